@@ -1,0 +1,74 @@
+"""What can go wrong: one exception a kind, and which of them are the user's to mend.
+
+Every message says, in this order: where, what was given, what would be right.
+"""
+
+from collections.abc import Iterable
+
+
+class GQMError(Exception):
+    """Anything that this package refuses or cannot do."""
+
+
+class InputError(GQMError):
+    """What was given is wrong: an expression, a declaration, a file or a launch."""
+
+
+class ExpressionError(InputError):
+    """Text or a SymPy expression that is not in the grammar of expressions."""
+
+
+class NumberError(InputError):
+    """Something given for a number that is not a finite real number."""
+
+
+class DeclarationError(InputError):
+    """A curve, a kernel or a model that is declared inconsistently."""
+
+
+class SpecFileError(InputError):
+    """A YAML file with mistakes in it, all of them reported together.
+
+    Parameters
+    ----------
+    mistakes
+        One line each: ``file:line:column: what is there; what would be right``.
+    """
+
+    mistakes: tuple[str, ...]
+
+    def __init__(self, mistakes: Iterable[str]) -> None:
+        # A lone string is one mistake; iterating over its characters helps nobody.
+        self.mistakes = (mistakes,) if isinstance(mistakes, str) else tuple(mistakes)
+        super().__init__(self.mistakes)
+
+    def __str__(self) -> str:
+        return "\n".join(self.mistakes)
+
+
+class LaunchError(InputError):
+    """A launch that cannot be: outside the domain, with a negative speed, not finite."""
+
+
+class ParameterError(InputError):
+    """A run-time parameter that is missing, unknown or outside its range."""
+
+
+class HandEditedError(InputError):
+    """A generated file that was edited by hand is in the way of a new one."""
+
+
+class DerivationError(GQMError):
+    """The closed forms could not be derived."""
+
+
+class EmissionError(GQMError):
+    """An expression that has no form in an emitted module."""
+
+
+class SolutionError(GQMError):
+    """A question about a motion that has no answer, or no finite one."""
+
+
+class OutdatedModuleError(GQMError):
+    """A generated module made for another version of the runtime's interface."""

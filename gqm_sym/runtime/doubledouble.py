@@ -1,0 +1,56 @@
+"""Sums and products of two doubles kept exactly, for the reduction of a time by its period (MATHS, section 5)."""
+
+from math import floor
+
+from numba import njit
+
+from gqm_sym.runtime.jit import COMPILE
+
+
+@njit(**COMPILE)
+def two_sum(a, b):  # type: ignore[no-untyped-def]
+    """a + b as rounded sum and its error (Knuth)."""
+    s = a + b
+    t = s - a
+    return s, (a - (s - t)) + (b - t)
+
+
+@njit(**COMPILE)
+def two_product(a, b):  # type: ignore[no-untyped-def]
+    """a * b as rounded product and its error (Dekker, Veltkamp)."""
+    p = a * b
+    c = 134217729.0 * a
+    a_hi = c - (c - a)
+    a_lo = a - a_hi
+    c = 134217729.0 * b
+    b_hi = c - (c - b)
+    b_lo = b - b_hi
+    return p, ((a_hi * b_hi - p) + a_hi * b_lo + a_lo * b_hi) + a_lo * b_lo
+
+
+@njit(**COMPILE)
+def add(a, a_low, b, b_low):  # type: ignore[no-untyped-def]
+    """(a + a_low) + (b + b_low), accurate however much cancels."""
+    s, e = two_sum(a, b)
+    t, f = two_sum(a_low, b_low)
+    s, e = two_sum(s, e + t)
+    return two_sum(s, e + f)
+
+
+@njit(**COMPILE)
+def reduce(t, t_low, period, period_low):  # type: ignore[no-untyped-def]
+    """The count of whole periods in t and what is left, in [0, period), as two doubles.
+
+    The product count * period is formed exactly up to 2**-106 of itself, so what is left is right to half an ulp of the
+    period for counts up to 2**52.
+    """
+    count = float(floor(t / period))
+    while True:
+        whole, error = two_product(count, period)
+        rest, rest_low = add(t, t_low, -whole, -(error + count * period_low))
+        if rest < 0.0 or (rest == 0.0 and rest_low < 0.0):
+            count -= 1.0
+        elif rest > period or (rest == period and rest_low >= period_low):
+            count += 1.0
+        else:
+            return count, rest, rest_low

@@ -1,0 +1,156 @@
+"""The entry points from Python into compiled code: explicit signatures, compiled once per installation.
+
+A conservative motion crosses once: `survey` finds its ends each way from the launch and, where it is periodic, lays the panels of
+its time. Everything else is asked for later, over arrays.
+"""
+
+from math import fabs, isfinite, pi
+
+import numpy as np
+from numba import njit, types
+
+from gqm_sym.runtime.crossing import call_climb, call_frame, call_rise
+from gqm_sym.runtime.doubledouble import reduce
+from gqm_sym.runtime.jit import COMPILE
+from gqm_sym.runtime.panels import DEGREE, REGULAR, TURN_TURN, lay, read_off, speeds
+from gqm_sym.runtime.inversion import look_up_many, tabulate
+from gqm_sym.runtime.search import CRITICAL, LIMIT, TURN, walk
+
+_ADDRESSES = types.UniTuple(types.int64, 5)
+_LINE = types.float64[::1]
+_ROWS = types.float64[:, ::1]
+_FLOAT = types.float64
+_PANELS = types.Tuple((_LINE, _LINE, _LINE, _ROWS, _ROWS, _FLOAT, _FLOAT, types.int64))
+_WALK = types.Tuple((types.int64, _FLOAT, _FLOAT))
+_TABLE = types.Tuple((_LINE, _LINE, _ROWS, types.int64[::1], _LINE, _FLOAT))
+
+# A launch from rest on a slope below this share of the climb's size may be an equilibrium: exact numbers decide.
+FLAT = 1e-12
+
+
+@njit(**COMPILE)
+def first_step(lam0, low, high, period):  # type: ignore[no-untyped-def]
+    """A step to begin a walk with: an eighth of the curve where that is known."""
+    if period > 0.0:
+        return period / 8.0
+    if isfinite(high - low):
+        return (high - low) / 8.0
+    return 1.0
+
+
+@njit(_WALK(_ADDRESSES, _LINE, _FLOAT, _FLOAT, types.int64, _FLOAT, _FLOAT, _FLOAT), **COMPILE)
+def walk_on(fns, p, lam0, w0, direction, begin, reach, step):  # type: ignore[no-untyped-def]
+    """`search.walk`, for Python."""
+    return walk(fns, p, lam0, w0, direction, begin, reach, step)
+
+
+@njit(
+    types.Tuple((types.int64, _WALK, _WALK, _PANELS))(
+        _ADDRESSES, _LINE, _FLOAT, _FLOAT, types.int64, _FLOAT, _FLOAT, _FLOAT
+    ),
+    **COMPILE,
+)
+def survey(fns, p, lam0, v0, direction, low, high, period):  # type: ignore[no-untyped-def]
+    """Find both ends of a motion, and lay its time where it is periodic.
+
+    Returns
+    -------
+    direction : int
+        The sign of ds/dt after launch (a body released at rest goes where it falls); 0 where exact numbers must decide.
+    ahead, behind : (what, near, far)
+        As `search.walk` returns them; ``behind`` is walked only if ``ahead`` is a turning point.
+    panels
+        As `panels.lay` returns them; empty unless the motion is a libration or a circulation.
+    """
+    nothing = (LIMIT, 0.0, 0.0)
+    w0 = v0 * v0
+    empty = (np.empty(0), np.empty(0), np.empty(0), np.empty((0, DEGREE)), np.empty((0, DEGREE)), 0.0, 0.0, 0)
+    if w0 == 0.0:
+        spot, rows = np.empty(1), np.empty((2, 1))
+        spot[0] = lam0
+        call_climb(fns[1], 1, spot, p, rows)
+        if not fabs(rows[1, 0]) > FLAT * fabs(rows[0, 0]):
+            return 0, (CRITICAL, 0.0, 0.0), nothing, empty
+        direction = -1 if rows[1, 0] > 0.0 else 1
+    step = first_step(lam0, low, high, period)
+    reach = period if period > 0.0 else (high - lam0 if direction > 0 else lam0 - low)
+    ahead = walk(fns, p, lam0, w0, direction, 0.0, reach, step)
+    if ahead[0] == LIMIT and period > 0.0 and w0 > 0.0:
+        return direction, ahead, nothing, lay(fns, p, REGULAR, lam0, lam0 + direction * period, lam0, w0, 0.0, 1.0)
+    if ahead[0] != TURN:
+        return direction, ahead, nothing, empty
+    if w0 == 0.0:
+        behind = (TURN, 0.0, 0.0)
+    else:
+        reach = period - fabs(ahead[1]) if period > 0.0 else (lam0 - low if direction > 0 else high - lam0)
+        behind = walk(fns, p, lam0, w0, -direction, 0.0, reach, step)
+    if behind[0] != TURN:
+        return direction, ahead, behind, empty
+    a = lam0 + min(ahead[1], behind[1])
+    b = lam0 + max(ahead[1], behind[1])
+    return direction, ahead, behind, lay(fns, p, TURN_TURN, a, b, a, 0.0, 0.0, pi)
+
+
+@njit(_PANELS(_ADDRESSES, _LINE, types.int64, _FLOAT, _FLOAT, _FLOAT, _FLOAT, _FLOAT, _FLOAT), **COMPILE)
+def lay_panels(fns, p, kind, a, b, ref, w, start, stop):  # type: ignore[no-untyped-def]
+    """`panels.lay`, for Python."""
+    return lay(fns, p, kind, a, b, ref, w, start, stop)
+
+
+@njit(_LINE(_ADDRESSES, _LINE, types.int64, _FLOAT, _FLOAT, _FLOAT, _FLOAT, _LINE), **COMPILE)
+def speeds_at(fns, p, kind, a, b, ref, w, phi):  # type: ignore[no-untyped-def]
+    """V at many anomalies of a stretch."""
+    out = np.empty(phi.size)
+    speeds(fns, p, kind, a, b, ref, w, phi, np.empty((4, phi.size)), out)
+    return out
+
+
+@njit(_LINE(_LINE, _LINE, _ROWS, _LINE), **COMPILE)
+def read_off_many(edges, marks, terms, phi):  # type: ignore[no-untyped-def]
+    """Time or arc length from the first edge to many anomalies."""
+    out = np.empty(phi.size)
+    for i in range(phi.size):
+        out[i] = read_off(edges, marks, terms, phi[i])
+    return out
+
+
+@njit(_TABLE(_LINE, _LINE, _ROWS), **COMPILE)
+def build_table(edges, times, time_terms):  # type: ignore[no-untyped-def]
+    """`inversion.tabulate`, for Python."""
+    return tabulate(edges, times, time_terms)
+
+
+@njit(_LINE(_LINE, _LINE, _ROWS, types.int64[::1], _LINE, _LINE, _LINE), **COMPILE)
+def anomalies(middles, scales, powers, index, ends, t, t_low):  # type: ignore[no-untyped-def]
+    """`inversion.look_up_many`, for Python."""
+    out = np.empty(t.size)
+    look_up_many(middles, scales, powers, index, ends, t, t_low, out)
+    return out
+
+
+@njit(types.Tuple((_LINE, _LINE, _LINE))(_LINE, _LINE, _FLOAT, _FLOAT), **COMPILE)
+def reduce_many(t, t_low, period, period_low):  # type: ignore[no-untyped-def]
+    """Counts of whole periods and what is left, as two doubles each (`doubledouble.reduce`)."""
+    count, rest, rest_low = np.empty(t.size), np.empty(t.size), np.empty(t.size)
+    for i in range(t.size):
+        count[i], rest[i], rest_low[i] = reduce(t[i], t_low[i], period, period_low)
+    return count, rest, rest_low
+
+
+@njit(_ROWS(_ADDRESSES, _LINE, _LINE, _LINE), **COMPILE)
+def frame_at(fns, p, lam, v2):  # type: ignore[no-untyped-def]
+    """x, z, ds, kappa and the contact force at many places, given V**2 there."""
+    out = np.empty((5, lam.size))
+    call_frame(fns[0], lam.size, lam, v2, p, out)
+    return out
+
+
+@njit(_LINE(_ADDRESSES, _LINE, _FLOAT, _FLOAT, _LINE), **COMPILE)
+def speed_squared_at(fns, p, lam0, w0, offsets):  # type: ignore[no-untyped-def]
+    """V**2 at many offsets from the launch, by divided differences."""
+    rows = np.empty((2, offsets.size))
+    call_rise(fns[2], offsets.size, lam0, offsets, p, rows)
+    out = np.empty(offsets.size)
+    for i in range(offsets.size):
+        out[i] = w0 - offsets[i] * rows[0, i]
+    return out

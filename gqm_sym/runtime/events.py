@@ -1,0 +1,75 @@
+"""What happens along a motion: turns, changes of contact, ends."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from gqm_sym.runtime.course import Pair, Piece, minus, plus
+from gqm_sym.runtime.entries import frame_at
+from gqm_sym.runtime.stretch import Array, Stretch
+
+# Places a panel at which the contact force is looked at: its sign changes are then narrowed down.
+LOOKS = 24
+
+
+@dataclass(frozen=True, slots=True)
+class Event:
+    """Something that happens at one time: ``kind`` as the ends of legs, or "contact-sign"."""
+
+    kind: str
+    t: float
+    lam: float
+    x: float
+    z: float
+
+
+@dataclass(frozen=True, slots=True)
+class Leg:
+    """A part of the motion in one direction, and what ends it."""
+
+    lam_start: float
+    lam_end: float
+    t_start: float
+    t_end: float
+    direction: int
+    end: str
+
+
+def contact_force(stretch: Stretch, phi: Array) -> Array:
+    """The contact force N at anomalies of a stretch."""
+    f = stretch.functions
+    return frame_at(f.addresses, f.p, stretch.places(phi), stretch.speeds(phi) ** 2)[4]  # type: ignore[no-any-return]
+
+
+def contact_changes(stretch: Stretch) -> Array:
+    """Anomalies of a stretch at which N changes sign, in rising order."""
+    steps = np.arange(LOOKS) / LOOKS
+    edges = stretch.edges
+    phi = np.append((edges[:-1, None] + np.diff(edges)[:, None] * steps).ravel(), edges[-1])
+    force = contact_force(stretch, phi)
+    sign = np.sign(force)
+    known = np.flatnonzero(np.isfinite(force) & (sign != 0))
+    turns = known[:-1][sign[known[:-1]] != sign[known[1:]]]
+    after = {int(k): int(n) for k, n in zip(known[:-1], known[1:], strict=True)}
+    lo = np.array([phi[k] for k in turns])
+    hi = np.array([phi[after[int(k)]] for k in turns])
+    before = sign[turns]
+    while lo.size and np.any(hi - lo > 2.5e-16 * np.maximum(1.0, hi)):
+        middle = 0.5 * (lo + hi)
+        if np.all((middle == lo) | (middle == hi)):
+            break
+        same = np.sign(contact_force(stretch, middle)) == before
+        lo, hi = np.where(same, middle, lo), np.where(same, hi, middle)
+    return 0.5 * (lo + hi)
+
+
+def crossings(piece: Piece, phi: Array, pace: float) -> list[tuple[Pair, float]]:
+    """When a piece passes anomalies of its stretch, in the order of time; those outside the piece are left out."""
+    out = []
+    low, high = sorted((piece.r_start[0], piece.r_stop[0]))
+    for angle, r in zip(phi, piece.stretch.times(phi), strict=True):
+        exact = (float(r), -float(r) * pace)
+        if low < r < high:
+            spent = minus(exact, piece.r_start)
+            out.append((plus(piece.t_start, (piece.sense * spent[0], piece.sense * spent[1])), float(angle)))
+    return sorted(out)

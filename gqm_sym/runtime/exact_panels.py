@@ -1,0 +1,84 @@
+"""Panels laid in extended precision, where doubles cannot tell V**2 from nothing (next to a separatrix).
+
+The panels are of the same kind as those of `panels.lay`, with values right to the last bit; only their nodes are evaluated elsewhere.
+Speed is no concern here.
+"""
+
+from typing import Any
+
+import numpy as np
+
+from gqm_sym.errors import SolutionError
+from gqm_sym.runtime.exact import ExactProblem
+from gqm_sym.runtime.kronrod import KRONROD_WEIGHTS, NODES
+from gqm_sym.runtime.panels import CONVERGED, COUNT, DEGREE, EXHAUSTED, TAIL, TURN_TURN, antiderivative
+
+DIGITS = 80  # a gap of 1e-30 to a barrier still leaves doubles their digits
+MOST_PANELS = 400
+
+
+def exact_ends(exact: ExactProblem, digits: int, kind: int, a: float, b: float, known: tuple[Any, Any]) -> tuple[Any, Any]:
+    """The ends of a stretch in extended precision; the launch place is kept as it was given."""
+    scale = exact.at(digits)
+    turns = {TURN_TURN: (True, True)}.get(kind, (False, False))
+    out = []
+    for place, turn, given in zip((a, b), turns, known, strict=True):
+        if place == exact.lam0.value and not (turn and exact.v0.value):
+            out.append(scale.lam0)
+        elif turn:
+            out.append(scale.turning_point(place if given is None else given))
+        else:
+            out.append(scale.mpf(place if given is None else given))
+    return out[0], out[1]
+
+
+def lay_exactly(exact: ExactProblem, kind: int, a: float, b: float, stop: float, known: tuple[Any, Any]) -> Any:
+    """Panels as `panels.lay` returns them."""
+    scale = exact.at(DIGITS)
+    rate = scale.anomaly_rate(kind, *exact_ends(exact, DIGITS, kind, a, b, known))
+    nodes = np.concatenate([-NODES[:0:-1], NODES])
+    weights = np.concatenate([KRONROD_WEIGHTS[:0:-1], KRONROD_WEIGHTS])
+    edges, times, lengths = [0.0], [0.0], [0.0]
+    time_terms, length_terms = [], []
+    # The last anomaly is pi itself, not its nearest double: at a barrier the difference takes time.
+    end = scale.context.pi if kind == TURN_TURN else scale.mpf(stop)
+    pending, left, error, status = [stop], 0.0, 0.0, CONVERGED
+    while pending:
+        right = pending[-1]
+        # Nodes are not rounded: next to a peak as narrow as 1e-6 that would be noise.
+        far = end if right == stop else scale.mpf(right)
+        reach, middle = (far - left) / 2, (far + left) / 2
+        half = float(reach)
+        values = np.empty((2, COUNT))
+        for i, x in enumerate(map(float, nodes)):
+            duration, w = rate(middle + reach * x)
+            if not (duration > 0 and w > 0):
+                raise SolutionError(f"time of flight from {a!r} to {b!r}: V**2 is not positive inside this stretch")
+            values[:, i] = float(duration), float(duration * scale.sqrt(w))
+        c, terms = np.empty(DEGREE + 1), np.empty((2, DEGREE))
+        length_size, length_tail, _ = antiderivative(values[1], half, c, terms[1])
+        size, tail, _ = antiderivative(values[0], half, c, terms[0])
+        settled = tail <= TAIL * size and length_tail <= 10.0 * TAIL * length_size
+        full = len(edges) + len(pending) >= MOST_PANELS or half <= 2.0**-50 * stop
+        if not settled and not full:
+            pending.append(0.5 * (left + right))
+            continue
+        status = status if settled else EXHAUSTED
+        time = half * float(weights @ values[0])
+        error += tail / size * time
+        edges.append(right)
+        times.append(times[-1] + time)
+        lengths.append(lengths[-1] + half * float(weights @ values[1]))
+        time_terms.append(terms[0])
+        length_terms.append(terms[1])
+        left = pending.pop()
+    return (
+        np.array(edges),
+        np.array(times),
+        np.array(lengths),
+        np.array(time_terms),
+        np.array(length_terms),
+        error / times[-1] + 2.3e-16,
+        1.0,
+        status,
+    )

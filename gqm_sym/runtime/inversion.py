@@ -1,0 +1,176 @@
+"""Pass 3: the anomaly as a function of time, tabulated as polynomials on segments of time.
+
+Each panel's time is analytic and grows with the anomaly, so its inverse is analytic too. It is cut into equal segments, as few as a
+Chebyshev fit of fixed degree needs to be resolved to rounding. A small uniform index over time finds the segment at once.
+"""
+
+from math import cos, fabs, floor, pi
+
+import numpy as np
+from numba import njit
+
+from gqm_sym.runtime.jit import COMPILE
+from gqm_sym.runtime.panels import legendre_sum
+
+TERMS = 15
+RESOLVED = 2e-16  # last two Chebyshev coefficients against the whole range of the anomaly
+MOST_CUTS = 2**52  # at a cusp the anomaly goes like the root of the time that is left: ever shorter segments
+LEVEL = 1e-13  # coefficients that have stopped falling below this share are rounding noise
+
+
+@njit(**COMPILE)
+def _anomaly(terms, rates_sum, left, half, duration, target, guess):  # type: ignore[no-untyped-def]
+    """The place x in [-1, 1] of a panel where its time is ``target``, by Newton's method inside a bracket."""
+    lo, hi, x = -1.0, 1.0, guess
+    for _ in range(60):
+        miss = legendre_sum(terms, x) - target
+        if miss > 0.0:
+            hi = x
+        else:
+            lo = x
+        slope = legendre_sum(rates_sum, x)
+        new = x - miss / slope if slope > 0.0 else 0.5 * (lo + hi)
+        if not (lo <= new <= hi):
+            new = 0.5 * (lo + hi)
+        if fabs(new - x) <= 1.2e-16 or hi - lo <= 1.2e-16:
+            return new
+        x = new
+    return x
+
+
+@njit(**COMPILE)
+def _derivative(terms, out):  # type: ignore[no-untyped-def]
+    """Legendre coefficients of the derivative (with respect to x) of a Legendre series."""
+    n = terms.size
+    out[:] = 0.0
+    for k in range(n - 1, 0, -1):
+        out[k - 1] = (2 * k - 1) * (terms[k] + (out[k + 1] / (2 * k + 3) if k + 1 < n else 0.0))
+
+
+@njit(**COMPILE)
+def tabulate(edges, times, time_terms):  # type: ignore[no-untyped-def]
+    """Polynomials for the anomaly over time.
+
+    Returns
+    -------
+    middles, scales : (n,) arrays
+        Middle of each segment in time and one over half its length.
+    powers : (n, TERMS) array
+        Coefficients of the anomaly in powers of ``(t - middle) * scale``.
+    index : (k,) array of int
+        First segment that can hold a time in each of k equal parts of the whole time.
+    ends : (n,) array
+        Where each segment ends in time.
+    error : float
+        Largest unresolved part of the anomaly.
+    """
+    room = 32
+    middles, scales, ends = np.empty(room), np.empty(room), np.empty(room)
+    powers = np.empty((room, TERMS))
+    x_nodes, values, c = np.empty(TERMS), np.empty(TERMS), np.empty(TERMS)
+    for i in range(TERMS):
+        x_nodes[i] = cos(pi * (i + 0.5) / TERMS)
+    slope_terms = np.empty(time_terms.shape[1])
+    scale = max(fabs(edges[0]), fabs(edges[-1]))
+    count, error = 0, 0.0
+    for k in range(edges.size - 1):
+        left, half = edges[k], 0.5 * (edges[k + 1] - edges[k])
+        duration = times[k + 1] - times[k]
+        _derivative(time_terms[k], slope_terms)
+        done, cuts = 0, 1  # ``done`` of ``cuts`` equal segments of the panel's time are laid
+        while done < cuts:
+            start, stop = times[k] + duration * done / cuts, times[k] + duration * (done + 1) / cuts
+            middle, reach = 0.5 * (start + stop), 0.5 * (stop - start)
+            guess = 2.0 * (done + 0.5) / cuts - 1.0
+            for i in range(TERMS):
+                target = (middle - times[k]) + reach * x_nodes[i]
+                guess = _anomaly(time_terms[k], slope_terms, left, half, duration, target, guess)
+                values[i] = guess
+            for j in range(TERMS):
+                total = 0.0
+                for i in range(TERMS):
+                    total += values[i] * cos(pi * j * (i + 0.5) / TERMS)
+                c[j] = 2.0 * total / TERMS
+            c[0] *= 0.5
+            tail = half * max(fabs(c[TERMS - 1]), fabs(c[TERMS - 2]))
+            before = half * max(fabs(c[TERMS - 5]), fabs(c[TERMS - 6]))
+            settled = tail <= RESOLVED * scale or (before <= LEVEL * scale and tail > 0.2 * before)
+            if not settled and cuts < MOST_CUTS:
+                done, cuts = 2 * done, 2 * cuts
+                continue
+            error = max(error, tail)
+            if count == room:
+                room *= 2
+                middles, scales, ends = _grown(middles, room), _grown(scales, room), _grown(ends, room)
+                taller = np.empty((room, TERMS))
+                taller[:count] = powers
+                powers = taller
+            middles[count], scales[count], ends[count] = middle, 1.0 / reach, stop
+            _to_powers(c, powers[count])
+            for j in range(TERMS):
+                powers[count, j] *= half
+            powers[count, 0] += left + half
+            count += 1
+            done += 1
+            while done % 2 == 0 and cuts > 1 and done < cuts:  # widen again where the panel allows it
+                done, cuts = done // 2, cuts // 2
+    whole = times[-1]
+    ends[count - 1] = whole
+    index = np.empty(4 * count, dtype=np.int64)
+    segment = 0
+    for i in range(index.size):
+        while segment < count - 1 and ends[segment] <= whole * i / index.size:
+            segment += 1
+        index[i] = segment
+    return middles[:count].copy(), scales[:count].copy(), powers[:count].copy(), index, ends[:count].copy(), error
+
+
+@njit(**COMPILE)
+def _grown(array, size):  # type: ignore[no-untyped-def]
+    out = np.empty(size)
+    out[: array.size] = array
+    return out
+
+
+@njit(**COMPILE)
+def _to_powers(c, out):  # type: ignore[no-untyped-def]
+    """Powers of x from Chebyshev coefficients (which fall fast enough for this to keep every digit)."""
+    n = c.size
+    one, two = np.zeros(n), np.zeros(n)
+    out[:] = 0.0
+    one[0] = 1.0
+    out[0] = c[0]
+    two[1] = 1.0
+    out[1] = c[1]
+    for j in range(2, n):
+        # one, two <- T_(j-1), T_j
+        previous = one.copy()
+        one[:] = two
+        two[0] = -previous[0]
+        for i in range(1, n):
+            two[i] = 2.0 * one[i - 1] - previous[i]
+        for i in range(n):
+            out[i] += c[j] * two[i]
+
+
+@njit(**COMPILE)
+def look_up(middles, scales, powers, index, ends, t, t_low):  # type: ignore[no-untyped-def]
+    """The anomaly at time t + t_low of a table."""
+    whole = ends[-1]
+    slot = int(floor(t / whole * index.size)) if whole > 0.0 else 0
+    segment = index[min(max(slot, 0), index.size - 1)]
+    while segment < ends.size - 1 and t >= ends[segment]:
+        segment += 1
+    x = ((t - middles[segment]) + t_low) * scales[segment]
+    row = powers[segment]
+    total = row[TERMS - 1]
+    for j in range(TERMS - 2, -1, -1):
+        total = total * x + row[j]
+    return total
+
+
+@njit(**COMPILE)
+def look_up_many(middles, scales, powers, index, ends, t, t_low, out):  # type: ignore[no-untyped-def]
+    """The anomaly at many times of one table."""
+    for i in range(t.size):
+        out[i] = look_up(middles, scales, powers, index, ends, t[i], t_low[i])

@@ -1,0 +1,406 @@
+"""The motion that a launch begins, as a value that answers questions."""
+
+from dataclasses import dataclass
+from math import inf
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from gqm_sym.errors import InputError, SolutionError
+from gqm_sym.runtime import timing
+from gqm_sym.runtime.course import ZERO, Course, Pair, Piece, libration
+from gqm_sym.runtime.entries import frame_at
+from gqm_sym.runtime.events import Event, Leg, contact_changes, crossings
+from gqm_sym.runtime.formulas import read_numbers
+from gqm_sym.runtime.numbers import read_number
+from gqm_sym.runtime.panels import FROM_TURN, TURN_TURN
+from gqm_sym.runtime.problem import Problem
+from gqm_sym.runtime.stretch import Array, Stretch
+
+ULP = 2.220446049250313e-16
+
+
+class State(NamedTuple):
+    """The state of the body at times; arrays of the times' shape.
+
+    ``s`` is arc length, 0 at launch and growing with the parameter; ``v`` is ds/dt with its sign.
+    """
+
+    t: Any
+    lam: Any
+    s: Any
+    x: Any
+    z: Any
+    v: Any
+    v2: Any
+    kappa: Any
+    normal_force: Any
+
+
+@dataclass(frozen=True, slots=True)
+class _Sample:
+    """Where a motion is at times, before it is turned into coordinates."""
+
+    lam: Array
+    reduced: Array
+    s: Array
+    v: Array
+    count: Array
+
+
+class Motion:
+    """A motion along a curve.
+
+    Attributes
+    ----------
+    kind : str
+        "libration", "circulation", "transit", "asymptotic" or "rest" (MATHS, section 6).
+    direction : int
+        The sign of ds/dt after launch.
+    turning_points : tuple of float
+        Values of the curve's parameter, in the order met; a launch from rest counts as met at t = 0.
+    t_end : float
+        When the motion ends; infinite if it does not.
+    """
+
+    kind: str
+    direction: int
+    turning_points: tuple[float, ...]
+    t_end: float
+
+    def __init__(self, problem: Problem, kind: str, direction: int) -> None:
+        self._problem = problem
+        self.kind = kind
+        self.direction = direction
+        self.turning_points = ()
+        horizon = problem.launch.t_max
+        self.t_end = inf if horizon is None else horizon.value
+
+    # -- what subclasses say ------------------------------------------------------------------
+
+    def _course(self, reach: float) -> Course:
+        """The pieces of the motion, good for times up to ``reach`` from launch."""
+        raise NotImplementedError
+
+    def _clock_error(self, t: Array) -> Array:
+        """Estimated error of the time at which the body is where it is said to be."""
+        raise NotImplementedError
+
+    # -- periods ------------------------------------------------------------------------------
+
+    @property
+    def half_period(self) -> float:
+        """Time from one turning point to the other (libration only)."""
+        raise SolutionError(f"half_period: only a libration has one; this motion is of kind {self.kind!r}")
+
+    @property
+    def period(self) -> float:
+        """Time after which the motion repeats (libration and circulation)."""
+        raise SolutionError(f"period: this motion is of kind {self.kind!r} and does not repeat")
+
+    def period_to(self, digits: int) -> str:
+        """The period as a decimal string with that many correct digits."""
+        raise SolutionError(f"period_to: this motion is of kind {self.kind!r} and does not repeat")
+
+    # -- positions ----------------------------------------------------------------------------
+
+    def lam(self, t: Any) -> Any:
+        """The curve's parameter at times.
+
+        Parameters
+        ----------
+        t : number or array_like
+            Times in seconds from launch, at most ``t_end``; negative ones too where the motion is periodic. Strings, ints and
+            Fractions are taken exactly.
+
+        Returns
+        -------
+        float or ndarray
+            Of the shape of ``t``. In circulation the parameter grows lap by lap.
+        """
+        times, low, shape = self._times(t)
+        return _shaped(self._sample(times, low).lam, shape)
+
+    def state(self, t: Any) -> State:
+        """Everything about the body at times: parameter, arc length, position, speed, curvature, contact force."""
+        times, low, shape = self._times(t)
+        sample = self._sample(times, low)
+        f = self._problem.functions
+        v2 = sample.v**2
+        x, z, _, kappa, force = frame_at(f.addresses, f.p, sample.reduced, v2)
+        arrays = (times, sample.lam, sample.s, x, z, sample.v, v2, kappa, force)
+        return State(*(_shaped(array, shape) for array in arrays))
+
+    def time_at(self, lam: Any) -> float:
+        """When the body is first at a place of the curve."""
+        place = read_number(lam, where=self._problem.formulas.parameter)
+        origin = self._problem.launch.lam0
+        if place.value == origin.value and place.low == origin.low:
+            return 0.0
+        times = self._first_passages(place.value, place.low)
+        times = [t for t in times if t <= self.t_end]
+        if not times:
+            raise SolutionError(
+                f"time_at: the motion is never at {self._problem.formulas.parameter} = {place.text}; {self._extent()}"
+            )
+        return min(times)
+
+    def error_bound(self, t: Any) -> Any:
+        """What ``lam(t)`` can be off by, at times: the clock's part and the inversion's (paper, eq. 32), rounding included."""
+        times, low, shape = self._times(t)
+        sample = self._sample(times, low)
+        f = self._problem.functions
+        ds = frame_at(f.addresses, f.p, sample.reduced, sample.v**2)[2]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            rate = np.where(ds > 0.0, np.abs(sample.v) / ds, 0.0)
+        table = max((piece.stretch.table[5] * _swing(piece.stretch) for piece in self._course(0.0).pieces), default=0.0)
+        width = max((abs(p.stretch.b - p.stretch.a) for p in self._course(0.0).pieces), default=0.0)
+        rounding = ULP * (np.abs(sample.lam) + np.abs(sample.reduced) + width)
+        return _shaped(rate * self._clock_error(times) + table + rounding, shape)
+
+    # -- history ------------------------------------------------------------------------------
+
+    @property
+    def legs(self) -> tuple[Leg, ...]:
+        """The motion leg by leg; over one period from launch where it is periodic."""
+        legs = []
+        for piece in self._history():
+            lam = piece.stretch.places(piece.anomalies)
+            leg = Leg(float(lam[0]), float(lam[1]), piece.t_start[0], piece.t_stop[0], piece.direction, piece.end)
+            legs.append(leg)
+        return tuple(_merged(legs, self.t_end))
+
+    @property
+    def events(self) -> tuple[Event, ...]:
+        """What happens, in the order of time; over one period from launch where the motion is periodic."""
+        found = []
+        course = self._course(0.0)
+        for piece in self._history():
+            for when, phi in crossings(piece, contact_changes(piece.stretch), course.pace):
+                found.append(self._event("contact-sign", when, piece, phi))
+            if piece.end not in ("", "horizon"):
+                found.append(self._event(piece.end, piece.t_stop, piece, float(piece.anomalies[1])))
+        if self.t_end < inf and not (found and found[-1].t == self.t_end):
+            found = [event for event in found if event.t < self.t_end]
+            state = self.state(self.t_end)
+            found.append(Event("horizon", self.t_end, state.lam, state.x, state.z))
+        return tuple(found)
+
+    def events_between(self, t1: Any, t2: Any) -> tuple[Event, ...]:
+        """Events at times from t1 to t2."""
+        start, stop = read_number(t1, where="t1").value, read_number(t2, where="t2").value
+        return tuple(event for event in self.events if start <= event.t <= stop)
+
+    # -- inside -------------------------------------------------------------------------------
+
+    def _history(self) -> tuple[Piece, ...]:
+        """The pieces that `legs` and `events` tell of."""
+        return self._course(0.0).pieces
+
+    def _event(self, kind: str, when: Pair, piece: Piece, phi: float) -> Event:
+        f = self._problem.functions
+        lam = piece.stretch.places(np.array([phi]))
+        x, z = frame_at(f.addresses, f.p, lam, np.zeros(1))[:2, 0]
+        return Event(kind, when[0], float(lam[0]), float(x), float(z))
+
+    def _times(self, t: Any) -> tuple[Array, Array, tuple[int, ...]]:
+        times, low, shape = read_numbers(t, where="t")
+        if times.size:
+            if np.isnan(times).any():
+                raise InputError("t: must be numbers, got NaN")
+            if times.max() > self.t_end:
+                raise InputError(f"t: the motion ends at {self.t_end!r} s ({self._how_it_ends()}), got {float(times.max())!r}")
+            if times.min() < 0.0 and self._course(0.0).period is None:
+                raise InputError(f"t: cannot be negative for a motion that does not repeat, got {float(times.min())!r}")
+        return times, low, shape
+
+    def _how_it_ends(self) -> str:
+        return "the horizon t_max"
+
+    def _extent(self) -> str:
+        return "it moves " + ", ".join(f"from {leg.lam_start!r} to {leg.lam_end!r}" for leg in self.legs)
+
+    def _sample(self, t: Array, t_low: Array) -> _Sample:
+        course = self._course(float(np.abs(t).max()) if t.size else 0.0)
+        count, rest, rest_low = course.reduced(t, t_low)
+        which = course.piece_of(rest)
+        lam, s, v = np.empty_like(t), np.empty_like(t), np.empty_like(t)
+        for k in np.unique(which):
+            piece, mask = course.pieces[k], which == k
+            stretch = piece.stretch
+            phi = course.anomalies(piece, rest[mask], rest_low[mask])
+            phi = np.clip(phi, 0.0, stretch.edges[-1])
+            lam[mask] = stretch.places(phi)
+            s[mask] = piece.s_a + stretch.direction * stretch.lengths(phi)
+            v[mask] = piece.direction * stretch.speeds(phi)
+        if course.lap == 0.0:
+            return _Sample(lam, lam, s, v, count)
+        return _Sample(lam + count * course.lap, lam, s + count * course.lap_length, v, count)
+
+    def _first_passages(self, lam: float, low: float) -> list[float]:
+        """Times of passing a place, the first on each piece."""
+        out = []
+        course = self._course(0.0)
+        for piece in course.pieces:
+            stretch = piece.stretch
+            inside, outside = (lam - stretch.a) + low, (stretch.b - lam) - low
+            if inside * stretch.direction < 0.0 or outside * stretch.direction < 0.0:
+                continue
+            phi = np.array([stretch.anomaly_of(inside, outside)])
+            if phi[0] > stretch.edges[-1]:
+                continue
+            out += [when[0] + when[1] for when, _ in crossings(piece, phi, course.pace)]
+            if phi[0] in (0.0, stretch.edges[-1]) and piece.r_stop[0] in (0.0, stretch.duration):
+                at_stop = stretch.a if piece.sense < 0 else stretch.b
+                if lam == at_stop:
+                    out.append(piece.t_stop[0])
+        return out
+
+
+def _swing(stretch: Stretch) -> float:
+    """How fast the parameter changes with the anomaly, at most."""
+    width = abs(stretch.b - stretch.a)
+    return {TURN_TURN: 0.5 * width, FROM_TURN: 2.0 * width}.get(stretch.kind, width)
+
+
+def _shaped(array: Array, shape: tuple[int, ...]) -> Any:
+    return float(array[0]) if shape == () else array.reshape(shape)
+
+
+def _merged(legs: list[Leg], t_end: float) -> list[Leg]:
+    """Legs without the joints that only the computation knows of, and none beyond the horizon."""
+    out: list[Leg] = []
+    for leg in legs:
+        if leg.t_start >= t_end:
+            break
+        if out and out[-1].end == "":
+            last = out.pop()
+            leg = Leg(last.lam_start, leg.lam_end, last.t_start, leg.t_end, leg.direction, leg.end)
+        out.append(leg)
+    return out
+
+
+class Rest(Motion):
+    """A body that stays where it is."""
+
+    def __init__(self, problem: Problem) -> None:
+        super().__init__(problem, "rest", problem.launch.direction)
+        self.turning_points = ()
+
+    def _sample(self, t: Array, t_low: Array) -> _Sample:
+        lam = np.full_like(t, self._problem.lam0)
+        nothing = np.zeros_like(t)
+        return _Sample(lam, lam, nothing, nothing, nothing)
+
+    def _course(self, reach: float) -> Course:
+        return Course(pieces=(), period=ZERO)
+
+    def _clock_error(self, t: Array) -> Array:
+        return np.zeros_like(t)
+
+    @property
+    def events(self) -> tuple[Event, ...]:
+        """At rest from the launch on."""
+        state = self.state(0.0)
+        return (Event("rest", 0.0, state.lam, state.x, state.z),)
+
+    def _extent(self) -> str:
+        return f"it rests at {self._problem.lam0!r}"
+
+
+class Periodic(Motion):
+    """A libration or a circulation: one stretch, repeated for ever.
+
+    Its course is first built from times in doubles. Beyond one period from launch the period is needed as two doubles; it is then evaluated
+    once in extended precision.
+    """
+
+    def __init__(
+        self, problem: Problem, kind: str, direction: int, stretch: Stretch
+    ) -> None:
+        super().__init__(problem, kind, direction)
+        self._stretch = stretch
+        self._plain: Course | None = None
+        self._precise: Course | None = None
+        self._exact: timing.Timing | None = None
+        if kind == "libration":
+            lam0 = problem.lam0
+            met = (stretch.b, stretch.a) if direction > 0 else (stretch.a, stretch.b)
+            self.turning_points = (lam0, met[0]) if problem.w0 == 0.0 else met
+
+    @property
+    def _timing(self) -> timing.Timing:
+        if self._exact is None:
+            self._exact = timing.exact(self._problem, self.kind, self.direction, self._stretch)
+        return self._exact
+
+    @property
+    def half_period(self) -> float:
+        if self.kind != "libration":
+            return super().half_period
+        return self._timing.duration[0]
+
+    @property
+    def period(self) -> float:
+        duration = self._timing.duration[0]
+        return 2.0 * duration if self.kind == "libration" else duration
+
+    def period_to(self, digits: int) -> str:
+        """The period as a decimal string with that many correct digits (up to 1000)."""
+        return timing.period_to(self._problem, self.kind, self.direction, self._stretch, digits)
+
+    def _course(self, reach: float) -> Course:
+        whole = self._stretch.duration * (2.0 if self.kind == "libration" else 1.0)
+        if self._precise is None and (reach > whole or self._exact is not None):
+            self._precise = self._build(self._timing)
+        if self._precise is not None:
+            return self._precise
+        if self._plain is None:
+            self._plain = self._build(timing.plain(self._problem, self.kind, self._stretch))
+        return self._plain
+
+    def _build(self, clock: timing.Timing) -> Course:
+        stretch, tau = self._stretch, clock.duration
+        pace = ((stretch.duration - tau[0]) - tau[1]) / tau[0]
+        if self.kind == "libration":
+            start = np.array([stretch.anomaly_of(*clock.offsets)])
+            s_a = -float(stretch.lengths(start)[0])
+            pieces = libration(stretch, direction=self.direction, tau=tau, phase=clock.phase, s_a=s_a)
+            return Course(pieces=pieces, period=(2.0 * tau[0], 2.0 * tau[1]), pace=pace)
+        piece = Piece(stretch=stretch, sense=1, r_start=ZERO, r_stop=tau, t_start=ZERO, s_a=0.0, end="horizon")
+        lap, length = self.direction * self._problem.period, self.direction * stretch.length
+        return Course(pieces=(piece,), period=tau, lap=lap, lap_length=length, pace=pace)
+
+    def _clock_error(self, t: Array) -> Array:
+        course = self._course(float(np.abs(t).max()) if t.size else 0.0)
+        assert course.period is not None
+        period = course.period[0]
+        # Within a period the stretch's clock counts; over many only the period does.
+        local = period * (self._stretch.relative_error + ULP)
+        per_period = period * (2.0**-104 if course is self._precise else self._stretch.relative_error)
+        return local + np.abs(t / period) * per_period
+
+    def events_between(self, t1: Any, t2: Any) -> tuple[Event, ...]:
+        """Events at times from t1 to t2, over as many periods as that takes."""
+        start, stop = read_number(t1, where="t1").value, read_number(t2, where="t2").value
+        period = self.period
+        lap = self._course(0.0).lap
+        out = []
+        for k in range(int(np.floor(start / period)), int(np.floor(stop / period)) + 1):
+            for event in self._one_period():
+                t = event.t + k * period
+                if start <= t <= min(stop, self.t_end):
+                    out.append(Event(event.kind, t, event.lam + k * lap, event.x, event.z))
+        return tuple(out)
+
+    def _one_period(self) -> tuple[Event, ...]:
+        return tuple(event for event in self.events if event.kind != "horizon")
+
+    def _first_passages(self, lam: float, low: float) -> list[float]:
+        lap = self._course(0.0).lap
+        if not lap:
+            return super()._first_passages(lam, low)
+        count = np.floor((lam - self._problem.lam0) / lap)
+        if count < 0:
+            return []
+        return [t + count * self.period for t in super()._first_passages(lam - count * lap, low)]

@@ -1,0 +1,115 @@
+"""Motions that do not repeat: they leave through an end, approach an equilibrium, or go on for ever."""
+
+from dataclasses import dataclass
+from math import inf, isfinite
+
+import numpy as np
+
+from gqm_sym.errors import SolutionError
+from gqm_sym.runtime import search
+from gqm_sym.runtime.course import ZERO, Course, Piece
+from gqm_sym.runtime.entries import walk_on
+from gqm_sym.runtime.motion import ULP, Motion
+from gqm_sym.runtime.problem import Problem, Reach
+from gqm_sym.runtime.stretch import Array, Stretch, through, toward_equilibrium
+
+
+@dataclass(slots=True)
+class OpenEnd:
+    """Where a motion that never ends has been computed to: it goes on in growing steps when asked."""
+
+    place: float
+    direction: int
+    known: float
+    step: float = 1.0
+
+
+class Passage(Motion):
+    """A motion that runs through each of its stretches once (or out to a turning point and back)."""
+
+    def __init__(self, problem: Problem, kind: str, direction: int, turn: Reach | None = None) -> None:
+        super().__init__(problem, kind, direction)
+        self._pieces: list[Piece] = []
+        self.open_end: OpenEnd | None = None
+        self._target: tuple[float, float] | None = None
+        turns = (problem.lam0,) if problem.w0 == 0.0 else ()
+        self.turning_points = turns if turn is None else (*turns, turn.place)
+
+    def add(self, stretch: Stretch, sense: int, end: str) -> None:
+        """Run through a whole stretch next."""
+        whole = (stretch.duration, 0.0)
+        start, stop = (ZERO, whole) if sense > 0 else (whole, ZERO)
+        t, s = (self._pieces[-1].t_stop, self._arc_end()) if self._pieces else (ZERO, 0.0)
+        s_a = s if sense > 0 else s - stretch.direction * stretch.length
+        self._pieces.append(
+            Piece(stretch=stretch, sense=sense, r_start=start, r_stop=stop, t_start=t, s_a=s_a, end=end)
+        )
+
+    def approach(self, start: float, top: float) -> None:
+        """Come ever closer to an equilibrium, from ``start``."""
+        self._target = (start, top)
+        self.add(toward_equilibrium(self._problem.functions, start, top, 0.0), 1, "asymptote")
+
+    def finish(self) -> "Passage":
+        """Close the list of pieces: what they are is known now."""
+        if self.open_end is not None and not self._pieces:
+            self._go_on()
+        if self.open_end is None and self._target is None:
+            self.t_end = min(self.t_end, self._pieces[-1].t_stop[0])
+        return self
+
+    def _arc_end(self) -> float:
+        last = self._pieces[-1]
+        return last.s_a + (last.stretch.direction * last.stretch.length if last.sense > 0 else 0.0)
+
+    def _course(self, reach: float) -> Course:
+        reach = max(reach, self.t_end if isfinite(self.t_end) else 0.0)
+        while self._pieces[-1].t_stop[0] < reach:
+            if self.open_end is not None:
+                self._go_on()
+            elif self._target is not None:
+                last = self._pieces.pop()
+                begun = last.t_start[0]
+                longer = toward_equilibrium(self._problem.functions, *self._target, reach - begun)
+                if not longer.duration > last.stretch.duration:
+                    raise SolutionError(
+                        f"t = {reach!r}: by then the body is closer to the equilibrium at "
+                        f"{self._problem.formulas.parameter} = {self._target[1]!r} than doubles can tell"
+                    )
+                self.add(longer, 1, "asymptote")
+            else:
+                break
+        return Course(pieces=tuple(self._pieces))
+
+    def _go_on(self) -> None:
+        """One more stretch of a motion without an end."""
+        end, problem = self.open_end, self._problem
+        assert end is not None
+        f, lam0 = problem.functions, problem.lam0
+        target = end.place + end.direction * end.step
+        if not isfinite(target) or not isfinite(target**2):
+            raise SolutionError(
+                f"the motion leaves the range of doubles at {problem.formulas.parameter} = {end.place!r}; give a shorter t_max"
+            )
+        what, near, _ = walk_on(
+            f.addresses, f.p, lam0, problem.w0, end.direction, abs(end.place - lam0), abs(target - lam0), end.step
+        )
+        if what != search.LIMIT:
+            raise SolutionError(
+                f"the motion beyond {problem.formulas.parameter} = {lam0 + near!r} could not be followed; give a domain that ends there"
+            )
+        self.add(through(f, end.place, target, lam0, problem.w0), 1, "")
+        end.place, end.step = target, 2.0 * end.step
+
+    def _history(self) -> tuple[Piece, ...]:
+        pieces = self._course(0.0).pieces
+        return pieces
+
+    def _clock_error(self, t: Array) -> Array:
+        course = self._course(float(np.abs(t).max()) if t.size else 0.0)
+        worst = max(piece.stretch.relative_error for piece in course.pieces)
+        return np.abs(t) * (worst + ULP)
+
+    def _how_it_ends(self) -> str:
+        end = self._pieces[-1].end
+        return f"{end} at {self._problem.formulas.parameter} = {self.legs[-1].lam_end!r}" if self.t_end < inf else end

@@ -1,0 +1,160 @@
+"""From a launch to a motion: how far it reaches each way, of what kind it is, and the stretches it runs through."""
+
+from math import isfinite
+from typing import Any
+
+import numpy as np
+
+from gqm_sym.errors import SolutionError
+from gqm_sym.runtime import search
+from gqm_sym.runtime.entries import frame_at, survey, walk_on
+from gqm_sym.runtime.formulas import Formulas, Launch
+from gqm_sym.runtime.motion import Motion, Periodic, Rest
+from gqm_sym.runtime.numbers import Number
+from gqm_sym.runtime.passage import OpenEnd, Passage
+from gqm_sym.runtime.problem import Problem, Reach
+from gqm_sym.runtime.stretch import Stretch, between_turns, from_turn, through
+
+# ds at an end of the domain, against its value at the launch, that makes the end a cusp.
+CUSP_SHARE = 1e-7
+
+
+def solve(formulas: Formulas, p: tuple[Number, ...], launch: Launch) -> Motion:
+    """The motion that a launch begins."""
+    low, high, period = formulas.domain(p)
+    formulas.check_place(launch.lam0, low, high)
+    functions = formulas.functions(p, launch)
+    problem = Problem(
+        formulas=formulas, launch=launch, p=p, functions=functions, low=low, high=high, period=period
+    )
+    f = functions
+    direction, ahead, behind, panels = survey(
+        f.addresses, f.p, problem.lam0, launch.v0.value, launch.direction, low, high, period
+    )
+    if direction == 0:
+        sign = functions.exact.slope_sign()
+        if sign == 0:
+            return Rest(problem)
+        direction = -sign
+        ahead = walk_on(
+            f.addresses, f.p, problem.lam0, 0.0, direction, 0.0, period or _room(problem, direction), _first_step(problem)
+        )
+    if len(panels[0]) and ahead[0] == search.TURN:  # a libration without difficulties
+        a, b = sorted((problem.lam0 + ahead[1], problem.lam0 + behind[1]))
+        return Periodic(problem, "libration", direction, between_turns(f, a, b, panels))
+    front = _reach(problem, direction, ahead)
+    if front.what == "closed":
+        end = problem.lam0 + direction * period
+        stretch = through(f, problem.lam0, end, problem.lam0, problem.w0, panels if len(panels[0]) else None)
+        return Periodic(problem, "circulation", direction, stretch)
+    if front.what != "turn":
+        return _outward(problem, direction, front)
+    if problem.w0 == 0.0:
+        back = Reach("turn", problem.lam0)
+    else:
+        step = _first_step(problem)
+        limit = period - abs(front.place - problem.lam0) if period else _room(problem, -direction)
+        start = walk_on(f.addresses, f.p, problem.lam0, problem.w0, -direction, 0.0, limit, step)
+        back = _reach(problem, -direction, start)
+    if back.what == "turn":
+        ends = sorted((front, back), key=lambda reach: reach.place)
+        exact = (ends[0].exact, ends[1].exact)
+        return Periodic(problem, "libration", direction, between_turns(f, ends[0].place, ends[1].place, ends=exact))
+    return _returning(problem, direction, front, back)
+
+
+def _first_step(problem: Problem) -> float:
+    if problem.period:
+        return problem.period / 8.0
+    return (problem.high - problem.low) / 8.0 if isfinite(problem.high - problem.low) else 1.0
+
+
+def _room(problem: Problem, direction: int) -> float:
+    return problem.high - problem.lam0 if direction > 0 else problem.lam0 - problem.low
+
+
+def _reach(problem: Problem, direction: int, walked: tuple[int, float, float]) -> Reach:
+    """What a walk found, with the exact problem asked where doubles could not decide."""
+    f, lam0 = problem.functions, problem.lam0
+    limit = problem.period or _room(problem, direction)
+    for _ in range(100):
+        what, near, far = walked
+        if what == search.CRITICAL:
+            end = problem.functions.exact.resolve(lam0 + near, lam0 + far, direction)
+            if end.what != "clear":
+                return Reach(end.what, float(end.place), end.place)
+            walked = walk_on(
+                f.addresses, f.p, lam0, problem.w0, direction, max(abs(far), 1e-300), limit, _first_step(problem)
+            )
+            continue
+        if what == search.TURN:
+            return Reach("turn", lam0 + near)
+        if what == search.LIMIT:
+            if problem.period and problem.w0 == 0.0:  # back at the launch place, where V**2 is zero again
+                walked = (search.CRITICAL, near * (1.0 - 1e-4), near)
+                continue
+            if problem.period:
+                return Reach("closed", lam0 + direction * problem.period)
+            return _domain_end(problem, direction)
+        if what == search.CUSP:
+            return Reach("cusp", lam0 + far)
+        if what == search.MARCHED:
+            return Reach("open", lam0 + near)
+        return Reach("singular-point", lam0 + near)
+    raise SolutionError(
+        f"turning points from {problem.formulas.parameter} = {lam0!r}: too many places at which V**2 nearly vanishes"
+    )
+
+
+def _domain_end(problem: Problem, direction: int) -> Reach:
+    place = problem.high if direction > 0 else problem.low
+    if not isfinite(place):
+        return Reach("open", place)
+    f = problem.functions
+    here = np.array([problem.lam0, place])
+    ds = frame_at(f.addresses, f.p, here, np.zeros(2))[2]
+    return Reach("cusp" if ds[1] <= CUSP_SHARE * ds[0] else "domain-end", place)
+
+
+def _outward(problem: Problem, direction: int, front: Reach) -> Motion:
+    """A motion that leaves the launch place for good, without turning."""
+    f, lam0 = problem.functions, problem.lam0
+    kind = "asymptotic" if front.what == "equilibrium" else "transit"
+    passage = Passage(problem, kind, direction)
+    if problem.w0 > 0.0:
+        if front.what == "equilibrium":
+            passage.approach(lam0, front.place)
+        elif front.what == "open":
+            passage.open_end = OpenEnd(lam0, direction, abs(front.place))
+        else:
+            passage.add(through(f, lam0, front.place, lam0, problem.w0), 1, front.what)
+        return passage.finish()
+    if front.what == "equilibrium":
+        middle = 0.5 * (lam0 + front.place)
+        passage.add(from_turn(f, lam0, middle), 1, "")
+        passage.approach(middle, front.place)
+    elif front.what == "open":
+        middle = lam0 + direction * min(1.0, abs(front.place - lam0))
+        passage.add(from_turn(f, lam0, middle), 1, "")
+        passage.open_end = OpenEnd(middle, direction, abs(front.place))
+    else:
+        passage.add(from_turn(f, lam0, front.place), 1, front.what)
+    return passage.finish()
+
+
+def _returning(problem: Problem, direction: int, front: Reach, back: Reach) -> Motion:
+    """A motion that turns once and leaves the other way."""
+    f, lam0 = problem.functions, problem.lam0
+    kind = "asymptotic" if back.what == "equilibrium" else "transit"
+    passage = Passage(problem, kind, direction, turn=front)
+    inbound = from_turn(f, front.place, lam0)
+    passage.add(inbound, -1, "turn")
+    if back.what in ("equilibrium", "open"):
+        passage.add(inbound, 1, "")
+        if back.what == "open":
+            passage.open_end = OpenEnd(lam0, -direction, abs(back.place))
+        else:
+            passage.approach(lam0, back.place)
+    else:
+        passage.add(from_turn(f, front.place, back.place), 1, back.what)
+    return passage.finish()

@@ -1,0 +1,111 @@
+"""The period of a motion and the time from its end to the launch, in doubles or in extended precision."""
+
+from dataclasses import dataclass
+from math import ceil, log10
+from typing import Any
+
+from gqm_sym.errors import InputError, SolutionError
+from gqm_sym.runtime.course import ZERO, Pair
+from gqm_sym.runtime.exact import SMOOTH_PANELS, Arithmetic, two_doubles
+from gqm_sym.runtime.exact_panels import exact_ends
+from gqm_sym.runtime.panels import REGULAR, TURN_TURN
+from gqm_sym.runtime.problem import Problem
+from gqm_sym.runtime.stretch import Stretch
+
+# Digits of a period as two doubles, and of the time from a turning point to the launch, which no count of periods multiplies.
+PERIOD_DIGITS = 34
+PHASE_DIGITS = 22
+MOST_DIGITS = 1000
+
+
+@dataclass(frozen=True, slots=True)
+class Timing:
+    """Times of a periodic motion, each as two doubles.
+
+    Attributes
+    ----------
+    duration : pair of float
+        Half period of a libration, loop time of a circulation.
+    phase : pair of float
+        Time from the lower turning point to the launch (libration).
+    offsets : (float, float)
+        The launch place from both ends of the stretch: ``lam0 - a`` and ``b - lam0``.
+    """
+
+    duration: Pair
+    phase: Pair
+    offsets: tuple[float, float]
+
+
+def plain(problem: Problem, kind: str, stretch: Stretch) -> Timing:
+    """Times in doubles, from the stretch's own quadrature."""
+    offsets = (problem.lam0 - stretch.a, stretch.b - problem.lam0)
+    duration = (stretch.duration, 0.0)
+    if kind == "circulation" or offsets[0] == 0.0:
+        return Timing(duration, ZERO, offsets)
+    if offsets[1] == 0.0:
+        return Timing(duration, duration, offsets)
+    import numpy as np
+
+    phase = float(stretch.times(np.array([stretch.anomaly_of(*offsets)]))[0])
+    return Timing(duration, (phase, 0.0), offsets)
+
+
+def exact(problem: Problem, kind: str, direction: int, stretch: Stretch) -> Timing:
+    """Times of the exact problem."""
+    a = _arithmetic(problem, stretch, PERIOD_DIGITS)
+    duration, low, high = _duration(a, problem, kind, direction, stretch, PERIOD_DIGITS)
+    if kind == "circulation":
+        return Timing(two_doubles(duration), ZERO, (0.0, stretch.b - stretch.a))
+    offsets = (float(a.lam0 - low), float(high - a.lam0))
+    if problem.w0 == 0.0:
+        at_low = abs(a.lam0 - low) < abs(high - a.lam0)
+        return Timing(two_doubles(duration), ZERO if at_low else two_doubles(duration), offsets)
+    c = a.context
+    start = 2 * c.atan2(c.sqrt(a.lam0 - low), c.sqrt(high - a.lam0))
+    edges = [a.mpf(float(e)) for e in stretch.edges if e < start]
+    phase = a.gauss(a.anomaly_rate(TURN_TURN, low, high), [*edges, start], PHASE_DIGITS)
+    return Timing(two_doubles(duration), two_doubles(phase), offsets)
+
+
+def period_to(
+    problem: Problem, kind: str, direction: int, stretch: Stretch, digits: int
+) -> str:
+    """The period with that many correct digits."""
+    if not isinstance(digits, int) or not 1 <= digits <= MOST_DIGITS:
+        raise InputError(f"period_to: digits must be a whole number from 1 to {MOST_DIGITS}, got {digits!r}")
+    a = _arithmetic(problem, stretch, digits + 5)
+    duration = _duration(a, problem, kind, direction, stretch, digits + 5)[0]
+    value = 2 * duration if kind == "libration" else duration
+    return str(a.context.nstr(value, digits, strip_zeros=False))
+
+
+def _arithmetic(problem: Problem, stretch: Stretch, digits: int) -> Arithmetic:
+    """Arithmetic precise enough for V**2 by subtraction to keep that many digits at every node."""
+    rough = problem.functions.exact.at(60)
+    middle = rough.mpf(0.5 * (stretch.a + stretch.b))
+    top = abs(rough.speed_squared(middle)) / rough.size
+    lost = ceil(-log10(float(top))) if 0 < top < 1 else 0
+    peaked = len(stretch.edges) - 1 > SMOOTH_PANELS
+    return problem.functions.exact.at(digits + 20 + lost + (60 if peaked else 0))
+
+
+def _duration(
+    a: Arithmetic, problem: Problem, kind: str, direction: int, stretch: Stretch, digits: int
+) -> tuple[Any, Any, Any]:
+    """Half period or loop time, and the exact ends of the stretch."""
+    if kind == "circulation":
+        low, high, code, stop = a.lam0, a.lam0 + direction * a.domain()[2], REGULAR, a.mpf(1)
+    else:
+        low, high = exact_ends(problem.functions.exact, a.digits, TURN_TURN, stretch.a, stretch.b, stretch.ends)
+        code, stop = TURN_TURN, a.context.pi
+    rate = a.anomaly_rate(code, low, high)
+    if len(stretch.edges) - 1 <= SMOOTH_PANELS:
+        value = a.trapezoid(rate, stop, digits)
+        if value is not None:
+            return value, low, high
+    edges = [*(a.mpf(float(e)) for e in stretch.edges[:-1]), stop]
+    value = a.gauss(rate, edges, digits)
+    if not value > 0:
+        raise SolutionError("period: extended precision gives no finite time; please report this launch")
+    return value, low, high
