@@ -35,6 +35,8 @@ class Piece:
         +1 where it is run from the stretch's end ``a``, -1 where towards it.
     r_start, r_stop : pair of float
         Time from the stretch's end ``a`` at the piece's start and stop, each as two doubles.
+    phi_start, phi_stop : float
+        The anomalies there.
     t_start : pair of float
         When it begins.
     s_a : float
@@ -47,6 +49,8 @@ class Piece:
     sense: int
     r_start: Pair
     r_stop: Pair
+    phi_start: float
+    phi_stop: float
     t_start: Pair
     s_a: float
     end: str
@@ -56,14 +60,6 @@ class Piece:
         """When it ends."""
         spent = minus(self.r_stop, self.r_start)
         return plus(self.t_start, (self.sense * spent[0], self.sense * spent[1]))
-
-    @property
-    def anomalies(self) -> Array:
-        """The anomalies at which it begins and stops: exactly the stretch's own where it runs to an end."""
-        times = np.array([self.r_start, self.r_stop])
-        phi = self.stretch.anomaly(times[:, 0].copy(), times[:, 1].copy())
-        phi[times[:, 0] >= self.stretch.duration * (1.0 - 4e-16)] = self.stretch.edges[-1]
-        return phi
 
     @property
     def direction(self) -> int:
@@ -114,17 +110,31 @@ class Course:
         return piece.stretch.anomaly(np.ascontiguousarray(r), np.ascontiguousarray(low))
 
 
-def libration(stretch: Stretch, *, direction: int, tau: Pair, phase: Pair, s_a: float) -> tuple[Piece, ...]:
-    """One period between two turning points. ``phase`` is the time from the end ``a`` to the launch place."""
-    whole = [(1, ZERO, tau), (-1, tau, ZERO)]
-    first, second = whole if direction > 0 else whole[::-1]
-    cuts = [(first[0], phase, first[2], "turn"), (*second, "turn"), (first[0], first[1], phase, "horizon")]
+def libration(stretch: Stretch, *, direction: int, tau: Pair, phase: Pair, phi: float) -> tuple[Piece, ...]:
+    """One period between two turning points.
+
+    ``phase`` is the time from the end ``a`` to the launch place, whose anomaly is ``phi``.
+    """
+    a, b, launch = (ZERO, 0.0), (tau, stretch.stop), (phase, phi)
+    first, second = (a, b) if direction > 0 else (b, a)
+    cuts = [(direction, launch, second, "turn"), (-direction, second, first, "turn"), (direction, first, launch, "horizon")]
+    s_a = -float(stretch.lengths(np.array([phi]))[0])
     pieces: list[Piece] = []
     t = ZERO
-    for sense, start, stop, end in cuts:
+    for sense, (start, phi_start), (stop, phi_stop), end in cuts:
         if start == stop:
             continue
-        piece = Piece(stretch=stretch, sense=sense, r_start=start, r_stop=stop, t_start=t, s_a=s_a, end=end)
+        piece = Piece(
+            stretch=stretch,
+            sense=sense,
+            r_start=start,
+            r_stop=stop,
+            phi_start=phi_start,
+            phi_stop=phi_stop,
+            t_start=t,
+            s_a=s_a,
+            end=end,
+        )
         pieces.append(piece)
         t = piece.t_stop
     return tuple(pieces)

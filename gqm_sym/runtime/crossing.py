@@ -36,9 +36,9 @@ def call_climb(_, address, n, lam, p, out):  # type: ignore[no-untyped-def]
 
 
 @intrinsic
-def call_rise(_, address, n, a, d, p, out):  # type: ignore[no-untyped-def]
+def call_rise(_, address, n, a, lam, d, p, out):  # type: ignore[no-untyped-def]
     """Fill the climb's first divided difference from ``a`` and ds."""
-    return types.void(address, n, a, d, p, out), _call
+    return types.void(address, n, a, lam, d, p, out), _call
 
 
 @intrinsic

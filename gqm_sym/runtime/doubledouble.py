@@ -45,12 +45,16 @@ def reduce(t, t_low, period, period_low):  # type: ignore[no-untyped-def]
     period for counts up to 2**52.
     """
     count = float(floor(t / period))
-    while True:
-        whole, error = two_product(count, period)
-        rest, rest_low = add(t, t_low, -whole, -(error + count * period_low))
-        if rest < 0.0 or (rest == 0.0 and rest_low < 0.0):
-            count -= 1.0
-        elif rest > period or (rest == period and rest_low >= period_low):
+    whole, error = two_product(count, period)
+    rest, rest_low = add(t, t_low, -whole, -(error + count * period_low))
+    # The quotient was rounded: at most one period too many or too few. One way, then the other, so that rounding at a boundary
+    # cannot send it back and forth.
+    if rest < 0.0 or (rest == 0.0 and rest_low < 0.0):
+        count -= 1.0
+        rest, rest_low = add(rest, rest_low, period, period_low)
+    else:
+        over, over_low = add(rest, rest_low, -period, -period_low)
+        if over > 0.0 or (over == 0.0 and over_low >= 0.0):
             count += 1.0
-        else:
-            return count, rest, rest_low
+            rest, rest_low = over, over_low
+    return count, rest, rest_low

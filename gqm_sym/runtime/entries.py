@@ -11,7 +11,7 @@ from numba import njit, types
 
 from gqm_sym.runtime.crossing import call_climb, call_frame, call_rise
 from gqm_sym.runtime.doubledouble import reduce
-from gqm_sym.runtime.jit import COMPILE
+from gqm_sym.runtime.jit import COMPILE, entry
 from gqm_sym.runtime.panels import DEGREE, REGULAR, TURN_TURN, lay, read_off, speeds
 from gqm_sym.runtime.inversion import look_up_many, tabulate
 from gqm_sym.runtime.search import CRITICAL, LIMIT, TURN, walk
@@ -26,6 +26,8 @@ _TABLE = types.Tuple((_LINE, _LINE, _ROWS, types.int64[::1], _LINE, _FLOAT))
 
 # A launch from rest on a slope below this share of the climb's size may be an equilibrium: exact numbers decide.
 FLAT = 1e-12
+# Heights that differ by less than this share of themselves are not subtracted.
+CANCELLING = 8.0
 
 
 @njit(**COMPILE)
@@ -38,17 +40,16 @@ def first_step(lam0, low, high, period):  # type: ignore[no-untyped-def]
     return 1.0
 
 
-@njit(_WALK(_ADDRESSES, _LINE, _FLOAT, _FLOAT, types.int64, _FLOAT, _FLOAT, _FLOAT), **COMPILE)
+@entry(_WALK(_ADDRESSES, _LINE, _FLOAT, _FLOAT, types.int64, _FLOAT, _FLOAT, _FLOAT))
 def walk_on(fns, p, lam0, w0, direction, begin, reach, step):  # type: ignore[no-untyped-def]
     """`search.walk`, for Python."""
     return walk(fns, p, lam0, w0, direction, begin, reach, step)
 
 
-@njit(
+@entry(
     types.Tuple((types.int64, _WALK, _WALK, _PANELS))(
         _ADDRESSES, _LINE, _FLOAT, _FLOAT, types.int64, _FLOAT, _FLOAT, _FLOAT
-    ),
-    **COMPILE,
+    )
 )
 def survey(fns, p, lam0, v0, direction, low, high, period):  # type: ignore[no-untyped-def]
     """Find both ends of a motion, and lay its time where it is periodic.
@@ -91,13 +92,13 @@ def survey(fns, p, lam0, v0, direction, low, high, period):  # type: ignore[no-u
     return direction, ahead, behind, lay(fns, p, TURN_TURN, a, b, a, 0.0, 0.0, pi)
 
 
-@njit(_PANELS(_ADDRESSES, _LINE, types.int64, _FLOAT, _FLOAT, _FLOAT, _FLOAT, _FLOAT, _FLOAT), **COMPILE)
+@entry(_PANELS(_ADDRESSES, _LINE, types.int64, _FLOAT, _FLOAT, _FLOAT, _FLOAT, _FLOAT, _FLOAT))
 def lay_panels(fns, p, kind, a, b, ref, w, start, stop):  # type: ignore[no-untyped-def]
     """`panels.lay`, for Python."""
     return lay(fns, p, kind, a, b, ref, w, start, stop)
 
 
-@njit(_LINE(_ADDRESSES, _LINE, types.int64, _FLOAT, _FLOAT, _FLOAT, _FLOAT, _LINE), **COMPILE)
+@entry(_LINE(_ADDRESSES, _LINE, types.int64, _FLOAT, _FLOAT, _FLOAT, _FLOAT, _LINE))
 def speeds_at(fns, p, kind, a, b, ref, w, phi):  # type: ignore[no-untyped-def]
     """V at many anomalies of a stretch."""
     out = np.empty(phi.size)
@@ -105,7 +106,7 @@ def speeds_at(fns, p, kind, a, b, ref, w, phi):  # type: ignore[no-untyped-def]
     return out
 
 
-@njit(_LINE(_LINE, _LINE, _ROWS, _LINE), **COMPILE)
+@entry(_LINE(_LINE, _LINE, _ROWS, _LINE))
 def read_off_many(edges, marks, terms, phi):  # type: ignore[no-untyped-def]
     """Time or arc length from the first edge to many anomalies."""
     out = np.empty(phi.size)
@@ -114,13 +115,13 @@ def read_off_many(edges, marks, terms, phi):  # type: ignore[no-untyped-def]
     return out
 
 
-@njit(_TABLE(_LINE, _LINE, _ROWS), **COMPILE)
+@entry(_TABLE(_LINE, _LINE, _ROWS))
 def build_table(edges, times, time_terms):  # type: ignore[no-untyped-def]
     """`inversion.tabulate`, for Python."""
     return tabulate(edges, times, time_terms)
 
 
-@njit(_LINE(_LINE, _LINE, _ROWS, types.int64[::1], _LINE, _LINE, _LINE), **COMPILE)
+@entry(_LINE(_LINE, _LINE, _ROWS, types.int64[::1], _LINE, _LINE, _LINE))
 def anomalies(middles, scales, powers, index, ends, t, t_low):  # type: ignore[no-untyped-def]
     """`inversion.look_up_many`, for Python."""
     out = np.empty(t.size)
@@ -128,7 +129,7 @@ def anomalies(middles, scales, powers, index, ends, t, t_low):  # type: ignore[n
     return out
 
 
-@njit(types.Tuple((_LINE, _LINE, _LINE))(_LINE, _LINE, _FLOAT, _FLOAT), **COMPILE)
+@entry(types.Tuple((_LINE, _LINE, _LINE))(_LINE, _LINE, _FLOAT, _FLOAT))
 def reduce_many(t, t_low, period, period_low):  # type: ignore[no-untyped-def]
     """Counts of whole periods and what is left, as two doubles each (`doubledouble.reduce`)."""
     count, rest, rest_low = np.empty(t.size), np.empty(t.size), np.empty(t.size)
@@ -137,7 +138,7 @@ def reduce_many(t, t_low, period, period_low):  # type: ignore[no-untyped-def]
     return count, rest, rest_low
 
 
-@njit(_ROWS(_ADDRESSES, _LINE, _LINE, _LINE), **COMPILE)
+@entry(_ROWS(_ADDRESSES, _LINE, _LINE, _LINE))
 def frame_at(fns, p, lam, v2):  # type: ignore[no-untyped-def]
     """x, z, ds, kappa and the contact force at many places, given V**2 there."""
     out = np.empty((5, lam.size))
@@ -145,12 +146,21 @@ def frame_at(fns, p, lam, v2):  # type: ignore[no-untyped-def]
     return out
 
 
-@njit(_LINE(_ADDRESSES, _LINE, _FLOAT, _FLOAT, _LINE), **COMPILE)
-def speed_squared_at(fns, p, lam0, w0, offsets):  # type: ignore[no-untyped-def]
-    """V**2 at many offsets from the launch, by divided differences."""
-    rows = np.empty((2, offsets.size))
-    call_rise(fns[2], offsets.size, lam0, offsets, p, rows)
+@entry(_LINE(_ADDRESSES, _LINE, _FLOAT, _FLOAT, _FLOAT, _LINE, _LINE))
+def speed_squared_at(fns, p, lam0, lam0_low, w0, places, offsets):  # type: ignore[no-untyped-def]
+    """V**2 at many places and their offsets from the launch.
+
+    By the difference of heights where hardly anything cancels in it, by their divided difference where much does.
+    """
+    rows, heights, launch = np.empty((2, offsets.size)), np.empty((2, offsets.size)), np.empty((2, 1))
+    call_rise(fns[2], offsets.size, lam0, places, offsets, p, rows)
+    call_climb(fns[1], offsets.size, places, p, heights)
+    call_climb(fns[1], 1, np.array([lam0]), p, launch)
+    start = launch[0, 0] + lam0_low * launch[1, 0]
     out = np.empty(offsets.size)
     for i in range(offsets.size):
-        out[i] = w0 - offsets[i] * rows[0, i]
+        lost = heights[0, i] - start
+        if CANCELLING * fabs(lost) < fabs(heights[0, i]) + fabs(start):
+            lost = offsets[i] * rows[0, i]
+        out[i] = w0 - lost
     return out

@@ -73,3 +73,28 @@ def crossings(piece: Piece, phi: Array, pace: float) -> list[tuple[Pair, float]]
             spent = minus(exact, piece.r_start)
             out.append((plus(piece.t_start, (piece.sense * spent[0], piece.sense * spent[1])), float(angle)))
     return sorted(out)
+
+
+def liftoff(piece: Piece, side: int, *, first: bool) -> tuple[Pair, float] | None:
+    """When and where contact is lost on a piece: time from its stretch's end ``a``, and anomaly; None if it lasts.
+
+    Parameters
+    ----------
+    side : int
+        +1 where the track can only push along the normal (N >= 0), -1 where against it.
+    first : bool
+        Whether the motion begins with this piece: it may be out of contact at once.
+    """
+    changes = contact_changes(piece.stretch)
+    met = crossings(piece, changes, 0.0)
+    if first:
+        start, stop = piece.phi_start, piece.phi_stop
+        ahead = met[0][1] if met else stop
+        # N may vanish at the launch itself: what follows decides.
+        force = contact_force(piece.stretch, np.array([start, 0.5 * (start + ahead)])) * side
+        if force[0] < 0.0 or (force[0] == 0.0 and force[1] < 0.0):
+            return piece.r_start, piece.phi_start
+    if not met:
+        return None
+    phi = met[0][1]
+    return (float(piece.stretch.times(np.array([phi]))[0]), 0.0), phi

@@ -32,10 +32,10 @@ def exact_ends(exact: ExactProblem, digits: int, kind: int, a: float, b: float, 
     return out[0], out[1]
 
 
-def lay_exactly(exact: ExactProblem, kind: int, a: float, b: float, stop: float, known: tuple[Any, Any]) -> Any:
+def lay_exactly(exact: ExactProblem, kind: int, ends: tuple[Any, Any], stop: float) -> Any:
     """Panels as `panels.lay` returns them."""
     scale = exact.at(DIGITS)
-    rate = scale.anomaly_rate(kind, *exact_ends(exact, DIGITS, kind, a, b, known))
+    rate = scale.anomaly_rate(kind, *ends)
     nodes = np.concatenate([-NODES[:0:-1], NODES])
     weights = np.concatenate([KRONROD_WEIGHTS[:0:-1], KRONROD_WEIGHTS])
     edges, times, lengths = [0.0], [0.0], [0.0]
@@ -53,7 +53,7 @@ def lay_exactly(exact: ExactProblem, kind: int, a: float, b: float, stop: float,
         for i, x in enumerate(map(float, nodes)):
             duration, w = rate(middle + reach * x)
             if not (duration > 0 and w > 0):
-                raise SolutionError(f"time of flight from {a!r} to {b!r}: V**2 is not positive inside this stretch")
+                raise SolutionError(f"time of flight from {float(ends[0])!r} to {float(ends[1])!r}: V**2 is not positive inside this stretch")
             values[:, i] = float(duration), float(duration * scale.sqrt(w))
         c, terms = np.empty(DEGREE + 1), np.empty((2, DEGREE))
         length_size, length_tail, _ = antiderivative(values[1], half, c, terms[1])

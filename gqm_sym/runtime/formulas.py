@@ -136,9 +136,9 @@ class Formulas:
         self.check_place(launch.lam0, *self.domain(p)[:2])
         f = self.functions(p, launch)
         places, low, shape = read_numbers(lam, where=self.parameter)
-        offsets = (places - launch.lam0.value) + (low - launch.lam0.low)
-        w0 = launch.v0.value**2
-        v2 = speed_squared_at(f.addresses, f.p, launch.lam0.value, w0, offsets)
+        start = launch.lam0
+        offsets = (places - start.value) + (low - start.low)
+        v2 = speed_squared_at(f.addresses, f.p, start.value, start.low, launch.v0.value**2, places, offsets)
         x, z, ds, kappa, force = frame_at(f.addresses, f.p, places, v2)
         return Pass1(*(array.reshape(shape) for array in (x, z, ds, kappa, v2, force)))
 

@@ -8,7 +8,7 @@ function    arguments                                     rows of ``out``
 =========== ============================================= ==========================================
 frame       n, lam, v2, p, out                            x, z, ds, kappa, normal force
 climb       n, lam, p, out                                climb, d climb/d lam
-rise        n, a, d, p, out                               climb[a, a+d], ds(a+d)
+rise        n, a, lam, d, p, out                          climb[a, lam], ds(lam); d = lam - a
 bend        n, a, b, da, db, p, out                       climb[a, lam, b], ds(lam)
 bounds      lo, hi, p, out                                enclosure of climb', enclosure of ds
 =========== ============================================= ==========================================
@@ -31,7 +31,7 @@ MANY = types.CPointer(REAL)
 
 FRAME = types.void(types.intp, MANY, MANY, MANY, MANY)
 CLIMB = types.void(types.intp, MANY, MANY, MANY)
-RISE = types.void(types.intp, REAL, MANY, MANY, MANY)
+RISE = types.void(types.intp, REAL, MANY, MANY, MANY, MANY)
 BEND = types.void(types.intp, REAL, REAL, MANY, MANY, MANY, MANY)
 BOUNDS = types.void(REAL, REAL, MANY, MANY)
 

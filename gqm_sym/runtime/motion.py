@@ -57,22 +57,18 @@ class Motion:
         "libration", "circulation", "transit", "asymptotic" or "rest" (MATHS, section 6).
     direction : int
         The sign of ds/dt after launch.
-    turning_points : tuple of float
-        Values of the curve's parameter, in the order met; a launch from rest counts as met at t = 0.
     t_end : float
         When the motion ends; infinite if it does not.
     """
 
     kind: str
     direction: int
-    turning_points: tuple[float, ...]
     t_end: float
 
     def __init__(self, problem: Problem, kind: str, direction: int) -> None:
-        self._problem = problem
+        self.problem = problem
         self.kind = kind
         self.direction = direction
-        self.turning_points = ()
         horizon = problem.launch.t_max
         self.t_end = inf if horizon is None else horizon.value
 
@@ -85,6 +81,11 @@ class Motion:
     def _clock_error(self, t: Array) -> Array:
         """Estimated error of the time at which the body is where it is said to be."""
         raise NotImplementedError
+
+    @property
+    def turning_points(self) -> tuple[float, ...]:
+        """Values of the curve's parameter, in the order met; a launch from rest counts as met at t = 0."""
+        return ()
 
     # -- periods ------------------------------------------------------------------------------
 
@@ -125,7 +126,7 @@ class Motion:
         """Everything about the body at times: parameter, arc length, position, speed, curvature, contact force."""
         times, low, shape = self._times(t)
         sample = self._sample(times, low)
-        f = self._problem.functions
+        f = self.problem.functions
         v2 = sample.v**2
         x, z, _, kappa, force = frame_at(f.addresses, f.p, sample.reduced, v2)
         arrays = (times, sample.lam, sample.s, x, z, sample.v, v2, kappa, force)
@@ -133,15 +134,15 @@ class Motion:
 
     def time_at(self, lam: Any) -> float:
         """When the body is first at a place of the curve."""
-        place = read_number(lam, where=self._problem.formulas.parameter)
-        origin = self._problem.launch.lam0
+        place = read_number(lam, where=self.problem.formulas.parameter)
+        origin = self.problem.launch.lam0
         if place.value == origin.value and place.low == origin.low:
             return 0.0
         times = self._first_passages(place.value, place.low)
         times = [t for t in times if t <= self.t_end]
         if not times:
             raise SolutionError(
-                f"time_at: the motion is never at {self._problem.formulas.parameter} = {place.text}; {self._extent()}"
+                f"time_at: the motion is never at {self.problem.formulas.parameter} = {place.text}; {self._extent()}"
             )
         return min(times)
 
@@ -149,7 +150,7 @@ class Motion:
         """What ``lam(t)`` can be off by, at times: the clock's part and the inversion's (paper, eq. 32), rounding included."""
         times, low, shape = self._times(t)
         sample = self._sample(times, low)
-        f = self._problem.functions
+        f = self.problem.functions
         ds = frame_at(f.addresses, f.p, sample.reduced, sample.v**2)[2]
         with np.errstate(divide="ignore", invalid="ignore"):
             rate = np.where(ds > 0.0, np.abs(sample.v) / ds, 0.0)
@@ -165,10 +166,10 @@ class Motion:
         """The motion leg by leg; over one period from launch where it is periodic."""
         legs = []
         for piece in self._history():
-            lam = piece.stretch.places(piece.anomalies)
+            lam = piece.stretch.places(np.array([piece.phi_start, piece.phi_stop]))
             leg = Leg(float(lam[0]), float(lam[1]), piece.t_start[0], piece.t_stop[0], piece.direction, piece.end)
             legs.append(leg)
-        return tuple(_merged(legs, self.t_end))
+        return tuple(self._told(_merged(legs)))
 
     @property
     def events(self) -> tuple[Event, ...]:
@@ -179,7 +180,7 @@ class Motion:
             for when, phi in crossings(piece, contact_changes(piece.stretch), course.pace):
                 found.append(self._event("contact-sign", when, piece, phi))
             if piece.end not in ("", "horizon"):
-                found.append(self._event(piece.end, piece.t_stop, piece, float(piece.anomalies[1])))
+                found.append(self._event(piece.end, piece.t_stop, piece, piece.phi_stop))
         if self.t_end < inf and not (found and found[-1].t == self.t_end):
             found = [event for event in found if event.t < self.t_end]
             state = self.state(self.t_end)
@@ -191,6 +192,16 @@ class Motion:
         start, stop = read_number(t1, where="t1").value, read_number(t2, where="t2").value
         return tuple(event for event in self.events if start <= event.t <= stop)
 
+    def _told(self, legs: list[Leg]) -> list[Leg]:
+        """Legs as far as the horizon."""
+        out = [leg for leg in legs if leg.t_start < self.t_end or leg.t_end == self.t_end]
+        if out and (out[-1].t_end > self.t_end or out[-1].end == ""):
+            last = out.pop()
+            cut = last.t_end > self.t_end
+            place, when = (float(self.lam(self.t_end)), self.t_end) if cut else (last.lam_end, last.t_end)
+            out.append(Leg(last.lam_start, place, last.t_start, when, last.direction, "horizon"))
+        return out
+
     # -- inside -------------------------------------------------------------------------------
 
     def _history(self) -> tuple[Piece, ...]:
@@ -198,7 +209,7 @@ class Motion:
         return self._course(0.0).pieces
 
     def _event(self, kind: str, when: Pair, piece: Piece, phi: float) -> Event:
-        f = self._problem.functions
+        f = self.problem.functions
         lam = piece.stretch.places(np.array([phi]))
         x, z = frame_at(f.addresses, f.p, lam, np.zeros(1))[:2, 0]
         return Event(kind, when[0], float(lam[0]), float(x), float(z))
@@ -267,12 +278,10 @@ def _shaped(array: Array, shape: tuple[int, ...]) -> Any:
     return float(array[0]) if shape == () else array.reshape(shape)
 
 
-def _merged(legs: list[Leg], t_end: float) -> list[Leg]:
-    """Legs without the joints that only the computation knows of, and none beyond the horizon."""
+def _merged(legs: list[Leg]) -> list[Leg]:
+    """Legs without the joints that only the computation knows of."""
     out: list[Leg] = []
     for leg in legs:
-        if leg.t_start >= t_end:
-            break
         if out and out[-1].end == "":
             last = out.pop()
             leg = Leg(last.lam_start, leg.lam_end, last.t_start, leg.t_end, leg.direction, leg.end)
@@ -285,10 +294,9 @@ class Rest(Motion):
 
     def __init__(self, problem: Problem) -> None:
         super().__init__(problem, "rest", problem.launch.direction)
-        self.turning_points = ()
 
     def _sample(self, t: Array, t_low: Array) -> _Sample:
-        lam = np.full_like(t, self._problem.lam0)
+        lam = np.full_like(t, self.problem.lam0)
         nothing = np.zeros_like(t)
         return _Sample(lam, lam, nothing, nothing, nothing)
 
@@ -305,7 +313,7 @@ class Rest(Motion):
         return (Event("rest", 0.0, state.lam, state.x, state.z),)
 
     def _extent(self) -> str:
-        return f"it rests at {self._problem.lam0!r}"
+        return f"it rests at {self.problem.lam0!r}"
 
 
 class Periodic(Motion):
@@ -323,16 +331,25 @@ class Periodic(Motion):
         self._plain: Course | None = None
         self._precise: Course | None = None
         self._exact: timing.Timing | None = None
-        if kind == "libration":
-            lam0 = problem.lam0
-            met = (stretch.b, stretch.a) if direction > 0 else (stretch.a, stretch.b)
-            self.turning_points = (lam0, met[0]) if problem.w0 == 0.0 else met
+
+    @property
+    def turning_points(self) -> tuple[float, ...]:
+        if self.kind != "libration":
+            return ()
+        low, high = timing.turning_points(self.problem, self._stretch)
+        met = (high, low) if self.direction > 0 else (low, high)
+        return (self.problem.lam0, met[0]) if self.problem.w0 == 0.0 else met
 
     @property
     def _timing(self) -> timing.Timing:
         if self._exact is None:
-            self._exact = timing.exact(self._problem, self.kind, self.direction, self._stretch)
+            self._exact = timing.exact(self.problem, self.kind, self.direction, self._stretch)
         return self._exact
+
+    @property
+    def one_period(self) -> tuple[Piece, ...]:
+        """The pieces of one period from launch."""
+        return self._course(0.0).pieces
 
     @property
     def half_period(self) -> float:
@@ -347,7 +364,7 @@ class Periodic(Motion):
 
     def period_to(self, digits: int) -> str:
         """The period as a decimal string with that many correct digits (up to 1000)."""
-        return timing.period_to(self._problem, self.kind, self.direction, self._stretch, digits)
+        return timing.period_to(self.problem, self.kind, self.direction, self._stretch, digits)
 
     def _course(self, reach: float) -> Course:
         whole = self._stretch.duration * (2.0 if self.kind == "libration" else 1.0)
@@ -356,19 +373,28 @@ class Periodic(Motion):
         if self._precise is not None:
             return self._precise
         if self._plain is None:
-            self._plain = self._build(timing.plain(self._problem, self.kind, self._stretch))
+            self._plain = self._build(timing.plain(self.problem, self.kind, self._stretch))
         return self._plain
 
     def _build(self, clock: timing.Timing) -> Course:
         stretch, tau = self._stretch, clock.duration
         pace = ((stretch.duration - tau[0]) - tau[1]) / tau[0]
         if self.kind == "libration":
-            start = np.array([stretch.anomaly_of(*clock.offsets)])
-            s_a = -float(stretch.lengths(start)[0])
-            pieces = libration(stretch, direction=self.direction, tau=tau, phase=clock.phase, s_a=s_a)
+            phi = stretch.anomaly_of(*clock.offsets)
+            pieces = libration(stretch, direction=self.direction, tau=tau, phase=clock.phase, phi=phi)
             return Course(pieces=pieces, period=(2.0 * tau[0], 2.0 * tau[1]), pace=pace)
-        piece = Piece(stretch=stretch, sense=1, r_start=ZERO, r_stop=tau, t_start=ZERO, s_a=0.0, end="horizon")
-        lap, length = self.direction * self._problem.period, self.direction * stretch.length
+        piece = Piece(
+            stretch=stretch,
+            sense=1,
+            r_start=ZERO,
+            r_stop=tau,
+            phi_start=0.0,
+            phi_stop=stretch.stop,
+            t_start=ZERO,
+            s_a=0.0,
+            end="horizon",
+        )
+        lap, length = self.direction * self.problem.period, self.direction * stretch.length
         return Course(pieces=(piece,), period=tau, lap=lap, lap_length=length, pace=pace)
 
     def _clock_error(self, t: Array) -> Array:
@@ -400,7 +426,7 @@ class Periodic(Motion):
         lap = self._course(0.0).lap
         if not lap:
             return super()._first_passages(lam, low)
-        count = np.floor((lam - self._problem.lam0) / lap)
+        count = np.floor((lam - self.problem.lam0) / lap)
         if count < 0:
             return []
         return [t + count * self.period for t in super()._first_passages(lam - count * lap, low)]

@@ -57,7 +57,8 @@ def rates(fns, p, kind, a, b, ref, w, phi, work, out):  # type: ignore[no-untype
     elif kind == FROM_TURN:
         for i in range(n):
             da[i] = (b - a) * phi[i] * phi[i]
-        call_rise(fns[2], n, a, da, p, rows)
+            db[i] = a + da[i]
+        call_rise(fns[2], n, a, db, da, p, rows)
         root = 2.0 * sqrt(fabs(b - a))
         for i in range(n):
             fall = -rows[0, i] if b > a else rows[0, i]
@@ -66,7 +67,8 @@ def rates(fns, p, kind, a, b, ref, w, phi, work, out):  # type: ignore[no-untype
     elif kind == REGULAR:
         for i in range(n):
             da[i] = (a - ref) + (b - a) * phi[i]
-        call_rise(fns[2], n, ref, da, p, rows)
+            db[i] = ref + da[i]
+        call_rise(fns[2], n, ref, db, da, p, rows)
         for i in range(n):
             out[0, i] = rows[1, i] * fabs(b - a) / sqrt(w - da[i] * rows[0, i])
             out[1, i] = rows[1, i] * fabs(b - a)
@@ -101,7 +103,8 @@ def speeds(fns, p, kind, a, b, ref, w, phi, work, out):  # type: ignore[no-untyp
         start = a if kind == FROM_TURN else ref
         for i in range(n):
             da[i] = (b - a) * phi[i] * (phi[i] if kind == FROM_TURN else 1.0) + (a - start)
-        call_rise(fns[2], n, start, da, p, rows)
+            db[i] = start + da[i]
+        call_rise(fns[2], n, start, db, da, p, rows)
         for i in range(n):
             out[i] = sqrt(max(w - da[i] * rows[0, i], 0.0))
 

@@ -1,6 +1,6 @@
 """Motions that do not repeat: they leave through an end, approach an equilibrium, or go on for ever."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import inf, isfinite
 
 import numpy as np
@@ -9,8 +9,9 @@ from gqm_sym.errors import SolutionError
 from gqm_sym.runtime import search
 from gqm_sym.runtime.course import ZERO, Course, Piece
 from gqm_sym.runtime.entries import walk_on
+from gqm_sym.runtime.events import liftoff
 from gqm_sym.runtime.motion import ULP, Motion
-from gqm_sym.runtime.problem import Problem, Reach
+from gqm_sym.runtime.problem import Problem
 from gqm_sym.runtime.stretch import Array, Stretch, through, toward_equilibrium
 
 
@@ -25,15 +26,21 @@ class OpenEnd:
 
 
 class Passage(Motion):
-    """A motion that runs through each of its stretches once (or out to a turning point and back)."""
+    """A motion that runs through each of its stretches once (or out to a turning point and back).
 
-    def __init__(self, problem: Problem, kind: str, direction: int, turn: Reach | None = None) -> None:
+    Where the track can push from one side only, it ends as soon as it would have to pull.
+    """
+
+    def __init__(self, problem: Problem, kind: str, direction: int) -> None:
         super().__init__(problem, kind, direction)
         self._pieces: list[Piece] = []
         self.open_end: OpenEnd | None = None
         self._target: tuple[float, float] | None = None
-        turns = (problem.lam0,) if problem.w0 == 0.0 else ()
-        self.turning_points = turns if turn is None else (*turns, turn.place)
+
+    @property
+    def lifted_off(self) -> bool:
+        """Whether contact has been lost."""
+        return bool(self._pieces) and self._pieces[-1].end == "liftoff"
 
     def add(self, stretch: Stretch, sense: int, end: str) -> None:
         """Run through a whole stretch next."""
@@ -41,14 +48,41 @@ class Passage(Motion):
         start, stop = (ZERO, whole) if sense > 0 else (whole, ZERO)
         t, s = (self._pieces[-1].t_stop, self._arc_end()) if self._pieces else (ZERO, 0.0)
         s_a = s if sense > 0 else s - stretch.direction * stretch.length
-        self._pieces.append(
-            Piece(stretch=stretch, sense=sense, r_start=start, r_stop=stop, t_start=t, s_a=s_a, end=end)
+        phi_start, phi_stop = (0.0, stretch.stop) if sense > 0 else (stretch.stop, 0.0)
+        self.append(
+            Piece(
+                stretch=stretch,
+                sense=sense,
+                r_start=start,
+                r_stop=stop,
+                phi_start=phi_start,
+                phi_stop=phi_stop,
+                t_start=t,
+                s_a=s_a,
+                end=end,
+            )
         )
+
+    def append(self, piece: Piece) -> None:
+        """Run through a piece next, as far as contact lasts."""
+        if self.lifted_off:
+            return
+        side = {"bilateral": 0, "above": 1, "below": -1}[self.problem.launch.contact]
+        lost = liftoff(piece, side, first=not self._pieces) if side else None
+        if lost is not None:
+            piece = replace(piece, r_stop=lost[0], phi_stop=lost[1], end="liftoff")
+            self.kind = "transit"
+            self.open_end = self._target = None
+        self._pieces.append(piece)
+        if lost is not None:
+            self.t_end = min(self.t_end, piece.t_stop[0])
 
     def approach(self, start: float, top: float) -> None:
         """Come ever closer to an equilibrium, from ``start``."""
+        if self.lifted_off:
+            return
         self._target = (start, top)
-        self.add(toward_equilibrium(self._problem.functions, start, top, 0.0), 1, "asymptote")
+        self.add(toward_equilibrium(self.problem.functions, start, top, 0.0), 1, "asymptote")
 
     def finish(self) -> "Passage":
         """Close the list of pieces: what they are is known now."""
@@ -57,6 +91,11 @@ class Passage(Motion):
         if self.open_end is None and self._target is None:
             self.t_end = min(self.t_end, self._pieces[-1].t_stop[0])
         return self
+
+    @property
+    def turning_points(self) -> tuple[float, ...]:
+        turns = [float(p.stretch.places(np.array([p.phi_stop]))[0]) for p in self._pieces if p.end == "turn"]
+        return (*((self.problem.lam0,) if self.problem.w0 == 0.0 else ()), *turns)
 
     def _arc_end(self) -> float:
         last = self._pieces[-1]
@@ -70,11 +109,11 @@ class Passage(Motion):
             elif self._target is not None:
                 last = self._pieces.pop()
                 begun = last.t_start[0]
-                longer = toward_equilibrium(self._problem.functions, *self._target, reach - begun)
+                longer = toward_equilibrium(self.problem.functions, *self._target, reach - begun)
                 if not longer.duration > last.stretch.duration:
                     raise SolutionError(
                         f"t = {reach!r}: by then the body is closer to the equilibrium at "
-                        f"{self._problem.formulas.parameter} = {self._target[1]!r} than doubles can tell"
+                        f"{self.problem.formulas.parameter} = {self._target[1]!r} than doubles can tell"
                     )
                 self.add(longer, 1, "asymptote")
             else:
@@ -83,7 +122,7 @@ class Passage(Motion):
 
     def _go_on(self) -> None:
         """One more stretch of a motion without an end."""
-        end, problem = self.open_end, self._problem
+        end, problem = self.open_end, self.problem
         assert end is not None
         f, lam0 = problem.functions, problem.lam0
         target = end.place + end.direction * end.step
@@ -101,10 +140,6 @@ class Passage(Motion):
         self.add(through(f, end.place, target, lam0, problem.w0), 1, "")
         end.place, end.step = target, 2.0 * end.step
 
-    def _history(self) -> tuple[Piece, ...]:
-        pieces = self._course(0.0).pieces
-        return pieces
-
     def _clock_error(self, t: Array) -> Array:
         course = self._course(float(np.abs(t).max()) if t.size else 0.0)
         worst = max(piece.stretch.relative_error for piece in course.pieces)
@@ -112,4 +147,4 @@ class Passage(Motion):
 
     def _how_it_ends(self) -> str:
         end = self._pieces[-1].end
-        return f"{end} at {self._problem.formulas.parameter} = {self.legs[-1].lam_end!r}" if self.t_end < inf else end
+        return f"{end} at {self.problem.formulas.parameter} = {self.legs[-1].lam_end!r}" if self.t_end < inf else end

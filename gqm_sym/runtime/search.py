@@ -30,8 +30,8 @@ NARROW = 1e-15
 @njit(**COMPILE)
 def speed_squared(fns, p, lam0, w0, offset, spot, rows):  # type: ignore[no-untyped-def]
     """V**2 at lam0 + offset, and the size of its parts, without subtracting heights."""
-    spot[0] = offset
-    call_rise(fns[2], 1, lam0, spot, p, rows)
+    spot[0], spot[1] = lam0 + offset, offset
+    call_rise(fns[2], 1, lam0, spot[:1], spot[1:], p, rows)
     lost = offset * rows[0, 0]
     return w0 - lost, w0 + fabs(lost)
 
@@ -73,7 +73,7 @@ def walk(fns, p, lam0, w0, direction, begin, reach, step):  # type: ignore[no-un
     near, far : float
         Offsets from lam0, signed.
     """
-    spot, rows, box = np.empty(1), np.empty((2, 1)), np.empty(4)
+    spot, rows, box = np.empty(2), np.empty((2, 1)), np.empty(4)
     left, w_left = begin, w0
     if begin > 0.0:
         w_left, _size = speed_squared(fns, p, lam0, w0, direction * begin, spot, rows)

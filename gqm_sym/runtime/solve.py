@@ -20,7 +20,17 @@ CUSP_SHARE = 1e-7
 
 
 def solve(formulas: Formulas, p: tuple[Number, ...], launch: Launch) -> Motion:
-    """The motion that a launch begins."""
+    """The motion that a launch begins, as long as contact lasts."""
+    motion = _bilateral(formulas, p, launch)
+    if launch.contact == "bilateral" or not isinstance(motion, Periodic):
+        return motion  # a passage looks after its contact itself
+    passage = Passage(motion.problem, "transit", motion.direction)
+    for piece in motion.one_period:
+        passage.append(piece)
+    return passage.finish() if passage.lifted_off else motion
+
+
+def _bilateral(formulas: Formulas, p: tuple[Number, ...], launch: Launch) -> Motion:
     low, high, period = formulas.domain(p)
     formulas.check_place(launch.lam0, low, high)
     functions = formulas.functions(p, launch)
@@ -146,7 +156,7 @@ def _returning(problem: Problem, direction: int, front: Reach, back: Reach) -> M
     """A motion that turns once and leaves the other way."""
     f, lam0 = problem.functions, problem.lam0
     kind = "asymptotic" if back.what == "equilibrium" else "transit"
-    passage = Passage(problem, kind, direction, turn=front)
+    passage = Passage(problem, kind, direction)
     inbound = from_turn(f, front.place, lam0)
     passage.add(inbound, -1, "turn")
     if back.what in ("equilibrium", "open"):

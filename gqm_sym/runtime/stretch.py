@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from gqm_sym.errors import SolutionError
 from gqm_sym.runtime.entries import anomalies, build_table, lay_panels, read_off_many, speeds_at
 from gqm_sym.runtime.exact import ExactProblem
-from gqm_sym.runtime.exact_panels import lay_exactly
+from gqm_sym.runtime.exact_panels import DIGITS, exact_ends, lay_exactly
 from gqm_sym.runtime.panels import EXHAUSTED, FAILED, FROM_TURN, ILL_CONDITIONED, REGULAR, TO_EQUILIBRIUM, TURN_TURN
 
 Array = NDArray[np.float64]
@@ -66,7 +66,10 @@ class Stretch:
             f = self.functions
             self.panels = lay_panels(f.addresses, f.p, self.kind, self.a, self.b, self.ref, self.w, 0.0, self.stop)
         if self.ill_conditioned:
-            self.panels = lay_exactly(self.functions.exact, self.kind, self.a, self.b, self.stop, self.ends)
+            exact = self.functions.exact
+            self.ends = exact_ends(exact, DIGITS, self.kind, self.a, self.b, self.ends)
+            self.a, self.b = float(self.ends[0]), float(self.ends[1])
+            self.panels = lay_exactly(exact, self.kind, self.ends, self.stop)
             self.from_exact = True
         if self.panels[7] == FAILED:
             raise SolutionError(

@@ -68,6 +68,13 @@ def exact(problem: Problem, kind: str, direction: int, stretch: Stretch) -> Timi
     return Timing(two_doubles(duration), two_doubles(phase), offsets)
 
 
+def turning_points(problem: Problem, stretch: Stretch) -> tuple[float, float]:
+    """Both turning points of a libration, each the double nearest to the exact one."""
+    a = _arithmetic(problem, stretch, PERIOD_DIGITS)
+    low, high = exact_ends(problem.functions.exact, a.digits, TURN_TURN, stretch.a, stretch.b, stretch.ends)
+    return float(low), float(high)
+
+
 def period_to(
     problem: Problem, kind: str, direction: int, stretch: Stretch, digits: int
 ) -> str:

@@ -1,0 +1,73 @@
+"""Symbolic declaration, closed forms and generated numba code for motion along planar curves.
+
+Importing this package loads no SymPy: names are fetched when first used.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from gqm_sym.build import build
+    from gqm_sym.declare import Curve, families
+    from gqm_sym.derive import Model, derive
+    from gqm_sym.emit import emit
+    from gqm_sym.errors import GQMError
+    from gqm_sym.kernels import CentralForce, Gravity, Kernel, Potential, Rolling, RotatingFrame
+    from gqm_sym.specfile import read_spec
+
+__version__ = "0.1.0"
+
+_HOMES = {
+    "CentralForce": "gqm_sym.kernels",
+    "Curve": "gqm_sym.declare",
+    "GQMError": "gqm_sym.errors",
+    "Gravity": "gqm_sym.kernels",
+    "Kernel": "gqm_sym.kernels",
+    "Model": "gqm_sym.derive",
+    "Potential": "gqm_sym.kernels",
+    "Rolling": "gqm_sym.kernels",
+    "RotatingFrame": "gqm_sym.kernels",
+    "build": "gqm_sym.build",
+    "derive": "gqm_sym.derive",
+    "emit": "gqm_sym.emit",
+    "families": "gqm_sym.declare",
+    "read_spec": "gqm_sym.specfile",
+}
+
+__all__ = [
+    "CentralForce",
+    "Curve",
+    "GQMError",
+    "Gravity",
+    "Kernel",
+    "Model",
+    "Potential",
+    "Rolling",
+    "RotatingFrame",
+    "build",
+    "derive",
+    "emit",
+    "families",
+    "read_spec",
+]
+
+
+def __getattr__(name: str) -> Any:
+    """Fetch a public name from where it lives."""
+    if name not in _HOMES:
+        raise AttributeError(f"module 'gqm_sym' has no attribute {name!r}")
+    return getattr(import_module(_HOMES[name]), name)
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)
+
+
+class _Package(__import__("types").ModuleType):  # interim: functions win over subpackages of the same name
+    def __setattr__(self, name: str, value: Any) -> None:
+        if name in _HOMES and type(value).__name__ == "module":
+            return
+        super().__setattr__(name, value)
+
+
+__import__("sys").modules[__name__].__class__ = _Package

@@ -1,0 +1,115 @@
+"""The whole chain on one page: a model becomes a file, and the file a module.
+
+=========  ==========================  ==============
+stage      from                        to
+=========  ==========================  ==============
+derive     `Curve`, `Kernel`           `Model`
+emit       `Model`, name               text
+write      text, path                  a file
+load       a file                      a module
+=========  ==========================  ==============
+"""
+
+import difflib
+import importlib.util
+import os
+import tempfile
+from pathlib import Path
+from types import ModuleType
+
+from gqm_sym.derive import Model
+from gqm_sym.emit import body_digests, emit
+from gqm_sym.errors import HandEditedError, InputError
+
+FOLDER = "generated"
+
+
+def build(model: Model, *, name: str, folder: str | os.PathLike[str] = FOLDER, force: bool = False) -> ModuleType:
+    """Write ``folder/name.py`` for a model and import it.
+
+    Parameters
+    ----------
+    model : Model
+        What `derive` returned.
+    name : str
+        The module's name, a Python identifier.
+    folder : path
+        Where to write; made if missing.
+    force : bool
+        Overwrite a file that was edited by hand.
+
+    Raises
+    ------
+    HandEditedError
+        If the file there is not what gqm-gen wrote.
+    """
+    path = Path(folder) / f"{name}.py"
+    write_module(emit(model, name=name), path, force=force)
+    return load(path, name)
+
+
+def write_module(text: str, path: str | os.PathLike[str], *, force: bool = False) -> bool:
+    """Write a generated module, whole or not at all. Returns whether the file changed."""
+    target = Path(path)
+    if target.exists():
+        present = _read(target)
+        if present == text:
+            return False
+        digests = body_digests(present)
+        if not force and (digests is None or digests[0] != digests[1]):
+            raise HandEditedError(
+                f"{target}: was not written by gqm-gen or was edited since; move it away, or give --force to overwrite it"
+            )
+    write_text(text, target)
+    return True
+
+
+def write_text(text: str, path: str | os.PathLike[str]) -> None:
+    """Write a text file, whole or not at all: to a neighbour first, which then takes its place."""
+    target = Path(path)
+    target.parent.mkdir(parents=True, exist_ok=True)
+    handle, temporary = tempfile.mkstemp(prefix=f".{target.name}.", suffix=".tmp", dir=target.parent)
+    try:
+        with open(handle, "w", encoding="utf-8", newline="\n") as stream:
+            stream.write(text)
+            stream.flush()
+            os.fsync(stream.fileno())
+        os.chmod(temporary, 0o666 & ~_umask())
+        os.replace(temporary, target)
+    except BaseException:
+        Path(temporary).unlink(missing_ok=True)
+        raise
+
+
+def difference(text: str, path: str | os.PathLike[str]) -> str:
+    """The unified diff from the file on disk to ``text``; empty if they are the same."""
+    target = Path(path)
+    present = _read(target) if target.exists() else ""
+    lines = difflib.unified_diff(
+        present.splitlines(keepends=True), text.splitlines(keepends=True), f"{target} (on disk)", f"{target} (generated)"
+    )
+    return "".join(lines)
+
+
+def load(path: str | os.PathLike[str], name: str) -> ModuleType:
+    """Import a generated module from its file, anew."""
+    location = Path(path).resolve()
+    spec = importlib.util.spec_from_file_location(name, location)
+    if spec is None or spec.loader is None or not location.is_file():
+        raise InputError(f"{path}: is no generated module; run gqm-gen to write it")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def _read(path: Path) -> str:
+    try:
+        return path.read_text(encoding="utf-8")
+    except UnicodeDecodeError:
+        return ""
+
+
+def _umask() -> int:
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask

@@ -1,0 +1,98 @@
+"""The one place where errors become a line and an exit code."""
+
+import os
+import sys
+import traceback
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from gqm_sym.errors import GQMError, InputError, SpecFileError
+
+DONE = 0
+DIFFERENT = 1  # --check found a file that is not what would be written
+WRONG_INPUT = 2
+FAILED = 3
+INTERRUPTED = 130
+READER_GONE = 141  # as of a program that SIGPIPE ended
+
+
+def guarded(program: str, work: Callable[[], int]) -> int:
+    """Run a command; what goes wrong becomes one clear message and an exit code.
+
+    Parameters
+    ----------
+    program
+        Its name, for messages.
+    work
+        Does everything, the reading of arguments included, and returns the exit code.
+    """
+    for stream in (sys.stdout, sys.stderr):
+        # A title in a script that the terminal lacks is no reason to fail.
+        if hasattr(stream, "reconfigure"):
+            stream.reconfigure(errors="backslashreplace")
+    try:
+        code = work()
+        sys.stdout.flush()
+        return code
+    except SystemExit as stop:  # argparse: 0 after --help, 2 after a usage error
+        return stop.code if isinstance(stop.code, int) else WRONG_INPUT
+    except KeyboardInterrupt:
+        return _end(f"{program}: interrupted", INTERRUPTED)
+    except BrokenPipeError:
+        # The interpreter flushes once more at exit, which must not fail again.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return READER_GONE
+    except GQMError as error:
+        return _end(message_of(error, program), code_of(error))
+    except OSError as error:
+        what = f"{error.filename}: " if error.filename else ""
+        return _end(f"{program}: {what}{error.strerror or error}", WRONG_INPUT)
+    except (RecursionError, MemoryError) as error:
+        what = "nested too deeply" if isinstance(error, RecursionError) else "too large"
+        return _end(f"{program}: an expression is {what}; write it in a simpler form", FAILED)
+    except Exception as error:  # a mistake of ours: still no traceback, but where to look
+        frame = traceback.extract_tb(error.__traceback__)[-1]
+        where = f"{Path(frame.filename).name}:{frame.lineno}"
+        what = f"{type(error).__name__}: {error}".replace("\n", " ")
+        return _end(
+            f"{program}: internal error ({where}): {what}; please report it, with the input", FAILED
+        )
+
+
+def code_of(error: GQMError) -> int:
+    """Return the exit code that an error means."""
+    return WRONG_INPUT if isinstance(error, InputError) else FAILED
+
+
+def message_of(error: GQMError, source: str) -> str:
+    """Return an error as it is printed; ``source`` is named unless the error names its own."""
+    return str(error) if isinstance(error, SpecFileError) else f"{source}: {error}"
+
+
+class Failures:
+    """Errors of several files: each is printed when it comes, and the rest goes on."""
+
+    def __init__(self) -> None:
+        self._codes: list[int] = []
+
+    def __bool__(self) -> bool:
+        return bool(self._codes)
+
+    @property
+    def code(self) -> int:
+        """The exit code: wrong input before failed, and 0 without either."""
+        return min(self._codes, default=DONE)
+
+    @contextmanager
+    def noting(self, source: str) -> Iterator[None]:
+        """Note an error that ends the block; ``source`` is the file it is about."""
+        try:
+            yield
+        except GQMError as error:
+            self._codes.append(_end(message_of(error, source), code_of(error)))
+
+
+def _end(message: str, code: int) -> int:
+    print(message, file=sys.stderr)
+    return code

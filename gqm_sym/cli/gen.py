@@ -1,0 +1,184 @@
+"""`gqm-gen`: curve files -> generated modules."""
+
+import argparse
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from gqm_sym.cli import show
+from gqm_sym.cli.exits import DIFFERENT, DONE, Failures, guarded
+from gqm_sym.errors import InputError
+
+if TYPE_CHECKING:
+    from gqm_sym.derive import Model
+    from gqm_sym.specfile import Spec
+
+PROGRAM = "gqm-gen"
+FOLDER = "generated"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Product:
+    """What one curve file leads to."""
+
+    spec: "Spec"
+    model: "Model"
+    text: str
+    path: Path
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the command and return its exit code."""
+    return guarded(PROGRAM, lambda: _run(_arguments(argv)))
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog=PROGRAM,
+        description="Derive the closed forms of a motion on a curve and write its module.",
+        epilog="Exit codes: 0 done, 1 --check found a difference, 2 the input is wrong, "
+        "3 the derivation or the solution failed, 130 interrupted.",
+    )
+    parser.add_argument("files", nargs="+", metavar="FILE", help="a curve file (YAML)")
+    parser.add_argument(
+        "-o", "--output", metavar="DIR", default=FOLDER, help=f"where to write (default: {FOLDER})"
+    )
+    mode = parser.add_mutually_exclusive_group()
+    mode.add_argument(
+        "--check", action="store_true", help="write nothing; fail if a file is not current"
+    )
+    mode.add_argument("--stdout", action="store_true", help="print the module, write no file")
+    mode.add_argument(
+        "--solve", action="store_true", help="also run the launch in the file and print its table"
+    )
+    parser.add_argument("--diff", action="store_true", help="with --check: show the differences")
+    parser.add_argument("--latex", metavar="FILE", help="also write the closed forms as LaTeX")
+    parser.add_argument(
+        "--force", action="store_true", help="overwrite a module that was edited by hand"
+    )
+    parser.add_argument("-q", "--quiet", action="store_true", help="print no closed forms")
+    return parser
+
+
+def _arguments(argv: Sequence[str] | None) -> argparse.Namespace:
+    parser = _parser()
+    options = parser.parse_args(argv)
+    if options.diff and not options.check:
+        parser.error("--diff: shows what --check finds; give both")
+    if options.latex is not None and options.check:
+        parser.error("--latex: writes a file, and --check writes nothing; give one of them")
+    for option, one_only in (("--stdout", options.stdout), ("--latex", options.latex is not None)):
+        if one_only and len(options.files) > 1:
+            parser.error(f"{option}: takes one FILE, got {len(options.files)}")
+    return options
+
+
+def _run(options: argparse.Namespace) -> int:
+    """Read everything, make everything, and only then write: a mistake leaves all files alone."""
+    failures = Failures()
+    specs: list[Spec] = []
+    for file in options.files:
+        with failures.noting(file):
+            specs.append(_read(file, specs))
+    products: list[Product] = []
+    for spec in specs:
+        with failures.noting(spec.path):
+            products.append(_make(spec, options))
+    if failures:
+        return failures.code
+    if options.check:
+        return _check(products, options)
+    for product in products:
+        with failures.noting(product.spec.path):
+            _deliver(product, options)
+    return failures.code
+
+
+def _read(file: str, others: "Sequence[Spec]") -> "Spec":
+    from gqm_sym.specfile import read_spec
+
+    spec = read_spec(file)
+    for other in others:
+        if other.name == spec.name:
+            raise spec.mistake(
+                f"name: {spec.name} is the name in {other.path} too, and both would be one file; "
+                "give one of them another"
+            )
+    return spec
+
+
+def _make(spec: "Spec", options: argparse.Namespace) -> Product:
+    from gqm_sym.emit import emit
+
+    model = spec.derive()
+    if options.solve:
+        spec.check_solvable(model)
+    path = Path(options.output) / f"{spec.name}.py"
+    return Product(spec=spec, model=model, text=emit(model, name=spec.name), path=path)
+
+
+def _check(products: Sequence[Product], options: argparse.Namespace) -> int:
+    from gqm_sym.build import difference
+
+    code = DONE
+    for product in products:
+        changes = difference(product.text, product.path)
+        if changes:
+            code = DIFFERENT
+            what = "is not what" if product.path.exists() else "is missing, and is what"
+            print(
+                f"{product.path}: {what} {product.spec.path} gives; "
+                f"write it by {PROGRAM} -o {options.output} {product.spec.path}",
+                file=sys.stderr,
+            )
+            if options.diff:
+                print(changes, end="" if changes.endswith("\n") else "\n")
+        elif not options.quiet:
+            print(f"{product.path} is current")
+    return code
+
+
+def _deliver(product: Product, options: argparse.Namespace) -> None:
+    """Print or write what was asked for."""
+    from gqm_sym.build import write_module, write_text
+
+    if options.latex is not None:
+        write_text(_latex(product), options.latex)
+    if options.stdout:
+        sys.stdout.write(product.text)
+        return
+    changed = write_module(product.text, product.path, force=options.force)
+    if not options.quiet:
+        for line in show.forms(product.spec, product.model):
+            print(line)
+        print()
+        if options.latex is not None:
+            print(f"wrote {options.latex}")
+        print(f"wrote {product.path}" if changed else f"{product.path} is current")
+    if options.solve:
+        table = _solve(product)
+        print(f"{product.spec.name}:" if options.quiet else "")
+        for line in table:
+            print(line)
+
+
+def _solve(product: Product) -> list[str]:
+    """Run the launch of the file and return its table, complete: it may fail half way."""
+    from gqm_sym.build import load
+
+    spec = product.spec
+    module = load(product.path, spec.name)
+    try:
+        motion = module.solve(**(spec.launch or {}))
+    except InputError as error:
+        raise spec.mistake(str(error), "launch") from None
+    return list(show.motion(motion, product.model.parameter.name))
+
+
+def _latex(product: Product) -> str:
+    return (
+        f"% Made by {PROGRAM} for {product.spec.name}; needs amsmath.\n"
+        f"\\[\n{product.model.latex()}\n\\]\n"
+    )

@@ -1,0 +1,175 @@
+"""`gqm`: what is not generation."""
+
+import argparse
+import json
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from gqm_sym.cli import show
+from gqm_sym.cli.exits import DONE, guarded
+from gqm_sym.errors import ParameterError
+
+if TYPE_CHECKING:
+    from gqm_sym.declare.families import Family
+
+PROGRAM = "gqm"
+FOLDER = "generated"
+
+# Options of `gqm solve` that replace entries of the file's launch, by their names in ``solve``.
+_LAUNCH = ("lam0", "v0", "direction", "t_max", "contact")
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the command and return its exit code."""
+    return guarded(PROGRAM, lambda: _run(argv))
+
+
+def _run(argv: Sequence[str] | None) -> int:
+    options = _parser().parse_args(argv)
+    options.command(options)
+    return DONE
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog=PROGRAM, description="Motion on planar curves: what is not generation (see gqm-gen)."
+    )
+    commands = parser.add_subparsers(required=True, metavar="COMMAND")
+
+    solve = commands.add_parser(
+        "solve",
+        help="run the launch of a curve file",
+        description="Run the launch of a curve file and print its table. Nothing is written.",
+        epilog="Numbers are taken exactly as written. One that begins with a minus needs an "
+        "equals sign: --lam0=-pi/2.",
+    )
+    solve.add_argument("file", metavar="FILE", help="a curve file (YAML)")
+    solve.add_argument("--lam0", metavar="NUMBER", help="launch from another place")
+    solve.add_argument("--v0", metavar="NUMBER", help="launch with another speed")
+    solve.add_argument("--direction", type=int, choices=(1, -1), help="sign of ds/dt at launch")
+    solve.add_argument("--t-max", metavar="NUMBER", help="follow the motion for so long")
+    solve.add_argument("--contact", choices=("bilateral", "above", "below"))
+    solve.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        dest="values",
+        metavar="NAME=NUMBER",
+        help="give a run-time parameter another value; may be repeated",
+    )
+    solve.add_argument(
+        "--at",
+        action="append",
+        default=[],
+        metavar="TIME",
+        help="also print the state at this time; may be repeated",
+    )
+    solve.add_argument(
+        "-o",
+        "--output",
+        metavar="DIR",
+        default=FOLDER,
+        help=f"where generated modules lie: a current one is used (default: {FOLDER})",
+    )
+    solve.set_defaults(command=_solve)
+
+    schema = commands.add_parser("schema", help="print the JSON Schema of curve files, for editors")
+    schema.set_defaults(command=_schema)
+    families = commands.add_parser("families", help="list the families of curves")
+    families.set_defaults(command=_families)
+    kernels = commands.add_parser("kernels", help="list the forces")
+    kernels.set_defaults(command=_kernels)
+    return parser
+
+
+# -- solve -----------------------------------------------------------------------------------
+
+
+def _solve(options: argparse.Namespace) -> None:
+    from gqm_sym.emit import emit
+    from gqm_sym.specfile import read_spec
+
+    spec = read_spec(options.file)
+    model = spec.derive()
+    given = {key: getattr(options, key) for key in _LAUNCH if getattr(options, key) is not None}
+    values = dict(_assignment(text, model.parameters) for text in options.values)
+    if not given and not values:
+        spec.check_solvable(model)
+    launch = {**(spec.launch or {}), **given, **values}
+    text = emit(model, name=spec.name)
+    motion = _module(text, spec.name, Path(options.output)).solve(**launch)
+    lines = list(show.motion(motion, model.parameter.name))
+    if options.at:
+        lines += ["", *show.moments(motion, model.parameter.name, options.at)]
+    # Printed when all of it is there: a question about a time may have no answer.
+    print("\n".join(lines))
+
+
+def _assignment(text: str, known: Sequence[str]) -> tuple[str, str]:
+    name, equals, value = text.partition("=")
+    if not equals or name.strip() not in known:
+        raise ParameterError(
+            f"--set {text}: must be NAME=NUMBER with one of the parameters {', '.join(known)}"
+        )
+    return name.strip(), value.strip()
+
+
+def _module(text: str, name: str, folder: Path) -> Any:
+    """Return the generated module: the current one on disk, or one in a temporary folder."""
+    from gqm_sym.build import difference, load, write_module
+
+    present = folder / f"{name}.py"
+    if present.is_file() and not difference(text, present):
+        return load(present, name)
+    with tempfile.TemporaryDirectory(prefix="gqm-") as temporary:
+        path = Path(temporary) / present.name
+        write_module(text, path)
+        return load(path, name)
+
+
+# -- lists -----------------------------------------------------------------------------------
+
+
+def _schema(options: argparse.Namespace) -> None:
+    from gqm_sym.specfile import json_schema
+
+    print(json.dumps(json_schema(), indent=2, ensure_ascii=False))
+
+
+def _families(options: argparse.Namespace) -> None:
+    from gqm_sym.declare.families import FAMILIES
+
+    print("cartesian_graph(phi)\n    z = phi(x)\n    The graph of any function of x.")
+    for row in FAMILIES.values():
+        print(f"{row.name}({', '.join(row.arguments)})")
+        print(f"    {', '.join(_formulas(row))}")
+        print(f"    {row.title}{f'; {row.note}' if row.note else ''}.")
+
+
+def _formulas(row: "Family") -> list[str]:
+    parts = [
+        f"{label} = {text}" for label, text in (("r", row.r), ("x", row.x), ("z", row.z)) if text
+    ]
+    if row.domain:
+        parts.append(f"{row.domain[0]} <= {row.parameter} <= {row.domain[1]}")
+    if row.period:
+        parts.append(f"period {row.period}")
+    return parts
+
+
+def _kernels(options: argparse.Namespace) -> None:
+    from gqm_sym.kernels import KERNELS
+
+    titles = ("in YAML", "in Python", "what it is")
+    rows = [
+        (
+            f"{row.name}: {{{', '.join(row.arguments)}}}",
+            f"{row.make.__name__}({', '.join(row.arguments)})",
+            row.summary,
+        )
+        for row in KERNELS.values()
+    ]
+    for line in show.table([titles, *rows], right=()):
+        print(line)

@@ -1,0 +1,6 @@
+"""What a user declares: a curve, by its own formulas or as one of the known families."""
+
+from gqm_sym.declare import families
+from gqm_sym.declare.curve import Curve
+
+__all__ = ["Curve", "families"]

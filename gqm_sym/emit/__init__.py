@@ -1,0 +1,41 @@
+"""Emit: a model as the text of a Python module."""
+
+import sympy
+from sympy import Expr
+
+from gqm_sym.derive import Model
+from gqm_sym.emit.lower import lower
+from gqm_sym.emit.render import body_digests, render
+
+__all__ = ["body_digests", "emit"]
+
+
+def emit(model: Model, *, name: str) -> str:
+    """The module's text for a model. The same model and name give the same bytes.
+
+    Parameters
+    ----------
+    model : Model
+        What `derive` returned.
+    name : str
+        The module's name, a Python identifier.
+
+    Raises
+    ------
+    EmissionError
+        If an expression has no form in emitted code; the message names it.
+    """
+    return render(lower(model, name=name, forms=model.closed_forms()), source=_source(model, name))
+
+
+def _source(model: Model, name: str) -> str:
+    """Everything the module was made from, as one canonical text."""
+
+    def exact(e: Expr | None) -> str:
+        return "-" if e is None else sympy.srepr(e)
+
+    curve = model.curve
+    parts = [name, model.title, model.parameter.name, exact(curve.x), exact(curve.z)]
+    parts += [exact(e) for e in (*curve.domain, curve.period, model.climb, model.reaction, model.inertia)]
+    parts += [repr(model.defaults), repr(model.positive)]
+    return "\n".join(parts)

@@ -1,0 +1,209 @@
+"""Lowered functions as the text of a module, through the templates."""
+
+import hashlib
+import re
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+import jinja2
+from jinja2 import meta
+from sympy import Equality
+from sympy.printing.str import StrPrinter
+
+from gqm_sym.emit.ir import Assignment, ExactIR, FunctionIR, ModuleIR
+from gqm_sym.emit.printer import FUNCTIONS, CodePrinter, ExactPrinter, IntervalPrinter
+from gqm_sym.errors import EmissionError
+
+# The version of gqm_sym.runtime.interface that emitted code is written for (a test holds the two together).
+INTERFACE = 1
+
+_MATH = frozenset({*FUNCTIONS.values(), "sqrt", "pi", "e"})
+_RUNTIME = (
+    "BEND",
+    "BOUNDS",
+    "CLIMB",
+    "FRAME",
+    "RISE",
+    "Addresses",
+    "ExactFormulas",
+    "Formulas",
+    "Motion",
+    "Pass1",
+    "compiler",
+)
+# Names that mean something in every emitted module: no run-time parameter may take them.
+_OWN = frozenset({*_RUNTIME, "Any", "MODEL", "PARAMETERS", "carray", "compiled", "fabs", "range", "op", "self", "nearest"})
+_OWN |= {"frame", "climb", "rise", "bend", "bounds", "pass1", "solve", "sweep"}
+_WIDTH = 100
+
+
+def render(module: ModuleIR, *, source: str) -> str:
+    """The text of a module. ``source`` is the canonical text of what it was made from; its digest goes into the header."""
+    _refuse_own_names(module)
+    functions, used = [], set[str]()
+    for function in module.functions:
+        text, names = _loop(function)
+        functions.append(text)
+        used |= names
+    bounds, intervals = _bounds(module.bounds, module.parameter)
+    functions.append(bounds)
+    environment = _environment()
+    fields: dict[str, Any] = {
+        "interface": INTERFACE,
+        "title": _quoted(module.title or module.name),
+        "forms": [_quoted(line) for line in _forms(module)],
+        "math": sorted(used & _MATH),
+        "runtime": list(_RUNTIME),
+        "differences": sorted(used - _MATH - {"nearest"}),
+        "intervals": sorted(intervals),
+        "defaults": [(repr(name), repr(value)) for name, value in module.defaults],
+        "functions": functions,
+        "exact": [_exact(f, module.parameter) for f in module.exact],
+        "name_text": repr(module.name),
+        "parameter": module.parameter,
+        "parameter_text": repr(module.parameter),
+        "positive": repr(module.positive),
+        "keywords": ", ".join(f"{name}: Any = {value!r}" for name, value in module.defaults),
+        "names": ", ".join(name for name, _ in module.defaults),
+    }
+    body = _tidied(_fill(environment, "body.py.j2", fields))
+    header = {"name": module.name, "interface": INTERFACE, "input_digest": _digest(source), "body_digest": _digest(body)}
+    return _fill(environment, "header.py.j2", header) + body
+
+
+def body_digests(text: str) -> tuple[str, str] | None:
+    """The body's digest as the header states it, and as it is; None if the text has no such header."""
+    first, _, rest = text.partition("\n")
+    second, _, body = rest.partition("\n")
+    if not first.startswith("# Made by gqm-gen") or " body " not in second:
+        return None
+    return second.rpartition(" body ")[2].strip(), _digest(body)
+
+
+def _tidied(text: str) -> str:
+    """No blanks at ends of lines, at most two empty lines together, one newline at the end."""
+    lines = "\n".join(line.rstrip() for line in text.splitlines())
+    return re.sub(r"\n{4,}", "\n\n\n", lines).strip() + "\n"
+
+
+def _digest(text: str) -> str:
+    return hashlib.sha256(text.encode()).hexdigest()[:12]
+
+
+def _quoted(text: str) -> str:
+    """Text as it may stand inside a docstring, whatever it holds."""
+    plain = "".join(c if c.isprintable() else " " for c in text)
+    return plain.replace("\\", "\\\\").replace('"', "'")
+
+
+def _refuse_own_names(module: ModuleIR) -> None:
+    for name in (module.parameter, *(n for n, _ in module.defaults)):
+        if name in _OWN or name.startswith("exact_"):
+            raise EmissionError(f"{name}: means something in emitted modules; choose another name for this symbol")
+
+
+def _forms(module: ModuleIR) -> list[str]:
+    printer = StrPrinter({"order": None})
+    width = max((len(label) for label, _ in module.forms), default=0)
+    lines = []
+    for label, form in module.forms:
+        if isinstance(form, Equality):
+            lines.append(f"{label:<{width}} : {printer.doprint(form.lhs)} = {printer.doprint(form.rhs)}")
+        else:
+            lines.append(f"{label:<{width}} = {printer.doprint(form)}")
+    return [*lines, *(["", *module.notes] if module.notes else [])]
+
+
+def _statements(assignments: Iterable[Assignment], printer: CodePrinter) -> list[str]:
+    return [f"{a.name} = {printer.doprint(a.value)}" for a in assignments]
+
+
+def _unpacked(parameters: tuple[tuple[str, int], ...], p: str) -> list[str]:
+    return [f"{name} = {p}[{i}]" for name, i in parameters]
+
+
+def _loop(function: FunctionIR) -> tuple[dict[str, Any], set[str]]:
+    taken = {name for name, _ in function.parameters} | {a.name for a in function.inside}
+    index = "_i" if "i" in taken else "i"
+    printer = CodePrinter(index)
+    names, shapes = zip(*function.views, strict=True)
+    count, out = function.arguments[0], function.arguments[-1]
+    before = [f"{', '.join(names)} = {', '.join(f'carray({n}, {s})' for n, s in zip(names, shapes, strict=True))}"]
+    if function.parameters:
+        left = ", ".join(n for n, _ in function.parameters)
+        right = ", ".join(f"{function.arguments[-2]}[{i}]" for _, i in function.parameters)
+        before.append(f"{left} = {right}")
+    before += _statements(function.before, printer)
+    inside = _statements(function.inside, printer)
+    inside += [f"{out}[{row}, {index}] = {printer.doprint(e)}" for row, e in enumerate(function.outputs)]
+    fields = {
+        "name": function.name,
+        "signature": function.signature,
+        "arguments": ", ".join(function.arguments),
+        "doc": function.doc,
+        "before": before,
+        "loop": True,
+        "index": index,
+        "count": count,
+        "inside": inside,
+    }
+    return fields, printer.used
+
+
+def _bounds(function: FunctionIR, parameter: str) -> tuple[dict[str, Any], set[str]]:
+    printer = IntervalPrinter()
+    lo, hi, p, out = function.arguments
+    before = [f"{p}, {out} = carray({p}, {max((i for _, i in function.parameters), default=0) + 1}), carray({out}, 4)"]
+    before.append(f"{parameter} = ({lo}, {hi})")
+    before += [f"{name} = ({p}[{i}], {p}[{i}])" for name, i in function.parameters]
+    inside = _statements(function.inside, printer)
+    for row, e in enumerate(function.outputs):
+        inside.append(f"{out}[{2 * row}], {out}[{2 * row + 1}] = {printer.doprint(e)}")
+    fields = {
+        "name": function.name,
+        "signature": function.signature,
+        "arguments": ", ".join(function.arguments),
+        "doc": function.doc,
+        "before": before,
+        "loop": False,
+        "inside": inside,
+    }
+    return fields, printer.used
+
+
+def _exact(function: ExactIR, parameter: str) -> dict[str, Any]:
+    printer = ExactPrinter()
+    p = "_p" if "p" in {name for name, _ in function.parameters} | {parameter} else "p"
+    domain = function.name == "exact_domain"
+    inside = _unpacked(function.parameters, p)
+    inside += _statements(function.inside, printer)
+    values = ["None" if e is None else printer.doprint(e) for e in function.outputs]
+    inside.append(f"return {', '.join(values)}")
+    arguments = ("op", p) if domain else ("op", parameter, p)
+    return {"name": function.name, "arguments": ", ".join(arguments), "doc": function.doc, "inside": inside}
+
+
+def _environment() -> jinja2.Environment:
+    """Templates of the installed package, or of the checkout it is run from."""
+    package = Path(__file__).resolve().parent.parent
+    folder = next((f for f in (package / "_templates", package.parent / "templates") if f.is_dir()), None)
+    if folder is None:
+        raise EmissionError(f"{package}: its templates are missing; install gqm_sym again")
+    return jinja2.Environment(
+        loader=jinja2.FileSystemLoader(folder),
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+        autoescape=False,
+    )
+
+
+def _fill(environment: jinja2.Environment, template: str, fields: dict[str, Any]) -> str:
+    loader = environment.loader
+    assert loader is not None
+    wanted = meta.find_undeclared_variables(environment.parse(loader.get_source(environment, template)[0]))
+    if wanted != set(fields):
+        raise EmissionError(f"{template}: wants {sorted(wanted)}, is given {sorted(fields)}")
+    return environment.get_template(template).render(fields)

@@ -1,0 +1,221 @@
+"""Text or SymPy -> SymPy, in few heads: what every later stage may rely on.
+
+An expression read here consists of real symbols, rational numbers, pi, E, Add, Mul, Pow, Abs and
+sin cos tan asin acos atan sinh cosh tanh asinh acosh atanh exp log. It holds no Float, and nothing
+that is complex or infinite.
+"""
+
+import keyword
+from collections.abc import Callable, Collection
+from decimal import Decimal
+from fractions import Fraction
+from typing import TypeAlias, TypeVar
+
+import sympy as sp
+
+from gqm_sym import rationals
+from gqm_sym.enclosures import check_constants
+from gqm_sym.errors import ExpressionError
+from gqm_sym.grammar import CONSTANTS, FUNCTIONS, NAME, evaluate, parse
+from gqm_sym.sympy_tree import is_sympy, tree_of
+from gqm_sym.trees import constant
+
+Source: TypeAlias = str | int | float | Fraction | Decimal | sp.Expr
+
+S = TypeVar("S")
+
+# Names that ``solve`` and its kin have arguments of; CONTRACT, "The YAML".
+RESERVED_NAMES = frozenset(
+    {"lam", "lam0", "v0", "direction", "t_max", "contact", "point", "quantity"}
+)
+
+# Size in bits of all rational numbers that one operation may melt into one, and of any that stays.
+# SymPy looks for the factors of a number it takes a root of: 3000 bits take it seconds.
+_MAX_MELTED_BITS = 2**17
+_MAX_BITS = 1400
+# Of anything but a name or a number. SymPy multiplies powers out on many occasions: (x - 1)**999
+# can take it half a minute.
+_MAX_POWER = 32
+
+_HEADS: dict[str, Callable[[sp.Expr], sp.Expr]] = {
+    **{
+        name: getattr(sp, name)
+        for name in (
+            *("sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh"),
+            *("asinh", "acosh", "atanh", "exp", "log", "sqrt"),
+        )
+    },
+    "ln": sp.log,
+    "abs": sp.Abs,
+    "cot": lambda u: sp.cos(u) / sp.sin(u),
+    "sec": lambda u: 1 / sp.cos(u),
+    "csc": lambda u: 1 / sp.sin(u),
+    "coth": lambda u: sp.cosh(u) / sp.sinh(u),
+    # The real root of what is known to be negative; of a symbol, the power, NaN below zero.
+    "cbrt": lambda u: -((-u) ** sp.Rational(1, 3)) if u.is_negative else u ** sp.Rational(1, 3),
+}
+_IMPROPER = (sp.nan, sp.zoo, sp.oo, -sp.oo, sp.I)
+
+
+def read_expression(source: Source, *, where: str) -> sp.Expr:
+    """Read an expression.
+
+    Parameters
+    ----------
+    source
+        Text in the grammar of ``gqm_sym.grammar``, a number, or a SymPy expression of the same
+        heads. A float means its binary value, text and every other number exactly what it says.
+    where
+        What the expression is, as errors should call it: ``curve.graph.z``.
+
+    Returns
+    -------
+    sympy.Expr
+        Whose symbols are all ``Symbol(name, real=True)``.
+
+    Raises
+    ------
+    ExpressionError
+        If it is not in the grammar, or not real and finite.
+    """
+    if isinstance(source, str):
+        tree = parse(source, where=where)
+    elif is_sympy(source):
+        tree = tree_of(source, where=where)
+    else:
+        exact = rationals.read_exact(source, where=where)
+        if exact is None:
+            raise ExpressionError(
+                f"{where}: {type(source).__name__} given; give text, a number or a SymPy expression"
+            )
+        tree = constant(exact)
+    check_constants(tree, where=where)
+    return evaluate(tree, _SymPy(), where=where)
+
+
+def check_name(name: str, *, where: str, reserved: Collection[str] = RESERVED_NAMES) -> str:
+    """Return ``name`` if a parameter can be called so, else say why not.
+
+    Parameters
+    ----------
+    name
+        The name of a parameter of a curve, a kernel or a model.
+    where
+        What is named, as errors should call it.
+    reserved
+        Names taken already; a curve's own parameter may be called ``lam``, for one.
+    """
+    if not isinstance(name, str):
+        raise ExpressionError(f"{where}: {type(name).__name__} given; a name is text")
+    reason = None
+    if not NAME.fullmatch(name):
+        reason = "a name is made of ASCII letters, digits and _, and begins with a letter"
+    elif keyword.iskeyword(name):
+        reason = "it is a word of Python's; choose another"
+    elif name in FUNCTIONS:
+        reason = "it is a function of the grammar; choose another"
+    elif name in CONSTANTS:
+        reason = f"it is a constant ({sp.N(_SymPy().name(name), 6)}); choose another"
+    elif name in reserved:
+        reason = f"it is reserved, as are {', '.join(sorted({*reserved} - {name}))}; choose another"
+    if reason is not None:
+        raise ExpressionError(f"{where}: {name[:40]!r} cannot be a name: {reason}")
+    return name
+
+
+def name_or_value(source: S, default_name: str) -> tuple[str, S | None]:
+    """Read the argument of a kernel or a family: another name for its parameter, or a value.
+
+    Returns
+    -------
+    tuple
+        ``(source, None)`` if it is text that is one word (whether that can be a name is for
+        ``check_name``), else ``(default_name, source)``.
+    """
+    if isinstance(source, str):
+        text = source.strip()
+        is_word = NAME.fullmatch(text) is not None and text not in CONSTANTS
+        if is_word:
+            return text, None
+    return default_name, source
+
+
+class _SymPy:
+    """The algebra of SymPy expressions.
+
+    SymPy computes rational powers and products at once, whatever their size: each operation here
+    first looks at how many bits it could melt together.
+    """
+
+    def number(self, value: Fraction) -> sp.Expr:
+        return sp.Rational(value.numerator, value.denominator)
+
+    def name(self, name: str) -> sp.Expr:
+        if name in CONSTANTS:
+            return sp.pi if name == "pi" else sp.E
+        return sp.Symbol(name, real=True)
+
+    def negate(self, value: sp.Expr) -> sp.Expr:
+        return -value
+
+    def total(self, terms: list[sp.Expr]) -> sp.Expr:
+        _check_bits(terms)
+        return _proper(sp.Add(*terms))
+
+    def product(self, factors: list[sp.Expr]) -> sp.Expr:
+        _check_bits(factors)
+        return _proper(sp.Mul(*factors))
+
+    def reciprocal(self, value: sp.Expr) -> sp.Expr:
+        if value.is_zero:
+            raise ValueError("division by zero")
+        return _proper(1 / value)
+
+    def power(self, base: sp.Expr, exponent: sp.Expr) -> sp.Expr:
+        for part in (exponent.as_coeff_Add()[0], exponent.as_coeff_Mul()[0]):
+            if part.is_Rational:
+                rationals.check_exponent(Fraction(part.p, part.q))
+        if base.is_negative and base.is_number and not exponent.is_integer:
+            raise ValueError("a negative number to a power that is not whole, which is not real")
+        if exponent.is_Rational:
+            if base.is_zero and exponent.is_negative:
+                raise ValueError("division by zero")
+            _check_bits([base], times=abs(exponent.p) // exponent.q + 1)
+        return _proper(base**exponent)
+
+    def call(self, function: str, argument: sp.Expr) -> sp.Expr:
+        if function == "exp" and argument.has(sp.log):
+            # exp(n*log(2)) is computed as 2**n.
+            largest = max((abs(number) for number in argument.atoms(sp.Rational)), default=1)
+            _check_bits([argument], times=int(largest) + 1)
+        try:
+            return _proper(_HEADS[function](argument))
+        except Exception as error:
+            # SymPy evaluates numbers by itself, and stumbles over some: asin(sin(10**300)) gives
+            # an AttributeError.
+            raise ValueError(f"SymPy cannot take {function} of it") from error
+
+
+def _check_bits(operands: list[sp.Expr], *, times: int = 1) -> None:
+    bits = sum(
+        max(number.p.bit_length(), number.q.bit_length())
+        for operand in operands
+        for number in operand.atoms(sp.Rational)
+    )
+    if bits * times > _MAX_MELTED_BITS:
+        raise ValueError("numbers of too many digits; write them as decimals")
+
+
+def _proper(value: sp.Expr) -> sp.Expr:
+    """Refuse what is complex, infinite or undefined, and what SymPy would choke on later."""
+    for node in sp.preorder_traversal(value):
+        if node in _IMPROPER:
+            raise ValueError("not a finite real number")
+        if node.is_Rational and max(node.p.bit_length(), node.q.bit_length()) > _MAX_BITS:
+            raise ValueError("an exact number of more than 420 digits; write it as a decimal")
+        if node.is_Pow and node.exp.is_Rational:
+            bound = rationals.MAX_EXPONENT if node.base.is_Atom else _MAX_POWER
+            if abs(node.exp) > bound:
+                what = "a name" if node.base.is_Atom else "a sum or function"
+                raise ValueError(f"a power of {what} with an exponent beyond {bound}")
+    return value

@@ -1,0 +1,158 @@
+"""Names of run-time parameters and the exact values they have where none is given."""
+
+from collections.abc import Iterable, Mapping
+from decimal import Decimal
+from fractions import Fraction
+from math import isfinite
+from numbers import Integral, Real
+from typing import TypeAlias
+
+import sympy as sp
+
+from gqm_sym.errors import DeclarationError, NumberError
+from gqm_sym.expressions import check_name, name_or_value, read_expression
+
+Value: TypeAlias = float | int | str
+"""A default: a float means its binary value, an int or a text exactly what it spells."""
+
+Given: TypeAlias = Value | Decimal | Fraction | sp.Expr
+"""What a user may write for a value."""
+
+# Mass and gravity mean the same everywhere, so several sources may use these two names.
+COMMON = ("g", "m")
+COMMON_DEFAULTS: dict[str, Value] = {"g": "9.81", "m": "1"}
+
+# The coordinates of the plane: a potential is written in them, so no parameter may be called so.
+COORDINATES = ("x", "z")
+
+
+def read_value(given: Given, *, where: str) -> Value:
+    """Return a finite real number as it will be kept: exactly as it was given."""
+    if isinstance(given, bool):
+        raise NumberError(f"{where}: must be a number, got {given}")
+    if isinstance(given, str):
+        _check_number(read_expression(given, where=where), given, where)
+        return given.strip()
+    if isinstance(given, Integral):
+        return int(given)
+    if isinstance(given, sp.Expr):
+        exact = read_expression(given, where=where)
+        _check_number(exact, given, where)
+        # The grammar writes Euler's number with a small letter.
+        return str(exact.xreplace({sp.E: sp.Symbol("e")}))
+    if isinstance(given, Decimal | Fraction):
+        if isinstance(given, Decimal) and not given.is_finite():
+            raise NumberError(f"{where}: must be a finite number, got {given}")
+        return str(given)
+    if isinstance(given, Real):
+        if not isfinite(given):
+            raise NumberError(f"{where}: must be a finite number, got {float(given)!r}")
+        return float(given)
+    raise NumberError(f"{where}: must be a number, got {type(given).__name__}")
+
+
+def _check_number(expression: sp.Expr, given: object, where: str) -> None:
+    free = sorted(symbol.name for symbol in expression.free_symbols)
+    if free:
+        raise NumberError(f"{where}: must be a number, got {given!s}, which contains {free[0]!r}")
+    if not (expression.is_real and expression.is_finite):
+        raise NumberError(f"{where}: must be a finite real number, got {given!s}")
+
+
+def read_parameters(
+    given: Mapping[str, Given | None] | Iterable[str] | None,
+    *,
+    found: Iterable[str],
+    where: str,
+) -> tuple[tuple[str, Value | None], ...]:
+    """Join the parameters that were declared with those that were found in the expressions.
+
+    Parameters
+    ----------
+    given
+        Names with their defaults (None: must be given at run time), or names alone, or nothing.
+    found
+        The free symbols, in order of appearance.
+    where
+        What is being declared, for messages.
+    """
+    order = tuple(found)
+    if given is None:
+        declared: dict[str, Given | None] = {}
+    elif isinstance(given, Mapping):
+        declared = dict(given)
+    else:
+        declared = dict.fromkeys([given] if isinstance(given, str) else given)
+    for name in declared:
+        if name not in order:
+            raise DeclarationError(
+                f"{where}: parameter {name!r} is declared but not used; "
+                f"remove it or use it (in use: {', '.join(order) or 'none'})"
+            )
+    names = (*declared, *(name for name in order if name not in declared))
+    pairs: list[tuple[str, Value | None]] = []
+    for name in names:
+        check_parameter(name, where=where)
+        value = declared.get(name, COMMON_DEFAULTS.get(name))
+        pairs.append((name, None if value is None else read_value(value, where=f"{where}: {name}")))
+    return tuple(pairs)
+
+
+def check_parameter(name: str, *, where: str) -> str:
+    """Return ``name`` if a run-time parameter may be called so."""
+    if name in COORDINATES:
+        raise DeclarationError(
+            f"{where}: {name!r} is a coordinate and cannot be a run-time parameter; "
+            "give the parameter another name"
+        )
+    return check_name(name, where=where)
+
+
+def read_argument(given: Given | None, name: str, *, where: str) -> tuple[str, Value | None]:
+    """Read what a kernel or a family was given for a parameter: another name, a value or nothing.
+
+    Returns the parameter's name and default.
+    """
+    called: str = name
+    value: Given | None = given
+    if isinstance(given, str):
+        called, value = name_or_value(given, name)
+    check_parameter(called, where=where)
+    if value is None:
+        value = COMMON_DEFAULTS.get(name)
+    return called, None if value is None else read_value(value, where=f"{where}: {called}")
+
+
+def exact_value(value: Value) -> sp.Expr:
+    """Return the number that a default means, exactly."""
+    return read_expression(value, where="default")
+
+
+def is_positive(value: Value | None) -> bool:
+    """Whether a default allows its parameter to be taken as positive; no default allows it."""
+    return value is None or bool(exact_value(value) > 0)
+
+
+def names_in_order(*expressions: sp.Expr) -> tuple[str, ...]:
+    """Return the names of the free symbols by first appearance; the same in every process."""
+    seen: dict[str, None] = {}
+    for expression in expressions:
+        for node in sp.preorder_traversal(expression):
+            if isinstance(node, sp.Symbol):
+                seen.setdefault(node.name)
+    return tuple(seen)
+
+
+__all__ = [
+    "COMMON",
+    "COORDINATES",
+    "Given",
+    "Value",
+    "check_parameter",
+    "exact_value",
+    "is_positive",
+    "names_in_order",
+    "read_argument",
+    "read_parameters",
+    "read_value",
+]

@@ -1,0 +1,7 @@
+"""A YAML file -> curve, kernel, parameters and launch, with every mistake at its line."""
+
+from gqm_sym.specfile.reader import read_spec
+from gqm_sym.specfile.schema import json_schema
+from gqm_sym.specfile.spec import Spec
+
+__all__ = ["Spec", "json_schema", "read_spec"]

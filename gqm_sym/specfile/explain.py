@@ -1,0 +1,116 @@
+"""What is wrong with the structure of a file, in words that its author understands."""
+
+import difflib
+from collections.abc import Collection
+from typing import Any
+
+from pydantic.fields import FieldInfo
+
+from gqm_sym.specfile.nodes import MapNode, Mark, Mistakes, Node, Scalar, shown
+from gqm_sym.specfile.places import descend, place_of
+from gqm_sym.specfile.schema import CURVE_KEYS, FAMILY_MODELS, KERNEL_KEYS, model_at
+
+# What pydantic calls it -> what must stand there.
+_WANTED = {
+    "string_type": "must be a single value",
+    "list_type": "must be a list, as in [a, b]",
+    "too_short": "must have two entries, as in [a, b]",
+    "too_long": "must have two entries, as in [a, b]",
+    "model_type": "must be a mapping, as in {key: value}",
+    "model_attributes_type": "must be a mapping, as in {key: value}",
+    "dict_type": "must be a mapping, as in {key: value}",
+}
+
+
+def explain(
+    detail: Any, tree: MapNode, mistakes: Mistakes, *, spoilt: Collection[Mark] = ()
+) -> None:
+    """Note what pydantic found, in words of ours.
+
+    Parameters
+    ----------
+    detail
+        One of the errors of a ``ValidationError``.
+    tree
+        The file.
+    mistakes
+        Takes what is noted.
+    spoilt
+        Places where something could not be read: what follows from that was said with it.
+    """
+    loc = tuple(detail["loc"])
+    kind = detail["type"]
+    steps = list(descend(tree, loc))
+    path = ".".join(step for step, _, _ in steps)
+    mark = steps[-1][1] if steps else tree.mark
+    node = steps[-1][2] if steps else tree
+    label = f"{path}: " if path else ""
+    # An empty value has its place on some later line: blame its key.
+    value_mark = mark if isinstance(node, Scalar) and not node.text else node.mark
+    if {mark, node.mark} & set(spoilt):
+        return
+    if kind == "gqm":
+        column = detail["ctx"]["column"]
+        if isinstance(node, Scalar) and loc[-1] != "[key]":
+            mark = node.at(column) if column else value_mark
+        mistakes.add(mark, f"{label}{detail['ctx']['what']}")
+    elif kind == "extra_forbidden":
+        _explain_unknown(loc, steps, mistakes)
+    elif kind == "missing":
+        field = model_at(_path(loc[:-1])).model_fields[loc[-1]]
+        what = f"{label}{loc[-1]} is missing"
+        mistakes.add(mark, what, f"add {loc[-1]}: {_example(field)}")
+    elif kind in ("union_tag_not_found", "union_tag_invalid"):
+        place = place_of(tree, (*loc, "name"))
+        what = "name is missing"
+        if kind == "union_tag_invalid":
+            what = f"unknown family {shown(str(detail['ctx']['tag']))}"
+        mistakes.add(place, f"{label}{what}", f"known are {', '.join(FAMILY_MODELS)}")
+    elif kind == "literal_error":
+        what = f"{label}must be {detail['ctx']['expected']}"
+        mistakes.add(value_mark, f"{what}, got {_given(node)}")
+    else:
+        what = _WANTED.get(kind, detail["msg"])
+        given = detail.get("ctx", {}).get("actual_length", _given(node))
+        mistakes.add(value_mark, f"{label}{what}, got {given}")
+
+
+def _explain_unknown(
+    loc: tuple[Any, ...], steps: list[tuple[str, Mark, Node]], mistakes: Mistakes
+) -> None:
+    key = str(loc[-1])
+    path = ".".join(step for step, _, _ in steps[:-1])
+    label = f"{path}: " if path else ""
+    allowed = sorted(model_at(_path(loc[:-1])).model_fields)
+    mark = steps[-1][1]
+    announced = {"curve": CURVE_KEYS, "kernel": KERNEL_KEYS}.get(path, ())
+    if key in announced:
+        what = f"{label}{key} is not supported yet by this version"
+        mistakes.add(mark, what, f"it knows {', '.join(allowed)}")
+    elif path == "launch" and key == "point":
+        what = f"{label}point is for implicit and sampled curves"
+        mistakes.add(mark, what, "give lam0, the curve's parameter at launch")
+    else:
+        near = difflib.get_close_matches(key, allowed, n=1)
+        remedy = f"did you mean {near[0]}?" if near else f"allowed are {', '.join(allowed)}"
+        mistakes.add(mark, f"{label}unknown key {shown(key)}", remedy)
+
+
+def _path(loc: tuple[Any, ...]) -> tuple[str, ...]:
+    return tuple(str(step) for step in loc)
+
+
+def _example(field: FieldInfo) -> str:
+    return _flow((field.examples or ["..."])[0])
+
+
+def _flow(value: Any) -> str:
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{key}: {_flow(item)}" for key, item in value.items()) + "}"
+    return str(value)
+
+
+def _given(node: Node) -> str:
+    if isinstance(node, Scalar):
+        return "nothing" if node.is_null else shown(node.text)
+    return node.kind

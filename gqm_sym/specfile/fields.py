@@ -1,0 +1,99 @@
+"""Single values of a curve file: what may stand there, and what is said if something else does.
+
+Every scalar arrives as text and stays text, so that ``9.81`` keeps meaning 981/100.
+"""
+
+import re
+import sys
+from collections.abc import Callable
+from typing import Annotated, TypeAlias
+
+from pydantic import AfterValidator, BeforeValidator, Field, WithJsonSchema
+from pydantic_core import PydanticCustomError
+
+from gqm_sym.errors import GQMError, NumberError
+from gqm_sym.expressions import RESERVED_NAMES, check_name
+from gqm_sym.grammar import parse
+from gqm_sym.parameters import check_parameter, exact_value, read_value
+from gqm_sym.specfile.nodes import shown
+
+LINE_LIMIT = 200
+
+# The ways of YAML and of Python to write what is no number.
+_NOT_FINITE = frozenset({".nan", ".inf", "nan", "inf", "infinity"})
+_COLUMN = re.compile(r"(?:.*?: )?column (\d+): ")
+
+
+def _mistake(what: str, column: int = 0) -> PydanticCustomError:
+    return PydanticCustomError("gqm", "{what}", {"what": what, "column": column})
+
+
+def column_of(message: str) -> tuple[str, int]:
+    """Split the column off a message about a text: ``column 4: unexpected '^'``; 0 without one."""
+    found = _COLUMN.match(message)
+    return (message[found.end() :], int(found[1])) if found else (message, 0)
+
+
+def _checked(check: Callable[[str], object]) -> AfterValidator:
+    """Make a validator of a check that raises an error of ours; the text itself is kept."""
+
+    def validate(text: str) -> str:
+        try:
+            check(text)
+        except GQMError as error:
+            # "where" is empty: the caller knows the place better, from the tree of the file.
+            raise _mistake(*column_of(str(error).removeprefix(": "))) from None
+        return text
+
+    return AfterValidator(validate)
+
+
+def _check_line(text: str) -> str:
+    # A title goes into the header of emitted code: nothing invisible, nothing that breaks a line.
+    if not text.isprintable() or len(text) > LINE_LIMIT:
+        raise _mistake(f"must be one line of at most {LINE_LIMIT} printable characters")
+    return text
+
+
+def _check_curve_parameter(text: str) -> object:
+    # A curve's own parameter, and nothing else, may be called "lam".
+    return check_name(text, where="", reserved=RESERVED_NAMES - {"lam"})
+
+
+def _check_number(text: str) -> object:
+    if text.lower().lstrip("+-") in _NOT_FINITE:
+        raise NumberError(f"must be a finite number, got {text}")
+    if abs(exact_value(read_value(text, where=""))) > sys.float_info.max:
+        raise NumberError(f"must be within the range of doubles, got {text}")
+    return text
+
+
+def _read_flag(value: object) -> object:
+    if value not in ("true", "false"):
+        raise _mistake(f"must be true or false, got {shown(str(value))}")
+    return value == "true"
+
+
+def _read_direction(value: object) -> object:
+    if value not in ("1", "+1", "-1"):
+        raise _mistake(f"must be 1 or -1 (the sign of ds/dt at launch), got {shown(str(value))}")
+    return int(str(value))
+
+
+_TEXT_OR_NUMBER = {"type": ["string", "number"]}
+
+Line: TypeAlias = Annotated[str, AfterValidator(_check_line)]
+Name: TypeAlias = Annotated[str, _checked(lambda text: check_name(text, where=""))]
+CurveParameter: TypeAlias = Annotated[str, _checked(_check_curve_parameter)]
+ParameterName: TypeAlias = Annotated[str, _checked(lambda text: check_parameter(text, where=""))]
+Expression: TypeAlias = Annotated[
+    str, _checked(lambda text: parse(text, where="")), WithJsonSchema(_TEXT_OR_NUMBER)
+]
+Number: TypeAlias = Annotated[str, _checked(_check_number), WithJsonSchema(_TEXT_OR_NUMBER)]
+Flag: TypeAlias = Annotated[bool, BeforeValidator(_read_flag), WithJsonSchema({"type": "boolean"})]
+Direction: TypeAlias = Annotated[
+    int, BeforeValidator(_read_direction), WithJsonSchema({"enum": [1, -1]})
+]
+Ends: TypeAlias = Annotated[list[Expression | None], Field(min_length=2, max_length=2)]
+Place: TypeAlias = Annotated[list[Number], Field(min_length=2, max_length=2)]
+Centre: TypeAlias = Annotated[list[Expression], Field(min_length=2, max_length=2)]

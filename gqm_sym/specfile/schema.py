@@ -1,0 +1,301 @@
+"""The shape of a curve file: one small pydantic model for each mapping in it.
+
+They check structure and single values, and are what ``gqm schema`` prints. What concerns several
+values at once (an undefined symbol, a launch outside the domain) is checked in ``reader``. A curve
+kind, a family or a kernel is one entry of a table; its model is made from the entry.
+"""
+
+from collections.abc import Callable
+from functools import reduce
+from operator import or_
+from typing import Annotated, Any, Literal, NamedTuple
+
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    GetJsonSchemaHandler,
+    create_model,
+)
+from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
+from pydantic_core import CoreSchema
+
+from gqm_sym.declare import Curve
+from gqm_sym.declare.families import FAMILIES, cartesian_graph
+from gqm_sym.kernels import KERNELS, KernelRow
+from gqm_sym.specfile.fields import (
+    Centre,
+    CurveParameter,
+    Direction,
+    Ends,
+    Expression,
+    Flag,
+    Line,
+    Name,
+    Number,
+    ParameterName,
+)
+
+# What the format has in the end; what is in no table yet gets a message of its own.
+CURVE_KEYS = ("graph", "parametric", "polar", "implicit", "points", "pieces", "family")
+KERNEL_KEYS = (
+    *("gravity", "rolling", "coulomb", "drag", "surface_tension", "rotating_frame", "potential"),
+    *("central_force", "law"),
+)
+
+
+# Not "model | None = None": null in the file is a mistake, only leaving the key out is not.
+_ABSENT: Any = None
+
+
+class Section(BaseModel):
+    """A mapping of the file."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+_DOMAIN = Field(
+    default=None,
+    description="ends of the parameter's range; null for an open end",
+    examples=[["-pi", "pi"], [0, None]],
+)
+_PERIOD = Field(default=None, description="parameter period of a closed curve", examples=["2*pi"])
+
+
+class Graph(Section):
+    """The graph z = z(x)."""
+
+    z: Expression = Field(description="height", examples=["x**3", "h*(x**4 - 2*x**2)"])
+    parameter: CurveParameter = Field(default="x", description="the curve's parameter")
+    domain: Ends | None = _DOMAIN
+
+
+class Parametric(Section):
+    """Both coordinates in a parameter."""
+
+    x: Expression = Field(description="horizontal coordinate", examples=["L*cos(theta)"])
+    z: Expression = Field(description="height", examples=["L*sin(theta)"])
+    parameter: CurveParameter = Field(description="the curve's parameter", examples=["theta"])
+    period: Expression | None = _PERIOD
+    domain: Ends | None = _DOMAIN
+
+
+class Polar(Section):
+    """r = r(theta), theta from the positive x axis."""
+
+    r: Expression = Field(description="radius; may be negative", examples=["r0*exp(b*theta)"])
+    parameter: CurveParameter = Field(default="theta", description="the curve's parameter")
+    period: Expression | None = _PERIOD
+    domain: Ends | None = _DOMAIN
+
+
+def _family_model(name: str, doc: str, own: dict[str, Any]) -> type[Section]:
+    fields: dict[str, Any] = {
+        "name": (Literal[name], Field(description="the family")),
+        **own,
+        "parameter": (CurveParameter | None, Field(default=None, description="another name")),
+        "domain": (Ends | None, _DOMAIN),
+    }
+    return create_model(f"Family_{name}", __base__=Section, __doc__=doc, **fields)
+
+
+def _name_or_value(argument: str) -> tuple[Any, Any]:
+    what = f"another name for the parameter {argument}, or a value of it"
+    return (Expression, Field(default=None, description=what))
+
+
+FAMILY_MODELS: dict[str, type[Section]] = {
+    "cartesian_graph": _family_model(
+        "cartesian_graph",
+        "The graph z = phi(x).",
+        {"phi": (Expression, Field(description="height, as in a graph", examples=["x**3"]))},
+    ),
+    **{
+        row.name: _family_model(
+            row.name,
+            row.title,
+            {
+                **{argument: _name_or_value(argument) for argument in row.arguments},
+                "inverted": (Flag, Field(default=False, description="upside down: -z for z")),
+            },
+        )
+        for row in FAMILIES.values()
+    },
+}
+
+
+class CurveRow(NamedTuple):
+    """How a curve kind is written, and how it is declared from what was written."""
+
+    model: Any
+    declare: Callable[[dict[str, Any]], Curve]
+    summary: str
+
+
+def _declare_graph(given: dict[str, Any]) -> Curve:
+    return Curve.graph(given.pop("z"), **given)
+
+
+def _declare_polar(given: dict[str, Any]) -> Curve:
+    return Curve.polar(given.pop("r"), **given)
+
+
+def _declare_family(given: dict[str, Any]) -> Curve:
+    name = given.pop("name")
+    return FAMILIES[name](**given) if name in FAMILIES else cartesian_graph(**given)
+
+
+_FAMILY: Any = Annotated[reduce(or_, FAMILY_MODELS.values()), Field(discriminator="name")]
+
+CURVES: dict[str, CurveRow] = {
+    "graph": CurveRow(Graph, _declare_graph, "the graph z = z(x)"),
+    "parametric": CurveRow(
+        Parametric, lambda given: Curve.parametric(**given), "both coordinates in a parameter"
+    ),
+    "polar": CurveRow(Polar, _declare_polar, "r = r(theta)"),
+    "family": CurveRow(_FAMILY, _declare_family, "a curve of a known family"),
+}
+
+# Arguments of kernels that are not a name or a value.
+_KERNEL_ARGUMENTS: dict[str, tuple[Any, Any]] = {
+    "U": (Expression, Field(description="potential energy per unit mass, in x and z")),
+    "centre": (Centre, Field(default=None, description="its two coordinates; (0, 0) if not given")),
+}
+
+
+def _kernel_model(row: KernelRow) -> type[Section]:
+    fields: dict[str, Any] = {
+        argument: _KERNEL_ARGUMENTS.get(argument, _name_or_value(argument))
+        for argument in row.arguments
+    }
+    return create_model(f"Kernel_{row.name}", __base__=Section, __doc__=row.summary, **fields)
+
+
+def _sections(rows: dict[str, tuple[Any, str]]) -> dict[str, Any]:
+    return {
+        key: (model, Field(default=_ABSENT, description=summary))
+        for key, (model, summary) in rows.items()
+    }
+
+
+CurveSection: type[Section] = create_model(
+    "CurveSection",
+    __base__=Section,
+    __doc__="Exactly one way to give the curve.",
+    __config__=ConfigDict(json_schema_extra={"minProperties": 1, "maxProperties": 1}),
+    **_sections({key: (row.model, row.summary) for key, row in CURVES.items()}),
+)
+KERNEL_MODELS = {key: _kernel_model(row) for key, row in KERNELS.items()}
+KernelSection: type[Section] = create_model(
+    "KernelSection",
+    __base__=Section,
+    __doc__="The forces, one entry a term; gravity too is there only if named.",
+    **_sections({key: (model, KERNELS[key].summary) for key, model in KERNEL_MODELS.items()}),
+)
+
+
+class Parameter(Section):
+    """A run-time parameter: its default, and what people should know about it."""
+
+    value: Number | None = Field(
+        description="the default, exactly as written; null: to be given at run time",
+        examples=["9.81", "2/5", "pi/2"],
+    )
+    unit: Line = Field(default="", description="for people; nothing is converted")
+    description: Line = Field(default="", description="for people")
+
+    @classmethod
+    def __get_pydantic_json_schema__(
+        cls, core_schema: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> JsonSchemaValue:
+        """Describe the short form too: the value alone."""
+        short = {"type": ["string", "number", "null"]}
+        return {"anyOf": [short, handler.resolve_ref_schema(handler(core_schema))]}
+
+
+def read_default(value: object) -> object:
+    """Wrap a bare default into the long form."""
+    return value if isinstance(value, dict) else {"value": value}
+
+
+class Launch(Section):
+    """Where, how fast and which way the motion starts."""
+
+    lam0: Number = Field(description="the curve's parameter at launch", examples=["-pi/2 + 6/5"])
+    v0: Number = Field(default="0", description="speed, never negative", examples=["6.2088"])
+    direction: Direction = Field(default=1, description="the sign of ds/dt at launch")
+    t_max: Number | None = Field(default=None, description="how long to follow the motion")
+    contact: Literal["bilateral", "above", "below"] = Field(
+        default="bilateral",
+        description="above: the body is left of growing parameter and can lift off; below: right",
+    )
+
+
+class CurveFile(Section):
+    """A curve, the forces on a body that moves along it, and a launch."""
+
+    name: Name = Field(
+        description="of the generated module: a Python identifier", examples=["pendulum"]
+    )
+    title: Line = Field(default="", description="one line for people")
+    curve: CurveSection = Field(
+        description="exactly one kind", examples=[{"graph": {"z": "x**3", "parameter": "x"}}]
+    )
+    kernel: KernelSection = Field(description="the forces", examples=[{"gravity": {}}])
+    parameters: dict[ParameterName, Annotated[Parameter, BeforeValidator(read_default)]] = Field(
+        default_factory=dict,
+        description="every free symbol: a number, {value, unit, description}, or null",
+    )
+    launch: Launch = Field(default=_ABSENT, description="needed to solve")
+
+
+def model_at(path: tuple[str, ...]) -> Any:
+    """Return the model of the mapping at a place of the file; None if there is none there."""
+    match path:
+        case ():
+            return CurveFile
+        case ("curve",):
+            return CurveSection
+        case ("curve", "family", name):
+            return FAMILY_MODELS.get(name)
+        case ("curve", kind) if kind in CURVES and kind != "family":
+            return CURVES[kind].model
+        case ("kernel",):
+            return KernelSection
+        case ("kernel", key):
+            return KERNEL_MODELS.get(key)
+        case ("parameters", _):
+            return Parameter
+        case ("launch",):
+            return Launch
+    return None
+
+
+class _Draft07(GenerateJsonSchema):
+    """What editors understand: draft 7, without the titles that pydantic makes from names."""
+
+    schema_dialect = "http://json-schema.org/draft-07/schema#"
+
+    def field_title_should_be_set(self, schema: Any) -> bool:
+        return False
+
+
+def json_schema() -> dict[str, Any]:
+    """Return the JSON Schema (draft 7) of a curve file."""
+    schema = CurveFile.model_json_schema(
+        ref_template="#/definitions/{model}", schema_generator=_Draft07
+    )
+    schema["definitions"] = schema.pop("$defs")
+    return {"$schema": _Draft07.schema_dialect, **_without_null_defaults(schema)}
+
+
+def _without_null_defaults(schema: Any) -> Any:
+    # "default: null" only says that a key may be left out, which "required" says already.
+    if isinstance(schema, dict):
+        return {
+            key: _without_null_defaults(value)
+            for key, value in schema.items()
+            if not (key == "default" and value is None)
+        }
+    return [_without_null_defaults(item) for item in schema] if isinstance(schema, list) else schema

@@ -1,0 +1,134 @@
+"""What a curve file says, read and checked."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import sympy as sp
+
+from gqm_sym.declare import Curve
+from gqm_sym.derive import Model, derive
+from gqm_sym.errors import InputError, SpecFileError
+from gqm_sym.kernels import Kernel
+from gqm_sym.parameters import exact_value, is_positive
+from gqm_sym.specfile.nodes import MapNode, Mistakes
+from gqm_sym.specfile.places import locate, node_at, place_of
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Note:
+    """What a file tells people about a parameter."""
+
+    unit: str = ""
+    description: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Spec:
+    """A curve file.
+
+    Attributes
+    ----------
+    path
+        As it was given.
+    name, title
+        Of the module that will be generated; the title may be empty.
+    curve, kernel
+        The declarations.
+    parameters
+        Names with the exact text of their defaults; None: to be given at run time.
+    notes
+        Unit and description of the parameters that have any.
+    launch
+        Keyword arguments for ``solve``, numbers as the texts they are; None without a launch.
+    tree
+        The file's nodes, which know their places.
+    """
+
+    path: str
+    name: str
+    title: str
+    curve: Curve
+    kernel: Kernel
+    parameters: Mapping[str, str | None]
+    notes: Mapping[str, Note]
+    launch: Mapping[str, str | int] | None
+    tree: MapNode = field(repr=False, compare=False)
+
+    def derive(self) -> Model:
+        """Derive the closed forms.
+
+        Raises
+        ------
+        SpecFileError
+            If curve, kernel and parameters do not go together.
+        DerivationError
+            If a closed form is not real and finite.
+        """
+        try:
+            return derive(
+                self.curve, self.kernel, parameters=self.parameters, title=self.title or None
+            )
+        except SpecFileError:
+            raise
+        except InputError as error:
+            raise self.mistake(str(error)) from None
+
+    def check_solvable(self, model: Model) -> None:
+        """Refuse, with all reasons, a file whose motion cannot be computed from it alone.
+
+        Raises
+        ------
+        SpecFileError
+            If there is no launch, or a parameter has no value or one of the wrong sign.
+        """
+        mistakes = Mistakes(self.path)
+        if self.launch is None:
+            mistakes.add(
+                self.tree.mark,
+                "launch is missing, and to solve needs one",
+                "add it, as in launch: {lam0: 0.5, v0: 0}",
+            )
+        for name, value in model.defaults:
+            if value is None:
+                mark = place_of(self.tree, ("parameters", name))
+                what = f"parameters.{name}: null, and to solve needs a value"
+                mistakes.add(mark, what, f"write one, as in {name}: 1")
+            elif name in model.positive and not is_positive(value):
+                mark = place_of(self.tree, ("parameters", name))
+                what = f"parameters.{name}: must be positive, got {value}"
+                mistakes.add(mark, what, "the closed forms hold only so")
+        if self.launch is not None and not mistakes and (fault := _fault(model, self.launch)):
+            mark = node_at(self.tree, ("launch", "lam0")).mark
+            what = f"launch.lam0: {model.parameter.name} = {self.launch['lam0']}: {fault}"
+            mistakes.add(mark, what, "launch where the curve and the forces are defined")
+        if mistakes:
+            raise mistakes.error()
+
+    def mistake(self, message: str, *base: str) -> SpecFileError:
+        """Return a message as a mistake of this file, at the place it speaks of.
+
+        Parameters
+        ----------
+        message
+            Of an error that something in the file led to.
+        base
+            Keys on the way to the section it is about, as far as that is known.
+        """
+        mistakes = Mistakes(self.path)
+        mistakes.add(*locate(self.tree, message, base))
+        return mistakes.error()
+
+
+def _fault(model: Model, launch: Mapping[str, str | int]) -> str:
+    """Say why a motion cannot begin at a launch; empty if it can."""
+    values = {sp.Symbol(n, real=True): exact_value(v) for n, v in model.defaults if v is not None}
+    values[model.parameter] = exact_value(launch["lam0"])
+    forms = (("x", model.x), ("z", model.z), ("ds", model.ds), ("the potential", model.potential))
+    for label, form in forms:
+        try:
+            value = form.xreplace(values).evalf()
+        except (ArithmeticError, TypeError, ValueError):
+            value = sp.nan
+        if value.is_real is False or value.has(sp.nan, sp.zoo, sp.oo, -sp.oo):
+            return f"{label} is not a finite real number there"
+    return ""

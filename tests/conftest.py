@@ -1,0 +1,60 @@
+"""Fixtures of the whole suite: generated modules and motions, each made once a session."""
+
+import os
+from collections.abc import Callable
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import pytest
+from hypothesis import settings
+from problems import PROBLEMS, TRACKS, Problem
+
+# The first example of a test may compile for seconds; and a failure must show again.
+settings.register_profile("suite", deadline=None, derandomize=True, print_blob=True)
+settings.load_profile("suite")
+
+
+@pytest.fixture(scope="session")
+def generated_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Where the suite's modules are written; shared by parallel workers, with numba's cache."""
+    base = tmp_path_factory.getbasetemp()
+    root = base.parent if "PYTEST_XDIST_WORKER" in os.environ else base
+    folder = root / "modules"
+    folder.mkdir(exist_ok=True)
+    return folder
+
+
+@pytest.fixture(scope="session")
+def module_of(generated_folder: Path) -> Callable[[str], ModuleType]:
+    """Give the generated module of a track under gravity, by the track's name."""
+    import gqm_sym as gqm
+
+    built: dict[str, ModuleType] = {}
+
+    def module(track: str) -> ModuleType:
+        if track not in built:
+            model = gqm.derive(TRACKS[track].declare(), gqm.Gravity())
+            built[track] = gqm.build(model, name=track, folder=generated_folder)
+        return built[track]
+
+    return module
+
+
+@pytest.fixture(scope="session")
+def motion_of(module_of: Callable[[str], ModuleType]) -> Callable[[Problem], Any]:
+    """Give the motion of a problem, solved once."""
+    solved: dict[str, Any] = {}
+
+    def motion(problem: Problem) -> Any:
+        if problem.slug not in solved:
+            solved[problem.slug] = module_of(problem.track).solve(**problem.launch)
+        return solved[problem.slug]
+
+    return motion
+
+
+@pytest.fixture(params=PROBLEMS.values(), ids=PROBLEMS)
+def problem(request: pytest.FixtureRequest) -> Problem:
+    """Each problem of the table in turn."""
+    return request.param

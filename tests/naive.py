@@ -1,0 +1,107 @@
+"""Slow, obvious oracles: what a motion must be, from mpmath and SymPy alone, never from gqm_sym."""
+
+import math
+from collections.abc import Callable
+from functools import cache
+from typing import NamedTuple
+
+import sympy as sp
+from mpmath import mp, mpf
+from problems import DIGITS, Problem, Track, number
+
+
+class Point(NamedTuple):
+    """Everything that is known at one place."""
+
+    x: mpf
+    z: mpf
+    ds: mpf
+    kappa: mpf
+    v2: mpf
+    normal_force: mpf
+
+
+@cache
+def _geometry(track: Track) -> Callable[..., list[mpf]]:
+    """Coordinates and their derivatives, as SymPy gives them without any simplification."""
+    names = sp.symbols([track.parameter, *track.parameters], real=True)
+    known = {symbol.name: symbol for symbol in names}
+    x, z = (sp.sympify(text, locals=known, rational=True) for text in (track.x, track.z))
+    lam = names[0]
+    derivatives = [sp.diff(c, lam, order) for order in (0, 1, 2) for c in (x, z)]
+    return sp.lambdify(names, derivatives, "mpmath")
+
+
+def point(problem: Problem, track: Track, lam: mpf | float | str) -> Point:
+    """What the definitions give at ``lam``, to 50 digits: V**2 = v0**2 - 2*g*(z - z0) and so on."""
+    given = dict(problem.parameters)
+    with mp.workdps(DIGITS):
+        geometry = _geometry(track)
+        values = [number(given[name]) for name in track.parameters]
+        g, m = number(given.get("g", "9.81")), number(given.get("m", "1"))
+        place = lam if isinstance(lam, mpf) else number(lam)
+        x, z, dx, dz, ddx, ddz = geometry(place, *values)
+        z0 = geometry(number(problem.lam0), *values)[1]
+        ds = mp.sqrt(dx**2 + dz**2)
+        kappa = (dx * ddz - dz * ddx) / ds**3
+        v2 = number(problem.v0) ** 2 - 2 * g * (z - z0)
+        return Point(x, z, ds, kappa, v2, m * (g * dx / ds + kappa * v2))
+
+
+class Scale(NamedTuple):
+    """What "within so much of its scale" refers to (a time's scale is the time itself)."""
+
+    lam: float
+    place: float
+    v: float
+
+
+@cache
+def scale(problem: Problem, track: Track) -> Scale:
+    """Largest |lam|, extent of the orbit in the plane, largest speed.
+
+    What rests has no extent: there it is the distance from the origin.
+    """
+    seen = [number(row.lam) for row in (*problem.positions, *problem.samples)]
+    seen += [number(text) for text in problem.turning_points or ()]
+    seen.append(number(problem.lam0))
+    if track.period is not None and problem.kind == "circulation":
+        seen.append(seen[-1] + number(track.period))
+    low, high = min(seen), max(seen)
+    orbit = [point(problem, track, low + (high - low) * k / 32) for k in range(33)]
+    width = max(p.x for p in orbit) - min(p.x for p in orbit)
+    height = max(p.z for p in orbit) - min(p.z for p in orbit)
+    if problem.kind == "rest":
+        width, height = (abs(c) for c in orbit[0][:2])
+    return Scale(
+        lam=float(max(*(abs(lam) for lam in seen), high - low)),
+        place=float(max(width, height)),
+        v=float(mp.sqrt(max(*(p.v2 for p in orbit), mpf(0)))),
+    )
+
+
+def pendulum(amplitude: mpf | float, frequency: mpf | float, t: mpf | float) -> mpf:
+    """Angle from the vertical after release at ``amplitude``: 2*asin(k*cd(omega*t, k))."""
+    with mp.workdps(DIGITS):
+        k = mp.sin(mpf(amplitude) / 2)
+        u = mpf(frequency) * mpf(t)
+        cn, dn = mp.ellipfun("cn", u, m=k**2), mp.ellipfun("dn", u, m=k**2)
+        return 2 * mp.asin(k * cn / dn)
+
+
+def pendulum_half_period(amplitude: mpf | float, frequency: mpf | float) -> mpf:
+    """Half period of a pendulum: 2*K(sin(A/2))/omega."""
+    with mp.workdps(DIGITS):
+        return 2 * mp.ellipk(mp.sin(mpf(amplitude) / 2) ** 2) / mpf(frequency)
+
+
+def error(actual: float, expected: str | mpf) -> float:
+    """|actual - expected|, subtracted at 50 digits."""
+    with mp.workdps(DIGITS):
+        truth = expected if isinstance(expected, mpf) else mpf(expected)
+        return float(abs(mpf(float(actual)) - truth))
+
+
+def ulps(actual: float, expected: str | mpf) -> float:
+    """The same in units of the last place of the expected value."""
+    return error(actual, expected) / math.ulp(float(expected))

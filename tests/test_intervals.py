@@ -1,0 +1,214 @@
+"""Intervals hold what they must, are tight where signs depend on it, and are never NaN."""
+
+import math
+from collections.abc import Callable
+from fractions import Fraction
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from mpmath import mp, mpf
+
+from gqm_sym.runtime import intervals as iv
+
+Interval = tuple[float, float]
+
+ALL = (-math.inf, math.inf)
+# Both ends: what the C library's functions are widened by, then rounding.
+WIDTH = 2 * (2.0**-50 + 2.0**-52)
+DIGITS = 40
+# Far enough for every overflow and underflow, while mpmath still answers at once.
+LARGEST = 1e9
+
+UNARY = {
+    "exp": (mp.exp, -LARGEST, LARGEST),
+    "sin": (mp.sin, -LARGEST, LARGEST),
+    "cos": (mp.cos, -LARGEST, LARGEST),
+    "tan": (mp.tan, -LARGEST, LARGEST),
+    "sinh": (mp.sinh, -LARGEST, LARGEST),
+    "cosh": (mp.cosh, -LARGEST, LARGEST),
+    "tanh": (mp.tanh, -LARGEST, LARGEST),
+    "atan": (mp.atan, -1e300, 1e300),
+    "asinh": (mp.asinh, -1e150, 1e150),
+    "abs": (abs, -1e300, 1e300),
+    "neg": (lambda x: -x, -1e300, 1e300),
+    "sqrt": (mp.sqrt, 0.0, 1e300),
+    "log": (mp.log, 5e-324, 1e300),
+    "acosh": (mp.acosh, 1.0, 1e300),
+    "asin": (mp.asin, -1.0, 1.0),
+    "acos": (mp.acos, -1.0, 1.0),
+    "atanh": (mp.atanh, math.nextafter(-1.0, 0.0), math.nextafter(1.0, 0.0)),
+}
+
+wide = st.floats(-1e300, 1e300)
+near = st.floats(-10.0, 10.0)
+exponents = st.integers(-12, 12)
+
+
+def holds(interval: Interval, true: mpf) -> bool:
+    """Whether the exact number lies in the interval."""
+    return mpf(interval[0]) <= true <= mpf(interval[1])
+
+
+def drawn(data: st.DataObject, low: float, high: float) -> tuple[Interval, float]:
+    """An interval and a number in it, often close to each other or to the ends of the domain."""
+    narrow = st.floats(max(low, -10.0), min(high, 10.0))
+    lo, hi = sorted(data.draw(st.tuples(*[narrow | st.floats(low, high)] * 2)))
+    inside = st.just(lo) if lo == hi else st.floats(lo, hi) | st.sampled_from([lo, hi])
+    return (lo, hi), data.draw(inside)
+
+
+@pytest.mark.parametrize("name", UNARY)
+@given(data=st.data())
+def test_function_holds_every_value(name: str, data: st.DataObject) -> None:
+    """The value at a number in the interval lies in the bounds, overflow and underflow included."""
+    true, low, high = UNARY[name]
+    interval, x = drawn(data, low, high)
+    bounds = getattr(iv, f"i{name}")(interval)
+    with mp.workdps(DIGITS):
+        assert holds(bounds, true(mpf(x))), f"i{name}({interval}) = {bounds} misses {name}({x!r})"
+
+
+@pytest.mark.parametrize("name", UNARY)
+@given(data=st.data())
+def test_function_of_a_number_is_tight(name: str, data: st.DataObject) -> None:
+    """A point gives an interval of a few ulps."""
+    _true, low, high = UNARY[name]
+    x = data.draw(st.floats(max(low, -3.0), min(high, 3.0), allow_subnormal=False))
+    lo, hi = getattr(iv, f"i{name}")((x, x))
+    if name == "tan" and abs(abs(x) - math.pi / 2) < 1e-12:
+        return  # a pole lies too close
+    if name in ("sin", "cos") and math.cos(2 * x) ** 2 > 1 - 1e-14:
+        assert hi - lo <= 1e-14  # an extremum lies too close
+        return
+    assert hi - lo <= WIDTH * max(abs(lo), abs(hi)) + 1e-322
+
+
+BINARY: dict[str, Callable[[Fraction, Fraction], Fraction]] = {
+    "add": lambda x, y: x + y,
+    "sub": lambda x, y: x - y,
+    "mul": lambda x, y: x * y,
+    "div": lambda x, y: x / y,
+}
+
+
+@pytest.mark.parametrize("name", BINARY)
+@given(data=st.data())
+def test_arithmetic_holds_every_value(name: str, data: st.DataObject) -> None:
+    """The result x op y lies in X op Y, in exact rational arithmetic."""
+    (a, x), (b, y) = drawn(data, -1e300, 1e300), drawn(data, -1e300, 1e300)
+    if name == "div" and y == 0.0:
+        return
+    lo, hi = getattr(iv, f"i{name}")(a, b)
+    true = BINARY[name](Fraction(x), Fraction(y))
+    assert lo == -math.inf or Fraction(lo) <= true
+    assert hi == math.inf or true <= Fraction(hi)
+
+
+@given(data=st.data(), n=exponents)
+def test_whole_powers_hold_every_value(data: st.DataObject, n: int) -> None:
+    """The power x**n lies in X**n, poles included."""
+    interval, x = drawn(data, -1e60, 1e60)
+    if n < 0 and x == 0.0:
+        return
+    with mp.workdps(DIGITS):
+        assert holds(iv.ipow(interval, n), mpf(x) ** n)
+
+
+@given(data=st.data(), p=st.floats(-12.0, 12.0))
+def test_real_powers_hold_every_value(data: st.DataObject, p: float) -> None:
+    """The power x**p lies in X**p, also for the exponents that p may be the rounding of."""
+    interval, x = drawn(data, 0.0, 1e300)
+    if p < 0 and x == 0.0:
+        return
+    bounds = iv.irpow(interval, p)
+    with mp.workdps(DIGITS):
+        for share in (-1, 0, 1):
+            assert holds(bounds, mpf(x) ** (mpf(p) * (1 + share * mpf(2) ** -53)))
+
+
+@given(a=st.tuples(*[st.floats(allow_nan=True)] * 2), b=st.tuples(*[st.floats(allow_nan=True)] * 2))
+def test_never_nan(a: Interval, b: Interval) -> None:
+    """Whatever comes in, even NaN and infinities, no bound is NaN."""
+    if a[0] > a[1] or b[0] > b[1]:
+        return
+    results = [getattr(iv, f"i{name}")(a, b) for name in BINARY]
+    results += [iv.ipow(a, 2), iv.ipow(a, 3), iv.ipow(a, -1), iv.ipow(a, -2)]
+    results += [iv.irpow(a, 0.3), iv.irpow(a, -0.3)]
+    results += [getattr(iv, f"i{name}")(a) for name in UNARY if name not in ("abs", "neg")]
+    for bounds in results:
+        assert bounds[0] <= bounds[1]
+
+
+@pytest.mark.parametrize(
+    ("bounds", "expected"),
+    [
+        (iv.ipow((-2.0, 1.0), 2)[0], 0.0),
+        (iv.ipow((-2.0, 1.0), 4)[0], 0.0),
+        (iv.iabs((-2.0, 1.0)), (0.0, 2.0)),
+        (iv.isqrt((0.0, 0.0)), (0.0, 0.0)),
+        (iv.imul((0.0, 3.0), (-math.inf, math.inf)), ALL),
+        (iv.imul((0.0, 0.0), ALL), (0.0, 0.0)),
+        (iv.imul((0.0, 1e-200), (0.0, 1e-200))[0], 0.0),
+        (iv.imul((1e-200, 1.0), (1e-200, 1.0))[0], 0.0),
+        (iv.iadd((0.0, 1.0), (0.0, 1.0))[0], 0.0),
+        (iv.icosh((-1.0, 2.0))[0], 1.0),
+        (iv.isin((1.0, 2.0))[1], 1.0),
+        (iv.icos((3.0, 4.0))[0], -1.0),
+        (iv.icos((-1.0, 1.0))[1], 1.0),
+        (iv.isin((0.0, 7.0)), (-1.0, 1.0)),
+        (iv.isin((1e300, 1e300)), (-1.0, 1.0)),
+        (iv.itanh((-1e3, 1e3)), (-1.0, 1.0)),
+        (iv.iexp((-math.inf, 0.0))[0], 0.0),
+        (iv.iconst(2), (2.0, 2.0)),
+        (iv.ineg((-1.0, 2.0)), (-2.0, 1.0)),
+    ],
+)
+def test_signs_and_extrema_are_exact(bounds: float | Interval, expected: float | Interval) -> None:
+    """Zeros, extrema and clamps are not widened: signs are proved by them."""
+    assert bounds == expected
+
+
+@pytest.mark.parametrize(
+    "bounds",
+    [
+        iv.isqrt((-1.0, 4.0)),
+        iv.ilog((-1.0, 4.0)),
+        iv.iasin((0.0, 1.5)),
+        iv.iacos((-1.5, 0.0)),
+        iv.iacosh((0.5, 2.0)),
+        iv.iatanh((0.0, 1.5)),
+        iv.irpow((-1.0, 2.0), 0.5),
+        iv.itan((1.0, 2.0)),
+        iv.idiv((1.0, 2.0), (-1.0, 1.0)),
+        iv.idiv((1.0, 2.0), (0.0, 0.0)),
+        iv.ipow((-1.0, 1.0), -3),
+        iv.isqrt((math.nan, 1.0)),
+    ],
+)
+def test_gaps_in_the_domain_prove_nothing(bounds: Interval) -> None:
+    """Partly outside the domain, or across a pole, anything is possible."""
+    assert bounds == ALL
+
+
+def test_pole_at_an_end_bounds_one_side() -> None:
+    """Towards a pole from one side the values go to one infinity."""
+    assert iv.idiv((1.0, 2.0), (0.0, 4.0)) == (pytest.approx(0.25), math.inf)
+    assert iv.idiv((1.0, 2.0), (-4.0, 0.0)) == (-math.inf, pytest.approx(-0.25))
+    assert iv.ilog((0.0, 1.0)) == (-math.inf, 0.0)
+    assert iv.iatanh((0.0, 1.0)) == (0.0, math.inf)
+    assert iv.irpow((0.0, 4.0), -0.5) == (pytest.approx(0.5), math.inf)
+
+
+def test_overflow_is_no_infinite_lower_bound() -> None:
+    """What overflows is bounded below by the largest float."""
+    assert iv.iexp((1e3, 1e4)) == (math.nextafter(math.inf, 0.0), math.inf)
+    assert iv.imul((1e300, 1e300), (-1e300, -1e300)) == (-math.inf, -math.nextafter(math.inf, 0.0))
+
+
+def test_rounded_constants_hold_what_they_stand_for() -> None:
+    """The float next to 1/10 and to pi hold these two."""
+    lo, hi = iv.ipoint(0.1)
+    assert Fraction(lo) < Fraction(1, 10) < Fraction(hi)
+    with mp.workdps(DIGITS):
+        assert holds(iv.ipi(), +mp.pi)
