@@ -73,10 +73,7 @@ def main() -> None:
             motion.lam(times)
             solved = seconds(lambda module=module, spec=spec: module.solve(**spec.launch), 20)
             asked = seconds(lambda motion=motion, times=times: motion.lam(times), 5) / MANY
-            print(
-                f"{spec.name:<18}{derived:>8.2f} s{emitted:>8.2f} s"
-                f"{1e3 * solved:>9.2f} ms{1e9 * asked:>7.0f} ns"
-            )
+            print(f"{spec.name:<18}{derived:>8.2f} s{emitted:>8.2f} s{1e3 * solved:>9.2f} ms{1e9 * asked:>7.0f} ns")
     numba, ours = second_process()
     print(f"\na second process: import numba {numba:.2f} s, then a solved pendulum {ours:.3f} s")
 

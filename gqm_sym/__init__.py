@@ -7,10 +7,10 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from gqm_sym.build import build
+    from gqm_sym.building import build
     from gqm_sym.declare import Curve, families
-    from gqm_sym.derive import Model, derive
-    from gqm_sym.emit import emit
+    from gqm_sym.derivation import Model, derive
+    from gqm_sym.emission import emit
     from gqm_sym.errors import GQMError
     from gqm_sym.kernels import CentralForce, Gravity, Kernel, Potential, Rolling, RotatingFrame
     from gqm_sym.specfile import read_spec
@@ -23,13 +23,13 @@ _HOMES = {
     "GQMError": "gqm_sym.errors",
     "Gravity": "gqm_sym.kernels",
     "Kernel": "gqm_sym.kernels",
-    "Model": "gqm_sym.derive",
+    "Model": "gqm_sym.derivation",
     "Potential": "gqm_sym.kernels",
     "Rolling": "gqm_sym.kernels",
     "RotatingFrame": "gqm_sym.kernels",
-    "build": "gqm_sym.build",
-    "derive": "gqm_sym.derive",
-    "emit": "gqm_sym.emit",
+    "build": "gqm_sym.building",
+    "derive": "gqm_sym.derivation",
+    "emit": "gqm_sym.emission",
     "families": "gqm_sym.declare",
     "read_spec": "gqm_sym.specfile",
 }
@@ -61,13 +61,3 @@ def __getattr__(name: str) -> Any:
 
 def __dir__() -> list[str]:
     return sorted(__all__)
-
-
-class _Package(__import__("types").ModuleType):  # interim: functions win over subpackages of the same name
-    def __setattr__(self, name: str, value: Any) -> None:
-        if name in _HOMES and type(value).__name__ == "module":
-            return
-        super().__setattr__(name, value)
-
-
-__import__("sys").modules[__name__].__class__ = _Package

@@ -25,9 +25,7 @@ Source: TypeAlias = str | int | float | Fraction | Decimal | sp.Expr
 S = TypeVar("S")
 
 # Names that ``solve`` and its kin have arguments of; CONTRACT, "The YAML".
-RESERVED_NAMES = frozenset(
-    {"lam", "lam0", "v0", "direction", "t_max", "contact", "point", "quantity"}
-)
+RESERVED_NAMES = frozenset({"lam", "lam0", "v0", "direction", "t_max", "contact", "point", "quantity"})
 
 # Size in bits of all rational numbers that one operation may melt into one, and of any that stays.
 # SymPy looks for the factors of a number it takes a root of: 3000 bits take it seconds.
@@ -85,9 +83,7 @@ def read_expression(source: Source, *, where: str) -> sp.Expr:
     else:
         exact = rationals.read_exact(source, where=where)
         if exact is None:
-            raise ExpressionError(
-                f"{where}: {type(source).__name__} given; give text, a number or a SymPy expression"
-            )
+            raise ExpressionError(f"{where}: {type(source).__name__} given; give text, a number or a SymPy expression")
         tree = constant(exact)
     check_constants(tree, where=where)
     return evaluate(tree, _SymPy(), where=where)

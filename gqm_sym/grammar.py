@@ -60,9 +60,7 @@ _HINTS = {
 }
 _LOOK_ALIKES = {
     **dict.fromkeys("\N{MINUS SIGN}\N{EN DASH}\N{EM DASH}\N{HYPHEN}\N{NON-BREAKING HYPHEN}", "-"),
-    **dict.fromkeys(
-        "\N{MULTIPLICATION SIGN}\N{MIDDLE DOT}\N{DOT OPERATOR}\N{ASTERISK OPERATOR}", "*"
-    ),
+    **dict.fromkeys("\N{MULTIPLICATION SIGN}\N{MIDDLE DOT}\N{DOT OPERATOR}\N{ASTERISK OPERATOR}", "*"),
     **dict.fromkeys("\N{DIVISION SIGN}\N{DIVISION SLASH}\N{FRACTION SLASH}", "/"),
     **{"\N{SUPERSCRIPT TWO}": "**2", "\N{SUPERSCRIPT THREE}": "**3", "\N{SQUARE ROOT}": "sqrt( )"},
 }
@@ -199,17 +197,11 @@ class _Parser:
             return self.name(token)
         if token.text in ("+", "-"):
             inner = self.nested(token, _SIGN)
-            return (
-                inner
-                if token.text == "+"
-                else at_column(ast.UnaryOp(ast.USub(), inner), token.column)
-            )
+            return inner if token.text == "+" else at_column(ast.UnaryOp(ast.USub(), inner), token.column)
         if token.text == "(":
             return self.parenthesis(token)
         given = f"{token.text!r}" if token.text else "the end"
-        raise _refuse(
-            self.where, token.column, f"{given} where a number, a name or '(' should stand"
-        )
+        raise _refuse(self.where, token.column, f"{given} where a number, a name or '(' should stand")
 
     def parenthesis(self, opening: _Token) -> ast.expr:
         inner = self.nested(opening, 0)
@@ -237,9 +229,7 @@ class _Parser:
             call = ast.Call(function, [self.parenthesis(following)], [])
             return at_column(call, token.column)
         if token.text in FUNCTIONS:
-            what = (
-                f"{token.text!r} is a function; write its argument in parentheses: {token.text}(x)"
-            )
+            what = f"{token.text!r} is a function; write its argument in parentheses: {token.text}(x)"
             raise _refuse(self.where, token.column, what)
         return at_column(ast.Name(token.text, ast.Load()), token.column)
 

@@ -102,8 +102,7 @@ def check_parameter(name: str, *, where: str) -> str:
     """Return ``name`` if a run-time parameter may be called so."""
     if name in COORDINATES:
         raise DeclarationError(
-            f"{where}: {name!r} is a coordinate and cannot be a run-time parameter; "
-            "give the parameter another name"
+            f"{where}: {name!r} is a coordinate and cannot be a run-time parameter; give the parameter another name"
         )
     return check_name(name, where=where)
 

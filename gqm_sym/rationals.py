@@ -121,9 +121,7 @@ def read_exact(value: object, *, where: str) -> Fraction | None:
 
 
 def _is_numpy_float(value: object) -> bool:
-    return any(
-        base.__module__ == "numpy" and base.__name__ == "floating" for base in type(value).__mro__
-    )
+    return any(base.__module__ == "numpy" and base.__name__ == "floating" for base in type(value).__mro__)
 
 
 def _is_special(value: Any) -> bool:

@@ -91,8 +91,7 @@ def _symbol(node: Any, where: str) -> ast.expr:
         )
     if not NAME.fullmatch(node.name):
         raise ExpressionError(
-            f"{where}: symbol {node.name!r}; a name is made of ASCII letters, digits and _, "
-            "and begins with a letter"
+            f"{where}: symbol {node.name!r}; a name is made of ASCII letters, digits and _, and begins with a letter"
         )
     if node.is_real is False:
         raise ExpressionError(f"{where}: symbol {node.name!r} is declared not real; drop that")

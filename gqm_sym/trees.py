@@ -107,9 +107,7 @@ def at_column(node: N, column: int) -> N:
     return node
 
 
-def _chain(
-    tree: ast.expr, direct: type[ast.operator], inverse: type[ast.operator]
-) -> list[tuple[ast.expr, bool]]:
+def _chain(tree: ast.expr, direct: type[ast.operator], inverse: type[ast.operator]) -> list[tuple[ast.expr, bool]]:
     """Operands of a chain of one precedence, in order, with whether each is inverted."""
     operands = []
     while isinstance(tree, ast.BinOp) and isinstance(tree.op, direct | inverse):

@@ -42,9 +42,7 @@ def kronrod_nodes():
         for power, c in enumerate(mp.taylor(lambda x, k=k: legendre(k, x), 0, k)):
             coefficients[power] += weight * c
     stieltjes = polyroots(coefficients[::-1], maxsteps=400, extraprec=400)
-    gauss = polyroots(
-        mp.taylor(lambda x: legendre(10, x), 0, 10)[::-1], maxsteps=400, extraprec=400
-    )
+    gauss = polyroots(mp.taylor(lambda x: legendre(10, x), 0, 10)[::-1], maxsteps=400, extraprec=400)
     roots = sorted(r.real for r in [*stieltjes, *gauss])
     return [mpf(0), *roots[11:]], sorted(r.real for r in gauss)[5:]
 
@@ -58,6 +56,7 @@ def show(name, values):
 
 
 def main():
+    """Print the module."""
     mp.dps = 80
     nodes, gauss = kronrod_nodes()
     even = matrix([[legendre_row(x, 21)[2 * j] for j in range(11)] for x in nodes])

@@ -270,9 +270,7 @@ def _paper() -> Iterator[Problem]:
             first_turn=expected["time_to_first_turning_point"],
             end=None if end is None else ("cusp", end),
             contact_changes=tuple(row["lam"] for row in expected.get("N_zero_crossings", ())),
-            positions=tuple(
-                Position(t=row["t"], lam=row["lam"], v=row["V"]) for row in expected["positions"]
-            ),
+            positions=tuple(Position(t=row["t"], lam=row["lam"], v=row["V"]) for row in expected["positions"]),
             samples=tuple(
                 Sample(
                     lam=row["lam"],
@@ -312,10 +310,7 @@ def _corpus() -> Iterator[Problem]:
                 loop_time=expected.get("loop_time"),
                 turning_points=met,
                 passage=None if transit is None else (launch["to"], transit),
-                positions=tuple(
-                    Position(t=row["t"], lam=row["lam"], v=row["v"])
-                    for row in expected["positions"]
-                ),
+                positions=tuple(Position(t=row["t"], lam=row["lam"], v=row["v"]) for row in expected["positions"]),
                 samples=tuple(
                     Sample(**{key: row[key] for key in ("lam", "v2", "kappa", "normal_force")})
                     for row in expected["samples"]
@@ -352,9 +347,7 @@ def where(**wanted: Any) -> list[Problem]:
 
     def fits(problem: Problem) -> bool:
         return all(
-            bool(getattr(problem, key)) is value
-            if isinstance(value, bool)
-            else getattr(problem, key) == value
+            bool(getattr(problem, key)) is value if isinstance(value, bool) else getattr(problem, key) == value
             for key, value in wanted.items()
         )
 

@@ -13,9 +13,9 @@ PACKAGE = Path(__file__).parent.parent / "gqm_sym"
 # From the top down: a unit imports itself and units of the layers under its own.
 LAYERS = (
     {"cli"},
-    {"build", "specfile"},
-    {"emit"},
-    {"derive"},
+    {"building", "specfile"},
+    {"emission"},
+    {"derivation"},
     {"declare", "kernels"},
     {"parameters"},
     {"expressions"},
@@ -28,11 +28,11 @@ LAYERS = (
 )
 
 # Not above the runtime though it lies in a layer above it: they know it by name only.
-KNOWS_NO_RUNTIME = {"emit", "derive", "declare", "kernels", "parameters", "expressions"}
+KNOWS_NO_RUNTIME = {"emission", "derivation", "declare", "kernels", "parameters", "expressions"}
 
 # Packages that only some units import. Nothing imports scipy.
 ONLY_IN = {
-    "jinja2": {"emit"},
+    "jinja2": {"emission"},
     "llvmlite": {"runtime"},
     "mpmath": {"runtime", "enclosures"},
     "numba": {"runtime"},
@@ -43,8 +43,8 @@ ONLY_IN = {
     "sympy": {
         "cli",
         "specfile",
-        "emit",
-        "derive",
+        "emission",
+        "derivation",
         "declare",
         "kernels",
         "parameters",
@@ -112,11 +112,7 @@ LEVEL = {unit: level for level, layer in enumerate(LAYERS) for unit in layer}
 
 def test_every_unit_has_its_place() -> None:
     """A new file or folder of the package is put into the table before anything imports it."""
-    units = {
-        _unit(path)
-        for path in PACKAGE.rglob("*.py")
-        if path.parent != PACKAGE or path.name != "__init__.py"
-    }
+    units = {_unit(path) for path in PACKAGE.rglob("*.py") if path.parent != PACKAGE or path.name != "__init__.py"}
     assert units - {"_templates"} == set(LEVEL)
 
 
@@ -127,8 +123,7 @@ def test_imports_go_downwards() -> None:
         for row in IMPORTS
         if row.target.startswith("gqm_sym.") and row.unit != "__init__"
         for unit in [row.target.split(".")[1]]
-        if unit != row.unit
-        and (LEVEL[unit] <= LEVEL[row.unit] or (unit == "runtime" and row.unit in KNOWS_NO_RUNTIME))
+        if unit != row.unit and (LEVEL[unit] <= LEVEL[row.unit] or (unit == "runtime" and row.unit in KNOWS_NO_RUNTIME))
     ]
     assert wrong == []
 
@@ -155,9 +150,5 @@ def test_no_other_package_is_imported() -> None:
 
 def test_some_imports_wait() -> None:
     """Packages that few calls need are imported inside the functions that need them."""
-    eager = [
-        row.file
-        for row in IMPORTS
-        if row.target.split(".")[0] in ONLY_INSIDE_FUNCTIONS and not row.waits
-    ]
+    eager = [row.file for row in IMPORTS if row.target.split(".")[0] in ONLY_INSIDE_FUNCTIONS and not row.waits]
     assert eager == []

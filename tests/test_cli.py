@@ -73,9 +73,7 @@ class Commands:
 
 
 @pytest.fixture
-def here(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> Commands:
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Commands:
     """A folder with two right curve files, to run commands in."""
     monkeypatch.chdir(tmp_path)
     Path("swing.yaml").write_text(PENDULUM)
@@ -143,9 +141,7 @@ def test_check_goes_through_all_states(here: Commands) -> None:
     before = module.read_text()
     outdated = here.gen("--check", "--diff", "swing.yaml")
     assert outdated.code == 1
-    assert outdated.err == (
-        f"{module}: is not what swing.yaml gives; write it by gqm-gen -o generated swing.yaml\n"
-    )
+    assert outdated.err == (f"{module}: is not what swing.yaml gives; write it by gqm-gen -o generated swing.yaml\n")
     assert outdated.out.startswith("--- ")
     assert "'2'" in outdated.out
     assert module.read_text() == before
@@ -234,9 +230,7 @@ REFUSED: dict[str, tuple[str, tuple[str, ...]]] = {
 
 
 @pytest.mark.parametrize("case", REFUSED.values(), ids=REFUSED.keys())
-def test_bad_input_ends_with_2_and_writes_nothing(
-    case: tuple[str, tuple[str, ...]], here: Commands
-) -> None:
+def test_bad_input_ends_with_2_and_writes_nothing(case: tuple[str, tuple[str, ...]], here: Commands) -> None:
     """Each mistake is one line on stderr, and no file is touched."""
     text, beginnings = case
     Path("swing.yaml").write_text(text)
@@ -254,9 +248,7 @@ def test_mistakes_of_all_files_come_together(here: Commands) -> None:
     Path("two.yaml").write_text(PENDULUM.replace("gravity", "levity"))
     code, _, err = here.gen("one.yaml", "missing.yaml", ".", "swing.yaml", "two.yaml")
     assert code == 2
-    assert [line.split(":")[0] for line in err.splitlines()] == [
-        *("one.yaml", "missing.yaml", ".", "two.yaml")
-    ]
+    assert [line.split(":")[0] for line in err.splitlines()] == [*("one.yaml", "missing.yaml", ".", "two.yaml")]
     assert not Path("generated").exists()
 
 
@@ -336,9 +328,7 @@ def test_a_mistake_of_ours_is_one_line_too(here: Commands, monkeypatch: pytest.M
 
 def test_gqm_solve_replaces_and_asks(here: Commands) -> None:
     """Launch and parameters can be replaced, states asked for; nothing is written."""
-    code, out, err = here.gqm(
-        *("solve", "bowl.yaml", "--set", "a=1/2", "--lam0=-1/4", "--v0", "0.5", "--at", "0")
-    )
+    code, out, err = here.gqm(*("solve", "bowl.yaml", "--set", "a=1/2", "--lam0=-1/4", "--v0", "0.5", "--at", "0"))
     assert (code, err) == (0, "")
     rows = [line.split() for line in out.splitlines()]
     assert ["kind", "libration"] in rows
@@ -371,9 +361,7 @@ def test_gqm_schema_is_json(here: Commands) -> None:
     """The schema can be read back, and knows the sections."""
     code, out, err = here.gqm("schema")
     assert (code, err) == (0, "")
-    assert set(json.loads(out)["properties"]) == {
-        *("name", "title", "curve", "kernel", "parameters", "launch")
-    }
+    assert set(json.loads(out)["properties"]) == {*("name", "title", "curve", "kernel", "parameters", "launch")}
 
 
 def test_gqm_lists_what_there_is(here: Commands) -> None:
@@ -403,9 +391,7 @@ def test_help_loads_nothing_heavy() -> None:
         "heavy = {'sympy', 'numba', 'numpy', 'pydantic', 'ruamel'} & set(sys.modules)\n"
         "sys.exit(str((codes, heavy)) if any(codes) or heavy else 0)\n"
     )
-    run = subprocess.run(
-        [sys.executable, "-c", script], capture_output=True, text=True, check=False
-    )
+    run = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False)
     assert run.returncode == 0, run.stderr
     assert "usage: gqm-gen" in run.stdout
 
@@ -415,9 +401,7 @@ def test_a_reader_that_leaves_is_no_error() -> None:
     script = "import sys\nfrom gqm_sym.cli import tool\nsys.exit(tool.main(['schema']))\n"
     reader, writer = os.pipe()
     os.close(reader)
-    run = subprocess.run(
-        [sys.executable, "-c", script], stdout=writer, stderr=subprocess.PIPE, check=False
-    )
+    run = subprocess.run([sys.executable, "-c", script], stdout=writer, stderr=subprocess.PIPE, check=False)
     os.close(writer)
     assert run.returncode == 141
     assert run.stderr == b""

@@ -43,9 +43,7 @@ def test_parameters_keep_the_order_of_their_declaration():
 
 def test_domain_and_period_may_contain_parameters():
     """Ends are expressions in run-time parameters; either may be open."""
-    curve = Curve.parametric(
-        x="L*cos(u)", z="L*sin(u)", parameter="u", period="2*pi", domain=(None, "w")
-    )
+    curve = Curve.parametric(x="L*cos(u)", z="L*sin(u)", parameter="u", period="2*pi", domain=(None, "w"))
     assert curve.domain == (None, sp.Symbol("w", real=True))
     assert curve.period == 2 * sp.pi
     assert curve.parameters == ("L", "w")
@@ -66,15 +64,9 @@ def test_lam_is_a_name_for_a_curves_parameter_only():
 @pytest.mark.parametrize(
     ("declare", "words"),
     [
-        pytest.param(
-            lambda: Curve.parametric(x="a", z="b", parameter="t"), ["'t'", "point"], id="a point"
-        ),
-        pytest.param(
-            lambda: Curve.graph("x", parameters={"q": 1}), ["'q'", "not used"], id="unused"
-        ),
-        pytest.param(
-            lambda: Curve.graph("x", domain=("x", 1)), ["domain", "'x'"], id="domain in x"
-        ),
+        pytest.param(lambda: Curve.parametric(x="a", z="b", parameter="t"), ["'t'", "point"], id="a point"),
+        pytest.param(lambda: Curve.graph("x", parameters={"q": 1}), ["'q'", "not used"], id="unused"),
+        pytest.param(lambda: Curve.graph("x", domain=("x", 1)), ["domain", "'x'"], id="domain in x"),
         pytest.param(lambda: Curve.graph("x", domain=(1, 1)), ["lo < hi"], id="empty domain"),
         pytest.param(lambda: Curve.graph("x", domain=(1,)), ["two ends"], id="one end"),
         pytest.param(lambda: Curve.graph("x", domain="01"), ["two ends"], id="text for a domain"),
@@ -90,9 +82,7 @@ def test_lam_is_a_name_for_a_curves_parameter_only():
         ),
         pytest.param(lambda: Curve.graph("x", parameter="sin"), ["sin"], id="a function's name"),
         pytest.param(lambda: Curve.graph("k*x", parameters={"k": "j"}), ["'j'"], id="no number"),
-        pytest.param(
-            lambda: Curve.graph("x", positive=("a",)), ["'a'", "positive"], id="idle promise"
-        ),
+        pytest.param(lambda: Curve.graph("x", positive=("a",)), ["'a'", "positive"], id="idle promise"),
     ],
 )
 def test_a_wrong_declaration_is_refused(declare, words):

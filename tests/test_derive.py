@@ -11,7 +11,7 @@ import sympy as sp
 from mpmath import mp, mpf
 
 from gqm_sym.declare import Curve, families
-from gqm_sym.derive import Model, derive
+from gqm_sym.derivation import Model, derive
 from gqm_sym.errors import DeclarationError, DerivationError
 from gqm_sym.expressions import read_expression
 from gqm_sym.kernels import Gravity
@@ -92,13 +92,9 @@ OTHERS = {
     "sech": Curve.graph("-a/cosh(x)**2", parameters={"a": 2}),
     "gaussians": Curve.graph("a*exp(-(x - 1)**2) + b*x**2", parameters={"a": 1, "b": "1/5"}),
     "kink": Curve.graph("abs(x)**3 + x"),
-    "trochoid": Curve.parametric(
-        x="R*t - d*sin(t)", z="R - d*cos(t)", parameter="t", parameters={"R": 1, "d": 2}
-    ),
+    "trochoid": Curve.parametric(x="R*t - d*sin(t)", z="R - d*cos(t)", parameter="t", parameters={"R": 1, "d": 2}),
     "limacon": Curve.polar("a + b*cos(theta)", parameters={"a": 1, "b": 3}),
-    "hypocycloid": Curve.parametric(
-        x="4*cos(t) + cos(4*t)", z="4*sin(t) - sin(4*t)", parameter="t"
-    ),
+    "hypocycloid": Curve.parametric(x="4*cos(t) + cos(4*t)", z="4*sin(t) - sin(4*t)", parameter="t"),
     "epicycloid": Curve.parametric(
         x="(R + r)*cos(t) - r*cos((R + r)/r*t)",
         z="(R + r)*sin(t) - r*sin((R + r)/r*t)",
@@ -110,9 +106,7 @@ OTHERS = {
         z="sin(u)*(cos(u)**4 + sin(u)**4)**(-1/4)",
         parameter="u",
     ),
-    "inverse functions": Curve.parametric(
-        x="asinh(t) + log(2 + t**2)", z="atan(t)*sqrt(1 + t**2)", parameter="t"
-    ),
+    "inverse functions": Curve.parametric(x="asinh(t) + log(2 + t**2)", z="atan(t)*sqrt(1 + t**2)", parameter="t"),
     "exponent": Curve.parametric(x="2**t", z="t**t", parameter="t"),
     "upside down": families.catenary(c=2, inverted=True),
     "spiral": families.log_spiral(r0=1, b="-3/20", inverted=True),
@@ -142,9 +136,7 @@ def test_forms_agree_with_numerical_differentiation(name, place):
     with mp.workdps(80):
 
         def coordinate(form):
-            return lambda at: mpf(
-                form.subs(values).subs(model.parameter, sp.Float(at, 80)).evalf(78)
-            )
+            return lambda at: mpf(form.subs(values).subs(model.parameter, sp.Float(at, 80)).evalf(78))
 
         at = mpf(int(lam.p)) / int(lam.q)
         dx, ddx = differences(coordinate(curve.x), at)
@@ -201,9 +193,7 @@ TEXTBOOK = {
         "3/(8*a*cos(theta/2))",
     ),
     "lemniscate": (
-        Curve.parametric(
-            x="a*cos(t)/(1 + sin(t)**2)", z="a*sin(t)*cos(t)/(1 + sin(t)**2)", parameter="t"
-        ),
+        Curve.parametric(x="a*cos(t)/(1 + sin(t)**2)", z="a*sin(t)*cos(t)/(1 + sin(t)**2)", parameter="t"),
         "a/sqrt(sin(t)**2 + 1)",
         "3*cos(t)/(a*sqrt(sin(t)**2 + 1))",
     ),
@@ -350,7 +340,7 @@ def test_the_forms_are_the_same_under_every_hash_seed():
     """No order comes from a set."""
     script = (
         "from gqm_sym.declare import Curve, families\n"
-        "from gqm_sym.derive import derive\n"
+        "from gqm_sym.derivation import derive\n"
         "from gqm_sym.kernels import *\n"
         "odd = Curve.parametric(x='b*sin(t)*exp(c*t)', z='a*sin(3*t + d)', parameter='t')\n"
         "for curve in (odd, families.ellipse(a='p'), Curve.polar('r1 + r2*cos(theta)')):\n"

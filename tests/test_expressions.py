@@ -177,9 +177,7 @@ def test_the_deepest_text_can_be_differentiated(pattern):
 EXPRESSIONS = st.recursive(
     st.one_of(
         st.sampled_from([x, y, theta, sp.pi, sp.E]),
-        st.fractions(-9, 9, max_denominator=9).map(
-            lambda f: sp.Rational(f.numerator, f.denominator)
-        ),
+        st.fractions(-9, 9, max_denominator=9).map(lambda f: sp.Rational(f.numerator, f.denominator)),
     ),
     lambda children: st.one_of(
         st.tuples(children, children).map(lambda p: p[0] + p[1]),

@@ -200,9 +200,9 @@ def test_only_text_is_parsed(given):
 
 ATTACK = st.text(
     st.one_of(
-        st.sampled_from(
-            [*FUNCTIONS, *CONSTANTS, *"0123456789.eE+-*/()_^,= x", "**", "sin("]
-        ).flatmap(lambda piece: st.sampled_from(piece)),
+        st.sampled_from([*FUNCTIONS, *CONSTANTS, *"0123456789.eE+-*/()_^,= x", "**", "sin("]).flatmap(
+            lambda piece: st.sampled_from(piece)
+        ),
         st.characters(),
     ),
     max_size=200,
@@ -280,9 +280,7 @@ def test_what_is_spelled_out_comes_back(spelled):
 @given(st.lists(st.sampled_from("+-*/"), min_size=1, max_size=12), st.data())
 def test_chains_agree_with_python(operators, data):
     """Without parentheses, precedence and association must be Python's."""
-    numbers = data.draw(
-        st.lists(st.integers(1, 9), min_size=len(operators) + 1, max_size=len(operators) + 1)
-    )
+    numbers = data.draw(st.lists(st.integers(1, 9), min_size=len(operators) + 1, max_size=len(operators) + 1))
     text = str(numbers[0])
     # Slow and obvious: products first, then sums, from the left.
     terms = [Fraction(numbers[0])]

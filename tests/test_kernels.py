@@ -4,7 +4,7 @@ import pytest
 import sympy as sp
 
 from gqm_sym.declare import Curve, families
-from gqm_sym.derive import derive
+from gqm_sym.derivation import derive
 from gqm_sym.errors import DeclarationError, InputError
 from gqm_sym.kernels import (
     KERNELS,
@@ -16,9 +16,7 @@ from gqm_sym.kernels import (
     RotatingFrame,
 )
 
-x, z, g, k, beta, Omega = (
-    sp.Symbol(name, real=True) for name in ("x", "z", "g", "k", "beta", "Omega")
-)
+x, z, g, k, beta, Omega = (sp.Symbol(name, real=True) for name in ("x", "z", "g", "k", "beta", "Omega"))
 
 
 def test_gravity_has_the_exact_default():
@@ -105,9 +103,7 @@ def test_the_force_along_a_curve_is_minus_the_gradient(kernel: Kernel, potential
     """A = F·t and n₀ = -F·n with F = -∇U, on z = sinh(x), by SymPy's own derivatives."""
     model = derive(Curve.graph("sinh(x)"), kernel)
     place = {x: sp.Rational(7, 10), Omega: 2, k: 3, g: sp.Rational(981, 100)}
-    push = [
-        -sp.diff(potential, along).subs(z, sp.sinh(x)).subs(place).evalf(40) for along in (x, z)
-    ]
+    push = [-sp.diff(potential, along).subs(z, sp.sinh(x)).subs(place).evalf(40) for along in (x, z)]
     tangent = [sp.S.One, sp.cosh(x).subs(place).evalf(40)]
     length = sp.sqrt(tangent[0] ** 2 + tangent[1] ** 2)
     along = (push[0] * tangent[0] + push[1] * tangent[1]) / length

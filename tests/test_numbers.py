@@ -243,9 +243,7 @@ def _grown(children):
         st.tuples(binary, children, children).map(
             lambda p: (f"({p[1][0]} {p[0][0]} {p[2][0]})", lambda: p[0][1](p[1][1](), p[2][1]()))
         ),
-        st.tuples(children, children).map(
-            lambda p: (f"({p[0][0]}/{p[1][0]})", lambda: p[0][1]() / p[1][1]())
-        ),
+        st.tuples(children, children).map(lambda p: (f"({p[0][0]}/{p[1][0]})", lambda: p[0][1]() / p[1][1]())),
         children.map(lambda c: (f"({c[0]})**3", lambda: c[1]() ** 3)),
     )
 
@@ -254,9 +252,7 @@ GROWN = st.recursive(
     st.one_of(
         st.just(("pi", lambda: +TRUTH.pi)),
         st.just(("e", lambda: +TRUTH.e)),
-        st.decimals(-20, 20, places=2).map(
-            lambda d: (f"({d:f})", lambda: TRUTH.mpf(int(d * 100)) / 100)
-        ),
+        st.decimals(-20, 20, places=2).map(lambda d: (f"({d:f})", lambda: TRUTH.mpf(int(d * 100)) / 100)),
     ),
     _grown,
     max_leaves=8,

@@ -28,10 +28,8 @@ def _declared() -> list[tuple[str, str, dict[str, str], tuple[str, str], str]]:
     for curve in json.loads((DATA / "curves.json").read_text(encoding="ascii")):
         if curve["name"] in CORPUS:
             track, renamed = CORPUS[curve["name"]]
-            if curve["kind"] == "graph":
-                texts = (curve["parameter"], curve["expr"])
-            else:
-                texts = (curve["x"], curve["z"])
+            is_graph = curve["kind"] == "graph"
+            texts = (curve["parameter"], curve["expr"]) if is_graph else (curve["x"], curve["z"])
             rows.append((track, curve["parameter"], renamed, texts, curve["name"]))
     return rows
 

@@ -151,7 +151,7 @@ FRONT = """
 import json, sys
 import gqm_sym as gqm
 light = "sympy" not in sys.modules
-import gqm_sym.build, gqm_sym.derive, gqm_sym.emit
+import gqm_sym.building, gqm_sym.derivation, gqm_sym.emission
 names = [name for name in gqm.__all__ for _ in range(2) if not callable(getattr(gqm, name))]
 print(json.dumps([light, names, callable(gqm.families.ellipse)]))
 """

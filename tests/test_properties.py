@@ -108,9 +108,7 @@ def test_scaling_laws(module_of: ModuleOf, amplitude: float, length: float, g: f
 
 @some
 @given(amplitude=amplitudes, mass=lengths)
-def test_mass_changes_the_contact_force_alone(
-    module_of: ModuleOf, amplitude: float, mass: float
-) -> None:
+def test_mass_changes_the_contact_force_alone(module_of: ModuleOf, amplitude: float, mass: float) -> None:
     """All bodies fall alike; the track carries m times as much."""
     solve = module_of("circle").solve
     unit, heavy = (solve(lam0=amplitude, L=1, m=m) for m in (1.0, mass))
@@ -123,9 +121,7 @@ def test_mass_changes_the_contact_force_alone(
 
 @some
 @given(lam0=st.floats(-3.0, 3.0), v0=st.floats(0.1, 9.0), a=st.floats(0.1, 4.0), share=fractions)
-def test_a_mirror_changes_signs_alone(
-    module_of: ModuleOf, lam0: float, v0: float, a: float, share: float
-) -> None:
+def test_a_mirror_changes_signs_alone(module_of: ModuleOf, lam0: float, v0: float, a: float, share: float) -> None:
     """In a symmetric bowl the mirrored launch gives the mirrored motion."""
     solve = module_of("parabola").solve
     right = solve(lam0=lam0, v0=v0, direction=1, a=a)
@@ -148,9 +144,7 @@ def test_the_tautochrone_swings_in_one_time(module_of: ModuleOf, lam0: float, R:
 
 @some
 @given(amplitude=st.one_of(small, st.floats(0.1, 10.0)), a=st.floats(0.1, 4.0))
-def test_a_parabola_swings_as_an_elliptic_integral_says(
-    module_of: ModuleOf, amplitude: float, a: float
-) -> None:
+def test_a_parabola_swings_as_an_elliptic_integral_says(module_of: ModuleOf, amplitude: float, a: float) -> None:
     """The half period on z = a*x**2 is 2*E(-4*a**2*X**2)/sqrt(2*g*a)."""
     motion = module_of("parabola").solve(lam0=amplitude, a=a)
     with mp.workdps(50):
@@ -161,9 +155,7 @@ def test_a_parabola_swings_as_an_elliptic_integral_says(
 
 @some
 @given(speed=st.floats(6.5, 30.0), share=fractions, laps=st.integers(-5, 5))
-def test_a_circulation_adds_a_turn_each_lap(
-    module_of: ModuleOf, speed: float, share: float, laps: int
-) -> None:
+def test_a_circulation_adds_a_turn_each_lap(module_of: ModuleOf, speed: float, share: float, laps: int) -> None:
     """After each loop time the angle is 2*pi further, and the state is the same."""
     motion = module_of("circle").solve(lam0=0.5, v0=speed, L=1)
     t = share * motion.period

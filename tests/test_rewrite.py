@@ -4,13 +4,13 @@ import pytest
 import sympy as sp
 
 from gqm_sym.declare import Curve
-from gqm_sym.derive.algebra import Algebra
-from gqm_sym.derive.differentiate import differentiate
-from gqm_sym.derive.generators import OverBudget
-from gqm_sym.derive.geometry import geometry
-from gqm_sym.derive.rewrite import product, spell_product, tidy, without_poles
-from gqm_sym.derive.signs import Signs
-from gqm_sym.derive.spelling import spell
+from gqm_sym.derivation.algebra import Algebra
+from gqm_sym.derivation.differentiate import differentiate
+from gqm_sym.derivation.generators import OverBudget
+from gqm_sym.derivation.geometry import geometry
+from gqm_sym.derivation.rewrite import product, spell_product, tidy, without_poles
+from gqm_sym.derivation.signs import Signs
+from gqm_sym.derivation.spelling import spell
 from gqm_sym.errors import DeclarationError
 from gqm_sym.expressions import read_expression
 
@@ -180,6 +180,4 @@ def test_the_budget_counts_and_does_not_wait():
 def test_a_hidden_point_is_refused():
     """sin² + cos² depends on t only in its text."""
     with pytest.raises(DeclarationError, match="point"):
-        geometry(
-            Curve.parametric(x="sin(t)**2 + cos(t)**2", z="a", parameter="t"), may_be_positive=()
-        )
+        geometry(Curve.parametric(x="sin(t)**2 + cos(t)**2", z="a", parameter="t"), may_be_positive=())

@@ -94,35 +94,23 @@ WRONG: dict[str, tuple[str | bytes, list[str]]] = {
     ),
     "an undefined symbol": (
         edited(("h*x**2", "h*x**2 + kk")),
-        [
-            "a.yaml:3:23: 'kk' is not in parameters; "
-            "add it there, as in kk: 1 (null: to be given at run time)"
-        ],
+        ["a.yaml:3:23: 'kk' is not in parameters; add it there, as in kk: 1 (null: to be given at run time)"],
     ),
     "a misspelt symbol": (
         edited(("h*x**2", "hight*x**2"), ("{h: 3}", "{height: 3}")),
         [
             "a.yaml:3:14: 'hight' is not in parameters; add it there, as in hight: 1 "
             "(null: to be given at run time), or did you mean height?",
-            "a.yaml:6:14: parameters: 'height' is used neither by the curve nor by the kernel; "
-            "remove it, or use it",
+            "a.yaml:6:14: parameters: 'height' is used neither by the curve nor by the kernel; remove it, or use it",
         ],
     ),
     "an undefined argument of a kernel": (
         edited(("gravity: {}", "gravity: {}\n  rolling: {}")),
-        [
-            "a.yaml:6:3: 'beta' is not in parameters; "
-            "add it there, as in beta: 1 (null: to be given at run time)"
-        ],
+        ["a.yaml:6:3: 'beta' is not in parameters; add it there, as in beta: 1 (null: to be given at run time)"],
     ),
     "gravity only among the parameters": (
-        edited(("gravity: {}", "potential: {U: h*z}"), ("{h: 3}", "{h: 3, g: 9.81}")).replace(
-            "h*x**2", "x**2"
-        ),
-        [
-            "a.yaml:6:20: parameters: 'g' is used neither by the curve nor by the kernel; "
-            "add gravity: {} to kernel"
-        ],
+        edited(("gravity: {}", "potential: {U: h*z}"), ("{h: 3}", "{h: 3, g: 9.81}")).replace("h*x**2", "x**2"),
+        ["a.yaml:6:20: parameters: 'g' is used neither by the curve nor by the kernel; add gravity: {} to kernel"],
     ),
     "no identifier": (
         edited(("name: track", "name: 2nd-track")),
@@ -134,10 +122,7 @@ WRONG: dict[str, tuple[str | bytes, list[str]]] = {
     ),
     "a parameter that shadows a function": (
         edited(("{h: 3}", "{h: 3, sin: 1}")),
-        [
-            "a.yaml:6:20: parameters.sin: 'sin' cannot be a name: "
-            "it is a function of the grammar; choose another"
-        ],
+        ["a.yaml:6:20: parameters.sin: 'sin' cannot be a name: it is a function of the grammar; choose another"],
     ),
     "a parameter in other letters": (
         edited(("{h: 3}", "{h: 3, ω: 1}")),
@@ -177,10 +162,7 @@ WRONG: dict[str, tuple[str | bytes, list[str]]] = {
     ),
     "a launch outside the domain": (
         edited(("lam0: 1/2", "lam0: 2.0000001")),
-        [
-            "a.yaml:7:16: launch.lam0: 2.0000001 is outside the curve's domain; "
-            "give one within [-2, 2]"
-        ],
+        ["a.yaml:7:16: launch.lam0: 2.0000001 is outside the curve's domain; give one within [-2, 2]"],
     ),
     "a launch outside a domain of parameters": (
         edited(("[-2, 2]", "[null, h]"), ("lam0: 1/2", "lam0: 4")),
@@ -221,10 +203,7 @@ WRONG: dict[str, tuple[str | bytes, list[str]]] = {
     ),
     "a launch by a point": (
         edited(("v0: 0", "point: [0, 1]")),
-        [
-            "a.yaml:7:21: launch: point is for implicit and sampled curves; "
-            "give lam0, the curve's parameter at launch"
-        ],
+        ["a.yaml:7:21: launch: point is for implicit and sampled curves; give lam0, the curve's parameter at launch"],
     ),
     "duplicate keys": (
         PLAIN + "name: other\n",
@@ -232,10 +211,7 @@ WRONG: dict[str, tuple[str | bytes, list[str]]] = {
     ),
     "two curves": (
         edited((GRAPH, f"{GRAPH}\n  polar: {{r: theta}}")),
-        [
-            "a.yaml:4:3: curve: declared as graph and as polar; "
-            "give exactly one of graph, parametric, polar, family"
-        ],
+        ["a.yaml:4:3: curve: declared as graph and as polar; give exactly one of graph, parametric, polar, family"],
     ),
     "no curve": (
         edited((f"\n  {GRAPH}", " {}")),
@@ -252,10 +228,7 @@ WRONG: dict[str, tuple[str | bytes, list[str]]] = {
     ),
     "a curve of a later version": (
         edited((GRAPH, "points: track.csv"), ("{h: 3}", "{}")),
-        [
-            "a.yaml:3:3: curve: points is not supported yet by this version; "
-            "it knows family, graph, parametric, polar"
-        ],
+        ["a.yaml:3:3: curve: points is not supported yet by this version; it knows family, graph, parametric, polar"],
     ),
     "an unknown family": (
         edited((GRAPH, "family: {name: elipse, a: h, b: 1}")),
@@ -266,10 +239,7 @@ WRONG: dict[str, tuple[str | bytes, list[str]]] = {
     ),
     "a name that means two things": (
         edited((GRAPH, "family: {name: ellipse, a: h, b: h}")),
-        [
-            "a.yaml:3:30: curve.family: the name 'h' means two things; "
-            'give one of them another name, as in b="b_2"'
-        ],
+        ["a.yaml:3:30: curve.family: the name 'h' means two things; give one of them another name, as in b=\"b_2\""],
     ),
     "an empty file": (
         "",
@@ -312,10 +282,7 @@ WRONG: dict[str, tuple[str | bytes, list[str]]] = {
     ),
     "tabs": (
         "curve:\n\tgraph: {}\n",
-        [
-            "a.yaml:2:1: this is not YAML: found character '\\t' that cannot start any token; "
-            "indent with spaces"
-        ],
+        ["a.yaml:2:1: this is not YAML: found character '\\t' that cannot start any token; indent with spaces"],
     ),
     "an impossible escape": (
         'name: "\\UFFFFFFFF"\n',
@@ -336,8 +303,7 @@ WRONG: dict[str, tuple[str | bytes, list[str]]] = {
         edited(("{h: 3}", "{h: &h 3, m: *h}")),
         [
             "a.yaml:6:17: the anchor &h is not allowed; write the value out where it is needed",
-            "a.yaml:6:26: the alias *h is not allowed; "
-            "write the value out, or put the text in quotes",
+            "a.yaml:6:26: the alias *h is not allowed; write the value out, or put the text in quotes",
         ],
     ),
     "a key that is a list": (
@@ -475,9 +441,7 @@ def test_kernels_add(tmp_path: Path) -> None:
     text = edited(("gravity: {}", forces), ("{h: 3}", "{h: 3, g_moon: 1.62, k: null}"))
     spec = read(tmp_path, text)
     assert [name for name, _ in spec.kernel.terms] == ["rolling", "gravity", "potential"]
-    assert dict(spec.derive().defaults) == {
-        **{"h": "3", "beta": "2/5", "g_moon": "1.62", "k": None, "m": "1"}
-    }
+    assert dict(spec.derive().defaults) == {**{"h": "3", "beta": "2/5", "g_moon": "1.62", "k": None, "m": "1"}}
 
 
 def test_the_title_is_the_familys_unless_given(tmp_path: Path) -> None:
@@ -517,10 +481,7 @@ def test_what_does_not_go_together(case: tuple[str, str], tmp_path: Path) -> Non
 UNSOLVABLE = {
     "no launch": (
         edited(("launch: {lam0: 1/2, v0: 0}", "")),
-        [
-            "a.yaml:1:1: launch is missing, and to solve needs one; "
-            "add it, as in launch: {lam0: 0.5, v0: 0}"
-        ],
+        ["a.yaml:1:1: launch is missing, and to solve needs one; add it, as in launch: {lam0: 0.5, v0: 0}"],
     ),
     "no value": (
         edited(("{h: 3}", "{h: null}")),

@@ -55,9 +55,7 @@ def guarded(program: str, work: Callable[[], int]) -> int:
         frame = traceback.extract_tb(error.__traceback__)[-1]
         where = f"{Path(frame.filename).name}:{frame.lineno}"
         what = f"{type(error).__name__}: {error}".replace("\n", " ")
-        return _end(
-            f"{program}: internal error ({where}): {what}; please report it, with the input", FAILED
-        )
+        return _end(f"{program}: internal error ({where}): {what}; please report it, with the input", FAILED)
 
 
 def code_of(error: GQMError) -> int:

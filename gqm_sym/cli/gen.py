@@ -12,7 +12,7 @@ from gqm_sym.cli.exits import DIFFERENT, DONE, Failures, guarded
 from gqm_sym.errors import InputError
 
 if TYPE_CHECKING:
-    from gqm_sym.derive import Model
+    from gqm_sym.derivation import Model
     from gqm_sym.specfile import Spec
 
 PROGRAM = "gqm-gen"
@@ -42,22 +42,14 @@ def _parser() -> argparse.ArgumentParser:
         "3 the derivation or the solution failed, 130 interrupted.",
     )
     parser.add_argument("files", nargs="+", metavar="FILE", help="a curve file (YAML)")
-    parser.add_argument(
-        "-o", "--output", metavar="DIR", default=FOLDER, help=f"where to write (default: {FOLDER})"
-    )
+    parser.add_argument("-o", "--output", metavar="DIR", default=FOLDER, help=f"where to write (default: {FOLDER})")
     mode = parser.add_mutually_exclusive_group()
-    mode.add_argument(
-        "--check", action="store_true", help="write nothing; fail if a file is not current"
-    )
+    mode.add_argument("--check", action="store_true", help="write nothing; fail if a file is not current")
     mode.add_argument("--stdout", action="store_true", help="print the module, write no file")
-    mode.add_argument(
-        "--solve", action="store_true", help="also run the launch in the file and print its table"
-    )
+    mode.add_argument("--solve", action="store_true", help="also run the launch in the file and print its table")
     parser.add_argument("--diff", action="store_true", help="with --check: show the differences")
     parser.add_argument("--latex", metavar="FILE", help="also write the closed forms as LaTeX")
-    parser.add_argument(
-        "--force", action="store_true", help="overwrite a module that was edited by hand"
-    )
+    parser.add_argument("--force", action="store_true", help="overwrite a module that was edited by hand")
     parser.add_argument("-q", "--quiet", action="store_true", help="print no closed forms")
     return parser
 
@@ -110,7 +102,7 @@ def _read(file: str, others: "Sequence[Spec]") -> "Spec":
 
 
 def _make(spec: "Spec", options: argparse.Namespace) -> Product:
-    from gqm_sym.emit import emit
+    from gqm_sym.emission import emit
 
     model = spec.derive()
     if options.solve:
@@ -120,7 +112,7 @@ def _make(spec: "Spec", options: argparse.Namespace) -> Product:
 
 
 def _check(products: Sequence[Product], options: argparse.Namespace) -> int:
-    from gqm_sym.build import difference
+    from gqm_sym.building import difference
 
     code = DONE
     for product in products:
@@ -142,7 +134,7 @@ def _check(products: Sequence[Product], options: argparse.Namespace) -> int:
 
 def _deliver(product: Product, options: argparse.Namespace) -> None:
     """Print or write what was asked for."""
-    from gqm_sym.build import write_module, write_text
+    from gqm_sym.building import write_module, write_text
 
     if options.latex is not None:
         write_text(_latex(product), options.latex)
@@ -166,7 +158,7 @@ def _deliver(product: Product, options: argparse.Namespace) -> None:
 
 def _solve(product: Product) -> list[str]:
     """Run the launch of the file and return its table, complete: it may fail half way."""
-    from gqm_sym.build import load
+    from gqm_sym.building import load
 
     spec = product.spec
     module = load(product.path, spec.name)
@@ -178,7 +170,4 @@ def _solve(product: Product) -> list[str]:
 
 
 def _latex(product: Product) -> str:
-    return (
-        f"% Made by {PROGRAM} for {product.spec.name}; needs amsmath.\n"
-        f"\\[\n{product.model.latex()}\n\\]\n"
-    )
+    return f"% Made by {PROGRAM} for {product.spec.name}; needs amsmath.\n\\[\n{product.model.latex()}\n\\]\n"

@@ -5,7 +5,7 @@ from math import isfinite
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from gqm_sym.derive import Model
+    from gqm_sym.derivation import Model
     from gqm_sym.runtime.motion import Motion
     from gqm_sym.specfile import Spec
 

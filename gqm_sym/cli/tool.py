@@ -42,8 +42,7 @@ def _parser() -> argparse.ArgumentParser:
         "solve",
         help="run the launch of a curve file",
         description="Run the launch of a curve file and print its table. Nothing is written.",
-        epilog="Numbers are taken exactly as written. One that begins with a minus needs an "
-        "equals sign: --lam0=-pi/2.",
+        epilog="Numbers are taken exactly as written. One that begins with a minus needs an equals sign: --lam0=-pi/2.",
     )
     solve.add_argument("file", metavar="FILE", help="a curve file (YAML)")
     solve.add_argument("--lam0", metavar="NUMBER", help="launch from another place")
@@ -88,7 +87,7 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _solve(options: argparse.Namespace) -> None:
-    from gqm_sym.emit import emit
+    from gqm_sym.emission import emit
     from gqm_sym.specfile import read_spec
 
     spec = read_spec(options.file)
@@ -110,15 +109,13 @@ def _solve(options: argparse.Namespace) -> None:
 def _assignment(text: str, known: Sequence[str]) -> tuple[str, str]:
     name, equals, value = text.partition("=")
     if not equals or name.strip() not in known:
-        raise ParameterError(
-            f"--set {text}: must be NAME=NUMBER with one of the parameters {', '.join(known)}"
-        )
+        raise ParameterError(f"--set {text}: must be NAME=NUMBER with one of the parameters {', '.join(known)}")
     return name.strip(), value.strip()
 
 
 def _module(text: str, name: str, folder: Path) -> Any:
     """Return the generated module: the current one on disk, or one in a temporary folder."""
-    from gqm_sym.build import difference, load, write_module
+    from gqm_sym.building import difference, load, write_module
 
     present = folder / f"{name}.py"
     if present.is_file() and not difference(text, present):
@@ -149,9 +146,7 @@ def _families(options: argparse.Namespace) -> None:
 
 
 def _formulas(row: "Family") -> list[str]:
-    parts = [
-        f"{label} = {text}" for label, text in (("r", row.r), ("x", row.x), ("z", row.z)) if text
-    ]
+    parts = [f"{label} = {text}" for label, text in (("r", row.r), ("x", row.x), ("z", row.z)) if text]
     if row.domain:
         parts.append(f"{row.domain[0]} <= {row.parameter} <= {row.domain[1]}")
     if row.period:

@@ -109,9 +109,7 @@ class Curve:
         symbol = _symbol(parameter, "parametric")
         first = read_expression(x, where="parametric: x")
         second = read_expression(z, where="parametric: z")
-        return _declare(
-            "parametric", first, second, symbol, domain, period, parameters, title, positive
-        )
+        return _declare("parametric", first, second, symbol, domain, period, parameters, title, positive)
 
     @classmethod
     def polar(
@@ -173,9 +171,7 @@ def _declare(
     promised = tuple(positive)
     for name in promised:
         if name not in found:
-            raise DeclarationError(
-                f"{kind} curve: {name!r} is promised to be positive but not used; remove it"
-            )
+            raise DeclarationError(f"{kind} curve: {name!r} is promised to be positive but not used; remove it")
     return Curve(
         kind=kind,
         x=x,
@@ -190,20 +186,15 @@ def _declare(
     )
 
 
-def _read_domain(
-    domain: Iterable[Source | None] | None, kind: str
-) -> tuple[sp.Expr | None, sp.Expr | None]:
+def _read_domain(domain: Iterable[Source | None] | None, kind: str) -> tuple[sp.Expr | None, sp.Expr | None]:
     if domain is None:
         return (None, None)
     ends = None if isinstance(domain, str) else tuple(domain)
     if ends is None or len(ends) != 2:
         raise DeclarationError(
-            f"{kind}: domain: must be two ends (lo, hi), either of them None where it is open; "
-            f"got {domain!r}"
+            f"{kind}: domain: must be two ends (lo, hi), either of them None where it is open; got {domain!r}"
         )
-    low, high = (
-        None if end is None else read_expression(end, where=f"{kind}: domain") for end in ends
-    )
+    low, high = (None if end is None else read_expression(end, where=f"{kind}: domain") for end in ends)
     return (low, high)
 
 

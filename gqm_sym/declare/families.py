@@ -221,9 +221,7 @@ def __getattr__(name: str) -> Callable[..., Curve]:
     try:
         return FAMILIES[name]
     except KeyError:
-        raise AttributeError(
-            f"there is no family {name!r}; known are {', '.join(names())}"
-        ) from None
+        raise AttributeError(f"there is no family {name!r}; known are {', '.join(names())}") from None
 
 
 def __dir__() -> list[str]:

@@ -82,9 +82,7 @@ def _refuse_clashes(first: Kernel, second: Kernel) -> None:
 _ONCE = frozenset({"gravity", "rolling", "rotating_frame"})
 
 
-def parameter(
-    given: Given | None, name: str, *, where: str
-) -> tuple[sp.Symbol, tuple[str, Value | None]]:
+def parameter(given: Given | None, name: str, *, where: str) -> tuple[sp.Symbol, tuple[str, Value | None]]:
     """Read a kernel's argument: another name for its parameter, a value for it, or nothing.
 
     Returns the symbol to write the law with and the pair of name and default.

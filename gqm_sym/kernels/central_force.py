@@ -10,9 +10,7 @@ from gqm_sym.kernels.base import Kernel, X, Z, parameter
 from gqm_sym.parameters import COORDINATES, Given, names_in_order, read_parameters
 
 
-def CentralForce(
-    *, centre: Iterable[str | int | sp.Expr] = (0, 0), k: Given | None = None
-) -> Kernel:
+def CentralForce(*, centre: Iterable[str | int | sp.Expr] = (0, 0), k: Given | None = None) -> Kernel:
     """Return the attraction ``k/r**2`` towards ``centre``.
 
     Parameters
@@ -24,15 +22,11 @@ def CentralForce(
     """
     place = tuple(read_expression(part, where="central_force: centre") for part in centre)
     if len(place) != 2:
-        raise DeclarationError(
-            f"central_force: centre: must be two coordinates (x, z), got {len(place)}"
-        )
+        raise DeclarationError(f"central_force: centre: must be two coordinates (x, z), got {len(place)}")
     found = names_in_order(*place)
     for name in COORDINATES:
         if name in found:
-            raise DeclarationError(
-                f"central_force: centre: must not depend on the coordinate {name!r}"
-            )
+            raise DeclarationError(f"central_force: centre: must not depend on the coordinate {name!r}")
     strength, pair = parameter(k, "k", where="central_force")
     distance = sp.sqrt((X - place[0]) ** 2 + (Z - place[1]) ** 2)
     own = Kernel(terms=(), defaults=read_parameters(None, found=found, where="central_force"))

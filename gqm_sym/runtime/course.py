@@ -92,7 +92,8 @@ class Course:
         """Whole periods, and the time that is left."""
         if self.period is None:
             return np.zeros_like(t), t, t_low
-        return reduce_many(t, t_low, *self.period)
+        count, rest, rest_low = reduce_many(t, t_low, *self.period)
+        return count, rest, rest_low
 
     def piece_of(self, rest: Array) -> np.ndarray:
         """Which piece each reduced time falls on."""
@@ -117,7 +118,11 @@ def libration(stretch: Stretch, *, direction: int, tau: Pair, phase: Pair, phi: 
     """
     a, b, launch = (ZERO, 0.0), (tau, stretch.stop), (phase, phi)
     first, second = (a, b) if direction > 0 else (b, a)
-    cuts = [(direction, launch, second, "turn"), (-direction, second, first, "turn"), (direction, first, launch, "horizon")]
+    cuts = [
+        (direction, launch, second, "turn"),
+        (-direction, second, first, "turn"),
+        (direction, first, launch, "horizon"),
+    ]
     s_a = -float(stretch.lengths(np.array([phi]))[0])
     pieces: list[Piece] = []
     t = ZERO

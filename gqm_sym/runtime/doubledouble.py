@@ -9,7 +9,7 @@ from gqm_sym.runtime.jit import COMPILE
 
 @njit(**COMPILE)
 def two_sum(a, b):  # type: ignore[no-untyped-def]
-    """a + b as rounded sum and its error (Knuth)."""
+    """A + b as rounded sum and its error (Knuth)."""
     s = a + b
     t = s - a
     return s, (a - (s - t)) + (b - t)
@@ -17,7 +17,7 @@ def two_sum(a, b):  # type: ignore[no-untyped-def]
 
 @njit(**COMPILE)
 def two_product(a, b):  # type: ignore[no-untyped-def]
-    """a * b as rounded product and its error (Dekker, Veltkamp)."""
+    """A * b as rounded product and its error (Dekker, Veltkamp)."""
     p = a * b
     c = 134217729.0 * a
     a_hi = c - (c - a)
@@ -47,7 +47,8 @@ def reduce(t, t_low, period, period_low):  # type: ignore[no-untyped-def]
     count = float(floor(t / period))
     whole, error = two_product(count, period)
     rest, rest_low = add(t, t_low, -whole, -(error + count * period_low))
-    # The quotient was rounded: at most one period too many or too few. One way, then the other, so that rounding at a boundary
+    # The quotient was rounded: at most one period too many or too few. One way, then the other, so that rounding at
+    # a boundary
     # cannot send it back and forth.
     if rest < 0.0 or (rest == 0.0 and rest_low < 0.0):
         count -= 1.0

@@ -1,6 +1,7 @@
 """The entry points from Python into compiled code: explicit signatures, compiled once per installation.
 
-A conservative motion crosses once: `survey` finds its ends each way from the launch and, where it is periodic, lays the panels of
+A conservative motion crosses once: `survey` finds its ends each way from the launch and, where it is periodic, lays
+the panels of
 its time. Everything else is asked for later, over arrays.
 """
 
@@ -11,9 +12,9 @@ from numba import njit, types
 
 from gqm_sym.runtime.crossing import call_climb, call_frame, call_rise
 from gqm_sym.runtime.doubledouble import reduce
+from gqm_sym.runtime.inversion import look_up_many, tabulate
 from gqm_sym.runtime.jit import COMPILE, entry
 from gqm_sym.runtime.panels import DEGREE, REGULAR, TURN_TURN, lay, read_off, speeds
-from gqm_sym.runtime.inversion import look_up_many, tabulate
 from gqm_sym.runtime.search import CRITICAL, LIMIT, TURN, walk
 
 _ADDRESSES = types.UniTuple(types.int64, 5)
@@ -26,8 +27,6 @@ _TABLE = types.Tuple((_LINE, _LINE, _ROWS, types.int64[::1], _LINE, _FLOAT))
 
 # A launch from rest on a slope below this share of the climb's size may be an equilibrium: exact numbers decide.
 FLAT = 1e-12
-# Heights that differ by less than this share of themselves are not subtracted.
-CANCELLING = 8.0
 
 
 @njit(**COMPILE)
@@ -65,7 +64,16 @@ def survey(fns, p, lam0, v0, direction, low, high, period):  # type: ignore[no-u
     """
     nothing = (LIMIT, 0.0, 0.0)
     w0 = v0 * v0
-    empty = (np.empty(0), np.empty(0), np.empty(0), np.empty((0, DEGREE)), np.empty((0, DEGREE)), 0.0, 0.0, 0)
+    empty = (
+        np.empty(0),
+        np.empty(0),
+        np.empty(0),
+        np.empty((0, DEGREE)),
+        np.empty((0, DEGREE)),
+        0.0,
+        0.0,
+        0,
+    )
     if w0 == 0.0:
         spot, rows = np.empty(1), np.empty((2, 1))
         spot[0] = lam0
@@ -77,7 +85,12 @@ def survey(fns, p, lam0, v0, direction, low, high, period):  # type: ignore[no-u
     reach = period if period > 0.0 else (high - lam0 if direction > 0 else lam0 - low)
     ahead = walk(fns, p, lam0, w0, direction, 0.0, reach, step)
     if ahead[0] == LIMIT and period > 0.0 and w0 > 0.0:
-        return direction, ahead, nothing, lay(fns, p, REGULAR, lam0, lam0 + direction * period, lam0, w0, 0.0, 1.0)
+        return (
+            direction,
+            ahead,
+            nothing,
+            lay(fns, p, REGULAR, lam0, lam0 + direction * period, lam0, w0, 0.0, 1.0),
+        )
     if ahead[0] != TURN:
         return direction, ahead, nothing, empty
     if w0 == 0.0:
@@ -148,19 +161,11 @@ def frame_at(fns, p, lam, v2):  # type: ignore[no-untyped-def]
 
 @entry(_LINE(_ADDRESSES, _LINE, _FLOAT, _FLOAT, _FLOAT, _LINE, _LINE))
 def speed_squared_at(fns, p, lam0, lam0_low, w0, places, offsets):  # type: ignore[no-untyped-def]
-    """V**2 at many places and their offsets from the launch.
-
-    By the difference of heights where hardly anything cancels in it, by their divided difference where much does.
-    """
-    rows, heights, launch = np.empty((2, offsets.size)), np.empty((2, offsets.size)), np.empty((2, 1))
+    """V**2 at many places and their offsets from lam0, launched from lam0 + lam0_low, without subtracting heights."""
+    rows, launch = np.empty((2, offsets.size)), np.empty((2, 1))
     call_rise(fns[2], offsets.size, lam0, places, offsets, p, rows)
-    call_climb(fns[1], offsets.size, places, p, heights)
     call_climb(fns[1], 1, np.array([lam0]), p, launch)
-    start = launch[0, 0] + lam0_low * launch[1, 0]
     out = np.empty(offsets.size)
     for i in range(offsets.size):
-        lost = heights[0, i] - start
-        if CANCELLING * fabs(lost) < fabs(heights[0, i]) + fabs(start):
-            lost = offsets[i] * rows[0, i]
-        out[i] = w0 - lost
+        out[i] = w0 - (offsets[i] * rows[0, i] - lam0_low * launch[1, 0])
     return out

@@ -1,6 +1,7 @@
 """What happens along a motion: turns, changes of contact, ends."""
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -38,7 +39,8 @@ class Leg:
 def contact_force(stretch: Stretch, phi: Array) -> Array:
     """The contact force N at anomalies of a stretch."""
     f = stretch.functions
-    return frame_at(f.addresses, f.p, stretch.places(phi), stretch.speeds(phi) ** 2)[4]  # type: ignore[no-any-return]
+    rows: Array = frame_at(f.addresses, f.p, stretch.places(phi), stretch.speeds(phi) ** 2)
+    return rows[4]
 
 
 def contact_changes(stretch: Stretch) -> Array:
@@ -50,7 +52,7 @@ def contact_changes(stretch: Stretch) -> Array:
     sign = np.sign(force)
     known = np.flatnonzero(np.isfinite(force) & (sign != 0))
     turns = known[:-1][sign[known[:-1]] != sign[known[1:]]]
-    after = {int(k): int(n) for k, n in zip(known[:-1], known[1:], strict=True)}
+    after = {int(k): int(n) for k, n in pairwise(known)}
     lo = np.array([phi[k] for k in turns])
     hi = np.array([phi[after[int(k)]] for k in turns])
     before = sign[turns]
@@ -71,7 +73,12 @@ def crossings(piece: Piece, phi: Array, pace: float) -> list[tuple[Pair, float]]
         exact = (float(r), -float(r) * pace)
         if low < r < high:
             spent = minus(exact, piece.r_start)
-            out.append((plus(piece.t_start, (piece.sense * spent[0], piece.sense * spent[1])), float(angle)))
+            out.append(
+                (
+                    plus(piece.t_start, (piece.sense * spent[0], piece.sense * spent[1])),
+                    float(angle),
+                )
+            )
     return sorted(out)
 
 

@@ -1,11 +1,13 @@
 """The exact problem in extended precision: what doubles cannot decide, and digits beyond them.
 
-A generated module carries its formulas as plain Python over a namespace of operations. Here they are evaluated with mpmath
+A generated module carries its formulas as plain Python over a namespace of operations. Here they are evaluated with
+mpmath
 for exactly the numbers that were given. mpmath is imported when first asked for, never with the runtime.
 """
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import Any
 
 from gqm_sym.errors import SolutionError
@@ -107,15 +109,19 @@ class Arithmetic:
         self.size = self.w0 + abs(self.base) + abs(self.climb(self.lam0 + 1) - self.base)
 
     def mpf(self, value: Any) -> Any:
+        """A number of this precision."""
         return self.context.mpf(value)
 
     def sqrt(self, value: Any) -> Any:
+        """Square root."""
         return self.context.sqrt(value)
 
     def climb(self, lam: Any) -> Any:
+        """What V**2 loses in climbing to a place, up to a constant."""
         return self.problem.formulas.climb(self.context, lam, self.values)
 
     def climb_slope(self, lam: Any) -> Any:
+        """Its derivative."""
         return self.problem.formulas.climb_slope(self.context, lam, self.values)
 
     def climb_bend(self, lam: Any) -> Any:
@@ -124,9 +130,11 @@ class Arithmetic:
         return (self.climb_slope(lam + h) - self.climb_slope(lam - h)) / (2 * h)
 
     def ds(self, lam: Any) -> Any:
+        """ds/dlam."""
         return self.problem.formulas.ds(self.context, lam, self.values)
 
     def speed_squared(self, lam: Any) -> Any:
+        """V**2, by subtraction."""
         return self.w0 + self.base - self.climb(lam)
 
     def domain(self) -> tuple[Any, Any, Any]:
@@ -142,7 +150,10 @@ class Arithmetic:
             slope = self.climb_slope(y)
             if slope == 0:
                 return y
-            first, second = self.context.diff(self.climb_slope, y, 1), self.context.diff(self.climb_slope, y, 2)
+            first, second = (
+                self.context.diff(self.climb_slope, y, 1),
+                self.context.diff(self.climb_slope, y, 2),
+            )
             below = first**2 - slope * second
             if below == 0:
                 return None
@@ -211,11 +222,10 @@ class Arithmetic:
             new = total * stop / n
             change = abs(new - value)
             value = new
-            if before is not None and change <= abs(value) * self.mpf(10) ** (-digits - 2):
-                return value
-            if before is not None and change < before / 1000:
-                # Geometric: the next change is at most this one times their ratio.
-                if change * (change / before) <= abs(value) * self.mpf(10) ** (-digits - 2):
+            if before is not None:
+                # Where it falls geometrically, the next change is at most this one times their ratio.
+                ratio = change / before if change < before / 1000 else 1
+                if change * ratio <= abs(value) * self.mpf(10) ** (-digits - 2):
                     return value
             before = change
         return None
@@ -224,8 +234,11 @@ class Arithmetic:
         """The integral over panels that resolved the rate in doubles, by Gauss-Legendre rules of higher degree."""
         nodes = legendre_rule(digits + 8, self.digits)
         total = self.mpf(0)
-        for left, right in zip(edges[:-1], edges[1:], strict=True):
-            half, middle = (self.mpf(right) - self.mpf(left)) / 2, (self.mpf(right) + self.mpf(left)) / 2
+        for left, right in pairwise(edges):
+            half, middle = (
+                (self.mpf(right) - self.mpf(left)) / 2,
+                (self.mpf(right) + self.mpf(left)) / 2,
+            )
             total += half * sum(
                 w * (rate(middle + half * x)[0] + (rate(middle - half * x)[0] if x else 0)) for x, w in nodes
             )

@@ -1,6 +1,7 @@
 """Panels laid in extended precision, where doubles cannot tell V**2 from nothing (next to a separatrix).
 
-The panels are of the same kind as those of `panels.lay`, with values right to the last bit; only their nodes are evaluated elsewhere.
+The panels are of the same kind as those of `panels.lay`, with values right to the last bit; only their nodes are
+evaluated elsewhere.
 Speed is no concern here.
 """
 
@@ -11,13 +12,23 @@ import numpy as np
 from gqm_sym.errors import SolutionError
 from gqm_sym.runtime.exact import ExactProblem
 from gqm_sym.runtime.kronrod import KRONROD_WEIGHTS, NODES
-from gqm_sym.runtime.panels import CONVERGED, COUNT, DEGREE, EXHAUSTED, TAIL, TURN_TURN, antiderivative
+from gqm_sym.runtime.panels import (
+    CONVERGED,
+    COUNT,
+    DEGREE,
+    EXHAUSTED,
+    TAIL,
+    TURN_TURN,
+    antiderivative,
+)
 
 DIGITS = 80  # a gap of 1e-30 to a barrier still leaves doubles their digits
 MOST_PANELS = 400
 
 
-def exact_ends(exact: ExactProblem, digits: int, kind: int, a: float, b: float, known: tuple[Any, Any]) -> tuple[Any, Any]:
+def exact_ends(
+    exact: ExactProblem, digits: int, kind: int, a: float, b: float, known: tuple[Any, Any]
+) -> tuple[Any, Any]:
     """The ends of a stretch in extended precision; the launch place is kept as it was given."""
     scale = exact.at(digits)
     turns = {TURN_TURN: (True, True)}.get(kind, (False, False))
@@ -53,7 +64,10 @@ def lay_exactly(exact: ExactProblem, kind: int, ends: tuple[Any, Any], stop: flo
         for i, x in enumerate(map(float, nodes)):
             duration, w = rate(middle + reach * x)
             if not (duration > 0 and w > 0):
-                raise SolutionError(f"time of flight from {float(ends[0])!r} to {float(ends[1])!r}: V**2 is not positive inside this stretch")
+                raise SolutionError(
+                    f"time of flight from {float(ends[0])!r} to {float(ends[1])!r}: "
+                    "V**2 is not positive inside this stretch"
+                )
             values[:, i] = float(duration), float(duration * scale.sqrt(w))
         c, terms = np.empty(DEGREE + 1), np.empty((2, DEGREE))
         length_size, length_tail, _ = antiderivative(values[1], half, c, terms[1])

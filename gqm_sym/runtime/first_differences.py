@@ -25,6 +25,7 @@ from math import pow as power
 
 from numba import njit
 
+from gqm_sym.runtime.doubledouble import two_sum
 from gqm_sym.runtime.jit import COMPILE
 
 # Below this t, 1 + t**2 is 1 to the last digit. Keeps quotients of subnormal numbers out.
@@ -65,14 +66,16 @@ def atanhc(t):  # type: ignore[no-untyped-def]
 
 @njit(**COMPILE)
 def sin1(x, y, h):  # type: ignore[no-untyped-def]
-    """sin[x,y] = cos((x+y)/2) sinc(h/2)."""
-    return cos(0.5 * (x + y)) * sinc(0.5 * h)
+    """sin[x,y] = cos((x+y)/2) sinc(h/2), with what rounding takes from x + y: near a zero of the cosine it counts."""
+    middle, rest = two_sum(x, y)
+    return (cos(0.5 * middle) - 0.5 * rest * sin(0.5 * middle)) * sinc(0.5 * h)
 
 
 @njit(**COMPILE)
 def cos1(x, y, h):  # type: ignore[no-untyped-def]
-    """cos[x,y] = -sin((x+y)/2) sinc(h/2)."""
-    return -sin(0.5 * (x + y)) * sinc(0.5 * h)
+    """cos[x,y] = -sin((x+y)/2) sinc(h/2), with what rounding takes from x + y: near a zero of the sine it counts."""
+    middle, rest = two_sum(x, y)
+    return -(sin(0.5 * middle) + 0.5 * rest * cos(0.5 * middle)) * sinc(0.5 * h)
 
 
 @njit(**COMPILE)

@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 
 # The same names as an mpmath context has, over floats.
 FLOATS = SimpleNamespace(
-    **{name: getattr(math, name) for name in "sin cos tan asin acos atan sinh cosh tanh".split()},
-    **{name: getattr(math, name) for name in "asinh acosh atanh exp log sqrt pi e".split()},
+    **{name: getattr(math, name) for name in ["sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh"]},
+    **{name: getattr(math, name) for name in ["asinh", "acosh", "atanh", "exp", "log", "sqrt", "pi", "e"]},
     mpf=float,
 )
 
@@ -77,7 +77,8 @@ class Formulas:
     def __post_init__(self) -> None:
         if self.interface != INTERFACE:
             raise OutdatedModuleError(
-                f"generated/{self.name}.py: made for interface {self.interface} of the runtime, which is now at {INTERFACE}; "
+                f"generated/{self.name}.py: made for interface {self.interface} of the runtime, "
+                f"which is now at {INTERFACE}; "
                 "run gqm-gen on its declaration again"
             )
 
@@ -89,14 +90,18 @@ class Formulas:
                 raise ParameterError(f"{name}: has no default and was not given; pass {name}=...")
             number = read_number(value, where=name)
             if (name in self.positive or name == "m") and not number.value > 0.0:
-                raise ParameterError(f"{name}: must be positive, got {number.text}; the closed forms hold for {name} > 0")
+                raise ParameterError(
+                    f"{name}: must be positive, got {number.text}; the closed forms hold for {name} > 0"
+                )
             out.append(number)
         return tuple(out)
 
     def launch(self, lam0: Any, v0: Any, direction: int, point: Any, t_max: Any, contact: str) -> Launch:
         """A launch, checked as far as it can be without the curve."""
         if point is not None:
-            raise LaunchError(f"point: {self.name} has a parameter of its own; launch by lam0 (a value of {self.parameter})")
+            raise LaunchError(
+                f"point: {self.name} has a parameter of its own; launch by lam0 (a value of {self.parameter})"
+            )
         if lam0 is None:
             raise LaunchError(f"lam0: not given; it is the value of {self.parameter} to launch from")
         if direction not in (1, -1):
@@ -105,7 +110,9 @@ class Formulas:
             raise LaunchError(f"contact: must be one of {', '.join(CONTACTS)}, got {contact!r}")
         speed = read_number(v0, where="v0")
         if speed.value < 0.0:
-            raise LaunchError(f"v0: is a speed and cannot be negative, got {speed.text}; use direction=-1 to launch the other way")
+            raise LaunchError(
+                f"v0: is a speed and cannot be negative, got {speed.text}; use direction=-1 to launch the other way"
+            )
         horizon = None if t_max is None else read_number(t_max, where="t_max")
         if horizon is not None and not horizon.value > 0.0:
             raise LaunchError(f"t_max: must be positive, got {horizon.text}")
@@ -117,7 +124,11 @@ class Formulas:
         low, high, period = self.exact.domain(FLOATS, tuple(number.value for number in p))
         if period is not None:
             return -math.inf, math.inf, float(period)
-        return -math.inf if low is None else float(low), math.inf if high is None else float(high), 0.0
+        return (
+            -math.inf if low is None else float(low),
+            math.inf if high is None else float(high),
+            0.0,
+        )
 
     def functions(self, p: tuple[Number, ...], launch: Launch) -> Functions:
         """The compiled functions with their parameters, and the exact problem of one launch."""
@@ -137,13 +148,20 @@ class Formulas:
         f = self.functions(p, launch)
         places, low, shape = read_numbers(lam, where=self.parameter)
         start = launch.lam0
-        offsets = (places - start.value) + (low - start.low)
+        offsets = (places - start.value) + low
         v2 = speed_squared_at(f.addresses, f.p, start.value, start.low, launch.v0.value**2, places, offsets)
         x, z, ds, kappa, force = frame_at(f.addresses, f.p, places, v2)
         return Pass1(*(array.reshape(shape) for array in (x, z, ds, kappa, v2, force)))
 
     def solve(
-        self, lam0: Any, v0: Any, direction: int, point: Any, t_max: Any, contact: str, given: tuple[Any, ...]
+        self,
+        lam0: Any,
+        v0: Any,
+        direction: int,
+        point: Any,
+        t_max: Any,
+        contact: str,
+        given: tuple[Any, ...],
     ) -> "Motion":
         """The motion that a launch begins."""
         from gqm_sym.runtime.solve import solve
@@ -152,7 +170,7 @@ class Formulas:
 
 
 def read_numbers(values: Any, *, where: str) -> tuple[Array, Array, tuple[int, ...]]:
-    """Numbers of any accepted kind, or arrays of them, as flat arrays of doubles and what those leave over; and their shape."""
+    """Numbers, or arrays of them, as flat arrays of doubles, flat arrays of what those leave over, and their shape."""
     if isinstance(values, np.ndarray) and values.dtype == np.float64:
         flat = np.ascontiguousarray(values).reshape(-1)
         return flat, np.zeros_like(flat), values.shape

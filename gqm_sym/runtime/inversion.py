@@ -1,10 +1,12 @@
 """Pass 3: the anomaly as a function of time, tabulated as polynomials on segments of time.
 
-Each panel's time is analytic and grows with the anomaly, so its inverse is analytic too. It is cut into equal segments, as few as a
-Chebyshev fit of fixed degree needs to be resolved to rounding. A small uniform index over time finds the segment at once.
+Each panel's time is analytic and grows with the anomaly, so its inverse is analytic too. It is cut into equal
+segments, as few as a
+Chebyshev fit of fixed degree needs to be resolved to rounding. A small uniform index over time finds the segment at
+once.
 """
 
-from math import cos, fabs, floor, pi
+from math import cos, fabs, pi
 
 import numpy as np
 from numba import njit
@@ -101,7 +103,11 @@ def tabulate(edges, times, time_terms):  # type: ignore[no-untyped-def]
             error = max(error, tail)
             if count == room:
                 room *= 2
-                middles, scales, ends = _grown(middles, room), _grown(scales, room), _grown(ends, room)
+                middles, scales, ends = (
+                    _grown(middles, room),
+                    _grown(scales, room),
+                    _grown(ends, room),
+                )
                 taller = np.empty((room, TERMS))
                 taller[:count] = powers
                 powers = taller
@@ -122,7 +128,14 @@ def tabulate(edges, times, time_terms):  # type: ignore[no-untyped-def]
         while segment < count - 1 and ends[segment] <= whole * i / index.size:
             segment += 1
         index[i] = segment
-    return middles[:count].copy(), scales[:count].copy(), powers[:count].copy(), index, ends[:count].copy(), error
+    return (
+        middles[:count].copy(),
+        scales[:count].copy(),
+        powers[:count].copy(),
+        index,
+        ends[:count].copy(),
+        error,
+    )
 
 
 @njit(**COMPILE)
@@ -157,7 +170,7 @@ def _to_powers(c, out):  # type: ignore[no-untyped-def]
 def look_up(middles, scales, powers, index, ends, t, t_low):  # type: ignore[no-untyped-def]
     """The anomaly at time t + t_low of a table."""
     whole = ends[-1]
-    slot = int(floor(t / whole * index.size)) if whole > 0.0 else 0
+    slot = np.int64(t / whole * index.size) if whole > 0.0 else 0
     segment = index[min(max(slot, 0), index.size - 1)]
     while segment < ends.size - 1 and t >= ends[segment]:
         segment += 1

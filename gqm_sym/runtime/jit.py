@@ -1,6 +1,7 @@
 """The one place for compiler options, and for how generated functions are compiled.
 
-No fast-math: reassociation would break sums and products of two doubles, and NaN and infinity have meaning here. Division by
+No fast-math: reassociation would break sums and products of two doubles, and NaN and infinity have meaning here.
+Division by
 zero gives infinity, as in IEEE arithmetic, and is not an exception.
 """
 
@@ -19,9 +20,10 @@ COMPILE: dict[str, Any] = {"cache": True, "error_model": "numpy"}
 
 
 def _spare_scipy() -> None:
-    """Keep numba from importing scipy.linalg, a third of its start-up, only to learn whether ``np.dot`` could be compiled.
+    """Keep numba from importing scipy.linalg, a third of its start-up, to learn whether ``np.dot`` can be compiled.
 
-    numba asks once, through `ensure_blas`; whether SciPy is installed answers it. Wherever BLAS is really used, numba asks again.
+    numba asks once, through `ensure_blas`; whether SciPy is installed answers it. Wherever BLAS is really used,
+    numba asks again.
     """
     if "numba.np.arraymath" in sys.modules:
         return
@@ -63,8 +65,10 @@ def entry(signature: Any) -> Callable[[Any], Callable[..., Any]]:
 def compiler(file: str) -> Callable[[Any], Callable[[Any], Any]]:
     """A decorator factory for the functions of one generated module: ``compiled(signature)``.
 
-    numba's disk cache remembers the module's name and imports it on loading, and machine code is told apart by it. A generated module may
-    be imported under any name, from any folder; so its functions are given to numba under a name made from the module's own text.
+    numba's disk cache remembers the module's name and imports it on loading, and machine code is told apart by it.
+    A generated module may
+    be imported under any name, from any folder; so its functions are given to numba under a name made from the
+    module's own text.
     """
     digest = hashlib.sha256(Path(file).read_bytes()).hexdigest()[:16]
     alias = f"gqm_sym_generated_{digest}"

@@ -15,7 +15,7 @@ from gqm_sym.runtime.formulas import read_numbers
 from gqm_sym.runtime.numbers import read_number
 from gqm_sym.runtime.panels import FROM_TURN, TURN_TURN
 from gqm_sym.runtime.problem import Problem
-from gqm_sym.runtime.stretch import Array, Stretch
+from gqm_sym.runtime.stretch import Array, Stretch, slopes
 
 ULP = 2.220446049250313e-16
 
@@ -111,7 +111,8 @@ class Motion:
         Parameters
         ----------
         t : number or array_like
-            Times in seconds from launch, at most ``t_end``; negative ones too where the motion is periodic. Strings, ints and
+            Times in seconds from launch, at most ``t_end``; negative ones too where the motion is periodic.
+            Strings, ints and
             Fractions are taken exactly.
 
         Returns
@@ -147,14 +148,17 @@ class Motion:
         return min(times)
 
     def error_bound(self, t: Any) -> Any:
-        """What ``lam(t)`` can be off by, at times: the clock's part and the inversion's (paper, eq. 32), rounding included."""
+        """What ``lam(t)`` can be off by: the clock's part and the inversion's (paper, eq. 32), rounding included."""
         times, low, shape = self._times(t)
         sample = self._sample(times, low)
         f = self.problem.functions
         ds = frame_at(f.addresses, f.p, sample.reduced, sample.v**2)[2]
         with np.errstate(divide="ignore", invalid="ignore"):
             rate = np.where(ds > 0.0, np.abs(sample.v) / ds, 0.0)
-        table = max((piece.stretch.table[5] * _swing(piece.stretch) for piece in self._course(0.0).pieces), default=0.0)
+        table = max(
+            (piece.stretch.table[5] * _swing(piece.stretch) for piece in self._course(0.0).pieces),
+            default=0.0,
+        )
         width = max((abs(p.stretch.b - p.stretch.a) for p in self._course(0.0).pieces), default=0.0)
         rounding = ULP * (np.abs(sample.lam) + np.abs(sample.reduced) + width)
         return _shaped(rate * self._clock_error(times) + table + rounding, shape)
@@ -167,7 +171,14 @@ class Motion:
         legs = []
         for piece in self._history():
             lam = piece.stretch.places(np.array([piece.phi_start, piece.phi_stop]))
-            leg = Leg(float(lam[0]), float(lam[1]), piece.t_start[0], piece.t_stop[0], piece.direction, piece.end)
+            leg = Leg(
+                float(lam[0]),
+                float(lam[1]),
+                piece.t_start[0],
+                piece.t_stop[0],
+                piece.direction,
+                piece.end,
+            )
             legs.append(leg)
         return tuple(self._told(_merged(legs)))
 
@@ -220,7 +231,9 @@ class Motion:
             if np.isnan(times).any():
                 raise InputError("t: must be numbers, got NaN")
             if times.max() > self.t_end:
-                raise InputError(f"t: the motion ends at {self.t_end!r} s ({self._how_it_ends()}), got {float(times.max())!r}")
+                raise InputError(
+                    f"t: the motion ends at {self.t_end!r} s ({self._how_it_ends()}), got {float(times.max())!r}"
+                )
             if times.min() < 0.0 and self._course(0.0).period is None:
                 raise InputError(f"t: cannot be negative for a motion that does not repeat, got {float(times.min())!r}")
         return times, low, shape
@@ -244,6 +257,8 @@ class Motion:
             lam[mask] = stretch.places(phi)
             s[mask] = piece.s_a + stretch.direction * stretch.lengths(phi)
             v[mask] = piece.direction * stretch.speeds(phi)
+        launch = (rest == 0.0) & (rest_low == 0.0)
+        lam[launch], s[launch], v[launch] = self.problem.lam0, 0.0, self.direction * self.problem.launch.v0.value
         if course.lap == 0.0:
             return _Sample(lam, lam, s, v, count)
         return _Sample(lam + count * course.lap, lam, s + count * course.lap_length, v, count)
@@ -319,13 +334,12 @@ class Rest(Motion):
 class Periodic(Motion):
     """A libration or a circulation: one stretch, repeated for ever.
 
-    Its course is first built from times in doubles. Beyond one period from launch the period is needed as two doubles; it is then evaluated
+    Its course is first built from times in doubles. Beyond one period from launch the period is needed as two
+    doubles; it is then evaluated
     once in extended precision.
     """
 
-    def __init__(
-        self, problem: Problem, kind: str, direction: int, stretch: Stretch
-    ) -> None:
+    def __init__(self, problem: Problem, kind: str, direction: int, stretch: Stretch) -> None:
         super().__init__(problem, kind, direction)
         self._stretch = stretch
         self._plain: Course | None = None
@@ -334,6 +348,7 @@ class Periodic(Motion):
 
     @property
     def turning_points(self) -> tuple[float, ...]:
+        """Both turning points of a libration, each the double nearest to the exact one."""
         if self.kind != "libration":
             return ()
         low, high = timing.turning_points(self.problem, self._stretch)
@@ -353,12 +368,14 @@ class Periodic(Motion):
 
     @property
     def half_period(self) -> float:
+        """Time from one turning point to the other, the double nearest to the exact one (libration only)."""
         if self.kind != "libration":
             return super().half_period
         return self._timing.duration[0]
 
     @property
     def period(self) -> float:
+        """Time after which the motion repeats, the double nearest to the exact one."""
         duration = self._timing.duration[0]
         return 2.0 * duration if self.kind == "libration" else duration
 
@@ -368,7 +385,7 @@ class Periodic(Motion):
 
     def _course(self, reach: float) -> Course:
         whole = self._stretch.duration * (2.0 if self.kind == "libration" else 1.0)
-        if self._precise is None and (reach > whole or self._exact is not None):
+        if self._precise is None and (reach > whole or self._exact is not None or self._stretch.from_exact):
             self._precise = self._build(self._timing)
         if self._precise is not None:
             return self._precise
@@ -401,8 +418,11 @@ class Periodic(Motion):
         course = self._course(float(np.abs(t).max()) if t.size else 0.0)
         assert course.period is not None
         period = course.period[0]
-        # Within a period the stretch's clock counts; over many only the period does.
+        # Within a period the stretch's clock counts, and the rounded anomaly of the launch; over many only the period does.
         local = period * (self._stretch.relative_error + ULP)
+        if course is not self._precise:
+            start = np.array([course.pieces[0].phi_start])
+            local += ULP * float(start[0] * slopes(self._stretch.edges, self._stretch.panels[3], start)[0])
         per_period = period * (2.0**-104 if course is self._precise else self._stretch.relative_error)
         return local + np.abs(t / period) * per_period
 

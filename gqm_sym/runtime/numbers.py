@@ -79,9 +79,7 @@ class Number:
             return ctx.make_mpf(libmp.from_rational(*ends, "n"))
         low, high = exact
         if interval:
-            return ctx.make_mpf(
-                (libmp.mpf_pos(low, ctx.prec, "f"), libmp.mpf_pos(high, ctx.prec, "c"))
-            )
+            return ctx.make_mpf((libmp.mpf_pos(low, ctx.prec, "f"), libmp.mpf_pos(high, ctx.prec, "c")))
         return ctx.make_mpf(libmp.mpf_pos(low, ctx.prec, "n"))
 
     def __float__(self) -> float:
@@ -136,9 +134,7 @@ def read_number(value: Source, *, where: str) -> Number:
         raise NumberError(str(error)) from None
     except ValueError as error:
         raise NumberError(f"{where}: {error}") from None
-    raise NumberError(
-        f"{where}: {type(value).__name__} given; give a number, or text such as '9.81' or 'pi/2'"
-    )
+    raise NumberError(f"{where}: {type(value).__name__} given; give a number, or text such as '9.81' or 'pi/2'")
 
 
 def _from_tree(tree: ast.expr, text: str, where: str) -> Number:

@@ -16,13 +16,13 @@ Each accepted panel keeps the Legendre coefficients of both antiderivatives, so 
 anywhere on it.
 """
 
-from math import cos, exp, fabs, inf, pi, sin, sqrt
+from math import cos, exp, fabs, inf, sin, sqrt
 
 import numpy as np
 from numba import njit
 
-from gqm_sym.runtime.jit import COMPILE
 from gqm_sym.runtime.crossing import call_bend, call_rise
+from gqm_sym.runtime.jit import COMPILE
 from gqm_sym.runtime.kronrod import EVEN, GAUSS_WEIGHTS, KRONROD_WEIGHTS, NODES, ODD
 
 TURN_TURN, FROM_TURN, REGULAR, TO_EQUILIBRIUM = range(4)
@@ -111,7 +111,7 @@ def speeds(fns, p, kind, a, b, ref, w, phi, work, out):  # type: ignore[no-untyp
 
 @njit(**COMPILE)
 def shares(kind, w, work, n):  # type: ignore[no-untyped-def]
-    """The least and the largest regular factor of V**2 over the places last filled: what is left where most of it cancels."""
+    """The least and largest regular factor of V**2 over the places last filled: what is left where it cancels."""
     low, high = 1.0, 1.0
     if kind == TURN_TURN:
         low, high = inf, 0.0
@@ -126,7 +126,7 @@ def shares(kind, w, work, n):  # type: ignore[no-untyped-def]
 
 @njit(**COMPILE)
 def antiderivative(values, half, c, out):  # type: ignore[no-untyped-def]
-    """Legendre coefficients of the integral from the panel's left end. Returns size, tail and plateau of the integrand's."""
+    """Legendre coefficients of the integral from the left end; returns size, tail and plateau of the integrand's."""
     for j in range(11):
         total = EVEN[11 * j] * values[10]
         for i in range(1, 11):
@@ -171,15 +171,22 @@ def lay(fns, p, kind, a, b, ref, w, start, stop):  # type: ignore[no-untyped-def
     error : float
         Estimated relative error of the whole time by quadrature, rounding included.
     balance : float
-        Smallest against largest regular factor of V**2: what is left of it where most of it cancels. Near a separatrix it is small.
+        Smallest against largest regular factor of V**2: what is left of it where most of it cancels. Near a
+        separatrix it is small.
     status : int
-        CONVERGED, FLOOR (coefficients levelled off above rounding), EXHAUSTED (too many panels), FAILED (not finite) or ILL_CONDITIONED (V**2 all but vanishes
+        CONVERGED, FLOOR (coefficients levelled off above rounding), EXHAUSTED (too many panels), FAILED (not
+        finite) or ILL_CONDITIONED (V**2 all but vanishes
         inside: extended precision must lay the panels).
     """
     room = 16
     edges, times, lengths = np.empty(room + 1), np.empty(room + 1), np.empty(room + 1)
     time_terms, length_terms = np.empty((room, DEGREE)), np.empty((room, DEGREE))
-    phi, work, values, c = np.empty(COUNT), np.empty((4, COUNT)), np.empty((2, COUNT)), np.empty(DEGREE + 1)
+    phi, work, values, c = (
+        np.empty(COUNT),
+        np.empty((4, COUNT)),
+        np.empty((2, COUNT)),
+        np.empty(DEGREE + 1),
+    )
     pending = np.empty(128)  # right edges still to do, nearest last
     pending[0] = stop
     waiting = 1
@@ -202,7 +209,11 @@ def lay(fns, p, kind, a, b, ref, w, start, stop):  # type: ignore[no-untyped-def
             break
         if count == room:
             room *= 2
-            edges, times, lengths = _longer(edges, room + 1), _longer(times, room + 1), _longer(lengths, room + 1)
+            edges, times, lengths = (
+                _longer(edges, room + 1),
+                _longer(times, room + 1),
+                _longer(lengths, room + 1),
+            )
             time_terms, length_terms = _taller(time_terms, room), _taller(length_terms, room)
         length_size, length_tail, length_middle = antiderivative(values[1], half, c, length_terms[count])
         size, tail, level = antiderivative(values[0], half, c, time_terms[count])
@@ -219,7 +230,10 @@ def lay(fns, p, kind, a, b, ref, w, start, stop):  # type: ignore[no-untyped-def
         floor = (
             level <= PLATEAU * size
             and tail >= 0.05 * level
-            and (length_tail <= TAIL * length_size or (length_middle <= PLATEAU * length_size and length_tail >= 0.05 * length_middle))
+            and (
+                length_tail <= TAIL * length_size
+                or (length_middle <= PLATEAU * length_size and length_tail >= 0.05 * length_middle)
+            )
         )
         narrow = fabs(right - left) <= least
         full = count + waiting >= MOST_PANELS or waiting >= pending.size - 1

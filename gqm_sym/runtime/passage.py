@@ -94,6 +94,7 @@ class Passage(Motion):
 
     @property
     def turning_points(self) -> tuple[float, ...]:
+        """Turning points so far, in the order met; a launch from rest counts."""
         turns = [float(p.stretch.places(np.array([p.phi_stop]))[0]) for p in self._pieces if p.end == "turn"]
         return (*((self.problem.lam0,) if self.problem.w0 == 0.0 else ()), *turns)
 
@@ -128,14 +129,23 @@ class Passage(Motion):
         target = end.place + end.direction * end.step
         if not isfinite(target) or not isfinite(target**2):
             raise SolutionError(
-                f"the motion leaves the range of doubles at {problem.formulas.parameter} = {end.place!r}; give a shorter t_max"
+                f"the motion leaves the range of doubles at {problem.formulas.parameter} = {end.place!r}; "
+                "give a shorter t_max"
             )
         what, near, _ = walk_on(
-            f.addresses, f.p, lam0, problem.w0, end.direction, abs(end.place - lam0), abs(target - lam0), end.step
+            f.addresses,
+            f.p,
+            lam0,
+            problem.w0,
+            end.direction,
+            abs(end.place - lam0),
+            abs(target - lam0),
+            end.step,
         )
         if what != search.LIMIT:
             raise SolutionError(
-                f"the motion beyond {problem.formulas.parameter} = {lam0 + near!r} could not be followed; give a domain that ends there"
+                f"the motion beyond {problem.formulas.parameter} = {lam0 + near!r} could not be followed; "
+                "give a domain that ends there"
             )
         self.add(through(f, end.place, target, lam0, problem.w0), 1, "")
         end.place, end.step = target, 2.0 * end.step

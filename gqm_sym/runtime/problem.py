@@ -10,7 +10,10 @@ from gqm_sym.runtime.stretch import Functions
 
 @dataclass(frozen=True, slots=True)
 class Reach:
-    """How far the motion goes one way: ``what`` is "turn", "equilibrium", "domain-end", "cusp", "singular-point", "open" or "closed"."""
+    """How far the motion goes one way, and what is there.
+
+    ``what`` is "turn", "equilibrium", "domain-end", "cusp", "singular-point", "open" or "closed".
+    """
 
     what: str
     place: float
@@ -31,8 +34,10 @@ class Problem:
 
     @property
     def lam0(self) -> float:
+        """The launch place, as the nearest double."""
         return self.launch.lam0.value
 
     @property
     def w0(self) -> float:
-        return self.launch.v0.value ** 2
+        """V**2 at launch."""
+        return self.launch.v0.value**2

@@ -10,8 +10,8 @@ from math import fabs, inf, isfinite
 import numpy as np
 from numba import njit
 
-from gqm_sym.runtime.jit import COMPILE
 from gqm_sym.runtime.crossing import call_bounds, call_climb, call_rise
+from gqm_sym.runtime.jit import COMPILE
 
 # What ended a walk.
 TURN, LIMIT, CRITICAL, CUSP, MARCHED, BROKEN = range(6)
@@ -67,9 +67,9 @@ def walk(fns, p, lam0, w0, direction, begin, reach, step):  # type: ignore[no-un
     Returns
     -------
     what : int
-        TURN (V**2 has its first zero at ``near``), LIMIT (walked all of ``reach``), CUSP (ds vanishes at ``far``), CRITICAL (V**2
-        and its slope are too close to zero between ``near`` and ``far`` for doubles to decide), MARCHED (steps spent with V**2 > 0 up to
-        ``near``) or BROKEN (a value that is not a number near ``far``).
+        TURN (V**2 has its first zero at ``near``), LIMIT (walked all of ``reach``), CUSP (ds vanishes at ``far``),
+        CRITICAL (V**2 and its slope are too close to zero between ``near`` and ``far`` for doubles to decide), MARCHED
+        (steps spent with V**2 > 0 up to ``near``) or BROKEN (a value that is not a number near ``far``).
     near, far : float
         Offsets from lam0, signed.
     """

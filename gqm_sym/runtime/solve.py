@@ -1,7 +1,6 @@
 """From a launch to a motion: how far it reaches each way, of what kind it is, and the stretches it runs through."""
 
 from math import isfinite
-from typing import Any
 
 import numpy as np
 
@@ -13,7 +12,7 @@ from gqm_sym.runtime.motion import Motion, Periodic, Rest
 from gqm_sym.runtime.numbers import Number
 from gqm_sym.runtime.passage import OpenEnd, Passage
 from gqm_sym.runtime.problem import Problem, Reach
-from gqm_sym.runtime.stretch import Stretch, between_turns, from_turn, through
+from gqm_sym.runtime.stretch import between_turns, from_turn, through
 
 # ds at an end of the domain, against its value at the launch, that makes the end a cusp.
 CUSP_SHARE = 1e-7
@@ -35,7 +34,13 @@ def _bilateral(formulas: Formulas, p: tuple[Number, ...], launch: Launch) -> Mot
     formulas.check_place(launch.lam0, low, high)
     functions = formulas.functions(p, launch)
     problem = Problem(
-        formulas=formulas, launch=launch, p=p, functions=functions, low=low, high=high, period=period
+        formulas=formulas,
+        launch=launch,
+        p=p,
+        functions=functions,
+        low=low,
+        high=high,
+        period=period,
     )
     f = functions
     direction, ahead, behind, panels = survey(
@@ -47,7 +52,14 @@ def _bilateral(formulas: Formulas, p: tuple[Number, ...], launch: Launch) -> Mot
             return Rest(problem)
         direction = -sign
         ahead = walk_on(
-            f.addresses, f.p, problem.lam0, 0.0, direction, 0.0, period or _room(problem, direction), _first_step(problem)
+            f.addresses,
+            f.p,
+            problem.lam0,
+            0.0,
+            direction,
+            0.0,
+            period or _room(problem, direction),
+            _first_step(problem),
         )
     if len(panels[0]) and ahead[0] == search.TURN:  # a libration without difficulties
         a, b = sorted((problem.lam0 + ahead[1], problem.lam0 + behind[1]))
@@ -69,7 +81,12 @@ def _bilateral(formulas: Formulas, p: tuple[Number, ...], launch: Launch) -> Mot
     if back.what == "turn":
         ends = sorted((front, back), key=lambda reach: reach.place)
         exact = (ends[0].exact, ends[1].exact)
-        return Periodic(problem, "libration", direction, between_turns(f, ends[0].place, ends[1].place, ends=exact))
+        return Periodic(
+            problem,
+            "libration",
+            direction,
+            between_turns(f, ends[0].place, ends[1].place, ends=exact),
+        )
     return _returning(problem, direction, front, back)
 
 
@@ -94,7 +111,14 @@ def _reach(problem: Problem, direction: int, walked: tuple[int, float, float]) -
             if end.what != "clear":
                 return Reach(end.what, float(end.place), end.place)
             walked = walk_on(
-                f.addresses, f.p, lam0, problem.w0, direction, max(abs(far), 1e-300), limit, _first_step(problem)
+                f.addresses,
+                f.p,
+                lam0,
+                problem.w0,
+                direction,
+                max(abs(far), 1e-300),
+                limit,
+                _first_step(problem),
             )
             continue
         if what == search.TURN:

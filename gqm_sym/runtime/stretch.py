@@ -11,7 +11,15 @@ from gqm_sym.errors import SolutionError
 from gqm_sym.runtime.entries import anomalies, build_table, lay_panels, read_off_many, speeds_at
 from gqm_sym.runtime.exact import ExactProblem
 from gqm_sym.runtime.exact_panels import DIGITS, exact_ends, lay_exactly
-from gqm_sym.runtime.panels import EXHAUSTED, FAILED, FROM_TURN, ILL_CONDITIONED, REGULAR, TO_EQUILIBRIUM, TURN_TURN
+from gqm_sym.runtime.panels import (
+    EXHAUSTED,
+    FAILED,
+    FROM_TURN,
+    ILL_CONDITIONED,
+    REGULAR,
+    TO_EQUILIBRIUM,
+    TURN_TURN,
+)
 
 Array = NDArray[np.float64]
 
@@ -99,7 +107,7 @@ class Stretch:
 
     @property
     def balance(self) -> float:
-        """How much of V**2's regular factor is left where most of it cancels: the conditioning of this stretch in doubles."""
+        """How much of V**2's regular factor is left where most of it cancels: this stretch's conditioning."""
         return float(self.panels[6])
 
     @property
@@ -126,10 +134,10 @@ class Stretch:
 
     def anomaly(self, t: Array, t_low: Array) -> Array:
         """The anomaly at times ``t + t_low`` from the end ``a``; exactly the first and the last one at both ends."""
-        phi = anomalies(*self.table[:5], t, t_low)
+        phi: Array = anomalies(*self.table[:5], t, t_low)
         phi[t + t_low <= 0.0] = 0.0
         phi[t + t_low >= self.duration] = self.edges[-1]
-        return phi  # type: ignore[no-any-return]
+        return phi
 
     def anomaly_of(self, offset_a: float, offset_b: float) -> float:
         """The anomaly of a place given by its signed offsets ``lam - a`` and ``b - lam``."""
@@ -147,7 +155,11 @@ class Stretch:
         width = self.b - self.a
         if self.kind == TURN_TURN:
             near = phi < 0.5 * pi
-            return np.where(near, self.a + width * np.sin(0.5 * phi) ** 2, self.b - width * np.cos(0.5 * phi) ** 2)
+            return np.where(
+                near,
+                self.a + width * np.sin(0.5 * phi) ** 2,
+                self.b - width * np.cos(0.5 * phi) ** 2,
+            )
         if self.kind == TO_EQUILIBRIUM:
             return self.b - width * np.exp(-phi)
         share = phi**2 if self.kind == FROM_TURN else phi
@@ -158,7 +170,8 @@ class Stretch:
         f = self.functions
         if self.from_exact:
             return self._paced(phi)
-        return speeds_at(f.addresses, f.p, self.kind, self.a, self.b, self.ref, self.w, phi)  # type: ignore[no-any-return]
+        speeds: Array = speeds_at(f.addresses, f.p, self.kind, self.a, self.b, self.ref, self.w, phi)
+        return speeds
 
     def _paced(self, phi: Array) -> Array:
         """|ds/dt| from the panels themselves, where doubles cannot tell V**2 from nothing."""
@@ -166,11 +179,13 @@ class Stretch:
 
     def times(self, phi: Array) -> Array:
         """Time from the end ``a`` to anomalies."""
-        return read_off_many(self.panels[0], self.panels[1], self.panels[3], phi)
+        times: Array = read_off_many(self.panels[0], self.panels[1], self.panels[3], phi)
+        return times
 
     def lengths(self, phi: Array) -> Array:
         """Arc length from the end ``a`` to anomalies."""
-        return read_off_many(self.panels[0], self.panels[2], self.panels[4], phi)
+        lengths: Array = read_off_many(self.panels[0], self.panels[2], self.panels[4], phi)
+        return lengths
 
 
 def slopes(edges: Array, terms: Array, phi: Array) -> Array:
@@ -194,7 +209,13 @@ def toward_equilibrium(functions: Functions, start: float, top: float, duration:
         stop *= 2.0
 
 
-def between_turns(functions: Functions, a: float, b: float, panels: Any = None, ends: tuple[Any, Any] = (None, None)) -> Stretch:
+def between_turns(
+    functions: Functions,
+    a: float,
+    b: float,
+    panels: Any = None,
+    ends: tuple[Any, Any] = (None, None),
+) -> Stretch:
     """A stretch between two turning points."""
     return Stretch(functions=functions, kind=TURN_TURN, a=a, b=b, stop=pi, panels=panels, ends=ends)
 

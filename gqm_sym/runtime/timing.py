@@ -12,7 +12,8 @@ from gqm_sym.runtime.panels import REGULAR, TURN_TURN
 from gqm_sym.runtime.problem import Problem
 from gqm_sym.runtime.stretch import Stretch
 
-# Digits of a period as two doubles, and of the time from a turning point to the launch, which no count of periods multiplies.
+# Digits of a period as two doubles, and of the time from a turning point to the launch, which no count of periods
+# multiplies.
 PERIOD_DIGITS = 34
 PHASE_DIGITS = 22
 MOST_DIGITS = 1000
@@ -75,9 +76,7 @@ def turning_points(problem: Problem, stretch: Stretch) -> tuple[float, float]:
     return float(low), float(high)
 
 
-def period_to(
-    problem: Problem, kind: str, direction: int, stretch: Stretch, digits: int
-) -> str:
+def period_to(problem: Problem, kind: str, direction: int, stretch: Stretch, digits: int) -> str:
     """The period with that many correct digits."""
     if not isinstance(digits, int) or not 1 <= digits <= MOST_DIGITS:
         raise InputError(f"period_to: digits must be a whole number from 1 to {MOST_DIGITS}, got {digits!r}")

@@ -22,9 +22,7 @@ _WANTED = {
 }
 
 
-def explain(
-    detail: Any, tree: MapNode, mistakes: Mistakes, *, spoilt: Collection[Mark] = ()
-) -> None:
+def explain(detail: Any, tree: MapNode, mistakes: Mistakes, *, spoilt: Collection[Mark] = ()) -> None:
     """Note what pydantic found, in words of ours.
 
     Parameters
@@ -75,9 +73,7 @@ def explain(
         mistakes.add(value_mark, f"{label}{what}, got {given}")
 
 
-def _explain_unknown(
-    loc: tuple[Any, ...], steps: list[tuple[str, Mark, Node]], mistakes: Mistakes
-) -> None:
+def _explain_unknown(loc: tuple[Any, ...], steps: list[tuple[str, Mark, Node]], mistakes: Mistakes) -> None:
     key = str(loc[-1])
     path = ".".join(step for step, _, _ in steps[:-1])
     label = f"{path}: " if path else ""

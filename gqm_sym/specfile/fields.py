@@ -86,14 +86,10 @@ Line: TypeAlias = Annotated[str, AfterValidator(_check_line)]
 Name: TypeAlias = Annotated[str, _checked(lambda text: check_name(text, where=""))]
 CurveParameter: TypeAlias = Annotated[str, _checked(_check_curve_parameter)]
 ParameterName: TypeAlias = Annotated[str, _checked(lambda text: check_parameter(text, where=""))]
-Expression: TypeAlias = Annotated[
-    str, _checked(lambda text: parse(text, where="")), WithJsonSchema(_TEXT_OR_NUMBER)
-]
+Expression: TypeAlias = Annotated[str, _checked(lambda text: parse(text, where="")), WithJsonSchema(_TEXT_OR_NUMBER)]
 Number: TypeAlias = Annotated[str, _checked(_check_number), WithJsonSchema(_TEXT_OR_NUMBER)]
 Flag: TypeAlias = Annotated[bool, BeforeValidator(_read_flag), WithJsonSchema({"type": "boolean"})]
-Direction: TypeAlias = Annotated[
-    int, BeforeValidator(_read_direction), WithJsonSchema({"enum": [1, -1]})
-]
+Direction: TypeAlias = Annotated[int, BeforeValidator(_read_direction), WithJsonSchema({"enum": [1, -1]})]
 Ends: TypeAlias = Annotated[list[Expression | None], Field(min_length=2, max_length=2)]
 Place: TypeAlias = Annotated[list[Number], Field(min_length=2, max_length=2)]
 Centre: TypeAlias = Annotated[list[Expression], Field(min_length=2, max_length=2)]

@@ -201,11 +201,7 @@ class _Reader:
             return
         values = dict(curve.defaults)
         values |= {name: entry.value for name, entry in declared.items() if entry is not None}
-        known = {
-            sp.Symbol(name, real=True): exact_value(value)
-            for name, value in values.items()
-            if value is not None
-        }
+        known = {sp.Symbol(name, real=True): exact_value(value) for name, value in values.items() if value is not None}
         lam0 = exact_value(launch.lam0)
         low, high = (None if end is None else end.xreplace(known) for end in curve.domain)
         for end in (low, high):
@@ -213,9 +209,7 @@ class _Reader:
                 what = f"the curve's domain ends at {end} with these parameters, no real number"
                 note("lam0", what, "change the parameters or the domain")
                 return
-        if (low is not None and _is_true(lam0 < low)) or (
-            high is not None and _is_true(lam0 > high)
-        ):
+        if (low is not None and _is_true(lam0 < low)) or (high is not None and _is_true(lam0 > high)):
             domain = f"[{'-oo' if low is None else low}, {'oo' if high is None else high}]"
             what = f"{launch.lam0} is outside the curve's domain"
             note("lam0", what, f"give one within {domain}")

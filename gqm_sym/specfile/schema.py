@@ -150,9 +150,7 @@ _FAMILY: Any = Annotated[reduce(or_, FAMILY_MODELS.values()), Field(discriminato
 
 CURVES: dict[str, CurveRow] = {
     "graph": CurveRow(Graph, _declare_graph, "the graph z = z(x)"),
-    "parametric": CurveRow(
-        Parametric, lambda given: Curve.parametric(**given), "both coordinates in a parameter"
-    ),
+    "parametric": CurveRow(Parametric, lambda given: Curve.parametric(**given), "both coordinates in a parameter"),
     "polar": CurveRow(Polar, _declare_polar, "r = r(theta)"),
     "family": CurveRow(_FAMILY, _declare_family, "a curve of a known family"),
 }
@@ -166,17 +164,13 @@ _KERNEL_ARGUMENTS: dict[str, tuple[Any, Any]] = {
 
 def _kernel_model(row: KernelRow) -> type[Section]:
     fields: dict[str, Any] = {
-        argument: _KERNEL_ARGUMENTS.get(argument, _name_or_value(argument))
-        for argument in row.arguments
+        argument: _KERNEL_ARGUMENTS.get(argument, _name_or_value(argument)) for argument in row.arguments
     }
     return create_model(f"Kernel_{row.name}", __base__=Section, __doc__=row.summary, **fields)
 
 
 def _sections(rows: dict[str, tuple[Any, str]]) -> dict[str, Any]:
-    return {
-        key: (model, Field(default=_ABSENT, description=summary))
-        for key, (model, summary) in rows.items()
-    }
+    return {key: (model, Field(default=_ABSENT, description=summary)) for key, (model, summary) in rows.items()}
 
 
 CurveSection: type[Section] = create_model(
@@ -206,9 +200,7 @@ class Parameter(Section):
     description: Line = Field(default="", description="for people")
 
     @classmethod
-    def __get_pydantic_json_schema__(
-        cls, core_schema: CoreSchema, handler: GetJsonSchemaHandler
-    ) -> JsonSchemaValue:
+    def __get_pydantic_json_schema__(cls, core_schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
         """Describe the short form too: the value alone."""
         short = {"type": ["string", "number", "null"]}
         return {"anyOf": [short, handler.resolve_ref_schema(handler(core_schema))]}
@@ -235,13 +227,9 @@ class Launch(Section):
 class CurveFile(Section):
     """A curve, the forces on a body that moves along it, and a launch."""
 
-    name: Name = Field(
-        description="of the generated module: a Python identifier", examples=["pendulum"]
-    )
+    name: Name = Field(description="of the generated module: a Python identifier", examples=["pendulum"])
     title: Line = Field(default="", description="one line for people")
-    curve: CurveSection = Field(
-        description="exactly one kind", examples=[{"graph": {"z": "x**3", "parameter": "x"}}]
-    )
+    curve: CurveSection = Field(description="exactly one kind", examples=[{"graph": {"z": "x**3", "parameter": "x"}}])
     kernel: KernelSection = Field(description="the forces", examples=[{"gravity": {}}])
     parameters: dict[ParameterName, Annotated[Parameter, BeforeValidator(read_default)]] = Field(
         default_factory=dict,
@@ -283,9 +271,7 @@ class _Draft07(GenerateJsonSchema):
 
 def json_schema() -> dict[str, Any]:
     """Return the JSON Schema (draft 7) of a curve file."""
-    schema = CurveFile.model_json_schema(
-        ref_template="#/definitions/{model}", schema_generator=_Draft07
-    )
+    schema = CurveFile.model_json_schema(ref_template="#/definitions/{model}", schema_generator=_Draft07)
     schema["definitions"] = schema.pop("$defs")
     return {"$schema": _Draft07.schema_dialect, **_without_null_defaults(schema)}
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 import sympy as sp
 
 from gqm_sym.declare import Curve
-from gqm_sym.derive import Model, derive
+from gqm_sym.derivation import Model, derive
 from gqm_sym.errors import InputError, SpecFileError
 from gqm_sym.kernels import Kernel
 from gqm_sym.parameters import exact_value, is_positive
@@ -65,9 +65,7 @@ class Spec:
             If a closed form is not real and finite.
         """
         try:
-            return derive(
-                self.curve, self.kernel, parameters=self.parameters, title=self.title or None
-            )
+            return derive(self.curve, self.kernel, parameters=self.parameters, title=self.title or None)
         except SpecFileError:
             raise
         except InputError as error:

@@ -77,9 +77,7 @@ def read_text(path: Path, mistakes: Mistakes) -> str:
             text = data.decode("utf-8").removeprefix("\ufeff")
         except UnicodeDecodeError as error:
             before = data[: error.start].decode("utf-8").removeprefix("\ufeff")
-            mistakes.add(
-                _mark_in(before, len(before)), "this is not UTF-8 text", "save it as UTF-8"
-            )
+            mistakes.add(_mark_in(before, len(before)), "this is not UTF-8 text", "save it as UTF-8")
         else:
             _check_text(text, mistakes)
     if mistakes:
@@ -152,9 +150,7 @@ class _Builder:
         for event in YAML(typ="safe", pure=True).parse(self.text):
             self._take(event)
         if self.root is None:
-            self.mistakes.add(
-                Mark(1, 1), "the file is empty", "give at least name, curve and kernel"
-            )
+            self.mistakes.add(Mark(1, 1), "the file is empty", "give at least name, curve and kernel")
         return self.root
 
     def _take(self, event: Any) -> None:

@@ -87,9 +87,7 @@ def swing(amplitude: mpf, t: mpf) -> tuple[mpf, mpf]:
 
 def complete(gap: mpf) -> mpf:
     """Complete elliptic integral of the first kind for k = sqrt(1 - gap**2), by quadrature."""
-    return integral(
-        lambda u: 1 / mp.sqrt(mp.sin(u) ** 2 + gap**2 * mp.cos(u) ** 2), graded(gap, mp.pi / 2)
-    )
+    return integral(lambda u: 1 / mp.sqrt(mp.sin(u) ** 2 + gap**2 * mp.cos(u) ** 2), graded(gap, mp.pi / 2))
 
 
 def swing_half_period(amplitude: mpf) -> mpf:
@@ -200,9 +198,7 @@ def graph_samples(
 
 def invert(time: Callable[[mpf], mpf], target: mpf, low: mpf, high: mpf) -> mpf:
     """Find the angle at which a growing ``time`` meets ``target``."""
-    return mp.findroot(
-        lambda u: time(u) - target, (low, high), solver="anderson", tol=mpf(10) ** -130
-    )
+    return mp.findroot(lambda u: time(u) - target, (low, high), solver="anderson", tol=mpf(10) ** -130)
 
 
 def quartic_small(amplitude: mpf, lam0: str) -> Row:
@@ -352,19 +348,13 @@ def parabola(slug: str, x0: str, amplitude: mpf, times: list[str]) -> Row:
     m, rate = -4 * a**2 * amplitude**2, mp.sqrt(2 * G * a)
     tau = must_agree(
         2 * mp.ellipe(m) / rate,
-        2
-        / rate
-        * integral(
-            lambda u: mp.sqrt(1 - m * mp.sin(u) ** 2), graded(1 / (1 + mp.sqrt(-m)), mp.pi / 2)
-        ),
+        2 / rate * integral(lambda u: mp.sqrt(1 - m * mp.sin(u) ** 2), graded(1 / (1 + mp.sqrt(-m)), mp.pi / 2)),
     )
     positions = []
     for t in times:
         laps, rest = fold(t, tau)
         elapsed = tau / 2 - rest  # from the bottom, on the way from +X to -X
-        u = mp.sign(elapsed) * invert(
-            lambda u: mp.ellipe(u, m) / rate, abs(elapsed), mpf(0), mp.pi / 2
-        )
+        u = mp.sign(elapsed) * invert(lambda u: mp.ellipe(u, m) / rate, abs(elapsed), mpf(0), mp.pi / 2)
         mirrored = 1 if laps % 2 == 0 else -1
         x = mirrored * amplitude * mp.sin(u)
         positions.append(position(t, x, -mirrored * rate * amplitude * mp.cos(u)))
@@ -489,9 +479,7 @@ def cases() -> list[Row]:
     float_top = mp.pi / 2 - mpf(3.141592653589793 / 2)
     length_one = {"L": "1"}
     return [
-        pendulum_from_rest(
-            "pendulum_almost_upright", "circle", "pi - 1e-3", mp.pi - milli, ["1.5", "7", "40"]
-        ),
+        pendulum_from_rest("pendulum_almost_upright", "circle", "pi - 1e-3", mp.pi - milli, ["1.5", "7", "40"]),
         pendulum_from_rest(
             "pendulum_almost_upright_from_the_horizontal",
             "pendulum",
@@ -499,9 +487,7 @@ def cases() -> list[Row]:
             mp.pi - milli,
             ["1.5", "7", "40"],
         ),
-        pendulum_from_rest(
-            "pendulum_nearly_upright", "circle", "pi - 1e-6", mp.pi - micro, ["4", "11", "60"]
-        ),
+        pendulum_from_rest("pendulum_nearly_upright", "circle", "pi - 1e-6", mp.pi - micro, ["4", "11", "60"]),
         pendulum_from_rest(
             "pendulum_nearly_upright_from_the_horizontal",
             "pendulum",
@@ -526,9 +512,7 @@ def cases() -> list[Row]:
         ),
         pendulum_from_bottom("pendulum_full_loop", "7", mpf(7), ["0.4", "3", "9"]),
         pendulum_from_bottom("pendulum_barely_loops", "6.2642", mpf("6.2642"), ["0.4", "3", "20"]),
-        pendulum_from_bottom(
-            "pendulum_barely_fails_to_loop", "6.2641", mpf("6.2641"), ["0.4", "3", "20"]
-        ),
+        pendulum_from_bottom("pendulum_barely_fails_to_loop", "6.2641", mpf("6.2641"), ["0.4", "3", "20"]),
         pendulum_from_bottom(
             "pendulum_launched_to_the_hilltop",
             "2*sqrt(9.81)",

@@ -12,11 +12,11 @@ from dataclasses import dataclass
 import sympy as sp
 
 from gqm_sym.declare import Curve
-from gqm_sym.derive.algebra import Algebra, Fraction, Polynomial
-from gqm_sym.derive.differentiate import differentiate
-from gqm_sym.derive.factors import factors
-from gqm_sym.derive.generators import Angle, OverBudget
-from gqm_sym.derive.rewrite import (
+from gqm_sym.derivation.algebra import Algebra, Fraction, Polynomial
+from gqm_sym.derivation.differentiate import differentiate
+from gqm_sym.derivation.factors import factors
+from gqm_sym.derivation.generators import Angle, OverBudget
+from gqm_sym.derivation.rewrite import (
     Power,
     absorb_bars,
     direction,
@@ -29,9 +29,9 @@ from gqm_sym.derive.rewrite import (
     spell_quotient,
     spell_ratio,
 )
-from gqm_sym.derive.signs import Signs
-from gqm_sym.derive.spelling import shortest
-from gqm_sym.derive.turning import tangent_angle
+from gqm_sym.derivation.signs import Signs
+from gqm_sym.derivation.spelling import shortest
+from gqm_sym.derivation.turning import tangent_angle
 from gqm_sym.errors import DeclarationError
 
 
@@ -150,9 +150,7 @@ def _factored(curve: Curve, signs: Signs) -> Geometry:
     way = _direction(curve)
     algebra = way.algebra
     root = _root_of_sum(way, signs)
-    scale = spell_product(
-        algebra, way.common, way.below if root.weight == algebra.one else algebra.one
-    )
+    scale = spell_product(algebra, way.common, way.below if root.weight == algebra.one else algebra.one)
     ds = [*magnitudes(signs, scale), *root.powers]
     rate = _turning_rate(way, root)
     inverse = [(base, -power) for base, power in root.powers]
@@ -297,8 +295,6 @@ def _in_plane(way: _Direction, root: _Root) -> tuple[list[Power], list[Power]]:
 
 def _cusp(signs: Signs, scale: list[Power], lam: sp.Symbol) -> sp.Expr | None:
     found = [
-        factor
-        for factor, power in scale
-        if power > 0 and lam in factor.free_symbols and not signs.nonzero(factor)
+        factor for factor, power in scale if power > 0 and lam in factor.free_symbols and not signs.nonzero(factor)
     ]
     return sp.Mul(*found) if found else None

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 import sympy as sp
 
 from gqm_sym.declare import Curve
-from gqm_sym.derive.forces import forces
-from gqm_sym.derive.geometry import geometry
-from gqm_sym.derive.rewrite import check_real, tidy, without_poles
+from gqm_sym.derivation.forces import forces
+from gqm_sym.derivation.geometry import geometry
+from gqm_sym.derivation.rewrite import check_real, tidy, without_poles
 from gqm_sym.errors import DeclarationError
 from gqm_sym.kernels.base import Kernel
 from gqm_sym.parameters import COMMON, COMMON_DEFAULTS, Given, Value, is_positive, read_value
@@ -207,9 +207,7 @@ def derive(
     """
     defaults = _join(curve, kernel, parameters or {})
     values = dict(defaults)
-    shape = geometry(
-        curve, may_be_positive=tuple(name for name in values if is_positive(values[name]))
-    )
+    shape = geometry(curve, may_be_positive=tuple(name for name in values if is_positive(values[name])))
     x, z = without_poles(curve.x), without_poles(curve.z)
     law = forces(x, z, kernel, shape)
     lam = curve.parameter
@@ -254,16 +252,13 @@ def derive(
     return model
 
 
-def _join(
-    curve: Curve, kernel: Kernel, given: Mapping[str, Given | None]
-) -> tuple[tuple[str, Value | None], ...]:
+def _join(curve: Curve, kernel: Kernel, given: Mapping[str, Given | None]) -> tuple[tuple[str, Value | None], ...]:
     """Join the parameters of curve and kernel, g and m last."""
     own, forced = dict(curve.defaults), dict(kernel.defaults)
     lam = curve.parameter.name
     if lam in forced:
         raise DeclarationError(
-            f"derive: {lam!r} is the curve's parameter and a parameter of the kernel; "
-            "give one of them another name"
+            f"derive: {lam!r} is the curve's parameter and a parameter of the kernel; give one of them another name"
         )
     for name in own.keys() & forced.keys():
         if name not in COMMON:
@@ -283,8 +278,7 @@ def _join(
     for name, value in given.items():
         if name not in values:
             raise DeclarationError(
-                f"derive: parameters: {name!r} is no parameter of this curve and kernel; "
-                f"they have {', '.join(order)}"
+                f"derive: parameters: {name!r} is no parameter of this curve and kernel; they have {', '.join(order)}"
             )
         values[name] = None if value is None else read_value(value, where=f"parameters: {name}")
     _refuse_negative(curve, kernel, values)
@@ -294,6 +288,4 @@ def _join(
 def _refuse_negative(curve: Curve, kernel: Kernel, values: Mapping[str, Value | None]) -> None:
     for name in (*curve.positive, *kernel.positive, "m"):
         if not is_positive(values[name]):
-            raise DeclarationError(
-                f"derive: parameters: {name!r} must be positive, got {values[name]}"
-            )
+            raise DeclarationError(f"derive: parameters: {name!r} must be positive, got {values[name]}")

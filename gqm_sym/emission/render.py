@@ -11,8 +11,8 @@ from jinja2 import meta
 from sympy import Equality
 from sympy.printing.str import StrPrinter
 
-from gqm_sym.emit.ir import Assignment, ExactIR, FunctionIR, ModuleIR
-from gqm_sym.emit.printer import FUNCTIONS, CodePrinter, ExactPrinter, IntervalPrinter
+from gqm_sym.emission.ir import Assignment, ExactIR, FunctionIR, ModuleIR
+from gqm_sym.emission.printer import FUNCTIONS, CodePrinter, ExactPrinter, IntervalPrinter
 from gqm_sym.errors import EmissionError
 
 # The version of gqm_sym.runtime.interface that emitted code is written for (a test holds the two together).
@@ -33,13 +33,27 @@ _RUNTIME = (
     "compiler",
 )
 # Names that mean something in every emitted module: no run-time parameter may take them.
-_OWN = frozenset({*_RUNTIME, "Any", "MODEL", "PARAMETERS", "carray", "compiled", "fabs", "range", "op", "self", "nearest"})
+_OWN = frozenset(
+    {
+        *_RUNTIME,
+        "Any",
+        "MODEL",
+        "PARAMETERS",
+        "carray",
+        "compiled",
+        "fabs",
+        "range",
+        "op",
+        "self",
+        "nearest",
+    }
+)
 _OWN |= {"frame", "climb", "rise", "bend", "bounds", "pass1", "solve", "sweep"}
 _WIDTH = 100
 
 
 def render(module: ModuleIR, *, source: str) -> str:
-    """The text of a module. ``source`` is the canonical text of what it was made from; its digest goes into the header."""
+    """The text of a module. ``source`` is the canonical text of what it was made from, for its digest."""
     _refuse_own_names(module)
     functions, used = [], set[str]()
     for function in module.functions:
@@ -68,7 +82,12 @@ def render(module: ModuleIR, *, source: str) -> str:
         "names": ", ".join(name for name, _ in module.defaults),
     }
     body = _tidied(_fill(environment, "body.py.j2", fields))
-    header = {"name": module.name, "interface": INTERFACE, "input_digest": _digest(source), "body_digest": _digest(body)}
+    header = {
+        "name": module.name,
+        "interface": INTERFACE,
+        "input_digest": _digest(source),
+        "body_digest": _digest(body),
+    }
     return _fill(environment, "header.py.j2", header) + body
 
 
@@ -181,7 +200,12 @@ def _exact(function: ExactIR, parameter: str) -> dict[str, Any]:
     values = ["None" if e is None else printer.doprint(e) for e in function.outputs]
     inside.append(f"return {', '.join(values)}")
     arguments = ("op", p) if domain else ("op", parameter, p)
-    return {"name": function.name, "arguments": ", ".join(arguments), "doc": function.doc, "inside": inside}
+    return {
+        "name": function.name,
+        "arguments": ", ".join(arguments),
+        "doc": function.doc,
+        "inside": inside,
+    }
 
 
 def _environment() -> jinja2.Environment:

@@ -11,10 +11,16 @@ from math import prod
 
 import sympy as sp
 
-from gqm_sym.derive.algebra import Algebra, Fraction, Polynomial
-from gqm_sym.derive.factors import factors
-from gqm_sym.derive.signs import Signs
-from gqm_sym.derive.spelling import MAX_SPELLED, in_multiple_angles, minus_signs, shortest, spell
+from gqm_sym.derivation.algebra import Algebra, Fraction, Polynomial
+from gqm_sym.derivation.factors import factors
+from gqm_sym.derivation.signs import Signs
+from gqm_sym.derivation.spelling import (
+    MAX_SPELLED,
+    in_multiple_angles,
+    minus_signs,
+    shortest,
+    spell,
+)
 from gqm_sym.errors import DerivationError
 
 # Above this many operations an expression is handed on as it is.
@@ -107,15 +113,11 @@ def spell_product(algebra: Algebra, top: Polynomial, bottom: Polynomial) -> list
     """Write a quotient as factors with powers, its number first."""
     content_top, above = factors(algebra, top)
     content_bottom, under = factors(algebra, bottom)
-    number, written = spell_factors(
-        algebra, [*above, *((factor, -power) for factor, power in under)]
-    )
+    number, written = spell_factors(algebra, [*above, *((factor, -power) for factor, power in under)])
     return [(number * sp.Rational(content_top, content_bottom), 1), *written]
 
 
-def spell_factors(
-    algebra: Algebra, found: Iterable[tuple[Polynomial, int]]
-) -> tuple[sp.Rational, list[Power]]:
+def spell_factors(algebra: Algebra, found: Iterable[tuple[Polynomial, int]]) -> tuple[sp.Rational, list[Power]]:
     """Write factors one by one, joining those that together are one sine or cosine.
 
     Returns a number and the expressions with their powers.
@@ -146,9 +148,7 @@ def _is_wave(algebra: Algebra, polynomial: Polynomial) -> bool:
     return any(touched <= {pair.sine, pair.cosine} for pair in algebra.pairs)
 
 
-def _merged(
-    algebra: Algebra, waves: list[Polynomial]
-) -> tuple[sp.Rational, sp.Expr, tuple[int, ...]]:
+def _merged(algebra: Algebra, waves: list[Polynomial]) -> tuple[sp.Rational, sp.Expr, tuple[int, ...]]:
     """Find the largest subset, with the first factor, whose product is a single sine or cosine.
 
     Returns its number, the function, and the places of the factors used.

@@ -5,9 +5,9 @@ from collections.abc import Iterable, Sequence
 import sympy
 from sympy import Expr, Function, Rational, Symbol
 
-from gqm_sym.derive import Model
-from gqm_sym.derive.difference import Differences
-from gqm_sym.emit.ir import Assignment, ExactIR, FunctionIR, ModuleIR
+from gqm_sym.derivation import Model
+from gqm_sym.derivation.difference import Differences
+from gqm_sym.emission.ir import Assignment, ExactIR, FunctionIR, ModuleIR
 
 
 class Names:
@@ -21,6 +21,7 @@ class Names:
         return f"_{name}" if name in self._taken else name
 
     def symbol(self, name: str) -> Symbol:
+        """The same as a symbol."""
         return Symbol(self(name), real=True)
 
 
@@ -104,7 +105,11 @@ class _Lowering:
             (a.name, b.name, left, right),
             "climb[a, {0}, b] = V**2/(({0} - a)*(b - {0})) between turning points, without cancellation, and ds/d{0}.",
             views=((left, "n"), (right, "n")),
-            inside=[(da, _at(left)), (db, _at(right)), (self.place, Function("nearest")(a, b, da, db))],
+            inside=[
+                (da, _at(left)),
+                (db, _at(right)),
+                (self.place, Function("nearest")(a, b, da, db)),
+            ],
             outputs=(differences.second(self.model.climb), self.model.ds),
         )
 
@@ -191,7 +196,11 @@ class _Lowering:
             signature=signature,
             arguments=(self.names("n"), *arguments, p, out),
             doc=doc.format(self.place.name),
-            views=(*views, (p, str(len(self.order))), (out, f"({len(outputs)}, {self.names('n')})")),
+            views=(
+                *views,
+                (p, str(len(self.order))),
+                (out, f"({len(outputs)}, {self.names('n')})"),
+            ),
             parameters=used,
             before=_sorted(before),
             inside=tuple(kept),
@@ -225,7 +234,8 @@ def _half_powers(e: Expr) -> Expr:
         return Function("sqrt")(power.base) ** power.exp.p
 
     return e.replace(
-        lambda t: t.is_Pow and isinstance(t.exp, Rational) and t.exp.q == 2 and abs(t.exp.p) > 1, replace
+        lambda t: t.is_Pow and isinstance(t.exp, Rational) and t.exp.q == 2 and abs(t.exp.p) > 1,
+        replace,
     )
 
 
@@ -235,7 +245,9 @@ def _hoist(outputs: Sequence[Expr], moving: set[Symbol]) -> tuple[list[Expr], li
         call
         for e in outputs
         for call in e.atoms(sympy.Function, sympy.Pow)
-        if not call.free_symbols & moving and call.free_symbols and not (call.is_Pow and isinstance(call.exp, sympy.Integer))
+        if not call.free_symbols & moving
+        and call.free_symbols
+        and not (call.is_Pow and isinstance(call.exp, sympy.Integer))
     }
     outermost = [c for c in sympy.ordered(calls) if not any(c != o and o.has(c) for o in calls)]
     named = [(Symbol(f"_c{i}", real=True), call) for i, call in enumerate(outermost)]

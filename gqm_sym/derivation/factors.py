@@ -2,8 +2,8 @@
 
 from math import prod
 
-from gqm_sym.derive.algebra import Algebra, Polynomial
-from gqm_sym.derive.generators import Pair
+from gqm_sym.derivation.algebra import Algebra, Polynomial
+from gqm_sym.derivation.generators import Pair
 
 # Factoring is far dearer than arithmetic, above all in many variables: polynomials with more
 # possible monomials are only made square-free, and yet larger ones left as they are.
@@ -46,10 +46,7 @@ def _flattened(algebra: Algebra, polynomial: Polynomial) -> tuple[Polynomial, li
     for pair in algebra.pairs:
         if len({pair.degree(monomial) for monomial in polynomial}) == 1:
             polynomial = algebra.ring(
-                {
-                    _with_cosine(monomial, pair, 0): coefficient
-                    for monomial, coefficient in polynomial.terms()
-                }
+                {_with_cosine(monomial, pair, 0): coefficient for monomial, coefficient in polynomial.terms()}
             )
             done.append(pair)
     return polynomial, done

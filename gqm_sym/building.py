@@ -17,8 +17,8 @@ import tempfile
 from pathlib import Path
 from types import ModuleType
 
-from gqm_sym.derive import Model
-from gqm_sym.emit import body_digests, emit
+from gqm_sym.derivation import Model
+from gqm_sym.emission import body_digests, emit
 from gqm_sym.errors import HandEditedError, InputError
 
 FOLDER = "generated"
@@ -58,7 +58,8 @@ def write_module(text: str, path: str | os.PathLike[str], *, force: bool = False
         digests = body_digests(present)
         if not force and (digests is None or digests[0] != digests[1]):
             raise HandEditedError(
-                f"{target}: was not written by gqm-gen or was edited since; move it away, or give --force to overwrite it"
+                f"{target}: was not written by gqm-gen, or was edited since; "
+                "move it away, or give --force to overwrite it"
             )
     write_text(text, target)
     return True
@@ -70,12 +71,12 @@ def write_text(text: str, path: str | os.PathLike[str]) -> None:
     target.parent.mkdir(parents=True, exist_ok=True)
     handle, temporary = tempfile.mkstemp(prefix=f".{target.name}.", suffix=".tmp", dir=target.parent)
     try:
-        with open(handle, "w", encoding="utf-8", newline="\n") as stream:
+        with os.fdopen(handle, "w", encoding="utf-8", newline="\n") as stream:
             stream.write(text)
             stream.flush()
             os.fsync(stream.fileno())
-        os.chmod(temporary, 0o666 & ~_umask())
-        os.replace(temporary, target)
+        Path(temporary).chmod(0o666 & ~_umask())
+        Path(temporary).replace(target)
     except BaseException:
         Path(temporary).unlink(missing_ok=True)
         raise
@@ -86,7 +87,10 @@ def difference(text: str, path: str | os.PathLike[str]) -> str:
     target = Path(path)
     present = _read(target) if target.exists() else ""
     lines = difflib.unified_diff(
-        present.splitlines(keepends=True), text.splitlines(keepends=True), f"{target} (on disk)", f"{target} (generated)"
+        present.splitlines(keepends=True),
+        text.splitlines(keepends=True),
+        f"{target} (on disk)",
+        f"{target} (generated)",
     )
     return "".join(lines)
 

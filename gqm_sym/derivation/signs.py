@@ -52,9 +52,7 @@ class Signs:
         if not self._candidates.issuperset(names):
             return
         terms = sp.Add.make_args(expression)
-        if all(
-            part.is_Symbol or part.is_positive for term in terms for part in sp.Mul.make_args(term)
-        ):
+        if all(part.is_Symbol or part.is_positive for term in terms for part in sp.Mul.make_args(term)):
             for name in sorted(names):
                 self._positive.setdefault(name)
 
@@ -92,9 +90,7 @@ class Signs:
         if isinstance(expression, sp.Pow | sp.Mul):
             return all(self.nonzero(factor) for factor in expression.args)
         if isinstance(expression, sp.Add):
-            return self.sign(expression) is not None and any(
-                self.nonzero(term) for term in expression.args
-            )
+            return self.sign(expression) is not None and any(self.nonzero(term) for term in expression.args)
         return False
 
     def _sign_of_product(self, expression: sp.Mul) -> int | None:

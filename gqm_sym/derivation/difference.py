@@ -1,6 +1,7 @@
 """Divided differences of an expression, built by exact rules that never subtract nearly equal numbers.
 
-For ``u`` along a curve with parameter lam, ``u[x, y] = (u(y) - u(x))/(y - x)`` and the second difference ``u[a, lam, b]``
+For ``u`` along a curve with parameter lam, ``u[x, y] = (u(y) - u(x))/(y - x)`` and the second difference ``u[a,
+lam, b]``
 follow from the expression's tree (MATHS, section 3). A function of the tree's nodes contributes its own divided
 differences, as calls of small helpers of the runtime: ``sin1(x, y, h)`` is sin[x, y] with h = y - x, and
 ``sin2(x, y, w, h1, h2)`` is sin[x, y, w]. The gaps h are formed from the given offsets, never from the values.
@@ -83,13 +84,9 @@ class Differences:
             return sympy.Add(*[self.first(term, i, j) for term in u.args])
         if u.is_Mul:
             left, right = _halves(u, self.parameter)
-            return self.first(left, i, j) * self.value(right, j) + self.value(left, i) * self.first(
-                right, i, j
-            )
+            return self.first(left, i, j) * self.value(right, j) + self.value(left, i) * self.first(right, i, j)
         outer, inner = _outermost(u, self.parameter)
-        return outer.first(
-            self.value(inner, i), self.value(inner, j), self.gap(inner, i, j)
-        ) * self.first(inner, i, j)
+        return outer.first(self.value(inner, i), self.value(inner, j), self.gap(inner, i, j)) * self.first(inner, i, j)
 
     def _build_second(self, u: Expr) -> Expr:
         if not u.has(self.parameter) or u == self.parameter:
@@ -106,7 +103,7 @@ class Differences:
         outer, inner = _outermost(u, self.parameter)
         at = [self.value(inner, k) for k in range(3)]
         low, high = self.gap(inner, 0, 1), self.gap(inner, 1, 2)
-        bend = outer.second(*at, low, high) * self.first(inner, 0, 1) * self.first(inner, 0, 2)
+        bend = outer.second(at[0], at[1], at[2], low, high) * self.first(inner, 0, 1) * self.first(inner, 0, 2)
         curved = self.second(inner)
         if curved != 0:
             bend += outer.first(at[1], at[2], high) * curved
@@ -183,6 +180,4 @@ def _outermost(u: Expr, parameter: Symbol) -> tuple[_Named | _Power, Expr]:
                 return _Power(Integer(exponent.p)), sympy.Pow(base, Rational(1, 2))
             return _Power(exponent), base
         return _Named("exp"), exponent * sympy.log(base)
-    raise EmissionError(
-        f"{u.func.__name__}: no rule for its divided difference; rewrite the curve without it"
-    )
+    raise EmissionError(f"{u.func.__name__}: no rule for its divided difference; rewrite the curve without it")

@@ -29,7 +29,7 @@ FUNCTIONS = {
 }
 
 
-class CodePrinter(StrPrinter):
+class CodePrinter(StrPrinter):  # type: ignore[misc]
     """Numba code over floats; ``used`` collects the functions that must be imported."""
 
     prefix = ""
@@ -86,7 +86,8 @@ class CodePrinter(StrPrinter):
     _print_ImaginaryUnit = _print_NaN = _print_Infinity = _print_NegativeInfinity = _print_ComplexInfinity = _unknown
     _print_Integral = _print_Derivative = _print_Piecewise = _print_Relational = _unknown
 
-    def emptyPrinter(self, expr: Any) -> str:  # noqa: N802 (SymPy's name)
+    def emptyPrinter(self, expr: Any) -> str:
+        """Refuse what no method above prints."""
         return self._unknown(expr)
 
 

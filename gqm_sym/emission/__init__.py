@@ -3,9 +3,9 @@
 import sympy
 from sympy import Expr
 
-from gqm_sym.derive import Model
-from gqm_sym.emit.lower import lower
-from gqm_sym.emit.render import body_digests, render
+from gqm_sym.derivation import Model
+from gqm_sym.emission.lower import lower
+from gqm_sym.emission.render import body_digests, render
 
 __all__ = ["body_digests", "emit"]
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import sympy as sp
 
-from gqm_sym.derive.differentiate import differentiate
+from gqm_sym.derivation.differentiate import differentiate
 
 MAX_GENERATORS = 14
 
@@ -68,9 +68,7 @@ class Generators:
     steps: dict[Angle, sp.Rational]
 
 
-def collect(
-    expressions: Iterable[sp.Expr], variable: sp.Symbol, halved: frozenset[Angle]
-) -> Generators:
+def collect(expressions: Iterable[sp.Expr], variable: sp.Symbol, halved: frozenset[Angle]) -> Generators:
     """Find the generators of some expressions and of all their derivatives.
 
     Parameters
@@ -110,9 +108,7 @@ def collect(
     return _number(atoms, angles, halved)
 
 
-def _number(
-    atoms: Iterable[sp.Basic], angles: dict[Angle, set[sp.Rational]], halved: frozenset[Angle]
-) -> Generators:
+def _number(atoms: Iterable[sp.Basic], angles: dict[Angle, set[sp.Rational]], halved: frozenset[Angle]) -> Generators:
     names: list[sp.Expr] = list(atoms)
     pairs: dict[Angle, Pair] = {}
     exponentials: dict[Angle, int] = {}

@@ -4,18 +4,16 @@ from collections.abc import Iterator
 
 import sympy as sp
 
-from gqm_sym.derive.algebra import Algebra, Polynomial
-from gqm_sym.derive.generators import Pair
-from gqm_sym.derive.rewrite import product, spell_ratio
-from gqm_sym.derive.signs import Signs
+from gqm_sym.derivation.algebra import Algebra, Polynomial
+from gqm_sym.derivation.generators import Pair
+from gqm_sym.derivation.rewrite import product, spell_ratio
+from gqm_sym.derivation.signs import Signs
 
 # Frames turning with up to so many times an angle of the curve are tried.
 MAX_TURNS = 4
 
 
-def tangent_angle(
-    algebra: Algebra, first: Polynomial, second: Polynomial, weight: Polynomial, signs: Signs
-) -> sp.Expr:
+def tangent_angle(algebra: Algebra, first: Polynomial, second: Polynomial, weight: Polynomial, signs: Signs) -> sp.Expr:
     """Return the angle of (first, second)/weight, up to a constant.
 
     Where one component, seen in a frame that turns evenly, never vanishes, it is that frame's
@@ -37,11 +35,7 @@ def _turned(
 ) -> Iterator[tuple[sp.Expr, Polynomial, Polynomial]]:
     """Yield (u, v) as seen in frames that turn with multiples of an angle of the curve's own."""
     parts = (first, second)
-    used = [
-        pair
-        for pair in algebra.pairs
-        if any(pair.degree(monomial) for part in parts for monomial in part)
-    ]
+    used = [pair for pair in algebra.pairs if any(pair.degree(monomial) for part in parts for monomial in part)]
     # With several angles no such frame has been seen to help.
     for pair in used if len(used) == 1 else ():
         if pair.sign < 0:

@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 import sympy as sp
 
-from gqm_sym.derive.differentiate import differentiate
-from gqm_sym.derive.geometry import Geometry
-from gqm_sym.derive.rewrite import absorb_bars, tidy
+from gqm_sym.derivation.differentiate import differentiate
+from gqm_sym.derivation.geometry import Geometry
+from gqm_sym.derivation.rewrite import absorb_bars, tidy
 from gqm_sym.kernels.base import Kernel, X, Z
 
 

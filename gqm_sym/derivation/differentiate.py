@@ -56,9 +56,7 @@ def differentiate(expression: sp.Expr, variable: sp.Symbol) -> sp.Expr:
     return visit(expression)
 
 
-def _product_rule(
-    factors: Sequence[sp.Basic], variable: sp.Symbol, visit: Callable[[sp.Basic], sp.Expr]
-) -> sp.Expr:
+def _product_rule(factors: Sequence[sp.Basic], variable: sp.Symbol, visit: Callable[[sp.Basic], sp.Expr]) -> sp.Expr:
     moving = [place for place, factor in enumerate(factors) if variable in factor.free_symbols]
     if len(moving) > MAX_FLAT_FACTORS:
         # One term a factor would square the length, and cube it in the second derivative.
@@ -68,12 +66,7 @@ def _product_rule(
             sp.Mul(_product_rule(first, variable, visit), *second),
             sp.Mul(*first, _product_rule(second, variable, visit)),
         )
-    return sp.Add(
-        *(
-            sp.Mul(*factors[:place], visit(factors[place]), *factors[place + 1 :])
-            for place in moving
-        )
-    )
+    return sp.Add(*(sp.Mul(*factors[:place], visit(factors[place]), *factors[place + 1 :]) for place in moving))
 
 
 def _rule(node: sp.Basic, variable: sp.Symbol, visit: Callable[[sp.Basic], sp.Expr]) -> sp.Expr:

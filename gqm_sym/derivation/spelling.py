@@ -10,8 +10,8 @@ from math import gcd, lcm
 
 import sympy as sp
 
-from gqm_sym.derive.algebra import Algebra, Polynomial
-from gqm_sym.derive.generators import Pair, waves
+from gqm_sym.derivation.algebra import Algebra, Polynomial
+from gqm_sym.derivation.generators import Pair, waves
 
 # Longer sums are written in powers only: no other form would make them readable.
 MAX_SPELLED = 24
@@ -37,12 +37,7 @@ def shortest(candidates: Iterable[sp.Expr]) -> sp.Expr:
 
 def minus_signs(expression: sp.Expr) -> int:
     """Return the number of terms that are subtracted in sums."""
-    return sum(
-        1
-        for total in expression.atoms(sp.Add)
-        for term in total.args
-        if term.could_extract_minus_sign()
-    )
+    return sum(1 for total in expression.atoms(sp.Add) for term in total.args if term.could_extract_minus_sign())
 
 
 def spell(algebra: Algebra, polynomial: Polynomial) -> sp.Expr:
@@ -77,23 +72,17 @@ def _spell(algebra: Algebra, polynomial: Polynomial) -> sp.Expr:
 def _in_powers(algebra: Algebra, polynomial: Polynomial) -> sp.Expr:
     """Write it in powers of the generators, collected by those of sines, cosines, exponentials."""
     paired = {place for pair in algebra.pairs for place in (pair.sine, pair.cosine)}
-    leads = [
-        place in paired or isinstance(name, sp.exp) for place, name in enumerate(algebra.names)
-    ]
+    leads = [place in paired or isinstance(name, sp.exp) for place, name in enumerate(algebra.names)]
     terms: Terms = {}
     for monomial, coefficient in polynomial.terms():
-        split = [
-            (power, 0) if lead else (0, power) for power, lead in zip(monomial, leads, strict=True)
-        ]
+        split = [(power, 0) if lead else (0, power) for power, lead in zip(monomial, leads, strict=True)]
         wave, rest = zip(*split, strict=True)
         _add(terms, _monomial(algebra, wave), rest, Fraction(int(coefficient)))
     return _sum(algebra, terms)
 
 
 def _monomial(algebra: Algebra, powers: Iterable[int]) -> sp.Expr:
-    return sp.Mul(
-        *(name**power for name, power in zip(algebra.names, powers, strict=True) if power)
-    )
+    return sp.Mul(*(name**power for name, power in zip(algebra.names, powers, strict=True) if power))
 
 
 def _add(terms: Terms, wave: sp.Expr, monomial: Monomial, size: Fraction) -> None:
@@ -109,18 +98,14 @@ def _sum(algebra: Algebra, terms: Terms) -> sp.Expr:
         if not kept:
             continue
         sizes = kept.values()
-        content = Fraction(
-            gcd(*(size.numerator for size in sizes)), lcm(*(size.denominator for size in sizes))
-        )
+        content = Fraction(gcd(*(size.numerator for size in sizes)), lcm(*(size.denominator for size in sizes)))
         if all(size < 0 for size in sizes):
             content = -content
         common = tuple(min(powers) for powers in zip(*kept, strict=True))
         rest = sp.Add(
             *(
                 _rational(size / content)
-                * _monomial(
-                    algebra, (power - low for power, low in zip(monomial, common, strict=True))
-                )
+                * _monomial(algebra, (power - low for power, low in zip(monomial, common, strict=True)))
                 for monomial, size in kept.items()
             )
         )
@@ -171,9 +156,7 @@ def in_multiple_angles(algebra: Algebra, polynomial: Polynomial) -> sp.Expr:
         for pair in algebra.pairs:
             series = _multiple_angles(pair, monomial[pair.sine], monomial[pair.cosine])
             rest[pair.sine] = rest[pair.cosine] = 0
-            products = [
-                (wave * other, size * factor) for wave, size in products for other, factor in series
-            ]
+            products = [(wave * other, size * factor) for wave, size in products for other, factor in series]
         for wave, size in products:
             _add(terms, wave, tuple(rest), size)
     return _sum(algebra, terms)
@@ -220,9 +203,7 @@ def _in_combined_angles(algebra: Algebra, polynomial: Polynomial) -> sp.Expr:
             sines, cosines = monomial[pair.sine], monomial[pair.cosine]
             rest[pair.sine] = rest[pair.cosine] = 0
             for is_sine in (True,) * sines + (False,) * cosines:
-                products = [
-                    new for old in products for new in _times_wave(*old, pair.angle, is_sine)
-                ]
+                products = [new for old in products for new in _times_wave(*old, pair.angle, is_sine)]
         for angle, is_sine, size in products:
             sign, wave = waves(sp.factor_terms(sp.cancel(angle)), 1)[1 - is_sine].as_coeff_Mul()
             _add(terms, wave, tuple(rest), int(sign) * size)

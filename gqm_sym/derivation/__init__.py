@@ -1,5 +1,5 @@
 """From a declared curve and a force law to closed forms: pure functions between frozen values."""
 
-from gqm_sym.derive.model import Model, derive
+from gqm_sym.derivation.model import Model, derive
 
 __all__ = ["Model", "derive"]

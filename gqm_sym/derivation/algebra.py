@@ -19,7 +19,7 @@ from typing import Any, TypeAlias
 import sympy as sp
 from sympy.polys.rings import ring
 
-from gqm_sym.derive.generators import (
+from gqm_sym.derivation.generators import (
     EXPONENTIAL,
     Angle,
     OverBudget,
@@ -245,15 +245,10 @@ class Algebra:
         return frozenset(
             angle
             for angle, pair in self._found.pairs.items()
-            if any(
-                len({pair.degree(monomial) % 2 for monomial in polynomial}) > 1
-                for polynomial in listed
-            )
+            if any(len({pair.degree(monomial) % 2 for monomial in polynomial}) > 1 for polynomial in listed)
         )
 
-    def doubled(
-        self, polynomial: Polynomial, pair: Pair
-    ) -> "tuple[Algebra, Polynomial, int] | None":
+    def doubled(self, polynomial: Polynomial, pair: Pair) -> "tuple[Algebra, Polynomial, int] | None":
         """Rewrite a polynomial in sine and cosine of twice a pair's angle, if it is of even degree.
 
         Returns the same ring read with the double angle, the polynomial in it, and the number by

@@ -1,0 +1,243 @@
+# Made by gqm-gen for "catenary". Do not edit: change its declaration and generate again.
+# interface 1, input cd1fa4541ae4, body a61e5e8e79cb
+"""Bead on a hanging chain
+
+x              = x
+z              = c*cosh(x/c)
+ds/dx          = cosh(x/c)
+dx/ds          = 1/cosh(x/c)
+dz/ds          = sinh(x/c)/cosh(x/c)
+kappa          = 1/(c*cosh(x/c)**2)
+Theta          = -atan(sinh(lam0/c)) + atan(sinh(x/c))
+V**2           = 2*c*g*(cosh(lam0/c) - cosh(x/c)) + v0**2
+N              = m*(g/cosh(x/c) + (2*c*g*(cosh(lam0/c) - cosh(x/c)) + v0**2)/(c*cosh(x/c)**2))
+A              = -g*sinh(x/c)/cosh(x/c)
+dt/dx          = cosh(x/c)/sqrt(2*c*g*(cosh(lam0/c) - cosh(x/c)) + v0**2)
+turning points : 2*c*g*(cosh(lam0/c) - cosh(x/c)) + v0**2 = 0
+liftoff        : g/cosh(x/c) + (2*c*g*(cosh(lam0/c) - cosh(x/c)) + v0**2)/(c*cosh(x/c)**2) = 0
+"""
+
+from math import cosh, sinh
+from typing import Any
+
+from numba import carray
+
+from gqm_sym.runtime import (
+    BEND,
+    BOUNDS,
+    CLIMB,
+    FRAME,
+    RISE,
+    Addresses,
+    ExactFormulas,
+    Formulas,
+    Motion,
+    Pass1,
+    compiler,
+)
+from gqm_sym.runtime.differences import cosh1, cosh2
+from gqm_sym.runtime.intervals import iconst, icosh, idiv, imul, isinh
+from gqm_sym.runtime.places import nearest
+
+PARAMETERS = {
+    'c': '0.8',
+    'g': '9.81',
+    'm': '1',
+}
+
+compiled = compiler(__file__)
+
+
+@compiled(FRAME)
+def frame(n, places, speeds, p, out):
+    """x, z, ds/dx, signed curvature and contact force, given V**2 (paper, eq. 15)."""
+    places, speeds, p, out = carray(places, n), carray(speeds, n), carray(p, 3), carray(out, (5, n))
+    c, g, m = p[0], p[1], p[2]
+    _t0 = 1/c
+    for i in range(n):
+        x = places[i]
+        v2 = speeds[i]
+        _t1 = cosh(_t0*x)
+        _t2 = _t0/_t1**2
+        out[0, i] = x
+        out[1, i] = _t1*c
+        out[2, i] = _t1
+        out[3, i] = _t2
+        out[4, i] = m*(_t2*v2 + g/_t1)
+
+
+@compiled(CLIMB)
+def climb(n, places, p, out):
+    """What V**2 loses in climbing to x, up to a constant, and its derivative (paper, eq. 13)."""
+    places, p, out = carray(places, n), carray(p, 3), carray(out, (2, n))
+    c, g = p[0], p[1]
+    _t1 = 2*g
+    for i in range(n):
+        x = places[i]
+        _t0 = x/c
+        out[0, i] = _t1*c*cosh(_t0)
+        out[1, i] = _t1*sinh(_t0)
+
+
+@compiled(RISE)
+def rise(n, a, places, offsets, p, out):
+    """climb[a, x] = (climb(x) - climb(a))/(x - a) without cancellation, and ds/dx."""
+    places, offsets, p, out = carray(places, n), carray(offsets, n), carray(p, 3), carray(out, (2, n))
+    c, g = p[0], p[1]
+    _t0 = 1/c
+    for i in range(n):
+        x = places[i]
+        d = offsets[i]
+        _t1 = _t0*x
+        out[0, i] = 2*g*cosh1(_t0*a, _t1, _t0*d)
+        out[1, i] = cosh(_t1)
+
+
+@compiled(BEND)
+def bend(n, a, b, left, right, p, out):
+    """climb[a, x, b] = V**2/((x - a)*(b - x)) between turning points, without cancellation, and ds/dx."""
+    left, right, p, out = carray(left, n), carray(right, n), carray(p, 3), carray(out, (2, n))
+    c, g = p[0], p[1]
+    _t0 = 1/c
+    for i in range(n):
+        da = left[i]
+        db = right[i]
+        x = nearest(a, b, da, db)
+        _t1 = _t0*x
+        out[0, i] = 2*_t0*g*cosh2(_t0*a, _t1, _t0*b, _t0*da, _t0*db)
+        out[1, i] = cosh(_t1)
+
+
+@compiled(BOUNDS)
+def bounds(lo, hi, p, out):
+    """Bounds of the climb's slope and of ds/dx for lo <= x <= hi."""
+    p, out = carray(p, 2), carray(out, 4)
+    x = (lo, hi)
+    c = (p[0], p[0])
+    g = (p[1], p[1])
+    _t0 = imul(idiv(iconst(1.0), c), x)
+    out[0], out[1] = imul(imul(iconst(2.0), g), isinh(_t0))
+    out[2], out[3] = icosh(_t0)
+
+
+# The same formulas over a namespace of operations: extended precision evaluates these.
+
+
+def exact_x(op, x, p):
+    """Horizontal coordinate."""
+    return x
+
+
+def exact_z(op, x, p):
+    """Height."""
+    c = p[0]
+    return c*op.cosh(x/c)
+
+
+def exact_ds(op, x, p):
+    """ds/dx."""
+    c = p[0]
+    return op.cosh(x/c)
+
+
+def exact_kappa(op, x, p):
+    """Signed curvature."""
+    c = p[0]
+    _t0 = 1/c
+    return _t0/op.cosh(_t0*x)**2
+
+
+def exact_reaction(op, x, p):
+    """Contact force per unit mass of a body at rest."""
+    c = p[0]
+    g = p[1]
+    return g/op.cosh(x/c)
+
+
+def exact_climb(op, x, p):
+    """What V**2 loses in climbing, up to a constant."""
+    c = p[0]
+    g = p[1]
+    return 2*c*g*op.cosh(x/c)
+
+
+def exact_climb_slope(op, x, p):
+    """Its derivative by x."""
+    c = p[0]
+    g = p[1]
+    return 2*g*op.sinh(x/c)
+
+
+def exact_domain(op, p):
+    """Both ends of the domain, and the period; None where there is none."""
+    return None, None, None
+
+
+MODEL = Formulas(
+    interface=1,
+    name='catenary',
+    parameter='x',
+    parameters=PARAMETERS,
+    positive=('c',),
+    addresses=Addresses(frame.address, climb.address, rise.address, bend.address, bounds.address),
+    exact=ExactFormulas(
+        exact_x, exact_z, exact_ds, exact_kappa, exact_reaction, exact_climb, exact_climb_slope, exact_domain
+    ),
+)
+
+
+def pass1(x: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, c: Any = '0.8', g: Any = '9.81', m: Any = '1') -> Pass1:
+    """Position, metric, curvature, V**2 and contact force at places of the curve (Pass 1, no quadrature).
+
+    Parameters
+    ----------
+    x : array_like
+        Places on the curve, as values of its parameter.
+    lam0, v0, direction
+        Launch place, speed and direction (+1 or -1: the sign of ds/dt).
+    c, g, m
+        Run-time parameters; `PARAMETERS` holds their defaults.
+
+    Returns
+    -------
+    Pass1
+        Arrays x, z, ds, kappa, v2 and normal_force.
+    """
+    return MODEL.pass1(x, lam0, v0, direction, (c, g, m,))
+
+
+def solve(
+    lam0: Any = None,
+    v0: Any = 0.0,
+    direction: int = 1,
+    *,
+    point: Any = None,
+    t_max: Any = None,
+    contact: str = "bilateral",
+    c: Any = '0.8', g: Any = '9.81', m: Any = '1',
+) -> Motion:
+    """The motion that a launch begins (Passes 1 to 3).
+
+    Parameters
+    ----------
+    lam0, v0, direction
+        Launch place, speed (never negative) and direction (+1 or -1: the sign of ds/dt).
+    point : pair of numbers, optional
+        The launch place by its coordinates, instead of ``lam0``.
+    t_max : number, optional
+        Horizon of time.
+    contact : {"bilateral", "above", "below"}
+        Which side of the track can push.
+    c, g, m
+        Run-time parameters; `PARAMETERS` holds their defaults.
+
+    Returns
+    -------
+    Motion
+
+    Raises
+    ------
+    GQMError
+        For a launch or a parameter that cannot be; the message says what would be right.
+    """
+    return MODEL.solve(lam0, v0, direction, point, t_max, contact, (c, g, m,))

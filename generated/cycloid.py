@@ -1,0 +1,241 @@
+# Made by gqm-gen for "cycloid". Do not edit: change its declaration and generate again.
+# interface 1, input bb93c1ef9815, body 71f9de85d180
+"""Bead on an arch of a cycloid
+
+x              = R*(theta - sin(theta))
+z              = R*(1 - cos(theta))
+ds/dtheta      = 2*R*sin(theta/2)
+dx/ds          = sin(theta/2)
+dz/ds          = cos(theta/2)
+kappa          = -1/(4*R*sin(theta/2))
+Theta          = lam0/2 - theta/2
+V**2           = 2*R*g*(-cos(lam0) + cos(theta)) + v0**2
+N              = m*(g*sin(theta/2) - (2*R*g*(-cos(lam0) + cos(theta)) + v0**2)/(4*R*sin(theta/2)))
+A              = -g*cos(theta/2)
+dt/dtheta      = 2*R*sin(theta/2)/sqrt(2*R*g*(-cos(lam0) + cos(theta)) + v0**2)
+turning points : 2*R*g*(-cos(lam0) + cos(theta)) + v0**2 = 0
+liftoff        : g*sin(theta/2) - (2*R*g*(-cos(lam0) + cos(theta)) + v0**2)/(4*R*sin(theta/2)) = 0
+"""
+
+from math import cos, sin
+from typing import Any
+
+from numba import carray
+
+from gqm_sym.runtime import (
+    BEND,
+    BOUNDS,
+    CLIMB,
+    FRAME,
+    RISE,
+    Addresses,
+    ExactFormulas,
+    Formulas,
+    Motion,
+    Pass1,
+    compiler,
+)
+from gqm_sym.runtime.differences import cos1, cos2
+from gqm_sym.runtime.intervals import iconst, icos, idiv, imul, isin
+from gqm_sym.runtime.places import nearest
+
+PARAMETERS = {
+    'R': '0.5',
+    'g': '9.81',
+    'm': '1',
+}
+
+compiled = compiler(__file__)
+
+
+@compiled(FRAME)
+def frame(n, places, speeds, p, out):
+    """x, z, ds/dtheta, signed curvature and contact force, given V**2 (paper, eq. 15)."""
+    places, speeds, p, out = carray(places, n), carray(speeds, n), carray(p, 3), carray(out, (5, n))
+    R, g, m = p[0], p[1], p[2]
+    for i in range(n):
+        theta = places[i]
+        v2 = speeds[i]
+        _t0 = sin(theta/2)
+        _t1 = 1/(4*R*_t0)
+        out[0, i] = R*(theta - sin(theta))
+        out[1, i] = R*(1 - cos(theta))
+        out[2, i] = 2*R*_t0
+        out[3, i] = -_t1
+        out[4, i] = m*(_t0*g - _t1*v2)
+
+
+@compiled(CLIMB)
+def climb(n, places, p, out):
+    """What V**2 loses in climbing to theta, up to a constant, and its derivative (paper, eq. 13)."""
+    places, p, out = carray(places, n), carray(p, 3), carray(out, (2, n))
+    R, g = p[0], p[1]
+    _t0 = R*g
+    for i in range(n):
+        theta = places[i]
+        _t1 = theta/2
+        out[0, i] = 2*_t0*(1 - cos(theta))
+        out[1, i] = 4*_t0*sin(_t1)*cos(_t1)
+
+
+@compiled(RISE)
+def rise(n, a, places, offsets, p, out):
+    """climb[a, theta] = (climb(theta) - climb(a))/(theta - a) without cancellation, and ds/dtheta."""
+    places, offsets, p, out = carray(places, n), carray(offsets, n), carray(p, 3), carray(out, (2, n))
+    R, g = p[0], p[1]
+    _t0 = 2*R
+    for i in range(n):
+        theta = places[i]
+        d = offsets[i]
+        out[0, i] = -_t0*g*cos1(a, theta, d)
+        out[1, i] = _t0*sin(theta/2)
+
+
+@compiled(BEND)
+def bend(n, a, b, left, right, p, out):
+    """climb[a, theta, b] = V**2/((theta - a)*(b - theta)) between turning points, without cancellation, and ds/dtheta."""
+    left, right, p, out = carray(left, n), carray(right, n), carray(p, 3), carray(out, (2, n))
+    R, g = p[0], p[1]
+    _t0 = 2*R
+    for i in range(n):
+        da = left[i]
+        db = right[i]
+        theta = nearest(a, b, da, db)
+        out[0, i] = -_t0*g*cos2(a, theta, b, da, db)
+        out[1, i] = _t0*sin(theta/2)
+
+
+@compiled(BOUNDS)
+def bounds(lo, hi, p, out):
+    """Bounds of the climb's slope and of ds/dtheta for lo <= theta <= hi."""
+    p, out = carray(p, 2), carray(out, 4)
+    theta = (lo, hi)
+    R = (p[0], p[0])
+    g = (p[1], p[1])
+    _t0 = imul(idiv(iconst(1.0), iconst(2.0)), theta)
+    _t1 = imul(R, isin(_t0))
+    out[0], out[1] = imul(imul(imul(iconst(4.0), _t1), g), icos(_t0))
+    out[2], out[3] = imul(iconst(2.0), _t1)
+
+
+# The same formulas over a namespace of operations: extended precision evaluates these.
+
+
+def exact_x(op, theta, p):
+    """Horizontal coordinate."""
+    R = p[0]
+    return R*(theta - op.sin(theta))
+
+
+def exact_z(op, theta, p):
+    """Height."""
+    R = p[0]
+    return R*(1 - op.cos(theta))
+
+
+def exact_ds(op, theta, p):
+    """ds/dtheta."""
+    R = p[0]
+    return 2*R*op.sin(theta/2)
+
+
+def exact_kappa(op, theta, p):
+    """Signed curvature."""
+    R = p[0]
+    return -1/(4*R*op.sin(theta/2))
+
+
+def exact_reaction(op, theta, p):
+    """Contact force per unit mass of a body at rest."""
+    g = p[1]
+    return g*op.sin(theta/2)
+
+
+def exact_climb(op, theta, p):
+    """What V**2 loses in climbing, up to a constant."""
+    R = p[0]
+    g = p[1]
+    return 2*R*g*(1 - op.cos(theta))
+
+
+def exact_climb_slope(op, theta, p):
+    """Its derivative by theta."""
+    R = p[0]
+    g = p[1]
+    _t0 = theta/2
+    return 4*R*g*op.sin(_t0)*op.cos(_t0)
+
+
+def exact_domain(op, p):
+    """Both ends of the domain, and the period; None where there is none."""
+    return 0, 2*op.pi, None
+
+
+MODEL = Formulas(
+    interface=1,
+    name='cycloid',
+    parameter='theta',
+    parameters=PARAMETERS,
+    positive=('R',),
+    addresses=Addresses(frame.address, climb.address, rise.address, bend.address, bounds.address),
+    exact=ExactFormulas(
+        exact_x, exact_z, exact_ds, exact_kappa, exact_reaction, exact_climb, exact_climb_slope, exact_domain
+    ),
+)
+
+
+def pass1(theta: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, R: Any = '0.5', g: Any = '9.81', m: Any = '1') -> Pass1:
+    """Position, metric, curvature, V**2 and contact force at places of the curve (Pass 1, no quadrature).
+
+    Parameters
+    ----------
+    theta : array_like
+        Places on the curve, as values of its parameter.
+    lam0, v0, direction
+        Launch place, speed and direction (+1 or -1: the sign of ds/dt).
+    R, g, m
+        Run-time parameters; `PARAMETERS` holds their defaults.
+
+    Returns
+    -------
+    Pass1
+        Arrays x, z, ds, kappa, v2 and normal_force.
+    """
+    return MODEL.pass1(theta, lam0, v0, direction, (R, g, m,))
+
+
+def solve(
+    lam0: Any = None,
+    v0: Any = 0.0,
+    direction: int = 1,
+    *,
+    point: Any = None,
+    t_max: Any = None,
+    contact: str = "bilateral",
+    R: Any = '0.5', g: Any = '9.81', m: Any = '1',
+) -> Motion:
+    """The motion that a launch begins (Passes 1 to 3).
+
+    Parameters
+    ----------
+    lam0, v0, direction
+        Launch place, speed (never negative) and direction (+1 or -1: the sign of ds/dt).
+    point : pair of numbers, optional
+        The launch place by its coordinates, instead of ``lam0``.
+    t_max : number, optional
+        Horizon of time.
+    contact : {"bilateral", "above", "below"}
+        Which side of the track can push.
+    R, g, m
+        Run-time parameters; `PARAMETERS` holds their defaults.
+
+    Returns
+    -------
+    Motion
+
+    Raises
+    ------
+    GQMError
+        For a launch or a parameter that cannot be; the message says what would be right.
+    """
+    return MODEL.solve(lam0, v0, direction, point, t_max, contact, (R, g, m,))

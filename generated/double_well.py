@@ -1,0 +1,245 @@
+# Made by gqm-gen for "double_well". Do not edit: change its declaration and generate again.
+# interface 1, input 28c16d144828, body 72e16c0341bb
+"""Bead between two wells
+
+x              = x
+z              = h*(x**4 - 2*x**2)
+ds/dx          = sqrt(16*h**2*x**2*(x**2 - 1)**2 + 1)
+dx/ds          = 1/sqrt(16*h**2*x**2*(x**2 - 1)**2 + 1)
+dz/ds          = 4*h*x*(x**2 - 1)/sqrt(16*h**2*x**2*(x**2 - 1)**2 + 1)
+kappa          = 4*h*(3*x**2 - 1)/(16*h**2*x**2*(x**2 - 1)**2 + 1)**(3/2)
+Theta          = -atan(4*h*lam0*(lam0**2 - 1)) + atan(4*h*x*(x**2 - 1))
+V**2           = 2*g*h*(lam0**2*(lam0**2 - 2) - x**2*(x**2 - 2)) + v0**2
+N              = m*(g/sqrt(16*h**2*x**2*(x**2 - 1)**2 + 1) + 4*h*(3*x**2 - 1)*(2*g*h*(lam0**2*(lam0**2 - 2) - x**2*(x**2 - 2)) + v0**2)/(16*h**2*x**2*(x**2 - 1)**2 + 1)**(3/2))
+A              = -4*g*h*x*(x**2 - 1)/sqrt(16*h**2*x**2*(x**2 - 1)**2 + 1)
+dt/dx          = sqrt(16*h**2*x**2*(x**2 - 1)**2 + 1)/sqrt(2*g*h*(lam0**2*(lam0**2 - 2) - x**2*(x**2 - 2)) + v0**2)
+turning points : 2*g*h*(lam0**2*(lam0**2 - 2) - x**2*(x**2 - 2)) + v0**2 = 0
+liftoff        : g/sqrt(16*h**2*x**2*(x**2 - 1)**2 + 1) + 4*h*(3*x**2 - 1)*(2*g*h*(lam0**2*(lam0**2 - 2) - x**2*(x**2 - 2)) + v0**2)/(16*h**2*x**2*(x**2 - 1)**2 + 1)**(3/2) = 0
+"""
+
+from math import sqrt
+from typing import Any
+
+from numba import carray
+
+from gqm_sym.runtime import (
+    BEND,
+    BOUNDS,
+    CLIMB,
+    FRAME,
+    RISE,
+    Addresses,
+    ExactFormulas,
+    Formulas,
+    Motion,
+    Pass1,
+    compiler,
+)
+from gqm_sym.runtime.differences import ipow1
+from gqm_sym.runtime.intervals import iadd, iconst, imul, ipow, isqrt
+from gqm_sym.runtime.places import nearest
+
+PARAMETERS = {
+    'h': '0.25',
+    'g': '9.81',
+    'm': '1',
+}
+
+compiled = compiler(__file__)
+
+
+@compiled(FRAME)
+def frame(n, places, speeds, p, out):
+    """x, z, ds/dx, signed curvature and contact force, given V**2 (paper, eq. 15)."""
+    places, speeds, p, out = carray(places, n), carray(speeds, n), carray(p, 3), carray(out, (5, n))
+    h, g, m = p[0], p[1], p[2]
+    for i in range(n):
+        x = places[i]
+        v2 = speeds[i]
+        _t0 = x**2
+        _t1 = 16*_t0*h**2*(_t0 - 1)**2 + 1
+        _t2 = sqrt(_t1)
+        _t3 = 4*h*(3*_t0 - 1)/sqrt(_t1)**3
+        out[0, i] = x
+        out[1, i] = h*(-2*_t0 + x**4)
+        out[2, i] = _t2
+        out[3, i] = _t3
+        out[4, i] = m*(_t3*v2 + g/_t2)
+
+
+@compiled(CLIMB)
+def climb(n, places, p, out):
+    """What V**2 loses in climbing to x, up to a constant, and its derivative (paper, eq. 13)."""
+    places, p, out = carray(places, n), carray(p, 3), carray(out, (2, n))
+    h, g = p[0], p[1]
+    _t1 = g*h
+    for i in range(n):
+        x = places[i]
+        _t0 = x**2
+        out[0, i] = 2*_t1*(-2*_t0 + x**4)
+        out[1, i] = 8*_t1*x*(_t0 - 1)
+
+
+@compiled(RISE)
+def rise(n, a, places, offsets, p, out):
+    """climb[a, x] = (climb(x) - climb(a))/(x - a) without cancellation, and ds/dx."""
+    places, offsets, p, out = carray(places, n), carray(offsets, n), carray(p, 3), carray(out, (2, n))
+    h, g = p[0], p[1]
+    for i in range(n):
+        x = places[i]
+        d = offsets[i]
+        _t0 = x**2
+        out[0, i] = 2*g*h*(-2*a - 2*x + ipow1(a, x, d, 4))
+        out[1, i] = sqrt(16*_t0*h**2*(_t0 - 1)**2 + 1)
+
+
+@compiled(BEND)
+def bend(n, a, b, left, right, p, out):
+    """climb[a, x, b] = V**2/((x - a)*(b - x)) between turning points, without cancellation, and ds/dx."""
+    left, right, p, out = carray(left, n), carray(right, n), carray(p, 3), carray(out, (2, n))
+    h, g = p[0], p[1]
+    for i in range(n):
+        da = left[i]
+        db = right[i]
+        x = nearest(a, b, da, db)
+        _t0 = x**2
+        out[0, i] = 2*g*h*(_t0 + a**2 + a*b + a*x + b**2 + b*x - 2)
+        out[1, i] = sqrt(16*_t0*h**2*(_t0 - 1)**2 + 1)
+
+
+@compiled(BOUNDS)
+def bounds(lo, hi, p, out):
+    """Bounds of the climb's slope and of ds/dx for lo <= x <= hi."""
+    p, out = carray(p, 2), carray(out, 4)
+    x = (lo, hi)
+    h = (p[0], p[0])
+    g = (p[1], p[1])
+    _t0 = ipow(x, 2)
+    _t1 = iadd(_t0, iconst(-1.0))
+    out[0], out[1] = imul(imul(imul(imul(iconst(8.0), _t1), g), h), x)
+    out[2], out[3] = isqrt(iadd(imul(imul(imul(iconst(16.0), _t0), ipow(_t1, 2)), ipow(h, 2)), iconst(1.0)))
+
+
+# The same formulas over a namespace of operations: extended precision evaluates these.
+
+
+def exact_x(op, x, p):
+    """Horizontal coordinate."""
+    return x
+
+
+def exact_z(op, x, p):
+    """Height."""
+    h = p[0]
+    return h*(x**4 - 2*x**2)
+
+
+def exact_ds(op, x, p):
+    """ds/dx."""
+    h = p[0]
+    _t0 = x**2
+    return op.sqrt(16*_t0*h**2*(_t0 - 1)**2 + 1)
+
+
+def exact_kappa(op, x, p):
+    """Signed curvature."""
+    h = p[0]
+    _t0 = x**2
+    return 4*h*(3*_t0 - 1)/(16*_t0*h**2*(_t0 - 1)**2 + 1)**(op.mpf(3)/2)
+
+
+def exact_reaction(op, x, p):
+    """Contact force per unit mass of a body at rest."""
+    h = p[0]
+    g = p[1]
+    _t0 = x**2
+    return g/op.sqrt(16*_t0*h**2*(_t0 - 1)**2 + 1)
+
+
+def exact_climb(op, x, p):
+    """What V**2 loses in climbing, up to a constant."""
+    h = p[0]
+    g = p[1]
+    return 2*g*h*(x**4 - 2*x**2)
+
+
+def exact_climb_slope(op, x, p):
+    """Its derivative by x."""
+    h = p[0]
+    g = p[1]
+    return 8*g*h*x*(x**2 - 1)
+
+
+def exact_domain(op, p):
+    """Both ends of the domain, and the period; None where there is none."""
+    return None, None, None
+
+
+MODEL = Formulas(
+    interface=1,
+    name='double_well',
+    parameter='x',
+    parameters=PARAMETERS,
+    positive=(),
+    addresses=Addresses(frame.address, climb.address, rise.address, bend.address, bounds.address),
+    exact=ExactFormulas(
+        exact_x, exact_z, exact_ds, exact_kappa, exact_reaction, exact_climb, exact_climb_slope, exact_domain
+    ),
+)
+
+
+def pass1(x: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, h: Any = '0.25', g: Any = '9.81', m: Any = '1') -> Pass1:
+    """Position, metric, curvature, V**2 and contact force at places of the curve (Pass 1, no quadrature).
+
+    Parameters
+    ----------
+    x : array_like
+        Places on the curve, as values of its parameter.
+    lam0, v0, direction
+        Launch place, speed and direction (+1 or -1: the sign of ds/dt).
+    h, g, m
+        Run-time parameters; `PARAMETERS` holds their defaults.
+
+    Returns
+    -------
+    Pass1
+        Arrays x, z, ds, kappa, v2 and normal_force.
+    """
+    return MODEL.pass1(x, lam0, v0, direction, (h, g, m,))
+
+
+def solve(
+    lam0: Any = None,
+    v0: Any = 0.0,
+    direction: int = 1,
+    *,
+    point: Any = None,
+    t_max: Any = None,
+    contact: str = "bilateral",
+    h: Any = '0.25', g: Any = '9.81', m: Any = '1',
+) -> Motion:
+    """The motion that a launch begins (Passes 1 to 3).
+
+    Parameters
+    ----------
+    lam0, v0, direction
+        Launch place, speed (never negative) and direction (+1 or -1: the sign of ds/dt).
+    point : pair of numbers, optional
+        The launch place by its coordinates, instead of ``lam0``.
+    t_max : number, optional
+        Horizon of time.
+    contact : {"bilateral", "above", "below"}
+        Which side of the track can push.
+    h, g, m
+        Run-time parameters; `PARAMETERS` holds their defaults.
+
+    Returns
+    -------
+    Motion
+
+    Raises
+    ------
+    GQMError
+        For a launch or a parameter that cannot be; the message says what would be right.
+    """
+    return MODEL.solve(lam0, v0, direction, point, t_max, contact, (h, g, m,))

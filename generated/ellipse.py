@@ -1,0 +1,246 @@
+# Made by gqm-gen for "ellipse". Do not edit: change its declaration and generate again.
+# interface 1, input 3a81da5567d3, body 49edcd2f6985
+"""Bead on an ellipse, by the eccentric angle
+
+x              = a*cos(theta)
+z              = b*sin(theta)
+ds/dtheta      = sqrt(a**2*sin(theta)**2 + b**2*cos(theta)**2)
+dx/ds          = -a*sin(theta)/sqrt(a**2*sin(theta)**2 + b**2*cos(theta)**2)
+dz/ds          = b*cos(theta)/sqrt(a**2*sin(theta)**2 + b**2*cos(theta)**2)
+kappa          = a*b/(a**2*sin(theta)**2 + b**2*cos(theta)**2)**(3/2)
+Theta          = -lam0 + theta + atan((-a + b)*sin(2*lam0)/(2*(a + (-a + b)*cos(lam0)**2))) - atan((-a + b)*sin(2*theta)/(2*(a + (-a + b)*cos(theta)**2)))
+V**2           = 2*b*g*(sin(lam0) - sin(theta)) + v0**2
+N              = m*(a*b*(2*b*g*(sin(lam0) - sin(theta)) + v0**2)/(a**2*sin(theta)**2 + b**2*cos(theta)**2)**(3/2) - a*g*sin(theta)/sqrt(a**2*sin(theta)**2 + b**2*cos(theta)**2))
+A              = -b*g*cos(theta)/sqrt(a**2*sin(theta)**2 + b**2*cos(theta)**2)
+dt/dtheta      = sqrt(a**2*sin(theta)**2 + b**2*cos(theta)**2)/sqrt(2*b*g*(sin(lam0) - sin(theta)) + v0**2)
+turning points : 2*b*g*(sin(lam0) - sin(theta)) + v0**2 = 0
+liftoff        : a*b*(2*b*g*(sin(lam0) - sin(theta)) + v0**2)/(a**2*sin(theta)**2 + b**2*cos(theta)**2)**(3/2) - a*g*sin(theta)/sqrt(a**2*sin(theta)**2 + b**2*cos(theta)**2) = 0
+"""
+
+from math import cos, sin, sqrt
+from typing import Any
+
+from numba import carray
+
+from gqm_sym.runtime import (
+    BEND,
+    BOUNDS,
+    CLIMB,
+    FRAME,
+    RISE,
+    Addresses,
+    ExactFormulas,
+    Formulas,
+    Motion,
+    Pass1,
+    compiler,
+)
+from gqm_sym.runtime.differences import sin1, sin2
+from gqm_sym.runtime.intervals import iadd, iconst, icos, imul, ipow, isin, isqrt
+from gqm_sym.runtime.places import nearest
+
+PARAMETERS = {
+    'a': '2',
+    'b': '1',
+    'g': '9.81',
+    'm': '1',
+}
+
+compiled = compiler(__file__)
+
+
+@compiled(FRAME)
+def frame(n, places, speeds, p, out):
+    """x, z, ds/dtheta, signed curvature and contact force, given V**2 (paper, eq. 15)."""
+    places, speeds, p, out = carray(places, n), carray(speeds, n), carray(p, 4), carray(out, (5, n))
+    a, b, g, m = p[0], p[1], p[2], p[3]
+    for i in range(n):
+        theta = places[i]
+        v2 = speeds[i]
+        _t0 = cos(theta)
+        _t1 = sin(theta)
+        _t2 = _t0**2*b**2 + _t1**2*a**2
+        _t3 = sqrt(_t2)
+        _t4 = a*b/sqrt(_t2)**3
+        out[0, i] = _t0*a
+        out[1, i] = _t1*b
+        out[2, i] = _t3
+        out[3, i] = _t4
+        out[4, i] = m*(-_t1*a*g/_t3 + _t4*v2)
+
+
+@compiled(CLIMB)
+def climb(n, places, p, out):
+    """What V**2 loses in climbing to theta, up to a constant, and its derivative (paper, eq. 13)."""
+    places, p, out = carray(places, n), carray(p, 4), carray(out, (2, n))
+    b, g = p[1], p[2]
+    _t0 = 2*b*g
+    for i in range(n):
+        theta = places[i]
+        out[0, i] = _t0*sin(theta)
+        out[1, i] = _t0*cos(theta)
+
+
+@compiled(RISE)
+def rise(n, _a, places, offsets, p, out):
+    """climb[a, theta] = (climb(theta) - climb(a))/(theta - a) without cancellation, and ds/dtheta."""
+    places, offsets, p, out = carray(places, n), carray(offsets, n), carray(p, 4), carray(out, (2, n))
+    a, b, g = p[0], p[1], p[2]
+    for i in range(n):
+        theta = places[i]
+        d = offsets[i]
+        out[0, i] = 2*b*g*sin1(_a, theta, d)
+        out[1, i] = sqrt(a**2*sin(theta)**2 + b**2*cos(theta)**2)
+
+
+@compiled(BEND)
+def bend(n, _a, _b, left, right, p, out):
+    """climb[a, theta, b] = V**2/((theta - a)*(b - theta)) between turning points, without cancellation, and ds/dtheta."""
+    left, right, p, out = carray(left, n), carray(right, n), carray(p, 4), carray(out, (2, n))
+    a, b, g = p[0], p[1], p[2]
+    for i in range(n):
+        da = left[i]
+        db = right[i]
+        theta = nearest(_a, _b, da, db)
+        out[0, i] = 2*b*g*sin2(_a, theta, _b, da, db)
+        out[1, i] = sqrt(a**2*sin(theta)**2 + b**2*cos(theta)**2)
+
+
+@compiled(BOUNDS)
+def bounds(lo, hi, p, out):
+    """Bounds of the climb's slope and of ds/dtheta for lo <= theta <= hi."""
+    p, out = carray(p, 3), carray(out, 4)
+    theta = (lo, hi)
+    a = (p[0], p[0])
+    b = (p[1], p[1])
+    g = (p[2], p[2])
+    _t0 = icos(theta)
+    out[0], out[1] = imul(imul(imul(iconst(2.0), _t0), b), g)
+    out[2], out[3] = isqrt(iadd(imul(ipow(_t0, 2), ipow(b, 2)), imul(ipow(a, 2), ipow(isin(theta), 2))))
+
+
+# The same formulas over a namespace of operations: extended precision evaluates these.
+
+
+def exact_x(op, theta, p):
+    """Horizontal coordinate."""
+    a = p[0]
+    return a*op.cos(theta)
+
+
+def exact_z(op, theta, p):
+    """Height."""
+    b = p[1]
+    return b*op.sin(theta)
+
+
+def exact_ds(op, theta, p):
+    """ds/dtheta."""
+    a = p[0]
+    b = p[1]
+    return op.sqrt(a**2*op.sin(theta)**2 + b**2*op.cos(theta)**2)
+
+
+def exact_kappa(op, theta, p):
+    """Signed curvature."""
+    a = p[0]
+    b = p[1]
+    return a*b/(a**2*op.sin(theta)**2 + b**2*op.cos(theta)**2)**(op.mpf(3)/2)
+
+
+def exact_reaction(op, theta, p):
+    """Contact force per unit mass of a body at rest."""
+    a = p[0]
+    b = p[1]
+    g = p[2]
+    _t0 = op.sin(theta)
+    return -_t0*a*g/op.sqrt(_t0**2*a**2 + b**2*op.cos(theta)**2)
+
+
+def exact_climb(op, theta, p):
+    """What V**2 loses in climbing, up to a constant."""
+    b = p[1]
+    g = p[2]
+    return 2*b*g*op.sin(theta)
+
+
+def exact_climb_slope(op, theta, p):
+    """Its derivative by theta."""
+    b = p[1]
+    g = p[2]
+    return 2*b*g*op.cos(theta)
+
+
+def exact_domain(op, p):
+    """Both ends of the domain, and the period; None where there is none."""
+    return None, None, 2*op.pi
+
+
+MODEL = Formulas(
+    interface=1,
+    name='ellipse',
+    parameter='theta',
+    parameters=PARAMETERS,
+    positive=('a', 'b'),
+    addresses=Addresses(frame.address, climb.address, rise.address, bend.address, bounds.address),
+    exact=ExactFormulas(
+        exact_x, exact_z, exact_ds, exact_kappa, exact_reaction, exact_climb, exact_climb_slope, exact_domain
+    ),
+)
+
+
+def pass1(theta: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, a: Any = '2', b: Any = '1', g: Any = '9.81', m: Any = '1') -> Pass1:
+    """Position, metric, curvature, V**2 and contact force at places of the curve (Pass 1, no quadrature).
+
+    Parameters
+    ----------
+    theta : array_like
+        Places on the curve, as values of its parameter.
+    lam0, v0, direction
+        Launch place, speed and direction (+1 or -1: the sign of ds/dt).
+    a, b, g, m
+        Run-time parameters; `PARAMETERS` holds their defaults.
+
+    Returns
+    -------
+    Pass1
+        Arrays x, z, ds, kappa, v2 and normal_force.
+    """
+    return MODEL.pass1(theta, lam0, v0, direction, (a, b, g, m,))
+
+
+def solve(
+    lam0: Any = None,
+    v0: Any = 0.0,
+    direction: int = 1,
+    *,
+    point: Any = None,
+    t_max: Any = None,
+    contact: str = "bilateral",
+    a: Any = '2', b: Any = '1', g: Any = '9.81', m: Any = '1',
+) -> Motion:
+    """The motion that a launch begins (Passes 1 to 3).
+
+    Parameters
+    ----------
+    lam0, v0, direction
+        Launch place, speed (never negative) and direction (+1 or -1: the sign of ds/dt).
+    point : pair of numbers, optional
+        The launch place by its coordinates, instead of ``lam0``.
+    t_max : number, optional
+        Horizon of time.
+    contact : {"bilateral", "above", "below"}
+        Which side of the track can push.
+    a, b, g, m
+        Run-time parameters; `PARAMETERS` holds their defaults.
+
+    Returns
+    -------
+    Motion
+
+    Raises
+    ------
+    GQMError
+        For a launch or a parameter that cannot be; the message says what would be right.
+    """
+    return MODEL.solve(lam0, v0, direction, point, t_max, contact, (a, b, g, m,))
