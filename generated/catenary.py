@@ -1,5 +1,5 @@
 # Made by gqm-gen for "catenary". Do not edit: change its declaration and generate again.
-# interface 1, input cd1fa4541ae4, body a61e5e8e79cb
+# interface 1, input cd1fa4541ae4, body 823208c1b4bc
 """Bead on a hanging chain
 
 x              = x
@@ -45,7 +45,7 @@ PARAMETERS = {
     'm': '1',
 }
 
-compiled = compiler(__file__)
+compiled = compiler(__file__, interface=1)
 
 
 @compiled(FRAME)
@@ -174,7 +174,6 @@ def exact_domain(op, p):
 
 
 MODEL = Formulas(
-    interface=1,
     name='catenary',
     parameter='x',
     parameters=PARAMETERS,

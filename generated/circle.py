@@ -1,5 +1,5 @@
 # Made by gqm-gen for "circle". Do not edit: change its declaration and generate again.
-# interface 1, input 6c3a741d3b21, body a9f0a4d63528
+# interface 1, input 6c3a741d3b21, body 3f7ddad42831
 """Bead that loops round a circle
 
 x              = L*sin(theta)
@@ -45,7 +45,7 @@ PARAMETERS = {
     'm': '1',
 }
 
-compiled = compiler(__file__)
+compiled = compiler(__file__, interface=1)
 
 
 @compiled(FRAME)
@@ -166,7 +166,6 @@ def exact_domain(op, p):
 
 
 MODEL = Formulas(
-    interface=1,
     name='circle',
     parameter='theta',
     parameters=PARAMETERS,

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "cycloid". Do not edit: change its declaration and generate again.
-# interface 1, input bb93c1ef9815, body 71f9de85d180
+# interface 1, input bb93c1ef9815, body e2001e48dc9b
 """Bead on an arch of a cycloid
 
 x              = R*(theta - sin(theta))
@@ -45,7 +45,7 @@ PARAMETERS = {
     'm': '1',
 }
 
-compiled = compiler(__file__)
+compiled = compiler(__file__, interface=1)
 
 
 @compiled(FRAME)
@@ -172,7 +172,6 @@ def exact_domain(op, p):
 
 
 MODEL = Formulas(
-    interface=1,
     name='cycloid',
     parameter='theta',
     parameters=PARAMETERS,

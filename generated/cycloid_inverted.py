@@ -1,5 +1,5 @@
 # Made by gqm-gen for "cycloid_inverted". Do not edit: change its declaration and generate again.
-# interface 1, input 2cc87984e0a0, body ce6c0a776692
+# interface 1, input 2cc87984e0a0, body 6bd09548b799
 """Bead in an inverted cycloid
 
 x              = R*(theta - sin(theta))
@@ -45,7 +45,7 @@ PARAMETERS = {
     'm': '1',
 }
 
-compiled = compiler(__file__)
+compiled = compiler(__file__, interface=1)
 
 
 @compiled(FRAME)
@@ -172,7 +172,6 @@ def exact_domain(op, p):
 
 
 MODEL = Formulas(
-    interface=1,
     name='cycloid_inverted',
     parameter='theta',
     parameters=PARAMETERS,

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "double_well". Do not edit: change its declaration and generate again.
-# interface 1, input 28c16d144828, body 72e16c0341bb
+# interface 1, input 28c16d144828, body 360abfa2dea8
 """Bead between two wells
 
 x              = x
@@ -45,7 +45,7 @@ PARAMETERS = {
     'm': '1',
 }
 
-compiled = compiler(__file__)
+compiled = compiler(__file__, interface=1)
 
 
 @compiled(FRAME)
@@ -176,7 +176,6 @@ def exact_domain(op, p):
 
 
 MODEL = Formulas(
-    interface=1,
     name='double_well',
     parameter='x',
     parameters=PARAMETERS,

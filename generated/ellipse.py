@@ -1,5 +1,5 @@
 # Made by gqm-gen for "ellipse". Do not edit: change its declaration and generate again.
-# interface 1, input 3a81da5567d3, body 49edcd2f6985
+# interface 1, input 3a81da5567d3, body 3517651760d4
 """Bead on an ellipse, by the eccentric angle
 
 x              = a*cos(theta)
@@ -46,7 +46,7 @@ PARAMETERS = {
     'm': '1',
 }
 
-compiled = compiler(__file__)
+compiled = compiler(__file__, interface=1)
 
 
 @compiled(FRAME)
@@ -177,7 +177,6 @@ def exact_domain(op, p):
 
 
 MODEL = Formulas(
-    interface=1,
     name='ellipse',
     parameter='theta',
     parameters=PARAMETERS,

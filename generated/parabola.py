@@ -1,5 +1,5 @@
 # Made by gqm-gen for "parabola". Do not edit: change its declaration and generate again.
-# interface 1, input 638613fc8598, body 2998895592f1
+# interface 1, input 638613fc8598, body 1f34f4425b1c
 """Bead in a parabolic bowl
 
 x              = x
@@ -44,7 +44,7 @@ PARAMETERS = {
     'm': '2',
 }
 
-compiled = compiler(__file__)
+compiled = compiler(__file__, interface=1)
 
 
 @compiled(FRAME)
@@ -166,7 +166,6 @@ def exact_domain(op, p):
 
 
 MODEL = Formulas(
-    interface=1,
     name='parabola',
     parameter='x',
     parameters=PARAMETERS,

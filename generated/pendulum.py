@@ -1,5 +1,5 @@
 # Made by gqm-gen for "pendulum". Do not edit: change its declaration and generate again.
-# interface 1, input abbc42e6e84e, body 10711af84e99
+# interface 1, input abbc42e6e84e, body 6762e53c6ba4
 """Simple pendulum, angle from the horizontal
 
 x              = L*cos(theta)
@@ -45,7 +45,7 @@ PARAMETERS = {
     'm': '1',
 }
 
-compiled = compiler(__file__)
+compiled = compiler(__file__, interface=1)
 
 
 @compiled(FRAME)
@@ -166,7 +166,6 @@ def exact_domain(op, p):
 
 
 MODEL = Formulas(
-    interface=1,
     name='pendulum',
     parameter='theta',
     parameters=PARAMETERS,

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "quartic". Do not edit: change its declaration and generate again.
-# interface 1, input e1ff78064d31, body 9a36a109aeb8
+# interface 1, input e1ff78064d31, body 9b1b671fd698
 """Bead in a quartic bowl
 
 x              = x
@@ -44,7 +44,7 @@ PARAMETERS = {
     'm': '1',
 }
 
-compiled = compiler(__file__)
+compiled = compiler(__file__, interface=1)
 
 
 @compiled(FRAME)
@@ -158,7 +158,6 @@ def exact_domain(op, p):
 
 
 MODEL = Formulas(
-    interface=1,
     name='quartic',
     parameter='x',
     parameters=PARAMETERS,

@@ -21,7 +21,7 @@ LAYERS = (
     {"expressions"},
     {"runtime"},
     {"sympy_tree"},
-    {"grammar", "enclosures"},
+    {"grammar", "enclosures", "angles"},
     {"trees"},
     {"rationals"},
     {"errors"},

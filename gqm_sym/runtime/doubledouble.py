@@ -2,12 +2,10 @@
 
 from math import floor
 
-from numba import njit
-
-from gqm_sym.runtime.jit import COMPILE
+from gqm_sym.runtime.jit import Inner
 
 
-@njit(**COMPILE)
+@Inner
 def two_sum(a, b):  # type: ignore[no-untyped-def]
     """A + b as rounded sum and its error (Knuth)."""
     s = a + b
@@ -15,7 +13,7 @@ def two_sum(a, b):  # type: ignore[no-untyped-def]
     return s, (a - (s - t)) + (b - t)
 
 
-@njit(**COMPILE)
+@Inner
 def two_product(a, b):  # type: ignore[no-untyped-def]
     """A * b as rounded product and its error (Dekker, Veltkamp)."""
     p = a * b
@@ -28,7 +26,7 @@ def two_product(a, b):  # type: ignore[no-untyped-def]
     return p, ((a_hi * b_hi - p) + a_hi * b_lo + a_lo * b_hi) + a_lo * b_lo
 
 
-@njit(**COMPILE)
+@Inner
 def add(a, a_low, b, b_low):  # type: ignore[no-untyped-def]
     """(a + a_low) + (b + b_low), accurate however much cancels."""
     s, e = two_sum(a, b)
@@ -37,7 +35,7 @@ def add(a, a_low, b, b_low):  # type: ignore[no-untyped-def]
     return two_sum(s, e + f)
 
 
-@njit(**COMPILE)
+@Inner
 def reduce(t, t_low, period, period_low):  # type: ignore[no-untyped-def]
     """The count of whole periods in t and what is left, in [0, period), as two doubles.
 

@@ -8,12 +8,12 @@ its time. Everything else is asked for later, over arrays.
 from math import fabs, isfinite, pi
 
 import numpy as np
-from numba import njit, types
+from numba import types
 
 from gqm_sym.runtime.crossing import call_climb, call_frame, call_rise
 from gqm_sym.runtime.doubledouble import reduce
 from gqm_sym.runtime.inversion import look_up_many, tabulate
-from gqm_sym.runtime.jit import COMPILE, entry
+from gqm_sym.runtime.jit import Inner, entry
 from gqm_sym.runtime.panels import DEGREE, REGULAR, TURN_TURN, lay, read_off, speeds
 from gqm_sym.runtime.search import CRITICAL, LIMIT, TURN, walk
 
@@ -29,7 +29,7 @@ _TABLE = types.Tuple((_LINE, _LINE, _ROWS, types.int64[::1], _LINE, _FLOAT))
 FLAT = 1e-12
 
 
-@njit(**COMPILE)
+@Inner
 def first_step(lam0, low, high, period):  # type: ignore[no-untyped-def]
     """A step to begin a walk with: an eighth of the curve where that is known."""
     if period > 0.0:

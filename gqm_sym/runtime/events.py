@@ -39,8 +39,8 @@ class Leg:
 def contact_force(stretch: Stretch, phi: Array) -> Array:
     """The contact force N at anomalies of a stretch."""
     f = stretch.functions
-    rows: Array = frame_at(f.addresses, f.p, stretch.places(phi), stretch.speeds(phi) ** 2)
-    return rows[4]
+    force: Array = frame_at(f.addresses, f.p, stretch.places(phi), stretch.speeds(phi) ** 2)[4]
+    return force
 
 
 def contact_changes(stretch: Stretch) -> Array:
@@ -62,7 +62,8 @@ def contact_changes(stretch: Stretch) -> Array:
             break
         same = np.sign(contact_force(stretch, middle)) == before
         lo, hi = np.where(same, middle, lo), np.where(same, hi, middle)
-    return 0.5 * (lo + hi)
+    zeros: Array = 0.5 * (lo + hi)
+    return zeros
 
 
 def crossings(piece: Piece, phi: Array, pace: float) -> list[tuple[Pair, float]]:

@@ -23,10 +23,8 @@ from math import (
 from math import atan2 as angle
 from math import pow as power
 
-from numba import njit
-
 from gqm_sym.runtime.doubledouble import two_sum
-from gqm_sym.runtime.jit import COMPILE
+from gqm_sym.runtime.jit import Inner
 
 # Below this t, 1 + t**2 is 1 to the last digit. Keeps quotients of subnormal numbers out.
 TINY = 1e-9
@@ -34,69 +32,69 @@ TINY = 1e-9
 FAR = 0.5
 
 
-@njit(**COMPILE)
+@Inner
 def sinc(t):  # type: ignore[no-untyped-def]
     """sin(t)/t."""
     return sin(t) / t if fabs(t) > TINY else 1.0
 
 
-@njit(**COMPILE)
+@Inner
 def sinhc(t):  # type: ignore[no-untyped-def]
     """sinh(t)/t."""
     return sinh(t) / t if fabs(t) > TINY else 1.0
 
 
-@njit(**COMPILE)
+@Inner
 def expc(t):  # type: ignore[no-untyped-def]
     """(1 - exp(-t))/t."""
     return -expm1(-t) / t if t != 0.0 else 1.0
 
 
-@njit(**COMPILE)
+@Inner
 def atanc(t):  # type: ignore[no-untyped-def]
     """atan(t)/t."""
     return atan(t) / t if fabs(t) > TINY else 1.0
 
 
-@njit(**COMPILE)
+@Inner
 def atanhc(t):  # type: ignore[no-untyped-def]
     """atanh(t)/t."""
     return atanh(t) / t if fabs(t) > TINY else 1.0
 
 
-@njit(**COMPILE)
+@Inner
 def sin1(x, y, h):  # type: ignore[no-untyped-def]
     """sin[x,y] = cos((x+y)/2) sinc(h/2), with what rounding takes from x + y: near a zero of the cosine it counts."""
     middle, rest = two_sum(x, y)
     return (cos(0.5 * middle) - 0.5 * rest * sin(0.5 * middle)) * sinc(0.5 * h)
 
 
-@njit(**COMPILE)
+@Inner
 def cos1(x, y, h):  # type: ignore[no-untyped-def]
     """cos[x,y] = -sin((x+y)/2) sinc(h/2), with what rounding takes from x + y: near a zero of the sine it counts."""
     middle, rest = two_sum(x, y)
     return -(sin(0.5 * middle) + 0.5 * rest * cos(0.5 * middle)) * sinc(0.5 * h)
 
 
-@njit(**COMPILE)
+@Inner
 def tan1(x, y, h):  # type: ignore[no-untyped-def]
     """tan[x,y] = sinc(h)/(cos x cos y)."""
     return sinc(h) / (cos(x) * cos(y))
 
 
-@njit(**COMPILE)
+@Inner
 def sinh1(x, y, h):  # type: ignore[no-untyped-def]
     """sinh[x,y] = cosh((x+y)/2) sinhc(h/2)."""
     return cosh(0.5 * (x + y)) * sinhc(0.5 * h)
 
 
-@njit(**COMPILE)
+@Inner
 def cosh1(x, y, h):  # type: ignore[no-untyped-def]
     """cosh[x,y] = sinh((x+y)/2) sinhc(h/2)."""
     return sinh(0.5 * (x + y)) * sinhc(0.5 * h)
 
 
-@njit(**COMPILE)
+@Inner
 def tanh1(x, y, h):  # type: ignore[no-untyped-def]
     """tanh[x,y] = sinhc(h)/(cosh x cosh y), with the growing exponentials cancelled by hand."""
     p, q = exp(-2.0 * fabs(x)), exp(-2.0 * fabs(y))
@@ -104,13 +102,13 @@ def tanh1(x, y, h):  # type: ignore[no-untyped-def]
     return 4.0 * decay * expc(2.0 * fabs(h)) / ((1.0 + p) * (1.0 + q))
 
 
-@njit(**COMPILE)
+@Inner
 def exp1(x, y, h):  # type: ignore[no-untyped-def]
     """exp[x,y] = exp(y) (1 - exp(-h))/h, y the larger."""
     return exp(max(x, y)) * expc(fabs(h))
 
 
-@njit(**COMPILE)
+@Inner
 def log1(x, y, h):  # type: ignore[no-untyped-def]
     """log[x,y] = log1p(h/x)/h, x the smaller."""
     gap, least = fabs(h), min(x, y)
@@ -118,38 +116,38 @@ def log1(x, y, h):  # type: ignore[no-untyped-def]
     return log1p(ratio) / gap if ratio > 0.1 * TINY * TINY else 1.0 / least
 
 
-@njit(**COMPILE)
+@Inner
 def atan1(x, y, h):  # type: ignore[no-untyped-def]
     """atan[x,y] = atan(h/(1+xy))/h."""
     p = 1.0 + x * y
     return angle(h, p) / h if fabs(h) > FAR * p else atanc(h / p) / p
 
 
-@njit(**COMPILE)
+@Inner
 def root_below(x):  # type: ignore[no-untyped-def]
     """sqrt(1 - x**2): the cosine of asin x."""
     return sqrt((1.0 - x) * (1.0 + x))
 
 
-@njit(**COMPILE)
+@Inner
 def root_above(x):  # type: ignore[no-untyped-def]
     """sqrt(1 + x**2): the cosh of asinh x."""
     return sqrt(1.0 + x * x)
 
 
-@njit(**COMPILE)
+@Inner
 def root_beyond(x):  # type: ignore[no-untyped-def]
     """sqrt(x**2 - 1): the sinh of acosh x."""
     return sqrt((x - 1.0) * (x + 1.0))
 
 
-@njit(**COMPILE)
+@Inner
 def one_less_product(x, y):  # type: ignore[no-untyped-def]
     """1 - xy with all its digits, |x| and |y| at most 1."""
     return (1.0 - x) + x * (1.0 - y) if x + y > 0.0 else (1.0 + x) - x * (1.0 + y)
 
 
-@njit(**COMPILE)
+@Inner
 def asin1(x, y, h):  # type: ignore[no-untyped-def]
     """asin[x,y] = 2 atan(h/(cx+cy))/h, c = sqrt(1 - x**2)."""
     p = root_below(x) + root_below(y)
@@ -157,13 +155,13 @@ def asin1(x, y, h):  # type: ignore[no-untyped-def]
     return 2.0 * atan(r) / h if fabs(r) > FAR else 2.0 * atanc(r) / p
 
 
-@njit(**COMPILE)
+@Inner
 def acos1(x, y, h):  # type: ignore[no-untyped-def]
     """acos[x,y] = -asin[x,y]."""
     return -asin1(x, y, h)
 
 
-@njit(**COMPILE)
+@Inner
 def asinh1(x, y, h):  # type: ignore[no-untyped-def]
     """asinh[x,y] = 2 atanh(h/(cx+cy))/h, c = sqrt(1 + x**2), or the quotient if far apart."""
     cx, cy = root_above(x), root_above(y)
@@ -176,7 +174,7 @@ def asinh1(x, y, h):  # type: ignore[no-untyped-def]
     return fabs(log((fabs(y) + cy) / (fabs(x) + cx)) / h)
 
 
-@njit(**COMPILE)
+@Inner
 def acosh1(x, y, h):  # type: ignore[no-untyped-def]
     """acosh[x,y] = 2 atanh(h/(sx+sy))/h, s = sqrt(x**2 - 1), or the quotient if far apart."""
     sx, sy = root_beyond(x), root_beyond(y)
@@ -185,7 +183,7 @@ def acosh1(x, y, h):  # type: ignore[no-untyped-def]
     return log((y + sy) / (x + sx)) / h if fabs(r) > FAR else 2.0 * atanhc(r) / p
 
 
-@njit(**COMPILE)
+@Inner
 def atanh1(x, y, h):  # type: ignore[no-untyped-def]
     """atanh[x,y] = atanh(h/(1-xy))/h, or the quotient if far apart."""
     p = one_less_product(x, y)
@@ -195,19 +193,19 @@ def atanh1(x, y, h):  # type: ignore[no-untyped-def]
     return atanhc(r) / p
 
 
-@njit(**COMPILE)
+@Inner
 def sqrt1(x, y, h):  # type: ignore[no-untyped-def]
     """sqrt[x,y] = 1/(sqrt x + sqrt y)."""
     return 1.0 / (sqrt(x) + sqrt(y))
 
 
-@njit(**COMPILE)
+@Inner
 def inv1(x, y, h):  # type: ignore[no-untyped-def]
     """(1/u)[x,y] = -1/(xy)."""
     return -1.0 / (x * y)
 
 
-@njit(**COMPILE)
+@Inner
 def abs1(x, y, h):  # type: ignore[no-untyped-def]
     """|u|[x,y]: 1 or -1 where the points have one sign, else (x+y)/|h|."""
     if min(x, y) >= 0.0:
@@ -215,7 +213,7 @@ def abs1(x, y, h):  # type: ignore[no-untyped-def]
     return -1.0 if max(x, y) <= 0.0 else (x + y) / fabs(h)
 
 
-@njit(**COMPILE)
+@Inner
 def ipow1(x, y, h, n):  # type: ignore[no-untyped-def]
     """(u**n)[x,y], n an integer: the sum of x**i y**j over i+j = n-1; a negative n by 1/u."""
     if n < 0:
@@ -223,7 +221,7 @@ def ipow1(x, y, h, n):  # type: ignore[no-untyped-def]
     return ipow1_sum(x, y, n)
 
 
-@njit(**COMPILE)
+@Inner
 def ipow1_sum(x, y, n):  # type: ignore[no-untyped-def]
     """The sum of x**i y**j over i+j = n-1, by (u**(k+1))[x,y] = y (u**k)[x,y] + x**k."""
     first, value = 0.0, 1.0
@@ -233,7 +231,7 @@ def ipow1_sum(x, y, n):  # type: ignore[no-untyped-def]
     return first
 
 
-@njit(**COMPILE)
+@Inner
 def rpow1(x, y, h, p):  # type: ignore[no-untyped-def]
     """(u**p)[x,y] = x**p expm1(p log(y/x))/h, x the smaller, or the quotient if far."""
     gap, least = fabs(h), min(x, y)

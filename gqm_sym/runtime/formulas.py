@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from gqm_sym.errors import LaunchError, OutdatedModuleError, ParameterError
+from gqm_sym.errors import LaunchError, ParameterError
 from gqm_sym.runtime.entries import frame_at, speed_squared_at
 from gqm_sym.runtime.exact import ExactProblem
-from gqm_sym.runtime.interface import INTERFACE, Addresses, ExactFormulas
+from gqm_sym.runtime.interface import Addresses, ExactFormulas
 from gqm_sym.runtime.numbers import Number, read_number
 from gqm_sym.runtime.stretch import Array, Functions
 
@@ -56,8 +56,6 @@ class Formulas:
 
     Attributes
     ----------
-    interface : int
-        The interface version it was generated for.
     name, parameter : str
         Its name, and the name of the curve's parameter.
     parameters : dict
@@ -66,21 +64,12 @@ class Formulas:
         Parameters for which the closed forms assume a positive value.
     """
 
-    interface: int
     name: str
     parameter: str
     parameters: Mapping[str, float | int | str | None]
     positive: tuple[str, ...]
     addresses: Addresses
     exact: ExactFormulas
-
-    def __post_init__(self) -> None:
-        if self.interface != INTERFACE:
-            raise OutdatedModuleError(
-                f"generated/{self.name}.py: made for interface {self.interface} of the runtime, "
-                f"which is now at {INTERFACE}; "
-                "run gqm-gen on its declaration again"
-            )
 
     def numbers(self, given: tuple[Any, ...]) -> tuple[Number, ...]:
         """The run-time parameters as exact numbers, checked."""

@@ -9,9 +9,8 @@ once.
 from math import cos, fabs, pi
 
 import numpy as np
-from numba import njit
 
-from gqm_sym.runtime.jit import COMPILE
+from gqm_sym.runtime.jit import Inner
 from gqm_sym.runtime.panels import legendre_sum
 
 TERMS = 15
@@ -20,7 +19,7 @@ MOST_CUTS = 2**52  # at a cusp the anomaly goes like the root of the time that i
 LEVEL = 1e-13  # coefficients that have stopped falling below this share are rounding noise
 
 
-@njit(**COMPILE)
+@Inner
 def _anomaly(terms, rates_sum, left, half, duration, target, guess):  # type: ignore[no-untyped-def]
     """The place x in [-1, 1] of a panel where its time is ``target``, by Newton's method inside a bracket."""
     lo, hi, x = -1.0, 1.0, guess
@@ -40,7 +39,7 @@ def _anomaly(terms, rates_sum, left, half, duration, target, guess):  # type: ig
     return x
 
 
-@njit(**COMPILE)
+@Inner
 def _derivative(terms, out):  # type: ignore[no-untyped-def]
     """Legendre coefficients of the derivative (with respect to x) of a Legendre series."""
     n = terms.size
@@ -49,7 +48,7 @@ def _derivative(terms, out):  # type: ignore[no-untyped-def]
         out[k - 1] = (2 * k - 1) * (terms[k] + (out[k + 1] / (2 * k + 3) if k + 1 < n else 0.0))
 
 
-@njit(**COMPILE)
+@Inner
 def tabulate(edges, times, time_terms):  # type: ignore[no-untyped-def]
     """Polynomials for the anomaly over time.
 
@@ -138,14 +137,14 @@ def tabulate(edges, times, time_terms):  # type: ignore[no-untyped-def]
     )
 
 
-@njit(**COMPILE)
+@Inner
 def _grown(array, size):  # type: ignore[no-untyped-def]
     out = np.empty(size)
     out[: array.size] = array
     return out
 
 
-@njit(**COMPILE)
+@Inner
 def _to_powers(c, out):  # type: ignore[no-untyped-def]
     """Powers of x from Chebyshev coefficients (which fall fast enough for this to keep every digit)."""
     n = c.size
@@ -166,7 +165,7 @@ def _to_powers(c, out):  # type: ignore[no-untyped-def]
             out[i] += c[j] * two[i]
 
 
-@njit(**COMPILE)
+@Inner
 def look_up(middles, scales, powers, index, ends, t, t_low):  # type: ignore[no-untyped-def]
     """The anomaly at time t + t_low of a table."""
     whole = ends[-1]
@@ -182,7 +181,7 @@ def look_up(middles, scales, powers, index, ends, t, t_low):  # type: ignore[no-
     return total
 
 
-@njit(**COMPILE)
+@Inner
 def look_up_many(middles, scales, powers, index, ends, t, t_low, out):  # type: ignore[no-untyped-def]
     """The anomaly at many times of one table."""
     for i in range(t.size):

@@ -1,47 +1,73 @@
 """The one place for compiler options, and for how generated functions are compiled.
 
 No fast-math: reassociation would break sums and products of two doubles, and NaN and infinity have meaning here.
-Division by
-zero gives infinity, as in IEEE arithmetic, and is not an exception.
+Division by zero gives infinity, as in IEEE arithmetic, and is not an exception.
 """
 
 import hashlib
 import sys
 from collections.abc import Callable
 from functools import wraps
-from importlib.util import find_spec
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from numba import cfunc, njit
+from numba import njit, types
+from numba.core import sigutils
+from numba.core.caching import FunctionCache
+from numba.core.ccallback import CFunc
+from numba.core.registry import cpu_target
+from numba.core.runtime import rtsys
+from numba.extending import typeof_impl
+
+from gqm_sym.errors import OutdatedModuleError
+from gqm_sym.runtime.interface import INTERFACE
 
 COMPILE: dict[str, Any] = {"cache": True, "error_model": "numpy"}
 
 
-def _spare_scipy() -> None:
-    """Keep numba from importing scipy.linalg, a third of its start-up, to learn whether ``np.dot`` can be compiled.
+class ReadyCache(FunctionCache):  # type: ignore[misc]
+    """numba's disk cache, looked into before numba prepares to compile.
 
-    numba asks once, through `ensure_blas`; whether SciPy is installed answers it. Wherever BLAS is really used,
-    numba asks again.
+    The preparation imports and registers all that compiling may need (SciPy's linear algebra as well) and takes a tenth
+    of a second; code that is in the cache needs none of it.
     """
-    if "numba.np.arraymath" in sys.modules:
-        return
-    from numba.np import linalg
 
-    def installed() -> None:
-        if find_spec("scipy") is None:
-            raise ImportError("scipy")
-
-    asks = linalg.ensure_blas
-    linalg.ensure_blas = installed
-    try:
-        import numba.np.arraymath  # noqa: F401
-    finally:
-        linalg.ensure_blas = asks
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """The compiled function from the cache, or numba's own way."""
+        with self._guard_against_spurious_io_errors():
+            found = self._load_overload(sig, target_context)
+            if found is not None:
+                return found
+        return super().load_overload(sig, target_context)
 
 
-_spare_scipy()
+class Inner:
+    """A function for other compiled functions to call.
+
+    numba's dispatcher is made when one of them is compiled, or Python calls it: code from the cache never needs it.
+    """
+
+    def __init__(self, function: Callable[..., Any]) -> None:
+        self.py_func = function
+        self.__name__, self.__doc__ = function.__name__, function.__doc__
+        self._dispatcher: Any = None
+
+    @property
+    def dispatcher(self) -> Any:
+        """The function as numba knows it."""
+        if self._dispatcher is None:
+            self._dispatcher = njit(**COMPILE)(self.py_func)
+        return self._dispatcher
+
+    def __call__(self, *arguments: Any) -> Any:
+        """Call it from Python."""
+        return self.dispatcher(*arguments)
+
+
+@typeof_impl.register(Inner)
+def _type_of_inner(value: Inner, _: Any) -> Any:
+    return types.Dispatcher(value.dispatcher)
 
 
 def entry(signature: Any) -> Callable[[Any], Callable[..., Any]]:
@@ -54,7 +80,12 @@ def entry(signature: Any) -> Callable[[Any], Callable[..., Any]]:
         def call(*arguments: Any) -> Any:
             nonlocal compiled
             if compiled is None:
-                compiled = njit(signature, **COMPILE)(function)
+                dispatcher = njit(**COMPILE)(function)
+                dispatcher._cache = ReadyCache(function)
+                rtsys.initialize(dispatcher.targetctx)  # cached code counts its arrays too
+                dispatcher.compile(signature)
+                dispatcher.disable_compile()
+                compiled = dispatcher
             return compiled(*arguments)
 
         return call
@@ -62,14 +93,20 @@ def entry(signature: Any) -> Callable[[Any], Callable[..., Any]]:
     return decorate
 
 
-def compiler(file: str) -> Callable[[Any], Callable[[Any], Any]]:
+def compiler(file: str, *, interface: int) -> Callable[[Any], Callable[[Any], Any]]:
     """A decorator factory for the functions of one generated module: ``compiled(signature)``.
 
+    Refuses a module that was generated for another version of the interface, before anything is compiled.
+
     numba's disk cache remembers the module's name and imports it on loading, and machine code is told apart by it.
-    A generated module may
-    be imported under any name, from any folder; so its functions are given to numba under a name made from the
-    module's own text.
+    A generated module may be imported under any name, from any folder; so its functions are given to numba under a
+    name made from the module's own text.
     """
+    if interface != INTERFACE:
+        raise OutdatedModuleError(
+            f"{file}: made for interface {interface} of the runtime, which is now at {INTERFACE}; "
+            "run gqm-gen on its declaration again"
+        )
     digest = hashlib.sha256(Path(file).read_bytes()).hexdigest()[:16]
     alias = f"gqm_sym_generated_{digest}"
     sys.modules.setdefault(alias, ModuleType(alias))
@@ -77,7 +114,12 @@ def compiler(file: str) -> Callable[[Any], Callable[[Any], Any]]:
     def compiled(signature: Any) -> Callable[[Any], Any]:
         def decorate(function: Any) -> Any:
             function.__module__ = alias
-            return cfunc(signature, **COMPILE)(function)
+            rtsys.initialize(cpu_target.target_context)
+            options = {"error_model": COMPILE["error_model"]}
+            callback: Any = CFunc(function, sigutils.normalize_signature(signature), {}, options)
+            callback._cache = ReadyCache(function)
+            callback.compile()
+            return callback
 
         return decorate
 

@@ -418,7 +418,7 @@ class Periodic(Motion):
         course = self._course(float(np.abs(t).max()) if t.size else 0.0)
         assert course.period is not None
         period = course.period[0]
-        # Within a period the stretch's clock counts, and the rounded anomaly of the launch; over many only the period does.
+        # Within a period the stretch's clock counts, and the rounded anomaly of the launch; over many, the period.
         local = period * (self._stretch.relative_error + ULP)
         if course is not self._precise:
             start = np.array([course.pieces[0].phi_start])

@@ -11,6 +11,7 @@ from fractions import Fraction
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 from gqm_sym import rationals
+from gqm_sym.angles import enclose_angle
 from gqm_sym.enclosures import Interval, enclose
 from gqm_sym.errors import ExpressionError, NumberError
 from gqm_sym.grammar import parse
@@ -138,6 +139,11 @@ def read_number(value: Source, *, where: str) -> Number:
 
 
 def _from_tree(tree: ast.expr, text: str, where: str) -> Number:
+    angle = enclose_angle(tree, where=where)
+    if angle is not None and angle[0] != angle[1]:
+        near = _split(angle[0], where)
+        if near == _split(angle[1], where):
+            return Number(*near, tree, text)
     exact = enclose(tree, _PAIR_BITS, where=where)
     if isinstance(exact, Fraction):
         return _from_fraction(exact, text, where)

@@ -19,10 +19,9 @@ anywhere on it.
 from math import cos, exp, fabs, inf, sin, sqrt
 
 import numpy as np
-from numba import njit
 
 from gqm_sym.runtime.crossing import call_bend, call_rise
-from gqm_sym.runtime.jit import COMPILE
+from gqm_sym.runtime.jit import Inner
 from gqm_sym.runtime.kronrod import EVEN, GAUSS_WEIGHTS, KRONROD_WEIGHTS, NODES, ODD
 
 TURN_TURN, FROM_TURN, REGULAR, TO_EQUILIBRIUM = range(4)
@@ -40,7 +39,7 @@ HOPELESS = 1e-9
 LEAST_WIDTH = 2.0**-48  # of the stretch
 
 
-@njit(**COMPILE)
+@Inner
 def rates(fns, p, kind, a, b, ref, w, phi, work, out):  # type: ignore[no-untyped-def]
     """Fill ``out`` with dt/dphi and ds/dphi at each phi. ``w`` is V**2 at ``ref`` (used where no end is special)."""
     n = phi.size
@@ -82,7 +81,7 @@ def rates(fns, p, kind, a, b, ref, w, phi, work, out):  # type: ignore[no-untype
             out[1, i] = rows[1, i] * fabs(da[i])
 
 
-@njit(**COMPILE)
+@Inner
 def speeds(fns, p, kind, a, b, ref, w, phi, work, out):  # type: ignore[no-untyped-def]
     """Fill ``out`` with V at each phi: no difference of heights, and exactly zero at a turning point."""
     n = phi.size
@@ -109,7 +108,7 @@ def speeds(fns, p, kind, a, b, ref, w, phi, work, out):  # type: ignore[no-untyp
             out[i] = sqrt(max(w - da[i] * rows[0, i], 0.0))
 
 
-@njit(**COMPILE)
+@Inner
 def shares(kind, w, work, n):  # type: ignore[no-untyped-def]
     """The least and largest regular factor of V**2 over the places last filled: what is left where it cancels."""
     low, high = 1.0, 1.0
@@ -124,7 +123,7 @@ def shares(kind, w, work, n):  # type: ignore[no-untyped-def]
     return low, high
 
 
-@njit(**COMPILE)
+@Inner
 def antiderivative(values, half, c, out):  # type: ignore[no-untyped-def]
     """Legendre coefficients of the integral from the left end; returns size, tail and plateau of the integrand's."""
     for j in range(11):
@@ -149,7 +148,7 @@ def antiderivative(values, half, c, out):  # type: ignore[no-untyped-def]
     return size, tail, middle
 
 
-@njit(**COMPILE)
+@Inner
 def legendre_sum(c, x):  # type: ignore[no-untyped-def]
     """The Legendre series with coefficients c, at x, by Clenshaw's recurrence."""
     high, low = 0.0, 0.0
@@ -158,7 +157,7 @@ def legendre_sum(c, x):  # type: ignore[no-untyped-def]
     return c[0] + x * high - 0.5 * low
 
 
-@njit(**COMPILE)
+@Inner
 def lay(fns, p, kind, a, b, ref, w, start, stop):  # type: ignore[no-untyped-def]
     """Lay panels over anomalies [start, stop] until time and arc length are resolved to rounding.
 
@@ -276,21 +275,21 @@ def lay(fns, p, kind, a, b, ref, w, start, stop):  # type: ignore[no-untyped-def
     )
 
 
-@njit(**COMPILE)
+@Inner
 def _longer(array, size):  # type: ignore[no-untyped-def]
     out = np.empty(size)
     out[: array.size] = array
     return out
 
 
-@njit(**COMPILE)
+@Inner
 def _taller(array, rows):  # type: ignore[no-untyped-def]
     out = np.empty((rows, array.shape[1]))
     out[: array.shape[0]] = array
     return out
 
 
-@njit(**COMPILE)
+@Inner
 def read_off(edges, marks, terms, phi):  # type: ignore[no-untyped-def]
     """Time (or arc length) from the first edge to anomaly phi."""
     k = min(max(np.searchsorted(edges, phi, side="right") - 1, 0), edges.size - 2)

@@ -2,12 +2,10 @@
 
 from math import fabs
 
-from numba import njit
-
-from gqm_sym.runtime.jit import COMPILE
+from gqm_sym.runtime.jit import Inner
 
 
-@njit(**COMPILE)
+@Inner
 def nearest(a, b, da, db):  # type: ignore[no-untyped-def]
     """``a + da``, or ``b - db`` where that end is nearer: the rounding is then that of the shorter distance."""
     return a + da if fabs(da) <= fabs(db) else b - db

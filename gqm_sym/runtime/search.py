@@ -8,10 +8,9 @@ they cannot prove is halved. Bounds of ds find cusps the same way (MATHS, sectio
 from math import fabs, inf, isfinite
 
 import numpy as np
-from numba import njit
 
 from gqm_sym.runtime.crossing import call_bounds, call_climb, call_rise
-from gqm_sym.runtime.jit import COMPILE
+from gqm_sym.runtime.jit import Inner
 
 # What ended a walk.
 TURN, LIMIT, CRITICAL, CUSP, MARCHED, BROKEN = range(6)
@@ -27,7 +26,7 @@ CUSP_SHARE = 1e-6
 NARROW = 1e-15
 
 
-@njit(**COMPILE)
+@Inner
 def speed_squared(fns, p, lam0, w0, offset, spot, rows):  # type: ignore[no-untyped-def]
     """V**2 at lam0 + offset, and the size of its parts, without subtracting heights."""
     spot[0], spot[1] = lam0 + offset, offset
@@ -36,7 +35,7 @@ def speed_squared(fns, p, lam0, w0, offset, spot, rows):  # type: ignore[no-unty
     return w0 - lost, w0 + fabs(lost)
 
 
-@njit(**COMPILE)
+@Inner
 def polish(fns, p, lam0, w0, lo, hi, spot, rows):  # type: ignore[no-untyped-def]
     """The zero of V**2 between offsets lo (V**2 > 0) and hi (V**2 < 0), by Newton's method kept inside the bracket."""
     x = 0.5 * (lo + hi)
@@ -60,7 +59,7 @@ def polish(fns, p, lam0, w0, lo, hi, spot, rows):  # type: ignore[no-untyped-def
     return x
 
 
-@njit(**COMPILE)
+@Inner
 def walk(fns, p, lam0, w0, direction, begin, reach, step):  # type: ignore[no-untyped-def]
     """Walk from lam0 + direction * begin to ``reach`` (may be infinite) from lam0, beginning with steps of ``step``.
 

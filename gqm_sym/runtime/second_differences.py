@@ -19,7 +19,6 @@ from math import cos, cosh, exp, fabs, factorial, sin, sinh, sqrt
 from math import pow as power
 
 import numpy as np
-from numba import njit
 
 from gqm_sym.runtime.first_differences import (
     acosh1,
@@ -42,7 +41,7 @@ from gqm_sym.runtime.first_differences import (
     tan1,
     tanh1,
 )
-from gqm_sym.runtime.jit import COMPILE
+from gqm_sym.runtime.jit import Inner
 
 # |h1| + |h2| up to which wave_parts may be used: its series are cut below 1e-19 there.
 NEAR = 1.0
@@ -61,7 +60,7 @@ NODES = tuple(float(0.5 + 0.5 * t) for t in _LEGENDRE[0])
 WEIGHTS = tuple(float(0.5 * c * (0.5 + 0.5 * t)) for t, c in zip(*_LEGENDRE, strict=True))
 
 
-@njit(**COMPILE)
+@Inner
 def series(c, t):  # type: ignore[no-untyped-def]
     """The polynomial's value at t."""
     value = 0.0
@@ -70,7 +69,7 @@ def series(c, t):  # type: ignore[no-untyped-def]
     return value
 
 
-@njit(**COMPILE)
+@Inner
 def series_pair(c, s, t):  # type: ignore[no-untyped-def]
     """The polynomial's values at s and t, added, and its divided difference [s,t]."""
     value, slope = 0.0, 0.0
@@ -80,7 +79,7 @@ def series_pair(c, s, t):  # type: ignore[no-untyped-def]
     return 2.0 * value + (s - t) * slope, slope
 
 
-@njit(**COMPILE)
+@Inner
 def ordered(x, y, w, h1, h2):  # type: ignore[no-untyped-def]
     """The points in ascending order and the two gaps between them."""
     if h1 >= 0.0 and h2 >= 0.0:
@@ -94,7 +93,7 @@ def ordered(x, y, w, h1, h2):  # type: ignore[no-untyped-def]
     return (y, x, w, -h1, rest) if rest >= 0.0 else (y, w, x, h2, -rest)
 
 
-@njit(**COMPILE)
+@Inner
 def wave_parts(h1, h2, sign):  # type: ignore[no-untyped-def]
     """A = S(H/2) (S(h1)+S(h2))/2, B = C(H/2) (h2-h1) S~[h1**2,h2**2], H = h1+h2, S~(t**2) = S(t).
 
@@ -106,7 +105,7 @@ def wave_parts(h1, h2, sign):  # type: ignore[no-untyped-def]
     return even, series(HALF_COSINE, quarter) * (h2 - h1) * sign * slope
 
 
-@njit(**COMPILE)
+@Inner
 def sin2(x, y, w, h1, h2):  # type: ignore[no-untyped-def]
     """sin[x,y,w] = (B cos M - A sin M)/2, M = (x+2y+w)/4, A and B from half the gaps."""
     u, v = 0.5 * h1, 0.5 * h2
@@ -118,7 +117,7 @@ def sin2(x, y, w, h1, h2):  # type: ignore[no-untyped-def]
     return (sin1(b, c, v) - sin1(a, b, u)) / (u + v)
 
 
-@njit(**COMPILE)
+@Inner
 def cos2(x, y, w, h1, h2):  # type: ignore[no-untyped-def]
     """cos[x,y,w] = -(B sin M + A cos M)/2, as for the sine."""
     u, v = 0.5 * h1, 0.5 * h2
@@ -130,7 +129,7 @@ def cos2(x, y, w, h1, h2):  # type: ignore[no-untyped-def]
     return (cos1(b, c, v) - cos1(a, b, u)) / (u + v)
 
 
-@njit(**COMPILE)
+@Inner
 def sinh2(x, y, w, h1, h2):  # type: ignore[no-untyped-def]
     """sinh[x,y,w] = (B cosh M + A sinh M)/2, as for the sine."""
     u, v = 0.5 * h1, 0.5 * h2
@@ -142,7 +141,7 @@ def sinh2(x, y, w, h1, h2):  # type: ignore[no-untyped-def]
     return (sinh1(b, c, v) - sinh1(a, b, u)) / (u + v)
 
 
-@njit(**COMPILE)
+@Inner
 def cosh2(x, y, w, h1, h2):  # type: ignore[no-untyped-def]
     """cosh[x,y,w] = (B sinh M + A cosh M)/2, as for the sine."""
     u, v = 0.5 * h1, 0.5 * h2
@@ -154,7 +153,7 @@ def cosh2(x, y, w, h1, h2):  # type: ignore[no-untyped-def]
     return (cosh1(b, c, v) - cosh1(a, b, u)) / (u + v)
 
 
-@njit(**COMPILE)
+@Inner
 def exp2(x, y, w, h1, h2):  # type: ignore[no-untyped-def]
     """exp[x,y,w] = exp(M) (A + B)/2; far points share the factor exp(w)."""
     u, v = 0.5 * h1, 0.5 * h2
@@ -166,7 +165,7 @@ def exp2(x, y, w, h1, h2):  # type: ignore[no-untyped-def]
     return exp(c) * (upper - (1.0 - v * upper) * expc(u)) / (u + v)
 
 
-@njit(**COMPILE)
+@Inner
 def tan2(x, y, w, h1, h2):  # type: ignore[no-untyped-def]
     """tan[x,y,w] = (B cos m + A sin m)/(cos x cos y cos w), m = (x+w)/2, from whole gaps."""
     if fabs(h1) + fabs(h2) <= NEAR:
@@ -177,7 +176,7 @@ def tan2(x, y, w, h1, h2):  # type: ignore[no-untyped-def]
     return (tan1(b, c, v) - tan1(a, b, u)) / (u + v)
 
 
-@njit(**COMPILE)
+@Inner
 def tanh2(x, y, w, h1, h2):  # type: ignore[no-untyped-def]
     """tanh[x,y,w] = (B cosh m - A sinh m)/(cosh x cosh y cosh w), as for the tangent."""
     if fabs(h1) + fabs(h2) <= NEAR:
@@ -188,13 +187,13 @@ def tanh2(x, y, w, h1, h2):  # type: ignore[no-untyped-def]
     return (tanh1(b, c, v) - tanh1(a, b, u)) / (u + v)
 
 
-@njit(**COMPILE)
+@Inner
 def near_area(h1, h2, p, q):  # type: ignore[no-untyped-def]
     """Whether area_bend may be used: r1 = h1/P and r2 = h2/Q are small."""
     return h1 * h1 <= NEAR_AREA * p * p and h2 * h2 <= NEAR_AREA * q * q
 
 
-@njit(**COMPILE)
+@Inner
 def area_bend(h1, h2, p, q, k, sign):  # type: ignore[no-untyped-def]
     """(A(r2)/h2 - A(r1)/h1)/(h1+h2) for r1 = h1/P, r2 = h2/Q, A = atanh (sign 1) or atan (sign -1).
 
@@ -212,7 +211,7 @@ def area_bend(h1, h2, p, q, k, sign):  # type: ignore[no-untyped-def]
     return 0.5 * (sign * slope * e * f * (total * uq) + both * k) * up * uq
 
 
-@njit(**COMPILE)
+@Inner
 def log2(x, y, w, h1, h2):  # type: ignore[no-untyped-def]
     """log[x,y,w], from log[x,y] = 2 atanh(h/(x+y))/h."""
     p, q = x + y, y + w
@@ -222,7 +221,7 @@ def log2(x, y, w, h1, h2):  # type: ignore[no-untyped-def]
     return (log1(b, c, v) - log1(a, b, u)) / (u + v)
 
 
-@njit(**COMPILE)
+@Inner
 def atan2(x, y, w, h1, h2):  # type: ignore[no-untyped-def]
     """atan[x,y,w], from atan[x,y] = atan(h/(1+xy))/h."""
     p, q = 1.0 + x * y, 1.0 + y * w
@@ -232,7 +231,7 @@ def atan2(x, y, w, h1, h2):  # type: ignore[no-untyped-def]
     return (atan1(b, c, v) - atan1(a, b, u)) / (u + v)
 
 
-@njit(**COMPILE)
+@Inner
 def asin2(x, y, w, h1, h2):  # type: ignore[no-untyped-def]
     """asin[x,y,w], from asin[x,y] = 2 atan(h/(cx+cy))/h, c = sqrt(1 - x**2)."""
     cx, cy, cw = root_below(x), root_below(y), root_below(w)
@@ -243,13 +242,13 @@ def asin2(x, y, w, h1, h2):  # type: ignore[no-untyped-def]
     return (asin1(b, c, v) - asin1(a, b, u)) / (u + v)
 
 
-@njit(**COMPILE)
+@Inner
 def acos2(x, y, w, h1, h2):  # type: ignore[no-untyped-def]
     """acos[x,y,w] = -asin[x,y,w]."""
     return -asin2(x, y, w, h1, h2)
 
 
-@njit(**COMPILE)
+@Inner
 def asinh2(x, y, w, h1, h2):  # type: ignore[no-untyped-def]
     """asinh[x,y,w], from asinh[x,y] = 2 atanh(h/(cx+cy))/h, c = sqrt(1 + x**2)."""
     cx, cy, cw = root_above(x), root_above(y), root_above(w)
@@ -260,7 +259,7 @@ def asinh2(x, y, w, h1, h2):  # type: ignore[no-untyped-def]
     return (asinh1(b, c, v) - asinh1(a, b, u)) / (u + v)
 
 
-@njit(**COMPILE)
+@Inner
 def acosh2(x, y, w, h1, h2):  # type: ignore[no-untyped-def]
     """acosh[x,y,w], from acosh[x,y] = 2 atanh(h/(sx+sy))/h, s = sqrt(x**2 - 1)."""
     sx, sy, sw = root_beyond(x), root_beyond(y), root_beyond(w)
@@ -271,7 +270,7 @@ def acosh2(x, y, w, h1, h2):  # type: ignore[no-untyped-def]
     return (acosh1(b, c, v) - acosh1(a, b, u)) / (u + v)
 
 
-@njit(**COMPILE)
+@Inner
 def atanh2(x, y, w, h1, h2):  # type: ignore[no-untyped-def]
     """atanh[x,y,w], from atanh[x,y] = atanh(h/(1-xy))/h."""
     p, q = one_less_product(x, y), one_less_product(y, w)
@@ -281,20 +280,20 @@ def atanh2(x, y, w, h1, h2):  # type: ignore[no-untyped-def]
     return (atanh1(b, c, v) - atanh1(a, b, u)) / (u + v)
 
 
-@njit(**COMPILE)
+@Inner
 def sqrt2(x, y, w, h1, h2):  # type: ignore[no-untyped-def]
     """sqrt[x,y,w] = -1/((sx+sy)(sy+sw)(sw+sx)), s = sqrt(x)."""
     sx, sy, sw = sqrt(x), sqrt(y), sqrt(w)
     return -1.0 / ((sx + sy) * (sy + sw) * (sw + sx))
 
 
-@njit(**COMPILE)
+@Inner
 def inv2(x, y, w, h1, h2):  # type: ignore[no-untyped-def]
     """(1/u)[x,y,w] = 1/(xyw)."""
     return 1.0 / (x * y) / w
 
 
-@njit(**COMPILE)
+@Inner
 def abs2(x, y, w, h1, h2):  # type: ignore[no-untyped-def]
     """|u|[x,y,w]: 0 where the points have one sign, else by the point that stands alone."""
     a, b, c, u, v = ordered(x, y, w, h1, h2)
@@ -303,7 +302,7 @@ def abs2(x, y, w, h1, h2):  # type: ignore[no-untyped-def]
     return -2.0 * a / (u * (u + v)) if b >= 0.0 else 2.0 * c / (v * (u + v))
 
 
-@njit(**COMPILE)
+@Inner
 def ipow2(x, y, w, h1, h2, n):  # type: ignore[no-untyped-def]
     """(u**n)[x,y,w], n an integer: the sum of x**i y**j w**k, i+j+k = n-2; n < 0 by 1/u."""
     if n < 0:
@@ -312,7 +311,7 @@ def ipow2(x, y, w, h1, h2, n):  # type: ignore[no-untyped-def]
     return ipow2_sum(x, y, w, n)
 
 
-@njit(**COMPILE)
+@Inner
 def ipow2_sum(x, y, w, n):  # type: ignore[no-untyped-def]
     """The sum of x**i y**j w**k, i+j+k = n-2: (u**(k+1))[x,y,w] = w (u**k)[x,y,w] + (u**k)[x,y]."""
     second, first, value = 0.0, 0.0, 1.0
@@ -323,7 +322,7 @@ def ipow2_sum(x, y, w, n):  # type: ignore[no-untyped-def]
     return second
 
 
-@njit(**COMPILE)
+@Inner
 def rpow2(x, y, w, h1, h2, p):  # type: ignore[no-untyped-def]
     """(u**p)[x,y,w], x, y, w >= 0: a mean of f'' whose weights grow from the ends to the middle."""
     a, b, c, u, v = ordered(x, y, w, h1, h2)
@@ -339,7 +338,7 @@ def rpow2(x, y, w, h1, h2, p):  # type: ignore[no-untyped-def]
     return p * (p - 1.0) * mean
 
 
-@njit(**COMPILE)
+@Inner
 def rpow2_far(a, b, c, u, v, p):  # type: ignore[no-untyped-def]
     """(u**p)[a,b,c] of sorted points far apart; where p may be near 1, as u times u**(p-1)."""
     if p < 0.5:

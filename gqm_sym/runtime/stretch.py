@@ -88,7 +88,8 @@ class Stretch:
     @property
     def edges(self) -> Array:
         """Panel edges in the anomaly."""
-        return self.panels[0]
+        edges: Array = self.panels[0]
+        return edges
 
     @property
     def duration(self) -> float:
