@@ -1,5 +1,5 @@
 # Made by gqm-gen for "catenary". Do not edit: change its declaration and generate again.
-# interface 1, input cd1fa4541ae4, body 823208c1b4bc
+# interface 1, input cd1fa4541ae4, body 9d98835292da
 """Bead on a hanging chain
 
 x              = x
@@ -185,13 +185,13 @@ MODEL = Formulas(
 )
 
 
-def pass1(x: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, c: Any = '0.8', g: Any = '9.81', m: Any = '1') -> Pass1:
+def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, c: Any = '0.8', g: Any = '9.81', m: Any = '1') -> Pass1:
     """Position, metric, curvature, V**2 and contact force at places of the curve (Pass 1, no quadrature).
 
     Parameters
     ----------
-    x : array_like
-        Places on the curve, as values of its parameter.
+    lam : array_like
+        Places on the curve, as values of its parameter x.
     lam0, v0, direction
         Launch place, speed and direction (+1 or -1: the sign of ds/dt).
     c, g, m
@@ -202,7 +202,7 @@ def pass1(x: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, c: Any = '0.8
     Pass1
         Arrays x, z, ds, kappa, v2 and normal_force.
     """
-    return MODEL.pass1(x, lam0, v0, direction, (c, g, m,))
+    return MODEL.pass1(lam, lam0, v0, direction, (c, g, m,))
 
 
 def solve(

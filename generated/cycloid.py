@@ -1,5 +1,5 @@
 # Made by gqm-gen for "cycloid". Do not edit: change its declaration and generate again.
-# interface 1, input bb93c1ef9815, body e2001e48dc9b
+# interface 1, input bb93c1ef9815, body 353db67199a5
 """Bead on an arch of a cycloid
 
 x              = R*(theta - sin(theta))
@@ -183,13 +183,13 @@ MODEL = Formulas(
 )
 
 
-def pass1(theta: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, R: Any = '0.5', g: Any = '9.81', m: Any = '1') -> Pass1:
+def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, R: Any = '0.5', g: Any = '9.81', m: Any = '1') -> Pass1:
     """Position, metric, curvature, V**2 and contact force at places of the curve (Pass 1, no quadrature).
 
     Parameters
     ----------
-    theta : array_like
-        Places on the curve, as values of its parameter.
+    lam : array_like
+        Places on the curve, as values of its parameter theta.
     lam0, v0, direction
         Launch place, speed and direction (+1 or -1: the sign of ds/dt).
     R, g, m
@@ -200,7 +200,7 @@ def pass1(theta: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, R: Any = 
     Pass1
         Arrays x, z, ds, kappa, v2 and normal_force.
     """
-    return MODEL.pass1(theta, lam0, v0, direction, (R, g, m,))
+    return MODEL.pass1(lam, lam0, v0, direction, (R, g, m,))
 
 
 def solve(

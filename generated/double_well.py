@@ -1,5 +1,5 @@
 # Made by gqm-gen for "double_well". Do not edit: change its declaration and generate again.
-# interface 1, input 28c16d144828, body 360abfa2dea8
+# interface 1, input 28c16d144828, body a792a2bc32ed
 """Bead between two wells
 
 x              = x
@@ -187,13 +187,13 @@ MODEL = Formulas(
 )
 
 
-def pass1(x: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, h: Any = '0.25', g: Any = '9.81', m: Any = '1') -> Pass1:
+def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, h: Any = '0.25', g: Any = '9.81', m: Any = '1') -> Pass1:
     """Position, metric, curvature, V**2 and contact force at places of the curve (Pass 1, no quadrature).
 
     Parameters
     ----------
-    x : array_like
-        Places on the curve, as values of its parameter.
+    lam : array_like
+        Places on the curve, as values of its parameter x.
     lam0, v0, direction
         Launch place, speed and direction (+1 or -1: the sign of ds/dt).
     h, g, m
@@ -204,7 +204,7 @@ def pass1(x: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, h: Any = '0.2
     Pass1
         Arrays x, z, ds, kappa, v2 and normal_force.
     """
-    return MODEL.pass1(x, lam0, v0, direction, (h, g, m,))
+    return MODEL.pass1(lam, lam0, v0, direction, (h, g, m,))
 
 
 def solve(

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "ellipse". Do not edit: change its declaration and generate again.
-# interface 1, input 3a81da5567d3, body 3517651760d4
+# interface 1, input 3a81da5567d3, body 0e9c191ed3a8
 """Bead on an ellipse, by the eccentric angle
 
 x              = a*cos(theta)
@@ -188,13 +188,13 @@ MODEL = Formulas(
 )
 
 
-def pass1(theta: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, a: Any = '2', b: Any = '1', g: Any = '9.81', m: Any = '1') -> Pass1:
+def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, a: Any = '2', b: Any = '1', g: Any = '9.81', m: Any = '1') -> Pass1:
     """Position, metric, curvature, V**2 and contact force at places of the curve (Pass 1, no quadrature).
 
     Parameters
     ----------
-    theta : array_like
-        Places on the curve, as values of its parameter.
+    lam : array_like
+        Places on the curve, as values of its parameter theta.
     lam0, v0, direction
         Launch place, speed and direction (+1 or -1: the sign of ds/dt).
     a, b, g, m
@@ -205,7 +205,7 @@ def pass1(theta: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, a: Any = 
     Pass1
         Arrays x, z, ds, kappa, v2 and normal_force.
     """
-    return MODEL.pass1(theta, lam0, v0, direction, (a, b, g, m,))
+    return MODEL.pass1(lam, lam0, v0, direction, (a, b, g, m,))
 
 
 def solve(

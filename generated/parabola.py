@@ -1,5 +1,5 @@
 # Made by gqm-gen for "parabola". Do not edit: change its declaration and generate again.
-# interface 1, input 638613fc8598, body 1f34f4425b1c
+# interface 1, input 638613fc8598, body 0f9e4ec04fdb
 """Bead in a parabolic bowl
 
 x              = x
@@ -177,13 +177,13 @@ MODEL = Formulas(
 )
 
 
-def pass1(x: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, a: Any = '0.7', g: Any = '9.81', m: Any = '2') -> Pass1:
+def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, a: Any = '0.7', g: Any = '9.81', m: Any = '2') -> Pass1:
     """Position, metric, curvature, V**2 and contact force at places of the curve (Pass 1, no quadrature).
 
     Parameters
     ----------
-    x : array_like
-        Places on the curve, as values of its parameter.
+    lam : array_like
+        Places on the curve, as values of its parameter x.
     lam0, v0, direction
         Launch place, speed and direction (+1 or -1: the sign of ds/dt).
     a, g, m
@@ -194,7 +194,7 @@ def pass1(x: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, a: Any = '0.7
     Pass1
         Arrays x, z, ds, kappa, v2 and normal_force.
     """
-    return MODEL.pass1(x, lam0, v0, direction, (a, g, m,))
+    return MODEL.pass1(lam, lam0, v0, direction, (a, g, m,))
 
 
 def solve(

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "pendulum". Do not edit: change its declaration and generate again.
-# interface 1, input abbc42e6e84e, body 6762e53c6ba4
+# interface 1, input abbc42e6e84e, body 0a64d953377a
 """Simple pendulum, angle from the horizontal
 
 x              = L*cos(theta)
@@ -177,13 +177,13 @@ MODEL = Formulas(
 )
 
 
-def pass1(theta: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, L: Any = '1', g: Any = '9.81', m: Any = '1') -> Pass1:
+def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, L: Any = '1', g: Any = '9.81', m: Any = '1') -> Pass1:
     """Position, metric, curvature, V**2 and contact force at places of the curve (Pass 1, no quadrature).
 
     Parameters
     ----------
-    theta : array_like
-        Places on the curve, as values of its parameter.
+    lam : array_like
+        Places on the curve, as values of its parameter theta.
     lam0, v0, direction
         Launch place, speed and direction (+1 or -1: the sign of ds/dt).
     L, g, m
@@ -194,7 +194,7 @@ def pass1(theta: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, L: Any = 
     Pass1
         Arrays x, z, ds, kappa, v2 and normal_force.
     """
-    return MODEL.pass1(theta, lam0, v0, direction, (L, g, m,))
+    return MODEL.pass1(lam, lam0, v0, direction, (L, g, m,))
 
 
 def solve(

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "quartic". Do not edit: change its declaration and generate again.
-# interface 1, input e1ff78064d31, body 9b1b671fd698
+# interface 1, input e1ff78064d31, body be51722599eb
 """Bead in a quartic bowl
 
 x              = x
@@ -169,13 +169,13 @@ MODEL = Formulas(
 )
 
 
-def pass1(x: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, g: Any = '9.81', m: Any = '1') -> Pass1:
+def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, g: Any = '9.81', m: Any = '1') -> Pass1:
     """Position, metric, curvature, V**2 and contact force at places of the curve (Pass 1, no quadrature).
 
     Parameters
     ----------
-    x : array_like
-        Places on the curve, as values of its parameter.
+    lam : array_like
+        Places on the curve, as values of its parameter x.
     lam0, v0, direction
         Launch place, speed and direction (+1 or -1: the sign of ds/dt).
     g, m
@@ -186,7 +186,7 @@ def pass1(x: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, g: Any = '9.8
     Pass1
         Arrays x, z, ds, kappa, v2 and normal_force.
     """
-    return MODEL.pass1(x, lam0, v0, direction, (g, m,))
+    return MODEL.pass1(lam, lam0, v0, direction, (g, m,))
 
 
 def solve(

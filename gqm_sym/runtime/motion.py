@@ -5,6 +5,7 @@ from math import inf
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gqm_sym.errors import InputError, SolutionError
 from gqm_sym.runtime import timing
@@ -38,14 +39,13 @@ class State(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True)
-class _Sample:
-    """Where a motion is at times, before it is turned into coordinates."""
+class _Located:
+    """Where a motion is at times: which of them fall on a piece, and the anomalies of its stretch there."""
 
-    lam: Array
-    reduced: Array
-    s: Array
-    v: Array
-    count: Array
+    pieces: tuple[tuple[Piece, NDArray[np.bool_], Array], ...]
+    at_launch: NDArray[np.bool_]
+    laps: Array
+    course: Course
 
 
 class Motion:
@@ -112,8 +112,7 @@ class Motion:
         ----------
         t : number or array_like
             Times in seconds from launch, at most ``t_end``; negative ones too where the motion is periodic.
-            Strings, ints and
-            Fractions are taken exactly.
+            Strings, ints and Fractions are taken exactly.
 
         Returns
         -------
@@ -121,17 +120,19 @@ class Motion:
             Of the shape of ``t``. In circulation the parameter grows lap by lap.
         """
         times, low, shape = self._times(t)
-        return _shaped(self._sample(times, low).lam, shape)
+        located = self._located(times, low)
+        return _shaped(self._places(located) + located.laps * located.course.lap, shape)
 
     def state(self, t: Any) -> State:
         """Everything about the body at times: parameter, arc length, position, speed, curvature, contact force."""
         times, low, shape = self._times(t)
-        sample = self._sample(times, low)
-        f = self.problem.functions
-        v2 = sample.v**2
-        x, z, _, kappa, force = frame_at(f.addresses, f.p, sample.reduced, v2)
-        arrays = (times, sample.lam, sample.s, x, z, sample.v, v2, kappa, force)
-        return State(*(_shaped(array, shape) for array in arrays))
+        located = self._located(times, low)
+        f, course = self.problem.functions, located.course
+        reduced, s, v = self._places(located), self._arc_lengths(located), self._velocities(located)
+        v2 = v**2
+        x, z, _, kappa, force = frame_at(f.addresses, f.p, reduced, v2)
+        lam, s = reduced + located.laps * course.lap, s + located.laps * course.lap_length
+        return State(*(_shaped(array, shape) for array in (times, lam, s, x, z, v, v2, kappa, force)))
 
     def time_at(self, lam: Any) -> float:
         """When the body is first at a place of the curve."""
@@ -150,17 +151,17 @@ class Motion:
     def error_bound(self, t: Any) -> Any:
         """What ``lam(t)`` can be off by: the clock's part and the inversion's (paper, eq. 32), rounding included."""
         times, low, shape = self._times(t)
-        sample = self._sample(times, low)
-        f = self.problem.functions
-        ds = frame_at(f.addresses, f.p, sample.reduced, sample.v**2)[2]
+        located = self._located(times, low)
+        f, reduced, v = self.problem.functions, self._places(located), self._velocities(located)
+        ds = frame_at(f.addresses, f.p, reduced, v**2)[2]
         with np.errstate(divide="ignore", invalid="ignore"):
-            rate = np.where(ds > 0.0, np.abs(sample.v) / ds, 0.0)
+            rate = np.where(ds > 0.0, np.abs(v) / ds, 0.0)
         table = max(
             (piece.stretch.table[5] * _swing(piece.stretch) for piece in self._course(0.0).pieces),
             default=0.0,
         )
         width = max((abs(p.stretch.b - p.stretch.a) for p in self._course(0.0).pieces), default=0.0)
-        rounding = ULP * (np.abs(sample.lam) + np.abs(sample.reduced) + width)
+        rounding = ULP * (np.abs(reduced + located.laps * located.course.lap) + np.abs(reduced) + width)
         return _shaped(rate * self._clock_error(times) + table + rounding, shape)
 
     # -- history ------------------------------------------------------------------------------
@@ -244,24 +245,38 @@ class Motion:
     def _extent(self) -> str:
         return "it moves " + ", ".join(f"from {leg.lam_start!r} to {leg.lam_end!r}" for leg in self.legs)
 
-    def _sample(self, t: Array, t_low: Array) -> _Sample:
+    def _located(self, t: Array, t_low: Array) -> _Located:
         course = self._course(float(np.abs(t).max()) if t.size else 0.0)
-        count, rest, rest_low = course.reduced(t, t_low)
+        laps, rest, rest_low = course.reduced(t, t_low)
         which = course.piece_of(rest)
-        lam, s, v = np.empty_like(t), np.empty_like(t), np.empty_like(t)
+        pieces = []
         for k in np.unique(which):
             piece, mask = course.pieces[k], which == k
-            stretch = piece.stretch
             phi = course.anomalies(piece, rest[mask], rest_low[mask])
-            phi = np.clip(phi, 0.0, stretch.edges[-1])
-            lam[mask] = stretch.places(phi)
-            s[mask] = piece.s_a + stretch.direction * stretch.lengths(phi)
-            v[mask] = piece.direction * stretch.speeds(phi)
-        launch = (rest == 0.0) & (rest_low == 0.0)
-        lam[launch], s[launch], v[launch] = self.problem.lam0, 0.0, self.direction * self.problem.launch.v0.value
-        if course.lap == 0.0:
-            return _Sample(lam, lam, s, v, count)
-        return _Sample(lam + count * course.lap, lam, s + count * course.lap_length, v, count)
+            pieces.append((piece, mask, np.clip(phi, 0.0, piece.stretch.edges[-1])))
+        return _Located(tuple(pieces), (rest == 0.0) & (rest_low == 0.0), laps, course)
+
+    def _places(self, located: _Located) -> Array:
+        """The parameter within the lap; exactly the launch place at launch."""
+        lam = np.full_like(located.laps, self.problem.lam0)
+        for piece, mask, phi in located.pieces:
+            lam[mask] = piece.stretch.places(phi)
+        lam[located.at_launch] = self.problem.lam0
+        return lam
+
+    def _arc_lengths(self, located: _Located) -> Array:
+        s = np.zeros_like(located.laps)
+        for piece, mask, phi in located.pieces:
+            s[mask] = piece.s_a + piece.stretch.direction * piece.stretch.lengths(phi)
+        s[located.at_launch] = 0.0
+        return s
+
+    def _velocities(self, located: _Located) -> Array:
+        v = np.zeros_like(located.laps)
+        for piece, mask, phi in located.pieces:
+            v[mask] = piece.direction * piece.stretch.speeds(phi)
+        v[located.at_launch] = self.direction * self.problem.launch.v0.value
+        return v
 
     def _first_passages(self, lam: float, low: float) -> list[float]:
         """Times of passing a place, the first on each piece."""
@@ -310,10 +325,8 @@ class Rest(Motion):
     def __init__(self, problem: Problem) -> None:
         super().__init__(problem, "rest", problem.launch.direction)
 
-    def _sample(self, t: Array, t_low: Array) -> _Sample:
-        lam = np.full_like(t, self.problem.lam0)
-        nothing = np.zeros_like(t)
-        return _Sample(lam, lam, nothing, nothing, nothing)
+    def _located(self, t: Array, t_low: Array) -> _Located:
+        return _Located((), np.ones(t.shape, dtype=bool), np.zeros_like(t), self._course(0.0))
 
     def _course(self, reach: float) -> Course:
         return Course(pieces=(), period=ZERO)
@@ -335,8 +348,7 @@ class Periodic(Motion):
     """A libration or a circulation: one stretch, repeated for ever.
 
     Its course is first built from times in doubles. Beyond one period from launch the period is needed as two
-    doubles; it is then evaluated
-    once in extended precision.
+    doubles; it is then evaluated once in extended precision.
     """
 
     def __init__(self, problem: Problem, kind: str, direction: int, stretch: Stretch) -> None:

@@ -8,6 +8,7 @@ for ``Number.at``.
 import ast
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 from gqm_sym import rationals
@@ -125,7 +126,7 @@ def read_number(value: Source, *, where: str) -> Number:
         return value
     try:
         if isinstance(value, str):
-            return _from_tree(parse(value, where=where), value.strip(), where)
+            return _read_text(value, where)
         exact = rationals.read_exact(value, where=where)
         if exact is not None:
             return _from_fraction(exact, str(value), where)
@@ -136,6 +137,12 @@ def read_number(value: Source, *, where: str) -> Number:
     except ValueError as error:
         raise NumberError(f"{where}: {error}") from None
     raise NumberError(f"{where}: {type(value).__name__} given; give a number, or text such as '9.81' or 'pi/2'")
+
+
+@lru_cache(maxsize=1024)
+def _read_text(text: str, where: str) -> Number:
+    # Defaults are read at every launch.
+    return _from_tree(parse(text, where=where), text.strip(), where)
 
 
 def _from_tree(tree: ast.expr, text: str, where: str) -> Number:

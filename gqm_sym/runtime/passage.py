@@ -5,24 +5,40 @@ from math import inf, isfinite
 
 import numpy as np
 
-from gqm_sym.errors import SolutionError
+from gqm_sym.errors import InputError, SolutionError
 from gqm_sym.runtime import search
 from gqm_sym.runtime.course import ZERO, Course, Piece
 from gqm_sym.runtime.entries import walk_on
 from gqm_sym.runtime.events import liftoff
 from gqm_sym.runtime.motion import ULP, Motion
 from gqm_sym.runtime.problem import Problem
+from gqm_sym.runtime.search import FARTHEST, NARROW
 from gqm_sym.runtime.stretch import Array, Stretch, through, toward_equilibrium
 
 
 @dataclass(slots=True)
 class OpenEnd:
-    """Where a motion that never ends has been computed to: it goes on in growing steps when asked."""
+    """How far a motion has been computed that goes on for ever, or towards a pole: stretch by stretch when asked.
+
+    Attributes
+    ----------
+    place : float
+        Where it has been computed to.
+    limit : float
+        What it moves towards: infinity, or a place where the curve or the force is not finite.
+    """
 
     place: float
     direction: int
-    known: float
+    limit: float
     step: float = 1.0
+
+    @property
+    def target(self) -> float:
+        """The end of the next stretch: twice as far as the last one, but never more than half-way to a pole."""
+        if isfinite(self.limit):
+            return self.place + self.direction * min(self.step, 0.5 * abs(self.limit - self.place))
+        return self.place + self.direction * self.step
 
 
 class Passage(Motion):
@@ -119,6 +135,8 @@ class Passage(Motion):
                 self.add(longer, 1, "asymptote")
             else:
                 break
+        if reach > self.t_end:
+            raise InputError(f"t: the motion ends at {self.t_end!r} s ({self._how_it_ends()}), got {reach!r}")
         return Course(pieces=tuple(self._pieces))
 
     def _go_on(self) -> None:
@@ -126,8 +144,13 @@ class Passage(Motion):
         end, problem = self.open_end, self.problem
         assert end is not None
         f, lam0 = problem.functions, problem.lam0
-        target = end.place + end.direction * end.step
-        if not isfinite(target) or not isfinite(target**2):
+        target = end.target
+        if abs(target - end.place) <= NARROW * max(abs(end.place), abs(lam0)):
+            self._pieces[-1] = replace(self._pieces[-1], end="singular-point")
+            self.t_end = min(self.t_end, self._pieces[-1].t_stop[0])
+            self.open_end = None
+            return
+        if abs(target) > FARTHEST * max(1.0, abs(lam0)):
             raise SolutionError(
                 f"the motion leaves the range of doubles at {problem.formulas.parameter} = {end.place!r}; "
                 "give a shorter t_max"

@@ -16,6 +16,8 @@ from gqm_sym.runtime.jit import Inner
 TURN, LIMIT, CRITICAL, CUSP, MARCHED, BROKEN = range(6)
 
 MOST_STEPS = 4096
+# As good as infinity: powers of a parameter this large still lie within the range of doubles.
+FARTHEST = 1e50
 # V**2 beyond which a value that is not finite means overflow, not a pole.
 OVERFLOWING = 1e100
 # V**2 whose possible change over a step is this small against its parts is as good as constant in doubles.
@@ -81,7 +83,7 @@ def walk(fns, p, lam0, w0, direction, begin, reach, step):  # type: ignore[no-un
         if left >= reach:
             return LIMIT, direction * reach, direction * reach
         right = min(left + step, reach)
-        if not isfinite(lam0 + right):
+        if right > FARTHEST * max(1.0, fabs(lam0)):
             return MARCHED, direction * left, direction * left
         narrow = right - left <= NARROW * max(fabs(lam0), right)
         here, there = lam0 + direction * left, lam0 + direction * right

@@ -1,10 +1,10 @@
 """From a launch to a motion: how far it reaches each way, of what kind it is, and the stretches it runs through."""
 
-from math import isfinite
+from math import inf, isfinite
 
 import numpy as np
 
-from gqm_sym.errors import SolutionError
+from gqm_sym.errors import LaunchError, SolutionError
 from gqm_sym.runtime import search
 from gqm_sym.runtime.entries import frame_at, survey, walk_on
 from gqm_sym.runtime.formulas import Formulas, Launch
@@ -133,8 +133,8 @@ def _reach(problem: Problem, direction: int, walked: tuple[int, float, float]) -
         if what == search.CUSP:
             return Reach("cusp", lam0 + far)
         if what == search.MARCHED:
-            return Reach("open", lam0 + near)
-        return Reach("singular-point", lam0 + near)
+            return Reach("open", direction * inf)
+        return Reach("open", lam0 + far)  # a pole: how long it takes to get there, stretch by stretch
     raise SolutionError(
         f"turning points from {problem.formulas.parameter} = {lam0!r}: too many places at which V**2 nearly vanishes"
     )
@@ -153,13 +153,18 @@ def _domain_end(problem: Problem, direction: int) -> Reach:
 def _outward(problem: Problem, direction: int, front: Reach) -> Motion:
     """A motion that leaves the launch place for good, without turning."""
     f, lam0 = problem.functions, problem.lam0
+    if abs(front.place - lam0) <= 1e-15 * max(abs(lam0), 1.0):
+        raise LaunchError(
+            f"lam0: {lam0!r} is the {front.what} itself, and the motion would leave through it at once; "
+            f"launch with direction={-direction} or from a place inside the domain"
+        )
     kind = "asymptotic" if front.what == "equilibrium" else "transit"
     passage = Passage(problem, kind, direction)
     if problem.w0 > 0.0:
         if front.what == "equilibrium":
             passage.approach(lam0, front.place)
         elif front.what == "open":
-            passage.open_end = OpenEnd(lam0, direction, abs(front.place))
+            passage.open_end = OpenEnd(lam0, direction, front.place)
         else:
             passage.add(through(f, lam0, front.place, lam0, problem.w0), 1, front.what)
         return passage.finish()
@@ -168,9 +173,9 @@ def _outward(problem: Problem, direction: int, front: Reach) -> Motion:
         passage.add(from_turn(f, lam0, middle), 1, "")
         passage.approach(middle, front.place)
     elif front.what == "open":
-        middle = lam0 + direction * min(1.0, abs(front.place - lam0))
+        middle = lam0 + direction * min(1.0, 0.5 * abs(front.place - lam0))
         passage.add(from_turn(f, lam0, middle), 1, "")
-        passage.open_end = OpenEnd(middle, direction, abs(front.place))
+        passage.open_end = OpenEnd(middle, direction, front.place)
     else:
         passage.add(from_turn(f, lam0, front.place), 1, front.what)
     return passage.finish()
@@ -186,7 +191,7 @@ def _returning(problem: Problem, direction: int, front: Reach, back: Reach) -> M
     if back.what in ("equilibrium", "open"):
         passage.add(inbound, 1, "")
         if back.what == "open":
-            passage.open_end = OpenEnd(lam0, -direction, abs(back.place))
+            passage.open_end = OpenEnd(lam0, -direction, back.place)
         else:
             passage.approach(lam0, back.place)
     else:

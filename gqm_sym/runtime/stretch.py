@@ -12,7 +12,6 @@ from gqm_sym.runtime.entries import anomalies, build_table, lay_panels, read_off
 from gqm_sym.runtime.exact import ExactProblem
 from gqm_sym.runtime.exact_panels import DIGITS, exact_ends, lay_exactly
 from gqm_sym.runtime.panels import (
-    EXHAUSTED,
     FAILED,
     FROM_TURN,
     ILL_CONDITIONED,
@@ -115,11 +114,6 @@ class Stretch:
     def ill_conditioned(self) -> bool:
         """Whether doubles lose digits of V**2 that matter."""
         return bool(self.panels[7] == ILL_CONDITIONED or self.panels[6] < LEAST_BALANCE)
-
-    @property
-    def exhausted(self) -> bool:
-        """Whether panels ran out before the integrand was resolved."""
-        return bool(self.panels[7] == EXHAUSTED)
 
     @property
     def direction(self) -> int:
