@@ -12,7 +12,7 @@ from mpmath import mp, mpf
 
 from gqm_sym.declare import Curve, families
 from gqm_sym.derivation import Model, derive
-from gqm_sym.errors import DeclarationError, DerivationError
+from gqm_sym.errors import DeclarationError, DerivationError, GQMError
 from gqm_sym.expressions import read_expression
 from gqm_sym.kernels import Gravity
 
@@ -360,3 +360,15 @@ def test_the_forms_are_the_same_under_every_hash_seed():
         texts.add(done.stdout)
     assert len(texts) == 1
     assert len(texts.pop()) > 1000
+
+
+@pytest.mark.parametrize("z", ["log(-exp(x))", "asin(2 + x**2)", "acosh(sin(x)/2)", "sqrt(-1 - x**2)"])
+def test_a_height_that_is_nowhere_real_is_refused(z: str) -> None:
+    """An expression that is complex at every place is refused when it is derived, by name."""
+    with pytest.raises(GQMError, match="z: |ds.dx: "):
+        derive(Curve.graph(z, parameter="x"), Gravity())
+
+
+def test_a_height_that_is_real_somewhere_is_kept() -> None:
+    """A curve that is real on part of the line is one: the motion ends where it is not."""
+    assert derive(Curve.graph("sqrt(x)", parameter="x"), Gravity()).z == sp.sqrt(sp.Symbol("x", real=True))

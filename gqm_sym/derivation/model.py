@@ -8,6 +8,7 @@ import sympy as sp
 from gqm_sym.declare import Curve
 from gqm_sym.derivation.forces import forces
 from gqm_sym.derivation.geometry import geometry
+from gqm_sym.derivation.reality import check_somewhere_real
 from gqm_sym.derivation.rewrite import check_real, tidy, without_poles
 from gqm_sym.errors import DeclarationError
 from gqm_sym.kernels.base import Kernel
@@ -201,7 +202,7 @@ def derive(
     Raises
     ------
     DeclarationError
-        If a name means two things, or a default belongs to no parameter.
+        If a name means two things, a default belongs to no parameter, or a form is nowhere real.
     DerivationError
         If a closed form is not real and finite.
     """
@@ -249,6 +250,8 @@ def derive(
     )
     for label, form in model.closed_forms():
         check_real(form, where=label)
+    tried = (("x", x), ("z", z), (f"ds/d{lam.name}", shape.ds), ("potential", law.potential))
+    check_somewhere_real(tried, lam, curve.domain, values)
     return model
 
 

@@ -12,7 +12,7 @@ from gqm_sym.runtime.stretch import Functions
 class Reach:
     """How far the motion goes one way, and what is there.
 
-    ``what`` is "turn", "equilibrium", "domain-end", "cusp", "closed", or "open": towards infinity or a pole at ``place``.
+    ``what`` is "turn", "equilibrium", "domain-end", "cusp", "closed", or "open" (towards infinity or a pole).
     """
 
     what: str

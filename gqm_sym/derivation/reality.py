@@ -1,0 +1,53 @@
+"""Whether a curve is real anywhere: ``asin(2 + x**2)`` is an expression like any other, and nowhere a height."""
+
+from collections.abc import Iterable, Mapping
+
+import sympy as sp
+
+from gqm_sym.errors import DeclarationError
+from gqm_sym.parameters import Value, exact_value
+
+# Where to look on a range without ends, and shares of one with ends.
+_PLACES = tuple(sp.Rational(n, 10) for n in (3, -7, 11, -23, 29, 1, -1, 57, -90))
+_SHARES = tuple(sp.Rational(n, 97) for n in (5, 17, 29, 41, 53, 67, 79, 91))
+# What a parameter without a default is given.
+_SOME = sp.Rational(13, 10)
+_DIGITS = 20
+
+
+def check_somewhere_real(
+    forms: Iterable[tuple[str, sp.Expr]],
+    parameter: sp.Symbol,
+    domain: tuple[sp.Expr | None, sp.Expr | None],
+    defaults: Mapping[str, Value | None],
+) -> None:
+    """Refuse forms that are complex or infinite wherever they are tried.
+
+    Raises
+    ------
+    DeclarationError
+        Naming the form. One that is real somewhere passes: where it is not, the motion ends.
+    """
+    values = {
+        sp.Symbol(name, real=True): _SOME if value is None else exact_value(value) for name, value in defaults.items()
+    }
+    low, high = (None if end is None else end.xreplace(values) for end in domain)
+    if low is not None and high is not None:
+        places = [low + (high - low) * share for share in _SHARES]
+    elif low is not None or high is not None:
+        places = [high - abs(p) if low is None else low + abs(p) for p in _PLACES]
+    else:
+        places = list(_PLACES)
+    for label, form in forms:
+        at = form.xreplace(values)
+        if not any(_is_real(at.xreplace({parameter: place})) for place in places):
+            raise DeclarationError(
+                f"{label}: {form} is not a real number at any place tried with the default parameters; "
+                "declare a curve and a potential that are real, or a domain on which they are"
+            )
+
+
+def _is_real(number: sp.Expr) -> bool:
+    value = number.evalf(_DIGITS)
+    real, imaginary = value.as_real_imag()
+    return bool(real.is_finite and abs(imaginary) <= 10 ** (-_DIGITS // 2) * (1 + abs(real)))
