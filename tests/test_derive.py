@@ -372,3 +372,9 @@ def test_a_height_that_is_nowhere_real_is_refused(z: str) -> None:
 def test_a_height_that_is_real_somewhere_is_kept() -> None:
     """A curve that is real on part of the line is one: the motion ends where it is not."""
     assert derive(Curve.graph("sqrt(x)", parameter="x"), Gravity()).z == sp.sqrt(sp.Symbol("x", real=True))
+
+
+def test_a_parameter_without_a_default_is_not_guessed() -> None:
+    """sqrt(1 - ecc**2) is real for the eccentricities it is meant for: nothing is refused before they are given."""
+    model = derive(Curve.parametric(x="a*cos(u)", z="a*sqrt(1 - ecc**2)*sin(u)", parameter="u"), Gravity())
+    assert model.parameters == ("a", "ecc", "g", "m")

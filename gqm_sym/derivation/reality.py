@@ -10,8 +10,6 @@ from gqm_sym.parameters import Value, exact_value
 # Where to look on a range without ends, and shares of one with ends.
 _PLACES = tuple(sp.Rational(n, 10) for n in (3, -7, 11, -23, 29, 1, -1, 57, -90))
 _SHARES = tuple(sp.Rational(n, 97) for n in (5, 17, 29, 41, 53, 67, 79, 91))
-# What a parameter without a default is given.
-_SOME = sp.Rational(13, 10)
 _DIGITS = 20
 
 
@@ -26,11 +24,13 @@ def check_somewhere_real(
     Raises
     ------
     DeclarationError
-        Naming the form. One that is real somewhere passes: where it is not, the motion ends.
+        Naming the form. One that is real somewhere passes: where it is not, the motion ends. So does
+        one whose parameters have no defaults: ``sqrt(1 - e_0**2)`` is real for the values it is meant for.
     """
-    values = {
-        sp.Symbol(name, real=True): _SOME if value is None else exact_value(value) for name, value in defaults.items()
-    }
+    values = {sp.Symbol(name, real=True): exact_value(value) for name, value in defaults.items() if value is not None}
+    unset = {sp.Symbol(name, real=True) for name, value in defaults.items() if value is None}
+    if any(end is not None and end.free_symbols & unset for end in domain):
+        return
     low, high = (None if end is None else end.xreplace(values) for end in domain)
     if low is not None and high is not None:
         places = [low + (high - low) * share for share in _SHARES]
@@ -40,6 +40,8 @@ def check_somewhere_real(
         places = list(_PLACES)
     for label, form in forms:
         at = form.xreplace(values)
+        if at.free_symbols & unset:
+            continue
         if not any(_is_real(at.xreplace({parameter: place})) for place in places):
             raise DeclarationError(
                 f"{label}: {form} is not a real number at any place tried with the default parameters; "

@@ -20,7 +20,7 @@ LADDER = (40, 80, 210)
 SPARE = 15  # digits that evaluation and cancellation may cost at each rung
 # A stretch that took this many panels has a peak that the trapezoidal rule would need too many nodes for.
 SMOOTH_PANELS = 8
-MOST_NODES = 1 << 17
+MOST_NODES = 1 << 13  # at 34 digits; a curve that is not smooth would take them without end
 
 
 @dataclass(frozen=True, slots=True)
@@ -216,7 +216,7 @@ class Arithmetic:
         n = 16
         total = (rate(self.mpf(0))[0] + rate(stop)[0]) / 2 + sum(rate(stop * k / n)[0] for k in range(1, n))
         value, before = total * stop / n, None
-        while n < MOST_NODES:
+        while n < max(MOST_NODES, 64 * digits):
             total += sum(rate(stop * (2 * k + 1) / (2 * n))[0] for k in range(n))
             n *= 2
             new = total * stop / n

@@ -26,12 +26,25 @@ from gqm_sym.runtime.interface import INTERFACE
 COMPILE: dict[str, Any] = {"cache": True, "error_model": "numpy"}
 
 
+def _stamp() -> tuple[tuple[str, int, int], ...]:
+    """Names, times and sizes of the runtime's files."""
+    files = sorted(Path(__file__).parent.glob("*.py"))
+    return tuple((file.name, (status := file.stat()).st_mtime_ns, status.st_size) for file in files)
+
+
+STAMP = _stamp()
+
+
 class ReadyCache(FunctionCache):  # type: ignore[misc]
-    """numba's disk cache, looked into before numba prepares to compile.
+    """numba's disk cache, looked into before numba prepares to compile, and aware of changes in the runtime.
 
     The preparation imports and registers all that compiling may need (SciPy's linear algebra as well) and takes a tenth
-    of a second; code that is in the cache needs none of it.
+    of a second; code that is in the cache needs none of it. numba itself notices changes in a function's own file only;
+    compiled code here holds functions of several.
     """
+
+    def _index_key(self, sig: Any, codegen: Any) -> Any:
+        return (*super()._index_key(sig, codegen), STAMP)
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """The compiled function from the cache, or numba's own way."""

@@ -1,0 +1,241 @@
+# Made by gqm-gen for "rotating_parabola". Do not edit: change its declaration and generate again.
+# interface 1, input 9d848a7566cb, body dc2fbf78d3c3
+"""Bead in a turning parabolic bowl
+
+x              = x
+z              = a*x**2
+ds/dx          = sqrt(4*a**2*x**2 + 1)
+dx/ds          = 1/sqrt(4*a**2*x**2 + 1)
+dz/ds          = 2*a*x/sqrt(4*a**2*x**2 + 1)
+kappa          = 2*a/(4*a**2*x**2 + 1)**(3/2)
+Theta          = -atan(2*a*lam0) + atan(2*a*x)
+V**2           = v0**2 + (-Omega**2 + 2*a*g)*(lam0**2 - x**2)
+N              = m*(2*a*(v0**2 + (-Omega**2 + 2*a*g)*(lam0**2 - x**2))/(4*a**2*x**2 + 1)**(3/2) + (2*Omega**2*a*x**2 + g)/sqrt(4*a**2*x**2 + 1))
+A              = -x*(-Omega**2 + 2*a*g)/sqrt(4*a**2*x**2 + 1)
+dt/dx          = sqrt(4*a**2*x**2 + 1)/sqrt(v0**2 + (-Omega**2 + 2*a*g)*(lam0**2 - x**2))
+turning points : v0**2 + (-Omega**2 + 2*a*g)*(lam0**2 - x**2) = 0
+liftoff        : 2*a*(v0**2 + (-Omega**2 + 2*a*g)*(lam0**2 - x**2))/(4*a**2*x**2 + 1)**(3/2) + (2*Omega**2*a*x**2 + g)/sqrt(4*a**2*x**2 + 1) = 0
+"""
+
+from math import sqrt
+from typing import Any
+
+from numba import carray
+
+from gqm_sym.runtime import (
+    BEND,
+    BOUNDS,
+    CLIMB,
+    FRAME,
+    RISE,
+    Addresses,
+    ExactFormulas,
+    Formulas,
+    Motion,
+    Pass1,
+    compiler,
+)
+from gqm_sym.runtime.intervals import iadd, iconst, imul, ipow, isqrt
+from gqm_sym.runtime.places import nearest
+
+PARAMETERS = {
+    'a': '0.6',
+    'Omega': '2.5',
+    'g': '9.81',
+    'm': '1.4',
+}
+
+compiled = compiler(__file__, interface=1)
+
+
+@compiled(FRAME)
+def frame(n, places, speeds, p, out):
+    """x, z, ds/dx, signed curvature and contact force, given V**2 (paper, eq. 15)."""
+    places, speeds, p, out = carray(places, n), carray(speeds, n), carray(p, 4), carray(out, (5, n))
+    a, Omega, g, m = p[0], p[1], p[2], p[3]
+    for i in range(n):
+        x = places[i]
+        v2 = speeds[i]
+        _t0 = x**2
+        _t1 = _t0*a
+        _t2 = 4*_t0*a**2 + 1
+        _t3 = sqrt(_t2)
+        _t4 = 2*a/sqrt(_t2)**3
+        out[0, i] = x
+        out[1, i] = _t1
+        out[2, i] = _t3
+        out[3, i] = _t4
+        out[4, i] = m*(_t4*v2 + (2*Omega**2*_t1 + g)/_t3)
+
+
+@compiled(CLIMB)
+def climb(n, places, p, out):
+    """What V**2 loses in climbing to x, up to a constant, and its derivative (paper, eq. 13)."""
+    places, p, out = carray(places, n), carray(p, 4), carray(out, (2, n))
+    a, Omega, g = p[0], p[1], p[2]
+    _t0 = -Omega**2 + 2*a*g
+    for i in range(n):
+        x = places[i]
+        out[0, i] = _t0*x**2
+        out[1, i] = 2*_t0*x
+
+
+@compiled(RISE)
+def rise(n, _a, places, offsets, p, out):
+    """climb[a, x] = (climb(x) - climb(a))/(x - a) without cancellation, and ds/dx."""
+    places, offsets, p, out = carray(places, n), carray(offsets, n), carray(p, 4), carray(out, (2, n))
+    a, Omega, g = p[0], p[1], p[2]
+    for i in range(n):
+        x = places[i]
+        out[0, i] = (-Omega**2 + 2*a*g)*(_a + x)
+        out[1, i] = sqrt(4*a**2*x**2 + 1)
+
+
+@compiled(BEND)
+def bend(n, _a, b, left, right, p, out):
+    """climb[a, x, b] = V**2/((x - a)*(b - x)) between turning points, without cancellation, and ds/dx."""
+    left, right, p, out = carray(left, n), carray(right, n), carray(p, 4), carray(out, (2, n))
+    a, Omega, g = p[0], p[1], p[2]
+    for i in range(n):
+        da = left[i]
+        db = right[i]
+        x = nearest(_a, b, da, db)
+        out[0, i] = -Omega**2 + 2*a*g
+        out[1, i] = sqrt(4*a**2*x**2 + 1)
+
+
+@compiled(BOUNDS)
+def bounds(lo, hi, p, out):
+    """Bounds of the climb's slope and of ds/dx for lo <= x <= hi."""
+    p, out = carray(p, 3), carray(out, 4)
+    x = (lo, hi)
+    a = (p[0], p[0])
+    Omega = (p[1], p[1])
+    g = (p[2], p[2])
+    out[0], out[1] = imul(imul(iconst(2.0), x), iadd(imul(iconst(-1.0), ipow(Omega, 2)), imul(imul(iconst(2.0), a), g)))
+    out[2], out[3] = isqrt(iadd(imul(imul(iconst(4.0), ipow(a, 2)), ipow(x, 2)), iconst(1.0)))
+
+
+# The same formulas over a namespace of operations: extended precision evaluates these.
+
+
+def exact_x(op, x, p):
+    """Horizontal coordinate."""
+    return x
+
+
+def exact_z(op, x, p):
+    """Height."""
+    a = p[0]
+    return a*x**2
+
+
+def exact_ds(op, x, p):
+    """ds/dx."""
+    a = p[0]
+    return op.sqrt(4*a**2*x**2 + 1)
+
+
+def exact_kappa(op, x, p):
+    """Signed curvature."""
+    a = p[0]
+    return 2*a/(4*a**2*x**2 + 1)**(op.mpf(3)/2)
+
+
+def exact_reaction(op, x, p):
+    """Contact force per unit mass of a body at rest."""
+    a = p[0]
+    Omega = p[1]
+    g = p[2]
+    _t0 = x**2
+    return (2*Omega**2*_t0*a + g)/op.sqrt(4*_t0*a**2 + 1)
+
+
+def exact_climb(op, x, p):
+    """What V**2 loses in climbing, up to a constant."""
+    a = p[0]
+    Omega = p[1]
+    g = p[2]
+    return x**2*(-Omega**2 + 2*a*g)
+
+
+def exact_climb_slope(op, x, p):
+    """Its derivative by x."""
+    a = p[0]
+    Omega = p[1]
+    g = p[2]
+    return 2*x*(-Omega**2 + 2*a*g)
+
+
+def exact_domain(op, p):
+    """Both ends of the domain, and the period; None where there is none."""
+    return None, None, None
+
+
+MODEL = Formulas(
+    name='rotating_parabola',
+    parameter='x',
+    parameters=PARAMETERS,
+    positive=(),
+    addresses=Addresses(frame.address, climb.address, rise.address, bend.address, bounds.address),
+    exact=ExactFormulas(
+        exact_x, exact_z, exact_ds, exact_kappa, exact_reaction, exact_climb, exact_climb_slope, exact_domain
+    ),
+)
+
+
+def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, a: Any = '0.6', Omega: Any = '2.5', g: Any = '9.81', m: Any = '1.4') -> Pass1:
+    """Position, metric, curvature, V**2 and contact force at places of the curve (Pass 1, no quadrature).
+
+    Parameters
+    ----------
+    lam : array_like
+        Places on the curve, as values of its parameter x.
+    lam0, v0, direction
+        Launch place, speed and direction (+1 or -1: the sign of ds/dt).
+    a, Omega, g, m
+        Run-time parameters; `PARAMETERS` holds their defaults.
+
+    Returns
+    -------
+    Pass1
+        Arrays x, z, ds, kappa, v2 and normal_force.
+    """
+    return MODEL.pass1(lam, lam0, v0, direction, (a, Omega, g, m,))
+
+
+def solve(
+    lam0: Any = None,
+    v0: Any = 0.0,
+    direction: int = 1,
+    *,
+    point: Any = None,
+    t_max: Any = None,
+    contact: str = "bilateral",
+    a: Any = '0.6', Omega: Any = '2.5', g: Any = '9.81', m: Any = '1.4',
+) -> Motion:
+    """The motion that a launch begins (Passes 1 to 3).
+
+    Parameters
+    ----------
+    lam0, v0, direction
+        Launch place, speed (never negative) and direction (+1 or -1: the sign of ds/dt).
+    point : pair of numbers, optional
+        The launch place by its coordinates, instead of ``lam0``.
+    t_max : number, optional
+        Horizon of time.
+    contact : {"bilateral", "above", "below"}
+        Which side of the track can push.
+    a, Omega, g, m
+        Run-time parameters; `PARAMETERS` holds their defaults.
+
+    Returns
+    -------
+    Motion
+
+    Raises
+    ------
+    GQMError
+        For a launch or a parameter that cannot be; the message says what would be right.
+    """
+    return MODEL.solve(lam0, v0, direction, point, t_max, contact, (a, Omega, g, m,))
