@@ -10,12 +10,14 @@ load       a file                      a module
 =========  ==========================  ==============
 """
 
+import contextlib
 import difflib
 import importlib.util
 import os
 import tempfile
+from importlib.machinery import SourceFileLoader
 from pathlib import Path
-from types import ModuleType
+from types import CodeType, ModuleType
 
 from gqm_sym.derivation import Model
 from gqm_sym.emission import body_digests, emit
@@ -62,6 +64,8 @@ def write_module(text: str, path: str | os.PathLike[str], *, force: bool = False
                 "move it away, or give --force to overwrite it"
             )
     write_text(text, target)
+    with contextlib.suppress(OSError, NotImplementedError):
+        Path(importlib.util.cache_from_source(str(target))).unlink(missing_ok=True)
     return True
 
 
@@ -95,10 +99,19 @@ def difference(text: str, path: str | os.PathLike[str]) -> str:
     return "".join(lines)
 
 
+class _Source(SourceFileLoader):
+    """Reads the source always: Python tells what it cached apart by size and whole seconds alone."""
+
+    def get_code(self, fullname: str) -> CodeType:
+        path = self.get_filename(fullname)
+        code: CodeType = self.source_to_code(self.get_data(path), path)
+        return code
+
+
 def load(path: str | os.PathLike[str], name: str) -> ModuleType:
     """Import a generated module from its file, anew."""
     location = Path(path).resolve()
-    spec = importlib.util.spec_from_file_location(name, location)
+    spec = importlib.util.spec_from_file_location(name, location, loader=_Source(name, str(location)))
     if spec is None or spec.loader is None or not location.is_file():
         raise InputError(f"{path}: is no generated module; run gqm-gen to write it")
     module = importlib.util.module_from_spec(spec)

@@ -365,7 +365,7 @@ def test_the_forms_are_the_same_under_every_hash_seed():
 @pytest.mark.parametrize("z", ["log(-exp(x))", "asin(2 + x**2)", "acosh(sin(x)/2)", "sqrt(-1 - x**2)"])
 def test_a_height_that_is_nowhere_real_is_refused(z: str) -> None:
     """An expression that is complex at every place is refused when it is derived, by name."""
-    with pytest.raises(GQMError, match="z: |ds.dx: "):
+    with pytest.raises(GQMError, match=r"z: |ds.dx: "):
         derive(Curve.graph(z, parameter="x"), Gravity())
 
 

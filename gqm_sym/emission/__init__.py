@@ -1,11 +1,14 @@
 """Emit: a model as the text of a Python module."""
 
+import keyword
+
 import sympy
 from sympy import Expr
 
 from gqm_sym.derivation import Model
 from gqm_sym.emission.lower import lower
 from gqm_sym.emission.render import body_digests, render
+from gqm_sym.errors import InputError
 
 __all__ = ["body_digests", "emit"]
 
@@ -22,9 +25,15 @@ def emit(model: Model, *, name: str) -> str:
 
     Raises
     ------
+    InputError
+        If the name is none.
     EmissionError
         If an expression has no form in emitted code; the message names it.
     """
+    if not (isinstance(name, str) and name.isascii() and name.isidentifier()) or keyword.iskeyword(name):
+        raise InputError(
+            f"name: {name!r} cannot be a module's; write a Python identifier of ASCII letters, digits and _"
+        )
     return render(lower(model, name=name, forms=model.closed_forms()), source=_source(model, name))
 
 

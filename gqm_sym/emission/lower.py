@@ -8,6 +8,7 @@ from sympy import Expr, Function, Rational, Symbol
 from gqm_sym.derivation import Model
 from gqm_sym.derivation.difference import Differences
 from gqm_sym.emission.ir import Assignment, ExactIR, FunctionIR, ModuleIR
+from gqm_sym.emission.printer import check_emittable
 
 
 class Names:
@@ -27,6 +28,7 @@ class Names:
 
 def lower(model: Model, *, name: str, forms: tuple[tuple[str, Expr], ...]) -> ModuleIR:
     """All functions of the module for ``model``."""
+    _check(model)
     lowering = _Lowering(model)
     return ModuleIR(
         name=name,
@@ -40,6 +42,20 @@ def lower(model: Model, *, name: str, forms: tuple[tuple[str, Expr], ...]) -> Mo
         bounds=lowering.bounds(),
         exact=lowering.exact(),
     )
+
+
+def _check(model: Model) -> None:
+    """Refuse a model with a form that has no text."""
+    names = {model.parameter.name, *model.parameters}
+    low, high = model.domain
+    forms = {
+        **{"x": model.x, "z": model.z, "ds": model.ds, "kappa": model.kappa, "reaction": model.reaction},
+        **{"climb": model.climb, "climb_slope": model.climb_slope},
+        **{"domain, low": low, "domain, high": high, "period": model.period},
+    }
+    for label, form in forms.items():
+        if form is not None:
+            check_emittable(form, names, where=label)
 
 
 class _Lowering:
@@ -61,7 +77,7 @@ class _Lowering:
             "FRAME",
             (places, speeds),
             "x, z, ds/d{0}, signed curvature and contact force, given V**2 (paper, eq. 15).",
-            views=((places, "n"), (speeds, "n")),
+            views=((places, self.names("n")), (speeds, self.names("n"))),
             inside=[(self.place, _at(places)), (v2, _at(speeds))],
             outputs=(model.x, model.z, model.ds, model.kappa, force),
         )
@@ -74,7 +90,7 @@ class _Lowering:
             "CLIMB",
             (places,),
             "What V**2 loses in climbing to {0}, up to a constant, and its derivative (paper, eq. 13).",
-            views=((places, "n"),),
+            views=((places, self.names("n")),),
             inside=[(self.place, _at(places))],
             outputs=(self.model.climb, self.model.climb_slope),
         )
@@ -89,7 +105,7 @@ class _Lowering:
             "RISE",
             (a.name, places, offsets),
             "climb[a, {0}] = (climb({0}) - climb(a))/({0} - a) without cancellation, and ds/d{0}.",
-            views=((places, "n"), (offsets, "n")),
+            views=((places, self.names("n")), (offsets, self.names("n"))),
             inside=[(self.place, _at(places)), (d, _at(offsets))],
             outputs=(differences.first(self.model.climb, 0, 1), self.model.ds),
         )
@@ -104,7 +120,7 @@ class _Lowering:
             "BEND",
             (a.name, b.name, left, right),
             "climb[a, {0}, b] = V**2/(({0} - a)*(b - {0})) between turning points, without cancellation, and ds/d{0}.",
-            views=((left, "n"), (right, "n")),
+            views=((left, self.names("n")), (right, self.names("n"))),
             inside=[
                 (da, _at(left)),
                 (db, _at(right)),

@@ -1,13 +1,18 @@
 """SymPy expressions as Python text: over floats, over a namespace of operations, and over intervals."""
 
+from collections.abc import Collection
 from typing import Any
 
-from sympy import Expr, Integer, Rational
+from sympy import Basic, Expr, Integer, Rational, Symbol, pi, preorder_traversal
 from sympy.core.function import AppliedUndef
+from sympy.core.numbers import Exp1
 from sympy.printing.precedence import PRECEDENCE
 from sympy.printing.str import StrPrinter
 
 from gqm_sym.errors import EmissionError
+
+# Up to this every integer is a double.
+MOST_INTEGER = 2**53
 
 # SymPy heads and what the standard library calls them.
 FUNCTIONS = {
@@ -27,6 +32,50 @@ FUNCTIONS = {
     "log": "log",
     "Abs": "fabs",
 }
+
+
+def check_emittable(expr: Expr, names: Collection[str], *, where: str) -> None:
+    """Refuse what the printers below have no text for, by name.
+
+    Parameters
+    ----------
+    expr
+        A closed form, before it is lowered.
+    names
+        The curve's parameter and the run-time parameters.
+    where
+        What the form is, for messages.
+    """
+    for node in preorder_traversal(expr):
+        if isinstance(node, Symbol):
+            if node.name not in names:
+                raise EmissionError(f"{where}: {node.name} is neither the curve's parameter nor a run-time parameter")
+        elif isinstance(node, AppliedUndef) or not _has_text(node):
+            what = f"{node.func.__name__}: no such function" if node.args else f"{node}: no such number"
+            raise EmissionError(f"{where}: {what} in emitted code; known are {', '.join(sorted(FUNCTIONS))}, pi and E")
+
+
+def _has_text(node: Basic) -> bool:
+    if isinstance(node, Rational):
+        return True
+    return node.is_Add or node.is_Mul or node.is_Pow or node in (pi, Exp1()) or type(node).__name__ in FUNCTIONS
+
+
+def as_double(number: Rational) -> float:
+    """The double nearest to a rational number; refused where there is none."""
+    try:
+        value: float = number.p / number.q
+    except OverflowError:
+        value = 0.0
+    if value == 0.0 and number.p:
+        digits = f"{float(len(str(abs(number.p))) - len(str(number.q))):.0f}"
+        raise EmissionError(f"a number near 10**{digits} is beyond the range of doubles; choose other units")
+    return value
+
+
+def is_double(number: Rational) -> bool:
+    """Whether numerator and denominator are doubles, and integers that compiled code can hold."""
+    return all(abs(part) <= MOST_INTEGER for part in (number.p, number.q))
 
 
 class CodePrinter(StrPrinter):  # type: ignore[misc]
@@ -50,8 +99,6 @@ class CodePrinter(StrPrinter):  # type: ignore[misc]
             return f"{expr.args[0]}[{self.index}]"
         if isinstance(expr, AppliedUndef):  # a helper of the runtime
             return self._call(name, *expr.args)
-        if name not in self.names:
-            raise EmissionError(f"{name}: no such function in emitted code; known are {', '.join(sorted(self.names))}")
         return self._call(self.names[name], *expr.args)
 
     _print_Abs = _print_exp = _print_log = _print_Function
@@ -72,23 +119,22 @@ class CodePrinter(StrPrinter):  # type: ignore[misc]
             return f"1/{self._call('sqrt', base)}"
         if exponent == -1:
             return f"1/{self.parenthesize(base, PRECEDENCE['Pow'])}"
+        if isinstance(exponent, Integer) and exponent < 0:
+            # numba raises for 0.0**(-2), whatever its error model, and leaves the rest of an array undone.
+            return f"1/{self.parenthesize(base, PRECEDENCE['Pow'])}**{-exponent.p}"
         return f"{self.parenthesize(base, PRECEDENCE['Pow'])}**{self.parenthesize(exponent, PRECEDENCE['Pow'])}"
 
+    def _print_Mul(self, expr: Expr) -> str:
+        number, rest = expr.as_coeff_Mul()
+        if number.is_Rational and not is_double(number):
+            return f"{self._print(number)}*{self.parenthesize(rest, PRECEDENCE['Mul'], strict=True)}"
+        return str(super()._print_Mul(expr))
+
     def _print_Rational(self, expr: Rational) -> str:
-        return f"{expr.p}/{expr.q}"
+        return f"{expr.p}/{expr.q}" if is_double(expr) else repr(as_double(expr))
 
     def _print_Integer(self, expr: Integer) -> str:
-        return str(expr.p)
-
-    def _unknown(self, expr: Any) -> str:
-        raise EmissionError(f"{type(expr).__name__}: {expr} is not a finite real number and cannot be emitted")
-
-    _print_ImaginaryUnit = _print_NaN = _print_Infinity = _print_NegativeInfinity = _print_ComplexInfinity = _unknown
-    _print_Integral = _print_Derivative = _print_Piecewise = _print_Relational = _unknown
-
-    def emptyPrinter(self, expr: Any) -> str:
-        """Refuse what no method above prints."""
-        return self._unknown(expr)
+        return str(expr.p) if is_double(expr) else repr(as_double(expr))
 
 
 class ExactPrinter(CodePrinter):
@@ -96,8 +142,14 @@ class ExactPrinter(CodePrinter):
 
     prefix = "op."
 
+    def _print_Mul(self, expr: Expr) -> str:
+        return str(StrPrinter._print_Mul(self, expr))
+
     def _print_Rational(self, expr: Rational) -> str:
         return f"op.mpf({expr.p})/{expr.q}"
+
+    def _print_Integer(self, expr: Integer) -> str:
+        return str(expr.p)
 
     def _print_Abs(self, expr: Expr) -> str:
         return f"abs({self._print(expr.args[0])})"
@@ -107,10 +159,8 @@ class IntervalPrinter(CodePrinter):
     """Code over intervals (lo, hi), as calls of the runtime's interval helpers."""
 
     def _print_Function(self, expr: Expr) -> str:
-        name = type(expr).__name__
-        if name not in self.names:
-            raise EmissionError(f"{name}: no interval bounds for this function")
-        return self._call("i" + self.names[name].replace("fabs", "abs"), *expr.args)
+        name = self.names[type(expr).__name__]
+        return self._call("i" + name.replace("fabs", "abs"), *expr.args)
 
     _print_Abs = _print_exp = _print_log = _print_Function
 
@@ -146,16 +196,19 @@ class IntervalPrinter(CodePrinter):
         self.used.add("irpow")
         return f"irpow({self._print(base)}, {float(exponent)!r})"
 
-    def _number(self, value: float) -> str:
-        self.used.add("iconst")
-        return f"iconst({value!r})"
+    def _number(self, value: Rational) -> str:
+        name = "iconst" if is_double(value) else "ipoint"
+        self.used.add(name)
+        return f"{name}({as_double(value)!r})"
 
     def _print_Integer(self, expr: Integer) -> str:
-        return self._number(float(expr.p))
+        return self._number(expr)
 
     def _print_Rational(self, expr: Rational) -> str:
-        self.used |= {"idiv", "iconst"}
-        return f"idiv(iconst({float(expr.p)!r}), iconst({float(expr.q)!r}))"
+        if not is_double(expr):
+            return self._number(expr)
+        self.used.add("idiv")
+        return f"idiv({self._number(Integer(expr.p))}, {self._number(Integer(expr.q))})"
 
     def _print_Pi(self, expr: Expr) -> str:
         self.used |= {"ipi"}

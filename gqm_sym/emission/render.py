@@ -49,12 +49,10 @@ _OWN = frozenset(
     }
 )
 _OWN |= {"frame", "climb", "rise", "bend", "bounds", "pass1", "solve", "sweep"}
-_WIDTH = 100
 
 
 def render(module: ModuleIR, *, source: str) -> str:
     """The text of a module. ``source`` is the canonical text of what it was made from, for its digest."""
-    _refuse_own_names(module)
     functions, used = [], set[str]()
     for function in module.functions:
         text, names = _loop(function)
@@ -62,6 +60,7 @@ def render(module: ModuleIR, *, source: str) -> str:
         used |= names
     bounds, intervals = _bounds(module.bounds, module.parameter)
     functions.append(bounds)
+    _refuse_own_names(module, used | intervals)
     environment = _environment()
     fields: dict[str, Any] = {
         "interface": INTERFACE,
@@ -107,7 +106,7 @@ def _tidied(text: str) -> str:
 
 
 def _digest(text: str) -> str:
-    return hashlib.sha256(text.encode()).hexdigest()[:12]
+    return hashlib.sha256(text.encode(errors="backslashreplace")).hexdigest()[:12]
 
 
 def _quoted(text: str) -> str:
@@ -116,9 +115,9 @@ def _quoted(text: str) -> str:
     return plain.replace("\\", "\\\\").replace('"', "'")
 
 
-def _refuse_own_names(module: ModuleIR) -> None:
+def _refuse_own_names(module: ModuleIR, helpers: set[str]) -> None:
     for name in (module.parameter, *(n for n, _ in module.defaults)):
-        if name in _OWN or name.startswith("exact_"):
+        if name in _OWN or name in helpers or name.startswith("exact_"):
             raise EmissionError(f"{name}: means something in emitted modules; choose another name for this symbol")
 
 

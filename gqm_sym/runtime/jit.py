@@ -39,12 +39,13 @@ class ReadyCache(FunctionCache):  # type: ignore[misc]
     """numba's disk cache, looked into before numba prepares to compile, and aware of changes in the runtime.
 
     The preparation imports and registers all that compiling may need (SciPy's linear algebra as well) and takes a tenth
-    of a second; code that is in the cache needs none of it. numba itself notices changes in a function's own file only;
-    compiled code here holds functions of several.
+    of a second; code that is in the cache needs none of it. numba itself notices changes in a function's own file only,
+    by time and size; compiled code here holds functions of several files, and the name of a generated module's
+    functions tells its text (`compiler`).
     """
 
     def _index_key(self, sig: Any, codegen: Any) -> Any:
-        return (*super()._index_key(sig, codegen), STAMP)
+        return (*super()._index_key(sig, codegen), self._py_func.__module__, STAMP)
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """The compiled function from the cache, or numba's own way."""
