@@ -11,6 +11,10 @@ from gqm_sym.runtime.stretch import Array, Stretch
 
 # Places a panel at which the contact force is looked at: its sign changes are then narrowed down.
 LOOKS = 24
+# A contact force below this share of the largest on its stretch is zero but for rounding: what follows decides its sign.
+TOUCH = 1e-15
+# A change of sign this close to the launch, as a share of the stretch, is that of the launch itself.
+AT_LAUNCH = 1e-14
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,7 +53,7 @@ def contact_changes(stretch: Stretch) -> Array:
     edges = stretch.edges
     phi = np.append((edges[:-1, None] + np.diff(edges)[:, None] * steps).ravel(), edges[-1])
     force = contact_force(stretch, phi)
-    sign = np.sign(force)
+    sign = np.where(np.abs(force) > TOUCH * np.nanmax(np.abs(force)), np.sign(force), 0.0)
     known = np.flatnonzero(np.isfinite(force) & (sign != 0))
     turns = known[:-1][sign[known[:-1]] != sign[known[1:]]]
     after = {int(k): int(n) for k, n in pairwise(known)}
@@ -97,10 +101,12 @@ def liftoff(piece: Piece, side: int, *, first: bool) -> tuple[Pair, float] | Non
     met = crossings(piece, changes, 0.0)
     if first:
         start, stop = piece.phi_start, piece.phi_stop
+        met = [(when, phi) for when, phi in met if abs(phi - start) > AT_LAUNCH * piece.stretch.stop]
         ahead = met[0][1] if met else stop
         # N may vanish at the launch itself: what follows decides.
         force = contact_force(piece.stretch, np.array([start, 0.5 * (start + ahead)])) * side
-        if force[0] < 0.0 or (force[0] == 0.0 and force[1] < 0.0):
+        decisive = force[0] if abs(force[0]) > TOUCH * np.abs(force).max() else force[1]
+        if decisive < 0.0:
             return piece.r_start, piece.phi_start
     if not met:
         return None

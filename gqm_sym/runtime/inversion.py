@@ -17,6 +17,10 @@ TERMS = 15
 RESOLVED = 2e-16  # last two Chebyshev coefficients against the whole range of the anomaly
 MOST_CUTS = 2**52  # at a cusp the anomaly goes like the root of the time that is left: ever shorter segments
 LEVEL = 1e-13  # coefficients that have stopped falling below this share are rounding noise
+# From so many cuts of a panel on, an anomaly that is off by no more than this share of the whole time is good enough:
+# at a cusp the rounding of the time moves it further than a table can tell.
+DEEP = 2**12
+TIMED = 4e-16
 
 
 @Inner
@@ -82,11 +86,12 @@ def tabulate(edges, times, time_terms):  # type: ignore[no-untyped-def]
         while done < cuts:
             start, stop = times[k] + duration * done / cuts, times[k] + duration * (done + 1) / cuts
             middle, reach = 0.5 * (start + stop), 0.5 * (stop - start)
-            guess = 2.0 * (done + 0.5) / cuts - 1.0
+            guess, steepest = 2.0 * (done + 0.5) / cuts - 1.0, 0.0
             for i in range(TERMS):
                 target = (middle - times[k]) + reach * x_nodes[i]
                 guess = _anomaly(time_terms[k], slope_terms, left, half, duration, target, guess)
                 values[i] = guess
+                steepest = max(steepest, legendre_sum(slope_terms, guess))
             for j in range(TERMS):
                 total = 0.0
                 for i in range(TERMS):
@@ -96,6 +101,7 @@ def tabulate(edges, times, time_terms):  # type: ignore[no-untyped-def]
             tail = half * max(fabs(c[TERMS - 1]), fabs(c[TERMS - 2]))
             before = half * max(fabs(c[TERMS - 5]), fabs(c[TERMS - 6]))
             settled = tail <= RESOLVED * scale or (before <= LEVEL * scale and tail > 0.2 * before)
+            settled = settled or (cuts >= DEEP and tail / half * steepest <= TIMED * times[-1])
             if not settled and cuts < MOST_CUTS:
                 done, cuts = 2 * done, 2 * cuts
                 continue

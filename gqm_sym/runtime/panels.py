@@ -97,7 +97,10 @@ def speeds(fns, p, kind, a, b, ref, w, phi, work, out):  # type: ignore[no-untyp
                 db[i] = -da[i]
         call_bend(fns[3], n, a if kind == TURN_TURN else b, b, da, db, p, rows)
         for i in range(n):
-            out[i] = sqrt(da[i] * db[i] * rows[0, i])
+            if kind == TURN_TURN:
+                out[i] = sqrt(da[i] * db[i] * rows[0, i])
+            else:  # V**2 may lie below the least double
+                out[i] = fabs(da[i]) * sqrt(-rows[0, i])
     else:
         start = a if kind == FROM_TURN else ref
         for i in range(n):

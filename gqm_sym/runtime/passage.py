@@ -124,7 +124,7 @@ class Passage(Motion):
             if self.open_end is not None:
                 self._go_on()
             elif self._target is not None:
-                last = self._pieces.pop()
+                last = self._pieces[-1]
                 begun = last.t_start[0]
                 longer = toward_equilibrium(self.problem.functions, *self._target, reach - begun)
                 if not longer.duration > last.stretch.duration:
@@ -132,12 +132,30 @@ class Passage(Motion):
                         f"t = {reach!r}: by then the body is closer to the equilibrium at "
                         f"{self.problem.formulas.parameter} = {self._target[1]!r} than doubles can tell"
                     )
+                self._pieces.pop()
                 self.add(longer, 1, "asymptote")
             else:
                 break
         if reach > self.t_end:
             raise InputError(f"t: the motion ends at {self.t_end!r} s ({self._how_it_ends()}), got {reach!r}")
         return Course(pieces=tuple(self._pieces))
+
+    def _first_passages(self, lam: float, low: float) -> list[float]:
+        while self._is_ahead(lam, low) and self._pieces[-1].t_stop[0] < self.t_end:
+            if self.open_end is not None:
+                self._go_on()
+            else:
+                self._course(min(2.0 * self._pieces[-1].t_stop[0], self.t_end))
+        return super()._first_passages(lam, low)
+
+    def _is_ahead(self, lam: float, low: float) -> bool:
+        """Whether a place lies beyond what has been computed of a motion without an end, and before its limit."""
+        end, last = self.open_end, self._pieces[-1].stretch
+        if end is not None:
+            return (lam - end.place) * end.direction > 0.0 and (end.limit - lam) * end.direction > 0.0
+        if self._target is None or (last.b - lam) * last.direction <= 0.0:
+            return False
+        return bool(last.anomaly_of((lam - last.a) + low, (last.b - lam) - low) > last.edges[-1])
 
     def _go_on(self) -> None:
         """One more stretch of a motion without an end."""

@@ -6,13 +6,17 @@ import numpy as np
 
 from gqm_sym.errors import LaunchError, SolutionError
 from gqm_sym.runtime import search
-from gqm_sym.runtime.entries import frame_at, survey, walk_on
+from gqm_sym.runtime.entries import frame_at, speed_squared_at, survey, walk_on
+from gqm_sym.runtime.exact_panels import DIGITS, lay_exactly
 from gqm_sym.runtime.formulas import Formulas, Launch
-from gqm_sym.runtime.motion import Motion, Periodic, Rest
+from gqm_sym.runtime.motion import Motion
 from gqm_sym.runtime.numbers import Number
+from gqm_sym.runtime.panels import REGULAR
 from gqm_sym.runtime.passage import OpenEnd, Passage
+from gqm_sym.runtime.periodic import Periodic
 from gqm_sym.runtime.problem import Problem, Reach
-from gqm_sym.runtime.stretch import between_turns, from_turn, through
+from gqm_sym.runtime.rest import Rest
+from gqm_sym.runtime.stretch import LEAST_BALANCE, Stretch, between_turns, from_turn, through
 
 # ds at an end of the domain, against its value at the launch, that makes the end a cusp.
 CUSP_SHARE = 1e-7
@@ -162,7 +166,7 @@ def _outward(problem: Problem, direction: int, front: Reach) -> Motion:
     passage = Passage(problem, kind, direction)
     if problem.w0 > 0.0:
         if front.what == "equilibrium":
-            passage.approach(lam0, front.place)
+            passage.approach(_gathering_speed(passage, front.place), front.place)
         elif front.what == "open":
             passage.open_end = OpenEnd(lam0, direction, front.place)
         else:
@@ -181,6 +185,28 @@ def _outward(problem: Problem, direction: int, front: Reach) -> Motion:
     return passage.finish()
 
 
+def _gathering_speed(passage: Passage, top: float) -> float:
+    """Run from a launch that is slow against what follows to half-way to the equilibrium; where that comes to.
+
+    Seen from the equilibrium, V**2 at a slow launch is the small difference of large numbers.
+    """
+    problem, f, lam0, w0 = passage.problem, passage.problem.functions, passage.problem.lam0, passage.problem.w0
+    middle = 0.5 * (lam0 + top)
+    places = np.array([middle])
+    fastest = speed_squared_at(f.addresses, f.p, lam0, problem.launch.lam0.low, w0, places, places - lam0)[0]
+    if w0 >= fastest:
+        return lam0
+    if w0 >= LEAST_BALANCE * fastest:
+        passage.add(through(f, lam0, middle, lam0, w0), 1, "")
+        return middle
+    # As slow as this the launch is next to an equilibrium, its place to be taken as exactly as it was given.
+    scale = f.exact.at(DIGITS)
+    panels = lay_exactly(f.exact, REGULAR, (scale.lam0, scale.mpf(middle)), 1.0)
+    slow = Stretch(functions=f, kind=REGULAR, a=lam0, b=middle, ref=lam0, w=w0, panels=panels, from_exact=True)
+    passage.add(slow, 1, "")
+    return middle
+
+
 def _returning(problem: Problem, direction: int, front: Reach, back: Reach) -> Motion:
     """A motion that turns once and leaves the other way."""
     f, lam0 = problem.functions, problem.lam0
@@ -188,12 +214,13 @@ def _returning(problem: Problem, direction: int, front: Reach, back: Reach) -> M
     passage = Passage(problem, kind, direction)
     inbound = from_turn(f, front.place, lam0)
     passage.add(inbound, -1, "turn")
-    if back.what in ("equilibrium", "open"):
+    if back.what == "open":
         passage.add(inbound, 1, "")
-        if back.what == "open":
-            passage.open_end = OpenEnd(lam0, -direction, back.place)
-        else:
-            passage.approach(lam0, back.place)
+        passage.open_end = OpenEnd(lam0, -direction, back.place)
+    elif back.what == "equilibrium":
+        middle = 0.5 * (front.place + back.place)
+        passage.add(from_turn(f, front.place, middle), 1, "")
+        passage.approach(middle, back.place)
     else:
         passage.add(from_turn(f, front.place, back.place), 1, back.what)
     return passage.finish()
