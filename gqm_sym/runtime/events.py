@@ -11,7 +11,8 @@ from gqm_sym.runtime.stretch import Array, Stretch
 
 # Places a panel at which the contact force is looked at: its sign changes are then narrowed down.
 LOOKS = 24
-# A contact force below this share of the largest on its stretch is zero but for rounding: what follows decides its sign.
+# A contact force below this share of the largest on its stretch is zero but for rounding: what follows
+# decides its sign.
 TOUCH = 1e-15
 # A change of sign this close to the launch, as a share of the stretch, is that of the launch itself.
 AT_LAUNCH = 1e-14
