@@ -30,7 +30,7 @@ FLAT = 1e-12
 
 
 @Inner
-def first_step(lam0, low, high, period):  # type: ignore[no-untyped-def]
+def first_step(low, high, period):  # type: ignore[no-untyped-def]
     """A step to begin a walk with: an eighth of the curve where that is known."""
     if period > 0.0:
         return period / 8.0
@@ -81,7 +81,7 @@ def survey(fns, p, lam0, v0, direction, low, high, period):  # type: ignore[no-u
         if not fabs(rows[1, 0]) > FLAT * fabs(rows[0, 0]):
             return 0, (CRITICAL, 0.0, 0.0), nothing, empty
         direction = -1 if rows[1, 0] > 0.0 else 1
-    step = first_step(lam0, low, high, period)
+    step = first_step(low, high, period)
     reach = period if period > 0.0 else (high - lam0 if direction > 0 else lam0 - low)
     ahead = walk(fns, p, lam0, w0, direction, 0.0, reach, step)
     if ahead[0] == LIMIT and period > 0.0 and w0 > 0.0:

@@ -11,7 +11,7 @@ from math import cos, fabs, pi
 import numpy as np
 
 from gqm_sym.runtime.jit import Inner
-from gqm_sym.runtime.panels import legendre_sum
+from gqm_sym.runtime.panels import legendre_sum, longer, taller
 
 TERMS = 15
 RESOLVED = 2e-16  # last two Chebyshev coefficients against the whole range of the anomaly
@@ -24,7 +24,7 @@ TIMED = 4e-16
 
 
 @Inner
-def _anomaly(terms, rates_sum, left, half, duration, target, guess):  # type: ignore[no-untyped-def]
+def _anomaly(terms, rates_sum, target, guess):  # type: ignore[no-untyped-def]
     """The place x in [-1, 1] of a panel where its time is ``target``, by Newton's method inside a bracket."""
     lo, hi, x = -1.0, 1.0, guess
     for _ in range(60):
@@ -89,7 +89,7 @@ def tabulate(edges, times, time_terms):  # type: ignore[no-untyped-def]
             guess, steepest = 2.0 * (done + 0.5) / cuts - 1.0, 0.0
             for i in range(TERMS):
                 target = (middle - times[k]) + reach * x_nodes[i]
-                guess = _anomaly(time_terms[k], slope_terms, left, half, duration, target, guess)
+                guess = _anomaly(time_terms[k], slope_terms, target, guess)
                 values[i] = guess
                 steepest = max(steepest, legendre_sum(slope_terms, guess))
             for j in range(TERMS):
@@ -109,13 +109,11 @@ def tabulate(edges, times, time_terms):  # type: ignore[no-untyped-def]
             if count == room:
                 room *= 2
                 middles, scales, ends = (
-                    _grown(middles, room),
-                    _grown(scales, room),
-                    _grown(ends, room),
+                    longer(middles, room),
+                    longer(scales, room),
+                    longer(ends, room),
                 )
-                taller = np.empty((room, TERMS))
-                taller[:count] = powers
-                powers = taller
+                powers = taller(powers, room)
             middles[count], scales[count], ends[count] = middle, 1.0 / reach, stop
             _to_powers(c, powers[count])
             for j in range(TERMS):
@@ -141,13 +139,6 @@ def tabulate(edges, times, time_terms):  # type: ignore[no-untyped-def]
         ends[:count].copy(),
         error,
     )
-
-
-@Inner
-def _grown(array, size):  # type: ignore[no-untyped-def]
-    out = np.empty(size)
-    out[: array.size] = array
-    return out
 
 
 @Inner

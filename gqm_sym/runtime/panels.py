@@ -212,11 +212,11 @@ def lay(fns, p, kind, a, b, ref, w, start, stop):  # type: ignore[no-untyped-def
         if count == room:
             room *= 2
             edges, times, lengths = (
-                _longer(edges, room + 1),
-                _longer(times, room + 1),
-                _longer(lengths, room + 1),
+                longer(edges, room + 1),
+                longer(times, room + 1),
+                longer(lengths, room + 1),
             )
-            time_terms, length_terms = _taller(time_terms, room), _taller(length_terms, room)
+            time_terms, length_terms = taller(time_terms, room), taller(length_terms, room)
         length_size, length_tail, length_middle = antiderivative(values[1], half, c, length_terms[count])
         size, tail, level = antiderivative(values[0], half, c, time_terms[count])
         kronrod, gauss, duration, length = 0.0, 0.0, 0.0, 0.0
@@ -279,14 +279,16 @@ def lay(fns, p, kind, a, b, ref, w, start, stop):  # type: ignore[no-untyped-def
 
 
 @Inner
-def _longer(array, size):  # type: ignore[no-untyped-def]
+def longer(array, size):  # type: ignore[no-untyped-def]
+    """The array with room for more."""
     out = np.empty(size)
     out[: array.size] = array
     return out
 
 
 @Inner
-def _taller(array, rows):  # type: ignore[no-untyped-def]
+def taller(array, rows):  # type: ignore[no-untyped-def]
+    """The table with room for more rows."""
     out = np.empty((rows, array.shape[1]))
     out[: array.shape[0]] = array
     return out

@@ -6,7 +6,7 @@ import numpy as np
 
 from gqm_sym.errors import LaunchError, SolutionError
 from gqm_sym.runtime import search
-from gqm_sym.runtime.entries import frame_at, speed_squared_at, survey, walk_on
+from gqm_sym.runtime.entries import first_step, frame_at, speed_squared_at, survey, walk_on
 from gqm_sym.runtime.exact_panels import DIGITS, lay_exactly
 from gqm_sym.runtime.formulas import Formulas, Launch
 from gqm_sym.runtime.motion import Motion
@@ -95,9 +95,8 @@ def _bilateral(formulas: Formulas, p: tuple[Number, ...], launch: Launch) -> Mot
 
 
 def _first_step(problem: Problem) -> float:
-    if problem.period:
-        return problem.period / 8.0
-    return (problem.high - problem.low) / 8.0 if isfinite(problem.high - problem.low) else 1.0
+    step: float = first_step.py_func(problem.low, problem.high, problem.period)
+    return step
 
 
 def _room(problem: Problem, direction: int) -> float:

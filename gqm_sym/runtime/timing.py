@@ -4,6 +4,8 @@ from dataclasses import dataclass
 from math import ceil, log10
 from typing import Any
 
+import numpy as np
+
 from gqm_sym.errors import InputError, SolutionError
 from gqm_sym.runtime.course import ZERO, Pair
 from gqm_sym.runtime.exact import SMOOTH_PANELS, Arithmetic, two_doubles
@@ -46,8 +48,6 @@ def plain(problem: Problem, kind: str, stretch: Stretch) -> Timing:
         return Timing(duration, ZERO, offsets)
     if offsets[1] == 0.0:
         return Timing(duration, duration, offsets)
-    import numpy as np
-
     phase = float(stretch.times(np.array([stretch.anomaly_of(*offsets)]))[0])
     return Timing(duration, (phase, 0.0), offsets)
 
