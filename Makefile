@@ -5,7 +5,7 @@ VENV    := .venv
 BIN     := $(VENV)/bin
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test lint generate bench
+.PHONY: help demo test lint generate docs soak fuzz bench
 
 help: ## show this list
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-9s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -16,23 +16,45 @@ demo: $(VENV)/.run ## take the paper's Example 1 from a YAML file to digits, bes
 test: $(VENV)/.dev ## run every test, notebooks included
 	$(BIN)/python -m pytest -n $(WORKERS)
 
-lint: $(VENV)/.dev ## check format, style and types, and that generated/ is current
+lint: $(VENV)/.dev ## check format, style and types, and that generated files are current
 	$(BIN)/ruff format --check
 	$(BIN)/ruff check
 	$(BIN)/mypy
 	$(BIN)/gqm-gen --check --quiet -o generated curves/*.yaml
+	$(BIN)/python scripts/make_family_pages.py --check
 
-generate: $(VENV)/.dev ## write generated/ afresh from curves/
+generate: $(VENV)/.dev ## write generated/ afresh from curves/, and the pages of the families
 	$(BIN)/gqm-gen --quiet -o generated curves/*.yaml
+	$(BIN)/python scripts/make_family_pages.py
 
-bench: $(VENV)/.run ## time each stage, from derivation to a warm solve
+docs: $(VENV)/.docs ## build the documentation into docs/_build/html; a warning is an error
+	$(BIN)/python -m sphinx -W --keep-going --quiet -b html docs docs/_build/html
+	@echo "open docs/_build/html/index.html"
+
+soak: $(VENV)/.run ## solve random launches and hold each motion to its laws (COUNT, SEED)
+	$(BIN)/python scripts/soak.py $(or $(COUNT),100000) $(or $(SEED),0)
+
+fuzz: $(VENV)/.run ## read mutated files and expressions for ten minutes (SECONDS, SEED)
+	$(BIN)/python scripts/fuzz.py $(or $(SECONDS),600) $(or $(SEED),0)
+
+bench: $(VENV)/.bench ## time each stage, and set accuracy and time beside the alternatives' (docs/benchmarks.md)
 	$(BIN)/python benchmarks/stages.py
+	$(BIN)/python benchmarks/comparison.py
 
 $(VENV)/.run: pyproject.toml
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable .
 	touch $@
 
+$(VENV)/.bench: $(VENV)/.run
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[bench]'
+	-$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[peers]'
+	touch $@
+
 $(VENV)/.dev: $(VENV)/.run
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[dev]'
+	touch $@
+
+$(VENV)/.docs: $(VENV)/.run
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[docs]'
 	touch $@

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "catenary". Do not edit: change its declaration and generate again.
-# interface 1, input cd1fa4541ae4, body 9d98835292da
+# interface 2, input cd1fa4541ae4, body edb1a564398c
 """Bead on a hanging chain
 
 x              = x
@@ -22,6 +22,11 @@ from typing import Any
 
 from numba import carray
 
+from gqm_sym.runtime import compiler
+
+# Before anything else is asked of the runtime, so that another version of it is told from a broken one.
+compiled = compiler(__file__, interface=2)
+
 from gqm_sym.runtime import (
     BEND,
     BOUNDS,
@@ -33,7 +38,7 @@ from gqm_sym.runtime import (
     Formulas,
     Motion,
     Pass1,
-    compiler,
+    Sweep,
 )
 from gqm_sym.runtime.differences import cosh1, cosh2
 from gqm_sym.runtime.intervals import iconst, icosh, idiv, imul, isinh
@@ -44,8 +49,6 @@ PARAMETERS = {
     'g': '9.81',
     'm': '1',
 }
-
-compiled = compiler(__file__, interface=1)
 
 
 @compiled(FRAME)
@@ -111,7 +114,7 @@ def bend(n, a, b, left, right, p, out):
 @compiled(BOUNDS)
 def bounds(lo, hi, p, out):
     """Bounds of the climb's slope and of ds/dx for lo <= x <= hi."""
-    p, out = carray(p, 2), carray(out, 4)
+    p, out = carray(p, 3), carray(out, 4)
     x = (lo, hi)
     c = (p[0], p[0])
     g = (p[1], p[1])
@@ -179,9 +182,8 @@ MODEL = Formulas(
     parameters=PARAMETERS,
     positive=('c',),
     addresses=Addresses(frame.address, climb.address, rise.address, bend.address, bounds.address),
-    exact=ExactFormulas(
-        exact_x, exact_z, exact_ds, exact_kappa, exact_reaction, exact_climb, exact_climb_slope, exact_domain
-    ),
+    domain_of=exact_domain,
+    exact=ExactFormulas(exact_x, exact_z, exact_ds, exact_kappa, exact_reaction, exact_climb, exact_climb_slope),
 )
 
 
@@ -240,3 +242,34 @@ def solve(
         For a launch or a parameter that cannot be; the message says what would be right.
     """
     return MODEL.solve(lam0, v0, direction, point, t_max, contact, (c, g, m,))
+
+
+def sweep(
+    quantity: str,
+    lam0: Any,
+    v0: Any = 0.0,
+    direction: Any = 1,
+    *,
+    lam: Any = None,
+    c: Any = '0.8', g: Any = '9.81', m: Any = '1',
+) -> Sweep:
+    """One quantity over arrays of launches and parameters, on all cores; all arguments broadcast.
+
+    Parameters
+    ----------
+    quantity : str
+        "half_period", "period", "turning_points" (the lower, the upper: one more axis), "v_min", "v_max",
+        "normal_force_min", "normal_force_max" or "time_at".
+    lam0, v0, direction
+        Launch places, speeds and directions.
+    lam
+        For "time_at": the place, of which the first time there is asked.
+    c, g, m
+        Run-time parameters; `PARAMETERS` holds their defaults.
+
+    Returns
+    -------
+    Sweep
+        ``values``, NaN where there is none, and ``reasons``, 0 where there is one; ``why()`` counts the others.
+    """
+    return MODEL.sweep(quantity, lam0, v0, direction, lam, (c, g, m,))

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "cycloid". Do not edit: change its declaration and generate again.
-# interface 1, input bb93c1ef9815, body 353db67199a5
+# interface 2, input bb93c1ef9815, body 654572111717
 """Bead on an arch of a cycloid
 
 x              = R*(theta - sin(theta))
@@ -22,6 +22,11 @@ from typing import Any
 
 from numba import carray
 
+from gqm_sym.runtime import compiler
+
+# Before anything else is asked of the runtime, so that another version of it is told from a broken one.
+compiled = compiler(__file__, interface=2)
+
 from gqm_sym.runtime import (
     BEND,
     BOUNDS,
@@ -33,7 +38,7 @@ from gqm_sym.runtime import (
     Formulas,
     Motion,
     Pass1,
-    compiler,
+    Sweep,
 )
 from gqm_sym.runtime.differences import cos1, cos2
 from gqm_sym.runtime.intervals import iconst, icos, idiv, imul, isin
@@ -44,8 +49,6 @@ PARAMETERS = {
     'g': '9.81',
     'm': '1',
 }
-
-compiled = compiler(__file__, interface=1)
 
 
 @compiled(FRAME)
@@ -108,7 +111,7 @@ def bend(n, a, b, left, right, p, out):
 @compiled(BOUNDS)
 def bounds(lo, hi, p, out):
     """Bounds of the climb's slope and of ds/dtheta for lo <= theta <= hi."""
-    p, out = carray(p, 2), carray(out, 4)
+    p, out = carray(p, 3), carray(out, 4)
     theta = (lo, hi)
     R = (p[0], p[0])
     g = (p[1], p[1])
@@ -177,9 +180,8 @@ MODEL = Formulas(
     parameters=PARAMETERS,
     positive=('R',),
     addresses=Addresses(frame.address, climb.address, rise.address, bend.address, bounds.address),
-    exact=ExactFormulas(
-        exact_x, exact_z, exact_ds, exact_kappa, exact_reaction, exact_climb, exact_climb_slope, exact_domain
-    ),
+    domain_of=exact_domain,
+    exact=ExactFormulas(exact_x, exact_z, exact_ds, exact_kappa, exact_reaction, exact_climb, exact_climb_slope),
 )
 
 
@@ -238,3 +240,34 @@ def solve(
         For a launch or a parameter that cannot be; the message says what would be right.
     """
     return MODEL.solve(lam0, v0, direction, point, t_max, contact, (R, g, m,))
+
+
+def sweep(
+    quantity: str,
+    lam0: Any,
+    v0: Any = 0.0,
+    direction: Any = 1,
+    *,
+    lam: Any = None,
+    R: Any = '0.5', g: Any = '9.81', m: Any = '1',
+) -> Sweep:
+    """One quantity over arrays of launches and parameters, on all cores; all arguments broadcast.
+
+    Parameters
+    ----------
+    quantity : str
+        "half_period", "period", "turning_points" (the lower, the upper: one more axis), "v_min", "v_max",
+        "normal_force_min", "normal_force_max" or "time_at".
+    lam0, v0, direction
+        Launch places, speeds and directions.
+    lam
+        For "time_at": the place, of which the first time there is asked.
+    R, g, m
+        Run-time parameters; `PARAMETERS` holds their defaults.
+
+    Returns
+    -------
+    Sweep
+        ``values``, NaN where there is none, and ``reasons``, 0 where there is one; ``why()`` counts the others.
+    """
+    return MODEL.sweep(quantity, lam0, v0, direction, lam, (R, g, m,))

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "ellipse". Do not edit: change its declaration and generate again.
-# interface 1, input 3a81da5567d3, body 0e9c191ed3a8
+# interface 2, input 3a81da5567d3, body ab942e195612
 """Bead on an ellipse, by the eccentric angle
 
 x              = a*cos(theta)
@@ -22,6 +22,11 @@ from typing import Any
 
 from numba import carray
 
+from gqm_sym.runtime import compiler
+
+# Before anything else is asked of the runtime, so that another version of it is told from a broken one.
+compiled = compiler(__file__, interface=2)
+
 from gqm_sym.runtime import (
     BEND,
     BOUNDS,
@@ -33,7 +38,7 @@ from gqm_sym.runtime import (
     Formulas,
     Motion,
     Pass1,
-    compiler,
+    Sweep,
 )
 from gqm_sym.runtime.differences import sin1, sin2
 from gqm_sym.runtime.intervals import iadd, iconst, icos, imul, ipow, isin, isqrt
@@ -45,8 +50,6 @@ PARAMETERS = {
     'g': '9.81',
     'm': '1',
 }
-
-compiled = compiler(__file__, interface=1)
 
 
 @compiled(FRAME)
@@ -109,7 +112,7 @@ def bend(n, _a, _b, left, right, p, out):
 @compiled(BOUNDS)
 def bounds(lo, hi, p, out):
     """Bounds of the climb's slope and of ds/dtheta for lo <= theta <= hi."""
-    p, out = carray(p, 3), carray(out, 4)
+    p, out = carray(p, 4), carray(out, 4)
     theta = (lo, hi)
     a = (p[0], p[0])
     b = (p[1], p[1])
@@ -182,9 +185,8 @@ MODEL = Formulas(
     parameters=PARAMETERS,
     positive=('a', 'b'),
     addresses=Addresses(frame.address, climb.address, rise.address, bend.address, bounds.address),
-    exact=ExactFormulas(
-        exact_x, exact_z, exact_ds, exact_kappa, exact_reaction, exact_climb, exact_climb_slope, exact_domain
-    ),
+    domain_of=exact_domain,
+    exact=ExactFormulas(exact_x, exact_z, exact_ds, exact_kappa, exact_reaction, exact_climb, exact_climb_slope),
 )
 
 
@@ -243,3 +245,34 @@ def solve(
         For a launch or a parameter that cannot be; the message says what would be right.
     """
     return MODEL.solve(lam0, v0, direction, point, t_max, contact, (a, b, g, m,))
+
+
+def sweep(
+    quantity: str,
+    lam0: Any,
+    v0: Any = 0.0,
+    direction: Any = 1,
+    *,
+    lam: Any = None,
+    a: Any = '2', b: Any = '1', g: Any = '9.81', m: Any = '1',
+) -> Sweep:
+    """One quantity over arrays of launches and parameters, on all cores; all arguments broadcast.
+
+    Parameters
+    ----------
+    quantity : str
+        "half_period", "period", "turning_points" (the lower, the upper: one more axis), "v_min", "v_max",
+        "normal_force_min", "normal_force_max" or "time_at".
+    lam0, v0, direction
+        Launch places, speeds and directions.
+    lam
+        For "time_at": the place, of which the first time there is asked.
+    a, b, g, m
+        Run-time parameters; `PARAMETERS` holds their defaults.
+
+    Returns
+    -------
+    Sweep
+        ``values``, NaN where there is none, and ``reasons``, 0 where there is one; ``why()`` counts the others.
+    """
+    return MODEL.sweep(quantity, lam0, v0, direction, lam, (a, b, g, m,))

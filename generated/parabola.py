@@ -1,5 +1,5 @@
 # Made by gqm-gen for "parabola". Do not edit: change its declaration and generate again.
-# interface 1, input 638613fc8598, body 0f9e4ec04fdb
+# interface 2, input 638613fc8598, body ababbd9390d0
 """Bead in a parabolic bowl
 
 x              = x
@@ -22,6 +22,11 @@ from typing import Any
 
 from numba import carray
 
+from gqm_sym.runtime import compiler
+
+# Before anything else is asked of the runtime, so that another version of it is told from a broken one.
+compiled = compiler(__file__, interface=2)
+
 from gqm_sym.runtime import (
     BEND,
     BOUNDS,
@@ -33,7 +38,7 @@ from gqm_sym.runtime import (
     Formulas,
     Motion,
     Pass1,
-    compiler,
+    Sweep,
 )
 from gqm_sym.runtime.intervals import iadd, iconst, imul, ipow, isqrt
 from gqm_sym.runtime.places import nearest
@@ -43,8 +48,6 @@ PARAMETERS = {
     'g': '9.81',
     'm': '2',
 }
-
-compiled = compiler(__file__, interface=1)
 
 
 @compiled(FRAME)
@@ -105,7 +108,7 @@ def bend(n, _a, b, left, right, p, out):
 @compiled(BOUNDS)
 def bounds(lo, hi, p, out):
     """Bounds of the climb's slope and of ds/dx for lo <= x <= hi."""
-    p, out = carray(p, 2), carray(out, 4)
+    p, out = carray(p, 3), carray(out, 4)
     x = (lo, hi)
     a = (p[0], p[0])
     g = (p[1], p[1])
@@ -171,9 +174,8 @@ MODEL = Formulas(
     parameters=PARAMETERS,
     positive=(),
     addresses=Addresses(frame.address, climb.address, rise.address, bend.address, bounds.address),
-    exact=ExactFormulas(
-        exact_x, exact_z, exact_ds, exact_kappa, exact_reaction, exact_climb, exact_climb_slope, exact_domain
-    ),
+    domain_of=exact_domain,
+    exact=ExactFormulas(exact_x, exact_z, exact_ds, exact_kappa, exact_reaction, exact_climb, exact_climb_slope),
 )
 
 
@@ -232,3 +234,34 @@ def solve(
         For a launch or a parameter that cannot be; the message says what would be right.
     """
     return MODEL.solve(lam0, v0, direction, point, t_max, contact, (a, g, m,))
+
+
+def sweep(
+    quantity: str,
+    lam0: Any,
+    v0: Any = 0.0,
+    direction: Any = 1,
+    *,
+    lam: Any = None,
+    a: Any = '0.7', g: Any = '9.81', m: Any = '2',
+) -> Sweep:
+    """One quantity over arrays of launches and parameters, on all cores; all arguments broadcast.
+
+    Parameters
+    ----------
+    quantity : str
+        "half_period", "period", "turning_points" (the lower, the upper: one more axis), "v_min", "v_max",
+        "normal_force_min", "normal_force_max" or "time_at".
+    lam0, v0, direction
+        Launch places, speeds and directions.
+    lam
+        For "time_at": the place, of which the first time there is asked.
+    a, g, m
+        Run-time parameters; `PARAMETERS` holds their defaults.
+
+    Returns
+    -------
+    Sweep
+        ``values``, NaN where there is none, and ``reasons``, 0 where there is one; ``why()`` counts the others.
+    """
+    return MODEL.sweep(quantity, lam0, v0, direction, lam, (a, g, m,))

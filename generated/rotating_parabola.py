@@ -1,5 +1,5 @@
 # Made by gqm-gen for "rotating_parabola". Do not edit: change its declaration and generate again.
-# interface 1, input 9d848a7566cb, body dc2fbf78d3c3
+# interface 2, input 9d848a7566cb, body 652eff352cab
 """Bead in a turning parabolic bowl
 
 x              = x
@@ -11,6 +11,7 @@ kappa          = 2*a/(4*a**2*x**2 + 1)**(3/2)
 Theta          = -atan(2*a*lam0) + atan(2*a*x)
 V**2           = v0**2 + (-Omega**2 + 2*a*g)*(lam0**2 - x**2)
 N              = m*(2*a*(v0**2 + (-Omega**2 + 2*a*g)*(lam0**2 - x**2))/(4*a**2*x**2 + 1)**(3/2) + (2*Omega**2*a*x**2 + g)/sqrt(4*a**2*x**2 + 1))
+N_b            = 2*Omega*direction*m*sqrt(v0**2 + (-Omega**2 + 2*a*g)*(lam0**2 - x**2))/sqrt(4*a**2*x**2 + 1)
 A              = -x*(-Omega**2 + 2*a*g)/sqrt(4*a**2*x**2 + 1)
 dt/dx          = sqrt(4*a**2*x**2 + 1)/sqrt(v0**2 + (-Omega**2 + 2*a*g)*(lam0**2 - x**2))
 turning points : v0**2 + (-Omega**2 + 2*a*g)*(lam0**2 - x**2) = 0
@@ -21,6 +22,11 @@ from math import sqrt
 from typing import Any
 
 from numba import carray
+
+from gqm_sym.runtime import compiler
+
+# Before anything else is asked of the runtime, so that another version of it is told from a broken one.
+compiled = compiler(__file__, interface=2)
 
 from gqm_sym.runtime import (
     BEND,
@@ -33,7 +39,7 @@ from gqm_sym.runtime import (
     Formulas,
     Motion,
     Pass1,
-    compiler,
+    Sweep,
 )
 from gqm_sym.runtime.intervals import iadd, iconst, imul, ipow, isqrt
 from gqm_sym.runtime.places import nearest
@@ -44,8 +50,6 @@ PARAMETERS = {
     'g': '9.81',
     'm': '1.4',
 }
-
-compiled = compiler(__file__, interface=1)
 
 
 @compiled(FRAME)
@@ -107,7 +111,7 @@ def bend(n, _a, b, left, right, p, out):
 @compiled(BOUNDS)
 def bounds(lo, hi, p, out):
     """Bounds of the climb's slope and of ds/dx for lo <= x <= hi."""
-    p, out = carray(p, 3), carray(out, 4)
+    p, out = carray(p, 4), carray(out, 4)
     x = (lo, hi)
     a = (p[0], p[0])
     Omega = (p[1], p[1])
@@ -178,9 +182,8 @@ MODEL = Formulas(
     parameters=PARAMETERS,
     positive=(),
     addresses=Addresses(frame.address, climb.address, rise.address, bend.address, bounds.address),
-    exact=ExactFormulas(
-        exact_x, exact_z, exact_ds, exact_kappa, exact_reaction, exact_climb, exact_climb_slope, exact_domain
-    ),
+    domain_of=exact_domain,
+    exact=ExactFormulas(exact_x, exact_z, exact_ds, exact_kappa, exact_reaction, exact_climb, exact_climb_slope),
 )
 
 
@@ -239,3 +242,34 @@ def solve(
         For a launch or a parameter that cannot be; the message says what would be right.
     """
     return MODEL.solve(lam0, v0, direction, point, t_max, contact, (a, Omega, g, m,))
+
+
+def sweep(
+    quantity: str,
+    lam0: Any,
+    v0: Any = 0.0,
+    direction: Any = 1,
+    *,
+    lam: Any = None,
+    a: Any = '0.6', Omega: Any = '2.5', g: Any = '9.81', m: Any = '1.4',
+) -> Sweep:
+    """One quantity over arrays of launches and parameters, on all cores; all arguments broadcast.
+
+    Parameters
+    ----------
+    quantity : str
+        "half_period", "period", "turning_points" (the lower, the upper: one more axis), "v_min", "v_max",
+        "normal_force_min", "normal_force_max" or "time_at".
+    lam0, v0, direction
+        Launch places, speeds and directions.
+    lam
+        For "time_at": the place, of which the first time there is asked.
+    a, Omega, g, m
+        Run-time parameters; `PARAMETERS` holds their defaults.
+
+    Returns
+    -------
+    Sweep
+        ``values``, NaN where there is none, and ``reasons``, 0 where there is one; ``why()`` counts the others.
+    """
+    return MODEL.sweep(quantity, lam0, v0, direction, lam, (a, Omega, g, m,))

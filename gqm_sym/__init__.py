@@ -8,46 +8,74 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from gqm_sym.building import build
-    from gqm_sym.declare import Curve, families
+    from gqm_sym.declare import Curve, arc, clothoid, families, line
     from gqm_sym.derivation import Model, derive
     from gqm_sym.emission import emit
     from gqm_sym.errors import GQMError
-    from gqm_sym.kernels import CentralForce, Gravity, Kernel, Potential, Rolling, RotatingFrame
+    from gqm_sym.kernels import (
+        CentralForce,
+        CoulombFriction,
+        Gravity,
+        Kernel,
+        Potential,
+        QuadraticDrag,
+        Rolling,
+        RotatingFrame,
+        SurfaceTension,
+    )
+    from gqm_sym.runtime import figures
+    from gqm_sym.runtime.least import least_speed
     from gqm_sym.specfile import read_spec
 
 __version__ = "0.1.0"
 
 _HOMES = {
     "CentralForce": "gqm_sym.kernels",
+    "CoulombFriction": "gqm_sym.kernels",
     "Curve": "gqm_sym.declare",
     "GQMError": "gqm_sym.errors",
     "Gravity": "gqm_sym.kernels",
     "Kernel": "gqm_sym.kernels",
     "Model": "gqm_sym.derivation",
     "Potential": "gqm_sym.kernels",
+    "QuadraticDrag": "gqm_sym.kernels",
     "Rolling": "gqm_sym.kernels",
     "RotatingFrame": "gqm_sym.kernels",
+    "SurfaceTension": "gqm_sym.kernels",
+    "arc": "gqm_sym.declare",
     "build": "gqm_sym.building",
+    "clothoid": "gqm_sym.declare",
     "derive": "gqm_sym.derivation",
     "emit": "gqm_sym.emission",
     "families": "gqm_sym.declare",
+    "figures": "gqm_sym.runtime.figures",
+    "least_speed": "gqm_sym.runtime.least",
+    "line": "gqm_sym.declare",
     "read_spec": "gqm_sym.specfile",
 }
 
 __all__ = [
     "CentralForce",
+    "CoulombFriction",
     "Curve",
     "GQMError",
     "Gravity",
     "Kernel",
     "Model",
     "Potential",
+    "QuadraticDrag",
     "Rolling",
     "RotatingFrame",
+    "SurfaceTension",
+    "arc",
     "build",
+    "clothoid",
     "derive",
     "emit",
     "families",
+    "figures",
+    "least_speed",
+    "line",
     "read_spec",
 ]
 
@@ -56,7 +84,8 @@ def __getattr__(name: str) -> Any:
     """Fetch a public name from where it lives."""
     if name not in _HOMES:
         raise AttributeError(f"module 'gqm_sym' has no attribute {name!r}")
-    return getattr(import_module(_HOMES[name]), name)
+    home = import_module(_HOMES[name])
+    return home if home.__name__.endswith(f".{name}") else getattr(home, name)
 
 
 def __dir__() -> list[str]:

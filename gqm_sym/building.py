@@ -44,6 +44,8 @@ def build(model: Model, *, name: str, folder: str | os.PathLike[str] = FOLDER, f
     ------
     HandEditedError
         If the file there is not what gqm-gen wrote.
+    InputError
+        If what is there is no file.
     """
     path = Path(folder) / f"{name}.py"
     write_module(emit(model, name=name), path, force=force)
@@ -54,6 +56,8 @@ def write_module(text: str, path: str | os.PathLike[str], *, force: bool = False
     """Write a generated module, whole or not at all. Returns whether the file changed."""
     target = Path(path)
     if target.exists():
+        if not target.is_file() and not target.is_symlink():
+            raise InputError(f"{target}: is a folder or a device; give a file for the module to be written to")
         present = _read(target)
         if present == text:
             return False
@@ -89,7 +93,7 @@ def write_text(text: str, path: str | os.PathLike[str]) -> None:
 def difference(text: str, path: str | os.PathLike[str]) -> str:
     """The unified diff from the file on disk to ``text``; empty if they are the same."""
     target = Path(path)
-    present = _read(target) if target.exists() else ""
+    present = _read(target)
     lines = difflib.unified_diff(
         present.splitlines(keepends=True),
         text.splitlines(keepends=True),
@@ -120,6 +124,9 @@ def load(path: str | os.PathLike[str], name: str) -> ModuleType:
 
 
 def _read(path: Path) -> str:
+    """Text of a file; nothing where there is none, as behind a link to a device, which may have no end."""
+    if not path.is_file():
+        return ""
     try:
         return path.read_text(encoding="utf-8")
     except UnicodeDecodeError:

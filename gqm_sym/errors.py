@@ -66,6 +66,10 @@ class EmissionError(GQMError):
     """An expression that has no form in an emitted module."""
 
 
+class BudgetError(GQMError):
+    """A stage that was not done when its time was used up."""
+
+
 class SolutionError(GQMError):
     """A question about a motion that has no answer, or no finite one."""
 

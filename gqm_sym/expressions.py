@@ -14,6 +14,7 @@ from typing import TypeAlias, TypeVar
 import sympy as sp
 
 from gqm_sym import rationals
+from gqm_sym.budgets import budget
 from gqm_sym.enclosures import check_constants
 from gqm_sym.errors import ExpressionError
 from gqm_sym.grammar import CONSTANTS, FUNCTIONS, NAME, evaluate, parse
@@ -34,6 +35,8 @@ _MAX_BITS = 1400
 # Of anything but a name or a number. SymPy multiplies powers out on many occasions: (x - 1)**999
 # can take it half a minute.
 _MAX_POWER = 32
+# Of processor time for one expression; those that people write take a thousandth of it.
+SECONDS = 0.5
 
 _HEADS: dict[str, Callable[[sp.Expr], sp.Expr]] = {
     **{
@@ -75,6 +78,8 @@ def read_expression(source: Source, *, where: str) -> sp.Expr:
     ------
     ExpressionError
         If it is not in the grammar, or not real and finite.
+    BudgetError
+        If SymPy takes too long over it.
     """
     if isinstance(source, str):
         tree = parse(source, where=where)
@@ -85,8 +90,9 @@ def read_expression(source: Source, *, where: str) -> sp.Expr:
         if exact is None:
             raise ExpressionError(f"{where}: {type(source).__name__} given; give text, a number or a SymPy expression")
         tree = constant(exact)
-    check_constants(tree, where=where)
-    return evaluate(tree, _SymPy(), where=where)
+    with budget(where, SECONDS, "write a shorter expression"):
+        check_constants(tree, where=where)
+        return evaluate(tree, _SymPy(), where=where)
 
 
 def check_name(name: str, *, where: str, reserved: Collection[str] = RESERVED_NAMES) -> str:
@@ -160,6 +166,9 @@ class _SymPy:
 
     def product(self, factors: list[sp.Expr]) -> sp.Expr:
         _check_bits(factors)
+        # Roots of numbers become one root, in whose product SymPy looks for factors.
+        roots = (part for factor in factors for part in sp.Mul.make_args(factor) if part.is_Pow)
+        _check_bits([root.base for root in roots if root.base.is_Rational], most=_MAX_BITS)
         return _proper(sp.Mul(*factors))
 
     def reciprocal(self, value: sp.Expr) -> sp.Expr:
@@ -192,13 +201,13 @@ class _SymPy:
             raise ValueError(f"SymPy cannot take {function} of it") from error
 
 
-def _check_bits(operands: list[sp.Expr], *, times: int = 1) -> None:
+def _check_bits(operands: list[sp.Expr], *, times: int = 1, most: int = _MAX_MELTED_BITS) -> None:
     bits = sum(
         max(number.p.bit_length(), number.q.bit_length())
         for operand in operands
         for number in operand.atoms(sp.Rational)
     )
-    if bits * times > _MAX_MELTED_BITS:
+    if bits * times > most:
         raise ValueError("numbers of too many digits; write them as decimals")
 
 

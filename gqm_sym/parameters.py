@@ -132,6 +132,26 @@ def is_positive(value: Value | None) -> bool:
     return value is None or bool(exact_value(value) > 0)
 
 
+def refuse_out_of_range(
+    values: Mapping[str, Value | None],
+    positive: Iterable[str],
+    at_least: Iterable[tuple[str, str]],
+    *,
+    where: str,
+) -> None:
+    """Refuse defaults that are not positive, or that fall below a number or another parameter's default."""
+    for name in positive:
+        if not is_positive(values.get(name)):
+            raise DeclarationError(f"{where}: {name!r} must be positive, got {values[name]}")
+    for name, least in at_least:
+        value, bound = values.get(name), values.get(least, least)
+        if value is None or bound is None:
+            continue
+        if exact_value(value) < exact_value(bound):
+            what = f"at least {least} = {bound}" if least in values else f"at least {least}"
+            raise DeclarationError(f"{where}: {name!r} must be {what}, got {value}")
+
+
 def names_in_order(*expressions: sp.Expr) -> tuple[str, ...]:
     """Return the names of the free symbols by first appearance; the same in every process."""
     seen: dict[str, None] = {}
@@ -154,4 +174,5 @@ __all__ = [
     "read_argument",
     "read_parameters",
     "read_value",
+    "refuse_out_of_range",
 ]

@@ -10,6 +10,7 @@ from fractions import Fraction
 from typing import Any, Protocol, TypeVar, cast
 
 from gqm_sym import rationals
+from gqm_sym.budgets import spend
 from gqm_sym.errors import ExpressionError
 
 T = TypeVar("T")
@@ -55,6 +56,7 @@ def evaluate(tree: ast.expr, algebra: Algebra[T], *, where: str) -> T:
     """
 
     def at(node: ast.expr, operation: Callable[..., T], *operands: object) -> T:
+        spend()
         try:
             return operation(*operands)
         except (ValueError, ArithmeticError) as error:

@@ -1,9 +1,9 @@
 """Slow, obvious oracles: what a motion must be, from mpmath and SymPy alone, never from gqm_sym."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from functools import cache
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import sympy as sp
 from mpmath import mp, mpf
@@ -105,3 +105,17 @@ def error(actual: float, expected: str | mpf) -> float:
 def ulps(actual: float, expected: str | mpf) -> float:
     """The same in units of the last place of the expected value."""
     return error(actual, expected) / math.ulp(float(expected))
+
+
+def overstatement(motion: Any, positions: Iterable[tuple[str, str]], scale: float) -> float:
+    """How many times, at most, ``error_bound`` says what it should.
+
+    That is the larger of one unit in the last place of the scale and the largest error in the same decade of time.
+    """
+    decades: dict[int | None, list[tuple[float, float]]] = {}
+    for t, lam in positions:
+        decade = math.floor(math.log10(abs(float(t)))) if float(t) else None
+        pair = (error(motion.lam(t), lam), motion.error_bound(t) / max(1.0, abs(float(lam)) / scale))
+        decades.setdefault(decade, []).append(pair)
+    unit = math.ulp(scale)
+    return max(max(b for _, b in rows) / max(unit, *(e for e, _ in rows)) for rows in decades.values())

@@ -405,3 +405,30 @@ def test_a_reader_that_leaves_is_no_error() -> None:
     os.close(writer)
     assert run.returncode == 141
     assert run.stderr == b""
+
+
+# -- pictures --------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("ending", "begins"), [("png", b"\x89PNG"), ("svg", b"<?xml"), ("pdf", b"%PDF")])
+def test_a_figure_in_each_format(here: Commands, ending: str, begins: bytes) -> None:
+    """The same from both commands, twice the same bytes."""
+    assert here.gen("-q", "--plot", f"one.{ending}", "swing.yaml") == (0, "", "")
+    assert Path(f"one.{ending}").read_bytes().startswith(begins)
+    drawn = here.gqm("plot", "swing.yaml", f"two.{ending}", "--what", "loads", "--v0", "1")
+    assert drawn == (0, f"wrote two.{ending}\n", "")
+    assert Path(f"two.{ending}").read_bytes().startswith(begins)
+    if ending != "svg":  # whose identifiers differ
+        here.gqm("plot", "swing.yaml", f"three.{ending}")
+        assert Path(f"three.{ending}").read_bytes() == Path(f"one.{ending}").read_bytes()
+
+
+def test_a_figure_of_no_known_format(here: Commands) -> None:
+    """The message lists the endings there are; nothing is drawn."""
+    code, _, err = here.gqm("plot", "swing.yaml", "swing.gif")
+    assert (code, err) == (
+        2,
+        "gqm: swing.gif: cannot tell the format of the figure; end its name in .png, .svg, .pdf\n",
+    )
+    assert not Path("swing.gif").exists()
+    assert here.gqm("plot", "bowl.yaml", "bowl.png").code == 2

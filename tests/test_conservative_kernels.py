@@ -284,3 +284,50 @@ def test_a_sum_of_forces_is_the_potential_written_out(
     assert motions[0].kind == motions[1].kind == "libration"
     assert ulps(motions[0].half_period, mpf(motions[1].half_period)) <= HALF_PERIOD_ULPS
     assert error(motions[0].lam(777), mpf(motions[1].lam(777))) <= POSITION * 4
+
+
+# Off its own orbit -------------------------------------------------------------------------------
+
+
+@ECCENTRICITIES
+@pytest.mark.parametrize("contact", ["bilateral", "above", "below"])
+def test_a_planet_never_changes_sides(e: str, contact: str, module_named: ModuleNamed) -> None:
+    """N = 0 all round is no change of sign, and no loss of contact."""
+    motion = module_named("kepler").solve(**orbital(e), contact=contact)
+    assert motion.kind == "circulation"
+    assert motion.events == ()
+
+
+@pytest.mark.parametrize("factor", ["4/5", "6/5"])
+def test_off_speed_the_track_carries_what_is_missing(factor: str, module_named: ModuleNamed) -> None:
+    """Launched at f times the orbital speed, N = m κ (f² - 1) v0²: W differs by a constant, and N was zero."""
+    e = "3/5"
+    launch = orbital(e)
+    speed = number(launch["v0"])
+    launch["v0"] = f"({factor})*{launch['v0']}"
+    launch["m"] = "3/2"
+    lams = np.linspace(-1.5, 1.5, 13)
+    field = module_named("kepler").pass1(lams, **launch)
+    with mp.workdps(DIGITS):
+        a, ecc = number(HALF_AXIS), number(e)
+        b = a * mp.sqrt(1 - ecc**2)
+        for actual, lam in zip(field.normal_force, lams, strict=True):
+            kappa = a * b / mp.sqrt((a * mp.sin(lam)) ** 2 + (b * mp.cos(lam)) ** 2) ** 3
+            truth = mpf("1.5") * kappa * (number(factor) ** 2 - 1) * speed**2
+            assert error(actual, truth) <= 1e-14 * float(mpf("1.5") * kappa * speed**2)
+
+
+def test_through_the_centre_nothing_is_nan(generated_folder: Path) -> None:
+    """A line through the centre of attraction: the fall ends there, and a launch from there is refused."""
+    model = gqm.derive(gqm.Curve.graph("x/2"), gqm.CentralForce())
+    module = gqm.build(model, name="through_the_centre", folder=generated_folder)
+    motion = module.solve("1", k="2")
+    assert motion.kind == "transit"
+    assert motion.direction == -1
+    # r'' = -k/r**2 from rest at r0 = sqrt(5)/2: it takes pi/2*sqrt(r0**3/(2*k)).
+    with mp.workdps(DIGITS):
+        fall = mp.pi / 2 * mp.sqrt((mp.sqrt(5) / 2) ** 3 / 4)
+        half = motion.state(float(fall) / 2)
+        assert np.isfinite([half.lam, half.v, half.normal_force]).all()
+    with pytest.raises(gqm.GQMError):
+        module.solve("0", "1", k="2")

@@ -121,7 +121,7 @@ def test_numbers_of_every_head(head: str, folder: Path) -> None:
             ("climb_slope", 2 * p[-2] * slope, p[-2] * size),
         ):
             assert abs(getattr(exact, name)(mp, place, p) - truth) <= EXACT * scale, name
-        assert exact.domain(mp, p) == (None, None, None)
+        assert module.MODEL.domain_of(mp, p) == (None, None, None)
 
 
 def test_exact_domain(folder: Path) -> None:
@@ -129,7 +129,7 @@ def test_exact_domain(folder: Path) -> None:
     curve = gqm.Curve.parametric(x="cos(u)", z="sin(u)", parameter="u", domain=("-k/3", "e"), period="2*pi")
     module = gqm.build(gqm.derive(curve, gqm.Gravity(), parameters={"k": 1}), name="domain", folder=folder)
     with mp.workdps(60):
-        low, high, period = module.MODEL.exact.domain(mp, (mpf(1), mpf(1), mpf(1)))
+        low, high, period = module.MODEL.domain_of(mp, (mpf(1), mpf(1), mpf(1)))
         assert max(abs(low + mpf(1) / 3), abs(high - mp.e), abs(period - 2 * mp.pi)) <= EXACT
 
 

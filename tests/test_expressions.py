@@ -8,7 +8,7 @@ import mpmath
 import numpy as np
 import pytest
 import sympy as sp
-from hypothesis import example, given, settings
+from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
 from gqm_sym.errors import ExpressionError, GQMError, NumberError
@@ -201,7 +201,12 @@ def test_an_expression_comes_back_from_itself_and_from_its_text(expression):
 
     Printed text has Abs and E where the grammar has abs and e; nothing else differs.
     """
-    again = read_expression(expression, where="t")
+    try:
+        again = read_expression(expression, where="t")
+    except ExpressionError as error:
+        # exp(-4**10), which is refused by design, can be drawn too.
+        assume("far outside the range of doubles" not in str(error))
+        raise
     assert_plain(again)
     text = str(expression).replace("Abs(", "abs(").replace("E", "e")
     from_text = read_expression(text, where="t")

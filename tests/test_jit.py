@@ -1,5 +1,9 @@
 """What the disk cache knows of, and what is compiled when."""
 
+import io
+import os
+import shutil
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -18,16 +22,42 @@ def test_an_edit_anywhere_in_the_runtime_compiles_anew(monkeypatch: pytest.Monke
     """The cache's key changes with any file of the runtime, though numba looks at one file only."""
     before = _key()
     assert before == _key()
-    name, time, size = jit.STAMP[0]
-    monkeypatch.setattr(jit, "STAMP", ((name, time + 1, size), *jit.STAMP[1:]))
+    monkeypatch.setattr(jit, "STAMP", "0" * 64)
     assert _key() != before
 
 
-def test_the_stamp_has_every_file_of_the_runtime() -> None:
-    """No file of the runtime is left out of the stamp."""
-    assert {name for name, _, _ in jit.STAMP} >= {"panels.py", "search.py", "first_differences.py", "intervals.py"}
+@pytest.mark.parametrize("name", ["jit.py", "panels.py", "search.py", "first_differences.py", "intervals.py"])
+def test_the_stamp_has_every_file_of_the_runtime(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A changed character in any file changes the stamp, though its time and size stay; a copy elsewhere does not."""
+    folder = Path(jit.__file__).parent
+    for file in folder.glob("*.py"):
+        shutil.copy2(file, tmp_path)
+    monkeypatch.setattr(jit, "__file__", str(tmp_path / "jit.py"))
+    assert jit._stamp() == jit.STAMP
+    changed = tmp_path / name
+    status = changed.stat()
+    changed.write_bytes(changed.read_bytes()[:-1] + b" ")
+    os.utime(changed, ns=(status.st_atime_ns, status.st_mtime_ns))
+    assert changed.stat().st_size == status.st_size
+    assert jit._stamp() != jit.STAMP
 
 
 def test_an_inner_function_works_from_python() -> None:
     """A function meant for compiled callers can be called from Python, and gives what it gives uncompiled."""
     assert two_sum(1.0, 2.0**-60) == two_sum.py_func(1.0, 2.0**-60) == (1.0, 2.0**-60)
+
+
+class _Terminal(io.StringIO):
+    def isatty(self) -> bool:
+        return True
+
+
+@pytest.mark.parametrize(("stream", "said"), [(_Terminal, 1), (io.StringIO, 0)])
+def test_compiling_the_runtime_is_announced_once(stream: Any, said: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """One line at a terminal, nothing in a log."""
+    stderr = stream()
+    monkeypatch.setattr("sys.stderr", stderr)
+    jit.announce.cache_clear()
+    for _ in range(3):
+        jit.announce()
+    assert stderr.getvalue().count("gqm_sym: compiling the runtime, once per installation\n") == said

@@ -5,18 +5,23 @@ import sympy as sp
 
 from gqm_sym.declare import Curve, families
 from gqm_sym.derivation import derive
-from gqm_sym.errors import DeclarationError, InputError
+from gqm_sym.errors import DeclarationError, DerivationError, InputError
 from gqm_sym.kernels import (
     KERNELS,
     CentralForce,
+    CoulombFriction,
     Gravity,
     Kernel,
     Potential,
+    QuadraticDrag,
     Rolling,
     RotatingFrame,
+    SurfaceTension,
 )
+from gqm_sym.kernels.base import KAPPA, MASS, W
 
 x, z, g, k, beta, Omega = (sp.Symbol(name, real=True) for name in ("x", "z", "g", "k", "beta", "Omega"))
+mu, b, gamma, ell_c = (sp.Symbol(name, real=True) for name in ("mu", "b", "gamma", "ell_c"))
 
 
 def test_gravity_has_the_exact_default():
@@ -124,6 +129,115 @@ def test_rolling_divides_what_drives_but_not_what_presses():
 def test_the_table_of_kernels_makes_each_of_them():
     """Every row is a kernel that says its own name."""
     for name, row in KERNELS.items():
-        kernel = row.make("z**2") if name == "potential" else row.make()
+        kernel = row.make("z**2") if name in ("potential", "law") else row.make()
         assert kernel.terms[0][0] == name
         assert row.summary
+
+
+# What is lost on the way --------------------------------------------------------------------------
+
+
+def test_lossy_slots_add() -> None:
+    """Each force fills its own."""
+    law = Gravity() + CoulombFriction(mu_static="mu_s") + QuadraticDrag() + SurfaceTension() + Kernel.law("k*W")
+    assert (law.friction, law.static_friction) == (mu, sp.Symbol("mu_s", real=True))
+    assert (law.drag, law.resistance) == (b / MASS, gamma * ell_c**2 * sp.Abs(KAPPA) / MASS)
+    assert (law.extra, law.potential, law.inertia) == (k * W, g * z, 1)
+    assert law.parameters == ("g", "mu", "mu_s", "b", "gamma", "ell_c", "k")
+    assert not law.conservative
+    assert (Gravity() + Rolling() + RotatingFrame() + CentralForce()).conservative
+
+
+def test_static_friction_is_that_of_sliding_if_nothing_is_said() -> None:
+    """One parameter, not two."""
+    law = CoulombFriction(mu="mu_rail")
+    assert law.parameters == ("mu_rail",)
+    assert law.friction == law.static_friction == sp.Symbol("mu_rail", real=True)
+
+
+def test_the_printed_droplet_is_signed() -> None:
+    """As the paper has it; it drives where the curvature is negative."""
+    assert SurfaceTension(form="printed").resistance == gamma * ell_c * KAPPA / MASS
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: CoulombFriction(mu=-1), r"'mu' must be at least 0, got -1"),
+        (lambda: CoulombFriction(mu="0.3", mu_static="0.2"), r"'mu_static' must be at least mu = 0.3, got 0.2"),
+        (lambda: QuadraticDrag(b="-1/2"), r"'b' must be at least 0"),
+        (lambda: SurfaceTension(gamma=-1), r"'gamma' must be at least 0"),
+        (lambda: SurfaceTension(form="wet"), r"form: must be one of resistance, printed, got 'wet'"),
+        (lambda: Rolling(beta="-0.1"), r"'beta' must be at least 0"),
+        (lambda: Rolling(mu_static=-1), r"'mu_static' must be at least 0"),
+        (lambda: CoulombFriction() + CoulombFriction(mu="mu2"), r"coulomb is given twice"),
+        (lambda: Gravity() + Rolling() + CoulombFriction(), r"rolling and coulomb exclude each other"),
+        (lambda: CoulombFriction() + Gravity() + Rolling(), r"rolling and coulomb exclude each other"),
+        (lambda: Kernel.law("k*direction*lam0"), r"'lam0' cannot be a name"),
+    ],
+)
+def test_what_no_force_can_be_is_refused(make, message) -> None:
+    """At the declaration, with the bound or the remedy."""
+    with pytest.raises(InputError, match=message):
+        make()
+
+
+@pytest.mark.parametrize(
+    ("parameters", "message"),
+    [
+        ({"mu": -1}, r"'mu' must be at least 0"),
+        ({"mu": "0.5", "mu_s": "0.4"}, r"'mu_s' must be at least mu = 0.5, got 0.4"),
+        ({"m": 0}, r"'m' must be positive"),
+        ({"b": "-1"}, r"'b' must be at least 0"),
+    ],
+)
+def test_defaults_out_of_their_range_are_refused(parameters, message) -> None:
+    """Where the model gives them too."""
+    force = Gravity() + CoulombFriction(mu_static="mu_s") + QuadraticDrag()
+    with pytest.raises(DeclarationError, match=message):
+        derive(families.parabola(), force, parameters=parameters)
+
+
+def test_a_law_knows_the_curve_s_parameter_and_coordinates() -> None:
+    """The curve's own parameter comes first; x and z are the place; the rest are run-time parameters."""
+    law = Gravity() + Kernel.law("q*theta + k*z*W - direction*x")
+    assert law.parameters == ("g", "q", "theta", "k")
+    model = derive(families.circle(), law)
+    assert model.parameters == ("L", "q", "k", "g", "m")
+    assert model.dissipation.linear
+    # z is the name of this curve's own parameter.
+    upright = derive(Curve.parametric(x="z**2", z="z", parameter="z"), Gravity() + Kernel.law("-k*z*W"))
+    assert upright.parameters == ("k", "g", "m")
+
+
+@pytest.mark.parametrize(
+    ("declare", "message"),
+    [
+        (lambda: derive(families.circle(), Kernel.law("k*lam*W")), r"law: 'lam' is not known .* parameter is 'theta'"),
+        (lambda: derive(Curve.graph("W*x**2"), Gravity() + QuadraticDrag()), r"'W' means V\*\*2"),
+        (
+            lambda: derive(Curve.graph("contact_sign*x"), Gravity() + CoulombFriction()),
+            r"'contact_sign' means the sign of the contact force",
+        ),
+        (lambda: derive(families.circle(), Potential("theta*z") + Kernel.law("theta*W")), r"'theta' means one thing"),
+    ],
+)
+def test_names_that_forces_need_are_refused(declare, message) -> None:
+    """With what they mean."""
+    with pytest.raises(DeclarationError, match=message):
+        declare()
+
+
+def test_a_law_that_is_infinite_at_rest_is_refused() -> None:
+    """Nothing could be said about a body that stops."""
+    with pytest.raises(DerivationError, match="at rest"):
+        derive(families.circle(), Gravity() + Kernel.law("-k*direction/sqrt(W)"))
+
+
+def test_a_turning_track_is_loaded_sideways() -> None:
+    """By the Coriolis force: N_b = 2 m Ω V dx/ds."""
+    model = derive(families.circle(), Gravity() + RotatingFrame())
+    v = model.side_force / (2 * MASS * Omega * model.dxds)
+    assert sp.simplify(v**2 - sp.Symbol("direction", real=True) ** 2 * model.speed_squared) == 0
+    assert "N_b" in dict(model.closed_forms())
+    assert derive(families.circle(), Gravity()).side_force == 0

@@ -62,10 +62,10 @@ class Laid:
         formulas = module.MODEL
         values = tuple((formulas.parameters | given).values())
         numbers = formulas.numbers(values)
-        launch = formulas.launch(a, 0.0, 1, None, None, "bilateral")
+        launch = formulas.launch(numbers, lam0=a, v0=0.0)
         functions = formulas.functions(numbers, launch)
         self.at = (functions.addresses, functions.p, kind, a, b, ref, w)
-        panels = lay_panels(*self.at, 0.0, stop)
+        panels = lay_panels(*self.at, np.array([0.0, stop]))
         self.edges, self.marks, self.lengths, self.time_terms, self.length_terms = panels[:5]
         self.error, self.balance, self.status = panels[5:]
 

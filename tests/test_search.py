@@ -48,7 +48,7 @@ def walk(module: ModuleType, lam0: float, v0: float, direction: int, reach: floa
     """What a walk from a launch finds: its end, and the places before and beyond."""
     formulas = module.MODEL
     numbers = formulas.numbers(tuple((formulas.parameters | given).values()))
-    functions = formulas.functions(numbers, formulas.launch(lam0, v0, direction, None, None, "bilateral"))
+    functions = formulas.functions(numbers, formulas.launch(numbers, lam0=lam0, v0=v0, direction=direction))
     step = reach / 8 if math.isfinite(reach) else 1.0
     what, near, far = walk_on(functions.addresses, functions.p, lam0, v0 * v0, direction, 0.0, reach, step)
     return what, lam0 + near, lam0 + far

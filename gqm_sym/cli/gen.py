@@ -9,10 +9,12 @@ from typing import TYPE_CHECKING
 
 from gqm_sym.cli import show
 from gqm_sym.cli.exits import DIFFERENT, DONE, Failures, guarded
+from gqm_sym.cli.pictures import save_figure
 from gqm_sym.errors import InputError
 
 if TYPE_CHECKING:
     from gqm_sym.derivation import Model
+    from gqm_sym.runtime.motion import Motion
     from gqm_sym.specfile import Spec
 
 PROGRAM = "gqm-gen"
@@ -41,7 +43,8 @@ def _parser() -> argparse.ArgumentParser:
         epilog="Exit codes: 0 done, 1 --check found a difference, 2 the input is wrong, "
         "3 the derivation or the solution failed, 130 interrupted.",
     )
-    parser.add_argument("files", nargs="+", metavar="FILE", help="a curve file (YAML)")
+    parser.add_argument("files", nargs="*", metavar="FILE", help="a curve file (YAML)")
+    parser.add_argument("--init", metavar="NAME", help="write NAME.yaml, a commented file to start from, and no module")
     parser.add_argument("-o", "--output", metavar="DIR", default=FOLDER, help=f"where to write (default: {FOLDER})")
     mode = parser.add_mutually_exclusive_group()
     mode.add_argument("--check", action="store_true", help="write nothing; fail if a file is not current")
@@ -49,6 +52,9 @@ def _parser() -> argparse.ArgumentParser:
     mode.add_argument("--solve", action="store_true", help="also run the launch in the file and print its table")
     parser.add_argument("--diff", action="store_true", help="with --check: show the differences")
     parser.add_argument("--latex", metavar="FILE", help="also write the closed forms as LaTeX")
+    parser.add_argument(
+        "--plot", metavar="FILE", help="also run the launch in the file and draw its motion (png, svg, pdf)"
+    )
     parser.add_argument("--force", action="store_true", help="overwrite a module that was edited by hand")
     parser.add_argument("-q", "--quiet", action="store_true", help="print no closed forms")
     return parser
@@ -57,11 +63,20 @@ def _parser() -> argparse.ArgumentParser:
 def _arguments(argv: Sequence[str] | None) -> argparse.Namespace:
     parser = _parser()
     options = parser.parse_args(argv)
+    if options.init is not None:
+        if options != parser.parse_args(["--init", options.init]):
+            parser.error("--init: takes one NAME and nothing else")
+        return options
+    if not options.files:
+        parser.error("the following arguments are required: FILE (or --init NAME)")
     if options.diff and not options.check:
         parser.error("--diff: shows what --check finds; give both")
     if options.latex is not None and options.check:
         parser.error("--latex: writes a file, and --check writes nothing; give one of them")
-    for option, one_only in (("--stdout", options.stdout), ("--latex", options.latex is not None)):
+    if options.plot is not None and (options.check or options.stdout):
+        parser.error("--plot: runs the module that is written; give it without --check and --stdout")
+    singles = {"--stdout": options.stdout, "--latex": options.latex is not None, "--plot": options.plot is not None}
+    for option, one_only in singles.items():
         if one_only and len(options.files) > 1:
             parser.error(f"{option}: takes one FILE, got {len(options.files)}")
     return options
@@ -69,6 +84,8 @@ def _arguments(argv: Sequence[str] | None) -> argparse.Namespace:
 
 def _run(options: argparse.Namespace) -> int:
     """Read everything, make everything, and only then write: a mistake leaves all files alone."""
+    if options.init is not None:
+        return _init(options.init)
     failures = Failures()
     specs: list[Spec] = []
     for file in options.files:
@@ -88,6 +105,19 @@ def _run(options: argparse.Namespace) -> int:
     return failures.code
 
 
+def _init(name: str) -> int:
+    from gqm_sym.specfile import starter
+
+    text, path = starter(name), Path(f"{name}.yaml")
+    try:
+        with path.open("x", encoding="utf-8", newline="\n") as file:
+            file.write(text)
+    except FileExistsError:
+        raise InputError(f"{path}: is there already and is left alone; choose another name") from None
+    print(f"wrote {path}")
+    return DONE
+
+
 def _read(file: str, others: "Sequence[Spec]") -> "Spec":
     from gqm_sym.specfile import read_spec
 
@@ -105,7 +135,7 @@ def _make(spec: "Spec", options: argparse.Namespace) -> Product:
     from gqm_sym.emission import emit
 
     model = spec.derive()
-    if options.solve:
+    if options.solve or options.plot is not None:
         spec.check_solvable(model)
     path = Path(options.output) / f"{spec.name}.py"
     return Product(spec=spec, model=model, text=emit(model, name=spec.name), path=path)
@@ -149,24 +179,32 @@ def _deliver(product: Product, options: argparse.Namespace) -> None:
         if options.latex is not None:
             print(f"wrote {options.latex}")
         print(f"wrote {product.path}" if changed else f"{product.path} is current")
+    if not (options.solve or options.plot is not None):
+        return
+    motion = _motion(product)
+    if options.plot is not None:
+        save_figure(motion, options.plot, "track")
+        if not options.quiet:
+            print(f"wrote {options.plot}")
     if options.solve:
-        table = _solve(product)
+        # Complete before the first line is printed: it may fail half way.
+        table = list(show.motion(motion, product.model.parameter.name))
         print(f"{product.spec.name}:" if options.quiet else "")
         for line in table:
             print(line)
 
 
-def _solve(product: Product) -> list[str]:
-    """Run the launch of the file and return its table, complete: it may fail half way."""
+def _motion(product: Product) -> "Motion":
+    """The motion that the launch of the file begins."""
     from gqm_sym.building import load
 
     spec = product.spec
     module = load(product.path, spec.name)
     try:
-        motion = module.solve(**(spec.launch or {}))
+        motion: Motion = module.solve(**(spec.launch or {}))
     except InputError as error:
         raise spec.mistake(str(error), "launch") from None
-    return list(show.motion(motion, product.model.parameter.name))
+    return motion
 
 
 def _latex(product: Product) -> str:

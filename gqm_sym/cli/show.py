@@ -37,7 +37,8 @@ def _parameter(spec: "Spec", name: str, value: object) -> tuple[str, ...]:
     note = spec.notes.get(name)
     unit, description = (note.unit, note.description) if note else ("", "")
     given = "to be given at run time" if value is None else f"= {value}"
-    return (name, f"{given} {unit}".strip(), description)
+    origin = f"({note.given})" if note and note.given else ""
+    return (name, f"{given} {unit}".strip(), f"{origin} {description}".strip())
 
 
 def motion(found: "Motion", parameter: str) -> Iterator[str]:
@@ -52,6 +53,8 @@ def motion(found: "Motion", parameter: str) -> Iterator[str]:
         yield f"  period          {_number(found.period)} s"
     elif isfinite(found.t_end):
         yield f"  ends after      {_number(found.t_end)} s"
+    yield f"  quadrature      within {found.quadrature_error:.1e} of a time"
+    yield f"  conditioning    {found.conditioning:.1e} (a relative change of the launch, magnified in a time)"
     if found.legs:
         yield ""
         yield from table(_legs(found, parameter), right=range(1, 6))
@@ -82,7 +85,7 @@ def _states(
     for label, t in labelled:
         state = found.state(t)
         values = (state.t, state.lam, state.x, state.z, state.v, state.normal_force)
-        yield (label, *map(_number, values), f"{found.error_bound(t):.1e}")
+        yield (label, *map(_number, values), f"{state.error:.1e}")
 
 
 def table(rows: Iterable[Sequence[str]], *, right: Iterable[int]) -> Iterator[str]:

@@ -9,15 +9,21 @@ from typing import TYPE_CHECKING, Any
 
 from gqm_sym.cli import show
 from gqm_sym.cli.exits import DONE, guarded
+from gqm_sym.cli.pictures import save_figure
 from gqm_sym.errors import ParameterError
 
 if TYPE_CHECKING:
     from gqm_sym.declare.families import Family
+    from gqm_sym.derivation import Model
+    from gqm_sym.runtime.motion import Motion
+    from gqm_sym.specfile import Spec
 
 PROGRAM = "gqm"
 FOLDER = "generated"
 
-# Options of `gqm solve` that replace entries of the file's launch, by their names in ``solve``.
+_EXACT = "Numbers are taken exactly as written. One that begins with a minus needs an equals sign: --lam0=-pi/2."
+
+# Options of commands that replace entries of the file's launch, by their names in ``solve``.
 _LAUNCH = ("lam0", "v0", "direction", "t_max", "contact")
 
 
@@ -32,6 +38,40 @@ def _run(argv: Sequence[str] | None) -> int:
     return DONE
 
 
+def _launching() -> argparse.ArgumentParser:
+    """Options of commands that run a launch."""
+    parser = argparse.ArgumentParser(add_help=False)
+    parser.add_argument("file", metavar="FILE", help="a curve file (YAML)")
+    parser.add_argument("--lam0", metavar="NUMBER", help="launch from another place")
+    parser.add_argument("--v0", metavar="NUMBER", help="launch with another speed")
+    parser.add_argument("--direction", type=int, choices=(1, -1), help="sign of ds/dt at launch")
+    parser.add_argument("--t-max", metavar="NUMBER", help="follow the motion for so long")
+    parser.add_argument("--contact", choices=("bilateral", "above", "below"))
+    parser.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        dest="values",
+        metavar="NAME=NUMBER",
+        help="give a run-time parameter another value; may be repeated",
+    )
+    return parser
+
+
+def _modules() -> argparse.ArgumentParser:
+    """Where commands that run a launch look for modules."""
+    parser = argparse.ArgumentParser(add_help=False)
+    parser.add_argument(
+        "-o",
+        "--output",
+        metavar="DIR",
+        default=FOLDER,
+        dest="folder",
+        help=f"where generated modules lie: a current one is used (default: {FOLDER})",
+    )
+    return parser
+
+
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog=PROGRAM, description="Motion on planar curves: what is not generation (see gqm-gen)."
@@ -40,23 +80,10 @@ def _parser() -> argparse.ArgumentParser:
 
     solve = commands.add_parser(
         "solve",
+        parents=[_launching(), _modules()],
         help="run the launch of a curve file",
         description="Run the launch of a curve file and print its table. Nothing is written.",
-        epilog="Numbers are taken exactly as written. One that begins with a minus needs an equals sign: --lam0=-pi/2.",
-    )
-    solve.add_argument("file", metavar="FILE", help="a curve file (YAML)")
-    solve.add_argument("--lam0", metavar="NUMBER", help="launch from another place")
-    solve.add_argument("--v0", metavar="NUMBER", help="launch with another speed")
-    solve.add_argument("--direction", type=int, choices=(1, -1), help="sign of ds/dt at launch")
-    solve.add_argument("--t-max", metavar="NUMBER", help="follow the motion for so long")
-    solve.add_argument("--contact", choices=("bilateral", "above", "below"))
-    solve.add_argument(
-        "--set",
-        action="append",
-        default=[],
-        dest="values",
-        metavar="NAME=NUMBER",
-        help="give a run-time parameter another value; may be repeated",
+        epilog=_EXACT,
     )
     solve.add_argument(
         "--at",
@@ -65,14 +92,37 @@ def _parser() -> argparse.ArgumentParser:
         metavar="TIME",
         help="also print the state at this time; may be repeated",
     )
-    solve.add_argument(
-        "-o",
-        "--output",
-        metavar="DIR",
-        default=FOLDER,
-        help=f"where generated modules lie: a current one is used (default: {FOLDER})",
-    )
     solve.set_defaults(command=_solve)
+
+    plot = commands.add_parser(
+        "plot",
+        parents=[_launching(), _modules()],
+        help="draw the motion that a curve file launches",
+        description="Run the launch of a curve file and draw its motion.",
+        epilog=_EXACT,
+    )
+    plot.add_argument("figure", metavar="FIGURE", help="the file to write: its ending says the format (png, svg, pdf)")
+    plot.add_argument(
+        "--what",
+        choices=("track", "loads", "portrait"),
+        default="track",
+        help="the track coloured by the contact force, speed and force against arc length, or the phase portrait "
+        "(default: track)",
+    )
+    plot.set_defaults(command=_plot)
+
+    report = commands.add_parser(
+        "report",
+        parents=[_launching()],
+        help="write a page about the motion that a curve file launches",
+        description="Run the launch of a curve file and write one page about it, complete in itself: formulas, "
+        "figures, events, and what it was made from.",
+        epilog=_EXACT,
+    )
+    report.add_argument(
+        "-o", "--output", metavar="FILE", help="the page (HTML); the name in the curve file with .html if not given"
+    )
+    report.set_defaults(command=_report, folder=FOLDER)
 
     schema = commands.add_parser("schema", help="print the JSON Schema of curve files, for editors")
     schema.set_defaults(command=_schema)
@@ -83,10 +133,11 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
-# -- solve -----------------------------------------------------------------------------------
+# -- solve, plot and report --------------------------------------------------------------------------
 
 
-def _solve(options: argparse.Namespace) -> None:
+def _launched(options: argparse.Namespace) -> "tuple[Spec, Model, Motion]":
+    """What a file says, and the motion that it and the options launch."""
     from gqm_sym.emission import emit
     from gqm_sym.specfile import read_spec
 
@@ -96,9 +147,33 @@ def _solve(options: argparse.Namespace) -> None:
     values = dict(_assignment(text, model.parameters) for text in options.values)
     if not given and not values:
         spec.check_solvable(model)
-    launch = {**(spec.launch or {}), **given, **values}
-    text = emit(model, name=spec.name)
-    motion = _module(text, spec.name, Path(options.output)).solve(**launch)
+    written = dict(spec.launch or {})
+    if "lam0" in given:
+        written.pop("point", None)
+    launch = {**written, **given, **values}
+    module = _module(emit(model, name=spec.name), spec.name, Path(options.folder))
+    return spec, model, module.solve(**launch)
+
+
+def _plot(options: argparse.Namespace) -> None:
+    *_, motion = _launched(options)
+    save_figure(motion, options.figure, options.what)
+    print(f"wrote {options.figure}")
+
+
+def _report(options: argparse.Namespace) -> None:
+    from gqm_sym.building import write_text
+    from gqm_sym.report import report
+
+    spec, model, motion = _launched(options)
+    page = report(spec, model, motion, Path(options.file).read_text(encoding="utf-8-sig"))
+    path = options.output or f"{spec.name}.html"
+    write_text(page, path)
+    print(f"wrote {path}")
+
+
+def _solve(options: argparse.Namespace) -> None:
+    _, model, motion = _launched(options)
     lines = list(show.motion(motion, model.parameter.name))
     if options.at:
         lines += ["", *show.moments(motion, model.parameter.name, options.at)]
@@ -143,6 +218,7 @@ def _families(options: argparse.Namespace) -> None:
         print(f"{row.name}({', '.join(row.arguments)})")
         print(f"    {', '.join(_formulas(row))}")
         print(f"    {row.title}{f'; {row.note}' if row.note else ''}.")
+    print("implicit(F, start)\n    F(x, z) = 0\n    The curve through the point start, in arc length from there.")
 
 
 def _formulas(row: "Family") -> list[str]:
@@ -161,7 +237,7 @@ def _kernels(options: argparse.Namespace) -> None:
     rows = [
         (
             f"{row.name}: {{{', '.join(row.arguments)}}}",
-            f"{row.make.__name__}({', '.join(row.arguments)})",
+            f"{row.make.__qualname__}({', '.join(row.arguments)})",
             row.summary,
         )
         for row in KERNELS.values()

@@ -1,14 +1,19 @@
 """A planar curve as it was declared: coordinates, parameter, domain and run-time parameters."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import sympy as sp
 
 from gqm_sym.errors import DeclarationError
 from gqm_sym.expressions import check_name, read_expression
 from gqm_sym.parameters import Given, Value, names_in_order, read_parameters
+from gqm_sym.sympy_charts import chart_x, chart_z
+
+if TYPE_CHECKING:
+    from gqm_sym.declare.implicit import Level
+    from gqm_sym.declare.piecewise import Piece
 
 Source: TypeAlias = str | int | sp.Expr
 Parameters: TypeAlias = Mapping[str, Given | None] | Iterable[str]
@@ -21,7 +26,8 @@ class Curve:
     Attributes
     ----------
     kind
-        The form in which it was declared: ``graph``, ``parametric`` or ``polar``.
+        The form in which it was declared: ``graph``, ``parametric``, ``polar``; of a charted curve ``implicit``,
+        ``sampled`` or ``piecewise``.
     x, z
         The coordinates, in the parameter and the run-time parameters.
     parameter
@@ -38,6 +44,8 @@ class Curve:
         Parameters promised to be positive; checked when the emitted module runs.
     radius
         Of a polar curve r(θ): its derivatives give shorter forms than those of x and z.
+    definition
+        What a charted curve is made from: its coordinates are known by numbers only, as functions of arc length.
     """
 
     kind: str
@@ -50,6 +58,7 @@ class Curve:
     title: str = ""
     positive: tuple[str, ...] = ()
     radius: sp.Expr | None = None
+    definition: object = None
 
     def __post_init__(self) -> None:
         if self.parameter not in self.x.free_symbols | self.z.free_symbols:
@@ -63,6 +72,11 @@ class Curve:
     def parameters(self) -> tuple[str, ...]:
         """Names of the run-time parameters, in order."""
         return tuple(name for name, _ in self.defaults)
+
+    @property
+    def charted(self) -> bool:
+        """Whether the parameter is arc length, and the coordinates are known by numbers only."""
+        return self.definition is not None
 
     @classmethod
     def graph(
@@ -139,6 +153,132 @@ class Curve:
             radius,
         )
 
+    @classmethod
+    def implicit(
+        cls,
+        F: Source,
+        *,
+        start: Iterable[Source],
+        tangent: int = 1,
+        parameter: str = "s",
+        domain: Iterable[Source | None] | None = None,
+        parameters: Parameters | None = None,
+        title: str = "",
+        positive: Iterable[str] = (),
+    ) -> "Curve":
+        """Declare the curve ``F(x, z) = 0`` through a point, in arc length from there.
+
+        Parameters
+        ----------
+        F
+            An expression in x, z and run-time parameters.
+        start
+            x and z of a point of the curve, where arc length is 0: numbers or expressions in run-time parameters.
+        tangent
+            1: arc length grows along (-F_z, F_x)/|grad F|; -1: along the opposite.
+        domain
+            Ends of the arc length, which contain 0. Without them the curve is followed until it closes or comes to a
+            singular point, where grad F = 0.
+
+        Examples
+        --------
+        >>> Curve.implicit("(x/a)**4 + (z/b)**4 - 1", start=("a", 0)).parameters
+        ('a', 'b')
+        """
+        from gqm_sym.declare.implicit import check_domain, read_level
+
+        symbol = _symbol(parameter, "implicit")
+        level = read_level(F, start=start, tangent=tangent, parameter=symbol.name)
+        ends = _read_domain(domain, "implicit")
+        check_domain(*ends)
+        return _declare(
+            "implicit", chart_x(symbol), chart_z(symbol), symbol, ends, None, parameters, title, positive, level=level
+        )
+
+    @classmethod
+    def sampled(
+        cls,
+        points: Iterable[Any],
+        *,
+        kind: str = "spline",
+        closed: bool | None = None,
+        title: str = "",
+    ) -> "Curve":
+        """Declare the track through points, in arc length from the first of them.
+
+        Parameters
+        ----------
+        points
+            Rows of x and z: an (n, 2) array, or pairs of numbers or of decimal text, which is kept as it is.
+        kind
+            "spline": the interpolating quintic spline. "linear": planes stitched together (paper, eq. 1); at their
+            corners the speed is kept.
+        closed
+            Whether the track closes; None: if its last point is its first.
+
+        Raises
+        ------
+        DeclarationError
+            If a row is no point, or points are too few, repeated, out of order or far away.
+        """
+        from gqm_sym.declare.sampled import read_track
+
+        s = sp.Symbol("s", real=True)
+        track = read_track(points, kind=kind, closed=closed)
+        return cls(kind="sampled", x=chart_x(s), z=chart_z(s), parameter=s, title=title, definition=track)
+
+    @classmethod
+    def piecewise(
+        cls,
+        pieces: "Iterable[Piece | Curve]",
+        *,
+        start: Sequence[Source] | None = None,
+        heading: Source | None = None,
+        closed: bool = False,
+        parameters: Parameters | None = None,
+        title: str = "",
+    ) -> "Curve":
+        """Declare a rail of pieces joined end to start, in arc length from its start.
+
+        Parameters
+        ----------
+        pieces
+            `line`, `arc` and `clothoid`, which are placed at the end of the piece before, and curves with formulas and
+            a bounded domain, whose place and tangent must match there (within 1e-9 of the rail's length and 1e-9 rad).
+        start, heading
+            Where the first piece begins, and the angle of its tangent from the x axis; (0, 0) and 0 if not given. A
+            curve that comes first has its own.
+        closed
+            Whether the rail ends where it began, in the same direction.
+
+        Raises
+        ------
+        DeclarationError
+            If a piece is none, or has no ends. What depends on parameters is checked when they are known.
+
+        Examples
+        --------
+        >>> from gqm_sym.declare.piecewise import arc, line
+        >>> Curve.piecewise([line(length=2), arc(radius="R", angle="pi/2")]).parameters
+        ('R',)
+        """
+        from gqm_sym.declare.piecewise import declare_rail
+
+        rail, defaults, positive = declare_rail(
+            pieces, start=start, heading=heading, closed=closed, parameters=parameters
+        )
+        s = sp.Symbol("s", real=True)
+        return cls(
+            kind="piecewise",
+            x=chart_x(s),
+            z=chart_z(s),
+            parameter=s,
+            defaults=defaults,
+            title=title,
+            positive=positive,
+            definition=rail,
+        )
+
 
 def _symbol(name: str, kind: str) -> sp.Symbol:
     return sp.Symbol(_check_parameter_name(name, kind), real=True)
@@ -161,12 +301,14 @@ def _declare(
     title: str,
     positive: Iterable[str],
     radius: sp.Expr | None = None,
+    level: "Level | None" = None,
 ) -> Curve:
     ends = _read_domain(domain, kind)
     turn = None if period is None else read_expression(period, where=f"{kind}: period")
     written = (x, z) if radius is None else (radius,)
     given = tuple(end for end in (*ends, turn) if end is not None)
-    found = tuple(name for name in names_in_order(*written, *given) if name != symbol.name)
+    names = (*names_in_order(*written), *(() if level is None else level.names), *names_in_order(*given))
+    found = tuple(name for name in dict.fromkeys(names) if name != symbol.name)
     defaults = read_parameters(parameters, found=found, where=f"{kind} curve")
     promised = tuple(positive)
     for name in promised:
@@ -183,6 +325,7 @@ def _declare(
         title=title,
         positive=promised,
         radius=radius,
+        definition=level,
     )
 
 

@@ -212,9 +212,22 @@ def cartesian_graph(
     return Curve.graph(phi, parameter=parameter, domain=domain, parameters=parameters)
 
 
+def implicit(
+    F: Source,
+    *,
+    start: Iterable[Source],
+    tangent: int = 1,
+    parameter: str = "s",
+    domain: Iterable[Source | None] | None = None,
+    parameters: Parameters | None = None,
+) -> Curve:
+    """Declare the curve ``F(x, z) = 0``; the same as `Curve.implicit`, by the paper's name."""
+    return Curve.implicit(F, start=start, tangent=tangent, parameter=parameter, domain=domain, parameters=parameters)
+
+
 def names() -> tuple[str, ...]:
     """Return the names of all families."""
-    return ("cartesian_graph", *FAMILIES)
+    return ("cartesian_graph", *FAMILIES, "implicit")
 
 
 def __getattr__(name: str) -> Callable[..., Curve]:

@@ -75,8 +75,8 @@ class Algebra:
         self.ring, *self.generators = ring([f"q{place}" for place in range(len(self.names))], sp.ZZ)
         self.one = self.ring.one
         self._place = {name: place for place, name in enumerate(self.names)}
-        self._squares: list[tuple[int, Polynomial]] = []
-        self._squares = self._square_relations()
+        self.squares: list[tuple[int, Polynomial]] = []
+        self.squares = self._square_relations()
         # Polynomials written out so far, by `derive.spelling`.
         self.texts: dict[Polynomial, sp.Expr] = {}
 
@@ -199,7 +199,7 @@ class Algebra:
 
     def normal(self, polynomial: Polynomial) -> Polynomial:
         """Square roots out, make homogeneous where one parity allows it, and drop factors 1."""
-        for place, square in self._squares:
+        for place, square in self.squares:
             polynomial = self.replace_squares(polynomial, place, square)
         for pair in self.pairs:
             polynomial = self._homogeneous(polynomial, pair)

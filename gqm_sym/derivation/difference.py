@@ -12,7 +12,9 @@ from dataclasses import dataclass, field
 import sympy
 from sympy import Expr, Function, Integer, Rational, S, Symbol
 
+from gqm_sym.budgets import spend
 from gqm_sym.errors import EmissionError
+from gqm_sym.sympy_charts import chart_x, chart_z
 
 # Heads with helpers `<name>1` and `<name>2` in the runtime.
 HELPERS = {
@@ -31,6 +33,8 @@ HELPERS = {
     sympy.exp: "exp",
     sympy.log: "log",
     sympy.Abs: "abs",
+    chart_x: "chart_x",
+    chart_z: "chart_z",
 }
 
 
@@ -62,12 +66,14 @@ class Differences:
         """``u[points[i], points[j]]``."""
         key = (u, i, j)
         if key not in self._first:
+            spend()
             self._first[key] = self._build_first(u, i, j)
         return self._first[key]
 
     def second(self, u: Expr) -> Expr:
         """``u[a, lam, b]``."""
         if u not in self._second:
+            spend()
             self._second[u] = self._build_second(u)
         return self._second[u]
 

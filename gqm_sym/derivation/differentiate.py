@@ -9,6 +9,7 @@ from collections.abc import Callable, Sequence
 
 import sympy as sp
 
+from gqm_sym.budgets import spend
 from gqm_sym.errors import DerivationError
 
 # Factors up to which the product rule is written out in one sum.
@@ -50,6 +51,7 @@ def differentiate(expression: sp.Expr, variable: sp.Symbol) -> sp.Expr:
         if variable not in node.free_symbols:
             return sp.S.Zero
         if node not in known:
+            spend()
             known[node] = _rule(node, variable, visit)
         return known[node]
 

@@ -12,27 +12,30 @@ from gqm_sym.kernels.base import Kernel, X, Z
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Forces:
-    """A conservative force law along a curve, per unit mass.
+    """The applied forces along a curve, per unit mass.
 
     Attributes
     ----------
     potential
         Φ(λ).
     climb
-        2Φ/inertia, so that W + climb is constant.
+        2Φ/inertia, so that W + climb is constant where nothing is lost.
     climb_slope
-        Its derivative by λ: minus that of W.
+        Its derivative by λ.
+    push
+        F·t.
     reaction
         n₀ = -F·n: what the track carries at rest; N/m = κ W + n₀.
-    acceleration
-        A = F·t/inertia, so that dW/ds = 2 A.
+    pressure
+        σ n₀, in which no absolute values are left.
     """
 
     potential: sp.Expr
     climb: sp.Expr
     climb_slope: sp.Expr
+    push: sp.Expr
     reaction: sp.Expr
-    acceleration: sp.Expr
+    pressure: sp.Expr
 
 
 def forces(x: sp.Expr, z: sp.Expr, kernel: Kernel, shape: Geometry) -> Forces:
@@ -50,6 +53,7 @@ def forces(x: sp.Expr, z: sp.Expr, kernel: Kernel, shape: Geometry) -> Forces:
         potential=potential,
         climb=tidy(2 * potential / kernel.inertia),
         climb_slope=2 * push * shape.size / kernel.inertia,
+        push=absorb_bars(-push * shape.per_length),
         reaction=absorb_bars(load * shape.per_length),
-        acceleration=absorb_bars(-push * shape.per_length / kernel.inertia),
+        pressure=load * shape.size,
     )

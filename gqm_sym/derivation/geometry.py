@@ -33,6 +33,7 @@ from gqm_sym.derivation.signs import Signs
 from gqm_sym.derivation.spelling import shortest
 from gqm_sym.derivation.turning import tangent_angle
 from gqm_sym.errors import DeclarationError
+from gqm_sym.sympy_charts import chart_alpha, chart_kappa
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -80,6 +81,8 @@ def geometry(curve: Curve, *, may_be_positive: tuple[str, ...]) -> Geometry:
     may_be_positive
         Parameters that may be taken as positive where |parameter| would stand otherwise.
     """
+    if curve.charted:
+        return _charted(curve)
     signs = Signs(
         parameter=curve.parameter,
         domain=curve.domain,
@@ -90,6 +93,27 @@ def geometry(curve: Curve, *, may_be_positive: tuple[str, ...]) -> Geometry:
         return _factored(curve, signs)
     except OverBudget as reason:
         return _plain(curve, signs, f"ds and kappa are left unsimplified: {reason}")
+
+
+def _charted(curve: Curve) -> Geometry:
+    """Read the shape from the chart: its parameter is arc length."""
+    s = curve.parameter
+    angle, kappa = chart_alpha(s), chart_kappa(s)
+    along, across = sp.cos(angle), sp.sin(angle)
+    return Geometry(
+        along=along,
+        across=across,
+        size=sp.S.One,
+        per_length=sp.S.One,
+        ds=sp.S.One,
+        dxds=along,
+        dzds=across,
+        kappa=kappa,
+        turning_rate=kappa,
+        angle=angle,
+        cusp=None,
+        positive=curve.positive,
+    )
 
 
 def _plain(curve: Curve, signs: Signs, note: str) -> Geometry:

@@ -5,20 +5,25 @@ from dataclasses import dataclass
 
 import sympy as sp
 
+from gqm_sym.budgets import budget
 from gqm_sym.declare import Curve
-from gqm_sym.derivation.forces import forces
-from gqm_sym.derivation.geometry import geometry
+from gqm_sym.derivation.defaults import join
+from gqm_sym.derivation.dissipation import LOAD, PUSH, SIGMA, TILT, TURN, Dissipation, dissipation
+from gqm_sym.derivation.forces import Forces, forces
+from gqm_sym.derivation.geometry import Geometry, geometry
+from gqm_sym.derivation.level_set import LevelSet, level_set
+from gqm_sym.derivation.path import beside
 from gqm_sym.derivation.reality import check_somewhere_real
-from gqm_sym.derivation.rewrite import check_real, tidy, without_poles
-from gqm_sym.errors import DeclarationError
-from gqm_sym.kernels.base import Kernel
-from gqm_sym.parameters import COMMON, COMMON_DEFAULTS, Given, Value, is_positive, read_value
+from gqm_sym.derivation.rewrite import check_real, without_poles
+from gqm_sym.derivation.signs import Signs
+from gqm_sym.derivation.speed import LAM0, V0, SpeedField, conservative_speed, dissipative_speed
+from gqm_sym.kernels.base import CONTACT_SIGN, DIRECTION, KAPPA, MASS, Kernel, W, X, Z
+from gqm_sym.parameters import Given, Value, is_positive
 
-LAM0 = sp.Symbol("lam0", real=True)
-V0 = sp.Symbol("v0", real=True)
 LAM1 = sp.Symbol("lam1", real=True)
 LAM2 = sp.Symbol("lam2", real=True)
-MASS = sp.Symbol("m", real=True)
+# Variables of integration, as texts and as LaTeX.
+_DASHES = (("_", "'"), ("__", "''"))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -49,24 +54,38 @@ class Model:
         2Φ/inertia, so that W + climb is constant along a motion, and its derivative by λ.
     reaction
         n₀ with N/m = κ W + n₀.
+    dissipation
+        What a force law that is not conservative does along the curve; None for a conservative one.
     speed_squared
-        W = V².
+        W = V². Of a dissipative model on one leg, where ``direction`` is the sign of ds/dt and ``contact_sign`` that
+        of N.
+    speed_squared_form
+        ``closed``, ``quadrature`` (it holds an Integral) or ``equation`` (an unknown function: the law is not linear
+        in W). Where it is not closed, the forms below hold W as a symbol.
     normal_force
         N, positive along the normal to the left of growing λ.
+    side_force
+        What a track that turns about the z axis carries out of its plane; 0 for one at rest.
     kernel
-        Tangential acceleration A, so that dW/ds = 2 A.
+        Tangential acceleration A, so that dW/ds = 2 A; of a dissipative model in ``W``.
     time_integrand
         dt/dλ = σ/√W.
     regularised_integrand
         σ √((λ - λ₁)(λ₂ - λ)/W) between turning points ``lam1`` and ``lam2``: it stays finite.
     turning_point_equation, liftoff_equation
         W = 0 and N = 0.
+    liftoff_speed_squared
+        v0² of the launch for which N = 0 at λ; None where W is not closed, or the curve is straight.
     defaults
         Run-time parameters in order, each with its default or None; g and m come last.
     positive
         Parameters that were taken to be positive, which is checked at run time.
+    at_least
+        Parameters with what they must not fall below, which is checked too.
     notes
-        What was left unsimplified, and why.
+        What was left unsimplified, and why; of a dissipative model what kind of form V² has.
+    level_set
+        Of an implicit curve: F with its derivatives, tangent and curvature, in x and z.
     """
 
     curve: Curve
@@ -90,16 +109,22 @@ class Model:
     climb: sp.Expr
     climb_slope: sp.Expr
     reaction: sp.Expr
+    dissipation: Dissipation | None
     speed_squared: sp.Expr
+    speed_squared_form: str
     normal_force: sp.Expr
+    side_force: sp.Expr
     kernel: sp.Expr
     time_integrand: sp.Expr
     regularised_integrand: sp.Expr
     turning_point_equation: sp.Eq
     liftoff_equation: sp.Eq
+    liftoff_speed_squared: sp.Expr | None
     defaults: tuple[tuple[str, Value | None], ...]
     positive: tuple[str, ...]
+    at_least: tuple[tuple[str, str], ...]
     notes: tuple[str, ...]
+    level_set: LevelSet | None = None
 
     @property
     def parameters(self) -> tuple[str, ...]:
@@ -122,9 +147,20 @@ class Model:
         return self.kernel
 
     def closed_forms(self) -> tuple[tuple[str, sp.Basic], ...]:
-        """Return the forms for people, in the order to print them, each with its label."""
+        """Return the forms for people, in the order to print them, each with its label.
+
+        Those of a dissipative model hold V² as the symbol W.
+        """
         lam = self.parameter.name
+        force, side, rate = self.normal_force, self.side_force, self.time_integrand
+        turning, liftoff = self.turning_point_equation, self.liftoff_equation
+        if self.dissipation is not None:
+            pressure = self.kappa * W + self.reaction
+            force, rate = self.mass * pressure, self.ds / sp.sqrt(W)
+            turning, liftoff = (sp.Eq(form, 0, evaluate=False) for form in (W, pressure))
+            side = 2 * self.mass * self.force.spin * DIRECTION * sp.sqrt(W) * self.dxds
         return (
+            *(self.level_set.closed_forms() if self.level_set else ()),
             ("x", self.x),
             ("z", self.z),
             (f"ds/d{lam}", self.ds),
@@ -132,12 +168,13 @@ class Model:
             ("dz/ds", self.dzds),
             ("kappa", self.kappa),
             ("Theta", self.turning_angle),
-            ("V**2", self.speed_squared),
-            ("N", self.normal_force),
+            ("V**2" if self.dissipation is None else "W = V**2", self.speed_squared),
+            ("N", force),
+            *((("N_b", side),) if side else ()),
             ("A", self.kernel),
-            (f"dt/d{lam}", self.time_integrand),
-            ("turning points", self.turning_point_equation),
-            ("liftoff", self.liftoff_equation),
+            (f"dt/d{lam}", rate),
+            ("turning points", turning),
+            ("liftoff", liftoff),
         )
 
     def latex(self) -> str:
@@ -148,10 +185,17 @@ class Model:
             f"ds/d{self.parameter.name}": rf"\frac{{ds}}{{d{lam}}}",
             f"dt/d{self.parameter.name}": rf"\frac{{dt}}{{d{lam}}}",
             "dx/ds": r"\frac{dx}{ds}",
+            "dF/dx": r"\frac{\partial F}{\partial x}",
+            "dF/dz": r"\frac{\partial F}{\partial z}",
+            "d2F/dx2": r"\frac{\partial^{2} F}{\partial x^{2}}",
+            "d2F/dxdz": r"\frac{\partial^{2} F}{\partial x \partial z}",
+            "d2F/dz2": r"\frac{\partial^{2} F}{\partial z^{2}}",
             "dz/ds": r"\frac{dz}{ds}",
             "kappa": r"\kappa",
             "Theta": r"\Theta",
             "V**2": "V^{2}",
+            "W = V**2": "W = V^{2}",
+            "N_b": "N_{b}",
             "turning points": "",
             "liftoff": "",
         }
@@ -175,12 +219,16 @@ class Model:
             LAM1: indexed % 1,
             LAM2: indexed % 2,
             self.v0: "V_{0}",
+            DIRECTION: r"\left(\operatorname{sgn} V\right)",
+            CONTACT_SIGN: r"\left(\operatorname{sgn} N\right)",
+            **{sp.Symbol(f"{mark}{self.parameter.name}", real=True): f"{{{lam}{dash}}}" for mark, dash in _DASHES},
         }
 
     def _repr_latex_(self) -> str:
         return f"$\\displaystyle {self.latex()}$"
 
 
+@budget("derivation", 60.0, "declare the curve and the forces by shorter expressions")
 def derive(
     curve: Curve,
     kernel: Kernel,
@@ -205,16 +253,22 @@ def derive(
         If a name means two things, a default belongs to no parameter, or a form is nowhere real.
     DerivationError
         If a closed form is not real and finite.
+    BudgetError
+        If it takes more than a minute of processor time, or is nested too deeply.
     """
-    defaults = _join(curve, kernel, parameters or {})
-    values = dict(defaults)
-    shape = geometry(curve, may_be_positive=tuple(name for name in values if is_positive(values[name])))
-    x, z = without_poles(curve.x), without_poles(curve.z)
-    law = forces(x, z, kernel, shape)
     lam = curve.parameter
+    kernel = kernel.along(lam)
+    defaults = join(curve, kernel, parameters or {})
+    values = dict(defaults)
+    track = geometry(curve, may_be_positive=tuple(name for name in values if is_positive(values[name])))
+    x, z, shape = beside(without_poles(curve.x), without_poles(curve.z), track, kernel.radius)
+    law = forces(x, z, kernel, shape)
+    loss, speed, level = None, conservative_speed(law, lam), level_set(curve)
+    if not kernel.conservative:
+        loss = _losses(curve, kernel, x, z, law, shape)
+        speed = dissipative_speed(kernel, law, shape, loss, curve)
+    pressure = shape.kappa * speed.held + law.reaction
     start = {lam: LAM0}
-    speed_squared = V0**2 + tidy(law.climb.xreplace(start) - law.climb)
-    pressure = shape.kappa * speed_squared + law.reaction
     model = Model(
         curve=curve,
         force=kernel,
@@ -237,58 +291,48 @@ def derive(
         climb=law.climb,
         climb_slope=law.climb_slope,
         reaction=law.reaction,
-        speed_squared=speed_squared,
+        dissipation=loss,
+        speed_squared=speed.squared,
+        speed_squared_form=speed.form,
         normal_force=MASS * pressure,
-        kernel=law.acceleration,
-        time_integrand=shape.ds / sp.sqrt(speed_squared),
-        regularised_integrand=shape.ds * sp.sqrt((lam - LAM1) * (LAM2 - lam) / speed_squared),
-        turning_point_equation=sp.Eq(speed_squared, 0, evaluate=False),
+        side_force=2 * MASS * kernel.spin * DIRECTION * sp.sqrt(speed.held) * shape.dxds,
+        kernel=law.push / kernel.inertia if loss is None else loss.along(loss.acceleration),
+        time_integrand=shape.ds / sp.sqrt(speed.held),
+        regularised_integrand=shape.ds * sp.sqrt((lam - LAM1) * (LAM2 - lam) / speed.held),
+        turning_point_equation=sp.Eq(speed.squared, 0, evaluate=False),
         liftoff_equation=sp.Eq(pressure, 0, evaluate=False),
+        liftoff_speed_squared=_liftoff_speed(speed, shape.kappa, law.reaction),
         defaults=defaults,
         positive=shape.positive,
-        notes=shape.notes,
+        at_least=kernel.at_least,
+        notes=(*(() if level is None else (level.note,)), *shape.notes, *(() if loss is None else (speed.note,))),
+        level_set=level,
     )
     for label, form in model.closed_forms():
         check_real(form, where=label)
-    tried = (("x", x), ("z", z), (f"ds/d{lam.name}", shape.ds), ("potential", law.potential))
-    check_somewhere_real(tried, lam, curve.domain, values)
+    if not curve.charted:
+        tried = (("x", x), ("z", z), (f"ds/d{lam.name}", shape.ds), ("potential", law.potential))
+        check_somewhere_real(tried, lam, curve.domain, values)
     return model
 
 
-def _join(curve: Curve, kernel: Kernel, given: Mapping[str, Given | None]) -> tuple[tuple[str, Value | None], ...]:
-    """Join the parameters of curve and kernel, g and m last."""
-    own, forced = dict(curve.defaults), dict(kernel.defaults)
-    lam = curve.parameter.name
-    if lam in forced:
-        raise DeclarationError(
-            f"derive: {lam!r} is the curve's parameter and a parameter of the kernel; give one of them another name"
-        )
-    for name in own.keys() & forced.keys():
-        if name not in COMMON:
-            raise DeclarationError(
-                f"derive: the name {name!r} means one thing in the curve and another in the "
-                f'kernel; give one of them another name, as in {name}="{name}2"'
-            )
-    if lam in COMMON:
-        raise DeclarationError(
-            f"derive: {lam!r} means {'gravity' if lam == 'g' else 'mass'} everywhere; "
-            "give the curve's parameter another name"
-        )
-    values: dict[str, Value | None] = {**own, **forced}
-    values.setdefault("m", COMMON_DEFAULTS["m"])
-    order = [name for name in values if name not in COMMON]
-    order += [name for name in COMMON if name in values]
-    for name, value in given.items():
-        if name not in values:
-            raise DeclarationError(
-                f"derive: parameters: {name!r} is no parameter of this curve and kernel; they have {', '.join(order)}"
-            )
-        values[name] = None if value is None else read_value(value, where=f"parameters: {name}")
-    _refuse_negative(curve, kernel, values)
-    return tuple((name, values[name]) for name in order)
+def _losses(curve: Curve, kernel: Kernel, x: sp.Expr, z: sp.Expr, law: Forces, shape: Geometry) -> Dissipation:
+    lam = curve.parameter
+    signs = Signs(parameter=lam, domain=curve.domain, positive=shape.positive, may_be_positive=())
+    # A curve's own parameter may be called x, and then means that in a law.
+    coordinates = {symbol: form for symbol, form in ((X, x), (Z, z)) if symbol != lam}
+    pieces = {
+        **{SIGMA: shape.ds, KAPPA: shape.kappa, TURN: shape.turning_rate, TILT: shape.dxds},
+        **{PUSH: law.push, LOAD: law.reaction},
+    }
+    loss = dissipation(kernel, pieces, coordinates, signs)
+    for way, form in zip(("forwards", "backwards"), loss.holds, strict=True):
+        check_real(form, where=f"the law of a body at rest that is about to move {way}")
+    return loss
 
 
-def _refuse_negative(curve: Curve, kernel: Kernel, values: Mapping[str, Value | None]) -> None:
-    for name in (*curve.positive, *kernel.positive, "m"):
-        if not is_positive(values[name]):
-            raise DeclarationError(f"derive: parameters: {name!r} must be positive, got {values[name]}")
+def _liftoff_speed(speed: SpeedField, kappa: sp.Expr, reaction: sp.Expr) -> sp.Expr | None:
+    """Solve kappa*W + n0 = 0 for v0**2."""
+    if speed.gain is None or not kappa:
+        return None
+    return -(reaction / kappa + speed.squared.xreplace({V0: sp.S.Zero})) / speed.gain

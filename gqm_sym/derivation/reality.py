@@ -32,12 +32,7 @@ def check_somewhere_real(
     if any(end is not None and end.free_symbols & unset for end in domain):
         return
     low, high = (None if end is None else end.xreplace(values) for end in domain)
-    if low is not None and high is not None:
-        places = [low + (high - low) * share for share in _SHARES]
-    elif low is not None or high is not None:
-        places = [high - abs(p) if low is None else low + abs(p) for p in _PLACES]
-    else:
-        places = list(_PLACES)
+    places = tried_places((low, high))
     for label, form in forms:
         at = form.xreplace(values)
         if at.free_symbols & unset:
@@ -47,6 +42,16 @@ def check_somewhere_real(
                 f"{label}: {form} is not a real number at any place tried with the default parameters; "
                 "declare a curve and a potential that are real, or a domain on which they are"
             )
+
+
+def tried_places(domain: tuple[sp.Expr | None, sp.Expr | None]) -> list[sp.Expr]:
+    """Places of a range at which to try a form."""
+    low, high = domain
+    if low is not None and high is not None:
+        return [low + (high - low) * share for share in _SHARES]
+    if low is not None or high is not None:
+        return [high - abs(p) if low is None else low + abs(p) for p in _PLACES]
+    return list(_PLACES)
 
 
 def _is_real(number: sp.Expr) -> bool:

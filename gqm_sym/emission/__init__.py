@@ -5,6 +5,7 @@ import keyword
 import sympy
 from sympy import Expr
 
+from gqm_sym.budgets import budget
 from gqm_sym.derivation import Model
 from gqm_sym.emission.lower import lower
 from gqm_sym.emission.render import body_digests, render
@@ -13,6 +14,7 @@ from gqm_sym.errors import InputError
 __all__ = ["body_digests", "emit"]
 
 
+@budget("emission", 60.0, "declare the curve and the forces by shorter expressions")
 def emit(model: Model, *, name: str) -> str:
     """The module's text for a model. The same model and name give the same bytes.
 
@@ -29,6 +31,8 @@ def emit(model: Model, *, name: str) -> str:
         If the name is none.
     EmissionError
         If an expression has no form in emitted code; the message names it.
+    BudgetError
+        If it takes more than a minute of processor time, or is nested too deeply.
     """
     if not (isinstance(name, str) and name.isascii() and name.isidentifier()) or keyword.iskeyword(name):
         raise InputError(
@@ -47,4 +51,10 @@ def _source(model: Model, name: str) -> str:
     parts = [name, model.title, model.parameter.name, exact(curve.x), exact(curve.z)]
     parts += [exact(e) for e in (*curve.domain, curve.period, model.climb, model.reaction, model.inertia)]
     parts += [repr(model.defaults), repr(model.positive)]
+    if model.at_least:
+        parts.append(repr(model.at_least))
+    if (loss := model.dissipation) is not None:
+        parts += [exact(e) for e in (loss.drive, loss.decay, *loss.holds, *(form for _, form in loss.pieces))]
+    if curve.charted:
+        parts.append(repr(curve.definition))
     return "\n".join(parts)

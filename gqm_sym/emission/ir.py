@@ -48,26 +48,63 @@ class FunctionIR:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ExactIR:
-    """One formula over a namespace of operations; an output that does not exist is None."""
+    """One formula over a namespace of operations; an output that does not exist is None.
+
+    ``at_place`` says whether it depends on a place of the curve, or on the run-time parameters alone.
+    """
 
     name: str
     doc: str
     parameters: tuple[tuple[str, int], ...]
     inside: tuple[Assignment, ...]
     outputs: tuple[Expr | None, ...]
+    at_place: bool = True
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ChartIR:
+    """How a module makes the chart of its curve.
+
+    Attributes
+    ----------
+    statement : str
+        The expression that makes the maker, as in ``Traced(field.address, exact_start, 1)``.
+    imports : tuple of str
+        Names it needs from the runtime.
+    functions, exact
+        Functions it needs.
+    data : tuple of (str, str)
+        Names and texts of long literals it needs.
+    """
+
+    statement: str
+    imports: tuple[str, ...]
+    functions: tuple[FunctionIR, ...] = ()
+    exact: tuple[ExactIR, ...] = ()
+    data: tuple[tuple[str, str], ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ModuleIR:
-    """A whole module, ready to print."""
+    """A whole module, ready to print.
+
+    ``dissipation`` holds what is said of a force law that is not conservative; then there are no ``bounds``.
+    ``body`` is the radius of a rolling body that must fit into its track, empty for any other; ``grip`` names beta and
+    mu_static of one that may slip.
+    """
 
     name: str
     title: str
     parameter: str
     defaults: tuple[tuple[str, float | int | str | None], ...]
     positive: tuple[str, ...]
+    at_least: tuple[tuple[str, str], ...]
     forms: tuple[tuple[str, Expr], ...]
     notes: tuple[str, ...]
     functions: tuple[FunctionIR, ...]
-    bounds: FunctionIR
+    bounds: FunctionIR | None
     exact: tuple[ExactIR, ...]
+    dissipation: tuple[tuple[str, bool], ...]
+    body: str
+    grip: tuple[str, str] | None
+    chart: ChartIR | None

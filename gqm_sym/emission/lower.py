@@ -3,12 +3,20 @@
 from collections.abc import Iterable, Sequence
 
 import sympy
-from sympy import Expr, Function, Rational, Symbol
+from sympy import Basic, Expr, Function, Rational, Symbol
 
 from gqm_sym.derivation import Model
 from gqm_sym.derivation.difference import Differences
+from gqm_sym.emission.charts import chart_maker
+from gqm_sym.emission.dissipative import drive, hold
 from gqm_sym.emission.ir import Assignment, ExactIR, FunctionIR, ModuleIR
+from gqm_sym.emission.places import at
 from gqm_sym.emission.printer import check_emittable
+from gqm_sym.errors import EmissionError
+from gqm_sym.kernels.base import CONTACT_SIGN, DIRECTION, W
+
+FLAGS = ("friction", "kinked", "linear")
+"""What a module says of a force law that is not conservative."""
 
 
 class Names:
@@ -26,21 +34,36 @@ class Names:
         return Symbol(self(name), real=True)
 
 
+# Operations of one function, written out: a long curve has some thousand, and SymPy goes through 10**5 in seconds.
+MAX_SIZE = 200_000
+
+
 def lower(model: Model, *, name: str, forms: tuple[tuple[str, Expr], ...]) -> ModuleIR:
     """All functions of the module for ``model``."""
     _check(model)
-    lowering = _Lowering(model)
+    lowering = Lowering(model)
+    loss = model.dissipation
+    if loss is None:
+        functions: tuple[FunctionIR, ...] = (lowering.climb(), lowering.rise(), lowering.bend())
+    else:
+        functions = (drive(lowering, loss), hold(lowering, loss))
+    exact = () if model.curve.charted else (*(lowering.exact() if loss is None else ()), lowering.domain())
     return ModuleIR(
         name=name,
         title=model.title,
         parameter=model.parameter.name,
         defaults=model.defaults,
         positive=model.positive,
+        at_least=model.at_least,
         forms=forms,
         notes=model.notes,
-        functions=(lowering.frame(), lowering.climb(), lowering.rise(), lowering.bend()),
-        bounds=lowering.bounds(),
-        exact=lowering.exact(),
+        functions=(lowering.frame(), *functions),
+        bounds=lowering.bounds() if loss is None else None,
+        exact=exact,
+        dissipation=() if loss is None else tuple((flag, getattr(loss, flag)) for flag in FLAGS),
+        body=str(model.force.radius) if model.force.radius else "",
+        grip=model.force.grip,
+        chart=chart_maker(lowering),
     )
 
 
@@ -50,15 +73,21 @@ def _check(model: Model) -> None:
     low, high = model.domain
     forms = {
         **{"x": model.x, "z": model.z, "ds": model.ds, "kappa": model.kappa, "reaction": model.reaction},
-        **{"climb": model.climb, "climb_slope": model.climb_slope},
         **{"domain, low": low, "domain, high": high, "period": model.period},
     }
+    loss = model.dissipation
+    if loss is None:
+        forms |= {"climb": model.climb, "climb_slope": model.climb_slope}
+    else:
+        names |= {DIRECTION.name, CONTACT_SIGN.name, W.name}
+        laws = {"P": loss.drive, "Q": loss.decay, "A at rest": loss.holds[0], "A at rest, backwards": loss.holds[1]}
+        forms |= {label: loss.along(form) for label, form in laws.items()}
     for label, form in forms.items():
         if form is not None:
             check_emittable(form, names, where=label)
 
 
-class _Lowering:
+class Lowering:
     """The functions of one model, sharing its names."""
 
     def __init__(self, model: Model) -> None:
@@ -72,26 +101,26 @@ class _Lowering:
         model, v2 = self.model, self.names.symbol("v2")
         force = Symbol("m", real=True) * (model.kappa * v2 + model.reaction)
         places, speeds = self.names("places"), self.names("speeds")
-        return self._function(
+        return self.function(
             "frame",
             "FRAME",
             (places, speeds),
             "x, z, ds/d{0}, signed curvature and contact force, given V**2 (paper, eq. 15).",
             views=((places, self.names("n")), (speeds, self.names("n"))),
-            inside=[(self.place, _at(places)), (v2, _at(speeds))],
+            inside=[(self.place, at(places)), (v2, at(speeds))],
             outputs=(model.x, model.z, model.ds, model.kappa, force),
         )
 
     def climb(self) -> FunctionIR:
         """The climb and its slope."""
         places = self.names("places")
-        return self._function(
+        return self.function(
             "climb",
             "CLIMB",
             (places,),
             "What V**2 loses in climbing to {0}, up to a constant, and its derivative (paper, eq. 13).",
             views=((places, self.names("n")),),
-            inside=[(self.place, _at(places))],
+            inside=[(self.place, at(places))],
             outputs=(self.model.climb, self.model.climb_slope),
         )
 
@@ -100,13 +129,13 @@ class _Lowering:
         a, d = self.names.symbol("a"), self.names.symbol("d")
         places, offsets = self.names("places"), self.names("offsets")
         differences = Differences(self.place, (a, self.place), {(0, 1): d})
-        return self._function(
+        return self.function(
             "rise",
             "RISE",
             (a.name, places, offsets),
             "climb[a, {0}] = (climb({0}) - climb(a))/({0} - a) without cancellation, and ds/d{0}.",
             views=((places, self.names("n")), (offsets, self.names("n"))),
-            inside=[(self.place, _at(places)), (d, _at(offsets))],
+            inside=[(self.place, at(places)), (d, at(offsets))],
             outputs=(differences.first(self.model.climb, 0, 1), self.model.ds),
         )
 
@@ -115,15 +144,15 @@ class _Lowering:
         a, b, da, db = (self.names.symbol(s) for s in ("a", "b", "da", "db"))
         left, right = self.names("left"), self.names("right")
         differences = Differences(self.place, (a, self.place, b), {(0, 1): da, (1, 2): db, (0, 2): b - a})
-        return self._function(
+        return self.function(
             "bend",
             "BEND",
             (a.name, b.name, left, right),
             "climb[a, {0}, b] = V**2/(({0} - a)*(b - {0})) between turning points, without cancellation, and ds/d{0}.",
             views=((left, self.names("n")), (right, self.names("n"))),
             inside=[
-                (da, _at(left)),
-                (db, _at(right)),
+                (da, at(left)),
+                (db, at(right)),
                 (self.place, Function("nearest")(a, b, da, db)),
             ],
             outputs=(differences.second(self.model.climb), self.model.ds),
@@ -133,14 +162,14 @@ class _Lowering:
         """Interval enclosures of the climb's slope and of ds."""
         outputs = (self.model.climb_slope, self.model.ds)
         replaced, reduced = sympy.cse(outputs, symbols=sympy.numbered_symbols("_t", real=True), order="canonical")
-        lo, hi = self.names("lo"), self.names("hi")
+        lo, hi, p, out = (self.names(name) for name in ("lo", "hi", "p", "out"))
         return FunctionIR(
             name="bounds",
             signature="BOUNDS",
-            arguments=(lo, hi, self.names("p"), self.names("out")),
+            arguments=(lo, hi, p, out),
             doc=f"Bounds of the climb's slope and of ds/d{self.place} for {lo} <= {self.place} <= {hi}.",
-            views=(),
-            parameters=self._used(outputs),
+            views=((p, str(len(self.order))), (out, "4")),
+            parameters=self.used(outputs),
             before=(),
             inside=tuple(Assignment(name=s.name, value=v) for s, v in replaced),
             outputs=tuple(reduced),
@@ -158,27 +187,33 @@ class _Lowering:
             ("climb", "What V**2 loses in climbing, up to a constant.", (model.climb,)),
             ("climb_slope", f"Its derivative by {self.place}.", (model.climb_slope,)),
         )
-        ends = (*model.curve.domain, model.curve.period)
-        domain = ExactIR(
+        return tuple(self.exact_function(*entry) for entry in named)
+
+    def domain(self) -> ExactIR:
+        """The range of the curve's parameter."""
+        curve = self.model.curve
+        ends = (*curve.domain, curve.period)
+        return ExactIR(
             name="exact_domain",
             doc="Both ends of the domain, and the period; None where there is none.",
-            parameters=self._used(e for e in ends if e is not None),
+            parameters=self.used(e for e in ends if e is not None),
             inside=(),
             outputs=ends,
+            at_place=False,
         )
-        return (*(self._exact(*entry) for entry in named), domain)
 
-    def _exact(self, name: str, doc: str, outputs: tuple[Expr, ...]) -> ExactIR:
+    def exact_function(self, name: str, doc: str, outputs: tuple[Expr, ...]) -> ExactIR:
+        """A formula over a namespace of operations."""
         replaced, reduced = sympy.cse(outputs, symbols=sympy.numbered_symbols("_t", real=True), order="canonical")
         return ExactIR(
             name=f"exact_{name}",
             doc=doc,
-            parameters=self._used(outputs),
+            parameters=self.used(outputs),
             inside=tuple(Assignment(name=s.name, value=v) for s, v in replaced),
             outputs=tuple(reduced),
         )
 
-    def _function(
+    def function(
         self,
         name: str,
         signature: str,
@@ -190,7 +225,8 @@ class _Lowering:
         outputs: tuple[Expr, ...],
     ) -> FunctionIR:
         """Share common subexpressions, and move what does not depend on the place in front of the loop."""
-        used = self._used([*outputs, *(value for _, value in inside)])
+        _check_size(outputs, where=name)
+        used = self.used([*outputs, *(value for _, value in inside)])
         moving = {symbol for symbol, _ in inside}
         prepared, fixed = _hoist([_half_powers(e) for e in outputs], moving)
         everything = [value for _, value in fixed] + prepared
@@ -204,8 +240,12 @@ class _Lowering:
             else:
                 before.append(Assignment(name=symbol.name, value=value))
         before += [Assignment(name=s.name, value=v) for (s, _), v in zip(fixed, reduced, strict=False)]
-        needed = set().union(*(a.value.free_symbols for a in [*loop, *before]), *(e.free_symbols for e in reduced))
-        kept = [a for a in loop if any(a.name == s.name for s in needed)]
+        needed = {s.name for e in (*reduced, *(a.value for a in before)) for s in e.free_symbols}
+        kept: list[Assignment] = []
+        for a in reversed(loop):  # what only something unused needs is unused too
+            if a.name in needed:
+                kept.insert(0, a)
+                needed |= {s.name for s in a.value.free_symbols}
         p, out = self.names("p"), self.names("out")
         return FunctionIR(
             name=name,
@@ -223,9 +263,30 @@ class _Lowering:
             outputs=tuple(reduced[len(fixed) :]),
         )
 
-    def _used(self, expressions: Iterable[Expr]) -> tuple[tuple[str, int], ...]:
+    def used(self, expressions: Iterable[Expr]) -> tuple[tuple[str, int], ...]:
+        """The run-time parameters in some expressions, and where they stand in ``p``."""
         free = {s.name for e in expressions for s in e.free_symbols}
         return tuple((name, i) for name, i in self.order.items() if name in free)
+
+
+def _check_size(outputs: Iterable[Expr], *, where: str) -> None:
+    """Refuse what is too large to be gone through term by term, as SymPy does at every step.
+
+    Divided differences share most of their parts, so that one of a thousand parts may be of 10**12 when written out.
+    """
+    sizes: dict[Basic, int] = {}
+
+    def size(node: Basic) -> int:
+        if node not in sizes:
+            sizes[node] = 1 + sum(size(part) for part in node.args)
+        return sizes[node]
+
+    total = sum(size(form) for form in outputs)
+    if total > MAX_SIZE:
+        raise EmissionError(
+            f"{where}: a formula of {total} operations, and at most {MAX_SIZE} are emitted; "
+            "declare the curve and the forces by shorter expressions"
+        )
 
 
 def _sorted(assignments: list[Assignment]) -> tuple[Assignment, ...]:
@@ -236,11 +297,6 @@ def _sorted(assignments: list[Assignment]) -> tuple[Assignment, ...]:
         for a in ready:
             out.append(waiting.pop(a.name))
     return tuple(out)
-
-
-def _at(array: str) -> Expr:
-    """The element of an array that the loop stands at."""
-    return Function("at")(Symbol(array, real=True))
 
 
 def _half_powers(e: Expr) -> Expr:

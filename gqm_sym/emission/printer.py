@@ -1,5 +1,6 @@
 """SymPy expressions as Python text: over floats, over a namespace of operations, and over intervals."""
 
+import re
 from collections.abc import Collection
 from typing import Any
 
@@ -33,6 +34,10 @@ FUNCTIONS = {
     "Abs": "fabs",
 }
 
+# Rows of a chart, which compiled code reads from the array ``chart``.
+CHARTED = frozenset({"chart_x", "chart_z", "chart_alpha", "chart_kappa"})
+_CHART_CALL = re.compile(r"chart_[a-z]+[12]?")
+
 
 def check_emittable(expr: Expr, names: Collection[str], *, where: str) -> None:
     """Refuse what the printers below have no text for, by name.
@@ -58,7 +63,9 @@ def check_emittable(expr: Expr, names: Collection[str], *, where: str) -> None:
 def _has_text(node: Basic) -> bool:
     if isinstance(node, Rational):
         return True
-    return node.is_Add or node.is_Mul or node.is_Pow or node in (pi, Exp1()) or type(node).__name__ in FUNCTIONS
+    if node.is_Add or node.is_Mul or node.is_Pow or node in (pi, Exp1()):
+        return True
+    return type(node).__name__ in {*FUNCTIONS, *CHARTED}
 
 
 def as_double(number: Rational) -> float:
@@ -81,6 +88,7 @@ def is_double(number: Rational) -> bool:
 class CodePrinter(StrPrinter):  # type: ignore[misc]
     """Numba code over floats; ``used`` collects the functions that must be imported."""
 
+    printmethod = "_emitted"
     prefix = ""
     names = FUNCTIONS
 
@@ -91,13 +99,16 @@ class CodePrinter(StrPrinter):  # type: ignore[misc]
 
     def _call(self, name: str, *arguments: Expr) -> str:
         self.used.add(name)
-        return f"{self.prefix}{name}({', '.join(self._print(a) for a in arguments)})"
+        texts = [self._print(a) for a in arguments]
+        if _CHART_CALL.fullmatch(name.removeprefix("i")):
+            texts.insert(0, "chart")
+        return f"{self.prefix}{name}({', '.join(texts)})"
 
     def _print_Function(self, expr: Expr) -> str:
         name = type(expr).__name__
         if name == "at":  # the element of an array that the loop stands at
             return f"{expr.args[0]}[{self.index}]"
-        if isinstance(expr, AppliedUndef):  # a helper of the runtime
+        if isinstance(expr, AppliedUndef) or name in CHARTED:  # a helper of the runtime
             return self._call(name, *expr.args)
         return self._call(self.names[name], *expr.args)
 
@@ -159,7 +170,8 @@ class IntervalPrinter(CodePrinter):
     """Code over intervals (lo, hi), as calls of the runtime's interval helpers."""
 
     def _print_Function(self, expr: Expr) -> str:
-        name = self.names[type(expr).__name__]
+        name = type(expr).__name__
+        name = self.names.get(name, name)
         return self._call("i" + name.replace("fabs", "abs"), *expr.args)
 
     _print_Abs = _print_exp = _print_log = _print_Function

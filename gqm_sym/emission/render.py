@@ -16,31 +16,27 @@ from gqm_sym.emission.printer import FUNCTIONS, CodePrinter, ExactPrinter, Inter
 from gqm_sym.errors import EmissionError
 
 # The version of gqm_sym.runtime.interface that emitted code is written for (a test holds the two together).
-INTERFACE = 1
+INTERFACE = 2
 
 _MATH = frozenset({*FUNCTIONS.values(), "sqrt", "pi", "e"})
-_RUNTIME = (
-    "BEND",
-    "BOUNDS",
-    "CLIMB",
-    "FRAME",
-    "RISE",
-    "Addresses",
-    "ExactFormulas",
-    "Formulas",
-    "Motion",
-    "Pass1",
-    "compiler",
-)
+_RUNTIME = ("Addresses", "Formulas", "Motion", "Pass1", "Sweep")
+# Functions that every module hands over, as the interface orders them.
+_ADDRESSES = ("frame", "climb", "rise", "bend", "bounds")
 # Names that mean something in every emitted module: no run-time parameter may take them.
 _OWN = frozenset(
     {
         *_RUNTIME,
         "Any",
+        "CHART",
+        "Dissipation",
+        "ExactFormulas",
         "MODEL",
         "PARAMETERS",
         "carray",
+        "chart",
+        "chart_of",
         "compiled",
+        "compiler",
         "fabs",
         "range",
         "op",
@@ -48,35 +44,55 @@ _OWN = frozenset(
         "nearest",
     }
 )
-_OWN |= {"frame", "climb", "rise", "bend", "bounds", "pass1", "solve", "sweep"}
+_OWN |= {"pass1", "solve", "sweep"}
 
 
 def render(module: ModuleIR, *, source: str) -> str:
     """The text of a module. ``source`` is the canonical text of what it was made from, for its digest."""
     functions, used = [], set[str]()
-    for function in module.functions:
+    chart = module.chart
+    for function in (*module.functions, *(chart.functions if chart else ())):
         text, names = _loop(function)
         functions.append(text)
         used |= names
-    bounds, intervals = _bounds(module.bounds, module.parameter)
-    functions.append(bounds)
-    _refuse_own_names(module, used | intervals)
+    intervals = set[str]()
+    if module.bounds is not None:
+        bounds, intervals = _bounds(module.bounds, module.parameter)
+        functions.append(bounds)
+    runtime = {*_RUNTIME, *(f["signature"] for f in functions)}
+    if chart:
+        runtime |= set(chart.imports)
+    elif module.dissipation == ():
+        runtime.add("ExactFormulas")
+    if module.dissipation:
+        runtime.add("Dissipation")
+    charted = {name for name in used | intervals if name.removeprefix("i").startswith("chart_")}
+    _refuse_own_names(module, used | intervals | runtime | {f["name"] for f in functions})
     environment = _environment()
     fields: dict[str, Any] = {
         "interface": INTERFACE,
         "title": _quoted(module.title or module.name),
         "forms": [_quoted(line) for line in _forms(module)],
         "math": sorted(used & _MATH),
-        "runtime": list(_RUNTIME),
-        "differences": sorted(used - _MATH - {"nearest"}),
-        "intervals": sorted(intervals),
+        "runtime": sorted(runtime, key=_as_imported),
+        "charted": sorted({*charted, "chart_of"}) if charted else [],
+        "differences": sorted(used - _MATH - charted - {"nearest"}),
+        "intervals": sorted(intervals - charted),
+        "nearest": "nearest" in used,
         "defaults": [(repr(name), repr(value)) for name, value in module.defaults],
         "functions": functions,
-        "exact": [_exact(f, module.parameter) for f in module.exact],
+        "exact": [_exact(f, module.parameter) for f in (*module.exact, *(chart.exact if chart else ()))],
+        "chart": chart.statement if chart else "",
+        "data": list(chart.data) if chart else [],
         "name_text": repr(module.name),
         "parameter": module.parameter,
         "parameter_text": repr(module.parameter),
         "positive": repr(module.positive),
+        "at_least": repr(module.at_least) if module.at_least else "",
+        "body": repr(module.body) if module.body else "",
+        "grip": repr(module.grip) if module.grip else "",
+        "addresses": ", ".join(f"{f['name']}.address" for f in functions if f["name"] in _ADDRESSES),
+        "dissipation": ", ".join(f"{flag}={value}" for flag, value in module.dissipation),
         "keywords": ", ".join(f"{name}: Any = {value!r}" for name, value in module.defaults),
         "names": ", ".join(name for name, _ in module.defaults),
     }
@@ -97,6 +113,11 @@ def body_digests(text: str) -> tuple[str, str] | None:
     if not first.startswith("# Made by gqm-gen") or " body " not in second:
         return None
     return second.rpartition(" body ")[2].strip(), _digest(body)
+
+
+def _as_imported(name: str) -> tuple[int, str]:
+    """The order in which names of one import stand: constants, classes, functions."""
+    return (0 if name.isupper() else 1 if name[0].isupper() else 2, name)
 
 
 def _tidied(text: str) -> str:
@@ -145,9 +166,8 @@ def _loop(function: FunctionIR) -> tuple[dict[str, Any], set[str]]:
     taken = {name for name, _ in function.parameters} | {a.name for a in function.inside}
     index = "_i" if "i" in taken else "i"
     printer = CodePrinter(index)
-    names, shapes = zip(*function.views, strict=True)
     count, out = function.arguments[0], function.arguments[-1]
-    before = [f"{', '.join(names)} = {', '.join(f'carray({n}, {s})' for n, s in zip(names, shapes, strict=True))}"]
+    before = [_views(function)]
     if function.parameters:
         left = ", ".join(n for n, _ in function.parameters)
         right = ", ".join(f"{function.arguments[-2]}[{i}]" for _, i in function.parameters)
@@ -155,6 +175,7 @@ def _loop(function: FunctionIR) -> tuple[dict[str, Any], set[str]]:
     before += _statements(function.before, printer)
     inside = _statements(function.inside, printer)
     inside += [f"{out}[{row}, {index}] = {printer.doprint(e)}" for row, e in enumerate(function.outputs)]
+    before = _chart_view(function, printer) + before
     fields = {
         "name": function.name,
         "signature": function.signature,
@@ -169,15 +190,27 @@ def _loop(function: FunctionIR) -> tuple[dict[str, Any], set[str]]:
     return fields, printer.used
 
 
+def _views(function: FunctionIR) -> str:
+    """Arguments that are seen as arrays."""
+    names = ", ".join(name for name, _ in function.views)
+    return f"{names} = {', '.join(f'carray({name}, {shape})' for name, shape in function.views)}"
+
+
+def _chart_view(function: FunctionIR, printer: CodePrinter) -> list[str]:
+    """Where a function reads its curve's chart: behind the run-time parameters."""
+    p, count = function.views[-2]
+    return [f"chart = chart_of({p}, {count})"] if any("chart_" in name for name in printer.used) else []
+
+
 def _bounds(function: FunctionIR, parameter: str) -> tuple[dict[str, Any], set[str]]:
     printer = IntervalPrinter()
     lo, hi, p, out = function.arguments
-    before = [f"{p}, {out} = carray({p}, {max((i for _, i in function.parameters), default=0) + 1}), carray({out}, 4)"]
-    before.append(f"{parameter} = ({lo}, {hi})")
+    before = [_views(function), f"{parameter} = ({lo}, {hi})"]
     before += [f"{name} = ({p}[{i}], {p}[{i}])" for name, i in function.parameters]
     inside = _statements(function.inside, printer)
     for row, e in enumerate(function.outputs):
         inside.append(f"{out}[{2 * row}], {out}[{2 * row + 1}] = {printer.doprint(e)}")
+    before = _chart_view(function, printer) + before
     fields = {
         "name": function.name,
         "signature": function.signature,
@@ -193,12 +226,11 @@ def _bounds(function: FunctionIR, parameter: str) -> tuple[dict[str, Any], set[s
 def _exact(function: ExactIR, parameter: str) -> dict[str, Any]:
     printer = ExactPrinter()
     p = "_p" if "p" in {name for name, _ in function.parameters} | {parameter} else "p"
-    domain = function.name == "exact_domain"
     inside = _unpacked(function.parameters, p)
     inside += _statements(function.inside, printer)
     values = ["None" if e is None else printer.doprint(e) for e in function.outputs]
     inside.append(f"return {', '.join(values)}")
-    arguments = ("op", p) if domain else ("op", parameter, p)
+    arguments = ("op", parameter, p) if function.at_place else ("op", p)
     return {
         "name": function.name,
         "arguments": ", ".join(arguments),

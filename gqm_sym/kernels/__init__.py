@@ -5,10 +5,13 @@ from dataclasses import dataclass
 
 from gqm_sym.kernels.base import Kernel
 from gqm_sym.kernels.central_force import CentralForce
+from gqm_sym.kernels.coulomb import CoulombFriction
+from gqm_sym.kernels.drag import QuadraticDrag
 from gqm_sym.kernels.gravity import Gravity
 from gqm_sym.kernels.potential import Potential
 from gqm_sym.kernels.rolling import Rolling
 from gqm_sym.kernels.rotating_frame import RotatingFrame
+from gqm_sym.kernels.surface_tension import SurfaceTension
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -33,8 +36,26 @@ KERNELS: dict[str, KernelRow] = {
         KernelRow(
             name="rolling",
             make=Rolling,
-            arguments=("beta",),
-            summary="rolling without slipping: inertia 1 + beta",
+            arguments=("beta", "radius", "mu_static"),
+            summary="rolling without slipping: inertia 1 + beta; with a radius the curve is the track",
+        ),
+        KernelRow(
+            name="coulomb",
+            make=CoulombFriction,
+            arguments=("mu", "mu_static"),
+            summary="friction mu*|N| of a body that slides, up to mu_static*|N| of one at rest",
+        ),
+        KernelRow(
+            name="drag",
+            make=QuadraticDrag,
+            arguments=("b",),
+            summary="drag b*V**2 against the motion",
+        ),
+        KernelRow(
+            name="surface_tension",
+            make=SurfaceTension,
+            arguments=("gamma", "ell_c", "form"),
+            summary="resistance of a droplet: gamma*ell_c**2*|kappa|/m",
         ),
         KernelRow(
             name="rotating_frame",
@@ -54,16 +75,25 @@ KERNELS: dict[str, KernelRow] = {
             arguments=("centre", "k"),
             summary="attraction k/r**2 towards a centre",
         ),
+        KernelRow(
+            name="law",
+            make=Kernel.law,
+            arguments=("A",),
+            summary="a tangential acceleration in the curve's parameter, x, z, W = V**2 and direction",
+        ),
     )
 }
 
 __all__ = [
     "KERNELS",
     "CentralForce",
+    "CoulombFriction",
     "Gravity",
     "Kernel",
     "KernelRow",
     "Potential",
+    "QuadraticDrag",
     "Rolling",
     "RotatingFrame",
+    "SurfaceTension",
 ]

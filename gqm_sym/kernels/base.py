@@ -1,19 +1,41 @@
 """The force law as data: the slots of one linear equation for W = V**2, added slot by slot.
 
-A kernel contributes a potential per unit mass (the applied force is minus its gradient) and an
-inertia factor. See section 2 of the notes on the mathematics: dW/ds = 2*(F.t)/inertia.
+With v the sign of ds/dt, F the applied force per unit mass, n0 = -F.n and N/m = kappa*W + n0 (section 2 of the notes
+on the mathematics)::
+
+    inertia * dW/ds = 2*(F.t - v*resistance - v*drag*W - v*friction*|N|/m + extra)
 """
 
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
 
 import sympy as sp
 
 from gqm_sym.errors import DeclarationError
-from gqm_sym.parameters import COMMON, Given, Value, read_argument
+from gqm_sym.expressions import read_expression
+from gqm_sym.parameters import (
+    COMMON,
+    COORDINATES,
+    Given,
+    Value,
+    names_in_order,
+    read_argument,
+    read_parameters,
+    refuse_out_of_range,
+)
 
 X = sp.Symbol("x", real=True)
 Z = sp.Symbol("z", real=True)
 """The coordinates of the plane, in which potentials are written."""
+W = sp.Symbol("W", real=True)
+"""V**2, in laws that are not linear in it."""
+DIRECTION = sp.Symbol("direction", real=True)
+"""The sign of ds/dt."""
+CONTACT_SIGN = sp.Symbol("contact_sign", real=True)
+"""The sign of the contact force."""
+MASS = sp.Symbol("m", real=True)
+KAPPA = sp.Symbol("κ", real=True)
+"""Signed curvature, in a resistance; no parameter is called so, for those have ASCII names."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -23,27 +45,98 @@ class Kernel:
     Attributes
     ----------
     potential
-        Potential energy per unit mass in the coordinates ``x`` and ``z``.
+        Potential energy per unit mass in the coordinates ``x`` and ``z``; the applied force is minus its gradient.
     inertia
         What multiplies the acceleration: 1 for sliding, ``1 + beta`` for rolling.
+    resistance
+        What opposes motion and does not depend on speed, per unit mass, in proportion to the curvature `KAPPA` or to
+        its absolute value.
+    drag
+        Coefficient of V**2 in what opposes motion, 1/length.
+    friction, static_friction
+        Coefficients of the contact force in what opposes motion, and in what holds a body at rest.
+    extra
+        Tangential acceleration of the user's own, in the curve's parameter, coordinates, `W` and `DIRECTION`.
+    spin
+        Angular velocity of a frame that turns about the z axis: its Coriolis force presses out of the plane.
+    radius
+        Of a body that rolls to the left of growing λ (negative: to the right), whose centre moves on a path of its own.
+    grip
+        Of a rolling body whose static friction is known: its parameters beta and mu_static.
     terms
         Name and one line of text of every force in it.
     defaults
         Its run-time parameters in order, each with its default or None.
     positive
         Parameters promised to be positive.
+    at_least
+        Parameters with what they must not fall below: a number, or another parameter.
     """
 
     terms: tuple[tuple[str, str], ...]
     potential: sp.Expr = field(default=sp.S.Zero)
     inertia: sp.Expr = field(default=sp.S.One)
+    resistance: sp.Expr = field(default=sp.S.Zero)
+    drag: sp.Expr = field(default=sp.S.Zero)
+    friction: sp.Expr = field(default=sp.S.Zero)
+    static_friction: sp.Expr = field(default=sp.S.Zero)
+    extra: sp.Expr = field(default=sp.S.Zero)
+    spin: sp.Expr = field(default=sp.S.Zero)
+    radius: sp.Expr = field(default=sp.S.Zero)
+    grip: tuple[str, str] | None = None
     defaults: tuple[tuple[str, Value | None], ...] = ()
     positive: tuple[str, ...] = ()
+    at_least: tuple[tuple[str, str], ...] = ()
+
+    def __post_init__(self) -> None:
+        refuse_out_of_range(dict(self.defaults), self.positive, self.at_least, where="kernel")
+
+    @classmethod
+    def law(
+        cls,
+        A: str | sp.Expr,
+        *,
+        parameters: Mapping[str, Given | None] | Iterable[str] | None = None,
+    ) -> "Kernel":
+        """Return a force law of the user's own, which is added to the tangential acceleration.
+
+        Parameters
+        ----------
+        A
+            Acceleration along growing λ in the curve's parameter, its coordinates ``x`` and ``z``, ``W`` = V**2 and
+            ``direction`` = sgn(ds/dt); its other symbols are run-time parameters. It adds nothing to the contact force.
+        parameters
+            Their defaults, or their names in the order wanted.
+
+        Examples
+        --------
+        >>> Kernel.law("-k*direction*sqrt(W)", parameters={"k": "0.3"}).defaults
+        (('k', '0.3'),)
+        """
+        written = read_expression(A, where="law: A")
+        known = (W.name, DIRECTION.name, "lam", *COORDINATES)
+        found = tuple(name for name in names_in_order(written) if name not in known)
+        return cls(
+            terms=(("law", f"tangential acceleration {written}"),),
+            extra=written,
+            defaults=read_parameters(parameters, found=found, where="law"),
+        )
 
     @property
     def parameters(self) -> tuple[str, ...]:
         """Names of the run-time parameters, in order."""
         return tuple(name for name, _ in self.defaults)
+
+    @property
+    def conservative(self) -> bool:
+        """Whether V**2 depends on the place alone."""
+        return not any((self.resistance, self.drag, self.friction, self.extra))
+
+    def along(self, parameter: sp.Symbol) -> "Kernel":
+        """Return the law on a curve of this parameter, which a law of the user's own may name."""
+        if parameter not in self.extra.free_symbols:
+            return self
+        return replace(self, defaults=tuple(pair for pair in self.defaults if pair[0] != parameter.name))
 
     def __add__(self, other: "Kernel") -> "Kernel":
         if not isinstance(other, Kernel):
@@ -55,16 +148,30 @@ class Kernel:
             potential=self.potential + other.potential,
             # 1 + beta of one kernel and 1 of another: the excesses add.
             inertia=self.inertia + other.inertia - 1,
+            resistance=self.resistance + other.resistance,
+            drag=self.drag + other.drag,
+            friction=self.friction + other.friction,
+            static_friction=self.static_friction + other.static_friction,
+            extra=self.extra + other.extra,
+            spin=self.spin + other.spin,
+            radius=self.radius + other.radius,
+            grip=other.grip if self.grip is None else self.grip,
             defaults=(*self.defaults, *(pair for pair in other.defaults if pair[0] not in known)),
             positive=tuple(dict.fromkeys(self.positive + other.positive)),
+            at_least=tuple(dict.fromkeys(self.at_least + other.at_least)),
         )
 
 
 def _refuse_clashes(first: Kernel, second: Kernel) -> None:
-    names = dict(first.terms)
+    names = {name for name, _ in first.terms}
     for name, _ in second.terms:
         if name in names and name in _ONCE:
             raise DeclarationError(f"kernel: {name} is given twice; give it once")
+        if {name, *names} >= _EXCLUSIVE and name in _EXCLUSIVE:
+            raise DeclarationError(
+                "kernel: rolling and coulomb exclude each other: what rolls without slipping does not slide; "
+                "leave one of them out (rolling has mu_static, the friction that it needs)"
+            )
     values = dict(first.defaults)
     for name, value in second.defaults:
         if name not in values:
@@ -79,7 +186,8 @@ def _refuse_clashes(first: Kernel, second: Kernel) -> None:
 
 
 # Forces that act on a body as a whole: a second one is a mistake, not a sum.
-_ONCE = frozenset({"gravity", "rolling", "rotating_frame"})
+_ONCE = frozenset({"gravity", "rolling", "coulomb", "rotating_frame"})
+_EXCLUSIVE = frozenset({"rolling", "coulomb"})
 
 
 def parameter(given: Given | None, name: str, *, where: str) -> tuple[sp.Symbol, tuple[str, Value | None]]:

@@ -7,6 +7,8 @@ from gqm_sym.parameters import Given
 def RotatingFrame(*, Omega: Given | None = None) -> Kernel:
     """Return the centrifugal force of a track that turns about the z axis.
 
+    Its Coriolis force presses the body out of the plane: friction feels that too.
+
     Parameters
     ----------
     Omega
@@ -16,5 +18,6 @@ def RotatingFrame(*, Omega: Given | None = None) -> Kernel:
     return Kernel(
         terms=(("rotating_frame", f"frame turning about the z axis at {rate}"),),
         potential=-(rate**2) * X**2 / 2,
+        spin=rate,
         defaults=(pair,),
     )

@@ -8,27 +8,45 @@ from gqm_sym.runtime.interface import (
     BEND,
     BOUNDS,
     CLIMB,
+    DRIVE,
+    FIELD,
     FRAME,
+    HOLD,
     INTERFACE,
     RISE,
+    SEGMENT,
     Addresses,
+    Dissipation,
     ExactFormulas,
 )
 from gqm_sym.runtime.jit import compiler
 from gqm_sym.runtime.motion import Motion, State
+from gqm_sym.runtime.rail import Rail
+from gqm_sym.runtime.sampled import Sampled
+from gqm_sym.runtime.sweeping import Sweep
+from gqm_sym.runtime.tracing import Traced
 
 __all__ = [
     "BEND",
     "BOUNDS",
     "CLIMB",
+    "DRIVE",
+    "FIELD",
     "FRAME",
+    "HOLD",
     "INTERFACE",
     "RISE",
+    "SEGMENT",
     "Addresses",
+    "Dissipation",
     "ExactFormulas",
     "Formulas",
     "Motion",
     "Pass1",
+    "Rail",
+    "Sampled",
     "State",
+    "Sweep",
+    "Traced",
     "compiler",
 ]

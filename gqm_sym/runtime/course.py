@@ -43,6 +43,8 @@ class Piece:
         Arc length of the stretch's end ``a``, from the launch.
     end : str
         What ends it.
+    laps : int
+        How many times the closed curve has been run round before: places on the stretch are within one lap.
     """
 
     stretch: Stretch
@@ -54,6 +56,7 @@ class Piece:
     t_start: Pair
     s_a: float
     end: str
+    laps: int = 0
 
     @property
     def t_stop(self) -> Pair:

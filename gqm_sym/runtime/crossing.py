@@ -51,3 +51,27 @@ def call_bend(_, address, n, a, b, da, db, p, out):  # type: ignore[no-untyped-d
 def call_bounds(_, address, lo, hi, p, out):  # type: ignore[no-untyped-def]
     """Fill enclosures of the climb's slope and of ds over [lo, hi]."""
     return types.void(address, lo, hi, p, out), _call
+
+
+@intrinsic
+def call_drive(_, address, n, lam, v2, v, nu, p, out):  # type: ignore[no-untyped-def]
+    """Fill ds, P, Q, n0 and kappa for a leg of signs v and nu."""
+    return types.void(address, n, lam, v2, v, nu, p, out), _call
+
+
+@intrinsic
+def call_hold(_, address, n, lam, p, out):  # type: ignore[no-untyped-def]
+    """Fill the accelerations from rest, forwards and backwards."""
+    return types.void(address, n, lam, p, out), _call
+
+
+@intrinsic
+def call_field(_, address, n, x, z, p, out):  # type: ignore[no-untyped-def]
+    """Fill the value, the gradient and the second derivatives of F."""
+    return types.void(address, n, x, z, p, out), _call
+
+
+@intrinsic
+def call_segment(_, address, n, lam, p, out):  # type: ignore[no-untyped-def]
+    """Fill x, z, ds, dx/ds, dz/ds and kappa."""
+    return types.void(address, n, lam, p, out), _call

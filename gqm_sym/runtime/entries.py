@@ -10,10 +10,13 @@ from math import fabs, isfinite, pi
 import numpy as np
 from numba import types
 
-from gqm_sym.runtime.crossing import call_climb, call_frame, call_rise
+from gqm_sym.runtime.crossing import call_climb, call_frame, call_hold, call_rise
 from gqm_sym.runtime.doubledouble import reduce
+from gqm_sym.runtime.interface import FRAME_ROWS
 from gqm_sym.runtime.inversion import look_up_many, tabulate
 from gqm_sym.runtime.jit import Inner, entry
+from gqm_sym.runtime.legs import ASYMPTOTE, run, run_back
+from gqm_sym.runtime.legs import TURN as TURNED
 from gqm_sym.runtime.panels import DEGREE, REGULAR, TURN_TURN, lay, read_off, speeds
 from gqm_sym.runtime.search import CRITICAL, LIMIT, TURN, walk
 
@@ -23,10 +26,12 @@ _ROWS = types.float64[:, ::1]
 _FLOAT = types.float64
 _PANELS = types.Tuple((_LINE, _LINE, _LINE, _ROWS, _ROWS, _FLOAT, _FLOAT, types.int64))
 _WALK = types.Tuple((types.int64, _FLOAT, _FLOAT))
-_TABLE = types.Tuple((_LINE, _LINE, _ROWS, types.int64[::1], _LINE, _FLOAT))
+_TABLE = types.Tuple((_LINE, _LINE, _LINE, _ROWS, types.int64[::1], _LINE, _LINE))
 
 # A launch from rest on a slope below this share of the climb's size may be an equilibrium: exact numbers decide.
 FLAT = 1e-12
+# Places filled at a time where many are asked for.
+BLOCK = 256
 
 
 @Inner
@@ -45,13 +50,9 @@ def walk_on(fns, p, lam0, w0, direction, begin, reach, step):  # type: ignore[no
     return walk(fns, p, lam0, w0, direction, begin, reach, step)
 
 
-@entry(
-    types.Tuple((types.int64, _WALK, _WALK, _PANELS))(
-        _ADDRESSES, _LINE, _FLOAT, _FLOAT, types.int64, _FLOAT, _FLOAT, _FLOAT
-    )
-)
-def survey(fns, p, lam0, v0, direction, low, high, period):  # type: ignore[no-untyped-def]
-    """Find both ends of a motion, and lay its time where it is periodic.
+@Inner
+def ends(fns, p, lam0, v0, direction, low, high, period):  # type: ignore[no-untyped-def]
+    """How far a motion reaches each way, and which way it goes.
 
     Returns
     -------
@@ -59,11 +60,52 @@ def survey(fns, p, lam0, v0, direction, low, high, period):  # type: ignore[no-u
         The sign of ds/dt after launch (a body released at rest goes where it falls); 0 where exact numbers must decide.
     ahead, behind : (what, near, far)
         As `search.walk` returns them; ``behind`` is walked only if ``ahead`` is a turning point.
-    panels
-        As `panels.lay` returns them; empty unless the motion is a libration or a circulation.
     """
     nothing = (LIMIT, 0.0, 0.0)
     w0 = v0 * v0
+    step = first_step(low, high, period)
+    if w0 == 0.0:
+        rows, size = np.empty((2, 3)), 0.0
+        call_climb(fns[1], 3, lam0 + step * np.array([0.0, 1.0, -1.0]), p, rows)
+        for height in rows[0]:
+            if isfinite(height):
+                size = max(size, fabs(height))
+        if not fabs(rows[1, 0]) * step > FLAT * size:
+            return 0, (CRITICAL, 0.0, 0.0), nothing
+        direction = -1 if rows[1, 0] > 0.0 else 1
+    reach = period if period > 0.0 else (high - lam0 if direction > 0 else lam0 - low)
+    ahead = walk(fns, p, lam0, w0, direction, 0.0, reach, step)
+    if ahead[0] != TURN:
+        return direction, ahead, nothing
+    if w0 == 0.0:
+        return direction, ahead, (TURN, 0.0, 0.0)
+    reach = period - fabs(ahead[1]) if period > 0.0 else (lam0 - low if direction > 0 else high - lam0)
+    return direction, ahead, walk(fns, p, lam0, w0, -direction, 0.0, reach, step)
+
+
+@entry(
+    types.Tuple((types.int64, _WALK, _WALK, _PANELS))(
+        _ADDRESSES, _LINE, _FLOAT, _FLOAT, types.int64, _FLOAT, _FLOAT, _FLOAT, types.boolean
+    )
+)
+def survey(fns, p, lam0, v0, direction, low, high, period, smooth):  # type: ignore[no-untyped-def]
+    """Find both ends of a motion, and lay its time where it is periodic and the curve is ``smooth``.
+
+    Returns
+    -------
+    direction, ahead, behind
+        As `ends` returns them.
+    panels
+        As `panels.lay` returns them; empty unless the motion is a libration or a circulation.
+    """
+    direction, ahead, behind = ends(fns, p, lam0, v0, direction, low, high, period)
+    if smooth and ahead[0] == LIMIT and period > 0.0 and v0 > 0.0:
+        end = lam0 + direction * period
+        loop = lay(fns, p, REGULAR, lam0, end, lam0, v0 * v0, np.empty((0, 0)), np.array([0.0, 1.0]))
+        return direction, ahead, behind, loop
+    if smooth and ahead[0] == TURN and behind[0] == TURN:
+        a, b = lam0 + min(ahead[1], behind[1]), lam0 + max(ahead[1], behind[1])
+        return direction, ahead, behind, lay(fns, p, TURN_TURN, a, b, a, 0.0, np.empty((0, 0)), np.array([0.0, pi]))
     empty = (
         np.empty(0),
         np.empty(0),
@@ -74,48 +116,73 @@ def survey(fns, p, lam0, v0, direction, low, high, period):  # type: ignore[no-u
         0.0,
         0,
     )
-    if w0 == 0.0:
-        spot, rows = np.empty(1), np.empty((2, 1))
-        spot[0] = lam0
-        call_climb(fns[1], 1, spot, p, rows)
-        if not fabs(rows[1, 0]) > FLAT * fabs(rows[0, 0]):
-            return 0, (CRITICAL, 0.0, 0.0), nothing, empty
-        direction = -1 if rows[1, 0] > 0.0 else 1
-    step = first_step(low, high, period)
-    reach = period if period > 0.0 else (high - lam0 if direction > 0 else lam0 - low)
-    ahead = walk(fns, p, lam0, w0, direction, 0.0, reach, step)
-    if ahead[0] == LIMIT and period > 0.0 and w0 > 0.0:
-        return (
-            direction,
-            ahead,
-            nothing,
-            lay(fns, p, REGULAR, lam0, lam0 + direction * period, lam0, w0, 0.0, 1.0),
-        )
-    if ahead[0] != TURN:
-        return direction, ahead, nothing, empty
-    if w0 == 0.0:
-        behind = (TURN, 0.0, 0.0)
-    else:
-        reach = period - fabs(ahead[1]) if period > 0.0 else (lam0 - low if direction > 0 else high - lam0)
-        behind = walk(fns, p, lam0, w0, -direction, 0.0, reach, step)
-    if behind[0] != TURN:
-        return direction, ahead, behind, empty
-    a = lam0 + min(ahead[1], behind[1])
-    b = lam0 + max(ahead[1], behind[1])
-    return direction, ahead, behind, lay(fns, p, TURN_TURN, a, b, a, 0.0, 0.0, pi)
+    return direction, ahead, behind, empty
 
 
-@entry(_PANELS(_ADDRESSES, _LINE, types.int64, _FLOAT, _FLOAT, _FLOAT, _FLOAT, _FLOAT, _FLOAT))
-def lay_panels(fns, p, kind, a, b, ref, w, start, stop):  # type: ignore[no-untyped-def]
+@entry(_PANELS(_ADDRESSES, _LINE, types.int64, _FLOAT, _FLOAT, _FLOAT, _FLOAT, _LINE))
+def lay_panels(fns, p, kind, a, b, ref, w, marks):  # type: ignore[no-untyped-def]
     """`panels.lay`, for Python."""
-    return lay(fns, p, kind, a, b, ref, w, start, stop)
+    return lay(fns, p, kind, a, b, ref, w, np.empty((0, 0)), marks)
 
 
 @entry(_LINE(_ADDRESSES, _LINE, types.int64, _FLOAT, _FLOAT, _FLOAT, _FLOAT, _LINE))
 def speeds_at(fns, p, kind, a, b, ref, w, phi):  # type: ignore[no-untyped-def]
     """V at many anomalies of a stretch."""
     out = np.empty(phi.size)
-    speeds(fns, p, kind, a, b, ref, w, phi, np.empty((4, phi.size)), out)
+    speeds(fns, p, kind, a, b, ref, w, np.empty((0, 0)), phi, np.empty((4, phi.size)), out)
+    return out
+
+
+_RUN = types.Tuple((types.int64, _FLOAT, _FLOAT, types.int64, _FLOAT, _FLOAT, _LINE, types.int64, _ROWS, _ROWS))
+
+
+@entry(
+    _RUN(
+        types.int64,
+        _LINE,
+        types.UniTuple(types.int64, 3),
+        _FLOAT,
+        _FLOAT,
+        types.int64,
+        types.int64,
+        _LINE,
+        _FLOAT,
+        _FLOAT,
+        _FLOAT,
+        types.int64,
+    )
+)
+def follow(drive, p, flags, start, w, v, nu, breaks, limit, reach, step, side):  # type: ignore[no-untyped-def]
+    """`legs.run`, and `legs.run_back` to its ``middle`` from where it ends with V**2 = 0."""
+    what, place, w, nu, step, middle, changes, first, ahead = run(
+        drive, p, flags, start, w, v, nu, breaks, limit, reach, step, side
+    )
+    back = np.empty((0, 0))
+    if what == TURNED or what == ASYMPTOTE:
+        back = run_back(drive, p, flags, place, middle, v, nu, changes, breaks, step, what == ASYMPTOTE)
+    return what, place, w, nu, step, middle, changes, first, ahead, back
+
+
+@entry(_LINE(types.int64, _LINE, _FLOAT))
+def from_rest(hold, p, lam):  # type: ignore[no-untyped-def]
+    """The accelerations from rest, forwards and backwards."""
+    spot, rows = np.empty(1), np.empty((2, 1))
+    spot[0] = lam
+    call_hold(hold, 1, spot, p, rows)
+    return rows[:, 0].copy()
+
+
+@entry(_PANELS(_LINE, types.int64, _FLOAT, _FLOAT, _ROWS, _LINE))
+def lay_along(p, kind, a, b, field, marks):  # type: ignore[no-untyped-def]
+    """`panels.lay` where V**2 is a field."""
+    return lay((0, 0, 0, 0, 0), p, kind, a, b, a, 0.0, field, marks)
+
+
+@entry(_LINE(_LINE, types.int64, _FLOAT, _FLOAT, _ROWS, _LINE))
+def speeds_along(p, kind, a, b, field, phi):  # type: ignore[no-untyped-def]
+    """V at many anomalies of a stretch where V**2 is a field."""
+    out = np.empty(phi.size)
+    speeds((0, 0, 0, 0, 0), p, kind, a, b, a, 0.0, field, phi, np.empty((4, phi.size)), out)
     return out
 
 
@@ -128,17 +195,17 @@ def read_off_many(edges, marks, terms, phi):  # type: ignore[no-untyped-def]
     return out
 
 
-@entry(_TABLE(_LINE, _LINE, _ROWS))
-def build_table(edges, times, time_terms):  # type: ignore[no-untyped-def]
+@entry(_TABLE(_LINE, _LINE, _LINE, _ROWS))
+def build_table(edges, times, times_low, time_terms):  # type: ignore[no-untyped-def]
     """`inversion.tabulate`, for Python."""
-    return tabulate(edges, times, time_terms)
+    return tabulate(edges, times, times_low, time_terms)
 
 
-@entry(_LINE(_LINE, _LINE, _ROWS, types.int64[::1], _LINE, _LINE, _LINE))
-def anomalies(middles, scales, powers, index, ends, t, t_low):  # type: ignore[no-untyped-def]
+@entry(_LINE(_LINE, _LINE, _LINE, _ROWS, types.int64[::1], _LINE, _LINE, _LINE))
+def anomalies(middles, lows, scales, powers, index, ends, t, t_low):  # type: ignore[no-untyped-def]
     """`inversion.look_up_many`, for Python."""
     out = np.empty(t.size)
-    look_up_many(middles, scales, powers, index, ends, t, t_low, out)
+    look_up_many(middles, lows, scales, powers, index, ends, t, t_low, out)
     return out
 
 
@@ -159,6 +226,14 @@ def frame_at(fns, p, lam, v2):  # type: ignore[no-untyped-def]
     return out
 
 
+@entry(_ROWS(_ADDRESSES, _LINE, _LINE))
+def climb_at(fns, p, lam):  # type: ignore[no-untyped-def]
+    """The climb and its slope at many places."""
+    out = np.empty((2, lam.size))
+    call_climb(fns[1], lam.size, lam, p, out)
+    return out
+
+
 @entry(_LINE(_ADDRESSES, _LINE, _FLOAT, _FLOAT, _FLOAT, _LINE, _LINE))
 def speed_squared_at(fns, p, lam0, lam0_low, w0, places, offsets):  # type: ignore[no-untyped-def]
     """V**2 at many places and their offsets from lam0, launched from lam0 + lam0_low, without subtracting heights."""
@@ -169,3 +244,32 @@ def speed_squared_at(fns, p, lam0, lam0_low, w0, places, offsets):  # type: igno
     for i in range(offsets.size):
         out[i] = w0 - (offsets[i] * rows[0, i] - lam0_low * launch[1, 0])
     return out
+
+
+@entry(types.void(_ADDRESSES, _LINE, _FLOAT, _FLOAT, _FLOAT, _LINE, _LINE, _ROWS, types.int64, types.int64), nogil=True)
+def loads_at(fns, p, lam0, lam0_low, w0, places, rests, out, begin, end):  # type: ignore[no-untyped-def]
+    """Fill x, z, ds, kappa, V**2 and the contact force at places, block by block: what lies between stays in cache.
+
+    ``rests`` are what the places leave over as doubles; empty where they leave nothing.
+    """
+    launch, rise = np.empty((2, 1)), np.empty((2, BLOCK))
+    offsets, v2, frame = np.empty(BLOCK), np.empty(BLOCK), np.empty((FRAME_ROWS, BLOCK))
+    call_climb(fns[1], 1, np.array([lam0]), p, launch)
+    gained = lam0_low * launch[1, 0]
+    for start in range(begin, end, BLOCK):
+        n = min(BLOCK, end - start)
+        here = places[start : start + n]
+        for i in range(n):
+            offsets[i] = here[i] - lam0
+            if rests.size:
+                offsets[i] += rests[start + i]
+        rows, five = rise.reshape(-1)[: 2 * n].reshape(2, n), frame.reshape(-1)[: FRAME_ROWS * n].reshape(FRAME_ROWS, n)
+        call_rise(fns[2], n, lam0, here, offsets, p, rows)
+        for i in range(n):
+            v2[i] = w0 - (offsets[i] * rows[0, i] - gained)
+        call_frame(fns[0], n, here, v2, p, five)
+        for row in range(4):
+            for i in range(n):
+                out[row, start + i] = five[row, i]
+        for i in range(n):
+            out[4, start + i], out[5, start + i] = v2[i], five[4, i]

@@ -1,5 +1,6 @@
 """What happens along a motion: turns, changes of contact, ends."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -11,9 +12,12 @@ from gqm_sym.runtime.stretch import Array, Stretch
 
 # Places a panel at which the contact force is looked at: its sign changes are then narrowed down.
 LOOKS = 24
-# A contact force below this share of the largest on its stretch is zero but for rounding: what follows
-# decides its sign.
-TOUCH = 1e-15
+# A contact force below this share of the parts that it is the sum of is zero but for rounding: what follows decides
+# its sign. (On a planet's own orbit it is zero all round.)
+TOUCH = 4e-15
+# The same against the middling size of those parts on a stretch: where the curvature and the load vanish together, what
+# is left of N is the rounding of both.
+LEVEL = 2e-14
 # A change of sign this close to the launch, as a share of the stretch, is that of the launch itself.
 AT_LAUNCH = 1e-14
 
@@ -48,14 +52,37 @@ def contact_force(stretch: Stretch, phi: Array) -> Array:
     return force
 
 
+def contact_signs(stretch: Stretch, phi: Array) -> Array:
+    """The sign of N at anomalies of a stretch; 0 where N is zero but for rounding, or not a number."""
+    f, places = stretch.functions, stretch.places(phi)
+    force = contact_force(stretch, phi)
+    load = frame_at(f.addresses, f.p, places, np.zeros_like(phi))[4]
+    parts = np.abs(force - load) + np.abs(load)
+    finite = np.isfinite(parts)
+    least = np.maximum(TOUCH * parts, LEVEL * np.median(parts[finite])) if finite.any() else np.inf
+    signs: Array = np.where(np.isfinite(force) & (np.abs(force) > least), np.sign(force), 0.0)
+    return signs
+
+
 def contact_changes(stretch: Stretch) -> Array:
     """Anomalies of a stretch at which N changes sign, in rising order."""
+    return sign_changes(
+        stretch,
+        lambda phi: contact_signs(stretch, phi),
+        lambda phi: np.sign(contact_force(stretch, phi)),
+    )
+
+
+def sign_changes(stretch: Stretch, signs: Callable[[Array], Array], narrowing: Callable[[Array], Array]) -> Array:
+    """Anomalies of a stretch at which a sign changes, in rising order.
+
+    ``signs`` tells it at many anomalies, 0 where it is not sure; ``narrowing`` close to a change.
+    """
     steps = np.arange(LOOKS) / LOOKS
     edges = stretch.edges
     phi = np.append((edges[:-1, None] + np.diff(edges)[:, None] * steps).ravel(), edges[-1])
-    force = contact_force(stretch, phi)
-    sign = np.where(np.abs(force) > TOUCH * np.nanmax(np.abs(force)), np.sign(force), 0.0)
-    known = np.flatnonzero(np.isfinite(force) & (sign != 0))
+    sign = signs(phi)
+    known = np.flatnonzero(sign)
     turns = known[:-1][sign[known[:-1]] != sign[known[1:]]]
     after = {int(k): int(n) for k, n in pairwise(known)}
     lo = np.array([phi[k] for k in turns])
@@ -65,7 +92,7 @@ def contact_changes(stretch: Stretch) -> Array:
         middle = 0.5 * (lo + hi)
         if np.all((middle == lo) | (middle == hi)):
             break
-        same = np.sign(contact_force(stretch, middle)) == before
+        same = narrowing(middle) == before
         lo, hi = np.where(same, middle, lo), np.where(same, hi, middle)
     zeros: Array = 0.5 * (lo + hi)
     return zeros
@@ -88,6 +115,14 @@ def crossings(piece: Piece, phi: Array, pace: float) -> list[tuple[Pair, float]]
     return sorted(out)
 
 
+def corners_met(piece: Piece, pace: float) -> list[tuple[Pair, float]]:
+    """When a piece passes corners of the curve, and the anomalies there."""
+    stretch = piece.stretch
+    places = stretch.functions.between(stretch.functions.corners, stretch.a, stretch.b)
+    phi = np.array([stretch.anomaly_of(place - stretch.a, stretch.b - place) for place in places])
+    return crossings(piece, phi, pace)
+
+
 def liftoff(piece: Piece, side: int, *, first: bool) -> tuple[Pair, float] | None:
     """When and where contact is lost on a piece: time from its stretch's end ``a``, and anomaly; None if it lasts.
 
@@ -105,9 +140,8 @@ def liftoff(piece: Piece, side: int, *, first: bool) -> tuple[Pair, float] | Non
         met = [(when, phi) for when, phi in met if abs(phi - start) > AT_LAUNCH * piece.stretch.stop]
         ahead = met[0][1] if met else stop
         # N may vanish at the launch itself: what follows decides.
-        force = contact_force(piece.stretch, np.array([start, 0.5 * (start + ahead)])) * side
-        decisive = force[0] if abs(force[0]) > TOUCH * np.abs(force).max() else force[1]
-        if decisive < 0.0:
+        here, then = contact_signs(piece.stretch, np.array([start, 0.5 * (start + ahead)])) * side
+        if (here or then) < 0.0:
             return piece.r_start, piece.phi_start
     if not met:
         return None

@@ -39,6 +39,7 @@ class ExactProblem:
     parameters: tuple[Number, ...]
     lam0: Number
     v0: Number
+    domain: Callable[..., Any]
     _scales: dict[int, "Arithmetic"] = field(default_factory=dict)
 
     def at(self, digits: int) -> "Arithmetic":
@@ -139,7 +140,7 @@ class Arithmetic:
 
     def domain(self) -> tuple[Any, Any, Any]:
         """Both ends of the domain and the period."""
-        low, high, period = self.problem.formulas.domain(self.context, self.values)
+        low, high, period = self.problem.domain(self.context, self.values)
         return low, high, period
 
     def equilibrium(self, near: float, far: float) -> Any | None:
@@ -230,19 +231,20 @@ class Arithmetic:
             before = change
         return None
 
-    def gauss(self, rate: Callable[[Any], tuple[Any, Any]], edges: Sequence[Any], digits: int) -> Any:
-        """The integral over panels that resolved the rate in doubles, by Gauss-Legendre rules of higher degree."""
+    def gauss(self, rate: Callable[[Any], tuple[Any, Any]], edges: Sequence[Any], digits: int) -> list[Any]:
+        """The integral over each panel of those that resolved the rate in doubles, by Gauss-Legendre rules."""
         nodes = legendre_rule(digits + 8, self.digits)
-        total = self.mpf(0)
+        parts = []
         for left, right in pairwise(edges):
             half, middle = (
                 (self.mpf(right) - self.mpf(left)) / 2,
                 (self.mpf(right) + self.mpf(left)) / 2,
             )
-            total += half * sum(
-                w * (rate(middle + half * x)[0] + (rate(middle - half * x)[0] if x else 0)) for x, w in nodes
+            parts.append(
+                half
+                * sum(w * (rate(middle + half * x)[0] + (rate(middle - half * x)[0] if x else 0)) for x, w in nodes)
             )
-        return total
+        return parts
 
 
 _RULES: dict[tuple[int, int], tuple[tuple[Any, Any], ...]] = {}

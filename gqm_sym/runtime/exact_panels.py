@@ -17,6 +17,7 @@ from gqm_sym.runtime.panels import (
     COUNT,
     DEGREE,
     EXHAUSTED,
+    FROM_TURN,
     TAIL,
     TURN_TURN,
     antiderivative,
@@ -31,7 +32,7 @@ def exact_ends(
 ) -> tuple[Any, Any]:
     """The ends of a stretch in extended precision; the launch place is kept as it was given."""
     scale = exact.at(digits)
-    turns = {TURN_TURN: (True, True)}.get(kind, (False, False))
+    turns = {TURN_TURN: (True, True), FROM_TURN: (True, False)}.get(kind, (False, False))
     out = []
     for place, turn, given in zip((a, b), turns, known, strict=True):
         if place == exact.lam0.value and not (turn and exact.v0.value):

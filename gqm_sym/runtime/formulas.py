@@ -1,22 +1,26 @@
 """What a generated module hands to the runtime, and the questions it answers through it."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from gqm_sym.errors import LaunchError, ParameterError
-from gqm_sym.runtime.entries import frame_at, speed_squared_at
+from gqm_sym.runtime.chart import Chart, ChartMaker
+from gqm_sym.runtime.entries import frame_at, loads_at
 from gqm_sym.runtime.exact import ExactProblem
-from gqm_sym.runtime.interface import Addresses, ExactFormulas
+from gqm_sym.runtime.interface import Addresses, Dissipation, ExactFormulas
 from gqm_sym.runtime.numbers import Number, read_number
 from gqm_sym.runtime.stretch import Array, Functions
+from gqm_sym.runtime.threads import spread
 
 if TYPE_CHECKING:
     from gqm_sym.runtime.motion import Motion
+    from gqm_sym.runtime.sweeping import Sweep
 
 # The same names as an mpmath context has, over floats.
 FLOATS = SimpleNamespace(
@@ -24,6 +28,15 @@ FLOATS = SimpleNamespace(
     **{name: getattr(math, name) for name in ["asinh", "acosh", "atanh", "exp", "log", "sqrt", "pi", "e"]},
     mpf=float,
 )
+
+# How far off a charted curve a launch point may be: a share of its larger coordinate or of the piece it is near to, for
+# a curve as a whole may be followed very far.
+NEAR = 1e-6
+
+# Places of a load map that a thread is worth starting for.
+LEAST_MAP = 2**15
+
+NOTHING: Array = np.empty(0)
 
 CONTACTS = ("bilateral", "above", "below")
 
@@ -50,6 +63,21 @@ class Launch:
     t_max: Number | None
 
 
+class Domain(NamedTuple):
+    """The parameter's range: its ends (infinite where open), its period (0 where there is none), and what is there."""
+
+    low: float
+    high: float
+    period: float
+    ends: tuple[str, str] = ("domain-end", "domain-end")
+
+
+@lru_cache(maxsize=8)
+def _chart(maker: ChartMaker, values: tuple[float, ...]) -> Chart:
+    """A curve's chart, made once for the same values of the run-time parameters."""
+    return maker.chart(values)
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Formulas:
     """The compiled functions and exact formulas of one generated module.
@@ -62,6 +90,20 @@ class Formulas:
         Run-time parameters and their defaults, None where one must be given.
     positive : tuple of str
         Parameters for which the closed forms assume a positive value.
+    at_least : tuple of (str, str)
+        Parameters with what they must not fall below: a number, or another parameter.
+    body : str
+        The radius of a rolling body whose centre's path was derived from its track; empty for any other.
+    grip : tuple of str, optional
+        Of a rolling body whose static friction is known: its inertia beta and its coefficient mu_static.
+    domain_of
+        ``f(op, p)``: both ends of the parameter's range and its period, None where there is none. A chart has its own.
+    exact
+        The formulas over a namespace of operations; None for a charted curve.
+    chart
+        What makes the chart of a curve that has no formulas.
+    dissipation
+        What a dissipative model adds; None for a conservative one.
     """
 
     name: str
@@ -69,7 +111,13 @@ class Formulas:
     parameters: Mapping[str, float | int | str | None]
     positive: tuple[str, ...]
     addresses: Addresses
-    exact: ExactFormulas
+    domain_of: Callable[..., Any] | None = None
+    exact: ExactFormulas | None = None
+    chart: ChartMaker | None = None
+    dissipation: Dissipation | None = None
+    at_least: tuple[tuple[str, str], ...] = ()
+    body: str = ""
+    grip: tuple[str, str] | None = None
 
     def numbers(self, given: tuple[Any, ...]) -> tuple[Number, ...]:
         """The run-time parameters as exact numbers, checked."""
@@ -83,16 +131,30 @@ class Formulas:
                     f"{name}: must be positive, got {number.text}; the closed forms hold for {name} > 0"
                 )
             out.append(number)
+        self._check_least(dict(zip(self.parameters, out, strict=True)))
         return tuple(out)
 
-    def launch(self, lam0: Any, v0: Any, direction: int, point: Any, t_max: Any, contact: str) -> Launch:
-        """A launch, checked as far as it can be without the curve."""
-        if point is not None:
-            raise LaunchError(
-                f"point: {self.name} has a parameter of its own; launch by lam0 (a value of {self.parameter})"
-            )
-        if lam0 is None:
-            raise LaunchError(f"lam0: not given; it is the value of {self.parameter} to launch from")
+    def _check_least(self, values: dict[str, Number]) -> None:
+        """Refuse a parameter below what it must not fall below."""
+        for name, least in self.at_least:
+            bound = values.get(least) or read_number(least, where=least)
+            if values[name].value < bound.value:
+                what = f"{least} = {bound.text}" if least in values else least
+                raise ParameterError(f"{name}: must be at least {what}, got {values[name].text}")
+
+    def launch(
+        self,
+        p: tuple[Number, ...],
+        *,
+        lam0: Any,
+        v0: Any,
+        direction: int = 1,
+        point: Any = None,
+        t_max: Any = None,
+        contact: str = "bilateral",
+    ) -> Launch:
+        """A launch, checked."""
+        place = self._place(p, lam0, point)
         if direction not in (1, -1):
             raise LaunchError(f"direction: must be 1 or -1 (the sign of ds/dt at launch), got {direction!r}")
         if contact not in CONTACTS:
@@ -105,42 +167,100 @@ class Formulas:
         horizon = None if t_max is None else read_number(t_max, where="t_max")
         if horizon is not None and not horizon.value > 0.0:
             raise LaunchError(f"t_max: must be positive, got {horizon.text}")
-        place = read_number(lam0, where="lam0")
+        low, high = self.domain(p)[:2]
+        if not low <= place.value <= high:
+            raise LaunchError(f"lam0: must lie in the domain [{low!r}, {high!r}] of {self.parameter}, got {place.text}")
         return Launch(lam0=place, v0=speed, direction=int(direction), contact=contact, t_max=horizon)
 
-    def domain(self, p: tuple[Number, ...]) -> tuple[float, float, float]:
-        """Both ends of the parameter's range (infinite where open) and the period (0 where there is none)."""
-        low, high, period = self.exact.domain(FLOATS, tuple(number.value for number in p))
+    def _place(self, p: tuple[Number, ...], lam0: Any, point: Any) -> Number:
+        """The launch place, by the curve's parameter or by its coordinates."""
+        if point is None:
+            if lam0 is None:
+                raise LaunchError(f"lam0: not given; it is the value of {self.parameter} to launch from")
+            return read_number(lam0, where="lam0")
+        if self.chart is None:
+            raise LaunchError(
+                f"point: {self.name} has a parameter of its own; launch by lam0 (a value of {self.parameter})"
+            )
+        if lam0 is not None:
+            raise LaunchError("lam0, point: give one of them; both say where to launch from")
+        try:
+            x, z = (read_number(value, where="point").value for value in point)
+        except (TypeError, ValueError):
+            raise LaunchError(f"point: must be a pair of numbers (x, z), got {point!r}") from None
+        chart = self.charted(p)
+        s, distance = chart.nearest(x, z)
+        piece = np.diff(chart.edges)[max(int(np.searchsorted(chart.edges, s)) - 1, 0)]
+        if distance > NEAR * min(chart.high - chart.low, max(abs(x), abs(z), piece)):
+            there = chart.points([s])[:2, 0]
+            raise LaunchError(
+                f"point: ({x!r}, {z!r}) is {distance:.3g} off the curve; the nearest point on it is "
+                f"({float(there[0])!r}, {float(there[1])!r}), at {self.parameter} = {s!r}"
+            )
+        return read_number(s, where="point")
+
+    def charted(self, p: tuple[Number, ...]) -> Chart:
+        """The chart of a charted curve."""
+        assert self.chart is not None
+        return _chart(self.chart, tuple(number.value for number in p))
+
+    def domain(self, p: tuple[Number, ...]) -> Domain:
+        """The range of the curve's parameter."""
+        if self.chart is not None:
+            chart = self.charted(p)
+            if chart.period:
+                return Domain(-math.inf, math.inf, chart.period)
+            return Domain(chart.low, chart.high, 0.0, chart.ends)
+        assert self.domain_of is not None
+        low, high, period = self.domain_of(FLOATS, tuple(number.value for number in p))
         if period is not None:
-            return -math.inf, math.inf, float(period)
-        return (
+            return Domain(-math.inf, math.inf, float(period))
+        return Domain(
             -math.inf if low is None else float(low),
             math.inf if high is None else float(high),
             0.0,
         )
 
     def functions(self, p: tuple[Number, ...], launch: Launch) -> Functions:
-        """The compiled functions with their parameters, and the exact problem of one launch."""
-        exact = ExactProblem(self.exact, p, launch.lam0, launch.v0)
-        return Functions(tuple(self.addresses), np.array([number.value for number in p]), exact)
-
-    def check_place(self, place: Number, low: float, high: float) -> None:
-        """Refuse a launch outside the domain."""
-        if not low <= place.value <= high:
-            raise LaunchError(f"lam0: must lie in the domain [{low!r}, {high!r}] of {self.parameter}, got {place.text}")
+        """The compiled functions with what they are given, and the exact problem of one launch."""
+        values, addresses = np.array([number.value for number in p]), tuple(self.addresses)
+        if self.chart is not None:
+            chart = self.charted(p)
+            return Functions(
+                addresses=addresses,
+                p=np.concatenate([values, chart.block]),
+                breaks=chart.breaks,
+                corners=chart.corners,
+                period=chart.period,
+            )
+        exact = None
+        if self.exact is not None and self.domain_of is not None:
+            exact = ExactProblem(self.exact, p, launch.lam0, launch.v0, self.domain_of)
+        return Functions(addresses=addresses, p=values, exact=exact)
 
     def pass1(self, lam: Any, lam0: Any, v0: Any, direction: int, given: tuple[Any, ...]) -> Pass1:
         """Pass 1 at places of the curve."""
         p = self.numbers(given)
-        launch = self.launch(lam0, v0, direction, None, None, "bilateral")
-        self.check_place(launch.lam0, *self.domain(p)[:2])
+        launch = self.launch(p, lam0=lam0, v0=v0, direction=direction)
         f = self.functions(p, launch)
-        places, low, shape = read_numbers(lam, where=self.parameter)
-        start = launch.lam0
-        offsets = (places - start.value) + low
-        v2 = speed_squared_at(f.addresses, f.p, start.value, start.low, launch.v0.value**2, places, offsets)
-        x, z, ds, kappa, force = frame_at(f.addresses, f.p, places, v2)
-        return Pass1(*(array.reshape(shape) for array in (x, z, ds, kappa, v2, force)))
+        if self.dissipation is not None:
+            from gqm_sym.runtime.dissipative import launch_leg
+
+            places, _, shape = read_numbers(lam, where=self.parameter)
+            v2 = launch_leg(self, p, launch, places)
+            x, z, ds, kappa, force = frame_at(f.addresses, f.p, places, v2)
+            return Pass1(*(array.reshape(shape) for array in (x, z, ds, kappa, v2, force)))
+        if isinstance(lam, np.ndarray) and lam.dtype == np.float64:
+            places, low, shape = np.ascontiguousarray(lam).reshape(-1), NOTHING, lam.shape
+        else:
+            places, low, shape = read_numbers(lam, where=self.parameter)
+        start, w0, out = launch.lam0, launch.v0.value**2, np.empty((len(Pass1._fields), places.size))
+
+        def fill(part: slice) -> None:
+            loads_at(f.addresses, f.p, start.value, start.low, w0, places, low, out, part.start, part.stop)
+
+        spread(fill, places.size, LEAST_MAP)
+        return Pass1(*(row.reshape(shape) for row in out))
 
     def solve(
         self,
@@ -153,9 +273,25 @@ class Formulas:
         given: tuple[Any, ...],
     ) -> "Motion":
         """The motion that a launch begins."""
+        from gqm_sym.runtime.dissipative import dissipate
+        from gqm_sym.runtime.fit import check_end, check_launch
         from gqm_sym.runtime.solve import solve
 
-        return solve(self, self.numbers(given), self.launch(lam0, v0, direction, point, t_max, contact))
+        p = self.numbers(given)
+        launch = self.launch(p, lam0=lam0, v0=v0, direction=direction, point=point, t_max=t_max, contact=contact)
+        find = solve if self.dissipation is None else dissipate
+        if not self.body:
+            return find(self, p, launch)
+        check_launch(self, self.functions(p, launch), launch.lam0.value)
+        motion = find(self, p, launch)
+        check_end(self, motion)
+        return motion
+
+    def sweep(self, quantity: str, lam0: Any, v0: Any, direction: Any, lam: Any, given: tuple[Any, ...]) -> "Sweep":
+        """One quantity over arrays of launches and parameters."""
+        from gqm_sym.runtime.sweeping import sweep
+
+        return sweep(self, quantity, lam0, v0, direction, lam, given)
 
 
 def read_numbers(values: Any, *, where: str) -> tuple[Array, Array, tuple[int, ...]]:

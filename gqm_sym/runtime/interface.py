@@ -11,11 +11,24 @@ climb       n, lam, p, out                                climb, d climb/d lam
 rise        n, a, lam, d, p, out                          climb[a, lam], ds(lam); d = lam - a
 bend        n, a, b, da, db, p, out                       climb[a, lam, b], ds(lam)
 bounds      lo, hi, p, out                                enclosure of climb', enclosure of ds
+drive       n, lam, v2, v, nu, p, out                     ds, P, Q, n0, kappa
+hold        n, lam, p, out                                A(lam, 0; +1), A(lam, 0; -1), static friction
+segment     n, lam, p, out                                x, z, ds, dx/ds, dz/ds, kappa
+field       n, x, z, p, out                               F, F_x, F_z, F_xx, F_xz, F_zz
 =========== ============================================= ==========================================
+
+A conservative model has ``climb``, ``rise``, ``bend`` and ``bounds``; a dissipative one ``drive`` and ``hold`` instead.
+
+A curve with formulas that is a piece of a rail has ``segment`` (`rail`), in its own parameter; an implicit curve F = 0
+has ``field``, by which it is traced (`tracing`).
 
 ``climb`` is twice the potential per unit mass over the inertia factor, so that ``V**2 + climb`` is constant
 (MATHS, section 2). Square brackets are divided differences (MATHS, section 3): ``da = lam - a`` and
 ``db = b - lam`` are given as computed, never re-subtracted.
+
+On a leg with signs v = sgn(ds/dt) and nu = sgn(N), ``dW/dlam = P - Q W`` with W = V**2 (MATHS, section 2). For a law
+that is not linear in W, P and Q are its linearisation at the ``v2`` given: ``P - Q v2`` is the law itself there. The
+contact force is ``N = m (kappa W + n0)``.
 """
 
 from collections.abc import Callable
@@ -24,7 +37,7 @@ from typing import Any, NamedTuple
 from numba import types
 
 # Raised with every change of a signature here, or of a number that runtime code puts into generated modules.
-INTERFACE = 1
+INTERFACE = 2
 
 REAL = types.float64
 MANY = types.CPointer(REAL)
@@ -35,17 +48,43 @@ RISE = types.void(types.intp, REAL, MANY, MANY, MANY, MANY)
 BEND = types.void(types.intp, REAL, REAL, MANY, MANY, MANY, MANY)
 BOUNDS = types.void(REAL, REAL, MANY, MANY)
 
+DRIVE = types.void(types.intp, MANY, MANY, REAL, REAL, MANY, MANY)
+HOLD = types.void(types.intp, MANY, MANY, MANY)
+
+FIELD = types.void(types.intp, MANY, MANY, MANY, MANY)
+SEGMENT = types.void(types.intp, MANY, MANY, MANY)
+
 FRAME_ROWS = 5
 
 
 class Addresses(NamedTuple):
-    """Where the compiled functions of one generated module lie in memory."""
+    """Where the compiled functions of one generated module lie in memory; 0 for those that it has none of."""
 
     frame: int
-    climb: int
-    rise: int
-    bend: int
-    bounds: int
+    climb: int = 0
+    rise: int = 0
+    bend: int = 0
+    bounds: int = 0
+
+
+class Dissipation(NamedTuple):
+    """What a dissipative model adds: the addresses of ``drive`` and ``hold``, and of what kind its forces are.
+
+    Attributes
+    ----------
+    friction : bool
+        Whether the force depends on the sign of N: then a leg ends where N changes sign.
+    kinked : bool
+        Whether it has a kink where the curvature changes sign: a leg is computed in parts there.
+    linear : bool
+        Whether it is linear in V**2.
+    """
+
+    drive: int
+    hold: int
+    friction: bool
+    kinked: bool
+    linear: bool
 
 
 class ExactFormulas(NamedTuple):
@@ -58,4 +97,3 @@ class ExactFormulas(NamedTuple):
     reaction: Callable[..., Any]
     climb: Callable[..., Any]
     climb_slope: Callable[..., Any]
-    domain: Callable[..., Any]

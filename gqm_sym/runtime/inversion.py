@@ -6,14 +6,20 @@ Chebyshev fit of fixed degree needs to be resolved to rounding. A small uniform 
 once.
 """
 
-from math import cos, fabs, pi
+from math import fabs
 
 import numpy as np
 
+from gqm_sym.runtime.doubledouble import two_sum
 from gqm_sym.runtime.jit import Inner
 from gqm_sym.runtime.panels import legendre_sum, longer, taller
 
 TERMS = 15
+LAST = TERMS - 1
+# cos(j theta_i) at the nodes of the fit, both ends of a segment among them; there the fit adds no error of its own.
+# They come from angles within a quarter turn: the rounding of larger ones would be the table's largest error.
+_HALF_TURNS = np.abs((np.outer(np.arange(TERMS), np.arange(TERMS)) + LAST) % (2 * LAST) - LAST)
+COSINES = np.sin(np.pi * (0.5 * LAST - _HALF_TURNS) / LAST)
 RESOLVED = 2e-16  # last two Chebyshev coefficients against the whole range of the anomaly
 MOST_CUTS = 2**52  # at a cusp the anomaly goes like the root of the time that is left: ever shorter segments
 LEVEL = 1e-13  # coefficients that have stopped falling below this share are rounding noise
@@ -21,10 +27,11 @@ LEVEL = 1e-13  # coefficients that have stopped falling below this share are rou
 # at a cusp the rounding of the time moves it further than a table can tell.
 DEEP = 2**12
 TIMED = 4e-16
+NEWTON = 1e-10
 
 
 @Inner
-def _anomaly(terms, rates_sum, target, guess):  # type: ignore[no-untyped-def]
+def anomaly_on(terms, rates_sum, target, guess):  # type: ignore[no-untyped-def]
     """The place x in [-1, 1] of a panel where its time is ``target``, by Newton's method inside a bracket."""
     lo, hi, x = -1.0, 1.0, guess
     for _ in range(60):
@@ -37,14 +44,15 @@ def _anomaly(terms, rates_sum, target, guess):  # type: ignore[no-untyped-def]
         new = x - miss / slope if slope > 0.0 else 0.5 * (lo + hi)
         if not (lo <= new <= hi):
             new = 0.5 * (lo + hi)
-        if fabs(new - x) <= 1.2e-16 or hi - lo <= 1.2e-16:
+        # Steps shrink as their squares: after one this short the next would be below rounding.
+        if fabs(new - x) <= NEWTON or hi - lo <= 1.2e-16:
             return new
         x = new
     return x
 
 
 @Inner
-def _derivative(terms, out):  # type: ignore[no-untyped-def]
+def derivative(terms, out):  # type: ignore[no-untyped-def]
     """Legendre coefficients of the derivative (with respect to x) of a Legendre series."""
     n = terms.size
     out[:] = 0.0
@@ -53,68 +61,85 @@ def _derivative(terms, out):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def tabulate(edges, times, time_terms):  # type: ignore[no-untyped-def]
+def tabulate(edges, times, times_low, time_terms):  # type: ignore[no-untyped-def]
     """Polynomials for the anomaly over time.
+
+    ``times + times_low`` is the clock at the panels' edges: short panels that come late, where the body rushes, keep
+    their own digits. Each panel's own time runs at the pace that meets the clock at both edges.
 
     Returns
     -------
-    middles, scales : (n,) arrays
-        Middle of each segment in time and one over half its length.
+    middles, lows, scales : (n,) arrays
+        Middle of each segment in time, as two doubles, and one over half its length.
     powers : (n, TERMS) array
         Coefficients of the anomaly in powers of ``(t - middle) * scale``.
     index : (k,) array of int
         First segment that can hold a time in each of k equal parts of the whole time.
     ends : (n,) array
         Where each segment ends in time.
-    error : float
-        Largest unresolved part of the anomaly.
+    errors : (n,) array
+        Unresolved part of the anomaly on each segment, beyond what ``TIMED`` allows.
     """
     room = 32
-    middles, scales, ends = np.empty(room), np.empty(room), np.empty(room)
+    middles, lows, scales, ends = np.empty(room), np.empty(room), np.empty(room), np.empty(room)
+    errors = np.empty(room)
     powers = np.empty((room, TERMS))
-    x_nodes, values, c = np.empty(TERMS), np.empty(TERMS), np.empty(TERMS)
-    for i in range(TERMS):
-        x_nodes[i] = cos(pi * (i + 0.5) / TERMS)
+    values, c = np.empty(TERMS), np.empty(TERMS)
     slope_terms = np.empty(time_terms.shape[1])
     scale = max(fabs(edges[0]), fabs(edges[-1]))
-    count, error = 0, 0.0
+    count = 0
     for k in range(edges.size - 1):
         left, half = edges[k], 0.5 * (edges[k + 1] - edges[k])
-        duration = times[k + 1] - times[k]
-        _derivative(time_terms[k], slope_terms)
+        duration = (times[k + 1] - times[k]) + (times_low[k + 1] - times_low[k])
+        pace = legendre_sum(time_terms[k], 1.0) / duration
+        derivative(time_terms[k], slope_terms)
         done, cuts = 0, 1  # ``done`` of ``cuts`` equal segments of the panel's time are laid
         while done < cuts:
-            start, stop = times[k] + duration * done / cuts, times[k] + duration * (done + 1) / cuts
+            # From the panel's left edge.
+            start, stop = duration * done / cuts, duration * (done + 1) / cuts
             middle, reach = 0.5 * (start + stop), 0.5 * (stop - start)
             guess, steepest = 2.0 * (done + 0.5) / cuts - 1.0, 0.0
             for i in range(TERMS):
-                target = (middle - times[k]) + reach * x_nodes[i]
-                guess = _anomaly(time_terms[k], slope_terms, target, guess)
+                if i == 0 and done + 1 == cuts:
+                    guess = 1.0
+                elif i == LAST and done == 0:
+                    guess = -1.0
+                else:
+                    target = (middle + reach * COSINES[1, i]) * pace
+                    guess = anomaly_on(time_terms[k], slope_terms, target, guess)
                 values[i] = guess
-                steepest = max(steepest, legendre_sum(slope_terms, guess))
+                slope = legendre_sum(slope_terms, guess)
+                steepest = max(steepest, slope)
+                if i < LAST and slope > 0.0:
+                    ahead = guess + pace * reach * (COSINES[1, i + 1] - COSINES[1, i]) / slope
+                    guess = min(max(ahead, -1.0), 1.0)
             for j in range(TERMS):
-                total = 0.0
-                for i in range(TERMS):
-                    total += values[i] * cos(pi * j * (i + 0.5) / TERMS)
-                c[j] = 2.0 * total / TERMS
+                total = 0.5 * (values[0] * COSINES[j, 0] + values[LAST] * COSINES[j, LAST])
+                for i in range(1, LAST):
+                    total += values[i] * COSINES[j, i]
+                c[j] = 2.0 * total / LAST
             c[0] *= 0.5
-            tail = half * max(fabs(c[TERMS - 1]), fabs(c[TERMS - 2]))
-            before = half * max(fabs(c[TERMS - 5]), fabs(c[TERMS - 6]))
+            c[LAST] *= 0.5
+            tail = half * max(fabs(c[LAST]), fabs(c[LAST - 1]))
+            before = half * max(fabs(c[LAST - 4]), fabs(c[LAST - 5]))
             settled = tail <= RESOLVED * scale or (before <= LEVEL * scale and tail > 0.2 * before)
-            settled = settled or (cuts >= DEEP and tail / half * steepest <= TIMED * times[-1])
-            if not settled and cuts < MOST_CUTS:
+            timed = not settled and cuts >= DEEP and tail / half * steepest <= TIMED * times[-1]
+            if not settled and not timed and cuts < MOST_CUTS:
                 done, cuts = 2 * done, 2 * cuts
                 continue
-            error = max(error, tail)
             if count == room:
                 room *= 2
-                middles, scales, ends = (
+                middles, lows, errors, scales, ends = (
                     longer(middles, room),
+                    longer(lows, room),
+                    longer(errors, room),
                     longer(scales, room),
                     longer(ends, room),
                 )
                 powers = taller(powers, room)
-            middles[count], scales[count], ends[count] = middle, 1.0 / reach, stop
+            middles[count], low = two_sum(times[k], middle)
+            lows[count], scales[count], ends[count] = low + times_low[k], 1.0 / reach, times[k] + stop
+            errors[count] = 0.0 if timed else tail
             _to_powers(c, powers[count])
             for j in range(TERMS):
                 powers[count, j] *= half
@@ -133,11 +158,12 @@ def tabulate(edges, times, time_terms):  # type: ignore[no-untyped-def]
         index[i] = segment
     return (
         middles[:count].copy(),
+        lows[:count].copy(),
         scales[:count].copy(),
         powers[:count].copy(),
         index,
         ends[:count].copy(),
-        error,
+        errors[:count].copy(),
     )
 
 
@@ -163,14 +189,14 @@ def _to_powers(c, out):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def look_up(middles, scales, powers, index, ends, t, t_low):  # type: ignore[no-untyped-def]
+def look_up(middles, lows, scales, powers, index, ends, t, t_low):  # type: ignore[no-untyped-def]
     """The anomaly at time t + t_low of a table."""
     whole = ends[-1]
     slot = np.int64(t / whole * index.size) if whole > 0.0 else 0
     segment = index[min(max(slot, 0), index.size - 1)]
     while segment < ends.size - 1 and t >= ends[segment]:
         segment += 1
-    x = ((t - middles[segment]) + t_low) * scales[segment]
+    x = ((t - middles[segment]) + (t_low - lows[segment])) * scales[segment]
     row = powers[segment]
     total = row[TERMS - 1]
     for j in range(TERMS - 2, -1, -1):
@@ -179,7 +205,7 @@ def look_up(middles, scales, powers, index, ends, t, t_low):  # type: ignore[no-
 
 
 @Inner
-def look_up_many(middles, scales, powers, index, ends, t, t_low, out):  # type: ignore[no-untyped-def]
+def look_up_many(middles, lows, scales, powers, index, ends, t, t_low, out):  # type: ignore[no-untyped-def]
     """The anomaly at many times of one table."""
     for i in range(t.size):
-        out[i] = look_up(middles, scales, powers, index, ends, t[i], t_low[i])
+        out[i] = look_up(middles, lows, scales, powers, index, ends, t[i], t_low[i])

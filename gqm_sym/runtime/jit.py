@@ -7,14 +7,15 @@ Division by zero gives infinity, as in IEEE arithmetic, and is not an exception.
 import hashlib
 import sys
 from collections.abc import Callable
-from functools import wraps
+from contextlib import suppress
+from functools import lru_cache, wraps
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
 from numba import njit, types
 from numba.core import sigutils
-from numba.core.caching import FunctionCache
+from numba.core.caching import FunctionCache, NullCache
 from numba.core.ccallback import CFunc
 from numba.core.registry import cpu_target
 from numba.core.runtime import rtsys
@@ -23,16 +24,26 @@ from numba.extending import typeof_impl
 from gqm_sym.errors import OutdatedModuleError
 from gqm_sym.runtime.interface import INTERFACE
 
-COMPILE: dict[str, Any] = {"cache": True, "error_model": "numpy"}
+COMPILE: dict[str, Any] = {"error_model": "numpy"}
 
 
-def _stamp() -> tuple[tuple[str, int, int], ...]:
-    """Names, times and sizes of the runtime's files."""
-    files = sorted(Path(__file__).parent.glob("*.py"))
-    return tuple((file.name, (status := file.stat()).st_mtime_ns, status.st_size) for file in files)
+def _stamp() -> str:
+    """Digest of the runtime's files: their times say little, as those of a wheel are all the same."""
+    digest = hashlib.sha256()
+    for file in sorted(Path(__file__).parent.glob("*.py")):
+        text = file.read_bytes()
+        digest.update(f"{file.name} {len(text)}\n".encode() + text)
+    return digest.hexdigest()
 
 
 STAMP = _stamp()
+
+
+@lru_cache(maxsize=1)
+def announce() -> None:
+    """Say once, to whoever sits before a terminal, what takes so long: the runtime is not in the cache yet."""
+    if sys.stderr is not None and sys.stderr.isatty():
+        print("gqm_sym: compiling the runtime, once per installation", file=sys.stderr, flush=True)
 
 
 class ReadyCache(FunctionCache):  # type: ignore[misc]
@@ -41,7 +52,7 @@ class ReadyCache(FunctionCache):  # type: ignore[misc]
     The preparation imports and registers all that compiling may need (SciPy's linear algebra as well) and takes a tenth
     of a second; code that is in the cache needs none of it. numba itself notices changes in a function's own file only,
     by time and size; compiled code here holds functions of several files, and the name of a generated module's
-    functions tells its text (`compiler`).
+    functions tells its text (`compiler`). What cannot be read is compiled anew, and what cannot be written is not kept.
     """
 
     def _index_key(self, sig: Any, codegen: Any) -> Any:
@@ -49,11 +60,37 @@ class ReadyCache(FunctionCache):  # type: ignore[misc]
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """The compiled function from the cache, or numba's own way."""
-        with self._guard_against_spurious_io_errors():
-            found = self._load_overload(sig, target_context)
-            if found is not None:
-                return found
-        return super().load_overload(sig, target_context)
+        found = self._sound(self._load_overload, sig, target_context)
+        if found is None and self._py_func.__module__.startswith(f"{__package__}."):
+            announce()
+        return found or self._sound(super().load_overload, sig, target_context)
+
+    def _sound(self, load: Callable[..., Any], *arguments: Any) -> Any:
+        try:
+            return load(*arguments)
+        except Exception:  # whatever unpickling does with a file that was cut off or overwritten
+            with suppress(OSError):
+                self.flush()
+            return None
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        """Keep a compiled function, unless the disk is full or the folder has become read-only."""
+        with suppress(OSError):
+            super().save_overload(sig, data)
+
+
+def _cache_of(function: Any) -> Any:
+    """The disk cache of a function; none where no folder can be written, so that each process compiles anew."""
+    try:
+        return ReadyCache(function)
+    except RuntimeError:
+        return NullCache()
+
+
+def _dispatcher_of(function: Any, *, nogil: bool = False) -> Any:
+    dispatcher = njit(nogil=nogil, **COMPILE)(function)
+    dispatcher._cache = _cache_of(function)
+    return dispatcher
 
 
 class Inner:
@@ -71,7 +108,8 @@ class Inner:
     def dispatcher(self) -> Any:
         """The function as numba knows it."""
         if self._dispatcher is None:
-            self._dispatcher = njit(**COMPILE)(self.py_func)
+            self._dispatcher = _dispatcher_of(self.py_func)
+            rtsys.initialize(self._dispatcher.targetctx)
         return self._dispatcher
 
     def __call__(self, *arguments: Any) -> Any:
@@ -84,8 +122,11 @@ def _type_of_inner(value: Inner, _: Any) -> Any:
     return types.Dispatcher(value.dispatcher)
 
 
-def entry(signature: Any) -> Callable[[Any], Callable[..., Any]]:
-    """An entry point from Python: compiled, or loaded from the cache, when it is first called."""
+def entry(signature: Any, *, nogil: bool = False) -> Callable[[Any], Callable[..., Any]]:
+    """An entry point from Python: compiled, or loaded from the cache, when it is first called.
+
+    With ``nogil`` other threads of Python run meanwhile.
+    """
 
     def decorate(function: Any) -> Callable[..., Any]:
         compiled: Any = None
@@ -94,8 +135,7 @@ def entry(signature: Any) -> Callable[[Any], Callable[..., Any]]:
         def call(*arguments: Any) -> Any:
             nonlocal compiled
             if compiled is None:
-                dispatcher = njit(**COMPILE)(function)
-                dispatcher._cache = ReadyCache(function)
+                dispatcher = _dispatcher_of(function, nogil=nogil)
                 rtsys.initialize(dispatcher.targetctx)  # cached code counts its arrays too
                 dispatcher.compile(signature)
                 dispatcher.disable_compile()
@@ -129,9 +169,8 @@ def compiler(file: str, *, interface: int) -> Callable[[Any], Callable[[Any], An
         def decorate(function: Any) -> Any:
             function.__module__ = alias
             rtsys.initialize(cpu_target.target_context)
-            options = {"error_model": COMPILE["error_model"]}
-            callback: Any = CFunc(function, sigutils.normalize_signature(signature), {}, options)
-            callback._cache = ReadyCache(function)
+            callback: Any = CFunc(function, sigutils.normalize_signature(signature), {}, COMPILE)
+            callback._cache = _cache_of(function)
             callback.compile()
             return callback
 

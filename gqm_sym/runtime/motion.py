@@ -1,6 +1,8 @@
 """The motion that a launch begins, as a value that answers questions."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from math import inf
 from typing import Any, NamedTuple
 
@@ -9,21 +11,21 @@ from numpy.typing import NDArray
 
 from gqm_sym.errors import InputError, SolutionError
 from gqm_sym.runtime.course import Course, Pair, Piece
+from gqm_sym.runtime.display import Rows, page
 from gqm_sym.runtime.entries import frame_at
-from gqm_sym.runtime.events import Event, Leg, contact_changes, crossings
+from gqm_sym.runtime.events import Event, Leg, contact_changes, corners_met, crossings
 from gqm_sym.runtime.formulas import read_numbers
+from gqm_sym.runtime.grip import slips
 from gqm_sym.runtime.numbers import read_number
-from gqm_sym.runtime.panels import FROM_TURN, TURN_TURN
 from gqm_sym.runtime.problem import Problem
-from gqm_sym.runtime.stretch import Array, Stretch
-
-ULP = 2.220446049250313e-16
+from gqm_sym.runtime.stretch import ULP, Array
 
 
 class State(NamedTuple):
     """The state of the body at times; arrays of the times' shape.
 
-    ``s`` is arc length, 0 at launch and growing with the parameter; ``v`` is ds/dt with its sign.
+    ``s`` is arc length, 0 at launch and growing with the parameter; ``v`` is ds/dt with its sign; ``error`` is what
+    ``lam`` can be off by (`Motion.error_bound`).
     """
 
     t: Any
@@ -35,6 +37,7 @@ class State(NamedTuple):
     v2: Any
     kappa: Any
     normal_force: Any
+    error: Any
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,6 +67,9 @@ class Motion:
     direction: int
     t_end: float
 
+    # Ends of pieces that end no leg.
+    _joints: tuple[str, ...] = ("",)
+
     def __init__(self, problem: Problem, kind: str, direction: int) -> None:
         self.problem = problem
         self.kind = kind
@@ -78,7 +84,7 @@ class Motion:
         raise NotImplementedError
 
     def _clock_error(self, t: Array) -> Array:
-        """Estimated error of the time at which the body is where it is said to be."""
+        """Estimated error of the time at which the body comes to its piece of the course."""
         raise NotImplementedError
 
     @property
@@ -102,6 +108,22 @@ class Motion:
         """The period as a decimal string with that many correct digits."""
         raise SolutionError(f"period_to: this motion is of kind {self.kind!r} and does not repeat")
 
+    # -- how far to trust it --------------------------------------------------------------------
+
+    @property
+    def quadrature_error(self) -> float:
+        """Estimated relative error of a time of flight by quadrature, for the numbers that were given."""
+        return max((piece.stretch.relative_error for piece in self._course(0.0).pieces), default=0.0)
+
+    @property
+    def conditioning(self) -> float:
+        """How many times a relative change of those numbers may change a time of flight.
+
+        A property of the problem: near a separatrix it is large, and 16 digits of a launch then say that much less
+        about the motion. From 100 on, the computation itself runs in extended precision.
+        """
+        return max((piece.stretch.conditioning for piece in self._course(0.0).pieces), default=1.0)
+
     # -- positions ----------------------------------------------------------------------------
 
     def lam(self, t: Any) -> Any:
@@ -123,15 +145,20 @@ class Motion:
         return _shaped(self._places(located) + located.laps * located.course.lap, shape)
 
     def state(self, t: Any) -> State:
-        """Everything about the body at times: parameter, arc length, position, speed, curvature, contact force."""
+        """Everything about the body at times: parameter, arc length, position, speed, curvature, contact force.
+
+        Times as in `lam`.
+        """
         times, low, shape = self._times(t)
         located = self._located(times, low)
         f, course = self.problem.functions, located.course
         reduced, s, v = self._places(located), self._arc_lengths(located), self._velocities(located)
         v2 = v**2
-        x, z, _, kappa, force = frame_at(f.addresses, f.p, reduced, v2)
-        lam, s = reduced + located.laps * course.lap, s + located.laps * course.lap_length
-        return State(*(_shaped(array, shape) for array in (times, lam, s, x, z, v, v2, kappa, force)))
+        x, z, ds, kappa, force = frame_at(f.addresses, f.p, reduced, v2)
+        error = self._bound(times, located, reduced, v, ds)
+        lam = reduced + located.laps * course.lap
+        s = (s + located.laps * course.lap_length) + self.problem.arc_origin
+        return State(*(_shaped(array, shape) for array in (times, lam, s, x, z, v, v2, kappa, force, error)))
 
     def time_at(self, lam: Any) -> float:
         """When the body is first at a place of the curve."""
@@ -148,20 +175,28 @@ class Motion:
         return min(times)
 
     def error_bound(self, t: Any) -> Any:
-        """What ``lam(t)`` can be off by: the clock's part and the inversion's (paper, eq. 32), rounding included."""
+        """What ``lam(t)`` can be off by: the clock's part and the inversion's (paper, eq. 32), rounding included.
+
+        It holds for the exact numbers that were given, and for times that are exact.
+        """
         times, low, shape = self._times(t)
         located = self._located(times, low)
         f, reduced, v = self.problem.functions, self._places(located), self._velocities(located)
         ds = frame_at(f.addresses, f.p, reduced, v**2)[2]
+        return _shaped(self._bound(times, located, reduced, v, ds), shape)
+
+    def _bound(self, times: Array, located: Located, reduced: Array, v: Array, ds: Array) -> Array:
+        """`error_bound`, with the places within the lap, the velocities and ds/dlam there."""
         with np.errstate(divide="ignore", invalid="ignore"):
             rate = np.where(ds > 0.0, np.abs(v) / ds, 0.0)
-        table = max(
-            (piece.stretch.table[5] * _swing(piece.stretch) for piece in self._course(0.0).pieces),
-            default=0.0,
-        )
-        width = max((abs(p.stretch.b - p.stretch.a) for p in self._course(0.0).pieces), default=0.0)
-        rounding = ULP * (np.abs(reduced + located.laps * located.course.lap) + np.abs(reduced) + width)
-        return _shaped(rate * self._clock_error(times) + table + rounding, shape)
+        clock, inversion = self._clock_error(times), np.zeros_like(times)
+        for piece, mask, phi in located.pieces:
+            clock[mask] += piece.stretch.clock_error(phi)
+            inversion[mask] = piece.stretch.inversion_error(phi)
+        # A lap is rounded, and so are so many of them and the sum.
+        rounding = ULP * (1.5 * np.abs(located.laps * located.course.lap) + 2.0 * np.abs(reduced))
+        bound: Array = rate * clock + inversion + rounding
+        return bound
 
     # -- history ------------------------------------------------------------------------------
 
@@ -169,18 +204,14 @@ class Motion:
     def legs(self) -> tuple[Leg, ...]:
         """The motion leg by leg; over one period from launch where it is periodic."""
         legs = []
+        pace, lap = self._course(0.0).pace, self._course(0.0).lap
         for piece in self._history():
-            lam = piece.stretch.places(np.array([piece.phi_start, piece.phi_stop]))
-            leg = Leg(
-                float(lam[0]),
-                float(lam[1]),
-                piece.t_start[0],
-                piece.t_stop[0],
-                piece.direction,
-                piece.end,
-            )
-            legs.append(leg)
-        return tuple(self._told(_merged(legs)))
+            marks = [(piece.t_start, piece.phi_start), *corners_met(piece, pace), (piece.t_stop, piece.phi_stop)]
+            lam = piece.stretch.places(np.array([phi for _, phi in marks])) + piece.laps * lap
+            for k, ((start, _), (stop, _)) in enumerate(pairwise(marks)):
+                end = piece.end if k == len(marks) - 2 else "corner"
+                legs.append(Leg(float(lam[k]), float(lam[k + 1]), start[0], stop[0], piece.direction, end))
+        return Rows(self._told(_merged(legs, self._joints)))
 
     @property
     def events(self) -> tuple[Event, ...]:
@@ -188,20 +219,22 @@ class Motion:
         found = []
         course = self._course(0.0)
         for piece in self._history():
-            for when, phi in crossings(piece, contact_changes(piece.stretch), course.pace):
-                found.append(self._event("contact-sign", when, piece, phi))
+            met = [("contact-sign", *m) for m in self._contact_changes(piece)]
+            met += [("corner", *m) for m in corners_met(piece, course.pace)]
+            met += [("slip", *m) for m in slips(self.problem, piece, course.pace)]
+            found += [self._event(kind, when, piece, phi) for kind, when, phi in sorted(met, key=lambda m: m[1])]
             if piece.end not in ("", "horizon"):
                 found.append(self._event(piece.end, piece.t_stop, piece, piece.phi_stop))
         if self.t_end < inf and not (found and found[-1].t == self.t_end):
             found = [event for event in found if event.t < self.t_end]
             state = self.state(self.t_end)
             found.append(Event("horizon", self.t_end, state.lam, state.x, state.z))
-        return tuple(found)
+        return Rows(found)
 
     def events_between(self, t1: Any, t2: Any) -> tuple[Event, ...]:
         """Events at times from t1 to t2."""
         start, stop = read_number(t1, where="t1").value, read_number(t2, where="t2").value
-        return tuple(event for event in self.events if start <= event.t <= stop)
+        return Rows(event for event in self.events if start <= event.t <= stop)
 
     def _told(self, legs: list[Leg]) -> list[Leg]:
         """Legs as far as the horizon."""
@@ -213,30 +246,66 @@ class Motion:
             out.append(Leg(last.lam_start, place, last.t_start, when, last.direction, "horizon"))
         return out
 
+    # -- pictures -----------------------------------------------------------------------------
+
+    def plot(self, what: str = "track", *, axes: Any = None) -> Any:
+        """Draw the motion with Matplotlib.
+
+        Parameters
+        ----------
+        what : {"track", "loads", "portrait"}
+            The track, coloured by the sign and size of the contact force; speed and contact force against arc
+            length; or the phase portrait round the orbit. All events are marked on the first two.
+        axes : matplotlib Axes, optional
+            Where to draw (a pair of them for "loads"); a new figure if not given.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+        """
+        from gqm_sym.runtime.figures import drawing
+
+        return drawing(self, what, axes)
+
+    def to_xarray(self, t: Any = None) -> Any:
+        """The states at times as an xarray Dataset, with units and provenance; evenly over the motion without ``t``."""
+        from gqm_sym.runtime.datasets import dataset
+
+        return dataset(self, t)
+
+    def _repr_html_(self) -> str:
+        return page(self)
+
     # -- inside -------------------------------------------------------------------------------
 
     def _history(self) -> tuple[Piece, ...]:
         """The pieces that `legs` and `events` tell of."""
         return self._course(0.0).pieces
 
+    def _contact_changes(self, piece: Piece) -> list[tuple[Pair, float]]:
+        """When N changes sign within a piece, and the anomalies there."""
+        return crossings(piece, contact_changes(piece.stretch), self._course(0.0).pace)
+
     def _event(self, kind: str, when: Pair, piece: Piece, phi: float) -> Event:
         f = self.problem.functions
         lam = piece.stretch.places(np.array([phi]))
         x, z = frame_at(f.addresses, f.p, lam, np.zeros(1))[:2, 0]
-        return Event(kind, when[0], float(lam[0]), float(x), float(z))
+        return Event(kind, when[0], float(lam[0]) + piece.laps * self._course(0.0).lap, float(x), float(z))
 
     def _times(self, t: Any) -> tuple[Array, Array, tuple[int, ...]]:
         times, low, shape = read_numbers(t, where="t")
         if times.size:
             if np.isnan(times).any():
                 raise InputError("t: must be numbers, got NaN")
-            if times.max() > self.t_end:
-                raise InputError(
-                    f"t: the motion ends at {self.t_end!r} s ({self._how_it_ends()}), got {float(times.max())!r}"
-                )
+            self._check_end(float(times.max()))
             if times.min() < 0.0 and self._course(0.0).period is None:
                 raise InputError(f"t: cannot be negative for a motion that does not repeat, got {float(times.min())!r}")
         return times, low, shape
+
+    def _check_end(self, t: float) -> None:
+        """Refuse a time beyond the motion's end."""
+        if t > self.t_end:
+            raise InputError(f"t: the motion ends at {self.t_end!r} s ({self._how_it_ends()}), got {t!r}")
 
     def _how_it_ends(self) -> str:
         return "the horizon t_max"
@@ -251,6 +320,7 @@ class Motion:
         pieces = []
         for k in np.unique(which):
             piece, mask = course.pieces[k], which == k
+            laps[mask] += piece.laps
             phi = course.anomalies(piece, rest[mask], rest_low[mask])
             pieces.append((piece, mask, np.clip(phi, 0.0, piece.stretch.edges[-1])))
         return Located(tuple(pieces), (rest == 0.0) & (rest_low == 0.0), laps, course)
@@ -279,11 +349,16 @@ class Motion:
 
     def _first_passages(self, lam: float, low: float) -> list[float]:
         """Times of passing a place, the first on each piece."""
-        out = []
         course = self._course(0.0)
-        for piece in course.pieces:
+        return self._passages(course.pieces, course, lam, low)
+
+    def _passages(self, pieces: Sequence[Piece], course: Course, lam: float, low: float) -> list[float]:
+        """Times of passing a place, the first on each of some pieces."""
+        out = []
+        for piece in pieces:
             stretch = piece.stretch
-            inside, outside = (lam - stretch.a) + low, (stretch.b - lam) - low
+            within = lam - piece.laps * course.lap
+            inside, outside = (within - stretch.a) + low, (stretch.b - within) - low
             if inside * stretch.direction < 0.0 or outside * stretch.direction < 0.0:
                 continue
             phi = np.array([stretch.anomaly_of(inside, outside)])
@@ -292,26 +367,20 @@ class Motion:
             out += [when[0] + when[1] for when, _ in crossings(piece, phi, course.pace)]
             if phi[0] in (0.0, stretch.edges[-1]) and piece.r_stop[0] in (0.0, stretch.duration):
                 at_stop = stretch.a if piece.sense < 0 else stretch.b
-                if lam == at_stop:
+                if within == at_stop:
                     out.append(piece.t_stop[0])
         return out
-
-
-def _swing(stretch: Stretch) -> float:
-    """How fast the parameter changes with the anomaly, at most."""
-    width = abs(stretch.b - stretch.a)
-    return {TURN_TURN: 0.5 * width, FROM_TURN: 2.0 * width}.get(stretch.kind, width)
 
 
 def _shaped(array: Array, shape: tuple[int, ...]) -> Any:
     return float(array[0]) if shape == () else array.reshape(shape)
 
 
-def _merged(legs: list[Leg]) -> list[Leg]:
-    """Legs without the joints that only the computation knows of."""
+def _merged(legs: list[Leg], joints: tuple[str, ...]) -> list[Leg]:
+    """Legs without the joints that end none: those that only the computation knows of, first of all."""
     out: list[Leg] = []
     for leg in legs:
-        if out and out[-1].end == "":
+        if out and out[-1].end in joints:
             last = out.pop()
             leg = Leg(last.lam_start, leg.lam_end, last.t_start, leg.t_end, leg.direction, leg.end)
         out.append(leg)

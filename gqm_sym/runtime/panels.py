@@ -12,6 +12,8 @@ REGULAR         a + (b-a) phi                           0 to 1
 TO_EQUILIBRIUM  b + (a-b) exp(-phi)                     0 onwards
 =============== ======================================= ================================
 
+V**2 comes from the climb, or, where forces dissipate, from a field (`fields`).
+
 Each accepted panel keeps the Legendre coefficients of both antiderivatives, so that time and arc length can be read off
 anywhere on it.
 """
@@ -21,6 +23,7 @@ from math import cos, exp, fabs, inf, sin, sqrt
 import numpy as np
 
 from gqm_sym.runtime.crossing import call_bend, call_rise
+from gqm_sym.runtime.fields import along
 from gqm_sym.runtime.jit import Inner
 from gqm_sym.runtime.kronrod import EVEN, GAUSS_WEIGHTS, KRONROD_WEIGHTS, NODES, ODD
 
@@ -37,14 +40,34 @@ MOST_PANELS = 4096
 # Below this balance doubles keep too few digits of V**2 to be worth laying panels on.
 HOPELESS = 1e-9
 LEAST_WIDTH = 2.0**-48  # of the stretch
+# Legendre's recurrence: P_(k+1) = GROWTH[k] x P_k - DECAY[k-1] P_(k-1).
+GROWTH = np.array([(2 * k + 1) / (k + 1) for k in range(DEGREE + 1)])
+DECAY = np.array([(k + 1) / (k + 2) for k in range(DEGREE + 1)])
 
 
 @Inner
-def rates(fns, p, kind, a, b, ref, w, phi, work, out):  # type: ignore[no-untyped-def]
+def rates(fns, p, kind, a, b, ref, w, field, phi, work, out):  # type: ignore[no-untyped-def]
     """Fill ``out`` with dt/dphi and ds/dphi at each phi. ``w`` is V**2 at ``ref`` (used where no end is special)."""
     n = phi.size
     da, db, rows = work[0, :n], work[1, :n], work[2:4, :n]
-    if kind == TURN_TURN:
+    if field.size > 0:
+        whole = fabs(b - a)
+        for i in range(n):
+            if kind == FROM_TURN:
+                d = whole * phi[i] * phi[i]
+                _, share, ds = along(field, d, 1)
+                out[0, i] = ds * 2.0 * sqrt(whole / share)
+                out[1, i] = ds * 2.0 * whole * phi[i]
+            elif kind == REGULAR:
+                v2, _, ds = along(field, whole * phi[i], 0)
+                out[0, i] = ds * whole / sqrt(v2)
+                out[1, i] = ds * whole
+            else:
+                d = whole * exp(-phi[i])
+                _, share, ds = along(field, d, 2)
+                out[0, i] = ds / sqrt(share)
+                out[1, i] = ds * d
+    elif kind == TURN_TURN:
         for i in range(n):
             s, c = sin(0.5 * phi[i]), cos(0.5 * phi[i])
             da[i] = (b - a) * s * s
@@ -82,11 +105,20 @@ def rates(fns, p, kind, a, b, ref, w, phi, work, out):  # type: ignore[no-untype
 
 
 @Inner
-def speeds(fns, p, kind, a, b, ref, w, phi, work, out):  # type: ignore[no-untyped-def]
+def speeds(fns, p, kind, a, b, ref, w, field, phi, work, out):  # type: ignore[no-untyped-def]
     """Fill ``out`` with V at each phi: no difference of heights, and exactly zero at a turning point."""
     n = phi.size
     da, db, rows = work[0, :n], work[1, :n], work[2:4, :n]
-    if kind == TURN_TURN or kind == TO_EQUILIBRIUM:
+    if field.size > 0:
+        whole = fabs(b - a)
+        for i in range(n):
+            if kind == TO_EQUILIBRIUM:
+                d = whole * exp(-phi[i])
+                out[i] = d * sqrt(along(field, d, 2)[1])
+            else:
+                d = whole * phi[i] * (phi[i] if kind == FROM_TURN else 1.0)
+                out[i] = sqrt(max(along(field, d, 0)[0], 0.0))
+    elif kind == TURN_TURN or kind == TO_EQUILIBRIUM:
         for i in range(n):
             if kind == TURN_TURN:
                 s, c = sin(0.5 * phi[i]), cos(0.5 * phi[i])
@@ -112,18 +144,36 @@ def speeds(fns, p, kind, a, b, ref, w, phi, work, out):  # type: ignore[no-untyp
 
 
 @Inner
-def shares(kind, w, work, n):  # type: ignore[no-untyped-def]
-    """The least and largest regular factor of V**2 over the places last filled: what is left where it cancels."""
+def shares(kind, w, field, work, n, peak):  # type: ignore[no-untyped-def]
+    """What is left of V**2 where it cancels, over the places last filled.
+
+    Between two turning points that is its regular factor, least and largest. From where V**2 is known it is V**2
+    itself, against the largest on the way, ``peak``: a body that has been fast and is slow again passes a barrier.
+
+    Returns
+    -------
+    low, high : float
+        Their ratio is the share that is left.
+    peak : float
+        The largest V**2 on the way up to the last place.
+    """
     low, high = 1.0, 1.0
+    if field.size > 0:
+        return low, high, peak
     if kind == TURN_TURN:
         low, high = inf, 0.0
         for i in range(n):
             low, high = min(low, work[2, i]), max(high, work[2, i])
-    elif kind == REGULAR:
+    elif kind != TO_EQUILIBRIUM:
+        # Towards the place where V**2 is known it only grows more certain.
+        outwards = fabs(work[0, 0]) <= fabs(work[0, n - 1])
         for i in range(n):
             lost = work[0, i] * work[2, i]
-            low = min(low, (w - lost) / (w + fabs(lost)))
-    return low, high
+            if outwards:
+                peak = max(peak, w - lost)
+            if peak > 0.0 or not outwards:
+                low = min(low, (w - lost) / max(peak, w + fabs(lost)))
+    return low, high, peak
 
 
 @Inner
@@ -156,13 +206,16 @@ def legendre_sum(c, x):  # type: ignore[no-untyped-def]
     """The Legendre series with coefficients c, at x, by Clenshaw's recurrence."""
     high, low = 0.0, 0.0
     for k in range(c.size - 1, 0, -1):
-        high, low = c[k] + (2 * k + 1) / (k + 1) * x * high - (k + 1) / (k + 2) * low, high
+        high, low = c[k] + GROWTH[k] * x * high - DECAY[k] * low, high
     return c[0] + x * high - 0.5 * low
 
 
 @Inner
-def lay(fns, p, kind, a, b, ref, w, start, stop):  # type: ignore[no-untyped-def]
-    """Lay panels over anomalies [start, stop] until time and arc length are resolved to rounding.
+def lay(fns, p, kind, a, b, ref, w, field, marks):  # type: ignore[no-untyped-def]
+    """Lay panels until time and arc length are resolved to rounding.
+
+    ``field`` is V**2 along the stretch where forces dissipate, else empty. ``marks`` are anomalies: the first and the
+    last, and between them those at which a panel must begin because the curve is not smooth there.
 
     Returns
     -------
@@ -189,22 +242,24 @@ def lay(fns, p, kind, a, b, ref, w, start, stop):  # type: ignore[no-untyped-def
         np.empty((2, COUNT)),
         np.empty(DEGREE + 1),
     )
-    pending = np.empty(128)  # right edges still to do, nearest last
-    pending[0] = stop
-    waiting = 1
+    start, stop = marks[0], marks[-1]
+    waiting = marks.size - 1
+    pending = np.empty(waiting + 128)  # right edges still to do, nearest last
+    pending[:waiting] = marks[:0:-1]
+    most = MOST_PANELS + waiting
     edges[0], times[0], lengths[0] = start, 0.0, 0.0
     left, count, error, status = start, 0, 0.0, CONVERGED
     time_low, length_low = 0.0, 0.0
     least = LEAST_WIDTH * fabs(stop - start)
-    smallest, largest = inf, 0.0
+    smallest, largest, peak = inf, 0.0, 0.0
     while waiting > 0:
         right = pending[waiting - 1]
         half, middle = 0.5 * (right - left), 0.5 * (right + left)
         for i in range(11):
             phi[10 + i] = middle + half * NODES[i]
             phi[10 - i] = middle - half * NODES[i]
-        rates(fns, p, kind, a, b, ref, w, phi, work, values)
-        low, high = shares(kind, w, work, COUNT)
+        rates(fns, p, kind, a, b, ref, w, field, phi, work, values)
+        low, high, reached = shares(kind, w, field, work, COUNT, peak)
         smallest, largest = min(smallest, low), max(largest, high)
         if largest > 0.0 and smallest < HOPELESS * largest:
             status = ILL_CONDITIONED
@@ -238,7 +293,7 @@ def lay(fns, p, kind, a, b, ref, w, start, stop):  # type: ignore[no-untyped-def
             )
         )
         narrow = fabs(right - left) <= least
-        full = count + waiting >= MOST_PANELS or waiting >= pending.size - 1
+        full = count + waiting >= most or waiting >= pending.size - 1
         if not (duration > 0.0 and duration < inf):
             if narrow or full:
                 status = FAILED
@@ -259,6 +314,7 @@ def lay(fns, p, kind, a, b, ref, w, start, stop):  # type: ignore[no-untyped-def
             lengths[count + 1] = total
             edges[count + 1] = right
             left = right
+            peak = reached
             count += 1
             waiting -= 1
             continue

@@ -7,13 +7,13 @@ import numpy as np
 
 from gqm_sym.errors import InputError, SolutionError
 from gqm_sym.runtime import search
-from gqm_sym.runtime.course import ZERO, Course, Piece
-from gqm_sym.runtime.entries import walk_on
+from gqm_sym.runtime.course import ZERO, Course, Piece, plus
+from gqm_sym.runtime.entries import frame_at, walk_on
 from gqm_sym.runtime.events import liftoff
-from gqm_sym.runtime.motion import ULP, Motion
+from gqm_sym.runtime.motion import Motion
 from gqm_sym.runtime.problem import Problem
 from gqm_sym.runtime.search import FARTHEST, NARROW
-from gqm_sym.runtime.stretch import Array, Stretch, through, toward_equilibrium
+from gqm_sym.runtime.stretch import ULP, Array, Stretch, through, toward_equilibrium
 
 
 @dataclass(slots=True)
@@ -60,8 +60,10 @@ class Passage(Motion):
 
     def add(self, stretch: Stretch, sense: int, end: str) -> None:
         """Run through a whole stretch next."""
-        whole = (stretch.duration, 0.0)
+        whole = stretch.whole
         start, stop = (ZERO, whole) if sense > 0 else (whole, ZERO)
+        if not self._pieces:
+            start = plus(start, (self._off_launch(stretch), 0.0))
         t, s = (self._pieces[-1].t_stop, self._arc_end()) if self._pieces else (ZERO, 0.0)
         s_a = s if sense > 0 else s - stretch.direction * stretch.length
         phi_start, phi_stop = (0.0, stretch.stop) if sense > 0 else (stretch.stop, 0.0)
@@ -78,6 +80,15 @@ class Passage(Motion):
                 end=end,
             )
         )
+
+    def _off_launch(self, stretch: Stretch) -> float:
+        """How long the body takes from the double nearest to the launch place to that place itself."""
+        low, speed = self.problem.launch.lam0.low, self.problem.launch.v0.value
+        if stretch.from_exact or low == 0.0 or speed == 0.0:
+            return 0.0
+        f = self.problem.functions
+        ds = frame_at(f.addresses, f.p, np.array([self.problem.lam0]), np.zeros(1))[2, 0]
+        return stretch.direction * low * float(ds) / speed
 
     def append(self, piece: Piece) -> None:
         """Run through a piece next, as far as contact lasts."""
@@ -173,16 +184,23 @@ class Passage(Motion):
                 f"the motion leaves the range of doubles at {problem.formulas.parameter} = {end.place!r}; "
                 "give a shorter t_max"
             )
-        what, near, _ = walk_on(
-            f.addresses,
-            f.p,
-            lam0,
-            problem.w0,
-            end.direction,
-            abs(end.place - lam0),
-            abs(target - lam0),
-            end.step,
-        )
+        begun = abs(end.place - lam0)
+        while True:
+            what, near, far = walk_on(
+                f.addresses,
+                f.p,
+                lam0,
+                problem.w0,
+                end.direction,
+                begun,
+                abs(target - lam0),
+                end.step,
+            )
+            if what != search.CRITICAL:
+                break
+            if problem.decider.resolve(lam0 + near, lam0 + far, end.direction).what != "clear":
+                break
+            begun = abs(far)  # a barrier that is barely cleared
         if what != search.LIMIT:
             raise SolutionError(
                 f"the motion beyond {problem.formulas.parameter} = {lam0 + near!r} could not be followed; "
@@ -193,8 +211,11 @@ class Passage(Motion):
 
     def _clock_error(self, t: Array) -> Array:
         course = self._course(float(np.abs(t).max()) if t.size else 0.0)
-        worst = max(piece.stretch.relative_error for piece in course.pieces)
-        return np.abs(t) * (worst + ULP)
+        spent = [
+            abs(piece.r_stop[0] - piece.r_start[0]) * (piece.stretch.relative_error + ULP) for piece in course.pieces
+        ]
+        before: Array = np.cumsum([0.0, *spent])[course.piece_of(t)]
+        return before
 
     def _how_it_ends(self) -> str:
         end = self._pieces[-1].end

@@ -1,16 +1,21 @@
 """Motions that repeat: libration between two turning points, and circulation round a closed curve."""
 
+from math import inf
 from typing import Any
 
 import numpy as np
 
+from gqm_sym.errors import SolutionError
 from gqm_sym.runtime import timing
+from gqm_sym.runtime.clocks import slopes
 from gqm_sym.runtime.course import ZERO, Course, Piece, libration
+from gqm_sym.runtime.display import Rows
 from gqm_sym.runtime.events import Event
-from gqm_sym.runtime.motion import ULP, Motion
+from gqm_sym.runtime.motion import Motion, State
 from gqm_sym.runtime.numbers import read_number
 from gqm_sym.runtime.problem import Problem
-from gqm_sym.runtime.stretch import Array, Stretch, slopes
+from gqm_sym.runtime.sampling import Sampler, plain_times
+from gqm_sym.runtime.stretch import ULP, Array, Stretch
 
 
 class Periodic(Motion):
@@ -26,18 +31,28 @@ class Periodic(Motion):
         self._plain: Course | None = None
         self._precise: Course | None = None
         self._exact: timing.Timing | None = None
+        self._sampler: Sampler | None = None
 
     @property
     def turning_points(self) -> tuple[float, ...]:
         """Both turning points of a libration, each the double nearest to the exact one."""
         if self.kind != "libration":
             return ()
-        low, high = timing.turning_points(self.problem, self._stretch)
+        low, high = self._stretch.a, self._stretch.b
+        if self._is_exact:
+            low, high = timing.turning_points(self.problem, self._stretch)
         met = (high, low) if self.direction > 0 else (low, high)
         return (self.problem.lam0, met[0]) if self.problem.w0 == 0.0 else met
 
     @property
+    def _is_exact(self) -> bool:
+        """Whether more digits can be had than doubles hold."""
+        return self.problem.functions.exact is not None
+
+    @property
     def _timing(self) -> timing.Timing:
+        if not self._is_exact:
+            return timing.plain(self.problem, self.kind, self._stretch)
         if self._exact is None:
             self._exact = timing.exact(self.problem, self.kind, self.direction, self._stretch)
         return self._exact
@@ -62,11 +77,58 @@ class Periodic(Motion):
 
     def period_to(self, digits: int) -> str:
         """The period as a decimal string with that many correct digits (up to 1000)."""
+        if not self._is_exact:
+            raise SolutionError(
+                "period_to: this curve is a chart in doubles, whose period has no more digits than `period`; "
+                "declare the curve by formulas for more"
+            )
         return timing.period_to(self.problem, self.kind, self.direction, self._stretch, digits)
+
+    def lam(self, t: Any) -> Any:
+        """The curve's parameter at times, as `Motion.lam`; doubles take one compiled loop."""
+        times = plain_times(t)
+        sampler = None if times is None else self._sampler_for(times[1], times[2])
+        if times is None or sampler is None:
+            return super().lam(t)
+        places = sampler.places(times[0])
+        return places.reshape(t.shape) if isinstance(t, np.ndarray) else float(places[0])
+
+    def state(self, t: Any) -> State:
+        """Everything about the body at times, as `Motion.state`; doubles take one compiled loop."""
+        times = plain_times(t)
+        sampler = None if times is None else self._sampler_for(times[1], times[2])
+        if times is None or sampler is None:
+            return super().state(t)
+        if self._stretch.from_exact:  # its speeds are known to its panels alone
+            return super().state(t)._replace(lam=self.lam(t))
+        rows = sampler.states(times[0])
+        if isinstance(t, np.ndarray):
+            return State(t, *rows.reshape(-1, *t.shape))
+        return State(float(t), *rows[:, 0].tolist())
+
+    def _sampler_for(self, least: float, greatest: float) -> Sampler | None:
+        """What samples times from ``least`` to ``greatest``; None for times that cannot be, or not as doubles."""
+        reach = max(-least, greatest)
+        if not (reach < inf and greatest <= self.t_end):
+            return None
+        sampler = self._sampler
+        if sampler is not None and sampler.course is self._precise and reach <= sampler.reach:
+            return sampler
+        course = self._course(reach)
+        if sampler is None or sampler.course is not course:
+            clock = self._timing if course is self._precise else timing.plain(self.problem, self.kind, self._stretch)
+            sampler = self._sampler = Sampler(
+                self.problem, course, clock.phase, self.direction, self._clock_drift(course)
+            )
+        return sampler if reach <= sampler.reach else None
 
     def _course(self, reach: float) -> Course:
         whole = self._stretch.duration * (2.0 if self.kind == "libration" else 1.0)
-        if self._precise is None and (reach > whole or self._exact is not None or self._stretch.from_exact):
+        if (
+            self._is_exact
+            and self._precise is None
+            and (reach > whole or self._exact is not None or self._stretch.from_exact)
+        ):
             self._precise = self._build(self._timing)
         if self._precise is not None:
             return self._precise
@@ -75,8 +137,10 @@ class Periodic(Motion):
         return self._plain
 
     def _build(self, clock: timing.Timing) -> Course:
-        stretch, tau = self._stretch, clock.duration
-        pace = ((stretch.duration - tau[0]) - tau[1]) / tau[0]
+        tau = clock.duration
+        stretch = self._stretch if clock.marks is None else self._stretch.timed(clock.marks)
+        own = stretch.whole
+        pace = ((own[0] - tau[0]) + (own[1] - tau[1])) / tau[0]
         if self.kind == "libration":
             phi = stretch.anomaly_of(*clock.offsets)
             pieces = libration(stretch, direction=self.direction, tau=tau, phase=clock.phase, phi=phi)
@@ -96,16 +160,17 @@ class Periodic(Motion):
         return Course(pieces=(piece,), period=tau, lap=lap, lap_length=length, pace=pace)
 
     def _clock_error(self, t: Array) -> Array:
-        course = self._course(float(np.abs(t).max()) if t.size else 0.0)
-        assert course.period is not None
-        period = course.period[0]
-        # Within a period the stretch's clock counts, and the rounded anomaly of the launch; over many, the period.
-        local = period * (self._stretch.relative_error + ULP)
-        if course is not self._precise:
-            start = np.array([course.pieces[0].phi_start])
-            local += ULP * float(start[0] * slopes(self._stretch.edges, self._stretch.panels[3], start)[0])
-        per_period = period * (2.0**-104 if course is self._precise else self._stretch.relative_error)
-        return local + np.abs(t / period) * per_period
+        late, drift = self._clock_drift(self._course(float(np.abs(t).max()) if t.size else 0.0))
+        return late + np.abs(t) * drift
+
+    def _clock_drift(self, course: Course) -> tuple[float, float]:
+        """Estimated error of a course's clock at launch, and by how much it grows with time."""
+        if course is self._precise:
+            return 0.0, 2.0**-104
+        # What the stretch's own clock says of the launch and of the period, and the rounded anomaly of the launch.
+        stretch, start = self._stretch, np.array([course.pieces[0].phi_start])
+        launch = stretch.clock_error(start) + ULP * start * slopes(stretch.edges, stretch.panels[3], start)
+        return float(launch[0]), stretch.relative_error + ULP
 
     def events_between(self, t1: Any, t2: Any) -> tuple[Event, ...]:
         """Events at times from t1 to t2, over as many periods as that takes."""
@@ -118,7 +183,7 @@ class Periodic(Motion):
                 t = event.t + k * period
                 if start <= t <= min(stop, self.t_end):
                     out.append(Event(event.kind, t, event.lam + k * lap, event.x, event.z))
-        return tuple(out)
+        return Rows(out)
 
     def _one_period(self) -> tuple[Event, ...]:
         return tuple(event for event in self.events if event.kind != "horizon")

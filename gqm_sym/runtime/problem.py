@@ -3,8 +3,10 @@
 from dataclasses import dataclass
 from typing import Any
 
-from gqm_sym.runtime.formulas import Formulas, Launch
+from gqm_sym.runtime.exact import ExactProblem
+from gqm_sym.runtime.formulas import Domain, Formulas, Launch
 from gqm_sym.runtime.numbers import Number
+from gqm_sym.runtime.rounded import RoundedProblem
 from gqm_sym.runtime.stretch import Functions
 
 
@@ -12,12 +14,14 @@ from gqm_sym.runtime.stretch import Functions
 class Reach:
     """How far the motion goes one way, and what is there.
 
-    ``what`` is "turn", "equilibrium", "domain-end", "cusp", "closed", or "open" (towards infinity or a pole).
+    ``what`` is "turn", "equilibrium", "domain-end", "singular-point", "cusp", "closed", or "open" (towards infinity or
+    a pole). ``level`` marks a cusp at which V**2 vanishes as well: it is reached in finite time all the same.
     """
 
     what: str
     place: float
     exact: Any = None
+    level: bool = False
 
 
 @dataclass(slots=True, kw_only=True)
@@ -28,9 +32,40 @@ class Problem:
     launch: Launch
     p: tuple[Number, ...]
     functions: Functions
-    low: float
-    high: float
-    period: float
+    domain: Domain
+
+    @property
+    def low(self) -> float:
+        """The lower end of the parameter's range."""
+        return self.domain.low
+
+    @property
+    def high(self) -> float:
+        """The upper end of the parameter's range."""
+        return self.domain.high
+
+    @property
+    def period(self) -> float:
+        """The parameter's period; 0 where there is none."""
+        return self.domain.period
+
+    @property
+    def exact(self) -> ExactProblem:
+        """The exact problem, where there is one."""
+        exact = self.functions.exact
+        assert exact is not None
+        return exact
+
+    @property
+    def arc_origin(self) -> float:
+        """Arc length at launch: 0, or on a charted curve its distance from the start point."""
+        return self.lam0 if self.formulas.chart is not None else 0.0
+
+    @property
+    def decider(self) -> ExactProblem | RoundedProblem:
+        """Who answers what doubles cannot decide."""
+        exact = self.functions.exact
+        return RoundedProblem(self.functions, self.lam0, self.w0) if exact is None else exact
 
     @property
     def lam0(self) -> float:

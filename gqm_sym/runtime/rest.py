@@ -3,6 +3,7 @@
 import numpy as np
 
 from gqm_sym.runtime.course import ZERO, Course
+from gqm_sym.runtime.display import Rows
 from gqm_sym.runtime.events import Event
 from gqm_sym.runtime.motion import Located, Motion
 from gqm_sym.runtime.problem import Problem
@@ -28,7 +29,7 @@ class Rest(Motion):
     def events(self) -> tuple[Event, ...]:
         """At rest from the launch on."""
         state = self.state(0.0)
-        return (Event("rest", 0.0, state.lam, state.x, state.z),)
+        return Rows([Event("rest", 0.0, state.lam, state.x, state.z)])
 
     def _extent(self) -> str:
         return f"it rests at {self.problem.lam0!r}"

@@ -16,10 +16,13 @@ from gqm_sym.runtime.passage import OpenEnd, Passage
 from gqm_sym.runtime.periodic import Periodic
 from gqm_sym.runtime.problem import Problem, Reach
 from gqm_sym.runtime.rest import Rest
-from gqm_sym.runtime.stretch import LEAST_BALANCE, Stretch, between_turns, from_turn, through
+from gqm_sym.runtime.stretch import LEAST_BALANCE, Functions, Stretch, between_turns, from_turn, through
 
 # ds at an end of the domain, against its value at the launch, that makes the end a cusp.
 CUSP_SHARE = 1e-7
+# How far from a place ds is looked at to tell whether it is a cusp, and where a walk from one begins; in first steps.
+NEAR_CUSP = 1e-3
+OFF_CUSP = 1e-6
 
 
 def solve(formulas: Formulas, p: tuple[Number, ...], launch: Launch) -> Motion:
@@ -34,24 +37,18 @@ def solve(formulas: Formulas, p: tuple[Number, ...], launch: Launch) -> Motion:
 
 
 def _bilateral(formulas: Formulas, p: tuple[Number, ...], launch: Launch) -> Motion:
-    low, high, period = formulas.domain(p)
-    formulas.check_place(launch.lam0, low, high)
-    functions = formulas.functions(p, launch)
-    problem = Problem(
-        formulas=formulas,
-        launch=launch,
-        p=p,
-        functions=functions,
-        low=low,
-        high=high,
-        period=period,
-    )
-    f = functions
+    low, high, period, _ = domain = formulas.domain(p)
+    f = formulas.functions(p, launch)
+    problem = Problem(formulas=formulas, launch=launch, p=p, functions=f, domain=domain)
+    smooth = f.breaks.size == 0
     direction, ahead, behind, panels = survey(
-        f.addresses, f.p, problem.lam0, launch.v0.value, launch.direction, low, high, period
+        f.addresses, f.p, problem.lam0, launch.v0.value, launch.direction, low, high, period, smooth
     )
+    stuck = ahead[0] in (search.CUSP, search.BROKEN) and ahead[1] == 0.0
+    if (direction == 0 or stuck) and _is_cusp(problem, problem.lam0):
+        return _from_cusp(problem)
     if direction == 0:
-        sign = functions.exact.slope_sign()
+        sign = problem.decider.slope_sign()
         if sign == 0:
             return Rest(problem)
         direction = -sign
@@ -63,7 +60,7 @@ def _bilateral(formulas: Formulas, p: tuple[Number, ...], launch: Launch) -> Mot
             direction,
             0.0,
             period or _room(problem, direction),
-            _first_step(problem),
+            starting_step(problem),
         )
     if len(panels[0]) and ahead[0] == search.TURN:  # a libration without difficulties
         a, b = sorted((problem.lam0 + ahead[1], problem.lam0 + behind[1]))
@@ -71,14 +68,14 @@ def _bilateral(formulas: Formulas, p: tuple[Number, ...], launch: Launch) -> Mot
     front = _reach(problem, direction, ahead)
     if front.what == "closed":
         end = problem.lam0 + direction * period
-        stretch = through(f, problem.lam0, end, problem.lam0, problem.w0, panels if len(panels[0]) else None)
+        stretch = through(f, problem.lam0, end, problem.lam0, problem.w0, panels=panels if len(panels[0]) else None)
         return Periodic(problem, "circulation", direction, stretch)
     if front.what != "turn":
         return _outward(problem, direction, front)
     if problem.w0 == 0.0:
         back = Reach("turn", problem.lam0)
     else:
-        step = _first_step(problem)
+        step = starting_step(problem)
         limit = period - abs(front.place - problem.lam0) if period else _room(problem, -direction)
         start = walk_on(f.addresses, f.p, problem.lam0, problem.w0, -direction, 0.0, limit, step)
         back = _reach(problem, -direction, start)
@@ -94,7 +91,8 @@ def _bilateral(formulas: Formulas, p: tuple[Number, ...], launch: Launch) -> Mot
     return _returning(problem, direction, front, back)
 
 
-def _first_step(problem: Problem) -> float:
+def starting_step(problem: Problem) -> float:
+    """A step along the curve to begin with."""
     step: float = first_step.py_func(problem.low, problem.high, problem.period)
     return step
 
@@ -110,7 +108,9 @@ def _reach(problem: Problem, direction: int, walked: tuple[int, float, float]) -
     for _ in range(100):
         what, near, far = walked
         if what == search.CRITICAL:
-            end = problem.functions.exact.resolve(lam0 + near, lam0 + far, direction)
+            end = problem.decider.resolve(lam0 + near, lam0 + far, direction)
+            if end.what == "equilibrium" and _is_cusp(problem, float(end.place)):
+                return Reach("cusp", float(end.place), end.place, level=True)
             if end.what != "clear":
                 return Reach(end.what, float(end.place), end.place)
             walked = walk_on(
@@ -121,7 +121,7 @@ def _reach(problem: Problem, direction: int, walked: tuple[int, float, float]) -
                 direction,
                 max(abs(far), 1e-300),
                 limit,
-                _first_step(problem),
+                starting_step(problem),
             )
             continue
         if what == search.TURN:
@@ -132,7 +132,7 @@ def _reach(problem: Problem, direction: int, walked: tuple[int, float, float]) -
                 continue
             if problem.period:
                 return Reach("closed", lam0 + direction * problem.period)
-            return _domain_end(problem, direction)
+            return domain_end(problem, direction)
         if what == search.CUSP:
             return Reach("cusp", lam0 + far)
         if what == search.MARCHED:
@@ -143,24 +143,73 @@ def _reach(problem: Problem, direction: int, walked: tuple[int, float, float]) -
     )
 
 
-def _domain_end(problem: Problem, direction: int) -> Reach:
-    place = problem.high if direction > 0 else problem.low
+def domain_end(problem: Problem, direction: int) -> Reach:
+    """The end of the domain one way: what is there."""
+    place, name = (problem.high, problem.domain.ends[1]) if direction > 0 else (problem.low, problem.domain.ends[0])
     if not isfinite(place):
         return Reach("open", place)
     f = problem.functions
     here = np.array([problem.lam0, place])
     ds = frame_at(f.addresses, f.p, here, np.zeros(2))[2]
-    return Reach("cusp" if ds[1] <= CUSP_SHARE * ds[0] else "domain-end", place)
+    return Reach("cusp" if ds[1] <= CUSP_SHARE * ds[0] else name, place)
+
+
+def _is_cusp(problem: Problem, place: float) -> bool:
+    """Whether ds vanishes at a place, against its values near by."""
+    f, near = problem.functions, NEAR_CUSP * starting_step(problem)
+    ds = frame_at(f.addresses, f.p, place + near * np.array([0.0, -1.0, 1.0]), np.zeros(3))[2]
+    return bool(ds[0] <= 1e-10 * np.nanmax(ds[1:]))
+
+
+def _from_cusp(problem: Problem) -> Motion:
+    """A motion that begins at a cusp: it leaves into the domain, and the way it falls if it is released there."""
+    f, lam0, w0, asked = problem.functions, problem.lam0, problem.w0, problem.launch.direction
+    begin = OFF_CUSP * starting_step(problem)
+    while True:
+        offsets = np.array([begin, -begin]) * asked
+        w = speed_squared_at(f.addresses, f.p, lam0, problem.launch.lam0.low, w0, lam0 + offsets, offsets)
+        ways = [way for way, rate in zip((asked, -asked), w, strict=True) if rate > 0.0 and _room(problem, way) > begin]
+        if ways:
+            break
+        if w0 == 0.0:
+            return Rest(problem)
+        begin *= 1e-3  # so slow a launch turns sooner
+    direction = ways[0] if w0 == 0.0 else asked
+    if direction not in ways:
+        raise leaving(problem, direction, "cusp")
+    walked = walk_on(f.addresses, f.p, lam0, w0, direction, begin, problem.period or _room(problem, direction), begin)
+    front = _reach(problem, direction, walked)
+    passage = Passage(problem, "transit", direction)
+    if w0 > 0.0 and front.what in ("cusp", "domain-end", "singular-point"):
+        # A slow body gathers and loses its speed over distances that even steps would miss: panels grow from both ends.
+        steps = np.geomspace(1e-12, 0.25, 25) * (front.place - lam0)
+        hints = (*(lam0 + steps), *(front.place - steps))
+        passage.add(through(f, lam0, front.place, lam0, w0, hints=hints), 1, front.what)
+        return passage.finish()
+    if front.what != "turn":
+        return _outward(problem, direction, front)
+    if w0 == 0.0:
+        swing, sense = between_turns(f, lam0, front.place), 1
+    else:
+        swing, sense = from_turn(f, front.place, lam0), -1
+    passage.add(swing, sense, "turn")
+    passage.add(swing, -sense, "cusp")
+    return passage.finish()
+
+
+def leaving(problem: Problem, direction: int, what: str) -> LaunchError:
+    """What to say where a launch would leave the curve at once."""
+    return LaunchError(
+        f"lam0: {problem.lam0!r} is the {what} itself, and the motion would leave through it at once; "
+        f"launch with direction={-direction} or from a place inside the domain"
+    )
 
 
 def _outward(problem: Problem, direction: int, front: Reach) -> Motion:
     """A motion that leaves the launch place for good, without turning."""
     f, lam0 = problem.functions, problem.lam0
     if abs(front.place - lam0) <= 1e-15 * max(abs(lam0), 1.0):
-        raise LaunchError(
-            f"lam0: {lam0!r} is the {front.what} itself, and the motion would leave through it at once; "
-            f"launch with direction={-direction} or from a place inside the domain"
-        )
+        raise leaving(problem, direction, front.what)
     kind = "asymptotic" if front.what == "equilibrium" else "transit"
     passage = Passage(problem, kind, direction)
     if problem.w0 > 0.0:
@@ -169,7 +218,8 @@ def _outward(problem: Problem, direction: int, front: Reach) -> Motion:
         elif front.what == "open":
             passage.open_end = OpenEnd(lam0, direction, front.place)
         else:
-            passage.add(through(f, lam0, front.place, lam0, problem.w0), 1, front.what)
+            ref, w = (front.place, 0.0) if front.level else (lam0, problem.w0)
+            passage.add(through(f, lam0, front.place, ref, w), 1, front.what)
         return passage.finish()
     if front.what == "equilibrium":
         middle = 0.5 * (lam0 + front.place)
@@ -180,8 +230,13 @@ def _outward(problem: Problem, direction: int, front: Reach) -> Motion:
         passage.add(from_turn(f, lam0, middle), 1, "")
         passage.open_end = OpenEnd(middle, direction, front.place)
     else:
-        passage.add(from_turn(f, lam0, front.place), 1, front.what)
+        passage.add(_swing(f, lam0, front), 1, front.what)
     return passage.finish()
+
+
+def _swing(f: Functions, turn: float, end: Reach) -> Stretch:
+    """From a turning point to an end: where V**2 vanishes there too, as between two turning points."""
+    return between_turns(f, turn, end.place) if end.level else from_turn(f, turn, end.place)
 
 
 def _gathering_speed(passage: Passage, top: float) -> float:
@@ -195,7 +250,7 @@ def _gathering_speed(passage: Passage, top: float) -> float:
     fastest = speed_squared_at(f.addresses, f.p, lam0, problem.launch.lam0.low, w0, places, places - lam0)[0]
     if w0 >= fastest:
         return lam0
-    if w0 >= LEAST_BALANCE * fastest:
+    if w0 >= LEAST_BALANCE * fastest or f.exact is None:
         passage.add(through(f, lam0, middle, lam0, w0), 1, "")
         return middle
     # As slow as this the launch is next to an equilibrium, its place to be taken as exactly as it was given.
@@ -221,5 +276,5 @@ def _returning(problem: Problem, direction: int, front: Reach, back: Reach) -> M
         passage.add(from_turn(f, front.place, middle), 1, "")
         passage.approach(middle, back.place)
     else:
-        passage.add(from_turn(f, front.place, back.place), 1, back.what)
+        passage.add(_swing(f, front.place, back), 1, back.what)
     return passage.finish()

@@ -1,16 +1,28 @@
 """A stretch of the curve that is run through in one direction, with its clock."""
 
+from copy import copy
 from dataclasses import dataclass, field
 from math import atan2, exp, inf, log, pi, sqrt
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gqm_sym.errors import SolutionError
-from gqm_sym.runtime.entries import anomalies, build_table, lay_panels, read_off_many, speeds_at
+from gqm_sym.runtime.clocks import Array as Array
+from gqm_sym.runtime.clocks import running_totals, slopes
+from gqm_sym.runtime.conditioning import magnified, off_launch
+from gqm_sym.runtime.entries import (
+    anomalies,
+    build_table,
+    lay_along,
+    lay_panels,
+    read_off_many,
+    speeds_along,
+    speeds_at,
+)
 from gqm_sym.runtime.exact import ExactProblem
 from gqm_sym.runtime.exact_panels import DIGITS, exact_ends, lay_exactly
+from gqm_sym.runtime.inversion import TIMED
 from gqm_sym.runtime.panels import (
     FAILED,
     FROM_TURN,
@@ -20,20 +32,48 @@ from gqm_sym.runtime.panels import (
     TURN_TURN,
 )
 
-Array = NDArray[np.float64]
-
-
 # Below this balance the half period in doubles is off by more than a few units in the last place.
 LEAST_BALANCE = 1e-2
+# Below this share of its ends, the width of a stretch is too rounded for a speed.
+LEAST_WIDTH = 1.0 / 32.0
 
 
-@dataclass(frozen=True, slots=True)
+NOWHERE: Array = np.empty(0)
+ULP = 2.220446049250313e-16
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Functions:
-    """One motion's compiled functions, its parameters, and the same problem exactly."""
+    """One motion's compiled functions and what they are given.
+
+    Attributes
+    ----------
+    addresses : tuple of int
+        Of the compiled functions.
+    p : array
+        The run-time parameters, and behind them the curve's chart where it has one.
+    exact : ExactProblem or None
+        The same problem exactly; None where the curve is known by doubles only.
+    breaks, corners : arrays
+        Places at which the curve is not smooth, and those where its tangent jumps; repeated with the period.
+    period : float
+        Of a closed curve, else 0.
+    """
 
     addresses: tuple[int, ...]
     p: Array
-    exact: ExactProblem
+    exact: ExactProblem | None = None
+    breaks: Array = field(default_factory=lambda: NOWHERE)
+    corners: Array = field(default_factory=lambda: NOWHERE)
+    period: float = 0.0
+
+    def between(self, places: Array, a: float, b: float) -> Array:
+        """Those of some places that lie strictly between two, round a closed curve as often as it takes."""
+        low, high = min(a, b), max(a, b)
+        if self.period and places.size:
+            laps = np.arange(np.floor((low - places[-1]) / self.period), np.ceil((high - places[0]) / self.period) + 1)
+            places = (places[None, :] + laps[:, None] * self.period).ravel()
+        return places[(places > low) & (places < high)]
 
 
 @dataclass(slots=True, kw_only=True)
@@ -50,10 +90,18 @@ class Stretch:
         Where no end is special: a place and V**2 there.
     stop : float
         The last anomaly.
+    hints : tuple of float
+        Places at which panels begin besides the curve's own breaks: the rate changes there on a scale that even steps
+        would miss.
+    v2 : array or None
+        V**2 along it where forces dissipate: a field (`fields`), by the distance from ``a``, or from ``b`` if that is
+        an equilibrium.
     ends : pair
         Its ends in extended precision, where they are known.
     from_exact : bool
         Whether its panels were laid in extended precision.
+    conditioning : float
+        How many times its times magnify, at most, the rounding of what they depend on.
     """
 
     functions: Functions
@@ -63,26 +111,61 @@ class Stretch:
     ref: float = 0.0
     w: float = 0.0
     stop: float = 1.0
+    hints: tuple[float, ...] = ()
+    v2: Array | None = None
     panels: Any = None
     ends: tuple[Any, Any] = (None, None)
     from_exact: bool = False
+    conditioning: float = field(default=1.0, init=False)
+    _clock: Any = field(default=None, repr=False)
+    _is_timed: bool = field(default=False, repr=False)
+    _stretched: float | None = field(default=None, repr=False)
     _table: Any = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
-        if self.panels is None:
-            f = self.functions
-            self.panels = lay_panels(f.addresses, f.p, self.kind, self.a, self.b, self.ref, self.w, 0.0, self.stop)
-        if self.ill_conditioned:
-            exact = self.functions.exact
+        f = self.functions
+        if self.v2 is not None:
+            self.panels = lay_along(f.p, self.kind, self.a, self.b, self.v2, self._marks())
+        elif self.panels is None:
+            self.w += self._off_launch()
+            self.panels = lay_panels(f.addresses, f.p, self.kind, self.a, self.b, self.ref, self.w, self._marks())
+        exact = f.exact
+        self.conditioning = max(1.0 / self.balance if self.balance > 0.0 else inf, self._magnified())
+        if exact is not None and not self.from_exact and self.conditioning > 1.0 / LEAST_BALANCE:
             self.ends = exact_ends(exact, DIGITS, self.kind, self.a, self.b, self.ends)
             self.a, self.b = float(self.ends[0]), float(self.ends[1])
             self.panels = lay_exactly(exact, self.kind, self.ends, self.stop)
             self.from_exact = True
+        if self.panels[7] == ILL_CONDITIONED:
+            raise SolutionError(
+                f"time of flight from {self.a!r} to {self.b!r}: V**2 all but vanishes inside, and this curve is known "
+                "by doubles only; launch a little faster or slower, or declare the curve by formulas"
+            )
         if self.panels[7] == FAILED:
             raise SolutionError(
                 f"time of flight from {self.a!r} to {self.b!r}: the integrand is not finite there; "
                 "is the curve regular and the potential finite on this stretch?"
             )
+
+    def timed(self, clock: tuple[Array, Array]) -> "Stretch":
+        """The same stretch by a better clock."""
+        better = copy(self)
+        better._clock, better._table, better._is_timed = clock, None, True
+        return better
+
+    @property
+    def clock(self) -> tuple[Array, Array]:
+        """Time at the panels' edges, each as two doubles."""
+        if self._clock is None:
+            self._clock = running_totals(self.panels[1], self.panels[3])
+        times, low = self._clock
+        return times, low
+
+    def _marks(self) -> Array:
+        """The first and the last anomaly, and those at which the curve is not smooth."""
+        places = self.functions.between(self.functions.breaks, self.a, self.b)
+        inside = [self.anomaly_of(place - self.a, self.b - place) for place in (*places, *self.hints)]
+        return np.unique([0.0, *(phi for phi in inside if 0.0 < phi < self.stop), self.stop])
 
     @property
     def edges(self) -> Array:
@@ -93,7 +176,14 @@ class Stretch:
     @property
     def duration(self) -> float:
         """Time from one end to the other."""
-        return float(self.panels[1][-1])
+        return self.whole[0]
+
+    @property
+    def whole(self) -> tuple[float, float]:
+        """The same as two doubles, as its clock shows it."""
+        if self._clock is None:  # not asked for yet
+            return float(self.panels[1][-1]), 0.0
+        return float(self._clock[0][-1]), float(self._clock[1][-1])
 
     @property
     def length(self) -> float:
@@ -105,15 +195,47 @@ class Stretch:
         """Estimated relative error of the duration by quadrature."""
         return float(self.panels[5])
 
+    def clock_error(self, phi: Array) -> Array:
+        """Estimated error of its clock at anomalies: of the whole time, or of the panel's where its edges are exact."""
+        error = self.relative_error + ULP + TIMED
+        which = np.clip(np.searchsorted(self.edges, phi, side="right") - 1, 0, len(self.edges) - 2)
+        times = self.clock[0]
+        if self._is_timed:
+            spans: Array = np.diff(times)[which]
+        elif self.kind == TO_EQUILIBRIUM:  # how far it goes on was a matter of choice
+            spans = times[which + 1]
+        else:
+            spans = np.full_like(phi, self.duration)
+        return error * spans
+
+    def inversion_error(self, phi: Array) -> Array:
+        """Estimated error of the table at anomalies, in the curve's parameter, rounding included."""
+        ends = self.table[3].sum(axis=1)
+        errors = self.table[6][np.clip(np.searchsorted(ends, phi), 0, len(ends) - 1)]
+        width = abs(self.b - self.a)
+        if self.kind == TO_EQUILIBRIUM:
+            left: Array = width * np.exp(-phi) * (errors + 3.0 * ULP * np.maximum(phi, 1.0))
+            return left
+        swing = {TURN_TURN: 0.5, FROM_TURN: 2.0, REGULAR: 1.0}[self.kind]  # dlam/dphi at most, in widths
+        moved: Array = width * (swing * errors + 3.0 * ULP)
+        return moved
+
     @property
     def balance(self) -> float:
         """How much of V**2's regular factor is left where most of it cancels: this stretch's conditioning."""
         return float(self.panels[6])
 
-    @property
-    def ill_conditioned(self) -> bool:
-        """Whether doubles lose digits of V**2 that matter."""
-        return bool(self.panels[7] == ILL_CONDITIONED or self.panels[6] < LEAST_BALANCE)
+    def _off_launch(self) -> float:
+        """What V**2 at the double nearest to the launch place has over that at the launch place itself."""
+        f = self.functions
+        if f.exact is None or self.kind != REGULAR or self.ref != f.exact.lam0.value:
+            return 0.0
+        return off_launch(f.addresses, f.p, f.exact.lam0)
+
+    def _magnified(self) -> float:
+        f, ref = self.functions, self.a if self.kind == FROM_TURN else self.ref
+        one_sided = self.kind in (FROM_TURN, REGULAR) and self.v2 is None
+        return magnified(f.addresses, f.p, self.a, self.b, ref, self.w) if one_sided else 1.0
 
     @property
     def direction(self) -> int:
@@ -124,14 +246,15 @@ class Stretch:
     def table(self) -> Any:
         """The anomaly over time, tabulated when first asked for."""
         if self._table is None:
-            self._table = build_table(self.panels[0], self.panels[1], self.panels[3])
+            self._table = build_table(self.panels[0], *self.clock, self.panels[3])
         return self._table
 
     def anomaly(self, t: Array, t_low: Array) -> Array:
         """The anomaly at times ``t + t_low`` from the end ``a``; exactly the first and the last one at both ends."""
-        phi: Array = anomalies(*self.table[:5], t, t_low)
+        phi: Array = anomalies(*self.table[:6], t, t_low)
+        whole = self.whole
         phi[t + t_low <= 0.0] = 0.0
-        phi[t + t_low >= self.duration] = self.edges[-1]
+        phi[(t - whole[0]) + (t_low - whole[1]) >= 0.0] = self.edges[-1]
         return phi
 
     def anomaly_of(self, offset_a: float, offset_b: float) -> float:
@@ -165,8 +288,11 @@ class Stretch:
         f = self.functions
         if self.from_exact:
             return self._paced(phi)
+        if self.v2 is not None:
+            along: Array = speeds_along(f.p, self.kind, self.a, self.b, self.v2, phi)
+            return along
         speeds: Array = speeds_at(f.addresses, f.p, self.kind, self.a, self.b, self.ref, self.w, phi)
-        return speeds
+        return speeds * self.spread
 
     def _paced(self, phi: Array) -> Array:
         """|ds/dt| from the panels themselves, where doubles cannot tell V**2 from nothing."""
@@ -174,24 +300,24 @@ class Stretch:
 
     def times(self, phi: Array) -> Array:
         """Time from the end ``a`` to anomalies."""
-        times: Array = read_off_many(self.panels[0], self.panels[1], self.panels[3], phi)
+        times: Array = read_off_many(self.panels[0], self.clock[0], self.panels[3], phi)
         return times
 
     def lengths(self, phi: Array) -> Array:
         """Arc length from the end ``a`` to anomalies."""
         lengths: Array = read_off_many(self.panels[0], self.panels[2], self.panels[4], phi)
-        return lengths
+        return lengths * self.spread
 
-
-def slopes(edges: Array, terms: Array, phi: Array) -> Array:
-    """Derivatives of the panels' Legendre series at anomalies."""
-    out = np.empty_like(phi)
-    which = np.clip(np.searchsorted(edges, phi, side="right") - 1, 0, len(edges) - 2)
-    for k in np.unique(which):
-        half = 0.5 * (edges[k + 1] - edges[k])
-        x = ((phi[which == k] - edges[k]) - half) / half
-        out[which == k] = np.polynomial.legendre.legval(x, np.polynomial.legendre.legder(terms[k])) / half
-    return out
+    @property
+    def spread(self) -> float:
+        """The exact width of a short stretch between two turning points, against that of the rounded ones."""
+        exact, width = self.functions.exact, self.b - self.a
+        if exact is None or self.kind != TURN_TURN or width > LEAST_WIDTH * max(abs(self.a), abs(self.b)):
+            return 1.0
+        if self._stretched is None:
+            low, high = exact_ends(exact, DIGITS, self.kind, self.a, self.b, self.ends)
+            self._stretched = float((high - low) / width)
+        return self._stretched
 
 
 def toward_equilibrium(functions: Functions, start: float, top: float, duration: float) -> Stretch:
@@ -220,6 +346,22 @@ def from_turn(functions: Functions, turn: float, end: float) -> Stretch:
     return Stretch(functions=functions, kind=FROM_TURN, a=turn, b=end)
 
 
-def through(functions: Functions, start: float, end: float, ref: float, w: float, panels: Any = None) -> Stretch:
+def through(
+    functions: Functions,
+    start: float,
+    end: float,
+    ref: float,
+    w: float,
+    *,
+    panels: Any = None,
+    hints: tuple[float, ...] = (),
+) -> Stretch:
     """A stretch without special ends; ``w`` is V**2 at ``ref``."""
-    return Stretch(functions=functions, kind=REGULAR, a=start, b=end, ref=ref, w=w, panels=panels)
+    return Stretch(functions=functions, kind=REGULAR, a=start, b=end, ref=ref, w=w, panels=panels, hints=hints)
+
+
+def along_field(functions: Functions, kind: int, a: float, b: float, field: Array, stop: float = 1.0) -> Stretch:
+    """A stretch whose V**2 is a field; its panels begin where the field's do."""
+    origin, way = (b, np.sign(a - b)) if kind == TO_EQUILIBRIUM else (a, np.sign(b - a))
+    hints = tuple(float(place) for place in origin + way * field[:-1, 1])
+    return Stretch(functions=functions, kind=kind, a=a, b=b, v2=field, stop=stop, hints=hints)

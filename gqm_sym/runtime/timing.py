@@ -1,6 +1,8 @@
 """The period of a motion and the time from its end to the launch, in doubles or in extended precision."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import accumulate
 from math import ceil, log10
 from typing import Any
 
@@ -12,7 +14,7 @@ from gqm_sym.runtime.exact import SMOOTH_PANELS, Arithmetic, two_doubles
 from gqm_sym.runtime.exact_panels import exact_ends
 from gqm_sym.runtime.panels import REGULAR, TURN_TURN
 from gqm_sym.runtime.problem import Problem
-from gqm_sym.runtime.stretch import Stretch
+from gqm_sym.runtime.stretch import Array, Stretch
 
 # Digits of a period as two doubles, and of the time from a turning point to the launch, which no count of periods
 # multiplies.
@@ -33,11 +35,14 @@ class Timing:
         Time from the lower turning point to the launch (libration).
     offsets : (float, float)
         The launch place from both ends of the stretch: ``lam0 - a`` and ``b - lam0``.
+    marks : pair of arrays, or None
+        Time at each edge of the stretch's panels, where there are many: between them the pace varies.
     """
 
     duration: Pair
     phase: Pair
     offsets: tuple[float, float]
+    marks: tuple[Array, Array] | None = None
 
 
 def plain(problem: Problem, kind: str, stretch: Stretch) -> Timing:
@@ -55,24 +60,32 @@ def plain(problem: Problem, kind: str, stretch: Stretch) -> Timing:
 def exact(problem: Problem, kind: str, direction: int, stretch: Stretch) -> Timing:
     """Times of the exact problem."""
     a = _arithmetic(problem, stretch, PERIOD_DIGITS)
-    duration, low, high = _duration(a, problem, kind, direction, stretch, PERIOD_DIGITS)
+    parts, low, high = _durations(a, problem, kind, direction, stretch, PERIOD_DIGITS)
+    duration = sum(parts)
+    marks = _marks(parts) if len(parts) > 1 else None
     if kind == "circulation":
-        return Timing(two_doubles(duration), ZERO, (0.0, stretch.b - stretch.a))
+        return Timing(two_doubles(duration), ZERO, (0.0, stretch.b - stretch.a), marks)
     offsets = (float(a.lam0 - low), float(high - a.lam0))
     if problem.w0 == 0.0:
         at_low = abs(a.lam0 - low) < abs(high - a.lam0)
-        return Timing(two_doubles(duration), ZERO if at_low else two_doubles(duration), offsets)
+        return Timing(two_doubles(duration), ZERO if at_low else two_doubles(duration), offsets, marks)
     c = a.context
     start = 2 * c.atan2(c.sqrt(a.lam0 - low), c.sqrt(high - a.lam0))
     edges = [a.mpf(float(e)) for e in stretch.edges if e < start]
-    phase = a.gauss(a.anomaly_rate(TURN_TURN, low, high), [*edges, start], PHASE_DIGITS)
-    return Timing(two_doubles(duration), two_doubles(phase), offsets)
+    phase = sum(a.gauss(a.anomaly_rate(TURN_TURN, low, high), [*edges, start], PHASE_DIGITS))
+    return Timing(two_doubles(duration), two_doubles(phase), offsets, marks)
+
+
+def _marks(parts: Sequence[Any]) -> tuple[Array, Array]:
+    """Running totals from zero, each as two doubles."""
+    pairs = np.array([ZERO, *(two_doubles(total) for total in accumulate(parts))])
+    return np.ascontiguousarray(pairs[:, 0]), np.ascontiguousarray(pairs[:, 1])
 
 
 def turning_points(problem: Problem, stretch: Stretch) -> tuple[float, float]:
     """Both turning points of a libration, each the double nearest to the exact one."""
     a = _arithmetic(problem, stretch, PERIOD_DIGITS)
-    low, high = exact_ends(problem.functions.exact, a.digits, TURN_TURN, stretch.a, stretch.b, stretch.ends)
+    low, high = exact_ends(problem.exact, a.digits, TURN_TURN, stretch.a, stretch.b, stretch.ends)
     return float(low), float(high)
 
 
@@ -81,37 +94,37 @@ def period_to(problem: Problem, kind: str, direction: int, stretch: Stretch, dig
     if not isinstance(digits, int) or not 1 <= digits <= MOST_DIGITS:
         raise InputError(f"period_to: digits must be a whole number from 1 to {MOST_DIGITS}, got {digits!r}")
     a = _arithmetic(problem, stretch, digits + 5)
-    duration = _duration(a, problem, kind, direction, stretch, digits + 5)[0]
+    duration = sum(_durations(a, problem, kind, direction, stretch, digits + 5)[0])
     value = 2 * duration if kind == "libration" else duration
     return str(a.context.nstr(value, digits, strip_zeros=False))
 
 
 def _arithmetic(problem: Problem, stretch: Stretch, digits: int) -> Arithmetic:
     """Arithmetic precise enough for V**2 by subtraction to keep that many digits at every node."""
-    rough = problem.functions.exact.at(60)
+    rough = problem.exact.at(60)
     middle = rough.mpf(0.5 * (stretch.a + stretch.b))
     top = abs(rough.speed_squared(middle)) / rough.size
     lost = ceil(-log10(float(top))) if 0 < top < 1 else 0
     peaked = len(stretch.edges) - 1 > SMOOTH_PANELS
-    return problem.functions.exact.at(digits + 20 + lost + (60 if peaked else 0))
+    return problem.exact.at(digits + 20 + lost + (60 if peaked else 0))
 
 
-def _duration(
+def _durations(
     a: Arithmetic, problem: Problem, kind: str, direction: int, stretch: Stretch, digits: int
-) -> tuple[Any, Any, Any]:
-    """Half period or loop time, and the exact ends of the stretch."""
+) -> tuple[list[Any], Any, Any]:
+    """Half period or loop time, whole or panel by panel, and the exact ends of the stretch."""
     if kind == "circulation":
         low, high, code, stop = a.lam0, a.lam0 + direction * a.domain()[2], REGULAR, a.mpf(1)
     else:
-        low, high = exact_ends(problem.functions.exact, a.digits, TURN_TURN, stretch.a, stretch.b, stretch.ends)
+        low, high = exact_ends(problem.exact, a.digits, TURN_TURN, stretch.a, stretch.b, stretch.ends)
         code, stop = TURN_TURN, a.context.pi
     rate = a.anomaly_rate(code, low, high)
     if len(stretch.edges) - 1 <= SMOOTH_PANELS:
         value = a.trapezoid(rate, stop, digits)
         if value is not None:
-            return value, low, high
+            return [value], low, high
     edges = [*(a.mpf(float(e)) for e in stretch.edges[:-1]), stop]
-    value = a.gauss(rate, edges, digits)
-    if not value > 0:
+    parts = a.gauss(rate, edges, digits)
+    if not all(part > 0 for part in parts):
         raise SolutionError("period: extended precision gives no finite time; please report this launch")
-    return value, low, high
+    return parts, low, high

@@ -8,7 +8,7 @@ from pydantic.fields import FieldInfo
 
 from gqm_sym.specfile.nodes import MapNode, Mark, Mistakes, Node, Scalar, shown
 from gqm_sym.specfile.places import descend, place_of
-from gqm_sym.specfile.schema import CURVE_KEYS, FAMILY_MODELS, KERNEL_KEYS, model_at
+from gqm_sym.specfile.schema import CURVE_KEYS, FAMILY_MODELS, model_at
 
 # What pydantic calls it -> what must stand there.
 _WANTED = {
@@ -79,13 +79,9 @@ def _explain_unknown(loc: tuple[Any, ...], steps: list[tuple[str, Mark, Node]], 
     label = f"{path}: " if path else ""
     allowed = sorted(model_at(_path(loc[:-1])).model_fields)
     mark = steps[-1][1]
-    announced = {"curve": CURVE_KEYS, "kernel": KERNEL_KEYS}.get(path, ())
-    if key in announced:
+    if path == "curve" and key in CURVE_KEYS:
         what = f"{label}{key} is not supported yet by this version"
         mistakes.add(mark, what, f"it knows {', '.join(allowed)}")
-    elif path == "launch" and key == "point":
-        what = f"{label}point is for implicit and sampled curves"
-        mistakes.add(mark, what, "give lam0, the curve's parameter at launch")
     else:
         near = difflib.get_close_matches(key, allowed, n=1)
         remedy = f"did you mean {near[0]}?" if near else f"allowed are {', '.join(allowed)}"

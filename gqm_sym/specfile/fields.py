@@ -6,22 +6,37 @@ Every scalar arrives as text and stays text, so that ``9.81`` keeps meaning 981/
 import re
 import sys
 from collections.abc import Callable
-from typing import Annotated, TypeAlias
+from typing import Annotated, Any, TypeAlias
 
-from pydantic import AfterValidator, BeforeValidator, Field, WithJsonSchema
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, WithJsonSchema
 from pydantic_core import PydanticCustomError
 
-from gqm_sym.errors import GQMError, NumberError
+from gqm_sym.errors import InputError, NumberError
 from gqm_sym.expressions import RESERVED_NAMES, check_name
 from gqm_sym.grammar import parse
 from gqm_sym.parameters import check_parameter, exact_value, read_value
 from gqm_sym.specfile.nodes import shown
+from gqm_sym.specfile.units import read_unit
 
 LINE_LIMIT = 200
+
+# The default of what may be left out. Not "model | None = None": null in the file is a mistake.
+ABSENT: Any = None
 
 # The ways of YAML and of Python to write what is no number.
 _NOT_FINITE = frozenset({".nan", ".inf", "nan", "inf", "infinity"})
 _COLUMN = re.compile(r"(?:.*?: )?column (\d+): ")
+
+
+class Section(BaseModel):
+    """A mapping of the file."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+def wrapped(key: str, kind: type) -> BeforeValidator:
+    """Take a value of a kind for the mapping that has it under a key."""
+    return BeforeValidator(lambda value: {key: value} if isinstance(value, kind) else value)
 
 
 def _mistake(what: str, column: int = 0) -> PydanticCustomError:
@@ -40,7 +55,7 @@ def _checked(check: Callable[[str], object]) -> AfterValidator:
     def validate(text: str) -> str:
         try:
             check(text)
-        except GQMError as error:
+        except InputError as error:
             # "where" is empty: the caller knows the place better, from the tree of the file.
             raise _mistake(*column_of(str(error).removeprefix(": "))) from None
         return text
@@ -74,10 +89,13 @@ def _read_flag(value: object) -> object:
     return value == "true"
 
 
-def _read_direction(value: object) -> object:
-    if value not in ("1", "+1", "-1"):
-        raise _mistake(f"must be 1 or -1 (the sign of ds/dt at launch), got {shown(str(value))}")
-    return int(str(value))
+def _read_sign(of: str) -> BeforeValidator:
+    def read(value: object) -> object:
+        if value not in ("1", "+1", "-1"):
+            raise _mistake(f"must be 1 or -1 (the sign of {of}), got {shown(str(value))}")
+        return int(str(value))
+
+    return BeforeValidator(read)
 
 
 _TEXT_OR_NUMBER = {"type": ["string", "number"]}
@@ -86,10 +104,12 @@ Line: TypeAlias = Annotated[str, AfterValidator(_check_line)]
 Name: TypeAlias = Annotated[str, _checked(lambda text: check_name(text, where=""))]
 CurveParameter: TypeAlias = Annotated[str, _checked(_check_curve_parameter)]
 ParameterName: TypeAlias = Annotated[str, _checked(lambda text: check_parameter(text, where=""))]
+UnitText: TypeAlias = Annotated[str, _checked(lambda text: text and read_unit(text, where=""))]
 Expression: TypeAlias = Annotated[str, _checked(lambda text: parse(text, where="")), WithJsonSchema(_TEXT_OR_NUMBER)]
 Number: TypeAlias = Annotated[str, _checked(_check_number), WithJsonSchema(_TEXT_OR_NUMBER)]
 Flag: TypeAlias = Annotated[bool, BeforeValidator(_read_flag), WithJsonSchema({"type": "boolean"})]
-Direction: TypeAlias = Annotated[int, BeforeValidator(_read_direction), WithJsonSchema({"enum": [1, -1]})]
+Direction: TypeAlias = Annotated[int, _read_sign("ds/dt at launch"), WithJsonSchema({"enum": [1, -1]})]
+Tangent: TypeAlias = Annotated[int, _read_sign("the tangent (-F_z, F_x)"), WithJsonSchema({"enum": [1, -1]})]
 Ends: TypeAlias = Annotated[list[Expression | None], Field(min_length=2, max_length=2)]
 Place: TypeAlias = Annotated[list[Number], Field(min_length=2, max_length=2)]
 Centre: TypeAlias = Annotated[list[Expression], Field(min_length=2, max_length=2)]

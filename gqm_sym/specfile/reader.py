@@ -13,10 +13,11 @@ from typing import Any, TypeAlias, TypeVar
 import sympy as sp
 from pydantic import BaseModel, ValidationError
 
+from gqm_sym.budgets import apart, budget, spend
 from gqm_sym.declare import Curve
-from gqm_sym.errors import InputError
+from gqm_sym.errors import BudgetError, InputError, SpecFileError
 from gqm_sym.kernels import KERNELS, Kernel
-from gqm_sym.parameters import exact_value
+from gqm_sym.parameters import exact_value, refuse_out_of_range
 from gqm_sym.specfile.explain import explain
 from gqm_sym.specfile.nodes import MapNode, Mark, Mistakes, plain
 from gqm_sym.specfile.places import locate, mention, node_at, place_of
@@ -27,13 +28,18 @@ from gqm_sym.specfile.schema import (
     KernelSection,
     Launch,
     Parameter,
+    Quantity,
     read_default,
 )
 from gqm_sym.specfile.spec import Note, Spec
+from gqm_sym.specfile.units import check_unit, expected_units, in_si, launch_units, read_unit
 from gqm_sym.specfile.yamltext import read_text, read_tree
 
 Parameters: TypeAlias = Mapping[str, Parameter | None]
 T = TypeVar("T", bound=BaseModel)
+
+# A file of the size that people write takes a hundredth of it.
+SECONDS = 0.5
 
 _NO_NUMBERS = (sp.nan, sp.zoo, sp.oo, -sp.oo)
 
@@ -44,7 +50,7 @@ def read_spec(path: Path | str) -> Spec:
     Parameters
     ----------
     path
-        Of a YAML file, at most 1 MiB.
+        Of a YAML file, at most 64 KiB.
 
     Raises
     ------
@@ -55,7 +61,11 @@ def read_spec(path: Path | str) -> Spec:
     mistakes = Mistakes(path)
     tree = read_tree(read_text(Path(path), mistakes), mistakes)
     if isinstance(tree, MapNode):
-        spec = _Reader(tree, mistakes).read()
+        try:
+            with budget("reading", SECONDS, "write fewer and simpler expressions"):
+                spec = _Reader(tree, mistakes).read()
+        except BudgetError as error:
+            raise SpecFileError(f"{path}: {error}") from None
         if spec is not None and not mistakes:
             return spec
     elif tree is not None:
@@ -85,9 +95,14 @@ class _Reader:
         declared = {name: self._section(Parameter, "parameters", name) for name in self._declared()}
         if curve is not None and kernel is not None:
             self._check_names(curve, kernel, declared)
+            self._check_ranges(kernel, declared)
         launch = self._section(Launch, "launch")
+        if isinstance(self.data.get("launch"), dict):
+            self._check_place({"lam0", "point"} & set(self.data["launch"]), curve)
+        if curve is not None and kernel is not None:
+            self._check_units(declared, launch)
         if launch is not None:
-            self._check_launch(launch, curve, declared)
+            self._check_launch(_arguments(launch), curve, declared)
         if self.mistakes or curve is None or kernel is None:
             return None
         entries = {name: entry for name, entry in declared.items() if entry is not None}
@@ -97,13 +112,9 @@ class _Reader:
             title=self.data.get("title", ""),
             curve=curve,
             kernel=kernel,
-            parameters=MappingProxyType({name: entry.value for name, entry in entries.items()}),
+            parameters=MappingProxyType({name: _value(entry) for name, entry in entries.items()}),
             notes=MappingProxyType(
-                {
-                    name: Note(unit=entry.unit, description=entry.description)
-                    for name, entry in entries.items()
-                    if entry.unit or entry.description
-                }
+                {name: _note(entry) for name, entry in entries.items() if entry.unit or entry.description}
             ),
             launch=None if launch is None else MappingProxyType(_arguments(launch)),
             tree=self.tree,
@@ -138,7 +149,11 @@ class _Reader:
             return None
         (kind,) = kinds
         try:
-            return CURVES[kind].declare(_arguments(getattr(section, kind)))
+            row, given = CURVES[kind], _arguments(getattr(section, kind))
+            if not row.reads_files:
+                return row.declare(given)
+            with apart():  # such files have limits of their own
+                return row.declare(given, Path(self.mistakes.path).parent)
         except InputError as error:
             self.mistakes.add(*locate(self.tree, str(error), ("curve", kind)))
             return None
@@ -159,12 +174,13 @@ class _Reader:
 
     def _check_names(self, curve: Curve, kernel: Kernel, declared: Parameters) -> None:
         """Note names that have no value, and values that have no use."""
-        defaults = {**dict(kernel.defaults), **dict(curve.defaults)}
+        defaults = {**dict(kernel.along(curve.parameter).defaults), **dict(curve.defaults)}
         right = [name for name, entry in declared.items() if entry is not None]
         unused = [name for name in right if name not in defaults and name != "m"]
         for name, default in defaults.items():
             if default is not None or name in declared:
                 continue
+            spend()
             near = difflib.get_close_matches(name, unused, n=1, cutoff=0.5)
             remedy = f"add it there, as in {name}: 1 (null: to be given at run time)"
             if near:
@@ -174,6 +190,14 @@ class _Reader:
             what = f"parameters: {name!r} is used neither by the curve nor by the kernel"
             remedy = "add gravity: {} to kernel" if name == "g" else "remove it, or use it"
             self.mistakes.add(place_of(self.tree, ("parameters", name)), what, remedy)
+
+    def _check_ranges(self, kernel: Kernel, declared: Parameters) -> None:
+        """Note a value that a force does not allow."""
+        values = dict(kernel.defaults) | {name: _value(entry) for name, entry in declared.items() if entry is not None}
+        try:
+            refuse_out_of_range(values, kernel.positive, kernel.at_least, where="parameters")
+        except InputError as error:
+            self.mistakes.add(*locate(self.tree, str(error), ()))
 
     def _origin(self, name: str) -> Mark:
         """Return the place where a parameter comes from."""
@@ -185,24 +209,49 @@ class _Reader:
                 return place_of(self.tree, ("kernel", key))
         return place_of(self.tree, ("curve", "family"))
 
-    def _check_launch(self, launch: Launch, curve: Curve | None, declared: Parameters) -> None:
+    def _check_place(self, given: set[str], curve: Curve | None) -> None:
+        """Note a launch that does not say where, or in a way that the curve does not have."""
+        mark = place_of(self.tree, ("launch",))
+        if "point" in given and curve is not None and not curve.charted:
+            what = "launch: point is for implicit curves, tracks and rails"
+            remedy = "give lam0, the curve's parameter at launch"
+            self.mistakes.add(place_of(self.tree, ("launch", "point")), what, remedy)
+        elif len(given) == 2:
+            self.mistakes.add(mark, "launch: lam0 and point are given", "give one of them; both say where to launch")
+        elif not given:
+            self.mistakes.add(mark, "launch: lam0 is missing", "add lam0: -pi/2 + 6/5")
+
+    def _check_units(self, declared: Parameters, launch: Launch | None) -> None:
+        """Note units of another dimension than what they are given for has."""
+        units, starts = expected_units(self.data), launch_units(self.data)
+        given = [(("parameters", name), entry, units.get(name)) for name, entry in declared.items()]
+        given += [(("launch", key), entry, starts.get(key)) for key, entry in launch or ()]
+        for path, entry, wanted in given:
+            if isinstance(entry, Quantity) and entry.unit:
+                try:
+                    check_unit(entry.unit, wanted)
+                except InputError as error:
+                    mark = node_at(self.tree, (*path, "unit")).mark
+                    self.mistakes.add(mark, f"{'.'.join(path)}.unit: {error}")
+
+    def _check_launch(self, launch: Mapping[str, Any], curve: Curve | None, declared: Parameters) -> None:
         """Note a launch that cannot be."""
 
         def note(key: str, what: str, remedy: str) -> None:
-            mark = node_at(self.tree, ("launch", key)).mark
+            mark = node_at(self.tree, ("launch", key, "value")).mark
             self.mistakes.add(mark, f"launch.{key}: {what}", remedy)
 
-        if _is_true(exact_value(launch.v0) < 0):
+        if "v0" in launch and _is_true(exact_value(launch["v0"]) < 0):
             remedy = "give a speed, and direction: -1 to launch against growing parameter"
-            note("v0", f"must not be negative, got {launch.v0}", remedy)
-        if launch.t_max is not None and not _is_true(exact_value(launch.t_max) > 0):
-            note("t_max", f"must be positive, got {launch.t_max}", "give a time in seconds")
-        if curve is None or any(entry is None for entry in declared.values()):
+            note("v0", f"must not be negative, got {launch['v0']}", remedy)
+        if "t_max" in launch and not _is_true(exact_value(launch["t_max"]) > 0):
+            note("t_max", f"must be positive, got {launch['t_max']}", "give a time in seconds")
+        if "lam0" not in launch or curve is None or any(entry is None for entry in declared.values()):
             return
         values = dict(curve.defaults)
-        values |= {name: entry.value for name, entry in declared.items() if entry is not None}
+        values |= {name: _value(entry) for name, entry in declared.items() if entry is not None}
         known = {sp.Symbol(name, real=True): exact_value(value) for name, value in values.items() if value is not None}
-        lam0 = exact_value(launch.lam0)
+        lam0 = exact_value(launch["lam0"])
         low, high = (None if end is None else end.xreplace(known) for end in curve.domain)
         for end in (low, high):
             if end is not None and (end.is_real is False or end.has(*_NO_NUMBERS)):
@@ -211,7 +260,7 @@ class _Reader:
                 return
         if (low is not None and _is_true(lam0 < low)) or (high is not None and _is_true(lam0 > high)):
             domain = f"[{'-oo' if low is None else low}, {'oo' if high is None else high}]"
-            what = f"{launch.lam0} is outside the curve's domain"
+            what = f"{launch['lam0']} is outside the curve's domain"
             note("lam0", what, f"give one within {domain}")
 
 
@@ -220,6 +269,20 @@ def _is_true(relation: Any) -> bool:
     return bool(relation is sp.true or relation is True)
 
 
+def _value(entry: Quantity) -> str | None:
+    """The exact text of a number, in SI."""
+    return None if entry.value is None else in_si(entry.value, entry.unit)
+
+
+def _note(entry: Parameter) -> Note:
+    unit = read_unit(entry.unit, where="unit") if entry.unit else None
+    if unit is None or unit.is_si:
+        return Note(unit=entry.unit, description=entry.description)
+    given = "" if entry.value is None else f"{entry.value} {entry.unit}"
+    return Note(unit=unit.name, description=entry.description, given=given)
+
+
 def _arguments(section: BaseModel) -> dict[str, Any]:
-    """Keyword arguments: what the file gives, and nothing else."""
-    return section.model_dump(exclude_unset=True, exclude_none=True)
+    """Keyword arguments: what the file gives, and nothing else; quantities as numbers in SI."""
+    given = section.model_dump(exclude_unset=True, exclude_none=True)
+    return {key: _value(entry) if isinstance(entry := getattr(section, key), Quantity) else given[key] for key in given}

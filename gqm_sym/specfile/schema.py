@@ -11,7 +11,6 @@ from operator import or_
 from typing import Annotated, Any, Literal, NamedTuple
 
 from pydantic import (
-    BaseModel,
     BeforeValidator,
     ConfigDict,
     Field,
@@ -22,9 +21,10 @@ from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
 from pydantic_core import CoreSchema
 
 from gqm_sym.declare import Curve
-from gqm_sym.declare.families import FAMILIES, cartesian_graph
+from gqm_sym.declare.families import FAMILIES, cartesian_graph, implicit
 from gqm_sym.kernels import KERNELS, KernelRow
 from gqm_sym.specfile.fields import (
+    ABSENT,
     Centre,
     CurveParameter,
     Direction,
@@ -35,24 +35,16 @@ from gqm_sym.specfile.fields import (
     Name,
     Number,
     ParameterName,
+    Place,
+    Section,
+    Tangent,
+    UnitText,
 )
+from gqm_sym.specfile.rails import RailSchema
+from gqm_sym.specfile.track import POINTS, Points, declare_track
 
 # What the format has in the end; what is in no table yet gets a message of its own.
 CURVE_KEYS = ("graph", "parametric", "polar", "implicit", "points", "pieces", "family")
-KERNEL_KEYS = (
-    *("gravity", "rolling", "coulomb", "drag", "surface_tension", "rotating_frame", "potential"),
-    *("central_force", "law"),
-)
-
-
-# Not "model | None = None": null in the file is a mistake, only leaving the key out is not.
-_ABSENT: Any = None
-
-
-class Section(BaseModel):
-    """A mapping of the file."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
 
 _DOMAIN = Field(
@@ -90,6 +82,22 @@ class Polar(Section):
     domain: Ends | None = _DOMAIN
 
 
+_LEVEL: dict[str, Any] = {
+    "F": (Expression, Field(description="in x and z; the curve is where it vanishes", examples=["x**4 + z**4 - 1"])),
+    "start": (Centre, Field(description="x and z of the point where arc length is 0", examples=[[1, 0]])),
+    "tangent": (Tangent, Field(default=1, description="1: arc length grows along (-F_z, F_x); -1: the other way")),
+}
+_LEVEL_SUMMARY = "F(x, z) = 0, in arc length from a start point."
+Implicit: type[Section] = create_model(
+    "Implicit",
+    __base__=Section,
+    __doc__=_LEVEL_SUMMARY,
+    **_LEVEL,
+    parameter=(CurveParameter, Field(default="s", description="the curve's parameter, arc length")),
+    domain=(Ends | None, _DOMAIN),
+)
+
+
 def _family_model(name: str, doc: str, own: dict[str, Any]) -> type[Section]:
     fields: dict[str, Any] = {
         "name": (Literal[name], Field(description="the family")),
@@ -122,6 +130,7 @@ FAMILY_MODELS: dict[str, type[Section]] = {
         )
         for row in FAMILIES.values()
     },
+    "implicit": _family_model("implicit", _LEVEL_SUMMARY, _LEVEL),
 }
 
 
@@ -129,8 +138,9 @@ class CurveRow(NamedTuple):
     """How a curve kind is written, and how it is declared from what was written."""
 
     model: Any
-    declare: Callable[[dict[str, Any]], Curve]
+    declare: Callable[..., Curve]
     summary: str
+    reads_files: bool = False  # then it is declared from the YAML file's folder too
 
 
 def _declare_graph(given: dict[str, Any]) -> Curve:
@@ -141,23 +151,46 @@ def _declare_polar(given: dict[str, Any]) -> Curve:
     return Curve.polar(given.pop("r"), **given)
 
 
+def _declare_implicit(given: dict[str, Any]) -> Curve:
+    return Curve.implicit(given.pop("F"), **given)
+
+
 def _declare_family(given: dict[str, Any]) -> Curve:
-    name = given.pop("name")
-    return FAMILIES[name](**given) if name in FAMILIES else cartesian_graph(**given)
+    declare: dict[str, Callable[..., Curve]] = {**FAMILIES, "cartesian_graph": cartesian_graph, "implicit": implicit}
+    return declare[given.pop("name")](**given)
 
 
 _FAMILY: Any = Annotated[reduce(or_, FAMILY_MODELS.values()), Field(discriminator="name")]
 
-CURVES: dict[str, CurveRow] = {
+
+EXPLICIT: dict[str, CurveRow] = {
     "graph": CurveRow(Graph, _declare_graph, "the graph z = z(x)"),
     "parametric": CurveRow(Parametric, lambda given: Curve.parametric(**given), "both coordinates in a parameter"),
     "polar": CurveRow(Polar, _declare_polar, "r = r(theta)"),
     "family": CurveRow(_FAMILY, _declare_family, "a curve of a known family"),
 }
+RAILS = RailSchema.over({key: (row.model, row.declare, row.summary) for key, row in EXPLICIT.items()})
+CURVES: dict[str, CurveRow] = {
+    **EXPLICIT,
+    "implicit": CurveRow(Implicit, _declare_implicit, "F(x, z) = 0"),
+    "points": CurveRow(POINTS, declare_track, "a track through the points of a file", reads_files=True),
+    "pieces": CurveRow(RAILS.rail, RAILS.declare, "a rail of lines, arcs, clothoids and curves"),
+}
 
 # Arguments of kernels that are not a name or a value.
 _KERNEL_ARGUMENTS: dict[str, tuple[Any, Any]] = {
     "U": (Expression, Field(description="potential energy per unit mass, in x and z")),
+    "A": (
+        Expression,
+        Field(
+            description="acceleration in the curve's parameter, x, z, W = V**2, direction and parameters",
+            examples=["-direction*k*W"],
+        ),
+    ),
+    "form": (
+        Literal["resistance", "printed"],
+        Field(default="resistance", description="printed: gamma*ell_c*kappa/m as the paper has it"),
+    ),
     "centre": (Centre, Field(default=None, description="its two coordinates; (0, 0) if not given")),
 }
 
@@ -170,14 +203,17 @@ def _kernel_model(row: KernelRow) -> type[Section]:
 
 
 def _sections(rows: dict[str, tuple[Any, str]]) -> dict[str, Any]:
-    return {key: (model, Field(default=_ABSENT, description=summary)) for key, (model, summary) in rows.items()}
+    return {key: (model, Field(default=ABSENT, description=summary)) for key, (model, summary) in rows.items()}
+
+
+class _OneEntry(Section):
+    model_config = ConfigDict(json_schema_extra={"minProperties": 1, "maxProperties": 1})
 
 
 CurveSection: type[Section] = create_model(
     "CurveSection",
-    __base__=Section,
+    __base__=_OneEntry,
     __doc__="Exactly one way to give the curve.",
-    __config__=ConfigDict(json_schema_extra={"minProperties": 1, "maxProperties": 1}),
     **_sections({key: (row.model, row.summary) for key, row in CURVES.items()}),
 )
 KERNEL_MODELS = {key: _kernel_model(row) for key, row in KERNELS.items()}
@@ -189,35 +225,54 @@ KernelSection: type[Section] = create_model(
 )
 
 
-class Parameter(Section):
-    """A run-time parameter: its default, and what people should know about it."""
+def read_default(value: object) -> object:
+    """Wrap a bare value into the long form."""
+    return value if isinstance(value, dict) else {"value": value}
 
-    value: Number | None = Field(
-        description="the default, exactly as written; null: to be given at run time",
-        examples=["9.81", "2/5", "pi/2"],
-    )
-    unit: Line = Field(default="", description="for people; nothing is converted")
-    description: Line = Field(default="", description="for people")
+
+def _read_if_given(value: object) -> object:
+    return None if value is None else read_default(value)
+
+
+class Quantity(Section):
+    """A number, in SI or in the unit that it names."""
+
+    value: Number = Field(description="exactly as written", examples=["9.81", "2/5", "pi/2"])
+    unit: UnitText = Field(default="", description="converted to SI", examples=["m", "cm", "km/h", "deg"])
 
     @classmethod
     def __get_pydantic_json_schema__(cls, core_schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
         """Describe the short form too: the value alone."""
-        short = {"type": ["string", "number", "null"]}
-        return {"anyOf": [short, handler.resolve_ref_schema(handler(core_schema))]}
+        long = handler.resolve_ref_schema(handler(core_schema))
+        nullable = "null" in str(long["properties"]["value"])
+        short = {"type": ["string", "number", *(["null"] if nullable else [])]}
+        return {"anyOf": [short, long]}
 
 
-def read_default(value: object) -> object:
-    """Wrap a bare default into the long form."""
-    return value if isinstance(value, dict) else {"value": value}
+class Parameter(Quantity):
+    """A run-time parameter: its default, and what people should know about it."""
+
+    value: Number | None = Field(  # type: ignore[assignment]
+        description="the default, exactly as written; null: to be given at run time",
+        examples=["9.81", "2/5", "pi/2"],
+    )
+    description: Line = Field(default="", description="for people")
 
 
 class Launch(Section):
-    """Where, how fast and which way the motion starts."""
+    """Where, how fast and which way the motion starts: at lam0, or at a point of a curve in arc length."""
 
-    lam0: Number = Field(description="the curve's parameter at launch", examples=["-pi/2 + 6/5"])
-    v0: Number = Field(default="0", description="speed, never negative", examples=["6.2088"])
+    lam0: Annotated[Quantity, BeforeValidator(read_default)] = Field(
+        default=ABSENT, description="the curve's parameter at launch", examples=["-pi/2 + 6/5"]
+    )
+    point: Place = Field(default=ABSENT, description="x and z at launch, instead of lam0", examples=[[1, 0]])
+    v0: Annotated[Quantity, BeforeValidator(read_default)] = Field(
+        default="0", validate_default=True, description="speed, never negative", examples=["6.2088"]
+    )
     direction: Direction = Field(default=1, description="the sign of ds/dt at launch")
-    t_max: Number | None = Field(default=None, description="how long to follow the motion")
+    t_max: Annotated[Quantity | None, BeforeValidator(_read_if_given)] = Field(
+        default=None, description="how long to follow the motion"
+    )
     contact: Literal["bilateral", "above", "below"] = Field(
         default="bilateral",
         description="above: the body is left of growing parameter and can lift off; below: right",
@@ -235,7 +290,7 @@ class CurveFile(Section):
         default_factory=dict,
         description="every free symbol: a number, {value, unit, description}, or null",
     )
-    launch: Launch = Field(default=_ABSENT, description="needed to solve")
+    launch: Launch = Field(default=ABSENT, description="needed to solve")
 
 
 def model_at(path: tuple[str, ...]) -> Any:
@@ -247,6 +302,12 @@ def model_at(path: tuple[str, ...]) -> Any:
             return CurveSection
         case ("curve", "family", name):
             return FAMILY_MODELS.get(name)
+        case ("curve", "pieces", "pieces", _, "family", name):
+            return FAMILY_MODELS.get(name)
+        case ("curve", "pieces", *steps):
+            return RAILS.model_at(steps)
+        case ("curve", "points"):
+            return Points
         case ("curve", kind) if kind in CURVES and kind != "family":
             return CURVES[kind].model
         case ("kernel",):
@@ -257,6 +318,8 @@ def model_at(path: tuple[str, ...]) -> Any:
             return Parameter
         case ("launch",):
             return Launch
+        case ("launch", _):
+            return Quantity
     return None
 
 

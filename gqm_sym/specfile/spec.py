@@ -20,6 +20,7 @@ class Note:
 
     unit: str = ""
     description: str = ""
+    given: str = ""  # value and unit as the file has them, where that is not SI
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -51,7 +52,7 @@ class Spec:
     kernel: Kernel
     parameters: Mapping[str, str | None]
     notes: Mapping[str, Note]
-    launch: Mapping[str, str | int] | None
+    launch: Mapping[str, str | int | list[str]] | None
     tree: MapNode = field(repr=False, compare=False)
 
     def derive(self) -> Model:
@@ -95,9 +96,10 @@ class Spec:
                 mark = place_of(self.tree, ("parameters", name))
                 what = f"parameters.{name}: must be positive, got {value}"
                 mistakes.add(mark, what, "the closed forms hold only so")
-        if self.launch is not None and not mistakes and (fault := _fault(model, self.launch)):
-            mark = node_at(self.tree, ("launch", "lam0")).mark
-            what = f"launch.lam0: {model.parameter.name} = {self.launch['lam0']}: {fault}"
+        lam0 = None if self.launch is None or model.curve.charted else str(self.launch["lam0"])
+        if lam0 is not None and not mistakes and (fault := _fault(model, lam0)):
+            mark = node_at(self.tree, ("launch", "lam0", "value")).mark
+            what = f"launch.lam0: {model.parameter.name} = {lam0}: {fault}"
             mistakes.add(mark, what, "launch where the curve and the forces are defined")
         if mistakes:
             raise mistakes.error()
@@ -117,10 +119,10 @@ class Spec:
         return mistakes.error()
 
 
-def _fault(model: Model, launch: Mapping[str, str | int]) -> str:
-    """Say why a motion cannot begin at a launch; empty if it can."""
+def _fault(model: Model, lam0: str) -> str:
+    """Say why a motion cannot begin at a place; empty if it can."""
     values = {sp.Symbol(n, real=True): exact_value(v) for n, v in model.defaults if v is not None}
-    values[model.parameter] = exact_value(launch["lam0"])
+    values[model.parameter] = exact_value(lam0)
     forms = (("x", model.x), ("z", model.z), ("ds", model.ds), ("the potential", model.potential))
     for label, form in forms:
         try:

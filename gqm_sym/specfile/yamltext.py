@@ -17,10 +17,10 @@ from ruamel.yaml.error import YAMLError
 from gqm_sym.errors import SpecFileError
 from gqm_sym.specfile.nodes import ListNode, MapNode, Mark, Mistakes, Node, Scalar, shown
 
-SIZE_LIMIT = 1 << 20
+SIZE_LIMIT = 1 << 16
 LINE_LIMIT = 10_000  # the scanner takes quadratic time over a tag of a million characters
 DEPTH_LIMIT = 20
-NODE_LIMIT = 10_000
+NODE_LIMIT = 1000
 
 _NOT_YAML = re.compile(r"[^\t\n\r\x20-\x7e\x85\xa0-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
@@ -67,7 +67,7 @@ def read_text(path: Path, mistakes: Mistakes) -> str:
     start = Mark(1, 1)
     text = ""
     if len(data) > SIZE_LIMIT:
-        mistakes.add(start, "the file is larger than 1 MiB", "a curve file has a few hundred bytes")
+        mistakes.add(start, "the file is larger than 64 KiB", "a curve file has a few hundred bytes")
     elif data.startswith((b"\xff\xfe", b"\xfe\xff")):
         mistakes.add(start, "the file is UTF-16 text", "save it as UTF-8")
     elif b"\0" in data:

@@ -1,0 +1,51 @@
+"""How the documentation is built: ``make docs``."""
+
+import re
+import sys
+from pathlib import Path
+from typing import Any
+
+ROOT = Path(__file__).parent.parent
+sys.path[:0] = [str(ROOT), str(Path(__file__).parent)]
+
+import made  # noqa: E402
+
+import gqm_sym  # noqa: E402
+
+made.write_all(Path(__file__).parent / "made")
+
+project = "gqm_sym"
+author = "the gqm_sym developers"
+copyright = "the gqm_sym developers"  # noqa: A001 (Sphinx wants it so)
+release = gqm_sym.__version__
+
+extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
+exclude_patterns = ["_build", "**/.ipynb_checkpoints", "**/generated"]
+myst_enable_extensions = ["amsmath", "dollarmath"]
+myst_heading_anchors = 3
+nb_execution_mode = "cache"
+nb_execution_raise_on_error = True
+nb_execution_timeout = 300
+napoleon_numpy_docstring = True
+napoleon_use_ivar = True
+autodoc_typehints = "none"
+autodoc_member_order = "bysource"
+
+html_theme = "furo"
+html_title = "gqm_sym"
+html_copy_source = False
+
+
+def _split_names(app: Any, what: str, name: str, obj: Any, options: Any, lines: list[str]) -> None:
+    """Give each of several attributes that are described together a line of its own."""
+    found = [(line, re.fullmatch(r":ivar (\w+(?:, \w+)+): (.*)", line)) for line in lines]
+    lines[:] = [
+        text
+        for line, names in found
+        for text in ([f":ivar {one}: {names[2]}" for one in names[1].split(", ")] if names else [line])
+    ]
+
+
+def setup(app: Any) -> None:
+    """Connect after napoleon, which writes those lines."""
+    app.connect("autodoc-process-docstring", _split_names, priority=600)

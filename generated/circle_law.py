@@ -1,0 +1,209 @@
+# Made by gqm-gen for "circle_law". Do not edit: change its declaration and generate again.
+# interface 2, input ba6587cf83ec, body a1c10cbeb4ed
+"""Pendulum in dense air
+
+x              = L*sin(theta)
+z              = -L*cos(theta)
+ds/dtheta      = L
+dx/ds          = cos(theta)
+dz/ds          = sin(theta)
+kappa          = 1/L
+Theta          = -lam0 + theta
+W = V**2       = W(theta)
+N              = m*(g*cos(theta) + W/L)
+A              = -W*direction*(W*c2 + c1) - g*sin(theta)
+dt/dtheta      = L/sqrt(W)
+turning points : W = 0
+liftoff        : g*cos(theta) + W/L = 0
+
+V**2: solved in space, for dV**2/ds = 2*A is not linear in it
+"""
+
+from math import cos, sin
+from typing import Any
+
+from numba import carray
+
+from gqm_sym.runtime import compiler
+
+# Before anything else is asked of the runtime, so that another version of it is told from a broken one.
+compiled = compiler(__file__, interface=2)
+
+from gqm_sym.runtime import (
+    DRIVE,
+    FRAME,
+    HOLD,
+    Addresses,
+    Dissipation,
+    Formulas,
+    Motion,
+    Pass1,
+    Sweep,
+)
+
+PARAMETERS = {
+    'L': '1',
+    'c1': '0.05',
+    'c2': '0.01',
+    'g': '9.81',
+    'm': '1',
+}
+
+
+@compiled(FRAME)
+def frame(n, places, speeds, p, out):
+    """x, z, ds/dtheta, signed curvature and contact force, given V**2 (paper, eq. 15)."""
+    places, speeds, p, out = carray(places, n), carray(speeds, n), carray(p, 5), carray(out, (5, n))
+    L, g, m = p[0], p[3], p[4]
+    _t1 = 1/L
+    for i in range(n):
+        theta = places[i]
+        v2 = speeds[i]
+        _t0 = cos(theta)
+        out[0, i] = L*sin(theta)
+        out[1, i] = -L*_t0
+        out[2, i] = L
+        out[3, i] = _t1
+        out[4, i] = m*(_t0*g + _t1*v2)
+
+
+@compiled(DRIVE)
+def drive(n, places, speeds, v, nu, p, out):
+    """ds/dtheta, P, Q, n0 and kappa: dV**2/dtheta = P - Q*V**2, linearised at V**2 = w, N/m = kappa*V**2 + n0; v = sgn(ds/dt), nu = sgn(N)."""
+    places, speeds, p, out = carray(places, n), carray(speeds, n), carray(p, 5), carray(out, (5, n))
+    L, c1, c2, g = p[0], p[1], p[2], p[3]
+    for i in range(n):
+        theta = places[i]
+        w = speeds[i]
+        ds = L
+        kappa = 1/L
+        push = -g*sin(theta)
+        n0 = g*cos(theta)
+        _u0 = c2*w
+        _u1 = v*(_u0 + c1)
+        _u2 = _u0*v + _u1
+        _u3 = 2*ds
+        out[0, i] = ds
+        out[1, i] = _u3*(-_u1*w + _u2*w + push)
+        out[2, i] = _u2*_u3
+        out[3, i] = n0
+        out[4, i] = kappa
+
+
+@compiled(HOLD)
+def hold(n, places, p, out):
+    """Acceleration from rest forwards, and backwards: a body rests where the first is <= 0 and the second >= 0."""
+    places, p, out = carray(places, n), carray(p, 5), carray(out, (2, n))
+    g = p[3]
+    for i in range(n):
+        theta = places[i]
+        push = -g*sin(theta)
+        out[0, i] = push
+        out[1, i] = push
+
+
+# The same formulas over a namespace of operations: extended precision evaluates these.
+
+
+def exact_domain(op, p):
+    """Both ends of the domain, and the period; None where there is none."""
+    return None, None, 2*op.pi
+
+
+MODEL = Formulas(
+    name='circle_law',
+    parameter='theta',
+    parameters=PARAMETERS,
+    positive=('L',),
+    addresses=Addresses(frame.address),
+    domain_of=exact_domain,
+    dissipation=Dissipation(drive.address, hold.address, friction=False, kinked=False, linear=False),
+)
+
+
+def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, L: Any = '1', c1: Any = '0.05', c2: Any = '0.01', g: Any = '9.81', m: Any = '1') -> Pass1:
+    """Position, metric, curvature, V**2 and contact force at places of the curve (Pass 1, no quadrature).
+
+    Parameters
+    ----------
+    lam : array_like
+        Places on the curve, as values of its parameter theta.
+    lam0, v0, direction
+        Launch place, speed and direction (+1 or -1: the sign of ds/dt).
+    L, c1, c2, g, m
+        Run-time parameters; `PARAMETERS` holds their defaults.
+
+    Returns
+    -------
+    Pass1
+        Arrays x, z, ds, kappa, v2 and normal_force.
+    """
+    return MODEL.pass1(lam, lam0, v0, direction, (L, c1, c2, g, m,))
+
+
+def solve(
+    lam0: Any = None,
+    v0: Any = 0.0,
+    direction: int = 1,
+    *,
+    point: Any = None,
+    t_max: Any = None,
+    contact: str = "bilateral",
+    L: Any = '1', c1: Any = '0.05', c2: Any = '0.01', g: Any = '9.81', m: Any = '1',
+) -> Motion:
+    """The motion that a launch begins (Passes 1 to 3).
+
+    Parameters
+    ----------
+    lam0, v0, direction
+        Launch place, speed (never negative) and direction (+1 or -1: the sign of ds/dt).
+    point : pair of numbers, optional
+        The launch place by its coordinates, instead of ``lam0``.
+    t_max : number, optional
+        Horizon of time.
+    contact : {"bilateral", "above", "below"}
+        Which side of the track can push.
+    L, c1, c2, g, m
+        Run-time parameters; `PARAMETERS` holds their defaults.
+
+    Returns
+    -------
+    Motion
+
+    Raises
+    ------
+    GQMError
+        For a launch or a parameter that cannot be; the message says what would be right.
+    """
+    return MODEL.solve(lam0, v0, direction, point, t_max, contact, (L, c1, c2, g, m,))
+
+
+def sweep(
+    quantity: str,
+    lam0: Any,
+    v0: Any = 0.0,
+    direction: Any = 1,
+    *,
+    lam: Any = None,
+    L: Any = '1', c1: Any = '0.05', c2: Any = '0.01', g: Any = '9.81', m: Any = '1',
+) -> Sweep:
+    """One quantity over arrays of launches and parameters, on all cores; all arguments broadcast.
+
+    Parameters
+    ----------
+    quantity : str
+        "half_period", "period", "turning_points" (the lower, the upper: one more axis), "v_min", "v_max",
+        "normal_force_min", "normal_force_max" or "time_at".
+    lam0, v0, direction
+        Launch places, speeds and directions.
+    lam
+        For "time_at": the place, of which the first time there is asked.
+    L, c1, c2, g, m
+        Run-time parameters; `PARAMETERS` holds their defaults.
+
+    Returns
+    -------
+    Sweep
+        ``values``, NaN where there is none, and ``reasons``, 0 where there is one; ``why()`` counts the others.
+    """
+    return MODEL.sweep(quantity, lam0, v0, direction, lam, (L, c1, c2, g, m,))

@@ -1,0 +1,301 @@
+# Made by gqm-gen for "circle_spring". Do not edit: change its declaration and generate again.
+# interface 2, input 8941b9022f6d, body 93d1458265b2
+"""Bead on a ring, tied by a spring to a point above its centre
+
+x              = L*sin(theta)
+z              = -L*cos(theta)
+ds/dtheta      = L
+dx/ds          = cos(theta)
+dz/ds          = sin(theta)
+kappa          = 1/L
+Theta          = -lam0 + theta
+V**2           = -2*L*g*cos(lam0) + 2*L*g*cos(theta) + v0**2 + w**2*(L**2*sin(lam0)**2 + (L*cos(lam0) + h)**2) - w**2*(L**2*sin(theta)**2 + (L*cos(theta) + h)**2)
+N              = m*(-L*w**2*sin(theta)**2 + (g - w**2*(L*cos(theta) + h))*cos(theta) + (-2*L*g*cos(lam0) + 2*L*g*cos(theta) + v0**2 + w**2*(L**2*sin(lam0)**2 + (L*cos(lam0) + h)**2) - w**2*(L**2*sin(theta)**2 + (L*cos(theta) + h)**2))/L)
+A              = -(L*w**2*cos(theta) + g - w**2*(L*cos(theta) + h))*sin(theta)
+dt/dtheta      = L/sqrt(-2*L*g*cos(lam0) + 2*L*g*cos(theta) + v0**2 + w**2*(L**2*sin(lam0)**2 + (L*cos(lam0) + h)**2) - w**2*(L**2*sin(theta)**2 + (L*cos(theta) + h)**2))
+turning points : -2*L*g*cos(lam0) + 2*L*g*cos(theta) + v0**2 + w**2*(L**2*sin(lam0)**2 + (L*cos(lam0) + h)**2) - w**2*(L**2*sin(theta)**2 + (L*cos(theta) + h)**2) = 0
+liftoff        : -L*w**2*sin(theta)**2 + (g - w**2*(L*cos(theta) + h))*cos(theta) + (-2*L*g*cos(lam0) + 2*L*g*cos(theta) + v0**2 + w**2*(L**2*sin(lam0)**2 + (L*cos(lam0) + h)**2) - w**2*(L**2*sin(theta)**2 + (L*cos(theta) + h)**2))/L = 0
+"""
+
+from math import cos, sin
+from typing import Any
+
+from numba import carray
+
+from gqm_sym.runtime import compiler
+
+# Before anything else is asked of the runtime, so that another version of it is told from a broken one.
+compiled = compiler(__file__, interface=2)
+
+from gqm_sym.runtime import (
+    BEND,
+    BOUNDS,
+    CLIMB,
+    FRAME,
+    RISE,
+    Addresses,
+    ExactFormulas,
+    Formulas,
+    Motion,
+    Pass1,
+    Sweep,
+)
+from gqm_sym.runtime.differences import cos1, cos2, sin1, sin2
+from gqm_sym.runtime.intervals import iadd, iconst, icos, imul, ipow, isin
+from gqm_sym.runtime.places import nearest
+
+PARAMETERS = {
+    'L': '1',
+    'w': '3',
+    'h': '0.5',
+    'g': '9.81',
+    'm': '1',
+}
+
+
+@compiled(FRAME)
+def frame(n, places, speeds, p, out):
+    """x, z, ds/dtheta, signed curvature and contact force, given V**2 (paper, eq. 15)."""
+    places, speeds, p, out = carray(places, n), carray(speeds, n), carray(p, 5), carray(out, (5, n))
+    L, w, h, g, m = p[0], p[1], p[2], p[3], p[4]
+    _t3 = 1/L
+    _t4 = w**2
+    for i in range(n):
+        theta = places[i]
+        v2 = speeds[i]
+        _t0 = sin(theta)
+        _t1 = cos(theta)
+        _t2 = L*_t1
+        out[0, i] = L*_t0
+        out[1, i] = -_t2
+        out[2, i] = L
+        out[3, i] = _t3
+        out[4, i] = m*(-L*_t0**2*_t4 + _t1*(-_t4*(_t2 + h) + g) + _t3*v2)
+
+
+@compiled(CLIMB)
+def climb(n, places, p, out):
+    """What V**2 loses in climbing to theta, up to a constant, and its derivative (paper, eq. 13)."""
+    places, p, out = carray(places, n), carray(p, 5), carray(out, (2, n))
+    L, w, h, g = p[0], p[1], p[2], p[3]
+    _t1 = w**2
+    for i in range(n):
+        theta = places[i]
+        _t0 = L*cos(theta)
+        _t2 = sin(theta)
+        _t3 = _t0 + h
+        out[0, i] = -2*_t0*g + _t1*(L**2*_t2**2 + _t3**2)
+        out[1, i] = 2*L*_t2*(_t0*_t1 - _t1*_t3 + g)
+
+
+@compiled(RISE)
+def rise(n, a, places, offsets, p, out):
+    """climb[a, theta] = (climb(theta) - climb(a))/(theta - a) without cancellation, and ds/dtheta."""
+    places, offsets, p, out = carray(places, n), carray(offsets, n), carray(p, 5), carray(out, (2, n))
+    L, w, h, g = p[0], p[1], p[2], p[3]
+    _c0 = sin(a)
+    _c1 = cos(a)
+    for i in range(n):
+        theta = places[i]
+        d = offsets[i]
+        _t0 = L*cos1(a, theta, d)
+        out[0, i] = -2*_t0*g + w**2*(L**2*(_c0 + sin(theta))*sin1(a, theta, d) + _t0*(L*_c1 + L*cos(theta) + 2*h))
+        out[1, i] = L
+
+
+@compiled(BEND)
+def bend(n, a, b, left, right, p, out):
+    """climb[a, theta, b] = V**2/((theta - a)*(b - theta)) between turning points, without cancellation, and ds/dtheta."""
+    left, right, p, out = carray(left, n), carray(right, n), carray(p, 5), carray(out, (2, n))
+    L, w, h, g = p[0], p[1], p[2], p[3]
+    _t0 = -a + b
+    _t2 = L**2
+    _c0 = sin(b)
+    _c1 = cos(b)
+    _c2 = cos1(a, b, _t0)
+    _c3 = sin1(a, b, _t0)
+    for i in range(n):
+        da = left[i]
+        db = right[i]
+        theta = nearest(a, b, da, db)
+        _t1 = L*cos2(a, theta, b, da, db)
+        out[0, i] = -2*_t1*g + w**2*(_c2*_t2*cos1(a, theta, da) + _t1*(L*_c1 + L*cos(theta) + 2*h) + _t2*(_c3*sin1(a, theta, da) + (_c0 + sin(theta))*sin2(a, theta, b, da, db)))
+        out[1, i] = L
+
+
+@compiled(BOUNDS)
+def bounds(lo, hi, p, out):
+    """Bounds of the climb's slope and of ds/dtheta for lo <= theta <= hi."""
+    p, out = carray(p, 5), carray(out, 4)
+    theta = (lo, hi)
+    L = (p[0], p[0])
+    w = (p[1], p[1])
+    h = (p[2], p[2])
+    g = (p[3], p[3])
+    _t0 = ipow(w, 2)
+    _t1 = imul(L, icos(theta))
+    out[0], out[1] = imul(imul(imul(iconst(2.0), L), iadd(iadd(imul(_t0, _t1), imul(imul(iconst(-1.0), _t0), iadd(_t1, h))), g)), isin(theta))
+    out[2], out[3] = L
+
+
+# The same formulas over a namespace of operations: extended precision evaluates these.
+
+
+def exact_x(op, theta, p):
+    """Horizontal coordinate."""
+    L = p[0]
+    return L*op.sin(theta)
+
+
+def exact_z(op, theta, p):
+    """Height."""
+    L = p[0]
+    return -L*op.cos(theta)
+
+
+def exact_ds(op, theta, p):
+    """ds/dtheta."""
+    L = p[0]
+    return L
+
+
+def exact_kappa(op, theta, p):
+    """Signed curvature."""
+    L = p[0]
+    return 1/L
+
+
+def exact_reaction(op, theta, p):
+    """Contact force per unit mass of a body at rest."""
+    L = p[0]
+    w = p[1]
+    h = p[2]
+    g = p[3]
+    _t0 = w**2
+    _t1 = op.cos(theta)
+    return -L*_t0*op.sin(theta)**2 + _t1*(-_t0*(L*_t1 + h) + g)
+
+
+def exact_climb(op, theta, p):
+    """What V**2 loses in climbing, up to a constant."""
+    L = p[0]
+    w = p[1]
+    h = p[2]
+    g = p[3]
+    _t0 = L*op.cos(theta)
+    return -2*_t0*g + w**2*(L**2*op.sin(theta)**2 + (_t0 + h)**2)
+
+
+def exact_climb_slope(op, theta, p):
+    """Its derivative by theta."""
+    L = p[0]
+    w = p[1]
+    h = p[2]
+    g = p[3]
+    _t0 = w**2
+    _t1 = L*op.cos(theta)
+    return 2*L*(_t0*_t1 - _t0*(_t1 + h) + g)*op.sin(theta)
+
+
+def exact_domain(op, p):
+    """Both ends of the domain, and the period; None where there is none."""
+    return None, None, 2*op.pi
+
+
+MODEL = Formulas(
+    name='circle_spring',
+    parameter='theta',
+    parameters=PARAMETERS,
+    positive=('L',),
+    addresses=Addresses(frame.address, climb.address, rise.address, bend.address, bounds.address),
+    domain_of=exact_domain,
+    exact=ExactFormulas(exact_x, exact_z, exact_ds, exact_kappa, exact_reaction, exact_climb, exact_climb_slope),
+)
+
+
+def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, L: Any = '1', w: Any = '3', h: Any = '0.5', g: Any = '9.81', m: Any = '1') -> Pass1:
+    """Position, metric, curvature, V**2 and contact force at places of the curve (Pass 1, no quadrature).
+
+    Parameters
+    ----------
+    lam : array_like
+        Places on the curve, as values of its parameter theta.
+    lam0, v0, direction
+        Launch place, speed and direction (+1 or -1: the sign of ds/dt).
+    L, w, h, g, m
+        Run-time parameters; `PARAMETERS` holds their defaults.
+
+    Returns
+    -------
+    Pass1
+        Arrays x, z, ds, kappa, v2 and normal_force.
+    """
+    return MODEL.pass1(lam, lam0, v0, direction, (L, w, h, g, m,))
+
+
+def solve(
+    lam0: Any = None,
+    v0: Any = 0.0,
+    direction: int = 1,
+    *,
+    point: Any = None,
+    t_max: Any = None,
+    contact: str = "bilateral",
+    L: Any = '1', w: Any = '3', h: Any = '0.5', g: Any = '9.81', m: Any = '1',
+) -> Motion:
+    """The motion that a launch begins (Passes 1 to 3).
+
+    Parameters
+    ----------
+    lam0, v0, direction
+        Launch place, speed (never negative) and direction (+1 or -1: the sign of ds/dt).
+    point : pair of numbers, optional
+        The launch place by its coordinates, instead of ``lam0``.
+    t_max : number, optional
+        Horizon of time.
+    contact : {"bilateral", "above", "below"}
+        Which side of the track can push.
+    L, w, h, g, m
+        Run-time parameters; `PARAMETERS` holds their defaults.
+
+    Returns
+    -------
+    Motion
+
+    Raises
+    ------
+    GQMError
+        For a launch or a parameter that cannot be; the message says what would be right.
+    """
+    return MODEL.solve(lam0, v0, direction, point, t_max, contact, (L, w, h, g, m,))
+
+
+def sweep(
+    quantity: str,
+    lam0: Any,
+    v0: Any = 0.0,
+    direction: Any = 1,
+    *,
+    lam: Any = None,
+    L: Any = '1', w: Any = '3', h: Any = '0.5', g: Any = '9.81', m: Any = '1',
+) -> Sweep:
+    """One quantity over arrays of launches and parameters, on all cores; all arguments broadcast.
+
+    Parameters
+    ----------
+    quantity : str
+        "half_period", "period", "turning_points" (the lower, the upper: one more axis), "v_min", "v_max",
+        "normal_force_min", "normal_force_max" or "time_at".
+    lam0, v0, direction
+        Launch places, speeds and directions.
+    lam
+        For "time_at": the place, of which the first time there is asked.
+    L, w, h, g, m
+        Run-time parameters; `PARAMETERS` holds their defaults.
+
+    Returns
+    -------
+    Sweep
+        ``values``, NaN where there is none, and ``reasons``, 0 where there is one; ``why()`` counts the others.
+    """
+    return MODEL.sweep(quantity, lam0, v0, direction, lam, (L, w, h, g, m,))

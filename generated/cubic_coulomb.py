@@ -1,0 +1,210 @@
+# Made by gqm-gen for "cubic_coulomb". Do not edit: change its declaration and generate again.
+# interface 2, input 366f93db8ec9, body 60a96c62a601
+"""Cubic track with Coulomb friction
+
+x              = x
+z              = x**3
+ds/dx          = sqrt(9*x**4 + 1)
+dx/ds          = 1/sqrt(9*x**4 + 1)
+dz/ds          = 3*x**2/sqrt(9*x**4 + 1)
+kappa          = 6*x/(9*x**4 + 1)**(3/2)
+Theta          = -atan(3*lam0**2) + atan(3*x**2)
+W = V**2       = v0**2*exp(-2*contact_sign*direction*mu*(-atan(3*lam0**2) + atan(3*x**2))) + Integral(-2*g*(3*_x**2 + contact_sign*direction*mu)*exp(-2*contact_sign*direction*mu*(-atan(3*_x**2) + atan(3*x**2))), (_x, lam0, x))
+N              = m*(6*W*x/(9*x**4 + 1)**(3/2) + g/sqrt(9*x**4 + 1))
+A              = -contact_sign*direction*mu*(6*W*x/(9*x**4 + 1)**(3/2) + g/sqrt(9*x**4 + 1)) - 3*g*x**2/sqrt(9*x**4 + 1)
+dt/dx          = sqrt(9*x**4 + 1)/sqrt(W)
+turning points : W = 0
+liftoff        : 6*W*x/(9*x**4 + 1)**(3/2) + g/sqrt(9*x**4 + 1) = 0
+
+V**2: spectral antiderivative, no elementary form found; direction is the sign of ds/dt; contact_sign is the sign of N
+"""
+
+from math import fabs, sqrt
+from typing import Any
+
+from numba import carray
+
+from gqm_sym.runtime import compiler
+
+# Before anything else is asked of the runtime, so that another version of it is told from a broken one.
+compiled = compiler(__file__, interface=2)
+
+from gqm_sym.runtime import (
+    DRIVE,
+    FRAME,
+    HOLD,
+    Addresses,
+    Dissipation,
+    Formulas,
+    Motion,
+    Pass1,
+    Sweep,
+)
+
+PARAMETERS = {
+    'mu': '0.1',
+    'g': '9.81',
+    'm': '1',
+}
+
+
+@compiled(FRAME)
+def frame(n, places, speeds, p, out):
+    """x, z, ds/dx, signed curvature and contact force, given V**2 (paper, eq. 15)."""
+    places, speeds, p, out = carray(places, n), carray(speeds, n), carray(p, 3), carray(out, (5, n))
+    g, m = p[1], p[2]
+    for i in range(n):
+        x = places[i]
+        v2 = speeds[i]
+        _t0 = 9*x**4 + 1
+        _t1 = sqrt(_t0)
+        _t2 = 6*x/sqrt(_t0)**3
+        out[0, i] = x
+        out[1, i] = x**3
+        out[2, i] = _t1
+        out[3, i] = _t2
+        out[4, i] = m*(_t2*v2 + g/_t1)
+
+
+@compiled(DRIVE)
+def drive(n, places, speeds, v, nu, p, out):
+    """ds/dx, P, Q, n0 and kappa: dV**2/dx = P - Q*V**2, N/m = kappa*V**2 + n0; v = sgn(ds/dt), nu = sgn(N)."""
+    places, p, out = carray(places, n), carray(p, 3), carray(out, (5, n))
+    mu, g = p[0], p[1]
+    for i in range(n):
+        x = places[i]
+        _t0 = 9*x**4 + 1
+        ds = sqrt(_t0)
+        _t2 = 6*x
+        _t3 = g/ds
+        kappa = _t2/sqrt(_t0)**3
+        turn = _t2/_t0
+        push = -3*_t3*x**2
+        n0 = _t3
+        out[0, i] = ds
+        out[1, i] = 2*ds*(-mu*n0*nu*v + push)
+        out[2, i] = 2*mu*nu*turn*v
+        out[3, i] = n0
+        out[4, i] = kappa
+
+
+@compiled(HOLD)
+def hold(n, places, p, out):
+    """Acceleration from rest forwards, and backwards: a body rests where the first is <= 0 and the second >= 0."""
+    places, p, out = carray(places, n), carray(p, 3), carray(out, (2, n))
+    mu, g = p[0], p[1]
+    for i in range(n):
+        x = places[i]
+        _t0 = g/sqrt(9*x**4 + 1)
+        push = -3*_t0*x**2
+        n0 = _t0
+        out[0, i] = -mu*fabs(n0) + push
+        out[1, i] = mu*fabs(n0) + push
+
+
+# The same formulas over a namespace of operations: extended precision evaluates these.
+
+
+def exact_domain(op, p):
+    """Both ends of the domain, and the period; None where there is none."""
+    return None, None, None
+
+
+MODEL = Formulas(
+    name='cubic_coulomb',
+    parameter='x',
+    parameters=PARAMETERS,
+    positive=(),
+    at_least=(('mu', '0'),),
+    addresses=Addresses(frame.address),
+    domain_of=exact_domain,
+    dissipation=Dissipation(drive.address, hold.address, friction=True, kinked=False, linear=True),
+)
+
+
+def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, mu: Any = '0.1', g: Any = '9.81', m: Any = '1') -> Pass1:
+    """Position, metric, curvature, V**2 and contact force at places of the curve (Pass 1, no quadrature).
+
+    Parameters
+    ----------
+    lam : array_like
+        Places on the curve, as values of its parameter x.
+    lam0, v0, direction
+        Launch place, speed and direction (+1 or -1: the sign of ds/dt).
+    mu, g, m
+        Run-time parameters; `PARAMETERS` holds their defaults.
+
+    Returns
+    -------
+    Pass1
+        Arrays x, z, ds, kappa, v2 and normal_force.
+    """
+    return MODEL.pass1(lam, lam0, v0, direction, (mu, g, m,))
+
+
+def solve(
+    lam0: Any = None,
+    v0: Any = 0.0,
+    direction: int = 1,
+    *,
+    point: Any = None,
+    t_max: Any = None,
+    contact: str = "bilateral",
+    mu: Any = '0.1', g: Any = '9.81', m: Any = '1',
+) -> Motion:
+    """The motion that a launch begins (Passes 1 to 3).
+
+    Parameters
+    ----------
+    lam0, v0, direction
+        Launch place, speed (never negative) and direction (+1 or -1: the sign of ds/dt).
+    point : pair of numbers, optional
+        The launch place by its coordinates, instead of ``lam0``.
+    t_max : number, optional
+        Horizon of time.
+    contact : {"bilateral", "above", "below"}
+        Which side of the track can push.
+    mu, g, m
+        Run-time parameters; `PARAMETERS` holds their defaults.
+
+    Returns
+    -------
+    Motion
+
+    Raises
+    ------
+    GQMError
+        For a launch or a parameter that cannot be; the message says what would be right.
+    """
+    return MODEL.solve(lam0, v0, direction, point, t_max, contact, (mu, g, m,))
+
+
+def sweep(
+    quantity: str,
+    lam0: Any,
+    v0: Any = 0.0,
+    direction: Any = 1,
+    *,
+    lam: Any = None,
+    mu: Any = '0.1', g: Any = '9.81', m: Any = '1',
+) -> Sweep:
+    """One quantity over arrays of launches and parameters, on all cores; all arguments broadcast.
+
+    Parameters
+    ----------
+    quantity : str
+        "half_period", "period", "turning_points" (the lower, the upper: one more axis), "v_min", "v_max",
+        "normal_force_min", "normal_force_max" or "time_at".
+    lam0, v0, direction
+        Launch places, speeds and directions.
+    lam
+        For "time_at": the place, of which the first time there is asked.
+    mu, g, m
+        Run-time parameters; `PARAMETERS` holds their defaults.
+
+    Returns
+    -------
+    Sweep
+        ``values``, NaN where there is none, and ``reasons``, 0 where there is one; ``why()`` counts the others.
+    """
+    return MODEL.sweep(quantity, lam0, v0, direction, lam, (mu, g, m,))

@@ -1,0 +1,213 @@
+# Made by gqm-gen for "ellipse_drag". Do not edit: change its declaration and generate again.
+# interface 2, input 85e32f4b5095, body 2ba9820631e0
+"""Bead on an ellipse, in air
+
+x              = a*cos(theta)
+z              = b*sin(theta)
+ds/dtheta      = sqrt(a**2*sin(theta)**2 + b**2*cos(theta)**2)
+dx/ds          = -a*sin(theta)/sqrt(a**2*sin(theta)**2 + b**2*cos(theta)**2)
+dz/ds          = b*cos(theta)/sqrt(a**2*sin(theta)**2 + b**2*cos(theta)**2)
+kappa          = a*b/(a**2*sin(theta)**2 + b**2*cos(theta)**2)**(3/2)
+Theta          = -lam0 + theta + atan((-a + b)*sin(2*lam0)/(2*(a + (-a + b)*cos(lam0)**2))) - atan((-a + b)*sin(2*theta)/(2*(a + (-a + b)*cos(theta)**2)))
+W = V**2       = v0**2*exp(-Integral(2*b_air*direction*sqrt(a**2*sin(__theta)**2 + b**2*cos(__theta)**2)/m, (__theta, lam0, theta))) + Integral(-2*b*g*exp(-Integral(2*b_air*direction*sqrt(a**2*sin(__theta)**2 + b**2*cos(__theta)**2)/m, (__theta, _theta, theta)))*cos(_theta), (_theta, lam0, theta))
+N              = m*(W*a*b/(a**2*sin(theta)**2 + b**2*cos(theta)**2)**(3/2) - a*g*sin(theta)/sqrt(a**2*sin(theta)**2 + b**2*cos(theta)**2))
+A              = -W*b_air*direction/m - b*g*cos(theta)/sqrt(a**2*sin(theta)**2 + b**2*cos(theta)**2)
+dt/dtheta      = sqrt(a**2*sin(theta)**2 + b**2*cos(theta)**2)/sqrt(W)
+turning points : W = 0
+liftoff        : W*a*b/(a**2*sin(theta)**2 + b**2*cos(theta)**2)**(3/2) - a*g*sin(theta)/sqrt(a**2*sin(theta)**2 + b**2*cos(theta)**2) = 0
+
+V**2: spectral antiderivative, no elementary form found; direction is the sign of ds/dt
+"""
+
+from math import cos, sin, sqrt
+from typing import Any
+
+from numba import carray
+
+from gqm_sym.runtime import compiler
+
+# Before anything else is asked of the runtime, so that another version of it is told from a broken one.
+compiled = compiler(__file__, interface=2)
+
+from gqm_sym.runtime import (
+    DRIVE,
+    FRAME,
+    HOLD,
+    Addresses,
+    Dissipation,
+    Formulas,
+    Motion,
+    Pass1,
+    Sweep,
+)
+
+PARAMETERS = {
+    'a': '1.5',
+    'b': '1',
+    'b_air': '0.3',
+    'g': '9.81',
+    'm': '2',
+}
+
+
+@compiled(FRAME)
+def frame(n, places, speeds, p, out):
+    """x, z, ds/dtheta, signed curvature and contact force, given V**2 (paper, eq. 15)."""
+    places, speeds, p, out = carray(places, n), carray(speeds, n), carray(p, 5), carray(out, (5, n))
+    a, b, g, m = p[0], p[1], p[3], p[4]
+    for i in range(n):
+        theta = places[i]
+        v2 = speeds[i]
+        _t0 = cos(theta)
+        _t1 = sin(theta)
+        _t2 = _t0**2*b**2 + _t1**2*a**2
+        _t3 = sqrt(_t2)
+        _t4 = a*b/sqrt(_t2)**3
+        out[0, i] = _t0*a
+        out[1, i] = _t1*b
+        out[2, i] = _t3
+        out[3, i] = _t4
+        out[4, i] = m*(-_t1*a*g/_t3 + _t4*v2)
+
+
+@compiled(DRIVE)
+def drive(n, places, speeds, v, nu, p, out):
+    """ds/dtheta, P, Q, n0 and kappa: dV**2/dtheta = P - Q*V**2, N/m = kappa*V**2 + n0; v = sgn(ds/dt), nu = sgn(N)."""
+    places, p, out = carray(places, n), carray(p, 5), carray(out, (5, n))
+    a, b, b_air, g, m = p[0], p[1], p[2], p[3], p[4]
+    for i in range(n):
+        theta = places[i]
+        _t0 = sin(theta)
+        _t1 = cos(theta)
+        _t2 = _t0**2*a**2 + _t1**2*b**2
+        ds = sqrt(_t2)
+        _t4 = g/ds
+        kappa = a*b/sqrt(_t2)**3
+        push = -_t1*_t4*b
+        n0 = -_t0*_t4*a
+        out[0, i] = ds
+        out[1, i] = 2*ds*push
+        out[2, i] = 2*b_air*ds*v/m
+        out[3, i] = n0
+        out[4, i] = kappa
+
+
+@compiled(HOLD)
+def hold(n, places, p, out):
+    """Acceleration from rest forwards, and backwards: a body rests where the first is <= 0 and the second >= 0."""
+    places, p, out = carray(places, n), carray(p, 5), carray(out, (2, n))
+    a, b, g = p[0], p[1], p[3]
+    for i in range(n):
+        theta = places[i]
+        _t0 = cos(theta)
+        push = -_t0*b*g/sqrt(_t0**2*b**2 + a**2*sin(theta)**2)
+        out[0, i] = push
+        out[1, i] = push
+
+
+# The same formulas over a namespace of operations: extended precision evaluates these.
+
+
+def exact_domain(op, p):
+    """Both ends of the domain, and the period; None where there is none."""
+    return None, None, 2*op.pi
+
+
+MODEL = Formulas(
+    name='ellipse_drag',
+    parameter='theta',
+    parameters=PARAMETERS,
+    positive=('a', 'b'),
+    at_least=(('b_air', '0'),),
+    addresses=Addresses(frame.address),
+    domain_of=exact_domain,
+    dissipation=Dissipation(drive.address, hold.address, friction=False, kinked=False, linear=True),
+)
+
+
+def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, a: Any = '1.5', b: Any = '1', b_air: Any = '0.3', g: Any = '9.81', m: Any = '2') -> Pass1:
+    """Position, metric, curvature, V**2 and contact force at places of the curve (Pass 1, no quadrature).
+
+    Parameters
+    ----------
+    lam : array_like
+        Places on the curve, as values of its parameter theta.
+    lam0, v0, direction
+        Launch place, speed and direction (+1 or -1: the sign of ds/dt).
+    a, b, b_air, g, m
+        Run-time parameters; `PARAMETERS` holds their defaults.
+
+    Returns
+    -------
+    Pass1
+        Arrays x, z, ds, kappa, v2 and normal_force.
+    """
+    return MODEL.pass1(lam, lam0, v0, direction, (a, b, b_air, g, m,))
+
+
+def solve(
+    lam0: Any = None,
+    v0: Any = 0.0,
+    direction: int = 1,
+    *,
+    point: Any = None,
+    t_max: Any = None,
+    contact: str = "bilateral",
+    a: Any = '1.5', b: Any = '1', b_air: Any = '0.3', g: Any = '9.81', m: Any = '2',
+) -> Motion:
+    """The motion that a launch begins (Passes 1 to 3).
+
+    Parameters
+    ----------
+    lam0, v0, direction
+        Launch place, speed (never negative) and direction (+1 or -1: the sign of ds/dt).
+    point : pair of numbers, optional
+        The launch place by its coordinates, instead of ``lam0``.
+    t_max : number, optional
+        Horizon of time.
+    contact : {"bilateral", "above", "below"}
+        Which side of the track can push.
+    a, b, b_air, g, m
+        Run-time parameters; `PARAMETERS` holds their defaults.
+
+    Returns
+    -------
+    Motion
+
+    Raises
+    ------
+    GQMError
+        For a launch or a parameter that cannot be; the message says what would be right.
+    """
+    return MODEL.solve(lam0, v0, direction, point, t_max, contact, (a, b, b_air, g, m,))
+
+
+def sweep(
+    quantity: str,
+    lam0: Any,
+    v0: Any = 0.0,
+    direction: Any = 1,
+    *,
+    lam: Any = None,
+    a: Any = '1.5', b: Any = '1', b_air: Any = '0.3', g: Any = '9.81', m: Any = '2',
+) -> Sweep:
+    """One quantity over arrays of launches and parameters, on all cores; all arguments broadcast.
+
+    Parameters
+    ----------
+    quantity : str
+        "half_period", "period", "turning_points" (the lower, the upper: one more axis), "v_min", "v_max",
+        "normal_force_min", "normal_force_max" or "time_at".
+    lam0, v0, direction
+        Launch places, speeds and directions.
+    lam
+        For "time_at": the place, of which the first time there is asked.
+    a, b, b_air, g, m
+        Run-time parameters; `PARAMETERS` holds their defaults.
+
+    Returns
+    -------
+    Sweep
+        ``values``, NaN where there is none, and ``reasons``, 0 where there is one; ``why()`` counts the others.
+    """
+    return MODEL.sweep(quantity, lam0, v0, direction, lam, (a, b, b_air, g, m,))

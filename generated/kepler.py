@@ -1,0 +1,343 @@
+# Made by gqm-gen for "kepler". Do not edit: change its declaration and generate again.
+# interface 2, input a1e1feaf475b, body 8a0dbc889c23
+"""Planet on its own ellipse, by the eccentric anomaly
+
+x              = a*(-ecc + cos(E))
+z              = a*sqrt(1 - ecc**2)*sin(E)
+ds/dE          = a*sqrt((1 - ecc**2)*cos(E)**2 + sin(E)**2)
+dx/ds          = -sin(E)/sqrt((1 - ecc**2)*cos(E)**2 + sin(E)**2)
+dz/ds          = sqrt(1 - ecc**2)*cos(E)/sqrt((1 - ecc**2)*cos(E)**2 + sin(E)**2)
+kappa          = sqrt(1 - ecc**2)/(a*((1 - ecc**2)*cos(E)**2 + sin(E)**2)**(3/2))
+Theta          = atan2(sqrt(1 - ecc**2)*cos(E), -sin(E)) - atan2(sqrt(1 - ecc**2)*cos(lam0), -sin(lam0))
+V**2           = 2*k*(-1/sqrt((1 - ecc**2)*sin(lam0)**2 + (-ecc + cos(lam0))**2) + 1/sqrt((1 - ecc**2)*sin(E)**2 + (-ecc + cos(E))**2))/Abs(a) + v0**2
+N              = m*(sqrt(1 - ecc**2)*(2*k*(-1/sqrt((1 - ecc**2)*sin(lam0)**2 + (-ecc + cos(lam0))**2) + 1/sqrt((1 - ecc**2)*sin(E)**2 + (-ecc + cos(E))**2))/Abs(a) + v0**2)/(a*((1 - ecc**2)*cos(E)**2 + sin(E)**2)**(3/2)) - k*sqrt(1 - ecc**2)*((-ecc + cos(E))*cos(E) + sin(E)**2)*Abs(a)/(a**3*((1 - ecc**2)*sin(E)**2 + (-ecc + cos(E))**2)**(3/2)*sqrt((1 - ecc**2)*cos(E)**2 + sin(E)**2)))
+A              = -k*(ecc + (1 - ecc**2)*cos(E) - cos(E))*sin(E)*Abs(a)/(a**3*((1 - ecc**2)*sin(E)**2 + (-ecc + cos(E))**2)**(3/2)*sqrt((1 - ecc**2)*cos(E)**2 + sin(E)**2))
+dt/dE          = a*sqrt((1 - ecc**2)*cos(E)**2 + sin(E)**2)/sqrt(2*k*(-1/sqrt((1 - ecc**2)*sin(lam0)**2 + (-ecc + cos(lam0))**2) + 1/sqrt((1 - ecc**2)*sin(E)**2 + (-ecc + cos(E))**2))/Abs(a) + v0**2)
+turning points : 2*k*(-1/sqrt((1 - ecc**2)*sin(lam0)**2 + (-ecc + cos(lam0))**2) + 1/sqrt((1 - ecc**2)*sin(E)**2 + (-ecc + cos(E))**2))/Abs(a) + v0**2 = 0
+liftoff        : sqrt(1 - ecc**2)*(2*k*(-1/sqrt((1 - ecc**2)*sin(lam0)**2 + (-ecc + cos(lam0))**2) + 1/sqrt((1 - ecc**2)*sin(E)**2 + (-ecc + cos(E))**2))/Abs(a) + v0**2)/(a*((1 - ecc**2)*cos(E)**2 + sin(E)**2)**(3/2)) - k*sqrt(1 - ecc**2)*((-ecc + cos(E))*cos(E) + sin(E)**2)*Abs(a)/(a**3*((1 - ecc**2)*sin(E)**2 + (-ecc + cos(E))**2)**(3/2)*sqrt((1 - ecc**2)*cos(E)**2 + sin(E)**2)) = 0
+"""
+
+from math import cos, fabs, sin, sqrt
+from typing import Any
+
+from numba import carray
+
+from gqm_sym.runtime import compiler
+
+# Before anything else is asked of the runtime, so that another version of it is told from a broken one.
+compiled = compiler(__file__, interface=2)
+
+from gqm_sym.runtime import (
+    BEND,
+    BOUNDS,
+    CLIMB,
+    FRAME,
+    RISE,
+    Addresses,
+    ExactFormulas,
+    Formulas,
+    Motion,
+    Pass1,
+    Sweep,
+)
+from gqm_sym.runtime.differences import cos1, cos2, sin1, sin2
+from gqm_sym.runtime.intervals import iabs, iadd, iconst, icos, imul, ipow, isin, isqrt
+from gqm_sym.runtime.places import nearest
+
+PARAMETERS = {
+    'a': '3/2',
+    'ecc': '3/5',
+    'k': '7/2',
+    'm': '1',
+}
+
+
+@compiled(FRAME)
+def frame(n, places, speeds, p, out):
+    """x, z, ds/dE, signed curvature and contact force, given V**2 (paper, eq. 15)."""
+    places, speeds, p, out = carray(places, n), carray(speeds, n), carray(p, 4), carray(out, (5, n))
+    a, ecc, k, m = p[0], p[1], p[2], p[3]
+    _t0 = 1 - ecc**2
+    _t7 = 1/a
+    _c0 = fabs(a)
+    _c1 = sqrt(_t0)
+    for i in range(n):
+        E = places[i]
+        v2 = speeds[i]
+        _t1 = cos(E)
+        _t2 = _t1 - ecc
+        _t3 = sin(E)
+        _t4 = _t3**2
+        _t5 = _t0*_t1**2 + _t4
+        _t6 = sqrt(_t5)
+        _t8 = 1/sqrt(_t5)**3
+        out[0, i] = _t2*a
+        out[1, i] = _c1*_t3*a
+        out[2, i] = _t6*a
+        out[3, i] = _c1*_t7*_t8
+        out[4, i] = m*(-_c0*_c1*k*(_t1*_t2 + _t4)/(_t6*a**3*sqrt(_t0*_t4 + _t2**2)**3) + _c1*_t7*_t8*v2)
+
+
+@compiled(CLIMB)
+def climb(n, places, p, out):
+    """What V**2 loses in climbing to E, up to a constant, and its derivative (paper, eq. 13)."""
+    places, p, out = carray(places, n), carray(p, 4), carray(out, (2, n))
+    a, ecc, k = p[0], p[1], p[2]
+    _t3 = 1 - ecc**2
+    _t5 = 2*k
+    _c0 = fabs(a)
+    for i in range(n):
+        E = places[i]
+        _t0 = cos(E)
+        _t1 = -_t0 + ecc
+        _t2 = sin(E)
+        _t4 = _t1**2 + _t2**2*_t3
+        out[0, i] = -_t5/(_c0*sqrt(_t4))
+        out[1, i] = _c0*_t2*_t5*(_t0*_t3 + _t1)/(a**2*sqrt(_t4)**3)
+
+
+@compiled(RISE)
+def rise(n, _a, places, offsets, p, out):
+    """climb[a, E] = (climb(E) - climb(a))/(E - a) without cancellation, and ds/dE."""
+    places, offsets, p, out = carray(places, n), carray(offsets, n), carray(p, 4), carray(out, (2, n))
+    a, ecc, k = p[0], p[1], p[2]
+    _t0 = cos(_a)
+    _t1 = sin(_a)
+    _t2 = 1 - ecc**2
+    _c0 = fabs(a)
+    _t3 = sqrt(_t1**2*_t2 + (_t0 - ecc)**2)
+    _c1 = 1/_t3
+    _c2 = _t3
+    for i in range(n):
+        E = places[i]
+        d = offsets[i]
+        _t4 = cos(E)
+        _t5 = sin(E)
+        _t6 = _t5**2
+        _t7 = sqrt(_t2*_t6 + (_t4 - ecc)**2)
+        out[0, i] = 2*_c1*k*(_t2*(_t1 + _t5)*sin1(_a, E, d) + (_t0 + _t4 - 2*ecc)*cos1(_a, E, d))/(_c0*_t7*(_c2 + _t7))
+        out[1, i] = a*sqrt(_t2*_t4**2 + _t6)
+
+
+@compiled(BEND)
+def bend(n, _a, b, left, right, p, out):
+    """climb[a, E, b] = V**2/((E - a)*(b - E)) between turning points, without cancellation, and ds/dE."""
+    left, right, p, out = carray(left, n), carray(right, n), carray(p, 4), carray(out, (2, n))
+    a, ecc, k = p[0], p[1], p[2]
+    _t0 = -_a + b
+    _t1 = cos(_a)
+    _t2 = sin(_a)
+    _t3 = 1 - ecc**2
+    _t5 = cos(b)
+    _t6 = sin(b)
+    _t13 = -2*ecc
+    _c0 = fabs(a)
+    _t4 = sqrt(_t2**2*_t3 + (_t1 - ecc)**2)
+    _t7 = sqrt(_t3*_t6**2 + (_t5 - ecc)**2)
+    _t14 = _t13 + _t5
+    _c1 = cos1(_a, b, _t0)
+    _c2 = sin1(_a, b, _t0)
+    _c3 = 1/_t4
+    _c4 = _t4
+    _c5 = 1/_t7
+    _c6 = _t7
+    for i in range(n):
+        da = left[i]
+        db = right[i]
+        E = nearest(_a, b, da, db)
+        _t8 = cos(E)
+        _t9 = sin(E)
+        _t10 = _t9**2
+        _t11 = sqrt(_t10*_t3 + (_t8 - ecc)**2)
+        _t12 = _c5/_t11
+        _t15 = cos1(_a, E, da)
+        _t16 = sin1(_a, E, da)
+        _t17 = (_c1*(_t1 + _t14) + _c2*_t3*(_t2 + _t6))*(_t15*(_t1 + _t13 + _t8) + _t16*_t3*(_t2 + _t9))/((_c4 + _c6)*(_c4 + _t11))
+        _t18 = 1/(_c6 + _t11)
+        out[0, i] = -2*k*(_c3*_t12*_t17 - _t12*(-_t17*_t18 + _t18*(_c1*_t15 + _t3*(_c2*_t16 + (_t6 + _t9)*sin2(_a, E, b, da, db)) + (_t14 + _t8)*cos2(_a, E, b, da, db))))/_c0
+        out[1, i] = a*sqrt(_t10 + _t3*_t8**2)
+
+
+@compiled(BOUNDS)
+def bounds(lo, hi, p, out):
+    """Bounds of the climb's slope and of ds/dE for lo <= E <= hi."""
+    p, out = carray(p, 4), carray(out, 4)
+    E = (lo, hi)
+    a = (p[0], p[0])
+    ecc = (p[1], p[1])
+    k = (p[2], p[2])
+    _t0 = isin(E)
+    _t1 = icos(E)
+    _t2 = iadd(iconst(1.0), imul(iconst(-1.0), ipow(ecc, 2)))
+    _t3 = iadd(imul(iconst(-1.0), _t1), ecc)
+    _t4 = ipow(_t0, 2)
+    out[0], out[1] = imul(imul(imul(imul(imul(imul(iconst(2.0), _t0), ipow(a, -2)), k), iadd(imul(_t1, _t2), _t3)), ipow(isqrt(iadd(imul(_t2, _t4), ipow(_t3, 2))), -3)), iabs(a))
+    out[2], out[3] = imul(a, isqrt(iadd(imul(ipow(_t1, 2), _t2), _t4)))
+
+
+# The same formulas over a namespace of operations: extended precision evaluates these.
+
+
+def exact_x(op, E, p):
+    """Horizontal coordinate."""
+    a = p[0]
+    ecc = p[1]
+    return a*(-ecc + op.cos(E))
+
+
+def exact_z(op, E, p):
+    """Height."""
+    a = p[0]
+    ecc = p[1]
+    return a*op.sqrt(1 - ecc**2)*op.sin(E)
+
+
+def exact_ds(op, E, p):
+    """ds/dE."""
+    a = p[0]
+    ecc = p[1]
+    return a*op.sqrt((1 - ecc**2)*op.cos(E)**2 + op.sin(E)**2)
+
+
+def exact_kappa(op, E, p):
+    """Signed curvature."""
+    a = p[0]
+    ecc = p[1]
+    _t0 = 1 - ecc**2
+    return op.sqrt(_t0)/(a*(_t0*op.cos(E)**2 + op.sin(E)**2)**(op.mpf(3)/2))
+
+
+def exact_reaction(op, E, p):
+    """Contact force per unit mass of a body at rest."""
+    a = p[0]
+    ecc = p[1]
+    k = p[2]
+    _t0 = 1 - ecc**2
+    _t1 = op.sin(E)**2
+    _t2 = op.cos(E)
+    _t3 = _t2 - ecc
+    return -op.sqrt(_t0)*k*(_t1 + _t2*_t3)*abs(a)/(a**3*(_t0*_t1 + _t3**2)**(op.mpf(3)/2)*op.sqrt(_t0*_t2**2 + _t1))
+
+
+def exact_climb(op, E, p):
+    """What V**2 loses in climbing, up to a constant."""
+    a = p[0]
+    ecc = p[1]
+    k = p[2]
+    return -2*k/(op.sqrt((1 - ecc**2)*op.sin(E)**2 + (-ecc + op.cos(E))**2)*abs(a))
+
+
+def exact_climb_slope(op, E, p):
+    """Its derivative by E."""
+    a = p[0]
+    ecc = p[1]
+    k = p[2]
+    _t0 = op.sin(E)
+    _t1 = op.cos(E)
+    _t2 = 1 - ecc**2
+    _t3 = -_t1 + ecc
+    return 2*_t0*k*(_t1*_t2 + _t3)*abs(a)/(a**2*(_t0**2*_t2 + _t3**2)**(op.mpf(3)/2))
+
+
+def exact_domain(op, p):
+    """Both ends of the domain, and the period; None where there is none."""
+    return None, None, 2*op.pi
+
+
+MODEL = Formulas(
+    name='kepler',
+    parameter='E',
+    parameters=PARAMETERS,
+    positive=('a',),
+    addresses=Addresses(frame.address, climb.address, rise.address, bend.address, bounds.address),
+    domain_of=exact_domain,
+    exact=ExactFormulas(exact_x, exact_z, exact_ds, exact_kappa, exact_reaction, exact_climb, exact_climb_slope),
+)
+
+
+def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, a: Any = '3/2', ecc: Any = '3/5', k: Any = '7/2', m: Any = '1') -> Pass1:
+    """Position, metric, curvature, V**2 and contact force at places of the curve (Pass 1, no quadrature).
+
+    Parameters
+    ----------
+    lam : array_like
+        Places on the curve, as values of its parameter E.
+    lam0, v0, direction
+        Launch place, speed and direction (+1 or -1: the sign of ds/dt).
+    a, ecc, k, m
+        Run-time parameters; `PARAMETERS` holds their defaults.
+
+    Returns
+    -------
+    Pass1
+        Arrays x, z, ds, kappa, v2 and normal_force.
+    """
+    return MODEL.pass1(lam, lam0, v0, direction, (a, ecc, k, m,))
+
+
+def solve(
+    lam0: Any = None,
+    v0: Any = 0.0,
+    direction: int = 1,
+    *,
+    point: Any = None,
+    t_max: Any = None,
+    contact: str = "bilateral",
+    a: Any = '3/2', ecc: Any = '3/5', k: Any = '7/2', m: Any = '1',
+) -> Motion:
+    """The motion that a launch begins (Passes 1 to 3).
+
+    Parameters
+    ----------
+    lam0, v0, direction
+        Launch place, speed (never negative) and direction (+1 or -1: the sign of ds/dt).
+    point : pair of numbers, optional
+        The launch place by its coordinates, instead of ``lam0``.
+    t_max : number, optional
+        Horizon of time.
+    contact : {"bilateral", "above", "below"}
+        Which side of the track can push.
+    a, ecc, k, m
+        Run-time parameters; `PARAMETERS` holds their defaults.
+
+    Returns
+    -------
+    Motion
+
+    Raises
+    ------
+    GQMError
+        For a launch or a parameter that cannot be; the message says what would be right.
+    """
+    return MODEL.solve(lam0, v0, direction, point, t_max, contact, (a, ecc, k, m,))
+
+
+def sweep(
+    quantity: str,
+    lam0: Any,
+    v0: Any = 0.0,
+    direction: Any = 1,
+    *,
+    lam: Any = None,
+    a: Any = '3/2', ecc: Any = '3/5', k: Any = '7/2', m: Any = '1',
+) -> Sweep:
+    """One quantity over arrays of launches and parameters, on all cores; all arguments broadcast.
+
+    Parameters
+    ----------
+    quantity : str
+        "half_period", "period", "turning_points" (the lower, the upper: one more axis), "v_min", "v_max",
+        "normal_force_min", "normal_force_max" or "time_at".
+    lam0, v0, direction
+        Launch places, speeds and directions.
+    lam
+        For "time_at": the place, of which the first time there is asked.
+    a, ecc, k, m
+        Run-time parameters; `PARAMETERS` holds their defaults.
+
+    Returns
+    -------
+    Sweep
+        ``values``, NaN where there is none, and ``reasons``, 0 where there is one; ``why()`` counts the others.
+    """
+    return MODEL.sweep(quantity, lam0, v0, direction, lam, (a, ecc, k, m,))

@@ -1,0 +1,249 @@
+# Made by gqm-gen for "line_spring". Do not edit: change its declaration and generate again.
+# interface 2, input 924b210c4a96, body c326801f65e0
+"""Bead on a sloping line, tied to the origin by a spring
+
+x              = x
+z              = 3*x/4 + 2
+ds/dx          = 5/4
+dx/ds          = 4/5
+dz/ds          = 3/5
+kappa          = 0
+Theta          = 0
+V**2           = v0**2 + w**2*(lam0**2 - x**2 + (3*lam0 + 8)**2/16 - (3*x + 8)**2/16)
+N              = 8*m*w**2/5
+A              = -w**2*(25*x/4 + 6)/5
+dt/dx          = 5/(4*sqrt(v0**2 + w**2*(lam0**2 - x**2 + (3*lam0 + 8)**2/16 - (3*x + 8)**2/16)))
+turning points : v0**2 + w**2*(lam0**2 - x**2 + (3*lam0 + 8)**2/16 - (3*x + 8)**2/16) = 0
+liftoff        : 8*w**2/5 = 0
+"""
+
+from typing import Any
+
+from numba import carray
+
+from gqm_sym.runtime import compiler
+
+# Before anything else is asked of the runtime, so that another version of it is told from a broken one.
+compiled = compiler(__file__, interface=2)
+
+from gqm_sym.runtime import (
+    BEND,
+    BOUNDS,
+    CLIMB,
+    FRAME,
+    RISE,
+    Addresses,
+    ExactFormulas,
+    Formulas,
+    Motion,
+    Pass1,
+    Sweep,
+)
+from gqm_sym.runtime.intervals import iadd, iconst, idiv, imul, ipow
+
+PARAMETERS = {
+    'w': '1.3',
+    'm': '1',
+}
+
+
+@compiled(FRAME)
+def frame(n, places, speeds, p, out):
+    """x, z, ds/dx, signed curvature and contact force, given V**2 (paper, eq. 15)."""
+    places, speeds, p, out = carray(places, n), carray(speeds, n), carray(p, 2), carray(out, (5, n))
+    w, m = p[0], p[1]
+    for i in range(n):
+        x = places[i]
+        out[0, i] = x
+        out[1, i] = 3*x/4 + 2
+        out[2, i] = 5/4
+        out[3, i] = 0
+        out[4, i] = 8*m*w**2/5
+
+
+@compiled(CLIMB)
+def climb(n, places, p, out):
+    """What V**2 loses in climbing to x, up to a constant, and its derivative (paper, eq. 13)."""
+    places, p, out = carray(places, n), carray(p, 2), carray(out, (2, n))
+    w = p[0]
+    _t0 = w**2
+    for i in range(n):
+        x = places[i]
+        out[0, i] = _t0*(x**2 + (3*x/4 + 2)**2)
+        out[1, i] = _t0*(25*x/4 + 6)/2
+
+
+@compiled(RISE)
+def rise(n, a, places, offsets, p, out):
+    """climb[a, x] = (climb(x) - climb(a))/(x - a) without cancellation, and ds/dx."""
+    places, offsets, p, out = carray(places, n), carray(offsets, n), carray(p, 2), carray(out, (2, n))
+    w = p[0]
+    for i in range(n):
+        x = places[i]
+        out[0, i] = w**2*(25*a/16 + 25*x/16 + 3)
+        out[1, i] = 5/4
+
+
+@compiled(BEND)
+def bend(n, a, b, left, right, p, out):
+    """climb[a, x, b] = V**2/((x - a)*(b - x)) between turning points, without cancellation, and ds/dx."""
+    left, right, p, out = carray(left, n), carray(right, n), carray(p, 2), carray(out, (2, n))
+    w = p[0]
+    for i in range(n):
+        out[0, i] = 25*w**2/16
+        out[1, i] = 5/4
+
+
+@compiled(BOUNDS)
+def bounds(lo, hi, p, out):
+    """Bounds of the climb's slope and of ds/dx for lo <= x <= hi."""
+    p, out = carray(p, 2), carray(out, 4)
+    x = (lo, hi)
+    w = (p[0], p[0])
+    out[0], out[1] = imul(imul(idiv(iconst(1.0), iconst(2.0)), ipow(w, 2)), iadd(imul(idiv(iconst(25.0), iconst(4.0)), x), iconst(6.0)))
+    out[2], out[3] = idiv(iconst(5.0), iconst(4.0))
+
+
+# The same formulas over a namespace of operations: extended precision evaluates these.
+
+
+def exact_x(op, x, p):
+    """Horizontal coordinate."""
+    return x
+
+
+def exact_z(op, x, p):
+    """Height."""
+    return 3*x/4 + 2
+
+
+def exact_ds(op, x, p):
+    """ds/dx."""
+    return op.mpf(5)/4
+
+
+def exact_kappa(op, x, p):
+    """Signed curvature."""
+    return 0
+
+
+def exact_reaction(op, x, p):
+    """Contact force per unit mass of a body at rest."""
+    w = p[0]
+    return 8*w**2/5
+
+
+def exact_climb(op, x, p):
+    """What V**2 loses in climbing, up to a constant."""
+    w = p[0]
+    return w**2*(x**2 + (3*x/4 + 2)**2)
+
+
+def exact_climb_slope(op, x, p):
+    """Its derivative by x."""
+    w = p[0]
+    return w**2*(25*x/4 + 6)/2
+
+
+def exact_domain(op, p):
+    """Both ends of the domain, and the period; None where there is none."""
+    return None, None, None
+
+
+MODEL = Formulas(
+    name='line_spring',
+    parameter='x',
+    parameters=PARAMETERS,
+    positive=(),
+    addresses=Addresses(frame.address, climb.address, rise.address, bend.address, bounds.address),
+    domain_of=exact_domain,
+    exact=ExactFormulas(exact_x, exact_z, exact_ds, exact_kappa, exact_reaction, exact_climb, exact_climb_slope),
+)
+
+
+def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, w: Any = '1.3', m: Any = '1') -> Pass1:
+    """Position, metric, curvature, V**2 and contact force at places of the curve (Pass 1, no quadrature).
+
+    Parameters
+    ----------
+    lam : array_like
+        Places on the curve, as values of its parameter x.
+    lam0, v0, direction
+        Launch place, speed and direction (+1 or -1: the sign of ds/dt).
+    w, m
+        Run-time parameters; `PARAMETERS` holds their defaults.
+
+    Returns
+    -------
+    Pass1
+        Arrays x, z, ds, kappa, v2 and normal_force.
+    """
+    return MODEL.pass1(lam, lam0, v0, direction, (w, m,))
+
+
+def solve(
+    lam0: Any = None,
+    v0: Any = 0.0,
+    direction: int = 1,
+    *,
+    point: Any = None,
+    t_max: Any = None,
+    contact: str = "bilateral",
+    w: Any = '1.3', m: Any = '1',
+) -> Motion:
+    """The motion that a launch begins (Passes 1 to 3).
+
+    Parameters
+    ----------
+    lam0, v0, direction
+        Launch place, speed (never negative) and direction (+1 or -1: the sign of ds/dt).
+    point : pair of numbers, optional
+        The launch place by its coordinates, instead of ``lam0``.
+    t_max : number, optional
+        Horizon of time.
+    contact : {"bilateral", "above", "below"}
+        Which side of the track can push.
+    w, m
+        Run-time parameters; `PARAMETERS` holds their defaults.
+
+    Returns
+    -------
+    Motion
+
+    Raises
+    ------
+    GQMError
+        For a launch or a parameter that cannot be; the message says what would be right.
+    """
+    return MODEL.solve(lam0, v0, direction, point, t_max, contact, (w, m,))
+
+
+def sweep(
+    quantity: str,
+    lam0: Any,
+    v0: Any = 0.0,
+    direction: Any = 1,
+    *,
+    lam: Any = None,
+    w: Any = '1.3', m: Any = '1',
+) -> Sweep:
+    """One quantity over arrays of launches and parameters, on all cores; all arguments broadcast.
+
+    Parameters
+    ----------
+    quantity : str
+        "half_period", "period", "turning_points" (the lower, the upper: one more axis), "v_min", "v_max",
+        "normal_force_min", "normal_force_max" or "time_at".
+    lam0, v0, direction
+        Launch places, speeds and directions.
+    lam
+        For "time_at": the place, of which the first time there is asked.
+    w, m
+        Run-time parameters; `PARAMETERS` holds their defaults.
+
+    Returns
+    -------
+    Sweep
+        ``values``, NaN where there is none, and ``reasons``, 0 where there is one; ``why()`` counts the others.
+    """
+    return MODEL.sweep(quantity, lam0, v0, direction, lam, (w, m,))

@@ -1,0 +1,295 @@
+# Made by gqm-gen for "log_spiral". Do not edit: change its declaration and generate again.
+# interface 2, input 458ba188398a, body 95b743ae6e8c
+"""Bead on a logarithmic spiral
+
+x              = r0*exp(b*theta)*cos(theta)
+z              = r0*exp(b*theta)*sin(theta)
+ds/dtheta      = r0*sqrt(b**2 + 1)*exp(b*theta)
+dx/ds          = (b*cos(theta) - sin(theta))/sqrt(b**2 + 1)
+dz/ds          = (b*sin(theta) + cos(theta))/sqrt(b**2 + 1)
+kappa          = exp(-b*theta)/(r0*sqrt(b**2 + 1))
+Theta          = -lam0 + theta
+V**2           = 2*g*r0*(exp(b*lam0)*sin(lam0) - exp(b*theta)*sin(theta)) + v0**2
+N              = m*(g*(b*cos(theta) - sin(theta))/sqrt(b**2 + 1) + (2*g*r0*(exp(b*lam0)*sin(lam0) - exp(b*theta)*sin(theta)) + v0**2)*exp(-b*theta)/(r0*sqrt(b**2 + 1)))
+A              = -g*(b*sin(theta) + cos(theta))/sqrt(b**2 + 1)
+dt/dtheta      = r0*sqrt(b**2 + 1)*exp(b*theta)/sqrt(2*g*r0*(exp(b*lam0)*sin(lam0) - exp(b*theta)*sin(theta)) + v0**2)
+turning points : 2*g*r0*(exp(b*lam0)*sin(lam0) - exp(b*theta)*sin(theta)) + v0**2 = 0
+liftoff        : g*(b*cos(theta) - sin(theta))/sqrt(b**2 + 1) + (2*g*r0*(exp(b*lam0)*sin(lam0) - exp(b*theta)*sin(theta)) + v0**2)*exp(-b*theta)/(r0*sqrt(b**2 + 1)) = 0
+"""
+
+from math import cos, exp, sin, sqrt
+from typing import Any
+
+from numba import carray
+
+from gqm_sym.runtime import compiler
+
+# Before anything else is asked of the runtime, so that another version of it is told from a broken one.
+compiled = compiler(__file__, interface=2)
+
+from gqm_sym.runtime import (
+    BEND,
+    BOUNDS,
+    CLIMB,
+    FRAME,
+    RISE,
+    Addresses,
+    ExactFormulas,
+    Formulas,
+    Motion,
+    Pass1,
+    Sweep,
+)
+from gqm_sym.runtime.differences import exp1, exp2, sin1, sin2
+from gqm_sym.runtime.intervals import iadd, iconst, icos, iexp, imul, ipow, isin, isqrt
+from gqm_sym.runtime.places import nearest
+
+PARAMETERS = {
+    'r0': '1',
+    'b': '0.15',
+    'g': '9.81',
+    'm': '1',
+}
+
+
+@compiled(FRAME)
+def frame(n, places, speeds, p, out):
+    """x, z, ds/dtheta, signed curvature and contact force, given V**2 (paper, eq. 15)."""
+    places, speeds, p, out = carray(places, n), carray(speeds, n), carray(p, 4), carray(out, (5, n))
+    r0, b, g, m = p[0], p[1], p[2], p[3]
+    _t0 = sqrt(b**2 + 1)
+    _c0 = 1/_t0
+    _c1 = _t0
+    for i in range(n):
+        theta = places[i]
+        v2 = speeds[i]
+        _t1 = cos(theta)
+        _t2 = b*theta
+        _t3 = r0*exp(_t2)
+        _t4 = sin(theta)
+        _t5 = _c0*exp(-_t2)/r0
+        out[0, i] = _t1*_t3
+        out[1, i] = _t3*_t4
+        out[2, i] = _c1*_t3
+        out[3, i] = _t5
+        out[4, i] = m*(_c0*g*(_t1*b - _t4) + _t5*v2)
+
+
+@compiled(CLIMB)
+def climb(n, places, p, out):
+    """What V**2 loses in climbing to theta, up to a constant, and its derivative (paper, eq. 13)."""
+    places, p, out = carray(places, n), carray(p, 4), carray(out, (2, n))
+    r0, b, g = p[0], p[1], p[2]
+    for i in range(n):
+        theta = places[i]
+        _t0 = sin(theta)
+        _t1 = 2*g*r0*exp(b*theta)
+        out[0, i] = _t0*_t1
+        out[1, i] = _t1*(_t0*b + cos(theta))
+
+
+@compiled(RISE)
+def rise(n, a, places, offsets, p, out):
+    """climb[a, theta] = (climb(theta) - climb(a))/(theta - a) without cancellation, and ds/dtheta."""
+    places, offsets, p, out = carray(places, n), carray(offsets, n), carray(p, 4), carray(out, (2, n))
+    r0, b, g = p[0], p[1], p[2]
+    _c0 = sin(a)
+    _c1 = sqrt(b**2 + 1)
+    for i in range(n):
+        theta = places[i]
+        d = offsets[i]
+        _t0 = b*theta
+        _t1 = exp(_t0)
+        out[0, i] = 2*g*r0*(_c0*b*exp1(a*b, _t0, b*d) + _t1*sin1(a, theta, d))
+        out[1, i] = _c1*_t1*r0
+
+
+@compiled(BEND)
+def bend(n, a, _b, left, right, p, out):
+    """climb[a, theta, b] = V**2/((theta - a)*(b - theta)) between turning points, without cancellation, and ds/dtheta."""
+    left, right, p, out = carray(left, n), carray(right, n), carray(p, 4), carray(out, (2, n))
+    r0, b, g = p[0], p[1], p[2]
+    _t0 = _b*b
+    _t1 = b**2
+    _c0 = sin(a)
+    _c1 = exp(_t0)
+    _c2 = sqrt(_t1 + 1)
+    for i in range(n):
+        da = left[i]
+        db = right[i]
+        theta = nearest(a, _b, da, db)
+        _t2 = b*theta
+        _t3 = b*db
+        out[0, i] = 2*g*r0*(_c0*_t1*exp2(a*b, _t2, _t0, b*da, _t3) + _c1*sin2(a, theta, _b, da, db) + b*exp1(_t2, _t0, _t3)*sin1(a, theta, da))
+        out[1, i] = _c2*r0*exp(_t2)
+
+
+@compiled(BOUNDS)
+def bounds(lo, hi, p, out):
+    """Bounds of the climb's slope and of ds/dtheta for lo <= theta <= hi."""
+    p, out = carray(p, 4), carray(out, 4)
+    theta = (lo, hi)
+    r0 = (p[0], p[0])
+    b = (p[1], p[1])
+    g = (p[2], p[2])
+    _t0 = imul(r0, iexp(imul(b, theta)))
+    out[0], out[1] = imul(imul(imul(iconst(2.0), _t0), g), iadd(imul(b, isin(theta)), icos(theta)))
+    out[2], out[3] = imul(_t0, isqrt(iadd(ipow(b, 2), iconst(1.0))))
+
+
+# The same formulas over a namespace of operations: extended precision evaluates these.
+
+
+def exact_x(op, theta, p):
+    """Horizontal coordinate."""
+    r0 = p[0]
+    b = p[1]
+    return r0*op.exp(b*theta)*op.cos(theta)
+
+
+def exact_z(op, theta, p):
+    """Height."""
+    r0 = p[0]
+    b = p[1]
+    return r0*op.exp(b*theta)*op.sin(theta)
+
+
+def exact_ds(op, theta, p):
+    """ds/dtheta."""
+    r0 = p[0]
+    b = p[1]
+    return r0*op.sqrt(b**2 + 1)*op.exp(b*theta)
+
+
+def exact_kappa(op, theta, p):
+    """Signed curvature."""
+    r0 = p[0]
+    b = p[1]
+    return op.exp(-b*theta)/(r0*op.sqrt(b**2 + 1))
+
+
+def exact_reaction(op, theta, p):
+    """Contact force per unit mass of a body at rest."""
+    b = p[1]
+    g = p[2]
+    return g*(b*op.cos(theta) - op.sin(theta))/op.sqrt(b**2 + 1)
+
+
+def exact_climb(op, theta, p):
+    """What V**2 loses in climbing, up to a constant."""
+    r0 = p[0]
+    b = p[1]
+    g = p[2]
+    return 2*g*r0*op.exp(b*theta)*op.sin(theta)
+
+
+def exact_climb_slope(op, theta, p):
+    """Its derivative by theta."""
+    r0 = p[0]
+    b = p[1]
+    g = p[2]
+    return 2*g*r0*(b*op.sin(theta) + op.cos(theta))*op.exp(b*theta)
+
+
+def exact_domain(op, p):
+    """Both ends of the domain, and the period; None where there is none."""
+    return None, None, None
+
+
+MODEL = Formulas(
+    name='log_spiral',
+    parameter='theta',
+    parameters=PARAMETERS,
+    positive=('r0',),
+    addresses=Addresses(frame.address, climb.address, rise.address, bend.address, bounds.address),
+    domain_of=exact_domain,
+    exact=ExactFormulas(exact_x, exact_z, exact_ds, exact_kappa, exact_reaction, exact_climb, exact_climb_slope),
+)
+
+
+def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, r0: Any = '1', b: Any = '0.15', g: Any = '9.81', m: Any = '1') -> Pass1:
+    """Position, metric, curvature, V**2 and contact force at places of the curve (Pass 1, no quadrature).
+
+    Parameters
+    ----------
+    lam : array_like
+        Places on the curve, as values of its parameter theta.
+    lam0, v0, direction
+        Launch place, speed and direction (+1 or -1: the sign of ds/dt).
+    r0, b, g, m
+        Run-time parameters; `PARAMETERS` holds their defaults.
+
+    Returns
+    -------
+    Pass1
+        Arrays x, z, ds, kappa, v2 and normal_force.
+    """
+    return MODEL.pass1(lam, lam0, v0, direction, (r0, b, g, m,))
+
+
+def solve(
+    lam0: Any = None,
+    v0: Any = 0.0,
+    direction: int = 1,
+    *,
+    point: Any = None,
+    t_max: Any = None,
+    contact: str = "bilateral",
+    r0: Any = '1', b: Any = '0.15', g: Any = '9.81', m: Any = '1',
+) -> Motion:
+    """The motion that a launch begins (Passes 1 to 3).
+
+    Parameters
+    ----------
+    lam0, v0, direction
+        Launch place, speed (never negative) and direction (+1 or -1: the sign of ds/dt).
+    point : pair of numbers, optional
+        The launch place by its coordinates, instead of ``lam0``.
+    t_max : number, optional
+        Horizon of time.
+    contact : {"bilateral", "above", "below"}
+        Which side of the track can push.
+    r0, b, g, m
+        Run-time parameters; `PARAMETERS` holds their defaults.
+
+    Returns
+    -------
+    Motion
+
+    Raises
+    ------
+    GQMError
+        For a launch or a parameter that cannot be; the message says what would be right.
+    """
+    return MODEL.solve(lam0, v0, direction, point, t_max, contact, (r0, b, g, m,))
+
+
+def sweep(
+    quantity: str,
+    lam0: Any,
+    v0: Any = 0.0,
+    direction: Any = 1,
+    *,
+    lam: Any = None,
+    r0: Any = '1', b: Any = '0.15', g: Any = '9.81', m: Any = '1',
+) -> Sweep:
+    """One quantity over arrays of launches and parameters, on all cores; all arguments broadcast.
+
+    Parameters
+    ----------
+    quantity : str
+        "half_period", "period", "turning_points" (the lower, the upper: one more axis), "v_min", "v_max",
+        "normal_force_min", "normal_force_max" or "time_at".
+    lam0, v0, direction
+        Launch places, speeds and directions.
+    lam
+        For "time_at": the place, of which the first time there is asked.
+    r0, b, g, m
+        Run-time parameters; `PARAMETERS` holds their defaults.
+
+    Returns
+    -------
+    Sweep
+        ``values``, NaN where there is none, and ``reasons``, 0 where there is one; ``why()`` counts the others.
+    """
+    return MODEL.sweep(quantity, lam0, v0, direction, lam, (r0, b, g, m,))

@@ -1,0 +1,246 @@
+# Made by gqm-gen for "loop". Do not edit: change its declaration and generate again.
+# interface 2, input ef6cb5936f16, body c6f05e5f03ca
+"""Loop of a roller coaster
+
+x              = x(s)
+z              = z(s)
+ds/ds          = 1
+dx/ds          = cos(alpha(s))
+dz/ds          = sin(alpha(s))
+kappa          = kappa(s)
+Theta          = -alpha(lam0) + alpha(s)
+V**2           = 2*g*(z(lam0) - z(s)) + v0**2
+N              = m*(g*cos(alpha(s)) + (2*g*(z(lam0) - z(s)) + v0**2)*kappa(s))
+A              = -g*sin(alpha(s))
+dt/ds          = 1/sqrt(2*g*(z(lam0) - z(s)) + v0**2)
+turning points : 2*g*(z(lam0) - z(s)) + v0**2 = 0
+liftoff        : g*cos(alpha(s)) + (2*g*(z(lam0) - z(s)) + v0**2)*kappa(s) = 0
+"""
+
+from math import cos, sin
+from typing import Any
+
+from numba import carray
+
+from gqm_sym.runtime import compiler
+
+# Before anything else is asked of the runtime, so that another version of it is told from a broken one.
+compiled = compiler(__file__, interface=2)
+
+from gqm_sym.runtime import (
+    BEND,
+    BOUNDS,
+    CLIMB,
+    FRAME,
+    RISE,
+    Addresses,
+    Formulas,
+    Motion,
+    Pass1,
+    Rail,
+    Sweep,
+)
+from gqm_sym.runtime.chart_functions import (
+    chart_alpha,
+    chart_kappa,
+    chart_of,
+    chart_x,
+    chart_z,
+    chart_z1,
+    chart_z2,
+    ichart_alpha,
+)
+from gqm_sym.runtime.intervals import iconst, imul, isin
+from gqm_sym.runtime.places import nearest
+
+PARAMETERS = {
+    'a': '2',
+    'c': '2',
+    'R': '1.5',
+    'g': '9.81',
+    'm': '1',
+}
+
+
+@compiled(FRAME)
+def frame(n, places, speeds, p, out):
+    """x, z, ds/ds, signed curvature and contact force, given V**2 (paper, eq. 15)."""
+    chart = chart_of(p, 5)
+    places, speeds, p, out = carray(places, n), carray(speeds, n), carray(p, 5), carray(out, (5, n))
+    g, m = p[3], p[4]
+    for i in range(n):
+        s = places[i]
+        v2 = speeds[i]
+        _t0 = chart_kappa(chart, s)
+        out[0, i] = chart_x(chart, s)
+        out[1, i] = chart_z(chart, s)
+        out[2, i] = 1
+        out[3, i] = _t0
+        out[4, i] = m*(_t0*v2 + g*cos(chart_alpha(chart, s)))
+
+
+@compiled(CLIMB)
+def climb(n, places, p, out):
+    """What V**2 loses in climbing to s, up to a constant, and its derivative (paper, eq. 13)."""
+    chart = chart_of(p, 5)
+    places, p, out = carray(places, n), carray(p, 5), carray(out, (2, n))
+    g = p[3]
+    _t0 = 2*g
+    for i in range(n):
+        s = places[i]
+        out[0, i] = _t0*chart_z(chart, s)
+        out[1, i] = _t0*sin(chart_alpha(chart, s))
+
+
+@compiled(RISE)
+def rise(n, _a, places, offsets, p, out):
+    """climb[a, s] = (climb(s) - climb(a))/(s - a) without cancellation, and ds/ds."""
+    chart = chart_of(p, 5)
+    places, offsets, p, out = carray(places, n), carray(offsets, n), carray(p, 5), carray(out, (2, n))
+    g = p[3]
+    for i in range(n):
+        s = places[i]
+        d = offsets[i]
+        out[0, i] = 2*g*chart_z1(chart, _a, s, d)
+        out[1, i] = 1
+
+
+@compiled(BEND)
+def bend(n, _a, b, left, right, p, out):
+    """climb[a, s, b] = V**2/((s - a)*(b - s)) between turning points, without cancellation, and ds/ds."""
+    chart = chart_of(p, 5)
+    left, right, p, out = carray(left, n), carray(right, n), carray(p, 5), carray(out, (2, n))
+    g = p[3]
+    for i in range(n):
+        da = left[i]
+        db = right[i]
+        s = nearest(_a, b, da, db)
+        out[0, i] = 2*g*chart_z2(chart, _a, s, b, da, db)
+        out[1, i] = 1
+
+
+@compiled(BOUNDS)
+def bounds(lo, hi, p, out):
+    """Bounds of the climb's slope and of ds/ds for lo <= s <= hi."""
+    chart = chart_of(p, 5)
+    p, out = carray(p, 5), carray(out, 4)
+    s = (lo, hi)
+    g = (p[3], p[3])
+    out[0], out[1] = imul(imul(iconst(2.0), g), isin(ichart_alpha(chart, s)))
+    out[2], out[3] = iconst(1.0)
+
+
+# The same formulas over a namespace of operations: extended precision evaluates these.
+
+
+def exact_rail(op, p):
+    """Where the rail starts, and what each of its pieces is given by."""
+    a = p[0]
+    c = p[1]
+    R = p[2]
+    _t0 = 1/R
+    return 0, 0, 0, a, c, 0, _t0, R, -_t0*c + 2*op.pi, c, _t0, 0, a
+
+
+CHART = Rail(
+    numbers=exact_rail,
+    placed=True,
+    pieces=('line', 'clothoid', 'arc', 'clothoid', 'line'),
+)
+
+MODEL = Formulas(
+    name='loop',
+    parameter='s',
+    parameters=PARAMETERS,
+    positive=(),
+    addresses=Addresses(frame.address, climb.address, rise.address, bend.address, bounds.address),
+    chart=CHART,
+)
+
+
+def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, a: Any = '2', c: Any = '2', R: Any = '1.5', g: Any = '9.81', m: Any = '1') -> Pass1:
+    """Position, metric, curvature, V**2 and contact force at places of the curve (Pass 1, no quadrature).
+
+    Parameters
+    ----------
+    lam : array_like
+        Places on the curve, as values of its parameter s.
+    lam0, v0, direction
+        Launch place, speed and direction (+1 or -1: the sign of ds/dt).
+    a, c, R, g, m
+        Run-time parameters; `PARAMETERS` holds their defaults.
+
+    Returns
+    -------
+    Pass1
+        Arrays x, z, ds, kappa, v2 and normal_force.
+    """
+    return MODEL.pass1(lam, lam0, v0, direction, (a, c, R, g, m,))
+
+
+def solve(
+    lam0: Any = None,
+    v0: Any = 0.0,
+    direction: int = 1,
+    *,
+    point: Any = None,
+    t_max: Any = None,
+    contact: str = "bilateral",
+    a: Any = '2', c: Any = '2', R: Any = '1.5', g: Any = '9.81', m: Any = '1',
+) -> Motion:
+    """The motion that a launch begins (Passes 1 to 3).
+
+    Parameters
+    ----------
+    lam0, v0, direction
+        Launch place, speed (never negative) and direction (+1 or -1: the sign of ds/dt).
+    point : pair of numbers, optional
+        The launch place by its coordinates, instead of ``lam0``.
+    t_max : number, optional
+        Horizon of time.
+    contact : {"bilateral", "above", "below"}
+        Which side of the track can push.
+    a, c, R, g, m
+        Run-time parameters; `PARAMETERS` holds their defaults.
+
+    Returns
+    -------
+    Motion
+
+    Raises
+    ------
+    GQMError
+        For a launch or a parameter that cannot be; the message says what would be right.
+    """
+    return MODEL.solve(lam0, v0, direction, point, t_max, contact, (a, c, R, g, m,))
+
+
+def sweep(
+    quantity: str,
+    lam0: Any,
+    v0: Any = 0.0,
+    direction: Any = 1,
+    *,
+    lam: Any = None,
+    a: Any = '2', c: Any = '2', R: Any = '1.5', g: Any = '9.81', m: Any = '1',
+) -> Sweep:
+    """One quantity over arrays of launches and parameters, on all cores; all arguments broadcast.
+
+    Parameters
+    ----------
+    quantity : str
+        "half_period", "period", "turning_points" (the lower, the upper: one more axis), "v_min", "v_max",
+        "normal_force_min", "normal_force_max" or "time_at".
+    lam0, v0, direction
+        Launch places, speeds and directions.
+    lam
+        For "time_at": the place, of which the first time there is asked.
+    a, c, R, g, m
+        Run-time parameters; `PARAMETERS` holds their defaults.
+
+    Returns
+    -------
+    Sweep
+        ``values``, NaN where there is none, and ``reasons``, 0 where there is one; ``why()`` counts the others.
+    """
+    return MODEL.sweep(quantity, lam0, v0, direction, lam, (a, c, R, g, m,))

@@ -1,0 +1,214 @@
+# Made by gqm-gen for "parabola_droplet". Do not edit: change its declaration and generate again.
+# interface 2, input fcd43efdbae3, body d0bb6024a167
+"""Droplet in a parabolic channel
+
+x              = x
+z              = a*x**2
+ds/dx          = sqrt(4*a**2*x**2 + 1)
+dx/ds          = 1/sqrt(4*a**2*x**2 + 1)
+dz/ds          = 2*a*x/sqrt(4*a**2*x**2 + 1)
+kappa          = 2*a/(4*a**2*x**2 + 1)**(3/2)
+Theta          = -atan(2*a*lam0) + atan(2*a*x)
+W = V**2       = 2*a*g*lam0**2 - 2*a*g*x**2 + v0**2 + 2*direction*ell_c**2*gamma*Abs(a)*atan(2*a*lam0)/(a*m) - 2*direction*ell_c**2*gamma*Abs(a)*atan(2*a*x)/(a*m)
+N              = m*(2*W*a/(4*a**2*x**2 + 1)**(3/2) + g/sqrt(4*a**2*x**2 + 1))
+A              = -2*a*g*x/sqrt(4*a**2*x**2 + 1) - 2*direction*ell_c**2*gamma*Abs(a)/(m*(4*a**2*x**2 + 1)**(3/2))
+dt/dx          = sqrt(4*a**2*x**2 + 1)/sqrt(W)
+turning points : W = 0
+liftoff        : 2*W*a/(4*a**2*x**2 + 1)**(3/2) + g/sqrt(4*a**2*x**2 + 1) = 0
+
+V**2: closed form; direction is the sign of ds/dt
+"""
+
+from math import fabs, sqrt
+from typing import Any
+
+from numba import carray
+
+from gqm_sym.runtime import compiler
+
+# Before anything else is asked of the runtime, so that another version of it is told from a broken one.
+compiled = compiler(__file__, interface=2)
+
+from gqm_sym.runtime import (
+    DRIVE,
+    FRAME,
+    HOLD,
+    Addresses,
+    Dissipation,
+    Formulas,
+    Motion,
+    Pass1,
+    Sweep,
+)
+
+PARAMETERS = {
+    'a': '0.5',
+    'gamma': '0.5',
+    'ell_c': '1',
+    'g': '9.81',
+    'm': '1',
+}
+
+
+@compiled(FRAME)
+def frame(n, places, speeds, p, out):
+    """x, z, ds/dx, signed curvature and contact force, given V**2 (paper, eq. 15)."""
+    places, speeds, p, out = carray(places, n), carray(speeds, n), carray(p, 5), carray(out, (5, n))
+    a, g, m = p[0], p[3], p[4]
+    for i in range(n):
+        x = places[i]
+        v2 = speeds[i]
+        _t0 = x**2
+        _t1 = 4*_t0*a**2 + 1
+        _t2 = sqrt(_t1)
+        _t3 = 2*a/sqrt(_t1)**3
+        out[0, i] = x
+        out[1, i] = _t0*a
+        out[2, i] = _t2
+        out[3, i] = _t3
+        out[4, i] = m*(_t3*v2 + g/_t2)
+
+
+@compiled(DRIVE)
+def drive(n, places, speeds, v, nu, p, out):
+    """ds/dx, P, Q, n0 and kappa: dV**2/dx = P - Q*V**2, N/m = kappa*V**2 + n0; v = sgn(ds/dt), nu = sgn(N)."""
+    places, p, out = carray(places, n), carray(p, 5), carray(out, (5, n))
+    a, gamma, ell_c, g, m = p[0], p[1], p[2], p[3], p[4]
+    _t2 = 2*a
+    for i in range(n):
+        x = places[i]
+        _t0 = 4*a**2*x**2 + 1
+        ds = sqrt(_t0)
+        _t3 = g/ds
+        kappa = _t2/sqrt(_t0)**3
+        turn = _t2/_t0
+        push = -_t2*_t3*x
+        n0 = _t3
+        out[0, i] = ds
+        out[1, i] = 2*ds*push - 2*ell_c**2*gamma*v*fabs(turn)/m
+        out[2, i] = 0
+        out[3, i] = n0
+        out[4, i] = kappa
+
+
+@compiled(HOLD)
+def hold(n, places, p, out):
+    """Acceleration from rest forwards, and backwards: a body rests where the first is <= 0 and the second >= 0."""
+    places, p, out = carray(places, n), carray(p, 5), carray(out, (2, n))
+    a, gamma, ell_c, g, m = p[0], p[1], p[2], p[3], p[4]
+    _t1 = 2*a
+    for i in range(n):
+        x = places[i]
+        _t0 = 4*a**2*x**2 + 1
+        kappa = _t1/sqrt(_t0)**3
+        push = -_t1*g*x/sqrt(_t0)
+        out[0, i] = -ell_c**2*gamma*fabs(kappa)/m + push
+        out[1, i] = ell_c**2*gamma*fabs(kappa)/m + push
+
+
+# The same formulas over a namespace of operations: extended precision evaluates these.
+
+
+def exact_domain(op, p):
+    """Both ends of the domain, and the period; None where there is none."""
+    return None, None, None
+
+
+MODEL = Formulas(
+    name='parabola_droplet',
+    parameter='x',
+    parameters=PARAMETERS,
+    positive=(),
+    at_least=(('gamma', '0'), ('ell_c', '0')),
+    addresses=Addresses(frame.address),
+    domain_of=exact_domain,
+    dissipation=Dissipation(drive.address, hold.address, friction=False, kinked=True, linear=True),
+)
+
+
+def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, a: Any = '0.5', gamma: Any = '0.5', ell_c: Any = '1', g: Any = '9.81', m: Any = '1') -> Pass1:
+    """Position, metric, curvature, V**2 and contact force at places of the curve (Pass 1, no quadrature).
+
+    Parameters
+    ----------
+    lam : array_like
+        Places on the curve, as values of its parameter x.
+    lam0, v0, direction
+        Launch place, speed and direction (+1 or -1: the sign of ds/dt).
+    a, gamma, ell_c, g, m
+        Run-time parameters; `PARAMETERS` holds their defaults.
+
+    Returns
+    -------
+    Pass1
+        Arrays x, z, ds, kappa, v2 and normal_force.
+    """
+    return MODEL.pass1(lam, lam0, v0, direction, (a, gamma, ell_c, g, m,))
+
+
+def solve(
+    lam0: Any = None,
+    v0: Any = 0.0,
+    direction: int = 1,
+    *,
+    point: Any = None,
+    t_max: Any = None,
+    contact: str = "bilateral",
+    a: Any = '0.5', gamma: Any = '0.5', ell_c: Any = '1', g: Any = '9.81', m: Any = '1',
+) -> Motion:
+    """The motion that a launch begins (Passes 1 to 3).
+
+    Parameters
+    ----------
+    lam0, v0, direction
+        Launch place, speed (never negative) and direction (+1 or -1: the sign of ds/dt).
+    point : pair of numbers, optional
+        The launch place by its coordinates, instead of ``lam0``.
+    t_max : number, optional
+        Horizon of time.
+    contact : {"bilateral", "above", "below"}
+        Which side of the track can push.
+    a, gamma, ell_c, g, m
+        Run-time parameters; `PARAMETERS` holds their defaults.
+
+    Returns
+    -------
+    Motion
+
+    Raises
+    ------
+    GQMError
+        For a launch or a parameter that cannot be; the message says what would be right.
+    """
+    return MODEL.solve(lam0, v0, direction, point, t_max, contact, (a, gamma, ell_c, g, m,))
+
+
+def sweep(
+    quantity: str,
+    lam0: Any,
+    v0: Any = 0.0,
+    direction: Any = 1,
+    *,
+    lam: Any = None,
+    a: Any = '0.5', gamma: Any = '0.5', ell_c: Any = '1', g: Any = '9.81', m: Any = '1',
+) -> Sweep:
+    """One quantity over arrays of launches and parameters, on all cores; all arguments broadcast.
+
+    Parameters
+    ----------
+    quantity : str
+        "half_period", "period", "turning_points" (the lower, the upper: one more axis), "v_min", "v_max",
+        "normal_force_min", "normal_force_max" or "time_at".
+    lam0, v0, direction
+        Launch places, speeds and directions.
+    lam
+        For "time_at": the place, of which the first time there is asked.
+    a, gamma, ell_c, g, m
+        Run-time parameters; `PARAMETERS` holds their defaults.
+
+    Returns
+    -------
+    Sweep
+        ``values``, NaN where there is none, and ``reasons``, 0 where there is one; ``why()`` counts the others.
+    """
+    return MODEL.sweep(quantity, lam0, v0, direction, lam, (a, gamma, ell_c, g, m,))

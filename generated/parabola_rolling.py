@@ -1,0 +1,316 @@
+# Made by gqm-gen for "parabola_rolling". Do not edit: change its declaration and generate again.
+# interface 2, input 821845b71c06, body 029866327913
+"""Ball rolling in a parabolic bowl
+
+x              = x*(-2*a*rho/sqrt(4*a**2*x**2 + 1) + 1)
+z              = a*x**2 + rho/sqrt(4*a**2*x**2 + 1)
+ds/dx          = (-2*a*rho + (4*a**2*x**2 + 1)**(3/2))/(4*a**2*x**2 + 1)
+dx/ds          = 1/sqrt(4*a**2*x**2 + 1)
+dz/ds          = 2*a*x/sqrt(4*a**2*x**2 + 1)
+kappa          = 2*a/(-2*a*rho + (4*a**2*x**2 + 1)**(3/2))
+Theta          = -atan(2*a*lam0) + atan(2*a*x)
+V**2           = 2*g*(a*lam0**2 - a*x**2 - rho/sqrt(4*a**2*x**2 + 1) + rho/sqrt(4*a**2*lam0**2 + 1))/(beta + 1) + v0**2
+N              = m*(2*a*(2*g*(a*lam0**2 - a*x**2 - rho/sqrt(4*a**2*x**2 + 1) + rho/sqrt(4*a**2*lam0**2 + 1))/(beta + 1) + v0**2)/(-2*a*rho + (4*a**2*x**2 + 1)**(3/2)) + g/sqrt(4*a**2*x**2 + 1))
+A              = -2*a*g*x/((beta + 1)*sqrt(4*a**2*x**2 + 1))
+dt/dx          = (-2*a*rho + (4*a**2*x**2 + 1)**(3/2))/((4*a**2*x**2 + 1)*sqrt(2*g*(a*lam0**2 - a*x**2 - rho/sqrt(4*a**2*x**2 + 1) + rho/sqrt(4*a**2*lam0**2 + 1))/(beta + 1) + v0**2))
+turning points : 2*g*(a*lam0**2 - a*x**2 - rho/sqrt(4*a**2*x**2 + 1) + rho/sqrt(4*a**2*lam0**2 + 1))/(beta + 1) + v0**2 = 0
+liftoff        : 2*a*(2*g*(a*lam0**2 - a*x**2 - rho/sqrt(4*a**2*x**2 + 1) + rho/sqrt(4*a**2*lam0**2 + 1))/(beta + 1) + v0**2)/(-2*a*rho + (4*a**2*x**2 + 1)**(3/2)) + g/sqrt(4*a**2*x**2 + 1) = 0
+"""
+
+from math import sqrt
+from typing import Any
+
+from numba import carray
+
+from gqm_sym.runtime import compiler
+
+# Before anything else is asked of the runtime, so that another version of it is told from a broken one.
+compiled = compiler(__file__, interface=2)
+
+from gqm_sym.runtime import (
+    BEND,
+    BOUNDS,
+    CLIMB,
+    FRAME,
+    RISE,
+    Addresses,
+    ExactFormulas,
+    Formulas,
+    Motion,
+    Pass1,
+    Sweep,
+)
+from gqm_sym.runtime.intervals import iadd, iconst, idiv, imul, ipow, isqrt
+from gqm_sym.runtime.places import nearest
+
+PARAMETERS = {
+    'a': '0.6',
+    'beta': '2/5',
+    'rho': '0.25',
+    'g': '9.81',
+    'm': '1',
+}
+
+
+@compiled(FRAME)
+def frame(n, places, speeds, p, out):
+    """x, z, ds/dx, signed curvature and contact force, given V**2 (paper, eq. 15)."""
+    places, speeds, p, out = carray(places, n), carray(speeds, n), carray(p, 5), carray(out, (5, n))
+    a, rho, g, m = p[0], p[2], p[3], p[4]
+    _t4 = 2*a
+    for i in range(n):
+        x = places[i]
+        v2 = speeds[i]
+        _t0 = x**2
+        _t1 = 4*_t0*a**2 + 1
+        _t2 = 1/sqrt(_t1)
+        _t3 = _t2*rho
+        _t5 = -_t4*rho + sqrt(_t1)**3
+        _t6 = _t4/_t5
+        out[0, i] = x*(-_t3*_t4 + 1)
+        out[1, i] = _t0*a + _t3
+        out[2, i] = _t5/_t1
+        out[3, i] = _t6
+        out[4, i] = m*(_t2*g + _t6*v2)
+
+
+@compiled(CLIMB)
+def climb(n, places, p, out):
+    """What V**2 loses in climbing to x, up to a constant, and its derivative (paper, eq. 13)."""
+    places, p, out = carray(places, n), carray(p, 5), carray(out, (2, n))
+    a, beta, rho, g = p[0], p[1], p[2], p[3]
+    _t2 = g/(beta + 1)
+    for i in range(n):
+        x = places[i]
+        _t0 = x**2
+        _t1 = 4*_t0*a**2 + 1
+        _t3 = sqrt(_t1)**3
+        out[0, i] = 2*_t2*(_t0*a + rho/sqrt(_t1))
+        out[1, i] = 4*_t2*a*x*(_t3 - 2*a*rho)/_t3
+
+
+@compiled(RISE)
+def rise(n, _a, places, offsets, p, out):
+    """climb[a, x] = (climb(x) - climb(a))/(x - a) without cancellation, and ds/dx."""
+    places, offsets, p, out = carray(places, n), carray(offsets, n), carray(p, 5), carray(out, (2, n))
+    a, beta, rho, g = p[0], p[1], p[2], p[3]
+    _t0 = 4*a**2
+    _t1 = sqrt(_a**2*_t0 + 1)
+    _c0 = 1/_t1
+    _c1 = _t1
+    for i in range(n):
+        x = places[i]
+        _t2 = _a + x
+        _t3 = _t0*x**2 + 1
+        _t4 = sqrt(_t3)
+        out[0, i] = 2*g*(-_c0*_t0*_t2*rho/(_t4*(_c1 + _t4)) + _t2*a)/(beta + 1)
+        out[1, i] = (-2*a*rho + sqrt(_t3)**3)/_t3
+
+
+@compiled(BEND)
+def bend(n, _a, b, left, right, p, out):
+    """climb[a, x, b] = V**2/((x - a)*(b - x)) between turning points, without cancellation, and ds/dx."""
+    left, right, p, out = carray(left, n), carray(right, n), carray(p, 5), carray(out, (2, n))
+    a, beta, rho, g = p[0], p[1], p[2], p[3]
+    _t0 = a**2
+    _t1 = 4*_t0
+    _t2 = sqrt(_a**2*_t1 + 1)
+    _t3 = sqrt(_t1*b**2 + 1)
+    _c0 = 1/_t2
+    _c1 = _t2
+    _c2 = 1/_t3
+    _c3 = _t3
+    for i in range(n):
+        da = left[i]
+        db = right[i]
+        x = nearest(_a, b, da, db)
+        _t4 = _t1*x**2 + 1
+        _t5 = sqrt(_t4)
+        _t6 = _c2/_t5
+        _t7 = 16*a**4*(_a + b)*(_a + x)/((_c1 + _c3)*(_c1 + _t5))
+        _t8 = 1/(_c3 + _t5)
+        out[0, i] = 2*g*(a + rho*(_c0*_t6*_t7 - _t6*(4*_t0*_t8 - _t7*_t8)))/(beta + 1)
+        out[1, i] = (-2*a*rho + sqrt(_t4)**3)/_t4
+
+
+@compiled(BOUNDS)
+def bounds(lo, hi, p, out):
+    """Bounds of the climb's slope and of ds/dx for lo <= x <= hi."""
+    p, out = carray(p, 5), carray(out, 4)
+    x = (lo, hi)
+    a = (p[0], p[0])
+    beta = (p[1], p[1])
+    rho = (p[2], p[2])
+    g = (p[3], p[3])
+    _t0 = iadd(imul(imul(iconst(4.0), ipow(a, 2)), ipow(x, 2)), iconst(1.0))
+    _t1 = ipow(isqrt(_t0), 3)
+    _t2 = iadd(_t1, imul(imul(imul(iconst(-1.0), iconst(2.0)), a), rho))
+    out[0], out[1] = imul(imul(imul(imul(imul(imul(iconst(4.0), idiv(iconst(1.0), _t1)), _t2), a), g), x), idiv(iconst(1.0), iadd(beta, iconst(1.0))))
+    out[2], out[3] = imul(idiv(iconst(1.0), _t0), _t2)
+
+
+# The same formulas over a namespace of operations: extended precision evaluates these.
+
+
+def exact_x(op, x, p):
+    """Horizontal coordinate."""
+    a = p[0]
+    rho = p[2]
+    return x*(-2*a*rho/op.sqrt(4*a**2*x**2 + 1) + 1)
+
+
+def exact_z(op, x, p):
+    """Height."""
+    a = p[0]
+    rho = p[2]
+    _t0 = x**2
+    return _t0*a + rho/op.sqrt(4*_t0*a**2 + 1)
+
+
+def exact_ds(op, x, p):
+    """ds/dx."""
+    a = p[0]
+    rho = p[2]
+    _t0 = 4*a**2*x**2 + 1
+    return (_t0**(op.mpf(3)/2) - 2*a*rho)/_t0
+
+
+def exact_kappa(op, x, p):
+    """Signed curvature."""
+    a = p[0]
+    rho = p[2]
+    _t0 = 2*a
+    return _t0/(-_t0*rho + (4*a**2*x**2 + 1)**(op.mpf(3)/2))
+
+
+def exact_reaction(op, x, p):
+    """Contact force per unit mass of a body at rest."""
+    a = p[0]
+    g = p[3]
+    return g/op.sqrt(4*a**2*x**2 + 1)
+
+
+def exact_climb(op, x, p):
+    """What V**2 loses in climbing, up to a constant."""
+    a = p[0]
+    beta = p[1]
+    rho = p[2]
+    g = p[3]
+    _t0 = x**2
+    return 2*g*(_t0*a + rho/op.sqrt(4*_t0*a**2 + 1))/(beta + 1)
+
+
+def exact_climb_slope(op, x, p):
+    """Its derivative by x."""
+    a = p[0]
+    beta = p[1]
+    rho = p[2]
+    g = p[3]
+    _t0 = (4*a**2*x**2 + 1)**(op.mpf(3)/2)
+    return 4*a*g*x*(_t0 - 2*a*rho)/(_t0*(beta + 1))
+
+
+def exact_domain(op, p):
+    """Both ends of the domain, and the period; None where there is none."""
+    return None, None, None
+
+
+MODEL = Formulas(
+    name='parabola_rolling',
+    parameter='x',
+    parameters=PARAMETERS,
+    positive=(),
+    at_least=(('beta', '0'),),
+    body='rho',
+    addresses=Addresses(frame.address, climb.address, rise.address, bend.address, bounds.address),
+    domain_of=exact_domain,
+    exact=ExactFormulas(exact_x, exact_z, exact_ds, exact_kappa, exact_reaction, exact_climb, exact_climb_slope),
+)
+
+
+def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, a: Any = '0.6', beta: Any = '2/5', rho: Any = '0.25', g: Any = '9.81', m: Any = '1') -> Pass1:
+    """Position, metric, curvature, V**2 and contact force at places of the curve (Pass 1, no quadrature).
+
+    Parameters
+    ----------
+    lam : array_like
+        Places on the curve, as values of its parameter x.
+    lam0, v0, direction
+        Launch place, speed and direction (+1 or -1: the sign of ds/dt).
+    a, beta, rho, g, m
+        Run-time parameters; `PARAMETERS` holds their defaults.
+
+    Returns
+    -------
+    Pass1
+        Arrays x, z, ds, kappa, v2 and normal_force.
+    """
+    return MODEL.pass1(lam, lam0, v0, direction, (a, beta, rho, g, m,))
+
+
+def solve(
+    lam0: Any = None,
+    v0: Any = 0.0,
+    direction: int = 1,
+    *,
+    point: Any = None,
+    t_max: Any = None,
+    contact: str = "bilateral",
+    a: Any = '0.6', beta: Any = '2/5', rho: Any = '0.25', g: Any = '9.81', m: Any = '1',
+) -> Motion:
+    """The motion that a launch begins (Passes 1 to 3).
+
+    Parameters
+    ----------
+    lam0, v0, direction
+        Launch place, speed (never negative) and direction (+1 or -1: the sign of ds/dt).
+    point : pair of numbers, optional
+        The launch place by its coordinates, instead of ``lam0``.
+    t_max : number, optional
+        Horizon of time.
+    contact : {"bilateral", "above", "below"}
+        Which side of the track can push.
+    a, beta, rho, g, m
+        Run-time parameters; `PARAMETERS` holds their defaults.
+
+    Returns
+    -------
+    Motion
+
+    Raises
+    ------
+    GQMError
+        For a launch or a parameter that cannot be; the message says what would be right.
+    """
+    return MODEL.solve(lam0, v0, direction, point, t_max, contact, (a, beta, rho, g, m,))
+
+
+def sweep(
+    quantity: str,
+    lam0: Any,
+    v0: Any = 0.0,
+    direction: Any = 1,
+    *,
+    lam: Any = None,
+    a: Any = '0.6', beta: Any = '2/5', rho: Any = '0.25', g: Any = '9.81', m: Any = '1',
+) -> Sweep:
+    """One quantity over arrays of launches and parameters, on all cores; all arguments broadcast.
+
+    Parameters
+    ----------
+    quantity : str
+        "half_period", "period", "turning_points" (the lower, the upper: one more axis), "v_min", "v_max",
+        "normal_force_min", "normal_force_max" or "time_at".
+    lam0, v0, direction
+        Launch places, speeds and directions.
+    lam
+        For "time_at": the place, of which the first time there is asked.
+    a, beta, rho, g, m
+        Run-time parameters; `PARAMETERS` holds their defaults.
+
+    Returns
+    -------
+    Sweep
+        ``values``, NaN where there is none, and ``reasons``, 0 where there is one; ``why()`` counts the others.
+    """
+    return MODEL.sweep(quantity, lam0, v0, direction, lam, (a, beta, rho, g, m,))

@@ -1,0 +1,291 @@
+# Made by gqm-gen for "planes". Do not edit: change its declaration and generate again.
+# interface 2, input 6aa424d89567, body 80c9a1c2a765
+"""Stitched planes through surveyed points
+
+x              = x(s)
+z              = z(s)
+ds/ds          = 1
+dx/ds          = cos(alpha(s))
+dz/ds          = sin(alpha(s))
+kappa          = kappa(s)
+Theta          = -alpha(lam0) + alpha(s)
+V**2           = 2*g*(z(lam0) - z(s)) + v0**2
+N              = m*(g*cos(alpha(s)) + (2*g*(z(lam0) - z(s)) + v0**2)*kappa(s))
+A              = -g*sin(alpha(s))
+dt/ds          = 1/sqrt(2*g*(z(lam0) - z(s)) + v0**2)
+turning points : 2*g*(z(lam0) - z(s)) + v0**2 = 0
+liftoff        : g*cos(alpha(s)) + (2*g*(z(lam0) - z(s)) + v0**2)*kappa(s) = 0
+"""
+
+from math import cos, sin
+from typing import Any
+
+from numba import carray
+
+from gqm_sym.runtime import compiler
+
+# Before anything else is asked of the runtime, so that another version of it is told from a broken one.
+compiled = compiler(__file__, interface=2)
+
+from gqm_sym.runtime import (
+    BEND,
+    BOUNDS,
+    CLIMB,
+    FRAME,
+    RISE,
+    Addresses,
+    Formulas,
+    Motion,
+    Pass1,
+    Sampled,
+    Sweep,
+)
+from gqm_sym.runtime.chart_functions import (
+    chart_alpha,
+    chart_kappa,
+    chart_of,
+    chart_x,
+    chart_z,
+    chart_z1,
+    chart_z2,
+    ichart_alpha,
+)
+from gqm_sym.runtime.intervals import iconst, imul, isin
+from gqm_sym.runtime.places import nearest
+
+PARAMETERS = {
+    'g': '9.81',
+    'm': '1',
+}
+
+POINTS = """
+0.0 14.0000
+0.5 13.3813
+1.0 12.2950
+1.5 10.8719
+2.0 9.2645
+2.5 7.6312
+3.0 6.1201
+3.5 4.8562
+4.0 3.9310
+4.5 3.3963
+5.0 3.2628
+5.5 3.5017
+6.0 4.0511
+6.5 4.8238
+7.0 5.7180
+7.5 6.6279
+8.0 7.4537
+8.5 8.1110
+9.0 8.5371
+9.5 8.6957
+10.0 8.5777
+10.5 8.2002
+11.0 7.6029
+11.5 6.8424
+12.0 5.9856
+12.5 5.1027
+13.0 4.2604
+13.5 3.5158
+14.0 2.9120
+14.5 2.4752
+15.0 2.2138
+15.5 2.1189
+16.0 2.1670
+16.5 2.3229
+17.0 2.5448
+17.5 2.7886
+18.0 3.0120
+18.5 3.1790
+19.0 3.2628
+19.5 3.2475
+20.0 3.1288
+20.5 2.9138
+21.0 2.6194
+21.5 2.2699
+22.0 1.8941
+22.5 1.5225
+23.0 1.1841
+23.5 0.9039
+24.0 0.7009
+24.5 0.5864
+25.0 0.5642
+25.5 0.6301
+26.0 0.7733
+26.5 0.9780
+27.0 1.2248
+27.5 1.4930
+28.0 1.7626
+28.5 2.0160
+29.0 2.2392
+29.5 2.4231
+30.0 2.5635
+"""
+
+
+@compiled(FRAME)
+def frame(n, places, speeds, p, out):
+    """x, z, ds/ds, signed curvature and contact force, given V**2 (paper, eq. 15)."""
+    chart = chart_of(p, 2)
+    places, speeds, p, out = carray(places, n), carray(speeds, n), carray(p, 2), carray(out, (5, n))
+    g, m = p[0], p[1]
+    for i in range(n):
+        s = places[i]
+        v2 = speeds[i]
+        _t0 = chart_kappa(chart, s)
+        out[0, i] = chart_x(chart, s)
+        out[1, i] = chart_z(chart, s)
+        out[2, i] = 1
+        out[3, i] = _t0
+        out[4, i] = m*(_t0*v2 + g*cos(chart_alpha(chart, s)))
+
+
+@compiled(CLIMB)
+def climb(n, places, p, out):
+    """What V**2 loses in climbing to s, up to a constant, and its derivative (paper, eq. 13)."""
+    chart = chart_of(p, 2)
+    places, p, out = carray(places, n), carray(p, 2), carray(out, (2, n))
+    g = p[0]
+    _t0 = 2*g
+    for i in range(n):
+        s = places[i]
+        out[0, i] = _t0*chart_z(chart, s)
+        out[1, i] = _t0*sin(chart_alpha(chart, s))
+
+
+@compiled(RISE)
+def rise(n, a, places, offsets, p, out):
+    """climb[a, s] = (climb(s) - climb(a))/(s - a) without cancellation, and ds/ds."""
+    chart = chart_of(p, 2)
+    places, offsets, p, out = carray(places, n), carray(offsets, n), carray(p, 2), carray(out, (2, n))
+    g = p[0]
+    for i in range(n):
+        s = places[i]
+        d = offsets[i]
+        out[0, i] = 2*g*chart_z1(chart, a, s, d)
+        out[1, i] = 1
+
+
+@compiled(BEND)
+def bend(n, a, b, left, right, p, out):
+    """climb[a, s, b] = V**2/((s - a)*(b - s)) between turning points, without cancellation, and ds/ds."""
+    chart = chart_of(p, 2)
+    left, right, p, out = carray(left, n), carray(right, n), carray(p, 2), carray(out, (2, n))
+    g = p[0]
+    for i in range(n):
+        da = left[i]
+        db = right[i]
+        s = nearest(a, b, da, db)
+        out[0, i] = 2*g*chart_z2(chart, a, s, b, da, db)
+        out[1, i] = 1
+
+
+@compiled(BOUNDS)
+def bounds(lo, hi, p, out):
+    """Bounds of the climb's slope and of ds/ds for lo <= s <= hi."""
+    chart = chart_of(p, 2)
+    p, out = carray(p, 2), carray(out, 4)
+    s = (lo, hi)
+    g = (p[0], p[0])
+    out[0], out[1] = imul(imul(iconst(2.0), g), isin(ichart_alpha(chart, s)))
+    out[2], out[3] = iconst(1.0)
+
+
+CHART = Sampled(POINTS, kind='linear', closed=False)
+
+MODEL = Formulas(
+    name='planes',
+    parameter='s',
+    parameters=PARAMETERS,
+    positive=(),
+    addresses=Addresses(frame.address, climb.address, rise.address, bend.address, bounds.address),
+    chart=CHART,
+)
+
+
+def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, g: Any = '9.81', m: Any = '1') -> Pass1:
+    """Position, metric, curvature, V**2 and contact force at places of the curve (Pass 1, no quadrature).
+
+    Parameters
+    ----------
+    lam : array_like
+        Places on the curve, as values of its parameter s.
+    lam0, v0, direction
+        Launch place, speed and direction (+1 or -1: the sign of ds/dt).
+    g, m
+        Run-time parameters; `PARAMETERS` holds their defaults.
+
+    Returns
+    -------
+    Pass1
+        Arrays x, z, ds, kappa, v2 and normal_force.
+    """
+    return MODEL.pass1(lam, lam0, v0, direction, (g, m,))
+
+
+def solve(
+    lam0: Any = None,
+    v0: Any = 0.0,
+    direction: int = 1,
+    *,
+    point: Any = None,
+    t_max: Any = None,
+    contact: str = "bilateral",
+    g: Any = '9.81', m: Any = '1',
+) -> Motion:
+    """The motion that a launch begins (Passes 1 to 3).
+
+    Parameters
+    ----------
+    lam0, v0, direction
+        Launch place, speed (never negative) and direction (+1 or -1: the sign of ds/dt).
+    point : pair of numbers, optional
+        The launch place by its coordinates, instead of ``lam0``.
+    t_max : number, optional
+        Horizon of time.
+    contact : {"bilateral", "above", "below"}
+        Which side of the track can push.
+    g, m
+        Run-time parameters; `PARAMETERS` holds their defaults.
+
+    Returns
+    -------
+    Motion
+
+    Raises
+    ------
+    GQMError
+        For a launch or a parameter that cannot be; the message says what would be right.
+    """
+    return MODEL.solve(lam0, v0, direction, point, t_max, contact, (g, m,))
+
+
+def sweep(
+    quantity: str,
+    lam0: Any,
+    v0: Any = 0.0,
+    direction: Any = 1,
+    *,
+    lam: Any = None,
+    g: Any = '9.81', m: Any = '1',
+) -> Sweep:
+    """One quantity over arrays of launches and parameters, on all cores; all arguments broadcast.
+
+    Parameters
+    ----------
+    quantity : str
+        "half_period", "period", "turning_points" (the lower, the upper: one more axis), "v_min", "v_max",
+        "normal_force_min", "normal_force_max" or "time_at".
+    lam0, v0, direction
+        Launch places, speeds and directions.
+    lam
+        For "time_at": the place, of which the first time there is asked.
+    g, m
+        Run-time parameters; `PARAMETERS` holds their defaults.
+
+    Returns
+    -------
+    Sweep
+        ``values``, NaN where there is none, and ``reasons``, 0 where there is one; ``why()`` counts the others.
+    """
+    return MODEL.sweep(quantity, lam0, v0, direction, lam, (g, m,))

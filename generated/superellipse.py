@@ -1,0 +1,265 @@
+# Made by gqm-gen for "superellipse". Do not edit: change its declaration and generate again.
+# interface 2, input f556e3e2c1ab, body b434b1d6f2cb
+"""Bead inside a superellipse, flat at its lowest point
+
+F              = -1 + z**4/b**4 + x**4/a**4
+dF/dx          = 4*x**3/a**4
+dF/dz          = 4*z**3/b**4
+d2F/dx2        = 12*x**2/a**4
+d2F/dxdz       = 0
+d2F/dz2        = 12*z**2/b**4
+x              = x(s)
+z              = z(s)
+ds/ds          = 1
+dx/ds          = cos(alpha(s))
+dz/ds          = sin(alpha(s))
+kappa          = kappa(s)
+Theta          = -alpha(lam0) + alpha(s)
+V**2           = 2*g*(z(lam0) - z(s)) + v0**2
+N              = m*(g*cos(alpha(s)) + (2*g*(z(lam0) - z(s)) + v0**2)*kappa(s))
+A              = -g*sin(alpha(s))
+dt/ds          = 1/sqrt(2*g*(z(lam0) - z(s)) + v0**2)
+turning points : 2*g*(z(lam0) - z(s)) + v0**2 = 0
+liftoff        : g*cos(alpha(s)) + (2*g*(z(lam0) - z(s)) + v0**2)*kappa(s) = 0
+
+On F = 0 arc length is 0 at (0, -b) and grows along (-F_z, F_x)/|grad F|; kappa = (F_xx*F_z**2 - 2*F_xz*F_x*F_z + F_zz*F_x**2)/|grad F|**3.
+"""
+
+from math import cos, sin
+from typing import Any
+
+from numba import carray
+
+from gqm_sym.runtime import compiler
+
+# Before anything else is asked of the runtime, so that another version of it is told from a broken one.
+compiled = compiler(__file__, interface=2)
+
+from gqm_sym.runtime import (
+    BEND,
+    BOUNDS,
+    CLIMB,
+    FIELD,
+    FRAME,
+    RISE,
+    Addresses,
+    Formulas,
+    Motion,
+    Pass1,
+    Sweep,
+    Traced,
+)
+from gqm_sym.runtime.chart_functions import (
+    chart_alpha,
+    chart_kappa,
+    chart_of,
+    chart_x,
+    chart_z,
+    chart_z1,
+    chart_z2,
+    ichart_alpha,
+)
+from gqm_sym.runtime.intervals import iconst, imul, isin
+from gqm_sym.runtime.places import nearest
+
+PARAMETERS = {
+    'a': '1.4',
+    'b': '0.9',
+    'g': '9.81',
+    'm': '1',
+}
+
+
+@compiled(FRAME)
+def frame(n, places, speeds, p, out):
+    """x, z, ds/ds, signed curvature and contact force, given V**2 (paper, eq. 15)."""
+    chart = chart_of(p, 4)
+    places, speeds, p, out = carray(places, n), carray(speeds, n), carray(p, 4), carray(out, (5, n))
+    g, m = p[2], p[3]
+    for i in range(n):
+        s = places[i]
+        v2 = speeds[i]
+        _t0 = chart_kappa(chart, s)
+        out[0, i] = chart_x(chart, s)
+        out[1, i] = chart_z(chart, s)
+        out[2, i] = 1
+        out[3, i] = _t0
+        out[4, i] = m*(_t0*v2 + g*cos(chart_alpha(chart, s)))
+
+
+@compiled(CLIMB)
+def climb(n, places, p, out):
+    """What V**2 loses in climbing to s, up to a constant, and its derivative (paper, eq. 13)."""
+    chart = chart_of(p, 4)
+    places, p, out = carray(places, n), carray(p, 4), carray(out, (2, n))
+    g = p[2]
+    _t0 = 2*g
+    for i in range(n):
+        s = places[i]
+        out[0, i] = _t0*chart_z(chart, s)
+        out[1, i] = _t0*sin(chart_alpha(chart, s))
+
+
+@compiled(RISE)
+def rise(n, _a, places, offsets, p, out):
+    """climb[a, s] = (climb(s) - climb(a))/(s - a) without cancellation, and ds/ds."""
+    chart = chart_of(p, 4)
+    places, offsets, p, out = carray(places, n), carray(offsets, n), carray(p, 4), carray(out, (2, n))
+    g = p[2]
+    for i in range(n):
+        s = places[i]
+        d = offsets[i]
+        out[0, i] = 2*g*chart_z1(chart, _a, s, d)
+        out[1, i] = 1
+
+
+@compiled(BEND)
+def bend(n, _a, _b, left, right, p, out):
+    """climb[a, s, b] = V**2/((s - a)*(b - s)) between turning points, without cancellation, and ds/ds."""
+    chart = chart_of(p, 4)
+    left, right, p, out = carray(left, n), carray(right, n), carray(p, 4), carray(out, (2, n))
+    g = p[2]
+    for i in range(n):
+        da = left[i]
+        db = right[i]
+        s = nearest(_a, _b, da, db)
+        out[0, i] = 2*g*chart_z2(chart, _a, s, _b, da, db)
+        out[1, i] = 1
+
+
+@compiled(FIELD)
+def field(n, xs, zs, p, out):
+    """F and its derivatives: F, F_x, F_z, F_xx, F_xz and F_zz (paper, eq. 36)."""
+    xs, zs, p, out = carray(xs, n), carray(zs, n), carray(p, 4), carray(out, (6, n))
+    a, b = p[0], p[1]
+    _t0 = 1/a**4
+    _t1 = 1/b**4
+    for i in range(n):
+        x = xs[i]
+        z = zs[i]
+        out[0, i] = _t0*x**4 + _t1*z**4 - 1
+        out[1, i] = 4*_t0*x**3
+        out[2, i] = 4*_t1*z**3
+        out[3, i] = 12*_t0*x**2
+        out[4, i] = 0
+        out[5, i] = 12*_t1*z**2
+
+
+@compiled(BOUNDS)
+def bounds(lo, hi, p, out):
+    """Bounds of the climb's slope and of ds/ds for lo <= s <= hi."""
+    chart = chart_of(p, 4)
+    p, out = carray(p, 4), carray(out, 4)
+    s = (lo, hi)
+    g = (p[2], p[2])
+    out[0], out[1] = imul(imul(iconst(2.0), g), isin(ichart_alpha(chart, s)))
+    out[2], out[3] = iconst(1.0)
+
+
+# The same formulas over a namespace of operations: extended precision evaluates these.
+
+
+def exact_start(op, p):
+    """Coordinates of the start point."""
+    b = p[1]
+    return 0, -b
+
+
+CHART = Traced(field=field.address, start=exact_start, tangent=1)
+
+MODEL = Formulas(
+    name='superellipse',
+    parameter='s',
+    parameters=PARAMETERS,
+    positive=(),
+    addresses=Addresses(frame.address, climb.address, rise.address, bend.address, bounds.address),
+    chart=CHART,
+)
+
+
+def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, a: Any = '1.4', b: Any = '0.9', g: Any = '9.81', m: Any = '1') -> Pass1:
+    """Position, metric, curvature, V**2 and contact force at places of the curve (Pass 1, no quadrature).
+
+    Parameters
+    ----------
+    lam : array_like
+        Places on the curve, as values of its parameter s.
+    lam0, v0, direction
+        Launch place, speed and direction (+1 or -1: the sign of ds/dt).
+    a, b, g, m
+        Run-time parameters; `PARAMETERS` holds their defaults.
+
+    Returns
+    -------
+    Pass1
+        Arrays x, z, ds, kappa, v2 and normal_force.
+    """
+    return MODEL.pass1(lam, lam0, v0, direction, (a, b, g, m,))
+
+
+def solve(
+    lam0: Any = None,
+    v0: Any = 0.0,
+    direction: int = 1,
+    *,
+    point: Any = None,
+    t_max: Any = None,
+    contact: str = "bilateral",
+    a: Any = '1.4', b: Any = '0.9', g: Any = '9.81', m: Any = '1',
+) -> Motion:
+    """The motion that a launch begins (Passes 1 to 3).
+
+    Parameters
+    ----------
+    lam0, v0, direction
+        Launch place, speed (never negative) and direction (+1 or -1: the sign of ds/dt).
+    point : pair of numbers, optional
+        The launch place by its coordinates, instead of ``lam0``.
+    t_max : number, optional
+        Horizon of time.
+    contact : {"bilateral", "above", "below"}
+        Which side of the track can push.
+    a, b, g, m
+        Run-time parameters; `PARAMETERS` holds their defaults.
+
+    Returns
+    -------
+    Motion
+
+    Raises
+    ------
+    GQMError
+        For a launch or a parameter that cannot be; the message says what would be right.
+    """
+    return MODEL.solve(lam0, v0, direction, point, t_max, contact, (a, b, g, m,))
+
+
+def sweep(
+    quantity: str,
+    lam0: Any,
+    v0: Any = 0.0,
+    direction: Any = 1,
+    *,
+    lam: Any = None,
+    a: Any = '1.4', b: Any = '0.9', g: Any = '9.81', m: Any = '1',
+) -> Sweep:
+    """One quantity over arrays of launches and parameters, on all cores; all arguments broadcast.
+
+    Parameters
+    ----------
+    quantity : str
+        "half_period", "period", "turning_points" (the lower, the upper: one more axis), "v_min", "v_max",
+        "normal_force_min", "normal_force_max" or "time_at".
+    lam0, v0, direction
+        Launch places, speeds and directions.
+    lam
+        For "time_at": the place, of which the first time there is asked.
+    a, b, g, m
+        Run-time parameters; `PARAMETERS` holds their defaults.
+
+    Returns
+    -------
+    Sweep
+        ``values``, NaN where there is none, and ``reasons``, 0 where there is one; ``why()`` counts the others.
+    """
+    return MODEL.sweep(quantity, lam0, v0, direction, lam, (a, b, g, m,))

@@ -1,0 +1,77 @@
+"""Processor time that a stage may take: symbolic work has no bound that could be seen from its input.
+
+Processor time and not that of the clock: a busy machine is no reason to refuse anything. Work in the stage calls
+`spend` often; what it is called from says nothing of budgets, and stages may lie within one another.
+"""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+from dataclasses import dataclass
+from time import thread_time
+
+from gqm_sym.errors import BudgetError
+
+
+@dataclass
+class _Budget:
+    stage: str
+    seconds: float
+    remedy: str
+    end: float
+    around: "_Budget | None"
+
+
+_CURRENT: ContextVar[_Budget | None] = ContextVar("budget", default=None)
+
+
+@contextmanager
+def budget(stage: str, seconds: float, remedy: str) -> Iterator[None]:
+    """Let the block take so many seconds of processor time.
+
+    Parameters
+    ----------
+    stage
+        What it does, as the error should call it: ``derivation``.
+    seconds
+        How long it may take.
+    remedy
+        What to try if that is not enough.
+    """
+    token = _CURRENT.set(_Budget(stage, seconds, remedy, thread_time() + seconds, _CURRENT.get()))
+    try:
+        yield
+    except RecursionError:
+        raise BudgetError(f"{stage}: nested too deeply; {remedy}") from None
+    finally:
+        _CURRENT.reset(token)
+
+
+@contextmanager
+def apart() -> Iterator[None]:
+    """Let the block's time count for no stage around it: what it does is bounded by its size."""
+    around, begin = _CURRENT.get(), thread_time()
+    token = _CURRENT.set(None)
+    try:
+        yield
+    finally:
+        _CURRENT.reset(token)
+        taken = thread_time() - begin
+        while around is not None:
+            around.end += taken
+            around = around.around
+
+
+def spend() -> None:
+    """End the stage if its time, or that of a stage around it, is used up.
+
+    Raises
+    ------
+    BudgetError
+        Which says what stage it was, how long it had, and what to try.
+    """
+    found = _CURRENT.get()
+    while found is not None:
+        if thread_time() > found.end:
+            raise BudgetError(f"{found.stage}: not done after {found.seconds:g} s of processor time; {found.remedy}")
+        found = found.around

@@ -1,0 +1,35 @@
+"""What surface tension does to a droplet that moves along a curve."""
+
+import sympy as sp
+
+from gqm_sym.errors import DeclarationError
+from gqm_sym.kernels.base import KAPPA, MASS, Kernel, parameter
+from gqm_sym.parameters import Given
+
+FORMS = ("resistance", "printed")
+
+
+def SurfaceTension(*, gamma: Given | None = None, ell_c: Given | None = None, form: str = "resistance") -> Kernel:
+    """Return the resistance of a droplet's contact line, in proportion to the curvature.
+
+    Parameters
+    ----------
+    gamma, ell_c
+        Other names for surface tension and contact length, or values.
+    form
+        ``resistance``: ``gamma*ell_c**2*|kappa|/m`` against the motion. ``printed``: the paper's
+        ``gamma*ell_c*kappa/m``, numbers in SI; it drives a droplet where the curvature is negative.
+    """
+    if form not in FORMS:
+        raise DeclarationError(f"surface_tension: form: must be one of {', '.join(FORMS)}, got {form!r}")
+    tension, first = parameter(gamma, "gamma", where="surface_tension")
+    length, second = parameter(ell_c, "ell_c", where="surface_tension")
+    coefficient = tension * length**2 if form == "resistance" else tension * length
+    bend = sp.Abs(KAPPA) if form == "resistance" else KAPPA
+    text = str(coefficient * (sp.Symbol("|kappa|") if form == "resistance" else sp.Symbol("kappa")))
+    return Kernel(
+        terms=(("surface_tension", f"resistance {text}/m to the motion of a droplet"),),
+        resistance=coefficient * bend / MASS,
+        defaults=(first, second),
+        at_least=((first[0], "0"), (second[0], "0")),
+    )

@@ -1,0 +1,171 @@
+"""A motion as one self-contained page: formulas as MathML, figures as inline SVG, tables, and what it was made from.
+
+The page is HTML and well-formed XML at once, needs no network and no script, and is the same bytes for the same input.
+"""
+
+import io
+import platform
+import re
+from collections.abc import Iterable, Iterator
+from contextlib import suppress
+from html import escape, unescape
+from importlib.metadata import version
+from typing import TYPE_CHECKING
+
+import sympy as sp
+
+from gqm_sym.derivation import Model
+from gqm_sym.errors import SolutionError
+from gqm_sym.runtime import Motion
+from gqm_sym.runtime.display import Rows, summary, table
+from gqm_sym.runtime.extras import needs
+from gqm_sym.specfile import Spec
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+FIGURES = {
+    "track": "The track as far as the motion runs, coloured by the contact force",
+    "loads": "Speed and contact force against arc length",
+    "portrait": "Phase portrait, with the orbit of the launch",
+}
+
+STYLE = """
+body { font: 16px/1.5 system-ui, sans-serif; max-width: 60rem; margin: 2rem auto; padding: 0 1rem; color: #222; }
+h1, h2 { line-height: 1.2; } h2 { margin-top: 2.5rem; border-bottom: 1px solid #ccc; }
+table { border-collapse: collapse; margin: 1rem 0; display: block; overflow-x: auto; }
+th, td { padding: 0.2rem 0.8rem; text-align: left; border-bottom: 1px solid #ddd; font-variant-numeric: tabular-nums; }
+math { font-size: 1.1rem; } .formula { overflow-x: auto; overflow-y: hidden; padding: 0.3rem 0; }
+svg { max-width: 100%; height: auto; } pre { background: #f6f6f6; padding: 1rem; overflow-x: auto; }
+@media print { body { max-width: none; } h2 { break-after: avoid; } figure { break-inside: avoid; } }
+"""
+
+
+@needs("plot")
+def report(spec: Spec, model: Model, motion: Motion, text: str) -> str:
+    """The page about one motion.
+
+    Parameters
+    ----------
+    spec, model
+        The curve file, and what was derived from it.
+    motion
+        What was launched.
+    text
+        Of the curve file.
+    """
+    title = escape(f"{spec.name}: {model.title}" if model.title else spec.name)
+    parts = [
+        f"<h1>{title}</h1>",
+        _facts(summary(motion)),
+        "<h2>The motion</h2>",
+        *_figures(motion),
+        "<h2>Events</h2>",
+        Rows(motion.events)._repr_html_(),
+        "<h2>Legs</h2>",
+        Rows(motion.legs)._repr_html_(),
+        "<h2>Closed forms</h2>",
+        *_formulas(model),
+        "<h2>Parameters</h2>",
+        _parameters(spec, motion),
+        "<h2>Made from</h2>",
+        f"<pre>{escape(text)}</pre>",
+        _facts(_provenance(motion)),
+    ]
+    return (
+        '<!DOCTYPE html>\n<html lang="en" xmlns="http://www.w3.org/1999/xhtml">\n<head>\n<meta charset="utf-8"/>\n'
+        f'<meta name="viewport" content="width=device-width"/>\n<title>{title}</title>\n<style>{STYLE}</style>\n'
+        f"</head>\n<body>\n{chr(10).join(parts)}\n</body>\n</html>\n"
+    )
+
+
+def _facts(rows: Iterable[tuple[str, object]]) -> str:
+    lines = "".join(f"<tr><th>{escape(label)}</th><td>{escape(str(value))}</td></tr>" for label, value in rows)
+    return f"<table><tbody>{lines}</tbody></table>"
+
+
+def _parameters(spec: Spec, motion: Motion) -> str:
+    rows = []
+    for name, number in zip(motion.problem.formulas.parameters, motion.problem.p, strict=True):
+        note = spec.notes.get(name)
+        rows.append((name, number.text, note.unit if note else "", note.description if note else ""))
+    return table(("name", "value", "unit", "what it is"), rows)
+
+
+def _provenance(motion: Motion) -> Iterator[tuple[str, str]]:
+    launch = motion.problem.launch
+    yield "launch", f"lam0 = {launch.lam0.text}, v0 = {launch.v0.text}, direction = {launch.direction:+d}"
+    yield "contact", launch.contact
+    if launch.t_max is not None:
+        yield "followed for", f"{launch.t_max.text} s"
+    yield "error bound of the parameter at the last event", f"{motion.error_bound(_last(motion)):.1e}"
+    for package in ("gqm_sym", "sympy", "numpy", "numba"):
+        yield package, version(package)
+    yield "Python", platform.python_version()
+
+
+def _last(motion: Motion) -> float:
+    return max((event.t for event in motion.events), default=0.0)
+
+
+# -- formulas --------------------------------------------------------------------------------
+
+
+def _formulas(model: Model) -> Iterator[str]:
+    """Yield each closed form as a block of MathML."""
+    lam = model.parameter.name
+    named = {model.lam0: sp.Symbol(f"{lam}_0"), model.v0: sp.Symbol("V_0")}
+    for label, form in model.closed_forms():
+        shown = form.xreplace(named)
+        if isinstance(shown, sp.Equality):
+            note = f'<mspace width="2em"/><mtext>({escape(label)})</mtext>'
+            inner = f"{_mathml(shown.lhs)}<mo>=</mo>{_mathml(shown.rhs)}{note}"
+        else:
+            inner = f"{_label(label)}<mo>=</mo>{_mathml(shown)}"
+        math = f'<math xmlns="http://www.w3.org/1998/Math/MathML" display="block"><mrow>{inner}</mrow></math>'
+        yield f'<div class="formula">{math}</div>'
+    for note in model.notes:
+        yield f"<p>{escape(note)}</p>"
+
+
+def _label(label: str) -> str:
+    """The left side of a closed form, such as ds/dtheta or V**2."""
+    if "/" in label:
+        above, below = (f"<mrow><mi>d</mi>{_mathml(sp.Symbol(part[1:]))}</mrow>" for part in label.split("/"))
+        return f"<mfrac>{above}{below}</mfrac>"
+    return _mathml(sp.Symbol("V") ** 2 if label == "V**2" else sp.Symbol(label))
+
+
+def _mathml(form: sp.Basic) -> str:
+    # Entities that HTML names are unknown to XML.
+    text: str = sp.mathml(form, printer="presentation")
+    return re.sub(r"&[A-Za-z]\w+;", lambda found: _kept(found[0]), text)
+
+
+def _kept(entity: str) -> str:
+    return entity if entity in ("&lt;", "&gt;", "&amp;", "&quot;") else unescape(entity)
+
+
+# -- figures ---------------------------------------------------------------------------------
+
+
+def _figures(motion: Motion) -> Iterator[str]:
+    for what, caption in FIGURES.items():
+        # With friction there is no portrait of energies.
+        with suppress(SolutionError):
+            yield _svg(motion.plot(what), what, caption)
+
+
+def _svg(figure: "Figure", name: str, caption: str) -> str:
+    """A figure as an element of the page; its ids are made its own."""
+    import matplotlib as mpl
+
+    stream = io.StringIO()
+    with mpl.rc_context({"svg.fonttype": "none", "svg.hashsalt": name}):
+        figure.savefig(stream, format="svg", metadata={"Date": None, "Creator": None, "Format": None, "Type": None})
+    text = stream.getvalue()
+    text = text[text.index("<svg") :]
+    text = re.sub(r"<metadata>.*?</metadata>", "", text, flags=re.DOTALL)
+    text = re.sub(r'(\bid="|href="#|url\(#)', rf"\g<1>{name}-", text)
+    said = escape(caption)
+    return f'<figure role="img" aria-label="{said}">{text.strip()}<figcaption>{said}</figcaption></figure>'

@@ -1,0 +1,38 @@
+"""What all figures share: axes to draw on, and how they are labelled."""
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+
+def new_axes(axes: "Axes | None") -> "Axes":
+    """Axes to draw on: those given, or those of a new figure."""
+    if axes is not None:
+        return axes
+    from matplotlib.figure import Figure
+
+    new: Axes = Figure(figsize=(7, 4.5), layout="constrained").subplots()
+    return new
+
+
+def figure_of(axes: "Axes") -> "Figure":
+    """The figure that axes are part of."""
+    from matplotlib.figure import Figure
+
+    figure = axes.get_figure(root=True)
+    assert isinstance(figure, Figure)
+    return figure
+
+
+def finished(axes: "Axes", x: str, y: str) -> "Figure":
+    """Label the axes and list each kind of mark once."""
+    axes.set_xlabel(x)
+    axes.set_ylabel(y)
+    axes.grid(visible=True, alpha=0.3)
+    handles, labels = axes.get_legend_handles_labels()
+    once = dict(zip(labels, handles, strict=True))
+    if once:
+        axes.legend(once.values(), once.keys(), loc="best", fontsize="small")
+    return figure_of(axes)

@@ -1,0 +1,204 @@
+"""Polynomials on a panel: from values at Chebyshev nodes to coefficients, running means, and proven changes of sign.
+
+The nodes are those of the first kind, so that no function is ever evaluated at a panel's ends: one of them may be a
+cusp, or the end of the domain. ``x`` runs from -1 at the end where the panel begins to 1.
+"""
+
+from fractions import Fraction
+from math import cos, fabs, fsum, pi, sin
+
+import numpy as np
+
+from gqm_sym.runtime.jit import Inner
+
+COUNT = 20
+
+
+def _tables() -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """The nodes as shares of the panel, the matrices of running means, and that of Chebyshev coefficients.
+
+    In whole numbers, and rounded at the end: an error of some roundings here would be one of every integral.
+    """
+    quarter = [
+        sin(0.5 * pi * m / COUNT) if 2 * m <= COUNT else cos(0.5 * pi * (COUNT - m) / COUNT) for m in range(COUNT)
+    ]
+    quarter.append(1.0)
+    wave = [*quarter, *quarter[-2::-1]]
+    sines = np.array([*wave, *(-value for value in wave[1:-1])])  # sin(pi m / (2 COUNT))
+    degree, odd = np.arange(COUNT), 2 * np.arange(COUNT) + 1
+    shares = np.array([sin(0.25 * pi * m / COUNT) ** 2 for m in odd])
+    # T_k at node j, with x = -cos(angle).
+    at_nodes = (-1.0) ** degree[:, None] * sines[(np.outer(degree, odd) + COUNT) % (4 * COUNT)]
+    to_coefficients = at_nodes * (2.0 / COUNT)
+    to_coefficients[0] *= 0.5
+    # Coefficients of T_k in powers of the share y: T_(k+1) = (4 y - 2) T_k - T_(k-1).
+    powers = [[1], [-1, 2]]
+    for _ in range(2, COUNT):
+        last, before = powers[-1], [*powers[-2], 0, 0]
+        powers.append([4 * a - 2 * b - c for a, b, c in zip([0, *last], [*last, 0], before, strict=True)])
+    one = 1 << 240
+    stops = [int(Fraction(float(y)) * one) for y in (*shares, 1.0)]
+
+    def mean(terms: list[int], y: int, measure: int) -> float:
+        """The mean of a polynomial over [0, y] by the measure d(y**measure)."""
+        total = 0
+        for k in range(len(terms) - 1, -1, -1):
+            total = total * y // one + terms[k] * one * measure // (k + measure)
+        return total / one
+
+    means, graded = (np.array([[mean(row, y, by) for row in powers] for y in stops]) for by in (1, 2))
+    times = [[fsum(row * column) for column in to_coefficients.T] for row in means]
+    graded_times = [[fsum(row * column) for column in to_coefficients.T] for row in graded]
+    return shares, np.array(times), np.array(graded_times), to_coefficients
+
+
+# Node j lies at ``SHARES[j]`` of the panel. Row j of ``MEANS`` gives the mean from the panel's start to that node, the
+# last row that over the whole panel; ``GRADED_MEANS`` those with respect to the square of the share.
+SHARES, MEANS, GRADED_MEANS, TO_COEFFICIENTS = _tables()
+
+# How finely a panel is searched for a change of sign that bounds cannot settle.
+FINEST = 2.0**-30
+
+
+@Inner
+def coefficients(values, out):  # type: ignore[no-untyped-def]
+    """Chebyshev coefficients of the polynomial with these values at the nodes."""
+    for k in range(COUNT):
+        total = 0.0
+        for j in range(COUNT):
+            total += TO_COEFFICIENTS[k, j] * values[j]
+        out[k] = total
+
+
+@Inner
+def chebyshev_sum(c, x):  # type: ignore[no-untyped-def]
+    """The Chebyshev series with coefficients c, at x, by Clenshaw's recurrence."""
+    high, low = 0.0, 0.0
+    for k in range(c.size - 1, 0, -1):
+        high, low = c[k] + 2.0 * x * high - low, high
+    return c[0] + x * high - low
+
+
+@Inner
+def tail_and_level(values):  # type: ignore[no-untyped-def]
+    """The largest of the last three coefficients, and of three in the middle."""
+    tail, level = 0.0, 0.0
+    for k in range(3):
+        last, middle = 0.0, 0.0
+        for j in range(COUNT):
+            last += TO_COEFFICIENTS[COUNT - 1 - k, j] * values[j]
+            middle += TO_COEFFICIENTS[12 + k, j] * values[j]
+        tail, level = max(tail, fabs(last)), max(level, fabs(middle))
+    return tail, level
+
+
+@Inner
+def _restrict(c, lo, hi, values, out):  # type: ignore[no-untyped-def]
+    """The series' coefficients on [lo, hi] alone."""
+    for j in range(COUNT):
+        values[j] = chebyshev_sum(c, lo + (hi - lo) * SHARES[j])
+    coefficients(values, out)
+
+
+@Inner
+def _is_monotone(c):  # type: ignore[no-untyped-def]
+    """Whether bounds prove that the series rises or falls throughout."""
+    # The derivative's coefficients, from the last one down; two apart they build on each other.
+    second, first, rest = 0.0, 0.0, 0.0
+    for k in range(c.size - 1, 0, -1):
+        second, first = first, second + 2.0 * k * c[k]
+        if k > 1:
+            rest += fabs(first)
+    return fabs(0.5 * first) > rest
+
+
+@Inner
+def _crossing(c, rising):  # type: ignore[no-untyped-def]
+    """The zero of a monotone series that changes sign over [-1, 1]."""
+    lo, hi = -1.0, 1.0
+    low, high = chebyshev_sum(c, lo), chebyshev_sum(c, hi)
+    x = lo + (hi - lo) * (low / (low - high))
+    for _ in range(100):
+        value = chebyshev_sum(c, x)
+        if value == 0.0:
+            return x
+        if (value > 0.0) == rising:
+            hi, high = x, value
+            low *= 0.5  # the other end gives way, so that both close in
+        else:
+            lo, low = x, value
+            high *= 0.5
+        new = lo + (hi - lo) * (low / (low - high))
+        if not lo < new < hi:
+            new = 0.5 * (lo + hi)
+        if fabs(new - x) <= 1e-16 or hi - lo <= 2e-16:
+            return new
+        x = new
+    return x
+
+
+@Inner
+def first_change(c, sign, noise):  # type: ignore[no-untyped-def]
+    """The first place in [-1, 1] where a series takes the other sign; none is missed.
+
+    The panel is halved until bounds by the coefficients prove one sign, or a monotone run. A part where the series is
+    nothing but ``noise`` has no sign of its own: zero touched without a change of sign is no change.
+
+    Parameters
+    ----------
+    sign : int
+        The sign it starts with; 0 to take its first definite one.
+
+    Returns
+    -------
+    x : float
+        Where it changes sign; 2 if it does not.
+    before : int
+        The sign it starts with.
+    touch : float
+        The first place before ``x`` where it is no more than noise and does not run through; 2 if there is none.
+    """
+    part, values, pending = np.empty(COUNT), np.empty(COUNT), np.empty(64)
+    part[:] = c
+    lo, hi, waiting = -1.0, 1.0, 0
+    before, unsure, touch = sign, 2.0, 2.0
+    while True:
+        spread = 0.0
+        for k in range(1, COUNT):
+            spread += fabs(part[k])
+        if fabs(part[0]) > spread + noise:
+            found = 1 if part[0] > 0.0 else -1
+            if before == 0:
+                before = found
+            if found != before:
+                return (lo if unsure > 1.0 else 0.5 * (unsure + lo)), before, touch
+            unsure = 2.0
+        elif fabs(part[0]) + spread > noise and _is_monotone(part):
+            left, right = chebyshev_sum(part, -1.0), chebyshev_sum(part, 1.0)
+            if before == 0:
+                before = 0 if fabs(left) <= noise else (1 if left > 0.0 else -1)
+            if fabs(right) > noise:
+                found = 1 if right > 0.0 else -1
+                if before == 0:
+                    before = found
+                if found != before:
+                    if left * found >= 0.0:
+                        return lo, before, touch
+                    return lo + 0.5 * (hi - lo) * (1.0 + _crossing(part, found > 0)), before, touch
+                unsure = 2.0
+        elif fabs(part[0]) + spread <= noise or hi - lo <= FINEST:
+            if unsure > 1.0:
+                unsure = lo
+            if touch > 1.0:
+                touch = lo
+        else:
+            pending[waiting] = hi
+            waiting += 1
+            hi = 0.5 * (lo + hi)
+            _restrict(c, lo, hi, values, part)
+            continue
+        if waiting == 0:
+            return 2.0, before, touch
+        lo, hi = hi, pending[waiting - 1]
+        waiting -= 1
+        _restrict(c, lo, hi, values, part)

@@ -1,0 +1,31 @@
+"""What the panels of a stretch say of time, beyond what compiled code reads off them."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gqm_sym.runtime.doubledouble import two_sum
+
+Array = NDArray[np.float64]
+
+
+def running_totals(times: Array, terms: Array) -> tuple[Array, Array]:
+    """Running totals of the panels' own times, each as two doubles, up to the last of ``times``."""
+    own = terms.sum(axis=1)  # every Legendre polynomial is 1 at the right edge
+    own *= times[-1] / own.sum()
+    high, low = np.zeros(len(own) + 1), np.zeros(len(own) + 1)
+    for k, part in enumerate(own):
+        high[k + 1], error = two_sum.py_func(high[k], part)
+        low[k + 1] = low[k] + error
+    high[-1], low[-1] = times[-1], 0.0
+    return high, low
+
+
+def slopes(edges: Array, terms: Array, phi: Array) -> Array:
+    """Derivatives of the panels' Legendre series at anomalies."""
+    out = np.empty_like(phi)
+    which = np.clip(np.searchsorted(edges, phi, side="right") - 1, 0, len(edges) - 2)
+    for k in np.unique(which):
+        half = 0.5 * (edges[k + 1] - edges[k])
+        x = ((phi[which == k] - edges[k]) - half) / half
+        out[which == k] = np.polynomial.legendre.legval(x, np.polynomial.legendre.legder(terms[k])) / half
+    return out

@@ -1,0 +1,315 @@
+"""Motions with friction, drag or resistance: leg after leg, each computed when it is asked for."""
+
+from math import inf, isfinite
+
+import numpy as np
+
+from gqm_sym.errors import InputError, SolutionError
+from gqm_sym.runtime import legs
+from gqm_sym.runtime.course import ZERO, Course, Pair, Piece
+from gqm_sym.runtime.entries import follow, frame_at, from_rest
+from gqm_sym.runtime.formulas import Formulas, Launch
+from gqm_sym.runtime.motion import Motion
+from gqm_sym.runtime.numbers import Number
+from gqm_sym.runtime.panels import FROM_TURN, REGULAR, TO_EQUILIBRIUM
+from gqm_sym.runtime.problem import Problem
+from gqm_sym.runtime.rest import Rest
+from gqm_sym.runtime.search import FARTHEST
+from gqm_sym.runtime.solve import CUSP_SHARE, domain_end, leaving, starting_step
+from gqm_sym.runtime.stretch import ULP, Array, Stretch, along_field
+
+# An equilibrium is approached until the distance left is exp(-this) of the leg: all that doubles have.
+CLOSEST = 690.0
+# On a curve without ends, how many stretches in a row without a turn `legs` and `events` look for one.
+MOST_PAUSES = 12
+# Turns after which `legs` and `events` stop looking for the rest.
+MOST_TURNS = 20000
+
+
+def dissipate(formulas: Formulas, p: tuple[Number, ...], launch: Launch) -> Motion:
+    """The motion that a launch begins where forces dissipate."""
+    functions = formulas.functions(p, launch)
+    problem = Problem(formulas=formulas, launch=launch, p=p, functions=functions, domain=formulas.domain(p))
+    if problem.w0 > 0.0:
+        return Dissipative(problem, launch.direction)
+    way = _leaves(problem, problem.lam0)[0]
+    return Dissipative(problem, way) if way else Rest(problem)
+
+
+def launch_leg(formulas: Formulas, p: tuple[Number, ...], launch: Launch, places: Array) -> Array:
+    """V**2 at places of the launch leg, through changes of contact sign up to its first turn; NaN elsewhere."""
+    motion = dissipate(formulas, p, launch)
+    v2 = np.full(places.shape, np.nan)
+    if isinstance(motion, Dissipative):
+        motion.fill_launch_leg(places, v2)
+    v2[places == launch.lam0.value] = launch.v0.value**2
+    return v2
+
+
+def _leaves(problem: Problem, lam: float) -> tuple[int, bool]:
+    """Which way a body leaves a place where it is at rest, 0 if it stays; and whether anything could hold it."""
+    dissipation = problem.formulas.dissipation
+    assert dissipation is not None
+    forwards, backwards = from_rest(dissipation.hold, problem.functions.p, lam)
+    if forwards <= 0.0 <= backwards:
+        return 0, True
+    return (1 if forwards > 0.0 else -1), bool(forwards < backwards)
+
+
+class Dissipative(Motion):
+    """A motion that loses energy: legs until it rests or leaves, or for ever.
+
+    Each leg begins with V**2 = 0 at a turning point, so that it owes nothing to the accuracy of those before; times are
+    summed as two doubles. Legs are computed as they are asked for. Without ``t_max``, `legs` and `events` tell of a
+    motion that never ends as far as it has been asked for, and of its first leg at least.
+    """
+
+    def __init__(self, problem: Problem, direction: int) -> None:
+        self._horizon = inf
+        self._pieces: list[Piece] = []
+        self._ending = ""
+        super().__init__(problem, "dissipative", direction)
+        dissipation = problem.formulas.dissipation
+        assert dissipation is not None
+        self._drive = dissipation.drive
+        self._flags = (int(dissipation.friction), int(dissipation.kinked), int(dissipation.linear))
+        self._joints = ("",) if dissipation.friction else ("", "contact-sign")
+        self._side = {"bilateral": 0, "above": 1, "below": -1}[problem.launch.contact]
+        self._place, self._w, self._way, self._nu, self._laps = problem.lam0, problem.w0, direction, 0, 0
+        self._step = starting_step(problem)
+        self._reach = problem.period or self._step
+        self._turns = 0
+        self._pauses = 0
+        self._arc = 0.0
+        self._held = True
+        self._whole: Course | None = None
+        self._go_on()
+
+    # -- what the motion says -----------------------------------------------------------------
+
+    @property
+    def t_end(self) -> float:
+        """When the motion ends: when the body rests or leaves, or at the horizon; infinite if it does not."""
+        self._look_ahead()
+        return self._known_end()
+
+    @t_end.setter
+    def t_end(self, value: float) -> None:
+        self._horizon = value
+
+    @property
+    def turning_points(self) -> tuple[float, ...]:
+        """Turning points so far, in the order met; a launch from rest counts."""
+        turns = [leg.lam_end for leg in self.legs if leg.end == "turn"]
+        return (*((self.problem.lam0,) if self.problem.w0 == 0.0 else ()), *turns)
+
+    def fill_launch_leg(self, places: Array, v2: Array) -> None:
+        """Fill in V**2 at those places that lie on the launch leg."""
+        course, done = self._course(0.0), 0
+        lap = course.lap
+        while True:
+            for piece in self._pieces[done:]:
+                stretch = piece.stretch
+                a, b = stretch.a + piece.laps * lap, stretch.b + piece.laps * lap
+                on = (places >= min(a, b)) & (places <= max(a, b)) & np.isnan(v2)
+                phi = [stretch.anomaly_of(place - a, b - place) for place in places[on]]
+                v2[on] = stretch.speeds(np.minimum(phi, stretch.stop)) ** 2
+                if piece.end not in ("", "contact-sign"):
+                    return
+            done = len(self._pieces)
+            if not self._is_ahead(places):
+                return
+            self._go_on()
+
+    def _is_ahead(self, places: Array) -> bool:
+        """Whether one of some places lies beyond what has been computed."""
+        reached = self._place + self._laps * self.problem.period
+        return bool(np.any((places - reached) * self._way > 0.0))
+
+    # -- what `Motion` asks -------------------------------------------------------------------
+
+    def _course(self, reach: float) -> Course:
+        if isfinite(self._horizon):
+            reach = max(reach, self._horizon)
+        while not self._ending and self._pieces[-1].t_stop[0] < reach:
+            self._go_on()
+        if self._whole is None or len(self._whole.pieces) != len(self._pieces):
+            self._whole = Course(pieces=tuple(self._pieces), lap=self.problem.period)
+        return self._whole
+
+    def _history(self) -> tuple[Piece, ...]:
+        self._look_ahead()
+        return self._course(0.0).pieces
+
+    def _contact_changes(self, piece: Piece) -> list[tuple[Pair, float]]:
+        return []  # pieces end there
+
+    def _check_end(self, t: float) -> None:
+        self._course(t)
+        end = self._known_end()
+        if t > end:
+            raise InputError(f"t: the motion ends at {end!r} s ({self._how_it_ends()}), got {t!r}")
+        if self._ending == "asymptote" and t > self._pieces[-1].t_stop[0]:
+            raise SolutionError(
+                f"t = {t!r}: by then the body is closer to the equilibrium at "
+                f"{self.problem.formulas.parameter} = {self._place!r} than doubles can tell"
+            )
+
+    def _clock_error(self, t: Array) -> Array:
+        course = self._course(float(np.abs(t).max()) if t.size else 0.0)
+        worst = max(piece.stretch.relative_error for piece in course.pieces)
+        return np.abs(t) * (worst + 4.0 * ULP)
+
+    def _how_it_ends(self) -> str:
+        if not self._ending or self._pieces[-1].t_stop[0] > self._horizon:
+            return super()._how_it_ends()
+        return (
+            f"{self._ending} at {self.problem.formulas.parameter} = {self._place + self._laps * self.problem.period!r}"
+        )
+
+    def _first_passages(self, lam: float, low: float) -> list[float]:
+        done = 0
+        while True:
+            course = self._course(0.0)
+            found = self._passages(course.pieces[done:], course, lam, low)
+            done = len(course.pieces)
+            # What turns between two points comes back to no place outside them.
+            settled = self._turns >= 2 or (self._turns and self.problem.w0 == 0.0)
+            if found or self._ending or settled or course.pieces[-1].t_stop[0] >= self._horizon:
+                return found
+            self._go_on()
+
+    # -- leg after leg ------------------------------------------------------------------------
+
+    def _known_end(self) -> float:
+        """When the motion ends, as far as has been computed."""
+        ends = self._ending not in ("", "asymptote")
+        return min(self._horizon, self._pieces[-1].t_stop[0] if ends else inf)
+
+    def _look_ahead(self) -> None:
+        """Compute the whole motion where it ends, and else its first leg at least."""
+        if isfinite(self._horizon):
+            self._course(self._horizon)
+            return
+        while not self._ending and self._pauses < MOST_PAUSES:
+            if self._turns and (not self._held or self._turns > MOST_TURNS):
+                return
+            self._go_on()
+
+    def _go_on(self) -> None:
+        """Follow the body to its next turn, to an end, or as far as one run goes."""
+        problem, way, start, w = self.problem, self._way, self._place, self._w
+        f, period = problem.functions, problem.period
+        end = problem.high if way > 0 else problem.low
+        far = 8.0 * period if period else end  # a closed curve's breaks are listed for some laps
+        limit = start + way * far if period else end
+        breaks = f.between(f.breaks, start, limit)[::way] if f.breaks.size else f.breaks
+        reach = inf if isfinite(end) else self._reach
+        given = (self._drive, f.p, self._flags, start, w, way, self._nu, np.ascontiguousarray(breaks))
+        what, place, w_end, nu, step, middle, changes, _, ahead, back = follow(
+            *given, limit, reach, self._step, self._side
+        )
+        self._step, self._nu = step, nu
+        if what == legs.LIFTOFF and place == start:
+            self._lift_off_at_once(given, limit)
+            return
+        if not len(ahead) and what == legs.LIMIT:
+            raise leaving(problem, way, "end of the domain")
+        if not len(ahead) or what == legs.SPENT:
+            raise SolutionError(
+                f"V**2 beyond {problem.formulas.parameter} = {place!r} could not be followed; "
+                "are the curve and the force smooth there?"
+            )
+        end_name = self._end_name(what, place, start)
+        kind = FROM_TURN if w == 0.0 else REGULAR
+        if what in (legs.TURN, legs.ASYMPTOTE):
+            if middle != start:
+                self._add(along_field(f, kind, start, middle, ahead), 1, changes, "")
+            if what == legs.TURN:
+                self._add(along_field(f, FROM_TURN, place, middle, back), -1, changes, end_name)
+            else:
+                closing = along_field(f, TO_EQUILIBRIUM, middle, place, back, CLOSEST)
+                self._add(closing, 1, changes, end_name)
+        else:
+            self._add(along_field(f, kind, start, place, ahead), 1, changes, end_name)
+        self._place, self._w = place, w_end
+        if what == legs.TURN:
+            self._turns += 1
+        self._pauses = self._pauses + 1 if what == legs.PAUSED and not period and not isfinite(end) else 0
+        if end_name not in ("", "turn", "contact-sign"):
+            self._ending = end_name
+            return
+        self._fold()
+        if abs(self._place) > FARTHEST * max(1.0, abs(problem.lam0)):
+            raise SolutionError(
+                f"the motion leaves the range of doubles at {problem.formulas.parameter} = {place!r}; "
+                "give a shorter t_max"
+            )
+        if what == legs.PAUSED and not period:
+            self._reach *= 2.0
+
+    def _fold(self) -> None:
+        """Count whole laps of a closed curve apart, so that places keep their digits."""
+        period = self.problem.period
+        if period:
+            count = int(np.trunc((self._place - self.problem.lam0) / period))
+            self._place -= count * period
+            self._laps += count
+
+    def _end_name(self, what: int, place: float, start: float) -> str:
+        """What ends a run; turns the body round where it turns."""
+        problem, f = self.problem, self.problem.functions
+        if what == legs.TURN:
+            way, self._held = _leaves(problem, place)
+            if way == 0 or place == start:
+                return "rest"
+            self._way = way
+            return "turn"
+        if what == legs.LIMIT and not problem.period:
+            return domain_end(problem, self._way).what
+        if what == legs.NARROWED:
+            ds = frame_at(f.addresses, f.p, np.array([start, place]), np.zeros(2))[2]
+            return "cusp" if ds[1] <= CUSP_SHARE * ds[0] else "singular-point"
+        return {legs.LIFTOFF: "liftoff", legs.ASYMPTOTE: "asymptote"}.get(what, "")
+
+    def _lift_off_at_once(self, given: tuple[object, ...], limit: float) -> None:
+        """A motion that ends as it begins: the track would have to pull at once."""
+        place, ahead = follow(*given, limit, 0.0, self._step, 0)[1:9:7]
+        stretch = along_field(
+            self.problem.functions, FROM_TURN if self._w == 0.0 else REGULAR, self._place, place, ahead
+        )
+        self._pieces.append(self._piece(stretch, 1, (ZERO, 0.0), (ZERO, 0.0), "liftoff"))
+        self._ending = "liftoff"
+
+    def _add(self, stretch: Stretch, sense: int, changes: Array, end: str) -> None:
+        """Run through a whole stretch next, cut where N changes sign."""
+        low, high = sorted((stretch.a, stretch.b))
+        cuts = [
+            stretch.anomaly_of(float(place) - stretch.a, stretch.b - float(place))
+            for place in changes
+            if low < place < high
+        ]
+        times = stretch.times(np.array(cuts)) if cuts else ()
+        marks = [(ZERO, 0.0), *(((float(r), 0.0), phi) for r, phi in zip(times, cuts, strict=True))]
+        marks.append(((stretch.duration, 0.0), stretch.stop))
+        marks.sort(key=lambda mark: sense * mark[1])
+        for k in range(len(marks) - 1):
+            name = end if k == len(marks) - 2 else "contact-sign"
+            self._pieces.append(self._piece(stretch, sense, marks[k], marks[k + 1], name))
+        self._arc += sense * stretch.direction * stretch.length
+
+    def _piece(
+        self, stretch: Stretch, sense: int, start: tuple[Pair, float], stop: tuple[Pair, float], end: str
+    ) -> Piece:
+        return Piece(
+            stretch=stretch,
+            sense=sense,
+            r_start=start[0],
+            r_stop=stop[0],
+            phi_start=start[1],
+            phi_stop=stop[1],
+            t_start=self._pieces[-1].t_stop if self._pieces else ZERO,
+            s_a=self._arc if sense > 0 else self._arc - stretch.direction * stretch.length,
+            end=end,
+            laps=self._laps,
+        )

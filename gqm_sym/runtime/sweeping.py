@@ -1,0 +1,233 @@
+"""One quantity over arrays of launches and parameters.
+
+Most orbits are answered by one compiled loop (`swift`); those that it leaves are solved one by one, as `solve` does.
+"""
+
+from collections.abc import Callable
+from math import inf, nan, pi
+from types import SimpleNamespace
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gqm_sym.errors import GQMError, InputError, ParameterError, SolutionError
+from gqm_sym.runtime import swift
+from gqm_sym.runtime.entries import frame_at
+from gqm_sym.runtime.numbers import read_number
+from gqm_sym.runtime.stretch import Array
+from gqm_sym.runtime.threads import spread
+
+if TYPE_CHECKING:
+    from gqm_sym.runtime.formulas import Formulas
+
+# The names that a module's domain needs, over arrays.
+ARRAYS = SimpleNamespace(
+    **{name: getattr(np, name) for name in ["sin", "cos", "tan", "sinh", "cosh", "tanh", "exp", "log", "sqrt"]},
+    **{name: getattr(np, f"arc{name[1:]}") for name in ["asin", "acos", "atan", "asinh", "acosh", "atanh"]},
+    pi=pi,
+    e=np.e,
+    mpf=float,
+)
+
+# Launches a thread is worth starting for, and those whose parameters are laid out at a time.
+LEAST, CHUNK = 2**9, 2**14
+
+# Why there is no value, by code; 0 where there is one.
+REASONS = (
+    "",
+    "left to the exact problem",
+    "the motion is not of a kind that has this quantity",
+    "the launch or a parameter is not a finite number",
+    "the launch place lies outside the domain",
+    "the motion is never at the place asked for",
+    "the launch is refused; solve says why",
+)
+REFUSED = 6
+
+
+class Sweep(NamedTuple):
+    """Values over all launches, NaN where there is none, and why not: codes into `REASONS`, 0 where there is one."""
+
+    values: Array
+    reasons: NDArray[np.int8]
+
+    def why(self) -> dict[str, int]:
+        """Count the launches without a value, by reason."""
+        codes, counts = np.unique(self.reasons[self.reasons > 0], return_counts=True)
+        return {REASONS[code]: int(count) for code, count in zip(codes, counts, strict=True)}
+
+
+class Quantity(NamedTuple):
+    """One quantity: what is asked of the compiled loop, the columns of its answer, and of one motion."""
+
+    asked: int
+    columns: slice | int
+    of_motion: Callable[[Any, Any], Any]
+
+
+def _turning_points(motion: Any, _: Any) -> Any:
+    return sorted(motion.turning_points) if motion.kind == "libration" else (nan, nan)
+
+
+def _extreme(load: Callable[[Any, Array], Array], sign: int) -> Callable[[Any, Any], float]:
+    """The largest or least load of a periodic motion: the best of many places, closer and closer."""
+
+    def of_motion(motion: Any, _: Any) -> float:
+        if motion.kind not in ("libration", "circulation"):
+            return nan
+        stretch = motion.one_period[0].stretch
+        low, high = 0.0, stretch.stop
+        for _round in range(8):
+            phi = np.linspace(low, high, 129)
+            values = load(motion, phi)
+            best = int(np.argmax(sign * values))
+            low, high = phi[max(best - 1, 0)], phi[min(best + 1, phi.size - 1)]
+        return float(values[best])
+
+    return of_motion
+
+
+def _speed(motion: Any, phi: Array) -> Array:
+    speeds: Array = motion.one_period[0].stretch.speeds(phi)
+    return speeds
+
+
+def _force(motion: Any, phi: Array) -> Array:
+    stretch = motion.one_period[0].stretch
+    f = stretch.functions
+    forces: Array = frame_at(f.addresses, f.p, stretch.places(phi), stretch.speeds(phi) ** 2)[4]
+    return forces
+
+
+QUANTITIES = {
+    "half_period": Quantity(swift.TIME, 0, lambda motion, _: motion.half_period),
+    "period": Quantity(swift.TIME, 0, lambda motion, _: motion.period),
+    "turning_points": Quantity(swift.PLACES, slice(0, 2), _turning_points),
+    "v_min": Quantity(swift.SPEEDS, 0, _extreme(_speed, -1)),
+    "v_max": Quantity(swift.SPEEDS, 1, _extreme(_speed, 1)),
+    "normal_force_min": Quantity(swift.FORCES, 0, _extreme(_force, -1)),
+    "normal_force_max": Quantity(swift.FORCES, 1, _extreme(_force, 1)),
+    "time_at": Quantity(swift.ARRIVAL, 0, lambda motion, place: motion.time_at(place)),
+}
+
+
+def sweep(
+    formulas: "Formulas", quantity: str, lam0: Any, v0: Any, direction: Any, lam: Any, given: tuple[Any, ...]
+) -> Sweep:
+    """One quantity of the motion of each launch; all arguments broadcast against each other."""
+    asked = QUANTITIES.get(quantity)
+    if asked is None:
+        raise InputError(f"quantity: must be one of {', '.join(QUANTITIES)}, got {quantity!r}")
+    if (lam is None) == (quantity == "time_at"):
+        raise InputError(f"lam: is the place that 'time_at' asks about, got {lam!r} with {quantity!r}")
+    names = ("lam0", "v0", "direction", "lam", *formulas.parameters)
+    sources = (lam0, v0, direction, 0.0 if lam is None else lam, *given)
+    columns = [_column(value, name) for value, name in zip(sources, names, strict=True)]
+    _check(formulas, dict(zip(names, columns, strict=True)))
+    try:
+        columns = list(np.broadcast_arrays(*columns))
+    except ValueError:
+        shapes = ", ".join(f"{name} {c.shape}" for name, c in zip(names, columns, strict=True) if c.shape)
+        raise InputError(f"sweep: these shapes do not broadcast against each other: {shapes}") from None
+    _check_least(formulas, dict(zip(names, columns, strict=True)))
+    shape, size = columns[0].shape, columns[0].size
+    out, reasons = np.full((size, 2), nan), np.full(size, swift.HARD, dtype=np.int8)
+    # Charts, dissipative motions and bodies that must fit their track have no swift way: each is solved.
+    if formulas.chart is None and formulas.dissipation is None and not formulas.body:
+        spread(lambda part: _answer(formulas, asked, columns, part, out, reasons), size, LEAST)
+        if quantity == "half_period":
+            _drop(out, reasons, (reasons == swift.DONE) & (out[:, 1] == swift.CIRCULATION))
+        elif quantity == "period":
+            out[out[:, 1] == swift.LIBRATION, 0] *= 2.0
+    values = out[:, asked.columns]
+    for k in np.flatnonzero(reasons == swift.HARD):
+        here = [s if np.ndim(s) == 0 else float(c.flat[k]) for s, c in zip(sources, columns, strict=True)]
+        values[k], reasons[k] = _solved(formulas, asked, here)
+    return Sweep(values.reshape(shape + values.shape[1:]), reasons.reshape(shape))
+
+
+def _column(value: Any, name: str) -> Array:
+    """Numbers as doubles; text and exact numbers by their nearest."""
+    if value is None:
+        raise ParameterError(f"{name}: has no default and was not given; pass {name}=...")
+    if isinstance(value, np.ndarray) and value.dtype != object:
+        return value.astype(np.float64, copy=False)
+    array = np.asarray(value, dtype=object)
+    numbers = [v if isinstance(v, float) else read_number(v, where=name).value for v in array.reshape(-1)]
+    return np.array(numbers, dtype=np.float64).reshape(array.shape)
+
+
+def _check(formulas: "Formulas", columns: dict[str, Array]) -> None:
+    """Refuse what no launch of a sweep may be."""
+    if (columns["v0"] < 0.0).any():
+        raise InputError("v0: is a speed and cannot be negative; use direction=-1 to launch the other way")
+    if (np.abs(columns["direction"]) != 1.0).any():
+        raise InputError("direction: must be 1 or -1 (the sign of ds/dt at launch)")
+    for name in (*formulas.positive, "m"):
+        if (columns[name] <= 0.0).any():
+            raise ParameterError(f"{name}: must be positive; the closed forms hold for {name} > 0")
+
+
+def _check_least(formulas: "Formulas", columns: dict[str, Array]) -> None:
+    """Refuse parameters below what they must not fall below."""
+    for name, least in formulas.at_least:
+        bound = columns[least] if least in columns else read_number(least, where=least).value
+        if (columns[name] < bound).any():
+            raise ParameterError(f"{name}: must be at least {least}")
+
+
+def _answer(
+    formulas: "Formulas", asked: Quantity, columns: list[Array], part: slice, out: Array, reasons: NDArray[np.int8]
+) -> None:
+    """Answer a part of all launches, laid out chunk by chunk."""
+    addresses = tuple(formulas.addresses)
+    assert formulas.domain_of is not None
+    for begin in range(part.start, part.stop, CHUNK):
+        end = min(begin + CHUNK, part.stop)
+        lam0, v0, direction, place, *p = (_laid_out(column, begin, end) for column in columns)
+        domain = np.empty((end - begin, 3))
+        for i, (end_value, missing) in enumerate(
+            zip(formulas.domain_of(ARRAYS, tuple(p)), (-inf, inf, 0.0), strict=True)
+        ):
+            domain[:, i] = missing if end_value is None else end_value
+        domain[domain[:, 2] > 0.0, :2] = -inf, inf
+        swift.answer_many(
+            addresses,
+            np.column_stack(p),
+            lam0,
+            v0,
+            direction.astype(np.int64),
+            domain,
+            place,
+            asked.asked,
+            out[begin:end],
+            reasons[begin:end],
+        )
+
+
+def _laid_out(column: Array, begin: int, end: int) -> Array:
+    """Elements of a broadcast column, one after the other."""
+    if not any(column.strides):
+        return np.full(end - begin, column.flat[0])
+    if column.flags.c_contiguous:
+        return column.reshape(-1)[begin:end]
+    return np.ascontiguousarray(column.flat[begin:end])
+
+
+def _drop(out: Array, reasons: NDArray[np.int8], which: NDArray[np.bool_]) -> None:
+    out[which], reasons[which] = nan, swift.PASSING
+
+
+def _solved(formulas: "Formulas", asked: Quantity, here: list[Any]) -> tuple[Any, int]:
+    """The quantity of one launch, solved by itself."""
+    lam0, v0, direction, place, *given = here
+    try:
+        motion = formulas.solve(lam0, v0, int(direction), None, None, "bilateral", tuple(given))
+    except GQMError:
+        return nan, REFUSED
+    try:
+        value = asked.of_motion(motion, place)
+    except SolutionError:
+        return nan, swift.ELSEWHERE if asked.asked == swift.ARRIVAL else swift.PASSING
+    return value, swift.PASSING if np.isnan(value).any() else swift.DONE

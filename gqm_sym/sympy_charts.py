@@ -1,0 +1,50 @@
+"""The coordinates of a charted curve as SymPy functions of its arc length.
+
+A curve that is known by numbers only (implicit, sampled, put together from pieces) has no formula x(s). These heads
+stand for what its chart holds: they are read as ``x(s)``, and lowered to calls of the chart.
+"""
+
+from typing import ClassVar
+
+import sympy as sp
+from sympy.printing.printer import Printer
+
+
+class ChartFunction(sp.Function):  # type: ignore[misc]
+    """A row of a chart, at an arc length."""
+
+    nargs = 1
+    is_real = True
+    row: ClassVar[str]
+    symbol: ClassVar[str]
+
+    def _sympystr(self, printer: Printer) -> str:
+        return f"{self.row}({printer._print(self.args[0])})"
+
+    def _latex(self, printer: Printer, exp: str | None = None) -> str:
+        power = "" if exp is None else f"^{{{exp}}}"
+        return rf"{self.symbol}{power}\left({printer._print(self.args[0])}\right)"
+
+
+class chart_x(ChartFunction):
+    """Horizontal coordinate."""
+
+    row, symbol = "x", "x"
+
+
+class chart_z(ChartFunction):
+    """Height."""
+
+    row, symbol = "z", "z"
+
+
+class chart_alpha(ChartFunction):
+    """Angle of the tangent."""
+
+    row, symbol = "alpha", r"\alpha"
+
+
+class chart_kappa(ChartFunction):
+    """Signed curvature."""
+
+    row, symbol = "kappa", r"\kappa"

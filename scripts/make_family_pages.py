@@ -1,0 +1,124 @@
+"""Write a page of documentation for every family of curves: its conventions and closed forms, as derived here and now.
+
+``python scripts/make_family_pages.py`` writes ``docs/families``; with ``--check`` it writes nothing and exits 1 if a
+page is not what it would write.
+"""
+
+import sys
+from pathlib import Path
+
+import sympy as sp
+
+import gqm_sym as gqm
+from gqm_sym.building import difference, write_text
+from gqm_sym.declare import Curve
+from gqm_sym.derivation import Model
+
+FOLDER = Path(__file__).parent.parent / "docs" / "families"
+
+# What to know beyond the formulas: conventions, where the paper's Table 3 errs (ERRATA), what is known in closed form.
+REMARKS = {
+    "cartesian_graph": (
+        "The parameter is x itself, so a vertical tangent needs another declaration (parametric, polar or implicit).",
+        "sqrt(1 + phi'**2) stays in ds and in the time of flight: it is not only in the curvature.",
+    ),
+    "circle": (
+        "The angle is measured from the downward vertical and grows counter-clockwise: theta = 0 hangs at rest.",
+        "kappa > 0 means that the curve is run through counter-clockwise.",
+        "The pendulum's period is 4*sqrt(L/g)*K(sin(theta_max/2)), K the complete elliptic integral.",
+    ),
+    "ellipse": ("theta is the eccentric angle, not the polar one; theta = -pi/2 is the lowest point.",),
+    "parabola": ("The half period is an elliptic integral of the second kind.",),
+    "log_spiral": (
+        "The pole r = 0 lies at theta = -oo where b > 0, though at a finite arc length.",
+        "ds/dtheta is proportional to r: the turning angle grows with theta.",
+    ),
+    "catenary": ("z = c at the lowest point, so heights are measured from the directrix.",),
+    "cycloid": (
+        "As printed in the paper it is an arch: the top is an unstable equilibrium, and no oscillation exists on it.",
+        "ds/dtheta = 2*R*sin(theta/2) holds for 0 < theta < 2*pi only; at both ends are cusps, where a motion ends.",
+        "`inverted=True` hangs it: the tautochrone, whose period 4*pi*sqrt(R/g) does not depend on the amplitude.",
+    ),
+    "implicit": (
+        "The parameter is arc length from the point `start`; it grows along (-F_z, F_x)/|grad F| where tangent=1, "
+        "along the opposite where tangent=-1.",
+        "The paper's +G/|grad F|**3, G = F_xx*F_z**2 - 2*F_xz*F_x*F_z + F_zz*F_x**2, is the curvature for tangent=1; "
+        "for tangent=-1 it is the negative.",
+        "x(s), z(s), alpha(s) and kappa(s) are no closed forms: the module traces them when it knows its parameters, "
+        "accurate to rounding.",
+        "A closed curve is recognised and closed on itself; where grad F = 0 (a node, a cusp) a motion ends.",
+        "Without a domain an open curve is followed over 2000 pieces, or 10**9 times the length of the first, "
+        "each way.",
+        "A start point that is off the curve by less than 1e-6 of its coordinates is moved onto it.",
+    ),
+}
+
+UNTITLED = {"cartesian_graph": "Graph of a function", "implicit": "Curve given by an equation"}
+# Where a family takes arguments: those, and the module that is made from it.
+EXAMPLES: dict[str, tuple[tuple[str, ...], dict[str, tuple[str, ...]], str]] = {
+    "cartesian_graph": (("x**4/4 + x**3/10 + x**2/2",), {}, "quartic"),
+    "implicit": (("(x/a)**4 + (z/b)**4 - 1",), {"start": ("0", "-b")}, "superellipse"),
+}
+
+
+def page(name: str) -> str:
+    """The page of one family."""
+    given, named, module = EXAMPLES.get(name, ((), {}, name))
+    curve: Curve = getattr(gqm.families, name)(*given, **named)
+    spelled = [_quoted(text) for text in given]
+    spelled += [f"{key}=({', '.join(map(_quoted, texts))})" for key, texts in named.items()]
+    model = gqm.derive(curve, gqm.Gravity())
+    parts = [
+        f"# {curve.title or UNTITLED[name]}",
+        "",
+        "```python",
+        f"gqm.families.{name}({', '.join(spelled)})",
+        "```",
+        "",
+    ]
+    parts += [_conventions(model), ""]
+    parts += [f"- {remark}" for remark in REMARKS[name]]
+    parts += ["", "Under gravity, launched at place and speed with the index 0:", "", "$$", model.latex(), "$$", ""]
+    parts += [f"A module made from it: [`generated/{module}.py`](../../generated/{module}.py).", ""]
+    if name == "cycloid":
+        hung = gqm.derive(gqm.families.cycloid(inverted=True), gqm.Gravity())
+        parts += ["## Upside down", "", "$$", hung.latex(), "$$", ""]
+        parts += ["A module: [`generated/cycloid_inverted.py`](../../generated/cycloid_inverted.py).", ""]
+    return "\n".join(parts)
+
+
+def _quoted(text: str) -> str:
+    return f'"{text}"'
+
+
+def _conventions(model: Model) -> str:
+    lam, curve = model.parameter.name, model.curve
+    low, high = curve.domain
+    reach = f"all {lam}" if low is None and high is None else f"{sp.sstr(low)} <= {lam} <= {sp.sstr(high)}"
+    if curve.period is not None:
+        reach = f"closed, with period {sp.sstr(curve.period)} in {lam}"
+    own = ", ".join(f"`{name}`" for name in curve.parameters) or "none"
+    return f"Parameter `{lam}` ({reach}); run-time parameters: {own}."
+
+
+def pages() -> dict[Path, str]:
+    """All pages by their files."""
+    names = list(REMARKS)
+    index = ["# Families of curves", "", "The rows of the paper's Table 3, with their conventions as corrected.", ""]
+    index += [f"- [{name}]({name}.md)" for name in names]
+    return {FOLDER / "index.md": "\n".join([*index, ""]), **{FOLDER / f"{name}.md": page(name) for name in names}}
+
+
+def main() -> int:
+    """Write the pages, or check them."""
+    if "--check" not in sys.argv[1:]:
+        for path, text in pages().items():
+            write_text(text, path)
+        return 0
+    changes = "".join(difference(text, path) for path, text in pages().items())
+    print(changes, end="")
+    return 1 if changes else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

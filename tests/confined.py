@@ -1,0 +1,37 @@
+"""Limits of time and memory around what hostile input is given to."""
+
+import resource
+import signal
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+SECONDS = 1.0
+MEGABYTES = 200
+
+
+class OutOfTime(BaseException):
+    """The limit of processor time was reached; no handler for ordinary errors takes it."""
+
+
+@contextmanager
+def confined(seconds: float = SECONDS, megabytes: int = MEGABYTES) -> Iterator[None]:
+    """Let the block take this processor time, and this memory beyond what the process has.
+
+    Processor time, so that a busy machine fails no test.
+    """
+
+    def stop(*_: object) -> None:
+        raise OutOfTime(f"more than {seconds} s of processor time")
+
+    pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[0])
+    soft, hard = resource.getrlimit(resource.RLIMIT_AS)
+    handler = signal.signal(signal.SIGVTALRM, stop)
+    resource.setrlimit(resource.RLIMIT_AS, (pages * resource.getpagesize() + (megabytes << 20), hard))
+    signal.setitimer(signal.ITIMER_VIRTUAL, seconds)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_VIRTUAL, 0)
+        signal.signal(signal.SIGVTALRM, handler)
+        resource.setrlimit(resource.RLIMIT_AS, (soft, hard))

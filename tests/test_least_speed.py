@@ -1,0 +1,85 @@
+"""The least launch speed with which contact holds everywhere."""
+
+from math import cosh, sqrt
+
+import pytest
+
+import generated.catenary
+import generated.circle
+import generated.circle_coulomb
+import generated.cycloid
+import generated.ellipse
+import generated.parabola
+import generated.rolling_circle
+import gqm_sym as gqm
+from gqm_sym.errors import GQMError, LaunchError, ParameterError, SolutionError
+
+# Roundings of the square that the speed is the root of.
+SHARE = 4e-16
+
+
+def near(actual: float, expected: float) -> bool:
+    """Whether a speed is the expected one to rounding."""
+    return abs(actual - expected) <= SHARE * expected
+
+
+def test_loop_the_loop() -> None:
+    """From the lowest point v0² = 5 g L; of a ring 4 g L; of a body that rolls (1 + 4/(1 + β)) g L."""
+    circle = generated.circle
+    assert near(gqm.least_speed(circle, 0, L=1.5, g=9.81), sqrt(5 * 9.81 * 1.5))
+    assert near(gqm.least_speed(circle, 0, L=1.5, g=9.81, contact="bilateral"), sqrt(4 * 9.81 * 1.5))
+    beta = 0.4
+    rolling = sqrt(9.81 * 2 * (1 + 4 / (1 + beta)))
+    assert near(gqm.least_speed(generated.rolling_circle, 0, L=2, beta=beta, g=9.81), rolling)
+
+
+def test_from_any_place_of_the_loop() -> None:
+    """Energy is conserved: v0² = g L (3 + 2 cos θ0)."""
+    expected = sqrt(9.81 * 0.9 * (3 + 2 * 0.5403023058681398))
+    assert near(gqm.least_speed(generated.circle, 1, between=(-4, 4)), expected)
+
+
+def test_loop_the_ellipse() -> None:
+    """At the top κ = b/a², so that v0² = g a²/b + 4 g b from the lowest point."""
+    a, b, g = 1.0, 2.0, 9.81
+    assert near(gqm.least_speed(generated.ellipse, "-pi/2", a=a, b=b, g=g), sqrt(g * a**2 / b + 4 * g * b))
+
+
+def test_in_a_valley_the_ends_decide() -> None:
+    """Contact from above is no trouble there: V² must last to the higher end."""
+    c, g = 0.8, 9.81
+    speed = gqm.least_speed(generated.catenary, 0, between=(-1, 0.5), c=c, g=g)
+    assert near(speed, sqrt(2 * g * c * (cosh(1 / c) - 1)))
+    assert gqm.least_speed(generated.catenary, 1, between=(-1, 1), c=c, g=g) == 0.0
+
+
+def test_the_motion_agrees() -> None:
+    """A little faster it goes round; a little slower it lifts off."""
+    speed = gqm.least_speed(generated.circle, 0)
+    assert generated.circle.solve(0, speed * (1 + 1e-9), contact="above").kind == "circulation"
+    assert generated.circle.solve(0, speed * (1 - 1e-9), contact="above").events[-1].kind == "liftoff"
+
+
+def test_a_hump_asks_for_less_and_not_for_more() -> None:
+    """On top of an arch of a cycloid no speed keeps a body on all of it, and any small one near its top."""
+    with pytest.raises(SolutionError, match=r"no speed.*at most|no speed.*none"):
+        gqm.least_speed(generated.cycloid, 3, between=(1, 5))
+    assert gqm.least_speed(generated.cycloid, "pi", between=(3, "2*pi - 3")) == 0.0
+
+
+@pytest.mark.parametrize(
+    ("module", "arguments", "kind", "message"),
+    [
+        (generated.parabola, {}, LaunchError, "between: .*no ends"),
+        (generated.circle, {"between": (1, 2)}, LaunchError, "between: .*holds lam0"),
+        (generated.cycloid, {"between": (-1, 2)}, LaunchError, "between"),
+        (generated.circle, {"contact": "inside"}, LaunchError, "contact: must be one of"),
+        (generated.circle, {"q": 1}, ParameterError, "q: is no parameter"),
+        (generated.circle, {"L": -1}, ParameterError, "L: must be positive"),
+        (generated.circle_coulomb, {}, SolutionError, "dissipative"),
+    ],
+)
+def test_questions_without_an_answer(module: object, arguments: dict, kind: type[GQMError], message: str) -> None:
+    """Each is refused with what would be right."""
+    with pytest.raises(kind, match=message):
+        gqm.least_speed(module, 0, **arguments)

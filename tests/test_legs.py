@@ -1,0 +1,87 @@
+"""Polynomials on a panel: their tables against exact integrals, and changes of sign that are never missed."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from mpmath import mp, mpf
+from numpy.polynomial import chebyshev
+
+from gqm_sym.runtime.chebyshev import COUNT, GRADED_MEANS, MEANS, SHARES, TO_COEFFICIENTS, first_change
+
+# Roundings of twenty products, of size 1.
+TABLE = 1e-15
+NOISE = 1e-15
+
+
+def test_tables() -> None:
+    """Means of every power up to the degree, from the panel's start to each node; and coefficients."""
+    stops = np.append(SHARES, 1.0)
+    with mp.workdps(30):
+        exact = [mp.sin(mp.pi * (j + mpf("0.5")) / (2 * COUNT)) ** 2 for j in range(COUNT)]
+        assert np.abs(SHARES - np.array(exact, dtype=float)).max() <= 1.2e-16
+    for n in range(COUNT):
+        assert np.abs(MEANS @ SHARES**n - stops**n / (n + 1)).max() <= TABLE
+        assert np.abs(GRADED_MEANS @ SHARES**n - stops**n * 2.0 / (n + 2)).max() <= TABLE
+    nodes = 2.0 * SHARES - 1.0
+    for k in range(COUNT):
+        unit = np.zeros(COUNT)
+        unit[k] = 1.0
+        assert np.abs(TO_COEFFICIENTS @ chebyshev.chebval(nodes, unit) - unit).max() <= 2e-14
+
+
+def _series(roots: list[float]) -> np.ndarray:
+    """Chebyshev coefficients of the polynomial with these roots, its largest one 1."""
+    c = chebyshev.chebfromroots(roots)
+    return np.pad(c, (0, COUNT - len(c))) / np.abs(c).max()
+
+
+@given(st.lists(st.floats(-1.5, 1.5), min_size=1, max_size=7))
+def test_the_first_root_is_found(roots: list[float]) -> None:
+    """Of roots well apart the first one inside is found; without one there is no change."""
+    roots = sorted(roots)
+    if min([b - a for a, b in pairwise(roots)], default=1.0) < 1e-2:
+        return
+    if any(abs(abs(root) - 1.0) < 1e-6 for root in roots):
+        return
+    c = _series(roots)
+    inside = [root for root in roots if abs(root) < 1.0]
+    x, before, touch = first_change(c, 0, NOISE)
+    assert before == np.sign(chebyshev.chebval(-1.0, c))
+    assert touch == 2.0
+    if inside:
+        steepness = abs(chebyshev.chebval(inside[0], chebyshev.chebder(c)))
+        assert abs(x - inside[0]) <= 2e-15 + 2e-15 / steepness
+    else:
+        assert x == 2.0
+
+
+@pytest.mark.parametrize("gap", [1e-2, 1e-4, 1e-6])
+def test_close_roots_are_not_missed(gap: float) -> None:
+    """Two roots close together are two changes, as long as the function between them is more than noise."""
+    x, before, _ = first_change(_series([0.3, 0.3 + gap]), 0, NOISE)
+    assert before == 1
+    assert x == pytest.approx(0.3, abs=1e-15 / gap + 1e-15)
+
+
+def test_zero_touched_is_no_change() -> None:
+    """A double root touches zero: no change, but reported; what is zero throughout has no sign."""
+    x, before, touch = first_change(_series([0.3, 0.3]), 1, NOISE)
+    assert (x, before) == (2.0, 1)
+    assert touch == pytest.approx(0.3, abs=1e-6)
+    assert first_change(np.zeros(COUNT), 0, 0.0)[:2] == (2.0, 0)
+
+
+def test_a_triple_root_is_a_change() -> None:
+    """Flat as it is there, the sign changes."""
+    x, before, _ = first_change(_series([0.3, 0.3, 0.3]), 0, NOISE)
+    assert before == -1
+    assert x == pytest.approx(0.3, abs=2e-5)
+
+
+def test_a_wrong_sign_to_begin_with_changes_at_once() -> None:
+    """A panel that begins with the other sign than it should changes at its start."""
+    assert first_change(_series([1.4]), 1, NOISE)[0] == -1.0
+    assert first_change(_series([-0.2]), -1, NOISE)[0] == pytest.approx(-0.2, abs=1e-15)

@@ -1,0 +1,431 @@
+"""Rails put together from pieces: against Fresnel integrals, closed forms and an integration in time."""
+
+import math
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import pytest
+from mpmath import ellipk, mp, mpf
+from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
+
+import gqm_sym as gqm
+from gqm_sym.errors import DeclarationError, ParameterError, SolutionError
+from gqm_sym.runtime.chart import Chart
+
+ULP = 2.0**-52
+G = 9.81
+
+
+def built(folder: Path, name: str, pieces: list[Any], **options: Any) -> ModuleType:
+    """A module for motion under gravity along a rail."""
+    return gqm.build(gqm.derive(gqm.Curve.piecewise(pieces, **options), gqm.Gravity()), name=name, folder=folder)
+
+
+def chart_of(module: ModuleType, **given: Any) -> Chart:
+    """The chart that a module makes of its rail."""
+    numbers = module.MODEL.numbers(tuple((module.PARAMETERS | given).values()))
+    return module.MODEL.charted(numbers)
+
+
+def standard_truth(segments: list[tuple[mpf, mpf, mpf]], s: mpf, x: mpf, z: mpf, angle: mpf) -> tuple[mpf, ...]:
+    """x, z, angle and curvature along lengths with end curvatures, by quadrature in 30 digits."""
+    for length, first, last in segments:
+        part = min(length, s)
+        bent = (last - first) / (2 * length)
+        steps = mp.linspace(0, part, 2 + int(abs(first) * part + abs(last) * part))
+        step = mp.quad(lambda t, a=angle, k=first, b=bent: mp.expj(a + k * t + b * t * t), steps)
+        x, z, angle, s = x + step.real, z + step.imag, angle + first * part + bent * part * part, s - part
+        if s <= 0:
+            break
+    return x, z, angle, first + 2 * bent * part
+
+
+def test_standard_pieces(tmp_path: Path) -> None:
+    """Lines, arcs both ways and clothoids through zero curvature, placed end to start: every row to rounding."""
+    module = built(
+        tmp_path,
+        "standard",
+        [
+            gqm.line(length="2/3"),
+            gqm.clothoid(length=2, kappa_start=0, kappa_end="1/R"),
+            gqm.arc(radius="R", angle="3*pi/2"),
+            gqm.clothoid(length="3", kappa_start="1/R", kappa_end=-1.5),
+            gqm.arc(radius=2, angle="-turn"),
+        ],
+        start=(1, "-1/3"),
+        heading="pi/6",
+        parameters={"R": "7/5", "turn": 9},
+    )
+    chart = chart_of(module)
+    with mp.workdps(30):
+        bend = mpf(5) / 7
+        segments = [
+            (mpf(2) / 3, mpf(0), mpf(0)),
+            (mpf(2), mpf(0), bend),
+            (3 * mp.pi / 2 / bend, bend, bend),
+            (mpf(3), bend, mpf("-1.5")),
+            (mpf(18), mpf("-0.5"), mpf("-0.5")),
+        ]
+        ends = [sum(length for length, _, _ in segments[: k + 1]) for k in range(5)]
+        assert abs(chart.high - ends[-1]) <= 2 * ULP * chart.high
+        assert np.abs(chart.breaks - np.array([float(end) for end in ends[:-1]])).max() <= 2 * ULP * chart.high
+        for s in np.linspace(0.01, chart.high - 0.01, 60):
+            truth = standard_truth(segments, mpf(float(s)), mpf(1), -mpf(1) / 3, mp.pi / 6)
+            row = chart.points([s])[:, 0]
+            assert abs(mp.mpc(row[0] - truth[0], row[1] - truth[1])) <= 20 * ULP
+            assert abs(row[2] - truth[2]) <= 4 * ULP * (1 + abs(truth[2])) + ULP * s
+            assert abs(row[3] - truth[3]) <= 4 * ULP + ULP * s
+    assert chart.corners.size == 0
+
+
+def test_a_ring_is_a_circle(tmp_path: Path) -> None:
+    """An arc all the way round, closed: the pendulum's half period, and the loop time of a fast round."""
+    module = built(tmp_path, "ring", [gqm.arc(radius="R", angle="2*pi")], closed=True, parameters={"R": 2})
+    chart = chart_of(module)
+    assert chart.period == chart.high
+    with mp.workdps(30):
+        half = 2 * mp.sqrt(mpf(2) / mpf("9.81")) * ellipk(mp.sin(mpf("0.5")) ** 2)
+        # V**2 = 100 (1 - k sin(angle/2)**2)
+        around = 2 * 2 * 2 / mpf(10) * ellipk(8 * mpf("9.81") / 100)
+    assert abs(module.solve(lam0=2.0).half_period - half) <= 8 * ULP * half
+    loop = module.solve(lam0=0.0, v0=10.0)
+    assert loop.kind == "circulation"
+    assert abs(loop.period - around) <= 8 * ULP * loop.period
+
+
+def test_a_curve_among_pieces(tmp_path: Path) -> None:
+    """A parabola with a line before it and an arc behind: in arc length, to rounding, with its own place."""
+    pieces = [
+        gqm.line(length="sqrt(5)"),
+        gqm.Curve.graph("a*x**2", domain=(-1, 1), parameters={"a": 1}),
+        gqm.arc(radius=1, angle=-1),
+    ]
+    module = built(tmp_path, "mixed", pieces, start=(-2, 3), heading="-atan(2)")
+    chart = chart_of(module)
+
+    def length(x: mpf) -> mpf:
+        return (2 * x * mp.sqrt(1 + 4 * x**2) + mp.asinh(2 * x)) / 4
+
+    with mp.workdps(30):
+        for x in np.linspace(-1.0, 1.0, 23):
+            s = mp.sqrt(5) + length(mpf(1)) + length(mpf(float(x)))
+            row = chart.points([float(s)])[:, 0]
+            assert abs(row[0] - x) <= 4 * ULP
+            assert abs(row[1] - x * x) <= 8 * ULP
+            # A place is known to an ulp, over which the angle turns by up to twice that.
+            assert abs(row[2] - mp.atan(2 * mpf(float(x)))) <= 4 * ULP + 2 * ULP * s
+            if abs(x) < 1.0:  # curvature jumps at the joints
+                assert abs(row[3] - 2 / (1 + 4 * mpf(float(x)) ** 2) ** mpf(1.5)) <= 16 * ULP + 4 * ULP * s
+    motion = module.solve(lam0=float(mp.sqrt(5)), v0=0.0)
+    parabola = gqm.build(gqm.derive(gqm.Curve.graph("x**2"), gqm.Gravity()), name="parabola", folder=tmp_path).solve(
+        lam0=-1.0
+    )
+    assert abs(motion.half_period - parabola.half_period) <= 1e-14
+
+
+def test_a_curve_comes_first(tmp_path: Path) -> None:
+    """It says where the rail starts; a parametric and a polar curve are pieces too, whole turns aside."""
+    pieces = [
+        gqm.Curve.parametric(x="2*sin(u)", z="-2*cos(u)", parameter="u", domain=("-pi/2", "5*pi/2")),
+        gqm.Curve.polar("2", parameter="theta", domain=(0, "pi/2")),
+        gqm.line(length=1),
+    ]
+    chart = chart_of(built(tmp_path, "first", pieces))
+    x, z, alpha, kappa = chart.points([0.0, chart.high, chart.high - 1.5])
+    assert np.abs(x[:2] - [-2.0, -1.0]).max() <= 16 * ULP
+    assert np.abs(z[:2] - [0.0, 2.0]).max() <= 16 * ULP
+    assert np.abs(alpha[:2] - [-math.pi / 2.0, 3.0 * math.pi]).max() <= 16 * ULP
+    assert abs(kappa[2] - 0.5) <= 8 * ULP
+
+
+def test_a_stadium(tmp_path: Path) -> None:
+    """Two lines and two half circles, closed and upright: the time of a round, plane by plane and by quadrature."""
+    pieces = [gqm.line(length=3), gqm.arc(radius=1, angle="pi")] * 2
+    module = built(tmp_path, "stadium", pieces, closed=True)
+    motion = module.solve(lam0=1.0, v0=8.0)
+    with mp.workdps(30):
+        top = mp.sqrt(64 - 4 * mpf("9.81"))
+        bend = mp.quad(lambda a: 1 / mp.sqrt(64 - 2 * mpf("9.81") * (1 - mp.cos(a))), mp.linspace(0, mp.pi, 5))
+        around = mpf(3) / 8 + 3 / top + 2 * bend
+    assert motion.kind == "circulation"
+    assert abs(motion.period - around) <= 8 * ULP * around
+
+
+# A loop between clothoids: lengths of the lines and of the clothoids, and the radius.
+LINE, EASE, RADIUS = 2.0, 2.0, 1.5
+LOOP = [
+    gqm.line(length="a"),
+    gqm.clothoid(length="c", kappa_start=0, kappa_end="1/R"),
+    gqm.arc(radius="R", angle="2*pi - c/R"),
+    gqm.clothoid(length="c", kappa_start="1/R", kappa_end=0),
+    gqm.line(length="a"),
+]
+
+
+@pytest.fixture(scope="module")
+def loop(tmp_path_factory: pytest.TempPathFactory) -> ModuleType:
+    """The rail of a loop."""
+    return built(tmp_path_factory.mktemp("loop"), "loop", LOOP, parameters={"a": 2, "c": 2, "R": "3/2"})
+
+
+def bend_at(s: float) -> float:
+    """Curvature along the loop, as it was declared."""
+    around = RADIUS * 2.0 * math.pi - EASE
+    if s < LINE:
+        return 0.0
+    if s < LINE + EASE:
+        return (s - LINE) / EASE / RADIUS
+    if s < LINE + EASE + around:
+        return 1.0 / RADIUS
+    if s < LINE + 2.0 * EASE + around:
+        return (LINE + 2.0 * EASE + around - s) / EASE / RADIUS
+    return 0.0
+
+
+def integrated(speed: float) -> Any:
+    """The motion along the loop as an initial value problem: x, z, angle, s and V, piece by piece."""
+    ends = np.cumsum([LINE, EASE, RADIUS * 2.0 * math.pi - EASE, EASE, LINE])
+    state, t, runs = np.array([0.0, 0.0, 0.0, 0.0, speed]), 0.0, []
+    for end in ends:
+
+        def rates(_: float, y: np.ndarray, high: float = end) -> list[float]:
+            v = y[4]
+            kappa = bend_at(min(y[3], high - 1e-13))
+            return [v * math.cos(y[2]), v * math.sin(y[2]), v * kappa, v, -G * math.sin(y[2])]
+
+        def arrived(_: float, y: np.ndarray, high: float = end) -> float:
+            return float(y[3] - high)
+
+        arrived.terminal = True
+        run = solve_ivp(
+            rates, (t, t + 10.0), state, method="DOP853", rtol=1e-13, atol=1e-13, events=arrived, dense_output=True
+        )
+        runs.append(run)
+        state, t = run.y[:, -1], float(run.t[-1])
+    return runs
+
+
+def test_force_along_a_loop(loop: ModuleType) -> None:
+    """Time, place, speed and N along it as an integration in time has them; N is least at the top."""
+    motion = loop.solve(lam0=0.0, v0=9.3)
+    runs = integrated(9.3)
+    assert abs(motion.legs[-1].t_end - runs[-1].t[-1]) <= 1e-11
+    least = math.inf
+    for run in runs:
+        t = np.linspace(run.t[0], run.t[-1], 42)[1:-1]
+        x, z, angle, s, v = run.sol(t)
+        force = G * np.cos(angle) + np.array([bend_at(place) for place in s]) * v**2
+        state = motion.state(t)
+        for got, want in ((state.x, x), (state.z, z), (state.s, s), (state.v, v)):
+            assert np.abs(got - want).max() <= 2e-11
+        assert np.abs(state.normal_force - force).max() <= 1e-9
+        least = min(least, force.min())
+    s = np.linspace(0.0, chart_of(loop).high, 20_001)
+    forces = loop.pass1(s, lam0=0.0, v0=9.3).normal_force
+    top = LINE + EASE + 0.5 * (RADIUS * 2.0 * math.pi - EASE)
+    assert abs(s[np.argmin(forces)] - top) <= s[1]
+    assert forces.min() <= least + 1e-9
+
+
+def test_launch_speed_that_keeps_contact(loop: ModuleType) -> None:
+    """Below it a unilateral rail loses the body at the top; where it does, N vanishes as the integration has it."""
+    with mp.workdps(30):
+        # Height of the top by the Fresnel integrals of the clothoid.
+        size, ease, radius = mp.sqrt(2 * mpf(EASE) * RADIUS), mpf(EASE), mpf(RADIUS)
+        turned = ease / (2 * radius)
+        rise = size * mp.quad(lambda w: mp.sin(w * w), [0, ease / size])
+        height = rise + radius * (1 + mp.cos(turned))
+        least = mp.sqrt(2 * mpf("9.81") * height + mpf("9.81") * radius)
+    for share, kept in ((1e-12, True), (-1e-12, False)):
+        motion = loop.solve(lam0=0.0, v0=float(least) * (1.0 + share), contact="above")
+        assert (motion.events[-1].kind == "domain-end") is kept
+        if not kept:
+            assert motion.events[-1].kind == "liftoff"
+    lost = loop.solve(lam0=0.0, v0=0.97 * float(least), contact="above").events[-1]
+    assert lost.kind == "liftoff"
+    run = integrated(0.97 * float(least))[2]
+
+    def force(t: float) -> float:
+        _, _, angle, s, v = run.sol(t)
+        return G * math.cos(angle) + bend_at(s) * v**2
+
+    assert abs(lost.t - brentq(force, run.t[0], 0.5 * (run.t[0] + run.t[-1]), xtol=1e-15)) <= 1e-10
+
+
+def test_joints_must_match(tmp_path: Path) -> None:
+    """Place and tangent within 1e-9; the message names the joint and by how much it misses."""
+    curve = gqm.Curve.graph("(x - 1)*(x - 1 + tilt) + gap", domain=(1, 2))
+    module = built(tmp_path, "joint", [gqm.line(length=1), curve])
+    assert chart_of(module, gap=1e-10, tilt=1e-10).high > 2.0
+    for gap, tilt in ((1e-8, 0), (0, 1e-8), (0.5, -2)):
+        missed = rf"{gap:.3g} and {abs(math.atan(tilt)):.3g} rad"
+        with pytest.raises(
+            DeclarationError, match=rf"piece 2 \(curve\): begins at .* {missed} off where the piece before"
+        ):
+            module.solve(lam0=0.5, v0=1, gap=gap, tilt=tilt)
+    half = built(tmp_path, "open", [gqm.line(length=3), gqm.arc(radius=1, angle="pi")], closed=True)
+    with pytest.raises(
+        DeclarationError, match=r"closed: the start lies at .* off where the last piece ends: .* both must"
+    ):
+        half.solve(lam0=1)
+
+
+@pytest.mark.parametrize(
+    ("pieces", "given", "error", "message"),
+    [
+        ([gqm.line(length="q")], {"q": -1}, ParameterError, r"piece 1 \(line\): length: must be positive, got -1.0"),
+        (
+            [gqm.arc(radius="q", angle=1)],
+            {"q": 0},
+            ParameterError,
+            r"piece 1 \(arc\): radius: must be positive, got 0.0",
+        ),
+        ([gqm.arc(radius=1, angle="q")], {"q": 0}, ParameterError, r"piece 1 \(arc\): angle: must not be zero"),
+        (
+            [gqm.arc(radius=1, angle="q")],
+            {"q": 1e6},
+            ParameterError,
+            r"piece 1 \(arc\): turns by 1e\+06 rad; 100000 is",
+        ),
+        (
+            [gqm.Curve.graph("x", domain=("q", 0))],
+            {"q": 1},
+            ParameterError,
+            r"piece 1 \(curve\): domain: must have finite",
+        ),
+        (
+            [gqm.Curve.graph("log(x)", domain=("q", 1))],
+            {"q": -1},
+            SolutionError,
+            r"piece 1 \(curve\): the curve is not fin",
+        ),
+        (
+            [gqm.Curve.graph("abs(x)", domain=("q", 1))],
+            {"q": -0.3},
+            SolutionError,
+            r"piece 1 \(curve\): the curve has a cu",
+        ),
+    ],
+)
+def test_numbers_that_cannot_be(
+    pieces: list[Any], given: dict[str, float], error: type[Exception], message: str, tmp_path: Path
+) -> None:
+    """Lengths, angles and domains that depend on parameters are checked when those are known."""
+    module = built(tmp_path, "wrong", pieces)
+    with pytest.raises(error, match=message):
+        module.solve(lam0=0, v0=1, **given)
+
+
+@pytest.mark.parametrize(
+    ("declare", "message"),
+    [
+        (lambda: gqm.line(length=0), "line: length: must be positive, got 0"),
+        (lambda: gqm.arc(radius="-2", angle=1), "arc: radius: must be positive, got -2"),
+        (lambda: gqm.arc(radius=2, angle=0), "arc: angle: must not be zero"),
+        (lambda: gqm.clothoid(length="1 +", kappa_start=0, kappa_end=1), "clothoid: length: "),
+        (lambda: gqm.Curve.piecewise([]), "piecewise: no pieces; give one or more"),
+        (lambda: gqm.Curve.piecewise(["line"]), "piecewise: piece 1: str given; give line, arc, clothoid or a curve"),
+        (
+            lambda: gqm.Curve.piecewise([gqm.Curve.graph("x**2")]),
+            r"piecewise: piece 1 \(graph\): domain: must have two ends",
+        ),
+        (
+            lambda: gqm.Curve.piecewise([gqm.Curve.piecewise([gqm.line(length=1)])]),
+            "piecewise: piece 1: a curve of kind 'piecewise' cannot be a piece",
+        ),
+        (lambda: gqm.Curve.piecewise([gqm.line(length="s")]), "piecewise: 's' is the arc length of the rail"),
+        (
+            lambda: gqm.Curve.piecewise([gqm.Curve.graph("x", domain=(0, 1))], start=(0, 0)),
+            "piecewise: start: the first piece is a curve with a place of its own",
+        ),
+        (
+            lambda: gqm.Curve.piecewise([gqm.line(length=1)], start=3),
+            r"piecewise: start: must be a pair \(x, z\), got 3",
+        ),
+        (
+            lambda: gqm.Curve.piecewise([gqm.line(length=1)], closed=1),
+            "piecewise: closed: must be True or False, got 1",
+        ),
+        (
+            lambda: gqm.Curve.piecewise([gqm.Curve.graph("q*x", domain=(0, 1), parameters={"q": k}) for k in (1, 2)]),
+            r"piecewise: piece 2 \(graph\): 'q' is 2 there and 1 before",
+        ),
+    ],
+)
+def test_declarations_that_cannot_be(declare: Any, message: str) -> None:
+    """What is wrong whatever the parameters are is refused at once."""
+    with pytest.raises(gqm.GQMError, match=f"^{message}"):
+        declare()
+
+
+def test_parameters_of_pieces() -> None:
+    """In order of appearance, each once, with the defaults of curves and those given."""
+    pieces = [
+        gqm.arc(radius="R", angle="turn"),
+        gqm.Curve.graph("k*x + R", domain=(0, "w"), parameters={"k": 2, "w": None, "R": None}, positive=["k"]),
+    ]
+    curve = gqm.Curve.piecewise(pieces, start=("x0", 0), parameters={"R": "1.5"})
+    assert dict(curve.defaults) == {"R": "1.5", "x0": None, "turn": None, "k": 2, "w": None}
+    assert curve.positive == ("k",)
+
+
+YAML = """
+name: rail
+curve:
+  pieces:
+{pieces}
+kernel: {{gravity: {{}}}}
+parameters: {{R: 1.5, c: 2, a: 2}}
+"""
+WRITTEN = """
+    - line: {length: a}
+    - clothoid: {length: c, kappa_start: 0, kappa_end: 1/R}
+    - arc: {radius: R, angle: 2*pi - c/R}
+    - clothoid: {length: c, kappa_start: 1/R, kappa_end: 0}
+    - line: {length: a}
+"""
+
+
+def spec(folder: Path, pieces: str, *, parameters: bool = True) -> gqm.Curve:
+    """The curve of a YAML file."""
+    text = YAML.format(pieces=pieces.strip("\n"))
+    (folder / "rail.yaml").write_text(text if parameters else text.rpartition("parameters")[0])
+    return gqm.read_spec(folder / "rail.yaml").curve
+
+
+def test_rails_in_yaml(tmp_path: Path) -> None:
+    """A list of pieces, or a mapping with start, heading and closed; families and graphs are pieces too."""
+    assert spec(tmp_path, WRITTEN).definition == gqm.Curve.piecewise(LOOP).definition
+    head = "    start: [0, 1]\n    heading: -pi/6\n    closed: true\n    pieces:"
+    long = spec(tmp_path, head + WRITTEN)
+    assert long.definition == gqm.Curve.piecewise(LOOP, start=(0, 1), heading="-pi/6", closed=True).definition
+    curves = "    - graph: {z: x**2, domain: [0, 1]}\n    - family: {name: parabola, a: 1, domain: [1, 2]}"
+    pieces = [gqm.Curve.graph("x**2", domain=(0, 1)), gqm.families.parabola(a="1", domain=(1, 2))]
+    assert spec(tmp_path, curves, parameters=False).definition == gqm.Curve.piecewise(pieces).definition
+
+
+@pytest.mark.parametrize(
+    ("pieces", "message"),
+    [
+        ("    - line: {length: -2}", ":5:5: curve.pieces: piece 1, line: length: must be positive, got -2"),
+        ("    - arc: {radius: 2}", ":5:7: curve.pieces.0.arc: angle is missing; add angle: pi/2"),
+        ("    - {}", ":5:5: curve.pieces: piece 1, which is empty: give exactly one of line, arc, clothoid, graph"),
+        ("    - {line: {length: 1}, arc: {radius: 1, angle: 1}}", "piece 1, which is line and arc: give exactly one"),
+        ("    - spiral: {length: 1}", "curve.pieces.0: unknown key 'spiral'"),
+        ("    - line: {length: 1 +}", r":5:25: curve.pieces.0.line.length: "),
+        ("    - graph: {z: x**2}", r"piece 1 \(graph\): domain: must have two ends"),
+        ("    - family: {name: parabola, b: 1}", "curve.pieces.0.family: unknown key 'b'"),
+        ("    start: [0, 1]", "curve.pieces: pieces is missing; add pieces: "),
+        (
+            "    start: 1\n    pieces: [{line: {length: 1}}]",
+            r"curve.pieces.start: must be a list, as in \[a, b\], got '1'",
+        ),
+    ],
+)
+def test_mistakes_in_yaml(tmp_path: Path, pieces: str, message: str) -> None:
+    """Each at its place."""
+    with pytest.raises(gqm.GQMError, match=message):
+        spec(tmp_path, pieces, parameters=False)

@@ -1,0 +1,108 @@
+"""Reports: one well-formed page, complete in itself, that says what the motion says."""
+
+import re
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+
+import gqm_sym as gqm
+from gqm_sym.cli import tool
+
+HTML, SVG, MATH = (
+    "{http://www.w3.org/1999/xhtml}",
+    "{http://www.w3.org/2000/svg}",
+    "{http://www.w3.org/1998/Math/MathML}",
+)
+
+FILE = """\
+name: swing
+title: '<script src="http://example.org/x.js">&amp;</script>'
+curve:
+  family: {name: circle, L: L}
+kernel:
+  gravity: {}
+parameters:
+  L: {value: 100, unit: cm, description: "length < 2 m"}
+launch: {lam0: 5/2}
+"""
+
+
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder with a curve file, to run commands in."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "swing.yaml").write_text(FILE)
+    return tmp_path
+
+
+def page(*arguments: str) -> ElementTree.Element:
+    """The tree of the page that the command writes."""
+    assert tool.main(["report", "swing.yaml", *arguments, "-o", "swing.html"]) == 0
+    return ElementTree.fromstring(Path("swing.html").read_text(encoding="utf-8"))
+
+
+def rows(tree: ElementTree.Element) -> list[list[str]]:
+    """The rows of all tables."""
+    return [["".join(cell.itertext()) for cell in row] for row in tree.iter(f"{HTML}tr")]
+
+
+def test_a_page_is_complete_in_itself(here: Path) -> None:
+    """Nothing is fetched or run, whatever the file says; every reference is to a place in the page, and is there."""
+    tree = page()
+    tags = {element.tag.split("}")[1] for element in tree.iter()}
+    assert not tags & {"script", "link", "img", "iframe", "object"}
+    ids = [element.get("id") for element in tree.iter() if element.get("id")]
+    assert len(ids) == len(set(ids))
+    for element in tree.iter():
+        for name, value in element.items():
+            assert not name.startswith("on")
+            if name.endswith(("href", "src")):
+                # The bar of colours is a picture in the page itself.
+                assert value.startswith("data:image/png;base64,") or value[1:] in ids
+            for target in re.findall(r"url\(([^)]*)\)", value):
+                assert target[1:] in ids
+    style = "".join(tree.find(f"{HTML}head/{HTML}style").itertext())  # type: ignore[union-attr]
+    assert "url(" not in style
+    assert "@import" not in style
+
+
+def test_what_a_page_says(here: Path) -> None:
+    """Formulas, figures, events, parameters with their units, and the file itself."""
+    tree = page()
+    first = Path("swing.html").read_bytes()
+    page()
+    assert Path("swing.html").read_bytes() == first, "the same input gives the same bytes"
+    spec = gqm.read_spec("swing.yaml")
+    model = spec.derive()
+    assert len(list(tree.iter(f"{MATH}math"))) == len(model.closed_forms())
+    shown = ["".join(math.itertext()) for math in tree.iter(f"{MATH}math")]
+    assert "κ=1L" in [text.replace("\u2062", "") for text in shown]
+    assert len(list(tree.iter(f"{SVG}svg"))) == 3
+    motion = gqm.build(model, name="swing").solve(**spec.launch)
+    table = rows(tree)
+    assert ["kind", "libration"] in table
+    assert ["period (s)", repr(motion.period)] in table
+    assert ["L", "1", "m", "length < 2 m"] in table
+    for event in motion.events:
+        assert [event.kind, *map(repr, (event.t, event.lam, event.x, event.z))] in table
+    (source,) = tree.iter(f"{HTML}pre")
+    assert source.text == FILE
+    assert tree.find(f"{HTML}head/{HTML}title").text == f"swing: {spec.title}"  # type: ignore[union-attr]
+
+
+@pytest.mark.parametrize("launch", [["--lam0=0"], ["--lam0=pi/2", "--v0=9", "--t-max=1"]])
+def test_other_motions(launch: list[str], here: Path) -> None:
+    """Rest, circulation, a horizon: options of the launch are those of gqm solve."""
+    given = launch[0].split("=")[1]
+    assert ["launch at theta", given] in rows(page(*launch))
+
+
+def test_where_it_is_written(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Beside the caller by the name in the file; wrong input writes nothing."""
+    assert tool.main(["report", "swing.yaml"]) == 0
+    assert capsys.readouterr().out == "wrote swing.html\n"
+    Path("swing.html").unlink()
+    assert tool.main(["report", "swing.yaml", "--v0=-1"]) == 2
+    assert tool.main(["report", "none.yaml"]) == 2
+    assert sorted(path.name for path in here.iterdir()) == ["swing.yaml"]

@@ -1,0 +1,73 @@
+"""The file to start from: it generates and solves as it is, and so do the lines in it that are comments."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+import gqm_sym as gqm
+from gqm_sym.cli import gen, tool
+from gqm_sym.specfile import starter
+
+
+def test_it_generates_and_solves(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """From no file to digits in two commands."""
+    monkeypatch.chdir(tmp_path)
+    assert gen.main(["--init", "first"]) == 0
+    assert capsys.readouterr().out == "wrote first.yaml\n"
+    assert gen.main(["first.yaml", "--solve"]) == 0
+    said = capsys.readouterr().out
+    assert "a = 1.4 m (140 cm) size of the bowl" in " ".join(said.split())
+    assert "kind            libration" in said
+
+
+def test_nothing_is_overwritten(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A file of that name stays as it is; a name that no module can have makes none."""
+    monkeypatch.chdir(tmp_path)
+    Path("mine.yaml").write_text("mine")
+    assert gen.main(["--init", "mine"]) == 2
+    assert Path("mine.yaml").read_text() == "mine"
+    assert gen.main(["--init", "../up"]) == 2
+    assert "cannot be a name" in capsys.readouterr().err
+    assert gen.main(["--init", "other", "mine.yaml"]) == 2
+    assert [path.name for path in tmp_path.iterdir()] == ["mine.yaml"]
+
+
+KEYS = ("parametric", "polar", "family", "rotating_frame", "rolling", "direction", "t_max", "contact")
+COMMENTED = re.findall(rf"^ +# ((?:{'|'.join(KEYS)}): .*)$", starter("a"), re.MULTILINE)
+
+
+@pytest.mark.parametrize("line", COMMENTED)
+def test_what_is_commented_out_is_right(line: str, tmp_path: Path) -> None:
+    """Each may take the place of the line it stands by, or be added to it."""
+    text = starter("a").replace(f"# {line}", line)
+    if line.startswith(("parametric", "polar", "family")):
+        text = "\n".join(row for row in text.split("\n") if not row.startswith("  graph:"))
+    path = tmp_path / "a.yaml"
+    path.write_text(text)
+    spec = gqm.read_spec(path)
+    spec.check_solvable(spec.derive())
+
+
+def test_all_of_them_are_found() -> None:
+    """The pattern above misses none."""
+    assert len(COMMENTED) == len(KEYS)
+
+
+def test_the_path_of_a_first_user(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Own file, module, figure, report: each command of the documentation's first page, in its order."""
+    page = (Path(__file__).parent.parent / "docs" / "start.md").read_text(encoding="utf-8")
+    (block,) = re.findall(r"^```sh\n(.*?)^```", page, re.MULTILINE | re.DOTALL)
+    commands = [line.split() for line in block.splitlines()]
+    monkeypatch.chdir(tmp_path)
+    for program, *arguments in commands:
+        assert {"gqm": tool.main, "gqm-gen": gen.main}[program](arguments) == 0
+    assert capsys.readouterr().err == ""
+    made = {path.relative_to(tmp_path).as_posix() for path in tmp_path.rglob("*") if path.suffix != ".pyc"}
+    assert made >= {"bowl.yaml", "generated/bowl.py", "bowl.svg", "bowl.html"}

@@ -1,0 +1,166 @@
+"""Sweeps over launches and parameters: against closed forms, and against motions solved one by one."""
+
+from collections.abc import Callable
+from types import ModuleType
+
+import numpy as np
+import pytest
+from mpmath import mp, mpf
+
+from gqm_sym.errors import InputError, ParameterError
+from gqm_sym.runtime.sweeping import REASONS
+
+ModuleOf = Callable[[str], ModuleType]
+
+# Half periods away from barriers, in units of the last place.
+ULPS = 4.0
+# An extreme is flat: its value has the digits of V or N themselves, relative to the largest.
+LOAD = 4e-15
+# Arrival by panels against the exact reading.
+ARRIVAL = 4e-15
+
+
+def _pendulum(amplitude: float, length: float) -> mpf:
+    """Half period of a pendulum in closed form."""
+    with mp.workdps(40):
+        k = mp.sin(mpf(amplitude) / 2)
+        return 2 * mp.ellipk(k * k) * mp.sqrt(mpf(length) / mpf("9.81"))
+
+
+def test_half_periods_of_pendulums(module_of: ModuleOf) -> None:
+    """Released from rest anywhere away from the top, with any length: within a few last places of the closed form."""
+    rng = np.random.default_rng(11)
+    amplitude, length = np.append(rng.uniform(1e-6, 2.5, 150), [1e-8, 1e-3]), rng.uniform(0.1, 10.0, 152)
+    got = module_of("circle").sweep("half_period", amplitude, L=length)
+    assert not got.reasons.any()
+    for value, a, el in zip(got.values, amplitude, length, strict=True):
+        truth = _pendulum(float(a), float(el))
+        assert abs(mpf(float(value)) - truth) <= ULPS * np.spacing(float(truth))
+
+
+def test_launched_with_speed_it_is_the_orbit_that_counts(module_of: ModuleOf) -> None:
+    """Launches at other phases of one swing have its period; the same upwards and downwards."""
+    top = 1.25
+    places = np.linspace(-1.2, 1.2, 7)
+    speeds = np.sqrt(2 * 9.81 * (np.cos(places) - np.cos(top)))
+    got = module_of("circle").sweep("period", places[:, None], speeds[:, None], [1, -1], L=1)
+    assert got.values.shape == got.reasons.shape == (7, 2)
+    # Speeds are rounded, and the period follows the amplitude they mean.
+    assert got.values == pytest.approx(2 * float(_pendulum(top, 1.0)), rel=1e-15)
+
+
+def test_loop_times_of_whirling_pendulums(module_of: ModuleOf) -> None:
+    """Loop times are 4 K/v0 from the bottom; they have no half period, and no turning points."""
+    v0 = np.linspace(7.0, 30.0, 20)
+    circle = module_of("circle")
+    got = circle.sweep("period", 0.0, v0, L=1)
+    for value, v in zip(got.values, v0, strict=True):
+        with mp.workdps(40):
+            truth = 4 * mp.ellipk(4 * mpf("9.81") / mpf(float(v)) ** 2) / mpf(float(v))
+        assert abs(mpf(float(value)) - truth) <= ULPS * np.spacing(float(truth))
+    for quantity in ("half_period", "turning_points"):
+        none = circle.sweep(quantity, 0.0, v0, L=1)
+        assert np.isnan(none.values).all()
+        assert none.why() == {REASONS[2]: 20}
+
+
+def test_next_to_a_barrier_the_exact_problem_answers(module_of: ModuleOf) -> None:
+    """Orbits that doubles cannot time have every digit all the same."""
+    amplitude = np.pi - np.array([1e-2, 1e-4, 1e-8])
+    got = module_of("circle").sweep("half_period", amplitude, L=1)
+    for value, a in zip(got.values, amplitude, strict=True):
+        truth = _pendulum(float(a), 1.0)
+        assert abs(mpf(float(value)) - truth) <= np.spacing(float(truth))
+
+
+def test_the_tautochrone_is_one(module_of: ModuleOf) -> None:
+    """Every amplitude takes 2 pi sqrt(R/g)."""
+    radius = np.array([[0.5], [2.0]])
+    got = module_of("cycloid_plus").sweep("half_period", np.linspace(0.1, 3.0, 9), R=radius)
+    assert got.values == pytest.approx(2 * np.pi * np.sqrt(np.broadcast_to(radius, (2, 9)) / 9.81), rel=6e-16)
+
+
+@pytest.mark.parametrize("v0", [0.0, 1.5, 9.0])
+def test_turning_points_and_loads_as_of_one_motion(v0: float, module_of: ModuleOf) -> None:
+    """Speeds and contact forces of a pendulum are extreme at the bottom, and at the turns or the top."""
+    circle = module_of("circle")
+    lam0 = np.array([0.4, 0.9])
+    bottom = np.sqrt(v0**2 + 2 * 9.81 * (1 - np.cos(lam0)))
+    climbed = np.maximum(v0**2 - 2 * 9.81 * (1 + np.cos(lam0)), 0.0)
+    height = np.cos(lam0) - v0**2 / (2 * 9.81) if v0 < 9 else np.full(2, -1.0)
+    for quantity, truth, scale in (
+        ("v_max", bottom, bottom),
+        ("v_min", np.sqrt(climbed), bottom),
+        ("normal_force_max", bottom**2 + 9.81, bottom**2 + 9.81),
+        ("normal_force_min", climbed + 9.81 * height, bottom**2 + 9.81),
+    ):
+        got = circle.sweep(quantity, lam0, v0, L=1)
+        assert (np.abs(got.values - truth) <= LOAD * scale).all(), quantity
+    if v0 < 9.0:
+        got = circle.sweep("turning_points", lam0, v0, L=1)
+        for pair, start in zip(got.values, lam0, strict=True):
+            assert list(pair) == pytest.approx(sorted(circle.solve(start, v0, L=1).turning_points), rel=5e-16)
+
+
+def test_loads_next_to_a_barrier(module_of: ModuleOf) -> None:
+    """An orbit that is left to the exact problem has its loads at the bottom too."""
+    top = np.pi - 1e-5
+    got = module_of("circle").sweep("normal_force_max", top, L=1)
+    assert got.values == pytest.approx(9.81 * (1 + 2 * (1 - np.cos(top))), rel=LOAD)
+
+
+def test_arrivals(module_of: ModuleOf) -> None:
+    """First times at places ahead, behind, beyond the turn and laps away, as of one motion; never is NaN."""
+    circle = module_of("circle")
+    for lam0, v0, way in ((0.5, 1.0, 1), (0.5, 1.0, -1), (0.5, 0.0, 1), (0.0, 9.0, 1), (0.0, 9.0, -1)):
+        motion = circle.solve(lam0, v0, way, L=1)
+        places = np.array([-0.4, 0.2, 0.5, 0.52, 4.0, -9.0])
+        got = circle.sweep("time_at", lam0, v0, way, lam=places, L=1)
+        for value, place, reason in zip(got.values, places, got.reasons, strict=True):
+            if reason:
+                assert REASONS[reason] == "the motion is never at the place asked for"
+                assert np.isnan(value)
+                assert motion.kind == "libration" or (place - lam0) * way < 0
+            else:
+                assert value == pytest.approx(motion.time_at(float(place)), rel=ARRIVAL, abs=1e-16)
+
+
+def test_what_has_no_answer_says_why(module_of: ModuleOf) -> None:
+    """NaN in, a place outside the domain, and a motion that leaves: codes, not exceptions."""
+    got = module_of("cycloid_arch").sweep("period", [np.nan, 99.0, 3.5], R=1)
+    assert np.isnan(got.values).all()
+    assert [REASONS[code] for code in got.reasons] == [
+        "the launch or a parameter is not a finite number",
+        "the launch place lies outside the domain",
+        "the motion is not of a kind that has this quantity",
+    ]
+    assert sum(got.why().values()) == 3
+
+
+def test_a_long_sweep_is_cut_and_joined(module_of: ModuleOf) -> None:
+    """Threads and chunks change nothing; broadcast columns need not lie in memory."""
+    amplitude = np.linspace(0.1, 1.0, 300)
+    length = np.linspace(0.5, 2.0, 120)[:, None]
+    circle = module_of("circle")
+    whole = circle.sweep("half_period", amplitude, L=length)
+    assert whole.values.shape == (120, 300)
+    assert (whole.values[77] == circle.sweep("half_period", amplitude, L=float(length[77, 0])).values).all()
+
+
+def test_mistakes_are_named(module_of: ModuleOf) -> None:
+    """An unknown quantity, a missing place, a negative speed, shapes that do not fit, a length below zero."""
+    sweep = module_of("circle").sweep
+    with pytest.raises(InputError, match="quantity: must be one of half_period"):
+        sweep("frequency", 0.1, L=1)
+    with pytest.raises(InputError, match="lam: is the place"):
+        sweep("time_at", 0.1, L=1)
+    with pytest.raises(InputError, match="v0: is a speed"):
+        sweep("period", 0.1, [1.0, -1.0], L=1)
+    with pytest.raises(InputError, match="direction: must be"):
+        sweep("period", 0.1, 1.0, 0, L=1)
+    with pytest.raises(InputError, match=r"lam0 \(2,\), v0 \(3,\)"):
+        sweep("period", [0.1, 0.2], [1, 2, 3], L=1)
+    with pytest.raises(ParameterError, match="L: must be positive"):
+        sweep("period", 0.1, L=[1.0, -1.0])
+    with pytest.raises(ParameterError, match="L: has no default"):
+        sweep("period", 0.1)
