@@ -74,13 +74,18 @@ def write_module(text: str, path: str | os.PathLike[str], *, force: bool = False
 
 
 def write_text(text: str, path: str | os.PathLike[str]) -> None:
-    """Write a text file, whole or not at all: to a neighbour first, which then takes its place."""
+    """Write a text file, whole or not at all."""
+    write_bytes(text.encode("utf-8"), path)
+
+
+def write_bytes(data: bytes, path: str | os.PathLike[str]) -> None:
+    """Write a file, whole or not at all: to a neighbour first, which then takes its place."""
     target = Path(path)
     target.parent.mkdir(parents=True, exist_ok=True)
     handle, temporary = tempfile.mkstemp(prefix=f".{target.name}.", suffix=".tmp", dir=target.parent)
     try:
-        with os.fdopen(handle, "w", encoding="utf-8", newline="\n") as stream:
-            stream.write(text)
+        with os.fdopen(handle, "wb") as stream:
+            stream.write(data)
             stream.flush()
             os.fsync(stream.fileno())
         Path(temporary).chmod(0o666 & ~_umask())
