@@ -4,8 +4,11 @@ WORKERS ?= 2
 VENV    := .venv
 BIN     := $(VENV)/bin
 
+# Tests whose subject is compilation, another process or the disk: the others run uncompiled for `coverage`.
+COMPILED := $(patsubst %,tests/test_%.py,architecture errors faults family_pages hostile jit processes starter)
+
 .DEFAULT_GOAL := help
-.PHONY: help demo test lint generate docs soak fuzz bench mutate
+.PHONY: help demo test lint generate docs soak fuzz bench coverage mutate
 
 help: ## show this list
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-9s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -36,6 +39,13 @@ soak: $(VENV)/.run ## solve random launches and hold each motion to its laws (CO
 
 fuzz: $(VENV)/.run ## read mutated files and expressions for ten minutes (SECONDS, SEED)
 	$(BIN)/python scripts/fuzz.py $(or $(SECONDS),600) $(or $(SEED),0)
+
+coverage: $(VENV)/.dev ## measure which branches the tests run, compiled code included; it takes an hour
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check 'coverage>=7.6'
+	$(BIN)/python scripts/mutate.py 0
+	-$(BIN)/python -m coverage run --branch --source=gqm_sym --data-file=.mutants/coverage.compiled -m pytest $(COMPILED)
+	$(BIN)/python -m coverage combine --keep --data-file=.mutants/all .mutants/coverage.*
+	$(BIN)/python -m coverage report --data-file=.mutants/all --skip-covered --show-missing
 
 mutate: $(VENV)/.dev ## change the code at random and list the changes that no test notices (COUNT, SEED)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check 'coverage>=7.6'

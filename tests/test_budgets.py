@@ -2,9 +2,14 @@
 
 import threading
 import time
+from collections.abc import Callable
+from itertools import count
+from types import ModuleType
+from typing import Any
 
 import pytest
 
+from gqm_sym import budgets
 from gqm_sym.budgets import apart, budget, spend
 from gqm_sym.errors import BudgetError
 
@@ -75,3 +80,25 @@ def test_a_budget_is_its_threads_own() -> None:
         thread.start()
         thread.join()
     assert done == [None]
+
+
+# The stage, the launch it belongs to, and what is asked of the motion (None: the motion itself).
+ASKED: dict[str, tuple[str, str, Callable[[Any], object] | None]] = {
+    "an equilibrium": ("search for turning points", "pi/2 - 1e-30", None),
+    "a time": ("quadrature", "-pi/2 + 6/5", lambda motion: motion.lam(1e9)),
+    "digits": ("period_to", "-pi/2 + 6/5", lambda motion: motion.period_to(50)),
+}
+
+
+@pytest.mark.parametrize("question", ASKED)
+def test_extended_precision_is_bounded(
+    question: str, module_of: Callable[[str], ModuleType], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What is evaluated in extended precision looks at the time it takes, and says what it was and what to try."""
+    stage, lam0, ask = ASKED[question]
+    module = module_of("pendulum")
+    motion = module.solve(lam0=lam0, L=1)
+    passing = count(0, 1000)
+    monkeypatch.setattr(budgets, "thread_time", lambda: next(passing))
+    with pytest.raises(BudgetError, match=rf"^{stage}: not done after \d+ s of processor time; (launch|ask)"):
+        module.solve(lam0=lam0, L=1) if ask is None else ask(motion)
