@@ -42,7 +42,7 @@ LEFT_OUT = ("architecture", "docs", "errors", "faults", "family_pages", "hostile
 IMPORTS = ("--import-mode=importlib", "--continue-on-collection-errors")
 # Processor time in seconds: that a test may take to be one of the quick ones, that a mutant's tests may take together
 # by what they took before, and by how much it may slow them down.
-SLOW, TOGETHER, SLOWER = 2.5, 20.0, 4.0
+SLOW, TOGETHER, SLOWER = 2.5, 10.0, 4.0
 
 
 class Slow(BaseException):

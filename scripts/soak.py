@@ -71,6 +71,8 @@ def faults(module: ModuleType, call: dict[str, Any], draw: random.Random) -> lis
     if not all(np.isfinite(row).all() for row in values):
         return ["not finite"]
     lam, v2 = values[0], values[4]
+    if motion.kind == "rest":
+        return [] if np.all(lam == call["lam0"]) and not np.any(values[3]) else ["moves at rest"]
     legs = motion.legs
     launch = {**call, "direction": legs[0].direction}
     ds = module.pass1(lam, **launch).ds

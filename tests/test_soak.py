@@ -43,8 +43,11 @@ def test_a_slow_launch_from_the_bottom_of_a_well(well: ModuleType) -> None:
 
 
 def _with(motion: Any, **changes: Callable[..., Any]) -> SimpleNamespace:
-    names = ("kind", "legs", "turning_points", "period", "t_end", "state", "lam", "error_bound", "time_at")
-    return SimpleNamespace(**{name: getattr(motion, name) for name in names} | changes)
+    names = ("kind", "legs", "turning_points", "t_end", "state", "lam", "error_bound", "time_at")
+    told = {name: getattr(motion, name) for name in names}
+    if motion.kind != "rest":
+        told["period"] = motion.period
+    return SimpleNamespace(**told | changes)
 
 
 def _scaled(state: Any, name: str, factor: float) -> Any:
@@ -72,6 +75,16 @@ def test_a_broken_law_is_reported(law: str, well: ModuleType) -> None:
     assert soak.faults(tampered, call, random.Random(0)) == []
     tampered.solve = lambda **_: wrong
     assert any(found.startswith(WRONG[law][0]) for found in soak.faults(tampered, call, random.Random(0)))
+
+
+def test_a_body_at_rest_stays(well: ModuleType) -> None:
+    """At the bottom, without speed; and one that moves there is reported."""
+    call = SLOW | {"v0": 0.0}
+    assert soak.faults(well, call, random.Random(0)) == []
+    motion = well.solve(**call)
+    moves = _with(motion, state=lambda t: motion.state(t)._replace(lam=np.full(len(t), -1.1)))
+    tampered = SimpleNamespace(MODEL=well.MODEL, PARAMETERS=well.PARAMETERS, solve=lambda **_: moves)
+    assert soak.faults(tampered, call, random.Random(0)) == ["moves at rest"]
 
 
 def test_a_sweep_that_differs_is_reported(well: ModuleType) -> None:

@@ -10,13 +10,15 @@ import importlib
 import math
 import pkgutil
 from collections.abc import Callable
-from functools import wraps
+from functools import cache, wraps
+from inspect import signature
 from types import FunctionType, SimpleNamespace
 from typing import Any
 
 import numba
 import numpy as np
 from numba.core.extending import _Intrinsic
+from numba.core.registry import CPUDispatcher
 
 import gqm_sym.runtime
 from gqm_sym.runtime import interface, jit
@@ -48,11 +50,26 @@ def _carray(array: Any, shape: Any) -> Any:
 
 _MATH: dict[Any, Any] = {getattr(math, name): getattr(np, other) for name, other in _NAMES.items()}
 _MATH |= {math.floor: _whole(math.floor), math.ceil: _whole(math.ceil), numba.carray: _carray}
-_FUSED = {"fma": lambda x, y, z: np.float64(_fma(x, y, z)), "nearest_whole": np.rint}
+_QUICK = {"fma": lambda x, y, z: np.float64(_fma(x, y, z)), "nearest_whole": np.rint}
 
 
 def _call(address: int, *arguments: Any) -> None:
     _FUNCTIONS[address](*arguments)
+
+
+@cache
+def _compiled(intrinsic: Any) -> Callable[..., Any]:
+    """Give what LLVM does, as a function for Python: nothing else knows what that is."""
+    f = intrinsic
+    forms: tuple[Callable[..., Any], ...] = (
+        lambda a: f(a),
+        lambda a, b: f(a, b),
+        lambda a, b, c: f(a, b, c),
+        lambda a, b, c, d: f(a, b, c, d),
+        lambda a, b, c, d, e: f(a, b, c, d, e),
+    )
+    count = len(signature(intrinsic._defn).parameters) - 1  # but for the typing context
+    return CPUDispatcher(forms[count - 1], targetoptions={"nopython": True})  # type: ignore[no-any-return]
 
 
 def _alike(value: Any) -> Any:
@@ -60,7 +77,9 @@ def _alike(value: Any) -> Any:
     if isinstance(value, float):
         return np.float64(value)
     if isinstance(value, _Intrinsic):
-        return _FUSED.get(value._name, _call)
+        if value._name.startswith("call_"):
+            return _call
+        return _QUICK.get(value._name) or _compiled(value)
     try:
         return _MATH.get(value, value)
     except TypeError:  # not hashable
@@ -95,8 +114,8 @@ def _compiler(file: str, *, interface: int) -> Callable[[Any], Callable[[Any], A
     if interface != INTERFACE:
         return COMPILER(file, interface=interface)
 
-    def compiled(signature: Any) -> Callable[[Any], Any]:
-        kinds = [_C.get(kind, ctypes.POINTER(ctypes.c_double)) for kind in signature.args]
+    def compiled(kind: Any) -> Callable[[Any], Any]:
+        kinds = [_C.get(one, ctypes.POINTER(ctypes.c_double)) for one in kind.args]
 
         def decorate(function: Any) -> Any:
             names = {name: _alike(value) for name, value in function.__globals__.items()}
