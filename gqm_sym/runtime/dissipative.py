@@ -4,7 +4,7 @@ from math import inf, isfinite
 
 import numpy as np
 
-from gqm_sym.errors import InputError, SolutionError
+from gqm_sym.errors import BudgetError, InputError, SolutionError
 from gqm_sym.runtime import legs
 from gqm_sym.runtime.course import ZERO, Course, Pair, Piece
 from gqm_sym.runtime.entries import follow, frame_at, from_rest
@@ -24,6 +24,8 @@ CLOSEST = 690.0
 MOST_PAUSES = 12
 # Turns after which `legs` and `events` stop looking for the rest.
 MOST_TURNS = 20000
+# Pieces of legs that are kept, each some kilobytes.
+MOST_PIECES = 250_000
 
 
 def dissipate(formulas: Formulas, p: tuple[Number, ...], launch: Launch) -> Motion:
@@ -198,6 +200,11 @@ class Dissipative(Motion):
 
     def _go_on(self) -> None:
         """Follow the body to its next turn, to an end, or as far as one run goes."""
+        if len(self._pieces) >= MOST_PIECES:
+            raise BudgetError(
+                f"motion: {MOST_PIECES} pieces of legs reach t = {self._pieces[-1].t_stop[0]!r} only; "
+                "give a shorter t_max, or ask for earlier times and nearer places"
+            )
         problem, way, start, w = self.problem, self._way, self._place, self._w
         f, period = problem.functions, problem.period
         end = problem.high if way > 0 else problem.low

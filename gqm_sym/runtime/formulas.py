@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from gqm_sym.budgets import budget
 from gqm_sym.errors import LaunchError, ParameterError
 from gqm_sym.runtime.chart import Chart, ChartMaker
 from gqm_sym.runtime.entries import frame_at, loads_at
@@ -75,7 +76,8 @@ class Domain(NamedTuple):
 @lru_cache(maxsize=8)
 def _chart(maker: ChartMaker, values: tuple[float, ...]) -> Chart:
     """A curve's chart, made once for the same values of the run-time parameters."""
-    return maker.chart(values)
+    with budget("chart", 60.0, "give fewer points, or shorter and simpler pieces"):
+        return maker.chart(values)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
