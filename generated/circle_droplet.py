@@ -1,5 +1,5 @@
 # Made by gqm-gen for "circle_droplet". Do not edit: change its declaration and generate again.
-# interface 2, input 41b535597751, body d0b70f7fa46a
+# interface 2, input 41b535597751, body a45a43fd15e9
 """Droplet in a round channel
 
 x              = L*sin(theta)
@@ -19,7 +19,6 @@ liftoff        : g*cos(theta) + W/L = 0
 V**2: closed form; direction is the sign of ds/dt
 """
 
-from math import cos, sin
 from typing import Any
 
 from numba import carray
@@ -40,6 +39,7 @@ from gqm_sym.runtime import (
     Pass1,
     Sweep,
 )
+from gqm_sym.runtime.elementary import cos, sin
 
 PARAMETERS = {
     'L': '0.02',

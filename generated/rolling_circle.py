@@ -1,5 +1,5 @@
 # Made by gqm-gen for "rolling_circle". Do not edit: change its declaration and generate again.
-# interface 2, input aed757e55b8b, body f5d2d15029f0
+# interface 2, input aed757e55b8b, body 50ab5770696b
 """Solid sphere rolling in a circular bowl
 
 x              = L*sin(theta)
@@ -17,7 +17,6 @@ turning points : 2*L*g*(-cos(lam0) + cos(theta))/(beta + 1) + v0**2 = 0
 liftoff        : g*cos(theta) + (2*L*g*(-cos(lam0) + cos(theta))/(beta + 1) + v0**2)/L = 0
 """
 
-from math import cos, sin
 from typing import Any
 
 from numba import carray
@@ -41,6 +40,7 @@ from gqm_sym.runtime import (
     Sweep,
 )
 from gqm_sym.runtime.differences import cos1, cos2
+from gqm_sym.runtime.elementary import cos, sin
 from gqm_sym.runtime.intervals import iadd, iconst, idiv, imul, isin
 from gqm_sym.runtime.places import nearest
 

@@ -57,3 +57,24 @@ def turn_cosine(f, low):  # type: ignore[no-untyped-def]
     g = 0.25 - fabs(f)
     lost = (0.25 - g) - fabs(f)
     return turn_sine(g, lost + (low if f < 0.0 else -low))
+
+
+@intrinsic
+def bits(_, x):  # type: ignore[no-untyped-def]
+    """The bits of a float, as a whole number."""
+
+    def lower(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        return builder.bitcast(args[0], ir.IntType(64))
+
+    return types.int64(types.float64), lower
+
+
+@intrinsic
+def choose(_, condition, x, y):  # type: ignore[no-untyped-def]
+    """``x if condition else y``, both worked out: a branch would keep a loop scalar."""
+
+    def lower(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        return builder.select(*args)
+
+    real = types.float64
+    return real(types.boolean, real, real), lower

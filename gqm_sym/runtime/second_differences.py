@@ -15,11 +15,12 @@ Farther points are sorted, and ``(f[b,c] - f[a,b])/(c - a)`` does no harm. Roots
 the absolute value have closed forms everywhere; real powers of near points take quadrature.
 """
 
-from math import cos, cosh, exp, fabs, factorial, sin, sinh, sqrt
+from math import cosh, exp, fabs, factorial, sinh, sqrt
 from math import pow as power
 
 import numpy as np
 
+from gqm_sym.runtime.elementary import cos, sin
 from gqm_sym.runtime.first_differences import (
     acosh1,
     asin1,
@@ -41,7 +42,8 @@ from gqm_sym.runtime.first_differences import (
     tan1,
     tanh1,
 )
-from gqm_sym.runtime.jit import Inner
+from gqm_sym.runtime.fused import choose, fma
+from gqm_sym.runtime.jit import Inlined, Inner
 
 # |h1| + |h2| up to which wave_parts may be used: its series are cut below 1e-19 there.
 NEAR = 1.0
@@ -60,23 +62,23 @@ NODES = tuple(float(0.5 + 0.5 * t) for t in _LEGENDRE[0])
 WEIGHTS = tuple(float(0.5 * c * (0.5 + 0.5 * t)) for t, c in zip(*_LEGENDRE, strict=True))
 
 
-@Inner
+@Inlined
 def series(c, t):  # type: ignore[no-untyped-def]
     """The polynomial's value at t."""
     value = 0.0
     for a in c:
-        value = value * t + a
+        value = fma(value, t, a)
     return value
 
 
-@Inner
+@Inlined
 def series_pair(c, s, t):  # type: ignore[no-untyped-def]
     """The polynomial's values at s and t, added, and its divided difference [s,t]."""
     value, slope = 0.0, 0.0
     for a in c:
-        slope = slope * s + value
-        value = value * t + a
-    return 2.0 * value + (s - t) * slope, slope
+        slope = fma(slope, s, value)
+        value = fma(value, t, a)
+    return fma(s - t, slope, 2.0 * value), slope
 
 
 @Inner
@@ -93,7 +95,24 @@ def ordered(x, y, w, h1, h2):  # type: ignore[no-untyped-def]
     return (y, x, w, -h1, rest) if rest >= 0.0 else (y, w, x, h2, -rest)
 
 
-@Inner
+@Inlined
+def around(x, y, w, h1, h2):  # type: ignore[no-untyped-def]
+    """Two pairs of points that share the middle one, their gaps, and the gap between the outer two.
+
+    Returns p, q, their gap, r, s, their gap, and d, so that ``f[x,y,w] = (f[r,s] - f[p,q])/d``.
+    """
+    y_between = h1 * h2 >= 0.0
+    x_between, w_between = (not y_between) & (fabs(h1) < fabs(h2)), (not y_between) & (fabs(h1) >= fabs(h2))
+    # Where y is an end, the gap between x and w comes from those two if they are small against the gaps.
+    rest = choose(fabs(h1) <= fabs(x) + fabs(w), h1 + h2, w - x)
+    return (
+        *(x, choose(w_between, w, y), choose(w_between, rest, h1)),
+        *(choose(x_between, x, y), w, choose(x_between, rest, h2)),
+        choose(x_between, h2, choose(w_between, h1, h1 + h2)),
+    )
+
+
+@Inlined
 def wave_parts(h1, h2, sign):  # type: ignore[no-untyped-def]
     """A = S(H/2) (S(h1)+S(h2))/2, B = C(H/2) (h2-h1) S~[h1**2,h2**2], H = h1+h2, S~(t**2) = S(t).
 
@@ -105,28 +124,28 @@ def wave_parts(h1, h2, sign):  # type: ignore[no-untyped-def]
     return even, series(HALF_COSINE, quarter) * (h2 - h1) * sign * slope
 
 
-@Inner
+@Inlined
 def sin2(x, y, w, h1, h2):  # type: ignore[no-untyped-def]
     """sin[x,y,w] = (B cos M - A sin M)/2, M = (x+2y+w)/4, A and B from half the gaps."""
     u, v = 0.5 * h1, 0.5 * h2
-    if fabs(u) + fabs(v) <= NEAR:
-        even, odd = wave_parts(u, v, 1.0)
-        m = 0.25 * (x + w + 2.0 * y)
-        return 0.5 * (odd * cos(m) - even * sin(m))
-    a, b, c, u, v = ordered(x, y, w, h1, h2)
-    return (sin1(b, c, v) - sin1(a, b, u)) / (u + v)
+    even, odd = wave_parts(u, v, 1.0)
+    m = 0.25 * (x + w + 2.0 * y)
+    near = 0.5 * (odd * cos(m) - even * sin(m))
+    p, q, first, r, s, second, d = around(x, y, w, h1, h2)
+    far = (sin1(r, s, second) - sin1(p, q, first)) / d
+    return choose(fabs(u) + fabs(v) <= NEAR, near, far)
 
 
-@Inner
+@Inlined
 def cos2(x, y, w, h1, h2):  # type: ignore[no-untyped-def]
     """cos[x,y,w] = -(B sin M + A cos M)/2, as for the sine."""
     u, v = 0.5 * h1, 0.5 * h2
-    if fabs(u) + fabs(v) <= NEAR:
-        even, odd = wave_parts(u, v, 1.0)
-        m = 0.25 * (x + w + 2.0 * y)
-        return -0.5 * (odd * sin(m) + even * cos(m))
-    a, b, c, u, v = ordered(x, y, w, h1, h2)
-    return (cos1(b, c, v) - cos1(a, b, u)) / (u + v)
+    even, odd = wave_parts(u, v, 1.0)
+    m = 0.25 * (x + w + 2.0 * y)
+    near = -0.5 * (odd * sin(m) + even * cos(m))
+    p, q, first, r, s, second, d = around(x, y, w, h1, h2)
+    far = (cos1(r, s, second) - cos1(p, q, first)) / d
+    return choose(fabs(u) + fabs(v) <= NEAR, near, far)
 
 
 @Inner
