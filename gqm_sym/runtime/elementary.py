@@ -12,7 +12,7 @@ number, or infinite, gives NaN (the exponential has its limits).
 from math import fabs
 
 from gqm_sym.runtime.doubledouble import two_sum
-from gqm_sym.runtime.fused import bits, choose, fma
+from gqm_sym.runtime.fused import bits, choose, fma, polynomial
 from gqm_sym.runtime.jit import Inlined
 
 # Adding this rounds to a whole number, which the lowest bits of the sum then hold.
@@ -57,9 +57,7 @@ def reduced(x):  # type: ignore[no-untyped-def]
 def sine_kernel(r, low):  # type: ignore[no-untyped-def]
     """sin(r + low), ``|r|`` <= pi/4."""
     z = r * r
-    tail = 0.0
-    for c in SINE:
-        tail = fma(tail, z, c)
+    tail = polynomial(SINE, z)
     v = z * r
     return r - ((z * fma(-v, tail, 0.5 * low) - low) - v * SINE_CUBIC)
 
@@ -68,9 +66,7 @@ def sine_kernel(r, low):  # type: ignore[no-untyped-def]
 def cosine_kernel(r, low):  # type: ignore[no-untyped-def]
     """cos(r + low), ``|r|`` <= pi/4."""
     z = r * r
-    tail = 0.0
-    for c in COSINE:
-        tail = fma(tail, z, c)
+    tail = polynomial(COSINE, z)
     half = 0.5 * z
     lead = 1.0 - half
     return lead + (((1.0 - lead) - half) + fma(z * z, tail, -r * low))

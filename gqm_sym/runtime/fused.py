@@ -78,3 +78,35 @@ def choose(_, condition, x, y):  # type: ignore[no-untyped-def]
 
     real = types.float64
     return real(types.boolean, real, real), lower
+
+
+def _horner(builder: Any, coefficients: Any, count: int, s: Any, t: Any) -> tuple[Any, Any]:
+    """Horner's scheme without a loop: the value at t, and the divided difference [s,t]."""
+    value, slope = ir.Constant(ir.DoubleType(), 0.0), ir.Constant(ir.DoubleType(), 0.0)
+    for k in range(count):
+        slope = builder.fma(slope, s, value)
+        value = builder.fma(value, t, builder.extract_value(coefficients, k))
+    return value, slope
+
+
+@intrinsic
+def polynomial(_, coefficients, t):  # type: ignore[no-untyped-def]
+    """The polynomial of these coefficients, highest power first, at t."""
+
+    def lower(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        return _horner(builder, args[0], coefficients.count, args[1], args[1])[0]
+
+    return types.float64(coefficients, types.float64), lower
+
+
+@intrinsic
+def polynomial_pair(_, coefficients, s, t):  # type: ignore[no-untyped-def]
+    """The polynomial's value at t, and its divided difference [s,t]."""
+
+    def lower(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        return context.make_tuple(
+            builder, signature.return_type, _horner(builder, args[0], coefficients.count, args[1], args[2])
+        )
+
+    real = types.float64
+    return types.UniTuple(real, 2)(coefficients, real, real), lower
