@@ -115,8 +115,8 @@ def _cache_of(function: Any) -> Any:
         return NullCache()
 
 
-def _dispatcher_of(function: Any, *, nogil: bool = False) -> Any:
-    dispatcher = njit(nogil=nogil, **COMPILE)(function)
+def _dispatcher_of(function: Any, *, nogil: bool = False, forceinline: bool = False) -> Any:
+    dispatcher = njit(nogil=nogil, forceinline=forceinline, **COMPILE)(function)
     dispatcher._cache = _cache_of(function)
     return dispatcher
 
@@ -127,6 +127,8 @@ class Inner:
     numba's dispatcher is made when one of them is compiled, or Python calls it: code from the cache never needs it.
     """
 
+    forceinline = False
+
     def __init__(self, function: Callable[..., Any]) -> None:
         self.py_func = function
         self.__name__, self.__doc__ = function.__name__, function.__doc__
@@ -136,13 +138,22 @@ class Inner:
     def dispatcher(self) -> Any:
         """The function as numba knows it."""
         if self._dispatcher is None:
-            self._dispatcher = _dispatcher_of(self.py_func)
+            self._dispatcher = _dispatcher_of(self.py_func, forceinline=self.forceinline)
             rtsys.initialize(self._dispatcher.targetctx)
         return self._dispatcher
 
     def __call__(self, *arguments: Any) -> Any:
         """Call it from Python."""
         return self.dispatcher(*arguments)
+
+
+class Inlined(Inner):
+    """An `Inner` function whose code is put where it is called: a loop around a call stays scalar.
+
+    For short functions without branches.
+    """
+
+    forceinline = True
 
 
 @typeof_impl.register(Inner)

@@ -14,7 +14,8 @@ from gqm_sym.runtime.events import liftoff
 from gqm_sym.runtime.motion import Motion
 from gqm_sym.runtime.problem import Problem
 from gqm_sym.runtime.search import FARTHEST, NARROW
-from gqm_sym.runtime.stretch import ULP, Array, Stretch, through, toward_equilibrium
+from gqm_sym.runtime.stretch import ULP, Array, Stretch
+from gqm_sym.runtime.stretches import through, toward_equilibrium
 
 
 @dataclass(slots=True)
