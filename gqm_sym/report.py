@@ -147,7 +147,8 @@ def _mathml(form: sp.Basic) -> str:
 
 
 def _kept(entity: str) -> str:
-    return entity if entity in ("&lt;", "&gt;", "&amp;", "&quot;") else unescape(entity)
+    # SymPy's e is a letter that few fonts have.
+    return entity if entity in ("&lt;", "&gt;", "&amp;", "&quot;") else unescape(entity).replace("\u2147", "e")
 
 
 # -- figures ---------------------------------------------------------------------------------
