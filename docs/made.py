@@ -75,7 +75,7 @@ def _file(title: str, schema: dict[str, Any]) -> Iterator[str]:
         # A parameter may be written in short as well: what is described is its long form.
         forms = [form for form in definition.get("anyOf", [definition]) if "properties" in form]
         for form in forms:
-            yield from _keys(name.replace("_", ": "), form)
+            yield from _keys(name.replace("_", ": ", 1).replace("_", " "), form)
 
 
 def _keys(title: str, schema: dict[str, Any]) -> Iterator[str]:
