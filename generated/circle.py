@@ -1,5 +1,5 @@
 # Made by gqm-gen for "circle". Do not edit: change its declaration and generate again.
-# interface 3, input 6c3a741d3b21, body 5a15b7aa3058
+# interface 3, input 6c3a741d3b21, body bf2439baf9be
 """Bead that loops round a circle
 
 x              = L*sin(theta)
@@ -17,7 +17,6 @@ turning points : 2*L*g*(-cos(lam0) + cos(theta)) + v0**2 = 0
 liftoff        : g*cos(theta) + (2*L*g*(-cos(lam0) + cos(theta)) + v0**2)/L = 0
 """
 
-from math import cos, sin
 from typing import Any
 
 from numba import carray
@@ -41,6 +40,7 @@ from gqm_sym.runtime import (
     Sweep,
 )
 from gqm_sym.runtime.differences import cos1, cos2
+from gqm_sym.runtime.elementary import cos, sin
 from gqm_sym.runtime.intervals import iconst, imul, isin
 from gqm_sym.runtime.places import nearest
 

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "circle_coulomb". Do not edit: change its declaration and generate again.
-# interface 3, input 4a697d006329, body cbbe909964a8
+# interface 3, input 4a697d006329, body c54831b7c5b2
 """Bead on a rough ring
 
 x              = L*sin(theta)
@@ -19,7 +19,7 @@ liftoff        : g*cos(theta) + W/L = 0
 V**2: closed form; direction is the sign of ds/dt; contact_sign is the sign of N
 """
 
-from math import cos, fabs, sin
+from math import fabs
 from typing import Any
 
 from numba import carray
@@ -40,6 +40,7 @@ from gqm_sym.runtime import (
     Pass1,
     Sweep,
 )
+from gqm_sym.runtime.elementary import cos, sin
 
 PARAMETERS = {
     'L': '1',

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "circle_drag". Do not edit: change its declaration and generate again.
-# interface 3, input 0816c77462d6, body db5964aed5b5
+# interface 3, input 0816c77462d6, body 5cda184758f6
 """Pendulum in air
 
 x              = L*sin(theta)
@@ -19,7 +19,6 @@ liftoff        : g*cos(theta) + W/L = 0
 V**2: closed form; direction is the sign of ds/dt
 """
 
-from math import cos, sin
 from typing import Any
 
 from numba import carray
@@ -40,6 +39,7 @@ from gqm_sym.runtime import (
     Pass1,
     Sweep,
 )
+from gqm_sym.runtime.elementary import cos, sin
 
 PARAMETERS = {
     'L': '1',

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "circle_droplet". Do not edit: change its declaration and generate again.
-# interface 3, input 41b535597751, body 3dccfed75efe
+# interface 3, input 41b535597751, body 55b2c8342cc5
 """Droplet in a round channel
 
 x              = L*sin(theta)
@@ -19,7 +19,6 @@ liftoff        : g*cos(theta) + W/L = 0
 V**2: closed form; direction is the sign of ds/dt
 """
 
-from math import cos, sin
 from typing import Any
 
 from numba import carray
@@ -40,6 +39,7 @@ from gqm_sym.runtime import (
     Pass1,
     Sweep,
 )
+from gqm_sym.runtime.elementary import cos, sin
 
 PARAMETERS = {
     'L': '0.02',

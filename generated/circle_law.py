@@ -1,5 +1,5 @@
 # Made by gqm-gen for "circle_law". Do not edit: change its declaration and generate again.
-# interface 3, input ba6587cf83ec, body f36aee59e83e
+# interface 3, input ba6587cf83ec, body 2e01b7251f79
 """Pendulum in dense air
 
 x              = L*sin(theta)
@@ -19,7 +19,6 @@ liftoff        : g*cos(theta) + W/L = 0
 V**2: solved in space, for dV**2/ds = 2*A is not linear in it
 """
 
-from math import cos, sin
 from typing import Any
 
 from numba import carray
@@ -40,6 +39,7 @@ from gqm_sym.runtime import (
     Pass1,
     Sweep,
 )
+from gqm_sym.runtime.elementary import cos, sin
 
 PARAMETERS = {
     'L': '1',

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "circle_rotating". Do not edit: change its declaration and generate again.
-# interface 3, input 4ab613b0cbfb, body 534e57f60bed
+# interface 3, input 4ab613b0cbfb, body ef9ab333618f
 """Bead on a hoop that turns about its vertical diameter
 
 x              = L*sin(theta)
@@ -18,7 +18,6 @@ turning points : -L*(L*Omega**2*sin(lam0)**2 + 2*g*cos(lam0)) + L*(L*Omega**2*si
 liftoff        : L*Omega**2*sin(theta)**2 + g*cos(theta) + (-L*(L*Omega**2*sin(lam0)**2 + 2*g*cos(lam0)) + L*(L*Omega**2*sin(theta)**2 + 2*g*cos(theta)) + v0**2)/L = 0
 """
 
-from math import cos, sin
 from typing import Any
 
 from numba import carray
@@ -42,6 +41,7 @@ from gqm_sym.runtime import (
     Sweep,
 )
 from gqm_sym.runtime.differences import cos1, cos2, sin1, sin2
+from gqm_sym.runtime.elementary import cos, sin
 from gqm_sym.runtime.intervals import iadd, iconst, icos, imul, ipow, isin
 from gqm_sym.runtime.places import nearest
 

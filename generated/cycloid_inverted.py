@@ -1,5 +1,5 @@
 # Made by gqm-gen for "cycloid_inverted". Do not edit: change its declaration and generate again.
-# interface 3, input 2cc87984e0a0, body 5a40b5ad7bb9
+# interface 3, input 2cc87984e0a0, body 35cb3963eea5
 """Bead in an inverted cycloid
 
 x              = R*(theta - sin(theta))
@@ -17,7 +17,6 @@ turning points : 2*R*g*(cos(lam0) - cos(theta)) + v0**2 = 0
 liftoff        : g*sin(theta/2) + (2*R*g*(cos(lam0) - cos(theta)) + v0**2)/(4*R*sin(theta/2)) = 0
 """
 
-from math import cos, sin
 from typing import Any
 
 from numba import carray
@@ -41,6 +40,7 @@ from gqm_sym.runtime import (
     Sweep,
 )
 from gqm_sym.runtime.differences import cos1, cos2
+from gqm_sym.runtime.elementary import cos, sin
 from gqm_sym.runtime.intervals import iconst, icos, idiv, imul, isin
 from gqm_sym.runtime.places import nearest
 

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "ellipse". Do not edit: change its declaration and generate again.
-# interface 3, input 3a81da5567d3, body beee63b0dee3
+# interface 3, input 3a81da5567d3, body 71c1a8668d9c
 """Bead on an ellipse, by the eccentric angle
 
 x              = a*cos(theta)
@@ -17,7 +17,7 @@ turning points : 2*b*g*(sin(lam0) - sin(theta)) + v0**2 = 0
 liftoff        : a*b*(2*b*g*(sin(lam0) - sin(theta)) + v0**2)/(a**2*sin(theta)**2 + b**2*cos(theta)**2)**(3/2) - a*g*sin(theta)/sqrt(a**2*sin(theta)**2 + b**2*cos(theta)**2) = 0
 """
 
-from math import cos, sin, sqrt
+from math import sqrt
 from typing import Any
 
 from numba import carray
@@ -41,6 +41,7 @@ from gqm_sym.runtime import (
     Sweep,
 )
 from gqm_sym.runtime.differences import sin1, sin2
+from gqm_sym.runtime.elementary import cos, sin
 from gqm_sym.runtime.intervals import iadd, iconst, icos, imul, ipow, isin, isqrt
 from gqm_sym.runtime.places import nearest
 

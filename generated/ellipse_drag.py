@@ -1,5 +1,5 @@
 # Made by gqm-gen for "ellipse_drag". Do not edit: change its declaration and generate again.
-# interface 3, input 85e32f4b5095, body 94416709e3b6
+# interface 3, input 85e32f4b5095, body 97567afea305
 """Bead on an ellipse, in air
 
 x              = a*cos(theta)
@@ -19,7 +19,7 @@ liftoff        : W*a*b/(a**2*sin(theta)**2 + b**2*cos(theta)**2)**(3/2) - a*g*si
 V**2: spectral antiderivative, no elementary form found; direction is the sign of ds/dt
 """
 
-from math import cos, sin, sqrt
+from math import sqrt
 from typing import Any
 
 from numba import carray
@@ -40,6 +40,7 @@ from gqm_sym.runtime import (
     Pass1,
     Sweep,
 )
+from gqm_sym.runtime.elementary import cos, sin
 
 PARAMETERS = {
     'a': '1.5',

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "kepler". Do not edit: change its declaration and generate again.
-# interface 3, input a1e1feaf475b, body e5684b283793
+# interface 3, input a1e1feaf475b, body 125c80b6d4bd
 """Planet on its own ellipse, by the eccentric anomaly
 
 x              = a*(-ecc + cos(E))
@@ -17,7 +17,7 @@ turning points : 2*k*(-1/sqrt((1 - ecc**2)*sin(lam0)**2 + (-ecc + cos(lam0))**2)
 liftoff        : sqrt(1 - ecc**2)*(2*k*(-1/sqrt((1 - ecc**2)*sin(lam0)**2 + (-ecc + cos(lam0))**2) + 1/sqrt((1 - ecc**2)*sin(E)**2 + (-ecc + cos(E))**2))/Abs(a) + v0**2)/(a*((1 - ecc**2)*cos(E)**2 + sin(E)**2)**(3/2)) - k*sqrt(1 - ecc**2)*((-ecc + cos(E))*cos(E) + sin(E)**2)*Abs(a)/(a**3*((1 - ecc**2)*sin(E)**2 + (-ecc + cos(E))**2)**(3/2)*sqrt((1 - ecc**2)*cos(E)**2 + sin(E)**2)) = 0
 """
 
-from math import cos, fabs, sin, sqrt
+from math import fabs, sqrt
 from typing import Any
 
 from numba import carray
@@ -41,6 +41,7 @@ from gqm_sym.runtime import (
     Sweep,
 )
 from gqm_sym.runtime.differences import cos1, cos2, sin1, sin2
+from gqm_sym.runtime.elementary import cos, sin
 from gqm_sym.runtime.intervals import iabs, iadd, iconst, icos, imul, ipow, isin, isqrt
 from gqm_sym.runtime.places import nearest
 

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "loop". Do not edit: change its declaration and generate again.
-# interface 3, input ef6cb5936f16, body 0d20d61792ff
+# interface 3, input ef6cb5936f16, body 3e67d123500e
 """Loop of a roller coaster
 
 x              = x(s)
@@ -17,7 +17,6 @@ turning points : 2*g*(z(lam0) - z(s)) + v0**2 = 0
 liftoff        : g*cos(alpha(s)) + (2*g*(z(lam0) - z(s)) + v0**2)*kappa(s) = 0
 """
 
-from math import cos, sin
 from typing import Any
 
 from numba import carray
@@ -50,6 +49,7 @@ from gqm_sym.runtime.chart_functions import (
     chart_z2,
     ichart_alpha,
 )
+from gqm_sym.runtime.elementary import cos, sin
 from gqm_sym.runtime.intervals import iconst, imul, isin
 from gqm_sym.runtime.places import nearest
 

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "pendulum". Do not edit: change its declaration and generate again.
-# interface 3, input abbc42e6e84e, body 75284c132281
+# interface 3, input abbc42e6e84e, body 83ff602d67d0
 """Simple pendulum, angle from the horizontal
 
 x              = L*cos(theta)
@@ -17,7 +17,6 @@ turning points : 2*L*g*(sin(lam0) - sin(theta)) + v0**2 = 0
 liftoff        : -g*sin(theta) + (2*L*g*(sin(lam0) - sin(theta)) + v0**2)/L = 0
 """
 
-from math import cos, sin
 from typing import Any
 
 from numba import carray
@@ -41,6 +40,7 @@ from gqm_sym.runtime import (
     Sweep,
 )
 from gqm_sym.runtime.differences import sin1, sin2
+from gqm_sym.runtime.elementary import cos, sin
 from gqm_sym.runtime.intervals import iconst, icos, imul
 from gqm_sym.runtime.places import nearest
 

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "rolling_circle". Do not edit: change its declaration and generate again.
-# interface 3, input aed757e55b8b, body c6b0ad543f56
+# interface 3, input aed757e55b8b, body db4967104123
 """Solid sphere rolling in a circular bowl
 
 x              = L*sin(theta)
@@ -17,7 +17,6 @@ turning points : 2*L*g*(-cos(lam0) + cos(theta))/(beta + 1) + v0**2 = 0
 liftoff        : g*cos(theta) + (2*L*g*(-cos(lam0) + cos(theta))/(beta + 1) + v0**2)/L = 0
 """
 
-from math import cos, sin
 from typing import Any
 
 from numba import carray
@@ -41,6 +40,7 @@ from gqm_sym.runtime import (
     Sweep,
 )
 from gqm_sym.runtime.differences import cos1, cos2
+from gqm_sym.runtime.elementary import cos, sin
 from gqm_sym.runtime.intervals import iadd, iconst, idiv, imul, isin
 from gqm_sym.runtime.places import nearest
 

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "strophoid". Do not edit: change its declaration and generate again.
-# interface 3, input 997282e2d787, body 7d218b9dbde7
+# interface 3, input 997282e2d787, body 865c60b9a2b1
 """Bead on the hanging loop of a right strophoid
 
 F              = x**2*(a - z) - z**2*(a + z)
@@ -25,7 +25,6 @@ liftoff        : g*cos(alpha(s)) + (2*g*(z(lam0) - z(s)) + v0**2)*kappa(s) = 0
 On F = 0 arc length is 0 at (-sqrt(3)*a/6, -a/2) and grows along -(-F_z, F_x)/|grad F|; kappa = -(F_xx*F_z**2 - 2*F_xz*F_x*F_z + F_zz*F_x**2)/|grad F|**3.
 """
 
-from math import cos, sin
 from typing import Any
 
 from numba import carray
@@ -59,6 +58,7 @@ from gqm_sym.runtime.chart_functions import (
     chart_z2,
     ichart_alpha,
 )
+from gqm_sym.runtime.elementary import cos, sin
 from gqm_sym.runtime.intervals import iconst, imul, isin
 from gqm_sym.runtime.places import nearest
 

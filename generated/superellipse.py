@@ -1,5 +1,5 @@
 # Made by gqm-gen for "superellipse". Do not edit: change its declaration and generate again.
-# interface 3, input f556e3e2c1ab, body 10a8b1031b30
+# interface 3, input f556e3e2c1ab, body 71084685ff09
 """Bead inside a superellipse, flat at its lowest point
 
 F              = -1 + z**4/b**4 + x**4/a**4
@@ -25,7 +25,6 @@ liftoff        : g*cos(alpha(s)) + (2*g*(z(lam0) - z(s)) + v0**2)*kappa(s) = 0
 On F = 0 arc length is 0 at (0, -b) and grows along (-F_z, F_x)/|grad F|; kappa = (F_xx*F_z**2 - 2*F_xz*F_x*F_z + F_zz*F_x**2)/|grad F|**3.
 """
 
-from math import cos, sin
 from typing import Any
 
 from numba import carray
@@ -59,6 +58,7 @@ from gqm_sym.runtime.chart_functions import (
     chart_z2,
     ichart_alpha,
 )
+from gqm_sym.runtime.elementary import cos, sin
 from gqm_sym.runtime.intervals import iconst, imul, isin
 from gqm_sym.runtime.places import nearest
 

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "track". Do not edit: change its declaration and generate again.
-# interface 3, input f6b2958be28b, body b214df95958b
+# interface 3, input f6b2958be28b, body 246d17c75186
 """Hills of a roller coaster, as surveyed
 
 x              = x(s)
@@ -17,7 +17,6 @@ turning points : 2*g*(z(lam0) - z(s)) + v0**2 = 0
 liftoff        : g*cos(alpha(s)) + (2*g*(z(lam0) - z(s)) + v0**2)*kappa(s) = 0
 """
 
-from math import cos, sin
 from typing import Any
 
 from numba import carray
@@ -50,6 +49,7 @@ from gqm_sym.runtime.chart_functions import (
     chart_z2,
     ichart_alpha,
 )
+from gqm_sym.runtime.elementary import cos, sin
 from gqm_sym.runtime.intervals import iconst, imul, isin
 from gqm_sym.runtime.places import nearest
 

@@ -68,9 +68,10 @@ def read_beside(name: str, folder: Path, *, wanted: str) -> str:
 
 def read_rows(name: str, text: str) -> tuple[list[str], list[list[str]]]:
     """The fields of the first line of a table where they are names, else none, and those of each line of values."""
-    lines = text.rstrip().split("\n")
-    if len(lines) > ROW_LIMIT:
-        raise InputError(f"{name!r}: has {len(lines)} rows; {ROW_LIMIT} is the most")
+    text = text.rstrip()
+    if (total := text.count("\n") + 1) > ROW_LIMIT:  # before they are parted, which takes much more memory
+        raise InputError(f"{name!r}: has {total} rows; {ROW_LIMIT} is the most")
+    lines = text.split("\n")
     rows = []
     for count, line in enumerate(lines, start=1):
         if len(line) > LINE_LIMIT:
