@@ -19,12 +19,13 @@ demo: $(VENV)/.run ## take the paper's Example 1 from a YAML file to digits, bes
 test: $(VENV)/.dev ## run every test, notebooks included
 	$(BIN)/python -m pytest -n $(WORKERS)
 
-lint: $(VENV)/.dev ## check format, style and types, and that generated files are current
+lint: $(VENV)/.dev ## check format, style, types and documentation, and that generated files are current
 	$(BIN)/ruff format --check
 	$(BIN)/ruff check
 	$(BIN)/mypy
 	$(BIN)/gqm-gen --check --quiet -o generated curves/*.yaml
 	$(BIN)/python scripts/make_family_pages.py --check
+	$(BIN)/python -m sphinx -W --keep-going --quiet -D nb_execution_mode=off -b html docs docs/_build/lint
 
 generate: $(VENV)/.dev ## write generated/ afresh from curves/, and the pages of the families
 	$(BIN)/gqm-gen --quiet -o generated curves/*.yaml

@@ -32,14 +32,14 @@ def _test(session: nox.Session) -> None:
 @nox.session(python=PYTHONS)
 def newest(session: nox.Session) -> None:
     """The newest of everything."""
-    session.install("--upgrade", ".[plot,notebook,test]")
+    session.install("--upgrade", ".[dask,data,notebook,plot,test]")
     _test(session)
 
 
 @nox.session(python=PYTHONS[0])
 def oldest(session: nox.Session) -> None:
     """The lower bounds that pyproject.toml promises."""
-    session.install(".[plot,notebook,test]", *OLDEST)
+    session.install(".[dask,data,notebook,plot,test]", *OLDEST)
     _test(session)
 
 

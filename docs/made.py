@@ -10,6 +10,7 @@ from gqm_sym.cli import gen, tool
 from gqm_sym.declare.families import FAMILIES
 from gqm_sym.kernels import KERNELS
 from gqm_sym.specfile import json_schema
+from gqm_sym.sweeps import sweep_schema
 
 ROOT = Path(__file__).parent.parent
 
@@ -19,8 +20,9 @@ def write_all(folder: Path) -> None:
     folder.mkdir(exist_ok=True)
     for name, lines in (("command_line", command_line()), ("yaml", curve_files()), ("forces", forces())):
         (folder / f"{name}.md").write_text("\n".join(lines) + "\n", encoding="utf-8")
-    for notebook in sorted((ROOT / "notebooks").glob("*.ipynb")):
-        shutil.copy(notebook, folder / notebook.name)
+    for pattern in ("*.ipynb", "*.csv"):
+        for file in sorted((ROOT / "notebooks").glob(pattern)):
+            shutil.copy(file, folder / file.name)
 
 
 def command_line() -> Iterator[str]:
@@ -58,19 +60,22 @@ def forces() -> Iterator[str]:
 
 
 def curve_files() -> Iterator[str]:
-    """Yield the tables of the keys of a curve file, from its schema."""
-    schema = json_schema()
-    yield from ("# Curve files (YAML)", "", "`gqm schema` prints this as JSON Schema (draft 7) for editors, and")
-    yield from (
-        "`gqm-gen --init NAME` writes a commented file to start from. Numbers are kept as text and are exact.",
-        "",
-    )
-    yield from _keys("The file", schema)
+    """Yield the tables of the keys of curve files and sweep files, from their schemas."""
+    yield from ("# Curve files and sweep files (YAML)", "")
+    yield "`gqm schema` and `gqm schema --sweep` print this as JSON Schema (draft 7) for editors, and"
+    yield "`gqm-gen --init NAME` writes a commented file to start from. Numbers are kept as text and are exact."
+    yield ""
+    yield from _file("A curve file", json_schema())
+    yield from _file("A sweep file", sweep_schema())
+
+
+def _file(title: str, schema: dict[str, Any]) -> Iterator[str]:
+    yield from _keys(title, schema)
     for name, definition in schema["definitions"].items():
         # A parameter may be written in short as well: what is described is its long form.
         forms = [form for form in definition.get("anyOf", [definition]) if "properties" in form]
         for form in forms:
-            yield from _keys(name.replace("_", ": "), form)
+            yield from _keys(name.replace("_", ": ", 1).replace("_", " "), form)
 
 
 def _keys(title: str, schema: dict[str, Any]) -> Iterator[str]:

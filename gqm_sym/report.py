@@ -33,10 +33,12 @@ FIGURES = {
 STYLE = """
 body { font: 16px/1.5 system-ui, sans-serif; max-width: 60rem; margin: 2rem auto; padding: 0 1rem; color: #222; }
 h1, h2 { line-height: 1.2; } h2 { margin-top: 2.5rem; border-bottom: 1px solid #ccc; }
-table { border-collapse: collapse; margin: 1rem 0; display: block; overflow-x: auto; }
-th, td { padding: 0.2rem 0.8rem; text-align: left; border-bottom: 1px solid #ddd; font-variant-numeric: tabular-nums; }
+table { border-collapse: collapse; margin: 1rem 0; display: block; overflow-x: auto; font-size: 0.85rem; }
+th, td { padding: 0.2rem 0.6rem; text-align: left; white-space: nowrap; border-bottom: 1px solid #ddd; }
+td { font-variant-numeric: tabular-nums; }
 math { font-size: 1.1rem; } .formula { overflow-x: auto; overflow-y: hidden; padding: 0.3rem 0; }
-svg { max-width: 100%; height: auto; } pre { background: #f6f6f6; padding: 1rem; overflow-x: auto; }
+figure { margin: 1rem 0; } svg { max-width: 100%; height: auto; } figcaption { color: #555; font-size: 0.9rem; }
+pre { background: #f6f6f6; padding: 1rem; white-space: pre-wrap; }
 @media print { body { max-width: none; } h2 { break-after: avoid; } figure { break-inside: avoid; } }
 """
 
@@ -129,7 +131,9 @@ def _formulas(model: Model) -> Iterator[str]:
 
 
 def _label(label: str) -> str:
-    """The left side of a closed form, such as ds/dtheta or V**2."""
+    """The left side of a closed form, such as ds/dtheta, V**2 or W = V**2."""
+    if " = " in label:
+        return "<mo>=</mo>".join(map(_label, label.split(" = ")))
     if "/" in label:
         above, below = (f"<mrow><mi>d</mi>{_mathml(sp.Symbol(part[1:]))}</mrow>" for part in label.split("/"))
         return f"<mfrac>{above}{below}</mfrac>"
@@ -143,7 +147,8 @@ def _mathml(form: sp.Basic) -> str:
 
 
 def _kept(entity: str) -> str:
-    return entity if entity in ("&lt;", "&gt;", "&amp;", "&quot;") else unescape(entity)
+    # SymPy's e is a letter that few fonts have.
+    return entity if entity in ("&lt;", "&gt;", "&amp;", "&quot;") else unescape(entity).replace("\u2147", "e")
 
 
 # -- figures ---------------------------------------------------------------------------------

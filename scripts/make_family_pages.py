@@ -69,7 +69,7 @@ def page(name: str) -> str:
     spelled += [f"{key}=({', '.join(map(_quoted, texts))})" for key, texts in named.items()]
     model = gqm.derive(curve, gqm.Gravity())
     parts = [
-        f"# {curve.title or UNTITLED[name]}",
+        "# " + (curve.title or UNTITLED[name]).replace("*", r"\*"),
         "",
         "```python",
         f"gqm.families.{name}({', '.join(spelled)})",

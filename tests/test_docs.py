@@ -1,5 +1,7 @@
 """What the documentation shows runs, and prints what it says."""
 
+import doctest
+import importlib
 import re
 import runpy
 import sys
@@ -12,6 +14,7 @@ from gqm_sym.declare import families
 from gqm_sym.errors import SpecFileError
 from gqm_sym.kernels import KERNELS
 from gqm_sym.specfile import read_spec
+from gqm_sym.sweeps import read_sweep
 
 ROOT = Path(__file__).parent.parent
 DOCS = ROOT / "docs"
@@ -58,6 +61,27 @@ def test_the_example_file_is_right(tmp_path: Path) -> None:
     assert str(caught.value).removeprefix(f"{tmp_path}/") == mistake.strip()
 
 
+def test_the_example_sweep_is_right(tmp_path: Path) -> None:
+    """The sweep file of the how-to is read, with a curve file of that name."""
+    page = (DOCS / "howto" / "sweeps.md").read_text(encoding="utf-8")
+    (text,) = [text for language, text in BLOCK.findall(page) if language == "yaml"]
+    (tmp_path / "periods.yaml").write_text(text)
+    (tmp_path / "pendulum.yaml").write_bytes((ROOT / "curves" / "pendulum.yaml").read_bytes())
+    assert read_sweep(tmp_path / "periods.yaml").shape == (300, 3)
+
+
+EXAMPLES = [path for path in sorted((ROOT / "gqm_sym").rglob("*.py")) if ">>> " in path.read_text(encoding="utf-8")]
+
+
+@pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.relative_to(ROOT).as_posix())
+def test_examples_in_docstrings(path: Path) -> None:
+    """Each gives what stands below it."""
+    name = ".".join(path.relative_to(ROOT).with_suffix("").parts)
+    ran = doctest.testmod(importlib.import_module(name))
+    assert ran.attempted > 0
+    assert ran.failed == 0
+
+
 def test_made_pages(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Tables made from the code name every force, family, command and key."""
     monkeypatch.syspath_prepend(str(DOCS))
@@ -68,6 +92,8 @@ def test_made_pages(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     pages = {path.stem: path.read_text(encoding="utf-8") for path in tmp_path.glob("*.md")}
     assert all(f"`{name}: {{" in pages["forces"] for name in KERNELS)
     assert all(f"| `{name}` |" in pages["forces"] for name in families.names())
-    assert all(f"## {command}\n" in pages["command_line"] for command in ("gqm-gen", "gqm solve", "gqm plot"))
-    assert all(f"| `{key}`" in pages["yaml"] for key in ("curve", "kernel", "lam0", "value", "unit"))
-    assert {path.stem for path in tmp_path.glob("*.ipynb")} >= {"quickstart", "example1", "kepler"}
+    assert all(f"## {command}\n" in pages["command_line"] for command in ("gqm-gen", "gqm solve", "gqm sweep"))
+    assert all(
+        f"| `{key}`" in pages["yaml"] for key in ("curve", "kernel", "lam0", "value", "unit", "grid", "quantities")
+    )
+    assert {path.stem for path in tmp_path.glob("*.ipynb")} >= {"quickstart", "example1", "example2", "own_curve"}

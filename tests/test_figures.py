@@ -69,6 +69,12 @@ def test_every_kind_can_be_drawn(circle: ModuleType, launch: dict[str, object]) 
         motion.plot(what).draw_without_rendering()
 
 
+def test_notebooks_show_figures(circle: ModuleType) -> None:
+    """Each is a picture to IPython, without pyplot."""
+    for what in ("track", "loads", "portrait"):
+        assert circle.solve(1.0).plot(what)._repr_png_().startswith(b"\x89PNG")
+
+
 def test_axes_of_the_caller(circle: ModuleType) -> None:
     """What is given is drawn on."""
     from matplotlib.figure import Figure

@@ -61,13 +61,31 @@ def test_all_of_them_are_found() -> None:
 def test_the_path_of_a_first_user(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Own file, module, figure, report: each command of the documentation's first page, in its order."""
+    """Own file, module, figure, report, sweep: each step of the documentation's first page, in its order."""
     page = (Path(__file__).parent.parent / "docs" / "start.md").read_text(encoding="utf-8")
-    (block,) = re.findall(r"^```sh\n(.*?)^```", page, re.MULTILINE | re.DOTALL)
-    commands = [line.split() for line in block.splitlines()]
     monkeypatch.chdir(tmp_path)
-    for program, *arguments in commands:
-        assert {"gqm": tool.main, "gqm-gen": gen.main}[program](arguments) == 0
+    for language, block in re.findall(r"^```(sh|yaml)\n(.*?)^```", page, re.MULTILINE | re.DOTALL):
+        if language == "yaml":
+            Path("periods.yaml").write_text(block, encoding="utf-8")
+            continue
+        for program, *arguments in map(str.split, block.splitlines()):
+            assert {"gqm": tool.main, "gqm-gen": gen.main}[program](arguments) == 0
     assert capsys.readouterr().err == ""
     made = {path.relative_to(tmp_path).as_posix() for path in tmp_path.rglob("*") if path.suffix != ".pyc"}
-    assert made >= {"bowl.yaml", "generated/bowl.py", "bowl.svg", "bowl.html"}
+    assert made >= {"bowl.yaml", "generated/bowl.py", "bowl.svg", "bowl.html", "periods.nc"}
+
+
+def test_the_commands_of_the_readme(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Each runs, in its order, with the file that is shown above them."""
+    page = (Path(__file__).parent.parent / "README.md").read_text(encoding="utf-8")
+    (shown,) = re.findall(r"^```yaml\n(.*?)^```", page, re.MULTILINE | re.DOTALL)
+    monkeypatch.chdir(tmp_path)
+    Path("curves").mkdir()
+    Path("curves/parabola.yaml").write_text(shown, encoding="utf-8")
+    Path("periods.yaml").write_text("curve: curves/parabola.yaml\nquantities: [period]\ngrid: {a: [0.5, 1]}\n")
+    for program, *arguments in (line.split("#")[0].split() for line in re.findall(r"^gqm.*", page, re.MULTILINE)):
+        assert {"gqm": tool.main, "gqm-gen": gen.main}[program](arguments) == 0
+    assert capsys.readouterr().err == ""
+    assert {path.name for path in tmp_path.iterdir()} >= {"mine.yaml", "bowl.svg", "parabola.html", "periods.nc"}

@@ -1,12 +1,14 @@
 """Sweeps over launches and parameters: against closed forms, and against motions solved one by one."""
 
 from collections.abc import Callable
+from pathlib import Path
 from types import ModuleType
 
 import numpy as np
 import pytest
 from mpmath import mp, mpf
 
+import gqm_sym as gqm
 from gqm_sym.errors import InputError, ParameterError
 from gqm_sym.runtime.sweeping import REASONS
 
@@ -145,6 +147,20 @@ def test_a_long_sweep_is_cut_and_joined(module_of: ModuleOf) -> None:
     whole = circle.sweep("half_period", amplitude, L=length)
     assert whole.values.shape == (120, 300)
     assert (whole.values[77] == circle.sweep("half_period", amplitude, L=float(length[77, 0])).values).all()
+
+
+def test_extremes_of_a_motion_that_ends(generated_folder: Path) -> None:
+    """None of many states beats them, and the best of these comes near."""
+    model = gqm.derive(gqm.families.circle(L=1), gqm.Gravity() + gqm.CoulombFriction(mu="0.1"))
+    ring = gqm.build(model, name="rough_ring", folder=generated_folder)
+    for v0 in (2.0, 9.0):
+        motion = ring.solve(0.5, v0)
+        state = motion.state(np.linspace(0.0, motion.t_end, 100_000))
+        for name, values in (("v", np.abs(state.v)), ("normal_force", state.normal_force)):
+            most, least = (float(ring.sweep(f"{name}_{which}", 0.5, v0).values) for which in ("max", "min"))
+            scale = np.abs(values).max()
+            assert values.max() - LOAD * scale <= most <= values.max() + 1e-7 * scale
+            assert values.min() + LOAD * scale >= least >= values.min() - 1e-7 * scale
 
 
 def test_columns_may_be_read_only(module_of: ModuleOf) -> None:

@@ -20,9 +20,10 @@ from gqm_sym.cli import tool
 from gqm_sym.cli.progress import Bar
 from gqm_sym.errors import InputError, SpecFileError
 from gqm_sym.runtime import cluster
-from gqm_sym.runtime.sweeping import REASONS
+from gqm_sym.runtime.sweeping import QUANTITIES, REASONS
 from gqm_sym.sweeps import read_sweep, run, sweep_schema
 from gqm_sym.sweeps.plan import evenly
+from gqm_sym.sweeps.results import DESCRIBED
 
 CURVES = {
     "swing": "curve: {family: {name: circle, L: L}}\nkernel: {gravity: {}}\nparameters: {L: {value: 1, unit: m}}\n"
@@ -201,6 +202,7 @@ def test_mistakes_have_their_place(line: str, instead: str, message: str, here: 
         ("lam0,v0\n1,2\n3\n", "'a.csv', row 3: must have 2 numbers, has 1"),
         ("lam0,v0\n1,pi\n", "'a.csv', row 2: 'pi' is no finite decimal number"),
         ("lam0,v0\n1,inf\n", "'a.csv', row 2: 'inf' is no finite decimal number"),
+        ("lam0,v0\n1,1e-400000000\n", "'a.csv', row 2: '1e-400000000' is no finite decimal number"),
         ("lam0,v_0\n1,2\n", "there is no 'v_0' in swing.yaml; did you mean v0?"),
     ],
 )
@@ -212,6 +214,35 @@ def test_bad_tables_are_refused(rows: str | None, message: str, here: Path) -> N
     with pytest.raises(SpecFileError, match=r"a\.yaml:3:") as caught:
         read_sweep("a.yaml")
     assert message in str(caught.value)
+
+
+def test_columns_in_units(here: Path) -> None:
+    """Nearest doubles of exact products, angles too."""
+    Path("a.csv").write_text("lam0\tL\n90\t0.3\n-30\t110\n")
+    Path("a.yaml").write_text(
+        "curve: swing.yaml\nquantities: [period]\ntable: {file: a.csv, units: {lam0: deg, L: cm}}\n"
+    )
+    place, length = read_sweep("a.yaml").axes
+    with mp.workdps(40):
+        assert place.values.tolist() == [float(mp.pi / 2), float(-mp.pi / 6)]
+    assert length.values.tolist() == [0.003, 1.1]
+
+
+def test_files_that_are_none_are_refused(here: Path) -> None:
+    """A link out of the folder, and a pipe that would never end."""
+    os.mkfifo("pipe.yaml")
+    Path("inside").mkdir()
+    Path("inside/link.yaml").symlink_to(here / "swing.yaml")
+    for where, name, message in ((".", "pipe.yaml", "is no plain file"), ("inside", "link.yaml", "by a link")):
+        path = Path(where) / "a.yaml"
+        path.write_text(f"curve: {name}\nquantities: [period]\ngrid: {{lam0: [1, 2]}}\n")
+        with pytest.raises(SpecFileError, match=message):
+            read_sweep(path)
+
+
+def test_every_quantity_has_a_name_and_a_unit() -> None:
+    """What is swept is described in the results."""
+    assert set(QUANTITIES) - {"turning_points"} <= set(DESCRIBED)
 
 
 def test_the_schema_describes_what_is_read(capsys: pytest.CaptureFixture[str]) -> None:

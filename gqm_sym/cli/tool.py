@@ -2,6 +2,7 @@
 
 import argparse
 import json
+import sys
 import tempfile
 from collections.abc import Sequence
 from contextlib import nullcontext
@@ -234,6 +235,9 @@ def _sweep(options: argparse.Namespace) -> None:
     with nullcontext() if options.scheduler is None else connected(options.scheduler) as client:
         try:
             data = run(plan, target, client=client, force=options.force, progress=bar)
+        except KeyboardInterrupt:
+            print(f"{PROGRAM}: what is done is stored; the same command goes on from there", file=sys.stderr)
+            raise
         finally:
             bar.close()
     for line in show.swept(plan.quantities, data):

@@ -1,5 +1,7 @@
 """What all figures share: axes to draw on, and how they are labelled."""
 
+from functools import lru_cache
+from io import BytesIO
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -11,10 +13,28 @@ def new_axes(axes: "Axes | None") -> "Axes":
     """Axes to draw on: those given, or those of a new figure."""
     if axes is not None:
         return axes
+    new: Axes = new_figure(7, 4.5).subplots()
+    return new
+
+
+def new_figure(width: float, height: float) -> "Figure":
+    """An empty figure, its size in inches, which notebooks show whether pyplot is in use or not."""
+    return _shown()(figsize=(width, height), layout="constrained")
+
+
+@lru_cache(maxsize=1)
+def _shown() -> "type[Figure]":
     from matplotlib.figure import Figure
 
-    new: Axes = Figure(figsize=(7, 4.5), layout="constrained").subplots()
-    return new
+    class Shown(Figure):
+        """A figure that is a picture to IPython."""
+
+        def _repr_png_(self) -> bytes:
+            stream = BytesIO()
+            self.savefig(stream, format="png")
+            return stream.getvalue()
+
+    return Shown
 
 
 def figure_of(axes: "Axes") -> "Figure":

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from gqm_sym.errors import InputError
-from gqm_sym.runtime.axes import figure_of, finished, new_axes
+from gqm_sym.runtime.axes import figure_of, finished, new_axes, new_figure
 from gqm_sym.runtime.extras import needs
 from gqm_sym.runtime.portraits import period_against_amplitude, phase_portrait, portrait_of
 from gqm_sym.runtime.stretch import Array
@@ -105,9 +105,7 @@ def loads(motion: "Motion", axes: Any = None) -> "Figure":
         Above for the speed, below for the load.
     """
     if axes is None:
-        from matplotlib.figure import Figure
-
-        axes = Figure(figsize=(7, 5), layout="constrained").subplots(2, 1, sharex=True)
+        axes = new_figure(7, 5).subplots(2, 1, sharex=True)
     above, below = axes
     path = sampled(motion)
     above.plot(path.s, np.abs(path.v), color="#0072b2")

@@ -59,8 +59,13 @@ def least_speed(
     --------
     A loop of radius L, from its lowest point: ``sqrt(5*g*L)``.
 
-    >>> least_speed(circle, 0, L=1, g=10)  # doctest: +SKIP
-    7.0710678118654755
+    >>> import tempfile
+    >>> import gqm_sym as gqm
+    >>> loop = gqm.derive(gqm.families.circle(), gqm.Gravity())
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     circle = gqm.build(loop, name="loop", folder=folder)
+    >>> round(least_speed(circle, 0, L=1, g=10), 12)
+    7.071067811865
     """
     formulas: Formulas = module.MODEL
     if formulas.dissipation is not None:

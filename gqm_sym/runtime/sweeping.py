@@ -4,7 +4,7 @@ Most orbits are answered by one compiled loop (`swift`); those that it leaves ar
 """
 
 from collections.abc import Callable, Mapping
-from math import inf, isfinite, nan, pi
+from math import e, inf, isfinite, nan, pi
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -28,7 +28,7 @@ ARRAYS = SimpleNamespace(
     **{name: getattr(np, name) for name in ["sin", "cos", "tan", "sinh", "cosh", "tanh", "exp", "log", "sqrt"]},
     **{name: getattr(np, f"arc{name[1:]}") for name in ["asin", "acos", "atan", "asinh", "acosh", "atanh"]},
     pi=pi,
-    e=np.e,
+    e=e,
     mpf=float,
 )
 

@@ -42,6 +42,8 @@ def path_beside(name: str, folder: Path, *, wanted: str) -> Path:
         raise _unreadable(name, error, wanted) from None
     if not path.is_relative_to(folder.resolve()):
         raise InputError(f"{name!r}: leads out of the YAML file's folder by a link; put the file itself there")
+    if not path.is_file():
+        raise InputError(f"{name!r}: is no plain file; give {wanted}")
     return path
 
 

@@ -2,7 +2,7 @@
 
 import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from gqm_sym.runtime.jit import STAMP
 from gqm_sym.runtime.numbers import read_number
+from gqm_sym.specfile.units import Unit
 
 Array = NDArray[np.float64]
 
@@ -116,6 +117,14 @@ def evenly(start: str, stop: str, count: int) -> Array:
     at, by = int(first * whole), int(step * whole)
     # A quotient of integers is rounded once, however long they are.
     return np.fromiter(((at + by * k) / whole for k in range(count)), dtype=np.float64, count=count)
+
+
+def in_doubles(cells: Iterable[str], unit: Unit) -> Array:
+    """Doubles nearest to decimal numbers given in a unit, in SI."""
+    if unit.is_si:
+        return np.array([float(cell) for cell in cells])
+    scale = unit.factor * _fraction("pi") ** unit.turns
+    return np.array([float(Fraction(cell) * scale) for cell in cells])
 
 
 def _fraction(text: str) -> Fraction:

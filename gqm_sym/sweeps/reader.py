@@ -1,7 +1,9 @@
 """Read a sweep file: every mistake at its line, as of a curve file."""
 
 import difflib
+import re
 from collections.abc import Iterator, Mapping
+from math import isfinite
 from pathlib import Path
 
 import numpy as np
@@ -19,10 +21,13 @@ from gqm_sym.specfile.nodes import MapNode, Mistakes, plain
 from gqm_sym.specfile.places import locate, node_at, place_of
 from gqm_sym.specfile.units import check_unit, expected_units, in_si, launch_units, read_unit
 from gqm_sym.specfile.yamltext import read_text, read_tree
-from gqm_sym.sweeps.plan import SOLVED, SWIFT, Axis, Plan, evenly
+from gqm_sym.sweeps.plan import SOLVED, SWIFT, Axis, Plan, evenly, in_doubles
 from gqm_sym.sweeps.schema import MOST_POINTS, SweepFile, model_at
 
 SECONDS = 0.5
+
+# An exponent of more digits would make exact numbers that fill the memory.
+_DECIMAL = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d{1,3})?", re.ASCII)
 
 _NEEDED = "curve, quantities and grid"
 _LAUNCH = ("lam0", "v0", "direction", "lam")
@@ -165,9 +170,8 @@ class _Reader:
             else:
                 self._check_unit(column, units[column], "table", "units", column)
         for column, cells in columns.items():
-            unit = units.get(column, "")
-            values = [read_number(in_si(cell, unit), where=column).value if unit else float(cell) for cell in cells]
-            yield Axis(name=column, values=np.array(values))
+            unit = read_unit(units.get(column) or "1", where="unit")
+            yield Axis(name=column, values=in_doubles(cells, unit))
 
     def _columns(self, name: str, header: list[str], rows: list[list[str]]) -> dict[str, list[str]]:
         """The cells of a table by its columns, each a finite decimal number."""
@@ -263,7 +267,4 @@ def _si(unit: str) -> str:
 
 
 def _is_decimal(cell: str) -> bool:
-    try:
-        return bool(np.isfinite(float(cell))) and "_" not in cell
-    except ValueError:
-        return False
+    return bool(_DECIMAL.fullmatch(cell)) and isfinite(float(cell))

@@ -26,7 +26,8 @@ _ENGINES: dict[str, dict[str, Any]] = {
 DIGEST = "sweep_digest"
 
 _PLACE = "lam0"  # what is a value of the curve's parameter has the launch place's unit
-_LONG = {
+# What the columns hold, and its unit.
+DESCRIBED = {
     "half_period": ("time from one turning point to the other", "s"),
     "period": ("time after which the motion repeats", "s"),
     "turning_point_lower": ("lower turning point, as a value of the curve's parameter", _PLACE),
@@ -90,7 +91,7 @@ def dataset(plan: Plan, swept: Mapping[str, Sweep], refusals: Mapping[str, str])
 
 
 def _attributes(plan: Plan, name: str) -> dict[str, str]:
-    text, unit = _LONG.get(name, (f"parameter {name}", plan.units.get(name, "")))
+    text, unit = DESCRIBED.get(name, (f"parameter {name}", plan.units.get(name, "")))
     unit = plan.units.get(_PLACE, "") if unit == _PLACE else unit
     return {"long_name": text, **({"units": unit} if unit else {})}
 
