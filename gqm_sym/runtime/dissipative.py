@@ -4,19 +4,19 @@ from math import inf, isfinite
 
 import numpy as np
 
-from gqm_sym.errors import InputError, SolutionError
+from gqm_sym.errors import BudgetError, InputError, SolutionError
 from gqm_sym.runtime import legs
 from gqm_sym.runtime.course import ZERO, Course, Pair, Piece
 from gqm_sym.runtime.entries import follow, frame_at, from_rest
-from gqm_sym.runtime.formulas import Formulas, Launch
+from gqm_sym.runtime.formulas import Formulas, Given, Launch
 from gqm_sym.runtime.motion import Motion
-from gqm_sym.runtime.numbers import Number
 from gqm_sym.runtime.panels import FROM_TURN, REGULAR, TO_EQUILIBRIUM
 from gqm_sym.runtime.problem import Problem
 from gqm_sym.runtime.rest import Rest
 from gqm_sym.runtime.search import FARTHEST
 from gqm_sym.runtime.solve import CUSP_SHARE, domain_end, leaving, starting_step
-from gqm_sym.runtime.stretch import ULP, Array, Stretch, along_field
+from gqm_sym.runtime.stretch import ULP, Array, Stretch
+from gqm_sym.runtime.stretches import along_field
 
 # An equilibrium is approached until the distance left is exp(-this) of the leg: all that doubles have.
 CLOSEST = 690.0
@@ -24,19 +24,21 @@ CLOSEST = 690.0
 MOST_PAUSES = 12
 # Turns after which `legs` and `events` stop looking for the rest.
 MOST_TURNS = 20000
+# Pieces of legs that are kept, each some kilobytes.
+MOST_PIECES = 250_000
 
 
-def dissipate(formulas: Formulas, p: tuple[Number, ...], launch: Launch) -> Motion:
+def dissipate(formulas: Formulas, p: Given, launch: Launch) -> Motion:
     """The motion that a launch begins where forces dissipate."""
     functions = formulas.functions(p, launch)
-    problem = Problem(formulas=formulas, launch=launch, p=p, functions=functions, domain=formulas.domain(p))
+    problem = Problem(formulas, launch, p, functions, formulas.domain(p))
     if problem.w0 > 0.0:
         return Dissipative(problem, launch.direction)
     way = _leaves(problem, problem.lam0)[0]
     return Dissipative(problem, way) if way else Rest(problem)
 
 
-def launch_leg(formulas: Formulas, p: tuple[Number, ...], launch: Launch, places: Array) -> Array:
+def launch_leg(formulas: Formulas, p: Given, launch: Launch, places: Array) -> Array:
     """V**2 at places of the launch leg, through changes of contact sign up to its first turn; NaN elsewhere."""
     motion = dissipate(formulas, p, launch)
     v2 = np.full(places.shape, np.nan)
@@ -198,6 +200,11 @@ class Dissipative(Motion):
 
     def _go_on(self) -> None:
         """Follow the body to its next turn, to an end, or as far as one run goes."""
+        if len(self._pieces) >= MOST_PIECES:
+            raise BudgetError(
+                f"motion: {MOST_PIECES} pieces of legs reach t = {self._pieces[-1].t_stop[0]!r} only; "
+                "give a shorter t_max, or ask for earlier times and nearer places"
+            )
         problem, way, start, w = self.problem, self._way, self._place, self._w
         f, period = problem.functions, problem.period
         end = problem.high if way > 0 else problem.low

@@ -1,11 +1,9 @@
 """The entry points from Python into compiled code: explicit signatures, compiled once per installation.
 
-A conservative motion crosses once: `survey` finds its ends each way from the launch and, where it is periodic, lays
-the panels of
-its time. Everything else is asked for later, over arrays.
+Over arrays, and asked for when somebody wants to know; what every launch needs is found in one crossing (`surveying`).
 """
 
-from math import fabs, isfinite, pi
+from math import fabs, isfinite
 
 import numpy as np
 from numba import types
@@ -17,7 +15,7 @@ from gqm_sym.runtime.inversion import look_up_many, tabulate
 from gqm_sym.runtime.jit import Inner, entry
 from gqm_sym.runtime.legs import ASYMPTOTE, run, run_back
 from gqm_sym.runtime.legs import TURN as TURNED
-from gqm_sym.runtime.panels import DEGREE, REGULAR, TURN_TURN, lay, read_off, speeds
+from gqm_sym.runtime.panels import lay, read_off, speeds
 from gqm_sym.runtime.search import CRITICAL, LIMIT, TURN, walk
 
 _ADDRESSES = types.UniTuple(types.int64, 5)
@@ -81,42 +79,6 @@ def ends(fns, p, lam0, v0, direction, low, high, period):  # type: ignore[no-unt
         return direction, ahead, (TURN, 0.0, 0.0)
     reach = period - fabs(ahead[1]) if period > 0.0 else (lam0 - low if direction > 0 else high - lam0)
     return direction, ahead, walk(fns, p, lam0, w0, -direction, 0.0, reach, step)
-
-
-@entry(
-    types.Tuple((types.int64, _WALK, _WALK, _PANELS))(
-        _ADDRESSES, _LINE, _FLOAT, _FLOAT, types.int64, _FLOAT, _FLOAT, _FLOAT, types.boolean
-    )
-)
-def survey(fns, p, lam0, v0, direction, low, high, period, smooth):  # type: ignore[no-untyped-def]
-    """Find both ends of a motion, and lay its time where it is periodic and the curve is ``smooth``.
-
-    Returns
-    -------
-    direction, ahead, behind
-        As `ends` returns them.
-    panels
-        As `panels.lay` returns them; empty unless the motion is a libration or a circulation.
-    """
-    direction, ahead, behind = ends(fns, p, lam0, v0, direction, low, high, period)
-    if smooth and ahead[0] == LIMIT and period > 0.0 and v0 > 0.0:
-        end = lam0 + direction * period
-        loop = lay(fns, p, REGULAR, lam0, end, lam0, v0 * v0, np.empty((0, 0)), np.array([0.0, 1.0]))
-        return direction, ahead, behind, loop
-    if smooth and ahead[0] == TURN and behind[0] == TURN:
-        a, b = lam0 + min(ahead[1], behind[1]), lam0 + max(ahead[1], behind[1])
-        return direction, ahead, behind, lay(fns, p, TURN_TURN, a, b, a, 0.0, np.empty((0, 0)), np.array([0.0, pi]))
-    empty = (
-        np.empty(0),
-        np.empty(0),
-        np.empty(0),
-        np.empty((0, DEGREE)),
-        np.empty((0, DEGREE)),
-        0.0,
-        0.0,
-        0,
-    )
-    return direction, ahead, behind, empty
 
 
 @entry(_PANELS(_ADDRESSES, _LINE, types.int64, _FLOAT, _FLOAT, _FLOAT, _FLOAT, _LINE))

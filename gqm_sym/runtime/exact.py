@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gqm_sym.budgets import budget, spend
 from gqm_sym.errors import SolutionError
 from gqm_sym.runtime.exact_quadrature import gauss
 from gqm_sym.runtime.exact_tracks import Track, TrackMaker
@@ -20,6 +21,7 @@ from gqm_sym.runtime.numbers import Number
 from gqm_sym.runtime.panels import FROM_TURN, REGULAR, TURN_TURN
 
 Array = NDArray[np.float64]
+NOWHERE: Array = np.empty(0)
 
 # Precisions at which a sign is asked for, in decimal digits; what is zero to the last counts as zero.
 LADDER = (40, 80, 210)
@@ -66,6 +68,7 @@ class ExactProblem:
                 return 1 if slope > 0 else -1
         return 0
 
+    @budget("search for turning points", 60.0, "launch a little farther from the equilibrium")
     def resolve(self, near: float, far: float, direction: int) -> End:
         """What lies between two places that doubles cannot tell apart from an equilibrium.
 
@@ -130,10 +133,12 @@ class Arithmetic:
 
     def climb(self, lam: Any) -> Any:
         """What V**2 loses in climbing to a place, up to a constant."""
+        spend()
         return self.track.climb(lam)
 
     def climb_slope(self, lam: Any) -> Any:
         """Its derivative."""
+        spend()
         return self.track.climb_slope(lam)
 
     def climb_bend(self, lam: Any) -> Any:

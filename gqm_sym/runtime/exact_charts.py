@@ -14,7 +14,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 
 from gqm_sym.errors import SolutionError
-from gqm_sym.runtime.chart import Chart
+from gqm_sym.runtime.chart import Chart, ChartMaker
 from gqm_sym.runtime.chart_functions import EDGES, RECORD, TERMS
 from gqm_sym.runtime.exact_quadrature import gauss
 from gqm_sym.runtime.fixed_point import Polynomials
@@ -59,34 +59,29 @@ class ChartTrack:
 
     Parameters
     ----------
-    context
-        An mpmath context.
-    values
-        The run-time parameters in it.
-    chart
-        The curve's chart.
-    curve
-        The curve itself.
+    maker, chart
+        What made the curve's chart, and the chart.
     climb
         ``f(op, x, z, p)``: the climb and its derivatives by x and z.
-    launch
-        Arc length from the start point, or the coordinates of a point.
-    near
-        Arc length of the launch, as a double.
+    point, lam0
+        The launch by its coordinates, where it was given so, and by arc length from the start point.
+    context, values
+        An mpmath context, and the run-time parameters in it.
     """
 
     def __init__(
         self,
+        maker: ChartMaker,
+        chart: Chart,
+        climb: Callable[..., Any],
+        point: tuple[Number, Number] | None,
+        lam0: Number,
         context: Any,
         values: tuple[Any, ...],
-        chart: Chart,
-        curve: TrueCurve,
-        climb: Callable[..., Any],
-        launch: Number | tuple[Number, Number],
-        near: float,
     ) -> None:
+        curve: TrueCurve = maker.true_curve(context, values, chart)
         self._context, self._values, self._chart, self._curve, self._climb = context, values, chart, curve, climb
-        self._near = near
+        self._near = lam0.value
         self._edges = chart.edges.tolist()
         count = len(self._edges) - 1
         self._polynomials: list[Any] = [None] * count
@@ -99,7 +94,7 @@ class ChartTrack:
         self._lowest = self._highest = min(begin, count - 1)
         self._shifts = [None] * count
         self._shifts[self._lowest] = self._meeting_of(self._lowest, *curve.start, context.mpf(self._edges[begin]))
-        self.lam0 = self._launch(launch)
+        self.lam0 = self._by_length(lam0.at(context)) if point is None else self._by_point(*point)
 
     # -- what the exact problem asks ----------------------------------------------------------
 
@@ -182,17 +177,18 @@ class ChartTrack:
 
     # -- places -------------------------------------------------------------------------------
 
-    def _launch(self, launch: Number | tuple[Number, Number]) -> Any:
-        context = self._context
-        if isinstance(launch, tuple):
-            x, z = (number.at(context) for number in launch)
-            guess = context.mpf(self._near)
-            k = self._piece(guess)
-            return self._meeting_of(k, x, z, guess - self._lap(guess) + self._shifts[k]) - self._shifts[k]
-        wanted = launch.at(context)
+    def _by_point(self, x: Number, z: Number) -> Any:
+        """The place next to the launch's double to which the perpendicular goes from a point."""
+        guess = self._context.mpf(self._near)
+        k = self._piece(guess)
+        c = guess - self._lap(guess) + self._shifts[k]
+        return self._meeting_of(k, x.at(self._context), z.at(self._context), c) - self._shifts[k]
+
+    def _by_length(self, wanted: Any) -> Any:
+        """The place at an arc length from the start point."""
         if wanted == 0:
             return wanted
-        lam, length = wanted, self.arc(context.mpf(0), wanted)
+        lam, length = wanted, self.arc(self._context.mpf(0), wanted)
         for _ in range(3):  # from rounding, each step squares what is off
             nearer = lam + (wanted - length) / self.ds(lam)
             length += self.arc(lam, nearer)

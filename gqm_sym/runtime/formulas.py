@@ -2,19 +2,18 @@
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from gqm_sym.budgets import budget
 from gqm_sym.errors import LaunchError, ParameterError
 from gqm_sym.runtime.chart import Chart, ChartMaker
 from gqm_sym.runtime.entries import frame_at, loads_at
-from gqm_sym.runtime.exact import ExactProblem
-from gqm_sym.runtime.exact_charts import ChartTrack
-from gqm_sym.runtime.exact_tracks import FormulaTrack, Track
+from gqm_sym.runtime.exact_problems import exact_problem
 from gqm_sym.runtime.interface import Addresses, Dissipation, ExactClimb, ExactFormulas
 from gqm_sym.runtime.numbers import Number, read_number
 from gqm_sym.runtime.stretch import Array, Functions
@@ -54,8 +53,7 @@ class Pass1(NamedTuple):
     normal_force: Array
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Launch:
+class Launch(NamedTuple):
     """Where and how a motion begins, in numbers that mean exactly what was given."""
 
     lam0: Number
@@ -75,10 +73,19 @@ class Domain(NamedTuple):
     ends: tuple[str, str] = ("domain-end", "domain-end")
 
 
+class Given(tuple[Number, ...]):
+    """Run-time parameters, and what follows from them alone: the same for every launch with them."""
+
+    values: Array
+    domain: Domain | None = None
+    functions: Functions | None = None
+
+
 @lru_cache(maxsize=8)
 def _chart(maker: ChartMaker, values: tuple[float, ...]) -> Chart:
     """A curve's chart, made once for the same values of the run-time parameters."""
-    return maker.chart(values)
+    with budget("chart", 60.0, "give fewer points, or shorter and simpler pieces"):
+        return maker.chart(values)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -121,9 +128,20 @@ class Formulas:
     at_least: tuple[tuple[str, str], ...] = ()
     body: str = ""
     grip: tuple[str, str] | None = None
+    _read: Callable[..., "Given"] = field(init=False, repr=False, compare=False)
 
-    def numbers(self, given: tuple[Any, ...]) -> tuple[Number, ...]:
+    def __post_init__(self) -> None:
+        # Most launches come with the parameters of one before; 1 and 1.0 are told apart, for their texts differ.
+        object.__setattr__(self, "_read", lru_cache(maxsize=16, typed=True)(self._numbers))
+
+    def numbers(self, given: tuple[Any, ...]) -> "Given":
         """The run-time parameters as exact numbers, checked."""
+        try:
+            return self._read(*given)
+        except TypeError:  # what cannot be hashed
+            return self._numbers(*given)
+
+    def _numbers(self, *given: Any) -> "Given":
         out = []
         for name, value in zip(self.parameters, given, strict=True):
             if value is None:
@@ -135,7 +153,9 @@ class Formulas:
                 )
             out.append(number)
         self._check_least(dict(zip(self.parameters, out, strict=True)))
-        return tuple(out)
+        p = Given(out)
+        p.values = np.array([number.value for number in out])
+        return p
 
     def _check_least(self, values: dict[str, Number]) -> None:
         """Refuse a parameter below what it must not fall below."""
@@ -147,7 +167,7 @@ class Formulas:
 
     def launch(
         self,
-        p: tuple[Number, ...],
+        p: Given,
         *,
         lam0: Any,
         v0: Any,
@@ -170,12 +190,12 @@ class Formulas:
         horizon = None if t_max is None else read_number(t_max, where="t_max")
         if horizon is not None and not horizon.value > 0.0:
             raise LaunchError(f"t_max: must be positive, got {horizon.text}")
-        low, high = self.domain(p)[:2]
+        low, high, _, _ = self.domain(p)
         if not low <= place.value <= high:
             raise LaunchError(f"lam0: must lie in the domain [{low!r}, {high!r}] of {self.parameter}, got {place.text}")
-        return Launch(lam0=place, v0=speed, direction=int(direction), contact=contact, t_max=horizon, point=at)
+        return Launch(place, speed, int(direction), contact, horizon, at)
 
-    def _place(self, p: tuple[Number, ...], lam0: Any, point: Any) -> tuple[Number, tuple[Number, Number] | None]:
+    def _place(self, p: Given, lam0: Any, point: Any) -> tuple[Number, tuple[Number, Number] | None]:
         """The launch place by the curve's parameter, and its coordinates if they are what was given."""
         if point is None:
             if lam0 is None:
@@ -202,13 +222,18 @@ class Formulas:
             )
         return read_number(s, where="point"), (at_x, at_z)
 
-    def charted(self, p: tuple[Number, ...]) -> Chart:
+    def charted(self, p: Given) -> Chart:
         """The chart of a charted curve."""
         assert self.chart is not None
-        return _chart(self.chart, tuple(number.value for number in p))
+        return _chart(self.chart, tuple(p.values.tolist()))
 
-    def domain(self, p: tuple[Number, ...]) -> Domain:
+    def domain(self, p: Given) -> Domain:
         """The range of the curve's parameter."""
+        if p.domain is None:
+            p.domain = self._domain(p)
+        return p.domain
+
+    def _domain(self, p: Given) -> Domain:
         if self.chart is not None:
             chart = self.charted(p)
             if chart.period:
@@ -224,42 +249,20 @@ class Formulas:
             0.0,
         )
 
-    def functions(self, p: tuple[Number, ...], launch: Launch) -> Functions:
+    def functions(self, p: Given, launch: Launch) -> Functions:
         """The compiled functions with what they are given, and the exact problem of one launch."""
-        values, addresses = np.array([number.value for number in p]), tuple(self.addresses)
-        if self.chart is not None:
-            chart = self.charted(p)
-            return Functions(
-                addresses=addresses,
-                p=np.concatenate([values, chart.block]),
-                exact=self._exact_problem(p, launch),
-                breaks=chart.breaks,
-                corners=chart.corners,
-                period=chart.period,
-            )
-        return Functions(addresses=addresses, p=values, exact=self._exact_problem(p, launch))
+        if p.functions is None:
+            p.functions = self._functions(p)
+        addresses, values, _, breaks, corners, period = p.functions
+        return Functions(addresses, values, exact_problem(self, p, launch), breaks, corners, period)
 
-    def _exact_problem(self, p: tuple[Number, ...], launch: Launch) -> ExactProblem | None:
-        """The exact problem of one launch, where there is one."""
-        if isinstance(self.exact, ExactFormulas):
-            formulas, domain_of, edges = self.exact, self.domain_of, NOTHING
-            assert domain_of is not None
-
-            def track(context: Any, values: tuple[Any, ...]) -> Track:
-                return FormulaTrack(formulas, domain_of, launch.lam0, context, values)
-        elif isinstance(self.exact, ExactClimb):
-            climb, maker, chart = self.exact.climb, self.chart, self.charted(p)
-            assert maker is not None
-            edges = chart.edges
-            if not maker.is_exact(chart):
-                return None
-
-            def track(context: Any, values: tuple[Any, ...]) -> Track:
-                curve = maker.true_curve(context, values, chart)
-                return ChartTrack(context, values, chart, curve, climb, launch.point or launch.lam0, launch.lam0.value)
-        else:
-            return None
-        return ExactProblem(track, edges, p, launch.lam0, launch.v0)
+    def _functions(self, p: Given) -> Functions:
+        addresses = tuple(self.addresses)
+        if self.chart is None:
+            return Functions(addresses, p.values)
+        chart = self.charted(p)
+        block = np.concatenate([p.values, chart.block])
+        return Functions(addresses, block, None, chart.breaks, chart.corners, chart.period)
 
     def pass1(self, lam: Any, lam0: Any, v0: Any, direction: int, given: tuple[Any, ...]) -> Pass1:
         """Pass 1 at places of the curve."""
@@ -310,11 +313,29 @@ class Formulas:
         check_end(self, motion)
         return motion
 
-    def sweep(self, quantity: str, lam0: Any, v0: Any, direction: Any, lam: Any, given: tuple[Any, ...]) -> "Sweep":
-        """One quantity over arrays of launches and parameters."""
+    def sweep(
+        self,
+        quantity: str,
+        lam0: Any,
+        v0: Any,
+        direction: Any,
+        lam: Any,
+        t_max: Any,
+        contact: str,
+        given: tuple[Any, ...],
+        client: Any,
+        source: str,
+    ) -> "Sweep":
+        """One quantity over arrays of launches and parameters, here or on a cluster that is sent the module's file."""
+        if client is not None:
+            from gqm_sym.runtime.cluster import sweep_on
+
+            launch = {"lam0": lam0, "v0": v0, "direction": direction, "lam": lam, "t_max": t_max, "contact": contact}
+            parameters = dict(zip(self.parameters, given, strict=True))
+            return sweep_on(client, source, self.name, quantity, {**launch, **parameters})
         from gqm_sym.runtime.sweeping import sweep
 
-        return sweep(self, quantity, lam0, v0, direction, lam, given)
+        return sweep(self, quantity, lam0, v0, direction, lam, t_max, contact, given)
 
 
 def read_numbers(values: Any, *, where: str) -> tuple[Array, Array, tuple[int, ...]]:

@@ -5,6 +5,7 @@ from math import inf, isfinite
 
 import numpy as np
 
+from gqm_sym.budgets import budget, spend
 from gqm_sym.errors import InputError, SolutionError
 from gqm_sym.runtime import search
 from gqm_sym.runtime.course import ZERO, Course, Piece, plus
@@ -13,7 +14,8 @@ from gqm_sym.runtime.events import liftoff
 from gqm_sym.runtime.motion import Motion
 from gqm_sym.runtime.problem import Problem
 from gqm_sym.runtime.search import FARTHEST, NARROW
-from gqm_sym.runtime.stretch import ULP, Array, Stretch, through, toward_equilibrium
+from gqm_sym.runtime.stretch import ULP, Array, Stretch
+from gqm_sym.runtime.stretches import through, toward_equilibrium
 
 
 @dataclass(slots=True)
@@ -168,6 +170,7 @@ class Passage(Motion):
             return False
         return bool(last.anomaly_of((lam - last.a) + low, (last.b - lam) - low) > last.edges[-1])
 
+    @budget("motion", 60.0, "give a shorter t_max, or ask for earlier times")
     def _go_on(self) -> None:
         """One more stretch of a motion without an end."""
         end, problem = self.open_end, self.problem
@@ -186,6 +189,7 @@ class Passage(Motion):
             )
         begun = abs(end.place - lam0)
         while True:
+            spend()
             what, near, far = walk_on(
                 f.addresses,
                 f.p,

@@ -4,8 +4,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from gqm_sym.runtime.exact import ExactProblem
-from gqm_sym.runtime.formulas import Domain, Formulas, Launch
-from gqm_sym.runtime.numbers import Number
+from gqm_sym.runtime.formulas import Domain, Formulas, Given, Launch
 from gqm_sym.runtime.rounded import RoundedProblem
 from gqm_sym.runtime.stretch import Functions
 
@@ -24,13 +23,13 @@ class Reach:
     level: bool = False
 
 
-@dataclass(slots=True, kw_only=True)
+@dataclass(slots=True)
 class Problem:
     """One launch of one module, in doubles and exactly."""
 
     formulas: Formulas
     launch: Launch
-    p: tuple[Number, ...]
+    p: Given
     functions: Functions
     domain: Domain
 

@@ -4,15 +4,15 @@ from typing import Any
 
 import numpy as np
 
+from gqm_sym.runtime import orbits
 from gqm_sym.runtime.course import Course, Pair
 from gqm_sym.runtime.doubledouble import two_product
 from gqm_sym.runtime.exact import SMOOTH_PANELS
-from gqm_sym.runtime.orbits import places_along, states_along
 from gqm_sym.runtime.panels import TURN_TURN
 from gqm_sym.runtime.problem import Problem
 from gqm_sym.runtime.stretch import Array
 from gqm_sym.runtime.threads import spread
-from gqm_sym.runtime.waves import fit_wave, sum_wave
+from gqm_sym.runtime.waves import fit_wave
 
 # Times a thread is worth starting for.
 PLACES, STATES = 2**16, 2**12
@@ -21,15 +21,18 @@ MOST_PERIODS = 2.0**50
 ROWS = 9
 
 
+def plain_time(t: Any) -> float | None:
+    """A time that is a double as it stands; None for any other."""
+    if type(t) is float:
+        return t
+    return float(t) if type(t) is int and abs(t) < 2**53 else None
+
+
 def plain_times(t: Any) -> tuple[Array, float, float] | None:
     """Times that are doubles as they stand, the least and the greatest; None where they need reading."""
-    if type(t) is float:
-        return np.array((t,)), t, t
     if isinstance(t, np.ndarray) and t.dtype == np.float64 and t.size:
         flat = np.ascontiguousarray(t).reshape(-1)
         return flat, float(flat.min()), float(flat.max())
-    if type(t) is int and abs(t) < 2**53:
-        return np.array((float(t),)), float(t), float(t)
     return None
 
 
@@ -52,74 +55,74 @@ class Sampler:
         self.course = course
         self.reach = MOST_PERIODS * course.period[0]
         self._problem, self._stretch = problem, stretch
-        v0, s_a = direction * problem.launch.v0.value, course.pieces[0].s_a
-        self._launch = np.array([problem.lam0, v0, course.lap_length, problem.arc_origin, s_a, *clock_error])
         there_and_back = stretch.kind == TURN_TURN
         way = direction if there_and_back else 1
         start, start_low = way * phase[0], way * phase[1]
-        if len(stretch.edges) - 1 > SMOOTH_PANELS:
-            self._cosines = self._sines = np.empty(0)
-        else:
-            self._cosines, self._sines = fit_wave(stretch.edges, *stretch.clock, stretch.panels[3], there_and_back)
-        self._dial = np.array(
-            [
-                *course.period,
-                *_inverse(course.period),
-                *(start, start_low, stretch.a, stretch.b, problem.lam0, course.lap),
-            ]
-        )
-        self._clock = np.array([*course.period, start, start_low, *stretch.whole, stretch.stop, course.pace])
+        ends = (stretch.a, stretch.b, problem.lam0, course.lap)
+        v0, s_a = direction * problem.launch.v0.value, course.pieces[0].s_a
+        self._sections = {
+            orbits.FUNCTIONS: np.array([*problem.functions.addresses, stretch.kind], dtype=np.int64),
+            orbits.LAUNCH: np.array(
+                [problem.lam0, v0, course.lap_length, problem.arc_origin, s_a, *clock_error], dtype=np.float64
+            ),
+            orbits.DIAL: np.array([*course.period, *_inverse(course.period), start, start_low, *ends]),
+            orbits.CLOCK: np.array([*course.period, start, start_low, *stretch.whole, stretch.stop, course.pace]),
+        }
+        if len(stretch.edges) - 1 <= SMOOTH_PANELS:
+            series = fit_wave(stretch.edges, *stretch.clock, stretch.panels[3], there_and_back)
+            self._sections[orbits.COSINES], self._sections[orbits.SINES] = series
+        if not len(self._sections.get(orbits.COSINES, ())):
+            self._tabulate()
+        self._short = orbits.record(self._sections)
+        self._whole: Array | None = None
+
+    def _tabulate(self) -> None:
+        names = (orbits.MIDDLES, orbits.LOWS, orbits.SCALES, orbits.POWERS, orbits.INDEX, orbits.ENDS)
+        self._sections.update(zip(names, self._stretch.table[:6], strict=True))
+
+    @property
+    def _record(self) -> Array:
+        """All that is known, for states; places take less."""
+        if self._whole is None:
+            self._tabulate()
+            stretch, panels = self._stretch, self._stretch.panels
+            reaches = stretch.table[3].sum(axis=1)
+            middles = 0.5 * (stretch.edges[1:] + stretch.edges[:-1])
+            self._sections |= {
+                orbits.SHAPE: np.array([stretch.a, stretch.b, stretch.ref, stretch.w, stretch.spread]),
+                orbits.EDGES: panels[0],
+                orbits.LENGTHS: panels[2],
+                orbits.ARCS: panels[4],
+                orbits.CLOCK_ERRORS: stretch.clock_error(middles),
+                orbits.REACHES: reaches,
+                orbits.TABLE_ERRORS: stretch.inversion_error(reaches),
+            }
+            self._whole = orbits.record(self._sections)
+        return self._whole
+
+    def place(self, t: float) -> float:
+        """The curve's parameter at one time."""
+        place: float = orbits.place_at_time(self._short, t)
+        return place
 
     def places(self, t: Array) -> Array:
         """The curve's parameter at times."""
         out = np.empty_like(t)
-        if self._cosines.size:
-            spread(
-                lambda part: sum_wave(self._dial, self._cosines, self._sines, t, out, part.start, part.stop),
-                t.size,
-                PLACES,
-            )
-            return out
-        s, lap, lam0 = self._stretch, self.course.lap, self._problem.lam0
-        table = s.table[:6]
-        spread(
-            lambda part: places_along(s.kind, s.a, s.b, lam0, lap, self._clock, table, t[part], out[part]),
-            t.size,
-            PLACES,
-        )
+        spread(lambda part: orbits.places_along(self._short, t, out, part.start, part.stop), t.size, PLACES)
         return out
+
+    def state(self, t: float) -> tuple[float, ...]:
+        """The time, and as `states` has it: what there is to say of it."""
+        row = list(orbits.state_at_time(self._record, self._problem.functions.p, t))
+        if self._problem.formulas.chart is not None:
+            row[2] = row[1]
+        return tuple(row)
 
     def states(self, t: Array) -> Array:
         """Rows of lam, s, x, z, v, v**2, kappa, normal force and error of lam at times."""
-        stretch, problem = self._stretch, self._problem
-        f, panels = problem.functions, stretch.panels
-        table, arcs = stretch.table[:6], (panels[0], panels[2], panels[4])
-        shape = (stretch.a, stretch.b, stretch.ref, stretch.w, stretch.spread)
-        reaches = stretch.table[3].sum(axis=1)
-        middles = 0.5 * (stretch.edges[1:] + stretch.edges[:-1])
-        errors = (stretch.clock_error(middles), reaches, stretch.inversion_error(reaches))
-        out = np.empty((ROWS, t.size))
-        out[0] = self.places(t)
-
-        def along(part: slice) -> None:
-            states_along(
-                f.addresses,
-                f.p,
-                stretch.kind,
-                shape,
-                self._launch,
-                self._clock,
-                table,
-                arcs,
-                errors,
-                t,
-                part.start,
-                part.stop,
-                out,
-            )
-
-        spread(along, t.size, STATES)
-        if problem.formulas.chart is not None:
+        record, p, out = self._record, self._problem.functions.p, np.empty((ROWS, t.size))
+        spread(lambda part: orbits.states_along(record, p, t, out, part.start, part.stop), t.size, STATES)
+        if self._problem.formulas.chart is not None:
             out[1] = out[0]  # a chart's parameter is its arc length
         return out
 

@@ -6,17 +6,18 @@ import numpy as np
 
 from gqm_sym.errors import LaunchError, SolutionError
 from gqm_sym.runtime import search
-from gqm_sym.runtime.entries import first_step, frame_at, speed_squared_at, survey, walk_on
+from gqm_sym.runtime.entries import first_step, frame_at, speed_squared_at, walk_on
 from gqm_sym.runtime.exact_panels import DIGITS, lay_exactly
-from gqm_sym.runtime.formulas import Formulas, Launch
+from gqm_sym.runtime.formulas import Formulas, Given, Launch
 from gqm_sym.runtime.motion import Motion
-from gqm_sym.runtime.numbers import Number
 from gqm_sym.runtime.panels import REGULAR
 from gqm_sym.runtime.passage import OpenEnd, Passage
 from gqm_sym.runtime.periodic import Periodic
 from gqm_sym.runtime.problem import Problem, Reach
 from gqm_sym.runtime.rest import Rest
-from gqm_sym.runtime.stretch import LEAST_BALANCE, Functions, Stretch, between_turns, from_turn, through
+from gqm_sym.runtime.stretch import LEAST_BALANCE, Functions, Stretch
+from gqm_sym.runtime.stretches import between_turns, from_turn, through
+from gqm_sym.runtime.surveying import survey
 
 # ds at an end of the domain, against its value at the launch, that makes the end a cusp.
 CUSP_SHARE = 1e-7
@@ -25,7 +26,7 @@ NEAR_CUSP = 1e-3
 OFF_CUSP = 1e-6
 
 
-def solve(formulas: Formulas, p: tuple[Number, ...], launch: Launch) -> Motion:
+def solve(formulas: Formulas, p: Given, launch: Launch) -> Motion:
     """The motion that a launch begins, as long as contact lasts."""
     motion = _bilateral(formulas, p, launch)
     if launch.contact == "bilateral" or not isinstance(motion, Periodic):
@@ -36,39 +37,30 @@ def solve(formulas: Formulas, p: tuple[Number, ...], launch: Launch) -> Motion:
     return passage.finish() if passage.lifted_off else motion
 
 
-def _bilateral(formulas: Formulas, p: tuple[Number, ...], launch: Launch) -> Motion:
+def _bilateral(formulas: Formulas, p: Given, launch: Launch) -> Motion:
     low, high, period, _ = domain = formulas.domain(p)
     f = formulas.functions(p, launch)
-    problem = Problem(formulas=formulas, launch=launch, p=p, functions=f, domain=domain)
-    smooth = f.breaks.size == 0
-    direction, ahead, behind, panels = survey(
-        f.addresses, f.p, problem.lam0, launch.v0.value, launch.direction, low, high, period, smooth
-    )
+    problem = Problem(formulas, launch, p, f, domain)
+    lam0, v0 = launch.lam0.value, launch.v0.value
+    direction, ahead, behind, time = survey(f.addresses, f.p, lam0, v0, launch.direction, low, high, period)
     stuck = ahead[0] in (search.CUSP, search.BROKEN) and ahead[1] == 0.0
-    if (direction == 0 or stuck) and _is_cusp(problem, problem.lam0):
+    if (direction == 0 or stuck) and _is_cusp(problem, lam0):
         return _from_cusp(problem)
     if direction == 0:
         sign = problem.decider.slope_sign()
         if sign == 0:
             return Rest(problem)
         direction = -sign
-        ahead = walk_on(
-            f.addresses,
-            f.p,
-            problem.lam0,
-            0.0,
-            direction,
-            0.0,
-            period or _room(problem, direction),
-            starting_step(problem),
-        )
-    if len(panels[0]) and ahead[0] == search.TURN:  # a libration without difficulties
-        a, b = sorted((problem.lam0 + ahead[1], problem.lam0 + behind[1]))
-        return Periodic(problem, "libration", direction, between_turns(f, a, b, panels))
+        reach = period or _room(problem, direction)
+        ahead = walk_on(f.addresses, f.p, lam0, 0.0, direction, 0.0, reach, starting_step(problem))
+    known = time if time == time and f.breaks.size == 0 else None
+    if known is not None and ahead[0] == search.TURN:  # a libration without difficulties
+        a, b = lam0 + ahead[1], lam0 + behind[1]
+        return Periodic(problem, "libration", direction, between_turns(f, min(a, b), max(a, b), known))
     front = _reach(problem, direction, ahead)
     if front.what == "closed":
-        end = problem.lam0 + direction * period
-        stretch = through(f, problem.lam0, end, problem.lam0, problem.w0, panels=panels if len(panels[0]) else None)
+        end = lam0 + direction * period
+        stretch = through(f, lam0, end, lam0, problem.w0, known=known)
         return Periodic(problem, "circulation", direction, stretch)
     if front.what != "turn":
         return _outward(problem, direction, front)
@@ -256,7 +248,7 @@ def _gathering_speed(passage: Passage, top: float) -> float:
     # As slow as this the launch is next to an equilibrium, its place to be taken as exactly as it was given.
     scale = f.exact.at(DIGITS)
     panels = lay_exactly(f.exact, REGULAR, (scale.lam0, scale.mpf(middle)), 1.0)
-    slow = Stretch(functions=f, kind=REGULAR, a=lam0, b=middle, ref=lam0, w=w0, panels=panels, from_exact=True)
+    slow = Stretch(functions=f, kind=REGULAR, a=lam0, b=middle, ref=lam0, w=w0, laid=panels)
     passage.add(slow, 1, "")
     return middle
 

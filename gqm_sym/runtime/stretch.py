@@ -2,8 +2,8 @@
 
 from copy import copy
 from dataclasses import dataclass, field
-from math import atan2, exp, inf, log, pi, sqrt
-from typing import Any
+from math import atan2, inf, log, pi, sqrt
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -42,8 +42,7 @@ NOWHERE: Array = np.empty(0)
 ULP = 2.220446049250313e-16
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Functions:
+class Functions(NamedTuple):
     """One motion's compiled functions and what they are given.
 
     Attributes
@@ -63,8 +62,8 @@ class Functions:
     addresses: tuple[int, ...]
     p: Array
     exact: ExactProblem | None = None
-    breaks: Array = field(default_factory=lambda: NOWHERE)
-    corners: Array = field(default_factory=lambda: NOWHERE)
+    breaks: Array = NOWHERE
+    corners: Array = NOWHERE
     period: float = 0.0
 
     def between(self, places: Array, a: float, b: float) -> Array:
@@ -96,12 +95,12 @@ class Stretch:
     v2 : array or None
         V**2 along it where forces dissipate: a field (`fields`), by the distance from ``a``, or from ``b`` if that is
         an equilibrium.
+    laid : tuple, optional
+        Its panels, if they were laid in extended precision.
+    known : float, optional
+        Its duration, where that is known to be good in doubles: panels are then laid when first asked for.
     ends : pair
         Its ends in extended precision, where they are known.
-    from_exact : bool
-        Whether its panels were laid in extended precision.
-    conditioning : float
-        How many times its times magnify, at most, the rounding of what they depend on.
     """
 
     functions: Functions
@@ -113,44 +112,71 @@ class Stretch:
     stop: float = 1.0
     hints: tuple[float, ...] = ()
     v2: Array | None = None
-    panels: Any = None
+    laid: Any = None
+    known: float | None = None
     ends: tuple[Any, Any] = (None, None)
-    from_exact: bool = False
-    conditioning: float = field(default=1.0, init=False)
+    _from_exact: bool = False
+    _conditioning: float = field(default=1.0, init=False)
     _clock: Any = field(default=None, repr=False)
     _is_timed: bool = field(default=False, repr=False)
     _stretched: float | None = field(default=None, repr=False)
     _table: Any = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
+        if self.known is None:
+            self._settle()
+
+    def _settle(self) -> None:
+        """Lay its panels, in extended precision where doubles would lose too much."""
         f = self.functions
+        self._from_exact = self.laid is not None
         if self.v2 is not None:
-            self.panels = lay_along(f.p, self.kind, self.a, self.b, self.v2, self._marks())
-        elif self.panels is None:
+            self.laid = lay_along(f.p, self.kind, self.a, self.b, self.v2, self._marks())
+        elif self.laid is None:
             self.w += self._off_launch()
-            self.panels = lay_panels(f.addresses, f.p, self.kind, self.a, self.b, self.ref, self.w, self._marks())
-        exact = f.exact
-        self.conditioning = max(1.0 / self.balance if self.balance > 0.0 else inf, self._magnified())
-        if exact is not None and not self.from_exact and self.conditioning > 1.0 / LEAST_BALANCE:
-            self.ends = exact_ends(exact, DIGITS, self.kind, self.a, self.b, self.ends)
+            self.laid = lay_panels(f.addresses, f.p, self.kind, self.a, self.b, self.ref, self.w, self._marks())
+        self._conditioning = max(1.0 / self.balance if self.balance > 0.0 else inf, self._magnified())
+        if f.exact is not None and not self._from_exact and self._conditioning > 1.0 / LEAST_BALANCE:
+            self.ends = exact_ends(f.exact, DIGITS, self.kind, self.a, self.b, self.ends)
             self.a, self.b = float(self.ends[0]), float(self.ends[1])
-            self.panels = lay_exactly(exact, self.kind, self.ends, self.stop)
-            self.from_exact = True
-        if self.panels[7] == ILL_CONDITIONED:
+            self.laid = lay_exactly(f.exact, self.kind, self.ends, self.stop)
+            self._from_exact = True
+        if self.laid[7] == ILL_CONDITIONED:
             raise SolutionError(
                 f"time of flight from {self.a!r} to {self.b!r}: V**2 all but vanishes inside, and this curve is known "
                 "by doubles only; launch a little faster or slower, or declare the curve by formulas"
             )
-        if self.panels[7] == FAILED:
+        if self.laid[7] == FAILED:
             raise SolutionError(
                 f"time of flight from {self.a!r} to {self.b!r}: the integrand is not finite there; "
                 "is the curve regular and the potential finite on this stretch?"
             )
 
+    def _ready(self) -> "Stretch":
+        """Itself, its panels laid."""
+        if self.laid is None:
+            self._settle()
+        return self
+
+    @property
+    def panels(self) -> Any:
+        """Its panels, as `panels.lay` returns them."""
+        return self._ready().laid
+
+    @property
+    def from_exact(self) -> bool:
+        """Whether its panels were laid in extended precision."""
+        return self._ready()._from_exact
+
+    @property
+    def conditioning(self) -> float:
+        """How many times its times magnify, at most, the rounding of what they depend on."""
+        return self._ready()._conditioning
+
     def timed(self, clock: tuple[Array, Array]) -> "Stretch":
         """The same stretch by a better clock."""
-        better = copy(self)
-        better._clock, better._table, better._is_timed = clock, None, True
+        better = copy(self._ready())
+        better._clock, better._table, better._is_timed, better.known = clock, None, True, None
         return better
 
     @property
@@ -176,7 +202,7 @@ class Stretch:
     @property
     def duration(self) -> float:
         """Time from one end to the other."""
-        return self.whole[0]
+        return self.whole[0] if self.known is None else self.known
 
     @property
     def whole(self) -> tuple[float, float]:
@@ -318,50 +344,3 @@ class Stretch:
             low, high = exact_ends(exact, DIGITS, self.kind, self.a, self.b, self.ends)
             self._stretched = float((high - low) / width)
         return self._stretched
-
-
-def toward_equilibrium(functions: Functions, start: float, top: float, duration: float) -> Stretch:
-    """A stretch from ``start`` that comes as close to an equilibrium as takes at least ``duration``."""
-    stop = 8.0
-    while True:
-        stretch = Stretch(functions=functions, kind=TO_EQUILIBRIUM, a=start, b=top, stop=stop)
-        if stretch.duration > duration or exp(-stop) * abs(start - top) < 1e-300:
-            return stretch
-        stop *= 2.0
-
-
-def between_turns(
-    functions: Functions,
-    a: float,
-    b: float,
-    panels: Any = None,
-    ends: tuple[Any, Any] = (None, None),
-) -> Stretch:
-    """A stretch between two turning points."""
-    return Stretch(functions=functions, kind=TURN_TURN, a=a, b=b, stop=pi, panels=panels, ends=ends)
-
-
-def from_turn(functions: Functions, turn: float, end: float) -> Stretch:
-    """A stretch from a turning point to a place where the speed is not zero."""
-    return Stretch(functions=functions, kind=FROM_TURN, a=turn, b=end)
-
-
-def through(
-    functions: Functions,
-    start: float,
-    end: float,
-    ref: float,
-    w: float,
-    *,
-    panels: Any = None,
-    hints: tuple[float, ...] = (),
-) -> Stretch:
-    """A stretch without special ends; ``w`` is V**2 at ``ref``."""
-    return Stretch(functions=functions, kind=REGULAR, a=start, b=end, ref=ref, w=w, panels=panels, hints=hints)
-
-
-def along_field(functions: Functions, kind: int, a: float, b: float, field: Array, stop: float = 1.0) -> Stretch:
-    """A stretch whose V**2 is a field; its panels begin where the field's do."""
-    origin, way = (b, np.sign(a - b)) if kind == TO_EQUILIBRIUM else (a, np.sign(b - a))
-    hints = tuple(float(place) for place in origin + way * field[:-1, 1])
-    return Stretch(functions=functions, kind=kind, a=a, b=b, v2=field, stop=stop, hints=hints)

@@ -121,7 +121,7 @@ def sum_up(c, x, n, high, low):  # type: ignore[no-untyped-def]
         k -= 2
 
 
-@entry(types.void(_LINE, _LINE, _LINE, _LINE, _LINE, types.int64, types.int64), nogil=True)
+@Inner
 def sum_wave(dial, cosines, sines, t, out, begin, end):  # type: ignore[no-untyped-def]
     """Fill ``out`` with the curve's parameter at times ``t``, from the index ``begin`` to ``end``.
 

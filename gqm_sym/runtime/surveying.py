@@ -1,0 +1,39 @@
+"""What every launch of a conservative model needs, in one crossing: its ends, what lies there, and the time between."""
+
+import numpy as np
+from numba import types
+
+from gqm_sym.runtime.entries import ends
+from gqm_sym.runtime.jit import entry
+from gqm_sym.runtime.search import LIMIT, TURN
+from gqm_sym.runtime.swift import CIRCULATION, LIBRATION, MOST, time_once
+
+_FLOAT = types.float64
+_WALK = types.Tuple((types.int64, _FLOAT, _FLOAT))
+
+
+@entry(
+    types.Tuple((types.int64, _WALK, _WALK, _FLOAT))(
+        types.UniTuple(types.int64, 5), types.float64[::1], _FLOAT, _FLOAT, types.int64, _FLOAT, _FLOAT, _FLOAT
+    )
+)
+def survey(fns, p, lam0, v0, direction, low, high, period):  # type: ignore[no-untyped-def]
+    """Find both ends of a motion, and its half period or loop time where that is easy.
+
+    Returns
+    -------
+    direction, ahead, behind
+        As `entries.ends` returns them.
+    time : float
+        Half period of a libration, loop time of a circulation, within some units in the last place; NaN where the
+        trapezoidal rule does not settle, or too little of V**2 is left for doubles, and of any other motion.
+    """
+    direction, ahead, behind = ends(fns, p, lam0, v0, direction, low, high, period)
+    turns = ahead[0] == TURN and behind[0] == TURN
+    if direction == 0 or not (turns or (ahead[0] == LIMIT and period > 0.0 and v0 > 0.0)):
+        return direction, ahead, behind, np.nan
+    near, far = min(ahead[1], behind[1]), max(ahead[1], behind[1])
+    kind, width = (LIBRATION, far - near) if turns else (CIRCULATION, direction * period)
+    a, b = (lam0 + near, lam0 + far) if turns else (lam0, lam0 + width)
+    work, rates = np.empty((4, MOST)), np.empty(MOST)
+    return direction, ahead, behind, time_once(fns, p, kind, lam0, v0 * v0, a, b, width, work, rates)
