@@ -1,5 +1,5 @@
 # Made by gqm-gen for "loop". Do not edit: change its declaration and generate again.
-# interface 3, input ef6cb5936f16, body 3e67d123500e
+# interface 3, input ef6cb5936f16, body a7dec591019b
 """Loop of a roller coaster
 
 x              = x(s)
@@ -33,6 +33,7 @@ from gqm_sym.runtime import (
     FRAME,
     RISE,
     Addresses,
+    ExactClimb,
     Formulas,
     Motion,
     Pass1,
@@ -133,6 +134,13 @@ def bounds(lo, hi, p, out):
 # The same formulas over a namespace of operations: extended precision evaluates these.
 
 
+def exact_climb(op, x, z, p):
+    """What V**2 loses in climbing, up to a constant, and its derivatives by x and z."""
+    g = p[3]
+    _t0 = 2*g
+    return _t0*z, 0, _t0
+
+
 def exact_rail(op, p):
     """Where the rail starts, and what each of its pieces is given by."""
     a = p[0]
@@ -155,6 +163,7 @@ MODEL = Formulas(
     positive=(),
     addresses=Addresses(frame.address, climb.address, rise.address, bend.address, bounds.address),
     chart=CHART,
+    exact=ExactClimb(exact_climb),
 )
 
 

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "planes". Do not edit: change its declaration and generate again.
-# interface 3, input 6aa424d89567, body 2d969c49fcc8
+# interface 3, input 6aa424d89567, body 3a46c3ca8aed
 """Stitched planes through surveyed points
 
 x              = x(s)
@@ -33,6 +33,7 @@ from gqm_sym.runtime import (
     FRAME,
     RISE,
     Addresses,
+    ExactClimb,
     Formulas,
     Motion,
     Pass1,
@@ -191,6 +192,16 @@ def bounds(lo, hi, p, out):
     out[2], out[3] = iconst(1.0)
 
 
+# The same formulas over a namespace of operations: extended precision evaluates these.
+
+
+def exact_climb(op, x, z, p):
+    """What V**2 loses in climbing, up to a constant, and its derivatives by x and z."""
+    g = p[0]
+    _t0 = 2*g
+    return _t0*z, 0, _t0
+
+
 CHART = Sampled(POINTS, kind='linear', closed=False)
 
 MODEL = Formulas(
@@ -200,6 +211,7 @@ MODEL = Formulas(
     positive=(),
     addresses=Addresses(frame.address, climb.address, rise.address, bend.address, bounds.address),
     chart=CHART,
+    exact=ExactClimb(exact_climb),
 )
 
 

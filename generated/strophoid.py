@@ -1,5 +1,5 @@
 # Made by gqm-gen for "strophoid". Do not edit: change its declaration and generate again.
-# interface 3, input 997282e2d787, body 865c60b9a2b1
+# interface 3, input 997282e2d787, body d31ca489989b
 """Bead on the hanging loop of a right strophoid
 
 F              = x**2*(a - z) - z**2*(a + z)
@@ -42,6 +42,7 @@ from gqm_sym.runtime import (
     FRAME,
     RISE,
     Addresses,
+    ExactClimb,
     Formulas,
     Motion,
     Pass1,
@@ -163,13 +164,30 @@ def bounds(lo, hi, p, out):
 # The same formulas over a namespace of operations: extended precision evaluates these.
 
 
+def exact_climb(op, x, z, p):
+    """What V**2 loses in climbing, up to a constant, and its derivatives by x and z."""
+    g = p[1]
+    _t0 = 2*g
+    return _t0*z, 0, _t0
+
+
 def exact_start(op, p):
     """Coordinates of the start point."""
     a = p[0]
     return -op.sqrt(3)*a/6, -a/2
 
 
-CHART = Traced(field=field.address, start=exact_start, tangent=-1)
+def exact_level(op, x, z, p):
+    """F, F_x and F_z."""
+    a = p[0]
+    _t0 = z**2
+    _t1 = a + z
+    _t2 = x**2
+    _t3 = a - z
+    return -_t0*_t1 + _t2*_t3, 2*_t3*x, -_t0 - 2*_t1*z - _t2
+
+
+CHART = Traced(field=field.address, start=exact_start, tangent=-1, level=exact_level)
 
 MODEL = Formulas(
     name='strophoid',
@@ -178,6 +196,7 @@ MODEL = Formulas(
     positive=(),
     addresses=Addresses(frame.address, climb.address, rise.address, bend.address, bounds.address),
     chart=CHART,
+    exact=ExactClimb(exact_climb),
 )
 
 

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "track". Do not edit: change its declaration and generate again.
-# interface 3, input f6b2958be28b, body 246d17c75186
+# interface 3, input f6b2958be28b, body 2cc289524285
 """Hills of a roller coaster, as surveyed
 
 x              = x(s)
@@ -33,6 +33,7 @@ from gqm_sym.runtime import (
     FRAME,
     RISE,
     Addresses,
+    ExactClimb,
     Formulas,
     Motion,
     Pass1,
@@ -191,6 +192,16 @@ def bounds(lo, hi, p, out):
     out[2], out[3] = iconst(1.0)
 
 
+# The same formulas over a namespace of operations: extended precision evaluates these.
+
+
+def exact_climb(op, x, z, p):
+    """What V**2 loses in climbing, up to a constant, and its derivatives by x and z."""
+    g = p[0]
+    _t0 = 2*g
+    return _t0*z, 0, _t0
+
+
 CHART = Sampled(POINTS, kind='spline', closed=False)
 
 MODEL = Formulas(
@@ -200,6 +211,7 @@ MODEL = Formulas(
     positive=(),
     addresses=Addresses(frame.address, climb.address, rise.address, bend.address, bounds.address),
     chart=CHART,
+    exact=ExactClimb(exact_climb),
 )
 
 

@@ -98,7 +98,13 @@ def other(which: int, start: tuple[float, float], domain: tuple[float | None, fl
 
 
 def _maker(field: Any, start: tuple[float, float], tangent: int, domain: tuple[float | None, float | None]) -> Traced:
-    return Traced(field=field.address, start=lambda op, p: start, tangent=tangent, domain=lambda op, p: domain)
+    return Traced(
+        field=field.address,
+        start=lambda op, p: start,
+        tangent=tangent,
+        level=lambda op, x, z, p: None,  # charts do without extended precision
+        domain=lambda op, p: domain,
+    )
 
 
 def hold(chart: Chart, places: Any, truth: Callable[[int], tuple[Any, ...]], within: float = ROUNDING) -> None:

@@ -1,7 +1,6 @@
 """What the module of a charted curve holds besides its formulas: the maker of its chart, one for each kind of curve."""
 
 from collections.abc import Callable
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from sympy import Expr, Function, Symbol
@@ -10,6 +9,7 @@ from gqm_sym.declare import Curve
 from gqm_sym.declare.implicit import X, Z
 from gqm_sym.declare.piecewise import Rail
 from gqm_sym.declare.sampled import Track
+from gqm_sym.derivation.differentiate import differentiate
 from gqm_sym.derivation.geometry import geometry
 from gqm_sym.emission.ir import ChartIR, ExactIR, FunctionIR
 from gqm_sym.emission.printer import check_emittable
@@ -36,7 +36,9 @@ def _implicit(lowering: "Lowering") -> ChartIR:
         outputs=found.rows,
     )
     exact = [_ends(lowering, "exact_start", "Coordinates of the start point.", found.level.start)]
-    arguments = ["field=field.address", "start=exact_start", f"tangent={found.level.tangent}"]
+    doc = "F, F_x and F_z."
+    exact.append(lowering.exact_function("level", doc, (found.value, found.slope_x, found.slope_z), (X, Z)))
+    arguments = ["field=field.address", "start=exact_start", f"tangent={found.level.tangent}", "level=exact_level"]
     if model.domain != (None, None):
         exact.append(
             _ends(lowering, "exact_domain", "Both ends in arc length; None where there is none.", model.domain)
@@ -55,10 +57,10 @@ def _ends(lowering: "Lowering", name: str, doc: str, values: tuple[Expr | None, 
     return ExactIR(
         name=name,
         doc=doc,
+        places=(),
         parameters=lowering.used(value for value in values if value is not None),
         inside=(),
         outputs=values,
-        at_place=False,
     )
 
 
@@ -79,6 +81,7 @@ def _rail(lowering: "Lowering") -> ChartIR:
     assert isinstance(rail, Rail)
     curves = [piece.curve for piece in rail.pieces if piece.curve is not None]
     functions = tuple(_segment(lowering, curve, f"segment_{count}") for count, curve in enumerate(curves, start=1))
+    formulas = tuple(_exact_segment(lowering, curve, f.name) for curve, f in zip(curves, functions, strict=True))
     given = (*(rail.start or ()), *(number for piece in rail.pieces for number in piece.numbers))
     doc = "Where the rail starts, and what each of its pieces is given by."
     numbers = lowering.exact_function("rail", doc, given)
@@ -89,13 +92,14 @@ def _rail(lowering: "Lowering") -> ChartIR:
     ]
     if functions:
         arguments.append(f"segments=({', '.join(f'{function.name}.address' for function in functions)},)")
+        arguments.append(f"formulas=({', '.join(formula.name for formula in formulas)},)")
     if rail.closed:
         arguments.append("closed=True")
     return ChartIR(
         statement="Rail(\n    " + ",\n    ".join(arguments) + ",\n)",
         imports=("Rail", *(["SEGMENT"] if functions else [])),
         functions=functions,
-        exact=(replace(numbers, at_place=False),),
+        exact=(numbers, *formulas),
     )
 
 
@@ -116,6 +120,14 @@ def _segment(lowering: "Lowering", curve: Curve, name: str) -> FunctionIR:
         inside=[(place, Function("at")(Symbol(places, real=True)))],
         outputs=outputs,
     )
+
+
+def _exact_segment(lowering: "Lowering", curve: Curve, name: str) -> ExactIR:
+    """Its coordinates and their derivatives over a namespace of operations."""
+    place = curve.parameter
+    rows = (curve.x, curve.z, differentiate(curve.x, place), differentiate(curve.z, place))
+    outputs = tuple(row.xreplace({place: lowering.place}) for row in rows)
+    return lowering.exact_function(name, "x, z and their derivatives by its own parameter.", outputs, (lowering.place,))
 
 
 MAKERS: dict[str, Callable[["Lowering"], ChartIR]] = {"implicit": _implicit, "piecewise": _rail, "sampled": _sampled}

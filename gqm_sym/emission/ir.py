@@ -50,15 +50,15 @@ class FunctionIR:
 class ExactIR:
     """One formula over a namespace of operations; an output that does not exist is None.
 
-    ``at_place`` says whether it depends on a place of the curve, or on the run-time parameters alone.
+    ``places`` are what it depends on besides the run-time parameters: the curve's parameter, coordinates, or nothing.
     """
 
     name: str
     doc: str
+    places: tuple[str, ...]
     parameters: tuple[tuple[str, int], ...]
     inside: tuple[Assignment, ...]
     outputs: tuple[Expr | None, ...]
-    at_place: bool = True
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

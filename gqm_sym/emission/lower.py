@@ -7,6 +7,7 @@ from sympy import Basic, Expr, Function, Rational, Symbol
 
 from gqm_sym.derivation import Model
 from gqm_sym.derivation.difference import Differences
+from gqm_sym.derivation.differentiate import differentiate
 from gqm_sym.emission.charts import chart_maker
 from gqm_sym.emission.dissipative import drive, hold
 from gqm_sym.emission.ir import Assignment, ExactIR, FunctionIR, ModuleIR
@@ -14,6 +15,7 @@ from gqm_sym.emission.places import at
 from gqm_sym.emission.printer import check_emittable
 from gqm_sym.errors import EmissionError
 from gqm_sym.kernels.base import CONTACT_SIGN, DIRECTION, W
+from gqm_sym.sympy_charts import chart_x, chart_z
 
 FLAGS = ("friction", "kinked", "linear")
 """What a module says of a force law that is not conservative."""
@@ -47,7 +49,7 @@ def lower(model: Model, *, name: str, forms: tuple[tuple[str, Expr], ...]) -> Mo
         functions: tuple[FunctionIR, ...] = (lowering.climb(), lowering.rise(), lowering.bend())
     else:
         functions = (drive(lowering, loss), hold(lowering, loss))
-    exact = () if model.curve.charted else (*(lowering.exact() if loss is None else ()), lowering.domain())
+    exact = lowering.exact() if loss is None else ()
     return ModuleIR(
         name=name,
         title=model.title,
@@ -59,7 +61,7 @@ def lower(model: Model, *, name: str, forms: tuple[tuple[str, Expr], ...]) -> Mo
         notes=model.notes,
         functions=(lowering.frame(), *functions),
         bounds=lowering.bounds() if loss is None else None,
-        exact=exact,
+        exact=exact if model.curve.charted else (*exact, lowering.domain()),
         dissipation=() if loss is None else tuple((flag, getattr(loss, flag)) for flag in FLAGS),
         body=str(model.force.radius) if model.force.radius else "",
         grip=model.force.grip,
@@ -176,8 +178,10 @@ class Lowering:
         )
 
     def exact(self) -> tuple[ExactIR, ...]:
-        """The formulas that extended precision needs."""
+        """The formulas that extended precision needs; of a charted curve the forces' alone, by coordinates."""
         model = self.model
+        if model.curve.charted:
+            return self.exact_climb()
         named: tuple[tuple[str, str, tuple[Expr, ...]], ...] = (
             ("x", "Horizontal coordinate.", (model.x,)),
             ("z", "Height.", (model.z,)),
@@ -187,7 +191,17 @@ class Lowering:
             ("climb", "What V**2 loses in climbing, up to a constant.", (model.climb,)),
             ("climb_slope", f"Its derivative by {self.place}.", (model.climb_slope,)),
         )
-        return tuple(self.exact_function(*entry) for entry in named)
+        return tuple(self.exact_function(*entry, (self.place,)) for entry in named)
+
+    def exact_climb(self) -> tuple[ExactIR, ...]:
+        """The climb and its gradient by coordinates; nothing where it depends on more than those."""
+        x, z = self.names.symbol("x"), self.names.symbol("z")
+        climb = self.model.climb.xreplace({chart_x(self.place): x, chart_z(self.place): z})
+        if self.place in climb.free_symbols or self.model.ds != 1:
+            return ()
+        outputs = (climb, differentiate(climb, x), differentiate(climb, z))
+        doc = "What V**2 loses in climbing, up to a constant, and its derivatives by x and z."
+        return (self.exact_function("climb", doc, outputs, (x, z)),)
 
     def domain(self) -> ExactIR:
         """The range of the curve's parameter."""
@@ -196,18 +210,21 @@ class Lowering:
         return ExactIR(
             name="exact_domain",
             doc="Both ends of the domain, and the period; None where there is none.",
+            places=(),
             parameters=self.used(e for e in ends if e is not None),
             inside=(),
             outputs=ends,
-            at_place=False,
         )
 
-    def exact_function(self, name: str, doc: str, outputs: tuple[Expr, ...]) -> ExactIR:
+    def exact_function(
+        self, name: str, doc: str, outputs: tuple[Expr, ...], places: tuple[Symbol, ...] = ()
+    ) -> ExactIR:
         """A formula over a namespace of operations."""
         replaced, reduced = sympy.cse(outputs, symbols=sympy.numbered_symbols("_t", real=True), order="canonical")
         return ExactIR(
             name=f"exact_{name}",
             doc=doc,
+            places=tuple(place.name for place in places),
             parameters=self.used(outputs),
             inside=tuple(Assignment(name=s.name, value=v) for s, v in replaced),
             outputs=tuple(reduced),

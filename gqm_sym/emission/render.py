@@ -31,6 +31,7 @@ _OWN = frozenset(
         "Any",
         "CHART",
         "Dissipation",
+        "ExactClimb",
         "ExactFormulas",
         "MODEL",
         "PARAMETERS",
@@ -64,8 +65,8 @@ def render(module: ModuleIR, *, source: str) -> str:
     runtime = {*_RUNTIME, *(f["signature"] for f in functions)}
     if chart:
         runtime |= set(chart.imports)
-    elif module.dissipation == ():
-        runtime.add("ExactFormulas")
+    exact = _exact_formulas(module)
+    runtime |= {exact.partition("(")[0]} if exact else set()
     if module.dissipation:
         runtime.add("Dissipation")
     charted = {name for name in used | intervals if name.removeprefix("i").startswith("chart_")}
@@ -84,7 +85,7 @@ def render(module: ModuleIR, *, source: str) -> str:
         "nearest": "nearest" in used,
         "defaults": [(repr(name), repr(value)) for name, value in module.defaults],
         "functions": functions,
-        "exact": [_exact(f, module.parameter) for f in (*module.exact, *(chart.exact if chart else ()))],
+        "exact": [_exact(f) for f in (*module.exact, *(chart.exact if chart else ()))],
         "chart": chart.statement if chart else "",
         "data": list(chart.data) if chart else [],
         "name_text": repr(module.name),
@@ -95,6 +96,7 @@ def render(module: ModuleIR, *, source: str) -> str:
         "body": repr(module.body) if module.body else "",
         "grip": repr(module.grip) if module.grip else "",
         "addresses": ", ".join(f"{f['name']}.address" for f in functions if f["name"] in _ADDRESSES),
+        "exact_formulas": exact,
         "dissipation": ", ".join(f"{flag}={value}" for flag, value in module.dissipation),
         "keywords": ", ".join(f"{name}: Any = {value!r}" for name, value in module.defaults),
         "names": ", ".join(name for name, _ in module.defaults),
@@ -107,6 +109,13 @@ def render(module: ModuleIR, *, source: str) -> str:
         "body_digest": _digest(body),
     }
     return _fill(environment, "header.py.j2", header) + body
+
+
+def _exact_formulas(module: ModuleIR) -> str:
+    """What a conservative module hands over of its formulas over a namespace; nothing where there are none."""
+    names = [function.name for function in module.exact if function.places]
+    kind = "ExactClimb" if module.chart else "ExactFormulas"
+    return f"{kind}({', '.join(names)})" if names else ""
 
 
 def body_digests(text: str) -> tuple[str, str] | None:
@@ -226,14 +235,14 @@ def _bounds(function: FunctionIR, parameter: str) -> tuple[dict[str, Any], set[s
     return fields, printer.used
 
 
-def _exact(function: ExactIR, parameter: str) -> dict[str, Any]:
+def _exact(function: ExactIR) -> dict[str, Any]:
     printer = ExactPrinter()
-    p = "_p" if "p" in {name for name, _ in function.parameters} | {parameter} else "p"
+    p = "_p" if "p" in {*function.places, *(name for name, _ in function.parameters)} else "p"
     inside = _unpacked(function.parameters, p)
     inside += _statements(function.inside, printer)
     values = ["None" if e is None else printer.doprint(e) for e in function.outputs]
     inside.append(f"return {', '.join(values)}")
-    arguments = ("op", parameter, p) if function.at_place else ("op", p)
+    arguments = ("op", *function.places, p)
     return {
         "name": function.name,
         "arguments": ", ".join(arguments),

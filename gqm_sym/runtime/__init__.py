@@ -17,6 +17,7 @@ from gqm_sym.runtime.interface import (
     SEGMENT,
     Addresses,
     Dissipation,
+    ExactClimb,
     ExactFormulas,
 )
 from gqm_sym.runtime.jit import compiler
@@ -39,6 +40,7 @@ __all__ = [
     "SEGMENT",
     "Addresses",
     "Dissipation",
+    "ExactClimb",
     "ExactFormulas",
     "Formulas",
     "Motion",

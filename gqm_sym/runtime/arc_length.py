@@ -7,6 +7,7 @@ method turns it round at the nodes. Angle and curvature are then read from the c
 from collections.abc import Callable
 from dataclasses import dataclass
 from math import fabs
+from typing import Any
 
 import numpy as np
 from numba import types
@@ -22,6 +23,7 @@ from gqm_sym.runtime.jit import Inner, entry
 # From places (n) and offsets from each of them (n, m) to rows x, z, ds/dlam, dx/ds, dz/ds and kappa (6, n, m).
 Rows = Callable[[Array, Array], Array]
 Flags = NDArray[np.bool_]
+Indices = NDArray[np.integer[Any]]
 
 # The last coefficients of a row, as a share of its size, on a piece that is short enough.
 TAIL = 5e-16
@@ -38,8 +40,12 @@ _SOLUTIONS = 20  # Newton steps; from where they begin, three are enough
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Pieces:
-    """Pieces of a curve in their order: lengths, left edges' coordinates, and angle and curvature at the nodes."""
+    """Pieces of a curve in their order: lengths, left edges' coordinates, and angle and curvature at the nodes.
 
+    ``places`` are where each begins and ends in the curve's own parameter, (n, 2).
+    """
+
+    places: Array
     lengths: Array
     anchors: Array
     angles: Array
@@ -49,6 +55,7 @@ class Pieces:
 def joined(parts: list[Pieces]) -> Pieces:
     """Pieces one after the other."""
     return Pieces(
+        places=np.concatenate([part.places for part in parts]),
         lengths=np.concatenate([part.lengths for part in parts]),
         anchors=np.concatenate([part.anchors for part in parts]),
         angles=np.concatenate([part.angles for part in parts]),
@@ -129,6 +136,7 @@ def rectify(rows: Rows, edges: Array, *, where: str) -> Pieces:
     anchors = rows(places[order], np.zeros((places.size, 1)))[:, :, 0]
     start = float(np.arctan2(anchors[4, 0], anchors[3, 0]))
     return Pieces(
+        places=np.stack([places[order], np.append(places[order][1:], edges[-1])], axis=1),
         lengths=lengths[order],
         anchors=anchors[:2].T,
         angles=unwrapped(angles[order], start),

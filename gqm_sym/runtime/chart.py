@@ -53,6 +53,12 @@ class ChartMaker(Hashable, Protocol):
     def chart(self, p: tuple[float, ...]) -> "Chart":
         """The chart for parameter values in the module's order."""
 
+    def true_curve(self, context: Any, p: tuple[Any, ...], chart: "Chart") -> Any:
+        """The curve itself in extended precision (`exact_charts.TrueCurve`)."""
+
+    def is_exact(self, chart: "Chart") -> bool:
+        """Whether that can be had everywhere on a chart."""
+
 
 @entry(types.float64[:, ::1](types.float64[::1], types.float64[::1]))
 def _read(block, s):  # type: ignore[no-untyped-def]
@@ -81,6 +87,9 @@ class Chart:
         Places inside the domain where the curvature or a higher derivative jumps: panels begin there.
     corners : array
         Those of them where the tangent itself jumps.
+    origins : (n, 3) array
+        Of each piece the part of the track that it belongs to, and where it begins and ends in that part's own
+        parameter; empty where there are no parts.
     """
 
     block: Array
@@ -90,6 +99,7 @@ class Chart:
     ends: tuple[str, str] = ("domain-end", "domain-end")
     breaks: Array = field(default_factory=lambda: np.empty(0))
     corners: Array = field(default_factory=lambda: np.empty(0))
+    origins: Array = field(default_factory=lambda: np.empty((0, 3)))
 
     @property
     def edges(self) -> Array:
@@ -149,6 +159,7 @@ def assemble(
     ends: tuple[str, str] = ("domain-end", "domain-end"),
     breaks: Any = (),
     corners: Any = (),
+    origins: Any = (),
 ) -> Chart:
     """Put pieces together.
 
@@ -166,7 +177,7 @@ def assemble(
         What the anchors, as doubles, leave over.
     period, turn : float
         Length of a closed curve, and by how much alpha grows once round.
-    ends, breaks, corners
+    ends, breaks, corners, origins
         As `Chart` has them.
     """
     edges, anchors = np.asarray(edges, dtype=np.float64), np.asarray(anchors, dtype=np.float64)
@@ -205,6 +216,7 @@ def assemble(
         ends=ends,
         breaks=np.asarray(breaks, dtype=np.float64),
         corners=np.asarray(corners, dtype=np.float64),
+        origins=np.asarray(origins, dtype=np.float64).reshape(-1, 3),
     )
 
 

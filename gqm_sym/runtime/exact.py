@@ -10,11 +10,18 @@ from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from gqm_sym.budgets import budget, spend
 from gqm_sym.errors import SolutionError
-from gqm_sym.runtime.interface import ExactFormulas
+from gqm_sym.runtime.exact_quadrature import gauss
+from gqm_sym.runtime.exact_tracks import Track, TrackMaker
 from gqm_sym.runtime.numbers import Number
 from gqm_sym.runtime.panels import FROM_TURN, REGULAR, TURN_TURN
+
+Array = NDArray[np.float64]
+NOWHERE: Array = np.empty(0)
 
 # Precisions at which a sign is asked for, in decimal digits; what is zero to the last counts as zero.
 LADDER = (40, 80, 210)
@@ -34,13 +41,16 @@ class End:
 
 @dataclass(slots=True)
 class ExactProblem:
-    """One launch of one model, to be evaluated at any precision."""
+    """One launch of one model, to be evaluated at any precision.
 
-    formulas: ExactFormulas
+    ``edges`` are those of the pieces of a charted curve: each must be integrated by itself.
+    """
+
+    track: TrackMaker
+    edges: Array
     parameters: tuple[Number, ...]
     lam0: Number
     v0: Number
-    domain: Callable[..., Any]
     _scales: dict[int, "Arithmetic"] = field(default_factory=dict)
 
     def at(self, digits: int) -> "Arithmetic":
@@ -69,16 +79,17 @@ class ExactProblem:
         """
         for digits in LADDER:
             a = self.at(digits)
-            top = a.equilibrium(near, far)
-            if top is not None and (top - a.mpf(near)) * direction <= 0:
+            here, there = a.track.place(near), a.track.place(far)
+            top = a.equilibrium(here, there)
+            if top is not None and (top - here) * direction <= 0:
                 top = None  # it lies behind
             if top is None:  # V**2 is monotonic: its sign at the far end decides
-                w = a.speed_squared(a.mpf(far))
-                guess = a.mpf(near) + (a.mpf(far) - a.mpf(near)) / 2
+                w = a.speed_squared(there)
+                guess = here + (there - here) / 2
             else:
                 w = a.speed_squared(top)
                 bend = abs(a.climb_bend(top))
-                guess = top - direction * a.sqrt(2 * abs(w) / bend) if bend else a.mpf(near)
+                guess = top - direction * a.sqrt(2 * abs(w) / bend) if bend else here
             if abs(w) <= a.mpf(10) ** (2 * SPARE - digits) * a.size:
                 continue
             if w > 0:
@@ -94,7 +105,7 @@ class Arithmetic:
     problem: ExactProblem
     digits: int
     context: Any = field(init=False)
-    values: tuple[Any, ...] = field(init=False)
+    track: Track = field(init=False)
     lam0: Any = field(init=False)
     w0: Any = field(init=False)
     base: Any = field(init=False)
@@ -105,11 +116,12 @@ class Arithmetic:
 
         self.context = MPContext()
         self.context.dps = self.digits
-        self.values = tuple(number.at(self.context) for number in self.problem.parameters)
-        self.lam0 = self.problem.lam0.at(self.context)
+        values = tuple(number.at(self.context) for number in self.problem.parameters)
+        self.track = self.problem.track(self.context, values)
+        self.lam0 = self.track.lam0
         self.w0 = self.problem.v0.at(self.context) ** 2
         self.base = self.climb(self.lam0)
-        self.size = self.w0 + abs(self.base) + abs(self.climb(self.lam0 + 1) - self.base)
+        self.size = self.w0 + abs(self.base) + abs(self.climb(self.track.elsewhere()) - self.base)
 
     def mpf(self, value: Any) -> Any:
         """A number of this precision."""
@@ -122,12 +134,12 @@ class Arithmetic:
     def climb(self, lam: Any) -> Any:
         """What V**2 loses in climbing to a place, up to a constant."""
         spend()
-        return self.problem.formulas.climb(self.context, lam, self.values)
+        return self.track.climb(lam)
 
     def climb_slope(self, lam: Any) -> Any:
         """Its derivative."""
         spend()
-        return self.problem.formulas.climb_slope(self.context, lam, self.values)
+        return self.track.climb_slope(lam)
 
     def climb_bend(self, lam: Any) -> Any:
         """Second derivative of the climb, to about half of the digits."""
@@ -136,20 +148,15 @@ class Arithmetic:
 
     def ds(self, lam: Any) -> Any:
         """ds/dlam."""
-        return self.problem.formulas.ds(self.context, lam, self.values)
+        return self.track.ds(lam)
 
     def speed_squared(self, lam: Any) -> Any:
         """V**2, by subtraction."""
         return self.w0 + self.base - self.climb(lam)
 
-    def domain(self) -> tuple[Any, Any, Any]:
-        """Both ends of the domain and the period."""
-        low, high, period = self.problem.domain(self.context, self.values)
-        return low, high, period
-
-    def equilibrium(self, near: float, far: float) -> Any | None:
+    def equilibrium(self, near: Any, far: Any) -> Any | None:
         """The zero of the climb's slope next to two places, or None if there is none."""
-        y, width = self.mpf(far), abs(self.mpf(far) - self.mpf(near))
+        y, width = far, abs(far - near)
         tolerance = self.mpf(10) ** (-(self.digits // 2))
         for _ in range(60):
             slope = self.climb_slope(y)
@@ -164,7 +171,7 @@ class Arithmetic:
                 return None
             step = slope * first / below  # Schroeder's: quadratic at a flat top as well
             y -= step
-            if abs(y - self.mpf(near)) > 1000 * width + abs(self.mpf(far)) * self.mpf(10) ** -6:
+            if abs(y - near) > 1000 * width + abs(far) * self.mpf(10) ** -6:
                 return None
             if abs(step) <= tolerance * (abs(y) + width):
                 return y
@@ -235,50 +242,26 @@ class Arithmetic:
             before = change
         return None
 
-    def gauss(self, rate: Callable[[Any], tuple[Any, Any]], edges: Sequence[Any], digits: int) -> list[Any]:
-        """The integral over each panel of those that resolved the rate in doubles, by Gauss-Legendre rules."""
-        nodes = legendre_rule(digits + 8, self.digits)
+    def anomalies(self, kind: int, a: Any, b: Any, places: Sequence[Any]) -> list[Any]:
+        """The anomalies of places on a stretch from a to b."""
+        c = self.context
+        shares = [(place - a) / (b - a) for place in places]
+        if kind == TURN_TURN:
+            return [2 * c.atan2(c.sqrt(share), c.sqrt(1 - share)) for share in shares]
+        return [c.sqrt(share) for share in shares] if kind == FROM_TURN else shares
+
+    def gauss(self, kind: int, a: Any, b: Any, edges: Sequence[Any], digits: int) -> list[Any]:
+        """Time over each panel of those that resolved its rate in doubles, by Gauss-Legendre rules.
+
+        At joints of the curve the panels are parted.
+        """
+        rate = self.anomaly_rate(kind, a, b)
+        joints = self.anomalies(kind, a, b, self.track.joints(a, b) or ())
         parts = []
         for left, right in pairwise(edges):
-            half, middle = (
-                (self.mpf(right) - self.mpf(left)) / 2,
-                (self.mpf(right) + self.mpf(left)) / 2,
-            )
-            parts.append(
-                half
-                * sum(w * (rate(middle + half * x)[0] + (rate(middle - half * x)[0] if x else 0)) for x, w in nodes)
-            )
+            cuts = [left, *(phi for phi in joints if left < phi < right), right]
+            parts.append(sum(gauss(self.context, lambda phi: rate(phi)[0], cuts, digits)))
         return parts
-
-
-_RULES: dict[tuple[int, int], tuple[tuple[Any, Any], ...]] = {}
-
-
-def legendre_rule(count: int, digits: int) -> tuple[tuple[Any, Any], ...]:
-    """Nodes that are not negative, and weights, of the Gauss-Legendre rule with ``count`` nodes."""
-    key = (count, digits)
-    if key not in _RULES:
-        import numpy as np
-        from mpmath.ctx_mp import MPContext
-
-        context = MPContext()
-        context.dps = digits + 5
-        guesses = np.polynomial.legendre.leggauss(count)[0]
-        rule = []
-        for guess in guesses[count // 2 :]:
-            x = context.mpf(float(guess)) if abs(guess) > 1e-14 else context.mpf(0)
-            for _ in range(digits.bit_length() + 2):
-                before, here = context.mpf(1), x
-                for k in range(2, count + 1):
-                    before, here = here, ((2 * k - 1) * x * here - (k - 1) * before) / k
-                slope = count * (x * here - before) / (x * x - 1)
-                step = here / slope
-                x -= step
-                if abs(step) <= context.mpf(10) ** -digits:
-                    break  # only now: the weight needs the slope at the node itself
-            rule.append((x, 2 / ((1 - x * x) * slope**2)))
-        _RULES[key] = tuple(rule)
-    return _RULES[key]
 
 
 def two_doubles(value: Any) -> tuple[float, float]:

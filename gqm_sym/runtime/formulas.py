@@ -13,8 +13,8 @@ from gqm_sym.budgets import budget
 from gqm_sym.errors import LaunchError, ParameterError
 from gqm_sym.runtime.chart import Chart, ChartMaker
 from gqm_sym.runtime.entries import frame_at, loads_at
-from gqm_sym.runtime.exact import ExactProblem
-from gqm_sym.runtime.interface import Addresses, Dissipation, ExactFormulas
+from gqm_sym.runtime.exact_problems import exact_problem
+from gqm_sym.runtime.interface import Addresses, Dissipation, ExactClimb, ExactFormulas
 from gqm_sym.runtime.numbers import Number, read_number
 from gqm_sym.runtime.stretch import Array, Functions
 from gqm_sym.runtime.threads import spread
@@ -61,6 +61,7 @@ class Launch(NamedTuple):
     direction: int
     contact: str
     t_max: Number | None
+    point: tuple[Number, Number] | None = None
 
 
 class Domain(NamedTuple):
@@ -108,7 +109,7 @@ class Formulas:
     domain_of
         ``f(op, p)``: both ends of the parameter's range and its period, None where there is none. A chart has its own.
     exact
-        The formulas over a namespace of operations; None for a charted curve.
+        The formulas over a namespace of operations, of a charted curve those of the forces; None where there are none.
     chart
         What makes the chart of a curve that has no formulas.
     dissipation
@@ -121,7 +122,7 @@ class Formulas:
     positive: tuple[str, ...]
     addresses: Addresses
     domain_of: Callable[..., Any] | None = None
-    exact: ExactFormulas | None = None
+    exact: ExactFormulas | ExactClimb | None = None
     chart: ChartMaker | None = None
     dissipation: Dissipation | None = None
     at_least: tuple[tuple[str, str], ...] = ()
@@ -176,7 +177,7 @@ class Formulas:
         contact: str = "bilateral",
     ) -> Launch:
         """A launch, checked."""
-        place = self._place(p, lam0, point)
+        place, at = self._place(p, lam0, point)
         if direction not in (1, -1):
             raise LaunchError(f"direction: must be 1 or -1 (the sign of ds/dt at launch), got {direction!r}")
         if contact not in CONTACTS:
@@ -192,14 +193,14 @@ class Formulas:
         low, high, _, _ = self.domain(p)
         if not low <= place.value <= high:
             raise LaunchError(f"lam0: must lie in the domain [{low!r}, {high!r}] of {self.parameter}, got {place.text}")
-        return Launch(place, speed, int(direction), contact, horizon)
+        return Launch(place, speed, int(direction), contact, horizon, at)
 
-    def _place(self, p: Given, lam0: Any, point: Any) -> Number:
-        """The launch place, by the curve's parameter or by its coordinates."""
+    def _place(self, p: Given, lam0: Any, point: Any) -> tuple[Number, tuple[Number, Number] | None]:
+        """The launch place by the curve's parameter, and its coordinates if they are what was given."""
         if point is None:
             if lam0 is None:
                 raise LaunchError(f"lam0: not given; it is the value of {self.parameter} to launch from")
-            return read_number(lam0, where="lam0")
+            return read_number(lam0, where="lam0"), None
         if self.chart is None:
             raise LaunchError(
                 f"point: {self.name} has a parameter of its own; launch by lam0 (a value of {self.parameter})"
@@ -207,10 +208,10 @@ class Formulas:
         if lam0 is not None:
             raise LaunchError("lam0, point: give one of them; both say where to launch from")
         try:
-            x, z = (read_number(value, where="point").value for value in point)
+            at_x, at_z = (read_number(value, where="point") for value in point)
         except (TypeError, ValueError):
             raise LaunchError(f"point: must be a pair of numbers (x, z), got {point!r}") from None
-        chart = self.charted(p)
+        chart, x, z = self.charted(p), at_x.value, at_z.value
         s, distance = chart.nearest(x, z)
         piece = np.diff(chart.edges)[max(int(np.searchsorted(chart.edges, s)) - 1, 0)]
         if distance > NEAR * min(chart.high - chart.low, max(abs(x), abs(z), piece)):
@@ -219,7 +220,7 @@ class Formulas:
                 f"point: ({x!r}, {z!r}) is {distance:.3g} off the curve; the nearest point on it is "
                 f"({float(there[0])!r}, {float(there[1])!r}), at {self.parameter} = {s!r}"
             )
-        return read_number(s, where="point")
+        return read_number(s, where="point"), (at_x, at_z)
 
     def charted(self, p: Given) -> Chart:
         """The chart of a charted curve."""
@@ -252,11 +253,8 @@ class Formulas:
         """The compiled functions with what they are given, and the exact problem of one launch."""
         if p.functions is None:
             p.functions = self._functions(p)
-        if self.exact is None or self.domain_of is None:
-            return p.functions
         addresses, values, _, breaks, corners, period = p.functions
-        exact = ExactProblem(self.exact, p, launch.lam0, launch.v0, self.domain_of)
-        return Functions(addresses, values, exact, breaks, corners, period)
+        return Functions(addresses, values, exact_problem(self, p, launch), breaks, corners, period)
 
     def _functions(self, p: Given) -> Functions:
         addresses = tuple(self.addresses)

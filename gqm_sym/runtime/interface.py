@@ -87,6 +87,12 @@ class Dissipation(NamedTuple):
     linear: bool
 
 
+class ExactClimb(NamedTuple):
+    """What a module of a charted curve has of them: ``f(op, x, z, p)``, the climb and its derivatives by x and z."""
+
+    climb: Callable[..., Any]
+
+
 class ExactFormulas(NamedTuple):
     """The same formulas as plain Python over a namespace of operations: ``f(op, lam, p)``."""
 

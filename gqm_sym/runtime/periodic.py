@@ -17,6 +17,13 @@ from gqm_sym.runtime.problem import Problem
 from gqm_sym.runtime.sampling import Sampler, plain_time, plain_times
 from gqm_sym.runtime.stretch import NOWHERE, ULP, Array, Stretch
 
+# A turning point may be told this share of it beside the end of the stretch.
+BESIDE = 1e-14
+# What the rounding of a chart may do to a period, of it: most at flat bottoms and on splines (14 roundings measured).
+CHARTED = 16 * ULP
+# Pieces of a chart that a stretch may have for its times to be taken in extended precision unasked.
+MOST_PIECES = 250
+
 
 class Periodic(Motion):
     """A libration or a circulation: one stretch, repeated for ever.
@@ -46,8 +53,9 @@ class Periodic(Motion):
 
     @property
     def _is_exact(self) -> bool:
-        """Whether more digits can be had than doubles hold."""
-        return self.problem.functions.exact is not None
+        """Whether more digits can be had than doubles hold, in some seconds at most."""
+        f, s = self.problem.functions, self._stretch
+        return f.exact is not None and f.between(f.exact.edges, s.a, s.b).size <= MOST_PIECES
 
     @property
     def _timing(self) -> timing.Timing:
@@ -77,7 +85,7 @@ class Periodic(Motion):
 
     def period_to(self, digits: int) -> str:
         """The period as a decimal string with that many correct digits (up to 1000)."""
-        if not self._is_exact:
+        if self.problem.functions.exact is None:
             raise SolutionError(
                 "period_to: this curve is a chart in doubles, whose period has no more digits than `period`; "
                 "declare the curve by formulas for more"
@@ -173,7 +181,8 @@ class Periodic(Motion):
         # What the stretch's own clock says of the launch and of the period, and the rounded anomaly of the launch.
         stretch, start = self._stretch, np.array([course.pieces[0].phi_start])
         launch = stretch.clock_error(start) + ULP * start * slopes(stretch.edges, stretch.panels[3], start)
-        return float(launch[0]), stretch.relative_error + ULP
+        rounding = ULP if self.problem.formulas.chart is None else CHARTED
+        return float(launch[0]), stretch.relative_error + rounding
 
     def events_between(self, t1: Any, t2: Any) -> tuple[Event, ...]:
         """Events at times from t1 to t2, over as many periods as that takes."""
@@ -191,10 +200,18 @@ class Periodic(Motion):
     def _one_period(self) -> tuple[Event, ...]:
         return tuple(event for event in self.events if event.kind != "horizon")
 
+    def _at_end(self, lam: float, low: float) -> float:
+        """The end of the stretch where a place is a turning point as `turning_points` rounds it, else the place."""
+        for end in (self._stretch.a, self._stretch.b):
+            beside = 0.0 < abs(lam - end) <= BESIDE * abs(end)
+            if beside and low == 0.0 and lam in self.turning_points:
+                return end
+        return lam
+
     def _first_passages(self, lam: float, low: float) -> list[float]:
         lap = self._course(0.0).lap
         if not lap:
-            return super()._first_passages(lam, low)
+            return super()._first_passages(self._at_end(lam, low), low)
         count = np.floor((lam - self.problem.lam0) / lap)
         if count < 0:
             return []

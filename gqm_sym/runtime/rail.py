@@ -5,7 +5,7 @@ integrals of the angle's cosine and sine.
 """
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import islice
 from math import atan2, ceil, hypot, pi
 from typing import Any
@@ -15,9 +15,10 @@ from numba import types
 from numpy.polynomial.legendre import leggauss
 
 from gqm_sym.errors import BudgetError, DeclarationError, ParameterError
-from gqm_sym.runtime.arc_length import MOST_PIECES, Pieces, joined, rectify, summed
+from gqm_sym.runtime.arc_length import MOST_PIECES, Indices, Pieces, joined, rectify, summed
 from gqm_sym.runtime.chart import NODES, Array, Chart, assemble
 from gqm_sym.runtime.crossing import call_segment
+from gqm_sym.runtime.exact_parts import Part, Parts, spiral
 from gqm_sym.runtime.formulas import FLOATS
 from gqm_sym.runtime.jit import entry
 
@@ -58,6 +59,8 @@ class Rail:
         Whether the start is given; else the first piece is a curve, which has a place of its own.
     segments : tuple of int
         Addresses of the functions of the curves among them, in order.
+    formulas
+        The same curves as ``f(op, lam, p)``: x, z and their derivatives.
     closed : bool
         Whether the end is joined to the start.
     """
@@ -66,6 +69,7 @@ class Rail:
     pieces: tuple[str, ...]
     placed: bool
     segments: tuple[int, ...] = ()
+    formulas: tuple[Callable[..., Any], ...] = ()
     closed: bool = False
 
     def chart(self, p: tuple[float, ...]) -> Chart:
@@ -93,12 +97,7 @@ class Rail:
                         pen, begin, length + part.lengths.sum(), f"{where}: begins", "the piece before it ends"
                     )
                     laps = 2.0 * pi * round((pen.angle - begin.angle) / (2.0 * pi))
-                    part = Pieces(
-                        lengths=part.lengths,
-                        anchors=part.anchors,
-                        angles=part.angles + laps,
-                        curvatures=part.curvatures,
-                    )
+                    part = replace(part, angles=part.angles + laps)
                     end = Pen(end.x, end.z, end.angle + laps)
                 start, pen = start or begin, end
             else:
@@ -111,9 +110,33 @@ class Rail:
             joints.append(length)
         assert start is not None
         assert pen is not None
-        return self._assembled(joined(parts), joints, start, pen)
+        which = np.repeat(np.arange(len(parts)), [part.lengths.size for part in parts])
+        return self._assembled(joined(parts), which, joints, start, pen)
 
-    def _assembled(self, pieces: Pieces, joints: list[float], start: Pen, end: Pen) -> Chart:
+    def is_exact(self, chart: Chart) -> bool:
+        """Every piece has formulas."""
+        return True
+
+    def true_curve(self, context: Any, p: tuple[Any, ...], chart: Chart) -> Parts:
+        """The rail in extended precision, its pieces where the numbers put them."""
+        numbers = iter(self.numbers(context, p))
+        pen = tuple(context.mpf(number) for number in islice(numbers, 3)) if self.placed else None
+        formulas, counts = iter(self.formulas), np.bincount(chart.origins[:, 0].astype(np.int64))
+        parts: list[Part] = []
+        for kind, count in zip(self.pieces, counts.tolist(), strict=True):
+            if kind == "curve":
+                parts.append(_formula(context, next(formulas), p, *islice(numbers, 2)))
+                x, z, dx, dz = parts[-1](context.mpf(1))
+                pen = x, z, context.atan2(dz, dx)
+                continue
+            assert pen is not None
+            given = {name: context.mpf(next(numbers)) for name in GIVEN[kind]}
+            length, first, last = _bent(kind, given)
+            parts.append(spiral(context, pen, length, first, last, count))
+            pen = *parts[-1](context.mpf(count))[:2], pen[2] + length * (first + last) / 2
+        return Parts(context, chart, parts.__getitem__)
+
+    def _assembled(self, pieces: Pieces, parts: Indices, joints: list[float], start: Pen, end: Pen) -> Chart:
         edges = summed(pieces.lengths)
         inner = joints[1:-1]
         turn = 0.0
@@ -128,6 +151,7 @@ class Rail:
             curvatures=pieces.curvatures,
             period=edges[-1] if self.closed else 0.0,
             turn=turn,
+            origins=np.column_stack([parts, pieces.places]),
             # Breaks are edges of the chart, to the last bit.
             breaks=edges[np.abs(edges[:, None] - np.array(inner)).argmin(axis=0)] if inner else (),
         )
@@ -145,6 +169,25 @@ def _check_joint(end: Pen, begin: Pen, length: float, who: str, whom: str) -> No
         )
 
 
+def _formula(context: Any, formula: Callable[..., Any], p: tuple[Any, ...], low: Any, high: Any) -> Part:
+    """A curve with formulas by the share of its parameter's range, which so has ends that are exact."""
+    low, width = context.mpf(low), context.mpf(high) - low
+
+    def at(share: Any) -> tuple[Any, Any, Any, Any]:
+        x, z, dx, dz = formula(context, low + width * share, p)
+        return x, z, dx * width, dz * width
+
+    return at
+
+
+def _bent(kind: str, given: dict[str, Any]) -> tuple[Any, Any, Any]:
+    """Length of a standard piece, and its curvature at its begin and at its end."""
+    if kind == "arc":
+        length = given["radius"] * abs(given["angle"])
+        return length, given["angle"] / length, given["angle"] / length
+    return given["length"], given.get("kappa_start", 0.0), given.get("kappa_end", 0.0)
+
+
 def _standard(kind: str, numbers: Iterator[Any], pen: Pen, where: str) -> tuple[Pieces, Pen]:
     """A piece whose curvature is linear in arc length, and where it ends."""
     given = {name: float(next(numbers)) for name in GIVEN[kind]}
@@ -152,13 +195,9 @@ def _standard(kind: str, numbers: Iterator[Any], pen: Pen, where: str) -> tuple[
         if not np.isfinite(value) or (name in ("length", "radius") and not value > 0.0):
             wanted = "positive" if name in ("length", "radius") else "finite"
             raise ParameterError(f"{where}: {name}: must be {wanted}, got {value!r}")
-    if kind == "arc":
-        if given["angle"] == 0.0:
-            raise ParameterError(f"{where}: angle: must not be zero; positive turns left, negative right")
-        length = given["radius"] * abs(given["angle"])
-        first = last = given["angle"] / length
-    else:
-        length, first, last = given["length"], given.get("kappa_start", 0.0), given.get("kappa_end", 0.0)
+    if given.get("angle") == 0.0:
+        raise ParameterError(f"{where}: angle: must not be zero; positive turns left, negative right")
+    length, first, last = (float(value) for value in _bent(kind, given))
     turned = max(abs(first), abs(last)) * length
     if not turned <= MOST_TURNED:
         raise ParameterError(f"{where}: turns by {turned:.3g} rad; {MOST_TURNED:g} is the most")
@@ -181,7 +220,9 @@ def _standard(kind: str, numbers: Iterator[Any], pen: Pen, where: str) -> tuple[
     )
     places = np.cumsum(np.concatenate([[[pen.x, pen.z]], gained]), axis=0, dtype=np.longdouble).astype(np.float64)
     s = left + 0.5 * step * (1.0 + NODES)
+    steps = np.arange(count)
     pieces = Pieces(
+        places=np.stack([steps, steps + 1], axis=1),
         lengths=np.full(count, step),
         anchors=places[:-1],
         angles=angle(s),
@@ -208,6 +249,7 @@ def _curve(address: int, p: Array, low: float, high: float, where: str) -> tuple
         return out.reshape(6, *offsets.shape)
 
     pieces = rectify(rows, np.array([low, high], dtype=np.float64), where=where)
+    pieces = replace(pieces, places=(pieces.places - low) / (high - low))
     ends = rows(np.array([low, high], dtype=np.float64), np.zeros((2, 1)))[:, :, 0]
     begin, end = (Pen(float(e[0]), float(e[1]), atan2(e[4], e[3])) for e in ends.T)
     laps = 2.0 * pi * round((pieces.angles[-1, 0] - end.angle) / (2.0 * pi))

@@ -14,9 +14,11 @@ from numba import types
 
 from gqm_sym.budgets import spend
 from gqm_sym.errors import SolutionError
-from gqm_sym.runtime.arc_length import Pieces, rectify, summed, unwrapped
+from gqm_sym.runtime.arc_length import Indices, Pieces, rectify, summed, unwrapped
 from gqm_sym.runtime.chart import NODES, Array, Chart, assemble
+from gqm_sym.runtime.exact_parts import Part, Parts, polynomial
 from gqm_sym.runtime.jit import Inner, entry
+from gqm_sym.runtime.numbers import read_number
 
 DEGREE = 5
 
@@ -51,15 +53,52 @@ class Sampled:
 
     def chart(self, p: tuple[float, ...]) -> Chart:
         """The chart; it does not depend on the run-time parameters."""
-        return _chart(self)
+        return _made(self)[0]
+
+    def is_exact(self, chart: Chart) -> bool:
+        """A track of polynomials is."""
+        return True
+
+    def true_curve(self, context: Any, p: tuple[Any, ...], chart: Chart) -> Parts:
+        """The track in extended precision: planes between the points as written, the spline of its coefficients."""
+        spline = _made(self)[1]
+        if spline is not None:
+            return Parts(context, chart, lambda k: _exact_polynomial(context, spline.t, spline.c, k))
+        numbers = [read_number(number, where="points").at(context) for number in self.points.split()]
+        count = len(numbers) // 2
+
+        def plane(k: int) -> Part:
+            (x, z), (to_x, to_z) = (numbers[2 * i : 2 * i + 2] for i in (k, (k + 1) % count))
+            return polynomial(context, 0, 1, (x, to_x - x), (z, to_z - z))
+
+        return Parts(context, chart, plane)
+
+
+def _exact_polynomial(context: Any, t: Array, c: Array, k: int) -> Part:
+    """The polynomial of a spline on [t_k, t_(k+1)], by de Boor's algorithm on powers of the share of that interval."""
+    knots = [context.mpf(float(knot)) for knot in t[k - DEGREE : k + DEGREE + 1]]
+    unit = knots[DEGREE + 1] - knots[DEGREE]
+    rows = []
+    for row in range(2):
+        found = [[context.mpf(float(value))] for value in c[k - DEGREE : k + 1, row]]
+        for order in range(1, DEGREE + 1):
+            for i in range(DEGREE, order - 1, -1):
+                change = [high - low for high, low in zip(found[i], found[i - 1], strict=True)]
+                span = knots[i + DEGREE + 1 - order] - knots[i]
+                ahead = (knots[DEGREE] - knots[i]) / span
+                by_power = zip([*found[i - 1], 0], [*change, 0], [0, *change], strict=True)
+                found[i] = [low + ahead * same + lower * unit / span for low, same, lower in by_power]
+        rows.append(found[DEGREE])
+    return polynomial(context, knots[DEGREE], unit, *rows)
 
 
 @lru_cache(maxsize=4)
-def _chart(track: Sampled) -> Chart:
+def _made(track: Sampled) -> tuple[Chart, Any]:
+    """A track's chart, and its spline where it has one."""
     points = np.array(track.points.split(), dtype=np.float64).reshape(-1, 2)
     if track.closed:
         points = np.concatenate([points, points[:1]])
-    return (_planes if track.kind == "linear" else _spline)(points, track.closed)
+    return (_planes(points, track.closed), None) if track.kind == "linear" else _splined(points, track.closed)
 
 
 def _planes(points: Array, closed: bool) -> Chart:
@@ -77,11 +116,14 @@ def _planes(points: Array, closed: bool) -> Chart:
     bent[0] &= closed
     corners = edges[:-1][bent]
     turn = 2.0 * np.pi * round(turns.sum() / (2.0 * np.pi)) if closed else 0.0
-    pieces = Pieces(lengths=lengths, anchors=points[:-1], angles=angles, curvatures=np.zeros_like(angles))
-    return _assembled(pieces, edges, turn, closed, corners, corners)
+    places = np.repeat([[0.0, 1.0]], lengths.size, axis=0)
+    pieces = Pieces(
+        places=places, lengths=lengths, anchors=points[:-1], angles=angles, curvatures=np.zeros_like(angles)
+    )
+    return _assembled(pieces, np.arange(lengths.size), edges, turn, closed, corners, corners)
 
 
-def _spline(points: Array, closed: bool) -> Chart:
+def _splined(points: Array, closed: bool) -> tuple[Chart, Any]:
     """The interpolating spline, each of its polynomials as one piece or more."""
     knots = summed(np.hypot(*np.diff(points, axis=0).T))
     for _ in range(MOST_ROUNDS):
@@ -99,7 +141,10 @@ def _spline(points: Array, closed: bool) -> Chart:
     if closed:
         turn = 2.0 * np.pi * round((pieces.angles[-1, 0] - pieces.angles[0, -1]) / (2.0 * np.pi))
     # The fifth derivative jumps at the points: panels across them would see noise from 1e-7 of the integrand on.
-    return _assembled(pieces, edges, turn, closed, edges[:-1] if closed else edges[1:-1], ())
+    breaks = edges[:-1] if closed else edges[1:-1]
+    spline = _interpolated(points, knots, closed)
+    parts = np.searchsorted(spline.t, pieces.places.mean(axis=1), side="right") - 1
+    return _assembled(pieces, parts, edges, turn, closed, breaks, ()), spline
 
 
 def _thinned(points: Array, knots: Array, closed: bool) -> tuple[Array, Array]:
@@ -116,7 +161,9 @@ def _thinned(points: Array, knots: Array, closed: bool) -> tuple[Array, Array]:
     return points, knots
 
 
-def _assembled(pieces: Pieces, edges: Array, turn: float, closed: bool, breaks: object, corners: object) -> Chart:
+def _assembled(
+    pieces: Pieces, parts: Indices, edges: Array, turn: float, closed: bool, breaks: object, corners: object
+) -> Chart:
     return assemble(
         edges=edges,
         anchors=pieces.anchors,
@@ -126,6 +173,7 @@ def _assembled(pieces: Pieces, edges: Array, turn: float, closed: bool, breaks: 
         turn=turn,
         breaks=breaks,
         corners=corners,
+        origins=np.column_stack([parts, pieces.places]),
     )
 
 

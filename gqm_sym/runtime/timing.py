@@ -22,6 +22,8 @@ from gqm_sym.runtime.stretch import Array, Stretch
 PERIOD_DIGITS = 34
 PHASE_DIGITS = 22
 MOST_DIGITS = 1000
+# Digits of V**2 that a stretch may lack throughout without being given more to work with.
+SMALL = 4
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,7 +76,7 @@ def exact(problem: Problem, kind: str, direction: int, stretch: Stretch) -> Timi
     c = a.context
     start = 2 * c.atan2(c.sqrt(a.lam0 - low), c.sqrt(high - a.lam0))
     edges = [a.mpf(float(e)) for e in stretch.edges if e < start]
-    phase = sum(a.gauss(a.anomaly_rate(TURN_TURN, low, high), [*edges, start], PHASE_DIGITS))
+    phase = sum(a.gauss(TURN_TURN, low, high, [*edges, start], PHASE_DIGITS))
     return Timing(two_doubles(duration), two_doubles(phase), offsets, marks)
 
 
@@ -104,12 +106,12 @@ def period_to(problem: Problem, kind: str, direction: int, stretch: Stretch, dig
 
 def _arithmetic(problem: Problem, stretch: Stretch, digits: int) -> Arithmetic:
     """Arithmetic precise enough for V**2 by subtraction to keep that many digits at every node."""
-    rough = problem.exact.at(60)
+    enough = digits + 20 + (60 if stretch.from_exact else 0)
+    rough = problem.exact.at(enough)
     middle = rough.mpf(0.5 * (stretch.a + stretch.b))
     top = abs(rough.speed_squared(middle)) / rough.size
     lost = ceil(-log10(float(top))) if 0 < top < 1 else 0
-    peaked = len(stretch.edges) - 1 > SMOOTH_PANELS
-    return problem.exact.at(digits + 20 + lost + (60 if peaked else 0))
+    return problem.exact.at(enough + lost) if lost > SMALL else rough
 
 
 def _durations(
@@ -117,17 +119,17 @@ def _durations(
 ) -> tuple[list[Any], Any, Any]:
     """Half period or loop time, whole or panel by panel, and the exact ends of the stretch."""
     if kind == "circulation":
-        low, high, code, stop = a.lam0, a.lam0 + direction * a.domain()[2], REGULAR, a.mpf(1)
+        low, high, code, stop = a.lam0, a.lam0 + direction * a.track.period(), REGULAR, a.mpf(1)
     else:
         low, high = exact_ends(problem.exact, a.digits, TURN_TURN, stretch.a, stretch.b, stretch.ends)
         code, stop = TURN_TURN, a.context.pi
-    rate = a.anomaly_rate(code, low, high)
-    if len(stretch.edges) - 1 <= SMOOTH_PANELS:
-        value = a.trapezoid(rate, stop, digits)
+    few = len(stretch.edges) - 1 <= SMOOTH_PANELS
+    if few and a.track.joints(low, high) is None:
+        value = a.trapezoid(a.anomaly_rate(code, low, high), stop, digits)
         if value is not None:
             return [value], low, high
     edges = [*(a.mpf(float(e)) for e in stretch.edges[:-1]), stop]
-    parts = a.gauss(rate, edges, digits)
+    parts = a.gauss(code, low, high, edges, digits)
     if not all(part > 0 for part in parts):
         raise SolutionError("period: extended precision gives no finite time; please report this launch")
-    return parts, low, high
+    return [sum(parts)] if few else parts, low, high

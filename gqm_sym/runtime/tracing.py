@@ -98,6 +98,8 @@ class Traced:
         ``f(op, p)``: x and z of the start point.
     tangent : int
         1 or -1: the sign of the tangent.
+    level
+        ``f(op, x, z, p)``: F, F_x and F_z.
     domain
         ``f(op, p)``: both ends in arc length, None where there is none; no function at all where there are none.
     """
@@ -105,6 +107,7 @@ class Traced:
     field: int
     start: Callable[..., Any]
     tangent: int
+    level: Callable[..., Any]
     domain: Callable[..., Any] | None = None
 
     def chart(self, p: tuple[float, ...]) -> Chart:
@@ -130,6 +133,14 @@ class Traced:
         behind = self._side(values, start, -1, -low)
         both = _pieces(_joined(behind, ahead))
         return assemble(**both, ends=(_what(behind.end), _what(ahead.end)))
+
+    def is_exact(self, chart: Chart) -> bool:
+        """Whether F is smooth all along."""
+        return chart.breaks.size == 0
+
+    def true_curve(self, context: Any, p: tuple[Any, ...], chart: Chart) -> "Zeros":
+        """The curve in extended precision."""
+        return Zeros(self, context, p)
 
     def _domain(self, p: tuple[float, ...]) -> tuple[float, float]:
         low, high = (None, None) if self.domain is None else self.domain(FLOATS, p)
@@ -199,6 +210,48 @@ class Traced:
         # The nodes of a piece stand from right to left.
         angles = np.unwrap(np.arctan2(tangents[:, 1], tangents[:, 0])[:, ::-1].ravel()).reshape(-1, TERMS)[:, ::-1]
         return Side(edges, anchors, tangents, angles, curvatures, jumps, end)
+
+
+class Zeros:
+    """The curve F = 0 at one precision, by Newton's method from the chart (`exact_charts.TrueCurve`)."""
+
+    def __init__(self, maker: Traced, context: Any, p: tuple[Any, ...]) -> None:
+        self._level, self._tangent, self._context, self._p = maker.level, maker.tangent, context, p
+        x, z = at_x, at_z = maker.start(context, p)
+        for _ in range(STEPS):
+            f, fx, fz = self._level(context, at_x, at_z, p)
+            square = fx * fx + fz * fz
+            # Across to the curve, and along to the foot of the perpendicular.
+            across, along = f / square, ((x - at_x) * fz - (z - at_z) * fx) / square
+            at_x, at_z = at_x - across * fx + along * fz, at_z - across * fz - along * fx
+            if (abs(across) + abs(along)) * context.sqrt(square) <= context.ldexp(abs(x) + abs(z), 16 - context.prec):
+                break
+        self.start = at_x, at_z
+
+    def ends(self, k: int) -> None:
+        """F = 0 is smooth: pieces may begin anywhere."""
+        return
+
+    def length(self, k: int) -> None:
+        """So they have no lengths of their own."""
+        return
+
+    def meet(self, k: int, u: float, x: Any, z: Any, dx: Any, dz: Any, size: float) -> tuple[Any, Any, Any, Any]:
+        """Where the line through (x, z) across (dx, dz) meets the curve, and the unit tangent there."""
+        context, at_x, at_z = self._context, x, z
+        enough = context.ldexp(size, -context.prec // 2)
+        for _ in range(STEPS):
+            f, fx, fz = self._level(context, at_x, at_z, self._p)
+            step = f / (fz * dx - fx * dz)
+            at_x, at_z = at_x + step * dz, at_z - step * dx
+            if abs(step) <= enough:  # it squares: the next would be nothing
+                _, fx, fz = self._level(context, at_x, at_z, self._p)
+                slope = self._tangent * context.sqrt(fx * fx + fz * fz)
+                return at_x, at_z, -fz / slope, fx / slope
+        raise SolutionError(
+            f"the curve near ({float(x)!r}, {float(z)!r}): Newton's method does not settle on F = 0; "
+            "is there a singular point?"
+        )
 
 
 def _what(end: int) -> str:
