@@ -255,6 +255,7 @@ def test_the_ellipses_turning_angle_never_jumps():
     """Once round the tangent has turned by 2π, through no cut of atan2."""
     model = derive(families.ellipse(a=3, b=1), Gravity())
     assert not model.turning_angle.has(sp.atan2)
+    assert model.parameter in model.turning_angle.args  # seen from a frame that turns once with it, and not twice
     around = model.turning_angle.subs({**defaults(model), model.lam0: 0})
     assert around.subs(model.parameter, 2 * sp.pi).evalf(30) == pytest.approx(2 * sp.pi.evalf(30))
 

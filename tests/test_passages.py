@@ -282,3 +282,39 @@ def test_the_end_of_the_domain_ends_a_motion(passage: Callable[..., Any]) -> Non
         assert motion.legs[-1].end == motion.events[-1].kind == "domain-end"
         assert motion.legs[-1].lam_end == motion.lam(motion.t_end) == stop
         assert off(motion.t_end, truth) <= TIME * motion.t_end
+
+
+@pytest.fixture(scope="module")
+def brink(generated_folder: Any) -> ModuleType:
+    """A fall without end at x = 0, a hilltop at 1, a well at 2, and a slope that rises for ever."""
+    curve = gqm.Curve.graph("log(x) - 3*x/2 + x**2/4", domain=(0, None))
+    return gqm.build(gqm.derive(curve, gqm.Gravity()), name="brink", folder=generated_folder)
+
+
+def test_released_a_hair_beside_a_hilltop(brink: ModuleType) -> None:
+    """It turns at the height of the hilltop, which exact numbers had to tell it to leave, and not farther."""
+    with mp.workdps(40):
+        level = mp.findroot(lambda x: mp.log(x) - 3 * x / 2 + x**2 / 4 + mpf("1.25"), 3)
+        motion = brink.solve("1 + 1e-14")
+        assert motion.kind == "libration"
+        assert off(max(motion.turning_points), level) <= math.ulp(3.0)
+        assert off(min(motion.turning_points), 1 + mpf("1e-14")) <= math.ulp(1.0)
+
+
+def test_a_fall_towards_a_pole(brink: ModuleType) -> None:
+    """Released at 1/2, where the pole is nearer than a step: the time to a place is the integral of ds/V."""
+    with mp.workdps(30):
+
+        def height(x: mpf) -> mpf:
+            return mp.log(x) - 3 * x / 2 + x**2 / 4
+
+        def rate(u: mpf) -> mpf:
+            x = mpf("0.5") - mpf("0.4") * u**2
+            slope = 1 / x - mpf("1.5") + x / 2
+            lost = height(mpf("0.5")) - height(x)
+            return mp.sqrt((1 + slope**2) / (2 * G * lost)) * mpf("0.8") * u if u else mpf(0)
+
+        truth = mp.quad(rate, [mpf("1e-12"), 0.25, 0.5, 0.75, 1]) + rate(mpf("1e-6")) * mpf("1e-12")
+        motion = brink.solve("1/2")
+        assert motion.kind == "transit"
+        assert off(motion.time_at("0.1"), truth) <= TIME * float(truth)

@@ -133,7 +133,7 @@ def imul(a, b):  # type: ignore[no-untyped-def]
 def iinv(a):  # type: ignore[no-untyped-def]
     """The inverse 1/a: everything if zero lies inside, half of it if zero is an end."""
     lo, hi = a
-    if lo < 0.0 < hi or lo == hi == 0.0 or not ordinary(a):
+    if lo < 0.0 < hi or not ordinary(a):
         return -inf, inf
     below = lower(kept(1.0 / hi, hi), ROUNDED) if hi != 0.0 else -inf
     above = upper(kept(1.0 / lo, lo), ROUNDED) if lo != 0.0 else inf
