@@ -16,6 +16,7 @@ import pytest
 from mpmath import mp, mpf
 
 import gqm_sym as gqm
+from gqm_sym import sweeps
 from gqm_sym.cli import tool
 from gqm_sym.cli.progress import Bar
 from gqm_sym.errors import InputError, SpecFileError
@@ -316,6 +317,19 @@ def test_a_damaged_part_is_computed_again(here: Path, monkeypatch: pytest.Monkey
     assert run(plan, "cut.nc", progress=lambda done, _: told.append(done)).identical(whole)
     assert told == [13, 26, 39, 52, 60]
     assert Path("cut.nc").read_bytes() == Path("whole.nc").read_bytes()
+
+
+def test_an_interruption_says_what_to_do(
+    here: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The code of interrupted programs, and that nothing is lost."""
+
+    def interrupted(*_: Any, **__: Any) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(sweeps, "run", interrupted)
+    assert tool.main(["sweep", "periods.yaml"]) == 130
+    assert "what is done is stored; the same command goes on from there" in capsys.readouterr().err
 
 
 def test_what_is_there_is_not_lost(here: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -249,10 +249,14 @@ def _sweep(options: argparse.Namespace) -> None:
 
 
 def _schema(options: argparse.Namespace) -> None:
-    from gqm_sym.specfile import json_schema
-    from gqm_sym.sweeps import sweep_schema
+    if options.sweep:
+        from gqm_sym.sweeps import sweep_schema
 
-    schema = sweep_schema() if options.sweep else json_schema()
+        schema = sweep_schema()
+    else:
+        from gqm_sym.specfile import json_schema
+
+        schema = json_schema()
     print(json.dumps(schema, indent=2, ensure_ascii=False))
 
 
