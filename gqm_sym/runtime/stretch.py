@@ -22,15 +22,9 @@ from gqm_sym.runtime.entries import (
 )
 from gqm_sym.runtime.exact import ExactProblem
 from gqm_sym.runtime.exact_panels import DIGITS, exact_ends, lay_exactly
+from gqm_sym.runtime.integrands import FROM_TURN, REGULAR, TO_EQUILIBRIUM, TURN_TURN
 from gqm_sym.runtime.inversion import TIMED
-from gqm_sym.runtime.panels import (
-    FAILED,
-    FROM_TURN,
-    ILL_CONDITIONED,
-    REGULAR,
-    TO_EQUILIBRIUM,
-    TURN_TURN,
-)
+from gqm_sym.runtime.panels import FAILED, ILL_CONDITIONED
 
 # Below this balance the half period in doubles is off by more than a few units in the last place.
 LEAST_BALANCE = 1e-2
@@ -93,10 +87,14 @@ class Stretch:
         Places at which panels begin besides the curve's own breaks: the rate changes there on a scale that even steps
         would miss.
     v2 : array or None
-        V**2 along it where forces dissipate: a field (`fields`), by the distance from ``a``, or from ``b`` if that is
-        an equilibrium.
+        V**2 towards an equilibrium where forces dissipate: a field (`fields`).
+    slack : float
+        Where ``a`` is no turning point but the body is slow there: how far behind ``a`` one would be, as a share of the
+        last anomaly, in the anomaly.
     laid : tuple, optional
-        Its panels, if they were laid in extended precision.
+        Its panels, if they were laid in extended precision, or with a leg.
+    paces : (float, array), optional
+        Of panels laid with a leg: the last value of the march variable, and the Legendre coefficients of Y (`legs`).
     known : float, optional
         Its duration, where that is known to be good in doubles: panels are then laid when first asked for.
     ends : pair
@@ -112,7 +110,9 @@ class Stretch:
     stop: float = 1.0
     hints: tuple[float, ...] = ()
     v2: Array | None = None
+    slack: float = 0.0
     laid: Any = None
+    paces: tuple[float, Array] | None = None
     known: float | None = None
     ends: tuple[Any, Any] = (None, None)
     _from_exact: bool = False
@@ -129,9 +129,11 @@ class Stretch:
     def _settle(self) -> None:
         """Lay its panels, in extended precision where doubles would lose too much."""
         f = self.functions
+        if self.paces is not None:
+            return
         self._from_exact = self.laid is not None
         if self.v2 is not None:
-            self.laid = lay_along(f.p, self.kind, self.a, self.b, self.v2, self._marks())
+            self.laid = lay_along(self.a, self.b, self.v2, self._marks())
         elif self.laid is None:
             self.w += self._off_launch()
             self.laid = lay_panels(f.addresses, f.p, self.kind, self.a, self.b, self.ref, self.w, self._marks())
@@ -260,7 +262,7 @@ class Stretch:
 
     def _magnified(self) -> float:
         f, ref = self.functions, self.a if self.kind == FROM_TURN else self.ref
-        one_sided = self.kind in (FROM_TURN, REGULAR) and self.v2 is None
+        one_sided = self.kind in (FROM_TURN, REGULAR)
         return magnified(f.addresses, f.p, self.a, self.b, ref, self.w) if one_sided else 1.0
 
     @property
@@ -292,7 +294,10 @@ class Stretch:
         if self.kind == TO_EQUILIBRIUM:
             return -log(share_b / whole) if share_b > 0.0 else inf
         share = share_a / whole if share_a <= share_b else 1.0 - share_b / whole
-        return sqrt(share) if self.kind == FROM_TURN else share
+        if self.kind == REGULAR or share <= 0.0:
+            return share
+        most = share * (1.0 + 2.0 * self.slack)
+        return most / (self.slack + sqrt(self.slack**2 + most))
 
     def places(self, phi: Array) -> Array:
         """The curve's parameter at anomalies, from the nearer end."""
@@ -306,7 +311,7 @@ class Stretch:
             )
         if self.kind == TO_EQUILIBRIUM:
             return self.b - width * np.exp(-phi)
-        share = phi**2 if self.kind == FROM_TURN else phi
+        share = phi * (phi + 2.0 * self.slack) / (1.0 + 2.0 * self.slack) if self.kind == FROM_TURN else phi
         return np.where(share <= 0.5, self.a + width * share, self.b - width * (1.0 - share))
 
     def speeds(self, phi: Array) -> Array:
@@ -315,8 +320,12 @@ class Stretch:
         if self.from_exact:
             return self._paced(phi)
         if self.v2 is not None:
-            along: Array = speeds_along(f.p, self.kind, self.a, self.b, self.v2, phi)
+            along: Array = speeds_along(self.a, self.b, self.v2, phi)
             return along
+        if self.paces is not None:
+            last, terms = self.paces
+            smooth: Array = read_off_many(self.edges, np.zeros_like(self.edges), terms, phi)
+            return smooth * (last * (phi + self.slack)) if self.kind == FROM_TURN else smooth
         speeds: Array = speeds_at(f.addresses, f.p, self.kind, self.a, self.b, self.ref, self.w, phi)
         return speeds * self.spread
 
