@@ -62,7 +62,8 @@ SHARES, MEANS, GRADED_MEANS, TO_COEFFICIENTS = _tables()
 WIDE = 24
 ENDS_BY_NODE = np.pad(np.append(SHARES, 1.0), (0, WIDE - COUNT - 1))
 MEANS_BY_NODE, GRADED_BY_NODE, COEFFICIENTS_BY_NODE = (
-    np.ascontiguousarray(np.pad(table.T, ((0, 0), (0, WIDE - len(table))))) for table in (MEANS, GRADED_MEANS, TO_COEFFICIENTS)
+    np.ascontiguousarray(np.pad(table.T, ((0, 0), (0, WIDE - len(table)))))
+    for table in (MEANS, GRADED_MEANS, TO_COEFFICIENTS)
 )
 LAST, MIDDLE = slice(COUNT - 3, COUNT), slice(12, 15)
 TAILS_BY_NODE = np.ascontiguousarray(
@@ -80,7 +81,7 @@ FINEST = 2.0**-30
 def coefficients(values, out):  # type: ignore[no-untyped-def]
     """Chebyshev coefficients of the polynomial with these values at the nodes."""
     padded = np.empty(WIDE)
-    to_ends(COEFFICIENTS_BY_NODE, values, padded)
+    to_ends(COEFFICIENTS_BY_NODE, values, 0, padded, 0)
     for k in range(COUNT):
         out[k] = padded[k]
 
@@ -97,8 +98,16 @@ def chebyshev_sum(c, x):  # type: ignore[no-untyped-def]
 @Inner
 def _restrict(c, lo, hi, values, out):  # type: ignore[no-untyped-def]
     """The series' coefficients on [lo, hi] alone."""
+    high, low, twice = np.zeros(WIDE), np.zeros(WIDE), np.empty(WIDE)
+    for j in range(WIDE):
+        twice[j] = 2.0 * (lo + (hi - lo) * ENDS_BY_NODE[j])
+    for k in range(COUNT - 1, 0, -1):
+        term = c[k]
+        for j in range(WIDE):
+            before = high[j]
+            high[j], low[j] = term + twice[j] * before - low[j], before
     for j in range(COUNT):
-        values[j] = chebyshev_sum(c, lo + (hi - lo) * SHARES[j])
+        values[j] = c[0] + 0.5 * twice[j] * high[j] - low[j]
     coefficients(values, out)
 
 

@@ -20,6 +20,8 @@ from gqm_sym.runtime.search import FARTHEST
 from gqm_sym.runtime.solve import CUSP_SHARE, domain_end, leaving_at_once, starting_step
 from gqm_sym.runtime.stretch import NOWHERE, ULP, Array, Stretch
 
+# The first panel, in first steps of a search: early times keep the more digits the shorter it is.
+FIRST = 0.25
 # On a curve without ends, how many stretches in a row without a turn `legs` and `events` look for one.
 MOST_PAUSES = 12
 # Turns after which `legs` and `events` stop looking for the rest.
@@ -97,8 +99,8 @@ class Dissipative(Motion):
         self._joints = ("",) if dissipation.friction else ("", "contact-sign")
         self._side = {"bilateral": 0, "above": 1, "below": -1}[problem.launch.contact]
         self._place, self._w, self._way, self._nu, self._laps = problem.lam0, problem.w0, direction, 0, 0
-        self._step = starting_step(problem)
-        self._reach, self._strict = problem.period or self._step, 0.0
+        step = starting_step(problem)
+        self._step, self._reach, self._strict = FIRST * step, problem.period or step, 0.0
         self._turns = 0
         self._pauses = 0
         self._arc = 0.0

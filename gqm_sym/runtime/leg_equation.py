@@ -18,6 +18,7 @@ from gqm_sym.runtime.chebyshev import (
     GRADED_BY_NODE,
     MEANS_BY_NODE,
     WIDE,
+    extent,
     to_ends,
 )
 from gqm_sym.runtime.crossing import call_drive
@@ -48,16 +49,14 @@ def marched(d, g, c):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def grow(q, out):  # type: ignore[no-untyped-def]
-    """``out = exp(q) - 1``, side by side."""
-    most = 0.0
-    for j in range(WIDE):
-        most = max(most, fabs(q[j]))
+def grow(work, q, out):  # type: ignore[no-untyped-def]
+    """Fill row ``out`` with exp - 1 of row ``q``, side by side."""
+    low, high = extent(work, q * WIDE)
     scale, doublings = 1.0, 0
-    while most * scale > SUMMED:
+    while max(-low, high, fabs(work[q, COUNT])) * scale > SUMMED:
         scale, doublings = 0.5 * scale, doublings + 1
     for j in range(WIDE):
-        x = q[j] * scale
+        x = work[q, j] * scale
         s = 1.0 / 6227020800.0
         s = s * x + 1.0 / 479001600.0
         s = s * x + 1.0 / 39916800.0
@@ -70,26 +69,10 @@ def grow(q, out):  # type: ignore[no-untyped-def]
         s = s * x + 1.0 / 24.0
         s = s * x + 1.0 / 6.0
         s = s * x + 0.5
-        out[j] = (s * x) * x + x
+        work[out, j] = (s * x) * x + x
     for _ in range(doublings):
         for j in range(WIDE):
-            out[j] *= out[j] + 2.0
-
-
-@Inner
-def integrals(values, y, near, g, mean, graded, out):  # type: ignore[no-untyped-def]
-    """Integrals over the distance from the panel's start, y (near + g y), to each node and the panel's end.
-
-    Leaves means in ``mean``, and with the weight y in ``graded``, where g is not 0.
-    """
-    to_ends(MEANS_BY_NODE, values, mean)
-    if g == 0.0:
-        for j in range(WIDE):
-            out[j] = y[j] * (near * mean[j])
-        return
-    to_ends(GRADED_BY_NODE, values, graded)
-    for j in range(WIDE):
-        out[j] = y[j] * (near * mean[j] + y[j] * graded[j])
+            work[out, j] *= work[out, j] + 2.0
 
 
 @Inner
@@ -99,32 +82,45 @@ def solve_panel(drive, p, linear, origin, u, g, c, left, width, base, v, nu, row
     Fills ``rows`` by ``drive`` and all of ``work`` that does not ask for W > 0. Returns q over the panel, inf where it
     is too wide for an answer.
     """
-    y, near, gone = work[PLACE], 2.0 * g * left + c, left * (g * left + c)
-    begin = origin + u * gone
+    near = 2.0 * g * left + c
+    begin = origin + u * distance(left, g, c)
+    places, speeds = work[ARC], work[W]
     for j in range(WIDE):
-        y[j] = width * ENDS_BY_NODE[j]
-        work[D, j] = y[j] * (near + g * y[j])
+        y = width * ENDS_BY_NODE[j]
+        work[PLACE, j] = y
+        work[D, j] = y * (near + g * y)
         work[ARC, j] = begin + u * work[D, j]
         work[W, j] = base
     if not linear:  # Newton's method begins with what W does at once; laws may ask for its root
         work[W, 0] = max(base, 1e-300)
-        call_drive(drive, 1, work[ARC], work[W], float(v), float(nu), p, rows)
+        call_drive(drive, 1, places, speeds, float(v), float(nu), p, rows)
         rise = max(u * (rows.flat[1] - rows.flat[2] * work[W, 0]), 0.0)
         for j in range(WIDE):
             work[W, j] = base + rise * work[D, j]
     stop, settled = inf, linear
     for _ in range(1 if linear else MOST_ROUNDS):
-        call_drive(drive, COUNT, work[ARC], work[W], float(v), float(nu), p, rows)
+        call_drive(drive, COUNT, places, speeds, float(v), float(nu), p, rows)
         for j in range(COUNT):
-            work[PULL, j] = u * rows[2, j]
-        integrals(work[PULL], y, near, g, work[MEAN], work[GRADED], work[SPEED])
+            work[PULL, j] = u * rows[2, j] * (near + 2.0 * g * work[PLACE, j])
+        to_ends(MEANS_BY_NODE, work, PULL * WIDE, work, SPEED * WIDE)
+        for j in range(WIDE):
+            work[SPEED, j] *= work[PLACE, j]
         far = work[SPEED, COUNT]
         if not fabs(far) <= STEEPEST:
             return inf
-        grow(work[SPEED], work[SWELL])
+        grow(work, SPEED, SWELL)
         for j in range(COUNT):
             work[FORCE, j] = u * rows[1, j] * (1.0 + work[SWELL, j])
-        integrals(work[FORCE], y, near, g, work[MEAN], work[GRADED], work[SPEED])
+        # The integral over the distance: means, and where the march is graded those with the weight y.
+        to_ends(MEANS_BY_NODE, work, FORCE * WIDE, work, MEAN * WIDE)
+        if g > 0.0:
+            to_ends(GRADED_BY_NODE, work, FORCE * WIDE, work, GRADED * WIDE)
+            for j in range(WIDE):
+                y = work[PLACE, j]
+                work[SPEED, j] = y * (near * work[MEAN, j] + y * work[GRADED, j])
+        else:
+            for j in range(WIDE):
+                work[SPEED, j] = work[PLACE, j] * work[MEAN, j]
         for j in range(WIDE):
             work[SPEED, j] = base + (work[SPEED, j] - base * work[SWELL, j]) / (1.0 + work[SWELL, j])
         moved, size = 0.0, 0.0

@@ -9,6 +9,7 @@ from gqm_sym.runtime.chebyshev import (
     LEBESGUE,
     MEANS,
     TAILS_BY_NODE,
+    WIDE,
     extent,
     first_change,
     to_ends,
@@ -22,6 +23,7 @@ from gqm_sym.runtime.leg_equation import (
     LOAD,
     MEAN,
     PACE,
+    PLACE,
     PULL,
     SPEED,
     D,
@@ -42,7 +44,7 @@ NARROW = 1e-15
 # Coefficients that fall by this factor a degree reach TAIL with the last ones but one.
 FALL = 7.2
 # A panel is made this much narrower than it would seem to be allowed to be, and at most that many times wider.
-CAUTION, GROWTH = 0.93, 4.0
+CAUTION, GROWTH = 0.9, 4.0
 # V**2 at a panel's end against the largest so far from which on time is resolved: below, a turn is expected, and time
 # is counted from there.
 HIGH = 0.5
@@ -59,9 +61,9 @@ COLUMNS = 3 + 3 * COUNT
 
 
 @Inner
-def size_of(values):  # type: ignore[no-untyped-def]
-    """The largest of some values, whatever its sign."""
-    low, high = extent(values)
+def size_of(work, row):  # type: ignore[no-untyped-def]
+    """The largest value of a row, whatever its sign."""
+    low, high = extent(work, row * WIDE)
     return max(-low, high)
 
 
@@ -71,18 +73,19 @@ def weigh(rows, base, work, sizes):  # type: ignore[no-untyped-def]
     for j in range(COUNT):
         work[MEAN, j] = fabs(rows[0, j]) * (fabs(rows[3, j]) + fabs(rows[4, j] * work[W, j]))
     for f in range(PACE):
-        sizes[f] = size_of(work[f])
-    highest = max(base, extent(work[W])[1])
-    sizes[FORCE] = max(sizes[FORCE], sizes[PULL] * highest)
-    sizes[PULL] = max(sizes[PULL], 1.0 / work[D, COUNT])
-    sizes[BARE], sizes[LOAD] = max(sizes[BARE], base), extent(work[MEAN])[1]
+        sizes[f] = size_of(work, f)
+    highest = max(base, extent(work, W * WIDE)[1])
+    width = work[PLACE, COUNT]
+    sizes[FORCE] = max(sizes[FORCE], sizes[PULL] * highest * width / work[D, COUNT])
+    sizes[PULL] = max(sizes[PULL], 1.0 / width)
+    sizes[BARE], sizes[LOAD] = max(sizes[BARE], base), extent(work, MEAN * WIDE)[1]
     return highest
 
 
 @Inner
-def falls(values, size, tails):  # type: ignore[no-untyped-def]
+def falls(work, row, size, tails):  # type: ignore[no-untyped-def]
     """The size of a function's last coefficients and of some in the middle, and whether it is resolved."""
-    to_tails(TAILS_BY_NODE, values, tails)
+    to_tails(TAILS_BY_NODE, work, row * WIDE, tails, 0)
     tail = max(fabs(tails[0]), max(fabs(tails[1]), fabs(tails[2])))
     level = max(fabs(tails[3]), max(fabs(tails[4]), fabs(tails[5])))
     return tail, level, tail <= TAIL * size or (level <= PLATEAU * size and tail >= 0.05 * level)
@@ -93,7 +96,7 @@ def resolved(work, sizes, first, last, tails):  # type: ignore[no-untyped-def]
     """Whether some functions are resolved, and by what the panel's width may be multiplied."""
     fine, worst = True, 0.0
     for f in range(first, last):
-        tail, level, ok = falls(work[f], sizes[f], tails)
+        tail, level, ok = falls(work, f, sizes[f], tails)
         if not (tail < inf and level < inf):
             return False, 0.5
         if sizes[f] > 0.0:
@@ -106,15 +109,15 @@ def resolved(work, sizes, first, last, tails):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def change_of(values, sign, noise, c):  # type: ignore[no-untyped-def]
+def change_of(work, row, sign, noise, c):  # type: ignore[no-untyped-def]
     """`first_change` of a function by its values; its coefficients, in c, are found only where values leave a doubt."""
-    low, high = extent(values)
+    low, high = extent(work, row * WIDE)
     middle, spread = 0.5 * (low + high), 0.5 * LEBESGUE * (high - low)
     if fabs(middle) > spread + noise:
         found = 1 if middle > 0.0 else -1
         if sign == 0 or found == sign:
             return 2.0, found, 2.0
-    to_ends(COEFFICIENTS_BY_NODE, values, c)
+    to_ends(COEFFICIENTS_BY_NODE, work, row * WIDE, c, 0)
     return first_change(c[:COUNT], sign, noise)
 
 
@@ -124,13 +127,12 @@ def to_kink(rows, work, c, tails):  # type: ignore[no-untyped-def]
 
     The sign is that of ds kappa, which is smooth at cusps too.
     """
-    values = work[LOAD]
     for j in range(COUNT):
-        values[j] = rows[0, j] * rows[4, j]
-    size = size_of(values)
-    if not falls(values, size, tails)[2]:
+        work[LOAD, j] = rows[0, j] * rows[4, j]
+    size = size_of(work, LOAD)
+    if not falls(work, LOAD, size, tails)[2]:
         return -1.0
-    return change_of(values, 0, NOISE * size, c)[0]
+    return change_of(work, LOAD, 0, NOISE * size, c)[0]
 
 
 @Inner
@@ -181,7 +183,7 @@ def next_panel(  # type: ignore[no-untyped-def]
             timed, more = False, GROWTH
             if ask != NEVER:
                 pace(g, c, left, base, work)
-                sizes[PACE] = size_of(work[PACE])
+                sizes[PACE] = size_of(work, PACE)
                 timed, more = resolved(work, sizes, PACE, PACE + 1, tails)
             # On so small a part of what is smooth it is noise that is not resolved; the error says so.
             timed = timed or (needed and width <= SLIVER * widest and tails[0] < inf)
@@ -191,7 +193,7 @@ def next_panel(  # type: ignore[no-untyped-def]
                 step = max(step, width * growth) if kink or width == room else width * growth
                 return width, step, far, timed
             growth = more
-        width, kink = width * max(min(growth, 0.7), 0.2), False
+        width, kink = width * max(min(growth, 0.9), 0.2), False
     return 0.0, step, 0.0, False
 
 

@@ -118,27 +118,34 @@ def run(drive, p, flags, start, w, v, nu, breaks, limit, reach, step, side, stri
     series, changes, spot = np.empty(WIDE), np.empty(4), np.empty((7, 1))
     panels = np.empty((8, COLUMNS))
     g, c = 1.0, 0.0
+    if nu == 0:
+        rise(drive, p, start, w, v, nu, spot)
+        load, turned = spot[4, 0], spot[5, 0] * w
+        if fabs(load + turned) > TOUCHED * (fabs(load) + fabs(turned)):
+            nu = 1 if load + turned > 0.0 else -1
     if w > 0.0:
         slope = rise(drive, p, start, w, v, nu, spot)
         slow = slope > 0.0 and w <= slope * step
         g, c = (1.0, 2.0 * sqrt(w / slope)) if slow else (0.0, 1.0)
     count, met, coming, what = 0, 0, 0, SPENT
-    base, left, ceiling, step = w, 0.0, w, marched(step, g, c)
+    base, left, gone, ceiling, step = w, 0.0, 0.0, w, marched(step, g, c)
     # The last place up to which time is counted, and what is known there; a turn is searched for beyond it.
     searching, kept, mark, mark_base, mark_nu, mark_met = False, 0, 0.0, w, nu, 0
     for _ in range(MOST_TRIES):
-        gone = distance(left, g, c)
+        if nu != 0 and nu == -side:
+            what = LIFTOFF
+            break
         here, late = start + v * gone, base < HIGH * ceiling
         if searching and not late:
             what = DIPPED
             break
-        while coming < breaks.size and v * (breaks[coming] - here) <= 0.0:
+        while coming < breaks.size and v * (breaks[coming] - start) <= gone:
             coming += 1
-        stop = breaks[coming] if coming < breaks.size else limit
-        if v * (stop - start) <= gone:
+        stop = v * ((breaks[coming] if coming < breaks.size else limit) - start)
+        if stop <= gone:
             what = LIMIT
             break
-        room = marched(v * (stop - start), g, c) - left
+        room = marched(stop, g, c) - left
         ask = ALWAYS if gone < strict else (NEVER if searching or late else MAYBE)
         width, step, far, timed = next_panel(
             *(drive, p, flags, start, v, g, c, left, room, step, base, v, nu, ceiling, ask),
@@ -149,19 +156,16 @@ def run(drive, p, flags, start, w, v, nu, breaks, limit, reach, step, side, stri
             if flags[2] == 0 and base > 0.0:
                 slope = rise(drive, p, here, base, v, nu, spot)
                 if slope < 0.0 and base <= -slope * NEAR * max(fabs(here), gone):
-                    what, left, base = TURN, marched(gone - base / slope, g, c), 0.0
+                    what, gone, base = TURN, gone - base / slope, 0.0
             break
-        turn_of_force, before, _ = change_of(work[LOAD], nu, TOUCHED * sizes[LOAD], series)
+        turn_of_force, before, _ = change_of(work, LOAD, nu, TOUCHED * sizes[LOAD], series)
         if nu == 0 and before != 0:
             nu = before
-            if nu == -side:
-                what = LIFTOFF
-                break
-            if flags[0] == 1:
+            if flags[0] == 1 or nu == -side:
                 continue
         # V**2, or what it is divided by the distance from the turning point it begins with.
-        scale = size_of(work[FORCE]) if base == 0.0 else max(ceiling, sizes[BARE])
-        at_rest, _, touch = change_of(work[BARE], 1, NOISE * scale, series)
+        scale = size_of(work, FORCE) if base == 0.0 else max(ceiling, sizes[BARE])
+        at_rest, _, touch = change_of(work, BARE, 1, NOISE * scale, series)
         if touch <= -1.0 and base == 0.0:
             touch = 2.0
         end = min(at_rest, touch, turn_of_force)
@@ -171,9 +175,6 @@ def run(drive, p, flags, start, w, v, nu, breaks, limit, reach, step, side, stri
                 nu = -nu  # N is zero here: what follows decides its sign
                 if left > 0.0:
                     changes, met = pushed(changes, met, here), met + 1
-                if nu == -side:
-                    what = LIFTOFF
-                    break
                 continue
         if not searching and ask != ALWAYS and (late or not timed):
             searching, mark, mark_base, mark_nu, mark_met = True, left, base, nu, met
@@ -192,27 +193,24 @@ def run(drive, p, flags, start, w, v, nu, breaks, limit, reach, step, side, stri
         if not searching:
             panels, kept, mark = keep(panels, kept, right, right - left, work, tails), kept + 1, right
         count += 1
-        highest = max(base, extent(work[V2])[1])
+        highest = max(base, extent(work, V2 * WIDE)[1])
         ceiling = max(ceiling * exp(-far) if end > 1.0 else ceiling, highest)
+        full = end > 1.0 and width == room
         base, left = max(work[V2, COUNT], 0.0), right
+        gone = stop if full else distance(right, g, c)
         if end <= 1.0:
             if end == at_rest or end == touch:
                 what, base = (TURN if end == at_rest else ASYMPTOTE), 0.0
                 break
-            changes, met = pushed(changes, met, start + v * distance(left, g, c)), met + 1
-            nu = -nu
-            if nu == -side:
-                what = LIFTOFF
-                break
-        elif width == room and stop == limit:
+            changes, met, nu = pushed(changes, met, start + v * gone), met + 1, -nu
+        elif full and coming == breaks.size:
             what = LIMIT
             break
-        elif (distance(left, g, c) >= reach and 2.0 * base >= ceiling) or count >= MOST_PANELS:
+        elif (gone >= reach and 2.0 * base >= ceiling) or count >= MOST_PANELS:
             what = PAUSED
             break
     middle = start + v * distance(mark, g, c)
-    onwards, gone = step * (2.0 * g * left + c + g * step), distance(left, g, c)
-    strict -= gone
+    onwards, strict = step * (2.0 * g * left + c + g * step), strict - gone
     if what == TURN or what == ASYMPTOTE:
         place = start + v * gone
     elif searching:
@@ -233,10 +231,10 @@ def run_back(drive, p, flags, turn, whole, v, nu, changes, breaks, step):  # typ
     """
     rows, work, sizes, tails = np.empty((5, COUNT)), np.empty((ROWS, WIDE)), np.empty(JUDGED), np.empty(8)
     series, panels = np.empty(WIDE), np.empty((8, COLUMNS))
-    count, base, left, u, step = 0, 0.0, 0.0, -v, sqrt(step)
+    count, base, left, gone, u, step = 0, 0.0, 0.0, 0.0, -v, sqrt(step)
     met, passed = changes.size - 1, breaks.size - 1
     for _ in range(MOST_TRIES):
-        stop, met, passed, nu = next_stop(turn, u, left * left, whole, changes, breaks, met, passed, nu)
+        stop, met, passed, nu = next_stop(turn, u, gone, whole, changes, breaks, met, passed, nu)
         room = sqrt(stop) - left
         if room <= 0.0:
             break
@@ -246,9 +244,9 @@ def run_back(drive, p, flags, turn, whole, v, nu, changes, breaks, step):  # typ
         )
         if width == 0.0:
             break
-        left = sqrt(stop) if width == room else left + width
+        gone, left = (stop, sqrt(stop)) if width == room else ((left + width) * (left + width), left + width)
         panels, count, base = keep(panels, count, left, width, work, tails), count + 1, work[V2, COUNT]
-        if left >= sqrt(whole):
+        if gone >= whole:
             break
     return panels[:count].copy()
 

@@ -16,16 +16,15 @@ _LANES = ir.VectorType(_REAL, LANES)
 
 
 def columns(rows: int, width: int) -> Any:
-    """A compiled function ``f(table, values, out)``: ``out = values @ table``, table of ``rows`` rows of ``width``.
+    """A compiled function ``f(table, values, at, out, to)``, table of ``rows`` rows of ``width``.
 
-    ``width`` is a multiple of `LANES`; the arrays lie in one piece, and nothing is checked.
+    It does ``out[to : to + width] = values[at : at + rows] @ table``, the arrays read as one line of numbers: a slice
+    would cost more than the sums. ``width`` is a multiple of `LANES`; nothing is checked.
     """
 
     def lower(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        table, values, out = (
-            context.make_array(kind)(context, builder, value).data
-            for kind, value in zip(signature.args, args, strict=True)
-        )
+        table, values, out = (context.make_array(signature.args[k])(context, builder, args[k]).data for k in (0, 1, 3))
+        values, out = builder.gep(values, [args[2]]), builder.gep(out, [args[4]])
 
         def lanes(base: Any, offset: int) -> Any:
             place = builder.gep(base, [ir.Constant(_INDEX, offset)])
@@ -45,16 +44,16 @@ def columns(rows: int, width: int) -> Any:
         return context.get_dummy_value()
 
     @intrinsic
-    def sums(_, table, values, out):  # type: ignore[no-untyped-def]
-        """``out = values @ table``."""
+    def sums(_, table, values, at, out, to):  # type: ignore[no-untyped-def]
+        """``out[to:] = values[at:] @ table``."""
         assert all(array.layout == "C" for array in (table, values, out))
-        return types.void(table, values, out), lower
+        return types.void(table, values, types.intp, out, types.intp), lower
 
     return sums
 
 
 def span(count: int) -> Any:
-    """A compiled function ``f(values)``: the least and the greatest of ``count`` numbers, a multiple of four.
+    """A compiled function ``f(values, at)``: the least and the greatest of ``count`` numbers, a multiple of four.
 
     What is not a number may be passed over.
     """
@@ -62,7 +61,7 @@ def span(count: int) -> Any:
 
     def lower(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         kind = signature.args[0]
-        values = context.make_array(kind)(context, builder, args[0]).data
+        values = builder.gep(context.make_array(kind)(context, builder, args[0]).data, [args[1]])
 
         def part(at: int) -> Any:
             place = builder.gep(values, [ir.Constant(_INDEX, 4 * at)])
@@ -81,8 +80,8 @@ def span(count: int) -> Any:
         return context.make_tuple(builder, signature.return_type, ends)
 
     @intrinsic
-    def least_and_greatest(_, values):  # type: ignore[no-untyped-def]
+    def least_and_greatest(_, values, at):  # type: ignore[no-untyped-def]
         """The least and the greatest."""
-        return types.UniTuple(types.float64, 2)(values), lower
+        return types.UniTuple(types.float64, 2)(values, types.intp), lower
 
     return least_and_greatest
