@@ -11,6 +11,7 @@ from gqm_sym.runtime import legs
 from gqm_sym.runtime.course import ZERO, Course, Pair, Piece
 from gqm_sym.runtime.doubledouble import two_sum
 from gqm_sym.runtime.entries import frame_at, from_rest
+from gqm_sym.runtime.events import passages
 from gqm_sym.runtime.formulas import Formulas, Given, Launch
 from gqm_sym.runtime.leg_stretches import along_field, along_panels
 from gqm_sym.runtime.motion import Motion
@@ -193,7 +194,7 @@ class Dissipative(Motion):
         done = 0
         while True:
             course = self._course(0.0)
-            found = self._passages(course.pieces[done:], course, lam, low)
+            found = passages(course.pieces[done:], course, lam, low)
             done = len(course.pieces)
             # What turns between two points comes back to no place outside them.
             settled = self._turns >= 2 or (self._turns and self.problem.w0 == 0.0)

@@ -1,13 +1,15 @@
 """Stretches of a dissipative motion, from the panels of its legs."""
 
-from functools import lru_cache
 from math import inf
 
 import numpy as np
+from numba import types
 
-from gqm_sym.runtime.chebyshev import COUNT, TO_COEFFICIENTS
+from gqm_sym.runtime.chebyshev import COUNT, TO_COEFFICIENTS, WIDE, to_ends
 from gqm_sym.runtime.clocks import Array
 from gqm_sym.runtime.integrands import FROM_TURN, REGULAR, TO_EQUILIBRIUM
+from gqm_sym.runtime.jit import entry
+from gqm_sym.runtime.leg_panels import COLUMNS
 from gqm_sym.runtime.panels import CONVERGED, DEGREE
 from gqm_sym.runtime.stretch import ULP, Functions, Stretch
 
@@ -15,12 +17,11 @@ from gqm_sym.runtime.stretch import ULP, Functions, Stretch
 CLOSEST = 690.0
 
 
-@lru_cache(maxsize=1)
 def _to_legendre() -> tuple[Array, Array]:
     """Legendre coefficients of a function on [-1, 1], and of its integral from -1, from values at a panel's nodes."""
     # x P_j = ((j + 1) P_(j+1) + j P_(j-1))/(2 j + 1), and T_(k+1) = 2 x T_k - T_(k-1).
-    j = np.arange(DEGREE + 2)
-    series = np.zeros((COUNT, DEGREE + 2))
+    j = np.arange(WIDE)
+    series = np.zeros((COUNT, WIDE))
     series[0, 0] = series[1, 1] = 1.0
     for k in range(2, COUNT):
         row = series[k - 1]
@@ -28,11 +29,52 @@ def _to_legendre() -> tuple[Array, Array]:
         series[k, :-1] += 2.0 * (j[1:] / (2 * j[1:] + 1)) * row[1:]
         series[k] -= series[k - 2]
     plain = TO_COEFFICIENTS.T @ series
-    integral = np.empty((COUNT, DEGREE))
+    integral = np.zeros((COUNT, WIDE))
     integral[:, 0] = plain[:, 0] - plain[:, 1] / 3.0
     i = np.arange(1, DEGREE)
-    integral[:, 1:] = plain[:, i - 1] / (2 * i - 1) - plain[:, i + 1] / (2 * i + 3)
-    return np.ascontiguousarray(plain[:, :DEGREE]), integral
+    integral[:, 1:DEGREE] = plain[:, i - 1] / (2 * i - 1) - plain[:, i + 1] / (2 * i + 3)
+    return np.ascontiguousarray(plain), integral
+
+
+PLAIN_BY_NODE, INTEGRAL_BY_NODE = _to_legendre()
+
+_LINE = types.float64[::1]
+_ROWS = types.float64[:, ::1]
+
+
+@entry(types.Tuple((_LINE, _LINE, _LINE, _ROWS, _ROWS, _ROWS, types.float64))(_ROWS, types.float64))
+def read_panels(panels, time):  # type: ignore[no-untyped-def]
+    """What `panels.lay` would have of a leg's panels, whose times add up to ``time``.
+
+    Returns
+    -------
+    edges, times, lengths, time_terms, length_terms : arrays
+        As `panels.lay` has them; the last anomaly is 1.
+    speed_terms : (n, DEGREE) array
+        Legendre coefficients of Y.
+    error : float
+        Estimated relative error of the time.
+    """
+    n = panels.shape[0]
+    edges, times, lengths = np.zeros(n + 1), np.zeros(n + 1), np.zeros(n + 1)
+    time_terms, length_terms, speed_terms = np.empty((n, DEGREE)), np.empty((n, DEGREE)), np.empty((n, DEGREE))
+    out, error, last = np.empty(3 * WIDE), 0.0, panels[n - 1, 0]
+    for k in range(n):
+        half = 0.5 * (panels[k, 0] - (panels[k - 1, 0] if k > 0 else 0.0))
+        at = k * COLUMNS + 3
+        to_ends(INTEGRAL_BY_NODE, panels, at, out, 0)
+        to_ends(INTEGRAL_BY_NODE, panels, at + COUNT, out, WIDE)
+        to_ends(PLAIN_BY_NODE, panels, at + 2 * COUNT, out, 2 * WIDE)
+        length = 0.0
+        for j in range(DEGREE):
+            time_terms[k, j], length_terms[k, j] = half * out[j], half * out[WIDE + j]
+            speed_terms[k, j] = out[2 * WIDE + j]
+            length += length_terms[k, j]
+        edges[k + 1] = panels[k, 0] / last
+        times[k + 1], lengths[k + 1] = times[k] + panels[k, 1], lengths[k] + length
+        error += panels[k, 2]
+    times[n] = time
+    return edges, times, lengths, time_terms, length_terms, speed_terms, error / time + ULP if time > 0.0 else ULP
 
 
 def along_panels(f: Functions, a: float, b: float, slack: float, time: float, panels: Array) -> Stretch:
@@ -40,24 +82,16 @@ def along_panels(f: Functions, a: float, b: float, slack: float, time: float, pa
 
     ``slack`` is c/2 of their march variable, infinite where that is the distance.
     """
-    plain, integral = _to_legendre()
-    rights = panels[:, 0]
-    last = float(rights[-1])
-    halves = 0.5 * np.diff(rights, prepend=0.0)[:, None]
-    pace, arc, speed = (panels[:, 3 + k * COUNT : 3 + (k + 1) * COUNT] for k in range(3))
-    time_terms, length_terms = halves * (pace @ integral), halves * (arc @ integral)
-    edges, times, lengths = np.zeros((3, len(panels) + 1))
-    edges[1:], times[1:], lengths[1:] = rights / last, panels[:, 1].cumsum(), length_terms.sum(axis=1).cumsum()
-    times[-1] = time
-    error = float(panels[:, 2].sum()) / time + ULP if time > 0.0 else ULP
+    *laid, speed_terms, error = read_panels(panels, time)
+    last = float(panels[-1, 0])
     return Stretch(
         functions=f,
         kind=REGULAR if slack == inf else FROM_TURN,
         a=a,
         b=b,
         slack=0.0 if slack == inf else slack / last,
-        laid=(edges, times, lengths, time_terms, length_terms, error, 1.0, CONVERGED),
-        paces=(last, speed @ plain),
+        laid=(*laid, error, 1.0, CONVERGED),
+        paces=(last, speed_terms),
     )
 
 

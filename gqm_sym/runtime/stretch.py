@@ -2,12 +2,13 @@
 
 from copy import copy
 from dataclasses import dataclass, field
-from math import atan2, inf, log, pi, sqrt
+from math import inf
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from gqm_sym.errors import SolutionError
+from gqm_sym.runtime.anomalies import anomaly_of, places
 from gqm_sym.runtime.clocks import Array as Array
 from gqm_sym.runtime.clocks import running_totals, slopes
 from gqm_sym.runtime.conditioning import magnified, off_launch
@@ -287,32 +288,12 @@ class Stretch:
 
     def anomaly_of(self, offset_a: float, offset_b: float) -> float:
         """The anomaly of a place given by its signed offsets ``lam - a`` and ``b - lam``."""
-        share_a, share_b = max(offset_a * self.direction, 0.0), max(offset_b * self.direction, 0.0)
-        if self.kind == TURN_TURN:
-            return 2.0 * atan2(sqrt(share_a), sqrt(share_b))
-        whole = abs(self.b - self.a)
-        if self.kind == TO_EQUILIBRIUM:
-            return -log(share_b / whole) if share_b > 0.0 else inf
-        share = share_a / whole if share_a <= share_b else 1.0 - share_b / whole
-        if self.kind == REGULAR or share <= 0.0:
-            return share
-        most = share * (1.0 + 2.0 * self.slack)
-        return most / (self.slack + sqrt(self.slack**2 + most))
+        ahead, behind = max(offset_a * self.direction, 0.0), max(offset_b * self.direction, 0.0)
+        return anomaly_of(self.kind, self.slack, ahead, behind, abs(self.b - self.a))
 
     def places(self, phi: Array) -> Array:
         """The curve's parameter at anomalies, from the nearer end."""
-        width = self.b - self.a
-        if self.kind == TURN_TURN:
-            near = phi < 0.5 * pi
-            return np.where(
-                near,
-                self.a + width * np.sin(0.5 * phi) ** 2,
-                self.b - width * np.cos(0.5 * phi) ** 2,
-            )
-        if self.kind == TO_EQUILIBRIUM:
-            return self.b - width * np.exp(-phi)
-        share = phi * (phi + 2.0 * self.slack) / (1.0 + 2.0 * self.slack) if self.kind == FROM_TURN else phi
-        return np.where(share <= 0.5, self.a + width * share, self.b - width * (1.0 - share))
+        return places(self.kind, self.slack, self.a, self.b, phi)
 
     def speeds(self, phi: Array) -> Array:
         """|ds/dt| at anomalies."""
