@@ -5,7 +5,7 @@ VENV    := .venv
 BIN     := $(VENV)/bin
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test lint generate docs soak fuzz bench
+.PHONY: help demo test lint generate docs soak fuzz bench mutate
 
 help: ## show this list
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-9s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -36,6 +36,10 @@ soak: $(VENV)/.run ## solve random launches and hold each motion to its laws (CO
 
 fuzz: $(VENV)/.run ## read mutated files and expressions for ten minutes (SECONDS, SEED)
 	$(BIN)/python scripts/fuzz.py $(or $(SECONDS),600) $(or $(SEED),0)
+
+mutate: $(VENV)/.dev ## change the code at random and list the changes that no test notices (COUNT, SEED)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check 'coverage>=7.6'
+	$(BIN)/python scripts/mutate.py $(or $(COUNT),300) $(or $(SEED),0)
 
 bench: $(VENV)/.bench ## time each stage, and set accuracy and time beside the alternatives' (docs/benchmarks.md)
 	$(BIN)/python benchmarks/stages.py

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "circle_rotating". Do not edit: change its declaration and generate again.
-# interface 2, input 4ab613b0cbfb, body 602d96ef12ef
+# interface 3, input 4ab613b0cbfb, body ef9ab333618f
 """Bead on a hoop that turns about its vertical diameter
 
 x              = L*sin(theta)
@@ -18,7 +18,6 @@ turning points : -L*(L*Omega**2*sin(lam0)**2 + 2*g*cos(lam0)) + L*(L*Omega**2*si
 liftoff        : L*Omega**2*sin(theta)**2 + g*cos(theta) + (-L*(L*Omega**2*sin(lam0)**2 + 2*g*cos(lam0)) + L*(L*Omega**2*sin(theta)**2 + 2*g*cos(theta)) + v0**2)/L = 0
 """
 
-from math import cos, sin
 from typing import Any
 
 from numba import carray
@@ -26,7 +25,7 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=2)
+compiled = compiler(__file__, interface=3)
 
 from gqm_sym.runtime import (
     BEND,
@@ -42,6 +41,7 @@ from gqm_sym.runtime import (
     Sweep,
 )
 from gqm_sym.runtime.differences import cos1, cos2, sin1, sin2
+from gqm_sym.runtime.elementary import cos, sin
 from gqm_sym.runtime.intervals import iadd, iconst, icos, imul, ipow, isin
 from gqm_sym.runtime.places import nearest
 
@@ -256,6 +256,9 @@ def sweep(
     direction: Any = 1,
     *,
     lam: Any = None,
+    t_max: Any = None,
+    contact: str = "bilateral",
+    client: Any = None,
     L: Any = '1', Omega: Any = '4', g: Any = '9.81', m: Any = '1',
 ) -> Sweep:
     """One quantity over arrays of launches and parameters, on all cores; all arguments broadcast.
@@ -264,11 +267,15 @@ def sweep(
     ----------
     quantity : str
         "half_period", "period", "turning_points" (the lower, the upper: one more axis), "v_min", "v_max",
-        "normal_force_min", "normal_force_max" or "time_at".
+        "normal_force_min", "normal_force_max", "time_at", "t_end" or "rest_position".
     lam0, v0, direction
         Launch places, speeds and directions.
     lam
         For "time_at": the place, of which the first time there is asked.
+    t_max, contact
+        One for all launches, as of ``solve``.
+    client : distributed.Client, optional
+        A Dask cluster to do the work, with the same results.
     L, Omega, g, m
         Run-time parameters; `PARAMETERS` holds their defaults.
 
@@ -277,4 +284,4 @@ def sweep(
     Sweep
         ``values``, NaN where there is none, and ``reasons``, 0 where there is one; ``why()`` counts the others.
     """
-    return MODEL.sweep(quantity, lam0, v0, direction, lam, (L, Omega, g, m,))
+    return MODEL.sweep(quantity, lam0, v0, direction, lam, t_max, contact, (L, Omega, g, m,), client, __file__)

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "ellipse_drag". Do not edit: change its declaration and generate again.
-# interface 2, input 85e32f4b5095, body 2ba9820631e0
+# interface 3, input 85e32f4b5095, body 97567afea305
 """Bead on an ellipse, in air
 
 x              = a*cos(theta)
@@ -19,7 +19,7 @@ liftoff        : W*a*b/(a**2*sin(theta)**2 + b**2*cos(theta)**2)**(3/2) - a*g*si
 V**2: spectral antiderivative, no elementary form found; direction is the sign of ds/dt
 """
 
-from math import cos, sin, sqrt
+from math import sqrt
 from typing import Any
 
 from numba import carray
@@ -27,7 +27,7 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=2)
+compiled = compiler(__file__, interface=3)
 
 from gqm_sym.runtime import (
     DRIVE,
@@ -40,6 +40,7 @@ from gqm_sym.runtime import (
     Pass1,
     Sweep,
 )
+from gqm_sym.runtime.elementary import cos, sin
 
 PARAMETERS = {
     'a': '1.5',
@@ -189,6 +190,9 @@ def sweep(
     direction: Any = 1,
     *,
     lam: Any = None,
+    t_max: Any = None,
+    contact: str = "bilateral",
+    client: Any = None,
     a: Any = '1.5', b: Any = '1', b_air: Any = '0.3', g: Any = '9.81', m: Any = '2',
 ) -> Sweep:
     """One quantity over arrays of launches and parameters, on all cores; all arguments broadcast.
@@ -197,11 +201,15 @@ def sweep(
     ----------
     quantity : str
         "half_period", "period", "turning_points" (the lower, the upper: one more axis), "v_min", "v_max",
-        "normal_force_min", "normal_force_max" or "time_at".
+        "normal_force_min", "normal_force_max", "time_at", "t_end" or "rest_position".
     lam0, v0, direction
         Launch places, speeds and directions.
     lam
         For "time_at": the place, of which the first time there is asked.
+    t_max, contact
+        One for all launches, as of ``solve``.
+    client : distributed.Client, optional
+        A Dask cluster to do the work, with the same results.
     a, b, b_air, g, m
         Run-time parameters; `PARAMETERS` holds their defaults.
 
@@ -210,4 +218,4 @@ def sweep(
     Sweep
         ``values``, NaN where there is none, and ``reasons``, 0 where there is one; ``why()`` counts the others.
     """
-    return MODEL.sweep(quantity, lam0, v0, direction, lam, (a, b, b_air, g, m,))
+    return MODEL.sweep(quantity, lam0, v0, direction, lam, t_max, contact, (a, b, b_air, g, m,), client, __file__)

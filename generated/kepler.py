@@ -1,5 +1,5 @@
 # Made by gqm-gen for "kepler". Do not edit: change its declaration and generate again.
-# interface 2, input a1e1feaf475b, body 8a0dbc889c23
+# interface 3, input a1e1feaf475b, body 125c80b6d4bd
 """Planet on its own ellipse, by the eccentric anomaly
 
 x              = a*(-ecc + cos(E))
@@ -17,7 +17,7 @@ turning points : 2*k*(-1/sqrt((1 - ecc**2)*sin(lam0)**2 + (-ecc + cos(lam0))**2)
 liftoff        : sqrt(1 - ecc**2)*(2*k*(-1/sqrt((1 - ecc**2)*sin(lam0)**2 + (-ecc + cos(lam0))**2) + 1/sqrt((1 - ecc**2)*sin(E)**2 + (-ecc + cos(E))**2))/Abs(a) + v0**2)/(a*((1 - ecc**2)*cos(E)**2 + sin(E)**2)**(3/2)) - k*sqrt(1 - ecc**2)*((-ecc + cos(E))*cos(E) + sin(E)**2)*Abs(a)/(a**3*((1 - ecc**2)*sin(E)**2 + (-ecc + cos(E))**2)**(3/2)*sqrt((1 - ecc**2)*cos(E)**2 + sin(E)**2)) = 0
 """
 
-from math import cos, fabs, sin, sqrt
+from math import fabs, sqrt
 from typing import Any
 
 from numba import carray
@@ -25,7 +25,7 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=2)
+compiled = compiler(__file__, interface=3)
 
 from gqm_sym.runtime import (
     BEND,
@@ -41,6 +41,7 @@ from gqm_sym.runtime import (
     Sweep,
 )
 from gqm_sym.runtime.differences import cos1, cos2, sin1, sin2
+from gqm_sym.runtime.elementary import cos, sin
 from gqm_sym.runtime.intervals import iabs, iadd, iconst, icos, imul, ipow, isin, isqrt
 from gqm_sym.runtime.places import nearest
 
@@ -319,6 +320,9 @@ def sweep(
     direction: Any = 1,
     *,
     lam: Any = None,
+    t_max: Any = None,
+    contact: str = "bilateral",
+    client: Any = None,
     a: Any = '3/2', ecc: Any = '3/5', k: Any = '7/2', m: Any = '1',
 ) -> Sweep:
     """One quantity over arrays of launches and parameters, on all cores; all arguments broadcast.
@@ -327,11 +331,15 @@ def sweep(
     ----------
     quantity : str
         "half_period", "period", "turning_points" (the lower, the upper: one more axis), "v_min", "v_max",
-        "normal_force_min", "normal_force_max" or "time_at".
+        "normal_force_min", "normal_force_max", "time_at", "t_end" or "rest_position".
     lam0, v0, direction
         Launch places, speeds and directions.
     lam
         For "time_at": the place, of which the first time there is asked.
+    t_max, contact
+        One for all launches, as of ``solve``.
+    client : distributed.Client, optional
+        A Dask cluster to do the work, with the same results.
     a, ecc, k, m
         Run-time parameters; `PARAMETERS` holds their defaults.
 
@@ -340,4 +348,4 @@ def sweep(
     Sweep
         ``values``, NaN where there is none, and ``reasons``, 0 where there is one; ``why()`` counts the others.
     """
-    return MODEL.sweep(quantity, lam0, v0, direction, lam, (a, ecc, k, m,))
+    return MODEL.sweep(quantity, lam0, v0, direction, lam, t_max, contact, (a, ecc, k, m,), client, __file__)

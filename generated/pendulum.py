@@ -1,5 +1,5 @@
 # Made by gqm-gen for "pendulum". Do not edit: change its declaration and generate again.
-# interface 2, input abbc42e6e84e, body ed343bb0d738
+# interface 3, input abbc42e6e84e, body 83ff602d67d0
 """Simple pendulum, angle from the horizontal
 
 x              = L*cos(theta)
@@ -17,7 +17,6 @@ turning points : 2*L*g*(sin(lam0) - sin(theta)) + v0**2 = 0
 liftoff        : -g*sin(theta) + (2*L*g*(sin(lam0) - sin(theta)) + v0**2)/L = 0
 """
 
-from math import cos, sin
 from typing import Any
 
 from numba import carray
@@ -25,7 +24,7 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=2)
+compiled = compiler(__file__, interface=3)
 
 from gqm_sym.runtime import (
     BEND,
@@ -41,6 +40,7 @@ from gqm_sym.runtime import (
     Sweep,
 )
 from gqm_sym.runtime.differences import sin1, sin2
+from gqm_sym.runtime.elementary import cos, sin
 from gqm_sym.runtime.intervals import iconst, icos, imul
 from gqm_sym.runtime.places import nearest
 
@@ -243,6 +243,9 @@ def sweep(
     direction: Any = 1,
     *,
     lam: Any = None,
+    t_max: Any = None,
+    contact: str = "bilateral",
+    client: Any = None,
     L: Any = '1', g: Any = '9.81', m: Any = '1',
 ) -> Sweep:
     """One quantity over arrays of launches and parameters, on all cores; all arguments broadcast.
@@ -251,11 +254,15 @@ def sweep(
     ----------
     quantity : str
         "half_period", "period", "turning_points" (the lower, the upper: one more axis), "v_min", "v_max",
-        "normal_force_min", "normal_force_max" or "time_at".
+        "normal_force_min", "normal_force_max", "time_at", "t_end" or "rest_position".
     lam0, v0, direction
         Launch places, speeds and directions.
     lam
         For "time_at": the place, of which the first time there is asked.
+    t_max, contact
+        One for all launches, as of ``solve``.
+    client : distributed.Client, optional
+        A Dask cluster to do the work, with the same results.
     L, g, m
         Run-time parameters; `PARAMETERS` holds their defaults.
 
@@ -264,4 +271,4 @@ def sweep(
     Sweep
         ``values``, NaN where there is none, and ``reasons``, 0 where there is one; ``why()`` counts the others.
     """
-    return MODEL.sweep(quantity, lam0, v0, direction, lam, (L, g, m,))
+    return MODEL.sweep(quantity, lam0, v0, direction, lam, t_max, contact, (L, g, m,), client, __file__)

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "quartic". Do not edit: change its declaration and generate again.
-# interface 2, input e1ff78064d31, body 55c072836cd3
+# interface 3, input e1ff78064d31, body 5ea8c92a5e39
 """Bead in a quartic bowl
 
 x              = x
@@ -25,7 +25,7 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=2)
+compiled = compiler(__file__, interface=3)
 
 from gqm_sym.runtime import (
     BEND,
@@ -235,6 +235,9 @@ def sweep(
     direction: Any = 1,
     *,
     lam: Any = None,
+    t_max: Any = None,
+    contact: str = "bilateral",
+    client: Any = None,
     g: Any = '9.81', m: Any = '1',
 ) -> Sweep:
     """One quantity over arrays of launches and parameters, on all cores; all arguments broadcast.
@@ -243,11 +246,15 @@ def sweep(
     ----------
     quantity : str
         "half_period", "period", "turning_points" (the lower, the upper: one more axis), "v_min", "v_max",
-        "normal_force_min", "normal_force_max" or "time_at".
+        "normal_force_min", "normal_force_max", "time_at", "t_end" or "rest_position".
     lam0, v0, direction
         Launch places, speeds and directions.
     lam
         For "time_at": the place, of which the first time there is asked.
+    t_max, contact
+        One for all launches, as of ``solve``.
+    client : distributed.Client, optional
+        A Dask cluster to do the work, with the same results.
     g, m
         Run-time parameters; `PARAMETERS` holds their defaults.
 
@@ -256,4 +263,4 @@ def sweep(
     Sweep
         ``values``, NaN where there is none, and ``reasons``, 0 where there is one; ``why()`` counts the others.
     """
-    return MODEL.sweep(quantity, lam0, v0, direction, lam, (g, m,))
+    return MODEL.sweep(quantity, lam0, v0, direction, lam, t_max, contact, (g, m,), client, __file__)

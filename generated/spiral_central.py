@@ -1,5 +1,5 @@
 # Made by gqm-gen for "spiral_central". Do not edit: change its declaration and generate again.
-# interface 2, input a75a85ae8f6e, body a472ccab260c
+# interface 3, input a75a85ae8f6e, body 337940d7b716
 """Bead on a logarithmic spiral, drawn to its pole
 
 x              = r0*exp(b*theta)*cos(theta)
@@ -17,7 +17,7 @@ turning points : 2*k*(exp(-b*theta)/sqrt(sin(theta)**2 + cos(theta)**2) - exp(-b
 liftoff        : k*(-(b*sin(theta) + cos(theta))*cos(theta) + (b*cos(theta) - sin(theta))*sin(theta))*exp(-2*b*theta)*Abs(r0)/(r0**3*sqrt(b**2 + 1)*(sin(theta)**2 + cos(theta)**2)**(3/2)) + (2*k*(exp(-b*theta)/sqrt(sin(theta)**2 + cos(theta)**2) - exp(-b*lam0)/sqrt(sin(lam0)**2 + cos(lam0)**2))/Abs(r0) + v0**2)*exp(-b*theta)/(r0*sqrt(b**2 + 1)) = 0
 """
 
-from math import cos, exp, fabs, sin, sqrt
+from math import exp, fabs, sqrt
 from typing import Any
 
 from numba import carray
@@ -25,7 +25,7 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=2)
+compiled = compiler(__file__, interface=3)
 
 from gqm_sym.runtime import (
     BEND,
@@ -41,6 +41,7 @@ from gqm_sym.runtime import (
     Sweep,
 )
 from gqm_sym.runtime.differences import cos1, cos2, exp1, exp2, sin1, sin2
+from gqm_sym.runtime.elementary import cos, sin
 from gqm_sym.runtime.intervals import iabs, iadd, iconst, icos, iexp, imul, ipow, isin, isqrt
 from gqm_sym.runtime.places import nearest
 
@@ -316,6 +317,9 @@ def sweep(
     direction: Any = 1,
     *,
     lam: Any = None,
+    t_max: Any = None,
+    contact: str = "bilateral",
+    client: Any = None,
     r0: Any = '1', b: Any = '0.15', k: Any = '2', m: Any = '1',
 ) -> Sweep:
     """One quantity over arrays of launches and parameters, on all cores; all arguments broadcast.
@@ -324,11 +328,15 @@ def sweep(
     ----------
     quantity : str
         "half_period", "period", "turning_points" (the lower, the upper: one more axis), "v_min", "v_max",
-        "normal_force_min", "normal_force_max" or "time_at".
+        "normal_force_min", "normal_force_max", "time_at", "t_end" or "rest_position".
     lam0, v0, direction
         Launch places, speeds and directions.
     lam
         For "time_at": the place, of which the first time there is asked.
+    t_max, contact
+        One for all launches, as of ``solve``.
+    client : distributed.Client, optional
+        A Dask cluster to do the work, with the same results.
     r0, b, k, m
         Run-time parameters; `PARAMETERS` holds their defaults.
 
@@ -337,4 +345,4 @@ def sweep(
     Sweep
         ``values``, NaN where there is none, and ``reasons``, 0 where there is one; ``why()`` counts the others.
     """
-    return MODEL.sweep(quantity, lam0, v0, direction, lam, (r0, b, k, m,))
+    return MODEL.sweep(quantity, lam0, v0, direction, lam, t_max, contact, (r0, b, k, m,), client, __file__)

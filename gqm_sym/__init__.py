@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from gqm_sym.runtime import figures
     from gqm_sym.runtime.least import least_speed
     from gqm_sym.specfile import read_spec
+    from gqm_sym.sweeps import read_sweep
 
 __version__ = "0.1.0"
 
@@ -52,6 +53,7 @@ _HOMES = {
     "least_speed": "gqm_sym.runtime.least",
     "line": "gqm_sym.declare",
     "read_spec": "gqm_sym.specfile",
+    "read_sweep": "gqm_sym.sweeps",
 }
 
 __all__ = [
@@ -77,6 +79,7 @@ __all__ = [
     "least_speed",
     "line",
     "read_spec",
+    "read_sweep",
 ]
 
 

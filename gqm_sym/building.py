@@ -15,13 +15,15 @@ import difflib
 import importlib.util
 import os
 import tempfile
-from importlib.machinery import SourceFileLoader
 from pathlib import Path
-from types import CodeType, ModuleType
+from types import ModuleType
 
 from gqm_sym.derivation import Model
 from gqm_sym.emission import body_digests, emit
 from gqm_sym.errors import HandEditedError, InputError
+from gqm_sym.loading import load
+
+__all__ = ["build", "difference", "load", "write_bytes", "write_module", "write_text"]
 
 FOLDER = "generated"
 
@@ -74,13 +76,18 @@ def write_module(text: str, path: str | os.PathLike[str], *, force: bool = False
 
 
 def write_text(text: str, path: str | os.PathLike[str]) -> None:
-    """Write a text file, whole or not at all: to a neighbour first, which then takes its place."""
+    """Write a text file, whole or not at all."""
+    write_bytes(text.encode("utf-8"), path)
+
+
+def write_bytes(data: bytes, path: str | os.PathLike[str]) -> None:
+    """Write a file, whole or not at all: to a neighbour first, which then takes its place."""
     target = Path(path)
     target.parent.mkdir(parents=True, exist_ok=True)
     handle, temporary = tempfile.mkstemp(prefix=f".{target.name}.", suffix=".tmp", dir=target.parent)
     try:
-        with os.fdopen(handle, "w", encoding="utf-8", newline="\n") as stream:
-            stream.write(text)
+        with os.fdopen(handle, "wb") as stream:
+            stream.write(data)
             stream.flush()
             os.fsync(stream.fileno())
         Path(temporary).chmod(0o666 & ~_umask())
@@ -101,26 +108,6 @@ def difference(text: str, path: str | os.PathLike[str]) -> str:
         f"{target} (generated)",
     )
     return "".join(lines)
-
-
-class _Source(SourceFileLoader):
-    """Reads the source always: Python tells what it cached apart by size and whole seconds alone."""
-
-    def get_code(self, fullname: str) -> CodeType:
-        path = self.get_filename(fullname)
-        code: CodeType = self.source_to_code(self.get_data(path), path)
-        return code
-
-
-def load(path: str | os.PathLike[str], name: str) -> ModuleType:
-    """Import a generated module from its file, anew."""
-    location = Path(path).resolve()
-    spec = importlib.util.spec_from_file_location(name, location, loader=_Source(name, str(location)))
-    if spec is None or spec.loader is None or not location.is_file():
-        raise InputError(f"{path}: is no generated module; run gqm-gen to write it")
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
 
 
 def _read(path: Path) -> str:

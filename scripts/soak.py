@@ -1,8 +1,9 @@
 """Solve random launches of the committed modules and hold each motion to its laws: ``soak.py [COUNT] [SEED]``.
 
 Launch, speed, direction and parameters are drawn at random. A solve may be refused by a GQMError (a launch outside the
-domain, for one); a motion that is given must keep its energy, its order, its period and its error bounds. What fails is
-printed as the call that shows it again. Memory is reported at a tenth of the run and at its end.
+domain, for one); a motion that is given must keep its energy, its order, its period and its error bounds, and a sweep
+over launches around it must give the same period. What fails is printed as the call that shows it again. Memory is
+reported at a tenth of the run and at its end.
 """
 
 import math
@@ -17,6 +18,7 @@ from types import ModuleType
 from typing import Any
 
 import numpy as np
+from mpmath import mp, mpf
 
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
@@ -26,6 +28,10 @@ from gqm_sym.errors import GQMError  # noqa: E402
 NAMES = sorted(path.stem for path in (ROOT / "generated").glob("*.py"))
 # Of the largest V**2 on the way, and of a place of the curve: many roundings, and far above those of a right motion.
 ENERGY = 1e-11
+# Periods of a sweep against those of the motions, relative: four units in the last place.
+SWEPT = 4.0 * 2.0**-52
+# One motion in so many is compared with a sweep.
+SWEEPS = 8
 # Places and times against bounds that the motion states: a factor for what is not bounded, the formulas' rounding.
 SLACK = 4.0
 PLACE = 1e-12
@@ -67,11 +73,11 @@ def faults(module: ModuleType, call: dict[str, Any], draw: random.Random) -> lis
     lam, v2 = values[0], values[4]
     legs = motion.legs
     launch = {**call, "direction": legs[0].direction}
-    speeds = module.pass1(lam, **launch)
-    told, ds = speeds.v2, speeds.ds
+    ds = module.pass1(lam, **launch).ds
     # Near a place of rest a place's last bit is much of V**2, and of the way there.
     bit = 2.0 * np.spacing(np.abs(lam))
-    unsure = sum(np.abs(module.pass1(lam + side * bit, **launch).v2 - told) for side in (-1.0, 1.0))
+    told, *beside = (speed_squared(module, lam + side * bit, launch) for side in (0.0, -1.0, 1.0))
+    unsure = sum(np.abs(other - told) for other in beside)
     late = SLACK * bit * ds / np.maximum(np.abs(values[3]), 1e-300)
     most = max(call["v0"] ** 2, float(np.nanmax(np.abs(told))), float(np.max(v2)))
     # With losses V**2 depends on the way, and pass 1 tells that of the first leg.
@@ -92,6 +98,8 @@ def faults(module: ModuleType, call: dict[str, Any], draw: random.Random) -> lis
         if np.any(-leg.direction * steps > PLACE * size):
             found.append("not monotone on a leg")
     if motion.kind == "libration":
+        if module.MODEL.dissipation is None and draw.random() < 1.0 / SWEEPS:
+            found += swept(module, call, motion.period)
         again = np.asarray(motion.lam(t + span))
         allowed = SLACK * (bound + np.asarray(motion.error_bound(t + span))) + PLACE * size
         rate = np.abs(np.asarray(state.v)) * np.spacing(span) / np.maximum(ds, 1e-300)
@@ -102,6 +110,27 @@ def faults(module: ModuleType, call: dict[str, Any], draw: random.Random) -> lis
     if first > t[middle] + 1e-9 * span + late[middle]:
         found.append(f"first passage late by {first - t[middle]:.1e}")
     return found
+
+
+def speed_squared(module: ModuleType, lam: Any, launch: dict[str, Any]) -> Any:
+    """V**2 at places by another way than the motion's: in extended precision where there are formulas, else by pass 1.
+
+    Launched slowly from the bottom of a well, pass 1 has V**2 to a rounding of its parts, which are far larger.
+    """
+    exact = module.MODEL.exact
+    if module.MODEL.dissipation is not None or not hasattr(exact, "climb"):
+        return module.pass1(lam, **launch).v2
+    with mp.workdps(40):
+        p = tuple(mpf(launch[name]) for name in module.PARAMETERS)
+        start = mpf(launch["v0"]) ** 2 + exact.climb(mp, mpf(launch["lam0"]), p)
+        return np.array([float(start - exact.climb(mp, mpf(float(place)), p)) for place in lam])
+
+
+def swept(module: ModuleType, call: dict[str, Any], period: float) -> list[str]:
+    """Say whether a sweep over launches, of which this is one, gives another period."""
+    around = {**call, "lam0": call["lam0"] * np.array([1.0, 1.0 - 1e-9, 1.0 + 1e-6])}
+    found = module.sweep("period", **around).values[0]
+    return [] if abs(found - period) <= SWEPT * period else [f"swept period {found!r} by {found / period - 1.0:.1e}"]
 
 
 def resident() -> float:

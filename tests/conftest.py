@@ -6,6 +6,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+import numba
 import pytest
 from hypothesis import settings
 from problems import PROBLEMS, TRACKS, Problem
@@ -13,6 +14,11 @@ from problems import PROBLEMS, TRACKS, Problem
 # The first example of a test may compile for seconds; and a failure must show again.
 settings.register_profile("suite", deadline=None, derandomize=True, print_blob=True)
 settings.load_profile("suite")
+
+if numba.config.DISABLE_JIT:
+    import uncompiled
+
+    uncompiled.install()
 
 
 @pytest.fixture(scope="session")

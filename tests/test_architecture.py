@@ -13,7 +13,7 @@ PACKAGE = Path(__file__).parent.parent / "gqm_sym"
 # From the top down: a unit imports itself and units of the layers under its own.
 LAYERS = (
     {"cli"},
-    {"report"},
+    {"report", "sweeps"},
     {"building", "specfile"},
     {"emission"},
     {"derivation"},
@@ -25,7 +25,7 @@ LAYERS = (
     {"grammar", "enclosures", "angles"},
     {"trees"},
     {"rationals"},
-    {"budgets"},
+    {"budgets", "loading"},
     {"errors"},
 )
 
@@ -34,15 +34,16 @@ KNOWS_NO_RUNTIME = {"emission", "derivation", "declare", "kernels", "parameters"
 
 # Packages that only some units import.
 ONLY_IN = {
+    "distributed": {"runtime"},
     "jinja2": {"emission"},
     "llvmlite": {"runtime"},
     "matplotlib": {"runtime", "report"},
     "mpmath": {"runtime", "enclosures"},
     "numba": {"runtime"},
-    "numpy": {"runtime"},
+    "numpy": {"runtime", "sweeps"},
     "pint": {"specfile"},
-    "pydantic": {"specfile"},
-    "pydantic_core": {"specfile"},
+    "pydantic": {"specfile", "sweeps"},
+    "pydantic_core": {"specfile", "sweeps"},
     "ruamel": {"specfile"},
     "scipy": {"runtime"},
     "sympy": {
@@ -57,11 +58,11 @@ ONLY_IN = {
         "expressions",
         "sympy_charts",
     },
-    "xarray": {"runtime"},
+    "xarray": {"cli", "runtime", "sweeps"},
 }
 
 # Imported when exact digits, splines, pictures, datasets or units are asked for, so never by a module as it loads.
-ONLY_INSIDE_FUNCTIONS = {"matplotlib", "mpmath", "pint", "scipy", "xarray"}
+ONLY_INSIDE_FUNCTIONS = {"distributed", "matplotlib", "mpmath", "pint", "scipy", "xarray"}
 
 
 class Import(NamedTuple):

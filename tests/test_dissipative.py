@@ -14,6 +14,8 @@ from mpmath import mp, mpf
 from scipy.integrate import solve_ivp
 
 import gqm_sym as gqm
+from gqm_sym.errors import BudgetError
+from gqm_sym.runtime import dissipative
 
 CASES = {
     case["id"]: case for case in json.loads((Path(__file__).parent / "data" / "paper_cases.json").read_text())["cases"]
@@ -388,3 +390,14 @@ def test_questions_without_an_answer(rubbed: ModuleType, dragged: ModuleType) ->
             motion.lam(-0.1)
         with pytest.raises(gqm.GQMError, match="period"):
             _ = motion.period
+
+
+def test_a_motion_of_too_many_legs(dragged: ModuleType, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Legs are kept: a motion that would need memory without end says how far it got; what was asked before stays."""
+    monkeypatch.setattr(dissipative, "MOST_PIECES", 40)
+    motion = dragged.solve(0.3, c="1e-6")
+    early = motion.lam(5.0)
+    words = r"^motion: 40 pieces of legs reach t = \d+\.\d+ only; give a shorter t_max, or ask for earlier times"
+    with pytest.raises(BudgetError, match=words):
+        motion.lam(1e9)
+    assert motion.lam(5.0) == early

@@ -77,13 +77,13 @@ def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 @pytest.fixture
-def function(tmp_path: Path) -> Callable[[float], Callable[[float], float]]:
-    """Make an entry point that adds a number, from a source file that is always the same to numba."""
+def function(tmp_path: Path) -> Callable[..., Callable[[float], float]]:
+    """Make an entry point that adds a number, from a source file that is always the same to numba, or of some time."""
 
-    def make(number: float) -> Callable[[float], float]:
+    def make(number: float, time: int = 1_000_000_000) -> Callable[[float], float]:
         path = tmp_path / "source.py"
         path.write_text(f"def add(x):\n    return x + {number:4.1f}\n", encoding="utf-8")
-        os.utime(path, (1_000_000_000, 1_000_000_000))
+        os.utime(path, (time, time))
         spec = importlib.util.spec_from_file_location("source", path)
         module = importlib.util.module_from_spec(spec)
         sys.modules["source"] = module
@@ -100,18 +100,17 @@ def _damage(cache: Path, pattern: str, content: Callable[[bytes], bytes]) -> Non
         path.write_bytes(content(path.read_bytes()))
 
 
-@pytest.mark.parametrize("pattern", ["*.nbi", "*.nbc", "*.nb?"])
 @pytest.mark.parametrize(
     "content",
     [lambda _: b"", lambda data: data[: len(data) // 2], lambda data: data[:-1], lambda _: bytes(range(256)) * 9],
     ids=["empty", "half", "a byte short", "noise"],
 )
 def test_a_damaged_cache_is_made_anew(
-    pattern: str, content: Callable[[bytes], bytes], cache: Path, function: Callable[[float], Any]
+    content: Callable[[bytes], bytes], cache: Path, function: Callable[[float], Any]
 ) -> None:
     """Files that were cut off or overwritten cost a compilation, and are whole afterwards."""
     assert function(2.0)(1.0) == 3.0
-    _damage(cache, pattern, content)
+    _damage(cache, "*.nbc", content)
     assert function(2.0)(1.0) == 3.0
     with event.install_recorder("numba:compile") as compiled:
         assert function(2.0)(1.0) == 3.0
@@ -123,6 +122,41 @@ def test_a_cache_of_other_code_is_not_used(
 ) -> None:
     """Another runtime at the same place, with the same times and sizes, gets code of its own."""
     assert function(2.0)(1.0) == 3.0
+    monkeypatch.setattr(jit, "STAMP", "another")
+    assert function(5.0)(1.0) == 6.0
+
+
+def test_killed_between_two_files_of_the_cache(
+    cache: Path, function: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """An edit whose code was never kept is not answered by the code from before it."""
+    assert function(2.0)(1.0) == 3.0
+    with monkeypatch.context() as patch:
+        patch.setattr(IndexDataCacheFile, "_save_data", lambda *_: None)
+        assert function(5.0, 1_100_000_000)(1.0) == 6.0
+    assert function(5.0, 1_100_000_000)(1.0) == 6.0
+
+
+def test_two_at_once_keep_their_own_code(
+    cache: Path, function: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Two versions that are kept at the same time, the one while the other is, are not taken for each other."""
+    save, waiting = IndexDataCacheFile._save_data, ["once"]
+
+    def save_later(self: Any, name: str, data: Any) -> None:
+        if waiting:
+            waiting.clear()
+            for index in cache.rglob("*.nbi"):
+                index.unlink()  # as if the other had looked before it was written
+            with monkeypatch.context() as patch:
+                patch.setattr(jit, "STAMP", "another")
+                assert function(5.0)(1.0) == 6.0
+        save(self, name, data)
+
+    monkeypatch.setattr(IndexDataCacheFile, "_save_data", save_later)
+    assert function(2.0)(1.0) == 3.0
+    monkeypatch.undo()
+    monkeypatch.setattr(numba.config, "CACHE_DIR", str(cache))
     monkeypatch.setattr(jit, "STAMP", "another")
     assert function(5.0)(1.0) == 6.0
 

@@ -16,6 +16,9 @@ from gqm_sym.errors import LaunchError, SolutionError
 
 ROUNDINGS = 8 * 2.0**-53
 HALF_PERIOD_ULPS = 4.0
+CHARTED_ULPS = 8.0
+# Of charted curves at t < 100 s, relative to the size of the curve.
+EARLY = 1e-13
 
 
 @pytest.fixture(scope="module")
@@ -33,6 +36,51 @@ def test_in_a_round_track_it_is_a_pendulum(bowl: ModuleType, rho: str, path: str
         length = sp.Rational(path)
         frequency = mp.sqrt(mpf("9.81") / mpf("1.4") / (mpf(int(length.p)) / int(length.q)))
         assert ulps(motion.half_period, pendulum_half_period(mpf("1.2"), frequency)) <= HALF_PERIOD_ULPS
+
+
+@pytest.fixture(scope="module")
+def loop(generated_folder: Path) -> ModuleType:
+    """A round track that is known by an equation only."""
+    curve = gqm.Curve.implicit("x**2 + z**2 - L**2", start=(0, "-L"), parameters={"L": "5/4"})
+    force = gqm.Gravity() + gqm.Rolling(radius="rho", beta="2/5")
+    return gqm.build(gqm.derive(curve, force), name="ball_in_a_loop", folder=generated_folder)
+
+
+@pytest.mark.parametrize("angle", ["1/1000000", "6/5", "29/10"])
+def test_on_a_charted_curve_as_on_one_with_formulas(loop: ModuleType, bowl: ModuleType, angle: str) -> None:
+    """Both are the pendulum, at the same times at the same places but for the rounding of the tangent's angle."""
+    numbers = {"rho": "1/4", "beta": "2/5", "g": "9.81"}
+    motion = loop.solve(sp.Rational(angle) * sp.Rational("5/4"), **numbers)
+    twin = bowl.solve(angle, L="5/4", **numbers)
+    with mp.workdps(DIGITS):
+        exact = pendulum_half_period(
+            mp.mpf(sp.Rational(angle).p) / sp.Rational(angle).q, mp.sqrt(mpf("9.81") / mpf("1.4"))
+        )
+        assert ulps(motion.half_period, exact) <= CHARTED_ULPS
+    times = np.linspace(0.0, 20.0, 41)
+    ours, theirs = motion.state(times), twin.state(times)
+    assert np.abs(ours.lam - 1.25 * theirs.lam).max() <= EARLY * 1.25
+    assert np.abs(ours.normal_force - theirs.normal_force).max() <= 2e-13 * 9.81
+
+
+def test_on_a_rail_of_arcs_and_a_line(generated_folder: Path) -> None:
+    """Between two arcs the centre goes straight; on each it is a pendulum of length 2 - rho."""
+    pieces = [gqm.arc(radius=2, angle="3/2"), gqm.line(length=3), gqm.arc(radius=2, angle="3/2")]
+    force = gqm.Gravity() + gqm.Rolling(radius="rho", beta="1/2")
+    rail = gqm.Curve.piecewise(pieces, start=(0, 0), heading="-3/2")
+    module = gqm.build(gqm.derive(rail, force), name="ball_in_a_channel", folder=generated_folder)
+    motion = module.solve("1", rho="1/2", g="9.81")  # half a radian from the end of the first arc
+    with mp.workdps(DIGITS):
+        size, rate = mpf(3) / 2, 2 * mpf("9.81") / mpf("1.5")
+        deepest = mpf(1)  # the angle of release: 3/2 - 1/2
+
+        def slowness(share: mpf) -> mpf:
+            fallen = deepest * share**2
+            drop = 2 * mp.sin(deepest - fallen / 2) * mp.sin(fallen / 2)
+            return 2 * deepest * share * size / mp.sqrt(rate * size * drop)
+
+        exact = 2 * mp.quad(slowness, [0, 1]) + 3 / mp.sqrt(rate * size * (1 - mp.cos(deepest)))
+        assert ulps(motion.half_period, exact) <= CHARTED_ULPS
 
 
 def test_the_centre_moves_beside_the_track() -> None:

@@ -355,15 +355,15 @@ WRONG: dict[str, tuple[str | bytes, list[str]]] = {
     ),
     "nesting in short lines": (
         "name:\n" + " [[[[[\n" * 5_000,
-        ["a.yaml:5:6: values are nested deeper than 20 levels; a curve file needs five"],
+        ["a.yaml:5:6: values are nested deeper than 20 levels; such a file needs five"],
     ),
     "too many values": (
         "name:\n" + "- 1\n" * 2000,
-        ["a.yaml:999:3: more than 1000 values; give a file for one curve"],
+        ["a.yaml:999:3: more than 1000 values; give a file for one curve or one sweep"],
     ),
     "too large": (
         PLAIN + "#" * (1 << 20),
-        ["a.yaml:1:1: the file is larger than 64 KiB; a curve file has a few hundred bytes"],
+        ["a.yaml:1:1: the file is larger than 64 KiB; such a file has a few hundred bytes"],
     ),
 }
 

@@ -147,6 +147,13 @@ def test_a_long_sweep_is_cut_and_joined(module_of: ModuleOf) -> None:
     assert (whole.values[77] == circle.sweep("half_period", amplitude, L=float(length[77, 0])).values).all()
 
 
+def test_columns_may_be_read_only(module_of: ModuleOf) -> None:
+    """Arrays that must not be written to, as a memory map's, are columns too."""
+    amplitude = np.linspace(0.1, 1.0, 5)
+    amplitude.flags.writeable = False
+    assert not module_of("circle").sweep("half_period", amplitude, L=1).reasons.any()
+
+
 def test_mistakes_are_named(module_of: ModuleOf) -> None:
     """An unknown quantity, a missing place, a negative speed, shapes that do not fit, a length below zero."""
     sweep = module_of("circle").sweep

@@ -5,6 +5,8 @@ from math import isfinite
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from xarray import Dataset
+
     from gqm_sym.derivation import Model
     from gqm_sym.runtime.motion import Motion
     from gqm_sym.specfile import Spec
@@ -86,6 +88,22 @@ def _states(
         state = found.state(t)
         values = (state.t, state.lam, state.x, state.z, state.v, state.normal_force)
         yield (label, *map(_number, values), f"{state.error:.1e}")
+
+
+def swept(quantities: Iterable[str], data: "Dataset") -> Iterator[str]:
+    """Yield what came of a sweep, line by line: its size, and what there is no value of, and why."""
+    from gqm_sym.runtime.sweeping import REASONS
+
+    yield f"  {' x '.join(f'{size} {name}' for name, size in data.sizes.items())}: {', '.join(quantities)}"
+    refused: dict[str, None] = {}
+    for quantity in quantities:
+        why = data[f"{quantity}_reason"]
+        for code, reason in enumerate(REASONS):
+            count = int((why == code).sum())
+            if reason and count:
+                yield f"  {quantity}: {count} without a value: {reason}"
+        refused[why.attrs.get("first_refused", "")] = None
+    yield from (f"  refused {first}" for first in refused if first)
 
 
 def table(rows: Iterable[Sequence[str]], *, right: Iterable[int]) -> Iterator[str]:

@@ -4,6 +4,7 @@ import argparse
 import json
 import tempfile
 from collections.abc import Sequence
+from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -124,7 +125,25 @@ def _parser() -> argparse.ArgumentParser:
     )
     report.set_defaults(command=_report, folder=FOLDER)
 
+    sweep = commands.add_parser(
+        "sweep",
+        help="compute quantities over many launches and parameters",
+        description="Compute what a sweep file asks, on all cores or on a Dask cluster, into a file with names, units "
+        "and provenance. What is done is stored as it goes: run an interrupted sweep again and it goes on.",
+    )
+    sweep.add_argument("file", metavar="FILE", help="a sweep file (YAML)")
+    sweep.add_argument(
+        "-o",
+        "--output",
+        metavar="FILE",
+        help="the results, .nc (netCDF) or .zarr; the name of the sweep file with .nc if not given",
+    )
+    sweep.add_argument("--scheduler", metavar="ADDRESS", help="of a Dask cluster to do the work, as in tcp://host:8786")
+    sweep.add_argument("--force", action="store_true", help="begin anew, whatever is there")
+    sweep.set_defaults(command=_sweep)
+
     schema = commands.add_parser("schema", help="print the JSON Schema of curve files, for editors")
+    schema.add_argument("--sweep", action="store_true", help="that of sweep files")
     schema.set_defaults(command=_schema)
     families = commands.add_parser("families", help="list the families of curves")
     families.set_defaults(command=_families)
@@ -201,13 +220,36 @@ def _module(text: str, name: str, folder: Path) -> Any:
         return load(path, name)
 
 
+# -- sweep -----------------------------------------------------------------------------------
+
+
+def _sweep(options: argparse.Namespace) -> None:
+    from gqm_sym.cli.progress import Bar
+    from gqm_sym.runtime.cluster import connected
+    from gqm_sym.sweeps import read_sweep, run
+
+    plan = read_sweep(options.file)
+    target = options.output or f"{Path(options.file).stem}.nc"
+    bar = Bar()
+    with nullcontext() if options.scheduler is None else connected(options.scheduler) as client:
+        try:
+            data = run(plan, target, client=client, force=options.force, progress=bar)
+        finally:
+            bar.close()
+    for line in show.swept(plan.quantities, data):
+        print(line)
+    print(f"wrote {target}")
+
+
 # -- lists -----------------------------------------------------------------------------------
 
 
 def _schema(options: argparse.Namespace) -> None:
     from gqm_sym.specfile import json_schema
+    from gqm_sym.sweeps import sweep_schema
 
-    print(json.dumps(json_schema(), indent=2, ensure_ascii=False))
+    schema = sweep_schema() if options.sweep else json_schema()
+    print(json.dumps(schema, indent=2, ensure_ascii=False))
 
 
 def _families(options: argparse.Namespace) -> None:

@@ -25,7 +25,7 @@ BACKWARDS = pi - 1e-6
 # A chord of a smooth track that is this many times as long as half of all chords jumps to another place.
 JUMP = 100.0
 
-_DECIMAL = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
+_DECIMAL = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -14,7 +14,7 @@ from sympy import Expr, Function, Integer, Rational, S, Symbol
 
 from gqm_sym.budgets import spend
 from gqm_sym.errors import EmissionError
-from gqm_sym.sympy_charts import chart_x, chart_z
+from gqm_sym.sympy_charts import chart_alpha, chart_x, chart_z
 
 # Heads with helpers `<name>1` and `<name>2` in the runtime.
 HELPERS = {
@@ -35,6 +35,7 @@ HELPERS = {
     sympy.Abs: "abs",
     chart_x: "chart_x",
     chart_z: "chart_z",
+    chart_alpha: "chart_alpha",
 }
 
 

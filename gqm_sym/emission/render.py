@@ -16,9 +16,11 @@ from gqm_sym.emission.printer import FUNCTIONS, CodePrinter, ExactPrinter, Inter
 from gqm_sym.errors import EmissionError
 
 # The version of gqm_sym.runtime.interface that emitted code is written for (a test holds the two together).
-INTERFACE = 2
+INTERFACE = 3
 
-_MATH = frozenset({*FUNCTIONS.values(), "sqrt", "pi", "e"})
+# Functions that the runtime has in forms that fill vector registers; the rest is the standard library's.
+_ELEMENTARY = frozenset({"cos", "sin"})
+_MATH = frozenset({*FUNCTIONS.values(), "sqrt", "pi", "e"} - _ELEMENTARY)
 _RUNTIME = ("Addresses", "Formulas", "Motion", "Pass1", "Sweep")
 # Functions that every module hands over, as the interface orders them.
 _ADDRESSES = ("frame", "climb", "rise", "bend", "bounds")
@@ -76,7 +78,8 @@ def render(module: ModuleIR, *, source: str) -> str:
         "math": sorted(used & _MATH),
         "runtime": sorted(runtime, key=_as_imported),
         "charted": sorted({*charted, "chart_of"}) if charted else [],
-        "differences": sorted(used - _MATH - charted - {"nearest"}),
+        "differences": sorted(used - _MATH - _ELEMENTARY - charted - {"nearest"}),
+        "elementary": sorted(used & _ELEMENTARY),
         "intervals": sorted(intervals - charted),
         "nearest": "nearest" in used,
         "defaults": [(repr(name), repr(value)) for name, value in module.defaults],

@@ -13,7 +13,8 @@ from numba import types
 from numpy.polynomial.chebyshev import chebint
 from numpy.typing import NDArray
 
-from gqm_sym.errors import SolutionError
+from gqm_sym.budgets import spend
+from gqm_sym.errors import BudgetError, SolutionError
 from gqm_sym.runtime.chart import FIT, NODES, Array
 from gqm_sym.runtime.chart_functions import TERMS
 from gqm_sym.runtime.jit import Inner, entry
@@ -29,6 +30,8 @@ PLATEAU = 1e-11
 FALLING = 8.0
 # A piece this short, as a share of the whole, that is not resolved: the curve is not smooth there.
 SHORTEST = 1e-11
+# Pieces beyond those that were given: a curve that needs more oscillates, or is noise.
+MOST_PIECES = 100_000
 
 _SOLUTIONS = 20  # Newton steps; from where they begin, three are enough
 
@@ -97,6 +100,12 @@ def rectify(rows: Rows, edges: Array, *, where: str) -> Pieces:
     shortest = SHORTEST * (edges[-1] - edges[0])
     found = []
     while low.size:
+        spend()
+        if low.size > MOST_PIECES + edges.size:
+            raise BudgetError(
+                f"chart: {where}: not resolved by {MOST_PIECES} pieces near {float(low[0])!r}; "
+                "give a shorter domain, or a curve that oscillates less"
+            )
         half = 0.5 * (high - low)
         middle = low + half
         values = rows(low, half[:, None] * (1.0 + NODES))

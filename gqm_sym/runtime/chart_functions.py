@@ -12,7 +12,7 @@ The flat array holds, one after the other::
 Divided differences subtract no coordinates of one piece or of neighbours; farther apart, coordinates as two doubles.
 """
 
-from math import fabs, floor
+from math import fabs, floor, inf
 
 from numba import carray
 
@@ -95,25 +95,33 @@ def chart_kappa(chart, s):  # type: ignore[no-untyped-def]
 
 
 @Inner
+def _power(chart, row, start, j):  # type: ignore[no-untyped-def]
+    """What a row is made of, but for a constant; the angle's differences are means of the curvature."""
+    if row < 2:
+        return chart[start + 6 + row * TERMS + j]
+    return chart[start + 5 + 3 * TERMS + j] / (j * chart[start + 1]) if j > 0 else 0.0
+
+
+@Inner
 def _slope(chart, row, k, u, v):  # type: ignore[no-untyped-def]
-    """The first divided difference of a coordinate over two places of one piece."""
+    """The first divided difference of a row over two places of one piece."""
     start = EDGES + 3 * int(chart[1]) + 2 + k * RECORD
     value, first = 0.0, 0.0
     for j in range(TERMS - 1, -1, -1):
         first = first * v + value
-        value = value * u + chart[start + 6 + row * TERMS + j]
+        value = value * u + _power(chart, row, start, j)
     return first * chart[start + 1]
 
 
 @Inner
 def _bend(chart, row, k, u, v, w):  # type: ignore[no-untyped-def]
-    """The second divided difference of a coordinate over three places of one piece."""
+    """The second divided difference of a row over three places of one piece."""
     start = EDGES + 3 * int(chart[1]) + 2 + k * RECORD
     value, first, second = 0.0, 0.0, 0.0
     for j in range(TERMS - 1, -1, -1):
         second = second * w + first
         first = first * v + value
-        value = value * u + chart[start + 6 + row * TERMS + j]
+        value = value * u + _power(chart, row, start, j)
     return second * chart[start + 1] * chart[start + 1]
 
 
@@ -139,6 +147,8 @@ def _first(chart, row, s, t, h):  # type: ignore[no-untyped-def]
     for j in range(TERMS - 1, -1, -1):
         one = one * us + chart[from_s + 6 + row * TERMS + j]
         two = two * ut + chart[from_t + 6 + row * TERMS + j]
+    if row >= 2:  # an angle: it grows with each lap
+        return ((laps_t - laps_s) * chart[5] + (two - one)) / h
     whole = chart[from_t + 2 + 2 * row] - chart[from_s + 2 + 2 * row]
     rest = (chart[from_t + 3 + 2 * row] - chart[from_s + 3 + 2 * row]) + (two - one)
     return (whole + rest) / h
@@ -160,11 +170,14 @@ def _second(chart, row, r, s, t, h1, h2):  # type: ignore[no-untyped-def]
     if span == 0.0:
         return _bend(chart, row, kr, ur, us, ut)
     if span == 1.0:
-        base = EDGES + 3 * int(chart[1]) + 2
+        count = int(chart[1])
+        base = EDGES + 3 * count + 2
         before, after = (1.0 - ur) / chart[base + kr * RECORD + 1], (ut + 1.0) / chart[base + kt * RECORD + 1]
         left, right = _slope(chart, row, kr, 1.0, 1.0), _slope(chart, row, kt, -1.0, -1.0)
         jump = right - left
-        if fabs(jump) <= JUMP:
+        # The slope of a coordinate is at most one, that of the angle the curvature.
+        largest = 1.0 if row < 2 else max(chart[EDGES + 2 * (count + 1) + kr], chart[EDGES + 2 * (count + 1) + kt])
+        if fabs(jump) <= JUMP * largest:
             jump = 0.0
         # The difference over the outer places is a weighted mean of those with the common edge put in between.
         if ks == kr and laps_s == laps_r:
@@ -195,6 +208,12 @@ def chart_z1(chart, s, t, h):  # type: ignore[no-untyped-def]
 
 
 @Inner
+def chart_alpha1(chart, s, t, h):  # type: ignore[no-untyped-def]
+    """alpha[s, t] with h = t - s."""
+    return _first(chart, 2, s, t, h)
+
+
+@Inner
 def chart_x2(chart, r, s, t, h1, h2):  # type: ignore[no-untyped-def]
     """x[r, s, t] with h1 = s - r and h2 = t - s."""
     return _second(chart, 0, r, s, t, h1, h2)
@@ -204,6 +223,12 @@ def chart_x2(chart, r, s, t, h1, h2):  # type: ignore[no-untyped-def]
 def chart_z2(chart, r, s, t, h1, h2):  # type: ignore[no-untyped-def]
     """z[r, s, t] with h1 = s - r and h2 = t - s."""
     return _second(chart, 1, r, s, t, h1, h2)
+
+
+@Inner
+def chart_alpha2(chart, r, s, t, h1, h2):  # type: ignore[no-untyped-def]
+    """alpha[r, s, t] with h1 = s - r and h2 = t - s."""
+    return _second(chart, 2, r, s, t, h1, h2)
 
 
 @Inner
@@ -225,6 +250,30 @@ def ichart_alpha(chart, s):  # type: ignore[no-untyped-def]
     reach = max(here - _turned(chart, low), _turned(chart, high) - here)
     slack = 1e-12 * (1.0 + fabs(value))
     return value - reach - slack, value + reach + slack
+
+
+@Inner
+def ichart_kappa(chart, s):  # type: ignore[no-untyped-def]
+    """Enclosure of the curvature over an interval of arc length: on each piece its middle, and bounds of its terms."""
+    count = int(chart[1])
+    first, left, laps = find(chart, s[0])
+    last, right, more = find(chart, s[1])
+    pieces = int(last - first + (more - laps) * count) + 1
+    if pieces > count:  # all round
+        pieces, left, right = count, -1.0, 1.0
+    low, high = inf, -inf
+    for k in range(pieces):
+        begin = left if k == 0 else -1.0
+        end = right if k == pieces - 1 else 1.0
+        start = EDGES + 3 * count + 2 + (first + k) % count * RECORD + 6 + 3 * TERMS
+        middle, reach = 0.5 * (begin + end), 0.5 * fabs(end - begin)
+        value, slope = 0.0, 0.0
+        for j in range(TERMS - 1, -1, -1):
+            value = value * middle + chart[start + j]
+            slope += j * fabs(chart[start + j])
+        slack = reach * slope + 1e-13 * (fabs(value) + slope)
+        low, high = min(low, value - slack), max(high, value + slack)
+    return low, high
 
 
 @Inner

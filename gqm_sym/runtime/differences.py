@@ -29,19 +29,13 @@ from gqm_sym.runtime.second_differences import (
     asinh2,
     atan2,
     atanh2,
-    cos2,
-    cosh2,
-    exp2,
     inv2,
     ipow2,
     log2,
     rpow2,
-    sin2,
-    sinh2,
     sqrt2,
-    tan2,
-    tanh2,
 )
+from gqm_sym.runtime.wave_differences import cos2, cosh2, exp2, sin2, sinh2, tan2, tanh2
 
 __all__ = [
     "abs1",

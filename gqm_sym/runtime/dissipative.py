@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from gqm_sym.errors import InputError, SolutionError
+from gqm_sym.errors import BudgetError, InputError, SolutionError
 from gqm_sym.runtime import legs
 from gqm_sym.runtime.course import ZERO, Course, Pair, Piece
 from gqm_sym.runtime.doubledouble import two_sum
@@ -27,6 +27,8 @@ FIRST = 0.25
 MOST_PAUSES = 12
 # Turns after which `legs` and `events` stop looking for the rest.
 MOST_TURNS = 20000
+# Pieces of legs that are kept, each some kilobytes.
+MOST_PIECES = 250_000
 
 
 def dissipate(formulas: Formulas, p: Given, launch: Launch) -> Motion:
@@ -229,6 +231,11 @@ class Dissipative(Motion):
 
     def _go_on(self) -> None:
         """Follow the body to its next turn, to an end, or as far as one run goes."""
+        if len(self._pieces) >= MOST_PIECES:
+            raise BudgetError(
+                f"motion: {MOST_PIECES} pieces of legs reach t = {self._pieces[-1].t_stop[0]!r} only; "
+                "give a shorter t_max, or ask for earlier times and nearer places"
+            )
         problem, way, start, w = self.problem, self._way, self._place, self._w
         f, (low, high, period, _) = problem.functions, problem.domain
         end = high if way > 0 else low

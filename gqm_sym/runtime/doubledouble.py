@@ -2,10 +2,10 @@
 
 from math import floor
 
-from gqm_sym.runtime.jit import Inner
+from gqm_sym.runtime.jit import Inlined, Inner
 
 
-@Inner
+@Inlined
 def two_sum(a, b):  # type: ignore[no-untyped-def]
     """A + b as rounded sum and its error (Knuth)."""
     s = a + b

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Any
 
+from gqm_sym.budgets import budget, spend
 from gqm_sym.errors import SolutionError
 from gqm_sym.runtime.interface import ExactFormulas
 from gqm_sym.runtime.numbers import Number
@@ -57,6 +58,7 @@ class ExactProblem:
                 return 1 if slope > 0 else -1
         return 0
 
+    @budget("search for turning points", 60.0, "launch a little farther from the equilibrium")
     def resolve(self, near: float, far: float, direction: int) -> End:
         """What lies between two places that doubles cannot tell apart from an equilibrium.
 
@@ -119,10 +121,12 @@ class Arithmetic:
 
     def climb(self, lam: Any) -> Any:
         """What V**2 loses in climbing to a place, up to a constant."""
+        spend()
         return self.problem.formulas.climb(self.context, lam, self.values)
 
     def climb_slope(self, lam: Any) -> Any:
         """Its derivative."""
+        spend()
         return self.problem.formulas.climb_slope(self.context, lam, self.values)
 
     def climb_bend(self, lam: Any) -> Any:

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from gqm_sym.budgets import budget
 from gqm_sym.errors import SolutionError
 from gqm_sym.runtime.exact import ExactProblem
 from gqm_sym.runtime.kronrod import KRONROD_WEIGHTS, NODES
@@ -44,6 +45,7 @@ def exact_ends(
     return out[0], out[1]
 
 
+@budget("quadrature", 60.0, "launch a little farther from the equilibrium")
 def lay_exactly(exact: ExactProblem, kind: int, ends: tuple[Any, Any], stop: float) -> Any:
     """Panels as `panels.lay` returns them."""
     scale = exact.at(DIGITS)

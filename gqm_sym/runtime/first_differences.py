@@ -9,14 +9,12 @@ from math import (
     asinh,
     atan,
     atanh,
-    cos,
     cosh,
     exp,
     expm1,
     fabs,
     log,
     log1p,
-    sin,
     sinh,
     sqrt,
 )
@@ -24,7 +22,9 @@ from math import atan2 as angle
 from math import pow as power
 
 from gqm_sym.runtime.doubledouble import two_sum
-from gqm_sym.runtime.jit import Inner
+from gqm_sym.runtime.elementary import cos, sin
+from gqm_sym.runtime.fused import choose
+from gqm_sym.runtime.jit import Inlined, Inner
 
 # Below this t, 1 + t**2 is 1 to the last digit. Keeps quotients of subnormal numbers out.
 TINY = 1e-9
@@ -32,10 +32,11 @@ TINY = 1e-9
 FAR = 0.5
 
 
-@Inner
+@Inlined
 def sinc(t):  # type: ignore[no-untyped-def]
     """sin(t)/t."""
-    return sin(t) / t if fabs(t) > TINY else 1.0
+    ordinary = fabs(t) > TINY
+    return choose(ordinary, sin(t) / choose(ordinary, t, 1.0), 1.0)
 
 
 @Inner
@@ -62,14 +63,14 @@ def atanhc(t):  # type: ignore[no-untyped-def]
     return atanh(t) / t if fabs(t) > TINY else 1.0
 
 
-@Inner
+@Inlined
 def sin1(x, y, h):  # type: ignore[no-untyped-def]
     """sin[x,y] = cos((x+y)/2) sinc(h/2), with what rounding takes from x + y: near a zero of the cosine it counts."""
     middle, rest = two_sum(x, y)
     return (cos(0.5 * middle) - 0.5 * rest * sin(0.5 * middle)) * sinc(0.5 * h)
 
 
-@Inner
+@Inlined
 def cos1(x, y, h):  # type: ignore[no-untyped-def]
     """cos[x,y] = -sin((x+y)/2) sinc(h/2), with what rounding takes from x + y: near a zero of the sine it counts."""
     middle, rest = two_sum(x, y)

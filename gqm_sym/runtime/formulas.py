@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from gqm_sym.budgets import budget
 from gqm_sym.errors import LaunchError, ParameterError
 from gqm_sym.runtime.chart import Chart, ChartMaker
 from gqm_sym.runtime.entries import frame_at, loads_at
@@ -82,7 +83,8 @@ class Given(tuple[Number, ...]):
 @lru_cache(maxsize=8)
 def _chart(maker: ChartMaker, values: tuple[float, ...]) -> Chart:
     """A curve's chart, made once for the same values of the run-time parameters."""
-    return maker.chart(values)
+    with budget("chart", 60.0, "give fewer points, or shorter and simpler pieces"):
+        return maker.chart(values)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -313,11 +315,29 @@ class Formulas:
         check_end(self, motion)
         return motion
 
-    def sweep(self, quantity: str, lam0: Any, v0: Any, direction: Any, lam: Any, given: tuple[Any, ...]) -> "Sweep":
-        """One quantity over arrays of launches and parameters."""
+    def sweep(
+        self,
+        quantity: str,
+        lam0: Any,
+        v0: Any,
+        direction: Any,
+        lam: Any,
+        t_max: Any,
+        contact: str,
+        given: tuple[Any, ...],
+        client: Any,
+        source: str,
+    ) -> "Sweep":
+        """One quantity over arrays of launches and parameters, here or on a cluster that is sent the module's file."""
+        if client is not None:
+            from gqm_sym.runtime.cluster import sweep_on
+
+            launch = {"lam0": lam0, "v0": v0, "direction": direction, "lam": lam, "t_max": t_max, "contact": contact}
+            parameters = dict(zip(self.parameters, given, strict=True))
+            return sweep_on(client, source, self.name, quantity, {**launch, **parameters})
         from gqm_sym.runtime.sweeping import sweep
 
-        return sweep(self, quantity, lam0, v0, direction, lam, given)
+        return sweep(self, quantity, lam0, v0, direction, lam, t_max, contact, given)
 
 
 def read_numbers(values: Any, *, where: str) -> tuple[Array, Array, tuple[int, ...]]:

@@ -57,3 +57,56 @@ def turn_cosine(f, low):  # type: ignore[no-untyped-def]
     g = 0.25 - fabs(f)
     lost = (0.25 - g) - fabs(f)
     return turn_sine(g, lost + (low if f < 0.0 else -low))
+
+
+@intrinsic
+def bits(_, x):  # type: ignore[no-untyped-def]
+    """The bits of a float, as a whole number."""
+
+    def lower(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        return builder.bitcast(args[0], ir.IntType(64))
+
+    return types.int64(types.float64), lower
+
+
+@intrinsic
+def choose(_, condition, x, y):  # type: ignore[no-untyped-def]
+    """``x if condition else y``, both worked out: a branch would keep a loop scalar."""
+
+    def lower(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        return builder.select(*args)
+
+    real = types.float64
+    return real(types.boolean, real, real), lower
+
+
+def _horner(builder: Any, coefficients: Any, count: int, s: Any, t: Any) -> tuple[Any, Any]:
+    """Horner's scheme without a loop: the value at t, and the divided difference [s,t]."""
+    value, slope = ir.Constant(ir.DoubleType(), 0.0), ir.Constant(ir.DoubleType(), 0.0)
+    for k in range(count):
+        slope = builder.fma(slope, s, value)
+        value = builder.fma(value, t, builder.extract_value(coefficients, k))
+    return value, slope
+
+
+@intrinsic
+def polynomial(_, coefficients, t):  # type: ignore[no-untyped-def]
+    """The polynomial of these coefficients, highest power first, at t."""
+
+    def lower(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        return _horner(builder, args[0], coefficients.count, args[1], args[1])[0]
+
+    return types.float64(coefficients, types.float64), lower
+
+
+@intrinsic
+def polynomial_pair(_, coefficients, s, t):  # type: ignore[no-untyped-def]
+    """The polynomial's value at t, and its divided difference [s,t]."""
+
+    def lower(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        return context.make_tuple(
+            builder, signature.return_type, _horner(builder, args[0], coefficients.count, args[1], args[2])
+        )
+
+    real = types.float64
+    return types.UniTuple(real, 2)(coefficients, real, real), lower

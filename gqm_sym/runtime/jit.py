@@ -15,7 +15,7 @@ from typing import Any
 
 from numba import njit, types
 from numba.core import sigutils
-from numba.core.caching import FunctionCache, NullCache
+from numba.core.caching import FunctionCache, IndexDataCacheFile, NullCache
 from numba.core.ccallback import CFunc
 from numba.core.registry import cpu_target
 from numba.core.runtime import rtsys
@@ -46,6 +46,31 @@ def announce() -> None:
         print("gqm_sym: compiling the runtime, once per installation", file=sys.stderr, flush=True)
 
 
+class KeyedFiles(IndexDataCacheFile):  # type: ignore[misc]
+    """Compiled code of a function, in a file for each key that is named by the key and holds it.
+
+    numba's own has an index, written before the code, that numbers the files. Processes that compile versions of a
+    function at once give both the same number, and one that is killed between leaves a number that an older file has:
+    the next one would then run other code than it asked for.
+    """
+
+    def _file_of(self, key: Any) -> str:
+        digest = hashlib.sha256(repr((self._version, self._source_stamp, key)).encode()).hexdigest()[:16]
+        return self._data_name_pattern.replace("{number:d}", digest)  # type: ignore[no-any-return]
+
+    def save(self, key: Any, data: Any) -> None:
+        """Keep what was compiled."""
+        self._save_data(self._file_of(key), (self._source_stamp, key, data))
+
+    def load(self, key: Any) -> Any:
+        """What was kept, or None."""
+        try:
+            stamp, kept, data = self._load_data(self._file_of(key))
+        except FileNotFoundError:
+            return None
+        return data if (stamp, kept) == (self._source_stamp, key) else None
+
+
 class ReadyCache(FunctionCache):  # type: ignore[misc]
     """numba's disk cache, looked into before numba prepares to compile, and aware of changes in the runtime.
 
@@ -54,6 +79,11 @@ class ReadyCache(FunctionCache):  # type: ignore[misc]
     by time and size; compiled code here holds functions of several files, and the name of a generated module's
     functions tells its text (`compiler`). What cannot be read is compiled anew, and what cannot be written is not kept.
     """
+
+    def __init__(self, function: Any) -> None:
+        super().__init__(function)
+        files = self._cache_file
+        self._cache_file = KeyedFiles(self._cache_path, self._impl.filename_base, files._source_stamp)
 
     def _index_key(self, sig: Any, codegen: Any) -> Any:
         return (*super()._index_key(sig, codegen), self._py_func.__module__, STAMP)
@@ -69,8 +99,6 @@ class ReadyCache(FunctionCache):  # type: ignore[misc]
         try:
             return load(*arguments)
         except Exception:  # whatever unpickling does with a file that was cut off or overwritten
-            with suppress(OSError):
-                self.flush()
             return None
 
     def save_overload(self, sig: Any, data: Any) -> None:
@@ -87,8 +115,8 @@ def _cache_of(function: Any) -> Any:
         return NullCache()
 
 
-def _dispatcher_of(function: Any, *, nogil: bool = False) -> Any:
-    dispatcher = njit(nogil=nogil, **COMPILE)(function)
+def _dispatcher_of(function: Any, *, nogil: bool = False, forceinline: bool = False) -> Any:
+    dispatcher = njit(nogil=nogil, forceinline=forceinline, **COMPILE)(function)
     dispatcher._cache = _cache_of(function)
     return dispatcher
 
@@ -99,6 +127,8 @@ class Inner:
     numba's dispatcher is made when one of them is compiled, or Python calls it: code from the cache never needs it.
     """
 
+    forceinline = False
+
     def __init__(self, function: Callable[..., Any]) -> None:
         self.py_func = function
         self.__name__, self.__doc__ = function.__name__, function.__doc__
@@ -108,13 +138,22 @@ class Inner:
     def dispatcher(self) -> Any:
         """The function as numba knows it."""
         if self._dispatcher is None:
-            self._dispatcher = _dispatcher_of(self.py_func)
+            self._dispatcher = _dispatcher_of(self.py_func, forceinline=self.forceinline)
             rtsys.initialize(self._dispatcher.targetctx)
         return self._dispatcher
 
     def __call__(self, *arguments: Any) -> Any:
         """Call it from Python."""
         return self.dispatcher(*arguments)
+
+
+class Inlined(Inner):
+    """An `Inner` function whose code is put where it is called: a loop around a call stays scalar.
+
+    For short functions without branches.
+    """
+
+    forceinline = True
 
 
 @typeof_impl.register(Inner)

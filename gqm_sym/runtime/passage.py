@@ -5,6 +5,7 @@ from math import inf, isfinite
 
 import numpy as np
 
+from gqm_sym.budgets import budget, spend
 from gqm_sym.errors import InputError, SolutionError
 from gqm_sym.runtime import search
 from gqm_sym.runtime.course import ZERO, Course, Piece, plus
@@ -169,6 +170,7 @@ class Passage(Motion):
             return False
         return bool(last.anomaly_of((lam - last.a) + low, (last.b - lam) - low) > last.edges[-1])
 
+    @budget("motion", 60.0, "give a shorter t_max, or ask for earlier times")
     def _go_on(self) -> None:
         """One more stretch of a motion without an end."""
         end, problem = self.open_end, self.problem
@@ -187,6 +189,7 @@ class Passage(Motion):
             )
         begun = abs(end.place - lam0)
         while True:
+            spend()
             what, near, far = walk_on(
                 f.addresses,
                 f.p,

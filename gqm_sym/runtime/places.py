@@ -2,10 +2,10 @@
 
 from math import fabs
 
-from gqm_sym.runtime.jit import Inner
+from gqm_sym.runtime.jit import Inlined
 
 
-@Inner
+@Inlined
 def nearest(a, b, da, db):  # type: ignore[no-untyped-def]
     """``a + da``, or ``b - db`` where that end is nearer: the rounding is then that of the shorter distance."""
     return a + da if fabs(da) <= fabs(db) else b - db

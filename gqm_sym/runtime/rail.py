@@ -14,8 +14,8 @@ import numpy as np
 from numba import types
 from numpy.polynomial.legendre import leggauss
 
-from gqm_sym.errors import DeclarationError, ParameterError
-from gqm_sym.runtime.arc_length import Pieces, joined, rectify, summed
+from gqm_sym.errors import BudgetError, DeclarationError, ParameterError
+from gqm_sym.runtime.arc_length import MOST_PIECES, Pieces, joined, rectify, summed
 from gqm_sym.runtime.chart import NODES, Array, Chart, assemble
 from gqm_sym.runtime.crossing import call_segment
 from gqm_sym.runtime.formulas import FLOATS
@@ -105,6 +105,8 @@ class Rail:
                 assert pen is not None
                 part, pen = _standard(kind, numbers, pen, where)
             parts.append(part)
+            if sum(one.lengths.size for one in parts) > MOST_PIECES:
+                raise BudgetError(f"chart: {where}: {MOST_PIECES} pieces reach no farther; let the rail turn less")
             length += float(part.lengths.sum())
             joints.append(length)
         assert start is not None

@@ -12,6 +12,8 @@ from typing import Any
 import numpy as np
 from numba import types
 
+from gqm_sym.budgets import spend
+from gqm_sym.errors import SolutionError
 from gqm_sym.runtime.arc_length import Pieces, rectify, summed, unwrapped
 from gqm_sym.runtime.chart import NODES, Array, Chart, assemble
 from gqm_sym.runtime.jit import Inner, entry
@@ -83,6 +85,7 @@ def _spline(points: Array, closed: bool) -> Chart:
     """The interpolating spline, each of its polynomials as one piece or more."""
     knots = summed(np.hypot(*np.diff(points, axis=0).T))
     for _ in range(MOST_ROUNDS):
+        spend()
         terms = _polynomials(points, knots, closed)
         lengths = _lengths(knots, terms)
         change = np.abs(lengths / np.diff(knots) - 1.0).max()
@@ -130,7 +133,13 @@ def _interpolated(points: Array, knots: Array, closed: bool) -> Any:
     """The interpolating spline as a function."""
     from scipy.interpolate import make_interp_spline
 
-    return make_interp_spline(knots, points, k=DEGREE, bc_type="periodic" if closed else None)
+    try:
+        return make_interp_spline(knots, points, k=DEGREE, bc_type="periodic" if closed else None)
+    except (np.linalg.LinAlgError, ValueError) as error:
+        raise SolutionError(
+            f"sampled: no smooth track through these points was found ({error}); are they close enough along it, or is "
+            "it made of planes (kind 'linear')?"
+        ) from None
 
 
 def _polynomials(points: Array, knots: Array, closed: bool) -> Array:

@@ -7,7 +7,7 @@ points (MATHS, section 3).
 Points near each other have a closed form, good in any order: the sum of two products of
 well-conditioned numbers, one of which holds a divided difference of an even series.
 
-- sin, cos, sinh, cosh, exp, tan, tanh take it from `wave_parts`;
+- sin, cos, sinh, cosh, exp, tan, tanh take it from `wave_differences.wave_parts`;
 - log, atan, asin, acos, asinh, acosh, atanh from `area_bend`: their differences are the atanh or
   the atan of a quotient.
 
@@ -15,7 +15,7 @@ Farther points are sorted, and ``(f[b,c] - f[a,b])/(c - a)`` does no harm. Roots
 the absolute value have closed forms everywhere; real powers of near points take quadrature.
 """
 
-from math import cos, cosh, exp, fabs, factorial, sin, sinh, sqrt
+from math import fabs, sqrt
 from math import pow as power
 
 import numpy as np
@@ -26,9 +26,6 @@ from gqm_sym.runtime.first_differences import (
     asinh1,
     atan1,
     atanh1,
-    cos1,
-    cosh1,
-    expc,
     ipow1_sum,
     log1,
     one_less_product,
@@ -36,155 +33,20 @@ from gqm_sym.runtime.first_differences import (
     root_below,
     root_beyond,
     rpow1,
-    sin1,
-    sinh1,
-    tan1,
-    tanh1,
 )
 from gqm_sym.runtime.jit import Inner
+from gqm_sym.runtime.triples import ordered, series_pair
 
-# |h1| + |h2| up to which wave_parts may be used: its series are cut below 1e-19 there.
-NEAR = 1.0
 # Square of r up to which area_bend may be used: its series is cut below 4e-18 there.
 NEAR_AREA = 1.0 / 9.0
 
-# Coefficients, highest power first, of sin(t)/t and cos(t) in t**2 and of atanh(t)/t.
-SINC = tuple((-1.0) ** k / factorial(2 * k + 1) for k in reversed(range(10)))
-HALF_SINC = SINC[2:]
-HALF_COSINE = tuple((-1.0) ** k / factorial(2 * k) for k in reversed(range(9)))
+# Coefficients of atanh(t)/t in t**2, highest power first.
 AREA = tuple(1.0 / (2 * k + 1) for k in reversed(range(17)))
 
 # Gauss-Legendre on [0, 1], weights times the place: to the last digit for powers on [x, 2x].
 _LEGENDRE = np.polynomial.legendre.leggauss(12)
 NODES = tuple(float(0.5 + 0.5 * t) for t in _LEGENDRE[0])
 WEIGHTS = tuple(float(0.5 * c * (0.5 + 0.5 * t)) for t, c in zip(*_LEGENDRE, strict=True))
-
-
-@Inner
-def series(c, t):  # type: ignore[no-untyped-def]
-    """The polynomial's value at t."""
-    value = 0.0
-    for a in c:
-        value = value * t + a
-    return value
-
-
-@Inner
-def series_pair(c, s, t):  # type: ignore[no-untyped-def]
-    """The polynomial's values at s and t, added, and its divided difference [s,t]."""
-    value, slope = 0.0, 0.0
-    for a in c:
-        slope = slope * s + value
-        value = value * t + a
-    return 2.0 * value + (s - t) * slope, slope
-
-
-@Inner
-def ordered(x, y, w, h1, h2):  # type: ignore[no-untyped-def]
-    """The points in ascending order and the two gaps between them."""
-    if h1 >= 0.0 and h2 >= 0.0:
-        return x, y, w, h1, h2
-    if h1 <= 0.0 and h2 <= 0.0:
-        return w, y, x, -h2, -h1
-    # y is an end. The gap between x and w comes from those two if they are small against the gaps.
-    rest = h1 + h2 if fabs(h1) <= fabs(x) + fabs(w) else w - x
-    if h1 > 0.0:
-        return (x, w, y, rest, -h2) if rest >= 0.0 else (w, x, y, -rest, h1)
-    return (y, x, w, -h1, rest) if rest >= 0.0 else (y, w, x, h2, -rest)
-
-
-@Inner
-def wave_parts(h1, h2, sign):  # type: ignore[no-untyped-def]
-    """A = S(H/2) (S(h1)+S(h2))/2, B = C(H/2) (h2-h1) S~[h1**2,h2**2], H = h1+h2, S~(t**2) = S(t).
-
-    S and C are sinc and cosine (sign 1) or their hyperbolic twins (sign -1). MATHS, section 3.
-    """
-    quarter = sign * 0.25 * (h1 + h2) * (h1 + h2)
-    both, slope = series_pair(SINC, sign * h1 * h1, sign * h2 * h2)
-    even = 0.5 * series(HALF_SINC, quarter) * both
-    return even, series(HALF_COSINE, quarter) * (h2 - h1) * sign * slope
-
-
-@Inner
-def sin2(x, y, w, h1, h2):  # type: ignore[no-untyped-def]
-    """sin[x,y,w] = (B cos M - A sin M)/2, M = (x+2y+w)/4, A and B from half the gaps."""
-    u, v = 0.5 * h1, 0.5 * h2
-    if fabs(u) + fabs(v) <= NEAR:
-        even, odd = wave_parts(u, v, 1.0)
-        m = 0.25 * (x + w + 2.0 * y)
-        return 0.5 * (odd * cos(m) - even * sin(m))
-    a, b, c, u, v = ordered(x, y, w, h1, h2)
-    return (sin1(b, c, v) - sin1(a, b, u)) / (u + v)
-
-
-@Inner
-def cos2(x, y, w, h1, h2):  # type: ignore[no-untyped-def]
-    """cos[x,y,w] = -(B sin M + A cos M)/2, as for the sine."""
-    u, v = 0.5 * h1, 0.5 * h2
-    if fabs(u) + fabs(v) <= NEAR:
-        even, odd = wave_parts(u, v, 1.0)
-        m = 0.25 * (x + w + 2.0 * y)
-        return -0.5 * (odd * sin(m) + even * cos(m))
-    a, b, c, u, v = ordered(x, y, w, h1, h2)
-    return (cos1(b, c, v) - cos1(a, b, u)) / (u + v)
-
-
-@Inner
-def sinh2(x, y, w, h1, h2):  # type: ignore[no-untyped-def]
-    """sinh[x,y,w] = (B cosh M + A sinh M)/2, as for the sine."""
-    u, v = 0.5 * h1, 0.5 * h2
-    if fabs(u) + fabs(v) <= NEAR:
-        even, odd = wave_parts(u, v, -1.0)
-        m = 0.25 * (x + w + 2.0 * y)
-        return 0.5 * (odd * cosh(m) + even * sinh(m))
-    a, b, c, u, v = ordered(x, y, w, h1, h2)
-    return (sinh1(b, c, v) - sinh1(a, b, u)) / (u + v)
-
-
-@Inner
-def cosh2(x, y, w, h1, h2):  # type: ignore[no-untyped-def]
-    """cosh[x,y,w] = (B sinh M + A cosh M)/2, as for the sine."""
-    u, v = 0.5 * h1, 0.5 * h2
-    if fabs(u) + fabs(v) <= NEAR:
-        even, odd = wave_parts(u, v, -1.0)
-        m = 0.25 * (x + w + 2.0 * y)
-        return 0.5 * (odd * sinh(m) + even * cosh(m))
-    a, b, c, u, v = ordered(x, y, w, h1, h2)
-    return (cosh1(b, c, v) - cosh1(a, b, u)) / (u + v)
-
-
-@Inner
-def exp2(x, y, w, h1, h2):  # type: ignore[no-untyped-def]
-    """exp[x,y,w] = exp(M) (A + B)/2; far points share the factor exp(w)."""
-    u, v = 0.5 * h1, 0.5 * h2
-    if fabs(u) + fabs(v) <= NEAR:
-        even, odd = wave_parts(u, v, -1.0)
-        return 0.5 * exp(0.25 * (x + w + 2.0 * y)) * (even + odd)
-    _a, _b, c, u, v = ordered(x, y, w, h1, h2)
-    upper = expc(v)
-    return exp(c) * (upper - (1.0 - v * upper) * expc(u)) / (u + v)
-
-
-@Inner
-def tan2(x, y, w, h1, h2):  # type: ignore[no-untyped-def]
-    """tan[x,y,w] = (B cos m + A sin m)/(cos x cos y cos w), m = (x+w)/2, from whole gaps."""
-    if fabs(h1) + fabs(h2) <= NEAR:
-        even, odd = wave_parts(h1, h2, 1.0)
-        m = 0.5 * (x + w)
-        return (odd * cos(m) + even * sin(m)) / (cos(x) * cos(y) * cos(w))
-    a, b, c, u, v = ordered(x, y, w, h1, h2)
-    return (tan1(b, c, v) - tan1(a, b, u)) / (u + v)
-
-
-@Inner
-def tanh2(x, y, w, h1, h2):  # type: ignore[no-untyped-def]
-    """tanh[x,y,w] = (B cosh m - A sinh m)/(cosh x cosh y cosh w), as for the tangent."""
-    if fabs(h1) + fabs(h2) <= NEAR:
-        even, odd = wave_parts(h1, h2, -1.0)
-        m = 0.5 * (x + w)
-        return (odd * cosh(m) - even * sinh(m)) / cosh(x) / (cosh(y) * cosh(w))
-    a, b, c, u, v = ordered(x, y, w, h1, h2)
-    return (tanh1(b, c, v) - tanh1(a, b, u)) / (u + v)
 
 
 @Inner

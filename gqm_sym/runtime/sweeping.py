@@ -3,8 +3,8 @@
 Most orbits are answered by one compiled loop (`swift`); those that it leaves are solved one by one, as `solve` does.
 """
 
-from collections.abc import Callable
-from math import inf, nan, pi
+from collections.abc import Callable, Mapping
+from math import inf, isfinite, nan, pi
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -14,6 +14,8 @@ from numpy.typing import NDArray
 from gqm_sym.errors import GQMError, InputError, ParameterError, SolutionError
 from gqm_sym.runtime import swift
 from gqm_sym.runtime.entries import frame_at
+from gqm_sym.runtime.extremes import over_legs
+from gqm_sym.runtime.formulas import CONTACTS
 from gqm_sym.runtime.numbers import read_number
 from gqm_sym.runtime.stretch import Array
 from gqm_sym.runtime.threads import spread
@@ -32,6 +34,9 @@ ARRAYS = SimpleNamespace(
 
 # Launches a thread is worth starting for, and those whose parameters are laid out at a time.
 LEAST, CHUNK = 2**9, 2**14
+
+# What the compiled loop is never asked.
+NEVER = -1
 
 # Why there is no value, by code; 0 where there is one.
 REASONS = (
@@ -70,12 +75,19 @@ def _turning_points(motion: Any, _: Any) -> Any:
     return sorted(motion.turning_points) if motion.kind == "libration" else (nan, nan)
 
 
-def _extreme(load: Callable[[Any, Array], Array], sign: int) -> Callable[[Any, Any], float]:
-    """The largest or least load of a periodic motion: the best of many places, closer and closer."""
+def _rest_position(motion: Any, _: Any) -> float:
+    if motion.kind == "rest":
+        return float(motion.problem.lam0)
+    rests = motion.kind == "dissipative" and isfinite(motion.t_end) and motion.legs[-1].end == "rest"
+    return motion.legs[-1].lam_end if rests else nan
+
+
+def _extreme(load: Callable[[Any, Array], Array], of_state: str, sign: int) -> Callable[[Any, Any], float]:
+    """The largest or least load: of a periodic motion the best of many places, closer and closer."""
 
     def of_motion(motion: Any, _: Any) -> float:
-        if motion.kind not in ("libration", "circulation"):
-            return nan
+        if motion.kind not in ("libration", "circulation") or isfinite(motion.t_end):
+            return over_legs(motion, _STATES[of_state], sign)
         stretch = motion.one_period[0].stretch
         low, high = 0.0, stretch.stop
         for _round in range(8):
@@ -93,6 +105,13 @@ def _speed(motion: Any, phi: Array) -> Array:
     return speeds
 
 
+# The same of states.
+_STATES: dict[str, Callable[[Any], Array]] = {
+    "speed": lambda state: np.abs(state.v),
+    "force": lambda state: state.normal_force,
+}
+
+
 def _force(motion: Any, phi: Array) -> Array:
     stretch = motion.one_period[0].stretch
     f = stretch.functions
@@ -104,37 +123,45 @@ QUANTITIES = {
     "half_period": Quantity(swift.TIME, 0, lambda motion, _: motion.half_period),
     "period": Quantity(swift.TIME, 0, lambda motion, _: motion.period),
     "turning_points": Quantity(swift.PLACES, slice(0, 2), _turning_points),
-    "v_min": Quantity(swift.SPEEDS, 0, _extreme(_speed, -1)),
-    "v_max": Quantity(swift.SPEEDS, 1, _extreme(_speed, 1)),
-    "normal_force_min": Quantity(swift.FORCES, 0, _extreme(_force, -1)),
-    "normal_force_max": Quantity(swift.FORCES, 1, _extreme(_force, 1)),
+    "v_min": Quantity(swift.SPEEDS, 0, _extreme(_speed, "speed", -1)),
+    "v_max": Quantity(swift.SPEEDS, 1, _extreme(_speed, "speed", 1)),
+    "normal_force_min": Quantity(swift.FORCES, 0, _extreme(_force, "force", -1)),
+    "normal_force_max": Quantity(swift.FORCES, 1, _extreme(_force, "force", 1)),
     "time_at": Quantity(swift.ARRIVAL, 0, lambda motion, place: motion.time_at(place)),
+    "t_end": Quantity(NEVER, 0, lambda motion, _: motion.t_end if isfinite(motion.t_end) else nan),
+    "rest_position": Quantity(NEVER, 0, _rest_position),
 }
 
 
 def sweep(
-    formulas: "Formulas", quantity: str, lam0: Any, v0: Any, direction: Any, lam: Any, given: tuple[Any, ...]
+    formulas: "Formulas",
+    quantity: str,
+    lam0: Any,
+    v0: Any,
+    direction: Any,
+    lam: Any,
+    t_max: Any,
+    contact: str,
+    given: tuple[Any, ...],
 ) -> Sweep:
-    """One quantity of the motion of each launch; all arguments broadcast against each other."""
+    """One quantity of the motion of each launch; all arguments but contact and t_max broadcast against each other."""
     asked = QUANTITIES.get(quantity)
     if asked is None:
         raise InputError(f"quantity: must be one of {', '.join(QUANTITIES)}, got {quantity!r}")
     if (lam is None) == (quantity == "time_at"):
         raise InputError(f"lam: is the place that 'time_at' asks about, got {lam!r} with {quantity!r}")
+    if contact not in CONTACTS:
+        raise InputError(f"contact: must be one of {', '.join(CONTACTS)}, got {contact!r}")
     names = ("lam0", "v0", "direction", "lam", *formulas.parameters)
     sources = (lam0, v0, direction, 0.0 if lam is None else lam, *given)
     columns = [_column(value, name) for value, name in zip(sources, names, strict=True)]
     _check(formulas, dict(zip(names, columns, strict=True)))
-    try:
-        columns = list(np.broadcast_arrays(*columns))
-    except ValueError:
-        shapes = ", ".join(f"{name} {c.shape}" for name, c in zip(names, columns, strict=True) if c.shape)
-        raise InputError(f"sweep: these shapes do not broadcast against each other: {shapes}") from None
+    shape = broadcast_shape(dict(zip(names, columns, strict=True)))
+    columns = [np.broadcast_to(column, shape) for column in columns]
     _check_least(formulas, dict(zip(names, columns, strict=True)))
-    shape, size = columns[0].shape, columns[0].size
+    size = columns[0].size
     out, reasons = np.full((size, 2), nan), np.full(size, swift.HARD, dtype=np.int8)
-    # Charts, dissipative motions and bodies that must fit their track have no swift way: each is solved.
-    if formulas.chart is None and formulas.dissipation is None and not formulas.body:
+    if is_swift(formulas, asked, t_max, contact):
         spread(lambda part: _answer(formulas, asked, columns, part, out, reasons), size, LEAST)
         if quantity == "half_period":
             _drop(out, reasons, (reasons == swift.DONE) & (out[:, 1] == swift.CIRCULATION))
@@ -143,8 +170,26 @@ def sweep(
     values = out[:, asked.columns]
     for k in np.flatnonzero(reasons == swift.HARD):
         here = [s if np.ndim(s) == 0 else float(c.flat[k]) for s, c in zip(sources, columns, strict=True)]
-        values[k], reasons[k] = _solved(formulas, asked, here)
+        values[k], reasons[k] = _solved(formulas, asked, here, t_max, contact)
     return Sweep(values.reshape(shape + values.shape[1:]), reasons.reshape(shape))
+
+
+def is_swift(formulas: "Formulas", asked: "Quantity", t_max: Any, contact: str) -> bool:
+    """Whether the compiled loop answers most launches.
+
+    Charts, dissipative motions, bodies that must fit their track or may leave it, and horizons have no swift way.
+    """
+    plain = formulas.chart is None and formulas.dissipation is None and not formulas.body
+    return plain and asked.asked != NEVER and t_max is None and contact == "bilateral"
+
+
+def broadcast_shape(columns: Mapping[str, Array]) -> tuple[int, ...]:
+    """The shape that named arrays broadcast to."""
+    try:
+        return np.broadcast_shapes(*(column.shape for column in columns.values()))
+    except ValueError:
+        shapes = ", ".join(f"{name} {column.shape}" for name, column in columns.items() if column.shape)
+        raise InputError(f"sweep: these shapes do not broadcast against each other: {shapes}") from None
 
 
 def _column(value: Any, name: str) -> Array:
@@ -211,7 +256,7 @@ def _laid_out(column: Array, begin: int, end: int) -> Array:
     if not any(column.strides):
         return np.full(end - begin, column.flat[0])
     if column.flags.c_contiguous:
-        return column.reshape(-1)[begin:end]
+        return column.reshape(-1)[begin:end].copy()  # the compiled loop takes no read-only arrays
     return np.ascontiguousarray(column.flat[begin:end])
 
 
@@ -219,11 +264,11 @@ def _drop(out: Array, reasons: NDArray[np.int8], which: NDArray[np.bool_]) -> No
     out[which], reasons[which] = nan, swift.PASSING
 
 
-def _solved(formulas: "Formulas", asked: Quantity, here: list[Any]) -> tuple[Any, int]:
+def _solved(formulas: "Formulas", asked: Quantity, here: list[Any], t_max: Any, contact: str) -> tuple[Any, int]:
     """The quantity of one launch, solved by itself."""
     lam0, v0, direction, place, *given = here
     try:
-        motion = formulas.solve(lam0, v0, int(direction), None, None, "bilateral", tuple(given))
+        motion = formulas.solve(lam0, v0, int(direction), None, t_max, contact, tuple(given))
     except GQMError:
         return nan, REFUSED
     try:

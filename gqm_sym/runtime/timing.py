@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from gqm_sym.budgets import budget
 from gqm_sym.errors import InputError, SolutionError
 from gqm_sym.runtime.course import ZERO, Pair
 from gqm_sym.runtime.exact import SMOOTH_PANELS, Arithmetic, two_doubles
@@ -57,6 +58,7 @@ def plain(problem: Problem, kind: str, stretch: Stretch) -> Timing:
     return Timing(duration, (phase, 0.0), offsets)
 
 
+@budget("quadrature", 60.0, "launch a little farther from the equilibrium, or cut the curve at its narrow places")
 def exact(problem: Problem, kind: str, direction: int, stretch: Stretch) -> Timing:
     """Times of the exact problem."""
     a = _arithmetic(problem, stretch, PERIOD_DIGITS)
@@ -89,6 +91,7 @@ def turning_points(problem: Problem, stretch: Stretch) -> tuple[float, float]:
     return float(low), float(high)
 
 
+@budget("period_to", 600.0, "ask for fewer digits")
 def period_to(problem: Problem, kind: str, direction: int, stretch: Stretch, digits: int) -> str:
     """The period with that many correct digits."""
     if not isinstance(digits, int) or not 1 <= digits <= MOST_DIGITS:

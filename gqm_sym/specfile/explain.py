@@ -1,14 +1,14 @@
 """What is wrong with the structure of a file, in words that its author understands."""
 
 import difflib
-from collections.abc import Collection
-from typing import Any
+from collections.abc import Callable, Collection
+from typing import Any, TypeAlias
 
 from pydantic.fields import FieldInfo
 
 from gqm_sym.specfile.nodes import MapNode, Mark, Mistakes, Node, Scalar, shown
 from gqm_sym.specfile.places import descend, place_of
-from gqm_sym.specfile.schema import CURVE_KEYS, FAMILY_MODELS, model_at
+from gqm_sym.specfile.schema import CURVE_KEYS, FAMILY_MODELS
 
 # What pydantic calls it -> what must stand there.
 _WANTED = {
@@ -22,7 +22,12 @@ _WANTED = {
 }
 
 
-def explain(detail: Any, tree: MapNode, mistakes: Mistakes, *, spoilt: Collection[Mark] = ()) -> None:
+ModelAt: TypeAlias = Callable[[tuple[str, ...]], Any]
+
+
+def explain(
+    detail: Any, tree: MapNode, mistakes: Mistakes, model_at: ModelAt, *, spoilt: Collection[Mark] = ()
+) -> None:
     """Note what pydantic found, in words of ours.
 
     Parameters
@@ -33,6 +38,8 @@ def explain(detail: Any, tree: MapNode, mistakes: Mistakes, *, spoilt: Collectio
         The file.
     mistakes
         Takes what is noted.
+    model_at
+        Gives the model of the mapping at a place of the file.
     spoilt
         Places where something could not be read: what follows from that was said with it.
     """
@@ -53,7 +60,7 @@ def explain(detail: Any, tree: MapNode, mistakes: Mistakes, *, spoilt: Collectio
             mark = node.at(column) if column else value_mark
         mistakes.add(mark, f"{label}{detail['ctx']['what']}")
     elif kind == "extra_forbidden":
-        _explain_unknown(loc, steps, mistakes)
+        _explain_unknown(loc, steps, mistakes, model_at)
     elif kind == "missing":
         field = model_at(_path(loc[:-1])).model_fields[loc[-1]]
         what = f"{label}{loc[-1]} is missing"
@@ -73,7 +80,9 @@ def explain(detail: Any, tree: MapNode, mistakes: Mistakes, *, spoilt: Collectio
         mistakes.add(value_mark, f"{label}{what}, got {given}")
 
 
-def _explain_unknown(loc: tuple[Any, ...], steps: list[tuple[str, Mark, Node]], mistakes: Mistakes) -> None:
+def _explain_unknown(
+    loc: tuple[Any, ...], steps: list[tuple[str, Mark, Node]], mistakes: Mistakes, model_at: ModelAt
+) -> None:
     key = str(loc[-1])
     path = ".".join(step for step, _, _ in steps[:-1])
     label = f"{path}: " if path else ""

@@ -29,6 +29,7 @@ from gqm_sym.specfile.schema import (
     Launch,
     Parameter,
     Quantity,
+    model_at,
     read_default,
 )
 from gqm_sym.specfile.spec import Note, Spec
@@ -90,7 +91,7 @@ class _Reader:
             spoilt = self.mistakes.places()
             for detail in error.errors(include_url=False, include_input=False):
                 self.bad.append(detail["loc"])
-                explain(detail, self.tree, self.mistakes, spoilt=spoilt)
+                explain(detail, self.tree, self.mistakes, model_at, spoilt=spoilt)
         curve, kernel = self._curve(), self._kernel()
         declared = {name: self._section(Parameter, "parameters", name) for name in self._declared()}
         if curve is not None and kernel is not None:

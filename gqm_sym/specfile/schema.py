@@ -332,10 +332,10 @@ class _Draft07(GenerateJsonSchema):
         return False
 
 
-def json_schema() -> dict[str, Any]:
-    """Return the JSON Schema (draft 7) of a curve file."""
-    schema = CurveFile.model_json_schema(ref_template="#/definitions/{model}", schema_generator=_Draft07)
-    schema["definitions"] = schema.pop("$defs")
+def json_schema(model: type[Section] = CurveFile) -> dict[str, Any]:
+    """Return the JSON Schema (draft 7) of a curve file, or of another file."""
+    schema = model.model_json_schema(ref_template="#/definitions/{model}", schema_generator=_Draft07)
+    schema["definitions"] = schema.pop("$defs", {})
     return {"$schema": _Draft07.schema_dialect, **_without_null_defaults(schema)}
 
 

@@ -1,6 +1,6 @@
 """YAML text -> a tree of nodes that know their line and column.
 
-Only what a curve file needs of YAML 1.2 is read: mappings with text keys, sequences and scalars,
+Only what such a file needs of YAML 1.2 is read: mappings with text keys, sequences and scalars,
 one document a file. Scalars stay text, because ``9.81`` means 981/100 and not the double nearest to
 it. Tags, anchors and aliases are refused: a file without them says everything in one place and
 cannot grow when it is read. The tree is built from the stream of events with a stack of our own, so
@@ -67,7 +67,7 @@ def read_text(path: Path, mistakes: Mistakes) -> str:
     start = Mark(1, 1)
     text = ""
     if len(data) > SIZE_LIMIT:
-        mistakes.add(start, "the file is larger than 64 KiB", "a curve file has a few hundred bytes")
+        mistakes.add(start, "the file is larger than 64 KiB", "such a file has a few hundred bytes")
     elif data.startswith((b"\xff\xfe", b"\xfe\xff")):
         mistakes.add(start, "the file is UTF-16 text", "save it as UTF-8")
     elif b"\0" in data:
@@ -101,7 +101,7 @@ def _check_text(text: str, mistakes: Mistakes) -> None:
             mistakes.add(Mark(number, 1), what, "break it")
 
 
-def read_tree(text: str, mistakes: Mistakes) -> Node | None:
+def read_tree(text: str, mistakes: Mistakes, *, needed: str = "name, curve and kernel") -> Node | None:
     """Read the one document of a text; None where there is nothing that can be looked at further.
 
     Parameters
@@ -110,9 +110,11 @@ def read_tree(text: str, mistakes: Mistakes) -> Node | None:
         The file's text.
     mistakes
         Takes everything that is wrong.
+    needed
+        The keys that an empty file lacks.
     """
     try:
-        return _Builder(text, mistakes).build()
+        return _Builder(text, mistakes).build(needed)
     except _Stop:
         return None
     except YAMLError as error:
@@ -145,12 +147,12 @@ class _Builder:
         self.count = 0
         self.documents = 0
 
-    def build(self) -> Node | None:
+    def build(self, needed: str) -> Node | None:
         # "safe" and pure: no round-trip comments to collect, no C extension needed.
         for event in YAML(typ="safe", pure=True).parse(self.text):
             self._take(event)
         if self.root is None:
-            self.mistakes.add(Mark(1, 1), "the file is empty", "give at least name, curve and kernel")
+            self.mistakes.add(Mark(1, 1), "the file is empty", f"give at least {needed}")
         return self.root
 
     def _take(self, event: Any) -> None:
@@ -175,7 +177,7 @@ class _Builder:
     def _check_properties(self, event: Any, mark: Mark) -> None:
         self.count += 1
         if self.count > NODE_LIMIT:
-            self.mistakes.add(mark, f"more than {NODE_LIMIT} values", "give a file for one curve")
+            self.mistakes.add(mark, f"more than {NODE_LIMIT} values", "give a file for one curve or one sweep")
             raise _Stop
         if event.anchor is not None:
             what = f"the anchor &{event.anchor} is not allowed"
@@ -214,7 +216,7 @@ class _Builder:
             self.key.append(None)
             if len(self.open) > DEPTH_LIMIT:
                 what = f"values are nested deeper than {DEPTH_LIMIT} levels"
-                self.mistakes.add(node.mark, what, "a curve file needs five")
+                self.mistakes.add(node.mark, what, "such a file needs five")
                 raise _Stop
 
     def _as_key(self, node: Node) -> Scalar:

@@ -1,0 +1,29 @@
+"""Import of generated modules from their files."""
+
+import importlib.util
+import os
+from importlib.machinery import SourceFileLoader
+from pathlib import Path
+from types import CodeType, ModuleType
+
+from gqm_sym.errors import InputError
+
+
+class _Source(SourceFileLoader):
+    """Reads the source always: Python tells what it cached apart by size and whole seconds alone."""
+
+    def get_code(self, fullname: str) -> CodeType:
+        path = self.get_filename(fullname)
+        code: CodeType = self.source_to_code(self.get_data(path), path)
+        return code
+
+
+def load(path: str | os.PathLike[str], name: str) -> ModuleType:
+    """Import a generated module from its file, anew."""
+    location = Path(path).resolve()
+    spec = importlib.util.spec_from_file_location(name, location, loader=_Source(name, str(location)))
+    if spec is None or spec.loader is None or not location.is_file():
+        raise InputError(f"{path}: is no generated module; run gqm-gen to write it")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module

@@ -1,0 +1,142 @@
+"""The runtime as plain Python, for runs with ``NUMBA_DISABLE_JIT=1``: coverage is measured so, and mutants are run so.
+
+Compiled functions are ordinary Python over doubles, so Python can run them, a thousand times slower and to the same
+bits but for the last place of elementary functions. What differs is made alike: a division by zero gives infinity, a
+root of a negative number NaN. Generated functions have an address, by which C can call them as well.
+"""
+
+import ctypes
+import importlib
+import math
+import pkgutil
+from collections.abc import Callable
+from functools import wraps
+from types import FunctionType, SimpleNamespace
+from typing import Any
+
+import numba
+import numpy as np
+from numba.core.extending import _Intrinsic
+
+import gqm_sym.runtime
+from gqm_sym.runtime import interface, jit
+
+_NAMES = {"asin": "arcsin", "acos": "arccos", "atan": "arctan", "atan2": "arctan2", "pow": "power"}
+_NAMES |= {"asinh": "arcsinh", "acosh": "arccosh", "atanh": "arctanh"}
+_SAME = ("sin", "cos", "tan", "sinh", "cosh", "tanh", "exp", "expm1", "log", "log1p", "log2", "log10", "sqrt")
+_NAMES |= {name: name for name in (*_SAME, "hypot", "fabs", "fmod")}
+
+_FUNCTIONS: dict[int, Callable[..., Any]] = {}
+_KEPT: list[Any] = []  # what C holds the address of
+
+_fma = ctypes.CDLL(None).fma
+_fma.restype, _fma.argtypes = ctypes.c_double, [ctypes.c_double] * 3
+
+
+def _whole(function: Callable[[float], int]) -> Callable[[float], int]:
+    return lambda x: function(x) if math.isfinite(x) else 0
+
+
+def _carray(array: Any, shape: Any) -> Any:
+    """Give the first places of an array, in another shape, or what lies at an address."""
+    if isinstance(array, ctypes._Pointer):
+        return np.ctypeslib.as_array(array, shape if isinstance(shape, tuple) else (shape,))
+    count = int(np.prod(shape))
+    assert array.flags.c_contiguous
+    return array.reshape(-1)[:count].reshape(shape)
+
+
+_MATH: dict[Any, Any] = {getattr(math, name): getattr(np, other) for name, other in _NAMES.items()}
+_MATH |= {math.floor: _whole(math.floor), math.ceil: _whole(math.ceil), numba.carray: _carray}
+_FUSED = {"fma": lambda x, y, z: np.float64(_fma(x, y, z)), "nearest_whole": np.rint}
+
+
+def _call(address: int, *arguments: Any) -> None:
+    _FUNCTIONS[address](*arguments)
+
+
+def _alike(value: Any) -> Any:
+    """Give what compiled code would mean by a global value."""
+    if isinstance(value, float):
+        return np.float64(value)
+    if isinstance(value, _Intrinsic):
+        return _FUSED.get(value._name, _call)
+    try:
+        return _MATH.get(value, value)
+    except TypeError:  # not hashable
+        return value
+
+
+def _rebuilt(function: FunctionType, names: dict[str, Any]) -> Any:
+    """Give the same code over other names, its numbers NumPy's."""
+    code = function.__code__
+    numbers = tuple(np.float64(value) if type(value) is float else value for value in code.co_consts)
+    return FunctionType(code.replace(co_consts=numbers), names, function.__name__, function.__defaults__)
+
+
+def _python(value: Any) -> Any:
+    """Give what numba returns: Python's own numbers."""
+    if isinstance(value, tuple):
+        return tuple(_python(one) for one in value)
+    return value.item() if isinstance(value, np.generic) else value
+
+
+def _entry(function: Callable[..., Any]) -> Callable[..., Any]:
+    @wraps(function)
+    def call(*arguments: Any) -> Any:
+        with np.errstate(all="ignore"):
+            return _python(function(*(np.float64(one) if isinstance(one, float) else one for one in arguments)))
+
+    return call
+
+
+def _compiler(file: str, *, interface: int) -> Callable[[Any], Callable[[Any], Any]]:
+    """Stand in for `jit.compiler`."""
+    if interface != INTERFACE:
+        return COMPILER(file, interface=interface)
+
+    def compiled(signature: Any) -> Callable[[Any], Any]:
+        kinds = [_C.get(kind, ctypes.POINTER(ctypes.c_double)) for kind in signature.args]
+
+        def decorate(function: Any) -> Any:
+            names = {name: _alike(value) for name, value in function.__globals__.items()}
+            plain = _rebuilt(function, names)
+            _KEPT.append(ctypes.CFUNCTYPE(None, *kinds)(_entry(plain)))
+            address = ctypes.cast(_KEPT[-1], ctypes.c_void_p).value
+            assert address is not None
+            _FUNCTIONS[address] = plain
+            return SimpleNamespace(address=address)
+
+        return decorate
+
+    return compiled
+
+
+INTERFACE, COMPILER = interface.INTERFACE, jit.compiler
+_C = {numba.types.float64: ctypes.c_double, numba.types.int64: ctypes.c_int64, numba.types.intp: ctypes.c_ssize_t}
+
+
+def install() -> None:
+    """Let Python run what numba would compile, from now on."""
+    found = pkgutil.iter_modules(gqm_sym.runtime.__path__, "gqm_sym.runtime.")
+    modules = [gqm_sym.runtime, *(importlib.import_module(info.name) for info in found)]
+    entries: dict[Any, Any] = {}
+    for module in modules:
+        names = {name: _alike(value) for name, value in vars(module).items()}
+        for value in list(vars(module).values()):
+            if (
+                isinstance(value, FunctionType)
+                and value.__code__.co_name == "call"
+                and value.__module__ == module.__name__
+            ):
+                entries[value] = _entry(_rebuilt(value.__wrapped__, names))
+            elif isinstance(value, jit.Inner) and value.py_func.__module__ == module.__name__:
+                value.py_func = _rebuilt(value.py_func, names)
+    for module in modules:
+        for name, value in list(vars(module).items()):
+            if isinstance(value, FunctionType) and value in entries:
+                setattr(module, name, entries[value])
+            elif value is jit.compiler:
+                setattr(module, name, _compiler)
+    jit.Inner.__call__ = lambda self, *arguments: self.py_func(*arguments)
+    numba.carray = _carray
