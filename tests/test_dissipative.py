@@ -291,6 +291,25 @@ def test_slow_launch_keeps_its_digits(build: Build) -> None:
         assert got == pytest.approx(exact, rel=FEW, abs=1e-16)
 
 
+@pytest.mark.parametrize("v0", ["1e-3", "1e-7", "1e-9", "1e-12"])
+def test_slow_launch_on_a_bend_keeps_its_digits(v0: str, rubbed: ModuleType) -> None:
+    """Down a circle with friction, W elementary and integrated in 30 digits: no launch is too slow."""
+    motion = rubbed.solve(lam0=1, v0=v0, direction=-1, mu="0.1")
+    with mp.workdps(30):
+        k, g, start = mpf("0.2"), mpf("9.81"), mpf(v0) ** 2
+        # While N > 0: W' = -2 g sin + k (W + g cos).
+        a = g * (2 - k**2) / (1 + k**2)
+        part = lambda x: a * mp.cos(x) + k * (g + a) * mp.sin(x)  # noqa: E731
+        rest = (start - part(1)) * mp.exp(-k)
+        w = lambda x: part(x) + rest * mp.exp(k * x)  # noqa: E731
+        behind = mp.sqrt(start / (2 * g * mp.sin(1) - k * (start + g * mp.cos(1))))
+        for place in (0.999, 0.9, 0.25):
+            # With 1 - x = y (y + 2 behind) what is integrated is smooth.
+            stop = mp.sqrt(behind**2 + (1 - mpf(place))) - behind
+            pace = lambda y: 2 * (y + behind) / mp.sqrt(w(1 - y * (y + 2 * behind)))  # noqa: E731
+            assert motion.time_at(place) == pytest.approx(float(mp.quad(pace, [0, stop])), rel=FEW)
+
+
 def test_droplet_over_kinks(build: Build) -> None:
     """The droplet's resistance has a kink at each inflection: its work is c_d times the turning angle."""
     module = build(

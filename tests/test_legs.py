@@ -2,14 +2,27 @@
 
 from itertools import pairwise
 
+import numba
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from mpmath import mp, mpf
-from numpy.polynomial import chebyshev
+from numpy.polynomial import chebyshev, legendre
 
-from gqm_sym.runtime.chebyshev import COUNT, GRADED_MEANS, MEANS, SHARES, TO_COEFFICIENTS, first_change
+from gqm_sym.runtime.chebyshev import (
+    COUNT,
+    GRADED_MEANS,
+    MEANS,
+    MEANS_BY_NODE,
+    SHARES,
+    TO_COEFFICIENTS,
+    WIDE,
+    extent,
+    first_change,
+    to_ends,
+)
+from gqm_sym.runtime.leg_stretches import INTEGRAL_BY_NODE, PLAIN_BY_NODE
 
 # Roundings of twenty products, of size 1.
 TABLE = 1e-15
@@ -30,6 +43,37 @@ def test_tables() -> None:
         unit = np.zeros(COUNT)
         unit[k] = 1.0
         assert np.abs(TO_COEFFICIENTS @ chebyshev.chebval(nodes, unit) - unit).max() <= 2e-14
+
+
+def test_sums_in_registers() -> None:
+    """Products with the tables, and the span of a panel's values, are those of numpy, wherever in an array they lie."""
+    values = np.random.default_rng(3).normal(size=3 * WIDE)
+    out = np.zeros(2 * WIDE)
+    _sums(values, out)
+    assert out[WIDE : WIDE + COUNT + 1] == pytest.approx(MEANS @ values[7 : 7 + COUNT], abs=TABLE)
+    assert not out[:WIDE].any()
+    inside = values[5 : 5 + COUNT]
+    assert _span(values) == (inside.min(), inside.max())
+
+
+@numba.njit
+def _sums(values, out):  # type: ignore[no-untyped-def]
+    to_ends(MEANS_BY_NODE, values, 7, out, WIDE)
+
+
+@numba.njit
+def _span(values):  # type: ignore[no-untyped-def]
+    return extent(values, 5)
+
+
+def test_integrals_in_legendre_polynomials() -> None:
+    """Powers from values at the nodes: the function, and its integral from the panel's start."""
+    x = 2.0 * SHARES - 1.0
+    at = np.linspace(-1.0, 1.0, 7)
+    for n in range(COUNT):
+        assert np.abs(legendre.legval(at, x**n @ PLAIN_BY_NODE) - at**n).max() <= 4.0 * TABLE
+        exact = (at ** (n + 1) - (-1.0) ** (n + 1)) / (n + 1)
+        assert np.abs(legendre.legval(at, x**n @ INTEGRAL_BY_NODE) - exact).max() <= 4.0 * TABLE
 
 
 def _series(roots: list[float]) -> np.ndarray:

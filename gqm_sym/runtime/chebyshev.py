@@ -10,6 +10,7 @@ from math import cos, fabs, fsum, pi, sin
 import numpy as np
 
 from gqm_sym.runtime.jit import Inner
+from gqm_sym.runtime.matrices import columns, span
 
 COUNT = 20
 
@@ -56,6 +57,22 @@ def _tables() -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
 # last row that over the whole panel; ``GRADED_MEANS`` those with respect to the square of the share.
 SHARES, MEANS, GRADED_MEANS, TO_COEFFICIENTS = _tables()
 
+# The same by columns, as `matrices` takes them: a row a node, padded to whole registers. The last is that of the
+# coefficients that tell how well a function is resolved, three at the end and three in the middle.
+WIDE = 24
+ENDS_BY_NODE = np.pad(np.append(SHARES, 1.0), (0, WIDE - COUNT - 1))
+MEANS_BY_NODE, GRADED_BY_NODE, COEFFICIENTS_BY_NODE = (
+    np.ascontiguousarray(np.pad(table.T, ((0, 0), (0, WIDE - len(table)))))
+    for table in (MEANS, GRADED_MEANS, TO_COEFFICIENTS)
+)
+LAST, MIDDLE = slice(COUNT - 3, COUNT), slice(12, 15)
+TAILS_BY_NODE = np.ascontiguousarray(
+    np.pad(np.vstack([TO_COEFFICIENTS[LAST], TO_COEFFICIENTS[MIDDLE]]).T, ((0, 0), (0, 2)))
+)
+to_ends, to_tails, extent = columns(COUNT, WIDE), columns(COUNT, TAILS_BY_NODE.shape[1]), span(COUNT)
+# A polynomial on the panel is nowhere further from a number than this many times its values at the nodes.
+LEBESGUE = 3.0
+
 # How finely a panel is searched for a change of sign that bounds cannot settle.
 FINEST = 2.0**-30
 
@@ -63,11 +80,10 @@ FINEST = 2.0**-30
 @Inner
 def coefficients(values, out):  # type: ignore[no-untyped-def]
     """Chebyshev coefficients of the polynomial with these values at the nodes."""
+    padded = np.empty(WIDE)
+    to_ends(COEFFICIENTS_BY_NODE, values, 0, padded, 0)
     for k in range(COUNT):
-        total = 0.0
-        for j in range(COUNT):
-            total += TO_COEFFICIENTS[k, j] * values[j]
-        out[k] = total
+        out[k] = padded[k]
 
 
 @Inner
@@ -80,23 +96,18 @@ def chebyshev_sum(c, x):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def tail_and_level(values):  # type: ignore[no-untyped-def]
-    """The largest of the last three coefficients, and of three in the middle."""
-    tail, level = 0.0, 0.0
-    for k in range(3):
-        last, middle = 0.0, 0.0
-        for j in range(COUNT):
-            last += TO_COEFFICIENTS[COUNT - 1 - k, j] * values[j]
-            middle += TO_COEFFICIENTS[12 + k, j] * values[j]
-        tail, level = max(tail, fabs(last)), max(level, fabs(middle))
-    return tail, level
-
-
-@Inner
 def _restrict(c, lo, hi, values, out):  # type: ignore[no-untyped-def]
     """The series' coefficients on [lo, hi] alone."""
+    high, low, twice = np.zeros(WIDE), np.zeros(WIDE), np.empty(WIDE)
+    for j in range(WIDE):
+        twice[j] = 2.0 * (lo + (hi - lo) * ENDS_BY_NODE[j])
+    for k in range(COUNT - 1, 0, -1):
+        term = c[k]
+        for j in range(WIDE):
+            before = high[j]
+            high[j], low[j] = term + twice[j] * before - low[j], before
     for j in range(COUNT):
-        values[j] = chebyshev_sum(c, lo + (hi - lo) * SHARES[j])
+        values[j] = c[0] + 0.5 * twice[j] * high[j] - low[j]
     coefficients(values, out)
 
 

@@ -1,25 +1,28 @@
 """Motions with friction, drag or resistance: leg after leg, each computed when it is asked for."""
 
 from math import inf, isfinite
+from operator import itemgetter
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from gqm_sym.errors import BudgetError, InputError, SolutionError
 from gqm_sym.runtime import legs
 from gqm_sym.runtime.course import ZERO, Course, Pair, Piece
-from gqm_sym.runtime.entries import follow, frame_at, from_rest
+from gqm_sym.runtime.doubledouble import two_sum
+from gqm_sym.runtime.entries import frame_at, from_rest
+from gqm_sym.runtime.events import passages
 from gqm_sym.runtime.formulas import Formulas, Given, Launch
+from gqm_sym.runtime.leg_stretches import along_field, along_panels
 from gqm_sym.runtime.motion import Motion
-from gqm_sym.runtime.panels import FROM_TURN, REGULAR, TO_EQUILIBRIUM
 from gqm_sym.runtime.problem import Problem
 from gqm_sym.runtime.rest import Rest
 from gqm_sym.runtime.search import FARTHEST
-from gqm_sym.runtime.solve import CUSP_SHARE, domain_end, leaving, starting_step
-from gqm_sym.runtime.stretch import ULP, Array, Stretch
-from gqm_sym.runtime.stretches import along_field
+from gqm_sym.runtime.solve import CUSP_SHARE, domain_end, leaving_at_once, starting_step
+from gqm_sym.runtime.stretch import NOWHERE, ULP, Array, Stretch
 
-# An equilibrium is approached until the distance left is exp(-this) of the leg: all that doubles have.
-CLOSEST = 690.0
+# The first panel, in first steps of a search: early times keep the more digits the shorter it is.
+FIRST = 0.25
 # On a curve without ends, how many stretches in a row without a turn `legs` and `events` look for one.
 MOST_PAUSES = 12
 # Turns after which `legs` and `events` stop looking for the rest.
@@ -34,7 +37,7 @@ def dissipate(formulas: Formulas, p: Given, launch: Launch) -> Motion:
     problem = Problem(formulas, launch, p, functions, formulas.domain(p))
     if problem.w0 > 0.0:
         return Dissipative(problem, launch.direction)
-    way = _leaves(problem, problem.lam0)[0]
+    way = _leaves(problem, problem.lam0)
     return Dissipative(problem, way) if way else Rest(problem)
 
 
@@ -48,14 +51,34 @@ def launch_leg(formulas: Formulas, p: Given, launch: Launch, places: Array) -> A
     return v2
 
 
-def _leaves(problem: Problem, lam: float) -> tuple[int, bool]:
-    """Which way a body leaves a place where it is at rest, 0 if it stays; and whether anything could hold it."""
+def _leaves(problem: Problem, lam: float) -> int:
+    """Which way a body leaves a place where it is at rest; 0 if it stays."""
     dissipation = problem.formulas.dissipation
     assert dissipation is not None
-    forwards, backwards = from_rest(dissipation.hold, problem.functions.p, lam)
+    return _way(*from_rest(dissipation.hold, problem.functions.p, lam))
+
+
+def _way(forwards: float, backwards: float) -> int:
+    """Which way a body leaves a place where these are its accelerations from rest; 0 if it stays."""
     if forwards <= 0.0 <= backwards:
-        return 0, True
-    return (1 if forwards > 0.0 else -1), bool(forwards < backwards)
+        return 0
+    return 1 if forwards > 0.0 else -1
+
+
+class Run(NamedTuple):
+    """One run of the body as compiled code tells of it (`legs.follow`), not yet made into pieces."""
+
+    start: float
+    place: float
+    middle: float
+    slack: float
+    times: tuple[float, float]
+    changes: Array
+    ahead: Array
+    back: Array
+    what: int
+    end: str
+    laps: int
 
 
 class Dissipative(Motion):
@@ -68,18 +91,19 @@ class Dissipative(Motion):
 
     def __init__(self, problem: Problem, direction: int) -> None:
         self._horizon = inf
-        self._pieces: list[Piece] = []
-        self._ending = ""
+        self._runs: list[Run] = []
+        self._done: list[Piece] = []
+        self._ending, self._elapsed, self._rest = "", 0.0, 0.0
         super().__init__(problem, "dissipative", direction)
         dissipation = problem.formulas.dissipation
         assert dissipation is not None
-        self._drive = dissipation.drive
+        self._drive, self._hold = dissipation.drive, dissipation.hold
         self._flags = (int(dissipation.friction), int(dissipation.kinked), int(dissipation.linear))
         self._joints = ("",) if dissipation.friction else ("", "contact-sign")
         self._side = {"bilateral": 0, "above": 1, "below": -1}[problem.launch.contact]
         self._place, self._w, self._way, self._nu, self._laps = problem.lam0, problem.w0, direction, 0, 0
-        self._step = starting_step(problem)
-        self._reach = problem.period or self._step
+        step = starting_step(problem)
+        self._step, self._reach, self._strict = FIRST * step, problem.period or step, 0.0
         self._turns = 0
         self._pauses = 0
         self._arc = 0.0
@@ -107,8 +131,7 @@ class Dissipative(Motion):
 
     def fill_launch_leg(self, places: Array, v2: Array) -> None:
         """Fill in V**2 at those places that lie on the launch leg."""
-        course, done = self._course(0.0), 0
-        lap = course.lap
+        done, lap = 0, self.problem.period
         while True:
             for piece in self._pieces[done:]:
                 stretch = piece.stretch
@@ -133,7 +156,7 @@ class Dissipative(Motion):
     def _course(self, reach: float) -> Course:
         if isfinite(self._horizon):
             reach = max(reach, self._horizon)
-        while not self._ending and self._pieces[-1].t_stop[0] < reach:
+        while not self._ending and self._elapsed + self._rest < reach:
             self._go_on()
         if self._whole is None or len(self._whole.pieces) != len(self._pieces):
             self._whole = Course(pieces=tuple(self._pieces), lap=self.problem.period)
@@ -173,7 +196,7 @@ class Dissipative(Motion):
         done = 0
         while True:
             course = self._course(0.0)
-            found = self._passages(course.pieces[done:], course, lam, low)
+            found = passages(course.pieces[done:], course, lam, low)
             done = len(course.pieces)
             # What turns between two points comes back to no place outside them.
             settled = self._turns >= 2 or (self._turns and self.problem.w0 == 0.0)
@@ -198,6 +221,14 @@ class Dissipative(Motion):
                 return
             self._go_on()
 
+    @property
+    def _pieces(self) -> list[Piece]:
+        """All pieces so far."""
+        for run in self._runs:
+            self._lay(run)
+        self._runs.clear()
+        return self._done
+
     def _go_on(self) -> None:
         """Follow the body to its next turn, to an end, or as far as one run goes."""
         if len(self._pieces) >= MOST_PIECES:
@@ -206,45 +237,36 @@ class Dissipative(Motion):
                 "give a shorter t_max, or ask for earlier times and nearer places"
             )
         problem, way, start, w = self.problem, self._way, self._place, self._w
-        f, period = problem.functions, problem.period
-        end = problem.high if way > 0 else problem.low
+        f, (low, high, period, _) = problem.functions, problem.domain
+        end = high if way > 0 else low
         far = 8.0 * period if period else end  # a closed curve's breaks are listed for some laps
         limit = start + way * far if period else end
-        breaks = f.between(f.breaks, start, limit)[::way] if f.breaks.size else f.breaks
+        breaks = np.ascontiguousarray(f.between(f.breaks, start, limit)[::way]) if f.breaks.size else NOWHERE
         reach = inf if isfinite(end) else self._reach
-        given = (self._drive, f.p, self._flags, start, w, way, self._nu, np.ascontiguousarray(breaks))
-        what, place, w_end, nu, step, middle, changes, _, ahead, back = follow(
-            *given, limit, reach, self._step, self._side
+        run = (self._drive, self._hold, f.p, self._flags, start, w, way, self._nu, breaks, limit)
+        what, nu, place, w_end, step, strict, middle, slack, times, leaving, changes, ahead, back = legs.follow(
+            *run, reach, self._step, self._side, self._strict
         )
-        self._step, self._nu = step, nu
         if what == legs.LIFTOFF and place == start:
-            self._lift_off_at_once(given, limit)
+            self._lift_off_at_once(run)
             return
         if not len(ahead) and what == legs.LIMIT:
-            raise leaving(problem, way, "end of the domain")
-        if not len(ahead) or what == legs.SPENT:
+            raise leaving_at_once(problem, way, "end of the domain")
+        if not (len(ahead) or len(back)) or what == legs.SPENT:
             raise SolutionError(
                 f"V**2 beyond {problem.formulas.parameter} = {place!r} could not be followed; "
                 "are the curve and the force smooth there?"
             )
-        end_name = self._end_name(what, place, start)
-        kind = FROM_TURN if w == 0.0 else REGULAR
-        if what in (legs.TURN, legs.ASYMPTOTE):
-            if middle != start:
-                self._add(along_field(f, kind, start, middle, ahead), 1, changes, "")
-            if what == legs.TURN:
-                self._add(along_field(f, FROM_TURN, place, middle, back), -1, changes, end_name)
-            else:
-                closing = along_field(f, TO_EQUILIBRIUM, middle, place, back, CLOSEST)
-                self._add(closing, 1, changes, end_name)
-        else:
-            self._add(along_field(f, kind, start, place, ahead), 1, changes, end_name)
-        self._place, self._w = place, w_end
+        name = self._end_name(what, place, start, leaving)
+        self._runs.append(Run(start, place, middle, slack, times, changes, ahead, back, what, name, self._laps))
+        self._place, self._w, self._nu, self._step, self._strict = place, w_end, nu, step, strict
+        total, lost = two_sum.py_func(self._elapsed, times[0] + times[1])
+        self._elapsed, self._rest = total, self._rest + lost
         if what == legs.TURN:
-            self._turns += 1
+            self._turns, self._strict = self._turns + 1, 0.0
         self._pauses = self._pauses + 1 if what == legs.PAUSED and not period and not isfinite(end) else 0
-        if end_name not in ("", "turn", "contact-sign"):
-            self._ending = end_name
+        if name not in ("", "turn", "contact-sign"):
+            self._ending = name
             return
         self._fold()
         if abs(self._place) > FARTHEST * max(1.0, abs(problem.lam0)):
@@ -263,11 +285,11 @@ class Dissipative(Motion):
             self._place -= count * period
             self._laps += count
 
-    def _end_name(self, what: int, place: float, start: float) -> str:
+    def _end_name(self, what: int, place: float, start: float, leaving: tuple[float, float]) -> str:
         """What ends a run; turns the body round where it turns."""
         problem, f = self.problem, self.problem.functions
         if what == legs.TURN:
-            way, self._held = _leaves(problem, place)
+            way, self._held = _way(*leaving), leaving[0] < leaving[1]
             if way == 0 or place == start:
                 return "rest"
             self._way = way
@@ -279,21 +301,31 @@ class Dissipative(Motion):
             return "cusp" if ds[1] <= CUSP_SHARE * ds[0] else "singular-point"
         return {legs.LIFTOFF: "liftoff", legs.ASYMPTOTE: "asymptote"}.get(what, "")
 
-    def _lift_off_at_once(self, given: tuple[object, ...], limit: float) -> None:
+    def _lift_off_at_once(self, run: tuple[Any, ...]) -> None:
         """A motion that ends as it begins: the track would have to pull at once."""
-        place, ahead = follow(*given, limit, 0.0, self._step, 0)[1:9:7]
-        stretch = along_field(
-            self.problem.functions, FROM_TURN if self._w == 0.0 else REGULAR, self._place, place, ahead
-        )
-        self._pieces.append(self._piece(stretch, 1, (ZERO, 0.0), (ZERO, 0.0), "liftoff"))
+        place, slack, times, ahead = itemgetter(2, 7, 8, 11)(legs.follow(*run, 0.0, self._step, 0, inf))
+        stretch = along_panels(self.problem.functions, self._place, place, slack, times[0], ahead)
+        self._done.append(self._piece(stretch, 1, (ZERO, 0.0), (ZERO, 0.0), "liftoff", self._laps))
         self._ending = "liftoff"
 
-    def _add(self, stretch: Stretch, sense: int, changes: Array, end: str) -> None:
+    def _lay(self, run: Run) -> None:
+        """Make pieces of a run."""
+        f, (before, after) = self.problem.functions, run.times
+        two = len(run.back) > 0
+        if len(run.ahead):
+            stretch = along_panels(f, run.start, run.middle, run.slack, before, run.ahead)
+            self._add(stretch, 1, run, "" if two else run.end)
+        if run.what == legs.ASYMPTOTE:
+            self._add(along_field(f, run.middle, run.place, run.back), 1, run, run.end)
+        elif two:
+            self._add(along_panels(f, run.place, run.middle, 0.0, after, run.back), -1, run, run.end)
+
+    def _add(self, stretch: Stretch, sense: int, run: Run, end: str) -> None:
         """Run through a whole stretch next, cut where N changes sign."""
         low, high = sorted((stretch.a, stretch.b))
         cuts = [
             stretch.anomaly_of(float(place) - stretch.a, stretch.b - float(place))
-            for place in changes
+            for place in run.changes
             if low < place < high
         ]
         times = stretch.times(np.array(cuts)) if cuts else ()
@@ -302,11 +334,11 @@ class Dissipative(Motion):
         marks.sort(key=lambda mark: sense * mark[1])
         for k in range(len(marks) - 1):
             name = end if k == len(marks) - 2 else "contact-sign"
-            self._pieces.append(self._piece(stretch, sense, marks[k], marks[k + 1], name))
+            self._done.append(self._piece(stretch, sense, marks[k], marks[k + 1], name, run.laps))
         self._arc += sense * stretch.direction * stretch.length
 
     def _piece(
-        self, stretch: Stretch, sense: int, start: tuple[Pair, float], stop: tuple[Pair, float], end: str
+        self, stretch: Stretch, sense: int, start: tuple[Pair, float], stop: tuple[Pair, float], end: str, laps: int
     ) -> Piece:
         return Piece(
             stretch=stretch,
@@ -315,8 +347,8 @@ class Dissipative(Motion):
             r_stop=stop[0],
             phi_start=start[1],
             phi_stop=stop[1],
-            t_start=self._pieces[-1].t_stop if self._pieces else ZERO,
+            t_start=self._done[-1].t_stop if self._done else ZERO,
             s_a=self._arc if sense > 0 else self._arc - stretch.direction * stretch.length,
             end=end,
-            laps=self._laps,
+            laps=laps,
         )

@@ -10,12 +10,11 @@ from numba import types
 
 from gqm_sym.runtime.crossing import call_climb, call_frame, call_hold, call_rise
 from gqm_sym.runtime.doubledouble import reduce
+from gqm_sym.runtime.integrands import TO_EQUILIBRIUM, speeds
 from gqm_sym.runtime.interface import FRAME_ROWS
 from gqm_sym.runtime.inversion import look_up_many, tabulate
 from gqm_sym.runtime.jit import Inner, entry
-from gqm_sym.runtime.legs import ASYMPTOTE, run, run_back
-from gqm_sym.runtime.legs import TURN as TURNED
-from gqm_sym.runtime.panels import lay, read_off, speeds
+from gqm_sym.runtime.panels import lay, read_off
 from gqm_sym.runtime.search import CRITICAL, LIMIT, TURN, walk
 
 _ADDRESSES = types.UniTuple(types.int64, 5)
@@ -95,36 +94,6 @@ def speeds_at(fns, p, kind, a, b, ref, w, phi):  # type: ignore[no-untyped-def]
     return out
 
 
-_RUN = types.Tuple((types.int64, _FLOAT, _FLOAT, types.int64, _FLOAT, _FLOAT, _LINE, types.int64, _ROWS, _ROWS))
-
-
-@entry(
-    _RUN(
-        types.int64,
-        _LINE,
-        types.UniTuple(types.int64, 3),
-        _FLOAT,
-        _FLOAT,
-        types.int64,
-        types.int64,
-        _LINE,
-        _FLOAT,
-        _FLOAT,
-        _FLOAT,
-        types.int64,
-    )
-)
-def follow(drive, p, flags, start, w, v, nu, breaks, limit, reach, step, side):  # type: ignore[no-untyped-def]
-    """`legs.run`, and `legs.run_back` to its ``middle`` from where it ends with V**2 = 0."""
-    what, place, w, nu, step, middle, changes, first, ahead = run(
-        drive, p, flags, start, w, v, nu, breaks, limit, reach, step, side
-    )
-    back = np.empty((0, 0))
-    if what == TURNED or what == ASYMPTOTE:
-        back = run_back(drive, p, flags, place, middle, v, nu, changes, breaks, step, what == ASYMPTOTE)
-    return what, place, w, nu, step, middle, changes, first, ahead, back
-
-
 @entry(_LINE(types.int64, _LINE, _FLOAT))
 def from_rest(hold, p, lam):  # type: ignore[no-untyped-def]
     """The accelerations from rest, forwards and backwards."""
@@ -134,17 +103,17 @@ def from_rest(hold, p, lam):  # type: ignore[no-untyped-def]
     return rows[:, 0].copy()
 
 
-@entry(_PANELS(_LINE, types.int64, _FLOAT, _FLOAT, _ROWS, _LINE))
-def lay_along(p, kind, a, b, field, marks):  # type: ignore[no-untyped-def]
-    """`panels.lay` where V**2 is a field."""
-    return lay((0, 0, 0, 0, 0), p, kind, a, b, a, 0.0, field, marks)
+@entry(_PANELS(_FLOAT, _FLOAT, _ROWS, _LINE))
+def lay_along(a, b, field, marks):  # type: ignore[no-untyped-def]
+    """`panels.lay` towards an equilibrium b where V**2 is a field."""
+    return lay((0, 0, 0, 0, 0), np.empty(0), TO_EQUILIBRIUM, a, b, a, 0.0, field, marks)
 
 
-@entry(_LINE(_LINE, types.int64, _FLOAT, _FLOAT, _ROWS, _LINE))
-def speeds_along(p, kind, a, b, field, phi):  # type: ignore[no-untyped-def]
-    """V at many anomalies of a stretch where V**2 is a field."""
-    out = np.empty(phi.size)
-    speeds((0, 0, 0, 0, 0), p, kind, a, b, a, 0.0, field, phi, np.empty((4, phi.size)), out)
+@entry(_LINE(_FLOAT, _FLOAT, _ROWS, _LINE))
+def speeds_along(a, b, field, phi):  # type: ignore[no-untyped-def]
+    """V at many anomalies of a stretch towards an equilibrium b where V**2 is a field."""
+    out, work = np.empty(phi.size), np.empty((4, phi.size))
+    speeds((0, 0, 0, 0, 0), np.empty(0), TO_EQUILIBRIUM, a, b, a, 0.0, field, phi, work, out)
     return out
 
 

@@ -1,12 +1,12 @@
 """What happens along a motion: turns, changes of contact, ends."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 
-from gqm_sym.runtime.course import Pair, Piece, minus, plus
+from gqm_sym.runtime.course import Course, Pair, Piece, minus, plus
 from gqm_sym.runtime.entries import frame_at
 from gqm_sym.runtime.stretch import Array, Stretch
 
@@ -113,6 +113,26 @@ def crossings(piece: Piece, phi: Array, pace: float) -> list[tuple[Pair, float]]
                 )
             )
     return sorted(out)
+
+
+def passages(pieces: Sequence[Piece], course: Course, lam: float, low: float) -> list[float]:
+    """Times of passing a place, the first on each of some pieces."""
+    out = []
+    for piece in pieces:
+        stretch = piece.stretch
+        within = lam - piece.laps * course.lap
+        inside, outside = (within - stretch.a) + low, (stretch.b - within) - low
+        if inside * stretch.direction < 0.0 or outside * stretch.direction < 0.0:
+            continue
+        phi = np.array([stretch.anomaly_of(inside, outside)])
+        if phi[0] > stretch.edges[-1]:
+            continue
+        out += [when[0] + when[1] for when, _ in crossings(piece, phi, course.pace)]
+        if phi[0] in (0.0, stretch.edges[-1]) and piece.r_stop[0] in (0.0, stretch.duration):
+            at_stop = stretch.a if piece.sense < 0 else stretch.b
+            if within == at_stop:
+                out.append(piece.t_stop[0])
+    return out
 
 
 def corners_met(piece: Piece, pace: float) -> list[tuple[Pair, float]]:

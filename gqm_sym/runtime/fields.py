@@ -1,55 +1,73 @@
-"""V**2 along a leg as polynomials, panel by panel, by the distance d from the place where it was begun.
+"""V**2 next to an equilibrium that a dissipative motion approaches, as polynomials of the distance d from there.
 
-On a panel that begins at distance l with V**2 = ``base``, ``V**2 = base + (d - l) R``. On the first panel from a
-turning point R is V**2 over d, on that from an equilibrium V**2 over d**2: both without subtracting anything. One row
-is a panel:
+Kept is V**2 over d**2, without subtracting anything. One row is a panel:
 
-======= ===========================================================================================
+======= ============================================================================
 column  meaning
-======= ===========================================================================================
-0, 1    where the panel begins, and up to where it holds, as distances
-2       the width that its polynomials were made for; below 0 if they are polynomials in the root of d
-3       base
-4 on    Chebyshev coefficients of R, then those of ds
-======= ===========================================================================================
+======= ============================================================================
+0, 1    where the panel begins and ends, as distances
+2 on    Chebyshev coefficients of V**2/d**2, then those of ds
+======= ============================================================================
 """
 
-from math import sqrt
+from math import fabs
 
 import numpy as np
 
-from gqm_sym.runtime.chebyshev import COUNT, chebyshev_sum, coefficients
+from gqm_sym.runtime.arrays import taller
+from gqm_sym.runtime.chebyshev import COUNT, WIDE, chebyshev_sum, coefficients
 from gqm_sym.runtime.jit import Inner
+from gqm_sym.runtime.leg_equation import BARE, DS, JUDGED, PLACE, ROWS
+from gqm_sym.runtime.leg_equation import W as V2
+from gqm_sym.runtime.leg_panels import NEVER, next_panel, next_stop
 
-COLUMNS = 4 + 2 * COUNT
-
-
-@Inner
-def enter(field, count, left, right, width, base, regular, ds):  # type: ignore[no-untyped-def]
-    """Enter a panel, by values at its nodes, behind ``count`` others; the field, longer if it had to be."""
-    if count == field.shape[0]:
-        longer = np.empty((2 * count, COLUMNS))
-        longer[:count] = field
-        field = longer
-    field[count, 0], field[count, 1], field[count, 2], field[count, 3] = left, right, width, base
-    coefficients(regular, field[count, 4 : 4 + COUNT])
-    coefficients(ds, field[count, 4 + COUNT :])
-    return field
+COLUMNS = 2 + 2 * COUNT
+MOST_TRIES = 20000
 
 
 @Inner
-def along(field, d, order):  # type: ignore[no-untyped-def]
-    """V**2 at distance d, what it is divided by ``d**order``, and ds; ``order`` is that of its zero at d = 0."""
+def approach(drive, p, flags, top, end, v, nu, changes, breaks, step):  # type: ignore[no-untyped-def]
+    """The field of the leg that tends to the equilibrium ``top``, followed back from there to ``end``.
+
+    ``nu`` is the sign of N at the equilibrium, ``changes`` are the places where it has changed sign on the way.
+    """
+    rows, work, sizes, tails = np.empty((5, COUNT)), np.empty((ROWS, WIDE)), np.empty(JUDGED), np.empty(8)
+    series, field = np.empty(WIDE), np.empty((8, COLUMNS))
+    count, base, left, least, u, whole = 0, 0.0, 0.0, 0.0, -v, fabs(end - top)
+    met, passed = changes.size - 1, breaks.size - 1
+    for _ in range(MOST_TRIES):
+        stop, met, passed, nu = next_stop(top, u, left, whole, changes, breaks, met, passed, nu)
+        if stop <= left:
+            break
+        width, step, _, _ = next_panel(
+            *(drive, p, flags, top, u, 0.0, 1.0, left, stop - left, step, base, v, nu, 0.0, NEVER),
+            *(rows, work, sizes, tails, series),
+        )
+        if width == 0.0:
+            break
+        if count == field.shape[0]:
+            field = taller(field, 2 * count)
+        row, right = field[count], stop if width == stop - left else left + width
+        row[0], row[1] = left, right
+        if count == 0:
+            # V**2 over d vanishes at the equilibrium, as the force does.
+            coefficients(work[BARE], series[:COUNT])
+            least = chebyshev_sum(series[:COUNT], -1.0)
+        for j in range(COUNT):
+            d = left + work[PLACE, j]
+            work[BARE, j] = (work[BARE, j] - least) / d if count == 0 else work[V2, j] / (d * d)
+        coefficients(work[BARE], row[2 : 2 + COUNT])
+        coefficients(work[DS], row[2 + COUNT :])
+        count, base, left = count + 1, work[V2, COUNT], right
+    return field[:count].copy()
+
+
+@Inner
+def along(field, d):  # type: ignore[no-untyped-def]
+    """V**2 over d**2 and ds at a distance."""
     k = 0
     while k < field.shape[0] - 1 and d > field[k, 1]:
         k += 1
     row = field[k]
-    inside = d - row[0]
-    x = 2.0 * inside / row[2] - 1.0 if row[2] > 0.0 else 2.0 * sqrt(inside / -row[2]) - 1.0
-    regular, ds = chebyshev_sum(row[4 : 4 + COUNT], x), chebyshev_sum(row[4 + COUNT :], x)
-    if k == 0 and row[3] == 0.0:
-        return (regular * d * d if order == 2 else regular * d), regular, ds
-    v2 = row[3] + inside * regular
-    if order == 0:
-        return v2, v2, ds
-    return v2, (v2 / d if order == 1 else v2 / (d * d)), ds
+    x = 2.0 * (d - row[0]) / (row[1] - row[0]) - 1.0
+    return chebyshev_sum(row[2 : 2 + COUNT], x), chebyshev_sum(row[2 + COUNT :], x)

@@ -10,9 +10,10 @@ from math import fabs
 
 import numpy as np
 
+from gqm_sym.runtime.arrays import longer, taller
 from gqm_sym.runtime.doubledouble import two_sum
 from gqm_sym.runtime.jit import Inner
-from gqm_sym.runtime.panels import legendre_sum, longer, taller
+from gqm_sym.runtime.panels import legendre_sum
 
 TERMS = 15
 LAST = TERMS - 1

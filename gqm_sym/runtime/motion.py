@@ -1,21 +1,19 @@
 """The motion that a launch begins, as a value that answers questions."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import pairwise
 from math import inf
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gqm_sym.errors import InputError, SolutionError
 from gqm_sym.runtime.course import Course, Pair, Piece
 from gqm_sym.runtime.display import Rows, page
 from gqm_sym.runtime.entries import frame_at
-from gqm_sym.runtime.events import Event, Leg, contact_changes, corners_met, crossings
+from gqm_sym.runtime.events import Event, Leg, contact_changes, corners_met, crossings, passages
 from gqm_sym.runtime.formulas import read_numbers
 from gqm_sym.runtime.grip import slips
+from gqm_sym.runtime.located import Located, locate
 from gqm_sym.runtime.numbers import read_number
 from gqm_sym.runtime.problem import Problem
 from gqm_sym.runtime.stretch import ULP, Array
@@ -38,16 +36,6 @@ class State(NamedTuple):
     kappa: Any
     normal_force: Any
     error: Any
-
-
-@dataclass(frozen=True, slots=True)
-class Located:
-    """Where a motion is at times: which of them fall on a piece, and the anomalies of its stretch there."""
-
-    pieces: tuple[tuple[Piece, NDArray[np.bool_], Array], ...]
-    at_launch: NDArray[np.bool_]
-    laps: Array
-    course: Course
 
 
 class Motion:
@@ -152,7 +140,7 @@ class Motion:
         times, low, shape = self._times(t)
         located = self._located(times, low)
         f, course = self.problem.functions, located.course
-        reduced, s, v = self._places(located), self._arc_lengths(located), self._velocities(located)
+        reduced, s, v = self._places(located), located.arc_lengths(), self._velocities(located)
         v2 = v**2
         x, z, ds, kappa, force = frame_at(f.addresses, f.p, reduced, v2)
         error = self._bound(times, located, reduced, v, ds)
@@ -314,62 +302,19 @@ class Motion:
         return "it moves " + ", ".join(f"from {leg.lam_start!r} to {leg.lam_end!r}" for leg in self.legs)
 
     def _located(self, t: Array, t_low: Array) -> Located:
-        course = self._course(float(np.abs(t).max()) if t.size else 0.0)
-        laps, rest, rest_low = course.reduced(t, t_low)
-        which = course.piece_of(rest)
-        pieces = []
-        for k in np.unique(which):
-            piece, mask = course.pieces[k], which == k
-            laps[mask] += piece.laps
-            phi = course.anomalies(piece, rest[mask], rest_low[mask])
-            pieces.append((piece, mask, np.clip(phi, 0.0, piece.stretch.edges[-1])))
-        return Located(tuple(pieces), (rest == 0.0) & (rest_low == 0.0), laps, course)
+        return locate(self._course(float(np.abs(t).max()) if t.size else 0.0), t, t_low)
 
     def _places(self, located: Located) -> Array:
         """The parameter within the lap; exactly the launch place at launch."""
-        lam = np.full_like(located.laps, self.problem.lam0)
-        for piece, mask, phi in located.pieces:
-            lam[mask] = piece.stretch.places(phi)
-        lam[located.at_launch] = self.problem.lam0
-        return lam
-
-    def _arc_lengths(self, located: Located) -> Array:
-        s = np.zeros_like(located.laps)
-        for piece, mask, phi in located.pieces:
-            s[mask] = piece.s_a + piece.stretch.direction * piece.stretch.lengths(phi)
-        s[located.at_launch] = 0.0
-        return s
+        return located.places(self.problem.lam0)
 
     def _velocities(self, located: Located) -> Array:
-        v = np.zeros_like(located.laps)
-        for piece, mask, phi in located.pieces:
-            v[mask] = piece.direction * piece.stretch.speeds(phi)
-        v[located.at_launch] = self.direction * self.problem.launch.v0.value
-        return v
+        return located.velocities(self.direction * self.problem.launch.v0.value)
 
     def _first_passages(self, lam: float, low: float) -> list[float]:
         """Times of passing a place, the first on each piece."""
         course = self._course(0.0)
-        return self._passages(course.pieces, course, lam, low)
-
-    def _passages(self, pieces: Sequence[Piece], course: Course, lam: float, low: float) -> list[float]:
-        """Times of passing a place, the first on each of some pieces."""
-        out = []
-        for piece in pieces:
-            stretch = piece.stretch
-            within = lam - piece.laps * course.lap
-            inside, outside = (within - stretch.a) + low, (stretch.b - within) - low
-            if inside * stretch.direction < 0.0 or outside * stretch.direction < 0.0:
-                continue
-            phi = np.array([stretch.anomaly_of(inside, outside)])
-            if phi[0] > stretch.edges[-1]:
-                continue
-            out += [when[0] + when[1] for when, _ in crossings(piece, phi, course.pace)]
-            if phi[0] in (0.0, stretch.edges[-1]) and piece.r_stop[0] in (0.0, stretch.duration):
-                at_stop = stretch.a if piece.sense < 0 else stretch.b
-                if within == at_stop:
-                    out.append(piece.t_stop[0])
-        return out
+        return passages(course.pieces, course, lam, low)
 
 
 def _shaped(array: Array, shape: tuple[int, ...]) -> Any:

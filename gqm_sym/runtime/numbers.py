@@ -29,8 +29,7 @@ _TIE_BITS = 700
 _GUARD_BITS = 16
 
 
-# Not frozen, though never changed: a launch makes two or three, and freezing is most of what making one costs.
-@dataclass(slots=True, eq=False, repr=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Number:
     """A finite real number, known exactly. Made by ``read_number``.
 

@@ -28,9 +28,10 @@ from numba import types
 from gqm_sym.runtime.clocks import Array
 from gqm_sym.runtime.crossing import call_frame
 from gqm_sym.runtime.doubledouble import add, reduce
+from gqm_sym.runtime.integrands import TURN_TURN, speeds
 from gqm_sym.runtime.inversion import TERMS, look_up
 from gqm_sym.runtime.jit import Inner, entry
-from gqm_sym.runtime.panels import DEGREE, TURN_TURN, read_off, speeds
+from gqm_sym.runtime.panels import DEGREE, read_off
 from gqm_sym.runtime.waves import sum_wave
 
 BLOCK = 64

@@ -5,7 +5,8 @@ import numpy as np
 from gqm_sym.runtime.course import ZERO, Course
 from gqm_sym.runtime.display import Rows
 from gqm_sym.runtime.events import Event
-from gqm_sym.runtime.motion import Located, Motion
+from gqm_sym.runtime.located import Located
+from gqm_sym.runtime.motion import Motion
 from gqm_sym.runtime.problem import Problem
 from gqm_sym.runtime.stretch import Array
 

@@ -168,7 +168,7 @@ def _from_cusp(problem: Problem) -> Motion:
         begin *= 1e-3  # so slow a launch turns sooner
     direction = ways[0] if w0 == 0.0 else asked
     if direction not in ways:
-        raise leaving(problem, direction, "cusp")
+        raise leaving_at_once(problem, direction, "cusp")
     walked = walk_on(f.addresses, f.p, lam0, w0, direction, begin, problem.period or _room(problem, direction), begin)
     front = _reach(problem, direction, walked)
     passage = Passage(problem, "transit", direction)
@@ -189,7 +189,7 @@ def _from_cusp(problem: Problem) -> Motion:
     return passage.finish()
 
 
-def leaving(problem: Problem, direction: int, what: str) -> LaunchError:
+def leaving_at_once(problem: Problem, direction: int, what: str) -> LaunchError:
     """What to say where a launch would leave the curve at once."""
     return LaunchError(
         f"lam0: {problem.lam0!r} is the {what} itself, and the motion would leave through it at once; "
@@ -201,7 +201,7 @@ def _outward(problem: Problem, direction: int, front: Reach) -> Motion:
     """A motion that leaves the launch place for good, without turning."""
     f, lam0 = problem.functions, problem.lam0
     if abs(front.place - lam0) <= 1e-15 * max(abs(lam0), 1.0):
-        raise leaving(problem, direction, front.what)
+        raise leaving_at_once(problem, direction, front.what)
     kind = "asymptotic" if front.what == "equilibrium" else "transit"
     passage = Passage(problem, kind, direction)
     if problem.w0 > 0.0:

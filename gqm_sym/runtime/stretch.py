@@ -2,12 +2,13 @@
 
 from copy import copy
 from dataclasses import dataclass, field
-from math import atan2, inf, log, pi, sqrt
+from math import inf
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from gqm_sym.errors import SolutionError
+from gqm_sym.runtime.anomalies import anomaly_of, places
 from gqm_sym.runtime.clocks import Array as Array
 from gqm_sym.runtime.clocks import running_totals, slopes
 from gqm_sym.runtime.conditioning import magnified, off_launch
@@ -22,15 +23,9 @@ from gqm_sym.runtime.entries import (
 )
 from gqm_sym.runtime.exact import ExactProblem
 from gqm_sym.runtime.exact_panels import DIGITS, exact_ends, lay_exactly
+from gqm_sym.runtime.integrands import FROM_TURN, REGULAR, TO_EQUILIBRIUM, TURN_TURN
 from gqm_sym.runtime.inversion import TIMED
-from gqm_sym.runtime.panels import (
-    FAILED,
-    FROM_TURN,
-    ILL_CONDITIONED,
-    REGULAR,
-    TO_EQUILIBRIUM,
-    TURN_TURN,
-)
+from gqm_sym.runtime.panels import FAILED, ILL_CONDITIONED
 
 # Below this balance the half period in doubles is off by more than a few units in the last place.
 LEAST_BALANCE = 1e-2
@@ -93,10 +88,14 @@ class Stretch:
         Places at which panels begin besides the curve's own breaks: the rate changes there on a scale that even steps
         would miss.
     v2 : array or None
-        V**2 along it where forces dissipate: a field (`fields`), by the distance from ``a``, or from ``b`` if that is
-        an equilibrium.
+        V**2 towards an equilibrium where forces dissipate: a field (`fields`).
+    slack : float
+        Where ``a`` is no turning point but the body is slow there: how far behind ``a`` one would be, as a share of the
+        last anomaly, in the anomaly.
     laid : tuple, optional
-        Its panels, if they were laid in extended precision.
+        Its panels, if they were laid in extended precision, or with a leg.
+    paces : (float, array), optional
+        Of panels laid with a leg: the last value of the march variable, and the Legendre coefficients of Y (`legs`).
     known : float, optional
         Its duration, where that is known to be good in doubles: panels are then laid when first asked for.
     ends : pair
@@ -112,7 +111,9 @@ class Stretch:
     stop: float = 1.0
     hints: tuple[float, ...] = ()
     v2: Array | None = None
+    slack: float = 0.0
     laid: Any = None
+    paces: tuple[float, Array] | None = None
     known: float | None = None
     ends: tuple[Any, Any] = (None, None)
     _from_exact: bool = False
@@ -129,9 +130,11 @@ class Stretch:
     def _settle(self) -> None:
         """Lay its panels, in extended precision where doubles would lose too much."""
         f = self.functions
+        if self.paces is not None:
+            return
         self._from_exact = self.laid is not None
         if self.v2 is not None:
-            self.laid = lay_along(f.p, self.kind, self.a, self.b, self.v2, self._marks())
+            self.laid = lay_along(self.a, self.b, self.v2, self._marks())
         elif self.laid is None:
             self.w += self._off_launch()
             self.laid = lay_panels(f.addresses, f.p, self.kind, self.a, self.b, self.ref, self.w, self._marks())
@@ -260,7 +263,7 @@ class Stretch:
 
     def _magnified(self) -> float:
         f, ref = self.functions, self.a if self.kind == FROM_TURN else self.ref
-        one_sided = self.kind in (FROM_TURN, REGULAR) and self.v2 is None
+        one_sided = self.kind in (FROM_TURN, REGULAR)
         return magnified(f.addresses, f.p, self.a, self.b, ref, self.w) if one_sided else 1.0
 
     @property
@@ -285,29 +288,12 @@ class Stretch:
 
     def anomaly_of(self, offset_a: float, offset_b: float) -> float:
         """The anomaly of a place given by its signed offsets ``lam - a`` and ``b - lam``."""
-        share_a, share_b = max(offset_a * self.direction, 0.0), max(offset_b * self.direction, 0.0)
-        if self.kind == TURN_TURN:
-            return 2.0 * atan2(sqrt(share_a), sqrt(share_b))
-        whole = abs(self.b - self.a)
-        if self.kind == TO_EQUILIBRIUM:
-            return -log(share_b / whole) if share_b > 0.0 else inf
-        share = share_a / whole if share_a <= share_b else 1.0 - share_b / whole
-        return sqrt(share) if self.kind == FROM_TURN else share
+        ahead, behind = max(offset_a * self.direction, 0.0), max(offset_b * self.direction, 0.0)
+        return anomaly_of(self.kind, self.slack, ahead, behind, abs(self.b - self.a))
 
     def places(self, phi: Array) -> Array:
         """The curve's parameter at anomalies, from the nearer end."""
-        width = self.b - self.a
-        if self.kind == TURN_TURN:
-            near = phi < 0.5 * pi
-            return np.where(
-                near,
-                self.a + width * np.sin(0.5 * phi) ** 2,
-                self.b - width * np.cos(0.5 * phi) ** 2,
-            )
-        if self.kind == TO_EQUILIBRIUM:
-            return self.b - width * np.exp(-phi)
-        share = phi**2 if self.kind == FROM_TURN else phi
-        return np.where(share <= 0.5, self.a + width * share, self.b - width * (1.0 - share))
+        return places(self.kind, self.slack, self.a, self.b, phi)
 
     def speeds(self, phi: Array) -> Array:
         """|ds/dt| at anomalies."""
@@ -315,8 +301,12 @@ class Stretch:
         if self.from_exact:
             return self._paced(phi)
         if self.v2 is not None:
-            along: Array = speeds_along(f.p, self.kind, self.a, self.b, self.v2, phi)
+            along: Array = speeds_along(self.a, self.b, self.v2, phi)
             return along
+        if self.paces is not None:
+            last, terms = self.paces
+            smooth: Array = read_off_many(self.edges, np.zeros_like(self.edges), terms, phi)
+            return smooth * (last * (phi + self.slack)) if self.kind == FROM_TURN else smooth
         speeds: Array = speeds_at(f.addresses, f.p, self.kind, self.a, self.b, self.ref, self.w, phi)
         return speeds * self.spread
 

@@ -3,9 +3,6 @@
 from math import exp, pi
 from typing import Any
 
-import numpy as np
-
-from gqm_sym.runtime.clocks import Array
 from gqm_sym.runtime.panels import FROM_TURN, REGULAR, TO_EQUILIBRIUM, TURN_TURN
 from gqm_sym.runtime.stretch import Functions, Stretch
 
@@ -48,10 +45,3 @@ def through(
 ) -> Stretch:
     """A stretch without special ends; ``w`` is V**2 at ``ref``."""
     return Stretch(functions=functions, kind=REGULAR, a=start, b=end, ref=ref, w=w, known=known, hints=hints)
-
-
-def along_field(functions: Functions, kind: int, a: float, b: float, field: Array, stop: float = 1.0) -> Stretch:
-    """A stretch whose V**2 is a field; its panels begin where the field's do."""
-    origin, way = (b, np.sign(a - b)) if kind == TO_EQUILIBRIUM else (a, np.sign(b - a))
-    hints = tuple(float(place) for place in origin + way * field[:-1, 1])
-    return Stretch(functions=functions, kind=kind, a=a, b=b, v2=field, stop=stop, hints=hints)

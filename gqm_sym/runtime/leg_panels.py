@@ -1,0 +1,229 @@
+"""The panels of a leg: as wide as V**2, the forces and the pace of time on them can be resolved."""
+
+from math import fabs, inf
+
+from gqm_sym.runtime.arrays import taller
+from gqm_sym.runtime.chebyshev import (
+    COEFFICIENTS_BY_NODE,
+    COUNT,
+    LEBESGUE,
+    MEANS,
+    TAILS_BY_NODE,
+    WIDE,
+    extent,
+    first_change,
+    to_ends,
+    to_tails,
+)
+from gqm_sym.runtime.jit import Inner
+from gqm_sym.runtime.leg_equation import (
+    ARC,
+    BARE,
+    FORCE,
+    LOAD,
+    MEAN,
+    PACE,
+    PLACE,
+    PULL,
+    SPEED,
+    D,
+    W,
+    distance,
+    pace,
+    solve_panel,
+)
+
+# Last coefficients against the largest: noise in them is about 1e-16.
+TAIL = 4e-16
+# Coefficients that have stopped falling below this level are rounding noise, not structure.
+PLATEAU = 1e-9
+# What may be left of a function where all of it cancels, as a share of its parts.
+NOISE = 1e-15
+# A width of a few units in the last place of the parameter.
+NARROW = 1e-15
+# Coefficients that fall by this factor a degree reach TAIL with the last ones but one.
+FALL = 7.2
+# A panel is made this much narrower than it would seem to be allowed to be, and at most that many times wider.
+CAUTION, GROWTH = 0.9, 4.0
+# V**2 at a panel's end against the largest so far from which on time is resolved: below, a turn is expected, and time
+# is counted from there.
+HIGH = 0.5
+
+# A part this small of a panel on which V**2 is resolved tells noise from structure.
+SLIVER = 2.0**-20
+
+# Whether time is to be resolved.
+NEVER, MAYBE, ALWAYS = range(3)
+
+# A panel that is kept: where it ends, its time and what that may be off by, and at its nodes the pace of time, that of
+# arc length, and Y.
+COLUMNS = 3 + 3 * COUNT
+
+
+@Inner
+def size_of(work, row):  # type: ignore[no-untyped-def]
+    """The largest value of a row, whatever its sign."""
+    low, high = extent(work, row * WIDE)
+    return max(-low, high)
+
+
+@Inner
+def weigh(rows, base, work, sizes):  # type: ignore[no-untyped-def]
+    """What the coefficients of each function but the pace are held against; the largest V**2 on the panel."""
+    for j in range(COUNT):
+        work[MEAN, j] = fabs(rows[0, j]) * (fabs(rows[3, j]) + fabs(rows[4, j] * work[W, j]))
+    for f in range(PACE):
+        sizes[f] = size_of(work, f)
+    highest = max(base, extent(work, W * WIDE)[1])
+    width = work[PLACE, COUNT]
+    sizes[FORCE] = max(sizes[FORCE], sizes[PULL] * highest * width / work[D, COUNT])
+    sizes[PULL] = max(sizes[PULL], 1.0 / width)
+    sizes[BARE], sizes[LOAD] = max(sizes[BARE], base), extent(work, MEAN * WIDE)[1]
+    return highest
+
+
+@Inner
+def falls(work, row, size, tails):  # type: ignore[no-untyped-def]
+    """The size of a function's last coefficients and of some in the middle, and whether it is resolved."""
+    to_tails(TAILS_BY_NODE, work, row * WIDE, tails, 0)
+    tail = max(fabs(tails[0]), max(fabs(tails[1]), fabs(tails[2])))
+    level = max(fabs(tails[3]), max(fabs(tails[4]), fabs(tails[5])))
+    return tail, level, tail <= TAIL * size or (level <= PLATEAU * size and tail >= 0.05 * level)
+
+
+@Inner
+def resolved(work, sizes, first, last, tails):  # type: ignore[no-untyped-def]
+    """Whether some functions are resolved, and by what the panel's width may be multiplied."""
+    fine, worst = True, 0.0
+    for f in range(first, last):
+        tail, level, ok = falls(work, f, sizes[f], tails)
+        if not (tail < inf and level < inf):
+            return False, 0.5
+        if sizes[f] > 0.0:
+            worst = max(worst, level / sizes[f])
+        fine = fine and ok
+    if worst == 0.0:
+        return fine, GROWTH
+    # Coefficients fall like powers of the distance of what is not smooth.
+    return fine, min(CAUTION * worst ** (-1.0 / 13.0) / FALL, GROWTH)
+
+
+@Inner
+def change_of(work, row, sign, noise, c):  # type: ignore[no-untyped-def]
+    """`first_change` of a function by its values; its coefficients, in c, are found only where values leave a doubt."""
+    low, high = extent(work, row * WIDE)
+    middle, spread = 0.5 * (low + high), 0.5 * LEBESGUE * (high - low)
+    if fabs(middle) > spread + noise:
+        found = 1 if middle > 0.0 else -1
+        if sign == 0 or found == sign:
+            return 2.0, found, 2.0
+    to_ends(COEFFICIENTS_BY_NODE, work, row * WIDE, c, 0)
+    return first_change(c[:COUNT], sign, noise)
+
+
+@Inner
+def to_kink(rows, work, c, tails):  # type: ignore[no-untyped-def]
+    """The place x up to which the curvature keeps its sign: 2 if throughout, -1 if that is not resolved.
+
+    The sign is that of ds kappa, which is smooth at cusps too.
+    """
+    for j in range(COUNT):
+        work[LOAD, j] = rows[0, j] * rows[4, j]
+    size = size_of(work, LOAD)
+    if not falls(work, LOAD, size, tails)[2]:
+        return -1.0
+    return change_of(work, LOAD, 0, NOISE * size, c)[0]
+
+
+@Inner
+def next_panel(  # type: ignore[no-untyped-def]
+    drive, p, flags, origin, u, g, c, left, room, step, base, v, nu, ceiling, ask, rows, work, sizes, tails, series
+):
+    """The widest panel that can be resolved, no wider than ``room`` and ``step``.
+
+    Time on it is resolved too: where ``ask`` is ALWAYS; never where it is NEVER; where it is MAYBE, unless V**2 falls
+    below a part of the largest so far, ``ceiling``.
+
+    Returns
+    -------
+    width : float
+        In the march variable; 0 if none is wide enough to be one.
+    step : float
+        To go on with.
+    far : float
+        q over the panel.
+    timed : bool
+        Whether time is resolved.
+    """
+    width, kink, widest = min(step, room), False, 0.0
+    gone, near = distance(left, g, c), 2.0 * g * left + c
+    here = origin + u * gone
+    for _ in range(2100):
+        run = width * (near + g * width)
+        if run <= NARROW * max(fabs(here), gone) or run < 1e-300:
+            return 0.0, step, 0.0, False
+        far = solve_panel(drive, p, flags[2] == 1, origin, u, g, c, left, width, base, v, nu, rows, work)
+        if flags[1] == 1 and not kink and (far < inf or flags[2] == 1):
+            x = to_kink(rows, work, series, tails)
+            if x <= 1.0:
+                kink = x > -1.0
+                width *= 0.5 * (1.0 + x) if kink else 0.5
+                continue
+            for j in range(COUNT):
+                work[LOAD, j] = rows[0, j] * (rows[3, j] + rows[4, j] * work[W, j])
+        if not far < inf:
+            width, kink = 0.5 * width, False
+            continue
+        highest = weigh(rows, base, work, sizes)
+        fine, growth = resolved(work, sizes, 0, PACE, tails)
+        if fine:
+            widest = max(widest, width)
+            top, end = max(ceiling, highest), work[W, COUNT]
+            needed = ask == ALWAYS or (ask == MAYBE and (end >= HIGH * top or base < HIGH * top))
+            timed, more = False, GROWTH
+            if ask != NEVER:
+                pace(g, c, left, base, work)
+                sizes[PACE] = size_of(work, PACE)
+                timed, more = resolved(work, sizes, PACE, PACE + 1, tails)
+            # On so small a part of what is smooth it is noise that is not resolved; the error says so.
+            timed = timed or (needed and width <= SLIVER * widest and tails[0] < inf)
+            if timed or not needed:
+                if timed:
+                    growth = min(growth, more)
+                step = max(step, width * growth) if kink or width == room else width * growth
+                return width, step, far, timed
+            growth = more
+        width, kink = width * max(min(growth, 0.9), 0.2), False
+    return 0.0, step, 0.0, False
+
+
+@Inner
+def keep(panels, count, right, width, work, tails):  # type: ignore[no-untyped-def]
+    """Keep a panel that ends at w = ``right`` behind ``count`` others; the panels, more of them if it had to be."""
+    if count == panels.shape[0]:
+        panels = taller(panels, 2 * count)
+    row, time = panels[count], 0.0
+    for j in range(COUNT):
+        time += MEANS[COUNT, j] * work[PACE, j]
+        row[3 + j], row[3 + COUNT + j], row[3 + 2 * COUNT + j] = work[PACE, j], work[ARC, j], work[SPEED, j]
+    row[0], row[1] = right, width * time
+    row[2] = width * max(fabs(tails[0]), max(fabs(tails[1]), fabs(tails[2])))
+    return panels
+
+
+@Inner
+def next_stop(origin, u, gone, whole, changes, breaks, met, passed, nu):  # type: ignore[no-untyped-def]
+    """On the way back: the distance at which the next panel must end, and what has been passed.
+
+    ``met`` and ``passed`` are the last changes of N's sign ``nu`` and the last breaks that are still to come.
+    """
+    here, stop = origin + u * gone, whole
+    while met >= 0 and u * (changes[met] - here) <= 0.0:
+        met, nu = met - 1, -nu
+    while passed >= 0 and u * (breaks[passed] - here) <= 0.0:
+        passed -= 1
+    if met >= 0:
+        stop = min(stop, u * (changes[met] - origin))
+    if passed >= 0:
+        stop = min(stop, u * (breaks[passed] - origin))
+    return stop, met, passed, nu

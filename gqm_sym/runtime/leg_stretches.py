@@ -1,0 +1,101 @@
+"""Stretches of a dissipative motion, from the panels of its legs."""
+
+from math import inf
+
+import numpy as np
+from numba import types
+
+from gqm_sym.runtime.chebyshev import COUNT, TO_COEFFICIENTS, WIDE, to_ends
+from gqm_sym.runtime.clocks import Array
+from gqm_sym.runtime.integrands import FROM_TURN, REGULAR, TO_EQUILIBRIUM
+from gqm_sym.runtime.jit import entry
+from gqm_sym.runtime.leg_panels import COLUMNS
+from gqm_sym.runtime.panels import CONVERGED, DEGREE
+from gqm_sym.runtime.stretch import ULP, Functions, Stretch
+
+# An equilibrium is approached until the distance left is exp(-this) of the leg: all that doubles have.
+CLOSEST = 690.0
+
+
+def _to_legendre() -> tuple[Array, Array]:
+    """Legendre coefficients of a function on [-1, 1], and of its integral from -1, from values at a panel's nodes."""
+    # x P_j = ((j + 1) P_(j+1) + j P_(j-1))/(2 j + 1), and T_(k+1) = 2 x T_k - T_(k-1).
+    j = np.arange(WIDE)
+    series = np.zeros((COUNT, WIDE))
+    series[0, 0] = series[1, 1] = 1.0
+    for k in range(2, COUNT):
+        row = series[k - 1]
+        series[k, 1:] += 2.0 * (j[1:] / (2 * j[1:] - 1)) * row[:-1]
+        series[k, :-1] += 2.0 * (j[1:] / (2 * j[1:] + 1)) * row[1:]
+        series[k] -= series[k - 2]
+    plain = TO_COEFFICIENTS.T @ series
+    integral = np.zeros((COUNT, WIDE))
+    integral[:, 0] = plain[:, 0] - plain[:, 1] / 3.0
+    i = np.arange(1, DEGREE)
+    integral[:, 1:DEGREE] = plain[:, i - 1] / (2 * i - 1) - plain[:, i + 1] / (2 * i + 3)
+    return np.ascontiguousarray(plain), integral
+
+
+PLAIN_BY_NODE, INTEGRAL_BY_NODE = _to_legendre()
+
+_LINE = types.float64[::1]
+_ROWS = types.float64[:, ::1]
+
+
+@entry(types.Tuple((_LINE, _LINE, _LINE, _ROWS, _ROWS, _ROWS, types.float64))(_ROWS, types.float64))
+def read_panels(panels, time):  # type: ignore[no-untyped-def]
+    """What `panels.lay` would have of a leg's panels, whose times add up to ``time``.
+
+    Returns
+    -------
+    edges, times, lengths, time_terms, length_terms : arrays
+        As `panels.lay` has them; the last anomaly is 1.
+    speed_terms : (n, DEGREE) array
+        Legendre coefficients of Y.
+    error : float
+        Estimated relative error of the time.
+    """
+    n = panels.shape[0]
+    edges, times, lengths = np.zeros(n + 1), np.zeros(n + 1), np.zeros(n + 1)
+    time_terms, length_terms, speed_terms = np.empty((n, DEGREE)), np.empty((n, DEGREE)), np.empty((n, DEGREE))
+    out, error, last = np.empty(3 * WIDE), 0.0, panels[n - 1, 0]
+    for k in range(n):
+        half = 0.5 * (panels[k, 0] - (panels[k - 1, 0] if k > 0 else 0.0))
+        at = k * COLUMNS + 3
+        to_ends(INTEGRAL_BY_NODE, panels, at, out, 0)
+        to_ends(INTEGRAL_BY_NODE, panels, at + COUNT, out, WIDE)
+        to_ends(PLAIN_BY_NODE, panels, at + 2 * COUNT, out, 2 * WIDE)
+        length = 0.0
+        for j in range(DEGREE):
+            time_terms[k, j], length_terms[k, j] = half * out[j], half * out[WIDE + j]
+            speed_terms[k, j] = out[2 * WIDE + j]
+            length += length_terms[k, j]
+        edges[k + 1] = panels[k, 0] / last
+        times[k + 1], lengths[k + 1] = times[k] + panels[k, 1], lengths[k] + length
+        error += panels[k, 2]
+    times[n] = time
+    return edges, times, lengths, time_terms, length_terms, speed_terms, error / time + ULP if time > 0.0 else ULP
+
+
+def along_panels(f: Functions, a: float, b: float, slack: float, time: float, panels: Array) -> Stretch:
+    """A stretch by its panels (`leg_panels`), whose times add up to ``time``.
+
+    ``slack`` is c/2 of their march variable, infinite where that is the distance.
+    """
+    *laid, speed_terms, error = read_panels(panels, time)
+    last = float(panels[-1, 0])
+    return Stretch(
+        functions=f,
+        kind=REGULAR if slack == inf else FROM_TURN,
+        a=a,
+        b=b,
+        slack=0.0 if slack == inf else slack / last,
+        laid=(*laid, error, 1.0, CONVERGED),
+        paces=(last, speed_terms),
+    )
+
+
+def along_field(f: Functions, a: float, b: float, field: Array) -> Stretch:
+    """A stretch towards an equilibrium b where V**2 is a field; its panels begin where the field's do."""
+    hints = tuple(float(place) for place in b + np.sign(a - b) * field[:-1, 1])
+    return Stretch(functions=f, kind=TO_EQUILIBRIUM, a=a, b=b, v2=field, stop=CLOSEST, hints=hints)
