@@ -135,6 +135,34 @@ def test_start_point_off_the_curve(ring: ModuleType, generated_folder: Path) -> 
         assert agrees(module.solve(lam0="1/4").period_to(DIGITS), pendulum_period(angle, mpf(0)))
 
 
+def test_beside_a_singular_point(generated_folder: Path) -> None:
+    """The strophoid's loop is traced to its node; a swing on it (of the corpus) that stays away has all digits."""
+    start = ("-3*sqrt(3)/10", "-9/10")
+    curve = gqm.Curve.implicit("x**2*(a - z) - z**2*(a + z)", start=start, tangent=-1, parameters={"a": "9/5"})
+    module = gqm.build(gqm.derive(curve, gqm.Gravity()), name="exact_strophoid", folder=generated_folder)
+    motion = module.solve(lam0=0)
+    assert ulps(motion.half_period, "1.003562114539050285946395584607442") <= PERIOD_ULPS
+
+
+def test_another_force(generated_folder: Path) -> None:
+    """A bead on a turning hoop: V**2 changes with x as well."""
+    curve = gqm.Curve.implicit("x**2 + z**2 - 1", start=(0, -1))
+    force = gqm.Gravity() + gqm.RotatingFrame(Omega="3/2")
+    module = gqm.build(gqm.derive(curve, force), name="exact_hoop", folder=generated_folder)
+    motion = module.solve(lam0="1")
+    with mp.workdps(45):
+        g, rate = mpf(G), mpf(9) / 4
+
+        def quarter(phi: mpf) -> mpf:
+            # sin(angle/2) = k sin(phi): V**2 = (cos(angle) - cos(1)) (2 g - rate (cos(angle) + cos(1))).
+            k = mp.sin(mpf("0.5"))
+            angle = 2 * mp.asin(k * mp.sin(phi))
+            return 2 / (mp.cos(angle / 2) * mp.sqrt(2 * (2 * g - rate * (mp.cos(angle) + mp.cos(1)))))
+
+        period = 4 * mp.quad(quarter, [0, mp.pi / 2])
+        assert agrees(motion.period_to(40), period)
+
+
 # -- tracks of parts ------------------------------------------------------------------------------
 
 VALLEY = [("-3", "4"), ("0", "0"), ("2", "0"), ("7", "12")]

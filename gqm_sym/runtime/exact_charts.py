@@ -128,10 +128,10 @@ class ChartTrack:
         return self._period
 
     def elsewhere(self) -> Any:
-        """The place of the edge of a piece that is farthest from the launch, among the nearer ones."""
-        here = bisect_right(self._edges, self._near)
-        near = self._edges[max(here - 8, 0)], self._edges[min(here + 7, len(self._edges) - 1)]
-        return self._context.mpf(max(near, key=lambda edge: abs(edge - self._near)))
+        """The farther end of the piece that is launched on, but no end of the curve, which may be singular."""
+        k, last = self._piece(self.lam0), len(self._edges) - 1
+        ends = [self._edges[j] for j in (k, k + 1) if self._chart.period or 0 < j < last] or self._edges[k : k + 2]
+        return self._context.mpf(max(ends, key=lambda edge: abs(edge - self._near)))
 
     def joints(self, low: Any, high: Any) -> list[Any]:
         """Joints of pieces between two places, in their order."""
