@@ -16,10 +16,12 @@ import sympy as sp
 
 from gqm_sym.derivation import Model
 from gqm_sym.errors import SolutionError
+from gqm_sym.kernels.base import CONTACT_SIGN, DIRECTION
 from gqm_sym.runtime import Motion
 from gqm_sym.runtime.display import Rows, summary, table
 from gqm_sym.runtime.extras import needs
 from gqm_sym.specfile import Spec
+from gqm_sym.sympy_charts import ChartFunction
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -29,6 +31,9 @@ FIGURES = {
     "loads": "Speed and contact force against arc length",
     "portrait": "Phase portrait, with the orbit of the launch",
 }
+
+# dF/dx, d2F/dx2, d2F/dxdz.
+_PARTIAL = re.compile(r"d(2?)F/d(\w)d?(\w?)")
 
 STYLE = """
 body { font: 16px/1.5 system-ui, sans-serif; max-width: 60rem; margin: 2rem auto; padding: 0 1rem; color: #222; }
@@ -117,8 +122,10 @@ def _formulas(model: Model) -> Iterator[str]:
     """Yield each closed form as a block of MathML."""
     lam = model.parameter.name
     named = {model.lam0: sp.Symbol(f"{lam}_0"), model.v0: sp.Symbol("V_0")}
+    named |= {DIRECTION: sp.Symbol("sgn V"), CONTACT_SIGN: sp.Symbol("sgn N")}
     for label, form in model.closed_forms():
-        shown = form.xreplace(named)
+        charted = {head: sp.Function(head.row)(*head.args) for head in form.atoms(ChartFunction)}
+        shown = form.xreplace(charted).xreplace(named)
         if isinstance(shown, sp.Equality):
             note = f'<mspace width="2em"/><mtext>({escape(label)})</mtext>'
             inner = f"{_mathml(shown.lhs)}<mo>=</mo>{_mathml(shown.rhs)}{note}"
@@ -134,10 +141,19 @@ def _label(label: str) -> str:
     """The left side of a closed form, such as ds/dtheta, V**2 or W = V**2."""
     if " = " in label:
         return "<mo>=</mo>".join(map(_label, label.split(" = ")))
+    if found := _PARTIAL.fullmatch(label):
+        order, first, second = found.groups()
+        above, below = _power("<mo>∂</mo>", order), _power(f"<mi>{first}</mi>", "2" if second == "2" else "")
+        mixed = f"<mo>∂</mo><mi>{second}</mi>" if second not in ("", "2") else ""
+        return f"<mfrac><mrow>{above}<mi>F</mi></mrow><mrow><mo>∂</mo>{below}{mixed}</mrow></mfrac>"
     if "/" in label:
         above, below = (f"<mrow><mi>d</mi>{_mathml(sp.Symbol(part[1:]))}</mrow>" for part in label.split("/"))
         return f"<mfrac>{above}{below}</mfrac>"
     return _mathml(sp.Symbol("V") ** 2 if label == "V**2" else sp.Symbol(label))
+
+
+def _power(base: str, exponent: str) -> str:
+    return f"<msup>{base}<mn>{exponent}</mn></msup>" if exponent else base
 
 
 def _mathml(form: sp.Basic) -> str:

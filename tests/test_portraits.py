@@ -1,5 +1,6 @@
 """Figures of models: their curves are the energies' own, and the separatrices pass through the equilibria."""
 
+from pathlib import Path
 from types import ModuleType
 
 import numpy as np
@@ -44,6 +45,16 @@ def test_separatrix_of_the_pendulum(circle: ModuleType) -> None:
     assert np.abs(marks["unstable equilibrium"] - [-np.pi, np.pi]).max() <= 1e-7
     assert np.abs(marks["stable equilibrium"]).min() <= 1e-7
     assert axes.get_ylabel() == "velocity ds/dt (m/s)"
+
+
+def test_level_stretches_have_no_equilibria(tmp_path: Path) -> None:
+    """On a rail with a loop the top is one; on the straight pieces a body may rest anywhere, and no place is marked."""
+    rail = gqm.Curve.piecewise([gqm.line(length=2), gqm.arc(radius=1, angle="2*pi"), gqm.line(length=2)])
+    module = gqm.build(gqm.derive(rail, gqm.Gravity()), name="loop", folder=tmp_path)
+    (axes,) = gqm.figures.phase_portrait(module).axes
+    marks = {line.get_label(): line.get_xdata() for line in axes.lines}
+    assert marks["unstable equilibrium"] == pytest.approx([2 + np.pi], abs=1e-6)
+    assert "stable equilibrium" not in marks
 
 
 def test_separatrix_ends_at_its_turning_points(wells: ModuleType) -> None:

@@ -8,6 +8,7 @@ import pytest
 
 import gqm_sym as gqm
 from gqm_sym.cli import tool
+from gqm_sym.report import _formulas
 
 HTML, SVG, MATH = (
     "{http://www.w3.org/1999/xhtml}",
@@ -89,6 +90,18 @@ def test_what_a_page_says(here: Path) -> None:
     (source,) = tree.iter(f"{HTML}pre")
     assert source.text == FILE
     assert tree.find(f"{HTML}head/{HTML}title").text == f"swing: {spec.title}"  # type: ignore[union-attr]
+
+
+def test_formulas_are_written_as_people_write_them() -> None:
+    """Partial derivatives, functions of arc length, signs of velocity and force, V**2 as a power."""
+    track = gqm.Curve.implicit("x**2*z + z**3 + 1", start=(0, -1))
+    rough = gqm.derive(track, gqm.Gravity() + gqm.CoulombFriction())
+    shown = [ElementTree.fromstring(block) for block in _formulas(rough) if block.startswith("<div")]
+    texts = ["".join(block.itertext()).replace("\u2062", "").replace(" ", "") for block in shown]
+    assert {"∂F∂x=2xz", "∂2F∂x2=2z", "∂2F∂x∂z=2x", "κ=κ(s)", "dzds=sin(α(s))"} <= set(texts)
+    assert any(text.startswith("W=V2=") for text in texts)
+    assert any("sgnV" in text and "sgnN" in text for text in texts)
+    assert not any("chart" in text or "contact" in text for text in texts)
 
 
 @pytest.mark.parametrize("launch", [["--lam0=0"], ["--lam0=pi/2", "--v0=9", "--t-max=1"]])

@@ -33,6 +33,9 @@ OVERLAP = 1.5
 # Periods that agree so well are drawn as equal.
 EQUAL = 1e-9
 
+# A step of the energy that is no more than rounding, and how wide (as a share of all places) a flat summit may be.
+LEVEL, FLAT = 1e-14, 0.05
+
 
 class _Levels(NamedTuple):
     """V**2 lost in climbing to each place, up to a constant, with its extrema among the places."""
@@ -195,11 +198,13 @@ def _field(formulas: Formulas, lam: Array, given: tuple[Any, ...]) -> _Levels:
 
 
 def _extremes(climb: Array) -> Iterator[tuple[int, int]]:
-    """Places that are lower (-1) or higher (+1) than the one before, and no less so than the one after."""
-    slopes = np.sign(np.diff(climb))
-    for k, (before, after) in enumerate(pairwise(slopes), start=1):
-        if before and np.isfinite(before + after) and after != before:
-            yield k, int(before)
+    """Places that are lowest (-1) or highest (+1) among those around; none on a level stretch."""
+    steps = np.diff(climb)
+    slopes = np.sign(np.where(np.abs(steps) <= LEVEL * np.nanmax(np.abs(climb)), 0.0, steps))
+    for before, after in pairwise(np.flatnonzero(slopes)):
+        turns = slopes[before] * slopes[after] < 0.0 and np.isfinite(slopes[before : after + 1]).all()
+        if turns and after - before <= FLAT * len(climb):
+            yield int(before + 1 + after) // 2, int(slopes[before])
 
 
 def _narrowed(climb_at: Any, low: float, high: float, sign: int) -> float:
