@@ -22,6 +22,7 @@ from numba.core.registry import CPUDispatcher
 
 import gqm_sym.runtime
 from gqm_sym.runtime import interface, jit
+from gqm_sym.runtime.chebyshev import COUNT
 
 _NAMES = {"asin": "arcsin", "acos": "arccos", "atan": "arctan", "atan2": "arctan2", "pow": "power"}
 _NAMES |= {"asinh": "arcsinh", "acosh": "arccosh", "atanh": "arctanh"}
@@ -50,7 +51,24 @@ def _carray(array: Any, shape: Any) -> Any:
 
 _MATH: dict[Any, Any] = {getattr(math, name): getattr(np, other) for name, other in _NAMES.items()}
 _MATH |= {math.floor: _whole(math.floor), math.ceil: _whole(math.ceil), numba.carray: _carray}
-_QUICK = {"fma": lambda x, y, z: np.float64(_fma(x, y, z)), "nearest_whole": np.rint}
+
+
+def _sums(table: Any, values: Any, at: int, out: Any, to: int) -> None:
+    """Add up rows of a table, as `matrices.columns` does."""
+    total = np.zeros(table.shape[1])
+    for value, row in zip(values.reshape(-1)[at : at + len(table)], table, strict=True):
+        total = total + value * row
+    out.reshape(-1)[to : to + total.size] = total
+
+
+def _extent(values: Any, at: int) -> tuple[Any, Any]:
+    """Give the span of a panel's values, as `matrices.span` does."""
+    part = values.reshape(-1)[at : at + COUNT]
+    return np.fmin.reduce(part), np.fmax.reduce(part)
+
+
+_QUICK = {"sums": _sums, "least_and_greatest": _extent}
+_QUICK |= {"fma": lambda x, y, z: np.float64(_fma(x, y, z)), "nearest_whole": np.rint}
 
 
 def _call(address: int, *arguments: Any) -> None:

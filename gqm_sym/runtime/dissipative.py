@@ -2,7 +2,7 @@
 
 from math import inf, isfinite
 from operator import itemgetter
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from gqm_sym.runtime.doubledouble import two_sum
 from gqm_sym.runtime.entries import frame_at, from_rest
 from gqm_sym.runtime.events import passages
 from gqm_sym.runtime.formulas import Formulas, Given, Launch
-from gqm_sym.runtime.leg_stretches import along_field, along_panels
+from gqm_sym.runtime.leg_stretches import Run, along_field, along_panels
 from gqm_sym.runtime.motion import Motion
 from gqm_sym.runtime.problem import Problem
 from gqm_sym.runtime.rest import Rest
@@ -63,22 +63,6 @@ def _way(forwards: float, backwards: float) -> int:
     if forwards <= 0.0 <= backwards:
         return 0
     return 1 if forwards > 0.0 else -1
-
-
-class Run(NamedTuple):
-    """One run of the body as compiled code tells of it (`legs.follow`), not yet made into pieces."""
-
-    start: float
-    place: float
-    middle: float
-    slack: float
-    times: tuple[float, float]
-    changes: Array
-    ahead: Array
-    back: Array
-    what: int
-    end: str
-    laps: int
 
 
 class Dissipative(Motion):
@@ -231,7 +215,7 @@ class Dissipative(Motion):
 
     def _go_on(self) -> None:
         """Follow the body to its next turn, to an end, or as far as one run goes."""
-        if len(self._pieces) >= MOST_PIECES:
+        if len(self._done) + len(self._runs) >= MOST_PIECES:
             raise BudgetError(
                 f"motion: {MOST_PIECES} pieces of legs reach t = {self._pieces[-1].t_stop[0]!r} only; "
                 "give a shorter t_max, or ask for earlier times and nearer places"

@@ -15,7 +15,7 @@ from gqm_sym.runtime.chart import Chart, ChartMaker
 from gqm_sym.runtime.entries import frame_at, loads_at
 from gqm_sym.runtime.exact_problems import exact_problem
 from gqm_sym.runtime.interface import Addresses, Dissipation, ExactClimb, ExactFormulas
-from gqm_sym.runtime.numbers import Number, read_number
+from gqm_sym.runtime.numbers import Number, read_number, read_numbers
 from gqm_sym.runtime.stretch import Array, Functions
 from gqm_sym.runtime.threads import spread
 
@@ -336,15 +336,3 @@ class Formulas:
         from gqm_sym.runtime.sweeping import sweep
 
         return sweep(self, quantity, lam0, v0, direction, lam, t_max, contact, given)
-
-
-def read_numbers(values: Any, *, where: str) -> tuple[Array, Array, tuple[int, ...]]:
-    """Numbers, or arrays of them, as flat arrays of doubles, flat arrays of what those leave over, and their shape."""
-    if isinstance(values, np.ndarray) and values.dtype == np.float64:
-        flat = np.ascontiguousarray(values).reshape(-1)
-        return flat, np.zeros_like(flat), values.shape
-    array = np.asarray(values, dtype=object)
-    numbers = [read_number(v, where=where) for v in array.reshape(-1)]
-    high = np.array([n.value for n in numbers], dtype=np.float64)
-    low = np.array([n.low for n in numbers], dtype=np.float64)
-    return high, low, array.shape

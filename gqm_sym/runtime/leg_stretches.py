@@ -1,6 +1,7 @@
 """Stretches of a dissipative motion, from the panels of its legs."""
 
 from math import inf
+from typing import NamedTuple
 
 import numpy as np
 from numba import types
@@ -75,6 +76,22 @@ def read_panels(panels, time):  # type: ignore[no-untyped-def]
         error += panels[k, 2]
     times[n] = time
     return edges, times, lengths, time_terms, length_terms, speed_terms, error / time + ULP if time > 0.0 else ULP
+
+
+class Run(NamedTuple):
+    """One run of the body as compiled code tells of it (`legs.follow`), not yet made into pieces."""
+
+    start: float
+    place: float
+    middle: float
+    slack: float
+    times: tuple[float, float]
+    changes: Array
+    ahead: Array
+    back: Array
+    what: int
+    end: str
+    laps: int
 
 
 def along_panels(f: Functions, a: float, b: float, slack: float, time: float, panels: Array) -> Stretch:

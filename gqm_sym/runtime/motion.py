@@ -11,10 +11,9 @@ from gqm_sym.runtime.course import Course, Pair, Piece
 from gqm_sym.runtime.display import Rows, page
 from gqm_sym.runtime.entries import frame_at
 from gqm_sym.runtime.events import Event, Leg, contact_changes, corners_met, crossings, passages
-from gqm_sym.runtime.formulas import read_numbers
 from gqm_sym.runtime.grip import slips
 from gqm_sym.runtime.located import Located, locate
-from gqm_sym.runtime.numbers import read_number
+from gqm_sym.runtime.numbers import read_number, read_numbers
 from gqm_sym.runtime.problem import Problem
 from gqm_sym.runtime.stretch import ULP, Array
 

@@ -11,6 +11,9 @@ from fractions import Fraction
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any, TypeAlias
 
+import numpy as np
+from numpy.typing import NDArray
+
 from gqm_sym import rationals
 from gqm_sym.angles import enclose_angle
 from gqm_sym.enclosures import Interval, enclose
@@ -100,6 +103,7 @@ class Number:
         return hash((self.value, self.low))
 
 
+Doubles: TypeAlias = NDArray[np.float64]
 Source: TypeAlias = "str | int | float | Fraction | Decimal | Number | Any"
 
 
@@ -137,6 +141,18 @@ def read_number(value: Source, *, where: str) -> Number:
     except ValueError as error:
         raise NumberError(f"{where}: {error}") from None
     raise NumberError(f"{where}: {type(value).__name__} given; give a number, or text such as '9.81' or 'pi/2'")
+
+
+def read_numbers(values: Any, *, where: str) -> tuple[Doubles, Doubles, tuple[int, ...]]:
+    """Numbers, or arrays of them, as flat arrays of doubles, flat arrays of what those leave over, and their shape."""
+    if isinstance(values, np.ndarray) and values.dtype == np.float64:
+        flat = np.ascontiguousarray(values).reshape(-1)
+        return flat, np.zeros_like(flat), values.shape
+    array = np.asarray(values, dtype=object)
+    numbers = [read_number(v, where=where) for v in array.reshape(-1)]
+    high = np.array([n.value for n in numbers], dtype=np.float64)
+    low = np.array([n.low for n in numbers], dtype=np.float64)
+    return high, low, array.shape
 
 
 @lru_cache(maxsize=1024)
