@@ -1,5 +1,5 @@
 # Made by gqm-gen for "strophoid". Do not edit: change its declaration and generate again.
-# interface 2, input 997282e2d787, body 60cdcfd4ae8b
+# interface 3, input 997282e2d787, body dd9e3722c15a
 """Bead on the hanging loop of a right strophoid
 
 F              = x**2*(a - z) - z**2*(a + z)
@@ -32,7 +32,7 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=2)
+compiled = compiler(__file__, interface=3)
 
 from gqm_sym.runtime import (
     BEND,

@@ -13,7 +13,7 @@ from gqm_sym.errors import LaunchError, ParameterError
 from gqm_sym.runtime.chart import Chart, ChartMaker
 from gqm_sym.runtime.entries import frame_at, loads_at
 from gqm_sym.runtime.exact import ExactProblem
-from gqm_sym.runtime.interface import Addresses, Dissipation, ExactFormulas
+from gqm_sym.runtime.interface import Addresses, Dissipation, Each, ExactFormulas
 from gqm_sym.runtime.numbers import Number, read_number
 from gqm_sym.runtime.stretch import Array, Functions
 from gqm_sym.runtime.threads import spread
@@ -104,6 +104,8 @@ class Formulas:
         What makes the chart of a curve that has no formulas.
     dissipation
         What a dissipative model adds; None for a conservative one.
+    each
+        The functions of a sweep; None where motions are solved one by one.
     """
 
     name: str
@@ -115,6 +117,7 @@ class Formulas:
     exact: ExactFormulas | None = None
     chart: ChartMaker | None = None
     dissipation: Dissipation | None = None
+    each: Each | None = None
     at_least: tuple[tuple[str, str], ...] = ()
     body: str = ""
     grip: tuple[str, str] | None = None

@@ -223,13 +223,15 @@ def extreme(fns, p, kind, lam0, w0, a, b, width, asked, sign, work):  # type: ig
     nogil=True,
 )
 def answer_many(fns, ps, lam0s, v0s, ways, domains, places, asked, out, reasons):  # type: ignore[no-untyped-def]
-    """Fill a row of ``out`` and of ``reasons`` for each launch.
+    """Fill a row of ``out`` and of ``reasons`` for each launch that is HARD so far.
 
     ``ps`` has a row of parameters a launch, ``domains`` both ends and the period. A row of ``out`` holds both turning
     points (PLACES), the least and the greatest (SPEEDS, FORCES), or the half period or loop time and the kind (TIME).
     """
     work, rates = np.empty((4, MOST)), np.empty(MOST)
     for k in range(lam0s.size):
+        if reasons[k] != HARD:
+            continue
         out[k, 0] = out[k, 1] = np.nan
         p, lam0, v0 = ps[k], lam0s[k], v0s[k]
         low, high, period = domains[k, 0], domains[k, 1], domains[k, 2]
