@@ -1,12 +1,7 @@
 """Turning points and times of many orbits at once, an orbit in each lane of a vector register.
 
-Every step is a loop over the orbits of a batch: it fills arrays by the module's functions ``_each``, and works on them
-without branches. Zeros of V**2 are guessed by Newton's method; then bounds of the climb's slope over a few pieces of an
-orbit prove that V**2 is positive between them. Orbits for which that does not succeed, or whose time does not
-converge, are left to `swift`, which takes them one by one.
-
-A batch is an array with a row for each quantity and a column for each orbit, beside the run-time parameters, a row
-each. Columns are whole registers: the last orbit is repeated to fill one.
+Orbits for which `batch_search` proves no turning points, or whose time does not converge, are left to `swift`, which
+takes them one by one. Columns of a batch are whole registers: the last orbit is repeated to fill one.
 """
 
 from math import fabs, inf, isfinite, nan, pi, sqrt
@@ -14,35 +9,51 @@ from math import fabs, inf, isfinite, nan, pi, sqrt
 import numpy as np
 from numba import types
 
-from gqm_sym.runtime.crossing import call_bend_each, call_bounds_each, call_rise_each
-from gqm_sym.runtime.entries import first_step
+from gqm_sym.runtime.batch_search import (
+    AHEAD,
+    CHANGE,
+    FOUND,
+    HIGH,
+    LASTING,
+    LEAST,
+    LOW,
+    MOST,
+    NOWHERE,
+    REACH,
+    ROWS,
+    SPEED,
+    START,
+    STATE,
+    SUM,
+    VALUE,
+    WAY,
+    WHO,
+    A,
+    B,
+    launch,
+    prove,
+    seek,
+    turn_round,
+)
+from gqm_sym.runtime.crossing import call_bend_each, call_rise_each
 from gqm_sym.runtime.fused import choose
 from gqm_sym.runtime.jit import Inner, entry
-from gqm_sym.runtime.search import UNRESOLVED
 from gqm_sym.runtime.swift import (
     CIRCULATION,
     DONE,
-    DOUBLINGS,
     FEWEST,
     FROM_A,
     FROM_B,
     LEAST_BALANCE,
     LIBRATION,
+    MOST_NODES,
     PASSING,
     SAME,
     SHARES,
 )
 
 # Orbits of a batch: its arrays stay in the first-level cache. Orbits of a full register, at most.
-BATCH, LANES = 256, 8
-# Rows of a batch: which launch, its place and V**2, which way it goes, how far the curve reaches; the search's state,
-# its bracket, its trial and the zero; offsets of both ends from the launch, the ends; what the quadrature keeps.
-WHO, START, SPEED, WAY, REACH, STATE, LEFT, RIGHT, TRIAL, AHEAD, LEAST, MOST = range(12)
-A, B, SUM, VALUE, CHANGE, LOW, HIGH, ROWS = range(12, 20)
-# What a search has come to.
-SEEKING, FOUND, NOWHERE = 0.0, 1.0, 2.0
-# Trials of a search, and the relative step after which the next would be below rounding.
-TRIALS, CLOSE = 40, 1e-9
+BATCH, LANES = 128, 8
 # Pieces of an orbit for its proof: a few first, more where those do not suffice.
 FEW_PIECES, MANY_PIECES = 3, 12
 # A rule's change is foreseen from its last two, which fall geometrically: below this it is less than rounding. The
@@ -54,10 +65,10 @@ _ROWS = types.float64[:, ::1]
 
 
 @Inner
-def gather(s, p, count, n, chosen, kept, t, q):  # type: ignore[no-untyped-def]
-    """Copy the first ``kept`` of ``chosen`` columns and their parameters; returns how many columns that fills."""
+def gather(s, p, count, n, chosen, kept, t, q, rows):  # type: ignore[no-untyped-def]
+    """Copy ``chosen`` columns, ``kept`` of them, and their parameters; returns how many columns that fills."""
     full = -(-kept // LANES) * LANES
-    for row in range(ROWS):
+    for row in range(rows):
         for j in range(kept):
             t[row, j] = s[row, chosen[j]]
         for j in range(kept, full):
@@ -71,119 +82,9 @@ def gather(s, p, count, n, chosen, kept, t, q):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def shrink(s, p, count, n, chosen, kept):  # type: ignore[no-untyped-def]
+def shrink(s, p, count, n, chosen, kept, rows):  # type: ignore[no-untyped-def]
     """Close up to the ``kept`` columns that are ``chosen``, in ascending order; returns how many columns are left."""
-    return n if kept == n else gather(s, p, count, n, chosen, kept, s, p)
-
-
-@Inner
-def launch(fns, n, s, p, domains, work):  # type: ignore[no-untyped-def]
-    """Set up the search ahead: a body released at rest goes where it falls."""
-    at_rest = 0.0
-    for j in range(n):
-        at_rest += choose(s[SPEED, j] == 0.0, 1.0, 0.0)
-    if at_rest > 0.0:
-        none, rows = work[0, :n], work[1:4].reshape(-1)[: 3 * n].reshape(3, n)
-        none[:] = 0.0
-        call_rise_each(fns[0], n, s[START, :n], s[START, :n], none, p, rows)
-        for j in range(n):
-            if s[SPEED, j] == 0.0:
-                s[WAY, j] = (rows[2, j] < 0.0) * 1.0 - (rows[2, j] > 0.0) * 1.0
-    for j in range(n):
-        low, high, period = domains[int(s[WHO, j]), 0], domains[int(s[WHO, j]), 1], domains[int(s[WHO, j]), 2]
-        s[REACH, j] = period if period > 0.0 else (high - s[START, j] if s[WAY, j] > 0.0 else s[START, j] - low)
-        s[TRIAL, j] = min(first_step(low, high, period), s[REACH, j])
-        s[AHEAD, j], s[STATE, j] = 0.0, SEEKING if s[WAY, j] != 0.0 else NOWHERE
-
-
-@Inner
-def turn_round(n, s, domains):  # type: ignore[no-untyped-def]
-    """Set up the search behind: none for a launch from rest. What was ahead is kept as an offset, in ``A``."""
-    for j in range(n):
-        low, high, period = domains[int(s[WHO, j]), 0], domains[int(s[WHO, j]), 1], domains[int(s[WHO, j]), 2]
-        s[A, j] = s[WAY, j] * s[AHEAD, j]
-        s[WAY, j] = -s[WAY, j]
-        rest = high - s[START, j] if s[WAY, j] > 0.0 else s[START, j] - low
-        s[REACH, j] = period - s[AHEAD, j] if period > 0.0 else rest
-        s[TRIAL, j] = min(s[AHEAD, j], s[REACH, j])
-        s[AHEAD, j], s[STATE, j] = 0.0, SEEKING if s[SPEED, j] > 0.0 else FOUND
-
-
-@Inner
-def seek(fns, n, s, p, work):  # type: ignore[no-untyped-def]
-    """Guess how far the first zero of V**2 is from each launch, from first trials.
-
-    Newton's method on V**2/distance, which has no zero at a launch from rest. Until a trial has V**2 < 0, trials go at
-    most four times as far.
-    """
-    offsets, places, rows = work[0, :n], work[1, :n], work[2:5].reshape(-1)[: 3 * n].reshape(3, n)
-    start, w0, way, reach = s[START, :n], s[SPEED, :n], s[WAY, :n], s[REACH, :n]
-    state, left, right, trial, zero = s[STATE, :n], s[LEFT, :n], s[RIGHT, :n], s[TRIAL, :n], s[AHEAD, :n]
-    for j in range(n):
-        left[j], right[j] = 0.0, inf
-    for _ in range(TRIALS):
-        for j in range(n):
-            offsets[j] = way[j] * trial[j]
-            places[j] = start[j] + offsets[j]
-        call_rise_each(fns[0], n, start, places, offsets, p, rows)
-        seeking = 0.0
-        for j in range(n):
-            at, w = trial[j], w0[j] - offsets[j] * rows[0, j]
-            before = w > 0.0
-            low, high = choose(before, at, left[j]), choose(before, right[j], at)
-            better = at + at * (w / (offsets[j] * rows[2, j] + w))
-            close = fabs(better - at) <= CLOSE * at
-            bracketed = high < inf
-            within = (better > low) & (better < choose(bracketed, high, 4.0 * at))
-            new = choose(within, better, choose(bracketed, 0.5 * (low + high), 2.0 * at))
-            new = choose(new > reach[j], reach[j], new)
-            lost = (w != w) | (before & (at >= reach[j]))
-            live = state[j] == SEEKING
-            zero[j] = choose(live & close, better, zero[j])
-            trial[j] = choose(live, new, at)
-            left[j], right[j] = low, high
-            state[j] = choose(live, choose(close, FOUND, choose(lost, NOWHERE, SEEKING)), state[j])
-            seeking += choose(state[j] == SEEKING, 1.0, 0.0)
-        if seeking == 0.0:
-            return
-
-
-@Inner
-def prove(fns, kind, pieces, n, s, p, work):  # type: ignore[no-untyped-def]
-    """Set the state to FOUND where V**2 > 0 and ds > 0 between both ends is certain, else to NOWHERE.
-
-    V**2 is zero at both ends of a libration, and what it is at launch at both ends of a lap. Over the piece at a zero
-    the slope must have its sign throughout: the zero is simple, and the only one there.
-    """
-    places, behind, lo, hi = work[0, :n], work[1, :n], work[2, :n], work[3, :n]
-    offsets, speeds, box = work[4, :n], work[5, :n], work[6:10].reshape(-1)[: 4 * n].reshape(4, n)
-    rows = work[10:13].reshape(-1)[: 3 * n].reshape(3, n)
-    start, w0, least, most, state = s[START, :n], s[SPEED, :n], s[LEAST, :n], s[MOST, :n], s[STATE, :n]
-    for j in range(n):
-        behind[j], speeds[j], state[j] = start[j] + least[j], w0[j], FOUND
-    for k in range(1, pieces + 1):
-        first, last = kind == LIBRATION and k == 1, kind == LIBRATION and k == pieces
-        share = k / pieces
-        for j in range(n):
-            offsets[j] = most[j] if k == pieces else least[j] + share * (most[j] - least[j])
-            places[j] = start[j] + offsets[j]
-            lo[j], hi[j] = behind[j], places[j]
-        call_bounds_each(fns[2], n, lo, hi, p, box)
-        if k < pieces:
-            call_rise_each(fns[0], n, start, places, offsets, p, rows)
-        else:
-            rows[0] = 0.0
-        for j in range(n):
-            lost = offsets[j] * rows[0, j]
-            w, clear = w0[j] - lost, UNRESOLVED * (w0[j] + fabs(lost))
-            # The most that V**2 may lose, and gain, for each unit of the parameter, and so the least it can be.
-            loss, gain, from_w = box[1, j], -box[0, j], speeds[j]
-            valley = (loss * w + gain * from_w - loss * gain * (hi[j] - lo[j])) / (loss + gain)
-            lowest = choose((loss > 0.0) & (gain > 0.0), valley, choose(w < from_w, w, from_w))
-            good = choose(first, -loss, choose(last, -gain, lowest - clear)) > 0.0
-            good = good & (last | (w > clear)) & (box[2, j] > 0.0)
-            state[j] = choose(good, state[j], NOWHERE)
-            behind[j], speeds[j] = places[j], w
+    return n if kept == n else gather(s, p, count, n, chosen, kept, s, p, rows)
 
 
 @Inner
@@ -223,75 +124,70 @@ def times(fns, kind, n, s, flat, count, chosen, work, out, reasons):  # type: ig
     Nodes are doubled until the next change is foreseen to be below rounding; orbits for which that is so drop out, and
     those whose V**2 all but vanishes.
     """
-    p = flat[: count * n].reshape(count, n)
     for j in range(n):
         s[SUM, j], s[VALUE, j], s[CHANGE, j], s[LOW, j], s[HIGH, j] = 0.0, 0.0, 0.0, inf, 0.0
-    for node in range(FEWEST + 1):
-        rates = fill(fns, kind, n, node, s, p, work)
-        ends = 0.5 if node in (0, FEWEST) else 1.0
-        half, quarter = ends * (node % 2 == 0), ends * (node % 4 == 0)
-        for j in range(n):
-            s[SUM, j] += ends * rates[j]
-            s[VALUE, j] += half * rates[j]
-            s[CHANGE, j] += quarter * rates[j]
-    for j in range(n):
-        rough, rougher = s[VALUE, j] * 2 / FEWEST, s[CHANGE, j] * 4 / FEWEST
-        s[VALUE, j], s[CHANGE, j] = rough, fabs(rough - rougher) / rough
-    nodes = FEWEST
+    begin, nodes = 0, FEWEST
     while True:
+        p = flat[: count * n].reshape(count, n)
+        for node in range(begin, nodes + 1 if begin == 0 else 2 * begin - 1):
+            rates = fill(fns, kind, n, node, s, p, work)
+            ends = 0.5 if node in (0, FEWEST) else 1.0
+            for j in range(n):
+                s[SUM, j] += ends * rates[j]
+            if begin == 0:  # the two levels before the first
+                half, quarter = ends * (node % 2 == 0) * 2 / FEWEST, ends * (node % 4 == 0) * 4 / FEWEST
+                for j in range(n):
+                    s[VALUE, j] += half * rates[j]
+                    s[CHANGE, j] += quarter * rates[j]
+        if begin == 0:
+            for j in range(n):
+                s[CHANGE, j] = fabs(s[VALUE, j] - s[CHANGE, j]) / s[VALUE, j]
         kept = 0
         for j in range(n):
             value, before = s[SUM, j] / nodes, s[CHANGE, j]
             change = fabs(value - s[VALUE, j]) / value
             s[VALUE, j], s[CHANGE, j] = value, change
+            if not s[LOW, j] > LEAST_BALANCE * s[HIGH, j]:
+                continue
             if before <= FALLING and (change <= SAME or change * (change / before) ** 2 <= FORESEEN):
-                if s[LOW, j] > LEAST_BALANCE * s[HIGH, j]:
-                    k = int(s[WHO, j])
-                    out[k, 0], reasons[k] = value, DONE
-            elif s[LOW, j] > LEAST_BALANCE * s[HIGH, j]:
+                k = int(s[WHO, j])
+                out[k, 0], reasons[k] = value, DONE
+            else:
                 chosen[kept] = j
                 kept += 1
-        if kept == 0 or nodes == FEWEST * 2**DOUBLINGS:
+        begin, nodes = nodes + 1, 2 * nodes
+        if kept == 0 or nodes > MOST_NODES:
             return
-        n = shrink(s, flat, count, n, chosen, kept)
-        p = flat[: count * n].reshape(count, n)
-        for node in range(nodes + 1, 2 * nodes + 1):
-            rates = fill(fns, kind, n, node, s, p, work)
-            for j in range(n):
-                s[SUM, j] += rates[j]
-        nodes *= 2
+        n = shrink(s, flat, count, n, chosen, kept, LASTING)
 
 
 @Inner
-def settle(fns, kind, n, s, flat, count, chosen, work, t, spare, timed, out, reasons):  # type: ignore[no-untyped-def]
-    """Prove orbits of one kind, and answer for those that are proved."""
+def settle(fns, kind, n, s, flat, t, spare, count, chosen, others, work, timed, out, reasons):  # type: ignore[no-untyped-def]
+    """Prove orbits of one kind, and answer for those that are proved; ``t`` and ``spare`` take the others meanwhile."""
     for pieces in (FEW_PIECES, MANY_PIECES):
         prove(fns, kind, pieces, n, s, flat[: count * n].reshape(count, n), work)
-        proved = 0
-        for j in range(n):
-            if s[STATE, j] == FOUND:
-                chosen[proved] = j
-                proved += 1
-                k = int(s[WHO, j])
-                if timed:
-                    out[k, 1] = kind
-                elif kind == LIBRATION:
-                    out[k, 0], out[k, 1], reasons[k] = s[A, j], s[B, j], DONE
-                else:
-                    reasons[k] = PASSING
-        if proved == n:
-            if timed:
-                times(fns, kind, n, s, flat, count, chosen, work, out, reasons)
-            return
-        if proved and timed:
-            m = gather(s, flat, count, n, chosen, proved, t, spare)
-            times(fns, kind, m, t, spare, count, chosen, work, out, reasons)
-        left = 0
+        proved, left = 0, 0
         for j in range(n):
             if s[STATE, j] != FOUND:
-                chosen[left] = j
+                others[left] = j
                 left += 1
-        n = shrink(s, flat, count, n, chosen, left)
+                continue
+            chosen[proved] = j
+            proved += 1
+            k = int(s[WHO, j])
+            if timed:
+                out[k, 1] = kind
+            elif kind == LIBRATION:
+                out[k, 0], out[k, 1], reasons[k] = s[A, j], s[B, j], DONE
+            else:
+                reasons[k] = PASSING
+        rest = gather(s, flat, count, n, others, left, t, spare, ROWS)
+        if proved and timed:
+            m = shrink(s, flat, count, n, chosen, proved, LASTING)
+            times(fns, kind, m, s, flat, count, chosen, work, out, reasons)
+        if left == 0:
+            return
+        n, s, flat, t, spare = rest, t, spare, s, flat
 
 
 @entry(
@@ -323,39 +219,40 @@ def answer_batches(fns, ps, lam0s, v0s, ways, domains, timed, out, reasons):  # 
         if filled == 0:
             continue
         n = -(-filled // LANES) * LANES
-        gather(s, flat, 0, n, chosen, filled, s, flat)
+        gather(s, flat, 0, n, chosen, filled, s, flat, ROWS)
         for j in range(n):
             for row in range(count):
                 flat[row * n + j] = ps[int(s[WHO, j]), row]
-        p = flat[: count * n].reshape(count, n)
-        launch(fns, n, s, p, domains, work)
-        seek(fns, n, s, p, work)
-        kept, laps = 0, 0
-        for j in range(n):  # what is found beyond the reach is not on the curve
-            period = domains[int(s[WHO, j]), 2]
-            if s[STATE, j] == FOUND and s[AHEAD, j] < s[REACH, j]:
-                chosen[kept] = j
-                kept += 1
-            elif s[STATE, j] == NOWHERE and period > 0.0 and s[SPEED, j] > 0.0:
-                s[LEAST, j], s[MOST, j] = min(s[WAY, j] * period, 0.0), max(s[WAY, j] * period, 0.0)
-                others[laps] = j
-                laps += 1
-        if laps:
-            m = gather(s, flat, count, n, others, laps, u, other)
-            settle(fns, CIRCULATION, m, u, other, count, others, work, t, spare, timed, out, reasons)
-        if kept == 0:
-            continue
-        n = shrink(s, flat, count, n, chosen, kept)
-        turn_round(n, s, domains)
-        seek(fns, n, s, flat[: count * n].reshape(count, n), work)
-        kept = 0
+        laps = 0
+        for ahead in (True, False):
+            p = flat[: count * n].reshape(count, n)
+            if ahead:
+                launch(fns, n, s, p, domains, work)
+            else:
+                turn_round(n, s, domains)
+            seek(fns, n, s, p, work)
+            kept = 0
+            for j in range(n):
+                if s[STATE, j] == FOUND and s[AHEAD, j] <= s[REACH, j]:
+                    chosen[kept] = j
+                    kept += 1
+                elif ahead and s[STATE, j] == NOWHERE and s[SPEED, j] > 0.0 and domains[int(s[WHO, j]), 2] > 0.0:
+                    others[laps] = j
+                    laps += 1
+            if ahead:
+                laps = gather(s, flat, count, n, others, laps, u, other, ROWS)
+            n = shrink(s, flat, count, n, chosen, kept, ROWS)
+            if n == 0:
+                break
         for j in range(n):
-            if s[STATE, j] == FOUND and s[AHEAD, j] <= s[REACH, j]:
-                ahead, behind = s[A, j], s[WAY, j] * s[AHEAD, j]
-                s[LEAST, j], s[MOST, j] = min(ahead, behind), max(ahead, behind)
-                s[A, j], s[B, j] = s[START, j] + s[LEAST, j], s[START, j] + s[MOST, j]
-                chosen[kept] = j
-                kept += 1
-        if kept:
-            n = shrink(s, flat, count, n, chosen, kept)
-            settle(fns, LIBRATION, n, s, flat, count, chosen, work, t, spare, timed, out, reasons)
+            first, second = s[A, j], s[WAY, j] * s[AHEAD, j]
+            s[LEAST, j], s[MOST, j] = min(first, second), max(first, second)
+            s[A, j], s[B, j] = s[START, j] + s[LEAST, j], s[START, j] + s[MOST, j]
+        for j in range(laps):
+            lap = u[WAY, j] * u[REACH, j]
+            u[LEAST, j], u[MOST, j] = min(lap, 0.0), max(lap, 0.0)
+        for kind in (LIBRATION, CIRCULATION):
+            if kind == CIRCULATION:
+                n, s, flat, u, other = laps, u, other, s, flat
+            if n:
+                settle(fns, kind, n, s, flat, t, spare, count, chosen, others, work, timed, out, reasons)

@@ -25,7 +25,7 @@ LIBRATION, CIRCULATION = range(2)
 
 # The trapezoidal rule doubles its nodes so often, from FEWEST intervals on.
 FEWEST, DOUBLINGS = 8, 7
-MOST = FEWEST * 2**DOUBLINGS
+MOST_NODES = FEWEST * 2**DOUBLINGS
 # Two sums as close as this agree to rounding.
 SAME = 4e-16
 # The error squares with each doubling, once it does so at all: two differences, the second below this and the first
@@ -92,7 +92,7 @@ def time_once(fns, p, kind, lam0, w0, a, b, width, work, rates):  # type: ignore
     for i in range(1, FEWEST):
         total += rates[i]
     value, before, n, first = total / FEWEST, inf, FEWEST, FEWEST + 1
-    while n < MOST:
+    while n < MOST_NODES:
         least, most = fill(fns, p, kind, lam0, w0, a, b, width, first, n, work, rates)
         low, high = min(low, least), max(high, most)
         if not low > LEAST_BALANCE * high:
@@ -228,7 +228,7 @@ def answer_many(fns, ps, lam0s, v0s, ways, domains, places, asked, out, reasons)
     ``ps`` has a row of parameters a launch, ``domains`` both ends and the period. A row of ``out`` holds both turning
     points (PLACES), the least and the greatest (SPEEDS, FORCES), or the half period or loop time and the kind (TIME).
     """
-    work, rates = np.empty((4, MOST)), np.empty(MOST)
+    work, rates = np.empty((4, MOST_NODES)), np.empty(MOST_NODES)
     for k in range(lam0s.size):
         if reasons[k] != HARD:
             continue
