@@ -59,9 +59,9 @@ def render(module: ModuleIR, *, source: str) -> str:
         functions.append(text)
         used |= names
     intervals = set[str]()
-    for function in (module.bounds, module.bounds_each):
-        if function is not None:
-            bounds, names = _bounds(function, module.parameter)
+    for enclosing in (module.bounds, module.bounds_each):
+        if enclosing is not None:
+            bounds, names = _bounds(enclosing, module.parameter)
             functions.append(bounds)
             intervals |= names
     runtime = {*_RUNTIME, *(f["signature"] for f in functions)}

@@ -162,7 +162,8 @@ class Later:
     """A function of a generated module that is compiled when its address is first asked for."""
 
     def __init__(self, compile_it: Callable[[], Any]) -> None:
-        self._compile, self._callback = compile_it, None
+        self._compile = compile_it
+        self._callback: Any = None
 
     @property
     def address(self) -> int:

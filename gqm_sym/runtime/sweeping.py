@@ -4,7 +4,7 @@ Most orbits are answered by one compiled loop (`swift`); those that it leaves ar
 """
 
 from collections.abc import Callable
-from math import inf, nan, pi
+from math import e, inf, nan, pi
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -27,7 +27,7 @@ ARRAYS = SimpleNamespace(
     **{name: getattr(np, name) for name in ["sin", "cos", "tan", "sinh", "cosh", "tanh", "exp", "log", "sqrt"]},
     **{name: getattr(np, f"arc{name[1:]}") for name in ["asin", "acos", "atan", "asinh", "acosh", "atanh"]},
     pi=pi,
-    e=np.e,
+    e=e,
     mpf=float,
 )
 

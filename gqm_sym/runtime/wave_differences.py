@@ -19,7 +19,7 @@ NEAR = 1.0
 WIDE = 3.2
 
 
-def _even(shift, terms):  # type: ignore[no-untyped-def]
+def _even(shift: int, terms: int) -> tuple[float, ...]:
     """Coefficients of the even series of a sinc (shift 1) or cosine (shift 0) in t**2, highest power first."""
     return tuple((-1.0) ** k / factorial(2 * k + shift) for k in reversed(range(terms)))
 
