@@ -1,5 +1,5 @@
 # Made by gqm-gen for "catenary". Do not edit: change its declaration and generate again.
-# interface 3, input cd1fa4541ae4, body 1512a51ae7a7
+# interface 3, input cd1fa4541ae4, body 86f6e6e68101
 """Bead on a hanging chain
 
 x              = x
@@ -17,7 +17,6 @@ turning points : 2*c*g*(cosh(lam0/c) - cosh(x/c)) + v0**2 = 0
 liftoff        : g/cosh(x/c) + (2*c*g*(cosh(lam0/c) - cosh(x/c)) + v0**2)/(c*cosh(x/c)**2) = 0
 """
 
-from math import cosh, sinh
 from typing import Any
 
 from numba import carray
@@ -45,8 +44,10 @@ from gqm_sym.runtime import (
     Sweep,
 )
 from gqm_sym.runtime.differences import cosh1, cosh2
+from gqm_sym.runtime.elementary import cosh, sinh
 from gqm_sym.runtime.intervals import iconst, icosh, idiv, imul, isinh
 from gqm_sym.runtime.places import nearest
+from gqm_sym.runtime.wave_differences import near_cosh2
 
 PARAMETERS = {
     'c': '0.8',
@@ -147,7 +148,7 @@ def bend_each(n, lows, highs, left, right, p, out):
         x = nearest(a, b, da, db)
         _t0 = 1/c
         _t1 = _t0*x
-        out[0, i] = 2*_t0*g*cosh2(_t0*a, _t1, _t0*b, _t0*da, _t0*db)
+        out[0, i] = 2*_t0*g*near_cosh2(_t0*a, _t1, _t0*b, _t0*da, _t0*db)
         out[1, i] = cosh(_t1)
 
 

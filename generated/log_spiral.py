@@ -1,5 +1,5 @@
 # Made by gqm-gen for "log_spiral". Do not edit: change its declaration and generate again.
-# interface 3, input 458ba188398a, body 9ee3ffdc9ef7
+# interface 3, input 458ba188398a, body 9ef58a60da80
 """Bead on a logarithmic spiral
 
 x              = r0*exp(b*theta)*cos(theta)
@@ -17,7 +17,7 @@ turning points : 2*g*r0*(exp(b*lam0)*sin(lam0) - exp(b*theta)*sin(theta)) + v0**
 liftoff        : g*(b*cos(theta) - sin(theta))/sqrt(b**2 + 1) + (2*g*r0*(exp(b*lam0)*sin(lam0) - exp(b*theta)*sin(theta)) + v0**2)*exp(-b*theta)/(r0*sqrt(b**2 + 1)) = 0
 """
 
-from math import exp, sqrt
+from math import sqrt
 from typing import Any
 
 from numba import carray
@@ -45,7 +45,7 @@ from gqm_sym.runtime import (
     Sweep,
 )
 from gqm_sym.runtime.differences import exp1, exp2, sin1, sin2
-from gqm_sym.runtime.elementary import cos, sin
+from gqm_sym.runtime.elementary import cos, exp, sin
 from gqm_sym.runtime.intervals import iadd, iconst, icos, iexp, imul, ipow, isin, isqrt
 from gqm_sym.runtime.places import nearest
 from gqm_sym.runtime.wave_differences import near_sin2

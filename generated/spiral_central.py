@@ -1,5 +1,5 @@
 # Made by gqm-gen for "spiral_central". Do not edit: change its declaration and generate again.
-# interface 3, input a75a85ae8f6e, body 408b9c1d476f
+# interface 3, input a75a85ae8f6e, body ef6ccfb2691e
 """Bead on a logarithmic spiral, drawn to its pole
 
 x              = r0*exp(b*theta)*cos(theta)
@@ -17,7 +17,7 @@ turning points : 2*k*(exp(-b*theta)/sqrt(sin(theta)**2 + cos(theta)**2) - exp(-b
 liftoff        : k*(-(b*sin(theta) + cos(theta))*cos(theta) + (b*cos(theta) - sin(theta))*sin(theta))*exp(-2*b*theta)*Abs(r0)/(r0**3*sqrt(b**2 + 1)*(sin(theta)**2 + cos(theta)**2)**(3/2)) + (2*k*(exp(-b*theta)/sqrt(sin(theta)**2 + cos(theta)**2) - exp(-b*lam0)/sqrt(sin(lam0)**2 + cos(lam0)**2))/Abs(r0) + v0**2)*exp(-b*theta)/(r0*sqrt(b**2 + 1)) = 0
 """
 
-from math import exp, fabs, sqrt
+from math import fabs, sqrt
 from typing import Any
 
 from numba import carray
@@ -45,7 +45,7 @@ from gqm_sym.runtime import (
     Sweep,
 )
 from gqm_sym.runtime.differences import cos1, cos2, exp1, exp2, sin1, sin2
-from gqm_sym.runtime.elementary import cos, sin
+from gqm_sym.runtime.elementary import cos, exp, sin
 from gqm_sym.runtime.intervals import iabs, iadd, iconst, icos, iexp, imul, ipow, isin, isqrt
 from gqm_sym.runtime.places import nearest
 from gqm_sym.runtime.wave_differences import near_cos2, near_sin2

@@ -13,7 +13,7 @@ from gqm_sym.emission.places import at
 if TYPE_CHECKING:
     from gqm_sym.emission.lower import Lowering
 
-NEAR = frozenset({"sin2", "cos2"})
+NEAR = frozenset({"cos2", "cosh2", "sin2", "sinh2"})
 """Differences that have a closed form for near points, without the rest: NaN tells a sweep to go another way."""
 
 

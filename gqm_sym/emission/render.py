@@ -19,7 +19,7 @@ from gqm_sym.errors import EmissionError
 INTERFACE = 3
 
 # Functions that the runtime has in forms that fill vector registers; the rest is the standard library's.
-_ELEMENTARY = frozenset({"cos", "sin"})
+_ELEMENTARY = frozenset({"cos", "cosh", "exp", "sin", "sinh"})
 _MATH = frozenset({*FUNCTIONS.values(), "sqrt", "pi", "e"} - _ELEMENTARY)
 _RUNTIME = ("Addresses", "Formulas", "Motion", "Pass1", "Sweep")
 # Functions that every module hands over, as the interface orders them.

@@ -79,6 +79,16 @@ def bits(_, x):  # type: ignore[no-untyped-def]
 
 
 @intrinsic
+def from_bits(_, n):  # type: ignore[no-untyped-def]
+    """The float of these bits."""
+
+    def lower(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        return builder.bitcast(args[0], ir.DoubleType())
+
+    return types.float64(types.int64), lower
+
+
+@intrinsic
 def choose(_, condition, x, y):  # type: ignore[no-untyped-def]
     """``x if condition else y``, both worked out: a branch would keep a loop scalar."""
 

@@ -13,20 +13,17 @@ from math import (
     asinh,
     atan,
     atanh,
-    cosh,
-    exp,
     fabs,
     inf,
     log,
     pi,
-    sinh,
     sqrt,
     tan,
     tanh,
 )
 from math import pow as power
 
-from gqm_sym.runtime.elementary import cos, sin
+from gqm_sym.runtime.elementary import cos, cosh, exp, sin, sinh
 from gqm_sym.runtime.fused import choose, whole_below
 from gqm_sym.runtime.jit import Inlined, Inner
 
@@ -209,7 +206,7 @@ def isqrt(a):  # type: ignore[no-untyped-def]
     return choose(known, lower(sqrt(a[0]), ROUNDED), -inf), choose(known, upper(sqrt(a[1]), ROUNDED), inf)
 
 
-@Inner
+@Inlined
 def iexp(a):  # type: ignore[no-untyped-def]
     """The values of exp."""
     return grown(kept(exp(a[0]), 1.0), kept(exp(a[1]), 1.0))
@@ -281,18 +278,18 @@ def iacos(a):  # type: ignore[no-untyped-def]
     return grown(acos(a[1]), acos(a[0])) if a[0] >= -1.0 and a[1] <= 1.0 else (-inf, inf)
 
 
-@Inner
+@Inlined
 def isinh(a):  # type: ignore[no-untyped-def]
     """The values of sinh."""
     return grown(sinh(a[0]), sinh(a[1]))
 
 
-@Inner
+@Inlined
 def icosh(a):  # type: ignore[no-untyped-def]
     """The values of cosh."""
     b = iabs(a)
     lo, hi = grown(cosh(b[0]), cosh(b[1]))
-    return max(lo, 1.0), hi
+    return greatest(lo, 1.0), hi
 
 
 @Inner
