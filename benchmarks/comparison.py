@@ -5,22 +5,21 @@ never do. Writes ``docs/benchmarks.md``.
 """
 
 import argparse
-import importlib
 import platform
 import sys
 import warnings
-from collections.abc import Callable
-from dataclasses import dataclass
-from math import cos, inf, pi, sin, sqrt
+from collections.abc import Iterator
+from contextlib import contextmanager
+from math import cos, pi, sin, sqrt
 from pathlib import Path
-from statistics import median
-from time import perf_counter
 from typing import Any
 
 import numpy as np
 import sympy as sp
+from measure import Result, Row, Work, apart, measured, readable, ulps
 from mpmath import mp, mpf
 from numba import carray, cfunc, njit, types
+from peers import PEERS, presence, rows_of_peers
 from scipy import LowLevelCallable
 from scipy.integrate import IntegrationWarning, quad, solve_ivp
 from scipy.interpolate import CubicSpline
@@ -28,58 +27,14 @@ from scipy.special import ellipj
 from stages import second_process
 
 import generated.pendulum as pendulum
+from gqm_sym.runtime import threads
 
 PAGE = Path(__file__).parent.parent / "docs" / "benchmarks.md"
-PEERS = ("heyoka", "quadax")
-ORBITS, TIMES, PLACES = 20_000, 1_000_000, 1_000_000
+ORBITS, TIMES, PLACES = 100_000, 1_000_000, 1_000_000
 mp.dps = 40
 G = mpf("9.81")
 TOP = 1.2  # amplitude of the swing that is sampled
 FAR = 1e6
-
-Work = Callable[[], Any]
-
-
-@dataclass(frozen=True)
-class Row:
-    """One way of doing some work.
-
-    ``each`` is how many results a call gives, ``line`` the error it may have (ours only), ``unit`` what errors are in.
-    """
-
-    work: str
-    who: str
-    call: Work
-    error: Callable[[Any], float]
-    each: int = 1
-    repeats: int = 15
-    line: float = inf
-    unit: str = ""
-
-
-@dataclass(frozen=True)
-class Result:
-    """A row with what was measured."""
-
-    row: Row
-    seconds: float
-    error: float
-
-    @property
-    def missed(self) -> bool:
-        """Whether the accuracy misses the row's line."""
-        return not self.error <= self.row.line
-
-
-def measured(row: Row) -> Result:
-    """Time a row: the median of some calls after a first."""
-    value = row.call()
-    times = []
-    for _ in range(row.repeats):
-        start = perf_counter()
-        row.call()
-        times.append(perf_counter() - start)
-    return Result(row, median(times) / row.each, row.error(value))
 
 
 def half_period(amplitude: float) -> mpf:
@@ -93,16 +48,15 @@ def place(amplitude: float, t: float) -> mpf:
     return 2 * mp.asin(k * mp.ellipfun("cd", mp.sqrt(G) * mpf(t), m=k * k)) - mp.pi / 2
 
 
-def ulps(values: Any, truths: list[mpf]) -> float:
-    """Worst error in units of the last place."""
-    return max(
-        float(abs(mpf(float(v)) - t)) / float(np.spacing(float(t))) for v, t in zip(values, truths, strict=False)
-    )
-
-
-def apart(values: Any, truths: list[mpf], scale: float) -> float:
-    """Worst error as a share of a scale."""
-    return max(float(abs(mpf(float(v)) - t)) / scale for v, t in zip(values, truths, strict=False))
+@contextmanager
+def one_core() -> Iterator[None]:
+    """Keep compiled loops on one core."""
+    kept = threads.cores
+    threads.cores = lambda: 1
+    try:
+        yield
+    finally:
+        threads.cores = kept
 
 
 def half_periods() -> list[Row]:
@@ -135,7 +89,34 @@ def half_periods() -> list[Row]:
         return quad(integrand, 0, pi, args=(a,), epsabs=0, epsrel=1.2e-14)[0]
 
     work = "half period of an orbit"
+    ours = "`sweep`, one core, turning points found"
+
+    def on_one_core(call: Work) -> Work:
+        def limited() -> Any:
+            with one_core():
+                return call()
+
+        return limited
+
     return [
+        Row(
+            work,
+            ours,
+            on_one_core(lambda: pendulum.sweep("half_period", lam0).values),
+            lambda values: ulps(values, exact),
+            each=ORBITS,
+            line=6.0,
+            unit="ulp",
+        ),
+        Row(
+            "the same, its turning points alone",
+            ours,
+            on_one_core(lambda: pendulum.sweep("turning_points", lam0).values),
+            lambda values: ulps(values[:300, 0], [-mp.pi - mpf(float(v)) for v in lam0[:300]]),
+            each=ORBITS,
+            line=2.0,
+            unit="ulp",
+        ),
         Row(
             work,
             "`sweep`, all cores, turning points found",
@@ -179,6 +160,9 @@ def half_periods() -> list[Row]:
             each=100,
             repeats=3,
             unit="ulp",
+        ),
+        *rows_of_peers(
+            work, amplitudes, lambda values: ulps(values, [half_period(float(a)) for a in amplitudes[:100]])
         ),
     ]
 
@@ -320,14 +304,6 @@ def load_maps() -> list[Row]:
     ]
 
 
-def readable(seconds: float) -> str:
-    """Write a time with its unit."""
-    for unit, size in (("s", 1.0), ("ms", 1e-3), ("µs", 1e-6)):
-        if seconds >= size:
-            return f"{seconds / size:.3g} {unit}"
-    return f"{seconds / 1e-9:.3g} ns"
-
-
 def page(results: list[Result], start: tuple[float, float]) -> str:
     """Write the results as a page of Markdown."""
     lines = [
@@ -349,15 +325,6 @@ def page(results: list[Result], start: tuple[float, float]) -> str:
     lines += [f"{start[1]:.2f} s.", ""]
     lines += [f"- {peer}: {presence(peer)}" for peer in PEERS]
     return "\n".join(lines) + "\n"
-
-
-def presence(peer: str) -> str:
-    """Say whether a peer is installed."""
-    try:
-        module = importlib.import_module(peer)
-    except ImportError:
-        return "not installed here, not compared (`pip install gqm_sym[peers]`)"
-    return f"installed ({getattr(module, '__version__', 'version unknown')}), no row yet"
 
 
 def main() -> int:

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "catenary". Do not edit: change its declaration and generate again.
-# interface 3, input cd1fa4541ae4, body 609a5e05f95b
+# interface 3, input cd1fa4541ae4, body 672d7de471de
 """Bead on a hanging chain
 
 x              = x
@@ -17,7 +17,6 @@ turning points : 2*c*g*(cosh(lam0/c) - cosh(x/c)) + v0**2 = 0
 liftoff        : g/cosh(x/c) + (2*c*g*(cosh(lam0/c) - cosh(x/c)) + v0**2)/(c*cosh(x/c)**2) = 0
 """
 
-from math import cosh, sinh
 from typing import Any
 
 from numba import carray
@@ -29,11 +28,15 @@ compiled = compiler(__file__, interface=3)
 
 from gqm_sym.runtime import (
     BEND,
+    BEND_EACH,
     BOUNDS,
+    BOUNDS_EACH,
     CLIMB,
     FRAME,
     RISE,
+    RISE_EACH,
     Addresses,
+    Each,
     ExactFormulas,
     Formulas,
     Motion,
@@ -41,8 +44,10 @@ from gqm_sym.runtime import (
     Sweep,
 )
 from gqm_sym.runtime.differences import cosh1, cosh2
+from gqm_sym.runtime.elementary import cosh, sinh
 from gqm_sym.runtime.intervals import iconst, icosh, idiv, imul, isinh
 from gqm_sym.runtime.places import nearest
+from gqm_sym.runtime.wave_differences import near_cosh2
 
 PARAMETERS = {
     'c': '0.8',
@@ -111,6 +116,42 @@ def bend(n, a, b, left, right, p, out):
         out[1, i] = cosh(_t1)
 
 
+@compiled(RISE_EACH, later=True)
+def rise_each(n, starts, places, offsets, p, out):
+    """climb[a, x], ds/dx and the climb's derivative, each for a launch of its own."""
+    starts, places, offsets, p, out = carray(starts, n), carray(places, n), carray(offsets, n), carray(p, (3, n)), carray(out, (3, n))
+    for i in range(n):
+        c = p[0, i]
+        g = p[1, i]
+        a = starts[i]
+        x = places[i]
+        d = offsets[i]
+        _t0 = 1/c
+        _t1 = _t0*x
+        _t2 = 2*g
+        out[0, i] = _t2*cosh1(_t0*a, _t1, _t0*d)
+        out[1, i] = cosh(_t1)
+        out[2, i] = _t2*sinh(_t1)
+
+
+@compiled(BEND_EACH, later=True)
+def bend_each(n, lows, highs, left, right, p, out):
+    """climb[a, x, b] and ds/dx, each for an orbit of its own; NaN where the closed form ends."""
+    lows, highs, left, right, p, out = carray(lows, n), carray(highs, n), carray(left, n), carray(right, n), carray(p, (3, n)), carray(out, (2, n))
+    for i in range(n):
+        c = p[0, i]
+        g = p[1, i]
+        a = lows[i]
+        b = highs[i]
+        da = left[i]
+        db = right[i]
+        x = nearest(a, b, da, db)
+        _t0 = 1/c
+        _t1 = _t0*x
+        out[0, i] = 2*_t0*g*near_cosh2(_t0*a, _t1, _t0*b, _t0*da, _t0*db)
+        out[1, i] = cosh(_t1)
+
+
 @compiled(BOUNDS)
 def bounds(lo, hi, p, out):
     """Bounds of the climb's slope and of ds/dx for lo <= x <= hi."""
@@ -121,6 +162,19 @@ def bounds(lo, hi, p, out):
     _t0 = imul(idiv(iconst(1.0), c), x)
     out[0], out[1] = imul(imul(iconst(2.0), g), isinh(_t0))
     out[2], out[3] = icosh(_t0)
+
+
+@compiled(BOUNDS_EACH, later=True)
+def bounds_each(n, lo, hi, p, out):
+    """Bounds over many intervals of the climb's slope and of ds/dx for lo <= x <= hi, each for parameters of its own."""
+    lo, hi, p, out = carray(lo, n), carray(hi, n), carray(p, (3, n)), carray(out, (4, n))
+    for i in range(n):
+        x = (lo[i], hi[i])
+        c = (p[0, i], p[0, i])
+        g = (p[1, i], p[1, i])
+        _t0 = imul(idiv(iconst(1.0), c), x)
+        out[0, i], out[1, i] = imul(imul(iconst(2.0), g), isinh(_t0))
+        out[2, i], out[3, i] = icosh(_t0)
 
 
 # The same formulas over a namespace of operations: extended precision evaluates these.
@@ -182,6 +236,7 @@ MODEL = Formulas(
     parameters=PARAMETERS,
     positive=('c',),
     addresses=Addresses(frame.address, climb.address, rise.address, bend.address, bounds.address),
+    each=Each(rise_each, bend_each, bounds_each),
     domain_of=exact_domain,
     exact=ExactFormulas(exact_x, exact_z, exact_ds, exact_kappa, exact_reaction, exact_climb, exact_climb_slope),
 )

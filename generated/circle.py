@@ -1,5 +1,5 @@
 # Made by gqm-gen for "circle". Do not edit: change its declaration and generate again.
-# interface 3, input 6c3a741d3b21, body bf2439baf9be
+# interface 3, input 6c3a741d3b21, body 782e926aca11
 """Bead that loops round a circle
 
 x              = L*sin(theta)
@@ -28,11 +28,15 @@ compiled = compiler(__file__, interface=3)
 
 from gqm_sym.runtime import (
     BEND,
+    BEND_EACH,
     BOUNDS,
+    BOUNDS_EACH,
     CLIMB,
     FRAME,
     RISE,
+    RISE_EACH,
     Addresses,
+    Each,
     ExactFormulas,
     Formulas,
     Motion,
@@ -43,6 +47,7 @@ from gqm_sym.runtime.differences import cos1, cos2
 from gqm_sym.runtime.elementary import cos, sin
 from gqm_sym.runtime.intervals import iconst, imul, isin
 from gqm_sym.runtime.places import nearest
+from gqm_sym.runtime.wave_differences import near_cos2
 
 PARAMETERS = {
     'L': '0.9',
@@ -105,6 +110,38 @@ def bend(n, a, b, left, right, p, out):
         out[1, i] = L
 
 
+@compiled(RISE_EACH, later=True)
+def rise_each(n, starts, places, offsets, p, out):
+    """climb[a, theta], ds/dtheta and the climb's derivative, each for a launch of its own."""
+    starts, places, offsets, p, out = carray(starts, n), carray(places, n), carray(offsets, n), carray(p, (3, n)), carray(out, (3, n))
+    for i in range(n):
+        L = p[0, i]
+        g = p[1, i]
+        a = starts[i]
+        theta = places[i]
+        d = offsets[i]
+        _t0 = 2*L*g
+        out[0, i] = -_t0*cos1(a, theta, d)
+        out[1, i] = L
+        out[2, i] = _t0*sin(theta)
+
+
+@compiled(BEND_EACH, later=True)
+def bend_each(n, lows, highs, left, right, p, out):
+    """climb[a, theta, b] and ds/dtheta, each for an orbit of its own; NaN where the closed form ends."""
+    lows, highs, left, right, p, out = carray(lows, n), carray(highs, n), carray(left, n), carray(right, n), carray(p, (3, n)), carray(out, (2, n))
+    for i in range(n):
+        L = p[0, i]
+        g = p[1, i]
+        a = lows[i]
+        b = highs[i]
+        da = left[i]
+        db = right[i]
+        theta = nearest(a, b, da, db)
+        out[0, i] = -2*L*g*near_cos2(a, theta, b, da, db)
+        out[1, i] = L
+
+
 @compiled(BOUNDS)
 def bounds(lo, hi, p, out):
     """Bounds of the climb's slope and of ds/dtheta for lo <= theta <= hi."""
@@ -114,6 +151,18 @@ def bounds(lo, hi, p, out):
     g = (p[1], p[1])
     out[0], out[1] = imul(imul(imul(iconst(2.0), L), g), isin(theta))
     out[2], out[3] = L
+
+
+@compiled(BOUNDS_EACH, later=True)
+def bounds_each(n, lo, hi, p, out):
+    """Bounds over many intervals of the climb's slope and of ds/dtheta for lo <= theta <= hi, each for parameters of its own."""
+    lo, hi, p, out = carray(lo, n), carray(hi, n), carray(p, (3, n)), carray(out, (4, n))
+    for i in range(n):
+        theta = (lo[i], hi[i])
+        L = (p[0, i], p[0, i])
+        g = (p[1, i], p[1, i])
+        out[0, i], out[1, i] = imul(imul(imul(iconst(2.0), L), g), isin(theta))
+        out[2, i], out[3, i] = L
 
 
 # The same formulas over a namespace of operations: extended precision evaluates these.
@@ -174,6 +223,7 @@ MODEL = Formulas(
     parameters=PARAMETERS,
     positive=('L',),
     addresses=Addresses(frame.address, climb.address, rise.address, bend.address, bounds.address),
+    each=Each(rise_each, bend_each, bounds_each),
     domain_of=exact_domain,
     exact=ExactFormulas(exact_x, exact_z, exact_ds, exact_kappa, exact_reaction, exact_climb, exact_climb_slope),
 )

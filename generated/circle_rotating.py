@@ -1,5 +1,5 @@
 # Made by gqm-gen for "circle_rotating". Do not edit: change its declaration and generate again.
-# interface 3, input 4ab613b0cbfb, body ef9ab333618f
+# interface 3, input 4ab613b0cbfb, body 9958051d5068
 """Bead on a hoop that turns about its vertical diameter
 
 x              = L*sin(theta)
@@ -29,11 +29,15 @@ compiled = compiler(__file__, interface=3)
 
 from gqm_sym.runtime import (
     BEND,
+    BEND_EACH,
     BOUNDS,
+    BOUNDS_EACH,
     CLIMB,
     FRAME,
     RISE,
+    RISE_EACH,
     Addresses,
+    Each,
     ExactFormulas,
     Formulas,
     Motion,
@@ -44,6 +48,7 @@ from gqm_sym.runtime.differences import cos1, cos2, sin1, sin2
 from gqm_sym.runtime.elementary import cos, sin
 from gqm_sym.runtime.intervals import iadd, iconst, icos, imul, ipow, isin
 from gqm_sym.runtime.places import nearest
+from gqm_sym.runtime.wave_differences import near_cos2, near_sin2
 
 PARAMETERS = {
     'L': '1',
@@ -113,6 +118,41 @@ def bend(n, a, b, left, right, p, out):
         out[1, i] = L
 
 
+@compiled(RISE_EACH, later=True)
+def rise_each(n, starts, places, offsets, p, out):
+    """climb[a, theta], ds/dtheta and the climb's derivative, each for a launch of its own."""
+    starts, places, offsets, p, out = carray(starts, n), carray(places, n), carray(offsets, n), carray(p, (4, n)), carray(out, (3, n))
+    for i in range(n):
+        L = p[0, i]
+        Omega = p[1, i]
+        g = p[2, i]
+        a = starts[i]
+        theta = places[i]
+        d = offsets[i]
+        _t0 = sin(theta)
+        _t1 = L*Omega**2
+        out[0, i] = -L*(_t1*(_t0 + sin(a))*sin1(a, theta, d) + 2*g*cos1(a, theta, d))
+        out[1, i] = L
+        out[2, i] = 2*L*_t0*(-_t1*cos(theta) + g)
+
+
+@compiled(BEND_EACH, later=True)
+def bend_each(n, lows, highs, left, right, p, out):
+    """climb[a, theta, b] and ds/dtheta, each for an orbit of its own; NaN where the closed form ends."""
+    lows, highs, left, right, p, out = carray(lows, n), carray(highs, n), carray(left, n), carray(right, n), carray(p, (4, n)), carray(out, (2, n))
+    for i in range(n):
+        L = p[0, i]
+        Omega = p[1, i]
+        g = p[2, i]
+        a = lows[i]
+        b = highs[i]
+        da = left[i]
+        db = right[i]
+        theta = nearest(a, b, da, db)
+        out[0, i] = -L*(L*Omega**2*((sin(b) + sin(theta))*near_sin2(a, theta, b, da, db) + sin1(a, b, -a + b)*sin1(a, theta, da)) + 2*g*near_cos2(a, theta, b, da, db))
+        out[1, i] = L
+
+
 @compiled(BOUNDS)
 def bounds(lo, hi, p, out):
     """Bounds of the climb's slope and of ds/dtheta for lo <= theta <= hi."""
@@ -123,6 +163,19 @@ def bounds(lo, hi, p, out):
     g = (p[2], p[2])
     out[0], out[1] = imul(imul(imul(iconst(2.0), L), iadd(imul(imul(imul(iconst(-1.0), L), ipow(Omega, 2)), icos(theta)), g)), isin(theta))
     out[2], out[3] = L
+
+
+@compiled(BOUNDS_EACH, later=True)
+def bounds_each(n, lo, hi, p, out):
+    """Bounds over many intervals of the climb's slope and of ds/dtheta for lo <= theta <= hi, each for parameters of its own."""
+    lo, hi, p, out = carray(lo, n), carray(hi, n), carray(p, (4, n)), carray(out, (4, n))
+    for i in range(n):
+        theta = (lo[i], hi[i])
+        L = (p[0, i], p[0, i])
+        Omega = (p[1, i], p[1, i])
+        g = (p[2, i], p[2, i])
+        out[0, i], out[1, i] = imul(imul(imul(iconst(2.0), L), iadd(imul(imul(imul(iconst(-1.0), L), ipow(Omega, 2)), icos(theta)), g)), isin(theta))
+        out[2, i], out[3, i] = L
 
 
 # The same formulas over a namespace of operations: extended precision evaluates these.
@@ -187,6 +240,7 @@ MODEL = Formulas(
     parameters=PARAMETERS,
     positive=('L',),
     addresses=Addresses(frame.address, climb.address, rise.address, bend.address, bounds.address),
+    each=Each(rise_each, bend_each, bounds_each),
     domain_of=exact_domain,
     exact=ExactFormulas(exact_x, exact_z, exact_ds, exact_kappa, exact_reaction, exact_climb, exact_climb_slope),
 )

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "circle_spring". Do not edit: change its declaration and generate again.
-# interface 3, input 8941b9022f6d, body 6a2b11e0f7bc
+# interface 3, input 8941b9022f6d, body cebb0c44cc96
 """Bead on a ring, tied by a spring to a point above its centre
 
 x              = L*sin(theta)
@@ -28,11 +28,15 @@ compiled = compiler(__file__, interface=3)
 
 from gqm_sym.runtime import (
     BEND,
+    BEND_EACH,
     BOUNDS,
+    BOUNDS_EACH,
     CLIMB,
     FRAME,
     RISE,
+    RISE_EACH,
     Addresses,
+    Each,
     ExactFormulas,
     Formulas,
     Motion,
@@ -43,6 +47,7 @@ from gqm_sym.runtime.differences import cos1, cos2, sin1, sin2
 from gqm_sym.runtime.elementary import cos, sin
 from gqm_sym.runtime.intervals import iadd, iconst, icos, imul, ipow, isin
 from gqm_sym.runtime.places import nearest
+from gqm_sym.runtime.wave_differences import near_cos2, near_sin2
 
 PARAMETERS = {
     'L': '1',
@@ -123,6 +128,48 @@ def bend(n, a, b, left, right, p, out):
         out[1, i] = L
 
 
+@compiled(RISE_EACH, later=True)
+def rise_each(n, starts, places, offsets, p, out):
+    """climb[a, theta], ds/dtheta and the climb's derivative, each for a launch of its own."""
+    starts, places, offsets, p, out = carray(starts, n), carray(places, n), carray(offsets, n), carray(p, (5, n)), carray(out, (3, n))
+    for i in range(n):
+        L = p[0, i]
+        w = p[1, i]
+        h = p[2, i]
+        g = p[3, i]
+        a = starts[i]
+        theta = places[i]
+        d = offsets[i]
+        _t0 = L*cos1(a, theta, d)
+        _t1 = w**2
+        _t2 = sin(theta)
+        _t3 = L*cos(theta)
+        out[0, i] = -2*_t0*g + _t1*(L**2*(_t2 + sin(a))*sin1(a, theta, d) + _t0*(L*cos(a) + _t3 + 2*h))
+        out[1, i] = L
+        out[2, i] = 2*L*_t2*(_t1*_t3 - _t1*(_t3 + h) + g)
+
+
+@compiled(BEND_EACH, later=True)
+def bend_each(n, lows, highs, left, right, p, out):
+    """climb[a, theta, b] and ds/dtheta, each for an orbit of its own; NaN where the closed form ends."""
+    lows, highs, left, right, p, out = carray(lows, n), carray(highs, n), carray(left, n), carray(right, n), carray(p, (5, n)), carray(out, (2, n))
+    for i in range(n):
+        L = p[0, i]
+        w = p[1, i]
+        h = p[2, i]
+        g = p[3, i]
+        a = lows[i]
+        b = highs[i]
+        da = left[i]
+        db = right[i]
+        theta = nearest(a, b, da, db)
+        _t0 = L*near_cos2(a, theta, b, da, db)
+        _t1 = L**2
+        _t2 = -a + b
+        out[0, i] = -2*_t0*g + w**2*(_t0*(L*cos(b) + L*cos(theta) + 2*h) + _t1*((sin(b) + sin(theta))*near_sin2(a, theta, b, da, db) + sin1(a, b, _t2)*sin1(a, theta, da)) + _t1*cos1(a, b, _t2)*cos1(a, theta, da))
+        out[1, i] = L
+
+
 @compiled(BOUNDS)
 def bounds(lo, hi, p, out):
     """Bounds of the climb's slope and of ds/dtheta for lo <= theta <= hi."""
@@ -136,6 +183,22 @@ def bounds(lo, hi, p, out):
     _t1 = imul(L, icos(theta))
     out[0], out[1] = imul(imul(imul(iconst(2.0), L), iadd(iadd(imul(_t0, _t1), imul(imul(iconst(-1.0), _t0), iadd(_t1, h))), g)), isin(theta))
     out[2], out[3] = L
+
+
+@compiled(BOUNDS_EACH, later=True)
+def bounds_each(n, lo, hi, p, out):
+    """Bounds over many intervals of the climb's slope and of ds/dtheta for lo <= theta <= hi, each for parameters of its own."""
+    lo, hi, p, out = carray(lo, n), carray(hi, n), carray(p, (5, n)), carray(out, (4, n))
+    for i in range(n):
+        theta = (lo[i], hi[i])
+        L = (p[0, i], p[0, i])
+        w = (p[1, i], p[1, i])
+        h = (p[2, i], p[2, i])
+        g = (p[3, i], p[3, i])
+        _t0 = ipow(w, 2)
+        _t1 = imul(L, icos(theta))
+        out[0, i], out[1, i] = imul(imul(imul(iconst(2.0), L), iadd(iadd(imul(_t0, _t1), imul(imul(iconst(-1.0), _t0), iadd(_t1, h))), g)), isin(theta))
+        out[2, i], out[3, i] = L
 
 
 # The same formulas over a namespace of operations: extended precision evaluates these.
@@ -208,6 +271,7 @@ MODEL = Formulas(
     parameters=PARAMETERS,
     positive=('L',),
     addresses=Addresses(frame.address, climb.address, rise.address, bend.address, bounds.address),
+    each=Each(rise_each, bend_each, bounds_each),
     domain_of=exact_domain,
     exact=ExactFormulas(exact_x, exact_z, exact_ds, exact_kappa, exact_reaction, exact_climb, exact_climb_slope),
 )

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "cycloid". Do not edit: change its declaration and generate again.
-# interface 3, input bb93c1ef9815, body cf0004873918
+# interface 3, input bb93c1ef9815, body a7da3665432c
 """Bead on an arch of a cycloid
 
 x              = R*(theta - sin(theta))
@@ -28,11 +28,15 @@ compiled = compiler(__file__, interface=3)
 
 from gqm_sym.runtime import (
     BEND,
+    BEND_EACH,
     BOUNDS,
+    BOUNDS_EACH,
     CLIMB,
     FRAME,
     RISE,
+    RISE_EACH,
     Addresses,
+    Each,
     ExactFormulas,
     Formulas,
     Motion,
@@ -43,6 +47,7 @@ from gqm_sym.runtime.differences import cos1, cos2
 from gqm_sym.runtime.elementary import cos, sin
 from gqm_sym.runtime.intervals import iconst, icos, idiv, imul, isin
 from gqm_sym.runtime.places import nearest
+from gqm_sym.runtime.wave_differences import near_cos2
 
 PARAMETERS = {
     'R': '0.5',
@@ -108,6 +113,41 @@ def bend(n, a, b, left, right, p, out):
         out[1, i] = _t0*sin(theta/2)
 
 
+@compiled(RISE_EACH, later=True)
+def rise_each(n, starts, places, offsets, p, out):
+    """climb[a, theta], ds/dtheta and the climb's derivative, each for a launch of its own."""
+    starts, places, offsets, p, out = carray(starts, n), carray(places, n), carray(offsets, n), carray(p, (3, n)), carray(out, (3, n))
+    for i in range(n):
+        R = p[0, i]
+        g = p[1, i]
+        a = starts[i]
+        theta = places[i]
+        d = offsets[i]
+        _t0 = 2*R
+        _t1 = theta/2
+        _t2 = sin(_t1)
+        out[0, i] = -_t0*g*cos1(a, theta, d)
+        out[1, i] = _t0*_t2
+        out[2, i] = 4*R*_t2*g*cos(_t1)
+
+
+@compiled(BEND_EACH, later=True)
+def bend_each(n, lows, highs, left, right, p, out):
+    """climb[a, theta, b] and ds/dtheta, each for an orbit of its own; NaN where the closed form ends."""
+    lows, highs, left, right, p, out = carray(lows, n), carray(highs, n), carray(left, n), carray(right, n), carray(p, (3, n)), carray(out, (2, n))
+    for i in range(n):
+        R = p[0, i]
+        g = p[1, i]
+        a = lows[i]
+        b = highs[i]
+        da = left[i]
+        db = right[i]
+        theta = nearest(a, b, da, db)
+        _t0 = 2*R
+        out[0, i] = -_t0*g*near_cos2(a, theta, b, da, db)
+        out[1, i] = _t0*sin(theta/2)
+
+
 @compiled(BOUNDS)
 def bounds(lo, hi, p, out):
     """Bounds of the climb's slope and of ds/dtheta for lo <= theta <= hi."""
@@ -119,6 +159,20 @@ def bounds(lo, hi, p, out):
     _t1 = imul(R, isin(_t0))
     out[0], out[1] = imul(imul(imul(iconst(4.0), _t1), g), icos(_t0))
     out[2], out[3] = imul(iconst(2.0), _t1)
+
+
+@compiled(BOUNDS_EACH, later=True)
+def bounds_each(n, lo, hi, p, out):
+    """Bounds over many intervals of the climb's slope and of ds/dtheta for lo <= theta <= hi, each for parameters of its own."""
+    lo, hi, p, out = carray(lo, n), carray(hi, n), carray(p, (3, n)), carray(out, (4, n))
+    for i in range(n):
+        theta = (lo[i], hi[i])
+        R = (p[0, i], p[0, i])
+        g = (p[1, i], p[1, i])
+        _t0 = imul(idiv(iconst(1.0), iconst(2.0)), theta)
+        _t1 = imul(R, isin(_t0))
+        out[0, i], out[1, i] = imul(imul(imul(iconst(4.0), _t1), g), icos(_t0))
+        out[2, i], out[3, i] = imul(iconst(2.0), _t1)
 
 
 # The same formulas over a namespace of operations: extended precision evaluates these.
@@ -180,6 +234,7 @@ MODEL = Formulas(
     parameters=PARAMETERS,
     positive=('R',),
     addresses=Addresses(frame.address, climb.address, rise.address, bend.address, bounds.address),
+    each=Each(rise_each, bend_each, bounds_each),
     domain_of=exact_domain,
     exact=ExactFormulas(exact_x, exact_z, exact_ds, exact_kappa, exact_reaction, exact_climb, exact_climb_slope),
 )

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "double_well". Do not edit: change its declaration and generate again.
-# interface 3, input 28c16d144828, body d1e9aff3136c
+# interface 3, input 28c16d144828, body f3aa418489f3
 """Bead between two wells
 
 x              = x
@@ -29,11 +29,15 @@ compiled = compiler(__file__, interface=3)
 
 from gqm_sym.runtime import (
     BEND,
+    BEND_EACH,
     BOUNDS,
+    BOUNDS_EACH,
     CLIMB,
     FRAME,
     RISE,
+    RISE_EACH,
     Addresses,
+    Each,
     ExactFormulas,
     Formulas,
     Motion,
@@ -110,6 +114,41 @@ def bend(n, a, b, left, right, p, out):
         out[1, i] = sqrt(16*_t0*h**2*(_t0 - 1)**2 + 1)
 
 
+@compiled(RISE_EACH, later=True)
+def rise_each(n, starts, places, offsets, p, out):
+    """climb[a, x], ds/dx and the climb's derivative, each for a launch of its own."""
+    starts, places, offsets, p, out = carray(starts, n), carray(places, n), carray(offsets, n), carray(p, (3, n)), carray(out, (3, n))
+    for i in range(n):
+        h = p[0, i]
+        g = p[1, i]
+        a = starts[i]
+        x = places[i]
+        d = offsets[i]
+        _t0 = g*h
+        _t1 = x**2
+        _t2 = _t1 - 1
+        out[0, i] = 2*_t0*(-2*a - 2*x + ipow1(a, x, d, 4))
+        out[1, i] = sqrt(16*_t1*_t2**2*h**2 + 1)
+        out[2, i] = 8*_t0*_t2*x
+
+
+@compiled(BEND_EACH, later=True)
+def bend_each(n, lows, highs, left, right, p, out):
+    """climb[a, x, b] and ds/dx, each for an orbit of its own; NaN where the closed form ends."""
+    lows, highs, left, right, p, out = carray(lows, n), carray(highs, n), carray(left, n), carray(right, n), carray(p, (3, n)), carray(out, (2, n))
+    for i in range(n):
+        h = p[0, i]
+        g = p[1, i]
+        a = lows[i]
+        b = highs[i]
+        da = left[i]
+        db = right[i]
+        x = nearest(a, b, da, db)
+        _t0 = x**2
+        out[0, i] = 2*g*h*(_t0 + a**2 + a*b + a*x + b**2 + b*x - 2)
+        out[1, i] = sqrt(16*_t0*h**2*(_t0 - 1)**2 + 1)
+
+
 @compiled(BOUNDS)
 def bounds(lo, hi, p, out):
     """Bounds of the climb's slope and of ds/dx for lo <= x <= hi."""
@@ -121,6 +160,20 @@ def bounds(lo, hi, p, out):
     _t1 = iadd(_t0, iconst(-1.0))
     out[0], out[1] = imul(imul(imul(imul(iconst(8.0), _t1), g), h), x)
     out[2], out[3] = isqrt(iadd(imul(imul(imul(iconst(16.0), _t0), ipow(_t1, 2)), ipow(h, 2)), iconst(1.0)))
+
+
+@compiled(BOUNDS_EACH, later=True)
+def bounds_each(n, lo, hi, p, out):
+    """Bounds over many intervals of the climb's slope and of ds/dx for lo <= x <= hi, each for parameters of its own."""
+    lo, hi, p, out = carray(lo, n), carray(hi, n), carray(p, (3, n)), carray(out, (4, n))
+    for i in range(n):
+        x = (lo[i], hi[i])
+        h = (p[0, i], p[0, i])
+        g = (p[1, i], p[1, i])
+        _t0 = ipow(x, 2)
+        _t1 = iadd(_t0, iconst(-1.0))
+        out[0, i], out[1, i] = imul(imul(imul(imul(iconst(8.0), _t1), g), h), x)
+        out[2, i], out[3, i] = isqrt(iadd(imul(imul(imul(iconst(16.0), _t0), ipow(_t1, 2)), ipow(h, 2)), iconst(1.0)))
 
 
 # The same formulas over a namespace of operations: extended precision evaluates these.
@@ -184,6 +237,7 @@ MODEL = Formulas(
     parameters=PARAMETERS,
     positive=(),
     addresses=Addresses(frame.address, climb.address, rise.address, bend.address, bounds.address),
+    each=Each(rise_each, bend_each, bounds_each),
     domain_of=exact_domain,
     exact=ExactFormulas(exact_x, exact_z, exact_ds, exact_kappa, exact_reaction, exact_climb, exact_climb_slope),
 )

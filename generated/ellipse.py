@@ -1,5 +1,5 @@
 # Made by gqm-gen for "ellipse". Do not edit: change its declaration and generate again.
-# interface 3, input 3a81da5567d3, body 71c1a8668d9c
+# interface 3, input 3a81da5567d3, body 25afb4c42cc4
 """Bead on an ellipse, by the eccentric angle
 
 x              = a*cos(theta)
@@ -29,11 +29,15 @@ compiled = compiler(__file__, interface=3)
 
 from gqm_sym.runtime import (
     BEND,
+    BEND_EACH,
     BOUNDS,
+    BOUNDS_EACH,
     CLIMB,
     FRAME,
     RISE,
+    RISE_EACH,
     Addresses,
+    Each,
     ExactFormulas,
     Formulas,
     Motion,
@@ -44,6 +48,7 @@ from gqm_sym.runtime.differences import sin1, sin2
 from gqm_sym.runtime.elementary import cos, sin
 from gqm_sym.runtime.intervals import iadd, iconst, icos, imul, ipow, isin, isqrt
 from gqm_sym.runtime.places import nearest
+from gqm_sym.runtime.wave_differences import near_sin2
 
 PARAMETERS = {
     'a': '2',
@@ -110,6 +115,41 @@ def bend(n, _a, _b, left, right, p, out):
         out[1, i] = sqrt(a**2*sin(theta)**2 + b**2*cos(theta)**2)
 
 
+@compiled(RISE_EACH, later=True)
+def rise_each(n, starts, places, offsets, p, out):
+    """climb[a, theta], ds/dtheta and the climb's derivative, each for a launch of its own."""
+    starts, places, offsets, p, out = carray(starts, n), carray(places, n), carray(offsets, n), carray(p, (4, n)), carray(out, (3, n))
+    for i in range(n):
+        a = p[0, i]
+        b = p[1, i]
+        g = p[2, i]
+        _a = starts[i]
+        theta = places[i]
+        d = offsets[i]
+        _t0 = 2*b*g
+        _t1 = cos(theta)
+        out[0, i] = _t0*sin1(_a, theta, d)
+        out[1, i] = sqrt(_t1**2*b**2 + a**2*sin(theta)**2)
+        out[2, i] = _t0*_t1
+
+
+@compiled(BEND_EACH, later=True)
+def bend_each(n, lows, highs, left, right, p, out):
+    """climb[a, theta, b] and ds/dtheta, each for an orbit of its own; NaN where the closed form ends."""
+    lows, highs, left, right, p, out = carray(lows, n), carray(highs, n), carray(left, n), carray(right, n), carray(p, (4, n)), carray(out, (2, n))
+    for i in range(n):
+        a = p[0, i]
+        b = p[1, i]
+        g = p[2, i]
+        _a = lows[i]
+        _b = highs[i]
+        da = left[i]
+        db = right[i]
+        theta = nearest(_a, _b, da, db)
+        out[0, i] = 2*b*g*near_sin2(_a, theta, _b, da, db)
+        out[1, i] = sqrt(a**2*sin(theta)**2 + b**2*cos(theta)**2)
+
+
 @compiled(BOUNDS)
 def bounds(lo, hi, p, out):
     """Bounds of the climb's slope and of ds/dtheta for lo <= theta <= hi."""
@@ -121,6 +161,20 @@ def bounds(lo, hi, p, out):
     _t0 = icos(theta)
     out[0], out[1] = imul(imul(imul(iconst(2.0), _t0), b), g)
     out[2], out[3] = isqrt(iadd(imul(ipow(_t0, 2), ipow(b, 2)), imul(ipow(a, 2), ipow(isin(theta), 2))))
+
+
+@compiled(BOUNDS_EACH, later=True)
+def bounds_each(n, lo, hi, p, out):
+    """Bounds over many intervals of the climb's slope and of ds/dtheta for lo <= theta <= hi, each for parameters of its own."""
+    lo, hi, p, out = carray(lo, n), carray(hi, n), carray(p, (4, n)), carray(out, (4, n))
+    for i in range(n):
+        theta = (lo[i], hi[i])
+        a = (p[0, i], p[0, i])
+        b = (p[1, i], p[1, i])
+        g = (p[2, i], p[2, i])
+        _t0 = icos(theta)
+        out[0, i], out[1, i] = imul(imul(imul(iconst(2.0), _t0), b), g)
+        out[2, i], out[3, i] = isqrt(iadd(imul(ipow(_t0, 2), ipow(b, 2)), imul(ipow(a, 2), ipow(isin(theta), 2))))
 
 
 # The same formulas over a namespace of operations: extended precision evaluates these.
@@ -186,6 +240,7 @@ MODEL = Formulas(
     parameters=PARAMETERS,
     positive=('a', 'b'),
     addresses=Addresses(frame.address, climb.address, rise.address, bend.address, bounds.address),
+    each=Each(rise_each, bend_each, bounds_each),
     domain_of=exact_domain,
     exact=ExactFormulas(exact_x, exact_z, exact_ds, exact_kappa, exact_reaction, exact_climb, exact_climb_slope),
 )

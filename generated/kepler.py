@@ -1,5 +1,5 @@
 # Made by gqm-gen for "kepler". Do not edit: change its declaration and generate again.
-# interface 3, input a1e1feaf475b, body 125c80b6d4bd
+# interface 3, input a1e1feaf475b, body 488f34576215
 """Planet on its own ellipse, by the eccentric anomaly
 
 x              = a*(-ecc + cos(E))
@@ -29,11 +29,15 @@ compiled = compiler(__file__, interface=3)
 
 from gqm_sym.runtime import (
     BEND,
+    BEND_EACH,
     BOUNDS,
+    BOUNDS_EACH,
     CLIMB,
     FRAME,
     RISE,
+    RISE_EACH,
     Addresses,
+    Each,
     ExactFormulas,
     Formulas,
     Motion,
@@ -44,6 +48,7 @@ from gqm_sym.runtime.differences import cos1, cos2, sin1, sin2
 from gqm_sym.runtime.elementary import cos, sin
 from gqm_sym.runtime.intervals import iabs, iadd, iconst, icos, imul, ipow, isin, isqrt
 from gqm_sym.runtime.places import nearest
+from gqm_sym.runtime.wave_differences import near_cos2, near_sin2
 
 PARAMETERS = {
     'a': '3/2',
@@ -159,6 +164,76 @@ def bend(n, _a, b, left, right, p, out):
         out[1, i] = a*sqrt(_t10 + _t3*_t8**2)
 
 
+@compiled(RISE_EACH, later=True)
+def rise_each(n, starts, places, offsets, p, out):
+    """climb[a, E], ds/dE and the climb's derivative, each for a launch of its own."""
+    starts, places, offsets, p, out = carray(starts, n), carray(places, n), carray(offsets, n), carray(p, (4, n)), carray(out, (3, n))
+    for i in range(n):
+        a = p[0, i]
+        ecc = p[1, i]
+        k = p[2, i]
+        _a = starts[i]
+        E = places[i]
+        d = offsets[i]
+        _t0 = cos(E)
+        _t1 = -_t0 + ecc
+        _t2 = sin(E)
+        _t3 = _t2**2
+        _t4 = 1 - ecc**2
+        _t5 = _t1**2 + _t3*_t4
+        _t6 = sqrt(_t5)
+        _t7 = cos(_a)
+        _t8 = sin(_a)
+        _t9 = sqrt(_t4*_t8**2 + (_t7 - ecc)**2)
+        _t10 = fabs(a)
+        _t11 = 2*k
+        out[0, i] = _t11*(_t4*(_t2 + _t8)*sin1(_a, E, d) + (_t0 + _t7 - 2*ecc)*cos1(_a, E, d))/(_t10*_t6*_t9*(_t6 + _t9))
+        out[1, i] = a*sqrt(_t0**2*_t4 + _t3)
+        out[2, i] = _t10*_t11*_t2*(_t0*_t4 + _t1)/(a**2*sqrt(_t5)**3)
+
+
+@compiled(BEND_EACH, later=True)
+def bend_each(n, lows, highs, left, right, p, out):
+    """climb[a, E, b] and ds/dE, each for an orbit of its own; NaN where the closed form ends."""
+    lows, highs, left, right, p, out = carray(lows, n), carray(highs, n), carray(left, n), carray(right, n), carray(p, (4, n)), carray(out, (2, n))
+    for i in range(n):
+        a = p[0, i]
+        ecc = p[1, i]
+        k = p[2, i]
+        _a = lows[i]
+        b = highs[i]
+        da = left[i]
+        db = right[i]
+        E = nearest(_a, b, da, db)
+        _t0 = cos(E)
+        _t1 = sin(E)
+        _t2 = _t1**2
+        _t3 = 1 - ecc**2
+        _t4 = sqrt(_t2*_t3 + (_t0 - ecc)**2)
+        _t5 = 1/_t4
+        _t6 = cos(_a)
+        _t7 = sin(_a)
+        _t8 = sqrt(_t3*_t7**2 + (_t6 - ecc)**2)
+        _t9 = cos(b)
+        _t10 = sin(b)
+        _t11 = sqrt(_t10**2*_t3 + (_t9 - ecc)**2)
+        _t12 = 1/_t11
+        _t13 = cos1(_a, E, da)
+        _t14 = -2*ecc
+        _t15 = _t0 + _t14
+        _t16 = sin1(_a, E, da)
+        _t17 = _t13*(_t15 + _t6) + _t16*_t3*(_t1 + _t7)
+        _t18 = -_a + b
+        _t19 = cos1(_a, b, _t18)
+        _t20 = sin1(_a, b, _t18)
+        _t21 = _t19*(_t14 + _t6 + _t9) + _t20*_t3*(_t10 + _t7)
+        _t22 = 1/(_t4 + _t8)
+        _t23 = 1/(_t11 + _t8)
+        _t24 = 1/(_t11 + _t4)
+        out[0, i] = -2*k*(_t12*_t17*_t21*_t22*_t23*_t5/_t8 - _t12*_t5*(-_t17*_t21*_t22*_t23*_t24 + _t24*(_t13*_t19 + _t3*(_t16*_t20 + (_t1 + _t10)*near_sin2(_a, E, b, da, db)) + (_t15 + _t9)*near_cos2(_a, E, b, da, db))))/fabs(a)
+        out[1, i] = a*sqrt(_t0**2*_t3 + _t2)
+
+
 @compiled(BOUNDS)
 def bounds(lo, hi, p, out):
     """Bounds of the climb's slope and of ds/dE for lo <= E <= hi."""
@@ -174,6 +249,24 @@ def bounds(lo, hi, p, out):
     _t4 = ipow(_t0, 2)
     out[0], out[1] = imul(imul(imul(imul(imul(imul(iconst(2.0), _t0), ipow(a, -2)), k), iadd(imul(_t1, _t2), _t3)), ipow(isqrt(iadd(imul(_t2, _t4), ipow(_t3, 2))), -3)), iabs(a))
     out[2], out[3] = imul(a, isqrt(iadd(imul(ipow(_t1, 2), _t2), _t4)))
+
+
+@compiled(BOUNDS_EACH, later=True)
+def bounds_each(n, lo, hi, p, out):
+    """Bounds over many intervals of the climb's slope and of ds/dE for lo <= E <= hi, each for parameters of its own."""
+    lo, hi, p, out = carray(lo, n), carray(hi, n), carray(p, (4, n)), carray(out, (4, n))
+    for i in range(n):
+        E = (lo[i], hi[i])
+        a = (p[0, i], p[0, i])
+        ecc = (p[1, i], p[1, i])
+        k = (p[2, i], p[2, i])
+        _t0 = isin(E)
+        _t1 = icos(E)
+        _t2 = iadd(iconst(1.0), imul(iconst(-1.0), ipow(ecc, 2)))
+        _t3 = iadd(imul(iconst(-1.0), _t1), ecc)
+        _t4 = ipow(_t0, 2)
+        out[0, i], out[1, i] = imul(imul(imul(imul(imul(imul(iconst(2.0), _t0), ipow(a, -2)), k), iadd(imul(_t1, _t2), _t3)), ipow(isqrt(iadd(imul(_t2, _t4), ipow(_t3, 2))), -3)), iabs(a))
+        out[2, i], out[3, i] = imul(a, isqrt(iadd(imul(ipow(_t1, 2), _t2), _t4)))
 
 
 # The same formulas over a namespace of operations: extended precision evaluates these.
@@ -251,6 +344,7 @@ MODEL = Formulas(
     parameters=PARAMETERS,
     positive=('a',),
     addresses=Addresses(frame.address, climb.address, rise.address, bend.address, bounds.address),
+    each=Each(rise_each, bend_each, bounds_each),
     domain_of=exact_domain,
     exact=ExactFormulas(exact_x, exact_z, exact_ds, exact_kappa, exact_reaction, exact_climb, exact_climb_slope),
 )

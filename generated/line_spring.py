@@ -1,5 +1,5 @@
 # Made by gqm-gen for "line_spring". Do not edit: change its declaration and generate again.
-# interface 3, input 924b210c4a96, body c8359e09f6ac
+# interface 3, input 924b210c4a96, body 6be59ac20a44
 """Bead on a sloping line, tied to the origin by a spring
 
 x              = x
@@ -28,11 +28,15 @@ compiled = compiler(__file__, interface=3)
 
 from gqm_sym.runtime import (
     BEND,
+    BEND_EACH,
     BOUNDS,
+    BOUNDS_EACH,
     CLIMB,
     FRAME,
     RISE,
+    RISE_EACH,
     Addresses,
+    Each,
     ExactFormulas,
     Formulas,
     Motion,
@@ -94,6 +98,30 @@ def bend(n, a, b, left, right, p, out):
         out[1, i] = 5/4
 
 
+@compiled(RISE_EACH, later=True)
+def rise_each(n, starts, places, offsets, p, out):
+    """climb[a, x], ds/dx and the climb's derivative, each for a launch of its own."""
+    starts, places, offsets, p, out = carray(starts, n), carray(places, n), carray(offsets, n), carray(p, (2, n)), carray(out, (3, n))
+    for i in range(n):
+        w = p[0, i]
+        a = starts[i]
+        x = places[i]
+        _t0 = w**2
+        out[0, i] = _t0*(25*a/16 + 25*x/16 + 3)
+        out[1, i] = 5/4
+        out[2, i] = _t0*(25*x/4 + 6)/2
+
+
+@compiled(BEND_EACH, later=True)
+def bend_each(n, lows, highs, left, right, p, out):
+    """climb[a, x, b] and ds/dx, each for an orbit of its own; NaN where the closed form ends."""
+    lows, highs, left, right, p, out = carray(lows, n), carray(highs, n), carray(left, n), carray(right, n), carray(p, (2, n)), carray(out, (2, n))
+    for i in range(n):
+        w = p[0, i]
+        out[0, i] = 25*w**2/16
+        out[1, i] = 5/4
+
+
 @compiled(BOUNDS)
 def bounds(lo, hi, p, out):
     """Bounds of the climb's slope and of ds/dx for lo <= x <= hi."""
@@ -102,6 +130,17 @@ def bounds(lo, hi, p, out):
     w = (p[0], p[0])
     out[0], out[1] = imul(imul(idiv(iconst(1.0), iconst(2.0)), ipow(w, 2)), iadd(imul(idiv(iconst(25.0), iconst(4.0)), x), iconst(6.0)))
     out[2], out[3] = idiv(iconst(5.0), iconst(4.0))
+
+
+@compiled(BOUNDS_EACH, later=True)
+def bounds_each(n, lo, hi, p, out):
+    """Bounds over many intervals of the climb's slope and of ds/dx for lo <= x <= hi, each for parameters of its own."""
+    lo, hi, p, out = carray(lo, n), carray(hi, n), carray(p, (2, n)), carray(out, (4, n))
+    for i in range(n):
+        x = (lo[i], hi[i])
+        w = (p[0, i], p[0, i])
+        out[0, i], out[1, i] = imul(imul(idiv(iconst(1.0), iconst(2.0)), ipow(w, 2)), iadd(imul(idiv(iconst(25.0), iconst(4.0)), x), iconst(6.0)))
+        out[2, i], out[3, i] = idiv(iconst(5.0), iconst(4.0))
 
 
 # The same formulas over a namespace of operations: extended precision evaluates these.
@@ -156,6 +195,7 @@ MODEL = Formulas(
     parameters=PARAMETERS,
     positive=(),
     addresses=Addresses(frame.address, climb.address, rise.address, bend.address, bounds.address),
+    each=Each(rise_each, bend_each, bounds_each),
     domain_of=exact_domain,
     exact=ExactFormulas(exact_x, exact_z, exact_ds, exact_kappa, exact_reaction, exact_climb, exact_climb_slope),
 )

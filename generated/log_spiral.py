@@ -1,5 +1,5 @@
 # Made by gqm-gen for "log_spiral". Do not edit: change its declaration and generate again.
-# interface 3, input 458ba188398a, body c67e71d782d6
+# interface 3, input 458ba188398a, body b314cf115b5f
 """Bead on a logarithmic spiral
 
 x              = r0*exp(b*theta)*cos(theta)
@@ -17,7 +17,7 @@ turning points : 2*g*r0*(exp(b*lam0)*sin(lam0) - exp(b*theta)*sin(theta)) + v0**
 liftoff        : g*(b*cos(theta) - sin(theta))/sqrt(b**2 + 1) + (2*g*r0*(exp(b*lam0)*sin(lam0) - exp(b*theta)*sin(theta)) + v0**2)*exp(-b*theta)/(r0*sqrt(b**2 + 1)) = 0
 """
 
-from math import exp, sqrt
+from math import sqrt
 from typing import Any
 
 from numba import carray
@@ -29,11 +29,15 @@ compiled = compiler(__file__, interface=3)
 
 from gqm_sym.runtime import (
     BEND,
+    BEND_EACH,
     BOUNDS,
+    BOUNDS_EACH,
     CLIMB,
     FRAME,
     RISE,
+    RISE_EACH,
     Addresses,
+    Each,
     ExactFormulas,
     Formulas,
     Motion,
@@ -41,9 +45,10 @@ from gqm_sym.runtime import (
     Sweep,
 )
 from gqm_sym.runtime.differences import exp1, exp2, sin1, sin2
-from gqm_sym.runtime.elementary import cos, sin
+from gqm_sym.runtime.elementary import cos, exp, sin
 from gqm_sym.runtime.intervals import iadd, iconst, icos, iexp, imul, ipow, isin, isqrt
 from gqm_sym.runtime.places import nearest
+from gqm_sym.runtime.wave_differences import near_sin2
 
 PARAMETERS = {
     'r0': '1',
@@ -125,6 +130,47 @@ def bend(n, a, _b, left, right, p, out):
         out[1, i] = _c2*r0*exp(_t2)
 
 
+@compiled(RISE_EACH, later=True)
+def rise_each(n, starts, places, offsets, p, out):
+    """climb[a, theta], ds/dtheta and the climb's derivative, each for a launch of its own."""
+    starts, places, offsets, p, out = carray(starts, n), carray(places, n), carray(offsets, n), carray(p, (4, n)), carray(out, (3, n))
+    for i in range(n):
+        r0 = p[0, i]
+        b = p[1, i]
+        g = p[2, i]
+        a = starts[i]
+        theta = places[i]
+        d = offsets[i]
+        _t0 = b*theta
+        _t1 = exp(_t0)
+        _t2 = 2*g
+        _t3 = _t1*r0
+        out[0, i] = _t2*r0*(_t1*sin1(a, theta, d) + b*exp1(a*b, _t0, b*d)*sin(a))
+        out[1, i] = _t3*sqrt(b**2 + 1)
+        out[2, i] = _t2*_t3*(b*sin(theta) + cos(theta))
+
+
+@compiled(BEND_EACH, later=True)
+def bend_each(n, lows, highs, left, right, p, out):
+    """climb[a, theta, b] and ds/dtheta, each for an orbit of its own; NaN where the closed form ends."""
+    lows, highs, left, right, p, out = carray(lows, n), carray(highs, n), carray(left, n), carray(right, n), carray(p, (4, n)), carray(out, (2, n))
+    for i in range(n):
+        r0 = p[0, i]
+        b = p[1, i]
+        g = p[2, i]
+        a = lows[i]
+        _b = highs[i]
+        da = left[i]
+        db = right[i]
+        theta = nearest(a, _b, da, db)
+        _t0 = _b*b
+        _t1 = b*theta
+        _t2 = b*db
+        _t3 = b**2
+        out[0, i] = 2*g*r0*(_t3*exp2(a*b, _t1, _t0, b*da, _t2)*sin(a) + b*exp1(_t1, _t0, _t2)*sin1(a, theta, da) + near_sin2(a, theta, _b, da, db)*exp(_t0))
+        out[1, i] = r0*sqrt(_t3 + 1)*exp(_t1)
+
+
 @compiled(BOUNDS)
 def bounds(lo, hi, p, out):
     """Bounds of the climb's slope and of ds/dtheta for lo <= theta <= hi."""
@@ -136,6 +182,20 @@ def bounds(lo, hi, p, out):
     _t0 = imul(r0, iexp(imul(b, theta)))
     out[0], out[1] = imul(imul(imul(iconst(2.0), _t0), g), iadd(imul(b, isin(theta)), icos(theta)))
     out[2], out[3] = imul(_t0, isqrt(iadd(ipow(b, 2), iconst(1.0))))
+
+
+@compiled(BOUNDS_EACH, later=True)
+def bounds_each(n, lo, hi, p, out):
+    """Bounds over many intervals of the climb's slope and of ds/dtheta for lo <= theta <= hi, each for parameters of its own."""
+    lo, hi, p, out = carray(lo, n), carray(hi, n), carray(p, (4, n)), carray(out, (4, n))
+    for i in range(n):
+        theta = (lo[i], hi[i])
+        r0 = (p[0, i], p[0, i])
+        b = (p[1, i], p[1, i])
+        g = (p[2, i], p[2, i])
+        _t0 = imul(r0, iexp(imul(b, theta)))
+        out[0, i], out[1, i] = imul(imul(imul(iconst(2.0), _t0), g), iadd(imul(b, isin(theta)), icos(theta)))
+        out[2, i], out[3, i] = imul(_t0, isqrt(iadd(ipow(b, 2), iconst(1.0))))
 
 
 # The same formulas over a namespace of operations: extended precision evaluates these.
@@ -203,6 +263,7 @@ MODEL = Formulas(
     parameters=PARAMETERS,
     positive=('r0',),
     addresses=Addresses(frame.address, climb.address, rise.address, bend.address, bounds.address),
+    each=Each(rise_each, bend_each, bounds_each),
     domain_of=exact_domain,
     exact=ExactFormulas(exact_x, exact_z, exact_ds, exact_kappa, exact_reaction, exact_climb, exact_climb_slope),
 )

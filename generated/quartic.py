@@ -1,5 +1,5 @@
 # Made by gqm-gen for "quartic". Do not edit: change its declaration and generate again.
-# interface 3, input e1ff78064d31, body 5ea8c92a5e39
+# interface 3, input e1ff78064d31, body 2379c38be85c
 """Bead in a quartic bowl
 
 x              = x
@@ -29,11 +29,15 @@ compiled = compiler(__file__, interface=3)
 
 from gqm_sym.runtime import (
     BEND,
+    BEND_EACH,
     BOUNDS,
+    BOUNDS_EACH,
     CLIMB,
     FRAME,
     RISE,
+    RISE_EACH,
     Addresses,
+    Each,
     ExactFormulas,
     Formulas,
     Motion,
@@ -104,6 +108,35 @@ def bend(n, a, b, left, right, p, out):
         out[1, i] = sqrt(16*x**6 + 1)
 
 
+@compiled(RISE_EACH, later=True)
+def rise_each(n, starts, places, offsets, p, out):
+    """climb[a, x], ds/dx and the climb's derivative, each for a launch of its own."""
+    starts, places, offsets, p, out = carray(starts, n), carray(places, n), carray(offsets, n), carray(p, (2, n)), carray(out, (3, n))
+    for i in range(n):
+        g = p[0, i]
+        a = starts[i]
+        x = places[i]
+        d = offsets[i]
+        out[0, i] = 2*g*ipow1(a, x, d, 4)
+        out[1, i] = sqrt(16*x**6 + 1)
+        out[2, i] = 8*g*x**3
+
+
+@compiled(BEND_EACH, later=True)
+def bend_each(n, lows, highs, left, right, p, out):
+    """climb[a, x, b] and ds/dx, each for an orbit of its own; NaN where the closed form ends."""
+    lows, highs, left, right, p, out = carray(lows, n), carray(highs, n), carray(left, n), carray(right, n), carray(p, (2, n)), carray(out, (2, n))
+    for i in range(n):
+        g = p[0, i]
+        a = lows[i]
+        b = highs[i]
+        da = left[i]
+        db = right[i]
+        x = nearest(a, b, da, db)
+        out[0, i] = 2*g*(a**2 + a*b + a*x + b**2 + b*x + x**2)
+        out[1, i] = sqrt(16*x**6 + 1)
+
+
 @compiled(BOUNDS)
 def bounds(lo, hi, p, out):
     """Bounds of the climb's slope and of ds/dx for lo <= x <= hi."""
@@ -112,6 +145,17 @@ def bounds(lo, hi, p, out):
     g = (p[0], p[0])
     out[0], out[1] = imul(imul(iconst(8.0), g), ipow(x, 3))
     out[2], out[3] = isqrt(iadd(imul(iconst(16.0), ipow(x, 6)), iconst(1.0)))
+
+
+@compiled(BOUNDS_EACH, later=True)
+def bounds_each(n, lo, hi, p, out):
+    """Bounds over many intervals of the climb's slope and of ds/dx for lo <= x <= hi, each for parameters of its own."""
+    lo, hi, p, out = carray(lo, n), carray(hi, n), carray(p, (2, n)), carray(out, (4, n))
+    for i in range(n):
+        x = (lo[i], hi[i])
+        g = (p[0, i], p[0, i])
+        out[0, i], out[1, i] = imul(imul(iconst(8.0), g), ipow(x, 3))
+        out[2, i], out[3, i] = isqrt(iadd(imul(iconst(16.0), ipow(x, 6)), iconst(1.0)))
 
 
 # The same formulas over a namespace of operations: extended precision evaluates these.
@@ -166,6 +210,7 @@ MODEL = Formulas(
     parameters=PARAMETERS,
     positive=(),
     addresses=Addresses(frame.address, climb.address, rise.address, bend.address, bounds.address),
+    each=Each(rise_each, bend_each, bounds_each),
     domain_of=exact_domain,
     exact=ExactFormulas(exact_x, exact_z, exact_ds, exact_kappa, exact_reaction, exact_climb, exact_climb_slope),
 )

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "rotating_parabola". Do not edit: change its declaration and generate again.
-# interface 3, input 9d848a7566cb, body a4c45ca7cef5
+# interface 3, input 9d848a7566cb, body d22c691cfe9a
 """Bead in a turning parabolic bowl
 
 x              = x
@@ -30,11 +30,15 @@ compiled = compiler(__file__, interface=3)
 
 from gqm_sym.runtime import (
     BEND,
+    BEND_EACH,
     BOUNDS,
+    BOUNDS_EACH,
     CLIMB,
     FRAME,
     RISE,
+    RISE_EACH,
     Addresses,
+    Each,
     ExactFormulas,
     Formulas,
     Motion,
@@ -108,6 +112,39 @@ def bend(n, _a, b, left, right, p, out):
         out[1, i] = sqrt(4*a**2*x**2 + 1)
 
 
+@compiled(RISE_EACH, later=True)
+def rise_each(n, starts, places, offsets, p, out):
+    """climb[a, x], ds/dx and the climb's derivative, each for a launch of its own."""
+    starts, places, offsets, p, out = carray(starts, n), carray(places, n), carray(offsets, n), carray(p, (4, n)), carray(out, (3, n))
+    for i in range(n):
+        a = p[0, i]
+        Omega = p[1, i]
+        g = p[2, i]
+        _a = starts[i]
+        x = places[i]
+        _t0 = -Omega**2 + 2*a*g
+        out[0, i] = _t0*(_a + x)
+        out[1, i] = sqrt(4*a**2*x**2 + 1)
+        out[2, i] = 2*_t0*x
+
+
+@compiled(BEND_EACH, later=True)
+def bend_each(n, lows, highs, left, right, p, out):
+    """climb[a, x, b] and ds/dx, each for an orbit of its own; NaN where the closed form ends."""
+    lows, highs, left, right, p, out = carray(lows, n), carray(highs, n), carray(left, n), carray(right, n), carray(p, (4, n)), carray(out, (2, n))
+    for i in range(n):
+        a = p[0, i]
+        Omega = p[1, i]
+        g = p[2, i]
+        _a = lows[i]
+        b = highs[i]
+        da = left[i]
+        db = right[i]
+        x = nearest(_a, b, da, db)
+        out[0, i] = -Omega**2 + 2*a*g
+        out[1, i] = sqrt(4*a**2*x**2 + 1)
+
+
 @compiled(BOUNDS)
 def bounds(lo, hi, p, out):
     """Bounds of the climb's slope and of ds/dx for lo <= x <= hi."""
@@ -118,6 +155,19 @@ def bounds(lo, hi, p, out):
     g = (p[2], p[2])
     out[0], out[1] = imul(imul(iconst(2.0), x), iadd(imul(iconst(-1.0), ipow(Omega, 2)), imul(imul(iconst(2.0), a), g)))
     out[2], out[3] = isqrt(iadd(imul(imul(iconst(4.0), ipow(a, 2)), ipow(x, 2)), iconst(1.0)))
+
+
+@compiled(BOUNDS_EACH, later=True)
+def bounds_each(n, lo, hi, p, out):
+    """Bounds over many intervals of the climb's slope and of ds/dx for lo <= x <= hi, each for parameters of its own."""
+    lo, hi, p, out = carray(lo, n), carray(hi, n), carray(p, (4, n)), carray(out, (4, n))
+    for i in range(n):
+        x = (lo[i], hi[i])
+        a = (p[0, i], p[0, i])
+        Omega = (p[1, i], p[1, i])
+        g = (p[2, i], p[2, i])
+        out[0, i], out[1, i] = imul(imul(iconst(2.0), x), iadd(imul(iconst(-1.0), ipow(Omega, 2)), imul(imul(iconst(2.0), a), g)))
+        out[2, i], out[3, i] = isqrt(iadd(imul(imul(iconst(4.0), ipow(a, 2)), ipow(x, 2)), iconst(1.0)))
 
 
 # The same formulas over a namespace of operations: extended precision evaluates these.
@@ -182,6 +232,7 @@ MODEL = Formulas(
     parameters=PARAMETERS,
     positive=(),
     addresses=Addresses(frame.address, climb.address, rise.address, bend.address, bounds.address),
+    each=Each(rise_each, bend_each, bounds_each),
     domain_of=exact_domain,
     exact=ExactFormulas(exact_x, exact_z, exact_ds, exact_kappa, exact_reaction, exact_climb, exact_climb_slope),
 )

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "spiral_central". Do not edit: change its declaration and generate again.
-# interface 3, input a75a85ae8f6e, body 337940d7b716
+# interface 3, input a75a85ae8f6e, body 76dd6bbd2f96
 """Bead on a logarithmic spiral, drawn to its pole
 
 x              = r0*exp(b*theta)*cos(theta)
@@ -17,7 +17,7 @@ turning points : 2*k*(exp(-b*theta)/sqrt(sin(theta)**2 + cos(theta)**2) - exp(-b
 liftoff        : k*(-(b*sin(theta) + cos(theta))*cos(theta) + (b*cos(theta) - sin(theta))*sin(theta))*exp(-2*b*theta)*Abs(r0)/(r0**3*sqrt(b**2 + 1)*(sin(theta)**2 + cos(theta)**2)**(3/2)) + (2*k*(exp(-b*theta)/sqrt(sin(theta)**2 + cos(theta)**2) - exp(-b*lam0)/sqrt(sin(lam0)**2 + cos(lam0)**2))/Abs(r0) + v0**2)*exp(-b*theta)/(r0*sqrt(b**2 + 1)) = 0
 """
 
-from math import exp, fabs, sqrt
+from math import fabs, sqrt
 from typing import Any
 
 from numba import carray
@@ -29,11 +29,15 @@ compiled = compiler(__file__, interface=3)
 
 from gqm_sym.runtime import (
     BEND,
+    BEND_EACH,
     BOUNDS,
+    BOUNDS_EACH,
     CLIMB,
     FRAME,
     RISE,
+    RISE_EACH,
     Addresses,
+    Each,
     ExactFormulas,
     Formulas,
     Motion,
@@ -41,9 +45,10 @@ from gqm_sym.runtime import (
     Sweep,
 )
 from gqm_sym.runtime.differences import cos1, cos2, exp1, exp2, sin1, sin2
-from gqm_sym.runtime.elementary import cos, sin
+from gqm_sym.runtime.elementary import cos, exp, sin
 from gqm_sym.runtime.intervals import iabs, iadd, iconst, icos, iexp, imul, ipow, isin, isqrt
 from gqm_sym.runtime.places import nearest
+from gqm_sym.runtime.wave_differences import near_cos2, near_sin2
 
 PARAMETERS = {
     'r0': '1',
@@ -163,6 +168,77 @@ def bend(n, a, _b, left, right, p, out):
         out[1, i] = _c2*r0*exp(_t9)
 
 
+@compiled(RISE_EACH, later=True)
+def rise_each(n, starts, places, offsets, p, out):
+    """climb[a, theta], ds/dtheta and the climb's derivative, each for a launch of its own."""
+    starts, places, offsets, p, out = carray(starts, n), carray(places, n), carray(offsets, n), carray(p, (4, n)), carray(out, (3, n))
+    for i in range(n):
+        r0 = p[0, i]
+        b = p[1, i]
+        k = p[2, i]
+        a = starts[i]
+        theta = places[i]
+        d = offsets[i]
+        _t0 = fabs(r0)
+        _t1 = sin(theta)
+        _t2 = cos(theta)
+        _t3 = _t1**2 + _t2**2
+        _t4 = sqrt(_t3)
+        _t5 = 1/_t4
+        _t6 = -a*b
+        _t7 = b*theta
+        _t8 = -_t7
+        _t9 = sin(a)
+        _t10 = cos(a)
+        _t11 = sqrt(_t10**2 + _t9**2)
+        _t12 = 2*k
+        out[0, i] = -_t12*(-_t5*b*exp1(_t6, _t8, -b*d) - _t5*((_t1 + _t9)*sin1(a, theta, d) + (_t10 + _t2)*cos1(a, theta, d))*exp(_t6)/(_t11*(_t11 + _t4)))/_t0
+        out[1, i] = r0*sqrt(b**2 + 1)*exp(_t7)
+        out[2, i] = _t0*_t12*(_t1*(_t1*b + _t2) + _t2*(-_t1 + _t2*b))*exp(_t8)/(r0**2*sqrt(_t3)**3)
+
+
+@compiled(BEND_EACH, later=True)
+def bend_each(n, lows, highs, left, right, p, out):
+    """climb[a, theta, b] and ds/dtheta, each for an orbit of its own; NaN where the closed form ends."""
+    lows, highs, left, right, p, out = carray(lows, n), carray(highs, n), carray(left, n), carray(right, n), carray(p, (4, n)), carray(out, (2, n))
+    for i in range(n):
+        r0 = p[0, i]
+        b = p[1, i]
+        k = p[2, i]
+        a = lows[i]
+        _b = highs[i]
+        da = left[i]
+        db = right[i]
+        theta = nearest(a, _b, da, db)
+        _t0 = b**2
+        _t1 = sin(_b)
+        _t2 = cos(_b)
+        _t3 = sqrt(_t1**2 + _t2**2)
+        _t4 = 1/_t3
+        _t5 = -a*b
+        _t6 = b*theta
+        _t7 = -_t6
+        _t8 = -b*da
+        _t9 = sin(theta)
+        _t10 = cos(theta)
+        _t11 = sqrt(_t10**2 + _t9**2)
+        _t12 = 1/(_t11 + _t3)
+        _t13 = _t1 + _t9
+        _t14 = _t10 + _t2
+        _t15 = _t4/_t11
+        _t16 = sin(a)
+        _t17 = cos(a)
+        _t18 = sqrt(_t16**2 + _t17**2)
+        _t19 = _b - a
+        _t20 = sin1(a, _b, _t19)
+        _t21 = cos1(a, _b, _t19)
+        _t22 = sin1(a, theta, da)
+        _t23 = cos1(a, theta, da)
+        _t24 = (_t20*(_t1 + _t16) + _t21*(_t17 + _t2))*(_t22*(_t16 + _t9) + _t23*(_t10 + _t17))/((_t11 + _t18)*(_t18 + _t3))
+        out[0, i] = -2*k*(_t0*_t4*exp2(_t5, _t7, -_b*b, _t8, -b*db) + _t12*_t15*b*(_t13*sin1(theta, _b, db) + _t14*cos1(theta, _b, db))*exp1(_t5, _t7, _t8) + (-_t15*(-_t12*_t24 + _t12*(_t13*near_sin2(a, theta, _b, da, db) + _t14*near_cos2(a, theta, _b, da, db) + _t20*_t22 + _t21*_t23)) + _t15*_t24/_t18)*exp(_t5))/fabs(r0)
+        out[1, i] = r0*sqrt(_t0 + 1)*exp(_t6)
+
+
 @compiled(BOUNDS)
 def bounds(lo, hi, p, out):
     """Bounds of the climb's slope and of ds/dtheta for lo <= theta <= hi."""
@@ -176,6 +252,22 @@ def bounds(lo, hi, p, out):
     _t2 = icos(theta)
     out[0], out[1] = imul(imul(imul(imul(imul(imul(iconst(2.0), k), ipow(r0, -2)), ipow(isqrt(iadd(ipow(_t1, 2), ipow(_t2, 2))), -3)), iadd(imul(_t1, iadd(imul(_t1, b), _t2)), imul(_t2, iadd(imul(iconst(-1.0), _t1), imul(_t2, b))))), iexp(imul(iconst(-1.0), _t0))), iabs(r0))
     out[2], out[3] = imul(imul(r0, isqrt(iadd(ipow(b, 2), iconst(1.0)))), iexp(_t0))
+
+
+@compiled(BOUNDS_EACH, later=True)
+def bounds_each(n, lo, hi, p, out):
+    """Bounds over many intervals of the climb's slope and of ds/dtheta for lo <= theta <= hi, each for parameters of its own."""
+    lo, hi, p, out = carray(lo, n), carray(hi, n), carray(p, (4, n)), carray(out, (4, n))
+    for i in range(n):
+        theta = (lo[i], hi[i])
+        r0 = (p[0, i], p[0, i])
+        b = (p[1, i], p[1, i])
+        k = (p[2, i], p[2, i])
+        _t0 = imul(b, theta)
+        _t1 = isin(theta)
+        _t2 = icos(theta)
+        out[0, i], out[1, i] = imul(imul(imul(imul(imul(imul(iconst(2.0), k), ipow(r0, -2)), ipow(isqrt(iadd(ipow(_t1, 2), ipow(_t2, 2))), -3)), iadd(imul(_t1, iadd(imul(_t1, b), _t2)), imul(_t2, iadd(imul(iconst(-1.0), _t1), imul(_t2, b))))), iexp(imul(iconst(-1.0), _t0))), iabs(r0))
+        out[2, i], out[3, i] = imul(imul(r0, isqrt(iadd(ipow(b, 2), iconst(1.0)))), iexp(_t0))
 
 
 # The same formulas over a namespace of operations: extended precision evaluates these.
@@ -248,6 +340,7 @@ MODEL = Formulas(
     parameters=PARAMETERS,
     positive=('r0',),
     addresses=Addresses(frame.address, climb.address, rise.address, bend.address, bounds.address),
+    each=Each(rise_each, bend_each, bounds_each),
     domain_of=exact_domain,
     exact=ExactFormulas(exact_x, exact_z, exact_ds, exact_kappa, exact_reaction, exact_climb, exact_climb_slope),
 )

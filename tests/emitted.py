@@ -36,7 +36,9 @@ NODES = (
     *(ast.BinOp, ast.Add, ast.Sub, ast.Mult, ast.Div, ast.Pow, ast.UnaryOp, ast.USub, ast.Return, ast.Attribute),
 )
 IMPORTS = ("math", "typing", "numba", "gqm_sym.runtime")
-IMPORTS += tuple(f"gqm_sym.runtime.{name}" for name in ("differences", "elementary", "intervals", "places"))
+IMPORTS += tuple(
+    f"gqm_sym.runtime.{name}" for name in ("differences", "elementary", "intervals", "places", "wave_differences")
+)
 
 
 def declared(text: str, *, title: str = "", parameter: str = "u", **parameters: str) -> Model:

@@ -1,4 +1,4 @@
-"""Sines and cosines that vectorise, against mpmath with digits to spare."""
+"""Elementary functions that vectorise, against mpmath with digits to spare."""
 
 import math
 import random
@@ -11,7 +11,7 @@ from numba import njit
 
 from gqm_sym.runtime import elementary
 
-# Worst measured on 5000 arguments of each kind: 0.75.
+# Worst measured on 5000 arguments of each kind: 0.75 (cosine), 0.62 (exp), 0.93 (sinh), 0.86 (cosh).
 ULPS = 1.0
 DIGITS = 60
 # Roundings of the argument that a sine of a very large one may stand for: worst measured 5.
@@ -47,6 +47,34 @@ def test_error_is_below_one_last_place(name: str, kind: str) -> None:
             truth = FUNCTIONS[name](mpf(x))
             error = abs(mpf(getattr(elementary, name)(x)) - truth) / mpf(np.spacing(abs(float(truth))))
             assert error <= ULPS, x
+
+
+GROWING: dict[str, Callable[[mpf], mpf]] = {"exp": mp.exp, "sinh": mp.sinh, "cosh": mp.cosh}
+
+
+@pytest.mark.parametrize("reach", [1e-9, 0.4, 1.0, 2.0, 20.0, 708.0])
+@pytest.mark.parametrize("name", GROWING)
+def test_growing_functions_too(name: str, reach: float) -> None:
+    """Up to where they overflow, and next to zero."""
+    source = random.Random(name)
+    with mp.workdps(DIGITS):
+        for _ in range(COUNT):
+            x = source.uniform(-reach, reach)
+            truth = GROWING[name](mpf(x))
+            error = abs(mpf(getattr(elementary, name)(x)) - truth) / mpf(np.spacing(abs(float(truth))))
+            assert error <= ULPS, x
+
+
+@pytest.mark.parametrize("x", [0.0, -0.0, 710.4, -710.4, 709.782712893384, 750.0, -745.0, -750.0, math.inf, -math.inf])
+@pytest.mark.parametrize("name", GROWING)
+def test_limits_are_those_of_the_library(name: str, x: float) -> None:
+    """Overflow, underflow, signed zeros and infinities; NaN is NaN."""
+    with np.errstate(over="ignore"):
+        expected = float(getattr(np, name)(x))
+    actual = getattr(elementary, name)(x)
+    assert actual == expected or abs(actual - expected) <= 1e-15 * abs(expected)
+    assert math.copysign(1.0, actual) == math.copysign(1.0, expected)
+    assert math.isnan(getattr(elementary, name)(math.nan))
 
 
 @pytest.mark.parametrize("x", [3e11, -7.7e13, 1.2e15, 8e15, -4.3e16, 1e17, 6e22, 1e300, -1.7e308])

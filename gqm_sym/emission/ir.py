@@ -33,6 +33,8 @@ class FunctionIR:
         What does not depend on the place, and what does.
     outputs : tuple of Expr
         One value a row of ``out``.
+    each : bool
+        Whether every place has run-time parameters of its own. Such a function is compiled when it is first needed.
     """
 
     name: str
@@ -44,6 +46,7 @@ class FunctionIR:
     before: tuple[Assignment, ...]
     inside: tuple[Assignment, ...]
     outputs: tuple[Expr, ...]
+    each: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -103,6 +106,7 @@ class ModuleIR:
     notes: tuple[str, ...]
     functions: tuple[FunctionIR, ...]
     bounds: FunctionIR | None
+    bounds_each: FunctionIR | None
     exact: tuple[ExactIR, ...]
     dissipation: tuple[tuple[str, bool], ...]
     body: str

@@ -10,6 +10,7 @@ from gqm_sym.derivation.difference import Differences
 from gqm_sym.derivation.differentiate import differentiate
 from gqm_sym.emission.charts import chart_maker
 from gqm_sym.emission.dissipative import drive, hold
+from gqm_sym.emission.each import bounds_each, each
 from gqm_sym.emission.ir import Assignment, ExactIR, FunctionIR, ModuleIR
 from gqm_sym.emission.places import at
 from gqm_sym.emission.printer import check_emittable
@@ -47,8 +48,9 @@ def lower(model: Model, *, name: str, forms: tuple[tuple[str, Expr], ...]) -> Mo
     loss = model.dissipation
     if loss is None:
         functions: tuple[FunctionIR, ...] = (lowering.climb(), lowering.rise(), lowering.bend())
+        many = each(lowering)
     else:
-        functions = (drive(lowering, loss), hold(lowering, loss))
+        functions, many = (drive(lowering, loss), hold(lowering, loss)), ()
     exact = lowering.exact() if loss is None else ()
     return ModuleIR(
         name=name,
@@ -59,8 +61,9 @@ def lower(model: Model, *, name: str, forms: tuple[tuple[str, Expr], ...]) -> Mo
         at_least=model.at_least,
         forms=forms,
         notes=model.notes,
-        functions=(lowering.frame(), *functions),
+        functions=(lowering.frame(), *functions, *many),
         bounds=lowering.bounds() if loss is None else None,
+        bounds_each=bounds_each(lowering) if many else None,
         exact=exact if model.curve.charted else (*exact, lowering.domain()),
         dissipation=() if loss is None else tuple((flag, getattr(loss, flag)) for flag in FLAGS),
         body=str(model.force.radius) if model.force.radius else "",
@@ -240,10 +243,17 @@ class Lowering:
         views: tuple[tuple[str, str], ...],
         inside: list[tuple[Symbol, Expr]],
         outputs: tuple[Expr, ...],
+        each: bool = False,
     ) -> FunctionIR:
-        """Share common subexpressions, and move what does not depend on the place in front of the loop."""
+        """Share common subexpressions, and move what does not depend on the place in front of the loop.
+
+        With ``each`` the run-time parameters belong to the place.
+        """
         _check_size(outputs, where=name)
+        n, p, out = (self.names(s) for s in ("n", "p", "out"))
         used = self.used([*outputs, *(value for _, value in inside)])
+        if each:
+            inside, used = [*((Symbol(s, real=True), at(p, row)) for s, row in used), *inside], ()
         moving = {symbol for symbol, _ in inside}
         prepared, fixed = _hoist([_half_powers(e) for e in outputs], moving)
         everything = [value for _, value in fixed] + prepared
@@ -263,21 +273,21 @@ class Lowering:
             if a.name in needed:
                 kept.insert(0, a)
                 needed |= {s.name for s in a.value.free_symbols}
-        p, out = self.names("p"), self.names("out")
         return FunctionIR(
             name=name,
             signature=signature,
-            arguments=(self.names("n"), *arguments, p, out),
+            arguments=(n, *arguments, p, out),
             doc=doc.format(self.place.name),
             views=(
                 *views,
-                (p, str(len(self.order))),
-                (out, f"({len(outputs)}, {self.names('n')})"),
+                (p, f"({len(self.order)}, {n})" if each else str(len(self.order))),
+                (out, f"({len(outputs)}, {n})"),
             ),
             parameters=used,
             before=_sorted(before),
             inside=tuple(kept),
             outputs=tuple(reduced[len(fixed) :]),
+            each=each,
         )
 
     def used(self, expressions: Iterable[Expr]) -> tuple[tuple[str, int], ...]:

@@ -107,7 +107,8 @@ class CodePrinter(StrPrinter):  # type: ignore[misc]
     def _print_Function(self, expr: Expr) -> str:
         name = type(expr).__name__
         if name == "at":  # the element of an array that the loop stands at
-            return f"{expr.args[0]}[{self.index}]"
+            array, *rows = expr.args
+            return f"{array}[{', '.join([*map(str, rows), self.index])}]"
         if isinstance(expr, AppliedUndef) or name in CHARTED:  # a helper of the runtime
             return self._call(name, *expr.args)
         return self._call(self.names[name], *expr.args)

@@ -19,7 +19,7 @@ from gqm_sym.errors import EmissionError
 INTERFACE = 3
 
 # Functions that the runtime has in forms that fill vector registers; the rest is the standard library's.
-_ELEMENTARY = frozenset({"cos", "sin"})
+_ELEMENTARY = frozenset({"cos", "cosh", "exp", "sin", "sinh"})
 _MATH = frozenset({*FUNCTIONS.values(), "sqrt", "pi", "e"} - _ELEMENTARY)
 _RUNTIME = ("Addresses", "Formulas", "Motion", "Pass1", "Sweep")
 # Functions that every module hands over, as the interface orders them.
@@ -31,6 +31,7 @@ _OWN = frozenset(
         "Any",
         "CHART",
         "Dissipation",
+        "Each",
         "ExactClimb",
         "ExactFormulas",
         "MODEL",
@@ -59,9 +60,11 @@ def render(module: ModuleIR, *, source: str) -> str:
         functions.append(text)
         used |= names
     intervals = set[str]()
-    if module.bounds is not None:
-        bounds, intervals = _bounds(module.bounds, module.parameter)
-        functions.append(bounds)
+    for enclosing in (module.bounds, module.bounds_each):
+        if enclosing is not None:
+            bounds, names = _bounds(enclosing, module.parameter)
+            functions.append(bounds)
+            intervals |= names
     runtime = {*_RUNTIME, *(f["signature"] for f in functions)}
     if chart:
         runtime |= set(chart.imports)
@@ -69,8 +72,11 @@ def render(module: ModuleIR, *, source: str) -> str:
     runtime |= {exact.partition("(")[0]} if exact else set()
     if module.dissipation:
         runtime.add("Dissipation")
+    if module.bounds_each is not None:
+        runtime.add("Each")
     charted = {name for name in used | intervals if name.removeprefix("i").startswith("chart_")}
     _refuse_own_names(module, used | intervals | runtime | {f["name"] for f in functions})
+    near = {name for name in used if name.startswith("near_")}
     environment = _environment()
     fields: dict[str, Any] = {
         "interface": INTERFACE,
@@ -79,7 +85,8 @@ def render(module: ModuleIR, *, source: str) -> str:
         "math": sorted(used & _MATH),
         "runtime": sorted(runtime, key=_as_imported),
         "charted": sorted({*charted, "chart_of"}) if charted else [],
-        "differences": sorted(used - _MATH - _ELEMENTARY - charted - {"nearest"}),
+        "differences": sorted(used - _MATH - _ELEMENTARY - charted - near - {"nearest"}),
+        "near": sorted(near),
         "elementary": sorted(used & _ELEMENTARY),
         "intervals": sorted(intervals - charted),
         "nearest": "nearest" in used,
@@ -97,6 +104,7 @@ def render(module: ModuleIR, *, source: str) -> str:
         "grip": repr(module.grip) if module.grip else "",
         "addresses": ", ".join(f"{f['name']}.address" for f in functions if f["name"] in _ADDRESSES),
         "exact_formulas": exact,
+        "each": ", ".join(f["name"] for f in functions if f["each"]),
         "dissipation": ", ".join(f"{flag}={value}" for flag, value in module.dissipation),
         "keywords": ", ".join(f"{name}: Any = {value!r}" for name, value in module.defaults),
         "names": ", ".join(name for name, _ in module.defaults),
@@ -198,6 +206,7 @@ def _loop(function: FunctionIR) -> tuple[dict[str, Any], set[str]]:
         "index": index,
         "count": count,
         "inside": inside,
+        "each": function.each,
     }
     return fields, printer.used
 
@@ -216,21 +225,25 @@ def _chart_view(function: FunctionIR, printer: CodePrinter) -> list[str]:
 
 def _bounds(function: FunctionIR, parameter: str) -> tuple[dict[str, Any], set[str]]:
     printer = IntervalPrinter()
-    lo, hi, p, out = function.arguments
-    before = [_views(function), f"{parameter} = ({lo}, {hi})"]
-    before += [f"{name} = ({p}[{i}], {p}[{i}])" for name, i in function.parameters]
-    inside = _statements(function.inside, printer)
-    for row, e in enumerate(function.outputs):
-        inside.append(f"{out}[{2 * row}], {out}[{2 * row + 1}] = {printer.doprint(e)}")
-    before = _chart_view(function, printer) + before
+    *count, lo, hi, p, out = function.arguments
+    index = "_i" if "i" in {parameter} | {name for name, _ in function.parameters} else "i"
+    here, row = (f"[{index}]", f", {index}") if function.each else ("", "")
+    inside = [f"{parameter} = ({lo}{here}, {hi}{here})"]
+    inside += [f"{name} = ({p}[{i}{row}], {p}[{i}{row}])" for name, i in function.parameters]
+    inside += _statements(function.inside, printer)
+    for k, e in enumerate(function.outputs):
+        inside.append(f"{out}[{2 * k}{row}], {out}[{2 * k + 1}{row}] = {printer.doprint(e)}")
     fields = {
         "name": function.name,
         "signature": function.signature,
         "arguments": ", ".join(function.arguments),
         "doc": function.doc,
-        "before": before,
-        "loop": False,
+        "before": [*_chart_view(function, printer), _views(function)],
+        "loop": function.each,
+        "index": index,
+        "count": count[0] if count else "",
         "inside": inside,
+        "each": function.each,
     }
     return fields, printer.used
 

@@ -6,7 +6,9 @@ An island: it knows numpy, numba and itself, and mpmath only where exact digits 
 from gqm_sym.runtime.formulas import Formulas, Pass1
 from gqm_sym.runtime.interface import (
     BEND,
+    BEND_EACH,
     BOUNDS,
+    BOUNDS_EACH,
     CLIMB,
     DRIVE,
     FIELD,
@@ -14,9 +16,11 @@ from gqm_sym.runtime.interface import (
     HOLD,
     INTERFACE,
     RISE,
+    RISE_EACH,
     SEGMENT,
     Addresses,
     Dissipation,
+    Each,
     ExactClimb,
     ExactFormulas,
 )
@@ -29,7 +33,9 @@ from gqm_sym.runtime.tracing import Traced
 
 __all__ = [
     "BEND",
+    "BEND_EACH",
     "BOUNDS",
+    "BOUNDS_EACH",
     "CLIMB",
     "DRIVE",
     "FIELD",
@@ -37,9 +43,11 @@ __all__ = [
     "HOLD",
     "INTERFACE",
     "RISE",
+    "RISE_EACH",
     "SEGMENT",
     "Addresses",
     "Dissipation",
+    "Each",
     "ExactClimb",
     "ExactFormulas",
     "Formulas",

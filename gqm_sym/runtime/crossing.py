@@ -54,6 +54,24 @@ def call_bounds(_, address, lo, hi, p, out):  # type: ignore[no-untyped-def]
 
 
 @intrinsic
+def call_rise_each(_, address, n, a, lam, d, p, out):  # type: ignore[no-untyped-def]
+    """Fill climb[a, lam], ds and the climb's slope, each for a launch of its own."""
+    return types.void(address, n, a, lam, d, p, out), _call
+
+
+@intrinsic
+def call_bend_each(_, address, n, a, b, da, db, p, out):  # type: ignore[no-untyped-def]
+    """Fill climb[a, lam, b] and ds, each for an orbit of its own."""
+    return types.void(address, n, a, b, da, db, p, out), _call
+
+
+@intrinsic
+def call_bounds_each(_, address, n, lo, hi, p, out):  # type: ignore[no-untyped-def]
+    """Fill enclosures of the climb's slope and of ds over many intervals, each for parameters of its own."""
+    return types.void(address, n, lo, hi, p, out), _call
+
+
+@intrinsic
 def call_drive(_, address, n, lam, v2, v, nu, p, out):  # type: ignore[no-untyped-def]
     """Fill ds, P, Q, n0 and kappa for a leg of signs v and nu."""
     return types.void(address, n, lam, v2, v, nu, p, out), _call

@@ -5,14 +5,14 @@ of a reduced argument without branches, which LLVM spreads over vector registers
 
 The argument is reduced by a multiple of pi/2 (or log 2) held in parts (Cody and Waite, Software Manual for the
 Elementary Functions, 1980), and its rounding is carried along as a second double. The error is below one unit in the
-last place for ``|x|`` < 1e9; beyond, the result is the sine of ``x*(1 + eps)`` with eps a few roundings. What is not a
-number, or infinite, gives NaN (the exponential has its limits).
+last place, of sin and cos for ``|x|`` < 1e9; beyond, the result is the sine of ``x*(1 + eps)`` with eps a few
+roundings. What is not a number gives NaN, and so do sin and cos of infinities; the others have their limits there.
 """
 
-from math import fabs
+from math import fabs, factorial, inf
 
 from gqm_sym.runtime.doubledouble import two_sum
-from gqm_sym.runtime.fused import bits, choose, fma, polynomial
+from gqm_sym.runtime.fused import bits, choose, fma, from_bits, polynomial
 from gqm_sym.runtime.jit import Inlined
 
 # Adding this rounds to a whole number, which the lowest bits of the sum then hold.
@@ -38,6 +38,15 @@ COSINE = (
     -1.38888888888741095749e-03,
     4.16666666666666019037e-02,
 )
+
+# Taylor coefficients of (exp(r) - 1 - r)/r**2, highest power first: cut below 1e-19 for |r| <= log(2)/2.
+EXPONENTIAL = tuple(1.0 / factorial(k) for k in reversed(range(2, 14)))
+# log 2 as two doubles, the first with zeros at its end: a whole number below 2**11 times it is exact.
+LOG2, LOG2_LOW, ONE_OVER_LOG2 = 0.6931471803691238, 1.9082149292705877e-10, 1.4426950408889634
+# Beyond these exp overflows, or is nothing; beyond FAR sinh and cosh overflow.
+MOST, LEAST, FAR = 709.782712893384, -746.0, 710.4758600739439
+# (sinh(x) - x)/x**3 in x**2 up to |x| = 1, cut below 1e-19.
+SINHC = tuple(1.0 / factorial(2 * k + 1) for k in reversed(range(1, 10)))
 
 
 @Inlined
@@ -86,3 +95,58 @@ def cos(x):  # type: ignore[no-untyped-def]
     turns, r, low = reduced(x)
     value = choose(turns & 1 == 1, sine_kernel(r, low), cosine_kernel(r, low))
     return choose((turns + 1) & 2 == 2, -value, value)
+
+
+@Inlined
+def scaled_exp(x):  # type: ignore[no-untyped-def]
+    """exp(x) = (lead + low)*2**k for ``LEAST <= x <= MOST``, and k as bits that `power_of_two` takes."""
+    shifted = fma(x, ONE_OVER_LOG2, ROUND)
+    k = shifted - ROUND
+    high, low = fma(-k, LOG2, x), -k * LOG2_LOW
+    r = high + low
+    lost = low - (r - high)
+    tail = fma(polynomial(EXPONENTIAL, r), r * r, lost)
+    lead = 1.0 + r
+    return lead, (r - (lead - 1.0)) + tail, bits(shifted) - bits(ROUND)
+
+
+@Inlined
+def power_of_two(k):  # type: ignore[no-untyped-def]
+    """2**k for a normal number."""
+    return from_bits((k + 1023) << 52)
+
+
+@Inlined
+def exp(x):  # type: ignore[no-untyped-def]
+    """The exponential; subnormal results are rounded twice."""
+    inside = choose(x < LEAST, LEAST, choose(x > MOST, MOST, x))
+    lead, low, k = scaled_exp(inside)
+    half = k >> 1
+    value = (lead + low) * power_of_two(half) * power_of_two(k - half)
+    return choose(x > MOST, inf, choose(x < LEAST, 0.0, value))
+
+
+@Inlined
+def half_exp(x):  # type: ignore[no-untyped-def]
+    """exp(x)/2 and exp(-x)/2 for ``0 <= x <= FAR``, the first as two doubles."""
+    lead, low, k = scaled_exp(x)
+    high = lead + low
+    scale = power_of_two(k - 2)
+    return 2.0 * (high * scale), 2.0 * ((low - (high - lead)) * scale), 0.125 / (high * scale)
+
+
+@Inlined
+def cosh(x):  # type: ignore[no-untyped-def]
+    """The hyperbolic cosine."""
+    size = fabs(x)
+    up, low, down = half_exp(choose(size > FAR, FAR, size))
+    return choose(size > FAR, inf, up + (down + low))
+
+
+@Inlined
+def sinh(x):  # type: ignore[no-untyped-def]
+    """The hyperbolic sine."""
+    size = fabs(x)
+    up, low, down = half_exp(choose(size > FAR, FAR, size))
+    far = choose(size > FAR, inf, up - (down - low))
+    return choose(size < 1.0, fma(x * (x * x), polynomial(SINHC, x * x), x), choose(x < 0.0, -far, far))

@@ -9,20 +9,17 @@ from math import (
     asinh,
     atan,
     atanh,
-    cosh,
-    exp,
     expm1,
     fabs,
     log,
     log1p,
-    sinh,
     sqrt,
 )
 from math import atan2 as angle
 from math import pow as power
 
 from gqm_sym.runtime.doubledouble import two_sum
-from gqm_sym.runtime.elementary import cos, sin
+from gqm_sym.runtime.elementary import cos, cosh, exp, sin, sinh
 from gqm_sym.runtime.fused import choose
 from gqm_sym.runtime.jit import Inlined, Inner
 
@@ -39,10 +36,11 @@ def sinc(t):  # type: ignore[no-untyped-def]
     return choose(ordinary, sin(t) / choose(ordinary, t, 1.0), 1.0)
 
 
-@Inner
+@Inlined
 def sinhc(t):  # type: ignore[no-untyped-def]
     """sinh(t)/t."""
-    return sinh(t) / t if fabs(t) > TINY else 1.0
+    ordinary = fabs(t) > TINY
+    return choose(ordinary, sinh(t) / choose(ordinary, t, 1.0), 1.0)
 
 
 @Inner
@@ -83,13 +81,13 @@ def tan1(x, y, h):  # type: ignore[no-untyped-def]
     return sinc(h) / (cos(x) * cos(y))
 
 
-@Inner
+@Inlined
 def sinh1(x, y, h):  # type: ignore[no-untyped-def]
     """sinh[x,y] = cosh((x+y)/2) sinhc(h/2)."""
     return cosh(0.5 * (x + y)) * sinhc(0.5 * h)
 
 
-@Inner
+@Inlined
 def cosh1(x, y, h):  # type: ignore[no-untyped-def]
     """cosh[x,y] = sinh((x+y)/2) sinhc(h/2)."""
     return sinh(0.5 * (x + y)) * sinhc(0.5 * h)

@@ -14,7 +14,7 @@ from gqm_sym.errors import LaunchError, ParameterError
 from gqm_sym.runtime.chart import Chart, ChartMaker
 from gqm_sym.runtime.entries import frame_at, loads_at
 from gqm_sym.runtime.exact_problems import exact_problem
-from gqm_sym.runtime.interface import Addresses, Dissipation, ExactClimb, ExactFormulas
+from gqm_sym.runtime.interface import Addresses, Dissipation, Each, ExactClimb, ExactFormulas
 from gqm_sym.runtime.numbers import Number, read_number, read_numbers
 from gqm_sym.runtime.stretch import Array, Functions
 from gqm_sym.runtime.threads import spread
@@ -114,6 +114,8 @@ class Formulas:
         What makes the chart of a curve that has no formulas.
     dissipation
         What a dissipative model adds; None for a conservative one.
+    each
+        The functions of a sweep; None where motions are solved one by one.
     """
 
     name: str
@@ -125,6 +127,7 @@ class Formulas:
     exact: ExactFormulas | ExactClimb | None = None
     chart: ChartMaker | None = None
     dissipation: Dissipation | None = None
+    each: Each | None = None
     at_least: tuple[tuple[str, str], ...] = ()
     body: str = ""
     grip: tuple[str, str] | None = None

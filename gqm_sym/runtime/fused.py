@@ -29,14 +29,23 @@ def fma(_, x, y, z):  # type: ignore[no-untyped-def]
     return real(real, real, real), lower
 
 
+def _rounding(name: str) -> Any:
+    def lower(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        return builder.call(builder.module.declare_intrinsic(name, [ir.DoubleType()]), args)
+
+    return types.float64(types.float64), lower
+
+
 @intrinsic
 def nearest_whole(_, x):  # type: ignore[no-untyped-def]
     """The nearest whole number, as a float."""
+    return _rounding("llvm.rint")
 
-    def lower(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        return builder.call(builder.module.declare_intrinsic("llvm.rint", [ir.DoubleType()]), args)
 
-    return types.float64(types.float64), lower
+@intrinsic
+def whole_below(_, x):  # type: ignore[no-untyped-def]
+    """The largest whole number that is not above, as a float."""
+    return _rounding("llvm.floor")
 
 
 @Inner
@@ -67,6 +76,16 @@ def bits(_, x):  # type: ignore[no-untyped-def]
         return builder.bitcast(args[0], ir.IntType(64))
 
     return types.int64(types.float64), lower
+
+
+@intrinsic
+def from_bits(_, n):  # type: ignore[no-untyped-def]
+    """The float of these bits."""
+
+    def lower(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        return builder.bitcast(args[0], ir.DoubleType())
+
+    return types.float64(types.int64), lower
 
 
 @intrinsic

@@ -11,6 +11,9 @@ climb       n, lam, p, out                                climb, d climb/d lam
 rise        n, a, lam, d, p, out                          climb[a, lam], ds(lam); d = lam - a
 bend        n, a, b, da, db, p, out                       climb[a, lam, b], ds(lam)
 bounds      lo, hi, p, out                                enclosure of climb', enclosure of ds
+rise_each   n, a, lam, d, p, out                          climb[a, lam], ds(lam), climb'(lam)
+bend_each   n, a, b, da, db, p, out                       climb[a, lam, b], ds(lam)
+bounds_each n, lo, hi, p, out                             enclosure of climb', enclosure of ds
 drive       n, lam, v2, v, nu, p, out                     ds, P, Q, n0, kappa
 hold        n, lam, p, out                                A(lam, 0; +1), A(lam, 0; -1), static friction
 segment     n, lam, p, out                                x, z, ds, dx/ds, dz/ds, kappa
@@ -18,6 +21,10 @@ field       n, x, z, p, out                               F, F_x, F_z, F_xx, F_x
 =========== ============================================= ==========================================
 
 A conservative model has ``climb``, ``rise``, ``bend`` and ``bounds``; a dissipative one ``drive`` and ``hold`` instead.
+
+The functions ``_each`` are for sweeps: their ``a``, ``b``, ``lo``, ``hi`` and ``p`` are arrays too, a launch and
+parameters for each place (``p`` has a row for each parameter). They are compiled when a sweep first asks for them.
+``bend_each`` may give NaN where points lie too far apart for its closed forms; ``bend`` never does.
 
 A curve with formulas that is a piece of a rail has ``segment`` (`rail`), in its own parameter; an implicit curve F = 0
 has ``field``, by which it is traced (`tracing`).
@@ -48,6 +55,10 @@ RISE = types.void(types.intp, REAL, MANY, MANY, MANY, MANY)
 BEND = types.void(types.intp, REAL, REAL, MANY, MANY, MANY, MANY)
 BOUNDS = types.void(REAL, REAL, MANY, MANY)
 
+RISE_EACH = types.void(types.intp, MANY, MANY, MANY, MANY, MANY)
+BEND_EACH = types.void(types.intp, MANY, MANY, MANY, MANY, MANY, MANY)
+BOUNDS_EACH = types.void(types.intp, MANY, MANY, MANY, MANY)
+
 DRIVE = types.void(types.intp, MANY, MANY, REAL, REAL, MANY, MANY)
 HOLD = types.void(types.intp, MANY, MANY, MANY)
 
@@ -65,6 +76,14 @@ class Addresses(NamedTuple):
     rise: int = 0
     bend: int = 0
     bounds: int = 0
+
+
+class Each(NamedTuple):
+    """The functions of a sweep over many orbits at once: each has an ``address`` (`jit.Later`)."""
+
+    rise: Any
+    bend: Any
+    bounds: Any
 
 
 class Dissipation(NamedTuple):

@@ -13,25 +13,19 @@ from math import (
     asinh,
     atan,
     atanh,
-    ceil,
-    copysign,
-    cos,
-    cosh,
-    exp,
     fabs,
-    floor,
     inf,
     log,
     pi,
-    sin,
-    sinh,
     sqrt,
     tan,
     tanh,
 )
 from math import pow as power
 
-from gqm_sym.runtime.jit import Inner
+from gqm_sym.runtime.elementary import cos, cosh, exp, sin, sinh
+from gqm_sym.runtime.fused import choose, whole_below
+from gqm_sym.runtime.jit import Inlined, Inner
 
 # One rounding is at most 2**-53 of the result; the C library's functions stay within four ulps.
 ROUNDED = 2.0**-52
@@ -43,137 +37,143 @@ MOST = 1.7976931348623157e308
 FAR_PHASE = 1e8
 
 
-@Inner
+@Inlined
 def lower(v, share):  # type: ignore[no-untyped-def]
     """A lower bound of what was rounded to v: a zero is exact, infinity an overflow."""
-    if v == 0.0:
-        return 0.0
     bound = v - fabs(v) * share - LEAST
-    if bound == bound:
-        return bound
-    return MOST if v > 0.0 else -inf
+    bound = choose(bound == bound, bound, choose(v > 0.0, MOST, -inf))
+    return choose(v == 0.0, 0.0, bound)
 
 
-@Inner
+@Inlined
 def upper(v, share):  # type: ignore[no-untyped-def]
     """An upper bound of what was rounded to v, mirrored."""
-    if v == 0.0:
-        return 0.0
-    bound = v + fabs(v) * share + LEAST
-    if bound == bound:
-        return bound
-    return -MOST if v < 0.0 else inf
+    return -lower(-v, share)
 
 
-@Inner
+@Inlined
 def kept(v, sign):  # type: ignore[no-untyped-def]
     """The float v, or a tiny one of the given sign if it underflowed to zero."""
-    return v if v != 0.0 else copysign(LEAST, sign)
+    return choose(v != 0.0, v, choose(sign < 0.0, -LEAST, LEAST))
 
 
-@Inner
+@Inlined
+def least(x, y):  # type: ignore[no-untyped-def]
+    """The smaller of two ends."""
+    return choose(x < y, x, y)
+
+
+@Inlined
+def greatest(x, y):  # type: ignore[no-untyped-def]
+    """The larger of two ends."""
+    return choose(x > y, x, y)
+
+
+@Inlined
 def ordinary(a):  # type: ignore[no-untyped-def]
     """Whether both ends are numbers."""
-    return a[0] == a[0] and a[1] == a[1]
+    return (a[0] == a[0]) & (a[1] == a[1])
 
 
-@Inner
+@Inlined
 def product(u, v):  # type: ignore[no-untyped-def]
     """The product of two ends; an infinite end is never reached, so zero times it is zero."""
-    return kept(u * v, copysign(1.0, u) * v) if u != 0.0 and v != 0.0 else 0.0
+    return choose((u != 0.0) & (v != 0.0), kept(u * v, choose(u < 0.0, -v, v)), 0.0)
 
 
-@Inner
+@Inlined
 def iconst(c):  # type: ignore[no-untyped-def]
     """A number that is exactly c."""
     return (float(c), float(c)) if c == c else (-inf, inf)
 
 
-@Inner
+@Inlined
 def ipoint(v):  # type: ignore[no-untyped-def]
     """A number whose nearest float is v."""
     return lower(float(v), ROUNDED), upper(float(v), ROUNDED)
 
 
-@Inner
+@Inlined
 def ipi():  # type: ignore[no-untyped-def]
     """The number pi, which lies just above its nearest float."""
     return pi, 3.1415926535897936
 
 
-@Inner
+@Inlined
 def ineg(a):  # type: ignore[no-untyped-def]
     """The negative of a."""
     return -a[1], -a[0]
 
 
-@Inner
+@Inlined
 def iadd(a, b):  # type: ignore[no-untyped-def]
     """The sum a + b."""
     return lower(a[0] + b[0], ROUNDED), upper(a[1] + b[1], ROUNDED)
 
 
-@Inner
+@Inlined
 def isub(a, b):  # type: ignore[no-untyped-def]
     """The difference a - b."""
     return lower(a[0] - b[1], ROUNDED), upper(a[1] - b[0], ROUNDED)
 
 
-@Inner
+@Inlined
 def imul(a, b):  # type: ignore[no-untyped-def]
     """The product a*b."""
     p, q = product(a[0], b[0]), product(a[0], b[1])
     r, s = product(a[1], b[0]), product(a[1], b[1])
-    if not (ordinary(a) and ordinary(b)):
-        return -inf, inf
-    return lower(min(min(p, q), min(r, s)), ROUNDED), upper(max(max(p, q), max(r, s)), ROUNDED)
+    known = ordinary(a) & ordinary(b)
+    return (
+        choose(known, lower(least(least(p, q), least(r, s)), ROUNDED), -inf),
+        choose(known, upper(greatest(greatest(p, q), greatest(r, s)), ROUNDED), inf),
+    )
 
 
-@Inner
+@Inlined
 def iinv(a):  # type: ignore[no-untyped-def]
     """The inverse 1/a: everything if zero lies inside, half of it if zero is an end."""
     lo, hi = a
-    if lo < 0.0 < hi or not ordinary(a):
-        return -inf, inf
-    below = lower(kept(1.0 / hi, hi), ROUNDED) if hi != 0.0 else -inf
-    above = upper(kept(1.0 / lo, lo), ROUNDED) if lo != 0.0 else inf
+    known = ordinary(a) & ((lo >= 0.0) | (hi <= 0.0))
+    below = choose(known & (hi != 0.0), lower(kept(1.0 / hi, hi), ROUNDED), -inf)
+    above = choose(known & (lo != 0.0), upper(kept(1.0 / lo, lo), ROUNDED), inf)
     return below, above
 
 
-@Inner
+@Inlined
 def idiv(a, b):  # type: ignore[no-untyped-def]
     """The quotient a/b."""
     return imul(a, iinv(b))
 
 
-@Inner
+@Inlined
 def iabs(a):  # type: ignore[no-untyped-def]
     """The absolute value of a."""
-    if a[0] >= 0.0:
-        return a
-    return ineg(a) if a[1] <= 0.0 else (0.0, max(-a[0], a[1]))
+    return greatest(greatest(a[0], -a[1]), 0.0), greatest(-a[0], a[1])
 
 
-@Inner
+@Inlined
 def grown(lo, hi):  # type: ignore[no-untyped-def]
     """From the values of the C library at the ends."""
     return lower(lo, LIBRARY), upper(hi, LIBRARY)
 
 
-@Inner
+@Inlined
 def natural_power(x, n):  # type: ignore[no-untyped-def]
     """The power x**n for n > 0, never an inexact zero."""
-    return kept(power(x, float(n)), x if n % 2 else 1.0) if x != 0.0 else 0.0
+    value = x
+    for _ in range(n - 1):
+        value *= x
+    return choose(x != 0.0, kept(value, choose(n % 2 == 1, x, 1.0)), 0.0)
 
 
-@Inner
+@Inlined
 def natural_ipow(a, n):  # type: ignore[no-untyped-def]
-    """The power a**n for n > 0."""
-    b = a if n % 2 else iabs(a)
-    return grown(natural_power(b[0], n), natural_power(b[1], n))
+    """The power a**n for n > 0, rounded n - 1 times."""
+    b, share = a if n % 2 else iabs(a), ROUNDED * n
+    return lower(natural_power(b[0], n), share), upper(natural_power(b[1], n), share)
 
 
-@Inner
+@Inlined
 def ipow(a, n):  # type: ignore[no-untyped-def]
     """The power a**n, n an integer."""
     if n == 0:
@@ -199,15 +199,14 @@ def irpow(a, p):  # type: ignore[no-untyped-def]
     return lower(below, slack), upper(above, share)
 
 
-@Inner
+@Inlined
 def isqrt(a):  # type: ignore[no-untyped-def]
     """The values of sqrt."""
-    if not a[0] >= 0.0:
-        return -inf, inf
-    return lower(sqrt(a[0]), ROUNDED), upper(sqrt(a[1]), ROUNDED)
+    known = a[0] >= 0.0
+    return choose(known, lower(sqrt(a[0]), ROUNDED), -inf), choose(known, upper(sqrt(a[1]), ROUNDED), inf)
 
 
-@Inner
+@Inlined
 def iexp(a):  # type: ignore[no-untyped-def]
     """The values of exp."""
     return grown(kept(exp(a[0]), 1.0), kept(exp(a[1]), 1.0))
@@ -219,37 +218,40 @@ def ilog(a):  # type: ignore[no-untyped-def]
     return grown(log(a[0]), log(a[1])) if a[0] >= 0.0 and a[1] > 0.0 else (-inf, inf)
 
 
-@Inner
+@Inlined
 def meets(a, point, period):  # type: ignore[no-untyped-def]
     """Whether point + k*period may lie in the interval for a whole k; yes when in doubt."""
     slack = 1e-15 * (2.0 + fabs(a[0]) + fabs(a[1]))
-    return floor((a[1] - point) / period + slack) >= ceil((a[0] - point) / period - slack)
+    return whole_below((a[1] - point) / period + slack) >= (a[0] - point) / period - slack
 
 
-@Inner
+@Inlined
 def unphased(a):  # type: ignore[no-untyped-def]
     """Whether the interval is too wide or too far out to know the phase (or not a number)."""
-    return not (a[0] >= -FAR_PHASE and a[1] <= FAR_PHASE and a[1] - a[0] < 2.0 * pi)
+    return not ((a[0] >= -FAR_PHASE) & (a[1] <= FAR_PHASE) & (a[1] - a[0] < 2.0 * pi))
 
 
-@Inner
+@Inlined
 def wave(a, left, right, trough, crest):  # type: ignore[no-untyped-def]
     """A wave with the values left and right at the ends, and a trough and a crest once a turn."""
-    lo, hi = grown(min(left, right), max(left, right))
-    below = -1.0 if meets(a, trough, 2.0 * pi) else max(lo, -1.0)
-    return below, 1.0 if meets(a, crest, 2.0 * pi) else min(hi, 1.0)
+    lo, hi = grown(least(left, right), greatest(left, right))
+    unknown = unphased(a)
+    return (
+        choose(unknown | meets(a, trough, 2.0 * pi), -1.0, greatest(lo, -1.0)),
+        choose(unknown | meets(a, crest, 2.0 * pi), 1.0, least(hi, 1.0)),
+    )
 
 
-@Inner
+@Inlined
 def isin(a):  # type: ignore[no-untyped-def]
     """The values of sin."""
-    return (-1.0, 1.0) if unphased(a) else wave(a, sin(a[0]), sin(a[1]), -0.5 * pi, 0.5 * pi)
+    return wave(a, sin(a[0]), sin(a[1]), -0.5 * pi, 0.5 * pi)
 
 
-@Inner
+@Inlined
 def icos(a):  # type: ignore[no-untyped-def]
     """The values of cos."""
-    return (-1.0, 1.0) if unphased(a) else wave(a, cos(a[0]), cos(a[1]), pi, 0.0)
+    return wave(a, cos(a[0]), cos(a[1]), pi, 0.0)
 
 
 @Inner
@@ -276,18 +278,18 @@ def iacos(a):  # type: ignore[no-untyped-def]
     return grown(acos(a[1]), acos(a[0])) if a[0] >= -1.0 and a[1] <= 1.0 else (-inf, inf)
 
 
-@Inner
+@Inlined
 def isinh(a):  # type: ignore[no-untyped-def]
     """The values of sinh."""
     return grown(sinh(a[0]), sinh(a[1]))
 
 
-@Inner
+@Inlined
 def icosh(a):  # type: ignore[no-untyped-def]
     """The values of cosh."""
     b = iabs(a)
     lo, hi = grown(cosh(b[0]), cosh(b[1]))
-    return max(lo, 1.0), hi
+    return greatest(lo, 1.0), hi
 
 
 @Inner

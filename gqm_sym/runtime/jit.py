@@ -186,8 +186,24 @@ def entry(signature: Any, *, nogil: bool = False) -> Callable[[Any], Callable[..
     return decorate
 
 
-def compiler(file: str, *, interface: int) -> Callable[[Any], Callable[[Any], Any]]:
-    """A decorator factory for the functions of one generated module: ``compiled(signature)``.
+class Later:
+    """A function of a generated module that is compiled when its address is first asked for."""
+
+    def __init__(self, compile_it: Callable[[], Any]) -> None:
+        self._compile = compile_it
+        self._callback: Any = None
+
+    @property
+    def address(self) -> int:
+        """Where the compiled function lies in memory."""
+        if self._callback is None:
+            self._callback = self._compile()
+        address: int = self._callback.address
+        return address
+
+
+def compiler(file: str, *, interface: int) -> Callable[..., Callable[[Any], Any]]:
+    """A decorator factory for the functions of one generated module: ``compiled(signature, later=False)``.
 
     Refuses a module that was generated for another version of the interface, before anything is compiled.
 
@@ -204,8 +220,8 @@ def compiler(file: str, *, interface: int) -> Callable[[Any], Callable[[Any], An
     alias = f"gqm_sym_generated_{digest}"
     sys.modules.setdefault(alias, ModuleType(alias))
 
-    def compiled(signature: Any) -> Callable[[Any], Any]:
-        def decorate(function: Any) -> Any:
+    def compiled(signature: Any, *, later: bool = False) -> Callable[[Any], Any]:
+        def compile_it(function: Any) -> Any:
             function.__module__ = alias
             rtsys.initialize(cpu_target.target_context)
             callback: Any = CFunc(function, sigutils.normalize_signature(signature), {}, COMPILE)
@@ -213,6 +229,6 @@ def compiler(file: str, *, interface: int) -> Callable[[Any], Callable[[Any], An
             callback.compile()
             return callback
 
-        return decorate
+        return (lambda function: Later(lambda: compile_it(function))) if later else compile_it
 
     return compiled

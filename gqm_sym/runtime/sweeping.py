@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from gqm_sym.errors import GQMError, InputError, ParameterError, SolutionError
 from gqm_sym.runtime import swift
+from gqm_sym.runtime.batches import answer_batches
 from gqm_sym.runtime.entries import frame_at
 from gqm_sym.runtime.extremes import over_legs
 from gqm_sym.runtime.formulas import CONTACTS
@@ -237,9 +238,22 @@ def _answer(
         ):
             domain[:, i] = missing if end_value is None else end_value
         domain[domain[:, 2] > 0.0, :2] = -inf, inf
+        parameters = np.column_stack(p)
+        if formulas.each is not None and asked.asked in (swift.TIME, swift.PLACES):
+            answer_batches(
+                tuple(function.address for function in formulas.each),
+                parameters,
+                lam0,
+                v0,
+                direction.astype(np.int64),
+                domain,
+                asked.asked == swift.TIME,
+                out[begin:end],
+                reasons[begin:end],
+            )
         swift.answer_many(
             addresses,
-            np.column_stack(p),
+            parameters,
             lam0,
             v0,
             direction.astype(np.int64),

@@ -25,7 +25,7 @@ LIBRATION, CIRCULATION = range(2)
 
 # The trapezoidal rule doubles its nodes so often, from FEWEST intervals on.
 FEWEST, DOUBLINGS = 8, 7
-MOST = FEWEST * 2**DOUBLINGS
+MOST_NODES = FEWEST * 2**DOUBLINGS
 # Two sums as close as this agree to rounding.
 SAME = 4e-16
 # The error squares with each doubling, once it does so at all: two differences, the second below this and the first
@@ -92,7 +92,7 @@ def time_once(fns, p, kind, lam0, w0, a, b, width, work, rates):  # type: ignore
     for i in range(1, FEWEST):
         total += rates[i]
     value, before, n, first = total / FEWEST, inf, FEWEST, FEWEST + 1
-    while n < MOST:
+    while n < MOST_NODES:
         least, most = fill(fns, p, kind, lam0, w0, a, b, width, first, n, work, rates)
         low, high = min(low, least), max(high, most)
         if not low > LEAST_BALANCE * high:
@@ -223,13 +223,15 @@ def extreme(fns, p, kind, lam0, w0, a, b, width, asked, sign, work):  # type: ig
     nogil=True,
 )
 def answer_many(fns, ps, lam0s, v0s, ways, domains, places, asked, out, reasons):  # type: ignore[no-untyped-def]
-    """Fill a row of ``out`` and of ``reasons`` for each launch.
+    """Fill a row of ``out`` and of ``reasons`` for each launch that is HARD so far.
 
     ``ps`` has a row of parameters a launch, ``domains`` both ends and the period. A row of ``out`` holds both turning
     points (PLACES), the least and the greatest (SPEEDS, FORCES), or the half period or loop time and the kind (TIME).
     """
-    work, rates = np.empty((4, MOST)), np.empty(MOST)
+    work, rates = np.empty((4, MOST_NODES)), np.empty(MOST_NODES)
     for k in range(lam0s.size):
+        if reasons[k] != HARD:
+            continue
         out[k, 0] = out[k, 1] = np.nan
         p, lam0, v0 = ps[k], lam0s[k], v0s[k]
         low, high, period = domains[k, 0], domains[k, 1], domains[k, 2]

@@ -1,13 +1,13 @@
 """Second divided differences of sin, cos, sinh, cosh, exp, tan and tanh.
 
 As in `second_differences`, near points have a closed form, here by `wave_parts`, and farther ones take first
-differences. For sin and cos both are worked out and one is chosen, so that a loop over them vectorises; ``near_sin2``
-and ``near_cos2`` are the closed forms alone, and NaN for points too far apart.
+differences. For sin, cos, sinh and cosh both are worked out and one is chosen, so that a loop over them vectorises;
+``near_sin2`` and its like are the closed forms alone, and NaN for points too far apart.
 """
 
-from math import cosh, exp, fabs, factorial, nan, sinh
+from math import fabs, factorial, nan
 
-from gqm_sym.runtime.elementary import cos, sin
+from gqm_sym.runtime.elementary import cos, cosh, exp, sin, sinh
 from gqm_sym.runtime.first_differences import cos1, cosh1, expc, sin1, sinh1, tan1, tanh1
 from gqm_sym.runtime.fused import choose, polynomial
 from gqm_sym.runtime.jit import Inlined, Inner
@@ -19,7 +19,7 @@ NEAR = 1.0
 WIDE = 3.2
 
 
-def _even(shift, terms):  # type: ignore[no-untyped-def]
+def _even(shift: int, terms: int) -> tuple[float, ...]:
     """Coefficients of the even series of a sinc (shift 1) or cosine (shift 0) in t**2, highest power first."""
     return tuple((-1.0) ** k / factorial(2 * k + shift) for k in reversed(range(terms)))
 
@@ -77,28 +77,38 @@ def cos2(x, y, w, h1, h2):  # type: ignore[no-untyped-def]
     return choose(near == near, near, (cos1(r, s, second) - cos1(p, q, first)) / d)
 
 
-@Inner
+@Inlined
+def near_sinh2(x, y, w, h1, h2):  # type: ignore[no-untyped-def]
+    """sinh[x,y,w] = (B cosh M + A sinh M)/2, as for the sine; NaN beyond `NEAR`."""
+    u, v = 0.5 * h1, 0.5 * h2
+    even, odd = wave_parts(u, v, -1.0, NEAR_SERIES)
+    m = 0.25 * (x + w + 2.0 * y)
+    return choose(fabs(u) + fabs(v) <= NEAR, 0.5 * (odd * cosh(m) + even * sinh(m)), nan)
+
+
+@Inlined
+def near_cosh2(x, y, w, h1, h2):  # type: ignore[no-untyped-def]
+    """cosh[x,y,w] = (B sinh M + A cosh M)/2, as for the sine; NaN beyond `NEAR`."""
+    u, v = 0.5 * h1, 0.5 * h2
+    even, odd = wave_parts(u, v, -1.0, NEAR_SERIES)
+    m = 0.25 * (x + w + 2.0 * y)
+    return choose(fabs(u) + fabs(v) <= NEAR, 0.5 * (odd * sinh(m) + even * cosh(m)), nan)
+
+
+@Inlined
 def sinh2(x, y, w, h1, h2):  # type: ignore[no-untyped-def]
-    """sinh[x,y,w] = (B cosh M + A sinh M)/2, as for the sine."""
-    u, v = 0.5 * h1, 0.5 * h2
-    if fabs(u) + fabs(v) <= NEAR:
-        even, odd = wave_parts(u, v, -1.0, NEAR_SERIES)
-        m = 0.25 * (x + w + 2.0 * y)
-        return 0.5 * (odd * cosh(m) + even * sinh(m))
-    a, b, c, u, v = ordered(x, y, w, h1, h2)
-    return (sinh1(b, c, v) - sinh1(a, b, u)) / (u + v)
+    """sinh[x,y,w], of points at any distance."""
+    near = near_sinh2(x, y, w, h1, h2)
+    p, q, first, r, s, second, d = around(x, y, w, h1, h2)
+    return choose(near == near, near, (sinh1(r, s, second) - sinh1(p, q, first)) / d)
 
 
-@Inner
+@Inlined
 def cosh2(x, y, w, h1, h2):  # type: ignore[no-untyped-def]
-    """cosh[x,y,w] = (B sinh M + A cosh M)/2, as for the sine."""
-    u, v = 0.5 * h1, 0.5 * h2
-    if fabs(u) + fabs(v) <= NEAR:
-        even, odd = wave_parts(u, v, -1.0, NEAR_SERIES)
-        m = 0.25 * (x + w + 2.0 * y)
-        return 0.5 * (odd * sinh(m) + even * cosh(m))
-    a, b, c, u, v = ordered(x, y, w, h1, h2)
-    return (cosh1(b, c, v) - cosh1(a, b, u)) / (u + v)
+    """cosh[x,y,w], of points at any distance."""
+    near = near_cosh2(x, y, w, h1, h2)
+    p, q, first, r, s, second, d = around(x, y, w, h1, h2)
+    return choose(near == near, near, (cosh1(r, s, second) - cosh1(p, q, first)) / d)
 
 
 @Inner

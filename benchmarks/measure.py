@@ -1,0 +1,75 @@
+"""What a benchmark row is, how it is timed, and how its error is measured."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import inf
+from statistics import median
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+from mpmath import mpf
+
+Work = Callable[[], Any]
+
+
+@dataclass(frozen=True)
+class Row:
+    """One way of doing some work.
+
+    ``each`` is how many results a call gives, ``line`` the error it may have (ours only), ``unit`` what errors are in.
+    """
+
+    work: str
+    who: str
+    call: Work
+    error: Callable[[Any], float]
+    each: int = 1
+    repeats: int = 15
+    line: float = inf
+    unit: str = ""
+
+
+@dataclass(frozen=True)
+class Result:
+    """A row with what was measured."""
+
+    row: Row
+    seconds: float
+    error: float
+
+    @property
+    def missed(self) -> bool:
+        """Whether the accuracy misses the row's line."""
+        return not self.error <= self.row.line
+
+
+def measured(row: Row) -> Result:
+    """Time a row: the median of some calls after a first."""
+    value = row.call()
+    times = []
+    for _ in range(row.repeats):
+        start = perf_counter()
+        row.call()
+        times.append(perf_counter() - start)
+    return Result(row, median(times) / row.each, row.error(value))
+
+
+def ulps(values: Any, truths: list[mpf]) -> float:
+    """Worst error in units of the last place."""
+    return max(
+        float(abs(mpf(float(v)) - t)) / float(np.spacing(float(t))) for v, t in zip(values, truths, strict=False)
+    )
+
+
+def apart(values: Any, truths: list[mpf], scale: float) -> float:
+    """Worst error as a share of a scale."""
+    return max(float(abs(mpf(float(v)) - t)) / scale for v, t in zip(values, truths, strict=False))
+
+
+def readable(seconds: float) -> str:
+    """Write a time with its unit."""
+    for unit, size in (("s", 1.0), ("ms", 1e-3), ("µs", 1e-6)):
+        if seconds >= size:
+            return f"{seconds / size:.3g} {unit}"
+    return f"{seconds / 1e-9:.3g} ns"

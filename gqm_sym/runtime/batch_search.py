@@ -1,0 +1,137 @@
+"""The turning points of many orbits at once: guessed by Newton's method, and proved by interval bounds.
+
+A batch is an array with a row for each quantity and a column for each orbit, beside the run-time parameters, a row
+each. Every step is a loop over the columns without branches, which vectorises.
+"""
+
+from math import fabs, inf
+
+from gqm_sym.runtime.crossing import call_bounds_each, call_rise_each
+from gqm_sym.runtime.entries import first_step
+from gqm_sym.runtime.fused import choose
+from gqm_sym.runtime.jit import Inner
+from gqm_sym.runtime.search import UNRESOLVED
+from gqm_sym.runtime.swift import LIBRATION
+
+# Rows of a batch: which launch, its place and V**2, offsets of both ends from it, both ends; what the quadrature keeps;
+# what the search needs: which way it goes and how far, its state, bracket, trial and the zero.
+WHO, START, SPEED, LEAST, MOST, A, B, SUM, VALUE, CHANGE, LOW, HIGH, LASTING = range(13)
+WAY, REACH, STATE, LEFT, RIGHT, TRIAL, AHEAD, ROWS = range(12, 20)
+# What a search has come to.
+SEEKING, FOUND, NOWHERE = 0.0, 1.0, 2.0
+# Trials of a search, and the relative step after which the next would be below rounding.
+TRIALS, CLOSE = 40, 1e-9
+
+
+@Inner
+def any_is(row, value):  # type: ignore[no-untyped-def]
+    """Whether a value is in a row: a loop of its own, for a loop that also counts stays scalar."""
+    found = False
+    for v in row:
+        found |= v == value
+    return found
+
+
+@Inner
+def launch(fns, n, s, p, domains, work):  # type: ignore[no-untyped-def]
+    """Set up the search ahead: a body released at rest goes where it falls."""
+    if any_is(s[SPEED, :n], 0.0):
+        none, rows = work[0, :n], work[1:4].reshape(-1)[: 3 * n].reshape(3, n)
+        none[:] = 0.0
+        call_rise_each(fns[0], n, s[START, :n], s[START, :n], none, p, rows)
+        for j in range(n):
+            if s[SPEED, j] == 0.0:
+                s[WAY, j] = (rows[2, j] < 0.0) * 1.0 - (rows[2, j] > 0.0) * 1.0
+    for j in range(n):
+        low, high, period = domains[int(s[WHO, j]), 0], domains[int(s[WHO, j]), 1], domains[int(s[WHO, j]), 2]
+        s[REACH, j] = period if period > 0.0 else (high - s[START, j] if s[WAY, j] > 0.0 else s[START, j] - low)
+        s[TRIAL, j] = min(first_step(low, high, period), s[REACH, j])
+        s[AHEAD, j], s[STATE, j] = 0.0, SEEKING if s[WAY, j] != 0.0 else NOWHERE
+
+
+@Inner
+def turn_round(n, s, domains):  # type: ignore[no-untyped-def]
+    """Set up the search behind: none for a launch from rest. What was ahead is kept as an offset, in ``A``."""
+    for j in range(n):
+        low, high, period = domains[int(s[WHO, j]), 0], domains[int(s[WHO, j]), 1], domains[int(s[WHO, j]), 2]
+        s[A, j] = s[WAY, j] * s[AHEAD, j]
+        s[WAY, j] = -s[WAY, j]
+        rest = high - s[START, j] if s[WAY, j] > 0.0 else s[START, j] - low
+        s[REACH, j] = period - s[AHEAD, j] if period > 0.0 else rest
+        s[TRIAL, j] = min(s[AHEAD, j], s[REACH, j])
+        s[AHEAD, j], s[STATE, j] = 0.0, SEEKING if s[SPEED, j] > 0.0 else FOUND
+
+
+@Inner
+def seek(fns, n, s, p, work):  # type: ignore[no-untyped-def]
+    """Guess how far the first zero of V**2 is from each launch, from first trials.
+
+    Newton's method on V**2/distance, which has no zero at a launch from rest. Until a trial has V**2 < 0, trials go at
+    most four times as far.
+    """
+    offsets, places, rows = work[0, :n], work[1, :n], work[2:5].reshape(-1)[: 3 * n].reshape(3, n)
+    start, w0, way, reach = s[START, :n], s[SPEED, :n], s[WAY, :n], s[REACH, :n]
+    state, left, right, trial, zero = s[STATE, :n], s[LEFT, :n], s[RIGHT, :n], s[TRIAL, :n], s[AHEAD, :n]
+    for j in range(n):
+        left[j], right[j] = 0.0, inf
+    for _ in range(TRIALS):
+        for j in range(n):
+            offsets[j] = way[j] * trial[j]
+            places[j] = start[j] + offsets[j]
+        call_rise_each(fns[0], n, start, places, offsets, p, rows)
+        for j in range(n):
+            at, w = trial[j], w0[j] - offsets[j] * rows[0, j]
+            before = w > 0.0
+            low, high = choose(before, at, left[j]), choose(before, right[j], at)
+            better = at + at * (w / (offsets[j] * rows[2, j] + w))
+            close = fabs(better - at) <= CLOSE * at
+            bracketed = high < inf
+            within = (better > low) & (better < choose(bracketed, high, 4.0 * at))
+            new = choose(within, better, choose(bracketed, 0.5 * (low + high), 2.0 * at))
+            new = choose(new > reach[j], reach[j], new)
+            lost = (w != w) | (before & (at >= reach[j]))
+            live = state[j] == SEEKING
+            zero[j] = choose(live & close, better, zero[j])
+            trial[j] = choose(live, new, at)
+            left[j], right[j] = low, high
+            state[j] = choose(live, choose(close, FOUND, choose(lost, NOWHERE, SEEKING)), state[j])
+        if not any_is(state, SEEKING):
+            return
+
+
+@Inner
+def prove(fns, kind, pieces, n, s, p, work):  # type: ignore[no-untyped-def]
+    """Set the state to FOUND where V**2 > 0 and ds > 0 between both ends is certain, else to NOWHERE.
+
+    V**2 is zero at both ends of a libration, and what it is at launch at both ends of a lap. Over the piece at a zero
+    the slope must have its sign throughout: the zero is simple, and the only one there.
+    """
+    places, behind, lo, hi = work[0, :n], work[1, :n], work[2, :n], work[3, :n]
+    offsets, speeds, box = work[4, :n], work[5, :n], work[6:10].reshape(-1)[: 4 * n].reshape(4, n)
+    rows = work[10:13].reshape(-1)[: 3 * n].reshape(3, n)
+    start, w0, least, most, state = s[START, :n], s[SPEED, :n], s[LEAST, :n], s[MOST, :n], s[STATE, :n]
+    for j in range(n):
+        behind[j], speeds[j], state[j] = start[j] + least[j], w0[j], FOUND
+    for k in range(1, pieces + 1):
+        first, last = kind == LIBRATION and k == 1, kind == LIBRATION and k == pieces
+        share = k / pieces
+        for j in range(n):
+            offsets[j] = most[j] if k == pieces else least[j] + share * (most[j] - least[j])
+            places[j] = start[j] + offsets[j]
+            lo[j], hi[j] = behind[j], places[j]
+        call_bounds_each(fns[2], n, lo, hi, p, box)
+        if k < pieces:
+            call_rise_each(fns[0], n, start, places, offsets, p, rows)
+        else:
+            rows[0] = 0.0
+        for j in range(n):
+            lost = offsets[j] * rows[0, j]
+            w, clear = w0[j] - lost, UNRESOLVED * (w0[j] + fabs(lost))
+            # The most that V**2 may lose, and gain, for each unit of the parameter, and so the least it can be.
+            loss, gain, from_w = box[1, j], -box[0, j], speeds[j]
+            valley = (loss * w + gain * from_w - loss * gain * (hi[j] - lo[j])) / (loss + gain)
+            lowest = choose((loss > 0.0) & (gain > 0.0), valley, choose(w < from_w, w, from_w))
+            good = choose(first, -loss, choose(last, -gain, lowest - clear)) > 0.0
+            good = good & (last | (w > clear)) & (box[2, j] > 0.0)
+            state[j] = choose(good, state[j], NOWHERE)
+            behind[j], speeds[j] = places[j], w

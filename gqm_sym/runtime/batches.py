@@ -1,0 +1,258 @@
+"""Turning points and times of many orbits at once, an orbit in each lane of a vector register.
+
+Orbits for which `batch_search` proves no turning points, or whose time does not converge, are left to `swift`, which
+takes them one by one. Columns of a batch are whole registers: the last orbit is repeated to fill one.
+"""
+
+from math import fabs, inf, isfinite, nan, pi, sqrt
+
+import numpy as np
+from numba import types
+
+from gqm_sym.runtime.batch_search import (
+    AHEAD,
+    CHANGE,
+    FOUND,
+    HIGH,
+    LASTING,
+    LEAST,
+    LOW,
+    MOST,
+    NOWHERE,
+    REACH,
+    ROWS,
+    SPEED,
+    START,
+    STATE,
+    SUM,
+    VALUE,
+    WAY,
+    WHO,
+    A,
+    B,
+    launch,
+    prove,
+    seek,
+    turn_round,
+)
+from gqm_sym.runtime.crossing import call_bend_each, call_rise_each
+from gqm_sym.runtime.fused import choose
+from gqm_sym.runtime.jit import Inner, entry
+from gqm_sym.runtime.swift import (
+    CIRCULATION,
+    DONE,
+    FEWEST,
+    FROM_A,
+    FROM_B,
+    LEAST_BALANCE,
+    LIBRATION,
+    MOST_NODES,
+    PASSING,
+    SAME,
+    SHARES,
+)
+
+# Orbits of a batch: its arrays stay in the first-level cache. Orbits of a full register, at most.
+BATCH, LANES = 128, 8
+# Pieces of an orbit for its proof: a few first, more where those do not suffice.
+FEW_PIECES, MANY_PIECES = 3, 12
+# A rule's change is foreseen from its last two, which fall geometrically: below this it is less than rounding. The
+# first of them must be below FALLING, whose fourth power is that: one accidentally small change decides nothing.
+FORESEEN, FALLING = 3e-17, 7e-5
+
+_LINE = types.float64[::1]
+_ROWS = types.float64[:, ::1]
+
+
+@Inner
+def gather(s, p, count, n, chosen, kept, t, q, rows):  # type: ignore[no-untyped-def]
+    """Copy ``chosen`` columns, ``kept`` of them, and their parameters; returns how many columns that fills."""
+    full = -(-kept // LANES) * LANES
+    for row in range(rows):
+        for j in range(kept):
+            t[row, j] = s[row, chosen[j]]
+        for j in range(kept, full):
+            t[row, j] = t[row, kept - 1]
+    for row in range(count):
+        for j in range(kept):
+            q[row * full + j] = p[row * n + chosen[j]]
+        for j in range(kept, full):
+            q[row * full + j] = q[row * full + kept - 1]
+    return full
+
+
+@Inner
+def shrink(s, p, count, n, chosen, kept, rows):  # type: ignore[no-untyped-def]
+    """Close up to the ``kept`` columns that are ``chosen``, in ascending order; returns how many columns are left."""
+    return n if kept == n else gather(s, p, count, n, chosen, kept, s, p, rows)
+
+
+@Inner
+def fill(fns, kind, n, node, s, p, work):  # type: ignore[no-untyped-def]
+    """The time per share of the orbit at one node of the rule, and the extremes so far of V**2's regular factor."""
+    da, db, rates, rows = work[0, :n], work[1, :n], work[2, :n], work[3:6].reshape(-1)
+    start, w0, least, most = s[START, :n], s[SPEED, :n], s[LEAST, :n], s[MOST, :n]
+    low, high = s[LOW, :n], s[HIGH, :n]
+    if kind == LIBRATION:
+        from_a, from_b, two = FROM_A[node], FROM_B[node], rows[: 2 * n].reshape(2, n)
+        for j in range(n):
+            width = most[j] - least[j]
+            da[j], db[j] = width * from_a, width * from_b
+        call_bend_each(fns[1], n, s[A, :n], s[B, :n], da, db, p, two)
+        for j in range(n):
+            q = two[0, j]
+            rates[j] = pi * two[1, j] / sqrt(q)
+            low[j], high[j] = choose(q >= low[j], low[j], q), choose(q > high[j], q, high[j])
+    else:
+        share, three = SHARES[node], rows[: 3 * n].reshape(3, n)
+        for j in range(n):
+            db[j] = least[j] + share * (most[j] - least[j])
+            da[j] = start[j] + db[j]
+        call_rise_each(fns[0], n, start, da, db, p, three)
+        for j in range(n):
+            lost = db[j] * three[0, j]
+            rates[j] = (most[j] - least[j]) * three[1, j] / sqrt(w0[j] - lost)
+            q = (w0[j] - lost) / (w0[j] + fabs(lost))
+            low[j], high[j] = choose(q >= low[j], low[j], q), 1.0
+    return rates
+
+
+@Inner
+def times(fns, kind, n, s, flat, count, chosen, work, out, reasons):  # type: ignore[no-untyped-def]
+    """Half periods or loop times by the trapezoidal rule, into the rows of ``out`` that belong to the orbits.
+
+    Nodes are doubled until the next change is foreseen to be below rounding; orbits for which that is so drop out, and
+    those whose V**2 all but vanishes.
+    """
+    for j in range(n):
+        s[SUM, j], s[VALUE, j], s[CHANGE, j], s[LOW, j], s[HIGH, j] = 0.0, 0.0, 0.0, inf, 0.0
+    begin, nodes = 0, FEWEST
+    while True:
+        p = flat[: count * n].reshape(count, n)
+        for node in range(begin, nodes + 1 if begin == 0 else 2 * begin - 1):
+            rates = fill(fns, kind, n, node, s, p, work)
+            ends = 0.5 if node in (0, FEWEST) else 1.0
+            for j in range(n):
+                s[SUM, j] += ends * rates[j]
+            if begin == 0:  # the two levels before the first
+                half, quarter = ends * (node % 2 == 0) * 2 / FEWEST, ends * (node % 4 == 0) * 4 / FEWEST
+                for j in range(n):
+                    s[VALUE, j] += half * rates[j]
+                    s[CHANGE, j] += quarter * rates[j]
+        if begin == 0:
+            for j in range(n):
+                s[CHANGE, j] = fabs(s[VALUE, j] - s[CHANGE, j]) / s[VALUE, j]
+        kept = 0
+        for j in range(n):
+            value, before = s[SUM, j] / nodes, s[CHANGE, j]
+            change = fabs(value - s[VALUE, j]) / value
+            s[VALUE, j], s[CHANGE, j] = value, change
+            if not s[LOW, j] > LEAST_BALANCE * s[HIGH, j]:
+                continue
+            if before <= FALLING and (change <= SAME or change * (change / before) ** 2 <= FORESEEN):
+                k = int(s[WHO, j])
+                out[k, 0], reasons[k] = value, DONE
+            else:
+                chosen[kept] = j
+                kept += 1
+        begin, nodes = nodes + 1, 2 * nodes
+        if kept == 0 or nodes > MOST_NODES:
+            return
+        n = shrink(s, flat, count, n, chosen, kept, LASTING)
+
+
+@Inner
+def settle(fns, kind, n, s, flat, t, spare, count, chosen, others, work, timed, out, reasons):  # type: ignore[no-untyped-def]
+    """Prove orbits of one kind, and answer for those that are proved; ``t`` and ``spare`` take the others meanwhile."""
+    for pieces in (FEW_PIECES, MANY_PIECES):
+        prove(fns, kind, pieces, n, s, flat[: count * n].reshape(count, n), work)
+        proved, left = 0, 0
+        for j in range(n):
+            if s[STATE, j] != FOUND:
+                others[left] = j
+                left += 1
+                continue
+            chosen[proved] = j
+            proved += 1
+            k = int(s[WHO, j])
+            if timed:
+                out[k, 1] = kind
+            elif kind == LIBRATION:
+                out[k, 0], out[k, 1], reasons[k] = s[A, j], s[B, j], DONE
+            else:
+                reasons[k] = PASSING
+        rest = gather(s, flat, count, n, others, left, t, spare, ROWS)
+        if proved and timed:
+            m = shrink(s, flat, count, n, chosen, proved, LASTING)
+            times(fns, kind, m, s, flat, count, chosen, work, out, reasons)
+        if left == 0:
+            return
+        n, s, flat, t, spare = rest, t, spare, s, flat
+
+
+@entry(
+    types.void(
+        *(types.UniTuple(types.int64, 3), _ROWS, _LINE, _LINE, types.int64[::1], _ROWS, types.boolean),
+        *(_ROWS, types.int8[::1]),
+    ),
+    nogil=True,
+)
+def answer_batches(fns, ps, lam0s, v0s, ways, domains, timed, out, reasons):  # type: ignore[no-untyped-def]
+    """Fill rows of ``out`` and of ``reasons`` for the launches that this can answer, as `swift.answer_many` does.
+
+    The others keep their reason. ``timed`` asks for times, else for turning points.
+    """
+    count = ps.shape[1]
+    s, t, u = np.empty((ROWS, BATCH)), np.empty((ROWS, BATCH)), np.empty((ROWS, BATCH))
+    flat, spare, other = np.empty(count * BATCH), np.empty(count * BATCH), np.empty(count * BATCH)
+    work, chosen, others = np.empty((13, BATCH)), np.empty(BATCH, dtype=np.int64), np.empty(BATCH, dtype=np.int64)
+    for begin in range(0, lam0s.size, BATCH):
+        filled = 0
+        for k in range(begin, min(begin + BATCH, lam0s.size)):
+            out[k, 0] = out[k, 1] = nan
+            low, high = domains[k, 0], domains[k, 1]
+            if isfinite(v0s[k]) and isfinite(ps[k].sum()) and low <= lam0s[k] <= high and isfinite(lam0s[k]):
+                s[WHO, filled], s[START, filled], s[SPEED, filled] = k, lam0s[k], v0s[k] * v0s[k]
+                s[WAY, filled] = ways[k]
+                chosen[filled] = filled
+                filled += 1
+        if filled == 0:
+            continue
+        n = -(-filled // LANES) * LANES
+        gather(s, flat, 0, n, chosen, filled, s, flat, ROWS)
+        for j in range(n):
+            for row in range(count):
+                flat[row * n + j] = ps[int(s[WHO, j]), row]
+        laps = 0
+        for ahead in (True, False):
+            p = flat[: count * n].reshape(count, n)
+            if ahead:
+                launch(fns, n, s, p, domains, work)
+            else:
+                turn_round(n, s, domains)
+            seek(fns, n, s, p, work)
+            kept = 0
+            for j in range(n):
+                if s[STATE, j] == FOUND and s[AHEAD, j] <= s[REACH, j]:
+                    chosen[kept] = j
+                    kept += 1
+                elif ahead and s[STATE, j] == NOWHERE and s[SPEED, j] > 0.0 and domains[int(s[WHO, j]), 2] > 0.0:
+                    others[laps] = j
+                    laps += 1
+            if ahead:
+                laps = gather(s, flat, count, n, others, laps, u, other, ROWS)
+            n = shrink(s, flat, count, n, chosen, kept, ROWS)
+            if n == 0:
+                break
+        for j in range(n):
+            first, second = s[A, j], s[WAY, j] * s[AHEAD, j]
+            s[LEAST, j], s[MOST, j] = min(first, second), max(first, second)
+            s[A, j], s[B, j] = s[START, j] + s[LEAST, j], s[START, j] + s[MOST, j]
+        for j in range(laps):
+            lap = u[WAY, j] * u[REACH, j]
+            u[LEAST, j], u[MOST, j] = min(lap, 0.0), max(lap, 0.0)
+        for kind in (LIBRATION, CIRCULATION):
+            if kind == CIRCULATION:
+                n, s, flat, u, other = laps, u, other, s, flat
+            if n:
+                settle(fns, kind, n, s, flat, t, spare, count, chosen, others, work, timed, out, reasons)

@@ -1,0 +1,108 @@
+"""Orbits in batches: which are answered, that none jumps a barrier, and that the times are those of single motions."""
+
+from collections.abc import Callable
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import pytest
+import sympy as sp
+from mpmath import mp, mpf
+
+import gqm_sym as gqm
+from gqm_sym.runtime import swift
+from gqm_sym.runtime.batches import answer_batches
+
+ModuleOf = Callable[[str], ModuleType]
+
+ULPS = 4.0
+
+
+def answered(
+    module: ModuleType,
+    lam0: Any,
+    v0: Any,
+    ways: Any,
+    p: list[float],
+    domain: tuple[float, float, float],
+    *,
+    timed: bool,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Answer launches by batches alone."""
+    lam0, v0, ways = (np.ascontiguousarray(a) for a in np.broadcast_arrays(np.asarray(lam0, float), v0, ways))
+    n = lam0.size
+    out, reasons = np.full((n, 2), np.nan), np.full(n, swift.HARD, dtype=np.int8)
+    answer_batches(
+        tuple(function.address for function in module.MODEL.each),
+        np.tile(p, (n, 1)),
+        lam0,
+        v0.astype(float),
+        ways.astype(np.int64),
+        np.tile(domain, (n, 1)),
+        timed,
+        out,
+        reasons,
+    )
+    return out, reasons
+
+
+CIRCLE = (-np.inf, np.inf, 2 * np.pi)
+
+
+@pytest.mark.parametrize("count", [1, 7, 8, 131])
+def test_every_pendulum_away_from_the_top_is_answered(count: int, module_of: ModuleOf) -> None:
+    """Whatever the number of launches: half periods of all, within a few last places."""
+    amplitude = np.linspace(0.01, 2.6, count)
+    out, reasons = answered(module_of("circle"), amplitude, 0.0, 1, [1.0, 9.81, 1.0], CIRCLE, timed=True)
+    assert (reasons == swift.DONE).all()
+    assert (out[:, 1] == swift.LIBRATION).all()
+    for value, a in zip(out[:, 0], amplitude, strict=True):
+        with mp.workdps(40):
+            truth = 2 * mp.ellipk(mp.sin(mpf(float(a)) / 2) ** 2) / mp.sqrt(mpf("9.81"))
+        assert abs(mpf(float(value)) - truth) <= ULPS * np.spacing(float(truth))
+
+
+@pytest.mark.parametrize("way", [1, -1])
+def test_laps(way: int, module_of: ModuleOf) -> None:
+    """Launched fast from anywhere: loop times, both ways; turning points there are none."""
+    places = np.linspace(-3.0, 3.0, 13)
+    v0 = np.sqrt(8.0**2 - 2 * 9.81 * (1 - np.cos(places)))
+    p = [1.0, 9.81, 1.0]
+    out, reasons = answered(module_of("circle"), places, v0, way, p, CIRCLE, timed=True)
+    assert (reasons == swift.DONE).all()
+    assert (out[:, 1] == swift.CIRCULATION).all()
+    with mp.workdps(40):
+        truth = float(4 * mp.ellipk(4 * mpf("9.81") / 64) / 8)
+    # Speeds are rounded, and the loop time follows the energy they mean.
+    assert out[:, 0] == pytest.approx(truth, rel=2e-15)
+    assert (answered(module_of("circle"), places, v0, way, p, CIRCLE, timed=False)[1] == swift.PASSING).all()
+
+
+def test_barriers_are_not_jumped(tmp_path: Path) -> None:
+    """On a track of hills every orbit keeps to its own valley, however narrow the hill beside it."""
+    curve = gqm.Curve.graph("x**2/4 + 3*exp(-(x - 1)**2/w**2)", parameter="x", parameters={"w": 1})
+    hills = gqm.build(gqm.derive(curve, gqm.Gravity()), name="hills_in_batches", folder=tmp_path)
+    rng = np.random.default_rng(5)
+    lam0, v0 = rng.uniform(-4, 4, 200), rng.uniform(0, 6, 200) * (rng.random(200) < 0.7)
+    width, ways = 10.0 ** rng.uniform(-3, 0, 200), rng.choice([1, -1], 200)
+    swept = hills.sweep("turning_points", lam0, v0, ways, w=width)
+    for k in range(60):
+        motion = hills.solve(float(lam0[k]), float(v0[k]), int(ways[k]), w=float(width[k]))
+        assert swept.values[k] == pytest.approx(sorted(motion.turning_points), rel=1e-14)
+    x, w = sp.symbols("x w")
+    height = sp.lambdify((x, w), x**2 / 4 + 3 * sp.exp(-((x - 1) ** 2) / w**2))
+    for k in range(200):
+        low, high = swept.values[k]
+        top = min(max(1.0, low + 0.001 * (high - low)), high - 0.001 * (high - low))
+        places = np.append(np.linspace(low, high, 500)[1:-1], top)
+        left = v0[k] ** 2 + 2 * 9.81 * (height(lam0[k], width[k]) - height(places, width[k]))
+        assert (left > 0).all()
+
+
+def test_what_cannot_be_proved_is_left(module_of: ModuleOf) -> None:
+    """Launches at the top, next to it, and what is not a number."""
+    lam0 = [np.pi, np.pi - 1e-9, np.nan, 0.3]
+    out, reasons = answered(module_of("circle"), lam0, 0.0, 1, [1.0, 9.81, 1.0], CIRCLE, timed=True)
+    assert list(reasons) == [swift.HARD, swift.HARD, swift.HARD, swift.DONE]
+    assert np.isnan(out[:3, 0]).all()
