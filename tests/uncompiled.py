@@ -127,12 +127,12 @@ def _entry(function: Callable[..., Any]) -> Callable[..., Any]:
     return call
 
 
-def _compiler(file: str, *, interface: int) -> Callable[[Any], Callable[[Any], Any]]:
+def _compiler(file: str, *, interface: int) -> Callable[..., Callable[[Any], Any]]:
     """Stand in for `jit.compiler`."""
     if interface != INTERFACE:
         return COMPILER(file, interface=interface)
 
-    def compiled(kind: Any) -> Callable[[Any], Any]:
+    def compiled(kind: Any, *, later: bool = False) -> Callable[[Any], Any]:
         kinds = [_C.get(one, ctypes.POINTER(ctypes.c_double)) for one in kind.args]
 
         def decorate(function: Any) -> Any:
