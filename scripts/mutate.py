@@ -38,7 +38,10 @@ import sympy  # noqa: E402, F401
 FOLDERS = ("gqm_sym/derivation", "gqm_sym/runtime")
 WORK = ROOT / ".mutants"
 # Tests whose subject is another process, a disk or compilation; and those that would need one.
-LEFT_OUT = ("architecture", "docs", "errors", "faults", "family_pages", "hostile", "jit", "processes", "starter")
+LEFT_OUT = (
+    *("architecture", "calls", "docs", "errors", "faults", "family_pages", "hostile", "jit", "processes", "starter"),
+    "uncompiled",
+)
 IMPORTS = ("--import-mode=importlib", "--continue-on-collection-errors")
 # Processor time in seconds: that a test may take to be one of the quick ones, that a mutant's tests may take together
 # by what they took before, and by how much it may slow them down.

@@ -132,7 +132,7 @@ def _compiler(file: str, *, interface: int) -> Callable[[Any], Callable[[Any], A
     if interface != INTERFACE:
         return COMPILER(file, interface=interface)
 
-    def compiled(kind: Any) -> Callable[[Any], Any]:
+    def compiled(kind: Any, *, later: bool = False) -> Callable[[Any], Any]:
         kinds = [_C.get(one, ctypes.POINTER(ctypes.c_double)) for one in kind.args]
 
         def decorate(function: Any) -> Any:
