@@ -68,7 +68,12 @@ def _extent(values: Any, at: int) -> tuple[Any, Any]:
 
 
 _QUICK = {"sums": _sums, "least_and_greatest": _extent}
-_QUICK |= {"fma": lambda x, y, z: np.float64(_fma(x, y, z)), "nearest_whole": np.rint}
+_QUICK |= {"fma": lambda x, y, z: np.float64(_fma(x, y, z)), "nearest_whole": np.rint, "whole_below": np.floor}
+_QUICK |= {"choose": lambda condition, x, y: np.float64(x if condition else y)}
+_QUICK |= {
+    "bits": lambda x: int(np.float64(x).view(np.int64)),
+    "from_bits": lambda n: np.uint64(n % 2**64).view(np.float64),
+}
 
 
 def _call(address: int, *arguments: Any) -> None:
@@ -87,13 +92,16 @@ def _compiled(intrinsic: Any) -> Callable[..., Any]:
         lambda a, b, c, d, e: f(a, b, c, d, e),
     )
     count = len(signature(intrinsic._defn).parameters) - 1  # but for the typing context
-    return CPUDispatcher(forms[count - 1], targetoptions={"nopython": True})  # type: ignore[no-any-return]
+    dispatcher = CPUDispatcher(forms[count - 1], targetoptions={"nopython": True})
+    return lambda *arguments: _numpy(dispatcher(*arguments))
 
 
 def _alike(value: Any) -> Any:
     """Give what compiled code would mean by a global value."""
     if isinstance(value, float):
         return np.float64(value)
+    if isinstance(value, jit.Inner):
+        return value.py_func
     if isinstance(value, _Intrinsic):
         if value._name.startswith("call_"):
             return _call
@@ -111,6 +119,13 @@ def _rebuilt(function: FunctionType, names: dict[str, Any]) -> Any:
     return FunctionType(code.replace(co_consts=numbers), names, function.__name__, function.__defaults__)
 
 
+def _numpy(value: Any) -> Any:
+    """Give numbers that divide by zero as compiled ones do."""
+    if isinstance(value, tuple):
+        return tuple(_numpy(one) for one in value)
+    return np.float64(value) if isinstance(value, float) else value
+
+
 def _python(value: Any) -> Any:
     """Give what numba returns: Python's own numbers."""
     if isinstance(value, tuple):
@@ -122,7 +137,7 @@ def _entry(function: Callable[..., Any]) -> Callable[..., Any]:
     @wraps(function)
     def call(*arguments: Any) -> Any:
         with np.errstate(all="ignore"):
-            return _python(function(*(np.float64(one) if isinstance(one, float) else one for one in arguments)))
+            return _python(function(*map(_numpy, arguments)))
 
     return call
 
@@ -158,8 +173,11 @@ def install() -> None:
     found = pkgutil.iter_modules(gqm_sym.runtime.__path__, "gqm_sym.runtime.")
     modules = [gqm_sym.runtime, *(importlib.import_module(info.name) for info in found)]
     entries: dict[Any, Any] = {}
+    known = []
     for module in modules:
-        names = {name: _alike(value) for name, value in vars(module).items()}
+        inner = {name: value for name, value in vars(module).items() if isinstance(value, jit.Inner)}
+        names = {name: _alike(value) for name, value in vars(module).items()} | inner
+        known.append(names)
         for value in list(vars(module).values()):
             if (
                 isinstance(value, FunctionType)
@@ -169,11 +187,13 @@ def install() -> None:
                 entries[value] = _entry(_rebuilt(value.__wrapped__, names))
             elif isinstance(value, jit.Inner) and value.py_func.__module__ == module.__name__:
                 value.py_func = _rebuilt(value.py_func, names)
+    for names in known:  # now that all are rebuilt, they call each other directly
+        names |= {name: _alike(value) for name, value in names.items() if isinstance(value, jit.Inner)}
     for module in modules:
         for name, value in list(vars(module).items()):
             if isinstance(value, FunctionType) and value in entries:
                 setattr(module, name, entries[value])
             elif value is jit.compiler:
                 setattr(module, name, _compiler)
-    jit.Inner.__call__ = lambda self, *arguments: self.py_func(*arguments)
+    jit.Inner.__call__ = lambda self, *arguments: _entry(self.py_func)(*arguments)
     numba.carray = _carray
