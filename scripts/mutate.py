@@ -42,7 +42,7 @@ MEASURING = str(Path(coverage.__file__).parent)
 # Tests whose subject is another process, a disk or compilation; and those that would need one.
 LEFT_OUT = (
     *("architecture", "calls", "docs", "errors", "faults", "family_pages", "hostile", "jit", "processes", "starter"),
-    "uncompiled",
+    *("sweeps", "uncompiled"),
 )
 IMPORTS = ("--import-mode=importlib", "--continue-on-collection-errors")
 # Processor time in seconds: that a test may take to be one of the quick ones, that a mutant's tests may take together
