@@ -20,6 +20,7 @@ from collections import Counter, defaultdict
 from collections.abc import Iterator
 from contextlib import contextmanager
 from importlib.machinery import SourceFileLoader
+from itertools import zip_longest
 from pathlib import Path
 from types import FrameType
 from typing import Any
@@ -52,10 +53,10 @@ LEFT_OUT = (
     *("sweeps", "uncompiled"),
 )
 IMPORTS = ("--import-mode=importlib", "--continue-on-collection-errors", "--assert=plain")
-# Processor time in seconds: that a test may take to be one of the quick ones, that a mutant's tests may take together
-# by what they took before, and by how much it may slow them down.
-SLOW, TOGETHER, SLOWER = 2.5, 6.0, 4.0
-MOST_TESTS = 120
+# Processor time in seconds that a test may take to be one of the quick ones, and by how much a mutant may slow it down.
+SLOW, SLOWER = 2.5, 4.0
+# Rounds of tests that a mutant meets until one notices: so long together, by what they took before, and so many.
+ROUNDS = ((6.0, 120), (90.0, 2000))
 
 
 class Slow(BaseException):
@@ -280,18 +281,32 @@ def quiet(tests: list[str], path: Path, tree: ast.Module, seconds: float) -> str
         os._exit(code)
 
 
-def meeting(tests: list[str], taken: dict[str, float]) -> tuple[list[str], float]:
-    """Which of the tests a mutant meets, and how long they take: the quickest of each file first, as they are alike."""
+def users(path: Path, trees: dict[Path, ast.Module]) -> list[str]:
+    """A file, or where it has no functions the files that import it."""
+    if any(isinstance(node, ast.FunctionDef) for node in ast.walk(trees[path])):
+        return [path.relative_to(ROOT).as_posix()]
+    module = ".".join(path.relative_to(ROOT).with_suffix("").parts)
+    told = ((other, node) for other, tree in trees.items() for node in ast.walk(tree))
+    found = {other for other, node in told if isinstance(node, ast.ImportFrom) and node.module == module}
+    return [other.relative_to(ROOT).as_posix() for other in sorted(found)]
+
+
+def meeting(tests: list[str], taken: dict[str, float]) -> Iterator[tuple[list[str], float]]:
+    """The tests of each round, and how long they take: the quickest of each file first, as they are alike."""
     files = defaultdict(list)
     for test in sorted(tests, key=lambda test: taken[test]):
         files[test.split("::")[0]].append(test)
-    chosen, total = [], 0.0
-    for turn in range(max(map(len, files.values()), default=0)):
-        for group in files.values():
-            if turn < len(group) and total + taken[group[turn]] < TOGETHER and len(chosen) < MOST_TESTS:
-                chosen.append(group[turn])
-                total += taken[group[turn]]
-    return chosen, total
+    waiting = [test for turn in zip_longest(*files.values()) for test in turn if test]
+    for together, most in ROUNDS:
+        chosen: list[str] = []
+        total = 0.0
+        for test in waiting:
+            if total + taken[test] < together and len(chosen) < most:
+                chosen.append(test)
+                total += taken[test]
+        waiting = [test for test in waiting if test not in chosen]
+        if chosen:
+            yield chosen, total
 
 
 def main(count: int, seed: int) -> int:
@@ -308,14 +323,18 @@ def main(count: int, seed: int) -> int:
         name = path.relative_to(ROOT).as_posix()
         tests = lines[name][str(node.lineno)]
         if not tests:  # run as the module loads: a table, a limit
-            tests = sorted({test for line in lines[name].values() for test in line})
-        chosen, total = meeting(tests, taken)
-        what = quiet(chosen, path, tree, 10.0 + SLOWER * total) if chosen else "unseen"
+            tests = sorted({test for user in users(path, trees) for line in lines[user].values() for test in line})
+        what, met = "unseen", 0
+        for chosen, total in meeting(tests, taken):
+            met += len(chosen)
+            what = quiet(chosen, path, tree, 10.0 + SLOWER * total)
+            if what != "lives":
+                break
         counts[what] += 1
         print(".", end="", flush=True)
         if what in ("lives", "unseen"):
             print(
-                f"{what}: {name}:{node.lineno}: {before}  ->  {after}  ({len(chosen)} of {len(tests)} tests)",
+                f"{what}: {name}:{node.lineno}: {before}  ->  {after}  ({met} of {len(tests)} tests)",
                 flush=True,
             )
     print(f"{count} mutants: {dict(counts)}")

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from fractions import Fraction
 from types import ModuleType
 
 import numpy as np
@@ -113,6 +114,32 @@ def test_two_places_at_one_joint() -> None:
         beside = np.nextafter(edge, 0.0)
         slope = functions.chart_z1(chart.block, beside, edge, 0.1 * (edge - beside))
         assert abs(slope - np.sin(edge / RADIUS)) <= 1e-14
+
+
+@pytest.mark.parametrize("size", [1e-3, 1e-6, 1e-9])
+def test_differences_of_the_angle_where_a_line_becomes_an_arc(size: float) -> None:
+    """Its curvature jumps at one joint; at those along the arc the fits differ by rounding, which counts as nothing."""
+    edges = np.array([0.0, 1.1, 1.9, 3.0, 3.7, 4.6, 5.3, 6.9, 7.2])
+    s = edges[:-1, None] + 0.5 * np.diff(edges)[:, None] * (1.0 + NODES)
+    turned = np.maximum(edges[:-1] - 3.0, 0.0) / RADIUS
+    straight = np.minimum(edges[:-1], 3.0)
+    chart = assemble(
+        edges=edges,
+        anchors=np.stack([straight + RADIUS * np.sin(turned), RADIUS * (1.0 - np.cos(turned))], axis=1),
+        angles=np.maximum(s - 3.0, 0.0) / RADIUS,
+        curvatures=np.where(s > 3.0, 1.0 / RADIUS, 0.0),
+    )
+    for joint in edges[1:-1]:
+        for shares in ((-0.7, -0.2, 0.9), (-0.6, 0.3, 0.8)):
+            a, b, c = (float(joint) + size * share for share in shares)
+            first, second = (
+                (max(Fraction(v) - 3, 0) - max(Fraction(u) - 3, 0)) / (Fraction(v) - Fraction(u))
+                for u, v in ((a, b), (b, c))
+            )
+            truth = float((second - first) / (Fraction(c) - Fraction(a))) / RADIUS
+            found = functions.chart_alpha2(chart.block, a, b, c, b - a, c - b)
+            # At the jump the distances from the joint count, and they are known to an ulp of the place.
+            assert abs(found - truth) <= 4e-13 + truth * 4 * ULP / size
 
 
 def test_bounds_enclose() -> None:
