@@ -132,6 +132,26 @@ def test_times_that_cannot_be_are_refused_as_before(module_of: ModuleOf) -> None
         motion.state(5.5)
 
 
+@pytest.mark.parametrize("launch", [{"lam0": 1.0}, {"lam0": 0.3, "v0": 9.0}, {"lam0": 0.3, "v0": 9.0, "direction": -1}])
+def test_arc_length_on_a_circle(launch: dict[str, Any], module_of: ModuleOf) -> None:
+    """From the launch on, radius times angle; backwards in time too."""
+    motion = module_of("circle").solve(**launch, L=2)
+    state = motion.state(np.array([-3.3, -0.1, 0.0, 0.2, 1.0, 7.7, 100.3]))
+    assert state.s == pytest.approx(2.0 * (state.lam - launch["lam0"]), rel=1e-14, abs=1e-14)
+
+
+def test_events_of_later_periods(module_of: ModuleOf) -> None:
+    """A swing turns each half period, a lap is at the lowest point once; between late times as between early ones."""
+    swing = module_of("circle").solve(1.0, L=2)
+    half = swing.half_period
+    for first in (-7, 1, 40):
+        turns = [
+            event for event in swing.events_between((first - 0.3) * half, (first + 4.3) * half) if event.kind == "turn"
+        ]
+        assert [event.t for event in turns] == pytest.approx([(first + k) * half for k in range(5)], rel=1e-14)
+        assert [event.lam for event in turns] == pytest.approx([(-1.0) ** (first + k) for k in range(5)], rel=1e-15)
+
+
 def series(motion: Any, there_and_back: bool) -> tuple[np.ndarray, np.ndarray]:
     """The coefficients of a motion's series."""
     stretch = motion._stretch
