@@ -5,7 +5,7 @@ VENV    := .venv
 BIN     := $(VENV)/bin
 
 # Tests whose subject is compilation, another process or the disk: the others run uncompiled for `coverage`.
-COMPILED := $(patsubst %,tests/test_%.py,architecture calls docs errors faults family_pages hostile jit processes starter uncompiled)
+COMPILED := $(patsubst %,tests/test_%.py,architecture calls docs errors faults family_pages hostile jit processes starter sweeps uncompiled)
 
 .DEFAULT_GOAL := help
 .PHONY: help demo test lint generate docs soak fuzz bench coverage mutate

@@ -20,6 +20,7 @@ from collections import Counter, defaultdict
 from collections.abc import Iterator
 from contextlib import contextmanager
 from importlib.machinery import SourceFileLoader
+from itertools import zip_longest
 from pathlib import Path
 from types import FrameType
 from typing import Any
@@ -30,11 +31,18 @@ sys.path[:0] = [str(ROOT), str(ROOT / "tests")]
 
 # Imported once, for all mutants; none of them imports the package.
 import coverage  # noqa: E402
+import hypothesis  # noqa: E402, F401
+import jinja2  # noqa: E402, F401
 import mpmath  # noqa: E402, F401
-import numba  # noqa: E402, F401
+import numba.core.ccallback  # noqa: E402, F401
+import pint  # noqa: E402, F401
+import pydantic  # noqa: E402, F401
 import pytest  # noqa: E402
+import ruamel.yaml  # noqa: E402, F401
 import scipy.integrate  # noqa: E402, F401
 import sympy  # noqa: E402, F401
+import xarray  # noqa: E402, F401
+import zarr  # noqa: E402, F401
 
 FOLDERS = ("gqm_sym/derivation", "gqm_sym/runtime")
 WORK = ROOT / ".mutants"
@@ -42,12 +50,13 @@ MEASURING = str(Path(coverage.__file__).parent)
 # Tests whose subject is another process, a disk or compilation; and those that would need one.
 LEFT_OUT = (
     *("architecture", "calls", "docs", "errors", "faults", "family_pages", "hostile", "jit", "processes", "starter"),
-    "uncompiled",
+    *("sweeps", "uncompiled"),
 )
-IMPORTS = ("--import-mode=importlib", "--continue-on-collection-errors")
-# Processor time in seconds: that a test may take to be one of the quick ones, that a mutant's tests may take together
-# by what they took before, and by how much it may slow them down.
-SLOW, TOGETHER, SLOWER = 2.5, 10.0, 4.0
+IMPORTS = ("--import-mode=importlib", "--continue-on-collection-errors", "--assert=plain")
+# Processor time in seconds that a test may take to be one of the quick ones, and by how much a mutant may slow it down.
+SLOW, SLOWER = 2.5, 4.0
+# Rounds of tests that a mutant meets until one notices: so long together, by what they took before, and so many.
+ROUNDS = ((6.0, 120), (90.0, 2000))
 
 
 class Slow(BaseException):
@@ -272,6 +281,34 @@ def quiet(tests: list[str], path: Path, tree: ast.Module, seconds: float) -> str
         os._exit(code)
 
 
+def users(path: Path, trees: dict[Path, ast.Module]) -> list[str]:
+    """A file, or where it has no functions the files that import it."""
+    if any(isinstance(node, ast.FunctionDef) for node in ast.walk(trees[path])):
+        return [path.relative_to(ROOT).as_posix()]
+    module = ".".join(path.relative_to(ROOT).with_suffix("").parts)
+    told = ((other, node) for other, tree in trees.items() for node in ast.walk(tree))
+    found = {other for other, node in told if isinstance(node, ast.ImportFrom) and node.module == module}
+    return [other.relative_to(ROOT).as_posix() for other in sorted(found)]
+
+
+def meeting(tests: list[str], taken: dict[str, float]) -> Iterator[tuple[list[str], float]]:
+    """The tests of each round, and how long they take: the quickest of each file first, as they are alike."""
+    files = defaultdict(list)
+    for test in sorted(tests, key=lambda test: taken[test]):
+        files[test.split("::")[0]].append(test)
+    waiting = [test for turn in zip_longest(*files.values()) for test in turn if test]
+    for together, most in ROUNDS:
+        chosen: list[str] = []
+        total = 0.0
+        for test in waiting:
+            if total + taken[test] < together and len(chosen) < most:
+                chosen.append(test)
+                total += taken[test]
+        waiting = [test for test in waiting if test not in chosen]
+        if chosen:
+            yield chosen, total
+
+
 def main(count: int, seed: int) -> int:
     """Run mutants, and print those that no test notices."""
     taken, lines = known_tests()
@@ -286,23 +323,18 @@ def main(count: int, seed: int) -> int:
         name = path.relative_to(ROOT).as_posix()
         tests = lines[name][str(node.lineno)]
         if not tests:  # run as the module loads: a table, a limit
-            tests = sorted({test for line in lines[name].values() for test in line})
-        # The quickest of each file first: a file's tests are alike.
-        files = defaultdict(list)
-        for test in sorted(tests, key=lambda test: taken[test]):
-            files[test.split("::")[0]].append(test)
-        chosen, total = [], 0.0
-        for turn in range(max(map(len, files.values()), default=0)):
-            for group in files.values():
-                if turn < len(group) and total + taken[group[turn]] < TOGETHER:
-                    chosen.append(group[turn])
-                    total += taken[group[turn]]
-        what = quiet(chosen[:200], path, tree, 10.0 + SLOWER * total) if chosen else "unseen"
+            tests = sorted({test for user in users(path, trees) for line in lines[user].values() for test in line})
+        what, met = "unseen", 0
+        for chosen, total in meeting(tests, taken):
+            met += len(chosen)
+            what = quiet(chosen, path, tree, 10.0 + SLOWER * total)
+            if what != "lives":
+                break
         counts[what] += 1
         print(".", end="", flush=True)
         if what in ("lives", "unseen"):
             print(
-                f"{what}: {name}:{node.lineno}: {before}  ->  {after}  ({len(chosen)} of {len(tests)} tests)",
+                f"{what}: {name}:{node.lineno}: {before}  ->  {after}  ({met} of {len(tests)} tests)",
                 flush=True,
             )
     print(f"{count} mutants: {dict(counts)}")

@@ -100,9 +100,32 @@ def test_barriers_are_not_jumped(tmp_path: Path) -> None:
         assert (left > 0).all()
 
 
+@pytest.mark.parametrize("strength", [1e-8, 1e8])
+def test_units_decide_nothing(strength: float, module_of: ModuleOf) -> None:
+    """Under another gravity the same swings are answered and the same are left, those next to the top."""
+    lam0 = np.linspace(0.1, np.pi - 0.01, 40)
+    one, other = (
+        answered(module_of("circle"), lam0, 0.0, 1, [1.0, g, 1.0], CIRCLE, timed=True) for g in (1.0, strength)
+    )
+    assert set(one[1]) == {swift.DONE, swift.HARD}
+    assert (other[1] == one[1]).all()
+    assert other[0][:, 0] * np.sqrt(strength) == pytest.approx(one[0][:, 0], rel=2e-15, nan_ok=True)
+
+
 def test_what_cannot_be_proved_is_left(module_of: ModuleOf) -> None:
     """Launches at the top, next to it, and what is not a number."""
     lam0 = [np.pi, np.pi - 1e-9, np.nan, 0.3]
     out, reasons = answered(module_of("circle"), lam0, 0.0, 1, [1.0, 9.81, 1.0], CIRCLE, timed=True)
     assert list(reasons) == [swift.HARD, swift.HARD, swift.HARD, swift.DONE]
     assert np.isnan(out[:3, 0]).all()
+
+
+def test_released_beside_the_top(module_of: ModuleOf) -> None:
+    """It swings nearly all the way round and back, and does not go round."""
+    beside = 10.0 ** -np.arange(1.0, 13.0)
+    swept = module_of("circle").sweep("half_period", np.pi - beside, L=1)
+    with mp.workdps(40):
+        for lam0, value in zip(np.pi - beside, swept.values, strict=True):
+            k = mp.sin(mpf(float(lam0)) / 2)
+            truth = 2 * mp.ellipk(k * k) / mp.sqrt(mpf("9.81"))
+            assert abs(mpf(float(value)) - truth) <= ULPS * np.spacing(float(truth))

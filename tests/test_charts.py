@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from fractions import Fraction
 from types import ModuleType
 
 import numpy as np
@@ -113,6 +114,38 @@ def test_two_places_at_one_joint() -> None:
         beside = np.nextafter(edge, 0.0)
         slope = functions.chart_z1(chart.block, beside, edge, 0.1 * (edge - beside))
         assert abs(slope - np.sin(edge / RADIUS)) <= 1e-14
+
+
+@pytest.mark.parametrize("size", [1e-3, 1e-6, 1e-9])
+def test_differences_of_the_angle_across_joints(size: float) -> None:
+    """Where the curvature jumps, and where it does not: what the fits of neighbours differ by is rounding, and no jump.
+
+    A line becomes a clothoid, that winds up, unwinds and becomes a line again, which becomes an arc.
+    """
+    edges = np.array([0.0, 0.4, 1.1, 1.9, 2.2, 3.0, 4.6, 5.25, 7.5, 8.3, 9.0, 9.9, 10.5])
+    s = edges[:-1, None] + 0.5 * np.diff(edges)[:, None] * (1.0 + NODES)
+    jump = 9.0
+
+    def angle(s: Fraction) -> Fraction:
+        """The integral of the curvature."""
+        winding = sum(times * max(s - Fraction(at), Fraction(0)) ** 2 for times, at in ((1, 3.0), (-2, 5.25), (1, 7.5)))
+        return Fraction(0.3) * winding / 2 + Fraction(0.7) * max(s - Fraction(jump), Fraction(0))
+
+    chart = assemble(
+        edges=edges,
+        anchors=np.zeros((edges.size - 1, 2)),
+        angles=[[float(angle(Fraction(place))) for place in row] for row in s],
+        curvatures=0.3 * np.maximum(2.25 - np.abs(s - 5.25), 0.0) + np.where(s > jump, 0.7, 0.0),
+    )
+    for joint in edges[1:-1]:
+        for shares in ((-0.7, -0.2, 0.9), (-0.6, 0.3, 0.8)):
+            a, b, c = (float(joint) + size * share for share in shares)
+            u, v, w = map(Fraction, (a, b, c))
+            truth = float(((angle(w) - angle(v)) / (w - v) - (angle(v) - angle(u)) / (v - u)) / (w - u))
+            found = functions.chart_alpha2(chart.block, a, b, c, b - a, c - b)
+            # It is a derivative of the fit, which costs short pieces five digits; and the distances from the joint
+            # count, which are known to an ulp of the place.
+            assert abs(found - truth) <= 2e-11 + abs(truth) * 8 * ULP / size
 
 
 def test_bounds_enclose() -> None:

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable
+from fractions import Fraction
 from itertools import pairwise
 from types import ModuleType
 from typing import Any
@@ -318,3 +319,11 @@ def test_a_fall_towards_a_pole(brink: ModuleType) -> None:
         motion = brink.solve("1/2")
         assert motion.kind == "transit"
         assert off(motion.time_at("0.1"), truth) <= TIME * float(truth)
+
+
+def test_the_launch_is_the_number_given_and_not_its_double(passage: Callable[..., Any]) -> None:
+    """Beside 1/10, which no double is, places are reached when they are that far from it."""
+    motion = passage("level", lam0="1/10", v0=4, direction=1)
+    for steps in (1, 3, 1000):
+        place = 0.1 + steps * 2.0**-54
+        assert motion.time_at(place) == pytest.approx(float((Fraction(place) - Fraction(1, 10)) / 4), abs=5e-19)

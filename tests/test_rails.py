@@ -145,6 +145,11 @@ def test_a_stadium(tmp_path: Path) -> None:
     """Two lines and two half circles, closed and upright: the time of a round, plane by plane and by quadrature."""
     pieces = [gqm.line(length=3), gqm.arc(radius=1, angle="pi")] * 2
     module = built(tmp_path, "stadium", pieces, closed=True)
+    joints = [0.0, 3.0, 3.0 + math.pi, 6.0 + math.pi]  # at the start too the curvature jumps
+    chart = chart_of(module)
+    assert chart.breaks == pytest.approx(joints, abs=8 * ULP)
+    one, two = chart.points([0.5, 0.5 + chart.high])[2]
+    assert two - one == pytest.approx(2.0 * math.pi, rel=4 * ULP)
     motion = module.solve(lam0=1.0, v0=8.0)
     with mp.workdps(30):
         top = mp.sqrt(64 - 4 * mpf("9.81"))

@@ -181,6 +181,17 @@ def test_closed_planes(tmp_path: Path) -> None:
     assert abs(motion.period - total) <= 8 * ULP * total
 
 
+@pytest.mark.parametrize(("start", "corners"), [((), [2.0, 4.0, 6.0]), (((0.0, -1.0),), [1.0, 3.0, 5.0, 7.0])])
+def test_a_square_turns_once(start: tuple[tuple[float, float], ...], corners: list[float]) -> None:
+    """At its corners, the first point one or on a side; after each lap its angle is 2 pi larger."""
+    ring = [(1.0, -1.0), (1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0)]
+    chart = charted(np.array([*start, *ring]), "linear", closed=True)
+    assert chart.corners[chart.corners > 0.0].tolist() == corners
+    assert (0.0 in chart.corners) == (not start)
+    one, two = chart.points([0.5, 8.5])[2]
+    assert two - one == pytest.approx(2 * np.pi, rel=4 * ULP)
+
+
 def test_closing_is_seen() -> None:
     """A first point repeated at the end closes the track, unless it is said not to."""
     points = ellipse(40)

@@ -7,11 +7,12 @@ from typing import Any
 import numpy as np
 import pytest
 from mpmath import mp, mpf
+from numpy.polynomial.chebyshev import chebval
 
 from gqm_sym.errors import InputError
 from gqm_sym.runtime import threads
 from gqm_sym.runtime.motion import Motion
-from gqm_sym.runtime.waves import fit_wave
+from gqm_sym.runtime.waves import fit_wave, sum_up
 
 ModuleOf = Callable[[str], ModuleType]
 
@@ -19,6 +20,8 @@ ModuleOf = Callable[[str], ModuleType]
 PLACE = 5e-16
 # Of the swing, next to the separatrix, where the panels' own noise grows: measured 1.6e-15.
 STEEP = 2.5e-15
+# Coefficients, of the swing or the lap: rounding of the nodes.
+SERIES = 4e-16
 # The compiled loop and the reading of exact times differ by the rounding of both.
 AGREE = 1.5e-15
 
@@ -129,13 +132,71 @@ def test_times_that_cannot_be_are_refused_as_before(module_of: ModuleOf) -> None
         motion.state(5.5)
 
 
+@pytest.mark.parametrize("launch", [{"lam0": 1.0}, {"lam0": 0.3, "v0": 9.0}, {"lam0": 0.3, "v0": 9.0, "direction": -1}])
+def test_arc_length_on_a_circle(launch: dict[str, Any], module_of: ModuleOf) -> None:
+    """From the launch on, radius times angle; backwards in time too."""
+    motion = module_of("circle").solve(**launch, L=2)
+    state = motion.state(np.array([-3.3, -0.1, 0.0, 0.2, 1.0, 7.7, 100.3]))
+    assert state.s == pytest.approx(2.0 * (state.lam - launch["lam0"]), rel=1e-14, abs=1e-14)
+
+
+def test_events_of_later_periods(module_of: ModuleOf) -> None:
+    """A swing turns each half period, a lap is at the lowest point once; between late times as between early ones."""
+    swing = module_of("circle").solve(1.0, L=2)
+    half = swing.half_period
+    for first in (-7, 1, 40):
+        turns = [
+            event for event in swing.events_between((first - 0.3) * half, (first + 4.3) * half) if event.kind == "turn"
+        ]
+        assert [event.t for event in turns] == pytest.approx([(first + k) * half for k in range(5)], rel=1e-14)
+        assert [event.lam for event in turns] == pytest.approx([(-1.0) ** (first + k) for k in range(5)], rel=1e-15)
+
+
+def series(motion: Any, there_and_back: bool) -> tuple[np.ndarray, np.ndarray]:
+    """The coefficients of a motion's series."""
+    stretch = motion._stretch
+    return fit_wave(stretch.edges, *stretch.clock, stretch.panels[3], there_and_back)
+
+
+@pytest.mark.parametrize("amplitude", [0.1, 1.2, 2.9])
+def test_the_series_of_a_swing(amplitude: float, module_of: ModuleOf) -> None:
+    """Fourier's of 2 asin(k sn u), by the nome (DLMF 22.11)."""
+    cosines, sines = series(module_of("circle").solve(amplitude, L=1), True)
+    assert sines.size == 0
+    k, n = mp.sin(mpf(amplitude) / 2), np.arange(cosines.size)
+    q = float(mp.qfrom(k=k))
+    truth = np.sin(0.5 * np.pi * n) * 8.0 * q ** (0.5 * n) / (np.maximum(n, 1) * (1.0 + q**n)) / amplitude
+    assert np.abs(cosines - truth).max() <= SERIES
+    assert cosines.sum() == pytest.approx(1.0, abs=4 * SERIES)
+
+
+@pytest.mark.parametrize("v0", [7.0, 12.0])
+def test_the_series_of_a_lap(v0: float, module_of: ModuleOf) -> None:
+    """Fourier's of the amplitude function, less its mean pace."""
+    cosines, sines = series(module_of("circle").solve(0.0, v0, L=1), False)
+    q, n = float(mp.qfrom(k=2 * mp.sqrt(mpf("9.81")) / mpf(v0))), np.arange(cosines.size)
+    assert np.abs(cosines).max() <= SERIES
+    truth = 2.0 * q**n / (np.pi * np.maximum(n, 1) * (1.0 + q ** (2 * n))) * (n > 0)
+    assert np.abs(sines - truth).max() <= SERIES
+    assert sines.size > 5
+
+
+@pytest.mark.parametrize("count", [1, 2, 3, 4, 9])
+def test_sums_of_cosines(count: int) -> None:
+    """Of an odd and an even number of terms: sum of c_k cos(k phi), as numpy has it."""
+    c = np.random.default_rng(count).normal(size=count)
+    x = np.cos(np.linspace(0.0, np.pi, 7))
+    high, low = np.empty(7), np.empty(7)
+    sum_up(c, x, 7, high, low)
+    assert high - x * low == pytest.approx(chebval(x, c), rel=1e-14, abs=1e-14)
+
+
 def test_series_are_as_long_as_they_must_be(module_of: ModuleOf) -> None:
     """The tautochrone's is one cosine, a swing takes a few, and next to the separatrix there is none."""
 
     def terms(lam0: float) -> int:
-        stretch = module_of("circle").solve(lam0, L=1)._stretch
-        return len(fit_wave(stretch.edges, *stretch.clock, stretch.panels[3], True)[0])
+        return len(series(module_of("circle").solve(lam0, L=1), True)[0])
 
-    assert terms(1e-4) <= 10
-    assert terms(1.2) <= 24
+    assert 0 < terms(1e-4) <= 10
+    assert 0 < terms(1.2) <= 24
     assert terms(3.14159) == 0

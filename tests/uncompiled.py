@@ -142,26 +142,28 @@ def _entry(function: Callable[..., Any]) -> Callable[..., Any]:
     return call
 
 
-def _compiler(file: str, *, interface: int) -> Callable[..., Callable[[Any], Any]]:
+def _callback(kind: Any, **_: Any) -> Callable[[Any], Any]:
+    """Stand in for `numba.cfunc`: the function with an address, by which C can call it as well."""
+    kinds = [_C.get(one, ctypes.POINTER(ctypes.c_double)) for one in kind.args]
+
+    def decorate(function: Any) -> Any:
+        names = {name: _alike(value) for name, value in function.__globals__.items()}
+        plain = _rebuilt(function, names)
+        _KEPT.append(ctypes.CFUNCTYPE(None, *kinds)(_entry(plain)))
+        address = ctypes.cast(_KEPT[-1], ctypes.c_void_p).value
+        assert address is not None
+        _FUNCTIONS[address] = plain
+        return SimpleNamespace(address=address)
+
+    return decorate
+
+
+def _compiler(file: str, *, interface: int) -> Callable[[Any], Callable[[Any], Any]]:
     """Stand in for `jit.compiler`."""
     if interface != INTERFACE:
         return COMPILER(file, interface=interface)
 
-    def compiled(kind: Any, *, later: bool = False) -> Callable[[Any], Any]:
-        kinds = [_C.get(one, ctypes.POINTER(ctypes.c_double)) for one in kind.args]
-
-        def decorate(function: Any) -> Any:
-            names = {name: _alike(value) for name, value in function.__globals__.items()}
-            plain = _rebuilt(function, names)
-            _KEPT.append(ctypes.CFUNCTYPE(None, *kinds)(_entry(plain)))
-            address = ctypes.cast(_KEPT[-1], ctypes.c_void_p).value
-            assert address is not None
-            _FUNCTIONS[address] = plain
-            return SimpleNamespace(address=address)
-
-        return decorate
-
-    return compiled
+    return _callback
 
 
 INTERFACE, COMPILER = interface.INTERFACE, jit.compiler
@@ -196,4 +198,4 @@ def install() -> None:
             elif value is jit.compiler:
                 setattr(module, name, _compiler)
     jit.Inner.__call__ = lambda self, *arguments: _entry(self.py_func)(*arguments)
-    numba.carray = _carray
+    numba.carray, numba.cfunc = _carray, _callback

@@ -213,11 +213,9 @@ class Model:
     def _latex_names(self) -> dict[sp.Symbol, str]:
         lam = sp.latex(self.parameter)
         # A parameter that carries an index already keeps it: λ_{1} becomes λ_{1,0}.
-        indexed = f"{lam[:-1]},%d}}" if lam.endswith("}") and "_{" in lam else f"{lam}_{{%d}}"
+        launch = f"{lam[:-1]},0}}" if lam.endswith("}") and "_{" in lam else f"{lam}_{{0}}"
         return {
-            self.lam0: indexed % 0,
-            LAM1: indexed % 1,
-            LAM2: indexed % 2,
+            self.lam0: launch,
             self.v0: "V_{0}",
             DIRECTION: r"\left(\operatorname{sgn} V\right)",
             CONTACT_SIGN: r"\left(\operatorname{sgn} N\right)",

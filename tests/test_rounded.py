@@ -1,0 +1,77 @@
+"""Curves that are not smooth are known by doubles only: what is decided next to an equilibrium, to rounding."""
+
+from math import asinh, sqrt
+from types import ModuleType
+
+import numpy as np
+import pytest
+
+import gqm_sym as gqm
+
+# z = -3 x**2/4 right of the hilltop and -x**2/4 left of it: the curvature jumps at the equilibrium. Launched from 0.8.
+X0, Z0, G = 0.8, -0.48, 9.81
+# What rounding of the speed leaves of a place and a time near the top.
+PLACE = 2e-8
+
+
+@pytest.fixture(scope="module")
+def hill(tmp_path_factory: pytest.TempPathFactory) -> ModuleType:
+    """The broken hill under gravity."""
+    track = gqm.Curve.implicit("z + x**2/2 + x*abs(x)/4", start=("4/5", "-12/25"))
+    return gqm.build(gqm.derive(track, gqm.Gravity()), name="broken_hill", folder=tmp_path_factory.mktemp("broken"))
+
+
+def way(x: float) -> float:
+    """Arc length from x to the top: of a parabola, in closed form."""
+    u = 1.5 * x
+    return (u * sqrt(1 + u * u) + asinh(u)) / 3.0
+
+
+def time_to(x: float) -> float:
+    """The time from 0.8 to x with V**2 = 3 g x**2/2: in closed form."""
+    one, two = (sqrt(1 + u * u) - asinh(1 / u) for u in (1.5 * X0, 1.5 * x))
+    return (one - two) / sqrt(1.5 * G)
+
+
+@pytest.mark.parametrize("off", [0.0, 1e-15, -1e-15])
+def test_the_speed_that_just_reaches_the_top(hill: ModuleType, off: float) -> None:
+    """It gets there, to rounding, after any time; where it is so late, doubles cannot tell."""
+    motion = hill.solve(0, sqrt(-2 * G * Z0) * (1 + off))
+    assert motion.kind == "asymptotic"
+    assert motion.t_end == np.inf
+    for t in (0.5, 1.0, 2.0, 3.0):
+        assert time_to(motion.state(t).x) == pytest.approx(t, rel=PLACE)
+    with pytest.raises(gqm.GQMError, match="closer to the equilibrium"):
+        motion.lam(1e3)
+
+
+@pytest.mark.parametrize("short", [1e-4, 1e-6, 1e-9, 1e-12])
+def test_a_little_slower_it_turns(hill: ModuleType, short: float) -> None:
+    """Where the height is spent: V0**2 = 2 g (z - z0) on the parabola."""
+    motion = hill.solve(0, sqrt(-2 * G * Z0) * (1 - short))
+    assert motion.kind == "transit"
+    x = sqrt(-Z0 * short * (2 - short) / 0.75)
+    (turn,) = motion.turning_points
+    assert turn == pytest.approx(way(X0) - way(x), rel=1e-12, abs=1e-14 / sqrt(short))
+
+
+@pytest.mark.parametrize("more", [1e-4, 1e-6, 1e-9])
+def test_a_little_faster_it_passes(hill: ModuleType, more: float) -> None:
+    """Over the top, down the other side."""
+    motion = hill.solve(0, sqrt(-2 * G * Z0) * (1 + more))
+    assert motion.kind == "transit"
+    assert motion.turning_points == ()
+    over = motion.time_at(2 * way(X0))
+    assert motion.state(over).x < 0.0
+    assert motion.state(over).v ** 2 == pytest.approx(
+        -2 * G * (motion.state(over).z + Z0 * more * (2 + more)), rel=1e-9
+    )
+
+
+def test_released_on_top_it_rests(hill: ModuleType) -> None:
+    """Where it is level to rounding; beside it, it falls, to the side that it is on."""
+    assert hill.solve(way(X0)).kind == "rest"
+    for side in (1, -1):
+        motion = hill.solve(way(X0) - side * 1e-3)
+        assert motion.kind == "transit"
+        assert side * motion.state(0.3).x > 1e-3
