@@ -167,6 +167,10 @@ def test_nearest_point() -> None:
     s, distance = Ring().chart((RADIUS,)).nearest(0.5, -0.9)
     assert abs(s - RADIUS * np.arctan2(0.5, 0.9)) <= 4 * ULP
     assert abs(distance - (RADIUS - np.hypot(0.5, 0.9))) <= 4 * ULP
+    flat = np.zeros((2, NODES.size))
+    line = assemble(edges=[0.0, 1.0, 2.0], anchors=[[0.0, 0.0], [1.0, 0.0]], angles=flat, curvatures=flat)
+    for x, end in ((-1.0, 0.0), (3.0, 2.0)):  # beyond an end that is the nearest
+        assert line.nearest(x, 1.0) == pytest.approx((end, np.sqrt(2.0)), rel=4 * ULP)
 
 
 def test_resolution_is_seen() -> None:
