@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable
+from pathlib import Path
 from types import ModuleType
 from typing import Any
 
@@ -200,3 +201,13 @@ def test_a_cusp_stops_the_walk(start: float, cusp: float, direction: int, module
     assert what == CUSP
     assert (near - cusp) * direction <= 4e-15
     assert abs(far - cusp) <= 1e-14
+
+
+@pytest.mark.parametrize("middle", [-2, 2])
+def test_a_valley_in_a_domain_on_one_side_of_zero(middle: int, tmp_path: Path) -> None:
+    """First steps are shares of the domain's length, wherever it lies."""
+    curve = gqm.Curve.graph(f"(x - {middle})**2", parameter="x", domain=(middle - 1, middle + 1))
+    valley = gqm.build(gqm.derive(curve, gqm.Gravity()), name="valley_aside", folder=tmp_path)
+    motion = valley.solve(middle + 0.5, 0.0)
+    assert motion.kind == "libration"
+    assert sorted(motion.turning_points) == [middle - 0.5, middle + 0.5]
