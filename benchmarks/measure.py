@@ -1,6 +1,7 @@
 """What a benchmark row is, how it is timed, and how its error is measured."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from math import inf
 from statistics import median
@@ -9,6 +10,8 @@ from typing import Any
 
 import numpy as np
 from mpmath import mpf
+
+from gqm_sym.runtime import threads
 
 Work = Callable[[], Any]
 
@@ -73,3 +76,35 @@ def readable(seconds: float) -> str:
         if seconds >= size:
             return f"{seconds / size:.3g} {unit}"
     return f"{seconds / 1e-9:.3g} ns"
+
+
+@contextmanager
+def one_core() -> Iterator[None]:
+    """Keep compiled loops on one core."""
+    kept = threads.cores
+    threads.cores = lambda: 1
+    try:
+        yield
+    finally:
+        threads.cores = kept
+
+
+def on_one_core(call: Work) -> Work:
+    """Give the same work, done on one core."""
+
+    def limited() -> Any:
+        with one_core():
+            return call()
+
+    return limited
+
+
+def repeated(call: Work, count: int) -> Work:
+    """Give the same work, done some times over."""
+
+    def many() -> Any:
+        for _ in range(count - 1):
+            call()
+        return call()
+
+    return many

@@ -1,12 +1,13 @@
 """Rows of other programs that not every machine can install; the page says which are absent."""
 
 import importlib
+import importlib.util
 from collections.abc import Callable
-from math import cos, pi, sin, sqrt
+from math import copysign, cos, pi, sin, sqrt
 from typing import Any
 
 import numpy as np
-from measure import Row
+from measure import Row, repeated
 from numpy.typing import NDArray
 
 PEERS = ("heyoka", "quadax", "numbalsoda")
@@ -19,7 +20,7 @@ Error = Callable[[Any], float]
 Amplitudes = NDArray[np.float64]
 
 
-def heyoka(work: str, amplitudes: Amplitudes, error: Error) -> list[Row]:
+def heyoka_half_periods(work: str, amplitudes: Amplitudes, error: Error) -> list[Row]:
     """Give its compiled function of our formula, and its integrator on Legendre's form, both in batches."""
     hy = importlib.import_module("heyoka")
     a, tau = hy.make_vars("a"), hy.make_vars("tau")
@@ -58,7 +59,7 @@ def heyoka(work: str, amplitudes: Amplitudes, error: Error) -> list[Row]:
     ]
 
 
-def quadax(work: str, amplitudes: Amplitudes, error: Error) -> list[Row]:
+def quadax_half_periods(work: str, amplitudes: Amplitudes, error: Error) -> list[Row]:
     """Give its Gauss-Kronrod rule on Legendre's form, mapped over orbits and compiled by JAX."""
     jax = importlib.import_module("jax")
     jax.config.update("jax_enable_x64", True)
@@ -73,15 +74,85 @@ def quadax(work: str, amplitudes: Amplitudes, error: Error) -> list[Row]:
     return [Row(work, who, lambda: np.asarray(many(k2)), error, each=FEW, repeats=3, unit="ulp")]
 
 
-def rows_of_peers(work: str, amplitudes: Amplitudes, error: Error) -> list[Row]:
+def half_periods(work: str, amplitudes: Amplitudes, error: Error) -> list[Row]:
     """Give the rows of the peers that are installed."""
-    out = []
-    for peer in (heyoka, quadax):
-        try:
-            out += peer(work, amplitudes, error)
-        except ImportError:
-            continue
-    return out
+    rows = heyoka_half_periods(work, amplitudes, error) if has("heyoka") else []
+    return rows + (quadax_half_periods(work, amplitudes, error) if has("quadax") else [])
+
+
+def swing(lam0: float) -> Any:
+    """Give heyoka's integrator of the pendulum, its angle from the horizontal."""
+    hy = importlib.import_module("heyoka")
+    u, w = hy.make_vars("u", "w")
+    return hy.taylor_adaptive([(u, w), (w, -9.81 * hy.cos(u))], state=[lam0, 0.0], tol=np.finfo(float).eps)
+
+
+def sampling(work: str, lam0: float, t: Any, error: Error) -> list[Row]:
+    """Give heyoka's continuous output at random times, the integration apart."""
+    if not has("heyoka"):
+        return []
+    out = swing(lam0).propagate_until(float(t.max()), c_output=True)[4]
+    who = "heyoka's continuous output (integration apart)"
+    return [Row(work, who, lambda: out(t)[:, 0].copy(), error, each=t.size, repeats=5, unit="of scale")]
+
+
+def far(work: str, lam0: float, t: float, error: Error) -> list[Row]:
+    """Give heyoka's way to a late state: step by step."""
+    if not has("heyoka"):
+        return []
+    body = swing(lam0)
+
+    def integrated() -> list[float]:
+        body.time, body.state[:] = 0.0, (lam0, 0.0)
+        body.propagate_until(t)
+        return [body.state[0]]
+
+    return [Row(work, "heyoka's integrator", integrated, error, repeats=1, unit="of scale")]
+
+
+def example2(work: str, error: Error) -> list[Row]:
+    """Give heyoka's integrator with events: where the contact force changes sign, and where the body turns."""
+    if not has("heyoka"):
+        return []
+    hy = importlib.import_module("heyoka")
+    x, v = hy.make_vars("x", "v")
+    ds = hy.sqrt(1.0 + 9.0 * x**4)
+    load = 9.81 / ds + 6.0 * x / ds**3 * v**2
+
+    def turned_over(body: Any, _: int) -> bool:
+        body.pars[0] = -body.pars[0]
+        return True
+
+    body = hy.taylor_adaptive(
+        [(x, v / ds), (v, -9.81 * 3.0 * x**2 / ds - 0.1 * hy.par[0] * load)],
+        state=[-1.0, 6.2088],
+        pars=[-1.0],
+        tol=np.finfo(float).eps,
+        t_events=[hy.t_event(load, callback=turned_over), hy.t_event(v)],
+    )
+    sign = copysign(1.0, 9.81 / sqrt(10.0) - 6.0 / 10.0**1.5 * 6.2088**2)
+
+    def integrated() -> tuple[float, float]:
+        body.time, body.state[:], body.pars[0] = 0.0, (-1.0, 6.2088), sign
+        body.reset_cooldowns()
+        body.propagate_until(5.0)
+        return body.time, body.state[0]
+
+    return [
+        Row(
+            work,
+            "heyoka's integrator with events, compiled before",
+            repeated(integrated, 20),
+            error,
+            each=20,
+            unit="s and m",
+        )
+    ]
+
+
+def has(peer: str) -> bool:
+    """Whether a peer is installed."""
+    return importlib.util.find_spec(peer) is not None
 
 
 def presence(peer: str) -> str:

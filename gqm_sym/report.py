@@ -32,6 +32,9 @@ FIGURES = {
     "portrait": "Phase portrait, with the orbit of the launch",
 }
 
+# SymPy writes names of functions as they are.
+_GREEK = {"alpha": "α", "kappa": "κ"}
+
 # dF/dx, d2F/dx2, d2F/dxdz.
 _PARTIAL = re.compile(r"d(2?)F/d(\w)d?(\w?)")
 
@@ -124,7 +127,9 @@ def _formulas(model: Model) -> Iterator[str]:
     named = {model.lam0: sp.Symbol(f"{lam}_0"), model.v0: sp.Symbol("V_0")}
     named |= {DIRECTION: sp.Symbol("sgn V"), CONTACT_SIGN: sp.Symbol("sgn N")}
     for label, form in model.closed_forms():
-        charted = {head: sp.Function(head.row)(*head.args) for head in form.atoms(ChartFunction)}
+        charted = {head: sp.Function(_GREEK.get(head.row, head.row))(*head.args) for head in form.atoms(ChartFunction)}
+        for integral in form.atoms(sp.Integral):
+            named |= {bound: sp.Symbol(f"{bound.name.strip('_')}'") for bound in integral.variables}
         shown = form.xreplace(charted).xreplace(named)
         if isinstance(shown, sp.Equality):
             note = f'<mspace width="2em"/><mtext>({escape(label)})</mtext>'

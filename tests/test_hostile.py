@@ -145,7 +145,8 @@ def test_no_expression_does_harm(
             refused = str(error)
     assert refused or attack in GIANTS
     assert not witness.exists()
-    if refused:
+    # What took too long may take less the second time: SymPy remembers.
+    if refused and "not done after" not in refused:
         assert gen.main(["-o", str(path.parent / "out"), str(path)]) == 2
         assert [entry.name for entry in path.parent.iterdir()] == ["a.yaml"]
         printed = capsys.readouterr()

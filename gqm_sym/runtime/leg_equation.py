@@ -30,7 +30,8 @@ STEEPEST = 2.0
 SUMMED = 0.25
 MOST_ROUNDS = 40
 # Rows of a panel's values, all over the panel's nodes; those before JUDGED may be judged, W and what follows holds the
-# panel's end as well. BARE is what W is made of: W over d from a turning point, W itself elsewhere.
+# panel's end as well. BARE is what W is made of: W over the distance from a turning point, be it one behind a slow
+# launch; W itself elsewhere.
 DS, PULL, FORCE, BARE, LOAD, PACE, JUDGED = *range(6), 6
 W, D, SWELL, MEAN, GRADED, SPEED, ARC, PLACE = range(6, 14)
 ROWS = 14
@@ -145,8 +146,10 @@ def solve_panel(drive, p, linear, origin, u, g, c, left, width, base, v, nu, row
             kept = 1.0 + work[SWELL, j]
             work[BARE, j] = (work[GRADED, j] if g > 0.0 else work[MEAN, j]) / kept
     else:
+        slow = g > 0.0 and left == 0.0
         for j in range(COUNT):
-            work[BARE, j] = work[W, j]
+            h = work[PLACE, j] + 0.5 * c if slow else 1.0
+            work[BARE, j] = work[W, j] / (h * h)
     for j in range(COUNT):
         work[DS, j] = rows[0, j]
         work[LOAD, j] = rows[0, j] * (rows[3, j] + rows[4, j] * work[W, j])
