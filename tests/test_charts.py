@@ -107,6 +107,29 @@ def test_divided_differences(size: float) -> None:
             assert abs(swapped - second) <= 4e-13
 
 
+def test_differences_far_from_the_origin() -> None:
+    """Where coordinates are a million times the distances, these keep their digits: constants are two doubles."""
+    edges = np.linspace(0.0, 2.0 * np.pi * RADIUS, 10)
+    s = edges[:-1, None] + 0.5 * np.diff(edges)[:, None] * (1.0 + NODES)
+
+    def x(s: float) -> mpf:
+        return 10**6 + RADIUS * mp.sin(mpf(s) / RADIUS)
+
+    with mp.workdps(40):
+        anchors = np.array([float(x(start)) for start in edges[:-1]])
+        rests = np.array([float(x(start) - mpf(float(anchor))) for start, anchor in zip(edges, anchors, strict=False)])
+        chart = assemble(
+            edges=edges,
+            anchors=np.stack([anchors, -RADIUS * np.cos(edges[:-1] / RADIUS)], axis=1),
+            rests=np.stack([rests, np.zeros(9)], axis=1),
+            angles=s / RADIUS,
+            curvatures=np.full_like(s, 1.0 / RADIUS),
+        )
+        for k in range(6):
+            a, b = float(edges[k] + 0.3), float(edges[k + 3] - 0.2)
+            assert abs(functions.chart_x1(chart.block, a, b, b - a) - (x(b) - x(a)) / (mpf(b) - mpf(a))) <= 16 * ULP
+
+
 def test_two_places_at_one_joint() -> None:
     """Beside a joint by rounding only, a first difference is the slope there."""
     chart = Ring().chart((RADIUS,))
@@ -167,6 +190,10 @@ def test_nearest_point() -> None:
     s, distance = Ring().chart((RADIUS,)).nearest(0.5, -0.9)
     assert abs(s - RADIUS * np.arctan2(0.5, 0.9)) <= 4 * ULP
     assert abs(distance - (RADIUS - np.hypot(0.5, 0.9))) <= 4 * ULP
+    flat = np.zeros((2, NODES.size))
+    line = assemble(edges=[0.0, 1.0, 2.0], anchors=[[0.0, 0.0], [1.0, 0.0]], angles=flat, curvatures=flat)
+    for x, end in ((-1.0, 0.0), (3.0, 2.0)):  # beyond an end that is the nearest
+        assert line.nearest(x, 1.0) == pytest.approx((end, np.sqrt(2.0)), rel=4 * ULP)
 
 
 def test_resolution_is_seen() -> None:

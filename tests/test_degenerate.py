@@ -174,3 +174,14 @@ def test_separatrices_are_ill_conditioned_and_say_so(edge_motion: MotionOf) -> N
         assert motion.quadrature_error < 1e-14
         if edge.hard.startswith("1e-14"):
             assert motion.conditioning > 1e5
+
+
+@pytest.mark.parametrize("short", [1e-3, 1e-6, 1e-9])
+def test_a_swing_that_almost_reaches_the_top(short: float, module_of: Callable[[str], ModuleType]) -> None:
+    """Launched at the bottom it turns where the energy is spent, to the last place of that number."""
+    v0 = math.sqrt(4 * 9.81) * (1.0 - short)
+    motion = module_of("circle").solve(0, v0, L=1)
+    with mp.workdps(40):
+        top = 2 * mp.asin(mpf(v0) / (2 * mp.sqrt(mpf("9.81"))))
+        assert abs(max(motion.turning_points) - top) <= math.ulp(3.0)
+        assert abs(mpf(float(motion.lam(motion.period / 4))) - top) <= 2 * math.ulp(3.0)

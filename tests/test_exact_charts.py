@@ -307,6 +307,25 @@ def test_rail_of_clothoid_and_curve(generated_folder: Path) -> None:
         assert agrees(motion.period_to(30), 2 * (down + up))
 
 
+def test_launch_by_a_length_over_many_pieces(generated_folder: Path) -> None:
+    """Far along a parabola: the length is (u sqrt(1 + u**2) + asinh(u))/2, the swing's time a quadrature."""
+    bowl = gqm.Curve.parametric(x="u", z="a*u**2", parameter="u", domain=("-2", "2"), parameters={"a": "1/2"})
+    module = gqm.build(
+        gqm.derive(gqm.Curve.piecewise([bowl]), gqm.Gravity()), name="exact_bowl", folder=generated_folder
+    )
+    assert len(module.CHART.chart((0.5, 9.81, 1.0)).edges) > 4
+    motion = module.solve(lam0="5")
+    with mp.workdps(45):
+
+        def length(u: mpf) -> mpf:
+            return (u * mp.sqrt(1 + u * u) + mp.asinh(u)) / 2
+
+        far = mp.findroot(lambda u: length(u) - length(mpf(-2)) - 5, mpf(1))
+        # u = far sin(phi), V**2 = g far**2 cos(phi)**2
+        period = 4 * mp.quad(lambda phi: mp.sqrt(1 + (far * mp.sin(phi)) ** 2), [0, mp.pi / 2]) / mp.sqrt(mpf(G))
+        assert agrees(motion.period_to(30), period)
+
+
 # -- the tools ------------------------------------------------------------------------------------
 
 

@@ -61,3 +61,16 @@ def test_compiling_the_runtime_is_announced_once(stream: Any, said: int, monkeyp
     for _ in range(3):
         jit.announce()
     assert stderr.getvalue().count("gqm_sym: compiling the runtime, once per installation\n") == said
+
+
+def test_what_is_kept_is_found_again_by_its_key_alone(tmp_path: Path) -> None:
+    """Under its key and stamp; a file that holds another key, or was made of another text, is not read."""
+    files = jit.KeyedFiles(str(tmp_path), "name", "stamp")
+    assert files.load(("key", 1)) is None
+    files.save(("key", 1), "code")
+    assert files.load(("key", 1)) == "code"
+    assert files.load(("key", 2)) is None
+    (kept,) = tmp_path.iterdir()
+    kept.rename(tmp_path / files._file_of(("key", 2)))
+    assert files.load(("key", 2)) is None
+    assert jit.KeyedFiles(str(tmp_path), "name", "another").load(("key", 1)) is None

@@ -1,6 +1,7 @@
 """Curves that are not smooth are known by doubles only: what is decided next to an equilibrium, to rounding."""
 
 from math import asinh, sqrt
+from pathlib import Path
 from types import ModuleType
 
 import numpy as np
@@ -75,3 +76,14 @@ def test_released_on_top_it_rests(hill: ModuleType) -> None:
         motion = hill.solve(way(X0) - side * 1e-3)
         assert motion.kind == "transit"
         assert side * motion.state(0.3).x > 1e-3
+
+
+@pytest.mark.parametrize("size", [1.0, 1e-8, 1e8])
+def test_a_break_is_seen_at_any_size(size: float, tmp_path: Path) -> None:
+    """The curvature jumps once, at the top, whether the hill is measured in its own length or not."""
+    start = tuple(f"{c}*{size:.0e}" for c in ("4/5", "-12/25"))
+    track = gqm.Curve.implicit(f"z + (x**2/2 + x*abs(x)/4)/{size:.0e}", start=start)
+    module = gqm.build(gqm.derive(track, gqm.Gravity()), name="hill_of_a_size", folder=tmp_path)
+    chart = module.CHART.chart((G, 1.0))
+    assert chart.corners.size == 0
+    assert chart.breaks / size == pytest.approx([way(X0)], rel=1e-9)

@@ -213,3 +213,13 @@ def test_a_curve_that_is_not_there(generated_folder: Path) -> None:
     for v0 in (0.0, 1.0):
         with pytest.raises(LaunchError, match=r"^lam0: the curve has no point at E = -1\.0 .* z = nan$"):
             module.solve(lam0=-1.0, v0=v0, ecc=1.2)
+
+
+@pytest.mark.parametrize("middle", [-2, 2])
+def test_a_valley_in_a_domain_on_one_side_of_zero(middle: int, tmp_path: Path) -> None:
+    """First steps are shares of the domain's length, wherever it lies."""
+    curve = gqm.Curve.graph(f"(x - {middle})**2", parameter="x", domain=(middle - 1, middle + 1))
+    valley = gqm.build(gqm.derive(curve, gqm.Gravity()), name="valley_aside", folder=tmp_path)
+    motion = valley.solve(middle + 0.5, 0.0)
+    assert motion.kind == "libration"
+    assert sorted(motion.turning_points) == [middle - 0.5, middle + 0.5]

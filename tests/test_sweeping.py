@@ -187,3 +187,13 @@ def test_mistakes_are_named(module_of: ModuleOf) -> None:
         sweep("period", 0.1, L=[1.0, -1.0])
     with pytest.raises(ParameterError, match="L: has no default"):
         sweep("period", 0.1)
+
+
+def test_loads_of_a_swing_next_to_the_top(module_of: ModuleOf) -> None:
+    """Orbits that are solved one by one: N is m g (3 - 2 cos A) at the bottom, m g cos(A) where it turns."""
+    amplitude = np.pi - np.array([1e-7, 1e-9])
+    circle = module_of("circle")
+    most, least = (circle.sweep(f"normal_force_{end}", amplitude, L=1).values for end in ("max", "min"))
+    assert most == pytest.approx(9.81 * (3 - 2 * np.cos(amplitude)), rel=LOAD)
+    assert least == pytest.approx(9.81 * np.cos(amplitude), rel=LOAD)
+    assert circle.sweep("v_max", amplitude, L=1).values == pytest.approx(np.sqrt(4 * 9.81), rel=LOAD)

@@ -129,6 +129,7 @@ def test_circle(tangent: int) -> None:
     assert ulps(chart.period, 4 * mp.pi) <= 1.0
     assert chart.high - chart.low == chart.period
     assert chart.low < -1.0
+    assert chart.breaks.size == chart.corners.size == 0
     places = np.linspace(0.0, 4.0 * math.pi, 37)
 
     def truth(k: int) -> tuple[Any, ...]:

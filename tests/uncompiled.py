@@ -158,7 +158,7 @@ def _callback(kind: Any, **_: Any) -> Callable[[Any], Any]:
     return decorate
 
 
-def _compiler(file: str, *, interface: int) -> Callable[[Any], Callable[[Any], Any]]:
+def _compiler(file: str, *, interface: int) -> Callable[..., Callable[[Any], Any]]:
     """Stand in for `jit.compiler`."""
     if interface != INTERFACE:
         return COMPILER(file, interface=interface)
