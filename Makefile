@@ -54,6 +54,7 @@ mutate: $(VENV)/.dev ## change the code at random and list the changes that no t
 
 bench: $(VENV)/.bench ## time each stage, and set accuracy and time beside the alternatives' (docs/benchmarks.md)
 	$(BIN)/python benchmarks/stages.py
+	$(BIN)/python benchmarks/scale.py
 	$(BIN)/python benchmarks/comparison.py
 
 $(VENV)/.run: pyproject.toml
@@ -62,7 +63,7 @@ $(VENV)/.run: pyproject.toml
 	touch $@
 
 $(VENV)/.bench: $(VENV)/.run
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[bench]'
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[bench,plot]'
 	-$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[peers]'
 	touch $@
 

@@ -1,7 +1,7 @@
-"""Where the time of one call goes: a solve, a place, a state, a leg. Prints the table of ``docs/profiles.md``.
+"""Where the time of one call goes: a solve, a place, a state, a leg, an orbit of a sweep.
 
 Each row is the least of many short runs in one process, so that other work on the machine weighs little; the numbers
-are for reading, not for passing.
+are for reading, not for passing. ``make bench`` puts them into ``docs/benchmarks.md``.
 """
 
 from collections.abc import Callable
@@ -10,10 +10,12 @@ from time import perf_counter
 from typing import Any
 
 import numpy as np
+from measure import readable
+from numba import njit
 
 import generated.cubic_coulomb as friction
 import generated.pendulum as pendulum
-from gqm_sym.runtime import entries, legs
+from gqm_sym.runtime import batch_search, batches, entries, legs
 from gqm_sym.runtime.leg_stretches import read_panels
 from gqm_sym.runtime.surveying import survey
 
@@ -74,8 +76,7 @@ def dissipative() -> list[tuple[str, float]]:
     flags = (int(loss.friction), int(loss.kinked), int(loss.linear))
     launch = (loss.drive, loss.hold, p.values, flags, -1.0, 6.2088**2, 1, 0, np.empty(0))
     leg = legs.follow(*launch, inf, 1.0, 0.25, 0, 0.0)
-    times, ahead, back = leg[8], leg[11], leg[12]
-    print(f"panels of Example 2's first leg: {len(ahead)} from the launch, {len(back)} from the turn")
+    times, back = leg[8], leg[12]
     return [
         ("`solve` of Example 2: its leg to the turn", least(lambda: friction.solve(-1.0, 6.2088))),
         ("- the crossing: the leg, its events, its time", least(lambda: legs.follow(*launch, inf, 1.0, 0.25, 0, 0.0))),
@@ -84,13 +85,55 @@ def dissipative() -> list[tuple[str, float]]:
     ]
 
 
-def main() -> None:
-    """Print the table."""
-    rows = conservative() + dissipative()
-    print("| what | least time |\n|---|---|")
-    for what, microseconds in rows:
-        print(f"| {what} | {microseconds:.1f} µs |")
+def sweeping() -> list[tuple[str, float]]:
+    """Parts of an orbit's share of a sweep over pendulums, on one core."""
+    fns, n = tuple(function.address for function in pendulum.MODEL.each), batches.BATCH
+    launch, seek, prove, times = batch_search.launch, batch_search.seek, batch_search.prove, batches.times
+    start = np.zeros((batch_search.ROWS, n))
+    start[batch_search.WHO], start[batch_search.WAY] = np.arange(n), 1.0
+    start[batch_search.START] = np.random.default_rng(0).uniform(0.05, 2.5, n) - np.pi / 2
+    p = np.repeat(pendulum.MODEL.numbers(tuple(pendulum.PARAMETERS.values())).values[:, None], n, axis=1)
+    count = len(p)
+    domains, work = np.tile([-inf, inf, 2 * np.pi], (n, 1)), np.empty((13, n))
+    chosen, out, reasons = np.empty(n, dtype=np.int64), np.zeros((n, 2)), np.zeros(n, dtype=np.int8)
+
+    @njit
+    def search(s: Any, start: Any, p: Any, domains: Any, work: Any) -> None:
+        s[:] = start
+        launch(fns, n, s, p, domains, work)
+        seek(fns, n, s, p, work)
+
+    @njit
+    def proof(s: Any, found: Any, p: Any, work: Any) -> None:
+        s[:] = found
+        prove(fns, 0, batches.FEW_PIECES, n, s, p, work)
+
+    @njit
+    def clock(s: Any, found: Any, flat: Any, work: Any, chosen: Any, out: Any, reasons: Any) -> None:
+        s[:] = found
+        times(fns, 0, n, s, flat, count, chosen, work, out, reasons)
+
+    s = start.copy()
+    search(s, start, p, domains, work)
+    found, other = s.copy(), s[batch_search.WAY] * s[batch_search.AHEAD]
+    found[batch_search.LEAST], found[batch_search.MOST] = np.minimum(other, 0.0), np.maximum(other, 0.0)
+    found[batch_search.A] = found[batch_search.START] + found[batch_search.LEAST]
+    found[batch_search.B] = found[batch_search.START] + found[batch_search.MOST]
+    return [
+        ("an orbit of a sweep: its turning points, guessed", least(lambda: search(s, start, p, domains, work)) / n),
+        ("- proved", least(lambda: proof(s, found, p, work)) / n),
+        (
+            "- its half period, error controlled",
+            least(lambda: clock(s, found, p.reshape(-1).copy(), work, chosen, out, reasons)) / n,
+        ),
+    ]
+
+
+def profile() -> list[str]:
+    """Give the table, line by line."""
+    rows = conservative() + dissipative() + sweeping()
+    return ["| what | least time |", "|---|---|", *(f"| {what} | {readable(1e-6 * time)} |" for what, time in rows)]
 
 
 if __name__ == "__main__":
-    main()
+    print("\n".join(profile()))

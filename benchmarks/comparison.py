@@ -10,6 +10,7 @@ import sys
 import warnings
 from pathlib import Path
 
+from calls import profile
 from half_periods import half_periods
 from legs import legs
 from load_maps import load_maps
@@ -42,6 +43,13 @@ def page(results: list[Result], start: tuple[float, float]) -> str:
     lines += ["", f"Start, in a second process: `import numba` {start[0]:.2f} s, from there to a solved pendulum"]
     lines += [f"{start[1]:.2f} s.", ""]
     lines += [f"- {peer}: {presence(peer)}" for peer in PEERS]
+    lines += ["", "## Where the time goes", "", "From Python, one core, the least of many runs.", "", *profile()]
+    lines += [
+        "",
+        "## How it grows",
+        "",
+        "![Cost against time, legs, launches and length of formulas](figures/scale.svg)",
+    ]
     return "\n".join(lines) + "\n"
 
 

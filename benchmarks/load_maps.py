@@ -134,7 +134,7 @@ def rows_of(family: Range) -> list[Row]:
         )
 
     loop, printed = by_hand(family.form), lambdified(family.form, len(p))
-    work = f"load map of a {name.replace('_', ' ')}, a place"
+    work = f"load map, {name.replace('_', ' ')}, a place"
     calls: tuple[tuple[str, Callable[[], Any], float], ...] = (
         ("`pass1`, one core", on_one_core(lambda: module.pass1(lam, lam0, SPEED)), 1e-15),
         ("a numba loop by hand, one core", lambda: loop(lam, lam0, SPEED, p, g, m), np.inf),

@@ -61,7 +61,7 @@ def measured(row: Row) -> Result:
 def ulps(values: Any, truths: list[mpf]) -> float:
     """Worst error in units of the last place."""
     return max(
-        float(abs(mpf(float(v)) - t)) / float(np.spacing(float(t))) for v, t in zip(values, truths, strict=False)
+        float(abs(mpf(float(v)) - t)) / float(np.spacing(abs(float(t)))) for v, t in zip(values, truths, strict=False)
     )
 
 

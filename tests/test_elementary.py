@@ -117,3 +117,15 @@ def test_a_loop_fills_vector_registers() -> None:
     both(x, out)
     assert np.abs(out - (np.sin(x) + np.cos(x))).max() <= 4e-16
     assert " x double>" in both.inspect_llvm(both.signatures[0])
+
+
+@pytest.mark.parametrize("reach", [1e-300, 1e-9, 0.4, 1.0, 3.0, 45.0, 1e300])
+def test_what_is_lost_in_falling(reach: float) -> None:
+    """exp(x) - 1 for x <= 0, to the last place next to zero too."""
+    source = random.Random(reach)
+    with mp.workdps(DIGITS):
+        for _ in range(COUNT):
+            x = -reach * source.random()
+            truth = mp.expm1(mpf(x))
+            error = abs(mpf(elementary.expm1_below(x)) - truth) / mpf(np.spacing(abs(float(truth))))
+            assert error <= ULPS, x

@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from mpmath import mp, mpf
 
 import gqm_sym as gqm
+from gqm_sym.errors import LaunchError
 from gqm_sym.runtime.entries import walk_on
 from gqm_sym.runtime.search import CUSP, LIMIT, MARCHED, TURN
 
@@ -201,6 +202,17 @@ def test_a_cusp_stops_the_walk(start: float, cusp: float, direction: int, module
     assert what == CUSP
     assert (near - cusp) * direction <= 4e-15
     assert abs(far - cusp) <= 1e-14
+
+
+def test_a_curve_that_is_not_there(generated_folder: Path) -> None:
+    """Parameters that make a coordinate the root of something negative: an error that says so, from rest and moving."""
+    ellipse = gqm.Curve.parametric(
+        x="cos(E) - ecc", z="sqrt(1 - ecc**2)*sin(E)", parameter="E", period="2*pi", parameters={"ecc": "3/5"}
+    )
+    module = gqm.build(gqm.derive(ellipse, gqm.CentralForce(k=1)), name="beyond", folder=generated_folder)
+    for v0 in (0.0, 1.0):
+        with pytest.raises(LaunchError, match=r"^lam0: the curve has no point at E = -1\.0 .* z = nan$"):
+            module.solve(lam0=-1.0, v0=v0, ecc=1.2)
 
 
 @pytest.mark.parametrize("middle", [-2, 2])

@@ -18,14 +18,3 @@ def running_totals(times: Array, terms: Array) -> tuple[Array, Array]:
         low[k + 1] = low[k] + error
     high[-1], low[-1] = times[-1], 0.0
     return high, low
-
-
-def slopes(edges: Array, terms: Array, phi: Array) -> Array:
-    """Derivatives of the panels' Legendre series at anomalies."""
-    out = np.empty_like(phi)
-    which = np.clip(np.searchsorted(edges, phi, side="right") - 1, 0, len(edges) - 2)
-    for k in np.unique(which):
-        half = 0.5 * (edges[k + 1] - edges[k])
-        x = ((phi[which == k] - edges[k]) - half) / half
-        out[which == k] = np.polynomial.legendre.legval(x, np.polynomial.legendre.legder(terms[k])) / half
-    return out

@@ -45,6 +45,8 @@ EXPONENTIAL = tuple(1.0 / factorial(k) for k in reversed(range(2, 14)))
 LOG2, LOG2_LOW, ONE_OVER_LOG2 = 0.6931471803691238, 1.9082149292705877e-10, 1.4426950408889634
 # Beyond these exp overflows, or is nothing; beyond FAR sinh and cosh overflow.
 MOST, LEAST, FAR = 709.782712893384, -746.0, 710.4758600739439
+# Below this exp is less than half an ulp of one.
+LEVEL = -45.0
 # (sinh(x) - x)/x**3 in x**2 up to |x| = 1, cut below 1e-19.
 SINHC = tuple(1.0 / factorial(2 * k + 1) for k in reversed(range(1, 10)))
 
@@ -124,6 +126,13 @@ def exp(x):  # type: ignore[no-untyped-def]
     half = k >> 1
     value = (lead + low) * power_of_two(half) * power_of_two(k - half)
     return choose(x > MOST, inf, choose(x < LEAST, 0.0, value))
+
+
+@Inlined
+def expm1_below(x):  # type: ignore[no-untyped-def]
+    """exp(x) - 1 for x <= 0, without cancellation next to zero."""
+    lead, low, k = scaled_exp(choose(x < LEVEL, LEVEL, x))
+    return ((lead - power_of_two(-k)) + low) * power_of_two(k)
 
 
 @Inlined

@@ -12,9 +12,9 @@ from gqm_sym.runtime.crossing import call_climb, call_frame, call_hold, call_ris
 from gqm_sym.runtime.doubledouble import reduce
 from gqm_sym.runtime.integrands import TO_EQUILIBRIUM, speeds
 from gqm_sym.runtime.interface import FRAME_ROWS
-from gqm_sym.runtime.inversion import look_up_many, tabulate
+from gqm_sym.runtime.inversion import derivative, look_up_many, tabulate
 from gqm_sym.runtime.jit import Inner, entry
-from gqm_sym.runtime.panels import lay, read_off
+from gqm_sym.runtime.panels import lay, legendre_sum, panel_of, read_off
 from gqm_sym.runtime.search import CRITICAL, LIMIT, TURN, walk
 
 _ADDRESSES = types.UniTuple(types.int64, 5)
@@ -114,6 +114,18 @@ def speeds_along(a, b, field, phi):  # type: ignore[no-untyped-def]
     """V at many anomalies of a stretch towards an equilibrium b where V**2 is a field."""
     out, work = np.empty(phi.size), np.empty((4, phi.size))
     speeds((0, 0, 0, 0, 0), np.empty(0), TO_EQUILIBRIUM, a, b, a, 0.0, field, phi, work, out)
+    return out
+
+
+@entry(_LINE(_LINE, _ROWS, _LINE))
+def slopes(edges, terms, phi):  # type: ignore[no-untyped-def]
+    """Derivatives of the panels' Legendre series at anomalies."""
+    out, series = np.empty(phi.size), np.empty(terms.shape[1])
+    for i in range(phi.size):
+        k = panel_of(edges, phi[i])
+        half = 0.5 * (edges[k + 1] - edges[k])
+        derivative(terms[k], series)
+        out[i] = legendre_sum(series, ((phi[i] - edges[k]) - half) / half) / half
     return out
 
 

@@ -66,7 +66,7 @@ def lay_exactly(exact: ExactProblem, kind: int, ends: tuple[Any, Any], stop: flo
         values = np.empty((2, COUNT))
         for i, x in enumerate(map(float, nodes)):
             duration, w = rate(middle + reach * x)
-            if not (duration > 0 and w > 0):
+            if duration.imag or w.imag or not (duration > 0 and w > 0):
                 raise SolutionError(
                     f"time of flight from {float(ends[0])!r} to {float(ends[1])!r}: "
                     "V**2 is not positive inside this stretch"

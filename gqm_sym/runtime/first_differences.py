@@ -19,7 +19,7 @@ from math import atan2 as angle
 from math import pow as power
 
 from gqm_sym.runtime.doubledouble import two_sum
-from gqm_sym.runtime.elementary import cos, cosh, exp, sin, sinh
+from gqm_sym.runtime.elementary import cos, cosh, exp, expm1_below, sin, sinh
 from gqm_sym.runtime.fused import choose
 from gqm_sym.runtime.jit import Inlined, Inner
 
@@ -43,10 +43,10 @@ def sinhc(t):  # type: ignore[no-untyped-def]
     return choose(ordinary, sinh(t) / choose(ordinary, t, 1.0), 1.0)
 
 
-@Inner
+@Inlined
 def expc(t):  # type: ignore[no-untyped-def]
-    """(1 - exp(-t))/t."""
-    return -expm1(-t) / t if t != 0.0 else 1.0
+    """(1 - exp(-t))/t for t >= 0."""
+    return choose(t == 0.0, 1.0, -expm1_below(-t) / choose(t == 0.0, 1.0, t))
 
 
 @Inner
@@ -101,10 +101,10 @@ def tanh1(x, y, h):  # type: ignore[no-untyped-def]
     return 4.0 * decay * expc(2.0 * fabs(h)) / ((1.0 + p) * (1.0 + q))
 
 
-@Inner
+@Inlined
 def exp1(x, y, h):  # type: ignore[no-untyped-def]
     """exp[x,y] = exp(y) (1 - exp(-h))/h, y the larger."""
-    return exp(max(x, y)) * expc(fabs(h))
+    return exp(choose(x > y, x, y)) * expc(fabs(h))
 
 
 @Inner

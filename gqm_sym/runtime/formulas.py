@@ -291,6 +291,16 @@ class Formulas:
         spread(fill, places.size, LEAST_MAP)
         return Pass1(*(row.reshape(shape) for row in out))
 
+    def _solver(self) -> "Callable[[Formulas, Given, Launch], Motion]":
+        # Loaded when it is needed: a process that solves one model needs one of the two.
+        if self.dissipation is None:
+            from gqm_sym.runtime.solve import solve
+
+            return solve
+        from gqm_sym.runtime.dissipative import dissipate
+
+        return dissipate
+
     def solve(
         self,
         lam0: Any,
@@ -302,15 +312,13 @@ class Formulas:
         given: tuple[Any, ...],
     ) -> "Motion":
         """The motion that a launch begins."""
-        from gqm_sym.runtime.dissipative import dissipate
-        from gqm_sym.runtime.fit import check_end, check_launch
-        from gqm_sym.runtime.solve import solve
-
         p = self.numbers(given)
         launch = self.launch(p, lam0=lam0, v0=v0, direction=direction, point=point, t_max=t_max, contact=contact)
-        find = solve if self.dissipation is None else dissipate
+        find = self._solver()
         if not self.body:
             return find(self, p, launch)
+        from gqm_sym.runtime.fit import check_end, check_launch
+
         check_launch(self, self.functions(p, launch), launch.lam0.value)
         motion = find(self, p, launch)
         check_end(self, motion)

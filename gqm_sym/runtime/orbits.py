@@ -36,7 +36,6 @@ from gqm_sym.runtime.waves import sum_wave
 
 BLOCK = 64
 ULP = 2.220446049250313e-16
-NOTHING: Array = np.empty(0)
 
 FUNCTIONS, SHAPE, LAUNCH, DIAL, COSINES, SINES, CLOCK = range(7)
 MIDDLES, LOWS, SCALES, POWERS, INDEX, ENDS = range(7, 13)
@@ -50,9 +49,15 @@ _STATE = types.UniTuple(types.float64, 10)
 
 def record(sections: dict[int, Array]) -> Array:
     """A record of some sections; the others are empty."""
-    parts = [sections.get(k, NOTHING) for k in range(SECTIONS)]
-    marks = np.cumsum([SECTIONS + 1, *(part.size for part in parts)], dtype=np.int64)
-    return np.concatenate([marks.view(np.float64), *(part.reshape(-1).view(np.float64) for part in parts)])
+    marks = np.empty(SECTIONS + 1, dtype=np.int64)
+    parts, end = [marks.view(np.float64)], SECTIONS + 1
+    for k in range(SECTIONS):
+        marks[k] = end
+        if k in sections:
+            parts.append(sections[k].reshape(-1).view(np.float64))
+            end += sections[k].size
+    marks[SECTIONS] = end
+    return np.concatenate(parts)
 
 
 @Inner

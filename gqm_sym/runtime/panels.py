@@ -192,9 +192,15 @@ def lay(fns, p, kind, a, b, ref, w, field, marks):  # type: ignore[no-untyped-de
 
 
 @Inner
+def panel_of(edges, phi):  # type: ignore[no-untyped-def]
+    """The panel on which an anomaly lies."""
+    return min(max(np.searchsorted(edges, phi, side="right") - 1, 0), edges.size - 2)
+
+
+@Inner
 def read_off(edges, marks, terms, phi):  # type: ignore[no-untyped-def]
     """Time (or arc length) from the first edge to anomaly phi."""
-    k = min(max(np.searchsorted(edges, phi, side="right") - 1, 0), edges.size - 2)
+    k = panel_of(edges, phi)
     half = 0.5 * (edges[k + 1] - edges[k])
     x = ((phi - edges[k]) - half) / half
     return marks[k] + legendre_sum(terms[k], x)

@@ -7,9 +7,9 @@ import numpy as np
 
 from gqm_sym.errors import SolutionError
 from gqm_sym.runtime import timing
-from gqm_sym.runtime.clocks import slopes
 from gqm_sym.runtime.course import ZERO, Course, Piece, libration
 from gqm_sym.runtime.display import Rows
+from gqm_sym.runtime.entries import slopes
 from gqm_sym.runtime.events import Event
 from gqm_sym.runtime.motion import Motion, State
 from gqm_sym.runtime.numbers import read_number
@@ -129,7 +129,7 @@ class Periodic(Motion):
         if sampler is None or sampler.course is not course:
             clock = self._timing if course is self._precise else timing.plain(self.problem, self.kind, self._stretch)
             sampler = self._sampler = Sampler(
-                self.problem, course, clock.phase, self.direction, self._clock_drift(course)
+                self.problem, course, clock.phase, self.direction, lambda: self._clock_drift(course)
             )
         return sampler if reach <= sampler.reach else None
 

@@ -1,5 +1,6 @@
 """Sampling of periodic motions: times in, places or states out, one crossing into compiled code a call."""
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -48,7 +49,7 @@ class Sampler:
     """
 
     def __init__(
-        self, problem: Problem, course: Course, phase: Pair, direction: int, clock_error: tuple[float, float]
+        self, problem: Problem, course: Course, phase: Pair, direction: int, drift: Callable[[], Pair]
     ) -> None:
         assert course.period is not None
         stretch = course.pieces[0].stretch
@@ -59,12 +60,9 @@ class Sampler:
         way = direction if there_and_back else 1
         start, start_low = way * phase[0], way * phase[1]
         ends = (stretch.a, stretch.b, problem.lam0, course.lap)
-        v0, s_a = direction * problem.launch.v0.value, course.pieces[0].s_a
+        self._v0, self._drift = direction * problem.launch.v0.value, drift
         self._sections = {
             orbits.FUNCTIONS: np.array([*problem.functions.addresses, stretch.kind], dtype=np.int64),
-            orbits.LAUNCH: np.array(
-                [problem.lam0, v0, course.lap_length, problem.arc_origin, s_a, *clock_error], dtype=np.float64
-            ),
             orbits.DIAL: np.array([*course.period, *_inverse(course.period), start, start_low, *ends]),
             orbits.CLOCK: np.array([*course.period, start, start_low, *stretch.whole, stretch.stop, course.pace]),
         }
@@ -85,10 +83,12 @@ class Sampler:
         """All that is known, for states; places take less."""
         if self._whole is None:
             self._tabulate()
-            stretch, panels = self._stretch, self._stretch.panels
+            stretch, panels, problem = self._stretch, self._stretch.panels, self._problem
+            lengths = self.course.lap_length, problem.arc_origin, self.course.pieces[0].s_a
             reaches = stretch.table[3].sum(axis=1)
             middles = 0.5 * (stretch.edges[1:] + stretch.edges[:-1])
             self._sections |= {
+                orbits.LAUNCH: np.array([problem.lam0, self._v0, *lengths, *self._drift()], dtype=np.float64),
                 orbits.SHAPE: np.array([stretch.a, stretch.b, stretch.ref, stretch.w, stretch.spread]),
                 orbits.EDGES: panels[0],
                 orbits.LENGTHS: panels[2],

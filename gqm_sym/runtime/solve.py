@@ -57,6 +57,7 @@ def _bilateral(formulas: Formulas, p: Given, launch: Launch) -> Motion:
     if known is not None and ahead[0] == search.TURN:  # a libration without difficulties
         a, b = lam0 + ahead[1], lam0 + behind[1]
         return Periodic(problem, "libration", direction, between_turns(f, min(a, b), max(a, b), known))
+    _check_place(problem)
     front = _reach(problem, direction, ahead)
     if front.what == "closed":
         end = lam0 + direction * period
@@ -81,6 +82,17 @@ def _bilateral(formulas: Formulas, p: Given, launch: Launch) -> Motion:
             between_turns(f, ends[0].place, ends[1].place, ends=exact),
         )
     return _returning(problem, direction, front, back)
+
+
+def _check_place(problem: Problem) -> None:
+    """Refuse a launch where the coordinates are no numbers: a root of what is negative with these parameters."""
+    f, lam0 = problem.functions, problem.lam0
+    x, z = (float(row[0]) for row in frame_at(f.addresses, f.p, np.array([lam0]), np.zeros(1))[:2])
+    if not (isfinite(x) and isfinite(z)):
+        raise LaunchError(
+            f"lam0: the curve has no point at {problem.formulas.parameter} = {lam0!r} with these parameters: "
+            f"x = {x!r}, z = {z!r}"
+        )
 
 
 def starting_step(problem: Problem) -> float:

@@ -10,7 +10,7 @@ import numpy as np
 from gqm_sym.errors import SolutionError
 from gqm_sym.runtime.anomalies import anomaly_of, places
 from gqm_sym.runtime.clocks import Array as Array
-from gqm_sym.runtime.clocks import running_totals, slopes
+from gqm_sym.runtime.clocks import running_totals
 from gqm_sym.runtime.conditioning import magnified, off_launch
 from gqm_sym.runtime.entries import (
     anomalies,
@@ -18,6 +18,7 @@ from gqm_sym.runtime.entries import (
     lay_along,
     lay_panels,
     read_off_many,
+    slopes,
     speeds_along,
     speeds_at,
 )
@@ -194,7 +195,7 @@ class Stretch:
         """The first and the last anomaly, and those at which the curve is not smooth."""
         places = self.functions.between(self.functions.breaks, self.a, self.b)
         inside = [self.anomaly_of(place - self.a, self.b - place) for place in (*places, *self.hints)]
-        return np.unique([0.0, *(phi for phi in inside if 0.0 < phi < self.stop), self.stop])
+        return np.array(sorted({0.0, *(phi for phi in inside if 0.0 < phi < self.stop), self.stop}))
 
     @property
     def edges(self) -> Array:
@@ -312,7 +313,8 @@ class Stretch:
 
     def _paced(self, phi: Array) -> Array:
         """|ds/dt| from the panels themselves, where doubles cannot tell V**2 from nothing."""
-        return slopes(self.edges, self.panels[4], phi) / slopes(self.edges, self.panels[3], phi)
+        paced: Array = slopes(self.edges, self.panels[4], phi) / slopes(self.edges, self.panels[3], phi)
+        return paced
 
     def times(self, phi: Array) -> Array:
         """Time from the end ``a`` to anomalies."""
