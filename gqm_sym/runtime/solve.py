@@ -57,7 +57,8 @@ def _bilateral(formulas: Formulas, p: Given, launch: Launch) -> Motion:
     if known is not None and ahead[0] == search.TURN:  # a libration without difficulties
         a, b = lam0 + ahead[1], lam0 + behind[1]
         return Periodic(problem, "libration", direction, between_turns(f, min(a, b), max(a, b), known))
-    _check_place(problem)
+    if known is None:
+        _check_place(problem)
     front = _reach(problem, direction, ahead)
     if front.what == "closed":
         end = lam0 + direction * period
