@@ -22,6 +22,7 @@ QUARTER = (1.5707963267948966, 6.123233995736766e-17, -1.4973849048591833e-33)
 TWO_OVER_PI = 0.6366197723675814
 
 # Minimax polynomials on |r| <= pi/4, highest power first: (sin(r)/r - 1 + r**2/6)/r**4, (cos(r) - 1 + r**2/2)/r**4.
+# The coefficients are those of fdlibm (Sun Microsystems, 1993: k_sin.c, k_cos.c).
 SINE = (
     1.58969099521155010221e-10,
     -2.50507602534068634195e-08,
