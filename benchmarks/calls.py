@@ -4,13 +4,11 @@ Each row is the least of many short runs in one process, so that other work on t
 are for reading, not for passing. ``make bench`` puts them into ``docs/benchmarks.md``.
 """
 
-from collections.abc import Callable
 from math import inf
-from time import perf_counter
 from typing import Any
 
 import numpy as np
-from measure import readable
+from measure import least, readable
 from numba import njit
 
 import generated.cubic_coulomb as friction
@@ -18,18 +16,6 @@ import generated.pendulum as pendulum
 from gqm_sym.runtime import batch_search, batches, entries, legs
 from gqm_sym.runtime.leg_stretches import read_panels
 from gqm_sym.runtime.surveying import survey
-
-
-def least(work: Callable[[], Any], count: int = 20, repeats: int = 300) -> float:
-    """Return the least time of one call, in microseconds."""
-    work()
-    times = []
-    for _ in range(repeats):
-        start = perf_counter()
-        for _ in range(count):
-            work()
-        times.append((perf_counter() - start) / count)
-    return 1e6 * min(times)
 
 
 def conservative() -> list[tuple[str, float]]:
@@ -132,7 +118,7 @@ def sweeping() -> list[tuple[str, float]]:
 def profile() -> list[str]:
     """Give the table, line by line."""
     rows = conservative() + dissipative() + sweeping()
-    return ["| what | least time |", "|---|---|", *(f"| {what} | {readable(1e-6 * time)} |" for what, time in rows)]
+    return ["| what | least time |", "|---|---|", *(f"| {what} | {readable(time)} |" for what, time in rows)]
 
 
 if __name__ == "__main__":

@@ -8,11 +8,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import sympy as sp
-from measure import Row, on_one_core
+from measure import Row, apart, on_one_core
 from mpmath import mp, mpf
 from numba import njit
 
-mp.dps = 40
 PLACES = 1_000_000
 G, SPEED = 9.81, 8.0
 
@@ -129,9 +128,7 @@ def rows_of(family: Range) -> list[Row]:
     scale = float(max(map(abs, known)))
 
     def error(values: Any) -> float:
-        return max(
-            float(abs(mpf(float(v)) - t)) / scale for v, t in zip(np.asarray(values[5])[few], known, strict=True)
-        )
+        return apart(np.asarray(values[5])[few], known, scale)
 
     loop, printed = by_hand(family.form), lambdified(family.form, len(p))
     work = f"load map, {name.replace('_', ' ')}, a place"

@@ -9,11 +9,13 @@ from time import perf_counter
 from typing import Any
 
 import numpy as np
-from mpmath import mpf
+from mpmath import mp, mpf
 
 from gqm_sym.runtime import threads
 
 Work = Callable[[], Any]
+# Digits of all truths.
+mp.dps = 40
 
 
 @dataclass(frozen=True)
@@ -56,6 +58,17 @@ def measured(row: Row) -> Result:
         row.call()
         times.append(perf_counter() - start)
     return Result(row, median(times) / row.each, row.error(value))
+
+
+def least(work: Work, count: int = 20, repeats: int = 300) -> float:
+    """Return the least time of one call, in seconds: other work on the machine weighs little in it."""
+    times = []
+    for _ in range(repeats):
+        start = perf_counter()
+        for _ in range(count):
+            work()
+        times.append((perf_counter() - start) / count)
+    return min(times)
 
 
 def ulps(values: Any, truths: list[mpf]) -> float:

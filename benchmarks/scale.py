@@ -6,13 +6,11 @@ Draws ``docs/figures/scale.svg``; run by ``make bench``. Each point is the least
 import json
 import subprocess
 import sys
-from collections.abc import Callable
 from pathlib import Path
-from time import perf_counter
-from typing import Any
 
 import matplotlib as mpl
 import numpy as np
+from measure import least
 
 import generated.circle_drag as dragged
 import generated.pendulum as pendulum
@@ -36,28 +34,18 @@ print(perf_counter() - start, 1024 * resource.getrusage(resource.RUSAGE_SELF).ru
 """
 
 
-def least(call: Callable[[], Any], repeats: int) -> float:
-    """Return the least time of some calls, in seconds."""
-    times = []
-    for _ in range(repeats):
-        start = perf_counter()
-        call()
-        times.append(perf_counter() - start)
-    return min(times)
-
-
 def late_states() -> tuple[list[float], list[float]]:
     """Time of one state against the time at which it is asked for."""
     motion, when = pendulum.solve("-pi/2 + 6/5"), [10.0**k for k in range(10)]
     motion.state(1e9)
-    return when, [least(lambda t=t: [motion.state(t) for _ in range(100)], 20) / 100 for t in when]  # type: ignore[misc]
+    return when, [least(lambda t=t: motion.state(t), 100, 20) for t in when]  # type: ignore[misc]
 
 
 def many_legs() -> tuple[list[int], list[float]]:
     """Time to follow a pendulum with drag over so many half swings."""
     counts = [10, 100, 1000, 10000]
     swing = 1.05  # half a period of its small swings, about
-    solved = [least(lambda n=n: dragged.solve(1.0, t_max=swing * n).legs, 2) for n in counts]  # type: ignore[misc]
+    solved = [least(lambda n=n: dragged.solve(1.0, t_max=swing * n).legs, 1, 2) for n in counts]  # type: ignore[misc]
     return [len(dragged.solve(1.0, t_max=swing * n).legs) for n in counts], solved
 
 
@@ -84,7 +72,7 @@ def long_formulas() -> tuple[list[int], list[float]]:
 
     emitted(2, 50)  # imports, and what SymPy remembers
     counts = (1, 2, 4, 8, 16, 32, 64)
-    return [emitted(n, 100) for n in counts], [least(lambda n=n: emitted(n, 200 + 100 * n), 1) for n in counts]  # type: ignore[misc]
+    return [emitted(n, 100) for n in counts], [least(lambda n=n: emitted(n, 200 + 100 * n), 1, 1) for n in counts]  # type: ignore[misc]
 
 
 def main() -> None:

@@ -1,8 +1,7 @@
 """Closed forms of the pendulum of length 1, in 40 digits: the truth of most rows."""
 
-from mpmath import mp, mpf
+from measure import mp, mpf  # with the digits of all truths
 
-mp.dps = 40
 G = mpf("9.81")
 
 

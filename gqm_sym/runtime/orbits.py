@@ -31,7 +31,7 @@ from gqm_sym.runtime.doubledouble import add, reduce
 from gqm_sym.runtime.integrands import TURN_TURN, speeds
 from gqm_sym.runtime.inversion import TERMS, look_up
 from gqm_sym.runtime.jit import Inner, entry
-from gqm_sym.runtime.panels import DEGREE, read_off
+from gqm_sym.runtime.panels import DEGREE, panel_of, read_off
 from gqm_sym.runtime.waves import sum_wave
 
 BLOCK = 64
@@ -186,7 +186,7 @@ def find_states(record, p, t, out, begin, end):  # type: ignore[no-untyped-def]
         for i in range(n):
             out[2, start + i], out[3, start + i] = frame[0, i], frame[1, i]
             out[6, start + i], out[7, start + i] = frame[3, i], frame[4, i]
-            panel = min(max(np.searchsorted(edges, phi[i], side="right") - 1, 0), edges.size - 2)
+            panel = panel_of(edges, phi[i])
             part = min(np.searchsorted(reaches, phi[i]), reaches.size - 1)
             rate = fabs(v[i]) / frame[2, i] if frame[2, i] > 0.0 else 0.0
             rounding = ULP * (1.5 * fabs(out[0, start + i] - reduced[i]) + 2.0 * fabs(reduced[i]))
