@@ -1,5 +1,5 @@
 # Made by gqm-gen for "catenary". Do not edit: change its declaration and generate again.
-# interface 3, input cd1fa4541ae4, body 672d7de471de
+# interface 4, input cd1fa4541ae4, body e31516131fbf
 """Bead on a hanging chain
 
 x              = x
@@ -24,7 +24,7 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=3)
+compiled = compiler(__file__, interface=4)
 
 from gqm_sym.runtime import (
     BEND,
@@ -230,6 +230,11 @@ def exact_domain(op, p):
     return None, None, None
 
 
+def exact_axes(op, p):
+    """A place about which V**2 and ds are even, and the distance to the next; None where there is none."""
+    return 0, None
+
+
 MODEL = Formulas(
     name='catenary',
     parameter='x',
@@ -238,6 +243,8 @@ MODEL = Formulas(
     addresses=Addresses(frame.address, climb.address, rise.address, bend.address, bounds.address),
     each=Each(rise_each, bend_each, bounds_each),
     domain_of=exact_domain,
+    axes_of=exact_axes,
+    monotone=True,
     exact=ExactFormulas(exact_x, exact_z, exact_ds, exact_kappa, exact_reaction, exact_climb, exact_climb_slope),
 )
 

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "circle_rotating". Do not edit: change its declaration and generate again.
-# interface 3, input 4ab613b0cbfb, body 9958051d5068
+# interface 4, input 4ab613b0cbfb, body abbbff768b8e
 """Bead on a hoop that turns about its vertical diameter
 
 x              = L*sin(theta)
@@ -25,7 +25,7 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=3)
+compiled = compiler(__file__, interface=4)
 
 from gqm_sym.runtime import (
     BEND,
@@ -234,6 +234,11 @@ def exact_domain(op, p):
     return None, None, 2*op.pi
 
 
+def exact_axes(op, p):
+    """A place about which V**2 and ds are even, and the distance to the next; None where there is none."""
+    return 0, op.pi
+
+
 MODEL = Formulas(
     name='circle_rotating',
     parameter='theta',
@@ -242,6 +247,7 @@ MODEL = Formulas(
     addresses=Addresses(frame.address, climb.address, rise.address, bend.address, bounds.address),
     each=Each(rise_each, bend_each, bounds_each),
     domain_of=exact_domain,
+    axes_of=exact_axes,
     exact=ExactFormulas(exact_x, exact_z, exact_ds, exact_kappa, exact_reaction, exact_climb, exact_climb_slope),
 )
 

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "circle_spring". Do not edit: change its declaration and generate again.
-# interface 3, input 8941b9022f6d, body cebb0c44cc96
+# interface 4, input 8941b9022f6d, body a3457fadf714
 """Bead on a ring, tied by a spring to a point above its centre
 
 x              = L*sin(theta)
@@ -24,7 +24,7 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=3)
+compiled = compiler(__file__, interface=4)
 
 from gqm_sym.runtime import (
     BEND,
@@ -265,6 +265,11 @@ def exact_domain(op, p):
     return None, None, 2*op.pi
 
 
+def exact_axes(op, p):
+    """A place about which V**2 and ds are even, and the distance to the next; None where there is none."""
+    return 0, op.pi
+
+
 MODEL = Formulas(
     name='circle_spring',
     parameter='theta',
@@ -273,6 +278,7 @@ MODEL = Formulas(
     addresses=Addresses(frame.address, climb.address, rise.address, bend.address, bounds.address),
     each=Each(rise_each, bend_each, bounds_each),
     domain_of=exact_domain,
+    axes_of=exact_axes,
     exact=ExactFormulas(exact_x, exact_z, exact_ds, exact_kappa, exact_reaction, exact_climb, exact_climb_slope),
 )
 

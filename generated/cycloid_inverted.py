@@ -1,5 +1,5 @@
 # Made by gqm-gen for "cycloid_inverted". Do not edit: change its declaration and generate again.
-# interface 3, input 2cc87984e0a0, body dcbe3702dd86
+# interface 4, input 2cc87984e0a0, body 0f37e9a5e2bf
 """Bead in an inverted cycloid
 
 x              = R*(theta - sin(theta))
@@ -24,7 +24,7 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=3)
+compiled = compiler(__file__, interface=4)
 
 from gqm_sym.runtime import (
     BEND,
@@ -228,6 +228,11 @@ def exact_domain(op, p):
     return 0, 2*op.pi, None
 
 
+def exact_axes(op, p):
+    """A place about which V**2 and ds are even, and the distance to the next; None where there is none."""
+    return -op.pi, 2*op.pi
+
+
 MODEL = Formulas(
     name='cycloid_inverted',
     parameter='theta',
@@ -236,6 +241,7 @@ MODEL = Formulas(
     addresses=Addresses(frame.address, climb.address, rise.address, bend.address, bounds.address),
     each=Each(rise_each, bend_each, bounds_each),
     domain_of=exact_domain,
+    axes_of=exact_axes,
     exact=ExactFormulas(exact_x, exact_z, exact_ds, exact_kappa, exact_reaction, exact_climb, exact_climb_slope),
 )
 

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "double_well". Do not edit: change its declaration and generate again.
-# interface 3, input 28c16d144828, body f3aa418489f3
+# interface 4, input 28c16d144828, body 493dae2a3a50
 """Bead between two wells
 
 x              = x
@@ -25,7 +25,7 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=3)
+compiled = compiler(__file__, interface=4)
 
 from gqm_sym.runtime import (
     BEND,
@@ -231,6 +231,11 @@ def exact_domain(op, p):
     return None, None, None
 
 
+def exact_axes(op, p):
+    """A place about which V**2 and ds are even, and the distance to the next; None where there is none."""
+    return 0, None
+
+
 MODEL = Formulas(
     name='double_well',
     parameter='x',
@@ -239,6 +244,7 @@ MODEL = Formulas(
     addresses=Addresses(frame.address, climb.address, rise.address, bend.address, bounds.address),
     each=Each(rise_each, bend_each, bounds_each),
     domain_of=exact_domain,
+    axes_of=exact_axes,
     exact=ExactFormulas(exact_x, exact_z, exact_ds, exact_kappa, exact_reaction, exact_climb, exact_climb_slope),
 )
 

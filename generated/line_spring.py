@@ -1,5 +1,5 @@
 # Made by gqm-gen for "line_spring". Do not edit: change its declaration and generate again.
-# interface 3, input 924b210c4a96, body 6be59ac20a44
+# interface 4, input 924b210c4a96, body f69f540fecd6
 """Bead on a sloping line, tied to the origin by a spring
 
 x              = x
@@ -24,7 +24,7 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=3)
+compiled = compiler(__file__, interface=4)
 
 from gqm_sym.runtime import (
     BEND,
@@ -189,6 +189,11 @@ def exact_domain(op, p):
     return None, None, None
 
 
+def exact_axes(op, p):
+    """A place about which V**2 and ds are even, and the distance to the next; None where there is none."""
+    return op.mpf(-24)/25, None
+
+
 MODEL = Formulas(
     name='line_spring',
     parameter='x',
@@ -197,6 +202,7 @@ MODEL = Formulas(
     addresses=Addresses(frame.address, climb.address, rise.address, bend.address, bounds.address),
     each=Each(rise_each, bend_each, bounds_each),
     domain_of=exact_domain,
+    axes_of=exact_axes,
     exact=ExactFormulas(exact_x, exact_z, exact_ds, exact_kappa, exact_reaction, exact_climb, exact_climb_slope),
 )
 

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "parabola_rolling". Do not edit: change its declaration and generate again.
-# interface 3, input 821845b71c06, body 86646b89acaa
+# interface 4, input 821845b71c06, body eff6ae187585
 """Ball rolling in a parabolic bowl
 
 x              = x*(-2*a*rho/sqrt(4*a**2*x**2 + 1) + 1)
@@ -25,7 +25,7 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=3)
+compiled = compiler(__file__, interface=4)
 
 from gqm_sym.runtime import (
     BEND,
@@ -215,6 +215,11 @@ def exact_domain(op, p):
     return None, None, None
 
 
+def exact_axes(op, p):
+    """A place about which V**2 and ds are even, and the distance to the next; None where there is none."""
+    return 0, None
+
+
 MODEL = Formulas(
     name='parabola_rolling',
     parameter='x',
@@ -224,6 +229,7 @@ MODEL = Formulas(
     body='rho',
     addresses=Addresses(frame.address, climb.address, rise.address, bend.address, bounds.address),
     domain_of=exact_domain,
+    axes_of=exact_axes,
     exact=ExactFormulas(exact_x, exact_z, exact_ds, exact_kappa, exact_reaction, exact_climb, exact_climb_slope),
 )
 

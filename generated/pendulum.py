@@ -1,5 +1,5 @@
 # Made by gqm-gen for "pendulum". Do not edit: change its declaration and generate again.
-# interface 3, input abbc42e6e84e, body d36ba6161e9b
+# interface 4, input abbc42e6e84e, body f287810b5d97
 """Simple pendulum, angle from the horizontal
 
 x              = L*cos(theta)
@@ -24,7 +24,7 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=3)
+compiled = compiler(__file__, interface=4)
 
 from gqm_sym.runtime import (
     BEND,
@@ -217,6 +217,11 @@ def exact_domain(op, p):
     return None, None, 2*op.pi
 
 
+def exact_axes(op, p):
+    """A place about which V**2 and ds are even, and the distance to the next; None where there is none."""
+    return -op.pi/2, op.pi
+
+
 MODEL = Formulas(
     name='pendulum',
     parameter='theta',
@@ -225,6 +230,8 @@ MODEL = Formulas(
     addresses=Addresses(frame.address, climb.address, rise.address, bend.address, bounds.address),
     each=Each(rise_each, bend_each, bounds_each),
     domain_of=exact_domain,
+    axes_of=exact_axes,
+    monotone=True,
     exact=ExactFormulas(exact_x, exact_z, exact_ds, exact_kappa, exact_reaction, exact_climb, exact_climb_slope),
 )
 

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "spiral_central". Do not edit: change its declaration and generate again.
-# interface 3, input a75a85ae8f6e, body 76dd6bbd2f96
+# interface 4, input a75a85ae8f6e, body 3e913be7b212
 """Bead on a logarithmic spiral, drawn to its pole
 
 x              = r0*exp(b*theta)*cos(theta)
@@ -25,7 +25,7 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=3)
+compiled = compiler(__file__, interface=4)
 
 from gqm_sym.runtime import (
     BEND,

@@ -28,18 +28,21 @@ def answered(
     domain: tuple[float, float, float],
     *,
     timed: bool,
+    mirrors: tuple[float, float] = (np.nan, 0.0),
+    monotone: bool = False,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Answer launches by batches alone."""
+    """Answer launches by batches alone; nothing is said of symmetry, if not by ``mirrors``."""
     lam0, v0, ways = (np.ascontiguousarray(a) for a in np.broadcast_arrays(np.asarray(lam0, float), v0, ways))
     n = lam0.size
     out, reasons = np.full((n, 2), np.nan), np.full(n, swift.HARD, dtype=np.int8)
     answer_batches(
         tuple(function.address for function in module.MODEL.each),
-        np.tile(p, (n, 1)),
+        np.tile(p, (n, 1)).T.copy(),
         lam0,
         v0.astype(float),
-        ways.astype(np.int64),
-        np.tile(domain, (n, 1)),
+        ways.astype(float),
+        np.tile((*domain, *mirrors), (n, 1)).T.copy(),
+        monotone,
         timed,
         out,
         reasons,
@@ -48,13 +51,21 @@ def answered(
 
 
 CIRCLE = (-np.inf, np.inf, 2 * np.pi)
+# What may be said of a circle's symmetry: nothing, its axes, and that heights between them only rise or only fall.
+SAID: dict[str, dict[str, Any]] = {
+    "nothing": {},
+    "axes": {"mirrors": (0.0, np.pi)},
+    "all": {"mirrors": (0.0, np.pi), "monotone": True},
+}
 
 
+@pytest.mark.parametrize("said", SAID)
 @pytest.mark.parametrize("count", [1, 7, 8, 131])
-def test_every_pendulum_away_from_the_top_is_answered(count: int, module_of: ModuleOf) -> None:
+def test_every_pendulum_away_from_the_top_is_answered(count: int, said: str, module_of: ModuleOf) -> None:
     """Whatever the number of launches: half periods of all, within a few last places."""
     amplitude = np.linspace(0.01, 2.6, count)
-    out, reasons = answered(module_of("circle"), amplitude, 0.0, 1, [1.0, 9.81, 1.0], CIRCLE, timed=True)
+    p = [1.0, 9.81, 1.0]
+    out, reasons = answered(module_of("circle"), amplitude, 0.0, 1, p, CIRCLE, timed=True, **SAID[said])
     assert (reasons == swift.DONE).all()
     assert (out[:, 1] == swift.LIBRATION).all()
     for value, a in zip(out[:, 0], amplitude, strict=True):
@@ -63,20 +74,43 @@ def test_every_pendulum_away_from_the_top_is_answered(count: int, module_of: Mod
         assert abs(mpf(float(value)) - truth) <= ULPS * np.spacing(float(truth))
 
 
+@pytest.mark.parametrize("said", SAID)
 @pytest.mark.parametrize("way", [1, -1])
-def test_laps(way: int, module_of: ModuleOf) -> None:
+def test_what_is_said_of_symmetry_changes_nothing(way: int, said: str, module_of: ModuleOf) -> None:
+    """Launched with any speed from anywhere, on any turn of the circle: the same turning points and times."""
+    rng = np.random.default_rng(11)
+    lowest = 2 * np.pi * rng.integers(-3, 4, 300)
+    place, reach = rng.uniform(-1.5, 1.5, 300), rng.uniform(1.6, 2.8, 300)
+    v0 = np.sqrt(2 * 9.81 * (np.cos(place) - np.cos(reach)))
+    launch = (lowest + place, v0, way, [1.0, 9.81, 1.0], CIRCLE)
+    ends, why = answered(module_of("circle"), *launch, timed=False, **SAID[said])
+    done = why == swift.DONE
+    assert done.all() if said == "all" else done.mean() > 0.8
+    assert ends[done] == pytest.approx(np.column_stack([lowest - reach, lowest + reach])[done], rel=4e-15, abs=4e-15)
+    times, why = answered(module_of("circle"), *launch, timed=True, **SAID[said])
+    assert ((why == swift.DONE) == done).all()
+    for value, a in zip(times[done, 0], 0.5 * (ends[done, 1] - ends[done, 0]), strict=True):
+        with mp.workdps(40):
+            truth = 2 * mp.ellipk(mp.sin(mpf(float(a)) / 2) ** 2) / mp.sqrt(mpf("9.81"))
+        assert value == pytest.approx(float(truth), rel=4e-15)
+
+
+@pytest.mark.parametrize("said", SAID)
+@pytest.mark.parametrize("way", [1, -1])
+def test_laps(way: int, said: str, module_of: ModuleOf) -> None:
     """Launched fast from anywhere: loop times, both ways; turning points there are none."""
     places = np.linspace(-3.0, 3.0, 13)
     v0 = np.sqrt(8.0**2 - 2 * 9.81 * (1 - np.cos(places)))
     p = [1.0, 9.81, 1.0]
-    out, reasons = answered(module_of("circle"), places, v0, way, p, CIRCLE, timed=True)
+    out, reasons = answered(module_of("circle"), places, v0, way, p, CIRCLE, timed=True, **SAID[said])
     assert (reasons == swift.DONE).all()
     assert (out[:, 1] == swift.CIRCULATION).all()
     with mp.workdps(40):
         truth = float(4 * mp.ellipk(4 * mpf("9.81") / 64) / 8)
     # Speeds are rounded, and the loop time follows the energy they mean.
     assert out[:, 0] == pytest.approx(truth, rel=2e-15)
-    assert (answered(module_of("circle"), places, v0, way, p, CIRCLE, timed=False)[1] == swift.PASSING).all()
+    ends = answered(module_of("circle"), places, v0, way, p, CIRCLE, timed=False, **SAID[said])
+    assert (ends[1] == swift.PASSING).all()
 
 
 def test_barriers_are_not_jumped(tmp_path: Path) -> None:
@@ -100,6 +134,20 @@ def test_barriers_are_not_jumped(tmp_path: Path) -> None:
         assert (left > 0).all()
 
 
+def test_wells_within_wells(module_of: ModuleOf) -> None:
+    """In a double well the outer orbits are their own mirror images, and the inner ones are not: both, side by side."""
+    well = module_of("double_well")
+    height = np.random.default_rng(3).uniform(-0.24, 1.0, 300)  # of lam**4 - lam**2
+    height = height[np.abs(height) > 0.02]
+    far = np.sqrt(0.5 * (1 + np.sqrt(1 + 4 * height)))
+    near = np.where(height < 0, np.sqrt(np.abs(0.5 * (1 - np.sqrt(1 + 4 * height)))), -far)
+    swept = well.sweep("turning_points", far)
+    assert swept.values == pytest.approx(np.column_stack([near, far]), rel=1e-13)
+    times = well.sweep("half_period", far).values
+    for k in range(0, far.size, 10):
+        assert times[k] == pytest.approx(well.solve(float(far[k])).half_period, rel=2e-15)
+
+
 @pytest.mark.parametrize("strength", [1e-8, 1e8])
 def test_units_decide_nothing(strength: float, module_of: ModuleOf) -> None:
     """Under another gravity the same swings are answered and the same are left, those next to the top."""
@@ -112,10 +160,12 @@ def test_units_decide_nothing(strength: float, module_of: ModuleOf) -> None:
     assert other[0][:, 0] * np.sqrt(strength) == pytest.approx(one[0][:, 0], rel=2e-15, nan_ok=True)
 
 
-def test_what_cannot_be_proved_is_left(module_of: ModuleOf) -> None:
+@pytest.mark.parametrize("said", SAID)
+def test_what_cannot_be_proved_is_left(said: str, module_of: ModuleOf) -> None:
     """Launches at the top, next to it, and what is not a number."""
     lam0 = [np.pi, np.pi - 1e-9, np.nan, 0.3]
-    out, reasons = answered(module_of("circle"), lam0, 0.0, 1, [1.0, 9.81, 1.0], CIRCLE, timed=True)
+    p = [1.0, 9.81, 1.0]
+    out, reasons = answered(module_of("circle"), lam0, 0.0, 1, p, CIRCLE, timed=True, **SAID[said])
     assert list(reasons) == [swift.HARD, swift.HARD, swift.HARD, swift.DONE]
     assert np.isnan(out[:3, 0]).all()
 

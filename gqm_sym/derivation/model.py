@@ -17,6 +17,7 @@ from gqm_sym.derivation.reality import check_somewhere_real
 from gqm_sym.derivation.rewrite import check_real, without_poles
 from gqm_sym.derivation.signs import Signs
 from gqm_sym.derivation.speed import LAM0, V0, SpeedField, conservative_speed, dissipative_speed
+from gqm_sym.derivation.symmetry import Symmetry, symmetry
 from gqm_sym.kernels.base import CONTACT_SIGN, DIRECTION, KAPPA, MASS, Kernel, W, X, Z
 from gqm_sym.parameters import Given, Value, is_positive
 
@@ -52,6 +53,8 @@ class Model:
         Φ per unit mass along the curve, and 1 + β.
     climb, climb_slope
         2Φ/inertia, so that W + climb is constant along a motion, and its derivative by λ.
+    symmetry
+        Where climb and σ are even; None where no such place was found, or nothing repeats.
     reaction
         n₀ with N/m = κ W + n₀.
     dissipation
@@ -108,6 +111,7 @@ class Model:
     inertia: sp.Expr
     climb: sp.Expr
     climb_slope: sp.Expr
+    symmetry: Symmetry | None
     reaction: sp.Expr
     dissipation: Dissipation | None
     speed_squared: sp.Expr
@@ -288,6 +292,7 @@ def derive(
         inertia=kernel.inertia,
         climb=law.climb,
         climb_slope=law.climb_slope,
+        symmetry=None if loss or curve.charted else symmetry(law.climb, law.climb_slope, shape.ds, lam),
         reaction=law.reaction,
         dissipation=loss,
         speed_squared=speed.squared,

@@ -93,7 +93,8 @@ class ModuleIR:
 
     ``dissipation`` holds what is said of a force law that is not conservative; then there are no ``bounds``.
     ``body`` is the radius of a rolling body that must fit into its track, empty for any other; ``grip`` names beta and
-    mu_static of one that may slip.
+    mu_static of one that may slip. ``monotone`` says that there are no cusps, and that the climb rises or falls all the
+    way between places of symmetry.
     """
 
     name: str
@@ -108,6 +109,7 @@ class ModuleIR:
     bounds: FunctionIR | None
     bounds_each: FunctionIR | None
     exact: tuple[ExactIR, ...]
+    monotone: bool
     dissipation: tuple[tuple[str, bool], ...]
     body: str
     grip: tuple[str, str] | None

@@ -64,7 +64,8 @@ def lower(model: Model, *, name: str, forms: tuple[tuple[str, Expr], ...]) -> Mo
         functions=(lowering.frame(), *functions, *many),
         bounds=lowering.bounds() if loss is None else None,
         bounds_each=bounds_each(lowering) if many else None,
-        exact=exact if model.curve.charted else (*exact, lowering.domain()),
+        exact=exact if model.curve.charted else (*exact, lowering.domain(), *lowering.axes()),
+        monotone=model.symmetry is not None and model.symmetry.monotone and model.cusp is None,
         dissipation=() if loss is None else tuple((flag, getattr(loss, flag)) for flag in FLAGS),
         body=str(model.force.radius) if model.force.radius else "",
         grip=model.force.grip,
@@ -217,6 +218,23 @@ class Lowering:
             parameters=self.used(e for e in ends if e is not None),
             inside=(),
             outputs=ends,
+        )
+
+    def axes(self) -> tuple[ExactIR, ...]:
+        """Places of symmetry, where there are any."""
+        symmetry = self.model.symmetry
+        if symmetry is None:
+            return ()
+        outputs = (symmetry.place, symmetry.step)
+        return (
+            ExactIR(
+                name="exact_axes",
+                doc="A place about which V**2 and ds are even, and the distance to the next; None where there is none.",
+                places=(),
+                parameters=self.used(e for e in outputs if e is not None),
+                inside=(),
+                outputs=outputs,
+            ),
         )
 
     def exact_function(

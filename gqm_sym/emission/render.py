@@ -16,7 +16,7 @@ from gqm_sym.emission.printer import FUNCTIONS, CodePrinter, ExactPrinter, Inter
 from gqm_sym.errors import EmissionError
 
 # The version of gqm_sym.runtime.interface that emitted code is written for (a test holds the two together).
-INTERFACE = 3
+INTERFACE = 4
 
 # Functions that the runtime has in forms that fill vector registers; the rest is the standard library's.
 _ELEMENTARY = frozenset({"cos", "cosh", "exp", "sin", "sinh"})
@@ -104,6 +104,8 @@ def render(module: ModuleIR, *, source: str) -> str:
         "grip": repr(module.grip) if module.grip else "",
         "addresses": ", ".join(f"{f['name']}.address" for f in functions if f["name"] in _ADDRESSES),
         "exact_formulas": exact,
+        "axes": next((f.name for f in module.exact if f.name == "exact_axes"), ""),
+        "monotone": module.monotone,
         "each": ", ".join(f["name"] for f in functions if f["each"]),
         "dissipation": ", ".join(f"{flag}={value}" for flag, value in module.dissipation),
         "keywords": ", ".join(f"{name}: Any = {value!r}" for name, value in module.defaults),

@@ -7,16 +7,20 @@ each. Every step is a loop over the columns without branches, which vectorises.
 from math import fabs, inf
 
 from gqm_sym.runtime.crossing import call_bounds_each, call_rise_each
-from gqm_sym.runtime.entries import first_step
-from gqm_sym.runtime.fused import choose
+from gqm_sym.runtime.fused import choose, whole_below
 from gqm_sym.runtime.jit import Inner
 from gqm_sym.runtime.search import UNRESOLVED
 from gqm_sym.runtime.swift import LIBRATION
 
 # Rows of a batch: which launch, its place and V**2, offsets of both ends from it, both ends; what the quadrature keeps;
-# what the search needs: which way it goes and how far, its state, bracket, trial and the zero.
+# what the search needs: which way it goes and how far at most, and how far the other way, its state, bracket, trial and
+# the zero, how far the axis of symmetry is that the orbit may have, and the step from one axis to the next.
 WHO, START, SPEED, LEAST, MOST, A, B, SUM, VALUE, CHANGE, LOW, HIGH, LASTING = range(13)
-WAY, REACH, STATE, LEFT, RIGHT, TRIAL, AHEAD, ROWS = range(12, 20)
+WAY, REACH, BACK, STATE, LEFT, RIGHT, TRIAL, AHEAD, AXIS, STEP, ROWS = range(12, 23)
+# Rows of what is known of each launch's curve: both ends, the period, a place of symmetry, the step to the next.
+FIRST, LAST, PERIOD, PLACE, NEXT, KNOWN = range(6)
+# How far back it is on a closed curve: both zeros lie within one period.
+CLOSED = -1.0
 # What a search has come to.
 SEEKING, FOUND, NOWHERE = 0.0, 1.0, 2.0
 # Trials of a search, and the relative step after which the next would be below rounding.
@@ -33,33 +37,51 @@ def any_is(row, value):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def launch(fns, n, s, p, domains, work):  # type: ignore[no-untyped-def]
+def launch(fns, n, s, p, known, work):  # type: ignore[no-untyped-def]
     """Set up the search ahead: a body released at rest goes where it falls."""
-    if any_is(s[SPEED, :n], 0.0):
+    start, w0, way, state = s[START, :n], s[SPEED, :n], s[WAY, :n], s[STATE, :n]
+    reach, back, trial = s[REACH, :n], s[BACK, :n], s[TRIAL, :n]
+    if any_is(w0, 0.0):
         none, rows = work[0, :n], work[1:4].reshape(-1)[: 3 * n].reshape(3, n)
         none[:] = 0.0
-        call_rise_each(fns[0], n, s[START, :n], s[START, :n], none, p, rows)
+        call_rise_each(fns[0], n, start, start, none, p, rows)
         for j in range(n):
-            if s[SPEED, j] == 0.0:
-                s[WAY, j] = (rows[2, j] < 0.0) * 1.0 - (rows[2, j] > 0.0) * 1.0
+            falls = (rows[2, j] < 0.0) * 1.0 - (rows[2, j] > 0.0) * 1.0
+            way[j] = choose(w0[j] == 0.0, falls, way[j])
     for j in range(n):
-        low, high, period = domains[int(s[WHO, j]), 0], domains[int(s[WHO, j]), 1], domains[int(s[WHO, j]), 2]
-        s[REACH, j] = period if period > 0.0 else (high - s[START, j] if s[WAY, j] > 0.0 else s[START, j] - low)
-        s[TRIAL, j] = min(first_step(low, high, period), s[REACH, j])
-        s[AHEAD, j], s[STATE, j] = 0.0, SEEKING if s[WAY, j] != 0.0 else NOWHERE
+        low, high, period = known[FIRST, j], known[LAST, j], known[PERIOD, j]
+        forwards, closed, length = way[j] > 0.0, period > 0.0, high - low
+        reach[j] = choose(closed, period, choose(forwards, high - start[j], start[j] - low))
+        back[j] = choose(closed, CLOSED, choose(forwards, start[j] - low, high - start[j]))
+        trial[j] = choose(closed, 0.125 * period, choose(length < inf, 0.125 * length, 1.0))
+        state[j] = choose((way[j] != 0.0) & (low <= start[j]) & (start[j] <= high), SEEKING, NOWHERE)
+    axis, next_axis, zero = s[AXIS, :n], s[STEP, :n], s[AHEAD, :n]
+    for j in range(n):
+        step, away = known[NEXT, j], way[j] * (known[PLACE, j] - start[j])
+        first = choose(step > 0.0, away - step * whole_below(away / step), away)
+        # Released at rest it falls towards the axis, and comes to rest on the other side.
+        mirrored = choose((w0[j] == 0.0) & (first > 0.0), 2.0 * first, trial[j])
+        trial[j] = choose(mirrored < reach[j], mirrored, reach[j])
+        axis[j], next_axis[j], zero[j] = first, step, 0.0
 
 
 @Inner
-def turn_round(n, s, domains):  # type: ignore[no-untyped-def]
-    """Set up the search behind: none for a launch from rest. What was ahead is kept as an offset, in ``A``."""
+def turn_round(n, s):  # type: ignore[no-untyped-def]
+    """Set up the search behind: none for a launch from rest. What was ahead is kept as an offset, in ``A``.
+
+    The axis is the last before that, now as an offset; it mirrors what was found to the first trial.
+    """
+    way, reach, back, state = s[WAY, :n], s[REACH, :n], s[BACK, :n], s[STATE, :n]
+    trial, zero, axis, next_axis, end, w0 = s[TRIAL, :n], s[AHEAD, :n], s[AXIS, :n], s[STEP, :n], s[A, :n], s[SPEED, :n]
     for j in range(n):
-        low, high, period = domains[int(s[WHO, j]), 0], domains[int(s[WHO, j]), 1], domains[int(s[WHO, j]), 2]
-        s[A, j] = s[WAY, j] * s[AHEAD, j]
-        s[WAY, j] = -s[WAY, j]
-        rest = high - s[START, j] if s[WAY, j] > 0.0 else s[START, j] - low
-        s[REACH, j] = period - s[AHEAD, j] if period > 0.0 else rest
-        s[TRIAL, j] = min(s[AHEAD, j], s[REACH, j])
-        s[AHEAD, j], s[STATE, j] = 0.0, SEEKING if s[SPEED, j] > 0.0 else FOUND
+        ahead, step = zero[j], next_axis[j]
+        last = axis[j] + choose(step > 0.0, step * whole_below((ahead - axis[j]) / step), 0.0)
+        end[j], axis[j] = way[j] * ahead, way[j] * last
+        reach[j] = choose(back[j] == CLOSED, reach[j] - ahead, back[j])
+        mirrored = choose(ahead > 2.0 * last, ahead - 2.0 * last, ahead)
+        trial[j] = choose(mirrored < reach[j], mirrored, reach[j])
+    for j in range(n):
+        way[j], zero[j], state[j] = -way[j], 0.0, choose(w0[j] > 0.0, SEEKING, FOUND)
 
 
 @Inner
@@ -100,30 +122,33 @@ def seek(fns, n, s, p, work):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def prove(fns, kind, pieces, n, s, p, work):  # type: ignore[no-untyped-def]
+def prove(fns, kind, mirrored, pieces, n, s, p, work):  # type: ignore[no-untyped-def]
     """Set the state to FOUND where V**2 > 0 and ds > 0 between both ends is certain, else to NOWHERE.
 
     V**2 is zero at both ends of a libration, and what it is at launch at both ends of a lap. Over the piece at a zero
-    the slope must have its sign throughout: the zero is simple, and the only one there.
+    the slope must have its sign throughout: the zero is simple, and the only one there. Half of an orbit that is
+    ``mirrored`` is enough, up to the axis.
     """
     places, behind, lo, hi = work[0, :n], work[1, :n], work[2, :n], work[3, :n]
     offsets, speeds, box = work[4, :n], work[5, :n], work[6:10].reshape(-1)[: 4 * n].reshape(4, n)
     rows = work[10:13].reshape(-1)[: 3 * n].reshape(3, n)
-    start, w0, least, most, state = s[START, :n], s[SPEED, :n], s[LEAST, :n], s[MOST, :n], s[STATE, :n]
+    start, w0, least, state = s[START, :n], s[SPEED, :n], s[LEAST, :n], s[STATE, :n]
+    most = s[AXIS if mirrored else MOST, :n]
     for j in range(n):
         behind[j], speeds[j], state[j] = start[j] + least[j], w0[j], FOUND
     for k in range(1, pieces + 1):
-        first, last = kind == LIBRATION and k == 1, kind == LIBRATION and k == pieces
+        first, end = kind == LIBRATION and k == 1, k == pieces
+        last, half = kind == LIBRATION and end and not mirrored, end and mirrored
         share = k / pieces
         for j in range(n):
-            offsets[j] = most[j] if k == pieces else least[j] + share * (most[j] - least[j])
+            offsets[j] = most[j] if end else least[j] + share * (most[j] - least[j])
             places[j] = start[j] + offsets[j]
             lo[j], hi[j] = behind[j], places[j]
         call_bounds_each(fns[2], n, lo, hi, p, box)
-        if k < pieces:
-            call_rise_each(fns[0], n, start, places, offsets, p, rows)
-        else:
+        if end:
             rows[0] = 0.0
+        else:
+            call_rise_each(fns[0], n, start, places, offsets, p, rows)
         for j in range(n):
             lost = offsets[j] * rows[0, j]
             w, clear = w0[j] - lost, UNRESOLVED * (w0[j] + fabs(lost))
@@ -131,7 +156,9 @@ def prove(fns, kind, pieces, n, s, p, work):  # type: ignore[no-untyped-def]
             loss, gain, from_w = box[1, j], -box[0, j], speeds[j]
             valley = (loss * w + gain * from_w - loss * gain * (hi[j] - lo[j])) / (loss + gain)
             lowest = choose((loss > 0.0) & (gain > 0.0), valley, choose(w < from_w, w, from_w))
-            good = choose(first, -loss, choose(last, -gain, lowest - clear)) > 0.0
-            good = good & (last | (w > clear)) & (box[2, j] > 0.0)
+            # On the way to the axis it grows, but for rounding.
+            grown = 0.5 * from_w - choose(loss > 0.0, loss, 0.0) * (hi[j] - lo[j])
+            good = choose(first, -loss, choose(last, -gain, choose(half, grown, lowest - clear))) > 0.0
+            good = good & (last | half | (w > clear)) & (box[2, j] > 0.0)
             state[j] = choose(good, state[j], NOWHERE)
             behind[j], speeds[j] = places[j], w

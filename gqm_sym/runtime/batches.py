@@ -4,26 +4,30 @@ Orbits for which `batch_search` proves no turning points, or whose time does not
 takes them one by one. Columns of a batch are whole registers: the last orbit is repeated to fill one.
 """
 
-from math import fabs, inf, isfinite, nan, pi, sqrt
+from math import fabs, inf, nan, pi, sqrt
 
 import numpy as np
 from numba import types
 
 from gqm_sym.runtime.batch_search import (
     AHEAD,
+    AXIS,
     CHANGE,
     FOUND,
     HIGH,
+    KNOWN,
     LASTING,
     LEAST,
     LOW,
     MOST,
     NOWHERE,
+    PERIOD,
     REACH,
     ROWS,
     SPEED,
     START,
     STATE,
+    STEP,
     SUM,
     VALUE,
     WAY,
@@ -54,8 +58,12 @@ from gqm_sym.runtime.swift import (
 
 # Orbits of a batch: its arrays stay in the first-level cache. Orbits of a full register, at most.
 BATCH, LANES = 128, 8
-# Pieces of an orbit for its proof: a few first, more where those do not suffice.
-FEW_PIECES, MANY_PIECES = 3, 12
+# Pieces of an orbit, or of half a mirrored one, for its proof: a few first, more where those do not suffice.
+FEW_PIECES, FEW_OF_HALF, MANY_PIECES = 3, 2, 12
+# Roundings by which the middle of an orbit may miss the axis that makes it its own mirror image.
+ROUNDINGS = 8.0 * 2.0**-52
+# An orbit about one axis that reaches its neighbours, twice a step apart, is at rest there.
+NEIGHBOURING = 1.999
 # A rule's change is foreseen from its last two, which fall geometrically: below this it is less than rounding. The
 # first of them must be below FALLING, whose fourth power is that: one accidentally small change decides nothing.
 FORESEEN, FALLING = 3e-17, 7e-5
@@ -85,6 +93,15 @@ def gather(s, p, count, n, chosen, kept, t, q, rows):  # type: ignore[no-untyped
 def shrink(s, p, count, n, chosen, kept, rows):  # type: ignore[no-untyped-def]
     """Close up to the ``kept`` columns that are ``chosen``, in ascending order; returns how many columns are left."""
     return n if kept == n else gather(s, p, count, n, chosen, kept, s, p, rows)
+
+
+@Inner
+def fill_up(given, row):  # type: ignore[no-untyped-def]
+    """Copy what is given into a row, and repeat the last of it to the row's end."""
+    for j in range(given.size):
+        row[j] = given[j]
+    for j in range(given.size, row.size):
+        row[j] = row[j - 1]
 
 
 @Inner
@@ -118,20 +135,21 @@ def fill(fns, kind, n, node, s, p, work):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def times(fns, kind, n, s, flat, count, chosen, work, out, reasons):  # type: ignore[no-untyped-def]
+def times(fns, kind, mirrored, n, s, flat, count, chosen, work, out, reasons):  # type: ignore[no-untyped-def]
     """Half periods or loop times by the trapezoidal rule, into the rows of ``out`` that belong to the orbits.
 
     Nodes are doubled until the next change is foreseen to be below rounding; orbits for which that is so drop out, and
-    those whose V**2 all but vanishes.
+    those whose V**2 all but vanishes. Of orbits that are ``mirrored`` only nodes up to the middle are looked at.
     """
     for j in range(n):
         s[SUM, j], s[VALUE, j], s[CHANGE, j], s[LOW, j], s[HIGH, j] = 0.0, 0.0, 0.0, inf, 0.0
     begin, nodes = 0, FEWEST
+    last, sides = (FEWEST // 2, 2.0) if mirrored else (FEWEST, 1.0)
     while True:
         p = flat[: count * n].reshape(count, n)
-        for node in range(begin, nodes + 1 if begin == 0 else 2 * begin - 1):
+        for node in range(begin, last + 1):
             rates = fill(fns, kind, n, node, s, p, work)
-            ends = 0.5 if node in (0, FEWEST) else 1.0
+            ends = 0.5 * sides if node == 0 or (node == last and begin == 0) else sides
             for j in range(n):
                 s[SUM, j] += ends * rates[j]
             if begin == 0:  # the two levels before the first
@@ -142,30 +160,41 @@ def times(fns, kind, n, s, flat, count, chosen, work, out, reasons):  # type: ig
         if begin == 0:
             for j in range(n):
                 s[CHANGE, j] = fabs(s[VALUE, j] - s[CHANGE, j]) / s[VALUE, j]
-        kept = 0
+        known, clear = work[0, :n], work[1, :n]
         for j in range(n):
             value, before = s[SUM, j] / nodes, s[CHANGE, j]
             change = fabs(value - s[VALUE, j]) / value
             s[VALUE, j], s[CHANGE, j] = value, change
-            if not s[LOW, j] > LEAST_BALANCE * s[HIGH, j]:
+            foreseen = choose(change <= SAME, 0.0, change * (change / before) * (change / before))
+            known[j] = choose(before <= FALLING, foreseen, inf)
+            clear[j] = s[LOW, j] - LEAST_BALANCE * s[HIGH, j]
+        kept = 0
+        for j in range(n):
+            if not clear[j] > 0.0:
                 continue
-            if before <= FALLING and (change <= SAME or change * (change / before) ** 2 <= FORESEEN):
+            if known[j] <= FORESEEN:
                 k = int(s[WHO, j])
-                out[k, 0], reasons[k] = value, DONE
+                out[k, 0], reasons[k] = s[VALUE, j], DONE
             else:
                 chosen[kept] = j
                 kept += 1
-        begin, nodes = nodes + 1, 2 * nodes
+        begin, nodes, last = nodes + 1, 2 * nodes, nodes + (nodes // 2 if mirrored else nodes)
         if kept == 0 or nodes > MOST_NODES:
             return
         n = shrink(s, flat, count, n, chosen, kept, LASTING)
 
 
 @Inner
-def settle(fns, kind, n, s, flat, t, spare, count, chosen, others, work, timed, out, reasons):  # type: ignore[no-untyped-def]
-    """Prove orbits of one kind, and answer for those that are proved; ``t`` and ``spare`` take the others meanwhile."""
-    for pieces in (FEW_PIECES, MANY_PIECES):
-        prove(fns, kind, pieces, n, s, flat[: count * n].reshape(count, n), work)
+def settle(fns, kind, mirrored, known, n, s, flat, t, spare, count, chosen, others, work, timed, out, reasons):  # type: ignore[no-untyped-def]
+    """Prove orbits of one kind that are not ``known``, and answer for those that are proved.
+
+    ``t`` and ``spare`` take the others meanwhile.
+    """
+    for pieces in (FEW_OF_HALF if mirrored else FEW_PIECES, MANY_PIECES):
+        if known:
+            s[STATE, :n] = FOUND
+        else:
+            prove(fns, kind, mirrored, pieces, n, s, flat[: count * n].reshape(count, n), work)
         proved, left = 0, 0
         for j in range(n):
             if s[STATE, j] != FOUND:
@@ -184,7 +213,7 @@ def settle(fns, kind, n, s, flat, t, spare, count, chosen, others, work, timed, 
         rest = gather(s, flat, count, n, others, left, t, spare, ROWS)
         if proved and timed:
             m = shrink(s, flat, count, n, chosen, proved, LASTING)
-            times(fns, kind, m, s, flat, count, chosen, work, out, reasons)
+            times(fns, kind, mirrored, m, s, flat, count, chosen, work, out, reasons)
         if left == 0:
             return
         n, s, flat, t, spare = rest, t, spare, s, flat
@@ -192,51 +221,55 @@ def settle(fns, kind, n, s, flat, t, spare, count, chosen, others, work, timed, 
 
 @entry(
     types.void(
-        *(types.UniTuple(types.int64, 3), _ROWS, _LINE, _LINE, types.int64[::1], _ROWS, types.boolean),
+        *(types.UniTuple(types.int64, 3), _ROWS, _LINE, _LINE, _LINE, _ROWS, types.boolean, types.boolean),
         *(_ROWS, types.int8[::1]),
     ),
     nogil=True,
 )
-def answer_batches(fns, ps, lam0s, v0s, ways, domains, timed, out, reasons):  # type: ignore[no-untyped-def]
+def answer_batches(fns, ps, lam0s, v0s, ways, domains, monotone, timed, out, reasons):  # type: ignore[no-untyped-def]
     """Fill rows of ``out`` and of ``reasons`` for the launches that this can answer, as `swift.answer_many` does.
 
-    The others keep their reason. ``timed`` asks for times, else for turning points.
+    The others keep their reason. ``monotone`` says that V**2 rises or falls all the way between axes of symmetry and
+    that ds is nowhere 0; ``timed`` asks for times, else for turning points.
     """
-    count = ps.shape[1]
+    count = ps.shape[0]
     s, t, u = np.empty((ROWS, BATCH)), np.empty((ROWS, BATCH)), np.empty((ROWS, BATCH))
     flat, spare, other = np.empty(count * BATCH), np.empty(count * BATCH), np.empty(count * BATCH)
-    work, chosen, others = np.empty((13, BATCH)), np.empty(BATCH, dtype=np.int64), np.empty(BATCH, dtype=np.int64)
+    known, work = np.empty((KNOWN, BATCH)), np.empty((13, BATCH))
+    chosen, others = np.empty(BATCH, dtype=np.int64), np.empty(BATCH, dtype=np.int64)
     for begin in range(0, lam0s.size, BATCH):
-        filled = 0
-        for k in range(begin, min(begin + BATCH, lam0s.size)):
-            out[k, 0] = out[k, 1] = nan
-            low, high = domains[k, 0], domains[k, 1]
-            if isfinite(v0s[k]) and isfinite(ps[k].sum()) and low <= lam0s[k] <= high and isfinite(lam0s[k]):
-                s[WHO, filled], s[START, filled], s[SPEED, filled] = k, lam0s[k], v0s[k] * v0s[k]
-                s[WAY, filled] = ways[k]
-                chosen[filled] = filled
-                filled += 1
-        if filled == 0:
-            continue
-        n = -(-filled // LANES) * LANES
-        gather(s, flat, 0, n, chosen, filled, s, flat, ROWS)
+        m = min(BATCH, lam0s.size - begin)
+        n = -(-m // LANES) * LANES
+        p = flat[: count * n].reshape(count, n)
+        for row in range(KNOWN):
+            fill_up(domains[row, begin : begin + m], known[row, :n])
+        for row in range(count):
+            fill_up(ps[row, begin : begin + m], p[row])
+        fill_up(lam0s[begin : begin + m], s[START, :n])
+        fill_up(v0s[begin : begin + m], s[SPEED, :n])
+        fill_up(ways[begin : begin + m], s[WAY, :n])
         for j in range(n):
+            v0 = s[SPEED, j]
+            total = s[START, j] + v0
             for row in range(count):
-                flat[row * n + j] = ps[int(s[WHO, j]), row]
+                total += p[row, j]
+            s[WHO, j], s[SPEED, j] = begin + min(j, m - 1), v0 * v0
+            s[WAY, j] = choose(total - total == 0.0, s[WAY, j], 0.0)
+        out[begin : begin + m] = nan
         laps = 0
         for ahead in (True, False):
             p = flat[: count * n].reshape(count, n)
             if ahead:
-                launch(fns, n, s, p, domains, work)
+                launch(fns, n, s, p, known, work)
             else:
-                turn_round(n, s, domains)
+                turn_round(n, s)
             seek(fns, n, s, p, work)
             kept = 0
             for j in range(n):
                 if s[STATE, j] == FOUND and s[AHEAD, j] <= s[REACH, j]:
                     chosen[kept] = j
                     kept += 1
-                elif ahead and s[STATE, j] == NOWHERE and s[SPEED, j] > 0.0 and domains[int(s[WHO, j]), 2] > 0.0:
+                elif ahead and s[STATE, j] == NOWHERE and s[WAY, j] * s[SPEED, j] != 0.0 and known[PERIOD, j] > 0.0:
                     others[laps] = j
                     laps += 1
             if ahead:
@@ -244,10 +277,14 @@ def answer_batches(fns, ps, lam0s, v0s, ways, domains, timed, out, reasons):  # 
             n = shrink(s, flat, count, n, chosen, kept, ROWS)
             if n == 0:
                 break
+        mirrored, proved = True, monotone
         for j in range(n):
             first, second = s[A, j], s[WAY, j] * s[AHEAD, j]
             s[LEAST, j], s[MOST, j] = min(first, second), max(first, second)
             s[A, j], s[B, j] = s[START, j] + s[LEAST, j], s[START, j] + s[MOST, j]
+            missed = fabs(0.5 * (first + second) - s[AXIS, j])
+            mirrored &= missed <= ROUNDINGS * (fabs(s[START, j]) + fabs(first) + fabs(second))
+            proved &= (s[STEP, j] == 0.0) | (fabs(first - second) < NEIGHBOURING * s[STEP, j])
         for j in range(laps):
             lap = u[WAY, j] * u[REACH, j]
             u[LEAST, j], u[MOST, j] = min(lap, 0.0), max(lap, 0.0)
@@ -255,4 +292,22 @@ def answer_batches(fns, ps, lam0s, v0s, ways, domains, timed, out, reasons):  # 
             if kind == CIRCULATION:
                 n, s, flat, u, other = laps, u, other, s, flat
             if n:
-                settle(fns, kind, n, s, flat, t, spare, count, chosen, others, work, timed, out, reasons)
+                mirrored &= kind == LIBRATION
+                settle(
+                    fns,
+                    kind,
+                    mirrored,
+                    mirrored and proved,
+                    n,
+                    s,
+                    flat,
+                    t,
+                    spare,
+                    count,
+                    chosen,
+                    others,
+                    work,
+                    timed,
+                    out,
+                    reasons,
+                )

@@ -108,6 +108,10 @@ class Formulas:
         Of a rolling body whose static friction is known: its inertia beta and its coefficient mu_static.
     domain_of
         ``f(op, p)``: both ends of the parameter's range and its period, None where there is none. A chart has its own.
+    axes_of
+        ``f(op, p)``: a place about which V**2 and ds are even, and the distance to the next; None where there is none.
+    monotone
+        Whether V**2 is proved to rise or fall all the way between two such places, and ds to vanish nowhere.
     exact
         The formulas over a namespace of operations, of a charted curve those of the forces; None where there are none.
     chart
@@ -124,6 +128,8 @@ class Formulas:
     positive: tuple[str, ...]
     addresses: Addresses
     domain_of: Callable[..., Any] | None = None
+    axes_of: Callable[..., Any] | None = None
+    monotone: bool = False
     exact: ExactFormulas | ExactClimb | None = None
     chart: ChartMaker | None = None
     dissipation: Dissipation | None = None

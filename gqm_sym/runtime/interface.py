@@ -44,7 +44,7 @@ from typing import Any, NamedTuple
 from numba import types
 
 # Raised with every change of a signature here, or of a number that runtime code puts into generated modules.
-INTERFACE = 3
+INTERFACE = 4
 
 REAL = types.float64
 MANY = types.CPointer(REAL)

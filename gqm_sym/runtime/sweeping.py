@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from gqm_sym.errors import GQMError, InputError, ParameterError, SolutionError
 from gqm_sym.runtime import swift
+from gqm_sym.runtime.batch_search import FIRST, KNOWN, LAST, PERIOD
 from gqm_sym.runtime.batches import answer_batches
 from gqm_sym.runtime.entries import frame_at
 from gqm_sym.runtime.extremes import over_legs
@@ -232,21 +233,24 @@ def _answer(
     for begin in range(part.start, part.stop, CHUNK):
         end = min(begin + CHUNK, part.stop)
         lam0, v0, direction, place, *p = (_laid_out(column, begin, end) for column in columns)
-        domain = np.empty((end - begin, 3))
-        for i, (end_value, missing) in enumerate(
-            zip(formulas.domain_of(ARRAYS, tuple(p)), (-inf, inf, 0.0), strict=True)
-        ):
-            domain[:, i] = missing if end_value is None else end_value
-        domain[domain[:, 2] > 0.0, :2] = -inf, inf
-        parameters = np.column_stack(p)
+        domain = np.empty((KNOWN, end - begin))
+        symmetry = (None, None) if formulas.axes_of is None else formulas.axes_of(ARRAYS, tuple(p))
+        known = (*formulas.domain_of(ARRAYS, tuple(p)), *symmetry)
+        for i, (value, missing) in enumerate(zip(known, (-inf, inf, 0.0, nan, 0.0), strict=True)):
+            domain[i] = missing if value is None else value
+        closed = domain[PERIOD] > 0.0
+        np.copyto(domain[FIRST], -inf, where=closed)
+        np.copyto(domain[LAST], inf, where=closed)
+        parameters = np.array(p)
         if formulas.each is not None and asked.asked in (swift.TIME, swift.PLACES):
             answer_batches(
                 tuple(function.address for function in formulas.each),
                 parameters,
                 lam0,
                 v0,
-                direction.astype(np.int64),
+                direction,
                 domain,
+                formulas.monotone,
                 asked.asked == swift.TIME,
                 out[begin:end],
                 reasons[begin:end],
@@ -256,7 +260,7 @@ def _answer(
             parameters,
             lam0,
             v0,
-            direction.astype(np.int64),
+            direction,
             domain,
             place,
             asked.asked,

@@ -217,7 +217,7 @@ def extreme(fns, p, kind, lam0, w0, a, b, width, asked, sign, work):  # type: ig
 
 @entry(
     types.void(
-        *(_ADDRESSES, _ROWS, _LINE, _LINE, types.int64[::1], _ROWS, _LINE, types.int64),
+        *(_ADDRESSES, _ROWS, _LINE, _LINE, _LINE, _ROWS, _LINE, types.int64),
         *(_ROWS, types.int8[::1]),
     ),
     nogil=True,
@@ -225,23 +225,23 @@ def extreme(fns, p, kind, lam0, w0, a, b, width, asked, sign, work):  # type: ig
 def answer_many(fns, ps, lam0s, v0s, ways, domains, places, asked, out, reasons):  # type: ignore[no-untyped-def]
     """Fill a row of ``out`` and of ``reasons`` for each launch that is HARD so far.
 
-    ``ps`` has a row of parameters a launch, ``domains`` both ends and the period. A row of ``out`` holds both turning
+    ``ps`` has a row for each parameter, ``domains`` for both ends and the period. A row of ``out`` holds both turning
     points (PLACES), the least and the greatest (SPEEDS, FORCES), or the half period or loop time and the kind (TIME).
     """
-    work, rates = np.empty((4, MOST_NODES)), np.empty(MOST_NODES)
+    work, rates, p = np.empty((4, MOST_NODES)), np.empty(MOST_NODES), np.empty(ps.shape[0])
     for k in range(lam0s.size):
         if reasons[k] != HARD:
             continue
         out[k, 0] = out[k, 1] = np.nan
-        p, lam0, v0 = ps[k], lam0s[k], v0s[k]
-        low, high, period = domains[k, 0], domains[k, 1], domains[k, 2]
+        p[:], lam0, v0 = ps[:, k], lam0s[k], v0s[k]
+        low, high, period = domains[0, k], domains[1, k], domains[2, k]
         if not (isfinite(lam0) and isfinite(v0) and isfinite(p.sum())):
             reasons[k] = MEANINGLESS
             continue
         if not low <= lam0 <= high:
             reasons[k] = OUTSIDE
             continue
-        way, ahead, behind = ends(fns, p, lam0, v0, ways[k], low, high, period)
+        way, ahead, behind = ends(fns, p, lam0, v0, int(ways[k]), low, high, period)
         if way != 0 and ahead[0] == LIMIT and period > 0.0 and v0 > 0.0:
             kind, a, b, width = CIRCULATION, lam0, lam0 + way * period, way * period
         elif way != 0 and ahead[0] == TURN and behind[0] == TURN:

@@ -1,0 +1,81 @@
+"""Places about which a well and its curve are even: orbits around one are their own mirror images."""
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+
+import sympy as sp
+
+# Forms of more operations than this are not written out to find their symmetry.
+MAX_OPERATIONS = 200
+_WAVES = (sp.sin, sp.cos)
+
+
+@dataclass(frozen=True, slots=True)
+class Symmetry:
+    """Where a climb and σ are even functions of the distance.
+
+    Attributes
+    ----------
+    place
+        One such place.
+    step
+        From each to the next, None for a lone one: two mirrors make one of every multiple of their distance.
+    monotone
+        Whether the climb is proved to rise or fall all the way between two of them that are neighbours.
+    """
+
+    place: sp.Expr
+    step: sp.Expr | None
+    monotone: bool
+
+
+def symmetry(climb: sp.Expr, climb_slope: sp.Expr, ds: sp.Expr, lam: sp.Symbol) -> Symmetry | None:
+    """Return where climb and ds are even; None where no such place was found.
+
+    Tried are zeros of the arguments of all functions, steps of a quarter turn from those of sines and cosines, 0, and
+    what the two highest powers of a polynomial ask for.
+    """
+    forms = (climb, ds)
+    found = [place for place in dict.fromkeys(_candidates(forms, lam)) if all(_is_even(f, lam, place) for f in forms)]
+    if not found:
+        return None
+    step = min((abs(place - found[0]) for place in found[1:]), key=_size, default=None)
+    return Symmetry(found[0], step, _only_there(climb_slope, lam, found[0], step))
+
+
+def _size(step: sp.Expr) -> sp.Expr:
+    return step if step.is_number else sp.oo
+
+
+def _candidates(forms: Iterable[sp.Expr], lam: sp.Symbol) -> Iterator[sp.Expr]:
+    functions = {function for form in forms for function in form.atoms(sp.Function) if function.has(lam)}
+    for function in sorted(functions, key=sp.default_sort_key):
+        rate = function.args[0].diff(lam)
+        if rate and not rate.has(lam):
+            zero = -function.args[0].xreplace({lam: sp.S.Zero}) / rate
+            quarters = (-1, 0, 1, 2) if isinstance(function, _WAVES) else (0,)
+            yield from (zero + k * sp.pi / (2 * rate) for k in quarters)
+    yield sp.S.Zero
+    for form in forms:
+        polynomial = form.as_poly(lam)
+        if polynomial is not None and polynomial.degree() > 1:
+            highest, second = (polynomial.nth(polynomial.degree() - k) for k in (0, 1))
+            yield sp.cancel(-second / (polynomial.degree() * highest))
+
+
+def _is_even(form: sp.Expr, lam: sp.Symbol, place: sp.Expr) -> bool:
+    mirrored = form.xreplace({lam: 2 * place - lam})
+    return mirrored == form or bool(form.count_ops() <= MAX_OPERATIONS and sp.expand(mirrored - form) == 0)
+
+
+def _only_there(slope: sp.Expr, lam: sp.Symbol, place: sp.Expr, step: sp.Expr | None) -> bool:
+    """Whether a slope vanishes at places of symmetry and nowhere else: a wave, a power, or a hyperbolic sine."""
+    shape = slope.as_independent(lam, as_Add=False)[1]
+    if shape.xreplace({lam: place}) != 0:
+        return False
+    if isinstance(shape, _WAVES):
+        rate = shape.args[0].diff(lam)
+        return not rate.has(lam) and step is not None and sp.simplify(step * abs(rate) - sp.pi) == 0
+    if isinstance(shape, sp.sinh):
+        return not shape.args[0].diff(lam).has(lam)
+    return bool(shape.as_base_exp()[0] == lam and shape.as_base_exp()[1].is_positive)

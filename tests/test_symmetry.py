@@ -1,0 +1,50 @@
+"""Places of symmetry: that forms are even about them, and that slopes which are said to vanish only there do."""
+
+import pytest
+import sympy as sp
+from mpmath import mp, mpf
+
+import gqm_sym as gqm
+
+PENDULUM = gqm.Curve.parametric(x="L*cos(theta)", z="L*sin(theta)", parameter="theta", parameters={"L": 1})
+# Curves, a place of symmetry, the step to the next, and whether heights between them only rise or only fall.
+CASES = {
+    "pendulum": (PENDULUM, -sp.pi / 2, sp.pi, True),
+    "parabola": (gqm.Curve.graph("x**2", parameter="x"), 0, None, True),
+    "parabola, shifted": (gqm.Curve.graph("3*x**2 - x", parameter="x"), sp.Rational(1, 6), None, False),
+    "double well": (gqm.Curve.graph("x**4 - 2*x**2", parameter="x"), 0, None, False),
+    "catenary": (gqm.Curve.graph("cosh(x/2)", parameter="x"), 0, None, True),
+    "wave": (gqm.Curve.graph("sin(3*x)", parameter="x"), -sp.pi / 6, sp.pi / 3, True),
+    "two waves": (gqm.Curve.graph("cos(x) + cos(2*x)", parameter="x"), 0, sp.pi, False),
+    "two waves out of step": (gqm.Curve.graph("sin(x) + cos(3*x)/2 + x/9", parameter="x"), None, None, False),
+    "cubic": (gqm.Curve.graph("x**3", parameter="x"), None, None, False),
+    "spiral": (gqm.Curve.polar("exp(theta/5)", parameter="theta"), None, None, False),
+}
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_symmetry(name: str) -> None:
+    """The places are the textbook's, and numbers agree."""
+    curve, place, step, monotone = CASES[name]
+    model = gqm.derive(curve, gqm.Gravity())
+    found = model.symmetry
+    if place is None:
+        assert found is None
+        return
+    assert found is not None
+    assert (found.place, found.step, found.monotone) == (place, step, monotone)
+    values = {
+        sp.Symbol(key, real=True): value for key, value in (("L", sp.Rational(7, 5)), ("g", sp.Rational(981, 100)))
+    }
+    with mp.workdps(30):
+        climb, ds, slope = (
+            sp.lambdify(model.parameter, form.xreplace(values), "mpmath")
+            for form in (model.climb, model.ds, model.climb_slope)
+        )
+        axes = [mpf(sp.N(place + k * (step or 0), 40)) for k in (0, 1, -3)]
+        for axis in axes:
+            for away in map(mpf, ("0.3", "1.7", "2.9")):
+                for form in (climb, ds):
+                    assert abs(form(axis + away) - form(axis - away)) <= mpf("1e-25") * (1 + abs(form(axis + away)))
+        signs = {mp.sign(slope(axes[0] + (axes[1] - axes[0] or 9) * mpf(k) / 10)) for k in range(1, 10)}
+    assert not monotone or len(signs) == 1
