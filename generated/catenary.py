@@ -1,5 +1,5 @@
 # Made by gqm-gen for "catenary". Do not edit: change its declaration and generate again.
-# interface 4, input cd1fa4541ae4, body e31516131fbf
+# interface 4, input cd1fa4541ae4, body e2107640897d
 """Bead on a hanging chain
 
 x              = x
@@ -241,7 +241,7 @@ MODEL = Formulas(
     parameters=PARAMETERS,
     positive=('c',),
     addresses=Addresses(frame.address, climb.address, rise.address, bend.address, bounds.address),
-    each=Each(rise_each, bend_each, bounds_each),
+    each=Each(rise=rise_each, bend=bend_each, bounds=bounds_each),
     domain_of=exact_domain,
     axes_of=exact_axes,
     monotone=True,

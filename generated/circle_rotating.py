@@ -1,5 +1,5 @@
 # Made by gqm-gen for "circle_rotating". Do not edit: change its declaration and generate again.
-# interface 4, input 4ab613b0cbfb, body abbbff768b8e
+# interface 4, input 4ab613b0cbfb, body 020705dbde5e
 """Bead on a hoop that turns about its vertical diameter
 
 x              = L*sin(theta)
@@ -34,6 +34,7 @@ from gqm_sym.runtime import (
     BOUNDS_EACH,
     CLIMB,
     FRAME,
+    ORBIT_EACH,
     RISE,
     RISE_EACH,
     Addresses,
@@ -48,7 +49,7 @@ from gqm_sym.runtime.differences import cos1, cos2, sin1, sin2
 from gqm_sym.runtime.elementary import cos, sin
 from gqm_sym.runtime.intervals import iadd, iconst, icos, imul, ipow, isin
 from gqm_sym.runtime.places import nearest
-from gqm_sym.runtime.wave_differences import near_cos2, near_sin2
+from gqm_sym.runtime.wave_differences import near_even, near_odd, near_sinc
 
 PARAMETERS = {
     'L': '1',
@@ -139,18 +140,46 @@ def rise_each(n, starts, places, offsets, p, out):
 @compiled(BEND_EACH, later=True)
 def bend_each(n, lows, highs, left, right, p, out):
     """climb[a, theta, b] and ds/dtheta, each for an orbit of its own; NaN where the closed form ends."""
-    lows, highs, left, right, p, out = carray(lows, n), carray(highs, n), carray(left, n), carray(right, n), carray(p, (4, n)), carray(out, (2, n))
+    lows, highs, left, right, p, out = carray(lows, n), carray(highs, n), carray(left, n), carray(right, n), carray(p, (10, n)), carray(out, (2, n))
     for i in range(n):
         L = p[0, i]
         Omega = p[1, i]
         g = p[2, i]
+        _c0 = p[4, i]
+        _c1 = p[5, i]
+        _c2 = p[6, i]
+        _c3 = p[7, i]
+        _c4 = p[8, i]
+        _c5 = p[9, i]
         a = lows[i]
         b = highs[i]
         da = left[i]
         db = right[i]
         theta = nearest(a, b, da, db)
-        out[0, i] = -L*(L*Omega**2*((sin(b) + sin(theta))*near_sin2(a, theta, b, da, db) + sin1(a, b, -a + b)*sin1(a, theta, da)) + 2*g*near_cos2(a, theta, b, da, db))
+        _t0 = near_even(da, db)
+        _t1 = da/2 - db/2
+        _t2 = _t1*near_odd(da, db)
+        _t3 = da*db
+        out[0, i] = -L*(L*Omega**2*(_c2*sin1(a, theta, da) + (_c3*_t0 + _c5*_t2)*(_c0 + _c3*(_c4 - _t0*_t3) + _c5*(_c1*_t1 - _t2*_t3))) + 2*g*(-_c3*_t2 + _c5*_t0))
         out[1, i] = L
+
+
+@compiled(ORBIT_EACH, later=True)
+def orbit_each(n, lows, highs, p, out):
+    """What is the same all along an orbit: ``bend_each`` finds it behind the run-time parameters."""
+    lows, highs, p, out = carray(lows, n), carray(highs, n), carray(p, (4, n)), carray(out, (6, n))
+    for i in range(n):
+        a = lows[i]
+        b = highs[i]
+        _t0 = a/2
+        _t1 = _t0 - b/2
+        _t2 = _t0 + b/2
+        out[0, i] = sin(b)
+        out[1, i] = near_sinc(-_t1)
+        out[2, i] = sin1(a, b, -a + b)
+        out[3, i] = sin(_t2)
+        out[4, i] = cos(_t1)
+        out[5, i] = cos(_t2)
 
 
 @compiled(BOUNDS)
@@ -245,7 +274,7 @@ MODEL = Formulas(
     parameters=PARAMETERS,
     positive=('L',),
     addresses=Addresses(frame.address, climb.address, rise.address, bend.address, bounds.address),
-    each=Each(rise_each, bend_each, bounds_each),
+    each=Each(rise=rise_each, bend=bend_each, orbit=orbit_each, bounds=bounds_each, held=6),
     domain_of=exact_domain,
     axes_of=exact_axes,
     exact=ExactFormulas(exact_x, exact_z, exact_ds, exact_kappa, exact_reaction, exact_climb, exact_climb_slope),

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "circle_spring". Do not edit: change its declaration and generate again.
-# interface 4, input 8941b9022f6d, body a3457fadf714
+# interface 4, input 8941b9022f6d, body 1e063f647e6f
 """Bead on a ring, tied by a spring to a point above its centre
 
 x              = L*sin(theta)
@@ -33,6 +33,7 @@ from gqm_sym.runtime import (
     BOUNDS_EACH,
     CLIMB,
     FRAME,
+    ORBIT_EACH,
     RISE,
     RISE_EACH,
     Addresses,
@@ -47,7 +48,7 @@ from gqm_sym.runtime.differences import cos1, cos2, sin1, sin2
 from gqm_sym.runtime.elementary import cos, sin
 from gqm_sym.runtime.intervals import iadd, iconst, icos, imul, ipow, isin
 from gqm_sym.runtime.places import nearest
-from gqm_sym.runtime.wave_differences import near_cos2, near_sin2
+from gqm_sym.runtime.wave_differences import near_even, near_odd, near_sinc
 
 PARAMETERS = {
     'L': '1',
@@ -152,22 +153,56 @@ def rise_each(n, starts, places, offsets, p, out):
 @compiled(BEND_EACH, later=True)
 def bend_each(n, lows, highs, left, right, p, out):
     """climb[a, theta, b] and ds/dtheta, each for an orbit of its own; NaN where the closed form ends."""
-    lows, highs, left, right, p, out = carray(lows, n), carray(highs, n), carray(left, n), carray(right, n), carray(p, (5, n)), carray(out, (2, n))
+    lows, highs, left, right, p, out = carray(lows, n), carray(highs, n), carray(left, n), carray(right, n), carray(p, (13, n)), carray(out, (2, n))
     for i in range(n):
         L = p[0, i]
         w = p[1, i]
         h = p[2, i]
         g = p[3, i]
+        _c0 = p[5, i]
+        _c1 = p[6, i]
+        _c2 = p[7, i]
+        _c3 = p[8, i]
+        _c4 = p[9, i]
+        _c5 = p[10, i]
+        _c6 = p[11, i]
+        _c7 = p[12, i]
         a = lows[i]
         b = highs[i]
         da = left[i]
         db = right[i]
         theta = nearest(a, b, da, db)
-        _t0 = L*near_cos2(a, theta, b, da, db)
-        _t1 = L**2
-        _t2 = -a + b
-        out[0, i] = -2*_t0*g + w**2*(_t0*(L*cos(b) + L*cos(theta) + 2*h) + _t1*((sin(b) + sin(theta))*near_sin2(a, theta, b, da, db) + sin1(a, b, _t2)*sin1(a, theta, da)) + _t1*cos1(a, b, _t2)*cos1(a, theta, da))
+        _t0 = near_even(da, db)
+        _t1 = da/2 - db/2
+        _t2 = _t1*near_odd(da, db)
+        _t3 = L*(-_c5*_t2 + _c7*_t0)
+        _t4 = L**2
+        _t5 = da*db
+        _t6 = _c6 - _t0*_t5
+        _t7 = _c3*_t1 - _t2*_t5
+        out[0, i] = -2*_t3*g + w**2*(_c2*_t4*cos1(a, theta, da) + _t3*(L*_c1 + L*(-_c5*_t7 + _c7*_t6) + 2*h) + _t4*(_c4*sin1(a, theta, da) + (_c5*_t0 + _c7*_t2)*(_c0 + _c5*_t6 + _c7*_t7)))
         out[1, i] = L
+
+
+@compiled(ORBIT_EACH, later=True)
+def orbit_each(n, lows, highs, p, out):
+    """What is the same all along an orbit: ``bend_each`` finds it behind the run-time parameters."""
+    lows, highs, p, out = carray(lows, n), carray(highs, n), carray(p, (5, n)), carray(out, (8, n))
+    for i in range(n):
+        a = lows[i]
+        b = highs[i]
+        _t0 = -a + b
+        _t1 = a/2
+        _t2 = _t1 - b/2
+        _t3 = _t1 + b/2
+        out[0, i] = sin(b)
+        out[1, i] = cos(b)
+        out[2, i] = cos1(a, b, _t0)
+        out[3, i] = near_sinc(-_t2)
+        out[4, i] = sin1(a, b, _t0)
+        out[5, i] = sin(_t3)
+        out[6, i] = cos(_t2)
+        out[7, i] = cos(_t3)
 
 
 @compiled(BOUNDS)
@@ -276,7 +311,7 @@ MODEL = Formulas(
     parameters=PARAMETERS,
     positive=('L',),
     addresses=Addresses(frame.address, climb.address, rise.address, bend.address, bounds.address),
-    each=Each(rise_each, bend_each, bounds_each),
+    each=Each(rise=rise_each, bend=bend_each, orbit=orbit_each, bounds=bounds_each, held=8),
     domain_of=exact_domain,
     axes_of=exact_axes,
     exact=ExactFormulas(exact_x, exact_z, exact_ds, exact_kappa, exact_reaction, exact_climb, exact_climb_slope),

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "cycloid_inverted". Do not edit: change its declaration and generate again.
-# interface 4, input 2cc87984e0a0, body 0f37e9a5e2bf
+# interface 4, input 2cc87984e0a0, body 6f94c9f20300
 """Bead in an inverted cycloid
 
 x              = R*(theta - sin(theta))
@@ -33,6 +33,7 @@ from gqm_sym.runtime import (
     BOUNDS_EACH,
     CLIMB,
     FRAME,
+    ORBIT_EACH,
     RISE,
     RISE_EACH,
     Addresses,
@@ -47,7 +48,7 @@ from gqm_sym.runtime.differences import cos1, cos2
 from gqm_sym.runtime.elementary import cos, sin
 from gqm_sym.runtime.intervals import iconst, icos, idiv, imul, isin
 from gqm_sym.runtime.places import nearest
-from gqm_sym.runtime.wave_differences import near_cos2
+from gqm_sym.runtime.wave_differences import near_even, near_odd
 
 PARAMETERS = {
     'R': '0.5',
@@ -134,18 +135,32 @@ def rise_each(n, starts, places, offsets, p, out):
 @compiled(BEND_EACH, later=True)
 def bend_each(n, lows, highs, left, right, p, out):
     """climb[a, theta, b] and ds/dtheta, each for an orbit of its own; NaN where the closed form ends."""
-    lows, highs, left, right, p, out = carray(lows, n), carray(highs, n), carray(left, n), carray(right, n), carray(p, (3, n)), carray(out, (2, n))
+    lows, highs, left, right, p, out = carray(lows, n), carray(highs, n), carray(left, n), carray(right, n), carray(p, (5, n)), carray(out, (2, n))
     for i in range(n):
         R = p[0, i]
         g = p[1, i]
+        _c0 = p[3, i]
+        _c1 = p[4, i]
         a = lows[i]
         b = highs[i]
         da = left[i]
         db = right[i]
         theta = nearest(a, b, da, db)
         _t0 = 2*R
-        out[0, i] = _t0*g*near_cos2(a, theta, b, da, db)
+        out[0, i] = _t0*g*(-_c0*(da/2 - db/2)*near_odd(da, db) + _c1*near_even(da, db))
         out[1, i] = _t0*sin(theta/2)
+
+
+@compiled(ORBIT_EACH, later=True)
+def orbit_each(n, lows, highs, p, out):
+    """What is the same all along an orbit: ``bend_each`` finds it behind the run-time parameters."""
+    lows, highs, p, out = carray(lows, n), carray(highs, n), carray(p, (3, n)), carray(out, (2, n))
+    for i in range(n):
+        a = lows[i]
+        b = highs[i]
+        _t0 = a/2 + b/2
+        out[0, i] = sin(_t0)
+        out[1, i] = cos(_t0)
 
 
 @compiled(BOUNDS)
@@ -239,7 +254,7 @@ MODEL = Formulas(
     parameters=PARAMETERS,
     positive=('R',),
     addresses=Addresses(frame.address, climb.address, rise.address, bend.address, bounds.address),
-    each=Each(rise_each, bend_each, bounds_each),
+    each=Each(rise=rise_each, bend=bend_each, orbit=orbit_each, bounds=bounds_each, held=2),
     domain_of=exact_domain,
     axes_of=exact_axes,
     exact=ExactFormulas(exact_x, exact_z, exact_ds, exact_kappa, exact_reaction, exact_climb, exact_climb_slope),

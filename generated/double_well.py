@@ -1,5 +1,5 @@
 # Made by gqm-gen for "double_well". Do not edit: change its declaration and generate again.
-# interface 4, input 28c16d144828, body 493dae2a3a50
+# interface 4, input 28c16d144828, body 726d80759e47
 """Bead between two wells
 
 x              = x
@@ -242,7 +242,7 @@ MODEL = Formulas(
     parameters=PARAMETERS,
     positive=(),
     addresses=Addresses(frame.address, climb.address, rise.address, bend.address, bounds.address),
-    each=Each(rise_each, bend_each, bounds_each),
+    each=Each(rise=rise_each, bend=bend_each, bounds=bounds_each),
     domain_of=exact_domain,
     axes_of=exact_axes,
     exact=ExactFormulas(exact_x, exact_z, exact_ds, exact_kappa, exact_reaction, exact_climb, exact_climb_slope),

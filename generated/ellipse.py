@@ -1,5 +1,5 @@
 # Made by gqm-gen for "ellipse". Do not edit: change its declaration and generate again.
-# interface 4, input 3a81da5567d3, body 9a498b34c940
+# interface 4, input 3a81da5567d3, body 659d2205e1d8
 """Bead on an ellipse, by the eccentric angle
 
 x              = a*cos(theta)
@@ -34,6 +34,7 @@ from gqm_sym.runtime import (
     BOUNDS_EACH,
     CLIMB,
     FRAME,
+    ORBIT_EACH,
     RISE,
     RISE_EACH,
     Addresses,
@@ -48,7 +49,7 @@ from gqm_sym.runtime.differences import sin1, sin2
 from gqm_sym.runtime.elementary import cos, sin
 from gqm_sym.runtime.intervals import iadd, iconst, icos, imul, ipow, isin, isqrt
 from gqm_sym.runtime.places import nearest
-from gqm_sym.runtime.wave_differences import near_sin2
+from gqm_sym.runtime.wave_differences import near_even, near_odd, near_sinc
 
 PARAMETERS = {
     'a': '2',
@@ -136,18 +137,41 @@ def rise_each(n, starts, places, offsets, p, out):
 @compiled(BEND_EACH, later=True)
 def bend_each(n, lows, highs, left, right, p, out):
     """climb[a, theta, b] and ds/dtheta, each for an orbit of its own; NaN where the closed form ends."""
-    lows, highs, left, right, p, out = carray(lows, n), carray(highs, n), carray(left, n), carray(right, n), carray(p, (4, n)), carray(out, (2, n))
+    lows, highs, left, right, p, out = carray(lows, n), carray(highs, n), carray(left, n), carray(right, n), carray(p, (8, n)), carray(out, (2, n))
     for i in range(n):
         a = p[0, i]
         b = p[1, i]
         g = p[2, i]
-        _a = lows[i]
-        _b = highs[i]
+        _c0 = p[4, i]
+        _c1 = p[5, i]
+        _c2 = p[6, i]
+        _c3 = p[7, i]
         da = left[i]
         db = right[i]
-        theta = nearest(_a, _b, da, db)
-        out[0, i] = 2*b*g*near_sin2(_a, theta, _b, da, db)
-        out[1, i] = sqrt(a**2*sin(theta)**2 + b**2*cos(theta)**2)
+        _t0 = near_even(da, db)
+        _t1 = da/2 - db/2
+        _t2 = _t1*near_odd(da, db)
+        _t3 = da*db
+        _t4 = _c2 - _t0*_t3
+        _t5 = _c0*_t1 - _t2*_t3
+        out[0, i] = 2*b*g*(_c1*_t0 + _c3*_t2)
+        out[1, i] = sqrt(a**2*(_c1*_t4 + _c3*_t5)**2 + b**2*(-_c1*_t5 + _c3*_t4)**2)
+
+
+@compiled(ORBIT_EACH, later=True)
+def orbit_each(n, lows, highs, p, out):
+    """What is the same all along an orbit: ``bend_each`` finds it behind the run-time parameters."""
+    lows, highs, p, out = carray(lows, n), carray(highs, n), carray(p, (4, n)), carray(out, (4, n))
+    for i in range(n):
+        _a = lows[i]
+        _b = highs[i]
+        _t0 = _a/2
+        _t1 = -_b/2 + _t0
+        _t2 = _b/2 + _t0
+        out[0, i] = near_sinc(-_t1)
+        out[1, i] = sin(_t2)
+        out[2, i] = cos(_t1)
+        out[3, i] = cos(_t2)
 
 
 @compiled(BOUNDS)
@@ -245,7 +269,7 @@ MODEL = Formulas(
     parameters=PARAMETERS,
     positive=('a', 'b'),
     addresses=Addresses(frame.address, climb.address, rise.address, bend.address, bounds.address),
-    each=Each(rise_each, bend_each, bounds_each),
+    each=Each(rise=rise_each, bend=bend_each, orbit=orbit_each, bounds=bounds_each, held=4),
     domain_of=exact_domain,
     axes_of=exact_axes,
     monotone=True,

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "kepler". Do not edit: change its declaration and generate again.
-# interface 4, input a1e1feaf475b, body 83134ad6c11a
+# interface 4, input a1e1feaf475b, body 829702edc694
 """Planet on its own ellipse, by the eccentric anomaly
 
 x              = a*(-ecc + cos(E))
@@ -34,6 +34,7 @@ from gqm_sym.runtime import (
     BOUNDS_EACH,
     CLIMB,
     FRAME,
+    ORBIT_EACH,
     RISE,
     RISE_EACH,
     Addresses,
@@ -48,7 +49,7 @@ from gqm_sym.runtime.differences import cos1, cos2, sin1, sin2
 from gqm_sym.runtime.elementary import cos, sin
 from gqm_sym.runtime.intervals import iabs, iadd, iconst, icos, imul, ipow, isin, isqrt
 from gqm_sym.runtime.places import nearest
-from gqm_sym.runtime.wave_differences import near_cos2, near_sin2
+from gqm_sym.runtime.wave_differences import near_even, near_odd, near_sinc
 
 PARAMETERS = {
     'a': '3/2',
@@ -112,6 +113,8 @@ def rise(n, _a, places, offsets, p, out):
     _t2 = 1 - ecc**2
     _c0 = fabs(a)
     _t3 = sqrt(_t1**2*_t2 + (_t0 - ecc)**2)
+    _c3 = _t1
+    _c4 = _t0
     _c1 = 1/_t3
     _c2 = _t3
     for i in range(n):
@@ -121,7 +124,7 @@ def rise(n, _a, places, offsets, p, out):
         _t5 = sin(E)
         _t6 = _t5**2
         _t7 = sqrt(_t2*_t6 + (_t4 - ecc)**2)
-        out[0, i] = 2*_c1*k*(_t2*(_t1 + _t5)*sin1(_a, E, d) + (_t0 + _t4 - 2*ecc)*cos1(_a, E, d))/(_c0*_t7*(_c2 + _t7))
+        out[0, i] = 2*_c1*k*(_t2*(_c3 + _t5)*sin1(_a, E, d) + (_c4 + _t4 - 2*ecc)*cos1(_a, E, d))/(_c0*_t7*(_c2 + _t7))
         out[1, i] = a*sqrt(_t2*_t4**2 + _t6)
 
 
@@ -140,9 +143,13 @@ def bend(n, _a, b, left, right, p, out):
     _c0 = fabs(a)
     _t4 = sqrt(_t2**2*_t3 + (_t1 - ecc)**2)
     _t7 = sqrt(_t3*_t6**2 + (_t5 - ecc)**2)
-    _t14 = _t13 + _t5
     _c1 = cos1(_a, b, _t0)
     _c2 = sin1(_a, b, _t0)
+    _c7 = _t2
+    _c8 = _t6
+    _c9 = _t1
+    _c10 = _t5
+    _t14 = _c10 + _t13
     _c3 = 1/_t4
     _c4 = _t4
     _c5 = 1/_t7
@@ -158,9 +165,9 @@ def bend(n, _a, b, left, right, p, out):
         _t12 = _c5/_t11
         _t15 = cos1(_a, E, da)
         _t16 = sin1(_a, E, da)
-        _t17 = (_c1*(_t1 + _t14) + _c2*_t3*(_t2 + _t6))*(_t15*(_t1 + _t13 + _t8) + _t16*_t3*(_t2 + _t9))/((_c4 + _c6)*(_c4 + _t11))
+        _t17 = (_c1*(_c9 + _t14) + _c2*_t3*(_c7 + _c8))*(_t15*(_c9 + _t13 + _t8) + _t16*_t3*(_c7 + _t9))/((_c4 + _c6)*(_c4 + _t11))
         _t18 = 1/(_c6 + _t11)
-        out[0, i] = -2*k*(_c3*_t12*_t17 - _t12*(-_t17*_t18 + _t18*(_c1*_t15 + _t3*(_c2*_t16 + (_t6 + _t9)*sin2(_a, E, b, da, db)) + (_t14 + _t8)*cos2(_a, E, b, da, db))))/_c0
+        out[0, i] = -2*k*(_c3*_t12*_t17 - _t12*(-_t17*_t18 + _t18*(_c1*_t15 + _t3*(_c2*_t16 + (_c8 + _t9)*sin2(_a, E, b, da, db)) + (_t14 + _t8)*cos2(_a, E, b, da, db))))/_c0
         out[1, i] = a*sqrt(_t10 + _t3*_t8**2)
 
 
@@ -195,43 +202,90 @@ def rise_each(n, starts, places, offsets, p, out):
 @compiled(BEND_EACH, later=True)
 def bend_each(n, lows, highs, left, right, p, out):
     """climb[a, E, b] and ds/dE, each for an orbit of its own; NaN where the closed form ends."""
-    lows, highs, left, right, p, out = carray(lows, n), carray(highs, n), carray(left, n), carray(right, n), carray(p, (4, n)), carray(out, (2, n))
+    lows, highs, left, right, p, out = carray(lows, n), carray(highs, n), carray(left, n), carray(right, n), carray(p, (19, n)), carray(out, (2, n))
     for i in range(n):
         a = p[0, i]
         ecc = p[1, i]
         k = p[2, i]
+        _c0 = p[4, i]
+        _c1 = p[5, i]
+        _c2 = p[6, i]
+        _c3 = p[7, i]
+        _c4 = p[8, i]
+        _c5 = p[9, i]
+        _c6 = p[10, i]
+        _c7 = p[11, i]
+        _c8 = p[12, i]
+        _c9 = p[13, i]
+        _c10 = p[14, i]
+        _c11 = p[15, i]
+        _c12 = p[16, i]
+        _c13 = p[17, i]
+        _c14 = p[18, i]
         _a = lows[i]
         b = highs[i]
         da = left[i]
         db = right[i]
         E = nearest(_a, b, da, db)
-        _t0 = cos(E)
-        _t1 = sin(E)
-        _t2 = _t1**2
-        _t3 = 1 - ecc**2
-        _t4 = sqrt(_t2*_t3 + (_t0 - ecc)**2)
-        _t5 = 1/_t4
-        _t6 = cos(_a)
-        _t7 = sin(_a)
-        _t8 = sqrt(_t3*_t7**2 + (_t6 - ecc)**2)
-        _t9 = cos(b)
-        _t10 = sin(b)
-        _t11 = sqrt(_t10**2*_t3 + (_t9 - ecc)**2)
-        _t12 = 1/_t11
-        _t13 = cos1(_a, E, da)
-        _t14 = -2*ecc
-        _t15 = _t0 + _t14
-        _t16 = sin1(_a, E, da)
-        _t17 = _t13*(_t15 + _t6) + _t16*_t3*(_t1 + _t7)
-        _t18 = -_a + b
-        _t19 = cos1(_a, b, _t18)
-        _t20 = sin1(_a, b, _t18)
-        _t21 = _t19*(_t14 + _t6 + _t9) + _t20*_t3*(_t10 + _t7)
-        _t22 = 1/(_t4 + _t8)
-        _t23 = 1/(_t11 + _t8)
-        _t24 = 1/(_t11 + _t4)
-        out[0, i] = -2*k*(_t12*_t17*_t21*_t22*_t23*_t5/_t8 - _t12*_t5*(-_t17*_t21*_t22*_t23*_t24 + _t24*(_t13*_t19 + _t3*(_t16*_t20 + (_t1 + _t10)*near_sin2(_a, E, b, da, db)) + (_t15 + _t9)*near_cos2(_a, E, b, da, db))))/fabs(a)
-        out[1, i] = a*sqrt(_t0**2*_t3 + _t2)
+        _t0 = near_even(da, db)
+        _t1 = da*db
+        _t2 = _c5 - _t0*_t1
+        _t3 = da/2 - db/2
+        _t4 = _t3*near_odd(da, db)
+        _t5 = _c2*_t3 - _t1*_t4
+        _t6 = _c4*_t5
+        _t7 = -_c6*_t2 + _t6
+        _t8 = 1 - ecc**2
+        _t9 = _c4*_t2 + _c6*_t5
+        _t10 = _t9**2
+        _t11 = sqrt(_t10*_t8 + (-_t7 - ecc)**2)
+        _t12 = _c9/_t11
+        _t13 = -2*ecc
+        _t14 = _c14 + _t13
+        _t15 = cos1(_a, E, da)
+        _t16 = _c6*_t2 - _t6
+        _t17 = sin1(_a, E, da)
+        _t18 = (_c1*(_c13 + _t14) + _c3*_t8*(_c11 + _c12))*(_t15*(_c13 + _t13 + _t16) + _t17*_t8*(_c11 + _t9))/((_c10 + _c8)*(_c8 + _t11))
+        _t19 = 1/(_c10 + _t11)
+        out[0, i] = -2*k*(_c7*_t12*_t18 - _t12*(-_t18*_t19 + _t19*(_c1*_t15 + _t8*(_c3*_t17 + (_c12 + _t9)*(_c4*_t0 + _c6*_t4)) + (_t14 + _t16)*(-_c4*_t4 + _c6*_t0))))/_c0
+        out[1, i] = a*sqrt(_t10 + _t7**2*_t8)
+
+
+@compiled(ORBIT_EACH, later=True)
+def orbit_each(n, lows, highs, p, out):
+    """What is the same all along an orbit: ``bend_each`` finds it behind the run-time parameters."""
+    lows, highs, p, out = carray(lows, n), carray(highs, n), carray(p, (4, n)), carray(out, (15, n))
+    for i in range(n):
+        a = p[0, i]
+        ecc = p[1, i]
+        _a = lows[i]
+        b = highs[i]
+        _t0 = -_a + b
+        _t1 = _a/2
+        _t2 = _t1 - b/2
+        _t3 = _t1 + b/2
+        _t4 = cos(_a)
+        _t5 = sin(_a)
+        _t6 = 1 - ecc**2
+        _t7 = sqrt(_t5**2*_t6 + (_t4 - ecc)**2)
+        _t8 = cos(b)
+        _t9 = sin(b)
+        _t10 = sqrt(_t6*_t9**2 + (_t8 - ecc)**2)
+        out[0, i] = fabs(a)
+        out[1, i] = cos1(_a, b, _t0)
+        out[2, i] = near_sinc(-_t2)
+        out[3, i] = sin1(_a, b, _t0)
+        out[4, i] = sin(_t3)
+        out[5, i] = cos(_t2)
+        out[6, i] = cos(_t3)
+        out[7, i] = 1/_t7
+        out[8, i] = _t7
+        out[9, i] = 1/_t10
+        out[10, i] = _t10
+        out[11, i] = _t5
+        out[12, i] = _t9
+        out[13, i] = _t4
+        out[14, i] = _t8
 
 
 @compiled(BOUNDS)
@@ -349,7 +403,7 @@ MODEL = Formulas(
     parameters=PARAMETERS,
     positive=('a',),
     addresses=Addresses(frame.address, climb.address, rise.address, bend.address, bounds.address),
-    each=Each(rise_each, bend_each, bounds_each),
+    each=Each(rise=rise_each, bend=bend_each, orbit=orbit_each, bounds=bounds_each, held=15),
     domain_of=exact_domain,
     axes_of=exact_axes,
     exact=ExactFormulas(exact_x, exact_z, exact_ds, exact_kappa, exact_reaction, exact_climb, exact_climb_slope),

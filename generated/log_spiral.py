@@ -1,5 +1,5 @@
 # Made by gqm-gen for "log_spiral". Do not edit: change its declaration and generate again.
-# interface 4, input 458ba188398a, body 5394814a0d17
+# interface 4, input 458ba188398a, body 77040134da97
 """Bead on a logarithmic spiral
 
 x              = r0*exp(b*theta)*cos(theta)
@@ -34,6 +34,7 @@ from gqm_sym.runtime import (
     BOUNDS_EACH,
     CLIMB,
     FRAME,
+    ORBIT_EACH,
     RISE,
     RISE_EACH,
     Addresses,
@@ -48,7 +49,7 @@ from gqm_sym.runtime.differences import exp1, exp2, sin1, sin2
 from gqm_sym.runtime.elementary import cos, exp, sin
 from gqm_sym.runtime.intervals import iadd, iconst, icos, iexp, imul, ipow, isin, isqrt
 from gqm_sym.runtime.places import nearest
-from gqm_sym.runtime.wave_differences import near_sin2
+from gqm_sym.runtime.wave_differences import near_even, near_odd
 
 PARAMETERS = {
     'r0': '1',
@@ -153,22 +154,42 @@ def rise_each(n, starts, places, offsets, p, out):
 @compiled(BEND_EACH, later=True)
 def bend_each(n, lows, highs, left, right, p, out):
     """climb[a, theta, b] and ds/dtheta, each for an orbit of its own; NaN where the closed form ends."""
-    lows, highs, left, right, p, out = carray(lows, n), carray(highs, n), carray(left, n), carray(right, n), carray(p, (4, n)), carray(out, (2, n))
+    lows, highs, left, right, p, out = carray(lows, n), carray(highs, n), carray(left, n), carray(right, n), carray(p, (9, n)), carray(out, (2, n))
     for i in range(n):
         r0 = p[0, i]
         b = p[1, i]
         g = p[2, i]
+        _c0 = p[4, i]
+        _c1 = p[5, i]
+        _c2 = p[6, i]
+        _c3 = p[7, i]
+        _c4 = p[8, i]
         a = lows[i]
         _b = highs[i]
         da = left[i]
         db = right[i]
         theta = nearest(a, _b, da, db)
-        _t0 = _b*b
-        _t1 = b*theta
+        _t0 = b*theta
+        _t1 = _b*b
         _t2 = b*db
-        _t3 = b**2
-        out[0, i] = 2*g*r0*(_t3*exp2(a*b, _t1, _t0, b*da, _t2)*sin(a) + b*exp1(_t1, _t0, _t2)*sin1(a, theta, da) + near_sin2(a, theta, _b, da, db)*exp(_t0))
-        out[1, i] = r0*sqrt(_t3 + 1)*exp(_t1)
+        out[0, i] = 2*g*r0*(_c0*b**2*exp2(a*b, _t0, _t1, b*da, _t2) + _c1*(_c3*near_even(da, db) + _c4*(da/2 - db/2)*near_odd(da, db)) + b*exp1(_t0, _t1, _t2)*sin1(a, theta, da))
+        out[1, i] = _c2*r0*exp(_t0)
+
+
+@compiled(ORBIT_EACH, later=True)
+def orbit_each(n, lows, highs, p, out):
+    """What is the same all along an orbit: ``bend_each`` finds it behind the run-time parameters."""
+    lows, highs, p, out = carray(lows, n), carray(highs, n), carray(p, (4, n)), carray(out, (5, n))
+    for i in range(n):
+        b = p[1, i]
+        a = lows[i]
+        _b = highs[i]
+        _t0 = _b/2 + a/2
+        out[0, i] = sin(a)
+        out[1, i] = exp(_b*b)
+        out[2, i] = sqrt(b**2 + 1)
+        out[3, i] = sin(_t0)
+        out[4, i] = cos(_t0)
 
 
 @compiled(BOUNDS)
@@ -263,7 +284,7 @@ MODEL = Formulas(
     parameters=PARAMETERS,
     positive=('r0',),
     addresses=Addresses(frame.address, climb.address, rise.address, bend.address, bounds.address),
-    each=Each(rise_each, bend_each, bounds_each),
+    each=Each(rise=rise_each, bend=bend_each, orbit=orbit_each, bounds=bounds_each, held=5),
     domain_of=exact_domain,
     exact=ExactFormulas(exact_x, exact_z, exact_ds, exact_kappa, exact_reaction, exact_climb, exact_climb_slope),
 )

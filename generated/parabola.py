@@ -1,5 +1,5 @@
 # Made by gqm-gen for "parabola". Do not edit: change its declaration and generate again.
-# interface 4, input 638613fc8598, body 2184b49c279b
+# interface 4, input 638613fc8598, body 1c7c05f6c745
 """Bead in a parabolic bowl
 
 x              = x
@@ -226,7 +226,7 @@ MODEL = Formulas(
     parameters=PARAMETERS,
     positive=(),
     addresses=Addresses(frame.address, climb.address, rise.address, bend.address, bounds.address),
-    each=Each(rise_each, bend_each, bounds_each),
+    each=Each(rise=rise_each, bend=bend_each, bounds=bounds_each),
     domain_of=exact_domain,
     axes_of=exact_axes,
     monotone=True,

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "pendulum". Do not edit: change its declaration and generate again.
-# interface 4, input abbc42e6e84e, body f287810b5d97
+# interface 4, input abbc42e6e84e, body 14b34f8d0c4e
 """Simple pendulum, angle from the horizontal
 
 x              = L*cos(theta)
@@ -33,6 +33,7 @@ from gqm_sym.runtime import (
     BOUNDS_EACH,
     CLIMB,
     FRAME,
+    ORBIT_EACH,
     RISE,
     RISE_EACH,
     Addresses,
@@ -47,7 +48,7 @@ from gqm_sym.runtime.differences import sin1, sin2
 from gqm_sym.runtime.elementary import cos, sin
 from gqm_sym.runtime.intervals import iconst, icos, imul
 from gqm_sym.runtime.places import nearest
-from gqm_sym.runtime.wave_differences import near_sin2
+from gqm_sym.runtime.wave_differences import near_even, near_odd
 
 PARAMETERS = {
     'L': '1',
@@ -129,17 +130,28 @@ def rise_each(n, starts, places, offsets, p, out):
 @compiled(BEND_EACH, later=True)
 def bend_each(n, lows, highs, left, right, p, out):
     """climb[a, theta, b] and ds/dtheta, each for an orbit of its own; NaN where the closed form ends."""
-    lows, highs, left, right, p, out = carray(lows, n), carray(highs, n), carray(left, n), carray(right, n), carray(p, (3, n)), carray(out, (2, n))
+    lows, highs, left, right, p, out = carray(lows, n), carray(highs, n), carray(left, n), carray(right, n), carray(p, (5, n)), carray(out, (2, n))
     for i in range(n):
         L = p[0, i]
         g = p[1, i]
-        a = lows[i]
-        b = highs[i]
+        _c0 = p[3, i]
+        _c1 = p[4, i]
         da = left[i]
         db = right[i]
-        theta = nearest(a, b, da, db)
-        out[0, i] = 2*L*g*near_sin2(a, theta, b, da, db)
+        out[0, i] = 2*L*g*(_c0*near_even(da, db) + _c1*(da/2 - db/2)*near_odd(da, db))
         out[1, i] = L
+
+
+@compiled(ORBIT_EACH, later=True)
+def orbit_each(n, lows, highs, p, out):
+    """What is the same all along an orbit: ``bend_each`` finds it behind the run-time parameters."""
+    lows, highs, p, out = carray(lows, n), carray(highs, n), carray(p, (3, n)), carray(out, (2, n))
+    for i in range(n):
+        a = lows[i]
+        b = highs[i]
+        _t0 = a/2 + b/2
+        out[0, i] = sin(_t0)
+        out[1, i] = cos(_t0)
 
 
 @compiled(BOUNDS)
@@ -228,7 +240,7 @@ MODEL = Formulas(
     parameters=PARAMETERS,
     positive=('L',),
     addresses=Addresses(frame.address, climb.address, rise.address, bend.address, bounds.address),
-    each=Each(rise_each, bend_each, bounds_each),
+    each=Each(rise=rise_each, bend=bend_each, orbit=orbit_each, bounds=bounds_each, held=2),
     domain_of=exact_domain,
     axes_of=exact_axes,
     monotone=True,

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "rotating_parabola". Do not edit: change its declaration and generate again.
-# interface 4, input 9d848a7566cb, body ad63fccbe7d7
+# interface 4, input 9d848a7566cb, body 91a6dbf119cb
 """Bead in a turning parabolic bowl
 
 x              = x
@@ -237,7 +237,7 @@ MODEL = Formulas(
     parameters=PARAMETERS,
     positive=(),
     addresses=Addresses(frame.address, climb.address, rise.address, bend.address, bounds.address),
-    each=Each(rise_each, bend_each, bounds_each),
+    each=Each(rise=rise_each, bend=bend_each, bounds=bounds_each),
     domain_of=exact_domain,
     axes_of=exact_axes,
     monotone=True,

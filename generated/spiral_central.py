@@ -1,5 +1,5 @@
 # Made by gqm-gen for "spiral_central". Do not edit: change its declaration and generate again.
-# interface 4, input a75a85ae8f6e, body 3e913be7b212
+# interface 4, input a75a85ae8f6e, body 9b12f76a83e8
 """Bead on a logarithmic spiral, drawn to its pole
 
 x              = r0*exp(b*theta)*cos(theta)
@@ -34,6 +34,7 @@ from gqm_sym.runtime import (
     BOUNDS_EACH,
     CLIMB,
     FRAME,
+    ORBIT_EACH,
     RISE,
     RISE_EACH,
     Addresses,
@@ -48,7 +49,7 @@ from gqm_sym.runtime.differences import cos1, cos2, exp1, exp2, sin1, sin2
 from gqm_sym.runtime.elementary import cos, exp, sin
 from gqm_sym.runtime.intervals import iabs, iadd, iconst, icos, iexp, imul, ipow, isin, isqrt
 from gqm_sym.runtime.places import nearest
-from gqm_sym.runtime.wave_differences import near_cos2, near_sin2
+from gqm_sym.runtime.wave_differences import near_even, near_odd, near_sinc
 
 PARAMETERS = {
     'r0': '1',
@@ -110,6 +111,8 @@ def rise(n, a, places, offsets, p, out):
     _c2 = sqrt(b**2 + 1)
     _t3 = sqrt(_t1**2 + _t2**2)
     _c1 = exp(_t0)
+    _c5 = _t1
+    _c6 = _t2
     _c3 = 1/_t3
     _c4 = _t3
     for i in range(n):
@@ -120,7 +123,7 @@ def rise(n, a, places, offsets, p, out):
         _t6 = sqrt(_t4**2 + _t5**2)
         _t7 = 1/_t6
         _t8 = b*theta
-        out[0, i] = -2*k*(-_c1*_c3*_t7*((_t1 + _t4)*sin1(a, theta, d) + (_t2 + _t5)*cos1(a, theta, d))/(_c4 + _t6) - _t7*b*exp1(_t0, -_t8, -b*d))/_c0
+        out[0, i] = -2*k*(-_c1*_c3*_t7*((_c5 + _t4)*sin1(a, theta, d) + (_c6 + _t5)*cos1(a, theta, d))/(_c4 + _t6) - _t7*b*exp1(_t0, -_t8, -b*d))/_c0
         out[1, i] = _c2*r0*exp(_t8)
 
 
@@ -143,6 +146,10 @@ def bend(n, a, _b, left, right, p, out):
     _c2 = sqrt(_t1 + 1)
     _c3 = cos1(a, _b, _t2)
     _c4 = sin1(a, _b, _t2)
+    _c9 = _t3
+    _c10 = _t6
+    _c11 = _t4
+    _c12 = _t7
     _c5 = 1/_t5
     _c6 = _t5
     _c7 = 1/_t8
@@ -158,13 +165,13 @@ def bend(n, a, _b, left, right, p, out):
         _t13 = cos(theta)
         _t14 = sqrt(_t12**2 + _t13**2)
         _t15 = 1/(_c6 + _t14)
-        _t16 = _t12 + _t3
-        _t17 = _t13 + _t4
+        _t16 = _c11 + _t13
+        _t17 = _c9 + _t12
         _t18 = _c5/_t14
         _t19 = sin1(a, theta, da)
         _t20 = cos1(a, theta, da)
-        _t21 = (_c3*(_t4 + _t7) + _c4*(_t3 + _t6))*(_t19*(_t12 + _t6) + _t20*(_t13 + _t7))/((_c6 + _c8)*(_c8 + _t14))
-        out[0, i] = -2*k*(_c1*(_c7*_t18*_t21 - _t18*(-_t15*_t21 + _t15*(_c3*_t20 + _c4*_t19 + _t16*sin2(a, theta, _b, da, db) + _t17*cos2(a, theta, _b, da, db)))) + _c5*_t1*exp2(_t0, _t10, -_b*b, _t11, -b*db) + _t15*_t18*b*(_t16*sin1(theta, _b, db) + _t17*cos1(theta, _b, db))*exp1(_t0, _t10, _t11))/_c0
+        _t21 = (_c3*(_c11 + _c12) + _c4*(_c10 + _c9))*(_t19*(_c10 + _t12) + _t20*(_c12 + _t13))/((_c6 + _c8)*(_c8 + _t14))
+        out[0, i] = -2*k*(_c1*(_c7*_t18*_t21 - _t18*(-_t15*_t21 + _t15*(_c3*_t20 + _c4*_t19 + _t16*cos2(a, theta, _b, da, db) + _t17*sin2(a, theta, _b, da, db)))) + _c5*_t1*exp2(_t0, _t10, -_b*b, _t11, -b*db) + _t15*_t18*b*(_t16*cos1(theta, _b, db) + _t17*sin1(theta, _b, db))*exp1(_t0, _t10, _t11))/_c0
         out[1, i] = _c2*r0*exp(_t9)
 
 
@@ -200,43 +207,95 @@ def rise_each(n, starts, places, offsets, p, out):
 @compiled(BEND_EACH, later=True)
 def bend_each(n, lows, highs, left, right, p, out):
     """climb[a, theta, b] and ds/dtheta, each for an orbit of its own; NaN where the closed form ends."""
-    lows, highs, left, right, p, out = carray(lows, n), carray(highs, n), carray(left, n), carray(right, n), carray(p, (4, n)), carray(out, (2, n))
+    lows, highs, left, right, p, out = carray(lows, n), carray(highs, n), carray(left, n), carray(right, n), carray(p, (21, n)), carray(out, (2, n))
     for i in range(n):
         r0 = p[0, i]
         b = p[1, i]
         k = p[2, i]
+        _c0 = p[4, i]
+        _c1 = p[5, i]
+        _c2 = p[6, i]
+        _c3 = p[7, i]
+        _c4 = p[8, i]
+        _c5 = p[9, i]
+        _c6 = p[10, i]
+        _c7 = p[11, i]
+        _c8 = p[12, i]
+        _c9 = p[13, i]
+        _c10 = p[14, i]
+        _c11 = p[15, i]
+        _c12 = p[16, i]
+        _c13 = p[17, i]
+        _c14 = p[18, i]
+        _c15 = p[19, i]
+        _c16 = p[20, i]
         a = lows[i]
         _b = highs[i]
         da = left[i]
         db = right[i]
         theta = nearest(a, _b, da, db)
-        _t0 = b**2
-        _t1 = sin(_b)
-        _t2 = cos(_b)
-        _t3 = sqrt(_t1**2 + _t2**2)
-        _t4 = 1/_t3
-        _t5 = -a*b
-        _t6 = b*theta
-        _t7 = -_t6
-        _t8 = -b*da
-        _t9 = sin(theta)
-        _t10 = cos(theta)
-        _t11 = sqrt(_t10**2 + _t9**2)
-        _t12 = 1/(_t11 + _t3)
-        _t13 = _t1 + _t9
-        _t14 = _t10 + _t2
-        _t15 = _t4/_t11
-        _t16 = sin(a)
-        _t17 = cos(a)
-        _t18 = sqrt(_t16**2 + _t17**2)
-        _t19 = _b - a
-        _t20 = sin1(a, _b, _t19)
-        _t21 = cos1(a, _b, _t19)
-        _t22 = sin1(a, theta, da)
-        _t23 = cos1(a, theta, da)
-        _t24 = (_t20*(_t1 + _t16) + _t21*(_t17 + _t2))*(_t22*(_t16 + _t9) + _t23*(_t10 + _t17))/((_t11 + _t18)*(_t18 + _t3))
-        out[0, i] = -2*k*(_t0*_t4*exp2(_t5, _t7, -_b*b, _t8, -b*db) + _t12*_t15*b*(_t13*sin1(theta, _b, db) + _t14*cos1(theta, _b, db))*exp1(_t5, _t7, _t8) + (-_t15*(-_t12*_t24 + _t12*(_t13*near_sin2(a, theta, _b, da, db) + _t14*near_cos2(a, theta, _b, da, db) + _t20*_t22 + _t21*_t23)) + _t15*_t24/_t18)*exp(_t5))/fabs(r0)
-        out[1, i] = r0*sqrt(_t0 + 1)*exp(_t6)
+        _t0 = -a*b
+        _t1 = b*theta
+        _t2 = -_t1
+        _t3 = -b*da
+        _t4 = near_even(da, db)
+        _t5 = da*db
+        _t6 = _c7 - _t4*_t5
+        _t7 = da/2 - db/2
+        _t8 = _t7*near_odd(da, db)
+        _t9 = _c4*_t7 - _t5*_t8
+        _t10 = _c6*_t6 + _c8*_t9
+        _t11 = _c6*_t9
+        _t12 = sqrt(_t10**2 + (_c8*_t6 - _t11)**2)
+        _t13 = 1/(_c10 + _t12)
+        _t14 = _c13 + _t10
+        _t15 = _c8*_t6 - _t11
+        _t16 = _c15 + _t15
+        _t17 = _c9/_t12
+        _t18 = sin1(a, theta, da)
+        _t19 = cos1(a, theta, da)
+        _t20 = (_c3*(_c15 + _c16) + _c5*(_c13 + _c14))*(_t18*(_c14 + _t10) + _t19*(_c16 + _t15))/((_c10 + _c12)*(_c12 + _t12))
+        out[0, i] = -2*k*(_c1*(_c11*_t17*_t20 - _t17*(-_t13*_t20 + _t13*(_c3*_t19 + _c5*_t18 + _t14*(_c6*_t4 + _c8*_t8) + _t16*(-_c6*_t8 + _c8*_t4)))) + _c9*b**2*exp2(_t0, _t2, -_b*b, _t3, -b*db) + _t13*_t17*b*(_t14*sin1(theta, _b, db) + _t16*cos1(theta, _b, db))*exp1(_t0, _t2, _t3))/_c0
+        out[1, i] = _c2*r0*exp(_t1)
+
+
+@compiled(ORBIT_EACH, later=True)
+def orbit_each(n, lows, highs, p, out):
+    """What is the same all along an orbit: ``bend_each`` finds it behind the run-time parameters."""
+    lows, highs, p, out = carray(lows, n), carray(highs, n), carray(p, (4, n)), carray(out, (17, n))
+    for i in range(n):
+        r0 = p[0, i]
+        b = p[1, i]
+        a = lows[i]
+        _b = highs[i]
+        _t0 = _b - a
+        _t1 = _b/2
+        _t2 = a/2
+        _t3 = _t1 - _t2
+        _t4 = _t1 + _t2
+        _t5 = sin(_b)
+        _t6 = cos(_b)
+        _t7 = sqrt(_t5**2 + _t6**2)
+        _t8 = sin(a)
+        _t9 = cos(a)
+        _t10 = sqrt(_t8**2 + _t9**2)
+        out[0, i] = fabs(r0)
+        out[1, i] = exp(-a*b)
+        out[2, i] = sqrt(b**2 + 1)
+        out[3, i] = cos1(a, _b, _t0)
+        out[4, i] = near_sinc(_t3)
+        out[5, i] = sin1(a, _b, _t0)
+        out[6, i] = sin(_t4)
+        out[7, i] = cos(_t3)
+        out[8, i] = cos(_t4)
+        out[9, i] = 1/_t7
+        out[10, i] = _t7
+        out[11, i] = 1/_t10
+        out[12, i] = _t10
+        out[13, i] = _t5
+        out[14, i] = _t8
+        out[15, i] = _t6
+        out[16, i] = _t9
 
 
 @compiled(BOUNDS)
@@ -340,7 +399,7 @@ MODEL = Formulas(
     parameters=PARAMETERS,
     positive=('r0',),
     addresses=Addresses(frame.address, climb.address, rise.address, bend.address, bounds.address),
-    each=Each(rise_each, bend_each, bounds_each),
+    each=Each(rise=rise_each, bend=bend_each, orbit=orbit_each, bounds=bounds_each, held=17),
     domain_of=exact_domain,
     exact=ExactFormulas(exact_x, exact_z, exact_ds, exact_kappa, exact_reaction, exact_climb, exact_climb_slope),
 )

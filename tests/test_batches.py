@@ -36,7 +36,8 @@ def answered(
     n = lam0.size
     out, reasons = np.full((n, 2), np.nan), np.full(n, swift.HARD, dtype=np.int8)
     answer_batches(
-        tuple(function.address for function in module.MODEL.each),
+        module.MODEL.each.addresses(),
+        module.MODEL.each.held,
         np.tile(p, (n, 1)).T.copy(),
         lam0,
         v0.astype(float),

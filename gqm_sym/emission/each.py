@@ -1,20 +1,24 @@
 """What a sweep calls: the conservative functions again, each place with a launch and parameters of its own."""
 
-from dataclasses import replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from sympy import Expr, Function
+from sympy import Expr, Function, Symbol, cos, expand, sin
 from sympy.core.function import AppliedUndef
 
 from gqm_sym.derivation.difference import Differences
 from gqm_sym.emission.ir import FunctionIR
-from gqm_sym.emission.places import at
+from gqm_sym.emission.places import at, hoist
 
 if TYPE_CHECKING:
     from gqm_sym.emission.lower import Lowering
 
-NEAR = frozenset({"cos2", "cosh2", "sin2", "sinh2"})
+NEAR = frozenset({"cosh2", "sinh2"})
 """Differences that have a closed form for near points, without the rest: NaN tells a sweep to go another way."""
+
+WAVES = frozenset({"cos2", "sin2"})
+"""Differences that are taken apart into what belongs to the orbit and what to the place (MATHS, section 3)."""
 
 
 def _near(form: Expr) -> Expr:
@@ -22,6 +26,63 @@ def _near(form: Expr) -> Expr:
         lambda t: isinstance(t, AppliedUndef) and t.func.__name__ in NEAR,
         lambda t: Function(f"near_{t.func.__name__}")(*t.args),
     )
+
+
+@dataclass(frozen=True)
+class _Middle:
+    """A wave's argument x, y, w at both ends of an orbit and between, seen from the middle m: y = m + v, w - m = h."""
+
+    x: Expr
+    w: Expr
+    gaps: tuple[Expr, Expr]
+
+    @property
+    def m(self) -> Expr:
+        return (self.x + self.w) / 2
+
+    @property
+    def v(self) -> Expr:
+        return (self.gaps[0] - self.gaps[1]) / 2
+
+    @property
+    def parts(self) -> tuple[Expr, Expr]:
+        """Second differences of cos and sin over -h, v, h: ``near_even`` and v times ``near_odd``."""
+        return Function("near_even")(*self.gaps), self.v * Function("near_odd")(*self.gaps)
+
+    def second(self, name: str) -> Expr:
+        even, odd = self.parts
+        return sin(self.m) * even + cos(self.m) * odd if name == "sin2" else cos(self.m) * even - sin(self.m) * odd
+
+    def value(self, head: type[Expr]) -> Expr:
+        """The sine or cosine of y, by that of v: cos v = cos h + (v**2 - h**2) * even, and so for the sine."""
+        even, odd = self.parts
+        h, product = (self.w - self.x) / 2, self.gaps[0] * self.gaps[1]
+        cosine, sine = cos(h) - product * even, self.v * Function("near_sinc")(h) - product * odd
+        return sin(self.m) * cosine + cos(self.m) * sine if head is sin else cos(self.m) * cosine - sin(self.m) * sine
+
+
+def _apart(
+    forms: Sequence[Expr], place: Symbol, ends: tuple[Symbol, Symbol], gaps: tuple[Symbol, Symbol]
+) -> list[Expr]:
+    """Waves, and their second differences, by parts of which most belong to the orbit."""
+    known = set[tuple[Expr, Expr]]()
+
+    def second(t: Expr) -> Expr:
+        x, _y, w, *both = t.args
+        known.add((both[0], both[1]))
+        return _Middle(x, w, (both[0], both[1])).second(t.func.__name__)
+
+    def value(t: Expr) -> Expr:
+        argument = t.args[0]
+        rate = argument.diff(place)
+        scaled = tuple(expand(rate * gap) for gap in gaps)
+        if rate.has(place) or scaled not in known:
+            return t
+        x, w = (argument.xreplace({place: end}) for end in ends)
+        return _Middle(x, w, scaled).value(t.func)
+
+    forms = [f.replace(lambda t: isinstance(t, AppliedUndef) and t.func.__name__ in WAVES, second) for f in forms]
+    return [f.replace(lambda t: isinstance(t, (sin, cos)) and t.has(place), value) for f in forms]
 
 
 def rise_each(lowering: "Lowering") -> FunctionIR:
@@ -42,25 +103,45 @@ def rise_each(lowering: "Lowering") -> FunctionIR:
     )
 
 
-def bend_each(lowering: "Lowering") -> FunctionIR:
-    """Second divided differences of climbs, and ds."""
+def bend_each(lowering: "Lowering") -> tuple[FunctionIR, ...]:
+    """Second divided differences of climbs, and ds; with what is the same all along an orbit, if anything is."""
     model, names, place = lowering.model, lowering.names, lowering.place
     a, b, da, db = (names.symbol(s) for s in ("a", "b", "da", "db"))
-    arrays = tuple(names(name) for name in ("lows", "highs", "left", "right"))
+    lows, highs, left, right = (names(name) for name in ("lows", "highs", "left", "right"))
     differences = Differences(place, (a, place, b), {(0, 1): da, (1, 2): db, (0, 2): b - a})
-    return lowering.function(
+    forms = _apart((_near(differences.second(model.climb)), model.ds), place, (a, b), (da, db))
+    outputs, held = hoist(forms, {place, da, db})
+    ends = [(a, at(lows)), (b, at(highs))]
+    behind = len(lowering.order)
+    bend = lowering.function(
         "bend_each",
         "BEND_EACH",
-        arrays,
+        (lows, highs, left, right),
         "climb[a, {0}, b] and ds/d{0}, each for an orbit of its own; NaN where the closed form ends.",
-        views=tuple((name, names("n")) for name in arrays),
+        views=tuple((name, names("n")) for name in (lows, highs, left, right)),
         inside=[
-            *((symbol, at(array)) for symbol, array in zip((a, b, da, db), arrays, strict=True)),
+            *((symbol, at(names("p"), behind + row)) for row, (symbol, _) in enumerate(held)),
+            *ends,
+            *((symbol, at(array)) for symbol, array in ((da, left), (db, right))),
             (place, Function("nearest")(a, b, da, db)),
         ],
-        outputs=(_near(differences.second(model.climb)), model.ds),
+        outputs=tuple(outputs),
+        each=True,
+        held=len(held),
+    )
+    if not held:
+        return (bend,)
+    orbit = lowering.function(
+        "orbit_each",
+        "ORBIT_EACH",
+        (lows, highs),
+        "What is the same all along an orbit: ``bend_each`` finds it behind the run-time parameters.",
+        views=tuple((name, names("n")) for name in (lows, highs)),
+        inside=ends,
+        outputs=tuple(value for _, value in held),
         each=True,
     )
+    return bend, orbit
 
 
 def bounds_each(lowering: "Lowering") -> FunctionIR:
@@ -83,4 +164,4 @@ def each(lowering: "Lowering") -> tuple[FunctionIR, ...]:
     model = lowering.model
     if model.dissipation is not None or model.curve.charted or model.force.radius:
         return ()
-    return rise_each(lowering), bend_each(lowering)
+    return rise_each(lowering), *bend_each(lowering)

@@ -1,6 +1,6 @@
 """From a model's closed forms to functions as straight-line code."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 
 import sympy
 from sympy import Basic, Expr, Function, Rational, Symbol
@@ -12,7 +12,7 @@ from gqm_sym.emission.charts import chart_maker
 from gqm_sym.emission.dissipative import drive, hold
 from gqm_sym.emission.each import bounds_each, each
 from gqm_sym.emission.ir import Assignment, ExactIR, FunctionIR, ModuleIR
-from gqm_sym.emission.places import at
+from gqm_sym.emission.places import at, hoist
 from gqm_sym.emission.printer import check_emittable
 from gqm_sym.errors import EmissionError
 from gqm_sym.kernels.base import CONTACT_SIGN, DIRECTION, W
@@ -262,10 +262,11 @@ class Lowering:
         inside: list[tuple[Symbol, Expr]],
         outputs: tuple[Expr, ...],
         each: bool = False,
+        held: int = 0,
     ) -> FunctionIR:
         """Share common subexpressions, and move what does not depend on the place in front of the loop.
 
-        With ``each`` the run-time parameters belong to the place.
+        With ``each`` the run-time parameters belong to the place, and ``held`` rows follow behind them.
         """
         _check_size(outputs, where=name)
         n, p, out = (self.names(s) for s in ("n", "p", "out"))
@@ -273,7 +274,7 @@ class Lowering:
         if each:
             inside, used = [*((Symbol(s, real=True), at(p, row)) for s, row in used), *inside], ()
         moving = {symbol for symbol, _ in inside}
-        prepared, fixed = _hoist([_half_powers(e) for e in outputs], moving)
+        prepared, fixed = hoist([_half_powers(e) for e in outputs], moving)
         everything = [value for _, value in fixed] + prepared
         replaced, reduced = sympy.cse(everything, symbols=sympy.numbered_symbols("_t", real=True), order="canonical")
         before: list[Assignment] = []
@@ -298,7 +299,7 @@ class Lowering:
             doc=doc.format(self.place.name),
             views=(
                 *views,
-                (p, f"({len(self.order)}, {n})" if each else str(len(self.order))),
+                (p, f"({len(self.order) + held}, {n})" if each else str(len(self.order))),
                 (out, f"({len(outputs)}, {n})"),
             ),
             parameters=used,
@@ -354,19 +355,3 @@ def _half_powers(e: Expr) -> Expr:
         lambda t: t.is_Pow and isinstance(t.exp, Rational) and t.exp.q == 2 and abs(t.exp.p) > 1,
         replace,
     )
-
-
-def _hoist(outputs: Sequence[Expr], moving: set[Symbol]) -> tuple[list[Expr], list[tuple[Symbol, Expr]]]:
-    """Give calls that do not depend on the place a name of their own, so that the loop need not repeat them."""
-    calls = {
-        call
-        for e in outputs
-        for call in e.atoms(sympy.Function, sympy.Pow)
-        if not call.free_symbols & moving
-        and call.free_symbols
-        and not (call.is_Pow and isinstance(call.exp, sympy.Integer))
-    }
-    outermost = [c for c in sympy.ordered(calls) if not any(c != o and o.has(c) for o in calls)]
-    named = [(Symbol(f"_c{i}", real=True), call) for i, call in enumerate(outermost)]
-    replacement = {call: symbol for symbol, call in named}
-    return [e.xreplace(replacement) for e in outputs], named

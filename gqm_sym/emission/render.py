@@ -106,7 +106,7 @@ def render(module: ModuleIR, *, source: str) -> str:
         "exact_formulas": exact,
         "axes": next((f.name for f in module.exact if f.name == "exact_axes"), ""),
         "monotone": module.monotone,
-        "each": ", ".join(f["name"] for f in functions if f["each"]),
+        "each": ", ".join(_each(module, [f["name"] for f in functions if f["each"]])),
         "dissipation": ", ".join(f"{flag}={value}" for flag, value in module.dissipation),
         "keywords": ", ".join(f"{name}: Any = {value!r}" for name, value in module.defaults),
         "names": ", ".join(name for name, _ in module.defaults),
@@ -126,6 +126,12 @@ def _exact_formulas(module: ModuleIR) -> str:
     names = [function.name for function in module.exact if function.places]
     kind = "ExactClimb" if module.chart else "ExactFormulas"
     return f"{kind}({', '.join(names)})" if names else ""
+
+
+def _each(module: ModuleIR, names: list[str]) -> list[str]:
+    """What a module hands over of its functions for sweeps."""
+    held = sum(len(f.outputs) for f in module.functions if f.name == "orbit_each")
+    return [*(f"{name.removesuffix('_each')}={name}" for name in names), *([f"held={held}"] if held else [])]
 
 
 def body_digests(text: str) -> tuple[str, str] | None:

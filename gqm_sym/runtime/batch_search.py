@@ -12,10 +12,12 @@ from gqm_sym.runtime.jit import Inner
 from gqm_sym.runtime.search import UNRESOLVED
 from gqm_sym.runtime.swift import LIBRATION
 
-# Rows of a batch: which launch, its place and V**2, offsets of both ends from it, both ends; what the quadrature keeps;
-# what the search needs: which way it goes and how far at most, and how far the other way, its state, bracket, trial and
-# the zero, how far the axis of symmetry is that the orbit may have, and the step from one axis to the next.
-WHO, START, SPEED, LEAST, MOST, A, B, SUM, VALUE, CHANGE, LOW, HIGH, LASTING = range(13)
+# Rows of a batch: which launch, offsets of both ends from it, both ends; what the quadrature keeps; the launch's place
+# and V**2, which it needs of laps alone; what the search needs: which way it goes and how far at most, and how far the
+# other way, its state, bracket, trial and the zero, how far the axis of symmetry is that the orbit may have, and the
+# step from one axis to the next.
+WHO, LEAST, MOST, A, B, SUM, VALUE, CHANGE, LOW, HIGH, START, SPEED, LASTING = range(13)
+OF_LAPS = START
 WAY, REACH, BACK, STATE, LEFT, RIGHT, TRIAL, AHEAD, AXIS, STEP, ROWS = range(12, 23)
 # Rows of what is known of each launch's curve: both ends, the period, a place of symmetry, the step to the next.
 FIRST, LAST, PERIOD, PLACE, NEXT, KNOWN = range(6)

@@ -12,7 +12,9 @@ from numba import types
 from gqm_sym.runtime.batch_search import (
     AHEAD,
     AXIS,
+    BACK,
     CHANGE,
+    CLOSED,
     FOUND,
     HIGH,
     KNOWN,
@@ -21,7 +23,7 @@ from gqm_sym.runtime.batch_search import (
     LOW,
     MOST,
     NOWHERE,
-    PERIOD,
+    OF_LAPS,
     REACH,
     ROWS,
     SPEED,
@@ -29,17 +31,19 @@ from gqm_sym.runtime.batch_search import (
     STATE,
     STEP,
     SUM,
+    TRIAL,
     VALUE,
     WAY,
     WHO,
     A,
     B,
+    any_is,
     launch,
     prove,
     seek,
     turn_round,
 )
-from gqm_sym.runtime.crossing import call_bend_each, call_rise_each
+from gqm_sym.runtime.crossing import call_bend_each, call_orbit_each, call_rise_each
 from gqm_sym.runtime.fused import choose
 from gqm_sym.runtime.jit import Inner, entry
 from gqm_sym.runtime.swift import (
@@ -48,6 +52,7 @@ from gqm_sym.runtime.swift import (
     FEWEST,
     FROM_A,
     FROM_B,
+    HARD,
     LEAST_BALANCE,
     LIBRATION,
     MOST_NODES,
@@ -67,6 +72,8 @@ NEIGHBOURING = 1.999
 # A rule's change is foreseen from its last two, which fall geometrically: below this it is less than rounding. The
 # first of them must be below FALLING, whose fourth power is that: one accidentally small change decides nothing.
 FORESEEN, FALLING = 3e-17, 7e-5
+# What becomes of an orbit after a level of the rule.
+GOES_ON, SETTLED, LOST = 0.0, 1.0, 2.0
 
 _LINE = types.float64[::1]
 _ROWS = types.float64[:, ::1]
@@ -93,6 +100,21 @@ def gather(s, p, count, n, chosen, kept, t, q, rows):  # type: ignore[no-untyped
 def shrink(s, p, count, n, chosen, kept, rows):  # type: ignore[no-untyped-def]
     """Close up to the ``kept`` columns that are ``chosen``, in ascending order; returns how many columns are left."""
     return n if kept == n else gather(s, p, count, n, chosen, kept, s, p, rows)
+
+
+@Inner
+def part(state, found, others):  # type: ignore[no-untyped-def]
+    """List the columns whose state is FOUND, and the others; returns how many there are of each."""
+    if not any_is(state, NOWHERE):
+        for j in range(state.size):
+            found[j] = j
+        return state.size, 0
+    kept, left = 0, 0
+    for j in range(state.size):
+        found[kept] = others[left] = j
+        kept += state[j] == FOUND
+        left += state[j] != FOUND
+    return kept, left
 
 
 @Inner
@@ -135,12 +157,17 @@ def fill(fns, kind, n, node, s, p, work):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def times(fns, kind, mirrored, n, s, flat, count, chosen, work, out, reasons):  # type: ignore[no-untyped-def]
+def times(fns, kind, mirrored, n, s, flat, count, held, chosen, work, out, reasons):  # type: ignore[no-untyped-def]
     """Half periods or loop times by the trapezoidal rule, into the rows of ``out`` that belong to the orbits.
 
     Nodes are doubled until the next change is foreseen to be below rounding; orbits for which that is so drop out, and
     those whose V**2 all but vanishes. Of orbits that are ``mirrored`` only nodes up to the middle are looked at.
     """
+    if held:
+        p = flat[: count * n].reshape(count, n)
+        rest = flat[count * n : (count + held) * n].reshape(held, n)
+        call_orbit_each(fns[3], n, s[A, :n], s[B, :n], p, rest)
+        count += held
     for j in range(n):
         s[SUM, j], s[VALUE, j], s[CHANGE, j], s[LOW, j], s[HIGH, j] = 0.0, 0.0, 0.0, inf, 0.0
     begin, nodes = 0, FEWEST
@@ -160,60 +187,50 @@ def times(fns, kind, mirrored, n, s, flat, count, chosen, work, out, reasons):  
         if begin == 0:
             for j in range(n):
                 s[CHANGE, j] = fabs(s[VALUE, j] - s[CHANGE, j]) / s[VALUE, j]
-        known, clear = work[0, :n], work[1, :n]
+        verdict = work[0, :n]
         for j in range(n):
             value, before = s[SUM, j] / nodes, s[CHANGE, j]
             change = fabs(value - s[VALUE, j]) / value
             s[VALUE, j], s[CHANGE, j] = value, change
-            foreseen = choose(change <= SAME, 0.0, change * (change / before) * (change / before))
-            known[j] = choose(before <= FALLING, foreseen, inf)
-            clear[j] = s[LOW, j] - LEAST_BALANCE * s[HIGH, j]
+            fall = change / before
+            settled = (before <= FALLING) & ((change <= SAME) | (change * fall * fall <= FORESEEN))
+            clear = s[LOW, j] > LEAST_BALANCE * s[HIGH, j]
+            verdict[j] = choose(clear, choose(settled, SETTLED, GOES_ON), LOST)
         kept = 0
-        for j in range(n):
-            if not clear[j] > 0.0:
-                continue
-            if known[j] <= FORESEEN:
-                k = int(s[WHO, j])
-                out[k, 0], reasons[k] = s[VALUE, j], DONE
-            else:
-                chosen[kept] = j
-                kept += 1
+        for j in range(n):  # without branches, for none could be foreseen
+            k, settled = int(s[WHO, j]), verdict[j] == SETTLED
+            out[k, 0], out[k, 1] = choose(settled, s[VALUE, j], nan), kind
+            reasons[k] = DONE if settled else HARD
+            chosen[kept] = j
+            kept += verdict[j] == GOES_ON
         begin, nodes, last = nodes + 1, 2 * nodes, nodes + (nodes // 2 if mirrored else nodes)
         if kept == 0 or nodes > MOST_NODES:
             return
-        n = shrink(s, flat, count, n, chosen, kept, LASTING)
+        n = shrink(s, flat, count, n, chosen, kept, OF_LAPS if kind == LIBRATION else LASTING)
 
 
 @Inner
-def settle(fns, kind, mirrored, known, n, s, flat, t, spare, count, chosen, others, work, timed, out, reasons):  # type: ignore[no-untyped-def]
+def settle(fns, kind, mirrored, known, n, s, flat, t, spare, count, held, chosen, others, work, timed, out, reasons):  # type: ignore[no-untyped-def]
     """Prove orbits of one kind that are not ``known``, and answer for those that are proved.
 
     ``t`` and ``spare`` take the others meanwhile.
     """
     for pieces in (FEW_OF_HALF if mirrored else FEW_PIECES, MANY_PIECES):
-        if known:
-            s[STATE, :n] = FOUND
-        else:
+        proved, left = n, 0
+        if not known:
             prove(fns, kind, mirrored, pieces, n, s, flat[: count * n].reshape(count, n), work)
-        proved, left = 0, 0
-        for j in range(n):
-            if s[STATE, j] != FOUND:
-                others[left] = j
-                left += 1
-                continue
-            chosen[proved] = j
-            proved += 1
-            k = int(s[WHO, j])
-            if timed:
-                out[k, 1] = kind
-            elif kind == LIBRATION:
-                out[k, 0], out[k, 1], reasons[k] = s[A, j], s[B, j], DONE
-            else:
-                reasons[k] = PASSING
+            proved, left = part(s[STATE, :n], chosen, others)
         rest = gather(s, flat, count, n, others, left, t, spare, ROWS)
-        if proved and timed:
-            m = shrink(s, flat, count, n, chosen, proved, LASTING)
-            times(fns, kind, mirrored, m, s, flat, count, chosen, work, out, reasons)
+        m = shrink(s, flat, count, n, chosen, proved, LASTING)
+        if m and timed:
+            times(fns, kind, mirrored, m, s, flat, count, held if kind == LIBRATION else 0, chosen, work, out, reasons)
+        elif kind == LIBRATION:
+            for j in range(m):
+                k = int(s[WHO, j])
+                out[k, 0], out[k, 1], reasons[k] = s[A, j], s[B, j], DONE
+        else:
+            for j in range(m):
+                reasons[int(s[WHO, j])] = PASSING
         if left == 0:
             return
         n, s, flat, t, spare = rest, t, spare, s, flat
@@ -221,20 +238,21 @@ def settle(fns, kind, mirrored, known, n, s, flat, t, spare, count, chosen, othe
 
 @entry(
     types.void(
-        *(types.UniTuple(types.int64, 3), _ROWS, _LINE, _LINE, _LINE, _ROWS, types.boolean, types.boolean),
+        *(types.UniTuple(types.int64, 4), types.int64, _ROWS, _LINE, _LINE, _LINE, _ROWS, types.boolean, types.boolean),
         *(_ROWS, types.int8[::1]),
     ),
     nogil=True,
 )
-def answer_batches(fns, ps, lam0s, v0s, ways, domains, monotone, timed, out, reasons):  # type: ignore[no-untyped-def]
+def answer_batches(fns, held, ps, lam0s, v0s, ways, domains, monotone, timed, out, reasons):  # type: ignore[no-untyped-def]
     """Fill rows of ``out`` and of ``reasons`` for the launches that this can answer, as `swift.answer_many` does.
 
     The others keep their reason. ``monotone`` says that V**2 rises or falls all the way between axes of symmetry and
     that ds is nowhere 0; ``timed`` asks for times, else for turning points.
     """
     count = ps.shape[0]
+    rows = count + held
     s, t, u = np.empty((ROWS, BATCH)), np.empty((ROWS, BATCH)), np.empty((ROWS, BATCH))
-    flat, spare, other = np.empty(count * BATCH), np.empty(count * BATCH), np.empty(count * BATCH)
+    flat, spare, other = np.empty(rows * BATCH), np.empty(rows * BATCH), np.empty(rows * BATCH)
     known, work = np.empty((KNOWN, BATCH)), np.empty((13, BATCH))
     chosen, others = np.empty(BATCH, dtype=np.int64), np.empty(BATCH, dtype=np.int64)
     for begin in range(0, lam0s.size, BATCH):
@@ -264,27 +282,27 @@ def answer_batches(fns, ps, lam0s, v0s, ways, domains, monotone, timed, out, rea
             else:
                 turn_round(n, s)
             seek(fns, n, s, p, work)
-            kept = 0
             for j in range(n):
-                if s[STATE, j] == FOUND and s[AHEAD, j] <= s[REACH, j]:
-                    chosen[kept] = j
-                    kept += 1
-                elif ahead and s[STATE, j] == NOWHERE and s[WAY, j] * s[SPEED, j] != 0.0 and known[PERIOD, j] > 0.0:
-                    others[laps] = j
-                    laps += 1
-            if ahead:
+                beyond = (s[STATE, j] != FOUND) | (s[AHEAD, j] > s[REACH, j])
+                round_it = (s[STATE, j] == NOWHERE) & (s[WAY, j] * s[SPEED, j] != 0.0) & (s[BACK, j] == CLOSED)
+                s[STATE, j], s[TRIAL, j] = choose(beyond, NOWHERE, FOUND), choose(round_it, FOUND, NOWHERE)
+            if ahead and any_is(s[TRIAL, :n], FOUND):
+                laps, _rest = part(s[TRIAL, :n], others, chosen)
                 laps = gather(s, flat, count, n, others, laps, u, other, ROWS)
+            kept, _rest = part(s[STATE, :n], chosen, others)
             n = shrink(s, flat, count, n, chosen, kept, ROWS)
             if n == 0:
                 break
-        mirrored, proved = True, monotone
         for j in range(n):
             first, second = s[A, j], s[WAY, j] * s[AHEAD, j]
-            s[LEAST, j], s[MOST, j] = min(first, second), max(first, second)
+            s[LEAST, j], s[MOST, j] = choose(first < second, first, second), choose(first < second, second, first)
             s[A, j], s[B, j] = s[START, j] + s[LEAST, j], s[START, j] + s[MOST, j]
             missed = fabs(0.5 * (first + second) - s[AXIS, j])
-            mirrored &= missed <= ROUNDINGS * (fabs(s[START, j]) + fabs(first) + fabs(second))
-            proved &= (s[STEP, j] == 0.0) | (fabs(first - second) < NEIGHBOURING * s[STEP, j])
+            even = missed <= ROUNDINGS * (fabs(s[START, j]) + fabs(first) + fabs(second))
+            between = (s[STEP, j] == 0.0) | (fabs(first - second) < NEIGHBOURING * s[STEP, j])
+            s[STATE, j], s[TRIAL, j] = choose(even, FOUND, NOWHERE), choose(between, FOUND, NOWHERE)
+        mirrored = not any_is(s[STATE, :n], NOWHERE)
+        proved = monotone and mirrored and not any_is(s[TRIAL, :n], NOWHERE)
         for j in range(laps):
             lap = u[WAY, j] * u[REACH, j]
             u[LEAST, j], u[MOST, j] = min(lap, 0.0), max(lap, 0.0)
@@ -304,6 +322,7 @@ def answer_batches(fns, ps, lam0s, v0s, ways, domains, monotone, timed, out, rea
                     t,
                     spare,
                     count,
+                    held,
                     chosen,
                     others,
                     work,

@@ -72,6 +72,12 @@ def call_bounds_each(_, address, n, lo, hi, p, out):  # type: ignore[no-untyped-
 
 
 @intrinsic
+def call_orbit_each(_, address, n, a, b, p, out):  # type: ignore[no-untyped-def]
+    """Fill what is the same all along an orbit, for many orbits."""
+    return types.void(address, n, a, b, p, out), _call
+
+
+@intrinsic
 def call_drive(_, address, n, lam, v2, v, nu, p, out):  # type: ignore[no-untyped-def]
     """Fill ds, P, Q, n0 and kappa for a leg of signs v and nu."""
     return types.void(address, n, lam, v2, v, nu, p, out), _call

@@ -14,6 +14,7 @@ bounds      lo, hi, p, out                                enclosure of climb', e
 rise_each   n, a, lam, d, p, out                          climb[a, lam], ds(lam), climb'(lam)
 bend_each   n, a, b, da, db, p, out                       climb[a, lam, b], ds(lam)
 bounds_each n, lo, hi, p, out                             enclosure of climb', enclosure of ds
+orbit_each  n, a, b, p, out                               what bend_each finds behind p
 drive       n, lam, v2, v, nu, p, out                     ds, P, Q, n0, kappa
 hold        n, lam, p, out                                A(lam, 0; +1), A(lam, 0; -1), static friction
 segment     n, lam, p, out                                x, z, ds, dx/ds, dz/ds, kappa
@@ -24,7 +25,8 @@ A conservative model has ``climb``, ``rise``, ``bend`` and ``bounds``; a dissipa
 
 The functions ``_each`` are for sweeps: their ``a``, ``b``, ``lo``, ``hi`` and ``p`` are arrays too, a launch and
 parameters for each place (``p`` has a row for each parameter). They are compiled when a sweep first asks for them.
-``bend_each`` may give NaN where points lie too far apart for its closed forms; ``bend`` never does.
+``bend_each`` may give NaN where points lie too far apart for its closed forms; ``bend`` never does. What is the same
+all along an orbit, ``orbit_each`` works out once: those rows stand behind the parameters in the ``p`` of ``bend_each``.
 
 A curve with formulas that is a piece of a rail has ``segment`` (`rail`), in its own parameter; an implicit curve F = 0
 has ``field``, by which it is traced (`tracing`).
@@ -58,6 +60,7 @@ BOUNDS = types.void(REAL, REAL, MANY, MANY)
 RISE_EACH = types.void(types.intp, MANY, MANY, MANY, MANY, MANY)
 BEND_EACH = types.void(types.intp, MANY, MANY, MANY, MANY, MANY, MANY)
 BOUNDS_EACH = types.void(types.intp, MANY, MANY, MANY, MANY)
+ORBIT_EACH = types.void(types.intp, MANY, MANY, MANY, MANY)
 
 DRIVE = types.void(types.intp, MANY, MANY, REAL, REAL, MANY, MANY)
 HOLD = types.void(types.intp, MANY, MANY, MANY)
@@ -79,11 +82,20 @@ class Addresses(NamedTuple):
 
 
 class Each(NamedTuple):
-    """The functions of a sweep over many orbits at once: each has an ``address`` (`jit.Later`)."""
+    """The functions of a sweep over many orbits at once: each has an ``address`` (`jit.Later`).
+
+    ``held`` is how many rows ``orbit`` fills; None and 0 where nothing is the same all along an orbit.
+    """
 
     rise: Any
     bend: Any
     bounds: Any
+    orbit: Any = None
+    held: int = 0
+
+    def addresses(self) -> tuple[int, int, int, int]:
+        """Where they lie in memory; 0 for one that there is not."""
+        return self.rise.address, self.bend.address, self.bounds.address, self.orbit.address if self.orbit else 0
 
 
 class Dissipation(NamedTuple):

@@ -244,7 +244,8 @@ def _answer(
         parameters = np.array(p)
         if formulas.each is not None and asked.asked in (swift.TIME, swift.PLACES):
             answer_batches(
-                tuple(function.address for function in formulas.each),
+                formulas.each.addresses(),
+                formulas.each.held,
                 parameters,
                 lam0,
                 v0,
