@@ -23,7 +23,7 @@ def conservative() -> list[tuple[str, float]]:
     model, given = pendulum.MODEL, tuple(pendulum.PARAMETERS.values())
     p = model.numbers(given)
     launch = model.launch(p, lam0=-0.37, v0=0.0)
-    f, (low, high, period, _) = model.functions(p, launch), model.domain(p)
+    f, (low, high, period, _, place, step) = model.functions(p, launch), model.domain(p)
     motion = pendulum.solve(-0.37)
     motion.state(1000.0)
     stretch = motion._stretch
@@ -39,7 +39,7 @@ def conservative() -> list[tuple[str, float]]:
         ("- functions and the exact problem", least(lambda: model.functions(p, launch))),
         (
             "- the crossing: turning points, kind, half period",
-            least(lambda: survey(f.addresses, f.p, -0.37, 0.0, 1, low, high, period)),
+            least(lambda: survey(f.addresses, f.p, -0.37, 0.0, 1, low, high, period, place, step)),
         ),
         ("`lam` at one time", least(lambda: motion.lam(1000.0))),
         ("`state` at one time", least(lambda: motion.state(1000.0))),
@@ -73,44 +73,49 @@ def dissipative() -> list[tuple[str, float]]:
 
 def sweeping() -> list[tuple[str, float]]:
     """Parts of an orbit's share of a sweep over pendulums, on one core."""
-    fns, n = tuple(function.address for function in pendulum.MODEL.each), batches.BATCH
-    launch, seek, prove, times = batch_search.launch, batch_search.seek, batch_search.prove, batches.times
+    each, n = pendulum.MODEL.each, batches.BATCH
+    fns, held = each.addresses(), each.held
+    launch, seek, turn_round, prove = (
+        getattr(batch_search, name) for name in ("launch", "seek", "turn_round", "prove")
+    )
+    times = batches.times
     start = np.zeros((batch_search.ROWS, n))
     start[batch_search.WHO], start[batch_search.WAY] = np.arange(n), 1.0
     start[batch_search.START] = np.random.default_rng(0).uniform(0.05, 2.5, n) - np.pi / 2
     p = np.repeat(pendulum.MODEL.numbers(tuple(pendulum.PARAMETERS.values())).values[:, None], n, axis=1)
-    count = len(p)
-    domains, work = np.tile([-inf, inf, 2 * np.pi], (n, 1)), np.empty((13, n))
+    count, room = len(p), np.zeros(held * n)
+    known, work = np.repeat([[-inf], [inf], [2 * np.pi], [-np.pi / 2], [np.pi]], n, axis=1), np.empty((13, n))
     chosen, out, reasons = np.empty(n, dtype=np.int64), np.zeros((n, 2)), np.zeros(n, dtype=np.int8)
 
     @njit
-    def search(s: Any, start: Any, p: Any, domains: Any, work: Any) -> None:
+    def search(s: Any, start: Any, p: Any, known: Any, work: Any) -> None:
         s[:] = start
-        launch(fns, n, s, p, domains, work)
+        launch(fns, n, s, p, known, work)
         seek(fns, n, s, p, work)
+        turn_round(n, s)
 
     @njit
     def proof(s: Any, found: Any, p: Any, work: Any) -> None:
         s[:] = found
-        prove(fns, 0, batches.FEW_PIECES, n, s, p, work)
+        prove(fns, 0, True, batches.FEW_OF_HALF, n, s, p, work)
 
     @njit
     def clock(s: Any, found: Any, flat: Any, work: Any, chosen: Any, out: Any, reasons: Any) -> None:
         s[:] = found
-        times(fns, 0, n, s, flat, count, chosen, work, out, reasons)
+        times(fns, 0, True, n, s, flat, count, held, chosen, work, out, reasons)
 
     s = start.copy()
-    search(s, start, p, domains, work)
-    found, other = s.copy(), s[batch_search.WAY] * s[batch_search.AHEAD]
+    search(s, start, p, known, work)
+    found, other = s.copy(), s[batch_search.A]
     found[batch_search.LEAST], found[batch_search.MOST] = np.minimum(other, 0.0), np.maximum(other, 0.0)
     found[batch_search.A] = found[batch_search.START] + found[batch_search.LEAST]
     found[batch_search.B] = found[batch_search.START] + found[batch_search.MOST]
     return [
-        ("an orbit of a sweep: its turning points, guessed", least(lambda: search(s, start, p, domains, work)) / n),
-        ("- proved", least(lambda: proof(s, found, p, work)) / n),
+        ("an orbit of a sweep: its turning points, guessed", least(lambda: search(s, start, p, known, work)) / n),
+        ("- proved by intervals, where symbols do not tell", least(lambda: proof(s, found, p, work)) / n),
         (
             "- its half period, error controlled",
-            least(lambda: clock(s, found, p.reshape(-1).copy(), work, chosen, out, reasons)) / n,
+            least(lambda: clock(s, found, np.append(p.reshape(-1), room), work, chosen, out, reasons)) / n,
         ),
     ]
 

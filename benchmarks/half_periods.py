@@ -32,12 +32,14 @@ def half_periods() -> list[Row]:
     survey = Inner(surveying.survey.__wrapped__)
     p = pendulum.MODEL.numbers(tuple(pendulum.PARAMETERS.values()))
     f = pendulum.MODEL.functions(p, pendulum.MODEL.launch(p, lam0=-0.37, v0=0.0))
+    low, high, period, _, place, step = pendulum.MODEL.domain(p)
+    known = (low, high, period, place, step)
 
     @njit
-    def in_a_loop(fns: Any, p: Any, lam0: Any, low: float, high: float, period: float) -> Any:
+    def in_a_loop(fns: Any, p: Any, lam0: Any, known: Any) -> Any:
         out = np.empty(lam0.size)
         for k in range(lam0.size):
-            out[k] = survey(fns, p, lam0[k], 0.0, 1, low, high, period)[3]
+            out[k] = survey(fns, p, lam0[k], 0.0, 1, *known)[3]
         return out
 
     def raw(a: float) -> float:
@@ -94,7 +96,7 @@ def half_periods() -> list[Row]:
         Row(
             work,
             "one launch after the other in a compiled loop, turning points found",
-            lambda: in_a_loop(f.addresses, f.p, few - pi / 2, *pendulum.MODEL.domain(p)[:3]),
+            lambda: in_a_loop(f.addresses, f.p, few - pi / 2, known),
             lambda values: ulps(values, alone),
             each=100,
             line=6.0,

@@ -221,7 +221,7 @@ class Dissipative(Motion):
                 "give a shorter t_max, or ask for earlier times and nearer places"
             )
         problem, way, start, w = self.problem, self._way, self._place, self._w
-        f, (low, high, period, _) = problem.functions, problem.domain
+        f, (low, high, period, *_) = problem.functions, problem.domain
         end = high if way > 0 else low
         far = 8.0 * period if period else end  # a closed curve's breaks are listed for some laps
         limit = start + way * far if period else end

@@ -10,12 +10,13 @@ from numba import types
 
 from gqm_sym.runtime.crossing import call_climb, call_frame, call_hold, call_rise
 from gqm_sym.runtime.doubledouble import reduce
+from gqm_sym.runtime.fused import whole_below
 from gqm_sym.runtime.integrands import TO_EQUILIBRIUM, speeds
 from gqm_sym.runtime.interface import FRAME_ROWS
 from gqm_sym.runtime.inversion import derivative, look_up_many, tabulate
 from gqm_sym.runtime.jit import Inner, entry
 from gqm_sym.runtime.panels import lay, legendre_sum, panel_of, read_off
-from gqm_sym.runtime.search import CRITICAL, LIMIT, TURN, walk
+from gqm_sym.runtime.search import CRITICAL, LIMIT, TURN, speed_squared, walk
 
 _ADDRESSES = types.UniTuple(types.int64, 5)
 _LINE = types.float64[::1]
@@ -27,6 +28,9 @@ _TABLE = types.Tuple((_LINE, _LINE, _LINE, _ROWS, types.int64[::1], _LINE, _LINE
 
 # A launch from rest on a slope below this share of the climb's size may be an equilibrium: exact numbers decide.
 FLAT = 1e-12
+# A launch this near to an axis is not mirrored by what doubles know of it, nor one beyond this share of the way to the
+# next: there it may be an equilibrium.
+UNCLEAR, ALL_BUT = 1e-6, 0.9
 # Places filled at a time where many are asked for.
 BLOCK = 256
 
@@ -48,8 +52,31 @@ def walk_on(fns, p, lam0, w0, direction, begin, reach, step):  # type: ignore[no
 
 
 @Inner
-def ends(fns, p, lam0, v0, direction, low, high, period):  # type: ignore[no-untyped-def]
+def mirrored(fns, p, lam0, direction, reach, place, step):  # type: ignore[no-untyped-def]
+    """How far a body released at rest comes in an even well, beyond the first axis ahead; 0 where walking must tell.
+
+    V**2 rises all the way to the axis and falls all the way to the next, ``step`` farther (0: there is no other).
+    """
+    ahead = direction * (place - lam0)
+    if step > 0.0:
+        ahead -= step * whole_below(ahead / step)
+    guess = 2.0 * ahead
+    # NaN where no axis is known; next to one, or to where the body would just come over the next, walking is safer.
+    if not (ahead > UNCLEAR * (fabs(lam0) + fabs(place)) and guess <= reach) or (step > 0.0 and ahead > ALL_BUT * step):
+        return 0.0
+    guess *= direction
+    spot, rows = np.empty(2), np.empty((2, 1))
+    left, _size = speed_squared(fns, p, lam0, 0.0, guess, spot, rows)
+    call_climb(fns[1], 1, spot, p, rows)
+    more = left / rows[1, 0]  # a step of Newton's method, for what the axis is rounded by
+    return guess + more if fabs(more) <= UNCLEAR * fabs(guess) else 0.0
+
+
+@Inner
+def ends(fns, p, lam0, v0, direction, low, high, period, place, step):  # type: ignore[no-untyped-def]
     """How far a motion reaches each way, and which way it goes.
+
+    ``place`` and ``step`` are of even wells between whose axes V**2 rises or falls all the way; else ``place`` is NaN.
 
     Returns
     -------
@@ -60,24 +87,28 @@ def ends(fns, p, lam0, v0, direction, low, high, period):  # type: ignore[no-unt
     """
     nothing = (LIMIT, 0.0, 0.0)
     w0 = v0 * v0
-    step = first_step(low, high, period)
+    begin = first_step(low, high, period)
     if w0 == 0.0:
         rows, size = np.empty((2, 3)), 0.0
-        call_climb(fns[1], 3, lam0 + step * np.array([0.0, 1.0, -1.0]), p, rows)
+        call_climb(fns[1], 3, lam0 + begin * np.array([0.0, 1.0, -1.0]), p, rows)
         for height in rows[0]:
             if isfinite(height):
                 size = max(size, fabs(height))
-        if not fabs(rows[1, 0]) * step > FLAT * size:
+        if not fabs(rows[1, 0]) * begin > FLAT * size:
             return 0, (CRITICAL, 0.0, 0.0), nothing
         direction = -1 if rows[1, 0] > 0.0 else 1
     reach = period if period > 0.0 else (high - lam0 if direction > 0 else lam0 - low)
-    ahead = walk(fns, p, lam0, w0, direction, 0.0, reach, step)
+    if w0 == 0.0:
+        turn = mirrored(fns, p, lam0, direction, reach, place, step)
+        if turn != 0.0:
+            return direction, (TURN, turn, turn), (TURN, 0.0, 0.0)
+    ahead = walk(fns, p, lam0, w0, direction, 0.0, reach, begin)
     if ahead[0] != TURN:
         return direction, ahead, nothing
     if w0 == 0.0:
         return direction, ahead, (TURN, 0.0, 0.0)
     reach = period - fabs(ahead[1]) if period > 0.0 else (lam0 - low if direction > 0 else high - lam0)
-    return direction, ahead, walk(fns, p, lam0, w0, -direction, 0.0, reach, step)
+    return direction, ahead, walk(fns, p, lam0, w0, -direction, 0.0, reach, begin)
 
 
 @entry(_PANELS(_ADDRESSES, _LINE, types.int64, _FLOAT, _FLOAT, _FLOAT, _FLOAT, _LINE))

@@ -65,12 +65,17 @@ class Launch(NamedTuple):
 
 
 class Domain(NamedTuple):
-    """The parameter's range: its ends (infinite where open), its period (0 where there is none), and what is there."""
+    """The parameter's range: its ends (infinite where open), its period (0 where there is none), and what is there.
+
+    ``place`` and ``step`` are those of `Formulas.axes_of` where V**2 is monotone between them; else ``place`` is NaN.
+    """
 
     low: float
     high: float
     period: float
     ends: tuple[str, str] = ("domain-end", "domain-end")
+    place: float = math.nan
+    step: float = 0.0
 
 
 class Given(tuple[Number, ...]):
@@ -199,7 +204,7 @@ class Formulas:
         horizon = None if t_max is None else read_number(t_max, where="t_max")
         if horizon is not None and not horizon.value > 0.0:
             raise LaunchError(f"t_max: must be positive, got {horizon.text}")
-        low, high, _, _ = self.domain(p)
+        low, high, *_ = self.domain(p)
         if not low <= place.value <= high:
             raise LaunchError(f"lam0: must lie in the domain [{low!r}, {high!r}] of {self.parameter}, got {place.text}")
         return Launch(place, speed, int(direction), contact, horizon, at)
@@ -249,13 +254,14 @@ class Formulas:
                 return Domain(-math.inf, math.inf, chart.period)
             return Domain(chart.low, chart.high, 0.0, chart.ends)
         assert self.domain_of is not None
-        low, high, period = self.domain_of(FLOATS, tuple(number.value for number in p))
+        values = tuple(number.value for number in p)
+        low, high, period = self.domain_of(FLOATS, values)
+        place, step = self.axes_of(FLOATS, values) if self.axes_of and self.monotone else (None, None)
         if period is not None:
-            return Domain(-math.inf, math.inf, float(period))
+            low = high = None
+        ends = (-math.inf if low is None else float(low), math.inf if high is None else float(high))
         return Domain(
-            -math.inf if low is None else float(low),
-            math.inf if high is None else float(high),
-            0.0,
+            *ends, float(period or 0.0), place=math.nan if place is None else float(place), step=float(step or 0.0)
         )
 
     def functions(self, p: Given, launch: Launch) -> Functions:

@@ -38,11 +38,13 @@ def solve(formulas: Formulas, p: Given, launch: Launch) -> Motion:
 
 
 def _bilateral(formulas: Formulas, p: Given, launch: Launch) -> Motion:
-    low, high, period, _ = domain = formulas.domain(p)
+    low, high, period, _, place, step = domain = formulas.domain(p)
     f = formulas.functions(p, launch)
     problem = Problem(formulas, launch, p, f, domain)
     lam0, v0 = launch.lam0.value, launch.v0.value
-    direction, ahead, behind, time = survey(f.addresses, f.p, lam0, v0, launch.direction, low, high, period)
+    direction, ahead, behind, time = survey(
+        f.addresses, f.p, lam0, v0, launch.direction, low, high, period, place, step
+    )
     stuck = ahead[0] in (search.CUSP, search.BROKEN) and ahead[1] == 0.0
     if (direction == 0 or stuck) and _is_cusp(problem, lam0):
         return _from_cusp(problem)

@@ -14,10 +14,19 @@ _WALK = types.Tuple((types.int64, _FLOAT, _FLOAT))
 
 @entry(
     types.Tuple((types.int64, _WALK, _WALK, _FLOAT))(
-        types.UniTuple(types.int64, 5), types.float64[::1], _FLOAT, _FLOAT, types.int64, _FLOAT, _FLOAT, _FLOAT
+        types.UniTuple(types.int64, 5),
+        types.float64[::1],
+        _FLOAT,
+        _FLOAT,
+        types.int64,
+        _FLOAT,
+        _FLOAT,
+        _FLOAT,
+        _FLOAT,
+        _FLOAT,
     )
 )
-def survey(fns, p, lam0, v0, direction, low, high, period):  # type: ignore[no-untyped-def]
+def survey(fns, p, lam0, v0, direction, low, high, period, place, step):  # type: ignore[no-untyped-def]
     """Find both ends of a motion, and its half period or loop time where that is easy.
 
     Returns
@@ -28,7 +37,7 @@ def survey(fns, p, lam0, v0, direction, low, high, period):  # type: ignore[no-u
         Half period of a libration, loop time of a circulation, within some units in the last place; NaN where the
         trapezoidal rule does not settle, or too little of V**2 is left for doubles, and of any other motion.
     """
-    direction, ahead, behind = ends(fns, p, lam0, v0, direction, low, high, period)
+    direction, ahead, behind = ends(fns, p, lam0, v0, direction, low, high, period, place, step)
     turns = ahead[0] == TURN and behind[0] == TURN
     if direction == 0 or not (turns or (ahead[0] == LIMIT and period > 0.0 and v0 > 0.0)):
         return direction, ahead, behind, np.nan

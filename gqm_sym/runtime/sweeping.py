@@ -263,6 +263,7 @@ def _answer(
             v0,
             direction,
             domain,
+            formulas.monotone,
             place,
             asked.asked,
             out[begin:end],

@@ -217,15 +217,16 @@ def extreme(fns, p, kind, lam0, w0, a, b, width, asked, sign, work):  # type: ig
 
 @entry(
     types.void(
-        *(_ADDRESSES, _ROWS, _LINE, _LINE, _LINE, _ROWS, _LINE, types.int64),
+        *(_ADDRESSES, _ROWS, _LINE, _LINE, _LINE, _ROWS, types.boolean, _LINE, types.int64),
         *(_ROWS, types.int8[::1]),
     ),
     nogil=True,
 )
-def answer_many(fns, ps, lam0s, v0s, ways, domains, places, asked, out, reasons):  # type: ignore[no-untyped-def]
+def answer_many(fns, ps, lam0s, v0s, ways, domains, monotone, places, asked, out, reasons):  # type: ignore[no-untyped-def]
     """Fill a row of ``out`` and of ``reasons`` for each launch that is HARD so far.
 
-    ``ps`` has a row for each parameter, ``domains`` for both ends and the period. A row of ``out`` holds both turning
+    ``ps`` has a row for each parameter, ``domains`` for both ends, the period, and a place of symmetry with
+    the step to the next (`batches.answer_batches`). A row of ``out`` holds both turning
     points (PLACES), the least and the greatest (SPEEDS, FORCES), or the half period or loop time and the kind (TIME).
     """
     work, rates, p = np.empty((4, MOST_NODES)), np.empty(MOST_NODES), np.empty(ps.shape[0])
@@ -241,7 +242,9 @@ def answer_many(fns, ps, lam0s, v0s, ways, domains, places, asked, out, reasons)
         if not low <= lam0 <= high:
             reasons[k] = OUTSIDE
             continue
-        way, ahead, behind = ends(fns, p, lam0, v0, int(ways[k]), low, high, period)
+        way, ahead, behind = ends(
+            fns, p, lam0, v0, int(ways[k]), low, high, period, domains[3, k] if monotone else np.nan, domains[4, k]
+        )
         if way != 0 and ahead[0] == LIMIT and period > 0.0 and v0 > 0.0:
             kind, a, b, width = CIRCULATION, lam0, lam0 + way * period, way * period
         elif way != 0 and ahead[0] == TURN and behind[0] == TURN:
