@@ -74,8 +74,7 @@ def enclose(tree: ast.expr, bits: int, *, where: str) -> Fraction | Interval:
         algebra = _Enclosures(min(precision, last), last=precision >= last)
         try:
             value = evaluate(tree, algebra, where=where)
-            if value is None:
-                raise ExpressionError(f"{where}: a name where a number should stand")
+            assert value is not None  # `name` has refused what it knows no number of
             if isinstance(value, Fraction) or algebra.is_narrow(value, bits):
                 return value
         except _Undecided:
