@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 import sympy as sp
+from confined import confined
 from mpmath import mp, mpf
 
 import gqm_sym as gqm
@@ -22,6 +23,13 @@ def test_a_domain_that_is_known_at_run_time() -> None:
     """Where the curve is real cannot be tried before its ends are known; the launch is checked instead."""
     model = gqm.derive(gqm.Curve.graph("sqrt(q - x)", domain=(None, "q")), gqm.Gravity())
     assert model.parameters == ("q", "g", "m")
+
+
+@pytest.mark.parametrize("z", ["exp(exp(exp(90*x)))", "sin(exp(exp(90*x)))", "asin(sin(10**200*x))", "abs(x)**900"])
+def test_whether_it_is_real_is_soon_known(z: str) -> None:
+    """At the places tried these are towers, or sines that take hundreds of digits; somewhere they are numbers."""
+    with confined(10.0):
+        assert gqm.derive(gqm.Curve.graph(z), gqm.Gravity()).z == gqm.Curve.graph(z).z
 
 
 def test_the_mass_is_no_curve_s_parameter() -> None:
