@@ -92,6 +92,9 @@ def test_a_sum_without_minus_signs_is_preferred():
         ("t**2 + exp(t)", (None, None), 1),
         ("a", (None, None), None),
         ("1 - t", (None, None), None),
+        ("sin(t)", ("0", "pi"), 1),
+        ("cos(t)", ("-3*pi/2", "-pi/2"), -1),
+        ("sin(10**300*t)", ("-2", "2"), None),
     ],
 )
 def test_signs_on_a_domain(text, domain, sign):
