@@ -141,3 +141,39 @@ def test_an_approach_that_cannot_be_followed_back(slope: ModuleType, monkeypatch
     monkeypatch.setattr(legs, "follow", lost)
     with pytest.raises(SolutionError, match="could not be followed"):
         slope.solve(lam0=0, mu=0.1).lam(1.0)
+
+
+def test_over_a_joint_and_back(build: Build) -> None:
+    """Along a level line and up an arc until it turns, down again and to rest: each by its closed form.
+
+    On the arc W' + 2 mu W = -2 g R (sin + mu cos) upwards, with -mu downwards; on the line W' = -2 mu g.
+    """
+    rail = gqm.Curve.piecewise([gqm.line(length=2), gqm.arc(radius=1, angle="pi/2")])
+    motion = build("ramp", rail, gqm.CoulombFriction(mu="mu")).solve(lam0=0, v0=4, mu="0.25")
+    with mp.workdps(30):
+        mu, g, flat = mpf("0.25"), mpf("9.81"), mpf(2)
+
+        def wave(angle: mpf, mu: mpf) -> mpf:
+            return 2 * g / (1 + 4 * mu**2) * ((1 - 2 * mu**2) * mp.cos(angle) - 3 * mu * mp.sin(angle))
+
+        def up(angle: mpf) -> mpf:
+            return wave(angle, mu) + (16 - 2 * mu * g * flat - wave(mpf(0), mu)) * mp.exp(-2 * mu * angle)
+
+        top = mp.findroot(up, mpf("0.5"))
+
+        def down(angle: mpf) -> mpf:
+            return wave(angle, -mu) - wave(top, -mu) * mp.exp(2 * mu * (angle - top))
+
+        below = mp.sqrt(down(mpf(0)))
+        there = [flat + top, flat - below**2 / (2 * mu * g)]
+        joined = mp.sqrt(16 - 2 * mu * g * flat)
+        # Gauss: W is a small difference near the turn.
+        rise, fall = (
+            mp.quad(lambda y, w=w: 2 * y / mp.sqrt(w(top - y * y)), [0, mp.sqrt(top)], method="gauss-legendre")
+            for w in (up, down)
+        )
+        times = [(4 - joined) / (mu * g) + rise, (4 - joined) / (mu * g) + rise + fall + below / (mu * g)]
+    assert [event.kind for event in motion.events] == ["turn", "rest"]
+    for event, place, time in zip(motion.events, there, times, strict=True):
+        assert event.lam == pytest.approx(float(place), rel=1e-14)
+        assert event.t == pytest.approx(float(time), rel=1e-14)
