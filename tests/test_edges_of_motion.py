@@ -72,6 +72,38 @@ def test_a_fall_without_an_end(tmp_path: Path) -> None:
         motion.lam(1e120)
 
 
+def test_a_fall_to_a_singular_point(tmp_path: Path) -> None:
+    """Down the graph of x**(3/2) from 1 to 0, where its curvature is infinite and beyond which there is nothing."""
+    motion = gqm.build(gqm.derive(gqm.Curve.graph("x*sqrt(x)"), gqm.Gravity()), name="root", folder=tmp_path).solve(
+        lam0=1
+    )
+    with pytest.raises(InputError, match=r"the motion ends at 0\.6.* s \(singular-point at x = .*\), got 1\.0"):
+        motion.lam(1.0)
+    with mp.workdps(20):
+        time = mp.quad(
+            lambda y: 2 * y * mp.sqrt((1 + mpf("2.25") * (1 - y * y)) / (2 * mpf("9.81") * (1 - (1 - y * y) ** 1.5))),
+            [0, 1],
+            method="gauss-legendre",
+        )
+    assert motion.t_end == pytest.approx(float(time), rel=1e-14)
+
+
+def test_a_fall_beyond_what_can_be_summed(tmp_path: Path) -> None:
+    """Down -exp(x): V**2 = 2 g (exp(x) - 1) along some e**300 m; beyond, the climb's square is no double."""
+    motion = gqm.build(gqm.derive(gqm.Curve.graph("-exp(x)"), gqm.Gravity()), name="cliff", folder=tmp_path).solve(
+        lam0=0
+    )
+    with mp.workdps(20):
+        for place in (1.0, 100.0):
+            time = mp.quad(
+                lambda y: 2 * y * mp.sqrt((1 + mp.exp(2 * y * y)) / (2 * mpf("9.81") * mp.expm1(y * y))),
+                mp.linspace(0, mp.sqrt(place), 9),
+            )
+            assert motion.time_at(place) == pytest.approx(float(time), rel=1e-14)
+    with pytest.raises(SolutionError, match="the integrand is not finite there; is the curve regular"):
+        motion.time_at(900)
+
+
 @pytest.mark.parametrize("v0", ["1e-3", "1e-9", "1e-12", "1e-20"])
 def test_out_of_a_cusp_however_slowly(v0: str, module_of: Callable[[str], ModuleType]) -> None:
     """It turns at 2 asin(k) after 2 sqrt(R/g) atanh(k), k = v0/(2 sqrt(g R))."""
