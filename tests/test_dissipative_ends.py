@@ -66,6 +66,20 @@ def test_rest_and_what_comes_after(slope: ModuleType) -> None:
         motion.lam(1.0)
 
 
+def test_a_horizon_ends_it(slope: ModuleType) -> None:
+    """Later times are no part of the motion."""
+    with pytest.raises(InputError, match=r"the motion ends at 1\.0 s \(the horizon t_max\), got 2\.0"):
+        slope.solve(lam0=0, mu=0.1, t_max=1).lam(2.0)
+
+
+def test_what_a_sweep_has_no_number_for(slope: ModuleType) -> None:
+    """The largest speed of a fall without an end, turning points of what only falls, a launch that leaves at once."""
+    for quantity in ("v_max", "turning_points"):
+        swept = slope.sweep(quantity, lam0=[0.0, 1.0], mu=0.1)
+        assert np.isnan(swept.values).all()
+        assert list(swept.why()) == ["the motion is not of a kind that has this quantity"]
+
+
 def test_pass1_of_a_body_at_rest(slope: ModuleType) -> None:
     """It has a speed where it is, and is nowhere else."""
     v2 = slope.pass1(np.array([-1.0, 0.0, 1.0]), lam0=0, v0=0, mu=2).v2
@@ -78,6 +92,7 @@ def test_out_of_the_domain_at_once(build: Build) -> None:
     module = build("bounded", gqm.Curve.graph("x**2", domain=(0, 1)), gqm.QuadraticDrag(b="1"))
     with pytest.raises(LaunchError, match=r"1\.0 is the end of the domain itself, .* launch with direction=-1"):
         module.solve(lam0=1, v0=1)
+    assert module.sweep("t_end", lam0=[1.0], v0=1.0).why() == {"the launch is refused; solve says why": 1}
 
 
 @pytest.fixture(scope="module")
@@ -125,6 +140,12 @@ def test_an_approach_has_a_last_digit(build: Build) -> None:
         v0 = mp.sqrt(2 * g / (1 + k**2) * (loss(mp.pi) - loss(0)))
     motion = module.solve(lam0=0, v0=float(v0))
     assert motion.lam(60.0) == pytest.approx(math.pi, abs=4e-15)
+    # On the way the speed is that of the closed form, which near the top is a small difference.
+    state = motion.state(np.array([0.5, 1.0, 2.0]))
+    with mp.workdps(40):
+        for place, v in zip(state.lam, state.v, strict=True):
+            w = (v0**2 - 2 * g / (1 + k**2) * (loss(mpf(float(place))) - loss(0))) / mp.exp(k * mpf(float(place)))
+            assert v == pytest.approx(float(mp.sqrt(w)), rel=1e-10)
     with pytest.raises(SolutionError, match=r"closer to the equilibrium at theta = 3\.14.* than doubles can tell"):
         motion.lam(3600.0)
 

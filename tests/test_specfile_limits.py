@@ -40,6 +40,10 @@ def read(folder: Path, text: str) -> gqm.Model:
             "{pieces: [{family: {L: 2}}]}",
             "2:19: curve.pieces.0.family: name is missing; known are cartesian_graph, circle",
         ),
+        (
+            "{family: {name: circle, R: 2}}",
+            "2:32: curve.family: unknown key 'R'; allowed are L, domain, inverted, name, parameter",
+        ),
         ("{family: {L: 2}}", "2:9: curve.family: name is missing; known are cartesian_graph, circle"),
         ("{family: {name: circel}}", "2:18: curve.family: unknown family 'circel'; known are cartesian_graph, circle"),
         (
