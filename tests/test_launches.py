@@ -1,11 +1,13 @@
 """What a launch is refused for, whoever gives it; what may be left out, and in what it may be given."""
 
 from collections.abc import Callable
+from pathlib import Path
 from types import ModuleType
 from typing import Any
 
 import pytest
 
+import gqm_sym as gqm
 from gqm_sym.cli import show
 from gqm_sym.errors import InputError, SolutionError
 
@@ -46,6 +48,15 @@ def test_a_place_beyond_the_domain(arch: ModuleType) -> None:
     """The message has the domain."""
     with pytest.raises(InputError, match=r"lam0: must lie in the domain \[0\.0, 6\.28.*\] of lam, got 7"):
         arch.solve(lam0=7, R=1)
+
+
+def test_a_place_without_a_curve(tmp_path: Path) -> None:
+    """Where the coordinates are no numbers nothing can be launched."""
+    module = gqm.build(gqm.derive(gqm.Curve.graph("sqrt(x)"), gqm.Gravity()), name="root", folder=tmp_path)
+    with pytest.raises(
+        InputError, match=r"lam0: the curve has no point at x = -1\.0 with these"
+    ):
+        module.solve(lam0=-1)
 
 
 def test_a_sweep_is_refused_for_the_same(circle: ModuleType) -> None:
