@@ -62,6 +62,8 @@ def test_rest_and_what_comes_after(slope: ModuleType) -> None:
     assert motion.t_end == pytest.approx(end, rel=1e-14)
     there = -math.sqrt(0.5) * 0.5 * end
     assert motion.lam(motion.t_end) == pytest.approx(there, rel=1e-14)
+    assert motion.events_between(0, end / 2) == ()
+    assert [event.kind for event in motion.events_between(end / 2, 1)] == ["rest"]
     with pytest.raises(InputError, match=r"the motion ends at 0\.048.* s \(rest at x = -0\.01.*\), got 1\.0"):
         motion.lam(1.0)
 
