@@ -200,3 +200,28 @@ def test_over_a_joint_and_back(build: Build) -> None:
     for event, place, time in zip(motion.events, there, times, strict=True):
         assert event.lam == pytest.approx(float(place), rel=1e-14)
         assert event.t == pytest.approx(float(time), rel=1e-14)
+
+
+def test_where_the_contact_force_begins_as_nothing(build: Build) -> None:
+    """On a parabola of free fall N is zero at the launch, and the track carries what drag has slowed.
+
+    W = exp(-2 b s) (g + 2 g times the integral of x exp(2 b s)).
+    """
+    module = build("flight", gqm.Curve.graph("-x**2/2"), gqm.QuadraticDrag(b="0.5"))
+    motion = module.solve(lam0=0, v0="sqrt(9.81)")
+    with mp.workdps(20):
+        b, g = mpf("0.5"), mpf("9.81")
+
+        def length(x: mpf) -> mpf:
+            return (x * mp.sqrt(1 + x * x) + mp.asinh(x)) / 2
+
+        def w(x: mpf) -> mpf:
+            fed = mp.quad(lambda u: u * mp.exp(2 * b * length(u)), [0, x])
+            return mp.exp(-2 * b * length(x)) * (g + 2 * g * fed)
+
+        time = mp.quad(lambda x: mp.sqrt((1 + x * x) / w(x)), [0, 1])
+    assert motion.time_at(1) == pytest.approx(float(time), rel=1e-14)
+    state = motion.state(motion.time_at(1))
+    assert state.v2 == pytest.approx(float(w(mpf(1))), rel=1e-14)
+    assert state.normal_force == pytest.approx(float(g - w(mpf(1)) / 2) / math.sqrt(2.0), rel=1e-13)
+    assert [event.kind for event in motion.events if event.kind == "contact-sign"] == []

@@ -53,9 +53,7 @@ def test_a_place_beyond_the_domain(arch: ModuleType) -> None:
 def test_a_place_without_a_curve(tmp_path: Path) -> None:
     """Where the coordinates are no numbers nothing can be launched."""
     module = gqm.build(gqm.derive(gqm.Curve.graph("sqrt(x)"), gqm.Gravity()), name="root", folder=tmp_path)
-    with pytest.raises(
-        InputError, match=r"lam0: the curve has no point at x = -1\.0 with these"
-    ):
+    with pytest.raises(InputError, match=r"lam0: the curve has no point at x = -1\.0 with these"):
         module.solve(lam0=-1)
 
 
