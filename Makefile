@@ -4,9 +4,6 @@ WORKERS ?= 2
 VENV    := .venv
 BIN     := $(VENV)/bin
 
-# Tests whose subject is compilation, another process or the disk: the others run uncompiled for `coverage`.
-COMPILED := $(patsubst %,tests/test_%.py,architecture calls docs errors faults family_pages hostile jit processes starter sweeps uncompiled)
-
 .DEFAULT_GOAL := help
 .PHONY: help demo test lint generate docs soak fuzz bench coverage mutate
 
@@ -41,16 +38,19 @@ soak: $(VENV)/.run ## solve random launches and hold each motion to its laws (CO
 fuzz: $(VENV)/.run ## read mutated files and expressions for ten minutes (SECONDS, SEED)
 	$(BIN)/python scripts/fuzz.py $(or $(SECONDS),600) $(or $(SEED),0)
 
-coverage: $(VENV)/.dev ## measure which branches the tests run, compiled code included; it takes an hour
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check 'coverage>=7.6'
-	$(BIN)/python scripts/mutate.py 0
-	-$(BIN)/python -m coverage run --branch --source=gqm_sym --data-file=.mutants/coverage.compiled -m pytest $(COMPILED)
-	$(BIN)/python -m coverage combine --keep --data-file=.mutants/all .mutants/coverage.*
+coverage: $(VENV)/.dev ## measure which branches the tests run, compiled code included; it takes most of an hour
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check 'coverage>=7.10'
+	rm -rf .mutants/cache .mutants/coverage.compiled*
+	WORKERS=$(WORKERS) $(BIN)/python scripts/mutate.py 0
+	-NUMBA_CACHE_DIR=$(CURDIR)/.mutants/cache $(BIN)/python -m coverage run -m pytest -n $(WORKERS) tests
+	$(BIN)/python -m coverage combine --quiet --keep --data-file=.mutants/all .mutants/coverage.*
 	$(BIN)/python -m coverage report --data-file=.mutants/all --skip-covered --show-missing
+	$(BIN)/python -m coverage json --quiet --data-file=.mutants/all -o .mutants/all.json
+	$(BIN)/python -c "import json; t = json.load(open('.mutants/all.json'))['totals']; print(t['covered_branches'], 'of', t['num_branches'], 'branches')"
 
 mutate: $(VENV)/.dev ## change the code at random and list the changes that no test notices (COUNT, SEED)
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check 'coverage>=7.6'
-	$(BIN)/python scripts/mutate.py $(or $(COUNT),300) $(or $(SEED),0)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check 'coverage>=7.10'
+	WORKERS=$(WORKERS) $(BIN)/python scripts/mutate.py $(or $(COUNT),300) $(or $(SEED),0)
 
 bench: $(VENV)/.bench ## time each stage, and set accuracy and time beside the alternatives' (docs/benchmarks.md)
 	$(BIN)/python benchmarks/stages.py

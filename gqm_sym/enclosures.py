@@ -9,10 +9,11 @@ state, so this is safe in threads.
 """
 
 import ast
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from fractions import Fraction
 from functools import cached_property
 from math import isqrt
+from types import MappingProxyType
 from typing import Any, TypeAlias
 
 from gqm_sym import rationals
@@ -60,22 +61,28 @@ _STEEP = ("exp", "sinh", "cosh", "tanh")
 _GROWING = ("asin", "atan", "sinh", "tanh", "asinh", "atanh", "exp", "log", "sqrt")
 
 
-def enclose(tree: ast.expr, bits: int, *, where: str) -> Fraction | Interval:
-    """Value of a tree without names: exact, or an interval no wider than ``2**-bits`` of its size.
+def enclose(
+    tree: ast.expr, bits: int, *, where: str, values: Mapping[str, ast.expr] = MappingProxyType({})
+) -> Fraction | Interval:
+    """Value of a tree: exact, or an interval no wider than ``2**-bits`` of its size.
+
+    Parameters
+    ----------
+    values
+        What names in it mean, as trees without names: nearly, so that no exact number grows long.
 
     Raises
     ------
     ExpressionError
-        If it is not a finite real number, or has a name in it.
+        If it is not a finite real number, or has another name in it.
     """
     precision = bits + GUARD_BITS
     last = bits + LAST_BITS
     while True:
-        algebra = _Enclosures(min(precision, last), last=precision >= last)
+        algebra = _Enclosures(min(precision, last), last=precision >= last, values=values)
         try:
             value = evaluate(tree, algebra, where=where)
-            if value is None:
-                raise ExpressionError(f"{where}: a name where a number should stand")
+            assert value is not None  # `name` has refused what it knows no number of
             if isinstance(value, Fraction) or algebra.is_narrow(value, bits):
                 return value
         except _Undecided:
@@ -112,12 +119,22 @@ class _Enclosures:
         Whether no more than these will be tried: then what is undecided is decided.
     names
         Whether names are allowed; what depends on them is None.
+    values
+        Names that are allowed anyway, and what they mean.
     """
 
-    def __init__(self, bits: int, *, last: bool, names: bool = False) -> None:
+    def __init__(
+        self,
+        bits: int,
+        *,
+        last: bool,
+        names: bool = False,
+        values: Mapping[str, ast.expr] = MappingProxyType({}),
+    ) -> None:
         self.bits = bits
         self.last = last
         self.names = names
+        self.values = values
 
     @cached_property
     def mp(self) -> Any:
@@ -135,6 +152,9 @@ class _Enclosures:
             return self.mp.mpf_pi(self.bits, "f"), self.mp.mpf_pi(self.bits, "c")
         if name == "e":
             return self.mp.mpf_e(self.bits, "f"), self.mp.mpf_e(self.bits, "c")
+        if name in self.values:
+            value = evaluate(self.values[name], self, where=name)
+            return self.interval(value) if isinstance(value, Fraction) else value
         if self.names:
             return None
         raise ValueError(f"{name!r} is no number; write one such as 9.81 or pi/2")
@@ -179,9 +199,9 @@ class _Enclosures:
         return None if value is None else rationals.reciprocal(value)
 
     def power(self, base: Value, exponent: Value) -> Value:
-        if isinstance(exponent, Fraction):
-            rationals.check_exponent(exponent)
         if base is None or exponent is None:
+            if isinstance(exponent, Fraction):
+                rationals.check_exponent(exponent)
             return None
         if isinstance(exponent, Fraction) and exponent.denominator == 1:
             if isinstance(base, Fraction):

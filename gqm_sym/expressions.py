@@ -6,7 +6,7 @@ that is complex or infinite.
 """
 
 import keyword
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Mapping
 from decimal import Decimal
 from fractions import Fraction
 from typing import TypeAlias, TypeVar
@@ -15,7 +15,7 @@ import sympy as sp
 
 from gqm_sym import rationals
 from gqm_sym.budgets import budget
-from gqm_sym.enclosures import check_constants
+from gqm_sym.enclosures import check_constants, enclose
 from gqm_sym.errors import ExpressionError
 from gqm_sym.grammar import CONSTANTS, FUNCTIONS, NAME, evaluate, parse
 from gqm_sym.sympy_tree import is_sympy, tree_of
@@ -35,6 +35,8 @@ _MAX_BITS = 1400
 # Of anything but a name or a number. SymPy multiplies powers out on many occasions: (x - 1)**999
 # can take it half a minute.
 _MAX_POWER = 32
+# To which a number is known that is asked for its being one only.
+_REAL_BITS = 10
 # Of processor time for one expression; those that people write take a thousandth of it.
 SECONDS = 0.5
 
@@ -93,6 +95,23 @@ def read_expression(source: Source, *, where: str) -> sp.Expr:
     with budget(where, SECONDS, "write a shorter expression"):
         check_constants(tree, where=where)
         return evaluate(tree, _SymPy(), where=where)
+
+
+def is_real_at(form: sp.Expr, values: Mapping[sp.Symbol, sp.Expr]) -> bool | None:
+    """Whether a form is a finite real number where its symbols have some values; None where the grammar has no word.
+
+    Each step is bounded. SymPy's own evaluation takes exp(exp(exp(50))) for a number to be computed.
+    """
+    try:
+        tree = tree_of(form, where="form")
+        known = {symbol.name: tree_of(value, where=symbol.name) for symbol, value in values.items()}
+    except ExpressionError:
+        return None
+    try:
+        enclose(tree, _REAL_BITS, where="form", values=known)
+    except ExpressionError:
+        return False
+    return True
 
 
 def check_name(name: str, *, where: str, reserved: Collection[str] = RESERVED_NAMES) -> str:
@@ -178,8 +197,7 @@ class _SymPy:
 
     def power(self, base: sp.Expr, exponent: sp.Expr) -> sp.Expr:
         for part in (exponent.as_coeff_Add()[0], exponent.as_coeff_Mul()[0]):
-            if part.is_Rational:
-                rationals.check_exponent(Fraction(part.p, part.q))
+            rationals.check_exponent(Fraction(part.p, part.q))
         if base.is_negative and base.is_number and not exponent.is_integer:
             raise ValueError("a negative number to a power that is not whole, which is not real")
         if exponent.is_Rational:

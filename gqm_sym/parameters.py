@@ -55,8 +55,6 @@ def _check_number(expression: sp.Expr, given: object, where: str) -> None:
     free = sorted(symbol.name for symbol in expression.free_symbols)
     if free:
         raise NumberError(f"{where}: must be a number, got {given!s}, which contains {free[0]!r}")
-    if not (expression.is_real and expression.is_finite):
-        raise NumberError(f"{where}: must be a finite real number, got {given!s}")
 
 
 def read_parameters(

@@ -46,6 +46,7 @@ import zarr  # noqa: E402, F401
 
 FOLDERS = ("gqm_sym/derivation", "gqm_sym/runtime")
 WORK = ROOT / ".mutants"
+WORKERS = int(os.environ.get("WORKERS", "1"))
 MEASURING = str(Path(coverage.__file__).parent)
 # Tests whose subject is another process, a disk or compilation; and those that would need one.
 LEFT_OUT = (
@@ -146,18 +147,26 @@ def known_tests() -> tuple[dict[str, float], dict[str, dict[str, list[str]]]]:
     WORK.mkdir(exist_ok=True)
     taken: dict[str, float] = {}
     lines: dict[str, dict[str, list[str]]] = defaultdict(lambda: defaultdict(list))
-    for file in sorted((ROOT / "tests").glob("test_*.py")):
-        found = WORK / f"{file.stem}.json"
-        if file.stem.removeprefix("test_") in LEFT_OUT:
+    files = [
+        file for file in sorted((ROOT / "tests").glob("test_*.py")) if file.stem.removeprefix("test_") not in LEFT_OUT
+    ]
+    running: set[int] = set()
+    for file in files:
+        if (WORK / f"{file.stem}.json").exists():
             continue
-        if not found.exists():
-            child = os.fork()
-            if not child:
-                try:
-                    record(file)
-                finally:
-                    os._exit(0)
-            os.waitpid(child, 0)
+        if len(running) == WORKERS:
+            running.discard(os.wait()[0])
+        child = os.fork()
+        if not child:
+            try:
+                record(file)
+            finally:
+                os._exit(0)
+        running.add(child)
+    while running:
+        running.discard(os.wait()[0])
+    for file in files:
+        found = WORK / f"{file.stem}.json"
         if found.exists():  # else what it runs ended the process
             told = json.loads(found.read_text(encoding="utf-8"))
             taken |= told["taken"]

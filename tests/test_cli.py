@@ -1,5 +1,6 @@
 """The commands: what they print and write, and how they end."""
 
+import io
 import json
 import os
 import subprocess
@@ -11,7 +12,7 @@ from typing import NamedTuple
 import mpmath
 import pytest
 
-from gqm_sym.cli import gen, tool
+from gqm_sym.cli import exits, gen, tool
 from gqm_sym.declare.families import names
 from gqm_sym.kernels import KERNELS
 
@@ -432,3 +433,33 @@ def test_a_figure_of_no_known_format(here: Commands) -> None:
     )
     assert not Path("swing.gif").exists()
     assert here.gqm("plot", "bowl.yaml", "bowl.png").code == 2
+
+
+def test_what_a_figure_goes_with(here: Commands) -> None:
+    """It needs the module that is written, and a launch that the curve has; else no motion is drawn."""
+    for option in ("--check", "--stdout"):
+        code, _, err = here.gen("--plot", "one.png", option, "swing.yaml")
+        assert (code, err.splitlines()[-1]) == (
+            2,
+            "gqm-gen: error: --plot: runs the module that is written; give it without --check and --stdout",
+        )
+    assert here.gen("--plot", "one.png", "swing.yaml").out.endswith("wrote one.png\n")
+    Path("arch.yaml").write_text(
+        "name: arch\ncurve: {family: {name: cycloid, R: 1}}\nkernel: {gravity: {}}\n"
+        "launch: {lam0: 0, v0: 1, direction: -1}\n"
+    )
+    code, _, err = here.gen("-q", "--solve", "arch.yaml")
+    assert code == 2
+    assert err.startswith("arch.yaml:4:16: launch.lam0: 0.0 is the cusp itself, and the motion would leave through it")
+
+
+def test_what_ends_a_command(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    """An expression too deep, or too large for memory, is a failure with one line."""
+    monkeypatch.setattr("sys.stdout", io.StringIO())  # which cannot be told how to write what it lacks
+    for error, what in ((RecursionError(), "nested too deeply"), (MemoryError(), "too large")):
+
+        def work(error: BaseException = error) -> int:
+            raise error
+
+        assert exits.guarded("gqm", work) == exits.FAILED
+        assert capsys.readouterr().err == f"gqm: an expression is {what}; write it in a simpler form\n"

@@ -3,6 +3,7 @@
 import pytest
 import sympy as sp
 
+import gqm_sym as gqm
 from gqm_sym.declare import Curve, families
 from gqm_sym.errors import DeclarationError, InputError, NumberError
 
@@ -155,3 +156,11 @@ def test_an_unknown_family_is_no_attribute():
     """The message lists those there are."""
     with pytest.raises(AttributeError, match="cycloid"):
         families.spirograph  # noqa: B018
+
+
+def test_names_that_are_listed() -> None:
+    """What `dir` lists can be fetched, and the families are among theirs."""
+    assert dir(gqm) == sorted(gqm.__all__)
+    for name in dir(gqm):
+        assert getattr(gqm, name) is not None
+    assert {"circle", "ellipse", "cycloid"} <= set(dir(gqm.families))

@@ -12,7 +12,7 @@ from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
 from gqm_sym.errors import ExpressionError, GQMError, NumberError
-from gqm_sym.expressions import RESERVED_NAMES, check_name, name_or_value, read_expression
+from gqm_sym.expressions import RESERVED_NAMES, check_name, is_real_at, name_or_value, read_expression
 from gqm_sym.grammar import CONSTANTS, FUNCTIONS
 
 # Against a reader that hangs, not against a busy machine.
@@ -101,6 +101,8 @@ def test_sources_of_every_kind_are_read(source, expected):
         ("2**(y*10**50)", "an exponent beyond 1000"),
         ("log(0)", "log of a number outside (0, oo)"),
         ("x/(y - y)", "column 6: division by zero"),
+        ("(x - x)**(-2)", "column 8: division by zero"),
+        ("(x - x)**(-y)", "column 8: not a finite real number"),
         ("x/(sin(1)**2 + cos(1)**2 - 1)", "division by zero"),
         ("tan(pi/2)", "division by zero"),
         ("asin(sin(10**300))", "SymPy cannot take asin of it"),
@@ -334,3 +336,21 @@ def test_reserved_names_are_for_the_caller_to_say():
 def test_an_argument_is_another_name_or_a_value(source, expected):
     """One word renames the parameter; anything else is its value."""
     assert name_or_value(source, "mu") == expected
+
+
+@pytest.mark.parametrize(
+    ("form", "value", "real"),
+    [
+        (sp.sqrt(x), 2, True),
+        (sp.sqrt(x), -2, False),
+        (1 / x, 0, False),
+        (sp.exp(sp.exp(sp.exp(x))), 50, False),
+        (sp.sin(sp.exp(sp.exp(x))), 5, True),
+        (x**1500, sp.Rational(12345678, 10000001), True),
+        (sp.gamma(x), 2, None),
+        (x + y, 2, False),
+    ],
+)
+def test_whether_a_form_is_a_number_somewhere(form, value, real):
+    """Found without computing towers; nothing is said of what the grammar has no word for."""
+    assert is_real_at(form, {x: sp.sympify(value)}) is real

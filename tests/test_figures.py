@@ -82,6 +82,8 @@ def test_axes_of_the_caller(circle: ModuleType) -> None:
     figure = Figure()
     axes = figure.subplots()
     assert circle.solve(1.0).plot(axes=axes) is figure
+    pair = Figure()
+    assert circle.solve(1.0).plot("loads", axes=pair.subplots(2, 1)) is pair
 
 
 def test_an_unknown_figure(circle: ModuleType) -> None:

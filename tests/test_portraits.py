@@ -131,3 +131,21 @@ def test_portrait_of_a_motion(wells: ModuleType) -> None:
     assert np.abs(np.array([a - low, high - b]) - 0.4 * (b - a)).max() <= 1e-12
     (mark,) = [line for line in axes.lines if line.get_label() == "launch"]
     assert mark.get_xydata().tolist() == [[-1.2, -1.0]]
+
+
+def test_a_launch_in_another_round_is_drawn_in_this_one(circle: ModuleType) -> None:
+    """Three rounds on is the same place."""
+    drawn = []
+    for place in (0.5, 0.5 + 6.0 * np.pi, 0.5 - 4.0 * np.pi):
+        (axes,) = gqm.figures.phase_portrait(circle, levels=1, through=[(place, 2)]).axes
+        (launch,) = [line.get_xydata() for line in axes.lines if line.get_label() == "launch"]
+        drawn.append(launch[0])
+    assert drawn[0] == pytest.approx([0.5, 2.0])
+    assert np.abs(np.array(drawn[1:]) - drawn[0]).max() <= 1e-14
+
+
+def test_a_range_without_a_curve(tmp_path: Path) -> None:
+    """Where the curve is not real there is nothing to draw."""
+    module = gqm.build(gqm.derive(gqm.Curve.graph("sqrt(x)"), gqm.Gravity()), name="root", folder=tmp_path)
+    with pytest.raises(SolutionError, match="the energy is finite nowhere in the range; give another lam"):
+        gqm.figures.phase_portrait(module, (-3, -1))

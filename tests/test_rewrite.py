@@ -92,6 +92,9 @@ def test_a_sum_without_minus_signs_is_preferred():
         ("t**2 + exp(t)", (None, None), 1),
         ("a", (None, None), None),
         ("1 - t", (None, None), None),
+        ("sin(t)", ("0", "pi"), 1),
+        ("cos(t)", ("-3*pi/2", "-pi/2"), -1),
+        ("sin(10**300*t)", ("-2", "2"), None),
     ],
 )
 def test_signs_on_a_domain(text, domain, sign):
@@ -181,3 +184,52 @@ def test_a_hidden_point_is_refused():
     """sin² + cos² depends on t only in its text."""
     with pytest.raises(DeclarationError, match="point"):
         geometry(Curve.parametric(x="sin(t)**2 + cos(t)**2", z="a", parameter="t"), may_be_positive=())
+
+
+LONG, OTHER = (sum(name**k for k in range(40)) for name in (a, b))
+
+
+@pytest.mark.parametrize(
+    ("made_of", "expression", "message"),
+    [
+        (sp.sin(t) + sp.sin(41 * t), sp.sin(41 * t), "an angle 41 times another"),
+        (a + b + t, LONG * OTHER, "a product of 40 by 40 terms"),
+        (sp.sin(t), sp.sin(t) ** 30 * sp.cos(t) ** 30, "degree 60 in one angle"),
+        (t, sp.sqrt(t), r"sqrt\(t\) came up on the way"),
+    ],
+)
+def test_each_limit_says_what_was_too_large(made_of, expression, message):
+    """Each is counted before anything large is computed."""
+    with pytest.raises(OverBudget, match=message):
+        Algebra([made_of], t).fraction(expression)
+
+
+def test_a_double_angle_that_is_too_long_is_not_taken():
+    """Sixteen terms of degree 30 are some 180 in sine and cosine of twice the angle."""
+    mixed = sum(a**k * sp.sin(t) ** (2 * k) * sp.cos(t) ** (30 - 2 * k) for k in range(16))
+    algebra = Algebra([mixed], t)
+    (pair,) = algebra.pairs
+    assert algebra.doubled(algebra.fraction(mixed).top, pair) is None
+    _, found, number = algebra.doubled(algebra.fraction(sp.sin(t) * sp.cos(t)).top, pair)
+    assert (found, number) == (algebra.generators[pair.sine], 2)
+
+
+def test_odd_and_even_functions_whoever_wrote_the_sign():
+    """SymPy puts minus signs in front of sines, unless it is told not to; an algebra knows it anyway."""
+    minus = sp.Mul(-1, t, evaluate=False)
+    algebra = Algebra([sp.sin(t)], t)
+    assert algebra.fraction(sp.sin(minus, evaluate=False)) == algebra.fraction(-sp.sin(t))
+    assert algebra.fraction(sp.cos(minus, evaluate=False)) == algebra.fraction(sp.cos(t))
+
+
+def test_angles_that_have_nothing_in_common_stay_apart():
+    """A product of functions of two angles is no function of one."""
+    assert factored("sin(t)*sin(a)") == read("sin(t)*sin(a)")
+    assert factored("(1 - cos(t))*(1 - cos(a))") == read("4*sin(a/2)**2*sin(t/2)**2")
+
+
+def test_what_is_too_long_is_not_looked_at():
+    """A common factor is taken out of 100 terms, and not of 300."""
+    for count, taken in ((100, True), (300, False)):
+        long = sum(t * sp.Symbol(f"a{k}", real=True) for k in range(count))
+        assert (tidy(long) != long) is taken

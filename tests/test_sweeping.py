@@ -10,6 +10,7 @@ from mpmath import mp, mpf
 
 import gqm_sym as gqm
 from gqm_sym.errors import InputError, ParameterError
+from gqm_sym.runtime import threads
 from gqm_sym.runtime.sweeping import REASONS
 
 ModuleOf = Callable[[str], ModuleType]
@@ -197,3 +198,13 @@ def test_loads_of_a_swing_next_to_the_top(module_of: ModuleOf) -> None:
     assert most == pytest.approx(9.81 * (3 - 2 * np.cos(amplitude)), rel=LOAD)
     assert least == pytest.approx(9.81 * np.cos(amplitude), rel=LOAD)
     assert circle.sweep("v_max", amplitude, L=1).values == pytest.approx(np.sqrt(4 * 9.81), rel=LOAD)
+
+
+def test_cores_where_the_system_tells_no_more(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Without an affinity all cores of the machine are this process's; one at least."""
+    monkeypatch.delattr(threads.os, "sched_getaffinity")
+    for count, cores in ((6, 6), (None, 1)):
+        threads.cores.cache_clear()
+        monkeypatch.setattr(threads.os, "cpu_count", lambda count=count: count)
+        assert threads.cores() == cores
+    threads.cores.cache_clear()

@@ -2,7 +2,6 @@
 
 import json
 import math
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -10,116 +9,12 @@ import pytest
 import sympy as sp
 from mpmath import mp, mpf
 from naive import error, ulps
-from numba import carray, cfunc
 from problems import DATA
+from traced import ROUNDING, hold, trace
 
-from gqm_sym.errors import LaunchError, SolutionError
-from gqm_sym.runtime.chart import Chart
-from gqm_sym.runtime.interface import FIELD
-from gqm_sym.runtime.march import PIECES
-from gqm_sym.runtime.tracing import Traced
-
-# Of the curve's extent; worst measured 4e-16 where F is computed without cancellation.
-ROUNDING = 1e-15
 # Of the largest curvature: as for every sample of the corpus.
 SAMPLE = 1e-13
 PERIOD_ULPS = 2.0
-
-DEGREE = 6
-
-
-@cfunc(FIELD, error_model="numpy")
-def _polynomial(n, xs, zs, p, out):
-    """F = sum of p[j, k] x**j z**k and its derivatives."""
-    xs, zs, p, out = carray(xs, n), carray(zs, n), carray(p, (DEGREE + 1, DEGREE + 1)), carray(out, (6, n))
-    for i in range(n):
-        x, z = xs[i], zs[i]
-        f = fx = fz = fxx = fxz = fzz = 0.0
-        for j in range(DEGREE + 1):
-            for k in range(DEGREE + 1):
-                c = p[j, k]
-                if c == 0.0:
-                    continue
-                f += c * x**j * z**k
-                if j > 0:
-                    fx += c * j * x ** (j - 1) * z**k
-                if k > 0:
-                    fz += c * k * x**j * z ** (k - 1)
-                if j > 1:
-                    fxx += c * j * (j - 1) * x ** (j - 2) * z**k
-                if k > 1:
-                    fzz += c * k * (k - 1) * x**j * z ** (k - 2)
-                if j > 0 and k > 0:
-                    fxz += c * j * k * x ** (j - 1) * z ** (k - 1)
-        out[0, i], out[1, i], out[2, i], out[3, i], out[4, i], out[5, i] = f, fx, fz, fxx, fxz, fzz
-
-
-SQUARE, BEND, ROOT, WAVE = range(4)
-
-
-@cfunc(FIELD, error_model="numpy")
-def _other(n, xs, zs, p, out):
-    """|x| + |z| - 1, z - x|x|, z - sqrt(x) and z - sin(x), by the number p[0]."""
-    xs, zs, p, out = carray(xs, n), carray(zs, n), carray(p, 1), carray(out, (6, n))
-    for i in range(n):
-        x, z, which = xs[i], zs[i], int(p[0])
-        fx, fz, fxx = 0.0, 1.0, 0.0
-        if which == 0:
-            f, fx, fz = abs(x) + abs(z) - 1.0, math.copysign(1.0, x), math.copysign(1.0, z)
-        elif which == 1:
-            f, fx, fxx = z - x * abs(x), -2.0 * abs(x), -2.0 * math.copysign(1.0, x)
-        elif which == 2:
-            f, fx, fxx = z - math.sqrt(x), -0.5 / math.sqrt(x), 0.25 * x**-1.5
-        else:
-            f, fx, fxx = z - math.sin(x), -math.cos(x), math.sin(x)
-        out[0, i], out[1, i], out[2, i], out[3, i], out[4, i], out[5, i] = f, fx, fz, fxx, 0.0, 0.0
-
-
-def trace(
-    text: str,
-    start: tuple[float, float],
-    *,
-    tangent: int = 1,
-    domain: tuple[float | None, float | None] = (None, None),
-    given: dict[str, Any] | None = None,
-) -> Chart:
-    """The chart of a polynomial's curve."""
-    x, z = sp.symbols("x z")
-    polynomial = sp.Poly(sp.sympify(text, rational=True).subs(given or {}), x, z)
-    coefficients = np.zeros((DEGREE + 1, DEGREE + 1))
-    for (j, k), value in polynomial.terms():
-        coefficients[j, k] = float(value)
-    return _maker(_polynomial, start, tangent, domain).chart(tuple(coefficients.ravel()))
-
-
-def other(which: int, start: tuple[float, float], domain: tuple[float | None, float | None] = (None, None)) -> Chart:
-    """The chart of a curve that is no polynomial's."""
-    return _maker(_other, start, 1, domain).chart((float(which),))
-
-
-def _maker(field: Any, start: tuple[float, float], tangent: int, domain: tuple[float | None, float | None]) -> Traced:
-    return Traced(
-        field=field.address,
-        start=lambda op, p: start,
-        tangent=tangent,
-        level=lambda op, x, z, p: None,  # charts do without extended precision
-        domain=lambda op, p: domain,
-    )
-
-
-def hold(chart: Chart, places: Any, truth: Callable[[int], tuple[Any, ...]], within: float = ROUNDING) -> None:
-    """Hold x, z, alpha (but for whole turns) and kappa to a truth; x and z of their extent, kappa of its largest."""
-    rows = chart.points(places)
-    wanted = [truth(k) for k in range(len(places))]
-    extent = max(max(float(w[i]) for w in wanted) - min(float(w[i]) for w in wanted) for i in (0, 1))
-    sharpest = max(abs(float(w[3])) for w in wanted)
-    for k, (x, z, alpha, kappa) in enumerate(wanted):
-        assert error(rows[0, k], x) <= within * extent
-        assert error(rows[1, k], z) <= within * extent
-        with mp.workdps(40):
-            turns = mp.nint((mpf(float(rows[2, k])) - alpha) / (2 * mp.pi))
-            assert abs(mpf(float(rows[2, k])) - alpha - 2 * mp.pi * turns) <= 4 * within
-        assert error(rows[3, k], kappa) <= 10 * within * sharpest
 
 
 @pytest.mark.parametrize("tangent", [1, -1])
@@ -279,19 +174,6 @@ def test_line() -> None:
     assert not rows[3].any()
 
 
-@pytest.mark.parametrize("domain", [(0, 2 * math.pi), (-1, 7), (0, None), (None, 7)])
-def test_domain_longer_than_the_loop(domain: tuple[float | None, float | None]) -> None:
-    """A closed curve whose domain holds it is closed."""
-    assert ulps(trace("x**2 + z**2 - 1", (1.0, 0.0), domain=domain).period, 2 * mp.pi) <= 1.0
-
-
-def test_domain_shorter_than_the_loop() -> None:
-    """A part of a closed curve is open; one end may be the start."""
-    chart = trace("x**2 + z**2 - 1", (1.0, 0.0), domain=(-2.0, 0.0))
-    assert (chart.low, chart.high, chart.period) == (-2.0, 0.0, 0.0)
-    assert np.abs(chart.points([-2.0])[:2, 0] - [np.cos(2.0), -np.sin(2.0)]).max() <= ROUNDING
-
-
 def _corpus() -> list[dict[str, Any]]:
     entries = json.loads((DATA / "curves.json").read_text(encoding="ascii"))
     return [entry for entry in entries if entry["kind"] == "implicit"]
@@ -316,78 +198,3 @@ def test_corpus(entry: dict[str, Any]) -> None:
         assert error(rows[0, k], row["x"]) <= SAMPLE * extent
         assert error(rows[1, k], row["z"]) <= SAMPLE * extent
         assert error(rows[3, k], row["kappa"]) <= SAMPLE * max(abs(float(r["kappa"])) for r in samples)
-
-
-def test_near_start_is_moved_onto_the_curve() -> None:
-    """To the foot of the perpendicular, which becomes s = 0."""
-    chart = trace("x**2 + z**2 - 1", (0.6 + 1e-8, 0.8 + 1e-8))
-    x, z = chart.points([0.0])[:2, 0]
-    size = math.hypot(0.6 + 1e-8, 0.8 + 1e-8)
-    assert abs(x - (0.6 + 1e-8) / size) <= ROUNDING
-    assert abs(z - (0.8 + 1e-8) / size) <= ROUNDING
-
-
-@pytest.mark.parametrize(
-    ("text", "start", "message"),
-    [
-        ("x**2 + z**2 - 1", (0.3, 0.4), r"start: \(0\.3, 0\.4\) is not on the curve: it is 0\.5 from it; .*\(0\.6"),
-        ("x**2 + z**2 + 1", (1.0, 0.0), "not on the curve, and no point of the curve was found near it"),
-        ("x**2 - z**2", (0.0, 0.0), r"start: \(0\.0, 0\.0\) is a singular point: grad F vanishes there"),
-        ("(x**2 + z**2 - 1)**2", (1.0, 0.0), "is a singular point"),
-        ("x**2 + z**2 - 1", (math.nan, 0.0), "no finite point"),
-    ],
-    ids=["off the curve", "no curve", "node", "square", "nan"],
-)
-def test_bad_start(text: str, start: tuple[float, float], message: str) -> None:
-    """Refused, with how far it is off and where the curve is."""
-    with pytest.raises(LaunchError, match=message):
-        trace(text, start)
-
-
-def test_domain_without_the_start() -> None:
-    """Arc length is counted from the start point."""
-    with pytest.raises(LaunchError, match=r"domain: must contain 0, where the start point is; got \[1\.0, 2\.0\]"):
-        trace("x**2 + z**2 - 1", (1.0, 0.0), domain=(1.0, 2.0))
-
-
-def test_corners() -> None:
-    """|x| + |z| = 1: four corners, each to rounding; and the perimeter."""
-    chart = other(SQUARE, (0.3, 0.7))
-    side = math.sqrt(2.0)
-    first = 0.3 * side
-    assert np.abs(chart.corners - (first + side * np.arange(-2, 2))).max() <= 1e-14
-    assert np.array_equal(chart.breaks, chart.corners)
-    assert abs(chart.period - 4.0 * side) <= 1e-14
-    rows = chart.points(first + side * (np.arange(4) + 0.5))
-    assert np.abs(np.abs(rows[:2]) - 0.5).max() <= 1e-14
-
-
-@pytest.mark.parametrize("start", [-0.7, -0.703, -0.7111, -1.0])
-def test_break(start: float) -> None:
-    """On z = x|x| the curvature jumps at the origin, and only there."""
-    chart = other(BEND, (start, -(start**2)), (-2.0 if start > -1.0 else -4.0, 1.0))
-    where = -(math.asinh(-2 * start) / 4 - start * math.sqrt(1 + 4 * start**2) / 2)
-    assert np.abs(chart.breaks - where).max() <= 1e-14
-    assert chart.breaks.size == 1
-    assert chart.corners.size == 0
-    kappa = chart.points([where - 1e-6, where + 1e-6])[3]
-    assert np.abs(np.abs(kappa) - 2.0).max() <= 1e-10
-    assert kappa[0] * kappa[1] < 0.0
-
-
-def test_end_of_what_is_real() -> None:
-    """The root z = sqrt(x) ends at the origin."""
-    chart = other(ROOT, (1.0, 1.0), (None, 5.0))
-    assert chart.ends == ("domain-end", "domain-end")
-    assert error(chart.high, mp.asinh(2) / 4 + mp.sqrt(5) / 2) <= 1e-14
-    assert np.abs(chart.points([chart.high])[:2]).max() <= 1e-7
-
-
-def test_budget() -> None:
-    """A domain that takes too many pieces is refused; a wave without one is followed as far as they reach."""
-    with pytest.raises(SolutionError, match=f"the end of its domain: {PIECES} pieces reach s = -"):
-        other(WAVE, (0.0, 0.0), (-1e6, 0.0))
-    chart = other(WAVE, (0.0, 0.0))
-    assert chart.edges.size == 2 * PIECES + 1
-    x, z, _, _ = chart.points(np.linspace(chart.low, chart.high, 999))
-    assert np.abs(z - np.sin(x)).max() <= 2e-13

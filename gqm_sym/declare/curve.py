@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 import sympy as sp
 
+from gqm_sym.declare.ends import Ends, check_ends, read_ends
 from gqm_sym.errors import DeclarationError
 from gqm_sym.expressions import check_name, read_expression
 from gqm_sym.parameters import Given, Value, names_in_order, read_parameters
@@ -52,7 +53,7 @@ class Curve:
     x: sp.Expr
     z: sp.Expr
     parameter: sp.Symbol
-    domain: tuple[sp.Expr | None, sp.Expr | None] = (None, None)
+    domain: Ends = (None, None)
     period: sp.Expr | None = None
     defaults: tuple[tuple[str, Value | None], ...] = ()
     title: str = ""
@@ -66,7 +67,7 @@ class Curve:
                 f"{self.kind} curve: neither coordinate depends on the parameter "
                 f"{self.parameter.name!r}; x = {self.x}, z = {self.z} is a point, not a curve"
             )
-        _check_ends(self.kind, self.domain, self.period, self.parameter)
+        check_ends(self.kind, self.domain, self.period, self.parameter)
 
     @property
     def parameters(self) -> tuple[str, ...]:
@@ -189,7 +190,7 @@ class Curve:
 
         symbol = _symbol(parameter, "implicit")
         level = read_level(F, start=start, tangent=tangent, parameter=symbol.name)
-        ends = _read_domain(domain, "implicit")
+        ends = read_ends(domain, "implicit")
         check_domain(*ends)
         return _declare(
             "implicit", chart_x(symbol), chart_z(symbol), symbol, ends, None, parameters, title, positive, level=level
@@ -303,7 +304,7 @@ def _declare(
     radius: sp.Expr | None = None,
     level: "Level | None" = None,
 ) -> Curve:
-    ends = _read_domain(domain, kind)
+    ends = read_ends(domain, kind)
     turn = None if period is None else read_expression(period, where=f"{kind}: period")
     written = (x, z) if radius is None else (radius,)
     given = tuple(end for end in (*ends, turn) if end is not None)
@@ -327,34 +328,3 @@ def _declare(
         radius=radius,
         definition=level,
     )
-
-
-def _read_domain(domain: Iterable[Source | None] | None, kind: str) -> tuple[sp.Expr | None, sp.Expr | None]:
-    if domain is None:
-        return (None, None)
-    ends = None if isinstance(domain, str) else tuple(domain)
-    if ends is None or len(ends) != 2:
-        raise DeclarationError(
-            f"{kind}: domain: must be two ends (lo, hi), either of them None where it is open; got {domain!r}"
-        )
-    low, high = (None if end is None else read_expression(end, where=f"{kind}: domain") for end in ends)
-    return (low, high)
-
-
-def _check_ends(
-    kind: str,
-    domain: tuple[sp.Expr | None, sp.Expr | None],
-    period: sp.Expr | None,
-    parameter: sp.Symbol,
-) -> None:
-    for label, end in (("domain", domain[0]), ("domain", domain[1]), ("period", period)):
-        if end is not None and parameter in end.free_symbols:
-            raise DeclarationError(
-                f"{kind}: {label}: {end} contains the curve's parameter {parameter.name!r}; "
-                "only numbers and run-time parameters may stand there"
-            )
-    low, high = domain
-    if low is not None and high is not None and (high - low).is_number and not high > low:
-        raise DeclarationError(f"{kind}: domain: must have lo < hi, got ({low}, {high})")
-    if period is not None and period.is_number and not period > 0:
-        raise DeclarationError(f"{kind}: period: must be positive, got {period}")

@@ -145,11 +145,6 @@ class Model:
         """The parameter period of a closed curve."""
         return self.curve.period
 
-    @property
-    def kernel_acceleration(self) -> sp.Expr:
-        """The tangential acceleration A; the same as ``kernel``."""
-        return self.kernel
-
     def closed_forms(self) -> tuple[tuple[str, sp.Basic], ...]:
         """Return the forms for people, in the order to print them, each with its label.
 

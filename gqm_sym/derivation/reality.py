@@ -5,12 +5,12 @@ from collections.abc import Iterable, Mapping
 import sympy as sp
 
 from gqm_sym.errors import DeclarationError
+from gqm_sym.expressions import is_real_at
 from gqm_sym.parameters import Value, exact_value
 
 # Where to look on a range without ends, and shares of one with ends.
 _PLACES = tuple(sp.Rational(n, 10) for n in (3, -7, 11, -23, 29, 1, -1, 57, -90))
 _SHARES = tuple(sp.Rational(n, 97) for n in (5, 17, 29, 41, 53, 67, 79, 91))
-_DIGITS = 20
 
 
 def check_somewhere_real(
@@ -34,10 +34,9 @@ def check_somewhere_real(
     low, high = (None if end is None else end.xreplace(values) for end in domain)
     places = tried_places((low, high))
     for label, form in forms:
-        at = form.xreplace(values)
-        if at.free_symbols & unset:
+        if form.free_symbols & unset:
             continue
-        if not any(_is_real(at.xreplace({parameter: place})) for place in places):
+        if all(is_real_at(form, {**values, parameter: place}) is False for place in places):
             raise DeclarationError(
                 f"{label}: {form} is not a real number at any place tried with the default parameters; "
                 "declare a curve and a potential that are real, or a domain on which they are"
@@ -52,9 +51,3 @@ def tried_places(domain: tuple[sp.Expr | None, sp.Expr | None]) -> list[sp.Expr]
     if low is not None or high is not None:
         return [high - abs(p) if low is None else low + abs(p) for p in _PLACES]
     return list(_PLACES)
-
-
-def _is_real(number: sp.Expr) -> bool:
-    value = number.evalf(_DIGITS)
-    real, imaginary = value.as_real_imag()
-    return bool(real.is_finite and abs(imaginary) <= 10 ** (-_DIGITS // 2) * (1 + abs(real)))

@@ -6,6 +6,8 @@ import sympy as sp
 
 _ALWAYS_POSITIVE = (sp.exp, sp.cosh)
 _NEVER_NEGATIVE = (sp.Abs,)
+# Angles beyond which nobody's curve is within one half-wave; SymPy would need a digit more for each digit of theirs.
+FAR = 10**6
 _ODD = (sp.sinh, sp.tanh, sp.asinh, sp.atan, sp.asin, sp.atanh)
 
 
@@ -139,6 +141,8 @@ class Signs:
             return None
         low, high = self._image(slope, rest)
         if low is None or high is None or not (low.is_number and high.is_number):
+            return None
+        if not (abs(low) < FAR and abs(high) < FAR):
             return None
         if isinstance(expression, sp.cos):
             low, high = low + sp.pi / 2, high + sp.pi / 2

@@ -5,7 +5,7 @@ found, W is written as the quadrature that it is, and where the law is not linea
 """
 
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import pairwise, product
 
 import sympy as sp
 
@@ -17,6 +17,7 @@ from gqm_sym.derivation.geometry import Geometry
 from gqm_sym.derivation.particular import particular
 from gqm_sym.derivation.reality import tried_places
 from gqm_sym.derivation.rewrite import tidy
+from gqm_sym.expressions import is_real_at
 from gqm_sym.kernels.base import CONTACT_SIGN, DIRECTION, Kernel, W
 
 LAM0 = sp.Symbol("lam0", real=True)
@@ -151,12 +152,12 @@ def _agrees(squared: sp.Expr, loss: Dissipation, lam: sp.Symbol, domain: tuple[s
     values = {symbol: sp.Rational(7 + 2 * place, 11 + place) for place, symbol in enumerate(free)}
     low, high = (None if end is None else end.xreplace(values) for end in domain)
     tried = tried_places((low, high))
-    for signs in ((1, 1), (1, -1), (-1, 1), (-1, -1)):
+    for signs in product((sp.S.One, sp.S.NegativeOne), repeat=2):
         for here, there in pairwise(tried):
             at = {**values, **dict(zip(_SIGNS, signs, strict=True)), lam: here, LAM0: there}
-            parts = [term.xreplace(at).evalf(_DIGITS) for term in terms]
-            if not all(part.is_Float or part.is_Integer for part in parts):
+            if not all(is_real_at(term, at) for term in terms):
                 continue
+            parts = [term.xreplace(at).evalf(_DIGITS) for term in terms]
             if abs(sum(parts)) > _SHARE * (1 + sum(abs(part) for part in parts)):
                 return False
             break

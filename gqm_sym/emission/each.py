@@ -9,7 +9,8 @@ from sympy.core.function import AppliedUndef
 
 from gqm_sym.derivation.difference import Differences
 from gqm_sym.emission.ir import FunctionIR
-from gqm_sym.emission.places import at, hoist
+from gqm_sym.emission.places import at
+from gqm_sym.emission.sharing import hoist
 
 if TYPE_CHECKING:
     from gqm_sym.emission.lower import Lowering

@@ -3,7 +3,7 @@
 from collections.abc import Iterable
 
 import sympy
-from sympy import Basic, Expr, Function, Rational, Symbol
+from sympy import Expr, Function, Symbol
 
 from gqm_sym.derivation import Model
 from gqm_sym.derivation.difference import Differences
@@ -12,9 +12,9 @@ from gqm_sym.emission.charts import chart_maker
 from gqm_sym.emission.dissipative import drive, hold
 from gqm_sym.emission.each import bounds_each, each
 from gqm_sym.emission.ir import Assignment, ExactIR, FunctionIR, ModuleIR
-from gqm_sym.emission.places import at, hoist
+from gqm_sym.emission.places import at
 from gqm_sym.emission.printer import check_emittable
-from gqm_sym.errors import EmissionError
+from gqm_sym.emission.sharing import check_size, straight_line
 from gqm_sym.kernels.base import CONTACT_SIGN, DIRECTION, W
 from gqm_sym.sympy_charts import chart_x, chart_z
 
@@ -35,10 +35,6 @@ class Names:
     def symbol(self, name: str) -> Symbol:
         """The same as a symbol."""
         return Symbol(self(name), real=True)
-
-
-# Operations of one function, written out: a long curve has some thousand, and SymPy goes through 10**5 in seconds.
-MAX_SIZE = 200_000
 
 
 def lower(model: Model, *, name: str, forms: tuple[tuple[str, Expr], ...]) -> ModuleIR:
@@ -268,30 +264,12 @@ class Lowering:
 
         With ``each`` the run-time parameters belong to the place, and ``held`` rows follow behind them.
         """
-        _check_size(outputs, where=name)
+        check_size(outputs, where=name)
         n, p, out = (self.names(s) for s in ("n", "p", "out"))
         used = self.used([*outputs, *(value for _, value in inside)])
         if each:
             inside, used = [*((Symbol(s, real=True), at(p, row)) for s, row in used), *inside], ()
-        moving = {symbol for symbol, _ in inside}
-        prepared, fixed = hoist([_half_powers(e) for e in outputs], moving)
-        everything = [value for _, value in fixed] + prepared
-        replaced, reduced = sympy.cse(everything, symbols=sympy.numbered_symbols("_t", real=True), order="canonical")
-        before: list[Assignment] = []
-        loop = [Assignment(name=s.name, value=v) for s, v in inside]
-        for symbol, value in replaced:
-            if value.free_symbols & moving:
-                moving.add(symbol)
-                loop.append(Assignment(name=symbol.name, value=value))
-            else:
-                before.append(Assignment(name=symbol.name, value=value))
-        before += [Assignment(name=s.name, value=v) for (s, _), v in zip(fixed, reduced, strict=False)]
-        needed = {s.name for e in (*reduced, *(a.value for a in before)) for s in e.free_symbols}
-        kept: list[Assignment] = []
-        for a in reversed(loop):  # what only something unused needs is unused too
-            if a.name in needed:
-                kept.insert(0, a)
-                needed |= {s.name for s in a.value.free_symbols}
+        before, kept, results = straight_line(outputs, inside)
         return FunctionIR(
             name=name,
             signature=signature,
@@ -303,9 +281,9 @@ class Lowering:
                 (out, f"({len(outputs)}, {n})"),
             ),
             parameters=used,
-            before=_sorted(before),
-            inside=tuple(kept),
-            outputs=tuple(reduced[len(fixed) :]),
+            before=before,
+            inside=kept,
+            outputs=results,
             each=each,
         )
 
@@ -313,45 +291,3 @@ class Lowering:
         """The run-time parameters in some expressions, and where they stand in ``p``."""
         free = {s.name for e in expressions for s in e.free_symbols}
         return tuple((name, i) for name, i in self.order.items() if name in free)
-
-
-def _check_size(outputs: Iterable[Expr], *, where: str) -> None:
-    """Refuse what is too large to be gone through term by term, as SymPy does at every step.
-
-    Divided differences share most of their parts, so that one of a thousand parts may be of 10**12 when written out.
-    """
-    sizes: dict[Basic, int] = {}
-
-    def size(node: Basic) -> int:
-        if node not in sizes:
-            sizes[node] = 1 + sum(size(part) for part in node.args)
-        return sizes[node]
-
-    total = sum(size(form) for form in outputs)
-    if total > MAX_SIZE:
-        raise EmissionError(
-            f"{where}: a formula of {total} operations, and at most {MAX_SIZE} are emitted; "
-            "declare the curve and the forces by shorter expressions"
-        )
-
-
-def _sorted(assignments: list[Assignment]) -> tuple[Assignment, ...]:
-    """Assignments in an order in which each name is given before it is used."""
-    waiting, out = {a.name: a for a in assignments}, []
-    while waiting:
-        ready = [a for a in waiting.values() if not any(s.name in waiting for s in a.value.free_symbols)]
-        for a in ready:
-            out.append(waiting.pop(a.name))
-    return tuple(out)
-
-
-def _half_powers(e: Expr) -> Expr:
-    """Powers of whole and a half as powers of a root: a root costs a tenth of a general power."""
-
-    def replace(power: Expr) -> Expr:
-        return Function("sqrt")(power.base) ** power.exp.p
-
-    return e.replace(
-        lambda t: t.is_Pow and isinstance(t.exp, Rational) and t.exp.q == 2 and abs(t.exp.p) > 1,
-        replace,
-    )

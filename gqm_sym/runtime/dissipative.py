@@ -236,7 +236,7 @@ class Dissipative(Motion):
             return
         if not len(ahead) and what == legs.LIMIT:
             raise leaving_at_once(problem, way, "end of the domain")
-        if not (len(ahead) or len(back)) or what == legs.SPENT:
+        if not (len(ahead) or len(back)) or what == legs.SPENT or (what == legs.ASYMPTOTE and not len(back)):
             raise SolutionError(
                 f"V**2 beyond {problem.formulas.parameter} = {place!r} could not be followed; "
                 "are the curve and the force smooth there?"

@@ -157,6 +157,12 @@ def solve_panel(drive, p, linear, origin, u, g, c, left, width, base, v, nu, row
 
 
 @Inner
+def as_bare(w, g, c, left):  # type: ignore[no-untyped-def]
+    """A value of W in the units of BARE, at the start of a panel from w = ``left`` on."""
+    return w / (0.25 * c * c) if g > 0.0 and left == 0.0 and c > 0.0 else w
+
+
+@Inner
 def pace(g, c, left, base, work):  # type: ignore[no-untyped-def]
     """Fill in Y, the pace of time and that of arc length: not numbers where W is not positive."""
     for j in range(COUNT):

@@ -28,6 +28,7 @@ from gqm_sym.runtime.leg_equation import (
     SPEED,
     D,
     W,
+    as_bare,
     distance,
     pace,
     solve_panel,
@@ -68,8 +69,11 @@ def size_of(work, row):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def weigh(rows, base, work, sizes):  # type: ignore[no-untyped-def]
-    """What the coefficients of each function but the pace are held against; the largest V**2 on the panel."""
+def weigh(rows, base, bare, work, sizes):  # type: ignore[no-untyped-def]
+    """What the coefficients of each function but the pace are held against; the largest V**2 on the panel.
+
+    The panel begins with V**2 = ``base``, which is ``bare`` in the units of BARE.
+    """
     for j in range(COUNT):
         work[MEAN, j] = fabs(rows[0, j]) * (fabs(rows[3, j]) + fabs(rows[4, j] * work[W, j]))
     for f in range(PACE):
@@ -78,7 +82,7 @@ def weigh(rows, base, work, sizes):  # type: ignore[no-untyped-def]
     width = work[PLACE, COUNT]
     sizes[FORCE] = max(sizes[FORCE], sizes[PULL] * highest * width / work[D, COUNT])
     sizes[PULL] = max(sizes[PULL], 1.0 / width)
-    sizes[BARE], sizes[LOAD] = max(sizes[BARE], base), extent(work, MEAN * WIDE)[1]
+    sizes[BARE], sizes[LOAD] = max(sizes[BARE], bare), extent(work, MEAN * WIDE)[1]
     return highest
 
 
@@ -174,7 +178,7 @@ def next_panel(  # type: ignore[no-untyped-def]
         if not far < inf:
             width, kink = 0.5 * width, False
             continue
-        highest = weigh(rows, base, work, sizes)
+        highest = weigh(rows, base, as_bare(base, g, c, left), work, sizes)
         fine, growth = resolved(work, sizes, 0, PACE, tails)
         if fine:
             widest = max(widest, width)

@@ -16,7 +16,7 @@ from gqm_sym.runtime.crossing import call_drive, call_hold
 from gqm_sym.runtime.doubledouble import two_sum
 from gqm_sym.runtime.fields import approach
 from gqm_sym.runtime.jit import Inner, entry
-from gqm_sym.runtime.leg_equation import BARE, FORCE, JUDGED, LOAD, ROWS, distance, marched, pace, solve_panel
+from gqm_sym.runtime.leg_equation import BARE, FORCE, JUDGED, LOAD, ROWS, as_bare, distance, marched, pace, solve_panel
 from gqm_sym.runtime.leg_equation import W as V2
 from gqm_sym.runtime.leg_panels import (
     ALWAYS,
@@ -164,7 +164,7 @@ def run(drive, p, flags, start, w, v, nu, breaks, limit, reach, step, side, stri
             if flags[0] == 1 or nu == -side:
                 continue
         # V**2, or what it is divided by the distance from the turning point it begins with.
-        scale = size_of(work, FORCE) if base == 0.0 else max(ceiling, sizes[BARE])
+        scale = size_of(work, FORCE) if base == 0.0 else max(as_bare(ceiling, g, c, left), sizes[BARE])
         at_rest, _, touch = change_of(work, BARE, 1, NOISE * scale, series)
         if touch <= -1.0 and base == 0.0:
             touch = 2.0

@@ -1,5 +1,6 @@
 """The motion that a launch begins, as a value that answers questions."""
 
+from abc import ABC, abstractmethod
 from itertools import pairwise
 from math import inf
 from typing import Any, NamedTuple
@@ -37,7 +38,7 @@ class State(NamedTuple):
     error: Any
 
 
-class Motion:
+class Motion(ABC):
     """A motion along a curve.
 
     Attributes
@@ -66,13 +67,13 @@ class Motion:
 
     # -- what subclasses say ------------------------------------------------------------------
 
+    @abstractmethod
     def _course(self, reach: float) -> Course:
         """The pieces of the motion, good for times up to ``reach`` from launch."""
-        raise NotImplementedError
 
+    @abstractmethod
     def _clock_error(self, t: Array) -> Array:
         """Estimated error of the time at which the body comes to its piece of the course."""
-        raise NotImplementedError
 
     @property
     def turning_points(self) -> tuple[float, ...]:

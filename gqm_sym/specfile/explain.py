@@ -8,7 +8,7 @@ from pydantic.fields import FieldInfo
 
 from gqm_sym.specfile.nodes import MapNode, Mark, Mistakes, Node, Scalar, shown
 from gqm_sym.specfile.places import descend, place_of
-from gqm_sym.specfile.schema import CURVE_KEYS, FAMILY_MODELS
+from gqm_sym.specfile.schema import FAMILY_MODELS
 
 # What pydantic calls it -> what must stand there.
 _WANTED = {
@@ -88,13 +88,9 @@ def _explain_unknown(
     label = f"{path}: " if path else ""
     allowed = sorted(model_at(_path(loc[:-1])).model_fields)
     mark = steps[-1][1]
-    if path == "curve" and key in CURVE_KEYS:
-        what = f"{label}{key} is not supported yet by this version"
-        mistakes.add(mark, what, f"it knows {', '.join(allowed)}")
-    else:
-        near = difflib.get_close_matches(key, allowed, n=1)
-        remedy = f"did you mean {near[0]}?" if near else f"allowed are {', '.join(allowed)}"
-        mistakes.add(mark, f"{label}unknown key {shown(key)}", remedy)
+    near = difflib.get_close_matches(key, allowed, n=1)
+    remedy = f"did you mean {near[0]}?" if near else f"allowed are {', '.join(allowed)}"
+    mistakes.add(mark, f"{label}unknown key {shown(key)}", remedy)
 
 
 def _path(loc: tuple[Any, ...]) -> tuple[str, ...]:

@@ -43,10 +43,6 @@ from gqm_sym.specfile.fields import (
 from gqm_sym.specfile.rails import RailSchema
 from gqm_sym.specfile.track import POINTS, Points, declare_track
 
-# What the format has in the end; what is in no table yet gets a message of its own.
-CURVE_KEYS = ("graph", "parametric", "polar", "implicit", "points", "pieces", "family")
-
-
 _DOMAIN = Field(
     default=None,
     description="ends of the parameter's range; null for an open end",

@@ -8,8 +8,9 @@ import sympy as sp
 from gqm_sym.declare import Curve
 from gqm_sym.derivation import Model, derive
 from gqm_sym.errors import InputError, SpecFileError
+from gqm_sym.expressions import is_real_at
 from gqm_sym.kernels import Kernel
-from gqm_sym.parameters import exact_value, is_positive
+from gqm_sym.parameters import exact_value
 from gqm_sym.specfile.nodes import MapNode, Mistakes
 from gqm_sym.specfile.places import locate, node_at, place_of
 
@@ -67,8 +68,6 @@ class Spec:
         """
         try:
             return derive(self.curve, self.kernel, parameters=self.parameters, title=self.title or None)
-        except SpecFileError:
-            raise
         except InputError as error:
             raise self.mistake(str(error)) from None
 
@@ -78,7 +77,7 @@ class Spec:
         Raises
         ------
         SpecFileError
-            If there is no launch, or a parameter has no value or one of the wrong sign.
+            If there is no launch, a parameter has no value, or the curve none where the launch is.
         """
         mistakes = Mistakes(self.path)
         if self.launch is None:
@@ -92,10 +91,6 @@ class Spec:
                 mark = place_of(self.tree, ("parameters", name))
                 what = f"parameters.{name}: null, and to solve needs a value"
                 mistakes.add(mark, what, f"write one, as in {name}: 1")
-            elif name in model.positive and not is_positive(value):
-                mark = place_of(self.tree, ("parameters", name))
-                what = f"parameters.{name}: must be positive, got {value}"
-                mistakes.add(mark, what, "the closed forms hold only so")
         lam0 = None if self.launch is None or model.curve.charted else str(self.launch["lam0"])
         if lam0 is not None and not mistakes and (fault := _fault(model, lam0)):
             mark = node_at(self.tree, ("launch", "lam0", "value")).mark
@@ -125,10 +120,6 @@ def _fault(model: Model, lam0: str) -> str:
     values[model.parameter] = exact_value(lam0)
     forms = (("x", model.x), ("z", model.z), ("ds", model.ds), ("the potential", model.potential))
     for label, form in forms:
-        try:
-            value = form.xreplace(values).evalf()
-        except (ArithmeticError, TypeError, ValueError):
-            value = sp.nan
-        if value.is_real is False or value.has(sp.nan, sp.zoo, sp.oo, -sp.oo):
+        if is_real_at(form, values) is False:
             return f"{label} is not a finite real number there"
     return ""

@@ -1,0 +1,109 @@
+"""Expressions of one function as straight-line code: each common part once, before the loop what is the same in it."""
+
+from collections.abc import Iterable, Sequence
+
+import sympy
+from sympy import Basic, Expr, Function, Integer, Pow, Rational, Symbol, ordered
+
+from gqm_sym.emission.ir import Assignment
+from gqm_sym.errors import EmissionError
+
+# Operations of one function, written out: a long curve has some thousand, and SymPy goes through 10**5 in seconds.
+MAX_SIZE = 200_000
+
+
+def check_size(outputs: Iterable[Expr], *, where: str) -> None:
+    """Refuse what is too large to be gone through term by term, as SymPy does at every step.
+
+    Divided differences share most of their parts, so that one of a thousand parts may be of 10**12 when written out.
+    """
+    sizes: dict[Basic, int] = {}
+
+    def size(node: Basic) -> int:
+        if node not in sizes:
+            sizes[node] = 1 + sum(size(part) for part in node.args)
+        return sizes[node]
+
+    total = sum(size(form) for form in outputs)
+    if total > MAX_SIZE:
+        raise EmissionError(
+            f"{where}: a formula of {total} operations, and at most {MAX_SIZE} are emitted; "
+            "declare the curve and the forces by shorter expressions"
+        )
+
+
+def straight_line(
+    outputs: Iterable[Expr], inside: Sequence[tuple[Symbol, Expr]]
+) -> tuple[tuple[Assignment, ...], tuple[Assignment, ...], tuple[Expr, ...]]:
+    """Assignments before a loop and inside it, and what is left of the outputs.
+
+    Parameters
+    ----------
+    inside
+        What the loop begins with: each symbol that depends on the place, and what it is.
+    """
+    moving = {symbol for symbol, _ in inside}
+    prepared, fixed = hoist([_half_powers(e) for e in outputs], moving)
+    everything = [value for _, value in fixed] + prepared
+    replaced, reduced = sympy.cse(everything, symbols=sympy.numbered_symbols("_t", real=True), order="canonical")
+    before: list[Assignment] = []
+    loop = [Assignment(name=s.name, value=v) for s, v in inside]
+    for symbol, value in replaced:
+        if value.free_symbols & moving:
+            moving.add(symbol)
+            loop.append(Assignment(name=symbol.name, value=value))
+        else:
+            before.append(Assignment(name=symbol.name, value=value))
+    before += [Assignment(name=s.name, value=v) for (s, _), v in zip(fixed, reduced, strict=False)]
+    needed = {s.name for e in (*reduced, *(a.value for a in before)) for s in e.free_symbols}
+    kept: list[Assignment] = []
+    for a in reversed(loop):  # what only something unused needs is unused too
+        if a.name in needed:
+            kept.insert(0, a)
+            needed |= {s.name for s in a.value.free_symbols}
+    return _sorted(before), tuple(kept), tuple(reduced[len(fixed) :])
+
+
+def _sorted(assignments: list[Assignment]) -> tuple[Assignment, ...]:
+    """Assignments in an order in which each name is given before it is used."""
+    waiting, out = {a.name: a for a in assignments}, []
+    while waiting:
+        ready = [a for a in waiting.values() if not any(s.name in waiting for s in a.value.free_symbols)]
+        for a in ready:
+            out.append(waiting.pop(a.name))
+    return tuple(out)
+
+
+def _half_powers(e: Expr) -> Expr:
+    """Powers of whole and a half as powers of a root: a root costs a tenth of a general power."""
+
+    def replace(power: Expr) -> Expr:
+        return Function("sqrt")(power.base) ** power.exp.p
+
+    return e.replace(
+        lambda t: t.is_Pow and isinstance(t.exp, Rational) and t.exp.q == 2 and abs(t.exp.p) > 1,
+        replace,
+    )
+
+
+def hoist(outputs: Sequence[Expr], moving: set[Symbol]) -> tuple[list[Expr], list[tuple[Symbol, Expr]]]:
+    """Give calls that do not depend on the place a name of their own, so that the loop need not repeat them."""
+    named: list[tuple[Symbol, Expr]] = []
+    outputs = list(outputs)
+    while outermost := _fixed_calls(outputs, moving | {symbol for symbol, _ in named}):
+        new = [(Symbol(f"_c{len(named) + i}", real=True), call) for i, call in enumerate(outermost)]
+        replacement = {call: symbol for symbol, call in new}
+        outputs = [e.xreplace(replacement) for e in outputs]
+        named += new
+    return outputs, named
+
+
+def _fixed_calls(outputs: Sequence[Expr], moving: set[Symbol]) -> list[Expr]:
+    """Calls that do not depend on the place and are no part of another such call."""
+    calls = {
+        call
+        for e in outputs
+        for call in e.atoms(Function, Pow)
+        if not call.free_symbols & moving and call.free_symbols and not (call.is_Pow and isinstance(call.exp, Integer))
+    }
+    return [c for c in ordered(calls) if not any(c != o and o.has(c) for o in calls)]

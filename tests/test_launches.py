@@ -1,0 +1,98 @@
+"""What a launch is refused for, whoever gives it; what may be left out, and in what it may be given."""
+
+from collections.abc import Callable
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import pytest
+
+import gqm_sym as gqm
+from gqm_sym.cli import show
+from gqm_sym.errors import InputError, SolutionError
+
+
+@pytest.fixture(scope="module")
+def circle(module_of: Callable[[str], ModuleType]) -> ModuleType:
+    """A bead on a circle of radius L, which has no default."""
+    return module_of("circle")
+
+
+@pytest.fixture(scope="module")
+def arch(module_of: Callable[[str], ModuleType]) -> ModuleType:
+    """One arch of a cycloid: places from 0 to 2 pi."""
+    return module_of("cycloid_arch")
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"L": None}, r"L: has no default and was not given; pass L=\.\.\."),
+        ({"L": [1]}, "L: list given; give a number"),
+        ({"L": 0}, "L: must be positive, got 0; the closed forms hold for L > 0"),
+        ({"lam0": None}, "lam0: not given; it is the value of lam to launch from"),
+        ({"direction": 0}, r"direction: must be 1 or -1 .* got 0"),
+        ({"contact": "left"}, "contact: must be one of bilateral, above, below, got 'left'"),
+        ({"v0": -1}, "v0: is a speed and cannot be negative, got -1; use direction=-1"),
+        ({"t_max": 0}, "t_max: must be positive, got 0"),
+        ({"point": (0, 1)}, "point: circle has a parameter of its own; launch by lam0"),
+    ],
+)
+def test_what_a_launch_is_refused_for(given: dict[str, Any], message: str, circle: ModuleType) -> None:
+    """Each with its name, what is wrong, and what would be right."""
+    with pytest.raises(InputError, match=f"^{message}"):
+        circle.solve(**({"lam0": 1, "L": 1} | given))
+
+
+def test_a_place_beyond_the_domain(arch: ModuleType) -> None:
+    """The message has the domain."""
+    with pytest.raises(InputError, match=r"lam0: must lie in the domain \[0\.0, 6\.28.*\] of lam, got 7"):
+        arch.solve(lam0=7, R=1)
+
+
+def test_a_place_without_a_curve(tmp_path: Path) -> None:
+    """Where the coordinates are no numbers nothing can be launched."""
+    module = gqm.build(gqm.derive(gqm.Curve.graph("sqrt(x)"), gqm.Gravity()), name="root", folder=tmp_path)
+    with pytest.raises(InputError, match=r"lam0: the curve has no point at x = -1\.0 with these"):
+        module.solve(lam0=-1)
+
+
+def test_a_sweep_is_refused_for_the_same(circle: ModuleType) -> None:
+    """What holds for all of its launches is said before any is solved."""
+    with pytest.raises(InputError, match=r"^contact: must be one of bilateral, above, below, got 'left'"):
+        circle.sweep("half_period", lam0=[0.5, 1.0], v0=0, L=1, contact="left")
+    with pytest.raises(InputError, match=r"^quantity: must be one of half_period, "):
+        circle.sweep("colour", lam0=[0.5, 1.0], v0=0, L=1)
+
+
+@pytest.mark.parametrize("digits", [0, 2.5, "ten", 10**9])
+def test_digits_that_cannot_be_had(digits: Any, circle: ModuleType) -> None:
+    """They are counted, and there is a last one."""
+    with pytest.raises(InputError, match="period_to: digits must be a whole number from 1 to"):
+        circle.solve(lam0=1, L=1).period_to(digits)
+
+
+# What is said of a motion
+
+
+def said(motion: Any) -> str:
+    """What the commands print of it."""
+    return "\n".join(show.motion(motion, "lam"))
+
+
+def test_what_is_said_of_each_kind(circle: ModuleType, arch: ModuleType) -> None:
+    """Only what the motion has: a round no turning points, a body at rest no legs, a way out an end."""
+    swing = said(circle.solve(lam0=1, L=1))
+    assert "half period     " in swing
+    assert "turning points  lam = " in swing
+    around = said(circle.solve(lam0=0, v0=10, L=1))
+    assert "period          " in around
+    assert "half period" not in around
+    assert "turning points" not in around
+    rest = said(circle.solve(lam0=0, L=1))
+    assert "kind            rest" in rest
+    assert "leg" not in rest
+    out = said(arch.solve(lam0=1, R=1))
+    assert "ends after      " in out
+    with pytest.raises(SolutionError):
+        _ = arch.solve(lam0=1, R=1).period

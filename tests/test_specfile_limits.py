@@ -1,0 +1,73 @@
+"""Curve files: mistakes inside pieces, launches and families, each at its place; and values in odd units."""
+
+from pathlib import Path
+
+import pytest
+import sympy as sp
+
+import gqm_sym as gqm
+from gqm_sym.errors import SpecFileError
+
+HEAD, FORCE = "name: a\n", "kernel: {gravity: {}}\n"
+
+
+def read(folder: Path, text: str) -> gqm.Model:
+    """The model of a file."""
+    (folder / "a.yaml").write_text(text, encoding="utf-8")
+    return gqm.read_spec(folder / "a.yaml").derive()
+
+
+@pytest.mark.parametrize(
+    ("curve", "message"),
+    [
+        (
+            "{pieces: {closed: maybe, pieces: [{line: {length: 1}}]}}",
+            "2:26: curve.pieces.closed: must be true or false, got 'maybe'",
+        ),
+        (
+            "{pieces: {begin: [0, 0], pieces: [{line: {length: 1}}]}}",
+            "2:18: curve.pieces: unknown key 'begin'; allowed are closed, heading, pieces, start",
+        ),
+        (
+            "{pieces: {pieces: [{line: {length: 1, len: 2}}]}}",
+            "2:46: curve.pieces.pieces.0.line: unknown key 'len'; did you mean length?",
+        ),
+        (
+            "{pieces: {pieces: [{family: {name: circle, R: 2, domain: [0, 1]}}]}}",
+            "2:51: curve.pieces.pieces.0.family: unknown key 'R'; allowed are L, domain, inverted, name, parameter",
+        ),
+        (
+            "{pieces: [{family: {L: 2}}]}",
+            "2:19: curve.pieces.0.family: name is missing; known are cartesian_graph, circle",
+        ),
+        (
+            "{family: {name: circle, R: 2}}",
+            "2:32: curve.family: unknown key 'R'; allowed are L, domain, inverted, name, parameter",
+        ),
+        ("{family: {L: 2}}", "2:9: curve.family: name is missing; known are cartesian_graph, circle"),
+        ("{family: {name: circel}}", "2:18: curve.family: unknown family 'circel'; known are cartesian_graph, circle"),
+        (
+            "{family: {name: ellipse}}",
+            "2:9: 'a' is not in parameters; add it there, as in a: 1 (null: to be given at run time)",
+        ),
+    ],
+)
+def test_mistakes_inside_a_curve(curve: str, message: str, tmp_path: Path) -> None:
+    """With the path to them, and what may stand there."""
+    with pytest.raises(SpecFileError) as caught:
+        read(tmp_path, f"{HEAD}curve: {curve}\n{FORCE}")
+    found = [mistake.removeprefix(f"{tmp_path / 'a.yaml'}:") for mistake in caught.value.mistakes]
+    assert any(mistake.startswith(message) for mistake in found), found
+
+
+def test_mistakes_inside_a_launch(tmp_path: Path) -> None:
+    """Its numbers are mappings of a value and a unit."""
+    with pytest.raises(SpecFileError, match=r"4:27: launch\.lam0: unknown key 'units'; did you mean unit\?"):
+        read(tmp_path, f"{HEAD}curve: {{graph: {{z: x**2}}}}\n{FORCE}launch: {{lam0: {{value: 1, units: m}}}}\n")
+
+
+@pytest.mark.parametrize(("unit", "exact"), [("pi", 3 * sp.pi), ("pi*rad", 3 * sp.pi), ("deg/pi", sp.Rational(1, 60))])
+def test_multiples_of_pi(unit: str, exact: sp.Expr, tmp_path: Path) -> None:
+    """A unit may hold pi; the value in SI is exact."""
+    text = f"{HEAD}curve: {{graph: {{z: sin(a)*x}}}}\n{FORCE}parameters: {{a: {{value: 3, unit: {unit}}}}}\n"
+    assert sp.simplify(sp.sympify(str(dict(read(tmp_path, text).defaults)["a"])) - exact) == 0
