@@ -196,7 +196,7 @@ class Arithmetic:
         context = self.context
 
         def turn_turn(phi: Any) -> tuple[Any, Any]:
-            s, c = context.sin(phi / 2), context.cos(phi / 2)
+            c, s = context.cos_sin(phi / 2)
             left, right = (b - a) * s**2, (b - a) * c**2
             lam = a + left
             if s == 0:

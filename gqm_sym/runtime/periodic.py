@@ -215,4 +215,5 @@ class Periodic(Motion):
         count = np.floor((lam - self.problem.lam0) / lap)
         if count < 0:
             return []
-        return [t + count * self.period for t in super()._first_passages(lam - count * lap, low)]
+        within = super()._first_passages(lam - count * lap, low)
+        return [t + count * self.period for t in within] if count else within

@@ -44,6 +44,8 @@ def _bilateral(formulas: Formulas, p: Given, launch: Launch) -> Motion:
     lam0, v0 = launch.lam0.value, launch.v0.value
     direction, ahead, behind, time = survey(f.addresses, f.p, lam0, v0, launch.direction, low, high, period)
     stuck = ahead[0] in (search.CUSP, search.BROKEN) and ahead[1] == 0.0
+    if direction == 0 or stuck or time != time:
+        _check_place(problem)
     if (direction == 0 or stuck) and _is_cusp(problem, lam0):
         return _from_cusp(problem)
     if direction == 0:
@@ -57,8 +59,6 @@ def _bilateral(formulas: Formulas, p: Given, launch: Launch) -> Motion:
     if known is not None and ahead[0] == search.TURN:  # a libration without difficulties
         a, b = lam0 + ahead[1], lam0 + behind[1]
         return Periodic(problem, "libration", direction, between_turns(f, min(a, b), max(a, b), known))
-    if known is None:
-        _check_place(problem)
     front = _reach(problem, direction, ahead)
     if front.what == "closed":
         end = lam0 + direction * period
