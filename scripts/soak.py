@@ -1,8 +1,10 @@
-"""Solve random launches of the committed modules and hold each motion to its laws: ``soak.py [COUNT] [SEED] [MODULE ...]``.
+"""Solve random launches of the committed modules and hold each motion to its laws.
+
+``soak.py [COUNT] [SEED] [MODULE ...]``; all modules if none is named.
 
 Launch, speed, direction and parameters are drawn at random. A solve may be refused by a GQMError (a launch outside the
 domain, for one); a motion that is given must start as launched, keep its energy, its order and its error bounds.
-Doubles tell that: heights are subtracted, which is another way than the motion's own. One motion in a hundred is looked
+Doubles tell that: heights are subtracted, which is another way than the motion's own. One motion in five hundred is looked
 at closely: energy with forty digits, the exact period and turning points, more places and over a second period, and now
 and then a sweep over launches around it, which must give the same period. What fails is printed as the call that shows
 it again.
@@ -39,7 +41,7 @@ PACED = 1e-9
 # Periods of a sweep against those of the motions, relative: four units in the last place.
 SWEPT = 4.0 * 2.0**-52
 # One motion in so many is looked at closely, and of these one in so many is compared with a sweep.
-CLOSELY, SWEEPS = 100, 8
+CLOSELY, SWEEPS = 500, 8
 # Heights by doubles, and those of charts, as a share of the largest of them.
 ROUNDED = 1e-14
 # A share of V**2 that doubles must tell.
@@ -120,7 +122,7 @@ def faults(module: ModuleType, call: dict[str, Any], draw: random.Random, closel
     off = np.abs(v2 - told)[held]
     share = PACED if any(piece.stretch.from_exact for piece in motion._course(0.0).pieces) else ENERGY
     if not np.all(off <= (share * most + unsure)[held]):
-        found.append(f"energy {np.max(off) / most:.1e}")
+        found.append(f"energy by {np.max(off) / most:.1e}")
     size = max(1e-300, float(np.max(np.abs(lam))), abs(call["lam0"]))
     ends = sorted(motion.turning_points if closely else [end for leg in legs for end in (leg.lam_start, leg.lam_end)])
     if motion.kind == "libration":
