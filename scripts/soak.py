@@ -54,7 +54,7 @@ COLUMN, FEW = 12, 4
 # Seconds after which a motion that does not repeat is not looked at.
 LONG = 10.0
 # Share of the motions with losses that end then.
-SHORTENED = 0.98
+SHORTENED = 0.998
 # Drawn once where others are drawn so many times.
 DEAR = 64
 OFTEN_EXACT = {

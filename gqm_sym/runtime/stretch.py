@@ -30,7 +30,7 @@ from gqm_sym.runtime.panels import FAILED, ILL_CONDITIONED
 
 # Below this balance the half period in doubles is off by more than a few units in the last place.
 LEAST_BALANCE = 1e-2
-# Below this share of its ends, the width of a stretch is too rounded for a speed, and for a time from one turning point.
+# Below this share of its ends, the width of a stretch is too rounded for a speed, and for a time from one turn.
 LEAST_WIDTH = 1.0 / 32.0
 
 
