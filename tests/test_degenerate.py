@@ -185,3 +185,23 @@ def test_a_swing_that_almost_reaches_the_top(short: float, module_of: Callable[[
         top = 2 * mp.asin(mpf(v0) / (2 * mp.sqrt(mpf("9.81"))))
         assert abs(max(motion.turning_points) - top) <= math.ulp(3.0)
         assert abs(mpf(float(motion.lam(motion.period / 4))) - top) <= 2 * math.ulp(3.0)
+
+
+@pytest.mark.parametrize("g", ["9.81", 9.81, 6.3221])
+@pytest.mark.parametrize("v0", [3e-3, 1.2e-7, 5.8e-12, 2.3e-14])
+def test_a_slow_launch_from_a_bottom(v0: float, g: Any, module_of: Callable[[str], ModuleType]) -> None:
+    """The bottom is no barrier that was cleared. Found by ``make soak``: turning points 35 times as far out."""
+    with mp.workdps(60):
+        height = mpf(v0) ** 2 / (2 * mpf(g))
+        flat, round_ = height ** (mpf(1) / 4), mpf(2) * mp.acosh(1 + height / 2)
+    swings = (
+        (module_of("quartic").solve(0.0, v0, -1, g=g), flat),
+        (module_of("catenary").solve(0.0, v0, -1, c=2, g=g), round_),
+    )
+    for motion, end in swings:
+        low, high = motion.turning_points
+        assert ulps(low, -end) <= TURNING_POINT_ULPS
+        assert ulps(high, end) <= TURNING_POINT_ULPS
+        quarter = motion.legs[0].t_end
+        assert motion.lam(quarter) == pytest.approx(-float(end), rel=1e-13)
+        assert motion.state(quarter / 3.0).v2 <= v0 * v0
