@@ -45,7 +45,7 @@ def test_a_slow_launch_from_the_bottom_of_a_well(well: ModuleType) -> None:
     # Doubles leave too little of so small a V**2: forty digits are taken unasked.
     loosely, unsure = soak.speed_squared(well, motion, state.lam, bit, SLOW, False, SLOW["v0"] ** 2)
     assert np.array_equal(loosely, told)
-    assert np.max(unsure) <= 1e-9 * SLOW["v0"] ** 2
+    assert np.max(unsure) <= 2e-9 * SLOW["v0"] ** 2
 
 
 def _with(motion: Any, **changes: Callable[..., Any]) -> SimpleNamespace:
