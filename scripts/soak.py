@@ -177,8 +177,7 @@ def speed_squared(
     With losses there are none, and pass 1 of the first leg is asked.
     """
     if module.MODEL.dissipation is not None:
-        told = module.pass1(lam, **launch).v2
-        beside = (module.pass1(lam + side * bit, **launch).v2 for side in (-1.0, 1.0))
+        told, *beside = module.pass1(np.array([lam, lam - bit, lam + bit]), **launch).v2
         return told, sum(np.nan_to_num(np.abs(other - told)) for other in beside)  # off the leg there is none
     functions, lam0 = motion.problem.functions, launch["lam0"]
     heights, slopes = climb_at(functions.addresses, functions.p, np.array([lam0 - 1.0, lam0 + 1.0, lam0, *lam]))
