@@ -1,10 +1,16 @@
-"""Solve random launches of the committed modules and hold each motion to its laws: ``soak.py [COUNT] [SEED]``.
+"""Solve random launches of the committed modules and hold each motion to its laws.
+
+``soak.py [COUNT] [SEED] [MODULE ...]``; all modules if none is named.
 
 Launch, speed, direction and parameters are drawn at random. A solve may be refused by a GQMError (a launch outside the
-domain, for one); a motion that is given must keep its energy, its order, its period and its error bounds, and a sweep
-over launches around it must give the same period. One motion in a hundred is looked at over a second period, the others
-over the first. What fails is printed as the call that shows it again.
-Memory is reported at a tenth of the run and at its end.
+domain, for one); a motion that is given must start as launched, keep its energy, its order and its error bounds.
+Doubles tell that: heights are subtracted, which is another way than the motion's own. One motion in
+five hundred is looked at closely: energy with forty digits, the exact period and turning points, more places and over a
+second period, and now and then a sweep over launches around it, which must give the same period. What fails is printed
+as the call that shows it again.
+
+Modules whose motions often take extended precision are drawn less often, and most motions with losses end after ten
+seconds. Progress is printed on the way, with memory after a tenth of the run and now.
 """
 
 import math
@@ -24,22 +30,46 @@ from mpmath import mp, mpf
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
 
-from gqm_sym.errors import GQMError  # noqa: E402
+from gqm_sym.errors import GQMError, InputError  # noqa: E402
+from gqm_sym.runtime.entries import climb_at, frame_at  # noqa: E402
 
 NAMES = sorted(path.stem for path in (ROOT / "generated").glob("*.py"))
 # Of the largest V**2 on the way, and of a place of the curve: many roundings, and far above those of a right motion.
 ENERGY = 1e-11
+# The same where speeds are read off panels that extended precision laid.
+PACED = 1e-9
 # Periods of a sweep against those of the motions, relative: four units in the last place.
 SWEPT = 4.0 * 2.0**-52
 # One motion in so many is looked at closely, and of these one in so many is compared with a sweep.
-CLOSELY, SWEEPS = 100, 8
-# Heights of charts, as a share of the largest of them.
+CLOSELY, SWEEPS = 500, 8
+# Heights by doubles, and those of charts, as a share of the largest of them.
 ROUNDED = 1e-14
+# A share of V**2 that doubles must tell.
+LEFT = 1e-8
 # Places and times against bounds that the motion states: a factor for what is not bounded, the formulas' rounding.
 SLACK = 4.0
 PLACE = 1e-12
 # Times at which a motion is looked at: closely, and otherwise.
 COLUMN, FEW = 12, 4
+# Seconds after which a motion that does not repeat is not looked at.
+LONG = 10.0
+# Share of the motions with losses that end then.
+SHORTENED = 0.998
+# Drawn once where others are drawn so many times.
+DEAR = 64
+OFTEN_EXACT = {
+    "circle_droplet",
+    "circle_rotating",
+    "circle_spring",
+    "cycloid_inverted",
+    "double_well",
+    "loop",
+    "parabola_law",
+    "spiral_central",
+    "superellipse",
+}
+# Launches from one line of progress to the next.
+PROGRESS = 20_000
 
 
 def drawn(module: ModuleType, draw: random.Random) -> dict[str, Any]:
@@ -52,7 +82,8 @@ def drawn(module: ModuleType, draw: random.Random) -> dict[str, Any]:
         (draw.uniform(-1.5, 1.5), draw.gauss(0.0, 3.0), draw.choice((0.0, 1.0, -1.0)), 10.0 ** -draw.uniform(0, 9))
     )
     v0 = draw.choice((0.0, 0.0, draw.uniform(0, 5), math.exp(draw.gauss(0, 2)), 10.0 ** -draw.uniform(0, 12)))
-    return {"lam0": lam0, "v0": v0, "direction": draw.choice((1, -1)), **values}
+    horizon = {"t_max": LONG} if module.MODEL.dissipation is not None and draw.random() < SHORTENED else {}
+    return {"lam0": lam0, "v0": v0, "direction": draw.choice((1, -1)), **horizon, **values}
 
 
 def quotient(text: str) -> float:
@@ -66,74 +97,103 @@ def faults(module: ModuleType, call: dict[str, Any], draw: random.Random, closel
     motion = module.solve(**call)
     found = []
     repeats = motion.kind in ("libration", "circulation")
-    first = motion.legs[-1].t_end if repeats else min(motion.t_end, 10.0)
+    legs = motion.legs
+    first = legs[-1].t_end if repeats else lasting(motion, LONG)
     span = motion.period if closely and repeats else first
     if not span > 0.0:
         return [] if motion.kind in ("rest", "equilibrium") or span == 0.0 else [f"span {span}"]
     count = COLUMN if closely else FEW
-    t = np.sort([draw.uniform(0.0, 1.0) * span for _ in range(count)])
+    t = np.array([0.0, *sorted(draw.uniform(0.0, 1.0) * span for _ in range(count))])
     state = motion.state(t)
-    values = [np.asarray(row, dtype=float) for row in (state.lam, state.x, state.z, state.v, state.v2)]
-    if not all(np.isfinite(row).all() for row in values):
+    lam, v, v2, error = (np.asarray(row, dtype=float) for row in (state.lam, state.v, state.v2, state.error))
+    if not all(np.isfinite(row).all() for row in (lam, state.x, state.z, v, v2, error)):
         return ["not finite"]
-    lam, v2 = values[0], values[4]
+    if lam[0] != call["lam0"] or v2[0] != call["v0"] * call["v0"] or not np.all(error >= 0.0):
+        found.append("not as launched")
     if motion.kind == "rest":
-        return [] if np.all(lam == call["lam0"]) and not np.any(values[3]) else ["moves at rest"]
-    legs = motion.legs
-    launch = {**call, "direction": legs[0].direction}
-    ds = module.pass1(lam, **launch).ds
+        return found if np.all(lam == call["lam0"]) and not np.any(v) else [*found, "moves at rest"]
+    if any(not one.t_start <= one.t_end <= two.t_start <= two.t_end for one, two in pairwise(legs)):
+        found.append("legs out of order")
+    if any(abs(one.lam_end - two.lam_start) > PLACE * abs(one.lam_end) for one, two in pairwise(legs)):
+        found.append("legs apart")
     # Near a place of rest a place's last bit is much of V**2, and of the way there.
     bit = 2.0 * np.spacing(np.abs(lam))
-    told, *beside = (speed_squared(module, lam + side * bit, launch) for side in (0.0, -1.0, 1.0))
-    told, rounding = told
-    unsure = rounding + sum(np.abs(other - told) for other, _ in beside)
-    late = SLACK * bit * ds / np.maximum(np.abs(values[3]), 1e-300)
-    most = max(call["v0"] ** 2, float(np.nanmax(np.abs(told))), float(np.max(v2)))
+    most = max(call["v0"] ** 2, float(np.max(v2)))
+    launch = {name: value for name, value in call.items() if name != "t_max"} | {"direction": legs[0].direction}
+    told, unsure = speed_squared(module, motion, lam, bit, launch, closely, most)
     # With losses V**2 depends on the way, and pass 1 tells that of the first leg.
     held = t <= (legs[0].t_end if module.MODEL.dissipation is not None else t[-1])
-    if np.any((np.abs(v2 - told) > ENERGY * most + unsure)[held]):
-        found.append(f"energy {np.max(np.abs(v2 - told)) / most:.1e}")
+    off = np.abs(v2 - told)[held]
+    share = PACED if any(piece.stretch.from_exact for piece in motion._course(0.0).pieces) else ENERGY
+    if not np.all(off <= (share * most + unsure)[held]):
+        found.append(f"energy by {np.max(off) / most:.1e}")
     size = max(1e-300, float(np.max(np.abs(lam))), abs(call["lam0"]))
-    turns = sorted(motion.turning_points)
+    ends = sorted(motion.turning_points if closely else [end for leg in legs for end in (leg.lam_start, leg.lam_end)])
     if motion.kind == "libration":
-        over = max(turns[0] - lam.min(), lam.max() - turns[1])
+        over = max(ends[0] - lam.min(), lam.max() - ends[-1])
         if over > PLACE * size:
             found.append(f"beyond a turning point by {over:.1e}")
-    if any(one.t_end > two.t_start or one.t_start > one.t_end for one, two in pairwise(legs)):
-        found.append("legs out of order")
     for leg in legs:
         inside = (t > leg.t_start) & (t < leg.t_end)
-        steps = np.diff(lam[inside])
-        if np.any(-leg.direction * steps > PLACE * size):
+        if np.any(-leg.direction * np.diff(lam[inside]) > PLACE * size):
             found.append("not monotone on a leg")
+        if np.any(leg.direction * v[inside] < 0.0):
+            found.append("runs against its leg")
+    functions = motion.problem.functions
+    ds = frame_at(functions.addresses, functions.p, lam, v2)[2]
     if closely and motion.kind == "libration":
-        bound = np.asarray(motion.error_bound(t))
         if module.MODEL.dissipation is None and draw.random() < 1.0 / SWEEPS:
             found += swept(module, call, motion.period)
         again = np.asarray(motion.lam(t + span))
-        allowed = SLACK * (bound + np.asarray(motion.error_bound(t + span))) + PLACE * size
-        rate = np.abs(np.asarray(state.v)) * np.spacing(span) / np.maximum(ds, 1e-300)
+        allowed = SLACK * (error + np.asarray(motion.error_bound(t + span))) + PLACE * size
+        rate = np.abs(v) * np.spacing(span) / np.maximum(ds, 1e-300)
         if np.any(np.abs(again - lam) > allowed + SLACK * rate):
-            found.append(f"not periodic by {np.max(np.abs(again - lam)):.1e}, bound {np.max(bound):.1e}")
-    middle = count // 2
+            found.append(f"not periodic by {np.max(np.abs(again - lam)):.1e}, bound {np.max(error):.1e}")
+    middle = 1 + count // 2
+    late = SLACK * bit[middle] * ds[middle] / max(abs(v[middle]), 1e-300)
     passed = float(motion.time_at(float(lam[middle])))
-    if passed > t[middle] + 1e-9 * span + late[middle]:
+    if not passed <= t[middle] + 1e-9 * span + late:
         found.append(f"first passage late by {passed - t[middle]:.1e}")
     return found
 
 
-def speed_squared(module: ModuleType, lam: Any, launch: dict[str, Any]) -> tuple[Any, float]:
-    """V**2 at places by another way than the motion's, from heights where there are formulas; and its roundings.
+def lasting(motion: Any, reach: float) -> float:
+    """How long a motion lasts, up to ``reach``: where it leads to the centre of a spiral, it learns that on the way."""
+    if motion.t_end > reach:
+        try:
+            motion.lam(reach)
+        except InputError:
+            if motion.t_end > reach:
+                raise
+    return min(motion.t_end, reach)
 
-    With losses there are none: what pass 1 says of the first leg.
+
+def speed_squared(
+    module: ModuleType, motion: Any, lam: Any, bit: Any, launch: dict[str, Any], closely: bool, most: float
+) -> tuple[Any, Any]:
+    """V**2 at places by another way than the motion's, and what roundings, those of the places among them, do to it.
+
+    Heights are subtracted: in doubles, or with forty digits, closely and where doubles would leave little of ``most``.
+    With losses there are none, and pass 1 of the first leg is asked.
     """
-    exact = module.MODEL.exact
-    if exact is None or module.MODEL.dissipation is not None:
-        return module.pass1(lam, **launch).v2, 0.0
+    if module.MODEL.dissipation is not None:
+        told, *beside = module.pass1(np.array([lam, lam - bit, lam + bit]), **launch).v2
+        return told, sum(np.nan_to_num(np.abs(other - told)) for other in beside)  # off the leg there is none
+    functions, lam0 = motion.problem.functions, launch["lam0"]
+    heights, slopes = climb_at(functions.addresses, functions.p, np.array([lam0 - 1.0, lam0 + 1.0, lam0, *lam]))
+    moved, rounding = 2.0 * bit * np.abs(slopes[3:]), ROUNDED * np.nanmax(np.abs(heights))
+    if module.MODEL.exact is None or not (closely or rounding > LEFT * most):
+        return launch["v0"] ** 2 + (heights[2] - heights[3:]), moved + rounding
+    told, rounding = exactly(module, lam, launch)
+    return told, moved + rounding
+
+
+def exactly(module: ModuleType, lam: Any, launch: dict[str, Any]) -> tuple[Any, float]:
+    """V**2 at places from exact heights, and the rounding of a chart."""
     with mp.workdps(40):
         p = tuple(mpf(launch[name]) for name in module.PARAMETERS)
         start, *heights = (climb(module, float(place), launch, p) for place in (launch["lam0"], *lam))
-        size = 0.0 if hasattr(exact, "x") else ROUNDED * float(max(map(abs, heights)))  # a chart is one of doubles
+        size = 0.0 if hasattr(module.MODEL.exact, "x") else ROUNDED * float(max(map(abs, heights)))
         return np.array([float(mpf(launch["v0"]) ** 2 + start - height) for height in heights]), size
 
 
@@ -158,19 +218,32 @@ def resident() -> float:
     return int(Path("/proc/self/statm").read_text(encoding="ascii").split()[1]) * 4096 / 2**20
 
 
-def main(count: int, seed: int) -> int:
-    """Run, print the counts, and return 1 if anything failed."""
+def main(count: int, seed: int, names: list[str]) -> int:
+    """Run over some of the modules, print the counts, and return 1 if anything failed."""
     draw = random.Random(seed)
-    modules = {name: import_module(f"generated.{name}") for name in NAMES}
-    kinds, refused, failed = Counter[str](), Counter[str](), Counter[str]()
-    start, early = time.monotonic(), 0.0
-    for number in range(count):
-        name = draw.choice(NAMES)
+    modules = {name: import_module(f"generated.{name}") for name in names}
+    weights = [1.0 / DEAR if name in OFTEN_EXACT else 1.0 for name in names]
+    drawn_of, looked, refused, failed = Counter[str](), Counter[str](), Counter[str](), Counter[str]()
+    begin, early = time.process_time(), 0.0
+
+    def summary(number: int) -> str:
+        took, (name, least) = time.process_time() - begin, drawn_of.most_common()[-1]
+        return (
+            f"{number} launches in {took:.0f} s of processor time ({number / took:.0f} a second), {least} or more of "
+            f"each module ({name}): {looked['solved']} solved, {looked['closely']} looked at closely, "
+            f"refused {dict(refused)}, failures {dict(failed)}; memory {early:.0f} MB, then {resident():.0f} MB"
+        )
+
+    for number in range(1, count + 1):
+        name = draw.choices(names, weights)[0]
+        drawn_of[name] += 1
+        closely = drawn_of[name] % CLOSELY == 1
         call = drawn(modules[name], draw)
         shown = f"{name}.solve({', '.join(f'{key}={value!r}' for key, value in call.items())})"
         try:
-            found = faults(modules[name], call, draw, closely=number % CLOSELY == 0)
-            kinds["solved"] += 1
+            found = faults(modules[name], call, draw, closely)
+            looked["solved"] += 1
+            looked["closely"] += closely
         except GQMError as error:
             refused[type(error).__name__] += 1
             found = []
@@ -180,15 +253,14 @@ def main(count: int, seed: int) -> int:
             failed[what.split(" by ")[0].split(":")[0]] += 1
             if sum(failed.values()) <= 200:
                 print(f"{what}: {shown}", flush=True)
-        if number == count // 10:
+        if number == max(count // 10, 1):
             early = resident()
-    took = time.monotonic() - start
-    print(
-        f"{count} launches in {took:.0f} s ({count / took:.0f} a second): {kinds['solved']} solved, "
-        f"refused {dict(refused)}, failures {dict(failed)}; memory {early:.0f} MB, then {resident():.0f} MB"
-    )
+        if number % PROGRESS == 0 and number < count:
+            print(summary(number), flush=True)
+    print(summary(count))
     return 1 if failed else 0
 
 
 if __name__ == "__main__":
-    sys.exit(main(int(sys.argv[1]) if len(sys.argv) > 1 else 100_000, int(sys.argv[2]) if len(sys.argv) > 2 else 0))
+    asked = sys.argv[1:]
+    sys.exit(main(int(asked[0]) if asked else 100_000, int(asked[1]) if len(asked) > 1 else 0, asked[2:] or NAMES))

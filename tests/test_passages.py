@@ -12,6 +12,7 @@ import pytest
 from mpmath import mp, mpf
 
 import gqm_sym as gqm
+from gqm_sym.errors import InputError
 
 ModuleOf = Callable[[str], ModuleType]
 
@@ -327,3 +328,61 @@ def test_the_launch_is_the_number_given_and_not_its_double(passage: Callable[...
     for steps in (1, 3, 1000):
         place = 0.1 + steps * 2.0**-54
         assert motion.time_at(place) == pytest.approx(float((Fraction(place) - Fraction(1, 10)) / 4), abs=5e-19)
+
+
+@pytest.mark.parametrize("v0", [1e-2, 1e-3, 1e-5, 1e-7, 1e-8, 1.76e-12])
+def test_a_slow_launch_uphill_takes_its_time(v0: float, module_of: ModuleOf) -> None:
+    """It turns next to the launch, and its width in doubles says little of how long: found by ``make soak``.
+
+    From the top of a cycloid's arch the arc length obeys sigma'' = k**2 sigma with k**2 = g/(4R).
+    """
+    arch = module_of("cycloid_arch")
+    start = 1.6958207696593393
+    motion = arch.solve(start, v0, R="1/2", g="9.81")
+    with mp.workdps(40):
+        rate, top = mp.sqrt(G / 2), 2 * mp.cos(mpf(start) / 2)
+        turn = mp.atanh(mpf(v0) / (rate * top)) / rate
+        assert off(motion.legs[0].t_end, turn) <= TIME * turn
+        assert [leg.direction for leg in motion.legs] == [1, -1]
+        for t in (float(turn), 0.1, 0.2, 0.3, 0.4):
+            state = motion.state(t)
+            sigma = top * mp.cosh(rate * mpf(t)) - mpf(v0) / rate * mp.sinh(rate * mpf(t))
+            assert off(state.lam, 2 * mp.acos(sigma / 2)) <= state.error <= POSITION
+
+
+def test_a_spiral_ends_at_its_centre(generated_folder: Any) -> None:
+    """It winds for ever on a finite way: the motion ends, and says when. Found by ``make soak``: it took for ever."""
+    spiral = gqm.derive(gqm.families.log_spiral(), gqm.CentralForce())
+    drawn = gqm.build(spiral, name="drawn_in", folder=generated_folder)
+    motion = drawn.solve(0, 1, -1, r0=1, b="3/20", k=2)
+    with pytest.raises(InputError, match="singular-point"):
+        motion.lam(5.0)
+    with mp.workdps(30):
+        # ds = r sqrt(1 + 1/b**2) dr/r, and V**2 = 1 + 2k(1/r - 1).
+        stretched = mp.sqrt(1 + 1 / mpf("0.15") ** 2)
+        fall = mp.quad(lambda r: stretched / mp.sqrt(1 + 4 * (1 / r - 1)), [0, mpf(1) / 4, 1])
+    assert off(motion.t_end, fall) <= TIME * fall
+    assert motion.events[-1].kind == "singular-point"
+
+
+def test_a_fall_into_a_spiral_is_tabulated(generated_folder: Any) -> None:
+    """Its last turns take less than two doubles hold of the time. Found by ``make soak``: panels without end."""
+    spiral = gqm.build(gqm.derive(gqm.families.log_spiral(), gqm.Gravity()), name="wound_up", folder=generated_folder)
+    launch = {"lam0": 1.3490766955876934, "v0": 3.2020412377682295, "r0": 0.23362934079070044}
+    launch |= {"b": 0.16404457011909193, "g": 12.030635764538687}
+    motion = spiral.solve(**launch)
+    assert len(motion._course(0.0).pieces[1].stretch.table[0]) < 1000
+    with mp.workdps(30):
+        r0, b, v0, lam0, g = (mpf(launch[name]) for name in ("r0", "b", "v0", "lam0", "g"))
+
+        def squared(u: Any) -> Any:
+            return v0**2 + 2 * g * r0 * (mp.exp(b * lam0) * mp.sin(lam0) - mp.exp(b * u) * mp.sin(u))
+
+        def slowness(u: Any) -> Any:
+            return r0 * mp.sqrt(1 + b * b) * mp.exp(b * u) / mp.sqrt(squared(u))
+
+        turn = mp.findroot(squared, motion.turning_points[0])
+        down = mp.quad(slowness, [lam0 - 2 * k for k in range(200, -1, -1)])
+        up = mp.quad(lambda q: 2 * q * slowness(turn - q * q), [0, mp.sqrt(turn - lam0)]).real
+        assert off(motion.legs[0].t_end, up) <= TIME * up
+        assert off(motion.t_end, 2 * up + down) <= TIME * down

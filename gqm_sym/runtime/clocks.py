@@ -11,7 +11,7 @@ Array = NDArray[np.float64]
 def running_totals(times: Array, terms: Array) -> tuple[Array, Array]:
     """Running totals of the panels' own times, each as two doubles, up to the last of ``times``."""
     own = terms.sum(axis=1)  # every Legendre polynomial is 1 at the right edge
-    own *= times[-1] / own.sum()
+    own *= times[-1] / (own.sum() or 1.0)  # from a place to itself there are none
     high, low = np.zeros(len(own) + 1), np.zeros(len(own) + 1)
     for k, part in enumerate(own):
         high[k + 1], error = two_sum.py_func(high[k], part)

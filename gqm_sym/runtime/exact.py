@@ -90,8 +90,12 @@ class ExactProblem:
                 w = a.speed_squared(top)
                 bend = abs(a.climb_bend(top))
                 guess = top - direction * a.sqrt(2 * abs(w) / bend) if bend else here
-            if abs(w) <= a.mpf(10) ** (2 * SPARE - digits) * a.size:
+            lost = a.mpf(10) ** (2 * SPARE - digits) * a.size
+            # A launch that slow turns where heights cancel to fewer digits than doubles have.
+            if abs(w) <= lost or (0 < a.w0 <= lost and digits < LADDER[-1]):
                 continue
+            if w > 0 and top is not None and a.speed_squared(there) < 0:
+                guess, w = there, -w  # a bottom, and a wall behind it
             if w > 0:
                 return End("clear")
             return End("turn", a.turning_point(guess))
@@ -196,7 +200,7 @@ class Arithmetic:
         context = self.context
 
         def turn_turn(phi: Any) -> tuple[Any, Any]:
-            s, c = context.sin(phi / 2), context.cos(phi / 2)
+            c, s = context.cos_sin(phi / 2)
             left, right = (b - a) * s**2, (b - a) * c**2
             lam = a + left
             if s == 0:

@@ -19,6 +19,7 @@ from gqm_sym.runtime.panels import (
     DEGREE,
     EXHAUSTED,
     FROM_TURN,
+    NOTHING,
     TAIL,
     TURN_TURN,
     antiderivative,
@@ -76,16 +77,17 @@ def lay_exactly(exact: ExactProblem, kind: int, ends: tuple[Any, Any], stop: flo
         length_size, length_tail, _ = antiderivative(values[1], half, c, terms[1])
         size, tail, _ = antiderivative(values[0], half, c, terms[0])
         settled = tail <= TAIL * size and length_tail <= 10.0 * TAIL * length_size
+        time, length = half * (weights @ values[0]), half * (weights @ values[1])
+        settled = settled or (time <= NOTHING * times[-1] and length <= NOTHING * lengths[-1])
         full = len(edges) + len(pending) >= MOST_PANELS or half <= 2.0**-50 * stop
         if not settled and not full:
             pending.append(0.5 * (left + right))
             continue
         status = status if settled else EXHAUSTED
-        time = half * float(weights @ values[0])
-        error += tail / size * time
+        error += tail / size * float(time) if size else 0.0
         edges.append(right)
-        times.append(times[-1] + time)
-        lengths.append(lengths[-1] + half * float(weights @ values[1]))
+        times.append(times[-1] + float(time))
+        lengths.append(lengths[-1] + float(length))
         time_terms.append(terms[0])
         length_terms.append(terms[1])
         left = pending.pop()

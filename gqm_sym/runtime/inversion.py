@@ -13,7 +13,7 @@ import numpy as np
 from gqm_sym.runtime.arrays import longer, taller
 from gqm_sym.runtime.doubledouble import two_sum
 from gqm_sym.runtime.jit import Inner
-from gqm_sym.runtime.panels import legendre_sum
+from gqm_sym.runtime.panels import NOTHING, legendre_sum
 
 TERMS = 15
 LAST = TERMS - 1
@@ -92,6 +92,8 @@ def tabulate(edges, times, times_low, time_terms):  # type: ignore[no-untyped-de
     for k in range(edges.size - 1):
         left, half = edges[k], 0.5 * (edges[k + 1] - edges[k])
         duration = (times[k + 1] - times[k]) + (times_low[k + 1] - times_low[k])
+        if k > 0 and duration <= NOTHING * times[k]:
+            continue
         pace = legendre_sum(time_terms[k], 1.0) / duration
         derivative(time_terms[k], slope_terms)
         done, cuts = 0, 1  # ``done`` of ``cuts`` equal segments of the panel's time are laid

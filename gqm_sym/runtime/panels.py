@@ -28,6 +28,7 @@ MOST_PANELS = 4096
 # Below this balance doubles keep too few digits of V**2 to be worth laying panels on.
 HOPELESS = 1e-9
 LEAST_WIDTH = 2.0**-48  # of the stretch
+NOTHING = 2.0**-104  # a share of the time so far that two doubles do not hold
 # Legendre's recurrence: P_(k+1) = GROWTH[k] x P_k - DECAY[k-1] P_(k-1).
 GROWTH = np.array([(2 * k + 1) / (k + 1) for k in range(DEGREE + 1)])
 DECAY = np.array([(k + 1) / (k + 2) for k in range(DEGREE + 1)])
@@ -151,17 +152,19 @@ def lay(fns, p, kind, a, b, ref, w, field, marks):  # type: ignore[no-untyped-de
         )
         narrow = fabs(right - left) <= least
         full = count + waiting >= most or waiting >= pending.size - 1
-        if not (duration > 0.0 and duration < inf):
+        # At the end of a spiral, where it winds on below the last bit of what there is.
+        nothing = duration >= 0.0 and duration <= NOTHING * times[count] and length <= NOTHING * lengths[count]
+        if not ((duration > 0.0 or nothing) and duration < inf):
             if narrow or full:
                 status = FAILED
                 break
-        elif settled or floor or narrow or full:
-            if not settled:
+        elif settled or floor or narrow or full or nothing:
+            if not (settled or nothing):
                 if floor and tail > 50.0 * TAIL * size:
                     status = max(status, FLOOR)
                 elif not floor:
                     status = EXHAUSTED
-            error += tail / size * duration
+            error += tail / size * duration if size > 0.0 else 0.0
             # Two-sum: the running totals keep what a double would lose.
             total = times[count] + (duration + time_low)
             time_low = (duration + time_low) - (total - times[count])

@@ -12,6 +12,7 @@ from gqm_sym.runtime.course import ZERO, Course, Piece, plus
 from gqm_sym.runtime.entries import frame_at, walk_on
 from gqm_sym.runtime.events import liftoff
 from gqm_sym.runtime.motion import Motion
+from gqm_sym.runtime.panels import NOTHING
 from gqm_sym.runtime.problem import Problem
 from gqm_sym.runtime.search import FARTHEST, NARROW
 from gqm_sym.runtime.stretch import ULP, Array, Stretch
@@ -178,9 +179,7 @@ class Passage(Motion):
         f, lam0 = problem.functions, problem.lam0
         target = end.target
         if abs(target - end.place) <= NARROW * max(abs(end.place), abs(lam0)):
-            self._pieces[-1] = replace(self._pieces[-1], end="singular-point")
-            self.t_end = min(self.t_end, self._pieces[-1].t_stop[0])
-            self.open_end = None
+            self._ends_here()
             return
         if abs(target) > FARTHEST * max(1.0, abs(lam0)):
             raise SolutionError(
@@ -210,8 +209,21 @@ class Passage(Motion):
                 f"the motion beyond {problem.formulas.parameter} = {lam0 + near!r} could not be followed; "
                 "give a domain that ends there"
             )
-        self.add(through(f, end.place, target, lam0, problem.w0), 1, "")
+        stretch = through(f, end.place, target, lam0, problem.w0)
+        if self._pieces and (
+            stretch.duration <= NOTHING * self._pieces[-1].t_stop[0]
+            and stretch.length <= NOTHING * abs(self._arc_end())
+        ):
+            self._ends_here()  # a spiral has come to its centre
+            return
+        self.add(stretch, 1, "")
         end.place, end.step = target, 2.0 * end.step
+
+    def _ends_here(self) -> None:
+        """What is ahead takes neither time nor way."""
+        self._pieces[-1] = replace(self._pieces[-1], end="singular-point")
+        self.t_end = min(self.t_end, self._pieces[-1].t_stop[0])
+        self.open_end = None
 
     def _clock_error(self, t: Array) -> Array:
         course = self._course(float(np.abs(t).max()) if t.size else 0.0)

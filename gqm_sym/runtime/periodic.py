@@ -29,12 +29,15 @@ class Periodic(Motion):
     """A libration or a circulation: one stretch, repeated for ever.
 
     Its course is first built from times in doubles. Beyond one period from launch the period is needed as two
-    doubles; it is then evaluated once in extended precision.
+    doubles; it is then evaluated once in extended precision. ``offsets`` are the distances of a libration's ends from
+    the launch.
     """
 
-    def __init__(self, problem: Problem, kind: str, direction: int, stretch: Stretch) -> None:
+    def __init__(
+        self, problem: Problem, kind: str, direction: int, stretch: Stretch, offsets: tuple[float, float] = (0.0, 0.0)
+    ) -> None:
         super().__init__(problem, kind, direction)
-        self._stretch = stretch
+        self._stretch, self._offsets = stretch, offsets
         self._plain: Course | None = None
         self._precise: Course | None = None
         self._exact: timing.Timing | None = None
@@ -60,7 +63,7 @@ class Periodic(Motion):
     @property
     def _timing(self) -> timing.Timing:
         if not self._is_exact:
-            return timing.plain(self.problem, self.kind, self._stretch)
+            return timing.plain(self.kind, self._stretch, self._offsets)
         if self._exact is None:
             self._exact = timing.exact(self.problem, self.kind, self.direction, self._stretch)
         return self._exact
@@ -127,7 +130,7 @@ class Periodic(Motion):
             return sampler
         course = self._course(reach)
         if sampler is None or sampler.course is not course:
-            clock = self._timing if course is self._precise else timing.plain(self.problem, self.kind, self._stretch)
+            clock = self._timing if course is self._precise else timing.plain(self.kind, self._stretch, self._offsets)
             sampler = self._sampler = Sampler(
                 self.problem, course, clock.phase, self.direction, lambda: self._clock_drift(course)
             )
@@ -144,7 +147,7 @@ class Periodic(Motion):
         if self._precise is not None:
             return self._precise
         if self._plain is None:
-            self._plain = self._build(timing.plain(self.problem, self.kind, self._stretch))
+            self._plain = self._build(timing.plain(self.kind, self._stretch, self._offsets))
         return self._plain
 
     def _build(self, clock: timing.Timing) -> Course:
@@ -215,4 +218,5 @@ class Periodic(Motion):
         count = np.floor((lam - self.problem.lam0) / lap)
         if count < 0:
             return []
-        return [t + count * self.period for t in super()._first_passages(lam - count * lap, low)]
+        within = super()._first_passages(lam - count * lap, low)
+        return [t + count * self.period for t in within] if count else within

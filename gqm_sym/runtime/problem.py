@@ -15,12 +15,14 @@ class Reach:
 
     ``what`` is "turn", "equilibrium", "domain-end", "singular-point", "cusp", "closed", or "open" (towards infinity or
     a pole). ``level`` marks a cusp at which V**2 vanishes as well: it is reached in finite time all the same.
+    ``offset`` is a turning point's from the launch, which keeps its digits where both are one place in doubles.
     """
 
     what: str
     place: float
     exact: Any = None
     level: bool = False
+    offset: float = 0.0
 
 
 @dataclass(slots=True)

@@ -34,6 +34,8 @@ class RoundedProblem:
         size = self.w0 + abs(self._climb(beyond)[0]) + abs(self._climb(self.lam0)[0])
         if top is not None and abs(w) <= NOTHING * size:
             return End("equilibrium", top)
+        if w > 0.0 and (far - beyond) * direction > 0.0 and self._speed_squared(far) < 0.0:
+            return End("turn", self._zero(beyond, far))  # a bottom, and a wall behind it
         return End("clear") if w > 0.0 else End("turn", self._zero(near, beyond))
 
     def _climb(self, place: float) -> tuple[float, float]:

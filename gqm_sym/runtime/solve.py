@@ -46,6 +46,8 @@ def _bilateral(formulas: Formulas, p: Given, launch: Launch) -> Motion:
         f.addresses, f.p, lam0, v0, launch.direction, low, high, period, place, step
     )
     stuck = ahead[0] in (search.CUSP, search.BROKEN) and ahead[1] == 0.0
+    if direction == 0 or stuck or time != time:
+        _check_place(problem)
     if (direction == 0 or stuck) and _is_cusp(problem, lam0):
         return _from_cusp(problem)
     if direction == 0:
@@ -59,9 +61,8 @@ def _bilateral(formulas: Formulas, p: Given, launch: Launch) -> Motion:
     known = time if time == time and f.breaks.size == 0 else None
     if known is not None and ahead[0] == search.TURN:  # a libration without difficulties
         a, b = lam0 + ahead[1], lam0 + behind[1]
-        return Periodic(problem, "libration", direction, between_turns(f, min(a, b), max(a, b), known))
-    if known is None:
-        _check_place(problem)
+        offsets = abs(min(ahead[1], behind[1])), abs(max(ahead[1], behind[1]))
+        return Periodic(problem, "libration", direction, between_turns(f, min(a, b), max(a, b), known), offsets)
     front = _reach(problem, direction, ahead)
     if front.what == "closed":
         end = lam0 + direction * period
@@ -84,6 +85,7 @@ def _bilateral(formulas: Formulas, p: Given, launch: Launch) -> Motion:
             "libration",
             direction,
             between_turns(f, ends[0].place, ends[1].place, ends=exact),
+            (abs(ends[0].offset), abs(ends[1].offset)),
         )
     return _returning(problem, direction, front, back)
 
@@ -120,7 +122,8 @@ def _reach(problem: Problem, direction: int, walked: tuple[int, float, float]) -
             if end.what == "equilibrium" and _is_cusp(problem, float(end.place)):
                 return Reach("cusp", float(end.place), end.place, level=True)
             if end.what != "clear":
-                return Reach(end.what, float(end.place), end.place)
+                origin = lam0 if f.exact is None else f.exact.at(DIGITS).lam0
+                return Reach(end.what, float(end.place), end.place, offset=float(end.place - origin))
             walked = walk_on(
                 f.addresses,
                 f.p,
@@ -133,7 +136,7 @@ def _reach(problem: Problem, direction: int, walked: tuple[int, float, float]) -
             )
             continue
         if what == search.TURN:
-            return Reach("turn", lam0 + near)
+            return Reach("turn", lam0 + near, offset=near)
         if what == search.LIMIT:
             if problem.period and problem.w0 == 0.0:  # back at the launch place, where V**2 is zero again
                 walked = (search.CRITICAL, near * (1.0 - 1e-4), near)

@@ -30,8 +30,9 @@ from gqm_sym.runtime.panels import FAILED, ILL_CONDITIONED
 
 # Below this balance the half period in doubles is off by more than a few units in the last place.
 LEAST_BALANCE = 1e-2
-# Below this share of its ends, the width of a stretch is too rounded for a speed.
+# Below this share of its ends, the width of a stretch is too rounded for a speed, and for a time from one turn.
 LEAST_WIDTH = 1.0 / 32.0
+LEAST_TIMED = 2.0**-10
 
 
 NOWHERE: Array = np.empty(0)
@@ -140,7 +141,8 @@ class Stretch:
             self.w += self._off_launch()
             self.laid = lay_panels(f.addresses, f.p, self.kind, self.a, self.b, self.ref, self.w, self._marks())
         self._conditioning = max(1.0 / self.balance if self.balance > 0.0 else inf, self._magnified())
-        if f.exact is not None and not self._from_exact and self._conditioning > 1.0 / LEAST_BALANCE:
+        hard = self._conditioning > 1.0 / LEAST_BALANCE or (self.kind == FROM_TURN and self._is_short(LEAST_TIMED))
+        if f.exact is not None and not self._from_exact and hard:
             self.ends = exact_ends(f.exact, DIGITS, self.kind, self.a, self.b, self.ends)
             self.a, self.b = float(self.ends[0]), float(self.ends[1])
             self.laid = lay_exactly(f.exact, self.kind, self.ends, self.stop)
@@ -269,8 +271,12 @@ class Stretch:
 
     @property
     def direction(self) -> int:
-        """The sign of dlam/dphi."""
-        return 1 if self.b > self.a else -1
+        """The sign of dlam/dphi; of exact ends where those in doubles are one place."""
+        a, b = (self.a, self.b) if self.a != self.b or self.ends[0] is None else self.ends
+        return 1 if b > a else -1
+
+    def _is_short(self, share: float) -> bool:
+        return abs(self.b - self.a) <= share * max(abs(self.a), abs(self.b))
 
     @property
     def table(self) -> Any:
@@ -330,7 +336,7 @@ class Stretch:
     def spread(self) -> float:
         """The exact width of a short stretch between two turning points, against that of the rounded ones."""
         exact, width = self.functions.exact, self.b - self.a
-        if exact is None or self.kind != TURN_TURN or width > LEAST_WIDTH * max(abs(self.a), abs(self.b)):
+        if exact is None or self.kind != TURN_TURN or not self._is_short(LEAST_WIDTH):
             return 1.0
         if self._stretched is None:
             low, high = exact_ends(exact, DIGITS, self.kind, self.a, self.b, self.ends)

@@ -48,9 +48,8 @@ class Timing:
     marks: tuple[Array, Array] | None = None
 
 
-def plain(problem: Problem, kind: str, stretch: Stretch) -> Timing:
+def plain(kind: str, stretch: Stretch, offsets: tuple[float, float]) -> Timing:
     """Times in doubles, from the stretch's own quadrature."""
-    offsets = (problem.lam0 - stretch.a, stretch.b - problem.lam0)
     duration = (stretch.duration, 0.0)
     if kind == "circulation" or offsets[0] == 0.0:
         return Timing(duration, ZERO, offsets)
