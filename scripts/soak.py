@@ -117,7 +117,7 @@ def faults(module: ModuleType, call: dict[str, Any], draw: random.Random, closel
     if any(abs(one.lam_end - two.lam_start) > PLACE * abs(one.lam_end) for one, two in pairwise(legs)):
         found.append("legs apart")
     # Near a place of rest a place's last bit is much of V**2, and of the way there.
-    bit = 2.0 * np.spacing(np.abs(lam))
+    bit = np.maximum(2.0 * np.spacing(np.abs(lam)), error)
     most = max(call["v0"] ** 2, float(np.max(v2)))
     launch = {name: value for name, value in call.items() if name != "t_max"} | {"direction": legs[0].direction}
     told, unsure = speed_squared(module, motion, lam, bit, launch, closely, most)
