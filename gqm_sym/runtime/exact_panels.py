@@ -57,7 +57,9 @@ def lay_exactly(exact: ExactProblem, kind: int, ends: tuple[Any, Any], stop: flo
     time_terms, length_terms = [], []
     # The last anomaly is pi itself, not its nearest double: at a barrier the difference takes time.
     end = scale.context.pi if kind == TURN_TURN else scale.mpf(stop)
-    pending, left, error, status = [stop], 0.0, 0.0, CONVERGED
+    joints = scale.anomalies(kind, *ends, scale.track.joints(*ends) or ())
+    pending = [stop, *reversed([phi for phi in joints if 0 < phi < stop])]
+    left, error, status, most = 0.0, 0.0, CONVERGED, MOST_PANELS + len(pending)
     while pending:
         right = pending[-1]
         # Nodes are not rounded: next to a peak as narrow as 1e-6 that would be noise.
@@ -79,13 +81,13 @@ def lay_exactly(exact: ExactProblem, kind: int, ends: tuple[Any, Any], stop: flo
         settled = tail <= TAIL * size and length_tail <= 10.0 * TAIL * length_size
         time, length = half * (weights @ values[0]), half * (weights @ values[1])
         settled = settled or (time <= NOTHING * times[-1] and length <= NOTHING * lengths[-1])
-        full = len(edges) + len(pending) >= MOST_PANELS or half <= 2.0**-50 * stop
+        full = len(edges) + len(pending) >= most or half <= 2.0**-50 * stop
         if not settled and not full:
-            pending.append(0.5 * (left + right))
+            pending.append((left + right) / 2)
             continue
         status = status if settled else EXHAUSTED
         error += tail / size * float(time) if size else 0.0
-        edges.append(right)
+        edges.append(float(right))
         times.append(times[-1] + float(time))
         lengths.append(lengths[-1] + float(length))
         time_terms.append(terms[0])
