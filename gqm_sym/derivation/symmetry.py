@@ -2,11 +2,12 @@
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from itertools import islice
 
 import sympy as sp
 
-# Forms of more operations than this are not written out to find their symmetry.
-MAX_OPERATIONS = 200
+# Longer forms are not looked at, and only forms of so many operations are written out to find their symmetry.
+MAX_LENGTH, MAX_OPERATIONS = 1000, 200
 _WAVES = (sp.sin, sp.cos)
 
 
@@ -36,11 +37,18 @@ def symmetry(climb: sp.Expr, climb_slope: sp.Expr, ds: sp.Expr, lam: sp.Symbol) 
     what the two highest powers of a polynomial ask for.
     """
     forms = (climb, ds)
+    if any(_is_longer(form, MAX_LENGTH) for form in forms):
+        return None
     found = [place for place in dict.fromkeys(_candidates(forms, lam)) if all(_is_even(f, lam, place) for f in forms)]
     if not found:
         return None
     step = min((abs(place - found[0]) for place in found[1:]), key=_size, default=None)
     return Symmetry(found[0], step, _only_there(climb_slope, lam, found[0], step))
+
+
+def _is_longer(form: sp.Expr, length: int) -> bool:
+    """Whether a form has more parts, written out; found without going through all of them."""
+    return next(islice(sp.preorder_traversal(form), length, None), None) is not None
 
 
 def _size(step: sp.Expr) -> sp.Expr:
