@@ -1,6 +1,7 @@
 """The motion that a launch begins, as a value that answers questions."""
 
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from itertools import pairwise
 from math import inf
 from typing import Any, NamedTuple
@@ -195,11 +196,17 @@ class Motion(ABC):
         pace, lap = self._course(0.0).pace, self._course(0.0).lap
         for piece in self._history():
             marks = [(piece.t_start, piece.phi_start), *corners_met(piece, pace), (piece.t_stop, piece.phi_stop)]
-            lam = piece.stretch.places(np.array([phi for _, phi in marks])) + piece.laps * lap
+            lam = self._marked(piece, marks) + piece.laps * lap
             for k, ((start, _), (stop, _)) in enumerate(pairwise(marks)):
                 end = piece.end if k == len(marks) - 2 else "corner"
                 legs.append(Leg(float(lam[k]), float(lam[k + 1]), start[0], stop[0], piece.direction, end))
         return Rows(self._told(_merged(legs, self._joints)))
+
+    def _marked(self, piece: Piece, marks: Sequence[tuple[Pair, float]]) -> Array:
+        """Places at times and anomalies of a piece; the one at launch is the one given, to its last bit."""
+        lam = piece.stretch.places(np.array([phi for _, phi in marks]))
+        lam[[when[0] == 0.0 for when, _ in marks]] = self.problem.lam0
+        return lam
 
     @property
     def events(self) -> tuple[Event, ...]:
@@ -276,7 +283,7 @@ class Motion(ABC):
 
     def _event(self, kind: str, when: Pair, piece: Piece, phi: float) -> Event:
         f = self.problem.functions
-        lam = piece.stretch.places(np.array([phi]))
+        lam = self._marked(piece, [(when, phi)])
         x, z = frame_at(f.addresses, f.p, lam, np.zeros(1))[:2, 0]
         return Event(kind, when[0], float(lam[0]) + piece.laps * self._course(0.0).lap, float(x), float(z))
 
