@@ -121,8 +121,10 @@ def faults(module: ModuleType, call: dict[str, Any], draw: random.Random, closel
     most = max(call["v0"] ** 2, float(np.max(v2)))
     launch = {name: value for name, value in call.items() if name != "t_max"} | {"direction": legs[0].direction}
     told, unsure = speed_squared(module, motion, lam, bit, launch, closely, most)
-    # With losses V**2 depends on the way, and pass 1 tells that of the first leg.
-    held = t <= (legs[0].t_end if module.MODEL.dissipation is not None else t[-1])
+    held = t <= t[-1]
+    if module.MODEL.dissipation is not None:
+        # With losses V**2 depends on the way: pass 1 tells that of the first leg, if places in doubles tell it apart.
+        held = (t <= legs[0].t_end) & (abs(legs[0].lam_end - legs[0].lam_start) > SLACK * bit)
     share = PACED if any(piece.stretch.from_exact for piece in motion._course(0.0).pieces) else ENERGY
     if not np.all((np.abs(v2 - told) <= share * most + unsure)[held]):
         told, unsure = speed_squared(module, motion, lam, bit, launch, True, most)  # heights may cancel in themselves
