@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from sympy import Expr, Function, Symbol
+from sympy import Function, Symbol
 
 from gqm_sym.declare import Curve
 from gqm_sym.declare.implicit import X, Z
@@ -35,32 +35,19 @@ def _implicit(lowering: "Lowering") -> ChartIR:
         inside=[(place, Function("at")(Symbol(array, real=True))) for place, array in ((X, across), (Z, up))],
         outputs=found.rows,
     )
-    exact = [_ends(lowering, "exact_start", "Coordinates of the start point.", found.level.start)]
+    exact = [lowering.constants("exact_start", "Coordinates of the start point.", found.level.start)]
     doc = "F, F_x and F_z."
     exact.append(lowering.exact_function("level", doc, (found.value, found.slope_x, found.slope_z), (X, Z)))
     arguments = ["field=field.address", "start=exact_start", f"tangent={found.level.tangent}", "level=exact_level"]
     if model.domain != (None, None):
-        exact.append(
-            _ends(lowering, "exact_domain", "Both ends in arc length; None where there is none.", model.domain)
-        )
+        doc = "Both ends in arc length; None where there is none."
+        exact.append(lowering.constants("exact_domain", doc, model.domain))
         arguments.append("domain=exact_domain")
     return ChartIR(
         statement=f"Traced({', '.join(arguments)})",
         imports=("FIELD", "Traced"),
         functions=(field,),
         exact=tuple(exact),
-    )
-
-
-def _ends(lowering: "Lowering", name: str, doc: str, values: tuple[Expr | None, ...]) -> ExactIR:
-    """A function of the run-time parameters alone."""
-    return ExactIR(
-        name=name,
-        doc=doc,
-        places=(),
-        parameters=lowering.used(value for value in values if value is not None),
-        inside=(),
-        outputs=values,
     )
 
 

@@ -52,14 +52,18 @@ class _Middle:
 
     def second(self, name: str) -> Expr:
         even, odd = self.parts
-        return sin(self.m) * even + cos(self.m) * odd if name == "sin2" else cos(self.m) * even - sin(self.m) * odd
+        return self._turned(sin if name == "sin2" else cos, even, odd)
 
     def value(self, head: type[Expr]) -> Expr:
         """The sine or cosine of y, by that of v: cos v = cos h + (v**2 - h**2) * even, and so for the sine."""
         even, odd = self.parts
         h, product = (self.w - self.x) / 2, self.gaps[0] * self.gaps[1]
         cosine, sine = cos(h) - product * even, self.v * Function("near_sinc")(h) - product * odd
-        return sin(self.m) * cosine + cos(self.m) * sine if head is sin else cos(self.m) * cosine - sin(self.m) * sine
+        return self._turned(head, cosine, sine)
+
+    def _turned(self, head: type[Expr], even: Expr, odd: Expr) -> Expr:
+        """What belongs to sin(m + v) or cos(m + v), from what belongs to cos v and sin v."""
+        return sin(self.m) * even + cos(self.m) * odd if head is sin else cos(self.m) * even - sin(self.m) * odd
 
 
 def _apart(

@@ -206,31 +206,26 @@ class Lowering:
     def domain(self) -> ExactIR:
         """The range of the curve's parameter."""
         curve = self.model.curve
-        ends = (*curve.domain, curve.period)
-        return ExactIR(
-            name="exact_domain",
-            doc="Both ends of the domain, and the period; None where there is none.",
-            places=(),
-            parameters=self.used(e for e in ends if e is not None),
-            inside=(),
-            outputs=ends,
-        )
+        doc = "Both ends of the domain, and the period; None where there is none."
+        return self.constants("exact_domain", doc, (*curve.domain, curve.period))
 
     def axes(self) -> tuple[ExactIR, ...]:
         """Places of symmetry, where there are any."""
         symmetry = self.model.symmetry
         if symmetry is None:
             return ()
-        outputs = (symmetry.place, symmetry.step)
-        return (
-            ExactIR(
-                name="exact_axes",
-                doc="A place about which V**2 and ds are even, and the distance to the next; None where there is none.",
-                places=(),
-                parameters=self.used(e for e in outputs if e is not None),
-                inside=(),
-                outputs=outputs,
-            ),
+        doc = "A place about which V**2 and ds are even, and the distance to the next; None where there is none."
+        return (self.constants("exact_axes", doc, (symmetry.place, symmetry.step)),)
+
+    def constants(self, name: str, doc: str, values: tuple[Expr | None, ...]) -> ExactIR:
+        """A function of the run-time parameters alone."""
+        return ExactIR(
+            name=name,
+            doc=doc,
+            places=(),
+            parameters=self.used(value for value in values if value is not None),
+            inside=(),
+            outputs=values,
         )
 
     def exact_function(
