@@ -7,10 +7,11 @@ each. Every step is a loop over the columns without branches, which vectorises.
 from math import fabs, inf
 
 from gqm_sym.runtime.crossing import call_bounds_each, call_rise_each
+from gqm_sym.runtime.entries import to_axis
 from gqm_sym.runtime.fused import choose, whole_below
 from gqm_sym.runtime.jit import Inner
 from gqm_sym.runtime.search import UNRESOLVED
-from gqm_sym.runtime.swift import LIBRATION
+from gqm_sym.runtime.swift import FIRST, LAST, LIBRATION, NEXT, PERIOD, PLACE
 
 # Rows of a batch: which launch, offsets of both ends from it, both ends; what the quadrature keeps; the launch's place
 # and V**2, which it needs of laps alone; what the search needs: which way it goes and how far at most, and how far the
@@ -19,8 +20,6 @@ from gqm_sym.runtime.swift import LIBRATION
 WHO, LEAST, MOST, A, B, SUM, VALUE, CHANGE, LOW, HIGH, START, SPEED, LASTING = range(13)
 OF_LAPS = START
 WAY, REACH, BACK, STATE, LEFT, RIGHT, TRIAL, AHEAD, AXIS, STEP, ROWS = range(12, 23)
-# Rows of what is known of each launch's curve: both ends, the period, a place of symmetry, the step to the next.
-FIRST, LAST, PERIOD, PLACE, NEXT, KNOWN = range(6)
 # How far back it is on a closed curve: both zeros lie within one period.
 CLOSED = -1.0
 # What a search has come to.
@@ -59,8 +58,8 @@ def launch(fns, n, s, p, known, work):  # type: ignore[no-untyped-def]
         state[j] = choose((way[j] != 0.0) & (low <= start[j]) & (start[j] <= high), SEEKING, NOWHERE)
     axis, next_axis, zero = s[AXIS, :n], s[STEP, :n], s[AHEAD, :n]
     for j in range(n):
-        step, away = known[NEXT, j], way[j] * (known[PLACE, j] - start[j])
-        first = choose(step > 0.0, away - step * whole_below(away / step), away)
+        step = known[NEXT, j]
+        first = to_axis(start[j], way[j], known[PLACE, j], step)
         # Released at rest it falls towards the axis, and comes to rest on the other side.
         mirrored = choose((w0[j] == 0.0) & (first > 0.0), 2.0 * first, trial[j])
         trial[j] = choose(mirrored < reach[j], mirrored, reach[j])

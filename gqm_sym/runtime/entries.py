@@ -10,7 +10,7 @@ from numba import types
 
 from gqm_sym.runtime.crossing import call_climb, call_frame, call_hold, call_rise
 from gqm_sym.runtime.doubledouble import reduce
-from gqm_sym.runtime.fused import whole_below
+from gqm_sym.runtime.fused import choose, whole_below
 from gqm_sym.runtime.integrands import TO_EQUILIBRIUM, speeds
 from gqm_sym.runtime.interface import FRAME_ROWS
 from gqm_sym.runtime.inversion import derivative, look_up_many, tabulate
@@ -52,14 +52,19 @@ def walk_on(fns, p, lam0, w0, direction, begin, reach, step):  # type: ignore[no
 
 
 @Inner
+def to_axis(start, way, place, step):  # type: ignore[no-untyped-def]
+    """How far the first axis of symmetry is ahead; of a lone one (``step`` 0) less than nothing where it is behind."""
+    away = way * (place - start)
+    return choose(step > 0.0, away - step * whole_below(away / step), away)
+
+
+@Inner
 def mirrored(fns, p, lam0, direction, reach, place, step):  # type: ignore[no-untyped-def]
     """How far a body released at rest comes in an even well, beyond the first axis ahead; 0 where walking must tell.
 
     V**2 rises all the way to the axis and falls all the way to the next, ``step`` farther (0: there is no other).
     """
-    ahead = direction * (place - lam0)
-    if step > 0.0:
-        ahead -= step * whole_below(ahead / step)
+    ahead = to_axis(lam0, float(direction), place, step)
     guess = 2.0 * ahead
     # NaN where no axis is known; next to one, or to where the body would just come over the next, walking is safer.
     if not (ahead > UNCLEAR * (fabs(lam0) + fabs(place)) and guess <= reach) or (step > 0.0 and ahead > ALL_BUT * step):

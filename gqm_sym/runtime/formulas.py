@@ -253,16 +253,23 @@ class Formulas:
             if chart.period:
                 return Domain(-math.inf, math.inf, chart.period)
             return Domain(chart.low, chart.high, 0.0, chart.ends)
-        assert self.domain_of is not None
         values = tuple(number.value for number in p)
-        low, high, period = self.domain_of(FLOATS, values)
-        place, step = self.axes_of(FLOATS, values) if self.axes_of and self.monotone else (None, None)
-        if period is not None:
-            low = high = None
+        low, high, period = self.ends(FLOATS, values)
+        place, step = self.axes(FLOATS, values) if self.monotone else (None, None)
         ends = (-math.inf if low is None else float(low), math.inf if high is None else float(high))
         return Domain(
             *ends, float(period or 0.0), place=math.nan if place is None else float(place), step=float(step or 0.0)
         )
+
+    def ends(self, op: Any, values: tuple[Any, ...]) -> tuple[Any, Any, Any]:
+        """Both ends of the parameter's range and its period, None where there is none: on a closed curve no ends."""
+        assert self.domain_of is not None
+        low, high, period = self.domain_of(op, values)
+        return (low, high, None) if period is None else (None, None, period)
+
+    def axes(self, op: Any, values: tuple[Any, ...]) -> tuple[Any, Any]:
+        """A place of symmetry and the distance to the next, None where there is none."""
+        return (None, None) if self.axes_of is None else self.axes_of(op, values)
 
     def functions(self, p: Given, launch: Launch) -> Functions:
         """The compiled functions with what they are given, and the exact problem of one launch."""

@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 from gqm_sym.errors import GQMError, InputError, ParameterError, SolutionError
 from gqm_sym.runtime import swift
-from gqm_sym.runtime.batch_search import FIRST, KNOWN, LAST, PERIOD
 from gqm_sym.runtime.batches import answer_batches
 from gqm_sym.runtime.entries import frame_at
 from gqm_sym.runtime.extremes import over_legs
@@ -229,18 +228,13 @@ def _answer(
 ) -> None:
     """Answer a part of all launches, laid out chunk by chunk."""
     addresses = tuple(formulas.addresses)
-    assert formulas.domain_of is not None
     for begin in range(part.start, part.stop, CHUNK):
         end = min(begin + CHUNK, part.stop)
         lam0, v0, direction, place, *p = (_laid_out(column, begin, end) for column in columns)
-        domain = np.empty((KNOWN, end - begin))
-        symmetry = (None, None) if formulas.axes_of is None else formulas.axes_of(ARRAYS, tuple(p))
-        known = (*formulas.domain_of(ARRAYS, tuple(p)), *symmetry)
+        domain = np.empty((swift.KNOWN, end - begin))
+        known = (*formulas.ends(ARRAYS, tuple(p)), *formulas.axes(ARRAYS, tuple(p)))
         for i, (value, missing) in enumerate(zip(known, (-inf, inf, 0.0, nan, 0.0), strict=True)):
             domain[i] = missing if value is None else value
-        closed = domain[PERIOD] > 0.0
-        np.copyto(domain[FIRST], -inf, where=closed)
-        np.copyto(domain[LAST], inf, where=closed)
         parameters = np.array(p)
         if formulas.each is not None and asked.asked in (swift.TIME, swift.PLACES):
             answer_batches(

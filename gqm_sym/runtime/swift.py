@@ -20,6 +20,8 @@ TIME, PLACES, SPEEDS, FORCES, ARRIVAL = range(5)
 # What each launch came to: answered; left to the exact problem; never repeats; not numbers; outside the domain;
 # never at the place asked for.
 DONE, HARD, PASSING, MEANINGLESS, OUTSIDE, ELSEWHERE = range(6)
+# Rows of what is known of each launch's curve: both ends, the period, a place of symmetry, the step to the next.
+FIRST, LAST, PERIOD, PLACE, NEXT, KNOWN = range(6)
 # Kinds of orbits.
 LIBRATION, CIRCULATION = range(2)
 
@@ -235,16 +237,15 @@ def answer_many(fns, ps, lam0s, v0s, ways, domains, monotone, places, asked, out
             continue
         out[k, 0] = out[k, 1] = np.nan
         p[:], lam0, v0 = ps[:, k], lam0s[k], v0s[k]
-        low, high, period = domains[0, k], domains[1, k], domains[2, k]
+        low, high, period = domains[FIRST, k], domains[LAST, k], domains[PERIOD, k]
+        mirror = domains[PLACE, k] if monotone else np.nan
         if not (isfinite(lam0) and isfinite(v0) and isfinite(p.sum())):
             reasons[k] = MEANINGLESS
             continue
         if not low <= lam0 <= high:
             reasons[k] = OUTSIDE
             continue
-        way, ahead, behind = ends(
-            fns, p, lam0, v0, int(ways[k]), low, high, period, domains[3, k] if monotone else np.nan, domains[4, k]
-        )
+        way, ahead, behind = ends(fns, p, lam0, v0, int(ways[k]), low, high, period, mirror, domains[NEXT, k])
         if way != 0 and ahead[0] == LIMIT and period > 0.0 and v0 > 0.0:
             kind, a, b, width = CIRCULATION, lam0, lam0 + way * period, way * period
         elif way != 0 and ahead[0] == TURN and behind[0] == TURN:
