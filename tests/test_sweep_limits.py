@@ -1,6 +1,7 @@
 """Sweep files at their limits: what takes too long to read, what is nowhere in a table, what has no value and why."""
 
 import os
+import time
 from pathlib import Path
 from typing import Any
 
@@ -56,6 +57,20 @@ def test_reading_has_a_budget(here: Path, monkeypatch: pytest.MonkeyPatch) -> No
     monkeypatch.setattr(reader, "SECONDS", -1.0)
     with pytest.raises(SpecFileError, match=r"^a\.yaml: reading: not done after -1 s of processor time; write fewer"):
         read_sweep(sweep("grid: {lam0: [1, 2]}"))
+
+
+def test_what_is_derived_and_emitted_is_not_reading(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Those stages have budgets of their own: a slow machine's emission is no mistake of the sweep file."""
+
+    def slowly(*arguments: Any, **names: Any) -> Any:
+        end = time.thread_time() + reader.SECONDS
+        while time.thread_time() <= end:
+            pass
+        return emit(*arguments, **names)
+
+    emit = reader.emit
+    monkeypatch.setattr(reader, "emit", slowly)
+    assert read_sweep(sweep("grid: {lam0: [1, 2]}")).quantities == ("period",)
 
 
 def test_a_sweep_may_give_the_other_side_back(here: Path) -> None:

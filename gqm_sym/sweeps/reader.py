@@ -78,7 +78,7 @@ class _Reader:
             for detail in error.errors(include_url=False, include_input=False):
                 explain(detail, self.tree, self.mistakes, model_at, spoilt=spoilt)
             return None
-        with apart():  # curve files and derivations have budgets of their own
+        with apart():  # curve files, derivations and emissions have budgets of their own
             found = self._curve(file.curve)
             if found is None:
                 return None
@@ -94,6 +94,8 @@ class _Reader:
         if self.mistakes:
             return None
         notes = {name: note.unit for name, note in spec.notes.items() if note.unit}
+        with apart():
+            module = emit(model, name=spec.name)
         swift = not (model.curve.charted or model.dissipation is not None or {"t_max", "contact"} & set(fixed))
         return Plan(
             title=file.title,
@@ -103,7 +105,7 @@ class _Reader:
             fixed=fixed,
             units={**{name: _si(unit) for name, unit in self.units.items()}, **notes},
             name=spec.name,
-            module=emit(model, name=spec.name),
+            module=module,
             origin=self.origin,
             part=SWIFT if swift else SOLVED,
         )
