@@ -13,6 +13,7 @@ from mpmath import mp, mpf
 import gqm_sym as gqm
 from gqm_sym.runtime import swift
 from gqm_sym.runtime.batches import answer_batches
+from gqm_sym.runtime.columns import pointers
 
 ModuleOf = Callable[[str], ModuleType]
 
@@ -27,27 +28,16 @@ def answered(
     p: list[float],
     domain: tuple[float, float, float],
     *,
-    timed: bool,
+    asked: int,
     mirrors: tuple[float, float] = (np.nan, 0.0),
     monotone: bool = False,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Answer launches by batches alone; nothing is said of symmetry, if not by ``mirrors``."""
-    lam0, v0, ways = (np.ascontiguousarray(a) for a in np.broadcast_arrays(np.asarray(lam0, float), v0, ways))
-    n = lam0.size
+    lines = [*np.broadcast_arrays(*(np.asarray(v, dtype=float) for v in (lam0, v0, ways, 0.0, *domain, *mirrors, *p)))]
+    n = lines[0].size
     out, reasons = np.full((n, 2), np.nan), np.full(n, swift.HARD, dtype=np.int8)
-    answer_batches(
-        module.MODEL.each.addresses(),
-        module.MODEL.each.held,
-        np.tile(p, (n, 1)).T.copy(),
-        lam0,
-        v0.astype(float),
-        ways.astype(float),
-        np.tile((*domain, *mirrors), (n, 1)).T.copy(),
-        monotone,
-        timed,
-        out,
-        reasons,
-    )
+    each = module.MODEL.each
+    answer_batches(each.addresses(), each.held, pointers(lines), monotone, asked, out, reasons)
     return out, reasons
 
 
@@ -66,9 +56,8 @@ def test_every_pendulum_away_from_the_top_is_answered(count: int, said: str, mod
     """Whatever the number of launches: half periods of all, within a few last places."""
     amplitude = np.linspace(0.01, 2.6, count)
     p = [1.0, 9.81, 1.0]
-    out, reasons = answered(module_of("circle"), amplitude, 0.0, 1, p, CIRCLE, timed=True, **SAID[said])
+    out, reasons = answered(module_of("circle"), amplitude, 0.0, 1, p, CIRCLE, asked=swift.HALF, **SAID[said])
     assert (reasons == swift.DONE).all()
-    assert (out[:, 1] == swift.LIBRATION).all()
     for value, a in zip(out[:, 0], amplitude, strict=True):
         with mp.workdps(40):
             truth = 2 * mp.ellipk(mp.sin(mpf(float(a)) / 2) ** 2) / mp.sqrt(mpf("9.81"))
@@ -84,11 +73,11 @@ def test_what_is_said_of_symmetry_changes_nothing(way: int, said: str, module_of
     place, reach = rng.uniform(-1.5, 1.5, 300), rng.uniform(1.6, 2.8, 300)
     v0 = np.sqrt(2 * 9.81 * (np.cos(place) - np.cos(reach)))
     launch = (lowest + place, v0, way, [1.0, 9.81, 1.0], CIRCLE)
-    ends, why = answered(module_of("circle"), *launch, timed=False, **SAID[said])
+    ends, why = answered(module_of("circle"), *launch, asked=swift.PLACES, **SAID[said])
     done = why == swift.DONE
     assert done.all() if said == "all" else done.mean() > 0.8
     assert ends[done] == pytest.approx(np.column_stack([lowest - reach, lowest + reach])[done], rel=4e-15, abs=4e-15)
-    times, why = answered(module_of("circle"), *launch, timed=True, **SAID[said])
+    times, why = answered(module_of("circle"), *launch, asked=swift.HALF, **SAID[said])
     assert ((why == swift.DONE) == done).all()
     for value, a in zip(times[done, 0], 0.5 * (ends[done, 1] - ends[done, 0]), strict=True):
         with mp.workdps(40):
@@ -103,15 +92,16 @@ def test_laps(way: int, said: str, module_of: ModuleOf) -> None:
     places = np.linspace(-3.0, 3.0, 13)
     v0 = np.sqrt(8.0**2 - 2 * 9.81 * (1 - np.cos(places)))
     p = [1.0, 9.81, 1.0]
-    out, reasons = answered(module_of("circle"), places, v0, way, p, CIRCLE, timed=True, **SAID[said])
+    out, reasons = answered(module_of("circle"), places, v0, way, p, CIRCLE, asked=swift.WHOLE, **SAID[said])
     assert (reasons == swift.DONE).all()
-    assert (out[:, 1] == swift.CIRCULATION).all()
     with mp.workdps(40):
         truth = float(4 * mp.ellipk(4 * mpf("9.81") / 64) / 8)
     # Speeds are rounded, and the loop time follows the energy they mean.
     assert out[:, 0] == pytest.approx(truth, rel=2e-15)
-    ends = answered(module_of("circle"), places, v0, way, p, CIRCLE, timed=False, **SAID[said])
+    ends = answered(module_of("circle"), places, v0, way, p, CIRCLE, asked=swift.PLACES, **SAID[said])
     assert (ends[1] == swift.PASSING).all()
+    halves = answered(module_of("circle"), places, v0, way, p, CIRCLE, asked=swift.HALF, **SAID[said])
+    assert (halves[1] == swift.PASSING).all()
 
 
 def test_barriers_are_not_jumped(tmp_path: Path) -> None:
@@ -154,7 +144,7 @@ def test_units_decide_nothing(strength: float, module_of: ModuleOf) -> None:
     """Under another gravity the same swings are answered and the same are left, those next to the top."""
     lam0 = np.linspace(0.1, np.pi - 0.01, 40)
     one, other = (
-        answered(module_of("circle"), lam0, 0.0, 1, [1.0, g, 1.0], CIRCLE, timed=True) for g in (1.0, strength)
+        answered(module_of("circle"), lam0, 0.0, 1, [1.0, g, 1.0], CIRCLE, asked=swift.HALF) for g in (1.0, strength)
     )
     assert set(one[1]) == {swift.DONE, swift.HARD}
     assert (other[1] == one[1]).all()
@@ -166,7 +156,7 @@ def test_what_cannot_be_proved_is_left(said: str, module_of: ModuleOf) -> None:
     """Launches at the top, next to it, and what is not a number."""
     lam0 = [np.pi, np.pi - 1e-9, np.nan, 0.3]
     p = [1.0, 9.81, 1.0]
-    out, reasons = answered(module_of("circle"), lam0, 0.0, 1, p, CIRCLE, timed=True, **SAID[said])
+    out, reasons = answered(module_of("circle"), lam0, 0.0, 1, p, CIRCLE, asked=swift.HALF, **SAID[said])
     assert list(reasons) == [swift.HARD, swift.HARD, swift.HARD, swift.DONE]
     assert np.isnan(out[:3, 0]).all()
 

@@ -11,7 +11,7 @@ from gqm_sym.runtime.entries import to_axis
 from gqm_sym.runtime.fused import choose, whole_below
 from gqm_sym.runtime.jit import Inner
 from gqm_sym.runtime.search import UNRESOLVED
-from gqm_sym.runtime.swift import FIRST, LAST, LIBRATION, NEXT, PERIOD, PLACE
+from gqm_sym.runtime.swift import LIBRATION
 
 # Rows of a batch: which launch, offsets of both ends from it, both ends; what the quadrature keeps; the launch's place
 # and V**2, which it needs of laps alone; what the search needs: which way it goes and how far at most, and how far the
@@ -39,9 +39,10 @@ def any_is(row, value):  # type: ignore[no-untyped-def]
 
 @Inner
 def launch(fns, n, s, p, known, work):  # type: ignore[no-untyped-def]
-    """Set up the search ahead: a body released at rest goes where it falls."""
+    """Set up the search ahead: a body released at rest goes where it falls. ``known`` has the columns FIRST to NEXT."""
     start, w0, way, state = s[START, :n], s[SPEED, :n], s[WAY, :n], s[STATE, :n]
     reach, back, trial = s[REACH, :n], s[BACK, :n], s[TRIAL, :n]
+    lows, highs, periods, places, steps = known[0, :n], known[1, :n], known[2, :n], known[3, :n], known[4, :n]
     if any_is(w0, 0.0):
         none, rows = work[0, :n], work[1:4].reshape(-1)[: 3 * n].reshape(3, n)
         none[:] = 0.0
@@ -50,7 +51,7 @@ def launch(fns, n, s, p, known, work):  # type: ignore[no-untyped-def]
             falls = (rows[2, j] < 0.0) * 1.0 - (rows[2, j] > 0.0) * 1.0
             way[j] = choose(w0[j] == 0.0, falls, way[j])
     for j in range(n):
-        low, high, period = known[FIRST, j], known[LAST, j], known[PERIOD, j]
+        low, high, period = lows[j], highs[j], periods[j]
         forwards, closed, length = way[j] > 0.0, period > 0.0, high - low
         reach[j] = choose(closed, period, choose(forwards, high - start[j], start[j] - low))
         back[j] = choose(closed, CLOSED, choose(forwards, start[j] - low, high - start[j]))
@@ -58,8 +59,8 @@ def launch(fns, n, s, p, known, work):  # type: ignore[no-untyped-def]
         state[j] = choose((way[j] != 0.0) & (low <= start[j]) & (start[j] <= high), SEEKING, NOWHERE)
     axis, next_axis, zero = s[AXIS, :n], s[STEP, :n], s[AHEAD, :n]
     for j in range(n):
-        step = known[NEXT, j]
-        first = to_axis(start[j], way[j], known[PLACE, j], step)
+        step = steps[j]
+        first = to_axis(start[j], way[j], places[j], step)
         # Released at rest it falls towards the axis, and comes to rest on the other side.
         mirrored = choose((w0[j] == 0.0) & (first > 0.0), 2.0 * first, trial[j])
         trial[j] = choose(mirrored < reach[j], mirrored, reach[j])

@@ -42,6 +42,7 @@ from gqm_sym.runtime.batch_search import (
     seek,
     turn_round,
 )
+from gqm_sym.runtime.columns import DIRECTION, FIRST, LAM0, PARAMETERS, V0, fill_row
 from gqm_sym.runtime.crossing import call_bend_each, call_orbit_each, call_rise_each
 from gqm_sym.runtime.fused import choose
 from gqm_sym.runtime.jit import Inner, entry
@@ -52,13 +53,14 @@ from gqm_sym.runtime.swift import (
     FROM_A,
     FROM_B,
     HARD,
-    KNOWN,
     LEAST_BALANCE,
     LIBRATION,
     MOST_NODES,
     PASSING,
+    PLACES,
     SAME,
     SHARES,
+    WHOLE,
 )
 
 # Orbits of a batch: its arrays stay in the first-level cache. Orbits of a full register, at most.
@@ -74,9 +76,6 @@ NEIGHBOURING = 1.999
 FORESEEN, FALLING = 3e-17, 7e-5
 # What becomes of an orbit after a level of the rule.
 GOES_ON, SETTLED, LOST = 0.0, 1.0, 2.0
-
-_LINE = types.float64[::1]
-_ROWS = types.float64[:, ::1]
 
 
 @Inner
@@ -118,15 +117,6 @@ def part(state, found, others):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def fill_up(given, row):  # type: ignore[no-untyped-def]
-    """Copy what is given into a row, and repeat the last of it to the row's end."""
-    for j in range(given.size):
-        row[j] = given[j]
-    for j in range(given.size, row.size):
-        row[j] = row[j - 1]
-
-
-@Inner
 def fill(fns, kind, n, node, s, p, work):  # type: ignore[no-untyped-def]
     """The time per share of the orbit at one node of the rule, and the extremes so far of V**2's regular factor."""
     da, db, rates, rows = work[0, :n], work[1, :n], work[2, :n], work[3:6].reshape(-1)
@@ -157,8 +147,8 @@ def fill(fns, kind, n, node, s, p, work):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def times(fns, kind, mirrored, n, s, flat, count, held, chosen, work, out, reasons):  # type: ignore[no-untyped-def]
-    """Half periods or loop times by the trapezoidal rule, into the rows of ``out`` that belong to the orbits.
+def times(fns, kind, mirrored, n, s, flat, count, held, chosen, work, asked, out, reasons):  # type: ignore[no-untyped-def]
+    """Half periods, periods or loop times by the trapezoidal rule, into the rows of ``out`` that belong to the orbits.
 
     Nodes are doubled until the next change is foreseen to be below rounding; orbits for which that is so drop out, and
     those whose V**2 all but vanishes. Of orbits that are ``mirrored`` only nodes up to the middle are looked at.
@@ -196,10 +186,10 @@ def times(fns, kind, mirrored, n, s, flat, count, held, chosen, work, out, reaso
             settled = (before <= FALLING) & ((change <= SAME) | (change * fall * fall <= FORESEEN))
             clear = s[LOW, j] > LEAST_BALANCE * s[HIGH, j]
             verdict[j] = choose(clear, choose(settled, SETTLED, GOES_ON), LOST)
-        kept = 0
+        kept, whole = 0, 2.0 if asked == WHOLE and kind == LIBRATION else 1.0
         for j in range(n):  # without branches, for none could be foreseen
             k, settled = int(s[WHO, j]), verdict[j] == SETTLED
-            out[k, 0], out[k, 1] = choose(settled, s[VALUE, j], nan), kind
+            out[k, 0] = choose(settled, whole * s[VALUE, j], nan)
             reasons[k] = DONE if settled else HARD
             chosen[kept] = j
             kept += verdict[j] == GOES_ON
@@ -210,7 +200,7 @@ def times(fns, kind, mirrored, n, s, flat, count, held, chosen, work, out, reaso
 
 
 @Inner
-def settle(fns, kind, mirrored, known, n, s, flat, t, spare, count, held, chosen, others, work, timed, out, reasons):  # type: ignore[no-untyped-def]
+def settle(fns, kind, mirrored, known, n, s, flat, t, spare, count, held, chosen, others, work, asked, out, reasons):  # type: ignore[no-untyped-def]
     """Prove orbits of one kind that are not ``known``, and answer for those that are proved.
 
     ``t`` and ``spare`` take the others meanwhile.
@@ -222,15 +212,16 @@ def settle(fns, kind, mirrored, known, n, s, flat, t, spare, count, held, chosen
             proved, left = part(s[STATE, :n], chosen, others)
         rest = gather(s, flat, count, n, others, left, t, spare, ROWS)
         m = shrink(s, flat, count, n, chosen, proved, LASTING)
-        if m and timed:
-            times(fns, kind, mirrored, m, s, flat, count, held if kind == LIBRATION else 0, chosen, work, out, reasons)
-        elif kind == LIBRATION:
+        if asked != WHOLE and kind == CIRCULATION:
+            for j in range(m):
+                reasons[int(s[WHO, j])] = PASSING
+        elif asked == PLACES:
             for j in range(m):
                 k = int(s[WHO, j])
                 out[k, 0], out[k, 1], reasons[k] = s[A, j], s[B, j], DONE
-        else:
-            for j in range(m):
-                reasons[int(s[WHO, j])] = PASSING
+        elif m:
+            fixed = held if kind == LIBRATION else 0
+            times(fns, kind, mirrored, m, s, flat, count, fixed, chosen, work, asked, out, reasons)
         if left == 0:
             return
         n, s, flat, t, spare = rest, t, spare, s, flat
@@ -238,42 +229,43 @@ def settle(fns, kind, mirrored, known, n, s, flat, t, spare, count, held, chosen
 
 @entry(
     types.void(
-        *(types.UniTuple(types.int64, 4), types.int64, _ROWS, _LINE, _LINE, _LINE, _ROWS, types.boolean, types.boolean),
-        *(_ROWS, types.int8[::1]),
+        *(types.UniTuple(types.int64, 4), types.int64, types.int64[:, ::1], types.boolean, types.int64),
+        *(types.float64[:, ::1], types.int8[::1]),
     ),
     nogil=True,
 )
-def answer_batches(fns, held, ps, lam0s, v0s, ways, domains, monotone, timed, out, reasons):  # type: ignore[no-untyped-def]
+def answer_batches(fns, held, columns, monotone, asked, out, reasons):  # type: ignore[no-untyped-def]
     """Fill rows of ``out`` and of ``reasons`` for the launches that this can answer, as `swift.answer_many` does.
 
     The others keep their reason. ``monotone`` says that V**2 rises or falls all the way between axes of symmetry and
-    that ds is nowhere 0; ``timed`` asks for times, else for turning points.
+    that ds is nowhere 0; ``asked`` is HALF, WHOLE or PLACES.
     """
-    count = ps.shape[0]
+    count = columns.shape[0] - PARAMETERS
     rows = count + held
     s, t, u = np.empty((ROWS, BATCH)), np.empty((ROWS, BATCH)), np.empty((ROWS, BATCH))
     flat, spare, other = np.empty(rows * BATCH), np.empty(rows * BATCH), np.empty(rows * BATCH)
-    known, work = np.empty((KNOWN, BATCH)), np.empty((13, BATCH))
+    known, work = np.empty((PARAMETERS - FIRST, BATCH)), np.empty((13, BATCH))
     chosen, others = np.empty(BATCH, dtype=np.int64), np.empty(BATCH, dtype=np.int64)
-    for begin in range(0, lam0s.size, BATCH):
-        m = min(BATCH, lam0s.size - begin)
+    for begin in range(0, reasons.size, BATCH):
+        m = min(BATCH, reasons.size - begin)
         n = -(-m // LANES) * LANES
         p = flat[: count * n].reshape(count, n)
-        for row in range(KNOWN):
-            fill_up(domains[row, begin : begin + m], known[row, :n])
-        for row in range(count):
-            fill_up(ps[row, begin : begin + m], p[row])
-        fill_up(lam0s[begin : begin + m], s[START, :n])
-        fill_up(v0s[begin : begin + m], s[SPEED, :n])
-        fill_up(ways[begin : begin + m], s[WAY, :n])
+        for row in range(PARAMETERS - FIRST):
+            fill_row(columns, FIRST + row, begin, m, known[row, :n])
+        who, start, speed, way, total = s[WHO, :n], s[START, :n], s[SPEED, :n], s[WAY, :n], work[0, :n]
+        fill_row(columns, LAM0, begin, m, start)
+        fill_row(columns, V0, begin, m, speed)
+        fill_row(columns, DIRECTION, begin, m, way)
         for j in range(n):
-            v0 = s[SPEED, j]
-            total = s[START, j] + v0
-            for row in range(count):
-                total += p[row, j]
-            s[WHO, j], s[SPEED, j] = begin + min(j, m - 1), v0 * v0
-            s[WAY, j] = choose(total - total == 0.0, s[WAY, j], 0.0)
-        out[begin : begin + m] = nan
+            who[j], total[j] = begin + min(j, m - 1), start[j] + speed[j]
+            speed[j] *= speed[j]
+        for row in range(count):
+            given = p[row]
+            fill_row(columns, PARAMETERS + row, begin, m, given)
+            for j in range(n):
+                total[j] += given[j]
+        for j in range(n):
+            way[j] = choose(total[j] - total[j] == 0.0, way[j], 0.0)
         laps = 0
         for ahead in (True, False):
             p = flat[: count * n].reshape(count, n)
@@ -326,7 +318,7 @@ def answer_batches(fns, held, ps, lam0s, v0s, ways, domains, monotone, timed, ou
                     chosen,
                     others,
                     work,
-                    timed,
+                    asked,
                     out,
                     reasons,
                 )

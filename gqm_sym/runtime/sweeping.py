@@ -3,7 +3,7 @@
 Most orbits are answered by one compiled loop (`swift`); those that it leaves are solved one by one, as `solve` does.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from math import e, inf, isfinite, nan, pi
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from gqm_sym.errors import GQMError, InputError, ParameterError, SolutionError
 from gqm_sym.runtime import swift
 from gqm_sym.runtime.batches import answer_batches
+from gqm_sym.runtime.columns import lay_out, pointers
 from gqm_sym.runtime.entries import frame_at
 from gqm_sym.runtime.extremes import over_legs
 from gqm_sym.runtime.formulas import CONTACTS
@@ -33,8 +34,8 @@ ARRAYS = SimpleNamespace(
     mpf=float,
 )
 
-# Launches a thread is worth starting for, and those whose parameters are laid out at a time.
-LEAST, CHUNK = 2**9, 2**14
+# Launches a thread is worth starting for, and those that are laid out at a time.
+LEAST, CHUNK = 2**9, 2**16
 
 # What the compiled loop is never asked.
 NEVER = -1
@@ -65,9 +66,10 @@ class Sweep(NamedTuple):
 
 
 class Quantity(NamedTuple):
-    """One quantity: what is asked of the compiled loop, the columns of its answer, and of one motion."""
+    """One quantity: what is asked of the compiled loop, the numbers it answers, which of them, and of one motion."""
 
     asked: int
+    width: int
     columns: slice | int
     of_motion: Callable[[Any, Any], Any]
 
@@ -121,16 +123,16 @@ def _force(motion: Any, phi: Array) -> Array:
 
 
 QUANTITIES = {
-    "half_period": Quantity(swift.TIME, 0, lambda motion, _: motion.half_period),
-    "period": Quantity(swift.TIME, 0, lambda motion, _: motion.period),
-    "turning_points": Quantity(swift.PLACES, slice(0, 2), _turning_points),
-    "v_min": Quantity(swift.SPEEDS, 0, _extreme(_speed, "speed", -1)),
-    "v_max": Quantity(swift.SPEEDS, 1, _extreme(_speed, "speed", 1)),
-    "normal_force_min": Quantity(swift.FORCES, 0, _extreme(_force, "force", -1)),
-    "normal_force_max": Quantity(swift.FORCES, 1, _extreme(_force, "force", 1)),
-    "time_at": Quantity(swift.ARRIVAL, 0, lambda motion, place: motion.time_at(place)),
-    "t_end": Quantity(NEVER, 0, lambda motion, _: motion.t_end if isfinite(motion.t_end) else nan),
-    "rest_position": Quantity(NEVER, 0, _rest_position),
+    "half_period": Quantity(swift.HALF, 1, 0, lambda motion, _: motion.half_period),
+    "period": Quantity(swift.WHOLE, 1, 0, lambda motion, _: motion.period),
+    "turning_points": Quantity(swift.PLACES, 2, slice(0, 2), _turning_points),
+    "v_min": Quantity(swift.SPEEDS, 2, 0, _extreme(_speed, "speed", -1)),
+    "v_max": Quantity(swift.SPEEDS, 2, 1, _extreme(_speed, "speed", 1)),
+    "normal_force_min": Quantity(swift.FORCES, 2, 0, _extreme(_force, "force", -1)),
+    "normal_force_max": Quantity(swift.FORCES, 2, 1, _extreme(_force, "force", 1)),
+    "time_at": Quantity(swift.ARRIVAL, 1, 0, lambda motion, place: motion.time_at(place)),
+    "t_end": Quantity(NEVER, 1, 0, lambda motion, _: motion.t_end if isfinite(motion.t_end) else nan),
+    "rest_position": Quantity(NEVER, 1, 0, _rest_position),
 }
 
 
@@ -158,16 +160,14 @@ def sweep(
     columns = [_column(value, name) for value, name in zip(sources, names, strict=True)]
     _check(formulas, dict(zip(names, columns, strict=True)))
     shape = broadcast_shape(dict(zip(names, columns, strict=True)))
-    columns = [np.broadcast_to(column, shape) for column in columns]
     _check_least(formulas, dict(zip(names, columns, strict=True)))
+    plain, columns = columns, [np.broadcast_to(column, shape) for column in columns]
     size = columns[0].size
-    out, reasons = np.full((size, 2), nan), np.full(size, swift.HARD, dtype=np.int8)
+    out, reasons = np.full((size, asked.width), nan), np.full(size, swift.HARD, dtype=np.int8)
     if is_swift(formulas, asked, t_max, contact):
-        spread(lambda part: _answer(formulas, asked, columns, part, out, reasons), size, LEAST)
-        if quantity == "half_period":
-            _drop(out, reasons, (reasons == swift.DONE) & (out[:, 1] == swift.CIRCULATION))
-        elif quantity == "period":
-            out[out[:, 1] == swift.LIBRATION, 0] *= 2.0
+        known = [np.broadcast_to(value, shape) for value in _known(formulas, plain[4:])]
+        rows = [*columns[:4], *known, *columns[4:]]
+        spread(lambda part: _answer(formulas, asked, rows, part, out, reasons), size, LEAST)
     values = out[:, asked.columns]
     for k in np.flatnonzero(reasons == swift.HARD):
         here = [s if np.ndim(s) == 0 else float(c.flat[k]) for s, c in zip(sources, columns, strict=True)]
@@ -223,59 +223,24 @@ def _check_least(formulas: "Formulas", columns: dict[str, Array]) -> None:
             raise ParameterError(f"{name}: must be at least {least}")
 
 
+def _known(formulas: "Formulas", p: list[Array]) -> Iterator[Array]:
+    """What is known of each launch's curve, in the order of `columns`."""
+    known = (*formulas.ends(ARRAYS, tuple(p)), *formulas.axes(ARRAYS, tuple(p)))
+    for value, missing in zip(known, (-inf, inf, 0.0, nan, 0.0), strict=True):
+        yield np.asarray(missing if value is None else value, dtype=np.float64)
+
+
 def _answer(
     formulas: "Formulas", asked: Quantity, columns: list[Array], part: slice, out: Array, reasons: NDArray[np.int8]
 ) -> None:
-    """Answer a part of all launches, laid out chunk by chunk."""
-    addresses = tuple(formulas.addresses)
+    """Answer a part of all launches."""
     for begin in range(part.start, part.stop, CHUNK):
-        end = min(begin + CHUNK, part.stop)
-        lam0, v0, direction, place, *p = (_laid_out(column, begin, end) for column in columns)
-        domain = np.empty((swift.KNOWN, end - begin))
-        known = (*formulas.ends(ARRAYS, tuple(p)), *formulas.axes(ARRAYS, tuple(p)))
-        for i, (value, missing) in enumerate(zip(known, (-inf, inf, 0.0, nan, 0.0), strict=True)):
-            domain[i] = missing if value is None else value
-        parameters = np.array(p)
-        if formulas.each is not None and asked.asked in (swift.TIME, swift.PLACES):
-            answer_batches(
-                formulas.each.addresses(),
-                formulas.each.held,
-                parameters,
-                lam0,
-                v0,
-                direction,
-                domain,
-                formulas.monotone,
-                asked.asked == swift.TIME,
-                out[begin:end],
-                reasons[begin:end],
-            )
-        swift.answer_many(
-            addresses,
-            parameters,
-            lam0,
-            v0,
-            direction,
-            domain,
-            formulas.monotone,
-            place,
-            asked.asked,
-            out[begin:end],
-            reasons[begin:end],
-        )
-
-
-def _laid_out(column: Array, begin: int, end: int) -> Array:
-    """Elements of a broadcast column, one after the other."""
-    if not any(column.strides):
-        return np.full(end - begin, column.flat[0])
-    if column.flags.c_contiguous:
-        return column.reshape(-1)[begin:end].copy()  # the compiled loop takes no read-only arrays
-    return np.ascontiguousarray(column.flat[begin:end])
-
-
-def _drop(out: Array, reasons: NDArray[np.int8], which: NDArray[np.bool_]) -> None:
-    out[which], reasons[which] = nan, swift.PASSING
+        chunk = slice(begin, min(begin + CHUNK, part.stop))
+        lines = lay_out(columns, chunk.start, chunk.stop)
+        answers = (pointers(lines), formulas.monotone, asked.asked, out[chunk], reasons[chunk])
+        if formulas.each is not None and asked.asked in (swift.HALF, swift.WHOLE, swift.PLACES):
+            answer_batches(formulas.each.addresses(), formulas.each.held, *answers)
+        swift.answer_many(tuple(formulas.addresses), *answers)
 
 
 def _solved(formulas: "Formulas", asked: Quantity, here: list[Any], t_max: Any, contact: str) -> tuple[Any, int]:

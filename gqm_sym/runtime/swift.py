@@ -9,6 +9,7 @@ from math import fabs, inf, isfinite, pi, sqrt
 import numpy as np
 from numba import types
 
+from gqm_sym.runtime.columns import DIRECTION, FIRST, LAM0, LAST, NEXT, PARAMETERS, PERIOD, PLACE, TARGET, V0, element
 from gqm_sym.runtime.crossing import call_bend, call_frame, call_rise
 from gqm_sym.runtime.entries import ends
 from gqm_sym.runtime.jit import Inner, entry
@@ -16,12 +17,10 @@ from gqm_sym.runtime.panels import FLOOR, REGULAR, TURN_TURN, lay, read_off
 from gqm_sym.runtime.search import LIMIT, TURN
 
 # What is asked of each launch.
-TIME, PLACES, SPEEDS, FORCES, ARRIVAL = range(5)
+HALF, WHOLE, PLACES, SPEEDS, FORCES, ARRIVAL = range(6)
 # What each launch came to: answered; left to the exact problem; never repeats; not numbers; outside the domain;
 # never at the place asked for.
 DONE, HARD, PASSING, MEANINGLESS, OUTSIDE, ELSEWHERE = range(6)
-# Rows of what is known of each launch's curve: both ends, the period, a place of symmetry, the step to the next.
-FIRST, LAST, PERIOD, PLACE, NEXT, KNOWN = range(6)
 # Kinds of orbits.
 LIBRATION, CIRCULATION = range(2)
 
@@ -219,33 +218,32 @@ def extreme(fns, p, kind, lam0, w0, a, b, width, asked, sign, work):  # type: ig
 
 @entry(
     types.void(
-        *(_ADDRESSES, _ROWS, _LINE, _LINE, _LINE, _ROWS, types.boolean, _LINE, types.int64),
-        *(_ROWS, types.int8[::1]),
+        *(_ADDRESSES, types.int64[:, ::1], types.boolean, types.int64, _ROWS, types.int8[::1]),
     ),
     nogil=True,
 )
-def answer_many(fns, ps, lam0s, v0s, ways, domains, monotone, places, asked, out, reasons):  # type: ignore[no-untyped-def]
+def answer_many(fns, columns, monotone, asked, out, reasons):  # type: ignore[no-untyped-def]
     """Fill a row of ``out`` and of ``reasons`` for each launch that is HARD so far.
 
-    ``ps`` has a row for each parameter, ``domains`` for both ends, the period, and a place of symmetry with
-    the step to the next (`batches.answer_batches`). A row of ``out`` holds both turning
-    points (PLACES), the least and the greatest (SPEEDS, FORCES), or the half period or loop time and the kind (TIME).
+    ``columns`` are launches as `columns.pointers` gives them; V**2 is ``monotone`` between the axes of symmetry. A row
+    of ``out`` holds both turning points (PLACES), the least and the greatest (SPEEDS, FORCES), or a time.
     """
-    work, rates, p = np.empty((4, MOST_NODES)), np.empty(MOST_NODES), np.empty(ps.shape[0])
-    for k in range(lam0s.size):
+    work, rates, p = np.empty((4, MOST_NODES)), np.empty(MOST_NODES), np.empty(columns.shape[0] - PARAMETERS)
+    for k in range(reasons.size):
         if reasons[k] != HARD:
             continue
-        out[k, 0] = out[k, 1] = np.nan
-        p[:], lam0, v0 = ps[:, k], lam0s[k], v0s[k]
-        low, high, period = domains[FIRST, k], domains[LAST, k], domains[PERIOD, k]
-        mirror = domains[PLACE, k] if monotone else np.nan
+        for row in range(p.size):
+            p[row] = element(columns, PARAMETERS + row, k)
+        lam0, v0, way = element(columns, LAM0, k), element(columns, V0, k), int(element(columns, DIRECTION, k))
+        low, high, period = element(columns, FIRST, k), element(columns, LAST, k), element(columns, PERIOD, k)
+        mirror, step = element(columns, PLACE, k) if monotone else np.nan, element(columns, NEXT, k)
         if not (isfinite(lam0) and isfinite(v0) and isfinite(p.sum())):
             reasons[k] = MEANINGLESS
             continue
         if not low <= lam0 <= high:
             reasons[k] = OUTSIDE
             continue
-        way, ahead, behind = ends(fns, p, lam0, v0, int(ways[k]), low, high, period, mirror, domains[NEXT, k])
+        way, ahead, behind = ends(fns, p, lam0, v0, way, low, high, period, mirror, step)
         if way != 0 and ahead[0] == LIMIT and period > 0.0 and v0 > 0.0:
             kind, a, b, width = CIRCULATION, lam0, lam0 + way * period, way * period
         elif way != 0 and ahead[0] == TURN and behind[0] == TURN:
@@ -255,21 +253,20 @@ def answer_many(fns, ps, lam0s, v0s, ways, domains, monotone, places, asked, out
         else:
             reasons[k] = HARD
             continue
+        if kind == CIRCULATION and asked in (HALF, PLACES):
+            reasons[k] = PASSING
+            continue
         reasons[k] = DONE
         w0 = v0 * v0
-        if asked == TIME:
+        if asked in (HALF, WHOLE):
             value = time_once(fns, p, kind, lam0, w0, a, b, width, work, rates)
             if not value > 0.0:
                 value = time_adaptively(fns, p, kind, lam0, w0, a, b)
-            out[k, 0], out[k, 1] = value, kind
+            out[k, 0] = 2.0 * value if asked == WHOLE and kind == LIBRATION else value
         elif asked == PLACES:
-            if kind == CIRCULATION:
-                reasons[k] = PASSING
-            else:
-                out[k, 0], out[k, 1] = a, b
-            continue
+            out[k, 0], out[k, 1] = a, b
         elif asked == ARRIVAL:
-            out[k, 0] = arrival(fns, p, kind, way, lam0, w0, a, b, places[k])
+            out[k, 0] = arrival(fns, p, kind, way, lam0, w0, a, b, element(columns, TARGET, k))
             if out[k, 0] == inf:
                 out[k, 0], reasons[k] = np.nan, ELSEWHERE
                 continue
