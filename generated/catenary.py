@@ -1,5 +1,5 @@
 # Made by gqm-gen for "catenary". Do not edit: change its declaration and generate again.
-# interface 4, input cd1fa4541ae4, body e2107640897d
+# interface 5, input cd1fa4541ae4, body c8fcf6ac7134
 """Bead on a hanging chain
 
 x              = x
@@ -24,7 +24,7 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=4)
+compiled = compiler(__file__, interface=5)
 
 from gqm_sym.runtime import (
     BEND,
@@ -35,6 +35,8 @@ from gqm_sym.runtime import (
     FRAME,
     RISE,
     RISE_EACH,
+    SWING_EACH,
+    TOP_EACH,
     Addresses,
     Each,
     ExactFormulas,
@@ -152,6 +154,42 @@ def bend_each(n, lows, highs, left, right, p, out):
         out[1, i] = cosh(_t1)
 
 
+@compiled(SWING_EACH, later=True)
+def swing_each(n, fall, rise, p, out):
+    """(dt/du)**2 where sin(u)**2 = fall = 1 - rise, and what that is divided by, each for an orbit of its own."""
+    p, out = carray(p, (7, n)), carray(out, (2, n))
+    for i in range(n):
+        c = p[0, i]
+        g = p[1, i]
+        top = p[3, i]
+        top_lack = p[4, i]
+        top_apart = p[5, i]
+        stretch = p[6, i]
+        scale = 1/(fall*top_lack + rise)**2
+        _t0 = fall*top_apart + rise
+        _t1 = fall*top
+        out[0, i] = c*(4*_t1*scale + scale*(_t1 + 1)**2)**2/(_t0*g*stretch)
+        out[1, i] = 4*_t0*c*g
+
+
+@compiled(TOP_EACH, later=True)
+def top_each(n, halves, p, out):
+    """What is the same all along a swing: ``swing_each`` finds it behind the run-time parameters."""
+    halves, p, out = carray(halves, n), carray(p, (3, n)), carray(out, (4, n))
+    for i in range(n):
+        c = p[0, i]
+        half = halves[i]
+        _t0 = half/c
+        _t1 = _t0/4
+        _t2 = cosh(_t1)
+        _t3 = 1/_t2**2
+        _t4 = _t2**4
+        out[0, i] = _t3*sinh(_t1)**2
+        out[1, i] = _t3
+        out[2, i] = cosh(_t0/2)/_t4
+        out[3, i] = _t4
+
+
 @compiled(BOUNDS)
 def bounds(lo, hi, p, out):
     """Bounds of the climb's slope and of ds/dx for lo <= x <= hi."""
@@ -241,7 +279,7 @@ MODEL = Formulas(
     parameters=PARAMETERS,
     positive=('c',),
     addresses=Addresses(frame.address, climb.address, rise.address, bend.address, bounds.address),
-    each=Each(rise=rise_each, bend=bend_each, bounds=bounds_each),
+    each=Each(rise=rise_each, bend=bend_each, swing=swing_each, top=top_each, bounds=bounds_each, top_held=4),
     domain_of=exact_domain,
     axes_of=exact_axes,
     monotone=True,

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "circle". Do not edit: change its declaration and generate again.
-# interface 4, input 6c3a741d3b21, body 27b47e734c11
+# interface 5, input 6c3a741d3b21, body 2fa88406c72d
 """Bead that loops round a circle
 
 x              = L*sin(theta)
@@ -24,7 +24,7 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=4)
+compiled = compiler(__file__, interface=5)
 
 from gqm_sym.runtime import (
     BEND,
@@ -36,6 +36,8 @@ from gqm_sym.runtime import (
     ORBIT_EACH,
     RISE,
     RISE_EACH,
+    SWING_EACH,
+    TOP_EACH,
     Addresses,
     Each,
     ExactFormulas,
@@ -154,6 +156,31 @@ def orbit_each(n, lows, highs, p, out):
         out[1, i] = cos(_t0)
 
 
+@compiled(SWING_EACH, later=True)
+def swing_each(n, fall, rise, p, out):
+    """(dt/du)**2 where sin(u)**2 = fall = 1 - rise, and what that is divided by, each for an orbit of its own."""
+    p, out = carray(p, (5, n)), carray(out, (2, n))
+    for i in range(n):
+        L = p[0, i]
+        g = p[1, i]
+        top_apart = p[3, i]
+        stretch = p[4, i]
+        _t0 = fall*top_apart + rise
+        out[0, i] = L/(_t0*g*stretch)
+        out[1, i] = 4*L*_t0*g
+
+
+@compiled(TOP_EACH, later=True)
+def top_each(n, halves, p, out):
+    """What is the same all along a swing: ``swing_each`` finds it behind the run-time parameters."""
+    halves, p, out = carray(halves, n), carray(p, (3, n)), carray(out, (2, n))
+    for i in range(n):
+        half = halves[i]
+        _t0 = cos(half/4)**4
+        out[0, i] = cos(half/2)/_t0
+        out[1, i] = _t0
+
+
 @compiled(BOUNDS)
 def bounds(lo, hi, p, out):
     """Bounds of the climb's slope and of ds/dtheta for lo <= theta <= hi."""
@@ -240,7 +267,7 @@ MODEL = Formulas(
     parameters=PARAMETERS,
     positive=('L',),
     addresses=Addresses(frame.address, climb.address, rise.address, bend.address, bounds.address),
-    each=Each(rise=rise_each, bend=bend_each, orbit=orbit_each, bounds=bounds_each, held=2),
+    each=Each(rise=rise_each, bend=bend_each, orbit=orbit_each, swing=swing_each, top=top_each, bounds=bounds_each, held=2, top_held=2),
     domain_of=exact_domain,
     axes_of=exact_axes,
     monotone=True,

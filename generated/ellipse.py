@@ -1,5 +1,5 @@
 # Made by gqm-gen for "ellipse". Do not edit: change its declaration and generate again.
-# interface 4, input 3a81da5567d3, body 659d2205e1d8
+# interface 5, input 3a81da5567d3, body 10c861af40f1
 """Bead on an ellipse, by the eccentric angle
 
 x              = a*cos(theta)
@@ -25,7 +25,7 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=4)
+compiled = compiler(__file__, interface=5)
 
 from gqm_sym.runtime import (
     BEND,
@@ -37,6 +37,8 @@ from gqm_sym.runtime import (
     ORBIT_EACH,
     RISE,
     RISE_EACH,
+    SWING_EACH,
+    TOP_EACH,
     Addresses,
     Each,
     ExactFormulas,
@@ -174,6 +176,43 @@ def orbit_each(n, lows, highs, p, out):
         out[3, i] = cos(_t2)
 
 
+@compiled(SWING_EACH, later=True)
+def swing_each(n, fall, rise, p, out):
+    """(dt/du)**2 where sin(u)**2 = fall = 1 - rise, and what that is divided by, each for an orbit of its own."""
+    p, out = carray(p, (8, n)), carray(out, (2, n))
+    for i in range(n):
+        a = p[0, i]
+        b = p[1, i]
+        g = p[2, i]
+        top = p[4, i]
+        top_lack = p[5, i]
+        top_apart = p[6, i]
+        stretch = p[7, i]
+        scale = 1/(fall*top + 1)**2
+        _t0 = fall*top_apart + rise
+        _t1 = (fall*top_lack + rise)**2
+        _t2 = fall*top
+        out[0, i] = (64*_t1*_t2*b**2*scale**2 + 4*a**2*(_t1*scale - 4*_t2*scale)**2)/(4*_t0*b*g*stretch)
+        out[1, i] = 4*_t0*b*g
+
+
+@compiled(TOP_EACH, later=True)
+def top_each(n, halves, p, out):
+    """What is the same all along a swing: ``swing_each`` finds it behind the run-time parameters."""
+    halves, p, out = carray(halves, n), carray(p, (4, n)), carray(out, (4, n))
+    for i in range(n):
+        half = halves[i]
+        _t0 = half/4
+        _t1 = cos(_t0)
+        _t2 = 1/_t1**2
+        _t3 = cos(half/2)
+        _t4 = _t1**4
+        out[0, i] = _t2*sin(_t0)**2
+        out[1, i] = _t2*_t3
+        out[2, i] = _t3/_t4
+        out[3, i] = _t4
+
+
 @compiled(BOUNDS)
 def bounds(lo, hi, p, out):
     """Bounds of the climb's slope and of ds/dtheta for lo <= theta <= hi."""
@@ -269,7 +308,7 @@ MODEL = Formulas(
     parameters=PARAMETERS,
     positive=('a', 'b'),
     addresses=Addresses(frame.address, climb.address, rise.address, bend.address, bounds.address),
-    each=Each(rise=rise_each, bend=bend_each, orbit=orbit_each, bounds=bounds_each, held=4),
+    each=Each(rise=rise_each, bend=bend_each, orbit=orbit_each, swing=swing_each, top=top_each, bounds=bounds_each, held=4, top_held=4),
     domain_of=exact_domain,
     axes_of=exact_axes,
     monotone=True,

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "kepler". Do not edit: change its declaration and generate again.
-# interface 4, input a1e1feaf475b, body 829702edc694
+# interface 5, input a1e1feaf475b, body 6948b798cc40
 """Planet on its own ellipse, by the eccentric anomaly
 
 x              = a*(-ecc + cos(E))
@@ -25,7 +25,7 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=4)
+compiled = compiler(__file__, interface=5)
 
 from gqm_sym.runtime import (
     BEND,
@@ -37,6 +37,8 @@ from gqm_sym.runtime import (
     ORBIT_EACH,
     RISE,
     RISE_EACH,
+    SWING_EACH,
+    TOP_EACH,
     Addresses,
     Each,
     ExactFormulas,
@@ -288,6 +290,65 @@ def orbit_each(n, lows, highs, p, out):
         out[14, i] = _t8
 
 
+@compiled(SWING_EACH, later=True)
+def swing_each(n, fall, rise, p, out):
+    """(dt/du)**2 where sin(u)**2 = fall = 1 - rise, and what that is divided by, each for an orbit of its own."""
+    p, out = carray(p, (12, n)), carray(out, (2, n))
+    for i in range(n):
+        a = p[0, i]
+        ecc = p[1, i]
+        k = p[2, i]
+        top = p[4, i]
+        top_lack = p[5, i]
+        top_apart = p[6, i]
+        top_sine = p[7, i]
+        stretch = p[8, i]
+        _c0 = p[9, i]
+        _c1 = p[10, i]
+        _c2 = p[11, i]
+        scale = 1/(fall*top + 1)**2
+        _t0 = fall*top_apart + rise
+        _t1 = ecc**2
+        _t2 = 4*_t1
+        _t3 = fall*top
+        _t4 = _t3*scale
+        _t5 = 16*_t4
+        _t6 = _t1*_t5 + _t2*top_sine - _t2 + 4*ecc
+        _t7 = 1 - _t1
+        _t8 = 4*_t4
+        _t9 = sqrt(_t5*_t7*(1 - _t8) + (-8*_t4 - ecc + 1)**2)
+        _t10 = _c2 + _t9
+        _t11 = (fall*top_lack + rise)**2
+        out[0, i] = 2*_c0*_c2*_t10*_t9*a**2*(16*_t11*_t3*scale**2 + _t7*(_t11*scale - _t8)**2)/(_t0*_t6*k*stretch)
+        out[1, i] = 2*_c1*_t0*_t6*k/(_c0*_t10*_t9)
+
+
+@compiled(TOP_EACH, later=True)
+def top_each(n, halves, p, out):
+    """What is the same all along a swing: ``swing_each`` finds it behind the run-time parameters."""
+    halves, p, out = carray(halves, n), carray(p, (4, n)), carray(out, (8, n))
+    for i in range(n):
+        a = p[0, i]
+        ecc = p[1, i]
+        half = halves[i]
+        _t0 = half/4
+        _t1 = cos(_t0)
+        _t2 = 1/_t1**2
+        _t3 = half/2
+        _t4 = cos(_t3)
+        _t5 = _t1**4
+        _t6 = sin(_t3)**2
+        _t7 = sqrt(4*_t6*(1 - _t6)*(1 - ecc**2) + (-2*_t6 - ecc + 1)**2)
+        out[0, i] = _t2*sin(_t0)**2
+        out[1, i] = _t2*_t4
+        out[2, i] = _t4/_t5
+        out[3, i] = _t6
+        out[4, i] = _t5
+        out[5, i] = fabs(a)
+        out[6, i] = 1/_t7
+        out[7, i] = _t7
+
+
 @compiled(BOUNDS)
 def bounds(lo, hi, p, out):
     """Bounds of the climb's slope and of ds/dE for lo <= E <= hi."""
@@ -403,7 +464,7 @@ MODEL = Formulas(
     parameters=PARAMETERS,
     positive=('a',),
     addresses=Addresses(frame.address, climb.address, rise.address, bend.address, bounds.address),
-    each=Each(rise=rise_each, bend=bend_each, orbit=orbit_each, bounds=bounds_each, held=15),
+    each=Each(rise=rise_each, bend=bend_each, orbit=orbit_each, swing=swing_each, top=top_each, bounds=bounds_each, held=15, top_held=8),
     domain_of=exact_domain,
     axes_of=exact_axes,
     exact=ExactFormulas(exact_x, exact_z, exact_ds, exact_kappa, exact_reaction, exact_climb, exact_climb_slope),

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "parabola". Do not edit: change its declaration and generate again.
-# interface 4, input 638613fc8598, body 1c7c05f6c745
+# interface 5, input 638613fc8598, body 4535f35bb82e
 """Bead in a parabolic bowl
 
 x              = x
@@ -25,7 +25,7 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=4)
+compiled = compiler(__file__, interface=5)
 
 from gqm_sym.runtime import (
     BEND,
@@ -36,6 +36,8 @@ from gqm_sym.runtime import (
     FRAME,
     RISE,
     RISE_EACH,
+    SWING_EACH,
+    TOP_EACH,
     Addresses,
     Each,
     ExactFormulas,
@@ -140,6 +142,27 @@ def bend_each(n, lows, highs, left, right, p, out):
         out[1, i] = sqrt(4*a**2*x**2 + 1)
 
 
+@compiled(SWING_EACH, later=True)
+def swing_each(n, fall, rise, p, out):
+    """(dt/du)**2 where sin(u)**2 = fall = 1 - rise, and what that is divided by, each for an orbit of its own."""
+    p, out = carray(p, (4, n)), carray(out, (2, n))
+    for i in range(n):
+        a = p[0, i]
+        g = p[1, i]
+        top = p[3, i]
+        out[0, i] = (4*a**2*fall*top + 1)/(2*a*g)
+        out[1, i] = 2*a*g
+
+
+@compiled(TOP_EACH, later=True)
+def top_each(n, halves, p, out):
+    """What is the same all along a swing: ``swing_each`` finds it behind the run-time parameters."""
+    halves, p, out = carray(halves, n), carray(p, (3, n)), carray(out, (1, n))
+    for i in range(n):
+        half = halves[i]
+        out[0, i] = half**2
+
+
 @compiled(BOUNDS)
 def bounds(lo, hi, p, out):
     """Bounds of the climb's slope and of ds/dx for lo <= x <= hi."""
@@ -226,7 +249,7 @@ MODEL = Formulas(
     parameters=PARAMETERS,
     positive=(),
     addresses=Addresses(frame.address, climb.address, rise.address, bend.address, bounds.address),
-    each=Each(rise=rise_each, bend=bend_each, bounds=bounds_each),
+    each=Each(rise=rise_each, bend=bend_each, swing=swing_each, top=top_each, bounds=bounds_each, top_held=1),
     domain_of=exact_domain,
     axes_of=exact_axes,
     monotone=True,

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "rolling_circle". Do not edit: change its declaration and generate again.
-# interface 4, input aed757e55b8b, body 54c954b2cfc1
+# interface 5, input aed757e55b8b, body ea7b4252588c
 """Solid sphere rolling in a circular bowl
 
 x              = L*sin(theta)
@@ -24,7 +24,7 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=4)
+compiled = compiler(__file__, interface=5)
 
 from gqm_sym.runtime import (
     BEND,
@@ -36,6 +36,8 @@ from gqm_sym.runtime import (
     ORBIT_EACH,
     RISE,
     RISE_EACH,
+    SWING_EACH,
+    TOP_EACH,
     Addresses,
     Each,
     ExactFormulas,
@@ -157,6 +159,33 @@ def orbit_each(n, lows, highs, p, out):
         out[1, i] = cos(_t0)
 
 
+@compiled(SWING_EACH, later=True)
+def swing_each(n, fall, rise, p, out):
+    """(dt/du)**2 where sin(u)**2 = fall = 1 - rise, and what that is divided by, each for an orbit of its own."""
+    p, out = carray(p, (6, n)), carray(out, (2, n))
+    for i in range(n):
+        L = p[0, i]
+        beta = p[1, i]
+        g = p[2, i]
+        top_apart = p[4, i]
+        stretch = p[5, i]
+        _t0 = beta + 1
+        _t1 = fall*top_apart + rise
+        out[0, i] = L*_t0/(_t1*g*stretch)
+        out[1, i] = 4*L*_t1*g/_t0
+
+
+@compiled(TOP_EACH, later=True)
+def top_each(n, halves, p, out):
+    """What is the same all along a swing: ``swing_each`` finds it behind the run-time parameters."""
+    halves, p, out = carray(halves, n), carray(p, (4, n)), carray(out, (2, n))
+    for i in range(n):
+        half = halves[i]
+        _t0 = cos(half/4)**4
+        out[0, i] = cos(half/2)/_t0
+        out[1, i] = _t0
+
+
 @compiled(BOUNDS)
 def bounds(lo, hi, p, out):
     """Bounds of the climb's slope and of ds/dtheta for lo <= theta <= hi."""
@@ -248,7 +277,7 @@ MODEL = Formulas(
     positive=('L',),
     at_least=(('beta', '0'),),
     addresses=Addresses(frame.address, climb.address, rise.address, bend.address, bounds.address),
-    each=Each(rise=rise_each, bend=bend_each, orbit=orbit_each, bounds=bounds_each, held=2),
+    each=Each(rise=rise_each, bend=bend_each, orbit=orbit_each, swing=swing_each, top=top_each, bounds=bounds_each, held=2, top_held=2),
     domain_of=exact_domain,
     axes_of=exact_axes,
     monotone=True,

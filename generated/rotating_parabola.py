@@ -1,5 +1,5 @@
 # Made by gqm-gen for "rotating_parabola". Do not edit: change its declaration and generate again.
-# interface 4, input 9d848a7566cb, body 91a6dbf119cb
+# interface 5, input 9d848a7566cb, body cd89f5545b40
 """Bead in a turning parabolic bowl
 
 x              = x
@@ -26,7 +26,7 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=4)
+compiled = compiler(__file__, interface=5)
 
 from gqm_sym.runtime import (
     BEND,
@@ -37,6 +37,8 @@ from gqm_sym.runtime import (
     FRAME,
     RISE,
     RISE_EACH,
+    SWING_EACH,
+    TOP_EACH,
     Addresses,
     Each,
     ExactFormulas,
@@ -145,6 +147,29 @@ def bend_each(n, lows, highs, left, right, p, out):
         out[1, i] = sqrt(4*a**2*x**2 + 1)
 
 
+@compiled(SWING_EACH, later=True)
+def swing_each(n, fall, rise, p, out):
+    """(dt/du)**2 where sin(u)**2 = fall = 1 - rise, and what that is divided by, each for an orbit of its own."""
+    p, out = carray(p, (5, n)), carray(out, (2, n))
+    for i in range(n):
+        a = p[0, i]
+        Omega = p[1, i]
+        g = p[2, i]
+        top = p[4, i]
+        _t0 = -Omega**2 + 2*a*g
+        out[0, i] = (4*a**2*fall*top + 1)/_t0
+        out[1, i] = _t0
+
+
+@compiled(TOP_EACH, later=True)
+def top_each(n, halves, p, out):
+    """What is the same all along a swing: ``swing_each`` finds it behind the run-time parameters."""
+    halves, p, out = carray(halves, n), carray(p, (4, n)), carray(out, (1, n))
+    for i in range(n):
+        half = halves[i]
+        out[0, i] = half**2
+
+
 @compiled(BOUNDS)
 def bounds(lo, hi, p, out):
     """Bounds of the climb's slope and of ds/dx for lo <= x <= hi."""
@@ -237,7 +262,7 @@ MODEL = Formulas(
     parameters=PARAMETERS,
     positive=(),
     addresses=Addresses(frame.address, climb.address, rise.address, bend.address, bounds.address),
-    each=Each(rise=rise_each, bend=bend_each, bounds=bounds_each),
+    each=Each(rise=rise_each, bend=bend_each, swing=swing_each, top=top_each, bounds=bounds_each, top_held=1),
     domain_of=exact_domain,
     axes_of=exact_axes,
     monotone=True,

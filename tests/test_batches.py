@@ -37,7 +37,7 @@ def answered(
     n = lines[0].size
     out, reasons = np.full((n, 2), np.nan), np.full(n, swift.HARD, dtype=np.int8)
     each = module.MODEL.each
-    answer_batches(each.addresses(), each.held, pointers(lines), monotone, asked, out, reasons)
+    answer_batches(each.addresses(), (each.held, each.top_held), pointers(lines), monotone, asked, out, reasons)
     return out, reasons
 
 

@@ -17,6 +17,7 @@ from gqm_sym.derivation.reality import check_somewhere_real
 from gqm_sym.derivation.rewrite import check_real, without_poles
 from gqm_sym.derivation.signs import Signs
 from gqm_sym.derivation.speed import LAM0, V0, SpeedField, conservative_speed, dissipative_speed
+from gqm_sym.derivation.swing import Swing, swing
 from gqm_sym.derivation.symmetry import Symmetry, symmetry
 from gqm_sym.kernels.base import CONTACT_SIGN, DIRECTION, KAPPA, MASS, Kernel, W, X, Z
 from gqm_sym.parameters import Given, Value, is_positive
@@ -55,6 +56,8 @@ class Model:
         2Φ/inertia, so that W + climb is constant along a motion, and its derivative by λ.
     symmetry
         Where climb and σ are even; None where no such place was found, or nothing repeats.
+    swing
+        The time of an orbit about such a place as an integral without sines; None where there is no such form.
     reaction
         n₀ with N/m = κ W + n₀.
     dissipation
@@ -112,6 +115,7 @@ class Model:
     climb: sp.Expr
     climb_slope: sp.Expr
     symmetry: Symmetry | None
+    swing: Swing | None
     reaction: sp.Expr
     dissipation: Dissipation | None
     speed_squared: sp.Expr
@@ -265,6 +269,7 @@ def derive(
         loss = _losses(curve, kernel, x, z, law, shape)
         speed = dissipative_speed(kernel, law, shape, loss, curve)
     pressure = shape.kappa * speed.held + law.reaction
+    axes = None if loss or curve.charted else symmetry(law.climb, law.climb_slope, shape.ds, lam)
     start = {lam: LAM0}
     model = Model(
         curve=curve,
@@ -287,7 +292,8 @@ def derive(
         inertia=kernel.inertia,
         climb=law.climb,
         climb_slope=law.climb_slope,
-        symmetry=None if loss or curve.charted else symmetry(law.climb, law.climb_slope, shape.ds, lam),
+        symmetry=axes,
+        swing=swing(law.climb, shape.ds, lam, axes),
         reaction=law.reaction,
         dissipation=loss,
         speed_squared=speed.squared,

@@ -11,6 +11,7 @@ from gqm_sym.derivation.difference import Differences
 from gqm_sym.emission.ir import FunctionIR
 from gqm_sym.emission.places import at
 from gqm_sym.emission.sharing import hoist
+from gqm_sym.emission.swing import swing_each
 
 if TYPE_CHECKING:
     from gqm_sym.emission.lower import Lowering
@@ -169,4 +170,4 @@ def each(lowering: "Lowering") -> tuple[FunctionIR, ...]:
     model = lowering.model
     if model.dissipation is not None or model.curve.charted or model.force.radius:
         return ()
-    return rise_each(lowering), *bend_each(lowering)
+    return rise_each(lowering), *bend_each(lowering), *swing_each(lowering)

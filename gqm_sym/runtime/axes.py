@@ -41,8 +41,9 @@ def figure_of(axes: "Axes") -> "Figure":
     """The figure that axes are part of."""
     from matplotlib.figure import Figure
 
-    figure = axes.get_figure(root=True)
-    assert isinstance(figure, Figure)
+    figure = axes.figure
+    while not isinstance(figure, Figure):  # a figure within a figure
+        figure = figure.figure
     return figure
 
 

@@ -11,14 +11,13 @@ from gqm_sym.runtime.entries import to_axis
 from gqm_sym.runtime.fused import choose, whole_below
 from gqm_sym.runtime.jit import Inner
 from gqm_sym.runtime.search import UNRESOLVED
-from gqm_sym.runtime.swift import LIBRATION
+from gqm_sym.runtime.swift import CIRCULATION
 
-# Rows of a batch: which launch, offsets of both ends from it, both ends; what the quadrature keeps; the launch's place
-# and V**2, which it needs of laps alone; what the search needs: which way it goes and how far at most, and how far the
-# other way, its state, bracket, trial and the zero, how far the axis of symmetry is that the orbit may have, and the
-# step from one axis to the next.
-WHO, LEAST, MOST, A, B, SUM, VALUE, CHANGE, LOW, HIGH, START, SPEED, LASTING = range(13)
-OF_LAPS = START
+# Rows of a batch: which launch, and what the quadrature keeps of it; offsets of both ends from it, both ends; the
+# launch's place and V**2, which the quadrature needs of laps alone; what the search needs: which way it goes and how
+# far at most, and how far the other way, its state, bracket, trial and the zero, how far the axis of symmetry is that
+# the orbit may have, and the step from one axis to the next.
+WHO, SUM, VALUE, CHANGE, LOW, HIGH, LEAST, MOST, A, B, START, SPEED, LASTING = range(13)
 WAY, REACH, BACK, STATE, LEFT, RIGHT, TRIAL, AHEAD, AXIS, STEP, ROWS = range(12, 23)
 # How far back it is on a closed curve: both zeros lie within one period.
 CLOSED = -1.0
@@ -99,6 +98,8 @@ def seek(fns, n, s, p, work):  # type: ignore[no-untyped-def]
     for j in range(n):
         left[j], right[j] = 0.0, inf
     for _ in range(TRIALS):
+        if not any_is(state, SEEKING):
+            return
         for j in range(n):
             offsets[j] = way[j] * trial[j]
             places[j] = start[j] + offsets[j]
@@ -119,8 +120,6 @@ def seek(fns, n, s, p, work):  # type: ignore[no-untyped-def]
             trial[j] = choose(live, new, at)
             left[j], right[j] = low, high
             state[j] = choose(live, choose(close, FOUND, choose(lost, NOWHERE, SEEKING)), state[j])
-        if not any_is(state, SEEKING):
-            return
 
 
 @Inner
@@ -139,8 +138,8 @@ def prove(fns, kind, mirrored, pieces, n, s, p, work):  # type: ignore[no-untype
     for j in range(n):
         behind[j], speeds[j], state[j] = start[j] + least[j], w0[j], FOUND
     for k in range(1, pieces + 1):
-        first, end = kind == LIBRATION and k == 1, k == pieces
-        last, half = kind == LIBRATION and end and not mirrored, end and mirrored
+        first, end = kind != CIRCULATION and k == 1, k == pieces
+        last, half = kind != CIRCULATION and end and not mirrored, end and mirrored
         share = k / pieces
         for j in range(n):
             offsets[j] = most[j] if end else least[j] + share * (most[j] - least[j])

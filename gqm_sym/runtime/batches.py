@@ -22,7 +22,6 @@ from gqm_sym.runtime.batch_search import (
     LOW,
     MOST,
     NOWHERE,
-    OF_LAPS,
     REACH,
     ROWS,
     SPEED,
@@ -43,7 +42,7 @@ from gqm_sym.runtime.batch_search import (
     turn_round,
 )
 from gqm_sym.runtime.columns import DIRECTION, FIRST, LAM0, PARAMETERS, V0, fill_row
-from gqm_sym.runtime.crossing import call_bend_each, call_orbit_each, call_rise_each
+from gqm_sym.runtime.crossing import call_bend_each, call_orbit_each, call_rise_each, call_swing_each, call_top_each
 from gqm_sym.runtime.fused import choose
 from gqm_sym.runtime.jit import Inner, entry
 from gqm_sym.runtime.swift import (
@@ -58,9 +57,9 @@ from gqm_sym.runtime.swift import (
     MOST_NODES,
     PASSING,
     PLACES,
-    SAME,
     SHARES,
     WHOLE,
+    settled,
 )
 
 # Orbits of a batch: its arrays stay in the first-level cache. Orbits of a full register, at most.
@@ -71,9 +70,12 @@ FEW_PIECES, FEW_OF_HALF, MANY_PIECES = 3, 2, 12
 ROUNDINGS = 8.0 * 2.0**-52
 # An orbit about one axis that reaches its neighbours, twice a step apart, is at rest there.
 NEIGHBOURING = 1.999
-# A rule's change is foreseen from its last two, which fall geometrically: below this it is less than rounding. The
-# first of them must be below FALLING, whose fourth power is that: one accidentally small change decides nothing.
-FORESEEN, FALLING = 3e-17, 7e-5
+# Kinds of orbits, beside those that `swift` knows: about an axis of symmetry, by the integral without sines. Of each
+# the rows of a batch that the rule needs.
+SWING = 2
+NEEDED = (START, LASTING, LEAST)
+# The sines of that integral, squared: where y is at its largest, and at the axis half a turn later.
+FALL, RISE = np.cos(pi * SHARES) ** 2, np.sin(pi * SHARES) ** 2
 # What becomes of an orbit after a level of the rule.
 GOES_ON, SETTLED, LOST = 0.0, 1.0, 2.0
 
@@ -132,6 +134,13 @@ def fill(fns, kind, n, node, s, p, work):  # type: ignore[no-untyped-def]
             q = two[0, j]
             rates[j] = pi * two[1, j] / sqrt(q)
             low[j], high[j] = choose(q >= low[j], low[j], q), choose(q > high[j], q, high[j])
+    elif kind == SWING:
+        two = rows[: 2 * n].reshape(2, n)
+        call_swing_each(fns[4], n, FALL[node], RISE[node], p, two)
+        for j in range(n):
+            q = two[1, j]
+            rates[j] = pi * sqrt(two[0, j])
+            low[j], high[j] = choose(q >= low[j], low[j], q), choose(q > high[j], q, high[j])
     else:
         share, three = SHARES[node], rows[: 3 * n].reshape(3, n)
         for j in range(n):
@@ -150,25 +159,34 @@ def fill(fns, kind, n, node, s, p, work):  # type: ignore[no-untyped-def]
 def times(fns, kind, mirrored, n, s, flat, count, held, chosen, work, asked, out, reasons):  # type: ignore[no-untyped-def]
     """Half periods, periods or loop times by the trapezoidal rule, into the rows of ``out`` that belong to the orbits.
 
-    Nodes are doubled until the next change is foreseen to be below rounding; orbits for which that is so drop out, and
-    those whose V**2 all but vanishes. Of orbits that are ``mirrored`` only nodes up to the middle are looked at.
+    Nodes are doubled until the rule has settled. Orbits for which it has drop out, and those whose V**2 all but
+    vanishes. Of orbits that are ``mirrored`` only nodes up to the middle are looked at.
     """
-    if held:
-        p = flat[: count * n].reshape(count, n)
-        rest = flat[count * n : (count + held) * n].reshape(held, n)
-        call_orbit_each(fns[3], n, s[A, :n], s[B, :n], p, rest)
-        count += held
+    fixed = 0 if kind == CIRCULATION else held[kind // SWING]
+    if fixed:
+        p, halves = flat[: count * n].reshape(count, n), work[0, :n]
+        rest = flat[count * n : (count + fixed) * n].reshape(fixed, n)
+        if kind == SWING:
+            for j in range(n):
+                halves[j] = 0.5 * (s[MOST, j] - s[LEAST, j])
+            call_top_each(fns[5], n, halves, p, rest)
+        else:
+            call_orbit_each(fns[3], n, s[A, :n], s[B, :n], p, rest)
+        count += fixed
     for j in range(n):
         s[SUM, j], s[VALUE, j], s[CHANGE, j], s[LOW, j], s[HIGH, j] = 0.0, 0.0, 0.0, inf, 0.0
     begin, nodes = 0, FEWEST
     last, sides = (FEWEST // 2, 2.0) if mirrored else (FEWEST, 1.0)
     while True:
-        p = flat[: count * n].reshape(count, n)
+        p, more, lost = flat[: count * n].reshape(count, n), work[6, :n], work[7, :n]
+        more[:] = lost[:] = 0.0
         for node in range(begin, last + 1):
             rates = fill(fns, kind, n, node, s, p, work)
             ends = 0.5 * sides if node == 0 or (node == last and begin == 0) else sides
-            for j in range(n):
-                s[SUM, j] += ends * rates[j]
+            for j in range(n):  # a sum that keeps what it rounds off
+                term = ends * rates[j] - lost[j]
+                total = more[j] + term
+                more[j], lost[j] = total, (total - more[j]) - term
             if begin == 0:  # the two levels before the first
                 half, quarter = ends * (node % 2 == 0) * 2 / FEWEST, ends * (node % 4 == 0) * 4 / FEWEST
                 for j in range(n):
@@ -179,24 +197,23 @@ def times(fns, kind, mirrored, n, s, flat, count, held, chosen, work, asked, out
                 s[CHANGE, j] = fabs(s[VALUE, j] - s[CHANGE, j]) / s[VALUE, j]
         verdict = work[0, :n]
         for j in range(n):
+            s[SUM, j] += more[j]
             value, before = s[SUM, j] / nodes, s[CHANGE, j]
             change = fabs(value - s[VALUE, j]) / value
             s[VALUE, j], s[CHANGE, j] = value, change
-            fall = change / before
-            settled = (before <= FALLING) & ((change <= SAME) | (change * fall * fall <= FORESEEN))
             clear = s[LOW, j] > LEAST_BALANCE * s[HIGH, j]
-            verdict[j] = choose(clear, choose(settled, SETTLED, GOES_ON), LOST)
-        kept, whole = 0, 2.0 if asked == WHOLE and kind == LIBRATION else 1.0
+            verdict[j] = choose(clear, choose(settled(before, change), SETTLED, GOES_ON), LOST)
+        kept, whole = 0, 2.0 if asked == WHOLE and kind != CIRCULATION else 1.0
         for j in range(n):  # without branches, for none could be foreseen
-            k, settled = int(s[WHO, j]), verdict[j] == SETTLED
-            out[k, 0] = choose(settled, whole * s[VALUE, j], nan)
-            reasons[k] = DONE if settled else HARD
+            k, done = int(s[WHO, j]), verdict[j] == SETTLED
+            out[k, 0] = choose(done, whole * s[VALUE, j], nan)
+            reasons[k] = DONE if done else HARD
             chosen[kept] = j
             kept += verdict[j] == GOES_ON
         begin, nodes, last = nodes + 1, 2 * nodes, nodes + (nodes // 2 if mirrored else nodes)
         if kept == 0 or nodes > MOST_NODES:
             return
-        n = shrink(s, flat, count, n, chosen, kept, OF_LAPS if kind == LIBRATION else LASTING)
+        n = shrink(s, flat, count, n, chosen, kept, NEEDED[kind])
 
 
 @Inner
@@ -220,8 +237,7 @@ def settle(fns, kind, mirrored, known, n, s, flat, t, spare, count, held, chosen
                 k = int(s[WHO, j])
                 out[k, 0], out[k, 1], reasons[k] = s[A, j], s[B, j], DONE
         elif m:
-            fixed = held if kind == LIBRATION else 0
-            times(fns, kind, mirrored, m, s, flat, count, fixed, chosen, work, asked, out, reasons)
+            times(fns, kind, mirrored, m, s, flat, count, held, chosen, work, asked, out, reasons)
         if left == 0:
             return
         n, s, flat, t, spare = rest, t, spare, s, flat
@@ -229,7 +245,13 @@ def settle(fns, kind, mirrored, known, n, s, flat, t, spare, count, held, chosen
 
 @entry(
     types.void(
-        *(types.UniTuple(types.int64, 4), types.int64, types.int64[:, ::1], types.boolean, types.int64),
+        *(
+            types.UniTuple(types.int64, 6),
+            types.UniTuple(types.int64, 2),
+            types.int64[:, ::1],
+            types.boolean,
+            types.int64,
+        ),
         *(types.float64[:, ::1], types.int8[::1]),
     ),
     nogil=True,
@@ -241,7 +263,7 @@ def answer_batches(fns, held, columns, monotone, asked, out, reasons):  # type: 
     that ds is nowhere 0; ``asked`` is HALF, WHOLE or PLACES.
     """
     count = columns.shape[0] - PARAMETERS
-    rows = count + held
+    rows = count + max(held[0], held[1])
     s, t, u = np.empty((ROWS, BATCH)), np.empty((ROWS, BATCH)), np.empty((ROWS, BATCH))
     flat, spare, other = np.empty(rows * BATCH), np.empty(rows * BATCH), np.empty(rows * BATCH)
     known, work = np.empty((PARAMETERS - FIRST, BATCH)), np.empty((13, BATCH))
@@ -251,7 +273,8 @@ def answer_batches(fns, held, columns, monotone, asked, out, reasons):  # type: 
         n = -(-m // LANES) * LANES
         p = flat[: count * n].reshape(count, n)
         for row in range(PARAMETERS - FIRST):
-            fill_row(columns, FIRST + row, begin, m, known[row, :n])
+            if begin == 0 or columns[FIRST + row, 1] != 0:
+                fill_row(columns, FIRST + row, begin, m, known[row, :n])
         who, start, speed, way, total = s[WHO, :n], s[START, :n], s[SPEED, :n], s[WAY, :n], work[0, :n]
         fill_row(columns, LAM0, begin, m, start)
         fill_row(columns, V0, begin, m, speed)
@@ -293,21 +316,20 @@ def answer_batches(fns, held, columns, monotone, asked, out, reasons):  # type: 
             even = missed <= ROUNDINGS * (fabs(s[START, j]) + fabs(first) + fabs(second))
             between = (s[STEP, j] == 0.0) | (fabs(first - second) < NEIGHBOURING * s[STEP, j])
             s[STATE, j], s[TRIAL, j] = choose(even, FOUND, NOWHERE), choose(between, FOUND, NOWHERE)
-        mirrored = not any_is(s[STATE, :n], NOWHERE)
-        proved = monotone and mirrored and not any_is(s[TRIAL, :n], NOWHERE)
+        mirrored, alone = not any_is(s[STATE, :n], NOWHERE), not any_is(s[TRIAL, :n], NOWHERE)
+        about_one = SWING if mirrored and alone and fns[4] else LIBRATION
         for j in range(laps):
             lap = u[WAY, j] * u[REACH, j]
             u[LEAST, j], u[MOST, j] = min(lap, 0.0), max(lap, 0.0)
-        for kind in (LIBRATION, CIRCULATION):
+        for kind in (about_one, CIRCULATION):
             if kind == CIRCULATION:
-                n, s, flat, u, other = laps, u, other, s, flat
+                n, s, flat, u, other, mirrored = laps, u, other, s, flat, False
             if n:
-                mirrored &= kind == LIBRATION
                 settle(
                     fns,
                     kind,
                     mirrored,
-                    mirrored and proved,
+                    monotone and mirrored and alone,
                     n,
                     s,
                     flat,

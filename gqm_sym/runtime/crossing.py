@@ -78,6 +78,18 @@ def call_orbit_each(_, address, n, a, b, p, out):  # type: ignore[no-untyped-def
 
 
 @intrinsic
+def call_swing_each(_, address, n, fall, rise, p, out):  # type: ignore[no-untyped-def]
+    """Fill (dt/du)**2, and what that is divided by, for many orbits at the same share of their swing."""
+    return types.void(address, n, fall, rise, p, out), _call
+
+
+@intrinsic
+def call_top_each(_, address, n, half, p, out):  # type: ignore[no-untyped-def]
+    """Fill what is the same all along a swing, for many orbits."""
+    return types.void(address, n, half, p, out), _call
+
+
+@intrinsic
 def call_drive(_, address, n, lam, v2, v, nu, p, out):  # type: ignore[no-untyped-def]
     """Fill ds, P, Q, n0 and kappa for a leg of signs v and nu."""
     return types.void(address, n, lam, v2, v, nu, p, out), _call

@@ -15,6 +15,8 @@ rise_each   n, a, lam, d, p, out                          climb[a, lam], ds(lam)
 bend_each   n, a, b, da, db, p, out                       climb[a, lam, b], ds(lam)
 bounds_each n, lo, hi, p, out                             enclosure of climb', enclosure of ds
 orbit_each  n, a, b, p, out                               what bend_each finds behind p
+swing_each  n, fall, rise, p, out                         (dt/du)**2, what that is divided by
+top_each    n, half, p, out                               what swing_each finds behind p
 drive       n, lam, v2, v, nu, p, out                     ds, P, Q, n0, kappa
 hold        n, lam, p, out                                A(lam, 0; +1), A(lam, 0; -1), static friction
 segment     n, lam, p, out                                x, z, ds, dx/ds, dz/ds, kappa
@@ -27,6 +29,10 @@ The functions ``_each`` are for sweeps: their ``a``, ``b``, ``lo``, ``hi`` and `
 parameters for each place (``p`` has a row for each parameter). They are compiled when a sweep first asks for them.
 ``bend_each`` may give NaN where points lie too far apart for its closed forms; ``bend`` never does. What is the same
 all along an orbit, ``orbit_each`` works out once: those rows stand behind the parameters in the ``p`` of ``bend_each``.
+
+Orbits about an axis of symmetry may have ``swing_each``: their time as an integral over u in which the square of the
+coordinate sqrt(top)*sin(u) is the share ``fall`` = sin(u)**2 of its largest, ``rise`` being the rest. ``half`` is half
+of an orbit's width.
 
 A curve with formulas that is a piece of a rail has ``segment`` (`rail`), in its own parameter; an implicit curve F = 0
 has ``field``, by which it is traced (`tracing`).
@@ -46,7 +52,7 @@ from typing import Any, NamedTuple
 from numba import types
 
 # Raised with every change of a signature here, or of a number that runtime code puts into generated modules.
-INTERFACE = 4
+INTERFACE = 5
 
 REAL = types.float64
 MANY = types.CPointer(REAL)
@@ -61,6 +67,8 @@ RISE_EACH = types.void(types.intp, MANY, MANY, MANY, MANY, MANY)
 BEND_EACH = types.void(types.intp, MANY, MANY, MANY, MANY, MANY, MANY)
 BOUNDS_EACH = types.void(types.intp, MANY, MANY, MANY, MANY)
 ORBIT_EACH = types.void(types.intp, MANY, MANY, MANY, MANY)
+SWING_EACH = types.void(types.intp, REAL, REAL, MANY, MANY)
+TOP_EACH = types.void(types.intp, MANY, MANY, MANY)
 
 DRIVE = types.void(types.intp, MANY, MANY, REAL, REAL, MANY, MANY)
 HOLD = types.void(types.intp, MANY, MANY, MANY)
@@ -84,18 +92,23 @@ class Addresses(NamedTuple):
 class Each(NamedTuple):
     """The functions of a sweep over many orbits at once: each has an ``address`` (`jit.Later`).
 
-    ``held`` is how many rows ``orbit`` fills; None and 0 where nothing is the same all along an orbit.
+    ``held`` and ``top_held`` are how many rows ``orbit`` and ``top`` fill. None and 0 where nothing is the same all
+    along an orbit, and where orbits have no swing.
     """
 
     rise: Any
     bend: Any
     bounds: Any
     orbit: Any = None
+    swing: Any = None
+    top: Any = None
     held: int = 0
+    top_held: int = 0
 
-    def addresses(self) -> tuple[int, int, int, int]:
+    def addresses(self) -> tuple[int, int, int, int, int, int]:
         """Where they lie in memory; 0 for one that there is not."""
-        return self.rise.address, self.bend.address, self.bounds.address, self.orbit.address if self.orbit else 0
+        rise, bend, bounds, orbit, swing, top = (function.address if function else 0 for function in self[:6])
+        return rise, bend, bounds, orbit, swing, top
 
 
 class Dissipation(NamedTuple):

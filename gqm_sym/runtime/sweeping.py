@@ -239,7 +239,7 @@ def _answer(
         lines = lay_out(columns, chunk.start, chunk.stop)
         answers = (pointers(lines), formulas.monotone, asked.asked, out[chunk], reasons[chunk])
         if formulas.each is not None and asked.asked in (swift.HALF, swift.WHOLE, swift.PLACES):
-            answer_batches(formulas.each.addresses(), formulas.each.held, *answers)
+            answer_batches(formulas.each.addresses(), (formulas.each.held, formulas.each.top_held), *answers)
         swift.answer_many(tuple(formulas.addresses), *answers)
 
 

@@ -27,11 +27,9 @@ LIBRATION, CIRCULATION = range(2)
 # The trapezoidal rule doubles its nodes so often, from FEWEST intervals on.
 FEWEST, DOUBLINGS = 8, 7
 MOST_NODES = FEWEST * 2**DOUBLINGS
-# Two sums as close as this agree to rounding.
-SAME = 4e-16
-# The error squares with each doubling, once it does so at all: two differences, the second below this and the first
-# below FALLING, the quotient too, leave 1e-19.
-SQUARED, FALLING = 3e-10, 1e-2
+# The rule's error is a sum of terms c*r**nodes, times a cosine of the nodes. It squares with each doubling, over c,
+# which branch points of ds make as small as 1e-5. A change may also be small by accident; two in a row hardly are.
+LAST_CHANGE, CHANGE_BEFORE = 1e-11, 3e-6
 # Below this balance of V**2 doubles lose last places that matter (`stretch.LEAST_BALANCE`).
 LEAST_BALANCE = 1e-2
 # Places looked at for an extreme, before the best is refined.
@@ -86,13 +84,22 @@ def fill(fns, p, kind, lam0, w0, a, b, width, first, n, work, rates):  # type: i
 
 
 @Inner
+def settled(before, change):  # type: ignore[no-untyped-def]
+    """Whether the trapezoidal rule has come to its value, by its last two relative changes."""
+    return (before <= CHANGE_BEFORE) & (change <= LAST_CHANGE)
+
+
+@Inner
 def time_once(fns, p, kind, lam0, w0, a, b, width, work, rates):  # type: ignore[no-untyped-def]
     """Half period or loop time by the trapezoidal rule; NaN where it did not converge or V**2 all but vanishes."""
     low, high = fill(fns, p, kind, lam0, w0, a, b, width, 0, FEWEST + 1, work, rates)
     total = 0.5 * (rates[0] + rates[FEWEST])
+    half = total
     for i in range(1, FEWEST):
         total += rates[i]
-    value, before, n, first = total / FEWEST, inf, FEWEST, FEWEST + 1
+        half += (i % 2 == 0) * rates[i]
+    value, n, first = total / FEWEST, FEWEST, FEWEST + 1
+    before = fabs(2.0 * half - total) / total
     while n < MOST_NODES:
         least, most = fill(fns, p, kind, lam0, w0, a, b, width, first, n, work, rates)
         low, high = min(low, least), max(high, most)
@@ -107,7 +114,7 @@ def time_once(fns, p, kind, lam0, w0, a, b, width, work, rates):  # type: ignore
         new = total / n
         change = fabs(new - value) / new
         value = new
-        if change <= SAME or (change <= SQUARED and before <= FALLING and change <= FALLING * before):
+        if settled(before, change):
             return value
         before = change
     return np.nan

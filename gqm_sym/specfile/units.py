@@ -178,9 +178,9 @@ def _registry() -> Any:
 
 def _named(name: str) -> Unit:
     """A unit that pint knows by name."""
-    from pint import PintError
-
     registry = _registry()
+    from pint import PintError  # only now: the registry imports pint apart from what reading may take
+
     try:
         one = registry.Quantity(Fraction(1), name).to_root_units()
     except (PintError, AttributeError, TypeError, ValueError):
