@@ -170,3 +170,16 @@ def test_si_needs_no_library() -> None:
     code = "import sys, gqm_sym as g; g.read_spec(sys.argv[1]); sys.exit('pint' in sys.modules)"
     pendulum = Path(__file__).parent.parent / "curves" / "pendulum.yaml"
     assert subprocess.run([sys.executable, "-c", code, str(pendulum)], timeout=60, check=False).returncode == 0
+
+
+def test_loading_the_library_is_not_reading(tmp_path: Path) -> None:
+    """A first unit by name costs a process the library's import: more than a file may take, on a slow machine."""
+    code = (
+        "import sys, gqm_sym as g; from gqm_sym.specfile import reader; reader.SECONDS = 0.2; "
+        "g.read_spec(sys.argv[1]); "
+        "sys.exit('pint' not in sys.modules)"
+    )
+    path = tmp_path / "a.yaml"
+    path.write_text(FILE.replace("km/h", "furlong/day"))
+    done = subprocess.run([sys.executable, "-c", code, str(path)], timeout=120, check=False, capture_output=True)
+    assert done.returncode == 0, done.stderr.decode()
