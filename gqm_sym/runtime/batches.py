@@ -119,6 +119,35 @@ def part(state, found, others):  # type: ignore[no-untyped-def]
 
 
 @Inner
+def judge(n, s):  # type: ignore[no-untyped-def]
+    """Set the state by whether the turning point ahead is one, and the trial by whether the body goes round instead."""
+    state, trial, zero, reach = s[STATE, :n], s[TRIAL, :n], s[AHEAD, :n], s[REACH, :n]
+    way, w0, back = s[WAY, :n], s[SPEED, :n], s[BACK, :n]
+    for j in range(n):
+        round_it = (state[j] == NOWHERE) & (way[j] * w0[j] != 0.0) & (back[j] == CLOSED)
+        trial[j] = choose(round_it, FOUND, NOWHERE)
+    for j in range(n):
+        state[j] = choose((state[j] == FOUND) & (zero[j] <= reach[j]), FOUND, NOWHERE)
+
+
+@Inner
+def set_ends(n, s):  # type: ignore[no-untyped-def]
+    """Set both ends; the state by whether the orbit is its own mirror image, the trial by whether about one axis."""
+    start, least, most, a, b = s[START, :n], s[LEAST, :n], s[MOST, :n], s[A, :n], s[B, :n]
+    way, zero, axis, step, state, trial = s[WAY, :n], s[AHEAD, :n], s[AXIS, :n], s[STEP, :n], s[STATE, :n], s[TRIAL, :n]
+    for j in range(n):
+        first, second = a[j], way[j] * zero[j]
+        missed = fabs(0.5 * (first + second) - axis[j])
+        even = missed <= ROUNDINGS * (fabs(start[j]) + fabs(first) + fabs(second))
+        between = (step[j] == 0.0) | (fabs(first - second) < NEIGHBOURING * step[j])
+        state[j], trial[j] = choose(even, FOUND, NOWHERE), choose(between, FOUND, NOWHERE)
+    for j in range(n):
+        first, second = a[j], way[j] * zero[j]
+        least[j], most[j] = choose(first < second, first, second), choose(first < second, second, first)
+        a[j], b[j] = start[j] + least[j], start[j] + most[j]
+
+
+@Inner
 def fill(fns, kind, n, node, s, p, work):  # type: ignore[no-untyped-def]
     """The time per share of the orbit at one node of the rule, and the extremes so far of V**2's regular factor."""
     da, db, rates, rows = work[0, :n], work[1, :n], work[2, :n], work[3:6].reshape(-1)
@@ -174,8 +203,8 @@ def times(fns, kind, mirrored, n, s, flat, count, held, chosen, work, asked, out
             call_orbit_each(fns[3], n, s[A, :n], s[B, :n], p, rest)
         count += fixed
     for j in range(n):
-        s[SUM, j], s[VALUE, j], s[CHANGE, j], s[LOW, j], s[HIGH, j] = 0.0, 0.0, 0.0, inf, 0.0
-    begin, nodes = 0, FEWEST
+        s[SUM, j], s[VALUE, j], s[CHANGE, j], s[LOW, j], s[HIGH, j] = 0.0, 0.0, inf, inf, 0.0
+    begin, nodes, whole = 0, FEWEST, 2.0 if asked == WHOLE and kind != CIRCULATION else 1.0
     last, sides = (FEWEST // 2, 2.0) if mirrored else (FEWEST, 1.0)
     while True:
         p, more, lost = flat[: count * n].reshape(count, n), work[6, :n], work[7, :n]
@@ -187,14 +216,10 @@ def times(fns, kind, mirrored, n, s, flat, count, held, chosen, work, asked, out
                 term = ends * rates[j] - lost[j]
                 total = more[j] + term
                 more[j], lost[j] = total, (total - more[j]) - term
-            if begin == 0:  # the two levels before the first
-                half, quarter = ends * (node % 2 == 0) * 2 / FEWEST, ends * (node % 4 == 0) * 4 / FEWEST
+            if begin == 0 and node % 2 == 0:  # half of the nodes, for a first change
+                share = 2.0 * ends / FEWEST
                 for j in range(n):
-                    s[VALUE, j] += half * rates[j]
-                    s[CHANGE, j] += quarter * rates[j]
-        if begin == 0:
-            for j in range(n):
-                s[CHANGE, j] = fabs(s[VALUE, j] - s[CHANGE, j]) / s[VALUE, j]
+                    s[VALUE, j] += share * rates[j]
         verdict = work[0, :n]
         for j in range(n):
             s[SUM, j] += more[j]
@@ -203,17 +228,18 @@ def times(fns, kind, mirrored, n, s, flat, count, held, chosen, work, asked, out
             s[VALUE, j], s[CHANGE, j] = value, change
             clear = s[LOW, j] > LEAST_BALANCE * s[HIGH, j]
             verdict[j] = choose(clear, choose(settled(before, change), SETTLED, GOES_ON), LOST)
-        kept, whole = 0, 2.0 if asked == WHOLE and kind != CIRCULATION else 1.0
-        for j in range(n):  # without branches, for none could be foreseen
-            k, done = int(s[WHO, j]), verdict[j] == SETTLED
-            out[k, 0] = choose(done, whole * s[VALUE, j], nan)
-            reasons[k] = DONE if done else HARD
-            chosen[kept] = j
-            kept += verdict[j] == GOES_ON
+        if begin > 0:
+            kept = 0
+            for j in range(n):  # without branches, for none could be foreseen
+                k, done = int(s[WHO, j]), verdict[j] == SETTLED
+                out[k, 0] = choose(done, whole * s[VALUE, j], nan)
+                reasons[k] = DONE if done else HARD
+                chosen[kept] = j
+                kept += verdict[j] == GOES_ON
+            if kept == 0 or nodes == MOST_NODES:
+                return
+            n = shrink(s, flat, count, n, chosen, kept, NEEDED[kind])
         begin, nodes, last = nodes + 1, 2 * nodes, nodes + (nodes // 2 if mirrored else nodes)
-        if kept == 0 or nodes > MOST_NODES:
-            return
-        n = shrink(s, flat, count, n, chosen, kept, NEEDED[kind])
 
 
 @Inner
@@ -297,10 +323,7 @@ def answer_batches(fns, held, columns, monotone, asked, out, reasons):  # type: 
             else:
                 turn_round(n, s)
             seek(fns, n, s, p, work)
-            for j in range(n):
-                beyond = (s[STATE, j] != FOUND) | (s[AHEAD, j] > s[REACH, j])
-                round_it = (s[STATE, j] == NOWHERE) & (s[WAY, j] * s[SPEED, j] != 0.0) & (s[BACK, j] == CLOSED)
-                s[STATE, j], s[TRIAL, j] = choose(beyond, NOWHERE, FOUND), choose(round_it, FOUND, NOWHERE)
+            judge(n, s)
             if ahead and any_is(s[TRIAL, :n], FOUND):
                 laps, _rest = part(s[TRIAL, :n], others, chosen)
                 laps = gather(s, flat, count, n, others, laps, u, other, ROWS)
@@ -308,14 +331,7 @@ def answer_batches(fns, held, columns, monotone, asked, out, reasons):  # type: 
             n = shrink(s, flat, count, n, chosen, kept, ROWS)
             if n == 0:
                 break
-        for j in range(n):
-            first, second = s[A, j], s[WAY, j] * s[AHEAD, j]
-            s[LEAST, j], s[MOST, j] = choose(first < second, first, second), choose(first < second, second, first)
-            s[A, j], s[B, j] = s[START, j] + s[LEAST, j], s[START, j] + s[MOST, j]
-            missed = fabs(0.5 * (first + second) - s[AXIS, j])
-            even = missed <= ROUNDINGS * (fabs(s[START, j]) + fabs(first) + fabs(second))
-            between = (s[STEP, j] == 0.0) | (fabs(first - second) < NEIGHBOURING * s[STEP, j])
-            s[STATE, j], s[TRIAL, j] = choose(even, FOUND, NOWHERE), choose(between, FOUND, NOWHERE)
+        set_ends(n, s)
         mirrored, alone = not any_is(s[STATE, :n], NOWHERE), not any_is(s[TRIAL, :n], NOWHERE)
         about_one = SWING if mirrored and alone and fns[4] else LIBRATION
         for j in range(laps):
