@@ -84,13 +84,16 @@ def sweeping() -> list[tuple[str, float]]:
     start[batch_search.START] = np.random.default_rng(0).uniform(0.05, 2.5, n) - np.pi / 2
     p = np.repeat(pendulum.MODEL.numbers(tuple(pendulum.PARAMETERS.values())).values[:, None], n, axis=1)
     count, given = len(p), np.append(p.reshape(-1), np.zeros(max(held) * n))
-    known, work = np.repeat([[-inf], [inf], [2 * np.pi], [-np.pi / 2], [np.pi]], n, axis=1), np.empty((13, n))
+    known, work = (
+        np.repeat([[-inf], [inf], [2 * np.pi], [-np.pi / 2], [-6.1e-17], [np.pi]], n, axis=1),
+        np.empty((13, n)),
+    )
     chosen, out, reasons = np.empty(n, dtype=np.int64), np.zeros((n, 1)), np.zeros(n, dtype=np.int8)
 
     @njit
     def search(s: Any, start: Any, p: Any, known: Any, work: Any) -> None:
         s[:] = start
-        launch(fns, n, s, p, known, work)
+        launch(fns, n, s, p, known, True, work)
         seek(fns, n, s, p, work)
         turn_round(n, s)
 

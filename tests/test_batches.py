@@ -33,8 +33,10 @@ def answered(
     monotone: bool = False,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Answer launches by batches alone; nothing is said of symmetry, if not by ``mirrors``."""
-    lines = [*np.broadcast_arrays(*(np.asarray(v, dtype=float) for v in (lam0, v0, ways, 0.0, *domain, *mirrors, *p)))]
-    n = lines[0].size
+    known = (*domain, mirrors[0], np.nan, mirrors[1])
+    columns = [np.asarray(v, dtype=float) for v in (lam0, v0, ways, 0.0, *known, *p)]
+    n = max(column.size for column in columns)
+    lines = [np.broadcast_to(column, n) for column in columns]
     out, reasons = np.full((n, 2), np.nan), np.full(n, swift.HARD, dtype=np.int8)
     each = module.MODEL.each
     answer_batches(each.addresses(), (each.held, each.top_held), pointers(lines), monotone, asked, out, reasons)
@@ -102,6 +104,19 @@ def test_laps(way: int, said: str, module_of: ModuleOf) -> None:
     assert (ends[1] == swift.PASSING).all()
     halves = answered(module_of("circle"), places, v0, way, p, CIRCLE, asked=swift.HALF, **SAID[said])
     assert (halves[1] == swift.PASSING).all()
+
+
+@pytest.mark.parametrize("turns", [0, 1, -2, 50])
+def test_small_swings_on_any_turn(turns: int, module_of: ModuleOf) -> None:
+    """Released at rest near any axis: its place is known to more digits than a double has, or is found."""
+    amplitude = 10.0 ** np.linspace(-4.0, 0.4, 40)
+    lam0 = 2 * np.pi * turns + amplitude
+    swept = module_of("circle").sweep("half_period", lam0, L=1).values
+    for value, place in zip(swept, lam0, strict=True):
+        with mp.workdps(40):
+            away = mpf(float(place)) - 2 * mp.pi * turns
+            truth = 2 * mp.ellipk(mp.sin(away / 2) ** 2) / mp.sqrt(mpf(9.81))
+        assert abs(mpf(float(value)) - truth) <= ULPS * np.spacing(float(truth))
 
 
 def test_barriers_are_not_jumped(tmp_path: Path) -> None:

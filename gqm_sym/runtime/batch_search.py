@@ -7,7 +7,7 @@ each. Every step is a loop over the columns without branches, which vectorises.
 from math import fabs, inf
 
 from gqm_sym.runtime.crossing import call_bounds_each, call_rise_each
-from gqm_sym.runtime.entries import to_axis
+from gqm_sym.runtime.entries import ALL_BUT, UNCLEAR, to_axis
 from gqm_sym.runtime.fused import choose, whole_below
 from gqm_sym.runtime.jit import Inner
 from gqm_sym.runtime.search import UNRESOLVED
@@ -37,11 +37,15 @@ def any_is(row, value):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def launch(fns, n, s, p, known, work):  # type: ignore[no-untyped-def]
-    """Set up the search ahead: a body released at rest goes where it falls. ``known`` has the columns FIRST to NEXT."""
+def launch(fns, n, s, p, known, monotone, work):  # type: ignore[no-untyped-def]
+    """Set up the search ahead: a body released at rest goes where it falls. ``known`` has the columns FIRST to NEXT.
+
+    Where V**2 is ``monotone`` between axes it comes to rest at its mirror image, and nothing is to be searched.
+    """
     start, w0, way, state = s[START, :n], s[SPEED, :n], s[WAY, :n], s[STATE, :n]
     reach, back, trial = s[REACH, :n], s[BACK, :n], s[TRIAL, :n]
-    lows, highs, periods, places, steps = known[0, :n], known[1, :n], known[2, :n], known[3, :n], known[4, :n]
+    lows, highs, periods = known[0, :n], known[1, :n], known[2, :n]
+    places, places_low, steps = known[3, :n], known[4, :n], known[5, :n]
     if any_is(w0, 0.0):
         none, rows = work[0, :n], work[1:4].reshape(-1)[: 3 * n].reshape(3, n)
         none[:] = 0.0
@@ -58,12 +62,18 @@ def launch(fns, n, s, p, known, work):  # type: ignore[no-untyped-def]
         state[j] = choose((way[j] != 0.0) & (low <= start[j]) & (start[j] <= high), SEEKING, NOWHERE)
     axis, next_axis, zero = s[AXIS, :n], s[STEP, :n], s[AHEAD, :n]
     for j in range(n):
-        step = steps[j]
+        step, low, itself = steps[j], places_low[j], way[j] * (places[j] - start[j])
         first = to_axis(start[j], way[j], places[j], step)
+        known_well = monotone & (low == low) & (first == itself)  # steps are rounded, and so are axes by them
+        first += choose(known_well, way[j] * low, 0.0)
         # Released at rest it falls towards the axis, and comes to rest on the other side.
         mirrored = choose((w0[j] == 0.0) & (first > 0.0), 2.0 * first, trial[j])
         trial[j] = choose(mirrored < reach[j], mirrored, reach[j])
-        axis[j], next_axis[j], zero[j] = first, step, 0.0
+        away = (first > UNCLEAR * (fabs(start[j]) + fabs(places[j]))) & ((step == 0.0) | (first < ALL_BUT * step))
+        there = known_well & (w0[j] == 0.0) & away & (mirrored <= reach[j])
+        zero[j] = choose(there, mirrored, 0.0)
+        state[j] = choose(there & (state[j] == SEEKING), FOUND, state[j])
+        axis[j], next_axis[j] = first, step
 
 
 @Inner
@@ -95,11 +105,11 @@ def seek(fns, n, s, p, work):  # type: ignore[no-untyped-def]
     offsets, places, rows = work[0, :n], work[1, :n], work[2:5].reshape(-1)[: 3 * n].reshape(3, n)
     start, w0, way, reach = s[START, :n], s[SPEED, :n], s[WAY, :n], s[REACH, :n]
     state, left, right, trial, zero = s[STATE, :n], s[LEFT, :n], s[RIGHT, :n], s[TRIAL, :n], s[AHEAD, :n]
+    if not any_is(state, SEEKING):
+        return
     for j in range(n):
         left[j], right[j] = 0.0, inf
     for _ in range(TRIALS):
-        if not any_is(state, SEEKING):
-            return
         for j in range(n):
             offsets[j] = way[j] * trial[j]
             places[j] = start[j] + offsets[j]
@@ -120,6 +130,8 @@ def seek(fns, n, s, p, work):  # type: ignore[no-untyped-def]
             trial[j] = choose(live, new, at)
             left[j], right[j] = low, high
             state[j] = choose(live, choose(close, FOUND, choose(lost, NOWHERE, SEEKING)), state[j])
+        if not any_is(state, SEEKING):
+            return
 
 
 @Inner

@@ -319,7 +319,7 @@ def answer_batches(fns, held, columns, monotone, asked, out, reasons):  # type: 
         for ahead in (True, False):
             p = flat[: count * n].reshape(count, n)
             if ahead:
-                launch(fns, n, s, p, known, work)
+                launch(fns, n, s, p, known, monotone, work)
             else:
                 turn_round(n, s)
             seek(fns, n, s, p, work)

@@ -1,7 +1,7 @@
 """Columns of a sweep as compiled code reads them: an address and a step each, for one number may stand for many.
 
 They come in this order: the launches, the place that is asked about; of their curves both ends, the period, a place of
-symmetry and the step to the next; and all parameters.
+symmetry, what it leaves over as a double (NaN where that is not known), and the step to the next; and all parameters.
 """
 
 from typing import Any
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from gqm_sym.runtime.jit import Inner
 
-LAM0, V0, DIRECTION, TARGET, FIRST, LAST, PERIOD, PLACE, NEXT, PARAMETERS = range(10)
+LAM0, V0, DIRECTION, TARGET, FIRST, LAST, PERIOD, PLACE, PLACE_LOW, NEXT, PARAMETERS = range(11)
 
 
 def lay_out(columns: list[NDArray[np.float64]], begin: int, end: int) -> list[NDArray[np.float64]]:

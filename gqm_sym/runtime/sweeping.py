@@ -225,9 +225,21 @@ def _check_least(formulas: "Formulas", columns: dict[str, Array]) -> None:
 
 def _known(formulas: "Formulas", p: list[Array]) -> Iterator[Array]:
     """What is known of each launch's curve, in the order of `columns`."""
-    known = (*formulas.ends(ARRAYS, tuple(p)), *formulas.axes(ARRAYS, tuple(p)))
-    for value, missing in zip(known, (-inf, inf, 0.0, nan, 0.0), strict=True):
+    place, step = formulas.axes(ARRAYS, tuple(p))
+    known = (*formulas.ends(ARRAYS, tuple(p)), place, _left_over(formulas, place, p), step)
+    for value, missing in zip(known, (-inf, inf, 0.0, nan, nan, 0.0), strict=True):
         yield np.asarray(missing if value is None else value, dtype=np.float64)
+
+
+def _left_over(formulas: "Formulas", place: Any, p: list[Array]) -> float | None:
+    """What a place of symmetry leaves over as a double, if it is the same for all launches."""
+    if place is None or np.ndim(place) or not all(column.size for column in p):
+        return None
+    from mpmath import mp
+
+    with mp.workdps(40):
+        exact = formulas.axes(mp, tuple(mp.mpf(float(column.flat[0])) for column in p))[0]
+        return float(mp.mpf(exact) - mp.mpf(float(place)))
 
 
 def _answer(
