@@ -13,7 +13,7 @@ from numba import njit
 
 import generated.cubic_coulomb as friction
 import generated.pendulum as pendulum
-from gqm_sym.runtime import batch_search, batches, entries, legs, swift
+from gqm_sym.runtime import batch_rows, batch_search, batch_times, batches, entries, legs, swift
 from gqm_sym.runtime.leg_stretches import read_panels
 from gqm_sym.runtime.surveying import survey
 
@@ -73,15 +73,15 @@ def dissipative() -> list[tuple[str, float]]:
 
 def sweeping() -> list[tuple[str, float]]:
     """Parts of an orbit's share of a sweep over pendulums, on one core."""
-    each, n = pendulum.MODEL.each, batches.BATCH
+    each, n = pendulum.MODEL.each, batch_rows.BATCH
     fns, held = each.addresses(), (each.held, each.top_held)
     launch, seek, turn_round, prove = (
         getattr(batch_search, name) for name in ("launch", "seek", "turn_round", "prove")
     )
-    times = batches.times
-    start = np.zeros((batch_search.ROWS, n))
-    start[batch_search.WHO], start[batch_search.WAY] = np.arange(n), 1.0
-    start[batch_search.START] = np.random.default_rng(0).uniform(0.05, 2.5, n) - np.pi / 2
+    times = batch_times.times
+    start = np.zeros((batch_rows.ROWS, n))
+    start[batch_rows.WHO], start[batch_rows.WAY] = np.arange(n), 1.0
+    start[batch_rows.START] = np.random.default_rng(0).uniform(0.05, 2.5, n) - np.pi / 2
     p = np.repeat(pendulum.MODEL.numbers(tuple(pendulum.PARAMETERS.values())).values[:, None], n, axis=1)
     count, given = len(p), np.append(p.reshape(-1), np.zeros(max(held) * n))
     known, work = (
@@ -105,14 +105,14 @@ def sweeping() -> list[tuple[str, float]]:
     @njit
     def clock(s: Any, found: Any, flat: Any, given: Any, work: Any, chosen: Any, out: Any, reasons: Any) -> None:
         s[:], flat[:] = found, given
-        times(fns, batches.SWING, True, n, s, flat, count, held, chosen, work, swift.HALF, out, reasons)
+        times(fns, batch_times.SWING, True, n, s, flat, count, held, chosen, work, swift.HALF, out, reasons)
 
     s, flat = start.copy(), given.copy()
     search(s, start, p, known, work)
-    found, other = s.copy(), s[batch_search.A]
-    found[batch_search.LEAST], found[batch_search.MOST] = np.minimum(other, 0.0), np.maximum(other, 0.0)
-    found[batch_search.A] = found[batch_search.START] + found[batch_search.LEAST]
-    found[batch_search.B] = found[batch_search.START] + found[batch_search.MOST]
+    found, other = s.copy(), s[batch_rows.A]
+    found[batch_rows.LEAST], found[batch_rows.MOST] = np.minimum(other, 0.0), np.maximum(other, 0.0)
+    found[batch_rows.A] = found[batch_rows.START] + found[batch_rows.LEAST]
+    found[batch_rows.B] = found[batch_rows.START] + found[batch_rows.MOST]
     return [
         ("an orbit of a sweep: its turning points, guessed", least(lambda: search(s, start, p, known, work)) / n),
         ("- proved by intervals, where symbols do not tell", least(lambda: proof(s, found, p, work)) / n),

@@ -1,11 +1,30 @@
-"""The turning points of many orbits at once: guessed by Newton's method, and proved by interval bounds.
-
-A batch is an array with a row for each quantity and a column for each orbit, beside the run-time parameters, a row
-each. Every step is a loop over the columns without branches, which vectorises.
-"""
+"""The turning points of many orbits at once: guessed by Newton's method, and proved by interval bounds."""
 
 from math import fabs, inf
 
+from gqm_sym.runtime.batch_rows import (
+    AHEAD,
+    AXIS,
+    BACK,
+    CLOSED,
+    FOUND,
+    LEAST,
+    LEFT,
+    MOST,
+    NOWHERE,
+    REACH,
+    RIGHT,
+    SEEKING,
+    SPEED,
+    START,
+    STATE,
+    STEP,
+    TRIAL,
+    WAY,
+    A,
+    B,
+    any_is,
+)
 from gqm_sym.runtime.crossing import call_bounds_each, call_rise_each
 from gqm_sym.runtime.entries import ALL_BUT, UNCLEAR, to_axis
 from gqm_sym.runtime.fused import choose, whole_below
@@ -13,27 +32,12 @@ from gqm_sym.runtime.jit import Inner
 from gqm_sym.runtime.search import UNRESOLVED
 from gqm_sym.runtime.swift import CIRCULATION
 
-# Rows of a batch: which launch, and what the quadrature keeps of it; offsets of both ends from it, both ends; the
-# launch's place and V**2, which the quadrature needs of laps alone; what the search needs: which way it goes and how
-# far at most, and how far the other way, its state, bracket, trial and the zero, how far the axis of symmetry is that
-# the orbit may have, and the step from one axis to the next.
-WHO, SUM, VALUE, CHANGE, LOW, HIGH, LEAST, MOST, A, B, START, SPEED, LASTING = range(13)
-WAY, REACH, BACK, STATE, LEFT, RIGHT, TRIAL, AHEAD, AXIS, STEP, ROWS = range(12, 23)
-# How far back it is on a closed curve: both zeros lie within one period.
-CLOSED = -1.0
-# What a search has come to.
-SEEKING, FOUND, NOWHERE = 0.0, 1.0, 2.0
 # Trials of a search, and the relative step after which the next would be below rounding.
 TRIALS, CLOSE = 40, 1e-9
-
-
-@Inner
-def any_is(row, value):  # type: ignore[no-untyped-def]
-    """Whether a value is in a row: a loop of its own, for a loop that also counts stays scalar."""
-    found = False
-    for v in row:
-        found |= v == value
-    return found
+# Roundings by which the middle of an orbit may miss the axis that makes it its own mirror image.
+ROUNDINGS = 8.0 * 2.0**-52
+# An orbit about one axis that reaches its neighbours, twice a step apart, is at rest there.
+NEIGHBOURING = 1.999
 
 
 @Inner
@@ -132,6 +136,35 @@ def seek(fns, n, s, p, work):  # type: ignore[no-untyped-def]
             state[j] = choose(live, choose(close, FOUND, choose(lost, NOWHERE, SEEKING)), state[j])
         if not any_is(state, SEEKING):
             return
+
+
+@Inner
+def judge(n, s):  # type: ignore[no-untyped-def]
+    """Set the state by whether the turning point ahead is one, and the trial by whether the body goes round instead."""
+    state, trial, zero, reach = s[STATE, :n], s[TRIAL, :n], s[AHEAD, :n], s[REACH, :n]
+    way, w0, back = s[WAY, :n], s[SPEED, :n], s[BACK, :n]
+    for j in range(n):
+        round_it = (state[j] == NOWHERE) & (way[j] * w0[j] != 0.0) & (back[j] == CLOSED)
+        trial[j] = choose(round_it, FOUND, NOWHERE)
+    for j in range(n):
+        state[j] = choose((state[j] == FOUND) & (zero[j] <= reach[j]), FOUND, NOWHERE)
+
+
+@Inner
+def set_ends(n, s):  # type: ignore[no-untyped-def]
+    """Set both ends; the state by whether the orbit is its own mirror image, the trial by whether about one axis."""
+    start, least, most, a, b = s[START, :n], s[LEAST, :n], s[MOST, :n], s[A, :n], s[B, :n]
+    way, zero, axis, step, state, trial = s[WAY, :n], s[AHEAD, :n], s[AXIS, :n], s[STEP, :n], s[STATE, :n], s[TRIAL, :n]
+    for j in range(n):
+        first, second = a[j], way[j] * zero[j]
+        missed = fabs(0.5 * (first + second) - axis[j])
+        even = missed <= ROUNDINGS * (fabs(start[j]) + fabs(first) + fabs(second))
+        between = (step[j] == 0.0) | (fabs(first - second) < NEIGHBOURING * step[j])
+        state[j], trial[j] = choose(even, FOUND, NOWHERE), choose(between, FOUND, NOWHERE)
+    for j in range(n):
+        first, second = a[j], way[j] * zero[j]
+        least[j], most[j] = choose(first < second, first, second), choose(first < second, second, first)
+        a[j], b[j] = start[j] + least[j], start[j] + most[j]
 
 
 @Inner
