@@ -164,7 +164,21 @@ def _power(base: str, exponent: str) -> str:
 def _mathml(form: sp.Basic) -> str:
     # Entities that HTML names are unknown to XML.
     text: str = sp.mathml(form, printer="presentation")
-    return re.sub(r"&[A-Za-z]\w+;", lambda found: _kept(found[0]), text)
+    return re.sub(r"&[A-Za-z]\w+;", lambda found: _kept(found[0]), _unfenced(text))
+
+
+def _unfenced(text: str) -> str:
+    """Parentheses as signs: SymPy before 1.14 has an element for them that browsers no longer draw."""
+    closing: list[str] = []
+
+    def replaced(found: re.Match[str]) -> str:
+        if found[0].startswith("</"):
+            return f"<mo>{closing.pop()}</mo></mrow>"
+        marks = dict(re.findall(r'(\w+)="([^"]*)"', found[0]))
+        closing.append(marks.get("close", ")"))
+        return f"<mrow><mo>{marks.get('open', '(')}</mo>"
+
+    return re.sub(r"</?mfenced[^>]*>", replaced, text)
 
 
 def _kept(entity: str) -> str:

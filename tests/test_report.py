@@ -8,7 +8,7 @@ import pytest
 
 import gqm_sym as gqm
 from gqm_sym.cli import tool
-from gqm_sym.report import _formulas
+from gqm_sym.report import _formulas, _unfenced
 
 HTML, SVG, MATH = (
     "{http://www.w3.org/1999/xhtml}",
@@ -102,6 +102,13 @@ def test_formulas_are_written_as_people_write_them() -> None:
     assert any(text.startswith("W=V2=") for text in texts)
     assert any("sgnV" in text and "sgnN" in text for text in texts)
     assert not any("chart" in text or "contact" in text for text in texts)
+
+
+def test_parentheses_of_older_printers_are_drawn() -> None:
+    """SymPy 1.13 prints an element that browsers have dropped, with the signs as its attributes."""
+    old = '<mi>f</mi><mfenced><mi>x</mi><mfenced close="|" open="|"><mi>y</mi></mfenced></mfenced>'
+    new = "<mi>f</mi><mrow><mo>(</mo><mi>x</mi><mrow><mo>|</mo><mi>y</mi><mo>|</mo></mrow><mo>)</mo></mrow>"
+    assert _unfenced(old) == new
 
 
 @pytest.mark.parametrize("launch", [["--lam0=0"], ["--lam0=pi/2", "--v0=9", "--t-max=1"]])
