@@ -1,6 +1,7 @@
 """Orbits about an axis as integrals without sines: their times are those of the motion."""
 
 from collections.abc import Callable
+from pathlib import Path
 from types import ModuleType
 from typing import Any
 
@@ -112,6 +113,18 @@ def test_a_pendulum_has_the_elliptic_integral() -> None:
     assert swing.pace.free_symbols >= {APART, length, g}
     assert stretch == sp.cos(HALF / 4) ** 4
     assert dict(swing.ends)[TOP] == (sp.sin(HALF / 4) / sp.cos(HALF / 4)) ** 2
+
+
+def test_names_of_parameters_that_are_ours(tmp_path: Path) -> None:
+    """Run-time parameters may have the names of what an orbit is described by."""
+    names = ["fall", "half", "halves", "top", "top_lack", "top_apart", "top_sine", "stretch", "scale"]
+    curve = gqm.Curve.graph(f"-({'+'.join(names)})*cos(x)", parameter="x", parameters=dict.fromkeys(names, "1/8"))
+    module = gqm.build(gqm.derive(curve, gqm.Gravity()), name="ours", folder=tmp_path)
+    places = [0.5, 1.2, 2.4]
+    swept = module.sweep("half_period", places, half=[0.1, 0.2, 0.3], top=0.5).values
+    for value, place, half in zip(swept, places, (0.1, 0.2, 0.3), strict=True):
+        truth = module.solve(place, half=half, top=0.5).half_period
+        assert abs(value - float(truth)) <= 5 * np.spacing(value)
 
 
 # Orbits whose times were taken for settled when one change of the rule was small by accident, and neighbours.

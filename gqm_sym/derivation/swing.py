@@ -105,7 +105,7 @@ def swing(climb: sp.Expr, ds: sp.Expr, lam: sp.Symbol, symmetry: Symmetry | None
         (TOP_SINE, waves.sine(rate * HALF / 2) ** 2),
         (STRETCH, cosine**4),
     )
-    return Swing(pace, factor, more**-2 if pace.has(SCALE) else None, ends)
+    return Swing(pace, factor, more**-2 if pace.has(SCALE) or factor.has(SCALE) else None, ends)
 
 
 def _drop(height: sp.Expr, square: sp.Symbol, top: sp.Symbol, gap: sp.Expr) -> sp.Expr:
