@@ -14,7 +14,7 @@ from math import gcd, lcm
 import sympy as sp
 
 from gqm_sym.derivation.difference import Differences
-from gqm_sym.derivation.symmetry import MAX_OPERATIONS, Symmetry
+from gqm_sym.derivation.symmetry import MAX_OPERATIONS, Symmetry, is_half_turn
 
 # A wave of so many times the slowest one's rate is written by powers of that one.
 MAX_MULTIPLE = 8
@@ -84,7 +84,7 @@ def swing(climb: sp.Expr, ds: sp.Expr, lam: sp.Symbol, symmetry: Symmetry | None
         return Swing(metric / drop, drop, None, ((TOP, HALF**2),)) if drop else None
     waves = next((waves for waves in (_CIRCULAR, _HYPERBOLIC) if heads <= {waves.sine, waves.cosine}), None)
     found = None if waves is None else _of_waves(forms, d, waves)
-    if waves is None or found is None or (waves.sign < 0 and not _is_half_turn(symmetry.step, found[0])):
+    if waves is None or found is None or (waves.sign < 0 and not is_half_turn(symmetry.step, found[0])):
         return None  # beyond half a turn Y falls again
     rate, height, metric = found
     # V**2 = (TOP_SINE - _SINE)*drop, and both factors of that difference are known by Y.
@@ -113,10 +113,6 @@ def _drop(height: sp.Expr, square: sp.Symbol, top: sp.Symbol, gap: sp.Expr) -> s
     drop = Differences(square, (square, top), {(0, 1): gap}).first(height, 0, 1)
     # Products are written out: their terms may cancel, as those of cos**2 and sin**2 do.
     return sp.Mul(*(sp.expand(f) if f.is_polynomial(square, top) else f for f in sp.Mul.make_args(drop)))
-
-
-def _is_half_turn(step: sp.Expr | None, rate: sp.Expr) -> bool:
-    return step is not None and sp.simplify(step * abs(rate) - sp.pi) == 0
 
 
 def _even(form: sp.Expr | None, root: sp.Symbol, square: sp.Expr) -> sp.Expr | None:

@@ -76,6 +76,11 @@ def _is_even(form: sp.Expr, lam: sp.Symbol, place: sp.Expr) -> bool:
     return mirrored == form or bool(form.count_ops() <= MAX_OPERATIONS and sp.expand(mirrored - form) == 0)
 
 
+def is_half_turn(step: sp.Expr | None, rate: sp.Expr) -> bool:
+    """Whether a step is half a turn of a wave of this rate."""
+    return step is not None and sp.simplify(step * abs(rate) - sp.pi) == 0
+
+
 def _only_there(slope: sp.Expr, lam: sp.Symbol, place: sp.Expr, step: sp.Expr | None) -> bool:
     """Whether a slope vanishes at places of symmetry and nowhere else: a wave, a power, or a hyperbolic sine."""
     shape = slope.as_independent(lam, as_Add=False)[1]
@@ -83,7 +88,7 @@ def _only_there(slope: sp.Expr, lam: sp.Symbol, place: sp.Expr, step: sp.Expr | 
         return False
     if isinstance(shape, _WAVES):
         rate = shape.args[0].diff(lam)
-        return not rate.has(lam) and step is not None and sp.simplify(step * abs(rate) - sp.pi) == 0
+        return not rate.has(lam) and is_half_turn(step, rate)
     if isinstance(shape, sp.sinh):
         return not shape.args[0].diff(lam).has(lam)
     return bool(shape.as_base_exp()[0] == lam and shape.as_base_exp()[1].is_positive)

@@ -51,7 +51,6 @@ def _bilateral(formulas: Formulas, p: Given, launch: Launch) -> Motion:
     if (direction == 0 or stuck) and _is_cusp(problem, lam0):
         return _from_cusp(problem)
     if direction == 0:
-        _check_place(problem)
         sign = problem.decider.slope_sign()
         if sign == 0:
             return Rest(problem)
