@@ -1,5 +1,5 @@
 # Made by gqm-gen for "circle_coulomb". Do not edit: change its declaration and generate again.
-# interface 5, input 4a697d006329, body 99013c36882b
+# interface 6, input 4a697d006329, body bb0e2a142f87
 """Bead on a rough ring
 
 x              = L*sin(theta)
@@ -27,7 +27,7 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=5)
+compiled = compiler(__file__, interface=6)
 
 from gqm_sym.runtime import (
     DRIVE,

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "circle_drag". Do not edit: change its declaration and generate again.
-# interface 5, input 0816c77462d6, body fa5f47f452dc
+# interface 6, input 0816c77462d6, body 7d4d2d2f6a90
 """Pendulum in air
 
 x              = L*sin(theta)
@@ -26,7 +26,7 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=5)
+compiled = compiler(__file__, interface=6)
 
 from gqm_sym.runtime import (
     DRIVE,

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "circle_droplet". Do not edit: change its declaration and generate again.
-# interface 5, input 41b535597751, body 4af957d3fe9f
+# interface 6, input 41b535597751, body 270e166c39b2
 """Droplet in a round channel
 
 x              = L*sin(theta)
@@ -26,7 +26,7 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=5)
+compiled = compiler(__file__, interface=6)
 
 from gqm_sym.runtime import (
     DRIVE,

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "circle_law". Do not edit: change its declaration and generate again.
-# interface 5, input ba6587cf83ec, body 18a40345af13
+# interface 6, input ba6587cf83ec, body d8ffefb29235
 """Pendulum in dense air
 
 x              = L*sin(theta)
@@ -26,7 +26,7 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=5)
+compiled = compiler(__file__, interface=6)
 
 from gqm_sym.runtime import (
     DRIVE,

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "circle_rotating". Do not edit: change its declaration and generate again.
-# interface 5, input 4ab613b0cbfb, body faee4f4337e3
+# interface 6, input 4ab613b0cbfb, body 9c3b81827a5a
 """Bead on a hoop that turns about its vertical diameter
 
 x              = L*sin(theta)
@@ -25,7 +25,7 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=5)
+compiled = compiler(__file__, interface=6)
 
 from gqm_sym.runtime import (
     BEND,
@@ -196,13 +196,14 @@ def swing_each(n, fall, rise, p, out):
         top_apart = p[5, i]
         top_sine = p[6, i]
         stretch = p[7, i]
-        scale = 1/(fall*top + 1)**2
-        _t0 = fall*top_apart + rise
-        _t1 = Omega**2
-        _t2 = 4*L
-        _t3 = -16*L*_t1*fall*scale*top + 4*L*_t1 - _t1*_t2*top_sine - 4*g
-        out[0, i] = -_t2/(_t0*_t3*stretch)
-        out[1, i] = -L*_t0*_t3
+        _t0 = fall*top
+        _t1 = (_t0 + 1)**2
+        _t2 = fall*top_apart + rise
+        _t3 = Omega**2
+        _t4 = L*_t3
+        _t5 = L*_t1*_t3 - 4*_t0*_t4 - _t1*_t4*top_sine - _t1*g
+        out[0, i] = -L*_t1/(_t2*_t5*stretch)
+        out[1, i] = -4*L*_t2*_t5/_t1
 
 
 @compiled(TOP_EACH, later=True)

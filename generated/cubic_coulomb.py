@@ -1,5 +1,5 @@
 # Made by gqm-gen for "cubic_coulomb". Do not edit: change its declaration and generate again.
-# interface 5, input 366f93db8ec9, body ec6dfc2aa945
+# interface 6, input 366f93db8ec9, body 4c255753d904
 """Cubic track with Coulomb friction
 
 x              = x
@@ -27,7 +27,7 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=5)
+compiled = compiler(__file__, interface=6)
 
 from gqm_sym.runtime import (
     DRIVE,

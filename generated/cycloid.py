@@ -1,5 +1,5 @@
 # Made by gqm-gen for "cycloid". Do not edit: change its declaration and generate again.
-# interface 5, input bb93c1ef9815, body 804b599aaa4f
+# interface 6, input bb93c1ef9815, body f77b81d7796f
 """Bead on an arch of a cycloid
 
 x              = R*(theta - sin(theta))
@@ -24,7 +24,7 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=5)
+compiled = compiler(__file__, interface=6)
 
 from gqm_sym.runtime import (
     BEND,

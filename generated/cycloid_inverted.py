@@ -1,5 +1,5 @@
 # Made by gqm-gen for "cycloid_inverted". Do not edit: change its declaration and generate again.
-# interface 5, input 2cc87984e0a0, body 46171a70db95
+# interface 6, input 2cc87984e0a0, body 064e6f04f824
 """Bead in an inverted cycloid
 
 x              = R*(theta - sin(theta))
@@ -24,7 +24,7 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=5)
+compiled = compiler(__file__, interface=6)
 
 from gqm_sym.runtime import (
     BEND,

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "double_well". Do not edit: change its declaration and generate again.
-# interface 5, input 28c16d144828, body c6fda33a7ccf
+# interface 6, input 28c16d144828, body cc9000fd8870
 """Bead between two wells
 
 x              = x
@@ -25,7 +25,7 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=5)
+compiled = compiler(__file__, interface=6)
 
 from gqm_sym.runtime import (
     BEND,

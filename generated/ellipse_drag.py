@@ -1,5 +1,5 @@
 # Made by gqm-gen for "ellipse_drag". Do not edit: change its declaration and generate again.
-# interface 5, input 85e32f4b5095, body 4046b3393ed0
+# interface 6, input 85e32f4b5095, body cb44aa70a558
 """Bead on an ellipse, in air
 
 x              = a*cos(theta)
@@ -27,7 +27,7 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=5)
+compiled = compiler(__file__, interface=6)
 
 from gqm_sym.runtime import (
     DRIVE,

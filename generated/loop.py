@@ -1,5 +1,5 @@
 # Made by gqm-gen for "loop". Do not edit: change its declaration and generate again.
-# interface 5, input ef6cb5936f16, body 360470efff14
+# interface 6, input ef6cb5936f16, body e9208a438554
 """Loop of a roller coaster
 
 x              = x(s)
@@ -24,7 +24,7 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=5)
+compiled = compiler(__file__, interface=6)
 
 from gqm_sym.runtime import (
     BEND,

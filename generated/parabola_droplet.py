@@ -1,5 +1,5 @@
 # Made by gqm-gen for "parabola_droplet". Do not edit: change its declaration and generate again.
-# interface 5, input fcd43efdbae3, body ea481135ffe7
+# interface 6, input fcd43efdbae3, body d5d00a251195
 """Droplet in a parabolic channel
 
 x              = x
@@ -27,7 +27,7 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=5)
+compiled = compiler(__file__, interface=6)
 
 from gqm_sym.runtime import (
     DRIVE,

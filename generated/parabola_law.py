@@ -1,5 +1,5 @@
 # Made by gqm-gen for "parabola_law". Do not edit: change its declaration and generate again.
-# interface 5, input 353c2b6305ed, body cae315e324a8
+# interface 6, input 353c2b6305ed, body 00e850ce6582
 """Bead on a parabola, with a resistance that falls with speed
 
 x              = x
@@ -27,7 +27,7 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=5)
+compiled = compiler(__file__, interface=6)
 
 from gqm_sym.runtime import (
     DRIVE,

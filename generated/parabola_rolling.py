@@ -1,5 +1,5 @@
 # Made by gqm-gen for "parabola_rolling". Do not edit: change its declaration and generate again.
-# interface 5, input 821845b71c06, body 0900bf186b6a
+# interface 6, input 821845b71c06, body 37be5fdcc5d3
 """Ball rolling in a parabolic bowl
 
 x              = x*(-2*a*rho/sqrt(4*a**2*x**2 + 1) + 1)
@@ -25,7 +25,7 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=5)
+compiled = compiler(__file__, interface=6)
 
 from gqm_sym.runtime import (
     BEND,

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "planes". Do not edit: change its declaration and generate again.
-# interface 5, input 6aa424d89567, body d19f4188a1a6
+# interface 6, input 6aa424d89567, body 62f48746c85f
 """Stitched planes through surveyed points
 
 x              = x(s)
@@ -24,7 +24,7 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=5)
+compiled = compiler(__file__, interface=6)
 
 from gqm_sym.runtime import (
     BEND,

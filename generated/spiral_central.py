@@ -1,5 +1,5 @@
 # Made by gqm-gen for "spiral_central". Do not edit: change its declaration and generate again.
-# interface 5, input a75a85ae8f6e, body 21d6588c6a2b
+# interface 6, input a75a85ae8f6e, body c32ed8497432
 """Bead on a logarithmic spiral, drawn to its pole
 
 x              = r0*exp(b*theta)*cos(theta)
@@ -25,7 +25,7 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=5)
+compiled = compiler(__file__, interface=6)
 
 from gqm_sym.runtime import (
     BEND,

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "strophoid". Do not edit: change its declaration and generate again.
-# interface 5, input 997282e2d787, body f14d355f145b
+# interface 6, input 997282e2d787, body 7f8b605d1bde
 """Bead on the hanging loop of a right strophoid
 
 F              = x**2*(a - z) - z**2*(a + z)
@@ -32,7 +32,7 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=5)
+compiled = compiler(__file__, interface=6)
 
 from gqm_sym.runtime import (
     BEND,

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "superellipse". Do not edit: change its declaration and generate again.
-# interface 5, input f556e3e2c1ab, body fbf5bec0c47d
+# interface 6, input f556e3e2c1ab, body 948a6c6b33ef
 """Bead inside a superellipse, flat at its lowest point
 
 F              = -1 + z**4/b**4 + x**4/a**4
@@ -32,7 +32,7 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=5)
+compiled = compiler(__file__, interface=6)
 
 from gqm_sym.runtime import (
     BEND,

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "track". Do not edit: change its declaration and generate again.
-# interface 5, input f6b2958be28b, body 6e847eb09903
+# interface 6, input f6b2958be28b, body b4015bafcff6
 """Hills of a roller coaster, as surveyed
 
 x              = x(s)
@@ -24,7 +24,7 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=5)
+compiled = compiler(__file__, interface=6)
 
 from gqm_sym.runtime import (
     BEND,
