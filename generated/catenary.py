@@ -1,5 +1,5 @@
 # Made by gqm-gen for "catenary". Do not edit: change its declaration and generate again.
-# interface 6, input cd1fa4541ae4, body b44b215424c1
+# interface 6, input cd1fa4541ae4, body 856be29c8727
 """Bead on a hanging chain
 
 x              = x
@@ -18,7 +18,7 @@ liftoff        : g/cosh(x/c) + (2*c*g*(cosh(lam0/c) - cosh(x/c)) + v0**2)/(c*cos
 """
 
 from math import asinh, fabs, sqrt
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from numba import carray
 
@@ -45,13 +45,15 @@ from gqm_sym.runtime import (
     Formulas,
     Motion,
     Pass1,
-    Sweep,
 )
 from gqm_sym.runtime.differences import cosh1, cosh2
 from gqm_sym.runtime.elementary import cosh, sinh
 from gqm_sym.runtime.intervals import iconst, icosh, idiv, imul, isinh
 from gqm_sym.runtime.places import nearest
 from gqm_sym.runtime.wave_differences import near_cosh2
+
+if TYPE_CHECKING:
+    from gqm_sym.runtime import Sweep
 
 PARAMETERS = {
     'c': '0.8',
@@ -371,7 +373,7 @@ def sweep(
     contact: str = "bilateral",
     client: Any = None,
     c: Any = '0.8', g: Any = '9.81', m: Any = '1',
-) -> Sweep:
+) -> "Sweep":
     """One quantity over arrays of launches and parameters, on all cores; all arguments broadcast.
 
     Parameters

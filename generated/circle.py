@@ -1,5 +1,5 @@
 # Made by gqm-gen for "circle". Do not edit: change its declaration and generate again.
-# interface 6, input 6c3a741d3b21, body c556265403a4
+# interface 6, input 6c3a741d3b21, body 2cb6b4f11c6c
 """Bead that loops round a circle
 
 x              = L*sin(theta)
@@ -18,7 +18,7 @@ liftoff        : g*cos(theta) + (2*L*g*(-cos(lam0) + cos(theta)) + v0**2)/L = 0
 """
 
 from math import sqrt
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from numba import carray
 
@@ -45,13 +45,15 @@ from gqm_sym.runtime import (
     Formulas,
     Motion,
     Pass1,
-    Sweep,
 )
 from gqm_sym.runtime.differences import cos1, cos2
 from gqm_sym.runtime.elementary import atan, cos, sin
 from gqm_sym.runtime.intervals import iconst, imul, isin
 from gqm_sym.runtime.places import nearest
 from gqm_sym.runtime.wave_differences import near_even, near_odd
+
+if TYPE_CHECKING:
+    from gqm_sym.runtime import Sweep
 
 PARAMETERS = {
     'L': '0.9',
@@ -347,7 +349,7 @@ def sweep(
     contact: str = "bilateral",
     client: Any = None,
     L: Any = '0.9', g: Any = '9.81', m: Any = '1',
-) -> Sweep:
+) -> "Sweep":
     """One quantity over arrays of launches and parameters, on all cores; all arguments broadcast.
 
     Parameters

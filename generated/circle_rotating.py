@@ -1,5 +1,5 @@
 # Made by gqm-gen for "circle_rotating". Do not edit: change its declaration and generate again.
-# interface 6, input 4ab613b0cbfb, body 9c3b81827a5a
+# interface 6, input 4ab613b0cbfb, body ee19ef80551b
 """Bead on a hoop that turns about its vertical diameter
 
 x              = L*sin(theta)
@@ -18,7 +18,7 @@ turning points : -L*(L*Omega**2*sin(lam0)**2 + 2*g*cos(lam0)) + L*(L*Omega**2*si
 liftoff        : L*Omega**2*sin(theta)**2 + g*cos(theta) + (-L*(L*Omega**2*sin(lam0)**2 + 2*g*cos(lam0)) + L*(L*Omega**2*sin(theta)**2 + 2*g*cos(theta)) + v0**2)/L = 0
 """
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from numba import carray
 
@@ -45,13 +45,15 @@ from gqm_sym.runtime import (
     Formulas,
     Motion,
     Pass1,
-    Sweep,
 )
 from gqm_sym.runtime.differences import cos1, cos2, sin1, sin2
 from gqm_sym.runtime.elementary import cos, sin
 from gqm_sym.runtime.intervals import iadd, iconst, icos, imul, ipow, isin
 from gqm_sym.runtime.places import nearest
 from gqm_sym.runtime.wave_differences import near_even, near_odd, near_sinc
+
+if TYPE_CHECKING:
+    from gqm_sym.runtime import Sweep
 
 PARAMETERS = {
     'L': '1',
@@ -389,7 +391,7 @@ def sweep(
     contact: str = "bilateral",
     client: Any = None,
     L: Any = '1', Omega: Any = '4', g: Any = '9.81', m: Any = '1',
-) -> Sweep:
+) -> "Sweep":
     """One quantity over arrays of launches and parameters, on all cores; all arguments broadcast.
 
     Parameters

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "circle_spring". Do not edit: change its declaration and generate again.
-# interface 6, input 8941b9022f6d, body 7be338bf9a88
+# interface 6, input 8941b9022f6d, body ff3fd4f4b374
 """Bead on a ring, tied by a spring to a point above its centre
 
 x              = L*sin(theta)
@@ -17,7 +17,7 @@ turning points : -2*L*g*cos(lam0) + 2*L*g*cos(theta) + v0**2 + w**2*(L**2*sin(la
 liftoff        : -L*w**2*sin(theta)**2 + (g - w**2*(L*cos(theta) + h))*cos(theta) + (-2*L*g*cos(lam0) + 2*L*g*cos(theta) + v0**2 + w**2*(L**2*sin(lam0)**2 + (L*cos(lam0) + h)**2) - w**2*(L**2*sin(theta)**2 + (L*cos(theta) + h)**2))/L = 0
 """
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from numba import carray
 
@@ -43,13 +43,15 @@ from gqm_sym.runtime import (
     Formulas,
     Motion,
     Pass1,
-    Sweep,
 )
 from gqm_sym.runtime.differences import cos1, cos2, sin1, sin2
 from gqm_sym.runtime.elementary import cos, sin
 from gqm_sym.runtime.intervals import iadd, iconst, icos, imul, ipow, isin
 from gqm_sym.runtime.places import nearest
 from gqm_sym.runtime.wave_differences import near_even, near_odd, near_sinc
+
+if TYPE_CHECKING:
+    from gqm_sym.runtime import Sweep
 
 PARAMETERS = {
     'L': '1',
@@ -405,7 +407,7 @@ def sweep(
     contact: str = "bilateral",
     client: Any = None,
     L: Any = '1', w: Any = '3', h: Any = '0.5', g: Any = '9.81', m: Any = '1',
-) -> Sweep:
+) -> "Sweep":
     """One quantity over arrays of launches and parameters, on all cores; all arguments broadcast.
 
     Parameters

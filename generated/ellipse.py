@@ -1,5 +1,5 @@
 # Made by gqm-gen for "ellipse". Do not edit: change its declaration and generate again.
-# interface 6, input 3a81da5567d3, body 2bd81874056c
+# interface 6, input 3a81da5567d3, body f91218566746
 """Bead on an ellipse, by the eccentric angle
 
 x              = a*cos(theta)
@@ -18,7 +18,7 @@ liftoff        : a*b*(2*b*g*(sin(lam0) - sin(theta)) + v0**2)/(a**2*sin(theta)**
 """
 
 from math import sqrt
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from numba import carray
 
@@ -46,13 +46,15 @@ from gqm_sym.runtime import (
     Formulas,
     Motion,
     Pass1,
-    Sweep,
 )
 from gqm_sym.runtime.differences import sin1, sin2
 from gqm_sym.runtime.elementary import atan, cos, sin
 from gqm_sym.runtime.intervals import iadd, iconst, icos, imul, ipow, isin, isqrt
 from gqm_sym.runtime.places import nearest
 from gqm_sym.runtime.wave_differences import near_even, near_odd, near_sinc
+
+if TYPE_CHECKING:
+    from gqm_sym.runtime import Sweep
 
 PARAMETERS = {
     'a': '2',
@@ -399,7 +401,7 @@ def sweep(
     contact: str = "bilateral",
     client: Any = None,
     a: Any = '2', b: Any = '1', g: Any = '9.81', m: Any = '1',
-) -> Sweep:
+) -> "Sweep":
     """One quantity over arrays of launches and parameters, on all cores; all arguments broadcast.
 
     Parameters

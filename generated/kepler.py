@@ -1,5 +1,5 @@
 # Made by gqm-gen for "kepler". Do not edit: change its declaration and generate again.
-# interface 6, input a1e1feaf475b, body 6c507005a2da
+# interface 6, input a1e1feaf475b, body 419b9c8bf733
 """Planet on its own ellipse, by the eccentric anomaly
 
 x              = a*(-ecc + cos(E))
@@ -18,7 +18,7 @@ liftoff        : sqrt(1 - ecc**2)*(2*k*(-1/sqrt((1 - ecc**2)*sin(lam0)**2 + (-ec
 """
 
 from math import fabs, sqrt
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from numba import carray
 
@@ -45,13 +45,15 @@ from gqm_sym.runtime import (
     Formulas,
     Motion,
     Pass1,
-    Sweep,
 )
 from gqm_sym.runtime.differences import cos1, cos2, sin1, sin2
 from gqm_sym.runtime.elementary import cos, sin
 from gqm_sym.runtime.intervals import iabs, iadd, iconst, icos, imul, ipow, isin, isqrt
 from gqm_sym.runtime.places import nearest
 from gqm_sym.runtime.wave_differences import near_even, near_odd, near_sinc
+
+if TYPE_CHECKING:
+    from gqm_sym.runtime import Sweep
 
 PARAMETERS = {
     'a': '3/2',
@@ -540,7 +542,7 @@ def sweep(
     contact: str = "bilateral",
     client: Any = None,
     a: Any = '3/2', ecc: Any = '3/5', k: Any = '7/2', m: Any = '1',
-) -> Sweep:
+) -> "Sweep":
     """One quantity over arrays of launches and parameters, on all cores; all arguments broadcast.
 
     Parameters

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "line_spring". Do not edit: change its declaration and generate again.
-# interface 6, input 924b210c4a96, body 899e613e79e8
+# interface 6, input 924b210c4a96, body 842cb225beab
 """Bead on a sloping line, tied to the origin by a spring
 
 x              = x
@@ -17,7 +17,7 @@ turning points : v0**2 + w**2*(lam0**2 - x**2 + (3*lam0 + 8)**2/16 - (3*x + 8)**
 liftoff        : 8*w**2/5 = 0
 """
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from numba import carray
 
@@ -42,9 +42,11 @@ from gqm_sym.runtime import (
     Formulas,
     Motion,
     Pass1,
-    Sweep,
 )
 from gqm_sym.runtime.intervals import iadd, iconst, idiv, imul, ipow
+
+if TYPE_CHECKING:
+    from gqm_sym.runtime import Sweep
 
 PARAMETERS = {
     'w': '1.3',
@@ -287,7 +289,7 @@ def sweep(
     contact: str = "bilateral",
     client: Any = None,
     w: Any = '1.3', m: Any = '1',
-) -> Sweep:
+) -> "Sweep":
     """One quantity over arrays of launches and parameters, on all cores; all arguments broadcast.
 
     Parameters

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "parabola". Do not edit: change its declaration and generate again.
-# interface 6, input 638613fc8598, body f8ceddf46ba5
+# interface 6, input 638613fc8598, body aade2d563566
 """Bead in a parabolic bowl
 
 x              = x
@@ -18,7 +18,7 @@ liftoff        : 2*a*(2*a*g*(lam0**2 - x**2) + v0**2)/(4*a**2*x**2 + 1)**(3/2) +
 """
 
 from math import sqrt
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from numba import carray
 
@@ -45,10 +45,12 @@ from gqm_sym.runtime import (
     Formulas,
     Motion,
     Pass1,
-    Sweep,
 )
 from gqm_sym.runtime.intervals import iadd, iconst, imul, ipow, isqrt
 from gqm_sym.runtime.places import nearest
+
+if TYPE_CHECKING:
+    from gqm_sym.runtime import Sweep
 
 PARAMETERS = {
     'a': '0.7',
@@ -340,7 +342,7 @@ def sweep(
     contact: str = "bilateral",
     client: Any = None,
     a: Any = '0.7', g: Any = '9.81', m: Any = '2',
-) -> Sweep:
+) -> "Sweep":
     """One quantity over arrays of launches and parameters, on all cores; all arguments broadcast.
 
     Parameters

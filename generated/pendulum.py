@@ -1,5 +1,5 @@
 # Made by gqm-gen for "pendulum". Do not edit: change its declaration and generate again.
-# interface 6, input abbc42e6e84e, body 4833886c6592
+# interface 6, input abbc42e6e84e, body a28947b23145
 """Simple pendulum, angle from the horizontal
 
 x              = L*cos(theta)
@@ -18,7 +18,7 @@ liftoff        : -g*sin(theta) + (2*L*g*(sin(lam0) - sin(theta)) + v0**2)/L = 0
 """
 
 from math import sqrt
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from numba import carray
 
@@ -45,13 +45,15 @@ from gqm_sym.runtime import (
     Formulas,
     Motion,
     Pass1,
-    Sweep,
 )
 from gqm_sym.runtime.differences import sin1, sin2
 from gqm_sym.runtime.elementary import atan, cos, sin
 from gqm_sym.runtime.intervals import iconst, icos, imul
 from gqm_sym.runtime.places import nearest
 from gqm_sym.runtime.wave_differences import near_even, near_odd
+
+if TYPE_CHECKING:
+    from gqm_sym.runtime import Sweep
 
 PARAMETERS = {
     'L': '1',
@@ -347,7 +349,7 @@ def sweep(
     contact: str = "bilateral",
     client: Any = None,
     L: Any = '1', g: Any = '9.81', m: Any = '1',
-) -> Sweep:
+) -> "Sweep":
     """One quantity over arrays of launches and parameters, on all cores; all arguments broadcast.
 
     Parameters

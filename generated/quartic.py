@@ -1,5 +1,5 @@
 # Made by gqm-gen for "quartic". Do not edit: change its declaration and generate again.
-# interface 6, input e1ff78064d31, body 0802369aecc5
+# interface 6, input e1ff78064d31, body cb7e66519251
 """Bead in a quartic bowl
 
 x              = x
@@ -18,7 +18,7 @@ liftoff        : g/sqrt(16*x**6 + 1) + 12*x**2*(2*g*(lam0**4 - x**4) + v0**2)/(1
 """
 
 from math import sqrt
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from numba import carray
 
@@ -45,11 +45,13 @@ from gqm_sym.runtime import (
     Formulas,
     Motion,
     Pass1,
-    Sweep,
 )
 from gqm_sym.runtime.differences import ipow1
 from gqm_sym.runtime.intervals import iadd, iconst, imul, ipow, isqrt
 from gqm_sym.runtime.places import nearest
+
+if TYPE_CHECKING:
+    from gqm_sym.runtime import Sweep
 
 PARAMETERS = {
     'g': '9.81',
@@ -330,7 +332,7 @@ def sweep(
     contact: str = "bilateral",
     client: Any = None,
     g: Any = '9.81', m: Any = '1',
-) -> Sweep:
+) -> "Sweep":
     """One quantity over arrays of launches and parameters, on all cores; all arguments broadcast.
 
     Parameters

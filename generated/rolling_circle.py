@@ -1,5 +1,5 @@
 # Made by gqm-gen for "rolling_circle". Do not edit: change its declaration and generate again.
-# interface 6, input aed757e55b8b, body 524c27daa0a3
+# interface 6, input aed757e55b8b, body fecc16c2a3d1
 """Solid sphere rolling in a circular bowl
 
 x              = L*sin(theta)
@@ -18,7 +18,7 @@ liftoff        : g*cos(theta) + (2*L*g*(-cos(lam0) + cos(theta))/(beta + 1) + v0
 """
 
 from math import sqrt
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from numba import carray
 
@@ -45,13 +45,15 @@ from gqm_sym.runtime import (
     Formulas,
     Motion,
     Pass1,
-    Sweep,
 )
 from gqm_sym.runtime.differences import cos1, cos2
 from gqm_sym.runtime.elementary import atan, cos, sin
 from gqm_sym.runtime.intervals import iadd, iconst, idiv, imul, isin
 from gqm_sym.runtime.places import nearest
 from gqm_sym.runtime.wave_differences import near_even, near_odd
+
+if TYPE_CHECKING:
+    from gqm_sym.runtime import Sweep
 
 PARAMETERS = {
     'L': '2',
@@ -358,7 +360,7 @@ def sweep(
     contact: str = "bilateral",
     client: Any = None,
     L: Any = '2', beta: Any = '2/5', g: Any = '9.81', m: Any = '0.3',
-) -> Sweep:
+) -> "Sweep":
     """One quantity over arrays of launches and parameters, on all cores; all arguments broadcast.
 
     Parameters

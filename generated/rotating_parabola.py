@@ -1,5 +1,5 @@
 # Made by gqm-gen for "rotating_parabola". Do not edit: change its declaration and generate again.
-# interface 6, input 9d848a7566cb, body 3c1f756c957e
+# interface 6, input 9d848a7566cb, body 52f57cb2e326
 """Bead in a turning parabolic bowl
 
 x              = x
@@ -19,7 +19,7 @@ liftoff        : 2*a*(v0**2 + (-Omega**2 + 2*a*g)*(lam0**2 - x**2))/(4*a**2*x**2
 """
 
 from math import sqrt
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from numba import carray
 
@@ -46,10 +46,12 @@ from gqm_sym.runtime import (
     Formulas,
     Motion,
     Pass1,
-    Sweep,
 )
 from gqm_sym.runtime.intervals import iadd, iconst, imul, ipow, isqrt
 from gqm_sym.runtime.places import nearest
+
+if TYPE_CHECKING:
+    from gqm_sym.runtime import Sweep
 
 PARAMETERS = {
     'a': '0.6',
@@ -355,7 +357,7 @@ def sweep(
     contact: str = "bilateral",
     client: Any = None,
     a: Any = '0.6', Omega: Any = '2.5', g: Any = '9.81', m: Any = '1.4',
-) -> Sweep:
+) -> "Sweep":
     """One quantity over arrays of launches and parameters, on all cores; all arguments broadcast.
 
     Parameters
