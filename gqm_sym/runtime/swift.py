@@ -14,7 +14,7 @@ from gqm_sym.runtime.columns import DIRECTION, FIRST, LAM0, LAST, NEXT, PARAMETE
 from gqm_sym.runtime.crossing import call_bend, call_rise
 from gqm_sym.runtime.entries import ends
 from gqm_sym.runtime.jit import Inner, entry
-from gqm_sym.runtime.loads import extreme
+from gqm_sym.runtime.orbit_extremes import extreme
 from gqm_sym.runtime.panels import FLOOR, REGULAR, TURN_TURN, lay
 from gqm_sym.runtime.search import LIMIT, TURN
 
