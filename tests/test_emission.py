@@ -52,7 +52,6 @@ TAKEN = (
     "i",
     "n",
     "p",
-    "out",
     "v2",
     "places",
     "speeds",

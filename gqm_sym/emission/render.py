@@ -16,10 +16,11 @@ from gqm_sym.emission.printer import FUNCTIONS, CodePrinter, ExactPrinter, Inter
 from gqm_sym.errors import EmissionError
 
 # The version of gqm_sym.runtime.interface that emitted code is written for (a test holds the two together).
-INTERFACE = 5
+INTERFACE = 6
 
 # Functions that the runtime has in forms that fill vector registers; the rest is the standard library's.
 _ELEMENTARY = frozenset({"cos", "cosh", "exp", "sin", "sinh"})
+_PLACES = frozenset({"left_of", "nearest"})
 _MATH = frozenset({*FUNCTIONS.values(), "sqrt", "pi", "e"} - _ELEMENTARY)
 _RUNTIME = ("Addresses", "Formulas", "Motion", "Pass1", "Sweep")
 # Functions that every module hands over, as the interface orders them.
@@ -85,11 +86,11 @@ def render(module: ModuleIR, *, source: str) -> str:
         "math": sorted(used & _MATH),
         "runtime": sorted(runtime, key=_as_imported),
         "charted": sorted({*charted, "chart_of"}) if charted else [],
-        "differences": sorted(used - _MATH - _ELEMENTARY - charted - near - {"nearest"}),
+        "differences": sorted(used - _MATH - _ELEMENTARY - charted - near - _PLACES),
         "near": sorted(near),
         "elementary": sorted(used & _ELEMENTARY),
         "intervals": sorted(intervals - charted),
-        "nearest": "nearest" in used,
+        "places": sorted(used & _PLACES),
         "defaults": [(repr(name), repr(value)) for name, value in module.defaults],
         "functions": functions,
         "exact": [_exact(f) for f in (*module.exact, *(chart.exact if chart else ()))],
@@ -106,6 +107,7 @@ def render(module: ModuleIR, *, source: str) -> str:
         "exact_formulas": exact,
         "axes": next((f.name for f in module.exact if f.name == "exact_axes"), ""),
         "monotone": module.monotone,
+        "loads": next((f["name"] for f in functions if f["signature"] == "LOADS"), ""),
         "each": ", ".join(_each(module, [f["name"] for f in functions if f["each"]])),
         "dissipation": ", ".join(f"{flag}={value}" for flag, value in module.dissipation),
         "keywords": ", ".join(f"{name}: Any = {value!r}" for name, value in module.defaults),
@@ -216,6 +218,7 @@ def _loop(function: FunctionIR) -> tuple[dict[str, Any], set[str]]:
         "count": count,
         "inside": inside,
         "each": function.each,
+        "later": function.each or function.later,
     }
     return fields, printer.used
 
@@ -253,6 +256,7 @@ def _bounds(function: FunctionIR, parameter: str) -> tuple[dict[str, Any], set[s
         "count": count[0] if count else "",
         "inside": inside,
         "each": function.each,
+        "later": function.each or function.later,
     }
     return fields, printer.used
 

@@ -3,7 +3,7 @@
 An island: it knows numpy, numba and itself, and mpmath only where exact digits are asked for.
 """
 
-from gqm_sym.runtime.formulas import Formulas, Pass1
+from gqm_sym.runtime.formulas import Formulas
 from gqm_sym.runtime.interface import (
     BEND,
     BEND_EACH,
@@ -15,6 +15,7 @@ from gqm_sym.runtime.interface import (
     FRAME,
     HOLD,
     INTERFACE,
+    LOADS,
     ORBIT_EACH,
     RISE,
     RISE_EACH,
@@ -28,6 +29,7 @@ from gqm_sym.runtime.interface import (
     ExactFormulas,
 )
 from gqm_sym.runtime.jit import compiler
+from gqm_sym.runtime.loads import Pass1
 from gqm_sym.runtime.motion import Motion, State
 from gqm_sym.runtime.rail import Rail
 from gqm_sym.runtime.sampled import Sampled
@@ -45,6 +47,7 @@ __all__ = [
     "FRAME",
     "HOLD",
     "INTERFACE",
+    "LOADS",
     "ORBIT_EACH",
     "RISE",
     "RISE_EACH",
