@@ -8,7 +8,6 @@ import numpy as np
 from gqm_sym.runtime import orbits
 from gqm_sym.runtime.course import Course, Pair
 from gqm_sym.runtime.doubledouble import two_product
-from gqm_sym.runtime.exact import SMOOTH_PANELS
 from gqm_sym.runtime.panels import TURN_TURN
 from gqm_sym.runtime.problem import Problem
 from gqm_sym.runtime.stretch import Array
@@ -66,7 +65,8 @@ class Sampler:
             orbits.DIAL: np.array([*course.period, *_inverse(course.period), start, start_low, *ends]),
             orbits.CLOCK: np.array([*course.period, start, start_low, *stretch.whole, stretch.stop, course.pace]),
         }
-        if len(stretch.edges) - 1 <= SMOOTH_PANELS:
+        f = problem.functions
+        if not f.between(f.breaks, stretch.a, stretch.b).size:
             series = fit_wave(stretch.edges, *stretch.clock, stretch.panels[3], there_and_back)
             self._sections[orbits.COSINES], self._sections[orbits.SINES] = series
         if not len(self._sections.get(orbits.COSINES, ())):
