@@ -85,7 +85,8 @@ class Sampler:
             self._tabulate()
             stretch, panels, problem = self._stretch, self._stretch.panels, self._problem
             lengths = self.course.lap_length, problem.arc_origin, self.course.pieces[0].s_a
-            reaches = stretch.table[3].sum(axis=1)
+            segments = stretch.table[3]
+            owners = np.clip(np.searchsorted(stretch.edges, segments[:, 0], side="right") - 1, 0, len(panels[2]) - 2)
             middles = 0.5 * (stretch.edges[1:] + stretch.edges[:-1])
             self._sections |= {
                 orbits.LAUNCH: np.array([problem.lam0, self._v0, *lengths, *self._drift()], dtype=np.float64),
@@ -94,8 +95,8 @@ class Sampler:
                 orbits.LENGTHS: panels[2],
                 orbits.ARCS: panels[4],
                 orbits.CLOCK_ERRORS: stretch.clock_error(middles),
-                orbits.REACHES: reaches,
-                orbits.TABLE_ERRORS: stretch.inversion_error(reaches),
+                orbits.TABLE_ERRORS: stretch.inversion_error(segments.sum(axis=1)),
+                orbits.OWNERS: owners.astype(np.int64),
             }
             self._whole = orbits.record(self._sections)
         return self._whole

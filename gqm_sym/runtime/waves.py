@@ -3,8 +3,8 @@
 The place on a libration is an even function of the phase from the lower turning point, and what the place on a
 circulation has ahead of a steady pace is periodic. Both are analytic where the curve is smooth: a few tens of terms, a
 hundred next to a separatrix, hold them to rounding, and a sum over many times at once by Clenshaw's recurrence fills
-vector registers (`series`). Motions whose series is longer have none, and take the table (`orbits`), at ten times the
-cost.
+vector registers (`series`). Motions whose series is longer have none, and take the table (`orbits`), at three times
+the cost.
 """
 
 from math import cos, fabs, pi, sin
