@@ -34,6 +34,7 @@ from gqm_sym.runtime.integrands import TURN_TURN, speeds
 from gqm_sym.runtime.inversion import TERMS, look_up
 from gqm_sym.runtime.jit import Inlined, Inner, entry
 from gqm_sym.runtime.panels import DEGREE, read_off_block
+from gqm_sym.runtime.stores import put
 from gqm_sym.runtime.waves import sum_wave
 
 BLOCK = 128
@@ -144,7 +145,7 @@ def find_places(record, t, out, begin, end):  # type: ignore[no-untyped-def]
     a, b, launch, lap = dial[6], dial[7], dial[8], dial[9]
     size = min(BLOCK, end - begin)
     phi, sense, laps = np.empty(size), np.empty(size), np.empty(size)
-    spare, segments = np.empty((4, size)), np.empty(size, dtype=np.int64)
+    spare, segments = np.empty((3, size)), np.empty(size, dtype=np.int64)
     for start in range(begin, end, BLOCK):
         n = min(BLOCK, end - start)
         anomalies_at(clock, kind, table, t[start:], n, phi, sense, laps, spare, segments)
@@ -173,15 +174,17 @@ def find_states(record, p, t, out, begin, end):  # type: ignore[no-untyped-def]
     no_field = np.empty((0, 0))
     way = 1.0 if b > a else -1.0
     size = min(BLOCK, end - begin)
-    phi, sense, laps = np.empty(size), np.empty(size), np.empty(size)
-    spare, segments, panels = np.empty((4, size)), np.empty(size, dtype=np.int64), np.empty(size, dtype=np.int64)
-    v, reduced, v2, arc = np.empty(size), np.empty(size), np.empty(size), np.empty(size)
-    work, rows = np.empty((4, size)), np.empty(5 * size)
+    room, whole = (
+        np.empty((19, size)),
+        np.empty((2, size), dtype=np.int64),
+    )  # each of its own would take as long as a time
+    phi, sense, laps, v, reduced, v2, arc = room[0], room[1], room[2], room[3], room[4], room[5], room[6]
+    spare, work, rows, segments, panels = room[7:10], room[10:14], room[14:19], whole[0], whole[1]
     for start in range(begin, end, BLOCK):
         n = min(BLOCK, end - start)
         anomalies_at(clock, kind, table, t[start:], n, phi, sense, laps, spare, segments)
         # The functions of a generated module see rows of as many numbers as they are told.
-        flat = work.reshape(-1)[: 4 * n].reshape(4, n)
+        flat, frame = work.reshape(-1)[: 4 * n].reshape(4, n), rows.reshape(-1)[: 5 * n].reshape(5, n)
         speeds(fns, p, kind, a, b, ref, w, no_field, phi[:n], flat, v)
         for i in range(n):
             panels[i] = owners[segments[i]]
@@ -193,7 +196,6 @@ def find_states(record, p, t, out, begin, end):  # type: ignore[no-untyped-def]
             s = (s_a + way * spread * arc[i]) + laps[i] * lap_length
             reduced[i], v[i] = choose(launched, lam0, place), choose(launched, v0, speed)
             v2[i], arc[i] = v[i] * v[i], choose(launched, s0, s + s0)
-        frame = rows[: 5 * n].reshape(5, n)
         call_frame(fns[0], n, reduced, v2, p, frame)
         for i in range(n):
             ds = frame[2, i]
@@ -201,10 +203,9 @@ def find_states(record, p, t, out, begin, end):  # type: ignore[no-untyped-def]
             rounding = ULP * (1.5 * fabs(lam[i] - reduced[i]) + 2.0 * fabs(reduced[i]))
             error = rate * (late + drift * fabs(when[i]) + clock_errors[panels[i]])
             spare[0, i] = error + table_errors[segments[i]] + rounding
-        place = slice(start, start + n)
-        out[1, place], out[2, place], out[3, place] = arc[:n], frame[0], frame[1]
-        out[4, place], out[5, place], out[6, place] = v[:n], v2[:n], frame[3]
-        out[7, place], out[8, place] = frame[4], spare[0, :n]
+        found = (arc, frame[0], frame[1], v, v2, frame[3], frame[4], spare[0])
+        for k in range(8):
+            put(out[k + 1, start : start + n], found[k], False)
 
 
 @entry(types.void(_LINE, _LINE, _LINE, types.int64, types.int64), nogil=True)

@@ -165,8 +165,9 @@ def sum_wave(dial, cosines, sines, t, out, begin, end):  # type: ignore[no-untyp
     period, period_low, inverse, inverse_low = dial[0], dial[1], dial[2], dial[3]
     phase, phase_low, a, b, launch, lap = dial[4], dial[5], dial[6], dial[7], dial[8], dial[9]
     half = 0.5 * (b - a)
-    w, f, f_low = np.empty(BLOCK), np.empty(BLOCK), np.empty(BLOCK)
-    x, c, work, laps = np.zeros(BLOCK), np.empty(BLOCK), np.empty(BLOCK), np.empty(BLOCK)
+    room = np.empty((7, BLOCK))
+    w, f, f_low, x, c, work, laps = room[0], room[1], room[2], room[3], room[4], room[5], room[6]
+    x[:] = 0.0  # whole groups are summed
     for start in range(begin, end, BLOCK):
         n = min(BLOCK, end - start)
         given, found = t[start : start + n], out[start : start + n]
