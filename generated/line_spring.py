@@ -1,5 +1,5 @@
 # Made by gqm-gen for "line_spring". Do not edit: change its declaration and generate again.
-# interface 6, input 924b210c4a96, body 4cfb8a8cc59d
+# interface 7, input 924b210c4a96, body 8ff058b9ca1d
 """Bead on a sloping line, tied to the origin by a spring
 
 x              = x
@@ -18,14 +18,14 @@ liftoff        : 8*w**2/5 = 0
 """
 
 from math import fabs
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from numba import carray
 
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=6)
+compiled = compiler(__file__, interface=7)
 
 from gqm_sym.runtime import (
     BEND,
@@ -35,19 +35,21 @@ from gqm_sym.runtime import (
     CLIMB,
     FRAME,
     LOADS,
+    MEAN_EACH,
     RISE,
     RISE_EACH,
-    SWING_EACH,
     Addresses,
     Each,
     ExactFormulas,
     Formulas,
     Motion,
     Pass1,
-    Sweep,
 )
 from gqm_sym.runtime.intervals import iadd, iconst, idiv, imul, ipow
 from gqm_sym.runtime.places import left_of
+
+if TYPE_CHECKING:
+    from gqm_sym.runtime import Sweep
 
 PARAMETERS = {
     'w': '1.3',
@@ -145,15 +147,15 @@ def bend_each(n, lows, highs, left, right, p, out):
         out[1, i] = 5/4
 
 
-@compiled(SWING_EACH, later=True)
-def swing_each(n, fall, rise, p, out):
-    """(dt/du)**2 where sin(u)**2 = fall = 1 - rise, and what that is divided by, each for an orbit of its own."""
-    p, out = carray(p, (2, n)), carray(out, (2, n))
+@compiled(MEAN_EACH, later=True)
+def mean_each(n, halves, p, out):
+    """Squares of two numbers, each pair for an orbit of its own: its half period is pi over their agm (Gauss)."""
+    halves, p, out = carray(halves, n), carray(p, (2, n)), carray(out, (2, n))
     for i in range(n):
         w = p[0, i]
         _t0 = w**2
-        out[0, i] = 1/_t0
-        out[1, i] = 25*_t0/16
+        out[0, i] = _t0
+        out[1, i] = _t0
 
 
 @compiled(BOUNDS)
@@ -235,7 +237,7 @@ MODEL = Formulas(
     positive=(),
     addresses=Addresses(frame.address, climb.address, rise.address, bend.address, bounds.address),
     loads=loads,
-    each=Each(rise=rise_each, bend=bend_each, swing=swing_each, bounds=bounds_each),
+    each=Each(rise=rise_each, bend=bend_each, mean=mean_each, bounds=bounds_each),
     domain_of=exact_domain,
     axes_of=exact_axes,
     exact=ExactFormulas(exact_x, exact_z, exact_ds, exact_kappa, exact_reaction, exact_climb, exact_climb_slope),
@@ -312,7 +314,7 @@ def sweep(
     contact: str = "bilateral",
     client: Any = None,
     w: Any = '1.3', m: Any = '1',
-) -> Sweep:
+) -> "Sweep":
     """One quantity over arrays of launches and parameters, on all cores; all arguments broadcast.
 
     Parameters
