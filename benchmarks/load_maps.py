@@ -116,7 +116,7 @@ def truths(form: Callable[..., Any], lam: Any, lam0: float, p: tuple[float, ...]
 
 
 def rows_of(family: Range) -> list[Row]:
-    """Three ways to one family's load map."""
+    """Some ways to one family's load map."""
     name = family.form.__name__
     module = importlib.import_module(f"generated.{name}")
     given = {key: float(value) for key, value in module.PARAMETERS.items()}
@@ -132,8 +132,11 @@ def rows_of(family: Range) -> list[Row]:
 
     loop, printed = by_hand(family.form), lambdified(family.form, len(p))
     work = f"load map, {name.replace('_', ' ')}, a place"
+    field = module.pass1(lam, lam0, SPEED)
     calls: tuple[tuple[str, Callable[[], Any], float], ...] = (
         ("`pass1`, one core", on_one_core(lambda: module.pass1(lam, lam0, SPEED)), 1e-15),
+        ("`pass1(..., out=field)`, one core", on_one_core(lambda: module.pass1(lam, lam0, SPEED, out=field)), 1e-15),
+        ("`pass1(..., out=field)`, all cores", lambda: module.pass1(lam, lam0, SPEED, out=field), 1e-15),
         ("a numba loop by hand, one core", lambda: loop(lam, lam0, SPEED, p, g, m), np.inf),
         ("`lambdify(..., cse=True)` to NumPy", lambda: printed(lam, lam0, SPEED, p, g, m), np.inf),
     )

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "catenary". Do not edit: change its declaration and generate again.
-# interface 6, input cd1fa4541ae4, body 856be29c8727
+# interface 7, input cd1fa4541ae4, body b2cd58773323
 """Bead on a hanging chain
 
 x              = x
@@ -25,7 +25,7 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=6)
+compiled = compiler(__file__, interface=7)
 
 from gqm_sym.runtime import (
     BEND,
@@ -35,6 +35,7 @@ from gqm_sym.runtime import (
     CLIMB,
     CREST_EACH,
     FRAME,
+    LOADS,
     RISE,
     RISE_EACH,
     SWING_EACH,
@@ -49,7 +50,7 @@ from gqm_sym.runtime import (
 from gqm_sym.runtime.differences import cosh1, cosh2
 from gqm_sym.runtime.elementary import cosh, sinh
 from gqm_sym.runtime.intervals import iconst, icosh, idiv, imul, isinh
-from gqm_sym.runtime.places import nearest
+from gqm_sym.runtime.places import left_of, nearest
 from gqm_sym.runtime.wave_differences import near_cosh2
 
 if TYPE_CHECKING:
@@ -78,6 +79,29 @@ def frame(n, places, speeds, p, out):
         out[2, i] = _t1
         out[3, i] = _t2
         out[4, i] = m*(_t2*v2 + g/_t1)
+
+
+@compiled(LOADS, later=True)
+def loads(n, w0, level, places, p, out):
+    """x, z, ds/dx, signed curvature, V**2, contact force (paper, eq. 15), and the size of the heights in V**2."""
+    places, p, out = carray(places, n), carray(p, 3), carray(out, (7, n))
+    c, g, m = p[0], p[1], p[2]
+    _t0 = 1/c
+    _c0 = fabs(c)
+    _c1 = fabs(g)
+    for i in range(n):
+        x = places[i]
+        _t1 = cosh(_t0*x)
+        _t2 = _t1*c
+        _t3 = _t0/_t1**2
+        _t4 = left_of(w0, 2*_t2*g, level)
+        out[0, i] = x
+        out[1, i] = _t2
+        out[2, i] = _t1
+        out[3, i] = _t3
+        out[4, i] = _t4
+        out[5, i] = m*(_t3*_t4 + g/_t1)
+        out[6, i] = 2*_c0*_c1*_t1
 
 
 @compiled(CLIMB)
@@ -297,6 +321,7 @@ MODEL = Formulas(
     parameters=PARAMETERS,
     positive=('c',),
     addresses=Addresses(frame.address, climb.address, rise.address, bend.address, bounds.address),
+    loads=loads,
     each=Each(rise=rise_each, bend=bend_each, swing=swing_each, top=top_each, crest=crest_each, bounds=bounds_each, top_held=4),
     domain_of=exact_domain,
     axes_of=exact_axes,
@@ -305,7 +330,7 @@ MODEL = Formulas(
 )
 
 
-def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, c: Any = '0.8', g: Any = '9.81', m: Any = '1') -> Pass1:
+def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = None, c: Any = '0.8', g: Any = '9.81', m: Any = '1') -> Pass1:
     """Position, metric, curvature, V**2 and contact force at places of the curve (Pass 1, no quadrature).
 
     Parameters
@@ -314,6 +339,8 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, c: Any = '0
         Places on the curve, as values of its parameter x.
     lam0, v0, direction
         Launch place, speed and direction (+1 or -1: the sign of ds/dt).
+    out : Pass1, optional
+        The result of a call before, or six arrays like it, to be filled again: new memory takes as long as the work.
     c, g, m
         Run-time parameters; `PARAMETERS` holds their defaults.
 
@@ -322,7 +349,7 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, c: Any = '0
     Pass1
         Arrays x, z, ds, kappa, v2 and normal_force.
     """
-    return MODEL.pass1(lam, lam0, v0, direction, (c, g, m,))
+    return MODEL.pass1(lam, lam0, v0, direction, (c, g, m,), out)
 
 
 def solve(

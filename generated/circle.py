@@ -1,5 +1,5 @@
 # Made by gqm-gen for "circle". Do not edit: change its declaration and generate again.
-# interface 6, input 6c3a741d3b21, body 2cb6b4f11c6c
+# interface 7, input 6c3a741d3b21, body ddafcf09215e
 """Bead that loops round a circle
 
 x              = L*sin(theta)
@@ -17,7 +17,7 @@ turning points : 2*L*g*(-cos(lam0) + cos(theta)) + v0**2 = 0
 liftoff        : g*cos(theta) + (2*L*g*(-cos(lam0) + cos(theta)) + v0**2)/L = 0
 """
 
-from math import sqrt
+from math import fabs, sqrt
 from typing import TYPE_CHECKING, Any
 
 from numba import carray
@@ -25,7 +25,7 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=6)
+compiled = compiler(__file__, interface=7)
 
 from gqm_sym.runtime import (
     BEND,
@@ -35,6 +35,7 @@ from gqm_sym.runtime import (
     CLIMB,
     CREST_EACH,
     FRAME,
+    LOADS,
     MEAN_EACH,
     ORBIT_EACH,
     RISE,
@@ -49,7 +50,7 @@ from gqm_sym.runtime import (
 from gqm_sym.runtime.differences import cos1, cos2
 from gqm_sym.runtime.elementary import atan, cos, sin
 from gqm_sym.runtime.intervals import iconst, imul, isin
-from gqm_sym.runtime.places import nearest
+from gqm_sym.runtime.places import left_of, nearest
 from gqm_sym.runtime.wave_differences import near_even, near_odd
 
 if TYPE_CHECKING:
@@ -77,6 +78,28 @@ def frame(n, places, speeds, p, out):
         out[2, i] = L
         out[3, i] = _t1
         out[4, i] = m*(_t0*g + _t1*v2)
+
+
+@compiled(LOADS, later=True)
+def loads(n, w0, level, places, p, out):
+    """x, z, ds/dtheta, signed curvature, V**2, contact force (paper, eq. 15), and the size of the heights in V**2."""
+    places, p, out = carray(places, n), carray(p, 3), carray(out, (7, n))
+    L, g, m = p[0], p[1], p[2]
+    _t2 = 1/L
+    _c0 = fabs(L)
+    _c1 = fabs(g)
+    for i in range(n):
+        theta = places[i]
+        _t0 = cos(theta)
+        _t1 = L*_t0
+        _t3 = left_of(w0, -2*_t1*g, level)
+        out[0, i] = L*sin(theta)
+        out[1, i] = -_t1
+        out[2, i] = L
+        out[3, i] = _t2
+        out[4, i] = _t3
+        out[5, i] = m*(_t0*g + _t2*_t3)
+        out[6, i] = 2*_c0*_c1*fabs(_t0)
 
 
 @compiled(CLIMB)
@@ -273,6 +296,7 @@ MODEL = Formulas(
     parameters=PARAMETERS,
     positive=('L',),
     addresses=Addresses(frame.address, climb.address, rise.address, bend.address, bounds.address),
+    loads=loads,
     each=Each(rise=rise_each, bend=bend_each, orbit=orbit_each, mean=mean_each, crest=crest_each, bounds=bounds_each, held=2),
     domain_of=exact_domain,
     axes_of=exact_axes,
@@ -281,7 +305,7 @@ MODEL = Formulas(
 )
 
 
-def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, L: Any = '0.9', g: Any = '9.81', m: Any = '1') -> Pass1:
+def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = None, L: Any = '0.9', g: Any = '9.81', m: Any = '1') -> Pass1:
     """Position, metric, curvature, V**2 and contact force at places of the curve (Pass 1, no quadrature).
 
     Parameters
@@ -290,6 +314,8 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, L: Any = '0
         Places on the curve, as values of its parameter theta.
     lam0, v0, direction
         Launch place, speed and direction (+1 or -1: the sign of ds/dt).
+    out : Pass1, optional
+        The result of a call before, or six arrays like it, to be filled again: new memory takes as long as the work.
     L, g, m
         Run-time parameters; `PARAMETERS` holds their defaults.
 
@@ -298,7 +324,7 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, L: Any = '0
     Pass1
         Arrays x, z, ds, kappa, v2 and normal_force.
     """
-    return MODEL.pass1(lam, lam0, v0, direction, (L, g, m,))
+    return MODEL.pass1(lam, lam0, v0, direction, (L, g, m,), out)
 
 
 def solve(

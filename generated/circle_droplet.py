@@ -1,5 +1,5 @@
 # Made by gqm-gen for "circle_droplet". Do not edit: change its declaration and generate again.
-# interface 6, input 41b535597751, body 79c2661e91c7
+# interface 7, input 41b535597751, body b25d3ea79ea0
 """Droplet in a round channel
 
 x              = L*sin(theta)
@@ -26,7 +26,7 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=6)
+compiled = compiler(__file__, interface=7)
 
 from gqm_sym.runtime import (
     DRIVE,
@@ -120,7 +120,7 @@ MODEL = Formulas(
 )
 
 
-def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, L: Any = '0.02', gamma: Any = '0.072', ell_c: Any = '0.0004', g: Any = '9.81', m: Any = '5e-6') -> Pass1:
+def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = None, L: Any = '0.02', gamma: Any = '0.072', ell_c: Any = '0.0004', g: Any = '9.81', m: Any = '5e-6') -> Pass1:
     """Position, metric, curvature, V**2 and contact force at places of the curve (Pass 1, no quadrature).
 
     Parameters
@@ -129,6 +129,8 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, L: Any = '0
         Places on the curve, as values of its parameter theta.
     lam0, v0, direction
         Launch place, speed and direction (+1 or -1: the sign of ds/dt).
+    out : Pass1, optional
+        The result of a call before, or six arrays like it, to be filled again: new memory takes as long as the work.
     L, gamma, ell_c, g, m
         Run-time parameters; `PARAMETERS` holds their defaults.
 
@@ -137,7 +139,7 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, L: Any = '0
     Pass1
         Arrays x, z, ds, kappa, v2 and normal_force.
     """
-    return MODEL.pass1(lam, lam0, v0, direction, (L, gamma, ell_c, g, m,))
+    return MODEL.pass1(lam, lam0, v0, direction, (L, gamma, ell_c, g, m,), out)
 
 
 def solve(

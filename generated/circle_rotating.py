@@ -1,5 +1,5 @@
 # Made by gqm-gen for "circle_rotating". Do not edit: change its declaration and generate again.
-# interface 6, input 4ab613b0cbfb, body ee19ef80551b
+# interface 7, input 4ab613b0cbfb, body cc2a38136900
 """Bead on a hoop that turns about its vertical diameter
 
 x              = L*sin(theta)
@@ -18,6 +18,7 @@ turning points : -L*(L*Omega**2*sin(lam0)**2 + 2*g*cos(lam0)) + L*(L*Omega**2*si
 liftoff        : L*Omega**2*sin(theta)**2 + g*cos(theta) + (-L*(L*Omega**2*sin(lam0)**2 + 2*g*cos(lam0)) + L*(L*Omega**2*sin(theta)**2 + 2*g*cos(theta)) + v0**2)/L = 0
 """
 
+from math import fabs
 from typing import TYPE_CHECKING, Any
 
 from numba import carray
@@ -25,7 +26,7 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=6)
+compiled = compiler(__file__, interface=7)
 
 from gqm_sym.runtime import (
     BEND,
@@ -34,6 +35,7 @@ from gqm_sym.runtime import (
     BOUNDS_EACH,
     CLIMB,
     FRAME,
+    LOADS,
     ORBIT_EACH,
     RISE,
     RISE_EACH,
@@ -49,7 +51,7 @@ from gqm_sym.runtime import (
 from gqm_sym.runtime.differences import cos1, cos2, sin1, sin2
 from gqm_sym.runtime.elementary import cos, sin
 from gqm_sym.runtime.intervals import iadd, iconst, icos, imul, ipow, isin
-from gqm_sym.runtime.places import nearest
+from gqm_sym.runtime.places import left_of, nearest
 from gqm_sym.runtime.wave_differences import near_even, near_odd, near_sinc
 
 if TYPE_CHECKING:
@@ -79,6 +81,31 @@ def frame(n, places, speeds, p, out):
         out[2, i] = L
         out[3, i] = _t2
         out[4, i] = m*(L*Omega**2*_t0**2 + _t1*g + _t2*v2)
+
+
+@compiled(LOADS, later=True)
+def loads(n, w0, level, places, p, out):
+    """x, z, ds/dtheta, signed curvature, V**2, contact force (paper, eq. 15), and the size of the heights in V**2."""
+    places, p, out = carray(places, n), carray(p, 4), carray(out, (7, n))
+    L, Omega, g, m = p[0], p[1], p[2], p[3]
+    _t2 = 1/L
+    _c0 = fabs(L)
+    _c1 = fabs(g)
+    for i in range(n):
+        theta = places[i]
+        _t0 = sin(theta)
+        _t1 = cos(theta)
+        _t3 = _t1*g
+        _t4 = Omega**2*_t0**2
+        _t5 = L*_t4
+        _t6 = left_of(w0, -L*(2*_t3 + _t5), level)
+        out[0, i] = L*_t0
+        out[1, i] = -L*_t1
+        out[2, i] = L
+        out[3, i] = _t2
+        out[4, i] = _t6
+        out[5, i] = m*(_t2*_t6 + _t3 + _t5)
+        out[6, i] = _c0*(_c0*_t4 + 2*_c1*fabs(_t1))
 
 
 @compiled(CLIMB)
@@ -316,6 +343,7 @@ MODEL = Formulas(
     parameters=PARAMETERS,
     positive=('L',),
     addresses=Addresses(frame.address, climb.address, rise.address, bend.address, bounds.address),
+    loads=loads,
     each=Each(rise=rise_each, bend=bend_each, orbit=orbit_each, swing=swing_each, top=top_each, bounds=bounds_each, held=6, top_held=4),
     domain_of=exact_domain,
     axes_of=exact_axes,
@@ -323,7 +351,7 @@ MODEL = Formulas(
 )
 
 
-def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, L: Any = '1', Omega: Any = '4', g: Any = '9.81', m: Any = '1') -> Pass1:
+def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = None, L: Any = '1', Omega: Any = '4', g: Any = '9.81', m: Any = '1') -> Pass1:
     """Position, metric, curvature, V**2 and contact force at places of the curve (Pass 1, no quadrature).
 
     Parameters
@@ -332,6 +360,8 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, L: Any = '1
         Places on the curve, as values of its parameter theta.
     lam0, v0, direction
         Launch place, speed and direction (+1 or -1: the sign of ds/dt).
+    out : Pass1, optional
+        The result of a call before, or six arrays like it, to be filled again: new memory takes as long as the work.
     L, Omega, g, m
         Run-time parameters; `PARAMETERS` holds their defaults.
 
@@ -340,7 +370,7 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, L: Any = '1
     Pass1
         Arrays x, z, ds, kappa, v2 and normal_force.
     """
-    return MODEL.pass1(lam, lam0, v0, direction, (L, Omega, g, m,))
+    return MODEL.pass1(lam, lam0, v0, direction, (L, Omega, g, m,), out)
 
 
 def solve(

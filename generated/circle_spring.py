@@ -1,5 +1,5 @@
 # Made by gqm-gen for "circle_spring". Do not edit: change its declaration and generate again.
-# interface 6, input 8941b9022f6d, body ff3fd4f4b374
+# interface 7, input 8941b9022f6d, body 13798745106b
 """Bead on a ring, tied by a spring to a point above its centre
 
 x              = L*sin(theta)
@@ -17,6 +17,7 @@ turning points : -2*L*g*cos(lam0) + 2*L*g*cos(theta) + v0**2 + w**2*(L**2*sin(la
 liftoff        : -L*w**2*sin(theta)**2 + (g - w**2*(L*cos(theta) + h))*cos(theta) + (-2*L*g*cos(lam0) + 2*L*g*cos(theta) + v0**2 + w**2*(L**2*sin(lam0)**2 + (L*cos(lam0) + h)**2) - w**2*(L**2*sin(theta)**2 + (L*cos(theta) + h)**2))/L = 0
 """
 
+from math import fabs
 from typing import TYPE_CHECKING, Any
 
 from numba import carray
@@ -24,7 +25,7 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=6)
+compiled = compiler(__file__, interface=7)
 
 from gqm_sym.runtime import (
     BEND,
@@ -33,6 +34,7 @@ from gqm_sym.runtime import (
     BOUNDS_EACH,
     CLIMB,
     FRAME,
+    LOADS,
     MEAN_EACH,
     ORBIT_EACH,
     RISE,
@@ -47,7 +49,7 @@ from gqm_sym.runtime import (
 from gqm_sym.runtime.differences import cos1, cos2, sin1, sin2
 from gqm_sym.runtime.elementary import cos, sin
 from gqm_sym.runtime.intervals import iadd, iconst, icos, imul, ipow, isin
-from gqm_sym.runtime.places import nearest
+from gqm_sym.runtime.places import left_of, nearest
 from gqm_sym.runtime.wave_differences import near_even, near_odd, near_sinc
 
 if TYPE_CHECKING:
@@ -80,6 +82,35 @@ def frame(n, places, speeds, p, out):
         out[2, i] = L
         out[3, i] = _t3
         out[4, i] = m*(-L*_t0**2*_t4 + _t1*(-_t4*(_t2 + h) + g) + _t3*v2)
+
+
+@compiled(LOADS, later=True)
+def loads(n, w0, level, places, p, out):
+    """x, z, ds/dtheta, signed curvature, V**2, contact force (paper, eq. 15), and the size of the heights in V**2."""
+    places, p, out = carray(places, n), carray(p, 5), carray(out, (7, n))
+    L, w, h, g, m = p[0], p[1], p[2], p[3], p[4]
+    _t3 = 1/L
+    _t4 = w**2
+    _c0 = fabs(L)
+    _c1 = fabs(g)
+    _c2 = fabs(h)
+    for i in range(n):
+        theta = places[i]
+        _t0 = sin(theta)
+        _t1 = cos(theta)
+        _t2 = L*_t1
+        _t5 = _t0**2
+        _t6 = L**2*_t5
+        _t7 = _t2 + h
+        _t8 = left_of(w0, -2*_t2*g + _t4*(_t6 + _t7**2), level)
+        _t9 = _c0*fabs(_t1)
+        out[0, i] = L*_t0
+        out[1, i] = -_t2
+        out[2, i] = L
+        out[3, i] = _t3
+        out[4, i] = _t8
+        out[5, i] = m*(-L*_t4*_t5 + _t1*(-_t4*_t7 + g) + _t3*_t8)
+        out[6, i] = 2*_c1*_t9 + _t4*(_t6 + (_c2 + _t9)**2)
 
 
 @compiled(CLIMB)
@@ -332,6 +363,7 @@ MODEL = Formulas(
     parameters=PARAMETERS,
     positive=('L',),
     addresses=Addresses(frame.address, climb.address, rise.address, bend.address, bounds.address),
+    loads=loads,
     each=Each(rise=rise_each, bend=bend_each, orbit=orbit_each, mean=mean_each, bounds=bounds_each, held=8),
     domain_of=exact_domain,
     axes_of=exact_axes,
@@ -339,7 +371,7 @@ MODEL = Formulas(
 )
 
 
-def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, L: Any = '1', w: Any = '3', h: Any = '0.5', g: Any = '9.81', m: Any = '1') -> Pass1:
+def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = None, L: Any = '1', w: Any = '3', h: Any = '0.5', g: Any = '9.81', m: Any = '1') -> Pass1:
     """Position, metric, curvature, V**2 and contact force at places of the curve (Pass 1, no quadrature).
 
     Parameters
@@ -348,6 +380,8 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, L: Any = '1
         Places on the curve, as values of its parameter theta.
     lam0, v0, direction
         Launch place, speed and direction (+1 or -1: the sign of ds/dt).
+    out : Pass1, optional
+        The result of a call before, or six arrays like it, to be filled again: new memory takes as long as the work.
     L, w, h, g, m
         Run-time parameters; `PARAMETERS` holds their defaults.
 
@@ -356,7 +390,7 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, L: Any = '1
     Pass1
         Arrays x, z, ds, kappa, v2 and normal_force.
     """
-    return MODEL.pass1(lam, lam0, v0, direction, (L, w, h, g, m,))
+    return MODEL.pass1(lam, lam0, v0, direction, (L, w, h, g, m,), out)
 
 
 def solve(

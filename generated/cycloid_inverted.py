@@ -1,5 +1,5 @@
 # Made by gqm-gen for "cycloid_inverted". Do not edit: change its declaration and generate again.
-# interface 6, input 2cc87984e0a0, body 1dfcbd78cac9
+# interface 7, input 2cc87984e0a0, body e4d7d9e203a1
 """Bead in an inverted cycloid
 
 x              = R*(theta - sin(theta))
@@ -17,6 +17,7 @@ turning points : 2*R*g*(cos(lam0) - cos(theta)) + v0**2 = 0
 liftoff        : g*sin(theta/2) + (2*R*g*(cos(lam0) - cos(theta)) + v0**2)/(4*R*sin(theta/2)) = 0
 """
 
+from math import fabs
 from typing import TYPE_CHECKING, Any
 
 from numba import carray
@@ -24,7 +25,7 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=6)
+compiled = compiler(__file__, interface=7)
 
 from gqm_sym.runtime import (
     BEND,
@@ -33,6 +34,7 @@ from gqm_sym.runtime import (
     BOUNDS_EACH,
     CLIMB,
     FRAME,
+    LOADS,
     ORBIT_EACH,
     RISE,
     RISE_EACH,
@@ -46,7 +48,7 @@ from gqm_sym.runtime import (
 from gqm_sym.runtime.differences import cos1, cos2
 from gqm_sym.runtime.elementary import cos, sin
 from gqm_sym.runtime.intervals import iconst, icos, idiv, imul, isin
-from gqm_sym.runtime.places import nearest
+from gqm_sym.runtime.places import left_of, nearest
 from gqm_sym.runtime.wave_differences import near_even, near_odd
 
 if TYPE_CHECKING:
@@ -74,6 +76,29 @@ def frame(n, places, speeds, p, out):
         out[2, i] = 2*R*_t0
         out[3, i] = _t1
         out[4, i] = m*(_t0*g + _t1*v2)
+
+
+@compiled(LOADS, later=True)
+def loads(n, w0, level, places, p, out):
+    """x, z, ds/dtheta, signed curvature, V**2, contact force (paper, eq. 15), and the size of the heights in V**2."""
+    places, p, out = carray(places, n), carray(p, 3), carray(out, (7, n))
+    R, g, m = p[0], p[1], p[2]
+    _t2 = 2*R
+    _c0 = fabs(R)
+    _c1 = fabs(g)
+    for i in range(n):
+        theta = places[i]
+        _t0 = cos(theta)
+        _t1 = sin(theta/2)
+        _t3 = 1/(4*R*_t1)
+        _t4 = left_of(w0, _t0*_t2*g, level)
+        out[0, i] = R*(theta - sin(theta))
+        out[1, i] = -R*(1 - _t0)
+        out[2, i] = _t1*_t2
+        out[3, i] = _t3
+        out[4, i] = _t4
+        out[5, i] = m*(_t1*g + _t3*_t4)
+        out[6, i] = 2*_c0*_c1*fabs(_t0)
 
 
 @compiled(CLIMB)
@@ -256,6 +281,7 @@ MODEL = Formulas(
     parameters=PARAMETERS,
     positive=('R',),
     addresses=Addresses(frame.address, climb.address, rise.address, bend.address, bounds.address),
+    loads=loads,
     each=Each(rise=rise_each, bend=bend_each, orbit=orbit_each, bounds=bounds_each, held=2),
     domain_of=exact_domain,
     axes_of=exact_axes,
@@ -263,7 +289,7 @@ MODEL = Formulas(
 )
 
 
-def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, R: Any = '0.5', g: Any = '9.81', m: Any = '1') -> Pass1:
+def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = None, R: Any = '0.5', g: Any = '9.81', m: Any = '1') -> Pass1:
     """Position, metric, curvature, V**2 and contact force at places of the curve (Pass 1, no quadrature).
 
     Parameters
@@ -272,6 +298,8 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, R: Any = '0
         Places on the curve, as values of its parameter theta.
     lam0, v0, direction
         Launch place, speed and direction (+1 or -1: the sign of ds/dt).
+    out : Pass1, optional
+        The result of a call before, or six arrays like it, to be filled again: new memory takes as long as the work.
     R, g, m
         Run-time parameters; `PARAMETERS` holds their defaults.
 
@@ -280,7 +308,7 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, R: Any = '0
     Pass1
         Arrays x, z, ds, kappa, v2 and normal_force.
     """
-    return MODEL.pass1(lam, lam0, v0, direction, (R, g, m,))
+    return MODEL.pass1(lam, lam0, v0, direction, (R, g, m,), out)
 
 
 def solve(

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "double_well". Do not edit: change its declaration and generate again.
-# interface 6, input 28c16d144828, body 5253ca02c664
+# interface 7, input 28c16d144828, body 05eb98de2f00
 """Bead between two wells
 
 x              = x
@@ -17,7 +17,7 @@ turning points : 2*g*h*(lam0**2*(lam0**2 - 2) - x**2*(x**2 - 2)) + v0**2 = 0
 liftoff        : g/sqrt(16*h**2*x**2*(x**2 - 1)**2 + 1) + 4*h*(3*x**2 - 1)*(2*g*h*(lam0**2*(lam0**2 - 2) - x**2*(x**2 - 2)) + v0**2)/(16*h**2*x**2*(x**2 - 1)**2 + 1)**(3/2) = 0
 """
 
-from math import sqrt
+from math import fabs, sqrt
 from typing import TYPE_CHECKING, Any
 
 from numba import carray
@@ -25,7 +25,7 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=6)
+compiled = compiler(__file__, interface=7)
 
 from gqm_sym.runtime import (
     BEND,
@@ -34,6 +34,7 @@ from gqm_sym.runtime import (
     BOUNDS_EACH,
     CLIMB,
     FRAME,
+    LOADS,
     RISE,
     RISE_EACH,
     SWING_EACH,
@@ -47,7 +48,7 @@ from gqm_sym.runtime import (
 )
 from gqm_sym.runtime.differences import ipow1
 from gqm_sym.runtime.intervals import iadd, iconst, imul, ipow, isqrt
-from gqm_sym.runtime.places import nearest
+from gqm_sym.runtime.places import left_of, nearest
 
 if TYPE_CHECKING:
     from gqm_sym.runtime import Sweep
@@ -76,6 +77,32 @@ def frame(n, places, speeds, p, out):
         out[2, i] = _t2
         out[3, i] = _t3
         out[4, i] = m*(_t3*v2 + g/_t2)
+
+
+@compiled(LOADS, later=True)
+def loads(n, w0, level, places, p, out):
+    """x, z, ds/dx, signed curvature, V**2, contact force (paper, eq. 15), and the size of the heights in V**2."""
+    places, p, out = carray(places, n), carray(p, 3), carray(out, (7, n))
+    h, g, m = p[0], p[1], p[2]
+    _c0 = fabs(g)
+    _c1 = fabs(h)
+    for i in range(n):
+        x = places[i]
+        _t0 = x**4
+        _t1 = x**2
+        _t2 = 2*_t1
+        _t3 = h*(_t0 - _t2)
+        _t4 = 16*_t1*h**2*(_t1 - 1)**2 + 1
+        _t5 = sqrt(_t4)
+        _t6 = 4*h*(3*_t1 - 1)/sqrt(_t4)**3
+        _t7 = left_of(w0, 2*_t3*g, level)
+        out[0, i] = x
+        out[1, i] = _t3
+        out[2, i] = _t5
+        out[3, i] = _t6
+        out[4, i] = _t7
+        out[5, i] = m*(_t6*_t7 + g/_t5)
+        out[6, i] = 2*_c0*_c1*(_t0 + _t2)
 
 
 @compiled(CLIMB)
@@ -269,6 +296,7 @@ MODEL = Formulas(
     parameters=PARAMETERS,
     positive=(),
     addresses=Addresses(frame.address, climb.address, rise.address, bend.address, bounds.address),
+    loads=loads,
     each=Each(rise=rise_each, bend=bend_each, swing=swing_each, top=top_each, bounds=bounds_each, top_held=1),
     domain_of=exact_domain,
     axes_of=exact_axes,
@@ -276,7 +304,7 @@ MODEL = Formulas(
 )
 
 
-def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, h: Any = '0.25', g: Any = '9.81', m: Any = '1') -> Pass1:
+def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = None, h: Any = '0.25', g: Any = '9.81', m: Any = '1') -> Pass1:
     """Position, metric, curvature, V**2 and contact force at places of the curve (Pass 1, no quadrature).
 
     Parameters
@@ -285,6 +313,8 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, h: Any = '0
         Places on the curve, as values of its parameter x.
     lam0, v0, direction
         Launch place, speed and direction (+1 or -1: the sign of ds/dt).
+    out : Pass1, optional
+        The result of a call before, or six arrays like it, to be filled again: new memory takes as long as the work.
     h, g, m
         Run-time parameters; `PARAMETERS` holds their defaults.
 
@@ -293,7 +323,7 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, h: Any = '0
     Pass1
         Arrays x, z, ds, kappa, v2 and normal_force.
     """
-    return MODEL.pass1(lam, lam0, v0, direction, (h, g, m,))
+    return MODEL.pass1(lam, lam0, v0, direction, (h, g, m,), out)
 
 
 def solve(

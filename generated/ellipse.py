@@ -1,5 +1,5 @@
 # Made by gqm-gen for "ellipse". Do not edit: change its declaration and generate again.
-# interface 6, input 3a81da5567d3, body f91218566746
+# interface 7, input 3a81da5567d3, body 7176c99dcead
 """Bead on an ellipse, by the eccentric angle
 
 x              = a*cos(theta)
@@ -17,7 +17,7 @@ turning points : 2*b*g*(sin(lam0) - sin(theta)) + v0**2 = 0
 liftoff        : a*b*(2*b*g*(sin(lam0) - sin(theta)) + v0**2)/(a**2*sin(theta)**2 + b**2*cos(theta)**2)**(3/2) - a*g*sin(theta)/sqrt(a**2*sin(theta)**2 + b**2*cos(theta)**2) = 0
 """
 
-from math import sqrt
+from math import fabs, sqrt
 from typing import TYPE_CHECKING, Any
 
 from numba import carray
@@ -25,7 +25,7 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=6)
+compiled = compiler(__file__, interface=7)
 
 from gqm_sym.runtime import (
     BEND,
@@ -35,6 +35,7 @@ from gqm_sym.runtime import (
     CLIMB,
     CREST_EACH,
     FRAME,
+    LOADS,
     ORBIT_EACH,
     RISE,
     RISE_EACH,
@@ -50,7 +51,7 @@ from gqm_sym.runtime import (
 from gqm_sym.runtime.differences import sin1, sin2
 from gqm_sym.runtime.elementary import atan, cos, sin
 from gqm_sym.runtime.intervals import iadd, iconst, icos, imul, ipow, isin, isqrt
-from gqm_sym.runtime.places import nearest
+from gqm_sym.runtime.places import left_of, nearest
 from gqm_sym.runtime.wave_differences import near_even, near_odd, near_sinc
 
 if TYPE_CHECKING:
@@ -82,6 +83,31 @@ def frame(n, places, speeds, p, out):
         out[2, i] = _t3
         out[3, i] = _t4
         out[4, i] = m*(-_t1*a*g/_t3 + _t4*v2)
+
+
+@compiled(LOADS, later=True)
+def loads(n, w0, level, places, p, out):
+    """x, z, ds/dtheta, signed curvature, V**2, contact force (paper, eq. 15), and the size of the heights in V**2."""
+    places, p, out = carray(places, n), carray(p, 4), carray(out, (7, n))
+    a, b, g, m = p[0], p[1], p[2], p[3]
+    _c0 = fabs(b)
+    _c1 = fabs(g)
+    for i in range(n):
+        theta = places[i]
+        _t0 = cos(theta)
+        _t1 = sin(theta)
+        _t2 = _t1*b
+        _t3 = _t0**2*b**2 + _t1**2*a**2
+        _t4 = sqrt(_t3)
+        _t5 = a*b/sqrt(_t3)**3
+        _t6 = left_of(w0, 2*_t2*g, level)
+        out[0, i] = _t0*a
+        out[1, i] = _t2
+        out[2, i] = _t4
+        out[3, i] = _t5
+        out[4, i] = _t6
+        out[5, i] = m*(-_t1*a*g/_t4 + _t5*_t6)
+        out[6, i] = 2*_c0*_c1*fabs(_t1)
 
 
 @compiled(CLIMB)
@@ -325,6 +351,7 @@ MODEL = Formulas(
     parameters=PARAMETERS,
     positive=('a', 'b'),
     addresses=Addresses(frame.address, climb.address, rise.address, bend.address, bounds.address),
+    loads=loads,
     each=Each(rise=rise_each, bend=bend_each, orbit=orbit_each, swing=swing_each, top=top_each, crest=crest_each, bounds=bounds_each, held=4, top_held=4),
     domain_of=exact_domain,
     axes_of=exact_axes,
@@ -333,7 +360,7 @@ MODEL = Formulas(
 )
 
 
-def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, a: Any = '2', b: Any = '1', g: Any = '9.81', m: Any = '1') -> Pass1:
+def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = None, a: Any = '2', b: Any = '1', g: Any = '9.81', m: Any = '1') -> Pass1:
     """Position, metric, curvature, V**2 and contact force at places of the curve (Pass 1, no quadrature).
 
     Parameters
@@ -342,6 +369,8 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, a: Any = '2
         Places on the curve, as values of its parameter theta.
     lam0, v0, direction
         Launch place, speed and direction (+1 or -1: the sign of ds/dt).
+    out : Pass1, optional
+        The result of a call before, or six arrays like it, to be filled again: new memory takes as long as the work.
     a, b, g, m
         Run-time parameters; `PARAMETERS` holds their defaults.
 
@@ -350,7 +379,7 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, a: Any = '2
     Pass1
         Arrays x, z, ds, kappa, v2 and normal_force.
     """
-    return MODEL.pass1(lam, lam0, v0, direction, (a, b, g, m,))
+    return MODEL.pass1(lam, lam0, v0, direction, (a, b, g, m,), out)
 
 
 def solve(

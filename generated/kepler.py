@@ -1,5 +1,5 @@
 # Made by gqm-gen for "kepler". Do not edit: change its declaration and generate again.
-# interface 6, input a1e1feaf475b, body 419b9c8bf733
+# interface 7, input a1e1feaf475b, body 2dd1f44f1ebb
 """Planet on its own ellipse, by the eccentric anomaly
 
 x              = a*(-ecc + cos(E))
@@ -25,7 +25,7 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=6)
+compiled = compiler(__file__, interface=7)
 
 from gqm_sym.runtime import (
     BEND,
@@ -34,6 +34,7 @@ from gqm_sym.runtime import (
     BOUNDS_EACH,
     CLIMB,
     FRAME,
+    LOADS,
     ORBIT_EACH,
     RISE,
     RISE_EACH,
@@ -49,7 +50,7 @@ from gqm_sym.runtime import (
 from gqm_sym.runtime.differences import cos1, cos2, sin1, sin2
 from gqm_sym.runtime.elementary import cos, sin
 from gqm_sym.runtime.intervals import iabs, iadd, iconst, icos, imul, ipow, isin, isqrt
-from gqm_sym.runtime.places import nearest
+from gqm_sym.runtime.places import left_of, nearest
 from gqm_sym.runtime.wave_differences import near_even, near_odd, near_sinc
 
 if TYPE_CHECKING:
@@ -87,6 +88,39 @@ def frame(n, places, speeds, p, out):
         out[2, i] = _t6*a
         out[3, i] = _c1*_t7*_t8
         out[4, i] = m*(-_c0*_c1*k*(_t1*_t2 + _t4)/(_t6*a**3*sqrt(_t0*_t4 + _t2**2)**3) + _c1*_t7*_t8*v2)
+
+
+@compiled(LOADS, later=True)
+def loads(n, w0, level, places, p, out):
+    """x, z, ds/dE, signed curvature, V**2, contact force (paper, eq. 15), and the size of the heights in V**2."""
+    places, p, out = carray(places, n), carray(p, 4), carray(out, (7, n))
+    a, ecc, k, m = p[0], p[1], p[2], p[3]
+    _t0 = ecc**2
+    _t8 = 1/a
+    _c0 = fabs(a)
+    _c1 = fabs(ecc)
+    _c2 = fabs(k)
+    _t1 = 1 - _t0
+    _t11 = 2/_c0
+    _c3 = sqrt(_t1)
+    for i in range(n):
+        E = places[i]
+        _t2 = cos(E)
+        _t3 = _t2 - ecc
+        _t4 = sin(E)
+        _t5 = _t4**2
+        _t6 = _t1*_t2**2 + _t5
+        _t7 = sqrt(_t6)
+        _t9 = 1/sqrt(_t6)**3
+        _t10 = _t1*_t5 + _t3**2
+        _t12 = left_of(w0, -_t11*k/sqrt(_t10), level)
+        out[0, i] = _t3*a
+        out[1, i] = _c3*_t4*a
+        out[2, i] = _t7*a
+        out[3, i] = _c3*_t8*_t9
+        out[4, i] = _t12
+        out[5, i] = m*(-_c0*_c3*k*(_t2*_t3 + _t5)/(_t7*a**3*sqrt(_t10)**3) + _c3*_t12*_t8*_t9)
+        out[6, i] = _c2*_t11*(_t5*(_t0 + 1) + (_c1 + fabs(_t2))**2)/sqrt(fabs(_t10))**3
 
 
 @compiled(CLIMB)
@@ -467,6 +501,7 @@ MODEL = Formulas(
     parameters=PARAMETERS,
     positive=('a',),
     addresses=Addresses(frame.address, climb.address, rise.address, bend.address, bounds.address),
+    loads=loads,
     each=Each(rise=rise_each, bend=bend_each, orbit=orbit_each, swing=swing_each, top=top_each, bounds=bounds_each, held=15, top_held=8),
     domain_of=exact_domain,
     axes_of=exact_axes,
@@ -474,7 +509,7 @@ MODEL = Formulas(
 )
 
 
-def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, a: Any = '3/2', ecc: Any = '3/5', k: Any = '7/2', m: Any = '1') -> Pass1:
+def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = None, a: Any = '3/2', ecc: Any = '3/5', k: Any = '7/2', m: Any = '1') -> Pass1:
     """Position, metric, curvature, V**2 and contact force at places of the curve (Pass 1, no quadrature).
 
     Parameters
@@ -483,6 +518,8 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, a: Any = '3
         Places on the curve, as values of its parameter E.
     lam0, v0, direction
         Launch place, speed and direction (+1 or -1: the sign of ds/dt).
+    out : Pass1, optional
+        The result of a call before, or six arrays like it, to be filled again: new memory takes as long as the work.
     a, ecc, k, m
         Run-time parameters; `PARAMETERS` holds their defaults.
 
@@ -491,7 +528,7 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, a: Any = '3
     Pass1
         Arrays x, z, ds, kappa, v2 and normal_force.
     """
-    return MODEL.pass1(lam, lam0, v0, direction, (a, ecc, k, m,))
+    return MODEL.pass1(lam, lam0, v0, direction, (a, ecc, k, m,), out)
 
 
 def solve(

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "line_spring". Do not edit: change its declaration and generate again.
-# interface 6, input 924b210c4a96, body 842cb225beab
+# interface 7, input 924b210c4a96, body 8ff058b9ca1d
 """Bead on a sloping line, tied to the origin by a spring
 
 x              = x
@@ -17,6 +17,7 @@ turning points : v0**2 + w**2*(lam0**2 - x**2 + (3*lam0 + 8)**2/16 - (3*x + 8)**
 liftoff        : 8*w**2/5 = 0
 """
 
+from math import fabs
 from typing import TYPE_CHECKING, Any
 
 from numba import carray
@@ -24,7 +25,7 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=6)
+compiled = compiler(__file__, interface=7)
 
 from gqm_sym.runtime import (
     BEND,
@@ -33,6 +34,7 @@ from gqm_sym.runtime import (
     BOUNDS_EACH,
     CLIMB,
     FRAME,
+    LOADS,
     MEAN_EACH,
     RISE,
     RISE_EACH,
@@ -44,6 +46,7 @@ from gqm_sym.runtime import (
     Pass1,
 )
 from gqm_sym.runtime.intervals import iadd, iconst, idiv, imul, ipow
+from gqm_sym.runtime.places import left_of
 
 if TYPE_CHECKING:
     from gqm_sym.runtime import Sweep
@@ -66,6 +69,25 @@ def frame(n, places, speeds, p, out):
         out[2, i] = 5/4
         out[3, i] = 0
         out[4, i] = 8*m*w**2/5
+
+
+@compiled(LOADS, later=True)
+def loads(n, w0, level, places, p, out):
+    """x, z, ds/dx, signed curvature, V**2, contact force (paper, eq. 15), and the size of the heights in V**2."""
+    places, p, out = carray(places, n), carray(p, 2), carray(out, (7, n))
+    w, m = p[0], p[1]
+    _t1 = w**2
+    for i in range(n):
+        x = places[i]
+        _t0 = 3*x/4 + 2
+        _t2 = x**2
+        out[0, i] = x
+        out[1, i] = _t0
+        out[2, i] = 5/4
+        out[3, i] = 0
+        out[4, i] = left_of(w0, _t1*(_t0**2 + _t2), level)
+        out[5, i] = 8*_t1*m/5
+        out[6, i] = _t1*(_t2 + (3*fabs(x)/4 + 2)**2)
 
 
 @compiled(CLIMB)
@@ -214,6 +236,7 @@ MODEL = Formulas(
     parameters=PARAMETERS,
     positive=(),
     addresses=Addresses(frame.address, climb.address, rise.address, bend.address, bounds.address),
+    loads=loads,
     each=Each(rise=rise_each, bend=bend_each, mean=mean_each, bounds=bounds_each),
     domain_of=exact_domain,
     axes_of=exact_axes,
@@ -221,7 +244,7 @@ MODEL = Formulas(
 )
 
 
-def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, w: Any = '1.3', m: Any = '1') -> Pass1:
+def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = None, w: Any = '1.3', m: Any = '1') -> Pass1:
     """Position, metric, curvature, V**2 and contact force at places of the curve (Pass 1, no quadrature).
 
     Parameters
@@ -230,6 +253,8 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, w: Any = '1
         Places on the curve, as values of its parameter x.
     lam0, v0, direction
         Launch place, speed and direction (+1 or -1: the sign of ds/dt).
+    out : Pass1, optional
+        The result of a call before, or six arrays like it, to be filled again: new memory takes as long as the work.
     w, m
         Run-time parameters; `PARAMETERS` holds their defaults.
 
@@ -238,7 +263,7 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, w: Any = '1
     Pass1
         Arrays x, z, ds, kappa, v2 and normal_force.
     """
-    return MODEL.pass1(lam, lam0, v0, direction, (w, m,))
+    return MODEL.pass1(lam, lam0, v0, direction, (w, m,), out)
 
 
 def solve(

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "log_spiral". Do not edit: change its declaration and generate again.
-# interface 6, input 458ba188398a, body 98579f9483a2
+# interface 7, input 458ba188398a, body 54f03796cb34
 """Bead on a logarithmic spiral
 
 x              = r0*exp(b*theta)*cos(theta)
@@ -17,7 +17,7 @@ turning points : 2*g*r0*(exp(b*lam0)*sin(lam0) - exp(b*theta)*sin(theta)) + v0**
 liftoff        : g*(b*cos(theta) - sin(theta))/sqrt(b**2 + 1) + (2*g*r0*(exp(b*lam0)*sin(lam0) - exp(b*theta)*sin(theta)) + v0**2)*exp(-b*theta)/(r0*sqrt(b**2 + 1)) = 0
 """
 
-from math import sqrt
+from math import fabs, sqrt
 from typing import TYPE_CHECKING, Any
 
 from numba import carray
@@ -25,7 +25,7 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=6)
+compiled = compiler(__file__, interface=7)
 
 from gqm_sym.runtime import (
     BEND,
@@ -34,6 +34,7 @@ from gqm_sym.runtime import (
     BOUNDS_EACH,
     CLIMB,
     FRAME,
+    LOADS,
     ORBIT_EACH,
     RISE,
     RISE_EACH,
@@ -47,7 +48,7 @@ from gqm_sym.runtime import (
 from gqm_sym.runtime.differences import exp1, exp2, sin1, sin2
 from gqm_sym.runtime.elementary import cos, exp, sin
 from gqm_sym.runtime.intervals import iadd, iconst, icos, iexp, imul, ipow, isin, isqrt
-from gqm_sym.runtime.places import nearest
+from gqm_sym.runtime.places import left_of, nearest
 from gqm_sym.runtime.wave_differences import near_even, near_odd
 
 if TYPE_CHECKING:
@@ -82,6 +83,35 @@ def frame(n, places, speeds, p, out):
         out[2, i] = _c1*_t3
         out[3, i] = _t5
         out[4, i] = m*(_c0*g*(_t1*b - _t4) + _t5*v2)
+
+
+@compiled(LOADS, later=True)
+def loads(n, w0, level, places, p, out):
+    """x, z, ds/dtheta, signed curvature, V**2, contact force (paper, eq. 15), and the size of the heights in V**2."""
+    places, p, out = carray(places, n), carray(p, 4), carray(out, (7, n))
+    r0, b, g, m = p[0], p[1], p[2], p[3]
+    _t0 = sqrt(b**2 + 1)
+    _c0 = fabs(g)
+    _c1 = fabs(r0)
+    _c2 = 1/_t0
+    _c3 = _t0
+    for i in range(n):
+        theta = places[i]
+        _t1 = cos(theta)
+        _t2 = b*theta
+        _t3 = exp(_t2)
+        _t4 = _t3*r0
+        _t5 = sin(theta)
+        _t6 = _t4*_t5
+        _t7 = _c2*exp(-_t2)/r0
+        _t8 = left_of(w0, 2*_t6*g, level)
+        out[0, i] = _t1*_t4
+        out[1, i] = _t6
+        out[2, i] = _c3*_t4
+        out[3, i] = _t7
+        out[4, i] = _t8
+        out[5, i] = m*(_c2*g*(_t1*b - _t5) + _t7*_t8)
+        out[6, i] = 2*_c0*_c1*_t3*fabs(_t5)
 
 
 @compiled(CLIMB)
@@ -286,13 +316,14 @@ MODEL = Formulas(
     parameters=PARAMETERS,
     positive=('r0',),
     addresses=Addresses(frame.address, climb.address, rise.address, bend.address, bounds.address),
+    loads=loads,
     each=Each(rise=rise_each, bend=bend_each, orbit=orbit_each, bounds=bounds_each, held=5),
     domain_of=exact_domain,
     exact=ExactFormulas(exact_x, exact_z, exact_ds, exact_kappa, exact_reaction, exact_climb, exact_climb_slope),
 )
 
 
-def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, r0: Any = '1', b: Any = '0.15', g: Any = '9.81', m: Any = '1') -> Pass1:
+def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = None, r0: Any = '1', b: Any = '0.15', g: Any = '9.81', m: Any = '1') -> Pass1:
     """Position, metric, curvature, V**2 and contact force at places of the curve (Pass 1, no quadrature).
 
     Parameters
@@ -301,6 +332,8 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, r0: Any = '
         Places on the curve, as values of its parameter theta.
     lam0, v0, direction
         Launch place, speed and direction (+1 or -1: the sign of ds/dt).
+    out : Pass1, optional
+        The result of a call before, or six arrays like it, to be filled again: new memory takes as long as the work.
     r0, b, g, m
         Run-time parameters; `PARAMETERS` holds their defaults.
 
@@ -309,7 +342,7 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, r0: Any = '
     Pass1
         Arrays x, z, ds, kappa, v2 and normal_force.
     """
-    return MODEL.pass1(lam, lam0, v0, direction, (r0, b, g, m,))
+    return MODEL.pass1(lam, lam0, v0, direction, (r0, b, g, m,), out)
 
 
 def solve(

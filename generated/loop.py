@@ -1,5 +1,5 @@
 # Made by gqm-gen for "loop". Do not edit: change its declaration and generate again.
-# interface 6, input ef6cb5936f16, body d4d95950fda2
+# interface 7, input ef6cb5936f16, body f9e8a7d81519
 """Loop of a roller coaster
 
 x              = x(s)
@@ -24,7 +24,7 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=6)
+compiled = compiler(__file__, interface=7)
 
 from gqm_sym.runtime import (
     BEND,
@@ -169,7 +169,7 @@ MODEL = Formulas(
 )
 
 
-def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, a: Any = '2', c: Any = '2', R: Any = '1.5', g: Any = '9.81', m: Any = '1') -> Pass1:
+def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = None, a: Any = '2', c: Any = '2', R: Any = '1.5', g: Any = '9.81', m: Any = '1') -> Pass1:
     """Position, metric, curvature, V**2 and contact force at places of the curve (Pass 1, no quadrature).
 
     Parameters
@@ -178,6 +178,8 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, a: Any = '2
         Places on the curve, as values of its parameter s.
     lam0, v0, direction
         Launch place, speed and direction (+1 or -1: the sign of ds/dt).
+    out : Pass1, optional
+        The result of a call before, or six arrays like it, to be filled again: new memory takes as long as the work.
     a, c, R, g, m
         Run-time parameters; `PARAMETERS` holds their defaults.
 
@@ -186,7 +188,7 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, a: Any = '2
     Pass1
         Arrays x, z, ds, kappa, v2 and normal_force.
     """
-    return MODEL.pass1(lam, lam0, v0, direction, (a, c, R, g, m,))
+    return MODEL.pass1(lam, lam0, v0, direction, (a, c, R, g, m,), out)
 
 
 def solve(

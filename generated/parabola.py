@@ -1,5 +1,5 @@
 # Made by gqm-gen for "parabola". Do not edit: change its declaration and generate again.
-# interface 6, input 638613fc8598, body aade2d563566
+# interface 7, input 638613fc8598, body a9faf7a309e6
 """Bead in a parabolic bowl
 
 x              = x
@@ -17,7 +17,7 @@ turning points : 2*a*g*(lam0**2 - x**2) + v0**2 = 0
 liftoff        : 2*a*(2*a*g*(lam0**2 - x**2) + v0**2)/(4*a**2*x**2 + 1)**(3/2) + g/sqrt(4*a**2*x**2 + 1) = 0
 """
 
-from math import sqrt
+from math import fabs, sqrt
 from typing import TYPE_CHECKING, Any
 
 from numba import carray
@@ -25,7 +25,7 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=6)
+compiled = compiler(__file__, interface=7)
 
 from gqm_sym.runtime import (
     BEND,
@@ -35,6 +35,7 @@ from gqm_sym.runtime import (
     CLIMB,
     CREST_EACH,
     FRAME,
+    LOADS,
     RISE,
     RISE_EACH,
     SWING_EACH,
@@ -47,7 +48,7 @@ from gqm_sym.runtime import (
     Pass1,
 )
 from gqm_sym.runtime.intervals import iadd, iconst, imul, ipow, isqrt
-from gqm_sym.runtime.places import nearest
+from gqm_sym.runtime.places import left_of, nearest
 
 if TYPE_CHECKING:
     from gqm_sym.runtime import Sweep
@@ -76,6 +77,30 @@ def frame(n, places, speeds, p, out):
         out[2, i] = _t2
         out[3, i] = _t3
         out[4, i] = m*(_t3*v2 + g/_t2)
+
+
+@compiled(LOADS, later=True)
+def loads(n, w0, level, places, p, out):
+    """x, z, ds/dx, signed curvature, V**2, contact force (paper, eq. 15), and the size of the heights in V**2."""
+    places, p, out = carray(places, n), carray(p, 3), carray(out, (7, n))
+    a, g, m = p[0], p[1], p[2]
+    _c0 = fabs(a)
+    _c1 = fabs(g)
+    for i in range(n):
+        x = places[i]
+        _t0 = x**2
+        _t1 = _t0*a
+        _t2 = 4*_t0*a**2 + 1
+        _t3 = sqrt(_t2)
+        _t4 = 2*a/sqrt(_t2)**3
+        _t5 = left_of(w0, 2*_t1*g, level)
+        out[0, i] = x
+        out[1, i] = _t1
+        out[2, i] = _t3
+        out[3, i] = _t4
+        out[4, i] = _t5
+        out[5, i] = m*(_t4*_t5 + g/_t3)
+        out[6, i] = 2*_c0*_c1*_t0
 
 
 @compiled(CLIMB)
@@ -266,6 +291,7 @@ MODEL = Formulas(
     parameters=PARAMETERS,
     positive=(),
     addresses=Addresses(frame.address, climb.address, rise.address, bend.address, bounds.address),
+    loads=loads,
     each=Each(rise=rise_each, bend=bend_each, swing=swing_each, top=top_each, crest=crest_each, bounds=bounds_each, top_held=1),
     domain_of=exact_domain,
     axes_of=exact_axes,
@@ -274,7 +300,7 @@ MODEL = Formulas(
 )
 
 
-def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, a: Any = '0.7', g: Any = '9.81', m: Any = '2') -> Pass1:
+def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = None, a: Any = '0.7', g: Any = '9.81', m: Any = '2') -> Pass1:
     """Position, metric, curvature, V**2 and contact force at places of the curve (Pass 1, no quadrature).
 
     Parameters
@@ -283,6 +309,8 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, a: Any = '0
         Places on the curve, as values of its parameter x.
     lam0, v0, direction
         Launch place, speed and direction (+1 or -1: the sign of ds/dt).
+    out : Pass1, optional
+        The result of a call before, or six arrays like it, to be filled again: new memory takes as long as the work.
     a, g, m
         Run-time parameters; `PARAMETERS` holds their defaults.
 
@@ -291,7 +319,7 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, a: Any = '0
     Pass1
         Arrays x, z, ds, kappa, v2 and normal_force.
     """
-    return MODEL.pass1(lam, lam0, v0, direction, (a, g, m,))
+    return MODEL.pass1(lam, lam0, v0, direction, (a, g, m,), out)
 
 
 def solve(

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "parabola_rolling". Do not edit: change its declaration and generate again.
-# interface 6, input 821845b71c06, body c28d77920d20
+# interface 7, input 821845b71c06, body 4c2ce4a04a5c
 """Ball rolling in a parabolic bowl
 
 x              = x*(-2*a*rho/sqrt(4*a**2*x**2 + 1) + 1)
@@ -17,7 +17,7 @@ turning points : 2*g*(a*lam0**2 - a*x**2 - rho/sqrt(4*a**2*x**2 + 1) + rho/sqrt(
 liftoff        : 2*a*(2*g*(a*lam0**2 - a*x**2 - rho/sqrt(4*a**2*x**2 + 1) + rho/sqrt(4*a**2*lam0**2 + 1))/(beta + 1) + v0**2)/(-2*a*rho + (4*a**2*x**2 + 1)**(3/2)) + g/sqrt(4*a**2*x**2 + 1) = 0
 """
 
-from math import sqrt
+from math import fabs, sqrt
 from typing import TYPE_CHECKING, Any
 
 from numba import carray
@@ -25,13 +25,14 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=6)
+compiled = compiler(__file__, interface=7)
 
 from gqm_sym.runtime import (
     BEND,
     BOUNDS,
     CLIMB,
     FRAME,
+    LOADS,
     RISE,
     Addresses,
     ExactFormulas,
@@ -40,7 +41,7 @@ from gqm_sym.runtime import (
     Pass1,
 )
 from gqm_sym.runtime.intervals import iadd, iconst, idiv, imul, ipow, isqrt
-from gqm_sym.runtime.places import nearest
+from gqm_sym.runtime.places import left_of, nearest
 
 if TYPE_CHECKING:
     from gqm_sym.runtime import Sweep
@@ -74,6 +75,36 @@ def frame(n, places, speeds, p, out):
         out[2, i] = _t5/_t1
         out[3, i] = _t6
         out[4, i] = m*(_t2*g + _t6*v2)
+
+
+@compiled(LOADS, later=True)
+def loads(n, w0, level, places, p, out):
+    """x, z, ds/dx, signed curvature, V**2, contact force (paper, eq. 15), and the size of the heights in V**2."""
+    places, p, out = carray(places, n), carray(p, 5), carray(out, (7, n))
+    a, beta, rho, g, m = p[0], p[1], p[2], p[3], p[4]
+    _t0 = beta + 1
+    _t5 = 2*a
+    _c0 = fabs(a)
+    _c1 = fabs(g)
+    _c2 = fabs(rho)
+    _c3 = fabs(_t0)
+    for i in range(n):
+        x = places[i]
+        _t1 = x**2
+        _t2 = 4*_t1*a**2 + 1
+        _t3 = 1/sqrt(_t2)
+        _t4 = _t3*rho
+        _t6 = _t1*a + _t4
+        _t7 = -_t5*rho + sqrt(_t2)**3
+        _t8 = _t5/_t7
+        _t9 = left_of(w0, 2*_t6*g/_t0, level)
+        out[0, i] = x*(-_t4*_t5 + 1)
+        out[1, i] = _t6
+        out[2, i] = _t7/_t2
+        out[3, i] = _t8
+        out[4, i] = _t9
+        out[5, i] = m*(_t3*g + _t8*_t9)
+        out[6, i] = 2*_c1*(_c0*_t1 + _c2*_t3)/_c3
 
 
 @compiled(CLIMB)
@@ -230,13 +261,14 @@ MODEL = Formulas(
     at_least=(('beta', '0'),),
     body='rho',
     addresses=Addresses(frame.address, climb.address, rise.address, bend.address, bounds.address),
+    loads=loads,
     domain_of=exact_domain,
     axes_of=exact_axes,
     exact=ExactFormulas(exact_x, exact_z, exact_ds, exact_kappa, exact_reaction, exact_climb, exact_climb_slope),
 )
 
 
-def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, a: Any = '0.6', beta: Any = '2/5', rho: Any = '0.25', g: Any = '9.81', m: Any = '1') -> Pass1:
+def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = None, a: Any = '0.6', beta: Any = '2/5', rho: Any = '0.25', g: Any = '9.81', m: Any = '1') -> Pass1:
     """Position, metric, curvature, V**2 and contact force at places of the curve (Pass 1, no quadrature).
 
     Parameters
@@ -245,6 +277,8 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, a: Any = '0
         Places on the curve, as values of its parameter x.
     lam0, v0, direction
         Launch place, speed and direction (+1 or -1: the sign of ds/dt).
+    out : Pass1, optional
+        The result of a call before, or six arrays like it, to be filled again: new memory takes as long as the work.
     a, beta, rho, g, m
         Run-time parameters; `PARAMETERS` holds their defaults.
 
@@ -253,7 +287,7 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, a: Any = '0
     Pass1
         Arrays x, z, ds, kappa, v2 and normal_force.
     """
-    return MODEL.pass1(lam, lam0, v0, direction, (a, beta, rho, g, m,))
+    return MODEL.pass1(lam, lam0, v0, direction, (a, beta, rho, g, m,), out)
 
 
 def solve(

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "quartic". Do not edit: change its declaration and generate again.
-# interface 6, input e1ff78064d31, body cb7e66519251
+# interface 7, input e1ff78064d31, body da905e48631a
 """Bead in a quartic bowl
 
 x              = x
@@ -17,7 +17,7 @@ turning points : 2*g*(lam0**4 - x**4) + v0**2 = 0
 liftoff        : g/sqrt(16*x**6 + 1) + 12*x**2*(2*g*(lam0**4 - x**4) + v0**2)/(16*x**6 + 1)**(3/2) = 0
 """
 
-from math import sqrt
+from math import fabs, sqrt
 from typing import TYPE_CHECKING, Any
 
 from numba import carray
@@ -25,7 +25,7 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=6)
+compiled = compiler(__file__, interface=7)
 
 from gqm_sym.runtime import (
     BEND,
@@ -35,6 +35,7 @@ from gqm_sym.runtime import (
     CLIMB,
     CREST_EACH,
     FRAME,
+    LOADS,
     RISE,
     RISE_EACH,
     SWING_EACH,
@@ -48,7 +49,7 @@ from gqm_sym.runtime import (
 )
 from gqm_sym.runtime.differences import ipow1
 from gqm_sym.runtime.intervals import iadd, iconst, imul, ipow, isqrt
-from gqm_sym.runtime.places import nearest
+from gqm_sym.runtime.places import left_of, nearest
 
 if TYPE_CHECKING:
     from gqm_sym.runtime import Sweep
@@ -75,6 +76,29 @@ def frame(n, places, speeds, p, out):
         out[2, i] = _t1
         out[3, i] = _t2
         out[4, i] = m*(_t2*v2 + g/_t1)
+
+
+@compiled(LOADS, later=True)
+def loads(n, w0, level, places, p, out):
+    """x, z, ds/dx, signed curvature, V**2, contact force (paper, eq. 15), and the size of the heights in V**2."""
+    places, p, out = carray(places, n), carray(p, 2), carray(out, (7, n))
+    g, m = p[0], p[1]
+    _c0 = fabs(g)
+    for i in range(n):
+        x = places[i]
+        _t0 = x**4
+        _t1 = 16*x**6 + 1
+        _t2 = sqrt(_t1)
+        _t3 = 12*x**2/sqrt(_t1)**3
+        _t4 = 2*_t0
+        _t5 = left_of(w0, _t4*g, level)
+        out[0, i] = x
+        out[1, i] = _t0
+        out[2, i] = _t2
+        out[3, i] = _t3
+        out[4, i] = _t5
+        out[5, i] = m*(_t3*_t5 + g/_t2)
+        out[6, i] = _c0*_t4
 
 
 @compiled(CLIMB)
@@ -256,6 +280,7 @@ MODEL = Formulas(
     parameters=PARAMETERS,
     positive=(),
     addresses=Addresses(frame.address, climb.address, rise.address, bend.address, bounds.address),
+    loads=loads,
     each=Each(rise=rise_each, bend=bend_each, swing=swing_each, top=top_each, crest=crest_each, bounds=bounds_each, top_held=1),
     domain_of=exact_domain,
     axes_of=exact_axes,
@@ -264,7 +289,7 @@ MODEL = Formulas(
 )
 
 
-def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, g: Any = '9.81', m: Any = '1') -> Pass1:
+def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = None, g: Any = '9.81', m: Any = '1') -> Pass1:
     """Position, metric, curvature, V**2 and contact force at places of the curve (Pass 1, no quadrature).
 
     Parameters
@@ -273,6 +298,8 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, g: Any = '9
         Places on the curve, as values of its parameter x.
     lam0, v0, direction
         Launch place, speed and direction (+1 or -1: the sign of ds/dt).
+    out : Pass1, optional
+        The result of a call before, or six arrays like it, to be filled again: new memory takes as long as the work.
     g, m
         Run-time parameters; `PARAMETERS` holds their defaults.
 
@@ -281,7 +308,7 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, g: Any = '9
     Pass1
         Arrays x, z, ds, kappa, v2 and normal_force.
     """
-    return MODEL.pass1(lam, lam0, v0, direction, (g, m,))
+    return MODEL.pass1(lam, lam0, v0, direction, (g, m,), out)
 
 
 def solve(

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "rolling_circle". Do not edit: change its declaration and generate again.
-# interface 6, input aed757e55b8b, body fecc16c2a3d1
+# interface 7, input aed757e55b8b, body 6f9faa849c35
 """Solid sphere rolling in a circular bowl
 
 x              = L*sin(theta)
@@ -17,7 +17,7 @@ turning points : 2*L*g*(-cos(lam0) + cos(theta))/(beta + 1) + v0**2 = 0
 liftoff        : g*cos(theta) + (2*L*g*(-cos(lam0) + cos(theta))/(beta + 1) + v0**2)/L = 0
 """
 
-from math import sqrt
+from math import fabs, sqrt
 from typing import TYPE_CHECKING, Any
 
 from numba import carray
@@ -25,7 +25,7 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=6)
+compiled = compiler(__file__, interface=7)
 
 from gqm_sym.runtime import (
     BEND,
@@ -35,6 +35,7 @@ from gqm_sym.runtime import (
     CLIMB,
     CREST_EACH,
     FRAME,
+    LOADS,
     MEAN_EACH,
     ORBIT_EACH,
     RISE,
@@ -49,7 +50,7 @@ from gqm_sym.runtime import (
 from gqm_sym.runtime.differences import cos1, cos2
 from gqm_sym.runtime.elementary import atan, cos, sin
 from gqm_sym.runtime.intervals import iadd, iconst, idiv, imul, isin
-from gqm_sym.runtime.places import nearest
+from gqm_sym.runtime.places import left_of, nearest
 from gqm_sym.runtime.wave_differences import near_even, near_odd
 
 if TYPE_CHECKING:
@@ -78,6 +79,30 @@ def frame(n, places, speeds, p, out):
         out[2, i] = L
         out[3, i] = _t1
         out[4, i] = m*(_t0*g + _t1*v2)
+
+
+@compiled(LOADS, later=True)
+def loads(n, w0, level, places, p, out):
+    """x, z, ds/dtheta, signed curvature, V**2, contact force (paper, eq. 15), and the size of the heights in V**2."""
+    places, p, out = carray(places, n), carray(p, 4), carray(out, (7, n))
+    L, beta, g, m = p[0], p[1], p[2], p[3]
+    _t0 = beta + 1
+    _t3 = 1/L
+    _c0 = fabs(L)
+    _c1 = fabs(g)
+    _c2 = fabs(_t0)
+    for i in range(n):
+        theta = places[i]
+        _t1 = cos(theta)
+        _t2 = L*_t1
+        _t4 = left_of(w0, -2*_t2*g/_t0, level)
+        out[0, i] = L*sin(theta)
+        out[1, i] = -_t2
+        out[2, i] = L
+        out[3, i] = _t3
+        out[4, i] = _t4
+        out[5, i] = m*(_t1*g + _t3*_t4)
+        out[6, i] = 2*_c0*_c1*fabs(_t1)/_c2
 
 
 @compiled(CLIMB)
@@ -284,6 +309,7 @@ MODEL = Formulas(
     positive=('L',),
     at_least=(('beta', '0'),),
     addresses=Addresses(frame.address, climb.address, rise.address, bend.address, bounds.address),
+    loads=loads,
     each=Each(rise=rise_each, bend=bend_each, orbit=orbit_each, mean=mean_each, crest=crest_each, bounds=bounds_each, held=2),
     domain_of=exact_domain,
     axes_of=exact_axes,
@@ -292,7 +318,7 @@ MODEL = Formulas(
 )
 
 
-def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, L: Any = '2', beta: Any = '2/5', g: Any = '9.81', m: Any = '0.3') -> Pass1:
+def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = None, L: Any = '2', beta: Any = '2/5', g: Any = '9.81', m: Any = '0.3') -> Pass1:
     """Position, metric, curvature, V**2 and contact force at places of the curve (Pass 1, no quadrature).
 
     Parameters
@@ -301,6 +327,8 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, L: Any = '2
         Places on the curve, as values of its parameter theta.
     lam0, v0, direction
         Launch place, speed and direction (+1 or -1: the sign of ds/dt).
+    out : Pass1, optional
+        The result of a call before, or six arrays like it, to be filled again: new memory takes as long as the work.
     L, beta, g, m
         Run-time parameters; `PARAMETERS` holds their defaults.
 
@@ -309,7 +337,7 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, L: Any = '2
     Pass1
         Arrays x, z, ds, kappa, v2 and normal_force.
     """
-    return MODEL.pass1(lam, lam0, v0, direction, (L, beta, g, m,))
+    return MODEL.pass1(lam, lam0, v0, direction, (L, beta, g, m,), out)
 
 
 def solve(

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "spiral_central". Do not edit: change its declaration and generate again.
-# interface 6, input a75a85ae8f6e, body e2f71c16ffc3
+# interface 7, input a75a85ae8f6e, body 9388e2102d23
 """Bead on a logarithmic spiral, drawn to its pole
 
 x              = r0*exp(b*theta)*cos(theta)
@@ -25,7 +25,7 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=6)
+compiled = compiler(__file__, interface=7)
 
 from gqm_sym.runtime import (
     BEND,
@@ -34,6 +34,7 @@ from gqm_sym.runtime import (
     BOUNDS_EACH,
     CLIMB,
     FRAME,
+    LOADS,
     ORBIT_EACH,
     RISE,
     RISE_EACH,
@@ -47,7 +48,7 @@ from gqm_sym.runtime import (
 from gqm_sym.runtime.differences import cos1, cos2, exp1, exp2, sin1, sin2
 from gqm_sym.runtime.elementary import cos, exp, sin
 from gqm_sym.runtime.intervals import iabs, iadd, iconst, icos, iexp, imul, ipow, isin, isqrt
-from gqm_sym.runtime.places import nearest
+from gqm_sym.runtime.places import left_of, nearest
 from gqm_sym.runtime.wave_differences import near_even, near_odd, near_sinc
 
 if TYPE_CHECKING:
@@ -83,6 +84,36 @@ def frame(n, places, speeds, p, out):
         out[2, i] = _c2*_t3
         out[3, i] = _t5
         out[4, i] = m*(_c0*_c1*k*(-_t1*(_t1 + _t4*b) + _t4*(_t1*b - _t4))*exp(-2*_t2)/(r0**3*sqrt(_t1**2 + _t4**2)**3) + _t5*v2)
+
+
+@compiled(LOADS, later=True)
+def loads(n, w0, level, places, p, out):
+    """x, z, ds/dtheta, signed curvature, V**2, contact force (paper, eq. 15), and the size of the heights in V**2."""
+    places, p, out = carray(places, n), carray(p, 4), carray(out, (7, n))
+    r0, b, k, m = p[0], p[1], p[2], p[3]
+    _t0 = sqrt(b**2 + 1)
+    _c0 = fabs(k)
+    _c1 = fabs(r0)
+    _c2 = 1/_t0
+    _c3 = _t0
+    for i in range(n):
+        theta = places[i]
+        _t1 = cos(theta)
+        _t2 = b*theta
+        _t3 = r0*exp(_t2)
+        _t4 = sin(theta)
+        _t5 = exp(-_t2)
+        _t6 = _c2*_t5/r0
+        _t7 = _t1**2 + _t4**2
+        _t8 = 2*_t5/(_c1*sqrt(_t7))
+        _t9 = left_of(w0, -_t8*k, level)
+        out[0, i] = _t1*_t3
+        out[1, i] = _t3*_t4
+        out[2, i] = _c3*_t3
+        out[3, i] = _t6
+        out[4, i] = _t9
+        out[5, i] = m*(_c1*_c2*k*(-_t1*(_t1 + _t4*b) + _t4*(_t1*b - _t4))*exp(-2*_t2)/(r0**3*sqrt(_t7)**3) + _t6*_t9)
+        out[6, i] = _c0*_t8
 
 
 @compiled(CLIMB)
@@ -401,13 +432,14 @@ MODEL = Formulas(
     parameters=PARAMETERS,
     positive=('r0',),
     addresses=Addresses(frame.address, climb.address, rise.address, bend.address, bounds.address),
+    loads=loads,
     each=Each(rise=rise_each, bend=bend_each, orbit=orbit_each, bounds=bounds_each, held=17),
     domain_of=exact_domain,
     exact=ExactFormulas(exact_x, exact_z, exact_ds, exact_kappa, exact_reaction, exact_climb, exact_climb_slope),
 )
 
 
-def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, r0: Any = '1', b: Any = '0.15', k: Any = '2', m: Any = '1') -> Pass1:
+def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = None, r0: Any = '1', b: Any = '0.15', k: Any = '2', m: Any = '1') -> Pass1:
     """Position, metric, curvature, V**2 and contact force at places of the curve (Pass 1, no quadrature).
 
     Parameters
@@ -416,6 +448,8 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, r0: Any = '
         Places on the curve, as values of its parameter theta.
     lam0, v0, direction
         Launch place, speed and direction (+1 or -1: the sign of ds/dt).
+    out : Pass1, optional
+        The result of a call before, or six arrays like it, to be filled again: new memory takes as long as the work.
     r0, b, k, m
         Run-time parameters; `PARAMETERS` holds their defaults.
 
@@ -424,7 +458,7 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, r0: Any = '
     Pass1
         Arrays x, z, ds, kappa, v2 and normal_force.
     """
-    return MODEL.pass1(lam, lam0, v0, direction, (r0, b, k, m,))
+    return MODEL.pass1(lam, lam0, v0, direction, (r0, b, k, m,), out)
 
 
 def solve(

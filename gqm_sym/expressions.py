@@ -26,7 +26,7 @@ Source: TypeAlias = str | int | float | Fraction | Decimal | sp.Expr
 S = TypeVar("S")
 
 # Names that ``solve`` and its kin have arguments of; CONTRACT, "The YAML".
-RESERVED_NAMES = frozenset({"lam", "lam0", "v0", "direction", "t_max", "contact", "point", "quantity", "client"})
+RESERVED_NAMES = frozenset({"lam", "lam0", "v0", "direction", "t_max", "contact", "point", "quantity", "client", "out"})
 
 # Size in bits of all rational numbers that one operation may melt into one, and of any that stays.
 # SymPy looks for the factors of a number it takes a root of: 3000 bits take it seconds.

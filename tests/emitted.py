@@ -33,7 +33,19 @@ TRIPLES = (
 NODES = (
     *(ast.Module, ast.Expr, ast.Constant, ast.ImportFrom, ast.alias, ast.Assign, ast.Dict, ast.Name, ast.Load),
     *(ast.Store, ast.Call, ast.keyword, ast.FunctionDef, ast.arguments, ast.arg, ast.For, ast.Tuple, ast.Subscript),
-    *(ast.BinOp, ast.Add, ast.Sub, ast.Mult, ast.Div, ast.Pow, ast.UnaryOp, ast.USub, ast.Return, ast.Attribute),
+    *(
+        ast.If,
+        ast.BinOp,
+        ast.Add,
+        ast.Sub,
+        ast.Mult,
+        ast.Div,
+        ast.Pow,
+        ast.UnaryOp,
+        ast.USub,
+        ast.Return,
+        ast.Attribute,
+    ),
 )
 IMPORTS = ("math", "typing", "numba", "gqm_sym.runtime")
 IMPORTS += tuple(
@@ -172,6 +184,10 @@ def audit(text: str) -> ast.Module:
             assert node.module in IMPORTS
             assert node.level == 0
             assert all(a.asname is None and a.name != "*" for a in node.names)
+        elif isinstance(node, ast.If):  # names that only annotations need
+            assert isinstance(node.test, ast.Name)
+            assert node.test.id == "TYPE_CHECKING"
+            assert all(isinstance(part, ast.ImportFrom) for part in (*node.body, *node.orelse))
         elif isinstance(node, ast.Name):
             assert "__" not in node.id or node.id == "__file__"
         elif isinstance(node, ast.Attribute):
@@ -180,7 +196,7 @@ def audit(text: str) -> ast.Module:
             assert owners[node.value.id] == node.attr
         elif isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
             assert node.func.id in imported | {"compiled", "range", "abs"}
-    kinds = (ast.Expr, ast.ImportFrom, ast.Assign, ast.FunctionDef)
+    kinds = (ast.Expr, ast.ImportFrom, ast.If, ast.Assign, ast.FunctionDef)
     assert all(isinstance(node, kinds) for node in tree.body)
     assert [n for n in tree.body if isinstance(n, ast.Expr)] == [tree.body[0]]
     return tree

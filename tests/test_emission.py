@@ -52,8 +52,9 @@ TAKEN = (
     "i",
     "n",
     "p",
-    "out",
     "v2",
+    "w0",
+    "level",
     "places",
     "speeds",
     "offsets",
@@ -143,7 +144,7 @@ def test_taken_names_as_parameters(folder: Path) -> None:
     check_numbers(gqm.build(model, name="taken", folder=folder), text, values)
 
 
-@pytest.mark.parametrize("name", ["a", "b", "d", "da", "i", "n", "p", "out", "v2", "places", "left", "lo", "lam", "x"])
+@pytest.mark.parametrize("name", ["a", "b", "d", "da", "i", "n", "p", "w0", "v2", "places", "left", "lo", "lam", "x"])
 def test_taken_names_as_the_curves_parameter(name: str, folder: Path) -> None:
     """The curve's parameter may have any of them too."""
     text, values = f"k*cos({name}) + {name}**2/3", {"k": 1.5}

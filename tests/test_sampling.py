@@ -12,7 +12,8 @@ from numpy.polynomial.chebyshev import chebval
 from gqm_sym.errors import InputError
 from gqm_sym.runtime import threads
 from gqm_sym.runtime.motion import Motion
-from gqm_sym.runtime.waves import fit_wave, sum_up
+from gqm_sym.runtime.series import GROUP
+from gqm_sym.runtime.waves import fit_wave, sum_cosines, sum_sines
 
 ModuleOf = Callable[[str], ModuleType]
 
@@ -181,14 +182,19 @@ def test_the_series_of_a_lap(v0: float, module_of: ModuleOf) -> None:
     assert sines.size > 5
 
 
-@pytest.mark.parametrize("count", [1, 2, 3, 4, 9])
-def test_sums_of_cosines(count: int) -> None:
-    """Of an odd and an even number of terms: sum of c_k cos(k phi), as numpy has it."""
+@pytest.mark.parametrize("count", [1, 2, 3, 4, 9, 40])
+@pytest.mark.parametrize("places", [1, 7, GROUP, GROUP + 1])
+def test_sums_of_waves(count: int, places: int) -> None:
+    """Of cosines as numpy has it; of sines, each over sin(phi), as the product of both says."""
     c = np.random.default_rng(count).normal(size=count)
-    x = np.cos(np.linspace(0.0, np.pi, 7))
-    high, low = np.empty(7), np.empty(7)
-    sum_up(c, x, 7, high, low)
-    assert high - x * low == pytest.approx(chebval(x, c), rel=1e-14, abs=1e-14)
+    phi = np.linspace(0.1, np.pi - 0.1, places)
+    x, out, work = np.zeros(2 * GROUP), np.empty(2 * GROUP), np.empty(2 * GROUP)
+    x[:places] = np.cos(phi)
+    sum_cosines(c, x, places, out, work)
+    assert out[:places] == pytest.approx(chebval(x[:places], c), rel=1e-13, abs=1e-13)
+    sum_sines(c, x, places, out, work)
+    sines = np.sin(np.outer(phi, np.arange(count))) @ c
+    assert out[:places] * np.sin(phi) == pytest.approx(sines, rel=1e-13, abs=1e-13)
 
 
 def test_series_are_as_long_as_they_must_be(module_of: ModuleOf) -> None:
@@ -199,4 +205,5 @@ def test_series_are_as_long_as_they_must_be(module_of: ModuleOf) -> None:
 
     assert 0 < terms(1e-4) <= 10
     assert 0 < terms(1.2) <= 24
-    assert terms(3.14159) == 0
+    assert 100 < terms(3.14) <= 128
+    assert terms(3.14159265) == 0

@@ -35,6 +35,8 @@ class FunctionIR:
         One value a row of ``out``.
     each : bool
         Whether every place has run-time parameters of its own. Such a function is compiled when it is first needed.
+    later : bool
+        Whether another function is compiled only then.
     """
 
     name: str
@@ -47,6 +49,7 @@ class FunctionIR:
     inside: tuple[Assignment, ...]
     outputs: tuple[Expr, ...]
     each: bool = False
+    later: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

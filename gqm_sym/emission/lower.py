@@ -12,6 +12,7 @@ from gqm_sym.emission.charts import chart_maker
 from gqm_sym.emission.dissipative import drive, hold
 from gqm_sym.emission.each import bounds_each, each
 from gqm_sym.emission.ir import Assignment, ExactIR, FunctionIR, ModuleIR
+from gqm_sym.emission.loads import loads
 from gqm_sym.emission.places import at
 from gqm_sym.emission.printer import check_emittable
 from gqm_sym.emission.sharing import check_size, straight_line
@@ -43,7 +44,7 @@ def lower(model: Model, *, name: str, forms: tuple[tuple[str, Expr], ...]) -> Mo
     lowering = Lowering(model)
     loss = model.dissipation
     if loss is None:
-        functions: tuple[FunctionIR, ...] = (lowering.climb(), lowering.rise(), lowering.bend())
+        functions: tuple[FunctionIR, ...] = (*loads(lowering), lowering.climb(), lowering.rise(), lowering.bend())
         many = each(lowering)
     else:
         functions, many = (drive(lowering, loss), hold(lowering, loss)), ()
@@ -254,6 +255,7 @@ class Lowering:
         outputs: tuple[Expr, ...],
         each: bool = False,
         held: int = 0,
+        later: bool = False,
     ) -> FunctionIR:
         """Share common subexpressions, and move what does not depend on the place in front of the loop.
 
@@ -280,6 +282,7 @@ class Lowering:
             inside=kept,
             outputs=results,
             each=each,
+            later=later,
         )
 
     def used(self, expressions: Iterable[Expr]) -> tuple[tuple[str, int], ...]:

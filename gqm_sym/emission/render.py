@@ -16,9 +16,10 @@ from gqm_sym.emission.printer import FUNCTIONS, CodePrinter, ExactPrinter, Inter
 from gqm_sym.errors import EmissionError
 
 # The version of gqm_sym.runtime.interface that emitted code is written for (a test holds the two together).
-INTERFACE = 6
+INTERFACE = 7
 
 # Functions that the runtime has in forms that fill vector registers; the rest is the standard library's.
+_PLACES = frozenset({"left_of", "nearest"})
 _ELEMENTARY = frozenset({"atan", "cos", "cosh", "exp", "sin", "sinh"})
 _MATH = frozenset({*FUNCTIONS.values(), "sqrt", "pi", "e"} - _ELEMENTARY)
 _RUNTIME = ("Addresses", "Formulas", "Motion", "Pass1")
@@ -87,11 +88,11 @@ def render(module: ModuleIR, *, source: str) -> str:
         "math": sorted(used & _MATH),
         "runtime": sorted(runtime, key=_as_imported),
         "charted": sorted({*charted, "chart_of"}) if charted else [],
-        "differences": sorted(used - _MATH - _ELEMENTARY - charted - near - {"nearest"}),
+        "differences": sorted(used - _MATH - _ELEMENTARY - charted - near - _PLACES),
         "near": sorted(near),
         "elementary": sorted(used & _ELEMENTARY),
         "intervals": sorted(intervals - charted),
-        "nearest": "nearest" in used,
+        "places": sorted(used & _PLACES),
         "defaults": [(repr(name), repr(value)) for name, value in module.defaults],
         "functions": functions,
         "exact": [_exact(f) for f in (*module.exact, *(chart.exact if chart else ()))],
@@ -108,6 +109,7 @@ def render(module: ModuleIR, *, source: str) -> str:
         "exact_formulas": exact,
         "axes": next((f.name for f in module.exact if f.name == "exact_axes"), ""),
         "monotone": module.monotone,
+        "loads": next((f["name"] for f in functions if f["signature"] == "LOADS"), ""),
         "each": ", ".join(_each(module, [f["name"] for f in functions if f["each"]])),
         "dissipation": ", ".join(f"{flag}={value}" for flag, value in module.dissipation),
         "keywords": ", ".join(f"{name}: Any = {value!r}" for name, value in module.defaults),
@@ -218,6 +220,7 @@ def _loop(function: FunctionIR) -> tuple[dict[str, Any], set[str]]:
         "count": count,
         "inside": inside,
         "each": function.each,
+        "later": function.each or function.later,
     }
     return fields, printer.used
 
@@ -255,6 +258,7 @@ def _bounds(function: FunctionIR, parameter: str) -> tuple[dict[str, Any], set[s
         "count": count[0] if count else "",
         "inside": inside,
         "each": function.each,
+        "later": function.each or function.later,
     }
     return fields, printer.used
 

@@ -7,7 +7,7 @@ need is imported when it is asked for.
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from gqm_sym.runtime.formulas import Formulas, Pass1
+from gqm_sym.runtime.formulas import Formulas
 from gqm_sym.runtime.interface import (
     BEND,
     BEND_EACH,
@@ -20,6 +20,7 @@ from gqm_sym.runtime.interface import (
     FRAME,
     HOLD,
     INTERFACE,
+    LOADS,
     MEAN_EACH,
     ORBIT_EACH,
     RISE,
@@ -34,6 +35,7 @@ from gqm_sym.runtime.interface import (
     ExactFormulas,
 )
 from gqm_sym.runtime.jit import compiler
+from gqm_sym.runtime.loads import Pass1
 from gqm_sym.runtime.motion import Motion, State
 
 if TYPE_CHECKING:
@@ -56,6 +58,7 @@ __all__ = [
     "FRAME",
     "HOLD",
     "INTERFACE",
+    "LOADS",
     "MEAN_EACH",
     "ORBIT_EACH",
     "RISE",

@@ -30,6 +30,12 @@ def call_frame(_, address, n, lam, v2, p, out):  # type: ignore[no-untyped-def]
 
 
 @intrinsic
+def call_loads(_, address, n, w0, level, lam, p, out):  # type: ignore[no-untyped-def]
+    """Fill x, z, ds, kappa, V**2 and the normal force."""
+    return types.void(address, n, w0, level, lam, p, out), _call
+
+
+@intrinsic
 def call_climb(_, address, n, lam, p, out):  # type: ignore[no-untyped-def]
     """Fill the climb and its slope."""
     return types.void(address, n, lam, p, out), _call

@@ -12,7 +12,6 @@ from gqm_sym.runtime.crossing import call_climb, call_frame, call_hold, call_ris
 from gqm_sym.runtime.doubledouble import reduce
 from gqm_sym.runtime.fused import choose, whole_below
 from gqm_sym.runtime.integrands import TO_EQUILIBRIUM, speeds
-from gqm_sym.runtime.interface import FRAME_ROWS
 from gqm_sym.runtime.inversion import derivative, look_up_many, tabulate
 from gqm_sym.runtime.jit import Inner, entry
 from gqm_sym.runtime.panels import lay, legendre_sum, panel_of, read_off
@@ -31,8 +30,6 @@ FLAT = 1e-12
 # A launch this near to an axis is not mirrored by what doubles know of it, nor one beyond this share of the way to the
 # next: there it may be an equilibrium.
 UNCLEAR, ALL_BUT = 1e-6, 0.9
-# Places filled at a time where many are asked for.
-BLOCK = 256
 
 
 @Inner
@@ -223,32 +220,3 @@ def speed_squared_at(fns, p, lam0, lam0_low, w0, places, offsets):  # type: igno
     for i in range(offsets.size):
         out[i] = w0 - (offsets[i] * rows[0, i] - lam0_low * launch[1, 0])
     return out
-
-
-@entry(types.void(_ADDRESSES, _LINE, _FLOAT, _FLOAT, _FLOAT, _LINE, _LINE, _ROWS, types.int64, types.int64), nogil=True)
-def loads_at(fns, p, lam0, lam0_low, w0, places, rests, out, begin, end):  # type: ignore[no-untyped-def]
-    """Fill x, z, ds, kappa, V**2 and the contact force at places, block by block: what lies between stays in cache.
-
-    ``rests`` are what the places leave over as doubles; empty where they leave nothing.
-    """
-    launch, rise = np.empty((2, 1)), np.empty((2, BLOCK))
-    offsets, v2, frame = np.empty(BLOCK), np.empty(BLOCK), np.empty((FRAME_ROWS, BLOCK))
-    call_climb(fns[1], 1, np.array([lam0]), p, launch)
-    gained = lam0_low * launch[1, 0]
-    for start in range(begin, end, BLOCK):
-        n = min(BLOCK, end - start)
-        here = places[start : start + n]
-        for i in range(n):
-            offsets[i] = here[i] - lam0
-            if rests.size:
-                offsets[i] += rests[start + i]
-        rows, five = rise.reshape(-1)[: 2 * n].reshape(2, n), frame.reshape(-1)[: FRAME_ROWS * n].reshape(FRAME_ROWS, n)
-        call_rise(fns[2], n, lam0, here, offsets, p, rows)
-        for i in range(n):
-            v2[i] = w0 - (offsets[i] * rows[0, i] - gained)
-        call_frame(fns[0], n, here, v2, p, five)
-        for row in range(4):
-            for i in range(n):
-                out[row, start + i] = five[row, i]
-        for i in range(n):
-            out[4, start + i], out[5, start + i] = v2[i], five[4, i]

@@ -12,10 +12,13 @@ import numpy as np
 from gqm_sym.budgets import budget
 from gqm_sym.errors import LaunchError, ParameterError
 from gqm_sym.runtime.chart import Chart, ChartMaker
-from gqm_sym.runtime.entries import frame_at, loads_at
+from gqm_sym.runtime.entries import frame_at
 from gqm_sym.runtime.exact_problems import exact_problem
 from gqm_sym.runtime.interface import Addresses, Dissipation, Each, ExactClimb, ExactFormulas
+from gqm_sym.runtime.jit import Later
+from gqm_sym.runtime.loads import Pass1, fill_loads, room
 from gqm_sym.runtime.numbers import Number, read_number, read_numbers
+from gqm_sym.runtime.stores import LARGE
 from gqm_sym.runtime.stretch import Array, Functions
 from gqm_sym.runtime.threads import spread
 
@@ -35,22 +38,11 @@ FLOATS = SimpleNamespace(
 NEAR = 1e-6
 
 # Places of a load map that a thread is worth starting for.
-LEAST_MAP = 2**15
+LEAST_MAP = 2**16
 
 NOTHING: Array = np.empty(0)
 
 CONTACTS = ("bilateral", "above", "below")
-
-
-class Pass1(NamedTuple):
-    """Position, metric, curvature, V**2 and contact force at places of a curve, each an array of the places' shape."""
-
-    x: Array
-    z: Array
-    ds: Array
-    kappa: Array
-    v2: Array
-    normal_force: Array
 
 
 class Launch(NamedTuple):
@@ -123,6 +115,8 @@ class Formulas:
         What makes the chart of a curve that has no formulas.
     dissipation
         What a dissipative model adds; None for a conservative one.
+    loads
+        What fills a load map at once; None where there is no such function.
     each
         The functions of a sweep; None where motions are solved one by one.
     """
@@ -138,6 +132,7 @@ class Formulas:
     exact: ExactFormulas | ExactClimb | None = None
     chart: ChartMaker | None = None
     dissipation: Dissipation | None = None
+    loads: Later | None = None
     each: Each | None = None
     at_least: tuple[tuple[str, str], ...] = ()
     body: str = ""
@@ -286,29 +281,34 @@ class Formulas:
         block = np.concatenate([p.values, chart.block])
         return Functions(addresses, block, None, chart.breaks, chart.corners, chart.period)
 
-    def pass1(self, lam: Any, lam0: Any, v0: Any, direction: int, given: tuple[Any, ...]) -> Pass1:
-        """Pass 1 at places of the curve."""
+    def pass1(self, lam: Any, lam0: Any, v0: Any, direction: int, given: tuple[Any, ...], out: Any = None) -> Pass1:
+        """Pass 1 at places of the curve, into new arrays or those of ``out``."""
         p = self.numbers(given)
         launch = self.launch(p, lam0=lam0, v0=v0, direction=direction)
         f = self.functions(p, launch)
-        if self.dissipation is not None:
-            from gqm_sym.runtime.dissipative import launch_leg
-
-            places, _, shape = read_numbers(lam, where=self.parameter)
-            v2 = launch_leg(self, p, launch, places)
-            x, z, ds, kappa, force = frame_at(f.addresses, f.p, places, v2)
-            return Pass1(*(array.reshape(shape) for array in (x, z, ds, kappa, v2, force)))
         if isinstance(lam, np.ndarray) and lam.dtype == np.float64:
             places, low, shape = np.ascontiguousarray(lam).reshape(-1), NOTHING, lam.shape
         else:
             places, low, shape = read_numbers(lam, where=self.parameter)
-        start, w0, out = launch.lam0, launch.v0.value**2, np.empty((len(Pass1._fields), places.size))
+            low = low if low.any() else NOTHING
+        found = room(shape, places, out)
+        if self.dissipation is not None:
+            from gqm_sym.runtime.dissipative import launch_leg
+
+            v2 = launch_leg(self, p, launch, places)
+            x, z, ds, kappa, force = frame_at(f.addresses, f.p, places, v2)
+            for array, values in zip(found, (x, z, ds, kappa, v2, force), strict=True):
+                array[...] = values.reshape(shape)
+            return found
+        start, w0, loads = launch.lam0, launch.v0.value**2, 0 if self.loads is None else self.loads.address
+        rows, past = tuple(array.reshape(-1) for array in found), len(found) * places.nbytes >= LARGE
 
         def fill(part: slice) -> None:
-            loads_at(f.addresses, f.p, start.value, start.low, w0, places, low, out, part.start, part.stop)
+            ends = part.start, part.stop
+            fill_loads(f.addresses, loads, f.p, start.value, start.low, w0, places, low, rows, *ends, past)
 
         spread(fill, places.size, LEAST_MAP)
-        return Pass1(*(row.reshape(shape) for row in out))
+        return found
 
     def _solver(self) -> "Callable[[Formulas, Given, Launch], Motion]":
         # Loaded when it is needed: a process that solves one model needs one of the two.

@@ -18,6 +18,8 @@ V**2 comes from the climb, or, next to an equilibrium where forces dissipate, fr
 from math import cos, exp, fabs, inf, sin, sqrt
 
 from gqm_sym.runtime.crossing import call_bend, call_rise
+from gqm_sym.runtime.elementary import cos as cosine
+from gqm_sym.runtime.elementary import sin as sine
 from gqm_sym.runtime.fields import along
 from gqm_sym.runtime.jit import Inner
 
@@ -83,21 +85,21 @@ def speeds(fns, p, kind, a, b, ref, w, field, phi, work, out):  # type: ignore[n
         for i in range(n):
             d = whole * exp(-phi[i])
             out[i] = d * sqrt(along(field, d)[0])
-    elif kind == TURN_TURN or kind == TO_EQUILIBRIUM:
+    elif kind == TURN_TURN:
         for i in range(n):
-            if kind == TURN_TURN:
-                s, c = sin(0.5 * phi[i]), cos(0.5 * phi[i])
-                da[i] = (b - a) * s * s
-                db[i] = (b - a) * c * c
-            else:
-                da[i] = (a - b) * exp(-phi[i])
-                db[i] = -da[i]
-        call_bend(fns[3], n, a if kind == TURN_TURN else b, b, da, db, p, rows)
+            s, c = sine(0.5 * phi[i]), cosine(0.5 * phi[i])
+            da[i] = (b - a) * s * s
+            db[i] = (b - a) * c * c
+        call_bend(fns[3], n, a, b, da, db, p, rows)
         for i in range(n):
-            if kind == TURN_TURN:
-                out[i] = sqrt(da[i] * db[i] * rows[0, i])
-            else:  # V**2 may lie below the least double
-                out[i] = fabs(da[i]) * sqrt(-rows[0, i])
+            out[i] = sqrt(da[i] * db[i] * rows[0, i])
+    elif kind == TO_EQUILIBRIUM:
+        for i in range(n):
+            da[i] = (a - b) * exp(-phi[i])
+            db[i] = -da[i]
+        call_bend(fns[3], n, b, b, da, db, p, rows)
+        for i in range(n):  # V**2 may lie below the least double
+            out[i] = fabs(da[i]) * sqrt(-rows[0, i])
     else:
         start = a if kind == FROM_TURN else ref
         for i in range(n):

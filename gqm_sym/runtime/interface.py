@@ -7,6 +7,7 @@ runtime is compiled once per installation and shared by every module.
 function    arguments                                     rows of ``out``
 =========== ============================================= ==========================================
 frame       n, lam, v2, p, out                            x, z, ds, kappa, normal force
+loads       n, w0, level, lam, p, out                     x, z, ds, kappa, V**2, normal force, size
 climb       n, lam, p, out                                climb, d climb/d lam
 rise        n, a, lam, d, p, out                          climb[a, lam], ds(lam); d = lam - a
 bend        n, a, b, da, db, p, out                       climb[a, lam, b], ds(lam)
@@ -41,6 +42,9 @@ V**2 is used up may have a closed form: ``crest_each``, from the offset and V**2
 A curve with formulas that is a piece of a rail has ``segment`` (`rail`), in its own parameter; an implicit curve F = 0
 has ``field``, by which it is traced (`tracing`).
 
+``loads`` is for load maps: V**2 is ``w0`` less the climb from ``level``, and ``size`` is what the climb's roundings are
+shares of. There is none where that is not known.
+
 ``climb`` is twice the potential per unit mass over the inertia factor, so that ``V**2 + climb`` is constant
 (MATHS, section 2). Square brackets are divided differences (MATHS, section 3): ``da = lam - a`` and
 ``db = b - lam`` are given as computed, never re-subtracted.
@@ -56,12 +60,13 @@ from typing import Any, NamedTuple
 from numba import types
 
 # Raised with every change of a signature here, or of a number that runtime code puts into generated modules.
-INTERFACE = 6
+INTERFACE = 7
 
 REAL = types.float64
 MANY = types.CPointer(REAL)
 
 FRAME = types.void(types.intp, MANY, MANY, MANY, MANY)
+LOADS = types.void(types.intp, REAL, REAL, MANY, MANY, MANY)
 CLIMB = types.void(types.intp, MANY, MANY, MANY)
 RISE = types.void(types.intp, REAL, MANY, MANY, MANY, MANY)
 BEND = types.void(types.intp, REAL, REAL, MANY, MANY, MANY, MANY)
@@ -82,7 +87,7 @@ HOLD = types.void(types.intp, MANY, MANY, MANY)
 FIELD = types.void(types.intp, MANY, MANY, MANY, MANY)
 SEGMENT = types.void(types.intp, MANY, MANY, MANY)
 
-FRAME_ROWS = 5
+FRAME_ROWS, LOAD_ROWS = 5, 7
 
 
 class Addresses(NamedTuple):

@@ -12,6 +12,7 @@ import numpy as np
 
 from gqm_sym.runtime.arrays import longer, taller
 from gqm_sym.runtime.doubledouble import two_sum
+from gqm_sym.runtime.fused import fma
 from gqm_sym.runtime.jit import Inner
 from gqm_sym.runtime.panels import NOTHING, legendre_sum
 
@@ -29,6 +30,8 @@ LEVEL = 1e-13  # coefficients that have stopped falling below this share are rou
 DEEP = 2**12
 TIMED = 4e-16
 NEWTON = 1e-10
+# Times looked up together.
+BLOCK = 64
 
 
 @Inner
@@ -192,23 +195,31 @@ def _to_powers(c, out):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def look_up(middles, lows, scales, powers, index, ends, t, t_low):  # type: ignore[no-untyped-def]
-    """The anomaly at time t + t_low of a table."""
-    whole = ends[-1]
-    slot = np.int64(t / whole * index.size) if whole > 0.0 else 0
-    segment = index[min(max(slot, 0), index.size - 1)]
-    while segment < ends.size - 1 and t >= ends[segment]:
-        segment += 1
-    x = ((t - middles[segment]) + (t_low - lows[segment])) * scales[segment]
-    row = powers[segment]
-    total = row[TERMS - 1]
-    for j in range(TERMS - 2, -1, -1):
-        total = total * x + row[j]
-    return total
+def look_up(middles, lows, scales, powers, index, ends, t, t_low, n, segments, x, out):  # type: ignore[no-untyped-def]
+    """The anomalies at n times t + t_low of a table, side by side, and on which segments they are.
+
+    ``x`` is room for n numbers.
+    """
+    slots = index.size / ends[-1] if ends[-1] > 0.0 else 0.0
+    for i in range(n):
+        segment = index[min(max(np.int64(t[i] * slots), 0), index.size - 1)]
+        while segment < ends.size - 1 and t[i] >= ends[segment]:
+            segment += 1
+        segments[i] = segment
+    for i in range(n):
+        k = segments[i]
+        x[i] = ((t[i] - middles[k]) + (t_low[i] - lows[k])) * scales[k]
+        out[i] = powers[k, LAST]
+    for j in range(LAST - 1, -1, -1):
+        for i in range(n):
+            out[i] = fma(out[i], x[i], powers[segments[i], j])
 
 
 @Inner
 def look_up_many(middles, lows, scales, powers, index, ends, t, t_low, out):  # type: ignore[no-untyped-def]
     """The anomaly at many times of one table."""
-    for i in range(t.size):
-        out[i] = look_up(middles, lows, scales, powers, index, ends, t[i], t_low[i])
+    segments, x = np.empty(BLOCK, dtype=np.int64), np.empty(BLOCK)
+    for start in range(0, t.size, BLOCK):
+        n = min(BLOCK, t.size - start)
+        place = slice(start, start + n)
+        look_up(middles, lows, scales, powers, index, ends, t[place], t_low[place], n, segments, x, out[place])

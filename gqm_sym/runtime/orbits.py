@@ -16,30 +16,33 @@ CLOCK                    period, phase from the end ``a``, whole time by the str
 MIDDLES ... ENDS         the table (`inversion.tabulate`)
 EDGES, LENGTHS, ARCS     the panels' arc lengths
 CLOCK_ERRORS             of the clock, panel by panel
-REACHES, TABLE_ERRORS    the table's, with the anomalies up to which each holds
+TABLE_ERRORS, OWNERS     the table's, segment by segment; the panel that each segment is of: whole numbers
 ======================== ===================================================================================
 """
 
-from math import cos, fabs, pi, sin
+from math import fabs, pi
 
 import numpy as np
 from numba import types
 
 from gqm_sym.runtime.clocks import Array
 from gqm_sym.runtime.crossing import call_frame
-from gqm_sym.runtime.doubledouble import add, reduce
+from gqm_sym.runtime.doubledouble import two_sum
+from gqm_sym.runtime.elementary import cos, sin
+from gqm_sym.runtime.fused import choose, fma, nearest_whole
 from gqm_sym.runtime.integrands import TURN_TURN, speeds
 from gqm_sym.runtime.inversion import TERMS, look_up
-from gqm_sym.runtime.jit import Inner, entry
-from gqm_sym.runtime.panels import DEGREE, panel_of, read_off
+from gqm_sym.runtime.jit import Inlined, Inner, entry
+from gqm_sym.runtime.panels import DEGREE, read_off_block
+from gqm_sym.runtime.stores import put
 from gqm_sym.runtime.waves import sum_wave
 
-BLOCK = 64
+BLOCK = 128
 ULP = 2.220446049250313e-16
 
 FUNCTIONS, SHAPE, LAUNCH, DIAL, COSINES, SINES, CLOCK = range(7)
 MIDDLES, LOWS, SCALES, POWERS, INDEX, ENDS = range(7, 13)
-EDGES, LENGTHS, ARCS, CLOCK_ERRORS, REACHES, TABLE_ERRORS = range(13, 19)
+EDGES, LENGTHS, ARCS, CLOCK_ERRORS, TABLE_ERRORS, OWNERS = range(13, 19)
 SECTIONS = 19
 
 _LINE = types.float64[::1]
@@ -82,7 +85,7 @@ def table_of(record):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def anomalies_at(clock, kind, table, t, n, phi, sense, laps):  # type: ignore[no-untyped-def]
+def anomalies_at(clock, kind, table, t, n, phi, sense, laps, work, segments):  # type: ignore[no-untyped-def]
     """The anomaly, the sense of motion along the stretch and the count of laps at n times.
 
     ``clock`` holds the period, the phase from the stretch's end ``a`` and the whole time by the stretch's own clock,
@@ -90,34 +93,44 @@ def anomalies_at(clock, kind, table, t, n, phi, sense, laps):  # type: ignore[no
     """
     period, period_low, phase, phase_low = clock[0], clock[1], clock[2], clock[3]
     whole, whole_low, stop, pace = clock[4], clock[5], clock[6], clock[7]
-    middles, lows, scales, powers, index, ends = table
+    back, rests, lows = kind == TURN_TURN, work[0], work[1]
     for i in range(n):
-        s, low = add(t[i], 0.0, phase, phase_low)
-        laps[i], r, low = reduce(s, low, period, period_low)
-        sense[i] = 1.0
-        if kind == TURN_TURN and r > 0.5 * period:
-            r, low = add(period, period_low, -r, -low)
-            sense[i] = -1.0
-        low += r * pace
-        if r + low <= 0.0:
-            phi[i] = 0.0
-        elif (r - whole) + (low - whole_low) >= 0.0:
-            phi[i] = stop
+        s, low = two_sum(t[i], phase)
+        low += phase_low
+        count = nearest_whole(s / period)
+        # The first is exact: a whole number of last places, and at most half a period.
+        r, low = two_sum(fma(-count, period, s), fma(-count, period_low, low))
+        before = r + low < 0.0
+        sign = choose(before, -1.0, 1.0)
+        if back:  # before the end ``a`` it is on its way there; the quotient's rounding may pass the other end
+            r, low = sign * r, sign * low
+            over = r > 0.5 * period
+            other, rest = two_sum(period, -r)
+            rest += period_low - low
+            sense[i], laps[i] = choose(over, -sign, sign), count
         else:
-            phi[i] = min(max(look_up(middles, lows, scales, powers, index, ends, r, low), 0.0), stop)
+            over = before
+            other, rest = two_sum(period, r)
+            rest += period_low + low
+            sense[i], laps[i] = 1.0, choose(over, count - 1.0, count)
+        rests[i] = choose(over, other, r)
+        lows[i] = choose(over, rest, low) + rests[i] * pace
+    look_up(*table, rests, lows, n, segments, work[2], phi)
+    for i in range(n):
+        r, low = rests[i], lows[i]
+        inside = min(max(phi[i], 0.0), stop)
+        ended = choose((r - whole) + (low - whole_low) >= 0.0, stop, inside)
+        phi[i] = choose(r + low <= 0.0, 0.0, ended)
 
 
-@Inner
+@Inlined
 def place_at(kind, a, b, phi):  # type: ignore[no-untyped-def]
     """The curve's parameter at an anomaly, from the nearer end."""
     width = b - a
     if kind == TURN_TURN:
-        if phi < 0.5 * pi:
-            s = sin(0.5 * phi)
-            return a + width * (s * s)
-        c = cos(0.5 * phi)
-        return b - width * (c * c)
-    return a + width * phi if phi <= 0.5 else b - width * (1.0 - phi)
+        s, c = sin(0.5 * phi), cos(0.5 * phi)
+        return choose(phi < 0.5 * pi, a + width * (s * s), b - width * (c * c))
+    return choose(phi <= 0.5, a + width * phi, b - width * (1.0 - phi))
 
 
 @Inner
@@ -132,9 +145,10 @@ def find_places(record, t, out, begin, end):  # type: ignore[no-untyped-def]
     a, b, launch, lap = dial[6], dial[7], dial[8], dial[9]
     size = min(BLOCK, end - begin)
     phi, sense, laps = np.empty(size), np.empty(size), np.empty(size)
+    spare, segments = np.empty((3, size)), np.empty(size, dtype=np.int64)
     for start in range(begin, end, BLOCK):
         n = min(BLOCK, end - start)
-        anomalies_at(clock, kind, table, t[start:], n, phi, sense, laps)
+        anomalies_at(clock, kind, table, t[start:], n, phi, sense, laps, spare, segments)
         for i in range(n):
             place = place_at(kind, a, b, phi[i]) + laps[i] * lap
             out[start + i] = launch if t[start + i] == 0.0 else place
@@ -155,43 +169,43 @@ def find_states(record, p, t, out, begin, end):  # type: ignore[no-untyped-def]
         section(record, LENGTHS),
         arcs.reshape((arcs.size // DEGREE, DEGREE)),
     )
-    clock_errors, reaches, table_errors = (
-        section(record, CLOCK_ERRORS),
-        section(record, REACHES),
-        section(record, TABLE_ERRORS),
-    )
+    clock_errors, table_errors = section(record, CLOCK_ERRORS), section(record, TABLE_ERRORS)
+    owners = section(record, OWNERS).view(np.int64)
     no_field = np.empty((0, 0))
     way = 1.0 if b > a else -1.0
     size = min(BLOCK, end - begin)
-    phi, sense, laps = np.empty(size), np.empty(size), np.empty(size)
-    v, reduced, v2 = np.empty(size), np.empty(size), np.empty(size)
-    work, rows = np.empty((4, size)), np.empty(5 * size)
+    room, whole = (
+        np.empty((19, size)),
+        np.empty((2, size), dtype=np.int64),
+    )  # each of its own would take as long as a time
+    phi, sense, laps, v, reduced, v2, arc = room[0], room[1], room[2], room[3], room[4], room[5], room[6]
+    spare, work, rows, segments, panels = room[7:10], room[10:14], room[14:19], whole[0], whole[1]
     for start in range(begin, end, BLOCK):
         n = min(BLOCK, end - start)
-        anomalies_at(clock, kind, table, t[start:], n, phi, sense, laps)
+        anomalies_at(clock, kind, table, t[start:], n, phi, sense, laps, spare, segments)
         # The functions of a generated module see rows of as many numbers as they are told.
-        flat = work.reshape(-1)[: 4 * n].reshape(4, n)
+        flat, frame = work.reshape(-1)[: 4 * n].reshape(4, n), rows.reshape(-1)[: 5 * n].reshape(5, n)
         speeds(fns, p, kind, a, b, ref, w, no_field, phi[:n], flat, v)
         for i in range(n):
-            v[i] *= way * sense[i] * spread
-            reduced[i] = place_at(kind, a, b, phi[i])
-            s = (s_a + way * spread * read_off(edges, lengths, length_terms, phi[i])) + laps[i] * lap_length
-            if t[start + i] == 0.0:
-                v[i], reduced[i], s = v0, lam0, 0.0
-            v2[i] = v[i] * v[i]
-            out[1, start + i] = s + s0
-            out[4, start + i], out[5, start + i] = v[i], v2[i]
-        frame = rows[: 5 * n].reshape(5, n)
+            panels[i] = owners[segments[i]]
+        read_off_block(edges, lengths, length_terms, phi, n, panels, spare, arc)
+        when, lam = t[start : start + n], out[0, start : start + n]
+        for i in range(n):
+            launched = when[i] == 0.0
+            place, speed = place_at(kind, a, b, phi[i]), v[i] * (way * sense[i] * spread)
+            s = (s_a + way * spread * arc[i]) + laps[i] * lap_length
+            reduced[i], v[i] = choose(launched, lam0, place), choose(launched, v0, speed)
+            v2[i], arc[i] = v[i] * v[i], choose(launched, s0, s + s0)
         call_frame(fns[0], n, reduced, v2, p, frame)
         for i in range(n):
-            out[2, start + i], out[3, start + i] = frame[0, i], frame[1, i]
-            out[6, start + i], out[7, start + i] = frame[3, i], frame[4, i]
-            panel = panel_of(edges, phi[i])
-            part = min(np.searchsorted(reaches, phi[i]), reaches.size - 1)
-            rate = fabs(v[i]) / frame[2, i] if frame[2, i] > 0.0 else 0.0
-            rounding = ULP * (1.5 * fabs(out[0, start + i] - reduced[i]) + 2.0 * fabs(reduced[i]))
-            error = rate * (late + drift * fabs(t[start + i]) + clock_errors[panel])
-            out[8, start + i] = error + table_errors[part] + rounding
+            ds = frame[2, i]
+            rate = choose(ds > 0.0, fabs(v[i]) / ds, 0.0)
+            rounding = ULP * (1.5 * fabs(lam[i] - reduced[i]) + 2.0 * fabs(reduced[i]))
+            error = rate * (late + drift * fabs(when[i]) + clock_errors[panels[i]])
+            spare[0, i] = error + table_errors[segments[i]] + rounding
+        found = (arc, frame[0], frame[1], v, v2, frame[3], frame[4], spare[0])
+        for k in range(8):
+            put(out[k + 1, start : start + n], found[k], False)
 
 
 @entry(types.void(_LINE, _LINE, _LINE, types.int64, types.int64), nogil=True)

@@ -207,3 +207,19 @@ def read_off(edges, marks, terms, phi):  # type: ignore[no-untyped-def]
     half = 0.5 * (edges[k + 1] - edges[k])
     x = ((phi - edges[k]) - half) / half
     return marks[k] + legendre_sum(terms[k], x)
+
+
+@Inner
+def read_off_block(edges, marks, terms, phi, n, panels, work, out):  # type: ignore[no-untyped-def]
+    """`read_off` at n anomalies on known panels, side by side; ``work`` is room for three rows of n."""
+    x, high, low = work[0], work[1], work[2]
+    for i in range(n):
+        left, half = edges[panels[i]], 0.5 * (edges[panels[i] + 1] - edges[panels[i]])
+        x[i], high[i], low[i] = ((phi[i] - left) - half) / half, 0.0, 0.0
+    for k in range(DEGREE - 1, 0, -1):
+        growth, decay = GROWTH[k], DECAY[k]
+        for i in range(n):
+            new = terms[panels[i], k] + growth * x[i] * high[i] - decay * low[i]
+            low[i], high[i] = high[i], new
+    for i in range(n):
+        out[i] = marks[panels[i]] + (terms[panels[i], 0] + x[i] * high[i] - 0.5 * low[i])

@@ -8,7 +8,6 @@ import numpy as np
 from gqm_sym.runtime import orbits
 from gqm_sym.runtime.course import Course, Pair
 from gqm_sym.runtime.doubledouble import two_product
-from gqm_sym.runtime.exact import SMOOTH_PANELS
 from gqm_sym.runtime.panels import TURN_TURN
 from gqm_sym.runtime.problem import Problem
 from gqm_sym.runtime.stretch import Array
@@ -66,7 +65,8 @@ class Sampler:
             orbits.DIAL: np.array([*course.period, *_inverse(course.period), start, start_low, *ends]),
             orbits.CLOCK: np.array([*course.period, start, start_low, *stretch.whole, stretch.stop, course.pace]),
         }
-        if len(stretch.edges) - 1 <= SMOOTH_PANELS:
+        f = problem.functions
+        if not f.between(f.breaks, stretch.a, stretch.b).size:
             series = fit_wave(stretch.edges, *stretch.clock, stretch.panels[3], there_and_back)
             self._sections[orbits.COSINES], self._sections[orbits.SINES] = series
         if not len(self._sections.get(orbits.COSINES, ())):
@@ -85,7 +85,8 @@ class Sampler:
             self._tabulate()
             stretch, panels, problem = self._stretch, self._stretch.panels, self._problem
             lengths = self.course.lap_length, problem.arc_origin, self.course.pieces[0].s_a
-            reaches = stretch.table[3].sum(axis=1)
+            segments = stretch.table[3]
+            owners = np.clip(np.searchsorted(stretch.edges, segments[:, 0], side="right") - 1, 0, len(panels[2]) - 2)
             middles = 0.5 * (stretch.edges[1:] + stretch.edges[:-1])
             self._sections |= {
                 orbits.LAUNCH: np.array([problem.lam0, self._v0, *lengths, *self._drift()], dtype=np.float64),
@@ -94,8 +95,8 @@ class Sampler:
                 orbits.LENGTHS: panels[2],
                 orbits.ARCS: panels[4],
                 orbits.CLOCK_ERRORS: stretch.clock_error(middles),
-                orbits.REACHES: reaches,
-                orbits.TABLE_ERRORS: stretch.inversion_error(reaches),
+                orbits.TABLE_ERRORS: stretch.inversion_error(segments.sum(axis=1)),
+                orbits.OWNERS: owners.astype(np.int64),
             }
             self._whole = orbits.record(self._sections)
         return self._whole

@@ -1,0 +1,141 @@
+"""Load maps: Pass 1 at many places of a conservative model, block by block, so that what lies between stays in cache.
+
+V**2 is the launch's less the climb to a place. Where most of that cancels, as near a launch from rest, the climb's
+first divided difference from the launch place keeps the digits that subtracting heights loses.
+"""
+
+from itertools import pairwise
+from math import fabs, nan
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import types
+
+from gqm_sym.errors import InputError
+from gqm_sym.runtime.crossing import call_climb, call_frame, call_loads, call_rise
+from gqm_sym.runtime.interface import FRAME_ROWS, LOAD_ROWS
+from gqm_sym.runtime.jit import Inlined, entry
+from gqm_sym.runtime.stores import put, settle
+from gqm_sym.runtime.stretch import Array
+
+_LINE = types.float64[::1]
+_REAL, _WHOLE = types.float64, types.int64
+
+# Places filled at a time: all rows of a block lie in the first cache.
+BLOCK = 512
+# Rows that are asked for.
+SHOWN = 6
+# Heights may be of this many times the size of V**2 at launch or of its change: then both ways round alike.
+LEVELLED = 2.0
+
+
+class Pass1(NamedTuple):
+    """Position, metric, curvature, V**2 and contact force at places of a curve, each an array of the places' shape."""
+
+    x: Array
+    z: Array
+    ds: Array
+    kappa: Array
+    v2: Array
+    normal_force: Array
+
+
+def room(shape: tuple[int, ...], lam: Array, out: Any) -> Pass1:
+    """Arrays for a load map: new ones, or those of ``out`` where they will do.
+
+    Raises
+    ------
+    InputError
+        If ``out`` is not six arrays of doubles of that shape, each with memory of its own.
+    """
+    if out is None:
+        return Pass1(*(row.reshape(shape) for row in np.empty((len(Pass1._fields), lam.size))))
+    names = Pass1._fields
+    if not isinstance(out, tuple | list) or len(out) != len(names):
+        what = f"{len(out)} of them" if isinstance(out, tuple | list) else type(out).__name__
+        raise InputError(f"out: must be {len(names)} arrays ({', '.join(names)}), as pass1 returns them; got {what}")
+    for name, array in zip(names, out, strict=True):
+        _check(f"out: {name}", array, shape)
+    spans = sorted(
+        (array.__array_interface__["data"][0], array.nbytes, name) for name, array in zip(names, out, strict=True)
+    )
+    for (start, size, one), (other_start, _, other) in pairwise(spans):
+        if start + size > other_start:
+            raise InputError(f"out: {one} and {other} share memory; give each array its own")
+    for name, array in zip(names, out, strict=True):
+        if np.may_share_memory(array, lam):
+            raise InputError(f"out: {name} shares memory with the places; give it its own")
+    return Pass1(*out)
+
+
+def _check(where: str, array: Any, shape: tuple[int, ...]) -> None:
+    """Refuse what compiled code cannot fill in place."""
+    if not isinstance(array, np.ndarray):
+        raise InputError(f"{where} is {type(array).__name__}; give an array of float64")
+    if array.dtype != np.float64:
+        raise InputError(f"{where} is an array of {array.dtype}; give one of float64")
+    if array.shape != shape:
+        raise InputError(f"{where} has the shape {array.shape}; the places have {shape}")
+    if not array.flags.c_contiguous:
+        raise InputError(f"{where} is not contiguous; give an array whose rows follow each other (np.empty makes one)")
+    if not array.flags.writeable:
+        raise InputError(f"{where} is read-only; give an array that may be written to")
+
+
+@Inlined
+def keeps(w0, v2, sizes):  # type: ignore[no-untyped-def]
+    """Whether subtracting heights of some size has left V**2 its digits; never of what is not a number."""
+    return sizes <= LEVELLED * max(fabs(w0 - v2), w0)
+
+
+@entry(
+    types.void(
+        *(types.UniTuple(_WHOLE, 5), _WHOLE, _LINE, _REAL, _REAL, _REAL, _LINE, _LINE),
+        *(types.UniTuple(_LINE, SHOWN), _WHOLE, _WHOLE, types.boolean),
+    ),
+    nogil=True,
+)
+def fill_loads(fns, loads, p, lam0, lam0_low, w0, places, rests, rows, begin, end, past):  # type: ignore[no-untyped-def]
+    """Fill rows x, z, ds, kappa, V**2 and contact force from the index ``begin`` to ``end``; ``past`` as in `put`.
+
+    ``loads`` is the address of the module's function, 0 where it has none. ``rests`` are what the places leave over as
+    doubles; empty where they leave nothing.
+    """
+    launch, field, rise = np.empty((2, 1)), np.empty(LOAD_ROWS * BLOCK), np.empty(2 * BLOCK)
+    offsets, exact, frame = np.empty(BLOCK), np.empty(BLOCK), np.empty(FRAME_ROWS * BLOCK)
+    start = np.array([lam0])
+    call_climb(fns[1], 1, start, p, launch)
+    gained = lam0_low * launch[1, 0]
+    level, size = 0.0, nan  # nothing is kept of sizes that are not known
+    if loads and not rests.size:
+        call_loads(loads, 1, 0.0, 0.0, start, p, field)
+        level, size = gained - field[4], field[6]
+    for first in range(begin, end, BLOCK):
+        n = min(BLOCK, end - first)
+        here, v2, force, sizes = places[first : first + n], field[4 * n : 5 * n], field[5 * n :], field[6 * n :]
+        if size >= 0.0:
+            call_loads(loads, n, w0, level, here, p, field)
+        else:
+            sizes[:n] = nan
+        lost = 0
+        for i in range(n):
+            lost += 0 if keeps(w0, v2[i], size + sizes[i]) else 1
+        if lost:
+            for i in range(n):
+                offsets[i] = here[i] - lam0
+            if rests.size:
+                for i in range(n):
+                    offsets[i] += rests[first + i]
+            call_rise(fns[2], n, lam0, here, offsets, p, rise)
+            for i in range(n):
+                slow = w0 - (offsets[i] * rise[i] - gained)
+                exact[i] = v2[i] if keeps(w0, v2[i], size + sizes[i]) else slow
+            call_frame(fns[0], n, here, exact, p, frame)
+            if not size >= 0.0:
+                field[: 4 * n] = frame[: 4 * n]
+            for i in range(n):
+                force[i] = force[i] if keeps(w0, v2[i], size + sizes[i]) else frame[4 * n + i]
+            v2[:] = exact[:n]
+        for k in range(SHOWN):
+            put(rows[k][first : first + n], field[k * n : (k + 1) * n], past)
+    settle(rows[0])
