@@ -14,9 +14,10 @@ from gqm_sym.errors import LaunchError, ParameterError
 from gqm_sym.runtime.chart import Chart, ChartMaker
 from gqm_sym.runtime.entries import frame_at, loads_at
 from gqm_sym.runtime.exact_problems import exact_problem
+from gqm_sym.runtime.functions import Functions
 from gqm_sym.runtime.interface import Addresses, Dissipation, Each, ExactClimb, ExactFormulas
 from gqm_sym.runtime.numbers import Number, read_number, read_numbers
-from gqm_sym.runtime.stretch import Array, Functions
+from gqm_sym.runtime.stretch import Array
 from gqm_sym.runtime.threads import spread
 
 if TYPE_CHECKING:

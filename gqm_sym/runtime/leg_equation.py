@@ -29,6 +29,8 @@ STEEPEST = 2.0
 # exp(q) - 1 is summed to rounding below this; beyond, by doubling.
 SUMMED = 0.25
 MOST_ROUNDS = 40
+# A distance beyond any other: no number would be left of an infinite one.
+FARTHEST = 1e300
 # Rows of a panel's values, all over the panel's nodes; those before JUDGED may be judged, W and what follows holds the
 # panel's end as well. BARE is what W is made of: W over the distance from a turning point, be it one behind a slow
 # launch; W itself elsewhere.
@@ -46,6 +48,7 @@ def distance(w, g, c):  # type: ignore[no-untyped-def]
 @Inner
 def marched(d, g, c):  # type: ignore[no-untyped-def]
     """The march variable at a distance from the origin."""
+    d = min(d, FARTHEST)
     return 2.0 * d / (c + sqrt(c * c + 4.0 * g * d)) if d > 0.0 else 0.0
 
 

@@ -164,7 +164,8 @@ def next_panel(  # type: ignore[no-untyped-def]
     here = origin + u * gone
     for _ in range(2100):
         run = width * (near + g * width)
-        if run <= NARROW * max(fabs(here), gone) or run < 1e-300:
+        # As narrow as its room, a panel may be narrower than places in doubles: distances on it keep their digits.
+        if (run <= NARROW * max(fabs(here), gone) and width < room) or run < 1e-300:
             return 0.0, step, 0.0, False
         far = solve_panel(drive, p, flags[2] == 1, origin, u, g, c, left, width, base, v, nu, rows, work)
         if flags[1] == 1 and not kink and (far < inf or flags[2] == 1):

@@ -8,11 +8,13 @@ from numba import types
 
 from gqm_sym.runtime.chebyshev import COUNT, TO_COEFFICIENTS, WIDE, to_ends
 from gqm_sym.runtime.clocks import Array
+from gqm_sym.runtime.course import Pair
+from gqm_sym.runtime.functions import Functions
 from gqm_sym.runtime.integrands import FROM_TURN, REGULAR, TO_EQUILIBRIUM
 from gqm_sym.runtime.jit import entry
 from gqm_sym.runtime.leg_panels import COLUMNS
 from gqm_sym.runtime.panels import CONVERGED, DEGREE
-from gqm_sym.runtime.stretch import ULP, Functions, Stretch
+from gqm_sym.runtime.stretch import ULP, Stretch
 
 # An equilibrium is approached until the distance left is exp(-this) of the leg: all that doubles have.
 CLOSEST = 690.0
@@ -82,8 +84,8 @@ class Run(NamedTuple):
     """One run of the body as compiled code tells of it (`legs.follow`), not yet made into pieces."""
 
     start: float
-    place: float
-    middle: float
+    place: Pair
+    middle: Pair
     slack: float
     times: tuple[float, float]
     changes: Array
@@ -94,8 +96,8 @@ class Run(NamedTuple):
     laps: int
 
 
-def along_panels(f: Functions, a: float, b: float, slack: float, time: float, panels: Array) -> Stretch:
-    """A stretch by its panels (`leg_panels`), whose times add up to ``time``.
+def along_panels(f: Functions, a: Pair, b: Pair, slack: float, time: float, panels: Array) -> Stretch:
+    """A stretch by its panels (`leg_panels`), whose times add up to ``time``; its ends as two doubles each.
 
     ``slack`` is c/2 of their march variable, infinite where that is the distance.
     """
@@ -104,8 +106,9 @@ def along_panels(f: Functions, a: float, b: float, slack: float, time: float, pa
     return Stretch(
         functions=f,
         kind=REGULAR if slack == inf else FROM_TURN,
-        a=a,
-        b=b,
+        a=a[0],
+        b=b[0],
+        lows=(a[1], b[1]),
         slack=0.0 if slack == inf else slack / last,
         laid=(*laid, error, 1.0, CONVERGED),
         paces=(last, speed_terms),
