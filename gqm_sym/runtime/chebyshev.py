@@ -75,6 +75,8 @@ LEBESGUE = 3.0
 
 # How finely a panel is searched for a change of sign that bounds cannot settle.
 FINEST = 2.0**-30
+# The last step of Newton's method for a zero in [-1, 1].
+NEWTON = 1e-12
 
 
 @Inner
@@ -124,25 +126,35 @@ def _is_monotone(c):  # type: ignore[no-untyped-def]
 
 
 @Inner
+def _sum_and_slope(c, x):  # type: ignore[no-untyped-def]
+    """The series and its derivative at x."""
+    high, low, steep, flat = 0.0, 0.0, 0.0, 0.0
+    twice = 2.0 * x
+    for k in range(c.size - 1, 0, -1):
+        steep, flat = 2.0 * high + (twice * steep - flat), steep
+        high, low = (c[k] - low) + twice * high, high
+    return (c[0] - low) + x * high, high + (x * steep - flat)
+
+
+@Inner
 def _crossing(c, rising):  # type: ignore[no-untyped-def]
-    """The zero of a monotone series that changes sign over [-1, 1]."""
+    """The zero of a monotone series that changes sign over [-1, 1], by Newton's method inside a bracket."""
     lo, hi = -1.0, 1.0
     low, high = chebyshev_sum(c, lo), chebyshev_sum(c, hi)
     x = lo + (hi - lo) * (low / (low - high))
-    for _ in range(100):
-        value = chebyshev_sum(c, x)
+    for _ in range(60):
+        value, slope = _sum_and_slope(c, x)
         if value == 0.0:
             return x
         if (value > 0.0) == rising:
-            hi, high = x, value
-            low *= 0.5  # the other end gives way, so that both close in
+            hi = x
         else:
-            lo, low = x, value
-            high *= 0.5
-        new = lo + (hi - lo) * (low / (low - high))
-        if not lo < new < hi:
+            lo = x
+        new = x - value / slope
+        if not lo <= new <= hi:
             new = 0.5 * (lo + hi)
-        if fabs(new - x) <= 1e-16 or hi - lo <= 2e-16:
+        # Steps shrink as their squares: after one this short the next would be below rounding.
+        if fabs(new - x) <= NEWTON or hi - lo <= 2e-16:
             return new
         x = new
     return x

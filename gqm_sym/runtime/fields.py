@@ -40,7 +40,7 @@ def approach(drive, p, flags, top, end, v, nu, changes, breaks, step):  # type: 
         if stop <= left:
             break
         width, step, _, _ = next_panel(
-            *(drive, p, flags, top, u, 0.0, 1.0, left, stop - left, step, base, v, nu, 0.0, NEVER),
+            *(drive, p, flags, top, u, 0.0, 1.0, left, stop - left, step, base, v, nu, 0.0, NEVER, False),
             *(rows, work, sizes, tails, series),
         )
         if width == 0.0:

@@ -80,32 +80,49 @@ def grow(work, q, out):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def solve_panel(drive, p, linear, origin, u, g, c, left, width, base, v, nu, rows, work):  # type: ignore[no-untyped-def]
-    """W on a panel from w = ``left`` on, run towards growing (u = 1) or falling (u = -1) parameters.
+def begin_panel(drive, p, linear, origin, u, g, c, left, width, base, v, nu, rows, work):  # type: ignore[no-untyped-def]
+    """Lay out a panel from w = ``left`` on, run towards growing (u = 1) or falling (u = -1) parameters.
 
-    Fills ``rows`` by ``drive`` and all of ``work`` that does not ask for W > 0. Returns q over the panel, inf where it
-    is too wide for an answer.
+    Where forces are linear in V**2, fills ``rows`` by ``drive``, and DS and PULL of ``work``.
     """
     near = 2.0 * g * left + c
     begin = origin + u * distance(left, g, c)
-    places, speeds = work[ARC], work[W]
     for j in range(WIDE):
         y = width * ENDS_BY_NODE[j]
         work[PLACE, j] = y
         work[D, j] = y * (near + g * y)
         work[ARC, j] = begin + u * work[D, j]
         work[W, j] = base
+    if linear:
+        sample(drive, p, u, g, near, v, nu, rows, work)
+
+
+@Inner
+def sample(drive, p, u, g, near, v, nu, rows, work):  # type: ignore[no-untyped-def]
+    """Fill ``rows`` by ``drive``, and DS and PULL, at the panel's places for V**2 as it is taken to be there."""
+    call_drive(drive, COUNT, work[ARC], work[W], float(v), float(nu), p, rows)
+    for j in range(COUNT):
+        work[DS, j] = rows[0, j]
+        work[PULL, j] = u * rows[2, j] * (near + 2.0 * g * work[PLACE, j])
+
+
+@Inner
+def solve_panel(drive, p, linear, u, g, c, left, base, v, nu, rows, work):  # type: ignore[no-untyped-def]
+    """W on a panel that was begun (`begin_panel`).
+
+    Fills all of ``work`` that does not ask for W > 0. Returns q over the panel, inf where it is too wide for an answer.
+    """
+    near = 2.0 * g * left + c
     if not linear:  # Newton's method begins with what W does at once; laws may ask for its root
         work[W, 0] = max(base, 1e-300)
-        call_drive(drive, 1, places, speeds, float(v), float(nu), p, rows)
+        call_drive(drive, 1, work[ARC], work[W], float(v), float(nu), p, rows)
         rise = max(u * (rows.flat[1] - rows.flat[2] * work[W, 0]), 0.0)
         for j in range(WIDE):
             work[W, j] = base + rise * work[D, j]
     stop, settled = inf, linear
     for _ in range(1 if linear else MOST_ROUNDS):
-        call_drive(drive, COUNT, places, speeds, float(v), float(nu), p, rows)
-        for j in range(COUNT):
-            work[PULL, j] = u * rows[2, j] * (near + 2.0 * g * work[PLACE, j])
+        if not linear:
+            sample(drive, p, u, g, near, v, nu, rows, work)
         to_ends(MEANS_BY_NODE, work, PULL * WIDE, work, SPEED * WIDE)
         for j in range(WIDE):
             work[SPEED, j] *= work[PLACE, j]
@@ -154,7 +171,6 @@ def solve_panel(drive, p, linear, origin, u, g, c, left, width, base, v, nu, row
             h = work[PLACE, j] + 0.5 * c if slow else 1.0
             work[BARE, j] = work[W, j] / (h * h)
     for j in range(COUNT):
-        work[DS, j] = rows[0, j]
         work[LOAD, j] = rows[0, j] * (rows[3, j] + rows[4, j] * work[W, j])
     return far
 

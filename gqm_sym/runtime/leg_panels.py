@@ -19,6 +19,7 @@ from gqm_sym.runtime.jit import Inner
 from gqm_sym.runtime.leg_equation import (
     ARC,
     BARE,
+    DS,
     FORCE,
     LOAD,
     MEAN,
@@ -29,6 +30,7 @@ from gqm_sym.runtime.leg_equation import (
     D,
     W,
     as_bare,
+    begin_panel,
     distance,
     pace,
     solve_panel,
@@ -38,6 +40,8 @@ from gqm_sym.runtime.leg_equation import (
 TAIL = 4e-16
 # Coefficients that have stopped falling below this level are rounding noise, not structure.
 PLATEAU = 1e-9
+# The same where no more is asked than whether a function has one sign.
+SIGNED = 1e-7
 # What may be left of a function where all of it cancels, as a share of its parts.
 NOISE = 1e-15
 # A width of a few units in the last place of the parameter.
@@ -113,12 +117,23 @@ def resolved(work, sizes, first, last, tails):  # type: ignore[no-untyped-def]
 
 
 @Inner
+def keeps_sign(work, row, noise):  # type: ignore[no-untyped-def]
+    """Whether values of a function are so far from nothing that the polynomial through them changes sign nowhere."""
+    low, high = extent(work, row * WIDE)
+    return fabs(0.5 * (low + high)) > 0.5 * LEBESGUE * (high - low) + noise
+
+
+@Inner
+def is_clear(work, size, tails):  # type: ignore[no-untyped-def]
+    """Whether N has one sign on a panel, as is told long before its digits are."""
+    return keeps_sign(work, LOAD, 4.0 * SIGNED * size) and falls(work, LOAD, size, tails)[0] <= SIGNED * size
+
+
+@Inner
 def change_of(work, row, sign, noise, c):  # type: ignore[no-untyped-def]
     """`first_change` of a function by its values; its coefficients, in c, are found only where values leave a doubt."""
-    low, high = extent(work, row * WIDE)
-    middle, spread = 0.5 * (low + high), 0.5 * LEBESGUE * (high - low)
-    if fabs(middle) > spread + noise:
-        found = 1 if middle > 0.0 else -1
+    if keeps_sign(work, row, noise):
+        found = 1 if work[row, 0] > 0.0 else -1
         if sign == 0 or found == sign:
             return 2.0, found, 2.0
     to_ends(COEFFICIENTS_BY_NODE, work, row * WIDE, c, 0)
@@ -141,12 +156,33 @@ def to_kink(rows, work, c, tails):  # type: ignore[no-untyped-def]
 
 @Inner
 def next_panel(  # type: ignore[no-untyped-def]
-    drive, p, flags, origin, u, g, c, left, room, step, base, v, nu, ceiling, ask, rows, work, sizes, tails, series
+    drive,
+    p,
+    flags,
+    origin,
+    u,
+    g,
+    c,
+    left,
+    room,
+    step,
+    base,
+    v,
+    nu,
+    ceiling,
+    ask,
+    watch,
+    rows,
+    work,
+    sizes,
+    tails,
+    series,
 ):
     """The widest panel that can be resolved, no wider than ``room`` and ``step``.
 
     Time on it is resolved too: where ``ask`` is ALWAYS; never where it is NEVER; where it is MAYBE, unless V**2 falls
-    below a part of the largest so far, ``ceiling``.
+    below a part of the largest so far, ``ceiling``. N is resolved as well as its changes of sign ask for, and not at
+    all unless ``watch`` is set.
 
     Returns
     -------
@@ -167,7 +203,14 @@ def next_panel(  # type: ignore[no-untyped-def]
         # As narrow as its room, a panel may be narrower than places in doubles: distances on it keep their digits.
         if (run <= NARROW * max(fabs(here), gone) and width < room) or run < 1e-300:
             return 0.0, step, 0.0, False
-        far = solve_panel(drive, p, flags[2] == 1, origin, u, g, c, left, width, base, v, nu, rows, work)
+        begin_panel(drive, p, flags[2] == 1, origin, u, g, c, left, width, base, v, nu, rows, work)
+        if flags[1] == 0 and flags[2] == 1:  # most that is too wide is told from the curve alone
+            sizes[DS], sizes[PULL] = size_of(work, DS), max(size_of(work, PULL), 1.0 / width)
+            fine, growth = resolved(work, sizes, DS, PULL + 1, tails)
+            if not fine:
+                width *= max(min(growth, 0.9), 0.2)
+                continue
+        far = solve_panel(drive, p, flags[2] == 1, u, g, c, left, base, v, nu, rows, work)
         if flags[1] == 1 and not kink and (far < inf or flags[2] == 1):
             x = to_kink(rows, work, series, tails)
             if x <= 1.0:
@@ -180,7 +223,8 @@ def next_panel(  # type: ignore[no-untyped-def]
             width, kink = 0.5 * width, False
             continue
         highest = weigh(rows, base, as_bare(base, g, c, left), work, sizes)
-        fine, growth = resolved(work, sizes, 0, PACE, tails)
+        last = PACE if watch and not is_clear(work, sizes[LOAD], tails) else LOAD
+        fine, growth = resolved(work, sizes, 0, last, tails)
         if fine:
             widest = max(widest, width)
             top, end = max(ceiling, highest), work[W, COUNT]

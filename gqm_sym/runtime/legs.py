@@ -16,7 +16,19 @@ from gqm_sym.runtime.crossing import call_drive, call_hold
 from gqm_sym.runtime.doubledouble import two_sum
 from gqm_sym.runtime.fields import approach
 from gqm_sym.runtime.jit import Inner, entry
-from gqm_sym.runtime.leg_equation import BARE, FORCE, JUDGED, LOAD, ROWS, as_bare, distance, marched, pace, solve_panel
+from gqm_sym.runtime.leg_equation import (
+    BARE,
+    FORCE,
+    JUDGED,
+    LOAD,
+    ROWS,
+    as_bare,
+    begin_panel,
+    distance,
+    marched,
+    pace,
+    solve_panel,
+)
 from gqm_sym.runtime.leg_equation import W as V2
 from gqm_sym.runtime.leg_panels import (
     ALWAYS,
@@ -153,7 +165,7 @@ def run(drive, p, flags, start, w, v, nu, breaks, limit, reach, step, side, stri
         part = min(room, sooner) if gone == 0.0 else room
         ask = ALWAYS if gone < strict else (NEVER if searching or late else MAYBE)
         width, step, far, timed = next_panel(
-            *(drive, p, flags, start, v, g, c, left, part, step, base, v, nu, ceiling, ask),
+            *(drive, p, flags, start, v, g, c, left, part, step, base, v, nu, ceiling, ask, True),
             *(rows, work, sizes, tails, series),
         )
         if width == 0.0:
@@ -188,7 +200,8 @@ def run(drive, p, flags, start, w, v, nu, breaks, limit, reach, step, side, stri
             x = bottom(rows, work, v, touch) if end == touch and end != at_rest else end
             # Once more on a panel that ends there: its own sum has more digits than the series of a wider one.
             right = left + width * (0.5 * (1.0 + x))
-            far = solve_panel(drive, p, flags[2] == 1, start, v, g, c, left, right - left, base, v, nu, rows, work)
+            begin_panel(drive, p, flags[2] == 1, start, v, g, c, left, right - left, base, v, nu, rows, work)
+            far = solve_panel(drive, p, flags[2] == 1, v, g, c, left, base, v, nu, rows, work)
             pace(g, c, left, base, work)
             if end == at_rest and flags[2] == 1:
                 over, there = work[V2, COUNT], distance(right, g, c)
@@ -244,7 +257,7 @@ def run_back(drive, p, flags, turn, whole, v, nu, changes, breaks, step):  # typ
         if room <= 0.0:
             break
         width, step, _, _ = next_panel(
-            *(drive, p, flags, turn, u, 1.0, 0.0, left, room, step, base, v, nu, 0.0, ALWAYS),
+            *(drive, p, flags, turn, u, 1.0, 0.0, left, room, step, base, v, nu, 0.0, ALWAYS, False),
             *(rows, work, sizes, tails, series),
         )
         if width == 0.0:
