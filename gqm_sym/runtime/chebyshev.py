@@ -12,7 +12,8 @@ import numpy as np
 from gqm_sym.runtime.jit import Inner
 from gqm_sym.runtime.matrices import columns, span
 
-COUNT = 20
+# With the panel's end these fill three registers.
+COUNT = 23
 
 
 def _tables() -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
@@ -65,7 +66,7 @@ MEANS_BY_NODE, GRADED_BY_NODE, COEFFICIENTS_BY_NODE = (
     np.ascontiguousarray(np.pad(table.T, ((0, 0), (0, WIDE - len(table)))))
     for table in (MEANS, GRADED_MEANS, TO_COEFFICIENTS)
 )
-LAST, MIDDLE = slice(COUNT - 3, COUNT), slice(12, 15)
+LAST, MIDDLE = slice(COUNT - 3, COUNT), slice(14, 17)
 TAILS_BY_NODE = np.ascontiguousarray(
     np.pad(np.vstack([TO_COEFFICIENTS[LAST], TO_COEFFICIENTS[MIDDLE]]).T, ((0, 0), (0, 2)))
 )

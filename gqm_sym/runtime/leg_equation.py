@@ -100,8 +100,8 @@ def begin_panel(drive, p, linear, origin, u, g, c, left, width, base, v, nu, row
 @Inner
 def sample(drive, p, u, g, near, v, nu, rows, work):  # type: ignore[no-untyped-def]
     """Fill ``rows`` by ``drive``, and DS and PULL, at the panel's places for V**2 as it is taken to be there."""
-    call_drive(drive, COUNT, work[ARC], work[W], float(v), float(nu), p, rows)
-    for j in range(COUNT):
+    call_drive(drive, WIDE, work[ARC], work[W], float(v), float(nu), p, rows)
+    for j in range(WIDE):
         work[DS, j] = rows[0, j]
         work[PULL, j] = u * rows[2, j] * (near + 2.0 * g * work[PLACE, j])
 
@@ -130,7 +130,7 @@ def solve_panel(drive, p, linear, u, g, c, left, base, v, nu, rows, work):  # ty
         if not fabs(far) <= STEEPEST:
             return inf
         grow(work, SPEED, SWELL)
-        for j in range(COUNT):
+        for j in range(WIDE):
             work[FORCE, j] = u * rows[1, j] * (1.0 + work[SWELL, j])
         # The integral over the distance: means, and where the march is graded those with the weight y.
         to_ends(MEANS_BY_NODE, work, FORCE * WIDE, work, MEAN * WIDE)
@@ -162,15 +162,15 @@ def solve_panel(drive, p, linear, u, g, c, left, base, v, nu, rows, work):  # ty
     if not settled:
         return inf
     if base == 0.0:
-        for j in range(COUNT):
+        for j in range(WIDE):
             kept = 1.0 + work[SWELL, j]
             work[BARE, j] = (work[GRADED, j] if g > 0.0 else work[MEAN, j]) / kept
     else:
         slow = g > 0.0 and left == 0.0
-        for j in range(COUNT):
+        for j in range(WIDE):
             h = work[PLACE, j] + 0.5 * c if slow else 1.0
             work[BARE, j] = work[W, j] / (h * h)
-    for j in range(COUNT):
+    for j in range(WIDE):
         work[LOAD, j] = rows[0, j] * (rows[3, j] + rows[4, j] * work[W, j])
     return far
 
@@ -184,7 +184,7 @@ def as_bare(w, g, c, left):  # type: ignore[no-untyped-def]
 @Inner
 def pace(g, c, left, base, work):  # type: ignore[no-untyped-def]
     """Fill in Y, the pace of time and that of arc length: not numbers where W is not positive."""
-    for j in range(COUNT):
+    for j in range(WIDE):
         w = left + work[PLACE, j]
         h = g * (w + 0.5 * c) + (1.0 - g)
         bare = work[BARE, j] if base == 0.0 else work[W, j] / (h * h)

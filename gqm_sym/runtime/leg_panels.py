@@ -47,7 +47,7 @@ NOISE = 1e-15
 # A width of a few units in the last place of the parameter.
 NARROW = 1e-15
 # Coefficients that fall by this factor a degree reach TAIL with the last ones but one.
-FALL = 7.2
+FALL = 5.4
 # A panel is made this much narrower than it would seem to be allowed to be, and at most that many times wider.
 CAUTION, GROWTH = 0.9, 4.0
 # V**2 at a panel's end against the largest so far from which on time is resolved: below, a turn is expected, and time
@@ -78,7 +78,7 @@ def weigh(rows, base, bare, work, sizes):  # type: ignore[no-untyped-def]
 
     The panel begins with V**2 = ``base``, which is ``bare`` in the units of BARE.
     """
-    for j in range(COUNT):
+    for j in range(WIDE):
         work[MEAN, j] = fabs(rows[0, j]) * (fabs(rows[3, j]) + fabs(rows[4, j] * work[W, j]))
     for f in range(PACE):
         sizes[f] = size_of(work, f)
@@ -113,7 +113,7 @@ def resolved(work, sizes, first, last, tails):  # type: ignore[no-untyped-def]
     if worst == 0.0:
         return fine, GROWTH
     # Coefficients fall like powers of the distance of what is not smooth.
-    return fine, min(CAUTION * worst ** (-1.0 / 13.0) / FALL, GROWTH)
+    return fine, min(CAUTION * worst ** (-1.0 / 15.0) / FALL, GROWTH)
 
 
 @Inner
@@ -137,6 +137,13 @@ def change_of(work, row, sign, noise, c):  # type: ignore[no-untyped-def]
         if sign == 0 or found == sign:
             return 2.0, found, 2.0
     to_ends(COEFFICIENTS_BY_NODE, work, row * WIDE, c, 0)
+    rest, bounds = 0.0, extent(c, 0)
+    if max(bounds[1], -bounds[0]) == fabs(c[0]):
+        for k in range(1, COUNT):
+            rest += fabs(c[k])
+        found = 1 if c[0] > 0.0 else -1
+        if fabs(c[0]) > rest + noise and (sign == 0 or found == sign):
+            return 2.0, found, 2.0
     return first_change(c[:COUNT], sign, noise)
 
 
@@ -146,7 +153,7 @@ def to_kink(rows, work, c, tails):  # type: ignore[no-untyped-def]
 
     The sign is that of ds kappa, which is smooth at cusps too.
     """
-    for j in range(COUNT):
+    for j in range(WIDE):
         work[LOAD, j] = rows[0, j] * rows[4, j]
     size = size_of(work, LOAD)
     if not falls(work, LOAD, size, tails)[2]:
@@ -217,7 +224,7 @@ def next_panel(  # type: ignore[no-untyped-def]
                 kink = x > -1.0
                 width *= 0.5 * (1.0 + x) if kink else 0.5
                 continue
-            for j in range(COUNT):
+            for j in range(WIDE):
                 work[LOAD, j] = rows[0, j] * (rows[3, j] + rows[4, j] * work[W, j])
         if not far < inf:
             width, kink = 0.5 * width, False

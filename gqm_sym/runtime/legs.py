@@ -128,7 +128,7 @@ def run(drive, p, flags, start, w, v, nu, breaks, limit, reach, step, side, stri
     panels : (n, COLUMNS) array
         The panels up to ``middle``.
     """
-    rows, work, sizes, tails = np.empty((5, COUNT)), np.empty((ROWS, WIDE)), np.empty(JUDGED), np.empty(8)
+    rows, work, sizes, tails = np.empty((5, WIDE)), np.empty((ROWS, WIDE)), np.empty(JUDGED), np.empty(8)
     series, changes, spot = np.empty(WIDE), np.empty(4), np.empty((7, 1))
     panels = np.empty((8, COLUMNS))
     g, c, sooner = 1.0, 0.0, inf
@@ -247,7 +247,7 @@ def run_back(drive, p, flags, turn, whole, v, nu, changes, breaks, step):  # typ
 
     ``nu`` is the sign of N at the turn, ``changes`` are the places where it has changed sign on the way.
     """
-    rows, work, sizes, tails = np.empty((5, COUNT)), np.empty((ROWS, WIDE)), np.empty(JUDGED), np.empty(8)
+    rows, work, sizes, tails = np.empty((5, WIDE)), np.empty((ROWS, WIDE)), np.empty(JUDGED), np.empty(8)
     series, panels = np.empty(WIDE), np.empty((8, COLUMNS))
     count, base, left, gone, u, step = 0, 0.0, 0.0, 0.0, -v, sqrt(step)
     met, passed = changes.size - 1, breaks.size - 1
