@@ -87,6 +87,18 @@ class Given(tuple[Number, ...]):
     functions: Functions | None = None
 
 
+@lru_cache
+def _solver(dissipative: bool) -> "Callable[[Formulas, Given, Launch], Motion]":
+    """What solves a launch, loaded when it is needed: a process that solves one model needs one of the two."""
+    if dissipative:
+        from gqm_sym.runtime.dissipative import dissipate
+
+        return dissipate
+    from gqm_sym.runtime.solve import solve
+
+    return solve
+
+
 @lru_cache(maxsize=8)
 def _chart(maker: ChartMaker, values: tuple[float, ...]) -> Chart:
     """A curve's chart, made once for the same values of the run-time parameters."""
@@ -311,16 +323,6 @@ class Formulas:
         spread(fill, places.size, LEAST_MAP)
         return Pass1(*(row.reshape(shape) for row in out))
 
-    def _solver(self) -> "Callable[[Formulas, Given, Launch], Motion]":
-        # Loaded when it is needed: a process that solves one model needs one of the two.
-        if self.dissipation is None:
-            from gqm_sym.runtime.solve import solve
-
-            return solve
-        from gqm_sym.runtime.dissipative import dissipate
-
-        return dissipate
-
     def solve(
         self,
         lam0: Any,
@@ -334,7 +336,7 @@ class Formulas:
         """The motion that a launch begins."""
         p = self.numbers(given)
         launch = self.launch(p, lam0=lam0, v0=v0, direction=direction, point=point, t_max=t_max, contact=contact)
-        find = self._solver()
+        find = _solver(self.dissipation is not None)
         if not self.body:
             return find(self, p, launch)
         from gqm_sym.runtime.fit import check_end, check_launch

@@ -10,7 +10,7 @@ Integrals come from running means, so that nothing is subtracted however short t
 turning point too.
 """
 
-from math import fabs, inf, sqrt
+from math import fabs, factorial, inf, sqrt
 
 from gqm_sym.runtime.chebyshev import (
     COUNT,
@@ -22,12 +22,14 @@ from gqm_sym.runtime.chebyshev import (
     to_ends,
 )
 from gqm_sym.runtime.crossing import call_drive
+from gqm_sym.runtime.fused import fma, polynomial
 from gqm_sym.runtime.jit import Inner
 
 # V**2 over a panel may not change by more than this factor's logarithm through resistance alone.
 STEEPEST = 2.0
 # exp(q) - 1 is summed to rounding below this; beyond, by doubling.
 SUMMED = 0.25
+SWELLING = tuple(1.0 / factorial(k) for k in range(13, 1, -1))
 MOST_ROUNDS = 40
 # A distance beyond any other: no number would be left of an infinite one.
 FARTHEST = 1e300
@@ -61,19 +63,7 @@ def grow(work, q, out):  # type: ignore[no-untyped-def]
         scale, doublings = 0.5 * scale, doublings + 1
     for j in range(WIDE):
         x = work[q, j] * scale
-        s = 1.0 / 6227020800.0
-        s = s * x + 1.0 / 479001600.0
-        s = s * x + 1.0 / 39916800.0
-        s = s * x + 1.0 / 3628800.0
-        s = s * x + 1.0 / 362880.0
-        s = s * x + 1.0 / 40320.0
-        s = s * x + 1.0 / 5040.0
-        s = s * x + 1.0 / 720.0
-        s = s * x + 1.0 / 120.0
-        s = s * x + 1.0 / 24.0
-        s = s * x + 1.0 / 6.0
-        s = s * x + 0.5
-        work[out, j] = (s * x) * x + x
+        work[out, j] = fma(polynomial(SWELLING, x) * x, x, x)
     for _ in range(doublings):
         for j in range(WIDE):
             work[out, j] *= work[out, j] + 2.0

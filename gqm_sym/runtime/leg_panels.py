@@ -52,7 +52,7 @@ FALL = 5.4
 CAUTION, GROWTH = 0.9, 4.0
 # V**2 at a panel's end against the largest so far from which on time is resolved: below, a turn is expected, and time
 # is counted from there.
-HIGH = 0.5
+HIGH = 0.25
 
 # A part this small of a panel on which V**2 is resolved tells noise from structure.
 SLIVER = 2.0**-20
@@ -101,19 +101,30 @@ def falls(work, row, size, tails):  # type: ignore[no-untyped-def]
 
 @Inner
 def resolved(work, sizes, first, last, tails):  # type: ignore[no-untyped-def]
-    """Whether some functions are resolved, and by what the panel's width may be multiplied."""
+    """Whether some functions are resolved, and how large coefficients in their middle are, against the largest."""
     fine, worst = True, 0.0
     for f in range(first, last):
         tail, level, ok = falls(work, f, sizes[f], tails)
         if not (tail < inf and level < inf):
-            return False, 0.5
+            return False, inf
         if sizes[f] > 0.0:
             worst = max(worst, level / sizes[f])
         fine = fine and ok
+    return fine, worst
+
+
+@Inner
+def growth(worst):  # type: ignore[no-untyped-def]
+    """By what a panel's width may be multiplied: coefficients fall like powers of the distance of what is not smooth."""
     if worst == 0.0:
-        return fine, GROWTH
-    # Coefficients fall like powers of the distance of what is not smooth.
-    return fine, min(CAUTION * worst ** (-1.0 / 15.0) / FALL, GROWTH)
+        return GROWTH
+    return min(CAUTION * worst ** (-1.0 / 15.0) / FALL, GROWTH) if worst < inf else 0.5
+
+
+@Inner
+def narrower(width, worst):  # type: ignore[no-untyped-def]
+    """The width to try next."""
+    return width * max(min(growth(worst), 0.9), 0.2)
 
 
 @Inner
@@ -211,12 +222,14 @@ def next_panel(  # type: ignore[no-untyped-def]
         if (run <= NARROW * max(fabs(here), gone) and width < room) or run < 1e-300:
             return 0.0, step, 0.0, False
         begin_panel(drive, p, flags[2] == 1, origin, u, g, c, left, width, base, v, nu, rows, work)
+        first, worst = DS, 0.0
         if flags[1] == 0 and flags[2] == 1:  # most that is too wide is told from the curve alone
             sizes[DS], sizes[PULL] = size_of(work, DS), max(size_of(work, PULL), 1.0 / width)
-            fine, growth = resolved(work, sizes, DS, PULL + 1, tails)
+            fine, worst = resolved(work, sizes, DS, FORCE, tails)
             if not fine:
-                width *= max(min(growth, 0.9), 0.2)
+                width = narrower(width, worst)
                 continue
+            first = FORCE
         far = solve_panel(drive, p, flags[2] == 1, u, g, c, left, base, v, nu, rows, work)
         if flags[1] == 1 and not kink and (far < inf or flags[2] == 1):
             x = to_kink(rows, work, series, tails)
@@ -231,12 +244,13 @@ def next_panel(  # type: ignore[no-untyped-def]
             continue
         highest = weigh(rows, base, as_bare(base, g, c, left), work, sizes)
         last = PACE if watch and not is_clear(work, sizes[LOAD], tails) else LOAD
-        fine, growth = resolved(work, sizes, 0, last, tails)
+        fine, more = resolved(work, sizes, first, last, tails)
+        worst = max(worst, more)
         if fine:
             widest = max(widest, width)
             top, end = max(ceiling, highest), work[W, COUNT]
             needed = ask == ALWAYS or (ask == MAYBE and (end >= HIGH * top or base < HIGH * top))
-            timed, more = False, GROWTH
+            timed, more = False, 0.0
             if ask != NEVER:
                 pace(g, c, left, base, work)
                 sizes[PACE] = size_of(work, PACE)
@@ -244,12 +258,11 @@ def next_panel(  # type: ignore[no-untyped-def]
             # On so small a part of what is smooth it is noise that is not resolved; the error says so.
             timed = timed or (needed and width <= SLIVER * widest and tails[0] < inf)
             if timed or not needed:
-                if timed:
-                    growth = min(growth, more)
-                step = max(step, width * growth) if kink or width == room else width * growth
+                wider = width * growth(max(worst, more) if timed else worst)
+                step = max(step, wider) if kink or width == room else wider
                 return width, step, far, timed
-            growth = more
-        width, kink = width * max(min(growth, 0.9), 0.2), False
+            worst = more
+        width, kink = narrower(width, worst), False
     return 0.0, step, 0.0, False
 
 
@@ -261,6 +274,7 @@ def keep(panels, count, right, width, work, tails):  # type: ignore[no-untyped-d
     row, time = panels[count], 0.0
     for j in range(COUNT):
         time += MEANS[COUNT, j] * work[PACE, j]
+    for j in range(COUNT):
         row[3 + j], row[3 + COUNT + j], row[3 + 2 * COUNT + j] = work[PACE, j], work[ARC, j], work[SPEED, j]
     row[0], row[1] = right, width * time
     row[2] = width * max(fabs(tails[0]), max(fabs(tails[1]), fabs(tails[2])))
