@@ -30,6 +30,8 @@ MOST_PAUSES = 12
 MOST_TURNS = 20000
 # Pieces of legs that are kept, each some kilobytes.
 MOST_PIECES = 250_000
+# The only sign that N can have, 0 for both.
+SIDES = {"bilateral": 0, "above": 1, "below": -1}
 
 
 def dissipate(formulas: Formulas, p: Given, launch: Launch) -> Motion:
@@ -85,7 +87,7 @@ class Dissipative(Motion):
         self._drive, self._hold = dissipation.drive, dissipation.hold
         self._flags = (int(dissipation.friction), int(dissipation.kinked), int(dissipation.linear))
         self._joints = ("",) if dissipation.friction else ("", "contact-sign")
-        self._side = {"bilateral": 0, "above": 1, "below": -1}[problem.launch.contact]
+        self._side = SIDES[problem.launch.contact]
         self._place, self._w, self._way, self._nu, self._laps = problem.lam0, problem.w0, direction, 0, 0
         step = starting_step(problem)
         self._step, self._reach, self._strict = FIRST * step, problem.period or step, 0.0

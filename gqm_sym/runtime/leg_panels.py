@@ -40,8 +40,9 @@ from gqm_sym.runtime.leg_equation import (
 TAIL = 4e-16
 # Coefficients that have stopped falling below this level are rounding noise, not structure.
 PLATEAU = 1e-9
-# The same where no more is asked than whether a function has one sign.
-SIGNED = 1e-7
+# Last coefficients of N against the largest where it has one sign at all nodes, for its changes of sign are decided to
+# no more than that (`legs.TOUCHED`); and where the polynomial is far from nothing throughout.
+ONE_SIGN, CLEAR = 1e-14, 1e-7
 # What may be left of a function where all of it cancels, as a share of its parts.
 NOISE = 1e-15
 # A width of a few units in the last place of the parameter.
@@ -115,7 +116,7 @@ def resolved(work, sizes, first, last, tails):  # type: ignore[no-untyped-def]
 
 @Inner
 def growth(worst):  # type: ignore[no-untyped-def]
-    """By what a panel's width may be multiplied: coefficients fall like powers of the distance of what is not smooth."""
+    """By what a panel's width may be multiplied: coefficients are powers of the distance of what is not smooth."""
     if worst == 0.0:
         return GROWTH
     return min(CAUTION * worst ** (-1.0 / 15.0) / FALL, GROWTH) if worst < inf else 0.5
@@ -135,9 +136,18 @@ def keeps_sign(work, row, noise):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def is_clear(work, size, tails):  # type: ignore[no-untyped-def]
-    """Whether N has one sign on a panel, as is told long before its digits are."""
-    return keeps_sign(work, LOAD, 4.0 * SIGNED * size) and falls(work, LOAD, size, tails)[0] <= SIGNED * size
+def told(work, size, tails):  # type: ignore[no-untyped-def]
+    """Whether N is resolved as far as its changes of sign on a panel ask for, and how large its coefficients are."""
+    tail, level, fine = falls(work, LOAD, size, tails)
+    if not (tail < inf and level < inf):
+        return False, inf
+    if not fine:
+        low, high = extent(work, LOAD * WIDE)
+        same = low * high > 0.0 and low * work[LOAD, COUNT] > 0.0
+        fine = (same and tail <= ONE_SIGN * size) or (
+            tail <= CLEAR * size and keeps_sign(work, LOAD, 4.0 * CLEAR * size)
+        )
+    return fine, 0.0 if fine else level / size
 
 
 @Inner
@@ -243,9 +253,11 @@ def next_panel(  # type: ignore[no-untyped-def]
             width, kink = 0.5 * width, False
             continue
         highest = weigh(rows, base, as_bare(base, g, c, left), work, sizes)
-        last = PACE if watch and not is_clear(work, sizes[LOAD], tails) else LOAD
-        fine, more = resolved(work, sizes, first, last, tails)
+        fine, more = resolved(work, sizes, first, LOAD, tails)
         worst = max(worst, more)
+        if watch:
+            enough, more = told(work, sizes[LOAD], tails)
+            fine, worst = fine and enough, max(worst, more)
         if fine:
             widest = max(widest, width)
             top, end = max(ceiling, highest), work[W, COUNT]

@@ -21,6 +21,7 @@ from gqm_sym.runtime.leg_equation import (
     FORCE,
     JUDGED,
     LOAD,
+    PLACE,
     ROWS,
     as_bare,
     begin_panel,
@@ -208,6 +209,11 @@ def run(drive, p, flags, start, w, v, nu, breaks, limit, reach, step, side, stri
                 slope = rise(drive, p, start + v * there, over, v, nu, spot)
                 if fabs(over) < fabs(slope) * 1e-6 * (there - gone):
                     right = marched(there - over / slope, g, c)
+            elif end == turn_of_force and end != touch:
+                # N at the panel's end has no error of a series, nor has what is left of the way to where it vanishes.
+                rate = (work[LOAD, COUNT] - work[LOAD, COUNT - 1]) / (work[PLACE, COUNT] - work[PLACE, COUNT - 1])
+                if fabs(work[LOAD, COUNT]) < fabs(rate) * 1e-6 * (right - left):
+                    right -= work[LOAD, COUNT] / rate
         if not searching:
             panels, kept, mark = keep(panels, kept, right, right - left, work, tails), kept + 1, right
         count += 1

@@ -103,7 +103,8 @@ def _check_place(problem: Problem) -> None:
 
 def starting_step(problem: Problem) -> float:
     """A step along the curve to begin with."""
-    step: float = first_step.py_func(problem.low, problem.high, problem.period)
+    low, high, period, *_ = problem.domain
+    step: float = first_step.py_func(low, high, period)
     return step
 
 
