@@ -1,6 +1,6 @@
 """Polynomials on a panel: from values at Chebyshev nodes to coefficients, running means, and proven changes of sign.
 
-The nodes are those of the first kind, so that no function is ever evaluated at a panel's ends: one of them may be a
+The nodes are those of the first kind, so that no sum ever asks for a function at a panel's ends: one of them may be a
 cusp, or the end of the domain. ``x`` runs from -1 at the end where the panel begins to 1.
 """
 

@@ -89,7 +89,10 @@ def begin_panel(drive, p, linear, origin, u, g, c, left, width, base, v, nu, row
 
 @Inner
 def sample(drive, p, u, g, near, v, nu, rows, work):  # type: ignore[no-untyped-def]
-    """Fill ``rows`` by ``drive``, and DS and PULL, at the panel's places for V**2 as it is taken to be there."""
+    """Fill ``rows`` by ``drive``, and DS and PULL, at the panel's places for V**2 as it is taken to be there.
+
+    At its end too, which fills the registers; there they may not be numbers.
+    """
     call_drive(drive, WIDE, work[ARC], work[W], float(v), float(nu), p, rows)
     for j in range(WIDE):
         work[DS, j] = rows[0, j]
