@@ -97,7 +97,7 @@ def tabulate(edges, times, times_low, time_terms):  # type: ignore[no-untyped-de
             continue
         pace = legendre_sum(time_terms[k], 1.0) / duration
         derivative(time_terms[k], slope_terms)
-        # ``done`` of ``cuts`` equal segments of the panel's time are laid; the panel before tells how many to begin with.
+        # ``done`` of ``cuts`` equal segments of the panel's time are laid; the panel before tells how many to try.
         done, cuts = 0, min(cuts, MOST_AT_FIRST)
         while done < cuts:
             # From the panel's left edge.
