@@ -243,9 +243,10 @@ def next_panel(  # type: ignore[no-untyped-def]
         far = solve_panel(drive, p, flags[2] == 1, u, g, c, left, base, v, nu, rows, work)
         if flags[1] == 1 and not kink and (far < inf or flags[2] == 1):
             x = to_kink(rows, work, series, tails)
-            if x <= 1.0:
-                kink = x > -1.0
-                width *= 0.5 * (1.0 + x) if kink else 0.5
+            kinked = width * (0.5 * (1.0 + x) if x > -1.0 else 0.5)
+            # A run that begins at a kink may begin a rounding before it.
+            if x <= 1.0 and kinked * (near + g * kinked) > NARROW * max(fabs(here), gone):
+                width, kink = kinked, x > -1.0
                 continue
             for j in range(WIDE):
                 work[LOAD, j] = rows[0, j] * (rows[3, j] + rows[4, j] * work[W, j])
