@@ -1,5 +1,6 @@
 """Half periods of the pendulum, one by one and in sweeps."""
 
+import math
 from math import cos, pi, sin, sqrt
 from typing import Any
 
@@ -10,8 +11,10 @@ from mpmath import mp, mpf
 from numba import carray, cfunc, njit, types
 from scipy import LowLevelCallable
 from scipy.integrate import quad
-from swing import half_period
+from swing import G, half_period
 
+import generated.circle as circle
+import generated.ellipse as ellipse
 import generated.pendulum as pendulum
 from gqm_sym.runtime import surveying
 from gqm_sym.runtime.jit import Inner
@@ -139,5 +142,69 @@ def half_periods() -> list[Row]:
         ),
         *peers.half_periods(
             work, amplitudes, lambda values: ulps(values, [half_period(float(a)) for a in amplitudes[:100]])
+        ),
+        *launched(amplitudes, ours),
+        *on_an_ellipse(ours),
+    ]
+
+
+def launched(amplitudes: Any, ours: str) -> list[Row]:
+    """The same orbits from anywhere on them, with the speed there; the truth is that of doubles."""
+    lam0 = amplitudes * np.random.default_rng(2).uniform(-1.0, 1.0, ORBITS)
+    v0 = np.sqrt(2 * 9.81 * (np.cos(lam0) - np.cos(amplitudes)))
+
+    def truth(place: float, speed: float) -> mpf:
+        square = mp.sin(mpf(place) / 2) ** 2 + mpf(speed) ** 2 / (4 * G)
+        return half_period(2 * mp.asin(mp.sqrt(square)))
+
+    truths = [truth(float(a), float(v)) for a, v in zip(lam0[:300], v0[:300], strict=True)]
+    return [
+        Row(
+            "half period of an orbit, launched with speed",
+            ours,
+            on_one_core(lambda: circle.sweep("half_period", lam0, v0, L=1).values),
+            lambda values: ulps(values, truths),
+            each=ORBITS,
+            line=10.0,
+            unit="ulp",
+        )
+    ]
+
+
+def on_an_ellipse(ours: str) -> list[Row]:
+    """Half periods on an ellipse twice as wide as it is high, of orbits that need up to 32 nodes between turns."""
+    a, b = 2.0, 1.0
+    amplitudes = np.random.default_rng(3).uniform(0.05, 1.2, ORBITS)
+
+    def pace(phi: Any, half: Any, of: Any, g: Any) -> Any:
+        da, db = 2 * half * of.sin(phi / 2) ** 2, 2 * half * of.cos(phi / 2) ** 2
+        ds = of.sqrt((a * of.cos(half - da)) ** 2 + (b * of.sin(half - da)) ** 2)
+        if not da * db > 0:
+            return ds * of.sqrt(half / (g * b * of.sin(half)))
+        return ds * of.sqrt(da * db / (4 * g * b * of.sin(da / 2) * of.sin(db / 2)))
+
+    lam0 = amplitudes - pi / 2
+    few = [mpf(float(v)) + mp.pi / 2 for v in lam0[:20]]
+    truths = [2 * mp.quad(lambda phi, h=half: pace(phi, h, mp, G), [0, mp.pi / 4, mp.pi / 2]) for half in few]
+    return [
+        Row(
+            "half period of an orbit on an ellipse",
+            ours,
+            on_one_core(lambda: ellipse.sweep("half_period", lam0, a=a, b=b).values),
+            lambda values: ulps(values, truths),
+            each=ORBITS,
+            line=6.0,
+            unit="ulp",
+        ),
+        Row(
+            "half period of an orbit on an ellipse",
+            "QUADPACK on our integrand, in Python, turning points given",
+            lambda: [
+                quad(pace, 0, pi, args=(h, math, 9.81), epsabs=0, epsrel=1.2e-14, limit=200)[0] for h in amplitudes[:20]
+            ],
+            lambda values: ulps(values, truths),
+            each=20,
+            repeats=3,
+            unit="ulp",
         ),
     ]

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "catenary". Do not edit: change its declaration and generate again.
-# interface 5, input cd1fa4541ae4, body c8fcf6ac7134
+# interface 6, input cd1fa4541ae4, body 856be29c8727
 """Bead on a hanging chain
 
 x              = x
@@ -17,14 +17,15 @@ turning points : 2*c*g*(cosh(lam0/c) - cosh(x/c)) + v0**2 = 0
 liftoff        : g/cosh(x/c) + (2*c*g*(cosh(lam0/c) - cosh(x/c)) + v0**2)/(c*cosh(x/c)**2) = 0
 """
 
-from typing import Any
+from math import asinh, fabs, sqrt
+from typing import TYPE_CHECKING, Any
 
 from numba import carray
 
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=5)
+compiled = compiler(__file__, interface=6)
 
 from gqm_sym.runtime import (
     BEND,
@@ -32,6 +33,7 @@ from gqm_sym.runtime import (
     BOUNDS,
     BOUNDS_EACH,
     CLIMB,
+    CREST_EACH,
     FRAME,
     RISE,
     RISE_EACH,
@@ -43,13 +45,15 @@ from gqm_sym.runtime import (
     Formulas,
     Motion,
     Pass1,
-    Sweep,
 )
 from gqm_sym.runtime.differences import cosh1, cosh2
 from gqm_sym.runtime.elementary import cosh, sinh
 from gqm_sym.runtime.intervals import iconst, icosh, idiv, imul, isinh
 from gqm_sym.runtime.places import nearest
 from gqm_sym.runtime.wave_differences import near_cosh2
+
+if TYPE_CHECKING:
+    from gqm_sym.runtime import Sweep
 
 PARAMETERS = {
     'c': '0.8',
@@ -165,10 +169,9 @@ def swing_each(n, fall, rise, p, out):
         top_lack = p[4, i]
         top_apart = p[5, i]
         stretch = p[6, i]
-        scale = 1/(fall*top_lack + rise)**2
         _t0 = fall*top_apart + rise
         _t1 = fall*top
-        out[0, i] = c*(4*_t1*scale + scale*(_t1 + 1)**2)**2/(_t0*g*stretch)
+        out[0, i] = c*(4*_t1 + (_t1 + 1)**2)**2/(_t0*g*stretch*(fall*top_lack + rise)**4)
         out[1, i] = 4*_t0*c*g
 
 
@@ -188,6 +191,21 @@ def top_each(n, halves, p, out):
         out[1, i] = _t3
         out[2, i] = cosh(_t0/2)/_t4
         out[3, i] = _t4
+
+
+@compiled(CREST_EACH, later=True)
+def crest_each(n, offsets, launches, p, out):
+    """Half an orbit's width, where V**2 at an offset is used up; how the climb grows; above 1 where it never is."""
+    offsets, launches, p, out = carray(offsets, n), carray(launches, n), carray(p, (3, n)), carray(out, (3, n))
+    for i in range(n):
+        c = p[0, i]
+        g = p[1, i]
+        offset = offsets[i]
+        launch = launches[i]
+        _t0 = 1/c
+        out[0, i] = 2*fabs(c)*asinh(sqrt(_t0*launch/(4*g) + sinh(_t0*offset/2)**2))
+        out[1, i] = 4*c*g
+        out[2, i] = 0
 
 
 @compiled(BOUNDS)
@@ -279,7 +297,7 @@ MODEL = Formulas(
     parameters=PARAMETERS,
     positive=('c',),
     addresses=Addresses(frame.address, climb.address, rise.address, bend.address, bounds.address),
-    each=Each(rise=rise_each, bend=bend_each, swing=swing_each, top=top_each, bounds=bounds_each, top_held=4),
+    each=Each(rise=rise_each, bend=bend_each, swing=swing_each, top=top_each, crest=crest_each, bounds=bounds_each, top_held=4),
     domain_of=exact_domain,
     axes_of=exact_axes,
     monotone=True,
@@ -355,7 +373,7 @@ def sweep(
     contact: str = "bilateral",
     client: Any = None,
     c: Any = '0.8', g: Any = '9.81', m: Any = '1',
-) -> Sweep:
+) -> "Sweep":
     """One quantity over arrays of launches and parameters, on all cores; all arguments broadcast.
 
     Parameters

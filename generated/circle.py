@@ -1,5 +1,5 @@
 # Made by gqm-gen for "circle". Do not edit: change its declaration and generate again.
-# interface 5, input 6c3a741d3b21, body 2fa88406c72d
+# interface 6, input 6c3a741d3b21, body 2cb6b4f11c6c
 """Bead that loops round a circle
 
 x              = L*sin(theta)
@@ -17,14 +17,15 @@ turning points : 2*L*g*(-cos(lam0) + cos(theta)) + v0**2 = 0
 liftoff        : g*cos(theta) + (2*L*g*(-cos(lam0) + cos(theta)) + v0**2)/L = 0
 """
 
-from typing import Any
+from math import sqrt
+from typing import TYPE_CHECKING, Any
 
 from numba import carray
 
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=5)
+compiled = compiler(__file__, interface=6)
 
 from gqm_sym.runtime import (
     BEND,
@@ -32,25 +33,27 @@ from gqm_sym.runtime import (
     BOUNDS,
     BOUNDS_EACH,
     CLIMB,
+    CREST_EACH,
     FRAME,
+    MEAN_EACH,
     ORBIT_EACH,
     RISE,
     RISE_EACH,
-    SWING_EACH,
-    TOP_EACH,
     Addresses,
     Each,
     ExactFormulas,
     Formulas,
     Motion,
     Pass1,
-    Sweep,
 )
 from gqm_sym.runtime.differences import cos1, cos2
-from gqm_sym.runtime.elementary import cos, sin
+from gqm_sym.runtime.elementary import atan, cos, sin
 from gqm_sym.runtime.intervals import iconst, imul, isin
 from gqm_sym.runtime.places import nearest
 from gqm_sym.runtime.wave_differences import near_even, near_odd
+
+if TYPE_CHECKING:
+    from gqm_sym.runtime import Sweep
 
 PARAMETERS = {
     'L': '0.9',
@@ -156,29 +159,32 @@ def orbit_each(n, lows, highs, p, out):
         out[1, i] = cos(_t0)
 
 
-@compiled(SWING_EACH, later=True)
-def swing_each(n, fall, rise, p, out):
-    """(dt/du)**2 where sin(u)**2 = fall = 1 - rise, and what that is divided by, each for an orbit of its own."""
-    p, out = carray(p, (5, n)), carray(out, (2, n))
+@compiled(MEAN_EACH, later=True)
+def mean_each(n, halves, p, out):
+    """Squares of two numbers, each pair for an orbit of its own: its half period is pi over their agm (Gauss)."""
+    halves, p, out = carray(halves, n), carray(p, (3, n)), carray(out, (2, n))
     for i in range(n):
         L = p[0, i]
         g = p[1, i]
-        top_apart = p[3, i]
-        stretch = p[4, i]
-        _t0 = fall*top_apart + rise
-        out[0, i] = L/(_t0*g*stretch)
-        out[1, i] = 4*L*_t0*g
-
-
-@compiled(TOP_EACH, later=True)
-def top_each(n, halves, p, out):
-    """What is the same all along a swing: ``swing_each`` finds it behind the run-time parameters."""
-    halves, p, out = carray(halves, n), carray(p, (3, n)), carray(out, (2, n))
-    for i in range(n):
         half = halves[i]
-        _t0 = cos(half/4)**4
-        out[0, i] = cos(half/2)/_t0
-        out[1, i] = _t0
+        _t0 = g/L
+        out[0, i] = _t0*cos(half/4)**4
+        out[1, i] = _t0*cos(half/2)
+
+
+@compiled(CREST_EACH, later=True)
+def crest_each(n, offsets, launches, p, out):
+    """Half an orbit's width, where V**2 at an offset is used up; how the climb grows; above 1 where it never is."""
+    offsets, launches, p, out = carray(offsets, n), carray(launches, n), carray(p, (3, n)), carray(out, (3, n))
+    for i in range(n):
+        L = p[0, i]
+        g = p[1, i]
+        offset = offsets[i]
+        launch = launches[i]
+        _t0 = sin(offset/2)**2 + launch/(4*L*g)
+        out[0, i] = 4*atan(sqrt(_t0)/(sqrt(1 - _t0) + 1))
+        out[1, i] = 4*L*g
+        out[2, i] = _t0
 
 
 @compiled(BOUNDS)
@@ -267,7 +273,7 @@ MODEL = Formulas(
     parameters=PARAMETERS,
     positive=('L',),
     addresses=Addresses(frame.address, climb.address, rise.address, bend.address, bounds.address),
-    each=Each(rise=rise_each, bend=bend_each, orbit=orbit_each, swing=swing_each, top=top_each, bounds=bounds_each, held=2, top_held=2),
+    each=Each(rise=rise_each, bend=bend_each, orbit=orbit_each, mean=mean_each, crest=crest_each, bounds=bounds_each, held=2),
     domain_of=exact_domain,
     axes_of=exact_axes,
     monotone=True,
@@ -343,7 +349,7 @@ def sweep(
     contact: str = "bilateral",
     client: Any = None,
     L: Any = '0.9', g: Any = '9.81', m: Any = '1',
-) -> Sweep:
+) -> "Sweep":
     """One quantity over arrays of launches and parameters, on all cores; all arguments broadcast.
 
     Parameters

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "circle_coulomb". Do not edit: change its declaration and generate again.
-# interface 5, input 4a697d006329, body 99013c36882b
+# interface 6, input 4a697d006329, body 44f1a1e97a57
 """Bead on a rough ring
 
 x              = L*sin(theta)
@@ -20,14 +20,14 @@ V**2: closed form; direction is the sign of ds/dt; contact_sign is the sign of N
 """
 
 from math import fabs
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from numba import carray
 
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=5)
+compiled = compiler(__file__, interface=6)
 
 from gqm_sym.runtime import (
     DRIVE,
@@ -38,9 +38,11 @@ from gqm_sym.runtime import (
     Formulas,
     Motion,
     Pass1,
-    Sweep,
 )
 from gqm_sym.runtime.elementary import cos, sin
+
+if TYPE_CHECKING:
+    from gqm_sym.runtime import Sweep
 
 PARAMETERS = {
     'L': '1',
@@ -187,7 +189,7 @@ def sweep(
     contact: str = "bilateral",
     client: Any = None,
     L: Any = '1', mu: Any = '0.15', mu_static: Any = '0.2', g: Any = '9.81', m: Any = '1',
-) -> Sweep:
+) -> "Sweep":
     """One quantity over arrays of launches and parameters, on all cores; all arguments broadcast.
 
     Parameters

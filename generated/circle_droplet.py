@@ -1,5 +1,5 @@
 # Made by gqm-gen for "circle_droplet". Do not edit: change its declaration and generate again.
-# interface 5, input 41b535597751, body 4af957d3fe9f
+# interface 6, input 41b535597751, body 79c2661e91c7
 """Droplet in a round channel
 
 x              = L*sin(theta)
@@ -19,14 +19,14 @@ liftoff        : g*cos(theta) + W/L = 0
 V**2: closed form; direction is the sign of ds/dt
 """
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from numba import carray
 
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=5)
+compiled = compiler(__file__, interface=6)
 
 from gqm_sym.runtime import (
     DRIVE,
@@ -37,9 +37,11 @@ from gqm_sym.runtime import (
     Formulas,
     Motion,
     Pass1,
-    Sweep,
 )
 from gqm_sym.runtime.elementary import cos, sin
+
+if TYPE_CHECKING:
+    from gqm_sym.runtime import Sweep
 
 PARAMETERS = {
     'L': '0.02',
@@ -186,7 +188,7 @@ def sweep(
     contact: str = "bilateral",
     client: Any = None,
     L: Any = '0.02', gamma: Any = '0.072', ell_c: Any = '0.0004', g: Any = '9.81', m: Any = '5e-6',
-) -> Sweep:
+) -> "Sweep":
     """One quantity over arrays of launches and parameters, on all cores; all arguments broadcast.
 
     Parameters

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "circle_law". Do not edit: change its declaration and generate again.
-# interface 5, input ba6587cf83ec, body 18a40345af13
+# interface 6, input ba6587cf83ec, body bd2038abe362
 """Pendulum in dense air
 
 x              = L*sin(theta)
@@ -19,14 +19,14 @@ liftoff        : g*cos(theta) + W/L = 0
 V**2: solved in space, for dV**2/ds = 2*A is not linear in it
 """
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from numba import carray
 
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=5)
+compiled = compiler(__file__, interface=6)
 
 from gqm_sym.runtime import (
     DRIVE,
@@ -37,9 +37,11 @@ from gqm_sym.runtime import (
     Formulas,
     Motion,
     Pass1,
-    Sweep,
 )
 from gqm_sym.runtime.elementary import cos, sin
+
+if TYPE_CHECKING:
+    from gqm_sym.runtime import Sweep
 
 PARAMETERS = {
     'L': '1',
@@ -189,7 +191,7 @@ def sweep(
     contact: str = "bilateral",
     client: Any = None,
     L: Any = '1', c1: Any = '0.05', c2: Any = '0.01', g: Any = '9.81', m: Any = '1',
-) -> Sweep:
+) -> "Sweep":
     """One quantity over arrays of launches and parameters, on all cores; all arguments broadcast.
 
     Parameters

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "circle_rotating". Do not edit: change its declaration and generate again.
-# interface 5, input 4ab613b0cbfb, body faee4f4337e3
+# interface 6, input 4ab613b0cbfb, body ee19ef80551b
 """Bead on a hoop that turns about its vertical diameter
 
 x              = L*sin(theta)
@@ -18,14 +18,14 @@ turning points : -L*(L*Omega**2*sin(lam0)**2 + 2*g*cos(lam0)) + L*(L*Omega**2*si
 liftoff        : L*Omega**2*sin(theta)**2 + g*cos(theta) + (-L*(L*Omega**2*sin(lam0)**2 + 2*g*cos(lam0)) + L*(L*Omega**2*sin(theta)**2 + 2*g*cos(theta)) + v0**2)/L = 0
 """
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from numba import carray
 
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=5)
+compiled = compiler(__file__, interface=6)
 
 from gqm_sym.runtime import (
     BEND,
@@ -45,13 +45,15 @@ from gqm_sym.runtime import (
     Formulas,
     Motion,
     Pass1,
-    Sweep,
 )
 from gqm_sym.runtime.differences import cos1, cos2, sin1, sin2
 from gqm_sym.runtime.elementary import cos, sin
 from gqm_sym.runtime.intervals import iadd, iconst, icos, imul, ipow, isin
 from gqm_sym.runtime.places import nearest
 from gqm_sym.runtime.wave_differences import near_even, near_odd, near_sinc
+
+if TYPE_CHECKING:
+    from gqm_sym.runtime import Sweep
 
 PARAMETERS = {
     'L': '1',
@@ -196,13 +198,14 @@ def swing_each(n, fall, rise, p, out):
         top_apart = p[5, i]
         top_sine = p[6, i]
         stretch = p[7, i]
-        scale = 1/(fall*top + 1)**2
-        _t0 = fall*top_apart + rise
-        _t1 = Omega**2
-        _t2 = 4*L
-        _t3 = -16*L*_t1*fall*scale*top + 4*L*_t1 - _t1*_t2*top_sine - 4*g
-        out[0, i] = -_t2/(_t0*_t3*stretch)
-        out[1, i] = -L*_t0*_t3
+        _t0 = fall*top
+        _t1 = (_t0 + 1)**2
+        _t2 = fall*top_apart + rise
+        _t3 = Omega**2
+        _t4 = L*_t3
+        _t5 = L*_t1*_t3 - 4*_t0*_t4 - _t1*_t4*top_sine - _t1*g
+        out[0, i] = -L*_t1/(_t2*_t5*stretch)
+        out[1, i] = -4*L*_t2*_t5/_t1
 
 
 @compiled(TOP_EACH, later=True)
@@ -388,7 +391,7 @@ def sweep(
     contact: str = "bilateral",
     client: Any = None,
     L: Any = '1', Omega: Any = '4', g: Any = '9.81', m: Any = '1',
-) -> Sweep:
+) -> "Sweep":
     """One quantity over arrays of launches and parameters, on all cores; all arguments broadcast.
 
     Parameters

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "circle_spring". Do not edit: change its declaration and generate again.
-# interface 5, input 8941b9022f6d, body 2a0e868d03cc
+# interface 6, input 8941b9022f6d, body ff3fd4f4b374
 """Bead on a ring, tied by a spring to a point above its centre
 
 x              = L*sin(theta)
@@ -17,14 +17,14 @@ turning points : -2*L*g*cos(lam0) + 2*L*g*cos(theta) + v0**2 + w**2*(L**2*sin(la
 liftoff        : -L*w**2*sin(theta)**2 + (g - w**2*(L*cos(theta) + h))*cos(theta) + (-2*L*g*cos(lam0) + 2*L*g*cos(theta) + v0**2 + w**2*(L**2*sin(lam0)**2 + (L*cos(lam0) + h)**2) - w**2*(L**2*sin(theta)**2 + (L*cos(theta) + h)**2))/L = 0
 """
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from numba import carray
 
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=5)
+compiled = compiler(__file__, interface=6)
 
 from gqm_sym.runtime import (
     BEND,
@@ -33,24 +33,25 @@ from gqm_sym.runtime import (
     BOUNDS_EACH,
     CLIMB,
     FRAME,
+    MEAN_EACH,
     ORBIT_EACH,
     RISE,
     RISE_EACH,
-    SWING_EACH,
-    TOP_EACH,
     Addresses,
     Each,
     ExactFormulas,
     Formulas,
     Motion,
     Pass1,
-    Sweep,
 )
 from gqm_sym.runtime.differences import cos1, cos2, sin1, sin2
 from gqm_sym.runtime.elementary import cos, sin
 from gqm_sym.runtime.intervals import iadd, iconst, icos, imul, ipow, isin
 from gqm_sym.runtime.places import nearest
 from gqm_sym.runtime.wave_differences import near_even, near_odd, near_sinc
+
+if TYPE_CHECKING:
+    from gqm_sym.runtime import Sweep
 
 PARAMETERS = {
     'L': '1',
@@ -207,33 +208,22 @@ def orbit_each(n, lows, highs, p, out):
         out[7, i] = cos(_t3)
 
 
-@compiled(SWING_EACH, later=True)
-def swing_each(n, fall, rise, p, out):
-    """(dt/du)**2 where sin(u)**2 = fall = 1 - rise, and what that is divided by, each for an orbit of its own."""
-    p, out = carray(p, (7, n)), carray(out, (2, n))
+@compiled(MEAN_EACH, later=True)
+def mean_each(n, halves, p, out):
+    """Squares of two numbers, each pair for an orbit of its own: its half period is pi over their agm (Gauss)."""
+    halves, p, out = carray(halves, n), carray(p, (5, n)), carray(out, (2, n))
     for i in range(n):
         L = p[0, i]
         w = p[1, i]
         h = p[2, i]
         g = p[3, i]
-        top_apart = p[5, i]
-        stretch = p[6, i]
-        _t0 = fall*top_apart + rise
-        _t1 = 4*L
-        _t2 = _t1*g - _t1*h*w**2
-        out[0, i] = 4*L**2/(_t0*_t2*stretch)
-        out[1, i] = _t0*_t2
-
-
-@compiled(TOP_EACH, later=True)
-def top_each(n, halves, p, out):
-    """What is the same all along a swing: ``swing_each`` finds it behind the run-time parameters."""
-    halves, p, out = carray(halves, n), carray(p, (5, n)), carray(out, (2, n))
-    for i in range(n):
         half = halves[i]
-        _t0 = cos(half/4)**4
-        out[0, i] = cos(half/2)/_t0
-        out[1, i] = _t0
+        _t0 = 1/L
+        _t1 = cos(half/4)**4
+        _t2 = h*w**2
+        _t3 = cos(half/2)
+        out[0, i] = _t0*(-_t1*_t2 + _t1*g)
+        out[1, i] = _t0*(-_t2*_t3 + _t3*g)
 
 
 @compiled(BOUNDS)
@@ -342,7 +332,7 @@ MODEL = Formulas(
     parameters=PARAMETERS,
     positive=('L',),
     addresses=Addresses(frame.address, climb.address, rise.address, bend.address, bounds.address),
-    each=Each(rise=rise_each, bend=bend_each, orbit=orbit_each, swing=swing_each, top=top_each, bounds=bounds_each, held=8, top_held=2),
+    each=Each(rise=rise_each, bend=bend_each, orbit=orbit_each, mean=mean_each, bounds=bounds_each, held=8),
     domain_of=exact_domain,
     axes_of=exact_axes,
     exact=ExactFormulas(exact_x, exact_z, exact_ds, exact_kappa, exact_reaction, exact_climb, exact_climb_slope),
@@ -417,7 +407,7 @@ def sweep(
     contact: str = "bilateral",
     client: Any = None,
     L: Any = '1', w: Any = '3', h: Any = '0.5', g: Any = '9.81', m: Any = '1',
-) -> Sweep:
+) -> "Sweep":
     """One quantity over arrays of launches and parameters, on all cores; all arguments broadcast.
 
     Parameters

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "cubic_coulomb". Do not edit: change its declaration and generate again.
-# interface 5, input 366f93db8ec9, body ec6dfc2aa945
+# interface 6, input 366f93db8ec9, body 01d58246f325
 """Cubic track with Coulomb friction
 
 x              = x
@@ -20,14 +20,14 @@ V**2: spectral antiderivative, no elementary form found; direction is the sign o
 """
 
 from math import fabs, sqrt
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from numba import carray
 
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=5)
+compiled = compiler(__file__, interface=6)
 
 from gqm_sym.runtime import (
     DRIVE,
@@ -38,8 +38,10 @@ from gqm_sym.runtime import (
     Formulas,
     Motion,
     Pass1,
-    Sweep,
 )
+
+if TYPE_CHECKING:
+    from gqm_sym.runtime import Sweep
 
 PARAMETERS = {
     'mu': '0.1',
@@ -190,7 +192,7 @@ def sweep(
     contact: str = "bilateral",
     client: Any = None,
     mu: Any = '0.1', g: Any = '9.81', m: Any = '1',
-) -> Sweep:
+) -> "Sweep":
     """One quantity over arrays of launches and parameters, on all cores; all arguments broadcast.
 
     Parameters

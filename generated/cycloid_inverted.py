@@ -1,5 +1,5 @@
 # Made by gqm-gen for "cycloid_inverted". Do not edit: change its declaration and generate again.
-# interface 5, input 2cc87984e0a0, body 46171a70db95
+# interface 6, input 2cc87984e0a0, body 1dfcbd78cac9
 """Bead in an inverted cycloid
 
 x              = R*(theta - sin(theta))
@@ -17,14 +17,14 @@ turning points : 2*R*g*(cos(lam0) - cos(theta)) + v0**2 = 0
 liftoff        : g*sin(theta/2) + (2*R*g*(cos(lam0) - cos(theta)) + v0**2)/(4*R*sin(theta/2)) = 0
 """
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from numba import carray
 
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=5)
+compiled = compiler(__file__, interface=6)
 
 from gqm_sym.runtime import (
     BEND,
@@ -42,13 +42,15 @@ from gqm_sym.runtime import (
     Formulas,
     Motion,
     Pass1,
-    Sweep,
 )
 from gqm_sym.runtime.differences import cos1, cos2
 from gqm_sym.runtime.elementary import cos, sin
 from gqm_sym.runtime.intervals import iconst, icos, idiv, imul, isin
 from gqm_sym.runtime.places import nearest
 from gqm_sym.runtime.wave_differences import near_even, near_odd
+
+if TYPE_CHECKING:
+    from gqm_sym.runtime import Sweep
 
 PARAMETERS = {
     'R': '0.5',
@@ -329,7 +331,7 @@ def sweep(
     contact: str = "bilateral",
     client: Any = None,
     R: Any = '0.5', g: Any = '9.81', m: Any = '1',
-) -> Sweep:
+) -> "Sweep":
     """One quantity over arrays of launches and parameters, on all cores; all arguments broadcast.
 
     Parameters

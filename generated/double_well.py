@@ -1,5 +1,5 @@
 # Made by gqm-gen for "double_well". Do not edit: change its declaration and generate again.
-# interface 5, input 28c16d144828, body c6fda33a7ccf
+# interface 6, input 28c16d144828, body 5253ca02c664
 """Bead between two wells
 
 x              = x
@@ -18,14 +18,14 @@ liftoff        : g/sqrt(16*h**2*x**2*(x**2 - 1)**2 + 1) + 4*h*(3*x**2 - 1)*(2*g*
 """
 
 from math import sqrt
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from numba import carray
 
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=5)
+compiled = compiler(__file__, interface=6)
 
 from gqm_sym.runtime import (
     BEND,
@@ -44,11 +44,13 @@ from gqm_sym.runtime import (
     Formulas,
     Motion,
     Pass1,
-    Sweep,
 )
 from gqm_sym.runtime.differences import ipow1
 from gqm_sym.runtime.intervals import iadd, iconst, imul, ipow, isqrt
 from gqm_sym.runtime.places import nearest
+
+if TYPE_CHECKING:
+    from gqm_sym.runtime import Sweep
 
 PARAMETERS = {
     'h': '0.25',
@@ -342,7 +344,7 @@ def sweep(
     contact: str = "bilateral",
     client: Any = None,
     h: Any = '0.25', g: Any = '9.81', m: Any = '1',
-) -> Sweep:
+) -> "Sweep":
     """One quantity over arrays of launches and parameters, on all cores; all arguments broadcast.
 
     Parameters

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "ellipse". Do not edit: change its declaration and generate again.
-# interface 5, input 3a81da5567d3, body 10c861af40f1
+# interface 6, input 3a81da5567d3, body f91218566746
 """Bead on an ellipse, by the eccentric angle
 
 x              = a*cos(theta)
@@ -18,14 +18,14 @@ liftoff        : a*b*(2*b*g*(sin(lam0) - sin(theta)) + v0**2)/(a**2*sin(theta)**
 """
 
 from math import sqrt
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from numba import carray
 
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=5)
+compiled = compiler(__file__, interface=6)
 
 from gqm_sym.runtime import (
     BEND,
@@ -33,6 +33,7 @@ from gqm_sym.runtime import (
     BOUNDS,
     BOUNDS_EACH,
     CLIMB,
+    CREST_EACH,
     FRAME,
     ORBIT_EACH,
     RISE,
@@ -45,13 +46,15 @@ from gqm_sym.runtime import (
     Formulas,
     Motion,
     Pass1,
-    Sweep,
 )
 from gqm_sym.runtime.differences import sin1, sin2
-from gqm_sym.runtime.elementary import cos, sin
+from gqm_sym.runtime.elementary import atan, cos, sin
 from gqm_sym.runtime.intervals import iadd, iconst, icos, imul, ipow, isin, isqrt
 from gqm_sym.runtime.places import nearest
 from gqm_sym.runtime.wave_differences import near_even, near_odd, near_sinc
+
+if TYPE_CHECKING:
+    from gqm_sym.runtime import Sweep
 
 PARAMETERS = {
     'a': '2',
@@ -188,12 +191,11 @@ def swing_each(n, fall, rise, p, out):
         top_lack = p[5, i]
         top_apart = p[6, i]
         stretch = p[7, i]
-        scale = 1/(fall*top + 1)**2
-        _t0 = fall*top_apart + rise
-        _t1 = (fall*top_lack + rise)**2
-        _t2 = fall*top
-        out[0, i] = (64*_t1*_t2*b**2*scale**2 + 4*a**2*(_t1*scale - 4*_t2*scale)**2)/(4*_t0*b*g*stretch)
-        out[1, i] = 4*_t0*b*g
+        _t0 = fall*top
+        _t1 = fall*top_apart + rise
+        _t2 = (fall*top_lack + rise)**2
+        out[0, i] = (16*_t0*_t2*b**2 + a**2*(-4*_t0 + _t2)**2)/(_t1*b*g*stretch*(_t0 + 1)**4)
+        out[1, i] = 4*_t1*b*g
 
 
 @compiled(TOP_EACH, later=True)
@@ -211,6 +213,21 @@ def top_each(n, halves, p, out):
         out[1, i] = _t2*_t3
         out[2, i] = _t3/_t4
         out[3, i] = _t4
+
+
+@compiled(CREST_EACH, later=True)
+def crest_each(n, offsets, launches, p, out):
+    """Half an orbit's width, where V**2 at an offset is used up; how the climb grows; above 1 where it never is."""
+    offsets, launches, p, out = carray(offsets, n), carray(launches, n), carray(p, (4, n)), carray(out, (3, n))
+    for i in range(n):
+        b = p[1, i]
+        g = p[2, i]
+        offset = offsets[i]
+        launch = launches[i]
+        _t0 = sin(offset/2)**2 + launch/(4*b*g)
+        out[0, i] = 4*atan(sqrt(_t0)/(sqrt(1 - _t0) + 1))
+        out[1, i] = 4*b*g
+        out[2, i] = _t0
 
 
 @compiled(BOUNDS)
@@ -308,7 +325,7 @@ MODEL = Formulas(
     parameters=PARAMETERS,
     positive=('a', 'b'),
     addresses=Addresses(frame.address, climb.address, rise.address, bend.address, bounds.address),
-    each=Each(rise=rise_each, bend=bend_each, orbit=orbit_each, swing=swing_each, top=top_each, bounds=bounds_each, held=4, top_held=4),
+    each=Each(rise=rise_each, bend=bend_each, orbit=orbit_each, swing=swing_each, top=top_each, crest=crest_each, bounds=bounds_each, held=4, top_held=4),
     domain_of=exact_domain,
     axes_of=exact_axes,
     monotone=True,
@@ -384,7 +401,7 @@ def sweep(
     contact: str = "bilateral",
     client: Any = None,
     a: Any = '2', b: Any = '1', g: Any = '9.81', m: Any = '1',
-) -> Sweep:
+) -> "Sweep":
     """One quantity over arrays of launches and parameters, on all cores; all arguments broadcast.
 
     Parameters

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "ellipse_drag". Do not edit: change its declaration and generate again.
-# interface 5, input 85e32f4b5095, body 4046b3393ed0
+# interface 6, input 85e32f4b5095, body 410c19d13be2
 """Bead on an ellipse, in air
 
 x              = a*cos(theta)
@@ -20,14 +20,14 @@ V**2: spectral antiderivative, no elementary form found; direction is the sign o
 """
 
 from math import sqrt
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from numba import carray
 
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=5)
+compiled = compiler(__file__, interface=6)
 
 from gqm_sym.runtime import (
     DRIVE,
@@ -38,9 +38,11 @@ from gqm_sym.runtime import (
     Formulas,
     Motion,
     Pass1,
-    Sweep,
 )
 from gqm_sym.runtime.elementary import cos, sin
+
+if TYPE_CHECKING:
+    from gqm_sym.runtime import Sweep
 
 PARAMETERS = {
     'a': '1.5',
@@ -194,7 +196,7 @@ def sweep(
     contact: str = "bilateral",
     client: Any = None,
     a: Any = '1.5', b: Any = '1', b_air: Any = '0.3', g: Any = '9.81', m: Any = '2',
-) -> Sweep:
+) -> "Sweep":
     """One quantity over arrays of launches and parameters, on all cores; all arguments broadcast.
 
     Parameters

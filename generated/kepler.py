@@ -1,5 +1,5 @@
 # Made by gqm-gen for "kepler". Do not edit: change its declaration and generate again.
-# interface 5, input a1e1feaf475b, body 6948b798cc40
+# interface 6, input a1e1feaf475b, body 419b9c8bf733
 """Planet on its own ellipse, by the eccentric anomaly
 
 x              = a*(-ecc + cos(E))
@@ -18,14 +18,14 @@ liftoff        : sqrt(1 - ecc**2)*(2*k*(-1/sqrt((1 - ecc**2)*sin(lam0)**2 + (-ec
 """
 
 from math import fabs, sqrt
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from numba import carray
 
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=5)
+compiled = compiler(__file__, interface=6)
 
 from gqm_sym.runtime import (
     BEND,
@@ -45,13 +45,15 @@ from gqm_sym.runtime import (
     Formulas,
     Motion,
     Pass1,
-    Sweep,
 )
 from gqm_sym.runtime.differences import cos1, cos2, sin1, sin2
 from gqm_sym.runtime.elementary import cos, sin
 from gqm_sym.runtime.intervals import iabs, iadd, iconst, icos, imul, ipow, isin, isqrt
 from gqm_sym.runtime.places import nearest
 from gqm_sym.runtime.wave_differences import near_even, near_odd, near_sinc
+
+if TYPE_CHECKING:
+    from gqm_sym.runtime import Sweep
 
 PARAMETERS = {
     'a': '3/2',
@@ -306,21 +308,22 @@ def swing_each(n, fall, rise, p, out):
         _c0 = p[9, i]
         _c1 = p[10, i]
         _c2 = p[11, i]
-        scale = 1/(fall*top + 1)**2
-        _t0 = fall*top_apart + rise
-        _t1 = ecc**2
-        _t2 = 4*_t1
-        _t3 = fall*top
-        _t4 = _t3*scale
-        _t5 = 16*_t4
-        _t6 = _t1*_t5 + _t2*top_sine - _t2 + 4*ecc
-        _t7 = 1 - _t1
-        _t8 = 4*_t4
-        _t9 = sqrt(_t5*_t7*(1 - _t8) + (-8*_t4 - ecc + 1)**2)
-        _t10 = _c2 + _t9
-        _t11 = (fall*top_lack + rise)**2
-        out[0, i] = 2*_c0*_c2*_t10*_t9*a**2*(16*_t11*_t3*scale**2 + _t7*(_t11*scale - _t8)**2)/(_t0*_t6*k*stretch)
-        out[1, i] = 2*_c1*_t0*_t6*k/(_c0*_t10*_t9)
+        _t0 = fall*top
+        _t1 = _t0 + 1
+        _t2 = _t1**2
+        _t3 = 1/_t2
+        _t4 = fall*top_apart + rise
+        _t5 = (fall*top_lack + rise)**2
+        _t6 = 16*_t0
+        _t7 = 1 - ecc**2
+        _t8 = 4*_t0
+        _t9 = _t2*ecc
+        _t10 = _t2 + _t8*ecc + _t9*top_sine - _t9
+        _t11 = -_t2
+        _t12 = sqrt((_t6*_t7*(-_t11 - _t8) + (-8*_t0 - _t11 - _t9)**2)/_t1**4)
+        _t13 = _c2 + _t12
+        out[0, i] = _c0*_c2*_t12*_t13*_t3*a**2*(_t5*_t6 + _t7*(_t5 - _t8)**2)/(2*_t10*_t4*ecc*k*stretch)
+        out[1, i] = 8*_c1*_t10*_t3*_t4*ecc*k/(_c0*_t12*_t13)
 
 
 @compiled(TOP_EACH, later=True)
@@ -539,7 +542,7 @@ def sweep(
     contact: str = "bilateral",
     client: Any = None,
     a: Any = '3/2', ecc: Any = '3/5', k: Any = '7/2', m: Any = '1',
-) -> Sweep:
+) -> "Sweep":
     """One quantity over arrays of launches and parameters, on all cores; all arguments broadcast.
 
     Parameters

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "line_spring". Do not edit: change its declaration and generate again.
-# interface 5, input 924b210c4a96, body b9a97d5de03f
+# interface 6, input 924b210c4a96, body 842cb225beab
 """Bead on a sloping line, tied to the origin by a spring
 
 x              = x
@@ -17,14 +17,14 @@ turning points : v0**2 + w**2*(lam0**2 - x**2 + (3*lam0 + 8)**2/16 - (3*x + 8)**
 liftoff        : 8*w**2/5 = 0
 """
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from numba import carray
 
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=5)
+compiled = compiler(__file__, interface=6)
 
 from gqm_sym.runtime import (
     BEND,
@@ -33,18 +33,20 @@ from gqm_sym.runtime import (
     BOUNDS_EACH,
     CLIMB,
     FRAME,
+    MEAN_EACH,
     RISE,
     RISE_EACH,
-    SWING_EACH,
     Addresses,
     Each,
     ExactFormulas,
     Formulas,
     Motion,
     Pass1,
-    Sweep,
 )
 from gqm_sym.runtime.intervals import iadd, iconst, idiv, imul, ipow
+
+if TYPE_CHECKING:
+    from gqm_sym.runtime import Sweep
 
 PARAMETERS = {
     'w': '1.3',
@@ -123,15 +125,15 @@ def bend_each(n, lows, highs, left, right, p, out):
         out[1, i] = 5/4
 
 
-@compiled(SWING_EACH, later=True)
-def swing_each(n, fall, rise, p, out):
-    """(dt/du)**2 where sin(u)**2 = fall = 1 - rise, and what that is divided by, each for an orbit of its own."""
-    p, out = carray(p, (2, n)), carray(out, (2, n))
+@compiled(MEAN_EACH, later=True)
+def mean_each(n, halves, p, out):
+    """Squares of two numbers, each pair for an orbit of its own: its half period is pi over their agm (Gauss)."""
+    halves, p, out = carray(halves, n), carray(p, (2, n)), carray(out, (2, n))
     for i in range(n):
         w = p[0, i]
         _t0 = w**2
-        out[0, i] = 1/_t0
-        out[1, i] = 25*_t0/16
+        out[0, i] = _t0
+        out[1, i] = _t0
 
 
 @compiled(BOUNDS)
@@ -212,7 +214,7 @@ MODEL = Formulas(
     parameters=PARAMETERS,
     positive=(),
     addresses=Addresses(frame.address, climb.address, rise.address, bend.address, bounds.address),
-    each=Each(rise=rise_each, bend=bend_each, swing=swing_each, bounds=bounds_each),
+    each=Each(rise=rise_each, bend=bend_each, mean=mean_each, bounds=bounds_each),
     domain_of=exact_domain,
     axes_of=exact_axes,
     exact=ExactFormulas(exact_x, exact_z, exact_ds, exact_kappa, exact_reaction, exact_climb, exact_climb_slope),
@@ -287,7 +289,7 @@ def sweep(
     contact: str = "bilateral",
     client: Any = None,
     w: Any = '1.3', m: Any = '1',
-) -> Sweep:
+) -> "Sweep":
     """One quantity over arrays of launches and parameters, on all cores; all arguments broadcast.
 
     Parameters

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "log_spiral". Do not edit: change its declaration and generate again.
-# interface 5, input 458ba188398a, body 126a60228a4b
+# interface 6, input 458ba188398a, body 98579f9483a2
 """Bead on a logarithmic spiral
 
 x              = r0*exp(b*theta)*cos(theta)
@@ -18,14 +18,14 @@ liftoff        : g*(b*cos(theta) - sin(theta))/sqrt(b**2 + 1) + (2*g*r0*(exp(b*l
 """
 
 from math import sqrt
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from numba import carray
 
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=5)
+compiled = compiler(__file__, interface=6)
 
 from gqm_sym.runtime import (
     BEND,
@@ -43,13 +43,15 @@ from gqm_sym.runtime import (
     Formulas,
     Motion,
     Pass1,
-    Sweep,
 )
 from gqm_sym.runtime.differences import exp1, exp2, sin1, sin2
 from gqm_sym.runtime.elementary import cos, exp, sin
 from gqm_sym.runtime.intervals import iadd, iconst, icos, iexp, imul, ipow, isin, isqrt
 from gqm_sym.runtime.places import nearest
 from gqm_sym.runtime.wave_differences import near_even, near_odd
+
+if TYPE_CHECKING:
+    from gqm_sym.runtime import Sweep
 
 PARAMETERS = {
     'r0': '1',
@@ -358,7 +360,7 @@ def sweep(
     contact: str = "bilateral",
     client: Any = None,
     r0: Any = '1', b: Any = '0.15', g: Any = '9.81', m: Any = '1',
-) -> Sweep:
+) -> "Sweep":
     """One quantity over arrays of launches and parameters, on all cores; all arguments broadcast.
 
     Parameters

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "loop". Do not edit: change its declaration and generate again.
-# interface 5, input ef6cb5936f16, body 360470efff14
+# interface 6, input ef6cb5936f16, body d4d95950fda2
 """Loop of a roller coaster
 
 x              = x(s)
@@ -17,14 +17,14 @@ turning points : 2*g*(z(lam0) - z(s)) + v0**2 = 0
 liftoff        : g*cos(alpha(s)) + (2*g*(z(lam0) - z(s)) + v0**2)*kappa(s) = 0
 """
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from numba import carray
 
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=5)
+compiled = compiler(__file__, interface=6)
 
 from gqm_sym.runtime import (
     BEND,
@@ -38,7 +38,6 @@ from gqm_sym.runtime import (
     Motion,
     Pass1,
     Rail,
-    Sweep,
 )
 from gqm_sym.runtime.chart_functions import (
     chart_alpha,
@@ -53,6 +52,9 @@ from gqm_sym.runtime.chart_functions import (
 from gqm_sym.runtime.elementary import cos, sin
 from gqm_sym.runtime.intervals import iconst, imul, isin
 from gqm_sym.runtime.places import nearest
+
+if TYPE_CHECKING:
+    from gqm_sym.runtime import Sweep
 
 PARAMETERS = {
     'a': '2',
@@ -235,7 +237,7 @@ def sweep(
     contact: str = "bilateral",
     client: Any = None,
     a: Any = '2', c: Any = '2', R: Any = '1.5', g: Any = '9.81', m: Any = '1',
-) -> Sweep:
+) -> "Sweep":
     """One quantity over arrays of launches and parameters, on all cores; all arguments broadcast.
 
     Parameters

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "parabola". Do not edit: change its declaration and generate again.
-# interface 5, input 638613fc8598, body 4535f35bb82e
+# interface 6, input 638613fc8598, body aade2d563566
 """Bead in a parabolic bowl
 
 x              = x
@@ -18,14 +18,14 @@ liftoff        : 2*a*(2*a*g*(lam0**2 - x**2) + v0**2)/(4*a**2*x**2 + 1)**(3/2) +
 """
 
 from math import sqrt
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from numba import carray
 
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=5)
+compiled = compiler(__file__, interface=6)
 
 from gqm_sym.runtime import (
     BEND,
@@ -33,6 +33,7 @@ from gqm_sym.runtime import (
     BOUNDS,
     BOUNDS_EACH,
     CLIMB,
+    CREST_EACH,
     FRAME,
     RISE,
     RISE_EACH,
@@ -44,10 +45,12 @@ from gqm_sym.runtime import (
     Formulas,
     Motion,
     Pass1,
-    Sweep,
 )
 from gqm_sym.runtime.intervals import iadd, iconst, imul, ipow, isqrt
 from gqm_sym.runtime.places import nearest
+
+if TYPE_CHECKING:
+    from gqm_sym.runtime import Sweep
 
 PARAMETERS = {
     'a': '0.7',
@@ -163,6 +166,20 @@ def top_each(n, halves, p, out):
         out[0, i] = half**2
 
 
+@compiled(CREST_EACH, later=True)
+def crest_each(n, offsets, launches, p, out):
+    """Half an orbit's width, where V**2 at an offset is used up; how the climb grows; above 1 where it never is."""
+    offsets, launches, p, out = carray(offsets, n), carray(launches, n), carray(p, (3, n)), carray(out, (3, n))
+    for i in range(n):
+        a = p[0, i]
+        g = p[1, i]
+        offset = offsets[i]
+        launch = launches[i]
+        out[0, i] = sqrt(offset**2 + launch/(2*a*g))
+        out[1, i] = 2*a*g
+        out[2, i] = 0
+
+
 @compiled(BOUNDS)
 def bounds(lo, hi, p, out):
     """Bounds of the climb's slope and of ds/dx for lo <= x <= hi."""
@@ -249,7 +266,7 @@ MODEL = Formulas(
     parameters=PARAMETERS,
     positive=(),
     addresses=Addresses(frame.address, climb.address, rise.address, bend.address, bounds.address),
-    each=Each(rise=rise_each, bend=bend_each, swing=swing_each, top=top_each, bounds=bounds_each, top_held=1),
+    each=Each(rise=rise_each, bend=bend_each, swing=swing_each, top=top_each, crest=crest_each, bounds=bounds_each, top_held=1),
     domain_of=exact_domain,
     axes_of=exact_axes,
     monotone=True,
@@ -325,7 +342,7 @@ def sweep(
     contact: str = "bilateral",
     client: Any = None,
     a: Any = '0.7', g: Any = '9.81', m: Any = '2',
-) -> Sweep:
+) -> "Sweep":
     """One quantity over arrays of launches and parameters, on all cores; all arguments broadcast.
 
     Parameters

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "parabola_droplet". Do not edit: change its declaration and generate again.
-# interface 5, input fcd43efdbae3, body ea481135ffe7
+# interface 6, input fcd43efdbae3, body a34904c4c089
 """Droplet in a parabolic channel
 
 x              = x
@@ -20,14 +20,14 @@ V**2: closed form; direction is the sign of ds/dt
 """
 
 from math import fabs, sqrt
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from numba import carray
 
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=5)
+compiled = compiler(__file__, interface=6)
 
 from gqm_sym.runtime import (
     DRIVE,
@@ -38,8 +38,10 @@ from gqm_sym.runtime import (
     Formulas,
     Motion,
     Pass1,
-    Sweep,
 )
+
+if TYPE_CHECKING:
+    from gqm_sym.runtime import Sweep
 
 PARAMETERS = {
     'a': '0.5',
@@ -194,7 +196,7 @@ def sweep(
     contact: str = "bilateral",
     client: Any = None,
     a: Any = '0.5', gamma: Any = '0.5', ell_c: Any = '1', g: Any = '9.81', m: Any = '1',
-) -> Sweep:
+) -> "Sweep":
     """One quantity over arrays of launches and parameters, on all cores; all arguments broadcast.
 
     Parameters

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "parabola_law". Do not edit: change its declaration and generate again.
-# interface 5, input 353c2b6305ed, body cae315e324a8
+# interface 6, input 353c2b6305ed, body 9d1b1e629040
 """Bead on a parabola, with a resistance that falls with speed
 
 x              = x
@@ -20,14 +20,14 @@ V**2: solved in space, for dV**2/ds = 2*A is not linear in it
 """
 
 from math import sqrt
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from numba import carray
 
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=5)
+compiled = compiler(__file__, interface=6)
 
 from gqm_sym.runtime import (
     DRIVE,
@@ -38,8 +38,10 @@ from gqm_sym.runtime import (
     Formulas,
     Motion,
     Pass1,
-    Sweep,
 )
+
+if TYPE_CHECKING:
+    from gqm_sym.runtime import Sweep
 
 PARAMETERS = {
     'a': '0.7',
@@ -196,7 +198,7 @@ def sweep(
     contact: str = "bilateral",
     client: Any = None,
     a: Any = '0.7', r: Any = '0.8', w1: Any = '2', g: Any = '9.81', m: Any = '1',
-) -> Sweep:
+) -> "Sweep":
     """One quantity over arrays of launches and parameters, on all cores; all arguments broadcast.
 
     Parameters

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "parabola_rolling". Do not edit: change its declaration and generate again.
-# interface 5, input 821845b71c06, body 0900bf186b6a
+# interface 6, input 821845b71c06, body c28d77920d20
 """Ball rolling in a parabolic bowl
 
 x              = x*(-2*a*rho/sqrt(4*a**2*x**2 + 1) + 1)
@@ -18,14 +18,14 @@ liftoff        : 2*a*(2*g*(a*lam0**2 - a*x**2 - rho/sqrt(4*a**2*x**2 + 1) + rho/
 """
 
 from math import sqrt
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from numba import carray
 
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=5)
+compiled = compiler(__file__, interface=6)
 
 from gqm_sym.runtime import (
     BEND,
@@ -38,10 +38,12 @@ from gqm_sym.runtime import (
     Formulas,
     Motion,
     Pass1,
-    Sweep,
 )
 from gqm_sym.runtime.intervals import iadd, iconst, idiv, imul, ipow, isqrt
 from gqm_sym.runtime.places import nearest
+
+if TYPE_CHECKING:
+    from gqm_sym.runtime import Sweep
 
 PARAMETERS = {
     'a': '0.6',
@@ -302,7 +304,7 @@ def sweep(
     contact: str = "bilateral",
     client: Any = None,
     a: Any = '0.6', beta: Any = '2/5', rho: Any = '0.25', g: Any = '9.81', m: Any = '1',
-) -> Sweep:
+) -> "Sweep":
     """One quantity over arrays of launches and parameters, on all cores; all arguments broadcast.
 
     Parameters

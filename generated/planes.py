@@ -1,5 +1,5 @@
 # Made by gqm-gen for "planes". Do not edit: change its declaration and generate again.
-# interface 5, input 6aa424d89567, body d19f4188a1a6
+# interface 6, input 6aa424d89567, body 59e3dedbfc66
 """Stitched planes through surveyed points
 
 x              = x(s)
@@ -17,14 +17,14 @@ turning points : 2*g*(z(lam0) - z(s)) + v0**2 = 0
 liftoff        : g*cos(alpha(s)) + (2*g*(z(lam0) - z(s)) + v0**2)*kappa(s) = 0
 """
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from numba import carray
 
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=5)
+compiled = compiler(__file__, interface=6)
 
 from gqm_sym.runtime import (
     BEND,
@@ -38,7 +38,6 @@ from gqm_sym.runtime import (
     Motion,
     Pass1,
     Sampled,
-    Sweep,
 )
 from gqm_sym.runtime.chart_functions import (
     chart_alpha,
@@ -53,6 +52,9 @@ from gqm_sym.runtime.chart_functions import (
 from gqm_sym.runtime.elementary import cos, sin
 from gqm_sym.runtime.intervals import iconst, imul, isin
 from gqm_sym.runtime.places import nearest
+
+if TYPE_CHECKING:
+    from gqm_sym.runtime import Sweep
 
 PARAMETERS = {
     'g': '9.81',
@@ -283,7 +285,7 @@ def sweep(
     contact: str = "bilateral",
     client: Any = None,
     g: Any = '9.81', m: Any = '1',
-) -> Sweep:
+) -> "Sweep":
     """One quantity over arrays of launches and parameters, on all cores; all arguments broadcast.
 
     Parameters

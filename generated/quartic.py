@@ -1,5 +1,5 @@
 # Made by gqm-gen for "quartic". Do not edit: change its declaration and generate again.
-# interface 5, input e1ff78064d31, body 629c1d523d78
+# interface 6, input e1ff78064d31, body cb7e66519251
 """Bead in a quartic bowl
 
 x              = x
@@ -18,14 +18,14 @@ liftoff        : g/sqrt(16*x**6 + 1) + 12*x**2*(2*g*(lam0**4 - x**4) + v0**2)/(1
 """
 
 from math import sqrt
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from numba import carray
 
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=5)
+compiled = compiler(__file__, interface=6)
 
 from gqm_sym.runtime import (
     BEND,
@@ -33,6 +33,7 @@ from gqm_sym.runtime import (
     BOUNDS,
     BOUNDS_EACH,
     CLIMB,
+    CREST_EACH,
     FRAME,
     RISE,
     RISE_EACH,
@@ -44,11 +45,13 @@ from gqm_sym.runtime import (
     Formulas,
     Motion,
     Pass1,
-    Sweep,
 )
 from gqm_sym.runtime.differences import ipow1
 from gqm_sym.runtime.intervals import iadd, iconst, imul, ipow, isqrt
 from gqm_sym.runtime.places import nearest
+
+if TYPE_CHECKING:
+    from gqm_sym.runtime import Sweep
 
 PARAMETERS = {
     'g': '9.81',
@@ -160,6 +163,21 @@ def top_each(n, halves, p, out):
         out[0, i] = half**2
 
 
+@compiled(CREST_EACH, later=True)
+def crest_each(n, offsets, launches, p, out):
+    """Half an orbit's width, where V**2 at an offset is used up; how the climb grows; above 1 where it never is."""
+    offsets, launches, p, out = carray(offsets, n), carray(launches, n), carray(p, (2, n)), carray(out, (3, n))
+    for i in range(n):
+        g = p[0, i]
+        offset = offsets[i]
+        launch = launches[i]
+        _t0 = offset**2
+        _t1 = 2*_t0*g + sqrt(16*g**2*offset**4 + 8*g*launch)/2
+        out[0, i] = sqrt(_t0 + launch/_t1)
+        out[1, i] = _t1
+        out[2, i] = 0
+
+
 @compiled(BOUNDS)
 def bounds(lo, hi, p, out):
     """Bounds of the climb's slope and of ds/dx for lo <= x <= hi."""
@@ -238,7 +256,7 @@ MODEL = Formulas(
     parameters=PARAMETERS,
     positive=(),
     addresses=Addresses(frame.address, climb.address, rise.address, bend.address, bounds.address),
-    each=Each(rise=rise_each, bend=bend_each, swing=swing_each, top=top_each, bounds=bounds_each, top_held=1),
+    each=Each(rise=rise_each, bend=bend_each, swing=swing_each, top=top_each, crest=crest_each, bounds=bounds_each, top_held=1),
     domain_of=exact_domain,
     axes_of=exact_axes,
     monotone=True,
@@ -314,7 +332,7 @@ def sweep(
     contact: str = "bilateral",
     client: Any = None,
     g: Any = '9.81', m: Any = '1',
-) -> Sweep:
+) -> "Sweep":
     """One quantity over arrays of launches and parameters, on all cores; all arguments broadcast.
 
     Parameters

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "rotating_parabola". Do not edit: change its declaration and generate again.
-# interface 5, input 9d848a7566cb, body cd89f5545b40
+# interface 6, input 9d848a7566cb, body 52f57cb2e326
 """Bead in a turning parabolic bowl
 
 x              = x
@@ -19,14 +19,14 @@ liftoff        : 2*a*(v0**2 + (-Omega**2 + 2*a*g)*(lam0**2 - x**2))/(4*a**2*x**2
 """
 
 from math import sqrt
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from numba import carray
 
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=5)
+compiled = compiler(__file__, interface=6)
 
 from gqm_sym.runtime import (
     BEND,
@@ -34,6 +34,7 @@ from gqm_sym.runtime import (
     BOUNDS,
     BOUNDS_EACH,
     CLIMB,
+    CREST_EACH,
     FRAME,
     RISE,
     RISE_EACH,
@@ -45,10 +46,12 @@ from gqm_sym.runtime import (
     Formulas,
     Motion,
     Pass1,
-    Sweep,
 )
 from gqm_sym.runtime.intervals import iadd, iconst, imul, ipow, isqrt
 from gqm_sym.runtime.places import nearest
+
+if TYPE_CHECKING:
+    from gqm_sym.runtime import Sweep
 
 PARAMETERS = {
     'a': '0.6',
@@ -170,6 +173,22 @@ def top_each(n, halves, p, out):
         out[0, i] = half**2
 
 
+@compiled(CREST_EACH, later=True)
+def crest_each(n, offsets, launches, p, out):
+    """Half an orbit's width, where V**2 at an offset is used up; how the climb grows; above 1 where it never is."""
+    offsets, launches, p, out = carray(offsets, n), carray(launches, n), carray(p, (4, n)), carray(out, (3, n))
+    for i in range(n):
+        a = p[0, i]
+        Omega = p[1, i]
+        g = p[2, i]
+        offset = offsets[i]
+        launch = launches[i]
+        _t0 = -Omega**2 + 2*a*g
+        out[0, i] = sqrt(offset**2 + launch/_t0)
+        out[1, i] = _t0
+        out[2, i] = 0
+
+
 @compiled(BOUNDS)
 def bounds(lo, hi, p, out):
     """Bounds of the climb's slope and of ds/dx for lo <= x <= hi."""
@@ -262,7 +281,7 @@ MODEL = Formulas(
     parameters=PARAMETERS,
     positive=(),
     addresses=Addresses(frame.address, climb.address, rise.address, bend.address, bounds.address),
-    each=Each(rise=rise_each, bend=bend_each, swing=swing_each, top=top_each, bounds=bounds_each, top_held=1),
+    each=Each(rise=rise_each, bend=bend_each, swing=swing_each, top=top_each, crest=crest_each, bounds=bounds_each, top_held=1),
     domain_of=exact_domain,
     axes_of=exact_axes,
     monotone=True,
@@ -338,7 +357,7 @@ def sweep(
     contact: str = "bilateral",
     client: Any = None,
     a: Any = '0.6', Omega: Any = '2.5', g: Any = '9.81', m: Any = '1.4',
-) -> Sweep:
+) -> "Sweep":
     """One quantity over arrays of launches and parameters, on all cores; all arguments broadcast.
 
     Parameters

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "strophoid". Do not edit: change its declaration and generate again.
-# interface 5, input 997282e2d787, body f14d355f145b
+# interface 6, input 997282e2d787, body e4a11298ca5b
 """Bead on the hanging loop of a right strophoid
 
 F              = x**2*(a - z) - z**2*(a + z)
@@ -25,14 +25,14 @@ liftoff        : g*cos(alpha(s)) + (2*g*(z(lam0) - z(s)) + v0**2)*kappa(s) = 0
 On F = 0 arc length is 0 at (-sqrt(3)*a/6, -a/2) and grows along -(-F_z, F_x)/|grad F|; kappa = -(F_xx*F_z**2 - 2*F_xz*F_x*F_z + F_zz*F_x**2)/|grad F|**3.
 """
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from numba import carray
 
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=5)
+compiled = compiler(__file__, interface=6)
 
 from gqm_sym.runtime import (
     BEND,
@@ -46,7 +46,6 @@ from gqm_sym.runtime import (
     Formulas,
     Motion,
     Pass1,
-    Sweep,
     Traced,
 )
 from gqm_sym.runtime.chart_functions import (
@@ -62,6 +61,9 @@ from gqm_sym.runtime.chart_functions import (
 from gqm_sym.runtime.elementary import cos, sin
 from gqm_sym.runtime.intervals import iconst, imul, isin
 from gqm_sym.runtime.places import nearest
+
+if TYPE_CHECKING:
+    from gqm_sym.runtime import Sweep
 
 PARAMETERS = {
     'a': '1.8',
@@ -268,7 +270,7 @@ def sweep(
     contact: str = "bilateral",
     client: Any = None,
     a: Any = '1.8', g: Any = '9.81', m: Any = '1',
-) -> Sweep:
+) -> "Sweep":
     """One quantity over arrays of launches and parameters, on all cores; all arguments broadcast.
 
     Parameters

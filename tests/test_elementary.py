@@ -65,6 +65,24 @@ def test_growing_functions_too(name: str, reach: float) -> None:
             assert error <= ULPS, x
 
 
+@pytest.mark.parametrize("reach", [1e-300, 1e-9, 0.5, 1.0, 2.0, 3.0, 1e3, 1e20, 1e300])
+def test_arc_tangent(reach: float) -> None:
+    """Through all three forms."""
+    source = random.Random(reach)
+    with mp.workdps(DIGITS):
+        for _ in range(COUNT):
+            x = source.uniform(-reach, reach)
+            truth = mp.atan(mpf(x))
+            assert abs(mpf(elementary.atan(x)) - truth) <= ULPS * mpf(np.spacing(abs(float(truth)))), x
+
+
+def test_limits_of_the_arc_tangent() -> None:
+    """A quarter turn at infinity, signed zeros, and NaN."""
+    assert [elementary.atan(x) for x in (math.inf, -math.inf)] == [math.pi / 2, -math.pi / 2]
+    assert [math.copysign(1.0, elementary.atan(x)) for x in (0.0, -0.0)] == [1.0, -1.0]
+    assert math.isnan(elementary.atan(math.nan))
+
+
 @pytest.mark.parametrize("x", [0.0, -0.0, 710.4, -710.4, 709.782712893384, 750.0, -745.0, -750.0, math.inf, -math.inf])
 @pytest.mark.parametrize("name", GROWING)
 def test_limits_are_those_of_the_library(name: str, x: float) -> None:

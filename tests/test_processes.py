@@ -55,6 +55,16 @@ print(json.dumps(sorted({name.partition(".")[0] for name in sys.modules})))
 """
 
 
+COMES_WITH_CODE = """
+import json, sys
+import numba
+before = set(sys.modules)
+import generated.pendulum as pendulum
+pendulum.solve("-pi/2 + 6/5")
+print(json.dumps(sorted(set(sys.modules) - before)))
+"""
+
+
 def run(code: str, *arguments: str, cwd: Path = ROOT, **environment: str) -> str:
     """Run Python code in a fresh process and give what it printed."""
     done = subprocess.run(
@@ -97,6 +107,16 @@ def test_a_second_process_compiles_nothing() -> None:
     """All that the first process compiled, the second loads from numba's cache."""
     run(COUNT_COMPILATIONS)
     assert json.loads(run(COUNT_COMPILATIONS)) == []
+
+
+def test_a_second_process_imports_no_more_than_it_needs() -> None:
+    """Compiled code comes without what it was compiled with, a motion without what sweeps and charts need."""
+    run(COMES_WITH_CODE)
+    loaded = json.loads(run(COMES_WITH_CODE))
+    assert "gqm_sym.runtime.solve" in loaded
+    assert not [name for name in loaded if name.startswith(("numba.np", "numba.cpython"))]
+    unneeded = ("sweeping", "batches", "rail", "sampled", "tracing")
+    assert not {f"gqm_sym.runtime.{name}" for name in unneeded} & set(loaded)
 
 
 def test_the_text_does_not_depend_on_the_hash_seed() -> None:

@@ -52,6 +52,31 @@ def test_launched_with_speed_it_is_the_orbit_that_counts(module_of: ModuleOf) ->
     assert got.values == pytest.approx(2 * float(_pendulum(top, 1.0)), rel=1e-15)
 
 
+# Whole turns away, and speeds in units of what just reaches the top.
+LAUNCHES = [(turns, reach) for turns in (0, 1, -100) for reach in (1e-9, 1e-3, 0.4, 0.9)]
+
+
+@pytest.mark.parametrize(("turns", "reach"), LAUNCHES)
+def test_launched_anywhere_on_any_turn(turns: int, reach: float, module_of: ModuleOf) -> None:
+    """A pendulum's half period, as near as the square of a speed and a place in doubles tell it."""
+    rng = np.random.default_rng(5)
+    lam0 = 2 * np.pi * turns + rng.uniform(-2.0, 2.0, 24)
+    v0 = reach * np.sqrt(2 * 9.81 * (1 + np.cos(lam0)))
+    swept = module_of("circle").sweep("half_period", lam0, v0, rng.choice([-1, 1], 24), L=1)
+    assert not swept.reasons.any()
+    with mp.workdps(40):
+        for value, place, speed in zip(swept.values, map(float, lam0), map(float, v0), strict=True):
+
+            def truth(w: mpf, place: float = place) -> mpf:
+                square = mp.sin(mpf(place) / 2) ** 2 + w / (4 * mpf("9.81"))
+                return mp.pi / mp.sqrt(mpf("9.81")) / mp.agm(1, mp.sqrt(1 - square))
+
+            w = mpf(speed) ** 2
+            # Three roundings of V**2 from the lowest place to the top, at most.
+            rounding = abs(mp.diff(truth, w)) * 3 * mpf(2) ** -53 * 4 * mpf("9.81")
+            assert abs(mpf(float(value)) - truth(w)) <= ULPS * np.spacing(float(value)) + rounding
+
+
 def test_loop_times_of_whirling_pendulums(module_of: ModuleOf) -> None:
     """Loop times are 4 K/v0 from the bottom; they have no half period, and no turning points."""
     v0 = np.linspace(7.0, 30.0, 20)

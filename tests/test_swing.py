@@ -11,7 +11,7 @@ import sympy as sp
 from mpmath import mp, mpf
 
 import gqm_sym as gqm
-from gqm_sym.derivation.swing import APART, GAP, HALF, LACK, SCALE, SQUARE, TOP, TOP_APART, TOP_LACK
+from gqm_sym.derivation.swing import APART, GAP, HALF, LACK, LAUNCH, OFFSET, SQUARE, TOP, TOP_APART, TOP_LACK
 
 ModuleOf = Callable[[str], ModuleType]
 
@@ -39,6 +39,7 @@ CASES: dict[str, tuple[gqm.Curve, Any, str]] = {
     "squares of waves": (graph("-sin(x)**2/2"), GRAVITY, "1.4"),
     "root of a wave": (graph("-sqrt(2 + cos(x))"), GRAVITY, "2.1"),
     "turning hoop": (PENDULUM, gqm.Gravity() + gqm.RotatingFrame(Omega=2), "2"),
+    "Duffing": (graph("0*x"), gqm.Potential("2*x**2 + 3*x**4"), "1.3"),
     "spring": (graph("x**2/3"), gqm.Gravity() + gqm.Potential("3*(x**2 + (z - 1)**2)"), "1.5"),
 }
 
@@ -60,14 +61,13 @@ def by_swing(model: gqm.Model, half: mpf) -> mpf:
     assert swing is not None
     at_ends = dict(zip(dict(swing.ends), functions(model, *dict(swing.ends).values(), by=(HALF,)), strict=True))
     ends = {symbol: value(half) for symbol, value in at_ends.items()}
-    here = (SQUARE, GAP, LACK, APART, SCALE)
-    pace, scale = functions(model, swing.pace, swing.scale, by=(*here, *ends))
+    (pace,) = functions(model, swing.pace, by=(SQUARE, GAP, LACK, APART, *ends))
 
     def rate(u: mpf) -> mpf:
         fall, rise = mp.sin(u) ** 2, mp.cos(u) ** 2
         lack, apart = rise + ends.get(TOP_LACK, 0) * fall, rise + ends.get(TOP_APART, 0) * fall
         place = [ends[TOP] * fall, ends[TOP] * rise, lack, apart]
-        return mp.sqrt(pace(*place, scale(*place, 0, *ends.values()), *ends.values()))
+        return mp.sqrt(pace(*place, *ends.values()))
 
     return 2 * integral(rate)
 
@@ -94,6 +94,49 @@ def test_the_time_is_that_of_the_motion(name: str) -> None:
         truth = by_heights(model, mpf(half))
     with mp.workdps(30):
         assert abs(by_swing(model, mpf(half)) / truth - 1) < mpf("1e-20")
+
+
+MEANS = [name for name, (curve, force, _) in CASES.items() if gqm.derive(curve, force).swing.means]  # type: ignore[union-attr]
+CRESTS = [name for name, (curve, force, _) in CASES.items() if gqm.derive(curve, force).swing.crest]  # type: ignore[union-attr]
+
+
+def test_which_have_closed_forms() -> None:
+    """Pendulum and Duffing's oscillator are elliptic of the first kind; V**2 = 0 is solved up to squares."""
+    assert MEANS == ["pendulum", "Duffing"]
+    assert set(CASES) - set(CRESTS) == {"root of a wave"}
+
+
+@pytest.mark.parametrize("name", MEANS)
+def test_a_half_period_is_pi_over_a_mean(name: str) -> None:
+    """Of two numbers, the arithmetic-geometric one."""
+    curve, force, half = CASES[name]
+    model = gqm.derive(curve, force)
+    assert model.swing is not None
+    assert model.swing.means is not None
+    with mp.workdps(30):
+        one, other = (square(mpf(half)) for square in functions(model, *model.swing.means, by=(HALF,)))
+        with mp.workdps(60):
+            truth = by_heights(model, mpf(half))
+        assert abs(mp.pi / mp.agm(mp.sqrt(one), mp.sqrt(other)) / truth - 1) < mpf("1e-25")
+
+
+@pytest.mark.parametrize("share", ["-0.99", "-1/3", "0", "0.7"])
+@pytest.mark.parametrize("name", CRESTS)
+def test_where_a_body_comes_to_rest(name: str, share: str) -> None:
+    """Launched anywhere in the well with what V**2 it has there, it has the well's width; the climb grows outwards."""
+    curve, force, half = CASES[name]
+    model = gqm.derive(curve, force)
+    assert model.swing is not None
+    assert model.swing.crest is not None
+    assert model.symmetry is not None
+    (climb,) = functions(model, model.climb, by=(model.parameter,))
+    width, growth, square = functions(model, *model.swing.crest, by=(OFFSET, LAUNCH))
+    with mp.workdps(40):
+        axis, offset = mpf(sp.N(model.symmetry.place, 40)), mpf(half) * mp.mpf(sp.Rational(share))
+        left = climb(axis + mpf(half)) - climb(axis + offset)
+        assert abs(width(offset, left) / mpf(half) - 1) < mpf("1e-30")
+        assert growth(offset, left) > 0
+        assert 0 <= square(offset, left) < 1
 
 
 @pytest.mark.parametrize(

@@ -4,10 +4,12 @@ About an axis of symmetry, d away from it, waves of one rate k are rational func
 ones of Y = tanh(k d/4)**2, and even powers are powers of Y = d**2. Between turning points, where Y = top, y = sqrt(Y)
 swings as sqrt(top)*sin(u), and V**2 = (top - Y)*D with the divided difference D = climb[Y, top]. So the time is the
 integral over u of sqrt(pace), pace = (ds/dy)**2/D, which holds no sine. Of a pendulum it is the elliptic integral after
-Landen's transformation: the trapezoidal rule needs no more nodes for it than in the angle itself.
+Landen's transformation: the trapezoidal rule needs no more nodes for it than in the angle itself. Where 1/pace is
+linear in the square of the sine, as it is there and for Duffing's oscillator, the integral is a complete elliptic one
+of the first kind, and Gauss's arithmetic-geometric mean its value.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import gcd, lcm
 
@@ -24,12 +26,14 @@ def _symbol(name: str) -> sp.Symbol:
     return sp.Symbol(f"_{name}", real=True)
 
 
-# Of one place of an orbit: Y, 1 - Y, top - Y, 1 - Y*top, and what squares of sines and cosines are multiples of.
-SQUARE, LACK, GAP, APART, SCALE = (_symbol(name) for name in ("square", "lack", "gap", "apart", "scale"))
+# Of one place of an orbit: Y, 1 - Y, top - Y, 1 - Y*top.
+SQUARE, LACK, GAP, APART = (_symbol(name) for name in ("square", "lack", "gap", "apart"))
 # Of the whole orbit: half its width, Y at its ends, 1 - top, 1 - top**2; the square of the sine there, and the fourth
 # power of the cosine of half that argument.
 HALF, TOP, TOP_LACK, TOP_APART = (_symbol(name) for name in ("half", "top", "top_lack", "top_apart"))
 TOP_SINE, STRETCH = _symbol("top_sine"), _symbol("stretch")
+# Of a launch: how far from the axis, and V**2 there.
+OFFSET, LAUNCH = _symbol("offset"), _symbol("launch")
 # In between: the square of a wave's sine at half its argument, and that of its cosine.
 _SINE, _COSINE = _symbol("sine"), _symbol("cosine")
 
@@ -44,16 +48,23 @@ class Swing:
         (dt/du)**2 by the symbols of this module and the run-time parameters.
     factor
         What pace is divided by: next to a barrier it all but vanishes somewhere, and with it the digits.
-    scale
-        SCALE by the others; None where nothing depends on it.
     ends
         The symbols of the whole orbit, each with its value by HALF.
+    crest
+        Of a launch by OFFSET and LAUNCH: half the orbit's width; by how much the climb grows with the square it is
+        written in, which is that of a sine or of the distance, so that it is positive about a well; the square of the
+        sine at the turning point, which is above 1 where the body passes over the top (0 of other squares). None where
+        the climb is of a third power of that square, or no polynomial.
+    means
+        Squares of two numbers by HALF: the half period is pi over their arithmetic-geometric mean. None where it is no
+        complete elliptic integral of the first kind.
     """
 
     pace: sp.Expr
     factor: sp.Expr
-    scale: sp.Expr | None
     ends: tuple[tuple[sp.Symbol, sp.Expr], ...]
+    crest: tuple[sp.Expr, sp.Expr, sp.Expr] | None
+    means: tuple[sp.Expr, sp.Expr] | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,21 +92,25 @@ def swing(climb: sp.Expr, ds: sp.Expr, lam: sp.Symbol, symmetry: Symmetry | None
         if height is None or metric is None:
             return None
         drop = _drop(height, SQUARE, TOP, GAP)
-        return Swing(metric / drop, drop, None, ((TOP, HALF**2),)) if drop else None
+        if not drop:
+            return None
+        square, growth = _turn(height, SQUARE, OFFSET**2)
+        return _swing(metric / drop, drop, ((TOP, HALF**2),), square and (sp.sqrt(square), growth, sp.S.Zero))
     waves = next((waves for waves in (_CIRCULAR, _HYPERBOLIC) if heads <= {waves.sine, waves.cosine}), None)
     found = None if waves is None else _of_waves(forms, d, waves)
     if waves is None or found is None or (waves.sign < 0 and not is_half_turn(symmetry.step, found[0])):
         return None  # beyond half a turn Y falls again
     rate, height, metric = found
+    less, more = (LACK, 1 + SQUARE) if waves.sign < 0 else (1 + SQUARE, LACK)
     # V**2 = (TOP_SINE - _SINE)*drop, and both factors of that difference are known by Y.
-    sine_gap = 4 * GAP * APART * STRETCH * SCALE
-    drop = _drop(height.xreplace({_COSINE: 1 + waves.sign * _SINE}), _SINE, TOP_SINE, sine_gap)
+    sine_gap = 4 * GAP * APART * STRETCH / more**2
+    height = height.xreplace({_COSINE: 1 + waves.sign * _SINE})
+    drop = _drop(height, _SINE, TOP_SINE, sine_gap)
     if not drop:
         return None
-    less, more = (LACK, 1 + SQUARE) if waves.sign < 0 else (1 + SQUARE, LACK)
-    by_square = {_SINE: 4 * SQUARE * SCALE, _COSINE: less**2 * SCALE}
-    factor = drop.xreplace(by_square) * APART
-    pace = 4 * metric.xreplace(by_square) / (rate**2 * STRETCH * factor)
+    by_square = {_SINE: 4 * SQUARE / more**2, _COSINE: less**2 / more**2}
+    factor = sp.together(drop.xreplace(by_square)) * APART  # one division each
+    pace = 4 * sp.together(metric.xreplace(by_square)) / (rate**2 * STRETCH * factor)
     sine, cosine = waves.sine(rate * HALF / 4), waves.cosine(rate * HALF / 4)
     beyond = waves.cosine(rate * HALF / 2)
     ends = (
@@ -105,7 +120,50 @@ def swing(climb: sp.Expr, ds: sp.Expr, lam: sp.Symbol, symmetry: Symmetry | None
         (TOP_SINE, waves.sine(rate * HALF / 2) ** 2),
         (STRETCH, cosine**4),
     )
-    return Swing(pace, factor, more**-2 if pace.has(SCALE) or factor.has(SCALE) else None, ends)
+    square, growth = _turn(height, _SINE, waves.sine(rate * OFFSET / 2) ** 2)
+    if square is None:
+        return _swing(pace, factor, ends, None)
+    turn, share = 2 * sp.asinh(sp.sqrt(square)) / abs(rate), sp.S.Zero
+    if waves.sign < 0:
+        turn, share = 4 * sp.atan(sp.sqrt(square) / (1 + sp.sqrt(1 - square))) / abs(rate), square
+    return _swing(pace, factor, ends, (turn, growth, share))
+
+
+def _turn(height: sp.Expr, square: sp.Symbol, start: sp.Expr) -> tuple[sp.Expr | None, sp.Expr]:
+    """The square at which V**2 is used up, and the climb's growth up to there; None where no root gives it."""
+    form = height.as_poly(square)
+    if form is None or not 0 < form.degree() <= 2:
+        return None, sp.S.Zero
+    growth, bend = (form.coeff_monomial(square**power) for power in (1, 2))
+    if bend:
+        growth += 2 * bend * start
+        growth = (growth + sp.sqrt(growth**2 + 4 * bend * LAUNCH)) / 2
+    return start + LAUNCH / growth, growth
+
+
+def at_share(ends: Mapping[sp.Symbol, sp.Expr], fall: sp.Expr, rise: sp.Expr) -> dict[sp.Symbol, sp.Expr]:
+    """The symbols of one place, where Y = ``fall``*TOP and ``fall + rise`` = 1: by sums of what cannot cancel."""
+    return {
+        SQUARE: ends.get(TOP, TOP) * fall,
+        GAP: ends.get(TOP, TOP) * rise,
+        LACK: rise + ends.get(TOP_LACK, TOP_LACK) * fall,
+        APART: rise + ends.get(TOP_APART, TOP_APART) * fall,
+    }
+
+
+def _swing(
+    pace: sp.Expr,
+    factor: sp.Expr,
+    ends: tuple[tuple[sp.Symbol, sp.Expr], ...],
+    crest: tuple[sp.Expr, sp.Expr, sp.Expr] | None,
+) -> Swing:
+    fall, rise = _symbol("fall"), _symbol("rise")
+    inverse = (1 / pace.xreplace(at_share({}, fall, rise))).as_poly(fall, rise)
+    means = None
+    if inverse is not None and inverse.total_degree() <= 1:
+        always, by_end = inverse.coeff_monomial(1), dict(ends)
+        means = tuple((always + inverse.coeff_monomial(share)).xreplace(by_end) for share in (rise, fall))
+    return Swing(pace, factor, ends, crest, means)
 
 
 def _drop(height: sp.Expr, square: sp.Symbol, top: sp.Symbol, gap: sp.Expr) -> sp.Expr:

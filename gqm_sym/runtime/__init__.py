@@ -1,7 +1,11 @@
 """The fixed runtime that generated modules plug into: quadrature, turning points, tiling, inversion.
 
-An island: it knows numpy, numba and itself, and mpmath only where exact digits are asked for.
+An island: it knows numpy, numba and itself, and mpmath only where exact digits are asked for. What most motions never
+need is imported when it is asked for.
 """
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
 
 from gqm_sym.runtime.formulas import Formulas, Pass1
 from gqm_sym.runtime.interface import (
@@ -10,11 +14,13 @@ from gqm_sym.runtime.interface import (
     BOUNDS,
     BOUNDS_EACH,
     CLIMB,
+    CREST_EACH,
     DRIVE,
     FIELD,
     FRAME,
     HOLD,
     INTERFACE,
+    MEAN_EACH,
     ORBIT_EACH,
     RISE,
     RISE_EACH,
@@ -29,10 +35,14 @@ from gqm_sym.runtime.interface import (
 )
 from gqm_sym.runtime.jit import compiler
 from gqm_sym.runtime.motion import Motion, State
-from gqm_sym.runtime.rail import Rail
-from gqm_sym.runtime.sampled import Sampled
-from gqm_sym.runtime.sweeping import Sweep
-from gqm_sym.runtime.tracing import Traced
+
+if TYPE_CHECKING:
+    from gqm_sym.runtime.rail import Rail
+    from gqm_sym.runtime.sampled import Sampled
+    from gqm_sym.runtime.sweeping import Sweep
+    from gqm_sym.runtime.tracing import Traced
+
+LATER = {"Rail": "rail", "Sampled": "sampled", "Sweep": "sweeping", "Traced": "tracing"}
 
 __all__ = [
     "BEND",
@@ -40,11 +50,13 @@ __all__ = [
     "BOUNDS",
     "BOUNDS_EACH",
     "CLIMB",
+    "CREST_EACH",
     "DRIVE",
     "FIELD",
     "FRAME",
     "HOLD",
     "INTERFACE",
+    "MEAN_EACH",
     "ORBIT_EACH",
     "RISE",
     "RISE_EACH",
@@ -66,3 +78,9 @@ __all__ = [
     "Traced",
     "compiler",
 ]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in LATER:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(f"{__name__}.{LATER[name]}"), name)

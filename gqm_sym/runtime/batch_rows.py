@@ -11,9 +11,9 @@ BATCH, LANES = 128, 8
 # Rows of a batch: which launch, and what the quadrature keeps of it; offsets of both ends from it, both ends; the
 # launch's place and V**2, which the quadrature needs of laps alone; what the search needs: which way it goes and how
 # far at most, and how far the other way, its state, bracket, trial and the zero, how far the axis of symmetry is that
-# the orbit may have, and the step from one axis to the next.
+# the orbit may have, the step from one axis to the next, and how far the zero behind is where that is known (NaN).
 WHO, SUM, VALUE, CHANGE, LOW, HIGH, LEAST, MOST, A, B, START, SPEED, LASTING = range(13)
-WAY, REACH, BACK, STATE, LEFT, RIGHT, TRIAL, AHEAD, AXIS, STEP, ROWS = range(12, 23)
+WAY, REACH, BACK, STATE, LEFT, RIGHT, TRIAL, AHEAD, AXIS, STEP, BEHIND, ROWS = range(12, 24)
 # How far back it is on a closed curve: both zeros lie within one period.
 CLOSED = -1.0
 # What a search has come to.

@@ -1,11 +1,16 @@
-"""The turning points of many orbits at once: guessed by Newton's method, and proved by interval bounds."""
+"""The turning points of many orbits at once.
 
-from math import fabs, inf
+By their closed form where there is one (`derivation.swing`), which symbols prove; else guessed by Newton's method, and
+proved by interval bounds.
+"""
+
+from math import fabs, inf, nan
 
 from gqm_sym.runtime.batch_rows import (
     AHEAD,
     AXIS,
     BACK,
+    BEHIND,
     CLOSED,
     FOUND,
     LEAST,
@@ -25,9 +30,9 @@ from gqm_sym.runtime.batch_rows import (
     B,
     any_is,
 )
-from gqm_sym.runtime.crossing import call_bounds_each, call_rise_each
+from gqm_sym.runtime.crossing import call_bounds_each, call_crest_each, call_rise_each
 from gqm_sym.runtime.entries import ALL_BUT, UNCLEAR, to_axis
-from gqm_sym.runtime.fused import choose, whole_below
+from gqm_sym.runtime.fused import choose, fma, whole_below
 from gqm_sym.runtime.jit import Inner
 from gqm_sym.runtime.search import UNRESOLVED
 from gqm_sym.runtime.swift import CIRCULATION
@@ -40,6 +45,55 @@ ROUNDINGS = 8.0 * 2.0**-52
 NEIGHBOURING = 1.999
 
 
+# A body that comes this near to the top, by the square of a sine, is left to the search. Above the other share rounding
+# of that square moves the turning point by more than its own.
+TOP, STEEP = 1e-9, 0.5
+
+
+@Inner
+def by_closed_form(fns, n, s, p, known, work):  # type: ignore[no-untyped-def]
+    """Set AHEAD and BEHIND, and WAY of bodies at rest, by how wide the orbit about the nearest well is; else NaN.
+
+    The state is NOWHERE for bodies that pass over the top, and SEEKING for all others.
+    """
+    start, w0, way, state = s[START, :n], s[SPEED, :n], s[WAY, :n], s[STATE, :n]
+    ahead, behind, axis = s[AHEAD, :n], s[BEHIND, :n], s[AXIS, :n]
+    places, places_low, steps = known[3, :n], known[4, :n], known[5, :n]
+    rows, halves, offsets, steep = work[:3].reshape(-1)[: 3 * n].reshape(3, n), work[3, :n], work[4, :n], work[5, :n]
+    for j in range(n):
+        axis[j] = (start[j] - places[j]) - places_low[j]
+    call_crest_each(fns[7], n, axis, w0, p, rows)
+    for j in range(n):
+        turn, rests = 2.0 * steps[j], w0[j] == 0.0
+        turns = choose(turn > 0.0, whole_below(axis[j] / turn + 0.5), 0.0)
+        offsets[j] = fma(-turns, turn, axis[j])
+        halves[j] = choose(rests & (turns == 0.0), fabs(axis[j]), rows[0, j])
+        ahead[j] = choose(rests, choose(offsets[j] < 0.0, 1.0, -1.0), way[j])
+        steep[j] = choose((turns == 0.0) & (w0[j] > 0.0) & (rows[2, j] > STEEP), 1.0, 0.0)
+    if any_is(steep, 1.0):
+        near, ends, widths = work[6, :n], work[7, :n], work[8, :n]
+        rise = work[9:12].reshape(-1)[: 3 * n].reshape(3, n)
+        for j in range(n):
+            near[j], ends[j] = places[j] + offsets[j], places[j] + ahead[j] * halves[j]
+            widths[j] = ahead[j] * halves[j] - offsets[j]
+        call_rise_each(fns[0], n, near, ends, widths, p, rise)
+        for j in range(n):
+            missed = ahead[j] * ((w0[j] - widths[j] * rise[0, j]) / rise[2, j])
+            halves[j] += choose(steep[j] == 1.0, missed, 0.0)
+    for j in range(n):
+        offset, half, sense, step, rests = offsets[j], halves[j], ahead[j], steps[j], w0[j] == 0.0
+        size, alone = fabs(offset), step == 0.0
+        well = (rows[1, j] > 0.0) & (alone | (size < step))
+        clear = (size > UNCLEAR * (fabs(start[j]) + fabs(places[j]))) & (alone | (size < ALL_BUT * step))
+        inside = choose(size > half, half, size)  # many turns away the offset is rounded more than the width
+        uphill = choose(sense * offset < 0.0, -inside, inside)
+        known_well = well & ((rests & clear) | ((w0[j] > 0.0) & (rows[2, j] < 1.0 - TOP)))
+        ahead[j], behind[j] = choose(known_well, half - uphill, 0.0), choose(known_well, half + uphill, nan)
+        way[j] = choose(known_well, sense, way[j])
+        axis[j] = -sense * offset
+        state[j] = choose(well & (rows[2, j] > 1.0 + TOP), NOWHERE, SEEKING)
+
+
 @Inner
 def launch(fns, n, s, p, known, monotone, work):  # type: ignore[no-untyped-def]
     """Set up the search ahead: a body released at rest goes where it falls. ``known`` has the columns FIRST to NEXT.
@@ -50,21 +104,27 @@ def launch(fns, n, s, p, known, monotone, work):  # type: ignore[no-untyped-def]
     reach, back, trial = s[REACH, :n], s[BACK, :n], s[TRIAL, :n]
     lows, highs, periods = known[0, :n], known[1, :n], known[2, :n]
     places, places_low, steps = known[3, :n], known[4, :n], known[5, :n]
-    if any_is(w0, 0.0):
-        none, rows = work[0, :n], work[1:4].reshape(-1)[: 3 * n].reshape(3, n)
+    axis, next_axis, zero, behind = s[AXIS, :n], s[STEP, :n], s[AHEAD, :n], s[BEHIND, :n]
+    if monotone and fns[7]:
+        by_closed_form(fns, n, s, p, known, work)
+    else:
+        behind[:], zero[:], state[:] = nan, 0.0, SEEKING
+    none, undecided, rows = work[0, :n], work[1, :n], work[2:5].reshape(-1)[: 3 * n].reshape(3, n)
+    for j in range(n):
+        undecided[j] = choose((w0[j] == 0.0) & (behind[j] != behind[j]), 1.0, 0.0)
+    if any_is(undecided, 1.0):
         none[:] = 0.0
         call_rise_each(fns[0], n, start, start, none, p, rows)
         for j in range(n):
             falls = (rows[2, j] < 0.0) * 1.0 - (rows[2, j] > 0.0) * 1.0
-            way[j] = choose(w0[j] == 0.0, falls, way[j])
+            way[j] = choose(undecided[j] == 1.0, falls, way[j])
     for j in range(n):
         low, high, period = lows[j], highs[j], periods[j]
         forwards, closed, length = way[j] > 0.0, period > 0.0, high - low
         reach[j] = choose(closed, period, choose(forwards, high - start[j], start[j] - low))
         back[j] = choose(closed, CLOSED, choose(forwards, start[j] - low, high - start[j]))
         trial[j] = choose(closed, 0.125 * period, choose(length < inf, 0.125 * length, 1.0))
-        state[j] = choose((way[j] != 0.0) & (low <= start[j]) & (start[j] <= high), SEEKING, NOWHERE)
-    axis, next_axis, zero = s[AXIS, :n], s[STEP, :n], s[AHEAD, :n]
+        state[j] = choose((way[j] != 0.0) & (low <= start[j]) & (start[j] <= high), state[j], NOWHERE)
     for j in range(n):
         step, low, itself = steps[j], places_low[j], way[j] * (places[j] - start[j])
         first = to_axis(start[j], way[j], places[j], step)
@@ -74,10 +134,11 @@ def launch(fns, n, s, p, known, monotone, work):  # type: ignore[no-untyped-def]
         mirrored = choose((w0[j] == 0.0) & (first > 0.0), 2.0 * first, trial[j])
         trial[j] = choose(mirrored < reach[j], mirrored, reach[j])
         away = (first > UNCLEAR * (fabs(start[j]) + fabs(places[j]))) & ((step == 0.0) | (first < ALL_BUT * step))
-        there = known_well & (w0[j] == 0.0) & away & (mirrored <= reach[j])
-        zero[j] = choose(there, mirrored, 0.0)
-        state[j] = choose(there & (state[j] == SEEKING), FOUND, state[j])
-        axis[j], next_axis[j] = first, step
+        given = behind[j] == behind[j]
+        there = given | (known_well & (w0[j] == 0.0) & away)
+        zero[j] = choose(given, zero[j], mirrored)
+        state[j] = choose(there & (zero[j] <= reach[j]) & (state[j] == SEEKING), FOUND, state[j])
+        axis[j], next_axis[j] = choose(given, axis[j], first), step
 
 
 @Inner
@@ -88,6 +149,7 @@ def turn_round(n, s):  # type: ignore[no-untyped-def]
     """
     way, reach, back, state = s[WAY, :n], s[REACH, :n], s[BACK, :n], s[STATE, :n]
     trial, zero, axis, next_axis, end, w0 = s[TRIAL, :n], s[AHEAD, :n], s[AXIS, :n], s[STEP, :n], s[A, :n], s[SPEED, :n]
+    behind = s[BEHIND, :n]
     for j in range(n):
         ahead, step = zero[j], next_axis[j]
         last = axis[j] + choose(step > 0.0, step * whole_below((ahead - axis[j]) / step), 0.0)
@@ -96,7 +158,9 @@ def turn_round(n, s):  # type: ignore[no-untyped-def]
         mirrored = choose(ahead > 2.0 * last, ahead - 2.0 * last, ahead)
         trial[j] = choose(mirrored < reach[j], mirrored, reach[j])
     for j in range(n):
-        way[j], zero[j], state[j] = -way[j], 0.0, choose(w0[j] > 0.0, SEEKING, FOUND)
+        given = behind[j] == behind[j]
+        way[j], zero[j] = -way[j], choose(given, behind[j], 0.0)
+        state[j] = choose((w0[j] > 0.0) & (behind[j] != behind[j]), SEEKING, FOUND)
 
 
 @Inner

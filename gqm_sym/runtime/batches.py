@@ -7,6 +7,7 @@ takes them one by one. Columns of a batch are whole registers: the last orbit is
 import numpy as np
 from numba import types
 
+from gqm_sym.runtime.batch_means import MEANS, by_means
 from gqm_sym.runtime.batch_rows import (
     BATCH,
     FOUND,
@@ -61,6 +62,8 @@ def settle(fns, kind, mirrored, known, n, s, flat, t, spare, count, held, chosen
             for j in range(m):
                 k = int(s[WHO, j])
                 out[k, 0], out[k, 1], reasons[k] = s[A, j], s[B, j], DONE
+        elif m and kind == MEANS:
+            by_means(fns, m, s, flat, count, work, asked, out, reasons)
         elif m:
             times(fns, kind, mirrored, m, s, flat, count, held, chosen, work, asked, out, reasons)
         if left == 0:
@@ -71,7 +74,7 @@ def settle(fns, kind, mirrored, known, n, s, flat, t, spare, count, held, chosen
 @entry(
     types.void(
         *(
-            types.UniTuple(types.int64, 6),
+            types.UniTuple(types.int64, 8),
             types.UniTuple(types.int64, 2),
             types.int64[:, ::1],
             types.boolean,
@@ -132,7 +135,9 @@ def answer_batches(fns, held, columns, monotone, asked, out, reasons):  # type: 
                 break
         set_ends(n, s)
         mirrored, alone = not any_is(s[STATE, :n], NOWHERE), not any_is(s[TRIAL, :n], NOWHERE)
-        about_one = SWING if mirrored and alone and fns[4] else LIBRATION
+        about_one = LIBRATION
+        if mirrored and alone and (fns[4] or fns[6]):
+            about_one = MEANS if fns[6] else SWING
         for j in range(laps):
             lap = u[WAY, j] * u[REACH, j]
             u[LEAST, j], u[MOST, j] = min(lap, 0.0), max(lap, 0.0)

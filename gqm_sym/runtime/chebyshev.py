@@ -4,7 +4,6 @@ The nodes are those of the first kind, so that no sum ever asks for a function a
 cusp, or the end of the domain. ``x`` runs from -1 at the end where the panel begins to 1.
 """
 
-from fractions import Fraction
 from math import cos, fabs, fsum, pi, sin
 
 import numpy as np
@@ -33,22 +32,23 @@ def _tables() -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     at_nodes = (-1.0) ** degree[:, None] * sines[(np.outer(degree, odd) + COUNT) % (4 * COUNT)]
     to_coefficients = at_nodes * (2.0 / COUNT)
     to_coefficients[0] *= 0.5
-    # Coefficients of T_k in powers of the share y: T_(k+1) = (4 y - 2) T_k - T_(k-1).
-    powers = [[1], [-1, 2]]
-    for _ in range(2, COUNT):
-        last, before = powers[-1], [*powers[-2], 0, 0]
-        powers.append([4 * a - 2 * b - c for a, b, c in zip([0, *last], [*last, 0], before, strict=True)])
     one = 1 << 240
-    stops = [int(Fraction(float(y)) * one) for y in (*shares, 1.0)]
 
-    def mean(terms: list[int], y: int, measure: int) -> float:
-        """The mean of a polynomial over [0, y] by the measure d(y**measure)."""
-        total = 0
-        for k in range(len(terms) - 1, -1, -1):
-            total = total * y // one + terms[k] * one * measure // (k + measure)
-        return total / one
+    def both_means(share: float) -> tuple[list[float], list[float]]:
+        """Means of all T_k over [0, y], y a share of the panel, by the measures dy and d(y**2)."""
+        top, bottom = share.as_integer_ratio()
+        y = one // bottom * top
+        values = [one, 2 * y - one]  # T_(k+1) = (4 y - 2) T_k - T_(k-1)
+        for _ in range(COUNT):
+            values.append((4 * y - 2 * one) * values[-1] // one - values[-2])
+        from_start = [value - (-1) ** k * one for k, value in enumerate(values)]
+        areas = [y, y * y // one - y]
+        areas += [(from_start[k + 1] // (k + 1) - from_start[k - 1] // (k - 1)) // 4 for k in range(2, COUNT + 1)]
+        # y T_k = T_k/2 + (T_(k+1) + T_(k-1))/4, with T_(-1) = T_1.
+        moments = [(2 * areas[k] + areas[k + 1] + areas[abs(k - 1)]) // 4 for k in range(COUNT)]
+        return [area / y for area in areas[:COUNT]], [2 * moment * one / (y * y) for moment in moments]
 
-    means, graded = (np.array([[mean(row, y, by) for row in powers] for y in stops]) for by in (1, 2))
+    means, graded = (np.array(rows) for rows in zip(*map(both_means, (*shares.tolist(), 1.0)), strict=True))
     times = [[fsum(row * column) for column in to_coefficients.T] for row in means]
     graded_times = [[fsum(row * column) for column in to_coefficients.T] for row in graded]
     return shares, np.array(times), np.array(graded_times), to_coefficients

@@ -17,16 +17,21 @@ from gqm_sym.runtime.jit import Inner
 LAM0, V0, DIRECTION, TARGET, FIRST, LAST, PERIOD, PLACE, PLACE_LOW, NEXT, PARAMETERS = range(11)
 
 
+def widen(column: NDArray[np.float64], shape: tuple[int, ...]) -> NDArray[np.float64]:
+    """A column of this shape; one number stays one."""
+    return column if column.size == 1 or column.shape == shape else np.broadcast_to(column, shape)
+
+
 def lay_out(columns: list[NDArray[np.float64]], begin: int, end: int) -> list[NDArray[np.float64]]:
     """Elements ``begin`` to ``end`` of columns of one shape, each as a line: a view, where the column is one."""
     return [_line(column, begin, end) for column in columns]
 
 
 def _line(column: NDArray[np.float64], begin: int, end: int) -> NDArray[np.float64]:
+    if column.size == 1:
+        return column.reshape(1)
     if column.ndim == 1:
         return column[begin:end]
-    if not any(column.strides):
-        return np.broadcast_to(column[(0,) * column.ndim], (end - begin,))
     if column.flags.c_contiguous:
         return column.reshape(-1)[begin:end]
     return np.ascontiguousarray(column.flat[begin:end])
@@ -34,7 +39,7 @@ def _line(column: NDArray[np.float64], begin: int, end: int) -> NDArray[np.float
 
 def pointers(lines: list[NDArray[np.float64]]) -> NDArray[np.int64]:
     """A row for each line: where it begins, and the step to its next element, in bytes. Keep the lines alive."""
-    return np.array([(line.__array_interface__["data"][0], line.strides[0]) for line in lines], dtype=np.int64)
+    return np.array([(line.ctypes.data, line.strides[0] if line.size > 1 else 0) for line in lines], dtype=np.int64)
 
 
 @intrinsic

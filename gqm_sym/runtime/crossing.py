@@ -90,6 +90,18 @@ def call_top_each(_, address, n, half, p, out):  # type: ignore[no-untyped-def]
 
 
 @intrinsic
+def call_crest_each(_, address, n, offset, v2, p, out):  # type: ignore[no-untyped-def]
+    """Fill half the width of orbits, the growth of the climb, and the square of the sine at the turning point."""
+    return types.void(address, n, offset, v2, p, out), _call
+
+
+@intrinsic
+def call_mean_each(_, address, n, half, p, out):  # type: ignore[no-untyped-def]
+    """Fill the squares of two numbers whose arithmetic-geometric mean is pi over the half period, for many orbits."""
+    return types.void(address, n, half, p, out), _call
+
+
+@intrinsic
 def call_drive(_, address, n, lam, v2, v, nu, p, out):  # type: ignore[no-untyped-def]
     """Fill ds, P, Q, n0 and kappa for a leg of signs v and nu."""
     return types.void(address, n, lam, v2, v, nu, p, out), _call

@@ -17,6 +17,8 @@ bounds_each n, lo, hi, p, out                             enclosure of climb', e
 orbit_each  n, a, b, p, out                               what bend_each finds behind p
 swing_each  n, fall, rise, p, out                         (dt/du)**2, what that is divided by
 top_each    n, half, p, out                               what swing_each finds behind p
+crest_each  n, offset, v2, p, out                         half an orbit's width, growth of the climb, sine squared
+mean_each   n, half, p, out                               squares of two numbers, of pi over the half period
 drive       n, lam, v2, v, nu, p, out                     ds, P, Q, n0, kappa
 hold        n, lam, p, out                                A(lam, 0; +1), A(lam, 0; -1), static friction
 segment     n, lam, p, out                                x, z, ds, dx/ds, dz/ds, kappa
@@ -32,7 +34,9 @@ all along an orbit, ``orbit_each`` works out once: those rows stand behind the p
 
 Orbits about an axis of symmetry may have ``swing_each``: their time as an integral over u in which the square of the
 coordinate sqrt(top)*sin(u) is the share ``fall`` = sin(u)**2 of its largest, ``rise`` being the rest. ``half`` is half
-of an orbit's width.
+of an orbit's width. Where that is a complete elliptic integral of the first kind they have ``mean_each`` instead: pi
+over the half period is the arithmetic-geometric mean of two numbers. In a well that is monotone on either side, where
+V**2 is used up may have a closed form: ``crest_each``, from the offset and V**2 of a launch.
 
 A curve with formulas that is a piece of a rail has ``segment`` (`rail`), in its own parameter; an implicit curve F = 0
 has ``field``, by which it is traced (`tracing`).
@@ -52,7 +56,7 @@ from typing import Any, NamedTuple
 from numba import types
 
 # Raised with every change of a signature here, or of a number that runtime code puts into generated modules.
-INTERFACE = 5
+INTERFACE = 6
 
 REAL = types.float64
 MANY = types.CPointer(REAL)
@@ -69,6 +73,8 @@ BOUNDS_EACH = types.void(types.intp, MANY, MANY, MANY, MANY)
 ORBIT_EACH = types.void(types.intp, MANY, MANY, MANY, MANY)
 SWING_EACH = types.void(types.intp, REAL, REAL, MANY, MANY)
 TOP_EACH = types.void(types.intp, MANY, MANY, MANY)
+CREST_EACH = types.void(types.intp, MANY, MANY, MANY, MANY)
+MEAN_EACH = types.void(types.intp, MANY, MANY, MANY)
 
 DRIVE = types.void(types.intp, MANY, MANY, REAL, REAL, MANY, MANY)
 HOLD = types.void(types.intp, MANY, MANY, MANY)
@@ -102,13 +108,14 @@ class Each(NamedTuple):
     orbit: Any = None
     swing: Any = None
     top: Any = None
+    mean: Any = None
+    crest: Any = None
     held: int = 0
     top_held: int = 0
 
-    def addresses(self) -> tuple[int, int, int, int, int, int]:
+    def addresses(self) -> tuple[int, ...]:
         """Where they lie in memory; 0 for one that there is not."""
-        rise, bend, bounds, orbit, swing, top = (function.address if function else 0 for function in self[:6])
-        return rise, bend, bounds, orbit, swing, top
+        return tuple(function.address if function else 0 for function in self[:8])
 
 
 class Dissipation(NamedTuple):

@@ -5,6 +5,7 @@ Division by zero gives infinity, as in IEEE arithmetic, and is not an exception.
 """
 
 import hashlib
+import pickle
 import sys
 from collections.abc import Callable
 from contextlib import suppress
@@ -17,6 +18,7 @@ from numba import njit, types
 from numba.core import sigutils
 from numba.core.caching import FunctionCache, IndexDataCacheFile, NullCache
 from numba.core.ccallback import CFunc
+from numba.core.environment import Environment, lookup_environment
 from numba.core.registry import cpu_target
 from numba.core.runtime import rtsys
 from numba.extending import typeof_impl
@@ -46,6 +48,29 @@ def announce() -> None:
         print("gqm_sym: compiling the runtime, once per installation", file=sys.stderr, flush=True)
 
 
+def _environment(module: str, constants: Any, name: str) -> Environment:
+    """What numba keeps for a compiled function, without importing the module that it is from.
+
+    Its names are for Python objects in compiled code, which there are none of; of the modules of numba's own that are
+    linked in, such as that of ``np.empty``, importing takes longer than all else there is to load.
+    """
+    found = lookup_environment(name)
+    if found is None:
+        found = Environment(vars(sys.modules.get(module, ModuleType(module))))
+        found.consts[:], found.env_name = constants, name
+        Environment._memo[name] = found
+    return found
+
+
+class _Reader(pickle.Unpickler):
+    """Reads compiled code from the cache; numba's own way to rebuild a function's environment imports modules."""
+
+    def find_class(self, module: str, name: str) -> Any:
+        if (module, name) == (Environment.__module__, "_rebuild_env"):
+            return _environment
+        return super().find_class(module, name)
+
+
 class KeyedFiles(IndexDataCacheFile):  # type: ignore[misc]
     """Compiled code of a function, in a file for each key that is named by the key and holds it.
 
@@ -61,6 +86,10 @@ class KeyedFiles(IndexDataCacheFile):  # type: ignore[misc]
     def save(self, key: Any, data: Any) -> None:
         """Keep what was compiled."""
         self._save_data(self._file_of(key), (self._source_stamp, key, data))
+
+    def _load_data(self, name: str) -> Any:
+        with Path(self._data_path(name)).open("rb") as file:
+            return _Reader(file).load()
 
     def load(self, key: Any) -> Any:
         """What was kept, or None."""

@@ -4,7 +4,8 @@ Most orbits are answered by one compiled loop (`swift`); those that it leaves ar
 """
 
 from collections.abc import Callable, Iterator, Mapping
-from math import e, inf, isfinite, nan, pi
+from functools import lru_cache
+from math import e, inf, isfinite, nan, pi, prod
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -14,7 +15,7 @@ from numpy.typing import NDArray
 from gqm_sym.errors import GQMError, InputError, ParameterError, SolutionError
 from gqm_sym.runtime import swift
 from gqm_sym.runtime.batches import answer_batches
-from gqm_sym.runtime.columns import lay_out, pointers
+from gqm_sym.runtime.columns import lay_out, pointers, widen
 from gqm_sym.runtime.entries import frame_at
 from gqm_sym.runtime.extremes import over_legs
 from gqm_sym.runtime.formulas import CONTACTS
@@ -161,16 +162,16 @@ def sweep(
     _check(formulas, dict(zip(names, columns, strict=True)))
     shape = broadcast_shape(dict(zip(names, columns, strict=True)))
     _check_least(formulas, dict(zip(names, columns, strict=True)))
-    plain, columns = columns, [np.broadcast_to(column, shape) for column in columns]
-    size = columns[0].size
+    plain, columns = columns, [widen(column, shape) for column in columns]
+    size = prod(shape)
     out, reasons = np.full((size, asked.width), nan), np.full(size, swift.HARD, dtype=np.int8)
     if is_swift(formulas, asked, t_max, contact):
-        known = [np.broadcast_to(value, shape) for value in _known(formulas, plain[4:])]
+        known = [widen(value, shape) for value in _known(formulas, plain[4:])]
         rows = [*columns[:4], *known, *columns[4:]]
         spread(lambda part: _answer(formulas, asked, rows, part, out, reasons), size, LEAST)
     values = out[:, asked.columns]
     for k in np.flatnonzero(reasons == swift.HARD):
-        here = [s if np.ndim(s) == 0 else float(c.flat[k]) for s, c in zip(sources, columns, strict=True)]
+        here = [s if np.ndim(s) == 0 else float(c.flat[k % c.size]) for s, c in zip(sources, columns, strict=True)]
         values[k], reasons[k] = _solved(formulas, asked, here, t_max, contact)
     return Sweep(values.reshape(shape + values.shape[1:]), reasons.reshape(shape))
 
@@ -195,6 +196,10 @@ def broadcast_shape(columns: Mapping[str, Array]) -> tuple[int, ...]:
 
 def _column(value: Any, name: str) -> Array:
     """Numbers as doubles; text and exact numbers by their nearest."""
+    if type(value) is float:
+        return np.array(value)
+    if type(value) is str:
+        return np.array(_of_text(value, name))
     if value is None:
         raise ParameterError(f"{name}: has no default and was not given; pass {name}=...")
     if isinstance(value, np.ndarray) and value.dtype != object:
@@ -202,6 +207,11 @@ def _column(value: Any, name: str) -> Array:
     array = np.asarray(value, dtype=object)
     numbers = [v if isinstance(v, float) else read_number(v, where=name).value for v in array.reshape(-1)]
     return np.array(numbers, dtype=np.float64).reshape(array.shape)
+
+
+@lru_cache(maxsize=256)
+def _of_text(value: str, name: str) -> float:
+    return read_number(value, where=name).value
 
 
 def _check(formulas: "Formulas", columns: dict[str, Array]) -> None:
@@ -235,11 +245,15 @@ def _left_over(formulas: "Formulas", place: Any, p: list[Array]) -> float | None
     """What a place of symmetry leaves over as a double, if it is the same for all launches."""
     if place is None or np.ndim(place) or not all(column.size for column in p):
         return None
+    return _rest_of(formulas.axes, float(place), tuple(float(column.flat[0]) for column in p))
+
+
+@lru_cache(maxsize=256)
+def _rest_of(axes: Callable[..., Any], place: float, values: tuple[float, ...]) -> float:
     from mpmath import mp
 
     with mp.workdps(40):
-        exact = formulas.axes(mp, tuple(mp.mpf(float(column.flat[0])) for column in p))[0]
-        return float(mp.mpf(exact) - mp.mpf(float(place)))
+        return float(mp.mpf(axes(mp, tuple(map(mp.mpf, values)))[0]) - mp.mpf(place))
 
 
 def _answer(
