@@ -65,7 +65,7 @@ def legendre_sum(c, x):  # type: ignore[no-untyped-def]
     """The Legendre series with coefficients c, at x, by Clenshaw's recurrence."""
     high, low = 0.0, 0.0
     for k in range(c.size - 1, 0, -1):
-        high, low = c[k] + GROWTH[k] * x * high - DECAY[k] * low, high
+        high, low = (c[k] - DECAY[k] * low) + (GROWTH[k] * x) * high, high
     return c[0] + x * high - 0.5 * low
 
 
