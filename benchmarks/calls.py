@@ -13,7 +13,7 @@ from numba import njit
 
 import generated.cubic_coulomb as friction
 import generated.pendulum as pendulum
-from gqm_sym.runtime import batch_rows, batch_search, batch_times, batches, entries, legs, swift
+from gqm_sym.runtime import batch_means, batch_rows, batch_search, batch_times, batches, entries, legs, swift
 from gqm_sym.runtime.leg_stretches import read_panels
 from gqm_sym.runtime.surveying import survey
 
@@ -78,7 +78,7 @@ def sweeping() -> list[tuple[str, float]]:
     launch, seek, turn_round, prove = (
         getattr(batch_search, name) for name in ("launch", "seek", "turn_round", "prove")
     )
-    times = batch_times.times
+    times, by_means = batch_times.times, batch_means.by_means
     start = np.zeros((batch_rows.ROWS, n))
     start[batch_rows.WHO], start[batch_rows.WAY] = np.arange(n), 1.0
     start[batch_rows.START] = np.random.default_rng(0).uniform(0.05, 2.5, n) - np.pi / 2
@@ -91,9 +91,9 @@ def sweeping() -> list[tuple[str, float]]:
     chosen, out, reasons = np.empty(n, dtype=np.int64), np.zeros((n, 1)), np.zeros(n, dtype=np.int8)
 
     @njit
-    def search(s: Any, start: Any, p: Any, known: Any, work: Any) -> None:
+    def search(s: Any, start: Any, p: Any, known: Any, monotone: bool, work: Any) -> None:
         s[:] = start
-        launch(fns, n, s, p, known, True, work)
+        launch(fns, n, s, p, known, monotone, work)
         seek(fns, n, s, p, work)
         turn_round(n, s)
 
@@ -105,19 +105,29 @@ def sweeping() -> list[tuple[str, float]]:
     @njit
     def clock(s: Any, found: Any, flat: Any, given: Any, work: Any, chosen: Any, out: Any, reasons: Any) -> None:
         s[:], flat[:] = found, given
-        times(fns, batch_times.SWING, True, n, s, flat, count, held, chosen, work, swift.HALF, out, reasons)
+        times(fns, swift.LIBRATION, True, n, s, flat, count, held, chosen, work, swift.HALF, out, reasons)
+
+    @njit
+    def mean(s: Any, found: Any, given: Any, work: Any, out: Any, reasons: Any) -> None:
+        s[:] = found
+        by_means(fns, n, s, given, count, work, swift.HALF, out, reasons)
 
     s, flat = start.copy(), given.copy()
-    search(s, start, p, known, work)
+    search(s, start, p, known, True, work)
     found, other = s.copy(), s[batch_rows.A]
     found[batch_rows.LEAST], found[batch_rows.MOST] = np.minimum(other, 0.0), np.maximum(other, 0.0)
     found[batch_rows.A] = found[batch_rows.START] + found[batch_rows.LEAST]
     found[batch_rows.B] = found[batch_rows.START] + found[batch_rows.MOST]
     return [
-        ("an orbit of a sweep: its turning points, guessed", least(lambda: search(s, start, p, known, work)) / n),
-        ("- proved by intervals, where symbols do not tell", least(lambda: proof(s, found, p, work)) / n),
         (
-            "- its half period, error controlled",
+            "an orbit of a sweep: its turning points, in closed form",
+            least(lambda: search(s, start, p, known, True, work)) / n,
+        ),
+        ("- guessed by Newton's method", least(lambda: search(s, start, p, known, False, work)) / n),
+        ("- proved by intervals, where symbols do not tell", least(lambda: proof(s, found, p, work)) / n),
+        ("- its half period by a mean", least(lambda: mean(s, found, given, work, out, reasons)) / n),
+        (
+            "- by the trapezoidal rule, error controlled",
             least(lambda: clock(s, found, flat, given, work, chosen, out, reasons)) / n,
         ),
     ]

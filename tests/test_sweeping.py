@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 import numpy as np
 import pytest
@@ -153,6 +154,65 @@ def test_arrivals(module_of: ModuleOf) -> None:
                 # Both are differences of times since the turn: of up to half a period, and as its last place goes.
                 last = np.spacing(0.5 * motion.period)
                 assert value == pytest.approx(motion.time_at(float(place)), rel=ARRIVAL, abs=last)
+
+
+def _falls(places: int) -> tuple[np.ndarray, np.ndarray]:
+    """Distances from an axis to begin at, and places on the way through it: many of them a moment later."""
+    rng = np.random.default_rng(3)
+    start = rng.uniform(0.1, 2.6, places)
+    share = np.append(rng.uniform(0.0, 1.0, places - places // 4), 10.0 ** rng.uniform(-12, -1, places // 4))
+    return start, start - 2.0 * share * start
+
+
+def test_arrivals_of_released_pendulums(module_of: ModuleOf) -> None:
+    """All digits, in the first moments too."""
+    start, places = _falls(40)
+    swept = module_of("circle").sweep("time_at", start, lam=places, L=1)
+    assert not swept.reasons.any()
+    for value, a, x in zip(swept.values, map(float, start), map(float, places), strict=True):
+        with mp.workdps(40):
+            k = mp.sin(mpf(a) / 2)
+            fallen = mp.ellipk(k * k) - mp.ellipf(mp.asin(mp.sin(mpf(x) / 2) / k), k * k)
+        assert value == pytest.approx(float(fallen / mp.sqrt(mpf("9.81"))), rel=ARRIVAL)
+
+
+@pytest.mark.parametrize("speed", [0.0, 1e-6, 1.0])
+def test_arrivals_on_ellipses(speed: float, module_of: ModuleOf) -> None:
+    """As single motions have them, however many terms the series needs."""
+    start, places = (distances - np.pi / 2 for distances in _falls(24))
+    ellipse = module_of("ellipse")
+    swept = ellipse.sweep("time_at", start, speed, -1, lam=places, a=2, b=1)
+    assert not swept.reasons.any()
+    for value, a, x in zip(swept.values, map(float, start), map(float, places), strict=True):
+        motion = ellipse.solve(a, speed, -1, a=2, b=1)
+        # A single motion reads times off places that are rounded, as differences of times since the turn.
+        once = motion.time_at(x)
+        rounding = np.spacing(abs(x)) * 2 / abs(motion.state(once).v) + 2 * np.spacing(0.5 * motion.period)
+        assert value == pytest.approx(once, rel=ARRIVAL, abs=rounding)
+
+
+@pytest.mark.parametrize(
+    ("track", "v0", "size"),
+    [
+        ("ellipse", 0.0, {"a": 2, "b": 1}),
+        ("ellipse", 7.5, {"a": 2, "b": 1}),
+        ("circle", 0.3, {"L": 1}),
+        ("quartic", 1.0, {}),
+        ("double_well", 0.5, {}),
+    ],
+)
+def test_extremes_beat_all_states(track: str, v0: float, size: dict[str, Any], module_of: ModuleOf) -> None:
+    """None of many states has a greater or a smaller load, and the best of them comes near."""
+    module = module_of(track)
+    for lam0 in (0.3, 1.1):
+        motion = module.solve(lam0, v0, **size)
+        state = motion.state(np.linspace(0.0, motion.period, 20_001))
+        for name, values in (("v", np.abs(state.v)), ("normal_force", state.normal_force)):
+            sweeps = (module.sweep(f"{name}_{which}", lam0, v0, **size) for which in ("max", "min"))
+            most, least = (float(swept.values) for swept in sweeps)
+            scale = np.abs(values).max()
+            assert values.max() - LOAD * scale <= most <= values.max() + 1e-3 * scale
+            assert values.min() + LOAD * scale >= least >= values.min() - 1e-3 * scale
 
 
 def test_what_has_no_answer_says_why(module_of: ModuleOf) -> None:

@@ -4,6 +4,7 @@ from math import fabs, inf, nan, pi, sqrt
 
 import numpy as np
 
+from gqm_sym.runtime.arrivals import LEAST_BALANCE
 from gqm_sym.runtime.batch_rows import (
     CHANGE,
     HIGH,
@@ -30,7 +31,6 @@ from gqm_sym.runtime.swift import (
     FROM_A,
     FROM_B,
     HARD,
-    LEAST_BALANCE,
     LIBRATION,
     MOST_NODES,
     SHARES,

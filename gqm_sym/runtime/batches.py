@@ -4,6 +4,8 @@ Orbits for which `batch_search` proves no turning points, or whose time does not
 takes them one by one. Columns of a batch are whole registers: the last orbit is repeated to fill one.
 """
 
+from math import nan
+
 import numpy as np
 from numba import types
 
@@ -36,7 +38,7 @@ from gqm_sym.runtime.batch_times import SWING, times
 from gqm_sym.runtime.columns import DIRECTION, FIRST, LAM0, PARAMETERS, V0, fill_row
 from gqm_sym.runtime.fused import choose
 from gqm_sym.runtime.jit import Inner, entry
-from gqm_sym.runtime.swift import CIRCULATION, DONE, LIBRATION, PASSING, PLACES, WHOLE
+from gqm_sym.runtime.swift import CIRCULATION, DONE, LIBRATION, PASSING, PLACES, SPANNED, SPANS, WHOLE
 
 # Pieces of an orbit, or of half a mirrored one, for its proof: a few first, more where those do not suffice.
 FEW_PIECES, FEW_OF_HALF, MANY_PIECES = 3, 2, 12
@@ -55,7 +57,13 @@ def settle(fns, kind, mirrored, known, n, s, flat, t, spare, count, held, chosen
             proved, left = part(s[STATE, :n], chosen, others)
         rest = gather(s, flat, count, n, others, left, t, spare, ROWS)
         m = shrink(s, flat, count, n, chosen, proved, LASTING)
-        if asked != WHOLE and kind == CIRCULATION:
+        if asked == SPANS:
+            for j in range(m):
+                k, least, most = int(s[WHO, j]), s[LEAST, j], s[MOST, j]
+                going_round = kind == CIRCULATION
+                out[k, 0] = least + most if going_round else least
+                out[k, 1], reasons[k] = choose(going_round, nan, most), SPANNED
+        elif asked != WHOLE and kind == CIRCULATION:
             for j in range(m):
                 reasons[int(s[WHO, j])] = PASSING
         elif asked == PLACES:
@@ -88,7 +96,7 @@ def answer_batches(fns, held, columns, monotone, asked, out, reasons):  # type: 
     """Fill rows of ``out`` and of ``reasons`` for the launches that this can answer, as `swift.answer_many` does.
 
     The others keep their reason. ``monotone`` says that V**2 rises or falls all the way between axes of symmetry and
-    that ds is nowhere 0; ``asked`` is HALF, WHOLE or PLACES.
+    that ds is nowhere 0; ``asked`` is HALF, WHOLE, PLACES or SPANS.
     """
     count = columns.shape[0] - PARAMETERS
     rows = count + max(held[0], held[1])

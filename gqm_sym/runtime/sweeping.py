@@ -127,10 +127,10 @@ QUANTITIES = {
     "half_period": Quantity(swift.HALF, 1, 0, lambda motion, _: motion.half_period),
     "period": Quantity(swift.WHOLE, 1, 0, lambda motion, _: motion.period),
     "turning_points": Quantity(swift.PLACES, 2, slice(0, 2), _turning_points),
-    "v_min": Quantity(swift.SPEEDS, 2, 0, _extreme(_speed, "speed", -1)),
-    "v_max": Quantity(swift.SPEEDS, 2, 1, _extreme(_speed, "speed", 1)),
-    "normal_force_min": Quantity(swift.FORCES, 2, 0, _extreme(_force, "force", -1)),
-    "normal_force_max": Quantity(swift.FORCES, 2, 1, _extreme(_force, "force", 1)),
+    "v_min": Quantity(swift.SLOWEST, 1, 0, _extreme(_speed, "speed", -1)),
+    "v_max": Quantity(swift.FASTEST, 1, 0, _extreme(_speed, "speed", 1)),
+    "normal_force_min": Quantity(swift.WEAKEST, 1, 0, _extreme(_force, "force", -1)),
+    "normal_force_max": Quantity(swift.STRONGEST, 1, 0, _extreme(_force, "force", 1)),
     "time_at": Quantity(swift.ARRIVAL, 1, 0, lambda motion, place: motion.time_at(place)),
     "t_end": Quantity(NEVER, 1, 0, lambda motion, _: motion.t_end if isfinite(motion.t_end) else nan),
     "rest_position": Quantity(NEVER, 1, 0, _rest_position),
@@ -263,10 +263,13 @@ def _answer(
     for begin in range(part.start, part.stop, CHUNK):
         chunk = slice(begin, min(begin + CHUNK, part.stop))
         lines = lay_out(columns, chunk.start, chunk.stop)
-        answers = (pointers(lines), formulas.monotone, asked.asked, out[chunk], reasons[chunk])
-        if formulas.each is not None and asked.asked in (swift.HALF, swift.WHOLE, swift.PLACES):
-            answer_batches(formulas.each.addresses(), (formulas.each.held, formulas.each.top_held), *answers)
-        swift.answer_many(tuple(formulas.addresses), *answers)
+        launches, values, codes = (pointers(lines), formulas.monotone), out[chunk], reasons[chunk]
+        alone = asked.asked not in (swift.HALF, swift.WHOLE, swift.PLACES)  # batches find its span, no more
+        spans = np.empty((codes.size, 2)) if alone else values
+        if formulas.each is not None:
+            each, held = formulas.each.addresses(), (formulas.each.held, formulas.each.top_held)
+            answer_batches(each, held, *launches, swift.SPANS if alone else asked.asked, spans, codes)
+        swift.answer_many(tuple(formulas.addresses), *launches, asked.asked, spans, values, codes)
 
 
 def _solved(formulas: "Formulas", asked: Quantity, here: list[Any], t_max: Any, contact: str) -> tuple[Any, int]:

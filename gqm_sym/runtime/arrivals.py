@@ -1,0 +1,140 @@
+"""When one of many orbits is first at a place: the time as a sine series in the anomaly, or by panels."""
+
+from math import atan2, cos, fabs, inf, pi, sin, sqrt
+
+import numpy as np
+
+from gqm_sym.runtime.crossing import call_bend, call_climb, call_rise
+from gqm_sym.runtime.jit import Inner
+from gqm_sym.runtime.panels import FLOOR, REGULAR, TURN_TURN, lay, read_off
+
+# Below this balance of V**2 doubles lose last places that matter (`stretch.LEAST_BALANCE`).
+LEAST_BALANCE = 1e-2
+# Terms of the series that are tried; how small the last ones must be against the first, for the time they stand for is
+# divided by their number.
+SHORT, LONG, LONGEST, LAST, SMALL = 32, 64, 128, 4, 1e-14
+# A turning point is near a launch within this share of the orbit's width.
+NEAR_LAUNCH = 1e-3
+
+
+def _cosines(n: int) -> np.ndarray:
+    """The matrix from values at n + 1 equal steps of half a turn to coefficients of cosines: a row for each node."""
+    steps = np.outer(np.arange(n + 1), np.arange(n + 1)) % (2 * n)
+    matrix = np.array([cos(pi * m / n) for m in range(2 * n)])[steps] * (2.0 / n)
+    matrix[[0, n]] *= 0.5
+    matrix[:, [0, n]] *= 0.5
+    return matrix
+
+
+OF_SHORT, OF_LONG, OF_LONGEST = _cosines(SHORT), _cosines(LONG), _cosines(LONGEST)
+NEAR = np.sin(0.5 * pi * np.arange(LONGEST + 1) / LONGEST) ** 2
+
+
+@Inner
+def pace_series(fns, p, a, b, width, n, matrix, work, series):  # type: ignore[no-untyped-def]
+    """Fill the cosine series of dt/dphi over half a turn; returns whether it is resolved, and V**2 balanced."""
+    flat, m = work.reshape(-1), n + 1
+    da, db, rows = flat[:m], flat[m : 2 * m], flat[2 * m : 4 * m].reshape(2, m)
+    for j in range(m):
+        node = j * (LONGEST // n)
+        da[j], db[j] = width * NEAR[node], width * NEAR[LONGEST - node]
+    call_bend(fns[3], m, a, b, da, db, p, rows)
+    low, high = inf, 0.0
+    for k in range(m):
+        series[k] = 0.0
+    for j in range(m):
+        q = rows[0, j]
+        low, high = min(low, q), max(high, q)
+        pace = rows[1, j] / sqrt(q)
+        for k in range(m):
+            series[k] += matrix[j, k] * pace
+    tail = 0.0
+    for k in range(n - LAST, n + 1):
+        tail = max(tail, fabs(series[k]))
+    return tail <= SMALL * series[0] and low > LEAST_BALANCE * high
+
+
+@Inner
+def time_from(series, n, near, far, flip):  # type: ignore[no-untyped-def]
+    """The time from an end to where it is ``near`` that end and ``far`` from the other; ``flip`` is -1 for the second.
+
+    The integral of a cosine series, by Clenshaw's scheme for sines.
+    """
+    phi = 2.0 * atan2(sqrt(near), sqrt(far))
+    twice, sign = 2.0 * cos(phi), flip if n % 2 else 1.0
+    one, two = 0.0, 0.0
+    for k in range(n, 0, -1):
+        one, two = sign * series[k] / k + twice * one - two, one
+        sign *= flip
+    return series[0] * phi + one * sin(phi)
+
+
+@Inner
+def sharpened(fns, p, lam0, w0, end, width, work):  # type: ignore[no-untyped-def]
+    """How far a turning point is from the launch, with all digits: one that is near may be known as a rounded sum."""
+    if w0 == 0.0 or fabs(end) > NEAR_LAUNCH * width:
+        return end
+    flat = work.reshape(-1)
+    spot, offset, rows = flat[:1], flat[1:2], flat[2:4].reshape(2, 1)
+    spot[0], offset[0] = lam0 + end, end
+    call_rise(fns[2], 1, lam0, spot, offset, p, rows)
+    left = w0 - end * rows[0, 0]
+    call_climb(fns[1], 1, spot, p, rows)
+    better = end + left / rows[1, 0]
+    return better if better * end >= 0.0 and fabs(better) <= NEAR_LAUNCH * width else end
+
+
+@Inner
+def arrival(fns, p, going_round, direction, lam0, w0, least, most, place, work, series):  # type: ignore[no-untyped-def]
+    """When the body is first at a place; NaN for the exact problem, infinity if never.
+
+    ``least`` and ``most`` are offsets of both ends from the launch, or of a lap.
+    """
+    ahead = place - lam0
+    if ahead == 0.0:
+        return 0.0
+    if going_round:
+        lap = direction * (most - least)
+        laps = np.floor(ahead / lap)
+        if laps < 0.0:
+            return inf
+        panels = lay(fns, p, REGULAR, lam0, lam0 + lap, lam0, w0, np.empty((0, 0)), np.array([0.0, 1.0]))
+        if panels[7] >= FLOOR or panels[6] < LEAST_BALANCE:
+            return np.nan
+        return laps * panels[1][-1] + read_off(panels[0], panels[1], panels[3], ahead / lap - laps)
+    width = most - least
+    least = sharpened(fns, p, lam0, w0, least, width, work)
+    most = sharpened(fns, p, lam0, w0, most, width, work)
+    a, b = lam0 + least, lam0 + most
+    if not a <= place <= b:
+        return inf
+    n = SHORT
+    resolved = pace_series(fns, p, a, b, width, n, OF_SHORT, work, series)
+    if not resolved:
+        n = LONG
+        resolved = pace_series(fns, p, a, b, width, n, OF_LONG, work, series)
+    if not resolved:
+        n = LONGEST
+        resolved = pace_series(fns, p, a, b, width, n, OF_LONGEST, work, series)
+    # Times are told from the end that is nearer to the launch: of a launch there they have all their digits.
+    from_b = -least > most
+    near, far = (most, -least) if from_b else (-least, most)
+    there = (most - ahead, ahead - least) if from_b else (ahead - least, most - ahead)
+    if resolved:
+        flip = -1.0 if from_b else 1.0
+        whole, start = series[0] * pi, time_from(series, n, near, far, flip)
+        stop = time_from(series, n, max(there[0], 0.0), max(there[1], 0.0), flip)
+    else:
+        panels = lay(fns, p, TURN_TURN, a, b, a, 0.0, np.empty((0, 0)), np.array([0.0, pi]))
+        if panels[7] >= FLOOR or panels[6] < LEAST_BALANCE:
+            return np.nan
+        whole = panels[1][-1]
+        start = read_off(panels[0], panels[1], panels[3], 2.0 * atan2(sqrt(-least), sqrt(most)))
+        at = 2.0 * atan2(sqrt(max(ahead - least, 0.0)), sqrt(max(most - ahead, 0.0)))
+        stop = read_off(panels[0], panels[1], panels[3], at)
+        if from_b:
+            start, stop = whole - start, whole - stop
+    onwards = direction * ahead > 0.0
+    if (direction > 0) == from_b:  # towards that end
+        return start - stop if onwards else start + stop
+    return stop - start if onwards else (whole - start) + (whole - stop)
