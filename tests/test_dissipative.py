@@ -332,6 +332,18 @@ def test_droplet_over_kinks(build: Build) -> None:
     assert [event.kind for event in motion.events].count("contact-sign") == 2
 
 
+def test_the_first_leg_of_example_2_to_its_last_digits() -> None:
+    """Where contact changes and where the body turns, and when: within a place or two of the table's forty digits."""
+    from generated import cubic_coulomb
+
+    first = [event for event in CASES["example2_cubic_coulomb"]["expected"]["events"] if event["leg"] == 1]
+    found = cubic_coulomb.solve("-1", "6.2088").events[:2]
+    assert [event.kind for event in found] == [KINDS[event["kind"]] for event in first]
+    for event, known in zip(found, first, strict=True):
+        assert event.lam == pytest.approx(float(known["lam"]), rel=0.0, abs=2e-16)
+        assert event.t == pytest.approx(float(known["t"]), rel=4e-16, abs=0.0)
+
+
 RATES = {
     "squared": ("-direction*k*W**2", lambda v: -0.05 * v * abs(v) ** 3, "0.05"),
     "viscous": ("-direction*k*sqrt(W)", lambda v: -0.3 * v, "0.3"),

@@ -68,6 +68,40 @@ def test_rest_and_what_comes_after(slope: ModuleType) -> None:
         motion.lam(1.0)
 
 
+@pytest.mark.parametrize("v0", ["1e-140", "1e-20", "1e-9", "1e-7", "1e-5", "1e-3", "1"])
+def test_however_slow_a_launch_uphill(v0: str, slope: ModuleType) -> None:
+    """Way and time to the turn are elementary, and have their digits where the turn is the launch's own double too."""
+    for mu, end in (("2", "rest"), ("0.5", "turn")):
+        motion = slope.solve(lam0="0.0124357887", v0=v0, direction=-1, mu=mu, t_max=10)
+        leg = motion.legs[0]
+        with mp.workdps(40):
+            time = mp.sqrt(2) * mpf(v0) / (mpf("9.81") * (1 + mpf(mu)))
+            whole = mpf(v0) * time / 2
+            there = mpf("0.0124357887") - mpf("0.75") * whole / mp.sqrt(2)
+        assert (leg.end, leg.t_end) == (end, pytest.approx(float(time), rel=1e-15, abs=0.0))
+        half = motion.state(float(time / 2))
+        assert half.s == pytest.approx(float(-whole * 3 / 4), rel=2e-15, abs=0.0)
+        assert half.v == pytest.approx(-0.5 * float(v0), rel=2e-15, abs=0.0)
+        assert abs(half.lam - there) <= half.error <= 2e-17 + 5e-14 * whole
+
+
+def test_a_stop_within_the_last_places_of_the_launch() -> None:
+    """A bend is straight over 1e-18 m: the way there is v0**2/(2 a), and the time v0/a."""
+    from generated import cubic_coulomb
+
+    x, v0, mu, g = 0.012435788765528737, 1.284446461162977e-09, 0.11597631838334235, 6.389439513099816
+    motion = cubic_coulomb.solve(lam0=x, v0=v0, direction=1, t_max=10.0, mu=mu, g=g, m=1.0)
+    with mp.workdps(40):
+        slope = 3 * mpf(x) ** 2
+        a = mpf(g) * (slope + mpf(mu)) / mp.sqrt(1 + slope**2)
+        time, whole = mpf(v0) / a, mpf(v0) ** 2 / (2 * a)
+    (leg,) = motion.legs
+    assert (leg.end, leg.lam_end) == ("rest", float(x + whole))
+    assert leg.t_end == pytest.approx(float(time), rel=1e-15)
+    assert motion.state(0.5 * leg.t_end).s == pytest.approx(float(0.75 * whole), rel=2e-15)
+    assert motion.time_at(leg.lam_end) == pytest.approx(float(time), rel=1e-15)
+
+
 def test_a_horizon_ends_it(slope: ModuleType) -> None:
     """Later times are no part of the motion."""
     with pytest.raises(InputError, match=r"the motion ends at 1\.0 s \(the horizon t_max\), got 2\.0"):

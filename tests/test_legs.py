@@ -24,7 +24,7 @@ from gqm_sym.runtime.chebyshev import (
 )
 from gqm_sym.runtime.leg_stretches import INTEGRAL_BY_NODE, PLAIN_BY_NODE
 
-# Roundings of twenty products, of size 1.
+# Roundings of as many products, of size 1.
 TABLE = 1e-15
 NOISE = 1e-15
 

@@ -21,13 +21,16 @@ def anomaly_of(kind: int, slack: float, ahead: float, behind: float, whole: floa
     return most / (slack + sqrt(slack**2 + most))
 
 
-def places(kind: int, slack: float, a: float, b: float, phi: Array) -> Array:
-    """The curve's parameter at anomalies, from the nearer end."""
-    width = b - a
+def places(
+    kind: int, slack: float, start: tuple[float, float], stop: tuple[float, float], width: float, phi: Array
+) -> Array:
+    """The curve's parameter at anomalies, from the nearer end; the ends as two doubles each."""
+    (a, a_low), (b, b_low) = start, stop
     if kind == TURN_TURN:
-        return np.where(phi < 0.5 * pi, a + width * np.sin(0.5 * phi) ** 2, b - width * np.cos(0.5 * phi) ** 2)
+        ahead, behind = width * np.sin(0.5 * phi) ** 2, width * np.cos(0.5 * phi) ** 2
+        return np.where(phi < 0.5 * pi, a + (a_low + ahead), b - (behind - b_low))
     if kind == TO_EQUILIBRIUM:
         away: Array = b - width * np.exp(-phi)
         return away
     share = phi * (phi + 2.0 * slack) / (1.0 + 2.0 * slack) if kind == FROM_TURN else phi
-    return np.where(share <= 0.5, a + width * share, b - width * (1.0 - share))
+    return np.where(share <= 0.5, a + (a_low + width * share), b - (width * (1.0 - share) - b_low))

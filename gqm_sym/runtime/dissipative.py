@@ -12,6 +12,7 @@ from gqm_sym.runtime.course import ZERO, Course, Pair, Piece
 from gqm_sym.runtime.doubledouble import two_sum
 from gqm_sym.runtime.entries import frame_at, from_rest
 from gqm_sym.runtime.events import passages
+from gqm_sym.runtime.exact import NOWHERE
 from gqm_sym.runtime.formulas import Formulas, Given, Launch
 from gqm_sym.runtime.leg_stretches import Run, along_field, along_panels
 from gqm_sym.runtime.motion import Motion
@@ -19,7 +20,7 @@ from gqm_sym.runtime.problem import Problem
 from gqm_sym.runtime.rest import Rest
 from gqm_sym.runtime.search import FARTHEST
 from gqm_sym.runtime.solve import CUSP_SHARE, domain_end, leaving_at_once, starting_step
-from gqm_sym.runtime.stretch import NOWHERE, ULP, Array, Stretch
+from gqm_sym.runtime.stretch import ULP, Array, Stretch
 
 # The first panel, in first steps of a search: early times keep the more digits the shorter it is.
 FIRST = 0.25
@@ -29,6 +30,8 @@ MOST_PAUSES = 12
 MOST_TURNS = 20000
 # Pieces of legs that are kept, each some kilobytes.
 MOST_PIECES = 250_000
+# The only sign that N can have, 0 for both.
+SIDES = {"bilateral": 0, "above": 1, "below": -1}
 
 
 def dissipate(formulas: Formulas, p: Given, launch: Launch) -> Motion:
@@ -84,7 +87,7 @@ class Dissipative(Motion):
         self._drive, self._hold = dissipation.drive, dissipation.hold
         self._flags = (int(dissipation.friction), int(dissipation.kinked), int(dissipation.linear))
         self._joints = ("",) if dissipation.friction else ("", "contact-sign")
-        self._side = {"bilateral": 0, "above": 1, "below": -1}[problem.launch.contact]
+        self._side = SIDES[problem.launch.contact]
         self._place, self._w, self._way, self._nu, self._laps = problem.lam0, problem.w0, direction, 0, 0
         step = starting_step(problem)
         self._step, self._reach, self._strict = FIRST * step, problem.period or step, 0.0
@@ -119,9 +122,9 @@ class Dissipative(Motion):
         while True:
             for piece in self._pieces[done:]:
                 stretch = piece.stretch
-                a, b = stretch.a + piece.laps * lap, stretch.b + piece.laps * lap
-                on = (places >= min(a, b)) & (places <= max(a, b)) & np.isnan(v2)
-                phi = [stretch.anomaly_of(place - a, b - place) for place in places[on]]
+                within = places - piece.laps * lap
+                on = (within >= min(stretch.a, stretch.b)) & (within <= max(stretch.a, stretch.b)) & np.isnan(v2)
+                phi = [stretch.anomaly_of(*stretch.offsets(place)) for place in within[on].tolist()]
                 v2[on] = stretch.speeds(np.minimum(phi, stretch.stop)) ** 2
                 if piece.end not in ("", "contact-sign"):
                     return
@@ -231,19 +234,19 @@ class Dissipative(Motion):
         what, nu, place, w_end, step, strict, middle, slack, times, leaving, changes, ahead, back = legs.follow(
             *run, reach, self._step, self._side, self._strict
         )
-        if what == legs.LIFTOFF and place == start:
+        if what == legs.LIFTOFF and place == (start, 0.0):
             self._lift_off_at_once(run)
             return
         if not len(ahead) and what == legs.LIMIT:
             raise leaving_at_once(problem, way, "end of the domain")
         if not (len(ahead) or len(back)) or what == legs.SPENT or (what == legs.ASYMPTOTE and not len(back)):
             raise SolutionError(
-                f"V**2 beyond {problem.formulas.parameter} = {place!r} could not be followed; "
+                f"V**2 beyond {problem.formulas.parameter} = {place[0]!r} could not be followed; "
                 "are the curve and the force smooth there?"
             )
-        name = self._end_name(what, place, start, leaving)
+        name = self._end_name(what, place[0], leaving)
         self._runs.append(Run(start, place, middle, slack, times, changes, ahead, back, what, name, self._laps))
-        self._place, self._w, self._nu, self._step, self._strict = place, w_end, nu, step, strict
+        self._place, self._w, self._nu, self._step, self._strict = place[0], w_end, nu, step, strict
         total, lost = two_sum.py_func(self._elapsed, times[0] + times[1])
         self._elapsed, self._rest = total, self._rest + lost
         if what == legs.TURN:
@@ -255,7 +258,7 @@ class Dissipative(Motion):
         self._fold()
         if abs(self._place) > FARTHEST * max(1.0, abs(problem.lam0)):
             raise SolutionError(
-                f"the motion leaves the range of doubles at {problem.formulas.parameter} = {place!r}; "
+                f"the motion leaves the range of doubles at {problem.formulas.parameter} = {place[0]!r}; "
                 "give a shorter t_max"
             )
         if what == legs.PAUSED and not period:
@@ -269,12 +272,12 @@ class Dissipative(Motion):
             self._place -= count * period
             self._laps += count
 
-    def _end_name(self, what: int, place: float, start: float, leaving: tuple[float, float]) -> str:
+    def _end_name(self, what: int, place: float, leaving: tuple[float, float]) -> str:
         """What ends a run; turns the body round where it turns."""
-        problem, f = self.problem, self.problem.functions
+        problem, f, start = self.problem, self.problem.functions, self._place
         if what == legs.TURN:
             way, self._held = _way(*leaving), leaving[0] < leaving[1]
-            if way == 0 or place == start:
+            if way == 0 or (place == start and self._w == 0.0):
                 return "rest"
             self._way = way
             return "turn"
@@ -288,7 +291,7 @@ class Dissipative(Motion):
     def _lift_off_at_once(self, run: tuple[Any, ...]) -> None:
         """A motion that ends as it begins: the track would have to pull at once."""
         place, slack, times, ahead = itemgetter(2, 7, 8, 11)(legs.follow(*run, 0.0, self._step, 0, inf))
-        stretch = along_panels(self.problem.functions, self._place, place, slack, times[0], ahead)
+        stretch = along_panels(self.problem.functions, (self._place, 0.0), place, slack, times[0], ahead)
         self._done.append(self._piece(stretch, 1, (ZERO, 0.0), (ZERO, 0.0), "liftoff", self._laps))
         self._ending = "liftoff"
 
@@ -297,21 +300,17 @@ class Dissipative(Motion):
         f, (before, after) = self.problem.functions, run.times
         two = len(run.back) > 0
         if len(run.ahead):
-            stretch = along_panels(f, run.start, run.middle, run.slack, before, run.ahead)
+            stretch = along_panels(f, (run.start, 0.0), run.middle, run.slack, before, run.ahead)
             self._add(stretch, 1, run, "" if two else run.end)
         if run.what == legs.ASYMPTOTE:
-            self._add(along_field(f, run.middle, run.place, run.back), 1, run, run.end)
+            self._add(along_field(f, run.middle[0], run.place[0], run.back), 1, run, run.end)
         elif two:
             self._add(along_panels(f, run.place, run.middle, 0.0, after, run.back), -1, run, run.end)
 
     def _add(self, stretch: Stretch, sense: int, run: Run, end: str) -> None:
         """Run through a whole stretch next, cut where N changes sign."""
         low, high = sorted((stretch.a, stretch.b))
-        cuts = [
-            stretch.anomaly_of(float(place) - stretch.a, stretch.b - float(place))
-            for place in run.changes
-            if low < place < high
-        ]
+        cuts = [stretch.anomaly_of(*stretch.offsets(place)) for place in run.changes.tolist() if low < place < high]
         times = stretch.times(np.array(cuts)) if cuts else ()
         marks = [(ZERO, 0.0), *(((float(r), 0.0), phi) for r, phi in zip(times, cuts, strict=True))]
         marks.append(((stretch.duration, 0.0), stretch.stop))

@@ -121,7 +121,7 @@ def passages(pieces: Sequence[Piece], course: Course, lam: float, low: float) ->
     for piece in pieces:
         stretch = piece.stretch
         within = lam - piece.laps * course.lap
-        inside, outside = (within - stretch.a) + low, (stretch.b - within) - low
+        inside, outside = stretch.offsets(within, low)
         if inside * stretch.direction < 0.0 or outside * stretch.direction < 0.0:
             continue
         phi = np.array([stretch.anomaly_of(inside, outside)])
@@ -139,7 +139,7 @@ def corners_met(piece: Piece, pace: float) -> list[tuple[Pair, float]]:
     """When a piece passes corners of the curve, and the anomalies there."""
     stretch = piece.stretch
     places = stretch.functions.between(stretch.functions.corners, stretch.a, stretch.b)
-    phi = np.array([stretch.anomaly_of(place - stretch.a, stretch.b - place) for place in places])
+    phi = np.array([stretch.anomaly_of(*stretch.offsets(place)) for place in places])
     return crossings(piece, phi, pace)
 
 

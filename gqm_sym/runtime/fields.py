@@ -31,7 +31,7 @@ def approach(drive, p, flags, top, end, v, nu, changes, breaks, step):  # type: 
 
     ``nu`` is the sign of N at the equilibrium, ``changes`` are the places where it has changed sign on the way.
     """
-    rows, work, sizes, tails = np.empty((5, COUNT)), np.empty((ROWS, WIDE)), np.empty(JUDGED), np.empty(8)
+    rows, work, sizes, tails = np.empty((5, WIDE)), np.empty((ROWS, WIDE)), np.empty(JUDGED), np.empty(8)
     series, field = np.empty(WIDE), np.empty((8, COLUMNS))
     count, base, left, least, u, whole = 0, 0.0, 0.0, 0.0, -v, fabs(end - top)
     met, passed = changes.size - 1, breaks.size - 1
@@ -40,7 +40,7 @@ def approach(drive, p, flags, top, end, v, nu, changes, breaks, step):  # type: 
         if stop <= left:
             break
         width, step, _, _ = next_panel(
-            *(drive, p, flags, top, u, 0.0, 1.0, left, stop - left, step, base, v, nu, 0.0, NEVER),
+            *(drive, p, flags, top, u, 0.0, 1.0, left, stop - left, step, base, v, nu, 0.0, NEVER, False),
             *(rows, work, sizes, tails, series),
         )
         if width == 0.0:

@@ -6,7 +6,7 @@ import numpy as np
 
 from gqm_sym.errors import LaunchError, SolutionError
 from gqm_sym.runtime.entries import frame_at
-from gqm_sym.runtime.stretch import Functions
+from gqm_sym.runtime.functions import Functions
 
 if TYPE_CHECKING:
     from gqm_sym.runtime.formulas import Formulas

@@ -14,12 +14,13 @@ from gqm_sym.errors import LaunchError, ParameterError
 from gqm_sym.runtime.chart import Chart, ChartMaker
 from gqm_sym.runtime.entries import frame_at
 from gqm_sym.runtime.exact_problems import exact_problem
+from gqm_sym.runtime.functions import Functions
 from gqm_sym.runtime.interface import Addresses, Dissipation, Each, ExactClimb, ExactFormulas
 from gqm_sym.runtime.jit import Later
 from gqm_sym.runtime.loads import Pass1, fill_loads, room
 from gqm_sym.runtime.numbers import Number, read_number, read_numbers
 from gqm_sym.runtime.stores import LARGE
-from gqm_sym.runtime.stretch import Array, Functions
+from gqm_sym.runtime.stretch import Array
 from gqm_sym.runtime.threads import spread
 
 if TYPE_CHECKING:
@@ -76,6 +77,18 @@ class Given(tuple[Number, ...]):
     values: Array
     domain: Domain | None = None
     functions: Functions | None = None
+
+
+@lru_cache
+def _solver(dissipative: bool) -> "Callable[[Formulas, Given, Launch], Motion]":
+    """What solves a launch, loaded when it is needed: a process that solves one model needs one of the two."""
+    if dissipative:
+        from gqm_sym.runtime.dissipative import dissipate
+
+        return dissipate
+    from gqm_sym.runtime.solve import solve
+
+    return solve
 
 
 @lru_cache(maxsize=8)
@@ -310,16 +323,6 @@ class Formulas:
         spread(fill, places.size, LEAST_MAP)
         return found
 
-    def _solver(self) -> "Callable[[Formulas, Given, Launch], Motion]":
-        # Loaded when it is needed: a process that solves one model needs one of the two.
-        if self.dissipation is None:
-            from gqm_sym.runtime.solve import solve
-
-            return solve
-        from gqm_sym.runtime.dissipative import dissipate
-
-        return dissipate
-
     def solve(
         self,
         lam0: Any,
@@ -333,7 +336,7 @@ class Formulas:
         """The motion that a launch begins."""
         p = self.numbers(given)
         launch = self.launch(p, lam0=lam0, v0=v0, direction=direction, point=point, t_max=t_max, contact=contact)
-        find = self._solver()
+        find = _solver(self.dissipation is not None)
         if not self.body:
             return find(self, p, launch)
         from gqm_sym.runtime.fit import check_end, check_launch

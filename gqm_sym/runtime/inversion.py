@@ -24,6 +24,7 @@ _HALF_TURNS = np.abs((np.outer(np.arange(TERMS), np.arange(TERMS)) + LAST) % (2 
 COSINES = np.sin(np.pi * (0.5 * LAST - _HALF_TURNS) / LAST)
 RESOLVED = 2e-16  # last two Chebyshev coefficients against the whole range of the anomaly
 MOST_CUTS = 2**52  # at a cusp the anomaly goes like the root of the time that is left: ever shorter segments
+MOST_AT_FIRST = 8
 LEVEL = 1e-13  # coefficients that have stopped falling below this share are rounding noise
 # From so many cuts of a panel on, an anomaly that is off by no more than this share of the whole time is good enough:
 # at a cusp the rounding of the time moves it further than a table can tell.
@@ -91,7 +92,7 @@ def tabulate(edges, times, times_low, time_terms):  # type: ignore[no-untyped-de
     values, c = np.empty(TERMS), np.empty(TERMS)
     slope_terms = np.empty(time_terms.shape[1])
     scale = max(fabs(edges[0]), fabs(edges[-1]))
-    count = 0
+    count, cuts = 0, 1
     for k in range(edges.size - 1):
         left, half = edges[k], 0.5 * (edges[k + 1] - edges[k])
         duration = (times[k + 1] - times[k]) + (times_low[k + 1] - times_low[k])
@@ -99,7 +100,8 @@ def tabulate(edges, times, times_low, time_terms):  # type: ignore[no-untyped-de
             continue
         pace = legendre_sum(time_terms[k], 1.0) / duration
         derivative(time_terms[k], slope_terms)
-        done, cuts = 0, 1  # ``done`` of ``cuts`` equal segments of the panel's time are laid
+        # ``done`` of ``cuts`` equal segments of the panel's time are laid; the panel before tells how many to try.
+        done, cuts = 0, min(cuts, MOST_AT_FIRST)
         while done < cuts:
             # From the panel's left edge.
             start, stop = duration * done / cuts, duration * (done + 1) / cuts

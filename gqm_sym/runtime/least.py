@@ -10,8 +10,9 @@ import numpy as np
 from gqm_sym.errors import LaunchError, ParameterError, SolutionError
 from gqm_sym.runtime.entries import frame_at, speed_squared_at
 from gqm_sym.runtime.formulas import CONTACTS, Formulas
+from gqm_sym.runtime.functions import Functions
 from gqm_sym.runtime.numbers import read_number
-from gqm_sym.runtime.stretch import Array, Functions
+from gqm_sym.runtime.stretch import Array
 
 # Places at which the range is looked at first: a summit narrower than their distance may be overlooked.
 LOOKS = 4096

@@ -10,7 +10,7 @@ Integrals come from running means, so that nothing is subtracted however short t
 turning point too.
 """
 
-from math import fabs, inf, sqrt
+from math import fabs, factorial, inf, sqrt
 
 from gqm_sym.runtime.chebyshev import (
     COUNT,
@@ -22,13 +22,17 @@ from gqm_sym.runtime.chebyshev import (
     to_ends,
 )
 from gqm_sym.runtime.crossing import call_drive
+from gqm_sym.runtime.fused import fma, polynomial
 from gqm_sym.runtime.jit import Inner
 
 # V**2 over a panel may not change by more than this factor's logarithm through resistance alone.
 STEEPEST = 2.0
 # exp(q) - 1 is summed to rounding below this; beyond, by doubling.
 SUMMED = 0.25
+SWELLING = tuple(1.0 / factorial(k) for k in range(13, 1, -1))
 MOST_ROUNDS = 40
+# A distance beyond any other: no number would be left of an infinite one.
+FARTHEST = 1e300
 # Rows of a panel's values, all over the panel's nodes; those before JUDGED may be judged, W and what follows holds the
 # panel's end as well. BARE is what W is made of: W over the distance from a turning point, be it one behind a slow
 # launch; W itself elsewhere.
@@ -46,6 +50,7 @@ def distance(w, g, c):  # type: ignore[no-untyped-def]
 @Inner
 def marched(d, g, c):  # type: ignore[no-untyped-def]
     """The march variable at a distance from the origin."""
+    d = min(d, FARTHEST)
     return 2.0 * d / (c + sqrt(c * c + 4.0 * g * d)) if d > 0.0 else 0.0
 
 
@@ -58,51 +63,59 @@ def grow(work, q, out):  # type: ignore[no-untyped-def]
         scale, doublings = 0.5 * scale, doublings + 1
     for j in range(WIDE):
         x = work[q, j] * scale
-        s = 1.0 / 6227020800.0
-        s = s * x + 1.0 / 479001600.0
-        s = s * x + 1.0 / 39916800.0
-        s = s * x + 1.0 / 3628800.0
-        s = s * x + 1.0 / 362880.0
-        s = s * x + 1.0 / 40320.0
-        s = s * x + 1.0 / 5040.0
-        s = s * x + 1.0 / 720.0
-        s = s * x + 1.0 / 120.0
-        s = s * x + 1.0 / 24.0
-        s = s * x + 1.0 / 6.0
-        s = s * x + 0.5
-        work[out, j] = (s * x) * x + x
+        work[out, j] = fma(polynomial(SWELLING, x) * x, x, x)
     for _ in range(doublings):
         for j in range(WIDE):
             work[out, j] *= work[out, j] + 2.0
 
 
 @Inner
-def solve_panel(drive, p, linear, origin, u, g, c, left, width, base, v, nu, rows, work):  # type: ignore[no-untyped-def]
-    """W on a panel from w = ``left`` on, run towards growing (u = 1) or falling (u = -1) parameters.
+def begin_panel(drive, p, linear, origin, u, g, c, left, width, base, v, nu, rows, work):  # type: ignore[no-untyped-def]
+    """Lay out a panel from w = ``left`` on, run towards growing (u = 1) or falling (u = -1) parameters.
 
-    Fills ``rows`` by ``drive`` and all of ``work`` that does not ask for W > 0. Returns q over the panel, inf where it
-    is too wide for an answer.
+    Where forces are linear in V**2, fills ``rows`` by ``drive``, and DS and PULL of ``work``.
     """
     near = 2.0 * g * left + c
     begin = origin + u * distance(left, g, c)
-    places, speeds = work[ARC], work[W]
     for j in range(WIDE):
         y = width * ENDS_BY_NODE[j]
         work[PLACE, j] = y
         work[D, j] = y * (near + g * y)
         work[ARC, j] = begin + u * work[D, j]
         work[W, j] = base
+    if linear:
+        sample(drive, p, u, g, near, v, nu, rows, work)
+
+
+@Inner
+def sample(drive, p, u, g, near, v, nu, rows, work):  # type: ignore[no-untyped-def]
+    """Fill ``rows`` by ``drive``, and DS and PULL, at the panel's places for V**2 as it is taken to be there.
+
+    At its end too, which fills the registers; there they may not be numbers.
+    """
+    call_drive(drive, WIDE, work[ARC], work[W], float(v), float(nu), p, rows)
+    for j in range(WIDE):
+        work[DS, j] = rows[0, j]
+        work[PULL, j] = u * rows[2, j] * (near + 2.0 * g * work[PLACE, j])
+
+
+@Inner
+def solve_panel(drive, p, linear, u, g, c, left, base, v, nu, rows, work):  # type: ignore[no-untyped-def]
+    """W on a panel that was begun (`begin_panel`).
+
+    Fills all of ``work`` that does not ask for W > 0. Returns q over the panel, inf where it is too wide for an answer.
+    """
+    near = 2.0 * g * left + c
     if not linear:  # Newton's method begins with what W does at once; laws may ask for its root
         work[W, 0] = max(base, 1e-300)
-        call_drive(drive, 1, places, speeds, float(v), float(nu), p, rows)
+        call_drive(drive, 1, work[ARC], work[W], float(v), float(nu), p, rows)
         rise = max(u * (rows.flat[1] - rows.flat[2] * work[W, 0]), 0.0)
         for j in range(WIDE):
             work[W, j] = base + rise * work[D, j]
     stop, settled = inf, linear
     for _ in range(1 if linear else MOST_ROUNDS):
-        call_drive(drive, COUNT, places, speeds, float(v), float(nu), p, rows)
-        for j in range(COUNT):
-            work[PULL, j] = u * rows[2, j] * (near + 2.0 * g * work[PLACE, j])
+        if not linear:
+            sample(drive, p, u, g, near, v, nu, rows, work)
         to_ends(MEANS_BY_NODE, work, PULL * WIDE, work, SPEED * WIDE)
         for j in range(WIDE):
             work[SPEED, j] *= work[PLACE, j]
@@ -110,7 +123,7 @@ def solve_panel(drive, p, linear, origin, u, g, c, left, width, base, v, nu, row
         if not fabs(far) <= STEEPEST:
             return inf
         grow(work, SPEED, SWELL)
-        for j in range(COUNT):
+        for j in range(WIDE):
             work[FORCE, j] = u * rows[1, j] * (1.0 + work[SWELL, j])
         # The integral over the distance: means, and where the march is graded those with the weight y.
         to_ends(MEANS_BY_NODE, work, FORCE * WIDE, work, MEAN * WIDE)
@@ -142,16 +155,15 @@ def solve_panel(drive, p, linear, origin, u, g, c, left, width, base, v, nu, row
     if not settled:
         return inf
     if base == 0.0:
-        for j in range(COUNT):
+        for j in range(WIDE):
             kept = 1.0 + work[SWELL, j]
             work[BARE, j] = (work[GRADED, j] if g > 0.0 else work[MEAN, j]) / kept
     else:
         slow = g > 0.0 and left == 0.0
-        for j in range(COUNT):
+        for j in range(WIDE):
             h = work[PLACE, j] + 0.5 * c if slow else 1.0
             work[BARE, j] = work[W, j] / (h * h)
-    for j in range(COUNT):
-        work[DS, j] = rows[0, j]
+    for j in range(WIDE):
         work[LOAD, j] = rows[0, j] * (rows[3, j] + rows[4, j] * work[W, j])
     return far
 
@@ -165,7 +177,7 @@ def as_bare(w, g, c, left):  # type: ignore[no-untyped-def]
 @Inner
 def pace(g, c, left, base, work):  # type: ignore[no-untyped-def]
     """Fill in Y, the pace of time and that of arc length: not numbers where W is not positive."""
-    for j in range(COUNT):
+    for j in range(WIDE):
         w = left + work[PLACE, j]
         h = g * (w + 0.5 * c) + (1.0 - g)
         bare = work[BARE, j] if base == 0.0 else work[W, j] / (h * h)

@@ -19,6 +19,7 @@ from gqm_sym.runtime.jit import Inner
 from gqm_sym.runtime.leg_equation import (
     ARC,
     BARE,
+    DS,
     FORCE,
     LOAD,
     MEAN,
@@ -29,6 +30,7 @@ from gqm_sym.runtime.leg_equation import (
     D,
     W,
     as_bare,
+    begin_panel,
     distance,
     pace,
     solve_panel,
@@ -38,17 +40,20 @@ from gqm_sym.runtime.leg_equation import (
 TAIL = 4e-16
 # Coefficients that have stopped falling below this level are rounding noise, not structure.
 PLATEAU = 1e-9
+# Last coefficients of N against the largest where it has one sign at all nodes, for its changes of sign are decided to
+# no more than that (`legs.TOUCHED`); and where the polynomial is far from nothing throughout.
+ONE_SIGN, CLEAR = 1e-14, 1e-7
 # What may be left of a function where all of it cancels, as a share of its parts.
 NOISE = 1e-15
 # A width of a few units in the last place of the parameter.
 NARROW = 1e-15
 # Coefficients that fall by this factor a degree reach TAIL with the last ones but one.
-FALL = 7.2
+FALL = 5.4
 # A panel is made this much narrower than it would seem to be allowed to be, and at most that many times wider.
 CAUTION, GROWTH = 0.9, 4.0
 # V**2 at a panel's end against the largest so far from which on time is resolved: below, a turn is expected, and time
 # is counted from there.
-HIGH = 0.5
+HIGH = 0.25
 
 # A part this small of a panel on which V**2 is resolved tells noise from structure.
 SLIVER = 2.0**-20
@@ -74,7 +79,7 @@ def weigh(rows, base, bare, work, sizes):  # type: ignore[no-untyped-def]
 
     The panel begins with V**2 = ``base``, which is ``bare`` in the units of BARE.
     """
-    for j in range(COUNT):
+    for j in range(WIDE):
         work[MEAN, j] = fabs(rows[0, j]) * (fabs(rows[3, j]) + fabs(rows[4, j] * work[W, j]))
     for f in range(PACE):
         sizes[f] = size_of(work, f)
@@ -97,31 +102,69 @@ def falls(work, row, size, tails):  # type: ignore[no-untyped-def]
 
 @Inner
 def resolved(work, sizes, first, last, tails):  # type: ignore[no-untyped-def]
-    """Whether some functions are resolved, and by what the panel's width may be multiplied."""
+    """Whether some functions are resolved, and how large coefficients in their middle are, against the largest."""
     fine, worst = True, 0.0
     for f in range(first, last):
         tail, level, ok = falls(work, f, sizes[f], tails)
         if not (tail < inf and level < inf):
-            return False, 0.5
+            return False, inf
         if sizes[f] > 0.0:
             worst = max(worst, level / sizes[f])
         fine = fine and ok
+    return fine, worst
+
+
+@Inner
+def growth(worst):  # type: ignore[no-untyped-def]
+    """By what a panel's width may be multiplied: coefficients are powers of the distance of what is not smooth."""
     if worst == 0.0:
-        return fine, GROWTH
-    # Coefficients fall like powers of the distance of what is not smooth.
-    return fine, min(CAUTION * worst ** (-1.0 / 13.0) / FALL, GROWTH)
+        return GROWTH
+    return min(CAUTION * worst ** (-1.0 / 15.0) / FALL, GROWTH) if worst < inf else 0.5
+
+
+@Inner
+def narrower(width, worst):  # type: ignore[no-untyped-def]
+    """The width to try next."""
+    return width * max(min(growth(worst), 0.9), 0.2)
+
+
+@Inner
+def keeps_sign(work, row, noise):  # type: ignore[no-untyped-def]
+    """Whether values of a function are so far from nothing that the polynomial through them changes sign nowhere."""
+    low, high = extent(work, row * WIDE)
+    return fabs(0.5 * (low + high)) > 0.5 * LEBESGUE * (high - low) + noise
+
+
+@Inner
+def told(work, size, tails):  # type: ignore[no-untyped-def]
+    """Whether N is resolved as far as its changes of sign on a panel ask for, and how large its coefficients are."""
+    tail, level, fine = falls(work, LOAD, size, tails)
+    if not (tail < inf and level < inf):
+        return False, inf
+    if not fine:
+        low, high = extent(work, LOAD * WIDE)
+        same = low * high > 0.0 and low * work[LOAD, COUNT] > 0.0
+        fine = (same and tail <= ONE_SIGN * size) or (
+            tail <= CLEAR * size and keeps_sign(work, LOAD, 4.0 * CLEAR * size)
+        )
+    return fine, 0.0 if fine else level / size
 
 
 @Inner
 def change_of(work, row, sign, noise, c):  # type: ignore[no-untyped-def]
     """`first_change` of a function by its values; its coefficients, in c, are found only where values leave a doubt."""
-    low, high = extent(work, row * WIDE)
-    middle, spread = 0.5 * (low + high), 0.5 * LEBESGUE * (high - low)
-    if fabs(middle) > spread + noise:
-        found = 1 if middle > 0.0 else -1
+    if keeps_sign(work, row, noise):
+        found = 1 if work[row, 0] > 0.0 else -1
         if sign == 0 or found == sign:
             return 2.0, found, 2.0
     to_ends(COEFFICIENTS_BY_NODE, work, row * WIDE, c, 0)
+    rest, bounds = 0.0, extent(c, 0)
+    if max(bounds[1], -bounds[0]) == fabs(c[0]):
+        for k in range(1, COUNT):
+            rest += fabs(c[k])
+        found = 1 if c[0] > 0.0 else -1
+        if fabs(c[0]) > rest + noise and (sign == 0 or found == sign):
+            return 2.0, found, 2.0
     return first_change(c[:COUNT], sign, noise)
 
 
@@ -131,7 +174,7 @@ def to_kink(rows, work, c, tails):  # type: ignore[no-untyped-def]
 
     The sign is that of ds kappa, which is smooth at cusps too.
     """
-    for j in range(COUNT):
+    for j in range(WIDE):
         work[LOAD, j] = rows[0, j] * rows[4, j]
     size = size_of(work, LOAD)
     if not falls(work, LOAD, size, tails)[2]:
@@ -141,12 +184,33 @@ def to_kink(rows, work, c, tails):  # type: ignore[no-untyped-def]
 
 @Inner
 def next_panel(  # type: ignore[no-untyped-def]
-    drive, p, flags, origin, u, g, c, left, room, step, base, v, nu, ceiling, ask, rows, work, sizes, tails, series
+    drive,
+    p,
+    flags,
+    origin,
+    u,
+    g,
+    c,
+    left,
+    room,
+    step,
+    base,
+    v,
+    nu,
+    ceiling,
+    ask,
+    watch,
+    rows,
+    work,
+    sizes,
+    tails,
+    series,
 ):
     """The widest panel that can be resolved, no wider than ``room`` and ``step``.
 
     Time on it is resolved too: where ``ask`` is ALWAYS; never where it is NEVER; where it is MAYBE, unless V**2 falls
-    below a part of the largest so far, ``ceiling``.
+    below a part of the largest so far, ``ceiling``. N is resolved as well as its changes of sign ask for, and not at
+    all unless ``watch`` is set.
 
     Returns
     -------
@@ -164,27 +228,42 @@ def next_panel(  # type: ignore[no-untyped-def]
     here = origin + u * gone
     for _ in range(2100):
         run = width * (near + g * width)
-        if run <= NARROW * max(fabs(here), gone) or run < 1e-300:
+        # As narrow as its room, a panel may be narrower than places in doubles: distances on it keep their digits.
+        if (run <= NARROW * max(fabs(here), gone) and width < room) or run < 1e-300:
             return 0.0, step, 0.0, False
-        far = solve_panel(drive, p, flags[2] == 1, origin, u, g, c, left, width, base, v, nu, rows, work)
+        begin_panel(drive, p, flags[2] == 1, origin, u, g, c, left, width, base, v, nu, rows, work)
+        first, worst = DS, 0.0
+        if flags[1] == 0 and flags[2] == 1:  # most that is too wide is told from the curve alone
+            sizes[DS], sizes[PULL] = size_of(work, DS), max(size_of(work, PULL), 1.0 / width)
+            fine, worst = resolved(work, sizes, DS, FORCE, tails)
+            if not fine:
+                width = narrower(width, worst)
+                continue
+            first = FORCE
+        far = solve_panel(drive, p, flags[2] == 1, u, g, c, left, base, v, nu, rows, work)
         if flags[1] == 1 and not kink and (far < inf or flags[2] == 1):
             x = to_kink(rows, work, series, tails)
-            if x <= 1.0:
-                kink = x > -1.0
-                width *= 0.5 * (1.0 + x) if kink else 0.5
+            kinked = width * (0.5 * (1.0 + x) if x > -1.0 else 0.5)
+            # A run that begins at a kink may begin a rounding before it.
+            if x <= 1.0 and kinked * (near + g * kinked) > NARROW * max(fabs(here), gone):
+                width, kink = kinked, x > -1.0
                 continue
-            for j in range(COUNT):
+            for j in range(WIDE):
                 work[LOAD, j] = rows[0, j] * (rows[3, j] + rows[4, j] * work[W, j])
         if not far < inf:
             width, kink = 0.5 * width, False
             continue
         highest = weigh(rows, base, as_bare(base, g, c, left), work, sizes)
-        fine, growth = resolved(work, sizes, 0, PACE, tails)
+        fine, more = resolved(work, sizes, first, LOAD, tails)
+        worst = max(worst, more)
+        if watch:
+            enough, more = told(work, sizes[LOAD], tails)
+            fine, worst = fine and enough, max(worst, more)
         if fine:
             widest = max(widest, width)
             top, end = max(ceiling, highest), work[W, COUNT]
             needed = ask == ALWAYS or (ask == MAYBE and (end >= HIGH * top or base < HIGH * top))
-            timed, more = False, GROWTH
+            timed, more = False, 0.0
             if ask != NEVER:
                 pace(g, c, left, base, work)
                 sizes[PACE] = size_of(work, PACE)
@@ -192,12 +271,11 @@ def next_panel(  # type: ignore[no-untyped-def]
             # On so small a part of what is smooth it is noise that is not resolved; the error says so.
             timed = timed or (needed and width <= SLIVER * widest and tails[0] < inf)
             if timed or not needed:
-                if timed:
-                    growth = min(growth, more)
-                step = max(step, width * growth) if kink or width == room else width * growth
+                wider = width * growth(max(worst, more) if timed else worst)
+                step = max(step, wider) if kink or width == room else wider
                 return width, step, far, timed
-            growth = more
-        width, kink = width * max(min(growth, 0.9), 0.2), False
+            worst = more
+        width, kink = narrower(width, worst), False
     return 0.0, step, 0.0, False
 
 
@@ -209,6 +287,7 @@ def keep(panels, count, right, width, work, tails):  # type: ignore[no-untyped-d
     row, time = panels[count], 0.0
     for j in range(COUNT):
         time += MEANS[COUNT, j] * work[PACE, j]
+    for j in range(COUNT):
         row[3 + j], row[3 + COUNT + j], row[3 + 2 * COUNT + j] = work[PACE, j], work[ARC, j], work[SPEED, j]
     row[0], row[1] = right, width * time
     row[2] = width * max(fabs(tails[0]), max(fabs(tails[1]), fabs(tails[2])))

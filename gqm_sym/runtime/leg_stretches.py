@@ -8,11 +8,13 @@ from numba import types
 
 from gqm_sym.runtime.chebyshev import COUNT, TO_COEFFICIENTS, WIDE, to_ends
 from gqm_sym.runtime.clocks import Array
+from gqm_sym.runtime.course import Pair
+from gqm_sym.runtime.functions import Functions
 from gqm_sym.runtime.integrands import FROM_TURN, REGULAR, TO_EQUILIBRIUM
 from gqm_sym.runtime.jit import entry
 from gqm_sym.runtime.leg_panels import COLUMNS
-from gqm_sym.runtime.panels import CONVERGED, DEGREE
-from gqm_sym.runtime.stretch import ULP, Functions, Stretch
+from gqm_sym.runtime.panels import CONVERGED
+from gqm_sym.runtime.stretch import ULP, Stretch
 
 # An equilibrium is approached until the distance left is exp(-this) of the leg: all that doubles have.
 CLOSEST = 690.0
@@ -21,8 +23,8 @@ CLOSEST = 690.0
 def _to_legendre() -> tuple[Array, Array]:
     """Legendre coefficients of a function on [-1, 1], and of its integral from -1, from values at a panel's nodes."""
     # x P_j = ((j + 1) P_(j+1) + j P_(j-1))/(2 j + 1), and T_(k+1) = 2 x T_k - T_(k-1).
-    j = np.arange(WIDE)
-    series = np.zeros((COUNT, WIDE))
+    j = np.arange(WIDE + 1)
+    series = np.zeros((COUNT, WIDE + 1))
     series[0, 0] = series[1, 1] = 1.0
     for k in range(2, COUNT):
         row = series[k - 1]
@@ -32,9 +34,9 @@ def _to_legendre() -> tuple[Array, Array]:
     plain = TO_COEFFICIENTS.T @ series
     integral = np.zeros((COUNT, WIDE))
     integral[:, 0] = plain[:, 0] - plain[:, 1] / 3.0
-    i = np.arange(1, DEGREE)
-    integral[:, 1:DEGREE] = plain[:, i - 1] / (2 * i - 1) - plain[:, i + 1] / (2 * i + 3)
-    return np.ascontiguousarray(plain), integral
+    i = np.arange(1, WIDE)
+    integral[:, 1:] = plain[:, i - 1] / (2 * i - 1) - plain[:, i + 1] / (2 * i + 3)
+    return np.ascontiguousarray(plain[:, :WIDE]), integral
 
 
 PLAIN_BY_NODE, INTEGRAL_BY_NODE = _to_legendre()
@@ -51,14 +53,14 @@ def read_panels(panels, time):  # type: ignore[no-untyped-def]
     -------
     edges, times, lengths, time_terms, length_terms : arrays
         As `panels.lay` has them; the last anomaly is 1.
-    speed_terms : (n, DEGREE) array
+    speed_terms : (n, WIDE) array
         Legendre coefficients of Y.
     error : float
         Estimated relative error of the time.
     """
     n = panels.shape[0]
     edges, times, lengths = np.zeros(n + 1), np.zeros(n + 1), np.zeros(n + 1)
-    time_terms, length_terms, speed_terms = np.empty((n, DEGREE)), np.empty((n, DEGREE)), np.empty((n, DEGREE))
+    time_terms, length_terms, speed_terms = np.empty((n, WIDE)), np.empty((n, WIDE)), np.empty((n, WIDE))
     out, error, last = np.empty(3 * WIDE), 0.0, panels[n - 1, 0]
     for k in range(n):
         half = 0.5 * (panels[k, 0] - (panels[k - 1, 0] if k > 0 else 0.0))
@@ -67,7 +69,7 @@ def read_panels(panels, time):  # type: ignore[no-untyped-def]
         to_ends(INTEGRAL_BY_NODE, panels, at + COUNT, out, WIDE)
         to_ends(PLAIN_BY_NODE, panels, at + 2 * COUNT, out, 2 * WIDE)
         length = 0.0
-        for j in range(DEGREE):
+        for j in range(WIDE):
             time_terms[k, j], length_terms[k, j] = half * out[j], half * out[WIDE + j]
             speed_terms[k, j] = out[2 * WIDE + j]
             length += length_terms[k, j]
@@ -82,8 +84,8 @@ class Run(NamedTuple):
     """One run of the body as compiled code tells of it (`legs.follow`), not yet made into pieces."""
 
     start: float
-    place: float
-    middle: float
+    place: Pair
+    middle: Pair
     slack: float
     times: tuple[float, float]
     changes: Array
@@ -94,8 +96,8 @@ class Run(NamedTuple):
     laps: int
 
 
-def along_panels(f: Functions, a: float, b: float, slack: float, time: float, panels: Array) -> Stretch:
-    """A stretch by its panels (`leg_panels`), whose times add up to ``time``.
+def along_panels(f: Functions, a: Pair, b: Pair, slack: float, time: float, panels: Array) -> Stretch:
+    """A stretch by its panels (`leg_panels`), whose times add up to ``time``; its ends as two doubles each.
 
     ``slack`` is c/2 of their march variable, infinite where that is the distance.
     """
@@ -104,8 +106,9 @@ def along_panels(f: Functions, a: float, b: float, slack: float, time: float, pa
     return Stretch(
         functions=f,
         kind=REGULAR if slack == inf else FROM_TURN,
-        a=a,
-        b=b,
+        a=a[0],
+        b=b[0],
+        lows=(a[1], b[1]),
         slack=0.0 if slack == inf else slack / last,
         laid=(*laid, error, 1.0, CONVERGED),
         paces=(last, speed_terms),

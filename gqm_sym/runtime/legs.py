@@ -16,7 +16,20 @@ from gqm_sym.runtime.crossing import call_drive, call_hold
 from gqm_sym.runtime.doubledouble import two_sum
 from gqm_sym.runtime.fields import approach
 from gqm_sym.runtime.jit import Inner, entry
-from gqm_sym.runtime.leg_equation import BARE, FORCE, JUDGED, LOAD, ROWS, as_bare, distance, marched, pace, solve_panel
+from gqm_sym.runtime.leg_equation import (
+    BARE,
+    FORCE,
+    JUDGED,
+    LOAD,
+    PLACE,
+    ROWS,
+    as_bare,
+    begin_panel,
+    distance,
+    marched,
+    pace,
+    solve_panel,
+)
 from gqm_sym.runtime.leg_equation import W as V2
 from gqm_sym.runtime.leg_panels import (
     ALWAYS,
@@ -40,6 +53,8 @@ TURN, LIMIT, LIFTOFF, ASYMPTOTE, PAUSED, NARROWED, SPENT, DIPPED = range(8)
 TOUCHED = 5e-14
 # A body this close to a turn, as a share of what has been run, is there: for laws that have no value beyond it.
 NEAR = 1e-11
+# The first panel of a leg, against the way on which the first acceleration would stop the body.
+SOONER = 2.0
 MOST_TRIES = 20000
 MOST_PANELS = 512
 
@@ -99,14 +114,14 @@ def run(drive, p, flags, start, w, v, nu, breaks, limit, reach, step, side, stri
     what : int
         TURN, LIMIT, LIFTOFF, ASYMPTOTE (V**2 and the force vanish together), PAUSED, NARROWED (a place where the
         functions are not smooth), SPENT, DIPPED (the body gets slow from here on, but does not turn: to be run again).
-    place, w, nu : float, float, int
-        Where, with what V**2, and the sign of N.
+    place, w, nu : (float, float), float, int
+        Where, as two doubles, with what V**2, and the sign of N.
     step : float
         The distance to go on with.
     strict : float
         The same from here on.
-    middle : float
-        The place up to which time is counted.
+    middle : (float, float)
+        The place up to which time is counted, as two doubles.
     slack : float
         c/2 of the march variable (`leg_panels`); infinite where it is the distance itself.
     changes : (k,) array
@@ -114,10 +129,10 @@ def run(drive, p, flags, start, w, v, nu, breaks, limit, reach, step, side, stri
     panels : (n, COLUMNS) array
         The panels up to ``middle``.
     """
-    rows, work, sizes, tails = np.empty((5, COUNT)), np.empty((ROWS, WIDE)), np.empty(JUDGED), np.empty(8)
+    rows, work, sizes, tails = np.empty((5, WIDE)), np.empty((ROWS, WIDE)), np.empty(JUDGED), np.empty(8)
     series, changes, spot = np.empty(WIDE), np.empty(4), np.empty((7, 1))
     panels = np.empty((8, COLUMNS))
-    g, c = 1.0, 0.0
+    g, c, sooner = 1.0, 0.0, inf
     if nu == 0:
         rise(drive, p, start, w, v, nu, spot)
         load, turned = spot[4, 0], spot[5, 0] * w
@@ -127,6 +142,8 @@ def run(drive, p, flags, start, w, v, nu, breaks, limit, reach, step, side, stri
         slope = rise(drive, p, start, w, v, nu, spot)
         slow = slope > 0.0 and w <= slope * step
         g, c = (1.0, 2.0 * sqrt(w / slope)) if slow else (0.0, 1.0)
+        # V**2 at launch is exact: a turn that is near has its digits on a panel no wider than this.
+        sooner = SOONER * w / -slope if slope < 0.0 else inf
     count, met, coming, what = 0, 0, 0, SPENT
     base, left, gone, ceiling, step = w, 0.0, 0.0, w, marched(step, g, c)
     # The last place up to which time is counted, and what is known there; a turn is searched for beyond it.
@@ -146,9 +163,10 @@ def run(drive, p, flags, start, w, v, nu, breaks, limit, reach, step, side, stri
             what = LIMIT
             break
         room = marched(stop, g, c) - left
+        part = min(room, sooner) if gone == 0.0 else room
         ask = ALWAYS if gone < strict else (NEVER if searching or late else MAYBE)
         width, step, far, timed = next_panel(
-            *(drive, p, flags, start, v, g, c, left, room, step, base, v, nu, ceiling, ask),
+            *(drive, p, flags, start, v, g, c, left, part, step, base, v, nu, ceiling, ask, True),
             *(rows, work, sizes, tails, series),
         )
         if width == 0.0:
@@ -183,13 +201,19 @@ def run(drive, p, flags, start, w, v, nu, breaks, limit, reach, step, side, stri
             x = bottom(rows, work, v, touch) if end == touch and end != at_rest else end
             # Once more on a panel that ends there: its own sum has more digits than the series of a wider one.
             right = left + width * (0.5 * (1.0 + x))
-            far = solve_panel(drive, p, flags[2] == 1, start, v, g, c, left, right - left, base, v, nu, rows, work)
+            begin_panel(drive, p, flags[2] == 1, start, v, g, c, left, right - left, base, v, nu, rows, work)
+            far = solve_panel(drive, p, flags[2] == 1, v, g, c, left, base, v, nu, rows, work)
             pace(g, c, left, base, work)
             if end == at_rest and flags[2] == 1:
                 over, there = work[V2, COUNT], distance(right, g, c)
                 slope = rise(drive, p, start + v * there, over, v, nu, spot)
                 if fabs(over) < fabs(slope) * 1e-6 * (there - gone):
                     right = marched(there - over / slope, g, c)
+            elif end == turn_of_force and end != touch:
+                # N at the panel's end has no error of a series, nor has what is left of the way to where it vanishes.
+                rate = (work[LOAD, COUNT] - work[LOAD, COUNT - 1]) / (work[PLACE, COUNT] - work[PLACE, COUNT - 1])
+                if fabs(work[LOAD, COUNT]) < fabs(rate) * 1e-6 * (right - left):
+                    right -= work[LOAD, COUNT] / rate
         if not searching:
             panels, kept, mark = keep(panels, kept, right, right - left, work, tails), kept + 1, right
         count += 1
@@ -209,15 +233,15 @@ def run(drive, p, flags, start, w, v, nu, breaks, limit, reach, step, side, stri
         elif (gone >= reach and 2.0 * base >= ceiling) or count >= MOST_PANELS:
             what = PAUSED
             break
-    middle = start + v * distance(mark, g, c)
+    middle = two_sum(start, v * distance(mark, g, c))
     onwards, strict = step * (2.0 * g * left + c + g * step), strict - gone
     if what == TURN or what == ASYMPTOTE:
-        place = start + v * gone
+        place = two_sum(start, v * gone)
     elif searching:
         strict = gone - distance(mark, g, c) if what == PAUSED or what == DIPPED else inf
         what, place, base, nu, met = DIPPED, middle, mark_base, mark_nu, mark_met
     else:
-        place = limit if what == LIMIT else start + v * gone
+        place = (limit, 0.0) if what == LIMIT else two_sum(start, v * gone)
         middle = place
     slack = 0.5 * c if g > 0.0 else inf
     return what, place, base, nu, onwards, strict, middle, slack, changes[:met].copy(), panels[:kept].copy()
@@ -225,11 +249,11 @@ def run(drive, p, flags, start, w, v, nu, breaks, limit, reach, step, side, stri
 
 @Inner
 def run_back(drive, p, flags, turn, whole, v, nu, changes, breaks, step):  # type: ignore[no-untyped-def]
-    """The panels of the leg that turns at ``turn``, followed back from there over a distance.
+    """The panels of the leg that turns at ``turn``, followed back from there over the distance ``whole``.
 
     ``nu`` is the sign of N at the turn, ``changes`` are the places where it has changed sign on the way.
     """
-    rows, work, sizes, tails = np.empty((5, COUNT)), np.empty((ROWS, WIDE)), np.empty(JUDGED), np.empty(8)
+    rows, work, sizes, tails = np.empty((5, WIDE)), np.empty((ROWS, WIDE)), np.empty(JUDGED), np.empty(8)
     series, panels = np.empty(WIDE), np.empty((8, COLUMNS))
     count, base, left, gone, u, step = 0, 0.0, 0.0, 0.0, -v, sqrt(step)
     met, passed = changes.size - 1, breaks.size - 1
@@ -239,7 +263,7 @@ def run_back(drive, p, flags, turn, whole, v, nu, changes, breaks, step):  # typ
         if room <= 0.0:
             break
         width, step, _, _ = next_panel(
-            *(drive, p, flags, turn, u, 1.0, 0.0, left, room, step, base, v, nu, 0.0, ALWAYS),
+            *(drive, p, flags, turn, u, 1.0, 0.0, left, room, step, base, v, nu, 0.0, ALWAYS, False),
             *(rows, work, sizes, tails, series),
         )
         if width == 0.0:
@@ -262,8 +286,9 @@ def total(panels):  # type: ignore[no-untyped-def]
 
 
 _FLAGS = types.UniTuple(types.int64, 3)
+_PAIR = types.UniTuple(_FLOAT, 2)
 _FOLLOWED = types.Tuple(
-    (types.int64, types.int64, *[_FLOAT] * 6, types.UniTuple(_FLOAT, 2), types.UniTuple(_FLOAT, 2), _LINE, _ROWS, _ROWS)
+    (types.int64, types.int64, _PAIR, _FLOAT, _FLOAT, _FLOAT, _PAIR, _FLOAT, _PAIR, _PAIR, _LINE, _ROWS, _ROWS)
 )
 
 
@@ -296,13 +321,14 @@ def follow(drive, hold, p, flags, start, w, v, nu, breaks, limit, reach, step, s
         strict = next_strict
     back, leaving = np.empty((0, 0)), (0.0, 0.0)
     if what == TURN:
-        back = run_back(drive, p, flags, place, fabs(middle - place), v, n, changes, breaks, onwards)
+        whole = v * ((place[0] - middle[0]) + (place[1] - middle[1]))
+        back = run_back(drive, p, flags, place[0], whole, v, n, changes, breaks, onwards)
         spot, rates = np.empty(1), np.empty((2, 1))
-        spot[0] = place
+        spot[0] = place[0]
         call_hold(hold, 1, spot, p, rates)
         leaving = (rates[0, 0], rates[1, 0])
     elif what == ASYMPTOTE:
-        back = approach(drive, p, flags, place, middle, v, n, changes, breaks, onwards)
+        back = approach(drive, p, flags, place[0], middle[0], v, n, changes, breaks, onwards)
     times = (total(ahead), total(back) if what == TURN else 0.0)
     return (
         what,

@@ -53,7 +53,7 @@ def columns(rows: int, width: int) -> Any:
 
 
 def span(count: int) -> Any:
-    """A compiled function ``f(values, at)``: the least and the greatest of ``count`` numbers, a multiple of four.
+    """A compiled function ``f(values, at)``: the least and the greatest of ``count`` numbers, four or more.
 
     What is not a number may be passed over.
     """
@@ -64,7 +64,7 @@ def span(count: int) -> Any:
         values = builder.gep(context.make_array(kind)(context, builder, args[0]).data, [args[1]])
 
         def part(at: int) -> Any:
-            place = builder.gep(values, [ir.Constant(_INDEX, 4 * at)])
+            place = builder.gep(values, [ir.Constant(_INDEX, min(4 * at, count - 4))])
             return builder.load(builder.bitcast(place, four.as_pointer()), align=8)
 
         def most(order: str, found: list[Any]) -> Any:
@@ -75,7 +75,7 @@ def span(count: int) -> Any:
 
         ends = []
         for order in ("<", ">"):
-            lanes = most(order, [part(at) for at in range(count // 4)])
+            lanes = most(order, [part(at) for at in range(-(-count // 4))])
             ends.append(most(order, [builder.extract_element(lanes, ir.Constant(_INDEX, k)) for k in range(4)]))
         return context.make_tuple(builder, signature.return_type, ends)
 

@@ -22,6 +22,7 @@ CONVERGED, FLOOR, EXHAUSTED, FAILED, ILL_CONDITIONED = range(5)
 
 COUNT = 21
 DEGREE = 22  # coefficients of an antiderivative
+LONGEST = 32  # of a series in Legendre polynomials
 TAIL = 2e-15  # last Legendre coefficients against the largest: noise in them is about 5e-16
 PLATEAU = 1e-7  # coefficients that have stopped falling below this level are rounding noise, not structure
 MOST_PANELS = 4096
@@ -30,8 +31,8 @@ HOPELESS = 1e-9
 LEAST_WIDTH = 2.0**-48  # of the stretch
 NOTHING = 2.0**-104  # a share of the time so far that two doubles do not hold
 # Legendre's recurrence: P_(k+1) = GROWTH[k] x P_k - DECAY[k-1] P_(k-1).
-GROWTH = np.array([(2 * k + 1) / (k + 1) for k in range(DEGREE + 1)])
-DECAY = np.array([(k + 1) / (k + 2) for k in range(DEGREE + 1)])
+GROWTH = np.array([(2 * k + 1) / (k + 1) for k in range(LONGEST)])
+DECAY = np.array([(k + 1) / (k + 2) for k in range(LONGEST)])
 
 
 @Inner
@@ -64,7 +65,7 @@ def legendre_sum(c, x):  # type: ignore[no-untyped-def]
     """The Legendre series with coefficients c, at x, by Clenshaw's recurrence."""
     high, low = 0.0, 0.0
     for k in range(c.size - 1, 0, -1):
-        high, low = c[k] + GROWTH[k] * x * high - DECAY[k] * low, high
+        high, low = (c[k] - DECAY[k] * low) + (GROWTH[k] * x) * high, high
     return c[0] + x * high - 0.5 * low
 
 

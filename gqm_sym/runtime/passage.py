@@ -169,7 +169,7 @@ class Passage(Motion):
             return (lam - end.place) * end.direction > 0.0 and (end.limit - lam) * end.direction > 0.0
         if self._target is None or (last.b - lam) * last.direction <= 0.0:
             return False
-        return bool(last.anomaly_of((lam - last.a) + low, (last.b - lam) - low) > last.edges[-1])
+        return bool(last.anomaly_of(*last.offsets(lam, low)) > last.edges[-1])
 
     @budget("motion", 60.0, "give a shorter t_max, or ask for earlier times")
     def _go_on(self) -> None:

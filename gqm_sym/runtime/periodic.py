@@ -11,11 +11,12 @@ from gqm_sym.runtime.course import ZERO, Course, Piece, libration
 from gqm_sym.runtime.display import Rows
 from gqm_sym.runtime.entries import slopes
 from gqm_sym.runtime.events import Event
+from gqm_sym.runtime.exact import NOWHERE
 from gqm_sym.runtime.motion import Motion, State
 from gqm_sym.runtime.numbers import read_number
 from gqm_sym.runtime.problem import Problem
 from gqm_sym.runtime.sampling import Sampler, plain_time, plain_times
-from gqm_sym.runtime.stretch import NOWHERE, ULP, Array, Stretch
+from gqm_sym.runtime.stretch import ULP, Array, Stretch
 
 # A turning point may be told this share of it beside the end of the stretch.
 BESIDE = 1e-14

@@ -5,8 +5,8 @@ from typing import Any
 
 from gqm_sym.runtime.exact import ExactProblem
 from gqm_sym.runtime.formulas import Domain, Formulas, Given, Launch
+from gqm_sym.runtime.functions import Functions
 from gqm_sym.runtime.rounded import RoundedProblem
-from gqm_sym.runtime.stretch import Functions
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,7 +6,7 @@ import numpy as np
 
 from gqm_sym.runtime.entries import climb_at, speed_squared_at
 from gqm_sym.runtime.exact import End
-from gqm_sym.runtime.stretch import Functions
+from gqm_sym.runtime.functions import Functions
 
 # Shares of the climb's size, or of its slope's, that count as nothing.
 NOTHING = 2e-14

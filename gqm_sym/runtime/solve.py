@@ -9,13 +9,14 @@ from gqm_sym.runtime import search
 from gqm_sym.runtime.entries import first_step, frame_at, speed_squared_at, walk_on
 from gqm_sym.runtime.exact_panels import DIGITS, lay_exactly
 from gqm_sym.runtime.formulas import Formulas, Given, Launch
+from gqm_sym.runtime.functions import Functions
 from gqm_sym.runtime.motion import Motion
 from gqm_sym.runtime.panels import REGULAR
 from gqm_sym.runtime.passage import OpenEnd, Passage
 from gqm_sym.runtime.periodic import Periodic
 from gqm_sym.runtime.problem import Problem, Reach
 from gqm_sym.runtime.rest import Rest
-from gqm_sym.runtime.stretch import LEAST_BALANCE, Functions, Stretch
+from gqm_sym.runtime.stretch import LEAST_BALANCE, Stretch
 from gqm_sym.runtime.stretches import between_turns, from_turn, through
 from gqm_sym.runtime.surveying import survey
 
@@ -102,7 +103,8 @@ def _check_place(problem: Problem) -> None:
 
 def starting_step(problem: Problem) -> float:
     """A step along the curve to begin with."""
-    step: float = first_step.py_func(problem.low, problem.high, problem.period)
+    low, high, period, *_ = problem.domain
+    step: float = first_step.py_func(low, high, period)
     return step
 
 

@@ -3,7 +3,7 @@
 from copy import copy
 from dataclasses import dataclass, field
 from math import inf
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -22,8 +22,8 @@ from gqm_sym.runtime.entries import (
     speeds_along,
     speeds_at,
 )
-from gqm_sym.runtime.exact import ExactProblem
 from gqm_sym.runtime.exact_panels import DIGITS, exact_ends, lay_exactly
+from gqm_sym.runtime.functions import Functions
 from gqm_sym.runtime.integrands import FROM_TURN, REGULAR, TO_EQUILIBRIUM, TURN_TURN
 from gqm_sym.runtime.inversion import TIMED
 from gqm_sym.runtime.panels import FAILED, ILL_CONDITIONED
@@ -35,41 +35,7 @@ LEAST_WIDTH = 1.0 / 32.0
 LEAST_TIMED = 2.0**-10
 
 
-NOWHERE: Array = np.empty(0)
 ULP = 2.220446049250313e-16
-
-
-class Functions(NamedTuple):
-    """One motion's compiled functions and what they are given.
-
-    Attributes
-    ----------
-    addresses : tuple of int
-        Of the compiled functions.
-    p : array
-        The run-time parameters, and behind them the curve's chart where it has one.
-    exact : ExactProblem or None
-        The same problem exactly; None where the curve is known by doubles only.
-    breaks, corners : arrays
-        Places at which the curve is not smooth, and those where its tangent jumps; repeated with the period.
-    period : float
-        Of a closed curve, else 0.
-    """
-
-    addresses: tuple[int, ...]
-    p: Array
-    exact: ExactProblem | None = None
-    breaks: Array = NOWHERE
-    corners: Array = NOWHERE
-    period: float = 0.0
-
-    def between(self, places: Array, a: float, b: float) -> Array:
-        """Those of some places that lie strictly between two, round a closed curve as often as it takes."""
-        low, high = min(a, b), max(a, b)
-        if self.period and places.size:
-            laps = np.arange(np.floor((low - places[-1]) / self.period), np.ceil((high - places[0]) / self.period) + 1)
-            places = (places[None, :] + laps[:, None] * self.period).ravel()
-        return places[(places > low) & (places < high)]
 
 
 @dataclass(slots=True, kw_only=True)
@@ -82,6 +48,8 @@ class Stretch:
         Which of its ends are special (`panels`).
     a, b : float
         Its ends. ``a`` is the turning point where only one end is; ``b`` the equilibrium where there is one.
+    lows : (float, float)
+        What its ends are more than those doubles.
     ref, w : float
         Where no end is special: a place and V**2 there.
     stop : float
@@ -108,6 +76,7 @@ class Stretch:
     kind: int
     a: float
     b: float
+    lows: tuple[float, float] = (0.0, 0.0)
     ref: float = 0.0
     w: float = 0.0
     stop: float = 1.0
@@ -196,7 +165,7 @@ class Stretch:
     def _marks(self) -> Array:
         """The first and the last anomaly, and those at which the curve is not smooth."""
         places = self.functions.between(self.functions.breaks, self.a, self.b)
-        inside = [self.anomaly_of(place - self.a, self.b - place) for place in (*places, *self.hints)]
+        inside = [self.anomaly_of(*self.offsets(place)) for place in (*places, *self.hints)]
         return np.array(sorted({0.0, *(phi for phi in inside if 0.0 < phi < self.stop), self.stop}))
 
     @property
@@ -244,7 +213,7 @@ class Stretch:
         """Estimated error of the table at anomalies, in the curve's parameter, rounding included."""
         ends = self.table[3].sum(axis=1)
         errors = self.table[6][np.clip(np.searchsorted(ends, phi), 0, len(ends) - 1)]
-        width = abs(self.b - self.a)
+        width = abs(self.width)
         if self.kind == TO_EQUILIBRIUM:
             left: Array = width * np.exp(-phi) * (errors + 3.0 * ULP * np.maximum(phi, 1.0))
             return left
@@ -271,9 +240,21 @@ class Stretch:
 
     @property
     def direction(self) -> int:
-        """The sign of dlam/dphi; of exact ends where those in doubles are one place."""
-        a, b = (self.a, self.b) if self.a != self.b or self.ends[0] is None else self.ends
-        return 1 if b > a else -1
+        """The sign of dlam/dphi."""
+        return 1 if self.width > 0.0 else -1
+
+    @property
+    def width(self) -> float:
+        """The change of the parameter from end to end: of exact ends where those in doubles are one place."""
+        if self.a == self.b and self.ends[0] is not None:
+            return float(self.ends[1] - self.ends[0])
+        return (self.b - self.a) + (self.lows[1] - self.lows[0])
+
+    def offsets(self, place: float, low: float = 0.0) -> tuple[float, float]:
+        """A place's signed distances from the end ``a`` and to the end ``b``; the double next to an end is that end."""
+        if low == 0.0 and place in (self.a, self.b):
+            return (0.0, self.width) if place == self.a else (self.width, 0.0)
+        return (place - self.a) + (low - self.lows[0]), (self.b - place) + (self.lows[1] - low)
 
     def _is_short(self, share: float) -> bool:
         return abs(self.b - self.a) <= share * max(abs(self.a), abs(self.b))
@@ -296,11 +277,11 @@ class Stretch:
     def anomaly_of(self, offset_a: float, offset_b: float) -> float:
         """The anomaly of a place given by its signed offsets ``lam - a`` and ``b - lam``."""
         ahead, behind = max(offset_a * self.direction, 0.0), max(offset_b * self.direction, 0.0)
-        return anomaly_of(self.kind, self.slack, ahead, behind, abs(self.b - self.a))
+        return anomaly_of(self.kind, self.slack, ahead, behind, abs(self.width))
 
     def places(self, phi: Array) -> Array:
         """The curve's parameter at anomalies, from the nearer end."""
-        return places(self.kind, self.slack, self.a, self.b, phi)
+        return places(self.kind, self.slack, (self.a, self.lows[0]), (self.b, self.lows[1]), self.width, phi)
 
     def speeds(self, phi: Array) -> Array:
         """|ds/dt| at anomalies."""

@@ -3,8 +3,9 @@
 from math import exp, pi
 from typing import Any
 
+from gqm_sym.runtime.functions import Functions
 from gqm_sym.runtime.panels import FROM_TURN, REGULAR, TO_EQUILIBRIUM, TURN_TURN
-from gqm_sym.runtime.stretch import Functions, Stretch
+from gqm_sym.runtime.stretch import Stretch
 
 
 def toward_equilibrium(functions: Functions, start: float, top: float, duration: float) -> Stretch:
