@@ -1,5 +1,5 @@
 # Made by gqm-gen for "circle_spring". Do not edit: change its declaration and generate again.
-# interface 7, input 8941b9022f6d, body 13798745106b
+# interface 7, input 8941b9022f6d, body 5dd362af16bf
 """Bead on a ring, tied by a spring to a point above its centre
 
 x              = L*sin(theta)
@@ -249,12 +249,9 @@ def mean_each(n, halves, p, out):
         h = p[2, i]
         g = p[3, i]
         half = halves[i]
-        _t0 = 1/L
-        _t1 = cos(half/4)**4
-        _t2 = h*w**2
-        _t3 = cos(half/2)
-        out[0, i] = _t0*(-_t1*_t2 + _t1*g)
-        out[1, i] = _t0*(-_t2*_t3 + _t3*g)
+        _t0 = (g - h*w**2)/L
+        out[0, i] = _t0*cos(half/4)**4
+        out[1, i] = _t0*cos(half/2)
 
 
 @compiled(BOUNDS)

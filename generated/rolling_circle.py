@@ -1,5 +1,5 @@
 # Made by gqm-gen for "rolling_circle". Do not edit: change its declaration and generate again.
-# interface 7, input aed757e55b8b, body 6f9faa849c35
+# interface 7, input aed757e55b8b, body fbbd39adecf0
 """Solid sphere rolling in a circular bowl
 
 x              = L*sin(theta)
@@ -196,7 +196,7 @@ def mean_each(n, halves, p, out):
         beta = p[1, i]
         g = p[2, i]
         half = halves[i]
-        _t0 = g/(L*beta + L)
+        _t0 = g/(L*(beta + 1))
         out[0, i] = _t0*cos(half/4)**4
         out[1, i] = _t0*cos(half/2)
 

@@ -11,7 +11,7 @@ of the first kind, and Gauss's arithmetic-geometric mean its value.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from math import gcd, lcm
+from math import gcd, inf, lcm
 
 import sympy as sp
 
@@ -131,10 +131,9 @@ def swing(climb: sp.Expr, ds: sp.Expr, lam: sp.Symbol, symmetry: Symmetry | None
 
 def _turn(height: sp.Expr, square: sp.Symbol, start: sp.Expr) -> tuple[sp.Expr | None, sp.Expr]:
     """The square at which V**2 is used up, and the climb's growth up to there; None where no root gives it."""
-    form = height.as_poly(square)
-    if form is None or not 0 < form.degree() <= 2:
+    if not 0 < _degree(height, {square}) <= 2:
         return None, sp.S.Zero
-    growth, bend = (form.coeff_monomial(square**power) for power in (1, 2))
+    growth, bend = (height.diff(square, k).xreplace({square: sp.S.Zero}) / k for k in (1, 2))
     if bend:
         growth += 2 * bend * start
         growth = (growth + sp.sqrt(growth**2 + 4 * bend * LAUNCH)) / 2
@@ -151,6 +150,21 @@ def at_share(ends: Mapping[sp.Symbol, sp.Expr], fall: sp.Expr, rise: sp.Expr) ->
     }
 
 
+def _degree(form: sp.Expr, symbols: set[sp.Symbol]) -> float:
+    """The degree of a polynomial as it stands, for writing it out may take very long; infinite for other forms."""
+    if not form.free_symbols & symbols:
+        return 0
+    if form.is_Symbol:
+        return 1
+    if form.is_Add:
+        return max(_degree(part, symbols) for part in form.args)
+    if form.is_Mul:
+        return sum(_degree(part, symbols) for part in form.args)
+    if form.is_Pow and form.exp.is_Integer and form.exp > 0:
+        return int(form.exp) * _degree(form.base, symbols)
+    return inf
+
+
 def _swing(
     pace: sp.Expr,
     factor: sp.Expr,
@@ -158,11 +172,11 @@ def _swing(
     crest: tuple[sp.Expr, sp.Expr, sp.Expr] | None,
 ) -> Swing:
     fall, rise = _symbol("fall"), _symbol("rise")
-    inverse = (1 / pace.xreplace(at_share({}, fall, rise))).as_poly(fall, rise)
+    inverse = 1 / pace.xreplace(at_share({}, fall, rise))
     means = None
-    if inverse is not None and inverse.total_degree() <= 1:
-        always, by_end = inverse.coeff_monomial(1), dict(ends)
-        means = tuple((always + inverse.coeff_monomial(share)).xreplace(by_end) for share in (rise, fall))
+    if _degree(inverse, {fall, rise}) <= 1:
+        shares, by_end = ({rise: sp.S.One, fall: sp.S.Zero}, {rise: sp.S.Zero, fall: sp.S.One}), dict(ends)
+        means = tuple(inverse.xreplace(share).xreplace(by_end) for share in shares)
     return Swing(pace, factor, ends, crest, means)
 
 

@@ -31,6 +31,13 @@ NEAR = np.sin(0.5 * pi * np.arange(LONGEST + 1) / LONGEST) ** 2
 
 
 @Inner
+def orbit_panels(fns, p, going_round, a, b, lam0, w0):  # type: ignore[no-untyped-def]
+    """Adaptive panels over half a libration, or over a lap: one call, for compiling each takes long."""
+    kind, ref, w, stop = (REGULAR, lam0, w0, 1.0) if going_round else (TURN_TURN, a, 0.0, pi)
+    return lay(fns, p, kind, a, b, ref, w, np.empty((0, 0)), np.array([0.0, stop]))
+
+
+@Inner
 def pace_series(fns, p, a, b, width, n, matrix, work, series):  # type: ignore[no-untyped-def]
     """Fill the cosine series of dt/dphi over half a turn; returns whether it is resolved, and V**2 balanced."""
     flat, m = work.reshape(-1), n + 1
@@ -98,7 +105,7 @@ def arrival(fns, p, going_round, direction, lam0, w0, least, most, place, work, 
         laps = np.floor(ahead / lap)
         if laps < 0.0:
             return inf
-        panels = lay(fns, p, REGULAR, lam0, lam0 + lap, lam0, w0, np.empty((0, 0)), np.array([0.0, 1.0]))
+        panels = orbit_panels(fns, p, going_round, lam0, lam0 + lap, lam0, w0)
         if panels[7] >= FLOOR or panels[6] < LEAST_BALANCE:
             return np.nan
         return laps * panels[1][-1] + read_off(panels[0], panels[1], panels[3], ahead / lap - laps)
@@ -108,14 +115,11 @@ def arrival(fns, p, going_round, direction, lam0, w0, least, most, place, work, 
     a, b = lam0 + least, lam0 + most
     if not a <= place <= b:
         return inf
-    n = SHORT
-    resolved = pace_series(fns, p, a, b, width, n, OF_SHORT, work, series)
-    if not resolved:
-        n = LONG
-        resolved = pace_series(fns, p, a, b, width, n, OF_LONG, work, series)
-    if not resolved:
-        n = LONGEST
-        resolved = pace_series(fns, p, a, b, width, n, OF_LONGEST, work, series)
+    n, resolved = SHORT // 2, False
+    while n < LONGEST and not resolved:
+        n *= 2
+        matrix = OF_SHORT if n == SHORT else (OF_LONG if n == LONG else OF_LONGEST)
+        resolved = pace_series(fns, p, a, b, width, n, matrix, work, series)
     # Times are told from the end that is nearer to the launch: of a launch there they have all their digits.
     from_b = -least > most
     near, far = (most, -least) if from_b else (-least, most)
@@ -125,7 +129,7 @@ def arrival(fns, p, going_round, direction, lam0, w0, least, most, place, work, 
         whole, start = series[0] * pi, time_from(series, n, near, far, flip)
         stop = time_from(series, n, max(there[0], 0.0), max(there[1], 0.0), flip)
     else:
-        panels = lay(fns, p, TURN_TURN, a, b, a, 0.0, np.empty((0, 0)), np.array([0.0, pi]))
+        panels = orbit_panels(fns, p, going_round, a, b, lam0, w0)
         if panels[7] >= FLOOR or panels[6] < LEAST_BALANCE:
             return np.nan
         whole = panels[1][-1]

@@ -9,13 +9,13 @@ from math import fabs, inf, isfinite, pi, sqrt
 import numpy as np
 from numba import types
 
-from gqm_sym.runtime.arrivals import LEAST_BALANCE, arrival
+from gqm_sym.runtime.arrivals import LEAST_BALANCE, arrival, orbit_panels
 from gqm_sym.runtime.columns import DIRECTION, FIRST, LAM0, LAST, NEXT, PARAMETERS, PERIOD, PLACE, TARGET, V0, element
 from gqm_sym.runtime.crossing import call_bend, call_rise
 from gqm_sym.runtime.entries import ends
 from gqm_sym.runtime.jit import Inner, entry
 from gqm_sym.runtime.orbit_extremes import extreme
-from gqm_sym.runtime.panels import FLOOR, REGULAR, TURN_TURN, lay
+from gqm_sym.runtime.panels import FLOOR
 from gqm_sym.runtime.search import LIMIT, TURN
 
 # What is asked of each launch. Of batches also SPANS: the offsets of both ends from the launch, or of a lap and NaN.
@@ -121,10 +121,7 @@ def time_once(fns, p, kind, lam0, w0, a, b, width, work, rates):  # type: ignore
 @Inner
 def time_adaptively(fns, p, kind, lam0, w0, a, b):  # type: ignore[no-untyped-def]
     """Half period or loop time by adaptive panels; NaN where they did not converge."""
-    if kind == LIBRATION:
-        panels = lay(fns, p, TURN_TURN, a, b, a, 0.0, np.empty((0, 0)), np.array([0.0, pi]))
-    else:
-        panels = lay(fns, p, REGULAR, lam0, b, lam0, w0, np.empty((0, 0)), np.array([0.0, 1.0]))
+    panels = orbit_panels(fns, p, kind == CIRCULATION, a, b, lam0, w0)
     if panels[7] >= FLOOR or panels[6] < LEAST_BALANCE:
         return np.nan
     return panels[1][-1]
