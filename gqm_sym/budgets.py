@@ -1,14 +1,18 @@
 """Processor time that a stage may take: symbolic work has no bound that could be seen from its input.
 
-Processor time and not that of the clock: a busy machine is no reason to refuse anything. Work in the stage calls
-`spend` often; what it is called from says nothing of budgets, and stages may lie within one another.
+Processor time and not that of the clock: a busy machine is no reason to refuse anything. Nor is a large program: what
+collecting its garbage takes meanwhile does not count. Work in the stage calls `spend` often; what it is called from says
+nothing of budgets, and stages may lie within one another.
 """
 
-from collections.abc import Iterator
+import gc
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
+from threading import get_ident
 from time import thread_time
+from typing import Any
 
 from gqm_sym.errors import BudgetError
 
@@ -25,6 +29,21 @@ class _Budget:
 _CURRENT: ContextVar[_Budget | None] = ContextVar("budget", default=None)
 
 
+def _without_collections(own: _Budget) -> Callable[[str, Any], None]:
+    """What to call when a collection of garbage begins and ends, for the budget to be longer by its time."""
+    thread, begin = get_ident(), thread_time()
+
+    def collecting(phase: str, _: Any) -> None:
+        nonlocal begin
+        if get_ident() == thread:
+            if phase == "start":
+                begin = thread_time()
+            else:
+                own.end += thread_time() - begin
+
+    return collecting
+
+
 @contextmanager
 def budget(stage: str, seconds: float, remedy: str) -> Iterator[None]:
     """Let the block take so many seconds of processor time.
@@ -38,12 +57,15 @@ def budget(stage: str, seconds: float, remedy: str) -> Iterator[None]:
     remedy
         What to try if that is not enough.
     """
-    token = _CURRENT.set(_Budget(stage, seconds, remedy, thread_time() + seconds, _CURRENT.get()))
+    own = _Budget(stage, seconds, remedy, thread_time() + seconds, _CURRENT.get())
+    token, collecting = _CURRENT.set(own), _without_collections(own)
+    gc.callbacks.append(collecting)
     try:
         yield
     except RecursionError:
         raise BudgetError(f"{stage}: nested too deeply; {remedy}") from None
     finally:
+        gc.callbacks.remove(collecting)
         _CURRENT.reset(token)
 
 

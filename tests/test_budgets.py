@@ -1,5 +1,6 @@
 """Budgets of processor time: they end what they should, say whose they were, and leave no trace."""
 
+import gc
 import threading
 import time
 from collections.abc import Callable
@@ -30,6 +31,19 @@ def test_a_budget_ends_its_stage() -> None:
     with pytest.raises(BudgetError, match=words), budget("derivation", 0.0, "write less"):
         _work(1_000_000)
     _work(1000)
+
+
+def test_collecting_garbage_does_not_count() -> None:
+    """In a program of millions of objects it takes longer than a stage has; callbacks are taken back."""
+    many, callbacks = [[[]] for _ in range(1_000_000)], len(gc.callbacks)
+    begin = time.thread_time()
+    with budget("reading", 0.005, "-"), budget("parsing", 0.005, "-"):
+        gc.collect()
+        spend()
+        taken = time.thread_time() - begin
+    assert taken > 0.005
+    assert len(many) == 1_000_000
+    assert len(gc.callbacks) == callbacks
 
 
 @pytest.mark.parametrize(("outer", "inner", "named"), [(0.0, 60.0, "outer"), (60.0, 0.0, "inner")])
