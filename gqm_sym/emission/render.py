@@ -18,8 +18,9 @@ from gqm_sym.errors import EmissionError
 # The version of gqm_sym.runtime.interface that emitted code is written for (a test holds the two together).
 INTERFACE = 7
 
-# Functions that the runtime has in forms that fill vector registers; the rest is the standard library's.
+# What tells a place and what is left of V**2 there (`gqm_sym.runtime.places`).
 _PLACES = frozenset({"left_of", "nearest"})
+# Functions that the runtime has in forms that fill vector registers; the rest is the standard library's.
 _ELEMENTARY = frozenset({"atan", "cos", "cosh", "exp", "sin", "sinh"})
 _MATH = frozenset({*FUNCTIONS.values(), "sqrt", "pi", "e"} - _ELEMENTARY)
 _RUNTIME = ("Addresses", "Formulas", "Motion", "Pass1")
