@@ -67,7 +67,22 @@ def _extent(values: Any, at: int) -> tuple[Any, Any]:
     return np.fmin.reduce(part), np.fmax.reduce(part)
 
 
-_QUICK = {"sums": _sums, "least_and_greatest": _extent}
+def _row(intrinsic: Any) -> Callable[..., None]:
+    """Give a row by a formula of others, as `lanes.over_rows` does."""
+
+    def fill(line: Any, out: int, *given: Any) -> None:
+        rows = (value if isinstance(value, float) else line[value : value + intrinsic.width] for value in given)
+        line[out : out + intrinsic.width] = intrinsic.formula(*rows)
+
+    return fill
+
+
+def _drive(address: int, n: int, work: Any, lam: int, v2: int, v: float, nu: float, p: Any, out: int) -> None:
+    """Fill five rows of a line of numbers from others of it, as `crossing.call_drive` does."""
+    _FUNCTIONS[address](n, work[lam:], work[v2:], v, nu, p, work[out:])
+
+
+_QUICK = {"sums": _sums, "least_and_greatest": _extent, "call_drive": _drive}
 _QUICK |= {"fma": lambda x, y, z: np.float64(_fma(x, y, z)), "nearest_whole": np.rint, "whole_below": np.floor}
 _QUICK |= {"choose": lambda condition, x, y: np.float64(x if condition else y)}
 _QUICK |= {
@@ -103,9 +118,13 @@ def _alike(value: Any) -> Any:
     if isinstance(value, jit.Inner):
         return value.py_func
     if isinstance(value, _Intrinsic):
-        if value._name.startswith("call_"):
-            return _call
-        return _QUICK.get(value._name) or _compiled(value)
+        if value._name == "fill_row":
+            return _row(value)
+        if value._name == "stacked":
+            return lambda: np.empty(value.count)
+        if value._name in _QUICK:
+            return _QUICK[value._name]
+        return _call if value._name.startswith("call_") else _compiled(value)
     try:
         return _MATH.get(value, value)
     except TypeError:  # not hashable

@@ -58,8 +58,8 @@ def _tables() -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
 # last row that over the whole panel; ``GRADED_MEANS`` those with respect to the square of the share.
 SHARES, MEANS, GRADED_MEANS, TO_COEFFICIENTS = _tables()
 
-# The same by columns, as `matrices` takes them: a row a node, padded to whole registers. The last is that of the
-# coefficients that tell how well a function is resolved, three at the end and three in the middle.
+# The same by columns, as `matrices` takes them: a row a node, padded to whole registers. The last has the coefficients
+# that tell how well a function is resolved, three at the end and three in the middle, and the mean over the panel.
 WIDE = 24
 ENDS_BY_NODE = np.pad(np.append(SHARES, 1.0), (0, WIDE - COUNT - 1))
 MEANS_BY_NODE, GRADED_BY_NODE, COEFFICIENTS_BY_NODE = (
@@ -68,7 +68,7 @@ MEANS_BY_NODE, GRADED_BY_NODE, COEFFICIENTS_BY_NODE = (
 )
 LAST, MIDDLE = slice(COUNT - 3, COUNT), slice(14, 17)
 TAILS_BY_NODE = np.ascontiguousarray(
-    np.pad(np.vstack([TO_COEFFICIENTS[LAST], TO_COEFFICIENTS[MIDDLE]]).T, ((0, 0), (0, 2)))
+    np.pad(np.vstack([TO_COEFFICIENTS[LAST], TO_COEFFICIENTS[MIDDLE], MEANS[COUNT]]).T, ((0, 0), (0, 1)))
 )
 to_ends, to_tails, extent = columns(COUNT, WIDE), columns(COUNT, TAILS_BY_NODE.shape[1]), span(COUNT)
 # A polynomial on the panel is nowhere further from a number than this many times its values at the nodes.
@@ -76,17 +76,11 @@ LEBESGUE = 3.0
 
 # How finely a panel is searched for a change of sign that bounds cannot settle.
 FINEST = 2.0**-30
+# Where a search keeps the part it looks at, what that is told from, and the ends of parts that wait.
+PART, TWICE, ABOVE, BELOW, WAITING = range(0, 5 * WIDE, WIDE)
+ROOM = WAITING + 64
 # The last step of Newton's method for a zero in [-1, 1].
 NEWTON = 1e-12
-
-
-@Inner
-def coefficients(values, out):  # type: ignore[no-untyped-def]
-    """Chebyshev coefficients of the polynomial with these values at the nodes."""
-    padded = np.empty(WIDE)
-    to_ends(COEFFICIENTS_BY_NODE, values, 0, padded, 0)
-    for k in range(COUNT):
-        out[k] = padded[k]
 
 
 @Inner
@@ -99,19 +93,19 @@ def chebyshev_sum(c, x):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def _restrict(c, lo, hi, values, out):  # type: ignore[no-untyped-def]
-    """The series' coefficients on [lo, hi] alone."""
-    high, low, twice = np.zeros(WIDE), np.zeros(WIDE), np.empty(WIDE)
+def _restrict(c, lo, hi, room):  # type: ignore[no-untyped-def]
+    """The series' coefficients on [lo, hi] alone, at ``room[PART]``."""
     for j in range(WIDE):
-        twice[j] = 2.0 * (lo + (hi - lo) * ENDS_BY_NODE[j])
+        room[TWICE + j] = 2.0 * (lo + (hi - lo) * ENDS_BY_NODE[j])
+        room[ABOVE + j], room[BELOW + j] = 0.0, 0.0
     for k in range(COUNT - 1, 0, -1):
         term = c[k]
         for j in range(WIDE):
-            before = high[j]
-            high[j], low[j] = term + twice[j] * before - low[j], before
-    for j in range(COUNT):
-        values[j] = c[0] + 0.5 * twice[j] * high[j] - low[j]
-    coefficients(values, out)
+            before = room[ABOVE + j]
+            room[ABOVE + j], room[BELOW + j] = term + room[TWICE + j] * before - room[BELOW + j], before
+    for j in range(WIDE):
+        room[TWICE + j] = c[0] + 0.5 * room[TWICE + j] * room[ABOVE + j] - room[BELOW + j]
+    to_ends(COEFFICIENTS_BY_NODE, room, TWICE, room, PART)
 
 
 @Inner
@@ -182,9 +176,7 @@ def first_change(c, sign, noise):  # type: ignore[no-untyped-def]
     touch : float
         The first place before ``x`` where it is no more than noise and does not run through; 2 if there is none.
     """
-    part, values, pending = np.empty(COUNT), np.empty(COUNT), np.empty(64)
-    part[:] = c
-    lo, hi, waiting = -1.0, 1.0, 0
+    part, room, lo, hi, waiting, halved = c, c, -1.0, 1.0, 0, False
     before, unsure, touch = sign, 2.0, 2.0
     while True:
         spread = 0.0
@@ -216,13 +208,16 @@ def first_change(c, sign, noise):  # type: ignore[no-untyped-def]
             if touch > 1.0:
                 touch = lo
         else:
-            pending[waiting] = hi
+            if not halved:
+                room, halved = np.empty(ROOM), True
+                part = room[PART : PART + COUNT]
+            room[WAITING + waiting] = hi
             waiting += 1
             hi = 0.5 * (lo + hi)
-            _restrict(c, lo, hi, values, part)
+            _restrict(c, lo, hi, room)
             continue
         if waiting == 0:
             return 2.0, before, touch
-        lo, hi = hi, pending[waiting - 1]
+        lo, hi = hi, room[WAITING + waiting - 1]
         waiting -= 1
-        _restrict(c, lo, hi, values, part)
+        _restrict(c, lo, hi, room)

@@ -10,6 +10,8 @@ from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic
 
+from gqm_sym.runtime.lanes import line_of
+
 
 def _call(context: Any, builder: Any, signature: Any, args: Any) -> Any:
     """Lower ``address(arguments...)``: arrays by the address of their data, numbers as they are."""
@@ -108,9 +110,21 @@ def call_mean_each(_, address, n, half, p, out):  # type: ignore[no-untyped-def]
 
 
 @intrinsic
-def call_drive(_, address, n, lam, v2, v, nu, p, out):  # type: ignore[no-untyped-def]
-    """Fill ds, P, Q, n0 and kappa for a leg of signs v and nu."""
-    return types.void(address, n, lam, v2, v, nu, p, out), _call
+def call_drive(_, address, n, work, lam, v2, v, nu, p, out):  # type: ignore[no-untyped-def]
+    """Fill ds, P, Q, n0 and kappa for a leg of signs v and nu: of ``work``, from ``out`` on.
+
+    Places and V**2 stand in the same line of numbers from ``lam`` and ``v2`` on: views of it would have to be counted.
+    """
+
+    def lower(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        address, n, work, lam, v2, v, nu, p, out = args
+        line = line_of(context, builder, signature.args[2], work)
+        kinds = (*signature.args[:2], *(types.CPointer(types.float64),) * 2, *signature.args[5:8])
+        kinds = (*kinds, types.CPointer(types.float64))
+        places, speeds, rows = (builder.gep(line, [at]) for at in (lam, v2, out))
+        return _call(context, builder, types.void(*kinds), (address, n, places, speeds, v, nu, p, rows))
+
+    return types.void(address, n, work, types.intp, types.intp, v, nu, p, types.intp), lower
 
 
 @intrinsic

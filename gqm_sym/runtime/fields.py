@@ -15,9 +15,9 @@ from math import fabs
 import numpy as np
 
 from gqm_sym.runtime.arrays import taller
-from gqm_sym.runtime.chebyshev import COUNT, WIDE, chebyshev_sum, coefficients
+from gqm_sym.runtime.chebyshev import COEFFICIENTS_BY_NODE, COUNT, chebyshev_sum, to_ends
 from gqm_sym.runtime.jit import Inner
-from gqm_sym.runtime.leg_equation import BARE, DS, JUDGED, PLACE, ROWS
+from gqm_sym.runtime.leg_equation import BARE, DS, PLACE, SERIES, panel_room, set_nodes
 from gqm_sym.runtime.leg_equation import W as V2
 from gqm_sym.runtime.leg_panels import NEVER, next_panel, next_stop
 
@@ -31,8 +31,8 @@ def approach(drive, p, flags, top, end, v, nu, changes, breaks, step):  # type: 
 
     ``nu`` is the sign of N at the equilibrium, ``changes`` are the places where it has changed sign on the way.
     """
-    rows, work, sizes, tails = np.empty((5, WIDE)), np.empty((ROWS, WIDE)), np.empty(JUDGED), np.empty(8)
-    series, field = np.empty(WIDE), np.empty((8, COLUMNS))
+    work, field = panel_room(), np.empty((8, COLUMNS))
+    set_nodes(work)
     count, base, left, least, u, whole = 0, 0.0, 0.0, 0.0, -v, fabs(end - top)
     met, passed = changes.size - 1, breaks.size - 1
     for _ in range(MOST_TRIES):
@@ -40,8 +40,7 @@ def approach(drive, p, flags, top, end, v, nu, changes, breaks, step):  # type: 
         if stop <= left:
             break
         width, step, _, _ = next_panel(
-            *(drive, p, flags, top, u, 0.0, 1.0, left, stop - left, step, base, v, nu, 0.0, NEVER, False),
-            *(rows, work, sizes, tails, series),
+            *(drive, p, flags, top, u, 0.0, 1.0, left, stop - left, step, base, v, nu, 0.0, NEVER, False, work)
         )
         if width == 0.0:
             break
@@ -51,14 +50,16 @@ def approach(drive, p, flags, top, end, v, nu, changes, breaks, step):  # type: 
         row[0], row[1] = left, right
         if count == 0:
             # V**2 over d vanishes at the equilibrium, as the force does.
-            coefficients(work[BARE], series[:COUNT])
-            least = chebyshev_sum(series[:COUNT], -1.0)
+            to_ends(COEFFICIENTS_BY_NODE, work, BARE, work, SERIES)
+            least = chebyshev_sum(work[SERIES : SERIES + COUNT], -1.0)
         for j in range(COUNT):
-            d = left + work[PLACE, j]
-            work[BARE, j] = (work[BARE, j] - least) / d if count == 0 else work[V2, j] / (d * d)
-        coefficients(work[BARE], row[2 : 2 + COUNT])
-        coefficients(work[DS], row[2 + COUNT :])
-        count, base, left = count + 1, work[V2, COUNT], right
+            d = left + work[PLACE + j]
+            work[BARE + j] = (work[BARE + j] - least) / d if count == 0 else work[V2 + j] / (d * d)
+        for begin, values in ((2, BARE), (2 + COUNT, DS)):
+            to_ends(COEFFICIENTS_BY_NODE, work, values, work, SERIES)
+            for k in range(COUNT):
+                row[begin + k] = work[SERIES + k]
+        count, base, left = count + 1, work[V2 + COUNT], right
     return field[:count].copy()
 
 

@@ -7,7 +7,6 @@ from gqm_sym.runtime.chebyshev import (
     COEFFICIENTS_BY_NODE,
     COUNT,
     LEBESGUE,
-    MEANS,
     TAILS_BY_NODE,
     WIDE,
     extent,
@@ -15,24 +14,33 @@ from gqm_sym.runtime.chebyshev import (
     to_ends,
     to_tails,
 )
-from gqm_sym.runtime.jit import Inner
+from gqm_sym.runtime.jit import Inlined, Inner
 from gqm_sym.runtime.leg_equation import (
     ARC,
     BARE,
     DS,
     FORCE,
+    KAPPA,
     LOAD,
     MEAN,
+    N0,
     PACE,
     PLACE,
     PULL,
+    SERIES,
+    SIZES,
     SPEED,
+    TAILS,
     D,
+    P,
     W,
     as_bare,
     begin_panel,
     distance,
     pace,
+    product,
+    push,
+    push_sizes,
     solve_panel,
 )
 
@@ -66,50 +74,63 @@ NEVER, MAYBE, ALWAYS = range(3)
 COLUMNS = 3 + 3 * COUNT
 
 
+@Inlined
+def size_at(row):  # type: ignore[no-untyped-def]
+    """Where the size is kept that a row's coefficients are held against."""
+    return SIZES + row // WIDE
+
+
+@Inlined
+def last_of(work):  # type: ignore[no-untyped-def]
+    """The largest of the last coefficients of the function that was looked at before."""
+    return max(fabs(work[TAILS]), max(fabs(work[TAILS + 1]), fabs(work[TAILS + 2])))
+
+
 @Inner
 def size_of(work, row):  # type: ignore[no-untyped-def]
     """The largest value of a row, whatever its sign."""
-    low, high = extent(work, row * WIDE)
+    low, high = extent(work, row)
     return max(-low, high)
 
 
 @Inner
-def weigh(rows, base, bare, work, sizes):  # type: ignore[no-untyped-def]
+def weigh(base, bare, work):  # type: ignore[no-untyped-def]
     """What the coefficients of each function but the pace are held against; the largest V**2 on the panel.
 
     The panel begins with V**2 = ``base``, which is ``bare`` in the units of BARE.
     """
-    for j in range(WIDE):
-        work[MEAN, j] = fabs(rows[0, j]) * (fabs(rows[3, j]) + fabs(rows[4, j] * work[W, j]))
-    for f in range(PACE):
-        sizes[f] = size_of(work, f)
-    highest = max(base, extent(work, W * WIDE)[1])
-    width = work[PLACE, COUNT]
-    sizes[FORCE] = max(sizes[FORCE], sizes[PULL] * highest * width / work[D, COUNT])
-    sizes[PULL] = max(sizes[PULL], 1.0 / width)
-    sizes[BARE], sizes[LOAD] = max(sizes[BARE], bare), extent(work, MEAN * WIDE)[1]
+    push_sizes(work, MEAN, DS, N0, KAPPA, W)
+    highest, pull = max(base, extent(work, W)[1]), size_of(work, PULL)
+    width = work[PLACE + COUNT]
+    work[size_at(DS)] = size_of(work, DS)
+    work[size_at(FORCE)] = max(size_of(work, FORCE), pull * highest * width / work[D + COUNT])
+    work[size_at(PULL)] = max(pull, 1.0 / width)
+    work[size_at(BARE)] = max(size_of(work, BARE), bare)
+    work[size_at(LOAD)] = extent(work, MEAN)[1]
     return highest
 
 
 @Inner
-def falls(work, row, size, tails):  # type: ignore[no-untyped-def]
+def falls(work, row, size):  # type: ignore[no-untyped-def]
     """The size of a function's last coefficients and of some in the middle, and whether it is resolved."""
-    to_tails(TAILS_BY_NODE, work, row * WIDE, tails, 0)
-    tail = max(fabs(tails[0]), max(fabs(tails[1]), fabs(tails[2])))
-    level = max(fabs(tails[3]), max(fabs(tails[4]), fabs(tails[5])))
+    to_tails(TAILS_BY_NODE, work, row, work, TAILS)
+    tail, level = last_of(work), max(fabs(work[TAILS + 3]), max(fabs(work[TAILS + 4]), fabs(work[TAILS + 5])))
     return tail, level, tail <= TAIL * size or (level <= PLATEAU * size and tail >= 0.05 * level)
 
 
 @Inner
-def resolved(work, sizes, first, last, tails):  # type: ignore[no-untyped-def]
-    """Whether some functions are resolved, and how large coefficients in their middle are, against the largest."""
+def resolved(work, first, last):  # type: ignore[no-untyped-def]
+    """Whether the functions from ``first`` to before ``last`` are resolved, and how large coefficients in their middle
+    are, against the largest.
+    """
     fine, worst = True, 0.0
-    for f in range(first, last):
-        tail, level, ok = falls(work, f, sizes[f], tails)
+    for row in range(first, last, WIDE):
+        size = work[size_at(row)]
+        tail, level, ok = falls(work, row, size)
         if not (tail < inf and level < inf):
             return False, inf
-        if sizes[f] > 0.0:
-            worst = max(worst, level / sizes[f])
+        if size > 0.0:
+            worst = max(worst, level / size)
         fine = fine and ok
     return fine, worst
 
@@ -131,19 +152,20 @@ def narrower(width, worst):  # type: ignore[no-untyped-def]
 @Inner
 def keeps_sign(work, row, noise):  # type: ignore[no-untyped-def]
     """Whether values of a function are so far from nothing that the polynomial through them changes sign nowhere."""
-    low, high = extent(work, row * WIDE)
+    low, high = extent(work, row)
     return fabs(0.5 * (low + high)) > 0.5 * LEBESGUE * (high - low) + noise
 
 
 @Inner
-def told(work, size, tails):  # type: ignore[no-untyped-def]
+def told(work):  # type: ignore[no-untyped-def]
     """Whether N is resolved as far as its changes of sign on a panel ask for, and how large its coefficients are."""
-    tail, level, fine = falls(work, LOAD, size, tails)
+    size = work[size_at(LOAD)]
+    tail, level, fine = falls(work, LOAD, size)
     if not (tail < inf and level < inf):
         return False, inf
     if not fine:
-        low, high = extent(work, LOAD * WIDE)
-        same = low * high > 0.0 and low * work[LOAD, COUNT] > 0.0
+        low, high = extent(work, LOAD)
+        same = low * high > 0.0 and low * work[LOAD + COUNT] > 0.0
         fine = (same and tail <= ONE_SIGN * size) or (
             tail <= CLEAR * size and keeps_sign(work, LOAD, 4.0 * CLEAR * size)
         )
@@ -151,35 +173,27 @@ def told(work, size, tails):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def change_of(work, row, sign, noise, c):  # type: ignore[no-untyped-def]
-    """`first_change` of a function by its values; its coefficients, in c, are found only where values leave a doubt."""
+def change_of(work, row, sign, noise):  # type: ignore[no-untyped-def]
+    """`first_change` of a function by its values; its coefficients are found only where values leave a doubt."""
     if keeps_sign(work, row, noise):
-        found = 1 if work[row, 0] > 0.0 else -1
+        found = 1 if work[row] > 0.0 else -1
         if sign == 0 or found == sign:
             return 2.0, found, 2.0
-    to_ends(COEFFICIENTS_BY_NODE, work, row * WIDE, c, 0)
-    rest, bounds = 0.0, extent(c, 0)
-    if max(bounds[1], -bounds[0]) == fabs(c[0]):
-        for k in range(1, COUNT):
-            rest += fabs(c[k])
-        found = 1 if c[0] > 0.0 else -1
-        if fabs(c[0]) > rest + noise and (sign == 0 or found == sign):
-            return 2.0, found, 2.0
-    return first_change(c[:COUNT], sign, noise)
+    to_ends(COEFFICIENTS_BY_NODE, work, row, work, SERIES)
+    return first_change(work[SERIES : SERIES + COUNT], sign, noise)
 
 
 @Inner
-def to_kink(rows, work, c, tails):  # type: ignore[no-untyped-def]
+def to_kink(work):  # type: ignore[no-untyped-def]
     """The place x up to which the curvature keeps its sign: 2 if throughout, -1 if that is not resolved.
 
     The sign is that of ds kappa, which is smooth at cusps too.
     """
-    for j in range(WIDE):
-        work[LOAD, j] = rows[0, j] * rows[4, j]
+    product(work, LOAD, DS, KAPPA)
     size = size_of(work, LOAD)
-    if not falls(work, LOAD, size, tails)[2]:
+    if not falls(work, LOAD, size)[2]:
         return -1.0
-    return change_of(work, LOAD, 0, NOISE * size, c)[0]
+    return change_of(work, LOAD, 0, NOISE * size)[0]
 
 
 @Inner
@@ -200,11 +214,7 @@ def next_panel(  # type: ignore[no-untyped-def]
     ceiling,
     ask,
     watch,
-    rows,
     work,
-    sizes,
-    tails,
-    series,
 ):
     """The widest panel that can be resolved, no wider than ``room`` and ``step``.
 
@@ -231,45 +241,44 @@ def next_panel(  # type: ignore[no-untyped-def]
         # As narrow as its room, a panel may be narrower than places in doubles: distances on it keep their digits.
         if (run <= NARROW * max(fabs(here), gone) and width < room) or run < 1e-300:
             return 0.0, step, 0.0, False
-        begin_panel(drive, p, flags[2] == 1, origin, u, g, c, left, width, base, v, nu, rows, work)
-        first, worst = DS, 0.0
+        begin_panel(drive, p, flags[2] == 1, origin, u, g, c, left, width, base, v, nu, work)
+        untold, worst = P, 0.0
         if flags[1] == 0 and flags[2] == 1:  # most that is too wide is told from the curve alone
-            sizes[DS], sizes[PULL] = size_of(work, DS), max(size_of(work, PULL), 1.0 / width)
-            fine, worst = resolved(work, sizes, DS, FORCE, tails)
+            work[size_at(DS)], work[size_at(PULL)] = size_of(work, DS), max(size_of(work, PULL), 1.0 / width)
+            fine, worst = resolved(work, PULL, P)
             if not fine:
                 width = narrower(width, worst)
                 continue
-            first = FORCE
-        far = solve_panel(drive, p, flags[2] == 1, u, g, c, left, base, v, nu, rows, work)
+            untold = PULL
+        far = solve_panel(drive, p, flags[2] == 1, u, g, c, left, base, v, nu, work)
         if flags[1] == 1 and not kink and (far < inf or flags[2] == 1):
-            x = to_kink(rows, work, series, tails)
+            x = to_kink(work)
             kinked = width * (0.5 * (1.0 + x) if x > -1.0 else 0.5)
             # A run that begins at a kink may begin a rounding before it.
             if x <= 1.0 and kinked * (near + g * kinked) > NARROW * max(fabs(here), gone):
                 width, kink = kinked, x > -1.0
                 continue
-            for j in range(WIDE):
-                work[LOAD, j] = rows[0, j] * (rows[3, j] + rows[4, j] * work[W, j])
+            push(work, LOAD, DS, N0, KAPPA, W)
         if not far < inf:
             width, kink = 0.5 * width, False
             continue
-        highest = weigh(rows, base, as_bare(base, g, c, left), work, sizes)
-        fine, more = resolved(work, sizes, first, LOAD, tails)
+        highest = weigh(base, as_bare(base, g, c, left), work)
+        fine, more = resolved(work, BARE, untold)
         worst = max(worst, more)
         if watch:
-            enough, more = told(work, sizes[LOAD], tails)
+            enough, more = told(work)
             fine, worst = fine and enough, max(worst, more)
         if fine:
             widest = max(widest, width)
-            top, end = max(ceiling, highest), work[W, COUNT]
+            top, end = max(ceiling, highest), work[W + COUNT]
             needed = ask == ALWAYS or (ask == MAYBE and (end >= HIGH * top or base < HIGH * top))
             timed, more = False, 0.0
             if ask != NEVER:
                 pace(g, c, left, base, work)
-                sizes[PACE] = size_of(work, PACE)
-                timed, more = resolved(work, sizes, PACE, PACE + 1, tails)
+                work[size_at(PACE)] = size_of(work, PACE)
+                timed, more = resolved(work, PACE, LOAD)
             # On so small a part of what is smooth it is noise that is not resolved; the error says so.
-            timed = timed or (needed and width <= SLIVER * widest and tails[0] < inf)
+            timed = timed or (needed and width <= SLIVER * widest and work[TAILS] < inf)
             if timed or not needed:
                 wider = width * growth(max(worst, more) if timed else worst)
                 step = max(step, wider) if kink or width == room else wider
@@ -280,17 +289,16 @@ def next_panel(  # type: ignore[no-untyped-def]
 
 
 @Inner
-def keep(panels, count, right, width, work, tails):  # type: ignore[no-untyped-def]
+def keep(panels, count, right, width, work):  # type: ignore[no-untyped-def]
     """Keep a panel that ends at w = ``right`` behind ``count`` others; the panels, more of them if it had to be."""
     if count == panels.shape[0]:
         panels = taller(panels, 2 * count)
-    row, time = panels[count], 0.0
+    to_tails(TAILS_BY_NODE, work, PACE, work, TAILS)
+    panels[count, 0], panels[count, 1], panels[count, 2] = right, width * work[TAILS + 6], width * last_of(work)
     for j in range(COUNT):
-        time += MEANS[COUNT, j] * work[PACE, j]
-    for j in range(COUNT):
-        row[3 + j], row[3 + COUNT + j], row[3 + 2 * COUNT + j] = work[PACE, j], work[ARC, j], work[SPEED, j]
-    row[0], row[1] = right, width * time
-    row[2] = width * max(fabs(tails[0]), max(fabs(tails[1]), fabs(tails[2])))
+        panels[count, 3 + j] = work[PACE + j]
+        panels[count, 3 + COUNT + j] = work[ARC + j]
+        panels[count, 3 + 2 * COUNT + j] = work[SPEED + j]
     return panels
 
 

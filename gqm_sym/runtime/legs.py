@@ -11,25 +11,30 @@ import numpy as np
 from numba import types
 
 from gqm_sym.runtime.arrays import pushed
-from gqm_sym.runtime.chebyshev import COUNT, WIDE, chebyshev_sum, coefficients, extent
+from gqm_sym.runtime.chebyshev import COEFFICIENTS_BY_NODE, COUNT, chebyshev_sum, extent, to_ends
 from gqm_sym.runtime.crossing import call_drive, call_hold
 from gqm_sym.runtime.doubledouble import two_sum
 from gqm_sym.runtime.fields import approach
 from gqm_sym.runtime.jit import Inner, entry
+from gqm_sym.runtime.lanes import on_stack
 from gqm_sym.runtime.leg_equation import (
     BARE,
     FORCE,
-    JUDGED,
     LOAD,
+    MEAN,
     PLACE,
-    ROWS,
+    SERIES,
     as_bare,
     begin_panel,
     distance,
     marched,
     pace,
+    panel_room,
+    set_nodes,
     solve_panel,
 )
+from gqm_sym.runtime.leg_equation import P as GAIN
+from gqm_sym.runtime.leg_equation import Q as LOSS
 from gqm_sym.runtime.leg_equation import W as V2
 from gqm_sym.runtime.leg_panels import (
     ALWAYS,
@@ -43,6 +48,7 @@ from gqm_sym.runtime.leg_panels import (
     keep,
     next_panel,
     next_stop,
+    size_at,
     size_of,
 )
 
@@ -58,18 +64,20 @@ SOONER = 2.0
 MOST_TRIES = 20000
 MOST_PANELS = 512
 
+# Room for one place, V**2, and what ``drive`` gives there.
+spot_room = on_stack(7)
 _LINE = types.float64[::1]
 _ROWS = types.float64[:, ::1]
 _FLOAT = types.float64
 
 
 @Inner
-def bottom(rows, work, v, touch):  # type: ignore[no-untyped-def]
+def bottom(work, v, touch):  # type: ignore[no-untyped-def]
     """The place x near ``touch`` where V**2, all but zero there, is least: the force vanishes."""
-    values, c = np.empty(COUNT), np.empty(COUNT)
     for j in range(COUNT):
-        values[j] = v * (rows[1, j] - rows[2, j] * work[V2, j])
-    coefficients(values, c)
+        work[MEAN + j] = v * (work[GAIN + j] - work[LOSS + j] * work[V2 + j])
+    to_ends(COEFFICIENTS_BY_NODE, work, MEAN, work, SERIES)
+    c = work[SERIES : SERIES + COUNT]
     x, new = touch, touch + 1e-4
     before = chebyshev_sum(c, x)
     for _ in range(30):
@@ -83,9 +91,9 @@ def bottom(rows, work, v, touch):  # type: ignore[no-untyped-def]
 @Inner
 def rise(drive, p, place, v2, v, nu, spot):  # type: ignore[no-untyped-def]
     """By how much V**2 grows per distance run in direction v."""
-    spot[0, 0], spot[6, 0] = place, v2
-    call_drive(drive, 1, spot[0], spot[6], float(v), float(nu), p, spot[1:])
-    return v * (spot[2, 0] - spot[3, 0] * v2)
+    spot[0], spot[1] = place, v2
+    call_drive(drive, 1, spot, 0, 1, float(v), float(nu), p, 2)
+    return v * (spot[3] - spot[4] * v2)
 
 
 @Inner
@@ -129,13 +137,12 @@ def run(drive, p, flags, start, w, v, nu, breaks, limit, reach, step, side, stri
     panels : (n, COLUMNS) array
         The panels up to ``middle``.
     """
-    rows, work, sizes, tails = np.empty((5, WIDE)), np.empty((ROWS, WIDE)), np.empty(JUDGED), np.empty(8)
-    series, changes, spot = np.empty(WIDE), np.empty(4), np.empty((7, 1))
-    panels = np.empty((8, COLUMNS))
+    work, spot, changes, panels = panel_room(), spot_room(), np.empty(4), np.empty((8, COLUMNS))
+    set_nodes(work)
     g, c, sooner = 1.0, 0.0, inf
     if nu == 0:
         rise(drive, p, start, w, v, nu, spot)
-        load, turned = spot[4, 0], spot[5, 0] * w
+        load, turned = spot[5], spot[6] * w
         if fabs(load + turned) > TOUCHED * (fabs(load) + fabs(turned)):
             nu = 1 if load + turned > 0.0 else -1
     if w > 0.0:
@@ -166,8 +173,7 @@ def run(drive, p, flags, start, w, v, nu, breaks, limit, reach, step, side, stri
         part = min(room, sooner) if gone == 0.0 else room
         ask = ALWAYS if gone < strict else (NEVER if searching or late else MAYBE)
         width, step, far, timed = next_panel(
-            *(drive, p, flags, start, v, g, c, left, part, step, base, v, nu, ceiling, ask, True),
-            *(rows, work, sizes, tails, series),
+            *(drive, p, flags, start, v, g, c, left, part, step, base, v, nu, ceiling, ask, True, work)
         )
         if width == 0.0:
             what = NARROWED
@@ -176,14 +182,14 @@ def run(drive, p, flags, start, w, v, nu, breaks, limit, reach, step, side, stri
                 if slope < 0.0 and base <= -slope * NEAR * max(fabs(here), gone):
                     what, gone, base = TURN, gone - base / slope, 0.0
             break
-        turn_of_force, before, _ = change_of(work, LOAD, nu, TOUCHED * sizes[LOAD], series)
+        turn_of_force, before, _ = change_of(work, LOAD, nu, TOUCHED * work[size_at(LOAD)])
         if nu == 0 and before != 0:
             nu = before
             if flags[0] == 1 or nu == -side:
                 continue
         # V**2, or what it is divided by the distance from the turning point it begins with.
-        scale = size_of(work, FORCE) if base == 0.0 else max(as_bare(ceiling, g, c, left), sizes[BARE])
-        at_rest, _, touch = change_of(work, BARE, 1, NOISE * scale, series)
+        scale = size_of(work, FORCE) if base == 0.0 else max(as_bare(ceiling, g, c, left), work[size_at(BARE)])
+        at_rest, _, touch = change_of(work, BARE, 1, NOISE * scale)
         if touch <= -1.0 and base == 0.0:
             touch = 2.0
         end = min(at_rest, touch, turn_of_force)
@@ -198,29 +204,30 @@ def run(drive, p, flags, start, w, v, nu, breaks, limit, reach, step, side, stri
             searching, mark, mark_base, mark_nu, mark_met = True, left, base, nu, met
         right = left + width
         if end <= 1.0:
-            x = bottom(rows, work, v, touch) if end == touch and end != at_rest else end
+            x = bottom(work, v, touch) if end == touch and end != at_rest else end
             # Once more on a panel that ends there: its own sum has more digits than the series of a wider one.
             right = left + width * (0.5 * (1.0 + x))
-            begin_panel(drive, p, flags[2] == 1, start, v, g, c, left, right - left, base, v, nu, rows, work)
-            far = solve_panel(drive, p, flags[2] == 1, v, g, c, left, base, v, nu, rows, work)
+            begin_panel(drive, p, flags[2] == 1, start, v, g, c, left, right - left, base, v, nu, work)
+            far = solve_panel(drive, p, flags[2] == 1, v, g, c, left, base, v, nu, work)
             pace(g, c, left, base, work)
             if end == at_rest and flags[2] == 1:
-                over, there = work[V2, COUNT], distance(right, g, c)
+                over, there = work[V2 + COUNT], distance(right, g, c)
                 slope = rise(drive, p, start + v * there, over, v, nu, spot)
                 if fabs(over) < fabs(slope) * 1e-6 * (there - gone):
                     right = marched(there - over / slope, g, c)
             elif end == turn_of_force and end != touch:
                 # N at the panel's end has no error of a series, nor has what is left of the way to where it vanishes.
-                rate = (work[LOAD, COUNT] - work[LOAD, COUNT - 1]) / (work[PLACE, COUNT] - work[PLACE, COUNT - 1])
-                if fabs(work[LOAD, COUNT]) < fabs(rate) * 1e-6 * (right - left):
-                    right -= work[LOAD, COUNT] / rate
+                end_load, before_end = work[LOAD + COUNT], work[LOAD + COUNT - 1]
+                rate = (end_load - before_end) / (work[PLACE + COUNT] - work[PLACE + COUNT - 1])
+                if fabs(end_load) < fabs(rate) * 1e-6 * (right - left):
+                    right -= end_load / rate
         if not searching:
-            panels, kept, mark = keep(panels, kept, right, right - left, work, tails), kept + 1, right
+            panels, kept, mark = keep(panels, kept, right, right - left, work), kept + 1, right
         count += 1
-        highest = max(base, extent(work, V2 * WIDE)[1])
+        highest = max(base, extent(work, V2)[1])
         ceiling = max(ceiling * exp(-far) if end > 1.0 else ceiling, highest)
         full = end > 1.0 and width == room
-        base, left = max(work[V2, COUNT], 0.0), right
+        base, left = max(work[V2 + COUNT], 0.0), right
         gone = stop if full else distance(right, g, c)
         if end <= 1.0:
             if end == at_rest or end == touch:
@@ -253,8 +260,8 @@ def run_back(drive, p, flags, turn, whole, v, nu, changes, breaks, step):  # typ
 
     ``nu`` is the sign of N at the turn, ``changes`` are the places where it has changed sign on the way.
     """
-    rows, work, sizes, tails = np.empty((5, WIDE)), np.empty((ROWS, WIDE)), np.empty(JUDGED), np.empty(8)
-    series, panels = np.empty(WIDE), np.empty((8, COLUMNS))
+    work, panels = panel_room(), np.empty((8, COLUMNS))
+    set_nodes(work)
     count, base, left, gone, u, step = 0, 0.0, 0.0, 0.0, -v, sqrt(step)
     met, passed = changes.size - 1, breaks.size - 1
     for _ in range(MOST_TRIES):
@@ -263,13 +270,12 @@ def run_back(drive, p, flags, turn, whole, v, nu, changes, breaks, step):  # typ
         if room <= 0.0:
             break
         width, step, _, _ = next_panel(
-            *(drive, p, flags, turn, u, 1.0, 0.0, left, room, step, base, v, nu, 0.0, ALWAYS, False),
-            *(rows, work, sizes, tails, series),
+            *(drive, p, flags, turn, u, 1.0, 0.0, left, room, step, base, v, nu, 0.0, ALWAYS, False, work)
         )
         if width == 0.0:
             break
         gone, left = (stop, sqrt(stop)) if width == room else ((left + width) * (left + width), left + width)
-        panels, count, base = keep(panels, count, left, width, work, tails), count + 1, work[V2, COUNT]
+        panels, count, base = keep(panels, count, left, width, work), count + 1, work[V2 + COUNT]
         if gone >= whole:
             break
     return panels[:count].copy()

@@ -1,18 +1,23 @@
 """Small matrices of fixed size times vectors, and the span of a vector, in vector registers.
 
 numba keeps the order in which a dot product is summed, and so keeps it scalar. Summed over the rows of the transposed
-matrix, eight results side by side, the same order fills the registers.
+matrix, eight results side by side, the same order fills the registers; some sums of every other row side by side keep
+them busy, for a sum waits for the one before.
 """
 
+from functools import reduce
 from typing import Any
 
 from llvmlite import ir
 from numba import types
+from numba.core.cgutils import get_or_insert_function
 from numba.extending import intrinsic
 
-LANES = 8
-_REAL, _INDEX = ir.DoubleType(), ir.IntType(32)
-_LANES = ir.VectorType(_REAL, LANES)
+from gqm_sym.runtime.lanes import INDEX, LANES, REAL, REGISTER, line_of, register, spread
+
+# Sums at work at a time.
+SUMS = 6
+_FUSED = ir.FunctionType(REGISTER, [REGISTER] * 3)
 
 
 def columns(rows: int, width: int) -> Any:
@@ -23,30 +28,29 @@ def columns(rows: int, width: int) -> Any:
     """
 
     def lower(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        table, values, out = (context.make_array(signature.args[k])(context, builder, args[k]).data for k in (0, 1, 3))
+        table, values, out = (line_of(context, builder, signature.args[k], args[k]) for k in (0, 1, 3))
         values, out = builder.gep(values, [args[2]]), builder.gep(out, [args[4]])
-
-        def lanes(base: Any, offset: int) -> Any:
-            place = builder.gep(base, [ir.Constant(_INDEX, offset)])
-            return builder.bitcast(place, _LANES.as_pointer())
-
-        totals = [ir.Constant(_LANES, [0.0] * LANES)] * (width // LANES)
-        blank, spread = ir.Constant(_LANES, ir.Undefined), ir.Constant(ir.VectorType(_INDEX, LANES), [0] * LANES)
+        # A table that LLVM sees through is so many constants to it, each loaded from an address of its own, and kept on
+        # the stack around a loop.
+        unseen = ir.FunctionType(table.type, [table.type])
+        table = builder.asm(unseen, "", "=r,0", [table], side_effect=False)
+        fused = get_or_insert_function(builder.module, _FUSED, f"llvm.fma.v{LANES}f64")
+        blocks = width // LANES
+        chains = max(SUMS // blocks, 1)
+        totals = [[ir.Constant(REGISTER, [0.0] * LANES)] * blocks for _ in range(chains)]
         for row in range(rows):
-            value = builder.load(builder.gep(values, [ir.Constant(_INDEX, row)]))
-            one = builder.insert_element(blank, value, ir.Constant(_INDEX, 0))
-            each = builder.shuffle_vector(one, blank, spread)
-            for block in range(width // LANES):
-                entries = builder.load(lanes(table, row * width + block * LANES), align=8)
-                totals[block] = builder.fadd(totals[block], builder.fmul(each, entries))
-        for block, total in enumerate(totals):
-            builder.store(total, lanes(out, block * LANES), align=8)
+            each = spread(builder, builder.load(builder.gep(values, [ir.Constant(INDEX, row)])))
+            chain = totals[row % chains]
+            for block in range(blocks):
+                entries = builder.load(register(builder, table, row * width + block * LANES), align=8)
+                chain[block] = builder.call(fused, (each, entries, chain[block]))
+        for block, parts in enumerate(zip(*totals, strict=True)):
+            builder.store(reduce(builder.fadd, parts), register(builder, out, block * LANES), align=8)
         return context.get_dummy_value()
 
     @intrinsic
     def sums(_, table, values, at, out, to):  # type: ignore[no-untyped-def]
         """``out[to:] = values[at:] @ table``."""
-        assert all(array.layout == "C" for array in (table, values, out))
         return types.void(table, values, types.intp, out, types.intp), lower
 
     return sums
@@ -57,14 +61,13 @@ def span(count: int) -> Any:
 
     What is not a number may be passed over.
     """
-    four = ir.VectorType(_REAL, 4)
+    four = ir.VectorType(REAL, 4)
 
     def lower(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        kind = signature.args[0]
-        values = builder.gep(context.make_array(kind)(context, builder, args[0]).data, [args[1]])
+        values = builder.gep(line_of(context, builder, signature.args[0], args[0]), [args[1]])
 
         def part(at: int) -> Any:
-            place = builder.gep(values, [ir.Constant(_INDEX, min(4 * at, count - 4))])
+            place = builder.gep(values, [ir.Constant(INDEX, min(4 * at, count - 4))])
             return builder.load(builder.bitcast(place, four.as_pointer()), align=8)
 
         def most(order: str, found: list[Any]) -> Any:
@@ -76,7 +79,7 @@ def span(count: int) -> Any:
         ends = []
         for order in ("<", ">"):
             lanes = most(order, [part(at) for at in range(-(-count // 4))])
-            ends.append(most(order, [builder.extract_element(lanes, ir.Constant(_INDEX, k)) for k in range(4)]))
+            ends.append(most(order, [builder.extract_element(lanes, ir.Constant(INDEX, k)) for k in range(4)]))
         return context.make_tuple(builder, signature.return_type, ends)
 
     @intrinsic

@@ -1,0 +1,150 @@
+"""Rows of numbers in vector registers: the same arithmetic on all numbers of a row.
+
+LLVM unrolls a loop of known length before it looks for what could be done side by side, and does it one by one then;
+here it is told. A row is a stretch of some registers in a line of numbers, named by where it begins.
+"""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from llvmlite import ir
+from numba import types
+from numba.core.cgutils import alloca_once, get_or_insert_function
+from numba.extending import intrinsic
+
+LANES = 8
+REAL, INDEX = ir.DoubleType(), ir.IntType(32)
+REGISTER = ir.VectorType(REAL, LANES)
+
+
+def line_of(context: Any, builder: Any, kind: Any, array: Any) -> Any:
+    """Where the numbers of an array begin."""
+    assert kind.layout == "C"
+    return context.make_array(kind)(context, builder, array).data
+
+
+def register(builder: Any, line: Any, offset: int) -> Any:
+    """Where a register's numbers lie in a line."""
+    return builder.bitcast(builder.gep(line, [ir.Constant(INDEX, offset)]), REGISTER.as_pointer())
+
+
+def spread(builder: Any, value: Any) -> Any:
+    """A register with a number in all lanes."""
+    one = builder.insert_element(ir.Constant(REGISTER, ir.Undefined), value, ir.Constant(INDEX, 0))
+    return builder.shuffle_vector(one, one, ir.Constant(ir.VectorType(INDEX, LANES), [0] * LANES))
+
+
+class Lanes:
+    """A register while code is being made: what is done with it is done by LLVM."""
+
+    def __init__(self, builder: Any, value: Any) -> None:
+        self.builder, self.value = builder, value
+
+    def _with(self, other: Any, make: Callable[[Any, Any], Any], *, turned: bool = False) -> "Lanes":
+        given = other.value if isinstance(other, Lanes) else ir.Constant(REGISTER, [float(other)] * LANES)
+        return Lanes(self.builder, make(given, self.value) if turned else make(self.value, given))
+
+    def __add__(self, other: Any) -> "Lanes":
+        return self._with(other, self.builder.fadd)
+
+    def __radd__(self, other: Any) -> "Lanes":
+        return self._with(other, self.builder.fadd, turned=True)
+
+    def __sub__(self, other: Any) -> "Lanes":
+        return self._with(other, self.builder.fsub)
+
+    def __mul__(self, other: Any) -> "Lanes":
+        return self._with(other, self.builder.fmul)
+
+    def __rmul__(self, other: Any) -> "Lanes":
+        return self._with(other, self.builder.fmul, turned=True)
+
+    def __truediv__(self, other: Any) -> "Lanes":
+        return self._with(other, self.builder.fdiv)
+
+    def sqrt(self) -> "Lanes":
+        """Root; NumPy's asks for a method of this name."""
+        return self._called("sqrt")
+
+    def __abs__(self) -> "Lanes":
+        return self._called("fabs")
+
+    def _called(self, name: str) -> "Lanes":
+        kind = ir.FunctionType(REGISTER, [REGISTER])
+        function = get_or_insert_function(self.builder.module, kind, f"llvm.{name}.v{LANES}f64")
+        return Lanes(self.builder, self.builder.call(function, (self.value,)))
+
+
+def over_rows(formula: Callable[..., Any], width: int) -> Any:
+    """A compiled function ``f(line, out, ...)``: a row of ``width``, at ``out``, by a formula of rows and numbers.
+
+    What is given as a whole number is where a row begins, what is given as a float is the same in all lanes. The
+    formula is of ``+ - * /``, ``abs`` and ``numpy.sqrt``.
+    """
+
+    def lower(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        line = line_of(context, builder, signature.args[0], args[0])
+        rows = [
+            None if isinstance(kind, types.Float) else builder.gep(line, [at])
+            for kind, at in zip(signature.args[1:], args[1:], strict=True)
+        ]
+        numbers = [spread(builder, value) if row is None else None for row, value in zip(rows, args[1:], strict=True)]
+        found = []
+        for offset in range(0, width, LANES):
+            given = [
+                Lanes(builder, number if row is None else builder.load(register(builder, row, offset), align=8))
+                for row, number in zip(rows[1:], numbers[1:], strict=True)
+            ]
+            found.append(formula(*given).value)
+        for k, value in enumerate(found):
+            builder.store(value, register(builder, rows[0], k * LANES), align=8)
+        return context.get_dummy_value()
+
+    def typed(line: Any, out: Any, *given: Any) -> Any:
+        return types.void(line, out, *given), lower
+
+    # numba wants to know how many arguments there are.
+    forms: tuple[Callable[..., Any], ...] = (
+        lambda _, line, out, a: typed(line, out, a),
+        lambda _, line, out, a, b: typed(line, out, a, b),
+        lambda _, line, out, a, b, c: typed(line, out, a, b, c),
+        lambda _, line, out, a, b, c, d: typed(line, out, a, b, c, d),
+        lambda _, line, out, a, b, c, d, e: typed(line, out, a, b, c, d, e),
+    )
+    form = forms[(formula.nin if isinstance(formula, np.ufunc) else formula.__code__.co_argcount) - 1]
+    form.__name__ = "fill_row"
+    filler = intrinsic(form)
+    filler.formula, filler.width = formula, width
+    return filler
+
+
+def on_stack(count: int) -> Any:
+    """A compiled function ``f()``: an array of ``count`` numbers, there until the function that asked for it returns.
+
+    Nobody counts who holds it, as is done for other arrays at every call.
+    """
+    kind, whole = types.Array(types.float64, 1, "C"), ir.IntType(64)
+
+    def lower(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        data = alloca_once(builder, ir.ArrayType(REAL, count))
+        data.align = 8 * LANES
+        array = context.make_array(kind)(context, builder)
+        size, length = ir.Constant(whole, 8), [ir.Constant(whole, count)]
+        context.populate_array(
+            array,
+            data=builder.bitcast(data, REAL.as_pointer()),
+            shape=length,
+            strides=[size],
+            itemsize=size,
+            meminfo=None,
+        )
+        return array._getvalue()
+
+    @intrinsic
+    def stacked(_):  # type: ignore[no-untyped-def]
+        """The array."""
+        return kind(), lower
+
+    stacked.count = count
+    return stacked
