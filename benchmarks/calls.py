@@ -14,6 +14,7 @@ from numba import njit
 import generated.cubic_coulomb as friction
 import generated.pendulum as pendulum
 from gqm_sym.runtime import batch_means, batch_rows, batch_search, batch_times, batches, entries, legs, swift
+from gqm_sym.runtime.leg_panels import COLUMNS
 from gqm_sym.runtime.leg_stretches import read_panels
 from gqm_sym.runtime.surveying import survey
 
@@ -62,7 +63,8 @@ def dissipative() -> list[tuple[str, float]]:
     flags = (int(loss.friction), int(loss.kinked), int(loss.linear))
     launch = (loss.drive, loss.hold, p.values, flags, -1.0, 6.2088**2, 1, 0, np.empty(0))
     leg = legs.follow(*launch, inf, 1.0, 0.25, 0, 0.0)
-    times, back = leg[8], leg[12]
+    times, (ahead, count, _), record = leg[8], leg[10], leg[11]
+    back = record[ahead * COLUMNS : (ahead + count) * COLUMNS].reshape(count, COLUMNS)
     return [
         ("`solve` of Example 2: its leg to the turn", least(lambda: friction.solve(-1.0, 6.2088))),
         ("- the crossing: the leg, its events, its time", least(lambda: legs.follow(*launch, inf, 1.0, 0.25, 0, 0.0))),

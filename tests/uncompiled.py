@@ -77,6 +77,15 @@ def _row(intrinsic: Any) -> Callable[..., None]:
     return fill
 
 
+def _copy(width: int) -> Callable[..., None]:
+    """Copy a row of one line into another, as `lanes.copied` does."""
+
+    def copy(target: Any, to: int, line: Any, at: int) -> None:
+        target[to : to + width] = line[at : at + width]
+
+    return copy
+
+
 def _drive(address: int, n: int, work: Any, lam: int, v2: int, v: float, nu: float, p: Any, out: int) -> None:
     """Fill five rows of a line of numbers from others of it, as `crossing.call_drive` does."""
     _FUNCTIONS[address](n, work[lam:], work[v2:], v, nu, p, work[out:])
@@ -120,6 +129,8 @@ def _alike(value: Any) -> Any:
     if isinstance(value, _Intrinsic):
         if value._name == "fill_row":
             return _row(value)
+        if value._name == "copy_row":
+            return _copy(value.width)
         if value._name == "stacked":
             return lambda: np.empty(value.count)
         if value._name in _QUICK:

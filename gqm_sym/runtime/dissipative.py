@@ -1,7 +1,6 @@
 """Motions with friction, drag or resistance: leg after leg, each computed when it is asked for."""
 
 from math import inf, isfinite
-from operator import itemgetter
 from typing import Any
 
 import numpy as np
@@ -231,21 +230,22 @@ class Dissipative(Motion):
         breaks = np.ascontiguousarray(f.between(f.breaks, start, limit)[::way]) if f.breaks.size else NOWHERE
         reach = inf if isfinite(end) else self._reach
         run = (self._drive, self._hold, f.p, self._flags, start, w, way, self._nu, breaks, limit)
-        what, nu, place, w_end, step, strict, middle, slack, times, leaving, changes, ahead, back = legs.follow(
+        what, nu, place, w_end, step, strict, middle, slack, times, leaving, counts, record = legs.follow(
             *run, reach, self._step, self._side, self._strict
         )
         if what == legs.LIFTOFF and place == (start, 0.0):
             self._lift_off_at_once(run)
             return
-        if not len(ahead) and what == legs.LIMIT:
+        ahead, back, _ = counts
+        if not ahead and what == legs.LIMIT:
             raise leaving_at_once(problem, way, "end of the domain")
-        if not (len(ahead) or len(back)) or what == legs.SPENT or (what == legs.ASYMPTOTE and not len(back)):
+        if not (ahead or back) or what == legs.SPENT or (what == legs.ASYMPTOTE and not back):
             raise SolutionError(
                 f"V**2 beyond {problem.formulas.parameter} = {place[0]!r} could not be followed; "
                 "are the curve and the force smooth there?"
             )
         name = self._end_name(what, place[0], leaving)
-        self._runs.append(Run(start, place, middle, slack, times, changes, ahead, back, what, name, self._laps))
+        self._runs.append(Run(start, place, middle, slack, times, counts, record, what, name, self._laps))
         self._place, self._w, self._nu, self._step, self._strict = place[0], w_end, nu, step, strict
         total, lost = two_sum.py_func(self._elapsed, times[0] + times[1])
         self._elapsed, self._rest = total, self._rest + lost
@@ -290,20 +290,21 @@ class Dissipative(Motion):
 
     def _lift_off_at_once(self, run: tuple[Any, ...]) -> None:
         """A motion that ends as it begins: the track would have to pull at once."""
-        place, slack, times, ahead = itemgetter(2, 7, 8, 11)(legs.follow(*run, 0.0, self._step, 0, inf))
-        stretch = along_panels(self.problem.functions, (self._place, 0.0), place, slack, times[0], ahead)
+        what, _, place, _, _, _, middle, slack, times, _, counts, record = legs.follow(*run, 0.0, self._step, 0, inf)
+        first = Run(self._place, place, middle, slack, times, counts, record, what, "liftoff", self._laps)
+        stretch = along_panels(self.problem.functions, (self._place, 0.0), place, slack, times[0], first.ahead)
         self._done.append(self._piece(stretch, 1, (ZERO, 0.0), (ZERO, 0.0), "liftoff", self._laps))
         self._ending = "liftoff"
 
     def _lay(self, run: Run) -> None:
         """Make pieces of a run."""
         f, (before, after) = self.problem.functions, run.times
-        two = len(run.back) > 0
-        if len(run.ahead):
+        two = run.counts[1] > 0
+        if run.counts[0]:
             stretch = along_panels(f, (run.start, 0.0), run.middle, run.slack, before, run.ahead)
             self._add(stretch, 1, run, "" if two else run.end)
         if run.what == legs.ASYMPTOTE:
-            self._add(along_field(f, run.middle[0], run.place[0], run.back), 1, run, run.end)
+            self._add(along_field(f, run.middle[0], run.place[0], run.field), 1, run, run.end)
         elif two:
             self._add(along_panels(f, run.place, run.middle, 0.0, after, run.back), -1, run, run.end)
 

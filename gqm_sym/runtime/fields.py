@@ -12,9 +12,7 @@ column  meaning
 
 from math import fabs
 
-import numpy as np
-
-from gqm_sym.runtime.arrays import taller
+from gqm_sym.runtime.arrays import longer
 from gqm_sym.runtime.chebyshev import COEFFICIENTS_BY_NODE, COUNT, chebyshev_sum, to_ends
 from gqm_sym.runtime.jit import Inner
 from gqm_sym.runtime.leg_equation import BARE, DS, PLACE, SERIES, panel_room, set_nodes
@@ -26,15 +24,16 @@ MOST_TRIES = 20000
 
 
 @Inner
-def approach(drive, p, flags, top, end, v, nu, changes, breaks, step):  # type: ignore[no-untyped-def]
+def approach(drive, p, flags, top, end, v, nu, changes, met, breaks, step, record, used):  # type: ignore[no-untyped-def]
     """The field of the leg that tends to the equilibrium ``top``, followed back from there to ``end``.
 
-    ``nu`` is the sign of N at the equilibrium, ``changes`` are the places where it has changed sign on the way.
+    ``nu`` is the sign of N at the equilibrium, ``changes`` are the places where it has changed sign on the way, ``met``
+    of them. The field is entered behind what is ``used`` of a record. Returns the record, and how many rows it has.
     """
-    work, field = panel_room(), np.empty((8, COLUMNS))
+    work = panel_room()
     set_nodes(work)
     count, base, left, least, u, whole = 0, 0.0, 0.0, 0.0, -v, fabs(end - top)
-    met, passed = changes.size - 1, breaks.size - 1
+    met, passed = met - 1, breaks.size - 1
     for _ in range(MOST_TRIES):
         stop, met, passed, nu = next_stop(top, u, left, whole, changes, breaks, met, passed, nu)
         if stop <= left:
@@ -44,10 +43,10 @@ def approach(drive, p, flags, top, end, v, nu, changes, breaks, step):  # type: 
         )
         if width == 0.0:
             break
-        if count == field.shape[0]:
-            field = taller(field, 2 * count)
-        row, right = field[count], stop if width == stop - left else left + width
-        row[0], row[1] = left, right
+        row, right = used + count * COLUMNS, stop if width == stop - left else left + width
+        if row + COLUMNS > record.size:
+            record = longer(record, 2 * record.size)
+        record[row], record[row + 1] = left, right
         if count == 0:
             # V**2 over d vanishes at the equilibrium, as the force does.
             to_ends(COEFFICIENTS_BY_NODE, work, BARE, work, SERIES)
@@ -58,9 +57,9 @@ def approach(drive, p, flags, top, end, v, nu, changes, breaks, step):  # type: 
         for begin, values in ((2, BARE), (2 + COUNT, DS)):
             to_ends(COEFFICIENTS_BY_NODE, work, values, work, SERIES)
             for k in range(COUNT):
-                row[begin + k] = work[SERIES + k]
+                record[row + begin + k] = work[SERIES + k]
         count, base, left = count + 1, work[V2 + COUNT], right
-    return field[:count].copy()
+    return record, count
 
 
 @Inner

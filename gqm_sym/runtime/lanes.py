@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from llvmlite import ir
 from numba import types
-from numba.core.cgutils import alloca_once, get_or_insert_function
+from numba.core.cgutils import get_or_insert_function
 from numba.extending import intrinsic
 
 LANES = 8
@@ -119,6 +119,27 @@ def over_rows(formula: Callable[..., Any], width: int) -> Any:
     return filler
 
 
+def copied(width: int) -> Any:
+    """A compiled function ``f(target, to, line, at)``: a row of ``width`` put into another line."""
+
+    def lower(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        target, line = (
+            builder.gep(line_of(context, builder, signature.args[k], args[k]), [args[k + 1]]) for k in (0, 2)
+        )
+        rows = [builder.load(register(builder, line, offset), align=8) for offset in range(0, width, LANES)]
+        for k, row in enumerate(rows):
+            builder.store(row, register(builder, target, k * LANES), align=8)
+        return context.get_dummy_value()
+
+    @intrinsic
+    def copy_row(_, target, to, line, at):  # type: ignore[no-untyped-def]
+        """``target[to:] = line[at:]``."""
+        return types.void(target, types.intp, line, types.intp), lower
+
+    copy_row.width = width
+    return copy_row
+
+
 def on_stack(count: int) -> Any:
     """A compiled function ``f()``: an array of ``count`` numbers, there until the function that asked for it returns.
 
@@ -127,7 +148,8 @@ def on_stack(count: int) -> Any:
     kind, whole = types.Array(types.float64, 1, "C"), ir.IntType(64)
 
     def lower(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        data = alloca_once(builder, ir.ArrayType(REAL, count))
+        with builder.goto_entry_block():
+            data = builder.alloca(ir.ArrayType(REAL, count))
         data.align = 8 * LANES
         array = context.make_array(kind)(context, builder)
         size, length = ir.Constant(whole, 8), [ir.Constant(whole, count)]

@@ -2,7 +2,6 @@
 
 from math import fabs, inf
 
-from gqm_sym.runtime.arrays import taller
 from gqm_sym.runtime.chebyshev import (
     COEFFICIENTS_BY_NODE,
     COUNT,
@@ -15,6 +14,7 @@ from gqm_sym.runtime.chebyshev import (
     to_tails,
 )
 from gqm_sym.runtime.jit import Inlined, Inner
+from gqm_sym.runtime.lanes import copied
 from gqm_sym.runtime.leg_equation import (
     ARC,
     BARE,
@@ -69,9 +69,11 @@ SLIVER = 2.0**-20
 # Whether time is to be resolved.
 NEVER, MAYBE, ALWAYS = range(3)
 
-# A panel that is kept: where it ends, its time and what that may be off by, and at its nodes the pace of time, that of
-# arc length, and Y.
-COLUMNS = 3 + 3 * COUNT
+# A panel that is kept: at its nodes the pace of time, that of arc length, and Y; behind each of them one of what the
+# panel ends at, its time, and what that may be off by.
+COLUMNS = 3 * WIDE
+RIGHT, TIME, ERROR = range(COUNT, COLUMNS, WIDE)
+copy = copied(WIDE)
 
 
 @Inlined
@@ -289,17 +291,13 @@ def next_panel(  # type: ignore[no-untyped-def]
 
 
 @Inner
-def keep(panels, count, right, width, work):  # type: ignore[no-untyped-def]
-    """Keep a panel that ends at w = ``right`` behind ``count`` others; the panels, more of them if it had to be."""
-    if count == panels.shape[0]:
-        panels = taller(panels, 2 * count)
+def keep(record, at, right, width, work):  # type: ignore[no-untyped-def]
+    """Keep a panel that ends at w = ``right``, from ``at`` on in a record that has room for it."""
     to_tails(TAILS_BY_NODE, work, PACE, work, TAILS)
-    panels[count, 0], panels[count, 1], panels[count, 2] = right, width * work[TAILS + 6], width * last_of(work)
-    for j in range(COUNT):
-        panels[count, 3 + j] = work[PACE + j]
-        panels[count, 3 + COUNT + j] = work[ARC + j]
-        panels[count, 3 + 2 * COUNT + j] = work[SPEED + j]
-    return panels
+    copy(record, at, work, PACE)
+    copy(record, at + WIDE, work, ARC)
+    copy(record, at + 2 * WIDE, work, SPEED)
+    record[at + RIGHT], record[at + TIME], record[at + ERROR] = right, width * work[TAILS + 6], width * last_of(work)
 
 
 @Inner

@@ -9,10 +9,11 @@ from numba import types
 from gqm_sym.runtime.chebyshev import COUNT, TO_COEFFICIENTS, WIDE, to_ends
 from gqm_sym.runtime.clocks import Array
 from gqm_sym.runtime.course import Pair
+from gqm_sym.runtime.fields import COLUMNS as FIELD
 from gqm_sym.runtime.functions import Functions
 from gqm_sym.runtime.integrands import FROM_TURN, REGULAR, TO_EQUILIBRIUM
 from gqm_sym.runtime.jit import entry
-from gqm_sym.runtime.leg_panels import COLUMNS
+from gqm_sym.runtime.leg_panels import COLUMNS, ERROR, RIGHT, TIME
 from gqm_sym.runtime.panels import CONVERGED
 from gqm_sym.runtime.stretch import ULP, Stretch
 
@@ -61,21 +62,21 @@ def read_panels(panels, time):  # type: ignore[no-untyped-def]
     n = panels.shape[0]
     edges, times, lengths = np.zeros(n + 1), np.zeros(n + 1), np.zeros(n + 1)
     time_terms, length_terms, speed_terms = np.empty((n, WIDE)), np.empty((n, WIDE)), np.empty((n, WIDE))
-    out, error, last = np.empty(3 * WIDE), 0.0, panels[n - 1, 0]
+    out, error, last = np.empty(3 * WIDE), 0.0, panels[n - 1, RIGHT]
     for k in range(n):
-        half = 0.5 * (panels[k, 0] - (panels[k - 1, 0] if k > 0 else 0.0))
-        at = k * COLUMNS + 3
+        half = 0.5 * (panels[k, RIGHT] - (panels[k - 1, RIGHT] if k > 0 else 0.0))
+        at = k * COLUMNS
         to_ends(INTEGRAL_BY_NODE, panels, at, out, 0)
-        to_ends(INTEGRAL_BY_NODE, panels, at + COUNT, out, WIDE)
-        to_ends(PLAIN_BY_NODE, panels, at + 2 * COUNT, out, 2 * WIDE)
+        to_ends(INTEGRAL_BY_NODE, panels, at + WIDE, out, WIDE)
+        to_ends(PLAIN_BY_NODE, panels, at + 2 * WIDE, out, 2 * WIDE)
         length = 0.0
         for j in range(WIDE):
             time_terms[k, j], length_terms[k, j] = half * out[j], half * out[WIDE + j]
             speed_terms[k, j] = out[2 * WIDE + j]
             length += length_terms[k, j]
-        edges[k + 1] = panels[k, 0] / last
-        times[k + 1], lengths[k + 1] = times[k] + panels[k, 1], lengths[k] + length
-        error += panels[k, 2]
+        edges[k + 1] = panels[k, RIGHT] / last
+        times[k + 1], lengths[k + 1] = times[k] + panels[k, TIME], lengths[k] + length
+        error += panels[k, ERROR]
     times[n] = time
     return edges, times, lengths, time_terms, length_terms, speed_terms, error / time + ULP if time > 0.0 else ULP
 
@@ -88,12 +89,34 @@ class Run(NamedTuple):
     middle: Pair
     slack: float
     times: tuple[float, float]
-    changes: Array
-    ahead: Array
-    back: Array
+    counts: tuple[int, int, int]
+    record: Array
     what: int
     end: str
     laps: int
+
+    @property
+    def ahead(self) -> Array:
+        """Panels from the start."""
+        return self._rows(0, self.counts[0], COLUMNS)
+
+    @property
+    def back(self) -> Array:
+        """Panels from the turn."""
+        return self._rows(self.counts[0] * COLUMNS, self.counts[1], COLUMNS)
+
+    @property
+    def field(self) -> Array:
+        """V**2 next to an equilibrium (`fields`)."""
+        return self._rows(self.counts[0] * COLUMNS, self.counts[1], FIELD)
+
+    @property
+    def changes(self) -> Array:
+        """Places at which N changes sign."""
+        return self.record[self.record.size - self.counts[2] :]
+
+    def _rows(self, begin: int, count: int, columns: int) -> Array:
+        return self.record[begin : begin + count * columns].reshape(count, columns)
 
 
 def along_panels(f: Functions, a: Pair, b: Pair, slack: float, time: float, panels: Array) -> Stretch:
@@ -102,7 +125,7 @@ def along_panels(f: Functions, a: Pair, b: Pair, slack: float, time: float, pane
     ``slack`` is c/2 of their march variable, infinite where that is the distance.
     """
     *laid, speed_terms, error = read_panels(panels, time)
-    last = float(panels[-1, 0])
+    last = float(panels[-1, RIGHT])
     return Stretch(
         functions=f,
         kind=REGULAR if slack == inf else FROM_TURN,

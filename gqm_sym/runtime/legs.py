@@ -10,10 +10,11 @@ from math import exp, fabs, inf, sqrt
 import numpy as np
 from numba import types
 
-from gqm_sym.runtime.arrays import pushed
+from gqm_sym.runtime.arrays import longer, pushed
 from gqm_sym.runtime.chebyshev import COEFFICIENTS_BY_NODE, COUNT, chebyshev_sum, extent, to_ends
 from gqm_sym.runtime.crossing import call_drive, call_hold
 from gqm_sym.runtime.doubledouble import two_sum
+from gqm_sym.runtime.fields import COLUMNS as FIELD
 from gqm_sym.runtime.fields import approach
 from gqm_sym.runtime.jit import Inner, entry
 from gqm_sym.runtime.lanes import on_stack
@@ -44,6 +45,7 @@ from gqm_sym.runtime.leg_panels import (
     NARROW,
     NEVER,
     NOISE,
+    TIME,
     change_of,
     keep,
     next_panel,
@@ -63,11 +65,12 @@ NEAR = 1e-11
 SOONER = 2.0
 MOST_TRIES = 20000
 MOST_PANELS = 512
+# Panels of which there is room before a record grows.
+FEW = 16
 
 # Room for one place, V**2, and what ``drive`` gives there.
 spot_room = on_stack(7)
 _LINE = types.float64[::1]
-_ROWS = types.float64[:, ::1]
 _FLOAT = types.float64
 
 
@@ -97,7 +100,7 @@ def rise(drive, p, place, v2, v, nu, spot):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def run(drive, p, flags, start, w, v, nu, breaks, limit, reach, step, side, strict):  # type: ignore[no-untyped-def]
+def run(drive, p, flags, start, w, v, nu, breaks, limit, reach, step, side, strict, record):  # type: ignore[no-untyped-def]
     """Follow the body from ``start`` with V**2 = w in direction v, to the first turn, end or pause.
 
     Parameters
@@ -116,6 +119,8 @@ def run(drive, p, flags, start, w, v, nu, breaks, limit, reach, step, side, stri
         The only sign that N can have; 0 where it can have both.
     strict : float
         The distance up to which there is no turn to be expected, however slow the body gets.
+    record : array
+        For panels.
 
     Returns
     -------
@@ -132,12 +137,14 @@ def run(drive, p, flags, start, w, v, nu, breaks, limit, reach, step, side, stri
         The place up to which time is counted, as two doubles.
     slack : float
         c/2 of the march variable (`leg_panels`); infinite where it is the distance itself.
-    changes : (k,) array
-        Places at which N changes sign.
-    panels : (n, COLUMNS) array
-        The panels up to ``middle``.
+    changes : array
+        Places at which N changes sign, as many as ``met``.
+    met : int
+        How many.
+    record, kept : array, int
+        The panels up to ``middle``, each of COLUMNS numbers (`leg_panels`), and how many there are.
     """
-    work, spot, changes, panels = panel_room(), spot_room(), np.empty(4), np.empty((8, COLUMNS))
+    work, spot, changes = panel_room(), spot_room(), np.empty(4)
     set_nodes(work)
     g, c, sooner = 1.0, 0.0, inf
     if nu == 0:
@@ -222,7 +229,10 @@ def run(drive, p, flags, start, w, v, nu, breaks, limit, reach, step, side, stri
                 if fabs(end_load) < fabs(rate) * 1e-6 * (right - left):
                     right -= end_load / rate
         if not searching:
-            panels, kept, mark = keep(panels, kept, right, right - left, work), kept + 1, right
+            if (kept + 1) * COLUMNS > record.size:
+                record = longer(record, 2 * record.size)
+            keep(record, kept * COLUMNS, right, right - left, work)
+            kept, mark = kept + 1, right
         count += 1
         highest = max(base, extent(work, V2)[1])
         ceiling = max(ceiling * exp(-far) if end > 1.0 else ceiling, highest)
@@ -251,19 +261,20 @@ def run(drive, p, flags, start, w, v, nu, breaks, limit, reach, step, side, stri
         place = (limit, 0.0) if what == LIMIT else two_sum(start, v * gone)
         middle = place
     slack = 0.5 * c if g > 0.0 else inf
-    return what, place, base, nu, onwards, strict, middle, slack, changes[:met].copy(), panels[:kept].copy()
+    return what, place, base, nu, onwards, strict, middle, slack, changes, met, record, kept
 
 
 @Inner
-def run_back(drive, p, flags, turn, whole, v, nu, changes, breaks, step):  # type: ignore[no-untyped-def]
+def run_back(drive, p, flags, turn, whole, v, nu, changes, met, breaks, step, record, kept):  # type: ignore[no-untyped-def]
     """The panels of the leg that turns at ``turn``, followed back from there over the distance ``whole``.
 
-    ``nu`` is the sign of N at the turn, ``changes`` are the places where it has changed sign on the way.
+    ``nu`` is the sign of N at the turn, ``changes`` are the places where it has changed sign on the way, ``met`` of
+    them. The panels are entered behind those ``kept`` of a record. Returns the record, and how many they are.
     """
-    work, panels = panel_room(), np.empty((8, COLUMNS))
+    work = panel_room()
     set_nodes(work)
     count, base, left, gone, u, step = 0, 0.0, 0.0, 0.0, -v, sqrt(step)
-    met, passed = changes.size - 1, breaks.size - 1
+    met, passed = met - 1, breaks.size - 1
     for _ in range(MOST_TRIES):
         stop, met, passed, nu = next_stop(turn, u, gone, whole, changes, breaks, met, passed, nu)
         room = sqrt(stop) - left
@@ -275,18 +286,22 @@ def run_back(drive, p, flags, turn, whole, v, nu, changes, breaks, step):  # typ
         if width == 0.0:
             break
         gone, left = (stop, sqrt(stop)) if width == room else ((left + width) * (left + width), left + width)
-        panels, count, base = keep(panels, count, left, width, work), count + 1, work[V2 + COUNT]
+        end = (kept + count + 1) * COLUMNS
+        if end > record.size:
+            record = longer(record, 2 * record.size)
+        keep(record, end - COLUMNS, left, width, work)
+        count, base = count + 1, work[V2 + COUNT]
         if gone >= whole:
             break
-    return panels[:count].copy()
+    return record, count
 
 
 @Inner
-def total(panels):  # type: ignore[no-untyped-def]
-    """The time of all panels."""
+def total(record, begin, end):  # type: ignore[no-untyped-def]
+    """The time of the panels from one to before another."""
     high, low = 0.0, 0.0
-    for k in range(panels.shape[0]):
-        high, rest = two_sum(high, panels[k, 1])
+    for k in range(begin, end):
+        high, rest = two_sum(high, record[k * COLUMNS + TIME])
         low += rest
     return high + low
 
@@ -294,7 +309,7 @@ def total(panels):  # type: ignore[no-untyped-def]
 _FLAGS = types.UniTuple(types.int64, 3)
 _PAIR = types.UniTuple(_FLOAT, 2)
 _FOLLOWED = types.Tuple(
-    (types.int64, types.int64, _PAIR, _FLOAT, _FLOAT, _FLOAT, _PAIR, _FLOAT, _PAIR, _PAIR, _LINE, _ROWS, _ROWS)
+    (types.int64, types.int64, _PAIR, _FLOAT, _FLOAT, _FLOAT, _PAIR, _FLOAT, _PAIR, _PAIR, _FLAGS, _LINE)
 )
 
 
@@ -315,39 +330,35 @@ def follow(drive, hold, p, flags, start, w, v, nu, breaks, limit, reach, step, s
         Of the panels from the start, and of those from the turn.
     leaving : (float, float)
         At a turn, the accelerations from rest, forwards and backwards.
-    changes, ahead, back : arrays
-        As `run` has them; ``back`` are panels from the turn, or a field from an equilibrium (`fields`).
+    counts : (int, int, int)
+        How many panels there are from the start, how many rows from the end, and how many changes of N's sign.
+    record : array
+        The panels from the start, the rows from the end: panels from a turn, or a field from an equilibrium
+        (`fields`); and behind them, at its end, the places at which N changes sign.
     """
+    record = np.empty(FEW * COLUMNS)
     while True:
-        what, place, w1, n, onwards, next_strict, middle, slack, changes, ahead = run(
-            drive, p, flags, start, w, v, nu, breaks, limit, reach, step, side, strict
+        what, place, w1, n, onwards, next_strict, middle, slack, changes, met, record, kept = run(
+            drive, p, flags, start, w, v, nu, breaks, limit, reach, step, side, strict, record
         )
-        if what != DIPPED or ahead.shape[0] > 0:
+        if what != DIPPED or kept > 0:
             break
         strict = next_strict
-    back, leaving = np.empty((0, 0)), (0.0, 0.0)
+    back, leaving, used = 0, (0.0, 0.0), kept * COLUMNS
+    before, after = total(record, 0, kept), 0.0
     if what == TURN:
         whole = v * ((place[0] - middle[0]) + (place[1] - middle[1]))
-        back = run_back(drive, p, flags, place[0], whole, v, n, changes, breaks, onwards)
+        record, back = run_back(drive, p, flags, place[0], whole, v, n, changes, met, breaks, onwards, record, kept)
+        after, used = total(record, kept, kept + back), used + back * COLUMNS
         spot, rates = np.empty(1), np.empty((2, 1))
         spot[0] = place[0]
         call_hold(hold, 1, spot, p, rates)
         leaving = (rates[0, 0], rates[1, 0])
     elif what == ASYMPTOTE:
-        back = approach(drive, p, flags, place[0], middle[0], v, n, changes, breaks, onwards)
-    times = (total(ahead), total(back) if what == TURN else 0.0)
-    return (
-        what,
-        n,
-        place,
-        w1,
-        onwards,
-        next_strict,
-        middle,
-        slack,
-        times,
-        leaving,
-        changes,
-        ahead,
-        back,
-    )
+        record, back = approach(drive, p, flags, place[0], middle[0], v, n, changes, met, breaks, onwards, record, used)
+        used += back * FIELD
+    if used + met > record.size:
+        record = longer(record, used + met)
+    for k in range(met):
+        record[record.size - met + k] = changes[k]
+    return what, n, place, w1, onwards, next_strict, middle, slack, (before, after), leaving, (kept, back, met), record
