@@ -60,8 +60,7 @@ def dissipative() -> list[tuple[str, float]]:
     p = model.numbers(tuple(friction.PARAMETERS.values()))
     loss = model.dissipation
     assert loss is not None
-    flags = (int(loss.friction), int(loss.kinked), int(loss.linear))
-    launch = (loss.drive, loss.hold, p.values, flags, -1.0, 6.2088**2, 1, 0, np.empty(0))
+    launch = (loss.drive, loss.hold, p.values, loss.kinds, -1.0, 6.2088**2, 1, 0, np.empty(0))
     leg = legs.follow(*launch, inf, 1.0, 0.25, 0, 0.0)
     times, (ahead, count, _), record = leg[8], leg[10], leg[11]
     back = record[ahead * COLUMNS : (ahead + count) * COLUMNS].reshape(count, COLUMNS)

@@ -13,7 +13,9 @@ from gqm_sym.runtime.entries import frame_at, from_rest
 from gqm_sym.runtime.events import passages
 from gqm_sym.runtime.exact import NOWHERE
 from gqm_sym.runtime.formulas import Formulas, Given, Launch
+from gqm_sym.runtime.interface import Dissipation
 from gqm_sym.runtime.leg_stretches import Run, along_field, along_panels
+from gqm_sym.runtime.legs import ASYMPTOTE, LIFTOFF, LIMIT, NARROWED, PAUSED, SPENT, TURN
 from gqm_sym.runtime.motion import Motion
 from gqm_sym.runtime.problem import Problem
 from gqm_sym.runtime.rest import Rest
@@ -55,9 +57,14 @@ def launch_leg(formulas: Formulas, p: Given, launch: Launch, places: Array) -> A
 
 def _leaves(problem: Problem, lam: float) -> int:
     """Which way a body leaves a place where it is at rest; 0 if it stays."""
-    dissipation = problem.formulas.dissipation
-    assert dissipation is not None
-    return _way(*from_rest(dissipation.hold, problem.functions.p, lam))
+    return _way(*from_rest(_loss(problem).hold, problem.functions.p, lam))
+
+
+def _loss(problem: Problem) -> Dissipation:
+    """What the model adds to a conservative one."""
+    loss = problem.formulas.dissipation
+    assert loss is not None
+    return loss
 
 
 def _way(forwards: float, backwards: float) -> int:
@@ -75,26 +82,23 @@ class Dissipative(Motion):
     motion that never ends as far as it has been asked for, and of its first leg at least.
     """
 
+    # What a motion begins with.
+    _horizon = inf
+    _ending = ""
+    _elapsed = _rest = _arc = _strict = 0.0
+    _nu = _laps = _turns = _pauses = 0
+    _held = True
+    _whole: Course | None = None
+
     def __init__(self, problem: Problem, direction: int) -> None:
-        self._horizon = inf
         self._runs: list[Run] = []
         self._done: list[Piece] = []
-        self._ending, self._elapsed, self._rest = "", 0.0, 0.0
         super().__init__(problem, "dissipative", direction)
-        dissipation = problem.formulas.dissipation
-        assert dissipation is not None
-        self._drive, self._hold = dissipation.drive, dissipation.hold
-        self._flags = (int(dissipation.friction), int(dissipation.kinked), int(dissipation.linear))
-        self._joints = ("",) if dissipation.friction else ("", "contact-sign")
-        self._side = SIDES[problem.launch.contact]
-        self._place, self._w, self._way, self._nu, self._laps = problem.lam0, problem.w0, direction, 0, 0
+        if not _loss(problem).friction:
+            self._joints = ("", "contact-sign")
+        self._place, self._w, self._way = problem.lam0, problem.w0, direction
         step = starting_step(problem)
-        self._step, self._reach, self._strict = FIRST * step, problem.period or step, 0.0
-        self._turns = 0
-        self._pauses = 0
-        self._arc = 0.0
-        self._held = True
-        self._whole: Course | None = None
+        self._step, self._reach = FIRST * step, problem.period or step
         self._go_on()
 
     # -- what the motion says -----------------------------------------------------------------
@@ -222,24 +226,24 @@ class Dissipative(Motion):
                 f"motion: {MOST_PIECES} pieces of legs reach t = {self._pieces[-1].t_stop[0]!r} only; "
                 "give a shorter t_max, or ask for earlier times and nearer places"
             )
-        problem, way, start, w = self.problem, self._way, self._place, self._w
-        f, (low, high, period, *_) = problem.functions, problem.domain
-        end = high if way > 0 else low
+        problem, way, start = self.problem, self._way, self._place
+        f, domain, loss = problem.functions, problem.domain, _loss(problem)
+        end, period = domain.high if way > 0 else domain.low, domain.period
         far = 8.0 * period if period else end  # a closed curve's breaks are listed for some laps
         limit = start + way * far if period else end
         breaks = np.ascontiguousarray(f.between(f.breaks, start, limit)[::way]) if f.breaks.size else NOWHERE
         reach = inf if isfinite(end) else self._reach
-        run = (self._drive, self._hold, f.p, self._flags, start, w, way, self._nu, breaks, limit)
+        run = (loss.drive, loss.hold, f.p, loss.kinds, start, self._w, way, self._nu, breaks, limit)
         what, nu, place, w_end, step, strict, middle, slack, times, leaving, counts, record = legs.follow(
-            *run, reach, self._step, self._side, self._strict
+            *run, reach, self._step, SIDES[problem.launch.contact], self._strict
         )
-        if what == legs.LIFTOFF and place == (start, 0.0):
+        if what == LIFTOFF and place == (start, 0.0):
             self._lift_off_at_once(run)
             return
         ahead, back, _ = counts
-        if not ahead and what == legs.LIMIT:
+        if not ahead and what == LIMIT:
             raise leaving_at_once(problem, way, "end of the domain")
-        if not (ahead or back) or what == legs.SPENT or (what == legs.ASYMPTOTE and not back):
+        if not (ahead or back) or what == SPENT or (what == ASYMPTOTE and not back):
             raise SolutionError(
                 f"V**2 beyond {problem.formulas.parameter} = {place[0]!r} could not be followed; "
                 "are the curve and the force smooth there?"
@@ -247,46 +251,45 @@ class Dissipative(Motion):
         name = self._end_name(what, place[0], leaving)
         self._runs.append(Run(start, place, middle, slack, times, counts, record, what, name, self._laps))
         self._place, self._w, self._nu, self._step, self._strict = place[0], w_end, nu, step, strict
-        total, lost = two_sum.py_func(self._elapsed, times[0] + times[1])
-        self._elapsed, self._rest = total, self._rest + lost
-        if what == legs.TURN:
+        self._elapsed, lost = two_sum.py_func(self._elapsed, times[0] + times[1])
+        self._rest += lost
+        if what == TURN:
             self._turns, self._strict = self._turns + 1, 0.0
-        self._pauses = self._pauses + 1 if what == legs.PAUSED and not period and not isfinite(end) else 0
+        self._pauses = self._pauses + 1 if what == PAUSED and not period and not isfinite(end) else 0
         if name not in ("", "turn", "contact-sign"):
             self._ending = name
             return
-        self._fold()
-        if abs(self._place) > FARTHEST * max(1.0, abs(problem.lam0)):
+        if period:
+            self._fold(period)
+        if abs(self._place) > FARTHEST and abs(self._place) > FARTHEST * abs(problem.lam0):
             raise SolutionError(
                 f"the motion leaves the range of doubles at {problem.formulas.parameter} = {place[0]!r}; "
                 "give a shorter t_max"
             )
-        if what == legs.PAUSED and not period:
+        if what == PAUSED and not period:
             self._reach *= 2.0
 
-    def _fold(self) -> None:
+    def _fold(self, period: float) -> None:
         """Count whole laps of a closed curve apart, so that places keep their digits."""
-        period = self.problem.period
-        if period:
-            count = int(np.trunc((self._place - self.problem.lam0) / period))
-            self._place -= count * period
-            self._laps += count
+        count = int(np.trunc((self._place - self.problem.lam0) / period))
+        self._place -= count * period
+        self._laps += count
 
     def _end_name(self, what: int, place: float, leaving: tuple[float, float]) -> str:
         """What ends a run; turns the body round where it turns."""
         problem, f, start = self.problem, self.problem.functions, self._place
-        if what == legs.TURN:
+        if what == TURN:
             way, self._held = _way(*leaving), leaving[0] < leaving[1]
             if way == 0 or (place == start and self._w == 0.0):
                 return "rest"
             self._way = way
             return "turn"
-        if what == legs.LIMIT and not problem.period:
+        if what == LIMIT and not problem.period:
             return domain_end(problem, self._way).what
-        if what == legs.NARROWED:
+        if what == NARROWED:
             ds = frame_at(f.addresses, f.p, np.array([start, place]), np.zeros(2))[2]
             return "cusp" if ds[1] <= CUSP_SHARE * ds[0] else "singular-point"
-        return {legs.LIFTOFF: "liftoff", legs.ASYMPTOTE: "asymptote"}.get(what, "")
+        return {LIFTOFF: "liftoff", ASYMPTOTE: "asymptote"}.get(what, "")
 
     def _lift_off_at_once(self, run: tuple[Any, ...]) -> None:
         """A motion that ends as it begins: the track would have to pull at once."""
@@ -303,7 +306,7 @@ class Dissipative(Motion):
         if run.counts[0]:
             stretch = along_panels(f, (run.start, 0.0), run.middle, run.slack, before, run.ahead)
             self._add(stretch, 1, run, "" if two else run.end)
-        if run.what == legs.ASYMPTOTE:
+        if run.what == ASYMPTOTE:
             self._add(along_field(f, run.middle[0], run.place[0], run.field), 1, run, run.end)
         elif two:
             self._add(along_panels(f, run.place, run.middle, 0.0, after, run.back), -1, run, run.end)

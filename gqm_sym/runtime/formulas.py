@@ -212,9 +212,10 @@ class Formulas:
         horizon = None if t_max is None else read_number(t_max, where="t_max")
         if horizon is not None and not horizon.value > 0.0:
             raise LaunchError(f"t_max: must be positive, got {horizon.text}")
-        low, high, *_ = self.domain(p)
-        if not low <= place.value <= high:
-            raise LaunchError(f"lam0: must lie in the domain [{low!r}, {high!r}] of {self.parameter}, got {place.text}")
+        domain = self.domain(p)
+        if not domain.low <= place.value <= domain.high:
+            ends = f"[{domain.low!r}, {domain.high!r}]"
+            raise LaunchError(f"lam0: must lie in the domain {ends} of {self.parameter}, got {place.text}")
         return Launch(place, speed, int(direction), contact, horizon, at)
 
     def _place(self, p: Given, lam0: Any, point: Any) -> tuple[Number, tuple[Number, Number] | None]:
@@ -283,8 +284,8 @@ class Formulas:
         """The compiled functions with what they are given, and the exact problem of one launch."""
         if p.functions is None:
             p.functions = self._functions(p)
-        addresses, values, _, breaks, corners, period = p.functions
-        return Functions(addresses, values, exact_problem(self, p, launch), breaks, corners, period)
+        exact, (addresses, values, _, breaks, corners, period) = exact_problem(self, p, launch), p.functions
+        return p.functions if exact is None else Functions(addresses, values, exact, breaks, corners, period)
 
     def _functions(self, p: Given) -> Functions:
         addresses = tuple(self.addresses)

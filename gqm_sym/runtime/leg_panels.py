@@ -243,17 +243,17 @@ def next_panel(  # type: ignore[no-untyped-def]
         # As narrow as its room, a panel may be narrower than places in doubles: distances on it keep their digits.
         if (run <= NARROW * max(fabs(here), gone) and width < room) or run < 1e-300:
             return 0.0, step, 0.0, False
-        begin_panel(drive, p, flags[2] == 1, origin, u, g, c, left, width, base, v, nu, work)
+        begin_panel(drive, p, flags[2], origin, u, g, c, left, width, base, v, nu, work)
         untold, worst = P, 0.0
-        if flags[1] == 0 and flags[2] == 1:  # most that is too wide is told from the curve alone
+        if not flags[1] and flags[2]:  # most that is too wide is told from the curve alone
             work[size_at(DS)], work[size_at(PULL)] = size_of(work, DS), max(size_of(work, PULL), 1.0 / width)
             fine, worst = resolved(work, PULL, P)
             if not fine:
                 width = narrower(width, worst)
                 continue
             untold = PULL
-        far = solve_panel(drive, p, flags[2] == 1, u, g, c, left, base, v, nu, work)
-        if flags[1] == 1 and not kink and (far < inf or flags[2] == 1):
+        far = solve_panel(drive, p, flags[2], u, g, c, left, base, v, nu, work)
+        if flags[1] and not kink and (far < inf or flags[2]):
             x = to_kink(work)
             kinked = width * (0.5 * (1.0 + x) if x > -1.0 else 0.5)
             # A run that begins at a kink may begin a rounding before it.

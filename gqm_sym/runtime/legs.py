@@ -68,7 +68,7 @@ MOST_PANELS = 512
 # Panels of which there is room before a record grows.
 FEW = 16
 
-# Room for one place, V**2, and what ``drive`` gives there.
+# Room for one place, V**2, and what is found there.
 spot_room = on_stack(7)
 _LINE = types.float64[::1]
 _FLOAT = types.float64
@@ -184,7 +184,7 @@ def run(drive, p, flags, start, w, v, nu, breaks, limit, reach, step, side, stri
         )
         if width == 0.0:
             what = NARROWED
-            if flags[2] == 0 and base > 0.0:
+            if not flags[2] and base > 0.0:
                 slope = rise(drive, p, here, base, v, nu, spot)
                 if slope < 0.0 and base <= -slope * NEAR * max(fabs(here), gone):
                     what, gone, base = TURN, gone - base / slope, 0.0
@@ -192,7 +192,7 @@ def run(drive, p, flags, start, w, v, nu, breaks, limit, reach, step, side, stri
         turn_of_force, before, _ = change_of(work, LOAD, nu, TOUCHED * work[size_at(LOAD)])
         if nu == 0 and before != 0:
             nu = before
-            if flags[0] == 1 or nu == -side:
+            if flags[0] or nu == -side:
                 continue
         # V**2, or what it is divided by the distance from the turning point it begins with.
         scale = size_of(work, FORCE) if base == 0.0 else max(as_bare(ceiling, g, c, left), work[size_at(BARE)])
@@ -214,10 +214,10 @@ def run(drive, p, flags, start, w, v, nu, breaks, limit, reach, step, side, stri
             x = bottom(work, v, touch) if end == touch and end != at_rest else end
             # Once more on a panel that ends there: its own sum has more digits than the series of a wider one.
             right = left + width * (0.5 * (1.0 + x))
-            begin_panel(drive, p, flags[2] == 1, start, v, g, c, left, right - left, base, v, nu, work)
-            far = solve_panel(drive, p, flags[2] == 1, v, g, c, left, base, v, nu, work)
+            begin_panel(drive, p, flags[2], start, v, g, c, left, right - left, base, v, nu, work)
+            far = solve_panel(drive, p, flags[2], v, g, c, left, base, v, nu, work)
             pace(g, c, left, base, work)
-            if end == at_rest and flags[2] == 1:
+            if end == at_rest and flags[2]:
                 over, there = work[V2 + COUNT], distance(right, g, c)
                 slope = rise(drive, p, start + v * there, over, v, nu, spot)
                 if fabs(over) < fabs(slope) * 1e-6 * (there - gone):
@@ -306,10 +306,10 @@ def total(record, begin, end):  # type: ignore[no-untyped-def]
     return high + low
 
 
-_FLAGS = types.UniTuple(types.int64, 3)
+_COUNTS, _FLAGS = types.UniTuple(types.int64, 3), types.UniTuple(types.boolean, 3)
 _PAIR = types.UniTuple(_FLOAT, 2)
 _FOLLOWED = types.Tuple(
-    (types.int64, types.int64, _PAIR, _FLOAT, _FLOAT, _FLOAT, _PAIR, _FLOAT, _PAIR, _PAIR, _FLAGS, _LINE)
+    (types.int64, types.int64, _PAIR, _FLOAT, _FLOAT, _FLOAT, _PAIR, _FLOAT, _PAIR, _PAIR, _COUNTS, _LINE)
 )
 
 
@@ -350,10 +350,10 @@ def follow(drive, hold, p, flags, start, w, v, nu, breaks, limit, reach, step, s
         whole = v * ((place[0] - middle[0]) + (place[1] - middle[1]))
         record, back = run_back(drive, p, flags, place[0], whole, v, n, changes, met, breaks, onwards, record, kept)
         after, used = total(record, kept, kept + back), used + back * COLUMNS
-        spot, rates = np.empty(1), np.empty((2, 1))
+        spot, rates = spot_room(), spot_room()
         spot[0] = place[0]
         call_hold(hold, 1, spot, p, rates)
-        leaving = (rates[0, 0], rates[1, 0])
+        leaving = (rates[0], rates[1])
     elif what == ASYMPTOTE:
         record, back = approach(drive, p, flags, place[0], middle[0], v, n, changes, met, breaks, onwards, record, used)
         used += back * FIELD

@@ -103,8 +103,7 @@ def _check_place(problem: Problem) -> None:
 
 def starting_step(problem: Problem) -> float:
     """A step along the curve to begin with."""
-    low, high, period, *_ = problem.domain
-    step: float = first_step.py_func(low, high, period)
+    step: float = first_step.py_func(*problem.domain[:3])
     return step
 
 
