@@ -14,8 +14,8 @@ from numba import njit
 import generated.cubic_coulomb as friction
 import generated.pendulum as pendulum
 from gqm_sym.runtime import batch_means, batch_rows, batch_search, batch_times, batches, entries, legs, swift
-from gqm_sym.runtime.leg_panels import COLUMNS
-from gqm_sym.runtime.leg_stretches import read_panels
+from gqm_sym.runtime.leg_records import BEFORE, COLUMNS
+from gqm_sym.runtime.leg_stretches import Run, read_panels
 from gqm_sym.runtime.surveying import survey
 
 
@@ -61,13 +61,15 @@ def dissipative() -> list[tuple[str, float]]:
     loss = model.dissipation
     assert loss is not None
     launch = (loss.drive, loss.hold, p.values, loss.kinds, -1.0, 6.2088**2, 1, 0, np.empty(0))
-    leg = legs.follow(*launch, inf, 1.0, 0.25, 0, 0.0)
-    times, (ahead, count, _), record = leg[8], leg[10], leg[11]
-    back = record[ahead * COLUMNS : (ahead + count) * COLUMNS].reshape(count, COLUMNS)
+    record = np.empty(16 * COLUMNS)
+    leg = (*launch, inf, 1.0, 0.25, 0, 0.0, record)
+    what, *_, ahead, count, _, _, _, _, _ = legs.follow(*leg)
+    run = Run(-1.0, ahead, count, record, what, "turn", 0)
+    back, time = run.panels_back, run.pair(BEFORE)[1]
     return [
         ("`solve` of Example 2: its leg to the turn", least(lambda: friction.solve(-1.0, 6.2088))),
-        ("- the crossing: the leg, its events, its time", least(lambda: legs.follow(*launch, inf, 1.0, 0.25, 0, 0.0))),
-        ("the leg's panels read, when a position is asked for", least(lambda: read_panels(back, times[1]))),
+        ("- the crossing: the leg, its events, its time", least(lambda: legs.follow(*leg))),
+        ("the leg's panels read, when a position is asked for", least(lambda: read_panels(back, time))),
         ("`solve` and the first `lam`", least(lambda: friction.solve(-1.0, 6.2088).lam(0.1), 5)),
     ]
 

@@ -192,7 +192,7 @@ def test_an_approach_that_cannot_be_followed_back(slope: ModuleType, monkeypatch
 
     def lost(*arguments: Any) -> Any:
         found = list(follow(*arguments))
-        found[0], found[-1] = legs.ASYMPTOTE, np.empty((0, 42))
+        found[0], found[5] = legs.ASYMPTOTE, 0
         return tuple(found)
 
     monkeypatch.setattr(legs, "follow", lost)

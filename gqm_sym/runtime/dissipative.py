@@ -9,13 +9,14 @@ from gqm_sym.errors import BudgetError, InputError, SolutionError
 from gqm_sym.runtime import legs
 from gqm_sym.runtime.course import ZERO, Course, Pair, Piece
 from gqm_sym.runtime.doubledouble import two_sum
-from gqm_sym.runtime.entries import frame_at, from_rest
+from gqm_sym.runtime.entries import frame_at
 from gqm_sym.runtime.events import passages
 from gqm_sym.runtime.exact import NOWHERE
 from gqm_sym.runtime.formulas import Formulas, Given, Launch
 from gqm_sym.runtime.interface import Dissipation
+from gqm_sym.runtime.leg_records import BEFORE, COLUMNS, END, MIDDLE
+from gqm_sym.runtime.leg_runs import ASYMPTOTE, FULL, LIFTOFF, LIMIT, NARROWED, PAUSED, SPENT, TURN
 from gqm_sym.runtime.leg_stretches import Run, along_field, along_panels
-from gqm_sym.runtime.legs import ASYMPTOTE, LIFTOFF, LIMIT, NARROWED, PAUSED, SPENT, TURN
 from gqm_sym.runtime.motion import Motion
 from gqm_sym.runtime.problem import Problem
 from gqm_sym.runtime.rest import Rest
@@ -31,6 +32,8 @@ MOST_PAUSES = 12
 MOST_TURNS = 20000
 # Pieces of legs that are kept, each some kilobytes.
 MOST_PIECES = 250_000
+# Panels that a leg is expected to have at most; where it has more it is followed once more.
+FEW = 12
 # The only sign that N can have, 0 for both.
 SIDES = {"bilateral": 0, "above": 1, "below": -1}
 
@@ -57,7 +60,8 @@ def launch_leg(formulas: Formulas, p: Given, launch: Launch, places: Array) -> A
 
 def _leaves(problem: Problem, lam: float) -> int:
     """Which way a body leaves a place where it is at rest; 0 if it stays."""
-    return _way(*from_rest(_loss(problem).hold, problem.functions.p, lam))
+    way: int = legs.way_from_rest(_loss(problem).hold, problem.functions.p, lam)[0]
+    return way
 
 
 def _loss(problem: Problem) -> Dissipation:
@@ -65,13 +69,6 @@ def _loss(problem: Problem) -> Dissipation:
     loss = problem.formulas.dissipation
     assert loss is not None
     return loss
-
-
-def _way(forwards: float, backwards: float) -> int:
-    """Which way a body leaves a place where these are its accelerations from rest; 0 if it stays."""
-    if forwards <= 0.0 <= backwards:
-        return 0
-    return 1 if forwards > 0.0 else -1
 
 
 class Dissipative(Motion):
@@ -87,6 +84,7 @@ class Dissipative(Motion):
     _ending = ""
     _elapsed = _rest = _arc = _strict = 0.0
     _nu = _laps = _turns = _pauses = 0
+    _room = FEW * COLUMNS
     _held = True
     _whole: Course | None = None
 
@@ -234,27 +232,32 @@ class Dissipative(Motion):
         breaks = np.ascontiguousarray(f.between(f.breaks, start, limit)[::way]) if f.breaks.size else NOWHERE
         reach = inf if isfinite(end) else self._reach
         run = (loss.drive, loss.hold, f.p, loss.kinds, start, self._w, way, self._nu, breaks, limit)
-        what, nu, place, w_end, step, strict, middle, slack, times, leaving, counts, record = legs.follow(
-            *run, reach, self._step, SIDES[problem.launch.contact], self._strict
-        )
-        if what == LIFTOFF and place == (start, 0.0):
+        side = SIDES[problem.launch.contact]
+        while True:
+            record = np.empty(self._room)
+            what, nu, new_way, held, ahead, back, place, w_end, step, strict, time = legs.follow(
+                *run, reach, self._step, side, self._strict, record
+            )
+            if what != FULL:
+                break
+            self._room *= 4
+        if what == LIFTOFF and not ahead:
             self._lift_off_at_once(run)
             return
-        ahead, back, _ = counts
         if not ahead and what == LIMIT:
             raise leaving_at_once(problem, way, "end of the domain")
         if not (ahead or back) or what == SPENT or (what == ASYMPTOTE and not back):
             raise SolutionError(
-                f"V**2 beyond {problem.formulas.parameter} = {place[0]!r} could not be followed; "
+                f"V**2 beyond {problem.formulas.parameter} = {place!r} could not be followed; "
                 "are the curve and the force smooth there?"
             )
-        name = self._end_name(what, place[0], leaving)
-        self._runs.append(Run(start, place, middle, slack, times, counts, record, what, name, self._laps))
-        self._place, self._w, self._nu, self._step, self._strict = place[0], w_end, nu, step, strict
-        self._elapsed, lost = two_sum.py_func(self._elapsed, times[0] + times[1])
+        name = self._end_name(what, place, new_way)
+        self._runs.append(Run(start, ahead, back, record, what, name, self._laps))
+        self._place, self._w, self._way, self._nu, self._step, self._strict = place, w_end, new_way, nu, step, strict
+        self._elapsed, lost = two_sum.py_func(self._elapsed, time)
         self._rest += lost
         if what == TURN:
-            self._turns, self._strict = self._turns + 1, 0.0
+            self._turns, self._held, self._strict = self._turns + 1, held, 0.0
         self._pauses = self._pauses + 1 if what == PAUSED and not period and not isfinite(end) else 0
         if name not in ("", "turn", "contact-sign"):
             self._ending = name
@@ -263,7 +266,7 @@ class Dissipative(Motion):
             self._fold(period)
         if abs(self._place) > FARTHEST and abs(self._place) > FARTHEST * abs(problem.lam0):
             raise SolutionError(
-                f"the motion leaves the range of doubles at {problem.formulas.parameter} = {place[0]!r}; "
+                f"the motion leaves the range of doubles at {problem.formulas.parameter} = {place!r}; "
                 "give a shorter t_max"
             )
         if what == PAUSED and not period:
@@ -275,15 +278,11 @@ class Dissipative(Motion):
         self._place -= count * period
         self._laps += count
 
-    def _end_name(self, what: int, place: float, leaving: tuple[float, float]) -> str:
-        """What ends a run; turns the body round where it turns."""
+    def _end_name(self, what: int, place: float, way: int) -> str:
+        """What ends a run, after which the body goes a certain way."""
         problem, f, start = self.problem, self.problem.functions, self._place
         if what == TURN:
-            way, self._held = _way(*leaving), leaving[0] < leaving[1]
-            if way == 0 or (place == start and self._w == 0.0):
-                return "rest"
-            self._way = way
-            return "turn"
+            return "rest" if way == 0 or (place == start and self._w == 0.0) else "turn"
         if what == LIMIT and not problem.period:
             return domain_end(problem, self._way).what
         if what == NARROWED:
@@ -293,28 +292,32 @@ class Dissipative(Motion):
 
     def _lift_off_at_once(self, run: tuple[Any, ...]) -> None:
         """A motion that ends as it begins: the track would have to pull at once."""
-        what, _, place, _, _, _, middle, slack, times, _, counts, record = legs.follow(*run, 0.0, self._step, 0, inf)
-        first = Run(self._place, place, middle, slack, times, counts, record, what, "liftoff", self._laps)
-        stretch = along_panels(self.problem.functions, (self._place, 0.0), place, slack, times[0], first.ahead)
+        record = np.empty(self._room)
+        what, _, _, _, ahead, *_ = legs.follow(*run, 0.0, self._step, 0, inf, record)
+        first = Run(self._place, ahead, 0, record, what, "liftoff", self._laps)
+        stretch = self._panels_of(first)
         self._done.append(self._piece(stretch, 1, (ZERO, 0.0), (ZERO, 0.0), "liftoff", self._laps))
         self._ending = "liftoff"
 
     def _lay(self, run: Run) -> None:
         """Make pieces of a run."""
-        f, (before, after) = self.problem.functions, run.times
-        two = run.counts[1] > 0
-        if run.counts[0]:
-            stretch = along_panels(f, (run.start, 0.0), run.middle, run.slack, before, run.ahead)
-            self._add(stretch, 1, run, "" if two else run.end)
+        f, end, middle = self.problem.functions, run.pair(END), run.pair(MIDDLE)
+        if run.ahead:
+            self._add(self._panels_of(run), 1, run, "" if run.back else run.end)
         if run.what == ASYMPTOTE:
-            self._add(along_field(f, run.middle[0], run.place[0], run.field), 1, run, run.end)
-        elif two:
-            self._add(along_panels(f, run.place, run.middle, 0.0, after, run.back), -1, run, run.end)
+            self._add(along_field(f, middle[0], end[0], run.field), 1, run, run.end)
+        elif run.back:
+            self._add(along_panels(f, end, middle, 0.0, run.pair(BEFORE)[1], run.panels_back), -1, run, run.end)
+
+    def _panels_of(self, run: Run) -> Stretch:
+        """The stretch from a run's start to where time is counted from it."""
+        f, middle, (before, _) = self.problem.functions, run.pair(MIDDLE), run.pair(BEFORE)
+        return along_panels(f, (run.start, 0.0), middle, run.slack, before, run.panels_ahead)
 
     def _add(self, stretch: Stretch, sense: int, run: Run, end: str) -> None:
         """Run through a whole stretch next, cut where N changes sign."""
         low, high = sorted((stretch.a, stretch.b))
-        cuts = [stretch.anomaly_of(*stretch.offsets(place)) for place in run.changes.tolist() if low < place < high]
+        cuts = [stretch.anomaly_of(*stretch.offsets(place)) for place in run.changes if low < place < high]
         times = stretch.times(np.array(cuts)) if cuts else ()
         marks = [(ZERO, 0.0), *(((float(r), 0.0), phi) for r, phi in zip(times, cuts, strict=True))]
         marks.append(((stretch.duration, 0.0), stretch.stop))

@@ -8,7 +8,7 @@ from math import fabs, isfinite
 import numpy as np
 from numba import types
 
-from gqm_sym.runtime.crossing import call_climb, call_frame, call_hold, call_rise
+from gqm_sym.runtime.crossing import call_climb, call_frame, call_rise
 from gqm_sym.runtime.doubledouble import reduce
 from gqm_sym.runtime.fused import choose, whole_below
 from gqm_sym.runtime.integrands import TO_EQUILIBRIUM, speeds
@@ -125,15 +125,6 @@ def speeds_at(fns, p, kind, a, b, ref, w, phi):  # type: ignore[no-untyped-def]
     out = np.empty(phi.size)
     speeds(fns, p, kind, a, b, ref, w, np.empty((0, 0)), phi, np.empty((4, phi.size)), out)
     return out
-
-
-@entry(_LINE(types.int64, _LINE, _FLOAT))
-def from_rest(hold, p, lam):  # type: ignore[no-untyped-def]
-    """The accelerations from rest, forwards and backwards."""
-    spot, rows = np.empty(1), np.empty((2, 1))
-    spot[0] = lam
-    call_hold(hold, 1, spot, p, rows)
-    return rows[:, 0].copy()
 
 
 @entry(_PANELS(_FLOAT, _FLOAT, _ROWS, _LINE))

@@ -12,30 +12,30 @@ column  meaning
 
 from math import fabs
 
-from gqm_sym.runtime.arrays import longer
 from gqm_sym.runtime.chebyshev import COEFFICIENTS_BY_NODE, COUNT, chebyshev_sum, to_ends
 from gqm_sym.runtime.jit import Inner
 from gqm_sym.runtime.leg_equation import BARE, DS, PLACE, SERIES, panel_room, set_nodes
 from gqm_sym.runtime.leg_equation import W as V2
 from gqm_sym.runtime.leg_panels import NEVER, next_panel, next_stop
+from gqm_sym.runtime.leg_records import has_room
 
 COLUMNS = 2 + 2 * COUNT
 MOST_TRIES = 20000
 
 
 @Inner
-def approach(drive, p, flags, top, end, v, nu, changes, met, breaks, step, record, used):  # type: ignore[no-untyped-def]
+def approach(drive, p, flags, top, end, v, nu, met, breaks, step, record, used):  # type: ignore[no-untyped-def]
     """The field of the leg that tends to the equilibrium ``top``, followed back from there to ``end``.
 
-    ``nu`` is the sign of N at the equilibrium, ``changes`` are the places where it has changed sign on the way, ``met``
-    of them. The field is entered behind what is ``used`` of a record. Returns the record, and how many rows it has.
+    ``nu`` is the sign of N at the equilibrium, which has changed ``met`` times on the way. The field is entered behind
+    what is ``used`` of a record (`leg_records`). Returns how many rows it has; -1 where there is no room.
     """
     work = panel_room()
     set_nodes(work)
     count, base, left, least, u, whole = 0, 0.0, 0.0, 0.0, -v, fabs(end - top)
-    met, passed = met - 1, breaks.size - 1
+    coming, passed = met - 1, breaks.size - 1
     for _ in range(MOST_TRIES):
-        stop, met, passed, nu = next_stop(top, u, left, whole, changes, breaks, met, passed, nu)
+        stop, coming, passed, nu = next_stop(top, u, left, whole, record, breaks, coming, passed, nu)
         if stop <= left:
             break
         width, step, _, _ = next_panel(
@@ -44,8 +44,8 @@ def approach(drive, p, flags, top, end, v, nu, changes, met, breaks, step, recor
         if width == 0.0:
             break
         row, right = used + count * COLUMNS, stop if width == stop - left else left + width
-        if row + COLUMNS > record.size:
-            record = longer(record, 2 * record.size)
+        if not has_room(record, row, met):
+            return -1
         record[row], record[row + 1] = left, right
         if count == 0:
             # V**2 over d vanishes at the equilibrium, as the force does.
@@ -59,7 +59,7 @@ def approach(drive, p, flags, top, end, v, nu, changes, met, breaks, step, recor
             for k in range(COUNT):
                 record[row + begin + k] = work[SERIES + k]
         count, base, left = count + 1, work[V2 + COUNT], right
-    return record, count
+    return count
 
 
 @Inner

@@ -199,7 +199,10 @@ class Formulas:
         contact: str = "bilateral",
     ) -> Launch:
         """A launch, checked."""
-        place, at = self._place(p, lam0, point)
+        if point is None and lam0 is not None:
+            place, at = read_number(lam0, where="lam0"), None
+        else:
+            place, at = self._placed(p, lam0, point)
         if direction not in (1, -1):
             raise LaunchError(f"direction: must be 1 or -1 (the sign of ds/dt at launch), got {direction!r}")
         if contact not in CONTACTS:
@@ -218,12 +221,10 @@ class Formulas:
             raise LaunchError(f"lam0: must lie in the domain {ends} of {self.parameter}, got {place.text}")
         return Launch(place, speed, int(direction), contact, horizon, at)
 
-    def _place(self, p: Given, lam0: Any, point: Any) -> tuple[Number, tuple[Number, Number] | None]:
-        """The launch place by the curve's parameter, and its coordinates if they are what was given."""
+    def _placed(self, p: Given, lam0: Any, point: Any) -> tuple[Number, tuple[Number, Number] | None]:
+        """The launch place by the curve's parameter, and its coordinates: what was given."""
         if point is None:
-            if lam0 is None:
-                raise LaunchError(f"lam0: not given; it is the value of {self.parameter} to launch from")
-            return read_number(lam0, where="lam0"), None
+            raise LaunchError(f"lam0: not given; it is the value of {self.parameter} to launch from")
         if self.chart is None:
             raise LaunchError(
                 f"point: {self.name} has a parameter of its own; launch by lam0 (a value of {self.parameter})"

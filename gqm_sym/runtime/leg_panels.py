@@ -14,9 +14,7 @@ from gqm_sym.runtime.chebyshev import (
     to_tails,
 )
 from gqm_sym.runtime.jit import Inlined, Inner
-from gqm_sym.runtime.lanes import copied
 from gqm_sym.runtime.leg_equation import (
-    ARC,
     BARE,
     DS,
     FORCE,
@@ -29,7 +27,6 @@ from gqm_sym.runtime.leg_equation import (
     PULL,
     SERIES,
     SIZES,
-    SPEED,
     TAILS,
     D,
     P,
@@ -43,6 +40,7 @@ from gqm_sym.runtime.leg_equation import (
     push_sizes,
     solve_panel,
 )
+from gqm_sym.runtime.leg_records import change_at, last_of
 
 # Last coefficients against the largest: noise in them is about 1e-16.
 TAIL = 4e-16
@@ -69,23 +67,11 @@ SLIVER = 2.0**-20
 # Whether time is to be resolved.
 NEVER, MAYBE, ALWAYS = range(3)
 
-# A panel that is kept: at its nodes the pace of time, that of arc length, and Y; behind each of them one of what the
-# panel ends at, its time, and what that may be off by.
-COLUMNS = 3 * WIDE
-RIGHT, TIME, ERROR = range(COUNT, COLUMNS, WIDE)
-copy = copied(WIDE)
-
 
 @Inlined
 def size_at(row):  # type: ignore[no-untyped-def]
     """Where the size is kept that a row's coefficients are held against."""
     return SIZES + row // WIDE
-
-
-@Inlined
-def last_of(work):  # type: ignore[no-untyped-def]
-    """The largest of the last coefficients of the function that was looked at before."""
-    return max(fabs(work[TAILS]), max(fabs(work[TAILS + 1]), fabs(work[TAILS + 2])))
 
 
 @Inner
@@ -291,28 +277,18 @@ def next_panel(  # type: ignore[no-untyped-def]
 
 
 @Inner
-def keep(record, at, right, width, work):  # type: ignore[no-untyped-def]
-    """Keep a panel that ends at w = ``right``, from ``at`` on in a record that has room for it."""
-    to_tails(TAILS_BY_NODE, work, PACE, work, TAILS)
-    copy(record, at, work, PACE)
-    copy(record, at + WIDE, work, ARC)
-    copy(record, at + 2 * WIDE, work, SPEED)
-    record[at + RIGHT], record[at + TIME], record[at + ERROR] = right, width * work[TAILS + 6], width * last_of(work)
-
-
-@Inner
-def next_stop(origin, u, gone, whole, changes, breaks, met, passed, nu):  # type: ignore[no-untyped-def]
+def next_stop(origin, u, gone, whole, record, breaks, met, passed, nu):  # type: ignore[no-untyped-def]
     """On the way back: the distance at which the next panel must end, and what has been passed.
 
     ``met`` and ``passed`` are the last changes of N's sign ``nu`` and the last breaks that are still to come.
     """
     here, stop = origin + u * gone, whole
-    while met >= 0 and u * (changes[met] - here) <= 0.0:
+    while met >= 0 and u * (record[change_at(record, met)] - here) <= 0.0:
         met, nu = met - 1, -nu
     while passed >= 0 and u * (breaks[passed] - here) <= 0.0:
         passed -= 1
     if met >= 0:
-        stop = min(stop, u * (changes[met] - origin))
+        stop = min(stop, u * (record[change_at(record, met)] - origin))
     if passed >= 0:
         stop = min(stop, u * (breaks[passed] - origin))
     return stop, met, passed, nu

@@ -13,7 +13,7 @@ from gqm_sym.runtime.fields import COLUMNS as FIELD
 from gqm_sym.runtime.functions import Functions
 from gqm_sym.runtime.integrands import FROM_TURN, REGULAR, TO_EQUILIBRIUM
 from gqm_sym.runtime.jit import entry
-from gqm_sym.runtime.leg_panels import COLUMNS, ERROR, RIGHT, TIME
+from gqm_sym.runtime.leg_records import COLUMNS, ERROR, HEAD, MET, RIGHT, SLACK, TIME
 from gqm_sym.runtime.panels import CONVERGED
 from gqm_sym.runtime.stretch import ULP, Stretch
 
@@ -85,35 +85,43 @@ class Run(NamedTuple):
     """One run of the body as compiled code tells of it (`legs.follow`), not yet made into pieces."""
 
     start: float
-    place: Pair
-    middle: Pair
-    slack: float
-    times: tuple[float, float]
-    counts: tuple[int, int, int]
+    ahead: int
+    back: int
     record: Array
     what: int
     end: str
     laps: int
 
-    @property
-    def ahead(self) -> Array:
-        """Panels from the start."""
-        return self._rows(0, self.counts[0], COLUMNS)
+    def pair(self, at: int) -> Pair:
+        """Two doubles of the record: a place, or the times from the start and from the turn."""
+        high, low = self.record[at : at + 2].tolist()
+        return high, low
 
     @property
-    def back(self) -> Array:
+    def slack(self) -> float:
+        """C/2 of the march variable; infinite where that is the distance."""
+        return float(self.record[SLACK])
+
+    @property
+    def changes(self) -> list[float]:
+        """Places at which N changes sign."""
+        places: list[float] = self.record[self.record.size - int(self.record[MET]) :].tolist()
+        return places
+
+    @property
+    def panels_ahead(self) -> Array:
+        """Panels from the start."""
+        return self._rows(HEAD, self.ahead, COLUMNS)
+
+    @property
+    def panels_back(self) -> Array:
         """Panels from the turn."""
-        return self._rows(self.counts[0] * COLUMNS, self.counts[1], COLUMNS)
+        return self._rows(HEAD + self.ahead * COLUMNS, self.back, COLUMNS)
 
     @property
     def field(self) -> Array:
         """V**2 next to an equilibrium (`fields`)."""
-        return self._rows(self.counts[0] * COLUMNS, self.counts[1], FIELD)
-
-    @property
-    def changes(self) -> Array:
-        """Places at which N changes sign."""
-        return self.record[self.record.size - self.counts[2] :]
+        return self._rows(HEAD + self.ahead * COLUMNS, self.back, FIELD)
 
     def _rows(self, begin: int, count: int, columns: int) -> Array:
         return self.record[begin : begin + count * columns].reshape(count, columns)

@@ -1,364 +1,127 @@
 """V**2 along the legs of a dissipative motion, panel after panel: to where they end, and back from where they turn.
 
-A leg is run once from its start. Time is counted on the way, as long as V**2 is large; from where it falls for good
-the leg is only followed to its end, and if that is a turn, time is counted from there back to where it was left off:
-near a turn V**2 is a small difference when seen from the start, and none when seen from the turn.
+A leg is run once from its start (`leg_runs`), and time is counted on the way, as long as V**2 is large. If it ends at a
+turn, time is counted from there back to where it was left off: near a turn V**2 is a small difference when seen from
+the start, and none when seen from the turn.
 """
 
-from math import exp, fabs, inf, sqrt
+from math import sqrt
 
-import numpy as np
 from numba import types
 
-from gqm_sym.runtime.arrays import longer, pushed
-from gqm_sym.runtime.chebyshev import COEFFICIENTS_BY_NODE, COUNT, chebyshev_sum, extent, to_ends
-from gqm_sym.runtime.crossing import call_drive, call_hold
-from gqm_sym.runtime.doubledouble import two_sum
-from gqm_sym.runtime.fields import COLUMNS as FIELD
+from gqm_sym.runtime.chebyshev import COUNT
+from gqm_sym.runtime.crossing import call_hold
 from gqm_sym.runtime.fields import approach
 from gqm_sym.runtime.jit import Inner, entry
-from gqm_sym.runtime.lanes import on_stack
-from gqm_sym.runtime.leg_equation import (
-    BARE,
-    FORCE,
-    LOAD,
-    MEAN,
-    PLACE,
-    SERIES,
-    as_bare,
-    begin_panel,
-    distance,
-    marched,
-    pace,
-    panel_room,
-    set_nodes,
-    solve_panel,
-)
-from gqm_sym.runtime.leg_equation import P as GAIN
-from gqm_sym.runtime.leg_equation import Q as LOSS
-from gqm_sym.runtime.leg_equation import W as V2
-from gqm_sym.runtime.leg_panels import (
-    ALWAYS,
+from gqm_sym.runtime.leg_equation import W, panel_room, set_nodes
+from gqm_sym.runtime.leg_panels import ALWAYS, next_panel, next_stop
+from gqm_sym.runtime.leg_records import (
+    AFTER,
+    BEFORE,
     COLUMNS,
-    HIGH,
-    MAYBE,
-    NARROW,
-    NEVER,
-    NOISE,
-    TIME,
-    change_of,
+    END,
+    END_LOW,
+    HEAD,
+    MET,
+    MIDDLE,
+    MIDDLE_LOW,
+    SLACK,
+    has_room,
     keep,
-    next_panel,
-    next_stop,
-    size_at,
-    size_of,
+    total,
 )
+from gqm_sym.runtime.leg_runs import ASYMPTOTE, DIPPED, FULL, MOST_TRIES, TURN, run, spot_room
 
-# What ended a run along the curve.
-TURN, LIMIT, LIFTOFF, ASYMPTOTE, PAUSED, NARROWED, SPENT, DIPPED = range(8)
-
-# What may be left of N where it cancels, against the parts it is the sum of: the curvature of a chart has a digit less.
-TOUCHED = 5e-14
-# A body this close to a turn, as a share of what has been run, is there: for laws that have no value beyond it.
-NEAR = 1e-11
-# The first panel of a leg, against the way on which the first acceleration would stop the body.
-SOONER = 2.0
-MOST_TRIES = 20000
-MOST_PANELS = 512
-# Panels of which there is room before a record grows.
-FEW = 16
-
-# Room for one place, V**2, and what is found there.
-spot_room = on_stack(7)
 _LINE = types.float64[::1]
-_FLOAT = types.float64
+_FLOAT, _WHOLE = types.float64, types.int64
 
 
 @Inner
-def bottom(work, v, touch):  # type: ignore[no-untyped-def]
-    """The place x near ``touch`` where V**2, all but zero there, is least: the force vanishes."""
-    for j in range(COUNT):
-        work[MEAN + j] = v * (work[GAIN + j] - work[LOSS + j] * work[V2 + j])
-    to_ends(COEFFICIENTS_BY_NODE, work, MEAN, work, SERIES)
-    c = work[SERIES : SERIES + COUNT]
-    x, new = touch, touch + 1e-4
-    before = chebyshev_sum(c, x)
-    for _ in range(30):
-        slope = chebyshev_sum(c, new)
-        if slope == before:
-            break
-        x, before, new = new, slope, new - slope * (new - x) / (slope - before)
-    return new if fabs(new - touch) <= 1e-2 else touch
+def run_back(drive, p, flags, turn, whole, v, nu, met, breaks, step, record, used):  # type: ignore[no-untyped-def]
+    """Follow the leg that turns at ``turn`` back from there over the distance ``whole``.
 
-
-@Inner
-def rise(drive, p, place, v2, v, nu, spot):  # type: ignore[no-untyped-def]
-    """By how much V**2 grows per distance run in direction v."""
-    spot[0], spot[1] = place, v2
-    call_drive(drive, 1, spot, 0, 1, float(v), float(nu), p, 2)
-    return v * (spot[3] - spot[4] * v2)
-
-
-@Inner
-def run(drive, p, flags, start, w, v, nu, breaks, limit, reach, step, side, strict, record):  # type: ignore[no-untyped-def]
-    """Follow the body from ``start`` with V**2 = w in direction v, to the first turn, end or pause.
-
-    Parameters
-    ----------
-    flags : (friction, kinked, linear)
-        Of what kind the forces are.
-    nu : int
-        The sign of N; 0 to find it out.
-    breaks : array
-        Places at which panels must begin, in the order they are met.
-    limit, reach : float
-        The end of the domain; the distance from which on the run may pause.
-    step : float
-        A distance to begin with.
-    side : int
-        The only sign that N can have; 0 where it can have both.
-    strict : float
-        The distance up to which there is no turn to be expected, however slow the body gets.
-    record : array
-        For panels.
-
-    Returns
-    -------
-    what : int
-        TURN, LIMIT, LIFTOFF, ASYMPTOTE (V**2 and the force vanish together), PAUSED, NARROWED (a place where the
-        functions are not smooth), SPENT, DIPPED (the body gets slow from here on, but does not turn: to be run again).
-    place, w, nu : (float, float), float, int
-        Where, as two doubles, with what V**2, and the sign of N.
-    step : float
-        The distance to go on with.
-    strict : float
-        The same from here on.
-    middle : (float, float)
-        The place up to which time is counted, as two doubles.
-    slack : float
-        c/2 of the march variable (`leg_panels`); infinite where it is the distance itself.
-    changes : array
-        Places at which N changes sign, as many as ``met``.
-    met : int
-        How many.
-    record, kept : array, int
-        The panels up to ``middle``, each of COLUMNS numbers (`leg_panels`), and how many there are.
-    """
-    work, spot, changes = panel_room(), spot_room(), np.empty(4)
-    set_nodes(work)
-    g, c, sooner = 1.0, 0.0, inf
-    if nu == 0:
-        rise(drive, p, start, w, v, nu, spot)
-        load, turned = spot[5], spot[6] * w
-        if fabs(load + turned) > TOUCHED * (fabs(load) + fabs(turned)):
-            nu = 1 if load + turned > 0.0 else -1
-    if w > 0.0:
-        slope = rise(drive, p, start, w, v, nu, spot)
-        slow = slope > 0.0 and w <= slope * step
-        g, c = (1.0, 2.0 * sqrt(w / slope)) if slow else (0.0, 1.0)
-        # V**2 at launch is exact: a turn that is near has its digits on a panel no wider than this.
-        sooner = SOONER * w / -slope if slope < 0.0 else inf
-    count, met, coming, what = 0, 0, 0, SPENT
-    base, left, gone, ceiling, step = w, 0.0, 0.0, w, marched(step, g, c)
-    # The last place up to which time is counted, and what is known there; a turn is searched for beyond it.
-    searching, kept, mark, mark_base, mark_nu, mark_met = False, 0, 0.0, w, nu, 0
-    for _ in range(MOST_TRIES):
-        if nu != 0 and nu == -side:
-            what = LIFTOFF
-            break
-        here, late = start + v * gone, base < HIGH * ceiling
-        if searching and not late:
-            what = DIPPED
-            break
-        while coming < breaks.size and v * (breaks[coming] - start) <= gone:
-            coming += 1
-        stop = v * ((breaks[coming] if coming < breaks.size else limit) - start)
-        if stop <= gone:
-            what = LIMIT
-            break
-        room = marched(stop, g, c) - left
-        part = min(room, sooner) if gone == 0.0 else room
-        ask = ALWAYS if gone < strict else (NEVER if searching or late else MAYBE)
-        width, step, far, timed = next_panel(
-            *(drive, p, flags, start, v, g, c, left, part, step, base, v, nu, ceiling, ask, True, work)
-        )
-        if width == 0.0:
-            what = NARROWED
-            if not flags[2] and base > 0.0:
-                slope = rise(drive, p, here, base, v, nu, spot)
-                if slope < 0.0 and base <= -slope * NEAR * max(fabs(here), gone):
-                    what, gone, base = TURN, gone - base / slope, 0.0
-            break
-        turn_of_force, before, _ = change_of(work, LOAD, nu, TOUCHED * work[size_at(LOAD)])
-        if nu == 0 and before != 0:
-            nu = before
-            if flags[0] or nu == -side:
-                continue
-        # V**2, or what it is divided by the distance from the turning point it begins with.
-        scale = size_of(work, FORCE) if base == 0.0 else max(as_bare(ceiling, g, c, left), work[size_at(BARE)])
-        at_rest, _, touch = change_of(work, BARE, 1, NOISE * scale)
-        if touch <= -1.0 and base == 0.0:
-            touch = 2.0
-        end = min(at_rest, touch, turn_of_force)
-        if end == turn_of_force and end <= 1.0:
-            soon = distance(left + width * (0.5 * (1.0 + end)), g, c)
-            if soon <= gone + NARROW * max(fabs(here), gone):
-                nu = -nu  # N is zero here: what follows decides its sign
-                if left > 0.0:
-                    changes, met = pushed(changes, met, here), met + 1
-                continue
-        if not searching and ask != ALWAYS and (late or not timed):
-            searching, mark, mark_base, mark_nu, mark_met = True, left, base, nu, met
-        right = left + width
-        if end <= 1.0:
-            x = bottom(work, v, touch) if end == touch and end != at_rest else end
-            # Once more on a panel that ends there: its own sum has more digits than the series of a wider one.
-            right = left + width * (0.5 * (1.0 + x))
-            begin_panel(drive, p, flags[2], start, v, g, c, left, right - left, base, v, nu, work)
-            far = solve_panel(drive, p, flags[2], v, g, c, left, base, v, nu, work)
-            pace(g, c, left, base, work)
-            if end == at_rest and flags[2]:
-                over, there = work[V2 + COUNT], distance(right, g, c)
-                slope = rise(drive, p, start + v * there, over, v, nu, spot)
-                if fabs(over) < fabs(slope) * 1e-6 * (there - gone):
-                    right = marched(there - over / slope, g, c)
-            elif end == turn_of_force and end != touch:
-                # N at the panel's end has no error of a series, nor has what is left of the way to where it vanishes.
-                end_load, before_end = work[LOAD + COUNT], work[LOAD + COUNT - 1]
-                rate = (end_load - before_end) / (work[PLACE + COUNT] - work[PLACE + COUNT - 1])
-                if fabs(end_load) < fabs(rate) * 1e-6 * (right - left):
-                    right -= end_load / rate
-        if not searching:
-            if (kept + 1) * COLUMNS > record.size:
-                record = longer(record, 2 * record.size)
-            keep(record, kept * COLUMNS, right, right - left, work)
-            kept, mark = kept + 1, right
-        count += 1
-        highest = max(base, extent(work, V2)[1])
-        ceiling = max(ceiling * exp(-far) if end > 1.0 else ceiling, highest)
-        full = end > 1.0 and width == room
-        base, left = max(work[V2 + COUNT], 0.0), right
-        gone = stop if full else distance(right, g, c)
-        if end <= 1.0:
-            if end == at_rest or end == touch:
-                what, base = (TURN if end == at_rest else ASYMPTOTE), 0.0
-                break
-            changes, met, nu = pushed(changes, met, start + v * gone), met + 1, -nu
-        elif full and coming == breaks.size:
-            what = LIMIT
-            break
-        elif (gone >= reach and 2.0 * base >= ceiling) or count >= MOST_PANELS:
-            what = PAUSED
-            break
-    middle = two_sum(start, v * distance(mark, g, c))
-    onwards, strict = step * (2.0 * g * left + c + g * step), strict - gone
-    if what == TURN or what == ASYMPTOTE:
-        place = two_sum(start, v * gone)
-    elif searching:
-        strict = gone - distance(mark, g, c) if what == PAUSED or what == DIPPED else inf
-        what, place, base, nu, met = DIPPED, middle, mark_base, mark_nu, mark_met
-    else:
-        place = (limit, 0.0) if what == LIMIT else two_sum(start, v * gone)
-        middle = place
-    slack = 0.5 * c if g > 0.0 else inf
-    return what, place, base, nu, onwards, strict, middle, slack, changes, met, record, kept
-
-
-@Inner
-def run_back(drive, p, flags, turn, whole, v, nu, changes, met, breaks, step, record, kept):  # type: ignore[no-untyped-def]
-    """The panels of the leg that turns at ``turn``, followed back from there over the distance ``whole``.
-
-    ``nu`` is the sign of N at the turn, ``changes`` are the places where it has changed sign on the way, ``met`` of
-    them. The panels are entered behind those ``kept`` of a record. Returns the record, and how many they are.
+    ``nu`` is the sign of N at the turn, which has changed ``met`` times on the way. The panels are entered behind what
+    is ``used`` of a record. Returns how many they are; -1 where there is no room.
     """
     work = panel_room()
     set_nodes(work)
     count, base, left, gone, u, step = 0, 0.0, 0.0, 0.0, -v, sqrt(step)
-    met, passed = met - 1, breaks.size - 1
+    coming, passed = met - 1, breaks.size - 1
     for _ in range(MOST_TRIES):
-        stop, met, passed, nu = next_stop(turn, u, gone, whole, changes, breaks, met, passed, nu)
-        room = sqrt(stop) - left
+        stop, coming, passed, nu = next_stop(turn, u, gone, whole, record, breaks, coming, passed, nu)
+        room, at = sqrt(stop) - left, used + count * COLUMNS
         if room <= 0.0:
             break
+        if not has_room(record, at, met):
+            return -1
         width, step, _, _ = next_panel(
             *(drive, p, flags, turn, u, 1.0, 0.0, left, room, step, base, v, nu, 0.0, ALWAYS, False, work)
         )
         if width == 0.0:
             break
         gone, left = (stop, sqrt(stop)) if width == room else ((left + width) * (left + width), left + width)
-        end = (kept + count + 1) * COLUMNS
-        if end > record.size:
-            record = longer(record, 2 * record.size)
-        keep(record, end - COLUMNS, left, width, work)
-        count, base = count + 1, work[V2 + COUNT]
+        keep(record, at, left, width, work)
+        count, base = count + 1, work[W + COUNT]
         if gone >= whole:
             break
-    return record, count
+    return count
 
 
 @Inner
-def total(record, begin, end):  # type: ignore[no-untyped-def]
-    """The time of the panels from one to before another."""
-    high, low = 0.0, 0.0
-    for k in range(begin, end):
-        high, rest = two_sum(high, record[k * COLUMNS + TIME])
-        low += rest
-    return high + low
+def released(hold, p, place):  # type: ignore[no-untyped-def]
+    """Which way a body leaves a place where it is at rest, 0 if it stays; whether it could stay at some slope."""
+    spot, rates = spot_room(), spot_room()
+    spot[0] = place
+    call_hold(hold, 1, spot, p, rates)
+    forwards, backwards = rates[0], rates[1]
+    way = 0 if forwards <= 0.0 <= backwards else (1 if forwards > 0.0 else -1)
+    return way, forwards < backwards
 
 
-_COUNTS, _FLAGS = types.UniTuple(types.int64, 3), types.UniTuple(types.boolean, 3)
-_PAIR = types.UniTuple(_FLOAT, 2)
-_FOLLOWED = types.Tuple(
-    (types.int64, types.int64, _PAIR, _FLOAT, _FLOAT, _FLOAT, _PAIR, _FLOAT, _PAIR, _PAIR, _COUNTS, _LINE)
-)
+@entry(types.Tuple((_WHOLE, types.boolean))(_WHOLE, _LINE, _FLOAT))
+def way_from_rest(hold, p, place):  # type: ignore[no-untyped-def]
+    """`released`, for Python."""
+    return released(hold, p, place)
 
 
 @entry(
-    _FOLLOWED(
-        *(types.int64, types.int64, _LINE, _FLAGS, _FLOAT, _FLOAT, types.int64, types.int64, _LINE),
-        *(_FLOAT, _FLOAT, _FLOAT, types.int64, _FLOAT),
+    types.Tuple((_WHOLE, _WHOLE, _WHOLE, types.boolean, _WHOLE, _WHOLE, _FLOAT, _FLOAT, _FLOAT, _FLOAT, _FLOAT))(
+        *(_WHOLE, _WHOLE, _LINE, types.UniTuple(types.boolean, 3), _FLOAT, _FLOAT, _WHOLE, _WHOLE, _LINE),
+        *(_FLOAT, _FLOAT, _FLOAT, _WHOLE, _FLOAT, _LINE),
     )
 )
-def follow(drive, hold, p, flags, start, w, v, nu, breaks, limit, reach, step, side, strict):  # type: ignore[no-untyped-def]
-    """`run`, and from where that ends with V**2 = 0 back to its ``middle``.
+def follow(drive, hold, p, flags, start, w, v, nu, breaks, limit, reach, step, side, strict, record):  # type: ignore[no-untyped-def]
+    """`run`, and from where that ends with V**2 = 0 back to its ``middle``; what it finds stands in the record.
 
     Returns
     -------
-    what, nu, place, w, step, strict, middle, slack
+    what, nu
         As `run` has them.
-    times : (float, float)
-        Of the panels from the start, and of those from the turn.
-    leaving : (float, float)
-        At a turn, the accelerations from rest, forwards and backwards.
-    counts : (int, int, int)
-        How many panels there are from the start, how many rows from the end, and how many changes of N's sign.
-    record : array
-        The panels from the start, the rows from the end: panels from a turn, or a field from an equilibrium
-        (`fields`); and behind them, at its end, the places at which N changes sign.
+    way, held : int, bool
+        At a turn, what `released` says; else the direction as it was, and True.
+    ahead, back : int
+        How many panels there are from the start, and how many panels or rows of a field from the end.
+    place, w, step, strict
+        As `run` has them, the place as the nearest double.
+    time : float
+        Of the whole leg.
     """
-    record = np.empty(FEW * COLUMNS)
     while True:
-        what, place, w1, n, onwards, next_strict, middle, slack, changes, met, record, kept = run(
+        what, place, w1, n, onwards, next_strict, middle, slack, met, kept = run(
             drive, p, flags, start, w, v, nu, breaks, limit, reach, step, side, strict, record
         )
         if what != DIPPED or kept > 0:
             break
         strict = next_strict
-    back, leaving, used = 0, (0.0, 0.0), kept * COLUMNS
-    before, after = total(record, 0, kept), 0.0
+    used, back, after, way, held = HEAD + kept * COLUMNS, 0, 0.0, v, True
     if what == TURN:
         whole = v * ((place[0] - middle[0]) + (place[1] - middle[1]))
-        record, back = run_back(drive, p, flags, place[0], whole, v, n, changes, met, breaks, onwards, record, kept)
-        after, used = total(record, kept, kept + back), used + back * COLUMNS
-        spot, rates = spot_room(), spot_room()
-        spot[0] = place[0]
-        call_hold(hold, 1, spot, p, rates)
-        leaving = (rates[0], rates[1])
+        back = run_back(drive, p, flags, place[0], whole, v, n, met, breaks, onwards, record, used)
+        after = total(record, used, back)
+        way, held = released(hold, p, place[0])
     elif what == ASYMPTOTE:
-        record, back = approach(drive, p, flags, place[0], middle[0], v, n, changes, met, breaks, onwards, record, used)
-        used += back * FIELD
-    if used + met > record.size:
-        record = longer(record, used + met)
-    for k in range(met):
-        record[record.size - met + k] = changes[k]
-    return what, n, place, w1, onwards, next_strict, middle, slack, (before, after), leaving, (kept, back, met), record
+        back = approach(drive, p, flags, place[0], middle[0], v, n, met, breaks, onwards, record, used)
+    before = total(record, HEAD, kept)
+    record[END], record[END_LOW], record[MIDDLE], record[MIDDLE_LOW] = place[0], place[1], middle[0], middle[1]
+    record[SLACK], record[BEFORE], record[AFTER], record[MET] = slack, before, after, met
+    return (FULL if back < 0 else what), n, way, held, kept, back, place[0], w1, onwards, next_strict, before + after

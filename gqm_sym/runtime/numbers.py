@@ -32,9 +32,11 @@ _TIE_BITS = 700
 _GUARD_BITS = 16
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
+@dataclass(slots=True, eq=False, repr=False)
 class Number:
     """A finite real number, known exactly. Made by ``read_number``.
+
+    Nothing changes one once it is made; frozen, it would take four times as long to make.
 
     Attributes
     ----------
