@@ -60,7 +60,7 @@ def dissipative() -> list[tuple[str, float]]:
     p = model.numbers(tuple(friction.PARAMETERS.values()))
     loss = model.dissipation
     assert loss is not None
-    launch = (loss.drive, loss.hold, p.values, loss.kinds, -1.0, 6.2088**2, 1, 0, np.empty(0))
+    launch = (*loss, p.values, -1.0, 6.2088**2, 1, 0, np.empty(0))
     record = np.empty(16 * COLUMNS)
     leg = (*launch, inf, 1.0, 0.25, 0, 0.0, record)
     what, *_, ahead, count, _, _, _, _, _ = legs.follow(*leg)

@@ -8,6 +8,7 @@ from math import cos, fabs, fsum, pi, sin
 
 import numpy as np
 
+from gqm_sym.runtime.fused import fma
 from gqm_sym.runtime.jit import Inner
 from gqm_sym.runtime.matrices import columns, span
 
@@ -79,17 +80,27 @@ FINEST = 2.0**-30
 # Where a search keeps the part it looks at, what that is told from, and the ends of parts that wait.
 PART, TWICE, ABOVE, BELOW, WAITING = range(0, 5 * WIDE, WIDE)
 ROOM = WAITING + 64
-# The last step of Newton's method for a zero in [-1, 1].
-NEWTON = 1e-12
+# The last step of Newton's method for a zero in [-1, 1]: the next would be of the size of its square.
+NEWTON = 1e-9
 
 
 @Inner
 def chebyshev_sum(c, x):  # type: ignore[no-untyped-def]
     """The Chebyshev series with coefficients c, at x, by Clenshaw's recurrence."""
-    high, low = 0.0, 0.0
+    high, low, twice = 0.0, 0.0, 2.0 * x
     for k in range(c.size - 1, 0, -1):
-        high, low = c[k] + 2.0 * x * high - low, high
-    return c[0] + x * high - low
+        high, low = fma(twice, high, c[k] - low), high
+    return fma(x, high, c[0] - low)
+
+
+@Inner
+def _at_ends(c):  # type: ignore[no-untyped-def]
+    """The series at -1 and at 1."""
+    even, odd = c[0], 0.0
+    for k in range(1, COUNT - 1, 2):
+        odd += c[k]
+        even += c[k + 1]
+    return even - odd, even + odd
 
 
 @Inner
@@ -125,17 +136,16 @@ def _sum_and_slope(c, x):  # type: ignore[no-untyped-def]
     """The series and its derivative at x."""
     high, low, steep, flat = 0.0, 0.0, 0.0, 0.0
     twice = 2.0 * x
-    for k in range(c.size - 1, 0, -1):
-        steep, flat = 2.0 * high + (twice * steep - flat), steep
-        high, low = (c[k] - low) + twice * high, high
-    return (c[0] - low) + x * high, high + (x * steep - flat)
+    for k in range(COUNT - 1, 0, -1):
+        steep, flat = fma(twice, steep, fma(2.0, high, -flat)), steep
+        high, low = fma(twice, high, c[k] - low), high
+    return fma(x, high, c[0] - low), high + fma(x, steep, -flat)
 
 
 @Inner
-def _crossing(c, rising):  # type: ignore[no-untyped-def]
-    """The zero of a monotone series that changes sign over [-1, 1], by Newton's method inside a bracket."""
-    lo, hi = -1.0, 1.0
-    low, high = chebyshev_sum(c, lo), chebyshev_sum(c, hi)
+def _crossing(c, low, high):  # type: ignore[no-untyped-def]
+    """The zero of a monotone series that goes from ``low`` to ``high``, by Newton's method inside a bracket."""
+    lo, hi, rising = -1.0, 1.0, high > 0.0
     x = lo + (hi - lo) * (low / (low - high))
     for _ in range(60):
         value, slope = _sum_and_slope(c, x)
@@ -148,7 +158,6 @@ def _crossing(c, rising):  # type: ignore[no-untyped-def]
         new = x - value / slope
         if not lo <= new <= hi:
             new = 0.5 * (lo + hi)
-        # Steps shrink as their squares: after one this short the next would be below rounding.
         if fabs(new - x) <= NEWTON or hi - lo <= 2e-16:
             return new
         x = new
@@ -190,7 +199,7 @@ def first_change(c, sign, noise):  # type: ignore[no-untyped-def]
                 return (lo if unsure > 1.0 else 0.5 * (unsure + lo)), before, touch
             unsure = 2.0
         elif fabs(part[0]) + spread > noise and _is_monotone(part):
-            left, right = chebyshev_sum(part, -1.0), chebyshev_sum(part, 1.0)
+            left, right = _at_ends(part)
             if before == 0:
                 before = 0 if fabs(left) <= noise else (1 if left > 0.0 else -1)
             if fabs(right) > noise:
@@ -200,7 +209,7 @@ def first_change(c, sign, noise):  # type: ignore[no-untyped-def]
                 if found != before:
                     if left * found >= 0.0:
                         return lo, before, touch
-                    return lo + 0.5 * (hi - lo) * (1.0 + _crossing(part, found > 0)), before, touch
+                    return lo + 0.5 * (hi - lo) * (1.0 + _crossing(part, left, right)), before, touch
                 unsure = 2.0
         elif fabs(part[0]) + spread <= noise or hi - lo <= FINEST:
             if unsure > 1.0:

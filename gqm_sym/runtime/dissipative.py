@@ -89,7 +89,7 @@ class Dissipative(Motion):
     _whole: Course | None = None
 
     def __init__(self, problem: Problem, direction: int) -> None:
-        self._runs: list[Run] = []
+        self._runs: list[tuple[Any, ...]] = []
         self._done: list[Piece] = []
         super().__init__(problem, "dissipative", direction)
         if not _loss(problem).friction:
@@ -213,7 +213,7 @@ class Dissipative(Motion):
     def _pieces(self) -> list[Piece]:
         """All pieces so far."""
         for run in self._runs:
-            self._lay(run)
+            self._lay(Run(*run))
         self._runs.clear()
         return self._done
 
@@ -231,7 +231,7 @@ class Dissipative(Motion):
         limit = start + way * far if period else end
         breaks = np.ascontiguousarray(f.between(f.breaks, start, limit)[::way]) if f.breaks.size else NOWHERE
         reach = inf if isfinite(end) else self._reach
-        run = (loss.drive, loss.hold, f.p, loss.kinds, start, self._w, way, self._nu, breaks, limit)
+        run = (*loss, f.p, start, self._w, way, self._nu, breaks, limit)
         side = SIDES[problem.launch.contact]
         while True:
             record = np.empty(self._room)
@@ -251,8 +251,11 @@ class Dissipative(Motion):
                 f"V**2 beyond {problem.formulas.parameter} = {place!r} could not be followed; "
                 "are the curve and the force smooth there?"
             )
-        name = self._end_name(what, place, new_way)
-        self._runs.append(Run(start, ahead, back, record, what, name, self._laps))
+        if what == TURN:
+            name = "rest" if new_way == 0 or (place == start and self._w == 0.0) else "turn"
+        else:
+            name = self._end_name(what, place)
+        self._runs.append((start, ahead, back, record, what, name, self._laps))
         self._place, self._w, self._way, self._nu, self._step, self._strict = place, w_end, new_way, nu, step, strict
         self._elapsed, lost = two_sum.py_func(self._elapsed, time)
         self._rest += lost
@@ -278,11 +281,9 @@ class Dissipative(Motion):
         self._place -= count * period
         self._laps += count
 
-    def _end_name(self, what: int, place: float, way: int) -> str:
-        """What ends a run, after which the body goes a certain way."""
+    def _end_name(self, what: int, place: float) -> str:
+        """What ends a run that does not turn."""
         problem, f, start = self.problem, self.problem.functions, self._place
-        if what == TURN:
-            return "rest" if way == 0 or (place == start and self._w == 0.0) else "turn"
         if what == LIMIT and not problem.period:
             return domain_end(problem, self._way).what
         if what == NARROWED:

@@ -142,11 +142,6 @@ class Dissipation(NamedTuple):
     kinked: bool
     linear: bool
 
-    @property
-    def kinds(self) -> tuple[bool, bool, bool]:
-        """Of what kind the forces are."""
-        return self[2:]
-
 
 class ExactClimb(NamedTuple):
     """What a module of a charted curve has of them: ``f(op, x, z, p)``, the climb and its derivatives by x and z."""

@@ -13,6 +13,7 @@ from gqm_sym.runtime.chebyshev import (
     to_ends,
     to_tails,
 )
+from gqm_sym.runtime.fused import bits, from_bits
 from gqm_sym.runtime.jit import Inlined, Inner
 from gqm_sym.runtime.leg_equation import (
     BARE,
@@ -53,8 +54,12 @@ ONE_SIGN, CLEAR = 1e-14, 1e-7
 NOISE = 1e-15
 # A width of a few units in the last place of the parameter.
 NARROW = 1e-15
-# Coefficients that fall by this factor a degree reach TAIL with the last ones but one.
-FALL = 5.4
+# Coefficients that fall by this factor a degree reach TAIL with the last ones but one; those in the middle are as many
+# degrees from the first.
+FALL, DEGREES = 5.4, 15
+# Bits of 1.0, and what x**(-1/DEGREES) would have if logarithms were straight lines between powers of two.
+ONE = 0x3FF0000000000000
+STRAIGHT = ONE + ONE // DEGREES
 # A panel is made this much narrower than it would seem to be allowed to be, and at most that many times wider.
 CAUTION, GROWTH = 0.9, 4.0
 # V**2 at a panel's end against the largest so far from which on time is resolved: below, a turn is expected, and time
@@ -128,7 +133,8 @@ def growth(worst):  # type: ignore[no-untyped-def]
     """By what a panel's width may be multiplied: coefficients are powers of the distance of what is not smooth."""
     if worst == 0.0:
         return GROWTH
-    return min(CAUTION * worst ** (-1.0 / 15.0) / FALL, GROWTH) if worst < inf else 0.5
+    # A root to a few per cent is as good as any.
+    return min(CAUTION / FALL * from_bits(STRAIGHT - bits(worst) // DEGREES), GROWTH) if worst < inf else 0.5
 
 
 @Inner

@@ -86,12 +86,32 @@ def way_from_rest(hold, p, place):  # type: ignore[no-untyped-def]
 
 @entry(
     types.Tuple((_WHOLE, _WHOLE, _WHOLE, types.boolean, _WHOLE, _WHOLE, _FLOAT, _FLOAT, _FLOAT, _FLOAT, _FLOAT))(
-        *(_WHOLE, _WHOLE, _LINE, types.UniTuple(types.boolean, 3), _FLOAT, _FLOAT, _WHOLE, _WHOLE, _LINE),
+        *(_WHOLE, _WHOLE, types.boolean, types.boolean, types.boolean, _LINE, _FLOAT, _FLOAT, _WHOLE, _WHOLE, _LINE),
         *(_FLOAT, _FLOAT, _FLOAT, _WHOLE, _FLOAT, _LINE),
     )
 )
-def follow(drive, hold, p, flags, start, w, v, nu, breaks, limit, reach, step, side, strict, record):  # type: ignore[no-untyped-def]
+def follow(  # type: ignore[no-untyped-def]
+    drive,
+    hold,
+    friction,
+    kinked,
+    linear,
+    p,
+    start,
+    w,
+    v,
+    nu,
+    breaks,
+    limit,
+    reach,
+    step,
+    side,
+    strict,
+    record,
+):
     """`run`, and from where that ends with V**2 = 0 back to its ``middle``; what it finds stands in the record.
+
+    The forces are told of as by `interface.Dissipation`.
 
     Returns
     -------
@@ -106,6 +126,7 @@ def follow(drive, hold, p, flags, start, w, v, nu, breaks, limit, reach, step, s
     time : float
         Of the whole leg.
     """
+    flags = (friction, kinked, linear)
     while True:
         what, place, w1, n, onwards, next_strict, middle, slack, met, kept = run(
             drive, p, flags, start, w, v, nu, breaks, limit, reach, step, side, strict, record
