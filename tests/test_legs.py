@@ -14,13 +14,12 @@ from gqm_sym.runtime.chebyshev import (
     COUNT,
     GRADED_MEANS,
     MEANS,
-    MEANS_BY_NODE,
     SHARES,
     TO_COEFFICIENTS,
     WIDE,
     extent,
     first_change,
-    to_ends,
+    to_means,
 )
 from gqm_sym.runtime.leg_stretches import INTEGRAL_BY_NODE, PLAIN_BY_NODE
 
@@ -58,7 +57,7 @@ def test_sums_in_registers() -> None:
 
 @numba.njit
 def _sums(values, out):  # type: ignore[no-untyped-def]
-    to_ends(MEANS_BY_NODE, values, 7, out, WIDE)
+    to_means(values, 7, out, WIDE)
 
 
 @numba.njit

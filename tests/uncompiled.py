@@ -53,12 +53,16 @@ _MATH: dict[Any, Any] = {getattr(math, name): getattr(np, other) for name, other
 _MATH |= {math.floor: _whole(math.floor), math.ceil: _whole(math.ceil), numba.carray: _carray}
 
 
-def _sums(table: Any, values: Any, at: int, out: Any, to: int) -> None:
-    """Add up rows of a table, as `matrices.columns` does."""
-    total = np.zeros(table.shape[1])
-    for value, row in zip(values.reshape(-1)[at : at + len(table)], table, strict=True):
-        total = total + value * row
-    out.reshape(-1)[to : to + total.size] = total
+def _sums(table: Any) -> Callable[..., None]:
+    """Give what adds up rows of a table, as `matrices.times` does."""
+
+    def sums(values: Any, at: int, out: Any, to: int) -> None:
+        total = np.zeros(table.shape[1])
+        for value, row in zip(values.reshape(-1)[at : at + len(table)], table, strict=True):
+            total = total + value * row
+        out.reshape(-1)[to : to + total.size] = total
+
+    return sums
 
 
 def _extent(values: Any, at: int) -> tuple[Any, Any]:
@@ -91,7 +95,7 @@ def _drive(address: int, n: int, work: Any, lam: int, v2: int, v: float, nu: flo
     _FUNCTIONS[address](n, work[lam:], work[v2:], v, nu, p, work[out:])
 
 
-_QUICK = {"sums": _sums, "least_and_greatest": _extent, "call_drive": _drive}
+_QUICK = {"uncounted": lambda array: array, "least_and_greatest": _extent, "call_drive": _drive}
 _QUICK |= {"fma": lambda x, y, z: np.float64(_fma(x, y, z)), "nearest_whole": np.rint, "whole_below": np.floor}
 _QUICK |= {"choose": lambda condition, x, y: np.float64(x if condition else y)}
 _QUICK |= {
@@ -129,6 +133,8 @@ def _alike(value: Any) -> Any:
     if isinstance(value, _Intrinsic):
         if value._name == "fill_row":
             return _row(value)
+        if value._name == "sums":
+            return _sums(value.table)
         if value._name == "copy_row":
             return _copy(value.width)
         if value._name == "stacked":

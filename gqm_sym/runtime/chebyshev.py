@@ -10,7 +10,7 @@ import numpy as np
 
 from gqm_sym.runtime.fused import fma
 from gqm_sym.runtime.jit import Inner
-from gqm_sym.runtime.matrices import columns, span
+from gqm_sym.runtime.matrices import span, times
 
 # With the panel's end these fill three registers.
 COUNT = 23
@@ -31,8 +31,8 @@ def _tables() -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     shares = np.array([sin(0.25 * pi * m / COUNT) ** 2 for m in odd])
     # T_k at node j, with x = -cos(angle).
     at_nodes = (-1.0) ** degree[:, None] * sines[(np.outer(degree, odd) + COUNT) % (4 * COUNT)]
-    to_coefficients = at_nodes * (2.0 / COUNT)
-    to_coefficients[0] *= 0.5
+    coefficients = at_nodes * (2.0 / COUNT)
+    coefficients[0] *= 0.5
     one = 1 << 240
 
     def both_means(share: float) -> tuple[list[float], list[float]]:
@@ -50,28 +50,26 @@ def _tables() -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         return [area / y for area in areas[:COUNT]], [2 * moment * one / (y * y) for moment in moments]
 
     means, graded = (np.array(rows) for rows in zip(*map(both_means, (*shares.tolist(), 1.0)), strict=True))
-    times = [[fsum(row * column) for column in to_coefficients.T] for row in means]
-    graded_times = [[fsum(row * column) for column in to_coefficients.T] for row in graded]
-    return shares, np.array(times), np.array(graded_times), to_coefficients
+    times = [[fsum(row * column) for column in coefficients.T] for row in means]
+    graded_times = [[fsum(row * column) for column in coefficients.T] for row in graded]
+    return shares, np.array(times), np.array(graded_times), coefficients
 
 
 # Node j lies at ``SHARES[j]`` of the panel. Row j of ``MEANS`` gives the mean from the panel's start to that node, the
 # last row that over the whole panel; ``GRADED_MEANS`` those with respect to the square of the share.
 SHARES, MEANS, GRADED_MEANS, TO_COEFFICIENTS = _tables()
 
-# The same by columns, as `matrices` takes them: a row a node, padded to whole registers. The last has the coefficients
-# that tell how well a function is resolved, three at the end and three in the middle, and the mean over the panel.
+# A row of values at the nodes is padded to whole registers, behind them the panel's end; so are what tables make of it.
 WIDE = 24
 ENDS_BY_NODE = np.pad(np.append(SHARES, 1.0), (0, WIDE - COUNT - 1))
-MEANS_BY_NODE, GRADED_BY_NODE, COEFFICIENTS_BY_NODE = (
-    np.ascontiguousarray(np.pad(table.T, ((0, 0), (0, WIDE - len(table)))))
-    for table in (MEANS, GRADED_MEANS, TO_COEFFICIENTS)
+to_means, to_graded_means, to_coefficients = (
+    times(np.pad(table.T, ((0, 0), (0, WIDE - len(table))))) for table in (MEANS, GRADED_MEANS, TO_COEFFICIENTS)
 )
+# Coefficients that tell how well a function is resolved, three at the end and three in the middle; the mean over
+# the panel.
 LAST, MIDDLE = slice(COUNT - 3, COUNT), slice(14, 17)
-TAILS_BY_NODE = np.ascontiguousarray(
-    np.pad(np.vstack([TO_COEFFICIENTS[LAST], TO_COEFFICIENTS[MIDDLE], MEANS[COUNT]]).T, ((0, 0), (0, 1)))
-)
-to_ends, to_tails, extent = columns(COUNT, WIDE), columns(COUNT, TAILS_BY_NODE.shape[1]), span(COUNT)
+to_tails = times(np.pad(np.vstack([TO_COEFFICIENTS[LAST], TO_COEFFICIENTS[MIDDLE], MEANS[COUNT]]).T, ((0, 0), (0, 1))))
+extent = span(COUNT)
 # A polynomial on the panel is nowhere further from a number than this many times its values at the nodes.
 LEBESGUE = 3.0
 
@@ -116,7 +114,7 @@ def _restrict(c, lo, hi, room):  # type: ignore[no-untyped-def]
             room[ABOVE + j], room[BELOW + j] = term + room[TWICE + j] * before - room[BELOW + j], before
     for j in range(WIDE):
         room[TWICE + j] = c[0] + 0.5 * room[TWICE + j] * room[ABOVE + j] - room[BELOW + j]
-    to_ends(COEFFICIENTS_BY_NODE, room, TWICE, room, PART)
+    to_coefficients(room, TWICE, room, PART)
 
 
 @Inner

@@ -12,7 +12,7 @@ column  meaning
 
 from math import fabs
 
-from gqm_sym.runtime.chebyshev import COEFFICIENTS_BY_NODE, COUNT, chebyshev_sum, to_ends
+from gqm_sym.runtime.chebyshev import COUNT, chebyshev_sum, to_coefficients
 from gqm_sym.runtime.jit import Inner
 from gqm_sym.runtime.leg_equation import BARE, DS, PLACE, SERIES, panel_room, set_nodes
 from gqm_sym.runtime.leg_equation import W as V2
@@ -49,13 +49,13 @@ def approach(drive, p, flags, top, end, v, nu, met, breaks, step, record, used):
         record[row], record[row + 1] = left, right
         if count == 0:
             # V**2 over d vanishes at the equilibrium, as the force does.
-            to_ends(COEFFICIENTS_BY_NODE, work, BARE, work, SERIES)
+            to_coefficients(work, BARE, work, SERIES)
             least = chebyshev_sum(work[SERIES : SERIES + COUNT], -1.0)
         for j in range(COUNT):
             d = left + work[PLACE + j]
             work[BARE + j] = (work[BARE + j] - least) / d if count == 0 else work[V2 + j] / (d * d)
         for begin, values in ((2, BARE), (2 + COUNT, DS)):
-            to_ends(COEFFICIENTS_BY_NODE, work, values, work, SERIES)
+            to_coefficients(work, values, work, SERIES)
             for k in range(COUNT):
                 record[row + begin + k] = work[SERIES + k]
         count, base, left = count + 1, work[V2 + COUNT], right

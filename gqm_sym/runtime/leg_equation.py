@@ -17,11 +17,10 @@ import numpy as np
 from gqm_sym.runtime.chebyshev import (
     COUNT,
     ENDS_BY_NODE,
-    GRADED_BY_NODE,
-    MEANS_BY_NODE,
     WIDE,
     extent,
-    to_ends,
+    to_graded_means,
+    to_means,
 )
 from gqm_sym.runtime.crossing import call_drive
 from gqm_sym.runtime.fused import fma, polynomial
@@ -126,7 +125,7 @@ def sample(drive, p, u, g, near, v, nu, work):  # type: ignore[no-untyped-def]
 def integrate(u, g, c, left, base, out, work):  # type: ignore[no-untyped-def]
     """W over the panel, in the row at ``out``, for the forces that were sampled; q over the panel."""
     near = 2.0 * g * left + c
-    to_ends(MEANS_BY_NODE, work, PULL, work, SPEED)
+    to_means(work, PULL, work, SPEED)
     product(work, SPEED, SPEED, PLACE)
     far = work[SPEED + COUNT]
     if not fabs(far) <= STEEPEST:
@@ -134,9 +133,9 @@ def integrate(u, g, c, left, base, out, work):  # type: ignore[no-untyped-def]
     grow(work, SPEED, SWELL)
     swelled_force(work, FORCE, P, SWELL, float(u))
     # The integral over the distance: means, and where the march is graded those with the weight y.
-    to_ends(MEANS_BY_NODE, work, FORCE, work, MEAN)
+    to_means(work, FORCE, work, MEAN)
     if g > 0.0:
-        to_ends(GRADED_BY_NODE, work, FORCE, work, GRADED)
+        to_graded_means(work, FORCE, work, GRADED)
         graded_gain(work, SPEED, PLACE, MEAN, GRADED, near)
     else:
         product(work, SPEED, PLACE, MEAN)

@@ -3,14 +3,12 @@
 from math import fabs, inf
 
 from gqm_sym.runtime.chebyshev import (
-    COEFFICIENTS_BY_NODE,
     COUNT,
     LEBESGUE,
-    TAILS_BY_NODE,
     WIDE,
     extent,
     first_change,
-    to_ends,
+    to_coefficients,
     to_tails,
 )
 from gqm_sym.runtime.fused import bits, from_bits
@@ -106,7 +104,7 @@ def weigh(base, bare, work):  # type: ignore[no-untyped-def]
 @Inner
 def falls(work, row, size):  # type: ignore[no-untyped-def]
     """The size of a function's last coefficients and of some in the middle, and whether it is resolved."""
-    to_tails(TAILS_BY_NODE, work, row, work, TAILS)
+    to_tails(work, row, work, TAILS)
     tail, level = last_of(work), max(fabs(work[TAILS + 3]), max(fabs(work[TAILS + 4]), fabs(work[TAILS + 5])))
     return tail, level, tail <= TAIL * size or (level <= PLATEAU * size and tail >= 0.05 * level)
 
@@ -173,7 +171,7 @@ def change_of(work, row, sign, noise):  # type: ignore[no-untyped-def]
         found = 1 if work[row] > 0.0 else -1
         if sign == 0 or found == sign:
             return 2.0, found, 2.0
-    to_ends(COEFFICIENTS_BY_NODE, work, row, work, SERIES)
+    to_coefficients(work, row, work, SERIES)
     return first_change(work[SERIES : SERIES + COUNT], sign, noise)
 
 

@@ -5,7 +5,7 @@ its end: panels from a turn, or a field from an equilibrium (`fields`); at its e
 changes sign.
 """
 
-from gqm_sym.runtime.chebyshev import COUNT, TAILS_BY_NODE, WIDE, to_tails
+from gqm_sym.runtime.chebyshev import COUNT, WIDE, to_tails
 from gqm_sym.runtime.doubledouble import two_sum
 from gqm_sym.runtime.jit import Inlined, Inner
 from gqm_sym.runtime.lanes import copied
@@ -43,7 +43,7 @@ def last_of(work):  # type: ignore[no-untyped-def]
 @Inner
 def keep(record, at, right, width, work):  # type: ignore[no-untyped-def]
     """Enter a panel that ends at w = ``right``, from ``at`` on."""
-    to_tails(TAILS_BY_NODE, work, PACE, work, TAILS)
+    to_tails(work, PACE, work, TAILS)
     copy(record, at, work, PACE)
     copy(record, at + WIDE, work, ARC)
     copy(record, at + 2 * WIDE, work, SPEED)

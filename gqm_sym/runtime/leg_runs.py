@@ -5,7 +5,7 @@ Time is counted on the way, as long as V**2 is large; from where it falls for go
 
 from math import exp, fabs, inf, sqrt
 
-from gqm_sym.runtime.chebyshev import COEFFICIENTS_BY_NODE, COUNT, chebyshev_sum, extent, to_ends
+from gqm_sym.runtime.chebyshev import COUNT, chebyshev_sum, extent, to_coefficients
 from gqm_sym.runtime.crossing import call_drive
 from gqm_sym.runtime.doubledouble import two_sum
 from gqm_sym.runtime.jit import Inner
@@ -64,7 +64,7 @@ def bottom(work, v, touch):  # type: ignore[no-untyped-def]
     """The place x near ``touch`` where V**2, all but zero there, is least: the force vanishes."""
     for j in range(COUNT):
         work[MEAN + j] = v * (work[GAIN + j] - work[LOSS + j] * work[V2 + j])
-    to_ends(COEFFICIENTS_BY_NODE, work, MEAN, work, SERIES)
+    to_coefficients(work, MEAN, work, SERIES)
     c = work[SERIES : SERIES + COUNT]
     x, new = touch, touch + 1e-4
     before = chebyshev_sum(c, x)

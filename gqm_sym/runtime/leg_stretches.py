@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import types
 
-from gqm_sym.runtime.chebyshev import COUNT, TO_COEFFICIENTS, WIDE, to_ends
+from gqm_sym.runtime.chebyshev import COUNT, TO_COEFFICIENTS, WIDE
 from gqm_sym.runtime.clocks import Array
 from gqm_sym.runtime.course import Pair
 from gqm_sym.runtime.fields import COLUMNS as FIELD
@@ -14,6 +14,7 @@ from gqm_sym.runtime.functions import Functions
 from gqm_sym.runtime.integrands import FROM_TURN, REGULAR, TO_EQUILIBRIUM
 from gqm_sym.runtime.jit import entry
 from gqm_sym.runtime.leg_records import COLUMNS, ERROR, HEAD, MET, RIGHT, SLACK, TIME
+from gqm_sym.runtime.matrices import times
 from gqm_sym.runtime.panels import CONVERGED
 from gqm_sym.runtime.stretch import ULP, Stretch
 
@@ -41,6 +42,7 @@ def _to_legendre() -> tuple[Array, Array]:
 
 
 PLAIN_BY_NODE, INTEGRAL_BY_NODE = _to_legendre()
+to_plain, to_integral = times(PLAIN_BY_NODE), times(INTEGRAL_BY_NODE)
 
 _LINE = types.float64[::1]
 _ROWS = types.float64[:, ::1]
@@ -52,7 +54,7 @@ def read_panels(panels, time):  # type: ignore[no-untyped-def]
 
     Returns
     -------
-    edges, times, lengths, time_terms, length_terms : arrays
+    edges, clock, lengths, time_terms, length_terms : arrays
         As `panels.lay` has them; the last anomaly is 1.
     speed_terms : (n, WIDE) array
         Legendre coefficients of Y.
@@ -60,25 +62,25 @@ def read_panels(panels, time):  # type: ignore[no-untyped-def]
         Estimated relative error of the time.
     """
     n = panels.shape[0]
-    edges, times, lengths = np.zeros(n + 1), np.zeros(n + 1), np.zeros(n + 1)
+    edges, clock, lengths = np.zeros(n + 1), np.zeros(n + 1), np.zeros(n + 1)
     time_terms, length_terms, speed_terms = np.empty((n, WIDE)), np.empty((n, WIDE)), np.empty((n, WIDE))
     out, error, last = np.empty(3 * WIDE), 0.0, panels[n - 1, RIGHT]
     for k in range(n):
         half = 0.5 * (panels[k, RIGHT] - (panels[k - 1, RIGHT] if k > 0 else 0.0))
         at = k * COLUMNS
-        to_ends(INTEGRAL_BY_NODE, panels, at, out, 0)
-        to_ends(INTEGRAL_BY_NODE, panels, at + WIDE, out, WIDE)
-        to_ends(PLAIN_BY_NODE, panels, at + 2 * WIDE, out, 2 * WIDE)
+        to_integral(panels, at, out, 0)
+        to_integral(panels, at + WIDE, out, WIDE)
+        to_plain(panels, at + 2 * WIDE, out, 2 * WIDE)
         length = 0.0
         for j in range(WIDE):
             time_terms[k, j], length_terms[k, j] = half * out[j], half * out[WIDE + j]
             speed_terms[k, j] = out[2 * WIDE + j]
             length += length_terms[k, j]
         edges[k + 1] = panels[k, RIGHT] / last
-        times[k + 1], lengths[k + 1] = times[k] + panels[k, TIME], lengths[k] + length
+        clock[k + 1], lengths[k + 1] = clock[k] + panels[k, TIME], lengths[k] + length
         error += panels[k, ERROR]
-    times[n] = time
-    return edges, times, lengths, time_terms, length_terms, speed_terms, error / time + ULP if time > 0.0 else ULP
+    clock[n] = time
+    return edges, clock, lengths, time_terms, length_terms, speed_terms, error / time + ULP if time > 0.0 else ULP
 
 
 class Run(NamedTuple):

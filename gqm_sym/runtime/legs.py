@@ -13,6 +13,7 @@ from gqm_sym.runtime.chebyshev import COUNT
 from gqm_sym.runtime.crossing import call_hold
 from gqm_sym.runtime.fields import approach
 from gqm_sym.runtime.jit import Inner, entry
+from gqm_sym.runtime.lanes import uncounted
 from gqm_sym.runtime.leg_equation import W, panel_room, set_nodes
 from gqm_sym.runtime.leg_panels import ALWAYS, next_panel, next_stop
 from gqm_sym.runtime.leg_records import (
@@ -126,7 +127,7 @@ def follow(  # type: ignore[no-untyped-def]
     time : float
         Of the whole leg.
     """
-    flags = (friction, kinked, linear)
+    flags, p, breaks, record = (friction, kinked, linear), uncounted(p), uncounted(breaks), uncounted(record)
     while True:
         what, place, w1, n, onwards, next_strict, middle, slack, met, kept = run(
             drive, p, flags, start, w, v, nu, breaks, limit, reach, step, side, strict, record

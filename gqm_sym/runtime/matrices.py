@@ -10,7 +10,7 @@ from typing import Any
 
 from llvmlite import ir
 from numba import types
-from numba.core.cgutils import get_or_insert_function
+from numba.core.cgutils import get_or_insert_function, global_constant
 from numba.extending import intrinsic
 
 from gqm_sym.runtime.lanes import INDEX, LANES, REAL, REGISTER, line_of, register, spread
@@ -20,39 +20,45 @@ SUMS = 6
 _FUSED = ir.FunctionType(REGISTER, [REGISTER] * 3)
 
 
-def columns(rows: int, width: int) -> Any:
-    """A compiled function ``f(table, values, at, out, to)``, table of ``rows`` rows of ``width``.
+def times(table: Any) -> Any:
+    """A compiled function ``f(values, at, out, to)`` for a table of some rows as wide as some registers.
 
     It does ``out[to : to + width] = values[at : at + rows] @ table``, the arrays read as one line of numbers: a slice
-    would cost more than the sums. ``width`` is a multiple of `LANES`; nothing is checked.
+    would cost more than the sums. Nothing is checked.
     """
+    rows, width = table.shape
+    blocks = width // LANES
+    chains = max(SUMS // blocks, 1)
+    numbers = ir.Constant(ir.ArrayType(REAL, table.size), table.ravel().tolist())
 
     def lower(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        table, values, out = (line_of(context, builder, signature.args[k], args[k]) for k in (0, 1, 3))
-        values, out = builder.gep(values, [args[2]]), builder.gep(out, [args[4]])
+        values, out = (
+            builder.gep(line_of(context, builder, signature.args[k], args[k]), [args[k + 1]]) for k in (0, 2)
+        )
+        held = global_constant(builder, "table", numbers)
+        held.align = 8 * LANES
         # A table that LLVM sees through is so many constants to it, each loaded from an address of its own, and kept on
         # the stack around a loop.
-        unseen = ir.FunctionType(table.type, [table.type])
-        table = builder.asm(unseen, "", "=r,0", [table], side_effect=False)
+        unseen = ir.FunctionType(REAL.as_pointer(), [REAL.as_pointer()])
+        entries = builder.asm(unseen, "", "=r,0", [builder.bitcast(held, REAL.as_pointer())], side_effect=False)
         fused = get_or_insert_function(builder.module, _FUSED, f"llvm.fma.v{LANES}f64")
-        blocks = width // LANES
-        chains = max(SUMS // blocks, 1)
         totals = [[ir.Constant(REGISTER, [0.0] * LANES)] * blocks for _ in range(chains)]
         for row in range(rows):
             each = spread(builder, builder.load(builder.gep(values, [ir.Constant(INDEX, row)])))
             chain = totals[row % chains]
             for block in range(blocks):
-                entries = builder.load(register(builder, table, row * width + block * LANES), align=8)
-                chain[block] = builder.call(fused, (each, entries, chain[block]))
+                entry = builder.load(register(builder, entries, row * width + block * LANES), align=8 * LANES)
+                chain[block] = builder.call(fused, (each, entry, chain[block]))
         for block, parts in enumerate(zip(*totals, strict=True)):
             builder.store(reduce(builder.fadd, parts), register(builder, out, block * LANES), align=8)
         return context.get_dummy_value()
 
     @intrinsic
-    def sums(_, table, values, at, out, to):  # type: ignore[no-untyped-def]
+    def sums(_, values, at, out, to):  # type: ignore[no-untyped-def]
         """``out[to:] = values[at:] @ table``."""
-        return types.void(table, values, types.intp, out, types.intp), lower
+        return types.void(values, types.intp, out, types.intp), lower
 
+    sums.table = table
     return sums
 
 
