@@ -19,6 +19,7 @@ from gqm_sym.runtime.chebyshev import (
     WIDE,
     extent,
     first_change,
+    size_of,
     to_means,
 )
 from gqm_sym.runtime.leg_stretches import INTEGRAL_BY_NODE, PLAIN_BY_NODE
@@ -52,7 +53,7 @@ def test_sums_in_registers() -> None:
     assert out[WIDE : WIDE + COUNT + 1] == pytest.approx(MEANS @ values[7 : 7 + COUNT], abs=TABLE)
     assert not out[:WIDE].any()
     inside = values[5 : 5 + COUNT]
-    assert _span(values) == (inside.min(), inside.max())
+    assert _span(values) == (inside.min(), inside.max(), np.abs(inside).max())
 
 
 @numba.njit
@@ -62,7 +63,7 @@ def _sums(values, out):  # type: ignore[no-untyped-def]
 
 @numba.njit
 def _span(values):  # type: ignore[no-untyped-def]
-    return extent(values, 5)
+    return *extent(values, 5), size_of(values, 5)
 
 
 def test_integrals_in_legendre_polynomials() -> None:

@@ -71,6 +71,11 @@ def _extent(values: Any, at: int) -> tuple[Any, Any]:
     return np.fmin.reduce(part), np.fmax.reduce(part)
 
 
+def _size(values: Any, at: int) -> Any:
+    """Give the largest of a panel's values, as `matrices.largest` does."""
+    return np.fmax.reduce(np.abs(values.reshape(-1)[at : at + COUNT]))
+
+
 def _row(intrinsic: Any) -> Callable[..., None]:
     """Give a row by a formula of others, as `lanes.over_rows` does."""
 
@@ -95,7 +100,7 @@ def _drive(address: int, n: int, work: Any, lam: int, v2: int, v: float, nu: flo
     _FUNCTIONS[address](n, work[lam:], work[v2:], v, nu, p, work[out:])
 
 
-_QUICK = {"uncounted": lambda array: array, "least_and_greatest": _extent, "call_drive": _drive}
+_QUICK = {"uncounted": lambda array: array, "least_and_greatest": _extent, "size": _size, "call_drive": _drive}
 _QUICK |= {"fma": lambda x, y, z: np.float64(_fma(x, y, z)), "nearest_whole": np.rint, "whole_below": np.floor}
 _QUICK |= {"choose": lambda condition, x, y: np.float64(x if condition else y)}
 _QUICK |= {

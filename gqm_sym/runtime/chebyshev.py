@@ -10,7 +10,7 @@ import numpy as np
 
 from gqm_sym.runtime.fused import fma
 from gqm_sym.runtime.jit import Inner
-from gqm_sym.runtime.matrices import span, times
+from gqm_sym.runtime.matrices import largest, span, times
 
 # With the panel's end these fill three registers.
 COUNT = 23
@@ -69,7 +69,7 @@ to_means, to_graded_means, to_coefficients = (
 # the panel.
 LAST, MIDDLE = slice(COUNT - 3, COUNT), slice(14, 17)
 to_tails = times(np.pad(np.vstack([TO_COEFFICIENTS[LAST], TO_COEFFICIENTS[MIDDLE], MEANS[COUNT]]).T, ((0, 0), (0, 1))))
-extent = span(COUNT)
+extent, size_of = span(COUNT), largest(COUNT)
 # A polynomial on the panel is nowhere further from a number than this many times its values at the nodes.
 LEBESGUE = 3.0
 

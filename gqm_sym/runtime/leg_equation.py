@@ -18,7 +18,7 @@ from gqm_sym.runtime.chebyshev import (
     COUNT,
     ENDS_BY_NODE,
     WIDE,
-    extent,
+    size_of,
     to_graded_means,
     to_means,
 )
@@ -77,9 +77,8 @@ def marched(d, g, c):  # type: ignore[no-untyped-def]
 @Inner
 def grow(work, q, out):  # type: ignore[no-untyped-def]
     """Fill the row at ``out`` with exp - 1 of the row at ``q``, side by side."""
-    low, high = extent(work, q)
-    scale, doublings = 1.0, 0
-    while max(-low, high, fabs(work[q + COUNT])) * scale > SUMMED:
+    most, scale, doublings = max(size_of(work, q), fabs(work[q + COUNT])), 1.0, 0
+    while most * scale > SUMMED:
         scale, doublings = 0.5 * scale, doublings + 1
     for j in range(WIDE):
         x = work[q + j] * scale

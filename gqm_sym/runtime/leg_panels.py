@@ -8,6 +8,7 @@ from gqm_sym.runtime.chebyshev import (
     WIDE,
     extent,
     first_change,
+    size_of,
     to_coefficients,
     to_tails,
 )
@@ -75,13 +76,6 @@ NEVER, MAYBE, ALWAYS = range(3)
 def size_at(row):  # type: ignore[no-untyped-def]
     """Where the size is kept that a row's coefficients are held against."""
     return SIZES + row // WIDE
-
-
-@Inner
-def size_of(work, row):  # type: ignore[no-untyped-def]
-    """The largest value of a row, whatever its sign."""
-    low, high = extent(work, row)
-    return max(-low, high)
 
 
 @Inner

@@ -5,7 +5,7 @@ Time is counted on the way, as long as V**2 is large; from where it falls for go
 
 from math import exp, fabs, inf, sqrt
 
-from gqm_sym.runtime.chebyshev import COUNT, chebyshev_sum, extent, to_coefficients
+from gqm_sym.runtime.chebyshev import COUNT, chebyshev_sum, extent, size_of, to_coefficients
 from gqm_sym.runtime.crossing import call_drive
 from gqm_sym.runtime.doubledouble import two_sum
 from gqm_sym.runtime.jit import Inner
@@ -39,7 +39,6 @@ from gqm_sym.runtime.leg_panels import (
     change_of,
     next_panel,
     size_at,
-    size_of,
 )
 from gqm_sym.runtime.leg_records import COLUMNS, HEAD, change_at, has_room, keep
 

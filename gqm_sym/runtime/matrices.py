@@ -5,7 +5,7 @@ matrix, eight results side by side, the same order fills the registers; some sum
 them busy, for a sum waits for the one before.
 """
 
-from functools import reduce
+from functools import partial, reduce
 from typing import Any
 
 from llvmlite import ir
@@ -13,7 +13,7 @@ from numba import types
 from numba.core.cgutils import get_or_insert_function, global_constant
 from numba.extending import intrinsic
 
-from gqm_sym.runtime.lanes import INDEX, LANES, REAL, REGISTER, line_of, register, spread
+from gqm_sym.runtime.lanes import INDEX, LANES, REAL, REGISTER, Lanes, line_of, register, spread
 
 # Sums at work at a time.
 SUMS = 6
@@ -62,30 +62,38 @@ def times(table: Any) -> Any:
     return sums
 
 
+def _folded(builder: Any, order: str, value: Any) -> Any:
+    """The least or the greatest of a register's lanes."""
+    lanes = LANES
+    while lanes > 1:
+        lanes //= 2
+        halves = (
+            builder.shuffle_vector(value, value, ir.Constant(ir.VectorType(INDEX, lanes), list(range(k, k + lanes))))
+            for k in (0, lanes)
+        )
+        value = _of_two(builder, order, *halves)
+    return builder.extract_element(value, ir.Constant(INDEX, 0))
+
+
+def _of_two(builder: Any, order: str, one: Any, other: Any) -> Any:
+    return builder.select(builder.fcmp_ordered(order, one, other), one, other)
+
+
+def _registers(context: Any, builder: Any, signature: Any, args: Any, count: int) -> list[Any]:
+    """What holds ``count`` numbers of an array, some of them twice."""
+    values = builder.gep(line_of(context, builder, signature.args[0], args[0]), [args[1]])
+    return [builder.load(register(builder, values, min(at, count - LANES)), align=8) for at in range(0, count, LANES)]
+
+
 def span(count: int) -> Any:
-    """A compiled function ``f(values, at)``: the least and the greatest of ``count`` numbers, four or more.
+    """A compiled function ``f(values, at)``: the least and the greatest of ``count`` numbers, eight or more.
 
     What is not a number may be passed over.
     """
-    four = ir.VectorType(REAL, 4)
 
     def lower(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        values = builder.gep(line_of(context, builder, signature.args[0], args[0]), [args[1]])
-
-        def part(at: int) -> Any:
-            place = builder.gep(values, [ir.Constant(INDEX, min(4 * at, count - 4))])
-            return builder.load(builder.bitcast(place, four.as_pointer()), align=8)
-
-        def most(order: str, found: list[Any]) -> Any:
-            while len(found) > 1:
-                left, right, *rest = found
-                found = [*rest, builder.select(builder.fcmp_ordered(order, left, right), left, right)]
-            return found[0]
-
-        ends = []
-        for order in ("<", ">"):
-            lanes = most(order, [part(at) for at in range(-(-count // 4))])
-            ends.append(most(order, [builder.extract_element(lanes, ir.Constant(INDEX, k)) for k in range(4)]))
+        found = _registers(context, builder, signature, args, count)
+        ends = [_folded(builder, order, reduce(partial(_of_two, builder, order), found)) for order in ("<", ">")]
         return context.make_tuple(builder, signature.return_type, ends)
 
     @intrinsic
@@ -94,3 +102,19 @@ def span(count: int) -> Any:
         return types.UniTuple(types.float64, 2)(values, types.intp), lower
 
     return least_and_greatest
+
+
+def largest(count: int) -> Any:
+    """A compiled function ``f(values, at)``: the largest of ``count`` numbers whatever their signs, as `span` does."""
+
+    def lower(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        found = _registers(context, builder, signature, args, count)
+        sizes = [abs(Lanes(builder, value)).value for value in found]
+        return _folded(builder, ">", reduce(partial(_of_two, builder, ">"), sizes))
+
+    @intrinsic
+    def size(_, values, at):  # type: ignore[no-untyped-def]
+        """The largest."""
+        return types.float64(values, types.intp), lower
+
+    return size
