@@ -92,9 +92,8 @@ class Dissipative(Motion):
         self._runs: list[tuple[Any, ...]] = []
         self._done: list[Piece] = []
         super().__init__(problem, "dissipative", direction)
-        if not _loss(problem).friction:
-            self._joints = ("", "contact-sign")
-        self._place, self._w, self._way = problem.lam0, problem.w0, direction
+        launch = problem.launch
+        self._place, self._w, self._way = launch.lam0.value, launch.v0.value**2, direction
         step = starting_step(problem)
         self._step, self._reach = FIRST * step, problem.period or step
         self._go_on()
@@ -140,6 +139,10 @@ class Dissipative(Motion):
         return bool(np.any((places - reached) * self._way > 0.0))
 
     # -- what `Motion` asks -------------------------------------------------------------------
+
+    @property
+    def _joints(self) -> tuple[str, ...]:
+        return ("",) if _loss(self.problem).friction else ("", "contact-sign")
 
     def _course(self, reach: float) -> Course:
         if isfinite(self._horizon):
@@ -267,7 +270,7 @@ class Dissipative(Motion):
             return
         if period:
             self._fold(period)
-        if abs(self._place) > FARTHEST and abs(self._place) > FARTHEST * abs(problem.lam0):
+        if abs(place) > FARTHEST and abs(place) > FARTHEST * abs(problem.lam0):
             raise SolutionError(
                 f"the motion leaves the range of doubles at {problem.formulas.parameter} = {place!r}; "
                 "give a shorter t_max"

@@ -285,8 +285,10 @@ class Formulas:
         """The compiled functions with what they are given, and the exact problem of one launch."""
         if p.functions is None:
             p.functions = self._functions(p)
-        exact, (addresses, values, _, breaks, corners, period) = exact_problem(self, p, launch), p.functions
-        return p.functions if exact is None else Functions(addresses, values, exact, breaks, corners, period)
+        if self.exact is None:
+            return p.functions
+        addresses, values, _, breaks, corners, period = p.functions
+        return Functions(addresses, values, exact_problem(self, p, launch), breaks, corners, period)
 
     def _functions(self, p: Given) -> Functions:
         addresses = tuple(self.addresses)

@@ -56,9 +56,6 @@ class Motion(ABC):
     direction: int
     t_end: float
 
-    # Ends of pieces that end no leg.
-    _joints: tuple[str, ...] = ("",)
-
     def __init__(self, problem: Problem, kind: str, direction: int) -> None:
         self.problem = problem
         self.kind = kind
@@ -67,6 +64,11 @@ class Motion(ABC):
         self.t_end = inf if horizon is None else horizon.value
 
     # -- what subclasses say ------------------------------------------------------------------
+
+    @property
+    def _joints(self) -> tuple[str, ...]:
+        """Ends of pieces that end no leg."""
+        return ("",)
 
     @abstractmethod
     def _course(self, reach: float) -> Course:

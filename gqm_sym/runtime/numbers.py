@@ -40,22 +40,25 @@ class Number:
     ----------
     value
         Nearest double.
-    low
-        Nearest double of what the number is beyond ``value``.
     """
 
     value: float
-    low: float
-    # What it was made from: the exact value, or the tree of an irrational number.
-    _source: float | Fraction | ast.expr
-    _text: str | None
+    # For what is not a double: what it is beyond ``value``, what it was made from, and its text. Two numbers are made
+    # for every launch, doubles mostly, and each attribute of what is frozen takes its time.
+    _beyond: tuple[float, Fraction | ast.expr, str] | None
 
-    def __init__(self, value: float, low: float, source: float | Fraction | ast.expr, text: str | None) -> None:
-        # Half the time that a frozen class's own constructor takes: two are made for every launch.
+    def __init__(self, value: float, beyond: tuple[float, Fraction | ast.expr, str] | None = None) -> None:
         _set_value(self, value)
-        _set_low(self, low)
-        _set_source(self, source)
-        _set_text(self, text)
+        _set_beyond(self, beyond)
+
+    @property
+    def low(self) -> float:
+        """Nearest double of what the number is beyond ``value``."""
+        return 0.0 if self._beyond is None else self._beyond[0]
+
+    @property
+    def _source(self) -> float | Fraction | ast.expr:
+        return self.value if self._beyond is None else self._beyond[1]
 
     @property
     def fraction(self) -> Fraction | None:
@@ -67,7 +70,7 @@ class Number:
     @property
     def text(self) -> str:
         """The number as it was written."""
-        return repr(self.value) if self._text is None else self._text
+        return repr(self.value) if self._beyond is None else self._beyond[2]
 
     def at(self, ctx: Any) -> Any:
         """The number in an mpmath context, at its working precision.
@@ -110,7 +113,7 @@ class Number:
         return hash((self.value, self.low))
 
 
-_set_value, _set_low, _set_source, _set_text = (vars(Number)[name].__set__ for name in Number.__slots__)
+_set_value, _set_beyond = (vars(Number)[name].__set__ for name in Number.__slots__)
 
 Doubles: TypeAlias = NDArray[np.float64]
 Source: TypeAlias = "str | int | float | Fraction | Decimal | Number | Any"
@@ -134,7 +137,7 @@ def read_number(value: Source, *, where: str) -> Number:
     if type(value) is float:
         if value - value != 0.0:
             raise NumberError(f"{where}: {value!r} given; give a finite number")
-        return Number(value, 0.0, value, None)
+        return Number(value)
     if isinstance(value, Number):
         return value
     try:
@@ -175,7 +178,7 @@ def _from_tree(tree: ast.expr, text: str, where: str) -> Number:
     if angle is not None and angle[0] != angle[1]:
         near = _split(angle[0], where)
         if near == _split(angle[1], where):
-            return Number(*near, tree, text)
+            return _written(near, tree, text)
     exact = enclose(tree, _PAIR_BITS, where=where)
     if isinstance(exact, Fraction):
         return _from_fraction(exact, text, where)
@@ -184,11 +187,16 @@ def _from_tree(tree: ast.expr, text: str, where: str) -> Number:
         # It lies on the border between two doubles, or next to it: sqrt(2)**2.
         exact = enclose(tree, _TIE_BITS + _GUARD_BITS, where=where)
         low = _split(_nearest(exact), where)
-    return Number(*low, tree, text)
+    return _written(low, tree, text)
 
 
 def _from_fraction(exact: Fraction, text: str, where: str) -> Number:
-    return Number(*_split(exact, where), exact, text)
+    return _written(_split(exact, where), exact, text)
+
+
+def _written(pair: tuple[float, float], source: Fraction | ast.expr, text: str) -> Number:
+    value, low = pair
+    return Number(value, (low, source, text))
 
 
 def _split(exact: Fraction, where: str) -> tuple[float, float]:
