@@ -263,8 +263,9 @@ class Dissipative(Motion):
         self._elapsed, lost = two_sum.py_func(self._elapsed, time)
         self._rest += lost
         if what == TURN:
-            self._turns, self._held, self._strict = self._turns + 1, held, 0.0
-        self._pauses = self._pauses + 1 if what == PAUSED and not period and not isfinite(end) else 0
+            self._turns, self._held, self._strict, self._pauses = self._turns + 1, held, 0.0, 0
+        else:
+            self._pauses = self._pauses + 1 if what == PAUSED and not period and not isfinite(end) else 0
         if name not in ("", "turn", "contact-sign"):
             self._ending = name
             return

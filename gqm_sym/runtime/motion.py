@@ -54,14 +54,15 @@ class Motion(ABC):
 
     kind: str
     direction: int
-    t_end: float
+    t_end: float = inf
 
     def __init__(self, problem: Problem, kind: str, direction: int) -> None:
         self.problem = problem
         self.kind = kind
         self.direction = direction
         horizon = problem.launch.t_max
-        self.t_end = inf if horizon is None else horizon.value
+        if horizon is not None:
+            self.t_end = horizon.value
 
     # -- what subclasses say ------------------------------------------------------------------
 
