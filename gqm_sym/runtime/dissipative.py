@@ -84,7 +84,6 @@ class Dissipative(Motion):
     _ending = ""
     _elapsed = _rest = _arc = _strict = 0.0
     _nu = _laps = _turns = _pauses = 0
-    _room = FEW * COLUMNS
     _held = True
     _whole: Course | None = None
 
@@ -228,22 +227,23 @@ class Dissipative(Motion):
                 "give a shorter t_max, or ask for earlier times and nearer places"
             )
         problem, way, start = self.problem, self._way, self._place
-        f, domain, loss = problem.functions, problem.domain, _loss(problem)
+        f, domain, loss = problem.functions, problem.domain, problem.formulas.dissipation
         end, period = domain.high if way > 0 else domain.low, domain.period
+        assert loss is not None
         far = 8.0 * period if period else end  # a closed curve's breaks are listed for some laps
         limit = start + way * far if period else end
         breaks = np.ascontiguousarray(f.between(f.breaks, start, limit)[::way]) if f.breaks.size else NOWHERE
         reach = inf if isfinite(end) else self._reach
         run = (*loss, f.p, start, self._w, way, self._nu, breaks, limit)
-        side = SIDES[problem.launch.contact]
+        side, room = SIDES[problem.launch.contact], FEW * COLUMNS
         while True:
-            record = np.empty(self._room)
+            record = np.empty(room)
             what, nu, new_way, held, ahead, back, place, w_end, step, strict, time = legs.follow(
                 *run, reach, self._step, side, self._strict, record
             )
             if what != FULL:
                 break
-            self._room *= 4
+            room *= 4
         if what == LIFTOFF and not ahead:
             self._lift_off_at_once(run)
             return
@@ -297,7 +297,7 @@ class Dissipative(Motion):
 
     def _lift_off_at_once(self, run: tuple[Any, ...]) -> None:
         """A motion that ends as it begins: the track would have to pull at once."""
-        record = np.empty(self._room)
+        record = np.empty(FEW * COLUMNS)
         what, _, _, _, ahead, *_ = legs.follow(*run, 0.0, self._step, 0, inf, record)
         first = Run(self._place, ahead, 0, record, what, "liftoff", self._laps)
         stretch = self._panels_of(first)

@@ -32,7 +32,7 @@ _TIE_BITS = 700
 _GUARD_BITS = 16
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False, init=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Number:
     """A finite real number, known exactly. Made by ``read_number``.
 
@@ -43,13 +43,8 @@ class Number:
     """
 
     value: float
-    # For what is not a double: what it is beyond ``value``, what it was made from, and its text. Two numbers are made
-    # for every launch, doubles mostly, and each attribute of what is frozen takes its time.
+    # For what is not a double: what it is beyond ``value``, what it was made from, and its text.
     _beyond: tuple[float, Fraction | ast.expr, str] | None
-
-    def __init__(self, value: float, beyond: tuple[float, Fraction | ast.expr, str] | None = None) -> None:
-        _set_value(self, value)
-        _set_beyond(self, beyond)
 
     @property
     def low(self) -> float:
@@ -113,7 +108,8 @@ class Number:
         return hash((self.value, self.low))
 
 
-_set_value, _set_beyond = (vars(Number)[name].__set__ for name in Number.__slots__)
+# Two numbers are made for every launch, doubles mostly: past the constructor, which is slow for what is frozen.
+_new, _set_value, _set_beyond = object.__new__, *(vars(Number)[name].__set__ for name in Number.__slots__)
 
 Doubles: TypeAlias = NDArray[np.float64]
 Source: TypeAlias = "str | int | float | Fraction | Decimal | Number | Any"
@@ -137,7 +133,10 @@ def read_number(value: Source, *, where: str) -> Number:
     if type(value) is float:
         if value - value != 0.0:
             raise NumberError(f"{where}: {value!r} given; give a finite number")
-        return Number(value)
+        number = _new(Number)
+        _set_value(number, value)
+        _set_beyond(number, None)
+        return number
     if isinstance(value, Number):
         return value
     try:
