@@ -190,10 +190,11 @@ def _type_of_inner(value: Inner, _: Any) -> Any:
     return types.Dispatcher(value.dispatcher)
 
 
-def entry(signature: Any, *, nogil: bool = False) -> Callable[[Any], Callable[..., Any]]:
+def entry(signature: Any, *, nogil: bool = False, checked: bool = True) -> Callable[[Any], Callable[..., Any]]:
     """An entry point from Python: compiled, or loaded from the cache, when it is first called.
 
-    With ``nogil`` other threads of Python run meanwhile.
+    With ``nogil`` other threads of Python run meanwhile. Unless ``checked``, numba does not look whether arrays are of
+    doubles and in one piece: that takes half a microsecond. It is for what every launch calls, from a single place.
     """
 
     def decorate(function: Any) -> Callable[..., Any]:
@@ -207,7 +208,7 @@ def entry(signature: Any, *, nogil: bool = False) -> Callable[[Any], Callable[..
                 rtsys.initialize(dispatcher.targetctx)  # cached code counts its arrays too
                 dispatcher.compile(signature)
                 dispatcher.disable_compile()
-                compiled = dispatcher
+                compiled = dispatcher if checked else dispatcher.overloads[dispatcher.signatures[0]].entry_point
             return compiled(*arguments)
 
         return call

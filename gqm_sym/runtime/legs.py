@@ -89,7 +89,8 @@ def way_from_rest(hold, p, place):  # type: ignore[no-untyped-def]
     types.Tuple((_WHOLE, _WHOLE, _WHOLE, types.boolean, _WHOLE, _WHOLE, _FLOAT, _FLOAT, _FLOAT, _FLOAT, _FLOAT))(
         *(_WHOLE, _WHOLE, types.boolean, types.boolean, types.boolean, _LINE, _FLOAT, _FLOAT, _WHOLE, _WHOLE, _LINE),
         *(_FLOAT, _FLOAT, _FLOAT, _WHOLE, _FLOAT, _LINE),
-    )
+    ),
+    checked=False,
 )
 def follow(  # type: ignore[no-untyped-def]
     drive,

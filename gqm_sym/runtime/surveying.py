@@ -24,7 +24,8 @@ _WALK = types.Tuple((types.int64, _FLOAT, _FLOAT))
         _FLOAT,
         _FLOAT,
         _FLOAT,
-    )
+    ),
+    checked=False,
 )
 def survey(fns, p, lam0, v0, direction, low, high, period, place, step):  # type: ignore[no-untyped-def]
     """Find both ends of a motion, and its half period or loop time where that is easy.
