@@ -38,7 +38,7 @@ def approach(drive, p, flags, top, end, v, nu, met, breaks, step, record, used):
         stop, coming, passed, nu = next_stop(top, u, left, whole, record, breaks, coming, passed, nu)
         if stop <= left:
             break
-        width, step, _, _ = next_panel(
+        width, step, _ = next_panel(
             *(drive, p, flags, top, u, 0.0, 1.0, left, stop - left, step, base, v, nu, 0.0, NEVER, False, work)
         )
         if width == 0.0:

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from functools import lru_cache
+from functools import cache, lru_cache
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -79,7 +79,7 @@ class Given(tuple[Number, ...]):
     functions: Functions | None = None
 
 
-@lru_cache
+@cache
 def _solver(dissipative: bool) -> "Callable[[Formulas, Given, Launch], Motion]":
     """What solves a launch, loaded when it is needed: a process that solves one model needs one of the two."""
     if dissipative:

@@ -214,8 +214,6 @@ def next_panel(  # type: ignore[no-untyped-def]
         In the march variable; 0 if none is wide enough to be one.
     step : float
         To go on with.
-    far : float
-        q over the panel.
     timed : bool
         Whether time is resolved.
     """
@@ -226,7 +224,7 @@ def next_panel(  # type: ignore[no-untyped-def]
         run = width * (near + g * width)
         # As narrow as its room, a panel may be narrower than places in doubles: distances on it keep their digits.
         if (run <= NARROW * max(fabs(here), gone) and width < room) or run < 1e-300:
-            return 0.0, step, 0.0, False
+            return 0.0, step, False
         begin_panel(drive, p, flags[2], origin, u, g, c, left, width, base, v, nu, work)
         untold, worst = P, 0.0
         if not flags[1] and flags[2]:  # most that is too wide is told from the curve alone
@@ -268,10 +266,10 @@ def next_panel(  # type: ignore[no-untyped-def]
             if timed or not needed:
                 wider = width * growth(max(worst, more) if timed else worst)
                 step = max(step, wider) if kink or width == room else wider
-                return width, step, far, timed
+                return width, step, timed
             worst = more
         width, kink = narrower(width, worst), False
-    return 0.0, step, 0.0, False
+    return 0.0, step, False
 
 
 @Inner

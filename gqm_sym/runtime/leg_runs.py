@@ -3,7 +3,7 @@
 Time is counted on the way, as long as V**2 is large; from where it falls for good the run is only followed to its end.
 """
 
-from math import exp, fabs, inf, sqrt
+from math import fabs, inf, sqrt
 
 from gqm_sym.runtime.chebyshev import COUNT, chebyshev_sum, extent, size_of, to_coefficients
 from gqm_sym.runtime.crossing import call_drive
@@ -17,6 +17,7 @@ from gqm_sym.runtime.leg_equation import (
     MEAN,
     PLACE,
     SERIES,
+    SWELL,
     as_bare,
     begin_panel,
     distance,
@@ -163,7 +164,7 @@ def run(drive, p, flags, start, w, v, nu, breaks, limit, reach, step, side, stri
         room = marched(stop, g, c) - left
         part = min(room, sooner) if gone == 0.0 else room
         ask = ALWAYS if gone < strict else (NEVER if searching or late else MAYBE)
-        width, step, far, timed = next_panel(
+        width, step, timed = next_panel(
             *(drive, p, flags, start, v, g, c, left, part, step, base, v, nu, ceiling, ask, True, work)
         )
         if width == 0.0:
@@ -200,7 +201,7 @@ def run(drive, p, flags, start, w, v, nu, breaks, limit, reach, step, side, stri
             # Once more on a panel that ends there: its own sum has more digits than the series of a wider one.
             right = left + width * (0.5 * (1.0 + x))
             begin_panel(drive, p, flags[2], start, v, g, c, left, right - left, base, v, nu, work)
-            far = solve_panel(drive, p, flags[2], v, g, c, left, base, v, nu, work)
+            solve_panel(drive, p, flags[2], v, g, c, left, base, v, nu, work)
             pace(g, c, left, base, work)
             if end == at_rest and flags[2]:
                 over, there = work[V2 + COUNT], distance(right, g, c)
@@ -218,7 +219,8 @@ def run(drive, p, flags, start, w, v, nu, breaks, limit, reach, step, side, stri
             kept, mark = kept + 1, right
         count += 1
         highest = max(base, extent(work, V2)[1])
-        ceiling = max(ceiling * exp(-far) if end > 1.0 else ceiling, highest)
+        # What resistance alone leaves of it: exp(-q).
+        ceiling = max(ceiling / (1.0 + work[SWELL + COUNT]) if end > 1.0 else ceiling, highest)
         full = end > 1.0 and width == room
         base, left = max(work[V2 + COUNT], 0.0), right
         gone = stop if full else distance(right, g, c)

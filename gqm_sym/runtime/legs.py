@@ -55,7 +55,7 @@ def run_back(drive, p, flags, turn, whole, v, nu, met, breaks, step, record, use
             break
         if not has_room(record, at, met):
             return -1
-        width, step, _, _ = next_panel(
+        width, step, _ = next_panel(
             *(drive, p, flags, turn, u, 1.0, 0.0, left, room, step, base, v, nu, 0.0, ALWAYS, False, work)
         )
         if width == 0.0:
