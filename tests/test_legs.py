@@ -10,6 +10,8 @@ from hypothesis import strategies as st
 from mpmath import mp, mpf
 from numpy.polynomial import chebyshev, legendre
 
+import generated.cubic_coulomb as cubic_coulomb
+from gqm_sym.runtime import dissipative
 from gqm_sym.runtime.chebyshev import (
     COUNT,
     GRADED_MEANS,
@@ -22,6 +24,8 @@ from gqm_sym.runtime.chebyshev import (
     size_of,
     to_means,
 )
+from gqm_sym.runtime.lanes import LANES, copied, on_stack, over_rows, uncounted
+from gqm_sym.runtime.leg_panels import CAUTION, DEGREES, FALL, GROWTH, growth
 from gqm_sym.runtime.leg_stretches import INTEGRAL_BY_NODE, PLAIN_BY_NODE
 
 # Roundings of as many products, of size 1.
@@ -129,3 +133,50 @@ def test_a_wrong_sign_to_begin_with_changes_at_once() -> None:
     """A panel that begins with the other sign than it should changes at its start."""
     assert first_change(_series([1.4]), 1, NOISE)[0] == -1.0
     assert first_change(_series([-0.2]), -1, NOISE)[0] == pytest.approx(-0.2, abs=1e-15)
+
+
+WIDTH = 3 * LANES
+_weighed = over_rows(lambda a, b, c: a - b * c / (2.0 + abs(a)), WIDTH)
+_root = over_rows(np.sqrt, WIDTH)
+_copy = copied(WIDTH)
+_room = on_stack(2 * WIDTH)
+
+
+@numba.njit
+def _in_registers(line, other, c):  # type: ignore[no-untyped-def]
+    _weighed(line, 5, 40, WIDTH + 9, c)
+    _root(line, 70, 5)
+    room = _room()
+    _copy(room, 3, uncounted(line), 70)
+    _copy(other, 1, room, 3)
+
+
+def test_rows_in_registers() -> None:
+    """A formula over rows gives the bits that NumPy gives, wherever they lie; rows are copied as they are."""
+    line = np.random.default_rng(7).normal(size=100)
+    before, other = line.copy(), np.zeros(WIDTH + 2)
+    with np.errstate(invalid="ignore"):
+        _in_registers(line, other, 0.3)
+        a, b = before[40 : 40 + WIDTH], before[WIDTH + 9 : 2 * WIDTH + 9]
+        expected = a - b * 0.3 / (2.0 + np.abs(a))
+        assert np.array_equal(line[5 : 5 + WIDTH], expected)
+        assert np.array_equal(other[1:-1], np.sqrt(expected), equal_nan=True)
+    assert other[0] == other[-1] == 0.0
+    assert np.array_equal(line[:5], before[:5])
+    assert np.array_equal(line[5 + WIDTH : 70], before[5 + WIDTH : 70])
+
+
+@pytest.mark.parametrize("worst", [1e-300, 3e-17, 4.1e-9, 0.02, 0.5, 1.0, 7.0, 1e5])
+def test_how_much_wider_a_panel_may_be(worst: float) -> None:
+    """A root to a few per cent, and never more than the most."""
+    exact = min(CAUTION * worst ** (-1.0 / DEGREES) / FALL, GROWTH)
+    assert growth(worst) == pytest.approx(exact, rel=0.065)
+    assert growth(worst) <= GROWTH
+
+
+def test_a_record_that_is_too_short(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A leg of more panels than a record has room for is followed once more, to the same digits."""
+    times = np.linspace(0.0, 3.0, 40)
+    expected = cubic_coulomb.solve(-1.0, 6.2088).lam(times)
+    monkeypatch.setattr(dissipative, "FEW", 1)
+    assert np.array_equal(cubic_coulomb.solve(-1.0, 6.2088).lam(times), expected)
