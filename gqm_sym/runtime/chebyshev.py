@@ -83,15 +83,6 @@ NEWTON = 1e-9
 
 
 @Inner
-def chebyshev_sum(c, x):  # type: ignore[no-untyped-def]
-    """The Chebyshev series with coefficients c, at x, by Clenshaw's recurrence."""
-    high, low, twice = 0.0, 0.0, 2.0 * x
-    for k in range(c.size - 1, 0, -1):
-        high, low = fma(twice, high, c[k] - low), high
-    return fma(x, high, c[0] - low)
-
-
-@Inner
 def _at_ends(c):  # type: ignore[no-untyped-def]
     """The series at -1 and at 1."""
     even, odd = c[0], 0.0

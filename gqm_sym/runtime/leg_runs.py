@@ -5,9 +5,10 @@ Time is counted on the way, as long as V**2 is large; from where it falls for go
 
 from math import fabs, inf, sqrt
 
-from gqm_sym.runtime.chebyshev import COUNT, chebyshev_sum, extent, size_of, to_coefficients
+from gqm_sym.runtime.chebyshev import COUNT, extent, size_of, to_coefficients
 from gqm_sym.runtime.crossing import call_drive
 from gqm_sym.runtime.doubledouble import two_sum
+from gqm_sym.runtime.fields import chebyshev_sum
 from gqm_sym.runtime.jit import Inner
 from gqm_sym.runtime.lanes import on_stack
 from gqm_sym.runtime.leg_equation import (

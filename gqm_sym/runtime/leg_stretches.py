@@ -9,10 +9,10 @@ from numba import types
 from gqm_sym.runtime.chebyshev import COUNT, TO_COEFFICIENTS, WIDE
 from gqm_sym.runtime.clocks import Array
 from gqm_sym.runtime.course import Pair
-from gqm_sym.runtime.fields import COLUMNS as FIELD
 from gqm_sym.runtime.functions import Functions
 from gqm_sym.runtime.integrands import FROM_TURN, REGULAR, TO_EQUILIBRIUM
 from gqm_sym.runtime.jit import entry
+from gqm_sym.runtime.leg_approach import COLUMNS as FIELD
 from gqm_sym.runtime.leg_records import COLUMNS, ERROR, HEAD, MET, RIGHT, SLACK, TIME
 from gqm_sym.runtime.matrices import times
 from gqm_sym.runtime.panels import CONVERGED

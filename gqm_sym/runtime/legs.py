@@ -11,9 +11,9 @@ from numba import types
 
 from gqm_sym.runtime.chebyshev import COUNT
 from gqm_sym.runtime.crossing import call_hold
-from gqm_sym.runtime.fields import approach
 from gqm_sym.runtime.jit import Inner, entry
 from gqm_sym.runtime.lanes import uncounted
+from gqm_sym.runtime.leg_approach import approach
 from gqm_sym.runtime.leg_equation import W, panel_room, set_nodes
 from gqm_sym.runtime.leg_panels import ALWAYS, next_panel, next_stop
 from gqm_sym.runtime.leg_records import (
