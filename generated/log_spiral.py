@@ -1,5 +1,5 @@
 # Made by gqm-gen for "log_spiral". Do not edit: change its declaration and generate again.
-# interface 7, input 458ba188398a, body 54f03796cb34
+# interface 7, input 458ba188398a, body f3342a141347
 """Bead on a logarithmic spiral
 
 x              = r0*exp(b*theta)*cos(theta)
@@ -333,7 +333,8 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = 
     lam0, v0, direction
         Launch place, speed and direction (+1 or -1: the sign of ds/dt).
     out : Pass1, optional
-        The result of a call before, or six arrays like it, to be filled again: new memory takes as long as the work.
+        The result of a call before, or six arrays like it, to be filled again. Without it a large result takes the
+        memory of one before that nobody has any more.
     r0, b, g, m
         Run-time parameters; `PARAMETERS` holds their defaults.
 

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "spiral_central". Do not edit: change its declaration and generate again.
-# interface 7, input a75a85ae8f6e, body 9388e2102d23
+# interface 7, input a75a85ae8f6e, body a71f1820c233
 """Bead on a logarithmic spiral, drawn to its pole
 
 x              = r0*exp(b*theta)*cos(theta)
@@ -449,7 +449,8 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = 
     lam0, v0, direction
         Launch place, speed and direction (+1 or -1: the sign of ds/dt).
     out : Pass1, optional
-        The result of a call before, or six arrays like it, to be filled again: new memory takes as long as the work.
+        The result of a call before, or six arrays like it, to be filled again. Without it a large result takes the
+        memory of one before that nobody has any more.
     r0, b, k, m
         Run-time parameters; `PARAMETERS` holds their defaults.
 
