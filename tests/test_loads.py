@@ -9,13 +9,14 @@ import numpy as np
 import pytest
 import sympy as sp
 from mpmath import mp, mpf
+from numba import njit
 
 import gqm_sym as gqm
 from gqm_sym.emission.loads import rounded_size
 from gqm_sym.errors import InputError
 from gqm_sym.runtime import threads
 from gqm_sym.runtime.loads import BLOCK
-from gqm_sym.runtime.stores import LARGE, LINE
+from gqm_sym.runtime.stores import LARGE, LINE, put
 
 ModuleOf = Callable[[str], ModuleType]
 
@@ -93,6 +94,24 @@ def test_arrays_are_filled_again(size: int, offset: int, circle: Callable[..., A
         assert array is given
         assert (row == array).all()
         assert (np.delete(around, np.s_[offset : offset + size]) == 7.0).all()
+
+
+def test_nothing_waits_between_streamed_rows() -> None:
+    """The loop streams by itself: arrays are counted before it, as that locks, and what locks waits for the memory."""
+
+    @njit(error_model="numpy")
+    def three(to: np.ndarray, given: np.ndarray) -> None:
+        for at in range(0, to.size, BLOCK):
+            for k in range(3):
+                put(to, at, given, k, BLOCK, True)
+
+    to, given = np.empty(4 * BLOCK), np.arange(BLOCK + 3.0)
+    three(to, given)
+    assert (to.reshape(4, BLOCK) == given[2 : BLOCK + 2]).all()
+    whole = three.inspect_llvm(three.signatures[0])
+    code = whole[whole.index("define") :].split("\n}", 1)[0]
+    assert "!nontemporal" in code
+    assert code.count("@NRT_incref") <= 2
 
 
 def test_a_result_is_filled_again(circle: Callable[..., Any]) -> None:

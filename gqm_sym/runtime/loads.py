@@ -42,7 +42,7 @@ class Pass1(NamedTuple):
 
 
 def room(shape: tuple[int, ...], lam: Array, out: Any) -> Pass1:
-    """Arrays for a load map: new ones, or those of ``out`` where they will do.
+    """Arrays for a load map: new ones, if large in memory that was given back, or those of ``out`` where they will do.
 
     Raises
     ------
