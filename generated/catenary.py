@@ -1,5 +1,5 @@
 # Made by gqm-gen for "catenary". Do not edit: change its declaration and generate again.
-# interface 7, input cd1fa4541ae4, body b2cd58773323
+# interface 7, input cd1fa4541ae4, body f6f17293ed3a
 """Bead on a hanging chain
 
 x              = x
@@ -340,7 +340,8 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = 
     lam0, v0, direction
         Launch place, speed and direction (+1 or -1: the sign of ds/dt).
     out : Pass1, optional
-        The result of a call before, or six arrays like it, to be filled again: new memory takes as long as the work.
+        The result of a call before, or six arrays like it, to be filled again. Without it a large result takes the
+        memory of one before that nobody has any more.
     c, g, m
         Run-time parameters; `PARAMETERS` holds their defaults.
 

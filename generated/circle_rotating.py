@@ -1,5 +1,5 @@
 # Made by gqm-gen for "circle_rotating". Do not edit: change its declaration and generate again.
-# interface 7, input 4ab613b0cbfb, body cc2a38136900
+# interface 7, input 4ab613b0cbfb, body 7dc30164e824
 """Bead on a hoop that turns about its vertical diameter
 
 x              = L*sin(theta)
@@ -361,7 +361,8 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = 
     lam0, v0, direction
         Launch place, speed and direction (+1 or -1: the sign of ds/dt).
     out : Pass1, optional
-        The result of a call before, or six arrays like it, to be filled again: new memory takes as long as the work.
+        The result of a call before, or six arrays like it, to be filled again. Without it a large result takes the
+        memory of one before that nobody has any more.
     L, Omega, g, m
         Run-time parameters; `PARAMETERS` holds their defaults.
 

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "cycloid_inverted". Do not edit: change its declaration and generate again.
-# interface 7, input 2cc87984e0a0, body e4d7d9e203a1
+# interface 7, input 2cc87984e0a0, body 27d8ec0c4e8e
 """Bead in an inverted cycloid
 
 x              = R*(theta - sin(theta))
@@ -299,7 +299,8 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = 
     lam0, v0, direction
         Launch place, speed and direction (+1 or -1: the sign of ds/dt).
     out : Pass1, optional
-        The result of a call before, or six arrays like it, to be filled again: new memory takes as long as the work.
+        The result of a call before, or six arrays like it, to be filled again. Without it a large result takes the
+        memory of one before that nobody has any more.
     R, g, m
         Run-time parameters; `PARAMETERS` holds their defaults.
 

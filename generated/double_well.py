@@ -1,5 +1,5 @@
 # Made by gqm-gen for "double_well". Do not edit: change its declaration and generate again.
-# interface 7, input 28c16d144828, body 05eb98de2f00
+# interface 7, input 28c16d144828, body e93b84b75fb3
 """Bead between two wells
 
 x              = x
@@ -314,7 +314,8 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = 
     lam0, v0, direction
         Launch place, speed and direction (+1 or -1: the sign of ds/dt).
     out : Pass1, optional
-        The result of a call before, or six arrays like it, to be filled again: new memory takes as long as the work.
+        The result of a call before, or six arrays like it, to be filled again. Without it a large result takes the
+        memory of one before that nobody has any more.
     h, g, m
         Run-time parameters; `PARAMETERS` holds their defaults.
 

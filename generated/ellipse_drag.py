@@ -1,5 +1,5 @@
 # Made by gqm-gen for "ellipse_drag". Do not edit: change its declaration and generate again.
-# interface 7, input 85e32f4b5095, body bd404228c4dc
+# interface 7, input 85e32f4b5095, body 3dc090a3d547
 """Bead on an ellipse, in air
 
 x              = a*cos(theta)
@@ -138,7 +138,8 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = 
     lam0, v0, direction
         Launch place, speed and direction (+1 or -1: the sign of ds/dt).
     out : Pass1, optional
-        The result of a call before, or six arrays like it, to be filled again: new memory takes as long as the work.
+        The result of a call before, or six arrays like it, to be filled again. Without it a large result takes the
+        memory of one before that nobody has any more.
     a, b, b_air, g, m
         Run-time parameters; `PARAMETERS` holds their defaults.
 

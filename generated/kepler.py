@@ -1,5 +1,5 @@
 # Made by gqm-gen for "kepler". Do not edit: change its declaration and generate again.
-# interface 7, input a1e1feaf475b, body 2dd1f44f1ebb
+# interface 7, input a1e1feaf475b, body e441961a77c4
 """Planet on its own ellipse, by the eccentric anomaly
 
 x              = a*(-ecc + cos(E))
@@ -519,7 +519,8 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = 
     lam0, v0, direction
         Launch place, speed and direction (+1 or -1: the sign of ds/dt).
     out : Pass1, optional
-        The result of a call before, or six arrays like it, to be filled again: new memory takes as long as the work.
+        The result of a call before, or six arrays like it, to be filled again. Without it a large result takes the
+        memory of one before that nobody has any more.
     a, ecc, k, m
         Run-time parameters; `PARAMETERS` holds their defaults.
 

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "line_spring". Do not edit: change its declaration and generate again.
-# interface 7, input 924b210c4a96, body 8ff058b9ca1d
+# interface 7, input 924b210c4a96, body 4becfccd590b
 """Bead on a sloping line, tied to the origin by a spring
 
 x              = x
@@ -254,7 +254,8 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = 
     lam0, v0, direction
         Launch place, speed and direction (+1 or -1: the sign of ds/dt).
     out : Pass1, optional
-        The result of a call before, or six arrays like it, to be filled again: new memory takes as long as the work.
+        The result of a call before, or six arrays like it, to be filled again. Without it a large result takes the
+        memory of one before that nobody has any more.
     w, m
         Run-time parameters; `PARAMETERS` holds their defaults.
 

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "log_spiral". Do not edit: change its declaration and generate again.
-# interface 7, input 458ba188398a, body 54f03796cb34
+# interface 7, input 458ba188398a, body 7f882760cc01
 """Bead on a logarithmic spiral
 
 x              = r0*exp(b*theta)*cos(theta)
@@ -97,21 +97,20 @@ def loads(n, w0, level, places, p, out):
     _c3 = _t0
     for i in range(n):
         theta = places[i]
+        e0 = exp(b*theta)
         _t1 = cos(theta)
-        _t2 = b*theta
-        _t3 = exp(_t2)
-        _t4 = _t3*r0
-        _t5 = sin(theta)
-        _t6 = _t4*_t5
-        _t7 = _c2*exp(-_t2)/r0
-        _t8 = left_of(w0, 2*_t6*g, level)
-        out[0, i] = _t1*_t4
-        out[1, i] = _t6
-        out[2, i] = _c3*_t4
-        out[3, i] = _t7
-        out[4, i] = _t8
-        out[5, i] = m*(_c2*g*(_t1*b - _t5) + _t7*_t8)
-        out[6, i] = 2*_c0*_c1*_t3*fabs(_t5)
+        _t2 = e0*r0
+        _t3 = sin(theta)
+        _t4 = _t2*_t3
+        _t5 = _c2/(e0*r0)
+        _t6 = left_of(w0, 2*_t4*g, level)
+        out[0, i] = _t1*_t2
+        out[1, i] = _t4
+        out[2, i] = _c3*_t2
+        out[3, i] = _t5
+        out[4, i] = _t6
+        out[5, i] = m*(_c2*g*(_t1*b - _t3) + _t5*_t6)
+        out[6, i] = 2*_c0*_c1*e0*fabs(_t3)
 
 
 @compiled(CLIMB)
@@ -333,7 +332,8 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = 
     lam0, v0, direction
         Launch place, speed and direction (+1 or -1: the sign of ds/dt).
     out : Pass1, optional
-        The result of a call before, or six arrays like it, to be filled again: new memory takes as long as the work.
+        The result of a call before, or six arrays like it, to be filled again. Without it a large result takes the
+        memory of one before that nobody has any more.
     r0, b, g, m
         Run-time parameters; `PARAMETERS` holds their defaults.
 

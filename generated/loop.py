@@ -1,5 +1,5 @@
 # Made by gqm-gen for "loop". Do not edit: change its declaration and generate again.
-# interface 7, input ef6cb5936f16, body f9e8a7d81519
+# interface 7, input ef6cb5936f16, body 99e6b4ee21b1
 """Loop of a roller coaster
 
 x              = x(s)
@@ -179,7 +179,8 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = 
     lam0, v0, direction
         Launch place, speed and direction (+1 or -1: the sign of ds/dt).
     out : Pass1, optional
-        The result of a call before, or six arrays like it, to be filled again: new memory takes as long as the work.
+        The result of a call before, or six arrays like it, to be filled again. Without it a large result takes the
+        memory of one before that nobody has any more.
     a, c, R, g, m
         Run-time parameters; `PARAMETERS` holds their defaults.
 

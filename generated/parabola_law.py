@@ -1,5 +1,5 @@
 # Made by gqm-gen for "parabola_law". Do not edit: change its declaration and generate again.
-# interface 7, input 353c2b6305ed, body 7c2593cb2b55
+# interface 7, input 353c2b6305ed, body d149c6458b16
 """Bead on a parabola, with a resistance that falls with speed
 
 x              = x
@@ -140,7 +140,8 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = 
     lam0, v0, direction
         Launch place, speed and direction (+1 or -1: the sign of ds/dt).
     out : Pass1, optional
-        The result of a call before, or six arrays like it, to be filled again: new memory takes as long as the work.
+        The result of a call before, or six arrays like it, to be filled again. Without it a large result takes the
+        memory of one before that nobody has any more.
     a, r, w1, g, m
         Run-time parameters; `PARAMETERS` holds their defaults.
 

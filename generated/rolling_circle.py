@@ -1,5 +1,5 @@
 # Made by gqm-gen for "rolling_circle". Do not edit: change its declaration and generate again.
-# interface 7, input aed757e55b8b, body fbbd39adecf0
+# interface 7, input aed757e55b8b, body e0ffdcc60c54
 """Solid sphere rolling in a circular bowl
 
 x              = L*sin(theta)
@@ -328,7 +328,8 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = 
     lam0, v0, direction
         Launch place, speed and direction (+1 or -1: the sign of ds/dt).
     out : Pass1, optional
-        The result of a call before, or six arrays like it, to be filled again: new memory takes as long as the work.
+        The result of a call before, or six arrays like it, to be filled again. Without it a large result takes the
+        memory of one before that nobody has any more.
     L, beta, g, m
         Run-time parameters; `PARAMETERS` holds their defaults.
 

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "spiral_central". Do not edit: change its declaration and generate again.
-# interface 7, input a75a85ae8f6e, body 9388e2102d23
+# interface 7, input a75a85ae8f6e, body 591c9d69989d
 """Bead on a logarithmic spiral, drawn to its pole
 
 x              = r0*exp(b*theta)*cos(theta)
@@ -98,22 +98,22 @@ def loads(n, w0, level, places, p, out):
     _c3 = _t0
     for i in range(n):
         theta = places[i]
+        e0 = exp(b*theta)
         _t1 = cos(theta)
-        _t2 = b*theta
-        _t3 = r0*exp(_t2)
-        _t4 = sin(theta)
-        _t5 = exp(-_t2)
-        _t6 = _c2*_t5/r0
-        _t7 = _t1**2 + _t4**2
-        _t8 = 2*_t5/(_c1*sqrt(_t7))
-        _t9 = left_of(w0, -_t8*k, level)
-        out[0, i] = _t1*_t3
-        out[1, i] = _t3*_t4
-        out[2, i] = _c3*_t3
-        out[3, i] = _t6
-        out[4, i] = _t9
-        out[5, i] = m*(_c1*_c2*k*(-_t1*(_t1 + _t4*b) + _t4*(_t1*b - _t4))*exp(-2*_t2)/(r0**3*sqrt(_t7)**3) + _t6*_t9)
-        out[6, i] = _c0*_t8
+        _t2 = e0*r0
+        _t3 = sin(theta)
+        _t4 = 1/e0
+        _t5 = _c2*_t4/r0
+        _t6 = _t1**2 + _t3**2
+        _t7 = 2*_t4/(_c1*sqrt(_t6))
+        _t8 = left_of(w0, -_t7*k, level)
+        out[0, i] = _t1*_t2
+        out[1, i] = _t2*_t3
+        out[2, i] = _c3*_t2
+        out[3, i] = _t5
+        out[4, i] = _t8
+        out[5, i] = m*(_c1*_c2*k*(-_t1*(_t1 + _t3*b) + _t3*(_t1*b - _t3))*exp(-2*b*theta)/(r0**3*sqrt(_t6)**3) + _t5*_t8)
+        out[6, i] = _c0*_t7
 
 
 @compiled(CLIMB)
@@ -449,7 +449,8 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = 
     lam0, v0, direction
         Launch place, speed and direction (+1 or -1: the sign of ds/dt).
     out : Pass1, optional
-        The result of a call before, or six arrays like it, to be filled again: new memory takes as long as the work.
+        The result of a call before, or six arrays like it, to be filled again. Without it a large result takes the
+        memory of one before that nobody has any more.
     r0, b, k, m
         Run-time parameters; `PARAMETERS` holds their defaults.
 

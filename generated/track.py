@@ -1,5 +1,5 @@
 # Made by gqm-gen for "track". Do not edit: change its declaration and generate again.
-# interface 7, input f6b2958be28b, body 283eb99df3f0
+# interface 7, input f6b2958be28b, body c6a5fb08176f
 """Hills of a roller coaster, as surveyed
 
 x              = x(s)
@@ -227,7 +227,8 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = 
     lam0, v0, direction
         Launch place, speed and direction (+1 or -1: the sign of ds/dt).
     out : Pass1, optional
-        The result of a call before, or six arrays like it, to be filled again: new memory takes as long as the work.
+        The result of a call before, or six arrays like it, to be filled again. Without it a large result takes the
+        memory of one before that nobody has any more.
     g, m
         Run-time parameters; `PARAMETERS` holds their defaults.
 

@@ -1,9 +1,10 @@
 """What a load map calls: all its rows at once, V**2 by subtracting heights, and the size of what is rounded there."""
 
+from collections.abc import Callable
 from math import prod
 from typing import TYPE_CHECKING
 
-from sympy import Abs, Expr, Function, Pow, Rational, Symbol, cos, cosh, exp, sin, sinh
+from sympy import Abs, Expr, Function, Pow, Rational, Symbol, cos, cosh, exp, ordered, sin, sinh
 
 from gqm_sym.emission.ir import FunctionIR
 from gqm_sym.emission.places import at
@@ -22,17 +23,32 @@ def loads(lowering: "Lowering") -> tuple[FunctionIR, ...]:
     w0, level, places = names.symbol("w0"), names.symbol("level"), names("places")
     v2 = Function("left_of")(w0, climb, level)
     force = Symbol("m", real=True) * (model.kappa * v2 + model.reaction)
+    grown, outputs = rising((model.x, model.z, model.ds, model.kappa, v2, force, size), names.symbol)
     function = lowering.function(
         "loads",
         "LOADS",
         (w0.name, level.name, places),
         "x, z, ds/d{0}, signed curvature, V**2, contact force (paper, eq. 15), and the size of the heights in V**2.",
         views=((places, names("n")),),
-        inside=[(lowering.place, at(places))],
-        outputs=(model.x, model.z, model.ds, model.kappa, v2, force, size),
+        inside=[(lowering.place, at(places)), *grown],
+        outputs=outputs,
         later=True,
     )
     return (function,)
+
+
+def rising(
+    forms: tuple[Expr, ...], symbol: Callable[[str], Symbol]
+) -> tuple[list[tuple[Symbol, Expr]], tuple[Expr, ...]]:
+    """Exponentials whose reciprocals occur too, by names of their own, and the forms with these.
+
+    A division costs a third of an exponential, and what 1/exp(u) stands for, SymPy writes as exp(-u).
+    """
+    calls = {call for form in forms for call in form.atoms(exp)}
+    both = [call for call in ordered(calls) if exp(-call.exp) in calls and not call.exp.could_extract_minus_sign()]
+    named = [(symbol(f"e{k}"), call) for k, call in enumerate(both)]
+    by_name = {call: name for name, call in named} | {exp(-call.exp): 1 / name for name, call in named}
+    return named, tuple(form.xreplace(by_name) for form in forms)
 
 
 def _without_constant(climb: Expr, place: Symbol) -> Expr:

@@ -14,15 +14,16 @@ from numba import types
 from gqm_sym.errors import InputError
 from gqm_sym.runtime.crossing import call_climb, call_frame, call_loads, call_rise
 from gqm_sym.runtime.interface import FRAME_ROWS, LOAD_ROWS
-from gqm_sym.runtime.jit import Inlined, entry
+from gqm_sym.runtime.jit import Inlined, Inner, entry
+from gqm_sym.runtime.lending import rows
 from gqm_sym.runtime.stores import put, settle
 from gqm_sym.runtime.stretch import Array
 
 _LINE = types.float64[::1]
 _REAL, _WHOLE = types.float64, types.int64
 
-# Places filled at a time: all rows of a block lie in the first cache.
-BLOCK = 512
+# Places filled at a time: few enough that what is streamed drains into memory while the next are worked out.
+BLOCK = 256
 # Rows that are asked for.
 SHOWN = 6
 # Heights may be of this many times the size of V**2 at launch or of its change: then both ways round alike.
@@ -41,7 +42,7 @@ class Pass1(NamedTuple):
 
 
 def room(shape: tuple[int, ...], lam: Array, out: Any) -> Pass1:
-    """Arrays for a load map: new ones, or those of ``out`` where they will do.
+    """Arrays for a load map: new ones, if large in memory that was given back, or those of ``out`` where they will do.
 
     Raises
     ------
@@ -49,7 +50,7 @@ def room(shape: tuple[int, ...], lam: Array, out: Any) -> Pass1:
         If ``out`` is not six arrays of doubles of that shape, each with memory of its own.
     """
     if out is None:
-        return Pass1(*(row.reshape(shape) for row in np.empty((len(Pass1._fields), lam.size))))
+        return Pass1(*(row.reshape(shape) for row in rows(len(Pass1._fields), lam.size)))
     names = Pass1._fields
     if not isinstance(out, tuple | list) or len(out) != len(names):
         what = f"{len(out)} of them" if isinstance(out, tuple | list) else type(out).__name__
@@ -88,6 +89,29 @@ def keeps(w0, v2, sizes):  # type: ignore[no-untyped-def]
     return sizes <= LEVELLED * max(fabs(w0 - v2), w0)
 
 
+@Inner
+def mend(fns, p, lam0, gained, w0, size, here, rests, field, known):  # type: ignore[no-untyped-def]
+    """What `fill_loads` has in ``field``, with V**2 from the climb's divided difference wherever that has more digits.
+
+    Without ``known`` there is nothing in it yet.
+    """
+    n = here.size
+    rise, offsets, exact, frame = np.empty(2 * n), here - lam0, np.empty(n), np.empty(FRAME_ROWS * n)
+    v2, force, sizes = field[4 * n : 5 * n], field[5 * n : 6 * n], field[6 * n : 7 * n]
+    if rests.size:
+        offsets += rests
+    call_rise(fns[2], n, lam0, here, offsets, p, rise)
+    for i in range(n):
+        slow = w0 - (offsets[i] * rise[i] - gained)
+        exact[i] = v2[i] if known and keeps(w0, v2[i], size + sizes[i]) else slow
+    call_frame(fns[0], n, here, exact, p, frame)
+    if not known:
+        field[: 4 * n] = frame[: 4 * n]
+    for i in range(n):
+        force[i] = force[i] if known and keeps(w0, v2[i], size + sizes[i]) else frame[4 * n + i]
+    v2[:] = exact
+
+
 @entry(
     types.void(
         *(types.UniTuple(_WHOLE, 5), _WHOLE, _LINE, _REAL, _REAL, _REAL, _LINE, _LINE),
@@ -101,8 +125,7 @@ def fill_loads(fns, loads, p, lam0, lam0_low, w0, places, rests, rows, begin, en
     ``loads`` is the address of the module's function, 0 where it has none. ``rests`` are what the places leave over as
     doubles; empty where they leave nothing.
     """
-    launch, field, rise = np.empty((2, 1)), np.empty(LOAD_ROWS * BLOCK), np.empty(2 * BLOCK)
-    offsets, exact, frame = np.empty(BLOCK), np.empty(BLOCK), np.empty(FRAME_ROWS * BLOCK)
+    launch, field = np.empty((2, 1)), np.empty(LOAD_ROWS * BLOCK)
     start = np.array([lam0])
     call_climb(fns[1], 1, start, p, launch)
     gained = lam0_low * launch[1, 0]
@@ -110,32 +133,22 @@ def fill_loads(fns, loads, p, lam0, lam0_low, w0, places, rests, rows, begin, en
     if loads and not rests.size:
         call_loads(loads, 1, 0.0, 0.0, start, p, field)
         level, size = gained - field[4], field[6]
+    known = size >= 0.0
+    x, z, ds, kappa, v2, force = rows
     for first in range(begin, end, BLOCK):
         n = min(BLOCK, end - first)
-        here, v2, force, sizes = places[first : first + n], field[4 * n : 5 * n], field[5 * n :], field[6 * n :]
-        if size >= 0.0:
-            call_loads(loads, n, w0, level, here, p, field)
-        else:
-            sizes[:n] = nan
-        lost = 0
-        for i in range(n):
-            lost += 0 if keeps(w0, v2[i], size + sizes[i]) else 1
+        lost = n
+        if known:
+            call_loads(loads, n, w0, level, places[first : first + n], p, field)
+            lost = 0
+            for i in range(n):
+                lost += 0 if keeps(w0, field[4 * n + i], size + field[6 * n + i]) else 1
         if lost:
-            for i in range(n):
-                offsets[i] = here[i] - lam0
-            if rests.size:
-                for i in range(n):
-                    offsets[i] += rests[first + i]
-            call_rise(fns[2], n, lam0, here, offsets, p, rise)
-            for i in range(n):
-                slow = w0 - (offsets[i] * rise[i] - gained)
-                exact[i] = v2[i] if keeps(w0, v2[i], size + sizes[i]) else slow
-            call_frame(fns[0], n, here, exact, p, frame)
-            if not size >= 0.0:
-                field[: 4 * n] = frame[: 4 * n]
-            for i in range(n):
-                force[i] = force[i] if keeps(w0, v2[i], size + sizes[i]) else frame[4 * n + i]
-            v2[:] = exact[:n]
-        for k in range(SHOWN):
-            put(rows[k][first : first + n], field[k * n : (k + 1) * n], past)
-    settle(rows[0])
+            mend(fns, p, lam0, gained, w0, size, places[first : first + n], rests[first : first + n], field, known)
+        put(x, first, field, 0, n, past)
+        put(z, first, field, n, n, past)
+        put(ds, first, field, 2 * n, n, past)
+        put(kappa, first, field, 3 * n, n, past)
+        put(v2, first, field, 4 * n, n, past)
+        put(force, first, field, 5 * n, n, past)
+    settle(x)

@@ -205,7 +205,7 @@ def find_states(record, p, t, out, begin, end):  # type: ignore[no-untyped-def]
             spare[0, i] = error + table_errors[segments[i]] + rounding
         found = (arc, frame[0], frame[1], v, v2, frame[3], frame[4], spare[0])
         for k in range(8):
-            put(out[k + 1, start : start + n], found[k], False)
+            put(out[k + 1], start, found[k], 0, n, False)
 
 
 @entry(types.void(_LINE, _LINE, _LINE, types.int64, types.int64), nogil=True)

@@ -11,7 +11,7 @@ from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic
 
-from gqm_sym.runtime.jit import Inner
+from gqm_sym.runtime.jit import Inlined
 
 # Doubles in a line of the cache.
 LINE = 8
@@ -35,22 +35,22 @@ def before_line(_, array):  # type: ignore[no-untyped-def]
 
 
 @intrinsic
-def stream(_, to, given, i):  # type: ignore[no-untyped-def]
-    """``to[i : i + LINE] = given[i : i + LINE]``, past the caches; that is a line of the cache."""
+def stream(_, to, at, given, start):  # type: ignore[no-untyped-def]
+    """``to[at : at + LINE] = given[start : start + LINE]``, past the caches; that is a line of the cache."""
 
     def lower(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         target, source = (
             builder.bitcast(
-                builder.gep(context.make_array(signature.args[k])(context, builder, args[k]).data, [args[2]]),
+                builder.gep(context.make_array(signature.args[k])(context, builder, args[k]).data, [args[k + 1]]),
                 _LINE.as_pointer(),
             )
-            for k in (0, 1)
+            for k in (0, 2)
         )
         store = builder.store(builder.load(source, align=8), target, align=8 * LINE)
         store.set_metadata("nontemporal", builder.module.add_metadata([ir.Constant(ir.IntType(32), 1)]))
         return context.get_dummy_value()
 
-    return types.void(to, given, types.intp), lower
+    return types.void(to, types.intp, given, types.intp), lower
 
 
 @intrinsic
@@ -64,15 +64,17 @@ def settle(_, array):  # type: ignore[no-untyped-def]
     return types.void(array), lower
 
 
-@Inner
-def put(to, given, past):  # type: ignore[no-untyped-def]
-    """Copy a block into an array of its length; ``past`` the caches, or through them."""
-    n = to.size
-    head = min(before_line(to), n) if past else n
+@Inlined
+def put(to, at, given, start, n, past):  # type: ignore[no-untyped-def]
+    """``to[at : at + n] = given[start : start + n]``; ``past`` the caches, or through them.
+
+    Without slices: who holds an array is counted by locked instructions, and these wait for all stores before them.
+    """
+    head = min((before_line(to) - at) % LINE, n) if past else n
     last = n - (n - head) % LINE
     for i in range(head):
-        to[i] = given[i]
+        to[at + i] = given[start + i]
     for i in range(head, last, LINE):
-        stream(to, given, i)
+        stream(to, at + i, given, start + i)
     for i in range(last, n):
-        to[i] = given[i]
+        to[at + i] = given[start + i]
