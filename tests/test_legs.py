@@ -25,7 +25,7 @@ from gqm_sym.runtime.chebyshev import (
     to_means,
 )
 from gqm_sym.runtime.lanes import LANES, copied, on_stack, over_rows, uncounted
-from gqm_sym.runtime.leg_panels import CAUTION, DEGREES, FALL, GROWTH, growth
+from gqm_sym.runtime.leg_panels import CAUTION, DEGREES, FALL, GROWTH, ahead, growth
 from gqm_sym.runtime.leg_stretches import INTEGRAL_BY_NODE, PLAIN_BY_NODE
 
 # Roundings of as many products, of size 1.
@@ -180,3 +180,23 @@ def test_a_record_that_is_too_short(monkeypatch: pytest.MonkeyPatch) -> None:
     expected = cubic_coulomb.solve(-1.0, 6.2088).lam(times)
     monkeypatch.setattr(dissipative, "FEW", 1)
     assert np.array_equal(cubic_coulomb.solve(-1.0, 6.2088).lam(times), expected)
+
+
+@pytest.mark.parametrize("distance", [0.3, 1.0, 4.0])
+def test_how_far_a_panel_may_reach_toward_a_turn(distance: float) -> None:
+    """Toward a turn the pace of time is the inverse root of what is left: how wide the panel, and the next, may be.
+
+    The estimate is made on a panel of width 1; by it coefficients fall as they should, to a tenth a degree.
+    """
+
+    def middle(width: float, gap: float) -> float:
+        """Coefficients in the middle on a panel from which a root is as far ahead of its end as ``gap``."""
+        c = TO_COEFFICIENTS @ (1.0 / np.sqrt(gap + width * (1.0 - SHARES)))
+        return float(np.abs(c[14:17]).max() / np.abs(c).max())
+
+    level = middle(1.0, distance)
+    again, onwards = ahead(level, 1.0), ahead(level, -1.0)
+    if again < 1.0 + distance:
+        assert middle(again, 1.0 + distance - again) <= (FALL / 1.1) ** -DEGREES
+    assert middle(onwards, distance - onwards) <= (FALL / 1.1) ** -DEGREES
+    assert middle(1.6 * onwards, max(distance - 1.6 * onwards, 1e-9)) >= FALL**-DEGREES

@@ -59,6 +59,10 @@ FALL, DEGREES = 5.4, 15
 # Bits of 1.0, and what x**(-1/DEGREES) would have if logarithms were straight lines between powers of two.
 ONE = 0x3FF0000000000000
 STRAIGHT = ONE + ONE // DEGREES
+# By what coefficients of time are then larger than those of all else.
+TURNING = 10.0
+# How far, in half widths from the middle of a panel, what is not smooth may be for coefficients to fall so.
+REACH = 0.5 * (FALL + 1.0 / FALL)
 # A panel is made this much narrower than it would seem to be allowed to be, and at most that many times wider.
 CAUTION, GROWTH = 0.9, 4.0
 # V**2 at a panel's end against the largest so far from which on time is resolved: below, a turn is expected, and time
@@ -121,18 +125,34 @@ def resolved(work, first, last):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def growth(worst):  # type: ignore[no-untyped-def]
-    """By what a panel's width may be multiplied: coefficients are powers of the distance of what is not smooth."""
-    if worst == 0.0:
-        return GROWTH
-    # A root to a few per cent is as good as any.
-    return min(CAUTION / FALL * from_bits(STRAIGHT - bits(worst) // DEGREES), GROWTH) if worst < inf else 0.5
+def rate(worst):  # type: ignore[no-untyped-def]
+    """By what coefficients fall a degree, to a few per cent, if ``worst`` is the size of those in the middle."""
+    return from_bits(STRAIGHT - bits(worst) // DEGREES)
 
 
 @Inner
-def narrower(width, worst):  # type: ignore[no-untyped-def]
+def growth(worst):  # type: ignore[no-untyped-def]
+    """By what a panel's width may be multiplied: coefficients are powers of the distance of what is not smooth."""
+    return min(CAUTION / FALL * rate(worst), GROWTH) if worst < inf else 0.5
+
+
+@Inner
+def ahead(worst, side):  # type: ignore[no-untyped-def]
+    """The same where what is not smooth lies ahead, as for time a turn: for the panel once more, or for the next.
+
+    ``side`` is 1 for the panel itself, -1 for that which begins at its end. Coefficients fall as on an ellipse through
+    what is ahead.
+    """
+    if not worst < inf:
+        return 0.5
+    fall = rate(worst)
+    return min(CAUTION * (0.5 * (fall + 1.0 / fall) + side) / (REACH + 1.0), GROWTH)
+
+
+@Inner
+def narrower(width, factor):  # type: ignore[no-untyped-def]
     """The width to try next."""
-    return width * max(min(growth(worst), 0.9), 0.2)
+    return width * max(min(factor, 0.9), 0.2)
 
 
 @Inner
@@ -231,7 +251,7 @@ def next_panel(  # type: ignore[no-untyped-def]
             work[size_at(DS)], work[size_at(PULL)] = size_of(work, DS), max(size_of(work, PULL), 1.0 / width)
             fine, worst = resolved(work, PULL, P)
             if not fine:
-                width = narrower(width, worst)
+                width = narrower(width, growth(worst))
                 continue
             untold = PULL
         far = solve_panel(drive, p, flags[2], u, g, c, left, base, v, nu, work)
@@ -252,6 +272,7 @@ def next_panel(  # type: ignore[no-untyped-def]
         if watch:
             enough, more = told(work)
             fine, worst = fine and enough, max(worst, more)
+        factor = growth(worst)
         if fine:
             widest = max(widest, width)
             top, end = max(ceiling, highest), work[W + COUNT]
@@ -263,12 +284,15 @@ def next_panel(  # type: ignore[no-untyped-def]
                 timed, more = resolved(work, PACE, LOAD)
             # On so small a part of what is smooth it is noise that is not resolved; the error says so.
             timed = timed or (needed and width <= SLIVER * widest and work[TAILS] < inf)
+            # Where time alone asks for narrow panels while V**2 falls, it is for a turn.
+            turning = end < base and more > TURNING * worst
+            if timed:
+                factor = min(factor, ahead(more, -1.0) if turning else growth(more))
             if timed or not needed:
-                wider = width * growth(max(worst, more) if timed else worst)
-                step = max(step, wider) if kink or width == room else wider
+                step = max(step, width * factor) if kink or width == room else width * factor
                 return width, step, timed
-            worst = more
-        width, kink = narrower(width, worst), False
+            factor = ahead(more, 1.0) if turning else growth(more)
+        width, kink = narrower(width, factor), False
     return 0.0, step, False
 
 
