@@ -5,7 +5,10 @@ from math import atan2, cos, fabs, inf, pi, sin, sqrt
 import numpy as np
 
 from gqm_sym.runtime.crossing import call_bend, call_climb, call_rise
+from gqm_sym.runtime.fused import fma
 from gqm_sym.runtime.jit import Inner
+from gqm_sym.runtime.lanes import LANES
+from gqm_sym.runtime.matrices import times
 from gqm_sym.runtime.panels import FLOOR, REGULAR, TURN_TURN, lay, read_off
 
 # Below this balance of V**2 doubles lose last places that matter (`stretch.LEAST_BALANCE`).
@@ -26,7 +29,12 @@ def _cosines(n: int) -> np.ndarray:
     return matrix
 
 
-OF_SHORT, OF_LONG, OF_LONGEST = _cosines(SHORT), _cosines(LONG), _cosines(LONGEST)
+def _in_registers(matrix: np.ndarray) -> np.ndarray:
+    return np.pad(matrix, ((0, 0), (0, -len(matrix) % LANES)))
+
+
+OF_LONGEST = _cosines(LONGEST)
+of_short, of_long = (times(_in_registers(_cosines(n))) for n in (SHORT, LONG))
 NEAR = np.sin(0.5 * pi * np.arange(LONGEST + 1) / LONGEST) ** 2
 
 
@@ -38,42 +46,49 @@ def orbit_panels(fns, p, going_round, a, b, lam0, w0):  # type: ignore[no-untype
 
 
 @Inner
-def pace_series(fns, p, a, b, width, n, matrix, work, series):  # type: ignore[no-untyped-def]
+def pace_series(fns, p, a, b, width, n, work, series):  # type: ignore[no-untyped-def]
     """Fill the cosine series of dt/dphi over half a turn; returns whether it is resolved, and V**2 balanced."""
-    flat, m = work.reshape(-1), n + 1
-    da, db, rows = flat[:m], flat[m : 2 * m], flat[2 * m : 4 * m].reshape(2, m)
+    m = n + 1
+    da, db, rows = work[:m], work[m : 2 * m], work[2 * m : 4 * m]
     for j in range(m):
         node = j * (LONGEST // n)
         da[j], db[j] = width * NEAR[node], width * NEAR[LONGEST - node]
     call_bend(fns[3], m, a, b, da, db, p, rows)
-    low, high = inf, 0.0
-    for k in range(m):
-        series[k] = 0.0
+    low, high, tail = inf, 0.0, 0.0
     for j in range(m):
-        q = rows[0, j]
+        q = rows[j]
         low, high = min(low, q), max(high, q)
-        pace = rows[1, j] / sqrt(q)
+        da[j] = rows[m + j] / sqrt(q)
+    if n == SHORT:
+        of_short(work, 0, series, 0)
+    elif n == LONG:
+        of_long(work, 0, series, 0)
+    else:
         for k in range(m):
-            series[k] += matrix[j, k] * pace
-    tail = 0.0
+            series[k] = 0.0
+        for j in range(m):
+            for k in range(m):
+                series[k] += OF_LONGEST[j, k] * da[j]
     for k in range(n - LAST, n + 1):
         tail = max(tail, fabs(series[k]))
     return tail <= SMALL * series[0] and low > LEAST_BALANCE * high
 
 
 @Inner
-def time_from(series, n, near, far, flip):  # type: ignore[no-untyped-def]
-    """The time from an end to where it is ``near`` that end and ``far`` from the other; ``flip`` is -1 for the second.
+def times_from(series, n, phi, psi, flip):  # type: ignore[no-untyped-def]
+    """The times from an end to two anomalies; ``flip`` is -1 for the second end.
 
-    The integral of a cosine series, by Clenshaw's scheme for sines.
+    The integral of a cosine series, by Clenshaw's scheme for sines: two sums side by side, for each step waits for the
+    one before.
     """
-    phi = 2.0 * atan2(sqrt(near), sqrt(far))
-    twice, sign = 2.0 * cos(phi), flip if n % 2 else 1.0
-    one, two = 0.0, 0.0
+    twice, double, sign = 2.0 * cos(phi), 2.0 * cos(psi), flip if n % 2 else 1.0
+    one, two, first, second = 0.0, 0.0, 0.0, 0.0
     for k in range(n, 0, -1):
-        one, two = sign * series[k] / k + twice * one - two, one
+        term = sign * series[k] / k
+        one, two = fma(twice, one, term - two), one
+        first, second = fma(double, first, term - second), first
         sign *= flip
-    return series[0] * phi + one * sin(phi)
+    return series[0] * phi + one * sin(phi), series[0] * psi + first * sin(psi)
 
 
 @Inner
@@ -81,13 +96,12 @@ def sharpened(fns, p, lam0, w0, end, width, work):  # type: ignore[no-untyped-de
     """How far a turning point is from the launch, with all digits: one that is near may be known as a rounded sum."""
     if w0 == 0.0 or fabs(end) > NEAR_LAUNCH * width:
         return end
-    flat = work.reshape(-1)
-    spot, offset, rows = flat[:1], flat[1:2], flat[2:4].reshape(2, 1)
+    spot, offset, rows = work[:1], work[1:2], work[2:4]
     spot[0], offset[0] = lam0 + end, end
     call_rise(fns[2], 1, lam0, spot, offset, p, rows)
-    left = w0 - end * rows[0, 0]
+    left = w0 - end * rows[0]
     call_climb(fns[1], 1, spot, p, rows)
-    better = end + left / rows[1, 0]
+    better = end + left / rows[1]
     return better if better * end >= 0.0 and fabs(better) <= NEAR_LAUNCH * width else end
 
 
@@ -118,16 +132,15 @@ def arrival(fns, p, going_round, direction, lam0, w0, least, most, place, work, 
     n, resolved = SHORT // 2, False
     while n < LONGEST and not resolved:
         n *= 2
-        matrix = OF_SHORT if n == SHORT else (OF_LONG if n == LONG else OF_LONGEST)
-        resolved = pace_series(fns, p, a, b, width, n, matrix, work, series)
+        resolved = pace_series(fns, p, a, b, width, n, work, series)
     # Times are told from the end that is nearer to the launch: of a launch there they have all their digits.
     from_b = -least > most
     near, far = (most, -least) if from_b else (-least, most)
     there = (most - ahead, ahead - least) if from_b else (ahead - least, most - ahead)
     if resolved:
-        flip = -1.0 if from_b else 1.0
-        whole, start = series[0] * pi, time_from(series, n, near, far, flip)
-        stop = time_from(series, n, max(there[0], 0.0), max(there[1], 0.0), flip)
+        here = 2.0 * atan2(sqrt(near), sqrt(far))
+        then = 2.0 * atan2(sqrt(max(there[0], 0.0)), sqrt(max(there[1], 0.0)))
+        whole, (start, stop) = series[0] * pi, times_from(series, n, here, then, -1.0 if from_b else 1.0)
     else:
         panels = orbit_panels(fns, p, going_round, a, b, lam0, w0)
         if panels[7] >= FLOOR or panels[6] < LEAST_BALANCE:

@@ -6,7 +6,7 @@ from numba import types
 from gqm_sym.runtime.entries import ends
 from gqm_sym.runtime.jit import entry
 from gqm_sym.runtime.search import LIMIT, TURN
-from gqm_sym.runtime.swift import CIRCULATION, LIBRATION, MOST_NODES, time_once
+from gqm_sym.runtime.swift import CIRCULATION, LIBRATION, time_once
 
 _FLOAT = types.float64
 _WALK = types.Tuple((types.int64, _FLOAT, _FLOAT))
@@ -45,5 +45,4 @@ def survey(fns, p, lam0, v0, direction, low, high, period, place, step):  # type
     near, far = min(ahead[1], behind[1]), max(ahead[1], behind[1])
     kind, width = (LIBRATION, far - near) if turns else (CIRCULATION, direction * period)
     a, b = (lam0 + near, lam0 + far) if turns else (lam0, lam0 + width)
-    work, rates = np.empty((4, MOST_NODES)), np.empty(MOST_NODES)
-    return direction, ahead, behind, time_once(fns, p, kind, lam0, v0 * v0, a, b, width, work, rates)
+    return direction, ahead, behind, time_once(fns, p, kind, lam0, v0 * v0, a, b, width)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from gqm_sym.errors import GQMError, InputError, ParameterError, SolutionError
 from gqm_sym.runtime import swift
 from gqm_sym.runtime.batches import answer_batches
-from gqm_sym.runtime.columns import lay_out, pointers, widen
+from gqm_sym.runtime.columns import PARAMETERS, lay_out, pointers, widen
 from gqm_sym.runtime.entries import frame_at
 from gqm_sym.runtime.extremes import over_legs
 from gqm_sym.runtime.formulas import CONTACTS
@@ -269,7 +269,8 @@ def _answer(
         if formulas.each is not None:
             each, held = formulas.each.addresses(), (formulas.each.held, formulas.each.top_held)
             answer_batches(each, held, *launches, swift.SPANS if alone else asked.asked, spans, codes)
-        swift.answer_many(tuple(formulas.addresses), *launches, asked.asked, spans, values, codes)
+        room = np.empty(len(lines) - PARAMETERS)
+        swift.answer_many(tuple(formulas.addresses), *launches, asked.asked, spans, values, codes, room)
 
 
 def _solved(formulas: "Formulas", asked: Quantity, here: list[Any], t_max: Any, contact: str) -> tuple[Any, int]:

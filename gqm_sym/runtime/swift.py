@@ -14,6 +14,7 @@ from gqm_sym.runtime.columns import DIRECTION, FIRST, LAM0, LAST, NEXT, PARAMETE
 from gqm_sym.runtime.crossing import call_bend, call_rise
 from gqm_sym.runtime.entries import ends
 from gqm_sym.runtime.jit import Inner, entry
+from gqm_sym.runtime.lanes import on_stack, uncounted
 from gqm_sym.runtime.orbit_extremes import extreme
 from gqm_sym.runtime.panels import FLOOR
 from gqm_sym.runtime.search import LIMIT, TURN
@@ -33,6 +34,8 @@ MOST_NODES = FEWEST * 2**DOUBLINGS
 # The rule's error is a sum of terms c*r**nodes, times a cosine of the nodes. It squares with each doubling, over c,
 # which branch points of ds make as small as 1e-5. A change may also be small by accident; two in a row hardly are.
 LAST_CHANGE, CHANGE_BEFORE = 1e-11, 3e-6
+
+work_room, rate_room = on_stack(4 * MOST_NODES), on_stack(MOST_NODES)
 
 _ADDRESSES = types.UniTuple(types.int64, 5)
 _LINE = types.float64[::1]
@@ -58,24 +61,23 @@ def fill(fns, p, kind, lam0, w0, a, b, width, first, n, work, rates):  # type: i
 
     ``width`` is the orbit's, from offsets: closer than the difference of its rounded ends.
     """
-    flat = work.reshape(-1)
-    da, db, rows = flat[:n], flat[n : 2 * n], flat[2 * n : 4 * n].reshape(2, n)
+    da, db, rows = work[:n], work[n : 2 * n], work[2 * n : 4 * n]
     low, high = inf, 0.0
     if kind == LIBRATION:
         for i in range(n):
             da[i], db[i] = width * FROM_A[first + i], width * FROM_B[first + i]
         call_bend(fns[3], n, a, b, da, db, p, rows)
         for i in range(n):
-            rates[i] = pi * rows[1, i] / sqrt(rows[0, i])
-            low, high = min(low, rows[0, i]), max(high, rows[0, i])
+            rates[i] = pi * rows[n + i] / sqrt(rows[i])
+            low, high = min(low, rows[i]), max(high, rows[i])
     else:
         for i in range(n):
             db[i] = width * SHARES[first + i]
             da[i] = lam0 + db[i]
         call_rise(fns[2], n, lam0, da, db, p, rows)
         for i in range(n):
-            lost = db[i] * rows[0, i]
-            rates[i] = fabs(width) * rows[1, i] / sqrt(w0 - lost)
+            lost = db[i] * rows[i]
+            rates[i] = fabs(width) * rows[n + i] / sqrt(w0 - lost)
             low = min(low, (w0 - lost) / (w0 + fabs(lost)))
         high = 1.0
     return low, high
@@ -88,8 +90,9 @@ def settled(before, change):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def time_once(fns, p, kind, lam0, w0, a, b, width, work, rates):  # type: ignore[no-untyped-def]
+def time_once(fns, p, kind, lam0, w0, a, b, width):  # type: ignore[no-untyped-def]
     """Half period or loop time by the trapezoidal rule; NaN where it did not converge or V**2 all but vanishes."""
+    work, rates = work_room(), rate_room()
     low, high = fill(fns, p, kind, lam0, w0, a, b, width, 0, FEWEST + 1, work, rates)
     total = 0.5 * (rates[0] + rates[FEWEST])
     half = total
@@ -129,17 +132,18 @@ def time_adaptively(fns, p, kind, lam0, w0, a, b):  # type: ignore[no-untyped-de
 
 @entry(
     types.void(
-        *(_ADDRESSES, types.int64[:, ::1], types.boolean, types.int64, _ROWS, _ROWS, types.int8[::1]),
+        *(_ADDRESSES, types.int64[:, ::1], types.boolean, types.int64, _ROWS, _ROWS, types.int8[::1], _LINE),
     ),
     nogil=True,
 )
-def answer_many(fns, columns, monotone, asked, spans, out, reasons):  # type: ignore[no-untyped-def]
+def answer_many(fns, columns, monotone, asked, spans, out, reasons, held):  # type: ignore[no-untyped-def]
     """Fill a row of ``out`` and of ``reasons`` for each launch that is HARD or SPANNED so far.
 
     ``columns`` are launches as `columns.pointers` gives them; V**2 is ``monotone`` between the axes of symmetry;
-    ``spans`` are those that batches found. A row of ``out`` holds both turning points (PLACES), or one number.
+    ``spans`` are those that batches found. A row of ``out`` holds both turning points (PLACES), or one number. ``held``
+    is room for the parameters of one launch.
     """
-    work, rates, p = np.empty((4, MOST_NODES)), np.empty(MOST_NODES), np.empty(columns.shape[0] - PARAMETERS)
+    work, series, p = work_room(), rate_room(), uncounted(held)
     for k in range(reasons.size):
         spanned = reasons[k] == SPANNED
         if reasons[k] != HARD and not spanned:
@@ -178,7 +182,7 @@ def answer_many(fns, columns, monotone, asked, spans, out, reasons):  # type: ig
         if asked in (HALF, WHOLE):
             kind, width = (CIRCULATION, way * period) if going_round else (LIBRATION, most - least)
             a, b = (lam0, lam0 + width) if going_round else (a, b)
-            value = time_once(fns, p, kind, lam0, w0, a, b, width, work, rates)
+            value = time_once(fns, p, kind, lam0, w0, a, b, width)
             if not value > 0.0:
                 value = time_adaptively(fns, p, kind, lam0, w0, a, b)
             out[k, 0] = 2.0 * value if asked == WHOLE and kind == LIBRATION else value
@@ -186,12 +190,12 @@ def answer_many(fns, columns, monotone, asked, spans, out, reasons):  # type: ig
             out[k, 0], out[k, 1] = a, b
         elif asked == ARRIVAL:
             place = element(columns, TARGET, k)
-            out[k, 0] = arrival(fns, p, going_round, way, lam0, w0, least, most, place, work, rates)
+            out[k, 0] = arrival(fns, p, going_round, way, lam0, w0, least, most, place, work, series)
             if out[k, 0] == inf:
                 out[k, 0], reasons[k] = np.nan, ELSEWHERE
                 continue
         else:
             force, sign = asked in (WEAKEST, STRONGEST), 1.0 if asked in (FASTEST, STRONGEST) else -1.0
-            out[k, 0] = extreme(fns, p, going_round, lam0, w0, least, most, force, sign, work, rates)
+            out[k, 0] = extreme(fns, p, going_round, mirror == mirror, lam0, w0, least, most, force, sign)
         if not isfinite(out[k, 0]):
             reasons[k] = HARD
