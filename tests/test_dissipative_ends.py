@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from mpmath import mp, mpf
 
+import generated.circle_coulomb
 import gqm_sym as gqm
 from gqm_sym.errors import InputError, LaunchError, SolutionError
 from gqm_sym.runtime import legs
@@ -259,3 +260,35 @@ def test_where_the_contact_force_begins_as_nothing(build: Build) -> None:
     assert state.v2 == pytest.approx(float(w(mpf(1))), rel=1e-14)
     assert state.normal_force == pytest.approx(float(g - w(mpf(1)) / 2) / math.sqrt(2.0), rel=1e-13)
     assert [event.kind for event in motion.events if event.kind == "contact-sign"] == []
+
+
+@pytest.mark.parametrize(
+    ("lam0", "v0"),
+    [
+        # Time is counted back from the turn to where N changes sign, and no farther.
+        (0.7483964034543935, 5.818989927693156),
+        (0.5492047797152688, 6.863503323397249),
+        (1.4219101233586642, 4.690743520201464),
+        # Back from the turn past that place: the distance to it is a rounding longer than what was run.
+        (0.9646260788927759, 6.440001136948692),
+    ],
+)
+def test_where_the_contact_force_changes_sign_on_a_ring(lam0: float, v0: float) -> None:
+    """A rough ring up to where N = 0: W' + 2 mu W = -2 g (sin + mu cos), a closed form, and its time by quadrature."""
+    motion = generated.circle_coulomb.solve(lam0, v0, t_max=3.0)
+    with mp.workdps(30):
+        mu, g, start = mpf("0.15"), mpf("9.81"), mpf(lam0)
+
+        def wave(angle: mpf) -> mpf:
+            return 2 * g / (1 + 4 * mu**2) * ((1 - 2 * mu**2) * mp.cos(angle) - 3 * mu * mp.sin(angle))
+
+        def w(angle: mpf) -> mpf:
+            return wave(angle) + (mpf(v0) ** 2 - wave(start)) * mp.exp(-2 * mu * (angle - start))
+
+        place = mp.findroot(lambda angle: w(angle) + g * mp.cos(angle), mpf("2.1"))
+        time = mp.quad(lambda angle: 1 / mp.sqrt(w(angle)), [start, (start + place) / 2, place])
+    event = motion.events[0]
+    assert event.kind == "contact-sign"
+    assert event.lam == pytest.approx(float(place), rel=2e-15)
+    assert event.t == pytest.approx(float(time), rel=1e-14)
+    assert float(motion.state(event.t).lam) == pytest.approx(float(place), rel=1e-14)

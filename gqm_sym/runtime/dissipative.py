@@ -321,6 +321,8 @@ class Dissipative(Motion):
 
     def _add(self, stretch: Stretch, sense: int, run: Run, end: str) -> None:
         """Run through a whole stretch next, cut where N changes sign."""
+        if not end and stretch.b in run.changes:  # where counting time from the turn begins
+            end = "contact-sign"
         low, high = sorted((stretch.a, stretch.b))
         cuts = [stretch.anomaly_of(*stretch.offsets(place)) for place in run.changes if low < place < high]
         times = stretch.times(np.array(cuts)) if cuts else ()

@@ -13,6 +13,8 @@ from gqm_sym.runtime.leg_records import has_room
 # Of a field.
 COLUMNS = 2 + 2 * COUNT
 MOST_TRIES = 20000
+# Why a leg was not followed back.
+NO_ROOM, LOST = -1, -2
 
 
 @Inner
@@ -20,7 +22,8 @@ def approach(drive, p, flags, top, end, v, nu, met, breaks, step, record, used):
     """The field of the leg that tends to the equilibrium ``top``, followed back from there to ``end``.
 
     ``nu`` is the sign of N at the equilibrium, which has changed ``met`` times on the way. The field is entered behind
-    what is ``used`` of a record (`leg_records`). Returns how many rows it has; -1 where there is no room.
+    what is ``used`` of a record (`leg_records`). Returns how many rows it has; NO_ROOM where there is none, LOST where
+    it could not be followed.
     """
     work = panel_room()
     set_nodes(work)
@@ -37,7 +40,7 @@ def approach(drive, p, flags, top, end, v, nu, met, breaks, step, record, used):
             break
         row, right = used + count * COLUMNS, stop if width == stop - left else left + width
         if not has_room(record, row, met):
-            return -1
+            return NO_ROOM
         record[row], record[row + 1] = left, right
         if count == 0:
             # V**2 over d vanishes at the equilibrium, as the force does.
@@ -51,4 +54,4 @@ def approach(drive, p, flags, top, end, v, nu, met, breaks, step, record, used):
             for k in range(COUNT):
                 record[row + begin + k] = work[SERIES + k]
         count, base, left = count + 1, work[V2 + COUNT], right
-    return count
+    return count if left >= whole else LOST

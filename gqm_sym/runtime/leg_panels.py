@@ -302,10 +302,11 @@ def next_stop(origin, u, gone, whole, record, breaks, met, passed, nu):  # type:
 
     ``met`` and ``passed`` are the last changes of N's sign ``nu`` and the last breaks that are still to come.
     """
-    here, stop = origin + u * gone, whole
-    while met >= 0 and u * (record[change_at(record, met)] - here) <= 0.0:
+    stop = whole
+    # By distances, for what has been run to is as far as it was said to be: a place may be a rounding farther.
+    while met >= 0 and u * (record[change_at(record, met)] - origin) <= gone:
         met, nu = met - 1, -nu
-    while passed >= 0 and u * (breaks[passed] - here) <= 0.0:
+    while passed >= 0 and u * (breaks[passed] - origin) <= gone:
         passed -= 1
     if met >= 0:
         stop = min(stop, u * (record[change_at(record, met)] - origin))

@@ -13,7 +13,7 @@ from gqm_sym.runtime.chebyshev import COUNT
 from gqm_sym.runtime.crossing import call_hold
 from gqm_sym.runtime.jit import Inner, entry
 from gqm_sym.runtime.lanes import uncounted
-from gqm_sym.runtime.leg_approach import approach
+from gqm_sym.runtime.leg_approach import LOST, NO_ROOM, approach
 from gqm_sym.runtime.leg_equation import W, panel_room, set_nodes
 from gqm_sym.runtime.leg_panels import ALWAYS, next_panel, next_stop
 from gqm_sym.runtime.leg_records import (
@@ -31,7 +31,7 @@ from gqm_sym.runtime.leg_records import (
     keep,
     total,
 )
-from gqm_sym.runtime.leg_runs import ASYMPTOTE, DIPPED, FULL, MOST_TRIES, TURN, run, spot_room
+from gqm_sym.runtime.leg_runs import ASYMPTOTE, DIPPED, FULL, MOST_TRIES, SPENT, TURN, run, spot_room
 
 _LINE = types.float64[::1]
 _FLOAT, _WHOLE = types.float64, types.int64
@@ -42,7 +42,8 @@ def run_back(drive, p, flags, turn, whole, v, nu, met, breaks, step, record, use
     """Follow the leg that turns at ``turn`` back from there over the distance ``whole``.
 
     ``nu`` is the sign of N at the turn, which has changed ``met`` times on the way. The panels are entered behind what
-    is ``used`` of a record. Returns how many they are; -1 where there is no room.
+    is ``used`` of a record. Returns how many they are; NO_ROOM where there is none, LOST where it could not be
+    followed.
     """
     work = panel_room()
     set_nodes(work)
@@ -54,7 +55,7 @@ def run_back(drive, p, flags, turn, whole, v, nu, met, breaks, step, record, use
         if room <= 0.0:
             break
         if not has_room(record, at, met):
-            return -1
+            return NO_ROOM
         width, step, _ = next_panel(
             *(drive, p, flags, turn, u, 1.0, 0.0, left, room, step, base, v, nu, 0.0, ALWAYS, False, work)
         )
@@ -65,7 +66,7 @@ def run_back(drive, p, flags, turn, whole, v, nu, met, breaks, step, record, use
         count, base = count + 1, work[W + COUNT]
         if gone >= whole:
             break
-    return count
+    return count if left >= sqrt(whole) else LOST
 
 
 @Inner
@@ -147,4 +148,6 @@ def follow(  # type: ignore[no-untyped-def]
     before = total(record, HEAD, kept)
     record[END], record[END_LOW], record[MIDDLE], record[MIDDLE_LOW] = place[0], place[1], middle[0], middle[1]
     record[SLACK], record[BEFORE], record[AFTER], record[MET] = slack, before, after, met
-    return (FULL if back < 0 else what), n, way, held, kept, back, place[0], w1, onwards, next_strict, before + after
+    if back < 0:
+        what = FULL if back == NO_ROOM else SPENT
+    return what, n, way, held, kept, back, place[0], w1, onwards, next_strict, before + after
