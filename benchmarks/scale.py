@@ -89,7 +89,7 @@ def main() -> None:
     swept.loglog(sweeps[0], sweeps[1], "o-", color="#0072b2", label="time (s)")
     swept.loglog(sweeps[0], np.array(sweeps[2]) / 1e9, "s--", color="#d55e00", label="peak memory of the process (GB)")
     swept.set(xlabel="launches", title="half periods in one sweep")
-    swept.legend()
+    swept.legend(loc="lower right", fontsize=7)
     derived.loglog(*formulas, "o-", color="#0072b2")
     derived.set(xlabel="characters of the formula", ylabel="time taken (s)", title="derivation and emission")
     for panel in panels.flat:
