@@ -7,12 +7,9 @@ import numpy as np
 from gqm_sym.runtime.crossing import call_bend, call_climb, call_rise
 from gqm_sym.runtime.fused import fma
 from gqm_sym.runtime.jit import Inner
-from gqm_sym.runtime.lanes import LANES
 from gqm_sym.runtime.matrices import times
-from gqm_sym.runtime.panels import FLOOR, REGULAR, TURN_TURN, lay, read_off
+from gqm_sym.runtime.panels import FLOOR, LEAST_BALANCE, REGULAR, TURN_TURN, lay, read_off
 
-# Below this balance of V**2 doubles lose last places that matter (`stretch.LEAST_BALANCE`).
-LEAST_BALANCE = 1e-2
 # Terms of the series that are tried; how small the last ones must be against the first, for the time they stand for is
 # divided by their number.
 SHORT, LONG, LONGEST, LAST, SMALL = 32, 64, 128, 4, 1e-14
@@ -29,12 +26,8 @@ def _cosines(n: int) -> np.ndarray:
     return matrix
 
 
-def _in_registers(matrix: np.ndarray) -> np.ndarray:
-    return np.pad(matrix, ((0, 0), (0, -len(matrix) % LANES)))
-
-
 OF_LONGEST = _cosines(LONGEST)
-of_short, of_long = (times(_in_registers(_cosines(n))) for n in (SHORT, LONG))
+of_short, of_long = times(_cosines(SHORT)), times(_cosines(LONG))
 NEAR = np.sin(0.5 * pi * np.arange(LONGEST + 1) / LONGEST) ** 2
 
 
@@ -43,6 +36,12 @@ def orbit_panels(fns, p, going_round, a, b, lam0, w0):  # type: ignore[no-untype
     """Adaptive panels over half a libration, or over a lap: one call, for compiling each takes long."""
     kind, ref, w, stop = (REGULAR, lam0, w0, 1.0) if going_round else (TURN_TURN, a, 0.0, pi)
     return lay(fns, p, kind, a, b, ref, w, np.empty((0, 0)), np.array([0.0, stop]))
+
+
+@Inner
+def to_rounding(panels):  # type: ignore[no-untyped-def]
+    """Whether panels tell time to the last places."""
+    return not (panels[7] >= FLOOR or panels[6] < LEAST_BALANCE)
 
 
 @Inner
@@ -120,7 +119,7 @@ def arrival(fns, p, going_round, direction, lam0, w0, least, most, place, work, 
         if laps < 0.0:
             return inf
         panels = orbit_panels(fns, p, going_round, lam0, lam0 + lap, lam0, w0)
-        if panels[7] >= FLOOR or panels[6] < LEAST_BALANCE:
+        if not to_rounding(panels):
             return np.nan
         return laps * panels[1][-1] + read_off(panels[0], panels[1], panels[3], ahead / lap - laps)
     width = most - least
@@ -143,7 +142,7 @@ def arrival(fns, p, going_round, direction, lam0, w0, least, most, place, work, 
         whole, (start, stop) = series[0] * pi, times_from(series, n, here, then, -1.0 if from_b else 1.0)
     else:
         panels = orbit_panels(fns, p, going_round, a, b, lam0, w0)
-        if panels[7] >= FLOOR or panels[6] < LEAST_BALANCE:
+        if not to_rounding(panels):
             return np.nan
         whole = panels[1][-1]
         start = read_off(panels[0], panels[1], panels[3], 2.0 * atan2(sqrt(-least), sqrt(most)))

@@ -6,11 +6,11 @@ and Borwein, Pi and the AGM, 1987, section 1.1): a handful of square roots, and 
 
 from math import inf, nan, pi, sqrt
 
-from gqm_sym.runtime.arrivals import LEAST_BALANCE
 from gqm_sym.runtime.batch_rows import LEAST, MOST, WHO
 from gqm_sym.runtime.crossing import call_mean_each
 from gqm_sym.runtime.fused import choose
 from gqm_sym.runtime.jit import Inner
+from gqm_sym.runtime.panels import LEAST_BALANCE
 from gqm_sym.runtime.swift import DONE, HARD, WHOLE
 
 # The kind of such orbits, beside those of `swift` and `batch_times`.

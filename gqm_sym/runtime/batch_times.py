@@ -4,7 +4,6 @@ from math import fabs, inf, nan, pi, sqrt
 
 import numpy as np
 
-from gqm_sym.runtime.arrivals import LEAST_BALANCE
 from gqm_sym.runtime.batch_rows import (
     CHANGE,
     HIGH,
@@ -24,6 +23,7 @@ from gqm_sym.runtime.batch_rows import (
 from gqm_sym.runtime.crossing import call_bend_each, call_orbit_each, call_rise_each, call_swing_each, call_top_each
 from gqm_sym.runtime.fused import choose
 from gqm_sym.runtime.jit import Inner
+from gqm_sym.runtime.panels import LEAST_BALANCE
 from gqm_sym.runtime.swift import (
     CIRCULATION,
     DONE,

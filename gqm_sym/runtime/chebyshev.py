@@ -62,13 +62,11 @@ SHARES, MEANS, GRADED_MEANS, TO_COEFFICIENTS = _tables()
 # A row of values at the nodes is padded to whole registers, behind them the panel's end; so are what tables make of it.
 WIDE = 24
 ENDS_BY_NODE = np.pad(np.append(SHARES, 1.0), (0, WIDE - COUNT - 1))
-to_means, to_graded_means, to_coefficients = (
-    times(np.pad(table.T, ((0, 0), (0, WIDE - len(table))))) for table in (MEANS, GRADED_MEANS, TO_COEFFICIENTS)
-)
+to_means, to_graded_means, to_coefficients = (times(table.T) for table in (MEANS, GRADED_MEANS, TO_COEFFICIENTS))
 # Coefficients that tell how well a function is resolved, three at the end and three in the middle; the mean over
 # the panel.
 LAST, MIDDLE = slice(COUNT - 3, COUNT), slice(14, 17)
-to_tails = times(np.pad(np.vstack([TO_COEFFICIENTS[LAST], TO_COEFFICIENTS[MIDDLE], MEANS[COUNT]]).T, ((0, 0), (0, 1))))
+to_tails = times(np.vstack([TO_COEFFICIENTS[LAST], TO_COEFFICIENTS[MIDDLE], MEANS[COUNT]]).T)
 extent, size_of = span(COUNT), largest(COUNT)
 # A polynomial on the panel is nowhere further from a number than this many times its values at the nodes.
 LEBESGUE = 3.0

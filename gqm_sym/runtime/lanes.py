@@ -36,6 +36,12 @@ def spread(builder: Any, value: Any) -> Any:
     return builder.shuffle_vector(one, one, ir.Constant(ir.VectorType(INDEX, LANES), [0] * LANES))
 
 
+def operation(builder: Any, name: str, *values: Any) -> Any:
+    """One of LLVM's operations on registers, lane by lane: "fma", "sqrt", "fabs"."""
+    kind = ir.FunctionType(REGISTER, [REGISTER] * len(values))
+    return builder.call(get_or_insert_function(builder.module, kind, f"llvm.{name}.v{LANES}f64"), values)
+
+
 class Lanes:
     """A register while code is being made: what is done with it is done by LLVM."""
 
@@ -72,9 +78,7 @@ class Lanes:
         return self._called("fabs")
 
     def _called(self, name: str) -> "Lanes":
-        kind = ir.FunctionType(REGISTER, [REGISTER])
-        function = get_or_insert_function(self.builder.module, kind, f"llvm.{name}.v{LANES}f64")
-        return Lanes(self.builder, self.builder.call(function, (self.value,)))
+        return Lanes(self.builder, operation(self.builder, name, self.value))
 
 
 def over_rows(formula: Callable[..., Any], width: int) -> Any:

@@ -7,12 +7,11 @@ from gqm_sym.runtime.fields import chebyshev_sum
 from gqm_sym.runtime.jit import Inner
 from gqm_sym.runtime.leg_equation import BARE, DS, PLACE, SERIES, panel_room, set_nodes
 from gqm_sym.runtime.leg_equation import W as V2
-from gqm_sym.runtime.leg_panels import NEVER, next_panel, next_stop
+from gqm_sym.runtime.leg_panels import MOST_TRIES, NEVER, next_panel, next_stop
 from gqm_sym.runtime.leg_records import has_room
 
 # Of a field.
 COLUMNS = 2 + 2 * COUNT
-MOST_TRIES = 20000
 # Why a leg was not followed back.
 NO_ROOM, LOST = -1, -2
 

@@ -72,6 +72,9 @@ HIGH = 0.25
 # A part this small of a panel on which V**2 is resolved tells noise from structure.
 SLIVER = 2.0**-20
 
+# Panels that are tried in a row along a leg.
+MOST_TRIES = 20000
+
 # Whether time is to be resolved.
 NEVER, MAYBE, ALWAYS = range(3)
 

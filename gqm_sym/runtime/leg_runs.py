@@ -35,6 +35,7 @@ from gqm_sym.runtime.leg_panels import (
     ALWAYS,
     HIGH,
     MAYBE,
+    MOST_TRIES,
     NARROW,
     NEVER,
     NOISE,
@@ -53,7 +54,6 @@ TOUCHED = 5e-14
 NEAR = 1e-11
 # The first panel of a leg, against the way on which the first acceleration would stop the body.
 SOONER = 2.0
-MOST_TRIES = 20000
 MOST_PANELS = 512
 
 # Room for one place, V**2, and what is found there.

@@ -15,7 +15,7 @@ from gqm_sym.runtime.jit import Inner, entry
 from gqm_sym.runtime.lanes import uncounted
 from gqm_sym.runtime.leg_approach import LOST, NO_ROOM, approach
 from gqm_sym.runtime.leg_equation import W, panel_room, set_nodes
-from gqm_sym.runtime.leg_panels import ALWAYS, next_panel, next_stop
+from gqm_sym.runtime.leg_panels import ALWAYS, MOST_TRIES, next_panel, next_stop
 from gqm_sym.runtime.leg_records import (
     AFTER,
     BEFORE,
@@ -31,7 +31,7 @@ from gqm_sym.runtime.leg_records import (
     keep,
     total,
 )
-from gqm_sym.runtime.leg_runs import ASYMPTOTE, DIPPED, FULL, MOST_TRIES, SPENT, TURN, run, spot_room
+from gqm_sym.runtime.leg_runs import ASYMPTOTE, DIPPED, FULL, SPENT, TURN, run, spot_room
 
 _LINE = types.float64[::1]
 _FLOAT, _WHOLE = types.float64, types.int64

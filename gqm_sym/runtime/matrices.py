@@ -8,24 +8,25 @@ them busy, for a sum waits for the one before.
 from functools import partial, reduce
 from typing import Any
 
+import numpy as np
 from llvmlite import ir
 from numba import types
-from numba.core.cgutils import get_or_insert_function, global_constant
+from numba.core.cgutils import global_constant
 from numba.extending import intrinsic
 
-from gqm_sym.runtime.lanes import INDEX, LANES, REAL, REGISTER, Lanes, line_of, register, spread
+from gqm_sym.runtime.lanes import INDEX, LANES, REAL, REGISTER, Lanes, line_of, operation, register, spread
 
 # Sums at work at a time.
 SUMS = 6
-_FUSED = ir.FunctionType(REGISTER, [REGISTER] * 3)
 
 
 def times(table: Any) -> Any:
-    """A compiled function ``f(values, at, out, to)`` for a table of some rows as wide as some registers.
+    """A compiled function ``f(values, at, out, to)`` for a table of some rows, each filled up to whole registers by 0.
 
     It does ``out[to : to + width] = values[at : at + rows] @ table``, the arrays read as one line of numbers: a slice
     would cost more than the sums. Nothing is checked.
     """
+    table = np.pad(table, ((0, 0), (0, -table.shape[1] % LANES)))
     rows, width = table.shape
     blocks = width // LANES
     chains = max(SUMS // blocks, 1)
@@ -41,14 +42,13 @@ def times(table: Any) -> Any:
         # the stack around a loop.
         unseen = ir.FunctionType(REAL.as_pointer(), [REAL.as_pointer()])
         entries = builder.asm(unseen, "", "=r,0", [builder.bitcast(held, REAL.as_pointer())], side_effect=False)
-        fused = get_or_insert_function(builder.module, _FUSED, f"llvm.fma.v{LANES}f64")
         totals = [[ir.Constant(REGISTER, [0.0] * LANES)] * blocks for _ in range(chains)]
         for row in range(rows):
             each = spread(builder, builder.load(builder.gep(values, [ir.Constant(INDEX, row)])))
             chain = totals[row % chains]
             for block in range(blocks):
                 entry = builder.load(register(builder, entries, row * width + block * LANES), align=8 * LANES)
-                chain[block] = builder.call(fused, (each, entry, chain[block]))
+                chain[block] = operation(builder, "fma", each, entry, chain[block])
         for block, parts in enumerate(zip(*totals, strict=True)):
             builder.store(reduce(builder.fadd, parts), register(builder, out, block * LANES), align=8)
         return context.get_dummy_value()

@@ -174,10 +174,8 @@ def find_states(record, p, t, out, begin, end):  # type: ignore[no-untyped-def]
     no_field = np.empty((0, 0))
     way = 1.0 if b > a else -1.0
     size = min(BLOCK, end - begin)
-    room, whole = (
-        np.empty((19, size)),
-        np.empty((2, size), dtype=np.int64),
-    )  # each of its own would take as long as a time
+    # Arrays of their own would take as long as a time.
+    room, whole = np.empty((19, size)), np.empty((2, size), dtype=np.int64)
     phi, sense, laps, v, reduced, v2, arc = room[0], room[1], room[2], room[3], room[4], room[5], room[6]
     spare, work, rows, segments, panels = room[7:10], room[10:14], room[14:19], whole[0], whole[1]
     for start in range(begin, end, BLOCK):

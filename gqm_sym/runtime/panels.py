@@ -28,6 +28,8 @@ PLATEAU = 1e-7  # coefficients that have stopped falling below this level are ro
 MOST_PANELS = 4096
 # Below this balance doubles keep too few digits of V**2 to be worth laying panels on.
 HOPELESS = 1e-9
+# Below this balance the half period in doubles is off by more than a few units in the last place.
+LEAST_BALANCE = 1e-2
 LEAST_WIDTH = 2.0**-48  # of the stretch
 NOTHING = 2.0**-104  # a share of the time so far that two doubles do not hold
 # Legendre's recurrence: P_(k+1) = GROWTH[k] x P_k - DECAY[k-1] P_(k-1).

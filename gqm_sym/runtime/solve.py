@@ -11,12 +11,12 @@ from gqm_sym.runtime.exact_panels import DIGITS, lay_exactly
 from gqm_sym.runtime.formulas import Formulas, Given, Launch
 from gqm_sym.runtime.functions import Functions
 from gqm_sym.runtime.motion import Motion
-from gqm_sym.runtime.panels import REGULAR
+from gqm_sym.runtime.panels import LEAST_BALANCE, REGULAR
 from gqm_sym.runtime.passage import OpenEnd, Passage
 from gqm_sym.runtime.periodic import Periodic
 from gqm_sym.runtime.problem import Problem, Reach
 from gqm_sym.runtime.rest import Rest
-from gqm_sym.runtime.stretch import LEAST_BALANCE, Stretch
+from gqm_sym.runtime.stretch import Stretch
 from gqm_sym.runtime.stretches import between_turns, from_turn, through
 from gqm_sym.runtime.surveying import survey
 

@@ -26,10 +26,8 @@ from gqm_sym.runtime.exact_panels import DIGITS, exact_ends, lay_exactly
 from gqm_sym.runtime.functions import Functions
 from gqm_sym.runtime.integrands import FROM_TURN, REGULAR, TO_EQUILIBRIUM, TURN_TURN
 from gqm_sym.runtime.inversion import TIMED
-from gqm_sym.runtime.panels import FAILED, ILL_CONDITIONED
+from gqm_sym.runtime.panels import FAILED, ILL_CONDITIONED, LEAST_BALANCE
 
-# Below this balance the half period in doubles is off by more than a few units in the last place.
-LEAST_BALANCE = 1e-2
 # Below this share of its ends, the width of a stretch is too rounded for a speed, and for a time from one turn.
 LEAST_WIDTH = 1.0 / 32.0
 LEAST_TIMED = 2.0**-10

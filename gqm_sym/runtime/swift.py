@@ -9,14 +9,14 @@ from math import fabs, inf, isfinite, pi, sqrt
 import numpy as np
 from numba import types
 
-from gqm_sym.runtime.arrivals import LEAST_BALANCE, arrival, orbit_panels
+from gqm_sym.runtime.arrivals import arrival, orbit_panels, to_rounding
 from gqm_sym.runtime.columns import DIRECTION, FIRST, LAM0, LAST, NEXT, PARAMETERS, PERIOD, PLACE, TARGET, V0, element
 from gqm_sym.runtime.crossing import call_bend, call_rise
 from gqm_sym.runtime.entries import ends
 from gqm_sym.runtime.jit import Inner, entry
 from gqm_sym.runtime.lanes import on_stack, uncounted
 from gqm_sym.runtime.orbit_extremes import extreme
-from gqm_sym.runtime.panels import FLOOR
+from gqm_sym.runtime.panels import LEAST_BALANCE
 from gqm_sym.runtime.search import LIMIT, TURN
 
 # What is asked of each launch. Of batches also SPANS: the offsets of both ends from the launch, or of a lap and NaN.
@@ -125,7 +125,7 @@ def time_once(fns, p, kind, lam0, w0, a, b, width):  # type: ignore[no-untyped-d
 def time_adaptively(fns, p, kind, lam0, w0, a, b):  # type: ignore[no-untyped-def]
     """Half period or loop time by adaptive panels; NaN where they did not converge."""
     panels = orbit_panels(fns, p, kind == CIRCULATION, a, b, lam0, w0)
-    if panels[7] >= FLOOR or panels[6] < LEAST_BALANCE:
+    if not to_rounding(panels):
         return np.nan
     return panels[1][-1]
 
