@@ -322,7 +322,9 @@ def main(count: int, seed: int) -> int:
     """Run mutants, and print those that no test notices."""
     taken, lines = known_tests()
     trees = {
-        path: ast.parse(path.read_text(encoding="utf-8")) for folder in FOLDERS for path in (ROOT / folder).glob("*.py")
+        path: ast.parse(path.read_text(encoding="utf-8"))
+        for folder in FOLDERS
+        for path in (ROOT / folder).rglob("*.py")
     }
     every = [(path, *change) for path, tree in sorted(trees.items()) for change in changes(tree)]
     draw, counts = random.Random(seed), Counter[str]()

@@ -47,10 +47,7 @@ NODES = (
         ast.Attribute,
     ),
 )
-IMPORTS = ("math", "typing", "numba", "gqm_sym.runtime")
-IMPORTS += tuple(
-    f"gqm_sym.runtime.{name}" for name in ("differences", "elementary", "intervals", "places", "wave_differences")
-)
+IMPORTS = ("math", "typing", "numba", "gqm_sym.runtime", "gqm_sym.runtime.vocabulary")
 
 
 def declared(text: str, *, title: str = "", parameter: str = "u", **parameters: str) -> Model:

@@ -5,7 +5,7 @@ from types import ModuleType
 from typing import Any
 
 import gqm_sym as gqm
-from gqm_sym.runtime.chart import Chart
+from gqm_sym.runtime.charts.chart import Chart
 
 # A loop between clothoids.
 LOOP = [

@@ -11,9 +11,9 @@ import sympy as sp
 from mpmath import mp, mpf
 
 import gqm_sym as gqm
-from gqm_sym.runtime import swift
-from gqm_sym.runtime.batches import answer_batches
-from gqm_sym.runtime.columns import pointers
+from gqm_sym.runtime.compiled.strided import pointers
+from gqm_sym.runtime.sweep import quantities
+from gqm_sym.runtime.sweep.batch.batches import answer_batches
 
 ModuleOf = Callable[[str], ModuleType]
 
@@ -37,7 +37,7 @@ def answered(
     columns = [np.asarray(v, dtype=float) for v in (lam0, v0, ways, 0.0, *known, *p)]
     n = max(column.size for column in columns)
     lines = [np.broadcast_to(column, n) for column in columns]
-    out, reasons = np.full((n, 2), np.nan), np.full(n, swift.HARD, dtype=np.int8)
+    out, reasons = np.full((n, 2), np.nan), np.full(n, quantities.UNDECIDED, dtype=np.int8)
     each = module.MODEL.each
     answer_batches(each.addresses(), (each.held, each.top_held), pointers(lines), monotone, asked, out, reasons)
     return out, reasons
@@ -58,8 +58,10 @@ def test_every_pendulum_away_from_the_top_is_answered(count: int, said: str, mod
     """Whatever the number of launches: half periods of all, within a few last places."""
     amplitude = np.linspace(0.01, 2.6, count)
     p = [1.0, 9.81, 1.0]
-    out, reasons = answered(module_of("circle"), amplitude, 0.0, 1, p, CIRCLE, asked=swift.HALF, **SAID[said])
-    assert (reasons == swift.DONE).all()
+    out, reasons = answered(
+        module_of("circle"), amplitude, 0.0, 1, p, CIRCLE, asked=quantities.HALF_PERIOD, **SAID[said]
+    )
+    assert (reasons == quantities.ANSWERED).all()
     for value, a in zip(out[:, 0], amplitude, strict=True):
         with mp.workdps(40):
             truth = 2 * mp.ellipk(mp.sin(mpf(float(a)) / 2) ** 2) / mp.sqrt(mpf("9.81"))
@@ -75,12 +77,12 @@ def test_what_is_said_of_symmetry_changes_nothing(way: int, said: str, module_of
     place, reach = rng.uniform(-1.5, 1.5, 300), rng.uniform(1.6, 2.8, 300)
     v0 = np.sqrt(2 * 9.81 * (np.cos(place) - np.cos(reach)))
     launch = (lowest + place, v0, way, [1.0, 9.81, 1.0], CIRCLE)
-    ends, why = answered(module_of("circle"), *launch, asked=swift.PLACES, **SAID[said])
-    done = why == swift.DONE
+    ends, why = answered(module_of("circle"), *launch, asked=quantities.TURNING_POINTS, **SAID[said])
+    done = why == quantities.ANSWERED
     assert done.all() if said == "all" else done.mean() > 0.8
     assert ends[done] == pytest.approx(np.column_stack([lowest - reach, lowest + reach])[done], rel=4e-15, abs=4e-15)
-    times, why = answered(module_of("circle"), *launch, asked=swift.HALF, **SAID[said])
-    assert ((why == swift.DONE) == done).all()
+    times, why = answered(module_of("circle"), *launch, asked=quantities.HALF_PERIOD, **SAID[said])
+    assert ((why == quantities.ANSWERED) == done).all()
     for value, a in zip(times[done, 0], 0.5 * (ends[done, 1] - ends[done, 0]), strict=True):
         with mp.workdps(40):
             truth = 2 * mp.ellipk(mp.sin(mpf(float(a)) / 2) ** 2) / mp.sqrt(mpf("9.81"))
@@ -94,16 +96,16 @@ def test_laps(way: int, said: str, module_of: ModuleOf) -> None:
     places = np.linspace(-3.0, 3.0, 13)
     v0 = np.sqrt(8.0**2 - 2 * 9.81 * (1 - np.cos(places)))
     p = [1.0, 9.81, 1.0]
-    out, reasons = answered(module_of("circle"), places, v0, way, p, CIRCLE, asked=swift.WHOLE, **SAID[said])
-    assert (reasons == swift.DONE).all()
+    out, reasons = answered(module_of("circle"), places, v0, way, p, CIRCLE, asked=quantities.PERIOD, **SAID[said])
+    assert (reasons == quantities.ANSWERED).all()
     with mp.workdps(40):
         truth = float(4 * mp.ellipk(4 * mpf("9.81") / 64) / 8)
     # Speeds are rounded, and the loop time follows the energy they mean.
     assert out[:, 0] == pytest.approx(truth, rel=2e-15)
-    ends = answered(module_of("circle"), places, v0, way, p, CIRCLE, asked=swift.PLACES, **SAID[said])
-    assert (ends[1] == swift.PASSING).all()
-    halves = answered(module_of("circle"), places, v0, way, p, CIRCLE, asked=swift.HALF, **SAID[said])
-    assert (halves[1] == swift.PASSING).all()
+    ends = answered(module_of("circle"), places, v0, way, p, CIRCLE, asked=quantities.TURNING_POINTS, **SAID[said])
+    assert (ends[1] == quantities.NOT_PERIODIC).all()
+    halves = answered(module_of("circle"), places, v0, way, p, CIRCLE, asked=quantities.HALF_PERIOD, **SAID[said])
+    assert (halves[1] == quantities.NOT_PERIODIC).all()
 
 
 @pytest.mark.parametrize("turns", [0, 1, -2, 50])
@@ -159,9 +161,10 @@ def test_units_decide_nothing(strength: float, module_of: ModuleOf) -> None:
     """Under another gravity the same swings are answered and the same are left, those next to the top."""
     lam0 = np.linspace(0.1, np.pi - 0.01, 40)
     one, other = (
-        answered(module_of("circle"), lam0, 0.0, 1, [1.0, g, 1.0], CIRCLE, asked=swift.HALF) for g in (1.0, strength)
+        answered(module_of("circle"), lam0, 0.0, 1, [1.0, g, 1.0], CIRCLE, asked=quantities.HALF_PERIOD)
+        for g in (1.0, strength)
     )
-    assert set(one[1]) == {swift.DONE, swift.HARD}
+    assert set(one[1]) == {quantities.ANSWERED, quantities.UNDECIDED}
     assert (other[1] == one[1]).all()
     assert other[0][:, 0] * np.sqrt(strength) == pytest.approx(one[0][:, 0], rel=2e-15, nan_ok=True)
 
@@ -171,8 +174,8 @@ def test_what_cannot_be_proved_is_left(said: str, module_of: ModuleOf) -> None:
     """Launches at the top, next to it, and what is not a number."""
     lam0 = [np.pi, np.pi - 1e-9, np.nan, 0.3]
     p = [1.0, 9.81, 1.0]
-    out, reasons = answered(module_of("circle"), lam0, 0.0, 1, p, CIRCLE, asked=swift.HALF, **SAID[said])
-    assert list(reasons) == [swift.HARD, swift.HARD, swift.HARD, swift.DONE]
+    out, reasons = answered(module_of("circle"), lam0, 0.0, 1, p, CIRCLE, asked=quantities.HALF_PERIOD, **SAID[said])
+    assert list(reasons) == [quantities.UNDECIDED, quantities.UNDECIDED, quantities.UNDECIDED, quantities.ANSWERED]
     assert np.isnan(out[:3, 0]).all()
 
 

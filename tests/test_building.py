@@ -14,7 +14,7 @@ import pytest
 import gqm_sym as gqm
 from gqm_sym.building import difference, load, write_module, write_text
 from gqm_sym.errors import GQMError, HandEditedError, InputError, OutdatedModuleError
-from gqm_sym.runtime import jit
+from gqm_sym.runtime.compiled import jit
 from gqm_sym.runtime.interface import INTERFACE
 
 LONG_AGO = 1_000_000_000

@@ -15,8 +15,8 @@ from gqm_sym import runtime
 from gqm_sym.emission import charts
 from gqm_sym.emission.ir import ChartIR
 from gqm_sym.errors import LaunchError, SolutionError
-from gqm_sym.runtime import chart_functions as functions
-from gqm_sym.runtime.chart import NODES, Chart, assemble, resolved
+from gqm_sym.runtime.charts import evaluate
+from gqm_sym.runtime.charts.chart import NODES, Chart, assemble, resolved
 from gqm_sym.sympy_charts import chart_x, chart_z
 
 ULP = 2.0**-52
@@ -100,10 +100,10 @@ def test_divided_differences(size: float) -> None:
             c = b + size * rng.uniform()
             first = (height(mpf(b)) - height(mpf(a))) / (mpf(b) - mpf(a))
             second = ((height(mpf(c)) - height(mpf(b))) / (mpf(c) - mpf(b)) - first) / (mpf(c) - mpf(a))
-            assert abs(functions.chart_z1(chart.block, a, b, b - a) - first) <= 16 * ULP
+            assert abs(evaluate.chart_z1(chart.block, a, b, b - a) - first) <= 16 * ULP
             # Next to a joint a second difference is a derivative of the fit: 16 nodes cost it three digits.
-            assert abs(functions.chart_z2(chart.block, a, b, c, b - a, c - b) - second) <= 4e-13
-            swapped = functions.chart_z2(chart.block, c, a, b, a - c, b - a)
+            assert abs(evaluate.chart_z2(chart.block, a, b, c, b - a, c - b) - second) <= 4e-13
+            swapped = evaluate.chart_z2(chart.block, c, a, b, a - c, b - a)
             assert abs(swapped - second) <= 4e-13
 
 
@@ -127,7 +127,7 @@ def test_differences_far_from_the_origin() -> None:
         )
         for k in range(6):
             a, b = float(edges[k] + 0.3), float(edges[k + 3] - 0.2)
-            assert abs(functions.chart_x1(chart.block, a, b, b - a) - (x(b) - x(a)) / (mpf(b) - mpf(a))) <= 16 * ULP
+            assert abs(evaluate.chart_x1(chart.block, a, b, b - a) - (x(b) - x(a)) / (mpf(b) - mpf(a))) <= 16 * ULP
 
 
 def test_two_places_at_one_joint() -> None:
@@ -135,7 +135,7 @@ def test_two_places_at_one_joint() -> None:
     chart = Ring().chart((RADIUS,))
     for edge in map(float, chart.edges[1:-1]):
         beside = np.nextafter(edge, 0.0)
-        slope = functions.chart_z1(chart.block, beside, edge, 0.1 * (edge - beside))
+        slope = evaluate.chart_z1(chart.block, beside, edge, 0.1 * (edge - beside))
         assert abs(slope - np.sin(edge / RADIUS)) <= 1e-14
 
 
@@ -165,7 +165,7 @@ def test_differences_of_the_angle_across_joints(size: float) -> None:
             a, b, c = (float(joint) + size * share for share in shares)
             u, v, w = map(Fraction, (a, b, c))
             truth = float(((angle(w) - angle(v)) / (w - v) - (angle(v) - angle(u)) / (v - u)) / (w - u))
-            found = functions.chart_alpha2(chart.block, a, b, c, b - a, c - b)
+            found = evaluate.chart_alpha2(chart.block, a, b, c, b - a, c - b)
             # It is a derivative of the fit, which costs short pieces five digits; and the distances from the joint
             # count, which are known to an ulp of the place.
             assert abs(found - truth) <= 2e-11 + abs(truth) * 8 * ULP / size
@@ -178,7 +178,7 @@ def test_bounds_enclose() -> None:
     for low, width in zip(rng.uniform(-9.0, 9.0, 40), rng.uniform(0.0, 4.0, 40), strict=True):
         s = np.linspace(low, low + width, 33)
         rows = chart.points(s)
-        for row, enclosure in enumerate((functions.ichart_x, functions.ichart_z, functions.ichart_alpha)):
+        for row, enclosure in enumerate((evaluate.ichart_x, evaluate.ichart_z, evaluate.ichart_alpha)):
             lo, hi = enclosure(chart.block, (low, low + width))
             assert lo <= rows[row].min()
             assert rows[row].max() <= hi

@@ -13,7 +13,7 @@ from textbook import Textbook
 import generated.circle_coulomb
 import generated.circle_drag
 import gqm_sym as gqm
-from gqm_sym.derivation.particular import particular
+from gqm_sym.derivation.forces.particular_solution import particular
 
 DIGITS = 30
 # Of mpmath's quadrature, of the largest W on the way.

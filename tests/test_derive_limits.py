@@ -9,9 +9,9 @@ from confined import confined
 from mpmath import mp, mpf
 
 import gqm_sym as gqm
-from gqm_sym.derivation import speed
-from gqm_sym.derivation.difference import Differences
-from gqm_sym.derivation.speed import V0
+from gqm_sym.derivation.algebra.difference import Differences
+from gqm_sym.derivation.forces import speed
+from gqm_sym.derivation.forces.speed import V0
 from gqm_sym.emission import sharing
 from gqm_sym.errors import DeclarationError, EmissionError
 

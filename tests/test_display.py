@@ -9,7 +9,7 @@ import pytest
 
 import gqm_sym as gqm
 from gqm_sym.errors import SolutionError
-from gqm_sym.runtime.datasets import VARIABLES
+from gqm_sym.export.datasets import VARIABLES
 
 
 @pytest.fixture(scope="module")

@@ -15,7 +15,7 @@ from scipy.integrate import solve_ivp
 
 import gqm_sym as gqm
 from gqm_sym.errors import BudgetError
-from gqm_sym.runtime import dissipative
+from gqm_sym.runtime.legs import dissipative
 
 CASES = {
     case["id"]: case for case in json.loads((Path(__file__).parent / "data" / "paper_cases.json").read_text())["cases"]

@@ -12,7 +12,7 @@ from mpmath import mp, mpf
 import generated.circle_coulomb
 import gqm_sym as gqm
 from gqm_sym.errors import InputError, LaunchError, SolutionError
-from gqm_sym.runtime import legs
+from gqm_sym.runtime.legs import follow, leg_run
 
 G = 9.81
 Build = Callable[..., ModuleType]
@@ -189,14 +189,14 @@ def test_an_approach_has_a_last_digit(build: Build) -> None:
 
 def test_an_approach_that_cannot_be_followed_back(slope: ModuleType, monkeypatch: pytest.MonkeyPatch) -> None:
     """Without a field there is nothing to read speeds off: refused, and no memory is read that is not there."""
-    follow = legs.follow
+    followed = follow.follow
 
     def lost(*arguments: Any) -> Any:
-        found = list(follow(*arguments))
-        found[0], found[5] = legs.ASYMPTOTE, 0
+        found = list(followed(*arguments))
+        found[0], found[5] = leg_run.ASYMPTOTE, 0
         return tuple(found)
 
-    monkeypatch.setattr(legs, "follow", lost)
+    monkeypatch.setattr(follow, "follow", lost)
     with pytest.raises(SolutionError, match="could not be followed"):
         slope.solve(lam0=0, mu=0.1).lam(1.0)
 

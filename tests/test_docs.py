@@ -14,7 +14,7 @@ from gqm_sym.declare import families
 from gqm_sym.errors import SpecFileError
 from gqm_sym.kernels import KERNELS
 from gqm_sym.specfile import read_spec
-from gqm_sym.sweeps import read_sweep
+from gqm_sym.studies import read_sweep
 
 ROOT = Path(__file__).parent.parent
 DOCS = ROOT / "docs"

@@ -9,9 +9,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from gqm_sym.runtime.course import minus, plus
-from gqm_sym.runtime.doubledouble import add, two_product, two_sum
-from gqm_sym.runtime.entries import reduce_many
+from gqm_sym.runtime.arithmetic.doubledouble import add, minus, plus, reduce_many, two_product, two_sum
 
 U = Fraction(1, 2**53)
 # Proved for the accurate sum of two pairs: Joldes, Muller, Popescu, ACM TOMS 44 (2017), theorem 3.1.

@@ -9,7 +9,7 @@ import pytest
 from mpmath import mp, mpf
 from numba import njit
 
-from gqm_sym.runtime import elementary
+from gqm_sym.runtime.arithmetic import elementary
 
 # Worst measured on 5000 arguments of each kind: 0.75 (cosine), 0.62 (exp), 0.93 (sinh), 0.86 (cosh).
 ULPS = 1.0

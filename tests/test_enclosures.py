@@ -5,9 +5,9 @@ from fractions import Fraction
 import pytest
 from mpmath import libmp, mp
 
-from gqm_sym.enclosures import MAX_SCALE, _Enclosures, _scale, enclose
 from gqm_sym.errors import ExpressionError
-from gqm_sym.grammar import parse
+from gqm_sym.literals.enclosures import MAX_SCALE, _Enclosures, _scale, enclose
+from gqm_sym.literals.grammar import parse
 
 BITS = 64
 # A literal has at most 400 digits, and a power an exponent of at most 1000.

@@ -13,9 +13,9 @@ from naive import error, overstatement, pendulum, ulps
 from scipy.interpolate import make_interp_spline
 
 import gqm_sym as gqm
-from gqm_sym.runtime.exact_quadrature import gauss
-from gqm_sym.runtime.fixed_point import Polynomials
-from gqm_sym.runtime.numbers import read_number
+from gqm_sym.literals.numbers import read_number
+from gqm_sym.runtime.multiprecision.fixed_point import Polynomials
+from gqm_sym.runtime.multiprecision.gauss_legendre import gauss
 
 # A position of its scale; a period in its last place; how much error_bound may say too much.
 POSITION = 8e-15

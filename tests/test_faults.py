@@ -20,7 +20,7 @@ from numba.core.caching import IndexDataCacheFile, NullCache
 import gqm_sym as gqm
 from gqm_sym.building import load, write_module
 from gqm_sym.errors import OutdatedModuleError
-from gqm_sym.runtime import jit
+from gqm_sym.runtime.compiled import jit
 from gqm_sym.runtime.interface import INTERFACE
 
 ROOT = Path(__file__).parent.parent
@@ -163,7 +163,7 @@ def test_two_at_once_keep_their_own_code(
 
 def test_inner_functions_know_the_stamp_too() -> None:
     """What compiled code calls is kept under the same key: else an edit of what that calls would not be seen."""
-    from gqm_sym.runtime.doubledouble import two_sum
+    from gqm_sym.runtime.arithmetic.doubledouble import two_sum
 
     assert isinstance(two_sum.dispatcher._cache, jit.ReadyCache)
 
@@ -201,7 +201,7 @@ def test_a_module_of_an_older_interface_is_named(text: str, tmp_path: Path) -> N
         assert "GONE" in path.read_text(encoding="utf-8")
         with pytest.raises(OutdatedModuleError, match=rf"old\.py: .*interface {INTERFACE - 1} .*run gqm-gen"):
             load(path, "old")
-    path.write_text(old.replace("runtime.intervals", "runtime.gone"), encoding="utf-8")
+    path.write_text(old.replace("runtime.vocabulary", "runtime.gone"), encoding="utf-8")
     with pytest.raises(OutdatedModuleError, match="run gqm-gen"):
         load(path, "old")
 
@@ -218,7 +218,8 @@ print("loaded")
 # As gqm-gen writes them, with one function instead of seven: eight processes compile it, whichever is first.
 SMALL = f"""from numba import carray
 
-from gqm_sym.runtime import CLIMB, compiler
+from gqm_sym.runtime import compiler
+from gqm_sym.runtime.vocabulary import CLIMB
 
 compiled = compiler(__file__, interface={INTERFACE})
 
@@ -295,7 +296,7 @@ def test_interrupted_while_deriving(yaml: Path) -> None:
 RING = "name: ring\ncurve: {implicit: {F: x**2 + z**2 - 1, start: [0, -1]}}\nkernel: {gravity: {}}\n"
 # What is interrupted, the how-manieth call of it (a module is written first), and the command.
 STAGES = {
-    "a chart": ("gqm_sym.runtime.formulas.Formulas.charted", 1, ["solve", "ring.yaml"]),
+    "a chart": ("gqm_sym.runtime.launch.formulas.Formulas.charted", 1, ["solve", "ring.yaml"]),
     "a figure": ("os.fsync", 2, ["plot", "ring.yaml", "ring.svg"]),
     "a page": ("os.fsync", 2, ["report", "ring.yaml"]),
 }

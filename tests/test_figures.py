@@ -8,7 +8,7 @@ import pytest
 
 import gqm_sym as gqm
 from gqm_sym.errors import InputError
-from gqm_sym.runtime import figures
+from gqm_sym.figures import motions
 
 
 @pytest.fixture(scope="module")
@@ -94,7 +94,7 @@ def test_an_unknown_figure(circle: ModuleType) -> None:
 
 def test_animation(circle: ModuleType, tmp_path: Path) -> None:
     """A GIF of as many frames as asked for."""
-    figures.animate(circle.solve(1.0), tmp_path / "swing.gif", duration=0.2, rate=20)
+    motions.animate(circle.solve(1.0), tmp_path / "swing.gif", duration=0.2, rate=20)
     assert (tmp_path / "swing.gif").read_bytes().startswith(b"GIF89a")
     with pytest.raises(InputError, match="duration: must be positive"):
-        figures.animate(circle.solve(1.0), tmp_path / "none.gif", duration=0)
+        motions.animate(circle.solve(1.0), tmp_path / "none.gif", duration=0)

@@ -9,7 +9,8 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from gqm_sym.errors import ExpressionError, GQMError
-from gqm_sym.grammar import CONSTANTS, FUNCTIONS, MAX_DEPTH, MAX_LENGTH, evaluate, parse
+from gqm_sym.literals.grammar import CONSTANTS, FUNCTIONS, MAX_DEPTH, MAX_LENGTH, parse
+from gqm_sym.literals.trees import evaluate
 
 # Against a reader that hangs, not against a busy machine.
 NO_HANG = timedelta(seconds=10)

@@ -12,10 +12,10 @@ import gqm_sym as gqm
 from gqm_sym.budgets import budget
 from gqm_sym.declare.piecewise import arc
 from gqm_sym.errors import BudgetError, DeclarationError, ParameterError, SolutionError, SpecFileError
-from gqm_sym.runtime import arc_length, rail
-from gqm_sym.runtime.arc_length import rectify
-from gqm_sym.runtime.rail import Rail
-from gqm_sym.runtime.sampled import Sampled
+from gqm_sym.runtime.charts import arc_length, rail
+from gqm_sym.runtime.charts.arc_length import rectify
+from gqm_sym.runtime.charts.rail import Rail
+from gqm_sym.runtime.charts.sampled import Sampled
 
 YAML = "name: track\ncurve: {points: {file: track.csv, kind: linear}}\nkernel: {gravity: {}}\n"
 MIB = 1 << 20

@@ -9,8 +9,11 @@ import numpy as np
 import pytest
 from mpmath import mp, mpf
 
-from gqm_sym.runtime.entries import anomalies, build_table, lay_panels, read_off_many
-from gqm_sym.runtime.panels import FROM_TURN, REGULAR, TO_EQUILIBRIUM, TURN_TURN
+from gqm_sym.runtime.inversion.table import anomalies, build_table
+from gqm_sym.runtime.launch.problem import bind
+from gqm_sym.runtime.launch.request import LaunchRequest, read_launch
+from gqm_sym.runtime.quadrature.integrands import FROM_TURN, REGULAR, TO_EQUILIBRIUM, TURN_TURN
+from gqm_sym.runtime.quadrature.time_panels import lay_panels, read_off_many
 
 ModuleOf = Callable[[str], ModuleType]
 
@@ -50,7 +53,7 @@ class Table:
         track, given, kind, a, b, w, stop = STRETCHES[name]
         formulas = module_of(track).MODEL
         numbers = formulas.numbers(tuple((formulas.parameters | given).values()))
-        functions = formulas.functions(numbers, formulas.launch(numbers, lam0=a, v0=0.0))
+        functions = bind(formulas, numbers, read_launch(formulas, numbers, LaunchRequest(a)))
         panels = lay_panels(functions.addresses, functions.p, kind, a, b, a, w, np.array([0.0, stop]))
         self.edges, self.marks, _, self.terms = panels[:4]
         self.table = build_table(self.edges, self.marks, np.zeros_like(self.marks), self.terms)

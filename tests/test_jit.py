@@ -9,8 +9,8 @@ from typing import Any
 
 import pytest
 
-from gqm_sym.runtime import jit
-from gqm_sym.runtime.doubledouble import two_sum
+from gqm_sym.runtime.arithmetic.doubledouble import two_sum
+from gqm_sym.runtime.compiled import jit
 
 
 def _key() -> tuple[Any, ...]:
@@ -26,20 +26,23 @@ def test_an_edit_anywhere_in_the_runtime_compiles_anew(monkeypatch: pytest.Monke
     assert _key() != before
 
 
-@pytest.mark.parametrize("name", ["jit.py", "panels.py", "search.py", "first_differences.py", "intervals.py"])
-def test_the_stamp_has_every_file_of_the_runtime(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A changed character in any file changes the stamp, though its time and size stay; a copy elsewhere does not."""
-    folder = Path(jit.__file__).parent
-    for file in folder.glob("*.py"):
-        shutil.copy2(file, tmp_path)
-    monkeypatch.setattr(jit, "__file__", str(tmp_path / "jit.py"))
-    assert jit._stamp() == jit.STAMP
-    changed = tmp_path / name
+RUNTIME = Path(jit.__file__).parents[1]
+ONE_OF_EACH_ROOM = sorted(
+    {file.parent: file.relative_to(RUNTIME).as_posix() for file in sorted(RUNTIME.rglob("*.py"))}.values()
+)
+
+
+@pytest.mark.parametrize("name", ["compiled/jit.py", *ONE_OF_EACH_ROOM])
+def test_the_stamp_has_every_file_of_the_runtime(name: str, tmp_path: Path) -> None:
+    """A changed character in a file of any room changes the stamp, though its time and size stay; a copy does not."""
+    copy = shutil.copytree(RUNTIME, tmp_path / "runtime", ignore=shutil.ignore_patterns("__pycache__"))
+    assert jit.stamp_of(copy) == jit.STAMP
+    changed = copy / name
     status = changed.stat()
     changed.write_bytes(changed.read_bytes()[:-1] + b" ")
     os.utime(changed, ns=(status.st_atime_ns, status.st_mtime_ns))
     assert changed.stat().st_size == status.st_size
-    assert jit._stamp() != jit.STAMP
+    assert jit.stamp_of(copy) != jit.STAMP
 
 
 def test_an_inner_function_works_from_python() -> None:

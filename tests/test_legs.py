@@ -11,8 +11,11 @@ from mpmath import mp, mpf
 from numpy.polynomial import chebyshev, legendre
 
 import generated.cubic_coulomb as cubic_coulomb
-from gqm_sym.runtime import dissipative
-from gqm_sym.runtime.chebyshev import (
+from gqm_sym.runtime.compiled.registers import LANES, copied, on_stack, over_rows, uncounted
+from gqm_sym.runtime.legs import dissipative
+from gqm_sym.runtime.legs.leg_panels import CAUTION, DEGREES, FALL, GROWTH, ahead, growth
+from gqm_sym.runtime.legs.leg_segments import INTEGRAL_BY_NODE, PLAIN_BY_NODE
+from gqm_sym.runtime.legs.polynomials import (
     COUNT,
     GRADED_MEANS,
     MEANS,
@@ -24,9 +27,6 @@ from gqm_sym.runtime.chebyshev import (
     size_of,
     to_means,
 )
-from gqm_sym.runtime.lanes import LANES, copied, on_stack, over_rows, uncounted
-from gqm_sym.runtime.leg_panels import CAUTION, DEGREES, FALL, GROWTH, ahead, growth
-from gqm_sym.runtime.leg_stretches import INTEGRAL_BY_NODE, PLAIN_BY_NODE
 
 # Roundings of as many products, of size 1.
 TABLE = 1e-15

@@ -14,9 +14,9 @@ from numba import njit
 import gqm_sym as gqm
 from gqm_sym.emission.loads import rounded_size
 from gqm_sym.errors import InputError
-from gqm_sym.runtime import threads
-from gqm_sym.runtime.loads import BLOCK
-from gqm_sym.runtime.stores import LARGE, LINE, put
+from gqm_sym.runtime.compiled import threads
+from gqm_sym.runtime.compiled.streaming import LARGE, LINE, put
+from gqm_sym.runtime.launch.speed import BLOCK
 
 ModuleOf = Callable[[str], ModuleType]
 

@@ -6,7 +6,7 @@ import random
 import pytest
 from mpmath import mp, mpf
 
-from gqm_sym.runtime.wave_differences import WIDE, near_even, near_odd, near_sinc
+from gqm_sym.runtime.arithmetic.divided_differences.trigonometric import WIDE, near_even, near_odd, near_sinc
 
 # Absolute: at most 1/2, 1/6 and 1 in size. Worst on 2000 pairs: 1.1e-16, 5.0e-17, 2.4e-16.
 EVEN, ODD, SINC = 1.5e-16, 8e-17, 3e-16

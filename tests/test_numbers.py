@@ -18,8 +18,8 @@ from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
 from gqm_sym.errors import GQMError, NumberError
-from gqm_sym.grammar import CONSTANTS, FUNCTIONS
-from gqm_sym.runtime.numbers import Number, read_number
+from gqm_sym.literals.grammar import CONSTANTS, FUNCTIONS
+from gqm_sym.literals.numbers import Number, read_number
 
 # Against a reader that hangs, not against a busy machine.
 NO_HANG = timedelta(seconds=20)

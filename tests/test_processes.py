@@ -113,9 +113,16 @@ def test_a_second_process_imports_no_more_than_it_needs() -> None:
     """Compiled code comes without what it was compiled with, a motion without what sweeps and charts need."""
     run(COMES_WITH_CODE)
     loaded = json.loads(run(COMES_WITH_CODE))
-    assert "gqm_sym.runtime.solve" in loaded
+    assert "gqm_sym.runtime.motion.conservative" in loaded
     assert not [name for name in loaded if name.startswith(("numba.np", "numba.cpython"))]
-    unneeded = ("sweeping", "batches", "rail", "sampled", "tracing")
+    unneeded = (
+        "sweep.sweep",
+        "sweep.batch.batches",
+        "charts.rail",
+        "charts.sampled",
+        "charts.tracing",
+        "legs.dissipative",
+    )
     assert not {f"gqm_sym.runtime.{name}" for name in unneeded} & set(loaded)
 
 

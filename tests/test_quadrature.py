@@ -10,22 +10,22 @@ import pytest
 from mpmath import mp, mpf
 
 import gqm_sym as gqm
-from gqm_sym.runtime.entries import lay_panels, read_off_many, speeds_at
-from gqm_sym.runtime.kronrod import GAUSS_WEIGHTS, KRONROD_WEIGHTS, NODES
-from gqm_sym.runtime.panels import (
+from gqm_sym.runtime.arithmetic.clenshaw import legendre_sum
+from gqm_sym.runtime.launch.problem import bind
+from gqm_sym.runtime.launch.request import LaunchRequest, read_launch
+from gqm_sym.runtime.quadrature.integrands import FROM_TURN, REGULAR, TO_EQUILIBRIUM, TURN_TURN, speeds_at
+from gqm_sym.runtime.quadrature.kronrod import GAUSS_WEIGHTS, KRONROD_WEIGHTS, NODES
+from gqm_sym.runtime.quadrature.time_panels import (
     CONVERGED,
     COUNT,
     DEGREE,
     EXHAUSTED,
     FAILED,
-    FROM_TURN,
     ILL_CONDITIONED,
     LEAST_WIDTH,
-    REGULAR,
-    TO_EQUILIBRIUM,
-    TURN_TURN,
     antiderivative,
-    legendre_sum,
+    lay_panels,
+    read_off_many,
 )
 
 ModuleOf = Callable[[str], ModuleType]
@@ -62,8 +62,8 @@ class Laid:
         formulas = module.MODEL
         values = tuple((formulas.parameters | given).values())
         numbers = formulas.numbers(values)
-        launch = formulas.launch(numbers, lam0=a, v0=0.0)
-        functions = formulas.functions(numbers, launch)
+        launch = read_launch(formulas, numbers, LaunchRequest(a))
+        functions = bind(formulas, numbers, launch)
         self.at = (functions.addresses, functions.p, kind, a, b, ref, w)
         panels = lay_panels(*self.at, np.array([0.0, stop]))
         self.edges, self.marks, self.lengths, self.time_terms, self.length_terms = panels[:5]

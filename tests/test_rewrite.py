@@ -4,13 +4,13 @@ import pytest
 import sympy as sp
 
 from gqm_sym.declare import Curve
-from gqm_sym.derivation.algebra import Algebra
-from gqm_sym.derivation.differentiate import differentiate
-from gqm_sym.derivation.generators import OverBudget
-from gqm_sym.derivation.geometry import geometry
-from gqm_sym.derivation.rewrite import product, spell_product, tidy, without_poles
-from gqm_sym.derivation.signs import Signs
-from gqm_sym.derivation.spelling import spell
+from gqm_sym.derivation.algebra.algebra import Algebra
+from gqm_sym.derivation.algebra.differentiate import differentiate
+from gqm_sym.derivation.algebra.generators import OverBudget
+from gqm_sym.derivation.algebra.normal_form import spell
+from gqm_sym.derivation.algebra.rewrite import product, spell_product, tidy, without_poles
+from gqm_sym.derivation.algebra.signs import Signs
+from gqm_sym.derivation.geometry.geometry import geometry
 from gqm_sym.errors import DeclarationError
 from gqm_sym.expressions import read_expression
 

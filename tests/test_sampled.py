@@ -14,8 +14,8 @@ from numpy.polynomial.legendre import leggauss
 
 import gqm_sym as gqm
 from gqm_sym.errors import DeclarationError
-from gqm_sym.runtime.chart import Chart
-from gqm_sym.runtime.sampled import Sampled
+from gqm_sym.runtime.charts.chart import Chart
+from gqm_sym.runtime.charts.sampled import Sampled
 
 ULP = 2.0**-52
 G = 9.81

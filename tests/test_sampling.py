@@ -10,10 +10,10 @@ from mpmath import mp, mpf
 from numpy.polynomial.chebyshev import chebval
 
 from gqm_sym.errors import InputError
-from gqm_sym.runtime import threads
-from gqm_sym.runtime.motion import Motion
-from gqm_sym.runtime.series import GROUP
-from gqm_sym.runtime.waves import fit_wave, sum_cosines, sum_sines
+from gqm_sym.runtime.arithmetic.clenshaw import GROUP
+from gqm_sym.runtime.compiled import threads
+from gqm_sym.runtime.inversion.fourier import fit_wave, sum_cosines, sum_sines
+from gqm_sym.runtime.motion.motion import Motion
 
 ModuleOf = Callable[[str], ModuleType]
 

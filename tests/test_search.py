@@ -14,8 +14,10 @@ from mpmath import mp, mpf
 
 import gqm_sym as gqm
 from gqm_sym.errors import LaunchError
-from gqm_sym.runtime.entries import walk_on
-from gqm_sym.runtime.search import CUSP, LIMIT, MARCHED, TURN
+from gqm_sym.runtime.launch.ends import first_zero_from
+from gqm_sym.runtime.launch.problem import bind
+from gqm_sym.runtime.launch.request import LaunchRequest, read_launch
+from gqm_sym.runtime.launch.zeros import CUSP, LIMIT, MARCHED, TURN
 
 ModuleOf = Callable[[str], ModuleType]
 
@@ -50,9 +52,9 @@ def walk(module: ModuleType, lam0: float, v0: float, direction: int, reach: floa
     """What a walk from a launch finds: its end, and the places before and beyond."""
     formulas = module.MODEL
     numbers = formulas.numbers(tuple((formulas.parameters | given).values()))
-    functions = formulas.functions(numbers, formulas.launch(numbers, lam0=lam0, v0=v0, direction=direction))
+    functions = bind(formulas, numbers, read_launch(formulas, numbers, LaunchRequest(lam0, v0, direction)))
     step = reach / 8 if math.isfinite(reach) else 1.0
-    what, near, far = walk_on(functions.addresses, functions.p, lam0, v0 * v0, direction, 0.0, reach, step)
+    what, near, far = first_zero_from(functions.addresses, functions.p, lam0, v0 * v0, direction, 0.0, reach, step)
     return what, lam0 + near, lam0 + far
 
 

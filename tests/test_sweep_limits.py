@@ -7,10 +7,11 @@ from typing import Any
 
 import pytest
 
+from gqm_sym import emission
 from gqm_sym.cli import tool
 from gqm_sym.errors import InputError, SpecFileError
 from gqm_sym.specfile import beside
-from gqm_sym.sweeps import read_sweep, reader
+from gqm_sym.studies import read_sweep, reader
 
 SWING = (
     "name: swing\ncurve: {family: {name: circle, L: L}}\nkernel: {gravity: {}}\nparameters: {L: 1}\n"
@@ -68,7 +69,7 @@ def test_what_is_derived_and_emitted_is_not_reading(here: Path, monkeypatch: pyt
             pass
         return emit(*arguments, **names)
 
-    emit = reader.emit
+    emit = emission.emit
     monkeypatch.setattr(reader, "emit", slowly)
     assert read_sweep(sweep("grid: {lam0: [1, 2]}")).quantities == ("period",)
 

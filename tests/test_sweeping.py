@@ -11,8 +11,8 @@ from mpmath import mp, mpf
 
 import gqm_sym as gqm
 from gqm_sym.errors import InputError, ParameterError
-from gqm_sym.runtime import threads
-from gqm_sym.runtime.sweeping import REASONS
+from gqm_sym.runtime.compiled import threads
+from gqm_sym.runtime.sweep.sweep import REASONS
 
 ModuleOf = Callable[[str], ModuleType]
 

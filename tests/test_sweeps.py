@@ -16,15 +16,15 @@ import pytest
 from mpmath import mp, mpf
 
 import gqm_sym as gqm
-from gqm_sym import sweeps
+from gqm_sym import studies as sweeps
 from gqm_sym.cli import tool
 from gqm_sym.cli.progress import Bar
 from gqm_sym.errors import InputError, SpecFileError
-from gqm_sym.runtime import cluster
-from gqm_sym.runtime.sweeping import QUANTITIES, REASONS
-from gqm_sym.sweeps import read_sweep, run, sweep_schema
-from gqm_sym.sweeps.plan import evenly
-from gqm_sym.sweeps.results import DESCRIBED
+from gqm_sym.runtime.sweep import cluster
+from gqm_sym.runtime.sweep.sweep import QUANTITIES, REASONS
+from gqm_sym.studies import read_sweep, run, sweep_schema
+from gqm_sym.studies.plan import evenly
+from gqm_sym.studies.results import DESCRIBED
 
 CURVES = {
     "swing": "curve: {family: {name: circle, L: L}}\nkernel: {gravity: {}}\nparameters: {L: {value: 1, unit: m}}\n"
@@ -264,7 +264,7 @@ LONG = "curve: swing.yaml\nquantities: [half_period]\ngrid: {lam0: {start: 0.1, 
 KILLED = """\
 import os, signal, sys
 from gqm_sym.cli import tool
-from gqm_sym.sweeps.store import Store
+from gqm_sym.studies.store import Store
 
 put = Store.put
 

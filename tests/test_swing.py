@@ -11,7 +11,7 @@ import sympy as sp
 from mpmath import mp, mpf
 
 import gqm_sym as gqm
-from gqm_sym.derivation.swing import APART, GAP, HALF, LACK, LAUNCH, OFFSET, SQUARE, TOP, TOP_APART, TOP_LACK
+from gqm_sym.derivation.wells.swing import APART, GAP, HALF, LACK, LAUNCH, OFFSET, SQUARE, TOP, TOP_APART, TOP_LACK
 
 ModuleOf = Callable[[str], ModuleType]
 

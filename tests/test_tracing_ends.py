@@ -9,7 +9,7 @@ from naive import error, ulps
 from traced import BEND, ROOT, ROUNDING, SQUARE, WAVE, other, trace
 
 from gqm_sym.errors import LaunchError, SolutionError
-from gqm_sym.runtime.march import PIECES
+from gqm_sym.runtime.charts.continuation import PIECES
 
 
 @pytest.mark.parametrize("domain", [(0, 2 * math.pi), (-1, 7), (0, None), (None, 7)])

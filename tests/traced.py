@@ -10,9 +10,9 @@ from mpmath import mp, mpf
 from naive import error
 from numba import carray, cfunc
 
-from gqm_sym.runtime.chart import Chart
+from gqm_sym.runtime.charts.chart import Chart
+from gqm_sym.runtime.charts.tracing import Traced
 from gqm_sym.runtime.interface import FIELD
-from gqm_sym.runtime.tracing import Traced
 
 # Of the curve's extent; worst measured 4e-16 where F is computed without cancellation.
 ROUNDING = 1e-15

@@ -21,8 +21,9 @@ from numba.core.extending import _Intrinsic
 from numba.core.registry import CPUDispatcher
 
 import gqm_sym.runtime
-from gqm_sym.runtime import interface, jit
-from gqm_sym.runtime.chebyshev import COUNT
+from gqm_sym.runtime import interface
+from gqm_sym.runtime.compiled import jit
+from gqm_sym.runtime.legs.polynomials import COUNT
 
 _NAMES = {"asin": "arcsin", "acos": "arccos", "atan": "arctan", "atan2": "arctan2", "pow": "power"}
 _NAMES |= {"asinh": "arcsinh", "acosh": "arccosh", "atanh": "arctanh"}
@@ -213,7 +214,7 @@ _C = {numba.types.float64: ctypes.c_double, numba.types.int64: ctypes.c_int64, n
 
 def install() -> None:
     """Let Python run what numba would compile, from now on."""
-    found = pkgutil.iter_modules(gqm_sym.runtime.__path__, "gqm_sym.runtime.")
+    found = pkgutil.walk_packages(gqm_sym.runtime.__path__, "gqm_sym.runtime.")
     modules = [gqm_sym.runtime, *(importlib.import_module(info.name) for info in found)]
     entries: dict[Any, Any] = {}
     known = []

@@ -8,7 +8,7 @@ if TYPE_CHECKING:
     from xarray import Dataset
 
     from gqm_sym.derivation import Model
-    from gqm_sym.runtime.motion import Motion
+    from gqm_sym.runtime.motion.motion import Motion
     from gqm_sym.specfile import Spec
 
 
@@ -92,7 +92,7 @@ def _states(
 
 def swept(quantities: Iterable[str], data: "Dataset") -> Iterator[str]:
     """Yield what came of a sweep, line by line: its size, and what there is no value of, and why."""
-    from gqm_sym.runtime.sweeping import REASONS
+    from gqm_sym.runtime.sweep.sweep import REASONS
 
     yield f"  {' x '.join(f'{size} {name}' for name, size in data.sizes.items())}: {', '.join(quantities)}"
     refused: dict[str, None] = {}

@@ -1,6 +1,6 @@
 """A planar curve as it was declared: coordinates, parameter, domain and run-time parameters."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, TypeAlias
 
@@ -9,7 +9,7 @@ import sympy as sp
 from gqm_sym.declare.ends import Ends, check_ends, read_ends
 from gqm_sym.errors import DeclarationError
 from gqm_sym.expressions import check_name, read_expression
-from gqm_sym.parameters import Given, Value, names_in_order, read_parameters
+from gqm_sym.parameters import Parameters, Value, names_in_order, read_parameters
 from gqm_sym.sympy_charts import chart_x, chart_z
 
 if TYPE_CHECKING:
@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from gqm_sym.declare.piecewise import Piece
 
 Source: TypeAlias = str | int | sp.Expr
-Parameters: TypeAlias = Mapping[str, Given | None] | Iterable[str]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -10,10 +10,10 @@ from dataclasses import dataclass
 
 import sympy as sp
 
-from gqm_sym.declare.curve import Curve, Parameters, Source
+from gqm_sym.declare.curve import Curve, Source
 from gqm_sym.errors import DeclarationError
 from gqm_sym.expressions import read_expression
-from gqm_sym.parameters import Given, Value, read_argument
+from gqm_sym.parameters import Given, Parameters, Value, read_argument
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

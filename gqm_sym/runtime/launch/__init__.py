@@ -1,0 +1,1 @@
+"""One launch: checked, bound to its functions, and where its motion ends."""

@@ -1,0 +1,105 @@
+"""One launch of one module: its compiled functions bound to their parameters, and the same problem in extended precision."""
+
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+
+from gqm_sym.runtime.charts.exact_normals import ChartTrack
+from gqm_sym.runtime.interface import ExactClimb, ExactFormulas
+from gqm_sym.runtime.launch.domain import Domain
+from gqm_sym.runtime.launch.formulas import Formulas, ParameterValues
+from gqm_sym.runtime.launch.functions import BoundFunctions
+from gqm_sym.runtime.launch.request import Launch
+from gqm_sym.runtime.launch.rounded import RoundedProblem
+from gqm_sym.runtime.multiprecision.exact_problem import NOWHERE, ExactProblem
+from gqm_sym.runtime.multiprecision.exact_tracks import FormulaTrack
+
+
+def bind(formulas: Formulas, p: ParameterValues, launch: Launch) -> BoundFunctions:
+    """The compiled functions with what they are given, and the exact problem of one launch."""
+    if p.functions is None:
+        p.functions = _bind_all(formulas, p)
+    bound: BoundFunctions = p.functions
+    if formulas.exact is None:
+        return bound
+    addresses, values, _, breaks, corners, period = bound
+    return BoundFunctions(addresses, values, exact_problem(formulas, p, launch), breaks, corners, period)
+
+
+def _bind_all(formulas: Formulas, p: ParameterValues) -> BoundFunctions:
+    """What all launches with these parameters share."""
+    addresses = tuple(formulas.addresses)
+    if formulas.chart is None:
+        return BoundFunctions(addresses, p.values)
+    chart = formulas.charted(p)
+    block = np.concatenate([p.values, chart.block])
+    return BoundFunctions(addresses, block, None, chart.breaks, chart.corners, chart.period)
+
+
+@dataclass(slots=True)
+class Problem:
+    """One launch of one module, in doubles and exactly."""
+
+    formulas: Formulas
+    launch: Launch
+    p: ParameterValues
+    functions: BoundFunctions
+    domain: Domain
+
+    @property
+    def low(self) -> float:
+        """The lower end of the parameter's range."""
+        return self.domain.low
+
+    @property
+    def high(self) -> float:
+        """The upper end of the parameter's range."""
+        return self.domain.high
+
+    @property
+    def period(self) -> float:
+        """The parameter's period; 0 where there is none."""
+        return self.domain.period
+
+    @property
+    def exact(self) -> ExactProblem:
+        """The exact problem, where there is one."""
+        exact = self.functions.exact
+        assert exact is not None
+        return exact
+
+    @property
+    def arc_origin(self) -> float:
+        """Arc length at launch: 0, or on a charted curve its distance from the start point."""
+        return self.lam0 if self.formulas.chart is not None else 0.0
+
+    @property
+    def decider(self) -> ExactProblem | RoundedProblem:
+        """Who answers what doubles cannot decide."""
+        exact = self.functions.exact
+        return RoundedProblem(self.functions, self.lam0, self.w0) if exact is None else exact
+
+    @property
+    def lam0(self) -> float:
+        """The launch place, as the nearest double."""
+        return self.launch.lam0.value
+
+    @property
+    def w0(self) -> float:
+        """V**2 at launch."""
+        return self.launch.v0.value**2
+
+
+def exact_problem(formulas: "Formulas", p: "ParameterValues", launch: "Launch") -> ExactProblem | None:
+    """The exact problem of one launch, where there is one."""
+    exact, maker = formulas.exact, formulas.chart
+    if isinstance(exact, ExactFormulas) and formulas.domain_of is not None:
+        track = partial(FormulaTrack, exact, formulas.domain_of, launch.lam0)
+        return ExactProblem(track, NOWHERE, p, launch.lam0, launch.v0)
+    if isinstance(exact, ExactClimb) and maker is not None:
+        chart = formulas.charted(p)
+        if maker.is_exact(chart):
+            along = partial(ChartTrack, maker, chart, exact.climb, launch.point, launch.lam0)
+            return ExactProblem(along, chart.edges, p, launch.lam0, launch.v0)
+    return None
