@@ -14,6 +14,7 @@ from gqm_sym.runtime.crossing import call_hold
 from gqm_sym.runtime.jit import Inner, entry
 from gqm_sym.runtime.lanes import uncounted
 from gqm_sym.runtime.leg_approach import LOST, NO_ROOM, approach
+from gqm_sym.runtime.leg_breaks import between, grain, within
 from gqm_sym.runtime.leg_equation import W, panel_room, set_nodes
 from gqm_sym.runtime.leg_panels import ALWAYS, MOST_TRIES, next_panel, next_stop
 from gqm_sym.runtime.leg_records import (
@@ -38,12 +39,12 @@ _FLOAT, _WHOLE = types.float64, types.int64
 
 
 @Inner
-def run_back(drive, p, flags, turn, whole, v, nu, met, breaks, step, record, used):  # type: ignore[no-untyped-def]
-    """Follow the leg that turns at ``turn`` back from there over the distance ``whole``.
+def run_back(drive, p, flags, turn, whole, v, nu, met, breaks, off, step, record, used):  # type: ignore[no-untyped-def]
+    """Follow the leg that turns at ``turn``, two doubles, back from there over the distance ``whole``.
 
     ``nu`` is the sign of N at the turn, which has changed ``met`` times on the way. The panels are entered behind what
     is ``used`` of a record. Returns how many they are; NO_ROOM where there is none, LOST where it could not be
-    followed.
+    followed. ``off`` is as `leg_breaks.between` has it.
     """
     work = panel_room()
     set_nodes(work)
@@ -56,8 +57,9 @@ def run_back(drive, p, flags, turn, whole, v, nu, met, breaks, step, record, use
             break
         if not has_room(record, at, met):
             return NO_ROOM
+        span = between(breaks, passed + 1, v, off)
         width, step, _ = next_panel(
-            *(drive, p, flags, turn, u, 1.0, 0.0, left, room, step, base, v, nu, 0.0, ALWAYS, False, work)
+            *(drive, p, flags, turn, span, u, 1.0, 0.0, left, room, step, base, v, nu, 0.0, ALWAYS, False, work)
         )
         if width == 0.0:
             break
@@ -70,25 +72,39 @@ def run_back(drive, p, flags, turn, whole, v, nu, met, breaks, step, record, use
 
 
 @Inner
-def released(hold, p, place):  # type: ignore[no-untyped-def]
-    """Which way a body leaves a place where it is at rest, 0 if it stays; whether it could stay at some slope."""
+def released(hold, p, behind, ahead, asked):  # type: ignore[no-untyped-def]
+    """Which way a body leaves a place where it is at rest, 0 if it stays; whether it could stay at some slope.
+
+    The place is given by one on either side of it, which differ where it is a break. From a ridge it leaves either way:
+    that which is ``asked``.
+    """
     spot, rates = spot_room(), spot_room()
-    spot[0] = place
+    spot[0] = ahead
     call_hold(hold, 1, spot, p, rates)
     forwards, backwards = rates[0], rates[1]
-    way = 0 if forwards <= 0.0 <= backwards else (1 if forwards > 0.0 else -1)
+    if behind != ahead:
+        spot[0] = behind
+        call_hold(hold, 1, spot, p, rates)
+        backwards = rates[1]
+    if forwards <= 0.0 <= backwards:
+        way = 0
+    elif forwards > 0.0 > backwards:
+        way = asked
+    else:
+        way = 1 if forwards > 0.0 else -1
     return way, forwards < backwards
 
 
-@entry(types.Tuple((_WHOLE, types.boolean))(_WHOLE, _LINE, _FLOAT))
-def way_from_rest(hold, p, place):  # type: ignore[no-untyped-def]
-    """`released`, for Python."""
-    return released(hold, p, place)
+@entry(_WHOLE(_WHOLE, _LINE, _FLOAT, _FLOAT, _WHOLE))
+def way_from_rest(hold, p, behind, ahead, asked):  # type: ignore[no-untyped-def]
+    """The way that `released` tells, for Python."""
+    return released(hold, p, behind, ahead, asked)[0]
 
 
 @entry(
     types.Tuple((_WHOLE, _WHOLE, _WHOLE, types.boolean, _WHOLE, _WHOLE, _FLOAT, _FLOAT, _FLOAT, _FLOAT, _FLOAT))(
-        *(_WHOLE, _WHOLE, types.boolean, types.boolean, types.boolean, _LINE, _FLOAT, _FLOAT, _WHOLE, _WHOLE, _LINE),
+        *(_WHOLE, _WHOLE, types.boolean, types.boolean, types.boolean, _LINE, _FLOAT, _FLOAT, _FLOAT, _WHOLE, _WHOLE),
+        _LINE,
         *(_FLOAT, _FLOAT, _FLOAT, _WHOLE, _FLOAT, _LINE),
     ),
     checked=False,
@@ -101,6 +117,7 @@ def follow(  # type: ignore[no-untyped-def]
     linear,
     p,
     start,
+    start_low,
     w,
     v,
     nu,
@@ -114,7 +131,7 @@ def follow(  # type: ignore[no-untyped-def]
 ):
     """`run`, and from where that ends with V**2 = 0 back to its ``middle``; what it finds stands in the record.
 
-    The forces are told of as by `interface.Dissipation`.
+    It begins at ``start + start_low``. The forces are told of as by `interface.Dissipation`.
 
     Returns
     -------
@@ -130,21 +147,24 @@ def follow(  # type: ignore[no-untyped-def]
         Of the whole leg.
     """
     flags, p, breaks, record = (friction, kinked, linear), uncounted(p), uncounted(breaks), uncounted(record)
+    origin, off = (start, start_low), grain(start, limit) if breaks.size else 0.0
     while True:
-        what, place, w1, n, onwards, next_strict, middle, slack, met, kept = run(
-            drive, p, flags, start, w, v, nu, breaks, limit, reach, step, side, strict, record
+        what, place, w1, n, onwards, next_strict, middle, slack, met, kept, coming = run(
+            drive, p, flags, origin, w, v, nu, breaks, off, limit, reach, step, side, strict, record
         )
         if what != DIPPED or kept > 0:
             break
         strict = next_strict
     used, back, after, way, held = HEAD + kept * COLUMNS, 0, 0.0, v, True
     if what == TURN:
-        whole = v * ((place[0] - middle[0]) + (place[1] - middle[1]))
-        back = run_back(drive, p, flags, place[0], whole, v, n, met, breaks, onwards, record, used)
+        # As `next_stop` has the distance of a break, if the middle is one.
+        whole = v * ((place[0] - middle[0]) + place[1]) - v * middle[1]
+        back = run_back(drive, p, flags, place, whole, v, n, met, breaks, off, onwards, record, used)
         after = total(record, used, back)
-        way, held = released(hold, p, place[0])
+        here = within(place[0], between(breaks, coming, v, off))
+        way, held = released(hold, p, here, here, v)
     elif what == ASYMPTOTE:
-        back = approach(drive, p, flags, place[0], middle[0], v, n, met, breaks, onwards, record, used)
+        back = approach(drive, p, flags, place[0], middle[0], v, n, met, breaks, off, onwards, record, used)
     before = total(record, HEAD, kept)
     record[END], record[END_LOW], record[MIDDLE], record[MIDDLE_LOW] = place[0], place[1], middle[0], middle[1]
     record[SLACK], record[BEFORE], record[AFTER], record[MET] = slack, before, after, met
