@@ -212,7 +212,8 @@ class Curve:
             Rows of x and z: an (n, 2) array, or pairs of numbers or of decimal text, which is kept as it is.
         kind
             "spline": the interpolating quintic spline. "linear": planes stitched together (paper, eq. 1); at their
-            corners the speed is kept.
+            corners the speed is kept. A body at rest on a corner stays where both planes rise from it or hold it; on a
+            ridge that lets it slide down either side it goes in the direction of launch.
         closed
             Whether the track closes; None: if its last point is its first.
 

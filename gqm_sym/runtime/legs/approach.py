@@ -4,6 +4,7 @@ from math import fabs
 
 from gqm_sym.runtime.arithmetic.clenshaw import chebyshev_sum
 from gqm_sym.runtime.compiled.jit import Inner
+from gqm_sym.runtime.legs.leg_breaks import between
 from gqm_sym.runtime.legs.leg_equation import BARE, DS, PLACE, SERIES, panel_room, set_nodes
 from gqm_sym.runtime.legs.leg_equation import W as V2
 from gqm_sym.runtime.legs.leg_panels import MOST_TRIES, NEVER, next_panel, next_stop
@@ -18,23 +19,24 @@ NO_ROOM, LOST = -1, -2
 
 
 @Inner
-def approach(drive, p, flags, top, end, v, nu, met, breaks, step, record, used):  # type: ignore[no-untyped-def]
+def approach(drive, p, flags, top, end, v, nu, met, breaks, off, step, record, used):  # type: ignore[no-untyped-def]
     """The field of the leg that tends to the equilibrium ``top``, followed back from there to ``end``.
 
     ``nu`` is the sign of N at the equilibrium, which has changed ``met`` times on the way. The field is entered behind
     what is ``used`` of a record (`leg_records`). Returns how many rows it has; NO_ROOM where there is none, LOST where
-    it could not be followed.
+    it could not be followed. ``off`` is as `leg_breaks.between` has it.
     """
     work = panel_room()
     set_nodes(work)
-    count, base, left, least, u, whole = 0, 0.0, 0.0, 0.0, -v, fabs(end - top)
+    count, base, left, least, u, whole, origin = 0, 0.0, 0.0, 0.0, -v, fabs(end - top), (top, 0.0)
     coming, passed = met - 1, breaks.size - 1
     for _ in range(MOST_TRIES):
-        stop, coming, passed, nu = next_stop(top, u, left, whole, record, breaks, coming, passed, nu)
+        stop, coming, passed, nu = next_stop(origin, u, left, whole, record, breaks, coming, passed, nu)
         if stop <= left:
             break
+        span = between(breaks, passed + 1, v, off)
         width, step, _ = next_panel(
-            *(drive, p, flags, top, u, 0.0, 1.0, left, stop - left, step, base, v, nu, 0.0, NEVER, False, work)
+            *(drive, p, flags, origin, span, u, 0.0, 1.0, left, stop - left, step, base, v, nu, 0.0, NEVER, False, work)
         )
         if width == 0.0:
             break

@@ -11,12 +11,14 @@ from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.interface import Dissipation
 from gqm_sym.runtime.launch.ends import CUSP_SHARE, domain_end, leaving_at_once, starting_step
 from gqm_sym.runtime.launch.formulas import Formulas, ParameterValues
+from gqm_sym.runtime.launch.functions import BoundFunctions
 from gqm_sym.runtime.launch.problem import Problem, bind
 from gqm_sym.runtime.launch.request import Launch
 from gqm_sym.runtime.launch.speed import path_and_force_at
 from gqm_sym.runtime.launch.zeros import FARTHEST
 from gqm_sym.runtime.legs import follow
-from gqm_sym.runtime.legs.leg_record import BEFORE, COLUMNS, END, MIDDLE
+from gqm_sym.runtime.legs.leg_breaks import grain
+from gqm_sym.runtime.legs.leg_record import BEFORE, COLUMNS, END, END_LOW, MIDDLE
 from gqm_sym.runtime.legs.leg_run import ASYMPTOTE, FULL, LIFTOFF, LIMIT, NARROWED, PAUSED, SPENT, TURN
 from gqm_sym.runtime.legs.leg_segments import Run, along_field, along_panels
 from gqm_sym.runtime.motion.aperiodic import MotionAtRest
@@ -51,7 +53,7 @@ def dissipate(formulas: Formulas, p: ParameterValues, launch: Launch) -> Motion:
     problem = Problem(formulas, launch, p, functions, formulas.domain(p))
     if problem.w0 > 0.0:
         return DissipativeMotion(problem, launch.direction)
-    way = _leaves(problem, problem.lam0)
+    way = _leaves(problem, problem.lam0, launch.direction)
     return DissipativeMotion(problem, way) if way else MotionAtRest(problem)
 
 
@@ -65,10 +67,20 @@ def launch_leg(formulas: Formulas, p: ParameterValues, launch: Launch, places: A
     return v2
 
 
-def _leaves(problem: Problem, lam: float) -> int:
-    """Which way a body leaves a place where it is at rest; 0 if it stays."""
-    way: int = follow.way_from_rest(_loss(problem).hold, problem.functions.p, lam)[0]
+def _leaves(problem: Problem, lam: float, asked: int) -> int:
+    """Which way a body leaves a place where it is at rest; 0 if it stays.
+
+    At a corner the planes on both sides say so; where it would slide down either, it goes the way that is ``asked``.
+    """
+    f, domain = problem.functions, problem.domain
+    off = grain.py_func(lam, domain.period or max(abs(domain.low), abs(domain.high))) if _is_break(f, lam) else 0.0
+    way: int = follow.way_from_rest(_loss(problem).hold, f.p, lam - off, lam + off, asked)
     return way
+
+
+def _is_break(f: BoundFunctions, lam: float) -> bool:
+    """Whether the curve is not smooth at a place."""
+    return bool(f.between(f.breaks, *np.nextafter(lam, (-inf, inf)).tolist()).size)
 
 
 def _loss(problem: Problem) -> Dissipation:
@@ -89,7 +101,10 @@ class DissipativeMotion(Motion):
     # What a motion begins with.
     _horizon = inf
     _ending = ""
-    _elapsed = _rest = _arc = _strict = 0.0
+    _elapsed = _rest = _arc = _strict = _low = 0.0
+    # How long the body took from turn to turn: on the leg it is on, and on the last ones.
+    _swing = 0.0
+    _swings = (inf, inf)
     _nu = _laps = _turns = _pauses = 0
     _held = True
     _whole: Trajectory | None = None
@@ -233,15 +248,17 @@ class DissipativeMotion(Motion):
                 f"motion: {MOST_PIECES} pieces of legs reach t = {self._pieces[-1].t_stop[0]!r} only; "
                 "give a shorter t_max, or ask for earlier times and nearer places"
             )
-        problem, way, start = self.problem, self._way, self._place
+        problem, way, start, low = self.problem, self._way, self._place, self._low
         f, domain, loss = problem.functions, problem.domain, problem.formulas.dissipation
         end, period = domain.high if way > 0 else domain.low, domain.period
         assert loss is not None
         far = 8.0 * period if period else end  # a closed curve's breaks are listed for some laps
         limit = start + way * far if period else end
-        breaks = np.ascontiguousarray(f.between(f.breaks, start, limit)[::way]) if f.breaks.size else NOWHERE
+        breaks = NOWHERE
+        if f.breaks.size:  # those a little behind tell which piece of the curve the body is on
+            breaks = np.ascontiguousarray(f.between(f.breaks, start - way * starting_step(problem), limit)[::way])
         reach = inf if isfinite(end) else self._reach
-        run = (*loss, f.p, start, self._w, way, self._nu, breaks, limit)
+        run = (*loss, f.p, start, low, self._w, way, self._nu, breaks, limit)
         side, room = SIDES[problem.launch.contact], FEW * COLUMNS
         while True:
             record = np.empty(room)
@@ -261,12 +278,19 @@ class DissipativeMotion(Motion):
                 f"V**2 beyond {problem.formulas.parameter} = {place!r} could not be followed; "
                 "are the curve and the force smooth there?"
             )
+        new_low = float(record[END_LOW])
+        self._swing += time
         if what == TURN:
-            name = "rest" if new_way == 0 or (place == start and self._w == 0.0) else "turn"
+            stays = new_way == 0 or (place == start and new_low == low and self._w == 0.0)
+            name = "rest" if stays or self._comes_to_rest_between(place, time) else "turn"
+            self._swings, self._swing = (self._swings[1], self._swing), 0.0
         else:
             name = self._end_name(what, place)
-        self._runs.append((start, ahead, back, record, what, name, self._laps))
-        self._place, self._w, self._way, self._nu, self._step, self._strict = place, w_end, new_way, nu, step, strict
+        self._runs.append(((start, low), ahead, back, record, what, name, self._laps))
+        self._place, self._low, self._w, self._way, self._nu, self._step, self._strict = (
+            *(place, new_low, w_end, new_way),
+            *(nu, step, strict),
+        )
         self._elapsed, lost = two_sum.py_func(self._elapsed, time)
         self._rest += lost
         if what == TURN:
@@ -289,8 +313,22 @@ class DissipativeMotion(Motion):
     def _fold(self, period: float) -> None:
         """Count whole laps of a closed curve apart, so that places keep their digits."""
         count = int(np.trunc((self._place - self.problem.lam0) / period))
-        self._place -= count * period
+        self._place, low = two_sum.py_func(self._place, -count * period)
+        self._low += low
         self._laps += count
+
+    def _comes_to_rest_between(self, place: float, time: float) -> bool:
+        """Whether the body, turning at a place, has come to rest on the corner there as far as times can tell.
+
+        Between two planes swings fall geometrically, those either way by the same factor: what all others will take
+        is less than a rounding of the time.
+        """
+        f, (before_last, last), swing = self.problem.functions, self._swings, self._swing
+        if not (f.corners.size and before_last < inf and swing < before_last):
+            return False
+        left = swing * (last + swing) / (before_last - swing)
+        now = self._elapsed + time
+        return now + left == now and _is_break(f, place) and _leaves(self.problem, place, 0) == 0
 
     def _end_name(self, what: int, place: float) -> str:
         """What ends a run that does not turn."""
@@ -306,7 +344,7 @@ class DissipativeMotion(Motion):
         """A motion that ends as it begins: the track would have to pull at once."""
         record = np.empty(FEW * COLUMNS)
         what, _, _, _, ahead, *_ = follow.follow(*run, 0.0, self._step, 0, inf, record)
-        first = Run(self._place, ahead, 0, record, what, "liftoff", self._laps)
+        first = Run((self._place, self._low), ahead, 0, record, what, "liftoff", self._laps)
         stretch = self._panels_of(first)
         self._done.append(self._piece(stretch, 1, (ZERO, 0.0), (ZERO, 0.0), "liftoff", self._laps))
         self._ending = "liftoff"
@@ -324,7 +362,7 @@ class DissipativeMotion(Motion):
     def _panels_of(self, run: Run) -> Segment:
         """The stretch from a run's start to where time is counted from it."""
         f, middle, (before, _) = self.problem.functions, run.pair(MIDDLE), run.pair(BEFORE)
-        return along_panels(f, (run.start, 0.0), middle, run.slack, before, run.panels_ahead)
+        return along_panels(f, run.start, middle, run.slack, before, run.panels_ahead)
 
     def _add(self, stretch: Segment, sense: int, run: Run, end: str) -> None:
         """Run through a whole stretch next, cut where N changes sign."""

@@ -14,6 +14,7 @@ from gqm_sym.runtime.compiled.jit import Inner, entry
 from gqm_sym.runtime.compiled.registers import uncounted
 from gqm_sym.runtime.compiled.types import INTEGER, REAL, VECTOR
 from gqm_sym.runtime.legs.approach import LOST, NO_ROOM, approach
+from gqm_sym.runtime.legs.leg_breaks import between, grain, within
 from gqm_sym.runtime.legs.leg_equation import W, panel_room, set_nodes
 from gqm_sym.runtime.legs.leg_panels import ALWAYS, MOST_TRIES, next_panel, next_stop
 from gqm_sym.runtime.legs.leg_record import (
@@ -36,12 +37,12 @@ from gqm_sym.runtime.legs.polynomials import COUNT
 
 
 @Inner
-def run_back(drive, p, flags, turn, whole, v, nu, met, breaks, step, record, used):  # type: ignore[no-untyped-def]
-    """Follow the leg that turns at ``turn`` back from there over the distance ``whole``.
+def run_back(drive, p, flags, turn, whole, v, nu, met, breaks, off, step, record, used):  # type: ignore[no-untyped-def]
+    """Follow the leg that turns at ``turn``, two doubles, back from there over the distance ``whole``.
 
     ``nu`` is the sign of N at the turn, which has changed ``met`` times on the way. The panels are entered behind what
     is ``used`` of a record. Returns how many they are; NO_ROOM where there is none, LOST where it could not be
-    followed.
+    followed. ``off`` is as `leg_breaks.between` has it.
     """
     work = panel_room()
     set_nodes(work)
@@ -54,8 +55,9 @@ def run_back(drive, p, flags, turn, whole, v, nu, met, breaks, step, record, use
             break
         if not has_room(record, at, met):
             return NO_ROOM
+        span = between(breaks, passed + 1, v, off)
         width, step, _ = next_panel(
-            *(drive, p, flags, turn, u, 1.0, 0.0, left, room, step, base, v, nu, 0.0, ALWAYS, False, work)
+            *(drive, p, flags, turn, span, u, 1.0, 0.0, left, room, step, base, v, nu, 0.0, ALWAYS, False, work)
         )
         if width == 0.0:
             break
@@ -68,25 +70,39 @@ def run_back(drive, p, flags, turn, whole, v, nu, met, breaks, step, record, use
 
 
 @Inner
-def released(hold, p, place):  # type: ignore[no-untyped-def]
-    """Which way a body leaves a place where it is at rest, 0 if it stays; whether it could stay at some slope."""
+def released(hold, p, behind, ahead, asked):  # type: ignore[no-untyped-def]
+    """Which way a body leaves a place where it is at rest, 0 if it stays; whether it could stay at some slope.
+
+    The place is given by one on either side of it, which differ where it is a break. From a ridge it leaves either way:
+    that which is ``asked``.
+    """
     spot, rates = spot_room(), spot_room()
-    spot[0] = place
+    spot[0] = ahead
     call_static_balance(hold, 1, spot, p, rates)
     forwards, backwards = rates[0], rates[1]
-    way = 0 if forwards <= 0.0 <= backwards else (1 if forwards > 0.0 else -1)
+    if behind != ahead:
+        spot[0] = behind
+        call_static_balance(hold, 1, spot, p, rates)
+        backwards = rates[1]
+    if forwards <= 0.0 <= backwards:
+        way = 0
+    elif forwards > 0.0 > backwards:
+        way = asked
+    else:
+        way = 1 if forwards > 0.0 else -1
     return way, forwards < backwards
 
 
-@entry(types.Tuple((INTEGER, types.boolean))(INTEGER, VECTOR, REAL))
-def way_from_rest(hold, p, place):  # type: ignore[no-untyped-def]
-    """`released`, for Python."""
-    return released(hold, p, place)
+@entry(INTEGER(INTEGER, VECTOR, REAL, REAL, INTEGER))
+def way_from_rest(hold, p, behind, ahead, asked):  # type: ignore[no-untyped-def]
+    """The way that `released` tells, for Python."""
+    return released(hold, p, behind, ahead, asked)[0]
 
 
 @entry(
     types.Tuple((INTEGER, INTEGER, INTEGER, types.boolean, INTEGER, INTEGER, REAL, REAL, REAL, REAL, REAL))(
-        *(INTEGER, INTEGER, types.boolean, types.boolean, types.boolean, VECTOR, REAL, REAL, INTEGER, INTEGER, VECTOR),
+        *(INTEGER, INTEGER, types.boolean, types.boolean, types.boolean, VECTOR, REAL, REAL, REAL, INTEGER, INTEGER),
+        VECTOR,
         *(REAL, REAL, REAL, INTEGER, REAL, VECTOR),
     ),
     checked=False,
@@ -99,6 +115,7 @@ def follow(  # type: ignore[no-untyped-def]
     linear,
     p,
     start,
+    start_low,
     w,
     v,
     nu,
@@ -112,7 +129,7 @@ def follow(  # type: ignore[no-untyped-def]
 ):
     """`run`, and from where that ends with V**2 = 0 back to its ``middle``; what it finds stands in the record.
 
-    The forces are told of as by `interface.Dissipation`.
+    It begins at ``start + start_low``. The forces are told of as by `interface.Dissipation`.
 
     Returns
     -------
@@ -128,21 +145,24 @@ def follow(  # type: ignore[no-untyped-def]
         Of the whole leg.
     """
     flags, p, breaks, record = (friction, kinked, linear), uncounted(p), uncounted(breaks), uncounted(record)
+    origin, off = (start, start_low), grain(start, limit) if breaks.size else 0.0
     while True:
-        what, place, w1, n, onwards, next_strict, middle, slack, met, kept = run(
-            drive, p, flags, start, w, v, nu, breaks, limit, reach, step, side, strict, record
+        what, place, w1, n, onwards, next_strict, middle, slack, met, kept, coming = run(
+            drive, p, flags, origin, w, v, nu, breaks, off, limit, reach, step, side, strict, record
         )
         if what != DIPPED or kept > 0:
             break
         strict = next_strict
     used, back, after, way, held = HEAD + kept * COLUMNS, 0, 0.0, v, True
     if what == TURN:
-        whole = v * ((place[0] - middle[0]) + (place[1] - middle[1]))
-        back = run_back(drive, p, flags, place[0], whole, v, n, met, breaks, onwards, record, used)
+        # As `next_stop` has the distance of a break, if the middle is one.
+        whole = v * ((place[0] - middle[0]) + place[1]) - v * middle[1]
+        back = run_back(drive, p, flags, place, whole, v, n, met, breaks, off, onwards, record, used)
         after = total(record, used, back)
-        way, held = released(hold, p, place[0])
+        here = within(place[0], between(breaks, coming, v, off))
+        way, held = released(hold, p, here, here, v)
     elif what == ASYMPTOTE:
-        back = approach(drive, p, flags, place[0], middle[0], v, n, met, breaks, onwards, record, used)
+        back = approach(drive, p, flags, place[0], middle[0], v, n, met, breaks, off, onwards, record, used)
     before = total(record, HEAD, kept)
     record[END], record[END_LOW], record[MIDDLE], record[MIDDLE_LOW] = place[0], place[1], middle[0], middle[1]
     record[SLACK], record[BEFORE], record[AFTER], record[MET] = slack, before, after, met

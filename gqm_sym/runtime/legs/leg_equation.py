@@ -18,6 +18,7 @@ from gqm_sym.runtime.compiled.calls import call_speed_equation
 from gqm_sym.runtime.compiled.intrinsics import fma, polynomial
 from gqm_sym.runtime.compiled.jit import Inner
 from gqm_sym.runtime.compiled.registers import on_stack, over_rows
+from gqm_sym.runtime.legs.leg_breaks import within
 from gqm_sym.runtime.legs.polynomials import COUNT, ENDS_BY_NODE, WIDE, size_of, to_graded_means, to_means
 
 # V**2 over a panel may not change by more than this factor's logarithm through resistance alone.
@@ -92,15 +93,19 @@ def set_nodes(work):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def begin_panel(drive, p, linear, origin, u, g, c, left, width, base, v, nu, work):  # type: ignore[no-untyped-def]
+def begin_panel(drive, p, linear, origin, span, u, g, c, left, width, base, v, nu, work):  # type: ignore[no-untyped-def]
     """Lay out a panel from w = ``left`` on, run towards growing (u = 1) or falling (u = -1) parameters.
 
-    Where forces are linear in V**2, fills what ``drive`` gives, and PULL.
+    ``origin`` is two doubles; the curve is asked within ``span`` (`leg_breaks`). Where forces are linear in V**2, fills
+    what ``drive`` gives, and PULL.
     """
     near = 2.0 * g * left + c
     product(work, PLACE, NODES, width)
     away(work, D, PLACE, near, g)
-    place(work, ARC, D, origin + u * distance(left, g, c), float(u))
+    place(work, ARC, D, origin[0] + (u * distance(left, g, c) + origin[1]), float(u))
+    if span[0] > -inf or span[1] < inf:
+        for j in range(WIDE):
+            work[ARC + j] = within(work[ARC + j], span)
     same(work, W, base)
     if linear:
         sample(drive, p, u, g, near, v, nu, work)

@@ -4,6 +4,7 @@ from math import fabs, inf
 
 from gqm_sym.runtime.compiled.intrinsics import bits, from_bits
 from gqm_sym.runtime.compiled.jit import Inlined, Inner
+from gqm_sym.runtime.legs.leg_breaks import offset
 from gqm_sym.runtime.legs.leg_equation import (
     BARE,
     DS,
@@ -221,6 +222,7 @@ def next_panel(  # type: ignore[no-untyped-def]
     p,
     flags,
     origin,
+    span,
     u,
     g,
     c,
@@ -235,7 +237,7 @@ def next_panel(  # type: ignore[no-untyped-def]
     watch,
     work,
 ):
-    """The widest panel that can be resolved, no wider than ``room`` and ``step``.
+    """The widest panel that can be resolved, no wider than ``room`` and ``step``; on the piece within ``span``.
 
     Time on it is resolved too: where ``ask`` is ALWAYS; never where it is NEVER; where it is MAYBE, unless V**2 falls
     below a part of the largest so far, ``ceiling``. N is resolved as well as its changes of sign ask for, and not at
@@ -252,13 +254,13 @@ def next_panel(  # type: ignore[no-untyped-def]
     """
     width, kink, widest = min(step, room), False, 0.0
     gone, near = distance(left, g, c), 2.0 * g * left + c
-    here = origin + u * gone
+    here = origin[0] + u * gone
     for _ in range(2100):
         run = width * (near + g * width)
         # As narrow as its room, a panel may be narrower than places in doubles: distances on it keep their digits.
         if (run <= NARROW * max(fabs(here), gone) and width < room) or run < 1e-300:
             return 0.0, step, False
-        begin_panel(drive, p, flags[2], origin, u, g, c, left, width, base, v, nu, work)
+        begin_panel(drive, p, flags[2], origin, span, u, g, c, left, width, base, v, nu, work)
         untold, worst = P, 0.0
         if not flags[1] and flags[2]:  # most that is too wide is told from the curve alone
             work[size_at(DS)], work[size_at(PULL)] = size_of(work, DS), max(size_of(work, PULL), 1.0 / width)
@@ -317,12 +319,12 @@ def next_stop(origin, u, gone, whole, record, breaks, met, passed, nu):  # type:
     """
     stop = whole
     # By distances, for what has been run to is as far as it was said to be: a place may be a rounding farther.
-    while met >= 0 and u * (record[change_at(record, met)] - origin) <= gone:
+    while met >= 0 and offset(record[change_at(record, met)], origin, u) <= gone:
         met, nu = met - 1, -nu
-    while passed >= 0 and u * (breaks[passed] - origin) <= gone:
+    while passed >= 0 and offset(breaks[passed], origin, u) <= gone:
         passed -= 1
     if met >= 0:
-        stop = min(stop, u * (record[change_at(record, met)] - origin))
+        stop = min(stop, offset(record[change_at(record, met)], origin, u))
     if passed >= 0:
-        stop = min(stop, u * (breaks[passed] - origin))
+        stop = min(stop, offset(breaks[passed], origin, u))
     return stop, met, passed, nu

@@ -6,10 +6,10 @@ Time is counted on the way, as long as V**2 is large; from where it falls for go
 from math import fabs, inf, sqrt
 
 from gqm_sym.runtime.arithmetic.clenshaw import chebyshev_sum
-from gqm_sym.runtime.arithmetic.doubledouble import two_sum
 from gqm_sym.runtime.compiled.calls import call_speed_equation
 from gqm_sym.runtime.compiled.jit import Inner
 from gqm_sym.runtime.compiled.registers import on_stack
+from gqm_sym.runtime.legs.leg_breaks import between, located, offset, within
 from gqm_sym.runtime.legs.leg_equation import (
     BARE,
     FORCE,
@@ -54,7 +54,8 @@ TOUCHED = 5e-14
 # A body this close to a turn, as a share of what has been run, is there: for laws that have no value beyond it.
 NEAR = 1e-11
 
-# The first panel of a leg, against the way on which the first acceleration would stop the body.
+# The first panel of a leg, and the first behind a break, against the way on which the acceleration there would stop the
+# body.
 SOONER = 2.0
 MOST_PANELS = 512
 
@@ -88,8 +89,8 @@ def rise(drive, p, place, v2, v, nu, spot):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def run(drive, p, flags, start, w, v, nu, breaks, limit, reach, step, side, strict, record):  # type: ignore[no-untyped-def]
-    """Follow the body from ``start`` with V**2 = w in direction v, to the first turn, end or pause.
+def run(drive, p, flags, origin, w, v, nu, breaks, off, limit, reach, step, side, strict, record):  # type: ignore[no-untyped-def]
+    """Follow the body from ``origin``, two doubles, with V**2 = w in direction v, to the first turn, end or pause.
 
     Parameters
     ----------
@@ -98,7 +99,9 @@ def run(drive, p, flags, start, w, v, nu, breaks, limit, reach, step, side, stri
     nu : int
         The sign of N; 0 to find it out.
     breaks : array
-        Places at which panels must begin, in the order they are met.
+        Places at which panels must begin, in the order they are met; some may lie behind.
+    off : float
+        How far off them the curve is asked (`leg_breaks`).
     limit, reach : float
         The end of the domain; the distance from which on the run may pause.
     step : float
@@ -128,24 +131,30 @@ def run(drive, p, flags, start, w, v, nu, breaks, limit, reach, step, side, stri
         c/2 of the march variable (`leg_panels`); infinite where it is the distance itself.
     met, kept : int
         How many changes of N's sign there are on the way, and how many panels.
+    coming : int
+        Which break is next, where the run ends.
     """
     work, spot = panel_room(), spot_room()
     set_nodes(work)
-    g, c, sooner = 1.0, 0.0, inf
+    g, c, sooner, coming, start = 1.0, 0.0, inf, 0, origin[0]
+    while coming < breaks.size and offset(breaks[coming], origin, v) <= 0.0:
+        coming += 1
+    span = between(breaks, coming, v, off)
+    first = within(start, span)
     if nu == 0:
-        rise(drive, p, start, w, v, nu, spot)
+        rise(drive, p, first, w, v, nu, spot)
         load, turned = spot[5], spot[6] * w
         if fabs(load + turned) > TOUCHED * (fabs(load) + fabs(turned)):
             nu = 1 if load + turned > 0.0 else -1
     if w > 0.0:
-        slope = rise(drive, p, start, w, v, nu, spot)
+        slope = rise(drive, p, first, w, v, nu, spot)
         slow = slope > 0.0 and w <= slope * step
         g, c = (1.0, 2.0 * sqrt(w / slope)) if slow else (0.0, 1.0)
         # V**2 at launch is exact: a turn that is near has its digits on a panel no wider than this.
         sooner = SOONER * w / -slope if slope < 0.0 else inf
-    count, met, coming, what = 0, 0, 0, SPENT
+    count, met, what = 0, 0, SPENT
     base, left, gone, ceiling, step = w, 0.0, 0.0, w, marched(step, g, c)
-    # The last place up to which time is counted, and what is known there; a turn is searched for beyond it.
+    # The last distance up to which time is counted, and what is known there; a turn is searched for beyond it.
     searching, kept, mark, mark_base, mark_nu, mark_met = False, 0, 0.0, w, nu, 0
     for _ in range(MOST_TRIES):
         if nu != 0 and nu == -side:
@@ -158,22 +167,26 @@ def run(drive, p, flags, start, w, v, nu, breaks, limit, reach, step, side, stri
         if searching and not late:
             what = DIPPED
             break
-        while coming < breaks.size and v * (breaks[coming] - start) <= gone:
+        if coming < breaks.size and offset(breaks[coming], origin, v) <= gone:
             coming += 1
-        stop = v * ((breaks[coming] if coming < breaks.size else limit) - start)
+            span = between(breaks, coming, v, off)
+            slope = rise(drive, p, within(here, span), base, v, nu, spot) if base > 0.0 else 0.0
+            # V**2 at a break is as exact as at launch.
+            sooner = marched(gone + SOONER * base / -slope, g, c) - left if slope < 0.0 else inf
+        stop = offset(breaks[coming] if coming < breaks.size else limit, origin, v)
         if stop <= gone:
             what = LIMIT
             break
         room = marched(stop, g, c) - left
-        part = min(room, sooner) if gone == 0.0 else room
+        part = min(room, sooner)
         ask = ALWAYS if gone < strict else (NEVER if searching or late else MAYBE)
         width, step, timed = next_panel(
-            *(drive, p, flags, start, v, g, c, left, part, step, base, v, nu, ceiling, ask, True, work)
+            *(drive, p, flags, origin, span, v, g, c, left, part, step, base, v, nu, ceiling, ask, True, work)
         )
         if width == 0.0:
             what = NARROWED
             if not flags[2] and base > 0.0:
-                slope = rise(drive, p, here, base, v, nu, spot)
+                slope = rise(drive, p, within(here, span), base, v, nu, spot)
                 if slope < 0.0 and base <= -slope * NEAR * max(fabs(here), gone):
                     what, gone, base = TURN, gone - base / slope, 0.0
             break
@@ -197,18 +210,18 @@ def run(drive, p, flags, start, w, v, nu, breaks, limit, reach, step, side, stri
                     met += 1
                 continue
         if not searching and ask != ALWAYS and (late or not timed):
-            searching, mark, mark_base, mark_nu, mark_met = True, left, base, nu, met
+            searching, mark, mark_base, mark_nu, mark_met = True, gone, base, nu, met
         right = left + width
         if end <= 1.0:
             x = bottom(work, v, touch) if end == touch and end != at_rest else end
             # Once more on a panel that ends there: its own sum has more digits than the series of a wider one.
             right = left + width * (0.5 * (1.0 + x))
-            begin_panel(drive, p, flags[2], start, v, g, c, left, right - left, base, v, nu, work)
+            begin_panel(drive, p, flags[2], origin, span, v, g, c, left, right - left, base, v, nu, work)
             solve_panel(drive, p, flags[2], v, g, c, left, base, v, nu, work)
             pace(g, c, left, base, work)
             if end == at_rest and flags[2]:
                 over, there = work[V2 + COUNT], distance(right, g, c)
-                slope = rise(drive, p, start + v * there, over, v, nu, spot)
+                slope = rise(drive, p, within(start + v * there, span), over, v, nu, spot)
                 if fabs(over) < fabs(slope) * 1e-6 * (there - gone):
                     right = marched(there - over / slope, g, c)
             elif end == turn_of_force and end != touch:
@@ -219,14 +232,16 @@ def run(drive, p, flags, start, w, v, nu, breaks, limit, reach, step, side, stri
                     right -= end_load / rate
         if not searching:
             keep(record, HEAD + kept * COLUMNS, right, right - left, work)
-            kept, mark = kept + 1, right
+            kept += 1
         count += 1
         highest = max(base, extent(work, V2)[1])
         # What resistance alone leaves of it: exp(-q).
         ceiling = max(ceiling / (1.0 + work[SWELL + COUNT]) if end > 1.0 else ceiling, highest)
         full = end > 1.0 and width == room
         base, left = max(work[V2 + COUNT], 0.0), right
-        gone = stop if full else distance(right, g, c)
+        gone, sooner = stop if full else distance(right, g, c), inf
+        if not searching:
+            mark = gone
         if end <= 1.0:
             if end == at_rest or end == touch:
                 what, base = (TURN if end == at_rest else ASYMPTOTE), 0.0
@@ -239,15 +254,15 @@ def run(drive, p, flags, start, w, v, nu, breaks, limit, reach, step, side, stri
         elif (gone >= reach and 2.0 * base >= ceiling) or count >= MOST_PANELS:
             what = PAUSED
             break
-    middle = two_sum(start, v * distance(mark, g, c))
+    middle = located(origin, v, mark, breaks, coming)
     onwards, strict = step * (2.0 * g * left + c + g * step), strict - gone
     if what == TURN or what == ASYMPTOTE:
-        place = two_sum(start, v * gone)
+        place = located(origin, v, gone, breaks, coming)
     elif searching and what != FULL:
-        strict = gone - distance(mark, g, c) if what == PAUSED or what == DIPPED else inf
+        strict = gone - mark if what == PAUSED or what == DIPPED else inf
         what, place, base, nu, met = DIPPED, middle, mark_base, mark_nu, mark_met
     else:
-        place = (limit, 0.0) if what == LIMIT else two_sum(start, v * gone)
+        place = (limit, 0.0) if what == LIMIT else located(origin, v, gone, breaks, coming)
         middle = place
     slack = 0.5 * c if g > 0.0 else inf
-    return what, place, base, nu, onwards, strict, middle, slack, met, kept
+    return what, place, base, nu, onwards, strict, middle, slack, met, kept, coming

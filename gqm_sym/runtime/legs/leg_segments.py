@@ -83,7 +83,7 @@ def read_panels(panels, time):  # type: ignore[no-untyped-def]
 class Run(NamedTuple):
     """One run of the body as compiled code tells of it (`legs.follow`), not yet made into pieces."""
 
-    start: float
+    start: Pair
     ahead: int
     back: int
     record: Array

@@ -1,6 +1,6 @@
 """From a launch to a motion: how far it reaches each way, of what kind it is, and the stretches it runs through."""
 
-from math import isfinite
+from math import inf, isfinite
 
 import numpy as np
 
@@ -48,6 +48,8 @@ def _bilateral(formulas: Formulas, p: ParameterValues, launch: Launch) -> Motion
     f = bind(formulas, p, launch)
     problem = Problem(formulas, launch, p, f, domain)
     lam0, v0 = launch.lam0.value, launch.v0.value
+    if v0 == 0.0 and _is_in_corner(problem):
+        return MotionAtRest(problem)
     direction, ahead, behind, time = survey(
         f.addresses, f.p, lam0, v0, launch.direction, low, high, period, place, step
     )
@@ -93,6 +95,16 @@ def _bilateral(formulas: Formulas, p: ParameterValues, launch: Launch) -> Motion
             (abs(ends[0].offset), abs(ends[1].offset)),
         )
     return _returning(problem, direction, front, back)
+
+
+def _is_in_corner(problem: Problem) -> bool:
+    """Whether the launch place is a corner from which the curve rises both ways."""
+    f, lam0 = problem.functions, problem.lam0
+    if not f.between(f.corners, *np.nextafter(lam0, (-inf, inf)).tolist()).size:
+        return False
+    offsets = OFF_CUSP * starting_step(problem) * np.array([-1.0, 1.0])
+    w = speed_squared_at(f.addresses, f.p, lam0, problem.launch.lam0.low, 0.0, lam0 + offsets, offsets)
+    return bool(np.all(w < 0.0))
 
 
 def _check_place(problem: Problem) -> None:
