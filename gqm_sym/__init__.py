@@ -88,7 +88,7 @@ def __getattr__(name: str) -> Any:
     if name not in _HOMES:
         raise AttributeError(f"module 'gqm_sym' has no attribute {name!r}")
     home = import_module(_HOMES[name])
-    return home if home.__name__.endswith(f".{name}") else getattr(home, name)
+    return home if home.__name__ == f"gqm_sym.{name}" else getattr(home, name)
 
 
 def __dir__() -> list[str]:

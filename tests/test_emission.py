@@ -157,7 +157,7 @@ def test_taken_names_as_the_curves_parameter(name: str, folder: Path) -> None:
     "name",
     [
         *("frame", "climb", "rise", "bend", "bounds", "pass1", "solve", "op", "Any", "MODEL", "PARAMETERS", "FRAME"),
-        *("carray", "compiled", "compiler", "range", "fabs", "nearest", "Motion", "Formulas", "exact_z"),
+        *("carray", "compiled", "compiler", "range", "fabs", "nearest", "Motion", "CompiledModel", "exact_z"),
         *("cos1", "cos2", "iconst", "imul", "isin"),
     ],
 )
