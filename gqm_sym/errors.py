@@ -3,7 +3,31 @@
 Every message says, in this order: where, what was given, what would be right.
 """
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
+from typing import Any, NoReturn
+
+
+def renamed(**names: str) -> Callable[[Any, str], NoReturn]:
+    """Return the ``__getattr__`` of a class whose attributes have changed their names.
+
+    Parameters
+    ----------
+    **names : str
+        Each old name, and what it is called now.
+
+    Returns
+    -------
+    callable
+        It raises an AttributeError for every name; for an old one the message says the new one.
+    """
+
+    def __getattr__(self: Any, name: str) -> NoReturn:
+        message = f"{type(self).__name__!r} object has no attribute {name!r}"
+        if name in names:
+            message += f"; it is now called {names[name]}"
+        raise AttributeError(message, name=name, obj=self)
+
+    return __getattr__
 
 
 class GQMError(Exception):

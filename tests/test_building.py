@@ -240,7 +240,7 @@ def test_one_module_in_two_folders(text: str, path: Path, tmp_path: Path) -> Non
     write_module(text, twin)
     first, second = load(path, "bowl"), load(twin, "bowl")
     assert half_period(first) == half_period(second)
-    assert first.MODEL.addresses != second.MODEL.addresses or first.frame is not second.frame
+    assert first.MODEL.addresses != second.MODEL.addresses or first.bounds is not second.bounds
 
 
 def test_a_new_version_in_the_same_place(path: Path) -> None:

@@ -219,13 +219,13 @@ print("loaded")
 SMALL = f"""from numba import carray
 
 from gqm_sym.runtime import compiler
-from gqm_sym.runtime.vocabulary import CLIMB
+from gqm_sym.runtime.vocabulary import EFFECTIVE_POTENTIAL
 
 compiled = compiler(__file__, interface={INTERFACE})
 
 
-@compiled(CLIMB)
-def climb(n, places, p, out):
+@compiled(EFFECTIVE_POTENTIAL)
+def effective_potential(n, places, p, out):
     out = carray(out, (2, n))
     for i in range(n):
         out[0, i] = out[1, i] = 1.0

@@ -97,11 +97,11 @@ def _copy(width: int) -> Callable[..., None]:
 
 
 def _drive(address: int, n: int, work: Any, lam: int, v2: int, v: float, nu: float, p: Any, out: int) -> None:
-    """Fill five rows of a line of numbers from others of it, as `crossing.call_drive` does."""
+    """Fill five rows of a line of numbers from others of it, as `calls.call_speed_equation` does."""
     _FUNCTIONS[address](n, work[lam:], work[v2:], v, nu, p, work[out:])
 
 
-_QUICK = {"uncounted": lambda array: array, "least_and_greatest": _extent, "size": _size, "call_drive": _drive}
+_QUICK = {"uncounted": lambda array: array, "least_and_greatest": _extent, "size": _size, "call_speed_equation": _drive}
 _QUICK |= {"fma": lambda x, y, z: np.float64(_fma(x, y, z)), "nearest_whole": np.rint, "whole_below": np.floor}
 _QUICK |= {"choose": lambda condition, x, y: np.float64(x if condition else y)}
 _QUICK |= {

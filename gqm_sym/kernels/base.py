@@ -8,10 +8,11 @@ on the mathematics)::
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
 
 import sympy as sp
 
-from gqm_sym.errors import DeclarationError
+from gqm_sym.errors import DeclarationError, renamed
 from gqm_sym.expressions import read_expression
 from gqm_sym.parameters import (
     COMMON,
@@ -55,14 +56,14 @@ class Kernel:
         Coefficient of V**2 in what opposes motion, 1/length.
     friction, static_friction
         Coefficients of the contact force in what opposes motion, and in what holds a body at rest.
-    extra
+    tangential_law
         Tangential acceleration of the user's own, in the curve's parameter, coordinates, `W` and `DIRECTION`.
     spin
         Angular velocity of a frame that turns about the z axis: its Coriolis force presses out of the plane.
     radius
         Of a body that rolls to the left of growing λ (negative: to the right), whose centre moves on a path of its own.
-    grip
-        Of a rolling body whose static friction is known: its parameters beta and mu_static.
+    static_friction_limit
+        Of a rolling body whose static friction is known: the names of its parameters beta and mu_static.
     terms
         Name and one line of text of every force in it.
     defaults
@@ -80,13 +81,16 @@ class Kernel:
     drag: sp.Expr = field(default=sp.S.Zero)
     friction: sp.Expr = field(default=sp.S.Zero)
     static_friction: sp.Expr = field(default=sp.S.Zero)
-    extra: sp.Expr = field(default=sp.S.Zero)
+    tangential_law: sp.Expr = field(default=sp.S.Zero)
     spin: sp.Expr = field(default=sp.S.Zero)
     radius: sp.Expr = field(default=sp.S.Zero)
-    grip: tuple[str, str] | None = None
+    static_friction_limit: tuple[str, str] | None = None
     defaults: tuple[tuple[str, Value | None], ...] = ()
     positive: tuple[str, ...] = ()
     at_least: tuple[tuple[str, str], ...] = ()
+
+    if not TYPE_CHECKING:
+        __getattr__ = renamed(extra="tangential_law", grip="static_friction_limit")
 
     def __post_init__(self) -> None:
         refuse_out_of_range(dict(self.defaults), self.positive, self.at_least, where="kernel")
@@ -118,7 +122,7 @@ class Kernel:
         found = tuple(name for name in names_in_order(written) if name not in known)
         return cls(
             terms=(("law", f"tangential acceleration {written}"),),
-            extra=written,
+            tangential_law=written,
             defaults=read_parameters(parameters, found=found, where="law"),
         )
 
@@ -130,11 +134,11 @@ class Kernel:
     @property
     def conservative(self) -> bool:
         """Whether V**2 depends on the place alone."""
-        return not any((self.resistance, self.drag, self.friction, self.extra))
+        return not any((self.resistance, self.drag, self.friction, self.tangential_law))
 
     def along(self, parameter: sp.Symbol) -> "Kernel":
         """Return the law on a curve of this parameter, which a law of the user's own may name."""
-        if parameter not in self.extra.free_symbols:
+        if parameter not in self.tangential_law.free_symbols:
             return self
         return replace(self, defaults=tuple(pair for pair in self.defaults if pair[0] != parameter.name))
 
@@ -152,10 +156,10 @@ class Kernel:
             drag=self.drag + other.drag,
             friction=self.friction + other.friction,
             static_friction=self.static_friction + other.static_friction,
-            extra=self.extra + other.extra,
+            tangential_law=self.tangential_law + other.tangential_law,
             spin=self.spin + other.spin,
             radius=self.radius + other.radius,
-            grip=other.grip if self.grip is None else self.grip,
+            static_friction_limit=self.static_friction_limit or other.static_friction_limit,
             defaults=(*self.defaults, *(pair for pair in other.defaults if pair[0] not in known)),
             positive=tuple(dict.fromkeys(self.positive + other.positive)),
             at_least=tuple(dict.fromkeys(self.at_least + other.at_least)),

@@ -64,12 +64,12 @@ class CompiledModel(Formulas):
             for array, values in zip(found, (x, z, ds, kappa, v2, force), strict=True):
                 array[...] = values.reshape(shape)
             return found
-        start, w0, loads = launch.lam0, launch.v0.value**2, 0 if self.loads is None else self.loads.address
+        start, w0, load_map = launch.lam0, launch.v0.value**2, 0 if self.load_map is None else self.load_map.address
         rows, past = tuple(array.reshape(-1) for array in found), len(found) * places.nbytes >= LARGE
 
         def fill(part: slice) -> None:
             ends = part.start, part.stop
-            fill_loads(f.addresses, loads, f.p, start.value, start.low, w0, places, low, rows, *ends, past)
+            fill_loads(f.addresses, load_map, f.p, start.value, start.low, w0, places, low, rows, *ends, past)
 
         run_in_threads(fill, places.size, MIN_PLACES_PER_THREAD)
         return found
@@ -79,7 +79,7 @@ class CompiledModel(Formulas):
         p = self.numbers(given)
         launch = read_launch(self, p, request)
         find = _solver(self.dissipation is not None)
-        if not self.body:
+        if not self.rolling_radius:
             return find(self, p, launch)
         from gqm_sym.runtime.motion.rolling import check_end, check_launch
 

@@ -1,4 +1,4 @@
-"""What a force law becomes along a curve: potential, reaction and tangential acceleration."""
+"""What a force law becomes along a curve: potential, static normal load and tangential acceleration."""
 
 from dataclasses import dataclass
 
@@ -18,23 +18,23 @@ class Forces:
     ----------
     potential
         Φ(λ).
-    climb
-        2Φ/inertia, so that W + climb is constant where nothing is lost.
-    climb_slope
-        Its derivative by λ.
+    effective_potential
+        U = Φ/inertia, so that W + 2U is constant where nothing is lost.
+    effective_potential_slope
+        dU/dλ.
     push
         F·t.
-    reaction
+    static_normal_load
         n₀ = -F·n: what the track carries at rest; N/m = κ W + n₀.
     pressure
         σ n₀, in which no absolute values are left.
     """
 
     potential: sp.Expr
-    climb: sp.Expr
-    climb_slope: sp.Expr
+    effective_potential: sp.Expr
+    effective_potential_slope: sp.Expr
     push: sp.Expr
-    reaction: sp.Expr
+    static_normal_load: sp.Expr
     pressure: sp.Expr
 
 
@@ -51,9 +51,9 @@ def forces(x: sp.Expr, z: sp.Expr, kernel: Kernel, shape: Geometry) -> Forces:
     load = tidy(pull_z * shape.along - pull_x * shape.across)
     return Forces(
         potential=potential,
-        climb=tidy(2 * potential / kernel.inertia),
-        climb_slope=2 * push * shape.size / kernel.inertia,
+        effective_potential=tidy(potential / kernel.inertia),
+        effective_potential_slope=push * shape.size / kernel.inertia,
         push=absorb_bars(-push * shape.per_length),
-        reaction=absorb_bars(load * shape.per_length),
+        static_normal_load=absorb_bars(load * shape.per_length),
         pressure=load * shape.size,
     )

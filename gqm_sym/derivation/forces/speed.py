@@ -67,7 +67,7 @@ class SpeedField:
 
 def conservative_speed(law: Forces, lam: sp.Symbol) -> SpeedField:
     """W of a motion that loses nothing."""
-    squared = V0**2 + tidy(law.climb.xreplace({lam: LAM0}) - law.climb)
+    squared = V0**2 + tidy(2 * (law.effective_potential.xreplace({lam: LAM0}) - law.effective_potential))
     return SpeedField(squared=squared, form=CLOSED, gain=sp.S.One)
 
 
@@ -82,11 +82,10 @@ def dissipative_speed(
     lam = curve.parameter
     if not loss.linear:
         return SpeedField(squared=sp.Function(W.name, real=True)(lam), form=EQUATION)
-    half = sp.Rational(1, 2)
     bend = sp.Symbol("|κ|/κ", real=True)
     # What the law takes of a curve, without the absolute values in σ, and antiderivatives where those are known.
     table = {
-        SIGMA * PUSH: (-half * kernel.inertia * law.climb_slope, -half * kernel.inertia * law.climb),
+        SIGMA * PUSH: (-kernel.inertia * law.effective_potential_slope, -kernel.inertia * law.effective_potential),
         SIGMA * LOAD: (law.pressure, None),
         TURN: (shape.turning_rate, shape.angle),
         sp.Abs(TURN): (bend * shape.turning_rate, bend * shape.angle),

@@ -20,7 +20,7 @@ from gqm_sym.runtime.multiprecision.exact_panels import DIGITS
 
 END_TYPE = types.Tuple((types.int64, REAL, REAL))
 
-# A launch from rest on a slope below this share of the climb's size may be an equilibrium: exact numbers decide.
+# A launch from rest on a slope below this share of the potential's size may be an equilibrium: exact numbers decide.
 FLAT = 1e-12
 
 # A launch this near to an axis is not mirrored by what doubles know of it, nor one beyond this share of the way to the
@@ -66,7 +66,7 @@ def mirror_image(fns, p, lam0, direction, reach, place, step):  # type: ignore[n
     spot, rows = np.empty(2), np.empty((2, 1))
     left, _size = speed_squared(fns, p, lam0, 0.0, guess, spot, rows)
     call_effective_potential(fns.effective_potential, 1, spot, p, rows)
-    more = left / rows[1, 0]  # a step of Newton's method, for what the axis is rounded by
+    more = left / (2.0 * rows[1, 0])  # a step of Newton's method, for what the axis is rounded by
     return guess + more if fabs(more) <= UNCLEAR * fabs(guess) else 0.0
 
 

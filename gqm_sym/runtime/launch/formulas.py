@@ -4,18 +4,18 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from gqm_sym.budgets import budget
-from gqm_sym.errors import ParameterError
+from gqm_sym.errors import ParameterError, renamed
 from gqm_sym.literals.namespaces import FLOATS
 from gqm_sym.literals.numbers import Number, read_number
 from gqm_sym.runtime.charts.chart import Chart, ChartMaker
 from gqm_sym.runtime.compiled.jit import Later
 from gqm_sym.runtime.compiled.types import Array
-from gqm_sym.runtime.interface import Addresses, Dissipation, Each, ExactClimb, ExactFormulas
+from gqm_sym.runtime.interface import Addresses, BatchFunctions, Dissipation, ExactFormulas, ExactPotential
 from gqm_sym.runtime.launch.domain import Domain
 
 
@@ -48,9 +48,9 @@ class Formulas:
         Parameters for which the closed forms assume a positive value.
     at_least : tuple of (str, str)
         Parameters with what they must not fall below: a number, or another parameter.
-    body : str
+    rolling_radius : str
         The radius of a rolling body whose centre's path was derived from its track; empty for any other.
-    grip : tuple of str, optional
+    static_friction_limit : tuple of str, optional
         Of a rolling body whose static friction is known: its inertia beta and its coefficient mu_static.
     domain_of
         ``f(op, p)``: both ends of the parameter's range and its period, None where there is none. A chart has its own.
@@ -64,10 +64,10 @@ class Formulas:
         What makes the chart of a curve that has no formulas.
     dissipation
         What a dissipative model adds; None for a conservative one.
-    loads
-        What fills a load map at once; None where there is no such function.
-    each
-        The functions of a sweep; None where motions are solved one by one.
+    load_map
+        The function that fills a load map in one call; None where there is no such function.
+    batch
+        The functions that serve many orbits at once; None where motions are solved one by one.
     """
 
     name: str
@@ -78,15 +78,18 @@ class Formulas:
     domain_of: Callable[..., Any] | None = None
     axes_of: Callable[..., Any] | None = None
     monotone: bool = False
-    exact: ExactFormulas | ExactClimb | None = None
+    exact: ExactFormulas | ExactPotential | None = None
     chart: ChartMaker | None = None
     dissipation: Dissipation | None = None
-    loads: Later | None = None
-    each: Each | None = None
+    load_map: Later | None = None
+    batch: BatchFunctions | None = None
     at_least: tuple[tuple[str, str], ...] = ()
-    body: str = ""
-    grip: tuple[str, str] | None = None
+    rolling_radius: str = ""
+    static_friction_limit: tuple[str, str] | None = None
     _read: Callable[..., "ParameterValues"] = field(init=False, repr=False, compare=False)
+
+    if not TYPE_CHECKING:
+        __getattr__ = renamed(body="rolling_radius", each="batch", grip="static_friction_limit", loads="load_map")
 
     def __post_init__(self) -> None:
         # Most launches come with the parameters of one before; 1 and 1.0 are told apart, for their texts differ.

@@ -6,7 +6,7 @@ from functools import partial
 import numpy as np
 
 from gqm_sym.runtime.charts.exact_normals import ChartTrack
-from gqm_sym.runtime.interface import ExactClimb, ExactFormulas
+from gqm_sym.runtime.interface import ExactFormulas, ExactPotential
 from gqm_sym.runtime.launch.domain import Domain
 from gqm_sym.runtime.launch.formulas import Formulas, ParameterValues
 from gqm_sym.runtime.launch.functions import BoundFunctions
@@ -97,9 +97,9 @@ def exact_problem(formulas: "Formulas", p: "ParameterValues", launch: "Launch") 
     if isinstance(exact, ExactFormulas) and formulas.domain_of is not None:
         track = partial(FormulaTrack, exact, formulas.domain_of, launch.lam0)
         return ExactProblem(track, NOWHERE, p, launch.lam0, launch.v0)
-    if isinstance(exact, ExactClimb) and maker is not None:
+    if isinstance(exact, ExactPotential) and maker is not None:
         chart = formulas.charted(p)
         if maker.is_exact(chart):
-            along = partial(ChartTrack, maker, chart, exact.climb, launch.point, launch.lam0)
+            along = partial(ChartTrack, maker, chart, exact.effective_potential, launch.point, launch.lam0)
             return ExactProblem(along, chart.edges, p, launch.lam0, launch.v0)
     return None

@@ -1,7 +1,7 @@
 """Load maps: Pass 1 at many places of a conservative model, block by block, so that what lies between stays in cache.
 
-V**2 is the launch's less the climb to a place. Where most of that cancels, as near a launch from rest, the climb's
-first divided difference from the launch place keeps the digits that subtracting heights loses.
+V**2 is the launch's less twice the rise of the effective potential. Where most of that cancels, as near a launch from
+rest, the potential's first divided difference from the launch place keeps the digits that subtracting heights loses.
 """
 
 from itertools import pairwise
@@ -21,7 +21,7 @@ from gqm_sym.runtime.compiled.calls import (
 from gqm_sym.runtime.compiled.jit import Inlined, Inner, entry
 from gqm_sym.runtime.compiled.streaming import put, settle
 from gqm_sym.runtime.compiled.types import ADDRESSES, INTEGER, MATRIX, REAL, VECTOR, Array
-from gqm_sym.runtime.interface import FRAME_ROWS, LOAD_ROWS
+from gqm_sym.runtime.interface import LOAD_MAP_ROWS, PATH_ROWS
 
 # Places filled at a time: few enough that what is streamed drains into memory while the next are worked out.
 BLOCK = 256
@@ -29,8 +29,8 @@ BLOCK = 256
 # Rows that are asked for.
 SHOWN = 6
 
-# Heights may be of this many times the size of V**2 at launch or of its change: then both ways round alike.
-LEVELLED = 2.0
+# The potential may be this many times as large as V**2 at launch or its change: then both ways round alike.
+LEVELLED = 1.0
 
 
 class Pass1(NamedTuple):
@@ -94,18 +94,18 @@ def keeps(w0, v2, sizes):  # type: ignore[no-untyped-def]
 
 @Inner
 def mend(fns, p, lam0, gained, w0, size, here, rests, field, known):  # type: ignore[no-untyped-def]
-    """What `fill_loads` has in ``field``, with V**2 from the climb's divided difference wherever that has more digits.
+    """Fill ``field`` as `fill_loads` does, with V**2 from a divided difference wherever that has more digits.
 
     Without ``known`` there is nothing in it yet.
     """
     n = here.size
-    rise, offsets, exact, frame = np.empty(2 * n), here - lam0, np.empty(n), np.empty(FRAME_ROWS * n)
+    rise, offsets, exact, frame = np.empty(2 * n), here - lam0, np.empty(n), np.empty(PATH_ROWS * n)
     v2, force, sizes = field[4 * n : 5 * n], field[5 * n : 6 * n], field[6 * n : 7 * n]
     if rests.size:
         offsets += rests
     call_potential_divdiff1(fns.potential_divdiff1, n, lam0, here, offsets, p, rise)
     for i in range(n):
-        slow = w0 - (offsets[i] * rise[i] - gained)
+        slow = w0 - (2.0 * offsets[i] * rise[i] - gained)
         exact[i] = v2[i] if known and keeps(w0, v2[i], size + sizes[i]) else slow
     call_path_and_contact_force(fns.path_and_contact_force, n, here, exact, p, frame)
     if not known:
@@ -128,14 +128,14 @@ def fill_loads(fns, loads, p, lam0, lam0_low, w0, places, rests, rows, begin, en
     ``loads`` is the address of the module's function, 0 where it has none. ``rests`` are what the places leave over as
     doubles; empty where they leave nothing.
     """
-    launch, field = np.empty((2, 1)), np.empty(LOAD_ROWS * BLOCK)
+    launch, field = np.empty((2, 1)), np.empty(LOAD_MAP_ROWS * BLOCK)
     start = np.array([lam0])
     call_effective_potential(fns.effective_potential, 1, start, p, launch)
-    gained = lam0_low * launch[1, 0]
+    gained = 2.0 * lam0_low * launch[1, 0]
     level, size = 0.0, nan  # nothing is kept of sizes that are not known
     if loads and not rests.size:
         call_load_map(loads, 1, 0.0, 0.0, start, p, field)
-        level, size = gained - field[4], field[6]
+        level, size = 0.5 * (gained - field[4]), field[6]
     known = size >= 0.0
     x, z, ds, kappa, v2, force = rows
     for first in range(begin, end, BLOCK):
@@ -167,7 +167,7 @@ def path_and_force_at(fns, p, lam, v2):  # type: ignore[no-untyped-def]
 
 @entry(MATRIX(ADDRESSES, VECTOR, VECTOR))
 def potential_at(fns, p, lam):  # type: ignore[no-untyped-def]
-    """The climb and its slope at many places."""
+    """The effective potential and its slope at many places."""
     out = np.empty((2, lam.size))
     call_effective_potential(fns.effective_potential, lam.size, lam, p, out)
     return out
@@ -181,5 +181,5 @@ def speed_squared_at(fns, p, lam0, lam0_low, w0, places, offsets):  # type: igno
     call_effective_potential(fns.effective_potential, 1, np.array([lam0]), p, launch)
     out = np.empty(offsets.size)
     for i in range(offsets.size):
-        out[i] = w0 - (offsets[i] * rows[0, i] - lam0_low * launch[1, 0])
+        out[i] = w0 - 2.0 * (offsets[i] * rows[0, i] - lam0_low * launch[1, 0])
     return out

@@ -1,8 +1,8 @@
 """The first place where V**2 vanishes, each way from the launch, none missed.
 
-The curve is walked in steps from the launch. On each step interval bounds of the climb's slope prove one of three
-things: V**2 keeps away from zero, or it grows, or it falls throughout (then its sign at the far end decides). What
-they cannot prove is halved. Bounds of ds find cusps the same way (MATHS, section 3).
+The curve is walked in steps from the launch. On each step interval bounds of the effective potential's slope prove
+one of three things: V**2 keeps away from zero, or it grows, or it falls throughout (then its sign at the far end
+decides). What they cannot prove is halved. Bounds of ds find cusps the same way (MATHS, section 3).
 """
 
 from math import fabs, inf, isfinite
@@ -37,7 +37,7 @@ def speed_squared(fns, p, lam0, w0, offset, spot, rows):  # type: ignore[no-unty
     """V**2 at lam0 + offset, and the size of its parts, without subtracting heights."""
     spot[0], spot[1] = lam0 + offset, offset
     call_potential_divdiff1(fns.potential_divdiff1, 1, lam0, spot[:1], spot[1:], p, rows)
-    lost = offset * rows[0, 0]
+    lost = 2.0 * offset * rows[0, 0]
     return w0 - lost, w0 + fabs(lost)
 
 
@@ -55,7 +55,7 @@ def polish_zero(fns, p, lam0, w0, lo, hi, spot, rows):  # type: ignore[no-untype
             hi = x
         spot[0] = lam0 + x
         call_effective_potential(fns.effective_potential, 1, spot, p, rows)
-        slope = -rows[1, 0]
+        slope = -2.0 * rows[1, 0]
         new = x - value / slope if slope != 0.0 else inf
         if not (min(lo, hi) < new < max(lo, hi)):
             new = 0.5 * (lo + hi)
@@ -92,8 +92,8 @@ def first_zero(fns, p, lam0, w0, direction, begin, reach, step):  # type: ignore
         narrow = right - left <= NARROW * max(fabs(lam0), right)
         here, there = lam0 + direction * left, lam0 + direction * right
         call_bounds(fns.bounds, min(here, there), max(here, there), p, box)
-        # Change of V**2 per unit of offset: its climb is lost going forward, gained going back.
-        lower, upper = (-box[1], -box[0]) if direction > 0 else (box[0], box[1])
+        # V**2 changes by so much for each unit of the offset: -2 dU/dlam going forwards, 2 dU/dlam going back.
+        lower, upper = (-2.0 * box[1], -2.0 * box[0]) if direction > 0 else (2.0 * box[0], 2.0 * box[1])
         if box[2] <= 0.0:
             if narrow:
                 if box[3] <= CUSP_SHARE * widest_ds or not isfinite(box[3]):
@@ -120,7 +120,7 @@ def first_zero(fns, p, lam0, w0, direction, begin, reach, step):  # type: ignore
                 spot[0] = lam0 + root
                 call_effective_potential(fns.effective_potential, 1, spot, p, rows)
                 farthest = max(width, 1e-6 * (fabs(lam0) + fabs(root)))
-                slope = fabs(rows[1, 0])
+                slope = 2.0 * fabs(rows[1, 0])
                 unsure = min(UNRESOLVED * size / slope, farthest) if slope > 0.0 else farthest
                 call_bounds(fns.bounds, lam0 + root - unsure, lam0 + root + unsure, p, box)
                 if box[0] <= 0.0 <= box[1]:

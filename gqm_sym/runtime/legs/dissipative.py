@@ -74,7 +74,7 @@ def _leaves(problem: Problem, lam: float, asked: int) -> int:
     """
     f, domain = problem.functions, problem.domain
     off = grain.py_func(lam, domain.period or max(abs(domain.low), abs(domain.high))) if _is_break(f, lam) else 0.0
-    way: int = follow.way_from_rest(_loss(problem).hold, f.p, lam - off, lam + off, asked)
+    way: int = follow.way_from_rest(_loss(problem).static_balance, f.p, lam - off, lam + off, asked)
     return way
 
 

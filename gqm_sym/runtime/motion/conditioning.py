@@ -12,18 +12,18 @@ LOOKS = 0.5 ** np.arange(48)
 
 def off_launch(addresses: tuple[int, ...], p: Array, lam0: Number) -> float:
     """What V**2 at the double nearest to the launch place has over that at the launch place itself."""
-    return lam0.low * float(potential_at(addresses, p, np.array([lam0.value]))[1, 0]) if lam0.low else 0.0
+    return 2.0 * lam0.low * float(potential_at(addresses, p, np.array([lam0.value]))[1, 0]) if lam0.low else 0.0
 
 
 def magnified(addresses: tuple[int, ...], p: Array, a: float, b: float, ref: float, w: float) -> float:
     """How many times V**2 magnifies a relative change of ``ref``, where it is ``w``, at most from a to b.
 
-    V**2 = w - (lam - ref)*D(ref, lam): a shift of both places changes it by the difference of the slopes there. Beside
-    a hilltop that is much against V**2 itself.
+    V**2 = w - 2*(lam - ref)*U[ref, lam]: a shift of both places changes it by twice the difference of U's slopes
+    there. Beside a hilltop that is much against V**2 itself.
     """
     offsets = (a - ref) + (b - a) * LOOKS
     places = np.append(ref + offsets, ref)
-    slopes = potential_at(addresses, p, places)[1]
+    slopes = 2.0 * potential_at(addresses, p, places)[1]
     with np.errstate(all="ignore"):
         ratio = np.abs(
             (slopes[:-1] - slopes[-1]) * ref / speed_squared_at(addresses, p, ref, 0.0, w, places[:-1], offsets)

@@ -21,19 +21,19 @@ if TYPE_CHECKING:
 def slip_times(problem: "Problem", piece: TimedSegment, pace: float) -> list[tuple[Pair, float]]:
     """When, and at which anomalies, a body on a piece of its motion begins to slip; at launch too, if it slips there.
 
-    The motion goes on as if it rolled. Told of conservative motions, whose climb knows F.t.
+    The motion goes on as if it rolled. Only conservative motions have such times: their effective potential knows F.t.
     """
-    if problem.formulas.grip is None or problem.formulas.dissipation is not None:
+    if problem.formulas.static_friction_limit is None or problem.formulas.dissipation is not None:
         return []
     values = dict(zip(problem.formulas.parameters, problem.p, strict=True))
-    beta, mu, mass = (values[name].value for name in (*problem.formulas.grip, "m"))
+    beta, mu, mass = (values[name].value for name in (*problem.formulas.static_friction_limit, "m"))
 
     def spare(phi: Array) -> Array:
         """The sign of what static friction could carry beyond what it must."""
         f, places = piece.stretch.functions, piece.stretch.places(phi)
         _, _, ds, _, force = path_and_force_at(f.addresses, f.p, places, piece.stretch.speeds(phi) ** 2)
-        # Half the slope of the climb by arc length is |F.t|/(1 + beta).
-        needed = 0.5 * beta * np.abs(potential_at(f.addresses, f.p, places)[1]) / ds
+        # The slope of the effective potential by arc length is -F.t/(1 + beta).
+        needed = beta * np.abs(potential_at(f.addresses, f.p, places)[1]) / ds
         signs: Array = np.sign(mu * np.abs(force) / mass - needed)
         return signs
 
@@ -60,8 +60,9 @@ def check_end(formulas: "Formulas", legs: Sequence[Leg]) -> None:
 
 
 def _what(formulas: "Formulas", place: float) -> str:
-    return f"a body of radius {formulas.body} does not fit into the track at {formulas.parameter} = {place!r}"
+    return f"a body of radius {formulas.rolling_radius} does not fit into the track at {formulas.parameter} = {place!r}"
 
 
 def _remedy(formulas: "Formulas") -> str:
-    return f"give {formulas.body} so that 1 - kappa*{formulas.body} > 0, kappa being the track's curvature"
+    radius = formulas.rolling_radius
+    return f"give {radius} so that 1 - kappa*{radius} > 0, kappa being the track's curvature"

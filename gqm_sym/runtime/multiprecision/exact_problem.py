@@ -60,11 +60,11 @@ class ExactProblem:
         return self._scales[digits]
 
     def slope_sign(self) -> int:
-        """The sign of the climb's slope at the launch place, zero included."""
+        """The sign of the effective potential's slope at the launch place, zero included."""
         for digits in LADDER:
             a = self.at(digits)
-            slope = a.climb_slope(a.lam0)
-            if abs(slope) > a.mpf(10) ** (SPARE - digits) * (1 + abs(a.climb(a.lam0))):
+            slope = a.effective_potential_slope(a.lam0)
+            if abs(slope) > a.mpf(10) ** (SPARE - digits) * (a.mpf(0.5) + abs(a.effective_potential(a.lam0))):
                 return 1 if slope > 0 else -1
         return 0
 
@@ -88,8 +88,8 @@ class ExactProblem:
                 guess = here + (there - here) / 2
             else:
                 w = a.speed_squared(top)
-                bend = abs(a.climb_bend(top))
-                guess = top - direction * a.sqrt(2 * abs(w) / bend) if bend else here
+                curvature = abs(a.potential_curvature(top))
+                guess = top - direction * a.sqrt(abs(w) / curvature) if curvature else here
             lost = a.mpf(10) ** (2 * SPARE - digits) * a.size
             # A launch that slow turns where heights cancel to fewer digits than doubles have.
             if abs(w) <= lost or (0 < a.w0 <= lost and digits < LADDER[-1]):
@@ -124,8 +124,8 @@ class Arithmetic:
         self.track = self.problem.track(self.context, values)
         self.lam0 = self.track.lam0
         self.w0 = self.problem.v0.at(self.context) ** 2
-        self.base = self.climb(self.lam0)
-        self.size = self.w0 + abs(self.base) + abs(self.climb(self.track.elsewhere()) - self.base)
+        self.base = self.effective_potential(self.lam0)
+        self.size = self.w0 + 2 * abs(self.base) + 2 * abs(self.effective_potential(self.track.elsewhere()) - self.base)
 
     def mpf(self, value: Any) -> Any:
         """A number of this precision."""
@@ -135,20 +135,20 @@ class Arithmetic:
         """Square root."""
         return self.context.sqrt(value)
 
-    def climb(self, lam: Any) -> Any:
-        """What V**2 loses in climbing to a place, up to a constant."""
+    def effective_potential(self, lam: Any) -> Any:
+        """U, so that V**2 + 2*U is constant."""
         spend()
-        return self.track.climb(lam)
+        return self.track.effective_potential(lam)
 
-    def climb_slope(self, lam: Any) -> Any:
+    def effective_potential_slope(self, lam: Any) -> Any:
         """Its derivative."""
         spend()
-        return self.track.climb_slope(lam)
+        return self.track.effective_potential_slope(lam)
 
-    def climb_bend(self, lam: Any) -> Any:
-        """Second derivative of the climb, to about half of the digits."""
+    def potential_curvature(self, lam: Any) -> Any:
+        """Its second derivative, to about half of the digits."""
         h = self.mpf(10) ** (-(self.digits // 3))
-        return (self.climb_slope(lam + h) - self.climb_slope(lam - h)) / (2 * h)
+        return (self.effective_potential_slope(lam + h) - self.effective_potential_slope(lam - h)) / (2 * h)
 
     def ds(self, lam: Any) -> Any:
         """ds/dlam."""
@@ -156,19 +156,19 @@ class Arithmetic:
 
     def speed_squared(self, lam: Any) -> Any:
         """V**2, by subtraction."""
-        return self.w0 + self.base - self.climb(lam)
+        return self.w0 + 2 * self.base - 2 * self.effective_potential(lam)
 
     def equilibrium(self, near: Any, far: Any) -> Any | None:
-        """The zero of the climb's slope next to two places, or None if there is none."""
+        """The zero of the effective potential's slope next to two places, or None if there is none."""
         y, width = far, abs(far - near)
         tolerance = self.mpf(10) ** (-(self.digits // 2))
         for _ in range(60):
-            slope = self.climb_slope(y)
+            slope = self.effective_potential_slope(y)
             if slope == 0:
                 return y
             first, second = (
-                self.context.diff(self.climb_slope, y, 1),
-                self.context.diff(self.climb_slope, y, 2),
+                self.context.diff(self.effective_potential_slope, y, 1),
+                self.context.diff(self.effective_potential_slope, y, 2),
             )
             below = first**2 - slope * second
             if below == 0:
@@ -186,7 +186,7 @@ class Arithmetic:
         x = self.mpf(guess)
         tolerance = self.mpf(10) ** (-(self.digits // 2))  # quadratic: the step that is this small leaves rounding only
         for _ in range(100):
-            slope = self.climb_slope(x)
+            slope = 2 * self.effective_potential_slope(x)
             if slope == 0:
                 break
             step = self.speed_squared(x) / slope
@@ -204,9 +204,9 @@ class Arithmetic:
             left, right = (b - a) * s**2, (b - a) * c**2
             lam = a + left
             if s == 0:
-                w, q = self.mpf(0), -self.climb_slope(a) / (b - a)
+                w, q = self.mpf(0), -2 * self.effective_potential_slope(a) / (b - a)
             elif phi == context.pi:
-                w, q = self.mpf(0), self.climb_slope(b) / (b - a)
+                w, q = self.mpf(0), 2 * self.effective_potential_slope(b) / (b - a)
             else:
                 w = self.speed_squared(lam)
                 q = w / (left * right)

@@ -1,4 +1,4 @@
-"""Where a place is and what the climb is there, in extended precision: what the exact problem asks of a curve."""
+"""The curve and the effective potential along it in extended precision: what the exact problem asks of them."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -18,10 +18,10 @@ class Track(Protocol):
     def place(self, lam: float) -> Any:
         """The place that a double stands for."""
 
-    def climb(self, lam: Any) -> Any:
-        """What V**2 loses in climbing to a place, up to a constant."""
+    def effective_potential(self, lam: Any) -> Any:
+        """U, so that V**2 + 2*U is constant."""
 
-    def climb_slope(self, lam: Any) -> Any:
+    def effective_potential_slope(self, lam: Any) -> Any:
         """Its derivative."""
 
     def ds(self, lam: Any) -> Any:
@@ -31,7 +31,7 @@ class Track(Protocol):
         """The period of the places of a closed curve."""
 
     def elsewhere(self) -> Any:
-        """A place away from the launch: the climb there tells its size."""
+        """A place away from the launch: the effective potential there tells its size."""
 
     def joints(self, low: Any, high: Any) -> Sequence[Any] | None:
         """Places between two, in their order, at which the curve is not analytic; None where there can be none."""
@@ -60,13 +60,13 @@ class FormulaTrack:
         """The place that a double stands for: just that."""
         return self.context.mpf(lam)
 
-    def climb(self, lam: Any) -> Any:
-        """What V**2 loses in climbing to a place, up to a constant."""
-        return self.formulas.climb(self.context, lam, self.values)
+    def effective_potential(self, lam: Any) -> Any:
+        """U, so that V**2 + 2*U is constant."""
+        return self.formulas.effective_potential(self.context, lam, self.values)
 
-    def climb_slope(self, lam: Any) -> Any:
+    def effective_potential_slope(self, lam: Any) -> Any:
         """Its derivative."""
-        return self.formulas.climb_slope(self.context, lam, self.values)
+        return self.formulas.effective_potential_slope(self.context, lam, self.values)
 
     def ds(self, lam: Any) -> Any:
         """ds/dlam."""

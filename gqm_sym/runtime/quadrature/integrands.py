@@ -12,7 +12,7 @@ REGULAR         a + (b-a) phi                           0 to 1
 TO_EQUILIBRIUM  b + (a-b) exp(-phi)                     0 onwards
 =============== ======================================= ================================
 
-V**2 comes from the climb, or, next to an equilibrium where forces dissipate, from a field (`fields`).
+V**2 comes from the effective potential, or, next to an equilibrium where forces dissipate, from a field (`fields`).
 """
 
 from math import cos, exp, fabs, inf, sin, sqrt
@@ -53,7 +53,7 @@ def rates(fns, p, kind, a, b, ref, w, field, phi, work, out):  # type: ignore[no
             db[i] = (b - a) * c * c
         call_potential_divdiff2(fns.potential_divdiff2, n, a, b, da, db, p, rows)
         for i in range(n):
-            out[0, i] = rows[1, i] / sqrt(rows[0, i])
+            out[0, i] = rows[1, i] / sqrt(2.0 * rows[0, i])
             out[1, i] = rows[1, i] * sqrt(da[i] * db[i])
     elif kind == FROM_TURN:
         for i in range(n):
@@ -62,7 +62,7 @@ def rates(fns, p, kind, a, b, ref, w, field, phi, work, out):  # type: ignore[no
         call_potential_divdiff1(fns.potential_divdiff1, n, a, db, da, p, rows)
         root = 2.0 * sqrt(fabs(b - a))
         for i in range(n):
-            fall = -rows[0, i] if b > a else rows[0, i]
+            fall = -2.0 * rows[0, i] if b > a else 2.0 * rows[0, i]
             out[0, i] = rows[1, i] * root / sqrt(fall)
             out[1, i] = rows[1, i] * 2.0 * fabs(b - a) * phi[i]
     elif kind == REGULAR:
@@ -71,7 +71,7 @@ def rates(fns, p, kind, a, b, ref, w, field, phi, work, out):  # type: ignore[no
             db[i] = ref + da[i]
         call_potential_divdiff1(fns.potential_divdiff1, n, ref, db, da, p, rows)
         for i in range(n):
-            out[0, i] = rows[1, i] * fabs(b - a) / sqrt(w - da[i] * rows[0, i])
+            out[0, i] = rows[1, i] * fabs(b - a) / sqrt(w - 2.0 * da[i] * rows[0, i])
             out[1, i] = rows[1, i] * fabs(b - a)
     else:
         for i in range(n):
@@ -79,7 +79,7 @@ def rates(fns, p, kind, a, b, ref, w, field, phi, work, out):  # type: ignore[no
             db[i] = -da[i]
         call_potential_divdiff2(fns.potential_divdiff2, n, b, b, da, db, p, rows)
         for i in range(n):
-            out[0, i] = rows[1, i] / sqrt(-rows[0, i])
+            out[0, i] = rows[1, i] / sqrt(-2.0 * rows[0, i])
             out[1, i] = rows[1, i] * fabs(da[i])
 
 
@@ -100,14 +100,14 @@ def speeds(fns, p, kind, a, b, ref, w, field, phi, work, out):  # type: ignore[n
             db[i] = (b - a) * c * c
         call_potential_divdiff2(fns.potential_divdiff2, n, a, b, da, db, p, rows)
         for i in range(n):
-            out[i] = sqrt(da[i] * db[i] * rows[0, i])
+            out[i] = sqrt(2.0 * da[i] * db[i] * rows[0, i])
     elif kind == TO_EQUILIBRIUM:
         for i in range(n):
             da[i] = (a - b) * exp(-phi[i])
             db[i] = -da[i]
         call_potential_divdiff2(fns.potential_divdiff2, n, b, b, da, db, p, rows)
         for i in range(n):  # V**2 may lie below the least double
-            out[i] = fabs(da[i]) * sqrt(-rows[0, i])
+            out[i] = fabs(da[i]) * sqrt(-2.0 * rows[0, i])
     else:
         start = a if kind == FROM_TURN else ref
         for i in range(n):
@@ -115,7 +115,7 @@ def speeds(fns, p, kind, a, b, ref, w, field, phi, work, out):  # type: ignore[n
             db[i] = start + da[i]
         call_potential_divdiff1(fns.potential_divdiff1, n, start, db, da, p, rows)
         for i in range(n):
-            out[i] = sqrt(max(w - da[i] * rows[0, i], 0.0))
+            out[i] = sqrt(max(w - 2.0 * da[i] * rows[0, i], 0.0))
 
 
 @Inner
@@ -143,7 +143,7 @@ def shares(kind, w, field, work, n, peak):  # type: ignore[no-untyped-def]
         # Towards the place where V**2 is known it only grows more certain.
         outwards = fabs(work[0, 0]) <= fabs(work[0, n - 1])
         for i in range(n):
-            lost = work[0, i] * work[2, i]
+            lost = 2.0 * work[0, i] * work[2, i]
             if outwards:
                 peak = max(peak, w - lost)
             if peak > 0.0 or not outwards:

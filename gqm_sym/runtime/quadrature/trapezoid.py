@@ -48,7 +48,7 @@ def fill_integrand(fns, p, kind, lam0, w0, a, b, width, first, n, work, rates): 
             da[i], db[i] = width * FROM_A[first + i], width * FROM_B[first + i]
         call_potential_divdiff2(fns.potential_divdiff2, n, a, b, da, db, p, rows)
         for i in range(n):
-            rates[i] = pi * rows[n + i] / sqrt(rows[i])
+            rates[i] = pi * rows[n + i] / sqrt(2.0 * rows[i])
             low, high = min(low, rows[i]), max(high, rows[i])
     else:
         for i in range(n):
@@ -56,7 +56,7 @@ def fill_integrand(fns, p, kind, lam0, w0, a, b, width, first, n, work, rates): 
             da[i] = lam0 + db[i]
         call_potential_divdiff1(fns.potential_divdiff1, n, lam0, da, db, p, rows)
         for i in range(n):
-            lost = db[i] * rows[i]
+            lost = 2.0 * db[i] * rows[i]
             rates[i] = fabs(width) * rows[n + i] / sqrt(w0 - lost)
             low = min(low, (w0 - lost) / (w0 + fabs(lost)))
         high = 1.0

@@ -45,7 +45,7 @@ def pace_series(fns, p, a, b, width, n, work, series):  # type: ignore[no-untype
     for j in range(m):
         q = rows[j]
         low, high = min(low, q), max(high, q)
-        da[j] = rows[m + j] / sqrt(q)
+        da[j] = rows[m + j] / sqrt(2.0 * q)
     if n == SHORT:
         of_short(work, 0, series, 0)
     elif n == LONG:
@@ -86,9 +86,9 @@ def sharpened(fns, p, lam0, w0, end, width, work):  # type: ignore[no-untyped-de
     spot, offset, rows = work[:1], work[1:2], work[2:4]
     spot[0], offset[0] = lam0 + end, end
     call_potential_divdiff1(fns.potential_divdiff1, 1, lam0, spot, offset, p, rows)
-    left = w0 - end * rows[0]
+    left = w0 - 2.0 * end * rows[0]
     call_effective_potential(fns.effective_potential, 1, spot, p, rows)
-    better = end + left / rows[1]
+    better = end + left / (2.0 * rows[1])
     return better if better * end >= 0.0 and fabs(better) <= NEAR_LAUNCH * width else end
 
 

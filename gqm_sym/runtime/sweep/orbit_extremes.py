@@ -8,14 +8,14 @@ from gqm_sym.runtime.arithmetic.elementary import sin
 from gqm_sym.runtime.compiled.calls import call_path_and_contact_force, call_potential_divdiff1
 from gqm_sym.runtime.compiled.jit import Inner
 from gqm_sym.runtime.compiled.registers import on_stack
-from gqm_sym.runtime.interface import FRAME_ROWS
+from gqm_sym.runtime.interface import PATH_ROWS
 
 # Intervals looked at, in steps of the anomaly; by how much those of each round that refines the best are narrower.
 LOOKED_AT, ROUNDS, NARROWER = 64, 2, 16.0
 STEPS = np.arange(LOOKED_AT + 1) / LOOKED_AT
 PARTS = np.sin(0.5 * pi * STEPS) ** 2
 MOST = LOOKED_AT + 1
-line_room, pair_room, frame_room, trio_room = (on_stack(n) for n in (MOST, 2 * MOST, FRAME_ROWS * MOST, 3))
+line_room, pair_room, frame_room, trio_room = (on_stack(n) for n in (MOST, 2 * MOST, PATH_ROWS * MOST, 3))
 
 
 @Inner
@@ -30,7 +30,7 @@ def loads(fns, p, lam0, w0, least, width, force, parts, n, out):  # type: ignore
         lam[i] = lam0 + offsets[i]
     call_potential_divdiff1(fns.potential_divdiff1, n, lam0, lam, offsets, p, rows)
     for i in range(n):
-        out[i] = max(w0 - offsets[i] * rows[i], 0.0)
+        out[i] = max(w0 - 2.0 * offsets[i] * rows[i], 0.0)
     if force:
         call_path_and_contact_force(fns.path_and_contact_force, n, lam, out, p, frame)
         for i in range(n):

@@ -171,7 +171,7 @@ def is_swift(formulas: "Formulas", asked: "Quantity", t_max: Any, contact: str) 
 
     Charts, dissipative motions, bodies that must fit their track or may leave it, and horizons have no swift way.
     """
-    plain = formulas.chart is None and formulas.dissipation is None and not formulas.body
+    plain = formulas.chart is None and formulas.dissipation is None and not formulas.rolling_radius
     return plain and asked.asked != NEVER and t_max is None and contact == "bilateral"
 
 
@@ -260,8 +260,8 @@ def _answer(
             quantities.TURNING_POINTS,
         )  # batches find its span, no more
         spans = np.empty((codes.size, 2)) if alone else values
-        if formulas.each is not None:
-            each, held = formulas.each.addresses(), (formulas.each.held, formulas.each.top_held)
+        if formulas.batch is not None:
+            each, held = formulas.batch.addresses(), (formulas.batch.orbit_rows, formulas.batch.integrand_rows)
             answer_batches(each, held, *launches, quantities.SPANS if alone else asked.asked, spans, codes)
         room = np.empty(len(lines) - PARAMETERS)
         scalar.answer_one_by_one(formulas.addresses, *launches, asked.asked, spans, values, codes, room)

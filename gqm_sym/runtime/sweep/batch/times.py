@@ -69,7 +69,7 @@ def fill(fns, kind, n, node, s, p, work):  # type: ignore[no-untyped-def]
         call_potential_divdiff2_batch(fns.potential_divdiff2, n, s[A, :n], s[B, :n], da, db, p, two)
         for j in range(n):
             q = two[0, j]
-            rates[j] = pi * two[1, j] / sqrt(q)
+            rates[j] = pi * two[1, j] / sqrt(2.0 * q)
             low[j], high[j] = choose(q >= low[j], low[j], q), choose(q > high[j], q, high[j])
     elif kind == SWING:
         two = rows[: 2 * n].reshape(2, n)
@@ -85,7 +85,7 @@ def fill(fns, kind, n, node, s, p, work):  # type: ignore[no-untyped-def]
             da[j] = start[j] + db[j]
         call_potential_divdiff1_batch(fns.potential_divdiff1, n, start, da, db, p, three)
         for j in range(n):
-            lost = db[j] * three[0, j]
+            lost = 2.0 * db[j] * three[0, j]
             rates[j] = (most[j] - least[j]) * three[1, j] / sqrt(w0[j] - lost)
             q = (w0[j] - lost) / (w0[j] + fabs(lost))
             low[j], high[j] = choose(q >= low[j], low[j], q), 1.0

@@ -9,7 +9,7 @@ from math import fabs, inf, nan
 from gqm_sym.runtime.compiled.calls import (
     call_bounds_batch,
     call_potential_divdiff1_batch,
-    call_turning_by_closed_form_batch,
+    call_turning_point_batch,
 )
 from gqm_sym.runtime.compiled.intrinsics import choose, fma, whole_below
 from gqm_sym.runtime.compiled.jit import Inner
@@ -67,7 +67,7 @@ def by_closed_form(fns, n, s, p, known, work):  # type: ignore[no-untyped-def]
     rows, halves, offsets, steep = work[:3].reshape(-1)[: 3 * n].reshape(3, n), work[3, :n], work[4, :n], work[5, :n]
     for j in range(n):
         axis[j] = (start[j] - places[j]) - places_low[j]
-    call_turning_by_closed_form_batch(fns.turning_point, n, axis, w0, p, rows)
+    call_turning_point_batch(fns.turning_point, n, axis, w0, p, rows)
     for j in range(n):
         turn, rests = 2.0 * steps[j], w0[j] == 0.0
         turns = choose(turn > 0.0, whole_below(axis[j] / turn + 0.5), 0.0)
@@ -83,7 +83,7 @@ def by_closed_form(fns, n, s, p, known, work):  # type: ignore[no-untyped-def]
             widths[j] = ahead[j] * halves[j] - offsets[j]
         call_potential_divdiff1_batch(fns.potential_divdiff1, n, near, ends, widths, p, rise)
         for j in range(n):
-            missed = ahead[j] * ((w0[j] - widths[j] * rise[0, j]) / rise[2, j])
+            missed = ahead[j] * ((w0[j] - 2.0 * widths[j] * rise[0, j]) / (2.0 * rise[2, j]))
             halves[j] += choose(steep[j] == 1.0, missed, 0.0)
     for j in range(n):
         offset, half, sense, step, rests = offsets[j], halves[j], ahead[j], steps[j], w0[j] == 0.0
@@ -188,10 +188,10 @@ def seek(fns, n, s, p, work):  # type: ignore[no-untyped-def]
             places[j] = start[j] + offsets[j]
         call_potential_divdiff1_batch(fns.potential_divdiff1, n, start, places, offsets, p, rows)
         for j in range(n):
-            at, w = trial[j], w0[j] - offsets[j] * rows[0, j]
+            at, w = trial[j], w0[j] - 2.0 * offsets[j] * rows[0, j]
             before = w > 0.0
             low, high = choose(before, at, left[j]), choose(before, right[j], at)
-            better = at + at * (w / (offsets[j] * rows[2, j] + w))
+            better = at + at * (w / (2.0 * offsets[j] * rows[2, j] + w))
             close = fabs(better - at) <= CLOSE * at
             bracketed = high < inf
             within = (better > low) & (better < choose(bracketed, high, 4.0 * at))
@@ -265,10 +265,10 @@ def prove(fns, kind, mirrored, pieces, n, s, p, work):  # type: ignore[no-untype
         else:
             call_potential_divdiff1_batch(fns.potential_divdiff1, n, start, places, offsets, p, rows)
         for j in range(n):
-            lost = offsets[j] * rows[0, j]
+            lost = 2.0 * offsets[j] * rows[0, j]
             w, clear = w0[j] - lost, UNRESOLVED * (w0[j] + fabs(lost))
             # The most that V**2 may lose, and gain, for each unit of the parameter, and so the least it can be.
-            loss, gain, from_w = box[1, j], -box[0, j], speeds[j]
+            loss, gain, from_w = 2.0 * box[1, j], -2.0 * box[0, j], speeds[j]
             valley = (loss * w + gain * from_w - loss * gain * (hi[j] - lo[j])) / (loss + gain)
             lowest = choose((loss > 0.0) & (gain > 0.0), valley, choose(w < from_w, w, from_w))
             # On the way to the axis it grows, but for rounding.
