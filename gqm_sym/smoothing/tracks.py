@@ -1,0 +1,224 @@
+"""Surveyed points to a smooth track: where along it each point belongs, the spline, and what is known of its errors.
+
+Where along the track the points belong is unknown as well. Chord lengths from point to point are a beginning, but noise
+lengthens them; so the track is fitted again a few times, each time at the arc lengths of its places nearest to the
+points. Only the last rounds heed a standard deviation that was given: before, noise along the track is in the residual
+too, and what is taken for bends of the track once would be followed ever after.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from math import ceil, pi, sqrt
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from gqm_sym.budgets import spend
+from gqm_sym.errors import DeclarationError
+from gqm_sym.smoothing.report import Smoothing
+from gqm_sym.smoothing.selection import APART, Choice, choose
+from gqm_sym.smoothing.splines import Array
+
+# Rounds of fitting; from the second on little changes.
+ROUNDS = 4
+LAST = 2
+# Newton steps to the place nearest to a point.
+STEPS = 4
+# The least share of its value on a straight track that the derivative of a distance is taken to have.
+STEEP = 0.3
+# Nodes for the length of half a piece of spline.
+NODES = 6
+# Points of the smoothed track in a width: the interpolant through them has its curvature to some 1e-4.
+A_WIDTH = 4.0
+# The fewest points of a smoothed track, and the fewest places at which its errors are told.
+FEWEST = 16
+# A point this many times as far from the track as usual, and by this share of the usual chord, is stray.
+STRAY = 10.0
+OFF = 0.1
+# A normal deviate's standard deviation, in medians of its size.
+MEDIAN = 1.4826
+# A track that turns by more than this within its width, or from point to point, is out of order.
+SHARPEST = 0.5 * pi
+# Places at which errors are told, at most, and how much work they may be.
+PLACES = 2000
+WORK = 100_000_000
+
+
+class _Track(NamedTuple):
+    """A spline through points, where along it they belong, and its period if it has one."""
+
+    choice: Choice
+    spline: Any
+    u: Array
+    period: float | None
+
+    def at(self, u: Array) -> Array:
+        """Points of the track; beyond open ends it is straight."""
+        basis = self.choice.smoother.basis
+        inside = u if basis.closed else np.clip(u, basis.low, basis.high)
+        points: Array = self.spline(inside) + self.spline(inside, 1) * (u - inside)[:, None]
+        return points
+
+
+def smooth(given: Sequence[Sequence[float]], *, closed: bool, deviation: float | None) -> tuple[Array, Smoothing]:
+    """Smooth the points of a track.
+
+    Parameters
+    ----------
+    given : (n, 2) array
+        Points; a closed track does not repeat its first one.
+    closed : bool
+        Whether the track goes on from the last point to the first.
+    deviation : float or None
+        The standard deviation of the points in each coordinate; None: by cross-validation.
+
+    Returns
+    -------
+    places : (m, 2) array
+        Points of the smooth track, as many as the interpolating spline needs to be it.
+    report : Smoothing
+        What smoothing changed, and how good the track is.
+
+    Raises
+    ------
+    DeclarationError
+        If a point is far away from the track through the others, or the track turns too sharply to be one.
+    """
+    points: Array = np.asarray(given, dtype=np.float64)
+    middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
+    centred = points - middle  # all digits are for the shape
+    track = _fitted(centred, closed, deviation)
+    shifts = np.hypot(*(centred - track.at(track.u)).T)
+    _check_shifts(shifts, centred, deviation)
+    places = _places(track, closed)
+    report = _report(track, places, shifts, len(points), deviation)
+    _check_turns(track, report)
+    return middle + track.at(places), replace(report, points=points, places=middle + track.at(track.u))
+
+
+def _fitted(points: Array, closed: bool, deviation: float | None) -> _Track:
+    """The smooth track, in its own arc length from the place of the first point."""
+    around = np.concatenate([points, points[:1]]) if closed else points
+    lengths = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(around, axis=0).T))])
+    u, period = lengths[: len(points)], float(lengths[-1]) if closed else None
+    for count in range(1, ROUNDS + 1):
+        choice = choose(u, points, period, deviation if count > ROUNDS - LAST else None)
+        track = _Track(choice, choice.smoother.basis.spline(choice.fit.coefficients), u, period)
+        u = _nearest(track, points)
+        if count < ROUNDS:
+            u, period = _measured(track, u)
+    return track._replace(u=u)
+
+
+def _nearest(track: _Track, points: Array) -> Array:
+    """The places of a track that are nearest to points, by Newton's method from where they were."""
+    basis, u = track.choice.smoother.basis, track.u
+    for _ in range(STEPS):
+        spend()
+        inside = u if basis.closed else np.clip(u, basis.low, basis.high)
+        first, second, off = track.spline(inside, 1), track.spline(inside, 2), points - track.at(u)
+        square = np.square(first).sum(axis=1)
+        slope = square - np.where(u == inside, (off * second).sum(axis=1), 0.0)
+        farthest = np.sqrt(np.square(off).sum(axis=1) / square)
+        u = u + np.clip((off * first).sum(axis=1) / np.maximum(slope, STEEP * square), -farthest, farthest)
+    return u
+
+
+def _measured(track: _Track, u: Array) -> tuple[Array, float | None]:
+    """Arc length at places of a track from that of the first point, within one round, and that of the round."""
+    from scipy.interpolate import CubicHermiteSpline
+
+    basis, spline = track.choice.smoother.basis, track.spline
+    sites = np.unique(basis.knots[(basis.low <= basis.knots) & (basis.knots <= basis.high)])
+    edges = np.unique(np.concatenate([sites, 0.5 * (sites[1:] + sites[:-1])]))
+    nodes, weights = np.polynomial.legendre.leggauss(NODES)
+    half = 0.5 * np.diff(edges)
+    inside = (edges[:-1] + half)[:, None] + half[:, None] * nodes
+    lengths = np.concatenate([[0.0], np.cumsum(half * (_speed(spline, inside) @ weights))])
+    speeds = _speed(spline, edges)
+    length = CubicHermiteSpline(edges, lengths, speeds)
+    if basis.closed:
+        first, *_ = around = length(basis.low + np.remainder(u - basis.low, basis.high - basis.low))
+        return np.remainder(around - first, lengths[-1]), float(lengths[-1])
+    within = np.clip(u, basis.low, basis.high)
+    ends = np.where(u < basis.low, speeds[0], speeds[-1])
+    straight: Array = length(within) + (u - within) * ends
+    return straight - straight[0], None
+
+
+def _speed(spline: Any, u: Array) -> Array:
+    first = np.moveaxis(spline(u, 1), -1, 0)
+    speed: Array = np.hypot(first[0], first[1])
+    return speed
+
+
+def _places(track: _Track, closed: bool) -> Array:
+    """Where the track is taken from its spline: at the points' places, or as often as its width asks for."""
+    choice, basis = track.choice, track.choice.smoother.basis
+    low, high = track.u[0], track.u[-1]
+    if closed:
+        high = low + basis.high - basis.low
+    else:
+        low, high = max(low, basis.low), min(high, basis.high)
+    if choice.places is not None and choice.width < np.median(np.diff(choice.places)):
+        period = basis.high - basis.low
+        inner = np.sort(low + np.remainder(choice.places - low, period)) if closed else choice.places
+        least = APART * float(np.median(np.diff(inner)))
+        inner = inner[(inner > low + least) & (inner < high - least)]
+        places = np.concatenate([[low], inner, [high]])
+    else:
+        places = np.linspace(low, high, max(FEWEST, ceil(A_WIDTH * (high - low) / choice.width)) + 1)
+    return places[:-1] if closed else places
+
+
+def _report(track: _Track, places: Array, shifts: Array, count: int, deviation: float | None) -> Smoothing:
+    """What is known of a smooth track; its points are put in by whom they are known to."""
+    choice = track.choice
+    fit = choice.fit
+    estimate = sqrt(fit.residual / max(count - fit.freedom, 1.0))
+    most = max(FEWEST, min(PLACES, WORK // choice.smoother.basis.size))
+    told = places if len(places) <= most else places[np.linspace(0, len(places) - 1, most).astype(np.int64)]
+    first, second = track.spline(told, 1), track.spline(told, 2)
+    speed = np.hypot(*first.T)
+    lengths, _ = _measured(track._replace(u=told), told)
+    scatter = estimate if deviation is None else deviation
+    return Smoothing(
+        given=deviation,
+        standard_deviation=estimate,
+        rms=sqrt(float(np.square(shifts).mean())),
+        largest_shift=float(shifts.max()),
+        parameter=choice.weight,
+        width=choice.width,
+        degrees_of_freedom=fit.freedom,
+        s=lengths,
+        curvature=(first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]) / speed**3,
+        curvature_error=scatter * choice.smoother.spread(fit, told, 2) / speed**2,
+        points=np.empty((0, 2)),
+        places=np.empty((0, 2)),
+    )
+
+
+def _check_shifts(shifts: Array, points: Array, deviation: float | None) -> None:
+    """Refuse a point that is far away from the track through all of them."""
+    usual = max(MEDIAN * float(np.median(shifts)), deviation or 0.0)
+    row = int(shifts.argmax())
+    chord = float(np.median(np.hypot(*np.diff(points, axis=0).T)))
+    if shifts[row] > max(STRAY * usual, OFF * chord):
+        raise DeclarationError(
+            f"sampled: row {row + 1}: is {shifts[row]:.3g} m from the smooth track, where the points scatter by "
+            f"{usual:.3g} m; leave it out if it is stray, or give the standard deviation as smoothing"
+        )
+
+
+def _check_turns(track: _Track, report: Smoothing) -> None:
+    """Refuse a track that folds back."""
+    k = int(np.abs(report.curvature).argmax())
+    usual = float(np.median(np.abs(np.diff(track.u))))
+    turn = abs(float(report.curvature[k])) * max(report.width, usual)
+    if turn > SHARPEST:
+        row = int(np.abs(track.u - track.u[0] - report.s[k]).argmin()) + 1
+        raise DeclarationError(
+            f"sampled: row {row}: the smooth track turns by {turn * 180.0 / pi:.0f} degrees there within "
+            f"{max(report.width, usual):.3g} m; are the points in "
+            "order along it, without a stray one, and is smoothing as large as their scatter?"
+        )
