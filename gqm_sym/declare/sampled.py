@@ -121,7 +121,7 @@ def read_track(
         _check_order(places, size, kind, joined)
         if kind == "spline":
             _warn_of_scatter(
-                places, joined, "give their standard deviation in metres as smoothing, or smoothing='auto'"
+                places, joined, "give their standard deviation in metres as smoothing, or 'auto'"
             )
         return Track(points="\n".join(texts), kind=kind, closed=joined)
     _check_gaps(places, joined)

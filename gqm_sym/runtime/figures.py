@@ -15,6 +15,7 @@ from gqm_sym.runtime.axes import figure_of, finished, new_axes, new_figure
 from gqm_sym.runtime.extras import needs
 from gqm_sym.runtime.portraits import period_against_amplitude, phase_portrait, portrait_of
 from gqm_sym.runtime.stretch import Array
+from gqm_sym.runtime.survey_figure import smoothing
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -33,6 +34,7 @@ __all__ = [
     "phase_portrait",
     "portrait",
     "sampled",
+    "smoothing",
     "track",
 ]
 

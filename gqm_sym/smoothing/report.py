@@ -33,6 +33,8 @@ class Smoothing:
         It holds for the points as they are: features of a real track between two of them are not in it.
     points, places : (n, 2) array
         The points as measured, and the places of the track that are nearest to them.
+    places_s, shifts : (n,) array
+        Arc lengths of these places, and how far from them the points are; positive to the left of growing arc length.
     """
 
     given: float | None
@@ -47,6 +49,8 @@ class Smoothing:
     curvature_error: Array
     points: Array
     places: Array
+    places_s: Array
+    shifts: Array
 
     def load_error(self, speed: float) -> Array:
         """The standard error of the load at a speed [m/s], in units of 9.80665 m/s**2, at the arc lengths ``s``."""

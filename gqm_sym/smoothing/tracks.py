@@ -59,6 +59,13 @@ class _Track(NamedTuple):
         points: Array = self.spline(inside) + self.spline(inside, 1) * (u - inside)[:, None]
         return points
 
+    def heading(self, u: Array) -> Array:
+        """Its tangents, of length 1."""
+        basis = self.choice.smoother.basis
+        first = self.spline(u if basis.closed else np.clip(u, basis.low, basis.high), 1)
+        tangents: Array = first / np.hypot(*first.T)[:, None]
+        return tangents
+
 
 def smooth(given: Sequence[Sequence[float]], *, closed: bool, deviation: float | None) -> tuple[Array, Smoothing]:
     """Smooth the points of a track.
@@ -88,12 +95,14 @@ def smooth(given: Sequence[Sequence[float]], *, closed: bool, deviation: float |
     middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
     centred = points - middle  # all digits are for the shape
     track = _fitted(centred, closed, deviation)
-    shifts = np.hypot(*(centred - track.at(track.u)).T)
-    _check_shifts(shifts, centred, deviation)
+    nearest = track.at(track.u)
+    off, along = centred - nearest, track.heading(track.u)
+    shifts = along[:, 0] * off[:, 1] - along[:, 1] * off[:, 0]
+    _check_shifts(np.abs(shifts), centred, deviation)
     places = _places(track, closed)
-    report = _report(track, places, shifts, len(points), deviation)
+    report = _report(track, places, deviation, shifts)
     _check_turns(track, report)
-    return middle + track.at(places), replace(report, points=points, places=middle + track.at(track.u))
+    return middle + track.at(places), replace(report, points=points, places=middle + nearest)
 
 
 def _fitted(points: Array, closed: bool, deviation: float | None) -> _Track:
@@ -171,11 +180,11 @@ def _places(track: _Track, closed: bool) -> Array:
     return places[:-1] if closed else places
 
 
-def _report(track: _Track, places: Array, shifts: Array, count: int, deviation: float | None) -> Smoothing:
+def _report(track: _Track, places: Array, deviation: float | None, shifts: Array) -> Smoothing:
     """What is known of a smooth track; its points are put in by whom they are known to."""
     choice = track.choice
     fit = choice.fit
-    estimate = sqrt(fit.residual / max(count - fit.freedom, 1.0))
+    estimate = sqrt(fit.residual / max(len(shifts) - fit.freedom, 1.0))
     most = max(FEWEST, min(PLACES, WORK // choice.smoother.basis.size))
     told = places if len(places) <= most else places[np.linspace(0, len(places) - 1, most).astype(np.int64)]
     first, second = track.spline(told, 1), track.spline(told, 2)
@@ -186,7 +195,7 @@ def _report(track: _Track, places: Array, shifts: Array, count: int, deviation: 
         given=deviation,
         standard_deviation=estimate,
         rms=sqrt(float(np.square(shifts).mean())),
-        largest_shift=float(shifts.max()),
+        largest_shift=float(np.abs(shifts).max()),
         parameter=choice.weight,
         width=choice.width,
         degrees_of_freedom=fit.freedom,
@@ -195,6 +204,8 @@ def _report(track: _Track, places: Array, shifts: Array, count: int, deviation: 
         curvature_error=scatter * choice.smoother.spread(fit, told, 2) / speed**2,
         points=np.empty((0, 2)),
         places=np.empty((0, 2)),
+        places_s=_measured(track, track.u)[0],
+        shifts=shifts,
     )
 
 
