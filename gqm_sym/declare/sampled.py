@@ -32,6 +32,8 @@ SHARPEST = pi / 2
 BACKWARDS = pi - 1e-6
 # A chord of a smooth track that is this many times as long as half of all chords jumps to another place.
 JUMP = 100.0
+# A chord of measured points that is this many times as long as they scatter tells the direction of the track.
+LONG = 8.0
 # Cross-validation needs more points than a spline does.
 FEWEST_AUTO = 12
 # Curvature that rises and falls by turns between more than this share of neighbours is scatter,
@@ -112,6 +114,10 @@ def read_track(
     joined = repeated if closed is None else closed
     if joined and repeated:
         del texts[-1], places[-1]
+    rows = list(range(1, len(places) + 1))
+    if deviation is not None:  # what a recorder that waits for news says again was not measured again
+        rows = [row for row in rows if row == 1 or places[row - 1] != places[row - 2]]
+        places = [places[row - 1] for row in rows]
     fewest = FEWEST_AUTO if deviation == "auto" else FEWEST[kind, joined]
     if len(places) < fewest:
         what = "a closed" if joined else "an open"
@@ -120,15 +126,13 @@ def read_track(
     if deviation is None:
         _check_order(places, size, kind, joined)
         if kind == "spline":
-            _warn_of_scatter(
-                places, joined, "give their standard deviation in metres as smoothing, or 'auto'"
-            )
+            _warn_of_scatter(places, joined, "give their standard deviation in metres as smoothing, or 'auto'")
         return Track(points="\n".join(texts), kind=kind, closed=joined)
-    _check_gaps(places, joined)
-    smoothed, report = _smoothed(places, joined, deviation)
+    _check_survey(places, rows, joined, 0.0 if deviation == "auto" else deviation)
+    smoothed, report = _smoothed(places, rows, joined, deviation)
     _warn_of_scatter(smoothed, joined, f"smoothing {smoothing!r} is less than their scatter")
-    rows = "\n".join(f"{x!r} {z!r}" for x, z in smoothed)
-    return Track(points=rows, kind=kind, closed=joined, smoothing=report)
+    kept = "\n".join(f"{x!r} {z!r}" for x, z in smoothed)
+    return Track(points=kept, kind=kind, closed=joined, smoothing=report)
 
 
 def _read_smoothing(given: Any, kind: str) -> float | Literal["auto"] | None:
@@ -151,11 +155,13 @@ def _read_smoothing(given: Any, kind: str) -> float | Literal["auto"] | None:
     return deviation
 
 
-def _smoothed(places: list[Place], joined: bool, deviation: float | Literal["auto"]) -> tuple[list[Place], "Smoothing"]:
+def _smoothed(
+    places: list[Place], rows: list[int], joined: bool, deviation: float | Literal["auto"]
+) -> tuple[list[Place], "Smoothing"]:
     """The points of the smooth track, and what smoothing did."""
     from gqm_sym.smoothing import smooth
 
-    found, report = smooth(places, closed=joined, deviation=None if deviation == "auto" else deviation)
+    found, report = smooth(places, rows, closed=joined, deviation=None if deviation == "auto" else deviation)
     return [(x, z) for x, z in found.tolist()], report
 
 
@@ -204,18 +210,27 @@ def _distance(one: Place, two: Place) -> float:
     return hypot(two[0] - one[0], two[1] - one[1])
 
 
-def _check_gaps(places: list[Place], joined: bool) -> None:
-    """Refuse points that are far away from the rest."""
+def _check_survey(places: list[Place], rows: list[int], joined: bool, scatter: float) -> None:
+    """Refuse measured points that are far away from the rest, or out of order beyond what scatter explains."""
     chords = _chords(places, joined)
     usual = median(chords)
     for count, chord in enumerate(chords, start=1):
-        _check_gap(chord, usual, count, len(places))
+        _check_gap(chord, usual, rows[count - 1], rows[count % len(rows)])
+    around = [*places, *places[:2]] if joined else places
+    bends = [
+        _distance((0.5 * (one[0] + three[0]), 0.5 * (one[1] + three[1])), two)
+        for one, two, three in zip(around, around[1:], around[2:], strict=False)
+    ]
+    long = LONG * max(scatter, median(bends))
+    for count, (turn, pair) in enumerate(zip(_turns(places, joined), pairwise([*chords, chords[0]]), strict=False), 1):
+        if abs(turn) > SHARPEST and min(pair) > long:
+            _refuse_turn(turn, rows[count % len(rows)])
 
 
-def _check_gap(chord: float, usual: float, count: int, total: int) -> None:
+def _check_gap(chord: float, usual: float, before: int, row: int) -> None:
     if chord > JUMP * usual:
         raise DeclarationError(
-            f"sampled: row {count % total + 1}: is {chord:.3g} from row {count}, where half of all points are within "
+            f"sampled: row {row}: is {chord:.3g} from row {before}, where half of all points are within "
             f"{usual:.3g} of the next; leave out stray points, or sample the gap"
         )
 
@@ -241,14 +256,18 @@ def _check_order(places: list[Place], size: float, kind: str, joined: bool) -> N
             row = count % len(places) + 1
             raise DeclarationError(f"sampled: row {row}: repeats row {count}; leave one of them out")
         if kind == "spline":
-            _check_gap(chord, usual, count, len(places))
+            _check_gap(chord, usual, count, count % len(places) + 1)
     most = SHARPEST if kind == "spline" else BACKWARDS
     for count, turn in enumerate(_turns(places, joined), start=1):
         if abs(turn) > most:
-            raise DeclarationError(
-                f"sampled: row {count % len(places) + 1}: the track turns by {abs(turn) * 180.0 / pi:.0f} degrees "
-                "there; are the points in order along it, without a stray one, and close enough?"
-            )
+            _refuse_turn(turn, count % len(places) + 1)
+
+
+def _refuse_turn(turn: float, row: int) -> None:
+    raise DeclarationError(
+        f"sampled: row {row}: the track turns by {abs(turn) * 180.0 / pi:.0f} degrees there; are the points in order "
+        "along it, without a stray one, and close enough? (If they scatter farther than they are apart, give smoothing)"
+    )
 
 
 def _warn_of_scatter(places: list[Place], joined: bool, remedy: str) -> None:

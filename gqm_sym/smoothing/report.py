@@ -30,7 +30,8 @@ class Smoothing:
         How many numbers each coordinate was fitted with.
     s, curvature, curvature_error : array
         Arc lengths from the start of the track, its curvature there in 1/m, and the standard error of that curvature.
-        It holds for the points as they are: features of a real track between two of them are not in it.
+        It holds what noise adds and what smoothing takes away, at open ends as well, where it is several times as
+        large. What a track does between two points is not in it.
     points, places : (n, 2) array
         The points as measured, and the places of the track that are nearest to them.
     places_s, shifts : (n,) array

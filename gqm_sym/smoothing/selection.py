@@ -5,7 +5,7 @@ tried on knots that are close enough for them and not much closer, from coarse t
 points would cost time and digits, and say nothing that a few hundred do not.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -84,8 +84,8 @@ class Criterion:
         return float(np.log(max(fit.residual / self.count, TINY)) - 2.0 * np.log(left)) if left > 0.0 else np.inf
 
 
-def choose(u: Array, points: Array, period: float | None, deviation: float | None) -> Choice:
-    """The best smoothing spline through points at places.
+def choose(u: Array, points: Array, period: float | None, deviations: Sequence[float | None]) -> Choice:
+    """The best smoothing spline through points at places; of several criteria' best ones the smoothest.
 
     Parameters
     ----------
@@ -94,14 +94,13 @@ def choose(u: Array, points: Array, period: float | None, deviation: float | Non
     points : (n, 2) array
     period : float or None
         Of a closed track.
-    deviation : float or None
-        The standard deviation of the points; None: by cross-validation.
+    deviations : floats or None
+        Standard deviations of the points; None: by cross-validation.
     """
     low = float(u.min())
     high = float(u.max()) if period is None else low + period
     per_length = len(u) / (high - low)
-    criterion = Criterion(len(u), deviation)
-    best: Choice | None = None
+    best: dict[float | None, Choice] = {}
     top = high - low
     for sites, bottom, places in _grids(u, low, high, period is not None):
         spend()
@@ -114,22 +113,29 @@ def choose(u: Array, points: Array, period: float | None, deviation: float | Non
             fits = [smoother.fit(float(weight)) for weight in weights]
         except np.linalg.LinAlgError:  # knots closer than doubles can tell apart
             break
-        scores = [criterion(fit) for fit in fits]
-        k = int(np.argmin(scores))
-        if best is None or scores[k] < best.score:
-            best = Choice(
-                smoother=smoother,
-                fit=fits[k],
-                weight=float(weights[k]),
-                width=float(widths[k]),
-                score=scores[k],
-                places=places,
-            )
-        elif basis.size > ENOUGH:
+        better = False
+        for deviation in deviations:
+            criterion = Criterion(len(u), deviation)
+            scores = [criterion(fit) for fit in fits]
+            k = int(np.argmin(scores))
+            if deviation not in best or scores[k] < best[deviation].score:
+                better = True
+                best[deviation] = Choice(
+                    smoother=smoother,
+                    fit=fits[k],
+                    weight=float(weights[k]),
+                    width=float(widths[k]),
+                    score=scores[k],
+                    places=places,
+                )
+        if basis.size > ENOUGH and not better:
             break
-    if best is None:
-        raise DeclarationError("sampled: smoothing: no smooth track was found; are the points in order along it?")
-    return best
+    if not best:
+        raise DeclarationError(
+            "sampled: smoothing: no smooth track was found; are the points in order along it? If their scatter goes on "
+            "from point to point, give its standard deviation"
+        )
+    return max(best.values(), key=lambda choice: choice.width)
 
 
 def _grids(u: Array, low: float, high: float, closed: bool) -> Iterator[tuple[Array, float, Array | None]]:

@@ -2,8 +2,8 @@
 
 Where along the track the points belong is unknown as well. Chord lengths from point to point are a beginning, but noise
 lengthens them; so the track is fitted again a few times, each time at the arc lengths of its places nearest to the
-points. Only the last rounds heed a standard deviation that was given: before, noise along the track is in the residual
-too, and what is taken for bends of the track once would be followed ever after.
+points. What is taken for bends of the track once would be followed ever after. So the first rounds, in which noise
+along the track is in the residual too, take the smoother one of what cross-validation says and what is given.
 """
 
 from collections.abc import Sequence
@@ -22,6 +22,8 @@ from gqm_sym.smoothing.splines import Array
 # Rounds of fitting; from the second on little changes.
 ROUNDS = 4
 LAST = 2
+# How far from an end its third derivative is looked for, in widths.
+REACH = 6.0
 # Newton steps to the place nearest to a point.
 STEPS = 4
 # The least share of its value on a straight track that the derivative of a distance is taken to have.
@@ -67,13 +69,17 @@ class _Track(NamedTuple):
         return tangents
 
 
-def smooth(given: Sequence[Sequence[float]], *, closed: bool, deviation: float | None) -> tuple[Array, Smoothing]:
+def smooth(
+    given: Sequence[Sequence[float]], rows: Sequence[int], *, closed: bool, deviation: float | None
+) -> tuple[Array, Smoothing]:
     """Smooth the points of a track.
 
     Parameters
     ----------
     given : (n, 2) array
         Points; a closed track does not repeat its first one.
+    rows : (n,) ints
+        What messages call the points.
     closed : bool
         Whether the track goes on from the last point to the first.
     deviation : float or None
@@ -98,10 +104,10 @@ def smooth(given: Sequence[Sequence[float]], *, closed: bool, deviation: float |
     nearest = track.at(track.u)
     off, along = centred - nearest, track.heading(track.u)
     shifts = along[:, 0] * off[:, 1] - along[:, 1] * off[:, 0]
-    _check_shifts(np.abs(shifts), centred, deviation)
+    _check_shifts(np.abs(shifts), centred, rows, deviation)
     places = _places(track, closed)
     report = _report(track, places, deviation, shifts)
-    _check_turns(track, report)
+    _check_turns(track, report, rows)
     return middle + track.at(places), replace(report, points=points, places=middle + nearest)
 
 
@@ -111,7 +117,8 @@ def _fitted(points: Array, closed: bool, deviation: float | None) -> _Track:
     lengths = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(around, axis=0).T))])
     u, period = lengths[: len(points)], float(lengths[-1]) if closed else None
     for count in range(1, ROUNDS + 1):
-        choice = choose(u, points, period, deviation if count > ROUNDS - LAST else None)
+        deviations = [deviation] if deviation is None or count > ROUNDS - LAST else [None, sqrt(2.0) * deviation]
+        choice = choose(u, points, period, deviations)
         track = _Track(choice, choice.smoother.basis.spline(choice.fit.coefficients), u, period)
         u = _nearest(track, points)
         if count < ROUNDS:
@@ -201,7 +208,7 @@ def _report(track: _Track, places: Array, deviation: float | None, shifts: Array
         degrees_of_freedom=fit.freedom,
         s=lengths,
         curvature=(first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]) / speed**3,
-        curvature_error=scatter * choice.smoother.spread(fit, told, 2) / speed**2,
+        curvature_error=np.hypot(scatter * choice.smoother.spread(fit, told, 2), _end_errors(track, told)) / speed**2,
         points=np.empty((0, 2)),
         places=np.empty((0, 2)),
         places_s=_measured(track, track.u)[0],
@@ -209,25 +216,46 @@ def _report(track: _Track, places: Array, deviation: float | None, shifts: Array
     )
 
 
-def _check_shifts(shifts: Array, points: Array, deviation: float | None) -> None:
+def _end_errors(track: _Track, u: Array) -> Array:
+    """What the condition at open ends, that the third derivative vanishes, takes from the second derivative near them.
+
+    Where the true one is b, it is 2 b times the width at the end, and dies away within some widths: the solution of
+    ``d = width**6 D^6 d`` that has ``D^3 d = -b`` and no higher derivatives there. As b the largest third derivative
+    nearby is taken. (To draw the spline's ends to a third derivative from inside was tried: it is wrong as often.)
+    """
+    choice, basis = track.choice, track.choice.smoother.basis
+    errors: Array = np.zeros(len(u))
+    if basis.closed:
+        return errors
+    for end, sign in ((basis.low, 1.0), (basis.high, -1.0)):
+        near = np.clip(end + sign * np.linspace(0.0, REACH, 10 * int(REACH)) * choice.width, basis.low, basis.high)
+        largest = float(np.hypot(*track.spline(near, 3).T).max())
+        x = np.maximum(sign * (u - end), 0.0) / choice.width
+        turn = 0.5 * sqrt(3.0) * x
+        taken = np.exp(-x) + np.exp(-0.5 * x) * (np.cos(turn) + np.sin(turn) / sqrt(3.0))
+        errors = np.hypot(errors, choice.width * largest * taken)
+    return errors
+
+
+def _check_shifts(shifts: Array, points: Array, rows: Sequence[int], deviation: float | None) -> None:
     """Refuse a point that is far away from the track through all of them."""
     usual = max(MEDIAN * float(np.median(shifts)), deviation or 0.0)
-    row = int(shifts.argmax())
+    worst = int(shifts.argmax())
     chord = float(np.median(np.hypot(*np.diff(points, axis=0).T)))
-    if shifts[row] > max(STRAY * usual, OFF * chord):
+    if shifts[worst] > max(STRAY * usual, OFF * chord):
         raise DeclarationError(
-            f"sampled: row {row + 1}: is {shifts[row]:.3g} m from the smooth track, where the points scatter by "
+            f"sampled: row {rows[worst]}: is {shifts[worst]:.3g} m from the smooth track, where the points scatter by "
             f"{usual:.3g} m; leave it out if it is stray, or give the standard deviation as smoothing"
         )
 
 
-def _check_turns(track: _Track, report: Smoothing) -> None:
+def _check_turns(track: _Track, report: Smoothing, rows: Sequence[int]) -> None:
     """Refuse a track that folds back."""
     k = int(np.abs(report.curvature).argmax())
     usual = float(np.median(np.abs(np.diff(track.u))))
     turn = abs(float(report.curvature[k])) * max(report.width, usual)
     if turn > SHARPEST:
-        row = int(np.abs(track.u - track.u[0] - report.s[k]).argmin()) + 1
+        row = rows[int(np.abs(report.places_s - report.s[k]).argmin())]
         raise DeclarationError(
             f"sampled: row {row}: the smooth track turns by {turn * 180.0 / pi:.0f} degrees there within "
             f"{max(report.width, usual):.3g} m; are the points in "

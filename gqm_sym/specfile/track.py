@@ -24,7 +24,8 @@ class Scatter(Section):
     """How far measured points scatter: their standard deviation in metres or in the unit that it names, or auto."""
 
     value: ScatterText = Field(
-        description="the standard deviation of each coordinate; auto: found by cross-validation", examples=["0.01", "auto"]
+        description="the standard deviation of each coordinate; auto: found by cross-validation",
+        examples=["0.01", "auto"],
     )
     unit: UnitText = Field(default="", description="of length", examples=["mm", "cm"])
 
