@@ -76,3 +76,7 @@ class SolutionError(GQMError):
 
 class OutdatedModuleError(GQMError):
     """A generated module made for another version of the runtime's interface."""
+
+
+class NoisyPointsWarning(UserWarning):
+    """Surveyed points whose scatter is most of the curvature of the track through them."""

@@ -39,7 +39,7 @@ LAYERS = (
     {"runtime.arithmetic"},
     {"runtime.compiled"},
     {"runtime.interface"},
-    {"sympy_charts", "literals", "loading", "optional"},
+    {"sympy_charts", "literals", "loading", "optional", "smoothing"},
     {"budgets"},
     {"errors"},
 )
@@ -65,12 +65,12 @@ ONLY_IN = {
     "matplotlib": {"figures", "report"},
     "mpmath": {"runtime", "literals", "figures"},
     "numba": {"runtime"},
-    "numpy": {"runtime", "literals", "figures", "export", "design", "studies"},
+    "numpy": {"runtime", "literals", "figures", "export", "design", "studies", "smoothing"},
     "pint": {"specfile"},
     "pydantic": {"specfile", "studies"},
     "pydantic_core": {"specfile", "studies"},
     "ruamel": {"specfile"},
-    "scipy": {"runtime"},
+    "scipy": {"runtime", "smoothing"},
     "sympy": {
         "cli",
         "report",

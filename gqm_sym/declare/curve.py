@@ -15,6 +15,7 @@ from gqm_sym.sympy_charts import chart_x, chart_z
 if TYPE_CHECKING:
     from gqm_sym.declare.implicit import Level
     from gqm_sym.declare.piecewise import Piece
+    from gqm_sym.smoothing import Smoothing
 
 Source: TypeAlias = str | int | sp.Expr
 
@@ -77,6 +78,11 @@ class Curve:
     def charted(self) -> bool:
         """Whether the parameter is arc length, and the coordinates are known by numbers only."""
         return self.definition is not None
+
+    @property
+    def smoothing(self) -> "Smoothing | None":
+        """What smoothing did to the points of a sampled track; None where nothing was smoothed."""
+        return getattr(self.definition, "smoothing", None)
 
     @classmethod
     def graph(
@@ -202,6 +208,7 @@ class Curve:
         *,
         kind: str = "spline",
         closed: bool | None = None,
+        smoothing: float | str | None = None,
         title: str = "",
     ) -> "Curve":
         """Declare the track through points, in arc length from the first of them.
@@ -216,16 +223,34 @@ class Curve:
             ridge that lets it slide down either side it goes in the direction of launch.
         closed
             Whether the track closes; None: if its last point is its first.
+        smoothing
+            For measured points, whose scatter would be a hundredfold in curvature and loads: their standard deviation
+            in metres, or "auto", to find it by cross-validation. The track is then the smoothing spline of degree 5;
+            what it changed, and how good its curvature is, is in the attribute ``smoothing`` of the curve. None: the
+            track goes through the points.
 
         Raises
         ------
         DeclarationError
             If a row is no point, or points are too few, repeated, out of order or far away.
+
+        Warns
+        -----
+        NoisyPointsWarning
+            If the curvature of the track goes up and down from point to point.
+
+        Examples
+        --------
+        >>> from math import cos
+        >>> ruler = [(x / 10, round(cos(x / 10), 2)) for x in range(60)]  # heights to the centimetre
+        >>> track = Curve.sampled(ruler, smoothing=0.003)
+        >>> round(track.smoothing.rms, 4)
+        0.0021
         """
         from gqm_sym.declare.sampled import read_track
 
         s = sp.Symbol("s", real=True)
-        track = read_track(points, kind=kind, closed=closed)
+        track = read_track(points, kind=kind, closed=closed, smoothing=smoothing)
         return cls(kind="sampled", x=chart_x(s), z=chart_z(s), parameter=s, title=title, definition=track)
 
     @classmethod
