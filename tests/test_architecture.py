@@ -26,6 +26,7 @@ LAYERS = (
     {"trees"},
     {"rationals"},
     {"budgets", "loading"},
+    {"arguments"},
     {"errors"},
 )
 

@@ -5,8 +5,10 @@ from dataclasses import dataclass
 
 import sympy as sp
 
+from gqm_sym.arguments import checked, instance, one_line, short
 from gqm_sym.budgets import budget
 from gqm_sym.declare import Curve
+from gqm_sym.declare.ends import check_order
 from gqm_sym.derivation.defaults import join
 from gqm_sym.derivation.dissipation import LOAD, PUSH, SIGMA, TILT, TURN, Dissipation, dissipation
 from gqm_sym.derivation.forces import Forces, forces
@@ -19,6 +21,7 @@ from gqm_sym.derivation.signs import Signs
 from gqm_sym.derivation.speed import LAM0, V0, SpeedField, conservative_speed, dissipative_speed
 from gqm_sym.derivation.swing import Swing, swing
 from gqm_sym.derivation.symmetry import Symmetry, symmetry
+from gqm_sym.errors import ArgumentError
 from gqm_sym.kernels.base import CONTACT_SIGN, DIRECTION, KAPPA, MASS, Kernel, W, X, Z
 from gqm_sym.parameters import Given, Value, is_positive
 
@@ -229,6 +232,7 @@ class Model:
         return f"$\\displaystyle {self.latex()}$"
 
 
+@checked("derive")
 @budget("derivation", 60.0, "declare the curve and the forces by shorter expressions")
 def derive(
     curve: Curve,
@@ -257,9 +261,16 @@ def derive(
     BudgetError
         If it takes more than a minute of processor time, or is nested too deeply.
     """
+    instance(curve, Curve, where="derive: curve", what="a curve, as Curve.graph or a family makes one")
+    instance(kernel, Kernel, where="derive: kernel", what="a force law, as Gravity() + CoulombFriction()")
+    given = {} if parameters is None else parameters
+    if not isinstance(given, Mapping):
+        raise ArgumentError(f"derive: parameters: must be names with values, as in {{'mu': 0.1}}, got {short(given)}")
+    called = curve.title if title is None else one_line(title, where="derive: title")
     lam = curve.parameter
     kernel = kernel.along(lam)
-    defaults = join(curve, kernel, parameters or {})
+    defaults = join(curve, kernel, given)
+    check_order(curve.kind, curve.domain, curve.period, dict(defaults))
     values = dict(defaults)
     track = geometry(curve, may_be_positive=tuple(name for name in values if is_positive(values[name])))
     x, z, shape = beside(without_poles(curve.x), without_poles(curve.z), track, kernel.radius)
@@ -274,7 +285,7 @@ def derive(
     model = Model(
         curve=curve,
         force=kernel,
-        title=curve.title if title is None else title,
+        title=called,
         parameter=lam,
         lam0=LAM0,
         v0=V0,
