@@ -51,8 +51,7 @@ def check_order(kind: str, domain: Ends, period: sp.Expr | None, defaults: Mappi
     suffix = f" with {given}" if given else ""
     if low is not None and high is not None and _is_false(high > low):
         raise DeclarationError(
-            f"{kind}: domain: must have lo < hi, got ({domain[0]}, {domain[1]}){suffix}; "
-            "write the lower end first, whichever way the body moves"
+            f"{kind}: domain: must have lo < hi, got ({domain[0]}, {domain[1]}){suffix}; write the lower end first"
         )
     if turn is not None and _is_false(turn > 0):
         raise DeclarationError(f"{kind}: period: must be positive, got {period}{suffix}")
