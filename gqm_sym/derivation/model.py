@@ -274,7 +274,7 @@ def derive(
     values = dict(defaults)
     track = geometry(curve, may_be_positive=tuple(name for name in values if is_positive(values[name])))
     x, z, shape = beside(without_poles(curve.x), without_poles(curve.z), track, kernel.radius)
-    law = forces(x, z, kernel, shape)
+    law = forces(x, z, kernel, shape, lam)
     loss, speed, level = None, conservative_speed(law, lam), level_set(curve)
     if not kernel.conservative:
         loss = _losses(curve, kernel, x, z, law, shape)
