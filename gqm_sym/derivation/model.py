@@ -1,7 +1,7 @@
 """The model: every closed form of a motion on a curve under a force law, as one frozen value."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import sympy as sp
 
@@ -9,6 +9,7 @@ from gqm_sym.arguments import checked, instance, one_line, short
 from gqm_sym.budgets import budget
 from gqm_sym.declare import Curve
 from gqm_sym.declare.ends import check_order
+from gqm_sym.derivation.corners import check_corners, check_powers, without_known_bars
 from gqm_sym.derivation.defaults import join
 from gqm_sym.derivation.dissipation import LOAD, PUSH, SIGMA, TILT, TURN, Dissipation, dissipation
 from gqm_sym.derivation.forces import Forces, forces
@@ -272,9 +273,16 @@ def derive(
     defaults = join(curve, kernel, given)
     check_order(curve.kind, curve.domain, curve.period, dict(defaults))
     values = dict(defaults)
+    if not curve.charted:
+        check_powers((("x", curve.x), ("z", curve.z)), curve, values)
+        check_corners(curve, values)
+        signs = Signs(parameter=lam, domain=curve.domain, positive=curve.positive, may_be_positive=())
+        curve = replace(curve, **{name: without_known_bars(getattr(curve, name), signs) for name in ("x", "z")})
     track = geometry(curve, may_be_positive=tuple(name for name in values if is_positive(values[name])))
     x, z, shape = beside(without_poles(curve.x), without_poles(curve.z), track, kernel.radius)
     law = forces(x, z, kernel, shape, lam)
+    if not curve.charted:
+        check_powers((("potential", law.potential),), curve, values)
     loss, speed, level = None, conservative_speed(law, lam), level_set(curve)
     if not kernel.conservative:
         loss = _losses(curve, kernel, x, z, law, shape)
