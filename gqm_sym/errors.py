@@ -26,6 +26,10 @@ class DeclarationError(InputError):
     """A curve, a kernel or a model that is declared inconsistently."""
 
 
+class ArgumentError(DeclarationError, TypeError):
+    """Arguments that a function does not have, or of a type that it cannot use."""
+
+
 class SpecFileError(InputError):
     """A YAML file with mistakes in it, all of them reported together.
 

@@ -9,6 +9,7 @@ from typing import TypeAlias
 
 import sympy as sp
 
+from gqm_sym.arguments import names, short
 from gqm_sym.errors import DeclarationError, NumberError
 from gqm_sym.expressions import check_name, name_or_value, read_expression
 
@@ -82,16 +83,17 @@ def read_parameters(
     elif isinstance(given, Mapping):
         declared = dict(given)
     else:
-        declared = dict.fromkeys([given] if isinstance(given, str) else given)
+        declared = dict.fromkeys(names(given, where=f"{where}: parameters"))
     for name in declared:
+        if not isinstance(name, str):
+            raise DeclarationError(f"{where}: parameters: {name!r:.60} is no name; names are text")
         if name not in order:
             raise DeclarationError(
-                f"{where}: parameter {name!r} is declared but not used; "
+                f"{where}: parameter {short(name)} is declared but not used; "
                 f"remove it or use it (in use: {', '.join(order) or 'none'})"
             )
-    names = (*declared, *(name for name in order if name not in declared))
     pairs: list[tuple[str, Value | None]] = []
-    for name in names:
+    for name in (*declared, *(name for name in order if name not in declared)):
         check_parameter(name, where=where)
         value = declared.get(name, COMMON_DEFAULTS.get(name))
         pairs.append((name, None if value is None else read_value(value, where=f"{where}: {name}")))

@@ -40,7 +40,7 @@ LAYERS = (
     {"runtime.compiled"},
     {"runtime.interface"},
     {"sympy_charts", "literals", "loading", "optional", "smoothing"},
-    {"budgets"},
+    {"budgets", "arguments"},
     {"errors"},
 )
 

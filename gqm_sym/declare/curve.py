@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 import sympy as sp
 
-from gqm_sym.declare.ends import Ends, check_ends, read_ends
+from gqm_sym.arguments import checked, names, one_line, short
+from gqm_sym.declare.ends import Ends, check_ends, check_order, read_ends
 from gqm_sym.errors import DeclarationError
 from gqm_sym.expressions import check_name, read_expression
 from gqm_sym.parameters import Parameters, Value, names_in_order, read_parameters
@@ -67,7 +68,9 @@ class Curve:
                 f"{self.kind} curve: neither coordinate depends on the parameter "
                 f"{self.parameter.name!r}; x = {self.x}, z = {self.z} is a point, not a curve"
             )
+        one_line(self.title, where=f"{self.kind} curve: title")
         check_ends(self.kind, self.domain, self.period, self.parameter)
+        check_order(self.kind, self.domain, self.period, dict(self.defaults))
 
     @property
     def parameters(self) -> tuple[str, ...]:
@@ -85,6 +88,7 @@ class Curve:
         return getattr(self.definition, "smoothing", None)
 
     @classmethod
+    @checked("Curve.graph")
     def graph(
         cls,
         z: Source,
@@ -107,6 +111,7 @@ class Curve:
         return _declare("graph", symbol, height, symbol, domain, None, parameters, title, positive)
 
     @classmethod
+    @checked("Curve.parametric")
     def parametric(
         cls,
         *,
@@ -132,6 +137,7 @@ class Curve:
         return _declare("parametric", first, second, symbol, domain, period, parameters, title, positive)
 
     @classmethod
+    @checked("Curve.polar")
     def polar(
         cls,
         r: Source,
@@ -160,6 +166,7 @@ class Curve:
         )
 
     @classmethod
+    @checked("Curve.implicit")
     def implicit(
         cls,
         F: Source,
@@ -202,9 +209,11 @@ class Curve:
         )
 
     @classmethod
+    @checked("Curve.sampled")
     def sampled(
         cls,
-        points: Iterable[Any],
+        points: Any,
+        z: Any = None,
         *,
         kind: str = "spline",
         closed: bool | None = None,
@@ -216,7 +225,10 @@ class Curve:
         Parameters
         ----------
         points
-            Rows of x and z: an (n, 2) array, or pairs of numbers or of decimal text, which is kept as it is.
+            Rows of x and z: an (n, 2) array, or pairs of numbers or of decimal text, which is kept as it is; or a
+            table with columns x and z, as a DataFrame or a mapping; or, where ``z`` is given, the x of all points.
+        z
+            The heights of the points, where ``points`` are their x: ``Curve.sampled(x, z)``.
         kind
             "spline": the interpolating quintic spline. "linear": planes stitched together (paper, eq. 1); at their
             corners the speed is kept. A body at rest on a corner stays where both planes rise from it or hold it; on a
@@ -250,10 +262,11 @@ class Curve:
         from gqm_sym.declare.sampled import read_track
 
         s = sp.Symbol("s", real=True)
-        track = read_track(points, kind=kind, closed=closed, smoothing=smoothing)
+        track = read_track(points, z, kind=kind, closed=closed, smoothing=smoothing)
         return cls(kind="sampled", x=chart_x(s), z=chart_z(s), parameter=s, title=title, definition=track)
 
     @classmethod
+    @checked("Curve.piecewise")
     def piecewise(
         cls,
         pieces: "Iterable[Piece | Curve]",
@@ -307,13 +320,14 @@ class Curve:
 
 
 def _symbol(name: str, kind: str) -> sp.Symbol:
-    return sp.Symbol(_check_parameter_name(name, kind), real=True)
+    return sp.Symbol(check_parameter_name(name, kind), real=True)
 
 
-def _check_parameter_name(name: str, kind: str) -> str:
-    # "lam" is reserved because emitted functions call their argument so; a curve's own parameter
-    # is that argument, so it alone may have the name.
-    return name if name == "lam" else check_name(name, where=f"{kind}: parameter")
+def check_parameter_name(name: str, kind: str) -> str:
+    """Return the name of a curve's own parameter, which alone may be called ``lam``."""
+    # "lam" is reserved because emitted functions call their argument so, and that is the curve's parameter.
+    own = isinstance(name, str) and name == "lam"
+    return name if own else check_name(name, where=f"{kind}: parameter")
 
 
 def _declare(
@@ -333,13 +347,13 @@ def _declare(
     turn = None if period is None else read_expression(period, where=f"{kind}: period")
     written = (x, z) if radius is None else (radius,)
     given = tuple(end for end in (*ends, turn) if end is not None)
-    names = (*names_in_order(*written), *(() if level is None else level.names), *names_in_order(*given))
-    found = tuple(name for name in dict.fromkeys(names) if name != symbol.name)
+    used = (*names_in_order(*written), *(() if level is None else level.names), *names_in_order(*given))
+    found = tuple(name for name in dict.fromkeys(used) if name != symbol.name)
     defaults = read_parameters(parameters, found=found, where=f"{kind} curve")
-    promised = tuple(positive)
+    promised = names(positive, where=f"{kind}: positive")
     for name in promised:
         if name not in found:
-            raise DeclarationError(f"{kind} curve: {name!r} is promised to be positive but not used; remove it")
+            raise DeclarationError(f"{kind} curve: {short(name)} is promised to be positive but not used; remove it")
     return Curve(
         kind=kind,
         x=x,

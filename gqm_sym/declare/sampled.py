@@ -6,7 +6,7 @@ them, and a smooth track needs fewer of them.
 
 import re
 import warnings
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from decimal import Decimal
 from itertools import pairwise
@@ -14,6 +14,7 @@ from math import atan2, hypot, isfinite, pi
 from statistics import median
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
+from gqm_sym.arguments import one_of, several, short
 from gqm_sym.errors import DeclarationError, NoisyPointsWarning
 
 if TYPE_CHECKING:
@@ -42,6 +43,10 @@ RESTLESS = 0.5
 FELT = 0.1
 
 Place: TypeAlias = tuple[float, float]
+# So many turns in a row, each to the other side and by more than this, are a zigzag that no smooth track goes through:
+# the lengths of the spline between such points never settle.
+ZIGZAGS = 3
+ZIGZAG = pi / 9
 
 _DECIMAL = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 
@@ -69,7 +74,8 @@ class Track:
 
 
 def read_track(
-    points: Iterable[Any],
+    points: Any,
+    z: Any = None,
     *,
     kind: str = "spline",
     closed: bool | None = None,
@@ -80,7 +86,10 @@ def read_track(
     Parameters
     ----------
     points
-        Rows of x and z: an (n, 2) array, or pairs of numbers or of decimal text, which is kept as it is.
+        Rows of x and z: an (n, 2) array, or pairs of numbers or of decimal text, which is kept as it is; or a table
+        with columns x and z; or the x of all points.
+    z
+        The heights of the points, where ``points`` are their x.
     kind
         "spline" or "linear".
     closed
@@ -99,14 +108,13 @@ def read_track(
     NoisyPointsWarning
         If the track's curvature goes up and down from point to point.
     """
-    if kind not in KINDS:
-        raise DeclarationError(f"sampled: kind: must be one of {', '.join(KINDS)}, got {kind!r}")
+    one_of(kind, KINDS, where="sampled: kind")
     if not (closed is None or isinstance(closed, bool)):
-        raise DeclarationError(f"sampled: closed: must be True, False or None, got {closed!r}")
+        raise DeclarationError(f"sampled: closed: must be True, False or None, got {short(closed)}")
     deviation = _read_smoothing(smoothing, kind)
     texts: list[str] = []
     places: list[Place] = []
-    for text, place in _read_rows(points):
+    for text, place in _read_rows(_rows(points, z)):
         texts.append(text)
         places.append(place)
     size = _size(places)
@@ -165,16 +173,49 @@ def _smoothed(
     return [(x, z) for x, z in found.tolist()], report
 
 
+def _rows(points: Any, z: Any) -> Any:
+    """Points as rows, whichever way they were given."""
+    if z is not None:
+        return _paired(points, z, "sampled: x and z")
+    # Any kind of table will do, whoever made it.
+    names = points if isinstance(points, Mapping) else getattr(points, "columns", None)
+    if names is None:
+        return points
+    columns = {name.strip().lower(): name for name in names if isinstance(name, str)}
+    if not columns.keys() >= {"x", "z"}:
+        raise DeclarationError(
+            f"sampled: points: a table must have columns x and z, got {short(list(names))}; rename them, or give "
+            "both columns, as in Curve.sampled(table['distance'], table['height'])"
+        )
+    return _paired(points[columns["x"]], points[columns["z"]], "sampled: columns x and z")
+
+
+def _paired(x: Any, z: Any, where: str) -> list[tuple[Any, Any]]:
+    """Rows of two columns."""
+    first, second = (_column(column, where) for column in (x, z))
+    if len(first) != len(second):
+        raise DeclarationError(f"{where}: must be of one length, got {len(first)} and {len(second)} values")
+    return list(zip(first, second, strict=True))
+
+
+def _column(values: Any, where: str) -> tuple[Any, ...]:
+    listed = values.tolist() if hasattr(values, "tolist") else values
+    return several(listed, where=where, what="two columns of numbers")
+
+
 def _read_rows(points: Iterable[Any]) -> Iterator[tuple[str, Place]]:
     # An array of numbers gives Python's own floats at once, which is many times quicker than row by row.
     rows = points.tolist() if hasattr(points, "tolist") else points
     try:
         numbered = enumerate(rows, start=1)
     except TypeError:
-        raise DeclarationError(f"sampled: points: must be rows of x and z, got {type(points).__name__}") from None
+        raise DeclarationError(f"sampled: points: must be rows of x and z, got {short(points)}") from None
     for count, row in numbered:
         if isinstance(row, str) or not isinstance(row, Sequence) or len(row) != 2:
-            raise DeclarationError(f"sampled: row {count}: must be two numbers, x and z, got {row!r:.60}")
+            raise DeclarationError(
+                f"sampled: row {count}: must be two numbers, x and z, got {short(row)}; "
+                "for one array of each write Curve.sampled(x, z)"
+            )
         (x, first), (z, second) = (_read(value, count) for value in row)
         yield f"{x} {z}", (first, second)
 
@@ -261,6 +302,8 @@ def _check_order(places: list[Place], size: float, kind: str, joined: bool) -> N
     for count, turn in enumerate(_turns(places, joined), start=1):
         if abs(turn) > most:
             _refuse_turn(turn, count % len(places) + 1)
+    if kind == "spline":
+        _check_zigzag(_turns(places, joined))
 
 
 def _refuse_turn(turn: float, row: int) -> None:
@@ -297,3 +340,18 @@ def _warn_of_scatter(places: list[Place], joined: bool, remedy: str) -> None:
             NoisyPointsWarning,
             stacklevel=4,
         )
+
+
+def _check_zigzag(turns: list[float]) -> None:
+    """Refuse points between which a smooth track would swing to and fro."""
+    run = 0
+    for count, turn in enumerate(turns):
+        swings = run and turn * turns[count - 1] < 0.0
+        run = 0 if abs(turn) <= ZIGZAG else run + 1 if swings else 1
+        if run == ZIGZAGS:
+            first = count + 3 - ZIGZAGS
+            raise DeclarationError(
+                f"sampled: row {first}: the track turns to and fro there, {ZIGZAGS} times by more than "
+                f"{ZIGZAG * 180.0 / pi:.0f} degrees; no smooth track goes through a zigzag: give more points, points "
+                "without their noise, or kind='linear' for planes"
+            )

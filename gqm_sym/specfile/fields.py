@@ -12,7 +12,7 @@ from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Fie
 from pydantic_core import PydanticCustomError
 
 from gqm_sym.errors import InputError, NumberError
-from gqm_sym.expressions import RESERVED_NAMES, check_name
+from gqm_sym.expressions import RESERVED_NAMES, check_module_name, check_name
 from gqm_sym.literals.grammar import parse
 from gqm_sym.parameters import check_parameter, exact_value, read_value
 from gqm_sym.specfile.nodes import shown
@@ -114,7 +114,7 @@ def _read_sign(of: str) -> BeforeValidator:
 _TEXT_OR_NUMBER = {"type": ["string", "number"]}
 
 Line: TypeAlias = Annotated[str, AfterValidator(_check_line)]
-Name: TypeAlias = Annotated[str, _checked(lambda text: check_name(text, where=""))]
+Name: TypeAlias = Annotated[str, _checked(lambda text: check_module_name(text, where=""))]
 CurveParameter: TypeAlias = Annotated[str, _checked(_check_curve_parameter)]
 ParameterName: TypeAlias = Annotated[str, _checked(lambda text: check_parameter(text, where=""))]
 UnitText: TypeAlias = Annotated[str, _checked(lambda text: text and read_unit(text, where=""))]
