@@ -7,9 +7,11 @@ import pytest
 import sympy as sp
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from mpmath import mp, mpf
 
 import gqm_sym as gqm
 from gqm_sym.errors import DeclarationError
+from gqm_sym.expressions import common_measure
 from gqm_sym.specfile import read_spec
 
 
@@ -123,3 +125,24 @@ def test_rounds_of_a_ring_are_a_circulation(tmp_path):
     assert one.kind == two.kind == "circulation"
     assert one.period == two.period
     assert silent.solve(0, 2).kind == "libration"
+
+
+@settings(deadline=None, max_examples=25)
+@given(rates=st.lists(st.fractions(Fraction(1, 6), 5, max_denominator=6), min_size=2, max_size=3))
+def test_random_waves_are_derived_as_they_are(rates):
+    """Their line element against mpmath's derivatives: the common measure of 1, 3 and 7/6 is 1/6, and was taken for 1."""
+    curve = drawn(" + ".join(f"cos({rate}*u)/{k + 1}" for k, rate in enumerate(rates)), "3*sin(u)")
+    ds = sp.lambdify(curve.parameter, gqm.derive(curve, gqm.Gravity()).ds, "mpmath")
+    x, z = (sp.lambdify(curve.parameter, form, "mpmath") for form in (curve.x, curve.z))
+    for place in (0.3, 1.7, -4.1):
+        truth = mp.hypot(mp.diff(x, place), mp.diff(z, place))
+        assert ds(mpf(place)) == pytest.approx(float(truth), rel=1e-9)
+
+
+@pytest.mark.parametrize("numbers", [(1, 3, "7/6"), ("7/6", 3, 1), (1, 2, "9/4"), ("1/2", "1/3"), (4, 6), ("5/7",)])
+def test_a_common_measure_goes_into_all_numbers(numbers):
+    """In whatever order; SymPy's gcd_list stops at a 1."""
+    exact = [sp.Rational(number) for number in numbers]
+    quotients = [number / common_measure(exact) for number in exact]
+    assert all(quotient.is_Integer for quotient in quotients)
+    assert math.gcd(*map(int, quotients)) == 1

@@ -7,6 +7,7 @@ from math import hypot, isfinite
 import sympy as sp
 
 from gqm_sym.errors import DeclarationError
+from gqm_sym.expressions import common_measure
 from gqm_sym.parameters import Value, tried_values
 
 Point = tuple[sp.Expr, sp.Expr]
@@ -33,7 +34,7 @@ def found_period(point: Point, lam: sp.Symbol) -> sp.Expr | None:
     ratios = [sp.cancel(rate / first) for rate in rates]
     if not all(ratio.is_Rational for ratio in ratios):
         return None
-    period = 2 * sp.pi / sp.Abs(first * sp.gcd_list(ratios))
+    period = 2 * sp.pi / sp.Abs(first * common_measure(ratios))
     values = tried_values({symbol.name: None for form in point for symbol in form.free_symbols - {lam}})
     if _gap(point, lam, period, values) > SHARE:
         return None
