@@ -130,7 +130,7 @@ def test_rounds_of_a_ring_are_a_circulation(tmp_path):
 @settings(deadline=None, max_examples=25)
 @given(rates=st.lists(st.fractions(Fraction(1, 6), 5, max_denominator=6), min_size=2, max_size=3))
 def test_random_waves_are_derived_as_they_are(rates):
-    """Their line element against mpmath's derivatives: the common measure of 1, 3 and 7/6 is 1/6, and was taken for 1."""
+    """Their line element against mpmath: the common measure of 1, 3 and 7/6 is 1/6, and was taken for 1."""
     curve = drawn(" + ".join(f"cos({rate}*u)/{k + 1}" for k, rate in enumerate(rates)), "3*sin(u)")
     ds = sp.lambdify(curve.parameter, gqm.derive(curve, gqm.Gravity()).ds, "mpmath")
     x, z = (sp.lambdify(curve.parameter, form, "mpmath") for form in (curve.x, curve.z))
