@@ -7,9 +7,10 @@ that is complex or infinite.
 
 import importlib.util
 import keyword
+import math
 import sys
 import sysconfig
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from decimal import Decimal
 from fractions import Fraction
 from pathlib import Path
@@ -106,6 +107,15 @@ def read_expression(source: Source, *, where: str) -> sp.Expr:
     with budget(where, SECONDS, "write a shorter expression"):
         check_constants(tree, where=where)
         return evaluate(tree, _SymPy(), where=where)
+
+
+def common_measure(numbers: Iterable[sp.Rational]) -> sp.Rational:
+    """Return the largest number of which each of some rational ones is a whole multiple.
+
+    SymPy's own ``gcd_list`` stops at the first 1 that it comes to: of 1, 3 and 7/6 it says 1.
+    """
+    listed = tuple(numbers)
+    return sp.Rational(math.gcd(*(int(number.p) for number in listed)), math.lcm(*(int(number.q) for number in listed)))
 
 
 def is_real_at(form: sp.Expr, values: Mapping[sp.Symbol, sp.Expr]) -> bool | None:

@@ -129,6 +129,14 @@ def exact_value(value: Value) -> sp.Expr:
     return read_expression(value, where="default")
 
 
+def tried_values(defaults: Mapping[str, Value | None]) -> dict[sp.Symbol, sp.Expr]:
+    """Values of parameters to try a form with: their defaults, or numbers like 1."""
+    return {
+        sp.Symbol(name, real=True): sp.Rational(17 + 2 * place, 16 + place) if value is None else exact_value(value)
+        for place, (name, value) in enumerate(defaults.items())
+    }
+
+
 def is_positive(value: Value | None) -> bool:
     """Whether a default allows its parameter to be taken as positive; no default allows it."""
     return value is None or bool(exact_value(value) > 0)
@@ -177,4 +185,5 @@ __all__ = [
     "read_parameters",
     "read_value",
     "refuse_out_of_range",
+    "tried_values",
 ]

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import sympy as sp
 
 from gqm_sym.arguments import checked, names, one_line, short
+from gqm_sym.declare.closing import check_period, found_period
 from gqm_sym.declare.ends import Ends, check_ends, check_order, read_ends
 from gqm_sym.errors import DeclarationError
 from gqm_sym.expressions import check_name, read_expression
@@ -37,7 +38,7 @@ class Curve:
     domain
         Ends of the parameter's range, each an expression in run-time parameters or None (open).
     period
-        The parameter period of a closed curve.
+        The parameter period of a closed curve: as given, or found where the formulas tell it.
     defaults
         The run-time parameters in order, each with its default or None.
     title
@@ -71,6 +72,8 @@ class Curve:
         one_line(self.title, where=f"{self.kind} curve: title")
         check_ends(self.kind, self.domain, self.period, self.parameter)
         check_order(self.kind, self.domain, self.period, dict(self.defaults))
+        if self.period is not None:
+            check_period(self.kind, (self.x, self.z), self.parameter, self.period, dict(self.defaults))
 
     @property
     def parameters(self) -> tuple[str, ...]:
@@ -125,6 +128,8 @@ class Curve:
         positive: Iterable[str] = (),
     ) -> "Curve":
         """Declare a curve by both coordinates.
+
+        Without ``period`` and ``domain`` it is closed where both are made of waves of commensurate rates.
 
         Examples
         --------
@@ -350,6 +355,8 @@ def _declare(
     used = (*names_in_order(*written), *(() if level is None else level.names), *names_in_order(*given))
     found = tuple(name for name in dict.fromkeys(used) if name != symbol.name)
     defaults = read_parameters(parameters, found=found, where=f"{kind} curve")
+    if turn is None and kind in ("parametric", "polar") and ends == (None, None):
+        turn = found_period((x, z), symbol)
     promised = names(positive, where=f"{kind}: positive")
     for name in promised:
         if name not in found:

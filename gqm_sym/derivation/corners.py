@@ -21,7 +21,7 @@ from gqm_sym.derivation.algebra.generators import Angle, OverBudget
 from gqm_sym.derivation.algebra.rewrite import product, spell_factors
 from gqm_sym.derivation.algebra.signs import Signs
 from gqm_sym.errors import DeclarationError
-from gqm_sym.parameters import Value, exact_value
+from gqm_sym.parameters import Value, tried_values
 
 # Places of a range that are looked at, and their distance where it has no ends.
 PLACES = 120
@@ -77,14 +77,6 @@ def check_powers(
                     f"for some values of {given} only; write the exponent as a number, or give a domain on which "
                     f"{base} is positive"
                 )
-
-
-def tried_values(defaults: Mapping[str, Value | None]) -> dict[sp.Symbol, sp.Expr]:
-    """Values of parameters to try a form with: their defaults, or numbers like 1."""
-    return {
-        sp.Symbol(name, real=True): sp.Rational(17 + 2 * place, 16 + place) if value is None else exact_value(value)
-        for place, (name, value) in enumerate(defaults.items())
-    }
 
 
 def without_known_bars(form: sp.Expr, signs: Signs) -> sp.Expr:

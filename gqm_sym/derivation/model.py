@@ -8,6 +8,7 @@ import sympy as sp
 from gqm_sym.arguments import checked, instance, one_line, short
 from gqm_sym.budgets import budget
 from gqm_sym.declare import Curve
+from gqm_sym.declare.closing import check_period
 from gqm_sym.declare.ends import check_order
 from gqm_sym.derivation.algebra.rewrite import check_real, without_poles
 from gqm_sym.derivation.algebra.signs import Signs
@@ -274,6 +275,8 @@ def derive(
     check_order(curve.kind, curve.domain, curve.period, dict(defaults))
     values = dict(defaults)
     if not curve.charted:
+        if curve.period is not None:
+            check_period(curve.kind, (curve.x, curve.z), lam, curve.period, values)
         check_powers((("x", curve.x), ("z", curve.z)), curve, values)
         check_corners(curve, values)
         signs = Signs(parameter=lam, domain=curve.domain, positive=curve.positive, may_be_positive=())
