@@ -141,7 +141,7 @@ def test_loads_are_within_their_error(name: str, scatter: float, known: bool) ->
 
 @pytest.mark.parametrize("name", TRACKS)
 def test_there_is_little_bias(name: str) -> None:
-    """The mean over many surveys comes nearer to the track than each of them."""
+    """What is left in the mean over surveys, where noise cancels, is less than the error that is stated."""
     truth = TRACKS[name]
     means, errors = 0.0, 0.0
     for seed in range(8):
@@ -149,7 +149,7 @@ def test_there_is_little_bias(name: str) -> None:
         chart = charted(curve)
         off, factor = loads(truth, curve, np.linspace(0.03, 0.97, 300) * chart.edges[-1])
         means, errors = means + off / factor / 8, errors + np.median(curve.smoothing.curvature_error) / 8
-    assert np.sqrt(np.mean(means**2)) < 0.6 * errors
+    assert np.sqrt(np.mean(means**2)) < 0.8 * errors
 
 
 @pytest.mark.parametrize(("count", "interpolated", "smoothed"), [(160, 0.8, 0.06), (400, 5.0, 0.05)])

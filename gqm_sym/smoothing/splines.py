@@ -5,9 +5,9 @@ the second derivative, would have kinks in its curvature and so in every load. B
 the cost is left, so that the third derivative vanishes at open ends and curvature goes on evenly there.
 
 SciPy's own smoothing spline is cubic, and FITPACK's (``splprep``), which may have degree 5, sets a few knots where they
-fit the noise of these very points. With 1 cm of noise its loads are as good inside and twice as wrong at the ends; with
-10 cm they are many times worse; and it tells neither how many numbers it fitted nor how good they are. Here matrices
-are banded, and one Cholesky factorisation a weight tells both.
+fit the noise of these very points. With 1 cm of noise its loads are about as good, but the worst of them twice as
+wrong; with 10 cm they are two to forty times as wrong, as its target is chosen; and it tells neither how many numbers
+it fitted nor how good they are. Here matrices are banded, and one Cholesky factorisation a weight tells both.
 """
 
 from dataclasses import dataclass
