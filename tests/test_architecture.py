@@ -22,7 +22,7 @@ LAYERS = (
     {"derivation"},
     {"derivation.model"},
     {"derivation.wells", "derivation.forces", "derivation.defaults"},
-    {"derivation.geometry", "derivation.reality"},
+    {"derivation.geometry", "derivation.reality", "derivation.corners"},
     {"derivation.algebra"},
     {"declare", "kernels"},
     {"parameters"},
