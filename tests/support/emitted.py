@@ -89,19 +89,19 @@ class Compiled:
 
     def frame(self, places: list[float], speeds: list[float]) -> np.ndarray:
         """Rows x, z, ds, kappa, contact force."""
-        return self._call("frame", interface.FRAME_ROWS, len(places), places, speeds)
+        return self._call("path_and_contact_force", interface.FRAME_ROWS, len(places), places, speeds)
 
     def climb(self, places: list[float]) -> np.ndarray:
         """Rows climb, slope."""
-        return self._call("climb", 2, len(places), places)
+        return self._call("effective_potential", 2, len(places), places)
 
     def rise(self, a: float, places: list[float], offsets: list[float]) -> np.ndarray:
         """Rows first difference, ds."""
-        return self._call("rise", 2, len(places), a, places, offsets)
+        return self._call("potential_divdiff1", 2, len(places), a, places, offsets)
 
     def bend(self, a: float, b: float, left: list[float], right: list[float]) -> np.ndarray:
         """Rows second difference, ds."""
-        return self._call("bend", 2, len(left), a, b, left, right)
+        return self._call("potential_divdiff2", 2, len(left), a, b, left, right)
 
     def bounds(self, lo: float, hi: float) -> np.ndarray:
         """Ends of the slope's enclosure, and of that of ds."""

@@ -32,6 +32,7 @@ from gqm_sym.runtime.compiled.intrinsics import choose, fma, nearest_whole
 from gqm_sym.runtime.compiled.jit import Inlined, Inner, entry
 from gqm_sym.runtime.compiled.streaming import put
 from gqm_sym.runtime.compiled.types import MATRIX, VECTOR, Array
+from gqm_sym.runtime.interface import Addresses
 from gqm_sym.runtime.inversion.fourier import sum_wave
 from gqm_sym.runtime.inversion.table import TERMS, look_up
 from gqm_sym.runtime.quadrature.integrands import TURN_TURN, speeds
@@ -154,7 +155,7 @@ def find_states(record, p, t, out, begin, end):  # type: ignore[no-untyped-def]
     """Fill rows of ``out`` with lam, s, x, z, v, v**2, kappa, normal force and error of lam at some of the times."""
     find_places(record, t, out[0], begin, end)
     bits, shape, launch = section(record, FUNCTIONS).view(np.int64), section(record, SHAPE), section(record, LAUNCH)
-    fns, kind = (bits[0], bits[1], bits[2], bits[3], bits[4]), bits[5]
+    fns, kind = Addresses(bits[0], bits[1], bits[2], bits[3], bits[4]), bits[5]
     a, b, ref, w, spread = shape[0], shape[1], shape[2], shape[3], shape[4]
     lam0, v0, lap_length, s0, s_a = launch[0], launch[1], launch[2], launch[3], launch[4]
     late, drift = launch[5], launch[6]
@@ -189,7 +190,7 @@ def find_states(record, p, t, out, begin, end):  # type: ignore[no-untyped-def]
             s = (s_a + way * spread * arc[i]) + laps[i] * lap_length
             reduced[i], v[i] = choose(launched, lam0, place), choose(launched, v0, speed)
             v2[i], arc[i] = v[i] * v[i], choose(launched, s0, s + s0)
-        call_path_and_contact_force(fns[0], n, reduced, v2, p, frame)
+        call_path_and_contact_force(fns.path_and_contact_force, n, reduced, v2, p, frame)
         for i in range(n):
             ds = frame[2, i]
             rate = choose(ds > 0.0, fabs(v[i]) / ds, 0.0)

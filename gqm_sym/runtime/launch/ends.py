@@ -65,7 +65,7 @@ def mirror_image(fns, p, lam0, direction, reach, place, step):  # type: ignore[n
     guess *= direction
     spot, rows = np.empty(2), np.empty((2, 1))
     left, _size = speed_squared(fns, p, lam0, 0.0, guess, spot, rows)
-    call_effective_potential(fns[1], 1, spot, p, rows)
+    call_effective_potential(fns.effective_potential, 1, spot, p, rows)
     more = left / rows[1, 0]  # a step of Newton's method, for what the axis is rounded by
     return guess + more if fabs(more) <= UNCLEAR * fabs(guess) else 0.0
 
@@ -88,7 +88,7 @@ def ends(fns, p, lam0, v0, direction, low, high, period, place, step):  # type: 
     begin = first_step(low, high, period)
     if w0 == 0.0:
         rows, size = np.empty((2, 3)), 0.0
-        call_effective_potential(fns[1], 3, lam0 + begin * np.array([0.0, 1.0, -1.0]), p, rows)
+        call_effective_potential(fns.effective_potential, 3, lam0 + begin * np.array([0.0, 1.0, -1.0]), p, rows)
         for height in rows[0]:
             if isfinite(height):
                 size = max(size, fabs(height))

@@ -5,6 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from gqm_sym.runtime.compiled.types import Array
+from gqm_sym.runtime.interface import Addresses
 from gqm_sym.runtime.multiprecision.exact_problem import NOWHERE, ExactProblem
 
 
@@ -13,7 +14,7 @@ class BoundFunctions(NamedTuple):
 
     Attributes
     ----------
-    addresses : tuple of int
+    addresses : Addresses
         Of the compiled functions.
     p : array
         The run-time parameters, and behind them the curve's chart where it has one.
@@ -25,7 +26,7 @@ class BoundFunctions(NamedTuple):
         Of a closed curve, else 0.
     """
 
-    addresses: tuple[int, ...]
+    addresses: Addresses
     p: Array
     exact: ExactProblem | None = None
     breaks: Array = NOWHERE

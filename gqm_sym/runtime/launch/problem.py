@@ -29,7 +29,7 @@ def bind(formulas: Formulas, p: ParameterValues, launch: Launch) -> BoundFunctio
 
 def _bind_all(formulas: Formulas, p: ParameterValues) -> BoundFunctions:
     """What all launches with these parameters share."""
-    addresses = tuple(formulas.addresses)
+    addresses = formulas.addresses
     if formulas.chart is None:
         return BoundFunctions(addresses, p.values)
     chart = formulas.charted(p)

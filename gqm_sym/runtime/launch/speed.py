@@ -103,11 +103,11 @@ def mend(fns, p, lam0, gained, w0, size, here, rests, field, known):  # type: ig
     v2, force, sizes = field[4 * n : 5 * n], field[5 * n : 6 * n], field[6 * n : 7 * n]
     if rests.size:
         offsets += rests
-    call_potential_divdiff1(fns[2], n, lam0, here, offsets, p, rise)
+    call_potential_divdiff1(fns.potential_divdiff1, n, lam0, here, offsets, p, rise)
     for i in range(n):
         slow = w0 - (offsets[i] * rise[i] - gained)
         exact[i] = v2[i] if known and keeps(w0, v2[i], size + sizes[i]) else slow
-    call_path_and_contact_force(fns[0], n, here, exact, p, frame)
+    call_path_and_contact_force(fns.path_and_contact_force, n, here, exact, p, frame)
     if not known:
         field[: 4 * n] = frame[: 4 * n]
     for i in range(n):
@@ -117,7 +117,7 @@ def mend(fns, p, lam0, gained, w0, size, here, rests, field, known):  # type: ig
 
 @entry(
     types.void(
-        *(types.UniTuple(INTEGER, 5), INTEGER, VECTOR, REAL, REAL, REAL, VECTOR, VECTOR),
+        *(ADDRESSES, INTEGER, VECTOR, REAL, REAL, REAL, VECTOR, VECTOR),
         *(types.UniTuple(VECTOR, SHOWN), INTEGER, INTEGER, types.boolean),
     ),
     nogil=True,
@@ -130,7 +130,7 @@ def fill_loads(fns, loads, p, lam0, lam0_low, w0, places, rests, rows, begin, en
     """
     launch, field = np.empty((2, 1)), np.empty(LOAD_ROWS * BLOCK)
     start = np.array([lam0])
-    call_effective_potential(fns[1], 1, start, p, launch)
+    call_effective_potential(fns.effective_potential, 1, start, p, launch)
     gained = lam0_low * launch[1, 0]
     level, size = 0.0, nan  # nothing is kept of sizes that are not known
     if loads and not rests.size:
@@ -161,7 +161,7 @@ def fill_loads(fns, loads, p, lam0, lam0_low, w0, places, rests, rows, begin, en
 def path_and_force_at(fns, p, lam, v2):  # type: ignore[no-untyped-def]
     """x, z, ds, kappa and the contact force at many places, given V**2 there."""
     out = np.empty((5, lam.size))
-    call_path_and_contact_force(fns[0], lam.size, lam, v2, p, out)
+    call_path_and_contact_force(fns.path_and_contact_force, lam.size, lam, v2, p, out)
     return out
 
 
@@ -169,7 +169,7 @@ def path_and_force_at(fns, p, lam, v2):  # type: ignore[no-untyped-def]
 def potential_at(fns, p, lam):  # type: ignore[no-untyped-def]
     """The climb and its slope at many places."""
     out = np.empty((2, lam.size))
-    call_effective_potential(fns[1], lam.size, lam, p, out)
+    call_effective_potential(fns.effective_potential, lam.size, lam, p, out)
     return out
 
 
@@ -177,8 +177,8 @@ def potential_at(fns, p, lam):  # type: ignore[no-untyped-def]
 def speed_squared_at(fns, p, lam0, lam0_low, w0, places, offsets):  # type: ignore[no-untyped-def]
     """V**2 at many places and their offsets from lam0, launched from lam0 + lam0_low, without subtracting heights."""
     rows, launch = np.empty((2, offsets.size)), np.empty((2, 1))
-    call_potential_divdiff1(fns[2], offsets.size, lam0, places, offsets, p, rows)
-    call_effective_potential(fns[1], 1, np.array([lam0]), p, launch)
+    call_potential_divdiff1(fns.potential_divdiff1, offsets.size, lam0, places, offsets, p, rows)
+    call_effective_potential(fns.effective_potential, 1, np.array([lam0]), p, launch)
     out = np.empty(offsets.size)
     for i in range(offsets.size):
         out[i] = w0 - (offsets[i] * rows[0, i] - lam0_low * launch[1, 0])

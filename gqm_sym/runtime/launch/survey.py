@@ -4,7 +4,7 @@ import numpy as np
 from numba import types
 
 from gqm_sym.runtime.compiled.jit import entry
-from gqm_sym.runtime.compiled.types import REAL
+from gqm_sym.runtime.compiled.types import ADDRESSES, REAL
 from gqm_sym.runtime.launch.ends import END_TYPE, ends
 from gqm_sym.runtime.launch.zeros import LIMIT, TURN
 from gqm_sym.runtime.quadrature.trapezoid import CIRCULATION, LIBRATION, time_by_trapezoid
@@ -12,7 +12,7 @@ from gqm_sym.runtime.quadrature.trapezoid import CIRCULATION, LIBRATION, time_by
 
 @entry(
     types.Tuple((types.int64, END_TYPE, END_TYPE, REAL))(
-        types.UniTuple(types.int64, 5),
+        ADDRESSES,
         types.float64[::1],
         REAL,
         REAL,

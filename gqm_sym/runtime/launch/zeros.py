@@ -36,7 +36,7 @@ NARROW = 1e-15
 def speed_squared(fns, p, lam0, w0, offset, spot, rows):  # type: ignore[no-untyped-def]
     """V**2 at lam0 + offset, and the size of its parts, without subtracting heights."""
     spot[0], spot[1] = lam0 + offset, offset
-    call_potential_divdiff1(fns[2], 1, lam0, spot[:1], spot[1:], p, rows)
+    call_potential_divdiff1(fns.potential_divdiff1, 1, lam0, spot[:1], spot[1:], p, rows)
     lost = offset * rows[0, 0]
     return w0 - lost, w0 + fabs(lost)
 
@@ -54,7 +54,7 @@ def polish_zero(fns, p, lam0, w0, lo, hi, spot, rows):  # type: ignore[no-untype
         else:
             hi = x
         spot[0] = lam0 + x
-        call_effective_potential(fns[1], 1, spot, p, rows)
+        call_effective_potential(fns.effective_potential, 1, spot, p, rows)
         slope = -rows[1, 0]
         new = x - value / slope if slope != 0.0 else inf
         if not (min(lo, hi) < new < max(lo, hi)):
@@ -91,7 +91,7 @@ def first_zero(fns, p, lam0, w0, direction, begin, reach, step):  # type: ignore
             return MARCHED, direction * left, direction * left
         narrow = right - left <= NARROW * max(fabs(lam0), right)
         here, there = lam0 + direction * left, lam0 + direction * right
-        call_bounds(fns[4], min(here, there), max(here, there), p, box)
+        call_bounds(fns.bounds, min(here, there), max(here, there), p, box)
         # Change of V**2 per unit of offset: its climb is lost going forward, gained going back.
         lower, upper = (-box[1], -box[0]) if direction > 0 else (box[0], box[1])
         if box[2] <= 0.0:
@@ -118,11 +118,11 @@ def first_zero(fns, p, lam0, w0, direction, begin, reach, step):  # type: ignore
                 root = polish_zero(fns, p, lam0, w0, direction * left, direction * right, spot, rows)
                 # What doubles know of the root: an equilibrium that close makes it another matter.
                 spot[0] = lam0 + root
-                call_effective_potential(fns[1], 1, spot, p, rows)
+                call_effective_potential(fns.effective_potential, 1, spot, p, rows)
                 farthest = max(width, 1e-6 * (fabs(lam0) + fabs(root)))
                 slope = fabs(rows[1, 0])
                 unsure = min(UNRESOLVED * size / slope, farthest) if slope > 0.0 else farthest
-                call_bounds(fns[4], lam0 + root - unsure, lam0 + root + unsure, p, box)
+                call_bounds(fns.bounds, lam0 + root - unsure, lam0 + root + unsure, p, box)
                 if box[0] <= 0.0 <= box[1]:
                     return CRITICAL, direction * left, root + direction * unsure
                 return TURN, root, direction * right

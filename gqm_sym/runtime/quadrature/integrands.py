@@ -25,7 +25,11 @@ from gqm_sym.runtime.arithmetic.elementary import sin as sine
 from gqm_sym.runtime.compiled.calls import call_potential_divdiff1, call_potential_divdiff2
 from gqm_sym.runtime.compiled.jit import Inner, entry
 from gqm_sym.runtime.compiled.types import ADDRESSES, MATRIX, REAL, VECTOR
+from gqm_sym.runtime.interface import Addresses
 from gqm_sym.runtime.quadrature.equilibrium import along
+
+# Where V**2 is a field of its own, no function of the model is called.
+NO_FUNCTIONS = Addresses(0, 0, 0, 0, 0)
 
 TURN_TURN, FROM_TURN, REGULAR, TO_EQUILIBRIUM = range(4)
 
@@ -47,7 +51,7 @@ def rates(fns, p, kind, a, b, ref, w, field, phi, work, out):  # type: ignore[no
             s, c = sin(0.5 * phi[i]), cos(0.5 * phi[i])
             da[i] = (b - a) * s * s
             db[i] = (b - a) * c * c
-        call_potential_divdiff2(fns[3], n, a, b, da, db, p, rows)
+        call_potential_divdiff2(fns.potential_divdiff2, n, a, b, da, db, p, rows)
         for i in range(n):
             out[0, i] = rows[1, i] / sqrt(rows[0, i])
             out[1, i] = rows[1, i] * sqrt(da[i] * db[i])
@@ -55,7 +59,7 @@ def rates(fns, p, kind, a, b, ref, w, field, phi, work, out):  # type: ignore[no
         for i in range(n):
             da[i] = (b - a) * phi[i] * phi[i]
             db[i] = a + da[i]
-        call_potential_divdiff1(fns[2], n, a, db, da, p, rows)
+        call_potential_divdiff1(fns.potential_divdiff1, n, a, db, da, p, rows)
         root = 2.0 * sqrt(fabs(b - a))
         for i in range(n):
             fall = -rows[0, i] if b > a else rows[0, i]
@@ -65,7 +69,7 @@ def rates(fns, p, kind, a, b, ref, w, field, phi, work, out):  # type: ignore[no
         for i in range(n):
             da[i] = (a - ref) + (b - a) * phi[i]
             db[i] = ref + da[i]
-        call_potential_divdiff1(fns[2], n, ref, db, da, p, rows)
+        call_potential_divdiff1(fns.potential_divdiff1, n, ref, db, da, p, rows)
         for i in range(n):
             out[0, i] = rows[1, i] * fabs(b - a) / sqrt(w - da[i] * rows[0, i])
             out[1, i] = rows[1, i] * fabs(b - a)
@@ -73,7 +77,7 @@ def rates(fns, p, kind, a, b, ref, w, field, phi, work, out):  # type: ignore[no
         for i in range(n):
             da[i] = (a - b) * exp(-phi[i])
             db[i] = -da[i]
-        call_potential_divdiff2(fns[3], n, b, b, da, db, p, rows)
+        call_potential_divdiff2(fns.potential_divdiff2, n, b, b, da, db, p, rows)
         for i in range(n):
             out[0, i] = rows[1, i] / sqrt(-rows[0, i])
             out[1, i] = rows[1, i] * fabs(da[i])
@@ -94,14 +98,14 @@ def speeds(fns, p, kind, a, b, ref, w, field, phi, work, out):  # type: ignore[n
             s, c = sine(0.5 * phi[i]), cosine(0.5 * phi[i])
             da[i] = (b - a) * s * s
             db[i] = (b - a) * c * c
-        call_potential_divdiff2(fns[3], n, a, b, da, db, p, rows)
+        call_potential_divdiff2(fns.potential_divdiff2, n, a, b, da, db, p, rows)
         for i in range(n):
             out[i] = sqrt(da[i] * db[i] * rows[0, i])
     elif kind == TO_EQUILIBRIUM:
         for i in range(n):
             da[i] = (a - b) * exp(-phi[i])
             db[i] = -da[i]
-        call_potential_divdiff2(fns[3], n, b, b, da, db, p, rows)
+        call_potential_divdiff2(fns.potential_divdiff2, n, b, b, da, db, p, rows)
         for i in range(n):  # V**2 may lie below the least double
             out[i] = fabs(da[i]) * sqrt(-rows[0, i])
     else:
@@ -109,7 +113,7 @@ def speeds(fns, p, kind, a, b, ref, w, field, phi, work, out):  # type: ignore[n
         for i in range(n):
             da[i] = (b - a) * phi[i] * (phi[i] if kind == FROM_TURN else 1.0) + (a - start)
             db[i] = start + da[i]
-        call_potential_divdiff1(fns[2], n, start, db, da, p, rows)
+        call_potential_divdiff1(fns.potential_divdiff1, n, start, db, da, p, rows)
         for i in range(n):
             out[i] = sqrt(max(w - da[i] * rows[0, i], 0.0))
 
@@ -159,5 +163,5 @@ def speeds_at(fns, p, kind, a, b, ref, w, phi):  # type: ignore[no-untyped-def]
 def speeds_along(a, b, field, phi):  # type: ignore[no-untyped-def]
     """V at many anomalies of a stretch towards an equilibrium b where V**2 is a field."""
     out, work = np.empty(phi.size), np.empty((4, phi.size))
-    speeds((0, 0, 0, 0, 0), np.empty(0), TO_EQUILIBRIUM, a, b, a, 0.0, field, phi, work, out)
+    speeds(NO_FUNCTIONS, np.empty(0), TO_EQUILIBRIUM, a, b, a, 0.0, field, phi, work, out)
     return out

@@ -13,7 +13,7 @@ from gqm_sym.runtime.arithmetic.clenshaw import DECAY, GROWTH, legendre_sum
 from gqm_sym.runtime.compiled.buffers import longer, taller
 from gqm_sym.runtime.compiled.jit import Inner, entry
 from gqm_sym.runtime.compiled.types import ADDRESSES, MATRIX, REAL, VECTOR
-from gqm_sym.runtime.quadrature.integrands import REGULAR, TO_EQUILIBRIUM, TURN_TURN, rates, shares
+from gqm_sym.runtime.quadrature.integrands import NO_FUNCTIONS, REGULAR, TO_EQUILIBRIUM, TURN_TURN, rates, shares
 from gqm_sym.runtime.quadrature.kronrod import EVEN, GAUSS_WEIGHTS, KRONROD_WEIGHTS, NODES, ODD
 
 # How a stretch's quadrature ended.
@@ -228,7 +228,7 @@ def lay_panels(fns, p, kind, a, b, ref, w, marks):  # type: ignore[no-untyped-de
 @entry(PANELS_TYPE(REAL, REAL, MATRIX, VECTOR))
 def lay_along(a, b, field, marks):  # type: ignore[no-untyped-def]
     """`panels.lay` towards an equilibrium b where V**2 is a field."""
-    return lay((0, 0, 0, 0, 0), np.empty(0), TO_EQUILIBRIUM, a, b, a, 0.0, field, marks)
+    return lay(NO_FUNCTIONS, np.empty(0), TO_EQUILIBRIUM, a, b, a, 0.0, field, marks)
 
 
 @entry(VECTOR(VECTOR, MATRIX, VECTOR))

@@ -46,7 +46,7 @@ def fill_integrand(fns, p, kind, lam0, w0, a, b, width, first, n, work, rates): 
     if kind == LIBRATION:
         for i in range(n):
             da[i], db[i] = width * FROM_A[first + i], width * FROM_B[first + i]
-        call_potential_divdiff2(fns[3], n, a, b, da, db, p, rows)
+        call_potential_divdiff2(fns.potential_divdiff2, n, a, b, da, db, p, rows)
         for i in range(n):
             rates[i] = pi * rows[n + i] / sqrt(rows[i])
             low, high = min(low, rows[i]), max(high, rows[i])
@@ -54,7 +54,7 @@ def fill_integrand(fns, p, kind, lam0, w0, a, b, width, first, n, work, rates): 
         for i in range(n):
             db[i] = width * SHARES[first + i]
             da[i] = lam0 + db[i]
-        call_potential_divdiff1(fns[2], n, lam0, da, db, p, rows)
+        call_potential_divdiff1(fns.potential_divdiff1, n, lam0, da, db, p, rows)
         for i in range(n):
             lost = db[i] * rows[i]
             rates[i] = fabs(width) * rows[n + i] / sqrt(w0 - lost)

@@ -40,7 +40,7 @@ def pace_series(fns, p, a, b, width, n, work, series):  # type: ignore[no-untype
     for j in range(m):
         node = j * (LONGEST // n)
         da[j], db[j] = width * NEAR[node], width * NEAR[LONGEST - node]
-    call_potential_divdiff2(fns[3], m, a, b, da, db, p, rows)
+    call_potential_divdiff2(fns.potential_divdiff2, m, a, b, da, db, p, rows)
     low, high, tail = inf, 0.0, 0.0
     for j in range(m):
         q = rows[j]
@@ -85,9 +85,9 @@ def sharpened(fns, p, lam0, w0, end, width, work):  # type: ignore[no-untyped-de
         return end
     spot, offset, rows = work[:1], work[1:2], work[2:4]
     spot[0], offset[0] = lam0 + end, end
-    call_potential_divdiff1(fns[2], 1, lam0, spot, offset, p, rows)
+    call_potential_divdiff1(fns.potential_divdiff1, 1, lam0, spot, offset, p, rows)
     left = w0 - end * rows[0]
-    call_effective_potential(fns[1], 1, spot, p, rows)
+    call_effective_potential(fns.effective_potential, 1, spot, p, rows)
     better = end + left / rows[1]
     return better if better * end >= 0.0 and fabs(better) <= NEAR_LAUNCH * width else end
 

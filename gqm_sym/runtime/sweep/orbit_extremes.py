@@ -28,11 +28,11 @@ def loads(fns, p, lam0, w0, least, width, force, parts, n, out):  # type: ignore
     for i in range(n):
         offsets[i] = least + width * parts[i]
         lam[i] = lam0 + offsets[i]
-    call_potential_divdiff1(fns[2], n, lam0, lam, offsets, p, rows)
+    call_potential_divdiff1(fns.potential_divdiff1, n, lam0, lam, offsets, p, rows)
     for i in range(n):
         out[i] = max(w0 - offsets[i] * rows[i], 0.0)
     if force:
-        call_path_and_contact_force(fns[0], n, lam, out, p, frame)
+        call_path_and_contact_force(fns.path_and_contact_force, n, lam, out, p, frame)
         for i in range(n):
             out[i] = frame[4 * n + i]
     else:

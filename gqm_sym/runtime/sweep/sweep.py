@@ -264,7 +264,7 @@ def _answer(
             each, held = formulas.each.addresses(), (formulas.each.held, formulas.each.top_held)
             answer_batches(each, held, *launches, quantities.SPANS if alone else asked.asked, spans, codes)
         room = np.empty(len(lines) - PARAMETERS)
-        scalar.answer_one_by_one(tuple(formulas.addresses), *launches, asked.asked, spans, values, codes, room)
+        scalar.answer_one_by_one(formulas.addresses, *launches, asked.asked, spans, values, codes, room)
 
 
 def _solved(

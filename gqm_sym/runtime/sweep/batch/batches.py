@@ -12,6 +12,7 @@ from numba import types
 from gqm_sym.runtime.compiled.intrinsics import choose
 from gqm_sym.runtime.compiled.jit import Inner, entry
 from gqm_sym.runtime.compiled.strided import DIRECTION, DOMAIN_LOW, LAM0, PARAMETERS, V0, fill_row
+from gqm_sym.runtime.compiled.types import BATCH_ADDRESSES
 from gqm_sym.runtime.quadrature.trapezoid import CIRCULATION, LIBRATION
 from gqm_sym.runtime.sweep.batch.rows import (
     BATCH,
@@ -82,7 +83,7 @@ def settle(fns, kind, mirrored, known, n, s, flat, t, spare, count, held, chosen
 @entry(
     types.void(
         *(
-            types.UniTuple(types.int64, 8),
+            BATCH_ADDRESSES,
             types.UniTuple(types.int64, 2),
             types.int64[:, ::1],
             types.boolean,
@@ -144,8 +145,8 @@ def answer_batches(fns, held, columns, monotone, asked, out, reasons):  # type: 
         set_ends(n, s)
         mirrored, alone = not any_is(s[STATE, :n], NOWHERE), not any_is(s[TRIAL, :n], NOWHERE)
         about_one = LIBRATION
-        if mirrored and alone and (fns[4] or fns[6]):
-            about_one = MEANS if fns[6] else SWING
+        if mirrored and alone and (fns.time_integrand or fns.agm_arguments):
+            about_one = MEANS if fns.agm_arguments else SWING
         for j in range(laps):
             lap = u[WAY, j] * u[REACH, j]
             u[LEAST, j], u[MOST, j] = min(lap, 0.0), max(lap, 0.0)

@@ -66,14 +66,14 @@ def fill(fns, kind, n, node, s, p, work):  # type: ignore[no-untyped-def]
         for j in range(n):
             width = most[j] - least[j]
             da[j], db[j] = width * from_a, width * from_b
-        call_potential_divdiff2_batch(fns[1], n, s[A, :n], s[B, :n], da, db, p, two)
+        call_potential_divdiff2_batch(fns.potential_divdiff2, n, s[A, :n], s[B, :n], da, db, p, two)
         for j in range(n):
             q = two[0, j]
             rates[j] = pi * two[1, j] / sqrt(q)
             low[j], high[j] = choose(q >= low[j], low[j], q), choose(q > high[j], q, high[j])
     elif kind == SWING:
         two = rows[: 2 * n].reshape(2, n)
-        call_time_integrand_batch(fns[4], n, FALL[node], RISE[node], p, two)
+        call_time_integrand_batch(fns.time_integrand, n, FALL[node], RISE[node], p, two)
         for j in range(n):
             q = two[1, j]
             rates[j] = pi * sqrt(two[0, j])
@@ -83,7 +83,7 @@ def fill(fns, kind, n, node, s, p, work):  # type: ignore[no-untyped-def]
         for j in range(n):
             db[j] = least[j] + share * (most[j] - least[j])
             da[j] = start[j] + db[j]
-        call_potential_divdiff1_batch(fns[0], n, start, da, db, p, three)
+        call_potential_divdiff1_batch(fns.potential_divdiff1, n, start, da, db, p, three)
         for j in range(n):
             lost = db[j] * three[0, j]
             rates[j] = (most[j] - least[j]) * three[1, j] / sqrt(w0[j] - lost)
@@ -106,9 +106,9 @@ def times(fns, kind, mirrored, n, s, flat, count, held, chosen, work, asked, out
         if kind == SWING:
             for j in range(n):
                 halves[j] = 0.5 * (s[MOST, j] - s[LEAST, j])
-            call_integrand_invariants_batch(fns[5], n, halves, p, rest)
+            call_integrand_invariants_batch(fns.integrand_invariants, n, halves, p, rest)
         else:
-            call_orbit_invariants_batch(fns[3], n, s[A, :n], s[B, :n], p, rest)
+            call_orbit_invariants_batch(fns.orbit_invariants, n, s[A, :n], s[B, :n], p, rest)
         count += fixed
     for j in range(n):
         s[SUM, j], s[VALUE, j], s[CHANGE, j], s[LOW, j], s[HIGH, j] = 0.0, 0.0, inf, inf, 0.0
@@ -165,7 +165,7 @@ def half_periods_by_agm(fns, n, s, flat, count, work, asked, out, reasons):  # t
     clear, times = work[3, :n], work[4, :n]
     for j in range(n):
         halves[j] = 0.5 * (s[MOST, j] - s[LEAST, j])
-    call_agm_arguments_batch(fns[6], n, halves, p, rows)
+    call_agm_arguments_batch(fns.agm_arguments, n, halves, p, rows)
     for j in range(n):
         a, b = rows[0, j], rows[1, j]
         balanced = (b > LEAST_BALANCE * a) & (a > LEAST_BALANCE * b) & (a + b < inf)

@@ -67,7 +67,7 @@ def by_closed_form(fns, n, s, p, known, work):  # type: ignore[no-untyped-def]
     rows, halves, offsets, steep = work[:3].reshape(-1)[: 3 * n].reshape(3, n), work[3, :n], work[4, :n], work[5, :n]
     for j in range(n):
         axis[j] = (start[j] - places[j]) - places_low[j]
-    call_turning_by_closed_form_batch(fns[7], n, axis, w0, p, rows)
+    call_turning_by_closed_form_batch(fns.turning_point, n, axis, w0, p, rows)
     for j in range(n):
         turn, rests = 2.0 * steps[j], w0[j] == 0.0
         turns = choose(turn > 0.0, whole_below(axis[j] / turn + 0.5), 0.0)
@@ -81,7 +81,7 @@ def by_closed_form(fns, n, s, p, known, work):  # type: ignore[no-untyped-def]
         for j in range(n):
             near[j], ends[j] = places[j] + offsets[j], places[j] + ahead[j] * halves[j]
             widths[j] = ahead[j] * halves[j] - offsets[j]
-        call_potential_divdiff1_batch(fns[0], n, near, ends, widths, p, rise)
+        call_potential_divdiff1_batch(fns.potential_divdiff1, n, near, ends, widths, p, rise)
         for j in range(n):
             missed = ahead[j] * ((w0[j] - widths[j] * rise[0, j]) / rise[2, j])
             halves[j] += choose(steep[j] == 1.0, missed, 0.0)
@@ -110,7 +110,7 @@ def launch(fns, n, s, p, known, monotone, work):  # type: ignore[no-untyped-def]
     lows, highs, periods = known[0, :n], known[1, :n], known[2, :n]
     places, places_low, steps = known[3, :n], known[4, :n], known[5, :n]
     axis, next_axis, zero, behind = s[AXIS, :n], s[STEP, :n], s[AHEAD, :n], s[BEHIND, :n]
-    if monotone and fns[7]:
+    if monotone and fns.turning_point:
         by_closed_form(fns, n, s, p, known, work)
     else:
         behind[:], zero[:], state[:] = nan, 0.0, SEEKING
@@ -119,7 +119,7 @@ def launch(fns, n, s, p, known, monotone, work):  # type: ignore[no-untyped-def]
         undecided[j] = choose((w0[j] == 0.0) & (behind[j] != behind[j]), 1.0, 0.0)
     if any_is(undecided, 1.0):
         none[:] = 0.0
-        call_potential_divdiff1_batch(fns[0], n, start, start, none, p, rows)
+        call_potential_divdiff1_batch(fns.potential_divdiff1, n, start, start, none, p, rows)
         for j in range(n):
             falls = (rows[2, j] < 0.0) * 1.0 - (rows[2, j] > 0.0) * 1.0
             way[j] = choose(undecided[j] == 1.0, falls, way[j])
@@ -186,7 +186,7 @@ def seek(fns, n, s, p, work):  # type: ignore[no-untyped-def]
         for j in range(n):
             offsets[j] = way[j] * trial[j]
             places[j] = start[j] + offsets[j]
-        call_potential_divdiff1_batch(fns[0], n, start, places, offsets, p, rows)
+        call_potential_divdiff1_batch(fns.potential_divdiff1, n, start, places, offsets, p, rows)
         for j in range(n):
             at, w = trial[j], w0[j] - offsets[j] * rows[0, j]
             before = w > 0.0
@@ -259,11 +259,11 @@ def prove(fns, kind, mirrored, pieces, n, s, p, work):  # type: ignore[no-untype
             offsets[j] = most[j] if end else least[j] + share * (most[j] - least[j])
             places[j] = start[j] + offsets[j]
             lo[j], hi[j] = behind[j], places[j]
-        call_bounds_batch(fns[2], n, lo, hi, p, box)
+        call_bounds_batch(fns.bounds, n, lo, hi, p, box)
         if end:
             rows[0] = 0.0
         else:
-            call_potential_divdiff1_batch(fns[0], n, start, places, offsets, p, rows)
+            call_potential_divdiff1_batch(fns.potential_divdiff1, n, start, places, offsets, p, rows)
         for j in range(n):
             lost = offsets[j] * rows[0, j]
             w, clear = w0[j] - lost, UNRESOLVED * (w0[j] + fabs(lost))
