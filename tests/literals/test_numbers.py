@@ -397,7 +397,7 @@ def test_rational_numbers_need_neither_mpmath_nor_sympy():
     """Reading floats, ints and decimals must not load what exact digits need."""
     code = (
         "import sys\n"
-        "from gqm_sym.runtime.numbers import read_number\n"
+        "from gqm_sym.literals.numbers import read_number\n"
         "for given in (9.81, 3, '9.81', '-6/5', '2**10', 'pi/2', '-pi/2 + 6/5'):\n"
         "    read_number(given, where='t')\n"
         "assert not {'mpmath', 'sympy'} & set(sys.modules)\n"

@@ -16,7 +16,7 @@ from gqm_sym.emission import charts
 from gqm_sym.emission.ir import ChartIR
 from gqm_sym.errors import LaunchError, SolutionError
 from gqm_sym.runtime.charts import evaluate
-from gqm_sym.runtime.charts.chart import NODES, Chart, assemble, resolved
+from gqm_sym.runtime.charts.chart import NODES, Chart, assemble
 from gqm_sym.sympy_charts import chart_x, chart_z
 
 ULP = 2.0**-52
@@ -194,12 +194,6 @@ def test_nearest_point() -> None:
     line = assemble(edges=[0.0, 1.0, 2.0], anchors=[[0.0, 0.0], [1.0, 0.0]], angles=flat, curvatures=flat)
     for x, end in ((-1.0, 0.0), (3.0, 2.0)):  # beyond an end that is the nearest
         assert line.nearest(x, 1.0) == pytest.approx((end, np.sqrt(2.0)), rel=4 * ULP)
-
-
-def test_resolution_is_seen() -> None:
-    """A piece that is too long for the degree shows it."""
-    assert resolved(np.sin(0.5 * NODES))
-    assert not resolved(np.sin(8.0 * NODES))
 
 
 @pytest.mark.parametrize(

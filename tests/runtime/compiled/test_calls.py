@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 import gqm_sym as gqm
-from gqm_sym.runtime import jit
+from gqm_sym.runtime.compiled import jit
 
 ModuleOf = Callable[[str], ModuleType]
 
