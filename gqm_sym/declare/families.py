@@ -2,7 +2,7 @@
 
 ``families.ellipse(a=2, b="b_e")`` declares an ellipse whose semi-axis a is 2 unless another value
 is given at run time, and whose b is called ``b_e``. A new family is a row here and one in
-``tests/problems.py``.
+``tests/support/problems.py``.
 """
 
 from collections.abc import Callable, Iterable
