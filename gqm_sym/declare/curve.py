@@ -1,7 +1,7 @@
 """A planar curve as it was declared: coordinates, parameter, domain and run-time parameters."""
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import sympy as sp
@@ -15,7 +15,6 @@ from gqm_sym.parameters import Parameters, Value, names_in_order, read_parameter
 from gqm_sym.sympy_charts import chart_x, chart_z
 
 if TYPE_CHECKING:
-    from gqm_sym.declare.implicit import Level
     from gqm_sym.declare.piecewise import Piece
     from gqm_sym.smoothing import Smoothing
 
@@ -111,7 +110,8 @@ class Curve:
         """
         symbol = _symbol(parameter, "graph")
         height = read_expression(z, where="graph: z")
-        return _declare("graph", symbol, height, symbol, domain, None, parameters, title, positive)
+        forms = cls(kind="graph", x=symbol, z=height, parameter=symbol, title=title)
+        return _declare(forms, domain, parameters, positive)
 
     @classmethod
     @checked("Curve.parametric")
@@ -139,7 +139,8 @@ class Curve:
         symbol = _symbol(parameter, "parametric")
         first = read_expression(x, where="parametric: x")
         second = read_expression(z, where="parametric: z")
-        return _declare("parametric", first, second, symbol, domain, period, parameters, title, positive)
+        forms = cls(kind="parametric", x=first, z=second, parameter=symbol, title=title)
+        return _declare(forms, domain, parameters, positive, period)
 
     @classmethod
     @checked("Curve.polar")
@@ -157,18 +158,9 @@ class Curve:
         """Declare ``r = r(θ)``, θ from the positive x axis; r may be negative."""
         symbol = _symbol(parameter, "polar")
         radius = read_expression(r, where="polar: r")
-        return _declare(
-            "polar",
-            radius * sp.cos(symbol),
-            radius * sp.sin(symbol),
-            symbol,
-            domain,
-            period,
-            parameters,
-            title,
-            positive,
-            radius,
-        )
+        x, z = radius * sp.cos(symbol), radius * sp.sin(symbol)
+        forms = cls(kind="polar", x=x, z=z, parameter=symbol, title=title, radius=radius)
+        return _declare(forms, domain, parameters, positive, period)
 
     @classmethod
     @checked("Curve.implicit")
@@ -209,9 +201,9 @@ class Curve:
         level = read_level(F, start=start, tangent=tangent, parameter=symbol.name)
         ends = read_ends(domain, "implicit")
         check_domain(*ends)
-        return _declare(
-            "implicit", chart_x(symbol), chart_z(symbol), symbol, ends, None, parameters, title, positive, level=level
-        )
+        x, z = chart_x(symbol), chart_z(symbol)
+        forms = cls(kind="implicit", x=x, z=z, parameter=symbol, title=title, definition=level)
+        return _declare(forms, ends, parameters, positive, names_of_level=level.names)
 
     @classmethod
     @checked("Curve.sampled")
@@ -336,41 +328,26 @@ def check_parameter_name(name: str, kind: str) -> str:
 
 
 def _declare(
-    kind: str,
-    x: sp.Expr,
-    z: sp.Expr,
-    symbol: sp.Symbol,
+    forms: Curve,
     domain: Iterable[Source | None] | None,
-    period: Source | None,
     parameters: Parameters | None,
-    title: str,
     positive: Iterable[str],
-    radius: sp.Expr | None = None,
-    level: "Level | None" = None,
+    period: Source | None = None,
+    names_of_level: tuple[str, ...] = (),
 ) -> Curve:
+    """The curve of these coordinates with its domain, its period and its run-time parameters, read and checked."""
+    kind, symbol = forms.kind, forms.parameter
     ends = read_ends(domain, kind)
     turn = None if period is None else read_expression(period, where=f"{kind}: period")
-    written = (x, z) if radius is None else (radius,)
+    written = (forms.x, forms.z) if forms.radius is None else (forms.radius,)
     given = tuple(end for end in (*ends, turn) if end is not None)
-    used = (*names_in_order(*written), *(() if level is None else level.names), *names_in_order(*given))
+    used = (*names_in_order(*written), *names_of_level, *names_in_order(*given))
     found = tuple(name for name in dict.fromkeys(used) if name != symbol.name)
     defaults = read_parameters(parameters, found=found, where=f"{kind} curve")
     if turn is None and kind in ("parametric", "polar") and ends == (None, None):
-        turn = found_period((x, z), symbol)
+        turn = found_period((forms.x, forms.z), symbol)
     promised = names(positive, where=f"{kind}: positive")
     for name in promised:
         if name not in found:
             raise DeclarationError(f"{kind} curve: {short(name)} is promised to be positive but not used; remove it")
-    return Curve(
-        kind=kind,
-        x=x,
-        z=z,
-        parameter=symbol,
-        domain=ends,
-        period=turn,
-        defaults=defaults,
-        title=title,
-        positive=promised,
-        radius=radius,
-        definition=level,
-    )
+    return replace(forms, domain=ends, period=turn, defaults=defaults, positive=promised)
