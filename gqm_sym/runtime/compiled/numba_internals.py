@@ -1,19 +1,23 @@
-"""The only file that uses names that numba does not document. Each of them saves time; none of them is needed.
+"""The only file that uses names which numba does not document. Each of them saves time; none of them is needed.
 
-=============================== ========================================== ===========================================
-name                            what it is used for                        what is done where numba lacks it
-=============================== ========================================== ===========================================
-``caching.FunctionCache``,      a disk cache that knows of every file of   ``cache=True``, in a folder of the cache
-``caching.IndexDataCacheFile``, the runtime, and is read before numba      that is named by the runtime's digest; only
-``Dispatcher._cache``           prepares to compile (`KeyedCache`)         functions called from Python are cached
-``ccallback.CFunc``             the same for functions called by address   ``numba.cfunc(..., cache=True)`` as above
-``runtime.rtsys``               cached code runs without the preparation   the preparation: 0.3 s in each process
-``environment.Environment``,    cached code is read without the modules    reading imports those modules
-``lookup_environment``          that its environments name
-``CompileResult.entry_point``   a call without a check of its arguments    calls take half a microsecond longer
-=============================== ========================================== ===========================================
+=================================== ==================================== ===============================================
+name                                what it is used for                  what is done where numba lacks it
+=================================== ==================================== ===============================================
+``caching.FunctionCache``,          a disk cache that notices an edit    ``cache=True``, in a cache folder named by the
+``caching.IndexDataCacheFile``,     of any file of the runtime, and is   runtime's digest; only functions called from
+``_cache`` of a compiled function   read before numba prepares to        Python or by address are cached, and each
+                                    compile (`KeyedCache`)               process takes 0.4 s of CPU time longer to start
+``ccallback.CFunc``                 the same cache for functions         ``numba.cfunc(..., cache=True)``: 0.4 s longer
+                                    called by address
+``runtime.rtsys``                   code from the cache runs without     the preparation: 0.4 s longer
+                                    numba's preparation
+``environment.Environment``,        code from the cache is read          reading imports them: 0.2 s longer
+``environment.lookup_environment``  without importing numba's modules
+``entry_point`` of an overload      calls without a check of the         each call takes 0.5 microseconds longer
+                                    arguments' types
+=================================== ==================================== ===============================================
 
-The results are the same digits in every case (`tests/test_numba_internals.py`).
+The digits of all results are the same in every case (`tests/test_numba_internals.py`).
 """
 
 import hashlib
@@ -123,7 +127,7 @@ class KeyedCache(FunctionCache):  # type: ignore[misc]
     """numba's disk cache, read before numba prepares to compile, and aware of changes anywhere in the runtime.
 
     The preparation imports and registers everything that compiling may need (SciPy's linear algebra as well) and takes
-    some tenths of a second; code from the cache needs none of it. numba itself notices changes of a function's own
+    0.4 s; code from the cache needs none of it. numba itself notices changes of a function's own
     file only, but compiled code contains functions of several files: the key holds ``stamp``, the digest of the
     runtime's text, and the module's name, which for generated modules is made from their text (`jit.compiler`). A file
     that cannot be read is compiled again, and a file that cannot be written is left out.

@@ -19,7 +19,7 @@ from gqm_sym.runtime.motion.motion import Motion
 from gqm_sym.runtime.motion.rows import Rows
 from gqm_sym.runtime.motion.segment import Segment, through, toward_equilibrium
 from gqm_sym.runtime.motion.trajectory import PhasePoints, TimedSegment, Trajectory
-from gqm_sym.runtime.quadrature.time_panels import NOTHING
+from gqm_sym.runtime.quadrature.time_panels import NEGLIGIBLE_SHARE
 
 
 @dataclass(slots=True)
@@ -214,8 +214,8 @@ class AperiodicMotion(Motion):
             )
         stretch = through(f, end.place, target, lam0, problem.w0)
         if self._pieces and (
-            stretch.duration <= NOTHING * self._pieces[-1].t_stop[0]
-            and stretch.length <= NOTHING * abs(self._arc_end())
+            stretch.duration <= NEGLIGIBLE_SHARE * self._pieces[-1].t_stop[0]
+            and stretch.length <= NEGLIGIBLE_SHARE * abs(self._arc_end())
         ):
             self._ends_here()  # a spiral has come to its centre
             return

@@ -26,8 +26,8 @@ from gqm_sym.runtime.motion.motion import Motion
 from gqm_sym.runtime.motion.periodic import PeriodicMotion
 from gqm_sym.runtime.motion.segment import Segment, between_turns, from_turn, through
 from gqm_sym.runtime.multiprecision.exact_panels import DIGITS, lay_exactly
-from gqm_sym.runtime.quadrature.integrands import REGULAR
-from gqm_sym.runtime.quadrature.time_panels import LEAST_BALANCE
+from gqm_sym.runtime.quadrature.substitution import REGULAR
+from gqm_sym.runtime.quadrature.time_panels import MIN_CANCELLATION_RATIO
 
 OFF_CUSP = 1e-6
 
@@ -201,7 +201,7 @@ def _gathering_speed(passage: AperiodicMotion, top: float) -> float:
     fastest = speed_squared_at(f.addresses, f.p, lam0, problem.launch.lam0.low, w0, places, places - lam0)[0]
     if w0 >= fastest:
         return lam0
-    if w0 >= LEAST_BALANCE * fastest or f.exact is None:
+    if w0 >= MIN_CANCELLATION_RATIO * fastest or f.exact is None:
         passage.add(through(f, lam0, middle, lam0, w0), 1, "")
         return middle
     # As slow as this the launch is next to an equilibrium, its place to be taken as exactly as it was given.

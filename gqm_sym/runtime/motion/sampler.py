@@ -12,7 +12,7 @@ from gqm_sym.runtime.inversion import records
 from gqm_sym.runtime.inversion.fourier import fit_wave
 from gqm_sym.runtime.launch.problem import Problem
 from gqm_sym.runtime.motion.trajectory import Trajectory
-from gqm_sym.runtime.quadrature.integrands import TURN_TURN
+from gqm_sym.runtime.quadrature.substitution import TURN_TURN
 
 # Times a thread is worth starting for.
 PLACES, STATES = 2**16, 2**12
@@ -63,7 +63,7 @@ class Sampler:
         self._v0, self._drift = direction * problem.launch.v0.value, drift
         self._sections = {
             records.FUNCTIONS: np.array([*problem.functions.addresses, stretch.kind], dtype=np.int64),
-            records.DIAL: np.array([*course.period, *_inverse(course.period), start, start_low, *ends]),
+            records.WAVE: np.array([*course.period, *_inverse(course.period), start, start_low, *ends]),
             records.CLOCK: np.array([*course.period, start, start_low, *stretch.whole, stretch.stop, course.pace]),
         }
         f = problem.functions
@@ -95,7 +95,7 @@ class Sampler:
                 records.EDGES: panels[0],
                 records.LENGTHS: panels[2],
                 records.ARCS: panels[4],
-                records.CLOCK_ERRORS: stretch.clock_error(middles),
+                records.TIME_ERRORS: stretch.clock_error(middles),
                 records.TABLE_ERRORS: stretch.inversion_error(segments.sum(axis=1)),
                 records.OWNERS: owners.astype(np.int64),
             }

@@ -10,16 +10,23 @@ import numpy as np
 from gqm_sym.errors import SolutionError
 from gqm_sym.runtime.arithmetic.doubledouble import ULP, running_totals
 from gqm_sym.runtime.compiled.types import Array
-from gqm_sym.runtime.inversion.table import TIMED, anomalies, build_table
+from gqm_sym.runtime.inversion.table import MAX_TIME_ERROR, build_table, phase_angles
 from gqm_sym.runtime.launch.functions import BoundFunctions
 from gqm_sym.runtime.motion.conditioning import magnified, off_launch
 from gqm_sym.runtime.multiprecision.exact_panels import DIGITS, exact_ends, lay_exactly
-from gqm_sym.runtime.quadrature.integrands import FROM_TURN, REGULAR, TO_EQUILIBRIUM, TURN_TURN, speeds_along, speeds_at
-from gqm_sym.runtime.quadrature.substitution import phase_angle_of, places_at
+from gqm_sym.runtime.quadrature.integrands import speeds_along, speeds_at
+from gqm_sym.runtime.quadrature.substitution import (
+    FROM_TURN,
+    REGULAR,
+    TO_EQUILIBRIUM,
+    TURN_TURN,
+    phase_angle_of,
+    places_at,
+)
 from gqm_sym.runtime.quadrature.time_panels import (
     FAILED,
     ILL_CONDITIONED,
-    LEAST_BALANCE,
+    MIN_CANCELLATION_RATIO,
     lay_along,
     lay_panels,
     read_off_many,
@@ -103,7 +110,9 @@ class Segment:
             self.w += self._off_launch()
             self.laid = lay_panels(f.addresses, f.p, self.kind, self.a, self.b, self.ref, self.w, self._marks())
         self._conditioning = max(1.0 / self.balance if self.balance > 0.0 else inf, self._magnified())
-        hard = self._conditioning > 1.0 / LEAST_BALANCE or (self.kind == FROM_TURN and self._is_short(LEAST_TIMED))
+        hard = self._conditioning > 1.0 / MIN_CANCELLATION_RATIO or (
+            self.kind == FROM_TURN and self._is_short(LEAST_TIMED)
+        )
         if f.exact is not None and not self._from_exact and hard:
             self.ends = exact_ends(f.exact, DIGITS, self.kind, self.a, self.b, self.ends)
             self.a, self.b = float(self.ends[0]), float(self.ends[1])
@@ -191,7 +200,7 @@ class Segment:
 
     def clock_error(self, phi: Array) -> Array:
         """Estimated error of its clock at anomalies: of the whole time, or of the panel's where its edges are exact."""
-        error = self.relative_error + ULP + TIMED
+        error = self.relative_error + ULP + MAX_TIME_ERROR
         which = np.clip(np.searchsorted(self.edges, phi, side="right") - 1, 0, len(self.edges) - 2)
         times = self.clock[0]
         if self._is_timed:
@@ -261,7 +270,7 @@ class Segment:
 
     def anomaly(self, t: Array, t_low: Array) -> Array:
         """The anomaly at times ``t + t_low`` from the end ``a``; exactly the first and the last one at both ends."""
-        phi: Array = anomalies(*self.table[:6], t, t_low)
+        phi: Array = phase_angles(*self.table[:6], t, t_low)
         whole = self.whole
         phi[t + t_low <= 0.0] = 0.0
         phi[(t - whole[0]) + (t_low - whole[1]) >= 0.0] = self.edges[-1]
