@@ -58,7 +58,7 @@ def conservative() -> list[tuple[str, float]]:
                 lambda: time_panels.lay_panels(f.addresses, f.p, 0, segment.a, segment.b, 0.0, 0.0, panels[0][[0, -1]])
             ),
         ),
-        ("- table of the anomaly", least(lambda: table.build_table(panels[0], *clock, panels[3]))),
+        ("- table of the phase angle", least(lambda: table.build_table(panels[0], *clock, panels[3]))),
     ]
 
 

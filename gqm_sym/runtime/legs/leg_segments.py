@@ -15,7 +15,7 @@ from gqm_sym.runtime.legs.approach import COLUMNS as FIELD
 from gqm_sym.runtime.legs.leg_record import COLUMNS, ERROR, HEAD, MET, RIGHT, SLACK, TIME
 from gqm_sym.runtime.legs.polynomials import COUNT, TO_COEFFICIENTS, WIDE
 from gqm_sym.runtime.motion.segment import Segment
-from gqm_sym.runtime.quadrature.integrands import FROM_TURN, REGULAR, TO_EQUILIBRIUM
+from gqm_sym.runtime.quadrature.substitution import FROM_TURN, REGULAR, TO_EQUILIBRIUM
 from gqm_sym.runtime.quadrature.time_panels import CONVERGED
 
 # An equilibrium is approached until the distance left is exp(-this) of the leg: all that doubles have.

@@ -20,7 +20,7 @@ from gqm_sym.runtime.motion.motion import Motion
 from gqm_sym.runtime.motion.rows import Rows
 from gqm_sym.runtime.motion.segment import Segment, through, toward_equilibrium
 from gqm_sym.runtime.motion.trajectory import PhasePoints, TimedSegment, Trajectory
-from gqm_sym.runtime.quadrature.time_panels import NOTHING
+from gqm_sym.runtime.quadrature.time_panels import NEGLIGIBLE_SHARE
 
 
 @dataclass(slots=True)
@@ -203,8 +203,8 @@ class AperiodicMotion(Motion):
             )
         segment = through(f, end.place, target, lam0, problem.w0)
         if self._segments and (
-            segment.duration <= NOTHING * self._segments[-1].t_stop[0]
-            and segment.length <= NOTHING * abs(self._arc_end())
+            segment.duration <= NEGLIGIBLE_SHARE * self._segments[-1].t_stop[0]
+            and segment.length <= NEGLIGIBLE_SHARE * abs(self._arc_end())
         ):
             self._end_here()  # the motion along a spiral has come to its centre
             return

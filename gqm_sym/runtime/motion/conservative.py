@@ -27,8 +27,8 @@ from gqm_sym.runtime.motion.motion import Motion
 from gqm_sym.runtime.motion.periodic import PeriodicMotion
 from gqm_sym.runtime.motion.segment import Segment, between_turns, from_turn, through
 from gqm_sym.runtime.multiprecision.exact_panels import DIGITS, lay_exactly
-from gqm_sym.runtime.quadrature.integrands import REGULAR
-from gqm_sym.runtime.quadrature.time_panels import LEAST_BALANCE
+from gqm_sym.runtime.quadrature.substitution import REGULAR
+from gqm_sym.runtime.quadrature.time_panels import MIN_CANCELLATION_RATIO
 
 # Distance from a cusp or a corner, as a share of the first step, at which V**2 is evaluated and a search begins.
 NEAR_CUSP = 1e-6
@@ -234,7 +234,7 @@ def _to_half_way(motion: AperiodicMotion, equilibrium: float) -> float:
     middle_v2 = speed_squared_at(f.addresses, f.p, lam0, problem.launch.lam0.low, w0, places, places - lam0)[0]
     if w0 >= middle_v2:
         return lam0
-    if w0 >= LEAST_BALANCE * middle_v2 or f.exact is None:
+    if w0 >= MIN_CANCELLATION_RATIO * middle_v2 or f.exact is None:
         motion.add(through(f, lam0, middle, lam0, w0), 1, "")
         return middle
     # A launch as slow as this is next to another equilibrium, and its place is needed as exactly as it was given.

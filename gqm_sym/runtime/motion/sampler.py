@@ -12,7 +12,7 @@ from gqm_sym.runtime.inversion import records
 from gqm_sym.runtime.inversion.fourier import fit_wave
 from gqm_sym.runtime.launch.problem import Problem
 from gqm_sym.runtime.motion.trajectory import Trajectory
-from gqm_sym.runtime.quadrature.integrands import TURN_TURN
+from gqm_sym.runtime.quadrature.substitution import TURN_TURN
 
 # The fewest times for which another thread is started.
 MIN_PLACES_PER_THREAD, MIN_STATES_PER_THREAD = 2**16, 2**12
@@ -66,7 +66,7 @@ class Sampler:
         own_times = (*segment.total_time, segment.stop, trajectory.time_scale_error)
         self._sections = {
             records.FUNCTIONS: np.array([*problem.functions.addresses, segment.kind], dtype=np.int64),
-            records.DIAL: np.array([*trajectory.period, *_inverse(trajectory.period), start, start_low, *ends]),
+            records.WAVE: np.array([*trajectory.period, *_inverse(trajectory.period), start, start_low, *ends]),
             records.CLOCK: np.array([*trajectory.period, start, start_low, *own_times]),
         }
         f = problem.functions
@@ -98,7 +98,7 @@ class Sampler:
                 records.EDGES: panels[0],
                 records.LENGTHS: panels[2],
                 records.ARCS: panels[4],
-                records.CLOCK_ERRORS: segment.time_error(middles),
+                records.TIME_ERRORS: segment.time_error(middles),
                 records.TABLE_ERRORS: segment.inversion_error(intervals.sum(axis=1)),
                 records.OWNERS: owners.astype(np.int64),
             }

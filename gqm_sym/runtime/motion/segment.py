@@ -10,16 +10,23 @@ import numpy as np
 from gqm_sym.errors import SolutionError
 from gqm_sym.runtime.arithmetic.doubledouble import ULP, running_totals
 from gqm_sym.runtime.compiled.types import Array
-from gqm_sym.runtime.inversion.table import TIMED, anomalies, build_table
+from gqm_sym.runtime.inversion.table import MAX_TIME_ERROR, build_table, phase_angles
 from gqm_sym.runtime.launch.functions import BoundFunctions
 from gqm_sym.runtime.motion.conditioning import launch_condition_number, v2_correction
 from gqm_sym.runtime.multiprecision.exact_panels import DIGITS, exact_ends, lay_exactly
-from gqm_sym.runtime.quadrature.integrands import FROM_TURN, REGULAR, TO_EQUILIBRIUM, TURN_TURN, speeds_along, speeds_at
-from gqm_sym.runtime.quadrature.substitution import phase_angle_of, places_at
+from gqm_sym.runtime.quadrature.integrands import speeds_along, speeds_at
+from gqm_sym.runtime.quadrature.substitution import (
+    FROM_TURN,
+    REGULAR,
+    TO_EQUILIBRIUM,
+    TURN_TURN,
+    phase_angle_of,
+    places_at,
+)
 from gqm_sym.runtime.quadrature.time_panels import (
     FAILED,
     ILL_CONDITIONED,
-    LEAST_BALANCE,
+    MIN_CANCELLATION_RATIO,
     lay_along,
     lay_panels,
     read_off_many,
@@ -111,7 +118,7 @@ class Segment:
                 f.addresses, f.p, self.kind, self.a, self.b, self.ref, self.ref_v2, self._initial_edges()
             )
         self._condition_number = max(1.0 / self.balance if self.balance > 0.0 else inf, self._launch_condition_number())
-        needs_multiprecision = self._condition_number > 1.0 / LEAST_BALANCE or (
+        needs_multiprecision = self._condition_number > 1.0 / MIN_CANCELLATION_RATIO or (
             self.kind == FROM_TURN and self._is_short(MIN_TIMED_WIDTH_SHARE)
         )
         if f.exact is not None and not self._from_multiprecision and needs_multiprecision:
@@ -204,7 +211,7 @@ class Segment:
 
         It is a share of the whole duration, or of the panel's where the times of its edges are exact.
         """
-        error = self.relative_error + ULP + TIMED
+        error = self.relative_error + ULP + MAX_TIME_ERROR
         which = np.clip(np.searchsorted(self.edges, phi, side="right") - 1, 0, len(self.edges) - 2)
         times = self.edge_times[0]
         if self._has_given_times:
@@ -277,7 +284,7 @@ class Segment:
 
     def phase_angle(self, t: Array, t_low: Array) -> Array:
         """The phase angle at times t + t_low in s from the end ``a``; at both ends it is exact."""
-        phi: Array = anomalies(*self.table[:6], t, t_low)
+        phi: Array = phase_angles(*self.table[:6], t, t_low)
         total_time = self.total_time
         phi[t + t_low <= 0.0] = 0.0
         phi[(t - total_time[0]) + (t_low - total_time[1]) >= 0.0] = self.edges[-1]

@@ -15,8 +15,8 @@ from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.launch.problem import Problem
 from gqm_sym.runtime.motion.segment import Segment
 from gqm_sym.runtime.multiprecision.exact_panels import exact_ends
-from gqm_sym.runtime.multiprecision.exact_problem import SMOOTH_PANELS, Arithmetic, two_doubles
-from gqm_sym.runtime.quadrature.integrands import REGULAR, TURN_TURN
+from gqm_sym.runtime.multiprecision.exact_problem import MAX_SMOOTH_PANELS, Arithmetic, two_doubles
+from gqm_sym.runtime.quadrature.substitution import REGULAR, TURN_TURN
 
 # Digits of a period as two doubles, and of the time from a turning point to the launch; the latter needs fewer, because
 # it is not multiplied by the number of periods.
@@ -125,9 +125,9 @@ def _durations(
     else:
         low, high = exact_ends(problem.exact, a.digits, TURN_TURN, segment.a, segment.b, segment.ends)
         code, stop = TURN_TURN, a.context.pi
-    is_smooth = len(segment.edges) - 1 <= SMOOTH_PANELS
+    is_smooth = len(segment.edges) - 1 <= MAX_SMOOTH_PANELS
     if is_smooth and a.track.joints(low, high) is None:
-        value = a.trapezoid(a.anomaly_rate(code, low, high), stop, digits)
+        value = a.trapezoid(a.time_rate(code, low, high), stop, digits)
         if value is not None:
             return [value], low, high
     edges = [*(a.mpf(float(e)) for e in segment.edges[:-1]), stop]

@@ -30,10 +30,10 @@ from gqm_sym.runtime.launch.ends import NO_ORBIT, ends, orbit_kind
 from gqm_sym.runtime.quadrature.trapezoid import (
     CIRCULATION,
     LIBRATION,
-    rate_room,
     time_by_panels,
     time_by_trapezoid,
-    work_room,
+    trapezoid_rates,
+    trapezoid_workspace,
 )
 from gqm_sym.runtime.sweep.arrivals import arrival
 from gqm_sym.runtime.sweep.orbit_extremes import extreme
@@ -68,7 +68,7 @@ def answer_one_by_one(fns, columns, monotone, asked, spans, out, reasons, held):
     ``spans`` are those that batches found. A row of ``out`` holds both turning points (PLACES), or one number. ``held``
     is room for the parameters of one launch.
     """
-    work, series, p = work_room(), rate_room(), uncounted(held)
+    work, series, p = trapezoid_workspace(), trapezoid_rates(), uncounted(held)
     for k in range(reasons.size):
         spanned = reasons[k] == SPAN_KNOWN
         if reasons[k] != UNDECIDED and not spanned:
