@@ -30,11 +30,11 @@ def conservative() -> list[tuple[str, float]]:
     model, given = pendulum.MODEL, tuple(pendulum.PARAMETERS.values())
     p = model.numbers(given)
     launch = read_launch(model, p, LaunchRequest(-0.37))
-    f, (low, high, period, _, place, step) = bind(model, p, launch), model.domain(p)
+    f, domain = bind(model, p, launch), model.domain(p).numbers
     motion = pendulum.solve(-0.37)
     motion.state(1000.0)
-    stretch = motion._stretch
-    panels, clock = stretch.panels, stretch.clock
+    segment = motion._segment
+    panels, clock = segment.panels, segment.edge_times
 
     def first(ask: str) -> Any:
         return getattr(pendulum.solve(-0.37), ask)(1.0)
@@ -46,7 +46,7 @@ def conservative() -> list[tuple[str, float]]:
         ("- functions and the exact problem", least(lambda: bind(model, p, launch))),
         (
             "- the crossing: turning points, kind, half period",
-            least(lambda: survey(f.addresses, f.p, -0.37, 0.0, 1, low, high, period, place, step)),
+            least(lambda: survey(f.addresses, f.p, -0.37, 0.0, 1, domain)),
         ),
         ("`lam` at one time", least(lambda: motion.lam(1000.0))),
         ("`state` at one time", least(lambda: motion.state(1000.0))),
@@ -55,10 +55,10 @@ def conservative() -> list[tuple[str, float]]:
         (
             "- panels of time",
             least(
-                lambda: time_panels.lay_panels(f.addresses, f.p, 0, stretch.a, stretch.b, 0.0, 0.0, panels[0][[0, -1]])
+                lambda: time_panels.lay_panels(f.addresses, f.p, 0, segment.a, segment.b, 0.0, 0.0, panels[0][[0, -1]])
             ),
         ),
-        ("- table of the anomaly", least(lambda: table.build_table(panels[0], *clock, panels[3]))),
+        ("- table of the phase angle", least(lambda: table.build_table(panels[0], *clock, panels[3]))),
     ]
 
 

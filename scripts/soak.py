@@ -125,7 +125,7 @@ def faults(module: ModuleType, call: dict[str, Any], draw: random.Random, closel
     if module.MODEL.dissipation is not None:
         # With losses V**2 depends on the way: pass 1 tells that of the first leg, if places in doubles tell it apart.
         held = (t <= legs[0].t_end) & (abs(legs[0].lam_end - legs[0].lam_start) > SLACK * bit)
-    share = PACED if any(piece.stretch.from_exact for piece in motion._course(0.0).pieces) else ENERGY
+    share = PACED if any(timed.segment.from_multiprecision for timed in motion._trajectory(0.0).segments) else ENERGY
     if not np.all((np.abs(v2 - told) <= share * most + unsure)[held]):
         told, unsure = speed_squared(module, motion, lam, bit, launch, True, most)  # heights may cancel in themselves
     off = np.abs(v2 - told)[held]

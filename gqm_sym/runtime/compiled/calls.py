@@ -65,18 +65,19 @@ call_field = _caller("field")
 
 
 @intrinsic
-def call_speed_equation(_, address, n, work, lam, v2, v, nu, p, out):  # type: ignore[no-untyped-def]
-    """Fill ds, P, Q, n0 and kappa for a leg of signs v and nu: of ``work``, from ``out`` on.
+def call_speed_equation(_, address, n, work, rows, v, nu, p):  # type: ignore[no-untyped-def]
+    """Fill ds/dlam, P, Q, n0 and kappa for a leg of signs v and nu.
 
-    Places and V**2 stand in the same line of numbers from ``lam`` and ``v2`` on: views of it would have to be counted.
+    ``rows`` are the positions in the array ``work`` at which the places begin, V**2, and the results: numba would count
+    references to views.
     """
 
     def lower(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        address, n, work, lam, v2, v, nu, p, out = args
+        address, n, work, positions, v, nu, p = args
         line = line_of(context, builder, signature.args[2], work)
-        kinds = (*signature.args[:2], *(types.CPointer(types.float64),) * 2, *signature.args[5:8])
+        kinds = (*signature.args[:2], *(types.CPointer(types.float64),) * 2, *signature.args[4:7])
         kinds = (*kinds, types.CPointer(types.float64))
-        places, speeds, rows = (builder.gep(line, [at]) for at in (lam, v2, out))
-        return _call(context, builder, types.void(*kinds), (address, n, places, speeds, v, nu, p, rows))
+        places, speeds, out = (builder.gep(line, [builder.extract_value(positions, k)]) for k in range(3))
+        return _call(context, builder, types.void(*kinds), (address, n, places, speeds, v, nu, p, out))
 
-    return types.void(address, n, work, types.intp, types.intp, v, nu, p, types.intp), lower
+    return types.void(address, n, work, rows, v, nu, p), lower

@@ -15,7 +15,7 @@ from gqm_sym.runtime.launch.functions import BoundFunctions
 from gqm_sym.runtime.launch.problem import Problem, bind
 from gqm_sym.runtime.launch.request import Launch
 from gqm_sym.runtime.launch.speed import path_and_force_at
-from gqm_sym.runtime.launch.zeros import FARTHEST
+from gqm_sym.runtime.launch.zeros import MAX_PARAMETER
 from gqm_sym.runtime.legs import follow
 from gqm_sym.runtime.legs.leg_breaks import grain
 from gqm_sym.runtime.legs.leg_record import BEFORE, COLUMNS, END, END_LOW, MIDDLE
@@ -142,10 +142,10 @@ class DissipativeMotion(Motion):
         done, lap = 0, self.problem.period
         while True:
             for piece in self._pieces[done:]:
-                stretch = piece.stretch
+                stretch = piece.segment
                 within = places - piece.laps * lap
                 on = (within >= min(stretch.a, stretch.b)) & (within <= max(stretch.a, stretch.b)) & np.isnan(v2)
-                phi = [stretch.anomaly_of(*stretch.offsets(place)) for place in within[on].tolist()]
+                phi = [stretch.phase_angle_of(*stretch.offsets(place)) for place in within[on].tolist()]
                 v2[on] = stretch.speeds(np.minimum(phi, stretch.stop)) ** 2
                 if piece.end not in ("", "contact-sign"):
                     return
@@ -162,44 +162,44 @@ class DissipativeMotion(Motion):
     # -- what `Motion` asks -------------------------------------------------------------------
 
     @property
-    def _joints(self) -> tuple[str, ...]:
+    def _internal_ends(self) -> tuple[str, ...]:
         return ("",) if _loss(self.problem).friction else ("", "contact-sign")
 
-    def _course(self, reach: float) -> Trajectory:
+    def _trajectory(self, reach: float) -> Trajectory:
         if isfinite(self._horizon):
             reach = max(reach, self._horizon)
         while not self._ending and self._elapsed + self._rest < reach:
             self._go_on()
-        if self._whole is None or len(self._whole.pieces) != len(self._pieces):
-            self._whole = Trajectory(pieces=tuple(self._pieces), lap=self.problem.period)
+        if self._whole is None or len(self._whole.segments) != len(self._pieces):
+            self._whole = Trajectory(segments=tuple(self._pieces), lap=self.problem.period)
         return self._whole
 
     def _history(self) -> tuple[TimedSegment, ...]:
         self._look_ahead()
-        return self._course(0.0).pieces
+        return self._trajectory(0.0).segments
 
     def _contact_changes(self, piece: TimedSegment) -> list[tuple[Pair, float]]:
         return []  # pieces end there
 
     def _check_end(self, t: float) -> None:
-        self._course(t)
+        self._trajectory(t)
         end = self._known_end()
         if t > end:
-            raise InputError(f"t: the motion ends at {end!r} s ({self._how_it_ends()}), got {t!r}")
+            raise InputError(f"t: the motion ends at {end!r} s ({self._end_text()}), got {t!r}")
         if self._ending == "asymptote" and t > self._pieces[-1].t_stop[0]:
             raise SolutionError(
                 f"t = {t!r}: by then the body is closer to the equilibrium at "
                 f"{self.problem.formulas.parameter} = {self._place!r} than doubles can tell"
             )
 
-    def _clock_error(self, t: Array) -> Array:
-        course = self._course(float(np.abs(t).max()) if t.size else 0.0)
-        worst = max(piece.stretch.relative_error for piece in course.pieces)
+    def _time_error(self, t: Array) -> Array:
+        course = self._trajectory(float(np.abs(t).max()) if t.size else 0.0)
+        worst = max(piece.segment.relative_error for piece in course.segments)
         return np.abs(t) * (worst + 4.0 * ULP)
 
-    def _how_it_ends(self) -> str:
+    def _end_text(self) -> str:
         if not self._ending or self._pieces[-1].t_stop[0] > self._horizon:
-            return super()._how_it_ends()
+            return super()._end_text()
         return (
             f"{self._ending} at {self.problem.formulas.parameter} = {self._place + self._laps * self.problem.period!r}"
         )
@@ -207,12 +207,12 @@ class DissipativeMotion(Motion):
     def _first_passages(self, lam: float, low: float) -> list[float]:
         done = 0
         while True:
-            course = self._course(0.0)
-            found = passages(course.pieces[done:], course, lam, low)
-            done = len(course.pieces)
+            course = self._trajectory(0.0)
+            found = passages(course.segments[done:], course, lam, low)
+            done = len(course.segments)
             # What turns between two points comes back to no place outside them.
             settled = self._turns >= 2 or (self._turns and self.problem.w0 == 0.0)
-            if found or self._ending or settled or course.pieces[-1].t_stop[0] >= self._horizon:
+            if found or self._ending or settled or course.segments[-1].t_stop[0] >= self._horizon:
                 return found
             self._go_on()
 
@@ -226,7 +226,7 @@ class DissipativeMotion(Motion):
     def _look_ahead(self) -> None:
         """Compute the whole motion where it ends, and else its first leg at least."""
         if isfinite(self._horizon):
-            self._course(self._horizon)
+            self._trajectory(self._horizon)
             return
         while not self._ending and self._pauses < MOST_PAUSES:
             if self._turns and (not self._held or self._turns > MOST_TURNS):
@@ -302,7 +302,7 @@ class DissipativeMotion(Motion):
             return
         if period:
             self._fold(period)
-        if abs(place) > FARTHEST and abs(place) > FARTHEST * abs(problem.lam0):
+        if abs(place) > MAX_PARAMETER and abs(place) > MAX_PARAMETER * abs(problem.lam0):
             raise SolutionError(
                 f"the motion leaves the range of doubles at {problem.formulas.parameter} = {place!r}; "
                 "give a shorter t_max"
@@ -369,7 +369,7 @@ class DissipativeMotion(Motion):
         if not end and stretch.b in run.changes:  # where counting time from the turn begins
             end = "contact-sign"
         low, high = sorted((stretch.a, stretch.b))
-        cuts = [stretch.anomaly_of(*stretch.offsets(place)) for place in run.changes if low < place < high]
+        cuts = [stretch.phase_angle_of(*stretch.offsets(place)) for place in run.changes if low < place < high]
         times = stretch.times(np.array(cuts)) if cuts else ()
         marks = [(ZERO, 0.0), *(((float(r), 0.0), phi) for r, phi in zip(times, cuts, strict=True))]
         marks.append(((stretch.duration, 0.0), stretch.stop))
@@ -383,7 +383,7 @@ class DissipativeMotion(Motion):
         self, stretch: Segment, sense: int, start: tuple[Pair, float], stop: tuple[Pair, float], end: str, laps: int
     ) -> TimedSegment:
         return TimedSegment(
-            stretch=stretch,
+            segment=stretch,
             sense=sense,
             r_start=start[0],
             r_stop=stop[0],

@@ -117,7 +117,7 @@ def sample(drive, p, u, g, near, v, nu, work):  # type: ignore[no-untyped-def]
 
     At its end too, which fills the registers; there they may not be numbers.
     """
-    call_speed_equation(drive, WIDE, work, ARC, W, float(v), float(nu), p, DS)
+    call_speed_equation(drive, WIDE, work, (ARC, W, DS), float(v), float(nu), p)
     pull(work, PULL, Q, PLACE, near, g, float(u))
 
 
@@ -147,7 +147,7 @@ def integrate(u, g, c, left, base, out, work):  # type: ignore[no-untyped-def]
 def settle(drive, p, u, g, c, left, base, v, nu, work):  # type: ignore[no-untyped-def]
     """`integrate` for forces that are not linear in V**2, by Newton's method; inf where that does not settle."""
     work[W] = max(base, 1e-300)  # it begins with what W does at once; laws may ask for its root
-    call_speed_equation(drive, 1, work, ARC, W, float(v), float(nu), p, MEAN)
+    call_speed_equation(drive, 1, work, (ARC, W, MEAN), float(v), float(nu), p)
     rise = max(u * (work[MEAN + 1] - work[MEAN + 2] * work[W]), 0.0)
     place(work, W, D, base, rise)
     stop = inf

@@ -84,7 +84,7 @@ def bottom(work, v, touch):  # type: ignore[no-untyped-def]
 def rise(drive, p, place, v2, v, nu, spot):  # type: ignore[no-untyped-def]
     """By how much V**2 grows per distance run in direction v."""
     spot[0], spot[1] = place, v2
-    call_speed_equation(drive, 1, spot, 0, 1, float(v), float(nu), p, 2)
+    call_speed_equation(drive, 1, spot, (0, 1, 2), float(v), float(nu), p)
     return v * (spot[3] - spot[4] * v2)
 
 

@@ -15,7 +15,7 @@ from gqm_sym.runtime.legs.approach import COLUMNS as FIELD
 from gqm_sym.runtime.legs.leg_record import COLUMNS, ERROR, HEAD, MET, RIGHT, SLACK, TIME
 from gqm_sym.runtime.legs.polynomials import COUNT, TO_COEFFICIENTS, WIDE
 from gqm_sym.runtime.motion.segment import Segment
-from gqm_sym.runtime.quadrature.integrands import FROM_TURN, REGULAR, TO_EQUILIBRIUM
+from gqm_sym.runtime.quadrature.substitution import FROM_TURN, REGULAR, TO_EQUILIBRIUM
 from gqm_sym.runtime.quadrature.time_panels import CONVERGED
 
 # An equilibrium is approached until the distance left is exp(-this) of the leg: all that doubles have.
@@ -138,14 +138,14 @@ def along_panels(f: BoundFunctions, a: Pair, b: Pair, slack: float, time: float,
         kind=REGULAR if slack == inf else FROM_TURN,
         a=a[0],
         b=b[0],
-        lows=(a[1], b[1]),
-        slack=0.0 if slack == inf else slack / last,
-        laid=(*laid, error, 1.0, CONVERGED),
-        paces=(last, speed_terms),
+        low_parts=(a[1], b[1]),
+        turn_offset=0.0 if slack == inf else slack / last,
+        stored_panels=(*laid, error, 1.0, CONVERGED),
+        speed_series=(last, speed_terms),
     )
 
 
 def along_field(f: BoundFunctions, a: float, b: float, field: Array) -> Segment:
     """A stretch towards an equilibrium b where V**2 is a field; its panels begin where the field's do."""
     hints = tuple(float(place) for place in b + np.sign(a - b) * field[:-1, 1])
-    return Segment(functions=f, kind=TO_EQUILIBRIUM, a=a, b=b, v2=field, stop=CLOSEST, hints=hints)
+    return Segment(functions=f, kind=TO_EQUILIBRIUM, a=a, b=b, v2=field, stop=CLOSEST, panel_breaks=hints)

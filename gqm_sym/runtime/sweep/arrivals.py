@@ -8,7 +8,7 @@ from gqm_sym.runtime.arithmetic.matrices import multiply
 from gqm_sym.runtime.compiled.calls import call_effective_potential, call_potential_divdiff1, call_potential_divdiff2
 from gqm_sym.runtime.compiled.intrinsics import fma
 from gqm_sym.runtime.compiled.jit import Inner
-from gqm_sym.runtime.quadrature.time_panels import LEAST_BALANCE, orbit_panels, read_off, to_rounding
+from gqm_sym.runtime.quadrature.time_panels import MIN_CANCELLATION_RATIO, are_accurate, orbit_panels, read_off
 
 # Terms of the series that are tried; how small the last ones must be against the first, for the time they stand for is
 # divided by their number.
@@ -58,7 +58,7 @@ def pace_series(fns, p, a, b, width, n, work, series):  # type: ignore[no-untype
                 series[k] += OF_LONGEST[j, k] * da[j]
     for k in range(n - LAST, n + 1):
         tail = max(tail, fabs(series[k]))
-    return tail <= SMALL * series[0] and low > LEAST_BALANCE * high
+    return tail <= SMALL * series[0] and low > MIN_CANCELLATION_RATIO * high
 
 
 @Inner
@@ -107,9 +107,9 @@ def arrival(fns, p, going_round, direction, lam0, w0, least, most, place, work, 
         if laps < 0.0:
             return inf
         panels = orbit_panels(fns, p, going_round, lam0, lam0 + lap, lam0, w0)
-        if not to_rounding(panels):
+        if not are_accurate(panels):
             return np.nan
-        return laps * panels[1][-1] + read_off(panels[0], panels[1], panels[3], ahead / lap - laps)
+        return laps * panels.times[-1] + read_off(panels.edges, panels.times, panels.time_terms, ahead / lap - laps)
     width = most - least
     least = sharpened(fns, p, lam0, w0, least, width, work)
     most = sharpened(fns, p, lam0, w0, most, width, work)
@@ -130,12 +130,12 @@ def arrival(fns, p, going_round, direction, lam0, w0, least, most, place, work, 
         whole, (start, stop) = series[0] * pi, times_from(series, n, here, then, -1.0 if from_b else 1.0)
     else:
         panels = orbit_panels(fns, p, going_round, a, b, lam0, w0)
-        if not to_rounding(panels):
+        if not are_accurate(panels):
             return np.nan
-        whole = panels[1][-1]
-        start = read_off(panels[0], panels[1], panels[3], 2.0 * atan2(sqrt(-least), sqrt(most)))
+        whole = panels.times[-1]
+        start = read_off(panels.edges, panels.times, panels.time_terms, 2.0 * atan2(sqrt(-least), sqrt(most)))
         at = 2.0 * atan2(sqrt(max(ahead - least, 0.0)), sqrt(max(most - ahead, 0.0)))
-        stop = read_off(panels[0], panels[1], panels[3], at)
+        stop = read_off(panels.edges, panels.times, panels.time_terms, at)
         if from_b:
             start, stop = whole - start, whole - stop
     onwards = direction * ahead > 0.0

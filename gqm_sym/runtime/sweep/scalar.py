@@ -25,15 +25,15 @@ from gqm_sym.runtime.compiled.strided import (
     element,
 )
 from gqm_sym.runtime.compiled.types import ADDRESSES, MATRIX, VECTOR
-from gqm_sym.runtime.launch.ends import ends
-from gqm_sym.runtime.launch.zeros import LIMIT, TURN
+from gqm_sym.runtime.launch.domain import DomainNumbers
+from gqm_sym.runtime.launch.ends import NO_ORBIT, ends, orbit_kind
 from gqm_sym.runtime.quadrature.trapezoid import (
     CIRCULATION,
     LIBRATION,
-    rate_room,
     time_by_panels,
     time_by_trapezoid,
-    work_room,
+    trapezoid_rates,
+    trapezoid_workspace,
 )
 from gqm_sym.runtime.sweep.arrivals import arrival
 from gqm_sym.runtime.sweep.orbit_extremes import extreme
@@ -68,7 +68,7 @@ def answer_one_by_one(fns, columns, monotone, asked, spans, out, reasons, held):
     ``spans`` are those that batches found. A row of ``out`` holds both turning points (PLACES), or one number. ``held``
     is room for the parameters of one launch.
     """
-    work, series, p = work_room(), rate_room(), uncounted(held)
+    work, series, p = trapezoid_workspace(), trapezoid_rates(), uncounted(held)
     for k in range(reasons.size):
         spanned = reasons[k] == SPAN_KNOWN
         if reasons[k] != UNDECIDED and not spanned:
@@ -96,12 +96,13 @@ def answer_one_by_one(fns, columns, monotone, asked, spans, out, reasons, held):
             elif v0 == 0.0:
                 way = 1 if most > -least else -1
         else:
-            way, ahead, behind = ends(fns, p, lam0, v0, way, low, high, period, mirror, step)
-            going_round = way != 0 and ahead[0] == LIMIT and period > 0.0 and v0 > 0.0
-            if not (going_round or (way != 0 and ahead[0] == TURN and behind[0] == TURN)):
+            way, ahead, behind = ends(fns, p, lam0, v0, way, DomainNumbers(low, high, period, mirror, step))
+            orbit = orbit_kind(way, ahead, behind, v0, period)
+            if orbit == NO_ORBIT:
                 reasons[k] = UNDECIDED
                 continue
-            one, other = (way * period, 0.0) if going_round else (ahead[1], behind[1])
+            going_round = orbit == CIRCULATION
+            one, other = (way * period, 0.0) if going_round else (ahead.near, behind.near)
             least, most = min(one, other), max(one, other)
         if going_round and asked in (HALF_PERIOD, TURNING_POINTS):
             reasons[k] = NOT_PERIODIC

@@ -19,7 +19,7 @@ from gqm_sym.runtime.compiled.threads import run_in_threads
 from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.launch.request import CONTACTS, LaunchRequest
 from gqm_sym.runtime.launch.speed import path_and_force_at
-from gqm_sym.runtime.motion.extremes import over_legs
+from gqm_sym.runtime.motion.extremes import grid_peaks, over_legs
 from gqm_sym.runtime.sweep import quantities, scalar
 from gqm_sym.runtime.sweep.batch.batches import answer_batches
 
@@ -84,20 +84,15 @@ def _extreme(load: Callable[[Any, Array], Array], of_state: str, sign: int) -> C
     def of_motion(motion: Any, _: Any) -> float:
         if motion.kind not in ("libration", "circulation") or isfinite(motion.t_end):
             return over_legs(motion, _STATES[of_state], sign)
-        stretch = motion.one_period[0].stretch
-        low, high = 0.0, stretch.stop
-        for _round in range(8):
-            phi = np.linspace(low, high, 129)
-            values = load(motion, phi)
-            best = int(np.argmax(sign * values))
-            low, high = phi[max(best - 1, 0)], phi[min(best + 1, phi.size - 1)]
-        return float(values[best])
+        stop = motion.one_period[0].segment.stop
+        *_, peak = grid_peaks(lambda phi: sign * load(motion, phi), 0.0, stop)
+        return float(sign * peak.value)
 
     return of_motion
 
 
 def _speed(motion: Any, phi: Array) -> Array:
-    speeds: Array = motion.one_period[0].stretch.speeds(phi)
+    speeds: Array = motion.one_period[0].segment.speeds(phi)
     return speeds
 
 
@@ -109,9 +104,9 @@ _STATES: dict[str, Callable[[Any], Array]] = {
 
 
 def _force(motion: Any, phi: Array) -> Array:
-    stretch = motion.one_period[0].stretch
-    f = stretch.functions
-    forces: Array = path_and_force_at(f.addresses, f.p, stretch.places(phi), stretch.speeds(phi) ** 2)[4]
+    segment = motion.one_period[0].segment
+    f = segment.functions
+    forces: Array = path_and_force_at(f.addresses, f.p, segment.places(phi), segment.speeds(phi) ** 2)[4]
     return forces
 
 

@@ -14,15 +14,15 @@ from gqm_sym.runtime.compiled.calls import (
 )
 from gqm_sym.runtime.compiled.intrinsics import choose
 from gqm_sym.runtime.compiled.jit import Inner
-from gqm_sym.runtime.quadrature.time_panels import LEAST_BALANCE
+from gqm_sym.runtime.quadrature.time_panels import MIN_CANCELLATION_RATIO
 from gqm_sym.runtime.quadrature.trapezoid import (
     CIRCULATION,
-    FROM_A,
-    FROM_B,
     LIBRATION,
     MAX_NODES,
     MIN_INTERVALS,
-    SHARES,
+    NODE_SHARES,
+    OFFSETS_FROM_A,
+    OFFSETS_TO_B,
     has_converged,
 )
 from gqm_sym.runtime.sweep.batch.rows import (
@@ -49,7 +49,7 @@ SWING = 2
 NEEDED = (START, LASTING, LEAST)
 
 # The sines of that integral, squared: where y is at its largest, and at the axis half a turn later.
-FALL, RISE = np.cos(pi * SHARES) ** 2, np.sin(pi * SHARES) ** 2
+FALL, RISE = np.cos(pi * NODE_SHARES) ** 2, np.sin(pi * NODE_SHARES) ** 2
 
 # What becomes of an orbit after a level of the rule.
 GOES_ON, SETTLED, LOST = 0.0, 1.0, 2.0
@@ -62,7 +62,7 @@ def fill(fns, kind, n, node, s, p, work):  # type: ignore[no-untyped-def]
     start, w0, least, most = s[START, :n], s[SPEED, :n], s[LEAST, :n], s[MOST, :n]
     low, high = s[LOW, :n], s[HIGH, :n]
     if kind == LIBRATION:
-        from_a, from_b, two = FROM_A[node], FROM_B[node], rows[: 2 * n].reshape(2, n)
+        from_a, from_b, two = OFFSETS_FROM_A[node], OFFSETS_TO_B[node], rows[: 2 * n].reshape(2, n)
         for j in range(n):
             width = most[j] - least[j]
             da[j], db[j] = width * from_a, width * from_b
@@ -79,7 +79,7 @@ def fill(fns, kind, n, node, s, p, work):  # type: ignore[no-untyped-def]
             rates[j] = pi * sqrt(two[0, j])
             low[j], high[j] = choose(q >= low[j], low[j], q), choose(q > high[j], q, high[j])
     else:
-        share, three = SHARES[node], rows[: 3 * n].reshape(3, n)
+        share, three = NODE_SHARES[node], rows[: 3 * n].reshape(3, n)
         for j in range(n):
             db[j] = least[j] + share * (most[j] - least[j])
             da[j] = start[j] + db[j]
@@ -134,7 +134,7 @@ def times(fns, kind, mirrored, n, s, flat, count, held, chosen, work, asked, out
             value, before = s[SUM, j] / nodes, s[CHANGE, j]
             change = fabs(value - s[VALUE, j]) / value
             s[VALUE, j], s[CHANGE, j] = value, change
-            clear = s[LOW, j] > LEAST_BALANCE * s[HIGH, j]
+            clear = s[LOW, j] > MIN_CANCELLATION_RATIO * s[HIGH, j]
             verdict[j] = choose(clear, choose(has_converged(before, change), SETTLED, GOES_ON), LOST)
         if begin > 0:
             kept = 0
@@ -153,7 +153,8 @@ def times(fns, kind, mirrored, n, s, flat, count, held, chosen, work, asked, out
 # The kind of such orbits, beside those of `swift` and `batch_times`.
 MEANS = 3
 
-# From numbers in a ratio of 1 : 10, the root of LEAST_BALANCE, both are the same to half an ulp after so many steps
+# From numbers in a ratio of 1 : 10, the root of MIN_CANCELLATION_RATIO, both are the same to half an ulp after so many
+# steps
 # and one more arithmetic mean: their relative difference is 9e-1, 6e-1, 4e-2, 2e-4, 4e-9, and its square counts.
 STEPS = 4
 
@@ -168,7 +169,7 @@ def half_periods_by_agm(fns, n, s, flat, count, work, asked, out, reasons):  # t
     call_agm_arguments_batch(fns.agm_arguments, n, halves, p, rows)
     for j in range(n):
         a, b = rows[0, j], rows[1, j]
-        balanced = (b > LEAST_BALANCE * a) & (a > LEAST_BALANCE * b) & (a + b < inf)
+        balanced = (b > MIN_CANCELLATION_RATIO * a) & (a > MIN_CANCELLATION_RATIO * b) & (a + b < inf)
         clear[j] = choose(balanced, 1.0, 0.0)
         rows[0, j], rows[1, j] = sqrt(a), sqrt(b)
     for _ in range(STEPS):

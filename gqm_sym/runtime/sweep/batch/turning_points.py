@@ -13,8 +13,8 @@ from gqm_sym.runtime.compiled.calls import (
 )
 from gqm_sym.runtime.compiled.intrinsics import choose, fma, whole_below
 from gqm_sym.runtime.compiled.jit import Inner
-from gqm_sym.runtime.launch.ends import ALL_BUT, UNCLEAR, distance_to_axis
-from gqm_sym.runtime.launch.zeros import UNRESOLVED
+from gqm_sym.runtime.launch.ends import MAX_AXIS_STEP_SHARE, NEAR_AXIS, distance_to_axis
+from gqm_sym.runtime.launch.zeros import CONSTANT_SHARE
 from gqm_sym.runtime.quadrature.trapezoid import CIRCULATION
 from gqm_sym.runtime.sweep.batch.rows import (
     AHEAD,
@@ -89,7 +89,7 @@ def by_closed_form(fns, n, s, p, known, work):  # type: ignore[no-untyped-def]
         offset, half, sense, step, rests = offsets[j], halves[j], ahead[j], steps[j], w0[j] == 0.0
         size, alone = fabs(offset), step == 0.0
         well = (rows[1, j] > 0.0) & (alone | (size < step))
-        clear = (size > UNCLEAR * (fabs(start[j]) + fabs(places[j]))) & (alone | (size < ALL_BUT * step))
+        clear = (size > NEAR_AXIS * (fabs(start[j]) + fabs(places[j]))) & (alone | (size < MAX_AXIS_STEP_SHARE * step))
         inside = choose(size > half, half, size)  # many turns away the offset is rounded more than the width
         uphill = choose(sense * offset < 0.0, -inside, inside)
         known_well = well & ((rests & clear) | ((w0[j] > 0.0) & (rows[2, j] < 1.0 - TOP)))
@@ -138,7 +138,9 @@ def launch(fns, n, s, p, known, monotone, work):  # type: ignore[no-untyped-def]
         # Released at rest it falls towards the axis, and comes to rest on the other side.
         mirrored = choose((w0[j] == 0.0) & (first > 0.0), 2.0 * first, trial[j])
         trial[j] = choose(mirrored < reach[j], mirrored, reach[j])
-        away = (first > UNCLEAR * (fabs(start[j]) + fabs(places[j]))) & ((step == 0.0) | (first < ALL_BUT * step))
+        away = (first > NEAR_AXIS * (fabs(start[j]) + fabs(places[j]))) & (
+            (step == 0.0) | (first < MAX_AXIS_STEP_SHARE * step)
+        )
         given = behind[j] == behind[j]
         there = given | (known_well & (w0[j] == 0.0) & away)
         zero[j] = choose(given, zero[j], mirrored)
@@ -266,7 +268,7 @@ def prove(fns, kind, mirrored, pieces, n, s, p, work):  # type: ignore[no-untype
             call_potential_divdiff1_batch(fns.potential_divdiff1, n, start, places, offsets, p, rows)
         for j in range(n):
             lost = 2.0 * offsets[j] * rows[0, j]
-            w, clear = w0[j] - lost, UNRESOLVED * (w0[j] + fabs(lost))
+            w, clear = w0[j] - lost, CONSTANT_SHARE * (w0[j] + fabs(lost))
             # The most that V**2 may lose, and gain, for each unit of the parameter, and so the least it can be.
             loss, gain, from_w = 2.0 * box[1, j], -2.0 * box[0, j], speeds[j]
             valley = (loss * w + gain * from_w - loss * gain * (hi[j] - lo[j])) / (loss + gain)
