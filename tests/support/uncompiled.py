@@ -9,7 +9,7 @@ import ctypes
 import importlib
 import math
 import pkgutil
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from functools import cache, wraps
 from inspect import signature
 from types import FunctionType, SimpleNamespace
@@ -161,17 +161,22 @@ def _rebuilt(function: FunctionType, names: dict[str, Any]) -> Any:
     return FunctionType(code.replace(co_consts=numbers), names, function.__name__, function.__defaults__)
 
 
+def _like(value: Any, items: Iterable[Any]) -> Any:
+    """Give a tuple of the same class, which may be a named one."""
+    return type(value)(*items) if hasattr(value, "_fields") else tuple(items)
+
+
 def _numpy(value: Any) -> Any:
     """Give numbers that divide by zero as compiled ones do."""
     if isinstance(value, tuple):
-        return tuple(_numpy(one) for one in value)
+        return _like(value, (_numpy(one) for one in value))
     return np.float64(value) if isinstance(value, float) else value
 
 
 def _python(value: Any) -> Any:
     """Give what numba returns: Python's own numbers."""
     if isinstance(value, tuple):
-        return tuple(_python(one) for one in value)
+        return _like(value, (_python(one) for one in value))
     return value.item() if isinstance(value, np.generic) else value
 
 

@@ -20,7 +20,7 @@ MIN_PLACES_PER_THREAD, MIN_STATES_PER_THREAD = 2**16, 2**12
 # The most periods after which compiled code reduces times exactly; later ones are reduced one by one.
 MAX_PERIODS = 2.0**50
 
-# What there is to know of a state besides the time.
+# The number of fields of a state other than the time.
 STATE_ROWS = 9
 
 
