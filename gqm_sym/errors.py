@@ -26,6 +26,10 @@ class DeclarationError(InputError):
     """A curve, a kernel or a model that is declared inconsistently."""
 
 
+class ArgumentError(DeclarationError, TypeError):
+    """Arguments that a function does not have, or of a type that it cannot use."""
+
+
 class SpecFileError(InputError):
     """A YAML file with mistakes in it, all of them reported together.
 
@@ -76,3 +80,7 @@ class SolutionError(GQMError):
 
 class OutdatedModuleError(GQMError):
     """A generated module made for another version of the runtime's interface."""
+
+
+class NoisyPointsWarning(UserWarning):
+    """Surveyed points whose scatter is most of the curvature of the track through them."""

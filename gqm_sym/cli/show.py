@@ -32,6 +32,9 @@ def forms(spec: "Spec", model: "Model") -> Iterator[str]:
     yield from table((_parameter(spec, *pair) for pair in model.defaults), right=())
     for note in model.notes:
         yield f"  note: {note}"
+    if spec.curve.smoothing is not None:
+        yield ""
+        yield from (f"  {line}" for line in str(spec.curve.smoothing).splitlines())
 
 
 def _parameter(spec: "Spec", name: str, value: object) -> tuple[str, ...]:

@@ -1,14 +1,18 @@
 """The model: every closed form of a motion on a curve under a force law, as one frozen value."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import sympy as sp
 
+from gqm_sym.arguments import checked, instance, one_line, short
 from gqm_sym.budgets import budget
 from gqm_sym.declare import Curve
+from gqm_sym.declare.closing import check_period
+from gqm_sym.declare.ends import check_order
 from gqm_sym.derivation.algebra.rewrite import check_real, without_poles
 from gqm_sym.derivation.algebra.signs import Signs
+from gqm_sym.derivation.corners import check_corners, check_powers, without_known_bars
 from gqm_sym.derivation.defaults import join
 from gqm_sym.derivation.forces.dissipation import LOAD, PUSH, SIGMA, TILT, TURN, Dissipation, dissipation
 from gqm_sym.derivation.forces.forces import Forces, forces
@@ -19,6 +23,7 @@ from gqm_sym.derivation.geometry.offset_curve import beside
 from gqm_sym.derivation.reality import check_somewhere_real
 from gqm_sym.derivation.wells.swing import Swing, swing
 from gqm_sym.derivation.wells.symmetry import Symmetry, symmetry
+from gqm_sym.errors import ArgumentError
 from gqm_sym.kernels.base import CONTACT_SIGN, DIRECTION, KAPPA, MASS, Kernel, W, X, Z
 from gqm_sym.parameters import Given, Value, is_positive
 
@@ -229,6 +234,7 @@ class Model:
         return f"$\\displaystyle {self.latex()}$"
 
 
+@checked("derive")
 @budget("derivation", 60.0, "declare the curve and the forces by shorter expressions")
 def derive(
     curve: Curve,
@@ -257,13 +263,29 @@ def derive(
     BudgetError
         If it takes more than a minute of processor time, or is nested too deeply.
     """
+    instance(curve, Curve, where="derive: curve", what="a curve, as Curve.graph or a family makes one")
+    instance(kernel, Kernel, where="derive: kernel", what="a force law, as Gravity() + CoulombFriction()")
+    given = {} if parameters is None else parameters
+    if not isinstance(given, Mapping):
+        raise ArgumentError(f"derive: parameters: must be names with values, as in {{'mu': 0.1}}, got {short(given)}")
+    called = curve.title if title is None else one_line(title, where="derive: title")
     lam = curve.parameter
     kernel = kernel.along(lam)
-    defaults = join(curve, kernel, parameters or {})
+    defaults = join(curve, kernel, given)
+    check_order(curve.kind, curve.domain, curve.period, dict(defaults))
     values = dict(defaults)
+    if not curve.charted:
+        if curve.period is not None:
+            check_period(curve.kind, (curve.x, curve.z), lam, curve.period, values)
+        check_powers((("x", curve.x), ("z", curve.z)), curve, values)
+        check_corners(curve, values)
+        signs = Signs(parameter=lam, domain=curve.domain, positive=curve.positive, may_be_positive=())
+        curve = replace(curve, **{name: without_known_bars(getattr(curve, name), signs) for name in ("x", "z")})
     track = geometry(curve, may_be_positive=tuple(name for name in values if is_positive(values[name])))
     x, z, shape = beside(without_poles(curve.x), without_poles(curve.z), track, kernel.radius)
-    law = forces(x, z, kernel, shape)
+    law = forces(x, z, kernel, shape, lam)
+    if not curve.charted:
+        check_powers((("potential", law.potential),), curve, values)
     loss, speed, level = None, conservative_speed(law, lam), level_set(curve)
     if not kernel.conservative:
         loss = _losses(curve, kernel, x, z, law, shape)
@@ -274,7 +296,7 @@ def derive(
     model = Model(
         curve=curve,
         force=kernel,
-        title=curve.title if title is None else title,
+        title=called,
         parameter=lam,
         lam0=LAM0,
         v0=V0,

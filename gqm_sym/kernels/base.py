@@ -11,6 +11,7 @@ from dataclasses import dataclass, field, replace
 
 import sympy as sp
 
+from gqm_sym.arguments import checked, instance
 from gqm_sym.errors import DeclarationError
 from gqm_sym.expressions import read_expression
 from gqm_sym.parameters import (
@@ -92,6 +93,7 @@ class Kernel:
         refuse_out_of_range(dict(self.defaults), self.positive, self.at_least, where="kernel")
 
     @classmethod
+    @checked("Kernel.law")
     def law(
         cls,
         A: str | sp.Expr,
@@ -139,8 +141,7 @@ class Kernel:
         return replace(self, defaults=tuple(pair for pair in self.defaults if pair[0] != parameter.name))
 
     def __add__(self, other: "Kernel") -> "Kernel":
-        if not isinstance(other, Kernel):
-            return NotImplemented
+        instance(other, Kernel, where="kernel: +", what="two kernels, as in Gravity() + CoulombFriction()")
         _refuse_clashes(self, other)
         known = dict(self.defaults)
         return Kernel(
@@ -160,6 +161,12 @@ class Kernel:
             positive=tuple(dict.fromkeys(self.positive + other.positive)),
             at_least=tuple(dict.fromkeys(self.at_least + other.at_least)),
         )
+
+    def __radd__(self, other: object) -> "Kernel":
+        # Python's sum() begins with 0.
+        if isinstance(other, int) and other == 0:
+            return self
+        return instance(other, Kernel, where="kernel: +", what="two kernels, as in Gravity() + CoulombFriction()")
 
 
 def _refuse_clashes(first: Kernel, second: Kernel) -> None:

@@ -2,10 +2,12 @@
 
 import sympy as sp
 
+from gqm_sym.arguments import checked
 from gqm_sym.kernels.base import Kernel, parameter
 from gqm_sym.parameters import Given
 
 
+@checked("Rolling")
 def Rolling(*, beta: Given | None = None, radius: Given | None = None, mu_static: Given | None = None) -> Kernel:
     """Return the inertia of a body that rolls.
 

@@ -5,7 +5,8 @@ from dataclasses import dataclass
 import sympy as sp
 
 from gqm_sym.derivation.algebra.differentiate import differentiate
-from gqm_sym.derivation.algebra.rewrite import absorb_bars, tidy
+from gqm_sym.derivation.algebra.normal_form import shortest
+from gqm_sym.derivation.algebra.rewrite import absorb_bars, multiplied_out, tidy, without_waves
 from gqm_sym.derivation.geometry.geometry import Geometry
 from gqm_sym.kernels.base import Kernel, X, Z
 
@@ -38,17 +39,24 @@ class Forces:
     pressure: sp.Expr
 
 
-def forces(x: sp.Expr, z: sp.Expr, kernel: Kernel, shape: Geometry) -> Forces:
-    """Put the coordinates of a curve into the force law."""
+def forces(x: sp.Expr, z: sp.Expr, kernel: Kernel, shape: Geometry, lam: sp.Symbol) -> Forces:
+    """Put the coordinates of a curve in its parameter into the force law."""
     along = {X: x, Z: z}
     # The force before the coordinates are put in: the curve's own symbols may be called x or z.
-    pull_x = differentiate(kernel.potential, X).xreplace(along)
-    pull_z = differentiate(kernel.potential, Z).xreplace(along)
-    potential = kernel.potential.xreplace(along)
+    written = [
+        form.xreplace(along)
+        for form in (differentiate(kernel.potential, X), differentiate(kernel.potential, Z), kernel.potential)
+    ]
+    pull_x, pull_z, potential = forms = [without_waves(form) for form in written]
     # (F_x, F_z) turned into the tangent's frame, before the length of the tangent comes in: a
     # common root stays one piece.
     push = tidy(pull_x * shape.along + pull_z * shape.across)
     load = tidy(pull_z * shape.along - pull_x * shape.across)
+    if forms != written:
+        # Along a curve about the centre of a force most of its components cancels.
+        push, load = (multiplied_out(form) for form in (push, load))
+        if shape.cusp is None:
+            push = shortest([push, tidy(differentiate(potential, lam) / shape.size)])
     return Forces(
         potential=potential,
         climb=tidy(2 * potential / kernel.inertia),

@@ -62,7 +62,8 @@ class SpeedField:
         """What kind of form it is, and what the signs in it are."""
         meanings = {DIRECTION: "the sign of ds/dt", CONTACT_SIGN: "the sign of N"}
         found = [f"{s.name} is {text}" for s, text in meanings.items() if s in self.squared.free_symbols]
-        return "; ".join([f"V**2: {_TEXTS[self.form]}", *found])
+        jumps = ["atan2 is continued without its jumps by 2*pi"] if self.squared.has(sp.atan2) else []
+        return "; ".join([f"V**2: {_TEXTS[self.form]}", *found, *jumps])
 
 
 def conservative_speed(law: Forces, lam: sp.Symbol) -> SpeedField:
