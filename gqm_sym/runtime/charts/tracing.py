@@ -114,8 +114,8 @@ class Traced:
     def chart(self, p: tuple[float, ...]) -> Chart:
         """Trace the curve.
 
-        It is followed each way until it closes, to a singular point (grad F = 0), or to the end of its domain. If it has
-        no domain, it is followed over `continuation.MAX_PIECES` pieces or `continuation.MAX_REACH` times the length of
+        It is followed each way until it closes, to a singular point (grad F = 0), or to the end of its domain. Without
+        a domain it is followed over `continuation.MAX_PIECES` pieces or `continuation.MAX_REACH` times the length of
         the first. It also ends where F is no longer real.
 
         Raises

@@ -17,7 +17,7 @@ name                                what it is used for                  what is
                                     arguments' types
 =================================== ==================================== ===============================================
 
-The digits of all results are the same in every case (`tests/test_numba_internals.py`).
+The digits of all results are the same in every case (`tests/runtime/compiled/test_numba_internals.py`).
 """
 
 import hashlib

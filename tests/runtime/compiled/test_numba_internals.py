@@ -6,6 +6,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from paths import ROOT
 
 # Every private name that `numba_internals` uses: what it imports, and attributes of that.
 IMPORTED = ("FunctionCache", "IndexDataCacheFile", "ccallback", "Environment", "lookup_environment", "rtsys")
@@ -87,8 +88,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def _answers(folder: Path, cache: Path, *hidden: str) -> str:
     done = subprocess.run(
         [sys.executable, "-c", PROGRAM, str(folder), *hidden],
-        cwd=Path(__file__).parent.parent,
-        env={"NUMBA_CACHE_DIR": str(cache), "PYTHONPATH": str(Path(__file__).parent.parent)},
+        cwd=ROOT,
+        env={"NUMBA_CACHE_DIR": str(cache), "PYTHONPATH": str(ROOT)},
         capture_output=True,
         text=True,
         check=False,
@@ -121,7 +122,7 @@ def test_without_a_private_name_the_digits_are_the_same(
 def test_no_other_file_uses_private_names() -> None:
     """Modules of numba that its manual does not name are imported in one file; it names `extending` and `cgutils`."""
     private = re.compile(r"\s*(from|import) numba\.(?!extending|core import cgutils|core\.cgutils)")
-    files = (Path(__file__).parent.parent / "gqm_sym").rglob("*.py")
+    files = (ROOT / "gqm_sym").rglob("*.py")
     assert {
         path.name for path in files for line in path.read_text(encoding="utf-8").splitlines() if private.match(line)
     } == {"numba_internals.py"}
