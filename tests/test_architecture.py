@@ -26,7 +26,7 @@ LAYERS = (
     {"trees"},
     {"rationals"},
     {"budgets", "loading"},
-    {"arguments"},
+    {"arguments", "dimensions"},
     {"errors"},
 )
 
@@ -58,6 +58,7 @@ ONLY_IN = {
         "parameters",
         "expressions",
         "sympy_charts",
+        "dimensions",
     },
     "xarray": {"cli", "runtime", "sweeps"},
 }

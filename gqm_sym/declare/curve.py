@@ -85,6 +85,12 @@ class Curve:
         """Whether the parameter is arc length, and the coordinates are known by numbers only."""
         return self.definition is not None
 
+    def __str__(self) -> str:
+        """A few lines for people: what it is, where it goes, and what its parameters are measured in."""
+        from gqm_sym.declare.measures import told
+
+        return told(self)
+
     @classmethod
     @checked("Curve.graph")
     def graph(
