@@ -161,8 +161,8 @@ def _by_role(data: Mapping[str, Any]) -> dict[str, str]:
 def launch_units(curve: Curve | None) -> dict[str, str]:
     """What the numbers of a launch are measured in; the curve's parameter only where the kind of curve tells it."""
     own = None if curve is None else parameter_dimension(curve)
-    # A parametric curve's parameter may be anything.
-    lam0 = {} if own is None or (curve and curve.kind == "parametric") else {"lam0": "rad" if own == NUMBER else "m"}
+    # A parametric curve's parameter may be anything; that of its waves is an angle.
+    lam0 = {} if own is None else {"lam0": "rad" if own == NUMBER else "m"}
     return {**LAUNCH_UNITS, **lam0}
 
 
