@@ -13,22 +13,28 @@ from numba import njit
 
 import generated.cubic_coulomb as friction
 import generated.pendulum as pendulum
-from gqm_sym.runtime import batch_means, batch_rows, batch_search, batch_times, batches, entries, legs, swift
-from gqm_sym.runtime.leg_records import BEFORE, COLUMNS
-from gqm_sym.runtime.leg_stretches import Run, read_panels
-from gqm_sym.runtime.surveying import survey
+from gqm_sym.runtime.inversion import table
+from gqm_sym.runtime.launch.problem import bind
+from gqm_sym.runtime.launch.request import LaunchRequest, read_launch
+from gqm_sym.runtime.launch.survey import survey
+from gqm_sym.runtime.legs import follow
+from gqm_sym.runtime.legs.leg_record import BEFORE, COLUMNS
+from gqm_sym.runtime.legs.leg_segments import Run, read_panels
+from gqm_sym.runtime.quadrature import time_panels, trapezoid
+from gqm_sym.runtime.sweep import quantities
+from gqm_sym.runtime.sweep.batch import batches, rows, times, turning_points
 
 
 def conservative() -> list[tuple[str, float]]:
     """Parts of a pendulum's solve, and what is asked of its motion."""
     model, given = pendulum.MODEL, tuple(pendulum.PARAMETERS.values())
     p = model.numbers(given)
-    launch = model.launch(p, lam0=-0.37, v0=0.0)
-    f, (low, high, period, _, place, step) = model.functions(p, launch), model.domain(p)
+    launch = read_launch(model, p, LaunchRequest(-0.37))
+    f, domain = bind(model, p, launch), model.domain(p).numbers
     motion = pendulum.solve(-0.37)
     motion.state(1000.0)
-    stretch = motion._stretch
-    panels, clock = stretch.panels, stretch.clock
+    segment = motion._segment
+    panels, clock = segment.panels, segment.edge_times
 
     def first(ask: str) -> Any:
         return getattr(pendulum.solve(-0.37), ask)(1.0)
@@ -36,11 +42,11 @@ def conservative() -> list[tuple[str, float]]:
     return [
         ("`solve` of a pendulum, released from rest", least(lambda: pendulum.solve(-0.37))),
         ("- parameters read, from the cache", least(lambda: model.numbers(given))),
-        ("- launch checked", least(lambda: model.launch(p, lam0=-0.37, v0=0.0))),
-        ("- functions and the exact problem", least(lambda: model.functions(p, launch))),
+        ("- launch checked", least(lambda: read_launch(model, p, LaunchRequest(-0.37)))),
+        ("- functions and the exact problem", least(lambda: bind(model, p, launch))),
         (
             "- the crossing: turning points, kind, half period",
-            least(lambda: survey(f.addresses, f.p, -0.37, 0.0, 1, low, high, period, place, step)),
+            least(lambda: survey(f.addresses, f.p, -0.37, 0.0, 1, domain)),
         ),
         ("`lam` at one time", least(lambda: motion.lam(1000.0))),
         ("`state` at one time", least(lambda: motion.state(1000.0))),
@@ -48,9 +54,11 @@ def conservative() -> list[tuple[str, float]]:
         ("`solve` and the first `state`", least(lambda: first("state"))),
         (
             "- panels of time",
-            least(lambda: entries.lay_panels(f.addresses, f.p, 0, stretch.a, stretch.b, 0.0, 0.0, panels[0][[0, -1]])),
+            least(
+                lambda: time_panels.lay_panels(f.addresses, f.p, 0, segment.a, segment.b, 0.0, 0.0, panels[0][[0, -1]])
+            ),
         ),
-        ("- table of the anomaly", least(lambda: entries.build_table(panels[0], *clock, panels[3]))),
+        ("- table of the phase angle", least(lambda: table.build_table(panels[0], *clock, panels[3]))),
     ]
 
 
@@ -63,12 +71,12 @@ def dissipative() -> list[tuple[str, float]]:
     launch = (*loss, p.values, -1.0, 6.2088**2, 1, 0, np.empty(0))
     record = np.empty(16 * COLUMNS)
     leg = (*launch, inf, 1.0, 0.25, 0, 0.0, record)
-    what, *_, ahead, count, _, _, _, _, _ = legs.follow(*leg)
+    what, *_, ahead, count, _, _, _, _, _ = follow.follow(*leg)
     run = Run(-1.0, ahead, count, record, what, "turn", 0)
     back, time = run.panels_back, run.pair(BEFORE)[1]
     return [
         ("`solve` of Example 2: its leg to the turn", least(lambda: friction.solve(-1.0, 6.2088))),
-        ("- the crossing: the leg, its events, its time", least(lambda: legs.follow(*leg))),
+        ("- the crossing: the leg, its events, its time", least(lambda: follow.follow(*leg))),
         ("the leg's panels read, when a position is asked for", least(lambda: read_panels(back, time))),
         ("`solve` and the first `lam`", least(lambda: friction.solve(-1.0, 6.2088).lam(0.1), 5)),
     ]
@@ -76,15 +84,15 @@ def dissipative() -> list[tuple[str, float]]:
 
 def sweeping() -> list[tuple[str, float]]:
     """Parts of an orbit's share of a sweep over pendulums, on one core."""
-    each, n = pendulum.MODEL.each, batch_rows.BATCH
+    each, n = pendulum.MODEL.each, rows.BATCH
     fns, held = each.addresses(), (each.held, each.top_held)
     launch, seek, turn_round, prove = (
-        getattr(batch_search, name) for name in ("launch", "seek", "turn_round", "prove")
+        getattr(turning_points, name) for name in ("launch", "seek", "turn_round", "prove")
     )
-    times, by_means = batch_times.times, batch_means.by_means
-    start = np.zeros((batch_rows.ROWS, n))
-    start[batch_rows.WHO], start[batch_rows.WAY] = np.arange(n), 1.0
-    start[batch_rows.START] = np.random.default_rng(0).uniform(0.05, 2.5, n) - np.pi / 2
+    time_of, by_means = times.times, times.half_periods_by_agm
+    start = np.zeros((rows.ROWS, n))
+    start[rows.WHO], start[rows.WAY] = np.arange(n), 1.0
+    start[rows.START] = np.random.default_rng(0).uniform(0.05, 2.5, n) - np.pi / 2
     p = np.repeat(pendulum.MODEL.numbers(tuple(pendulum.PARAMETERS.values())).values[:, None], n, axis=1)
     count, given = len(p), np.append(p.reshape(-1), np.zeros(max(held) * n))
     known, work = (
@@ -108,19 +116,21 @@ def sweeping() -> list[tuple[str, float]]:
     @njit
     def clock(s: Any, found: Any, flat: Any, given: Any, work: Any, chosen: Any, out: Any, reasons: Any) -> None:
         s[:], flat[:] = found, given
-        times(fns, swift.LIBRATION, True, n, s, flat, count, held, chosen, work, swift.HALF, out, reasons)
+        time_of(
+            fns, trapezoid.LIBRATION, True, n, s, flat, count, held, chosen, work, quantities.HALF_PERIOD, out, reasons
+        )
 
     @njit
     def mean(s: Any, found: Any, given: Any, work: Any, out: Any, reasons: Any) -> None:
         s[:] = found
-        by_means(fns, n, s, given, count, work, swift.HALF, out, reasons)
+        by_means(fns, n, s, given, count, work, quantities.HALF_PERIOD, out, reasons)
 
     s, flat = start.copy(), given.copy()
     search(s, start, p, known, True, work)
-    found, other = s.copy(), s[batch_rows.A]
-    found[batch_rows.LEAST], found[batch_rows.MOST] = np.minimum(other, 0.0), np.maximum(other, 0.0)
-    found[batch_rows.A] = found[batch_rows.START] + found[batch_rows.LEAST]
-    found[batch_rows.B] = found[batch_rows.START] + found[batch_rows.MOST]
+    found, other = s.copy(), s[rows.A]
+    found[rows.LEAST], found[rows.MOST] = np.minimum(other, 0.0), np.maximum(other, 0.0)
+    found[rows.A] = found[rows.START] + found[rows.LEAST]
+    found[rows.B] = found[rows.START] + found[rows.MOST]
     return [
         (
             "an orbit of a sweep: its turning points, in closed form",

@@ -16,8 +16,10 @@ from swing import G, half_period
 import generated.circle as circle
 import generated.ellipse as ellipse
 import generated.pendulum as pendulum
-from gqm_sym.runtime import surveying
-from gqm_sym.runtime.jit import Inner
+from gqm_sym.runtime.compiled.jit import Inner
+from gqm_sym.runtime.launch import survey
+from gqm_sym.runtime.launch.problem import bind
+from gqm_sym.runtime.launch.request import LaunchRequest, read_launch
 
 ORBITS = 100_000
 
@@ -32,17 +34,16 @@ def half_periods() -> list[Row]:
     truths = [half_period(float(a)) for a in few]
 
     alone = [half_period(mpf(float(v)) + mp.pi / 2) for v in few - pi / 2]
-    survey = Inner(surveying.survey.__wrapped__)
+    inner_survey = Inner(survey.survey.__wrapped__)
     p = pendulum.MODEL.numbers(tuple(pendulum.PARAMETERS.values()))
-    f = pendulum.MODEL.functions(p, pendulum.MODEL.launch(p, lam0=-0.37, v0=0.0))
-    low, high, period, _, place, step = pendulum.MODEL.domain(p)
-    known = (low, high, period, place, step)
+    f = bind(pendulum.MODEL, p, read_launch(pendulum.MODEL, p, LaunchRequest(-0.37)))
+    domain = pendulum.MODEL.domain(p).numbers
 
     @njit
-    def in_a_loop(fns: Any, p: Any, lam0: Any, known: Any) -> Any:
+    def in_a_loop(fns: Any, p: Any, lam0: Any, domain: Any) -> Any:
         out = np.empty(lam0.size)
         for k in range(lam0.size):
-            out[k] = survey(fns, p, lam0[k], 0.0, 1, *known)[3]
+            out[k] = inner_survey(fns, p, lam0[k], 0.0, 1, domain)[3]
         return out
 
     def raw(a: float) -> float:
@@ -117,7 +118,7 @@ def half_periods() -> list[Row]:
         Row(
             work,
             "one launch after the other in a compiled loop, turning points found",
-            lambda: in_a_loop(f.addresses, f.p, few - pi / 2, known),
+            lambda: in_a_loop(f.addresses, f.p, few - pi / 2, domain),
             lambda values: ulps(values, alone),
             each=100,
             line=6.0,

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from mpmath import mp, mpf
 
-from gqm_sym.runtime import threads
+from gqm_sym.runtime.compiled import threads
 
 Work = Callable[[], Any]
 # Digits of all truths.

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "catenary". Do not edit: change its declaration and generate again.
-# interface 7, input cd1fa4541ae4, body f6f17293ed3a
+# interface 8, input cd1fa4541ae4, body 5f0f5940a4d8
 """Bead on a hanging chain
 
 x              = x
@@ -25,36 +25,16 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=7)
+compiled = compiler(__file__, interface=8)
 
-from gqm_sym.runtime import (
-    BEND,
-    BEND_EACH,
-    BOUNDS,
-    BOUNDS_EACH,
-    CLIMB,
-    CREST_EACH,
-    FRAME,
-    LOADS,
-    RISE,
-    RISE_EACH,
-    SWING_EACH,
-    TOP_EACH,
-    Addresses,
-    Each,
-    ExactFormulas,
-    Formulas,
-    Motion,
-    Pass1,
+from gqm_sym.runtime.vocabulary import (
+    BEND, BEND_EACH, BOUNDS, BOUNDS_EACH, CLIMB, CREST_EACH, FRAME, LOADS, RISE, RISE_EACH, SWING_EACH, TOP_EACH,
+    Addresses, CompiledModel, Each, ExactFormulas, LaunchRequest, Pass1, cosh, cosh1, cosh2, iconst, icosh, idiv, imul,
+    isinh, left_of, near_cosh2, nearest, sinh,
 )
-from gqm_sym.runtime.differences import cosh1, cosh2
-from gqm_sym.runtime.elementary import cosh, sinh
-from gqm_sym.runtime.intervals import iconst, icosh, idiv, imul, isinh
-from gqm_sym.runtime.places import left_of, nearest
-from gqm_sym.runtime.wave_differences import near_cosh2
 
 if TYPE_CHECKING:
-    from gqm_sym.runtime import Sweep
+    from gqm_sym.runtime import Motion, Sweep
 
 PARAMETERS = {
     'c': '0.8',
@@ -315,7 +295,7 @@ def exact_axes(op, p):
     return 0, None
 
 
-MODEL = Formulas(
+MODEL = CompiledModel(
     name='catenary',
     parameter='x',
     parameters=PARAMETERS,
@@ -340,8 +320,7 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = 
     lam0, v0, direction
         Launch place, speed and direction (+1 or -1: the sign of ds/dt).
     out : Pass1, optional
-        The result of a call before, or six arrays like it, to be filled again. Without it a large result takes the
-        memory of one before that nobody has any more.
+        The result of a call before, or six arrays like it, to be filled again.
     c, g, m
         Run-time parameters; `PARAMETERS` holds their defaults.
 
@@ -350,7 +329,7 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = 
     Pass1
         Arrays x, z, ds, kappa, v2 and normal_force.
     """
-    return MODEL.pass1(lam, lam0, v0, direction, (c, g, m,), out)
+    return MODEL.pass1(LaunchRequest(lam0, v0, direction), (c, g, m,), lam, out)
 
 
 def solve(
@@ -362,7 +341,7 @@ def solve(
     t_max: Any = None,
     contact: str = "bilateral",
     c: Any = '0.8', g: Any = '9.81', m: Any = '1',
-) -> Motion:
+) -> "Motion":
     """The motion that a launch begins (Passes 1 to 3).
 
     Parameters
@@ -387,7 +366,7 @@ def solve(
     GQMError
         For a launch or a parameter that cannot be; the message says what would be right.
     """
-    return MODEL.solve(lam0, v0, direction, point, t_max, contact, (c, g, m,))
+    return MODEL.solve(LaunchRequest(lam0, v0, direction, point, t_max, contact), (c, g, m,))
 
 
 def sweep(
@@ -425,4 +404,5 @@ def sweep(
     Sweep
         ``values``, NaN where there is none, and ``reasons``, 0 where there is one; ``why()`` counts the others.
     """
-    return MODEL.sweep(quantity, lam0, v0, direction, lam, t_max, contact, (c, g, m,), client, __file__)
+    launches = LaunchRequest(lam0, v0, direction, None, t_max, contact)
+    return MODEL.sweep(quantity, launches, (c, g, m,), lam=lam, client=client, source=__file__)

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "cycloid_inverted". Do not edit: change its declaration and generate again.
-# interface 7, input 2cc87984e0a0, body 27d8ec0c4e8e
+# interface 8, input 2cc87984e0a0, body 3bba90c4e3d1
 """Bead in an inverted cycloid
 
 x              = R*(theta - sin(theta))
@@ -25,34 +25,16 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=7)
+compiled = compiler(__file__, interface=8)
 
-from gqm_sym.runtime import (
-    BEND,
-    BEND_EACH,
-    BOUNDS,
-    BOUNDS_EACH,
-    CLIMB,
-    FRAME,
-    LOADS,
-    ORBIT_EACH,
-    RISE,
-    RISE_EACH,
-    Addresses,
-    Each,
-    ExactFormulas,
-    Formulas,
-    Motion,
-    Pass1,
+from gqm_sym.runtime.vocabulary import (
+    BEND, BEND_EACH, BOUNDS, BOUNDS_EACH, CLIMB, FRAME, LOADS, ORBIT_EACH, RISE, RISE_EACH, Addresses, CompiledModel,
+    Each, ExactFormulas, LaunchRequest, Pass1, cos, cos1, cos2, iconst, icos, idiv, imul, isin, left_of, near_even,
+    near_odd, nearest, sin,
 )
-from gqm_sym.runtime.differences import cos1, cos2
-from gqm_sym.runtime.elementary import cos, sin
-from gqm_sym.runtime.intervals import iconst, icos, idiv, imul, isin
-from gqm_sym.runtime.places import left_of, nearest
-from gqm_sym.runtime.wave_differences import near_even, near_odd
 
 if TYPE_CHECKING:
-    from gqm_sym.runtime import Sweep
+    from gqm_sym.runtime import Motion, Sweep
 
 PARAMETERS = {
     'R': '0.5',
@@ -275,7 +257,7 @@ def exact_axes(op, p):
     return -op.pi, 2*op.pi
 
 
-MODEL = Formulas(
+MODEL = CompiledModel(
     name='cycloid_inverted',
     parameter='theta',
     parameters=PARAMETERS,
@@ -299,8 +281,7 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = 
     lam0, v0, direction
         Launch place, speed and direction (+1 or -1: the sign of ds/dt).
     out : Pass1, optional
-        The result of a call before, or six arrays like it, to be filled again. Without it a large result takes the
-        memory of one before that nobody has any more.
+        The result of a call before, or six arrays like it, to be filled again.
     R, g, m
         Run-time parameters; `PARAMETERS` holds their defaults.
 
@@ -309,7 +290,7 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = 
     Pass1
         Arrays x, z, ds, kappa, v2 and normal_force.
     """
-    return MODEL.pass1(lam, lam0, v0, direction, (R, g, m,), out)
+    return MODEL.pass1(LaunchRequest(lam0, v0, direction), (R, g, m,), lam, out)
 
 
 def solve(
@@ -321,7 +302,7 @@ def solve(
     t_max: Any = None,
     contact: str = "bilateral",
     R: Any = '0.5', g: Any = '9.81', m: Any = '1',
-) -> Motion:
+) -> "Motion":
     """The motion that a launch begins (Passes 1 to 3).
 
     Parameters
@@ -346,7 +327,7 @@ def solve(
     GQMError
         For a launch or a parameter that cannot be; the message says what would be right.
     """
-    return MODEL.solve(lam0, v0, direction, point, t_max, contact, (R, g, m,))
+    return MODEL.solve(LaunchRequest(lam0, v0, direction, point, t_max, contact), (R, g, m,))
 
 
 def sweep(
@@ -384,4 +365,5 @@ def sweep(
     Sweep
         ``values``, NaN where there is none, and ``reasons``, 0 where there is one; ``why()`` counts the others.
     """
-    return MODEL.sweep(quantity, lam0, v0, direction, lam, t_max, contact, (R, g, m,), client, __file__)
+    launches = LaunchRequest(lam0, v0, direction, None, t_max, contact)
+    return MODEL.sweep(quantity, launches, (R, g, m,), lam=lam, client=client, source=__file__)

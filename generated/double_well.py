@@ -1,5 +1,5 @@
 # Made by gqm-gen for "double_well". Do not edit: change its declaration and generate again.
-# interface 7, input 28c16d144828, body e93b84b75fb3
+# interface 8, input 28c16d144828, body 4de68313d4e1
 """Bead between two wells
 
 x              = x
@@ -25,33 +25,15 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=7)
+compiled = compiler(__file__, interface=8)
 
-from gqm_sym.runtime import (
-    BEND,
-    BEND_EACH,
-    BOUNDS,
-    BOUNDS_EACH,
-    CLIMB,
-    FRAME,
-    LOADS,
-    RISE,
-    RISE_EACH,
-    SWING_EACH,
-    TOP_EACH,
-    Addresses,
-    Each,
-    ExactFormulas,
-    Formulas,
-    Motion,
-    Pass1,
+from gqm_sym.runtime.vocabulary import (
+    BEND, BEND_EACH, BOUNDS, BOUNDS_EACH, CLIMB, FRAME, LOADS, RISE, RISE_EACH, SWING_EACH, TOP_EACH, Addresses,
+    CompiledModel, Each, ExactFormulas, LaunchRequest, Pass1, iadd, iconst, imul, ipow, ipow1, isqrt, left_of, nearest,
 )
-from gqm_sym.runtime.differences import ipow1
-from gqm_sym.runtime.intervals import iadd, iconst, imul, ipow, isqrt
-from gqm_sym.runtime.places import left_of, nearest
 
 if TYPE_CHECKING:
-    from gqm_sym.runtime import Sweep
+    from gqm_sym.runtime import Motion, Sweep
 
 PARAMETERS = {
     'h': '0.25',
@@ -290,7 +272,7 @@ def exact_axes(op, p):
     return 0, None
 
 
-MODEL = Formulas(
+MODEL = CompiledModel(
     name='double_well',
     parameter='x',
     parameters=PARAMETERS,
@@ -314,8 +296,7 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = 
     lam0, v0, direction
         Launch place, speed and direction (+1 or -1: the sign of ds/dt).
     out : Pass1, optional
-        The result of a call before, or six arrays like it, to be filled again. Without it a large result takes the
-        memory of one before that nobody has any more.
+        The result of a call before, or six arrays like it, to be filled again.
     h, g, m
         Run-time parameters; `PARAMETERS` holds their defaults.
 
@@ -324,7 +305,7 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = 
     Pass1
         Arrays x, z, ds, kappa, v2 and normal_force.
     """
-    return MODEL.pass1(lam, lam0, v0, direction, (h, g, m,), out)
+    return MODEL.pass1(LaunchRequest(lam0, v0, direction), (h, g, m,), lam, out)
 
 
 def solve(
@@ -336,7 +317,7 @@ def solve(
     t_max: Any = None,
     contact: str = "bilateral",
     h: Any = '0.25', g: Any = '9.81', m: Any = '1',
-) -> Motion:
+) -> "Motion":
     """The motion that a launch begins (Passes 1 to 3).
 
     Parameters
@@ -361,7 +342,7 @@ def solve(
     GQMError
         For a launch or a parameter that cannot be; the message says what would be right.
     """
-    return MODEL.solve(lam0, v0, direction, point, t_max, contact, (h, g, m,))
+    return MODEL.solve(LaunchRequest(lam0, v0, direction, point, t_max, contact), (h, g, m,))
 
 
 def sweep(
@@ -399,4 +380,5 @@ def sweep(
     Sweep
         ``values``, NaN where there is none, and ``reasons``, 0 where there is one; ``why()`` counts the others.
     """
-    return MODEL.sweep(quantity, lam0, v0, direction, lam, t_max, contact, (h, g, m,), client, __file__)
+    launches = LaunchRequest(lam0, v0, direction, None, t_max, contact)
+    return MODEL.sweep(quantity, launches, (h, g, m,), lam=lam, client=client, source=__file__)

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "kepler". Do not edit: change its declaration and generate again.
-# interface 7, input a1e1feaf475b, body e441961a77c4
+# interface 8, input a1e1feaf475b, body af431f954693
 """Planet on its own ellipse, by the eccentric anomaly
 
 x              = a*(-ecc + cos(E))
@@ -25,36 +25,16 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=7)
+compiled = compiler(__file__, interface=8)
 
-from gqm_sym.runtime import (
-    BEND,
-    BEND_EACH,
-    BOUNDS,
-    BOUNDS_EACH,
-    CLIMB,
-    FRAME,
-    LOADS,
-    ORBIT_EACH,
-    RISE,
-    RISE_EACH,
-    SWING_EACH,
-    TOP_EACH,
-    Addresses,
-    Each,
-    ExactFormulas,
-    Formulas,
-    Motion,
-    Pass1,
+from gqm_sym.runtime.vocabulary import (
+    BEND, BEND_EACH, BOUNDS, BOUNDS_EACH, CLIMB, FRAME, LOADS, ORBIT_EACH, RISE, RISE_EACH, SWING_EACH, TOP_EACH,
+    Addresses, CompiledModel, Each, ExactFormulas, LaunchRequest, Pass1, cos, cos1, cos2, iabs, iadd, iconst, icos,
+    imul, ipow, isin, isqrt, left_of, near_even, near_odd, near_sinc, nearest, sin, sin1, sin2,
 )
-from gqm_sym.runtime.differences import cos1, cos2, sin1, sin2
-from gqm_sym.runtime.elementary import cos, sin
-from gqm_sym.runtime.intervals import iabs, iadd, iconst, icos, imul, ipow, isin, isqrt
-from gqm_sym.runtime.places import left_of, nearest
-from gqm_sym.runtime.wave_differences import near_even, near_odd, near_sinc
 
 if TYPE_CHECKING:
-    from gqm_sym.runtime import Sweep
+    from gqm_sym.runtime import Motion, Sweep
 
 PARAMETERS = {
     'a': '3/2',
@@ -495,7 +475,7 @@ def exact_axes(op, p):
     return 0, op.pi
 
 
-MODEL = Formulas(
+MODEL = CompiledModel(
     name='kepler',
     parameter='E',
     parameters=PARAMETERS,
@@ -519,8 +499,7 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = 
     lam0, v0, direction
         Launch place, speed and direction (+1 or -1: the sign of ds/dt).
     out : Pass1, optional
-        The result of a call before, or six arrays like it, to be filled again. Without it a large result takes the
-        memory of one before that nobody has any more.
+        The result of a call before, or six arrays like it, to be filled again.
     a, ecc, k, m
         Run-time parameters; `PARAMETERS` holds their defaults.
 
@@ -529,7 +508,7 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = 
     Pass1
         Arrays x, z, ds, kappa, v2 and normal_force.
     """
-    return MODEL.pass1(lam, lam0, v0, direction, (a, ecc, k, m,), out)
+    return MODEL.pass1(LaunchRequest(lam0, v0, direction), (a, ecc, k, m,), lam, out)
 
 
 def solve(
@@ -541,7 +520,7 @@ def solve(
     t_max: Any = None,
     contact: str = "bilateral",
     a: Any = '3/2', ecc: Any = '3/5', k: Any = '7/2', m: Any = '1',
-) -> Motion:
+) -> "Motion":
     """The motion that a launch begins (Passes 1 to 3).
 
     Parameters
@@ -566,7 +545,7 @@ def solve(
     GQMError
         For a launch or a parameter that cannot be; the message says what would be right.
     """
-    return MODEL.solve(lam0, v0, direction, point, t_max, contact, (a, ecc, k, m,))
+    return MODEL.solve(LaunchRequest(lam0, v0, direction, point, t_max, contact), (a, ecc, k, m,))
 
 
 def sweep(
@@ -604,4 +583,5 @@ def sweep(
     Sweep
         ``values``, NaN where there is none, and ``reasons``, 0 where there is one; ``why()`` counts the others.
     """
-    return MODEL.sweep(quantity, lam0, v0, direction, lam, t_max, contact, (a, ecc, k, m,), client, __file__)
+    launches = LaunchRequest(lam0, v0, direction, None, t_max, contact)
+    return MODEL.sweep(quantity, launches, (a, ecc, k, m,), lam=lam, client=client, source=__file__)

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "line_spring". Do not edit: change its declaration and generate again.
-# interface 7, input 924b210c4a96, body 4becfccd590b
+# interface 8, input 924b210c4a96, body 6c5744481424
 """Bead on a sloping line, tied to the origin by a spring
 
 x              = x
@@ -25,31 +25,15 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=7)
+compiled = compiler(__file__, interface=8)
 
-from gqm_sym.runtime import (
-    BEND,
-    BEND_EACH,
-    BOUNDS,
-    BOUNDS_EACH,
-    CLIMB,
-    FRAME,
-    LOADS,
-    MEAN_EACH,
-    RISE,
-    RISE_EACH,
-    Addresses,
-    Each,
-    ExactFormulas,
-    Formulas,
-    Motion,
-    Pass1,
+from gqm_sym.runtime.vocabulary import (
+    BEND, BEND_EACH, BOUNDS, BOUNDS_EACH, CLIMB, FRAME, LOADS, MEAN_EACH, RISE, RISE_EACH, Addresses, CompiledModel,
+    Each, ExactFormulas, LaunchRequest, Pass1, iadd, iconst, idiv, imul, ipow, left_of,
 )
-from gqm_sym.runtime.intervals import iadd, iconst, idiv, imul, ipow
-from gqm_sym.runtime.places import left_of
 
 if TYPE_CHECKING:
-    from gqm_sym.runtime import Sweep
+    from gqm_sym.runtime import Motion, Sweep
 
 PARAMETERS = {
     'w': '1.3',
@@ -230,7 +214,7 @@ def exact_axes(op, p):
     return op.mpf(-24)/25, None
 
 
-MODEL = Formulas(
+MODEL = CompiledModel(
     name='line_spring',
     parameter='x',
     parameters=PARAMETERS,
@@ -254,8 +238,7 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = 
     lam0, v0, direction
         Launch place, speed and direction (+1 or -1: the sign of ds/dt).
     out : Pass1, optional
-        The result of a call before, or six arrays like it, to be filled again. Without it a large result takes the
-        memory of one before that nobody has any more.
+        The result of a call before, or six arrays like it, to be filled again.
     w, m
         Run-time parameters; `PARAMETERS` holds their defaults.
 
@@ -264,7 +247,7 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = 
     Pass1
         Arrays x, z, ds, kappa, v2 and normal_force.
     """
-    return MODEL.pass1(lam, lam0, v0, direction, (w, m,), out)
+    return MODEL.pass1(LaunchRequest(lam0, v0, direction), (w, m,), lam, out)
 
 
 def solve(
@@ -276,7 +259,7 @@ def solve(
     t_max: Any = None,
     contact: str = "bilateral",
     w: Any = '1.3', m: Any = '1',
-) -> Motion:
+) -> "Motion":
     """The motion that a launch begins (Passes 1 to 3).
 
     Parameters
@@ -301,7 +284,7 @@ def solve(
     GQMError
         For a launch or a parameter that cannot be; the message says what would be right.
     """
-    return MODEL.solve(lam0, v0, direction, point, t_max, contact, (w, m,))
+    return MODEL.solve(LaunchRequest(lam0, v0, direction, point, t_max, contact), (w, m,))
 
 
 def sweep(
@@ -339,4 +322,5 @@ def sweep(
     Sweep
         ``values``, NaN where there is none, and ``reasons``, 0 where there is one; ``why()`` counts the others.
     """
-    return MODEL.sweep(quantity, lam0, v0, direction, lam, t_max, contact, (w, m,), client, __file__)
+    launches = LaunchRequest(lam0, v0, direction, None, t_max, contact)
+    return MODEL.sweep(quantity, launches, (w, m,), lam=lam, client=client, source=__file__)

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "log_spiral". Do not edit: change its declaration and generate again.
-# interface 7, input 458ba188398a, body 7f882760cc01
+# interface 8, input 458ba188398a, body c6318e5ebcfe
 """Bead on a logarithmic spiral
 
 x              = r0*exp(b*theta)*cos(theta)
@@ -25,34 +25,16 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=7)
+compiled = compiler(__file__, interface=8)
 
-from gqm_sym.runtime import (
-    BEND,
-    BEND_EACH,
-    BOUNDS,
-    BOUNDS_EACH,
-    CLIMB,
-    FRAME,
-    LOADS,
-    ORBIT_EACH,
-    RISE,
-    RISE_EACH,
-    Addresses,
-    Each,
-    ExactFormulas,
-    Formulas,
-    Motion,
-    Pass1,
+from gqm_sym.runtime.vocabulary import (
+    BEND, BEND_EACH, BOUNDS, BOUNDS_EACH, CLIMB, FRAME, LOADS, ORBIT_EACH, RISE, RISE_EACH, Addresses, CompiledModel,
+    Each, ExactFormulas, LaunchRequest, Pass1, cos, exp, exp1, exp2, iadd, iconst, icos, iexp, imul, ipow, isin, isqrt,
+    left_of, near_even, near_odd, nearest, sin, sin1, sin2,
 )
-from gqm_sym.runtime.differences import exp1, exp2, sin1, sin2
-from gqm_sym.runtime.elementary import cos, exp, sin
-from gqm_sym.runtime.intervals import iadd, iconst, icos, iexp, imul, ipow, isin, isqrt
-from gqm_sym.runtime.places import left_of, nearest
-from gqm_sym.runtime.wave_differences import near_even, near_odd
 
 if TYPE_CHECKING:
-    from gqm_sym.runtime import Sweep
+    from gqm_sym.runtime import Motion, Sweep
 
 PARAMETERS = {
     'r0': '1',
@@ -309,7 +291,7 @@ def exact_domain(op, p):
     return None, None, None
 
 
-MODEL = Formulas(
+MODEL = CompiledModel(
     name='log_spiral',
     parameter='theta',
     parameters=PARAMETERS,
@@ -332,8 +314,7 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = 
     lam0, v0, direction
         Launch place, speed and direction (+1 or -1: the sign of ds/dt).
     out : Pass1, optional
-        The result of a call before, or six arrays like it, to be filled again. Without it a large result takes the
-        memory of one before that nobody has any more.
+        The result of a call before, or six arrays like it, to be filled again.
     r0, b, g, m
         Run-time parameters; `PARAMETERS` holds their defaults.
 
@@ -342,7 +323,7 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = 
     Pass1
         Arrays x, z, ds, kappa, v2 and normal_force.
     """
-    return MODEL.pass1(lam, lam0, v0, direction, (r0, b, g, m,), out)
+    return MODEL.pass1(LaunchRequest(lam0, v0, direction), (r0, b, g, m,), lam, out)
 
 
 def solve(
@@ -354,7 +335,7 @@ def solve(
     t_max: Any = None,
     contact: str = "bilateral",
     r0: Any = '1', b: Any = '0.15', g: Any = '9.81', m: Any = '1',
-) -> Motion:
+) -> "Motion":
     """The motion that a launch begins (Passes 1 to 3).
 
     Parameters
@@ -379,7 +360,7 @@ def solve(
     GQMError
         For a launch or a parameter that cannot be; the message says what would be right.
     """
-    return MODEL.solve(lam0, v0, direction, point, t_max, contact, (r0, b, g, m,))
+    return MODEL.solve(LaunchRequest(lam0, v0, direction, point, t_max, contact), (r0, b, g, m,))
 
 
 def sweep(
@@ -417,4 +398,5 @@ def sweep(
     Sweep
         ``values``, NaN where there is none, and ``reasons``, 0 where there is one; ``why()`` counts the others.
     """
-    return MODEL.sweep(quantity, lam0, v0, direction, lam, t_max, contact, (r0, b, g, m,), client, __file__)
+    launches = LaunchRequest(lam0, v0, direction, None, t_max, contact)
+    return MODEL.sweep(quantity, launches, (r0, b, g, m,), lam=lam, client=client, source=__file__)

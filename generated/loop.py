@@ -1,5 +1,5 @@
 # Made by gqm-gen for "loop". Do not edit: change its declaration and generate again.
-# interface 7, input ef6cb5936f16, body 99e6b4ee21b1
+# interface 8, input ef6cb5936f16, body da9dfc682b1c
 """Loop of a roller coaster
 
 x              = x(s)
@@ -24,37 +24,15 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=7)
+compiled = compiler(__file__, interface=8)
 
-from gqm_sym.runtime import (
-    BEND,
-    BOUNDS,
-    CLIMB,
-    FRAME,
-    RISE,
-    Addresses,
-    ExactClimb,
-    Formulas,
-    Motion,
-    Pass1,
-    Rail,
+from gqm_sym.runtime.vocabulary import (
+    BEND, BOUNDS, CLIMB, FRAME, RISE, Addresses, CompiledModel, ExactClimb, LaunchRequest, Pass1, Rail, chart_alpha,
+    chart_kappa, chart_of, chart_x, chart_z, chart_z1, chart_z2, cos, ichart_alpha, iconst, imul, isin, nearest, sin,
 )
-from gqm_sym.runtime.chart_functions import (
-    chart_alpha,
-    chart_kappa,
-    chart_of,
-    chart_x,
-    chart_z,
-    chart_z1,
-    chart_z2,
-    ichart_alpha,
-)
-from gqm_sym.runtime.elementary import cos, sin
-from gqm_sym.runtime.intervals import iconst, imul, isin
-from gqm_sym.runtime.places import nearest
 
 if TYPE_CHECKING:
-    from gqm_sym.runtime import Sweep
+    from gqm_sym.runtime import Motion, Sweep
 
 PARAMETERS = {
     'a': '2',
@@ -158,7 +136,7 @@ CHART = Rail(
     pieces=('line', 'clothoid', 'arc', 'clothoid', 'line'),
 )
 
-MODEL = Formulas(
+MODEL = CompiledModel(
     name='loop',
     parameter='s',
     parameters=PARAMETERS,
@@ -179,8 +157,7 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = 
     lam0, v0, direction
         Launch place, speed and direction (+1 or -1: the sign of ds/dt).
     out : Pass1, optional
-        The result of a call before, or six arrays like it, to be filled again. Without it a large result takes the
-        memory of one before that nobody has any more.
+        The result of a call before, or six arrays like it, to be filled again.
     a, c, R, g, m
         Run-time parameters; `PARAMETERS` holds their defaults.
 
@@ -189,7 +166,7 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = 
     Pass1
         Arrays x, z, ds, kappa, v2 and normal_force.
     """
-    return MODEL.pass1(lam, lam0, v0, direction, (a, c, R, g, m,), out)
+    return MODEL.pass1(LaunchRequest(lam0, v0, direction), (a, c, R, g, m,), lam, out)
 
 
 def solve(
@@ -201,7 +178,7 @@ def solve(
     t_max: Any = None,
     contact: str = "bilateral",
     a: Any = '2', c: Any = '2', R: Any = '1.5', g: Any = '9.81', m: Any = '1',
-) -> Motion:
+) -> "Motion":
     """The motion that a launch begins (Passes 1 to 3).
 
     Parameters
@@ -226,7 +203,7 @@ def solve(
     GQMError
         For a launch or a parameter that cannot be; the message says what would be right.
     """
-    return MODEL.solve(lam0, v0, direction, point, t_max, contact, (a, c, R, g, m,))
+    return MODEL.solve(LaunchRequest(lam0, v0, direction, point, t_max, contact), (a, c, R, g, m,))
 
 
 def sweep(
@@ -264,4 +241,5 @@ def sweep(
     Sweep
         ``values``, NaN where there is none, and ``reasons``, 0 where there is one; ``why()`` counts the others.
     """
-    return MODEL.sweep(quantity, lam0, v0, direction, lam, t_max, contact, (a, c, R, g, m,), client, __file__)
+    launches = LaunchRequest(lam0, v0, direction, None, t_max, contact)
+    return MODEL.sweep(quantity, launches, (a, c, R, g, m,), lam=lam, client=client, source=__file__)

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "parabola". Do not edit: change its declaration and generate again.
-# interface 7, input 638613fc8598, body c14aeee5741b
+# interface 8, input 638613fc8598, body dabf35d8d9cc
 """Bead in a parabolic bowl
 
 x              = x
@@ -25,33 +25,16 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=7)
+compiled = compiler(__file__, interface=8)
 
-from gqm_sym.runtime import (
-    BEND,
-    BEND_EACH,
-    BOUNDS,
-    BOUNDS_EACH,
-    CLIMB,
-    CREST_EACH,
-    FRAME,
-    LOADS,
-    RISE,
-    RISE_EACH,
-    SWING_EACH,
-    TOP_EACH,
-    Addresses,
-    Each,
-    ExactFormulas,
-    Formulas,
-    Motion,
-    Pass1,
+from gqm_sym.runtime.vocabulary import (
+    BEND, BEND_EACH, BOUNDS, BOUNDS_EACH, CLIMB, CREST_EACH, FRAME, LOADS, RISE, RISE_EACH, SWING_EACH, TOP_EACH,
+    Addresses, CompiledModel, Each, ExactFormulas, LaunchRequest, Pass1, iadd, iconst, imul, ipow, isqrt, left_of,
+    nearest,
 )
-from gqm_sym.runtime.intervals import iadd, iconst, imul, ipow, isqrt
-from gqm_sym.runtime.places import left_of, nearest
 
 if TYPE_CHECKING:
-    from gqm_sym.runtime import Sweep
+    from gqm_sym.runtime import Motion, Sweep
 
 PARAMETERS = {
     'a': '0.7',
@@ -285,7 +268,7 @@ def exact_axes(op, p):
     return 0, None
 
 
-MODEL = Formulas(
+MODEL = CompiledModel(
     name='parabola',
     parameter='x',
     parameters=PARAMETERS,
@@ -310,8 +293,7 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = 
     lam0, v0, direction
         Launch place, speed and direction (+1 or -1: the sign of ds/dt).
     out : Pass1, optional
-        The result of a call before, or six arrays like it, to be filled again. Without it a large result takes the
-        memory of one before that nobody has any more.
+        The result of a call before, or six arrays like it, to be filled again.
     a, g, m
         Run-time parameters; `PARAMETERS` holds their defaults.
 
@@ -320,7 +302,7 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = 
     Pass1
         Arrays x, z, ds, kappa, v2 and normal_force.
     """
-    return MODEL.pass1(lam, lam0, v0, direction, (a, g, m,), out)
+    return MODEL.pass1(LaunchRequest(lam0, v0, direction), (a, g, m,), lam, out)
 
 
 def solve(
@@ -332,7 +314,7 @@ def solve(
     t_max: Any = None,
     contact: str = "bilateral",
     a: Any = '0.7', g: Any = '9.81', m: Any = '2',
-) -> Motion:
+) -> "Motion":
     """The motion that a launch begins (Passes 1 to 3).
 
     Parameters
@@ -357,7 +339,7 @@ def solve(
     GQMError
         For a launch or a parameter that cannot be; the message says what would be right.
     """
-    return MODEL.solve(lam0, v0, direction, point, t_max, contact, (a, g, m,))
+    return MODEL.solve(LaunchRequest(lam0, v0, direction, point, t_max, contact), (a, g, m,))
 
 
 def sweep(
@@ -395,4 +377,5 @@ def sweep(
     Sweep
         ``values``, NaN where there is none, and ``reasons``, 0 where there is one; ``why()`` counts the others.
     """
-    return MODEL.sweep(quantity, lam0, v0, direction, lam, t_max, contact, (a, g, m,), client, __file__)
+    launches = LaunchRequest(lam0, v0, direction, None, t_max, contact)
+    return MODEL.sweep(quantity, launches, (a, g, m,), lam=lam, client=client, source=__file__)

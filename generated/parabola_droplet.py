@@ -1,5 +1,5 @@
 # Made by gqm-gen for "parabola_droplet". Do not edit: change its declaration and generate again.
-# interface 7, input fcd43efdbae3, body dd73531dd779
+# interface 8, input fcd43efdbae3, body 88d3e3e19b70
 """Droplet in a parabolic channel
 
 x              = x
@@ -27,21 +27,14 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=7)
+compiled = compiler(__file__, interface=8)
 
-from gqm_sym.runtime import (
-    DRIVE,
-    FRAME,
-    HOLD,
-    Addresses,
-    Dissipation,
-    Formulas,
-    Motion,
-    Pass1,
+from gqm_sym.runtime.vocabulary import (
+    DRIVE, FRAME, HOLD, Addresses, CompiledModel, Dissipation, LaunchRequest, Pass1,
 )
 
 if TYPE_CHECKING:
-    from gqm_sym.runtime import Sweep
+    from gqm_sym.runtime import Motion, Sweep
 
 PARAMETERS = {
     'a': '0.5',
@@ -116,7 +109,7 @@ def exact_domain(op, p):
     return None, None, None
 
 
-MODEL = Formulas(
+MODEL = CompiledModel(
     name='parabola_droplet',
     parameter='x',
     parameters=PARAMETERS,
@@ -138,8 +131,7 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = 
     lam0, v0, direction
         Launch place, speed and direction (+1 or -1: the sign of ds/dt).
     out : Pass1, optional
-        The result of a call before, or six arrays like it, to be filled again. Without it a large result takes the
-        memory of one before that nobody has any more.
+        The result of a call before, or six arrays like it, to be filled again.
     a, gamma, ell_c, g, m
         Run-time parameters; `PARAMETERS` holds their defaults.
 
@@ -148,7 +140,7 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = 
     Pass1
         Arrays x, z, ds, kappa, v2 and normal_force.
     """
-    return MODEL.pass1(lam, lam0, v0, direction, (a, gamma, ell_c, g, m,), out)
+    return MODEL.pass1(LaunchRequest(lam0, v0, direction), (a, gamma, ell_c, g, m,), lam, out)
 
 
 def solve(
@@ -160,7 +152,7 @@ def solve(
     t_max: Any = None,
     contact: str = "bilateral",
     a: Any = '0.5', gamma: Any = '0.5', ell_c: Any = '1', g: Any = '9.81', m: Any = '1',
-) -> Motion:
+) -> "Motion":
     """The motion that a launch begins (Passes 1 to 3).
 
     Parameters
@@ -185,7 +177,7 @@ def solve(
     GQMError
         For a launch or a parameter that cannot be; the message says what would be right.
     """
-    return MODEL.solve(lam0, v0, direction, point, t_max, contact, (a, gamma, ell_c, g, m,))
+    return MODEL.solve(LaunchRequest(lam0, v0, direction, point, t_max, contact), (a, gamma, ell_c, g, m,))
 
 
 def sweep(
@@ -223,4 +215,5 @@ def sweep(
     Sweep
         ``values``, NaN where there is none, and ``reasons``, 0 where there is one; ``why()`` counts the others.
     """
-    return MODEL.sweep(quantity, lam0, v0, direction, lam, t_max, contact, (a, gamma, ell_c, g, m,), client, __file__)
+    launches = LaunchRequest(lam0, v0, direction, None, t_max, contact)
+    return MODEL.sweep(quantity, launches, (a, gamma, ell_c, g, m,), lam=lam, client=client, source=__file__)

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "parabola_law". Do not edit: change its declaration and generate again.
-# interface 7, input 353c2b6305ed, body d149c6458b16
+# interface 8, input 353c2b6305ed, body 96876dd91929
 """Bead on a parabola, with a resistance that falls with speed
 
 x              = x
@@ -27,21 +27,14 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=7)
+compiled = compiler(__file__, interface=8)
 
-from gqm_sym.runtime import (
-    DRIVE,
-    FRAME,
-    HOLD,
-    Addresses,
-    Dissipation,
-    Formulas,
-    Motion,
-    Pass1,
+from gqm_sym.runtime.vocabulary import (
+    DRIVE, FRAME, HOLD, Addresses, CompiledModel, Dissipation, LaunchRequest, Pass1,
 )
 
 if TYPE_CHECKING:
-    from gqm_sym.runtime import Sweep
+    from gqm_sym.runtime import Motion, Sweep
 
 PARAMETERS = {
     'a': '0.7',
@@ -119,7 +112,7 @@ def exact_domain(op, p):
     return None, None, None
 
 
-MODEL = Formulas(
+MODEL = CompiledModel(
     name='parabola_law',
     parameter='x',
     parameters=PARAMETERS,
@@ -140,8 +133,7 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = 
     lam0, v0, direction
         Launch place, speed and direction (+1 or -1: the sign of ds/dt).
     out : Pass1, optional
-        The result of a call before, or six arrays like it, to be filled again. Without it a large result takes the
-        memory of one before that nobody has any more.
+        The result of a call before, or six arrays like it, to be filled again.
     a, r, w1, g, m
         Run-time parameters; `PARAMETERS` holds their defaults.
 
@@ -150,7 +142,7 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = 
     Pass1
         Arrays x, z, ds, kappa, v2 and normal_force.
     """
-    return MODEL.pass1(lam, lam0, v0, direction, (a, r, w1, g, m,), out)
+    return MODEL.pass1(LaunchRequest(lam0, v0, direction), (a, r, w1, g, m,), lam, out)
 
 
 def solve(
@@ -162,7 +154,7 @@ def solve(
     t_max: Any = None,
     contact: str = "bilateral",
     a: Any = '0.7', r: Any = '0.8', w1: Any = '2', g: Any = '9.81', m: Any = '1',
-) -> Motion:
+) -> "Motion":
     """The motion that a launch begins (Passes 1 to 3).
 
     Parameters
@@ -187,7 +179,7 @@ def solve(
     GQMError
         For a launch or a parameter that cannot be; the message says what would be right.
     """
-    return MODEL.solve(lam0, v0, direction, point, t_max, contact, (a, r, w1, g, m,))
+    return MODEL.solve(LaunchRequest(lam0, v0, direction, point, t_max, contact), (a, r, w1, g, m,))
 
 
 def sweep(
@@ -225,4 +217,5 @@ def sweep(
     Sweep
         ``values``, NaN where there is none, and ``reasons``, 0 where there is one; ``why()`` counts the others.
     """
-    return MODEL.sweep(quantity, lam0, v0, direction, lam, t_max, contact, (a, r, w1, g, m,), client, __file__)
+    launches = LaunchRequest(lam0, v0, direction, None, t_max, contact)
+    return MODEL.sweep(quantity, launches, (a, r, w1, g, m,), lam=lam, client=client, source=__file__)

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "planes". Do not edit: change its declaration and generate again.
-# interface 7, input 6aa424d89567, body d4534f8400ee
+# interface 8, input 6aa424d89567, body 855ce49fbf12
 """Stitched planes through surveyed points
 
 x              = x(s)
@@ -24,37 +24,15 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=7)
+compiled = compiler(__file__, interface=8)
 
-from gqm_sym.runtime import (
-    BEND,
-    BOUNDS,
-    CLIMB,
-    FRAME,
-    RISE,
-    Addresses,
-    ExactClimb,
-    Formulas,
-    Motion,
-    Pass1,
-    Sampled,
+from gqm_sym.runtime.vocabulary import (
+    BEND, BOUNDS, CLIMB, FRAME, RISE, Addresses, CompiledModel, ExactClimb, LaunchRequest, Pass1, Sampled, chart_alpha,
+    chart_kappa, chart_of, chart_x, chart_z, chart_z1, chart_z2, cos, ichart_alpha, iconst, imul, isin, nearest, sin,
 )
-from gqm_sym.runtime.chart_functions import (
-    chart_alpha,
-    chart_kappa,
-    chart_of,
-    chart_x,
-    chart_z,
-    chart_z1,
-    chart_z2,
-    ichart_alpha,
-)
-from gqm_sym.runtime.elementary import cos, sin
-from gqm_sym.runtime.intervals import iconst, imul, isin
-from gqm_sym.runtime.places import nearest
 
 if TYPE_CHECKING:
-    from gqm_sym.runtime import Sweep
+    from gqm_sym.runtime import Motion, Sweep
 
 PARAMETERS = {
     'g': '9.81',
@@ -206,7 +184,7 @@ def exact_climb(op, x, z, p):
 
 CHART = Sampled(POINTS, kind='linear', closed=False)
 
-MODEL = Formulas(
+MODEL = CompiledModel(
     name='planes',
     parameter='s',
     parameters=PARAMETERS,
@@ -227,8 +205,7 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = 
     lam0, v0, direction
         Launch place, speed and direction (+1 or -1: the sign of ds/dt).
     out : Pass1, optional
-        The result of a call before, or six arrays like it, to be filled again. Without it a large result takes the
-        memory of one before that nobody has any more.
+        The result of a call before, or six arrays like it, to be filled again.
     g, m
         Run-time parameters; `PARAMETERS` holds their defaults.
 
@@ -237,7 +214,7 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = 
     Pass1
         Arrays x, z, ds, kappa, v2 and normal_force.
     """
-    return MODEL.pass1(lam, lam0, v0, direction, (g, m,), out)
+    return MODEL.pass1(LaunchRequest(lam0, v0, direction), (g, m,), lam, out)
 
 
 def solve(
@@ -249,7 +226,7 @@ def solve(
     t_max: Any = None,
     contact: str = "bilateral",
     g: Any = '9.81', m: Any = '1',
-) -> Motion:
+) -> "Motion":
     """The motion that a launch begins (Passes 1 to 3).
 
     Parameters
@@ -274,7 +251,7 @@ def solve(
     GQMError
         For a launch or a parameter that cannot be; the message says what would be right.
     """
-    return MODEL.solve(lam0, v0, direction, point, t_max, contact, (g, m,))
+    return MODEL.solve(LaunchRequest(lam0, v0, direction, point, t_max, contact), (g, m,))
 
 
 def sweep(
@@ -312,4 +289,5 @@ def sweep(
     Sweep
         ``values``, NaN where there is none, and ``reasons``, 0 where there is one; ``why()`` counts the others.
     """
-    return MODEL.sweep(quantity, lam0, v0, direction, lam, t_max, contact, (g, m,), client, __file__)
+    launches = LaunchRequest(lam0, v0, direction, None, t_max, contact)
+    return MODEL.sweep(quantity, launches, (g, m,), lam=lam, client=client, source=__file__)

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "rolling_circle". Do not edit: change its declaration and generate again.
-# interface 7, input aed757e55b8b, body e0ffdcc60c54
+# interface 8, input aed757e55b8b, body daf4edd67ede
 """Solid sphere rolling in a circular bowl
 
 x              = L*sin(theta)
@@ -25,36 +25,16 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=7)
+compiled = compiler(__file__, interface=8)
 
-from gqm_sym.runtime import (
-    BEND,
-    BEND_EACH,
-    BOUNDS,
-    BOUNDS_EACH,
-    CLIMB,
-    CREST_EACH,
-    FRAME,
-    LOADS,
-    MEAN_EACH,
-    ORBIT_EACH,
-    RISE,
-    RISE_EACH,
-    Addresses,
-    Each,
-    ExactFormulas,
-    Formulas,
-    Motion,
-    Pass1,
+from gqm_sym.runtime.vocabulary import (
+    BEND, BEND_EACH, BOUNDS, BOUNDS_EACH, CLIMB, CREST_EACH, FRAME, LOADS, MEAN_EACH, ORBIT_EACH, RISE, RISE_EACH,
+    Addresses, CompiledModel, Each, ExactFormulas, LaunchRequest, Pass1, atan, cos, cos1, cos2, iadd, iconst, idiv,
+    imul, isin, left_of, near_even, near_odd, nearest, sin,
 )
-from gqm_sym.runtime.differences import cos1, cos2
-from gqm_sym.runtime.elementary import atan, cos, sin
-from gqm_sym.runtime.intervals import iadd, iconst, idiv, imul, isin
-from gqm_sym.runtime.places import left_of, nearest
-from gqm_sym.runtime.wave_differences import near_even, near_odd
 
 if TYPE_CHECKING:
-    from gqm_sym.runtime import Sweep
+    from gqm_sym.runtime import Motion, Sweep
 
 PARAMETERS = {
     'L': '2',
@@ -302,7 +282,7 @@ def exact_axes(op, p):
     return 0, op.pi
 
 
-MODEL = Formulas(
+MODEL = CompiledModel(
     name='rolling_circle',
     parameter='theta',
     parameters=PARAMETERS,
@@ -328,8 +308,7 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = 
     lam0, v0, direction
         Launch place, speed and direction (+1 or -1: the sign of ds/dt).
     out : Pass1, optional
-        The result of a call before, or six arrays like it, to be filled again. Without it a large result takes the
-        memory of one before that nobody has any more.
+        The result of a call before, or six arrays like it, to be filled again.
     L, beta, g, m
         Run-time parameters; `PARAMETERS` holds their defaults.
 
@@ -338,7 +317,7 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = 
     Pass1
         Arrays x, z, ds, kappa, v2 and normal_force.
     """
-    return MODEL.pass1(lam, lam0, v0, direction, (L, beta, g, m,), out)
+    return MODEL.pass1(LaunchRequest(lam0, v0, direction), (L, beta, g, m,), lam, out)
 
 
 def solve(
@@ -350,7 +329,7 @@ def solve(
     t_max: Any = None,
     contact: str = "bilateral",
     L: Any = '2', beta: Any = '2/5', g: Any = '9.81', m: Any = '0.3',
-) -> Motion:
+) -> "Motion":
     """The motion that a launch begins (Passes 1 to 3).
 
     Parameters
@@ -375,7 +354,7 @@ def solve(
     GQMError
         For a launch or a parameter that cannot be; the message says what would be right.
     """
-    return MODEL.solve(lam0, v0, direction, point, t_max, contact, (L, beta, g, m,))
+    return MODEL.solve(LaunchRequest(lam0, v0, direction, point, t_max, contact), (L, beta, g, m,))
 
 
 def sweep(
@@ -413,4 +392,5 @@ def sweep(
     Sweep
         ``values``, NaN where there is none, and ``reasons``, 0 where there is one; ``why()`` counts the others.
     """
-    return MODEL.sweep(quantity, lam0, v0, direction, lam, t_max, contact, (L, beta, g, m,), client, __file__)
+    launches = LaunchRequest(lam0, v0, direction, None, t_max, contact)
+    return MODEL.sweep(quantity, launches, (L, beta, g, m,), lam=lam, client=client, source=__file__)

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "rotating_parabola". Do not edit: change its declaration and generate again.
-# interface 7, input 9d848a7566cb, body 757c5aabae82
+# interface 8, input 9d848a7566cb, body f306c76259ff
 """Bead in a turning parabolic bowl
 
 x              = x
@@ -26,33 +26,16 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=7)
+compiled = compiler(__file__, interface=8)
 
-from gqm_sym.runtime import (
-    BEND,
-    BEND_EACH,
-    BOUNDS,
-    BOUNDS_EACH,
-    CLIMB,
-    CREST_EACH,
-    FRAME,
-    LOADS,
-    RISE,
-    RISE_EACH,
-    SWING_EACH,
-    TOP_EACH,
-    Addresses,
-    Each,
-    ExactFormulas,
-    Formulas,
-    Motion,
-    Pass1,
+from gqm_sym.runtime.vocabulary import (
+    BEND, BEND_EACH, BOUNDS, BOUNDS_EACH, CLIMB, CREST_EACH, FRAME, LOADS, RISE, RISE_EACH, SWING_EACH, TOP_EACH,
+    Addresses, CompiledModel, Each, ExactFormulas, LaunchRequest, Pass1, iadd, iconst, imul, ipow, isqrt, left_of,
+    nearest,
 )
-from gqm_sym.runtime.intervals import iadd, iconst, imul, ipow, isqrt
-from gqm_sym.runtime.places import left_of, nearest
 
 if TYPE_CHECKING:
-    from gqm_sym.runtime import Sweep
+    from gqm_sym.runtime import Motion, Sweep
 
 PARAMETERS = {
     'a': '0.6',
@@ -301,7 +284,7 @@ def exact_axes(op, p):
     return 0, None
 
 
-MODEL = Formulas(
+MODEL = CompiledModel(
     name='rotating_parabola',
     parameter='x',
     parameters=PARAMETERS,
@@ -326,8 +309,7 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = 
     lam0, v0, direction
         Launch place, speed and direction (+1 or -1: the sign of ds/dt).
     out : Pass1, optional
-        The result of a call before, or six arrays like it, to be filled again. Without it a large result takes the
-        memory of one before that nobody has any more.
+        The result of a call before, or six arrays like it, to be filled again.
     a, Omega, g, m
         Run-time parameters; `PARAMETERS` holds their defaults.
 
@@ -336,7 +318,7 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = 
     Pass1
         Arrays x, z, ds, kappa, v2 and normal_force.
     """
-    return MODEL.pass1(lam, lam0, v0, direction, (a, Omega, g, m,), out)
+    return MODEL.pass1(LaunchRequest(lam0, v0, direction), (a, Omega, g, m,), lam, out)
 
 
 def solve(
@@ -348,7 +330,7 @@ def solve(
     t_max: Any = None,
     contact: str = "bilateral",
     a: Any = '0.6', Omega: Any = '2.5', g: Any = '9.81', m: Any = '1.4',
-) -> Motion:
+) -> "Motion":
     """The motion that a launch begins (Passes 1 to 3).
 
     Parameters
@@ -373,7 +355,7 @@ def solve(
     GQMError
         For a launch or a parameter that cannot be; the message says what would be right.
     """
-    return MODEL.solve(lam0, v0, direction, point, t_max, contact, (a, Omega, g, m,))
+    return MODEL.solve(LaunchRequest(lam0, v0, direction, point, t_max, contact), (a, Omega, g, m,))
 
 
 def sweep(
@@ -411,4 +393,5 @@ def sweep(
     Sweep
         ``values``, NaN where there is none, and ``reasons``, 0 where there is one; ``why()`` counts the others.
     """
-    return MODEL.sweep(quantity, lam0, v0, direction, lam, t_max, contact, (a, Omega, g, m,), client, __file__)
+    launches = LaunchRequest(lam0, v0, direction, None, t_max, contact)
+    return MODEL.sweep(quantity, launches, (a, Omega, g, m,), lam=lam, client=client, source=__file__)

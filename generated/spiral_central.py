@@ -1,5 +1,5 @@
 # Made by gqm-gen for "spiral_central". Do not edit: change its declaration and generate again.
-# interface 7, input 989a8c62d81e, body f113d12a5a79
+# interface 8, input 989a8c62d81e, body f77a49e1654b
 """Bead on a logarithmic spiral, drawn to its pole
 
 x              = r0*exp(b*theta)*cos(theta)
@@ -25,33 +25,16 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=7)
+compiled = compiler(__file__, interface=8)
 
-from gqm_sym.runtime import (
-    BEND,
-    BEND_EACH,
-    BOUNDS,
-    BOUNDS_EACH,
-    CLIMB,
-    FRAME,
-    LOADS,
-    ORBIT_EACH,
-    RISE,
-    RISE_EACH,
-    Addresses,
-    Each,
-    ExactFormulas,
-    Formulas,
-    Motion,
-    Pass1,
+from gqm_sym.runtime.vocabulary import (
+    BEND, BEND_EACH, BOUNDS, BOUNDS_EACH, CLIMB, FRAME, LOADS, ORBIT_EACH, RISE, RISE_EACH, Addresses, CompiledModel,
+    Each, ExactFormulas, LaunchRequest, Pass1, cos, exp, exp1, exp2, iabs, iadd, iconst, idiv, iexp, imul, ipow, isqrt,
+    left_of, nearest, sin,
 )
-from gqm_sym.runtime.differences import exp1, exp2
-from gqm_sym.runtime.elementary import cos, exp, sin
-from gqm_sym.runtime.intervals import iabs, iadd, iconst, idiv, iexp, imul, ipow, isqrt
-from gqm_sym.runtime.places import left_of, nearest
 
 if TYPE_CHECKING:
-    from gqm_sym.runtime import Sweep
+    from gqm_sym.runtime import Motion, Sweep
 
 PARAMETERS = {
     'r0': '1',
@@ -293,7 +276,7 @@ def exact_domain(op, p):
     return None, None, None
 
 
-MODEL = Formulas(
+MODEL = CompiledModel(
     name='spiral_central',
     parameter='theta',
     parameters=PARAMETERS,
@@ -316,8 +299,7 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = 
     lam0, v0, direction
         Launch place, speed and direction (+1 or -1: the sign of ds/dt).
     out : Pass1, optional
-        The result of a call before, or six arrays like it, to be filled again. Without it a large result takes the
-        memory of one before that nobody has any more.
+        The result of a call before, or six arrays like it, to be filled again.
     r0, b, k, m
         Run-time parameters; `PARAMETERS` holds their defaults.
 
@@ -326,7 +308,7 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = 
     Pass1
         Arrays x, z, ds, kappa, v2 and normal_force.
     """
-    return MODEL.pass1(lam, lam0, v0, direction, (r0, b, k, m,), out)
+    return MODEL.pass1(LaunchRequest(lam0, v0, direction), (r0, b, k, m,), lam, out)
 
 
 def solve(
@@ -338,7 +320,7 @@ def solve(
     t_max: Any = None,
     contact: str = "bilateral",
     r0: Any = '1', b: Any = '0.15', k: Any = '2', m: Any = '1',
-) -> Motion:
+) -> "Motion":
     """The motion that a launch begins (Passes 1 to 3).
 
     Parameters
@@ -363,7 +345,7 @@ def solve(
     GQMError
         For a launch or a parameter that cannot be; the message says what would be right.
     """
-    return MODEL.solve(lam0, v0, direction, point, t_max, contact, (r0, b, k, m,))
+    return MODEL.solve(LaunchRequest(lam0, v0, direction, point, t_max, contact), (r0, b, k, m,))
 
 
 def sweep(
@@ -401,4 +383,5 @@ def sweep(
     Sweep
         ``values``, NaN where there is none, and ``reasons``, 0 where there is one; ``why()`` counts the others.
     """
-    return MODEL.sweep(quantity, lam0, v0, direction, lam, t_max, contact, (r0, b, k, m,), client, __file__)
+    launches = LaunchRequest(lam0, v0, direction, None, t_max, contact)
+    return MODEL.sweep(quantity, launches, (r0, b, k, m,), lam=lam, client=client, source=__file__)

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "superellipse". Do not edit: change its declaration and generate again.
-# interface 7, input f556e3e2c1ab, body bdfec51efc71
+# interface 8, input f556e3e2c1ab, body caffad296a3a
 """Bead inside a superellipse, flat at its lowest point
 
 F              = -1 + z**4/b**4 + x**4/a**4
@@ -32,38 +32,16 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=7)
+compiled = compiler(__file__, interface=8)
 
-from gqm_sym.runtime import (
-    BEND,
-    BOUNDS,
-    CLIMB,
-    FIELD,
-    FRAME,
-    RISE,
-    Addresses,
-    ExactClimb,
-    Formulas,
-    Motion,
-    Pass1,
-    Traced,
+from gqm_sym.runtime.vocabulary import (
+    BEND, BOUNDS, CLIMB, FIELD, FRAME, RISE, Addresses, CompiledModel, ExactClimb, LaunchRequest, Pass1, Traced,
+    chart_alpha, chart_kappa, chart_of, chart_x, chart_z, chart_z1, chart_z2, cos, ichart_alpha, iconst, imul, isin,
+    nearest, sin,
 )
-from gqm_sym.runtime.chart_functions import (
-    chart_alpha,
-    chart_kappa,
-    chart_of,
-    chart_x,
-    chart_z,
-    chart_z1,
-    chart_z2,
-    ichart_alpha,
-)
-from gqm_sym.runtime.elementary import cos, sin
-from gqm_sym.runtime.intervals import iconst, imul, isin
-from gqm_sym.runtime.places import nearest
 
 if TYPE_CHECKING:
-    from gqm_sym.runtime import Sweep
+    from gqm_sym.runtime import Motion, Sweep
 
 PARAMETERS = {
     'a': '1.4',
@@ -186,7 +164,7 @@ def exact_level(op, x, z, p):
 
 CHART = Traced(field=field.address, start=exact_start, tangent=1, level=exact_level)
 
-MODEL = Formulas(
+MODEL = CompiledModel(
     name='superellipse',
     parameter='s',
     parameters=PARAMETERS,
@@ -207,8 +185,7 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = 
     lam0, v0, direction
         Launch place, speed and direction (+1 or -1: the sign of ds/dt).
     out : Pass1, optional
-        The result of a call before, or six arrays like it, to be filled again. Without it a large result takes the
-        memory of one before that nobody has any more.
+        The result of a call before, or six arrays like it, to be filled again.
     a, b, g, m
         Run-time parameters; `PARAMETERS` holds their defaults.
 
@@ -217,7 +194,7 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = 
     Pass1
         Arrays x, z, ds, kappa, v2 and normal_force.
     """
-    return MODEL.pass1(lam, lam0, v0, direction, (a, b, g, m,), out)
+    return MODEL.pass1(LaunchRequest(lam0, v0, direction), (a, b, g, m,), lam, out)
 
 
 def solve(
@@ -229,7 +206,7 @@ def solve(
     t_max: Any = None,
     contact: str = "bilateral",
     a: Any = '1.4', b: Any = '0.9', g: Any = '9.81', m: Any = '1',
-) -> Motion:
+) -> "Motion":
     """The motion that a launch begins (Passes 1 to 3).
 
     Parameters
@@ -254,7 +231,7 @@ def solve(
     GQMError
         For a launch or a parameter that cannot be; the message says what would be right.
     """
-    return MODEL.solve(lam0, v0, direction, point, t_max, contact, (a, b, g, m,))
+    return MODEL.solve(LaunchRequest(lam0, v0, direction, point, t_max, contact), (a, b, g, m,))
 
 
 def sweep(
@@ -292,4 +269,5 @@ def sweep(
     Sweep
         ``values``, NaN where there is none, and ``reasons``, 0 where there is one; ``why()`` counts the others.
     """
-    return MODEL.sweep(quantity, lam0, v0, direction, lam, t_max, contact, (a, b, g, m,), client, __file__)
+    launches = LaunchRequest(lam0, v0, direction, None, t_max, contact)
+    return MODEL.sweep(quantity, launches, (a, b, g, m,), lam=lam, client=client, source=__file__)

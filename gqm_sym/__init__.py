@@ -7,9 +7,11 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from gqm_sym import figures
     from gqm_sym.building import build
     from gqm_sym.declare import Curve, arc, clothoid, families, line
     from gqm_sym.derivation import Model, derive
+    from gqm_sym.design.least_speed import least_speed
     from gqm_sym.emission import emit
     from gqm_sym.errors import GQMError
     from gqm_sym.kernels import (
@@ -23,10 +25,8 @@ if TYPE_CHECKING:
         RotatingFrame,
         SurfaceTension,
     )
-    from gqm_sym.runtime import figures
-    from gqm_sym.runtime.least import least_speed
     from gqm_sym.specfile import read_spec
-    from gqm_sym.sweeps import read_sweep
+    from gqm_sym.studies import read_sweep
 
 __version__ = "0.1.0"
 
@@ -49,11 +49,11 @@ _HOMES = {
     "derive": "gqm_sym.derivation",
     "emit": "gqm_sym.emission",
     "families": "gqm_sym.declare",
-    "figures": "gqm_sym.runtime.figures",
-    "least_speed": "gqm_sym.runtime.least",
+    "figures": "gqm_sym.figures",
+    "least_speed": "gqm_sym.design.least_speed",
     "line": "gqm_sym.declare",
     "read_spec": "gqm_sym.specfile",
-    "read_sweep": "gqm_sym.sweeps",
+    "read_sweep": "gqm_sym.studies",
 }
 
 __all__ = [
@@ -88,7 +88,7 @@ def __getattr__(name: str) -> Any:
     if name not in _HOMES:
         raise AttributeError(f"module 'gqm_sym' has no attribute {name!r}")
     home = import_module(_HOMES[name])
-    return home if home.__name__.endswith(f".{name}") else getattr(home, name)
+    return home if home.__name__ == f"gqm_sym.{name}" else getattr(home, name)
 
 
 def __dir__() -> list[str]:

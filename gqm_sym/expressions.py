@@ -18,13 +18,13 @@ from typing import TypeAlias, TypeVar
 
 import sympy as sp
 
-from gqm_sym import rationals
 from gqm_sym.budgets import budget
-from gqm_sym.enclosures import check_constants, enclose
 from gqm_sym.errors import ExpressionError
-from gqm_sym.grammar import CONSTANTS, FUNCTIONS, NAME, evaluate, parse
-from gqm_sym.sympy_tree import is_sympy, tree_of
-from gqm_sym.trees import constant
+from gqm_sym.literals import rationals
+from gqm_sym.literals.enclosures import check_constants, enclose
+from gqm_sym.literals.grammar import CONSTANTS, FUNCTIONS, NAME, parse
+from gqm_sym.literals.sympy_tree import is_sympy, tree_of
+from gqm_sym.literals.trees import constant, evaluate
 
 Source: TypeAlias = str | int | float | Fraction | Decimal | sp.Expr
 

@@ -17,6 +17,8 @@ Value: TypeAlias = float | int | str
 """A default: a float means its binary value, an int or a text exactly what it spells."""
 
 Given: TypeAlias = Value | Decimal | Fraction | sp.Expr
+# Parameters as they are declared: with their defaults, or names alone.
+Parameters: TypeAlias = Mapping[str, Given | None] | Iterable[str]
 """What a user may write for a value."""
 
 # Mass and gravity mean the same everywhere, so several sources may use these two names.

@@ -16,10 +16,11 @@ import sympy as sp
 
 from gqm_sym.derivation import Model
 from gqm_sym.errors import SolutionError
+from gqm_sym.export.html import summary
 from gqm_sym.kernels.base import CONTACT_SIGN, DIRECTION
+from gqm_sym.optional import require
 from gqm_sym.runtime import Motion
-from gqm_sym.runtime.display import Rows, summary, table
-from gqm_sym.runtime.extras import needs
+from gqm_sym.runtime.motion.rows import Rows, table
 from gqm_sym.specfile import Spec
 from gqm_sym.sympy_charts import ChartFunction
 
@@ -51,7 +52,7 @@ pre { background: #f6f6f6; padding: 1rem; white-space: pre-wrap; }
 """
 
 
-@needs("plot")
+@require("plot")
 def report(spec: Spec, model: Model, motion: Motion, text: str) -> str:
     """The page about one motion.
 

@@ -16,14 +16,17 @@ from pathlib import Path
 from typing import Any
 
 ROOT = Path(__file__).resolve().parent.parent
-sys.path[:0] = [str(ROOT / "tests"), str(ROOT)]
+sys.path[:0] = [str(ROOT / "tests" / "support"), str(ROOT)]
 
 from confined import OutOfTime, confined  # noqa: E402
 
-from gqm_sym.errors import GQMError  # noqa: E402
-from gqm_sym.expressions import read_expression  # noqa: E402
-from gqm_sym.grammar import CONSTANTS, FUNCTIONS  # noqa: E402
-from gqm_sym.specfile import read_spec  # noqa: E402
+from gqm_sym.errors import GQMError
+from gqm_sym.expressions import read_expression
+from gqm_sym.literals.grammar import (
+    CONSTANTS,  # noqa: E402
+    FUNCTIONS,
+)
+from gqm_sym.specfile import read_spec
 
 PACKAGE = str(ROOT / "gqm_sym")
 FAILURES = Path("fuzz-failures")

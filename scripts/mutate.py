@@ -1,10 +1,10 @@
 """Change the code at random and see whether a test notices: ``mutate.py [COUNT] [SEED]``.
 
 Each mutant differs from `gqm_sym/derivation` or `gqm_sym/runtime` in one place: a comparison, an operator, a sign, a
-number, a condition, or a statement left out. First all tests run once, uncompiled (`tests/uncompiled.py`), to learn
-which lines each of them runs. Then every mutant meets the tests that run its line, the quick ones first, in a process
-of its own; the file on disk is never touched. Mutants that no test notices are printed: each is a gap in the tests, or
-changes nothing that can be seen. What was learnt stays in ``.mutants``; remove that after an edit.
+number, a condition, or a statement left out. First all tests run once, uncompiled (`tests/support/uncompiled.py`), to
+learn which lines each of them runs. Then every mutant meets the tests that run its line, the quick ones first, in a
+process of its own; the file on disk is never touched. Mutants that no test notices are printed: each is a gap in the
+tests, or changes nothing that can be seen. What was learnt stays in ``.mutants``; remove that after an edit.
 """
 
 import ast
@@ -27,7 +27,7 @@ from typing import Any
 
 os.environ["NUMBA_DISABLE_JIT"] = "1"
 ROOT = Path(__file__).resolve().parent.parent
-sys.path[:0] = [str(ROOT), str(ROOT / "tests")]
+sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "support")]
 
 # Imported once, for all mutants; none of them imports the package.
 import coverage  # noqa: E402
@@ -50,8 +50,9 @@ WORKERS = int(os.environ.get("WORKERS", "1"))
 MEASURING = str(Path(coverage.__file__).parent)
 # Tests whose subject is another process, a disk or compilation; and those that would need one.
 LEFT_OUT = (
-    *("architecture", "calls", "docs", "errors", "faults", "family_pages", "hostile", "jit", "processes", "starter"),
-    *("sweeps", "uncompiled"),
+    *("claims/test_architecture", "claims/test_docs", "claims/test_faults", "claims/test_family_pages"),
+    *("claims/test_hostile", "claims/test_processes", "claims/test_uncompiled", "runtime/compiled/test_calls"),
+    *("runtime/compiled/test_jit", "specfile/test_starter", "studies/test_studies", "test_errors"),
 )
 IMPORTS = ("--import-mode=importlib", "--continue-on-collection-errors", "--assert=plain")
 # Processor time in seconds that a test may take to be one of the quick ones, and by how much a mutant may slow it down.
@@ -122,10 +123,23 @@ def options() -> list[str]:
     return ["-q", "--no-header", "-p", "no:cacheprovider", "-p", "no:nbmake", "-o", "addopts=", *IMPORTS]
 
 
+def in_tests(file: Path) -> str:
+    """The name of a file of tests: its path inside the folder of tests, without its suffix."""
+    return file.relative_to(ROOT / "tests").with_suffix("").as_posix()
+
+
+def found_by(file: Path) -> Path:
+    """Where what a file of tests runs is written down."""
+    return WORK / f"{in_tests(file).replace('/', '.')}.json"
+
+
 def record(file: Path) -> None:
     """Run a file of tests, and write down which of them run which lines, and how long they take."""
     measured = coverage.Coverage(
-        data_file=str(WORK / f"coverage.{file.stem}"), branch=True, source=[str(ROOT / "gqm_sym")], config_file=False
+        data_file=str(WORK / f"coverage.{found_by(file).stem}"),
+        branch=True,
+        source=[str(ROOT / "gqm_sym")],
+        config_file=False,
     )
     recorder = Recorder(measured)
     measured.start()
@@ -139,7 +153,7 @@ def record(file: Path) -> None:
         if path.startswith(FOLDERS):
             told = data.contexts_by_lineno(name).items()
             lines[path] = {line: sorted({*tests} - recorder.failed - {""}) for line, tests in told}
-    (WORK / f"{file.stem}.json").write_text(json.dumps({"taken": recorder.taken, "lines": lines}), encoding="utf-8")
+    found_by(file).write_text(json.dumps({"taken": recorder.taken, "lines": lines}), encoding="utf-8")
 
 
 def known_tests() -> tuple[dict[str, float], dict[str, dict[str, list[str]]]]:
@@ -147,12 +161,10 @@ def known_tests() -> tuple[dict[str, float], dict[str, dict[str, list[str]]]]:
     WORK.mkdir(exist_ok=True)
     taken: dict[str, float] = {}
     lines: dict[str, dict[str, list[str]]] = defaultdict(lambda: defaultdict(list))
-    files = [
-        file for file in sorted((ROOT / "tests").glob("test_*.py")) if file.stem.removeprefix("test_") not in LEFT_OUT
-    ]
+    files = [file for file in sorted((ROOT / "tests").rglob("test_*.py")) if in_tests(file) not in LEFT_OUT]
     running: set[int] = set()
     for file in files:
-        if (WORK / f"{file.stem}.json").exists():
+        if found_by(file).exists():
             continue
         if len(running) == WORKERS:
             running.discard(os.wait()[0])
@@ -166,9 +178,8 @@ def known_tests() -> tuple[dict[str, float], dict[str, dict[str, list[str]]]]:
     while running:
         running.discard(os.wait()[0])
     for file in files:
-        found = WORK / f"{file.stem}.json"
-        if found.exists():  # else what it runs ended the process
-            told = json.loads(found.read_text(encoding="utf-8"))
+        if found_by(file).exists():  # else what it runs ended the process
+            told = json.loads(found_by(file).read_text(encoding="utf-8"))
             taken |= told["taken"]
             for path, places in told["lines"].items():
                 for line, tests in places.items():
@@ -322,7 +333,9 @@ def main(count: int, seed: int) -> int:
     """Run mutants, and print those that no test notices."""
     taken, lines = known_tests()
     trees = {
-        path: ast.parse(path.read_text(encoding="utf-8")) for folder in FOLDERS for path in (ROOT / folder).glob("*.py")
+        path: ast.parse(path.read_text(encoding="utf-8"))
+        for folder in FOLDERS
+        for path in (ROOT / folder).rglob("*.py")
     }
     every = [(path, *change) for path, tree in sorted(trees.items()) for change in changes(tree)]
     draw, counts = random.Random(seed), Counter[str]()

@@ -31,7 +31,7 @@ ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
 
 from gqm_sym.errors import GQMError, InputError  # noqa: E402
-from gqm_sym.runtime.entries import climb_at, frame_at  # noqa: E402
+from gqm_sym.runtime.launch.speed import path_and_force_at, potential_at  # noqa: E402
 
 NAMES = sorted(path.stem for path in (ROOT / "generated").glob("*.py"))
 # Of the largest V**2 on the way, and of a place of the curve: many roundings, and far above those of a right motion.
@@ -125,7 +125,7 @@ def faults(module: ModuleType, call: dict[str, Any], draw: random.Random, closel
     if module.MODEL.dissipation is not None:
         # With losses V**2 depends on the way: pass 1 tells that of the first leg, if places in doubles tell it apart.
         held = (t <= legs[0].t_end) & (abs(legs[0].lam_end - legs[0].lam_start) > SLACK * bit)
-    share = PACED if any(piece.stretch.from_exact for piece in motion._course(0.0).pieces) else ENERGY
+    share = PACED if any(timed.segment.from_multiprecision for timed in motion._trajectory(0.0).segments) else ENERGY
     if not np.all((np.abs(v2 - told) <= share * most + unsure)[held]):
         told, unsure = speed_squared(module, motion, lam, bit, launch, True, most)  # heights may cancel in themselves
     off = np.abs(v2 - told)[held]
@@ -144,7 +144,7 @@ def faults(module: ModuleType, call: dict[str, Any], draw: random.Random, closel
         if np.any(leg.direction * v[inside] < 0.0):
             found.append("runs against its leg")
     functions = motion.problem.functions
-    ds = frame_at(functions.addresses, functions.p, lam, v2)[2]
+    ds = path_and_force_at(functions.addresses, functions.p, lam, v2)[2]
     if closely and motion.kind == "libration":
         if module.MODEL.dissipation is None and draw.random() < 1.0 / SWEEPS:
             found += swept(module, call, motion.period)
@@ -184,7 +184,7 @@ def speed_squared(
         told, *beside = module.pass1(np.array([lam, lam - bit, lam + bit]), **launch).v2
         return told, sum(np.nan_to_num(np.abs(other - told)) for other in beside)  # off the leg there is none
     functions, lam0 = motion.problem.functions, launch["lam0"]
-    heights, slopes = climb_at(functions.addresses, functions.p, np.array([lam0 - 1.0, lam0 + 1.0, lam0, *lam]))
+    heights, slopes = potential_at(functions.addresses, functions.p, np.array([lam0 - 1.0, lam0 + 1.0, lam0, *lam]))
     moved, rounding = 2.0 * bit * np.abs(slopes[3:]), ROUNDED * np.nanmax(np.abs(heights))
     if module.MODEL.exact is None or not (closely or rounding > LEFT * most):
         return launch["v0"] ** 2 + (heights[2] - heights[3:]), moved + rounding

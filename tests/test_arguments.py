@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 import gqm_sym as gqm
 from gqm_sym.errors import ArgumentError, DeclarationError, GQMError, InputError
 from gqm_sym.expressions import RESERVED_NAMES, check_module_name
-from gqm_sym.runtime.sampled import Sampled
+from gqm_sym.runtime.charts.sampled import Sampled
 from gqm_sym.specfile import read_spec
 
 TRACK = gqm.Curve.graph("a*x**2", parameters={"a": 2})

@@ -14,7 +14,7 @@ import pytest
 import gqm_sym as gqm
 from gqm_sym.building import difference, load, write_module, write_text
 from gqm_sym.errors import GQMError, HandEditedError, InputError, OutdatedModuleError
-from gqm_sym.runtime import jit
+from gqm_sym.runtime.compiled import jit
 from gqm_sym.runtime.interface import INTERFACE
 
 LONG_AGO = 1_000_000_000
@@ -190,7 +190,7 @@ def test_a_module_that_is_not_there(name: str, tmp_path: Path) -> None:
 def test_a_module_for_another_interface(version: int, text: str, path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """It is refused as it is imported, with what to run, before anything is compiled."""
     path.write_text(text.replace(f"interface={INTERFACE})", f"interface={version})"), encoding="utf-8")
-    monkeypatch.setattr(jit, "CFunc", _failing(AssertionError("compiled")))
+    monkeypatch.setattr(jit.COMPILER, "callback", _failing(AssertionError("compiled")))
     with pytest.raises(OutdatedModuleError, match=rf"bowl\.py: .*interface {version} .*{INTERFACE}; run gqm-gen"):
         load(path, "outdated")
     path.write_text(text, encoding="utf-8")

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from gqm_sym.errors import ExpressionError, GQMError, NumberError
 from gqm_sym.expressions import RESERVED_NAMES, check_name, is_real_at, name_or_value, read_expression
-from gqm_sym.grammar import CONSTANTS, FUNCTIONS
+from gqm_sym.literals.grammar import CONSTANTS, FUNCTIONS
 
 # Against a reader that hangs, not against a busy machine.
 NO_HANG = timedelta(seconds=20)

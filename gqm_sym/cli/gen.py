@@ -14,7 +14,7 @@ from gqm_sym.errors import InputError
 
 if TYPE_CHECKING:
     from gqm_sym.derivation import Model
-    from gqm_sym.runtime.motion import Motion
+    from gqm_sym.runtime.motion.motion import Motion
     from gqm_sym.specfile import Spec
 
 PROGRAM = "gqm-gen"

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from gqm_sym.errors import InputError
 
 if TYPE_CHECKING:
-    from gqm_sym.runtime.motion import Motion
+    from gqm_sym.runtime.motion.motion import Motion
 
 FORMATS = (".png", ".svg", ".pdf")
 

@@ -8,7 +8,7 @@ if TYPE_CHECKING:
     from xarray import Dataset
 
     from gqm_sym.derivation import Model
-    from gqm_sym.runtime.motion import Motion
+    from gqm_sym.runtime.motion.motion import Motion
     from gqm_sym.specfile import Spec
 
 
@@ -32,6 +32,9 @@ def forms(spec: "Spec", model: "Model") -> Iterator[str]:
     yield from table((_parameter(spec, *pair) for pair in model.defaults), right=())
     for note in model.notes:
         yield f"  note: {note}"
+    if spec.curve.smoothing is not None:
+        yield ""
+        yield from (f"  {line}" for line in str(spec.curve.smoothing).splitlines())
 
 
 def _parameter(spec: "Spec", name: str, value: object) -> tuple[str, ...]:
@@ -56,7 +59,7 @@ def motion(found: "Motion", parameter: str) -> Iterator[str]:
     elif isfinite(found.t_end):
         yield f"  ends after      {_number(found.t_end)} s"
     yield f"  quadrature      within {found.quadrature_error:.1e} of a time"
-    yield f"  conditioning    {found.conditioning:.1e} (a relative change of the launch, magnified in a time)"
+    yield f"  condition       {found.condition_number:.1e} (relative change of a time per that of the launch)"
     if found.legs:
         yield ""
         yield from table(_legs(found, parameter), right=range(1, 6))
@@ -92,7 +95,7 @@ def _states(
 
 def swept(quantities: Iterable[str], data: "Dataset") -> Iterator[str]:
     """Yield what came of a sweep, line by line: its size, and what there is no value of, and why."""
-    from gqm_sym.runtime.sweeping import REASONS
+    from gqm_sym.runtime.sweep.sweep import REASONS
 
     yield f"  {' x '.join(f'{size} {name}' for name, size in data.sizes.items())}: {', '.join(quantities)}"
     refused: dict[str, None] = {}

@@ -17,7 +17,7 @@ from gqm_sym.errors import ParameterError
 if TYPE_CHECKING:
     from gqm_sym.declare.families import Family
     from gqm_sym.derivation import Model
-    from gqm_sym.runtime.motion import Motion
+    from gqm_sym.runtime.motion.motion import Motion
     from gqm_sym.specfile import Spec
 
 PROGRAM = "gqm"
@@ -226,8 +226,8 @@ def _module(text: str, name: str, folder: Path) -> Any:
 
 def _sweep(options: argparse.Namespace) -> None:
     from gqm_sym.cli.progress import Bar
-    from gqm_sym.runtime.cluster import connected
-    from gqm_sym.sweeps import read_sweep, run
+    from gqm_sym.runtime.sweep.cluster import connected
+    from gqm_sym.studies import read_sweep, run
 
     plan = read_sweep(options.file)
     target = options.output or f"{Path(options.file).stem}.nc"
@@ -250,7 +250,7 @@ def _sweep(options: argparse.Namespace) -> None:
 
 def _schema(options: argparse.Namespace) -> None:
     if options.sweep:
-        from gqm_sym.sweeps import sweep_schema
+        from gqm_sym.studies import sweep_schema
 
         schema = sweep_schema()
     else:

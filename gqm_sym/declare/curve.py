@@ -1,7 +1,7 @@
 """A planar curve as it was declared: coordinates, parameter, domain and run-time parameters."""
 
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import sympy as sp
@@ -9,17 +9,17 @@ import sympy as sp
 from gqm_sym.arguments import checked, names, one_line, short
 from gqm_sym.declare.closing import check_period, found_period
 from gqm_sym.declare.ends import Ends, check_ends, check_order, read_ends
+from gqm_sym.declare.measures import told
 from gqm_sym.errors import DeclarationError
 from gqm_sym.expressions import check_name, read_expression
-from gqm_sym.parameters import Given, Value, names_in_order, read_parameters
+from gqm_sym.parameters import Parameters, Value, names_in_order, read_parameters
 from gqm_sym.sympy_charts import chart_x, chart_z
 
 if TYPE_CHECKING:
-    from gqm_sym.declare.implicit import Level
     from gqm_sym.declare.piecewise import Piece
+    from gqm_sym.smoothing import Smoothing
 
 Source: TypeAlias = str | int | sp.Expr
-Parameters: TypeAlias = Mapping[str, Given | None] | Iterable[str]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -87,9 +87,12 @@ class Curve:
 
     def __str__(self) -> str:
         """A few lines for people: what it is, where it goes, and what its parameters are measured in."""
-        from gqm_sym.declare.measures import told
-
         return told(self)
+
+    @property
+    def smoothing(self) -> "Smoothing | None":
+        """What smoothing did to the points of a sampled track; None where nothing was smoothed."""
+        return getattr(self.definition, "smoothing", None)
 
     @classmethod
     @checked("Curve.graph")
@@ -112,7 +115,8 @@ class Curve:
         """
         symbol = _symbol(parameter, "graph")
         height = read_expression(z, where="graph: z")
-        return _declare("graph", symbol, height, symbol, domain, None, parameters, title, positive)
+        forms = cls(kind="graph", x=symbol, z=height, parameter=symbol, title=title)
+        return _declare(forms, domain, parameters, positive)
 
     @classmethod
     @checked("Curve.parametric")
@@ -140,7 +144,8 @@ class Curve:
         symbol = _symbol(parameter, "parametric")
         first = read_expression(x, where="parametric: x")
         second = read_expression(z, where="parametric: z")
-        return _declare("parametric", first, second, symbol, domain, period, parameters, title, positive)
+        forms = cls(kind="parametric", x=first, z=second, parameter=symbol, title=title)
+        return _declare(forms, domain, parameters, positive, period)
 
     @classmethod
     @checked("Curve.polar")
@@ -158,18 +163,9 @@ class Curve:
         """Declare ``r = r(θ)``, θ from the positive x axis; r may be negative."""
         symbol = _symbol(parameter, "polar")
         radius = read_expression(r, where="polar: r")
-        return _declare(
-            "polar",
-            radius * sp.cos(symbol),
-            radius * sp.sin(symbol),
-            symbol,
-            domain,
-            period,
-            parameters,
-            title,
-            positive,
-            radius,
-        )
+        x, z = radius * sp.cos(symbol), radius * sp.sin(symbol)
+        forms = cls(kind="polar", x=x, z=z, parameter=symbol, title=title, radius=radius)
+        return _declare(forms, domain, parameters, positive, period)
 
     @classmethod
     @checked("Curve.implicit")
@@ -210,9 +206,9 @@ class Curve:
         level = read_level(F, start=start, tangent=tangent, parameter=symbol.name)
         ends = read_ends(domain, "implicit")
         check_domain(*ends)
-        return _declare(
-            "implicit", chart_x(symbol), chart_z(symbol), symbol, ends, None, parameters, title, positive, level=level
-        )
+        x, z = chart_x(symbol), chart_z(symbol)
+        forms = cls(kind="implicit", x=x, z=z, parameter=symbol, title=title, definition=level)
+        return _declare(forms, ends, parameters, positive, names_of_level=level.names)
 
     @classmethod
     @checked("Curve.sampled")
@@ -223,6 +219,7 @@ class Curve:
         *,
         kind: str = "spline",
         closed: bool | None = None,
+        smoothing: float | str | None = None,
         title: str = "",
     ) -> "Curve":
         """Declare the track through points, in arc length from the first of them.
@@ -236,19 +233,38 @@ class Curve:
             The heights of the points, where ``points`` are their x: ``Curve.sampled(x, z)``.
         kind
             "spline": the interpolating quintic spline. "linear": planes stitched together (paper, eq. 1); at their
-            corners the speed is kept.
+            corners the speed is kept. A body at rest on a corner stays where both planes rise from it or hold it; on a
+            ridge that lets it slide down either side it goes in the direction of launch.
         closed
             Whether the track closes; None: if its last point is its first.
+        smoothing
+            For measured points, whose scatter would be a hundredfold in curvature and loads: their standard deviation
+            in metres, or "auto", to find it by cross-validation. The track is then the smoothing spline of degree 5;
+            what it changed, and how good its curvature is, is in the attribute ``smoothing`` of the curve. None: the
+            track goes through the points.
 
         Raises
         ------
         DeclarationError
             If a row is no point, or points are too few, repeated, out of order or far away.
+
+        Warns
+        -----
+        NoisyPointsWarning
+            If the curvature of the track goes up and down from point to point.
+
+        Examples
+        --------
+        >>> from math import cos
+        >>> ruler = [(x / 10, round(cos(x / 10), 2)) for x in range(60)]  # heights to the centimetre
+        >>> track = Curve.sampled(ruler, smoothing=0.003)
+        >>> round(track.smoothing.rms, 4)
+        0.0021
         """
         from gqm_sym.declare.sampled import read_track
 
         s = sp.Symbol("s", real=True)
-        track = read_track(points, z, kind=kind, closed=closed)
+        track = read_track(points, z, kind=kind, closed=closed, smoothing=smoothing)
         return cls(kind="sampled", x=chart_x(s), z=chart_z(s), parameter=s, title=title, definition=track)
 
     @classmethod
@@ -317,41 +333,26 @@ def check_parameter_name(name: str, kind: str) -> str:
 
 
 def _declare(
-    kind: str,
-    x: sp.Expr,
-    z: sp.Expr,
-    symbol: sp.Symbol,
+    forms: Curve,
     domain: Iterable[Source | None] | None,
-    period: Source | None,
     parameters: Parameters | None,
-    title: str,
     positive: Iterable[str],
-    radius: sp.Expr | None = None,
-    level: "Level | None" = None,
+    period: Source | None = None,
+    names_of_level: tuple[str, ...] = (),
 ) -> Curve:
+    """The curve of these coordinates with its domain, its period and its run-time parameters, read and checked."""
+    kind, symbol = forms.kind, forms.parameter
     ends = read_ends(domain, kind)
     turn = None if period is None else read_expression(period, where=f"{kind}: period")
-    written = (x, z) if radius is None else (radius,)
+    written = (forms.x, forms.z) if forms.radius is None else (forms.radius,)
     given = tuple(end for end in (*ends, turn) if end is not None)
-    used = (*names_in_order(*written), *(() if level is None else level.names), *names_in_order(*given))
+    used = (*names_in_order(*written), *names_of_level, *names_in_order(*given))
     found = tuple(name for name in dict.fromkeys(used) if name != symbol.name)
     defaults = read_parameters(parameters, found=found, where=f"{kind} curve")
     if turn is None and kind in ("parametric", "polar") and ends == (None, None):
-        turn = found_period((x, z), symbol)
+        turn = found_period((forms.x, forms.z), symbol)
     promised = names(positive, where=f"{kind}: positive")
     for name in promised:
         if name not in found:
             raise DeclarationError(f"{kind} curve: {short(name)} is promised to be positive but not used; remove it")
-    return Curve(
-        kind=kind,
-        x=x,
-        z=z,
-        parameter=symbol,
-        domain=ends,
-        period=turn,
-        defaults=defaults,
-        title=title,
-        positive=promised,
-        radius=radius,
-        definition=level,
-    )
+    return replace(forms, domain=ends, period=turn, defaults=defaults, positive=promised)

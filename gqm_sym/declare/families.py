@@ -2,7 +2,7 @@
 
 ``families.ellipse(a=2, b="b_e")`` declares an ellipse whose semi-axis a is 2 unless another value
 is given at run time, and whose b is called ``b_e``. A new family is a row here and one in
-``tests/problems.py``.
+``tests/support/problems.py``.
 """
 
 from collections.abc import Callable, Iterable
@@ -11,10 +11,10 @@ from dataclasses import dataclass
 import sympy as sp
 
 from gqm_sym.arguments import checked, flag, short, unknown_argument
-from gqm_sym.declare.curve import Curve, Parameters, Source, check_parameter_name
+from gqm_sym.declare.curve import Curve, Source, check_parameter_name
 from gqm_sym.errors import ArgumentError, DeclarationError
 from gqm_sym.expressions import read_expression
-from gqm_sym.parameters import Given, Value, read_argument
+from gqm_sym.parameters import Given, Parameters, Value, read_argument
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

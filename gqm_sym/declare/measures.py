@@ -1,13 +1,47 @@
 """What the formulas of a curve are measured in, and the curve in words: coordinates are lengths, angles numbers."""
 
+from typing import Protocol, cast
+
 import sympy as sp
 
-from gqm_sym.declare.curve import Curve
 from gqm_sym.declare.implicit import Level
-from gqm_sym.declare.piecewise import Rail
+from gqm_sym.declare.piecewise import FormulaCurve, Rail
 from gqm_sym.declare.sampled import Track
 from gqm_sym.dimensions import COMMON, LENGTH, NUMBER, Dimension, Formulas, dimension, found_dimensions, unit_of
 from gqm_sym.parameters import in_words
+
+
+class DeclaredCurve(FormulaCurve, Protocol):
+    """What is read of a curve here (`curve.Curve` is one)."""
+
+    @property
+    def x(self) -> sp.Expr:
+        """The horizontal coordinate."""
+
+    @property
+    def z(self) -> sp.Expr:
+        """The height."""
+
+    @property
+    def radius(self) -> sp.Expr | None:
+        """Of a polar curve."""
+
+    @property
+    def parameter(self) -> sp.Symbol:
+        """The curve's own parameter."""
+
+    @property
+    def period(self) -> sp.Expr | None:
+        """Of a closed curve."""
+
+    @property
+    def title(self) -> str:
+        """One line for people."""
+
+    @property
+    def definition(self) -> object:
+        """What a charted curve is made from."""
+
 
 PER_LENGTH = dimension(metre=-1)
 _PIECES: dict[str, tuple[Dimension, ...]] = {
@@ -18,7 +52,7 @@ _PIECES: dict[str, tuple[Dimension, ...]] = {
 _PLANE: dict[str, Dimension | None] = {"x": LENGTH, "z": LENGTH}
 
 
-def curve_formulas(curve: Curve) -> Formulas:
+def curve_formulas(curve: DeclaredCurve) -> Formulas:
     """Return the formulas of a curve with their dimensions."""
     lam = curve.parameter
     if isinstance(curve.definition, Level):
@@ -35,7 +69,7 @@ def curve_formulas(curve: Curve) -> Formulas:
     return Formulas([*((form, LENGTH) for form in coordinates), *ends], {lam.name: own})
 
 
-def parameter_dimension(curve: Curve) -> Dimension | None:
+def parameter_dimension(curve: DeclaredCurve) -> Dimension | None:
     """Return what a curve's parameter is measured in; None where its formulas do not tell it at once."""
     lam = curve.parameter
     if curve.kind == "parametric":
@@ -54,15 +88,16 @@ def _rail_formulas(rail: Rail) -> Formulas:
             total += Formulas(list(zip(piece.numbers, _PIECES[piece.kind], strict=True)))
             continue
         # Each curve has a parameter of its own, by whatever name.
-        lam = piece.curve.parameter
+        curve = cast(DeclaredCurve, piece.curve)
+        lam = curve.parameter
         own = sp.Symbol(f"{lam.name} of {count}", real=True)
-        inside = curve_formulas(piece.curve)
+        inside = curve_formulas(curve)
         equal = [(form.xreplace({lam: own}), wanted) for form, wanted in inside.equal]
         total += Formulas(equal, {own.name: inside.variables[lam.name]})
     return total
 
 
-def told(curve: Curve) -> str:
+def told(curve: DeclaredCurve) -> str:
     """Describe a curve in a few lines."""
     units = {name: unit_of(found) for name, found in found_dimensions(curve_formulas(curve), COMMON).items()}
     lines = [f"{curve.title or 'Curve'}: {_what(curve)}", *(f"  {name} = {form}" for name, form in _forms(curve))]
@@ -76,7 +111,7 @@ def told(curve: Curve) -> str:
     return "\n".join(lines)
 
 
-def _what(curve: Curve) -> str:
+def _what(curve: DeclaredCurve) -> str:
     made = curve.definition
     if isinstance(made, Track):
         count = made.points.count("\n") + 1
@@ -92,7 +127,7 @@ def _what(curve: Curve) -> str:
     return f"{curve.kind}, in {curve.parameter}{unit}; coordinates in m, z upwards"
 
 
-def _forms(curve: Curve) -> list[tuple[str, sp.Expr]]:
+def _forms(curve: DeclaredCurve) -> list[tuple[str, sp.Expr]]:
     made = curve.definition
     if isinstance(made, Level):
         x, z = made.start

@@ -2,17 +2,46 @@
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import Protocol, runtime_checkable
 
 import sympy as sp
 
 from gqm_sym.arguments import checked, flag, several, short
-from gqm_sym.declare.curve import Curve, Parameters, Source
 from gqm_sym.errors import DeclarationError
-from gqm_sym.expressions import read_expression
-from gqm_sym.parameters import Value, names_in_order, read_parameters
+from gqm_sym.expressions import Source, read_expression
+from gqm_sym.parameters import Parameters, Value, names_in_order, read_parameters
 
 # What each standard piece is given by; the first of them must be positive.
 STANDARD = {"line": ("length",), "arc": ("radius", "angle"), "clothoid": ("length", "kappa_start", "kappa_end")}
+
+
+@runtime_checkable
+class FormulaCurve(Protocol):
+    """What a rail needs of a curve with formulas that is one of its pieces (`curve.Curve` is one)."""
+
+    @property
+    def kind(self) -> str:
+        """The form in which it was declared."""
+
+    @property
+    def charted(self) -> bool:
+        """Whether it has no formulas."""
+
+    @property
+    def domain(self) -> tuple[sp.Expr | None, sp.Expr | None]:
+        """The ends of its parameter."""
+
+    @property
+    def parameters(self) -> tuple[str, ...]:
+        """The names of its run-time parameters."""
+
+    @property
+    def positive(self) -> tuple[str, ...]:
+        """Those promised to be positive."""
+
+    @property
+    def defaults(self) -> tuple[tuple[str, Value | None], ...]:
+        """The run-time parameters with their defaults."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -31,7 +60,7 @@ class Piece:
 
     kind: str
     numbers: tuple[sp.Expr, ...]
-    curve: Curve | None = None
+    curve: FormulaCurve | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -82,7 +111,7 @@ def _standard(kind: str, *given: Source) -> Piece:
 
 
 def declare_rail(
-    pieces: Iterable[Piece | Curve],
+    pieces: Iterable[Piece | FormulaCurve],
     *,
     start: Sequence[Source] | None,
     heading: Source | None,
@@ -109,10 +138,10 @@ def declare_rail(
     return rail, defaults, positive
 
 
-def _piece(given: Piece | Curve, where: str) -> Piece:
+def _piece(given: Piece | FormulaCurve, where: str) -> Piece:
     if isinstance(given, Piece):
         return given
-    if not isinstance(given, Curve):
+    if not isinstance(given, FormulaCurve):
         raise DeclarationError(f"{where}: {short(given)} given; give line, arc, clothoid or a curve with formulas")
     if given.charted:
         raise DeclarationError(f"{where}: a curve of kind {given.kind!r} cannot be a piece; give one with formulas")

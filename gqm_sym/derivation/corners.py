@@ -14,12 +14,12 @@ import sympy as sp
 
 from gqm_sym.budgets import spend
 from gqm_sym.declare import Curve
-from gqm_sym.derivation.algebra import Algebra
-from gqm_sym.derivation.differentiate import differentiate
-from gqm_sym.derivation.factors import factors
-from gqm_sym.derivation.generators import Angle, OverBudget
-from gqm_sym.derivation.rewrite import product, spell_factors
-from gqm_sym.derivation.signs import Signs
+from gqm_sym.derivation.algebra.algebra import Algebra
+from gqm_sym.derivation.algebra.differentiate import differentiate
+from gqm_sym.derivation.algebra.factors import factors
+from gqm_sym.derivation.algebra.generators import Angle, OverBudget
+from gqm_sym.derivation.algebra.rewrite import product, spell_factors
+from gqm_sym.derivation.algebra.signs import Signs
 from gqm_sym.errors import DeclarationError
 from gqm_sym.parameters import Value, tried_values
 

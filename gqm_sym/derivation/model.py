@@ -11,19 +11,19 @@ from gqm_sym.declare import Curve
 from gqm_sym.declare.closing import check_period
 from gqm_sym.declare.ends import check_order
 from gqm_sym.declare.measures import curve_formulas
+from gqm_sym.derivation.algebra.rewrite import check_real, without_poles
+from gqm_sym.derivation.algebra.signs import Signs
 from gqm_sym.derivation.corners import check_corners, check_powers, without_known_bars
 from gqm_sym.derivation.defaults import join
-from gqm_sym.derivation.dissipation import LOAD, PUSH, SIGMA, TILT, TURN, Dissipation, dissipation
-from gqm_sym.derivation.forces import Forces, forces
-from gqm_sym.derivation.geometry import Geometry, geometry
-from gqm_sym.derivation.level_set import LevelSet, level_set
-from gqm_sym.derivation.path import beside
+from gqm_sym.derivation.forces.dissipation import LOAD, PUSH, SIGMA, TILT, TURN, Dissipation, dissipation
+from gqm_sym.derivation.forces.forces import Forces, forces
+from gqm_sym.derivation.forces.speed import LAM0, V0, SpeedField, conservative_speed, dissipative_speed
+from gqm_sym.derivation.geometry.geometry import Geometry, geometry
+from gqm_sym.derivation.geometry.level_set import LevelSet, level_set
+from gqm_sym.derivation.geometry.offset_curve import beside
 from gqm_sym.derivation.reality import check_somewhere_real
-from gqm_sym.derivation.rewrite import check_real, without_poles
-from gqm_sym.derivation.signs import Signs
-from gqm_sym.derivation.speed import LAM0, V0, SpeedField, conservative_speed, dissipative_speed
-from gqm_sym.derivation.swing import Swing, swing
-from gqm_sym.derivation.symmetry import Symmetry, symmetry
+from gqm_sym.derivation.wells.swing import Swing, swing
+from gqm_sym.derivation.wells.symmetry import Symmetry, symmetry
 from gqm_sym.dimensions import COMMON, found_dimensions, unit_of
 from gqm_sym.errors import ArgumentError
 from gqm_sym.kernels.base import (

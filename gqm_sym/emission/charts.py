@@ -9,13 +9,13 @@ from gqm_sym.declare import Curve
 from gqm_sym.declare.implicit import X, Z
 from gqm_sym.declare.piecewise import Rail
 from gqm_sym.declare.sampled import Track
-from gqm_sym.derivation.differentiate import differentiate
-from gqm_sym.derivation.geometry import geometry
+from gqm_sym.derivation.algebra.differentiate import differentiate
+from gqm_sym.derivation.geometry.geometry import geometry
 from gqm_sym.emission.ir import ChartIR, ExactIR, FunctionIR
 from gqm_sym.emission.printer import check_emittable
 
 if TYPE_CHECKING:
-    from gqm_sym.emission.lower import Lowering
+    from gqm_sym.emission.context import Lowering
 
 
 def _implicit(lowering: "Lowering") -> ChartIR:
@@ -66,7 +66,7 @@ def _rail(lowering: "Lowering") -> ChartIR:
     """What each piece is given by, and a function for each curve among them."""
     rail = lowering.model.curve.definition
     assert isinstance(rail, Rail)
-    curves = [piece.curve for piece in rail.pieces if piece.curve is not None]
+    curves = [piece.curve for piece in rail.pieces if isinstance(piece.curve, Curve)]
     functions = tuple(_segment(lowering, curve, f"segment_{count}") for count, curve in enumerate(curves, start=1))
     formulas = tuple(_exact_segment(lowering, curve, f.name) for curve, f in zip(curves, functions, strict=True))
     given = (*(rail.start or ()), *(number for piece in rail.pieces for number in piece.numbers))

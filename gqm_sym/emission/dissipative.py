@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING
 import sympy
 from sympy import Expr, Symbol
 
-from gqm_sym.derivation.dissipation import LOAD, PUSH, SIGMA, TILT, TURN, Dissipation
+from gqm_sym.derivation.forces.dissipation import LOAD, PUSH, SIGMA, TILT, TURN, Dissipation
 from gqm_sym.emission.ir import Assignment, FunctionIR
-from gqm_sym.emission.places import at
+from gqm_sym.emission.subscripts import at
 from gqm_sym.kernels.base import CONTACT_SIGN, DIRECTION, KAPPA, W
 
 if TYPE_CHECKING:
-    from gqm_sym.emission.lower import Lowering
+    from gqm_sym.emission.context import Lowering
 
 _NAMES = {SIGMA: "ds", KAPPA: "kappa", TURN: "turn", LOAD: "n0", PUSH: "push", TILT: "dxds"}
 """What emitted code calls that which a force law takes of a curve."""

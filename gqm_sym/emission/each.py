@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING
 from sympy import Expr, Function, Symbol, cos, expand, sin
 from sympy.core.function import AppliedUndef
 
-from gqm_sym.derivation.difference import Differences
+from gqm_sym.derivation.algebra.difference import Differences
 from gqm_sym.emission.ir import FunctionIR
-from gqm_sym.emission.places import at
 from gqm_sym.emission.sharing import hoist
+from gqm_sym.emission.subscripts import at
 from gqm_sym.emission.swing import swing_each
 
 if TYPE_CHECKING:
-    from gqm_sym.emission.lower import Lowering
+    from gqm_sym.emission.context import Lowering
 
 NEAR = frozenset({"cosh2", "sinh2"})
 """Differences that have a closed form for near points, without the rest: NaN tells a sweep to go another way."""

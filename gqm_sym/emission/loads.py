@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 from sympy import Abs, Expr, Function, Pow, Rational, Symbol, cos, cosh, exp, ordered, sin, sinh
 
 from gqm_sym.emission.ir import FunctionIR
-from gqm_sym.emission.places import at
+from gqm_sym.emission.subscripts import at
 
 if TYPE_CHECKING:
-    from gqm_sym.emission.lower import Lowering
+    from gqm_sym.emission.context import Lowering
 
 
 def loads(lowering: "Lowering") -> tuple[FunctionIR, ...]:

@@ -1,21 +1,18 @@
 """From a model's closed forms to functions as straight-line code."""
 
-from collections.abc import Iterable
-
-import sympy
 from sympy import Expr, Function, Symbol
 
 from gqm_sym.derivation import Model
-from gqm_sym.derivation.difference import Differences
-from gqm_sym.derivation.differentiate import differentiate
+from gqm_sym.derivation.algebra.difference import Differences
+from gqm_sym.derivation.algebra.differentiate import differentiate
 from gqm_sym.emission.charts import chart_maker
+from gqm_sym.emission.context import Lowering
 from gqm_sym.emission.dissipative import drive, hold
 from gqm_sym.emission.each import bounds_each, each
-from gqm_sym.emission.ir import Assignment, ExactIR, FunctionIR, ModuleIR
+from gqm_sym.emission.ir import ExactIR, FunctionIR, ModuleIR
 from gqm_sym.emission.loads import loads
-from gqm_sym.emission.places import at
 from gqm_sym.emission.printer import check_emittable
-from gqm_sym.emission.sharing import check_size, straight_line
+from gqm_sym.emission.subscripts import at
 from gqm_sym.kernels.base import CONTACT_SIGN, DIRECTION, W
 from gqm_sym.sympy_charts import chart_x, chart_z
 
@@ -23,25 +20,10 @@ FLAGS = ("friction", "kinked", "linear")
 """What a module says of a force law that is not conservative."""
 
 
-class Names:
-    """Names of our own inside emitted functions: a user's name never begins with an underscore, so ours may."""
-
-    def __init__(self, taken: Iterable[str]) -> None:
-        self._taken = frozenset(taken)
-
-    def __call__(self, name: str) -> str:
-        """``name``, or ``_name`` where the user has that one."""
-        return f"_{name}" if name in self._taken else name
-
-    def symbol(self, name: str) -> Symbol:
-        """The same as a symbol."""
-        return Symbol(self(name), real=True)
-
-
 def lower(model: Model, *, name: str, forms: tuple[tuple[str, Expr], ...]) -> ModuleIR:
     """All functions of the module for ``model``."""
     _check(model)
-    lowering = Lowering(model)
+    lowering = _ModelLowering(model)
     loss = model.dissipation
     if loss is None:
         functions: tuple[FunctionIR, ...] = (*loads(lowering), lowering.climb(), lowering.rise(), lowering.bend())
@@ -90,14 +72,8 @@ def _check(model: Model) -> None:
             check_emittable(form, names, where=label)
 
 
-class Lowering:
-    """The functions of one model, sharing its names."""
-
-    def __init__(self, model: Model) -> None:
-        self.model = model
-        self.place = model.parameter
-        self.order = {name: i for i, (name, _) in enumerate(model.defaults)}
-        self.names = Names([self.place.name, *self.order])
+class _ModelLowering(Lowering):
+    """The functions that every conservative or dissipative module has."""
 
     def frame(self) -> FunctionIR:
         """Position, metric, curvature and contact force, given the speed squared."""
@@ -161,23 +137,6 @@ class Lowering:
             outputs=(differences.second(self.model.climb), self.model.ds),
         )
 
-    def bounds(self) -> FunctionIR:
-        """Interval enclosures of the climb's slope and of ds."""
-        outputs = (self.model.climb_slope, self.model.ds)
-        replaced, reduced = sympy.cse(outputs, symbols=sympy.numbered_symbols("_t", real=True), order="canonical")
-        lo, hi, p, out = (self.names(name) for name in ("lo", "hi", "p", "out"))
-        return FunctionIR(
-            name="bounds",
-            signature="BOUNDS",
-            arguments=(lo, hi, p, out),
-            doc=f"Bounds of the climb's slope and of ds/d{self.place} for {lo} <= {self.place} <= {hi}.",
-            views=((p, str(len(self.order))), (out, "4")),
-            parameters=self.used(outputs),
-            before=(),
-            inside=tuple(Assignment(name=s.name, value=v) for s, v in replaced),
-            outputs=tuple(reduced),
-        )
-
     def exact(self) -> tuple[ExactIR, ...]:
         """The formulas that extended precision needs; of a charted curve the forces' alone, by coordinates."""
         model = self.model
@@ -217,75 +176,3 @@ class Lowering:
             return ()
         doc = "A place about which V**2 and ds are even, and the distance to the next; None where there is none."
         return (self.constants("exact_axes", doc, (symmetry.place, symmetry.step)),)
-
-    def constants(self, name: str, doc: str, values: tuple[Expr | None, ...]) -> ExactIR:
-        """A function of the run-time parameters alone."""
-        return ExactIR(
-            name=name,
-            doc=doc,
-            places=(),
-            parameters=self.used(value for value in values if value is not None),
-            inside=(),
-            outputs=values,
-        )
-
-    def exact_function(
-        self, name: str, doc: str, outputs: tuple[Expr, ...], places: tuple[Symbol, ...] = ()
-    ) -> ExactIR:
-        """A formula over a namespace of operations."""
-        replaced, reduced = sympy.cse(outputs, symbols=sympy.numbered_symbols("_t", real=True), order="canonical")
-        return ExactIR(
-            name=f"exact_{name}",
-            doc=doc,
-            places=tuple(place.name for place in places),
-            parameters=self.used(outputs),
-            inside=tuple(Assignment(name=s.name, value=v) for s, v in replaced),
-            outputs=tuple(reduced),
-        )
-
-    def function(
-        self,
-        name: str,
-        signature: str,
-        arguments: tuple[str, ...],
-        doc: str,
-        *,
-        views: tuple[tuple[str, str], ...],
-        inside: list[tuple[Symbol, Expr]],
-        outputs: tuple[Expr, ...],
-        each: bool = False,
-        held: int = 0,
-        later: bool = False,
-    ) -> FunctionIR:
-        """Share common subexpressions, and move what does not depend on the place in front of the loop.
-
-        With ``each`` the run-time parameters belong to the place, and ``held`` rows follow behind them.
-        """
-        check_size(outputs, where=name)
-        n, p, out = (self.names(s) for s in ("n", "p", "out"))
-        used = self.used([*outputs, *(value for _, value in inside)])
-        if each:
-            inside, used = [*((Symbol(s, real=True), at(p, row)) for s, row in used), *inside], ()
-        before, kept, results = straight_line(outputs, inside)
-        return FunctionIR(
-            name=name,
-            signature=signature,
-            arguments=(n, *arguments, p, out),
-            doc=doc.format(self.place.name),
-            views=(
-                *views,
-                (p, f"({len(self.order) + held}, {n})" if each else str(len(self.order))),
-                (out, f"({len(outputs)}, {n})"),
-            ),
-            parameters=used,
-            before=before,
-            inside=kept,
-            outputs=results,
-            each=each,
-            later=later,
-        )
-
-    def used(self, expressions: Iterable[Expr]) -> tuple[tuple[str, int], ...]:
-        """The run-time parameters in some expressions, and where they stand in ``p``."""
-        free = {s.name for e in expressions for s in e.free_symbols}
-        return tuple((name, i) for name, i in self.order.items() if name in free)

@@ -16,14 +16,14 @@ from gqm_sym.emission.printer import FUNCTIONS, CodePrinter, ExactPrinter, Inter
 from gqm_sym.errors import EmissionError
 
 # The version of gqm_sym.runtime.interface that emitted code is written for (a test holds the two together).
-INTERFACE = 7
+INTERFACE = 8
 
-# What tells a place and what is left of V**2 there (`gqm_sym.runtime.places`).
-_PLACES = frozenset({"left_of", "nearest"})
 # Functions that the runtime has in forms that fill vector registers; the rest is the standard library's.
 _ELEMENTARY = frozenset({"atan", "cos", "cosh", "exp", "sin", "sinh"})
 _MATH = frozenset({*FUNCTIONS.values(), "sqrt", "pi", "e"} - _ELEMENTARY)
-_RUNTIME = ("Addresses", "Formulas", "Motion", "Pass1")
+_RUNTIME = ("Addresses", "CompiledModel", "LaunchRequest", "Pass1")
+# Columns of the emitted import list.
+_WIDTH = 116
 # Functions that every module hands over, as the interface orders them.
 _ADDRESSES = ("frame", "climb", "rise", "bend", "bounds")
 # Names that mean something in every emitted module: no run-time parameter may take them.
@@ -37,6 +37,7 @@ _OWN = frozenset(
         "ExactClimb",
         "ExactFormulas",
         "MODEL",
+        "Motion",
         "PARAMETERS",
         "Sweep",
         "TYPE_CHECKING",
@@ -78,22 +79,16 @@ def render(module: ModuleIR, *, source: str) -> str:
         runtime.add("Dissipation")
     if module.bounds_each is not None:
         runtime.add("Each")
-    charted = {name for name in used | intervals if name.removeprefix("i").startswith("chart_")}
+    if any(name.removeprefix("i").startswith("chart_") for name in used | intervals):
+        runtime.add("chart_of")
     _refuse_own_names(module, used | intervals | runtime | {f["name"] for f in functions})
-    near = {name for name in used if name.startswith("near_")}
     environment = _environment()
     fields: dict[str, Any] = {
         "interface": INTERFACE,
         "title": _quoted(module.title or module.name),
         "forms": [_quoted(line) for line in _forms(module)],
         "math": sorted(used & _MATH),
-        "runtime": sorted(runtime, key=_as_imported),
-        "charted": sorted({*charted, "chart_of"}) if charted else [],
-        "differences": sorted(used - _MATH - _ELEMENTARY - charted - near - _PLACES),
-        "near": sorted(near),
-        "elementary": sorted(used & _ELEMENTARY),
-        "intervals": sorted(intervals - charted),
-        "places": sorted(used & _PLACES),
+        "runtime": _listed(sorted(runtime | (used - _MATH) | intervals, key=_as_imported)),
         "defaults": [(repr(name), repr(value)) for name, value in module.defaults],
         "functions": functions,
         "exact": [_exact(f) for f in (*module.exact, *(chart.exact if chart else ()))],
@@ -147,6 +142,16 @@ def body_digests(text: str) -> tuple[str, str] | None:
     if not first.startswith("# Made by gqm-gen") or " body " not in second:
         return None
     return second.rpartition(" body ")[2].strip(), _digest(body)
+
+
+def _listed(names: list[str]) -> list[str]:
+    """Names with commas, as many on a line as fit."""
+    lines = [""]
+    for name in names:
+        if lines[-1] and len(lines[-1]) + len(name) + 2 > _WIDTH:
+            lines.append("")
+        lines[-1] += f"{' ' if lines[-1] else ''}{name},"
+    return lines
 
 
 def _as_imported(name: str) -> tuple[int, str]:

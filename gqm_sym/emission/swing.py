@@ -4,13 +4,13 @@ from typing import TYPE_CHECKING
 
 from sympy import Expr
 
-from gqm_sym.derivation.swing import HALF, LAUNCH, OFFSET, Swing, at_share
+from gqm_sym.derivation.wells.swing import HALF, LAUNCH, OFFSET, Swing, at_share
 from gqm_sym.emission.ir import FunctionIR
-from gqm_sym.emission.places import at
 from gqm_sym.emission.sharing import hoist
+from gqm_sym.emission.subscripts import at
 
 if TYPE_CHECKING:
-    from gqm_sym.emission.lower import Lowering
+    from gqm_sym.emission.context import Lowering
 
 
 def swing_each(lowering: "Lowering") -> tuple[FunctionIR, ...]:

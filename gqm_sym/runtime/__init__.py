@@ -1,89 +1,35 @@
-"""The fixed runtime that generated modules plug into: quadrature, turning points, tiling, inversion.
+"""The numerical library that generated modules run on: motions and sweeps, and all that they are computed with.
 
-An island: it knows numpy, numba and itself, and mpmath only where exact digits are asked for. What most motions never
-need is imported when it is asked for.
+A generated module imports `compiler` from here, which refuses a module made for another version of the runtime, and
+everything else from `vocabulary`.
 """
 
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from gqm_sym.runtime.formulas import Formulas
-from gqm_sym.runtime.interface import (
-    BEND,
-    BEND_EACH,
-    BOUNDS,
-    BOUNDS_EACH,
-    CLIMB,
-    CREST_EACH,
-    DRIVE,
-    FIELD,
-    FRAME,
-    HOLD,
-    INTERFACE,
-    LOADS,
-    MEAN_EACH,
-    ORBIT_EACH,
-    RISE,
-    RISE_EACH,
-    SEGMENT,
-    SWING_EACH,
-    TOP_EACH,
-    Addresses,
-    Dissipation,
-    Each,
-    ExactClimb,
-    ExactFormulas,
-)
-from gqm_sym.runtime.jit import compiler
-from gqm_sym.runtime.loads import Pass1
-from gqm_sym.runtime.motion import Motion, State
+from gqm_sym.runtime.compiled.jit import compiler
 
 if TYPE_CHECKING:
-    from gqm_sym.runtime.rail import Rail
-    from gqm_sym.runtime.sampled import Sampled
-    from gqm_sym.runtime.sweeping import Sweep
-    from gqm_sym.runtime.tracing import Traced
+    from gqm_sym.runtime.launch.speed import Pass1
+    from gqm_sym.runtime.model import CompiledModel
+    from gqm_sym.runtime.motion.events import Event, Leg
+    from gqm_sym.runtime.motion.motion import Motion, State
+    from gqm_sym.runtime.sweep.sweep import Sweep
 
-LATER = {"Rail": "rail", "Sampled": "sampled", "Sweep": "sweeping", "Traced": "tracing"}
+__all__ = ["CompiledModel", "Event", "Leg", "Motion", "Pass1", "State", "Sweep", "compiler"]
 
-__all__ = [
-    "BEND",
-    "BEND_EACH",
-    "BOUNDS",
-    "BOUNDS_EACH",
-    "CLIMB",
-    "CREST_EACH",
-    "DRIVE",
-    "FIELD",
-    "FRAME",
-    "HOLD",
-    "INTERFACE",
-    "LOADS",
-    "MEAN_EACH",
-    "ORBIT_EACH",
-    "RISE",
-    "RISE_EACH",
-    "SEGMENT",
-    "SWING_EACH",
-    "TOP_EACH",
-    "Addresses",
-    "Dissipation",
-    "Each",
-    "ExactClimb",
-    "ExactFormulas",
-    "Formulas",
-    "Motion",
-    "Pass1",
-    "Rail",
-    "Sampled",
-    "State",
-    "Sweep",
-    "Traced",
-    "compiler",
-]
+_HOMES = {
+    "CompiledModel": "model",
+    "Event": "motion.events",
+    "Leg": "motion.events",
+    "Motion": "motion.motion",
+    "Pass1": "launch.speed",
+    "State": "motion.motion",
+    "Sweep": "sweep.sweep",
+}
 
 
 def __getattr__(name: str) -> Any:
-    if name not in LATER:
+    if name not in _HOMES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(import_module(f"{__name__}.{LATER[name]}"), name)
+    return getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)

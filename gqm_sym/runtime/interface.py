@@ -60,7 +60,7 @@ from typing import Any, NamedTuple
 from numba import types
 
 # Raised with every change of a signature here, or of a number that runtime code puts into generated modules.
-INTERFACE = 7
+INTERFACE = 8
 
 REAL = types.float64
 MANY = types.CPointer(REAL)
@@ -93,11 +93,24 @@ FRAME_ROWS, LOAD_ROWS = 5, 7
 class Addresses(NamedTuple):
     """Where the compiled functions of one generated module lie in memory; 0 for those that it has none of."""
 
-    frame: int
-    climb: int = 0
-    rise: int = 0
-    bend: int = 0
+    path_and_contact_force: int
+    effective_potential: int = 0
+    potential_divdiff1: int = 0
+    potential_divdiff2: int = 0
     bounds: int = 0
+
+
+class BatchAddresses(NamedTuple):
+    """Where the compiled functions of one module that serve many orbits at once lie in memory; 0 for missing ones."""
+
+    potential_divdiff1: int
+    potential_divdiff2: int
+    bounds: int
+    orbit_invariants: int = 0
+    time_integrand: int = 0
+    integrand_invariants: int = 0
+    agm_arguments: int = 0
+    turning_point: int = 0
 
 
 class Each(NamedTuple):
@@ -118,9 +131,9 @@ class Each(NamedTuple):
     held: int = 0
     top_held: int = 0
 
-    def addresses(self) -> tuple[int, ...]:
+    def addresses(self) -> BatchAddresses:
         """Where they lie in memory; 0 for one that there is not."""
-        return tuple(function.address if function else 0 for function in self[:8])
+        return BatchAddresses(*(function.address if function else 0 for function in self[:8]))
 
 
 class Dissipation(NamedTuple):

@@ -6,8 +6,8 @@ from typing import Any, TypeAlias
 
 from pydantic.fields import FieldInfo
 
+from gqm_sym.specfile.locations import descend, place_of
 from gqm_sym.specfile.nodes import MapNode, Mark, Mistakes, Node, Scalar, shown
-from gqm_sym.specfile.places import descend, place_of
 from gqm_sym.specfile.schema import FAMILY_MODELS
 
 # What pydantic calls it -> what must stand there.

@@ -19,8 +19,8 @@ from gqm_sym.errors import BudgetError, InputError, SpecFileError
 from gqm_sym.kernels import KERNELS, Kernel
 from gqm_sym.parameters import exact_value, refuse_out_of_range
 from gqm_sym.specfile.explain import explain
+from gqm_sym.specfile.locations import locate, mention, node_at, place_of
 from gqm_sym.specfile.nodes import MapNode, Mark, Mistakes, plain
-from gqm_sym.specfile.places import locate, mention, node_at, place_of
 from gqm_sym.specfile.schema import (
     CURVES,
     CurveFile,

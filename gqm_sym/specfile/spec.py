@@ -11,8 +11,8 @@ from gqm_sym.errors import InputError, SpecFileError
 from gqm_sym.expressions import is_real_at
 from gqm_sym.kernels import Kernel
 from gqm_sym.parameters import exact_value
+from gqm_sym.specfile.locations import locate, node_at, place_of
 from gqm_sym.specfile.nodes import MapNode, Mistakes
-from gqm_sym.specfile.places import locate, node_at, place_of
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

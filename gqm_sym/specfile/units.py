@@ -13,16 +13,17 @@ from typing import Any, NamedTuple
 
 import sympy as sp
 
-from gqm_sym import rationals
 from gqm_sym.budgets import apart
 from gqm_sym.declare import Curve
 from gqm_sym.declare.measures import curve_formulas, parameter_dimension
 from gqm_sym.dimensions import NUMBER, Dimension, Formulas, dimension, found_dimensions, unit_of
 from gqm_sym.errors import InputError
 from gqm_sym.expressions import name_or_value
-from gqm_sym.grammar import evaluate, parse
 from gqm_sym.kernels import KERNELS, Kernel
 from gqm_sym.kernels.base import UNITS, kernel_formulas
+from gqm_sym.literals import rationals
+from gqm_sym.literals.grammar import parse
+from gqm_sym.literals.trees import evaluate
 from gqm_sym.parameters import exact_value, read_value
 
 # More places than this are not written as a decimal.

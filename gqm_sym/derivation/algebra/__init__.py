@@ -1,0 +1,1 @@
+"""Expressions as exact algebra: polynomials, signs, derivatives, divided differences, and how results are written."""

@@ -1,0 +1,104 @@
+"""What a force law that is not conservative does along a curve: dW/dλ = P - Q W, and what holds a body at rest.
+
+The law is first written in what it takes of a curve, its *pieces* (σ, κ, dΘ/dλ, F·t, n₀ and dx/ds), where every force
+adds its terms; then the pieces are replaced by their closed forms. Emitted code keeps the pieces apart, as a person
+would. At a cusp κ is infinite and σ zero: in P and Q stands dΘ/dλ = σ κ, which is neither.
+"""
+
+from dataclasses import dataclass
+
+import sympy as sp
+
+from gqm_sym.derivation.algebra.differentiate import differentiate
+from gqm_sym.derivation.algebra.signs import Signs
+from gqm_sym.kernels.base import CONTACT_SIGN, DIRECTION, KAPPA, Kernel, W
+
+# Names with a mark that no text of a user's can have.
+SIGMA, TURN, PUSH, LOAD, TILT = (sp.Symbol(name, real=True) for name in ("σ", "dΘ/dλ", "F·t", "n₀", "dx/ds"))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Dissipation:
+    """A force law along a curve, in the sign v of ds/dt, the sign ν of the contact force, and W where not linear.
+
+    Attributes
+    ----------
+    pieces
+        Symbols of what the forms below take of the curve, with their closed forms in λ.
+    drive, decay
+        P and Q in the pieces; for a law that is not linear in W its linearisation, so that P - Q W is the law itself.
+    acceleration
+        Tangential acceleration A in the pieces, so that dW/ds = 2 A.
+    holds
+        A of a body at rest that is about to move forwards and backwards, under static friction, in the pieces.
+    friction, kinked, linear
+        Whether it depends on the contact force, has a kink where κ changes sign, and is linear in W.
+    """
+
+    pieces: tuple[tuple[sp.Symbol, sp.Expr], ...]
+    drive: sp.Expr
+    decay: sp.Expr
+    acceleration: sp.Expr
+    holds: tuple[sp.Expr, sp.Expr]
+    friction: bool
+    kinked: bool
+    linear: bool
+
+    def along(self, form: sp.Expr) -> sp.Expr:
+        """Return a form in the pieces as a form in λ."""
+        return form.xreplace(dict(self.pieces))
+
+
+def dissipation(
+    kernel: Kernel, pieces: dict[sp.Symbol, sp.Expr], coordinates: dict[sp.Symbol, sp.Expr], signs: Signs
+) -> Dissipation:
+    """Put a curve into a force law that is not conservative.
+
+    Parameters
+    ----------
+    kernel
+        The force law.
+    pieces
+        Closed forms of SIGMA, KAPPA, TURN, PUSH, LOAD and TILT.
+    coordinates
+        What x and z are along the curve, where a law of the user's own names them.
+    signs
+        Of expressions on the curve.
+    """
+    v, nu = DIRECTION, CONTACT_SIGN
+    resistance = _without_bars(kernel.resistance, pieces[KAPPA], signs)
+    extra = kernel.extra.xreplace(coordinates)
+    sliding, other = v * nu * kernel.friction, extra
+    if kernel.spin:
+        # The contact force has a part out of the plane: friction is not linear in W.
+        sideways = 2 * kernel.spin * TILT
+        other -= v * kernel.friction * sp.sqrt((LOAD + KAPPA * W) ** 2 + sideways**2 * W)
+        sliding = sp.S.Zero
+    slope = differentiate(other, W)
+    linear = W not in sp.expand(slope).free_symbols
+    if linear:
+        slope = sp.expand(slope)
+    rest = sp.expand(other - slope * W) if linear else other - slope * W
+    resisting = v * resistance.xreplace({KAPPA: TURN})
+    return Dissipation(
+        pieces=tuple(pieces.items()),
+        drive=2 * (SIGMA * (PUSH - sliding * LOAD + rest) - resisting) / kernel.inertia,
+        decay=2 * (SIGMA * (v * kernel.drag - slope) + sliding * TURN) / kernel.inertia,
+        acceleration=(PUSH - v * resistance - v * kernel.drag * W - sliding * (LOAD + KAPPA * W) + other)
+        / kernel.inertia,
+        holds=(_held(kernel, resistance, extra, 1), _held(kernel, resistance, extra, -1)),
+        friction=bool(kernel.friction),
+        kinked=bool(resistance.atoms(sp.Abs)),
+        linear=linear,
+    )
+
+
+def _held(kernel: Kernel, resistance: sp.Expr, extra: sp.Expr, way: int) -> sp.Expr:
+    against = resistance + kernel.static_friction * sp.Abs(LOAD)
+    return (PUSH - way * against + extra.xreplace({DIRECTION: sp.Integer(way), W: sp.S.Zero})) / kernel.inertia
+
+
+def _without_bars(resistance: sp.Expr, kappa: sp.Expr, signs: Signs) -> sp.Expr:
+    """Write |κ| as κ or -κ on a curve that bends one way only."""
+    sign = signs.sign(kappa)
+    return resistance if sign is None else resistance.xreplace({sp.Abs(KAPPA): sign * KAPPA})

@@ -1,0 +1,181 @@
+"""V² along a motion: W(λ) = U(λ) + (v0² - U(lam0)) e^(-q), with q = ∫ Q dλ and U any solution of W' + Q W = P.
+
+U is an antiderivative of P where Q = 0, and else looked for among elementary functions (`particular`). Where none is
+found, W is written as the quadrature that it is, and where the law is not linear in W, as an unknown function.
+"""
+
+from dataclasses import dataclass
+from itertools import pairwise, product
+
+import sympy as sp
+
+from gqm_sym.declare import Curve
+from gqm_sym.derivation.algebra.differentiate import differentiate
+from gqm_sym.derivation.algebra.rewrite import tidy
+from gqm_sym.derivation.forces.dissipation import LOAD, PUSH, SIGMA, TURN, Dissipation
+from gqm_sym.derivation.forces.forces import Forces
+from gqm_sym.derivation.forces.particular_solution import particular
+from gqm_sym.derivation.geometry.geometry import Geometry
+from gqm_sym.derivation.reality import tried_places
+from gqm_sym.expressions import is_real_at
+from gqm_sym.kernels.base import CONTACT_SIGN, DIRECTION, Kernel, W
+
+LAM0 = sp.Symbol("lam0", real=True)
+V0 = sp.Symbol("v0", real=True)
+CLOSED, QUADRATURE, EQUATION = "closed", "quadrature", "equation"
+_TEXTS = {
+    CLOSED: "closed form",
+    QUADRATURE: "spectral antiderivative, no elementary form found",
+    EQUATION: "solved in space, for dV**2/ds = 2*A is not linear in it",
+}
+
+# A closed form's derivative must be P - Q W to so many digits, and to such a share of their size.
+_DIGITS = 40
+_SHARE = sp.Rational(1, 10**25)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SpeedField:
+    """W = V² in λ, ``lam0`` and ``v0``.
+
+    Attributes
+    ----------
+    squared
+        W.
+    form
+        ``closed``, ``quadrature`` (it holds an Integral) or ``equation`` (it is an unknown function).
+    gain
+        dW/d(v0²), where W is a closed form: it is linear in v0².
+    """
+
+    squared: sp.Expr
+    form: str
+    gain: sp.Expr | None = None
+
+    @property
+    def held(self) -> sp.Expr:
+        """W as other forms hold it: itself if closed, else its symbol."""
+        return self.squared if self.form == CLOSED else W
+
+    @property
+    def note(self) -> str:
+        """What kind of form it is, and what the signs in it are."""
+        meanings = {DIRECTION: "the sign of ds/dt", CONTACT_SIGN: "the sign of N"}
+        found = [f"{s.name} is {text}" for s, text in meanings.items() if s in self.squared.free_symbols]
+        jumps = ["atan2 is continued without its jumps by 2*pi"] if self.squared.has(sp.atan2) else []
+        return "; ".join([f"V**2: {_TEXTS[self.form]}", *found, *jumps])
+
+
+def conservative_speed(law: Forces, lam: sp.Symbol) -> SpeedField:
+    """W of a motion that loses nothing."""
+    squared = V0**2 + tidy(law.climb.xreplace({lam: LAM0}) - law.climb)
+    return SpeedField(squared=squared, form=CLOSED, gain=sp.S.One)
+
+
+def dissipative_speed(
+    kernel: Kernel,
+    law: Forces,
+    shape: Geometry,
+    loss: Dissipation,
+    curve: Curve,
+) -> SpeedField:
+    """W of a motion along one leg, in closed form where one is found."""
+    lam = curve.parameter
+    if not loss.linear:
+        return SpeedField(squared=sp.Function(W.name, real=True)(lam), form=EQUATION)
+    half = sp.Rational(1, 2)
+    bend = sp.Symbol("|κ|/κ", real=True)
+    # What the law takes of a curve, without the absolute values in σ, and antiderivatives where those are known.
+    table = {
+        SIGMA * PUSH: (-half * kernel.inertia * law.climb_slope, -half * kernel.inertia * law.climb),
+        SIGMA * LOAD: (law.pressure, None),
+        TURN: (shape.turning_rate, shape.angle),
+        sp.Abs(TURN): (bend * shape.turning_rate, bend * shape.angle),
+    }
+    drive, decay = (_Sum(form, table, shape.ds, lam) for form in (loss.drive, loss.decay))
+    spent = decay.antiderivative()
+    ground = drive.antiderivative() if not decay.rate else particular(drive.rate, decay.rate, lam, _SIGNS)
+    # One sign on a leg, which ends where κ changes sign; it may begin where κ is zero.
+    signed = {bend: sp.Abs(shape.kappa) / shape.kappa if shape.kappa else sp.S.Zero}
+    if spent is not None and ground is not None:
+        start = {lam: LAM0}
+        gain = sp.exp(-tidy(spent - spent.xreplace(start)))
+        launch = ground.xreplace(start)
+        squared = V0**2 + tidy(ground - launch) if gain == 1 else ground + (V0**2 - launch) * gain
+        squared = squared.xreplace(signed)
+        # A charted curve has no numbers before it is traced; the only closed forms on it are those of Φ and Θ.
+        if curve.charted or _agrees(squared, loss, lam, curve.domain):
+            return SpeedField(squared=squared, form=CLOSED, gain=gain)
+    return SpeedField(squared=_quadrature(drive.rate.xreplace(signed), decay.rate, spent, lam), form=QUADRATURE)
+
+
+_SIGNS = (DIRECTION, CONTACT_SIGN)
+
+
+class _Sum:
+    """A form in the pieces as a sum over what it takes of the curve."""
+
+    def __init__(
+        self,
+        form: sp.Expr,
+        table: dict[sp.Expr, tuple[sp.Expr, sp.Expr | None]],
+        ds: sp.Expr,
+        lam: sp.Symbol,
+    ) -> None:
+        rest = sp.expand(form)
+        self.lam = lam
+        self.known, self.unknown = sp.S.Zero, sp.S.Zero
+        known_rate = sp.S.Zero
+        for piece, (rate, whole) in table.items():
+            coefficient = rest.coeff(piece)
+            rest -= sp.expand(coefficient * piece)
+            if whole is None or lam in coefficient.free_symbols:
+                self.unknown += coefficient * rate
+            else:
+                self.known += coefficient * whole
+                known_rate += coefficient * rate
+        self.unknown += sp.factor_terms(rest).xreplace({SIGMA: ds})
+        self.rate = tidy(known_rate + self.unknown)
+
+    def antiderivative(self) -> sp.Expr | None:
+        """Return an antiderivative by λ, or None if no elementary one was found."""
+        found = particular(self.unknown, sp.S.Zero, self.lam, _SIGNS)
+        return None if found is None else self.known + found
+
+
+def _agrees(squared: sp.Expr, loss: Dissipation, lam: sp.Symbol, domain: tuple[sp.Expr | None, sp.Expr | None]) -> bool:
+    """Differentiate a closed form back, at a place of the curve and values of everything else."""
+    # Each apart: of a sum that is zero, no number of digits is enough for SymPy.
+    terms = (differentiate(squared, lam), -loss.along(loss.drive), loss.along(loss.decay) * squared)
+    named = [*terms, *(end for end in domain if end is not None)]
+    free = sorted(set().union(*(form.free_symbols for form in named)) - {lam, LAM0, *_SIGNS}, key=str)
+    values = {symbol: sp.Rational(7 + 2 * place, 11 + place) for place, symbol in enumerate(free)}
+    low, high = (None if end is None else end.xreplace(values) for end in domain)
+    tried = tried_places((low, high))
+    for signs in product((sp.S.One, sp.S.NegativeOne), repeat=2):
+        for here, there in pairwise(tried):
+            at = {**values, **dict(zip(_SIGNS, signs, strict=True)), lam: here, LAM0: there}
+            if not all(is_real_at(term, at) for term in terms):
+                continue
+            parts = [term.xreplace(at).evalf(_DIGITS) for term in terms]
+            if abs(sum(parts)) > _SHARE * (1 + sum(abs(part) for part in parts)):
+                return False
+            break
+        else:
+            return False
+    return True
+
+
+def _quadrature(drive: sp.Expr, decay: sp.Expr, spent: sp.Expr | None, lam: sp.Symbol) -> sp.Expr:
+    """Write W as an integral, of exponents that do not grow on the way."""
+    between, inner = (sp.Symbol(f"{mark}{lam.name}", real=True) for mark in ("_", "__"))
+
+    def loss(start: sp.Symbol) -> sp.Expr:
+        if spent is None:
+            return sp.Integral(decay.xreplace({lam: inner}), (inner, start, lam))
+        return tidy(spent - spent.xreplace({lam: start}))
+
+    total = V0**2 * sp.exp(-loss(LAM0))
+    if not drive:
+        return total
+    return total + sp.Integral(sp.exp(-loss(between)) * drive.xreplace({lam: between}), (between, LAM0, lam))

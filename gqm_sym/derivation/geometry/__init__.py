@@ -1,0 +1,1 @@
+"""The shape of a curve in closed form."""

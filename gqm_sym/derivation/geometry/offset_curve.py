@@ -1,0 +1,26 @@
+"""The path of a rolling body's centre, beside the track that it rolls on."""
+
+from dataclasses import replace
+
+import sympy as sp
+
+from gqm_sym.derivation.algebra.rewrite import tidy
+from gqm_sym.derivation.geometry.geometry import Geometry
+
+
+def beside(x: sp.Expr, z: sp.Expr, shape: Geometry, radius: sp.Expr) -> tuple[sp.Expr, sp.Expr, Geometry]:
+    """Return the curve at a distance to the left of another, in the same parameter (MATHS, section 2).
+
+    Its tangent is that of the track, its arc ``1 - kappa*radius`` times as long: where that is not positive, the body
+    does not fit.
+    """
+    if not radius:
+        return x, z, shape
+    share = sp.together(1 - shape.kappa * radius)
+    centre = replace(
+        shape,
+        size=tidy(shape.size * share),
+        ds=tidy(shape.ds * share),
+        kappa=tidy(shape.kappa / share),
+    )
+    return tidy(x - radius * shape.dzds), tidy(z + radius * shape.dxds), centre

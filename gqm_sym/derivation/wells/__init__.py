@@ -1,0 +1,1 @@
+"""What symmetry says of a potential well."""

@@ -1,0 +1,1 @@
+"""Launches and tracks found from what a motion should do."""

@@ -1,0 +1,1 @@
+"""Motions in other formats: labelled datasets and HTML."""

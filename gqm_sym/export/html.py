@@ -1,0 +1,35 @@
+"""Motions and their events as HTML tables, for notebooks and reports."""
+
+from html import escape
+from math import isfinite
+from typing import TYPE_CHECKING, Any
+
+from gqm_sym.runtime.motion.rows import Rows, _text
+
+if TYPE_CHECKING:
+    from gqm_sym.runtime.motion.motion import Motion
+
+
+def summary(motion: "Motion") -> list[tuple[str, Any]]:
+    """What there is to say of a motion in a few lines: its launch, kind, turning points and times."""
+    problem = motion.problem
+    name = problem.formulas.parameter
+    rows: list[tuple[str, Any]] = [("kind", motion.kind), (f"launch at {name}", problem.launch.lam0.text)]
+    rows.append(("launch speed (m/s)", problem.launch.v0.text))
+    if motion.turning_points:
+        rows.append((f"turning points {name}", ", ".join(map(repr, motion.turning_points))))
+    if motion.kind == "libration":
+        rows.append(("half period (s)", motion.half_period))
+    if motion.kind in ("libration", "circulation"):
+        rows.append(("period (s)", motion.period))
+    elif isfinite(motion.t_end):
+        rows.append(("ends after (s)", motion.t_end))
+    rows += [(key, number.text) for key, number in zip(problem.formulas.parameters, problem.p, strict=True)]
+    return rows
+
+
+def page(motion: "Motion") -> str:
+    """A motion as HTML: its summary and its events."""
+    lines = "".join(f"<tr><th>{escape(label)}</th><td>{_text(value)}</td></tr>" for label, value in summary(motion))
+    events = Rows(motion.events)._repr_html_()
+    return f"<p><b>{escape(motion.problem.formulas.name)}</b></p><table><tbody>{lines}</tbody></table>{events}"

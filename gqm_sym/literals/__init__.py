@@ -1,0 +1,1 @@
+"""Numbers and formulas as people write them, read without SymPy and kept exact."""

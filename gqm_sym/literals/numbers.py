@@ -1,0 +1,218 @@
+"""Numbers that mean exactly what was written, without SymPy.
+
+A float means its binary value; an int, text such as ``"9.81"`` or ``"-pi/2 + 6/5"``, a Decimal, a
+Fraction and a SymPy number mean what they say. mpmath is imported for irrational numbers alone, and
+for ``Number.at``.
+"""
+
+import ast
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gqm_sym.errors import ExpressionError, NumberError
+from gqm_sym.literals import rationals
+from gqm_sym.literals.angles import enclose_angle
+from gqm_sym.literals.enclosures import Interval, enclose
+from gqm_sym.literals.grammar import parse
+from gqm_sym.literals.sympy_tree import is_sympy, tree_of
+
+if TYPE_CHECKING:
+    from decimal import Decimal
+
+# Enough that both halves of a double-double are correctly rounded, but for cases of chance 2**-80.
+_PAIR_BITS = 192
+
+# Rounding what is known to more digits than these first takes away the last doubt: a tie is a tie.
+_TIE_BITS = 700
+
+# Beyond the precision asked for by ``at``, so that it can be rounded once.
+_GUARD_BITS = 16
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Number:
+    """A finite real number, known exactly. Made by ``read_number``.
+
+    Attributes
+    ----------
+    value
+        Nearest double.
+    """
+
+    value: float
+    # For what is not a double: what it is beyond ``value``, what it was made from, and its text.
+    _beyond: tuple[float, Fraction | ast.expr, str] | None
+
+    @property
+    def low(self) -> float:
+        """Nearest double of what the number is beyond ``value``."""
+        return 0.0 if self._beyond is None else self._beyond[0]
+
+    @property
+    def _source(self) -> float | Fraction | ast.expr:
+        return self.value if self._beyond is None else self._beyond[1]
+
+    @property
+    def fraction(self) -> Fraction | None:
+        """Exact value if the number is rational as it was written, else None."""
+        if isinstance(self._source, ast.expr):
+            return None
+        return Fraction(self._source)
+
+    @property
+    def text(self) -> str:
+        """The number as it was written."""
+        return repr(self.value) if self._beyond is None else self._beyond[2]
+
+    def at(self, ctx: Any) -> Any:
+        """The number in an mpmath context, at its working precision.
+
+        Rounded once in ``mpmath.mp`` and its like; in ``mpmath.iv`` an interval that contains it.
+        """
+        from mpmath import MPIntervalContext, libmp
+
+        source = self._source
+        if isinstance(source, ast.expr):
+            bits = ctx.prec + _GUARD_BITS
+            exact: Fraction | Interval = enclose(source, bits, where=self.text)
+        else:
+            exact = Fraction(source)
+        interval = isinstance(ctx, MPIntervalContext)
+        if isinstance(exact, Fraction):
+            ends = exact.numerator, exact.denominator, ctx.prec
+            if interval:
+                pair = libmp.from_rational(*ends, "f"), libmp.from_rational(*ends, "c")
+                return ctx.make_mpf(pair)
+            return ctx.make_mpf(libmp.from_rational(*ends, "n"))
+        low, high = exact
+        if interval:
+            return ctx.make_mpf((libmp.mpf_pos(low, ctx.prec, "f"), libmp.mpf_pos(high, ctx.prec, "c")))
+        return ctx.make_mpf(libmp.mpf_pos(low, ctx.prec, "n"))
+
+    def __float__(self) -> float:
+        return self.value
+
+    def __repr__(self) -> str:
+        return f"Number({self.text!r})"
+
+    def __eq__(self, other: object) -> bool:
+        """Equality of exact values; irrational numbers are told apart by their first 32 digits."""
+        if not isinstance(other, Number):
+            return NotImplemented
+        return (self.value, self.low, self.fraction) == (other.value, other.low, other.fraction)
+
+    def __hash__(self) -> int:
+        return hash((self.value, self.low))
+
+
+# Two numbers are made for every launch, doubles mostly: past the constructor, which is slow for what is frozen.
+_new, _set_value, _set_beyond = object.__new__, *(vars(Number)[name].__set__ for name in Number.__slots__)
+Doubles: TypeAlias = NDArray[np.float64]
+Source: TypeAlias = "str | int | float | Fraction | Decimal | Number | Any"
+
+
+def read_number(value: Source, *, where: str) -> Number:
+    """Read a number.
+
+    Parameters
+    ----------
+    value
+        A float, int, text, Decimal, Fraction, NumPy scalar, mpmath float, SymPy number or Number.
+    where
+        What the number is, as errors should call it: ``lam0``.
+
+    Raises
+    ------
+    NumberError
+        If it is no finite real number, or none that can be evaluated within bounds.
+    """
+    if type(value) is float:
+        if value - value != 0.0:
+            raise NumberError(f"{where}: {value!r} given; give a finite number")
+        number = _new(Number)
+        _set_value(number, value)
+        _set_beyond(number, None)
+        return number
+    if isinstance(value, Number):
+        return value
+    try:
+        if isinstance(value, str):
+            return _read_text(value, where)
+        exact = rationals.read_exact(value, where=where)
+        if exact is not None:
+            return _from_fraction(exact, str(value), where)
+        if is_sympy(value):
+            return _from_tree(tree_of(value, where=where), str(value), where)
+    except ExpressionError as error:
+        raise NumberError(str(error)) from None
+    except ValueError as error:
+        raise NumberError(f"{where}: {error}") from None
+    raise NumberError(f"{where}: {type(value).__name__} given; give a number, or text such as '9.81' or 'pi/2'")
+
+
+def read_numbers(values: Any, *, where: str) -> tuple[Doubles, Doubles, tuple[int, ...]]:
+    """Numbers, or arrays of them, as flat arrays of doubles, flat arrays of what those leave over, and their shape."""
+    if isinstance(values, np.ndarray) and values.dtype == np.float64:
+        flat = np.ascontiguousarray(values).reshape(-1)
+        return flat, np.zeros_like(flat), values.shape
+    array = np.asarray(values, dtype=object)
+    numbers = [read_number(v, where=where) for v in array.reshape(-1)]
+    high = np.array([n.value for n in numbers], dtype=np.float64)
+    low = np.array([n.low for n in numbers], dtype=np.float64)
+    return high, low, array.shape
+
+
+@lru_cache(maxsize=1024)
+def _read_text(text: str, where: str) -> Number:
+    # Defaults are read at every launch.
+    return _from_tree(parse(text, where=where), text.strip(), where)
+
+
+def _from_tree(tree: ast.expr, text: str, where: str) -> Number:
+    angle = enclose_angle(tree, where=where)
+    if angle is not None and angle[0] != angle[1]:
+        near = _split(angle[0], where)
+        if near == _split(angle[1], where):
+            return _written(near, tree, text)
+    exact = enclose(tree, _PAIR_BITS, where=where)
+    if isinstance(exact, Fraction):
+        return _from_fraction(exact, text, where)
+    low, high = (_split(rationals.from_mpf(end), where) for end in exact)
+    if low != high:
+        # It lies on the border between two doubles, or next to it: sqrt(2)**2.
+        exact = enclose(tree, _TIE_BITS + _GUARD_BITS, where=where)
+        low = _split(_nearest(exact), where)
+    return _written(low, tree, text)
+
+
+def _from_fraction(exact: Fraction, text: str, where: str) -> Number:
+    return _written(_split(exact, where), exact, text)
+
+
+def _written(pair: tuple[float, float], source: Fraction | ast.expr, text: str) -> Number:
+    value, low = pair
+    return Number(value, (low, source, text))
+
+
+def _split(exact: Fraction, where: str) -> tuple[float, float]:
+    """Nearest double, and the nearest double of the rest; division of integers rounds correctly."""
+    try:
+        value = exact.numerator / exact.denominator
+    except OverflowError:
+        what = "beyond the largest double, 1.8e308; give a smaller number"
+        raise NumberError(f"{where}: {what}") from None
+    rest = exact - Fraction(value)
+    return value, rest.numerator / rest.denominator
+
+
+def _nearest(exact: Fraction | Interval) -> Fraction:
+    if isinstance(exact, Fraction):
+        return exact
+    from mpmath import libmp
+
+    return rationals.from_mpf(libmp.mpf_pos(exact[0], _TIE_BITS, "n"))

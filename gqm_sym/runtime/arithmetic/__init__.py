@@ -1,0 +1,1 @@
+"""Two doubles, elementary functions, intervals and divided differences, in compiled code."""

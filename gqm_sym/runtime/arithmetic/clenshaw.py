@@ -1,0 +1,79 @@
+"""Chebyshev and Legendre sums by Clenshaw's recurrence; for many places at once in vector registers."""
+
+from typing import Any
+
+import numpy as np
+from llvmlite import ir
+from numba import types
+from numba.core import cgutils
+from numba.extending import intrinsic
+
+from gqm_sym.runtime.compiled.intrinsics import fma
+from gqm_sym.runtime.compiled.jit import Inner
+from gqm_sym.runtime.compiled.registers import LANES, REGISTER, line_of, operation, register, spread
+
+# The longest Legendre series that the runtime sums.
+MAX_TERMS = 32
+# Legendre's recurrence: P_(k+1) = GROWTH[k] x P_k - DECAY[k-1] P_(k-1).
+GROWTH = np.array([(2 * k + 1) / (k + 1) for k in range(MAX_TERMS)])
+DECAY = np.array([(k + 1) / (k + 2) for k in range(MAX_TERMS)])
+
+# Registers side by side, and so places of a group.
+ABREAST = 4
+GROUP = LANES * ABREAST
+_COUNT = ir.IntType(64)
+
+
+@intrinsic
+def sum_group(_, c, x, at, high, low):  # type: ignore[no-untyped-def]
+    """Clenshaw's sums b_2 (in ``high``) and b_3 (in ``low``) of the coefficients c, at a group of places x."""
+
+    def lower(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        terms = context.make_array(signature.args[0])(context, builder, args[0])
+        places, first, last = (
+            builder.gep(line_of(context, builder, signature.args[k], args[k]), [args[2]]) for k in (1, 3, 4)
+        )
+        zero = ir.Constant(REGISTER, [0.0] * LANES)
+        ahead = [cgutils.alloca_once_value(builder, zero) for _ in range(ABREAST)]
+        behind = [cgutils.alloca_once_value(builder, zero) for _ in range(ABREAST)]
+        for k in range(ABREAST):
+            builder.store(zero, ahead[k])
+            builder.store(zero, behind[k])
+        twice = []
+        for k in range(ABREAST):
+            place = builder.load(register(builder, places, LANES * k), align=8)
+            twice.append(builder.fadd(place, place))
+        size = builder.extract_value(terms.shape, 0)
+        start, stop, step = builder.sub(size, ir.Constant(_COUNT, 1)), ir.Constant(_COUNT, 1), ir.Constant(_COUNT, -1)
+        with cgutils.for_range_slice(builder, start, stop, step, inc=False) as (index, _):
+            term = spread(builder, builder.load(builder.gep(terms.data, [index])))
+            for k in range(ABREAST):
+                before = builder.load(ahead[k])
+                left = builder.fsub(term, builder.load(behind[k]))
+                builder.store(before, behind[k])
+                builder.store(operation(builder, "fma", twice[k], before, left), ahead[k])
+        for k in range(ABREAST):
+            builder.store(builder.load(ahead[k]), register(builder, first, LANES * k), align=8)
+            builder.store(builder.load(behind[k]), register(builder, last, LANES * k), align=8)
+        return context.get_dummy_value()
+
+    assert c.layout == "C"
+    return types.void(c, x, types.intp, high, low), lower
+
+
+@Inner
+def chebyshev_sum(c, x):  # type: ignore[no-untyped-def]
+    """The Chebyshev series with coefficients c, at x, by Clenshaw's recurrence."""
+    high, low, twice = 0.0, 0.0, 2.0 * x
+    for k in range(c.size - 1, 0, -1):
+        high, low = fma(twice, high, c[k] - low), high
+    return fma(x, high, c[0] - low)
+
+
+@Inner
+def legendre_sum(c, x):  # type: ignore[no-untyped-def]
+    """The Legendre series with coefficients c, at x, by Clenshaw's recurrence."""
+    high, low = 0.0, 0.0
+    for k in range(c.size - 1, 0, -1):
+        high, low = (c[k] - DECAY[k] * low) + (GROWTH[k] * x) * high, high
+    return c[0] + x * high - 0.5 * low

@@ -1,0 +1,1 @@
+"""Divided differences of the elementary functions, without subtracting nearly equal numbers."""

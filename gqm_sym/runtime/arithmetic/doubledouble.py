@@ -1,0 +1,104 @@
+"""Sums and products of two doubles kept exactly, for the reduction of a time by its period (MATHS, section 5)."""
+
+from math import floor
+
+import numpy as np
+from numba import types
+
+from gqm_sym.runtime.compiled.jit import Inlined, Inner, entry
+from gqm_sym.runtime.compiled.types import REAL, VECTOR, Array
+
+# The distance from 1.0 to the next double.
+ULP = 2.220446049250313e-16
+
+
+@Inlined
+def two_sum(a, b):  # type: ignore[no-untyped-def]
+    """A + b as rounded sum and its error (Knuth)."""
+    s = a + b
+    t = s - a
+    return s, (a - (s - t)) + (b - t)
+
+
+@Inner
+def two_product(a, b):  # type: ignore[no-untyped-def]
+    """A * b as rounded product and its error (Dekker, Veltkamp)."""
+    p = a * b
+    c = 134217729.0 * a
+    a_hi = c - (c - a)
+    a_lo = a - a_hi
+    c = 134217729.0 * b
+    b_hi = c - (c - b)
+    b_lo = b - b_hi
+    return p, ((a_hi * b_hi - p) + a_hi * b_lo + a_lo * b_hi) + a_lo * b_lo
+
+
+@Inner
+def add(a, a_low, b, b_low):  # type: ignore[no-untyped-def]
+    """(a + a_low) + (b + b_low), accurate however much cancels."""
+    s, e = two_sum(a, b)
+    t, f = two_sum(a_low, b_low)
+    s, e = two_sum(s, e + t)
+    return two_sum(s, e + f)
+
+
+@Inner
+def reduce(t, t_low, period, period_low):  # type: ignore[no-untyped-def]
+    """The count of whole periods in t and what is left, in [0, period), as two doubles.
+
+    The product count * period is formed exactly up to 2**-106 of itself, so what is left is right to half an ulp of the
+    period for counts up to 2**52.
+    """
+    count = float(floor(t / period))
+    whole, error = two_product(count, period)
+    rest, rest_low = add(t, t_low, -whole, -(error + count * period_low))
+    # The quotient was rounded: at most one period too many or too few. One way, then the other, so that rounding at
+    # a boundary
+    # cannot send it back and forth.
+    if rest < 0.0 or (rest == 0.0 and rest_low < 0.0):
+        count -= 1.0
+        rest, rest_low = add(rest, rest_low, period, period_low)
+    else:
+        over, over_low = add(rest, rest_low, -period, -period_low)
+        if over > 0.0 or (over == 0.0 and over_low >= 0.0):
+            count += 1.0
+            rest, rest_low = over, over_low
+    return count, rest, rest_low
+
+
+def running_totals(times: Array, terms: Array) -> tuple[Array, Array]:
+    """Running totals of the panels' own times, each as two doubles, up to the last of ``times``."""
+    own = terms.sum(axis=1)  # every Legendre polynomial is 1 at the right edge
+    own *= times[-1] / (own.sum() or 1.0)  # from a place to itself there are none
+    high, low = np.zeros(len(own) + 1), np.zeros(len(own) + 1)
+    for k, part in enumerate(own):
+        high[k + 1], error = two_sum.py_func(high[k], part)
+        low[k + 1] = low[k] + error
+    high[-1], low[-1] = times[-1], 0.0
+    return high, low
+
+
+Pair = tuple[float, float]
+ZERO: Pair = (0.0, 0.0)
+
+
+def plus(a: Pair, b: Pair) -> Pair:
+    """Sum of two numbers that are each two doubles."""
+    s, e = two_sum.py_func(a[0], b[0])
+    t, f = two_sum.py_func(a[1], b[1])
+    s, e = two_sum.py_func(s, e + t)
+    return two_sum.py_func(s, e + f)  # type: ignore[no-any-return]
+
+
+def minus(a: Pair, b: Pair) -> Pair:
+    """Difference of two numbers that are each two doubles."""
+    return plus(a, (-b[0], -b[1]))
+
+
+@entry(types.Tuple((VECTOR, VECTOR, VECTOR))(VECTOR, VECTOR, REAL, REAL))
+def reduce_many(t, t_low, period, period_low):  # type: ignore[no-untyped-def]
+    """Counts of whole periods and what is left, as two doubles each (`doubledouble.reduce`)."""
+    count, rest, rest_low = np.empty(t.size), np.empty(t.size), np.empty(t.size)
+    for i in range(t.size):
+        count[i], rest[i], rest_low[i] = reduce(t[i], t_low[i], period, period_low)
+    return count, rest, rest_low

@@ -1,0 +1,240 @@
+"""Sines, cosines, arc tangents and exponentials that vectorise.
+
+numba calls the C library for ``math.sin``, one number at a time, so a loop over it stays scalar. These are polynomials
+of a reduced argument without branches, which LLVM spreads over vector registers once it has put them into the loop.
+
+The argument is reduced by a multiple of pi/2 (or log 2) held in parts (Cody and Waite, Software Manual for the
+Elementary Functions, 1980), and its rounding is carried along as a second double. The error is below one unit in the
+last place, of sin and cos for ``|x|`` < 1e9; beyond, the result is the sine of ``x*(1 + eps)`` with eps a few
+roundings. What is not a number gives NaN, and so do sin and cos of infinities; the others have their limits there.
+"""
+
+from math import fabs, factorial, inf, pi
+
+from gqm_sym.runtime.compiled.intrinsics import bits, choose, fma, from_bits, polynomial
+from gqm_sym.runtime.compiled.jit import Inlined, Inner
+
+# Adding this rounds to a whole number, which the lowest bits of the sum then hold.
+ROUND = 1.5 * 2.0**52
+
+# pi/2 as three doubles: with a fused product the first difference is exact.
+QUARTER = (1.5707963267948966, 6.123233995736766e-17, -1.4973849048591833e-33)
+TWO_OVER_PI = 0.6366197723675814
+
+# Minimax polynomials on |r| <= pi/4, highest power first: (1 - sin(r)/r)/r**2, (cos(r) - 1 + r**2/2)/r**4.
+# The coefficients are those of fdlibm (Sun Microsystems, 1993: k_sin.c, k_cos.c).
+SINE = (
+    -1.58969099521155010221e-10,
+    2.50507602534068634195e-08,
+    -2.75573137070700676789e-06,
+    1.98412698298579493134e-04,
+    -8.33333333332248946124e-03,
+    1.66666666666666324348e-01,
+)
+COSINE = (
+    -1.13596475577881948265e-11,
+    2.08757232129817482790e-09,
+    -2.75573143513906633035e-07,
+    2.48015872894767294178e-05,
+    -1.38888888888741095749e-03,
+    4.16666666666666019037e-02,
+)
+
+# (atan(z)/z - 1)/z**2 in z**2 for |z| <= 1/2, highest power first, interpolated at Chebyshev points: within 2e-19.
+ARC = (
+    0.007652045927107981,
+    -0.02167557997633693,
+    0.0339817401335798,
+    -0.04183153509507902,
+    0.04729905909510015,
+    -0.052587105453942753,
+    0.05881912329940347,
+    -0.06666636006378054,
+    0.07692306236122758,
+    -0.09090909045918692,
+    0.11111111110275738,
+    -0.1428571428570617,
+    0.19999999999999968,
+    -0.3333333333333333,
+)
+
+# Where its argument is inverted, or seen from 1; beyond WIDE it is a quarter turn to the last bit.
+INVERTED, SEEN_FROM_ONE, WIDE = 2.0, 0.5, 2.0**60
+
+# (exp(r) - 1 - r)/r**2 for |r| <= log(2)/2, highest power first, interpolated at Chebyshev points: within 4e-19 of exp.
+EXPONENTIAL = (
+    2.091467944897855e-09,
+    2.5105206475334834e-08,
+    2.7557273661174726e-07,
+    2.75572554255029e-06,
+    2.4801587325533502e-05,
+    0.00019841269874800683,
+    0.0013888888888883752,
+    0.008333333333326141,
+    0.04166666666666667,
+    0.1666666666666667,
+    0.5,
+)
+
+# log 2 as two doubles, the first with zeros at its end: a whole number below 2**11 times it is exact.
+LOG2, LOG2_LOW, ONE_OVER_LOG2 = 0.6931471803691238, 1.9082149292705877e-10, 1.4426950408889634
+
+# Beyond BEYOND exp overflows, or is nothing, whatever its argument; beyond FAR sinh and cosh overflow.
+BEYOND, FAR = 1000.0, 710.4758600739439
+
+# Below this exp is less than half an ulp of one.
+LEVEL = -45.0
+
+# (sinh(x) - x)/x**3 in x**2 up to |x| = 1, cut below 1e-19.
+SINHC = tuple(1.0 / factorial(2 * k + 1) for k in reversed(range(1, 10)))
+
+
+@Inlined
+def reduced(x):  # type: ignore[no-untyped-def]
+    """The quarter turns in x, of which the lowest bits count, what is left of it, and by how much that is too large."""
+    shifted = fma(x, TWO_OVER_PI, ROUND)
+    k = shifted - ROUND
+    t = fma(-k, QUARTER[0], x)
+    p = k * QUARTER[1]
+    r = t - p  # what this is rounded by is a double: t is a multiple of 2**-53, or p is zero
+    over = fma(k, QUARTER[2], fma(k, QUARTER[1], -p)) - ((t - r) - p)
+    lost = fabs(r) > 1.0  # beyond 1e15 the multiple is not known to one
+    return bits(shifted), choose(lost, 1.0, r), choose(lost, 0.0, over)
+
+
+@Inlined
+def sine_kernel(r, over):  # type: ignore[no-untyped-def]
+    """sin(r - over), ``|r|`` <= pi/4."""
+    z = r * r
+    return r - fma(z * r, polynomial(SINE, z), fma(-0.5, z, 1.0) * over)
+
+
+@Inlined
+def cosine_kernel(r, over):  # type: ignore[no-untyped-def]
+    """cos(r - over), ``|r|`` <= pi/4."""
+    z = r * r
+    lead = fma(-0.5, z, 1.0)
+    rest = fma(r, over, fma(-0.5, z, 1.0 - lead))
+    return lead + fma(z * z, polynomial(COSINE, z), rest)
+
+
+@Inlined
+def sin(x):  # type: ignore[no-untyped-def]
+    """The sine."""
+    turns, r, over = reduced(x)
+    value = choose(turns & 1 == 1, cosine_kernel(r, over), sine_kernel(r, over))
+    return choose(turns & 2 == 2, -value, value)
+
+
+@Inlined
+def cos(x):  # type: ignore[no-untyped-def]
+    """The cosine."""
+    turns, r, over = reduced(x)
+    value = choose(turns & 1 == 1, sine_kernel(r, over), cosine_kernel(r, over))
+    return choose((turns + 1) & 2 == 2, -value, value)
+
+
+@Inlined
+def atan(x):  # type: ignore[no-untyped-def]
+    """The arc tangent: of -1/x next to a quarter turn, of (x - 1)/(x + 1) next to half of one."""
+    size = choose(fabs(x) > WIDE, WIDE, fabs(x))
+    far, near = size > INVERTED, size <= SEEN_FROM_ONE
+    more = size + 1.0
+    top = choose(far, -1.0, choose(near, size, size - 1.0))
+    bottom = choose(far, size, choose(near, 1.0, more))
+    lost = choose(far | near, 0.0, choose(size > 1.0, 1.0 - (more - size), size - (more - 1.0)))
+    inverse = 1.0 / bottom
+    z = top * inverse
+    low = (fma(-z, bottom, top) - z * lost) * inverse  # what the quotient is rounded by
+    start = choose(far, 1.0, choose(near, 0.0, 0.5))
+    lead = start * QUARTER[0] + z
+    rounded = (start * QUARTER[0] - lead) + z
+    w = z * z
+    value = lead + (rounded + fma(z * w, polynomial(ARC, w), fma(start, QUARTER[1], low)))
+    return choose(x < 0.0, -value, choose(x == 0.0, x, value))
+
+
+@Inlined
+def scaled_exp(x):  # type: ignore[no-untyped-def]
+    """exp(x) = (lead + low)*2**k for ``|x| <= BEYOND``, and bits that `power_of_two` takes for k."""
+    shifted = fma(x, ONE_OVER_LOG2, ROUND)
+    k = shifted - ROUND
+    high, low = fma(-k, LOG2, x), -k * LOG2_LOW
+    r = high + low
+    lost = low - (r - high)
+    tail = fma(polynomial(EXPONENTIAL, r), r * r, lost)
+    lead = 1.0 + r
+    return lead, (r - (lead - 1.0)) + tail, bits(shifted)
+
+
+@Inlined
+def power_of_two(k):  # type: ignore[no-untyped-def]
+    """2**k for a normal number; of k the lowest twelve bits count."""
+    return from_bits((k + 1023) << 52)
+
+
+@Inlined
+def exp(x):  # type: ignore[no-untyped-def]
+    """The exponential; subnormal results are rounded twice."""
+    below = choose(x > BEYOND, BEYOND, x)
+    lead, low, k = scaled_exp(choose(below < -BEYOND, -BEYOND, below))
+    half = k >> 1
+    return (lead + low) * power_of_two(half) * power_of_two(k - half)
+
+
+@Inlined
+def expm1_below(x):  # type: ignore[no-untyped-def]
+    """exp(x) - 1 for x <= 0, without cancellation next to zero."""
+    lead, low, k = scaled_exp(choose(x < LEVEL, LEVEL, x))
+    return ((lead - power_of_two(-k)) + low) * power_of_two(k)
+
+
+@Inlined
+def half_exp(x):  # type: ignore[no-untyped-def]
+    """exp(x)/2 and exp(-x)/2 for ``0 <= x <= FAR``, the first as two doubles."""
+    lead, low, k = scaled_exp(x)
+    high = lead + low
+    scale = power_of_two(k - 2)
+    return 2.0 * (high * scale), 2.0 * ((low - (high - lead)) * scale), 0.125 / (high * scale)
+
+
+@Inlined
+def cosh(x):  # type: ignore[no-untyped-def]
+    """The hyperbolic cosine."""
+    size = fabs(x)
+    up, low, down = half_exp(choose(size > FAR, FAR, size))
+    return choose(size > FAR, inf, up + (down + low))
+
+
+@Inlined
+def sinh(x):  # type: ignore[no-untyped-def]
+    """The hyperbolic sine."""
+    size = fabs(x)
+    up, low, down = half_exp(choose(size > FAR, FAR, size))
+    far = choose(size > FAR, inf, up - (down - low))
+    return choose(size < 1.0, fma(x * (x * x), polynomial(SINHC, x * x), x), choose(x < 0.0, -far, far))
+
+
+# 2 pi as two doubles, and the Taylor coefficients of sin(2 pi g) from g**3 on: cut below 2e-18 at g = 1/4.
+ONE_TURN, ONE_TURN_LOW = 2.0 * pi, 2.4492935982947064e-16
+TURN_SINE_SERIES = tuple((-1.0) ** k * ONE_TURN ** (2 * k + 1) / factorial(2 * k + 1) for k in reversed(range(1, 12)))
+
+
+@Inner
+def turn_sine(g, low):  # type: ignore[no-untyped-def]
+    """sin(2 pi (g + low)) for ``|g|`` <= 1/4 and ``low`` a rounding of g."""
+    z = g * g
+    slope = fma(fma(64.9, z, -19.7), z, 1.0)  # of the sine: enough digits for what a rounding does
+    tail = 0.0
+    for c in TURN_SINE_SERIES:
+        tail = fma(tail, z, c)
+    lead = ONE_TURN * g
+    return lead + fma(tail, z * g, fma(ONE_TURN, g, -lead) + fma(ONE_TURN_LOW, g, ONE_TURN * slope * low))
+
+
+@Inner
+def turn_cosine(f, low):  # type: ignore[no-untyped-def]
+    """cos(2 pi (f + low)) for ``|f|`` <= 1/2 and ``low`` a rounding of f."""
+    g = 0.25 - fabs(f)
+    lost = (0.25 - g) - fabs(f)
+    return turn_sine(g, lost + (low if f < 0.0 else -low))

@@ -1,0 +1,120 @@
+"""Small matrices of fixed size times vectors, and the span of a vector, in vector registers.
+
+numba keeps the order in which a dot product is summed, and so keeps it scalar. Summed over the rows of the transposed
+matrix, eight results side by side, the same order fills the registers; some sums of every other row side by side keep
+them busy, for a sum waits for the one before.
+"""
+
+from functools import partial, reduce
+from typing import Any
+
+import numpy as np
+from llvmlite import ir
+from numba import types
+from numba.core.cgutils import global_constant
+from numba.extending import intrinsic
+
+from gqm_sym.runtime.compiled.registers import INDEX, LANES, REAL, REGISTER, Lanes, line_of, operation, register, spread
+
+# Sums at work at a time.
+SUMS = 6
+
+
+def multiply(table: Any) -> Any:
+    """A compiled function ``f(values, at, out, to)`` for a table of some rows, each filled up to whole registers by 0.
+
+    It does ``out[to : to + width] = values[at : at + rows] @ table``, the arrays read as one line of numbers: a slice
+    would cost more than the sums. Nothing is checked.
+    """
+    table = np.pad(table, ((0, 0), (0, -table.shape[1] % LANES)))
+    rows, width = table.shape
+    blocks = width // LANES
+    chains = max(SUMS // blocks, 1)
+    numbers = ir.Constant(ir.ArrayType(REAL, table.size), table.ravel().tolist())
+
+    def lower(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        values, out = (
+            builder.gep(line_of(context, builder, signature.args[k], args[k]), [args[k + 1]]) for k in (0, 2)
+        )
+        held = global_constant(builder, "table", numbers)
+        held.align = 8 * LANES
+        # A table that LLVM sees through is so many constants to it, each loaded from an address of its own, and kept on
+        # the stack around a loop.
+        unseen = ir.FunctionType(REAL.as_pointer(), [REAL.as_pointer()])
+        entries = builder.asm(unseen, "", "=r,0", [builder.bitcast(held, REAL.as_pointer())], side_effect=False)
+        totals = [[ir.Constant(REGISTER, [0.0] * LANES)] * blocks for _ in range(chains)]
+        for row in range(rows):
+            each = spread(builder, builder.load(builder.gep(values, [ir.Constant(INDEX, row)])))
+            chain = totals[row % chains]
+            for block in range(blocks):
+                entry = builder.load(register(builder, entries, row * width + block * LANES), align=8 * LANES)
+                chain[block] = operation(builder, "fma", each, entry, chain[block])
+        for block, parts in enumerate(zip(*totals, strict=True)):
+            builder.store(reduce(builder.fadd, parts), register(builder, out, block * LANES), align=8)
+        return context.get_dummy_value()
+
+    @intrinsic
+    def sums(_, values, at, out, to):  # type: ignore[no-untyped-def]
+        """``out[to:] = values[at:] @ table``."""
+        return types.void(values, types.intp, out, types.intp), lower
+
+    sums.table = table
+    return sums
+
+
+def _folded(builder: Any, order: str, value: Any) -> Any:
+    """The least or the greatest of a register's lanes."""
+    lanes = LANES
+    while lanes > 1:
+        lanes //= 2
+        halves = (
+            builder.shuffle_vector(value, value, ir.Constant(ir.VectorType(INDEX, lanes), list(range(k, k + lanes))))
+            for k in (0, lanes)
+        )
+        value = _of_two(builder, order, *halves)
+    return builder.extract_element(value, ir.Constant(INDEX, 0))
+
+
+def _of_two(builder: Any, order: str, one: Any, other: Any) -> Any:
+    return builder.select(builder.fcmp_ordered(order, one, other), one, other)
+
+
+def _registers(context: Any, builder: Any, signature: Any, args: Any, count: int) -> list[Any]:
+    """What holds ``count`` numbers of an array, some of them twice."""
+    values = builder.gep(line_of(context, builder, signature.args[0], args[0]), [args[1]])
+    return [builder.load(register(builder, values, min(at, count - LANES)), align=8) for at in range(0, count, LANES)]
+
+
+def span(count: int) -> Any:
+    """A compiled function ``f(values, at)``: the least and the greatest of ``count`` numbers, eight or more.
+
+    What is not a number may be passed over.
+    """
+
+    def lower(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        found = _registers(context, builder, signature, args, count)
+        ends = [_folded(builder, order, reduce(partial(_of_two, builder, order), found)) for order in ("<", ">")]
+        return context.make_tuple(builder, signature.return_type, ends)
+
+    @intrinsic
+    def least_and_greatest(_, values, at):  # type: ignore[no-untyped-def]
+        """The least and the greatest."""
+        return types.UniTuple(types.float64, 2)(values, types.intp), lower
+
+    return least_and_greatest
+
+
+def largest(count: int) -> Any:
+    """A compiled function ``f(values, at)``: the largest of ``count`` numbers whatever their signs, as `span` does."""
+
+    def lower(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        found = _registers(context, builder, signature, args, count)
+        sizes = [abs(Lanes(builder, value)).value for value in found]
+        return _folded(builder, ">", reduce(partial(_of_two, builder, ">"), sizes))
+
+    @intrinsic
+    def size(_, values, at):  # type: ignore[no-untyped-def]
+        """The largest."""
+        return types.float64(values, types.intp), lower
+
+    return size

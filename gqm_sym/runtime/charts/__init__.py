@@ -1,0 +1,1 @@
+"""Curves without formulas (points, rails, implicit curves) as polynomials in arc length."""

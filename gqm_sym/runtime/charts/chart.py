@@ -1,0 +1,229 @@
+"""Charts: curves that are known by numbers only, as piecewise polynomials in arc length.
+
+A chart gives four rows as functions of arc length s: the coordinates x and z, the tangent's angle alpha (continuous;
+dx/ds = cos alpha, dz/ds = sin alpha) and the signed curvature kappa. Angle and curvature are given at the nodes of each
+piece, each accurate to rounding; the coordinates are integrals of the angle's cosine and sine, so that their divided
+differences lose nothing. Compiled code reads a chart from one flat array that follows the run-time parameters in ``p``
+(`chart_functions`).
+"""
+
+from collections.abc import Hashable
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+from numba import types
+from numpy.polynomial.chebyshev import cheb2poly, chebint
+
+from gqm_sym.runtime.arithmetic.doubledouble import two_sum
+from gqm_sym.runtime.charts.evaluate import EDGES, RECORD, ROWS, TERMS, chart_row
+from gqm_sym.runtime.compiled.jit import entry
+from gqm_sym.runtime.compiled.types import Array
+
+NODES: Array = np.cos(np.pi * (np.arange(TERMS) + 0.5) / TERMS)
+"""Chebyshev points of the first kind on [-1, 1], at which a piece is given."""
+
+# Chebyshev coefficients from values at the nodes; powers of u from Chebyshev coefficients.
+# The angles are reduced before they are rounded: else noise of several units in the last place would remain.
+_QUARTERS = np.outer(np.arange(TERMS), 2 * np.arange(TERMS) + 1) % (4 * TERMS)
+FIT: Array = (2.0 / TERMS) * np.cos(np.pi * _QUARTERS / (2 * TERMS))
+FIT[0] *= 0.5
+
+# Values at the nodes from Chebyshev coefficients.
+AT_NODES: Array = np.cos(np.pi * _QUARTERS / (2 * TERMS))
+_POWERS = np.array([np.pad(cheb2poly(row[: k + 1]), (0, TERMS - 1 - k)) for k, row in enumerate(np.eye(TERMS))])
+
+# Coefficients behind the last one above this share of the largest are rounding noise, and left out.
+NOISE = 2e-16
+
+# Places on each piece at which the search for the nearest point begins.
+_SAMPLES = 8
+
+
+class ChartMaker(Hashable, Protocol):
+    """What makes a curve's chart for values of the run-time parameters."""
+
+    def chart(self, p: tuple[float, ...]) -> "Chart":
+        """The chart for parameter values in the module's order."""
+
+    def true_curve(self, context: Any, p: tuple[Any, ...], chart: "Chart") -> Any:
+        """The curve itself in extended precision (`exact_charts.TrueCurve`)."""
+
+    def is_exact(self, chart: "Chart") -> bool:
+        """Whether that can be had everywhere on a chart."""
+
+
+@entry(types.float64[:, ::1](types.float64[::1], types.float64[::1]))
+def _read(block, s):  # type: ignore[no-untyped-def]
+    out = np.empty((ROWS, s.size))
+    for i in range(s.size):
+        for row in range(ROWS):
+            out[row, i] = chart_row(block, row, s[i])
+    return out
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Chart:
+    """A curve in arc length.
+
+    Attributes
+    ----------
+    block : array
+        What compiled code reads.
+    low, high : float
+        The domain in arc length; 0 and the period of a closed curve.
+    period : float
+        0 where the curve is open.
+    ends : pair of str
+        What is at both ends of an open curve: "domain-end" or "singular-point".
+    breaks : array
+        Places inside the domain where the curvature or a higher derivative jumps: panels begin there.
+    corners : array
+        Those of them where the tangent itself jumps.
+    origins : (n, 3) array
+        Of each piece the part of the track that it belongs to, and where it begins and ends in that part's own
+        parameter; empty where there are no parts.
+    """
+
+    block: Array
+    low: float
+    high: float
+    period: float = 0.0
+    ends: tuple[str, str] = ("domain-end", "domain-end")
+    breaks: Array = field(default_factory=lambda: np.empty(0))
+    corners: Array = field(default_factory=lambda: np.empty(0))
+    origins: Array = field(default_factory=lambda: np.empty((0, 3)))
+
+    @property
+    def edges(self) -> Array:
+        """Arc length at the edges of the pieces."""
+        return self.block[EDGES : EDGES + int(self.block[1]) + 1]
+
+    def points(self, s: Any) -> Array:
+        """x, z, alpha and kappa at arc lengths, as rows."""
+        rows: Array = _read(self.block, np.ascontiguousarray(s, dtype=np.float64).reshape(-1))
+        return rows
+
+    def nearest(self, x: float, z: float) -> tuple[float, float]:
+        """The arc length of the point of the curve that is nearest to a point, and its distance."""
+        edges = self.edges
+        shares = np.arange(_SAMPLES) / _SAMPLES
+        s = np.append((edges[:-1, None] + np.diff(edges)[:, None] * shares).ravel(), edges[-1])
+        rows = self.points(s)
+        k = int(np.argmin(np.hypot(rows[0] - x, rows[1] - z)))
+        step = max(s[min(k + 1, s.size - 1)] - s[k], s[k] - s[max(k - 1, 0)])
+        place = float(s[k])
+        for _ in range(50):
+            row = self.points([place])[:, 0]
+            ahead = (x - row[0]) * np.cos(row[2]) + (z - row[1]) * np.sin(row[2])
+            aside = (z - row[1]) * np.cos(row[2]) - (x - row[0]) * np.sin(row[2])
+            bend = max(1.0 - row[3] * aside, 0.25)
+            move = float(np.clip(ahead / bend, -step, step))
+            new = place + move
+            if not self.period:
+                new = min(max(new, self.low), self.high)
+            if abs(new - place) <= 1e-16 * max(abs(place), step):
+                break
+            place = new
+        if self.period:
+            place -= self.period * np.floor((place - self.low) / self.period)
+        row = self.points([place])[:, 0]
+        return float(place), float(np.hypot(row[0] - x, row[1] - z))
+
+
+class PieceData(NamedTuple):
+    """What the pieces of a chart are made from.
+
+    Attributes
+    ----------
+    anchors : (n, 2) array
+        x and z at the left edge of each piece.
+    angles, curvatures : (n, TERMS) arrays
+        alpha and kappa at the nodes.
+    tangents : (n, 2, TERMS) array, optional
+        Cosine and sine of alpha at the nodes, if they are known more accurately than from alpha (near pi, for example).
+    anchor_lows : (n, 2) array, optional
+        The low parts of anchors that are known as two doubles.
+    """
+
+    anchors: Any
+    angles: Any
+    curvatures: Any
+    tangents: Any = None
+    anchor_lows: Any = 0.0
+
+
+def assemble(
+    edges: Any,
+    data: PieceData,
+    *,
+    period: float = 0.0,
+    turn: float = 0.0,
+    ends: tuple[str, str] = ("domain-end", "domain-end"),
+    breaks: Any = (),
+    corners: Any = (),
+    origins: Any = (),
+) -> Chart:
+    """Assemble a chart from its pieces.
+
+    Parameters
+    ----------
+    edges : (n+1,) array
+        Arc length at the edges of the pieces, increasing.
+    data : PieceData
+        The pieces.
+    period, turn : float
+        Length of a closed curve, and the increase of alpha over it.
+    ends, breaks, corners, origins
+        As `Chart` has them.
+    """
+    anchors, angles, curvatures, tangents, rests = data
+    edges, anchors = np.asarray(edges, dtype=np.float64), np.asarray(anchors, dtype=np.float64)
+    angles, half = np.asarray(angles, dtype=np.float64), 0.5 * np.diff(edges)
+    count = half.size
+    curvature = _fitted(np.asarray(curvatures, dtype=np.float64))
+    powers, records = np.empty((count, ROWS, TERMS)), np.empty((count, RECORD))
+    records[:, 0], records[:, 1] = edges[:-1] + half, 1.0 / half
+    known = np.stack([np.cos(angles), np.sin(angles)], axis=1) if tangents is None else np.asarray(tangents)
+    rests = np.broadcast_to(rests, anchors.shape)
+    # Second derivatives are known as well as first ones: the tangent is integrated from them, but for its mean.
+    bends = half[:, None, None] * np.asarray(curvatures)[:, None] * np.stack([-known[:, 1], known[:, 0]], axis=1)
+    turning = chebint(_fitted(bends), axis=2)[:, :, :TERMS]
+    turning[:, :, 0] += np.mean(known - turning @ AT_NODES, axis=2)
+    for row in range(2):
+        gained = chebint(turning[:, row], lbnd=-1, axis=1)[:, :TERMS]
+        powers[:, row] = half[:, None] * (gained @ _POWERS)
+        # The constant term goes into two doubles: what lies between two places is the difference of such.
+        records[:, 2 + 2 * row], records[:, 3 + 2 * row] = two_sum.py_func(anchors[:, row], powers[:, row, 0])
+        records[:, 3 + 2 * row] += rests[:, row]
+        powers[:, row, 0] = 0.0
+    powers[:, 2], powers[:, 3] = _fitted(angles) @ _POWERS, curvature @ _POWERS
+    records[:, 6:] = powers.reshape(count, -1)
+    # How much alpha can turn from the start on: on each piece by a bound of the curvature, and by jumps between pieces.
+    most = np.abs(curvature).sum(axis=1)
+    left, right = (powers[:, 2] @ (side ** np.arange(TERMS)) for side in (-1.0, 1.0))
+    jumps = np.append(np.abs(left[1:] - right[:-1]), abs(left[0] + turn - right[-1]) if period else 0.0)
+    turned = np.append(0.0, np.cumsum(2.0 * half * most + jumps))
+    block = np.concatenate([[0.0, count, edges[0], edges[-1], period, turn], edges, turned, most, records.ravel()])
+    block[0] = block.size
+    return Chart(
+        block=block,
+        low=float(edges[0]),
+        high=float(edges[-1]),
+        period=float(period),
+        ends=ends,
+        breaks=np.asarray(breaks, dtype=np.float64),
+        corners=np.asarray(corners, dtype=np.float64),
+        origins=np.asarray(origins, dtype=np.float64).reshape(-1, 3),
+    )
+
+
+def _fitted(values: Array) -> Array:
+    """Chebyshev coefficients from values at the nodes (the last axis), without the noise that follows them."""
+    coefficients = (values - values[..., :1]) @ FIT.T
+    size = np.abs(values).max(axis=-1, keepdims=True)
+    significant = np.abs(coefficients) > NOISE * size
+    kept = np.flip(np.logical_or.accumulate(np.flip(significant, axis=-1), axis=-1), axis=-1)
+    coefficients = np.where(kept, coefficients, 0.0)
+    coefficients[..., 0] += values[..., 0]
+    return coefficients

@@ -1,0 +1,109 @@
+"""Tracks of parts with formulas of their own, in extended precision, beside their charts (`exact_charts`)."""
+
+from collections.abc import Callable, Sequence
+from functools import cache
+from typing import Any
+
+from gqm_sym.errors import SolutionError
+from gqm_sym.runtime.charts.chart import Chart
+from gqm_sym.runtime.multiprecision.fixed_point import Polynomials
+from gqm_sym.runtime.multiprecision.gauss_legendre import gauss
+
+# From a part's own parameter to x, z and their derivatives by it.
+Part = Callable[[Any], tuple[Any, Any, Any, Any]]
+MOST_STEPS = 60
+
+
+class Parts:
+    """Parts that follow each other, at one precision: the chart says which of its pieces belongs to which."""
+
+    def __init__(self, context: Any, chart: Chart, part: Callable[[int], Part]) -> None:
+        self._context, self._part = context, cache(part)
+        self._origins = [(int(part), low, high) for part, low, high in chart.origins.tolist()]
+        self.ends = cache(self._ends)
+        self.start = self.ends(0)[0]
+
+    def _ends(self, k: int) -> tuple[tuple[Any, Any], tuple[Any, Any]]:
+        """The points at which a piece begins and ends."""
+        part, *places = self._origins[k]
+        begin, end = (self._part(part)(self._context.mpf(place))[:2] for place in places)
+        return begin, end
+
+    def length(self, k: int) -> Any:
+        """The length between them."""
+        context, (part, *places) = self._context, self._origins[k]
+
+        def speed(place: Any) -> Any:
+            return context.hypot(*self._part(part)(place)[2:])
+
+        return gauss(context, speed, [context.mpf(place) for place in places], context.dps)[0]
+
+    def meet(self, k: int, u: float, x: Any, z: Any, dx: Any, dz: Any, size: float) -> tuple[Any, Any, Any, Any]:
+        """Where the line through (x, z) across (dx, dz) meets the track, and the unit tangent there."""
+        context, (part, low, high) = self._context, self._origins[k]
+        at, enough = self._part(part), context.ldexp(size, -context.prec // 2)
+        place = context.mpf(low + 0.5 * (1.0 + u) * (high - low))
+        for _ in range(MOST_STEPS):
+            at_x, at_z, rate_x, rate_z = at(place)
+            ahead = (x - at_x) * dx + (z - at_z) * dz
+            place += ahead / (rate_x * dx + rate_z * dz)
+            if abs(ahead) <= enough:  # it squares: the next would be nothing
+                at_x, at_z, rate_x, rate_z = at(place)
+                speed = context.sqrt(rate_x * rate_x + rate_z * rate_z)
+                return at_x, at_z, rate_x / speed, rate_z / speed
+        raise SolutionError(f"the track near ({float(x)!r}, {float(z)!r}): Newton's method does not settle on it")
+
+
+def polynomial(context: Any, begin: Any, unit: Any, x: Sequence[Any], z: Sequence[Any]) -> Part:
+    """A part whose coordinates are polynomials, given by their powers of the distance from ``begin`` in units."""
+    rows = Polynomials(context, (x, z))
+
+    def at(place: Any) -> tuple[Any, Any, Any, Any]:
+        (at_x, rate_x, _), (at_z, rate_z, _) = rows((place - begin) / unit)
+        return at_x, at_z, rate_x / unit, rate_z / unit
+
+    return at
+
+
+def spiral(context: Any, pen: tuple[Any, Any, Any], length: Any, first: Any, last: Any, count: int) -> Part:
+    """A line, an arc or a clothoid by its arc length in steps, Taylor series about the middles of ``count`` equal ones.
+
+    Parameters
+    ----------
+    pen
+        x, z and the angle of the tangent at its begin.
+    first, last
+        Its curvature at its begin and at its end.
+    """
+    step, bent = length / count, (last - first) / length
+    x, z, angle = pen
+    steps: list[Part] = []
+    for k in range(count):
+        middle = (k + context.mpf(1) / 2) * step
+        turned = angle + middle * (first + middle * bent / 2)
+        waves = _waves(context, turned, (first + middle * bent) * step, bent * step**2)
+        terms = [[context.mpf(0), *(step * term / n for n, term in enumerate(row, start=1))] for row in waves]
+        for row, begin in zip(terms, (x, z), strict=True):
+            row[0] = begin - context.polyval(row[::-1], context.mpf(-1) / 2)
+        x, z = (context.polyval(row[::-1], context.mpf(1) / 2) for row in terms)
+        steps.append(polynomial(context, k + context.mpf(1) / 2, 1, *terms))
+
+    def at(place: Any) -> tuple[Any, Any, Any, Any]:
+        return steps[min(max(int(place), 0), count - 1)](place)
+
+    return at
+
+
+def _waves(context: Any, angle: Any, kappa: Any, bent: Any) -> tuple[list[Any], list[Any]]:
+    """Powers of cos(a) and sin(a), a' = kappa + bent*v from ``angle`` on, as many as matter for |v| up to a half.
+
+    From c' = -a' s and s' = a' c.
+    """
+    cosines, sines = [context.mpf(0), context.cos(angle)], [context.mpf(0), context.sin(angle)]
+    n = 0
+    while max(abs(value) for row in (cosines, sines) for value in row[-2:]) > context.ldexp(1, n - context.prec - 10):
+        n += 1
+        c, s = -kappa * sines[-1] - bent * sines[-2], kappa * cosines[-1] + bent * cosines[-2]
+        cosines.append(c / n)
+        sines.append(s / n)
+    return cosines[1:], sines[1:]

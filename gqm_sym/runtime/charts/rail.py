@@ -1,0 +1,256 @@
+"""Rails put together from pieces: lines, arcs and clothoids end to start, and curves with formulas of their own.
+
+The curvature of a standard piece is linear in arc length, so that its angle is known exactly and its coordinates are
+integrals of the angle's cosine and sine.
+"""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from itertools import islice
+from math import atan2, ceil, hypot, pi
+from typing import Any
+
+import numpy as np
+from numba import types
+from numpy.polynomial.legendre import leggauss
+
+from gqm_sym.errors import BudgetError, DeclarationError, ParameterError
+from gqm_sym.literals.namespaces import FLOATS
+from gqm_sym.runtime.charts.arc_length import MOST_PIECES, Indices, Pieces, joined, rectify, summed
+from gqm_sym.runtime.charts.chart import NODES, Chart, PieceData, assemble
+from gqm_sym.runtime.charts.exact_parts import Part, Parts, spiral
+from gqm_sym.runtime.compiled.calls import call_segment
+from gqm_sym.runtime.compiled.jit import entry
+from gqm_sym.runtime.compiled.types import Array
+
+# How far a curve may begin from the end of the piece before it, as a share of the length up to its end and in radians.
+MATCH = 1e-9
+
+# The angle turns by no more than this on a piece of the chart: its cosine is a polynomial there, to rounding.
+TURN = 1.0
+
+# Of one standard piece: a spring with more turns than this is a mistake.
+MOST_TURNED = 1e5
+_GAUSS = leggauss(16)
+
+# What a standard piece is given by.
+GIVEN = {"line": ("length",), "arc": ("radius", "angle"), "clothoid": ("length", "kappa_start", "kappa_end")}
+
+
+@dataclass(frozen=True, slots=True)
+class Pen:
+    """An end of a rail: its place, and the angle of its tangent."""
+
+    x: float
+    z: float
+    angle: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Rail:
+    """The maker of a rail's chart.
+
+    Attributes
+    ----------
+    numbers
+        ``f(op, p)``: x, z and heading at the start where the rail is ``placed``, then for each piece what `GIVEN` says,
+        or the ends of a curve's parameter.
+    pieces : tuple of str
+        "line", "arc", "clothoid", or "curve".
+    placed : bool
+        Whether the start is given; else the first piece is a curve, which has a place of its own.
+    segments : tuple of int
+        Addresses of the functions of the curves among them, in order.
+    formulas
+        The same curves as ``f(op, lam, p)``: x, z and their derivatives.
+    closed : bool
+        Whether the end is joined to the start.
+    """
+
+    numbers: Callable[..., Any]
+    pieces: tuple[str, ...]
+    placed: bool
+    segments: tuple[int, ...] = ()
+    formulas: tuple[Callable[..., Any], ...] = ()
+    closed: bool = False
+
+    def chart(self, p: tuple[float, ...]) -> Chart:
+        """The chart.
+
+        Raises
+        ------
+        ParameterError
+            If a length or a radius is not positive, or a number is not finite.
+        DeclarationError
+            If pieces do not meet, or a closed rail does not close.
+        """
+        numbers = iter(self.numbers(FLOATS, p))
+        pen = Pen(*(float(number) for number in islice(numbers, 3))) if self.placed else None
+        segments = iter(self.segments)
+        parts: list[Pieces] = []
+        joints, start, length = [0.0], pen, 0.0
+        for count, kind in enumerate(self.pieces, start=1):
+            where = f"piecewise: piece {count} ({kind})"
+            if kind == "curve":
+                low, high = islice(numbers, 2)
+                part, begin, end = _curve(next(segments), np.array(p), low, high, where)
+                if pen is not None:
+                    _check_joint(
+                        pen, begin, length + part.lengths.sum(), f"{where}: begins", "the piece before it ends"
+                    )
+                    laps = 2.0 * pi * round((pen.angle - begin.angle) / (2.0 * pi))
+                    part = replace(part, angles=part.angles + laps)
+                    end = Pen(end.x, end.z, end.angle + laps)
+                start, pen = start or begin, end
+            else:
+                assert pen is not None
+                part, pen = _standard(kind, numbers, pen, where)
+            parts.append(part)
+            if sum(one.lengths.size for one in parts) > MOST_PIECES:
+                raise BudgetError(f"chart: {where}: {MOST_PIECES} pieces reach no farther; let the rail turn less")
+            length += float(part.lengths.sum())
+            joints.append(length)
+        assert start is not None
+        assert pen is not None
+        which = np.repeat(np.arange(len(parts)), [part.lengths.size for part in parts])
+        return self._assembled(joined(parts), which, joints, start, pen)
+
+    def is_exact(self, chart: Chart) -> bool:
+        """Every piece has formulas."""
+        return True
+
+    def true_curve(self, context: Any, p: tuple[Any, ...], chart: Chart) -> Parts:
+        """The rail in extended precision, its pieces where the numbers put them."""
+        numbers = iter(self.numbers(context, p))
+        pen = tuple(context.mpf(number) for number in islice(numbers, 3)) if self.placed else None
+        formulas, counts = iter(self.formulas), np.bincount(chart.origins[:, 0].astype(np.int64))
+        parts: list[Part] = []
+        for kind, count in zip(self.pieces, counts.tolist(), strict=True):
+            if kind == "curve":
+                parts.append(_formula(context, next(formulas), p, *islice(numbers, 2)))
+                x, z, dx, dz = parts[-1](context.mpf(1))
+                pen = x, z, context.atan2(dz, dx)
+                continue
+            assert pen is not None
+            given = {name: context.mpf(next(numbers)) for name in GIVEN[kind]}
+            length, first, last = _bent(kind, given)
+            parts.append(spiral(context, pen, length, first, last, count))
+            pen = *parts[-1](context.mpf(count))[:2], pen[2] + length * (first + last) / 2
+        return Parts(context, chart, parts.__getitem__)
+
+    def _assembled(self, pieces: Pieces, parts: Indices, joints: list[float], start: Pen, end: Pen) -> Chart:
+        edges = summed(pieces.lengths)
+        inner = joints[1:-1]
+        turn = 0.0
+        if self.closed:
+            _check_joint(end, start, edges[-1], "piecewise: closed: the start lies", "the last piece ends")
+            turn = 2.0 * pi * round((end.angle - start.angle) / (2.0 * pi))
+            inner = joints[:-1]
+        return assemble(
+            edges,
+            PieceData(pieces.anchors, pieces.angles, pieces.curvatures),
+            period=edges[-1] if self.closed else 0.0,
+            turn=turn,
+            origins=np.column_stack([parts, pieces.places]),
+            # Breaks are edges of the chart, to the last bit.
+            breaks=edges[np.abs(edges[:, None] - np.array(inner)).argmin(axis=0)] if inner else (),
+        )
+
+
+def _check_joint(end: Pen, begin: Pen, length: float, who: str, whom: str) -> None:
+    """Refuse a joint at which the place or the tangent jumps."""
+    gap = hypot(begin.x - end.x, begin.z - end.z)
+    turn = abs((begin.angle - end.angle + pi) % (2.0 * pi) - pi)
+    if not (gap <= MATCH * length and turn <= MATCH):
+        raise DeclarationError(
+            f"{who} at ({begin.x!r}, {begin.z!r}) with its tangent at {begin.angle!r} rad, {gap:.3g} and "
+            f"{turn:.3g} rad off where {whom}: ({end.x!r}, {end.z!r}), {end.angle!r} rad; "
+            f"both must match within {MATCH:g} of the rail's length and {MATCH:g} rad"
+        )
+
+
+def _formula(context: Any, formula: Callable[..., Any], p: tuple[Any, ...], low: Any, high: Any) -> Part:
+    """A curve with formulas by the share of its parameter's range, which so has ends that are exact."""
+    low, width = context.mpf(low), context.mpf(high) - low
+
+    def at(share: Any) -> tuple[Any, Any, Any, Any]:
+        x, z, dx, dz = formula(context, low + width * share, p)
+        return x, z, dx * width, dz * width
+
+    return at
+
+
+def _bent(kind: str, given: dict[str, Any]) -> tuple[Any, Any, Any]:
+    """Length of a standard piece, and its curvature at its begin and at its end."""
+    if kind == "arc":
+        length = given["radius"] * abs(given["angle"])
+        return length, given["angle"] / length, given["angle"] / length
+    return given["length"], given.get("kappa_start", 0.0), given.get("kappa_end", 0.0)
+
+
+def _standard(kind: str, numbers: Iterator[Any], pen: Pen, where: str) -> tuple[Pieces, Pen]:
+    """A piece whose curvature is linear in arc length, and where it ends."""
+    given = {name: float(next(numbers)) for name in GIVEN[kind]}
+    for name, value in given.items():
+        if not np.isfinite(value) or (name in ("length", "radius") and not value > 0.0):
+            wanted = "positive" if name in ("length", "radius") else "finite"
+            raise ParameterError(f"{where}: {name}: must be {wanted}, got {value!r}")
+    if given.get("angle") == 0.0:
+        raise ParameterError(f"{where}: angle: must not be zero; positive turns left, negative right")
+    length, first, last = (float(value) for value in _bent(kind, given))
+    turned = max(abs(first), abs(last)) * length
+    if not turned <= MOST_TURNED:
+        raise ParameterError(f"{where}: turns by {turned:.3g} rad; {MOST_TURNED:g} is the most")
+    count = max(1, ceil(turned / TURN))
+    step, bent = length / count, 0.5 * (last - first) / length
+    left: Array = step * np.arange(count, dtype=np.float64)[:, None]
+
+    def angle(s: Array) -> Array:
+        return pen.angle + s * (first + s * bent)
+
+    nodes, weights = _GAUSS
+    inside, middle = angle(left + 0.5 * step * (1.0 + nodes)), angle(left + 0.5 * step)
+    # What is added to a straight piece vanishes with the curvature: the weights' own rounding must not show.
+    gained = np.concatenate(
+        [
+            step * wave(middle) + 0.5 * step * (wave(inside) - wave(middle)) @ weights[:, None]
+            for wave in (np.cos, np.sin)
+        ],
+        axis=1,
+    )
+    places = np.cumsum(np.concatenate([[[pen.x, pen.z]], gained]), axis=0, dtype=np.longdouble).astype(np.float64)
+    s = left + 0.5 * step * (1.0 + NODES)
+    steps = np.arange(count)
+    pieces = Pieces(
+        places=np.stack([steps, steps + 1], axis=1),
+        lengths=np.full(count, step),
+        anchors=places[:-1],
+        angles=angle(s),
+        curvatures=first + 2.0 * bent * s,
+    )
+    return pieces, Pen(float(places[-1, 0]), float(places[-1, 1]), pen.angle + 0.5 * (first + last) * length)
+
+
+@entry(types.float64[:, ::1](types.int64, types.float64[::1], types.float64[::1]))
+def _segment_rows(address, p, lam):  # type: ignore[no-untyped-def]
+    """x, z, ds, dx/ds, dz/ds and kappa of a curve with formulas."""
+    out = np.empty((6, lam.size))
+    call_segment(address, lam.size, lam, p, out)
+    return out
+
+
+def _curve(address: int, p: Array, low: float, high: float, where: str) -> tuple[Pieces, Pen, Pen]:
+    """A curve with formulas, and both its ends."""
+    if not (np.isfinite(low) and np.isfinite(high) and low < high):
+        raise ParameterError(f"{where}: domain: must have finite ends lo < hi, got ({low!r}, {high!r})")
+
+    def rows(left: Array, offsets: Array) -> Array:
+        out: Array = _segment_rows(address, p, (left[:, None] + offsets).ravel())
+        return out.reshape(6, *offsets.shape)
+
+    pieces = rectify(rows, np.array([low, high], dtype=np.float64), where=where)
+    pieces = replace(pieces, places=(pieces.places - low) / (high - low))
+    ends = rows(np.array([low, high], dtype=np.float64), np.zeros((2, 1)))[:, :, 0]
+    begin, end = (Pen(float(e[0]), float(e[1]), atan2(e[4], e[3])) for e in ends.T)
+    laps = 2.0 * pi * round((pieces.angles[-1, 0] - end.angle) / (2.0 * pi))
+    return pieces, begin, Pen(end.x, end.z, end.angle + laps)

@@ -1,0 +1,267 @@
+"""Tracks given by points: an interpolating spline, or planes stitched together (paper, eq. 1).
+
+The spline is quintic, so that its curvature has two continuous derivatives, and its parameter at the points is its own
+arc length: chord lengths at first, then the lengths of the spline through them, until they settle.
+"""
+
+from dataclasses import dataclass
+from functools import lru_cache
+from math import sqrt
+from typing import Any
+
+import numpy as np
+from numba import types
+
+from gqm_sym.budgets import spend
+from gqm_sym.errors import SolutionError
+from gqm_sym.literals.numbers import read_number
+from gqm_sym.runtime.charts.arc_length import Indices, Pieces, rectify, summed, unwrapped
+from gqm_sym.runtime.charts.chart import NODES, Chart, PieceData, assemble
+from gqm_sym.runtime.charts.exact_parts import Part, Parts, polynomial
+from gqm_sym.runtime.compiled.jit import Inner, entry
+from gqm_sym.runtime.compiled.types import MATRIX, Array
+
+DEGREE = 5
+
+# Lengths between points that change by less than this share have settled; each round gains some digits.
+SETTLED = 1e-9
+MOST_ROUNDS = 10
+
+# Points that are met within this share of the track's length are met to rounding: so the length itself is rounded.
+SAME = 8.0 * 2.0**-52
+FEWEST = 64
+
+# A turn of stitched planes that is less than this many roundings of the points is none.
+STRAIGHT = 8.0 * 2.0**-52
+
+
+@dataclass(frozen=True, slots=True)
+class Sampled:
+    """The maker of a sampled track's chart.
+
+    Attributes
+    ----------
+    points : str
+        x and z of each point in turn, separated by blanks.
+    kind : {"spline", "linear"}
+        What lies between the points.
+    closed : bool
+        Whether the track goes on from the last point to the first, which is not repeated.
+    """
+
+    points: str
+    kind: str = "spline"
+    closed: bool = False
+
+    def chart(self, p: tuple[float, ...]) -> Chart:
+        """The chart; it does not depend on the run-time parameters."""
+        return _made(self)[0]
+
+    def is_exact(self, chart: Chart) -> bool:
+        """A track of polynomials is."""
+        return True
+
+    def true_curve(self, context: Any, p: tuple[Any, ...], chart: Chart) -> Parts:
+        """The track in extended precision: planes between the points as written, the spline of its coefficients."""
+        spline = _made(self)[1]
+        if spline is not None:
+            return Parts(context, chart, lambda k: _exact_polynomial(context, spline.t, spline.c, k))
+        numbers = [read_number(number, where="points").at(context) for number in self.points.split()]
+        count = len(numbers) // 2
+
+        def plane(k: int) -> Part:
+            (x, z), (to_x, to_z) = (numbers[2 * i : 2 * i + 2] for i in (k, (k + 1) % count))
+            return polynomial(context, 0, 1, (x, to_x - x), (z, to_z - z))
+
+        return Parts(context, chart, plane)
+
+
+def _exact_polynomial(context: Any, t: Array, c: Array, k: int) -> Part:
+    """The polynomial of a spline on [t_k, t_(k+1)], by de Boor's algorithm on powers of the share of that interval."""
+    knots = [context.mpf(float(knot)) for knot in t[k - DEGREE : k + DEGREE + 1]]
+    unit = knots[DEGREE + 1] - knots[DEGREE]
+    rows = []
+    for row in range(2):
+        found = [[context.mpf(float(value))] for value in c[k - DEGREE : k + 1, row]]
+        for order in range(1, DEGREE + 1):
+            for i in range(DEGREE, order - 1, -1):
+                change = [high - low for high, low in zip(found[i], found[i - 1], strict=True)]
+                span = knots[i + DEGREE + 1 - order] - knots[i]
+                ahead = (knots[DEGREE] - knots[i]) / span
+                by_power = zip([*found[i - 1], 0], [*change, 0], [0, *change], strict=True)
+                found[i] = [low + ahead * same + lower * unit / span for low, same, lower in by_power]
+        rows.append(found[DEGREE])
+    return polynomial(context, knots[DEGREE], unit, *rows)
+
+
+@lru_cache(maxsize=4)
+def _made(track: Sampled) -> tuple[Chart, Any]:
+    """A track's chart, and its spline where it has one."""
+    points = np.array(track.points.split(), dtype=np.float64).reshape(-1, 2)
+    if track.closed:
+        points = np.concatenate([points, points[:1]])
+    return (_planes(points, track.closed), None) if track.kind == "linear" else _splined(points, track.closed)
+
+
+def _planes(points: Array, closed: bool) -> Chart:
+    """Straight pieces from point to point; each turn of the tangent is a corner."""
+    steps = np.diff(points, axis=0)
+    lengths = np.hypot(steps[:, 0], steps[:, 1])
+    edges = summed(lengths)
+    angles = np.repeat(np.arctan2(steps[:, 1], steps[:, 0])[:, None], NODES.size, axis=1)
+    angles = unwrapped(angles, float(angles[0, 0]))
+    # From the plane before each point to the one behind it; before the first point comes the last plane.
+    turns = np.diff(angles[:, 0], prepend=angles[-1, 0])
+    turns[0] = np.remainder(turns[0] + np.pi, 2.0 * np.pi) - np.pi
+    shorter = np.minimum(np.roll(lengths, 1), lengths)
+    bent = np.abs(turns) > STRAIGHT * (1.0 + np.abs(points).max() / shorter)
+    bent[0] &= closed
+    corners = edges[:-1][bent]
+    turn = 2.0 * np.pi * round(turns.sum() / (2.0 * np.pi)) if closed else 0.0
+    places = np.repeat([[0.0, 1.0]], lengths.size, axis=0)
+    pieces = Pieces(
+        places=places, lengths=lengths, anchors=points[:-1], angles=angles, curvatures=np.zeros_like(angles)
+    )
+    return _assembled(pieces, np.arange(lengths.size), edges, turn, closed, corners, corners)
+
+
+def _splined(points: Array, closed: bool) -> tuple[Chart, Any]:
+    """The interpolating spline, each of its polynomials as one piece or more."""
+    knots = summed(np.hypot(*np.diff(points, axis=0).T))
+    for _ in range(MOST_ROUNDS):
+        spend()
+        terms = _polynomials(points, knots, closed)
+        lengths = _lengths(knots, terms)
+        change = np.abs(lengths / np.diff(knots) - 1.0).max()
+        knots = summed(lengths)
+        if change <= SETTLED:
+            break
+    points, knots = _thinned(points, knots, closed)
+    terms = _polynomials(points, knots, closed)
+    pieces = rectify(lambda left, offsets: _evaluate(knots, terms, left, offsets), knots, where="sampled")
+    edges, turn = summed(pieces.lengths), 0.0
+    if closed:
+        turn = 2.0 * np.pi * round((pieces.angles[-1, 0] - pieces.angles[0, -1]) / (2.0 * np.pi))
+    # The fifth derivative jumps at the points: panels across them would see noise from 1e-7 of the integrand on.
+    breaks = edges[:-1] if closed else edges[1:-1]
+    spline = _interpolated(points, knots, closed)
+    parts = np.searchsorted(spline.t, pieces.places.mean(axis=1), side="right") - 1
+    return _assembled(pieces, parts, edges, turn, closed, breaks, ()), spline
+
+
+def _thinned(points: Array, knots: Array, closed: bool) -> tuple[Array, Array]:
+    """The points without those that the spline through every second one meets to rounding.
+
+    Curvature from points at a distance h carries their rounding over h**2: closer points than are needed do harm.
+    """
+    while len(knots) > FEWEST:
+        kept = np.unique(np.append(np.arange(0, len(knots), 2), len(knots) - 1))
+        spline = _interpolated(points[kept], knots[kept], closed)
+        if np.abs(spline(knots) - points).max() > SAME * knots[-1]:
+            break
+        points, knots = points[kept], knots[kept]
+    return points, knots
+
+
+def _assembled(
+    pieces: Pieces, parts: Indices, edges: Array, turn: float, closed: bool, breaks: object, corners: object
+) -> Chart:
+    return assemble(
+        edges,
+        PieceData(pieces.anchors, pieces.angles, pieces.curvatures),
+        period=edges[-1] if closed else 0.0,
+        turn=turn,
+        breaks=breaks,
+        corners=corners,
+        origins=np.column_stack([parts, pieces.places]),
+    )
+
+
+def _interpolated(points: Array, knots: Array, closed: bool) -> Any:
+    """The interpolating spline as a function."""
+    from scipy.interpolate import make_interp_spline
+
+    try:
+        return make_interp_spline(knots, points, k=DEGREE, bc_type="periodic" if closed else None)
+    except (np.linalg.LinAlgError, ValueError) as error:
+        raise SolutionError(
+            f"sampled: no smooth track through these points was found ({error}); are they close enough along it, or is "
+            "it made of planes (kind 'linear')?"
+        ) from None
+
+
+def _polynomials(points: Array, knots: Array, closed: bool) -> Array:
+    """Coefficients of both coordinates between the points, in powers of the distance from the one before."""
+    spline = _interpolated(points, knots, closed)
+    terms = np.empty((knots.size - 1, 2, DEGREE + 1))
+    share = 1.0
+    for power in range(DEGREE + 1):
+        terms[:, :, power] = share * spline(knots[:-1], power)
+        share /= power + 1.0
+    return terms
+
+
+@Inner
+def velocity(terms, t):  # type: ignore[no-untyped-def]
+    """The first derivative of a polynomial."""
+    total = 0.0
+    for power in range(DEGREE, 0, -1):
+        total = total * t + power * terms[power]
+    return total
+
+
+@entry(types.float64[::1](types.float64[::1], types.float64[:, :, ::1]))
+def _measure(knots, terms):  # type: ignore[no-untyped-def]
+    """The length of each polynomial by Simpson's rule on halves and its Richardson step: what settling needs."""
+    out = np.empty(knots.size - 1)
+    for k in range(out.size):
+        width = knots[k + 1] - knots[k]
+        speeds = np.empty(9)
+        for i in range(9):
+            dx, dz = velocity(terms[k, 0], i * width / 8.0), velocity(terms[k, 1], i * width / 8.0)
+            speeds[i] = sqrt(dx * dx + dz * dz)
+        coarse = speeds[0] + 4.0 * (speeds[2] + speeds[6]) + 2.0 * speeds[4] + speeds[8]
+        odd = speeds[1] + speeds[3] + speeds[5] + speeds[7]
+        fine = speeds[0] + 4.0 * odd + 2.0 * (speeds[2] + speeds[4] + speeds[6]) + speeds[8]
+        coarse, fine = coarse * width / 12.0, fine * width / 24.0
+        out[k] = fine + (fine - coarse) / 15.0
+    return out
+
+
+@Inner
+def taylor(terms, t):  # type: ignore[no-untyped-def]
+    """A polynomial and its first two derivatives."""
+    value, first, second = 0.0, 0.0, 0.0
+    for power in range(DEGREE, -1, -1):
+        second = second * t + 2.0 * first
+        first = first * t + value
+        value = value * t + terms[power]
+    return value, first, second
+
+
+@entry(types.float64[:, :, ::1](types.float64[::1], types.float64[:, :, ::1], types.float64[::1], MATRIX))
+def _evaluate(knots, terms, left, offsets):  # type: ignore[no-untyped-def]
+    """x, z, ds/du, dx/ds, dz/ds and kappa of the spline, at offsets from places."""
+    out = np.empty((6, *offsets.shape))
+    for k in range(left.size):
+        low, high = 0, knots.size - 1
+        while high - low > 1:
+            middle = (low + high) // 2
+            if left[k] >= knots[middle]:
+                low = middle
+            else:
+                high = middle
+        for i in range(offsets.shape[1]):
+            t = (left[k] - knots[low]) + offsets[k, i]
+            x, dx, ddx = taylor(terms[low, 0], t)
+            z, dz, ddz = taylor(terms[low, 1], t)
+            speed = sqrt(dx * dx + dz * dz)
+            out[0, k, i], out[1, k, i], out[2, k, i] = x, z, speed
+            out[3, k, i], out[4, k, i] = dx / speed, dz / speed
+            out[5, k, i] = (dx * ddz - dz * ddx) / speed**3
+    return out
+
+
+def _lengths(knots: Array, terms: Array) -> Array:
+    lengths: Array = _measure(knots, terms)
+    return lengths

@@ -1,0 +1,1 @@
+"""How functions are compiled, called by address, buffered and spread over threads."""

@@ -1,0 +1,104 @@
+"""Operations that LLVM has and Python's ``math`` has not, and a sine that vectorises.
+
+numba's loops over ``math.sin`` stay scalar, as the C library has no sine of vectors; polynomials of reduced arguments
+do not. A fused product and sum rounds once, and keeps what a product loses.
+"""
+
+from typing import Any
+
+from llvmlite import ir
+from numba import types
+from numba.extending import intrinsic
+
+
+@intrinsic
+def fma(_, x, y, z):  # type: ignore[no-untyped-def]
+    """X * y + z, rounded once."""
+
+    def lower(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        return builder.fma(*args)
+
+    real = types.float64
+    return real(real, real, real), lower
+
+
+def _rounding(name: str) -> Any:
+    def lower(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        return builder.call(builder.module.declare_intrinsic(name, [ir.DoubleType()]), args)
+
+    return types.float64(types.float64), lower
+
+
+@intrinsic
+def nearest_whole(_, x):  # type: ignore[no-untyped-def]
+    """The nearest whole number, as a float."""
+    return _rounding("llvm.rint")
+
+
+@intrinsic
+def whole_below(_, x):  # type: ignore[no-untyped-def]
+    """The largest whole number that is not above, as a float."""
+    return _rounding("llvm.floor")
+
+
+@intrinsic
+def bits(_, x):  # type: ignore[no-untyped-def]
+    """The bits of a float, as a whole number."""
+
+    def lower(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        return builder.bitcast(args[0], ir.IntType(64))
+
+    return types.int64(types.float64), lower
+
+
+@intrinsic
+def from_bits(_, n):  # type: ignore[no-untyped-def]
+    """The float of these bits."""
+
+    def lower(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        return builder.bitcast(args[0], ir.DoubleType())
+
+    return types.float64(types.int64), lower
+
+
+@intrinsic
+def choose(_, condition, x, y):  # type: ignore[no-untyped-def]
+    """``x if condition else y``, both worked out: a branch would keep a loop scalar."""
+
+    def lower(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        return builder.select(*args)
+
+    real = types.float64
+    return real(types.boolean, real, real), lower
+
+
+def _horner(builder: Any, coefficients: Any, count: int, s: Any, t: Any) -> tuple[Any, Any]:
+    """Horner's scheme without a loop: the value at t, and the divided difference [s,t]."""
+    value, slope = ir.Constant(ir.DoubleType(), 0.0), ir.Constant(ir.DoubleType(), 0.0)
+    for k in range(count):
+        slope = builder.fma(slope, s, value)
+        value = builder.fma(value, t, builder.extract_value(coefficients, k))
+    return value, slope
+
+
+@intrinsic
+def polynomial(_, coefficients, t):  # type: ignore[no-untyped-def]
+    """The polynomial of these coefficients, highest power first, at t."""
+
+    def lower(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        return _horner(builder, args[0], coefficients.count, args[1], args[1])[0]
+
+    return types.float64(coefficients, types.float64), lower
+
+
+@intrinsic
+def polynomial_pair(_, coefficients, s, t):  # type: ignore[no-untyped-def]
+    """The polynomial's value at t, and its divided difference [s,t]."""
+
+    def lower(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        return context.make_tuple(
+            builder, signature.return_type, _horner(builder, args[0], coefficients.count, args[1], args[2])
+        )
+
+    real = types.float64
+    return types.UniTuple(real, 2)(coefficients, real, real), lower

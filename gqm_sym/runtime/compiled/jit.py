@@ -1,0 +1,180 @@
+"""Decorators that compile functions, and the compiler options of all of them.
+
+No fast-math: reassociation would break sums and products of two doubles, and NaN and infinity have meaning here.
+Division by zero gives infinity, as in IEEE arithmetic, and is not an exception.
+"""
+
+import hashlib
+import sys
+from collections.abc import Callable
+from functools import lru_cache, wraps
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+from numba import types
+from numba.extending import typeof_impl
+
+from gqm_sym.errors import OutdatedModuleError
+from gqm_sym.runtime.compiled.numba_internals import Compiler
+from gqm_sym.runtime.interface import INTERFACE
+
+COMPILE: dict[str, Any] = {"error_model": "numpy"}
+
+
+# The package that every function belongs to which compiled code calls.
+RUNTIME = "gqm_sym.runtime"
+
+
+def stamp_of(folder: Path) -> str:
+    """Return the digest of all Python files in a folder and its sub-folders, by their paths and contents.
+
+    Their times of change do not count: those of an installed wheel are all the same.
+    """
+    digest = hashlib.sha256()
+    for path, file in sorted((file.relative_to(folder).as_posix(), file) for file in folder.rglob("*.py")):
+        text = file.read_bytes()
+        digest.update(f"{path} {len(text)}\n".encode() + text)
+    return digest.hexdigest()
+
+
+STAMP = stamp_of(Path(__file__).parent.parent)
+
+
+@lru_cache(maxsize=1)
+def announce() -> None:
+    """Print once, if the output is a terminal, that the runtime is being compiled, because that takes minutes."""
+    if sys.stderr is not None and sys.stderr.isatty():
+        print("gqm_sym: compiling the runtime, once per installation", file=sys.stderr, flush=True)
+
+
+def _announce_runtime(function: Any) -> None:
+    """Announce that a function is compiled, if it belongs to the runtime."""
+    if function.__module__.startswith(f"{RUNTIME}."):
+        announce()
+
+
+COMPILER = Compiler(COMPILE, lambda: STAMP, _announce_runtime)
+
+
+class Inner:
+    """A function that other compiled functions call.
+
+    Its numba dispatcher is made when such a function is compiled, or when Python calls it: code from the cache never
+    needs it.
+    """
+
+    forceinline = False
+
+    def __init__(self, function: Callable[..., Any]) -> None:
+        self.py_func = function
+        self.__name__, self.__doc__ = function.__name__, function.__doc__
+        self._dispatcher: Any = None
+
+    @property
+    def dispatcher(self) -> Any:
+        """The function as numba's dispatcher."""
+        if self._dispatcher is None:
+            self._dispatcher = COMPILER.inner(self.py_func, forceinline=self.forceinline)
+        return self._dispatcher
+
+    def __call__(self, *arguments: Any) -> Any:
+        """Call the compiled function from Python."""
+        return self.dispatcher(*arguments)
+
+
+class Inlined(Inner):
+    """An `Inner` function that is inlined where it is called, for short functions without branches.
+
+    LLVM does not vectorise a loop that contains a call.
+    """
+
+    forceinline = True
+
+
+@typeof_impl.register(Inner)
+def _type_of_inner(value: Inner, _: Any) -> Any:
+    return types.Dispatcher(value.dispatcher)
+
+
+def entry(signature: Any, *, nogil: bool = False, checked: bool = True) -> Callable[[Any], Callable[..., Any]]:
+    """Make a function an entry point from Python: it is compiled, or read from the cache, when it is first called.
+
+    Parameters
+    ----------
+    signature
+        numba's signature.
+    nogil : bool
+        Whether other threads of Python may run while the function does.
+    checked : bool
+        Whether numba checks that arrays are contiguous and of doubles, which takes half a microsecond. It is switched
+        off for the functions that every launch calls, each of which is called in a single place.
+    """
+
+    def decorate(function: Any) -> Callable[..., Any]:
+        compiled: Any = None
+
+        @wraps(function)
+        def call(*arguments: Any) -> Any:
+            nonlocal compiled
+            if compiled is None:
+                compiled = COMPILER.entry(function, signature, nogil=nogil, checked=checked)
+            return compiled(*arguments)
+
+        return call
+
+    return decorate
+
+
+class Later:
+    """A function of a generated module that is compiled when its address is first needed."""
+
+    def __init__(self, compile_it: Callable[[], Any]) -> None:
+        self._compile = compile_it
+        self._callback: Any = None
+
+    @property
+    def address(self) -> int:
+        """Address of the compiled function."""
+        if self._callback is None:
+            self._callback = self._compile()
+        address: int = self._callback.address
+        return address
+
+
+def compiler(file: str, *, interface: int) -> Callable[..., Callable[[Any], Any]]:
+    """Return a decorator factory for the functions of one generated module: ``compiled(signature, later=False)``.
+
+    numba's disk cache stores the name of a function's module, imports it on loading, and distinguishes machine code by
+    it. A generated module may be imported under any name, from any folder: so numba sees its functions under a name
+    that is made from the module's own text.
+
+    Parameters
+    ----------
+    file : str
+        Path of the generated module.
+    interface : int
+        Version of the runtime's interface that it was generated for.
+
+    Raises
+    ------
+    OutdatedModuleError
+        If that is not the version of this runtime; nothing has been compiled then.
+    """
+    if interface != INTERFACE:
+        raise OutdatedModuleError(
+            f"{file}: made for interface {interface} of the runtime, which is now at {INTERFACE}; "
+            "run gqm-gen on its declaration again"
+        )
+    digest = hashlib.sha256(Path(file).read_bytes()).hexdigest()[:16]
+    alias = f"gqm_sym_generated_{digest}"
+    sys.modules.setdefault(alias, ModuleType(alias))
+
+    def compiled(signature: Any, *, later: bool = False) -> Callable[[Any], Any]:
+        def compile_it(function: Any) -> Any:
+            function.__module__ = alias
+            return COMPILER.callback(function, signature)
+
+        return (lambda function: Later(lambda: compile_it(function))) if later else compile_it
+
+    return compiled

@@ -1,0 +1,21 @@
+"""Types of compiled functions' arguments, and of arrays: each has its one name here."""
+
+from typing import Any
+
+import numpy as np
+from numba import types
+from numpy.typing import NDArray
+
+from gqm_sym.runtime.interface import Addresses, BatchAddresses
+
+# Arrays of doubles, for annotations.
+Array = NDArray[np.float64]
+
+REAL: Any = types.float64
+INTEGER: Any = types.int64
+# Contiguous arrays of doubles: one axis, two axes.
+VECTOR: Any = types.float64[::1]
+MATRIX: Any = types.float64[:, ::1]
+# Addresses of a model's compiled functions: for one orbit, and for a batch of them.
+ADDRESSES: Any = types.NamedUniTuple(types.int64, len(Addresses._fields), Addresses)
+BATCH_ADDRESSES: Any = types.NamedUniTuple(types.int64, len(BatchAddresses._fields), BatchAddresses)

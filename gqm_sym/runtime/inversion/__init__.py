@@ -1,0 +1,1 @@
+"""From time to place: tables and Fourier series."""

@@ -1,0 +1,42 @@
+"""The compiled functions of one module, bound to the values of its parameters."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from gqm_sym.runtime.compiled.types import Array
+from gqm_sym.runtime.interface import Addresses
+from gqm_sym.runtime.multiprecision.exact_problem import NOWHERE, ExactProblem
+
+
+class BoundFunctions(NamedTuple):
+    """The compiled functions of one module with the values that they take.
+
+    Attributes
+    ----------
+    addresses : Addresses
+        The addresses of the compiled functions.
+    p : array
+        The values of the run-time parameters, followed by the curve's chart if it has one.
+    exact : ExactProblem or None
+        The same problem in extended precision; None if the curve is known in doubles only.
+    breaks, corners : arrays
+        The places at which the curve is not smooth, and those at which its tangent jumps, within one period.
+    period : float
+        The period of a closed curve in units of its parameter, 0 otherwise.
+    """
+
+    addresses: Addresses
+    p: Array
+    exact: ExactProblem | None = None
+    breaks: Array = NOWHERE
+    corners: Array = NOWHERE
+    period: float = 0.0
+
+    def between(self, places: Array, a: float, b: float) -> Array:
+        """The places that lie strictly between a and b; on a closed curve they are repeated with the period."""
+        low, high = min(a, b), max(a, b)
+        if self.period and places.size:
+            laps = np.arange(np.floor((low - places[-1]) / self.period), np.ceil((high - places[0]) / self.period) + 1)
+            places = (places[None, :] + laps[:, None] * self.period).ravel()
+        return places[(places > low) & (places < high)]

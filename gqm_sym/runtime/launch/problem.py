@@ -1,0 +1,119 @@
+"""One launch of one module: compiled functions bound to their parameters, and the problem in extended precision."""
+
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+
+from gqm_sym.runtime.charts.exact_normals import ChartTrack
+from gqm_sym.runtime.interface import ExactClimb, ExactFormulas
+from gqm_sym.runtime.launch.domain import Domain
+from gqm_sym.runtime.launch.formulas import Formulas, ParameterValues
+from gqm_sym.runtime.launch.functions import BoundFunctions
+from gqm_sym.runtime.launch.request import Launch
+from gqm_sym.runtime.launch.rounded import RoundedProblem
+from gqm_sym.runtime.multiprecision.exact_problem import NOWHERE, ExactProblem
+from gqm_sym.runtime.multiprecision.exact_tracks import FormulaTrack
+
+
+def bind(formulas: Formulas, p: ParameterValues, launch: Launch) -> BoundFunctions:
+    """The compiled functions bound to parameter values, with one launch's problem in extended precision."""
+    if p.functions is None:
+        p.functions = _bind_all(formulas, p)
+    bound: BoundFunctions = p.functions
+    if formulas.exact is None:
+        return bound
+    addresses, values, _, breaks, corners, period = bound
+    return BoundFunctions(addresses, values, exact_problem(formulas, p, launch), breaks, corners, period)
+
+
+def _bind_all(formulas: Formulas, p: ParameterValues) -> BoundFunctions:
+    """The bound functions that all launches with these parameters share."""
+    addresses = formulas.addresses
+    if formulas.chart is None:
+        return BoundFunctions(addresses, p.values)
+    chart = formulas.charted(p)
+    block = np.concatenate([p.values, chart.block])
+    return BoundFunctions(addresses, block, None, chart.breaks, chart.corners, chart.period)
+
+
+@dataclass(slots=True)
+class Problem:
+    """One launch of one module, in doubles and in extended precision.
+
+    Attributes
+    ----------
+    formulas : Formulas
+        The module's record.
+    launch : Launch
+        Where and how the motion begins.
+    p : ParameterValues
+        The exact values of the run-time parameters.
+    functions : BoundFunctions
+        The compiled functions bound to these values.
+    domain : Domain
+        The range of the curve parameter.
+    """
+
+    formulas: Formulas
+    launch: Launch
+    p: ParameterValues
+    functions: BoundFunctions
+    domain: Domain
+
+    @property
+    def low(self) -> float:
+        """The lower end of the parameter's range."""
+        return self.domain.low
+
+    @property
+    def high(self) -> float:
+        """The upper end of the parameter's range."""
+        return self.domain.high
+
+    @property
+    def period(self) -> float:
+        """The period of the parameter on a closed curve, 0 otherwise."""
+        return self.domain.period
+
+    @property
+    def exact(self) -> ExactProblem:
+        """The problem in extended precision; only for curves that are known by formulas."""
+        exact = self.functions.exact
+        assert exact is not None
+        return exact
+
+    @property
+    def arc_origin(self) -> float:
+        """Arc length at launch in m: 0, or on a charted curve the distance from its start point."""
+        return self.lam0 if self.formulas.chart is not None else 0.0
+
+    @property
+    def decider(self) -> ExactProblem | RoundedProblem:
+        """What decides where doubles cannot: extended precision if there is any, else tests with rounding margins."""
+        exact = self.functions.exact
+        return RoundedProblem(self.functions, self.lam0, self.w0) if exact is None else exact
+
+    @property
+    def lam0(self) -> float:
+        """The launch place, rounded to a double."""
+        return self.launch.lam0.value
+
+    @property
+    def w0(self) -> float:
+        """V**2 at launch."""
+        return self.launch.v0.value**2
+
+
+def exact_problem(formulas: "Formulas", p: "ParameterValues", launch: "Launch") -> ExactProblem | None:
+    """The problem of one launch in extended precision; None if the curve is known in doubles only."""
+    exact, maker = formulas.exact, formulas.chart
+    if isinstance(exact, ExactFormulas) and formulas.domain_of is not None:
+        track = partial(FormulaTrack, exact, formulas.domain_of, launch.lam0)
+        return ExactProblem(track, NOWHERE, p, launch.lam0, launch.v0)
+    if isinstance(exact, ExactClimb) and maker is not None:
+        chart = formulas.charted(p)
+        if maker.is_exact(chart):
+            along = partial(ChartTrack, maker, chart, exact.climb, launch.point, launch.lam0)
+            return ExactProblem(along, chart.edges, p, launch.lam0, launch.v0)
+    return None

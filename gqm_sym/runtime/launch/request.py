@@ -1,0 +1,123 @@
+"""A launch as a user gives it, and the same launch checked and read as exact numbers."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from gqm_sym.errors import LaunchError
+from gqm_sym.literals.numbers import Number, read_number
+from gqm_sym.runtime.launch.formulas import Formulas, ParameterValues
+
+# The largest distance of a launch point from a charted curve, as a share of the point's larger coordinate or of the
+# length of the nearest piece (a curve as a whole may be very long).
+MAX_POINT_DISTANCE_SHARE = 1e-6
+
+CONTACTS = ("bilateral", "above", "below")
+
+
+class LaunchRequest(NamedTuple):
+    """A launch, or arrays of launches, as given to a module's ``solve`` and ``sweep``.
+
+    Attributes
+    ----------
+    lam0, v0, direction
+        The launch place as a value of the curve parameter, the speed in m/s, and the sign of ds/dt at launch.
+    point : pair of numbers, optional
+        The coordinates of the launch place in m, instead of ``lam0``.
+    t_max : number, optional
+        The time in s up to which the motion is computed (the horizon).
+    contact : str
+        One of `CONTACTS`: which side of the track can push.
+    """
+
+    lam0: Any
+    v0: Any = 0.0
+    direction: Any = 1
+    point: Any = None
+    t_max: Any = None
+    contact: str = "bilateral"
+
+
+class Launch(NamedTuple):
+    """Where and how a motion begins, in exact numbers.
+
+    Attributes
+    ----------
+    lam0, v0 : Number
+        The launch place, and the speed in m/s.
+    direction : int
+        The sign of ds/dt at launch.
+    contact : str
+        One of `CONTACTS`.
+    t_max : Number or None
+        The horizon in s.
+    point : pair of Number, optional
+        The coordinates of the launch place in m, if it was given by them.
+    """
+
+    lam0: Number
+    v0: Number
+    direction: int
+    contact: str
+    t_max: Number | None
+    point: tuple[Number, Number] | None = None
+
+
+def read_launch(formulas: Formulas, p: ParameterValues, request: LaunchRequest) -> Launch:
+    """Check a launch and read its numbers.
+
+    Raises
+    ------
+    LaunchError
+        If the model cannot be launched so; the message names the argument and says what would be right.
+    """
+    lam0, v0, direction, point, t_max, contact = request
+    if point is None and lam0 is not None:
+        place, at = read_number(lam0, where="lam0"), None
+    else:
+        place, at = _read_place(formulas, p, lam0, point)
+    if direction not in (1, -1):
+        raise LaunchError(f"direction: must be 1 or -1 (the sign of ds/dt at launch), got {direction!r}")
+    if contact not in CONTACTS:
+        raise LaunchError(f"contact: must be one of {', '.join(CONTACTS)}, got {contact!r}")
+    speed = read_number(v0, where="v0")
+    if speed.value < 0.0:
+        raise LaunchError(
+            f"v0: is a speed and cannot be negative, got {speed.text}; use direction=-1 to launch the other way"
+        )
+    horizon = None if t_max is None else read_number(t_max, where="t_max")
+    if horizon is not None and not horizon.value > 0.0:
+        raise LaunchError(f"t_max: must be positive, got {horizon.text}")
+    domain = formulas.domain(p).numbers
+    if not domain.low <= place.value <= domain.high:
+        ends = f"[{domain.low!r}, {domain.high!r}]"
+        raise LaunchError(f"lam0: must lie in the domain {ends} of {formulas.parameter}, got {place.text}")
+    return Launch(place, speed, int(direction), contact, horizon, at)
+
+
+def _read_place(
+    formulas: Formulas, p: ParameterValues, lam0: Any, point: Any
+) -> tuple[Number, tuple[Number, Number] | None]:
+    """The launch place as a value of the curve parameter, and its coordinates if these were given."""
+    if point is None:
+        raise LaunchError(f"lam0: not given; it is the value of {formulas.parameter} to launch from")
+    if formulas.chart is None:
+        raise LaunchError(
+            f"point: {formulas.name} has a parameter of its own; launch by lam0 (a value of {formulas.parameter})"
+        )
+    if lam0 is not None:
+        raise LaunchError("lam0, point: give one of them; both say where to launch from")
+    try:
+        at_x, at_z = (read_number(value, where="point") for value in point)
+    except (TypeError, ValueError):
+        raise LaunchError(f"point: must be a pair of numbers (x, z), got {point!r}") from None
+    chart, x, z = formulas.charted(p), at_x.value, at_z.value
+    s, distance = chart.nearest(x, z)
+    piece = np.diff(chart.edges)[max(int(np.searchsorted(chart.edges, s)) - 1, 0)]
+    if distance > MAX_POINT_DISTANCE_SHARE * min(chart.high - chart.low, max(abs(x), abs(z), piece)):
+        there = chart.points([s])[:2, 0]
+        raise LaunchError(
+            f"point: ({x!r}, {z!r}) is {distance:.3g} off the curve; the nearest point on it is "
+            f"({float(there[0])!r}, {float(there[1])!r}), at {formulas.parameter} = {s!r}"
+        )
+    return read_number(s, where="point"), (at_x, at_z)

@@ -1,0 +1,252 @@
+"""Pass 1: position, curvature, V**2 and contact force at given places of a conservative model.
+
+A load map has all of these at many places. It is filled block by block, so that intermediate results stay in cache.
+V**2 is its value at launch less the change of the effective potential. Where most of that cancels, as near a launch
+from rest, the first divided difference of the potential from the launch place keeps the digits that a subtraction of
+potentials loses.
+"""
+
+from itertools import pairwise
+from math import fabs, nan
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import types
+
+from gqm_sym.errors import InputError
+from gqm_sym.runtime.compiled.calls import (
+    call_effective_potential,
+    call_load_map,
+    call_path_and_contact_force,
+    call_potential_divdiff1,
+)
+from gqm_sym.runtime.compiled.jit import Inlined, Inner, entry
+from gqm_sym.runtime.compiled.streaming import put, settle
+from gqm_sym.runtime.compiled.types import ADDRESSES, INTEGER, MATRIX, REAL, VECTOR, Array
+from gqm_sym.runtime.interface import FRAME_ROWS, LOAD_ROWS
+
+# Places filled at a time: few enough that what is streamed drains into memory while the next are computed.
+BLOCK = 256
+
+# The rows of a load map.
+MAP_ROWS = 6
+
+# The largest size of the potential's terms for which V**2 by subtraction keeps its digits, in units of V**2 at launch
+# or of its change: the divided difference is then no more accurate.
+MAX_TERMS_RATIO = 2.0
+
+
+class Pass1(NamedTuple):
+    """What pass 1 finds at places of a curve (paper, section "Pass 1"; MATHS, section 2).
+
+    Each field is an array of the shape of the places, or of that of ``out``.
+
+    Attributes
+    ----------
+    x, z : array
+        Coordinates in m; z is up.
+    ds : array
+        Arc length per unit of the curve parameter, ds/dlam, in m.
+    kappa : array
+        Signed curvature in 1/m, positive where the track bends to the left of growing parameter.
+    v2 : array
+        Squared speed V**2 in m**2/s**2; negative where a conservative motion cannot come, NaN beyond the first turn of
+        a dissipative one.
+    normal_force : array
+        Contact force N in N along the normal, which is to the left of growing parameter.
+    """
+
+    x: Array
+    z: Array
+    ds: Array
+    kappa: Array
+    v2: Array
+    normal_force: Array
+
+
+class LaunchNumbers(NamedTuple):
+    """A launch in doubles, and what a load map keeps of it.
+
+    Attributes
+    ----------
+    lam0, w0 : float
+        The launch place, and V**2 there.
+    v2_correction : float
+        What V**2 gains because the launch place is given more exactly than by a double.
+    size : float
+        Size of the terms of the effective potential at launch; NaN where it is not known.
+    """
+
+    lam0: float
+    w0: float
+    v2_correction: float
+    size: float
+
+
+def load_map_arrays(shape: tuple[int, ...], lam: Array, out: Any) -> Pass1:
+    """The arrays of a load map: those of ``out``, or new ones if it is None.
+
+    Parameters
+    ----------
+    shape : tuple of int
+        The shape of the places.
+    lam : array
+        The places, with which no array of ``out`` may share memory.
+    out : tuple or list of six arrays, or None
+        Arrays of doubles to be filled, in the order of `Pass1`.
+
+    Raises
+    ------
+    InputError
+        If ``out`` is not six writable, contiguous arrays of doubles of that shape, each with memory of its own.
+    """
+    if out is None:
+        return Pass1(*(np.empty(shape) for _ in Pass1._fields))
+    names = Pass1._fields
+    if not isinstance(out, tuple | list) or len(out) != len(names):
+        what = f"{len(out)} of them" if isinstance(out, tuple | list) else type(out).__name__
+        raise InputError(f"out: must be {len(names)} arrays ({', '.join(names)}), as pass1 returns them; got {what}")
+    for name, array in zip(names, out, strict=True):
+        _check(f"out: {name}", array, shape)
+    spans = sorted(
+        (array.__array_interface__["data"][0], array.nbytes, name) for name, array in zip(names, out, strict=True)
+    )
+    for (start, size, one), (other_start, _, other) in pairwise(spans):
+        if start + size > other_start:
+            raise InputError(f"out: {one} and {other} share memory; give each array its own")
+    for name, array in zip(names, out, strict=True):
+        if np.may_share_memory(array, lam):
+            raise InputError(f"out: {name} shares memory with the places; give it its own")
+    return Pass1(*out)
+
+
+def _check(where: str, array: Any, shape: tuple[int, ...]) -> None:
+    """Refuse an array that compiled code cannot fill."""
+    if not isinstance(array, np.ndarray):
+        raise InputError(f"{where} is {type(array).__name__}; give an array of float64")
+    if array.dtype != np.float64:
+        raise InputError(f"{where} is an array of {array.dtype}; give one of float64")
+    if array.shape != shape:
+        raise InputError(f"{where} has the shape {array.shape}; the places have {shape}")
+    if not array.flags.c_contiguous:
+        raise InputError(f"{where} is not contiguous; give an array whose rows follow each other (np.empty makes one)")
+    if not array.flags.writeable:
+        raise InputError(f"{where} is read-only; give an array that may be written to")
+
+
+@Inlined
+def keeps_digits(w0, v2, sizes):  # type: ignore[no-untyped-def]
+    """Whether V**2 has kept its digits though terms of some size were subtracted; false if one is not a number."""
+    return sizes <= MAX_TERMS_RATIO * max(fabs(w0 - v2), w0)
+
+
+@Inner
+def fill_by_difference(fns, p, launch, places, low_parts, field):  # type: ignore[no-untyped-def]
+    """Fill V**2 and the contact force by the divided difference of the potential wherever that has more digits.
+
+    ``field`` holds the rows of a block of a load map. If the size of the potential's terms at launch is not known,
+    there is nothing in it yet, and all of its rows are filled.
+    """
+    n, lam0, w0, size = places.size, launch.lam0, launch.w0, launch.size
+    is_filled = size >= 0.0
+    divdiff, offsets = np.empty(2 * n), places - lam0
+    better, frame = np.empty(n), np.empty(FRAME_ROWS * n)
+    v2, force, sizes = field[4 * n : 5 * n], field[5 * n : 6 * n], field[6 * n : 7 * n]
+    if low_parts.size:
+        offsets += low_parts
+    call_potential_divdiff1(fns.potential_divdiff1, n, lam0, places, offsets, p, divdiff)
+    for i in range(n):
+        by_difference = w0 - (offsets[i] * divdiff[i] - launch.v2_correction)
+        better[i] = v2[i] if is_filled and keeps_digits(w0, v2[i], size + sizes[i]) else by_difference
+    call_path_and_contact_force(fns.path_and_contact_force, n, places, better, p, frame)
+    if not is_filled:
+        field[: 4 * n] = frame[: 4 * n]
+    for i in range(n):
+        force[i] = force[i] if is_filled and keeps_digits(w0, v2[i], size + sizes[i]) else frame[4 * n + i]
+    v2[:] = better
+
+
+@entry(
+    types.void(
+        *(ADDRESSES, INTEGER, VECTOR, types.UniTuple(REAL, 3), types.UniTuple(VECTOR, 2)),
+        *(types.UniTuple(VECTOR, MAP_ROWS), types.UniTuple(INTEGER, 2), types.boolean),
+    ),
+    nogil=True,
+)
+def fill_load_map(fns, load_map, p, launch, places, rows, part, past_cache):  # type: ignore[no-untyped-def]
+    """Fill a part of the rows x, z, ds, kappa, V**2 and contact force of a load map.
+
+    Python hands over plain tuples, whose types numba finds faster than those of named ones.
+
+    Parameters
+    ----------
+    load_map : int
+        The address of the module's function for load maps; 0 if there is none.
+    launch : (lam0, lam0_low, w0)
+        The launch place as two doubles, and V**2 there.
+    places : (lam, low_parts)
+        The places as two doubles each; ``low_parts`` is empty if all of them are zero.
+    rows : tuple of six arrays
+        The rows to be filled.
+    part : (begin, end)
+        Which places.
+    past_cache : bool
+        Whether the rows are written past the caches (`streaming.put`).
+    """
+    (lam0, lam0_low, w0), (lam, low_parts), (begin, end) = launch, places, part
+    slopes, field = np.empty((2, 1)), np.empty(LOAD_ROWS * BLOCK)
+    start = np.array([lam0])
+    call_effective_potential(fns.effective_potential, 1, start, p, slopes)
+    correction = lam0_low * slopes[1, 0]
+    level, size = 0.0, nan
+    if load_map and not low_parts.size:
+        call_load_map(load_map, 1, 0.0, 0.0, start, p, field)
+        level, size = correction - field[4], field[6]
+    numbers = LaunchNumbers(lam0, w0, correction, size)
+    by_subtraction = size >= 0.0
+    x, z, ds, kappa, v2, force = rows
+    for first in range(begin, end, BLOCK):
+        n = min(BLOCK, end - first)
+        inaccurate = n
+        if by_subtraction:
+            call_load_map(load_map, n, w0, level, lam[first : first + n], p, field)
+            inaccurate = 0
+            for i in range(n):
+                inaccurate += 0 if keeps_digits(w0, field[4 * n + i], size + field[6 * n + i]) else 1
+        if inaccurate:
+            fill_by_difference(fns, p, numbers, lam[first : first + n], low_parts[first : first + n], field)
+        put(x, first, field, 0, n, past_cache)
+        put(z, first, field, n, n, past_cache)
+        put(ds, first, field, 2 * n, n, past_cache)
+        put(kappa, first, field, 3 * n, n, past_cache)
+        put(v2, first, field, 4 * n, n, past_cache)
+        put(force, first, field, 5 * n, n, past_cache)
+    settle(x)
+
+
+@entry(MATRIX(ADDRESSES, VECTOR, VECTOR, VECTOR))
+def path_and_force_at(fns, p, lam, v2):  # type: ignore[no-untyped-def]
+    """Rows x, z, ds, kappa and contact force at places ``lam``, given V**2 there."""
+    out = np.empty((5, lam.size))
+    call_path_and_contact_force(fns.path_and_contact_force, lam.size, lam, v2, p, out)
+    return out
+
+
+@entry(MATRIX(ADDRESSES, VECTOR, VECTOR))
+def potential_at(fns, p, lam):  # type: ignore[no-untyped-def]
+    """Rows of the effective potential, as the compiled functions have it, and of its slope at places ``lam``."""
+    out = np.empty((2, lam.size))
+    call_effective_potential(fns.effective_potential, lam.size, lam, p, out)
+    return out
+
+
+@entry(VECTOR(ADDRESSES, VECTOR, REAL, REAL, REAL, VECTOR, VECTOR))
+def speed_squared_at(fns, p, lam0, lam0_low, w0, places, offsets):  # type: ignore[no-untyped-def]
+    """V**2 at places and their offsets from lam0, launched from lam0 + lam0_low, without subtracting potentials."""
+    rows, launch = np.empty((2, offsets.size)), np.empty((2, 1))
+    call_potential_divdiff1(fns.potential_divdiff1, offsets.size, lam0, places, offsets, p, rows)
+    call_effective_potential(fns.effective_potential, 1, np.array([lam0]), p, launch)
+    out = np.empty(offsets.size)
+    for i in range(offsets.size):
+        out[i] = w0 - (offsets[i] * rows[0, i] - lam0_low * launch[1, 0])
+    return out

@@ -1,0 +1,1 @@
+"""Motions with losses, leg by leg."""

@@ -1,0 +1,151 @@
+"""Stretches of a dissipative motion, from the panels of its legs."""
+
+from math import inf
+from typing import NamedTuple
+
+import numpy as np
+from numba import types
+
+from gqm_sym.runtime.arithmetic.doubledouble import ULP, Pair
+from gqm_sym.runtime.arithmetic.matrices import multiply
+from gqm_sym.runtime.compiled.jit import entry
+from gqm_sym.runtime.compiled.types import MATRIX, VECTOR, Array
+from gqm_sym.runtime.launch.functions import BoundFunctions
+from gqm_sym.runtime.legs.approach import COLUMNS as FIELD
+from gqm_sym.runtime.legs.leg_record import COLUMNS, ERROR, HEAD, MET, RIGHT, SLACK, TIME
+from gqm_sym.runtime.legs.polynomials import COUNT, TO_COEFFICIENTS, WIDE
+from gqm_sym.runtime.motion.segment import Segment
+from gqm_sym.runtime.quadrature.substitution import FROM_TURN, REGULAR, TO_EQUILIBRIUM
+from gqm_sym.runtime.quadrature.time_panels import CONVERGED
+
+# An equilibrium is approached until the distance left is exp(-this) of the leg: all that doubles have.
+CLOSEST = 690.0
+
+
+def _to_legendre() -> tuple[Array, Array]:
+    """Legendre coefficients of a function on [-1, 1], and of its integral from -1, from values at a panel's nodes."""
+    # x P_j = ((j + 1) P_(j+1) + j P_(j-1))/(2 j + 1), and T_(k+1) = 2 x T_k - T_(k-1).
+    j = np.arange(WIDE + 1)
+    series = np.zeros((COUNT, WIDE + 1))
+    series[0, 0] = series[1, 1] = 1.0
+    for k in range(2, COUNT):
+        row = series[k - 1]
+        series[k, 1:] += 2.0 * (j[1:] / (2 * j[1:] - 1)) * row[:-1]
+        series[k, :-1] += 2.0 * (j[1:] / (2 * j[1:] + 1)) * row[1:]
+        series[k] -= series[k - 2]
+    plain = TO_COEFFICIENTS.T @ series
+    integral = np.zeros((COUNT, WIDE))
+    integral[:, 0] = plain[:, 0] - plain[:, 1] / 3.0
+    i = np.arange(1, WIDE)
+    integral[:, 1:] = plain[:, i - 1] / (2 * i - 1) - plain[:, i + 1] / (2 * i + 3)
+    return np.ascontiguousarray(plain[:, :WIDE]), integral
+
+
+PLAIN_BY_NODE, INTEGRAL_BY_NODE = _to_legendre()
+to_plain, to_integral = multiply(PLAIN_BY_NODE), multiply(INTEGRAL_BY_NODE)
+
+
+@entry(types.Tuple((VECTOR, VECTOR, VECTOR, MATRIX, MATRIX, MATRIX, types.float64))(MATRIX, types.float64))
+def read_panels(panels, time):  # type: ignore[no-untyped-def]
+    """What `panels.lay` would have of a leg's panels, whose times add up to ``time``.
+
+    Returns
+    -------
+    edges, clock, lengths, time_terms, length_terms : arrays
+        As `panels.lay` has them; the last anomaly is 1.
+    speed_terms : (n, WIDE) array
+        Legendre coefficients of Y.
+    error : float
+        Estimated relative error of the time.
+    """
+    n = panels.shape[0]
+    edges, clock, lengths = np.zeros(n + 1), np.zeros(n + 1), np.zeros(n + 1)
+    time_terms, length_terms, speed_terms = np.empty((n, WIDE)), np.empty((n, WIDE)), np.empty((n, WIDE))
+    out, error, last = np.empty(3 * WIDE), 0.0, panels[n - 1, RIGHT]
+    for k in range(n):
+        half = 0.5 * (panels[k, RIGHT] - (panels[k - 1, RIGHT] if k > 0 else 0.0))
+        at = k * COLUMNS
+        to_integral(panels, at, out, 0)
+        to_integral(panels, at + WIDE, out, WIDE)
+        to_plain(panels, at + 2 * WIDE, out, 2 * WIDE)
+        length = 0.0
+        for j in range(WIDE):
+            time_terms[k, j], length_terms[k, j] = half * out[j], half * out[WIDE + j]
+            speed_terms[k, j] = out[2 * WIDE + j]
+            length += length_terms[k, j]
+        edges[k + 1] = panels[k, RIGHT] / last
+        clock[k + 1], lengths[k + 1] = clock[k] + panels[k, TIME], lengths[k] + length
+        error += panels[k, ERROR]
+    clock[n] = time
+    return edges, clock, lengths, time_terms, length_terms, speed_terms, error / time + ULP if time > 0.0 else ULP
+
+
+class Run(NamedTuple):
+    """One run of the body as compiled code tells of it (`legs.follow`), not yet made into pieces."""
+
+    start: Pair
+    ahead: int
+    back: int
+    record: Array
+    what: int
+    end: str
+    laps: int
+
+    def pair(self, at: int) -> Pair:
+        """Two doubles of the record: a place, or the times from the start and from the turn."""
+        high, low = self.record[at : at + 2].tolist()
+        return high, low
+
+    @property
+    def slack(self) -> float:
+        """C/2 of the march variable; infinite where that is the distance."""
+        return float(self.record[SLACK])
+
+    @property
+    def changes(self) -> list[float]:
+        """Places at which N changes sign."""
+        places: list[float] = self.record[self.record.size - int(self.record[MET]) :].tolist()
+        return places
+
+    @property
+    def panels_ahead(self) -> Array:
+        """Panels from the start."""
+        return self._rows(HEAD, self.ahead, COLUMNS)
+
+    @property
+    def panels_back(self) -> Array:
+        """Panels from the turn."""
+        return self._rows(HEAD + self.ahead * COLUMNS, self.back, COLUMNS)
+
+    @property
+    def field(self) -> Array:
+        """V**2 next to an equilibrium (`fields`)."""
+        return self._rows(HEAD + self.ahead * COLUMNS, self.back, FIELD)
+
+    def _rows(self, begin: int, count: int, columns: int) -> Array:
+        return self.record[begin : begin + count * columns].reshape(count, columns)
+
+
+def along_panels(f: BoundFunctions, a: Pair, b: Pair, slack: float, time: float, panels: Array) -> Segment:
+    """A stretch by its panels (`leg_panels`), whose times add up to ``time``; its ends as two doubles each.
+
+    ``slack`` is c/2 of their march variable, infinite where that is the distance.
+    """
+    *laid, speed_terms, error = read_panels(panels, time)
+    last = float(panels[-1, RIGHT])
+    return Segment(
+        functions=f,
+        kind=REGULAR if slack == inf else FROM_TURN,
+        a=a[0],
+        b=b[0],
+        low_parts=(a[1], b[1]),
+        turn_offset=0.0 if slack == inf else slack / last,
+        stored_panels=(*laid, error, 1.0, CONVERGED),
+        speed_series=(last, speed_terms),
+    )
+
+
+def along_field(f: BoundFunctions, a: float, b: float, field: Array) -> Segment:
+    """A stretch towards an equilibrium b where V**2 is a field; its panels begin where the field's do."""
+    hints = tuple(float(place) for place in b + np.sign(a - b) * field[:-1, 1])
+    return Segment(functions=f, kind=TO_EQUILIBRIUM, a=a, b=b, v2=field, stop=CLOSEST, panel_breaks=hints)

@@ -1,0 +1,1 @@
+"""The answers: segments, trajectory, events, and the kinds of motion."""

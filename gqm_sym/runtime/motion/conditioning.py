@@ -1,0 +1,34 @@
+"""How much the rounding of a launch changes V**2 on a segment on which it is measured from one place."""
+
+import numpy as np
+
+from gqm_sym.literals.numbers import Number
+from gqm_sym.runtime.compiled.types import Array
+from gqm_sym.runtime.launch.speed import potential_at, speed_squared_at
+
+# Shares of a segment at which V**2 is examined: halved again and again, since the part with small V**2 may be short.
+SHARES = 0.5 ** np.arange(48)
+
+
+def v2_correction(addresses: tuple[int, ...], p: Array, lam0: Number) -> float:
+    """How much larger V**2 is at the double nearest to the launch place than at the launch place itself."""
+    return lam0.low * float(potential_at(addresses, p, np.array([lam0.value]))[1, 0]) if lam0.low else 0.0
+
+
+def launch_condition_number(
+    addresses: tuple[int, ...], p: Array, a: float, b: float, ref: float, ref_v2: float
+) -> float:
+    """The largest relative change of V**2 from a to b per relative change of ``ref``, where V**2 is ``ref_v2``.
+
+    V**2 = ref_v2 - (lam - ref)*D(ref, lam), where D is the divided difference of the effective potential. A shift of
+    both places changes this by the difference of the slopes at them, which beside a maximum of the potential is large
+    in comparison with V**2.
+    """
+    offsets = (a - ref) + (b - a) * SHARES
+    places = np.append(ref + offsets, ref)
+    slopes = potential_at(addresses, p, places)[1]
+    with np.errstate(all="ignore"):
+        ratio = np.abs(
+            (slopes[:-1] - slopes[-1]) * ref / speed_squared_at(addresses, p, ref, 0.0, ref_v2, places[:-1], offsets)
+        )
+    return float(np.max(ratio, initial=1.0, where=np.isfinite(ratio)))

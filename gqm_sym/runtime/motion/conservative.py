@@ -1,0 +1,264 @@
+"""The motion of a conservative model that a launch begins: its ends, its kind, and the segments that it consists of."""
+
+from math import inf, isfinite
+
+import numpy as np
+
+from gqm_sym.errors import LaunchError
+from gqm_sym.runtime.launch import zeros
+from gqm_sym.runtime.launch.ends import (
+    EndOfMotion,
+    distance_to_end,
+    end_of_motion,
+    first_zero_from,
+    is_cusp,
+    leaving_at_once,
+    starting_step,
+)
+from gqm_sym.runtime.launch.formulas import Formulas, ParameterValues
+from gqm_sym.runtime.launch.functions import BoundFunctions
+from gqm_sym.runtime.launch.kinds import MotionKind
+from gqm_sym.runtime.launch.problem import Problem, bind
+from gqm_sym.runtime.launch.request import Launch
+from gqm_sym.runtime.launch.speed import path_and_force_at, speed_squared_at
+from gqm_sym.runtime.launch.survey import survey
+from gqm_sym.runtime.motion.aperiodic import AperiodicMotion, MotionAtRest, OpenEnd
+from gqm_sym.runtime.motion.motion import Motion
+from gqm_sym.runtime.motion.periodic import PeriodicMotion
+from gqm_sym.runtime.motion.segment import Segment, between_turns, from_turn, through
+from gqm_sym.runtime.multiprecision.exact_panels import DIGITS, lay_exactly
+from gqm_sym.runtime.quadrature.substitution import REGULAR
+from gqm_sym.runtime.quadrature.time_panels import MIN_CANCELLATION_RATIO
+
+# Distance from a cusp or a corner, as a share of the first step, at which V**2 is evaluated and a search begins.
+NEAR_CUSP = 1e-6
+
+
+def solve(formulas: Formulas, p: ParameterValues, launch: Launch) -> Motion:
+    """The motion that a launch begins, as long as contact lasts.
+
+    Parameters
+    ----------
+    formulas : Formulas
+        The record of a conservative module.
+    p : ParameterValues
+        The exact values of its run-time parameters.
+    launch : Launch
+        Where and how the motion begins.
+
+    Returns
+    -------
+    Motion
+        The motion, which computes what it is asked for.
+
+    Raises
+    ------
+    LaunchError
+        If the curve has no point at the launch place, or the motion would leave the domain at once.
+    SolutionError
+        If the kind of the motion cannot be decided.
+    """
+    motion = _as_bilateral(formulas, p, launch)
+    if launch.contact == "bilateral" or not isinstance(motion, PeriodicMotion):
+        return motion  # an aperiodic motion finds by itself where contact is lost
+    until_liftoff = AperiodicMotion(motion.problem, "transit", motion.direction)
+    for timed in motion.one_period:
+        until_liftoff.append(timed)
+    return until_liftoff.finish() if until_liftoff.lifted_off else motion
+
+
+def _as_bilateral(formulas: Formulas, p: ParameterValues, launch: Launch) -> Motion:
+    """The motion if contact is never lost; of an aperiodic one the part for which contact lasts."""
+    domain = formulas.domain(p)
+    f = bind(formulas, p, launch)
+    problem = Problem(formulas, launch, p, f, domain)
+    lam0, v0 = launch.lam0.value, launch.v0.value
+    if v0 == 0.0 and _is_in_corner(problem):
+        return MotionAtRest(problem)
+    direction, ahead, behind, time = survey(f.addresses, f.p, lam0, v0, launch.direction, domain.numbers)
+    is_stuck = ahead[0] in (zeros.CUSP, zeros.NOT_FINITE) and ahead[1] == 0.0
+    if direction == 0 or is_stuck or time != time:
+        _check_place(problem)
+    if (direction == 0 or is_stuck) and is_cusp(problem, lam0):
+        return _from_cusp(problem)
+    if direction == 0:
+        sign = problem.decider.slope_sign()
+        if sign == 0:
+            return MotionAtRest(problem)
+        direction = -sign
+        length = problem.period or distance_to_end(problem, direction)
+        ahead = first_zero_from(f.addresses, f.p, lam0, 0.0, direction, 0.0, length, starting_step(problem))
+    known_duration = time if time == time and f.breaks.size == 0 else None
+    if known_duration is not None and ahead[0] == zeros.TURN:  # doubles have found all of a libration
+        near, far = min(ahead[1], behind[1]), max(ahead[1], behind[1])
+        segment = between_turns(f, lam0 + near, lam0 + far, known_duration)
+        return PeriodicMotion(problem, "libration", direction, segment, (abs(near), abs(far)))
+    front = end_of_motion(problem, direction, ahead)
+    if front.what == "closed":
+        end = lam0 + direction * problem.period
+        segment = through(f, lam0, end, lam0, problem.w0, known_duration=known_duration)
+        return PeriodicMotion(problem, "circulation", direction, segment)
+    if front.what != "turn":
+        return _without_turn(problem, direction, front)
+    back = _opposite_end(problem, direction, front)
+    if back.what != "turn":
+        return _with_one_turn(problem, direction, front, back)
+    low, high = sorted((front, back), key=lambda end: end.place)
+    segment = between_turns(f, low.place, high.place, ends=(low.multiprecision, high.multiprecision))
+    return PeriodicMotion(problem, "libration", direction, segment, (abs(low.offset), abs(high.offset)))
+
+
+def _opposite_end(problem: Problem, direction: int, front: EndOfMotion) -> EndOfMotion:
+    """What ends the motion behind the launch place, if there is a turning point ahead."""
+    if problem.w0 == 0.0:
+        return EndOfMotion("turn", problem.lam0)
+    f, period = problem.functions, problem.period
+    length = period - abs(front.place - problem.lam0) if period else distance_to_end(problem, -direction)
+    step = starting_step(problem)
+    found = first_zero_from(f.addresses, f.p, problem.lam0, problem.w0, -direction, 0.0, length, step)
+    return end_of_motion(problem, -direction, found)
+
+
+def _is_in_corner(problem: Problem) -> bool:
+    """Whether the launch place is a corner from which the effective potential grows in both directions."""
+    f, lam0 = problem.functions, problem.lam0
+    if not f.between(f.corners, *np.nextafter(lam0, (-inf, inf)).tolist()).size:
+        return False
+    offsets = NEAR_CUSP * starting_step(problem) * np.array([-1.0, 1.0])
+    v2 = speed_squared_at(f.addresses, f.p, lam0, problem.launch.lam0.low, 0.0, lam0 + offsets, offsets)
+    return bool(np.all(v2 < 0.0))
+
+
+def _check_place(problem: Problem) -> None:
+    """Refuse a launch where the curve has no point, because a coordinate is the root of a negative number."""
+    f, lam0 = problem.functions, problem.lam0
+    x, z = (float(row[0]) for row in path_and_force_at(f.addresses, f.p, np.array([lam0]), np.zeros(1))[:2])
+    if not (isfinite(x) and isfinite(z)):
+        raise LaunchError(
+            f"lam0: the curve has no point at {problem.formulas.parameter} = {lam0!r} with these parameters: "
+            f"x = {x!r}, z = {z!r}"
+        )
+
+
+def _from_cusp(problem: Problem) -> Motion:
+    """A motion that begins at a cusp: it goes into the domain, and downhill if the body is released there."""
+    f, lam0, w0 = problem.functions, problem.lam0, problem.w0
+    begin, directions = _directions_from_cusp(problem)
+    if not directions:
+        return MotionAtRest(problem)
+    direction = directions[0] if w0 == 0.0 else problem.launch.direction
+    if direction not in directions:
+        raise leaving_at_once(problem, direction, "cusp")
+    length = problem.period or distance_to_end(problem, direction)
+    front = end_of_motion(
+        problem, direction, first_zero_from(f.addresses, f.p, lam0, w0, direction, begin, length, begin)
+    )
+    motion = AperiodicMotion(problem, "transit", direction)
+    if w0 > 0.0 and front.what in ("cusp", "domain-end", "singular-point"):
+        # A slow body gains and loses its speed over distances that equal steps would miss, so panels grow from both
+        # ends.
+        steps = np.geomspace(1e-12, 0.25, 25) * (front.place - lam0)
+        panel_breaks = (*(lam0 + steps), *(front.place - steps))
+        motion.add(through(f, lam0, front.place, lam0, w0, panel_breaks=panel_breaks), 1, front.what)
+        return motion.finish()
+    if front.what != "turn":
+        return _without_turn(problem, direction, front)
+    if w0 == 0.0:
+        segment, sense = between_turns(f, lam0, front.place), 1
+    else:
+        segment, sense = from_turn(f, front.place, lam0), -1
+    motion.add(segment, sense, "turn")
+    motion.add(segment, -sense, "cusp")
+    return motion.finish()
+
+
+def _directions_from_cusp(problem: Problem) -> tuple[float, list[int]]:
+    """A distance from the cusp, and the directions in which V**2 > 0 there; that of the launch comes first."""
+    f, lam0, w0, first = problem.functions, problem.lam0, problem.w0, problem.launch.direction
+    distance = NEAR_CUSP * starting_step(problem)
+    while True:
+        offsets = np.array([distance, -distance]) * first
+        v2 = speed_squared_at(f.addresses, f.p, lam0, problem.launch.lam0.low, w0, lam0 + offsets, offsets)
+        directions = [
+            direction
+            for direction, value in zip((first, -first), v2, strict=True)
+            if value > 0.0 and distance_to_end(problem, direction) > distance
+        ]
+        if directions or w0 == 0.0:
+            return distance, directions
+        distance *= 1e-3  # the slower the launch is, the sooner the body turns
+
+
+def _without_turn(problem: Problem, direction: int, front: EndOfMotion) -> Motion:
+    """A motion that has no turning point ahead."""
+    f, lam0 = problem.functions, problem.lam0
+    if abs(front.place - lam0) <= 1e-15 * max(abs(lam0), 1.0):
+        raise leaving_at_once(problem, direction, front.what)
+    kind: MotionKind = "asymptotic" if front.what == "equilibrium" else "transit"
+    motion = AperiodicMotion(problem, kind, direction)
+    if problem.w0 > 0.0:
+        if front.what == "equilibrium":
+            motion.approach(_to_half_way(motion, front.place), front.place)
+        elif front.what == "open":
+            motion.open_end = OpenEnd(lam0, direction, front.place)
+        else:
+            ref, ref_v2 = (front.place, 0.0) if front.zero_v2 else (lam0, problem.w0)
+            motion.add(through(f, lam0, front.place, ref, ref_v2), 1, front.what)
+        return motion.finish()
+    if front.what == "equilibrium":
+        middle = 0.5 * (lam0 + front.place)
+        motion.add(from_turn(f, lam0, middle), 1, "")
+        motion.approach(middle, front.place)
+    elif front.what == "open":
+        middle = lam0 + direction * min(1.0, 0.5 * abs(front.place - lam0))
+        motion.add(from_turn(f, lam0, middle), 1, "")
+        motion.open_end = OpenEnd(middle, direction, front.place)
+    else:
+        motion.add(_from_turn_to(f, lam0, front), 1, front.what)
+    return motion.finish()
+
+
+def _from_turn_to(f: BoundFunctions, turn: float, end: EndOfMotion) -> Segment:
+    """The segment from a turning point to an end; if V**2 vanishes there too, it is one between two turning points."""
+    return between_turns(f, turn, end.place) if end.zero_v2 else from_turn(f, turn, end.place)
+
+
+def _to_half_way(motion: AperiodicMotion, equilibrium: float) -> float:
+    """Add the first half of the way to an equilibrium if the launch is slow; returns where the rest begins.
+
+    Measured from the equilibrium, V**2 at a slow launch is the small difference of large numbers.
+    """
+    problem, f, lam0, w0 = motion.problem, motion.problem.functions, motion.problem.lam0, motion.problem.w0
+    middle = 0.5 * (lam0 + equilibrium)
+    places = np.array([middle])
+    middle_v2 = speed_squared_at(f.addresses, f.p, lam0, problem.launch.lam0.low, w0, places, places - lam0)[0]
+    if w0 >= middle_v2:
+        return lam0
+    if w0 >= MIN_CANCELLATION_RATIO * middle_v2 or f.exact is None:
+        motion.add(through(f, lam0, middle, lam0, w0), 1, "")
+        return middle
+    # A launch as slow as this is next to another equilibrium, and its place is needed as exactly as it was given.
+    scale = f.exact.at(DIGITS)
+    panels = lay_exactly(f.exact, REGULAR, (scale.lam0, scale.mpf(middle)), 1.0)
+    slow = Segment(functions=f, kind=REGULAR, a=lam0, b=middle, ref=lam0, ref_v2=w0, stored_panels=panels)
+    motion.add(slow, 1, "")
+    return middle
+
+
+def _with_one_turn(problem: Problem, direction: int, front: EndOfMotion, back: EndOfMotion) -> Motion:
+    """A motion that has a turning point ahead and none behind the launch place."""
+    f, lam0 = problem.functions, problem.lam0
+    kind: MotionKind = "asymptotic" if back.what == "equilibrium" else "transit"
+    motion = AperiodicMotion(problem, kind, direction)
+    inbound = from_turn(f, front.place, lam0)
+    motion.add(inbound, -1, "turn")
+    if back.what == "open":
+        motion.add(inbound, 1, "")
+        motion.open_end = OpenEnd(lam0, -direction, back.place)
+    elif back.what == "equilibrium":
+        middle = 0.5 * (front.place + back.place)
+        motion.add(from_turn(f, front.place, middle), 1, "")
+        motion.approach(middle, back.place)
+    else:
+        motion.add(_from_turn_to(f, front.place, back), 1, back.what)
+    return motion.finish()

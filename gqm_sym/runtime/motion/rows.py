@@ -1,0 +1,32 @@
+"""Legs and events as tuples that display as tables."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import astuple, fields
+from html import escape
+from typing import Any, TypeVar
+
+T = TypeVar("T")
+HEADINGS = {"t": "t (s)", "x": "x (m)", "z": "z (m)", "t_start": "t from (s)", "t_end": "t to (s)"}
+
+
+class Rows(tuple[T, ...]):
+    """A tuple of records of one class, which notebooks display as a table."""
+
+    __slots__ = ()
+
+    def _repr_html_(self) -> str:
+        if not self:
+            return "<p>none</p>"
+        titles = [field.name for field in fields(self[0])]  # type: ignore[arg-type]
+        return table([HEADINGS.get(name, name) for name in titles], (astuple(row) for row in self))  # type: ignore[call-overload]
+
+
+def table(titles: Sequence[str], rows: Iterable[Iterable[Any]]) -> str:
+    """An HTML table; each number is the shortest text that is read back as the same double."""
+    head = "".join(f"<th>{escape(title)}</th>" for title in titles)
+    body = "".join(f"<tr>{''.join(f'<td>{_text(cell)}</td>' for cell in row)}</tr>" for row in rows)
+    return f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
+
+
+def _text(cell: Any) -> str:
+    return repr(float(cell) + 0.0) if isinstance(cell, float) else escape(str(cell))

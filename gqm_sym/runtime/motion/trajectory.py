@@ -1,0 +1,198 @@
+"""Where a motion is at a time: segments in the order of time, repeated if the motion is periodic."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gqm_sym.runtime.arithmetic.doubledouble import ZERO, Pair, minus, plus, reduce_many, two_sum
+from gqm_sym.runtime.compiled.types import Array
+from gqm_sym.runtime.motion.segment import Segment
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TimedSegment:
+    """A segment, or a part of one, that the body moves through once, with its times.
+
+    Attributes
+    ----------
+    segment : Segment
+        The segment.
+    sense : int
+        +1 if the body moves away from the segment's end ``a``, -1 if towards it.
+    r_start, r_stop : pair of float
+        Time in s from the segment's end ``a`` at the start and at the stop, each as two doubles.
+    phi_start, phi_stop : float
+        The phase angles there.
+    t_start : pair of float
+        Time in s from launch at the start, as two doubles.
+    s_a : float
+        Arc length in m from the launch to the segment's end ``a``.
+    end : str
+        What ends it, one of `launch.kinds.LEG_ENDS`; empty where the next segment continues it.
+    laps : int
+        The number of laps of a closed curve before it; places on the segment are within one lap.
+    """
+
+    segment: Segment
+    sense: int
+    r_start: Pair
+    r_stop: Pair
+    phi_start: float
+    phi_stop: float
+    t_start: Pair
+    s_a: float
+    end: str
+    laps: int = 0
+
+    @property
+    def t_stop(self) -> Pair:
+        """Time in s from launch at the stop, as two doubles."""
+        spent = minus(self.r_stop, self.r_start)
+        return plus(self.t_start, (self.sense * spent[0], self.sense * spent[1]))
+
+    @property
+    def direction(self) -> int:
+        """The sign of ds/dt."""
+        return self.sense * self.segment.direction
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Trajectory:
+    """The timed segments of a motion.
+
+    Attributes
+    ----------
+    segments : tuple of TimedSegment
+        The segments in the order of time.
+    period : pair of float or None
+        The time in s after which they repeat, as two doubles; None if they do not.
+    lap, lap_length : float
+        The growth of the curve parameter and of the arc length (in m) in one period of a circulation, 0 otherwise.
+    time_scale_error : float
+        The relative error of the times of the segments' own quadrature, where the exact time is known.
+    """
+
+    segments: tuple[TimedSegment, ...]
+    period: Pair | None = None
+    lap: float = 0.0
+    lap_length: float = 0.0
+    time_scale_error: float = 0.0
+
+    def reduce(self, t: Array, t_low: Array) -> tuple[Array, Array, Array]:
+        """The number of whole periods in each time, and the remaining time as two doubles."""
+        if self.period is None:
+            return np.zeros_like(t), t, t_low
+        count, reduced, reduced_low = reduce_many(t, t_low, *self.period)
+        return count, reduced, reduced_low
+
+    def segment_indices(self, reduced: Array) -> np.ndarray:
+        """The index of the segment that each reduced time falls on."""
+        starts = np.array([timed.t_start[0] for timed in self.segments])
+        return np.clip(np.searchsorted(starts, reduced, side="right") - 1, 0, len(self.segments) - 1)
+
+    def phase_angles(self, timed: TimedSegment, reduced: Array, reduced_low: Array) -> Array:
+        """The phase angles on a timed segment at reduced times."""
+        s, e = two_sum.py_func(reduced, -timed.t_start[0])
+        e = e + (reduced_low - timed.t_start[1])
+        r, low = two_sum.py_func(timed.r_start[0], timed.sense * s)
+        low = low + (timed.r_start[1] + timed.sense * e)
+        # The table has the times of the segment's own quadrature, whose total may be wrong in the last place.
+        low = low + r * self.time_scale_error
+        return timed.segment.phase_angle(np.ascontiguousarray(r), np.ascontiguousarray(low))
+
+
+def libration(
+    segment: Segment, *, direction: int, duration: Pair, phase_time: Pair, phi: float
+) -> tuple[TimedSegment, ...]:
+    """One period between two turning points, from the launch.
+
+    ``duration`` is the half period, and ``phase_time`` the time from the end ``a`` to the launch place, whose phase
+    angle is ``phi``.
+    """
+    a, b, launch = (ZERO, 0.0), (duration, segment.stop), (phase_time, phi)
+    first, second = (a, b) if direction > 0 else (b, a)
+    runs = [
+        (direction, launch, second, "turn"),
+        (-direction, second, first, "turn"),
+        (direction, first, launch, "horizon"),
+    ]
+    s_a = -float(segment.lengths(np.array([phi]))[0])
+    segments: list[TimedSegment] = []
+    t = ZERO
+    for sense, (start, phi_start), (stop, phi_stop), end in runs:
+        if start == stop:
+            continue
+        timed = TimedSegment(
+            segment=segment,
+            sense=sense,
+            r_start=start,
+            r_stop=stop,
+            phi_start=phi_start,
+            phi_stop=phi_stop,
+            t_start=t,
+            s_a=s_a,
+            end=end,
+        )
+        segments.append(timed)
+        t = timed.t_stop
+    return tuple(segments)
+
+
+@dataclass(frozen=True, slots=True)
+class PhasePoints:
+    """Where a motion is at given times.
+
+    Attributes
+    ----------
+    segments : tuple
+        For each timed segment that times fall on: the segment, which of the times these are, and the phase angles.
+    at_launch : array of bool
+        Which times are those of the launch, or of a return to it after whole periods.
+    laps : array
+        The number of laps at each time.
+    trajectory : Trajectory
+        The trajectory that the segments are of.
+    """
+
+    segments: tuple[tuple[TimedSegment, NDArray[np.bool_], Array], ...]
+    at_launch: NDArray[np.bool_]
+    laps: Array
+    trajectory: Trajectory
+
+    def places(self, launch: float) -> Array:
+        """The curve parameter within the lap; at launch it is exactly the launch place."""
+        lam = np.full_like(self.laps, launch)
+        for timed, mask, phi in self.segments:
+            lam[mask] = timed.segment.places(phi)
+        lam[self.at_launch] = launch
+        return lam
+
+    def arc_lengths(self) -> Array:
+        """Arc length in m from the launch, within the lap."""
+        s = np.zeros_like(self.laps)
+        for timed, mask, phi in self.segments:
+            s[mask] = timed.s_a + timed.segment.direction * timed.segment.lengths(phi)
+        s[self.at_launch] = 0.0
+        return s
+
+    def velocities(self, launch: float) -> Array:
+        """ds/dt in m/s; at launch it is exactly that of the launch."""
+        v = np.zeros_like(self.laps)
+        for timed, mask, phi in self.segments:
+            v[mask] = timed.direction * timed.segment.speeds(phi)
+        v[self.at_launch] = launch
+        return v
+
+
+def locate(trajectory: Trajectory, t: Array, t_low: Array) -> PhasePoints:
+    """The segments and phase angles that times fall on; a time is t + t_low."""
+    laps, reduced, reduced_low = trajectory.reduce(t, t_low)
+    which = trajectory.segment_indices(reduced)
+    segments = []
+    for k in np.unique(which):
+        timed, mask = trajectory.segments[k], which == k
+        laps[mask] += timed.laps
+        phi = trajectory.phase_angles(timed, reduced[mask], reduced_low[mask])
+        segments.append((timed, mask, np.clip(phi, 0.0, timed.segment.edges[-1])))
+    return PhasePoints(tuple(segments), (reduced == 0.0) & (reduced_low == 0.0), laps, trajectory)

@@ -1,0 +1,312 @@
+"""One launch in extended precision, for what doubles cannot decide, and for more digits than a double has.
+
+A generated module contains its formulas as plain Python over a namespace of operations. Here they are evaluated with
+mpmath, for exactly the numbers that the user gave. mpmath is imported when it is first needed, not with the runtime.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from gqm_sym.budgets import budget, spend
+from gqm_sym.errors import SolutionError
+from gqm_sym.literals.numbers import Number
+from gqm_sym.runtime.compiled.types import Array
+from gqm_sym.runtime.multiprecision.exact_tracks import Track, TrackMaker
+from gqm_sym.runtime.multiprecision.gauss_legendre import gauss
+from gqm_sym.runtime.quadrature.substitution import FROM_TURN, REGULAR, TURN_TURN
+
+NOWHERE: Array = np.empty(0)
+
+# Decimal digits with which a sign is determined, one after the other; what is zero with the last counts as zero.
+PRECISIONS = (40, 80, 210)
+
+# Digits that rounding and cancellation may cost.
+GUARD_DIGITS = 15
+
+# A segment with more panels than this has a peak for which the trapezoidal rule would need too many nodes.
+MAX_SMOOTH_PANELS = 8
+
+# Nodes of the trapezoidal rule at up to 128 digits, if the curve is not smooth.
+MAX_NODES = 1 << 13
+
+
+@dataclass(frozen=True, slots=True)
+class End:
+    """What lies ahead of a place of the curve: ``what`` is "turn", "equilibrium" or "clear", ``place`` where it is."""
+
+    what: str
+    place: Any = None
+
+
+@dataclass(slots=True)
+class ExactProblem:
+    """One launch of one model, which can be evaluated with any precision.
+
+    Attributes
+    ----------
+    track
+        Makes the curve with its forces at a precision.
+    edges : array
+        Edges of the pieces of a charted curve, in arc length; each piece must be integrated by itself.
+    parameters : tuple of Number
+        Run-time parameters.
+    lam0, v0 : Number
+        Launch place and speed in m/s.
+    """
+
+    track: TrackMaker
+    edges: Array
+    parameters: tuple[Number, ...]
+    lam0: Number
+    v0: Number
+    _scales: dict[int, "Arithmetic"] = field(default_factory=dict)
+
+    def at(self, digits: int) -> "Arithmetic":
+        """Return the problem at a working precision of so many decimal digits."""
+        if digits not in self._scales:
+            self._scales[digits] = Arithmetic(self, digits)
+        return self._scales[digits]
+
+    def slope_sign(self) -> int:
+        """Return the sign of the effective potential's slope at the launch place, which may be zero."""
+        for digits in PRECISIONS:
+            a = self.at(digits)
+            slope = a.climb_slope(a.lam0)
+            if abs(slope) > a.mpf(10) ** (GUARD_DIGITS - digits) * (1 + abs(a.climb(a.lam0))):
+                return 1 if slope > 0 else -1
+        return 0
+
+    @budget("search for turning points", 60.0, "launch a little farther from the equilibrium")
+    def resolve(self, near: float, far: float, direction: int) -> End:
+        """Decide what lies between two places that doubles cannot distinguish from an equilibrium.
+
+        Parameters
+        ----------
+        near, far : float
+            Places on the curve; V**2 >= 0 at the first of them.
+        direction : int
+            The sign of far - near.
+        """
+        for digits in PRECISIONS:
+            a = self.at(digits)
+            here, there = a.track.place(near), a.track.place(far)
+            top = a.equilibrium(here, there)
+            if top is not None and (top - here) * direction <= 0:
+                top = None  # it lies behind the first place
+            if top is None:  # V**2 is monotone: its sign at the far place decides
+                w = a.speed_squared(there)
+                guess = here + (there - here) / 2
+            else:
+                w = a.speed_squared(top)
+                curvature = abs(a.climb_curvature(top))
+                guess = top - direction * a.sqrt(2 * abs(w) / curvature) if curvature else here
+            lost = a.mpf(10) ** (2 * GUARD_DIGITS - digits) * a.size
+            # A launch this slow turns where the potential cancels to fewer digits than a double has.
+            if abs(w) <= lost or (0 < a.w0 <= lost and digits < PRECISIONS[-1]):
+                continue
+            if w > 0 and top is not None and a.speed_squared(there) < 0:
+                guess, w = there, -w  # a minimum of the potential, and a turning point behind it
+            if w > 0:
+                return End("clear")
+            return End("turn", a.turning_point(guess))
+        return End("equilibrium", top)
+
+
+@dataclass(slots=True)
+class Arithmetic:
+    """A launch at one precision.
+
+    Attributes
+    ----------
+    context
+        An mpmath context.
+    track : Track
+        The curve with its forces.
+    lam0, w0
+        The launch place, and V**2 there.
+    base
+        The effective potential (times 2) at the launch place.
+    size
+        The size of V**2 and of the effective potential, against which rounding is judged.
+    """
+
+    problem: ExactProblem
+    digits: int
+    context: Any = field(init=False)
+    track: Track = field(init=False)
+    lam0: Any = field(init=False)
+    w0: Any = field(init=False)
+    base: Any = field(init=False)
+    size: Any = field(init=False)
+
+    def __post_init__(self) -> None:
+        from mpmath.ctx_mp import MPContext
+
+        self.context = MPContext()
+        self.context.dps = self.digits
+        values = tuple(number.at(self.context) for number in self.problem.parameters)
+        self.track = self.problem.track(self.context, values)
+        self.lam0 = self.track.lam0
+        self.w0 = self.problem.v0.at(self.context) ** 2
+        self.base = self.climb(self.lam0)
+        self.size = self.w0 + abs(self.base) + abs(self.climb(self.track.elsewhere()) - self.base)
+
+    def mpf(self, value: Any) -> Any:
+        """Return a number of this precision."""
+        return self.context.mpf(value)
+
+    def sqrt(self, value: Any) -> Any:
+        """Return the square root."""
+        return self.context.sqrt(value)
+
+    def climb(self, lam: Any) -> Any:
+        """Return 2*Phi/(1 + beta), the loss of V**2 up to a constant."""
+        spend()
+        return self.track.climb(lam)
+
+    def climb_slope(self, lam: Any) -> Any:
+        """Return its derivative by lam."""
+        spend()
+        return self.track.climb_slope(lam)
+
+    def climb_curvature(self, lam: Any) -> Any:
+        """Return its second derivative by lam, to about half of the digits."""
+        h = self.mpf(10) ** (-(self.digits // 3))
+        return (self.climb_slope(lam + h) - self.climb_slope(lam - h)) / (2 * h)
+
+    def ds(self, lam: Any) -> Any:
+        """Return ds/dlam."""
+        return self.track.ds(lam)
+
+    def speed_squared(self, lam: Any) -> Any:
+        """Return V**2, by subtraction."""
+        return self.w0 + self.base - self.climb(lam)
+
+    def equilibrium(self, near: Any, far: Any) -> Any | None:
+        """Return the zero of the effective potential's slope near two places, or None if there is none."""
+        y, width = far, abs(far - near)
+        tolerance = self.mpf(10) ** (-(self.digits // 2))
+        for _ in range(60):
+            slope = self.climb_slope(y)
+            if slope == 0:
+                return y
+            first, second = (
+                self.context.diff(self.climb_slope, y, 1),
+                self.context.diff(self.climb_slope, y, 2),
+            )
+            below = first**2 - slope * second
+            if below == 0:
+                return None
+            step = slope * first / below  # Schroeder's method: quadratic at a flat maximum as well
+            y -= step
+            if abs(y - near) > 1000 * width + abs(far) * self.mpf(10) ** -6:
+                return None
+            if abs(step) <= tolerance * (abs(y) + width):
+                return y
+        return None
+
+    def turning_point(self, guess: Any) -> Any:
+        """Return the zero of V**2 that Newton's method reaches from ``guess``."""
+        x = self.mpf(guess)
+        tolerance = self.mpf(10) ** (
+            -(self.digits // 2)
+        )  # convergence is quadratic: after such a step only rounding remains
+        for _ in range(100):
+            slope = self.climb_slope(x)
+            if slope == 0:
+                break
+            step = self.speed_squared(x) / slope
+            x += step
+            if abs(step) <= tolerance * (abs(x) + abs(x - self.lam0)):
+                return x
+        raise SolutionError(f"turning point near {float(guess)!r}: extended precision does not converge to it")
+
+    def time_rate(self, kind: int, a: Any, b: Any) -> Callable[[Any], tuple[Any, Any]]:
+        """Return a function of phi that gives dt/dphi and V**2 on a segment, by subtraction."""
+        context = self.context
+
+        def turn_turn(phi: Any) -> tuple[Any, Any]:
+            c, s = context.cos_sin(phi / 2)
+            left, right = (b - a) * s**2, (b - a) * c**2
+            lam = a + left
+            if s == 0:
+                w, q = self.mpf(0), -self.climb_slope(a) / (b - a)
+            elif phi == context.pi:
+                w, q = self.mpf(0), self.climb_slope(b) / (b - a)
+            else:
+                w = self.speed_squared(lam)
+                q = w / (left * right)
+            return self.ds(lam) / context.sqrt(q), w
+
+        def from_turn(phi: Any) -> tuple[Any, Any]:
+            offset = (b - a) * phi**2
+            w = self.speed_squared(a + offset)
+            return self.ds(a + offset) * 2 * abs(b - a) * phi / context.sqrt(w), w
+
+        def regular(phi: Any) -> tuple[Any, Any]:
+            lam = a + (b - a) * phi
+            w = self.speed_squared(lam)
+            return self.ds(lam) * abs(b - a) / context.sqrt(w), w
+
+        return {TURN_TURN: turn_turn, FROM_TURN: from_turn, REGULAR: regular}[kind]
+
+    def trapezoid(self, rate: Callable[[Any], tuple[Any, Any]], stop: Any, digits: int) -> Any | None:
+        """Integrate over [0, stop] a function that is smooth and periodic, or even about both ends.
+
+        Halving the spacing squares the error, so the last but one difference bounds it. The result is None if too many
+        nodes would be needed.
+        """
+        n = 16
+        total = (rate(self.mpf(0))[0] + rate(stop)[0]) / 2 + sum(rate(stop * k / n)[0] for k in range(1, n))
+        value, before = total * stop / n, None
+        while n < max(MAX_NODES, 64 * digits):
+            total += sum(rate(stop * (2 * k + 1) / (2 * n))[0] for k in range(n))
+            n *= 2
+            new = total * stop / n
+            change = abs(new - value)
+            value = new
+            if before is not None:
+                # If the changes fall geometrically, the next one is at most this one times their ratio.
+                ratio = change / before if change < before / 1000 else 1
+                if change * ratio <= abs(value) * self.mpf(10) ** (-digits - 2):
+                    return value
+            before = change
+        return None
+
+    def phase_angles(self, kind: int, a: Any, b: Any, places: Sequence[Any]) -> list[Any]:
+        """Return the phase angles of places on a segment from a to b (`substitution`)."""
+        c = self.context
+        shares = [(place - a) / (b - a) for place in places]
+        if kind == TURN_TURN:
+            return [2 * c.atan2(c.sqrt(share), c.sqrt(1 - share)) for share in shares]
+        return [c.sqrt(share) for share in shares] if kind == FROM_TURN else shares
+
+    def gauss(self, kind: int, a: Any, b: Any, edges: Sequence[Any], digits: int) -> list[Any]:
+        """Return the time on each panel by Gauss-Legendre rules.
+
+        Parameters
+        ----------
+        kind, a, b
+            The segment.
+        edges : sequence
+            Phase angles at the edges of the panels. A panel is divided at joints of the curve.
+        digits : int
+            Decimal digits of the result.
+        """
+        rate = self.time_rate(kind, a, b)
+        joints = self.phase_angles(kind, a, b, self.track.joints(a, b) or ())
+        parts = []
+        for left, right in pairwise(edges):
+            cuts = [left, *(phi for phi in joints if left < phi < right), right]
+            parts.append(sum(gauss(self.context, lambda phi: rate(phi)[0], cuts, digits)))
+        return parts
+
+
+def two_doubles(value: Any) -> tuple[float, float]:
+    """Return a number of extended precision as two doubles, whose sum it is."""
+    high = float(value)
+    return high, float(value - high)

@@ -1,0 +1,1 @@
+"""Time and arc length over one segment of the curve."""

@@ -1,0 +1,352 @@
+"""Pass 2: adaptive Gauss-Kronrod panels for time and arc length along one segment of the curve.
+
+Each accepted panel stores the Legendre coefficients of both antiderivatives, so that time and arc length can be
+evaluated anywhere on it.
+"""
+
+from math import fabs, inf, pi
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import types
+
+from gqm_sym.runtime.arithmetic.clenshaw import DECAY, GROWTH, legendre_sum
+from gqm_sym.runtime.compiled.buffers import longer, taller
+from gqm_sym.runtime.compiled.jit import Inlined, Inner, entry
+from gqm_sym.runtime.compiled.types import ADDRESSES, MATRIX, REAL, VECTOR
+from gqm_sym.runtime.quadrature.integrands import NO_FUNCTIONS, Integrand, cancellation_range, fill_rates
+from gqm_sym.runtime.quadrature.kronrod import EVEN, GAUSS_WEIGHTS, KRONROD_WEIGHTS, NODES, ODD
+from gqm_sym.runtime.quadrature.substitution import REGULAR, TO_EQUILIBRIUM, TURN_TURN
+
+# Status of a segment's quadrature.
+CONVERGED, FLOOR, EXHAUSTED, FAILED, ILL_CONDITIONED = range(5)
+
+# Nodes of a panel, and coefficients of its antiderivatives.
+COUNT = 21
+DEGREE = 22
+
+# A panel is resolved when its last Legendre coefficients are below this share of the largest: they hold rounding noise
+# of about 5e-16.
+MAX_TAIL_RATIO = 2e-15
+
+# Coefficients that stop falling below this share of the largest are rounding noise, not structure.
+MAX_NOISE_RATIO = 1e-7
+
+# They have stopped falling when the last ones are at least this share of those in the middle.
+MIN_FLAT_RATIO = 0.05
+
+# Kronrod's and Gauss's value of a resolved panel differ by no more than this share.
+MAX_RULE_DIFFERENCE = 1e-6
+
+MAX_PANELS = 4096
+
+# If cancellation leaves less than this part of V**2, panels in doubles are not worth laying.
+MIN_USABLE_RATIO = 1e-9
+
+# If cancellation leaves less than this part of V**2, the half period in doubles is off by more than a few ulp.
+MIN_CANCELLATION_RATIO = 1e-2
+
+# The shortest panel, as a share of the segment.
+MIN_PANEL_SHARE = 2.0**-48
+
+# A duration below this share of the time so far does not change it, even as two doubles.
+NEGLIGIBLE_SHARE = 2.0**-104
+
+
+class Panels(NamedTuple):
+    """The panels of a segment.
+
+    Attributes
+    ----------
+    edges : (n+1,) array
+        Phase angles at the edges of the panels.
+    times, lengths : (n+1,) arrays
+        Time in s and arc length in m from the first edge to each edge.
+    time_terms, length_terms : (n, DEGREE) arrays
+        Legendre coefficients of both antiderivatives on each panel.
+    error : float
+        Estimated relative error of the whole time by quadrature, rounding included.
+    cancellation : float
+        The part of V**2 that cancellation leaves: its smallest regular factor against the largest. It is small near a
+        separatrix.
+    status : int
+        CONVERGED, FLOOR (the coefficients level off above rounding), EXHAUSTED (too many panels), FAILED (an integrand
+        is not finite) or ILL_CONDITIONED (V**2 nearly vanishes inside: panels must be laid in extended precision).
+    """
+
+    edges: Any
+    times: Any
+    lengths: Any
+    time_terms: Any
+    length_terms: Any
+    error: Any
+    cancellation: Any
+    status: Any
+
+
+@Inner
+def antiderivative(values, half, c, out):  # type: ignore[no-untyped-def]
+    """Fill ``out`` with the Legendre coefficients of an integral from the left end of a panel.
+
+    Parameters
+    ----------
+    values : (COUNT,) array
+        The integrand at the nodes.
+    half : float
+        Half the width of the panel.
+    c : (DEGREE + 1,) array
+        Filled with the integrand's Legendre coefficients.
+
+    Returns
+    -------
+    size, tail, middle : float
+        The largest coefficient of the integrand, the largest of the last three, and of three in the middle.
+    """
+    for j in range(11):
+        total = EVEN[11 * j] * values[10]
+        for i in range(1, 11):
+            total += EVEN[11 * j + i] * (values[10 + i] + values[10 - i])
+        c[2 * j] = total
+    for j in range(10):
+        total = 0.0
+        for i in range(10):
+            total += ODD[10 * j + i] * (values[11 + i] - values[9 - i])
+        c[2 * j + 1] = total
+    c[21] = c[22] = 0.0
+    size = 0.0
+    for j in range(COUNT):
+        size = max(size, fabs(c[j]))
+    out[0] = half * (c[0] - c[1] / 3.0)
+    for k in range(1, DEGREE):
+        out[k] = half * (c[k - 1] / (2 * k - 1) - c[k + 1] / (2 * k + 3))
+    tail = max(fabs(c[18]), fabs(c[19]), fabs(c[20]))
+    middle = max(fabs(c[12]), fabs(c[13]), fabs(c[14]))
+    return size, tail, middle
+
+
+@Inlined
+def _accumulate(total, low, value):  # type: ignore[no-untyped-def]
+    """Add a value to a running total of two doubles."""
+    new = total + (value + low)
+    return new, (value + low) - (new - total)
+
+
+@Inner
+def _panel_sums(values, half):  # type: ignore[no-untyped-def]
+    """Duration and length of a panel by Kronrod's rule, and how far Gauss's rule is from that duration."""
+    gauss, duration, length = 0.0, 0.0, 0.0
+    for i in range(10, 0, -1):
+        pair = values[0, 10 + i] + values[0, 10 - i]
+        duration += KRONROD_WEIGHTS[i] * pair
+        gauss += GAUSS_WEIGHTS[i] * pair
+        length += KRONROD_WEIGHTS[i] * (values[1, 10 + i] + values[1, 10 - i])
+    duration = half * (duration + KRONROD_WEIGHTS[0] * values[0, 10])
+    length = half * (length + KRONROD_WEIGHTS[0] * values[1, 10])
+    return duration, length, fabs(duration - half * gauss)
+
+
+@Inlined
+def _is_noise(size, tail, middle):  # type: ignore[no-untyped-def]
+    """Whether coefficients have stopped falling at the level of rounding noise."""
+    return middle <= MAX_NOISE_RATIO * size and tail >= MIN_FLAT_RATIO * middle
+
+
+@Inner
+def lay(integrand, marks):  # type: ignore[no-untyped-def]
+    """Lay panels until time and arc length are resolved to rounding.
+
+    Parameters
+    ----------
+    integrand : Integrand
+        The segment.
+    marks : (m,) array
+        Phase angles: the first and the last one, and between them those at which a panel must begin because the curve
+        is not smooth there.
+
+    Returns
+    -------
+    Panels
+    """
+    capacity = 16
+    edges, times, lengths = np.empty(capacity + 1), np.empty(capacity + 1), np.empty(capacity + 1)
+    time_terms, length_terms = np.empty((capacity, DEGREE)), np.empty((capacity, DEGREE))
+    phi, work, values, c = np.empty(COUNT), np.empty((4, COUNT)), np.empty((2, COUNT)), np.empty(DEGREE + 1)
+    start, stop = marks[0], marks[-1]
+    waiting = marks.size - 1
+    pending = np.empty(waiting + 128)  # right edges of the panels that remain, the next one last
+    pending[:waiting] = marks[:0:-1]
+    max_panels = MAX_PANELS + waiting
+    edges[0], times[0], lengths[0] = start, 0.0, 0.0
+    left, count, error, status = start, 0, 0.0, CONVERGED
+    time_low, length_low = 0.0, 0.0
+    min_width = MIN_PANEL_SHARE * fabs(stop - start)
+    smallest, largest, peak = inf, 0.0, 0.0
+    while waiting > 0:
+        right = pending[waiting - 1]
+        half, middle = 0.5 * (right - left), 0.5 * (right + left)
+        for i in range(11):
+            phi[10 + i] = middle + half * NODES[i]
+            phi[10 - i] = middle - half * NODES[i]
+        fill_rates(integrand, phi, work, values)
+        low, high, new_peak = cancellation_range(integrand, work, COUNT, peak)
+        smallest, largest = min(smallest, low), max(largest, high)
+        if largest > 0.0 and smallest < MIN_USABLE_RATIO * largest:
+            status = ILL_CONDITIONED
+            break
+        if count == capacity:
+            capacity *= 2
+            edges, times, lengths = (
+                longer(edges, capacity + 1),
+                longer(times, capacity + 1),
+                longer(lengths, capacity + 1),
+            )
+            time_terms, length_terms = taller(time_terms, capacity), taller(length_terms, capacity)
+        length_size, length_tail, length_middle = antiderivative(values[1], half, c, length_terms[count])
+        size, tail, level = antiderivative(values[0], half, c, time_terms[count])
+        duration, length, difference = _panel_sums(values, half)
+        length_resolved = length_tail <= MAX_TAIL_RATIO * length_size
+        resolved = tail <= MAX_TAIL_RATIO * size and length_resolved and difference <= MAX_RULE_DIFFERENCE * duration
+        noise = _is_noise(size, tail, level) and (length_resolved or _is_noise(length_size, length_tail, length_middle))
+        narrow = fabs(right - left) <= min_width
+        full = count + waiting >= max_panels or waiting >= pending.size - 1
+        # At the end of a spiral, which winds on below the last bit of the time and the length so far.
+        negligible = (
+            duration >= 0.0
+            and duration <= NEGLIGIBLE_SHARE * times[count]
+            and length <= NEGLIGIBLE_SHARE * lengths[count]
+        )
+        if not ((duration > 0.0 or negligible) and duration < inf):
+            if narrow or full:
+                status = FAILED
+                break
+        elif resolved or noise or narrow or full or negligible:
+            if not (resolved or negligible):
+                if noise and tail > 50.0 * MAX_TAIL_RATIO * size:
+                    status = max(status, FLOOR)
+                elif not noise:
+                    status = EXHAUSTED
+            error += tail / size * duration if size > 0.0 else 0.0
+            times[count + 1], time_low = _accumulate(times[count], time_low, duration)
+            lengths[count + 1], length_low = _accumulate(lengths[count], length_low, length)
+            left = edges[count + 1] = right
+            peak = new_peak
+            count += 1
+            waiting -= 1
+            continue
+        pending[waiting] = middle
+        waiting += 1
+    total = times[count]
+    return Panels(
+        edges[: count + 1].copy(),
+        times[: count + 1].copy(),
+        lengths[: count + 1].copy(),
+        time_terms[:count].copy(),
+        length_terms[:count].copy(),
+        error / total + 2.3e-16 if total > 0.0 else inf,
+        smallest / largest if largest > 0.0 else 0.0,
+        status,
+    )
+
+
+@Inner
+def panel_of(edges, phi):  # type: ignore[no-untyped-def]
+    """Return the index of the panel on which a phase angle lies."""
+    return min(max(np.searchsorted(edges, phi, side="right") - 1, 0), edges.size - 2)
+
+
+@Inner
+def read_off(edges, marks, terms, phi):  # type: ignore[no-untyped-def]
+    """Return the time (or the arc length) from the first edge to a phase angle.
+
+    Parameters
+    ----------
+    edges : (n+1,) array
+        Phase angles at the edges of the panels.
+    marks : (n+1,) array
+        Time (or arc length) at the edges.
+    terms : (n, DEGREE) array
+        Legendre coefficients on each panel.
+    phi : float
+        The phase angle.
+    """
+    k = panel_of(edges, phi)
+    half = 0.5 * (edges[k + 1] - edges[k])
+    x = ((phi - edges[k]) - half) / half
+    return marks[k] + legendre_sum(terms[k], x)
+
+
+@Inner
+def read_off_block(edges, marks, terms, phi, n, panels, work, out):  # type: ignore[no-untyped-def]
+    """Evaluate `read_off` at n phase angles on known panels, in vector registers; ``work`` has three rows of n."""
+    x, high, low = work[0], work[1], work[2]
+    for i in range(n):
+        left, half = edges[panels[i]], 0.5 * (edges[panels[i] + 1] - edges[panels[i]])
+        x[i], high[i], low[i] = ((phi[i] - left) - half) / half, 0.0, 0.0
+    for k in range(DEGREE - 1, 0, -1):
+        growth, decay = GROWTH[k], DECAY[k]
+        for i in range(n):
+            new = terms[panels[i], k] + growth * x[i] * high[i] - decay * low[i]
+            low[i], high[i] = high[i], new
+    for i in range(n):
+        out[i] = marks[panels[i]] + (terms[panels[i], 0] + x[i] * high[i] - 0.5 * low[i])
+
+
+PANELS_TYPE = types.NamedTuple((VECTOR, VECTOR, VECTOR, MATRIX, MATRIX, REAL, REAL, types.int64), Panels)
+
+
+@entry(PANELS_TYPE(ADDRESSES, VECTOR, types.int64, REAL, REAL, REAL, REAL, VECTOR))
+def lay_panels(fns, p, kind, a, b, ref, w0, marks):  # type: ignore[no-untyped-def]
+    """Call `lay` from Python; the arguments are those of `Integrand`."""
+    return lay(Integrand(fns, p, kind, a, b, ref, w0, np.empty((0, 0))), marks)
+
+
+@entry(PANELS_TYPE(REAL, REAL, MATRIX, VECTOR))
+def lay_along(a, b, field, marks):  # type: ignore[no-untyped-def]
+    """Call `lay` from Python for a segment from ``a`` to an equilibrium ``b``, with V**2 from `equilibrium`."""
+    return lay(Integrand(NO_FUNCTIONS, np.empty(0), TO_EQUILIBRIUM, a, b, a, 0.0, field), marks)
+
+
+@entry(VECTOR(VECTOR, MATRIX, VECTOR))
+def slopes(edges, terms, phi):  # type: ignore[no-untyped-def]
+    """Return the derivatives by phi of the panels' Legendre series at phase angles."""
+    out, series = np.empty(phi.size), np.empty(terms.shape[1])
+    for i in range(phi.size):
+        k = panel_of(edges, phi[i])
+        half = 0.5 * (edges[k + 1] - edges[k])
+        derivative(terms[k], series)
+        out[i] = legendre_sum(series, ((phi[i] - edges[k]) - half) / half) / half
+    return out
+
+
+@entry(VECTOR(VECTOR, VECTOR, MATRIX, VECTOR))
+def read_off_many(edges, marks, terms, phi):  # type: ignore[no-untyped-def]
+    """Evaluate `read_off` at many phase angles."""
+    out = np.empty(phi.size)
+    for i in range(phi.size):
+        out[i] = read_off(edges, marks, terms, phi[i])
+    return out
+
+
+@Inner
+def orbit_panels(fns, p, is_circulation, a, b, lam0, w0):  # type: ignore[no-untyped-def]
+    """Lay panels over half a period of a libration, or over a lap of a circulation.
+
+    Both share one call of `lay`, because each call takes long to compile.
+    """
+    kind, ref, w, stop = (REGULAR, lam0, w0, 1.0) if is_circulation else (TURN_TURN, a, 0.0, pi)
+    return lay(Integrand(fns, p, kind, a, b, ref, w, np.empty((0, 0))), np.array([0.0, stop]))
+
+
+@Inner
+def are_accurate(panels):  # type: ignore[no-untyped-def]
+    """Whether the time by these panels is accurate to a few ulp."""
+    return not (panels.status >= FLOOR or panels.cancellation < MIN_CANCELLATION_RATIO)
+
+
+@Inner
+def derivative(terms, out):  # type: ignore[no-untyped-def]
+    """Fill ``out`` with the Legendre coefficients of the derivative of a Legendre series."""
+    n = terms.size
+    out[:] = 0.0
+    for k in range(n - 1, 0, -1):
+        out[k - 1] = (2 * k - 1) * (terms[k] + (out[k + 1] / (2 * k + 3) if k + 1 < n else 0.0))

@@ -1,0 +1,1 @@
+"""Many orbits at once, one in each lane of a vector register."""

@@ -1,0 +1,136 @@
+"""Sweeps on a Dask cluster: cut into jobs that carry the module's text, answered by its workers, put together here.
+
+The cut is the same whoever answers, and a job is answered as here, so that the numbers are the same.
+"""
+
+import tempfile
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from functools import lru_cache
+from itertools import islice
+from math import prod
+from pathlib import Path
+from types import ModuleType
+from typing import Any, TypeVar
+
+import numpy as np
+
+from gqm_sym.errors import InputError, SolutionError
+from gqm_sym.loading import load
+from gqm_sym.optional import require
+from gqm_sym.runtime.compiled.jit import STAMP
+from gqm_sym.runtime.sweep.sweep import Sweep, broadcast_shape
+
+T = TypeVar("T")
+
+# Launches of one job, and jobs that wait in line for each thread of a worker.
+JOB, WAITING = 2**13, 3
+
+# Seconds in which a scheduler must answer.
+PATIENCE = 10
+
+
+@require("dask")
+def connected(address: str) -> Any:
+    """A client of the cluster whose scheduler is at an address.
+
+    Raises
+    ------
+    InputError
+        If there is none.
+    """
+    from distributed import Client
+
+    try:
+        return Client(address, timeout=PATIENCE)
+    except (OSError, ValueError) as error:
+        raise InputError(
+            f"{address}: no Dask scheduler answers there ({error}); give an address as tcp://host:8786"
+        ) from None
+
+
+@require("dask")
+def finished(client: Any, work: Callable[..., T], jobs: Iterable[tuple[Any, ...]]) -> Iterator[tuple[int, T]]:
+    """Do ``work`` on the arguments of each job, on a cluster; yield number and outcome of each job as it is finished.
+
+    Parameters
+    ----------
+    client : distributed.Client
+    work
+        A function that the workers can import.
+    jobs
+        Taken as there is room for them.
+    """
+    from distributed import as_completed
+
+    numbers: dict[str, int] = {}
+
+    def sent(numbered: Iterable[tuple[int, tuple[Any, ...]]]) -> Iterator[Any]:
+        for number, job in numbered:
+            future = client.submit(work, *job, pure=False)
+            numbers[future.key] = number
+            yield future
+
+    queue = enumerate(jobs)
+    line = as_completed(list(sent(islice(queue, WAITING * max(sum(client.nthreads().values()), 2)))))
+    return _outcomes(line, numbers, sent(queue))
+
+
+def _outcomes(line: Any, numbers: dict[str, int], others: Iterator[Any]) -> Iterator[tuple[int, Any]]:
+    """Yield what is done; another one joins the line for each."""
+    for future in line:
+        outcome = future.result()
+        line.update(islice(others, 1))
+        yield numbers.pop(future.key), outcome
+
+
+def answer(stamp: str, source: str, text: str, name: str, quantity: str, arguments: Mapping[str, Any]) -> Sweep:
+    """Answer one job, on a worker.
+
+    Parameters
+    ----------
+    stamp
+        Of the runtime that asks.
+    source, text, name
+        The module: where its file was, what is in it, and what it is called.
+    quantity, arguments
+        As of the module's ``sweep``.
+    """
+    if stamp != STAMP:
+        raise SolutionError("client: a worker runs another version of gqm_sym; install the same one everywhere")
+    swept: Sweep = _module(source, text, name).sweep(quantity, **arguments)
+    return swept
+
+
+@lru_cache(maxsize=16)
+def _module(source: str, text: str, name: str) -> ModuleType:
+    """A module by its text: from the same file where this machine has it, for what was compiled lies beside it."""
+    path = Path(source)
+    if path.is_file() and path.read_text(encoding="utf-8", errors="replace") == text:
+        return load(path, name)
+    with tempfile.TemporaryDirectory(prefix="gqm-") as folder:
+        path = Path(folder) / f"{name}.py"
+        path.write_text(text, encoding="utf-8")
+        return load(path, name)
+
+
+def sweep_on(client: Any, source: str, name: str, quantity: str, arguments: Mapping[str, Any]) -> Sweep:
+    """``module.sweep`` on a cluster; the arguments broadcast against each other.
+
+    Parameters
+    ----------
+    source, name
+        The generated module's file, and what it is called.
+    """
+    text = Path(source).read_text(encoding="utf-8")
+    given = {key: value for key, value in arguments.items() if value is not None}
+    # Lists stay lists of what they hold: text would otherwise become text of NumPy's.
+    arrays = {k: v if isinstance(v, np.ndarray) else np.array(v, dtype=object) for k, v in given.items() if np.ndim(v)}
+    shape = broadcast_shape(arrays)
+    flat = {key: np.broadcast_to(array, shape).reshape(-1) for key, array in arrays.items()}
+    cuts = [slice(begin, begin + JOB) for begin in range(0, max(prod(shape), 1), JOB)]
+    parts = ({**given, **{key: column[cut] for key, column in flat.items()}} for cut in cuts)
+    found = dict(finished(client, answer, ((STAMP, source, text, name, quantity, part) for part in parts)))
+    if not arrays:
+        return found[0]
+    values, reasons = (np.concatenate([found[k][field] for k in range(len(cuts))]) for field in (0, 1))
+    return type(found[0])(values.reshape(shape + values.shape[1:]), reasons.reshape(shape))

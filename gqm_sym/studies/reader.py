@@ -1,0 +1,271 @@
+"""Read a sweep file: every mistake at its line, as of a curve file."""
+
+import difflib
+import re
+from collections.abc import Iterator, Mapping
+from math import isfinite
+from pathlib import Path
+
+import numpy as np
+from pydantic import ValidationError
+
+from gqm_sym.budgets import apart, budget
+from gqm_sym.derivation import Model
+from gqm_sym.emission import emit
+from gqm_sym.errors import BudgetError, InputError, SpecFileError
+from gqm_sym.literals.numbers import read_number
+from gqm_sym.specfile import Spec, read_spec
+from gqm_sym.specfile.beside import path_beside, read_beside, read_rows
+from gqm_sym.specfile.explain import explain
+from gqm_sym.specfile.locations import locate, node_at, place_of
+from gqm_sym.specfile.nodes import MapNode, Mistakes, plain
+from gqm_sym.specfile.units import check_unit, expected_units, in_si, launch_units, read_unit
+from gqm_sym.specfile.yamltext import read_text, read_tree
+from gqm_sym.studies.plan import SOLVED, SWIFT, Axis, Plan, evenly, in_doubles
+from gqm_sym.studies.schema import MOST_POINTS, SweepFile, model_at
+
+SECONDS = 0.5
+
+# An exponent of more digits would make exact numbers that fill the memory.
+_DECIMAL = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d{1,3})?", re.ASCII)
+_NEEDED = "curve, quantities and grid"
+_LAUNCH = ("lam0", "v0", "direction", "lam")
+
+
+def read_sweep(path: Path | str) -> Plan:
+    """Read a sweep file, and the curve file that it names.
+
+    Parameters
+    ----------
+    path
+        Of a YAML file, at most 64 KiB.
+
+    Raises
+    ------
+    SpecFileError
+        With every mistake, one line each: ``file:line:column: what; what would be right``.
+    """
+    mistakes = Mistakes(path)
+    text = read_text(Path(path), mistakes)
+    tree = read_tree(text, mistakes, needed=_NEEDED)
+    if isinstance(tree, MapNode):
+        try:
+            with budget("reading", SECONDS, "write fewer and simpler numbers"):
+                plan = _Reader(tree, mistakes, text).read()
+        except BudgetError as error:
+            raise SpecFileError(f"{path}: {error}") from None
+        if plan is not None and not mistakes:
+            return plan
+    elif tree is not None:
+        mistakes.add(tree.mark, f"the file holds {tree.kind}, not a mapping", "begin with 'curve: ...'")
+    raise mistakes.error()
+
+
+class _Reader:
+    """Goes through one file's tree; notes what is wrong and goes on with the rest."""
+
+    def __init__(self, tree: MapNode, mistakes: Mistakes, text: str) -> None:
+        self.tree, self.mistakes, self.text = tree, mistakes, text
+        self.folder = Path(mistakes.path).parent
+        self.origin = {"sweep_file": text}
+
+    def read(self) -> Plan | None:
+        try:
+            file = SweepFile.model_validate(plain(self.tree))
+        except ValidationError as error:
+            spoilt = self.mistakes.places()
+            for detail in error.errors(include_url=False, include_input=False):
+                explain(detail, self.tree, self.mistakes, model_at, spoilt=spoilt)
+            return None
+        with apart():  # curve files, derivations and emissions have budgets of their own
+            found = self._curve(file.curve)
+            if found is None:
+                return None
+            spec, model = found
+            self.known = (*_LAUNCH, *(name for name, _ in model.defaults))
+            kernel = spec.kernel.along(spec.curve.parameter)
+            units = {**expected_units(plain(spec.tree), spec.curve, kernel), **launch_units(spec.curve)}
+            self.units = {**units, "direction": "1", **({"lam": units["lam0"]} if "lam0" in units else {})}
+            axes = self._axes(file)
+        fixed = self._fixed(file, spec)
+        self._check_names(axes, fixed, file, spec, model)
+        self._check_values(axes, fixed, model)
+        if self.mistakes:
+            return None
+        notes = {name: note.unit for name, note in spec.notes.items() if note.unit}
+        with apart():
+            module = emit(model, name=spec.name)
+        swift = not (model.curve.charted or model.dissipation is not None or {"t_max", "contact"} & set(fixed))
+        return Plan(
+            title=file.title,
+            quantities=tuple(dict.fromkeys(file.quantities)),
+            axes=tuple(axes),
+            grid="grid" in file.model_fields_set,
+            fixed=fixed,
+            units={**{name: _si(unit) for name, unit in self.units.items()}, **notes},
+            name=spec.name,
+            module=module,
+            origin=self.origin,
+            part=SWIFT if swift else SOLVED,
+        )
+
+    def _curve(self, name: str) -> tuple[Spec, Model] | None:
+        """The curve file, and what is derived from it; its own mistakes are its own."""
+        try:
+            path = path_beside(name, self.folder, wanted="a curve file")
+        except InputError as error:
+            self.mistakes.add(*locate(self.tree, str(error), ("curve",)))
+            return None
+        spec = read_spec(self.folder / name)
+        self.origin["curve_file"] = path.read_text(encoding="utf-8-sig")
+        return spec, spec.derive()
+
+    # -- what varies, and what does not -----------------------------------------------------------
+
+    def _axes(self, file: SweepFile) -> list[Axis]:
+        given = {"grid", "table"} & file.model_fields_set
+        if len(given) != 1:
+            what = "grid and table are given" if given else "grid is missing"
+            remedy = "give one of them" if given else "say what varies, as in grid: {lam0: [0.5, 1]}, or give a table"
+            self.mistakes.add(place_of(self.tree, ("table",)), what, remedy)
+            return []
+        return list(self._grid(file) if "grid" in given else self._table(file))
+
+    def _grid(self, file: SweepFile) -> Iterator[Axis]:
+        points = 1
+        for name, axis in file.grid.items():
+            mark, given = place_of(self.tree, ("grid", name)), axis.model_fields_set - {"unit"}
+            if given == {"values"} and axis.values:
+                exact = [in_si(value, axis.unit) for value in axis.values]
+                points *= len(exact)
+            elif given == {"start", "stop", "num"}:
+                exact = [in_si(value, axis.unit) for value in (axis.start, axis.stop)]
+                points *= axis.num
+            else:
+                what = f"grid.{name}: does not say what its values are"
+                self.mistakes.add(mark, what, "give start, stop and num, or values")
+                continue
+            self._check_unit(name, axis.unit, "grid", name, "unit")
+            if points > MOST_POINTS:
+                self.mistakes.add(mark, f"grid: has more than {MOST_POINTS} points", "give fewer values")
+                return
+            values = [read_number(value, where=name).value for value in exact] if "values" in given else None
+            yield Axis(name=name, values=evenly(exact[0], exact[1], axis.num) if values is None else np.array(values))
+
+    def _table(self, file: SweepFile) -> Iterator[Axis]:
+        name, units = file.table.file, file.table.units
+        try:
+            text = read_beside(name, self.folder, wanted="a CSV file whose first line names its columns")
+            header, rows = read_rows(name, text)
+            columns = self._columns(name, header, rows)
+        except InputError as error:
+            self.mistakes.add(*locate(self.tree, str(error), ("table",)))
+            return
+        self.origin["table"] = text
+        for column in units:
+            if column not in columns:
+                mark = place_of(self.tree, ("table", "units", column))
+                self.mistakes.add(
+                    mark, f"table.units: {name!r} has no column {column!r}", f"it has {', '.join(columns)}"
+                )
+            else:
+                self._check_unit(column, units[column], "table", "units", column)
+        for column, cells in columns.items():
+            unit = read_unit(units.get(column) or "1", where="unit")
+            yield Axis(name=column, values=in_doubles(cells, unit))
+
+    def _columns(self, name: str, header: list[str], rows: list[list[str]]) -> dict[str, list[str]]:
+        """The cells of a table by its columns, each a finite decimal number."""
+        if not header or not rows:
+            raise InputError(f"{name!r}, row 1: must name the columns, as in lam0,v0, with values in the rows below")
+        if len(set(header)) < len(header):
+            raise InputError(f"{name!r}, row 1: names a column twice: {', '.join(header)}")
+        for number, row in enumerate(rows, start=2):
+            if len(row) != len(header):
+                raise InputError(f"{name!r}, row {number}: must have {len(header)} numbers, has {len(row)}")
+            for cell in row:
+                if not _is_decimal(cell):
+                    raise InputError(f"{name!r}, row {number}: {cell!r:.60} is no finite decimal number")
+        return dict(zip(header, map(list, zip(*rows, strict=True)), strict=True))
+
+    def _fixed(self, file: SweepFile, spec: Spec) -> dict[str, str]:
+        """What is the same at all points: of the curve file's launch, and of this file."""
+        launch = {key: str(value) for key, value in (spec.launch or {}).items() if key != "point"}
+        given = {}
+        for name, entry in file.fixed.items():
+            self._check_unit(name, entry.unit, "fixed", name, "unit")
+            given[name] = in_si(entry.value, entry.unit)
+        if "contact" in file.model_fields_set:
+            launch["contact"] = file.contact
+        if launch.get("contact") == "bilateral":
+            del launch["contact"]
+        return launch | given
+
+    # -- what is wrong with it --------------------------------------------------------------------
+
+    def _check_unit(self, name: str, unit: str, *path: str) -> None:
+        if unit:
+            try:
+                check_unit(unit, self.units.get(name))
+            except InputError as error:
+                self.mistakes.add(node_at(self.tree, path).mark, f"{'.'.join(path)}: {error}")
+
+    def _check_names(self, axes: list[Axis], fixed: dict[str, str], file: SweepFile, spec: Spec, model: Model) -> None:
+        """Note names that nothing is called by, and those that lack a value; of two values, one goes."""
+        grid = "grid" in file.model_fields_set
+        places = {axis.name: ("grid", axis.name) if grid else ("table",) for axis in axes}
+        for name, path in [*places.items(), *((name, ("fixed", name)) for name in file.fixed)]:
+            known = (*self.known, "t_max") if path[0] == "fixed" else self.known
+            mark = place_of(self.tree, path)
+            if name not in known:
+                near = difflib.get_close_matches(name, known, n=1)
+                remedy = f"did you mean {near[0]}?" if near else f"known are {', '.join(known)}"
+                self.mistakes.add(mark, f"{path[0]}: there is no {name!r} in {spec.path}", remedy)
+            elif path[0] == "fixed" and name in places:
+                self.mistakes.add(mark, f"fixed: {name!r} varies", "give its values in one place")
+        for axis in axes:
+            fixed.pop(axis.name, None)
+        given = {axis.name for axis in axes} | set(fixed)
+        needed = ["lam0", *(name for name, value in model.defaults if value is None)]
+        for name in needed:
+            if name not in given:
+                self.mistakes.add(self.tree.mark, f"{name} has no value", f"add fixed: {{{name}: ...}}, or let it vary")
+        asks = "time_at" in file.quantities
+        if asks != ("lam" in given):
+            what = (
+                "'time_at' needs lam, the place that it asks about"
+                if asks
+                else "lam is for 'time_at', which is not asked"
+            )
+            self.mistakes.add(place_of(self.tree, ("quantities",)), what, "add it" if asks else "ask it, or remove lam")
+
+    def _check_values(self, axes: list[Axis], fixed: Mapping[str, str], model: Model) -> None:
+        """Note values that no motion can have, wherever they are given."""
+        columns = [(axis.name, axis.values, True) for axis in axes]
+        columns += [
+            (name, np.array([read_number(v, where=name).value]), False)
+            for name, v in fixed.items()
+            if name != "contact"
+        ]
+        for name, values, varies in columns:
+            wrong = ""
+            if name == "v0" and (values < 0.0).any():
+                wrong = "is a speed and cannot be negative; use direction: -1 to launch the other way"
+            elif name == "direction" and (np.abs(values) != 1.0).any():
+                wrong = "must be 1 or -1 (the sign of ds/dt at launch)"
+            elif name in (*model.positive, "m", "t_max") and (values <= 0.0).any():
+                wrong = "must be positive"
+            if wrong:
+                place = (
+                    ("grid", name) if varies and "grid" in self.tree.items else ("table" if varies else "fixed", name)
+                )
+                self.mistakes.add(place_of(self.tree, place), f"{place[0]}: {name} {wrong}")
+
+
+def _si(unit: str) -> str:
+    """The SI unit of what is measured in a unit; none for a number."""
+    return read_unit(unit, where="unit").name if unit != "1" else ""
+
+
+def _is_decimal(cell: str) -> bool:
+    return bool(_DECIMAL.fullmatch(cell)) and isfinite(float(cell))

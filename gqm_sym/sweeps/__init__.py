@@ -1,8 +1,0 @@
-"""Sweep files: one question to many launches, stored as it is answered."""
-
-from gqm_sym.sweeps.plan import Plan
-from gqm_sym.sweeps.reader import read_sweep
-from gqm_sym.sweeps.run import run
-from gqm_sym.sweeps.schema import sweep_schema
-
-__all__ = ["Plan", "read_sweep", "run", "sweep_schema"]

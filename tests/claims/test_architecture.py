@@ -1,0 +1,245 @@
+"""Who imports whom: the table of ARCHITECTURE.md, held against the imports as they stand."""
+
+import ast
+import sys
+from collections import Counter
+from collections.abc import Iterable, Iterator, Sequence
+from graphlib import TopologicalSorter
+from pathlib import Path
+from typing import NamedTuple
+
+import pytest
+from paths import ROOT
+
+PACKAGE = ROOT / "gqm_sym"
+
+# From the top down: a unit imports itself and units of the layers under its own. A room of the runtime or of the
+# derivation is a unit; the files beside the rooms are units too.
+LAYERS = (
+    {"cli"},
+    {"report", "studies"},
+    {"building", "specfile"},
+    {"emission"},
+    {"derivation"},
+    {"derivation.model"},
+    {"derivation.wells", "derivation.forces", "derivation.defaults"},
+    {"derivation.geometry", "derivation.reality", "derivation.corners"},
+    {"derivation.algebra"},
+    {"declare", "kernels"},
+    {"parameters"},
+    {"expressions"},
+    {"figures", "export", "design"},
+    {"runtime", "runtime.vocabulary"},
+    {"runtime.model"},
+    {"runtime.sweep", "runtime.legs"},
+    {"runtime.motion"},
+    {"runtime.inversion", "runtime.launch"},
+    {"runtime.charts"},
+    {"runtime.multiprecision"},
+    {"runtime.quadrature"},
+    {"runtime.arithmetic"},
+    {"runtime.compiled"},
+    {"runtime.interface"},
+    {"sympy_charts", "literals", "loading", "optional", "smoothing"},
+    {"budgets", "arguments", "dimensions"},
+    {"errors"},
+)
+
+# A motion is drawn and converted by what lies above it, as pandas and xarray do it: these imports alone go upwards.
+PRESENTATION_HOOKS = {
+    ("runtime/motion/motion.py", "gqm_sym.figures.motions"),  # Motion.plot
+    ("runtime/motion/motion.py", "gqm_sym.export.datasets"),  # Motion.to_xarray
+    ("runtime/motion/motion.py", "gqm_sym.export.html"),  # Motion._repr_html_
+}
+
+# Not above the runtime though it lies in a layer above it: they know it by name only.
+KNOWS_NO_RUNTIME = {"emission", "derivation", "declare", "kernels", "parameters", "expressions"}
+
+# No folder of the package holds more files than a reader takes in at a glance.
+MAX_FILES = 16
+
+# Packages that only some parts import.
+ONLY_IN = {
+    "distributed": {"runtime"},
+    "jinja2": {"emission"},
+    "llvmlite": {"runtime"},
+    "matplotlib": {"figures", "report"},
+    "mpmath": {"runtime", "literals", "figures"},
+    "numba": {"runtime"},
+    "numpy": {"runtime", "literals", "figures", "export", "design", "studies", "smoothing"},
+    "pint": {"specfile"},
+    "pydantic": {"specfile", "studies"},
+    "pydantic_core": {"specfile", "studies"},
+    "ruamel": {"specfile"},
+    "scipy": {"runtime", "smoothing"},
+    "sympy": {
+        "cli",
+        "report",
+        "specfile",
+        "emission",
+        "derivation",
+        "declare",
+        "kernels",
+        "parameters",
+        "expressions",
+        "sympy_charts",
+        "dimensions",
+    },
+    "xarray": {"cli", "export", "studies"},
+}
+
+# Imported when exact digits, splines, pictures, datasets or units are asked for, so never by a module as it loads.
+ONLY_INSIDE_FUNCTIONS = {"distributed", "matplotlib", "mpmath", "pint", "scipy", "xarray"}
+
+
+class Import(NamedTuple):
+    """One import: by which file of which unit, of what, and whether it waits for a call.
+
+    What only a type checker reads waits for ever.
+    """
+
+    file: str
+    unit: str
+    target: str
+    waits: bool
+
+
+def _unit(parts: Sequence[str]) -> str:
+    """Name the part of the package that a module belongs to, given its path or dotted name below the package."""
+    units = (".".join(parts[:2]), parts[0])
+    return next((unit for unit in units if unit in LEVEL), parts[0])
+
+
+def _parts(path: Path) -> tuple[str, ...]:
+    """The dotted name of a file's module below the package; the front of a folder has the folder's name."""
+    parts = path.relative_to(PACKAGE).with_suffix("").parts
+    return parts[:-1] if parts[-1] == "__init__" else parts
+
+
+def _targets(node: ast.stmt) -> Iterator[str]:
+    if isinstance(node, ast.Import):
+        yield from (alias.name for alias in node.names)
+    elif isinstance(node, ast.ImportFrom):
+        assert node.level == 0, "imports are absolute"
+        assert node.module is not None
+        if node.module == "gqm_sym":
+            yield from (f"gqm_sym.{alias.name}" for alias in node.names)
+        else:
+            yield node.module
+
+
+def _waits(node: ast.AST) -> bool:
+    """Whether what stands inside does not run when the file is imported."""
+    if isinstance(node, ast.If):
+        return isinstance(node.test, ast.Name) and node.test.id == "TYPE_CHECKING"
+    return isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef)
+
+
+LEVEL = {unit: level for level, layer in enumerate(LAYERS) for unit in layer}
+FILES = {
+    _parts(path): path for path in sorted(PACKAGE.rglob("*.py")) if not {"_templates", "__pycache__"} & set(path.parts)
+}
+
+
+def _modules(target: str, names: Sequence[str]) -> Iterator[str]:
+    """The modules that ``from target import names`` needs: submodules where the names are some, else the target."""
+    for name in names or [""]:
+        inside = (*target.split(".")[1:], name)
+        yield f"{target}.{name}" if inside in FILES else target
+
+
+def _imports() -> Iterator[Import]:
+    for parts, path in FILES.items():
+        tree = ast.parse(path.read_text(encoding="utf-8"))
+        inside = {id(node) for outer in ast.walk(tree) if _waits(outer) for node in ast.walk(outer)}
+        for node in ast.walk(tree):
+            if isinstance(node, ast.stmt):
+                names = [alias.name for alias in node.names] if isinstance(node, ast.ImportFrom) else []
+                for target in _targets(node):
+                    for module in _modules(target, names):
+                        file = path.relative_to(PACKAGE).as_posix()
+                        yield Import(file, _unit(parts) if parts else "", module, id(node) in inside)
+
+
+IMPORTS = tuple(_imports())
+
+
+def _upward(rows: Iterable[Import]) -> list[str]:
+    """The imports that do not go downwards; the package's front imports all units, waiting."""
+    wrong = []
+    for row in rows:
+        if not row.target.startswith("gqm_sym.") or not row.unit or (row.file, row.target) in PRESENTATION_HOOKS:
+            continue
+        unit = _unit(row.target.split(".")[1:])
+        knows = unit.split(".")[0] == "runtime" and row.unit.split(".")[0] in KNOWS_NO_RUNTIME
+        if unit != row.unit and (LEVEL[unit] <= LEVEL[row.unit] or knows):
+            wrong.append(f"{row.file} imports {row.target}")
+    return wrong
+
+
+def test_every_unit_has_its_place() -> None:
+    """A new file or folder of the package is put into the table before anything imports it."""
+    assert {_unit(parts) for parts in FILES if parts} == set(LEVEL)
+
+
+def test_imports_go_downwards() -> None:
+    """No unit imports one beside or above it but for the presentation hooks."""
+    assert _upward(IMPORTS) == []
+
+
+@pytest.mark.parametrize("unit", sorted(set(LEVEL) - {"cli"}))
+def test_an_upward_import_is_noticed(unit: str) -> None:
+    """An import of the command line, the highest unit, from any other fails, also where it waits."""
+    file = next(path for parts, path in FILES.items() if parts and _unit(parts) == unit)
+    row = Import(file.relative_to(PACKAGE).as_posix(), unit, "gqm_sym.cli.gen", True)
+    assert _upward([row]) != []
+
+
+def test_there_are_no_import_circles() -> None:
+    """No file imports itself through others: waiting imports count, and those for type checkers; hooks do not."""
+    graph: dict[str, set[str]] = {}
+    names = {path.relative_to(PACKAGE).as_posix(): ".".join(("gqm_sym", *parts)) for parts, path in FILES.items()}
+    for row in IMPORTS:
+        if row.target.startswith("gqm_sym") and row.unit and (row.file, row.target) not in PRESENTATION_HOOKS:
+            graph.setdefault(names[row.file], set()).add(row.target)
+    assert list(TopologicalSorter(graph).static_order())  # raises CycleError, which names the circle
+
+
+def test_no_folder_holds_too_many_files() -> None:
+    """A folder that outgrows its reader is cut into rooms."""
+    counts = Counter(path.parent.relative_to(PACKAGE).as_posix() for path in FILES.values())
+    assert {folder: count for folder, count in counts.items() if count > MAX_FILES} == {}
+
+
+def test_each_room_says_what_it_is_for() -> None:
+    """The front of a folder begins with one line about it."""
+    for parts, path in FILES.items():
+        if path.name == "__init__.py":
+            doc = ast.get_docstring(ast.parse(path.read_text(encoding="utf-8")))
+            assert doc, parts
+
+
+def test_the_front_loads_nothing_heavy() -> None:
+    """What ``import gqm_sym`` runs at once is the errors alone."""
+    loaded = {row.target for row in IMPORTS if not row.unit and not row.waits}
+    outside = {target for target in loaded if target.split(".")[0] not in sys.stdlib_module_names}
+    assert outside <= {"gqm_sym.errors"}
+
+
+@pytest.mark.parametrize("package", ONLY_IN)
+def test_a_package_is_imported_where_it_belongs(package: str) -> None:
+    """Each dependency has its units; what they need of it, others ask them for."""
+    users = {row.unit.split(".")[0] for row in IMPORTS if row.target.split(".")[0] == package}
+    assert users <= ONLY_IN[package]
+
+
+def test_no_other_package_is_imported() -> None:
+    """The dependencies are those of the table above and the standard library."""
+    names = {row.target.split(".")[0] for row in IMPORTS}
+    assert names - sys.stdlib_module_names - {"gqm_sym"} <= set(ONLY_IN)
+
+
+def test_some_imports_wait() -> None:
+    """Packages that few calls need are imported inside the functions that need them."""
+    eager = [row.file for row in IMPORTS if row.target.split(".")[0] in ONLY_INSIDE_FUNCTIONS and not row.waits]
+    assert eager == []

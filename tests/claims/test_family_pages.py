@@ -1,0 +1,15 @@
+"""Every family has a page of documentation that is what its derivation says."""
+
+import runpy
+
+from paths import ROOT
+
+import gqm_sym as gqm
+
+
+def test_pages_are_current() -> None:
+    """The committed pages are those that the script writes, one for each family and an index."""
+    pages = runpy.run_path(str(ROOT / "scripts" / "make_family_pages.py"))["pages"]()
+    assert {path.stem for path in pages} == {"index", *gqm.families.names()}
+    for path, text in pages.items():
+        assert path.read_text(encoding="utf-8") == text, f"{path.name}: run make generate"

@@ -1,0 +1,362 @@
+"""Full disks, killed runs, damaged caches, old modules: correct output, or one clear error and nothing half done."""
+
+import ctypes
+import errno
+import importlib.util
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numba
+import pytest
+from numba import types
+from numba.core import event
+from numba.core.caching import IndexDataCacheFile
+from paths import ROOT
+
+import gqm_sym as gqm
+from gqm_sym.building import load, write_module
+from gqm_sym.errors import OutdatedModuleError
+from gqm_sym.runtime.compiled import jit
+from gqm_sym.runtime.compiled.numba_internals import KeyedCache
+from gqm_sym.runtime.interface import INTERFACE
+
+FILE = "name: bowl\ntitle: Größe λ\ncurve: {graph: {z: 6*x**2, parameter: x}}\nkernel: {gravity: {}}\n"
+GENERATE = "import sys\nfrom gqm_sym.cli.gen import main\n"
+PR_CAPBSET_DROP, CAP_DAC_OVERRIDE = 24, 1
+
+
+def python(code: str, *arguments: str | Path, before: Callable[[], None] | None = None, **environment: str) -> Any:
+    """Run Python code in a fresh process."""
+    return subprocess.run(
+        [sys.executable, "-c", code, *map(str, arguments)],
+        cwd=ROOT,
+        env=os.environ | environment,
+        capture_output=True,
+        check=False,
+        preexec_fn=before,
+    )
+
+
+def unprivileged() -> None:
+    """Give up root's right to write what is read-only; others do not have it."""
+    ctypes.CDLL(None).prctl(PR_CAPBSET_DROP, CAP_DAC_OVERRIDE, 0, 0, 0)
+
+
+def names_in(folder: Path) -> list[str]:
+    """List a folder."""
+    return sorted(entry.name for entry in folder.iterdir())
+
+
+@pytest.fixture(scope="module")
+def text() -> str:
+    """Give the text of a small module."""
+    return gqm.emit(gqm.derive(gqm.Curve.graph("6*x**2"), gqm.Gravity()), name="bowl")
+
+
+@pytest.fixture
+def yaml(tmp_path: Path) -> Path:
+    """Write a small curve file, in a folder of its own."""
+    path = tmp_path / "in" / "bowl.yaml"
+    path.parent.mkdir()
+    path.write_text(FILE, encoding="utf-8")
+    return path
+
+
+# The cache of compiled code
+
+
+@pytest.fixture
+def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Give a cache folder that nothing else uses."""
+    monkeypatch.setattr(numba.config, "CACHE_DIR", str(tmp_path / "cache"))
+    return tmp_path / "cache"
+
+
+@pytest.fixture
+def function(tmp_path: Path) -> Callable[..., Callable[[float], float]]:
+    """Make an entry point that adds a number, from a source file that is always the same to numba, or of some time."""
+
+    def make(number: float, time: int = 1_000_000_000) -> Callable[[float], float]:
+        path = tmp_path / "source.py"
+        path.write_text(f"def add(x):\n    return x + {number:4.1f}\n", encoding="utf-8")
+        os.utime(path, (time, time))
+        spec = importlib.util.spec_from_file_location("source", path)
+        module = importlib.util.module_from_spec(spec)
+        sys.modules["source"] = module
+        exec(compile(path.read_text(encoding="utf-8"), str(path), "exec"), module.__dict__)  # noqa: S102
+        return jit.entry(types.float64(types.float64))(module.add)
+
+    return make
+
+
+def _damage(cache: Path, pattern: str, content: Callable[[bytes], bytes]) -> None:
+    files = list(cache.rglob(pattern))
+    assert files
+    for path in files:
+        path.write_bytes(content(path.read_bytes()))
+
+
+@pytest.mark.parametrize(
+    "content",
+    [lambda _: b"", lambda data: data[: len(data) // 2], lambda data: data[:-1], lambda _: bytes(range(256)) * 9],
+    ids=["empty", "half", "a byte short", "noise"],
+)
+def test_a_damaged_cache_is_made_anew(
+    content: Callable[[bytes], bytes], cache: Path, function: Callable[[float], Any]
+) -> None:
+    """Files that were cut off or overwritten cost a compilation, and are whole afterwards."""
+    assert function(2.0)(1.0) == 3.0
+    _damage(cache, "*.nbc", content)
+    assert function(2.0)(1.0) == 3.0
+    with event.install_recorder("numba:compile") as compiled:
+        assert function(2.0)(1.0) == 3.0
+    assert not compiled.buffer
+
+
+def test_a_cache_of_other_code_is_not_used(
+    cache: Path, function: Callable[[float], Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Another runtime at the same place, with the same times and sizes, gets code of its own."""
+    assert function(2.0)(1.0) == 3.0
+    monkeypatch.setattr(jit, "STAMP", "another")
+    assert function(5.0)(1.0) == 6.0
+
+
+def test_killed_between_two_files_of_the_cache(
+    cache: Path, function: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """An edit whose code was never kept is not answered by the code from before it."""
+    assert function(2.0)(1.0) == 3.0
+    with monkeypatch.context() as patch:
+        patch.setattr(IndexDataCacheFile, "_save_data", lambda *_: None)
+        assert function(5.0, 1_100_000_000)(1.0) == 6.0
+    assert function(5.0, 1_100_000_000)(1.0) == 6.0
+
+
+def test_two_at_once_keep_their_own_code(
+    cache: Path, function: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Two versions that are kept at the same time, the one while the other is, are not taken for each other."""
+    save, waiting = IndexDataCacheFile._save_data, ["once"]
+
+    def save_later(self: Any, name: str, data: Any) -> None:
+        if waiting:
+            waiting.clear()
+            for index in cache.rglob("*.nbi"):
+                index.unlink()  # as if the other had looked before it was written
+            with monkeypatch.context() as patch:
+                patch.setattr(jit, "STAMP", "another")
+                assert function(5.0)(1.0) == 6.0
+        save(self, name, data)
+
+    monkeypatch.setattr(IndexDataCacheFile, "_save_data", save_later)
+    assert function(2.0)(1.0) == 3.0
+    monkeypatch.undo()
+    monkeypatch.setattr(numba.config, "CACHE_DIR", str(cache))
+    monkeypatch.setattr(jit, "STAMP", "another")
+    assert function(5.0)(1.0) == 6.0
+
+
+def test_inner_functions_know_the_stamp_too() -> None:
+    """What compiled code calls is kept under the same key: else an edit of what that calls would not be seen."""
+    from gqm_sym.runtime.arithmetic.doubledouble import two_sum
+
+    assert isinstance(two_sum.dispatcher._cache, KeyedCache)
+
+
+@pytest.mark.parametrize("number", [errno.ENOSPC, errno.EROFS, errno.EACCES])
+def test_a_cache_that_cannot_be_written(
+    number: int, cache: Path, function: Callable[[float], Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A full disk, or a folder that became read-only, costs a compilation in every process, and nothing else."""
+
+    def fail(*_: Any) -> Any:
+        raise OSError(number, os.strerror(number))
+
+    monkeypatch.setattr(IndexDataCacheFile, "_open_for_write", fail)
+    assert function(2.0)(1.0) == 3.0
+    assert not list(cache.rglob("*.nb?"))
+
+
+def test_no_folder_for_a_cache(monkeypatch: pytest.MonkeyPatch, function: Callable[[float], Any]) -> None:
+    """Where nothing can be written at all, everything works, compiled anew in every process."""
+    monkeypatch.setattr(KeyedCache._impl_class, "_locator_classes", [])
+    assert jit.COMPILER.cache_of(function(2.0)) is None
+    assert function(2.0)(1.0) == 3.0
+
+
+# Modules
+
+
+def test_a_module_of_an_older_interface_is_named(text: str, tmp_path: Path) -> None:
+    """Names that the runtime no longer has are not asked for before the version: the message says what to run."""
+    path = tmp_path / "old.py"
+    old = text.replace(f"interface={INTERFACE})", f"interface={INTERFACE - 1})")
+    for name in ("BEND", "CompiledModel"):
+        path.write_text(old.replace(f"    {name},\n", f"    {name},\n    GONE,\n"), encoding="utf-8")
+        assert "GONE" in path.read_text(encoding="utf-8")
+        with pytest.raises(OutdatedModuleError, match=rf"old\.py: .*interface {INTERFACE - 1} .*run gqm-gen"):
+            load(path, "old")
+    path.write_text(old.replace("runtime.vocabulary", "runtime.gone"), encoding="utf-8")
+    with pytest.raises(OutdatedModuleError, match="run gqm-gen"):
+        load(path, "old")
+
+
+WRITE_AND_LOAD = """
+import sys
+from pathlib import Path
+from gqm_sym.building import load, write_module
+text, path = Path(sys.argv[1]).read_text(encoding="utf-8"), sys.argv[2]
+write_module(text, path)
+load(path, "small")
+print("loaded")
+"""
+# As gqm-gen writes them, with one function instead of seven: eight processes compile it, whichever is first.
+SMALL = f"""from numba import carray
+
+from gqm_sym.runtime import compiler
+from gqm_sym.runtime.vocabulary import CLIMB
+
+compiled = compiler(__file__, interface={INTERFACE})
+
+
+@compiled(CLIMB)
+def climb(n, places, p, out):
+    out = carray(out, (2, n))
+    for i in range(n):
+        out[0, i] = out[1, i] = 1.0
+"""
+
+
+def test_eight_processes_at_once(tmp_path: Path) -> None:
+    """All write and import the same module, with one cache: each gets it whole, and nothing is left beside it."""
+    source, path = tmp_path / "text", tmp_path / "out" / "small.py"
+    source.write_text(SMALL, encoding="utf-8")
+    environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path / "cache")}
+    command = [sys.executable, "-c", WRITE_AND_LOAD, str(source), str(path)]
+    running = [subprocess.Popen(command, cwd=ROOT, env=environment, stdout=subprocess.PIPE) for _ in range(8)]
+    printed = [process.communicate()[0] for process in running]
+    assert [process.returncode for process in running] == [0] * 8
+    assert printed == [b"loaded\n"] * 8
+    assert names_in(path.parent) == ["small.py"]
+    assert path.read_text(encoding="utf-8") == SMALL
+
+
+KILLED = """
+import os, signal, sys
+from gqm_sym.cli.gen import main
+number = getattr(signal, sys.argv.pop(1))
+os.fsync = lambda _: os.kill(os.getpid(), number)
+sys.exit(main(["-q", *sys.argv[1:]]))
+"""
+
+
+def test_killed_while_writing(yaml: Path, text: str) -> None:
+    """The module that was there stays whole; the next run writes the new one."""
+    out = yaml.parent / "out"
+    target = out / "bowl.py"
+    write_module(text, target)
+    assert python(KILLED, "SIGKILL", "-o", out, yaml).returncode == -signal.SIGKILL
+    assert target.read_text(encoding="utf-8") == text
+    assert python(GENERATE + "sys.exit(main(['-q', *sys.argv[1:]]))", "-o", out, yaml).returncode == 0
+    assert "Größe λ" in target.read_text(encoding="utf-8")
+
+
+def test_interrupted_while_writing(yaml: Path) -> None:
+    """Ctrl-C ends with 130 and one line, and no file is there, whole or partial."""
+    out = yaml.parent / "out"
+    done = python(KILLED, "SIGINT", "-o", out, yaml)
+    assert (done.returncode, done.stdout, done.stderr) == (130, b"", b"gqm-gen: interrupted\n")
+    assert names_in(out) == []
+
+
+INTERRUPTED = """
+import os, signal, sys, threading
+from gqm_sym.cli.gen import main
+import gqm_sym.derivation
+threading.Timer(0.3, lambda: os.kill(os.getpid(), signal.SIGINT)).start()
+sys.exit(main(["-q", *sys.argv[1:]]))
+"""
+
+
+def test_interrupted_while_deriving(yaml: Path) -> None:
+    """So it does in the middle of a long derivation."""
+    out = yaml.parent / "out"
+    terms = "+".join(f"sin({n}*x)*cos(x**{n})" for n in range(1, 150))
+    yaml.write_text(FILE.replace("6*x**2", terms), encoding="utf-8")
+    done = python(INTERRUPTED, "-o", out, yaml)
+    assert (done.returncode, done.stdout, done.stderr) == (130, b"", b"gqm-gen: interrupted\n")
+    assert not out.exists()
+
+
+RING = "name: ring\ncurve: {implicit: {F: x**2 + z**2 - 1, start: [0, -1]}}\nkernel: {gravity: {}}\n"
+# What is interrupted, the how-manieth call of it (a module is written first), and the command.
+STAGES = {
+    "a chart": ("gqm_sym.runtime.launch.formulas.Formulas.charted", 1, ["solve", "ring.yaml"]),
+    "a figure": ("os.fsync", 2, ["plot", "ring.yaml", "ring.svg"]),
+    "a page": ("os.fsync", 2, ["report", "ring.yaml"]),
+}
+INTERRUPTED_AT = """
+import os, pkgutil, signal, sys
+from gqm_sym.cli.tool import main
+place, left, folder = sys.argv.pop(1), int(sys.argv.pop(1)), sys.argv.pop(1)
+home, _, name = place.rpartition(".")
+home = pkgutil.resolve_name(home)
+plain = getattr(home, name)
+def interrupted(*arguments):
+    global left
+    left -= 1
+    if not left:
+        os.kill(os.getpid(), signal.SIGINT)
+    return plain(*arguments)
+setattr(home, name, interrupted)
+os.chdir(folder)
+sys.exit(main(sys.argv[1:]))
+"""
+
+
+@pytest.mark.parametrize("stage", STAGES)
+def test_interrupted_at_work(stage: str, tmp_path: Path) -> None:
+    """So it does while a chart is made, and while a figure or a page is written."""
+    (tmp_path / "ring.yaml").write_text(RING + "launch: {lam0: 0, v0: 1}\n", encoding="utf-8")
+    place, call, arguments = STAGES[stage]
+    done = python(INTERRUPTED_AT, place, str(call), tmp_path, *arguments)
+    assert (done.returncode, done.stdout, done.stderr) == (130, b"", b"gqm: interrupted\n")
+    assert names_in(tmp_path) == ["ring.yaml"]
+
+
+def test_a_folder_that_cannot_be_written(yaml: Path) -> None:
+    """The error names it; what is in it stays."""
+    out = yaml.parent / "out"
+    out.mkdir()
+    out.chmod(0o555)
+    done = python(GENERATE + "sys.exit(main(['-q', *sys.argv[1:]]))", "-o", out, yaml, before=unprivileged)
+    assert done.returncode == 2
+    assert done.stderr.startswith(b"gqm-gen: ")
+    assert str(out).encode() in done.stderr
+    assert done.stderr.count(b"\n") == 1
+    assert names_in(out) == []
+
+
+@pytest.mark.parametrize(
+    "environment",
+    [
+        {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"},
+        {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONIOENCODING": "latin-1"},
+        {"LC_ALL": "tr_TR.UTF-8", "LANG": "tr_TR.UTF-8", "TZ": "Pacific/Kiritimati"},
+        {"PYTHONOPTIMIZE": "2", "PYTHONWARNINGS": "error"},
+    ],
+    ids=["C", "Latin-1", "Turkish", "optimised, with warnings as errors"],
+)
+def test_no_setting_changes_the_text(environment: dict[str, str], yaml: Path) -> None:
+    """The file's bytes do not depend on locale, encoding, time zone or Python's flags; printing never fails."""
+    out, expected = yaml.parent / "out", yaml.parent / "expected"
+    assert python(GENERATE + "sys.exit(main(sys.argv[1:]))", "-o", expected, yaml).returncode == 0
+    done = python(GENERATE + "sys.exit(main(sys.argv[1:]))", "-o", out, yaml, **environment)
+    assert (done.returncode, done.stderr) == (0, b"")
+    assert (out / "bowl.py").read_bytes() == (expected / "bowl.py").read_bytes()

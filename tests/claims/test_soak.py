@@ -1,0 +1,114 @@
+"""The checks of ``make soak``: a right motion passes them, and one that breaks a law does not."""
+
+import random
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from types import ModuleType, SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from paths import ROOT
+
+sys.path.append(str(ROOT / "scripts"))
+
+import soak
+
+SLOW = {"lam0": -1.0, "v0": 2.0116e-06, "direction": 1, "h": 0.18013, "g": 7.62668, "m": 1.0}
+
+
+@pytest.fixture(scope="module")
+def well(generated_folder: Path) -> ModuleType:
+    """Two wells with a hill between."""
+    import gqm_sym as gqm
+
+    curve = gqm.Curve.graph("h*(x**4 - 2*x**2)", parameters={"h": "1/4"})
+    return gqm.build(gqm.derive(curve, gqm.Gravity()), name="soaked_well", folder=generated_folder)
+
+
+def test_a_slow_launch_from_the_bottom_of_a_well(well: ModuleType) -> None:
+    """V**2 is right to a bit of the place, though pass 1 subtracts parts that are a million times as large.
+
+    Found by seed 3: held against pass 1, its energy was off by 5.5e-10 of V**2, which is what pass 1 leaves.
+    """
+    motion = well.solve(**SLOW)
+    state = motion.state(np.linspace(0.0, motion.period, 400))
+    told, rounding = soak.exactly(well, state.lam, SLOW)
+    assert rounding == 0.0
+    bit = np.spacing(np.abs(state.lam))
+    above, below = (soak.exactly(well, state.lam + side * bit, SLOW)[0] for side in (1.0, -1.0))
+    slope = np.abs(above - below)
+    assert np.max(np.abs(state.v2 - told) - slope) <= 1e-14 * SLOW["v0"] ** 2
+    assert np.max(np.abs(well.pass1(state.lam, **SLOW).v2 - told)) > 1e-10 * SLOW["v0"] ** 2
+    assert soak.faults(well, SLOW, random.Random(0), closely=True) == []
+    # Doubles leave too little of so small a V**2: forty digits are taken unasked.
+    loosely, unsure = soak.speed_squared(well, motion, state.lam, bit, SLOW, False, SLOW["v0"] ** 2)
+    assert np.array_equal(loosely, told)
+    assert np.max(unsure) <= 2e-9 * SLOW["v0"] ** 2
+
+
+def _with(motion: Any, **changes: Callable[..., Any]) -> SimpleNamespace:
+    names = ("kind", "legs", "turning_points", "t_end", "state", "lam", "error_bound", "time_at", "problem", "_course")
+    told = {name: getattr(motion, name) for name in names}
+    if motion.kind != "rest":
+        told["period"] = motion.period
+    return SimpleNamespace(**told | changes)
+
+
+def _scaled(state: Any, name: str, factor: float) -> Any:
+    return state._replace(**{name: getattr(state, name) * factor})
+
+
+WRONG: dict[str, tuple[str, Callable[[Any], dict[str, Any]]]] = {
+    "energy": ("energy", lambda motion: {"state": lambda t: _scaled(motion.state(t), "v2", 1.0 + 1e-9)}),
+    "not a number": ("not finite", lambda motion: {"state": lambda t: _scaled(motion.state(t), "x", np.nan)}),
+    "order": ("legs out of order", lambda motion: {"legs": motion.legs[::-1]}),
+    "period": ("not periodic", lambda motion: {"lam": lambda t: motion.lam(t) * (1.0 + 1e-9)}),
+    "passage": ("first passage late", lambda motion: {"time_at": lambda lam: motion.time_at(lam) + motion.period}),
+    "launch": ("not as launched", lambda motion: {"state": lambda t: motion.state(t + 1e-9)}),
+    "sense": ("runs against its leg", lambda motion: {"state": lambda t: _scaled(motion.state(t), "v", -1.0)}),
+    "turning points": ("beyond a turning point", lambda motion: {"turning_points": (-1.0, -0.9)}),
+}
+
+
+@pytest.mark.parametrize("law", WRONG)
+def test_a_broken_law_is_reported(law: str, well: ModuleType) -> None:
+    """Each law is looked at."""
+    call = SLOW | {"v0": 0.5}
+    motion = well.solve(**call)
+    wrong = _with(motion, **WRONG[law][1](motion))
+    tampered = SimpleNamespace(MODEL=well.MODEL, PARAMETERS=well.PARAMETERS, pass1=well.pass1, sweep=well.sweep)
+    tampered.solve = lambda **_: motion
+    assert soak.faults(tampered, call, random.Random(0), closely=True) == []
+    tampered.solve = lambda **_: wrong
+    assert any(found.startswith(WRONG[law][0]) for found in soak.faults(tampered, call, random.Random(0), closely=True))
+
+
+@pytest.mark.parametrize("closely", [True, False])
+def test_charts_are_held_to_their_heights(closely: bool, generated_folder: Path) -> None:
+    """A circle known as F = 0, through all of which V**2 follows the height."""
+    import gqm_sym as gqm
+
+    ring = gqm.Curve.implicit("x**2 + z**2 - 1", start=(0, -1))
+    module = gqm.build(gqm.derive(ring, gqm.Gravity()), name="soaked_ring", folder=generated_folder)
+    call = {"lam0": 0.5, "v0": 1.0, "direction": 1, "g": 9.81, "m": 1.0}
+    assert soak.faults(module, call, random.Random(0), closely=closely) == []
+
+
+def test_a_body_at_rest_stays(well: ModuleType) -> None:
+    """At the bottom, without speed; and one that moves there is reported."""
+    call = SLOW | {"v0": 0.0}
+    assert soak.faults(well, call, random.Random(0), closely=True) == []
+    motion = well.solve(**call)
+    moves = _with(motion, state=lambda t: motion.state(t)._replace(lam=np.full(len(t), -1.1)))
+    tampered = SimpleNamespace(MODEL=well.MODEL, PARAMETERS=well.PARAMETERS, solve=lambda **_: moves)
+    assert soak.faults(tampered, call, random.Random(0), closely=True) == ["not as launched", "moves at rest"]
+
+
+def test_a_sweep_that_differs_is_reported(well: ModuleType) -> None:
+    """By more than four units in the last place."""
+    call = SLOW | {"v0": 0.5}
+    period = well.solve(**call).period
+    assert soak.swept(well, call, period) == []
+    assert soak.swept(well, call, period * (1.0 + 2e-15))

@@ -1,0 +1,47 @@
+"""The runtime as plain Python: the same answers as compiled, so that what is measured and tried there counts here."""
+
+import json
+import os
+import subprocess
+import sys
+from typing import Any
+
+import numpy as np
+import pytest
+from paths import ROOT
+
+SOLVE = """
+import json, sys
+import numba
+if numba.config.DISABLE_JIT:
+    sys.path.append("tests/support")
+    import uncompiled
+    uncompiled.install()
+from gqm_sym.building import load
+pendulum, drag = (load(f"generated/{name}.py", name) for name in ("pendulum", "circle_drag"))
+motion, lost = pendulum.solve("-pi/2 + 6/5"), drag.solve("1/2", v0="3")
+loads = pendulum.pass1([0.1, -0.2, 40.0], lam0=0.1, v0=1.0)
+swept = pendulum.sweep("period", lam0=[-1.5, -1.0, 0.5], v0=0.25)
+values = [motion.half_period, *motion.lam([0.1, 1.0, 1e6]).tolist(), *motion.state(0.7)[1:], lost.lam(2.5)]
+print(json.dumps([*map(float, values), *swept.values.tolist(), *loads.v2.tolist(), *loads.x.tolist()]))
+"""
+# Of elementary functions, and of sums of them: a few units in the last place.
+SAME = 4e-15
+
+
+def _run(**environment: str) -> Any:
+    done = subprocess.run(
+        [sys.executable, "-c", SOLVE],
+        cwd=ROOT,
+        env=os.environ | environment,
+        capture_output=True,
+        check=False,
+        text=True,
+    )
+    assert done.returncode == 0, done.stderr
+    return np.array(json.loads(done.stdout))
+
+
+def test_python_runs_what_numba_compiles() -> None:
+    """A motion, late positions, a leg with drag, a sweep and a load map; NaN where they are NaN."""
+    assert _run(NUMBA_DISABLE_JIT="1") == pytest.approx(_run(), rel=SAME, abs=SAME, nan_ok=True)

@@ -1,0 +1,265 @@
+"""Emitted text: what it may hold, what it must refuse, and its numbers against those of the declaration."""
+
+import ast
+import dataclasses
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+import sympy as sp
+from emitted import audit, check_numbers, declared, oracle
+from mpmath import mp, mpf
+
+import gqm_sym as gqm
+from gqm_sym.derivation import Model
+from gqm_sym.emission import body_digests
+from gqm_sym.emission.render import INTERFACE
+from gqm_sym.errors import EmissionError, ExpressionError, GQMError, InputError
+from gqm_sym.runtime import interface
+
+# Formulas of 60 digits, with some for rounding.
+EXACT = mpf("1e-56")
+
+# An inner function that bends, in (0.1, 0.7) on the places below.
+W = "(u/2 + u**2/9)"
+HEADS = {
+    **{name: f"{name}{W}" for name in ("sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh")},
+    **{name: f"{name}{W}" for name in ("asinh", "atanh", "exp", "log", "sqrt", "abs", "cot", "sec", "csc", "coth")},
+    "acosh": f"acosh(1 + {W})",
+    "ln": f"ln{W}",
+    "cbrt": f"cbrt{W}",
+    "kink": "abs(u - 3/5)*u",
+    **{f"power {n}": f"{W}**({n})" for n in (2, 3, 4, 7, -1, -2, -3)},
+    **{f"power {n}": f"{W}**({n})" for n in ("1/2", "3/2", "5/2", "-1/2", "-3/2", "1/3", "-7/5", "sqrt(2)", "-pi")},
+    "parameter as exponent": f"{W}**k",
+    "parameter as base": "k**u",
+    "both": "u**u",
+    "product": "sin(u)*exp(-k*u)*u/(1 + u**2)",
+    "nested": "sin(exp(u/2)*cos(k*u))",
+    "constants": "pi*u**2 + e*u + exp(2)",
+    "many digits": "3.14159265358979323846*u**2 + u/3.0000000000000000000001",
+    "large": "1e30*u**2 + 12345678901234567890123*u",
+    "small": "1e-30*u**2",
+}
+# Every name that emitted functions have for something of their own.
+TAKEN = (
+    "a",
+    "b",
+    "d",
+    "da",
+    "db",
+    "i",
+    "n",
+    "p",
+    "v2",
+    "w0",
+    "level",
+    "places",
+    "speeds",
+    "offsets",
+    "left",
+    "right",
+    "lo",
+    "hi",
+)
+
+TITLES = (
+    "quotes \" and '",
+    '""" + __import__("os").system("true") + """',
+    "'''\nimport os\n'''",
+    "a backslash \\",
+    '\\"""\\',
+    "\\N{BULLET} \\x41 \\u0041",
+    "lines\nof\r\ntext\x0b\x0c\x1c\u2028\x85end",
+    "# a comment, */ an end --> of one ?> %> {{ title }} {% for x in y %} {# #}",
+    "bidi \u202e\u2066reversed\u2069 \u200f",
+    "zero \x00 width \u200b and \x1b[31m",
+    "alone \ud800",
+    "Bahn \N{LATIN SMALL LETTER U WITH DIAERESIS}ber \u4e2d\u6587",
+    "   ",
+)
+
+
+def refuses(name: str) -> Model:
+    """Derive a motion with a run-time parameter of that name, whose functions need helpers."""
+    return declared(f"cos(u) + {name}*u", **{name: "1"})
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Where the modules of this file are written."""
+    return tmp_path_factory.mktemp("emitted")
+
+
+def test_the_interface_is_the_runtimes() -> None:
+    """The emitter does not import the runtime, but writes for the version that there is."""
+    assert INTERFACE == interface.INTERFACE
+
+
+@pytest.mark.parametrize("head", HEADS)
+def test_numbers_of_every_head(head: str, folder: Path) -> None:
+    """Compiled values, differences and bounds are those of the declared text; exact forms to 60 digits."""
+    text = HEADS[head]
+    values = {"k": 1.6875} if "k" in re.findall(r"\w+", text) else {}
+    model = declared(text, **{name: str(value) for name, value in values.items()})
+    module = gqm.build(model, name=f"head{list(HEADS).index(head)}", folder=folder)
+    audit(gqm.emit(model, name="head"))
+    check_numbers(module, text, values, kink=0.6 if head == "kink" else None)
+    exact, place = module.MODEL.exact, mpf("0.375")
+    with mp.workdps(60):
+        p = (*(mpf(v) for v in values.values()), mpf("9.75"), mpf(2))
+        z, slope, bend = oracle(text, ("u", *values))(place, *(mpf(v) for v in values.values()))
+        ds = mp.sqrt(1 + slope**2)
+        size = abs(z) + abs(slope) + abs(bend)
+        for name, truth, scale in (
+            ("x", place, 1),
+            ("z", z, size),
+            ("ds", ds, ds),
+            ("kappa", bend / ds**3, size / ds**3),
+            ("reaction", p[-2] / ds, p[-2] / ds),
+            ("climb", 2 * p[-2] * z, p[-2] * size),
+            ("climb_slope", 2 * p[-2] * slope, p[-2] * size),
+        ):
+            assert abs(getattr(exact, name)(mp, place, p) - truth) <= EXACT * scale, name
+        assert module.MODEL.domain_of(mp, p) == (None, None, None)
+
+
+def test_exact_domain(folder: Path) -> None:
+    """Ends and period are evaluated in any arithmetic, with no rational number rounded."""
+    curve = gqm.Curve.parametric(x="cos(u)", z="sin(u)", parameter="u", domain=("-k/3", "e"), period="2*pi")
+    module = gqm.build(gqm.derive(curve, gqm.Gravity(), parameters={"k": 1}), name="domain", folder=folder)
+    with mp.workdps(60):
+        low, high, period = module.MODEL.domain_of(mp, (mpf(1), mpf(1), mpf(1)))
+        assert max(abs(low + mpf(1) / 3), abs(high - mp.e), abs(period - 2 * mp.pi)) <= EXACT
+
+
+def test_taken_names_as_parameters(folder: Path) -> None:
+    """Run-time parameters may have all the names of ours at once, and keep their meaning."""
+    terms = (f"{name}*{f}" for name, f in zip(TAKEN, ("sin(u)", "exp(u)", "u**3", "cosh(u/2)") * 5, strict=False))
+    values = {name: 0.5 + k / 8 for k, name in enumerate(TAKEN)}
+    text = " + ".join(terms)
+    model = declared(text, **{name: str(value) for name, value in values.items()})
+    audit(gqm.emit(model, name="taken"))
+    check_numbers(gqm.build(model, name="taken", folder=folder), text, values)
+
+
+@pytest.mark.parametrize("name", ["a", "b", "d", "da", "i", "n", "p", "w0", "v2", "places", "left", "lo", "lam", "x"])
+def test_taken_names_as_the_curves_parameter(name: str, folder: Path) -> None:
+    """The curve's parameter may have any of them too."""
+    text, values = f"k*cos({name}) + {name}**2/3", {"k": 1.5}
+    module = gqm.build(declared(text, parameter=name, k="1.5"), name=f"along_{name}", folder=folder)
+    check_numbers(module, text, values, name)
+    assert module.pass1([0.5], lam0=0, v0=1).x == [0.5]
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        *("frame", "climb", "rise", "bend", "bounds", "pass1", "solve", "op", "Any", "MODEL", "PARAMETERS", "FRAME"),
+        *("carray", "compiled", "compiler", "range", "fabs", "nearest", "Motion", "CompiledModel", "exact_z"),
+        *("cos1", "cos2", "iconst", "imul", "isin"),
+    ],
+)
+def test_names_of_the_module_are_refused(name: str) -> None:
+    """What an emitted module calls something, no parameter may be called; the message names it."""
+    with pytest.raises(EmissionError, match=rf"^{name}: "):
+        gqm.emit(refuses(name), name="refused")
+
+
+@pytest.mark.parametrize("name", ["lam", "lam0", "v0", "t_max", "contact", "quantity", "x", "z", "class", "sin", "pi"])
+def test_reserved_names_never_come_so_far(name: str) -> None:
+    """Names with another meaning are refused when they are declared."""
+    with pytest.raises(GQMError, match=name):
+        refuses(name)
+
+
+@pytest.mark.parametrize("title", TITLES, ids=range(len(TITLES)))
+def test_a_title_changes_the_docstring_alone(title: str) -> None:
+    """Whatever a title holds, it is text of one line within the docstring, and nothing else changes."""
+    text = gqm.emit(declared("k*u**2", title=title), name="hostile")
+    tree, plain = audit(text), audit(gqm.emit(declared("k*u**2", title="plain"), name="hostile"))
+    line, rest = ast.get_docstring(tree, clean=False).split("\n", 1)
+    assert rest == ast.get_docstring(plain, clean=False).split("\n", 1)[1]
+    assert line == "".join(c if c.isprintable() else " " for c in title).replace('"', "'").rstrip()
+    assert [ast.dump(node) for node in tree.body[1:]] == [ast.dump(node) for node in plain.body[1:]]
+    assert all(c.isprintable() or c == "\n" for c in text)
+    assert text.encode().decode() == text
+
+
+@pytest.mark.parametrize(
+    "name", ["", "1st", "a-b", "a b", 'x"\nimport os', "../up", "a.b", "class", "\u00e9t\u00e9", None, 3]
+)
+def test_a_modules_name_is_an_identifier(name: str) -> None:
+    """Nothing else gets into the header or into a file's name."""
+    with pytest.raises(InputError, match="name: "):
+        gqm.emit(declared("u**2"), name=name)
+
+
+def test_the_same_model_gives_the_same_text() -> None:
+    """Derived and emitted anew, a declaration gives the same bytes."""
+    assert gqm.emit(declared("k*sin(u)/u"), name="again") == gqm.emit(declared("k*sin(u)/u"), name="again")
+
+
+def test_the_body_digest() -> None:
+    """The header states the digest of what follows it; a changed character is seen."""
+    text = gqm.emit(declared("u**2"), name="digest")
+    stated, actual = body_digests(text)
+    assert stated == actual
+    stated, actual = body_digests(text.replace("range(n)", "range( n)"))
+    assert stated != actual
+    assert body_digests("") is None
+    assert body_digests("# Made by gqm-gen\n# nothing\n") is None
+
+
+def test_the_input_digest() -> None:
+    """It changes with whatever the module was made from."""
+    inputs = [
+        gqm.emit(declared("k*u**2", k="1"), name="digest"),
+        gqm.emit(declared("k*u**2", k="1"), name="other"),
+        gqm.emit(declared("k*u**2", k="2"), name="digest"),
+        gqm.emit(declared("k*u**2", k="1", title="A title"), name="digest"),
+        gqm.emit(declared("k*u**2 + 1", k="1"), name="digest"),
+        gqm.emit(declared("k*v**2", k="1", parameter="v"), name="digest"),
+    ]
+    digests = [re.search(r"input ([0-9a-f]{12}),", text).group(1) for text in inputs]
+    assert len(set(digests)) == len(inputs)
+
+
+@pytest.mark.parametrize(
+    ("form", "name"),
+    [
+        (sp.I, "I"),
+        (sp.zoo, "zoo"),
+        (sp.nan, "nan"),
+        (sp.oo, "oo"),
+        (sp.Float("0.125"), "2.125000"),
+        (sp.Catalan, "Catalan"),
+        (sp.Function("f")(sp.Symbol("u", real=True)), "f"),
+        (sp.Function("sin")(sp.Symbol("u", real=True)), "sin"),
+        (sp.gamma(sp.Symbol("u", real=True)), "gamma"),
+        (sp.Max(1, sp.Symbol("u", real=True)), "Max"),
+        (sp.Piecewise((1, sp.Symbol("u", real=True) > 0), (2, True)), "Piecewise"),
+        (sp.Symbol("stray", real=True), "stray"),
+    ],
+    ids=lambda value: value if isinstance(value, str) else "",
+)
+@pytest.mark.parametrize("where", ["x", "climb_slope", "kappa"])
+def test_what_has_no_text_is_refused_by_name(form: sp.Expr, name: str, where: str) -> None:
+    """A model made by hand gets no further than one that was derived."""
+    with pytest.raises(EmissionError, match=rf"^{where}: {re.escape(name)}"):
+        gqm.emit(dataclasses.replace(declared("u**2"), **{where: 2 + form}), name="refused")
+
+
+@pytest.mark.parametrize("form", [sp.Function("f"), sp.gamma, sp.Heaviside, lambda u: u * sp.I, lambda u: u + sp.zoo])
+def test_sympy_expressions_are_refused_where_they_are_declared(form: Callable[[sp.Symbol], sp.Expr]) -> None:
+    """What is undefined, complex or infinite is refused before anything is derived."""
+    with pytest.raises(ExpressionError, match="graph: z: "):
+        gqm.Curve.graph(form(sp.Symbol("u")), parameter="u")
+
+
+@pytest.mark.parametrize("text", ["1e400*u", "1e-400*u"])
+def test_numbers_beyond_doubles_are_refused(text: str) -> None:
+    """Compiled code could hold no such number; the message says how large it is."""
+    with pytest.raises(EmissionError, match=r"10\*\*\d+ is beyond the range of doubles"):
+        gqm.emit(declared(text), name="beyond")

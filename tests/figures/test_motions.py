@@ -1,0 +1,100 @@
+"""Figures: what they show is what the motion says; files are written in the format asked for."""
+
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+import pytest
+
+import gqm_sym as gqm
+from gqm_sym.errors import InputError
+from gqm_sym.figures import motions
+
+
+@pytest.fixture(scope="module")
+def circle(tmp_path_factory: pytest.TempPathFactory) -> ModuleType:
+    """A pendulum that swings so high that its rod pushes and pulls."""
+    model = gqm.derive(gqm.families.circle(), gqm.Gravity(), parameters={"L": 1})
+    return gqm.build(model, name="swing", folder=tmp_path_factory.mktemp("figures"))
+
+
+def labels(axes: object) -> set[str]:
+    """What a legend lists."""
+    return {text.get_text() for text in axes.get_legend().get_texts()}  # type: ignore[attr-defined]
+
+
+def test_track(circle: ModuleType) -> None:
+    """The coloured line is the orbit, its colours are N, and every kind of event is in the legend."""
+    motion = circle.solve(2.5)
+    figure = motion.plot()
+    axes, bar = figure.axes
+    (line,) = axes.collections
+    points = np.concatenate(line.get_segments())
+    assert np.abs(np.hypot(*points.T) - 1.0).max() <= 1e-14
+    assert abs(points[:, 0].max() - 1.0) <= 1e-4
+    assert abs(points[:, 1].max() + np.cos(2.5)) <= 1e-12
+    force = line.get_array()
+    state = motion.state(np.linspace(0.0, motion.period, 200))
+    assert abs(force.max() - state.normal_force.max()) <= 0.01 * force.max()
+    assert line.norm.vcenter == 0.0
+    assert labels(axes) == {"launch", "turn", "contact-sign"}
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("x (m)", "z (m)")
+    assert bar.get_ylabel() == "contact force N (N)"
+
+
+def test_loads(circle: ModuleType) -> None:
+    """Speed above, force below, over the arc from turn to turn."""
+    motion = circle.solve(2.5)
+    above, below = motion.plot("loads").axes
+    s, speed = above.lines[0].get_data()
+    assert abs((s.max() - s.min()) - 5.0) <= 1e-13
+    assert abs(speed.max() - motion.state(motion.period / 4).v.__abs__()) <= 1e-4
+    assert below.get_xlabel() == "arc length s (m)"
+
+
+def test_a_liftoff_is_marked_where_it_is(circle: ModuleType) -> None:
+    """The marker stands where contact is lost."""
+    motion = circle.solve(0.3, 5, contact="above")
+    axes = motion.plot().axes[0]
+    (mark,) = [line for line in axes.lines if line.get_label() == "liftoff"]
+    event = motion.events[-1]
+    assert mark.get_xydata().tolist() == [[event.x, event.z]]
+
+
+@pytest.mark.parametrize("launch", [{"lam0": 0}, {"lam0": 0, "v0": 20}, {"lam0": "pi/2", "v0": "sqrt(2*9.81)"}])
+def test_every_kind_can_be_drawn(circle: ModuleType, launch: dict[str, object]) -> None:
+    """Rest, circulation, and a motion that takes for ever."""
+    motion = circle.solve(**launch)
+    for what in ("track", "loads", "portrait"):
+        motion.plot(what).draw_without_rendering()
+
+
+def test_notebooks_show_figures(circle: ModuleType) -> None:
+    """Each is a picture to IPython, without pyplot."""
+    for what in ("track", "loads", "portrait"):
+        assert circle.solve(1.0).plot(what)._repr_png_().startswith(b"\x89PNG")
+
+
+def test_axes_of_the_caller(circle: ModuleType) -> None:
+    """What is given is drawn on."""
+    from matplotlib.figure import Figure
+
+    figure = Figure()
+    axes = figure.subplots()
+    assert circle.solve(1.0).plot(axes=axes) is figure
+    pair = Figure()
+    assert circle.solve(1.0).plot("loads", axes=pair.subplots(2, 1)) is pair
+
+
+def test_an_unknown_figure(circle: ModuleType) -> None:
+    """The message lists what there is."""
+    with pytest.raises(InputError, match="plot: what: must be one of track, loads, portrait, got 'map'"):
+        circle.solve(1.0).plot("map")
+
+
+def test_animation(circle: ModuleType, tmp_path: Path) -> None:
+    """A GIF of as many frames as asked for."""
+    motions.animate(circle.solve(1.0), tmp_path / "swing.gif", duration=0.2, rate=20)
+    assert (tmp_path / "swing.gif").read_bytes().startswith(b"GIF89a")
+    with pytest.raises(InputError, match="duration: must be positive"):
+        motions.animate(circle.solve(1.0), tmp_path / "none.gif", duration=0)

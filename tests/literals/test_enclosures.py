@@ -1,0 +1,98 @@
+"""Values of trees without names: exact, or enclosed as narrowly as asked, or refused."""
+
+from fractions import Fraction
+
+import pytest
+from mpmath import libmp, mp
+
+from gqm_sym.errors import ExpressionError
+from gqm_sym.literals.enclosures import MAX_SCALE, _Enclosures, _scale, enclose
+from gqm_sym.literals.grammar import parse
+
+BITS = 64
+# A literal has at most 400 digits, and a power an exponent of at most 1000.
+CHUNK, MOST = 390, 900
+
+
+def value(text: str) -> Fraction | tuple[Fraction, Fraction]:
+    """The value of a text: exact, or both ends of what encloses it."""
+    found = enclose(parse(text, where="w"), BITS, where="w")
+    if isinstance(found, Fraction):
+        return found
+    low, high = (Fraction(*libmp.to_rational(end)) for end in found)
+    return low, high
+
+
+def less_its_digits(count: int) -> str:
+    """Pi less its first digits, so many behind the point: from 10**-count on."""
+    with mp.workdps(count + 20):
+        digits = str(int(mp.pi * mp.mpf(10) ** count))
+    terms = ["pi"]
+    for begin in range(0, len(digits), CHUNK):
+        chunk = digits[begin : begin + CHUNK]
+        behind = begin + len(chunk) - 1
+        powers = [MOST] * (behind // MOST) + [behind % MOST]
+        terms.append(chunk + "".join(f"/10**{power}" for power in powers))
+    return " - ".join(terms)
+
+
+@pytest.mark.parametrize(
+    ("text", "exact"), [("0**sqrt(2)", 0), ("pi**0", 1), ("sqrt(9/4)", Fraction(3, 2)), ("sqrt(2)**2 - 2", 0)]
+)
+def test_rational_numbers_are_exact(text: str, exact: Fraction) -> None:
+    """What is rational by a law of arithmetic comes out so, whatever it is made of."""
+    assert value(text) == exact
+
+
+@pytest.mark.parametrize("count", [230, 1200])
+def test_what_is_left_of_pi(count: int) -> None:
+    """Its digits from some place on, enclosed to as many bits as any other number."""
+    low, high = value(less_its_digits(count))
+    with mp.workdps(count + 400):
+        left = mp.pi - mp.floor(mp.pi * mp.mpf(10) ** count) / mp.mpf(10) ** count
+        assert mp.mpf(low.numerator) / low.denominator <= left <= mp.mpf(high.numerator) / high.denominator
+    assert high - low <= high / 2 ** (BITS - 1)
+
+
+def test_cube_roots() -> None:
+    """The real one, of negative numbers too; its cube encloses the number."""
+    low, high = value("cbrt(2)")
+    assert low**3 < 2 < high**3
+    assert value("cbrt(-2)") == (-high, -low)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("0**(-sqrt(2))", "column 2: division by zero"),
+        ("q + pi", "'q' is no number"),
+        # Too near zero to tell its digits, and yet not equal to it; beyond 4096 bits it is.
+        (less_its_digits(1240), "its digits cancel; write it in another way"),
+        # Of an argument of 1100 digits few are left behind the point.
+        (" - ".join(["sin(10**900*10**200*sqrt(2))"] * 2), "the digits of it cancel"),
+    ],
+    ids=["pole", "name", "pi", "sine"],
+)
+def test_what_has_no_value(text: str, message: str) -> None:
+    """It is said where, and why."""
+    with pytest.raises(ExpressionError, match=f"^w: .*{message}|^w: {message}"):
+        value(text)
+
+
+def test_equal_to_all_digits_that_are_tried() -> None:
+    """Beyond the last precision two numbers are the same."""
+    assert value(less_its_digits(1300)) == 0
+
+
+def test_nothing_is_taken_for_growing_unknown() -> None:
+    """A function that has no bounds yet is refused, not enclosed by its values at the ends."""
+    with pytest.raises(ValueError, match="no function 'gamma'"):
+        _Enclosures(BITS, last=True).call("gamma", Fraction(1, 3))
+
+
+@pytest.mark.parametrize("number", [libmp.finf, libmp.fninf, libmp.fnan])
+def test_what_is_not_finite_is_beyond_all_sizes(number: tuple[int, int, int, int]) -> None:
+    """A library writes them with a mantissa of zero; they are no zeros."""
+    assert _scale(number) > MAX_SCALE
+    with pytest.raises(ValueError, match="far outside the range"):
+        _Enclosures(BITS, last=False).settled((number, number))

@@ -1,0 +1,294 @@
+"""Where motions that lose energy end, and how far they are followed: falls, singular points, tops, rest."""
+
+import math
+from collections.abc import Callable
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import pytest
+from mpmath import mp, mpf
+
+import generated.circle_coulomb
+import gqm_sym as gqm
+from gqm_sym.errors import InputError, LaunchError, SolutionError
+from gqm_sym.runtime.legs import follow, leg_run
+
+G = 9.81
+Build = Callable[..., ModuleType]
+
+
+@pytest.fixture(scope="module")
+def build(tmp_path_factory: pytest.TempPathFactory) -> Build:
+    """Build a module once."""
+    folder, built = tmp_path_factory.mktemp("ends"), {}
+
+    def module(name: str, curve: Any, force: Any) -> ModuleType:
+        if name not in built:
+            built[name] = gqm.build(gqm.derive(curve, gqm.Gravity() + force), name=name, folder=folder)
+        return built[name]
+
+    return module
+
+
+@pytest.fixture(scope="module")
+def slope(build: Build) -> ModuleType:
+    """A line that falls by 45 degrees, with friction."""
+    return build("slope", gqm.Curve.graph("-x"), gqm.CoulombFriction(mu="mu"))
+
+
+@pytest.mark.parametrize("t", [1.0, 1e3, 1e8, 1e20])
+def test_a_fall_with_friction(t: float, slope: ModuleType) -> None:
+    """There x = g (1 - mu) t**2/4 for as long as anyone asks: fast is not at rest, however slowly the speed grows."""
+    motion = slope.solve(lam0=0, mu=0.1)
+    with mp.workdps(30):
+        exact = mpf("9.81") * (1 - mpf("0.1")) * mpf(t) ** 2 / 4
+    assert motion.lam(t) == pytest.approx(float(exact), rel=2e-15)
+    assert [leg.end for leg in motion.legs] == ["horizon"]
+    assert slope.solve(lam0=0, mu=0.1).time_at(float(exact)) == pytest.approx(t, rel=2e-15)
+
+
+def test_a_fall_leaves_the_range_of_doubles(slope: ModuleType) -> None:
+    """With room to spare; a place above is never met on the way."""
+    motion = slope.solve(lam0=0, mu=0.1)
+    for question in (lambda: motion.lam(1e60), lambda: motion.time_at(-1.0)):
+        with pytest.raises(SolutionError, match="the motion leaves the range of doubles at x = "):
+            question()
+
+
+def test_rest_and_what_comes_after(slope: ModuleType) -> None:
+    """Uphill v0/(g (1 + mu) sin 45) long; with mu > 1 the body stays there, and no later time is part of the motion."""
+    motion = slope.solve(lam0=0, v0=1, direction=-1, mu=2)
+    end = math.sqrt(2.0) / (3.0 * G)
+    assert motion.t_end == pytest.approx(end, rel=1e-14)
+    there = -math.sqrt(0.5) * 0.5 * end
+    assert motion.lam(motion.t_end) == pytest.approx(there, rel=1e-14)
+    assert motion.events_between(0, end / 2) == ()
+    assert [event.kind for event in motion.events_between(end / 2, 1)] == ["rest"]
+    with pytest.raises(InputError, match=r"the motion ends at 0\.048.* s \(rest at x = -0\.01.*\), got 1\.0"):
+        motion.lam(1.0)
+
+
+@pytest.mark.parametrize("v0", ["1e-140", "1e-20", "1e-9", "1e-7", "1e-5", "1e-3", "1"])
+def test_however_slow_a_launch_uphill(v0: str, slope: ModuleType) -> None:
+    """Way and time to the turn are elementary, and have their digits where the turn is the launch's own double too."""
+    for mu, end in (("2", "rest"), ("0.5", "turn")):
+        motion = slope.solve(lam0="0.0124357887", v0=v0, direction=-1, mu=mu, t_max=10)
+        leg = motion.legs[0]
+        with mp.workdps(40):
+            time = mp.sqrt(2) * mpf(v0) / (mpf("9.81") * (1 + mpf(mu)))
+            whole = mpf(v0) * time / 2
+            there = mpf("0.0124357887") - mpf("0.75") * whole / mp.sqrt(2)
+        assert (leg.end, leg.t_end) == (end, pytest.approx(float(time), rel=1e-15, abs=0.0))
+        half = motion.state(float(time / 2))
+        assert half.s == pytest.approx(float(-whole * 3 / 4), rel=2e-15, abs=0.0)
+        assert half.v == pytest.approx(-0.5 * float(v0), rel=2e-15, abs=0.0)
+        assert abs(half.lam - there) <= half.error <= 2e-17 + 5e-14 * whole
+
+
+def test_a_stop_within_the_last_places_of_the_launch() -> None:
+    """A bend is straight over 1e-18 m: the way there is v0**2/(2 a), and the time v0/a."""
+    from generated import cubic_coulomb
+
+    x, v0, mu, g = 0.012435788765528737, 1.284446461162977e-09, 0.11597631838334235, 6.389439513099816
+    motion = cubic_coulomb.solve(lam0=x, v0=v0, direction=1, t_max=10.0, mu=mu, g=g, m=1.0)
+    with mp.workdps(40):
+        slope = 3 * mpf(x) ** 2
+        a = mpf(g) * (slope + mpf(mu)) / mp.sqrt(1 + slope**2)
+        time, whole = mpf(v0) / a, mpf(v0) ** 2 / (2 * a)
+    (leg,) = motion.legs
+    assert (leg.end, leg.lam_end) == ("rest", float(x + whole))
+    assert leg.t_end == pytest.approx(float(time), rel=1e-15)
+    assert motion.state(0.5 * leg.t_end).s == pytest.approx(float(0.75 * whole), rel=2e-15)
+    assert motion.time_at(leg.lam_end) == pytest.approx(float(time), rel=1e-15)
+
+
+def test_a_horizon_ends_it(slope: ModuleType) -> None:
+    """Later times are no part of the motion."""
+    with pytest.raises(InputError, match=r"the motion ends at 1\.0 s \(the horizon t_max\), got 2\.0"):
+        slope.solve(lam0=0, mu=0.1, t_max=1).lam(2.0)
+
+
+def test_what_a_sweep_has_no_number_for(slope: ModuleType) -> None:
+    """The largest speed of a fall without an end, turning points of what only falls, a launch that leaves at once."""
+    for quantity in ("v_max", "turning_points"):
+        swept = slope.sweep(quantity, lam0=[0.0, 1.0], mu=0.1)
+        assert np.isnan(swept.values).all()
+        assert list(swept.why()) == ["the motion is not of a kind that has this quantity"]
+
+
+def test_pass1_of_a_body_at_rest(slope: ModuleType) -> None:
+    """It has a speed where it is, and is nowhere else."""
+    v2 = slope.pass1(np.array([-1.0, 0.0, 1.0]), lam0=0, v0=0, mu=2).v2
+    assert np.isnan(v2).tolist() == [True, False, True]
+    assert v2[1] == 0.0
+
+
+def test_out_of_the_domain_at_once(build: Build) -> None:
+    """A launch at the end of the domain, outwards."""
+    module = build("bounded", gqm.Curve.graph("x**2", domain=(0, 1)), gqm.QuadraticDrag(b="1"))
+    with pytest.raises(LaunchError, match=r"1\.0 is the end of the domain itself, .* launch with direction=-1"):
+        module.solve(lam0=1, v0=1)
+    assert module.sweep("t_end", lam0=[1.0], v0=1.0).why() == {"the launch is refused; solve says why": 1}
+
+
+@pytest.fixture(scope="module")
+def root(build: Build) -> ModuleType:
+    """The graph of x**(3/2): at 0 the curvature is infinite, and beyond there is nothing."""
+    return build("root", gqm.Curve.graph("x*sqrt(x)"), gqm.QuadraticDrag(b="0.1"))
+
+
+def test_a_singular_point_is_reached(root: ModuleType) -> None:
+    """From rest at 1: W = 2 g times the integral of z' exp(-2 b (s(u) - s(x))), and the time is that of ds/sqrt(W)."""
+    (event,) = root.solve(lam0=1).events
+    assert event.kind == "singular-point"
+    assert abs(event.lam) <= 1e-14
+    with mp.workdps(20):
+        b, g = mpf("0.1"), mpf("9.81")
+
+        def length(x: mpf) -> mpf:
+            return 8 * ((1 + mpf("2.25") * x) ** mpf("1.5") - 1) / 27
+
+        def w_over_way(y: mpf) -> mpf:  # the way is y**2
+            x = 1 - y * y
+            place = lambda v: x + y * y * v  # noqa: E731
+            return (
+                3 * g * mp.quad(lambda v: mp.sqrt(place(v)) * mp.exp(-2 * b * (length(place(v)) - length(x))), [0, 1])
+            )
+
+        time = mp.quad(lambda y: 2 * mp.sqrt((1 + mpf("2.25") * (1 - y * y)) / w_over_way(y)), [0, 1])
+    assert event.t == pytest.approx(float(time), rel=1e-13)
+
+
+def test_a_launch_at_a_singular_point(root: ModuleType) -> None:
+    """There no panel of V**2 can be laid; the message asks for what is not smooth."""
+    with pytest.raises(
+        SolutionError, match=r"V\*\*2 beyond x = 0\.0 could not be followed; are the curve and the force"
+    ):
+        root.solve(lam0=0, v0=1).lam(0.1)
+
+
+def test_an_approach_has_a_last_digit(build: Build) -> None:
+    """Towards the top of a circle with drag: known after a minute, and no number any more after an hour."""
+    module = build("drop", gqm.families.circle(L=1), gqm.QuadraticDrag(b="0.1"))
+    with mp.workdps(40):
+        k, g = mpf("0.2"), mpf("9.81")
+        loss = lambda a: mp.exp(k * a) * (k * mp.sin(a) - mp.cos(a))  # noqa: E731
+        v0 = mp.sqrt(2 * g / (1 + k**2) * (loss(mp.pi) - loss(0)))
+    motion = module.solve(lam0=0, v0=float(v0))
+    assert motion.lam(60.0) == pytest.approx(math.pi, abs=4e-15)
+    # On the way the speed is that of the closed form, which near the top is a small difference.
+    state = motion.state(np.array([0.5, 1.0, 2.0]))
+    with mp.workdps(40):
+        for place, v in zip(state.lam, state.v, strict=True):
+            w = (v0**2 - 2 * g / (1 + k**2) * (loss(mpf(float(place))) - loss(0))) / mp.exp(k * mpf(float(place)))
+            assert v == pytest.approx(float(mp.sqrt(w)), rel=1e-10)
+    with pytest.raises(SolutionError, match=r"closer to the equilibrium at theta = 3\.14.* than doubles can tell"):
+        motion.lam(3600.0)
+
+
+def test_an_approach_that_cannot_be_followed_back(slope: ModuleType, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Without a field there is nothing to read speeds off: refused, and no memory is read that is not there."""
+    followed = follow.follow
+
+    def lost(*arguments: Any) -> Any:
+        found = list(followed(*arguments))
+        found[0], found[5] = leg_run.ASYMPTOTE, 0
+        return tuple(found)
+
+    monkeypatch.setattr(follow, "follow", lost)
+    with pytest.raises(SolutionError, match="could not be followed"):
+        slope.solve(lam0=0, mu=0.1).lam(1.0)
+
+
+def test_over_a_joint_and_back(build: Build) -> None:
+    """Along a level line and up an arc until it turns, down again and to rest: each by its closed form.
+
+    On the arc W' + 2 mu W = -2 g R (sin + mu cos) upwards, with -mu downwards; on the line W' = -2 mu g.
+    """
+    rail = gqm.Curve.piecewise([gqm.line(length=2), gqm.arc(radius=1, angle="pi/2")])
+    motion = build("ramp", rail, gqm.CoulombFriction(mu="mu")).solve(lam0=0, v0=4, mu="0.25")
+    with mp.workdps(30):
+        mu, g, flat = mpf("0.25"), mpf("9.81"), mpf(2)
+
+        def wave(angle: mpf, mu: mpf) -> mpf:
+            return 2 * g / (1 + 4 * mu**2) * ((1 - 2 * mu**2) * mp.cos(angle) - 3 * mu * mp.sin(angle))
+
+        def up(angle: mpf) -> mpf:
+            return wave(angle, mu) + (16 - 2 * mu * g * flat - wave(mpf(0), mu)) * mp.exp(-2 * mu * angle)
+
+        top = mp.findroot(up, mpf("0.5"))
+
+        def down(angle: mpf) -> mpf:
+            return wave(angle, -mu) - wave(top, -mu) * mp.exp(2 * mu * (angle - top))
+
+        below = mp.sqrt(down(mpf(0)))
+        there = [flat + top, flat - below**2 / (2 * mu * g)]
+        joined = mp.sqrt(16 - 2 * mu * g * flat)
+        # Gauss: W is a small difference near the turn.
+        rise, fall = (
+            mp.quad(lambda y, w=w: 2 * y / mp.sqrt(w(top - y * y)), [0, mp.sqrt(top)], method="gauss-legendre")
+            for w in (up, down)
+        )
+        times = [(4 - joined) / (mu * g) + rise, (4 - joined) / (mu * g) + rise + fall + below / (mu * g)]
+    assert [event.kind for event in motion.events] == ["turn", "rest"]
+    for event, place, time in zip(motion.events, there, times, strict=True):
+        assert event.lam == pytest.approx(float(place), rel=1e-14)
+        assert event.t == pytest.approx(float(time), rel=1e-14)
+
+
+def test_where_the_contact_force_begins_as_nothing(build: Build) -> None:
+    """On a parabola of free fall N is zero at the launch, and the track carries what drag has slowed.
+
+    W = exp(-2 b s) (g + 2 g times the integral of x exp(2 b s)).
+    """
+    module = build("flight", gqm.Curve.graph("-x**2/2"), gqm.QuadraticDrag(b="0.5"))
+    motion = module.solve(lam0=0, v0="sqrt(9.81)")
+    with mp.workdps(20):
+        b, g = mpf("0.5"), mpf("9.81")
+
+        def length(x: mpf) -> mpf:
+            return (x * mp.sqrt(1 + x * x) + mp.asinh(x)) / 2
+
+        def w(x: mpf) -> mpf:
+            fed = mp.quad(lambda u: u * mp.exp(2 * b * length(u)), [0, x])
+            return mp.exp(-2 * b * length(x)) * (g + 2 * g * fed)
+
+        time = mp.quad(lambda x: mp.sqrt((1 + x * x) / w(x)), [0, 1])
+    assert motion.time_at(1) == pytest.approx(float(time), rel=1e-14)
+    state = motion.state(motion.time_at(1))
+    assert state.v2 == pytest.approx(float(w(mpf(1))), rel=1e-14)
+    assert state.normal_force == pytest.approx(float(g - w(mpf(1)) / 2) / math.sqrt(2.0), rel=1e-13)
+    assert [event.kind for event in motion.events if event.kind == "contact-sign"] == []
+
+
+@pytest.mark.parametrize(
+    ("lam0", "v0"),
+    [
+        # Time is counted back from the turn to where N changes sign, and no farther.
+        (0.7483964034543935, 5.818989927693156),
+        (0.5492047797152688, 6.863503323397249),
+        (1.4219101233586642, 4.690743520201464),
+        # Back from the turn past that place: the distance to it is a rounding longer than what was run.
+        (0.9646260788927759, 6.440001136948692),
+    ],
+)
+def test_where_the_contact_force_changes_sign_on_a_ring(lam0: float, v0: float) -> None:
+    """A rough ring up to where N = 0: W' + 2 mu W = -2 g (sin + mu cos), a closed form, and its time by quadrature."""
+    motion = generated.circle_coulomb.solve(lam0, v0, t_max=3.0)
+    with mp.workdps(30):
+        mu, g, start = mpf("0.15"), mpf("9.81"), mpf(lam0)
+
+        def wave(angle: mpf) -> mpf:
+            return 2 * g / (1 + 4 * mu**2) * ((1 - 2 * mu**2) * mp.cos(angle) - 3 * mu * mp.sin(angle))
+
+        def w(angle: mpf) -> mpf:
+            return wave(angle) + (mpf(v0) ** 2 - wave(start)) * mp.exp(-2 * mu * (angle - start))
+
+        place = mp.findroot(lambda angle: w(angle) + g * mp.cos(angle), mpf("2.1"))
+        time = mp.quad(lambda angle: 1 / mp.sqrt(w(angle)), [start, (start + place) / 2, place])
+    event = motion.events[0]
+    assert event.kind == "contact-sign"
+    assert event.lam == pytest.approx(float(place), rel=2e-15)
+    assert event.t == pytest.approx(float(time), rel=1e-14)
+    assert float(motion.state(event.t).lam) == pytest.approx(float(place), rel=1e-14)

@@ -1,0 +1,30 @@
+"""Slow passages over the crests of a track of stitched planes, which extended precision lays panels for."""
+
+from types import ModuleType
+
+import numpy as np
+import pytest
+from paths import ROOT
+
+from gqm_sym.loading import load
+
+ENERGY, USEFUL = 2e-14, 1e-11
+# Launches that a random run found: from rest, and with little to spare at a crest.
+LAUNCHES = ((5.725266733964419, 0.0, -1), (5.754549511786295, 0.43248306634587075, 1), (0.7953743236188708, 0.0, -1))
+
+
+@pytest.fixture(scope="module")
+def planes() -> ModuleType:
+    """The example of the repository."""
+    return load(ROOT / "generated" / "planes.py", "planes")
+
+
+@pytest.mark.parametrize(("lam0", "v0", "direction"), LAUNCHES)
+def test_panels_begin_at_the_joints(lam0: float, v0: float, direction: int, planes: ModuleType) -> None:
+    """V**2 along the motion is that of the height lost, and the bound on places is of some use."""
+    motion = planes.solve(lam0, v0, direction)
+    t = np.linspace(0.0, min(motion.t_end, 10.0), 300)[1:-1]
+    state, start = motion.state(t), planes.pass1(lam0, lam0, v0, direction)
+    wanted = v0**2 + 2 * 9.81 * (start.z - state.z)
+    assert np.abs(state.v2 - wanted).max() <= ENERGY * np.abs(wanted).max()
+    assert np.max(motion.error_bound(t)) <= USEFUL

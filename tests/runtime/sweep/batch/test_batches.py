@@ -1,0 +1,190 @@
+"""Orbits in batches: which are answered, that none jumps a barrier, and that the times are those of single motions."""
+
+from collections.abc import Callable
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import pytest
+import sympy as sp
+from mpmath import mp, mpf
+
+import gqm_sym as gqm
+from gqm_sym.runtime.compiled.strided import pointers
+from gqm_sym.runtime.sweep import quantities
+from gqm_sym.runtime.sweep.batch.batches import answer_batches
+
+ModuleOf = Callable[[str], ModuleType]
+
+ULPS = 4.0
+
+
+def answered(
+    module: ModuleType,
+    lam0: Any,
+    v0: Any,
+    ways: Any,
+    p: list[float],
+    domain: tuple[float, float, float],
+    *,
+    asked: int,
+    mirrors: tuple[float, float] = (np.nan, 0.0),
+    monotone: bool = False,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Answer launches by batches alone; nothing is said of symmetry, if not by ``mirrors``."""
+    known = (*domain, mirrors[0], np.nan, mirrors[1])
+    columns = [np.asarray(v, dtype=float) for v in (lam0, v0, ways, 0.0, *known, *p)]
+    n = max(column.size for column in columns)
+    lines = [np.broadcast_to(column, n) for column in columns]
+    out, reasons = np.full((n, 2), np.nan), np.full(n, quantities.UNDECIDED, dtype=np.int8)
+    each = module.MODEL.each
+    answer_batches(each.addresses(), (each.held, each.top_held), pointers(lines), monotone, asked, out, reasons)
+    return out, reasons
+
+
+CIRCLE = (-np.inf, np.inf, 2 * np.pi)
+# What may be said of a circle's symmetry: nothing, its axes, and that heights between them only rise or only fall.
+SAID: dict[str, dict[str, Any]] = {
+    "nothing": {},
+    "axes": {"mirrors": (0.0, np.pi)},
+    "all": {"mirrors": (0.0, np.pi), "monotone": True},
+}
+
+
+@pytest.mark.parametrize("said", SAID)
+@pytest.mark.parametrize("count", [1, 7, 8, 131])
+def test_every_pendulum_away_from_the_top_is_answered(count: int, said: str, module_of: ModuleOf) -> None:
+    """Whatever the number of launches: half periods of all, within a few last places."""
+    amplitude = np.linspace(0.01, 2.6, count)
+    p = [1.0, 9.81, 1.0]
+    out, reasons = answered(
+        module_of("circle"), amplitude, 0.0, 1, p, CIRCLE, asked=quantities.HALF_PERIOD, **SAID[said]
+    )
+    assert (reasons == quantities.ANSWERED).all()
+    for value, a in zip(out[:, 0], amplitude, strict=True):
+        with mp.workdps(40):
+            truth = 2 * mp.ellipk(mp.sin(mpf(float(a)) / 2) ** 2) / mp.sqrt(mpf("9.81"))
+        assert abs(mpf(float(value)) - truth) <= ULPS * np.spacing(float(truth))
+
+
+@pytest.mark.parametrize("said", SAID)
+@pytest.mark.parametrize("way", [1, -1])
+def test_what_is_said_of_symmetry_changes_nothing(way: int, said: str, module_of: ModuleOf) -> None:
+    """Launched with any speed from anywhere, on any turn of the circle: the same turning points and times."""
+    rng = np.random.default_rng(11)
+    lowest = 2 * np.pi * rng.integers(-3, 4, 300)
+    place, reach = rng.uniform(-1.5, 1.5, 300), rng.uniform(1.6, 2.8, 300)
+    v0 = np.sqrt(2 * 9.81 * (np.cos(place) - np.cos(reach)))
+    launch = (lowest + place, v0, way, [1.0, 9.81, 1.0], CIRCLE)
+    ends, why = answered(module_of("circle"), *launch, asked=quantities.TURNING_POINTS, **SAID[said])
+    done = why == quantities.ANSWERED
+    assert done.all() if said == "all" else done.mean() > 0.8
+    assert ends[done] == pytest.approx(np.column_stack([lowest - reach, lowest + reach])[done], rel=4e-15, abs=4e-15)
+    times, why = answered(module_of("circle"), *launch, asked=quantities.HALF_PERIOD, **SAID[said])
+    assert ((why == quantities.ANSWERED) == done).all()
+    for value, a in zip(times[done, 0], 0.5 * (ends[done, 1] - ends[done, 0]), strict=True):
+        with mp.workdps(40):
+            truth = 2 * mp.ellipk(mp.sin(mpf(float(a)) / 2) ** 2) / mp.sqrt(mpf("9.81"))
+        assert value == pytest.approx(float(truth), rel=4e-15)
+
+
+@pytest.mark.parametrize("said", SAID)
+@pytest.mark.parametrize("way", [1, -1])
+def test_laps(way: int, said: str, module_of: ModuleOf) -> None:
+    """Launched fast from anywhere: loop times, both ways; turning points there are none."""
+    places = np.linspace(-3.0, 3.0, 13)
+    v0 = np.sqrt(8.0**2 - 2 * 9.81 * (1 - np.cos(places)))
+    p = [1.0, 9.81, 1.0]
+    out, reasons = answered(module_of("circle"), places, v0, way, p, CIRCLE, asked=quantities.PERIOD, **SAID[said])
+    assert (reasons == quantities.ANSWERED).all()
+    with mp.workdps(40):
+        truth = float(4 * mp.ellipk(4 * mpf("9.81") / 64) / 8)
+    # Speeds are rounded, and the loop time follows the energy they mean.
+    assert out[:, 0] == pytest.approx(truth, rel=2e-15)
+    ends = answered(module_of("circle"), places, v0, way, p, CIRCLE, asked=quantities.TURNING_POINTS, **SAID[said])
+    assert (ends[1] == quantities.NOT_PERIODIC).all()
+    halves = answered(module_of("circle"), places, v0, way, p, CIRCLE, asked=quantities.HALF_PERIOD, **SAID[said])
+    assert (halves[1] == quantities.NOT_PERIODIC).all()
+
+
+@pytest.mark.parametrize("turns", [0, 1, -2, 50])
+def test_small_swings_on_any_turn(turns: int, module_of: ModuleOf) -> None:
+    """Released at rest near any axis: its place is known to more digits than a double has, or is found."""
+    amplitude = 10.0 ** np.linspace(-4.0, 0.4, 40)
+    lam0 = 2 * np.pi * turns + amplitude
+    swept = module_of("circle").sweep("half_period", lam0, L=1).values
+    for value, place in zip(swept, lam0, strict=True):
+        with mp.workdps(40):
+            away = mpf(float(place)) - 2 * mp.pi * turns
+            truth = 2 * mp.ellipk(mp.sin(away / 2) ** 2) / mp.sqrt(mpf(9.81))
+        assert abs(mpf(float(value)) - truth) <= ULPS * np.spacing(float(truth))
+
+
+def test_barriers_are_not_jumped(tmp_path: Path) -> None:
+    """On a track of hills every orbit keeps to its own valley, however narrow the hill beside it."""
+    curve = gqm.Curve.graph("x**2/4 + 3*exp(-(x - 1)**2/w**2)", parameter="x", parameters={"w": 1})
+    hills = gqm.build(gqm.derive(curve, gqm.Gravity()), name="hills_in_batches", folder=tmp_path)
+    rng = np.random.default_rng(5)
+    lam0, v0 = rng.uniform(-4, 4, 200), rng.uniform(0, 6, 200) * (rng.random(200) < 0.7)
+    width, ways = 10.0 ** rng.uniform(-3, 0, 200), rng.choice([1, -1], 200)
+    swept = hills.sweep("turning_points", lam0, v0, ways, w=width)
+    for k in range(60):
+        motion = hills.solve(float(lam0[k]), float(v0[k]), int(ways[k]), w=float(width[k]))
+        assert swept.values[k] == pytest.approx(sorted(motion.turning_points), rel=1e-14)
+    x, w = sp.symbols("x w")
+    height = sp.lambdify((x, w), x**2 / 4 + 3 * sp.exp(-((x - 1) ** 2) / w**2))
+    for k in range(200):
+        low, high = swept.values[k]
+        top = min(max(1.0, low + 0.001 * (high - low)), high - 0.001 * (high - low))
+        places = np.append(np.linspace(low, high, 500)[1:-1], top)
+        left = v0[k] ** 2 + 2 * 9.81 * (height(lam0[k], width[k]) - height(places, width[k]))
+        assert (left > 0).all()
+
+
+def test_wells_within_wells(module_of: ModuleOf) -> None:
+    """In a double well the outer orbits are their own mirror images, and the inner ones are not: both, side by side."""
+    well = module_of("double_well")
+    height = np.random.default_rng(3).uniform(-0.24, 1.0, 300)  # of lam**4 - lam**2
+    height = height[np.abs(height) > 0.02]
+    far = np.sqrt(0.5 * (1 + np.sqrt(1 + 4 * height)))
+    near = np.where(height < 0, np.sqrt(np.abs(0.5 * (1 - np.sqrt(1 + 4 * height)))), -far)
+    swept = well.sweep("turning_points", far)
+    assert swept.values == pytest.approx(np.column_stack([near, far]), rel=1e-13)
+    times = well.sweep("half_period", far).values
+    for k in range(0, far.size, 10):
+        assert times[k] == pytest.approx(well.solve(float(far[k])).half_period, rel=2e-15)
+
+
+@pytest.mark.parametrize("strength", [1e-8, 1e8])
+def test_units_decide_nothing(strength: float, module_of: ModuleOf) -> None:
+    """Under another gravity the same swings are answered and the same are left, those next to the top."""
+    lam0 = np.linspace(0.1, np.pi - 0.01, 40)
+    one, other = (
+        answered(module_of("circle"), lam0, 0.0, 1, [1.0, g, 1.0], CIRCLE, asked=quantities.HALF_PERIOD)
+        for g in (1.0, strength)
+    )
+    assert set(one[1]) == {quantities.ANSWERED, quantities.UNDECIDED}
+    assert (other[1] == one[1]).all()
+    assert other[0][:, 0] * np.sqrt(strength) == pytest.approx(one[0][:, 0], rel=2e-15, nan_ok=True)
+
+
+@pytest.mark.parametrize("said", SAID)
+def test_what_cannot_be_proved_is_left(said: str, module_of: ModuleOf) -> None:
+    """Launches at the top, next to it, and what is not a number."""
+    lam0 = [np.pi, np.pi - 1e-9, np.nan, 0.3]
+    p = [1.0, 9.81, 1.0]
+    out, reasons = answered(module_of("circle"), lam0, 0.0, 1, p, CIRCLE, asked=quantities.HALF_PERIOD, **SAID[said])
+    assert list(reasons) == [quantities.UNDECIDED, quantities.UNDECIDED, quantities.UNDECIDED, quantities.ANSWERED]
+    assert np.isnan(out[:3, 0]).all()
+
+
+def test_released_beside_the_top(module_of: ModuleOf) -> None:
+    """It swings nearly all the way round and back, and does not go round."""
+    beside = 10.0 ** -np.arange(1.0, 13.0)
+    swept = module_of("circle").sweep("half_period", np.pi - beside, L=1)
+    with mp.workdps(40):
+        for lam0, value in zip(np.pi - beside, swept.values, strict=True):
+            k = mp.sin(mpf(float(lam0)) / 2)
+            truth = 2 * mp.ellipk(k * k) / mp.sqrt(mpf("9.81"))
+            assert abs(mpf(float(value)) - truth) <= ULPS * np.spacing(float(truth))

@@ -1,0 +1,297 @@
+"""Sweeps over launches and parameters: against closed forms, and against motions solved one by one."""
+
+from collections.abc import Callable
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import pytest
+from mpmath import mp, mpf
+
+import gqm_sym as gqm
+from gqm_sym.errors import InputError, ParameterError
+from gqm_sym.runtime.compiled import threads
+from gqm_sym.runtime.sweep.sweep import REASONS
+
+ModuleOf = Callable[[str], ModuleType]
+
+# Half periods away from barriers, in units of the last place.
+ULPS = 4.0
+# An extreme is flat: its value has the digits of V or N themselves, relative to the largest.
+LOAD = 4e-15
+# Arrival by panels against the exact reading.
+ARRIVAL = 4e-15
+
+
+def _pendulum(amplitude: float, length: float) -> mpf:
+    """Half period of a pendulum in closed form."""
+    with mp.workdps(40):
+        k = mp.sin(mpf(amplitude) / 2)
+        return 2 * mp.ellipk(k * k) * mp.sqrt(mpf(length) / mpf("9.81"))
+
+
+def test_half_periods_of_pendulums(module_of: ModuleOf) -> None:
+    """Released from rest anywhere away from the top, with any length: within a few last places of the closed form."""
+    rng = np.random.default_rng(11)
+    amplitude, length = np.append(rng.uniform(1e-6, 2.5, 150), [1e-8, 1e-3]), rng.uniform(0.1, 10.0, 152)
+    got = module_of("circle").sweep("half_period", amplitude, L=length)
+    assert not got.reasons.any()
+    for value, a, el in zip(got.values, amplitude, length, strict=True):
+        truth = _pendulum(float(a), float(el))
+        assert abs(mpf(float(value)) - truth) <= ULPS * np.spacing(float(truth))
+
+
+def test_launched_with_speed_it_is_the_orbit_that_counts(module_of: ModuleOf) -> None:
+    """Launches at other phases of one swing have its period; the same upwards and downwards."""
+    top = 1.25
+    places = np.linspace(-1.2, 1.2, 7)
+    speeds = np.sqrt(2 * 9.81 * (np.cos(places) - np.cos(top)))
+    got = module_of("circle").sweep("period", places[:, None], speeds[:, None], [1, -1], L=1)
+    assert got.values.shape == got.reasons.shape == (7, 2)
+    # Speeds are rounded, and the period follows the amplitude they mean.
+    assert got.values == pytest.approx(2 * float(_pendulum(top, 1.0)), rel=1e-15)
+
+
+# Whole turns away, and speeds in units of what just reaches the top.
+LAUNCHES = [(turns, reach) for turns in (0, 1, -100) for reach in (1e-9, 1e-3, 0.4, 0.9)]
+
+
+@pytest.mark.parametrize(("turns", "reach"), LAUNCHES)
+def test_launched_anywhere_on_any_turn(turns: int, reach: float, module_of: ModuleOf) -> None:
+    """A pendulum's half period, as near as the square of a speed and a place in doubles tell it."""
+    rng = np.random.default_rng(5)
+    lam0 = 2 * np.pi * turns + rng.uniform(-2.0, 2.0, 24)
+    v0 = reach * np.sqrt(2 * 9.81 * (1 + np.cos(lam0)))
+    swept = module_of("circle").sweep("half_period", lam0, v0, rng.choice([-1, 1], 24), L=1)
+    assert not swept.reasons.any()
+    with mp.workdps(40):
+        for value, place, speed in zip(swept.values, map(float, lam0), map(float, v0), strict=True):
+
+            def truth(w: mpf, place: float = place) -> mpf:
+                square = mp.sin(mpf(place) / 2) ** 2 + w / (4 * mpf("9.81"))
+                return mp.pi / mp.sqrt(mpf("9.81")) / mp.agm(1, mp.sqrt(1 - square))
+
+            w = mpf(speed) ** 2
+            # Three roundings of V**2 from the lowest place to the top, at most.
+            rounding = abs(mp.diff(truth, w)) * 3 * mpf(2) ** -53 * 4 * mpf("9.81")
+            assert abs(mpf(float(value)) - truth(w)) <= ULPS * np.spacing(float(value)) + rounding
+
+
+def test_loop_times_of_whirling_pendulums(module_of: ModuleOf) -> None:
+    """Loop times are 4 K/v0 from the bottom; they have no half period, and no turning points."""
+    v0 = np.linspace(7.0, 30.0, 20)
+    circle = module_of("circle")
+    got = circle.sweep("period", 0.0, v0, L=1)
+    for value, v in zip(got.values, v0, strict=True):
+        with mp.workdps(40):
+            truth = 4 * mp.ellipk(4 * mpf("9.81") / mpf(float(v)) ** 2) / mpf(float(v))
+        assert abs(mpf(float(value)) - truth) <= ULPS * np.spacing(float(truth))
+    for quantity in ("half_period", "turning_points"):
+        none = circle.sweep(quantity, 0.0, v0, L=1)
+        assert np.isnan(none.values).all()
+        assert none.why() == {REASONS[2]: 20}
+
+
+def test_next_to_a_barrier_the_exact_problem_answers(module_of: ModuleOf) -> None:
+    """Orbits that doubles cannot time have every digit all the same."""
+    amplitude = np.pi - np.array([1e-2, 1e-4, 1e-8])
+    got = module_of("circle").sweep("half_period", amplitude, L=1)
+    for value, a in zip(got.values, amplitude, strict=True):
+        truth = _pendulum(float(a), 1.0)
+        assert abs(mpf(float(value)) - truth) <= np.spacing(float(truth))
+
+
+def test_the_tautochrone_is_one(module_of: ModuleOf) -> None:
+    """Every amplitude takes 2 pi sqrt(R/g)."""
+    radius = np.array([[0.5], [2.0]])
+    got = module_of("cycloid_plus").sweep("half_period", np.linspace(0.1, 3.0, 9), R=radius)
+    assert got.values == pytest.approx(2 * np.pi * np.sqrt(np.broadcast_to(radius, (2, 9)) / 9.81), rel=6e-16)
+
+
+@pytest.mark.parametrize("v0", [0.0, 1.5, 9.0])
+def test_turning_points_and_loads_as_of_one_motion(v0: float, module_of: ModuleOf) -> None:
+    """Speeds and contact forces of a pendulum are extreme at the bottom, and at the turns or the top."""
+    circle = module_of("circle")
+    lam0 = np.array([0.4, 0.9])
+    bottom = np.sqrt(v0**2 + 2 * 9.81 * (1 - np.cos(lam0)))
+    climbed = np.maximum(v0**2 - 2 * 9.81 * (1 + np.cos(lam0)), 0.0)
+    height = np.cos(lam0) - v0**2 / (2 * 9.81) if v0 < 9 else np.full(2, -1.0)
+    for quantity, truth, scale in (
+        ("v_max", bottom, bottom),
+        ("v_min", np.sqrt(climbed), bottom),
+        ("normal_force_max", bottom**2 + 9.81, bottom**2 + 9.81),
+        ("normal_force_min", climbed + 9.81 * height, bottom**2 + 9.81),
+    ):
+        got = circle.sweep(quantity, lam0, v0, L=1)
+        assert (np.abs(got.values - truth) <= LOAD * scale).all(), quantity
+    if v0 < 9.0:
+        got = circle.sweep("turning_points", lam0, v0, L=1)
+        for pair, start in zip(got.values, lam0, strict=True):
+            assert list(pair) == pytest.approx(sorted(circle.solve(start, v0, L=1).turning_points), rel=5e-16)
+
+
+def test_loads_next_to_a_barrier(module_of: ModuleOf) -> None:
+    """An orbit that is left to the exact problem has its loads at the bottom too."""
+    top = np.pi - 1e-5
+    got = module_of("circle").sweep("normal_force_max", top, L=1)
+    assert got.values == pytest.approx(9.81 * (1 + 2 * (1 - np.cos(top))), rel=LOAD)
+
+
+def test_arrivals(module_of: ModuleOf) -> None:
+    """First times at places ahead, behind, beyond the turn and laps away, as of one motion; never is NaN."""
+    circle = module_of("circle")
+    for lam0, v0, way in ((0.5, 1.0, 1), (0.5, 1.0, -1), (0.5, 0.0, 1), (0.0, 9.0, 1), (0.0, 9.0, -1)):
+        motion = circle.solve(lam0, v0, way, L=1)
+        places = np.array([-0.4, 0.2, 0.5, 0.52, 4.0, -9.0])
+        got = circle.sweep("time_at", lam0, v0, way, lam=places, L=1)
+        for value, place, reason in zip(got.values, places, got.reasons, strict=True):
+            if reason:
+                assert REASONS[reason] == "the motion is never at the place asked for"
+                assert np.isnan(value)
+                assert motion.kind == "libration" or (place - lam0) * way < 0
+            else:
+                # Both are differences of times since the turn: of up to half a period, and as its last place goes.
+                last = np.spacing(0.5 * motion.period)
+                assert value == pytest.approx(motion.time_at(float(place)), rel=ARRIVAL, abs=last)
+
+
+def _falls(places: int) -> tuple[np.ndarray, np.ndarray]:
+    """Distances from an axis to begin at, and places on the way through it: many of them a moment later."""
+    rng = np.random.default_rng(3)
+    start = rng.uniform(0.1, 2.6, places)
+    share = np.append(rng.uniform(0.0, 1.0, places - places // 4), 10.0 ** rng.uniform(-12, -1, places // 4))
+    return start, start - 2.0 * share * start
+
+
+def test_arrivals_of_released_pendulums(module_of: ModuleOf) -> None:
+    """All digits, in the first moments too."""
+    start, places = _falls(40)
+    swept = module_of("circle").sweep("time_at", start, lam=places, L=1)
+    assert not swept.reasons.any()
+    for value, a, x in zip(swept.values, map(float, start), map(float, places), strict=True):
+        with mp.workdps(40):
+            k = mp.sin(mpf(a) / 2)
+            fallen = mp.ellipk(k * k) - mp.ellipf(mp.asin(mp.sin(mpf(x) / 2) / k), k * k)
+        assert value == pytest.approx(float(fallen / mp.sqrt(mpf("9.81"))), rel=ARRIVAL)
+
+
+@pytest.mark.parametrize("speed", [0.0, 1e-6, 1.0])
+def test_arrivals_on_ellipses(speed: float, module_of: ModuleOf) -> None:
+    """As single motions have them, however many terms the series needs."""
+    start, places = (distances - np.pi / 2 for distances in _falls(24))
+    ellipse = module_of("ellipse")
+    swept = ellipse.sweep("time_at", start, speed, -1, lam=places, a=2, b=1)
+    assert not swept.reasons.any()
+    for value, a, x in zip(swept.values, map(float, start), map(float, places), strict=True):
+        motion = ellipse.solve(a, speed, -1, a=2, b=1)
+        # A single motion reads times off places that are rounded, as differences of times since the turn.
+        once = motion.time_at(x)
+        rounding = np.spacing(abs(x)) * 2 / abs(motion.state(once).v) + 2 * np.spacing(0.5 * motion.period)
+        assert value == pytest.approx(once, rel=ARRIVAL, abs=rounding)
+
+
+@pytest.mark.parametrize(
+    ("track", "v0", "size"),
+    [
+        ("ellipse", 0.0, {"a": 2, "b": 1}),
+        ("ellipse", 7.5, {"a": 2, "b": 1}),
+        ("circle", 0.3, {"L": 1}),
+        ("quartic", 1.0, {}),
+        ("double_well", 0.5, {}),
+    ],
+)
+def test_extremes_beat_all_states(track: str, v0: float, size: dict[str, Any], module_of: ModuleOf) -> None:
+    """None of many states has a greater or a smaller load, and the best of them comes near."""
+    module = module_of(track)
+    for lam0 in (0.3, 1.1):
+        motion = module.solve(lam0, v0, **size)
+        state = motion.state(np.linspace(0.0, motion.period, 20_001))
+        for name, values in (("v", np.abs(state.v)), ("normal_force", state.normal_force)):
+            sweeps = (module.sweep(f"{name}_{which}", lam0, v0, **size) for which in ("max", "min"))
+            most, least = (float(swept.values) for swept in sweeps)
+            scale = np.abs(values).max()
+            assert values.max() - LOAD * scale <= most <= values.max() + 1e-3 * scale
+            assert values.min() + LOAD * scale >= least >= values.min() - 1e-3 * scale
+
+
+def test_what_has_no_answer_says_why(module_of: ModuleOf) -> None:
+    """NaN in, a place outside the domain, and a motion that leaves: codes, not exceptions."""
+    got = module_of("cycloid_arch").sweep("period", [np.nan, 99.0, 3.5], R=1)
+    assert np.isnan(got.values).all()
+    assert [REASONS[code] for code in got.reasons] == [
+        "the launch or a parameter is not a finite number",
+        "the launch place lies outside the domain",
+        "the motion is not of a kind that has this quantity",
+    ]
+    assert sum(got.why().values()) == 3
+
+
+def test_a_long_sweep_is_cut_and_joined(module_of: ModuleOf) -> None:
+    """Threads and chunks change nothing; broadcast columns need not lie in memory."""
+    amplitude = np.linspace(0.1, 1.0, 300)
+    length = np.linspace(0.5, 2.0, 120)[:, None]
+    circle = module_of("circle")
+    whole = circle.sweep("half_period", amplitude, L=length)
+    assert whole.values.shape == (120, 300)
+    assert (whole.values[77] == circle.sweep("half_period", amplitude, L=float(length[77, 0])).values).all()
+
+
+def test_extremes_of_a_motion_that_ends(generated_folder: Path) -> None:
+    """None of many states beats them, and the best of these comes near."""
+    model = gqm.derive(gqm.families.circle(L=1), gqm.Gravity() + gqm.CoulombFriction(mu="0.1"))
+    ring = gqm.build(model, name="rough_ring", folder=generated_folder)
+    for v0 in (2.0, 9.0):
+        motion = ring.solve(0.5, v0)
+        state = motion.state(np.linspace(0.0, motion.t_end, 100_000))
+        for name, values in (("v", np.abs(state.v)), ("normal_force", state.normal_force)):
+            most, least = (float(ring.sweep(f"{name}_{which}", 0.5, v0).values) for which in ("max", "min"))
+            scale = np.abs(values).max()
+            assert values.max() - LOAD * scale <= most <= values.max() + 1e-7 * scale
+            assert values.min() + LOAD * scale >= least >= values.min() - 1e-7 * scale
+
+
+def test_columns_may_be_read_only(module_of: ModuleOf) -> None:
+    """Arrays that must not be written to, as a memory map's, are columns too."""
+    amplitude = np.linspace(0.1, 1.0, 5)
+    amplitude.flags.writeable = False
+    assert not module_of("circle").sweep("half_period", amplitude, L=1).reasons.any()
+
+
+def test_mistakes_are_named(module_of: ModuleOf) -> None:
+    """An unknown quantity, a missing place, a negative speed, shapes that do not fit, a length below zero."""
+    sweep = module_of("circle").sweep
+    with pytest.raises(InputError, match="quantity: must be one of half_period"):
+        sweep("frequency", 0.1, L=1)
+    with pytest.raises(InputError, match="lam: is the place"):
+        sweep("time_at", 0.1, L=1)
+    with pytest.raises(InputError, match="v0: is a speed"):
+        sweep("period", 0.1, [1.0, -1.0], L=1)
+    with pytest.raises(InputError, match="direction: must be"):
+        sweep("period", 0.1, 1.0, 0, L=1)
+    with pytest.raises(InputError, match=r"lam0 \(2,\), v0 \(3,\)"):
+        sweep("period", [0.1, 0.2], [1, 2, 3], L=1)
+    with pytest.raises(ParameterError, match="L: must be positive"):
+        sweep("period", 0.1, L=[1.0, -1.0])
+    with pytest.raises(ParameterError, match="L: has no default"):
+        sweep("period", 0.1)
+
+
+def test_loads_of_a_swing_next_to_the_top(module_of: ModuleOf) -> None:
+    """Orbits that are solved one by one: N is m g (3 - 2 cos A) at the bottom, m g cos(A) where it turns."""
+    amplitude = np.pi - np.array([1e-7, 1e-9])
+    circle = module_of("circle")
+    most, least = (circle.sweep(f"normal_force_{end}", amplitude, L=1).values for end in ("max", "min"))
+    assert most == pytest.approx(9.81 * (3 - 2 * np.cos(amplitude)), rel=LOAD)
+    assert least == pytest.approx(9.81 * np.cos(amplitude), rel=LOAD)
+    assert circle.sweep("v_max", amplitude, L=1).values == pytest.approx(np.sqrt(4 * 9.81), rel=LOAD)
+
+
+def test_cores_where_the_system_tells_no_more(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Without an affinity all cores of the machine are this process's; one at least."""
+    monkeypatch.delattr(threads.os, "sched_getaffinity")
+    for count, cores in ((6, 6), (None, 1)):
+        threads.cores.cache_clear()
+        monkeypatch.setattr(threads.os, "cpu_count", lambda count=count: count)
+        assert threads.cores() == cores
+    threads.cores.cache_clear()

@@ -1,0 +1,199 @@
+"""Emitted modules as tests see them: their syntax audited, their compiled functions against the declared text."""
+
+import ast
+from collections.abc import Callable
+from ctypes import CFUNCTYPE, POINTER, c_double, c_ssize_t
+from functools import cache
+from types import ModuleType
+
+import numpy as np
+import sympy as sp
+from mpmath import mp, mpf
+
+import gqm_sym as gqm
+from gqm_sym.derivation import Model
+from gqm_sym.runtime import interface
+
+DIGITS = 50
+# Roundings (2**-53) of what a value is made of: worst measured 6.1, 2.0, 1.9 and 6.7.
+FRAME, CLIMB, RISE, BEND = 8, 3, 3, 9
+# Bounds at a single place are as wide as a few roundings outwards of each operation.
+POINT_WIDTH = 1e-13
+
+# Ends and a place between or beyond them, near and far, whose differences are exact.
+TRIPLES = (
+    (0.25, 0.5, 1.125),
+    (0.5, 0.75, 0.75),
+    (0.5, 0.5, 1.0),
+    (0.625, 0.625 + 2.0**-20, 0.625 + 2.0**-19),
+    (0.75 - 2.0**-40, 0.75, 0.75 + 2.0**-35),
+    (1.0, 0.875, 0.5),
+)
+
+NODES = (
+    *(ast.Module, ast.Expr, ast.Constant, ast.ImportFrom, ast.alias, ast.Assign, ast.Dict, ast.Name, ast.Load),
+    *(ast.Store, ast.Call, ast.keyword, ast.FunctionDef, ast.arguments, ast.arg, ast.For, ast.Tuple, ast.Subscript),
+    *(
+        ast.If,
+        ast.BinOp,
+        ast.Add,
+        ast.Sub,
+        ast.Mult,
+        ast.Div,
+        ast.Pow,
+        ast.UnaryOp,
+        ast.USub,
+        ast.Return,
+        ast.Attribute,
+    ),
+)
+IMPORTS = ("math", "typing", "numba", "gqm_sym.runtime", "gqm_sym.runtime.vocabulary")
+
+
+def declared(text: str, *, title: str = "", parameter: str = "u", **parameters: str) -> Model:
+    """Derive the motion on a graph under gravity."""
+    curve = gqm.Curve.graph(text, parameter=parameter, parameters=parameters or None, title=title)
+    return gqm.derive(curve, gqm.Gravity())
+
+
+@cache
+def oracle(text: str, names: tuple[str, ...]) -> Callable[..., list[mpf]]:
+    """Give z, z' and z'' by the first name, as SymPy and mpmath read the text."""
+    known = {name: sp.Symbol(name, real=True) for name in names} | {"e": sp.E, "ln": sp.log}
+    known["cbrt"] = lambda w: w ** sp.Rational(1, 3)
+    z = sp.sympify(text, locals=known, rational=True)
+    first = known[names[0]]
+    return sp.lambdify(
+        [known[n] for n in names], [z, z.diff(first), z.diff(first, 2)], [{"DiracDelta": lambda _: 0}, "mpmath"]
+    )
+
+
+class Compiled:
+    """The compiled functions of a module, called by address as the runtime calls them."""
+
+    def __init__(self, module: ModuleType, values: tuple[float, ...]) -> None:
+        self.addresses = module.MODEL.addresses
+        self.p = np.array([*values, 9.75, 2.0])
+
+    def _call(self, name: str, rows: int, n: int | None, *arguments: float | list[float]) -> np.ndarray:
+        line = POINTER(c_double)
+        out = np.full((rows, n or 1), np.nan)
+        given = [np.array(a) if isinstance(a, list) else a for a in arguments] + [self.p, out]
+        types = [line if isinstance(a, np.ndarray) else c_double for a in given]
+        count = [] if n is None else [c_ssize_t]
+        function = CFUNCTYPE(None, *count, *types)(getattr(self.addresses, name))
+        function(
+            *([] if n is None else [n]), *(a.ctypes.data_as(line) if isinstance(a, np.ndarray) else a for a in given)
+        )
+        return out
+
+    def frame(self, places: list[float], speeds: list[float]) -> np.ndarray:
+        """Rows x, z, ds, kappa, contact force."""
+        return self._call("path_and_contact_force", interface.FRAME_ROWS, len(places), places, speeds)
+
+    def climb(self, places: list[float]) -> np.ndarray:
+        """Rows climb, slope."""
+        return self._call("effective_potential", 2, len(places), places)
+
+    def rise(self, a: float, places: list[float], offsets: list[float]) -> np.ndarray:
+        """Rows first difference, ds."""
+        return self._call("potential_divdiff1", 2, len(places), a, places, offsets)
+
+    def bend(self, a: float, b: float, left: list[float], right: list[float]) -> np.ndarray:
+        """Rows second difference, ds."""
+        return self._call("potential_divdiff2", 2, len(left), a, b, left, right)
+
+    def bounds(self, lo: float, hi: float) -> np.ndarray:
+        """Ends of the slope's enclosure, and of that of ds."""
+        return self._call("bounds", 4, None, lo, hi)[:, 0]
+
+
+def near(actual: float, truth: mpf, roundings: int, scale: mpf | None = None) -> None:
+    """Hold a number to a truth of 50 digits, in roundings of it or of its scale."""
+    allowed = roundings * mpf(2) ** -53 * (abs(truth) if scale is None else scale)
+    assert abs(mpf(float(actual)) - truth) <= allowed, (actual, mp.nstr(truth, 20))
+
+
+def check_numbers(
+    module: ModuleType, text: str, values: dict[str, float], parameter: str = "u", *, kink: float | None = None
+) -> None:
+    """Hold all five compiled functions to the declared text, g = 9.75 and m = 2.
+
+    At a kink the slope jumps: no bounds are asked for there, and they may be infinite across it.
+    """
+    compiled = Compiled(module, tuple(values.values()))
+    with mp.workdps(DIGITS):
+        function = oracle(text, (parameter, *values))
+        given = [mpf(v) for v in values.values()]
+
+        def at(place: mpf | float) -> tuple[mpf, ...]:
+            z, slope, bend = function(mpf(place), *given)
+            ds = mp.sqrt(1 + slope**2)
+            return mpf(z), slope, ds, bend / ds**3, bend
+
+        g, m, v2 = mpf("9.75"), mpf(2), mpf("3.5")
+        for a, y, b in TRIPLES:
+            z, slope, ds, kappa, bent = at(y)
+            size = abs(z) + abs(slope) + abs(bent)
+            x, *frame = compiled.frame([0.0, y], [0.0, float(v2)])[:, 1]
+            assert x == y
+            near(frame[0], z, FRAME, size)
+            near(frame[1], ds, FRAME)
+            near(frame[2], kappa, FRAME, size / ds**3)
+            near(frame[3], m * (g / ds + kappa * v2), FRAME, m * (g / ds + size / ds**3 * v2))
+            climb = compiled.climb([y, y])[:, 1]
+            near(climb[0], 2 * g * z, CLIMB, 2 * g * size)
+            near(climb[1], 2 * g * slope, CLIMB, 2 * g * size)
+
+            def first(x: float, y: float) -> mpf:
+                return at(x)[1] if x == y else (at(y)[0] - at(x)[0]) / (mpf(y) - mpf(x))
+
+            rise = compiled.rise(a, [y, y], [y - a, y - a])[:, 1]
+            near(rise[0], 2 * g * first(a, y), RISE, 2 * g * size)
+            near(rise[1], ds, FRAME)
+            second = (first(y, b) - first(a, y)) / (mpf(b) - mpf(a))
+            low, high = min(a, y), max(a, y)
+            bend = compiled.bend(a, b, [y - a, y - a], [b - y, b - y])[:, 1]
+            largest = max(abs(at(s)[0]) + abs(at(s)[1]) + abs(at(s)[4]) for s in (a, y, b))
+            near(bend[0], 2 * g * second, BEND, 2 * g * largest)
+            near(bend[1], ds, FRAME)
+            bounds = compiled.bounds(low, high)
+            assert np.isfinite(bounds).all() or (kink is not None and low <= kink <= high)
+            for k in range(9):
+                place = mpf(low) + (mpf(high) - mpf(low)) * k / 8
+                _, slope, ds, _, _ = at(place)
+                if kink is None or abs(place - mpf(kink)) > 1e-15:
+                    assert bounds[0] <= 2 * g * slope <= bounds[1]
+                    assert bounds[2] <= ds <= bounds[3]
+            point = compiled.bounds(y, y)
+            assert point[1] - point[0] <= POINT_WIDTH * 2 * g * size
+            assert point[3] - point[2] <= POINT_WIDTH * ds
+
+
+def audit(text: str) -> ast.Module:
+    """Parse emitted text and hold every node, name, import and call to what a module may have."""
+    tree = ast.parse(text)
+    functions = {node.name for node in tree.body if isinstance(node, ast.FunctionDef)}
+    imported = {a.name for node in tree.body if isinstance(node, ast.ImportFrom) for a in node.names}
+    for node in ast.walk(tree):
+        assert isinstance(node, NODES), type(node)
+        if isinstance(node, ast.ImportFrom):
+            assert node.module in IMPORTS
+            assert node.level == 0
+            assert all(a.asname is None and a.name != "*" for a in node.names)
+        elif isinstance(node, ast.If):  # names that only annotations need
+            assert isinstance(node.test, ast.Name)
+            assert node.test.id == "TYPE_CHECKING"
+            assert all(isinstance(part, ast.ImportFrom) for part in (*node.body, *node.orelse))
+        elif isinstance(node, ast.Name):
+            assert "__" not in node.id or node.id == "__file__"
+        elif isinstance(node, ast.Attribute):
+            assert isinstance(node.value, ast.Name)
+            owners = {"op": node.attr, "MODEL": node.attr} | dict.fromkeys(functions, "address")
+            assert owners[node.value.id] == node.attr
+        elif isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
+            assert node.func.id in imported | {"compiled", "range", "abs"}
+    kinds = (ast.Expr, ast.ImportFrom, ast.If, ast.Assign, ast.FunctionDef)
+    assert all(isinstance(node, kinds) for node in tree.body)
+    assert [n for n in tree.body if isinstance(n, ast.Expr)] == [tree.body[0]]
+    return tree
