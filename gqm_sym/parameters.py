@@ -137,6 +137,18 @@ def tried_values(defaults: Mapping[str, Value | None]) -> dict[sp.Symbol, sp.Exp
     }
 
 
+def in_words(defaults: Mapping[str, Value | None], units: Mapping[str, str]) -> str:
+    """Name parameters with their defaults and units, on one line: ``L = 2 m, b (1/m, no default)``."""
+    told = []
+    for name, value in defaults.items():
+        unit = "" if units.get(name, "1") == "1" else units[name]
+        if value is None:
+            told.append(f"{name} ({unit + ', ' if unit else ''}no default)")
+        else:
+            told.append(f"{name} = {value} {unit}".rstrip())
+    return ", ".join(told) or "none"
+
+
 def is_positive(value: Value | None) -> bool:
     """Whether a default allows its parameter to be taken as positive; no default allows it."""
     return value is None or bool(exact_value(value) > 0)

@@ -17,6 +17,7 @@ PLACES = (-2.71, -1.3, -0.37, 0.113, 0.59, 1.17, 1.93, 2.83)
 SHARE = 1e-6
 # Shares of a period that may be one themselves.
 PRIMES = (2, 3, 5, 7, 11, 13)
+MOST_TIMES = 10
 # Heads that are real and finite for every real argument.
 _EVERYWHERE = (sp.sin, sp.cos, sp.exp, sp.sinh, sp.cosh, sp.tanh, sp.atan, sp.asinh, sp.Abs)
 _WAVES = (sp.sin, sp.cos)
@@ -35,12 +36,25 @@ def found_period(point: Point, lam: sp.Symbol) -> sp.Expr | None:
     if not all(ratio.is_Rational for ratio in ratios):
         return None
     period = 2 * sp.pi / sp.Abs(first * common_measure(ratios))
-    values = tried_values({symbol.name: None for form in point for symbol in form.free_symbols - {lam}})
-    if _gap(point, lam, period, values) > SHARE:
-        return None
+    unset = sorted(symbol.name for symbol in set().union(*(form.free_symbols for form in point)) - {lam})
+    for share in (1, sp.Rational(1, 3)):  # some forms are real for small values only: sqrt(1 - ecc**2)
+        values = {symbol: value * share for symbol, value in tried_values(dict.fromkeys(unset)).items()}
+        gap = _gap(point, lam, period, values)
+        if gap is not None:
+            return _least(point, lam, period, values) if gap <= SHARE else None
+    return None
+
+
+def _least(point: Point, lam: sp.Symbol, period: sp.Expr, values: Mapping[sp.Symbol, sp.Expr]) -> sp.Expr | None:
+    """The least share of a period that is one; None of what does not move at all."""
     for prime in PRIMES:
-        while _gap(point, lam, period / prime, values) <= SHARE:
+        for _ in range(MOST_TIMES):
+            gap = _gap(point, lam, period / prime, values)
+            if gap is None or gap > SHARE:
+                break
             period /= prime
+        else:
+            return None
     return period
 
 
@@ -61,7 +75,7 @@ def check_period(
         return  # the values at run time decide
     values = tried_values(defaults)
     gap = _gap(point, lam, period, values)
-    if gap <= SHARE:
+    if gap is None or gap <= SHARE:
         return
     x, z = point
     right = found_period((x.xreplace(values), z.xreplace(values)), lam)
@@ -101,8 +115,8 @@ def _not_negative(form: sp.Expr) -> bool:
     return bool(form.is_nonnegative)
 
 
-def _gap(point: Point, lam: sp.Symbol, period: sp.Expr, values: Mapping[sp.Symbol, sp.Expr]) -> float:
-    """By how much of its size a curve is elsewhere after a period, at the worst; 0 where it cannot be told."""
+def _gap(point: Point, lam: sp.Symbol, period: sp.Expr, values: Mapping[sp.Symbol, sp.Expr]) -> float | None:
+    """By how much of its size a curve is elsewhere after a period, at the worst; None where it has no numbers."""
     length = float(period.xreplace(dict(values)))
     functions = [sp.lambdify(lam, form.xreplace(dict(values)), "math") for form in point]
 
@@ -120,5 +134,7 @@ def _gap(point: Point, lam: sp.Symbol, period: sp.Expr, values: Mapping[sp.Symbo
                 yield here, there
 
     found = list(pairs())
-    size = max((hypot(*there) + hypot(*here) for here, there in found), default=0.0)
-    return max((hypot(b[0] - a[0], b[1] - a[1]) for a, b in found), default=0.0) / size if size else 0.0
+    if not found:
+        return None
+    size = max(hypot(*there) + hypot(*here) for here, there in found)
+    return max(hypot(b[0] - a[0], b[1] - a[1]) for a, b in found) / size if size else 0.0

@@ -9,6 +9,7 @@ import sympy as sp
 from gqm_sym.arguments import checked, names, one_line, short
 from gqm_sym.declare.closing import check_period, found_period
 from gqm_sym.declare.ends import Ends, check_ends, check_order, read_ends
+from gqm_sym.declare.measures import told
 from gqm_sym.errors import DeclarationError
 from gqm_sym.expressions import check_name, read_expression
 from gqm_sym.parameters import Parameters, Value, names_in_order, read_parameters
@@ -83,6 +84,10 @@ class Curve:
     def charted(self) -> bool:
         """Whether the parameter is arc length, and the coordinates are known by numbers only."""
         return self.definition is not None
+
+    def __str__(self) -> str:
+        """A few lines for people: what it is, where it goes, and what its parameters are measured in."""
+        return told(self)
 
     @property
     def smoothing(self) -> "Smoothing | None":

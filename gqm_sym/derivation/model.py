@@ -11,6 +11,7 @@ from gqm_sym.budgets import budget
 from gqm_sym.declare import Curve
 from gqm_sym.declare.closing import check_period
 from gqm_sym.declare.ends import check_order
+from gqm_sym.declare.measures import curve_formulas
 from gqm_sym.derivation.algebra.rewrite import check_real, without_poles
 from gqm_sym.derivation.algebra.signs import Signs
 from gqm_sym.derivation.corners import check_corners, check_powers, without_known_bars
@@ -24,12 +25,26 @@ from gqm_sym.derivation.geometry.offset_curve import beside
 from gqm_sym.derivation.reality import check_somewhere_real
 from gqm_sym.derivation.wells.swing import Swing, swing
 from gqm_sym.derivation.wells.symmetry import Symmetry, symmetry
+from gqm_sym.dimensions import COMMON, found_dimensions, unit_of
 from gqm_sym.errors import ArgumentError, renamed
-from gqm_sym.kernels.base import CONTACT_SIGN, DIRECTION, KAPPA, MASS, Kernel, W, X, Z
-from gqm_sym.parameters import Given, Value, is_positive
+from gqm_sym.kernels.base import (
+    CONTACT_SIGN,
+    DIRECTION,
+    KAPPA,
+    MASS,
+    Kernel,
+    W,
+    X,
+    Z,
+    kernel_formulas,
+    units_by_role,
+)
+from gqm_sym.parameters import Given, Value, in_words, is_positive
 
 LAM1 = sp.Symbol("lam1", real=True)
 LAM2 = sp.Symbol("lam2", real=True)
+# Characters of a closed form that a printed model shows.
+MOST_SHOWN = 160
 # Variables of integration, as texts and as LaTeX.
 _DASHES = (("_", "'"), ("__", "''"))
 
@@ -194,6 +209,21 @@ class Model:
             ("turning points", turning),
             ("liftoff", liftoff),
         )
+
+    def __str__(self) -> str:
+        """A few lines for people: the closed forms that a motion follows, and the parameters with their units."""
+        formulas = curve_formulas(self.curve) + kernel_formulas(self.force)
+        found = found_dimensions(formulas, COMMON)
+        units = {**units_by_role(self.force), **{name: unit for name in found if (unit := unit_of(found[name]))}}
+        said = {"kappa": " [1/m]", "V**2": " [m**2/s**2]", "W = V**2": " [m**2/s**2]", "N": " [N]", "A": " [m/s**2]"}
+        lines = [f"{self.title or 'Model'}: {self.curve.kind} curve, {', '.join(name for name, _ in self.force.terms)}"]
+        for label, form in self.closed_forms():
+            if label in said or label in ("x", "z", f"ds/d{self.parameter.name}"):
+                text = str(form)
+                shown = text if len(text) <= MOST_SHOWN else text[: MOST_SHOWN - 3] + "..."
+                lines.append(f"  {label}{said.get(label, '')} = {shown}")
+        lines.append(f"  parameters: {in_words(dict(self.defaults), units)}")
+        return "\n".join([*lines, *(f"  {note}" for note in self.notes)])
 
     def latex(self) -> str:
         """Return the closed forms as one aligned LaTeX block, without delimiters."""

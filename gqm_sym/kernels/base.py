@@ -13,6 +13,18 @@ from typing import TYPE_CHECKING
 import sympy as sp
 
 from gqm_sym.arguments import checked, instance
+from gqm_sym.dimensions import (
+    ACCELERATION,
+    LENGTH,
+    NUMBER,
+    SPEED_SQUARED,
+    Dimension,
+    Formulas,
+    dimension,
+    found_dimensions,
+    unit_of,
+)
+from gqm_sym.dimensions import COMMON as COMMON_DIMENSIONS
 from gqm_sym.errors import DeclarationError, renamed
 from gqm_sym.expressions import read_expression
 from gqm_sym.parameters import (
@@ -20,6 +32,7 @@ from gqm_sym.parameters import (
     COORDINATES,
     Given,
     Value,
+    in_words,
     names_in_order,
     read_argument,
     read_parameters,
@@ -128,6 +141,14 @@ class Kernel:
             defaults=read_parameters(parameters, found=found, where="law"),
         )
 
+    def __str__(self) -> str:
+        """A few lines for people: every force, and what its parameters are measured in."""
+        found = found_dimensions(kernel_formulas(self), COMMON_DIMENSIONS)
+        units = {**units_by_role(self), **{name: unit for name in found if (unit := unit_of(found[name]))}}
+        loss = "conservative" if self.conservative else "dissipative"
+        lines = [f"Force law, {loss}", *(f"  {name}: {text}" for name, text in self.terms)]
+        return "\n".join([*lines, f"  parameters: {in_words(dict(self.defaults), units)}"])
+
     @property
     def parameters(self) -> tuple[str, ...]:
         """Names of the run-time parameters, in order."""
@@ -199,6 +220,39 @@ def _refuse_clashes(first: Kernel, second: Kernel) -> None:
 # Forces that act on a body as a whole: a second one is a mistake, not a sum.
 _ONCE = frozenset({"gravity", "rolling", "coulomb", "rotating_frame"})
 _EXCLUSIVE = frozenset({"rolling", "coulomb"})
+
+
+# What the parameters of the kernels are measured in, by their usual names.
+UNITS = {
+    "g": "m/s**2",
+    "Omega": "rad/s",
+    "k": "m**3/s**2",
+    "beta": "1",
+    "radius": "m",
+    "mu": "1",
+    "mu_static": "1",
+    "b": "kg/m",
+    "gamma": "N/m",
+    "ell_c": "m",
+}
+
+
+def kernel_formulas(kernel: Kernel) -> Formulas:
+    """Return the formulas of a force law with their dimensions.
+
+    Those of a resistance are left out: the printed form of surface tension takes its numbers in SI.
+    """
+    fields = ((kernel.potential, SPEED_SQUARED), (kernel.tangential_law, ACCELERATION), (kernel.drag, dimension(metre=-1)))
+    numbers = ((kernel.friction, NUMBER), (kernel.static_friction, NUMBER), (kernel.inertia - 1, NUMBER))
+    others = ((kernel.spin, dimension(second=-1)), (kernel.radius, LENGTH))
+    variables: dict[str, Dimension | None] = {X.name: LENGTH, Z.name: LENGTH, W.name: SPEED_SQUARED}
+    return Formulas([*fields, *numbers, *others], {**variables, DIRECTION.name: NUMBER})
+
+
+def units_by_role(kernel: Kernel) -> dict[str, str]:
+    """Return the units of parameters that formulas alone do not tell, where they have their usual names."""
+    droplet = any(name == "surface_tension" for name, _ in kernel.terms)
+    return {name: UNITS[name] for name in ("gamma", "ell_c") if droplet and name in kernel.parameters}
 
 
 def parameter(given: Given | None, name: str, *, where: str) -> tuple[sp.Symbol, tuple[str, Value | None]]:

@@ -83,8 +83,8 @@ class _Reader:
                 return None
             spec, model = found
             self.known = (*_LAUNCH, *(name for name, _ in model.defaults))
-            data = plain(spec.tree)
-            units = {**expected_units(data), **launch_units(data)}
+            kernel = spec.kernel.along(spec.curve.parameter)
+            units = {**expected_units(plain(spec.tree), spec.curve, kernel), **launch_units(spec.curve)}
             self.units = {**units, "direction": "1", **({"lam": units["lam0"]} if "lam0" in units else {})}
             axes = self._axes(file)
         fixed = self._fixed(file, spec)

@@ -41,7 +41,7 @@ LAYERS = (
     {"runtime.compiled"},
     {"runtime.interface"},
     {"sympy_charts", "literals", "loading", "optional", "smoothing"},
-    {"budgets", "arguments"},
+    {"budgets", "arguments", "dimensions"},
     {"errors"},
 )
 
@@ -83,6 +83,7 @@ ONLY_IN = {
         "parameters",
         "expressions",
         "sympy_charts",
+        "dimensions",
     },
     "xarray": {"cli", "export", "studies"},
 }

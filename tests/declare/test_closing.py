@@ -32,6 +32,7 @@ FOUND = {
     "three petals": (gqm.Curve.polar("cos(3*theta)"), "pi"),
     "four petals": (gqm.Curve.polar("a*cos(2*theta)"), "2*pi"),
     "limacon": (gqm.Curve.polar("a + b*cos(theta)"), "2*pi"),
+    "kepler": (drawn("a*(cos(u) - ecc)", "a*sqrt(1 - ecc**2)*sin(u)"), "2*pi"),
     "long": (gqm.Curve.polar("2 + cos(theta/3)"), "6*pi"),
 }
 OPEN = {
@@ -44,6 +45,8 @@ OPEN = {
     "tangent": drawn("tan(u)", "sin(u)"),
     "spiral": gqm.Curve.polar("a*theta"),
     "an arc": drawn("cos(u)", "sin(u)", domain=(0, 1)),
+    "a point": drawn("sin(u)**2 + cos(u)**2", "a"),
+    "nowhere real": drawn("cos(u)*sqrt(-1 - a**2)", "sin(u)"),
     "a graph": gqm.Curve.graph("sin(x)"),
 }
 
