@@ -1,5 +1,5 @@
 # Made by gqm-gen for "circle". Do not edit: change its declaration and generate again.
-# interface 8, input 6c3a741d3b21, body 6ad0baeec3be
+# interface 8, input 6c3a741d3b21, body a7256a309a1a
 """Bead that loops round a circle
 
 x              = L*sin(theta)
@@ -377,7 +377,8 @@ def sweep(
     Returns
     -------
     Sweep
-        ``values``, NaN where there is none, and ``reasons``, 0 where there is one; ``why()`` counts the others.
+        ``values``, NaN where there is none; ``status``, 0 where there is one, and ``route``, how each was found.
+        ``status_counts()`` counts the launches without a value.
     """
     launches = LaunchRequest(lam0, v0, direction, None, t_max, contact)
     return MODEL.sweep(quantity, launches, (L, g, m,), lam=lam, client=client, source=__file__)

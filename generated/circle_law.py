@@ -1,5 +1,5 @@
 # Made by gqm-gen for "circle_law". Do not edit: change its declaration and generate again.
-# interface 8, input ba6587cf83ec, body f470abaf86f0
+# interface 8, input ba6587cf83ec, body 9d7a5335895b
 """Pendulum in dense air
 
 x              = L*sin(theta)
@@ -207,7 +207,8 @@ def sweep(
     Returns
     -------
     Sweep
-        ``values``, NaN where there is none, and ``reasons``, 0 where there is one; ``why()`` counts the others.
+        ``values``, NaN where there is none; ``status``, 0 where there is one, and ``route``, how each was found.
+        ``status_counts()`` counts the launches without a value.
     """
     launches = LaunchRequest(lam0, v0, direction, None, t_max, contact)
     return MODEL.sweep(quantity, launches, (L, c1, c2, g, m,), lam=lam, client=client, source=__file__)

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "parabola_droplet". Do not edit: change its declaration and generate again.
-# interface 8, input fcd43efdbae3, body 88d3e3e19b70
+# interface 8, input fcd43efdbae3, body 8339079be6ee
 """Droplet in a parabolic channel
 
 x              = x
@@ -213,7 +213,8 @@ def sweep(
     Returns
     -------
     Sweep
-        ``values``, NaN where there is none, and ``reasons``, 0 where there is one; ``why()`` counts the others.
+        ``values``, NaN where there is none; ``status``, 0 where there is one, and ``route``, how each was found.
+        ``status_counts()`` counts the launches without a value.
     """
     launches = LaunchRequest(lam0, v0, direction, None, t_max, contact)
     return MODEL.sweep(quantity, launches, (a, gamma, ell_c, g, m,), lam=lam, client=client, source=__file__)

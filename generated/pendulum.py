@@ -1,5 +1,5 @@
 # Made by gqm-gen for "pendulum". Do not edit: change its declaration and generate again.
-# interface 8, input abbc42e6e84e, body af525610d9d2
+# interface 8, input abbc42e6e84e, body ddd6ea9c6bf5
 """Simple pendulum, angle from the horizontal
 
 x              = L*cos(theta)
@@ -377,7 +377,8 @@ def sweep(
     Returns
     -------
     Sweep
-        ``values``, NaN where there is none, and ``reasons``, 0 where there is one; ``why()`` counts the others.
+        ``values``, NaN where there is none; ``status``, 0 where there is one, and ``route``, how each was found.
+        ``status_counts()`` counts the launches without a value.
     """
     launches = LaunchRequest(lam0, v0, direction, None, t_max, contact)
     return MODEL.sweep(quantity, launches, (L, g, m,), lam=lam, client=client, source=__file__)

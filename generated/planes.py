@@ -1,5 +1,5 @@
 # Made by gqm-gen for "planes". Do not edit: change its declaration and generate again.
-# interface 8, input 6aa424d89567, body 855ce49fbf12
+# interface 8, input 6aa424d89567, body c529c62f2610
 """Stitched planes through surveyed points
 
 x              = x(s)
@@ -287,7 +287,8 @@ def sweep(
     Returns
     -------
     Sweep
-        ``values``, NaN where there is none, and ``reasons``, 0 where there is one; ``why()`` counts the others.
+        ``values``, NaN where there is none; ``status``, 0 where there is one, and ``route``, how each was found.
+        ``status_counts()`` counts the launches without a value.
     """
     launches = LaunchRequest(lam0, v0, direction, None, t_max, contact)
     return MODEL.sweep(quantity, launches, (g, m,), lam=lam, client=client, source=__file__)

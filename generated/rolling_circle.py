@@ -1,5 +1,5 @@
 # Made by gqm-gen for "rolling_circle". Do not edit: change its declaration and generate again.
-# interface 8, input aed757e55b8b, body daf4edd67ede
+# interface 8, input aed757e55b8b, body 0dcbc75c0fe0
 """Solid sphere rolling in a circular bowl
 
 x              = L*sin(theta)
@@ -390,7 +390,8 @@ def sweep(
     Returns
     -------
     Sweep
-        ``values``, NaN where there is none, and ``reasons``, 0 where there is one; ``why()`` counts the others.
+        ``values``, NaN where there is none; ``status``, 0 where there is one, and ``route``, how each was found.
+        ``status_counts()`` counts the launches without a value.
     """
     launches = LaunchRequest(lam0, v0, direction, None, t_max, contact)
     return MODEL.sweep(quantity, launches, (L, beta, g, m,), lam=lam, client=client, source=__file__)

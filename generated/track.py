@@ -1,5 +1,5 @@
 # Made by gqm-gen for "track". Do not edit: change its declaration and generate again.
-# interface 8, input f6b2958be28b, body cf49f9b905e2
+# interface 8, input f6b2958be28b, body 23209c200fe7
 """Hills of a roller coaster, as surveyed
 
 x              = x(s)
@@ -287,7 +287,8 @@ def sweep(
     Returns
     -------
     Sweep
-        ``values``, NaN where there is none, and ``reasons``, 0 where there is one; ``why()`` counts the others.
+        ``values``, NaN where there is none; ``status``, 0 where there is one, and ``route``, how each was found.
+        ``status_counts()`` counts the launches without a value.
     """
     launches = LaunchRequest(lam0, v0, direction, None, t_max, contact)
     return MODEL.sweep(quantity, launches, (g, m,), lam=lam, client=client, source=__file__)
