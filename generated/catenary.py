@@ -1,5 +1,5 @@
 # Made by gqm-gen for "catenary". Do not edit: change its declaration and generate again.
-# interface 8, input 2558bd3a8d44, body cb12ba819010
+# interface 8, input 2558bd3a8d44, body d325924b6cf4
 """Bead on a hanging chain
 
 x              = x
@@ -246,7 +246,8 @@ def sweep(
     Returns
     -------
     Sweep
-        ``values``, NaN where there is none, and ``reasons``, 0 where there is one; ``why()`` counts the others.
+        ``values``, NaN where there is none; ``status``, 0 where there is one, and ``route``, how each was found.
+        ``status_counts()`` counts the launches without a value.
     """
     launches = LaunchRequest(lam0, v0, direction, None, t_max, contact)
     return MODEL.sweep(quantity, launches, (c, g, m), lam=lam, client=client, source=__file__)

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "circle_coulomb". Do not edit: change its declaration and generate again.
-# interface 8, input b0d8ff0ac753, body a6578017c7cb
+# interface 8, input b0d8ff0ac753, body ac19edcd18ec
 """Bead on a rough ring
 
 x              = L*sin(theta)
@@ -186,7 +186,8 @@ def sweep(
     Returns
     -------
     Sweep
-        ``values``, NaN where there is none, and ``reasons``, 0 where there is one; ``why()`` counts the others.
+        ``values``, NaN where there is none; ``status``, 0 where there is one, and ``route``, how each was found.
+        ``status_counts()`` counts the launches without a value.
     """
     launches = LaunchRequest(lam0, v0, direction, None, t_max, contact)
     return MODEL.sweep(quantity, launches, (L, mu, mu_static, g, m), lam=lam, client=client, source=__file__)

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "circle_drag". Do not edit: change its declaration and generate again.
-# interface 8, input f2f11f54325e, body f9da1f847a5b
+# interface 8, input f2f11f54325e, body 262b432325fa
 """Pendulum in air
 
 x              = L*sin(theta)
@@ -184,7 +184,8 @@ def sweep(
     Returns
     -------
     Sweep
-        ``values``, NaN where there is none, and ``reasons``, 0 where there is one; ``why()`` counts the others.
+        ``values``, NaN where there is none; ``status``, 0 where there is one, and ``route``, how each was found.
+        ``status_counts()`` counts the launches without a value.
     """
     launches = LaunchRequest(lam0, v0, direction, None, t_max, contact)
     return MODEL.sweep(quantity, launches, (L, b, g, m), lam=lam, client=client, source=__file__)

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "circle_droplet". Do not edit: change its declaration and generate again.
-# interface 8, input 38113942f710, body 04cb95000a3b
+# interface 8, input 38113942f710, body d89f12c2dca3
 """Droplet in a round channel
 
 x              = L*sin(theta)
@@ -185,7 +185,8 @@ def sweep(
     Returns
     -------
     Sweep
-        ``values``, NaN where there is none, and ``reasons``, 0 where there is one; ``why()`` counts the others.
+        ``values``, NaN where there is none; ``status``, 0 where there is one, and ``route``, how each was found.
+        ``status_counts()`` counts the launches without a value.
     """
     launches = LaunchRequest(lam0, v0, direction, None, t_max, contact)
     return MODEL.sweep(quantity, launches, (L, gamma, ell_c, g, m), lam=lam, client=client, source=__file__)

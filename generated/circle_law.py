@@ -1,5 +1,5 @@
 # Made by gqm-gen for "circle_law". Do not edit: change its declaration and generate again.
-# interface 8, input 2718db879066, body a4acb30c79e5
+# interface 8, input 2718db879066, body 0d177fe17623
 """Pendulum in dense air
 
 x              = L*sin(theta)
@@ -188,7 +188,8 @@ def sweep(
     Returns
     -------
     Sweep
-        ``values``, NaN where there is none, and ``reasons``, 0 where there is one; ``why()`` counts the others.
+        ``values``, NaN where there is none; ``status``, 0 where there is one, and ``route``, how each was found.
+        ``status_counts()`` counts the launches without a value.
     """
     launches = LaunchRequest(lam0, v0, direction, None, t_max, contact)
     return MODEL.sweep(quantity, launches, (L, c1, c2, g, m), lam=lam, client=client, source=__file__)

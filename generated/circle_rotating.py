@@ -1,5 +1,5 @@
 # Made by gqm-gen for "circle_rotating". Do not edit: change its declaration and generate again.
-# interface 8, input a74aedd594f9, body 887dea817deb
+# interface 8, input a74aedd594f9, body e24e27887310
 """Bead on a hoop that turns about its vertical diameter
 
 x              = L*sin(theta)
@@ -247,7 +247,8 @@ def sweep(
     Returns
     -------
     Sweep
-        ``values``, NaN where there is none, and ``reasons``, 0 where there is one; ``why()`` counts the others.
+        ``values``, NaN where there is none; ``status``, 0 where there is one, and ``route``, how each was found.
+        ``status_counts()`` counts the launches without a value.
     """
     launches = LaunchRequest(lam0, v0, direction, None, t_max, contact)
     return MODEL.sweep(quantity, launches, (L, Omega, g, m), lam=lam, client=client, source=__file__)

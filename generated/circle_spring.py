@@ -1,5 +1,5 @@
 # Made by gqm-gen for "circle_spring". Do not edit: change its declaration and generate again.
-# interface 8, input bcc7b1afa151, body 17b4c67e2f22
+# interface 8, input bcc7b1afa151, body 0ad41cfdb11c
 """Bead on a ring, tied by a spring to a point above its centre
 
 x              = L*sin(theta)
@@ -263,7 +263,8 @@ def sweep(
     Returns
     -------
     Sweep
-        ``values``, NaN where there is none, and ``reasons``, 0 where there is one; ``why()`` counts the others.
+        ``values``, NaN where there is none; ``status``, 0 where there is one, and ``route``, how each was found.
+        ``status_counts()`` counts the launches without a value.
     """
     launches = LaunchRequest(lam0, v0, direction, None, t_max, contact)
     return MODEL.sweep(quantity, launches, (L, w, h, g, m), lam=lam, client=client, source=__file__)

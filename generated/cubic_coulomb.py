@@ -1,5 +1,5 @@
 # Made by gqm-gen for "cubic_coulomb". Do not edit: change its declaration and generate again.
-# interface 8, input f472752dd3ba, body 8f6f305efcce
+# interface 8, input f472752dd3ba, body 42262cabc6e8
 """Cubic track with Coulomb friction
 
 x              = x
@@ -191,7 +191,8 @@ def sweep(
     Returns
     -------
     Sweep
-        ``values``, NaN where there is none, and ``reasons``, 0 where there is one; ``why()`` counts the others.
+        ``values``, NaN where there is none; ``status``, 0 where there is one, and ``route``, how each was found.
+        ``status_counts()`` counts the launches without a value.
     """
     launches = LaunchRequest(lam0, v0, direction, None, t_max, contact)
     return MODEL.sweep(quantity, launches, (mu, g, m), lam=lam, client=client, source=__file__)

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "cycloid". Do not edit: change its declaration and generate again.
-# interface 8, input 350ae6cf923a, body cbce55235527
+# interface 8, input 350ae6cf923a, body decfd2d1e5e8
 """Bead on an arch of a cycloid
 
 x              = R*(theta - sin(theta))
@@ -244,7 +244,8 @@ def sweep(
     Returns
     -------
     Sweep
-        ``values``, NaN where there is none, and ``reasons``, 0 where there is one; ``why()`` counts the others.
+        ``values``, NaN where there is none; ``status``, 0 where there is one, and ``route``, how each was found.
+        ``status_counts()`` counts the launches without a value.
     """
     launches = LaunchRequest(lam0, v0, direction, None, t_max, contact)
     return MODEL.sweep(quantity, launches, (R, g, m), lam=lam, client=client, source=__file__)

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "cycloid_inverted". Do not edit: change its declaration and generate again.
-# interface 8, input 01e055bdd46f, body 62f17f9c6e7a
+# interface 8, input 01e055bdd46f, body f0156977fd9e
 """Bead in an inverted cycloid
 
 x              = R*(theta - sin(theta))
@@ -244,7 +244,8 @@ def sweep(
     Returns
     -------
     Sweep
-        ``values``, NaN where there is none, and ``reasons``, 0 where there is one; ``why()`` counts the others.
+        ``values``, NaN where there is none; ``status``, 0 where there is one, and ``route``, how each was found.
+        ``status_counts()`` counts the launches without a value.
     """
     launches = LaunchRequest(lam0, v0, direction, None, t_max, contact)
     return MODEL.sweep(quantity, launches, (R, g, m), lam=lam, client=client, source=__file__)

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "double_well". Do not edit: change its declaration and generate again.
-# interface 8, input 876b66f15f50, body dbb2f84dc8a6
+# interface 8, input 876b66f15f50, body 1a132d3538d0
 """Bead between two wells
 
 x              = x
@@ -248,7 +248,8 @@ def sweep(
     Returns
     -------
     Sweep
-        ``values``, NaN where there is none, and ``reasons``, 0 where there is one; ``why()`` counts the others.
+        ``values``, NaN where there is none; ``status``, 0 where there is one, and ``route``, how each was found.
+        ``status_counts()`` counts the launches without a value.
     """
     launches = LaunchRequest(lam0, v0, direction, None, t_max, contact)
     return MODEL.sweep(quantity, launches, (h, g, m), lam=lam, client=client, source=__file__)

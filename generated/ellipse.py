@@ -1,5 +1,5 @@
 # Made by gqm-gen for "ellipse". Do not edit: change its declaration and generate again.
-# interface 8, input 81dc4ee20e82, body e50e4391cd8d
+# interface 8, input 81dc4ee20e82, body d3fd4712ee02
 """Bead on an ellipse, by the eccentric angle
 
 x              = a*cos(theta)
@@ -245,7 +245,8 @@ def sweep(
     Returns
     -------
     Sweep
-        ``values``, NaN where there is none, and ``reasons``, 0 where there is one; ``why()`` counts the others.
+        ``values``, NaN where there is none; ``status``, 0 where there is one, and ``route``, how each was found.
+        ``status_counts()`` counts the launches without a value.
     """
     launches = LaunchRequest(lam0, v0, direction, None, t_max, contact)
     return MODEL.sweep(quantity, launches, (a, b, g, m), lam=lam, client=client, source=__file__)

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "ellipse_drag". Do not edit: change its declaration and generate again.
-# interface 8, input f2717a5ad91f, body 3240c173597e
+# interface 8, input f2717a5ad91f, body 519764070200
 """Bead on an ellipse, in air
 
 x              = a*cos(theta)
@@ -193,7 +193,8 @@ def sweep(
     Returns
     -------
     Sweep
-        ``values``, NaN where there is none, and ``reasons``, 0 where there is one; ``why()`` counts the others.
+        ``values``, NaN where there is none; ``status``, 0 where there is one, and ``route``, how each was found.
+        ``status_counts()`` counts the launches without a value.
     """
     launches = LaunchRequest(lam0, v0, direction, None, t_max, contact)
     return MODEL.sweep(quantity, launches, (a, b, b_air, g, m), lam=lam, client=client, source=__file__)

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "line_spring". Do not edit: change its declaration and generate again.
-# interface 8, input 702c9ef6b67b, body 729ce9693e83
+# interface 8, input 702c9ef6b67b, body 9d4ee8063bc0
 """Bead on a sloping line, tied to the origin by a spring
 
 x              = x
@@ -231,7 +231,8 @@ def sweep(
     Returns
     -------
     Sweep
-        ``values``, NaN where there is none, and ``reasons``, 0 where there is one; ``why()`` counts the others.
+        ``values``, NaN where there is none; ``status``, 0 where there is one, and ``route``, how each was found.
+        ``status_counts()`` counts the launches without a value.
     """
     launches = LaunchRequest(lam0, v0, direction, None, t_max, contact)
     return MODEL.sweep(quantity, launches, (w, m), lam=lam, client=client, source=__file__)

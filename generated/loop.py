@@ -1,5 +1,5 @@
 # Made by gqm-gen for "loop". Do not edit: change its declaration and generate again.
-# interface 8, input e5eeff356595, body 13a22b2bb59a
+# interface 8, input e5eeff356595, body 4b82fe267f7e
 """Loop of a roller coaster
 
 x              = x(s)
@@ -208,7 +208,8 @@ def sweep(
     Returns
     -------
     Sweep
-        ``values``, NaN where there is none, and ``reasons``, 0 where there is one; ``why()`` counts the others.
+        ``values``, NaN where there is none; ``status``, 0 where there is one, and ``route``, how each was found.
+        ``status_counts()`` counts the launches without a value.
     """
     launches = LaunchRequest(lam0, v0, direction, None, t_max, contact)
     return MODEL.sweep(quantity, launches, (a, c, R, g, m), lam=lam, client=client, source=__file__)

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "parabola". Do not edit: change its declaration and generate again.
-# interface 8, input 2c8bf584b06a, body ad0941ee4542
+# interface 8, input 2c8bf584b06a, body 98798fd026c5
 """Bead in a parabolic bowl
 
 x              = x
@@ -240,7 +240,8 @@ def sweep(
     Returns
     -------
     Sweep
-        ``values``, NaN where there is none, and ``reasons``, 0 where there is one; ``why()`` counts the others.
+        ``values``, NaN where there is none; ``status``, 0 where there is one, and ``route``, how each was found.
+        ``status_counts()`` counts the launches without a value.
     """
     launches = LaunchRequest(lam0, v0, direction, None, t_max, contact)
     return MODEL.sweep(quantity, launches, (a, g, m), lam=lam, client=client, source=__file__)

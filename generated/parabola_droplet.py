@@ -1,5 +1,5 @@
 # Made by gqm-gen for "parabola_droplet". Do not edit: change its declaration and generate again.
-# interface 8, input 016fa3c6503a, body fa884352f088
+# interface 8, input 016fa3c6503a, body a67465c2a849
 """Droplet in a parabolic channel
 
 x              = x
@@ -193,7 +193,8 @@ def sweep(
     Returns
     -------
     Sweep
-        ``values``, NaN where there is none, and ``reasons``, 0 where there is one; ``why()`` counts the others.
+        ``values``, NaN where there is none; ``status``, 0 where there is one, and ``route``, how each was found.
+        ``status_counts()`` counts the launches without a value.
     """
     launches = LaunchRequest(lam0, v0, direction, None, t_max, contact)
     return MODEL.sweep(quantity, launches, (a, gamma, ell_c, g, m), lam=lam, client=client, source=__file__)

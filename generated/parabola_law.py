@@ -1,5 +1,5 @@
 # Made by gqm-gen for "parabola_law". Do not edit: change its declaration and generate again.
-# interface 8, input 6669068dcbd5, body 0d9f13a3416f
+# interface 8, input 6669068dcbd5, body 87e78712bb58
 """Bead on a parabola, with a resistance that falls with speed
 
 x              = x
@@ -195,7 +195,8 @@ def sweep(
     Returns
     -------
     Sweep
-        ``values``, NaN where there is none, and ``reasons``, 0 where there is one; ``why()`` counts the others.
+        ``values``, NaN where there is none; ``status``, 0 where there is one, and ``route``, how each was found.
+        ``status_counts()`` counts the launches without a value.
     """
     launches = LaunchRequest(lam0, v0, direction, None, t_max, contact)
     return MODEL.sweep(quantity, launches, (a, r, w1, g, m), lam=lam, client=client, source=__file__)

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "pendulum". Do not edit: change its declaration and generate again.
-# interface 8, input f60615287831, body f407bac5adb8
+# interface 8, input f60615287831, body ff53a146aa8c
 """Simple pendulum, angle from the horizontal
 
 x              = L*cos(theta)
@@ -240,7 +240,8 @@ def sweep(
     Returns
     -------
     Sweep
-        ``values``, NaN where there is none, and ``reasons``, 0 where there is one; ``why()`` counts the others.
+        ``values``, NaN where there is none; ``status``, 0 where there is one, and ``route``, how each was found.
+        ``status_counts()`` counts the launches without a value.
     """
     launches = LaunchRequest(lam0, v0, direction, None, t_max, contact)
     return MODEL.sweep(quantity, launches, (L, g, m), lam=lam, client=client, source=__file__)

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "planes". Do not edit: change its declaration and generate again.
-# interface 8, input 1c6e3a707056, body b598dff17704
+# interface 8, input 1c6e3a707056, body 33b251cb4a3d
 """Stitched planes through surveyed points
 
 x              = x(s)
@@ -266,7 +266,8 @@ def sweep(
     Returns
     -------
     Sweep
-        ``values``, NaN where there is none, and ``reasons``, 0 where there is one; ``why()`` counts the others.
+        ``values``, NaN where there is none; ``status``, 0 where there is one, and ``route``, how each was found.
+        ``status_counts()`` counts the launches without a value.
     """
     launches = LaunchRequest(lam0, v0, direction, None, t_max, contact)
     return MODEL.sweep(quantity, launches, (g, m), lam=lam, client=client, source=__file__)

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "rolling_circle". Do not edit: change its declaration and generate again.
-# interface 8, input 2a76ceb4277a, body ac7792d91867
+# interface 8, input 2a76ceb4277a, body 3ce3cb6a8352
 """Solid sphere rolling in a circular bowl
 
 x              = L*sin(theta)
@@ -240,7 +240,8 @@ def sweep(
     Returns
     -------
     Sweep
-        ``values``, NaN where there is none, and ``reasons``, 0 where there is one; ``why()`` counts the others.
+        ``values``, NaN where there is none; ``status``, 0 where there is one, and ``route``, how each was found.
+        ``status_counts()`` counts the launches without a value.
     """
     launches = LaunchRequest(lam0, v0, direction, None, t_max, contact)
     return MODEL.sweep(quantity, launches, (L, beta, g, m), lam=lam, client=client, source=__file__)

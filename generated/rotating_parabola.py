@@ -1,5 +1,5 @@
 # Made by gqm-gen for "rotating_parabola". Do not edit: change its declaration and generate again.
-# interface 8, input 33421e752297, body f65e8e12806b
+# interface 8, input 33421e752297, body 4d87ba1bb4d5
 """Bead in a turning parabolic bowl
 
 x              = x
@@ -243,7 +243,8 @@ def sweep(
     Returns
     -------
     Sweep
-        ``values``, NaN where there is none, and ``reasons``, 0 where there is one; ``why()`` counts the others.
+        ``values``, NaN where there is none; ``status``, 0 where there is one, and ``route``, how each was found.
+        ``status_counts()`` counts the launches without a value.
     """
     launches = LaunchRequest(lam0, v0, direction, None, t_max, contact)
     return MODEL.sweep(quantity, launches, (a, Omega, g, m), lam=lam, client=client, source=__file__)

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "track". Do not edit: change its declaration and generate again.
-# interface 8, input e49691f04fda, body cbf98415fb0d
+# interface 8, input e49691f04fda, body d91f833331d6
 """Hills of a roller coaster, as surveyed
 
 x              = x(s)
@@ -266,7 +266,8 @@ def sweep(
     Returns
     -------
     Sweep
-        ``values``, NaN where there is none, and ``reasons``, 0 where there is one; ``why()`` counts the others.
+        ``values``, NaN where there is none; ``status``, 0 where there is one, and ``route``, how each was found.
+        ``status_counts()`` counts the launches without a value.
     """
     launches = LaunchRequest(lam0, v0, direction, None, t_max, contact)
     return MODEL.sweep(quantity, launches, (g, m), lam=lam, client=client, source=__file__)

@@ -94,18 +94,18 @@ def _states(
 
 
 def swept(quantities: Iterable[str], data: "Dataset") -> Iterator[str]:
-    """Yield what came of a sweep, line by line: its size, and what there is no value of, and why."""
-    from gqm_sym.runtime.sweep.sweep import REASONS
+    """Yield a summary of a sweep line by line: its size, and how many launches have no value and why."""
+    from gqm_sym.runtime.sweep.quantities import STATUS_SENTENCES
 
     yield f"  {' x '.join(f'{size} {name}' for name, size in data.sizes.items())}: {', '.join(quantities)}"
     refused: dict[str, None] = {}
     for quantity in quantities:
-        why = data[f"{quantity}_reason"]
-        for code, reason in enumerate(REASONS):
-            count = int((why == code).sum())
-            if reason and count:
-                yield f"  {quantity}: {count} without a value: {reason}"
-        refused[why.attrs.get("first_refused", "")] = None
+        status = data[f"{quantity}_status"]
+        for code, sentence in enumerate(STATUS_SENTENCES):
+            count = int((status == code).sum())
+            if sentence and count:
+                yield f"  {quantity}: {count} without a value: {sentence}"
+        refused[status.attrs.get("first_refused", "")] = None
     yield from (f"  refused {first}" for first in refused if first)
 
 

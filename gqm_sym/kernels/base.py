@@ -242,7 +242,11 @@ def kernel_formulas(kernel: Kernel) -> Formulas:
 
     Those of a resistance are left out: the printed form of surface tension takes its numbers in SI.
     """
-    fields = ((kernel.potential, SPEED_SQUARED), (kernel.tangential_law, ACCELERATION), (kernel.drag, dimension(metre=-1)))
+    fields = (
+        (kernel.potential, SPEED_SQUARED),
+        (kernel.tangential_law, ACCELERATION),
+        (kernel.drag, dimension(metre=-1)),
+    )
     numbers = ((kernel.friction, NUMBER), (kernel.static_friction, NUMBER), (kernel.inertia - 1, NUMBER))
     others = ((kernel.spin, dimension(second=-1)), (kernel.radius, LENGTH))
     variables: dict[str, Dimension | None] = {X.name: LENGTH, Z.name: LENGTH, W.name: SPEED_SQUARED}

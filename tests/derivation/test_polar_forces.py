@@ -62,7 +62,12 @@ def test_a_field_line_has_mirror_points(degrees, field_line):
 def test_no_form_keeps_what_adds_up_to_one():
     """x**2 + z**2 is r**2 in the potential, in its slope and in both forces."""
     model = gqm.derive(DIPOLE, MIRROR)
-    for form in (model.potential, model.effective_potential_slope, model.tangential_acceleration, model.static_normal_load):
+    for form in (
+        model.potential,
+        model.effective_potential_slope,
+        model.tangential_acceleration,
+        model.static_normal_load,
+    ):
         assert not form.has(sp.cos(model.parameter) ** 2 + sp.sin(model.parameter) ** 2)
     spiral = gqm.derive(gqm.families.log_spiral(), gqm.CentralForce())
     assert not spiral.kernel.has(sp.sin, sp.cos)
