@@ -1,5 +1,9 @@
 # Made by gqm-gen for "loop". Do not edit: change its declaration and generate again.
+<<<<<<< HEAD
 # interface 8, input e5eeff356595, body 4b82fe267f7e
+=======
+# interface 8, input e5eeff356595, body e2a36515b6fb
+>>>>>>> 46d4b1d23ff9239c44e7cc2ecd697a50c6509495
 """Loop of a roller coaster
 
 x              = x(s)
@@ -110,7 +114,7 @@ def exact_effective_potential(op, x, z, p):
     return g*z, 0, g
 
 def exact_rail(op, p):
-    """Where the rail starts, and what each of its pieces is given by."""
+    """The start of the rail, then the numbers of each piece."""
     a, c, R = p[0], p[1], p[2]
     _t0 = 1/R
     return 0, 0, 0, a, c, 0, _t0, R, -_t0*c + 2*op.pi, c, _t0, 0, a

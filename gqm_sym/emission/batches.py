@@ -1,4 +1,4 @@
-"""Functions of a batch, for sweeps: the conservative ones again, with a launch and parameters for each place."""
+"""The functions that serve sweeps: those of a conservative model, but each place has its own launch and parameters."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -13,23 +13,27 @@ from gqm_sym.emission.sharing import hoist
 from gqm_sym.emission.subscripts import at
 from gqm_sym.emission.time_integrand import axis_orbits_batch
 
-NEAR = frozenset({"divdiff2_cosh", "divdiff2_sinh"})
-"""Differences that have a closed form for near points, without the rest: NaN tells a sweep to go another way."""
+_HYPERBOLIC = frozenset({"divdiff2_cosh", "divdiff2_sinh"})
+"""Divided differences that are replaced by their closed form for near points. It is NaN for points that are not near,
+and a sweep then solves the orbit in another way."""
 
-WAVES = frozenset({"divdiff2_cos", "divdiff2_sin"})
-"""Differences that are taken apart into what belongs to the orbit and what to the place (MATHS, section 3)."""
+_CIRCULAR = frozenset({"divdiff2_cos", "divdiff2_sin"})
+"""Divided differences that are split into factors of the orbit and factors of the place (MATHS, section 3)."""
 
 
 def _near(form: Expr) -> Expr:
     return form.replace(
-        lambda t: isinstance(t, AppliedUndef) and t.func.__name__ in NEAR,
+        lambda t: isinstance(t, AppliedUndef) and t.func.__name__ in _HYPERBOLIC,
         lambda t: Function(f"{t.func.__name__}_near")(*t.args),
     )
 
 
 @dataclass(frozen=True)
 class _Middle:
-    """A wave's argument x, y, w at both ends of an orbit and between, seen from the middle m: y = m + v, w - m = h."""
+    """The argument of a sine or cosine at one end x of an orbit, at a place y and at the other end w.
+
+    It is measured from the middle m of both ends: y = m + v and w = m + h.
+    """
 
     x: Expr
     w: Expr
@@ -60,14 +64,14 @@ class _Middle:
         return self._turned(head, cosine, sine)
 
     def _turned(self, head: type[Expr], even: Expr, odd: Expr) -> Expr:
-        """What belongs to sin(m + v) or cos(m + v), from what belongs to cos v and sin v."""
+        """Rotate by m: the result for sin(m + v) or cos(m + v), given the results for cos v and sin v."""
         return sin(self.m) * even + cos(self.m) * odd if head is sin else cos(self.m) * even - sin(self.m) * odd
 
 
 def _apart(
     forms: Sequence[Expr], place: Symbol, ends: tuple[Symbol, Symbol], gaps: tuple[Symbol, Symbol]
 ) -> list[Expr]:
-    """Waves, and their second differences, by parts of which most belong to the orbit."""
+    """Write sines, cosines and their second differences by factors most of which are constant along an orbit."""
     known = set[tuple[Expr, Expr]]()
 
     def second(t: Expr) -> Expr:
@@ -84,7 +88,7 @@ def _apart(
         x, w = (argument.xreplace({place: end}) for end in ends)
         return _Middle(x, w, scaled).value(t.func)
 
-    forms = [f.replace(lambda t: isinstance(t, AppliedUndef) and t.func.__name__ in WAVES, second) for f in forms]
+    forms = [f.replace(lambda t: isinstance(t, AppliedUndef) and t.func.__name__ in _CIRCULAR, second) for f in forms]
     return [f.replace(lambda t: isinstance(t, (sin, cos)) and t.has(place), value) for f in forms]
 
 
@@ -106,7 +110,7 @@ def potential_divdiff1_batch(lowering: Lowering) -> FunctionIR:
 
 
 def potential_divdiff2_batch(lowering: Lowering) -> tuple[FunctionIR, ...]:
-    """Second divided differences of the effective potential, and ds; with the terms that an orbit shares, if any."""
+    """Second divided differences of the effective potential, and ds, with the terms that an orbit has in common."""
     model, names, place = lowering.model, lowering.names, lowering.place
     a, b, da, db = (names.symbol(s) for s in ("a", "b", "da", "db"))
     lows, highs, left, right = (names(name) for name in ("lows", "highs", "left", "right"))

@@ -1,4 +1,4 @@
-"""What the module of a charted curve holds besides its formulas: the maker of its chart, one for each kind of curve."""
+"""The part of a module that makes the chart of its curve, for each kind of curve without formulas."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -17,7 +17,7 @@ from gqm_sym.emission.printer import check_emittable
 
 
 def _implicit(lowering: Lowering) -> ChartIR:
-    """F and its derivatives at many points, the start point and the ends of arc length."""
+    """An implicit curve: F and its derivatives, the start point, and the ends in arc length."""
     model = lowering.model
     found = model.level_set
     assert found is not None
@@ -48,7 +48,7 @@ def _implicit(lowering: Lowering) -> ChartIR:
 
 
 def _sampled(lowering: Lowering) -> ChartIR:
-    """The points, as text."""
+    """A sampled curve: its points, as text."""
     track = lowering.model.curve.definition
     assert isinstance(track, Track)
     return ChartIR(
@@ -59,14 +59,14 @@ def _sampled(lowering: Lowering) -> ChartIR:
 
 
 def _rail(lowering: Lowering) -> ChartIR:
-    """What each piece is given by, and a function for each curve among them."""
+    """A piecewise curve: the numbers of each piece, and a function for each piece that is a curve with formulas."""
     rail = lowering.model.curve.definition
     assert isinstance(rail, Rail)
     curves = [piece.curve for piece in rail.pieces if isinstance(piece.curve, Curve)]
     functions = tuple(_segment(lowering, curve, f"segment_{count}") for count, curve in enumerate(curves, start=1))
     formulas = tuple(_exact_segment(lowering, curve, f.name) for curve, f in zip(curves, functions, strict=True))
     given = (*(rail.start or ()), *(number for piece in rail.pieces for number in piece.numbers))
-    doc = "Where the rail starts, and what each of its pieces is given by."
+    doc = "The start of the rail, then the numbers of each piece."
     numbers = lowering.exact_function("rail", doc, given)
     arguments = [
         f"numbers={numbers.name}",
@@ -87,7 +87,7 @@ def _rail(lowering: Lowering) -> ChartIR:
 
 
 def _segment(lowering: Lowering, curve: Curve, name: str) -> FunctionIR:
-    """The shape of a curve that is a piece, in its own parameter."""
+    """Position, metric and curvature of a piece that is a curve with formulas, in its own parameter."""
     shape = geometry(curve, may_be_positive=())
     place, places = lowering.place, lowering.names("places")
     rows = (curve.x, curve.z, shape.ds, shape.dxds, shape.dzds, shape.kappa)
@@ -105,7 +105,7 @@ def _segment(lowering: Lowering, curve: Curve, name: str) -> FunctionIR:
 
 
 def _exact_segment(lowering: Lowering, curve: Curve, name: str) -> ExactIR:
-    """Its coordinates and their derivatives over a namespace of operations."""
+    """The coordinates of such a piece and their derivatives, over a namespace of operations."""
     place = curve.parameter
     rows = (curve.x, curve.z, differentiate(curve.x, place), differentiate(curve.z, place))
     outputs = tuple(row.xreplace({place: lowering.place}) for row in rows)
@@ -113,7 +113,7 @@ def _exact_segment(lowering: Lowering, curve: Curve, name: str) -> ExactIR:
 
 
 MAKERS: dict[str, Callable[[Lowering], ChartIR]] = {"implicit": _implicit, "piecewise": _rail, "sampled": _sampled}
-"""By the curve's kind."""
+"""The function that describes the chart, by the kind of the curve."""
 
 
 def chart_maker(lowering: Lowering) -> ChartIR | None:

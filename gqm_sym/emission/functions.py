@@ -1,4 +1,4 @@
-"""Lowered functions as the lines of a module: what the template prints of each, and the names that it calls."""
+"""Lowered functions as lines of text: the fields that the template prints, and the names that they call."""
 
 from collections.abc import Iterable
 from typing import Any
@@ -47,7 +47,7 @@ def _unpacked(parameters: tuple[tuple[str, int], ...], p: str) -> list[str]:
 
 
 def loop(function: FunctionIR) -> tuple[dict[str, Any], set[str]]:
-    """A function over many places: its parts for the template, and the names that it calls."""
+    """The template's fields of a function over many places, and the names that it calls."""
     taken = {name for name, _ in function.parameters} | {a.name for a in function.inside}
     index = "_i" if "i" in taken else "i"
     printer = CodePrinter(index)
@@ -74,19 +74,19 @@ def loop(function: FunctionIR) -> tuple[dict[str, Any], set[str]]:
 
 
 def _views(function: FunctionIR) -> str:
-    """Arguments that are seen as arrays."""
+    """The line that turns pointers into arrays."""
     names = ", ".join(name for name, _ in function.views)
     return f"{names} = {', '.join(f'carray({name}, {shape})' for name, shape in function.views)}"
 
 
 def _chart_view(function: FunctionIR, printer: CodePrinter) -> list[str]:
-    """Where a function reads its curve's chart: behind the run-time parameters."""
+    """The line that finds the chart of the curve, which stands behind the run-time parameters."""
     p, count = function.views[-2]
     return [f"chart = chart_of({p}, {count})"] if any("chart_" in name for name in printer.used) else []
 
 
 def enclosure(function: FunctionIR, parameter: str) -> tuple[dict[str, Any], set[str]]:
-    """The same of a function over intervals."""
+    """The template's fields of a function over intervals, and the names that it calls."""
     printer = IntervalPrinter()
     *count, lo, hi, p, out = function.arguments
     index = "_i" if "i" in {parameter} | {name for name, _ in function.parameters} else "i"
@@ -112,7 +112,7 @@ def enclosure(function: FunctionIR, parameter: str) -> tuple[dict[str, Any], set
 
 
 def exact_formula(function: ExactIR) -> dict[str, Any]:
-    """A function over a namespace of operations: its parts for the template."""
+    """The template's fields of a function over a namespace of operations."""
     printer = ExactPrinter()
     p = "_p" if "p" in {*function.places, *(name for name, _ in function.parameters)} else "p"
     inside = _unpacked(function.parameters, p)

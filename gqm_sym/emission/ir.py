@@ -1,4 +1,4 @@
-"""What the printer receives: functions as straight-line assignments, with everything already decided."""
+"""The data that are printed: functions as straight-line assignments, in their final form."""
 
 from dataclasses import dataclass
 
@@ -69,7 +69,7 @@ class ExactIR:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ChartIR:
-    """How a module makes the chart of its curve.
+    """The part of a module that makes the chart of its curve.
 
     Attributes
     ----------

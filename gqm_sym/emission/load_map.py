@@ -35,9 +35,9 @@ def load_map(lowering: Lowering) -> tuple[FunctionIR, ...]:
 def rising(
     forms: tuple[Expr, ...], symbol: Callable[[str], Symbol]
 ) -> tuple[list[tuple[Symbol, Expr]], tuple[Expr, ...]]:
-    """Exponentials whose reciprocals occur too, by names of their own, and the forms with these.
+    """Give names to exponentials whose reciprocals occur as well; return them and the forms that use them.
 
-    A division costs a third of an exponential, and what 1/exp(u) stands for, SymPy writes as exp(-u).
+    SymPy writes 1/exp(u) as exp(-u). A division costs a third of a second exponential.
     """
     calls = {call for form in forms for call in form.atoms(exp)}
     both = [call for call in ordered(calls) if exp(-call.exp) in calls and not call.exp.could_extract_minus_sign()]
@@ -47,7 +47,7 @@ def rising(
 
 
 def _without_constant(potential: Expr, place: Symbol) -> Expr:
-    """The potential less what is the same everywhere: that would only be rounded."""
+    """The potential without its constant term, which would only add rounding."""
     factor, rest = potential.as_independent(place, as_Add=False)
     return factor * rest.as_independent(place, as_Add=True)[1]
 
@@ -67,7 +67,7 @@ def rounded_size(form: Expr, place: Symbol) -> Expr | None:
 
 
 def _composed(form: Expr, sizes: list[Expr], place: Symbol) -> Expr | None:
-    """The same, given the sizes of the form's parts."""
+    """The size of a form, given the sizes of its parts."""
     if form.is_Add:
         return sum(sizes[1:], sizes[0])
     if form.is_Mul:
@@ -87,6 +87,6 @@ def _composed(form: Expr, sizes: list[Expr], place: Symbol) -> Expr | None:
 
 
 def _is_exact(form: Expr, place: Symbol) -> bool:
-    """Whether a form is the place times a power of two, and so not rounded."""
+    """Whether a form is the place times a power of two, which is not rounded."""
     factor = form / place
     return isinstance(factor, Rational) and all(part & (part - 1) == 0 for part in (abs(factor.p), factor.q))

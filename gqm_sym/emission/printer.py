@@ -15,7 +15,7 @@ from gqm_sym.errors import EmissionError
 # Up to this every integer is a double.
 MAX_INTEGER = 2**53
 
-# SymPy heads and what the standard library calls them.
+# The standard library's names of SymPy's functions.
 FUNCTIONS = {
     "sin": "sin",
     "cos": "cos",
@@ -40,7 +40,7 @@ _CHART_CALL = re.compile(r"(divdiff[12]_)?chart_[a-z]+")
 
 
 def check_emittable(expr: Expr, names: Collection[str], *, where: str) -> None:
-    """Refuse what the printers below have no text for, by name.
+    """Refuse a form that holds something the printers below have no text for; the message names it.
 
     Parameters
     ----------
@@ -69,7 +69,7 @@ def _has_text(node: Basic) -> bool:
 
 
 def as_double(number: Rational) -> float:
-    """The double nearest to a rational number; refused where there is none."""
+    """The double nearest to a rational number; an error if that is beyond their range."""
     try:
         value: float = number.p / number.q
     except OverflowError:

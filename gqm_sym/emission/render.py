@@ -170,7 +170,7 @@ def _batch(module: ModuleIR) -> list[str]:
 
 
 def body_digests(text: str) -> tuple[str, str] | None:
-    """The body's digest as the header states it, and as it is; None if the text has no such header."""
+    """The body's digest as the header states it, and as computed; None if the text has no such header."""
     first, _, rest = text.partition("\n")
     second, _, body = rest.partition("\n")
     if not first.startswith("# Made by gqm-gen") or " body " not in second:
@@ -179,7 +179,7 @@ def body_digests(text: str) -> tuple[str, str] | None:
 
 
 def _listed(names: list[str], width: int = _WIDTH) -> list[str]:
-    """Names with commas, as many on a line as fit."""
+    """Names followed by commas, as many on each line as fit."""
     lines = [""] if names else []
     for name in names:
         if lines[-1] and len(lines[-1]) + len(name) + 2 > width:
@@ -194,7 +194,7 @@ def _as_imported(name: str) -> tuple[int, str]:
 
 
 def _tidied(text: str) -> str:
-    """No blanks at ends of lines, at most two empty lines together, one newline at the end."""
+    """Remove blanks at ends of lines, all but two of consecutive empty lines, and all but one newline at the end."""
     lines = "\n".join(line.rstrip() for line in text.splitlines())
     return re.sub(r"\n{4,}", "\n\n\n", lines).strip() + "\n"
 
@@ -204,7 +204,7 @@ def _digest(text: str) -> str:
 
 
 def _quoted(text: str) -> str:
-    """Text as it may stand inside a docstring, whatever it holds."""
+    """Change any text so that it can stand inside a docstring."""
     plain = "".join(c if c.isprintable() else " " for c in text)
     return plain.replace("\\", "\\\\").replace('"', "'")
 

@@ -1,4 +1,4 @@
-"""Functions of a batch for orbits about an axis of symmetry, whose time is an integral without sines."""
+"""The functions of a batch for orbits about an axis of symmetry, whose time is an integral without sines."""
 
 from sympy import Expr
 
@@ -10,7 +10,7 @@ from gqm_sym.emission.subscripts import at
 
 
 def axis_orbits_batch(lowering: Lowering) -> tuple[FunctionIR, ...]:
-    """The times of many orbits about an axis, by a mean or else by an integrand, and their turning points."""
+    """Times of orbits about an axis, by an arithmetic-geometric mean or by an integrand, and their turning points."""
     swing = lowering.model.swing
     if swing is None:
         return ()

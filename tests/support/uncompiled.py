@@ -96,12 +96,14 @@ def _copy(width: int) -> Callable[..., None]:
     return copy
 
 
-def _drive(address: int, n: int, work: Any, lam: int, v2: int, v: float, nu: float, p: Any, out: int) -> None:
+def _speed_equation(address: int, n: int, work: Any, rows: tuple[int, ...], v: float, nu: float, p: Any) -> None:
     """Fill five rows of a line of numbers from others of it, as `calls.call_speed_equation` does."""
+    lam, v2, out = rows
     _FUNCTIONS[address](n, work[lam:], work[v2:], v, nu, p, work[out:])
 
 
-_QUICK = {"uncounted": lambda array: array, "least_and_greatest": _extent, "size": _size, "call_speed_equation": _drive}
+_QUICK = {"uncounted": lambda array: array, "least_and_greatest": _extent, "size": _size}
+_QUICK |= {"call_speed_equation": _speed_equation}
 _QUICK |= {"fma": lambda x, y, z: np.float64(_fma(x, y, z)), "nearest_whole": np.rint, "whole_below": np.floor}
 _QUICK |= {"choose": lambda condition, x, y: np.float64(x if condition else y)}
 _QUICK |= {
