@@ -1,7 +1,7 @@
 """Calls from compiled runtime code into the compiled functions of a generated module, by address.
 
-A first-class function argument costs 30 to 60 microseconds to pass from Python; an integer address costs
-nothing, and the code that calls it can be cached on disk.
+Passing a function itself from Python would take 30 to 60 microseconds. Passing an address takes none, and code that
+calls it can be cached on disk. The rows that each function fills are in the table of `interface`.
 """
 
 from typing import Any
@@ -14,7 +14,7 @@ from gqm_sym.runtime.compiled.registers import line_of
 
 
 def _call(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-    """Lower ``address(arguments...)``: arrays by the address of their data, numbers as they are."""
+    """Emit the call ``address(arguments...)``; an array is passed by the address of its data, a number by value."""
     values = []
     for kind, value in zip(signature.args[1:], args[1:], strict=True):
         if isinstance(kind, types.Array):
@@ -27,85 +27,85 @@ def _call(context: Any, builder: Any, signature: Any, args: Any) -> Any:
 
 @intrinsic
 def call_path_and_contact_force(_, address, n, lam, v2, p, out):  # type: ignore[no-untyped-def]
-    """Fill x, z, ds, kappa and the normal force."""
+    """Fill x, z, ds/dlam, kappa and the normal force."""
     return types.void(address, n, lam, v2, p, out), _call
 
 
 @intrinsic
 def call_load_map(_, address, n, w0, level, lam, p, out):  # type: ignore[no-untyped-def]
-    """Fill x, z, ds, kappa, V**2 and the normal force."""
+    """Fill x, z, ds/dlam, kappa, V**2 and the normal force."""
     return types.void(address, n, w0, level, lam, p, out), _call
 
 
 @intrinsic
 def call_effective_potential(_, address, n, lam, p, out):  # type: ignore[no-untyped-def]
-    """Fill the climb and its slope."""
+    """Fill 2*Phi/(1 + beta) and its slope."""
     return types.void(address, n, lam, p, out), _call
 
 
 @intrinsic
 def call_potential_divdiff1(_, address, n, a, lam, d, p, out):  # type: ignore[no-untyped-def]
-    """Fill the climb's first divided difference from ``a`` and ds."""
+    """Fill the potential's first divided difference over a and lam = a + d, and ds/dlam."""
     return types.void(address, n, a, lam, d, p, out), _call
 
 
 @intrinsic
 def call_potential_divdiff2(_, address, n, a, b, da, db, p, out):  # type: ignore[no-untyped-def]
-    """Fill the climb's second divided difference over a, lam, b and ds."""
+    """Fill the potential's second divided difference over a, lam = a + da = b - db and b, and ds/dlam."""
     return types.void(address, n, a, b, da, db, p, out), _call
 
 
 @intrinsic
 def call_bounds(_, address, lo, hi, p, out):  # type: ignore[no-untyped-def]
-    """Fill enclosures of the climb's slope and of ds over [lo, hi]."""
+    """Fill enclosures of the potential's slope and of ds/dlam over [lo, hi]."""
     return types.void(address, lo, hi, p, out), _call
 
 
 @intrinsic
 def call_potential_divdiff1_batch(_, address, n, a, lam, d, p, out):  # type: ignore[no-untyped-def]
-    """Fill climb[a, lam], ds and the climb's slope, each for a launch of its own."""
+    """Fill the first divided difference over a and lam, ds/dlam and the potential's slope for a batch of launches."""
     return types.void(address, n, a, lam, d, p, out), _call
 
 
 @intrinsic
 def call_potential_divdiff2_batch(_, address, n, a, b, da, db, p, out):  # type: ignore[no-untyped-def]
-    """Fill climb[a, lam, b] and ds, each for an orbit of its own."""
+    """Fill the second divided difference over a, lam and b, and ds/dlam, for a batch of orbits."""
     return types.void(address, n, a, b, da, db, p, out), _call
 
 
 @intrinsic
 def call_bounds_batch(_, address, n, lo, hi, p, out):  # type: ignore[no-untyped-def]
-    """Fill enclosures of the climb's slope and of ds over many intervals, each for parameters of its own."""
+    """Fill enclosures of the potential's slope and of ds/dlam over a batch of intervals."""
     return types.void(address, n, lo, hi, p, out), _call
 
 
 @intrinsic
 def call_orbit_invariants_batch(_, address, n, a, b, p, out):  # type: ignore[no-untyped-def]
-    """Fill what is the same all along an orbit, for many orbits."""
+    """Fill the invariants of a batch of orbits."""
     return types.void(address, n, a, b, p, out), _call
 
 
 @intrinsic
 def call_time_integrand_batch(_, address, n, fall, rise, p, out):  # type: ignore[no-untyped-def]
-    """Fill (dt/du)**2, and what that is divided by, for many orbits at the same share of their swing."""
+    """Fill numerator and denominator of (dt/du)**2 for a batch of orbits, at the same share of each swing."""
     return types.void(address, n, fall, rise, p, out), _call
 
 
 @intrinsic
 def call_integrand_invariants_batch(_, address, n, half, p, out):  # type: ignore[no-untyped-def]
-    """Fill what is the same all along a swing, for many orbits."""
+    """Fill the invariants of the time integrand of a batch of orbits."""
     return types.void(address, n, half, p, out), _call
 
 
 @intrinsic
 def call_turning_by_closed_form_batch(_, address, n, offset, v2, p, out):  # type: ignore[no-untyped-def]
-    """Fill half the width of orbits, the growth of the climb, and the square of the sine at the turning point."""
+    """Fill half the width of orbits, the growth of the potential, and the squared sine at the turning point."""
     return types.void(address, n, offset, v2, p, out), _call
 
 
 @intrinsic
 def call_agm_arguments_batch(_, address, n, half, p, out):  # type: ignore[no-untyped-def]
-    """Fill the squares of two numbers whose arithmetic-geometric mean is pi over the half period, for many orbits."""
+    """Fill the squares of two numbers whose arithmetic-geometric mean is pi/(half period), for a batch of orbits."""
     return types.void(address, n, half, p, out), _call
 
 
@@ -142,5 +142,5 @@ def call_field(_, address, n, x, z, p, out):  # type: ignore[no-untyped-def]
 
 @intrinsic
 def call_segment(_, address, n, lam, p, out):  # type: ignore[no-untyped-def]
-    """Fill x, z, ds, dx/ds, dz/ds and kappa."""
+    """Fill x, z, ds/dlam, dx/ds, dz/ds and kappa."""
     return types.void(address, n, lam, p, out), _call
