@@ -161,17 +161,22 @@ def _rebuilt(function: FunctionType, names: dict[str, Any]) -> Any:
     return FunctionType(code.replace(co_consts=numbers), names, function.__name__, function.__defaults__)
 
 
+def _tuple_like(value: Any, items: Any) -> Any:
+    """Give a tuple of these items, named as the other one is."""
+    return type(value)(*items) if hasattr(value, "_fields") else tuple(items)
+
+
 def _numpy(value: Any) -> Any:
     """Give numbers that divide by zero as compiled ones do."""
     if isinstance(value, tuple):
-        return tuple(_numpy(one) for one in value)
+        return _tuple_like(value, map(_numpy, value))
     return np.float64(value) if isinstance(value, float) else value
 
 
 def _python(value: Any) -> Any:
     """Give what numba returns: Python's own numbers."""
     if isinstance(value, tuple):
-        return tuple(_python(one) for one in value)
+        return _tuple_like(value, map(_python, value))
     return value.item() if isinstance(value, np.generic) else value
 
 
