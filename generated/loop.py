@@ -1,9 +1,5 @@
 # Made by gqm-gen for "loop". Do not edit: change its declaration and generate again.
-<<<<<<< HEAD
-# interface 8, input e5eeff356595, body 4b82fe267f7e
-=======
-# interface 8, input e5eeff356595, body e2a36515b6fb
->>>>>>> 46d4b1d23ff9239c44e7cc2ecd697a50c6509495
+# interface 8, input e5eeff356595, body 0c55c25a7324
 """Loop of a roller coaster
 
 x              = x(s)

@@ -119,7 +119,7 @@ def test_points_without_a_smooth_track(count: int) -> None:
 
 def test_a_rail_that_winds_for_ever(monkeypatch: pytest.MonkeyPatch) -> None:
     """Each piece is bounded, and so are all of them together."""
-    monkeypatch.setattr(rail, "MOST_PIECES", 1000)
+    monkeypatch.setattr(rail, "MAX_PIECES", 1000)
     pieces = [arc(radius=1 + k, angle=300) for k in range(5)]
     assert gqm.Curve.piecewise(pieces).kind == "piecewise"
     numbers = [n for k in range(5) for n in (1.0 + k, 300.0)]
@@ -147,7 +147,7 @@ def _wave(frequency: float) -> Callable[..., np.ndarray]:
 
 def test_a_curve_that_oscillates_for_ever(monkeypatch: pytest.MonkeyPatch) -> None:
     """It is given up at a number of pieces, by a message that says where; one that needs fewer is not."""
-    monkeypatch.setattr(arc_length, "MOST_PIECES", 500)
+    monkeypatch.setattr(arc_length, "MAX_PIECES", 500)
     assert rectify(_wave(1.0), np.array([0.0, 10.0]), where="wave").lengths.sum() == pytest.approx(LENGTH, rel=1e-13)
     with confined(10.0), pytest.raises(BudgetError, match=r"^chart: wave: not resolved by 500 pieces near 0\.0; give"):
         rectify(_wave(1e6), np.array([0.0, 10.0]), where="wave")

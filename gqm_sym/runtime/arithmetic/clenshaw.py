@@ -1,4 +1,4 @@
-"""Chebyshev and Legendre sums by Clenshaw's recurrence; for many places at once in vector registers."""
+"""Chebyshev and Legendre series by Clenshaw's recurrence, and sums at many places at once in vector registers."""
 
 from typing import Any
 
@@ -18,7 +18,7 @@ MAX_TERMS = 32
 GROWTH = np.array([(2 * k + 1) / (k + 1) for k in range(MAX_TERMS)])
 DECAY = np.array([(k + 1) / (k + 2) for k in range(MAX_TERMS)])
 
-# Registers side by side, and so places of a group.
+# Registers that are computed in parallel, and places in a group of so many registers.
 ABREAST = 4
 GROUP = LANES * ABREAST
 _COUNT = ir.IntType(64)
@@ -26,7 +26,7 @@ _COUNT = ir.IntType(64)
 
 @intrinsic
 def sum_group(_, c, x, at, high, low):  # type: ignore[no-untyped-def]
-    """Clenshaw's sums b_2 (in ``high``) and b_3 (in ``low``) of the coefficients c, at a group of places x."""
+    """Fill Clenshaw's sums b_2 (``high``) and b_3 (``low``) of coefficients c, at GROUP places x from index ``at``."""
 
     def lower(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         terms = context.make_array(signature.args[0])(context, builder, args[0])
@@ -63,7 +63,7 @@ def sum_group(_, c, x, at, high, low):  # type: ignore[no-untyped-def]
 
 @Inner
 def chebyshev_sum(c, x):  # type: ignore[no-untyped-def]
-    """The Chebyshev series with coefficients c, at x, by Clenshaw's recurrence."""
+    """Return the Chebyshev series with coefficients c at x."""
     high, low, twice = 0.0, 0.0, 2.0 * x
     for k in range(c.size - 1, 0, -1):
         high, low = fma(twice, high, c[k] - low), high
@@ -72,7 +72,7 @@ def chebyshev_sum(c, x):  # type: ignore[no-untyped-def]
 
 @Inner
 def legendre_sum(c, x):  # type: ignore[no-untyped-def]
-    """The Legendre series with coefficients c, at x, by Clenshaw's recurrence."""
+    """Return the Legendre series with coefficients c at x."""
     high, low = 0.0, 0.0
     for k in range(c.size - 1, 0, -1):
         high, low = (c[k] - DECAY[k] * low) + (GROWTH[k] * x) * high, high

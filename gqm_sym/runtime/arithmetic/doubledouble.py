@@ -14,7 +14,7 @@ ULP = 2.220446049250313e-16
 
 @Inlined
 def two_sum(a, b):  # type: ignore[no-untyped-def]
-    """A + b as rounded sum and its error (Knuth)."""
+    """Return the rounded sum a + b and its error (Knuth)."""
     s = a + b
     t = s - a
     return s, (a - (s - t)) + (b - t)
@@ -22,7 +22,7 @@ def two_sum(a, b):  # type: ignore[no-untyped-def]
 
 @Inner
 def two_product(a, b):  # type: ignore[no-untyped-def]
-    """A * b as rounded product and its error (Dekker, Veltkamp)."""
+    """Return the rounded product a * b and its error (Dekker, Veltkamp)."""
     p = a * b
     c = 134217729.0 * a
     a_hi = c - (c - a)
@@ -35,7 +35,7 @@ def two_product(a, b):  # type: ignore[no-untyped-def]
 
 @Inner
 def add(a, a_low, b, b_low):  # type: ignore[no-untyped-def]
-    """(a + a_low) + (b + b_low), accurate however much cancels."""
+    """Return (a + a_low) + (b + b_low) as two doubles, accurate however much cancels."""
     s, e = two_sum(a, b)
     t, f = two_sum(a_low, b_low)
     s, e = two_sum(s, e + t)
@@ -44,17 +44,16 @@ def add(a, a_low, b, b_low):  # type: ignore[no-untyped-def]
 
 @Inner
 def reduce(t, t_low, period, period_low):  # type: ignore[no-untyped-def]
-    """The count of whole periods in t and what is left, in [0, period), as two doubles.
+    """Return the number of whole periods in t, and the remainder in [0, period) as two doubles.
 
-    The product count * period is formed exactly up to 2**-106 of itself, so what is left is right to half an ulp of the
+    The product count * period is exact up to 2**-106 of itself. So the remainder is accurate to half an ulp of the
     period for counts up to 2**52.
     """
     count = float(floor(t / period))
     whole, error = two_product(count, period)
     rest, rest_low = add(t, t_low, -whole, -(error + count * period_low))
-    # The quotient was rounded: at most one period too many or too few. One way, then the other, so that rounding at
-    # a boundary
-    # cannot send it back and forth.
+    # The quotient was rounded, so the count may be wrong by one. Only one correction is made, so that rounding at a
+    # boundary cannot alternate between two counts.
     if rest < 0.0 or (rest == 0.0 and rest_low < 0.0):
         count -= 1.0
         rest, rest_low = add(rest, rest_low, period, period_low)
@@ -67,9 +66,9 @@ def reduce(t, t_low, period, period_low):  # type: ignore[no-untyped-def]
 
 
 def running_totals(times: Array, terms: Array) -> tuple[Array, Array]:
-    """Running totals of the panels' own times, each as two doubles, up to the last of ``times``."""
-    own = terms.sum(axis=1)  # every Legendre polynomial is 1 at the right edge
-    own *= times[-1] / (own.sum() or 1.0)  # from a place to itself there are none
+    """Return the running totals of the panels' times as two doubles each, scaled to end at the last of ``times``."""
+    own = terms.sum(axis=1)  # all Legendre polynomials are 1 at the right edge
+    own *= times[-1] / (own.sum() or 1.0)  # all times are 0 if both ends are the same place
     high, low = np.zeros(len(own) + 1), np.zeros(len(own) + 1)
     for k, part in enumerate(own):
         high[k + 1], error = two_sum.py_func(high[k], part)
@@ -83,7 +82,7 @@ ZERO: Pair = (0.0, 0.0)
 
 
 def plus(a: Pair, b: Pair) -> Pair:
-    """Sum of two numbers that are each two doubles."""
+    """Return the sum of two numbers of two doubles each."""
     s, e = two_sum.py_func(a[0], b[0])
     t, f = two_sum.py_func(a[1], b[1])
     s, e = two_sum.py_func(s, e + t)
@@ -91,13 +90,13 @@ def plus(a: Pair, b: Pair) -> Pair:
 
 
 def minus(a: Pair, b: Pair) -> Pair:
-    """Difference of two numbers that are each two doubles."""
+    """Return the difference of two numbers of two doubles each."""
     return plus(a, (-b[0], -b[1]))
 
 
 @entry(types.Tuple((VECTOR, VECTOR, VECTOR))(VECTOR, VECTOR, REAL, REAL))
 def reduce_many(t, t_low, period, period_low):  # type: ignore[no-untyped-def]
-    """Counts of whole periods and what is left, as two doubles each (`doubledouble.reduce`)."""
+    """Call `reduce` for many times from Python."""
     count, rest, rest_low = np.empty(t.size), np.empty(t.size), np.empty(t.size)
     for i in range(t.size):
         count[i], rest[i], rest_low[i] = reduce(t[i], t_low[i], period, period_low)

@@ -1,7 +1,7 @@
-"""Curves in a parameter of their own as pieces in arc length: what charts are assembled from.
+"""Rectification: a curve in any parameter is divided into pieces in arc length, from which a chart is assembled.
 
-On each piece the length is the integral of ds/dlam, a polynomial that is as exact as ds/dlam is resolved; Newton's
-method turns it round at the nodes. Angle and curvature are then read from the curve itself, there.
+On each piece the arc length is the integral of ds/dlam, a polynomial as accurate as the fit of ds/dlam. Newton's method
+inverts it at the Chebyshev nodes, where the curve itself then gives the tangent's angle and the curvature.
 """
 
 from collections.abc import Callable
@@ -21,31 +21,43 @@ from gqm_sym.runtime.charts.evaluate import TERMS
 from gqm_sym.runtime.compiled.jit import Inner, entry
 from gqm_sym.runtime.compiled.types import Array
 
-# From places (n) and offsets from each of them (n, m) to rows x, z, ds/dlam, dx/ds, dz/ds and kappa (6, n, m).
+# A curve: a function of places (n,) and of offsets from each of them (n, m) that returns x, z, ds/dlam, dx/ds, dz/ds
+# and kappa as an array (6, n, m).
 Rows = Callable[[Array, Array], Array]
 Flags = NDArray[np.bool_]
 Indices = NDArray[np.integer[Any]]
 
-# The last coefficients of a row, as a share of its size, on a piece that is short enough.
-TAIL = 5e-16
+# A piece is resolved if the last two coefficients of each row are below this share of the row's size.
+MAX_TAIL_RATIO = 5e-16
 
-# Below this level, coefficients that halving a piece does not bring down are the curve's own rounding noise.
-PLATEAU = 1e-11
-FALLING = 8.0
+# Below this share, coefficients that do not fall by this factor when a piece is halved are rounding noise of the curve.
+MAX_NOISE_RATIO = 1e-11
+MIN_FALL = 8.0
 
-# A piece this short, as a share of the whole, that is not resolved: the curve is not smooth there.
-SHORTEST = 1e-11
+# If a piece shorter than this share of the curve is not resolved, the curve is not smooth there.
+MIN_PIECE_SHARE = 1e-11
 
-# Pieces beyond those that were given: a curve that needs more oscillates, or is noise.
-MOST_PIECES = 100_000
-_SOLUTIONS = 20  # Newton steps; from where they begin, three are enough
+# A curve that needs more pieces oscillates, or is noise.
+MAX_PIECES = 100_000
+
+# Newton steps of the inversion; usually three are enough.
+MAX_NEWTON_STEPS = 20
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Pieces:
-    """Pieces of a curve in their order: lengths, left edges' coordinates, and angle and curvature at the nodes.
+    """The n pieces of a curve, in their order.
 
-    ``places`` are where each begins and ends in the curve's own parameter, (n, 2).
+    Attributes
+    ----------
+    places : (n, 2) array
+        Where each piece begins and ends in the curve's own parameter.
+    lengths : (n,) array
+        Arc lengths.
+    anchors : (n, 2) array
+        x and z at the left edges.
+    angles, curvatures : (n, TERMS) arrays
+        The tangent's angle in radians, and the curvature, at the nodes.
     """
 
     places: Array
@@ -56,7 +68,7 @@ class Pieces:
 
 
 def joined(parts: list[Pieces]) -> Pieces:
-    """Pieces one after the other."""
+    """Return the pieces of several curves as those of one."""
     return Pieces(
         places=np.concatenate([part.places for part in parts]),
         lengths=np.concatenate([part.lengths for part in parts]),
@@ -67,15 +79,20 @@ def joined(parts: list[Pieces]) -> Pieces:
 
 
 def summed(lengths: Array) -> Array:
-    """Arc length at the edges of pieces of these lengths: each sum rounded once or so."""
+    """Return the arc length at the edges of pieces of these lengths; the sums are rounded about once."""
     total: Array = np.concatenate([[0.0], np.cumsum(lengths, dtype=np.longdouble).astype(np.float64)])
     return total
 
 
 def unwrapped(angles: Array, start: float) -> Array:
-    """Angles along a curve without jumps of whole turns, the first of them within half a turn of ``start``.
+    """Return angles along a curve without jumps by whole turns, the first within half a turn of ``start``.
 
-    ``angles`` are at the nodes of pieces, in rows; the nodes run backwards.
+    Parameters
+    ----------
+    angles : (n, m) array
+        Angles at the m nodes of n pieces; the nodes are in decreasing order.
+    start : float
+        Angle at the beginning.
     """
     forwards = np.concatenate([[start], angles[:, ::-1].ravel()])
     turns = np.cumsum(np.round(np.diff(forwards) / (2.0 * np.pi)))
@@ -84,36 +101,38 @@ def unwrapped(angles: Array, start: float) -> Array:
 
 
 def rectify(rows: Rows, edges: Array, *, where: str) -> Pieces:
-    """The pieces of a curve between edges in its own parameter, halved until each is resolved.
+    """Divide a curve into pieces in arc length, and halve them until each is resolved.
 
     Parameters
     ----------
     rows
         The curve.
     edges : (n+1,) array
-        Places, growing, where pieces must begin: the curve is analytic between them.
+        Places in the curve's own parameter, increasing; the curve is analytic between them.
     where
-        What is being rectified, for messages.
+        Name of the curve in messages.
 
     Returns
     -------
     Pieces
-        Whose angles are unwrapped, from the angle of the tangent at the first edge.
+        Their angles are unwrapped, beginning with the tangent's angle at the first edge.
 
     Raises
     ------
     SolutionError
-        If the curve has a cusp or a pole, or is not defined throughout.
+        If the curve has a cusp or a pole, or is not defined everywhere.
+    BudgetError
+        If it needs more than MAX_PIECES pieces.
     """
     low, high = edges[:-1], edges[1:]
     before = np.full(low.size, np.inf)
-    shortest = SHORTEST * (edges[-1] - edges[0])
+    shortest = MIN_PIECE_SHARE * (edges[-1] - edges[0])
     found = []
     while low.size:
         spend()
-        if low.size > MOST_PIECES + edges.size:
+        if low.size > MAX_PIECES + edges.size:
             raise BudgetError(
-                f"chart: {where}: not resolved by {MOST_PIECES} pieces near {float(low[0])!r}; "
+                f"chart: {where}: not resolved by {MAX_PIECES} pieces near {float(low[0])!r}; "
                 "give a shorter domain, or a curve that oscillates less"
             )
         half = 0.5 * (high - low)
@@ -123,13 +142,13 @@ def rectify(rows: Rows, edges: Array, *, where: str) -> Pieces:
         rates = np.ascontiguousarray((half[:, None] * values[2]) @ FIT.T)
         gains = np.ascontiguousarray(chebint(rates, lbnd=-1, axis=1))
         lengths = gains.sum(axis=1)
-        # What the length is beyond that at the mean rate, which is little: so Newton's steps are not rounded as it is.
+        # The mean rate is subtracted: the remainder is small, so that its rounding does not limit Newton's method.
         gains[:, :2] -= 0.5 * lengths[:, None]
         speeds = values[2]
         values = rows(low, half[:, None] * (1.0 + _invert(lengths, rates, gains)))
-        bends = values[5] * lengths[:, None]
-        tail = np.max([_tail(speeds), _tail(values[3], 1.0), _tail(values[4], 1.0), _tail(bends, 1.0)], axis=0)
-        good = (tail <= TAIL) | ((tail <= PLATEAU) & (tail > before / FALLING))
+        turns = values[5] * lengths[:, None]
+        tail = np.max([_tail(speeds), _tail(values[3], 1.0), _tail(values[4], 1.0), _tail(turns, 1.0)], axis=0)
+        good = (tail <= MAX_TAIL_RATIO) | ((tail <= MAX_NOISE_RATIO) & (tail > before / MIN_FALL))
         _check(good | (half > shortest), middle, where, "has a cusp or a pole, or is not smooth")
         angles = np.arctan2(values[4], values[3])
         found.append((low[good], lengths[good], angles[good], values[5][good]))
@@ -159,16 +178,16 @@ def _halves(low: Array, middle: Array, high: Array, tail: Array) -> tuple[Array,
     return np.concatenate([low, middle]), np.concatenate([middle, high]), np.concatenate([tail, tail])
 
 
-def _tail(values: Array, least: float = 0.0) -> Array:
-    """The last coefficients of rows of values, as a share of the rows' sizes, which are ``least`` at least."""
-    size = np.maximum(np.abs(values).max(axis=-1), least)
+def _tail(values: Array, min_size: float = 0.0) -> Array:
+    """Return the last coefficients of rows of values as a share of the rows' sizes, or of ``min_size``."""
+    size = np.maximum(np.abs(values).max(axis=-1), min_size)
     tail: Array = np.abs(values @ FIT[-2:].T).max(axis=-1) / size
     return tail
 
 
 @Inner
 def clenshaw(terms, u):  # type: ignore[no-untyped-def]
-    """The value of a Chebyshev series."""
+    """Return the value of a Chebyshev series; `arithmetic.clenshaw.chebyshev_sum` has other roundings."""
     one, two = 0.0, 0.0
     for j in range(terms.size - 1, 0, -1):
         one, two = 2.0 * u * one - two + terms[j], one
@@ -177,13 +196,13 @@ def clenshaw(terms, u):  # type: ignore[no-untyped-def]
 
 @entry(types.float64[:, ::1](types.float64[::1], types.float64[:, ::1], types.float64[:, ::1]))
 def _invert(lengths, rates, gains):  # type: ignore[no-untyped-def]
-    """Where on [-1, 1] the length has come to the nodes' shares of the whole, for each piece."""
+    """Return the places u in [-1, 1] at which the arc length is the share of the nodes, for each piece."""
     out = np.empty((rates.shape[0], TERMS))
     for k in range(rates.shape[0]):
         half = 0.5 * lengths[k]
         for i in range(TERMS):
             u = NODES[i]
-            for _ in range(_SOLUTIONS):
+            for _ in range(MAX_NEWTON_STEPS):
                 step = (clenshaw(gains[k], u) + half * (u - NODES[i])) / clenshaw(rates[k], u)
                 u = min(max(u - step, -1.0), 1.0)
                 if not fabs(step) > 1e-15:

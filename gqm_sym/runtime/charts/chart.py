@@ -1,10 +1,10 @@
-"""Charts: curves that are known by numbers only, as piecewise polynomials in arc length.
+"""Charts: curves without formulas, as piecewise polynomials in arc length.
 
 A chart gives four rows as functions of arc length s: the coordinates x and z, the tangent's angle alpha (continuous;
-dx/ds = cos alpha, dz/ds = sin alpha) and the signed curvature kappa. Angle and curvature are given at the nodes of each
-piece, each accurate to rounding; the coordinates are integrals of the angle's cosine and sine, so that their divided
-differences lose nothing. Compiled code reads a chart from one flat array that follows the run-time parameters in ``p``
-(`chart_functions`).
+dx/ds = cos alpha, dz/ds = sin alpha) and the signed curvature kappa. Angle and curvature are known at the nodes of each
+piece, both accurate to rounding. The coordinates are integrals of the angle's cosine and sine, so that their divided
+differences do not cancel. Compiled code reads a chart from one flat array that follows the run-time parameters in ``p``
+(`evaluate`).
 """
 
 from collections.abc import Hashable
@@ -21,36 +21,36 @@ from gqm_sym.runtime.compiled.jit import entry
 from gqm_sym.runtime.compiled.types import Array
 
 NODES: Array = np.cos(np.pi * (np.arange(TERMS) + 0.5) / TERMS)
-"""Chebyshev points of the first kind on [-1, 1], at which a piece is given."""
+"""Chebyshev points of the first kind on [-1, 1], in decreasing order."""
 
-# Chebyshev coefficients from values at the nodes; powers of u from Chebyshev coefficients.
-# The angles are reduced before they are rounded: else noise of several units in the last place would remain.
+# The matrix FIT takes values at the nodes to Chebyshev coefficients, AT_NODES takes these back to values, and _POWERS
+# takes them to coefficients of powers of u. Angles are reduced before they are rounded: else noise of several ulp would
+# remain. (The fits of `level_pieces` are not reduced, and differ in last bits.)
 _QUARTERS = np.outer(np.arange(TERMS), 2 * np.arange(TERMS) + 1) % (4 * TERMS)
 FIT: Array = (2.0 / TERMS) * np.cos(np.pi * _QUARTERS / (2 * TERMS))
 FIT[0] *= 0.5
 
-# Values at the nodes from Chebyshev coefficients.
 AT_NODES: Array = np.cos(np.pi * _QUARTERS / (2 * TERMS))
 _POWERS = np.array([np.pad(cheb2poly(row[: k + 1]), (0, TERMS - 1 - k)) for k, row in enumerate(np.eye(TERMS))])
 
-# Coefficients behind the last one above this share of the largest are rounding noise, and left out.
-NOISE = 2e-16
+# Coefficients after the last one above this share of the largest value are rounding noise, and are set to zero.
+MAX_NOISE_RATIO = 2e-16
 
-# Places on each piece at which the search for the nearest point begins.
+# Places on each piece among which the search for the nearest point begins.
 _SAMPLES = 8
 
 
 class ChartMaker(Hashable, Protocol):
-    """What makes a curve's chart for values of the run-time parameters."""
+    """A curve that makes its chart for values of the run-time parameters."""
 
     def chart(self, p: tuple[float, ...]) -> "Chart":
-        """The chart for parameter values in the module's order."""
+        """Return the chart for parameter values in the module's order."""
 
     def true_curve(self, context: Any, p: tuple[Any, ...], chart: "Chart") -> Any:
-        """The curve itself in extended precision (`exact_charts.TrueCurve`)."""
+        """Return the curve itself in extended precision (`exact_normals.TrueCurve`)."""
 
     def is_exact(self, chart: "Chart") -> bool:
-        """Whether that can be had everywhere on a chart."""
+        """Whether the curve can be evaluated in extended precision everywhere on a chart."""
 
 
 @entry(types.float64[:, ::1](types.float64[::1], types.float64[::1]))
@@ -69,20 +69,20 @@ class Chart:
     Attributes
     ----------
     block : array
-        What compiled code reads.
+        The numbers that compiled code reads (`evaluate`).
     low, high : float
         The domain in arc length; 0 and the period of a closed curve.
     period : float
-        0 where the curve is open.
+        Length of a closed curve; 0 if the curve is open.
     ends : pair of str
-        What is at both ends of an open curve: "domain-end" or "singular-point".
+        What lies at both ends of an open curve: "domain-end" or "singular-point".
     breaks : array
-        Places inside the domain where the curvature or a higher derivative jumps: panels begin there.
+        Arc lengths inside the domain at which the curvature or a higher derivative jumps; panels begin there.
     corners : array
-        Those of them where the tangent itself jumps.
+        Those of them at which the tangent itself jumps.
     origins : (n, 3) array
-        Of each piece the part of the track that it belongs to, and where it begins and ends in that part's own
-        parameter; empty where there are no parts.
+        For each piece, the index of the part of the track that it belongs to, and where it begins and ends in that
+        part's own parameter; empty if the track has no parts.
     """
 
     block: Array
@@ -96,16 +96,16 @@ class Chart:
 
     @property
     def edges(self) -> Array:
-        """Arc length at the edges of the pieces."""
+        """Return the arc length at the edges of the pieces."""
         return self.block[EDGES : EDGES + int(self.block[1]) + 1]
 
     def points(self, s: Any) -> Array:
-        """x, z, alpha and kappa at arc lengths, as rows."""
+        """Return x, z, alpha and kappa at arc lengths, as rows."""
         rows: Array = _read(self.block, np.ascontiguousarray(s, dtype=np.float64).reshape(-1))
         return rows
 
     def nearest(self, x: float, z: float) -> tuple[float, float]:
-        """The arc length of the point of the curve that is nearest to a point, and its distance."""
+        """Return the arc length of the point of the curve nearest to (x, z), and the distance to it."""
         edges = self.edges
         shares = np.arange(_SAMPLES) / _SAMPLES
         s = np.append((edges[:-1, None] + np.diff(edges)[:, None] * shares).ravel(), edges[-1])
@@ -117,8 +117,8 @@ class Chart:
             row = self.points([place])[:, 0]
             ahead = (x - row[0]) * np.cos(row[2]) + (z - row[1]) * np.sin(row[2])
             aside = (z - row[1]) * np.cos(row[2]) - (x - row[0]) * np.sin(row[2])
-            bend = max(1.0 - row[3] * aside, 0.25)
-            move = float(np.clip(ahead / bend, -step, step))
+            factor = max(1.0 - row[3] * aside, 0.25)
+            move = float(np.clip(ahead / factor, -step, step))
             new = place + move
             if not self.period:
                 new = min(max(new, self.low), self.high)
@@ -177,7 +177,7 @@ def assemble(
     ends, breaks, corners, origins
         As `Chart` has them.
     """
-    anchors, angles, curvatures, tangents, rests = data
+    anchors, angles, curvatures, tangents, anchor_lows = data
     edges, anchors = np.asarray(edges, dtype=np.float64), np.asarray(anchors, dtype=np.float64)
     angles, half = np.asarray(angles, dtype=np.float64), 0.5 * np.diff(edges)
     count = half.size
@@ -185,26 +185,26 @@ def assemble(
     powers, records = np.empty((count, ROWS, TERMS)), np.empty((count, RECORD))
     records[:, 0], records[:, 1] = edges[:-1] + half, 1.0 / half
     known = np.stack([np.cos(angles), np.sin(angles)], axis=1) if tangents is None else np.asarray(tangents)
-    rests = np.broadcast_to(rests, anchors.shape)
-    # Second derivatives are known as well as first ones: the tangent is integrated from them, but for its mean.
-    bends = half[:, None, None] * np.asarray(curvatures)[:, None] * np.stack([-known[:, 1], known[:, 0]], axis=1)
-    turning = chebint(_fitted(bends), axis=2)[:, :, :TERMS]
+    anchor_lows = np.broadcast_to(anchor_lows, anchors.shape)
+    # Second derivatives are as accurate as first ones: the tangent is integrated from them, only its mean is fitted.
+    second = half[:, None, None] * np.asarray(curvatures)[:, None] * np.stack([-known[:, 1], known[:, 0]], axis=1)
+    turning = chebint(_fitted(second), axis=2)[:, :, :TERMS]
     turning[:, :, 0] += np.mean(known - turning @ AT_NODES, axis=2)
     for row in range(2):
         gained = chebint(turning[:, row], lbnd=-1, axis=1)[:, :TERMS]
         powers[:, row] = half[:, None] * (gained @ _POWERS)
-        # The constant term goes into two doubles: what lies between two places is the difference of such.
+        # The constant term is stored as two doubles, because differences of coordinates are differences of these.
         records[:, 2 + 2 * row], records[:, 3 + 2 * row] = two_sum.py_func(anchors[:, row], powers[:, row, 0])
-        records[:, 3 + 2 * row] += rests[:, row]
+        records[:, 3 + 2 * row] += anchor_lows[:, row]
         powers[:, row, 0] = 0.0
     powers[:, 2], powers[:, 3] = _fitted(angles) @ _POWERS, curvature @ _POWERS
     records[:, 6:] = powers.reshape(count, -1)
-    # How much alpha can turn from the start on: on each piece by a bound of the curvature, and by jumps between pieces.
-    most = np.abs(curvature).sum(axis=1)
+    # A bound of how much alpha turns from the start, from bounds of the curvature and jumps between pieces.
+    bounds = np.abs(curvature).sum(axis=1)
     left, right = (powers[:, 2] @ (side ** np.arange(TERMS)) for side in (-1.0, 1.0))
     jumps = np.append(np.abs(left[1:] - right[:-1]), abs(left[0] + turn - right[-1]) if period else 0.0)
-    turned = np.append(0.0, np.cumsum(2.0 * half * most + jumps))
-    block = np.concatenate([[0.0, count, edges[0], edges[-1], period, turn], edges, turned, most, records.ravel()])
+    turned = np.append(0.0, np.cumsum(2.0 * half * bounds + jumps))
+    block = np.concatenate([[0.0, count, edges[0], edges[-1], period, turn], edges, turned, bounds, records.ravel()])
     block[0] = block.size
     return Chart(
         block=block,
@@ -219,11 +219,11 @@ def assemble(
 
 
 def _fitted(values: Array) -> Array:
-    """Chebyshev coefficients from values at the nodes (the last axis), without the noise that follows them."""
+    """Return the Chebyshev coefficients of values at the nodes (the last axis), without trailing noise."""
     coefficients = (values - values[..., :1]) @ FIT.T
     size = np.abs(values).max(axis=-1, keepdims=True)
-    significant = np.abs(coefficients) > NOISE * size
-    kept = np.flip(np.logical_or.accumulate(np.flip(significant, axis=-1), axis=-1), axis=-1)
-    coefficients = np.where(kept, coefficients, 0.0)
+    significant = np.abs(coefficients) > MAX_NOISE_RATIO * size
+    used = np.flip(np.logical_or.accumulate(np.flip(significant, axis=-1), axis=-1), axis=-1)
+    coefficients = np.where(used, coefficients, 0.0)
     coefficients[..., 0] += values[..., 0]
     return coefficients

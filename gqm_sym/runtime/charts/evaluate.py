@@ -1,15 +1,16 @@
-"""What compiled code reads from a chart (`chart`): its rows, their divided differences, and bounds.
+"""Evaluation of a chart in compiled code: its rows, their divided differences, and enclosures.
 
-The flat array holds, one after the other::
+The flat array of a chart (`chart.Chart.block`) contains, one after the other::
 
-    size, count, low, high, period, turn      of the chart; then, n = count pieces,
+    size, count, low, high, period, turn      of the chart; then, for n = count pieces,
     edges (n+1)                               arc length at their edges
     turned (n+1)                              bound of how much alpha turns from the first edge to each edge
     most (n)                                  bound of |kappa| on each piece
     records (n, RECORD)                       middle, one over the half length, x and z at the middle as two doubles
                                               each, then powers of u in [-1, 1] for x, z, alpha and kappa
 
-Divided differences subtract no coordinates of one piece or of neighbours; farther apart, coordinates as two doubles.
+Divided differences on one piece, or on two neighbours, subtract no coordinates. Between other pieces they subtract
+coordinates that are two doubles each.
 """
 
 from math import fabs, floor, inf
@@ -23,20 +24,20 @@ ROWS = 4
 EDGES = 6
 RECORD = 6 + ROWS * TERMS
 
-# A jump of a derivative between neighbours that is smaller than this share of it is rounding.
-JUMP = 1e-11
+# A jump of a derivative between neighbouring pieces that is smaller than this share of it is rounding.
+MAX_ROUNDING_JUMP = 1e-11
 
 
 @Inner
 def chart_of(p, count):  # type: ignore[no-untyped-def]
-    """The chart that follows ``count`` run-time parameters."""
+    """Return the chart that follows ``count`` run-time parameters."""
     size = int(carray(p, count + 1)[count])
     return carray(p, count + size)[count:]
 
 
 @Inner
 def find(chart, s):  # type: ignore[no-untyped-def]
-    """The piece of an arc length, the place u in [-1, 1] on it, and how many times round the closed curve it is."""
+    """Return the piece of an arc length, the place u in [-1, 1] on it, and the number of laps of a closed curve."""
     count, low, period = int(chart[1]), chart[2], chart[4]
     laps = 0.0
     if period > 0.0:
@@ -58,7 +59,7 @@ def find(chart, s):  # type: ignore[no-untyped-def]
 
 @Inner
 def chart_row(chart, row, s):  # type: ignore[no-untyped-def]
-    """One row of the chart: 0 is x, 1 is z, 2 is alpha, 3 is kappa."""
+    """Return one row of the chart: 0 is x, 1 is z, 2 is alpha, 3 is kappa."""
     k, u, laps = find(chart, s)
     start = EDGES + 3 * int(chart[1]) + 2 + k * RECORD
     total = 0.0
@@ -97,15 +98,15 @@ def chart_kappa(chart, s):  # type: ignore[no-untyped-def]
 
 @Inner
 def _power(chart, row, start, j):  # type: ignore[no-untyped-def]
-    """What a row is made of, but for a constant; the angle's differences are means of the curvature."""
+    """Return a coefficient of a row up to its constant; the angle is the integral of the curvature."""
     if row < 2:
         return chart[start + 6 + row * TERMS + j]
     return chart[start + 5 + 3 * TERMS + j] / (j * chart[start + 1]) if j > 0 else 0.0
 
 
 @Inner
-def _slope(chart, row, k, u, v):  # type: ignore[no-untyped-def]
-    """The first divided difference of a row over two places of one piece."""
+def _divdiff1_on_piece(chart, row, k, u, v):  # type: ignore[no-untyped-def]
+    """Return the first divided difference of a row over two places of one piece."""
     start = EDGES + 3 * int(chart[1]) + 2 + k * RECORD
     value, first = 0.0, 0.0
     for j in range(TERMS - 1, -1, -1):
@@ -115,8 +116,8 @@ def _slope(chart, row, k, u, v):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def _bend(chart, row, k, u, v, w):  # type: ignore[no-untyped-def]
-    """The second divided difference of a row over three places of one piece."""
+def _divdiff2_on_piece(chart, row, k, u, v, w):  # type: ignore[no-untyped-def]
+    """Return the second divided difference of a row over three places of one piece."""
     start = EDGES + 3 * int(chart[1]) + 2 + k * RECORD
     value, first, second = 0.0, 0.0, 0.0
     for j in range(TERMS - 1, -1, -1):
@@ -127,28 +128,30 @@ def _bend(chart, row, k, u, v, w):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def _first(chart, row, s, t, h):  # type: ignore[no-untyped-def]
-    """The first divided difference over places s and t = s + h, in any order."""
+def _divdiff1(chart, row, s, t, h):  # type: ignore[no-untyped-def]
+    """Return the first divided difference over places s and t = s + h, in any order."""
     if h < 0.0:
         s, t, h = t, s, -h
     ks, us, laps_s = find(chart, s)
     kt, ut, laps_t = find(chart, t)
     apart = (kt - ks) + (laps_t - laps_s) * chart[1]
     if apart == 0.0:
-        return _slope(chart, row, ks, us, ut)
+        return _divdiff1_on_piece(chart, row, ks, us, ut)
     base = EDGES + 3 * int(chart[1]) + 2
     from_s, from_t = base + ks * RECORD, base + kt * RECORD
-    if apart == 1.0:  # neighbours: what both sides of their common edge add
+    if apart == 1.0:  # neighbours: the mean of the differences on both sides of the common edge
         before, after = (1.0 - us) / chart[from_s + 1], (ut + 1.0) / chart[from_t + 1]
-        if not before + after > 0.0:  # both at the joint, but for rounding
-            return _slope(chart, row, kt, -1.0, ut)
-        gained = before * _slope(chart, row, ks, us, 1.0) + after * _slope(chart, row, kt, -1.0, ut)
+        if not before + after > 0.0:  # both places are at the joint, up to rounding
+            return _divdiff1_on_piece(chart, row, kt, -1.0, ut)
+        gained = before * _divdiff1_on_piece(chart, row, ks, us, 1.0) + after * _divdiff1_on_piece(
+            chart, row, kt, -1.0, ut
+        )
         return gained / (before + after)
     one, two = 0.0, 0.0
     for j in range(TERMS - 1, -1, -1):
         one = one * us + chart[from_s + 6 + row * TERMS + j]
         two = two * ut + chart[from_t + 6 + row * TERMS + j]
-    if row >= 2:  # an angle: it grows with each lap
+    if row >= 2:  # the angle increases with each lap
         return ((laps_t - laps_s) * chart[5] + (two - one)) / h
     whole = chart[from_t + 2 + 2 * row] - chart[from_s + 2 + 2 * row]
     rest = (chart[from_t + 3 + 2 * row] - chart[from_s + 3 + 2 * row]) + (two - one)
@@ -156,8 +159,8 @@ def _first(chart, row, s, t, h):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def _second(chart, row, r, s, t, h1, h2):  # type: ignore[no-untyped-def]
-    """The second divided difference over r, s = r + h1 and t = s + h2, in any order."""
+def _divdiff2(chart, row, r, s, t, h1, h2):  # type: ignore[no-untyped-def]
+    """Return the second divided difference over r, s = r + h1 and t = s + h2, in any order."""
     if h1 < 0.0:
         r, s, h1, h2 = s, r, -h1, h1 + h2
     if h2 < 0.0:
@@ -169,72 +172,80 @@ def _second(chart, row, r, s, t, h1, h2):  # type: ignore[no-untyped-def]
     kt, ut, laps_t = find(chart, t)
     span = (kt - kr) + (laps_t - laps_r) * chart[1]
     if span == 0.0:
-        return _bend(chart, row, kr, ur, us, ut)
+        return _divdiff2_on_piece(chart, row, kr, ur, us, ut)
     if span == 1.0:
         count = int(chart[1])
         base = EDGES + 3 * count + 2
         before, after = (1.0 - ur) / chart[base + kr * RECORD + 1], (ut + 1.0) / chart[base + kt * RECORD + 1]
-        left, right = _slope(chart, row, kr, 1.0, 1.0), _slope(chart, row, kt, -1.0, -1.0)
+        left, right = _divdiff1_on_piece(chart, row, kr, 1.0, 1.0), _divdiff1_on_piece(chart, row, kt, -1.0, -1.0)
         jump = right - left
         # The slope of a coordinate is at most one, that of the angle the curvature.
         largest = 1.0 if row < 2 else max(chart[EDGES + 2 * (count + 1) + kr], chart[EDGES + 2 * (count + 1) + kt])
-        if fabs(jump) <= JUMP * largest:
+        if fabs(jump) <= MAX_ROUNDING_JUMP * largest:
             jump = 0.0
-        # The difference over the outer places is a weighted mean of those with the common edge put in between.
+        # The difference over all three is a weighted mean of those in which the common edge replaces an outer place.
         if ks == kr and laps_s == laps_r:
             near = (1.0 - us) / chart[base + ks * RECORD + 1]
-            over = after * _bend(chart, row, kt, -1.0, -1.0, ut) + near * _bend(chart, row, kr, us, 1.0, 1.0) + jump
+            over = (
+                after * _divdiff2_on_piece(chart, row, kt, -1.0, -1.0, ut)
+                + near * _divdiff2_on_piece(chart, row, kr, us, 1.0, 1.0)
+                + jump
+            )
             if near + after > 0.0:
                 over /= near + after
-                return (before * _bend(chart, row, kr, ur, us, 1.0) + after * over) / (before + after)
+                return (before * _divdiff2_on_piece(chart, row, kr, ur, us, 1.0) + after * over) / (before + after)
         else:
             near = (us + 1.0) / chart[base + ks * RECORD + 1]
-            over = near * _bend(chart, row, kt, -1.0, -1.0, us) + before * _bend(chart, row, kr, ur, 1.0, 1.0) + jump
+            over = (
+                near * _divdiff2_on_piece(chart, row, kt, -1.0, -1.0, us)
+                + before * _divdiff2_on_piece(chart, row, kr, ur, 1.0, 1.0)
+                + jump
+            )
             if near + before > 0.0:
                 over /= near + before
-                return (before * over + after * _bend(chart, row, kt, -1.0, us, ut)) / (before + after)
-    return (_first(chart, row, s, t, h2) - _first(chart, row, r, s, h1)) / (h1 + h2)
+                return (before * over + after * _divdiff2_on_piece(chart, row, kt, -1.0, us, ut)) / (before + after)
+    return (_divdiff1(chart, row, s, t, h2) - _divdiff1(chart, row, r, s, h1)) / (h1 + h2)
 
 
 @Inner
 def divdiff1_chart_x(chart, s, t, h):  # type: ignore[no-untyped-def]
     """x[s, t] with h = t - s."""
-    return _first(chart, 0, s, t, h)
+    return _divdiff1(chart, 0, s, t, h)
 
 
 @Inner
 def divdiff1_chart_z(chart, s, t, h):  # type: ignore[no-untyped-def]
     """z[s, t] with h = t - s."""
-    return _first(chart, 1, s, t, h)
+    return _divdiff1(chart, 1, s, t, h)
 
 
 @Inner
 def divdiff1_chart_alpha(chart, s, t, h):  # type: ignore[no-untyped-def]
     """alpha[s, t] with h = t - s."""
-    return _first(chart, 2, s, t, h)
+    return _divdiff1(chart, 2, s, t, h)
 
 
 @Inner
 def divdiff2_chart_x(chart, r, s, t, h1, h2):  # type: ignore[no-untyped-def]
     """x[r, s, t] with h1 = s - r and h2 = t - s."""
-    return _second(chart, 0, r, s, t, h1, h2)
+    return _divdiff2(chart, 0, r, s, t, h1, h2)
 
 
 @Inner
 def divdiff2_chart_z(chart, r, s, t, h1, h2):  # type: ignore[no-untyped-def]
     """z[r, s, t] with h1 = s - r and h2 = t - s."""
-    return _second(chart, 1, r, s, t, h1, h2)
+    return _divdiff2(chart, 1, r, s, t, h1, h2)
 
 
 @Inner
 def divdiff2_chart_alpha(chart, r, s, t, h1, h2):  # type: ignore[no-untyped-def]
     """alpha[r, s, t] with h1 = s - r and h2 = t - s."""
-    return _second(chart, 2, r, s, t, h1, h2)
+    return _divdiff2(chart, 2, r, s, t, h1, h2)
 
 
 @Inner
 def _turned(chart, s):  # type: ignore[no-untyped-def]
-    """Bound of how much alpha turns from the first edge to a place."""
+    """Return a bound of how much alpha turns from the first edge to a place."""
     k, u, laps = find(chart, s)
     count = int(chart[1])
     start = EDGES + 3 * count + 2 + k * RECORD
@@ -244,23 +255,23 @@ def _turned(chart, s):  # type: ignore[no-untyped-def]
 
 @Inner
 def ichart_alpha(chart, s):  # type: ignore[no-untyped-def]
-    """Enclosure of alpha over an interval of arc length."""
+    """Return an enclosure of alpha over an interval of arc length."""
     low, high = s
     middle = 0.5 * (low + high)
     value, here = chart_row(chart, 2, middle), _turned(chart, middle)
     reach = max(here - _turned(chart, low), _turned(chart, high) - here)
-    slack = 1e-12 * (1.0 + fabs(value))
-    return value - reach - slack, value + reach + slack
+    margin = 1e-12 * (1.0 + fabs(value))
+    return value - reach - margin, value + reach + margin
 
 
 @Inner
 def ichart_kappa(chart, s):  # type: ignore[no-untyped-def]
-    """Enclosure of the curvature over an interval of arc length: on each piece its middle, and bounds of its terms."""
+    """Return an enclosure of the curvature over an interval of arc length, from middle and terms on each piece."""
     count = int(chart[1])
     first, left, laps = find(chart, s[0])
     last, right, more = find(chart, s[1])
     pieces = int(last - first + (more - laps) * count) + 1
-    if pieces > count:  # all round
+    if pieces > count:  # the whole curve
         pieces, left, right = count, -1.0, 1.0
     low, high = inf, -inf
     for k in range(pieces):
@@ -272,14 +283,14 @@ def ichart_kappa(chart, s):  # type: ignore[no-untyped-def]
         for j in range(TERMS - 1, -1, -1):
             value = value * middle + chart[start + j]
             slope += j * fabs(chart[start + j])
-        slack = reach * slope + 1e-13 * (fabs(value) + slope)
-        low, high = min(low, value - slack), max(high, value + slack)
+        margin = reach * slope + 1e-13 * (fabs(value) + slope)
+        low, high = min(low, value - margin), max(high, value + margin)
     return low, high
 
 
 @Inner
 def _ichart(chart, row, s):  # type: ignore[no-untyped-def]
-    """Enclosure of a coordinate: it changes by no more than the arc length does."""
+    """Return an enclosure of a coordinate, which changes by no more than the arc length does."""
     low, high = s
     value = chart_row(chart, row, 0.5 * (low + high))
     reach = 0.5 * (high - low) * (1.0 + 1e-12) + 1e-14 * fabs(value)
@@ -288,11 +299,11 @@ def _ichart(chart, row, s):  # type: ignore[no-untyped-def]
 
 @Inner
 def ichart_x(chart, s):  # type: ignore[no-untyped-def]
-    """Enclosure of x over an interval of arc length."""
+    """Return an enclosure of x over an interval of arc length."""
     return _ichart(chart, 0, s)
 
 
 @Inner
 def ichart_z(chart, s):  # type: ignore[no-untyped-def]
-    """Enclosure of z over an interval of arc length."""
+    """Return an enclosure of z over an interval of arc length."""
     return _ichart(chart, 1, s)

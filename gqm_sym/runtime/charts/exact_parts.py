@@ -1,4 +1,4 @@
-"""Tracks of parts with formulas of their own, in extended precision, beside their charts (`exact_charts`)."""
+"""Curves that consist of parts with formulas, in extended precision (`exact_normals.TrueCurve`)."""
 
 from collections.abc import Callable, Sequence
 from functools import cache
@@ -9,13 +9,15 @@ from gqm_sym.runtime.charts.chart import Chart
 from gqm_sym.runtime.multiprecision.fixed_point import Polynomials
 from gqm_sym.runtime.multiprecision.gauss_legendre import gauss
 
-# From a part's own parameter to x, z and their derivatives by it.
+# A part: a function of the part's own parameter that returns x, z and their derivatives by it.
 Part = Callable[[Any], tuple[Any, Any, Any, Any]]
-MOST_STEPS = 60
+
+# Steps of Newton's method.
+MAX_STEPS = 60
 
 
 class Parts:
-    """Parts that follow each other, at one precision: the chart says which of its pieces belongs to which."""
+    """Parts that follow each other, at one precision; the chart's ``origins`` say which piece belongs to which part."""
 
     def __init__(self, context: Any, chart: Chart, part: Callable[[int], Part]) -> None:
         self._context, self._part = context, cache(part)
@@ -24,13 +26,13 @@ class Parts:
         self.start = self.ends(0)[0]
 
     def _ends(self, k: int) -> tuple[tuple[Any, Any], tuple[Any, Any]]:
-        """The points at which a piece begins and ends."""
+        """Return the points at which a piece begins and ends."""
         part, *places = self._origins[k]
         begin, end = (self._part(part)(self._context.mpf(place))[:2] for place in places)
         return begin, end
 
     def length(self, k: int) -> Any:
-        """The length between them."""
+        """Return the arc length between them."""
         context, (part, *places) = self._context, self._origins[k]
 
         def speed(place: Any) -> Any:
@@ -39,23 +41,23 @@ class Parts:
         return gauss(context, speed, [context.mpf(place) for place in places], context.dps)[0]
 
     def meet(self, k: int, u: float, x: Any, z: Any, dx: Any, dz: Any, size: float) -> tuple[Any, Any, Any, Any]:
-        """Where the line through (x, z) across (dx, dz) meets the track, and the unit tangent there."""
+        """Return where the line through (x, z) perpendicular to (dx, dz) meets the curve, and the tangent there."""
         context, (part, low, high) = self._context, self._origins[k]
         at, enough = self._part(part), context.ldexp(size, -context.prec // 2)
         place = context.mpf(low + 0.5 * (1.0 + u) * (high - low))
-        for _ in range(MOST_STEPS):
+        for _ in range(MAX_STEPS):
             at_x, at_z, rate_x, rate_z = at(place)
             ahead = (x - at_x) * dx + (z - at_z) * dz
             place += ahead / (rate_x * dx + rate_z * dz)
-            if abs(ahead) <= enough:  # it squares: the next would be nothing
+            if abs(ahead) <= enough:  # convergence is quadratic: the next step would be below rounding
                 at_x, at_z, rate_x, rate_z = at(place)
                 speed = context.sqrt(rate_x * rate_x + rate_z * rate_z)
                 return at_x, at_z, rate_x / speed, rate_z / speed
-        raise SolutionError(f"the track near ({float(x)!r}, {float(z)!r}): Newton's method does not settle on it")
+        raise SolutionError(f"the track near ({float(x)!r}, {float(z)!r}): Newton's method does not converge to it")
 
 
 def polynomial(context: Any, begin: Any, unit: Any, x: Sequence[Any], z: Sequence[Any]) -> Part:
-    """A part whose coordinates are polynomials, given by their powers of the distance from ``begin`` in units."""
+    """Return a part whose coordinates are polynomials in ``(place - begin)/unit``, lowest power first."""
     rows = Polynomials(context, (x, z))
 
     def at(place: Any) -> tuple[Any, Any, Any, Any]:
@@ -66,14 +68,14 @@ def polynomial(context: Any, begin: Any, unit: Any, x: Sequence[Any], z: Sequenc
 
 
 def spiral(context: Any, pen: tuple[Any, Any, Any], length: Any, first: Any, last: Any, count: int) -> Part:
-    """A line, an arc or a clothoid by its arc length in steps, Taylor series about the middles of ``count`` equal ones.
+    """Return a line, an arc or a clothoid as Taylor series about the middles of ``count`` equal steps of length.
 
     Parameters
     ----------
     pen
-        x, z and the angle of the tangent at its begin.
+        x, z and the angle of the tangent at its beginning.
     first, last
-        Its curvature at its begin and at its end.
+        Its curvature at the beginning and at the end.
     """
     step, bent = length / count, (last - first) / length
     x, z, angle = pen
@@ -95,9 +97,9 @@ def spiral(context: Any, pen: tuple[Any, Any, Any], length: Any, first: Any, las
 
 
 def _waves(context: Any, angle: Any, kappa: Any, bent: Any) -> tuple[list[Any], list[Any]]:
-    """Powers of cos(a) and sin(a), a' = kappa + bent*v from ``angle`` on, as many as matter for |v| up to a half.
+    """Return the Taylor coefficients in v of cos(a) and sin(a), with a(0) = ``angle`` and a' = kappa + bent*v.
 
-    From c' = -a' s and s' = a' c.
+    They come from c' = -a' s and s' = a' c, and are enough for |v| up to 1/2.
     """
     cosines, sines = [context.mpf(0), context.cos(angle)], [context.mpf(0), context.sin(angle)]
     n = 0

@@ -1,9 +1,9 @@
 """One piece of a curve F(x, z) = 0 in arc length: r' = T(r), T the unit tangent across grad F.
 
-Solved at Chebyshev nodes by integrating the tangents found there and looking again at the places this leads to, until
-nothing moves. The tangents have unit length to rounding, so arc length is kept; rounding of F enters the direction
-only. Along the exact solution F is constant: the mean of its values at the nodes, whose rounding averages out, says
-how far the whole piece lies beside F = 0, and the piece is moved by as much along the gradient.
+It is solved at Chebyshev nodes: the tangents there are integrated, and evaluated again at the places that this gives,
+until nothing changes. The tangents have unit length to rounding, so arc length is preserved, and rounding of F enters
+only the direction. Along the exact solution F is constant. The mean of its values at the nodes, in which rounding
+averages out, tells how far the piece lies beside F = 0, and the piece is moved by as much along the gradient.
 """
 
 from math import fabs, inf, isfinite, sqrt
@@ -16,49 +16,50 @@ from gqm_sym.runtime.charts.evaluate import TERMS
 from gqm_sym.runtime.compiled.calls import call_field
 from gqm_sym.runtime.compiled.jit import Inner
 
-# Behind the nodes come the piece's right end and its left end, the anchor.
+# Points of a piece: the nodes, then its right end, then its left end, the anchor.
 END = TERMS
 ANCHOR = TERMS + 1
 POINTS = TERMS + 2
 ROWS = 6
 """Rows of ``field``."""
 
-# Rounds of integrating and looking again; a piece that takes more is too long.
-ROUNDS = 40
+# Iterations; a piece that needs more is too long.
+MAX_ITERATIONS = 40
 
-# Of the piece's length: what counts as not moving, and what may be rounding once it no longer shrinks.
-STILL = 4e-16
-STALLED = 1e-8
+# The iteration has converged when places change by less than the first share of the length, or by less than the second
+# and the changes no longer fall: they are rounding then.
+MAX_LAST_CHANGE = 4e-16
+MAX_ROUNDING_CHANGE = 1e-8
 
-# Most that a piece is moved onto F = 0.
-MOST_SHIFT = 1e-3
+# The largest shift of a piece onto F = 0, as a share of its length.
+MAX_SHIFT = 1e-3
 
-# The last two Chebyshev coefficients of a resolved piece, of the size of what the row is a sum of.
-TAIL = 1e-15
+# A piece is resolved if the last two Chebyshev coefficients of a row are below this share of the size of its terms.
+MAX_TAIL_RATIO = 1e-15
 
-# Last coefficients that have stopped falling are rounding: below this size, and above this share of those before them.
-ROUNDING = 1e-9
-FLAT = 0.2
+# Last coefficients below the first share are rounding noise if they exceed the second share of those before them.
+MAX_NOISE_RATIO = 1e-9
+MIN_FLAT_RATIO = 0.2
 
-# How many coefficients a piece should need, and by how much the next may be longer or shorter.
-WANTED = 14
-LONGER = 3.0
-SHORTER = 0.3
+# The number of coefficients that a piece should need, and limits of the change of length from a piece to the next.
+IDEAL_TERMS = 14
+MAX_GROWTH = 3.0
+MIN_GROWTH = 0.3
 
-# Beside a place where F is not smooth: the tangent's jump at a corner; the curvature's at a break, of its size and as
-# the turn it makes over the piece.
-TURNED = 1e-6
-BENT = 1e-5
-BENT_TURN = 1e-12
+# Smaller jumps are taken for rounding: of the tangent at a corner; of the curvature at a break, as a share of its size
+# and as the turn it makes over the piece.
+MIN_TANGENT_JUMP = 1e-6
+MIN_CURVATURE_JUMP = 1e-5
+MIN_TURN_JUMP = 1e-12
 SMOOTH, BREAK, CORNER = range(3)
 _FIT = (2.0 / TERMS) * np.cos(np.pi * np.outer(np.arange(TERMS), np.arange(TERMS) + 0.5) / TERMS)
 _FIT[0] *= 0.5
 
 
 def _gains() -> np.ndarray:
-    """Integrals of the Chebyshev polynomials from -1 to the nodes and to 1, each to its last digits near -1 too.
+    """Return the integrals of the Chebyshev polynomials from -1 to the nodes and to 1, accurate near -1 too.
 
-    With x = -cos(phi) the one of T_k is (-1)**k (S(k+1) - S(k-1)), S(n) = sin(n phi/2)**2/n.
+    With x = -cos(phi), that of T_k is (-1)**k (S(k+1) - S(k-1)), S(n) = sin(n phi/2)**2/n.
     """
     phi = np.pi * np.append((TERMS - 0.5 - np.arange(TERMS)) / TERMS, 1.0)
     n = np.arange(-1, TERMS + 1)
@@ -68,11 +69,11 @@ def _gains() -> np.ndarray:
 
 _ALONG = _gains()
 
-# From the left end: 1 + x, and the integral from values at the nodes.
+# 1 + x at the nodes, and the matrix from values at the nodes to the integral from the left end.
 _BEYOND = np.ascontiguousarray(_ALONG[:, 0])
 _GAIN = np.ascontiguousarray(_ALONG @ _FIT)
 
-# The values at the left and the right end.
+# The matrix from values at the nodes to those at the left and the right end.
 _ENDS = np.ascontiguousarray(np.array([(-1.0) ** np.arange(TERMS), np.ones(TERMS)]) @ _FIT)
 
 
@@ -103,9 +104,9 @@ def evaluate_points(curve, at, piece):  # type: ignore[no-untyped-def]
     curve : LevelCurve
         The curve.
     at : (4,) array
-        The anchor: x and z as two doubles each.
+        x and z at the anchor, as two doubles each.
     piece : (11, POINTS) array
-        Rows 0 and 1 are offsets from the anchor; the others are filled: tangent (2, 3), curvature (4), sum of the
+        Rows 0 and 1 are offsets from the anchor. The others are filled: tangent (2, 3), curvature (4), sum of the
         magnitudes of the curvature's terms (5), F (6), |grad F| (7), its derivative by arc length (8), places (9, 10).
     """
     sign = curve.sign
@@ -149,13 +150,13 @@ def solve_piece(curve, at, length, piece):  # type: ignore[no-untyped-def]
     piece[:2] = 0.0
     if not evaluate_points(curve, at, piece):
         return False
-    bend = piece[4, ANCHOR]
+    kappa = piece[4, ANCHOR]
     for i in range(TERMS + 1):
         s = half * _BEYOND[i]
-        piece[0, i] = s * (piece[2, ANCHOR] - 0.5 * s * bend * piece[3, ANCHOR])
-        piece[1, i] = s * (piece[3, ANCHOR] + 0.5 * s * bend * piece[2, ANCHOR])
+        piece[0, i] = s * (piece[2, ANCHOR] - 0.5 * s * kappa * piece[3, ANCHOR])
+        piece[1, i] = s * (piece[3, ANCHOR] + 0.5 * s * kappa * piece[2, ANCHOR])
     before, moved = inf, False
-    for _ in range(ROUNDS):
+    for _ in range(MAX_ITERATIONS):
         if not evaluate_points(curve, at, piece):
             return False
         change = 0.0
@@ -168,16 +169,18 @@ def solve_piece(curve, at, length, piece):  # type: ignore[no-untyped-def]
                 offset = half * (_BEYOND[i] * base + gained)
                 change = max(change, fabs(offset - piece[row, i]))
                 piece[row, i] = offset
-        still = change <= STILL * length or (change <= STALLED * length and change >= 0.5 * before)
-        if still and moved:
+        converged = change <= MAX_LAST_CHANGE * length or (
+            change <= MAX_ROUNDING_CHANGE * length and change >= 0.5 * before
+        )
+        if converged and moved:
             return True
-        if still:
+        if converged:
             moved = True
             level = 0.0
             for j in range(TERMS):
                 level += piece[6, j] / TERMS
             shift = -level / piece[7, ANCHOR]
-            if fabs(shift) > MOST_SHIFT * length:
+            if fabs(shift) > MAX_SHIFT * length:
                 return False
             s, e = two_sum(at[0], sign * shift * piece[3, ANCHOR])
             at[0], at[1] = two_sum(s, e + at[1])
@@ -189,8 +192,8 @@ def solve_piece(curve, at, length, piece):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def seen_from(values, end):  # type: ignore[no-untyped-def]
-    """The value at the left end (0) or the right end (1), as those at the nodes say."""
+def extrapolate(values, end):  # type: ignore[no-untyped-def]
+    """Return the value at the left end (0) or the right end (1) from those at the nodes."""
     total = 0.0
     for j in range(TERMS):
         total += _ENDS[end, j] * values[j]
@@ -198,30 +201,32 @@ def seen_from(values, end):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def bends_of(piece):  # type: ignore[no-untyped-def]
-    """The largest sum of magnitudes that a curvature of the piece is made of."""
-    bends = 0.0
+def curvature_size(piece):  # type: ignore[no-untyped-def]
+    """Return the largest sum of magnitudes of the terms of a curvature on the piece."""
+    curvature = 0.0
     for j in range(TERMS):
-        bends = max(bends, piece[5, j])
-    return bends
+        curvature = max(curvature, piece[5, j])
+    return curvature
 
 
 @Inner
 def compare(tx, tz, curvature, piece, end, length):  # type: ignore[no-untyped-def]
-    """What lies between a tangent and curvature and those that the nodes of a piece say at its end."""
-    x, z = seen_from(piece[2], end), seen_from(piece[3], end)
-    if fabs(tx * z - tz * x) > TURNED or tx * x + tz * z < 0.0:
+    """Compare a tangent and a curvature with those of a piece at its end 0 or 1: SMOOTH, BREAK or CORNER."""
+    x, z = extrapolate(piece[2], end), extrapolate(piece[3], end)
+    if fabs(tx * z - tz * x) > MIN_TANGENT_JUMP or tx * x + tz * z < 0.0:
         return CORNER
-    if fabs(seen_from(piece[4], end) - curvature) > max(BENT * bends_of(piece), BENT_TURN / length):
+    if fabs(extrapolate(piece[4], end) - curvature) > max(
+        MIN_CURVATURE_JUMP * curvature_size(piece), MIN_TURN_JUMP / length
+    ):
         return BREAK
     return SMOOTH
 
 
 @Inner
 def _growth(values, size, noisy):  # type: ignore[no-untyped-def]
-    """By how much longer or shorter a piece would be just resolved in this row; negative where this one is not.
+    """Return the factor by which a piece would be just resolved in this row; negative if this piece is not resolved.
 
-    Coefficients that fall from ``size`` to the floor within ``needed`` terms do so within ``WANTED`` on a longer piece.
+    On a piece longer by this factor, coefficients would fall from ``size`` to the floor within ``IDEAL_TERMS`` terms.
     ``noisy`` is the size of what the row is computed from.
     """
     coefficients = np.zeros(TERMS)
@@ -231,29 +236,29 @@ def _growth(values, size, noisy):  # type: ignore[no-untyped-def]
     tail = max(fabs(coefficients[TERMS - 2]), fabs(coefficients[TERMS - 1]))
     middle = max(fabs(coefficients[TERMS - 6]), fabs(coefficients[TERMS - 5]))
     if tail == 0.0:
-        return LONGER
-    floor = TAIL * size
-    if tail <= ROUNDING * noisy and tail >= FLAT * middle:
+        return MAX_GROWTH
+    floor = MAX_TAIL_RATIO * size
+    if tail <= MAX_NOISE_RATIO * noisy and tail >= MIN_FLAT_RATIO * middle:
         floor = max(floor, 4.0 * tail)
     if tail > floor:
-        return -max(SHORTER, 0.9 * (floor / tail) ** (1.0 / (TERMS - 1)))
+        return -max(MIN_GROWTH, 0.9 * (floor / tail) ** (1.0 / (TERMS - 1)))
     needed = TERMS - 2
     while needed > 1 and fabs(coefficients[needed - 1]) <= floor:
         needed -= 1
-    return max(SHORTER, min(LONGER, (size / floor) ** (1.0 / needed - 1.0 / WANTED)))
+    return max(MIN_GROWTH, min(MAX_GROWTH, (size / floor) ** (1.0 / needed - 1.0 / IDEAL_TERMS)))
 
 
 @Inner
 def growth(piece, length):  # type: ignore[no-untyped-def]
-    """By how much longer or shorter the next piece may be; negative where this one is not resolved.
+    """Return by which factor the next piece may be longer; negative if this one is not resolved.
 
-    Judged by the tangent and by the curvature, which is the least smooth of what a chart holds. An error of the
-    curvature counts as the turn it makes over the piece, so that a curve may be as straight as it likes.
+    It is judged by the tangent and by the curvature, the least smooth rows of a chart. An error of the curvature counts
+    as the turn it makes over the piece, so that a straight piece is resolved.
     """
     if compare(piece[2, END], piece[3, END], piece[4, END], piece, 1, length) != SMOOTH:
         return -0.5  # between the last node and the end, F is not smooth
-    bends = bends_of(piece)
-    change = _growth(piece[4], max(bends, 1.0 / length), bends)
+    curvature = curvature_size(piece)
+    change = _growth(piece[4], max(curvature, 1.0 / length), curvature)
     least, short = fabs(change), change < 0.0
     for row in range(2, 4):
         change = _growth(piece[row], 1.0, 1.0)

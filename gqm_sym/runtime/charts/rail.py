@@ -1,4 +1,4 @@
-"""Rails put together from pieces: lines, arcs and clothoids end to start, and curves with formulas of their own.
+"""Rails: lines, arcs, clothoids and curves with formulas, joined end to start.
 
 The curvature of a standard piece is linear in arc length, so that its angle is known exactly and its coordinates are
 integrals of the angle's cosine and sine.
@@ -16,30 +16,30 @@ from numpy.polynomial.legendre import leggauss
 
 from gqm_sym.errors import BudgetError, DeclarationError, ParameterError
 from gqm_sym.literals.namespaces import FLOATS
-from gqm_sym.runtime.charts.arc_length import MOST_PIECES, Indices, Pieces, joined, rectify, summed
+from gqm_sym.runtime.charts.arc_length import MAX_PIECES, Indices, Pieces, joined, rectify, summed
 from gqm_sym.runtime.charts.chart import NODES, Chart, PieceData, assemble
 from gqm_sym.runtime.charts.exact_parts import Part, Parts, spiral
 from gqm_sym.runtime.compiled.calls import call_segment
 from gqm_sym.runtime.compiled.jit import entry
 from gqm_sym.runtime.compiled.types import Array
 
-# How far a curve may begin from the end of the piece before it, as a share of the length up to its end and in radians.
-MATCH = 1e-9
+# The largest gap at a joint, as a share of the length so far, and the largest angle there in radians.
+MAX_MISMATCH = 1e-9
 
-# The angle turns by no more than this on a piece of the chart: its cosine is a polynomial there, to rounding.
-TURN = 1.0
+# The largest turn on a piece of the chart, in radians: the cosine of the angle is a polynomial there, to rounding.
+MAX_TURN = 1.0
 
-# Of one standard piece: a spring with more turns than this is a mistake.
-MOST_TURNED = 1e5
+# The largest turn of one line, arc or clothoid, in radians: more is taken for a mistake.
+MAX_TOTAL_TURN = 1e5
 _GAUSS = leggauss(16)
 
-# What a standard piece is given by.
-GIVEN = {"line": ("length",), "arc": ("radius", "angle"), "clothoid": ("length", "kappa_start", "kappa_end")}
+# The numbers that define a line, an arc and a clothoid.
+PIECE_NUMBERS = {"line": ("length",), "arc": ("radius", "angle"), "clothoid": ("length", "kappa_start", "kappa_end")}
 
 
 @dataclass(frozen=True, slots=True)
 class Pen:
-    """An end of a rail: its place, and the angle of its tangent."""
+    """An end of a piece: its coordinates, and the angle of the tangent in radians."""
 
     x: float
     z: float
@@ -48,19 +48,19 @@ class Pen:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Rail:
-    """The maker of a rail's chart.
+    """A rail, which makes its chart for values of the run-time parameters.
 
     Attributes
     ----------
     numbers
-        ``f(op, p)``: x, z and heading at the start where the rail is ``placed``, then for each piece what `GIVEN` says,
-        or the ends of a curve's parameter.
+        ``f(op, p)``: x, z and heading at the start where the rail is ``placed``, then for each piece those of
+        `PIECE_NUMBERS`, or the ends of a curve's parameter.
     pieces : tuple of str
         "line", "arc", "clothoid", or "curve".
     placed : bool
-        Whether the start is given; else the first piece is a curve, which has a place of its own.
+        Whether the start is given; else the first piece is a curve, whose place is known.
     segments : tuple of int
-        Addresses of the functions of the curves among them, in order.
+        Addresses of the compiled functions of the curves among the pieces, in order.
     formulas
         The same curves as ``f(op, lam, p)``: x, z and their derivatives.
     closed : bool
@@ -75,7 +75,7 @@ class Rail:
     closed: bool = False
 
     def chart(self, p: tuple[float, ...]) -> Chart:
-        """The chart.
+        """Return the chart.
 
         Raises
         ------
@@ -106,8 +106,8 @@ class Rail:
                 assert pen is not None
                 part, pen = _standard(kind, numbers, pen, where)
             parts.append(part)
-            if sum(one.lengths.size for one in parts) > MOST_PIECES:
-                raise BudgetError(f"chart: {where}: {MOST_PIECES} pieces reach no farther; let the rail turn less")
+            if sum(one.lengths.size for one in parts) > MAX_PIECES:
+                raise BudgetError(f"chart: {where}: {MAX_PIECES} pieces reach no farther; let the rail turn less")
             length += float(part.lengths.sum())
             joints.append(length)
         assert start is not None
@@ -116,11 +116,11 @@ class Rail:
         return self._assembled(joined(parts), which, joints, start, pen)
 
     def is_exact(self, chart: Chart) -> bool:
-        """Every piece has formulas."""
+        """Return True: every piece has formulas."""
         return True
 
     def true_curve(self, context: Any, p: tuple[Any, ...], chart: Chart) -> Parts:
-        """The rail in extended precision, its pieces where the numbers put them."""
+        """Return the rail in extended precision."""
         numbers = iter(self.numbers(context, p))
         pen = tuple(context.mpf(number) for number in islice(numbers, 3)) if self.placed else None
         formulas, counts = iter(self.formulas), np.bincount(chart.origins[:, 0].astype(np.int64))
@@ -132,7 +132,7 @@ class Rail:
                 pen = x, z, context.atan2(dz, dx)
                 continue
             assert pen is not None
-            given = {name: context.mpf(next(numbers)) for name in GIVEN[kind]}
+            given = {name: context.mpf(next(numbers)) for name in PIECE_NUMBERS[kind]}
             length, first, last = _bent(kind, given)
             parts.append(spiral(context, pen, length, first, last, count))
             pen = *parts[-1](context.mpf(count))[:2], pen[2] + length * (first + last) / 2
@@ -161,16 +161,16 @@ def _check_joint(end: Pen, begin: Pen, length: float, who: str, whom: str) -> No
     """Refuse a joint at which the place or the tangent jumps."""
     gap = hypot(begin.x - end.x, begin.z - end.z)
     turn = abs((begin.angle - end.angle + pi) % (2.0 * pi) - pi)
-    if not (gap <= MATCH * length and turn <= MATCH):
+    if not (gap <= MAX_MISMATCH * length and turn <= MAX_MISMATCH):
         raise DeclarationError(
             f"{who} at ({begin.x!r}, {begin.z!r}) with its tangent at {begin.angle!r} rad, {gap:.3g} and "
             f"{turn:.3g} rad off where {whom}: ({end.x!r}, {end.z!r}), {end.angle!r} rad; "
-            f"both must match within {MATCH:g} of the rail's length and {MATCH:g} rad"
+            f"both must match within {MAX_MISMATCH:g} of the rail's length and {MAX_MISMATCH:g} rad"
         )
 
 
 def _formula(context: Any, formula: Callable[..., Any], p: tuple[Any, ...], low: Any, high: Any) -> Part:
-    """A curve with formulas by the share of its parameter's range, which so has ends that are exact."""
+    """Return a curve with formulas as a function of the share of its parameter's range; its ends 0 and 1 are exact."""
     low, width = context.mpf(low), context.mpf(high) - low
 
     def at(share: Any) -> tuple[Any, Any, Any, Any]:
@@ -181,7 +181,7 @@ def _formula(context: Any, formula: Callable[..., Any], p: tuple[Any, ...], low:
 
 
 def _bent(kind: str, given: dict[str, Any]) -> tuple[Any, Any, Any]:
-    """Length of a standard piece, and its curvature at its begin and at its end."""
+    """Return the length of a line, an arc or a clothoid, and its curvature at both ends."""
     if kind == "arc":
         length = given["radius"] * abs(given["angle"])
         return length, given["angle"] / length, given["angle"] / length
@@ -189,8 +189,8 @@ def _bent(kind: str, given: dict[str, Any]) -> tuple[Any, Any, Any]:
 
 
 def _standard(kind: str, numbers: Iterator[Any], pen: Pen, where: str) -> tuple[Pieces, Pen]:
-    """A piece whose curvature is linear in arc length, and where it ends."""
-    given = {name: float(next(numbers)) for name in GIVEN[kind]}
+    """Return a line, an arc or a clothoid, and its right end."""
+    given = {name: float(next(numbers)) for name in PIECE_NUMBERS[kind]}
     for name, value in given.items():
         if not np.isfinite(value) or (name in ("length", "radius") and not value > 0.0):
             wanted = "positive" if name in ("length", "radius") else "finite"
@@ -199,9 +199,9 @@ def _standard(kind: str, numbers: Iterator[Any], pen: Pen, where: str) -> tuple[
         raise ParameterError(f"{where}: angle: must not be zero; positive turns left, negative right")
     length, first, last = (float(value) for value in _bent(kind, given))
     turned = max(abs(first), abs(last)) * length
-    if not turned <= MOST_TURNED:
-        raise ParameterError(f"{where}: turns by {turned:.3g} rad; {MOST_TURNED:g} is the most")
-    count = max(1, ceil(turned / TURN))
+    if not turned <= MAX_TOTAL_TURN:
+        raise ParameterError(f"{where}: turns by {turned:.3g} rad; {MAX_TOTAL_TURN:g} is the most")
+    count = max(1, ceil(turned / MAX_TURN))
     step, bent = length / count, 0.5 * (last - first) / length
     left: Array = step * np.arange(count, dtype=np.float64)[:, None]
 
@@ -210,7 +210,7 @@ def _standard(kind: str, numbers: Iterator[Any], pen: Pen, where: str) -> tuple[
 
     nodes, weights = _GAUSS
     inside, middle = angle(left + 0.5 * step * (1.0 + nodes)), angle(left + 0.5 * step)
-    # What is added to a straight piece vanishes with the curvature: the weights' own rounding must not show.
+    # The difference from a straight piece is integrated; it vanishes with the curvature, so rounded weights do no harm.
     gained = np.concatenate(
         [
             step * wave(middle) + 0.5 * step * (wave(inside) - wave(middle)) @ weights[:, None]
@@ -233,14 +233,14 @@ def _standard(kind: str, numbers: Iterator[Any], pen: Pen, where: str) -> tuple[
 
 @entry(types.float64[:, ::1](types.int64, types.float64[::1], types.float64[::1]))
 def _segment_rows(address, p, lam):  # type: ignore[no-untyped-def]
-    """x, z, ds, dx/ds, dz/ds and kappa of a curve with formulas."""
+    """Return x, z, ds/dlam, dx/ds, dz/ds and kappa of a curve with formulas, as rows."""
     out = np.empty((6, lam.size))
     call_segment(address, lam.size, lam, p, out)
     return out
 
 
 def _curve(address: int, p: Array, low: float, high: float, where: str) -> tuple[Pieces, Pen, Pen]:
-    """A curve with formulas, and both its ends."""
+    """Return a curve with formulas, and both its ends."""
     if not (np.isfinite(low) and np.isfinite(high) and low < high):
         raise ParameterError(f"{where}: domain: must have finite ends lo < hi, got ({low!r}, {high!r})")
 

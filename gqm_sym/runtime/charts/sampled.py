@@ -23,21 +23,22 @@ from gqm_sym.runtime.compiled.types import MATRIX, Array
 
 DEGREE = 5
 
-# Lengths between points that change by less than this share have settled; each round gains some digits.
-SETTLED = 1e-9
-MOST_ROUNDS = 10
+# The lengths between points have converged when they change by less than this share; each round gains some digits.
+MAX_LAST_CHANGE = 1e-9
+MAX_ROUNDS = 10
 
-# Points that are met within this share of the track's length are met to rounding: so the length itself is rounded.
-SAME = 8.0 * 2.0**-52
-FEWEST = 64
+# Points that the spline meets within this share of the track's length are met to rounding. No more points are left out
+# when only so many remain.
+MAX_FIT_ERROR = 8.0 * 2.0**-52
+MIN_POINTS = 64
 
-# A turn of stitched planes that is less than this many roundings of the points is none.
-STRAIGHT = 8.0 * 2.0**-52
+# The smallest turn between stitched planes, relative to the rounding of the points; less is rounding.
+MIN_TURN = 8.0 * 2.0**-52
 
 
 @dataclass(frozen=True, slots=True)
 class Sampled:
-    """The maker of a sampled track's chart.
+    """A sampled track, which makes its chart.
 
     Attributes
     ----------
@@ -54,7 +55,7 @@ class Sampled:
     closed: bool = False
 
     def chart(self, p: tuple[float, ...]) -> Chart:
-        """The chart; it does not depend on the run-time parameters."""
+        """Return the chart, which does not depend on the run-time parameters."""
         return _made(self)[0]
 
     def is_exact(self, chart: Chart) -> bool:
@@ -104,17 +105,17 @@ def _made(track: Sampled) -> tuple[Chart, Any]:
 
 
 def _planes(points: Array, closed: bool) -> Chart:
-    """Straight pieces from point to point; each turn of the tangent is a corner."""
+    """Return the chart of straight pieces from point to point; each turn of the tangent is a corner."""
     steps = np.diff(points, axis=0)
     lengths = np.hypot(steps[:, 0], steps[:, 1])
     edges = summed(lengths)
     angles = np.repeat(np.arctan2(steps[:, 1], steps[:, 0])[:, None], NODES.size, axis=1)
     angles = unwrapped(angles, float(angles[0, 0]))
-    # From the plane before each point to the one behind it; before the first point comes the last plane.
+    # From the plane before each point to the one after it; the last plane comes before the first point.
     turns = np.diff(angles[:, 0], prepend=angles[-1, 0])
     turns[0] = np.remainder(turns[0] + np.pi, 2.0 * np.pi) - np.pi
     shorter = np.minimum(np.roll(lengths, 1), lengths)
-    bent = np.abs(turns) > STRAIGHT * (1.0 + np.abs(points).max() / shorter)
+    bent = np.abs(turns) > MIN_TURN * (1.0 + np.abs(points).max() / shorter)
     bent[0] &= closed
     corners = edges[:-1][bent]
     turn = 2.0 * np.pi * round(turns.sum() / (2.0 * np.pi)) if closed else 0.0
@@ -126,15 +127,15 @@ def _planes(points: Array, closed: bool) -> Chart:
 
 
 def _splined(points: Array, closed: bool) -> tuple[Chart, Any]:
-    """The interpolating spline, each of its polynomials as one piece or more."""
+    """Return the chart of the interpolating spline, each of whose polynomials becomes one or more pieces."""
     knots = summed(np.hypot(*np.diff(points, axis=0).T))
-    for _ in range(MOST_ROUNDS):
+    for _ in range(MAX_ROUNDS):
         spend()
         terms = _polynomials(points, knots, closed)
         lengths = _lengths(knots, terms)
         change = np.abs(lengths / np.diff(knots) - 1.0).max()
         knots = summed(lengths)
-        if change <= SETTLED:
+        if change <= MAX_LAST_CHANGE:
             break
     points, knots = _thinned(points, knots, closed)
     terms = _polynomials(points, knots, closed)
@@ -154,12 +155,12 @@ def _thinned(points: Array, knots: Array, closed: bool) -> tuple[Array, Array]:
 
     Curvature from points at a distance h carries their rounding over h**2: closer points than are needed do harm.
     """
-    while len(knots) > FEWEST:
-        kept = np.unique(np.append(np.arange(0, len(knots), 2), len(knots) - 1))
-        spline = _interpolated(points[kept], knots[kept], closed)
-        if np.abs(spline(knots) - points).max() > SAME * knots[-1]:
+    while len(knots) > MIN_POINTS:
+        used = np.unique(np.append(np.arange(0, len(knots), 2), len(knots) - 1))
+        spline = _interpolated(points[used], knots[used], closed)
+        if np.abs(spline(knots) - points).max() > MAX_FIT_ERROR * knots[-1]:
             break
-        points, knots = points[kept], knots[kept]
+        points, knots = points[used], knots[used]
     return points, knots
 
 
@@ -178,7 +179,7 @@ def _assembled(
 
 
 def _interpolated(points: Array, knots: Array, closed: bool) -> Any:
-    """The interpolating spline as a function."""
+    """Return the interpolating spline as a function."""
     from scipy.interpolate import make_interp_spline
 
     try:
@@ -203,7 +204,7 @@ def _polynomials(points: Array, knots: Array, closed: bool) -> Array:
 
 @Inner
 def velocity(terms, t):  # type: ignore[no-untyped-def]
-    """The first derivative of a polynomial."""
+    """Return the first derivative of a polynomial."""
     total = 0.0
     for power in range(DEGREE, 0, -1):
         total = total * t + power * terms[power]
@@ -230,7 +231,7 @@ def _measure(knots, terms):  # type: ignore[no-untyped-def]
 
 @Inner
 def taylor(terms, t):  # type: ignore[no-untyped-def]
-    """A polynomial and its first two derivatives."""
+    """Return a polynomial and its first two derivatives."""
     value, first, second = 0.0, 0.0, 0.0
     for power in range(DEGREE, -1, -1):
         second = second * t + 2.0 * first
@@ -241,7 +242,7 @@ def taylor(terms, t):  # type: ignore[no-untyped-def]
 
 @entry(types.float64[:, :, ::1](types.float64[::1], types.float64[:, :, ::1], types.float64[::1], MATRIX))
 def _evaluate(knots, terms, left, offsets):  # type: ignore[no-untyped-def]
-    """x, z, ds/du, dx/ds, dz/ds and kappa of the spline, at offsets from places."""
+    """Return x, z, ds/du, dx/ds, dz/ds and kappa of the spline at offsets from places."""
     out = np.empty((6, *offsets.shape))
     for k in range(left.size):
         low, high = 0, knots.size - 1

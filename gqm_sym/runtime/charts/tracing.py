@@ -1,4 +1,4 @@
-"""Charts of implicit curves F(x, z) = 0: traced both ways from a start point.
+"""Charts of implicit curves F(x, z) = 0, traced in both directions from a start point.
 
 The parameter is arc length, 0 at the start point, and grows along ±(-F_z, F_x)/|grad F|; for the upper sign the
 curvature is the Hessian form (F_xx F_z**2 - 2 F_xz F_x F_z + F_zz F_x**2)/|grad F|**3, for the lower its negative
@@ -23,15 +23,15 @@ from gqm_sym.runtime.charts.level_pieces import ANCHOR, CORNER, POINTS, SMOOTH, 
 from gqm_sym.runtime.compiled.jit import entry
 from gqm_sym.runtime.compiled.types import VECTOR, Array
 
-# A start point is moved onto the curve where that is no farther than this share of its larger coordinate.
-NEAR = 1e-6
+# The largest distance of a start point from the curve, as a share of its larger coordinate; it is moved onto the curve.
+MAX_DISTANCE = 1e-6
 
-# Steps from a start point to the foot of the perpendicular; they are taken as converged below this share.
-STEPS = 100
-CONVERGED = 1e-12
+# Newton steps from a start point to the foot of the perpendicular; they have converged below this share.
+MAX_STEPS = 100
+MAX_LAST_STEP = 1e-12
 
-# Of its larger coordinate: grad F changes over less than this where a start point is singular.
-SINGULAR_START = 1e-9
+# A start point is singular if grad F changes over less than this share of its larger coordinate.
+MIN_GRADIENT_SCALE = 1e-9
 
 
 @entry(VECTOR(types.int64, VECTOR, types.float64, VECTOR))
@@ -72,7 +72,7 @@ class Side(NamedTuple):
     end: int
 
     def parted(self, at: int) -> tuple["Side", "Side"]:
-        """What lies before an edge, and what lies behind it."""
+        """Return the pieces before an edge, and those after it."""
         return self._between(0, at), self._between(at, self.edges.size - 1)
 
     def _between(self, one: int, two: int) -> "Side":
@@ -89,7 +89,7 @@ class Side(NamedTuple):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Traced:
-    """The maker of an implicit curve's charts.
+    """An implicit curve, which makes its chart for values of the run-time parameters.
 
     Attributes
     ----------
@@ -102,7 +102,7 @@ class Traced:
     level
         ``f(op, x, z, p)``: F, F_x and F_z.
     domain
-        ``f(op, p)``: both ends in arc length, None where there is none; no function at all where there are none.
+        ``f(op, p)``: both ends in arc length, each None if there is none; None instead of a function if there are none.
     """
 
     field: int
@@ -136,11 +136,11 @@ class Traced:
         return assemble(**both, ends=(_what(behind.end), _what(ahead.end)))
 
     def is_exact(self, chart: Chart) -> bool:
-        """Whether F is smooth all along."""
+        """Whether F is smooth everywhere on the chart."""
         return chart.breaks.size == 0
 
     def true_curve(self, context: Any, p: tuple[Any, ...], chart: Chart) -> "Zeros":
-        """The curve in extended precision."""
+        """Return the curve in extended precision."""
         return Zeros(self, context, p)
 
     def _domain(self, p: tuple[float, ...]) -> tuple[float, float]:
@@ -151,40 +151,40 @@ class Traced:
         return low, high
 
     def _start(self, values: Array, p: tuple[float, ...]) -> Array:
-        """The start point, moved onto the curve: x and z, two doubles each."""
+        """Return the start point, moved onto the curve: x and z as two doubles each."""
         x, z = (float(c) for c in self.start(FLOATS, p))
         if not (isfinite(x) and isfinite(z)):
             raise LaunchError(f"start: ({x!r}, {z!r}) is no finite point; give one on the curve")
         size = max(abs(x), abs(z)) or 1.0
         at = np.array([x, 0.0, z, 0.0])
         moved, regular = inf, True
-        for _ in range(STEPS):
+        for _ in range(MAX_STEPS):
             found, _, tx, tz, _, bends, level, slope, fall, *_ = _rows_at(self.field, values, 1.0, at)
-            regular = bool(found) and slope > SINGULAR_START * size * (bends * slope + abs(fall))
+            regular = bool(found) and slope > MIN_GRADIENT_SCALE * size * (bends * slope + abs(fall))
             if not regular:
                 break
-            # Across by Newton's method, along to where the given point is neither ahead nor behind.
+            # Newton's method across the curve; along it to the foot of the perpendicular from the start point.
             across, along = -level / slope, (x - at[0]) * tx + (z - at[2]) * tz
             at[:2] = add.py_func(at[0], at[1], along * tx + across * tz, 0.0)
             at[2:] = add.py_func(at[2], at[3], along * tz - across * tx, 0.0)
             before, moved = moved, hypot(along, across)
-            if moved <= CONVERGED * size and moved >= 0.5 * before:
+            if moved <= MAX_LAST_STEP * size and moved >= 0.5 * before:
                 break
         away = hypot(at[0] - x, at[2] - z)
-        if regular and moved <= CONVERGED * size and away <= NEAR * size:
+        if regular and moved <= MAX_LAST_STEP * size and away <= MAX_DISTANCE * size:
             return at
-        if not regular and away <= NEAR * size:
+        if not regular and away <= MAX_DISTANCE * size:
             raise LaunchError(
                 f"start: ({x!r}, {z!r}) is a singular point: grad F vanishes there, or F is not smooth or not real; "
                 "start from a regular point of the curve"
             )
         what = f"start: ({x!r}, {z!r}) is not on the curve"
-        if regular and moved <= CONVERGED * size:
+        if regular and moved <= MAX_LAST_STEP * size:
             raise LaunchError(f"{what}: it is {away:.3g} from it; the nearest point is ({at[0]!r}, {at[2]!r})")
         raise LaunchError(f"{what}, and no point of the curve was found near it; give a point with F = 0")
 
     def _side(self, values: Array, start: Array, direction: int, limit: float) -> Side:
-        """What lies ahead of the start, or behind it."""
+        """Return the pieces ahead of the start (direction 1), or behind it (-1)."""
         sign = float(direction * self.tangent)
         end, edges, anchors, nodes, jumps, last = trace_one_way(self.field, values, sign, start, limit, direction > 0)
         if end == FAR and isfinite(limit):
@@ -195,7 +195,7 @@ class Traced:
             )
         tangents, curvatures = nodes[:, :2], nodes[:, 2]
         if end == SINGULAR and last[3] > 0.0:
-            # What is left to the singular point itself, far shorter than any radius of curvature.
+            # The rest of the way to the singular point, which is far shorter than the radius of curvature.
             edges, jumps = np.append(edges, edges[-1] + last[3]), np.append(jumps, SMOOTH)
             beyond = anchors[-1] + last[3] * np.array([last[0], 0.0, last[1], 0.0])
             anchors = np.append(anchors, [beyond], axis=0)
@@ -208,21 +208,21 @@ class Traced:
         else:
             edges, anchors, jumps = -edges[::-1], anchors[:0:-1], jumps[::-1]
             tangents, curvatures = -tangents[::-1, :, ::-1], -curvatures[::-1, ::-1]
-        # The nodes of a piece stand from right to left.
+        # The nodes of a piece are in decreasing order.
         angles = np.unwrap(np.arctan2(tangents[:, 1], tangents[:, 0])[:, ::-1].ravel()).reshape(-1, TERMS)[:, ::-1]
         return Side(edges, anchors, tangents, angles, curvatures, jumps, end)
 
 
 class Zeros:
-    """The curve F = 0 at one precision, by Newton's method from the chart (`exact_charts.TrueCurve`)."""
+    """The curve F = 0 at one precision, by Newton's method from the chart (`exact_normals.TrueCurve`)."""
 
     def __init__(self, maker: Traced, context: Any, p: tuple[Any, ...]) -> None:
         self._level, self._tangent, self._context, self._p = maker.level, maker.tangent, context, p
         x, z = at_x, at_z = maker.start(context, p)
-        for _ in range(STEPS):
+        for _ in range(MAX_STEPS):
             f, fx, fz = self._level(context, at_x, at_z, p)
             square = fx * fx + fz * fz
-            # Across to the curve, and along to the foot of the perpendicular.
+            # Newton's method across the curve; along it to the foot of the perpendicular.
             across, along = f / square, ((x - at_x) * fz - (z - at_z) * fx) / square
             at_x, at_z = at_x - across * fx + along * fz, at_z - across * fz - along * fx
             if (abs(across) + abs(along)) * context.sqrt(square) <= context.ldexp(abs(x) + abs(z), 16 - context.prec):
@@ -230,27 +230,27 @@ class Zeros:
         self.start = at_x, at_z
 
     def ends(self, k: int) -> None:
-        """F = 0 is smooth: pieces may begin anywhere."""
+        """Return None: F = 0 is smooth, so pieces may begin anywhere."""
         return
 
     def length(self, k: int) -> None:
-        """So they have no lengths of their own."""
+        """Return None: the ends of pieces are not prescribed."""
         return
 
     def meet(self, k: int, u: float, x: Any, z: Any, dx: Any, dz: Any, size: float) -> tuple[Any, Any, Any, Any]:
-        """Where the line through (x, z) across (dx, dz) meets the curve, and the unit tangent there."""
+        """Return where the line through (x, z) perpendicular to (dx, dz) meets the curve, and the tangent there."""
         context, at_x, at_z = self._context, x, z
         enough = context.ldexp(size, -context.prec // 2)
-        for _ in range(STEPS):
+        for _ in range(MAX_STEPS):
             f, fx, fz = self._level(context, at_x, at_z, self._p)
             step = f / (fz * dx - fx * dz)
             at_x, at_z = at_x + step * dz, at_z - step * dx
-            if abs(step) <= enough:  # it squares: the next would be nothing
+            if abs(step) <= enough:  # convergence is quadratic: the next step would be below rounding
                 _, fx, fz = self._level(context, at_x, at_z, self._p)
                 slope = self._tangent * context.sqrt(fx * fx + fz * fz)
                 return at_x, at_z, -fz / slope, fx / slope
         raise SolutionError(
-            f"the curve near ({float(x)!r}, {float(z)!r}): Newton's method does not settle on F = 0; "
+            f"the curve near ({float(x)!r}, {float(z)!r}): Newton's method does not converge to F = 0; "
             "is there a singular point?"
         )
 
@@ -260,9 +260,9 @@ def _what(end: int) -> str:
 
 
 def _closed(loop: Side) -> Chart:
-    """The chart of a loop: from half a period before the start to half a period behind it.
+    """Return the chart of a closed curve, from half a period before the start to half a period after it.
 
-    So a place near the start keeps its digits whichever side it lies on. The edges are moved without rounding.
+    So places on both sides of the start keep all their digits. The edges are moved without rounding.
     """
     period = float(loop.edges[-1])
     turn = 2.0 * pi * round((loop.angles[-1, 0] - loop.angles[0, -1]) / (2.0 * pi))
@@ -273,7 +273,7 @@ def _closed(loop: Side) -> Chart:
 
 
 def _joined(behind: Side, ahead: Side) -> Side:
-    """Both sides of the start, the angle continuous and between -pi and pi after it."""
+    """Join both sides of the start; the angle is continuous, and between -pi and pi just after it."""
     angles = behind.angles
     if angles.size and ahead.angles.size:
         angles = angles + 2.0 * pi * round((ahead.angles[0, -1] - angles[-1, 0]) / (2.0 * pi))
@@ -289,7 +289,7 @@ def _joined(behind: Side, ahead: Side) -> Side:
 
 
 def _pieces(side: Side) -> dict[str, Any]:
-    """The arguments of `assemble` that every chart has."""
+    """Return the arguments of `assemble` that every chart has."""
     return {
         "edges": side.edges,
         "data": PieceData(

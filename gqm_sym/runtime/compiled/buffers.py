@@ -1,4 +1,4 @@
-"""Arrays that grow as they are filled."""
+"""Arrays that grow while they are filled."""
 
 import numpy as np
 
@@ -7,7 +7,7 @@ from gqm_sym.runtime.compiled.jit import Inner
 
 @Inner
 def longer(array, size):  # type: ignore[no-untyped-def]
-    """The array with room for more."""
+    """Return a vector of ``size`` elements that begins with those of ``array``."""
     out = np.empty(size)
     out[: array.size] = array
     return out
@@ -15,7 +15,7 @@ def longer(array, size):  # type: ignore[no-untyped-def]
 
 @Inner
 def taller(array, rows):  # type: ignore[no-untyped-def]
-    """The table with room for more rows."""
+    """Return a matrix of so many rows that begins with those of ``array``."""
     out = np.empty((rows, array.shape[1]))
     out[: array.shape[0]] = array
     return out

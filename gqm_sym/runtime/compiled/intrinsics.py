@@ -1,7 +1,6 @@
-"""Operations that LLVM has and Python's ``math`` has not, and a sine that vectorises.
+"""Operations of LLVM that Python's ``math`` lacks: fused products, rounding, bits, selection, polynomials.
 
-numba's loops over ``math.sin`` stay scalar, as the C library has no sine of vectors; polynomials of reduced arguments
-do not. A fused product and sum rounds once, and keeps what a product loses.
+Loops over these vectorise. Loops over functions of the C library, such as ``math.sin``, do not.
 """
 
 from typing import Any
@@ -13,7 +12,7 @@ from numba.extending import intrinsic
 
 @intrinsic
 def fma(_, x, y, z):  # type: ignore[no-untyped-def]
-    """X * y + z, rounded once."""
+    """Return x * y + z, rounded once."""
 
     def lower(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         return builder.fma(*args)
@@ -31,19 +30,19 @@ def _rounding(name: str) -> Any:
 
 @intrinsic
 def nearest_whole(_, x):  # type: ignore[no-untyped-def]
-    """The nearest whole number, as a float."""
+    """Return the nearest integer, as a float."""
     return _rounding("llvm.rint")
 
 
 @intrinsic
 def whole_below(_, x):  # type: ignore[no-untyped-def]
-    """The largest whole number that is not above, as a float."""
+    """Return the largest integer that is not above x, as a float."""
     return _rounding("llvm.floor")
 
 
 @intrinsic
 def bits(_, x):  # type: ignore[no-untyped-def]
-    """The bits of a float, as a whole number."""
+    """Return the bits of a float as an integer."""
 
     def lower(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         return builder.bitcast(args[0], ir.IntType(64))
@@ -53,7 +52,7 @@ def bits(_, x):  # type: ignore[no-untyped-def]
 
 @intrinsic
 def from_bits(_, n):  # type: ignore[no-untyped-def]
-    """The float of these bits."""
+    """Return the float that has these bits."""
 
     def lower(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         return builder.bitcast(args[0], ir.DoubleType())
@@ -63,7 +62,7 @@ def from_bits(_, n):  # type: ignore[no-untyped-def]
 
 @intrinsic
 def choose(_, condition, x, y):  # type: ignore[no-untyped-def]
-    """``x if condition else y``, both worked out: a branch would keep a loop scalar."""
+    """Return ``x if condition else y``, both computed: a branch would keep a loop from being vectorised."""
 
     def lower(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         return builder.select(*args)
@@ -73,7 +72,7 @@ def choose(_, condition, x, y):  # type: ignore[no-untyped-def]
 
 
 def _horner(builder: Any, coefficients: Any, count: int, s: Any, t: Any) -> tuple[Any, Any]:
-    """Horner's scheme without a loop: the value at t, and the divided difference [s,t]."""
+    """Emit Horner's scheme without a loop: the value at t, and the divided difference [s,t]."""
     value, slope = ir.Constant(ir.DoubleType(), 0.0), ir.Constant(ir.DoubleType(), 0.0)
     for k in range(count):
         slope = builder.fma(slope, s, value)
@@ -83,7 +82,7 @@ def _horner(builder: Any, coefficients: Any, count: int, s: Any, t: Any) -> tupl
 
 @intrinsic
 def polynomial(_, coefficients, t):  # type: ignore[no-untyped-def]
-    """The polynomial of these coefficients, highest power first, at t."""
+    """Return the value at t of the polynomial with these coefficients, highest power first."""
 
     def lower(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         return _horner(builder, args[0], coefficients.count, args[1], args[1])[0]
@@ -93,7 +92,7 @@ def polynomial(_, coefficients, t):  # type: ignore[no-untyped-def]
 
 @intrinsic
 def polynomial_pair(_, coefficients, s, t):  # type: ignore[no-untyped-def]
-    """The polynomial's value at t, and its divided difference [s,t]."""
+    """Return the value at t of a polynomial, and its divided difference [s,t]."""
 
     def lower(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         return context.make_tuple(

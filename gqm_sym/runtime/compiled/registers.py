@@ -1,7 +1,8 @@
-"""Rows of numbers in vector registers: the same arithmetic on all numbers of a row.
+"""Arithmetic on rows of numbers in vector registers.
 
-LLVM unrolls a loop of known length before it looks for what could be done side by side, and does it one by one then;
-here it is told. A row is a stretch of some registers in a line of numbers, named by where it begins.
+LLVM unrolls a loop of known length before it looks for operations that could be done in parallel, and then does not
+vectorise it. So the vector operations are written here. A row is a part of a contiguous array that fills some
+registers; it is given by the index at which it begins.
 """
 
 from collections.abc import Callable
@@ -14,36 +15,37 @@ from numba.core import cgutils
 from numba.core.cgutils import get_or_insert_function
 from numba.extending import intrinsic
 
+# Doubles in a register.
 LANES = 8
 REAL, INDEX = ir.DoubleType(), ir.IntType(32)
 REGISTER = ir.VectorType(REAL, LANES)
 
 
 def line_of(context: Any, builder: Any, kind: Any, array: Any) -> Any:
-    """Where the numbers of an array begin."""
+    """Return the address of the first number of a contiguous array."""
     assert kind.layout == "C"
     return context.make_array(kind)(context, builder, array).data
 
 
 def register(builder: Any, line: Any, offset: int) -> Any:
-    """Where a register's numbers lie in a line."""
+    """Return the address of a register's numbers in an array."""
     return builder.bitcast(builder.gep(line, [ir.Constant(INDEX, offset)]), REGISTER.as_pointer())
 
 
 def spread(builder: Any, value: Any) -> Any:
-    """A register with a number in all lanes."""
+    """Return a register with the same number in all lanes."""
     one = builder.insert_element(ir.Constant(REGISTER, ir.Undefined), value, ir.Constant(INDEX, 0))
     return builder.shuffle_vector(one, one, ir.Constant(ir.VectorType(INDEX, LANES), [0] * LANES))
 
 
 def operation(builder: Any, name: str, *values: Any) -> Any:
-    """One of LLVM's operations on registers, lane by lane: "fma", "sqrt", "fabs"."""
+    """Apply one of LLVM's operations to registers, lane by lane: "fma", "sqrt" or "fabs"."""
     kind = ir.FunctionType(REGISTER, [REGISTER] * len(values))
     return builder.call(get_or_insert_function(builder.module, kind, f"llvm.{name}.v{LANES}f64"), values)
 
 
 class Lanes:
-    """A register while code is being made: what is done with it is done by LLVM."""
+    """A register while code is generated: its operators emit LLVM instructions."""
 
     def __init__(self, builder: Any, value: Any) -> None:
         self.builder, self.value = builder, value
@@ -71,7 +73,7 @@ class Lanes:
         return self._with(other, self.builder.fdiv)
 
     def sqrt(self) -> "Lanes":
-        """Root; NumPy's asks for a method of this name."""
+        """Emit a square root; `numpy.sqrt` calls a method of this name."""
         return self._called("sqrt")
 
     def __abs__(self) -> "Lanes":
@@ -82,10 +84,16 @@ class Lanes:
 
 
 def over_rows(formula: Callable[..., Any], width: int) -> Any:
-    """A compiled function ``f(line, out, ...)``: a row of ``width``, at ``out``, by a formula of rows and numbers.
+    """Return a compiled function ``f(array, out, ...)`` that fills a row by a formula.
 
-    What is given as a whole number is where a row begins, what is given as a float is the same in all lanes. The
-    formula is of ``+ - * /``, ``abs`` and ``numpy.sqrt``.
+    An integer argument is the index at which a row begins; a float is the same in all lanes.
+
+    Parameters
+    ----------
+    formula
+        A function of registers, made of ``+ - * /``, ``abs`` and ``numpy.sqrt``.
+    width : int
+        Numbers of a row, a multiple of LANES.
     """
 
     def lower(context: Any, builder: Any, signature: Any, args: Any) -> Any:
@@ -109,7 +117,7 @@ def over_rows(formula: Callable[..., Any], width: int) -> Any:
     def typed(line: Any, out: Any, *given: Any) -> Any:
         return types.void(line, out, *given), lower
 
-    # numba wants to know how many arguments there are.
+    # numba reads the number of arguments from the function's signature.
     forms: tuple[Callable[..., Any], ...] = (
         lambda _, line, out, a: typed(line, out, a),
         lambda _, line, out, a, b: typed(line, out, a, b),
@@ -125,7 +133,7 @@ def over_rows(formula: Callable[..., Any], width: int) -> Any:
 
 
 def copied(width: int) -> Any:
-    """A compiled function ``f(target, to, line, at)``: a row of ``width`` put into another line."""
+    """Return a compiled function ``f(target, to, source, at)`` that copies a row of ``width`` numbers."""
 
     def lower(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         target, line = (
@@ -147,7 +155,7 @@ def copied(width: int) -> Any:
 
 @intrinsic
 def uncounted(_, array):  # type: ignore[no-untyped-def]
-    """The array, for a function that ends before its holder: no call that is given it counts itself among those."""
+    """Return an array whose references numba does not count, for calls that end before its owner does."""
 
     def lower(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         held = context.make_array(signature.args[0])(context, builder, args[0])
@@ -159,9 +167,10 @@ def uncounted(_, array):  # type: ignore[no-untyped-def]
 
 
 def on_stack(count: int) -> Any:
-    """A compiled function ``f()``: an array of ``count`` numbers, there until the function that asked for it returns.
+    """Return a compiled function ``f()`` that returns an array of ``count`` numbers on the stack of its caller.
 
-    Nobody counts who holds it, as is done for other arrays at every call.
+    The array is valid until the caller returns. numba does not count references to it, as it does for other arrays at
+    every call.
     """
     kind, whole = types.Array(types.float64, 1, "C"), ir.IntType(64)
 
@@ -183,7 +192,7 @@ def on_stack(count: int) -> Any:
 
     @intrinsic
     def stacked(_):  # type: ignore[no-untyped-def]
-        """The array."""
+        """Return the array."""
         return kind(), lower
 
     stacked.count = count

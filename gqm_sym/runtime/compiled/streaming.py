@@ -1,8 +1,8 @@
-"""Blocks of results put into their place in large arrays, past the caches where these could not hold them.
+"""Stores of results into large arrays that bypass the caches.
 
-A store reads the line of memory that it writes into, and drives another out of the cache: for an array that will be out
-of the cache again before anybody reads it, that is two thirds of what there is to do. A streaming store does neither,
-but takes whole lines.
+An ordinary store first reads the cache line that it writes into, and evicts another one. For an array too large for the
+caches, which will be evicted before anybody reads it, that is two thirds of the memory traffic. A streaming store does
+neither, but it must write whole cache lines.
 """
 
 from typing import Any
@@ -13,17 +13,17 @@ from numba.extending import intrinsic
 
 from gqm_sym.runtime.compiled.jit import Inlined
 
-# Doubles in a line of the cache.
+# Doubles in a cache line.
 LINE = 8
 
-# Bytes of results from which on they go past the caches.
+# Results of at least so many bytes bypass the caches.
 LARGE = 2**22
 _LINE = ir.VectorType(ir.DoubleType(), LINE)
 
 
 @intrinsic
 def before_line(_, array):  # type: ignore[no-untyped-def]
-    """How many numbers of an array lie before its first whole line of the cache."""
+    """Return how many numbers of an array lie before its first whole cache line."""
 
     def lower(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         whole = ir.IntType(64)
@@ -35,27 +35,27 @@ def before_line(_, array):  # type: ignore[no-untyped-def]
 
 
 @intrinsic
-def stream(_, to, at, given, start):  # type: ignore[no-untyped-def]
-    """``to[at : at + LINE] = given[start : start + LINE]``, past the caches; that is a line of the cache."""
+def stream(_, to, at, source, start):  # type: ignore[no-untyped-def]
+    """Store ``to[at : at + LINE] = source[start : start + LINE]``, which must be one cache line, past the caches."""
 
     def lower(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        target, source = (
+        into, values = (
             builder.bitcast(
                 builder.gep(context.make_array(signature.args[k])(context, builder, args[k]).data, [args[k + 1]]),
                 _LINE.as_pointer(),
             )
             for k in (0, 2)
         )
-        store = builder.store(builder.load(source, align=8), target, align=8 * LINE)
+        store = builder.store(builder.load(values, align=8), into, align=8 * LINE)
         store.set_metadata("nontemporal", builder.module.add_metadata([ir.Constant(ir.IntType(32), 1)]))
         return context.get_dummy_value()
 
-    return types.void(to, types.intp, given, types.intp), lower
+    return types.void(to, types.intp, source, types.intp), lower
 
 
 @intrinsic
 def settle(_, array):  # type: ignore[no-untyped-def]
-    """Have other threads see what was streamed."""
+    """Make streamed results visible to other threads."""
 
     def lower(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         builder.fence("seq_cst")
@@ -65,16 +65,17 @@ def settle(_, array):  # type: ignore[no-untyped-def]
 
 
 @Inlined
-def put(to, at, given, start, n, past):  # type: ignore[no-untyped-def]
-    """``to[at : at + n] = given[start : start + n]``; ``past`` the caches, or through them.
+def put(to, at, source, start, n, bypass):  # type: ignore[no-untyped-def]
+    """Store ``to[at : at + n] = source[start : start + n]``, past the caches if ``bypass``.
 
-    Without slices: who holds an array is counted by locked instructions, and these wait for all stores before them.
+    It takes no slices, because numba counts references to them with locked instructions, which wait for all earlier
+    stores.
     """
-    head = min((before_line(to) - at) % LINE, n) if past else n
+    head = min((before_line(to) - at) % LINE, n) if bypass else n
     last = n - (n - head) % LINE
     for i in range(head):
-        to[at + i] = given[start + i]
+        to[at + i] = source[start + i]
     for i in range(head, last, LINE):
-        stream(to, at + i, given, start + i)
+        stream(to, at + i, source, start + i)
     for i in range(last, n):
-        to[at + i] = given[start + i]
+        to[at + i] = source[start + i]

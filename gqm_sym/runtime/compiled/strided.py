@@ -1,7 +1,8 @@
-"""Columns of a sweep as compiled code reads them: an address and a step each, for one number may stand for many.
+"""Columns of a sweep as compiled code reads them: an address and a step each, 0 if one number stands for all.
 
-They come in this order: the launches, the place that is asked about; of their curves both ends, the period, a place of
-symmetry, what it leaves over as a double (NaN where that is not known), and the step to the next; and all parameters.
+Their order is that of the constants below: the launch (place, speed, direction); the target of ``time_at``; both ends
+of the curve's domain and its period; an axis of symmetry as two doubles (NaN if there is none that can be used) and the
+distance to the next one; and the run-time parameters.
 """
 
 from typing import Any
@@ -18,12 +19,12 @@ LAM0, V0, DIRECTION, TARGET, DOMAIN_LOW, DOMAIN_HIGH, DOMAIN_PERIOD, AXIS, PLACE
 
 
 def widen(column: NDArray[np.float64], shape: tuple[int, ...]) -> NDArray[np.float64]:
-    """A column of this shape; one number stays one."""
+    """Broadcast a column to a shape, unless it is a single number."""
     return column if column.size == 1 or column.shape == shape else np.broadcast_to(column, shape)
 
 
 def lay_out(columns: list[NDArray[np.float64]], begin: int, end: int) -> list[NDArray[np.float64]]:
-    """Elements ``begin`` to ``end`` of columns of one shape, each as a line: a view, where the column is one."""
+    """Return the elements ``begin`` to ``end`` of columns of one shape as vectors, as views where that is possible."""
     return [_line(column, begin, end) for column in columns]
 
 
@@ -38,13 +39,13 @@ def _line(column: NDArray[np.float64], begin: int, end: int) -> NDArray[np.float
 
 
 def pointers(lines: list[NDArray[np.float64]]) -> NDArray[np.int64]:
-    """A row for each line: where it begins, and the step to its next element, in bytes. Keep the lines alive."""
+    """Return the address and the step in bytes of each vector, as rows; the caller must keep the vectors alive."""
     return np.array([(line.ctypes.data, line.strides[0] if line.size > 1 else 0) for line in lines], dtype=np.int64)
 
 
 @intrinsic
 def number_at(_, address):  # type: ignore[no-untyped-def]
-    """The double at an address, which need not be a multiple of eight: a field of packed records is a column too."""
+    """Return the double at an address, which need not be aligned: a field of packed records is a column too."""
 
     def lower(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         return builder.load(builder.inttoptr(args[0], ir.DoubleType().as_pointer()), align=1)
@@ -54,13 +55,13 @@ def number_at(_, address):  # type: ignore[no-untyped-def]
 
 @Inner
 def element(columns, which, k):  # type: ignore[no-untyped-def]
-    """Element k of one column."""
+    """Return element k of one column."""
     return number_at(columns[which, 0] + k * columns[which, 1])
 
 
 @Inner
 def fill_row(columns, which, begin, count, row):  # type: ignore[no-untyped-def]
-    """Copy ``count`` elements of a column from ``begin`` on, and repeat the last of them to the row's end."""
+    """Copy ``count`` elements of a column from index ``begin`` to a row, and fill the rest with the last of them."""
     address, step = columns[which, 0] + begin * columns[which, 1], columns[which, 1]
     if step == 0:
         count = 1

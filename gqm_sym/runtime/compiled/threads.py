@@ -1,7 +1,7 @@
-"""Compiled work over large arrays, on all cores.
+"""Compiled work over large arrays on all cores, in threads of Python.
 
-A pool of Python's threads: the compiled loops let go of the interpreter, need no threading layer of numba's, and may be
-called from anywhere, forked processes included.
+The compiled loops release the interpreter's lock. Unlike numba's own threads these need no threading layer, and they
+work everywhere, in forked processes too.
 """
 
 import os
@@ -13,15 +13,25 @@ from typing import Any
 
 @lru_cache(maxsize=1)
 def cores() -> int:
-    """How many cores this process may use."""
+    """Return how many cores this process may use."""
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
 
 
-def run_in_threads(work: Callable[[slice], Any], size: int, least: int) -> None:
-    """Do ``work`` on slices of ``range(size)``, one a core, none shorter than ``least``; each fills its own part."""
-    parts = min(cores(), size // least)
+def run_in_threads(work: Callable[[slice], Any], size: int, min_slice: int) -> None:
+    """Call ``work`` in threads, on one slice of ``range(size)`` for each core.
+
+    Parameters
+    ----------
+    work
+        A function of a slice; it must write only to its own part of the results.
+    size : int
+        Number of elements.
+    min_slice : int
+        The shortest slice that is worth a thread.
+    """
+    parts = min(cores(), size // min_slice)
     if parts <= 1:
         work(slice(0, size))
         return

@@ -1,4 +1,4 @@
-"""Types of compiled functions' arguments, and of arrays: each has its one name here."""
+"""numba's types of the arguments of compiled functions, and the type of arrays in annotations."""
 
 from typing import Any
 
