@@ -74,7 +74,8 @@ class CompiledModel(Formulas):
         launch = read_launch(self, p, request)
         f = bind(self, p, launch)
         if isinstance(lam, np.ndarray) and lam.dtype == np.float64:
-            places, low_parts, shape = np.ascontiguousarray(lam).reshape(-1), NO_LOW_PARTS, lam.shape
+            aligned = lam if lam.flags.aligned else lam.copy()
+            places, low_parts, shape = np.ascontiguousarray(aligned).reshape(-1), NO_LOW_PARTS, lam.shape
         else:
             places, low_parts, shape = read_numbers(lam, where=self.parameter)
             low_parts = low_parts if low_parts.any() else NO_LOW_PARTS

@@ -130,6 +130,8 @@ def _check(where: str, array: Any, shape: tuple[int, ...]) -> None:
         raise InputError(f"{where} has the shape {array.shape}; the places have {shape}")
     if not array.flags.c_contiguous:
         raise InputError(f"{where} is not contiguous; give an array whose rows follow each other (np.empty makes one)")
+    if not array.flags.aligned:
+        raise InputError(f"{where} is not aligned in memory; give an array that is (np.empty makes one)")
     if not array.flags.writeable:
         raise InputError(f"{where} is read-only; give an array that may be written to")
 
@@ -172,11 +174,13 @@ def fill_by_difference(fns, p, launch, places, low_parts, field):  # type: ignor
         *(types.UniTuple(VECTOR, MAP_ROWS), types.UniTuple(INTEGER, 2), types.boolean),
     ),
     nogil=True,
+    checked=False,
 )
 def fill_load_map(fns, load_map, p, launch, places, rows, part, past_cache):  # type: ignore[no-untyped-def]
     """Fill a part of the rows x, z, ds, kappa, V**2 and contact force of a load map.
 
-    Python hands over plain tuples, whose types numba finds faster than those of named ones.
+    The arguments are not checked, for looking at the tuples would take two microseconds a call: `CompiledModel.pass1`,
+    the only caller, sees to it that arrays are aligned, contiguous and of doubles.
 
     Parameters
     ----------

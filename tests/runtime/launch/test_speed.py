@@ -160,6 +160,7 @@ LAM = np.linspace(0.0, 1.0, 5)
         (bad(4, np.empty(10)[::2]), "out: v2 is not contiguous; give"),
         (bad(5, np.broadcast_to(np.zeros(1), 5)), "out: normal_force is not contiguous"),
         (bad(0, np.frombuffer(bytes(40))), "out: x is read-only; give"),
+        (bad(0, np.zeros(48, dtype=np.uint8)[1:41].view(np.float64)), "out: x is not aligned in memory; give"),
         ([SHARED[:5], *bad(0, None)[1:5], SHARED[4:]], "out: x and normal_force share memory; give each array its own"),
         (bad(1, LAM), "out: z shares memory with the places; give it its own"),
     ],
