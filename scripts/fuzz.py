@@ -20,13 +20,10 @@ sys.path[:0] = [str(ROOT / "tests" / "support"), str(ROOT)]
 
 from confined import OutOfTime, confined  # noqa: E402
 
-from gqm_sym.errors import GQMError
-from gqm_sym.expressions import read_expression
-from gqm_sym.literals.grammar import (
-    CONSTANTS,  # noqa: E402
-    FUNCTIONS,
-)
-from gqm_sym.specfile import read_spec
+from gqm_sym.errors import GQMError  # noqa: E402
+from gqm_sym.expressions import read_expression  # noqa: E402
+from gqm_sym.literals.grammar import CONSTANTS, FUNCTIONS  # noqa: E402
+from gqm_sym.specfile import read_spec  # noqa: E402
 
 PACKAGE = str(ROOT / "gqm_sym")
 FAILURES = Path("fuzz-failures")

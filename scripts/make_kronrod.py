@@ -1,4 +1,6 @@
-"""Print gqm_sym/runtime/quadrature/kronrod.py: the 21-point Gauss-Kronrod rule and its Legendre transform, to the last bit.
+"""Print gqm_sym/runtime/quadrature/kronrod.py: the 21-point Gauss-Kronrod rule and its Legendre transform.
+
+They are right to the last bit.
 
 The Stieltjes polynomial of degree 11 is found from its orthogonality to P10 times every polynomial of degree below 11,
 in 80-digit arithmetic; the transform inverts the Legendre-Vandermonde matrix, split by parity.
