@@ -74,8 +74,8 @@ def _direction_from_rest(problem: Problem, lam: float, preferred: int) -> int:
     """
     f, domain = problem.functions, problem.domain
     off = clearance.py_func(lam, domain.period or max(abs(domain.low), abs(domain.high))) if _is_break(f, lam) else 0.0
-    hold = _loss(problem).static_balance
-    direction: int = follow.direction_from_rest(hold, f.p, lam - off, lam + off, preferred)
+    balance = _loss(problem).static_balance
+    direction: int = follow.direction_from_rest(balance, f.p, lam - off, lam + off, preferred)
     return direction
 
 

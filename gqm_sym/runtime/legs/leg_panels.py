@@ -344,12 +344,12 @@ def next_panel(forces, march, panel, request, work):  # type: ignore[no-untyped-
 
 
 @Inner
-def next_stop(march, passed, whole, record, breaks, remaining):  # type: ignore[no-untyped-def]
+def next_stop(march, passed, length_back, record, breaks, remaining):  # type: ignore[no-untyped-def]
     """On the way back, the distance at which the next panel must end.
 
     Parameters
     ----------
-    passed, whole : float
+    passed, length_back : float
         The distance that was followed back so far, and that to follow.
     remaining : (int, int, int)
         The index of the next change of N's sign, that of the next break, and the sign of N.
@@ -360,7 +360,7 @@ def next_stop(march, passed, whole, record, breaks, remaining):  # type: ignore[
     remaining : (int, int, int)
     """
     change, upcoming, contact_sign = remaining
-    origin, u, stop = march.origin, march.direction, whole
+    origin, u, stop = march.origin, march.direction, length_back
     # Distances are compared, because the distance to a stop was given as such: its place may be a rounding farther.
     while change >= 0 and offset(record[change_at(record, change)], origin, u) <= passed:
         change, contact_sign = change - 1, -contact_sign

@@ -296,33 +296,33 @@ def begin(forces, start, route, off, point):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def pass_break(forces, march, route, off, panel, ahead, gone, point):  # type: ignore[no-untyped-def]
-    """What is ahead of a panel that begins at the distance ``gone``.
+def pass_break(forces, march, route, off, panel, ahead, run_length, point):  # type: ignore[no-untyped-def]
+    """What is ahead of a panel that begins at the distance ``run_length``.
 
     V**2 at a break is as exact as at launch, so that the panel after it is as narrow as the first one.
     """
     upcoming, breaks, v = ahead.upcoming, route.breaks, march.direction
-    if upcoming == breaks.size or offset(breaks[upcoming], march.origin, v) > gone:
+    if upcoming == breaks.size or offset(breaks[upcoming], march.origin, v) > run_length:
         return ahead
     upcoming, widest = upcoming + 1, inf
     span = span_before(breaks, upcoming, v, off)
     if panel.v2 > 0.0:
-        place = within(march.origin[0] + v * gone, span)
+        place = within(march.origin[0] + v * run_length, span)
         slope = slope_of_v2(forces, place, panel.v2, panel.contact_sign, point)
         if slope < 0.0:
-            widest = marched(gone + STOPPING_SHARE * panel.v2 / -slope, march) - panel.left
+            widest = marched(run_length + STOPPING_SHARE * panel.v2 / -slope, march) - panel.left
     return Ahead(upcoming, span, widest)
 
 
 @Inner
-def end_where_narrowed(forces, march, panel, gone, point):  # type: ignore[no-untyped-def]
+def end_where_narrowed(forces, march, panel, run_length, point):  # type: ignore[no-untyped-def]
     """What ends a run where no panel can be laid, at what distance and with what V**2: a turn, if one is near."""
     if not forces.linear and panel.v2 > 0.0:
-        here = march.origin[0] + march.direction * gone
+        here = march.origin[0] + march.direction * run_length
         slope = slope_of_v2(forces, within(here, panel.span), panel.v2, panel.contact_sign, point)
-        if slope < 0.0 and panel.v2 <= -slope * NEAR_TURN * max(fabs(here), gone):
-            return TURN, gone - panel.v2 / slope, 0.0
-    return NARROWED, gone, panel.v2
+        if slope < 0.0 and panel.v2 <= -slope * NEAR_TURN * max(fabs(here), run_length):
+            return TURN, run_length - panel.v2 / slope, 0.0
+    return NARROWED, run_length, panel.v2
 
 
 @Inner
@@ -339,17 +339,17 @@ def first_changes(march, panel, largest_v2, load_change, work):  # type: ignore[
 
 
 @Inner
-def changes_at_once(march, panel, width, change, gone):  # type: ignore[no-untyped-def]
+def changes_at_once(march, panel, width, change, run_length):  # type: ignore[no-untyped-def]
     """Whether N is zero at the panel's start, so that what follows decides its sign."""
     if change.first == change.load and change.first <= 1.0:
         where = distance(panel.left + width * (0.5 * (1.0 + change.first)), march)
-        here = march.origin[0] + march.direction * gone
-        return where <= gone + MIN_RELATIVE_WIDTH * max(fabs(here), gone)
+        here = march.origin[0] + march.direction * run_length
+        return where <= run_length + MIN_RELATIVE_WIDTH * max(fabs(here), run_length)
     return False
 
 
 @Inner
-def cut_panel(forces, march, panel, width, change, gone, work, point):  # type: ignore[no-untyped-def]
+def cut_panel(forces, march, panel, width, change, run_length, work, point):  # type: ignore[no-untyped-def]
     """Lay a panel once more, so that it ends at the first change; returns the march variable there.
 
     Its own sum has more digits than the series of a wider panel.
@@ -365,7 +365,7 @@ def cut_panel(forces, march, panel, width, change, gone, work, point):  # type: 
         v2, there = work[W + COUNT], distance(right, march)
         place = within(march.origin[0] + march.direction * there, panel.span)
         slope = slope_of_v2(forces, place, v2, panel.contact_sign, point)
-        if fabs(v2) < fabs(slope) * 1e-6 * (there - gone):
+        if fabs(v2) < fabs(slope) * 1e-6 * (there - run_length):
             right = marched(there - v2 / slope, march)
     elif change.first == change.load and change.first != change.touch:
         # N at the panel's end has no error of a series, nor has the distance left to where it vanishes.
@@ -415,19 +415,19 @@ def what_before(contact_sign, only_sign, has_room, fast_again, at_limit):  # typ
 
 
 @Inner
-def conclude(route, march, end, timed, searching, gone):  # type: ignore[no-untyped-def]
-    """The end of a run at the distance ``gone``; ``end`` has all of it but the places."""
+def conclude(route, march, end, timed, searching, run_length):  # type: ignore[no-untyped-def]
+    """The end of a run at the distance ``run_length``; ``end`` has all of it but the places."""
     breaks, v, what = route.breaks, march.direction, end.what
     middle = located(march.origin, v, timed.distance, breaks, end.upcoming)
-    v2, sign, changes, no_turn_until = end.v2, end.contact_sign, end.change_count, end.no_turn_until - gone
+    v2, sign, changes, no_turn_until = end.v2, end.contact_sign, end.change_count, end.no_turn_until - run_length
     place = middle
     if what == TURN or what == ASYMPTOTE:
-        place = located(march.origin, v, gone, breaks, end.upcoming)
+        place = located(march.origin, v, run_length, breaks, end.upcoming)
     elif searching and what != FULL:
-        no_turn_until = gone - timed.distance if what == PAUSED or what == SLOWED else inf
+        no_turn_until = run_length - timed.distance if what == PAUSED or what == SLOWED else inf
         what, v2, sign, changes = SLOWED, timed.v2, timed.contact_sign, timed.change_count
     else:
-        place = (route.limit, 0.0) if what == LIMIT else located(march.origin, v, gone, breaks, end.upcoming)
+        place = (route.limit, 0.0) if what == LIMIT else located(march.origin, v, run_length, breaks, end.upcoming)
         middle = place
     count, upcoming = end.panel_count, end.upcoming
     return End(what, place, v2, sign, end.step, no_turn_until, middle, end.half_c, changes, count, upcoming)
@@ -454,26 +454,26 @@ def run(forces, start, route, off, record):  # type: ignore[no-untyped-def]
     work, point, v, step = panel_buffer(), point_buffer(), start.direction, start.step
     set_nodes(work)
     march, nu, ahead = begin(forces, start, route, off, point)
-    v2, left, gone, largest_v2, step = start.v2, 0.0, 0.0, start.v2, marched(step, march)
+    v2, left, run_length, largest_v2, step = start.v2, 0.0, 0.0, start.v2, marched(step, march)
     what, panel_count, recorded, change_count = SPENT, 0, 0, 0
     # Once time is not counted any more, a turn is searched for.
-    searching, timed = False, Timed(gone, v2, nu, change_count)
+    searching, timed = False, Timed(run_length, v2, nu, change_count)
     for _ in range(MAX_PANELS):
         late = v2 < HIGH_V2_RATIO * largest_v2
         has_room = has_space(record, HEAD + recorded * COLUMNS, change_count)
-        ahead = pass_break(forces, march, route, off, Panel(left, v2, nu, ahead.span), ahead, gone, point)
+        ahead = pass_break(forces, march, route, off, Panel(left, v2, nu, ahead.span), ahead, run_length, point)
         at_end = ahead.upcoming == route.breaks.size
         stop = offset(route.limit if at_end else route.breaks[ahead.upcoming], march.origin, v)
-        code = what_before(nu, route.only_sign, has_room, searching and not late, stop <= gone)
+        code = what_before(nu, route.only_sign, has_room, searching and not late, stop <= run_length)
         if code != GOES_ON:
             what = code
             break
         panel, max_width = Panel(left, v2, nu, ahead.span), marched(stop, march) - left
-        timing = ALWAYS if gone < start.no_turn_until else (NEVER if searching or late else MAYBE)
+        timing = ALWAYS if run_length < start.no_turn_until else (NEVER if searching or late else MAYBE)
         request = PanelRequest(min(max_width, ahead.widest), step, largest_v2, timing, True)
         width, step, is_timed = next_panel(forces, march, panel, request, work)
         if width == 0.0:
-            what, gone, v2 = end_where_narrowed(forces, march, panel, gone, point)
+            what, run_length, v2 = end_where_narrowed(forces, march, panel, run_length, point)
             break
         load_change, sign, _ = first_change_of(work, LOAD, nu, ZERO_TOLERANCE * work[size_at(LOAD)])
         if nu == 0 and sign != 0:
@@ -481,32 +481,34 @@ def run(forces, start, route, off, record):  # type: ignore[no-untyped-def]
             if forces.friction or nu == -route.only_sign:
                 continue  # with forces of this sign
         change = first_changes(march, panel, largest_v2, load_change, work)
-        if changes_at_once(march, panel, width, change, gone):
-            change_count = enter_change(record, change_count, start.place + v * gone) if left > 0.0 else change_count
+        if changes_at_once(march, panel, width, change, run_length):
+            change_count = (
+                enter_change(record, change_count, start.place + v * run_length) if left > 0.0 else change_count
+            )
             nu = -nu
             continue
         if not searching and timing != ALWAYS and (late or not is_timed):
-            searching, timed = True, Timed(gone, v2, nu, change_count)
+            searching, timed = True, Timed(run_length, v2, nu, change_count)
         right, ends_here = left + width, change.first <= 1.0
         if ends_here:
-            right = cut_panel(forces, march, Panel(left, v2, nu, ahead.span), width, change, gone, work, point)
+            right = cut_panel(forces, march, Panel(left, v2, nu, ahead.span), width, change, run_length, work, point)
         if not searching:
             add_panel(record, HEAD + recorded * COLUMNS, right, right - left, work)
             recorded += 1
         panel_count += 1
         largest_v2 = largest_after(largest_v2, v2, ends_here, work)
         at_stop = not ends_here and width == max_width
-        v2, left, gone = max(work[W + COUNT], 0.0), right, stop if at_stop else distance(right, march)
+        v2, left, run_length = max(work[W + COUNT], 0.0), right, stop if at_stop else distance(right, march)
         ahead = Ahead(ahead.upcoming, ahead.span, inf)
-        timed = timed if searching else Timed(gone, v2, nu, change_count)
-        may_pause = (gone >= route.pause and 2.0 * v2 >= largest_v2) or panel_count >= PANELS_PER_RUN
+        timed = timed if searching else Timed(run_length, v2, nu, change_count)
+        may_pause = (run_length >= route.pause and 2.0 * v2 >= largest_v2) or panel_count >= PANELS_PER_RUN
         code = what_after(change, at_stop and at_end, may_pause)
         if code != GOES_ON:
             what, v2 = code, 0.0 if ends_here else v2
             break
         if ends_here:
-            change_count, nu = enter_change(record, change_count, start.place + v * gone), -nu
+            change_count, nu = enter_change(record, change_count, start.place + v * run_length), -nu
     onwards, half_c = step * (slope_at(left, march) + march.g * step), 0.5 * march.c if march.g > 0.0 else inf
     origin, no_turn, upcoming = march.origin, start.no_turn_until, ahead.upcoming
     end = End(what, origin, v2, nu, onwards, no_turn, origin, half_c, change_count, recorded, upcoming)
-    return conclude(route, march, end, timed, searching, gone)
+    return conclude(route, march, end, timed, searching, run_length)

@@ -52,7 +52,7 @@ def read_panels(panels, time):  # type: ignore[no-untyped-def]
 
     Returns
     -------
-    edges, clock, lengths, time_terms, length_terms : arrays
+    edges, edge_times, lengths, time_terms, length_terms : arrays
         As of `time_panels.lay`; the last phase angle is 1.
     speed_terms : (n, WIDE) array
         Legendre coefficients of Y.
@@ -60,7 +60,7 @@ def read_panels(panels, time):  # type: ignore[no-untyped-def]
         Estimated relative error of the time.
     """
     n = panels.shape[0]
-    edges, clock, lengths = np.zeros(n + 1), np.zeros(n + 1), np.zeros(n + 1)
+    edges, edge_times, lengths = np.zeros(n + 1), np.zeros(n + 1), np.zeros(n + 1)
     time_terms, length_terms, speed_terms = np.empty((n, WIDE)), np.empty((n, WIDE)), np.empty((n, WIDE))
     out, error, last = np.empty(3 * WIDE), 0.0, panels[n - 1, RIGHT]
     for k in range(n):
@@ -75,10 +75,10 @@ def read_panels(panels, time):  # type: ignore[no-untyped-def]
             speed_terms[k, j] = out[2 * WIDE + j]
             length += length_terms[k, j]
         edges[k + 1] = panels[k, RIGHT] / last
-        clock[k + 1], lengths[k + 1] = clock[k] + panels[k, TIME], lengths[k] + length
+        edge_times[k + 1], lengths[k + 1] = edge_times[k] + panels[k, TIME], lengths[k] + length
         error += panels[k, TIME_ERROR]
-    clock[n] = time
-    return edges, clock, lengths, time_terms, length_terms, speed_terms, error / time + ULP if time > 0.0 else ULP
+    edge_times[n] = time
+    return edges, edge_times, lengths, time_terms, length_terms, speed_terms, error / time + ULP if time > 0.0 else ULP
 
 
 class Run(NamedTuple):

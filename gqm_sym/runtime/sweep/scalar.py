@@ -150,14 +150,16 @@ def answer_one_by_one(fns, columns, monotone, quantity, spans, answers, paramete
         A buffer for the parameters of one launch.
     """
     work, series, p = trapezoid_workspace(), trapezoid_rates(), uncounted(parameters)
-    for k in range(answers.status.size):
-        known = answers.status[k] == SPAN_KNOWN
-        if answers.status[k] != UNDECIDED and not known:
+    columns, spans, values = uncounted(columns), uncounted(spans), uncounted(answers.values)
+    statuses, routes = uncounted(answers.status), uncounted(answers.route)
+    for k in range(statuses.size):
+        known = statuses[k] == SPAN_KNOWN
+        if statuses[k] != UNDECIDED and not known:
             continue
         for row in range(p.size):
             p[row] = element(columns, PARAMETERS + row, k)
         status, orbit = find_orbit(fns, p, columns, k, monotone, spans, known)
         if status == ANSWERED:
             target = element(columns, TARGET, k)
-            status = fill_answer(fns, p, orbit, quantity, target, work, series, uncounted(answers.values[k]))
-        answers.status[k], answers.route[k] = status, SINGLE
+            status = fill_answer(fns, p, orbit, quantity, target, work, series, values[k])
+        statuses[k], routes[k] = status, SINGLE

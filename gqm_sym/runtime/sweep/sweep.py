@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 # From how many launches on a thread is worth starting, and how many are laid out at a time.
 MIN_LAUNCHES_PER_THREAD, CHUNK = 2**9, 2**16
 
-# The motion of one launch with the parameters given.
+# The motion of one launch with given parameters.
 Solve = Callable[[LaunchRequest, tuple[Any, ...]], Any]
 
 # Quantities that are answered by batches themselves; for others batches find the span of an orbit.
@@ -112,7 +112,7 @@ def sweep(
     formulas: "Formulas",
     quantity: str,
     launches: LaunchRequest,
-    given: tuple[Any, ...],
+    parameters: tuple[Any, ...],
     lam: Any,
     solve: Solve,
 ) -> Sweep:
@@ -126,7 +126,7 @@ def sweep(
         A name in `quantities.QUANTITIES`.
     launches : LaunchRequest
         Its ``lam0``, ``v0`` and ``direction`` may be arrays.
-    given : tuple
+    parameters : tuple
         A number or an array for each run-time parameter.
     lam : number or array, optional
         The place that "time_at" asks about.
@@ -149,7 +149,7 @@ def sweep(
     if contact not in CONTACTS:
         raise InputError(f"contact: must be one of {', '.join(CONTACTS)}, got {contact!r}")
     names = ("lam0", "v0", "direction", "lam", *formulas.parameters)
-    sources = (lam0, v0, direction, 0.0 if lam is None else lam, *given)
+    sources = (lam0, v0, direction, 0.0 if lam is None else lam, *parameters)
     arrays = [_column(value, name) for value, name in zip(sources, names, strict=True)]
     named = dict(zip(names, arrays, strict=True))
     _check(formulas, named)
@@ -279,9 +279,9 @@ def _solved(
     contact: str,
 ) -> tuple[Any, int]:
     """The quantity of one launch that is solved by itself, and its status."""
-    lam0, v0, direction, place, *given = here
+    lam0, v0, direction, place, *parameters = here
     try:
-        motion = solve(LaunchRequest(lam0, v0, int(direction), None, t_max, contact), tuple(given))
+        motion = solve(LaunchRequest(lam0, v0, int(direction), None, t_max, contact), tuple(parameters))
     except GQMError:
         return nan, quantities.REFUSED
     try:

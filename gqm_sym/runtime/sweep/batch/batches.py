@@ -98,12 +98,12 @@ def answer_orbits(fns, kind, orbits, spare, scratch, quantity, answers):  # type
     count = scratch.param_count
     for pieces in (FEW_PIECES_OF_HALF if kind.mirrored else FEW_PIECES, MANY_PIECES):
         n, rows = orbits.size, orbits.rows
-        proved, left = n, 0
+        proved, unproved = n, 0
         if not kind.proved:
             p = orbits.params[: count * n].reshape(count, n)
             prove(fns, kind.kind, kind.mirrored, pieces, n, rows, p, scratch.work)
-            proved, left = partition(rows[STATE, :n], scratch.chosen, scratch.others)
-        waiting = gather(orbits, count, scratch.others, left, spare, ROWS)
+            proved, unproved = partition(rows[STATE, :n], scratch.chosen, scratch.others)
+        waiting = gather(orbits, count, scratch.others, unproved, spare, ROWS)
         orbits = shrink(orbits, count, scratch.chosen, proved, TIME_ROWS)
         if quantity in (SPANS, TURNING_POINTS) or (quantity != PERIOD and kind.kind == CIRCULATION):
             answer_spans(orbits, kind.kind, quantity, answers)
@@ -111,7 +111,7 @@ def answer_orbits(fns, kind, orbits, spare, scratch, quantity, answers):  # type
             half_periods_by_agm(fns, orbits, scratch, quantity, answers)
         elif orbits.size:
             times_by_trapezoid(fns, kind.kind, kind.mirrored, orbits, scratch, quantity, answers)
-        if left == 0:
+        if unproved == 0:
             return
         orbits, spare = Orbits(waiting, spare.rows, spare.params), orbits
 

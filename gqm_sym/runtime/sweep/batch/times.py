@@ -74,12 +74,17 @@ def fill_integrand_batch(fns, kind, n, node, rows, p, work):  # type: ignore[no-
     Updates the rows for the smallest and largest regular factor of V**2.
     """
     da, db, rates, out = work[0, :n], work[1, :n], work[2, :n], work[3:6].reshape(-1)
-    start, w0, least, most = rows[LAUNCH_PLACE, :n], rows[LAUNCH_V2, :n], rows[OFFSET_LOW, :n], rows[OFFSET_HIGH, :n]
+    start, w0, offset_low, offset_high = (
+        rows[LAUNCH_PLACE, :n],
+        rows[LAUNCH_V2, :n],
+        rows[OFFSET_LOW, :n],
+        rows[OFFSET_HIGH, :n],
+    )
     low, high = rows[FACTOR_LOW, :n], rows[FACTOR_HIGH, :n]
     if kind == LIBRATION:
         from_a, from_b, two = OFFSETS_FROM_A[node], OFFSETS_TO_B[node], out[: 2 * n].reshape(2, n)
         for j in range(n):
-            width = most[j] - least[j]
+            width = offset_high[j] - offset_low[j]
             da[j], db[j] = width * from_a, width * from_b
         a, b = rows[END_LOW, :n], rows[END_HIGH, :n]
         call_potential_divdiff2_batch(fns.potential_divdiff2, n, a, b, da, db, p, two)
@@ -97,12 +102,12 @@ def fill_integrand_batch(fns, kind, n, node, rows, p, work):  # type: ignore[no-
     else:
         share, three = NODE_SHARES[node], out[: 3 * n].reshape(3, n)
         for j in range(n):
-            db[j] = least[j] + share * (most[j] - least[j])
+            db[j] = offset_low[j] + share * (offset_high[j] - offset_low[j])
             da[j] = start[j] + db[j]
         call_potential_divdiff1_batch(fns.potential_divdiff1, n, start, da, db, p, three)
         for j in range(n):
             lost = 2.0 * db[j] * three[0, j]
-            rates[j] = (most[j] - least[j]) * three[1, j] / sqrt(w0[j] - lost)
+            rates[j] = (offset_high[j] - offset_low[j]) * three[1, j] / sqrt(w0[j] - lost)
             q = (w0[j] - lost) / (w0[j] + fabs(lost))
             low[j], high[j] = choose(q >= low[j], low[j], q), 1.0
     return rates
@@ -181,10 +186,10 @@ def times_by_trapezoid(fns, kind, mirrored, orbits, scratch, quantity, answers):
             rows[SUM, j] += more[j]
         judge_level(rows, n, nodes, work[0, :n])
         if begin > 0:
-            left = answer_level(rows, n, factor, work[0, :n], chosen, answers)
-            if left == 0 or nodes == MAX_NODES:
+            continuing = answer_level(rows, n, factor, work[0, :n], chosen, answers)
+            if continuing == 0 or nodes == MAX_NODES:
                 return
-            orbits = shrink(orbits, count, chosen, left, NEEDED_ROWS[kind])
+            orbits = shrink(orbits, count, chosen, continuing, NEEDED_ROWS[kind])
             n = orbits.size
         begin, nodes, last = nodes + 1, 2 * nodes, nodes + (nodes // 2 if mirrored else nodes)
 

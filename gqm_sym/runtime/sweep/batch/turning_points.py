@@ -219,7 +219,7 @@ def search(fns, n, rows, p, work):  # type: ignore[no-untyped-def]
         rows[SEARCH_DIRECTION, :n],
         rows[SEARCH_LENGTH, :n],
     )
-    state, left, right, trial, zero = (
+    state, bracket_low, bracket_high, trial, zero = (
         rows[STATE, :n],
         rows[BRACKET_LOW, :n],
         rows[BRACKET_HIGH, :n],
@@ -229,7 +229,7 @@ def search(fns, n, rows, p, work):  # type: ignore[no-untyped-def]
     if not contains(state, SEEKING):
         return
     for j in range(n):
-        left[j], right[j] = 0.0, inf
+        bracket_low[j], bracket_high[j] = 0.0, inf
     for _ in range(MAX_TRIALS):
         for j in range(n):
             offsets[j] = direction[j] * trial[j]
@@ -238,7 +238,7 @@ def search(fns, n, rows, p, work):  # type: ignore[no-untyped-def]
         for j in range(n):
             at, w = trial[j], w0[j] - 2.0 * offsets[j] * out[0, j]
             before = w > 0.0
-            low, high = choose(before, at, left[j]), choose(before, right[j], at)
+            low, high = choose(before, at, bracket_low[j]), choose(before, bracket_high[j], at)
             better = at + at * (w / (2.0 * offsets[j] * out[2, j] + w))
             close = fabs(better - at) <= LAST_STEP * at
             bracketed = high < inf
@@ -249,7 +249,7 @@ def search(fns, n, rows, p, work):  # type: ignore[no-untyped-def]
             live = state[j] == SEEKING
             zero[j] = choose(live & close, better, zero[j])
             trial[j] = choose(live, new, at)
-            left[j], right[j] = low, high
+            bracket_low[j], bracket_high[j] = low, high
             state[j] = choose(live, choose(close, FOUND, choose(lost, NOWHERE, SEEKING)), state[j])
         if not contains(state, SEEKING):
             return
@@ -270,7 +270,7 @@ def classify(n, rows):  # type: ignore[no-untyped-def]
 @Inner
 def set_ends(n, rows):  # type: ignore[no-untyped-def]
     """Set both ends; STATE to FOUND where the orbit is even, and TRIAL to FOUND where only one axis lies within it."""
-    start, least, most, a, b = (
+    start, offset_low, offset_high, a, b = (
         rows[LAUNCH_PLACE, :n],
         rows[OFFSET_LOW, :n],
         rows[OFFSET_HIGH, :n],
@@ -293,8 +293,8 @@ def set_ends(n, rows):  # type: ignore[no-untyped-def]
         state[j], trial[j] = choose(even, FOUND, NOWHERE), choose(between, FOUND, NOWHERE)
     for j in range(n):
         first, second = a[j], direction[j] * zero[j]
-        least[j], most[j] = choose(first < second, first, second), choose(first < second, second, first)
-        a[j], b[j] = start[j] + least[j], start[j] + most[j]
+        offset_low[j], offset_high[j] = choose(first < second, first, second), choose(first < second, second, first)
+        a[j], b[j] = start[j] + offset_low[j], start[j] + offset_high[j]
 
 
 @Inner
@@ -308,16 +308,16 @@ def prove(fns, kind, mirrored, pieces, n, rows, p, work):  # type: ignore[no-unt
     places, behind, lo, hi = work[0, :n], work[1, :n], work[2, :n], work[3, :n]
     offsets, speeds, box = work[4, :n], work[5, :n], work[6:10].reshape(-1)[: 4 * n].reshape(4, n)
     out = work[10:13].reshape(-1)[: 3 * n].reshape(3, n)
-    start, w0, least, state = rows[LAUNCH_PLACE, :n], rows[LAUNCH_V2, :n], rows[OFFSET_LOW, :n], rows[STATE, :n]
-    most = rows[AXIS_DISTANCE if mirrored else OFFSET_HIGH, :n]
+    start, w0, offset_low, state = rows[LAUNCH_PLACE, :n], rows[LAUNCH_V2, :n], rows[OFFSET_LOW, :n], rows[STATE, :n]
+    offset_high = rows[AXIS_DISTANCE if mirrored else OFFSET_HIGH, :n]
     for j in range(n):
-        behind[j], speeds[j], state[j] = start[j] + least[j], w0[j], FOUND
+        behind[j], speeds[j], state[j] = start[j] + offset_low[j], w0[j], FOUND
     for k in range(1, pieces + 1):
         first, end = kind != CIRCULATION and k == 1, k == pieces
         last, half = kind != CIRCULATION and end and not mirrored, end and mirrored
         share = k / pieces
         for j in range(n):
-            offsets[j] = most[j] if end else least[j] + share * (most[j] - least[j])
+            offsets[j] = offset_high[j] if end else offset_low[j] + share * (offset_high[j] - offset_low[j])
             places[j] = start[j] + offsets[j]
             lo[j], hi[j] = behind[j], places[j]
         call_bounds_batch(fns.bounds, n, lo, hi, p, box)
