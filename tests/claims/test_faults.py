@@ -29,8 +29,20 @@ GENERATE = "import sys\nfrom gqm_sym.cli.gen import main\n"
 PR_CAPBSET_DROP, CAP_DAC_OVERRIDE = 24, 1
 
 
-def python(code: str, *arguments: str | Path, before: Callable[[], None] | None = None, **environment: str) -> Any:
-    """Run Python code in a fresh process."""
+def interruptible() -> None:
+    """Take Ctrl-C as from a terminal, also where the tests run in the background: jobs there begin by ignoring it."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+
+def uninterruptible() -> None:
+    """Ignore Ctrl-C, as jobs in the background do from their beginning."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+def python(
+    code: str, *arguments: str | Path, before: Callable[[], None] = interruptible, **environment: str
+) -> subprocess.CompletedProcess[bytes]:
+    """Run Python code in a fresh process, after a call in that process."""
     return subprocess.run(
         [sys.executable, "-c", code, *map(str, arguments)],
         cwd=ROOT,
@@ -272,6 +284,14 @@ def test_interrupted_while_writing(yaml: Path) -> None:
     done = python(KILLED, "SIGINT", "-o", out, yaml)
     assert (done.returncode, done.stdout, done.stderr) == (130, b"", b"gqm-gen: interrupted\n")
     assert names_in(out) == []
+
+
+def test_an_interruption_that_is_ignored_stays_so(yaml: Path) -> None:
+    """A job in the background ignores Ctrl-C, which is meant for the one in the foreground, and ends its work."""
+    out = yaml.parent / "out"
+    done = python(KILLED, "SIGINT", "-o", out, yaml, before=uninterruptible)
+    assert (done.returncode, done.stdout, done.stderr) == (0, b"", b"")
+    assert names_in(out) == ["bowl.py"]
 
 
 INTERRUPTED = """
