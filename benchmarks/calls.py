@@ -18,7 +18,8 @@ from gqm_sym.runtime.launch.problem import bind
 from gqm_sym.runtime.launch.request import LaunchRequest, read_launch
 from gqm_sym.runtime.launch.survey import survey
 from gqm_sym.runtime.legs import follow
-from gqm_sym.runtime.legs.leg_record import BEFORE, COLUMNS
+from gqm_sym.runtime.legs.leg_record import COLUMNS, TIME_FROM_END
+from gqm_sym.runtime.legs.leg_run import Route, Start
 from gqm_sym.runtime.legs.leg_segments import Run, read_panels
 from gqm_sym.runtime.quadrature import time_panels, trapezoid
 from gqm_sym.runtime.sweep import quantities
@@ -30,11 +31,11 @@ def conservative() -> list[tuple[str, float]]:
     model, given = pendulum.MODEL, tuple(pendulum.PARAMETERS.values())
     p = model.numbers(given)
     launch = read_launch(model, p, LaunchRequest(-0.37))
-    f, (low, high, period, _, place, step) = bind(model, p, launch), model.domain(p)
+    f, domain = bind(model, p, launch), model.domain(p).numbers
     motion = pendulum.solve(-0.37)
     motion.state(1000.0)
-    stretch = motion._stretch
-    panels, clock = stretch.panels, stretch.clock
+    segment = motion._segment
+    panels, clock = segment.panels, segment.edge_times
 
     def first(ask: str) -> Any:
         return getattr(pendulum.solve(-0.37), ask)(1.0)
@@ -46,7 +47,7 @@ def conservative() -> list[tuple[str, float]]:
         ("- functions and the exact problem", least(lambda: bind(model, p, launch))),
         (
             "- the crossing: turning points, kind, half period",
-            least(lambda: survey(f.addresses, f.p, -0.37, 0.0, 1, low, high, period, place, step)),
+            least(lambda: survey(f.addresses, f.p, -0.37, 0.0, 1, domain)),
         ),
         ("`lam` at one time", least(lambda: motion.lam(1000.0))),
         ("`state` at one time", least(lambda: motion.state(1000.0))),
@@ -55,10 +56,10 @@ def conservative() -> list[tuple[str, float]]:
         (
             "- panels of time",
             least(
-                lambda: time_panels.lay_panels(f.addresses, f.p, 0, stretch.a, stretch.b, 0.0, 0.0, panels[0][[0, -1]])
+                lambda: time_panels.lay_panels(f.addresses, f.p, 0, segment.a, segment.b, 0.0, 0.0, panels[0][[0, -1]])
             ),
         ),
-        ("- table of the anomaly", least(lambda: table.build_table(panels[0], *clock, panels[3]))),
+        ("- table of the phase angle", least(lambda: table.build_table(panels[0], *clock, panels[3]))),
     ]
 
 
@@ -68,12 +69,12 @@ def dissipative() -> list[tuple[str, float]]:
     p = model.numbers(tuple(friction.PARAMETERS.values()))
     loss = model.dissipation
     assert loss is not None
-    launch = (*loss, p.values, -1.0, 6.2088**2, 1, 0, np.empty(0))
+    start, route = Start(-1.0, 0.0, 6.2088**2, 1, 0, 0.25, 0.0), Route(np.empty(0), inf, 1.0, 0)
     record = np.empty(16 * COLUMNS)
-    leg = (*launch, inf, 1.0, 0.25, 0, 0.0, record)
-    what, *_, ahead, count, _, _, _, _, _ = follow.follow(*leg)
-    run = Run(-1.0, ahead, count, record, what, "turn", 0)
-    back, time = run.panels_back, run.pair(BEFORE)[1]
+    leg = (loss, p.values, start, route, record)
+    what, _, _, _, ahead, count, *_ = follow.follow(*leg)
+    run = Run((-1.0, 0.0), ahead, count, record, what, "turn", 0)
+    back, time = run.panels_back, float(record[TIME_FROM_END])
     return [
         ("`solve` of Example 2: its leg to the turn", least(lambda: friction.solve(-1.0, 6.2088))),
         ("- the crossing: the leg, its events, its time", least(lambda: follow.follow(*leg))),
@@ -86,51 +87,52 @@ def sweeping() -> list[tuple[str, float]]:
     """Parts of an orbit's share of a sweep over pendulums, on one core."""
     each, n = pendulum.MODEL.each, rows.BATCH
     fns, held = each.addresses(), (each.held, each.top_held)
-    launch, seek, turn_round, prove = (
-        getattr(turning_points, name) for name in ("launch", "seek", "turn_round", "prove")
+    start_search, search_zeros, start_search_behind, prove = (
+        getattr(turning_points, name) for name in ("start_search", "search", "start_search_behind", "prove")
     )
-    time_of, by_means = times.times, times.half_periods_by_agm
+    by_trapezoid, by_agm = times.times_by_trapezoid, times.half_periods_by_agm
     start = np.zeros((rows.ROWS, n))
-    start[rows.WHO], start[rows.WAY] = np.arange(n), 1.0
-    start[rows.START] = np.random.default_rng(0).uniform(0.05, 2.5, n) - np.pi / 2
+    start[rows.INDEX], start[rows.SEARCH_DIRECTION] = np.arange(n), 1.0
+    start[rows.LAUNCH_PLACE] = np.random.default_rng(0).uniform(0.05, 2.5, n) - np.pi / 2
     p = np.repeat(pendulum.MODEL.numbers(tuple(pendulum.PARAMETERS.values())).values[:, None], n, axis=1)
     count, given = len(p), np.append(p.reshape(-1), np.zeros(max(held) * n))
     known, work = (
         np.repeat([[-inf], [inf], [2 * np.pi], [-np.pi / 2], [-6.1e-17], [np.pi]], n, axis=1),
         np.empty((13, n)),
     )
-    chosen, out, reasons = np.empty(n, dtype=np.int64), np.zeros((n, 1)), np.zeros(n, dtype=np.int8)
+    chosen, status = np.empty(n, dtype=np.int64), np.zeros(n, dtype=np.int8)
+    scratch = rows.Scratch(count, held, chosen, chosen.copy(), work)
+    answers = quantities.Answers(np.zeros((n, 1)), status, status.copy())
 
     @njit
     def search(s: Any, start: Any, p: Any, known: Any, monotone: bool, work: Any) -> None:
         s[:] = start
-        launch(fns, n, s, p, known, monotone, work)
-        seek(fns, n, s, p, work)
-        turn_round(n, s)
+        start_search(fns, n, s, p, known, monotone, work)
+        search_zeros(fns, n, s, p, work)
+        start_search_behind(n, s)
 
     @njit
     def proof(s: Any, found: Any, p: Any, work: Any) -> None:
         s[:] = found
-        prove(fns, 0, True, batches.FEW_OF_HALF, n, s, p, work)
+        prove(fns, 0, True, batches.FEW_PIECES_OF_HALF, n, s, p, work)
 
     @njit
-    def clock(s: Any, found: Any, flat: Any, given: Any, work: Any, chosen: Any, out: Any, reasons: Any) -> None:
-        s[:], flat[:] = found, given
-        time_of(
-            fns, trapezoid.LIBRATION, True, n, s, flat, count, held, chosen, work, quantities.HALF_PERIOD, out, reasons
-        )
+    def trapezoidal(orbits: Any, found: Any, given: Any, scratch: Any, answers: Any) -> None:
+        orbits.rows[:], orbits.params[:] = found, given
+        by_trapezoid(fns, trapezoid.LIBRATION, True, orbits, scratch, quantities.HALF_PERIOD, answers)
 
     @njit
-    def mean(s: Any, found: Any, given: Any, work: Any, out: Any, reasons: Any) -> None:
-        s[:] = found
-        by_means(fns, n, s, given, count, work, quantities.HALF_PERIOD, out, reasons)
+    def mean(orbits: Any, found: Any, scratch: Any, answers: Any) -> None:
+        orbits.rows[:] = found
+        by_agm(fns, orbits, scratch, quantities.HALF_PERIOD, answers)
 
     s, flat = start.copy(), given.copy()
+    orbits = rows.Orbits(n, s, flat)
     search(s, start, p, known, True, work)
-    found, other = s.copy(), s[rows.A]
-    found[rows.LEAST], found[rows.MOST] = np.minimum(other, 0.0), np.maximum(other, 0.0)
-    found[rows.A] = found[rows.START] + found[rows.LEAST]
-    found[rows.B] = found[rows.START] + found[rows.MOST]
+    found, other = s.copy(), s[rows.END_LOW]
+    found[rows.OFFSET_LOW], found[rows.OFFSET_HIGH] = np.minimum(other, 0.0), np.maximum(other, 0.0)
+    found[rows.END_LOW] = found[rows.LAUNCH_PLACE] + found[rows.OFFSET_LOW]
+    found[rows.END_HIGH] = found[rows.LAUNCH_PLACE] + found[rows.OFFSET_HIGH]
     return [
         (
             "an orbit of a sweep: its turning points, in closed form",
@@ -138,10 +140,10 @@ def sweeping() -> list[tuple[str, float]]:
         ),
         ("- guessed by Newton's method", least(lambda: search(s, start, p, known, False, work)) / n),
         ("- proved by intervals, where symbols do not tell", least(lambda: proof(s, found, p, work)) / n),
-        ("- its half period by a mean", least(lambda: mean(s, found, given, work, out, reasons)) / n),
+        ("- its half period by a mean", least(lambda: mean(orbits, found, scratch, answers)) / n),
         (
             "- by the trapezoidal rule, error controlled",
-            least(lambda: clock(s, found, flat, given, work, chosen, out, reasons)) / n,
+            least(lambda: trapezoidal(orbits, found, given, scratch, answers)) / n,
         ),
     ]
 

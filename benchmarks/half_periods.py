@@ -37,14 +37,13 @@ def half_periods() -> list[Row]:
     inner_survey = Inner(survey.survey.__wrapped__)
     p = pendulum.MODEL.numbers(tuple(pendulum.PARAMETERS.values()))
     f = bind(pendulum.MODEL, p, read_launch(pendulum.MODEL, p, LaunchRequest(-0.37)))
-    low, high, period, _, place, step = pendulum.MODEL.domain(p)
-    known = (low, high, period, place, step)
+    domain = pendulum.MODEL.domain(p).numbers
 
     @njit
-    def in_a_loop(fns: Any, p: Any, lam0: Any, known: Any) -> Any:
+    def in_a_loop(fns: Any, p: Any, lam0: Any, domain: Any) -> Any:
         out = np.empty(lam0.size)
         for k in range(lam0.size):
-            out[k] = inner_survey(fns, p, lam0[k], 0.0, 1, *known)[3]
+            out[k] = inner_survey(fns, p, lam0[k], 0.0, 1, domain)[3]
         return out
 
     def raw(a: float) -> float:
@@ -119,7 +118,7 @@ def half_periods() -> list[Row]:
         Row(
             work,
             "one launch after the other in a compiled loop, turning points found",
-            lambda: in_a_loop(f.addresses, f.p, few - pi / 2, known),
+            lambda: in_a_loop(f.addresses, f.p, few - pi / 2, domain),
             lambda values: ulps(values, alone),
             each=100,
             line=6.0,

@@ -6,12 +6,11 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+from gqm_sym.cli import gen, tool
 from gqm_sym.declare.families import FAMILIES
 from gqm_sym.kernels import KERNELS
-from gqm_sym.cli import gen
 from gqm_sym.specfile import json_schema
 from gqm_sym.studies import sweep_schema
-from gqm_sym.cli import tool
 
 ROOT = Path(__file__).parent.parent
 

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "circle_coulomb". Do not edit: change its declaration and generate again.
-# interface 8, input 4a697d006329, body 52b7911b1505
+# interface 8, input b0d8ff0ac753, body ac19edcd18ec
 """Bead on a rough ring
 
 x              = L*sin(theta)
@@ -30,30 +30,24 @@ from gqm_sym.runtime import compiler
 compiled = compiler(__file__, interface=8)
 
 from gqm_sym.runtime.vocabulary import (
-    DRIVE, FRAME, HOLD, Addresses, CompiledModel, Dissipation, LaunchRequest, Pass1, cos, sin,
+    PATH_AND_CONTACT_FORCE, SPEED_EQUATION, STATIC_BALANCE, Addresses, CompiledModel, Dissipation, LaunchRequest, Pass1,
+    cos, sin,
 )
 
 if TYPE_CHECKING:
     from gqm_sym.runtime import Motion, Sweep
 
-PARAMETERS = {
-    'L': '1',
-    'mu': '0.15',
-    'mu_static': '0.2',
-    'g': '9.81',
-    'm': '1',
-}
+PARAMETERS = {'L': '1', 'mu': '0.15', 'mu_static': '0.2', 'g': '9.81', 'm': '1'}
 
 
-@compiled(FRAME)
-def frame(n, places, speeds, p, out):
-    """x, z, ds/dtheta, signed curvature and contact force, given V**2 (paper, eq. 15)."""
+@compiled(PATH_AND_CONTACT_FORCE)
+def path_and_contact_force(n, places, speeds, p, out):
+    """x, z, ds/dtheta, curvature kappa, contact force N = m*(kappa*V**2 + n0), given V**2 (paper, eqs. 8, 15)."""
     places, speeds, p, out = carray(places, n), carray(speeds, n), carray(p, 5), carray(out, (5, n))
     L, g, m = p[0], p[3], p[4]
     _t1 = 1/L
     for i in range(n):
-        theta = places[i]
-        v2 = speeds[i]
+        theta, v2 = places[i], speeds[i]
         _t0 = cos(theta)
         out[0, i] = L*sin(theta)
         out[1, i] = -L*_t0
@@ -62,9 +56,9 @@ def frame(n, places, speeds, p, out):
         out[4, i] = m*(_t0*g + _t1*v2)
 
 
-@compiled(DRIVE)
-def drive(n, places, speeds, v, nu, p, out):
-    """ds/dtheta, P, Q, n0 and kappa: dV**2/dtheta = P - Q*V**2, N/m = kappa*V**2 + n0; v = sgn(ds/dt), nu = sgn(N)."""
+@compiled(SPEED_EQUATION)
+def speed_equation(n, places, speeds, v, nu, p, out):
+    """ds/dtheta, P, Q, n0, kappa: dV**2/dtheta = P - Q*V**2, N = m*(kappa*V**2 + n0) (paper, eq. 19); v = sgn(ds/dt), nu = sgn(N)."""
     places, p, out = carray(places, n), carray(p, 5), carray(out, (5, n))
     L, mu, g = p[0], p[1], p[3]
     for i in range(n):
@@ -80,8 +74,8 @@ def drive(n, places, speeds, v, nu, p, out):
         out[4, i] = kappa
 
 
-@compiled(HOLD)
-def hold(n, places, p, out):
+@compiled(STATIC_BALANCE)
+def static_balance(n, places, p, out):
     """Acceleration from rest forwards, and backwards: a body rests where the first is <= 0 and the second >= 0."""
     places, p, out = carray(places, n), carray(p, 5), carray(out, (2, n))
     mu_static, g = p[2], p[3]
@@ -93,24 +87,11 @@ def hold(n, places, p, out):
         out[1, i] = mu_static*fabs(n0) + push
 
 
-# The same formulas over a namespace of operations: extended precision evaluates these.
-
+# The same formulas over a namespace of operations, for extended precision.
 
 def exact_domain(op, p):
     """Both ends of the domain, and the period; None where there is none."""
     return None, None, 2*op.pi
-
-
-MODEL = CompiledModel(
-    name='circle_coulomb',
-    parameter='theta',
-    parameters=PARAMETERS,
-    positive=('L',),
-    at_least=(('mu', '0'), ('mu_static', 'mu')),
-    addresses=Addresses(frame.address),
-    domain_of=exact_domain,
-    dissipation=Dissipation(drive.address, hold.address, friction=True, kinked=False, linear=True),
-)
 
 
 def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = None, L: Any = '1', mu: Any = '0.15', mu_static: Any = '0.2', g: Any = '9.81', m: Any = '1') -> Pass1:
@@ -132,7 +113,7 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = 
     Pass1
         Arrays x, z, ds, kappa, v2 and normal_force.
     """
-    return MODEL.pass1(LaunchRequest(lam0, v0, direction), (L, mu, mu_static, g, m,), lam, out)
+    return MODEL.pass1(LaunchRequest(lam0, v0, direction), (L, mu, mu_static, g, m), lam, out)
 
 
 def solve(
@@ -169,7 +150,7 @@ def solve(
     GQMError
         For a launch or a parameter that cannot be; the message says what would be right.
     """
-    return MODEL.solve(LaunchRequest(lam0, v0, direction, point, t_max, contact), (L, mu, mu_static, g, m,))
+    return MODEL.solve(LaunchRequest(lam0, v0, direction, point, t_max, contact), (L, mu, mu_static, g, m))
 
 
 def sweep(
@@ -205,7 +186,19 @@ def sweep(
     Returns
     -------
     Sweep
-        ``values``, NaN where there is none, and ``reasons``, 0 where there is one; ``why()`` counts the others.
+        ``values``, NaN where there is none; ``status``, 0 where there is one, and ``route``, how each was found.
+        ``status_counts()`` counts the launches without a value.
     """
     launches = LaunchRequest(lam0, v0, direction, None, t_max, contact)
-    return MODEL.sweep(quantity, launches, (L, mu, mu_static, g, m,), lam=lam, client=client, source=__file__)
+    return MODEL.sweep(quantity, launches, (L, mu, mu_static, g, m), lam=lam, client=client, source=__file__)
+
+
+MODEL = CompiledModel(
+    name='circle_coulomb', parameter='theta', parameters=PARAMETERS, positive=('L',),
+    at_least=(('mu', '0'), ('mu_static', 'mu')),
+    addresses=Addresses(
+        path_and_contact_force.address,
+    ),
+    domain_of=exact_domain,
+    dissipation=Dissipation(speed_equation.address, static_balance.address, friction=True, kinked=False, linear=True),
+)

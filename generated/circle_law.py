@@ -1,5 +1,5 @@
 # Made by gqm-gen for "circle_law". Do not edit: change its declaration and generate again.
-# interface 8, input ba6587cf83ec, body f470abaf86f0
+# interface 8, input 2718db879066, body 0d177fe17623
 """Pendulum in dense air
 
 x              = L*sin(theta)
@@ -29,30 +29,24 @@ from gqm_sym.runtime import compiler
 compiled = compiler(__file__, interface=8)
 
 from gqm_sym.runtime.vocabulary import (
-    DRIVE, FRAME, HOLD, Addresses, CompiledModel, Dissipation, LaunchRequest, Pass1, cos, sin,
+    PATH_AND_CONTACT_FORCE, SPEED_EQUATION, STATIC_BALANCE, Addresses, CompiledModel, Dissipation, LaunchRequest, Pass1,
+    cos, sin,
 )
 
 if TYPE_CHECKING:
     from gqm_sym.runtime import Motion, Sweep
 
-PARAMETERS = {
-    'L': '1',
-    'c1': '0.05',
-    'c2': '0.01',
-    'g': '9.81',
-    'm': '1',
-}
+PARAMETERS = {'L': '1', 'c1': '0.05', 'c2': '0.01', 'g': '9.81', 'm': '1'}
 
 
-@compiled(FRAME)
-def frame(n, places, speeds, p, out):
-    """x, z, ds/dtheta, signed curvature and contact force, given V**2 (paper, eq. 15)."""
+@compiled(PATH_AND_CONTACT_FORCE)
+def path_and_contact_force(n, places, speeds, p, out):
+    """x, z, ds/dtheta, curvature kappa, contact force N = m*(kappa*V**2 + n0), given V**2 (paper, eqs. 8, 15)."""
     places, speeds, p, out = carray(places, n), carray(speeds, n), carray(p, 5), carray(out, (5, n))
     L, g, m = p[0], p[3], p[4]
     _t1 = 1/L
     for i in range(n):
-        theta = places[i]
-        v2 = speeds[i]
+        theta, v2 = places[i], speeds[i]
         _t0 = cos(theta)
         out[0, i] = L*sin(theta)
         out[1, i] = -L*_t0
@@ -61,14 +55,13 @@ def frame(n, places, speeds, p, out):
         out[4, i] = m*(_t0*g + _t1*v2)
 
 
-@compiled(DRIVE)
-def drive(n, places, speeds, v, nu, p, out):
-    """ds/dtheta, P, Q, n0 and kappa: dV**2/dtheta = P - Q*V**2, linearised at V**2 = w, N/m = kappa*V**2 + n0; v = sgn(ds/dt), nu = sgn(N)."""
+@compiled(SPEED_EQUATION)
+def speed_equation(n, places, speeds, v, nu, p, out):
+    """ds/dtheta, P, Q, n0, kappa: dV**2/dtheta = P - Q*V**2, linearised at V**2 = w, N = m*(kappa*V**2 + n0) (paper, eq. 19); v = sgn(ds/dt), nu = sgn(N)."""
     places, speeds, p, out = carray(places, n), carray(speeds, n), carray(p, 5), carray(out, (5, n))
     L, c1, c2, g = p[0], p[1], p[2], p[3]
     for i in range(n):
-        theta = places[i]
-        w = speeds[i]
+        theta, w = places[i], speeds[i]
         ds = L
         kappa = 1/L
         push = -g*sin(theta)
@@ -84,8 +77,8 @@ def drive(n, places, speeds, v, nu, p, out):
         out[4, i] = kappa
 
 
-@compiled(HOLD)
-def hold(n, places, p, out):
+@compiled(STATIC_BALANCE)
+def static_balance(n, places, p, out):
     """Acceleration from rest forwards, and backwards: a body rests where the first is <= 0 and the second >= 0."""
     places, p, out = carray(places, n), carray(p, 5), carray(out, (2, n))
     g = p[3]
@@ -96,23 +89,11 @@ def hold(n, places, p, out):
         out[1, i] = push
 
 
-# The same formulas over a namespace of operations: extended precision evaluates these.
-
+# The same formulas over a namespace of operations, for extended precision.
 
 def exact_domain(op, p):
     """Both ends of the domain, and the period; None where there is none."""
     return None, None, 2*op.pi
-
-
-MODEL = CompiledModel(
-    name='circle_law',
-    parameter='theta',
-    parameters=PARAMETERS,
-    positive=('L',),
-    addresses=Addresses(frame.address),
-    domain_of=exact_domain,
-    dissipation=Dissipation(drive.address, hold.address, friction=False, kinked=False, linear=False),
-)
 
 
 def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = None, L: Any = '1', c1: Any = '0.05', c2: Any = '0.01', g: Any = '9.81', m: Any = '1') -> Pass1:
@@ -134,7 +115,7 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = 
     Pass1
         Arrays x, z, ds, kappa, v2 and normal_force.
     """
-    return MODEL.pass1(LaunchRequest(lam0, v0, direction), (L, c1, c2, g, m,), lam, out)
+    return MODEL.pass1(LaunchRequest(lam0, v0, direction), (L, c1, c2, g, m), lam, out)
 
 
 def solve(
@@ -171,7 +152,7 @@ def solve(
     GQMError
         For a launch or a parameter that cannot be; the message says what would be right.
     """
-    return MODEL.solve(LaunchRequest(lam0, v0, direction, point, t_max, contact), (L, c1, c2, g, m,))
+    return MODEL.solve(LaunchRequest(lam0, v0, direction, point, t_max, contact), (L, c1, c2, g, m))
 
 
 def sweep(
@@ -207,7 +188,18 @@ def sweep(
     Returns
     -------
     Sweep
-        ``values``, NaN where there is none, and ``reasons``, 0 where there is one; ``why()`` counts the others.
+        ``values``, NaN where there is none; ``status``, 0 where there is one, and ``route``, how each was found.
+        ``status_counts()`` counts the launches without a value.
     """
     launches = LaunchRequest(lam0, v0, direction, None, t_max, contact)
-    return MODEL.sweep(quantity, launches, (L, c1, c2, g, m,), lam=lam, client=client, source=__file__)
+    return MODEL.sweep(quantity, launches, (L, c1, c2, g, m), lam=lam, client=client, source=__file__)
+
+
+MODEL = CompiledModel(
+    name='circle_law', parameter='theta', parameters=PARAMETERS, positive=('L',),
+    addresses=Addresses(
+        path_and_contact_force.address,
+    ),
+    domain_of=exact_domain,
+    dissipation=Dissipation(speed_equation.address, static_balance.address, friction=False, kinked=False, linear=False),
+)

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "circle_rotating". Do not edit: change its declaration and generate again.
-# interface 8, input 4ab613b0cbfb, body 09db83a64659
+# interface 8, input a74aedd594f9, body e24e27887310
 """Bead on a hoop that turns about its vertical diameter
 
 x              = L*sin(theta)
@@ -9,13 +9,13 @@ dx/ds          = cos(theta)
 dz/ds          = sin(theta)
 kappa          = 1/L
 Theta          = -lam0 + theta
-V**2           = -L*(L*Omega**2*sin(lam0)**2 + 2*g*cos(lam0)) + L*(L*Omega**2*sin(theta)**2 + 2*g*cos(theta)) + v0**2
-N              = m*(L*Omega**2*sin(theta)**2 + g*cos(theta) + (-L*(L*Omega**2*sin(lam0)**2 + 2*g*cos(lam0)) + L*(L*Omega**2*sin(theta)**2 + 2*g*cos(theta)) + v0**2)/L)
-N_b            = 2*Omega*direction*m*sqrt(-L*(L*Omega**2*sin(lam0)**2 + 2*g*cos(lam0)) + L*(L*Omega**2*sin(theta)**2 + 2*g*cos(theta)) + v0**2)*cos(theta)
+V**2           = 2*L*(-L*Omega**2*sin(lam0)**2/2 + L*Omega**2*sin(theta)**2/2 - g*cos(lam0) + g*cos(theta)) + v0**2
+N              = m*(L*Omega**2*sin(theta)**2 + g*cos(theta) + (2*L*(-L*Omega**2*sin(lam0)**2/2 + L*Omega**2*sin(theta)**2/2 - g*cos(lam0) + g*cos(theta)) + v0**2)/L)
+N_b            = 2*Omega*direction*m*sqrt(2*L*(-L*Omega**2*sin(lam0)**2/2 + L*Omega**2*sin(theta)**2/2 - g*cos(lam0) + g*cos(theta)) + v0**2)*cos(theta)
 A              = -(-L*Omega**2*cos(theta) + g)*sin(theta)
-dt/dtheta      = L/sqrt(-L*(L*Omega**2*sin(lam0)**2 + 2*g*cos(lam0)) + L*(L*Omega**2*sin(theta)**2 + 2*g*cos(theta)) + v0**2)
-turning points : -L*(L*Omega**2*sin(lam0)**2 + 2*g*cos(lam0)) + L*(L*Omega**2*sin(theta)**2 + 2*g*cos(theta)) + v0**2 = 0
-liftoff        : L*Omega**2*sin(theta)**2 + g*cos(theta) + (-L*(L*Omega**2*sin(lam0)**2 + 2*g*cos(lam0)) + L*(L*Omega**2*sin(theta)**2 + 2*g*cos(theta)) + v0**2)/L = 0
+dt/dtheta      = L/sqrt(2*L*(-L*Omega**2*sin(lam0)**2/2 + L*Omega**2*sin(theta)**2/2 - g*cos(lam0) + g*cos(theta)) + v0**2)
+turning points : 2*L*(-L*Omega**2*sin(lam0)**2/2 + L*Omega**2*sin(theta)**2/2 - g*cos(lam0) + g*cos(theta)) + v0**2 = 0
+liftoff        : L*Omega**2*sin(theta)**2 + g*cos(theta) + (2*L*(-L*Omega**2*sin(lam0)**2/2 + L*Omega**2*sin(theta)**2/2 - g*cos(lam0) + g*cos(theta)) + v0**2)/L = 0
 """
 
 from math import fabs
@@ -29,31 +29,27 @@ from gqm_sym.runtime import compiler
 compiled = compiler(__file__, interface=8)
 
 from gqm_sym.runtime.vocabulary import (
-    BEND, BEND_EACH, BOUNDS, BOUNDS_EACH, CLIMB, FRAME, LOADS, ORBIT_EACH, RISE, RISE_EACH, SWING_EACH, TOP_EACH,
-    Addresses, CompiledModel, Each, ExactFormulas, LaunchRequest, Pass1, cos, cos1, cos2, iadd, iconst, icos, imul,
-    ipow, isin, left_of, near_even, near_odd, near_sinc, nearest, sin, sin1, sin2,
+    BOUNDS, BOUNDS_BATCH, EFFECTIVE_POTENTIAL, INTEGRAND_INVARIANTS_BATCH, LOAD_MAP, ORBIT_INVARIANTS_BATCH,
+    PATH_AND_CONTACT_FORCE, POTENTIAL_DIVDIFF1, POTENTIAL_DIVDIFF1_BATCH, POTENTIAL_DIVDIFF2, POTENTIAL_DIVDIFF2_BATCH,
+    TIME_INTEGRAND_BATCH, Addresses, BatchFunctions, CompiledModel, ExactFormulas, LaunchRequest, Pass1, cos,
+    divdiff1_cos, divdiff1_cos_in_square, divdiff1_sin, divdiff1_sinc_in_square, divdiff2_cos, divdiff2_sin, iadd,
+    iconst, icos, imul, ipow, isin, place_from_ends, sin, sinc_near, speed_squared_from_potential,
 )
 
 if TYPE_CHECKING:
     from gqm_sym.runtime import Motion, Sweep
 
-PARAMETERS = {
-    'L': '1',
-    'Omega': '4',
-    'g': '9.81',
-    'm': '1',
-}
+PARAMETERS = {'L': '1', 'Omega': '4', 'g': '9.81', 'm': '1'}
 
 
-@compiled(FRAME)
-def frame(n, places, speeds, p, out):
-    """x, z, ds/dtheta, signed curvature and contact force, given V**2 (paper, eq. 15)."""
+@compiled(PATH_AND_CONTACT_FORCE)
+def path_and_contact_force(n, places, speeds, p, out):
+    """x, z, ds/dtheta, curvature kappa, contact force N = m*(kappa*V**2 + n0), given V**2 (paper, eqs. 8, 15)."""
     places, speeds, p, out = carray(places, n), carray(speeds, n), carray(p, 4), carray(out, (5, n))
     L, Omega, g, m = p[0], p[1], p[2], p[3]
     _t2 = 1/L
     for i in range(n):
-        theta = places[i]
-        v2 = speeds[i]
+        theta, v2 = places[i], speeds[i]
         _t0 = sin(theta)
         _t1 = cos(theta)
         out[0, i] = L*_t0
@@ -63,34 +59,9 @@ def frame(n, places, speeds, p, out):
         out[4, i] = m*(L*Omega**2*_t0**2 + _t1*g + _t2*v2)
 
 
-@compiled(LOADS, later=True)
-def loads(n, w0, level, places, p, out):
-    """x, z, ds/dtheta, signed curvature, V**2, contact force (paper, eq. 15), and the size of the heights in V**2."""
-    places, p, out = carray(places, n), carray(p, 4), carray(out, (7, n))
-    L, Omega, g, m = p[0], p[1], p[2], p[3]
-    _t2 = 1/L
-    _c0 = fabs(L)
-    _c1 = fabs(g)
-    for i in range(n):
-        theta = places[i]
-        _t0 = sin(theta)
-        _t1 = cos(theta)
-        _t3 = _t1*g
-        _t4 = Omega**2*_t0**2
-        _t5 = L*_t4
-        _t6 = left_of(w0, -L*(2*_t3 + _t5), level)
-        out[0, i] = L*_t0
-        out[1, i] = -L*_t1
-        out[2, i] = L
-        out[3, i] = _t2
-        out[4, i] = _t6
-        out[5, i] = m*(_t2*_t6 + _t3 + _t5)
-        out[6, i] = _c0*(_c0*_t4 + 2*_c1*fabs(_t1))
-
-
-@compiled(CLIMB)
-def climb(n, places, p, out):
-    """What V**2 loses in climbing to theta, up to a constant, and its derivative (paper, eq. 13)."""
+@compiled(EFFECTIVE_POTENTIAL)
+def effective_potential(n, places, p, out):
+    """U per unit mass, V**2 = v0**2 - 2*(U(theta) - U(lam0)), and dU/dtheta (paper, eq. 13)."""
     places, p, out = carray(places, n), carray(p, 4), carray(out, (2, n))
     L, Omega, g = p[0], p[1], p[2]
     _t2 = L*Omega**2
@@ -98,237 +69,90 @@ def climb(n, places, p, out):
         theta = places[i]
         _t0 = cos(theta)
         _t1 = sin(theta)
-        out[0, i] = -L*(2*_t0*g + _t1**2*_t2)
-        out[1, i] = 2*L*_t1*(-_t0*_t2 + g)
+        out[0, i] = -L*(_t0*g + _t1**2*_t2/2)
+        out[1, i] = L*_t1*(-_t0*_t2 + g)
 
 
-@compiled(RISE)
-def rise(n, a, places, offsets, p, out):
-    """climb[a, theta] = (climb(theta) - climb(a))/(theta - a) without cancellation, and ds/dtheta."""
+@compiled(POTENTIAL_DIVDIFF1)
+def potential_divdiff1(n, a, places, offsets, p, out):
+    """U[a, theta] = (U(theta) - U(a))/(theta - a) without cancellation, and ds/dtheta (MATHS, s. 3)."""
     places, offsets, p, out = carray(places, n), carray(offsets, n), carray(p, 4), carray(out, (2, n))
     L, Omega, g = p[0], p[1], p[2]
     _c0 = sin(a)
     for i in range(n):
-        theta = places[i]
-        d = offsets[i]
-        out[0, i] = -L*(L*Omega**2*(_c0 + sin(theta))*sin1(a, theta, d) + 2*g*cos1(a, theta, d))
+        theta, d = places[i], offsets[i]
+        out[0, i] = -L*(L*Omega**2*(_c0 + sin(theta))*divdiff1_sin(a, theta, d)/2 + g*divdiff1_cos(a, theta, d))
         out[1, i] = L
 
 
-@compiled(BEND)
-def bend(n, a, b, left, right, p, out):
-    """climb[a, theta, b] = V**2/((theta - a)*(b - theta)) between turning points, without cancellation, and ds/dtheta."""
+@compiled(POTENTIAL_DIVDIFF2)
+def potential_divdiff2(n, a, b, left, right, p, out):
+    """U[a, theta, b] = V**2/(2*(theta - a)*(b - theta)) from turn a to turn b, and ds/dtheta (MATHS, s. 3)."""
     left, right, p, out = carray(left, n), carray(right, n), carray(p, 4), carray(out, (2, n))
     L, Omega, g = p[0], p[1], p[2]
     _c0 = sin(b)
-    _c1 = sin1(a, b, -a + b)
+    _c1 = divdiff1_sin(a, b, -a + b)
     for i in range(n):
-        da = left[i]
-        db = right[i]
-        theta = nearest(a, b, da, db)
-        out[0, i] = -L*(L*Omega**2*(_c1*sin1(a, theta, da) + (_c0 + sin(theta))*sin2(a, theta, b, da, db)) + 2*g*cos2(a, theta, b, da, db))
+        da, db = left[i], right[i]
+        theta = place_from_ends(a, b, da, db)
+        out[0, i] = -L*(L*Omega**2*(_c1*divdiff1_sin(a, theta, da) + (_c0 + sin(theta))*divdiff2_sin(a, theta, b, da, db))/2 + g*divdiff2_cos(a, theta, b, da, db))
         out[1, i] = L
-
-
-@compiled(RISE_EACH, later=True)
-def rise_each(n, starts, places, offsets, p, out):
-    """climb[a, theta], ds/dtheta and the climb's derivative, each for a launch of its own."""
-    starts, places, offsets, p, out = carray(starts, n), carray(places, n), carray(offsets, n), carray(p, (4, n)), carray(out, (3, n))
-    for i in range(n):
-        L = p[0, i]
-        Omega = p[1, i]
-        g = p[2, i]
-        a = starts[i]
-        theta = places[i]
-        d = offsets[i]
-        _t0 = sin(theta)
-        _t1 = L*Omega**2
-        out[0, i] = -L*(_t1*(_t0 + sin(a))*sin1(a, theta, d) + 2*g*cos1(a, theta, d))
-        out[1, i] = L
-        out[2, i] = 2*L*_t0*(-_t1*cos(theta) + g)
-
-
-@compiled(BEND_EACH, later=True)
-def bend_each(n, lows, highs, left, right, p, out):
-    """climb[a, theta, b] and ds/dtheta, each for an orbit of its own; NaN where the closed form ends."""
-    lows, highs, left, right, p, out = carray(lows, n), carray(highs, n), carray(left, n), carray(right, n), carray(p, (10, n)), carray(out, (2, n))
-    for i in range(n):
-        L = p[0, i]
-        Omega = p[1, i]
-        g = p[2, i]
-        _c0 = p[4, i]
-        _c1 = p[5, i]
-        _c2 = p[6, i]
-        _c3 = p[7, i]
-        _c4 = p[8, i]
-        _c5 = p[9, i]
-        a = lows[i]
-        b = highs[i]
-        da = left[i]
-        db = right[i]
-        theta = nearest(a, b, da, db)
-        _t0 = near_even(da, db)
-        _t1 = da/2 - db/2
-        _t2 = _t1*near_odd(da, db)
-        _t3 = da*db
-        out[0, i] = -L*(L*Omega**2*(_c2*sin1(a, theta, da) + (_c3*_t0 + _c5*_t2)*(_c0 + _c3*(_c4 - _t0*_t3) + _c5*(_c1*_t1 - _t2*_t3))) + 2*g*(-_c3*_t2 + _c5*_t0))
-        out[1, i] = L
-
-
-@compiled(ORBIT_EACH, later=True)
-def orbit_each(n, lows, highs, p, out):
-    """What is the same all along an orbit: ``bend_each`` finds it behind the run-time parameters."""
-    lows, highs, p, out = carray(lows, n), carray(highs, n), carray(p, (4, n)), carray(out, (6, n))
-    for i in range(n):
-        a = lows[i]
-        b = highs[i]
-        _t0 = a/2
-        _t1 = _t0 - b/2
-        _t2 = _t0 + b/2
-        out[0, i] = sin(b)
-        out[1, i] = near_sinc(-_t1)
-        out[2, i] = sin1(a, b, -a + b)
-        out[3, i] = sin(_t2)
-        out[4, i] = cos(_t1)
-        out[5, i] = cos(_t2)
-
-
-@compiled(SWING_EACH, later=True)
-def swing_each(n, fall, rise, p, out):
-    """(dt/du)**2 where sin(u)**2 = fall = 1 - rise, and what that is divided by, each for an orbit of its own."""
-    p, out = carray(p, (8, n)), carray(out, (2, n))
-    for i in range(n):
-        L = p[0, i]
-        Omega = p[1, i]
-        g = p[2, i]
-        top = p[4, i]
-        top_apart = p[5, i]
-        top_sine = p[6, i]
-        stretch = p[7, i]
-        _t0 = fall*top
-        _t1 = (_t0 + 1)**2
-        _t2 = fall*top_apart + rise
-        _t3 = Omega**2
-        _t4 = L*_t3
-        _t5 = L*_t1*_t3 - 4*_t0*_t4 - _t1*_t4*top_sine - _t1*g
-        out[0, i] = -L*_t1/(_t2*_t5*stretch)
-        out[1, i] = -4*L*_t2*_t5/_t1
-
-
-@compiled(TOP_EACH, later=True)
-def top_each(n, halves, p, out):
-    """What is the same all along a swing: ``swing_each`` finds it behind the run-time parameters."""
-    halves, p, out = carray(halves, n), carray(p, (4, n)), carray(out, (4, n))
-    for i in range(n):
-        half = halves[i]
-        _t0 = half/4
-        _t1 = cos(_t0)
-        _t2 = half/2
-        _t3 = _t1**4
-        out[0, i] = sin(_t0)**2/_t1**2
-        out[1, i] = cos(_t2)/_t3
-        out[2, i] = sin(_t2)**2
-        out[3, i] = _t3
 
 
 @compiled(BOUNDS)
 def bounds(lo, hi, p, out):
-    """Bounds of the climb's slope and of ds/dtheta for lo <= theta <= hi."""
+    """Bounds of dU/dtheta and ds/dtheta for lo <= theta <= hi, by interval arithmetic."""
     p, out = carray(p, 4), carray(out, 4)
     theta = (lo, hi)
-    L = (p[0], p[0])
-    Omega = (p[1], p[1])
-    g = (p[2], p[2])
-    out[0], out[1] = imul(imul(imul(iconst(2.0), L), iadd(imul(imul(imul(iconst(-1.0), L), ipow(Omega, 2)), icos(theta)), g)), isin(theta))
+    L, Omega, g = (p[0], p[0]), (p[1], p[1]), (p[2], p[2])
+    out[0], out[1] = imul(imul(L, iadd(imul(imul(imul(iconst(-1.0), L), ipow(Omega, 2)), icos(theta)), g)), isin(theta))
     out[2], out[3] = L
 
 
-@compiled(BOUNDS_EACH, later=True)
-def bounds_each(n, lo, hi, p, out):
-    """Bounds over many intervals of the climb's slope and of ds/dtheta for lo <= theta <= hi, each for parameters of its own."""
-    lo, hi, p, out = carray(lo, n), carray(hi, n), carray(p, (4, n)), carray(out, (4, n))
-    for i in range(n):
-        theta = (lo[i], hi[i])
-        L = (p[0, i], p[0, i])
-        Omega = (p[1, i], p[1, i])
-        g = (p[2, i], p[2, i])
-        out[0, i], out[1, i] = imul(imul(imul(iconst(2.0), L), iadd(imul(imul(imul(iconst(-1.0), L), ipow(Omega, 2)), icos(theta)), g)), isin(theta))
-        out[2, i], out[3, i] = L
-
-
-# The same formulas over a namespace of operations: extended precision evaluates these.
-
+# The same formulas over a namespace of operations, for extended precision.
 
 def exact_x(op, theta, p):
     """Horizontal coordinate."""
     L = p[0]
     return L*op.sin(theta)
 
-
 def exact_z(op, theta, p):
     """Height."""
     L = p[0]
     return -L*op.cos(theta)
-
 
 def exact_ds(op, theta, p):
     """ds/dtheta."""
     L = p[0]
     return L
 
-
 def exact_kappa(op, theta, p):
-    """Signed curvature."""
+    """Signed curvature (paper, eq. 8)."""
     L = p[0]
     return 1/L
 
-
-def exact_reaction(op, theta, p):
-    """Contact force per unit mass of a body at rest."""
-    L = p[0]
-    Omega = p[1]
-    g = p[2]
+def exact_static_normal_load(op, theta, p):
+    """n0 = N/m of a body at rest, so that N = m*(kappa*V**2 + n0) (paper, eq. 15)."""
+    L, Omega, g = p[0], p[1], p[2]
     return L*Omega**2*op.sin(theta)**2 + g*op.cos(theta)
 
+def exact_effective_potential(op, theta, p):
+    """U, so that V**2 + 2*U is constant (paper, eq. 13)."""
+    L, Omega, g = p[0], p[1], p[2]
+    return -L*(L*Omega**2*op.sin(theta)**2/2 + g*op.cos(theta))
 
-def exact_climb(op, theta, p):
-    """What V**2 loses in climbing, up to a constant."""
-    L = p[0]
-    Omega = p[1]
-    g = p[2]
-    return -L*(L*Omega**2*op.sin(theta)**2 + 2*g*op.cos(theta))
-
-
-def exact_climb_slope(op, theta, p):
-    """Its derivative by theta."""
-    L = p[0]
-    Omega = p[1]
-    g = p[2]
-    return 2*L*(-L*Omega**2*op.cos(theta) + g)*op.sin(theta)
-
+def exact_effective_potential_slope(op, theta, p):
+    """dU/dtheta."""
+    L, Omega, g = p[0], p[1], p[2]
+    return L*(-L*Omega**2*op.cos(theta) + g)*op.sin(theta)
 
 def exact_domain(op, p):
     """Both ends of the domain, and the period; None where there is none."""
     return None, None, 2*op.pi
 
-
 def exact_axes(op, p):
     """A place about which V**2 and ds are even, and the distance to the next; None where there is none."""
     return 0, op.pi
-
-
-MODEL = CompiledModel(
-    name='circle_rotating',
-    parameter='theta',
-    parameters=PARAMETERS,
-    positive=('L',),
-    addresses=Addresses(frame.address, climb.address, rise.address, bend.address, bounds.address),
-    loads=loads,
-    each=Each(rise=rise_each, bend=bend_each, orbit=orbit_each, swing=swing_each, top=top_each, bounds=bounds_each, held=6, top_held=4),
-    domain_of=exact_domain,
-    axes_of=exact_axes,
-    exact=ExactFormulas(exact_x, exact_z, exact_ds, exact_kappa, exact_reaction, exact_climb, exact_climb_slope),
-)
 
 
 def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = None, L: Any = '1', Omega: Any = '4', g: Any = '9.81', m: Any = '1') -> Pass1:
@@ -350,7 +174,7 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = 
     Pass1
         Arrays x, z, ds, kappa, v2 and normal_force.
     """
-    return MODEL.pass1(LaunchRequest(lam0, v0, direction), (L, Omega, g, m,), lam, out)
+    return MODEL.pass1(LaunchRequest(lam0, v0, direction), (L, Omega, g, m), lam, out)
 
 
 def solve(
@@ -387,7 +211,7 @@ def solve(
     GQMError
         For a launch or a parameter that cannot be; the message says what would be right.
     """
-    return MODEL.solve(LaunchRequest(lam0, v0, direction, point, t_max, contact), (L, Omega, g, m,))
+    return MODEL.solve(LaunchRequest(lam0, v0, direction, point, t_max, contact), (L, Omega, g, m))
 
 
 def sweep(
@@ -423,7 +247,145 @@ def sweep(
     Returns
     -------
     Sweep
-        ``values``, NaN where there is none, and ``reasons``, 0 where there is one; ``why()`` counts the others.
+        ``values``, NaN where there is none; ``status``, 0 where there is one, and ``route``, how each was found.
+        ``status_counts()`` counts the launches without a value.
     """
     launches = LaunchRequest(lam0, v0, direction, None, t_max, contact)
-    return MODEL.sweep(quantity, launches, (L, Omega, g, m,), lam=lam, client=client, source=__file__)
+    return MODEL.sweep(quantity, launches, (L, Omega, g, m), lam=lam, client=client, source=__file__)
+
+
+# ---- The same formulas once more, only for speed: a load map in one call, and many orbits at once for sweeps. ----
+
+
+@compiled(LOAD_MAP, later=True)
+def load_map(n, w0, level, places, p, out):
+    """x, z, ds/dtheta, kappa, V**2 = w0 - 2*(U - level), N (paper, eqs. 8, 13, 15), size of U's terms."""
+    places, p, out = carray(places, n), carray(p, 4), carray(out, (7, n))
+    L, Omega, g, m = p[0], p[1], p[2], p[3]
+    _t2 = 1/L
+    _c0 = fabs(L)
+    _c1 = fabs(g)
+    for i in range(n):
+        theta = places[i]
+        _t0 = sin(theta)
+        _t1 = cos(theta)
+        _t3 = _t1*g
+        _t4 = Omega**2*_t0**2
+        _t5 = L*_t4
+        _t6 = speed_squared_from_potential(w0, -L*(_t3 + _t5/2), level)
+        out[0, i] = L*_t0
+        out[1, i] = -L*_t1
+        out[2, i] = L
+        out[3, i] = _t2
+        out[4, i] = _t6
+        out[5, i] = m*(_t2*_t6 + _t3 + _t5)
+        out[6, i] = _c0*(_c0*_t4/2 + _c1*fabs(_t1))
+
+
+@compiled(POTENTIAL_DIVDIFF1_BATCH, later=True)
+def potential_divdiff1_batch(n, starts, places, offsets, p, out):
+    """U[a, theta], ds/dtheta and dU/dtheta."""
+    starts, places, offsets, p, out = carray(starts, n), carray(places, n), carray(offsets, n), carray(p, (4, n)), carray(out, (3, n))
+    for i in range(n):
+        L, Omega, g, a, theta, d = p[0, i], p[1, i], p[2, i], starts[i], places[i], offsets[i]
+        _t0 = sin(theta)
+        _t1 = L*Omega**2
+        out[0, i] = -L*(_t1*(_t0 + sin(a))*divdiff1_sin(a, theta, d)/2 + g*divdiff1_cos(a, theta, d))
+        out[1, i] = L
+        out[2, i] = L*_t0*(-_t1*cos(theta) + g)
+
+
+@compiled(POTENTIAL_DIVDIFF2_BATCH, later=True)
+def potential_divdiff2_batch(n, lows, highs, left, right, p, out):
+    """U[a, theta, b] and ds/dtheta; NaN where the points lie too far apart for the closed form."""
+    lows, highs, left, right, p, out = carray(lows, n), carray(highs, n), carray(left, n), carray(right, n), carray(p, (10, n)), carray(out, (2, n))
+    for i in range(n):
+        L, Omega, g, _c0, _c1, _c2, _c3, _c4 = p[0, i], p[1, i], p[2, i], p[4, i], p[5, i], p[6, i], p[7, i], p[8, i]
+        _c5, a, b, da, db = p[9, i], lows[i], highs[i], left[i], right[i]
+        theta = place_from_ends(a, b, da, db)
+        _t0 = divdiff1_cos_in_square(da, db)
+        _t1 = da/2 - db/2
+        _t2 = _t1*divdiff1_sinc_in_square(da, db)
+        _t3 = da*db
+        out[0, i] = -L*(L*Omega**2*(_c1*divdiff1_sin(a, theta, da) + (_c3*_t0 + _c5*_t2)*(_c0 + _c3*(_c4 - _t0*_t3) + _c5*(_c2*_t1 - _t2*_t3)))/2 + g*(-_c3*_t2 + _c5*_t0))
+        out[1, i] = L
+
+
+@compiled(ORBIT_INVARIANTS_BATCH, later=True)
+def orbit_invariants_batch(n, lows, highs, p, out):
+    """Terms that are constant along an orbit: ``potential_divdiff2_batch`` reads them behind the parameters."""
+    lows, highs, p, out = carray(lows, n), carray(highs, n), carray(p, (4, n)), carray(out, (6, n))
+    for i in range(n):
+        a, b = lows[i], highs[i]
+        _t0 = a/2
+        _t1 = _t0 - b/2
+        _t2 = _t0 + b/2
+        out[0, i] = sin(b)
+        out[1, i] = divdiff1_sin(a, b, -a + b)
+        out[2, i] = sinc_near(-_t1)
+        out[3, i] = sin(_t2)
+        out[4, i] = cos(_t1)
+        out[5, i] = cos(_t2)
+
+
+@compiled(TIME_INTEGRAND_BATCH, later=True)
+def time_integrand_batch(n, fall, rise, p, out):
+    """(dt/du)**2 at sin(u)**2 = fall = 1 - rise, and its divisor; dt/du integrates to the half period (eq. 17)."""
+    p, out = carray(p, (8, n)), carray(out, (2, n))
+    for i in range(n):
+        L, Omega, g, top, top_apart, top_sine, stretch = p[0, i], p[1, i], p[2, i], p[4, i], p[5, i], p[6, i], p[7, i]
+        _t0 = fall*top
+        _t1 = (_t0 + 1)**2
+        _t2 = fall*top_apart + rise
+        _t3 = Omega**2
+        _t4 = L*_t3
+        _t5 = L*_t1*_t3 - 4*_t0*_t4 - _t1*_t4*top_sine - _t1*g
+        out[0, i] = -L*_t1/(_t2*_t5*stretch)
+        out[1, i] = -4*L*_t2*_t5/_t1
+
+
+@compiled(INTEGRAND_INVARIANTS_BATCH, later=True)
+def integrand_invariants_batch(n, halves, p, out):
+    """Terms that are constant along an orbit: ``time_integrand_batch`` reads them behind the parameters."""
+    halves, p, out = carray(halves, n), carray(p, (4, n)), carray(out, (4, n))
+    for i in range(n):
+        half = halves[i]
+        _t0 = half/4
+        _t1 = cos(_t0)
+        _t2 = half/2
+        _t3 = _t1**4
+        out[0, i] = sin(_t0)**2/_t1**2
+        out[1, i] = cos(_t2)/_t3
+        out[2, i] = sin(_t2)**2
+        out[3, i] = _t3
+
+
+@compiled(BOUNDS_BATCH, later=True)
+def bounds_batch(n, lo, hi, p, out):
+    """Bounds of dU/dtheta and ds/dtheta for lo <= theta <= hi."""
+    lo, hi, p, out = carray(lo, n), carray(hi, n), carray(p, (4, n)), carray(out, (4, n))
+    for i in range(n):
+        theta = (lo[i], hi[i])
+        L, Omega, g = (p[0, i], p[0, i]), (p[1, i], p[1, i]), (p[2, i], p[2, i])
+        out[0, i], out[1, i] = imul(imul(L, iadd(imul(imul(imul(iconst(-1.0), L), ipow(Omega, 2)), icos(theta)), g)), isin(theta))
+        out[2, i], out[3, i] = L
+
+
+MODEL = CompiledModel(
+    name='circle_rotating', parameter='theta', parameters=PARAMETERS, positive=('L',),
+    addresses=Addresses(
+        path_and_contact_force.address, effective_potential.address, potential_divdiff1.address,
+        potential_divdiff2.address, bounds.address,
+    ),
+    load_map=load_map,
+    batch=BatchFunctions(
+        potential_divdiff1=potential_divdiff1_batch, potential_divdiff2=potential_divdiff2_batch,
+        orbit_invariants=orbit_invariants_batch, time_integrand=time_integrand_batch,
+        integrand_invariants=integrand_invariants_batch, bounds=bounds_batch, orbit_rows=6, integrand_rows=4,
+    ),
+    domain_of=exact_domain, axes_of=exact_axes,
+    exact=ExactFormulas(
+        exact_x, exact_z, exact_ds, exact_kappa, exact_static_normal_load, exact_effective_potential,
+        exact_effective_potential_slope,
+    ),
+)

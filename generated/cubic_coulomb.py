@@ -1,5 +1,5 @@
 # Made by gqm-gen for "cubic_coulomb". Do not edit: change its declaration and generate again.
-# interface 8, input 366f93db8ec9, body cdc74845cf43
+# interface 8, input f472752dd3ba, body 42262cabc6e8
 """Cubic track with Coulomb friction
 
 x              = x
@@ -30,27 +30,22 @@ from gqm_sym.runtime import compiler
 compiled = compiler(__file__, interface=8)
 
 from gqm_sym.runtime.vocabulary import (
-    DRIVE, FRAME, HOLD, Addresses, CompiledModel, Dissipation, LaunchRequest, Pass1,
+    PATH_AND_CONTACT_FORCE, SPEED_EQUATION, STATIC_BALANCE, Addresses, CompiledModel, Dissipation, LaunchRequest, Pass1,
 )
 
 if TYPE_CHECKING:
     from gqm_sym.runtime import Motion, Sweep
 
-PARAMETERS = {
-    'mu': '0.1',
-    'g': '9.81',
-    'm': '1',
-}
+PARAMETERS = {'mu': '0.1', 'g': '9.81', 'm': '1'}
 
 
-@compiled(FRAME)
-def frame(n, places, speeds, p, out):
-    """x, z, ds/dx, signed curvature and contact force, given V**2 (paper, eq. 15)."""
+@compiled(PATH_AND_CONTACT_FORCE)
+def path_and_contact_force(n, places, speeds, p, out):
+    """x, z, ds/dx, curvature kappa, contact force N = m*(kappa*V**2 + n0), given V**2 (paper, eqs. 8, 15)."""
     places, speeds, p, out = carray(places, n), carray(speeds, n), carray(p, 3), carray(out, (5, n))
     g, m = p[1], p[2]
     for i in range(n):
-        x = places[i]
-        v2 = speeds[i]
+        x, v2 = places[i], speeds[i]
         _t0 = 9*x**4 + 1
         _t1 = sqrt(_t0)
         _t2 = 6*x/sqrt(_t0)**3
@@ -61,9 +56,9 @@ def frame(n, places, speeds, p, out):
         out[4, i] = m*(_t2*v2 + g/_t1)
 
 
-@compiled(DRIVE)
-def drive(n, places, speeds, v, nu, p, out):
-    """ds/dx, P, Q, n0 and kappa: dV**2/dx = P - Q*V**2, N/m = kappa*V**2 + n0; v = sgn(ds/dt), nu = sgn(N)."""
+@compiled(SPEED_EQUATION)
+def speed_equation(n, places, speeds, v, nu, p, out):
+    """ds/dx, P, Q, n0, kappa: dV**2/dx = P - Q*V**2, N = m*(kappa*V**2 + n0) (paper, eq. 19); v = sgn(ds/dt), nu = sgn(N)."""
     places, p, out = carray(places, n), carray(p, 3), carray(out, (5, n))
     mu, g = p[0], p[1]
     for i in range(n):
@@ -83,8 +78,8 @@ def drive(n, places, speeds, v, nu, p, out):
         out[4, i] = kappa
 
 
-@compiled(HOLD)
-def hold(n, places, p, out):
+@compiled(STATIC_BALANCE)
+def static_balance(n, places, p, out):
     """Acceleration from rest forwards, and backwards: a body rests where the first is <= 0 and the second >= 0."""
     places, p, out = carray(places, n), carray(p, 3), carray(out, (2, n))
     mu, g = p[0], p[1]
@@ -97,24 +92,11 @@ def hold(n, places, p, out):
         out[1, i] = mu*fabs(n0) + push
 
 
-# The same formulas over a namespace of operations: extended precision evaluates these.
-
+# The same formulas over a namespace of operations, for extended precision.
 
 def exact_domain(op, p):
     """Both ends of the domain, and the period; None where there is none."""
     return None, None, None
-
-
-MODEL = CompiledModel(
-    name='cubic_coulomb',
-    parameter='x',
-    parameters=PARAMETERS,
-    positive=(),
-    at_least=(('mu', '0'),),
-    addresses=Addresses(frame.address),
-    domain_of=exact_domain,
-    dissipation=Dissipation(drive.address, hold.address, friction=True, kinked=False, linear=True),
-)
 
 
 def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = None, mu: Any = '0.1', g: Any = '9.81', m: Any = '1') -> Pass1:
@@ -136,7 +118,7 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = 
     Pass1
         Arrays x, z, ds, kappa, v2 and normal_force.
     """
-    return MODEL.pass1(LaunchRequest(lam0, v0, direction), (mu, g, m,), lam, out)
+    return MODEL.pass1(LaunchRequest(lam0, v0, direction), (mu, g, m), lam, out)
 
 
 def solve(
@@ -173,7 +155,7 @@ def solve(
     GQMError
         For a launch or a parameter that cannot be; the message says what would be right.
     """
-    return MODEL.solve(LaunchRequest(lam0, v0, direction, point, t_max, contact), (mu, g, m,))
+    return MODEL.solve(LaunchRequest(lam0, v0, direction, point, t_max, contact), (mu, g, m))
 
 
 def sweep(
@@ -209,7 +191,19 @@ def sweep(
     Returns
     -------
     Sweep
-        ``values``, NaN where there is none, and ``reasons``, 0 where there is one; ``why()`` counts the others.
+        ``values``, NaN where there is none; ``status``, 0 where there is one, and ``route``, how each was found.
+        ``status_counts()`` counts the launches without a value.
     """
     launches = LaunchRequest(lam0, v0, direction, None, t_max, contact)
-    return MODEL.sweep(quantity, launches, (mu, g, m,), lam=lam, client=client, source=__file__)
+    return MODEL.sweep(quantity, launches, (mu, g, m), lam=lam, client=client, source=__file__)
+
+
+MODEL = CompiledModel(
+    name='cubic_coulomb', parameter='x', parameters=PARAMETERS, positive=(),
+    at_least=(('mu', '0'),),
+    addresses=Addresses(
+        path_and_contact_force.address,
+    ),
+    domain_of=exact_domain,
+    dissipation=Dissipation(speed_equation.address, static_balance.address, friction=True, kinked=False, linear=True),
+)

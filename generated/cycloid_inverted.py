@@ -1,5 +1,5 @@
 # Made by gqm-gen for "cycloid_inverted". Do not edit: change its declaration and generate again.
-# interface 8, input 2cc87984e0a0, body 3bba90c4e3d1
+# interface 8, input 01e055bdd46f, body f0156977fd9e
 """Bead in an inverted cycloid
 
 x              = R*(theta - sin(theta))
@@ -28,29 +28,26 @@ from gqm_sym.runtime import compiler
 compiled = compiler(__file__, interface=8)
 
 from gqm_sym.runtime.vocabulary import (
-    BEND, BEND_EACH, BOUNDS, BOUNDS_EACH, CLIMB, FRAME, LOADS, ORBIT_EACH, RISE, RISE_EACH, Addresses, CompiledModel,
-    Each, ExactFormulas, LaunchRequest, Pass1, cos, cos1, cos2, iconst, icos, idiv, imul, isin, left_of, near_even,
-    near_odd, nearest, sin,
+    BOUNDS, BOUNDS_BATCH, EFFECTIVE_POTENTIAL, LOAD_MAP, ORBIT_INVARIANTS_BATCH, PATH_AND_CONTACT_FORCE,
+    POTENTIAL_DIVDIFF1, POTENTIAL_DIVDIFF1_BATCH, POTENTIAL_DIVDIFF2, POTENTIAL_DIVDIFF2_BATCH, Addresses,
+    BatchFunctions, CompiledModel, ExactFormulas, LaunchRequest, Pass1, cos, divdiff1_cos, divdiff1_cos_in_square,
+    divdiff1_sinc_in_square, divdiff2_cos, iconst, icos, idiv, imul, isin, place_from_ends, sin,
+    speed_squared_from_potential,
 )
 
 if TYPE_CHECKING:
     from gqm_sym.runtime import Motion, Sweep
 
-PARAMETERS = {
-    'R': '0.5',
-    'g': '9.81',
-    'm': '1',
-}
+PARAMETERS = {'R': '0.5', 'g': '9.81', 'm': '1'}
 
 
-@compiled(FRAME)
-def frame(n, places, speeds, p, out):
-    """x, z, ds/dtheta, signed curvature and contact force, given V**2 (paper, eq. 15)."""
+@compiled(PATH_AND_CONTACT_FORCE)
+def path_and_contact_force(n, places, speeds, p, out):
+    """x, z, ds/dtheta, curvature kappa, contact force N = m*(kappa*V**2 + n0), given V**2 (paper, eqs. 8, 15)."""
     places, speeds, p, out = carray(places, n), carray(speeds, n), carray(p, 3), carray(out, (5, n))
     R, g, m = p[0], p[1], p[2]
     for i in range(n):
-        theta = places[i]
-        v2 = speeds[i]
+        theta, v2 = places[i], speeds[i]
         _t0 = sin(theta/2)
         _t1 = 1/(4*R*_t0)
         out[0, i] = R*(theta - sin(theta))
@@ -60,215 +57,99 @@ def frame(n, places, speeds, p, out):
         out[4, i] = m*(_t0*g + _t1*v2)
 
 
-@compiled(LOADS, later=True)
-def loads(n, w0, level, places, p, out):
-    """x, z, ds/dtheta, signed curvature, V**2, contact force (paper, eq. 15), and the size of the heights in V**2."""
-    places, p, out = carray(places, n), carray(p, 3), carray(out, (7, n))
-    R, g, m = p[0], p[1], p[2]
-    _t2 = 2*R
-    _c0 = fabs(R)
-    _c1 = fabs(g)
-    for i in range(n):
-        theta = places[i]
-        _t0 = cos(theta)
-        _t1 = sin(theta/2)
-        _t3 = 1/(4*R*_t1)
-        _t4 = left_of(w0, _t0*_t2*g, level)
-        out[0, i] = R*(theta - sin(theta))
-        out[1, i] = -R*(1 - _t0)
-        out[2, i] = _t1*_t2
-        out[3, i] = _t3
-        out[4, i] = _t4
-        out[5, i] = m*(_t1*g + _t3*_t4)
-        out[6, i] = 2*_c0*_c1*fabs(_t0)
-
-
-@compiled(CLIMB)
-def climb(n, places, p, out):
-    """What V**2 loses in climbing to theta, up to a constant, and its derivative (paper, eq. 13)."""
+@compiled(EFFECTIVE_POTENTIAL)
+def effective_potential(n, places, p, out):
+    """U per unit mass, V**2 = v0**2 - 2*(U(theta) - U(lam0)), and dU/dtheta (paper, eq. 13)."""
     places, p, out = carray(places, n), carray(p, 3), carray(out, (2, n))
     R, g = p[0], p[1]
     _t0 = R*g
     for i in range(n):
         theta = places[i]
         _t1 = theta/2
-        out[0, i] = -2*_t0*(1 - cos(theta))
-        out[1, i] = -4*_t0*sin(_t1)*cos(_t1)
+        out[0, i] = -_t0*(1 - cos(theta))
+        out[1, i] = -2*_t0*sin(_t1)*cos(_t1)
 
 
-@compiled(RISE)
-def rise(n, a, places, offsets, p, out):
-    """climb[a, theta] = (climb(theta) - climb(a))/(theta - a) without cancellation, and ds/dtheta."""
+@compiled(POTENTIAL_DIVDIFF1)
+def potential_divdiff1(n, a, places, offsets, p, out):
+    """U[a, theta] = (U(theta) - U(a))/(theta - a) without cancellation, and ds/dtheta (MATHS, s. 3)."""
     places, offsets, p, out = carray(places, n), carray(offsets, n), carray(p, 3), carray(out, (2, n))
     R, g = p[0], p[1]
-    _t0 = 2*R
     for i in range(n):
-        theta = places[i]
-        d = offsets[i]
-        out[0, i] = _t0*g*cos1(a, theta, d)
-        out[1, i] = _t0*sin(theta/2)
+        theta, d = places[i], offsets[i]
+        out[0, i] = R*g*divdiff1_cos(a, theta, d)
+        out[1, i] = 2*R*sin(theta/2)
 
 
-@compiled(BEND)
-def bend(n, a, b, left, right, p, out):
-    """climb[a, theta, b] = V**2/((theta - a)*(b - theta)) between turning points, without cancellation, and ds/dtheta."""
+@compiled(POTENTIAL_DIVDIFF2)
+def potential_divdiff2(n, a, b, left, right, p, out):
+    """U[a, theta, b] = V**2/(2*(theta - a)*(b - theta)) from turn a to turn b, and ds/dtheta (MATHS, s. 3)."""
     left, right, p, out = carray(left, n), carray(right, n), carray(p, 3), carray(out, (2, n))
     R, g = p[0], p[1]
-    _t0 = 2*R
     for i in range(n):
-        da = left[i]
-        db = right[i]
-        theta = nearest(a, b, da, db)
-        out[0, i] = _t0*g*cos2(a, theta, b, da, db)
-        out[1, i] = _t0*sin(theta/2)
-
-
-@compiled(RISE_EACH, later=True)
-def rise_each(n, starts, places, offsets, p, out):
-    """climb[a, theta], ds/dtheta and the climb's derivative, each for a launch of its own."""
-    starts, places, offsets, p, out = carray(starts, n), carray(places, n), carray(offsets, n), carray(p, (3, n)), carray(out, (3, n))
-    for i in range(n):
-        R = p[0, i]
-        g = p[1, i]
-        a = starts[i]
-        theta = places[i]
-        d = offsets[i]
-        _t0 = 2*R
-        _t1 = theta/2
-        _t2 = sin(_t1)
-        out[0, i] = _t0*g*cos1(a, theta, d)
-        out[1, i] = _t0*_t2
-        out[2, i] = -4*R*_t2*g*cos(_t1)
-
-
-@compiled(BEND_EACH, later=True)
-def bend_each(n, lows, highs, left, right, p, out):
-    """climb[a, theta, b] and ds/dtheta, each for an orbit of its own; NaN where the closed form ends."""
-    lows, highs, left, right, p, out = carray(lows, n), carray(highs, n), carray(left, n), carray(right, n), carray(p, (5, n)), carray(out, (2, n))
-    for i in range(n):
-        R = p[0, i]
-        g = p[1, i]
-        _c0 = p[3, i]
-        _c1 = p[4, i]
-        a = lows[i]
-        b = highs[i]
-        da = left[i]
-        db = right[i]
-        theta = nearest(a, b, da, db)
-        _t0 = 2*R
-        out[0, i] = _t0*g*(-_c0*(da/2 - db/2)*near_odd(da, db) + _c1*near_even(da, db))
-        out[1, i] = _t0*sin(theta/2)
-
-
-@compiled(ORBIT_EACH, later=True)
-def orbit_each(n, lows, highs, p, out):
-    """What is the same all along an orbit: ``bend_each`` finds it behind the run-time parameters."""
-    lows, highs, p, out = carray(lows, n), carray(highs, n), carray(p, (3, n)), carray(out, (2, n))
-    for i in range(n):
-        a = lows[i]
-        b = highs[i]
-        _t0 = a/2 + b/2
-        out[0, i] = sin(_t0)
-        out[1, i] = cos(_t0)
+        da, db = left[i], right[i]
+        theta = place_from_ends(a, b, da, db)
+        out[0, i] = R*g*divdiff2_cos(a, theta, b, da, db)
+        out[1, i] = 2*R*sin(theta/2)
 
 
 @compiled(BOUNDS)
 def bounds(lo, hi, p, out):
-    """Bounds of the climb's slope and of ds/dtheta for lo <= theta <= hi."""
+    """Bounds of dU/dtheta and ds/dtheta for lo <= theta <= hi, by interval arithmetic."""
     p, out = carray(p, 3), carray(out, 4)
     theta = (lo, hi)
-    R = (p[0], p[0])
-    g = (p[1], p[1])
+    R, g = (p[0], p[0]), (p[1], p[1])
     _t0 = imul(idiv(iconst(1.0), iconst(2.0)), theta)
-    _t1 = imul(R, isin(_t0))
-    out[0], out[1] = imul(imul(imul(imul(iconst(-1.0), iconst(4.0)), _t1), g), icos(_t0))
-    out[2], out[3] = imul(iconst(2.0), _t1)
+    _t1 = imul(imul(iconst(2.0), R), isin(_t0))
+    out[0], out[1] = imul(imul(imul(iconst(-1.0), _t1), g), icos(_t0))
+    out[2], out[3] = _t1
 
 
-@compiled(BOUNDS_EACH, later=True)
-def bounds_each(n, lo, hi, p, out):
-    """Bounds over many intervals of the climb's slope and of ds/dtheta for lo <= theta <= hi, each for parameters of its own."""
-    lo, hi, p, out = carray(lo, n), carray(hi, n), carray(p, (3, n)), carray(out, (4, n))
-    for i in range(n):
-        theta = (lo[i], hi[i])
-        R = (p[0, i], p[0, i])
-        g = (p[1, i], p[1, i])
-        _t0 = imul(idiv(iconst(1.0), iconst(2.0)), theta)
-        _t1 = imul(R, isin(_t0))
-        out[0, i], out[1, i] = imul(imul(imul(imul(iconst(-1.0), iconst(4.0)), _t1), g), icos(_t0))
-        out[2, i], out[3, i] = imul(iconst(2.0), _t1)
-
-
-# The same formulas over a namespace of operations: extended precision evaluates these.
-
+# The same formulas over a namespace of operations, for extended precision.
 
 def exact_x(op, theta, p):
     """Horizontal coordinate."""
     R = p[0]
     return R*(theta - op.sin(theta))
 
-
 def exact_z(op, theta, p):
     """Height."""
     R = p[0]
     return -R*(1 - op.cos(theta))
-
 
 def exact_ds(op, theta, p):
     """ds/dtheta."""
     R = p[0]
     return 2*R*op.sin(theta/2)
 
-
 def exact_kappa(op, theta, p):
-    """Signed curvature."""
+    """Signed curvature (paper, eq. 8)."""
     R = p[0]
     return 1/(4*R*op.sin(theta/2))
 
-
-def exact_reaction(op, theta, p):
-    """Contact force per unit mass of a body at rest."""
+def exact_static_normal_load(op, theta, p):
+    """n0 = N/m of a body at rest, so that N = m*(kappa*V**2 + n0) (paper, eq. 15)."""
     g = p[1]
     return g*op.sin(theta/2)
 
+def exact_effective_potential(op, theta, p):
+    """U, so that V**2 + 2*U is constant (paper, eq. 13)."""
+    R, g = p[0], p[1]
+    return -R*g*(1 - op.cos(theta))
 
-def exact_climb(op, theta, p):
-    """What V**2 loses in climbing, up to a constant."""
-    R = p[0]
-    g = p[1]
-    return -2*R*g*(1 - op.cos(theta))
-
-
-def exact_climb_slope(op, theta, p):
-    """Its derivative by theta."""
-    R = p[0]
-    g = p[1]
+def exact_effective_potential_slope(op, theta, p):
+    """dU/dtheta."""
+    R, g = p[0], p[1]
     _t0 = theta/2
-    return -4*R*g*op.sin(_t0)*op.cos(_t0)
-
+    return -2*R*g*op.sin(_t0)*op.cos(_t0)
 
 def exact_domain(op, p):
     """Both ends of the domain, and the period; None where there is none."""
     return 0, 2*op.pi, None
 
-
 def exact_axes(op, p):
     """A place about which V**2 and ds are even, and the distance to the next; None where there is none."""
     return -op.pi, 2*op.pi
-
-
-MODEL = CompiledModel(
-    name='cycloid_inverted',
-    parameter='theta',
-    parameters=PARAMETERS,
-    positive=('R',),
-    addresses=Addresses(frame.address, climb.address, rise.address, bend.address, bounds.address),
-    loads=loads,
-    each=Each(rise=rise_each, bend=bend_each, orbit=orbit_each, bounds=bounds_each, held=2),
-    domain_of=exact_domain,
-    axes_of=exact_axes,
-    exact=ExactFormulas(exact_x, exact_z, exact_ds, exact_kappa, exact_reaction, exact_climb, exact_climb_slope),
-)
 
 
 def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = None, R: Any = '0.5', g: Any = '9.81', m: Any = '1') -> Pass1:
@@ -290,7 +171,7 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = 
     Pass1
         Arrays x, z, ds, kappa, v2 and normal_force.
     """
-    return MODEL.pass1(LaunchRequest(lam0, v0, direction), (R, g, m,), lam, out)
+    return MODEL.pass1(LaunchRequest(lam0, v0, direction), (R, g, m), lam, out)
 
 
 def solve(
@@ -327,7 +208,7 @@ def solve(
     GQMError
         For a launch or a parameter that cannot be; the message says what would be right.
     """
-    return MODEL.solve(LaunchRequest(lam0, v0, direction, point, t_max, contact), (R, g, m,))
+    return MODEL.solve(LaunchRequest(lam0, v0, direction, point, t_max, contact), (R, g, m))
 
 
 def sweep(
@@ -363,7 +244,101 @@ def sweep(
     Returns
     -------
     Sweep
-        ``values``, NaN where there is none, and ``reasons``, 0 where there is one; ``why()`` counts the others.
+        ``values``, NaN where there is none; ``status``, 0 where there is one, and ``route``, how each was found.
+        ``status_counts()`` counts the launches without a value.
     """
     launches = LaunchRequest(lam0, v0, direction, None, t_max, contact)
-    return MODEL.sweep(quantity, launches, (R, g, m,), lam=lam, client=client, source=__file__)
+    return MODEL.sweep(quantity, launches, (R, g, m), lam=lam, client=client, source=__file__)
+
+
+# ---- The same formulas once more, only for speed: a load map in one call, and many orbits at once for sweeps. ----
+
+
+@compiled(LOAD_MAP, later=True)
+def load_map(n, w0, level, places, p, out):
+    """x, z, ds/dtheta, kappa, V**2 = w0 - 2*(U - level), N (paper, eqs. 8, 13, 15), size of U's terms."""
+    places, p, out = carray(places, n), carray(p, 3), carray(out, (7, n))
+    R, g, m = p[0], p[1], p[2]
+    _c0 = fabs(R)
+    _c1 = fabs(g)
+    for i in range(n):
+        theta = places[i]
+        _t0 = cos(theta)
+        _t1 = sin(theta/2)
+        _t2 = 1/(4*R*_t1)
+        _t3 = speed_squared_from_potential(w0, R*_t0*g, level)
+        out[0, i] = R*(theta - sin(theta))
+        out[1, i] = -R*(1 - _t0)
+        out[2, i] = 2*R*_t1
+        out[3, i] = _t2
+        out[4, i] = _t3
+        out[5, i] = m*(_t1*g + _t2*_t3)
+        out[6, i] = _c0*_c1*fabs(_t0)
+
+
+@compiled(POTENTIAL_DIVDIFF1_BATCH, later=True)
+def potential_divdiff1_batch(n, starts, places, offsets, p, out):
+    """U[a, theta], ds/dtheta and dU/dtheta."""
+    starts, places, offsets, p, out = carray(starts, n), carray(places, n), carray(offsets, n), carray(p, (3, n)), carray(out, (3, n))
+    for i in range(n):
+        R, g, a, theta, d = p[0, i], p[1, i], starts[i], places[i], offsets[i]
+        _t0 = R*g
+        _t1 = theta/2
+        _t2 = 2*sin(_t1)
+        out[0, i] = _t0*divdiff1_cos(a, theta, d)
+        out[1, i] = R*_t2
+        out[2, i] = -_t0*_t2*cos(_t1)
+
+
+@compiled(POTENTIAL_DIVDIFF2_BATCH, later=True)
+def potential_divdiff2_batch(n, lows, highs, left, right, p, out):
+    """U[a, theta, b] and ds/dtheta; NaN where the points lie too far apart for the closed form."""
+    lows, highs, left, right, p, out = carray(lows, n), carray(highs, n), carray(left, n), carray(right, n), carray(p, (5, n)), carray(out, (2, n))
+    for i in range(n):
+        R, g, _c0, _c1, a, b, da, db = p[0, i], p[1, i], p[3, i], p[4, i], lows[i], highs[i], left[i], right[i]
+        theta = place_from_ends(a, b, da, db)
+        out[0, i] = R*g*(-_c0*(da/2 - db/2)*divdiff1_sinc_in_square(da, db) + _c1*divdiff1_cos_in_square(da, db))
+        out[1, i] = 2*R*sin(theta/2)
+
+
+@compiled(ORBIT_INVARIANTS_BATCH, later=True)
+def orbit_invariants_batch(n, lows, highs, p, out):
+    """Terms that are constant along an orbit: ``potential_divdiff2_batch`` reads them behind the parameters."""
+    lows, highs, p, out = carray(lows, n), carray(highs, n), carray(p, (3, n)), carray(out, (2, n))
+    for i in range(n):
+        a, b = lows[i], highs[i]
+        _t0 = a/2 + b/2
+        out[0, i] = sin(_t0)
+        out[1, i] = cos(_t0)
+
+
+@compiled(BOUNDS_BATCH, later=True)
+def bounds_batch(n, lo, hi, p, out):
+    """Bounds of dU/dtheta and ds/dtheta for lo <= theta <= hi."""
+    lo, hi, p, out = carray(lo, n), carray(hi, n), carray(p, (3, n)), carray(out, (4, n))
+    for i in range(n):
+        theta = (lo[i], hi[i])
+        R, g = (p[0, i], p[0, i]), (p[1, i], p[1, i])
+        _t0 = imul(idiv(iconst(1.0), iconst(2.0)), theta)
+        _t1 = imul(imul(iconst(2.0), R), isin(_t0))
+        out[0, i], out[1, i] = imul(imul(imul(iconst(-1.0), _t1), g), icos(_t0))
+        out[2, i], out[3, i] = _t1
+
+
+MODEL = CompiledModel(
+    name='cycloid_inverted', parameter='theta', parameters=PARAMETERS, positive=('R',),
+    addresses=Addresses(
+        path_and_contact_force.address, effective_potential.address, potential_divdiff1.address,
+        potential_divdiff2.address, bounds.address,
+    ),
+    load_map=load_map,
+    batch=BatchFunctions(
+        potential_divdiff1=potential_divdiff1_batch, potential_divdiff2=potential_divdiff2_batch,
+        orbit_invariants=orbit_invariants_batch, bounds=bounds_batch, orbit_rows=2,
+    ),
+    domain_of=exact_domain, axes_of=exact_axes,
+    exact=ExactFormulas(
+        exact_x, exact_z, exact_ds, exact_kappa, exact_static_normal_load, exact_effective_potential,
+        exact_effective_potential_slope,
+    ),
+)

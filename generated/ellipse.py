@@ -1,5 +1,5 @@
 # Made by gqm-gen for "ellipse". Do not edit: change its declaration and generate again.
-# interface 8, input 3a81da5567d3, body 14fcfaf8b63e
+# interface 8, input 81dc4ee20e82, body d3fd4712ee02
 """Bead on an ellipse, by the eccentric angle
 
 x              = a*cos(theta)
@@ -28,30 +28,26 @@ from gqm_sym.runtime import compiler
 compiled = compiler(__file__, interface=8)
 
 from gqm_sym.runtime.vocabulary import (
-    BEND, BEND_EACH, BOUNDS, BOUNDS_EACH, CLIMB, CREST_EACH, FRAME, LOADS, ORBIT_EACH, RISE, RISE_EACH, SWING_EACH,
-    TOP_EACH, Addresses, CompiledModel, Each, ExactFormulas, LaunchRequest, Pass1, atan, cos, iadd, iconst, icos, imul,
-    ipow, isin, isqrt, left_of, near_even, near_odd, near_sinc, nearest, sin, sin1, sin2,
+    BOUNDS, BOUNDS_BATCH, EFFECTIVE_POTENTIAL, INTEGRAND_INVARIANTS_BATCH, LOAD_MAP, ORBIT_INVARIANTS_BATCH,
+    PATH_AND_CONTACT_FORCE, POTENTIAL_DIVDIFF1, POTENTIAL_DIVDIFF1_BATCH, POTENTIAL_DIVDIFF2, POTENTIAL_DIVDIFF2_BATCH,
+    TIME_INTEGRAND_BATCH, TURNING_POINT_BATCH, Addresses, BatchFunctions, CompiledModel, ExactFormulas, LaunchRequest,
+    Pass1, atan, cos, divdiff1_cos_in_square, divdiff1_sin, divdiff1_sinc_in_square, divdiff2_sin, iadd, icos, imul,
+    ipow, isin, isqrt, place_from_ends, sin, sinc_near, speed_squared_from_potential,
 )
 
 if TYPE_CHECKING:
     from gqm_sym.runtime import Motion, Sweep
 
-PARAMETERS = {
-    'a': '2',
-    'b': '1',
-    'g': '9.81',
-    'm': '1',
-}
+PARAMETERS = {'a': '2', 'b': '1', 'g': '9.81', 'm': '1'}
 
 
-@compiled(FRAME)
-def frame(n, places, speeds, p, out):
-    """x, z, ds/dtheta, signed curvature and contact force, given V**2 (paper, eq. 15)."""
+@compiled(PATH_AND_CONTACT_FORCE)
+def path_and_contact_force(n, places, speeds, p, out):
+    """x, z, ds/dtheta, curvature kappa, contact force N = m*(kappa*V**2 + n0), given V**2 (paper, eqs. 8, 15)."""
     places, speeds, p, out = carray(places, n), carray(speeds, n), carray(p, 4), carray(out, (5, n))
     a, b, g, m = p[0], p[1], p[2], p[3]
     for i in range(n):
-        theta = places[i]
-        v2 = speeds[i]
+        theta, v2 = places[i], speeds[i]
         _t0 = cos(theta)
         _t1 = sin(theta)
         _t2 = _t0**2*b**2 + _t1**2*a**2
@@ -64,279 +60,97 @@ def frame(n, places, speeds, p, out):
         out[4, i] = m*(-_t1*a*g/_t3 + _t4*v2)
 
 
-@compiled(LOADS, later=True)
-def loads(n, w0, level, places, p, out):
-    """x, z, ds/dtheta, signed curvature, V**2, contact force (paper, eq. 15), and the size of the heights in V**2."""
-    places, p, out = carray(places, n), carray(p, 4), carray(out, (7, n))
-    a, b, g, m = p[0], p[1], p[2], p[3]
-    _c0 = fabs(b)
-    _c1 = fabs(g)
-    for i in range(n):
-        theta = places[i]
-        _t0 = cos(theta)
-        _t1 = sin(theta)
-        _t2 = _t1*b
-        _t3 = _t0**2*b**2 + _t1**2*a**2
-        _t4 = sqrt(_t3)
-        _t5 = a*b/sqrt(_t3)**3
-        _t6 = left_of(w0, 2*_t2*g, level)
-        out[0, i] = _t0*a
-        out[1, i] = _t2
-        out[2, i] = _t4
-        out[3, i] = _t5
-        out[4, i] = _t6
-        out[5, i] = m*(-_t1*a*g/_t4 + _t5*_t6)
-        out[6, i] = 2*_c0*_c1*fabs(_t1)
-
-
-@compiled(CLIMB)
-def climb(n, places, p, out):
-    """What V**2 loses in climbing to theta, up to a constant, and its derivative (paper, eq. 13)."""
+@compiled(EFFECTIVE_POTENTIAL)
+def effective_potential(n, places, p, out):
+    """U per unit mass, V**2 = v0**2 - 2*(U(theta) - U(lam0)), and dU/dtheta (paper, eq. 13)."""
     places, p, out = carray(places, n), carray(p, 4), carray(out, (2, n))
     b, g = p[1], p[2]
-    _t0 = 2*b*g
+    _t0 = b*g
     for i in range(n):
         theta = places[i]
         out[0, i] = _t0*sin(theta)
         out[1, i] = _t0*cos(theta)
 
 
-@compiled(RISE)
-def rise(n, _a, places, offsets, p, out):
-    """climb[a, theta] = (climb(theta) - climb(a))/(theta - a) without cancellation, and ds/dtheta."""
+@compiled(POTENTIAL_DIVDIFF1)
+def potential_divdiff1(n, _a, places, offsets, p, out):
+    """U[a, theta] = (U(theta) - U(a))/(theta - a) without cancellation, and ds/dtheta (MATHS, s. 3)."""
     places, offsets, p, out = carray(places, n), carray(offsets, n), carray(p, 4), carray(out, (2, n))
     a, b, g = p[0], p[1], p[2]
     for i in range(n):
-        theta = places[i]
-        d = offsets[i]
-        out[0, i] = 2*b*g*sin1(_a, theta, d)
+        theta, d = places[i], offsets[i]
+        out[0, i] = b*g*divdiff1_sin(_a, theta, d)
         out[1, i] = sqrt(a**2*sin(theta)**2 + b**2*cos(theta)**2)
 
 
-@compiled(BEND)
-def bend(n, _a, _b, left, right, p, out):
-    """climb[a, theta, b] = V**2/((theta - a)*(b - theta)) between turning points, without cancellation, and ds/dtheta."""
+@compiled(POTENTIAL_DIVDIFF2)
+def potential_divdiff2(n, _a, _b, left, right, p, out):
+    """U[a, theta, b] = V**2/(2*(theta - a)*(b - theta)) from turn a to turn b, and ds/dtheta (MATHS, s. 3)."""
     left, right, p, out = carray(left, n), carray(right, n), carray(p, 4), carray(out, (2, n))
     a, b, g = p[0], p[1], p[2]
     for i in range(n):
-        da = left[i]
-        db = right[i]
-        theta = nearest(_a, _b, da, db)
-        out[0, i] = 2*b*g*sin2(_a, theta, _b, da, db)
+        da, db = left[i], right[i]
+        theta = place_from_ends(_a, _b, da, db)
+        out[0, i] = b*g*divdiff2_sin(_a, theta, _b, da, db)
         out[1, i] = sqrt(a**2*sin(theta)**2 + b**2*cos(theta)**2)
-
-
-@compiled(RISE_EACH, later=True)
-def rise_each(n, starts, places, offsets, p, out):
-    """climb[a, theta], ds/dtheta and the climb's derivative, each for a launch of its own."""
-    starts, places, offsets, p, out = carray(starts, n), carray(places, n), carray(offsets, n), carray(p, (4, n)), carray(out, (3, n))
-    for i in range(n):
-        a = p[0, i]
-        b = p[1, i]
-        g = p[2, i]
-        _a = starts[i]
-        theta = places[i]
-        d = offsets[i]
-        _t0 = 2*b*g
-        _t1 = cos(theta)
-        out[0, i] = _t0*sin1(_a, theta, d)
-        out[1, i] = sqrt(_t1**2*b**2 + a**2*sin(theta)**2)
-        out[2, i] = _t0*_t1
-
-
-@compiled(BEND_EACH, later=True)
-def bend_each(n, lows, highs, left, right, p, out):
-    """climb[a, theta, b] and ds/dtheta, each for an orbit of its own; NaN where the closed form ends."""
-    lows, highs, left, right, p, out = carray(lows, n), carray(highs, n), carray(left, n), carray(right, n), carray(p, (8, n)), carray(out, (2, n))
-    for i in range(n):
-        a = p[0, i]
-        b = p[1, i]
-        g = p[2, i]
-        _c0 = p[4, i]
-        _c1 = p[5, i]
-        _c2 = p[6, i]
-        _c3 = p[7, i]
-        da = left[i]
-        db = right[i]
-        _t0 = near_even(da, db)
-        _t1 = da/2 - db/2
-        _t2 = _t1*near_odd(da, db)
-        _t3 = da*db
-        _t4 = _c2 - _t0*_t3
-        _t5 = _c0*_t1 - _t2*_t3
-        out[0, i] = 2*b*g*(_c1*_t0 + _c3*_t2)
-        out[1, i] = sqrt(a**2*(_c1*_t4 + _c3*_t5)**2 + b**2*(-_c1*_t5 + _c3*_t4)**2)
-
-
-@compiled(ORBIT_EACH, later=True)
-def orbit_each(n, lows, highs, p, out):
-    """What is the same all along an orbit: ``bend_each`` finds it behind the run-time parameters."""
-    lows, highs, p, out = carray(lows, n), carray(highs, n), carray(p, (4, n)), carray(out, (4, n))
-    for i in range(n):
-        _a = lows[i]
-        _b = highs[i]
-        _t0 = _a/2
-        _t1 = -_b/2 + _t0
-        _t2 = _b/2 + _t0
-        out[0, i] = near_sinc(-_t1)
-        out[1, i] = sin(_t2)
-        out[2, i] = cos(_t1)
-        out[3, i] = cos(_t2)
-
-
-@compiled(SWING_EACH, later=True)
-def swing_each(n, fall, rise, p, out):
-    """(dt/du)**2 where sin(u)**2 = fall = 1 - rise, and what that is divided by, each for an orbit of its own."""
-    p, out = carray(p, (8, n)), carray(out, (2, n))
-    for i in range(n):
-        a = p[0, i]
-        b = p[1, i]
-        g = p[2, i]
-        top = p[4, i]
-        top_lack = p[5, i]
-        top_apart = p[6, i]
-        stretch = p[7, i]
-        _t0 = fall*top
-        _t1 = fall*top_apart + rise
-        _t2 = (fall*top_lack + rise)**2
-        out[0, i] = (16*_t0*_t2*b**2 + a**2*(-4*_t0 + _t2)**2)/(_t1*b*g*stretch*(_t0 + 1)**4)
-        out[1, i] = 4*_t1*b*g
-
-
-@compiled(TOP_EACH, later=True)
-def top_each(n, halves, p, out):
-    """What is the same all along a swing: ``swing_each`` finds it behind the run-time parameters."""
-    halves, p, out = carray(halves, n), carray(p, (4, n)), carray(out, (4, n))
-    for i in range(n):
-        half = halves[i]
-        _t0 = half/4
-        _t1 = cos(_t0)
-        _t2 = 1/_t1**2
-        _t3 = cos(half/2)
-        _t4 = _t1**4
-        out[0, i] = _t2*sin(_t0)**2
-        out[1, i] = _t2*_t3
-        out[2, i] = _t3/_t4
-        out[3, i] = _t4
-
-
-@compiled(CREST_EACH, later=True)
-def crest_each(n, offsets, launches, p, out):
-    """Half an orbit's width, where V**2 at an offset is used up; how the climb grows; above 1 where it never is."""
-    offsets, launches, p, out = carray(offsets, n), carray(launches, n), carray(p, (4, n)), carray(out, (3, n))
-    for i in range(n):
-        b = p[1, i]
-        g = p[2, i]
-        offset = offsets[i]
-        launch = launches[i]
-        _t0 = sin(offset/2)**2 + launch/(4*b*g)
-        out[0, i] = 4*atan(sqrt(_t0)/(sqrt(1 - _t0) + 1))
-        out[1, i] = 4*b*g
-        out[2, i] = _t0
 
 
 @compiled(BOUNDS)
 def bounds(lo, hi, p, out):
-    """Bounds of the climb's slope and of ds/dtheta for lo <= theta <= hi."""
+    """Bounds of dU/dtheta and ds/dtheta for lo <= theta <= hi, by interval arithmetic."""
     p, out = carray(p, 4), carray(out, 4)
     theta = (lo, hi)
-    a = (p[0], p[0])
-    b = (p[1], p[1])
-    g = (p[2], p[2])
+    a, b, g = (p[0], p[0]), (p[1], p[1]), (p[2], p[2])
     _t0 = icos(theta)
-    out[0], out[1] = imul(imul(imul(iconst(2.0), _t0), b), g)
+    out[0], out[1] = imul(imul(_t0, b), g)
     out[2], out[3] = isqrt(iadd(imul(ipow(_t0, 2), ipow(b, 2)), imul(ipow(a, 2), ipow(isin(theta), 2))))
 
 
-@compiled(BOUNDS_EACH, later=True)
-def bounds_each(n, lo, hi, p, out):
-    """Bounds over many intervals of the climb's slope and of ds/dtheta for lo <= theta <= hi, each for parameters of its own."""
-    lo, hi, p, out = carray(lo, n), carray(hi, n), carray(p, (4, n)), carray(out, (4, n))
-    for i in range(n):
-        theta = (lo[i], hi[i])
-        a = (p[0, i], p[0, i])
-        b = (p[1, i], p[1, i])
-        g = (p[2, i], p[2, i])
-        _t0 = icos(theta)
-        out[0, i], out[1, i] = imul(imul(imul(iconst(2.0), _t0), b), g)
-        out[2, i], out[3, i] = isqrt(iadd(imul(ipow(_t0, 2), ipow(b, 2)), imul(ipow(a, 2), ipow(isin(theta), 2))))
-
-
-# The same formulas over a namespace of operations: extended precision evaluates these.
-
+# The same formulas over a namespace of operations, for extended precision.
 
 def exact_x(op, theta, p):
     """Horizontal coordinate."""
     a = p[0]
     return a*op.cos(theta)
 
-
 def exact_z(op, theta, p):
     """Height."""
     b = p[1]
     return b*op.sin(theta)
 
-
 def exact_ds(op, theta, p):
     """ds/dtheta."""
-    a = p[0]
-    b = p[1]
+    a, b = p[0], p[1]
     return op.sqrt(a**2*op.sin(theta)**2 + b**2*op.cos(theta)**2)
 
-
 def exact_kappa(op, theta, p):
-    """Signed curvature."""
-    a = p[0]
-    b = p[1]
+    """Signed curvature (paper, eq. 8)."""
+    a, b = p[0], p[1]
     return a*b/(a**2*op.sin(theta)**2 + b**2*op.cos(theta)**2)**(op.mpf(3)/2)
 
-
-def exact_reaction(op, theta, p):
-    """Contact force per unit mass of a body at rest."""
-    a = p[0]
-    b = p[1]
-    g = p[2]
+def exact_static_normal_load(op, theta, p):
+    """n0 = N/m of a body at rest, so that N = m*(kappa*V**2 + n0) (paper, eq. 15)."""
+    a, b, g = p[0], p[1], p[2]
     _t0 = op.sin(theta)
     return -_t0*a*g/op.sqrt(_t0**2*a**2 + b**2*op.cos(theta)**2)
 
+def exact_effective_potential(op, theta, p):
+    """U, so that V**2 + 2*U is constant (paper, eq. 13)."""
+    b, g = p[1], p[2]
+    return b*g*op.sin(theta)
 
-def exact_climb(op, theta, p):
-    """What V**2 loses in climbing, up to a constant."""
-    b = p[1]
-    g = p[2]
-    return 2*b*g*op.sin(theta)
-
-
-def exact_climb_slope(op, theta, p):
-    """Its derivative by theta."""
-    b = p[1]
-    g = p[2]
-    return 2*b*g*op.cos(theta)
-
+def exact_effective_potential_slope(op, theta, p):
+    """dU/dtheta."""
+    b, g = p[1], p[2]
+    return b*g*op.cos(theta)
 
 def exact_domain(op, p):
     """Both ends of the domain, and the period; None where there is none."""
     return None, None, 2*op.pi
 
-
 def exact_axes(op, p):
     """A place about which V**2 and ds are even, and the distance to the next; None where there is none."""
     return -op.pi/2, op.pi
-
-
-MODEL = CompiledModel(
-    name='ellipse',
-    parameter='theta',
-    parameters=PARAMETERS,
-    positive=('a', 'b'),
-    addresses=Addresses(frame.address, climb.address, rise.address, bend.address, bounds.address),
-    loads=loads,
-    each=Each(rise=rise_each, bend=bend_each, orbit=orbit_each, swing=swing_each, top=top_each, crest=crest_each, bounds=bounds_each, held=4, top_held=4),
-    domain_of=exact_domain,
-    axes_of=exact_axes,
-    monotone=True,
-    exact=ExactFormulas(exact_x, exact_z, exact_ds, exact_kappa, exact_reaction, exact_climb, exact_climb_slope),
-)
 
 
 def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = None, a: Any = '2', b: Any = '1', g: Any = '9.81', m: Any = '1') -> Pass1:
@@ -358,7 +172,7 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = 
     Pass1
         Arrays x, z, ds, kappa, v2 and normal_force.
     """
-    return MODEL.pass1(LaunchRequest(lam0, v0, direction), (a, b, g, m,), lam, out)
+    return MODEL.pass1(LaunchRequest(lam0, v0, direction), (a, b, g, m), lam, out)
 
 
 def solve(
@@ -395,7 +209,7 @@ def solve(
     GQMError
         For a launch or a parameter that cannot be; the message says what would be right.
     """
-    return MODEL.solve(LaunchRequest(lam0, v0, direction, point, t_max, contact), (a, b, g, m,))
+    return MODEL.solve(LaunchRequest(lam0, v0, direction, point, t_max, contact), (a, b, g, m))
 
 
 def sweep(
@@ -431,7 +245,156 @@ def sweep(
     Returns
     -------
     Sweep
-        ``values``, NaN where there is none, and ``reasons``, 0 where there is one; ``why()`` counts the others.
+        ``values``, NaN where there is none; ``status``, 0 where there is one, and ``route``, how each was found.
+        ``status_counts()`` counts the launches without a value.
     """
     launches = LaunchRequest(lam0, v0, direction, None, t_max, contact)
-    return MODEL.sweep(quantity, launches, (a, b, g, m,), lam=lam, client=client, source=__file__)
+    return MODEL.sweep(quantity, launches, (a, b, g, m), lam=lam, client=client, source=__file__)
+
+
+# ---- The same formulas once more, only for speed: a load map in one call, and many orbits at once for sweeps. ----
+
+
+@compiled(LOAD_MAP, later=True)
+def load_map(n, w0, level, places, p, out):
+    """x, z, ds/dtheta, kappa, V**2 = w0 - 2*(U - level), N (paper, eqs. 8, 13, 15), size of U's terms."""
+    places, p, out = carray(places, n), carray(p, 4), carray(out, (7, n))
+    a, b, g, m = p[0], p[1], p[2], p[3]
+    _c0 = fabs(b)
+    _c1 = fabs(g)
+    for i in range(n):
+        theta = places[i]
+        _t0 = cos(theta)
+        _t1 = sin(theta)
+        _t2 = _t1*b
+        _t3 = _t0**2*b**2 + _t1**2*a**2
+        _t4 = sqrt(_t3)
+        _t5 = a*b/sqrt(_t3)**3
+        _t6 = speed_squared_from_potential(w0, _t2*g, level)
+        out[0, i] = _t0*a
+        out[1, i] = _t2
+        out[2, i] = _t4
+        out[3, i] = _t5
+        out[4, i] = _t6
+        out[5, i] = m*(-_t1*a*g/_t4 + _t5*_t6)
+        out[6, i] = _c0*_c1*fabs(_t1)
+
+
+@compiled(POTENTIAL_DIVDIFF1_BATCH, later=True)
+def potential_divdiff1_batch(n, starts, places, offsets, p, out):
+    """U[a, theta], ds/dtheta and dU/dtheta."""
+    starts, places, offsets, p, out = carray(starts, n), carray(places, n), carray(offsets, n), carray(p, (4, n)), carray(out, (3, n))
+    for i in range(n):
+        a, b, g, _a, theta, d = p[0, i], p[1, i], p[2, i], starts[i], places[i], offsets[i]
+        _t0 = b*g
+        _t1 = cos(theta)
+        out[0, i] = _t0*divdiff1_sin(_a, theta, d)
+        out[1, i] = sqrt(_t1**2*b**2 + a**2*sin(theta)**2)
+        out[2, i] = _t0*_t1
+
+
+@compiled(POTENTIAL_DIVDIFF2_BATCH, later=True)
+def potential_divdiff2_batch(n, lows, highs, left, right, p, out):
+    """U[a, theta, b] and ds/dtheta; NaN where the points lie too far apart for the closed form."""
+    lows, highs, left, right, p, out = carray(lows, n), carray(highs, n), carray(left, n), carray(right, n), carray(p, (8, n)), carray(out, (2, n))
+    for i in range(n):
+        a, b, g, _c0, _c1, _c2, _c3, da = p[0, i], p[1, i], p[2, i], p[4, i], p[5, i], p[6, i], p[7, i], left[i]
+        db = right[i]
+        _t0 = divdiff1_cos_in_square(da, db)
+        _t1 = da/2 - db/2
+        _t2 = _t1*divdiff1_sinc_in_square(da, db)
+        _t3 = da*db
+        _t4 = _c2 - _t0*_t3
+        _t5 = _c0*_t1 - _t2*_t3
+        out[0, i] = b*g*(_c1*_t0 + _c3*_t2)
+        out[1, i] = sqrt(a**2*(_c1*_t4 + _c3*_t5)**2 + b**2*(-_c1*_t5 + _c3*_t4)**2)
+
+
+@compiled(ORBIT_INVARIANTS_BATCH, later=True)
+def orbit_invariants_batch(n, lows, highs, p, out):
+    """Terms that are constant along an orbit: ``potential_divdiff2_batch`` reads them behind the parameters."""
+    lows, highs, p, out = carray(lows, n), carray(highs, n), carray(p, (4, n)), carray(out, (4, n))
+    for i in range(n):
+        _a, _b = lows[i], highs[i]
+        _t0 = _a/2
+        _t1 = -_b/2 + _t0
+        _t2 = _b/2 + _t0
+        out[0, i] = sinc_near(-_t1)
+        out[1, i] = sin(_t2)
+        out[2, i] = cos(_t1)
+        out[3, i] = cos(_t2)
+
+
+@compiled(TIME_INTEGRAND_BATCH, later=True)
+def time_integrand_batch(n, fall, rise, p, out):
+    """(dt/du)**2 at sin(u)**2 = fall = 1 - rise, and its divisor; dt/du integrates to the half period (eq. 17)."""
+    p, out = carray(p, (8, n)), carray(out, (2, n))
+    for i in range(n):
+        a, b, g, top, top_lack, top_apart, stretch = p[0, i], p[1, i], p[2, i], p[4, i], p[5, i], p[6, i], p[7, i]
+        _t0 = fall*top
+        _t1 = fall*top_apart + rise
+        _t2 = (fall*top_lack + rise)**2
+        out[0, i] = (16*_t0*_t2*b**2 + a**2*(-4*_t0 + _t2)**2)/(_t1*b*g*stretch*(_t0 + 1)**4)
+        out[1, i] = 4*_t1*b*g
+
+
+@compiled(INTEGRAND_INVARIANTS_BATCH, later=True)
+def integrand_invariants_batch(n, halves, p, out):
+    """Terms that are constant along an orbit: ``time_integrand_batch`` reads them behind the parameters."""
+    halves, p, out = carray(halves, n), carray(p, (4, n)), carray(out, (4, n))
+    for i in range(n):
+        half = halves[i]
+        _t0 = half/4
+        _t1 = cos(_t0)
+        _t2 = 1/_t1**2
+        _t3 = cos(half/2)
+        _t4 = _t1**4
+        out[0, i] = _t2*sin(_t0)**2
+        out[1, i] = _t2*_t3
+        out[2, i] = _t3/_t4
+        out[3, i] = _t4
+
+
+@compiled(TURNING_POINT_BATCH, later=True)
+def turning_point_batch(n, offsets, launches, p, out):
+    """From V**2 at an offset: half the orbit's width (paper, eq. 14), -dV**2/dq, and a sine's square q at the turn."""
+    offsets, launches, p, out = carray(offsets, n), carray(launches, n), carray(p, (4, n)), carray(out, (3, n))
+    for i in range(n):
+        b, g, offset, launch = p[1, i], p[2, i], offsets[i], launches[i]
+        _t0 = sin(offset/2)**2 + launch/(4*b*g)
+        out[0, i] = 4*atan(sqrt(_t0)/(sqrt(1 - _t0) + 1))
+        out[1, i] = 4*b*g
+        out[2, i] = _t0
+
+
+@compiled(BOUNDS_BATCH, later=True)
+def bounds_batch(n, lo, hi, p, out):
+    """Bounds of dU/dtheta and ds/dtheta for lo <= theta <= hi."""
+    lo, hi, p, out = carray(lo, n), carray(hi, n), carray(p, (4, n)), carray(out, (4, n))
+    for i in range(n):
+        theta = (lo[i], hi[i])
+        a, b, g = (p[0, i], p[0, i]), (p[1, i], p[1, i]), (p[2, i], p[2, i])
+        _t0 = icos(theta)
+        out[0, i], out[1, i] = imul(imul(_t0, b), g)
+        out[2, i], out[3, i] = isqrt(iadd(imul(ipow(_t0, 2), ipow(b, 2)), imul(ipow(a, 2), ipow(isin(theta), 2))))
+
+
+MODEL = CompiledModel(
+    name='ellipse', parameter='theta', parameters=PARAMETERS, positive=('a', 'b'),
+    addresses=Addresses(
+        path_and_contact_force.address, effective_potential.address, potential_divdiff1.address,
+        potential_divdiff2.address, bounds.address,
+    ),
+    load_map=load_map,
+    batch=BatchFunctions(
+        potential_divdiff1=potential_divdiff1_batch, potential_divdiff2=potential_divdiff2_batch,
+        orbit_invariants=orbit_invariants_batch, time_integrand=time_integrand_batch,
+        integrand_invariants=integrand_invariants_batch, turning_point=turning_point_batch, bounds=bounds_batch,
+        orbit_rows=4, integrand_rows=4,
+    ),
+    domain_of=exact_domain, axes_of=exact_axes, monotone=True,
+    exact=ExactFormulas(
+        exact_x, exact_z, exact_ds, exact_kappa, exact_static_normal_load, exact_effective_potential,
+        exact_effective_potential_slope,
+    ),
+)

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "kepler". Do not edit: change its declaration and generate again.
-# interface 8, input a1e1feaf475b, body af431f954693
+# interface 8, input a0162e77d64e, body f205025208e4
 """Planet on its own ellipse, by the eccentric anomaly
 
 x              = a*(-ecc + cos(E))
@@ -28,25 +28,22 @@ from gqm_sym.runtime import compiler
 compiled = compiler(__file__, interface=8)
 
 from gqm_sym.runtime.vocabulary import (
-    BEND, BEND_EACH, BOUNDS, BOUNDS_EACH, CLIMB, FRAME, LOADS, ORBIT_EACH, RISE, RISE_EACH, SWING_EACH, TOP_EACH,
-    Addresses, CompiledModel, Each, ExactFormulas, LaunchRequest, Pass1, cos, cos1, cos2, iabs, iadd, iconst, icos,
-    imul, ipow, isin, isqrt, left_of, near_even, near_odd, near_sinc, nearest, sin, sin1, sin2,
+    BOUNDS, BOUNDS_BATCH, EFFECTIVE_POTENTIAL, INTEGRAND_INVARIANTS_BATCH, LOAD_MAP, ORBIT_INVARIANTS_BATCH,
+    PATH_AND_CONTACT_FORCE, POTENTIAL_DIVDIFF1, POTENTIAL_DIVDIFF1_BATCH, POTENTIAL_DIVDIFF2, POTENTIAL_DIVDIFF2_BATCH,
+    TIME_INTEGRAND_BATCH, Addresses, BatchFunctions, CompiledModel, ExactFormulas, LaunchRequest, Pass1, cos,
+    divdiff1_cos, divdiff1_cos_in_square, divdiff1_sin, divdiff1_sinc_in_square, divdiff2_cos, divdiff2_sin, iabs, iadd,
+    iconst, icos, imul, ipow, isin, isqrt, place_from_ends, sin, sinc_near, speed_squared_from_potential,
 )
 
 if TYPE_CHECKING:
     from gqm_sym.runtime import Motion, Sweep
 
-PARAMETERS = {
-    'a': '3/2',
-    'ecc': '3/5',
-    'k': '7/2',
-    'm': '1',
-}
+PARAMETERS = {'a': '3/2', 'ecc': '3/5', 'k': '7/2', 'm': '1'}
 
 
-@compiled(FRAME)
-def frame(n, places, speeds, p, out):
-    """x, z, ds/dE, signed curvature and contact force, given V**2 (paper, eq. 15)."""
+@compiled(PATH_AND_CONTACT_FORCE)
+def path_and_contact_force(n, places, speeds, p, out):
+    """x, z, ds/dE, curvature kappa, contact force N = m*(kappa*V**2 + n0), given V**2 (paper, eqs. 8, 15)."""
     places, speeds, p, out = carray(places, n), carray(speeds, n), carray(p, 4), carray(out, (5, n))
     a, ecc, k, m = p[0], p[1], p[2], p[3]
     _t0 = 1 - ecc**2
@@ -54,8 +51,7 @@ def frame(n, places, speeds, p, out):
     _c0 = fabs(a)
     _c1 = sqrt(_t0)
     for i in range(n):
-        E = places[i]
-        v2 = speeds[i]
+        E, v2 = places[i], speeds[i]
         _t1 = cos(E)
         _t2 = _t1 - ecc
         _t3 = sin(E)
@@ -70,46 +66,12 @@ def frame(n, places, speeds, p, out):
         out[4, i] = m*(-_c0*_c1*k*(_t1*_t2 + _t4)/(_t6*a**3*sqrt(_t0*_t4 + _t2**2)**3) + _c1*_t7*_t8*v2)
 
 
-@compiled(LOADS, later=True)
-def loads(n, w0, level, places, p, out):
-    """x, z, ds/dE, signed curvature, V**2, contact force (paper, eq. 15), and the size of the heights in V**2."""
-    places, p, out = carray(places, n), carray(p, 4), carray(out, (7, n))
-    a, ecc, k, m = p[0], p[1], p[2], p[3]
-    _t0 = ecc**2
-    _t8 = 1/a
-    _c0 = fabs(a)
-    _c1 = fabs(ecc)
-    _c2 = fabs(k)
-    _t1 = 1 - _t0
-    _t11 = 2/_c0
-    _c3 = sqrt(_t1)
-    for i in range(n):
-        E = places[i]
-        _t2 = cos(E)
-        _t3 = _t2 - ecc
-        _t4 = sin(E)
-        _t5 = _t4**2
-        _t6 = _t1*_t2**2 + _t5
-        _t7 = sqrt(_t6)
-        _t9 = 1/sqrt(_t6)**3
-        _t10 = _t1*_t5 + _t3**2
-        _t12 = left_of(w0, -_t11*k/sqrt(_t10), level)
-        out[0, i] = _t3*a
-        out[1, i] = _c3*_t4*a
-        out[2, i] = _t7*a
-        out[3, i] = _c3*_t8*_t9
-        out[4, i] = _t12
-        out[5, i] = m*(-_c0*_c3*k*(_t2*_t3 + _t5)/(_t7*a**3*sqrt(_t10)**3) + _c3*_t12*_t8*_t9)
-        out[6, i] = _c2*_t11*(_t5*(_t0 + 1) + (_c1 + fabs(_t2))**2)/sqrt(fabs(_t10))**3
-
-
-@compiled(CLIMB)
-def climb(n, places, p, out):
-    """What V**2 loses in climbing to E, up to a constant, and its derivative (paper, eq. 13)."""
+@compiled(EFFECTIVE_POTENTIAL)
+def effective_potential(n, places, p, out):
+    """U per unit mass, V**2 = v0**2 - 2*(U(E) - U(lam0)), and dU/dE (paper, eq. 13)."""
     places, p, out = carray(places, n), carray(p, 4), carray(out, (2, n))
     a, ecc, k = p[0], p[1], p[2]
     _t3 = 1 - ecc**2
-    _t5 = 2*k
     _c0 = fabs(a)
     for i in range(n):
         E = places[i]
@@ -117,13 +79,13 @@ def climb(n, places, p, out):
         _t1 = -_t0 + ecc
         _t2 = sin(E)
         _t4 = _t1**2 + _t2**2*_t3
-        out[0, i] = -_t5/(_c0*sqrt(_t4))
-        out[1, i] = _c0*_t2*_t5*(_t0*_t3 + _t1)/(a**2*sqrt(_t4)**3)
+        out[0, i] = -k/(_c0*sqrt(_t4))
+        out[1, i] = _c0*_t2*k*(_t0*_t3 + _t1)/(a**2*sqrt(_t4)**3)
 
 
-@compiled(RISE)
-def rise(n, _a, places, offsets, p, out):
-    """climb[a, E] = (climb(E) - climb(a))/(E - a) without cancellation, and ds/dE."""
+@compiled(POTENTIAL_DIVDIFF1)
+def potential_divdiff1(n, _a, places, offsets, p, out):
+    """U[a, E] = (U(E) - U(a))/(E - a) without cancellation, and ds/dE (MATHS, s. 3)."""
     places, offsets, p, out = carray(places, n), carray(offsets, n), carray(p, 4), carray(out, (2, n))
     a, ecc, k = p[0], p[1], p[2]
     _t0 = cos(_a)
@@ -136,19 +98,18 @@ def rise(n, _a, places, offsets, p, out):
     _c1 = 1/_t3
     _c2 = _t3
     for i in range(n):
-        E = places[i]
-        d = offsets[i]
+        E, d = places[i], offsets[i]
         _t4 = cos(E)
         _t5 = sin(E)
         _t6 = _t5**2
         _t7 = sqrt(_t2*_t6 + (_t4 - ecc)**2)
-        out[0, i] = 2*_c1*k*(_t2*(_c3 + _t5)*sin1(_a, E, d) + (_c4 + _t4 - 2*ecc)*cos1(_a, E, d))/(_c0*_t7*(_c2 + _t7))
+        out[0, i] = _c1*k*(_t2*(_c3 + _t5)*divdiff1_sin(_a, E, d) + (_c4 + _t4 - 2*ecc)*divdiff1_cos(_a, E, d))/(_c0*_t7*(_c2 + _t7))
         out[1, i] = a*sqrt(_t2*_t4**2 + _t6)
 
 
-@compiled(BEND)
-def bend(n, _a, b, left, right, p, out):
-    """climb[a, E, b] = V**2/((E - a)*(b - E)) between turning points, without cancellation, and ds/dE."""
+@compiled(POTENTIAL_DIVDIFF2)
+def potential_divdiff2(n, _a, b, left, right, p, out):
+    """U[a, E, b] = V**2/(2*(E - a)*(b - E)) from turn a to turn b, and ds/dE (MATHS, s. 3)."""
     left, right, p, out = carray(left, n), carray(right, n), carray(p, 4), carray(out, (2, n))
     a, ecc, k = p[0], p[1], p[2]
     _t0 = -_a + b
@@ -161,8 +122,8 @@ def bend(n, _a, b, left, right, p, out):
     _c0 = fabs(a)
     _t4 = sqrt(_t2**2*_t3 + (_t1 - ecc)**2)
     _t7 = sqrt(_t3*_t6**2 + (_t5 - ecc)**2)
-    _c1 = cos1(_a, b, _t0)
-    _c2 = sin1(_a, b, _t0)
+    _c1 = divdiff1_cos(_a, b, _t0)
+    _c2 = divdiff1_sin(_a, b, _t0)
     _c7 = _t2
     _c8 = _t6
     _c9 = _t1
@@ -173,320 +134,89 @@ def bend(n, _a, b, left, right, p, out):
     _c5 = 1/_t7
     _c6 = _t7
     for i in range(n):
-        da = left[i]
-        db = right[i]
-        E = nearest(_a, b, da, db)
+        da, db = left[i], right[i]
+        E = place_from_ends(_a, b, da, db)
         _t8 = cos(E)
         _t9 = sin(E)
         _t10 = _t9**2
         _t11 = sqrt(_t10*_t3 + (_t8 - ecc)**2)
         _t12 = _c5/_t11
-        _t15 = cos1(_a, E, da)
-        _t16 = sin1(_a, E, da)
+        _t15 = divdiff1_cos(_a, E, da)
+        _t16 = divdiff1_sin(_a, E, da)
         _t17 = (_c1*(_c9 + _t14) + _c2*_t3*(_c7 + _c8))*(_t15*(_c9 + _t13 + _t8) + _t16*_t3*(_c7 + _t9))/((_c4 + _c6)*(_c4 + _t11))
         _t18 = 1/(_c6 + _t11)
-        out[0, i] = -2*k*(_c3*_t12*_t17 - _t12*(-_t17*_t18 + _t18*(_c1*_t15 + _t3*(_c2*_t16 + (_c8 + _t9)*sin2(_a, E, b, da, db)) + (_t14 + _t8)*cos2(_a, E, b, da, db))))/_c0
+        out[0, i] = -k*(_c3*_t12*_t17 - _t12*(-_t17*_t18 + _t18*(_c1*_t15 + _t3*(_c2*_t16 + (_c8 + _t9)*divdiff2_sin(_a, E, b, da, db)) + (_t14 + _t8)*divdiff2_cos(_a, E, b, da, db))))/_c0
         out[1, i] = a*sqrt(_t10 + _t3*_t8**2)
-
-
-@compiled(RISE_EACH, later=True)
-def rise_each(n, starts, places, offsets, p, out):
-    """climb[a, E], ds/dE and the climb's derivative, each for a launch of its own."""
-    starts, places, offsets, p, out = carray(starts, n), carray(places, n), carray(offsets, n), carray(p, (4, n)), carray(out, (3, n))
-    for i in range(n):
-        a = p[0, i]
-        ecc = p[1, i]
-        k = p[2, i]
-        _a = starts[i]
-        E = places[i]
-        d = offsets[i]
-        _t0 = cos(E)
-        _t1 = -_t0 + ecc
-        _t2 = sin(E)
-        _t3 = _t2**2
-        _t4 = 1 - ecc**2
-        _t5 = _t1**2 + _t3*_t4
-        _t6 = sqrt(_t5)
-        _t7 = cos(_a)
-        _t8 = sin(_a)
-        _t9 = sqrt(_t4*_t8**2 + (_t7 - ecc)**2)
-        _t10 = fabs(a)
-        _t11 = 2*k
-        out[0, i] = _t11*(_t4*(_t2 + _t8)*sin1(_a, E, d) + (_t0 + _t7 - 2*ecc)*cos1(_a, E, d))/(_t10*_t6*_t9*(_t6 + _t9))
-        out[1, i] = a*sqrt(_t0**2*_t4 + _t3)
-        out[2, i] = _t10*_t11*_t2*(_t0*_t4 + _t1)/(a**2*sqrt(_t5)**3)
-
-
-@compiled(BEND_EACH, later=True)
-def bend_each(n, lows, highs, left, right, p, out):
-    """climb[a, E, b] and ds/dE, each for an orbit of its own; NaN where the closed form ends."""
-    lows, highs, left, right, p, out = carray(lows, n), carray(highs, n), carray(left, n), carray(right, n), carray(p, (19, n)), carray(out, (2, n))
-    for i in range(n):
-        a = p[0, i]
-        ecc = p[1, i]
-        k = p[2, i]
-        _c0 = p[4, i]
-        _c1 = p[5, i]
-        _c2 = p[6, i]
-        _c3 = p[7, i]
-        _c4 = p[8, i]
-        _c5 = p[9, i]
-        _c6 = p[10, i]
-        _c7 = p[11, i]
-        _c8 = p[12, i]
-        _c9 = p[13, i]
-        _c10 = p[14, i]
-        _c11 = p[15, i]
-        _c12 = p[16, i]
-        _c13 = p[17, i]
-        _c14 = p[18, i]
-        _a = lows[i]
-        b = highs[i]
-        da = left[i]
-        db = right[i]
-        E = nearest(_a, b, da, db)
-        _t0 = near_even(da, db)
-        _t1 = da*db
-        _t2 = _c5 - _t0*_t1
-        _t3 = da/2 - db/2
-        _t4 = _t3*near_odd(da, db)
-        _t5 = _c2*_t3 - _t1*_t4
-        _t6 = _c4*_t5
-        _t7 = -_c6*_t2 + _t6
-        _t8 = 1 - ecc**2
-        _t9 = _c4*_t2 + _c6*_t5
-        _t10 = _t9**2
-        _t11 = sqrt(_t10*_t8 + (-_t7 - ecc)**2)
-        _t12 = _c9/_t11
-        _t13 = -2*ecc
-        _t14 = _c14 + _t13
-        _t15 = cos1(_a, E, da)
-        _t16 = _c6*_t2 - _t6
-        _t17 = sin1(_a, E, da)
-        _t18 = (_c1*(_c13 + _t14) + _c3*_t8*(_c11 + _c12))*(_t15*(_c13 + _t13 + _t16) + _t17*_t8*(_c11 + _t9))/((_c10 + _c8)*(_c8 + _t11))
-        _t19 = 1/(_c10 + _t11)
-        out[0, i] = -2*k*(_c7*_t12*_t18 - _t12*(-_t18*_t19 + _t19*(_c1*_t15 + _t8*(_c3*_t17 + (_c12 + _t9)*(_c4*_t0 + _c6*_t4)) + (_t14 + _t16)*(-_c4*_t4 + _c6*_t0))))/_c0
-        out[1, i] = a*sqrt(_t10 + _t7**2*_t8)
-
-
-@compiled(ORBIT_EACH, later=True)
-def orbit_each(n, lows, highs, p, out):
-    """What is the same all along an orbit: ``bend_each`` finds it behind the run-time parameters."""
-    lows, highs, p, out = carray(lows, n), carray(highs, n), carray(p, (4, n)), carray(out, (15, n))
-    for i in range(n):
-        a = p[0, i]
-        ecc = p[1, i]
-        _a = lows[i]
-        b = highs[i]
-        _t0 = -_a + b
-        _t1 = _a/2
-        _t2 = _t1 - b/2
-        _t3 = _t1 + b/2
-        _t4 = cos(_a)
-        _t5 = sin(_a)
-        _t6 = 1 - ecc**2
-        _t7 = sqrt(_t5**2*_t6 + (_t4 - ecc)**2)
-        _t8 = cos(b)
-        _t9 = sin(b)
-        _t10 = sqrt(_t6*_t9**2 + (_t8 - ecc)**2)
-        out[0, i] = fabs(a)
-        out[1, i] = cos1(_a, b, _t0)
-        out[2, i] = near_sinc(-_t2)
-        out[3, i] = sin1(_a, b, _t0)
-        out[4, i] = sin(_t3)
-        out[5, i] = cos(_t2)
-        out[6, i] = cos(_t3)
-        out[7, i] = 1/_t7
-        out[8, i] = _t7
-        out[9, i] = 1/_t10
-        out[10, i] = _t10
-        out[11, i] = _t5
-        out[12, i] = _t9
-        out[13, i] = _t4
-        out[14, i] = _t8
-
-
-@compiled(SWING_EACH, later=True)
-def swing_each(n, fall, rise, p, out):
-    """(dt/du)**2 where sin(u)**2 = fall = 1 - rise, and what that is divided by, each for an orbit of its own."""
-    p, out = carray(p, (12, n)), carray(out, (2, n))
-    for i in range(n):
-        a = p[0, i]
-        ecc = p[1, i]
-        k = p[2, i]
-        top = p[4, i]
-        top_lack = p[5, i]
-        top_apart = p[6, i]
-        top_sine = p[7, i]
-        stretch = p[8, i]
-        _c0 = p[9, i]
-        _c1 = p[10, i]
-        _c2 = p[11, i]
-        _t0 = fall*top
-        _t1 = _t0 + 1
-        _t2 = _t1**2
-        _t3 = 1/_t2
-        _t4 = fall*top_apart + rise
-        _t5 = (fall*top_lack + rise)**2
-        _t6 = 16*_t0
-        _t7 = 1 - ecc**2
-        _t8 = 4*_t0
-        _t9 = _t2*ecc
-        _t10 = _t2 + _t8*ecc + _t9*top_sine - _t9
-        _t11 = -_t2
-        _t12 = sqrt((_t6*_t7*(-_t11 - _t8) + (-8*_t0 - _t11 - _t9)**2)/_t1**4)
-        _t13 = _c2 + _t12
-        out[0, i] = _c0*_c2*_t12*_t13*_t3*a**2*(_t5*_t6 + _t7*(_t5 - _t8)**2)/(2*_t10*_t4*ecc*k*stretch)
-        out[1, i] = 8*_c1*_t10*_t3*_t4*ecc*k/(_c0*_t12*_t13)
-
-
-@compiled(TOP_EACH, later=True)
-def top_each(n, halves, p, out):
-    """What is the same all along a swing: ``swing_each`` finds it behind the run-time parameters."""
-    halves, p, out = carray(halves, n), carray(p, (4, n)), carray(out, (8, n))
-    for i in range(n):
-        a = p[0, i]
-        ecc = p[1, i]
-        half = halves[i]
-        _t0 = half/4
-        _t1 = cos(_t0)
-        _t2 = 1/_t1**2
-        _t3 = half/2
-        _t4 = cos(_t3)
-        _t5 = _t1**4
-        _t6 = sin(_t3)**2
-        _t7 = sqrt(4*_t6*(1 - _t6)*(1 - ecc**2) + (-2*_t6 - ecc + 1)**2)
-        out[0, i] = _t2*sin(_t0)**2
-        out[1, i] = _t2*_t4
-        out[2, i] = _t4/_t5
-        out[3, i] = _t6
-        out[4, i] = _t5
-        out[5, i] = fabs(a)
-        out[6, i] = 1/_t7
-        out[7, i] = _t7
 
 
 @compiled(BOUNDS)
 def bounds(lo, hi, p, out):
-    """Bounds of the climb's slope and of ds/dE for lo <= E <= hi."""
+    """Bounds of dU/dE and ds/dE for lo <= E <= hi, by interval arithmetic."""
     p, out = carray(p, 4), carray(out, 4)
     E = (lo, hi)
-    a = (p[0], p[0])
-    ecc = (p[1], p[1])
-    k = (p[2], p[2])
+    a, ecc, k = (p[0], p[0]), (p[1], p[1]), (p[2], p[2])
     _t0 = isin(E)
     _t1 = icos(E)
     _t2 = iadd(iconst(1.0), imul(iconst(-1.0), ipow(ecc, 2)))
     _t3 = iadd(imul(iconst(-1.0), _t1), ecc)
     _t4 = ipow(_t0, 2)
-    out[0], out[1] = imul(imul(imul(imul(imul(imul(iconst(2.0), _t0), ipow(a, -2)), k), iadd(imul(_t1, _t2), _t3)), ipow(isqrt(iadd(imul(_t2, _t4), ipow(_t3, 2))), -3)), iabs(a))
+    out[0], out[1] = imul(imul(imul(imul(imul(_t0, ipow(a, -2)), k), iadd(imul(_t1, _t2), _t3)), ipow(isqrt(iadd(imul(_t2, _t4), ipow(_t3, 2))), -3)), iabs(a))
     out[2], out[3] = imul(a, isqrt(iadd(imul(ipow(_t1, 2), _t2), _t4)))
 
 
-@compiled(BOUNDS_EACH, later=True)
-def bounds_each(n, lo, hi, p, out):
-    """Bounds over many intervals of the climb's slope and of ds/dE for lo <= E <= hi, each for parameters of its own."""
-    lo, hi, p, out = carray(lo, n), carray(hi, n), carray(p, (4, n)), carray(out, (4, n))
-    for i in range(n):
-        E = (lo[i], hi[i])
-        a = (p[0, i], p[0, i])
-        ecc = (p[1, i], p[1, i])
-        k = (p[2, i], p[2, i])
-        _t0 = isin(E)
-        _t1 = icos(E)
-        _t2 = iadd(iconst(1.0), imul(iconst(-1.0), ipow(ecc, 2)))
-        _t3 = iadd(imul(iconst(-1.0), _t1), ecc)
-        _t4 = ipow(_t0, 2)
-        out[0, i], out[1, i] = imul(imul(imul(imul(imul(imul(iconst(2.0), _t0), ipow(a, -2)), k), iadd(imul(_t1, _t2), _t3)), ipow(isqrt(iadd(imul(_t2, _t4), ipow(_t3, 2))), -3)), iabs(a))
-        out[2, i], out[3, i] = imul(a, isqrt(iadd(imul(ipow(_t1, 2), _t2), _t4)))
-
-
-# The same formulas over a namespace of operations: extended precision evaluates these.
-
+# The same formulas over a namespace of operations, for extended precision.
 
 def exact_x(op, E, p):
     """Horizontal coordinate."""
-    a = p[0]
-    ecc = p[1]
+    a, ecc = p[0], p[1]
     return a*(-ecc + op.cos(E))
-
 
 def exact_z(op, E, p):
     """Height."""
-    a = p[0]
-    ecc = p[1]
+    a, ecc = p[0], p[1]
     return a*op.sqrt(1 - ecc**2)*op.sin(E)
-
 
 def exact_ds(op, E, p):
     """ds/dE."""
-    a = p[0]
-    ecc = p[1]
+    a, ecc = p[0], p[1]
     return a*op.sqrt((1 - ecc**2)*op.cos(E)**2 + op.sin(E)**2)
 
-
 def exact_kappa(op, E, p):
-    """Signed curvature."""
-    a = p[0]
-    ecc = p[1]
+    """Signed curvature (paper, eq. 8)."""
+    a, ecc = p[0], p[1]
     _t0 = 1 - ecc**2
     return op.sqrt(_t0)/(a*(_t0*op.cos(E)**2 + op.sin(E)**2)**(op.mpf(3)/2))
 
-
-def exact_reaction(op, E, p):
-    """Contact force per unit mass of a body at rest."""
-    a = p[0]
-    ecc = p[1]
-    k = p[2]
+def exact_static_normal_load(op, E, p):
+    """n0 = N/m of a body at rest, so that N = m*(kappa*V**2 + n0) (paper, eq. 15)."""
+    a, ecc, k = p[0], p[1], p[2]
     _t0 = 1 - ecc**2
     _t1 = op.sin(E)**2
     _t2 = op.cos(E)
     _t3 = _t2 - ecc
     return -op.sqrt(_t0)*k*(_t1 + _t2*_t3)*abs(a)/(a**3*(_t0*_t1 + _t3**2)**(op.mpf(3)/2)*op.sqrt(_t0*_t2**2 + _t1))
 
+def exact_effective_potential(op, E, p):
+    """U, so that V**2 + 2*U is constant (paper, eq. 13)."""
+    a, ecc, k = p[0], p[1], p[2]
+    return -k/(op.sqrt((1 - ecc**2)*op.sin(E)**2 + (-ecc + op.cos(E))**2)*abs(a))
 
-def exact_climb(op, E, p):
-    """What V**2 loses in climbing, up to a constant."""
-    a = p[0]
-    ecc = p[1]
-    k = p[2]
-    return -2*k/(op.sqrt((1 - ecc**2)*op.sin(E)**2 + (-ecc + op.cos(E))**2)*abs(a))
-
-
-def exact_climb_slope(op, E, p):
-    """Its derivative by E."""
-    a = p[0]
-    ecc = p[1]
-    k = p[2]
+def exact_effective_potential_slope(op, E, p):
+    """dU/dE."""
+    a, ecc, k = p[0], p[1], p[2]
     _t0 = op.sin(E)
     _t1 = op.cos(E)
     _t2 = 1 - ecc**2
     _t3 = -_t1 + ecc
-    return 2*_t0*k*(_t1*_t2 + _t3)*abs(a)/(a**2*(_t0**2*_t2 + _t3**2)**(op.mpf(3)/2))
-
+    return _t0*k*(_t1*_t2 + _t3)*abs(a)/(a**2*(_t0**2*_t2 + _t3**2)**(op.mpf(3)/2))
 
 def exact_domain(op, p):
     """Both ends of the domain, and the period; None where there is none."""
     return None, None, 2*op.pi
 
-
 def exact_axes(op, p):
     """A place about which V**2 and ds are even, and the distance to the next; None where there is none."""
     return 0, op.pi
-
-
-MODEL = CompiledModel(
-    name='kepler',
-    parameter='E',
-    parameters=PARAMETERS,
-    positive=('a',),
-    addresses=Addresses(frame.address, climb.address, rise.address, bend.address, bounds.address),
-    loads=loads,
-    each=Each(rise=rise_each, bend=bend_each, orbit=orbit_each, swing=swing_each, top=top_each, bounds=bounds_each, held=15, top_held=8),
-    domain_of=exact_domain,
-    axes_of=exact_axes,
-    exact=ExactFormulas(exact_x, exact_z, exact_ds, exact_kappa, exact_reaction, exact_climb, exact_climb_slope),
-)
 
 
 def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = None, a: Any = '3/2', ecc: Any = '3/5', k: Any = '7/2', m: Any = '1') -> Pass1:
@@ -508,7 +238,7 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = 
     Pass1
         Arrays x, z, ds, kappa, v2 and normal_force.
     """
-    return MODEL.pass1(LaunchRequest(lam0, v0, direction), (a, ecc, k, m,), lam, out)
+    return MODEL.pass1(LaunchRequest(lam0, v0, direction), (a, ecc, k, m), lam, out)
 
 
 def solve(
@@ -545,7 +275,7 @@ def solve(
     GQMError
         For a launch or a parameter that cannot be; the message says what would be right.
     """
-    return MODEL.solve(LaunchRequest(lam0, v0, direction, point, t_max, contact), (a, ecc, k, m,))
+    return MODEL.solve(LaunchRequest(lam0, v0, direction, point, t_max, contact), (a, ecc, k, m))
 
 
 def sweep(
@@ -581,7 +311,218 @@ def sweep(
     Returns
     -------
     Sweep
-        ``values``, NaN where there is none, and ``reasons``, 0 where there is one; ``why()`` counts the others.
+        ``values``, NaN where there is none; ``status``, 0 where there is one, and ``route``, how each was found.
+        ``status_counts()`` counts the launches without a value.
     """
     launches = LaunchRequest(lam0, v0, direction, None, t_max, contact)
-    return MODEL.sweep(quantity, launches, (a, ecc, k, m,), lam=lam, client=client, source=__file__)
+    return MODEL.sweep(quantity, launches, (a, ecc, k, m), lam=lam, client=client, source=__file__)
+
+
+# ---- The same formulas once more, only for speed: a load map in one call, and many orbits at once for sweeps. ----
+
+
+@compiled(LOAD_MAP, later=True)
+def load_map(n, w0, level, places, p, out):
+    """x, z, ds/dE, kappa, V**2 = w0 - 2*(U - level), N (paper, eqs. 8, 13, 15), size of U's terms."""
+    places, p, out = carray(places, n), carray(p, 4), carray(out, (7, n))
+    a, ecc, k, m = p[0], p[1], p[2], p[3]
+    _t0 = ecc**2
+    _t8 = 1/a
+    _c0 = fabs(a)
+    _c1 = fabs(ecc)
+    _c2 = fabs(k)
+    _t1 = 1 - _t0
+    _t10 = 1/_c0
+    _c3 = sqrt(_t1)
+    for i in range(n):
+        E = places[i]
+        _t2 = cos(E)
+        _t3 = _t2 - ecc
+        _t4 = sin(E)
+        _t5 = _t4**2
+        _t6 = _t1*_t2**2 + _t5
+        _t7 = sqrt(_t6)
+        _t9 = 1/sqrt(_t6)**3
+        _t11 = _t1*_t5 + _t3**2
+        _t12 = speed_squared_from_potential(w0, -_t10*k/sqrt(_t11), level)
+        out[0, i] = _t3*a
+        out[1, i] = _c3*_t4*a
+        out[2, i] = _t7*a
+        out[3, i] = _c3*_t8*_t9
+        out[4, i] = _t12
+        out[5, i] = m*(-_c0*_c3*k*(_t2*_t3 + _t5)/(_t7*a**3*sqrt(_t11)**3) + _c3*_t12*_t8*_t9)
+        out[6, i] = _c2*_t10*(_t5*(_t0 + 1) + (_c1 + fabs(_t2))**2)/sqrt(fabs(_t11))**3
+
+
+@compiled(POTENTIAL_DIVDIFF1_BATCH, later=True)
+def potential_divdiff1_batch(n, starts, places, offsets, p, out):
+    """U[a, E], ds/dE and dU/dE."""
+    starts, places, offsets, p, out = carray(starts, n), carray(places, n), carray(offsets, n), carray(p, (4, n)), carray(out, (3, n))
+    for i in range(n):
+        a, ecc, k, _a, E, d = p[0, i], p[1, i], p[2, i], starts[i], places[i], offsets[i]
+        _t0 = fabs(a)
+        _t1 = cos(E)
+        _t2 = -_t1 + ecc
+        _t3 = sin(E)
+        _t4 = _t3**2
+        _t5 = 1 - ecc**2
+        _t6 = _t2**2 + _t4*_t5
+        _t7 = sqrt(_t6)
+        _t8 = cos(_a)
+        _t9 = sin(_a)
+        _t10 = sqrt(_t5*_t9**2 + (_t8 - ecc)**2)
+        out[0, i] = k*(_t5*(_t3 + _t9)*divdiff1_sin(_a, E, d) + (_t1 + _t8 - 2*ecc)*divdiff1_cos(_a, E, d))/(_t0*_t10*_t7*(_t10 + _t7))
+        out[1, i] = a*sqrt(_t1**2*_t5 + _t4)
+        out[2, i] = _t0*_t3*k*(_t1*_t5 + _t2)/(a**2*sqrt(_t6)**3)
+
+
+@compiled(POTENTIAL_DIVDIFF2_BATCH, later=True)
+def potential_divdiff2_batch(n, lows, highs, left, right, p, out):
+    """U[a, E, b] and ds/dE; NaN where the points lie too far apart for the closed form."""
+    lows, highs, left, right, p, out = carray(lows, n), carray(highs, n), carray(left, n), carray(right, n), carray(p, (19, n)), carray(out, (2, n))
+    for i in range(n):
+        a, ecc, k, _c0, _c1, _c2, _c3, _c4 = p[0, i], p[1, i], p[2, i], p[4, i], p[5, i], p[6, i], p[7, i], p[8, i]
+        _c5, _c6, _c7, _c8, _c9, _c10, _c11 = p[9, i], p[10, i], p[11, i], p[12, i], p[13, i], p[14, i], p[15, i]
+        _c12, _c13, _c14, _a, b, da, db = p[16, i], p[17, i], p[18, i], lows[i], highs[i], left[i], right[i]
+        E = place_from_ends(_a, b, da, db)
+        _t0 = divdiff1_cos_in_square(da, db)
+        _t1 = da*db
+        _t2 = _c5 - _t0*_t1
+        _t3 = da/2 - db/2
+        _t4 = _t3*divdiff1_sinc_in_square(da, db)
+        _t5 = _c3*_t3 - _t1*_t4
+        _t6 = _c4*_t5
+        _t7 = -_c6*_t2 + _t6
+        _t8 = 1 - ecc**2
+        _t9 = _c4*_t2 + _c6*_t5
+        _t10 = _t9**2
+        _t11 = sqrt(_t10*_t8 + (-_t7 - ecc)**2)
+        _t12 = _c9/_t11
+        _t13 = -2*ecc
+        _t14 = _c14 + _t13
+        _t15 = divdiff1_cos(_a, E, da)
+        _t16 = _c6*_t2 - _t6
+        _t17 = divdiff1_sin(_a, E, da)
+        _t18 = (_c1*(_c13 + _t14) + _c2*_t8*(_c11 + _c12))*(_t15*(_c13 + _t13 + _t16) + _t17*_t8*(_c11 + _t9))/((_c10 + _c8)*(_c8 + _t11))
+        _t19 = 1/(_c10 + _t11)
+        out[0, i] = -k*(_c7*_t12*_t18 - _t12*(-_t18*_t19 + _t19*(_c1*_t15 + _t8*(_c2*_t17 + (_c12 + _t9)*(_c4*_t0 + _c6*_t4)) + (_t14 + _t16)*(-_c4*_t4 + _c6*_t0))))/_c0
+        out[1, i] = a*sqrt(_t10 + _t7**2*_t8)
+
+
+@compiled(ORBIT_INVARIANTS_BATCH, later=True)
+def orbit_invariants_batch(n, lows, highs, p, out):
+    """Terms that are constant along an orbit: ``potential_divdiff2_batch`` reads them behind the parameters."""
+    lows, highs, p, out = carray(lows, n), carray(highs, n), carray(p, (4, n)), carray(out, (15, n))
+    for i in range(n):
+        a, ecc, _a, b = p[0, i], p[1, i], lows[i], highs[i]
+        _t0 = -_a + b
+        _t1 = _a/2
+        _t2 = _t1 - b/2
+        _t3 = _t1 + b/2
+        _t4 = cos(_a)
+        _t5 = sin(_a)
+        _t6 = 1 - ecc**2
+        _t7 = sqrt(_t5**2*_t6 + (_t4 - ecc)**2)
+        _t8 = cos(b)
+        _t9 = sin(b)
+        _t10 = sqrt(_t6*_t9**2 + (_t8 - ecc)**2)
+        out[0, i] = fabs(a)
+        out[1, i] = divdiff1_cos(_a, b, _t0)
+        out[2, i] = divdiff1_sin(_a, b, _t0)
+        out[3, i] = sinc_near(-_t2)
+        out[4, i] = sin(_t3)
+        out[5, i] = cos(_t2)
+        out[6, i] = cos(_t3)
+        out[7, i] = 1/_t7
+        out[8, i] = _t7
+        out[9, i] = 1/_t10
+        out[10, i] = _t10
+        out[11, i] = _t5
+        out[12, i] = _t9
+        out[13, i] = _t4
+        out[14, i] = _t8
+
+
+@compiled(TIME_INTEGRAND_BATCH, later=True)
+def time_integrand_batch(n, fall, rise, p, out):
+    """(dt/du)**2 at sin(u)**2 = fall = 1 - rise, and its divisor; dt/du integrates to the half period (eq. 17)."""
+    p, out = carray(p, (12, n)), carray(out, (2, n))
+    for i in range(n):
+        a, ecc, k, top, top_lack, top_apart, top_sine = p[0, i], p[1, i], p[2, i], p[4, i], p[5, i], p[6, i], p[7, i]
+        stretch, _c0, _c1, _c2 = p[8, i], p[9, i], p[10, i], p[11, i]
+        _t0 = fall*top
+        _t1 = _t0 + 1
+        _t2 = _t1**2
+        _t3 = 1/_t2
+        _t4 = fall*top_apart + rise
+        _t5 = (fall*top_lack + rise)**2
+        _t6 = 16*_t0
+        _t7 = 1 - ecc**2
+        _t8 = 4*_t0
+        _t9 = _t2*ecc
+        _t10 = _t2 + _t8*ecc + _t9*top_sine - _t9
+        _t11 = -_t2
+        _t12 = sqrt((_t6*_t7*(-_t11 - _t8) + (-8*_t0 - _t11 - _t9)**2)/_t1**4)
+        _t13 = _c2 + _t12
+        out[0, i] = _c0*_c2*_t12*_t13*_t3*a**2*(_t5*_t6 + _t7*(_t5 - _t8)**2)/(2*_t10*_t4*ecc*k*stretch)
+        out[1, i] = 8*_c1*_t10*_t3*_t4*ecc*k/(_c0*_t12*_t13)
+
+
+@compiled(INTEGRAND_INVARIANTS_BATCH, later=True)
+def integrand_invariants_batch(n, halves, p, out):
+    """Terms that are constant along an orbit: ``time_integrand_batch`` reads them behind the parameters."""
+    halves, p, out = carray(halves, n), carray(p, (4, n)), carray(out, (8, n))
+    for i in range(n):
+        a, ecc, half = p[0, i], p[1, i], halves[i]
+        _t0 = half/4
+        _t1 = cos(_t0)
+        _t2 = 1/_t1**2
+        _t3 = half/2
+        _t4 = cos(_t3)
+        _t5 = _t1**4
+        _t6 = sin(_t3)**2
+        _t7 = sqrt(4*_t6*(1 - _t6)*(1 - ecc**2) + (-2*_t6 - ecc + 1)**2)
+        out[0, i] = _t2*sin(_t0)**2
+        out[1, i] = _t2*_t4
+        out[2, i] = _t4/_t5
+        out[3, i] = _t6
+        out[4, i] = _t5
+        out[5, i] = fabs(a)
+        out[6, i] = 1/_t7
+        out[7, i] = _t7
+
+
+@compiled(BOUNDS_BATCH, later=True)
+def bounds_batch(n, lo, hi, p, out):
+    """Bounds of dU/dE and ds/dE for lo <= E <= hi."""
+    lo, hi, p, out = carray(lo, n), carray(hi, n), carray(p, (4, n)), carray(out, (4, n))
+    for i in range(n):
+        E = (lo[i], hi[i])
+        a, ecc, k = (p[0, i], p[0, i]), (p[1, i], p[1, i]), (p[2, i], p[2, i])
+        _t0 = isin(E)
+        _t1 = icos(E)
+        _t2 = iadd(iconst(1.0), imul(iconst(-1.0), ipow(ecc, 2)))
+        _t3 = iadd(imul(iconst(-1.0), _t1), ecc)
+        _t4 = ipow(_t0, 2)
+        out[0, i], out[1, i] = imul(imul(imul(imul(imul(_t0, ipow(a, -2)), k), iadd(imul(_t1, _t2), _t3)), ipow(isqrt(iadd(imul(_t2, _t4), ipow(_t3, 2))), -3)), iabs(a))
+        out[2, i], out[3, i] = imul(a, isqrt(iadd(imul(ipow(_t1, 2), _t2), _t4)))
+
+
+MODEL = CompiledModel(
+    name='kepler', parameter='E', parameters=PARAMETERS, positive=('a',),
+    addresses=Addresses(
+        path_and_contact_force.address, effective_potential.address, potential_divdiff1.address,
+        potential_divdiff2.address, bounds.address,
+    ),
+    load_map=load_map,
+    batch=BatchFunctions(
+        potential_divdiff1=potential_divdiff1_batch, potential_divdiff2=potential_divdiff2_batch,
+        orbit_invariants=orbit_invariants_batch, time_integrand=time_integrand_batch,
+        integrand_invariants=integrand_invariants_batch, bounds=bounds_batch, orbit_rows=15, integrand_rows=8,
+    ),
+    domain_of=exact_domain, axes_of=exact_axes,
+    exact=ExactFormulas(
+        exact_x, exact_z, exact_ds, exact_kappa, exact_static_normal_load, exact_effective_potential,
+        exact_effective_potential_slope,
+    ),
+)

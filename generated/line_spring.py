@@ -1,5 +1,5 @@
 # Made by gqm-gen for "line_spring". Do not edit: change its declaration and generate again.
-# interface 8, input 924b210c4a96, body 6c5744481424
+# interface 8, input 702c9ef6b67b, body 9d4ee8063bc0
 """Bead on a sloping line, tied to the origin by a spring
 
 x              = x
@@ -28,22 +28,21 @@ from gqm_sym.runtime import compiler
 compiled = compiler(__file__, interface=8)
 
 from gqm_sym.runtime.vocabulary import (
-    BEND, BEND_EACH, BOUNDS, BOUNDS_EACH, CLIMB, FRAME, LOADS, MEAN_EACH, RISE, RISE_EACH, Addresses, CompiledModel,
-    Each, ExactFormulas, LaunchRequest, Pass1, iadd, iconst, idiv, imul, ipow, left_of,
+    AGM_ARGUMENTS_BATCH, BOUNDS, BOUNDS_BATCH, EFFECTIVE_POTENTIAL, LOAD_MAP, PATH_AND_CONTACT_FORCE,
+    POTENTIAL_DIVDIFF1, POTENTIAL_DIVDIFF1_BATCH, POTENTIAL_DIVDIFF2, POTENTIAL_DIVDIFF2_BATCH, Addresses,
+    BatchFunctions, CompiledModel, ExactFormulas, LaunchRequest, Pass1, iadd, iconst, idiv, imul, ipow,
+    speed_squared_from_potential,
 )
 
 if TYPE_CHECKING:
     from gqm_sym.runtime import Motion, Sweep
 
-PARAMETERS = {
-    'w': '1.3',
-    'm': '1',
-}
+PARAMETERS = {'w': '1.3', 'm': '1'}
 
 
-@compiled(FRAME)
-def frame(n, places, speeds, p, out):
-    """x, z, ds/dx, signed curvature and contact force, given V**2 (paper, eq. 15)."""
+@compiled(PATH_AND_CONTACT_FORCE)
+def path_and_contact_force(n, places, speeds, p, out):
+    """x, z, ds/dx, curvature kappa, contact force N = m*(kappa*V**2 + n0), given V**2 (paper, eqs. 8, 15)."""
     places, speeds, p, out = carray(places, n), carray(speeds, n), carray(p, 2), carray(out, (5, n))
     w, m = p[0], p[1]
     for i in range(n):
@@ -55,177 +54,89 @@ def frame(n, places, speeds, p, out):
         out[4, i] = 8*m*w**2/5
 
 
-@compiled(LOADS, later=True)
-def loads(n, w0, level, places, p, out):
-    """x, z, ds/dx, signed curvature, V**2, contact force (paper, eq. 15), and the size of the heights in V**2."""
-    places, p, out = carray(places, n), carray(p, 2), carray(out, (7, n))
-    w, m = p[0], p[1]
-    _t1 = w**2
-    for i in range(n):
-        x = places[i]
-        _t0 = 3*x/4 + 2
-        _t2 = x**2
-        out[0, i] = x
-        out[1, i] = _t0
-        out[2, i] = 5/4
-        out[3, i] = 0
-        out[4, i] = left_of(w0, _t1*(_t0**2 + _t2), level)
-        out[5, i] = 8*_t1*m/5
-        out[6, i] = _t1*(_t2 + (3*fabs(x)/4 + 2)**2)
-
-
-@compiled(CLIMB)
-def climb(n, places, p, out):
-    """What V**2 loses in climbing to x, up to a constant, and its derivative (paper, eq. 13)."""
+@compiled(EFFECTIVE_POTENTIAL)
+def effective_potential(n, places, p, out):
+    """U per unit mass, V**2 = v0**2 - 2*(U(x) - U(lam0)), and dU/dx (paper, eq. 13)."""
     places, p, out = carray(places, n), carray(p, 2), carray(out, (2, n))
     w = p[0]
     _t0 = w**2
     for i in range(n):
         x = places[i]
-        out[0, i] = _t0*(x**2 + (3*x/4 + 2)**2)
-        out[1, i] = _t0*(25*x/4 + 6)/2
+        out[0, i] = _t0*(x**2 + (3*x/4 + 2)**2)/2
+        out[1, i] = _t0*(25*x/4 + 6)/4
 
 
-@compiled(RISE)
-def rise(n, a, places, offsets, p, out):
-    """climb[a, x] = (climb(x) - climb(a))/(x - a) without cancellation, and ds/dx."""
+@compiled(POTENTIAL_DIVDIFF1)
+def potential_divdiff1(n, a, places, offsets, p, out):
+    """U[a, x] = (U(x) - U(a))/(x - a) without cancellation, and ds/dx (MATHS, s. 3)."""
     places, offsets, p, out = carray(places, n), carray(offsets, n), carray(p, 2), carray(out, (2, n))
     w = p[0]
     for i in range(n):
         x = places[i]
-        out[0, i] = w**2*(25*a/16 + 25*x/16 + 3)
+        out[0, i] = w**2*(25*a/16 + 25*x/16 + 3)/2
         out[1, i] = 5/4
 
 
-@compiled(BEND)
-def bend(n, a, b, left, right, p, out):
-    """climb[a, x, b] = V**2/((x - a)*(b - x)) between turning points, without cancellation, and ds/dx."""
+@compiled(POTENTIAL_DIVDIFF2)
+def potential_divdiff2(n, a, b, left, right, p, out):
+    """U[a, x, b] = V**2/(2*(x - a)*(b - x)) from turn a to turn b, and ds/dx (MATHS, s. 3)."""
     left, right, p, out = carray(left, n), carray(right, n), carray(p, 2), carray(out, (2, n))
     w = p[0]
     for i in range(n):
-        out[0, i] = 25*w**2/16
+        out[0, i] = 25*w**2/32
         out[1, i] = 5/4
-
-
-@compiled(RISE_EACH, later=True)
-def rise_each(n, starts, places, offsets, p, out):
-    """climb[a, x], ds/dx and the climb's derivative, each for a launch of its own."""
-    starts, places, offsets, p, out = carray(starts, n), carray(places, n), carray(offsets, n), carray(p, (2, n)), carray(out, (3, n))
-    for i in range(n):
-        w = p[0, i]
-        a = starts[i]
-        x = places[i]
-        _t0 = w**2
-        out[0, i] = _t0*(25*a/16 + 25*x/16 + 3)
-        out[1, i] = 5/4
-        out[2, i] = _t0*(25*x/4 + 6)/2
-
-
-@compiled(BEND_EACH, later=True)
-def bend_each(n, lows, highs, left, right, p, out):
-    """climb[a, x, b] and ds/dx, each for an orbit of its own; NaN where the closed form ends."""
-    lows, highs, left, right, p, out = carray(lows, n), carray(highs, n), carray(left, n), carray(right, n), carray(p, (2, n)), carray(out, (2, n))
-    for i in range(n):
-        w = p[0, i]
-        out[0, i] = 25*w**2/16
-        out[1, i] = 5/4
-
-
-@compiled(MEAN_EACH, later=True)
-def mean_each(n, halves, p, out):
-    """Squares of two numbers, each pair for an orbit of its own: its half period is pi over their agm (Gauss)."""
-    halves, p, out = carray(halves, n), carray(p, (2, n)), carray(out, (2, n))
-    for i in range(n):
-        w = p[0, i]
-        _t0 = w**2
-        out[0, i] = _t0
-        out[1, i] = _t0
 
 
 @compiled(BOUNDS)
 def bounds(lo, hi, p, out):
-    """Bounds of the climb's slope and of ds/dx for lo <= x <= hi."""
+    """Bounds of dU/dx and ds/dx for lo <= x <= hi, by interval arithmetic."""
     p, out = carray(p, 2), carray(out, 4)
     x = (lo, hi)
     w = (p[0], p[0])
-    out[0], out[1] = imul(imul(idiv(iconst(1.0), iconst(2.0)), ipow(w, 2)), iadd(imul(idiv(iconst(25.0), iconst(4.0)), x), iconst(6.0)))
+    out[0], out[1] = imul(imul(idiv(iconst(1.0), iconst(4.0)), ipow(w, 2)), iadd(imul(idiv(iconst(25.0), iconst(4.0)), x), iconst(6.0)))
     out[2], out[3] = idiv(iconst(5.0), iconst(4.0))
 
 
-@compiled(BOUNDS_EACH, later=True)
-def bounds_each(n, lo, hi, p, out):
-    """Bounds over many intervals of the climb's slope and of ds/dx for lo <= x <= hi, each for parameters of its own."""
-    lo, hi, p, out = carray(lo, n), carray(hi, n), carray(p, (2, n)), carray(out, (4, n))
-    for i in range(n):
-        x = (lo[i], hi[i])
-        w = (p[0, i], p[0, i])
-        out[0, i], out[1, i] = imul(imul(idiv(iconst(1.0), iconst(2.0)), ipow(w, 2)), iadd(imul(idiv(iconst(25.0), iconst(4.0)), x), iconst(6.0)))
-        out[2, i], out[3, i] = idiv(iconst(5.0), iconst(4.0))
-
-
-# The same formulas over a namespace of operations: extended precision evaluates these.
-
+# The same formulas over a namespace of operations, for extended precision.
 
 def exact_x(op, x, p):
     """Horizontal coordinate."""
     return x
 
-
 def exact_z(op, x, p):
     """Height."""
     return 3*x/4 + 2
-
 
 def exact_ds(op, x, p):
     """ds/dx."""
     return op.mpf(5)/4
 
-
 def exact_kappa(op, x, p):
-    """Signed curvature."""
+    """Signed curvature (paper, eq. 8)."""
     return 0
 
-
-def exact_reaction(op, x, p):
-    """Contact force per unit mass of a body at rest."""
+def exact_static_normal_load(op, x, p):
+    """n0 = N/m of a body at rest, so that N = m*(kappa*V**2 + n0) (paper, eq. 15)."""
     w = p[0]
     return 8*w**2/5
 
-
-def exact_climb(op, x, p):
-    """What V**2 loses in climbing, up to a constant."""
+def exact_effective_potential(op, x, p):
+    """U, so that V**2 + 2*U is constant (paper, eq. 13)."""
     w = p[0]
-    return w**2*(x**2 + (3*x/4 + 2)**2)
+    return w**2*(x**2 + (3*x/4 + 2)**2)/2
 
-
-def exact_climb_slope(op, x, p):
-    """Its derivative by x."""
+def exact_effective_potential_slope(op, x, p):
+    """dU/dx."""
     w = p[0]
-    return w**2*(25*x/4 + 6)/2
-
+    return w**2*(25*x/4 + 6)/4
 
 def exact_domain(op, p):
     """Both ends of the domain, and the period; None where there is none."""
     return None, None, None
 
-
 def exact_axes(op, p):
     """A place about which V**2 and ds are even, and the distance to the next; None where there is none."""
     return op.mpf(-24)/25, None
-
-
-MODEL = CompiledModel(
-    name='line_spring',
-    parameter='x',
-    parameters=PARAMETERS,
-    positive=(),
-    addresses=Addresses(frame.address, climb.address, rise.address, bend.address, bounds.address),
-    loads=loads,
-    each=Each(rise=rise_each, bend=bend_each, mean=mean_each, bounds=bounds_each),
-    domain_of=exact_domain,
-    axes_of=exact_axes,
-    exact=ExactFormulas(exact_x, exact_z, exact_ds, exact_kappa, exact_reaction, exact_climb, exact_climb_slope),
-)
 
 
 def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = None, w: Any = '1.3', m: Any = '1') -> Pass1:
@@ -247,7 +158,7 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = 
     Pass1
         Arrays x, z, ds, kappa, v2 and normal_force.
     """
-    return MODEL.pass1(LaunchRequest(lam0, v0, direction), (w, m,), lam, out)
+    return MODEL.pass1(LaunchRequest(lam0, v0, direction), (w, m), lam, out)
 
 
 def solve(
@@ -284,7 +195,7 @@ def solve(
     GQMError
         For a launch or a parameter that cannot be; the message says what would be right.
     """
-    return MODEL.solve(LaunchRequest(lam0, v0, direction, point, t_max, contact), (w, m,))
+    return MODEL.solve(LaunchRequest(lam0, v0, direction, point, t_max, contact), (w, m))
 
 
 def sweep(
@@ -320,7 +231,94 @@ def sweep(
     Returns
     -------
     Sweep
-        ``values``, NaN where there is none, and ``reasons``, 0 where there is one; ``why()`` counts the others.
+        ``values``, NaN where there is none; ``status``, 0 where there is one, and ``route``, how each was found.
+        ``status_counts()`` counts the launches without a value.
     """
     launches = LaunchRequest(lam0, v0, direction, None, t_max, contact)
-    return MODEL.sweep(quantity, launches, (w, m,), lam=lam, client=client, source=__file__)
+    return MODEL.sweep(quantity, launches, (w, m), lam=lam, client=client, source=__file__)
+
+
+# ---- The same formulas once more, only for speed: a load map in one call, and many orbits at once for sweeps. ----
+
+
+@compiled(LOAD_MAP, later=True)
+def load_map(n, w0, level, places, p, out):
+    """x, z, ds/dx, kappa, V**2 = w0 - 2*(U - level), N (paper, eqs. 8, 13, 15), size of U's terms."""
+    places, p, out = carray(places, n), carray(p, 2), carray(out, (7, n))
+    w, m = p[0], p[1]
+    _t2 = w**2
+    _t3 = _t2/2
+    for i in range(n):
+        x = places[i]
+        _t0 = 3*x/4 + 2
+        _t1 = x**2
+        out[0, i] = x
+        out[1, i] = _t0
+        out[2, i] = 5/4
+        out[3, i] = 0
+        out[4, i] = speed_squared_from_potential(w0, _t3*(_t0**2 + _t1), level)
+        out[5, i] = 8*_t2*m/5
+        out[6, i] = _t3*(_t1 + (3*fabs(x)/4 + 2)**2)
+
+
+@compiled(POTENTIAL_DIVDIFF1_BATCH, later=True)
+def potential_divdiff1_batch(n, starts, places, offsets, p, out):
+    """U[a, x], ds/dx and dU/dx."""
+    starts, places, offsets, p, out = carray(starts, n), carray(places, n), carray(offsets, n), carray(p, (2, n)), carray(out, (3, n))
+    for i in range(n):
+        w, a, x = p[0, i], starts[i], places[i]
+        _t0 = w**2
+        out[0, i] = _t0*(25*a/16 + 25*x/16 + 3)/2
+        out[1, i] = 5/4
+        out[2, i] = _t0*(25*x/4 + 6)/4
+
+
+@compiled(POTENTIAL_DIVDIFF2_BATCH, later=True)
+def potential_divdiff2_batch(n, lows, highs, left, right, p, out):
+    """U[a, x, b] and ds/dx; NaN where the points lie too far apart for the closed form."""
+    lows, highs, left, right, p, out = carray(lows, n), carray(highs, n), carray(left, n), carray(right, n), carray(p, (2, n)), carray(out, (2, n))
+    for i in range(n):
+        w = p[0, i]
+        out[0, i] = 25*w**2/32
+        out[1, i] = 5/4
+
+
+@compiled(AGM_ARGUMENTS_BATCH, later=True)
+def agm_arguments_batch(n, halves, p, out):
+    """a**2, b**2: the half period (paper, eq. 17) is pi over the arithmetic-geometric mean of a and b (Gauss)."""
+    halves, p, out = carray(halves, n), carray(p, (2, n)), carray(out, (2, n))
+    for i in range(n):
+        w = p[0, i]
+        _t0 = w**2
+        out[0, i] = _t0
+        out[1, i] = _t0
+
+
+@compiled(BOUNDS_BATCH, later=True)
+def bounds_batch(n, lo, hi, p, out):
+    """Bounds of dU/dx and ds/dx for lo <= x <= hi."""
+    lo, hi, p, out = carray(lo, n), carray(hi, n), carray(p, (2, n)), carray(out, (4, n))
+    for i in range(n):
+        x = (lo[i], hi[i])
+        w = (p[0, i], p[0, i])
+        out[0, i], out[1, i] = imul(imul(idiv(iconst(1.0), iconst(4.0)), ipow(w, 2)), iadd(imul(idiv(iconst(25.0), iconst(4.0)), x), iconst(6.0)))
+        out[2, i], out[3, i] = idiv(iconst(5.0), iconst(4.0))
+
+
+MODEL = CompiledModel(
+    name='line_spring', parameter='x', parameters=PARAMETERS, positive=(),
+    addresses=Addresses(
+        path_and_contact_force.address, effective_potential.address, potential_divdiff1.address,
+        potential_divdiff2.address, bounds.address,
+    ),
+    load_map=load_map,
+    batch=BatchFunctions(
+        potential_divdiff1=potential_divdiff1_batch, potential_divdiff2=potential_divdiff2_batch,
+        agm_arguments=agm_arguments_batch, bounds=bounds_batch,
+    ),
+    domain_of=exact_domain, axes_of=exact_axes,
+    exact=ExactFormulas(
+        exact_x, exact_z, exact_ds, exact_kappa, exact_static_normal_load, exact_effective_potential,
+        exact_effective_potential_slope,
+    ),
+)

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "log_spiral". Do not edit: change its declaration and generate again.
-# interface 8, input 458ba188398a, body c6318e5ebcfe
+# interface 8, input 8cb1e254c2ba, body 35accce194e9
 """Bead on a logarithmic spiral
 
 x              = r0*exp(b*theta)*cos(theta)
@@ -28,33 +28,29 @@ from gqm_sym.runtime import compiler
 compiled = compiler(__file__, interface=8)
 
 from gqm_sym.runtime.vocabulary import (
-    BEND, BEND_EACH, BOUNDS, BOUNDS_EACH, CLIMB, FRAME, LOADS, ORBIT_EACH, RISE, RISE_EACH, Addresses, CompiledModel,
-    Each, ExactFormulas, LaunchRequest, Pass1, cos, exp, exp1, exp2, iadd, iconst, icos, iexp, imul, ipow, isin, isqrt,
-    left_of, near_even, near_odd, nearest, sin, sin1, sin2,
+    BOUNDS, BOUNDS_BATCH, EFFECTIVE_POTENTIAL, LOAD_MAP, ORBIT_INVARIANTS_BATCH, PATH_AND_CONTACT_FORCE,
+    POTENTIAL_DIVDIFF1, POTENTIAL_DIVDIFF1_BATCH, POTENTIAL_DIVDIFF2, POTENTIAL_DIVDIFF2_BATCH, Addresses,
+    BatchFunctions, CompiledModel, ExactFormulas, LaunchRequest, Pass1, cos, divdiff1_cos_in_square, divdiff1_exp,
+    divdiff1_sin, divdiff1_sinc_in_square, divdiff2_exp, divdiff2_sin, exp, iadd, iconst, icos, iexp, imul, ipow, isin,
+    isqrt, place_from_ends, sin, speed_squared_from_potential,
 )
 
 if TYPE_CHECKING:
     from gqm_sym.runtime import Motion, Sweep
 
-PARAMETERS = {
-    'r0': '1',
-    'b': '0.15',
-    'g': '9.81',
-    'm': '1',
-}
+PARAMETERS = {'r0': '1', 'b': '0.15', 'g': '9.81', 'm': '1'}
 
 
-@compiled(FRAME)
-def frame(n, places, speeds, p, out):
-    """x, z, ds/dtheta, signed curvature and contact force, given V**2 (paper, eq. 15)."""
+@compiled(PATH_AND_CONTACT_FORCE)
+def path_and_contact_force(n, places, speeds, p, out):
+    """x, z, ds/dtheta, curvature kappa, contact force N = m*(kappa*V**2 + n0), given V**2 (paper, eqs. 8, 15)."""
     places, speeds, p, out = carray(places, n), carray(speeds, n), carray(p, 4), carray(out, (5, n))
     r0, b, g, m = p[0], p[1], p[2], p[3]
     _t0 = sqrt(b**2 + 1)
     _c0 = 1/_t0
     _c1 = _t0
     for i in range(n):
-        theta = places[i]
-        v2 = speeds[i]
+        theta, v2 = places[i], speeds[i]
         _t1 = cos(theta)
         _t2 = b*theta
         _t3 = r0*exp(_t2)
@@ -67,66 +63,37 @@ def frame(n, places, speeds, p, out):
         out[4, i] = m*(_c0*g*(_t1*b - _t4) + _t5*v2)
 
 
-@compiled(LOADS, later=True)
-def loads(n, w0, level, places, p, out):
-    """x, z, ds/dtheta, signed curvature, V**2, contact force (paper, eq. 15), and the size of the heights in V**2."""
-    places, p, out = carray(places, n), carray(p, 4), carray(out, (7, n))
-    r0, b, g, m = p[0], p[1], p[2], p[3]
-    _t0 = sqrt(b**2 + 1)
-    _c0 = fabs(g)
-    _c1 = fabs(r0)
-    _c2 = 1/_t0
-    _c3 = _t0
-    for i in range(n):
-        theta = places[i]
-        e0 = exp(b*theta)
-        _t1 = cos(theta)
-        _t2 = e0*r0
-        _t3 = sin(theta)
-        _t4 = _t2*_t3
-        _t5 = _c2/(e0*r0)
-        _t6 = left_of(w0, 2*_t4*g, level)
-        out[0, i] = _t1*_t2
-        out[1, i] = _t4
-        out[2, i] = _c3*_t2
-        out[3, i] = _t5
-        out[4, i] = _t6
-        out[5, i] = m*(_c2*g*(_t1*b - _t3) + _t5*_t6)
-        out[6, i] = 2*_c0*_c1*e0*fabs(_t3)
-
-
-@compiled(CLIMB)
-def climb(n, places, p, out):
-    """What V**2 loses in climbing to theta, up to a constant, and its derivative (paper, eq. 13)."""
+@compiled(EFFECTIVE_POTENTIAL)
+def effective_potential(n, places, p, out):
+    """U per unit mass, V**2 = v0**2 - 2*(U(theta) - U(lam0)), and dU/dtheta (paper, eq. 13)."""
     places, p, out = carray(places, n), carray(p, 4), carray(out, (2, n))
     r0, b, g = p[0], p[1], p[2]
     for i in range(n):
         theta = places[i]
         _t0 = sin(theta)
-        _t1 = 2*g*r0*exp(b*theta)
+        _t1 = g*r0*exp(b*theta)
         out[0, i] = _t0*_t1
         out[1, i] = _t1*(_t0*b + cos(theta))
 
 
-@compiled(RISE)
-def rise(n, a, places, offsets, p, out):
-    """climb[a, theta] = (climb(theta) - climb(a))/(theta - a) without cancellation, and ds/dtheta."""
+@compiled(POTENTIAL_DIVDIFF1)
+def potential_divdiff1(n, a, places, offsets, p, out):
+    """U[a, theta] = (U(theta) - U(a))/(theta - a) without cancellation, and ds/dtheta (MATHS, s. 3)."""
     places, offsets, p, out = carray(places, n), carray(offsets, n), carray(p, 4), carray(out, (2, n))
     r0, b, g = p[0], p[1], p[2]
     _c0 = sin(a)
     _c1 = sqrt(b**2 + 1)
     for i in range(n):
-        theta = places[i]
-        d = offsets[i]
+        theta, d = places[i], offsets[i]
         _t0 = b*theta
         _t1 = exp(_t0)
-        out[0, i] = 2*g*r0*(_c0*b*exp1(a*b, _t0, b*d) + _t1*sin1(a, theta, d))
+        out[0, i] = g*r0*(_c0*b*divdiff1_exp(a*b, _t0, b*d) + _t1*divdiff1_sin(a, theta, d))
         out[1, i] = _c1*_t1*r0
 
 
-@compiled(BEND)
-def bend(n, a, _b, left, right, p, out):
-    """climb[a, theta, b] = V**2/((theta - a)*(b - theta)) between turning points, without cancellation, and ds/dtheta."""
+@compiled(POTENTIAL_DIVDIFF2)
+def potential_divdiff2(n, a, _b, left, right, p, out):
+    """U[a, theta, b] = V**2/(2*(theta - a)*(b - theta)) from turn a to turn b, and ds/dtheta (MATHS, s. 3)."""
     left, right, p, out = carray(left, n), carray(right, n), carray(p, 4), carray(out, (2, n))
     r0, b, g = p[0], p[1], p[2]
     _t0 = _b*b
@@ -135,173 +102,65 @@ def bend(n, a, _b, left, right, p, out):
     _c1 = exp(_t0)
     _c2 = sqrt(_t1 + 1)
     for i in range(n):
-        da = left[i]
-        db = right[i]
-        theta = nearest(a, _b, da, db)
+        da, db = left[i], right[i]
+        theta = place_from_ends(a, _b, da, db)
         _t2 = b*theta
         _t3 = b*db
-        out[0, i] = 2*g*r0*(_c0*_t1*exp2(a*b, _t2, _t0, b*da, _t3) + _c1*sin2(a, theta, _b, da, db) + b*exp1(_t2, _t0, _t3)*sin1(a, theta, da))
+        out[0, i] = g*r0*(_c0*_t1*divdiff2_exp(a*b, _t2, _t0, b*da, _t3) + _c1*divdiff2_sin(a, theta, _b, da, db) + b*divdiff1_exp(_t2, _t0, _t3)*divdiff1_sin(a, theta, da))
         out[1, i] = _c2*r0*exp(_t2)
-
-
-@compiled(RISE_EACH, later=True)
-def rise_each(n, starts, places, offsets, p, out):
-    """climb[a, theta], ds/dtheta and the climb's derivative, each for a launch of its own."""
-    starts, places, offsets, p, out = carray(starts, n), carray(places, n), carray(offsets, n), carray(p, (4, n)), carray(out, (3, n))
-    for i in range(n):
-        r0 = p[0, i]
-        b = p[1, i]
-        g = p[2, i]
-        a = starts[i]
-        theta = places[i]
-        d = offsets[i]
-        _t0 = b*theta
-        _t1 = exp(_t0)
-        _t2 = 2*g
-        _t3 = _t1*r0
-        out[0, i] = _t2*r0*(_t1*sin1(a, theta, d) + b*exp1(a*b, _t0, b*d)*sin(a))
-        out[1, i] = _t3*sqrt(b**2 + 1)
-        out[2, i] = _t2*_t3*(b*sin(theta) + cos(theta))
-
-
-@compiled(BEND_EACH, later=True)
-def bend_each(n, lows, highs, left, right, p, out):
-    """climb[a, theta, b] and ds/dtheta, each for an orbit of its own; NaN where the closed form ends."""
-    lows, highs, left, right, p, out = carray(lows, n), carray(highs, n), carray(left, n), carray(right, n), carray(p, (9, n)), carray(out, (2, n))
-    for i in range(n):
-        r0 = p[0, i]
-        b = p[1, i]
-        g = p[2, i]
-        _c0 = p[4, i]
-        _c1 = p[5, i]
-        _c2 = p[6, i]
-        _c3 = p[7, i]
-        _c4 = p[8, i]
-        a = lows[i]
-        _b = highs[i]
-        da = left[i]
-        db = right[i]
-        theta = nearest(a, _b, da, db)
-        _t0 = b*theta
-        _t1 = _b*b
-        _t2 = b*db
-        out[0, i] = 2*g*r0*(_c0*b**2*exp2(a*b, _t0, _t1, b*da, _t2) + _c1*(_c3*near_even(da, db) + _c4*(da/2 - db/2)*near_odd(da, db)) + b*exp1(_t0, _t1, _t2)*sin1(a, theta, da))
-        out[1, i] = _c2*r0*exp(_t0)
-
-
-@compiled(ORBIT_EACH, later=True)
-def orbit_each(n, lows, highs, p, out):
-    """What is the same all along an orbit: ``bend_each`` finds it behind the run-time parameters."""
-    lows, highs, p, out = carray(lows, n), carray(highs, n), carray(p, (4, n)), carray(out, (5, n))
-    for i in range(n):
-        b = p[1, i]
-        a = lows[i]
-        _b = highs[i]
-        _t0 = _b/2 + a/2
-        out[0, i] = sin(a)
-        out[1, i] = exp(_b*b)
-        out[2, i] = sqrt(b**2 + 1)
-        out[3, i] = sin(_t0)
-        out[4, i] = cos(_t0)
 
 
 @compiled(BOUNDS)
 def bounds(lo, hi, p, out):
-    """Bounds of the climb's slope and of ds/dtheta for lo <= theta <= hi."""
+    """Bounds of dU/dtheta and ds/dtheta for lo <= theta <= hi, by interval arithmetic."""
     p, out = carray(p, 4), carray(out, 4)
     theta = (lo, hi)
-    r0 = (p[0], p[0])
-    b = (p[1], p[1])
-    g = (p[2], p[2])
+    r0, b, g = (p[0], p[0]), (p[1], p[1]), (p[2], p[2])
     _t0 = imul(r0, iexp(imul(b, theta)))
-    out[0], out[1] = imul(imul(imul(iconst(2.0), _t0), g), iadd(imul(b, isin(theta)), icos(theta)))
+    out[0], out[1] = imul(imul(_t0, g), iadd(imul(b, isin(theta)), icos(theta)))
     out[2], out[3] = imul(_t0, isqrt(iadd(ipow(b, 2), iconst(1.0))))
 
 
-@compiled(BOUNDS_EACH, later=True)
-def bounds_each(n, lo, hi, p, out):
-    """Bounds over many intervals of the climb's slope and of ds/dtheta for lo <= theta <= hi, each for parameters of its own."""
-    lo, hi, p, out = carray(lo, n), carray(hi, n), carray(p, (4, n)), carray(out, (4, n))
-    for i in range(n):
-        theta = (lo[i], hi[i])
-        r0 = (p[0, i], p[0, i])
-        b = (p[1, i], p[1, i])
-        g = (p[2, i], p[2, i])
-        _t0 = imul(r0, iexp(imul(b, theta)))
-        out[0, i], out[1, i] = imul(imul(imul(iconst(2.0), _t0), g), iadd(imul(b, isin(theta)), icos(theta)))
-        out[2, i], out[3, i] = imul(_t0, isqrt(iadd(ipow(b, 2), iconst(1.0))))
-
-
-# The same formulas over a namespace of operations: extended precision evaluates these.
-
+# The same formulas over a namespace of operations, for extended precision.
 
 def exact_x(op, theta, p):
     """Horizontal coordinate."""
-    r0 = p[0]
-    b = p[1]
+    r0, b = p[0], p[1]
     return r0*op.exp(b*theta)*op.cos(theta)
-
 
 def exact_z(op, theta, p):
     """Height."""
-    r0 = p[0]
-    b = p[1]
+    r0, b = p[0], p[1]
     return r0*op.exp(b*theta)*op.sin(theta)
-
 
 def exact_ds(op, theta, p):
     """ds/dtheta."""
-    r0 = p[0]
-    b = p[1]
+    r0, b = p[0], p[1]
     return r0*op.sqrt(b**2 + 1)*op.exp(b*theta)
 
-
 def exact_kappa(op, theta, p):
-    """Signed curvature."""
-    r0 = p[0]
-    b = p[1]
+    """Signed curvature (paper, eq. 8)."""
+    r0, b = p[0], p[1]
     return op.exp(-b*theta)/(r0*op.sqrt(b**2 + 1))
 
-
-def exact_reaction(op, theta, p):
-    """Contact force per unit mass of a body at rest."""
-    b = p[1]
-    g = p[2]
+def exact_static_normal_load(op, theta, p):
+    """n0 = N/m of a body at rest, so that N = m*(kappa*V**2 + n0) (paper, eq. 15)."""
+    b, g = p[1], p[2]
     return g*(b*op.cos(theta) - op.sin(theta))/op.sqrt(b**2 + 1)
 
+def exact_effective_potential(op, theta, p):
+    """U, so that V**2 + 2*U is constant (paper, eq. 13)."""
+    r0, b, g = p[0], p[1], p[2]
+    return g*r0*op.exp(b*theta)*op.sin(theta)
 
-def exact_climb(op, theta, p):
-    """What V**2 loses in climbing, up to a constant."""
-    r0 = p[0]
-    b = p[1]
-    g = p[2]
-    return 2*g*r0*op.exp(b*theta)*op.sin(theta)
-
-
-def exact_climb_slope(op, theta, p):
-    """Its derivative by theta."""
-    r0 = p[0]
-    b = p[1]
-    g = p[2]
-    return 2*g*r0*(b*op.sin(theta) + op.cos(theta))*op.exp(b*theta)
-
+def exact_effective_potential_slope(op, theta, p):
+    """dU/dtheta."""
+    r0, b, g = p[0], p[1], p[2]
+    return g*r0*(b*op.sin(theta) + op.cos(theta))*op.exp(b*theta)
 
 def exact_domain(op, p):
     """Both ends of the domain, and the period; None where there is none."""
     return None, None, None
-
-
-MODEL = CompiledModel(
-    name='log_spiral',
-    parameter='theta',
-    parameters=PARAMETERS,
-    positive=('r0',),
-    addresses=Addresses(frame.address, climb.address, rise.address, bend.address, bounds.address),
-    loads=loads,
-    each=Each(rise=rise_each, bend=bend_each, orbit=orbit_each, bounds=bounds_each, held=5),
-    domain_of=exact_domain,
-    exact=ExactFormulas(exact_x, exact_z, exact_ds, exact_kappa, exact_reaction, exact_climb, exact_climb_slope),
-)
 
 
 def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = None, r0: Any = '1', b: Any = '0.15', g: Any = '9.81', m: Any = '1') -> Pass1:
@@ -323,7 +182,7 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = 
     Pass1
         Arrays x, z, ds, kappa, v2 and normal_force.
     """
-    return MODEL.pass1(LaunchRequest(lam0, v0, direction), (r0, b, g, m,), lam, out)
+    return MODEL.pass1(LaunchRequest(lam0, v0, direction), (r0, b, g, m), lam, out)
 
 
 def solve(
@@ -360,7 +219,7 @@ def solve(
     GQMError
         For a launch or a parameter that cannot be; the message says what would be right.
     """
-    return MODEL.solve(LaunchRequest(lam0, v0, direction, point, t_max, contact), (r0, b, g, m,))
+    return MODEL.solve(LaunchRequest(lam0, v0, direction, point, t_max, contact), (r0, b, g, m))
 
 
 def sweep(
@@ -396,7 +255,113 @@ def sweep(
     Returns
     -------
     Sweep
-        ``values``, NaN where there is none, and ``reasons``, 0 where there is one; ``why()`` counts the others.
+        ``values``, NaN where there is none; ``status``, 0 where there is one, and ``route``, how each was found.
+        ``status_counts()`` counts the launches without a value.
     """
     launches = LaunchRequest(lam0, v0, direction, None, t_max, contact)
-    return MODEL.sweep(quantity, launches, (r0, b, g, m,), lam=lam, client=client, source=__file__)
+    return MODEL.sweep(quantity, launches, (r0, b, g, m), lam=lam, client=client, source=__file__)
+
+
+# ---- The same formulas once more, only for speed: a load map in one call, and many orbits at once for sweeps. ----
+
+
+@compiled(LOAD_MAP, later=True)
+def load_map(n, w0, level, places, p, out):
+    """x, z, ds/dtheta, kappa, V**2 = w0 - 2*(U - level), N (paper, eqs. 8, 13, 15), size of U's terms."""
+    places, p, out = carray(places, n), carray(p, 4), carray(out, (7, n))
+    r0, b, g, m = p[0], p[1], p[2], p[3]
+    _t0 = sqrt(b**2 + 1)
+    _c0 = fabs(g)
+    _c1 = fabs(r0)
+    _c2 = 1/_t0
+    _c3 = _t0
+    for i in range(n):
+        theta = places[i]
+        e0 = exp(b*theta)
+        _t1 = cos(theta)
+        _t2 = e0*r0
+        _t3 = sin(theta)
+        _t4 = _t2*_t3
+        _t5 = _c2/(e0*r0)
+        _t6 = speed_squared_from_potential(w0, _t4*g, level)
+        out[0, i] = _t1*_t2
+        out[1, i] = _t4
+        out[2, i] = _c3*_t2
+        out[3, i] = _t5
+        out[4, i] = _t6
+        out[5, i] = m*(_c2*g*(_t1*b - _t3) + _t5*_t6)
+        out[6, i] = _c0*_c1*e0*fabs(_t3)
+
+
+@compiled(POTENTIAL_DIVDIFF1_BATCH, later=True)
+def potential_divdiff1_batch(n, starts, places, offsets, p, out):
+    """U[a, theta], ds/dtheta and dU/dtheta."""
+    starts, places, offsets, p, out = carray(starts, n), carray(places, n), carray(offsets, n), carray(p, (4, n)), carray(out, (3, n))
+    for i in range(n):
+        r0, b, g, a, theta, d = p[0, i], p[1, i], p[2, i], starts[i], places[i], offsets[i]
+        _t0 = b*theta
+        _t1 = exp(_t0)
+        _t2 = g*r0
+        out[0, i] = _t2*(_t1*divdiff1_sin(a, theta, d) + b*divdiff1_exp(a*b, _t0, b*d)*sin(a))
+        out[1, i] = _t1*r0*sqrt(b**2 + 1)
+        out[2, i] = _t1*_t2*(b*sin(theta) + cos(theta))
+
+
+@compiled(POTENTIAL_DIVDIFF2_BATCH, later=True)
+def potential_divdiff2_batch(n, lows, highs, left, right, p, out):
+    """U[a, theta, b] and ds/dtheta; NaN where the points lie too far apart for the closed form."""
+    lows, highs, left, right, p, out = carray(lows, n), carray(highs, n), carray(left, n), carray(right, n), carray(p, (9, n)), carray(out, (2, n))
+    for i in range(n):
+        r0, b, g, _c0, _c1, _c2, _c3, _c4 = p[0, i], p[1, i], p[2, i], p[4, i], p[5, i], p[6, i], p[7, i], p[8, i]
+        a, _b, da, db = lows[i], highs[i], left[i], right[i]
+        theta = place_from_ends(a, _b, da, db)
+        _t0 = b*theta
+        _t1 = _b*b
+        _t2 = b*db
+        out[0, i] = g*r0*(_c0*b**2*divdiff2_exp(a*b, _t0, _t1, b*da, _t2) + _c1*(_c3*divdiff1_cos_in_square(da, db) + _c4*(da/2 - db/2)*divdiff1_sinc_in_square(da, db)) + b*divdiff1_exp(_t0, _t1, _t2)*divdiff1_sin(a, theta, da))
+        out[1, i] = _c2*r0*exp(_t0)
+
+
+@compiled(ORBIT_INVARIANTS_BATCH, later=True)
+def orbit_invariants_batch(n, lows, highs, p, out):
+    """Terms that are constant along an orbit: ``potential_divdiff2_batch`` reads them behind the parameters."""
+    lows, highs, p, out = carray(lows, n), carray(highs, n), carray(p, (4, n)), carray(out, (5, n))
+    for i in range(n):
+        b, a, _b = p[1, i], lows[i], highs[i]
+        _t0 = _b/2 + a/2
+        out[0, i] = sin(a)
+        out[1, i] = exp(_b*b)
+        out[2, i] = sqrt(b**2 + 1)
+        out[3, i] = sin(_t0)
+        out[4, i] = cos(_t0)
+
+
+@compiled(BOUNDS_BATCH, later=True)
+def bounds_batch(n, lo, hi, p, out):
+    """Bounds of dU/dtheta and ds/dtheta for lo <= theta <= hi."""
+    lo, hi, p, out = carray(lo, n), carray(hi, n), carray(p, (4, n)), carray(out, (4, n))
+    for i in range(n):
+        theta = (lo[i], hi[i])
+        r0, b, g = (p[0, i], p[0, i]), (p[1, i], p[1, i]), (p[2, i], p[2, i])
+        _t0 = imul(r0, iexp(imul(b, theta)))
+        out[0, i], out[1, i] = imul(imul(_t0, g), iadd(imul(b, isin(theta)), icos(theta)))
+        out[2, i], out[3, i] = imul(_t0, isqrt(iadd(ipow(b, 2), iconst(1.0))))
+
+
+MODEL = CompiledModel(
+    name='log_spiral', parameter='theta', parameters=PARAMETERS, positive=('r0',),
+    addresses=Addresses(
+        path_and_contact_force.address, effective_potential.address, potential_divdiff1.address,
+        potential_divdiff2.address, bounds.address,
+    ),
+    load_map=load_map,
+    batch=BatchFunctions(
+        potential_divdiff1=potential_divdiff1_batch, potential_divdiff2=potential_divdiff2_batch,
+        orbit_invariants=orbit_invariants_batch, bounds=bounds_batch, orbit_rows=5,
+    ),
+    domain_of=exact_domain,
+    exact=ExactFormulas(
+        exact_x, exact_z, exact_ds, exact_kappa, exact_static_normal_load, exact_effective_potential,
+        exact_effective_potential_slope,
+    ),
+)

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "parabola_law". Do not edit: change its declaration and generate again.
-# interface 8, input 353c2b6305ed, body 96876dd91929
+# interface 8, input 6669068dcbd5, body 87e78712bb58
 """Bead on a parabola, with a resistance that falls with speed
 
 x              = x
@@ -30,29 +30,22 @@ from gqm_sym.runtime import compiler
 compiled = compiler(__file__, interface=8)
 
 from gqm_sym.runtime.vocabulary import (
-    DRIVE, FRAME, HOLD, Addresses, CompiledModel, Dissipation, LaunchRequest, Pass1,
+    PATH_AND_CONTACT_FORCE, SPEED_EQUATION, STATIC_BALANCE, Addresses, CompiledModel, Dissipation, LaunchRequest, Pass1,
 )
 
 if TYPE_CHECKING:
     from gqm_sym.runtime import Motion, Sweep
 
-PARAMETERS = {
-    'a': '0.7',
-    'r': '0.8',
-    'w1': '2',
-    'g': '9.81',
-    'm': '1',
-}
+PARAMETERS = {'a': '0.7', 'r': '0.8', 'w1': '2', 'g': '9.81', 'm': '1'}
 
 
-@compiled(FRAME)
-def frame(n, places, speeds, p, out):
-    """x, z, ds/dx, signed curvature and contact force, given V**2 (paper, eq. 15)."""
+@compiled(PATH_AND_CONTACT_FORCE)
+def path_and_contact_force(n, places, speeds, p, out):
+    """x, z, ds/dx, curvature kappa, contact force N = m*(kappa*V**2 + n0), given V**2 (paper, eqs. 8, 15)."""
     places, speeds, p, out = carray(places, n), carray(speeds, n), carray(p, 5), carray(out, (5, n))
     a, g, m = p[0], p[3], p[4]
     for i in range(n):
-        x = places[i]
-        v2 = speeds[i]
+        x, v2 = places[i], speeds[i]
         _t0 = x**2
         _t1 = 4*_t0*a**2 + 1
         _t2 = sqrt(_t1)
@@ -64,15 +57,14 @@ def frame(n, places, speeds, p, out):
         out[4, i] = m*(_t3*v2 + g/_t2)
 
 
-@compiled(DRIVE)
-def drive(n, places, speeds, v, nu, p, out):
-    """ds/dx, P, Q, n0 and kappa: dV**2/dx = P - Q*V**2, linearised at V**2 = w, N/m = kappa*V**2 + n0; v = sgn(ds/dt), nu = sgn(N)."""
+@compiled(SPEED_EQUATION)
+def speed_equation(n, places, speeds, v, nu, p, out):
+    """ds/dx, P, Q, n0, kappa: dV**2/dx = P - Q*V**2, linearised at V**2 = w, N = m*(kappa*V**2 + n0) (paper, eq. 19); v = sgn(ds/dt), nu = sgn(N)."""
     places, speeds, p, out = carray(places, n), carray(speeds, n), carray(p, 5), carray(out, (5, n))
     a, r, w1, g = p[0], p[1], p[2], p[3]
     _t2 = 2*a
     for i in range(n):
-        x = places[i]
-        w = speeds[i]
+        x, w = places[i], speeds[i]
         _t0 = 4*a**2*x**2 + 1
         ds = sqrt(_t0)
         _t3 = g/ds
@@ -92,8 +84,8 @@ def drive(n, places, speeds, v, nu, p, out):
         out[4, i] = kappa
 
 
-@compiled(HOLD)
-def hold(n, places, p, out):
+@compiled(STATIC_BALANCE)
+def static_balance(n, places, p, out):
     """Acceleration from rest forwards, and backwards: a body rests where the first is <= 0 and the second >= 0."""
     places, p, out = carray(places, n), carray(p, 5), carray(out, (2, n))
     a, r, g = p[0], p[1], p[3]
@@ -104,23 +96,11 @@ def hold(n, places, p, out):
         out[1, i] = push + r
 
 
-# The same formulas over a namespace of operations: extended precision evaluates these.
-
+# The same formulas over a namespace of operations, for extended precision.
 
 def exact_domain(op, p):
     """Both ends of the domain, and the period; None where there is none."""
     return None, None, None
-
-
-MODEL = CompiledModel(
-    name='parabola_law',
-    parameter='x',
-    parameters=PARAMETERS,
-    positive=(),
-    addresses=Addresses(frame.address),
-    domain_of=exact_domain,
-    dissipation=Dissipation(drive.address, hold.address, friction=False, kinked=False, linear=False),
-)
 
 
 def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = None, a: Any = '0.7', r: Any = '0.8', w1: Any = '2', g: Any = '9.81', m: Any = '1') -> Pass1:
@@ -142,7 +122,7 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = 
     Pass1
         Arrays x, z, ds, kappa, v2 and normal_force.
     """
-    return MODEL.pass1(LaunchRequest(lam0, v0, direction), (a, r, w1, g, m,), lam, out)
+    return MODEL.pass1(LaunchRequest(lam0, v0, direction), (a, r, w1, g, m), lam, out)
 
 
 def solve(
@@ -179,7 +159,7 @@ def solve(
     GQMError
         For a launch or a parameter that cannot be; the message says what would be right.
     """
-    return MODEL.solve(LaunchRequest(lam0, v0, direction, point, t_max, contact), (a, r, w1, g, m,))
+    return MODEL.solve(LaunchRequest(lam0, v0, direction, point, t_max, contact), (a, r, w1, g, m))
 
 
 def sweep(
@@ -215,7 +195,18 @@ def sweep(
     Returns
     -------
     Sweep
-        ``values``, NaN where there is none, and ``reasons``, 0 where there is one; ``why()`` counts the others.
+        ``values``, NaN where there is none; ``status``, 0 where there is one, and ``route``, how each was found.
+        ``status_counts()`` counts the launches without a value.
     """
     launches = LaunchRequest(lam0, v0, direction, None, t_max, contact)
-    return MODEL.sweep(quantity, launches, (a, r, w1, g, m,), lam=lam, client=client, source=__file__)
+    return MODEL.sweep(quantity, launches, (a, r, w1, g, m), lam=lam, client=client, source=__file__)
+
+
+MODEL = CompiledModel(
+    name='parabola_law', parameter='x', parameters=PARAMETERS, positive=(),
+    addresses=Addresses(
+        path_and_contact_force.address,
+    ),
+    domain_of=exact_domain,
+    dissipation=Dissipation(speed_equation.address, static_balance.address, friction=False, kinked=False, linear=False),
+)

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "parabola_rolling". Do not edit: change its declaration and generate again.
-# interface 8, input 821845b71c06, body a98aaea3f09a
+# interface 8, input 6fc25406b912, body 2f9040741f82
 """Ball rolling in a parabolic bowl
 
 x              = x*(-2*a*rho/sqrt(4*a**2*x**2 + 1) + 1)
@@ -28,31 +28,25 @@ from gqm_sym.runtime import compiler
 compiled = compiler(__file__, interface=8)
 
 from gqm_sym.runtime.vocabulary import (
-    BEND, BOUNDS, CLIMB, FRAME, LOADS, RISE, Addresses, CompiledModel, ExactFormulas, LaunchRequest, Pass1, iadd,
-    iconst, idiv, imul, ipow, isqrt, left_of, nearest,
+    BOUNDS, EFFECTIVE_POTENTIAL, LOAD_MAP, PATH_AND_CONTACT_FORCE, POTENTIAL_DIVDIFF1, POTENTIAL_DIVDIFF2, Addresses,
+    CompiledModel, ExactFormulas, LaunchRequest, Pass1, iadd, iconst, idiv, imul, ipow, isqrt, place_from_ends,
+    speed_squared_from_potential,
 )
 
 if TYPE_CHECKING:
     from gqm_sym.runtime import Motion, Sweep
 
-PARAMETERS = {
-    'a': '0.6',
-    'beta': '2/5',
-    'rho': '0.25',
-    'g': '9.81',
-    'm': '1',
-}
+PARAMETERS = {'a': '0.6', 'beta': '2/5', 'rho': '0.25', 'g': '9.81', 'm': '1'}
 
 
-@compiled(FRAME)
-def frame(n, places, speeds, p, out):
-    """x, z, ds/dx, signed curvature and contact force, given V**2 (paper, eq. 15)."""
+@compiled(PATH_AND_CONTACT_FORCE)
+def path_and_contact_force(n, places, speeds, p, out):
+    """x, z, ds/dx, curvature kappa, contact force N = m*(kappa*V**2 + n0), given V**2 (paper, eqs. 8, 15)."""
     places, speeds, p, out = carray(places, n), carray(speeds, n), carray(p, 5), carray(out, (5, n))
     a, rho, g, m = p[0], p[2], p[3], p[4]
     _t4 = 2*a
     for i in range(n):
-        x = places[i]
-        v2 = speeds[i]
+        x, v2 = places[i], speeds[i]
         _t0 = x**2
         _t1 = 4*_t0*a**2 + 1
         _t2 = 1/sqrt(_t1)
@@ -66,54 +60,25 @@ def frame(n, places, speeds, p, out):
         out[4, i] = m*(_t2*g + _t6*v2)
 
 
-@compiled(LOADS, later=True)
-def loads(n, w0, level, places, p, out):
-    """x, z, ds/dx, signed curvature, V**2, contact force (paper, eq. 15), and the size of the heights in V**2."""
-    places, p, out = carray(places, n), carray(p, 5), carray(out, (7, n))
-    a, beta, rho, g, m = p[0], p[1], p[2], p[3], p[4]
-    _t0 = beta + 1
-    _t5 = 2*a
-    _c0 = fabs(a)
-    _c1 = fabs(g)
-    _c2 = fabs(rho)
-    _c3 = fabs(_t0)
-    for i in range(n):
-        x = places[i]
-        _t1 = x**2
-        _t2 = 4*_t1*a**2 + 1
-        _t3 = 1/sqrt(_t2)
-        _t4 = _t3*rho
-        _t6 = _t1*a + _t4
-        _t7 = -_t5*rho + sqrt(_t2)**3
-        _t8 = _t5/_t7
-        _t9 = left_of(w0, 2*_t6*g/_t0, level)
-        out[0, i] = x*(-_t4*_t5 + 1)
-        out[1, i] = _t6
-        out[2, i] = _t7/_t2
-        out[3, i] = _t8
-        out[4, i] = _t9
-        out[5, i] = m*(_t3*g + _t8*_t9)
-        out[6, i] = 2*_c1*(_c0*_t1 + _c2*_t3)/_c3
-
-
-@compiled(CLIMB)
-def climb(n, places, p, out):
-    """What V**2 loses in climbing to x, up to a constant, and its derivative (paper, eq. 13)."""
+@compiled(EFFECTIVE_POTENTIAL)
+def effective_potential(n, places, p, out):
+    """U per unit mass, V**2 = v0**2 - 2*(U(x) - U(lam0)), and dU/dx (paper, eq. 13)."""
     places, p, out = carray(places, n), carray(p, 5), carray(out, (2, n))
     a, beta, rho, g = p[0], p[1], p[2], p[3]
     _t2 = g/(beta + 1)
+    _t4 = 2*a
     for i in range(n):
         x = places[i]
         _t0 = x**2
         _t1 = 4*_t0*a**2 + 1
         _t3 = sqrt(_t1)**3
-        out[0, i] = 2*_t2*(_t0*a + rho/sqrt(_t1))
-        out[1, i] = 4*_t2*a*x*(_t3 - 2*a*rho)/_t3
+        out[0, i] = _t2*(_t0*a + rho/sqrt(_t1))
+        out[1, i] = _t2*_t4*x*(_t3 - _t4*rho)/_t3
 
 
-@compiled(RISE)
-def rise(n, _a, places, offsets, p, out):
-    """climb[a, x] = (climb(x) - climb(a))/(x - a) without cancellation, and ds/dx."""
+@compiled(POTENTIAL_DIVDIFF1)
+def potential_divdiff1(n, _a, places, offsets, p, out):
+    """U[a, x] = (U(x) - U(a))/(x - a) without cancellation, and ds/dx (MATHS, s. 3)."""
     places, offsets, p, out = carray(places, n), carray(offsets, n), carray(p, 5), carray(out, (2, n))
     a, beta, rho, g = p[0], p[1], p[2], p[3]
     _t0 = 4*a**2
@@ -125,13 +90,13 @@ def rise(n, _a, places, offsets, p, out):
         _t2 = _a + x
         _t3 = _t0*x**2 + 1
         _t4 = sqrt(_t3)
-        out[0, i] = 2*g*(-_c0*_t0*_t2*rho/(_t4*(_c1 + _t4)) + _t2*a)/(beta + 1)
+        out[0, i] = g*(-_c0*_t0*_t2*rho/(_t4*(_c1 + _t4)) + _t2*a)/(beta + 1)
         out[1, i] = (-2*a*rho + sqrt(_t3)**3)/_t3
 
 
-@compiled(BEND)
-def bend(n, _a, b, left, right, p, out):
-    """climb[a, x, b] = V**2/((x - a)*(b - x)) between turning points, without cancellation, and ds/dx."""
+@compiled(POTENTIAL_DIVDIFF2)
+def potential_divdiff2(n, _a, b, left, right, p, out):
+    """U[a, x, b] = V**2/(2*(x - a)*(b - x)) from turn a to turn b, and ds/dx (MATHS, s. 3)."""
     left, right, p, out = carray(left, n), carray(right, n), carray(p, 5), carray(out, (2, n))
     a, beta, rho, g = p[0], p[1], p[2], p[3]
     _t0 = a**2
@@ -143,118 +108,81 @@ def bend(n, _a, b, left, right, p, out):
     _c2 = 1/_t3
     _c3 = _t3
     for i in range(n):
-        da = left[i]
-        db = right[i]
-        x = nearest(_a, b, da, db)
+        da, db = left[i], right[i]
+        x = place_from_ends(_a, b, da, db)
         _t4 = _t1*x**2 + 1
         _t5 = sqrt(_t4)
         _t6 = _c2/_t5
         _t7 = 16*a**4*(_a + b)*(_a + x)/((_c1 + _c3)*(_c1 + _t5))
         _t8 = 1/(_c3 + _t5)
-        out[0, i] = 2*g*(a + rho*(_c0*_t6*_t7 - _t6*(4*_t0*_t8 - _t7*_t8)))/(beta + 1)
+        out[0, i] = g*(a + rho*(_c0*_t6*_t7 - _t6*(4*_t0*_t8 - _t7*_t8)))/(beta + 1)
         out[1, i] = (-2*a*rho + sqrt(_t4)**3)/_t4
 
 
 @compiled(BOUNDS)
 def bounds(lo, hi, p, out):
-    """Bounds of the climb's slope and of ds/dx for lo <= x <= hi."""
+    """Bounds of dU/dx and ds/dx for lo <= x <= hi, by interval arithmetic."""
     p, out = carray(p, 5), carray(out, 4)
     x = (lo, hi)
-    a = (p[0], p[0])
-    beta = (p[1], p[1])
-    rho = (p[2], p[2])
-    g = (p[3], p[3])
-    _t0 = iadd(imul(imul(iconst(4.0), ipow(a, 2)), ipow(x, 2)), iconst(1.0))
-    _t1 = ipow(isqrt(_t0), 3)
-    _t2 = iadd(_t1, imul(imul(imul(iconst(-1.0), iconst(2.0)), a), rho))
-    out[0], out[1] = imul(imul(imul(imul(imul(imul(iconst(4.0), idiv(iconst(1.0), _t1)), _t2), a), g), x), idiv(iconst(1.0), iadd(beta, iconst(1.0))))
-    out[2], out[3] = imul(idiv(iconst(1.0), _t0), _t2)
+    a, beta, rho, g = (p[0], p[0]), (p[1], p[1]), (p[2], p[2]), (p[3], p[3])
+    _t0 = imul(iconst(2.0), a)
+    _t1 = iadd(imul(imul(iconst(4.0), ipow(a, 2)), ipow(x, 2)), iconst(1.0))
+    _t2 = ipow(isqrt(_t1), 3)
+    _t3 = iadd(imul(imul(iconst(-1.0), _t0), rho), _t2)
+    out[0], out[1] = imul(imul(imul(imul(imul(_t0, idiv(iconst(1.0), _t2)), _t3), g), x), idiv(iconst(1.0), iadd(beta, iconst(1.0))))
+    out[2], out[3] = imul(idiv(iconst(1.0), _t1), _t3)
 
 
-# The same formulas over a namespace of operations: extended precision evaluates these.
-
+# The same formulas over a namespace of operations, for extended precision.
 
 def exact_x(op, x, p):
     """Horizontal coordinate."""
-    a = p[0]
-    rho = p[2]
+    a, rho = p[0], p[2]
     return x*(-2*a*rho/op.sqrt(4*a**2*x**2 + 1) + 1)
-
 
 def exact_z(op, x, p):
     """Height."""
-    a = p[0]
-    rho = p[2]
+    a, rho = p[0], p[2]
     _t0 = x**2
     return _t0*a + rho/op.sqrt(4*_t0*a**2 + 1)
 
-
 def exact_ds(op, x, p):
     """ds/dx."""
-    a = p[0]
-    rho = p[2]
+    a, rho = p[0], p[2]
     _t0 = 4*a**2*x**2 + 1
     return (_t0**(op.mpf(3)/2) - 2*a*rho)/_t0
 
-
 def exact_kappa(op, x, p):
-    """Signed curvature."""
-    a = p[0]
-    rho = p[2]
+    """Signed curvature (paper, eq. 8)."""
+    a, rho = p[0], p[2]
     _t0 = 2*a
     return _t0/(-_t0*rho + (4*a**2*x**2 + 1)**(op.mpf(3)/2))
 
-
-def exact_reaction(op, x, p):
-    """Contact force per unit mass of a body at rest."""
-    a = p[0]
-    g = p[3]
+def exact_static_normal_load(op, x, p):
+    """n0 = N/m of a body at rest, so that N = m*(kappa*V**2 + n0) (paper, eq. 15)."""
+    a, g = p[0], p[3]
     return g/op.sqrt(4*a**2*x**2 + 1)
 
-
-def exact_climb(op, x, p):
-    """What V**2 loses in climbing, up to a constant."""
-    a = p[0]
-    beta = p[1]
-    rho = p[2]
-    g = p[3]
+def exact_effective_potential(op, x, p):
+    """U, so that V**2 + 2*U is constant (paper, eq. 13)."""
+    a, beta, rho, g = p[0], p[1], p[2], p[3]
     _t0 = x**2
-    return 2*g*(_t0*a + rho/op.sqrt(4*_t0*a**2 + 1))/(beta + 1)
+    return g*(_t0*a + rho/op.sqrt(4*_t0*a**2 + 1))/(beta + 1)
 
-
-def exact_climb_slope(op, x, p):
-    """Its derivative by x."""
-    a = p[0]
-    beta = p[1]
-    rho = p[2]
-    g = p[3]
+def exact_effective_potential_slope(op, x, p):
+    """dU/dx."""
+    a, beta, rho, g = p[0], p[1], p[2], p[3]
     _t0 = (4*a**2*x**2 + 1)**(op.mpf(3)/2)
-    return 4*a*g*x*(_t0 - 2*a*rho)/(_t0*(beta + 1))
-
+    _t1 = 2*a
+    return _t1*g*x*(_t0 - _t1*rho)/(_t0*(beta + 1))
 
 def exact_domain(op, p):
     """Both ends of the domain, and the period; None where there is none."""
     return None, None, None
 
-
 def exact_axes(op, p):
     """A place about which V**2 and ds are even, and the distance to the next; None where there is none."""
     return 0, None
-
-
-MODEL = CompiledModel(
-    name='parabola_rolling',
-    parameter='x',
-    parameters=PARAMETERS,
-    positive=(),
-    at_least=(('beta', '0'),),
-    body='rho',
-    addresses=Addresses(frame.address, climb.address, rise.address, bend.address, bounds.address),
-    loads=loads,
-    domain_of=exact_domain,
-    axes_of=exact_axes,
-    exact=ExactFormulas(exact_x, exact_z, exact_ds, exact_kappa, exact_reaction, exact_climb, exact_climb_slope),
-)
 
 
 def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = None, a: Any = '0.6', beta: Any = '2/5', rho: Any = '0.25', g: Any = '9.81', m: Any = '1') -> Pass1:
@@ -276,7 +204,7 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = 
     Pass1
         Arrays x, z, ds, kappa, v2 and normal_force.
     """
-    return MODEL.pass1(LaunchRequest(lam0, v0, direction), (a, beta, rho, g, m,), lam, out)
+    return MODEL.pass1(LaunchRequest(lam0, v0, direction), (a, beta, rho, g, m), lam, out)
 
 
 def solve(
@@ -313,7 +241,7 @@ def solve(
     GQMError
         For a launch or a parameter that cannot be; the message says what would be right.
     """
-    return MODEL.solve(LaunchRequest(lam0, v0, direction, point, t_max, contact), (a, beta, rho, g, m,))
+    return MODEL.solve(LaunchRequest(lam0, v0, direction, point, t_max, contact), (a, beta, rho, g, m))
 
 
 def sweep(
@@ -349,7 +277,58 @@ def sweep(
     Returns
     -------
     Sweep
-        ``values``, NaN where there is none, and ``reasons``, 0 where there is one; ``why()`` counts the others.
+        ``values``, NaN where there is none; ``status``, 0 where there is one, and ``route``, how each was found.
+        ``status_counts()`` counts the launches without a value.
     """
     launches = LaunchRequest(lam0, v0, direction, None, t_max, contact)
-    return MODEL.sweep(quantity, launches, (a, beta, rho, g, m,), lam=lam, client=client, source=__file__)
+    return MODEL.sweep(quantity, launches, (a, beta, rho, g, m), lam=lam, client=client, source=__file__)
+
+
+# ---- The same formulas once more, only for speed: a load map in one call, and many orbits at once for sweeps. ----
+
+
+@compiled(LOAD_MAP, later=True)
+def load_map(n, w0, level, places, p, out):
+    """x, z, ds/dx, kappa, V**2 = w0 - 2*(U - level), N (paper, eqs. 8, 13, 15), size of U's terms."""
+    places, p, out = carray(places, n), carray(p, 5), carray(out, (7, n))
+    a, beta, rho, g, m = p[0], p[1], p[2], p[3], p[4]
+    _t0 = beta + 1
+    _t5 = 2*a
+    _c0 = fabs(a)
+    _c1 = fabs(g)
+    _c2 = fabs(rho)
+    _c3 = fabs(_t0)
+    for i in range(n):
+        x = places[i]
+        _t1 = x**2
+        _t2 = 4*_t1*a**2 + 1
+        _t3 = 1/sqrt(_t2)
+        _t4 = _t3*rho
+        _t6 = _t1*a + _t4
+        _t7 = -_t5*rho + sqrt(_t2)**3
+        _t8 = _t5/_t7
+        _t9 = speed_squared_from_potential(w0, _t6*g/_t0, level)
+        out[0, i] = x*(-_t4*_t5 + 1)
+        out[1, i] = _t6
+        out[2, i] = _t7/_t2
+        out[3, i] = _t8
+        out[4, i] = _t9
+        out[5, i] = m*(_t3*g + _t8*_t9)
+        out[6, i] = _c1*(_c0*_t1 + _c2*_t3)/_c3
+
+
+MODEL = CompiledModel(
+    name='parabola_rolling', parameter='x', parameters=PARAMETERS, positive=(),
+    at_least=(('beta', '0'),),
+    rolling_radius='rho',
+    addresses=Addresses(
+        path_and_contact_force.address, effective_potential.address, potential_divdiff1.address,
+        potential_divdiff2.address, bounds.address,
+    ),
+    load_map=load_map,
+    domain_of=exact_domain, axes_of=exact_axes,
+    exact=ExactFormulas(
+        exact_x, exact_z, exact_ds, exact_kappa, exact_static_normal_load, exact_effective_potential,
+        exact_effective_potential_slope,
+    ),
+)

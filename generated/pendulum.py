@@ -1,5 +1,5 @@
 # Made by gqm-gen for "pendulum". Do not edit: change its declaration and generate again.
-# interface 8, input abbc42e6e84e, body af525610d9d2
+# interface 8, input f60615287831, body ff53a146aa8c
 """Simple pendulum, angle from the horizontal
 
 x              = L*cos(theta)
@@ -28,30 +28,27 @@ from gqm_sym.runtime import compiler
 compiled = compiler(__file__, interface=8)
 
 from gqm_sym.runtime.vocabulary import (
-    BEND, BEND_EACH, BOUNDS, BOUNDS_EACH, CLIMB, CREST_EACH, FRAME, LOADS, MEAN_EACH, ORBIT_EACH, RISE, RISE_EACH,
-    Addresses, CompiledModel, Each, ExactFormulas, LaunchRequest, Pass1, atan, cos, iconst, icos, imul, left_of,
-    near_even, near_odd, nearest, sin, sin1, sin2,
+    AGM_ARGUMENTS_BATCH, BOUNDS, BOUNDS_BATCH, EFFECTIVE_POTENTIAL, LOAD_MAP, ORBIT_INVARIANTS_BATCH,
+    PATH_AND_CONTACT_FORCE, POTENTIAL_DIVDIFF1, POTENTIAL_DIVDIFF1_BATCH, POTENTIAL_DIVDIFF2, POTENTIAL_DIVDIFF2_BATCH,
+    TURNING_POINT_BATCH, Addresses, BatchFunctions, CompiledModel, ExactFormulas, LaunchRequest, Pass1, atan, cos,
+    divdiff1_cos_in_square, divdiff1_sin, divdiff1_sinc_in_square, divdiff2_sin, icos, imul, place_from_ends, sin,
+    speed_squared_from_potential,
 )
 
 if TYPE_CHECKING:
     from gqm_sym.runtime import Motion, Sweep
 
-PARAMETERS = {
-    'L': '1',
-    'g': '9.81',
-    'm': '1',
-}
+PARAMETERS = {'L': '1', 'g': '9.81', 'm': '1'}
 
 
-@compiled(FRAME)
-def frame(n, places, speeds, p, out):
-    """x, z, ds/dtheta, signed curvature and contact force, given V**2 (paper, eq. 15)."""
+@compiled(PATH_AND_CONTACT_FORCE)
+def path_and_contact_force(n, places, speeds, p, out):
+    """x, z, ds/dtheta, curvature kappa, contact force N = m*(kappa*V**2 + n0), given V**2 (paper, eqs. 8, 15)."""
     places, speeds, p, out = carray(places, n), carray(speeds, n), carray(p, 3), carray(out, (5, n))
     L, g, m = p[0], p[1], p[2]
     _t1 = 1/L
     for i in range(n):
-        theta = places[i]
-        v2 = speeds[i]
+        theta, v2 = places[i], speeds[i]
         _t0 = sin(theta)
         out[0, i] = L*cos(theta)
         out[1, i] = L*_t0
@@ -60,229 +57,95 @@ def frame(n, places, speeds, p, out):
         out[4, i] = m*(-_t0*g + _t1*v2)
 
 
-@compiled(LOADS, later=True)
-def loads(n, w0, level, places, p, out):
-    """x, z, ds/dtheta, signed curvature, V**2, contact force (paper, eq. 15), and the size of the heights in V**2."""
-    places, p, out = carray(places, n), carray(p, 3), carray(out, (7, n))
-    L, g, m = p[0], p[1], p[2]
-    _t2 = 1/L
-    _c0 = fabs(L)
-    _c1 = fabs(g)
-    for i in range(n):
-        theta = places[i]
-        _t0 = sin(theta)
-        _t1 = L*_t0
-        _t3 = left_of(w0, 2*_t1*g, level)
-        out[0, i] = L*cos(theta)
-        out[1, i] = _t1
-        out[2, i] = L
-        out[3, i] = _t2
-        out[4, i] = _t3
-        out[5, i] = m*(-_t0*g + _t2*_t3)
-        out[6, i] = 2*_c0*_c1*fabs(_t0)
-
-
-@compiled(CLIMB)
-def climb(n, places, p, out):
-    """What V**2 loses in climbing to theta, up to a constant, and its derivative (paper, eq. 13)."""
+@compiled(EFFECTIVE_POTENTIAL)
+def effective_potential(n, places, p, out):
+    """U per unit mass, V**2 = v0**2 - 2*(U(theta) - U(lam0)), and dU/dtheta (paper, eq. 13)."""
     places, p, out = carray(places, n), carray(p, 3), carray(out, (2, n))
     L, g = p[0], p[1]
-    _t0 = 2*L*g
+    _t0 = L*g
     for i in range(n):
         theta = places[i]
         out[0, i] = _t0*sin(theta)
         out[1, i] = _t0*cos(theta)
 
 
-@compiled(RISE)
-def rise(n, a, places, offsets, p, out):
-    """climb[a, theta] = (climb(theta) - climb(a))/(theta - a) without cancellation, and ds/dtheta."""
+@compiled(POTENTIAL_DIVDIFF1)
+def potential_divdiff1(n, a, places, offsets, p, out):
+    """U[a, theta] = (U(theta) - U(a))/(theta - a) without cancellation, and ds/dtheta (MATHS, s. 3)."""
     places, offsets, p, out = carray(places, n), carray(offsets, n), carray(p, 3), carray(out, (2, n))
     L, g = p[0], p[1]
     for i in range(n):
-        theta = places[i]
-        d = offsets[i]
-        out[0, i] = 2*L*g*sin1(a, theta, d)
+        theta, d = places[i], offsets[i]
+        out[0, i] = L*g*divdiff1_sin(a, theta, d)
         out[1, i] = L
 
 
-@compiled(BEND)
-def bend(n, a, b, left, right, p, out):
-    """climb[a, theta, b] = V**2/((theta - a)*(b - theta)) between turning points, without cancellation, and ds/dtheta."""
+@compiled(POTENTIAL_DIVDIFF2)
+def potential_divdiff2(n, a, b, left, right, p, out):
+    """U[a, theta, b] = V**2/(2*(theta - a)*(b - theta)) from turn a to turn b, and ds/dtheta (MATHS, s. 3)."""
     left, right, p, out = carray(left, n), carray(right, n), carray(p, 3), carray(out, (2, n))
     L, g = p[0], p[1]
     for i in range(n):
-        da = left[i]
-        db = right[i]
-        theta = nearest(a, b, da, db)
-        out[0, i] = 2*L*g*sin2(a, theta, b, da, db)
+        da, db = left[i], right[i]
+        theta = place_from_ends(a, b, da, db)
+        out[0, i] = L*g*divdiff2_sin(a, theta, b, da, db)
         out[1, i] = L
-
-
-@compiled(RISE_EACH, later=True)
-def rise_each(n, starts, places, offsets, p, out):
-    """climb[a, theta], ds/dtheta and the climb's derivative, each for a launch of its own."""
-    starts, places, offsets, p, out = carray(starts, n), carray(places, n), carray(offsets, n), carray(p, (3, n)), carray(out, (3, n))
-    for i in range(n):
-        L = p[0, i]
-        g = p[1, i]
-        a = starts[i]
-        theta = places[i]
-        d = offsets[i]
-        _t0 = 2*L*g
-        out[0, i] = _t0*sin1(a, theta, d)
-        out[1, i] = L
-        out[2, i] = _t0*cos(theta)
-
-
-@compiled(BEND_EACH, later=True)
-def bend_each(n, lows, highs, left, right, p, out):
-    """climb[a, theta, b] and ds/dtheta, each for an orbit of its own; NaN where the closed form ends."""
-    lows, highs, left, right, p, out = carray(lows, n), carray(highs, n), carray(left, n), carray(right, n), carray(p, (5, n)), carray(out, (2, n))
-    for i in range(n):
-        L = p[0, i]
-        g = p[1, i]
-        _c0 = p[3, i]
-        _c1 = p[4, i]
-        da = left[i]
-        db = right[i]
-        out[0, i] = 2*L*g*(_c0*near_even(da, db) + _c1*(da/2 - db/2)*near_odd(da, db))
-        out[1, i] = L
-
-
-@compiled(ORBIT_EACH, later=True)
-def orbit_each(n, lows, highs, p, out):
-    """What is the same all along an orbit: ``bend_each`` finds it behind the run-time parameters."""
-    lows, highs, p, out = carray(lows, n), carray(highs, n), carray(p, (3, n)), carray(out, (2, n))
-    for i in range(n):
-        a = lows[i]
-        b = highs[i]
-        _t0 = a/2 + b/2
-        out[0, i] = sin(_t0)
-        out[1, i] = cos(_t0)
-
-
-@compiled(MEAN_EACH, later=True)
-def mean_each(n, halves, p, out):
-    """Squares of two numbers, each pair for an orbit of its own: its half period is pi over their agm (Gauss)."""
-    halves, p, out = carray(halves, n), carray(p, (3, n)), carray(out, (2, n))
-    for i in range(n):
-        L = p[0, i]
-        g = p[1, i]
-        half = halves[i]
-        _t0 = g/L
-        out[0, i] = _t0*cos(half/4)**4
-        out[1, i] = _t0*cos(half/2)
-
-
-@compiled(CREST_EACH, later=True)
-def crest_each(n, offsets, launches, p, out):
-    """Half an orbit's width, where V**2 at an offset is used up; how the climb grows; above 1 where it never is."""
-    offsets, launches, p, out = carray(offsets, n), carray(launches, n), carray(p, (3, n)), carray(out, (3, n))
-    for i in range(n):
-        L = p[0, i]
-        g = p[1, i]
-        offset = offsets[i]
-        launch = launches[i]
-        _t0 = sin(offset/2)**2 + launch/(4*L*g)
-        out[0, i] = 4*atan(sqrt(_t0)/(sqrt(1 - _t0) + 1))
-        out[1, i] = 4*L*g
-        out[2, i] = _t0
 
 
 @compiled(BOUNDS)
 def bounds(lo, hi, p, out):
-    """Bounds of the climb's slope and of ds/dtheta for lo <= theta <= hi."""
+    """Bounds of dU/dtheta and ds/dtheta for lo <= theta <= hi, by interval arithmetic."""
     p, out = carray(p, 3), carray(out, 4)
     theta = (lo, hi)
-    L = (p[0], p[0])
-    g = (p[1], p[1])
-    out[0], out[1] = imul(imul(imul(iconst(2.0), L), g), icos(theta))
+    L, g = (p[0], p[0]), (p[1], p[1])
+    out[0], out[1] = imul(imul(L, g), icos(theta))
     out[2], out[3] = L
 
 
-@compiled(BOUNDS_EACH, later=True)
-def bounds_each(n, lo, hi, p, out):
-    """Bounds over many intervals of the climb's slope and of ds/dtheta for lo <= theta <= hi, each for parameters of its own."""
-    lo, hi, p, out = carray(lo, n), carray(hi, n), carray(p, (3, n)), carray(out, (4, n))
-    for i in range(n):
-        theta = (lo[i], hi[i])
-        L = (p[0, i], p[0, i])
-        g = (p[1, i], p[1, i])
-        out[0, i], out[1, i] = imul(imul(imul(iconst(2.0), L), g), icos(theta))
-        out[2, i], out[3, i] = L
-
-
-# The same formulas over a namespace of operations: extended precision evaluates these.
-
+# The same formulas over a namespace of operations, for extended precision.
 
 def exact_x(op, theta, p):
     """Horizontal coordinate."""
     L = p[0]
     return L*op.cos(theta)
 
-
 def exact_z(op, theta, p):
     """Height."""
     L = p[0]
     return L*op.sin(theta)
-
 
 def exact_ds(op, theta, p):
     """ds/dtheta."""
     L = p[0]
     return L
 
-
 def exact_kappa(op, theta, p):
-    """Signed curvature."""
+    """Signed curvature (paper, eq. 8)."""
     L = p[0]
     return 1/L
 
-
-def exact_reaction(op, theta, p):
-    """Contact force per unit mass of a body at rest."""
+def exact_static_normal_load(op, theta, p):
+    """n0 = N/m of a body at rest, so that N = m*(kappa*V**2 + n0) (paper, eq. 15)."""
     g = p[1]
     return -g*op.sin(theta)
 
+def exact_effective_potential(op, theta, p):
+    """U, so that V**2 + 2*U is constant (paper, eq. 13)."""
+    L, g = p[0], p[1]
+    return L*g*op.sin(theta)
 
-def exact_climb(op, theta, p):
-    """What V**2 loses in climbing, up to a constant."""
-    L = p[0]
-    g = p[1]
-    return 2*L*g*op.sin(theta)
-
-
-def exact_climb_slope(op, theta, p):
-    """Its derivative by theta."""
-    L = p[0]
-    g = p[1]
-    return 2*L*g*op.cos(theta)
-
+def exact_effective_potential_slope(op, theta, p):
+    """dU/dtheta."""
+    L, g = p[0], p[1]
+    return L*g*op.cos(theta)
 
 def exact_domain(op, p):
     """Both ends of the domain, and the period; None where there is none."""
     return None, None, 2*op.pi
 
-
 def exact_axes(op, p):
     """A place about which V**2 and ds are even, and the distance to the next; None where there is none."""
     return -op.pi/2, op.pi
-
-
-MODEL = CompiledModel(
-    name='pendulum',
-    parameter='theta',
-    parameters=PARAMETERS,
-    positive=('L',),
-    addresses=Addresses(frame.address, climb.address, rise.address, bend.address, bounds.address),
-    loads=loads,
-    each=Each(rise=rise_each, bend=bend_each, orbit=orbit_each, mean=mean_each, crest=crest_each, bounds=bounds_each, held=2),
-    domain_of=exact_domain,
-    axes_of=exact_axes,
-    monotone=True,
-    exact=ExactFormulas(exact_x, exact_z, exact_ds, exact_kappa, exact_reaction, exact_climb, exact_climb_slope),
-)
 
 
 def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = None, L: Any = '1', g: Any = '9.81', m: Any = '1') -> Pass1:
@@ -304,7 +167,7 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = 
     Pass1
         Arrays x, z, ds, kappa, v2 and normal_force.
     """
-    return MODEL.pass1(LaunchRequest(lam0, v0, direction), (L, g, m,), lam, out)
+    return MODEL.pass1(LaunchRequest(lam0, v0, direction), (L, g, m), lam, out)
 
 
 def solve(
@@ -341,7 +204,7 @@ def solve(
     GQMError
         For a launch or a parameter that cannot be; the message says what would be right.
     """
-    return MODEL.solve(LaunchRequest(lam0, v0, direction, point, t_max, contact), (L, g, m,))
+    return MODEL.solve(LaunchRequest(lam0, v0, direction, point, t_max, contact), (L, g, m))
 
 
 def sweep(
@@ -377,7 +240,120 @@ def sweep(
     Returns
     -------
     Sweep
-        ``values``, NaN where there is none, and ``reasons``, 0 where there is one; ``why()`` counts the others.
+        ``values``, NaN where there is none; ``status``, 0 where there is one, and ``route``, how each was found.
+        ``status_counts()`` counts the launches without a value.
     """
     launches = LaunchRequest(lam0, v0, direction, None, t_max, contact)
-    return MODEL.sweep(quantity, launches, (L, g, m,), lam=lam, client=client, source=__file__)
+    return MODEL.sweep(quantity, launches, (L, g, m), lam=lam, client=client, source=__file__)
+
+
+# ---- The same formulas once more, only for speed: a load map in one call, and many orbits at once for sweeps. ----
+
+
+@compiled(LOAD_MAP, later=True)
+def load_map(n, w0, level, places, p, out):
+    """x, z, ds/dtheta, kappa, V**2 = w0 - 2*(U - level), N (paper, eqs. 8, 13, 15), size of U's terms."""
+    places, p, out = carray(places, n), carray(p, 3), carray(out, (7, n))
+    L, g, m = p[0], p[1], p[2]
+    _t2 = 1/L
+    _c0 = fabs(L)
+    _c1 = fabs(g)
+    for i in range(n):
+        theta = places[i]
+        _t0 = sin(theta)
+        _t1 = L*_t0
+        _t3 = speed_squared_from_potential(w0, _t1*g, level)
+        out[0, i] = L*cos(theta)
+        out[1, i] = _t1
+        out[2, i] = L
+        out[3, i] = _t2
+        out[4, i] = _t3
+        out[5, i] = m*(-_t0*g + _t2*_t3)
+        out[6, i] = _c0*_c1*fabs(_t0)
+
+
+@compiled(POTENTIAL_DIVDIFF1_BATCH, later=True)
+def potential_divdiff1_batch(n, starts, places, offsets, p, out):
+    """U[a, theta], ds/dtheta and dU/dtheta."""
+    starts, places, offsets, p, out = carray(starts, n), carray(places, n), carray(offsets, n), carray(p, (3, n)), carray(out, (3, n))
+    for i in range(n):
+        L, g, a, theta, d = p[0, i], p[1, i], starts[i], places[i], offsets[i]
+        _t0 = L*g
+        out[0, i] = _t0*divdiff1_sin(a, theta, d)
+        out[1, i] = L
+        out[2, i] = _t0*cos(theta)
+
+
+@compiled(POTENTIAL_DIVDIFF2_BATCH, later=True)
+def potential_divdiff2_batch(n, lows, highs, left, right, p, out):
+    """U[a, theta, b] and ds/dtheta; NaN where the points lie too far apart for the closed form."""
+    lows, highs, left, right, p, out = carray(lows, n), carray(highs, n), carray(left, n), carray(right, n), carray(p, (5, n)), carray(out, (2, n))
+    for i in range(n):
+        L, g, _c0, _c1, da, db = p[0, i], p[1, i], p[3, i], p[4, i], left[i], right[i]
+        out[0, i] = L*g*(_c0*divdiff1_cos_in_square(da, db) + _c1*(da/2 - db/2)*divdiff1_sinc_in_square(da, db))
+        out[1, i] = L
+
+
+@compiled(ORBIT_INVARIANTS_BATCH, later=True)
+def orbit_invariants_batch(n, lows, highs, p, out):
+    """Terms that are constant along an orbit: ``potential_divdiff2_batch`` reads them behind the parameters."""
+    lows, highs, p, out = carray(lows, n), carray(highs, n), carray(p, (3, n)), carray(out, (2, n))
+    for i in range(n):
+        a, b = lows[i], highs[i]
+        _t0 = a/2 + b/2
+        out[0, i] = sin(_t0)
+        out[1, i] = cos(_t0)
+
+
+@compiled(AGM_ARGUMENTS_BATCH, later=True)
+def agm_arguments_batch(n, halves, p, out):
+    """a**2, b**2: the half period (paper, eq. 17) is pi over the arithmetic-geometric mean of a and b (Gauss)."""
+    halves, p, out = carray(halves, n), carray(p, (3, n)), carray(out, (2, n))
+    for i in range(n):
+        L, g, half = p[0, i], p[1, i], halves[i]
+        _t0 = g/L
+        out[0, i] = _t0*cos(half/4)**4
+        out[1, i] = _t0*cos(half/2)
+
+
+@compiled(TURNING_POINT_BATCH, later=True)
+def turning_point_batch(n, offsets, launches, p, out):
+    """From V**2 at an offset: half the orbit's width (paper, eq. 14), -dV**2/dq, and a sine's square q at the turn."""
+    offsets, launches, p, out = carray(offsets, n), carray(launches, n), carray(p, (3, n)), carray(out, (3, n))
+    for i in range(n):
+        L, g, offset, launch = p[0, i], p[1, i], offsets[i], launches[i]
+        _t0 = sin(offset/2)**2 + launch/(4*L*g)
+        out[0, i] = 4*atan(sqrt(_t0)/(sqrt(1 - _t0) + 1))
+        out[1, i] = 4*L*g
+        out[2, i] = _t0
+
+
+@compiled(BOUNDS_BATCH, later=True)
+def bounds_batch(n, lo, hi, p, out):
+    """Bounds of dU/dtheta and ds/dtheta for lo <= theta <= hi."""
+    lo, hi, p, out = carray(lo, n), carray(hi, n), carray(p, (3, n)), carray(out, (4, n))
+    for i in range(n):
+        theta = (lo[i], hi[i])
+        L, g = (p[0, i], p[0, i]), (p[1, i], p[1, i])
+        out[0, i], out[1, i] = imul(imul(L, g), icos(theta))
+        out[2, i], out[3, i] = L
+
+
+MODEL = CompiledModel(
+    name='pendulum', parameter='theta', parameters=PARAMETERS, positive=('L',),
+    addresses=Addresses(
+        path_and_contact_force.address, effective_potential.address, potential_divdiff1.address,
+        potential_divdiff2.address, bounds.address,
+    ),
+    load_map=load_map,
+    batch=BatchFunctions(
+        potential_divdiff1=potential_divdiff1_batch, potential_divdiff2=potential_divdiff2_batch,
+        orbit_invariants=orbit_invariants_batch, agm_arguments=agm_arguments_batch,
+        turning_point=turning_point_batch, bounds=bounds_batch, orbit_rows=2,
+    ),
+    domain_of=exact_domain, axes_of=exact_axes, monotone=True,
+    exact=ExactFormulas(
+        exact_x, exact_z, exact_ds, exact_kappa, exact_static_normal_load, exact_effective_potential,
+        exact_effective_potential_slope,
+    ),
+)

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "quartic". Do not edit: change its declaration and generate again.
-# interface 8, input e1ff78064d31, body 3c9655c4391f
+# interface 8, input 79764b04feb4, body 97c6c5651d45
 """Bead in a quartic bowl
 
 x              = x
@@ -28,28 +28,25 @@ from gqm_sym.runtime import compiler
 compiled = compiler(__file__, interface=8)
 
 from gqm_sym.runtime.vocabulary import (
-    BEND, BEND_EACH, BOUNDS, BOUNDS_EACH, CLIMB, CREST_EACH, FRAME, LOADS, RISE, RISE_EACH, SWING_EACH, TOP_EACH,
-    Addresses, CompiledModel, Each, ExactFormulas, LaunchRequest, Pass1, iadd, iconst, imul, ipow, ipow1, isqrt,
-    left_of, nearest,
+    BOUNDS, BOUNDS_BATCH, EFFECTIVE_POTENTIAL, INTEGRAND_INVARIANTS_BATCH, LOAD_MAP, PATH_AND_CONTACT_FORCE,
+    POTENTIAL_DIVDIFF1, POTENTIAL_DIVDIFF1_BATCH, POTENTIAL_DIVDIFF2, POTENTIAL_DIVDIFF2_BATCH, TIME_INTEGRAND_BATCH,
+    TURNING_POINT_BATCH, Addresses, BatchFunctions, CompiledModel, ExactFormulas, LaunchRequest, Pass1, divdiff1_ipow,
+    iadd, iconst, imul, ipow, isqrt, place_from_ends, speed_squared_from_potential,
 )
 
 if TYPE_CHECKING:
     from gqm_sym.runtime import Motion, Sweep
 
-PARAMETERS = {
-    'g': '9.81',
-    'm': '1',
-}
+PARAMETERS = {'g': '9.81', 'm': '1'}
 
 
-@compiled(FRAME)
-def frame(n, places, speeds, p, out):
-    """x, z, ds/dx, signed curvature and contact force, given V**2 (paper, eq. 15)."""
+@compiled(PATH_AND_CONTACT_FORCE)
+def path_and_contact_force(n, places, speeds, p, out):
+    """x, z, ds/dx, curvature kappa, contact force N = m*(kappa*V**2 + n0), given V**2 (paper, eqs. 8, 15)."""
     places, speeds, p, out = carray(places, n), carray(speeds, n), carray(p, 2), carray(out, (5, n))
     g, m = p[0], p[1]
     for i in range(n):
-        x = places[i]
-        v2 = speeds[i]
+        x, v2 = places[i], speeds[i]
         _t0 = 16*x**6 + 1
         _t1 = sqrt(_t0)
         _t2 = 12*x**2/sqrt(_t0)**3
@@ -60,215 +57,90 @@ def frame(n, places, speeds, p, out):
         out[4, i] = m*(_t2*v2 + g/_t1)
 
 
-@compiled(LOADS, later=True)
-def loads(n, w0, level, places, p, out):
-    """x, z, ds/dx, signed curvature, V**2, contact force (paper, eq. 15), and the size of the heights in V**2."""
-    places, p, out = carray(places, n), carray(p, 2), carray(out, (7, n))
-    g, m = p[0], p[1]
-    _c0 = fabs(g)
-    for i in range(n):
-        x = places[i]
-        _t0 = x**4
-        _t1 = 16*x**6 + 1
-        _t2 = sqrt(_t1)
-        _t3 = 12*x**2/sqrt(_t1)**3
-        _t4 = 2*_t0
-        _t5 = left_of(w0, _t4*g, level)
-        out[0, i] = x
-        out[1, i] = _t0
-        out[2, i] = _t2
-        out[3, i] = _t3
-        out[4, i] = _t5
-        out[5, i] = m*(_t3*_t5 + g/_t2)
-        out[6, i] = _c0*_t4
-
-
-@compiled(CLIMB)
-def climb(n, places, p, out):
-    """What V**2 loses in climbing to x, up to a constant, and its derivative (paper, eq. 13)."""
+@compiled(EFFECTIVE_POTENTIAL)
+def effective_potential(n, places, p, out):
+    """U per unit mass, V**2 = v0**2 - 2*(U(x) - U(lam0)), and dU/dx (paper, eq. 13)."""
     places, p, out = carray(places, n), carray(p, 2), carray(out, (2, n))
     g = p[0]
     for i in range(n):
         x = places[i]
-        out[0, i] = 2*g*x**4
-        out[1, i] = 8*g*x**3
+        out[0, i] = g*x**4
+        out[1, i] = 4*g*x**3
 
 
-@compiled(RISE)
-def rise(n, a, places, offsets, p, out):
-    """climb[a, x] = (climb(x) - climb(a))/(x - a) without cancellation, and ds/dx."""
+@compiled(POTENTIAL_DIVDIFF1)
+def potential_divdiff1(n, a, places, offsets, p, out):
+    """U[a, x] = (U(x) - U(a))/(x - a) without cancellation, and ds/dx (MATHS, s. 3)."""
     places, offsets, p, out = carray(places, n), carray(offsets, n), carray(p, 2), carray(out, (2, n))
     g = p[0]
     for i in range(n):
-        x = places[i]
-        d = offsets[i]
-        out[0, i] = 2*g*ipow1(a, x, d, 4)
+        x, d = places[i], offsets[i]
+        out[0, i] = g*divdiff1_ipow(a, x, d, 4)
         out[1, i] = sqrt(16*x**6 + 1)
 
 
-@compiled(BEND)
-def bend(n, a, b, left, right, p, out):
-    """climb[a, x, b] = V**2/((x - a)*(b - x)) between turning points, without cancellation, and ds/dx."""
+@compiled(POTENTIAL_DIVDIFF2)
+def potential_divdiff2(n, a, b, left, right, p, out):
+    """U[a, x, b] = V**2/(2*(x - a)*(b - x)) from turn a to turn b, and ds/dx (MATHS, s. 3)."""
     left, right, p, out = carray(left, n), carray(right, n), carray(p, 2), carray(out, (2, n))
     g = p[0]
     for i in range(n):
-        da = left[i]
-        db = right[i]
-        x = nearest(a, b, da, db)
-        out[0, i] = 2*g*(a**2 + a*b + a*x + b**2 + b*x + x**2)
+        da, db = left[i], right[i]
+        x = place_from_ends(a, b, da, db)
+        out[0, i] = g*(a**2 + a*b + a*x + b**2 + b*x + x**2)
         out[1, i] = sqrt(16*x**6 + 1)
-
-
-@compiled(RISE_EACH, later=True)
-def rise_each(n, starts, places, offsets, p, out):
-    """climb[a, x], ds/dx and the climb's derivative, each for a launch of its own."""
-    starts, places, offsets, p, out = carray(starts, n), carray(places, n), carray(offsets, n), carray(p, (2, n)), carray(out, (3, n))
-    for i in range(n):
-        g = p[0, i]
-        a = starts[i]
-        x = places[i]
-        d = offsets[i]
-        out[0, i] = 2*g*ipow1(a, x, d, 4)
-        out[1, i] = sqrt(16*x**6 + 1)
-        out[2, i] = 8*g*x**3
-
-
-@compiled(BEND_EACH, later=True)
-def bend_each(n, lows, highs, left, right, p, out):
-    """climb[a, x, b] and ds/dx, each for an orbit of its own; NaN where the closed form ends."""
-    lows, highs, left, right, p, out = carray(lows, n), carray(highs, n), carray(left, n), carray(right, n), carray(p, (2, n)), carray(out, (2, n))
-    for i in range(n):
-        g = p[0, i]
-        a = lows[i]
-        b = highs[i]
-        da = left[i]
-        db = right[i]
-        x = nearest(a, b, da, db)
-        out[0, i] = 2*g*(a**2 + a*b + a*x + b**2 + b*x + x**2)
-        out[1, i] = sqrt(16*x**6 + 1)
-
-
-@compiled(SWING_EACH, later=True)
-def swing_each(n, fall, rise, p, out):
-    """(dt/du)**2 where sin(u)**2 = fall = 1 - rise, and what that is divided by, each for an orbit of its own."""
-    p, out = carray(p, (3, n)), carray(out, (2, n))
-    for i in range(n):
-        g = p[0, i]
-        top = p[2, i]
-        _t0 = fall*top + top
-        out[0, i] = (16*fall**3*top**3 + 1)/(2*_t0*g)
-        out[1, i] = 2*_t0*g
-
-
-@compiled(TOP_EACH, later=True)
-def top_each(n, halves, p, out):
-    """What is the same all along a swing: ``swing_each`` finds it behind the run-time parameters."""
-    halves, p, out = carray(halves, n), carray(p, (2, n)), carray(out, (1, n))
-    for i in range(n):
-        half = halves[i]
-        out[0, i] = half**2
-
-
-@compiled(CREST_EACH, later=True)
-def crest_each(n, offsets, launches, p, out):
-    """Half an orbit's width, where V**2 at an offset is used up; how the climb grows; above 1 where it never is."""
-    offsets, launches, p, out = carray(offsets, n), carray(launches, n), carray(p, (2, n)), carray(out, (3, n))
-    for i in range(n):
-        g = p[0, i]
-        offset = offsets[i]
-        launch = launches[i]
-        _t0 = offset**2
-        _t1 = 2*_t0*g + sqrt(16*g**2*offset**4 + 8*g*launch)/2
-        out[0, i] = sqrt(_t0 + launch/_t1)
-        out[1, i] = _t1
-        out[2, i] = 0
 
 
 @compiled(BOUNDS)
 def bounds(lo, hi, p, out):
-    """Bounds of the climb's slope and of ds/dx for lo <= x <= hi."""
+    """Bounds of dU/dx and ds/dx for lo <= x <= hi, by interval arithmetic."""
     p, out = carray(p, 2), carray(out, 4)
     x = (lo, hi)
     g = (p[0], p[0])
-    out[0], out[1] = imul(imul(iconst(8.0), g), ipow(x, 3))
+    out[0], out[1] = imul(imul(iconst(4.0), g), ipow(x, 3))
     out[2], out[3] = isqrt(iadd(imul(iconst(16.0), ipow(x, 6)), iconst(1.0)))
 
 
-@compiled(BOUNDS_EACH, later=True)
-def bounds_each(n, lo, hi, p, out):
-    """Bounds over many intervals of the climb's slope and of ds/dx for lo <= x <= hi, each for parameters of its own."""
-    lo, hi, p, out = carray(lo, n), carray(hi, n), carray(p, (2, n)), carray(out, (4, n))
-    for i in range(n):
-        x = (lo[i], hi[i])
-        g = (p[0, i], p[0, i])
-        out[0, i], out[1, i] = imul(imul(iconst(8.0), g), ipow(x, 3))
-        out[2, i], out[3, i] = isqrt(iadd(imul(iconst(16.0), ipow(x, 6)), iconst(1.0)))
-
-
-# The same formulas over a namespace of operations: extended precision evaluates these.
-
+# The same formulas over a namespace of operations, for extended precision.
 
 def exact_x(op, x, p):
     """Horizontal coordinate."""
     return x
 
-
 def exact_z(op, x, p):
     """Height."""
     return x**4
-
 
 def exact_ds(op, x, p):
     """ds/dx."""
     return op.sqrt(16*x**6 + 1)
 
-
 def exact_kappa(op, x, p):
-    """Signed curvature."""
+    """Signed curvature (paper, eq. 8)."""
     return 12*x**2/(16*x**6 + 1)**(op.mpf(3)/2)
 
-
-def exact_reaction(op, x, p):
-    """Contact force per unit mass of a body at rest."""
+def exact_static_normal_load(op, x, p):
+    """n0 = N/m of a body at rest, so that N = m*(kappa*V**2 + n0) (paper, eq. 15)."""
     g = p[0]
     return g/op.sqrt(16*x**6 + 1)
 
-
-def exact_climb(op, x, p):
-    """What V**2 loses in climbing, up to a constant."""
+def exact_effective_potential(op, x, p):
+    """U, so that V**2 + 2*U is constant (paper, eq. 13)."""
     g = p[0]
-    return 2*g*x**4
+    return g*x**4
 
-
-def exact_climb_slope(op, x, p):
-    """Its derivative by x."""
+def exact_effective_potential_slope(op, x, p):
+    """dU/dx."""
     g = p[0]
-    return 8*g*x**3
-
+    return 4*g*x**3
 
 def exact_domain(op, p):
     """Both ends of the domain, and the period; None where there is none."""
     return None, None, None
 
-
 def exact_axes(op, p):
     """A place about which V**2 and ds are even, and the distance to the next; None where there is none."""
     return 0, None
-
-
-MODEL = CompiledModel(
-    name='quartic',
-    parameter='x',
-    parameters=PARAMETERS,
-    positive=(),
-    addresses=Addresses(frame.address, climb.address, rise.address, bend.address, bounds.address),
-    loads=loads,
-    each=Each(rise=rise_each, bend=bend_each, swing=swing_each, top=top_each, crest=crest_each, bounds=bounds_each, top_held=1),
-    domain_of=exact_domain,
-    axes_of=exact_axes,
-    monotone=True,
-    exact=ExactFormulas(exact_x, exact_z, exact_ds, exact_kappa, exact_reaction, exact_climb, exact_climb_slope),
-)
 
 
 def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = None, g: Any = '9.81', m: Any = '1') -> Pass1:
@@ -290,7 +162,7 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = 
     Pass1
         Arrays x, z, ds, kappa, v2 and normal_force.
     """
-    return MODEL.pass1(LaunchRequest(lam0, v0, direction), (g, m,), lam, out)
+    return MODEL.pass1(LaunchRequest(lam0, v0, direction), (g, m), lam, out)
 
 
 def solve(
@@ -327,7 +199,7 @@ def solve(
     GQMError
         For a launch or a parameter that cannot be; the message says what would be right.
     """
-    return MODEL.solve(LaunchRequest(lam0, v0, direction, point, t_max, contact), (g, m,))
+    return MODEL.solve(LaunchRequest(lam0, v0, direction, point, t_max, contact), (g, m))
 
 
 def sweep(
@@ -363,7 +235,119 @@ def sweep(
     Returns
     -------
     Sweep
-        ``values``, NaN where there is none, and ``reasons``, 0 where there is one; ``why()`` counts the others.
+        ``values``, NaN where there is none; ``status``, 0 where there is one, and ``route``, how each was found.
+        ``status_counts()`` counts the launches without a value.
     """
     launches = LaunchRequest(lam0, v0, direction, None, t_max, contact)
-    return MODEL.sweep(quantity, launches, (g, m,), lam=lam, client=client, source=__file__)
+    return MODEL.sweep(quantity, launches, (g, m), lam=lam, client=client, source=__file__)
+
+
+# ---- The same formulas once more, only for speed: a load map in one call, and many orbits at once for sweeps. ----
+
+
+@compiled(LOAD_MAP, later=True)
+def load_map(n, w0, level, places, p, out):
+    """x, z, ds/dx, kappa, V**2 = w0 - 2*(U - level), N (paper, eqs. 8, 13, 15), size of U's terms."""
+    places, p, out = carray(places, n), carray(p, 2), carray(out, (7, n))
+    g, m = p[0], p[1]
+    _c0 = fabs(g)
+    for i in range(n):
+        x = places[i]
+        _t0 = x**4
+        _t1 = 16*x**6 + 1
+        _t2 = sqrt(_t1)
+        _t3 = 12*x**2/sqrt(_t1)**3
+        _t4 = speed_squared_from_potential(w0, _t0*g, level)
+        out[0, i] = x
+        out[1, i] = _t0
+        out[2, i] = _t2
+        out[3, i] = _t3
+        out[4, i] = _t4
+        out[5, i] = m*(_t3*_t4 + g/_t2)
+        out[6, i] = _c0*_t0
+
+
+@compiled(POTENTIAL_DIVDIFF1_BATCH, later=True)
+def potential_divdiff1_batch(n, starts, places, offsets, p, out):
+    """U[a, x], ds/dx and dU/dx."""
+    starts, places, offsets, p, out = carray(starts, n), carray(places, n), carray(offsets, n), carray(p, (2, n)), carray(out, (3, n))
+    for i in range(n):
+        g, a, x, d = p[0, i], starts[i], places[i], offsets[i]
+        out[0, i] = g*divdiff1_ipow(a, x, d, 4)
+        out[1, i] = sqrt(16*x**6 + 1)
+        out[2, i] = 4*g*x**3
+
+
+@compiled(POTENTIAL_DIVDIFF2_BATCH, later=True)
+def potential_divdiff2_batch(n, lows, highs, left, right, p, out):
+    """U[a, x, b] and ds/dx; NaN where the points lie too far apart for the closed form."""
+    lows, highs, left, right, p, out = carray(lows, n), carray(highs, n), carray(left, n), carray(right, n), carray(p, (2, n)), carray(out, (2, n))
+    for i in range(n):
+        g, a, b, da, db = p[0, i], lows[i], highs[i], left[i], right[i]
+        x = place_from_ends(a, b, da, db)
+        out[0, i] = g*(a**2 + a*b + a*x + b**2 + b*x + x**2)
+        out[1, i] = sqrt(16*x**6 + 1)
+
+
+@compiled(TIME_INTEGRAND_BATCH, later=True)
+def time_integrand_batch(n, fall, rise, p, out):
+    """(dt/du)**2 at sin(u)**2 = fall = 1 - rise, and its divisor; dt/du integrates to the half period (eq. 17)."""
+    p, out = carray(p, (3, n)), carray(out, (2, n))
+    for i in range(n):
+        g, top = p[0, i], p[2, i]
+        _t0 = fall*top + top
+        out[0, i] = (16*fall**3*top**3 + 1)/(2*_t0*g)
+        out[1, i] = 2*_t0*g
+
+
+@compiled(INTEGRAND_INVARIANTS_BATCH, later=True)
+def integrand_invariants_batch(n, halves, p, out):
+    """Terms that are constant along an orbit: ``time_integrand_batch`` reads them behind the parameters."""
+    halves, p, out = carray(halves, n), carray(p, (2, n)), carray(out, (1, n))
+    for i in range(n):
+        half = halves[i]
+        out[0, i] = half**2
+
+
+@compiled(TURNING_POINT_BATCH, later=True)
+def turning_point_batch(n, offsets, launches, p, out):
+    """From V**2 at an offset: half the orbit's width (paper, eq. 14), -dV**2/dq, and a sine's square q at the turn."""
+    offsets, launches, p, out = carray(offsets, n), carray(launches, n), carray(p, (2, n)), carray(out, (3, n))
+    for i in range(n):
+        g, offset, launch = p[0, i], offsets[i], launches[i]
+        _t0 = offset**2
+        _t1 = 2*_t0*g + sqrt(16*g**2*offset**4 + 8*g*launch)/2
+        out[0, i] = sqrt(_t0 + launch/_t1)
+        out[1, i] = _t1
+        out[2, i] = 0
+
+
+@compiled(BOUNDS_BATCH, later=True)
+def bounds_batch(n, lo, hi, p, out):
+    """Bounds of dU/dx and ds/dx for lo <= x <= hi."""
+    lo, hi, p, out = carray(lo, n), carray(hi, n), carray(p, (2, n)), carray(out, (4, n))
+    for i in range(n):
+        x = (lo[i], hi[i])
+        g = (p[0, i], p[0, i])
+        out[0, i], out[1, i] = imul(imul(iconst(4.0), g), ipow(x, 3))
+        out[2, i], out[3, i] = isqrt(iadd(imul(iconst(16.0), ipow(x, 6)), iconst(1.0)))
+
+
+MODEL = CompiledModel(
+    name='quartic', parameter='x', parameters=PARAMETERS, positive=(),
+    addresses=Addresses(
+        path_and_contact_force.address, effective_potential.address, potential_divdiff1.address,
+        potential_divdiff2.address, bounds.address,
+    ),
+    load_map=load_map,
+    batch=BatchFunctions(
+        potential_divdiff1=potential_divdiff1_batch, potential_divdiff2=potential_divdiff2_batch,
+        time_integrand=time_integrand_batch, integrand_invariants=integrand_invariants_batch,
+        turning_point=turning_point_batch, bounds=bounds_batch, integrand_rows=1,
+    ),
+    domain_of=exact_domain, axes_of=exact_axes, monotone=True,
+    exact=ExactFormulas(
+        exact_x, exact_z, exact_ds, exact_kappa, exact_static_normal_load, exact_effective_potential,
+        exact_effective_potential_slope,
+    ),
+)

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "rotating_parabola". Do not edit: change its declaration and generate again.
-# interface 8, input 9d848a7566cb, body f306c76259ff
+# interface 8, input 33421e752297, body 4d87ba1bb4d5
 """Bead in a turning parabolic bowl
 
 x              = x
@@ -9,13 +9,13 @@ dx/ds          = 1/sqrt(4*a**2*x**2 + 1)
 dz/ds          = 2*a*x/sqrt(4*a**2*x**2 + 1)
 kappa          = 2*a/(4*a**2*x**2 + 1)**(3/2)
 Theta          = -atan(2*a*lam0) + atan(2*a*x)
-V**2           = v0**2 + (-Omega**2 + 2*a*g)*(lam0**2 - x**2)
-N              = m*(2*a*(v0**2 + (-Omega**2 + 2*a*g)*(lam0**2 - x**2))/(4*a**2*x**2 + 1)**(3/2) + (2*Omega**2*a*x**2 + g)/sqrt(4*a**2*x**2 + 1))
-N_b            = 2*Omega*direction*m*sqrt(v0**2 + (-Omega**2 + 2*a*g)*(lam0**2 - x**2))/sqrt(4*a**2*x**2 + 1)
+V**2           = v0**2 + 2*(-Omega**2/2 + a*g)*(lam0**2 - x**2)
+N              = m*(2*a*(v0**2 + 2*(-Omega**2/2 + a*g)*(lam0**2 - x**2))/(4*a**2*x**2 + 1)**(3/2) + (2*Omega**2*a*x**2 + g)/sqrt(4*a**2*x**2 + 1))
+N_b            = 2*Omega*direction*m*sqrt(v0**2 + 2*(-Omega**2/2 + a*g)*(lam0**2 - x**2))/sqrt(4*a**2*x**2 + 1)
 A              = -x*(-Omega**2 + 2*a*g)/sqrt(4*a**2*x**2 + 1)
-dt/dx          = sqrt(4*a**2*x**2 + 1)/sqrt(v0**2 + (-Omega**2 + 2*a*g)*(lam0**2 - x**2))
-turning points : v0**2 + (-Omega**2 + 2*a*g)*(lam0**2 - x**2) = 0
-liftoff        : 2*a*(v0**2 + (-Omega**2 + 2*a*g)*(lam0**2 - x**2))/(4*a**2*x**2 + 1)**(3/2) + (2*Omega**2*a*x**2 + g)/sqrt(4*a**2*x**2 + 1) = 0
+dt/dx          = sqrt(4*a**2*x**2 + 1)/sqrt(v0**2 + 2*(-Omega**2/2 + a*g)*(lam0**2 - x**2))
+turning points : v0**2 + 2*(-Omega**2/2 + a*g)*(lam0**2 - x**2) = 0
+liftoff        : 2*a*(v0**2 + 2*(-Omega**2/2 + a*g)*(lam0**2 - x**2))/(4*a**2*x**2 + 1)**(3/2) + (2*Omega**2*a*x**2 + g)/sqrt(4*a**2*x**2 + 1) = 0
 """
 
 from math import fabs, sqrt
@@ -29,30 +29,25 @@ from gqm_sym.runtime import compiler
 compiled = compiler(__file__, interface=8)
 
 from gqm_sym.runtime.vocabulary import (
-    BEND, BEND_EACH, BOUNDS, BOUNDS_EACH, CLIMB, CREST_EACH, FRAME, LOADS, RISE, RISE_EACH, SWING_EACH, TOP_EACH,
-    Addresses, CompiledModel, Each, ExactFormulas, LaunchRequest, Pass1, iadd, iconst, imul, ipow, isqrt, left_of,
-    nearest,
+    BOUNDS, BOUNDS_BATCH, EFFECTIVE_POTENTIAL, INTEGRAND_INVARIANTS_BATCH, LOAD_MAP, PATH_AND_CONTACT_FORCE,
+    POTENTIAL_DIVDIFF1, POTENTIAL_DIVDIFF1_BATCH, POTENTIAL_DIVDIFF2, POTENTIAL_DIVDIFF2_BATCH, TIME_INTEGRAND_BATCH,
+    TURNING_POINT_BATCH, Addresses, BatchFunctions, CompiledModel, ExactFormulas, LaunchRequest, Pass1, iadd, iconst,
+    imul, ipow, isqrt, place_from_ends, speed_squared_from_potential,
 )
 
 if TYPE_CHECKING:
     from gqm_sym.runtime import Motion, Sweep
 
-PARAMETERS = {
-    'a': '0.6',
-    'Omega': '2.5',
-    'g': '9.81',
-    'm': '1.4',
-}
+PARAMETERS = {'a': '0.6', 'Omega': '2.5', 'g': '9.81', 'm': '1.4'}
 
 
-@compiled(FRAME)
-def frame(n, places, speeds, p, out):
-    """x, z, ds/dx, signed curvature and contact force, given V**2 (paper, eq. 15)."""
+@compiled(PATH_AND_CONTACT_FORCE)
+def path_and_contact_force(n, places, speeds, p, out):
+    """x, z, ds/dx, curvature kappa, contact force N = m*(kappa*V**2 + n0), given V**2 (paper, eqs. 8, 15)."""
     places, speeds, p, out = carray(places, n), carray(speeds, n), carray(p, 4), carray(out, (5, n))
     a, Omega, g, m = p[0], p[1], p[2], p[3]
     for i in range(n):
-        x = places[i]
-        v2 = speeds[i]
+        x, v2 = places[i], speeds[i]
         _t0 = x**2
         _t1 = _t0*a
         _t2 = 4*_t0*a**2 + 1
@@ -65,238 +60,95 @@ def frame(n, places, speeds, p, out):
         out[4, i] = m*(_t4*v2 + (2*Omega**2*_t1 + g)/_t3)
 
 
-@compiled(LOADS, later=True)
-def loads(n, w0, level, places, p, out):
-    """x, z, ds/dx, signed curvature, V**2, contact force (paper, eq. 15), and the size of the heights in V**2."""
-    places, p, out = carray(places, n), carray(p, 4), carray(out, (7, n))
-    a, Omega, g, m = p[0], p[1], p[2], p[3]
-    _t5 = Omega**2
-    _c0 = fabs(a)
-    _c1 = fabs(g)
-    for i in range(n):
-        x = places[i]
-        _t0 = x**2
-        _t1 = _t0*a
-        _t2 = 4*_t0*a**2 + 1
-        _t3 = sqrt(_t2)
-        _t4 = 2*a/sqrt(_t2)**3
-        _t6 = left_of(w0, _t0*(-_t5 + 2*a*g), level)
-        out[0, i] = x
-        out[1, i] = _t1
-        out[2, i] = _t3
-        out[3, i] = _t4
-        out[4, i] = _t6
-        out[5, i] = m*(_t4*_t6 + (2*_t1*_t5 + g)/_t3)
-        out[6, i] = _t0*(2*_c0*_c1 + _t5)
-
-
-@compiled(CLIMB)
-def climb(n, places, p, out):
-    """What V**2 loses in climbing to x, up to a constant, and its derivative (paper, eq. 13)."""
+@compiled(EFFECTIVE_POTENTIAL)
+def effective_potential(n, places, p, out):
+    """U per unit mass, V**2 = v0**2 - 2*(U(x) - U(lam0)), and dU/dx (paper, eq. 13)."""
     places, p, out = carray(places, n), carray(p, 4), carray(out, (2, n))
     a, Omega, g = p[0], p[1], p[2]
-    _t0 = -Omega**2 + 2*a*g
+    _t0 = Omega**2
     for i in range(n):
         x = places[i]
-        out[0, i] = _t0*x**2
-        out[1, i] = 2*_t0*x
+        out[0, i] = x**2*(-_t0/2 + a*g)
+        out[1, i] = x*(-_t0 + 2*a*g)
 
 
-@compiled(RISE)
-def rise(n, _a, places, offsets, p, out):
-    """climb[a, x] = (climb(x) - climb(a))/(x - a) without cancellation, and ds/dx."""
+@compiled(POTENTIAL_DIVDIFF1)
+def potential_divdiff1(n, _a, places, offsets, p, out):
+    """U[a, x] = (U(x) - U(a))/(x - a) without cancellation, and ds/dx (MATHS, s. 3)."""
     places, offsets, p, out = carray(places, n), carray(offsets, n), carray(p, 4), carray(out, (2, n))
     a, Omega, g = p[0], p[1], p[2]
     for i in range(n):
         x = places[i]
-        out[0, i] = (-Omega**2 + 2*a*g)*(_a + x)
+        out[0, i] = (-Omega**2/2 + a*g)*(_a + x)
         out[1, i] = sqrt(4*a**2*x**2 + 1)
 
 
-@compiled(BEND)
-def bend(n, _a, b, left, right, p, out):
-    """climb[a, x, b] = V**2/((x - a)*(b - x)) between turning points, without cancellation, and ds/dx."""
+@compiled(POTENTIAL_DIVDIFF2)
+def potential_divdiff2(n, _a, b, left, right, p, out):
+    """U[a, x, b] = V**2/(2*(x - a)*(b - x)) from turn a to turn b, and ds/dx (MATHS, s. 3)."""
     left, right, p, out = carray(left, n), carray(right, n), carray(p, 4), carray(out, (2, n))
     a, Omega, g = p[0], p[1], p[2]
     for i in range(n):
-        da = left[i]
-        db = right[i]
-        x = nearest(_a, b, da, db)
-        out[0, i] = -Omega**2 + 2*a*g
+        da, db = left[i], right[i]
+        x = place_from_ends(_a, b, da, db)
+        out[0, i] = -Omega**2/2 + a*g
         out[1, i] = sqrt(4*a**2*x**2 + 1)
-
-
-@compiled(RISE_EACH, later=True)
-def rise_each(n, starts, places, offsets, p, out):
-    """climb[a, x], ds/dx and the climb's derivative, each for a launch of its own."""
-    starts, places, offsets, p, out = carray(starts, n), carray(places, n), carray(offsets, n), carray(p, (4, n)), carray(out, (3, n))
-    for i in range(n):
-        a = p[0, i]
-        Omega = p[1, i]
-        g = p[2, i]
-        _a = starts[i]
-        x = places[i]
-        _t0 = -Omega**2 + 2*a*g
-        out[0, i] = _t0*(_a + x)
-        out[1, i] = sqrt(4*a**2*x**2 + 1)
-        out[2, i] = 2*_t0*x
-
-
-@compiled(BEND_EACH, later=True)
-def bend_each(n, lows, highs, left, right, p, out):
-    """climb[a, x, b] and ds/dx, each for an orbit of its own; NaN where the closed form ends."""
-    lows, highs, left, right, p, out = carray(lows, n), carray(highs, n), carray(left, n), carray(right, n), carray(p, (4, n)), carray(out, (2, n))
-    for i in range(n):
-        a = p[0, i]
-        Omega = p[1, i]
-        g = p[2, i]
-        _a = lows[i]
-        b = highs[i]
-        da = left[i]
-        db = right[i]
-        x = nearest(_a, b, da, db)
-        out[0, i] = -Omega**2 + 2*a*g
-        out[1, i] = sqrt(4*a**2*x**2 + 1)
-
-
-@compiled(SWING_EACH, later=True)
-def swing_each(n, fall, rise, p, out):
-    """(dt/du)**2 where sin(u)**2 = fall = 1 - rise, and what that is divided by, each for an orbit of its own."""
-    p, out = carray(p, (5, n)), carray(out, (2, n))
-    for i in range(n):
-        a = p[0, i]
-        Omega = p[1, i]
-        g = p[2, i]
-        top = p[4, i]
-        _t0 = -Omega**2 + 2*a*g
-        out[0, i] = (4*a**2*fall*top + 1)/_t0
-        out[1, i] = _t0
-
-
-@compiled(TOP_EACH, later=True)
-def top_each(n, halves, p, out):
-    """What is the same all along a swing: ``swing_each`` finds it behind the run-time parameters."""
-    halves, p, out = carray(halves, n), carray(p, (4, n)), carray(out, (1, n))
-    for i in range(n):
-        half = halves[i]
-        out[0, i] = half**2
-
-
-@compiled(CREST_EACH, later=True)
-def crest_each(n, offsets, launches, p, out):
-    """Half an orbit's width, where V**2 at an offset is used up; how the climb grows; above 1 where it never is."""
-    offsets, launches, p, out = carray(offsets, n), carray(launches, n), carray(p, (4, n)), carray(out, (3, n))
-    for i in range(n):
-        a = p[0, i]
-        Omega = p[1, i]
-        g = p[2, i]
-        offset = offsets[i]
-        launch = launches[i]
-        _t0 = -Omega**2 + 2*a*g
-        out[0, i] = sqrt(offset**2 + launch/_t0)
-        out[1, i] = _t0
-        out[2, i] = 0
 
 
 @compiled(BOUNDS)
 def bounds(lo, hi, p, out):
-    """Bounds of the climb's slope and of ds/dx for lo <= x <= hi."""
+    """Bounds of dU/dx and ds/dx for lo <= x <= hi, by interval arithmetic."""
     p, out = carray(p, 4), carray(out, 4)
     x = (lo, hi)
-    a = (p[0], p[0])
-    Omega = (p[1], p[1])
-    g = (p[2], p[2])
-    out[0], out[1] = imul(imul(iconst(2.0), x), iadd(imul(iconst(-1.0), ipow(Omega, 2)), imul(imul(iconst(2.0), a), g)))
+    a, Omega, g = (p[0], p[0]), (p[1], p[1]), (p[2], p[2])
+    out[0], out[1] = imul(x, iadd(imul(iconst(-1.0), ipow(Omega, 2)), imul(imul(iconst(2.0), a), g)))
     out[2], out[3] = isqrt(iadd(imul(imul(iconst(4.0), ipow(a, 2)), ipow(x, 2)), iconst(1.0)))
 
 
-@compiled(BOUNDS_EACH, later=True)
-def bounds_each(n, lo, hi, p, out):
-    """Bounds over many intervals of the climb's slope and of ds/dx for lo <= x <= hi, each for parameters of its own."""
-    lo, hi, p, out = carray(lo, n), carray(hi, n), carray(p, (4, n)), carray(out, (4, n))
-    for i in range(n):
-        x = (lo[i], hi[i])
-        a = (p[0, i], p[0, i])
-        Omega = (p[1, i], p[1, i])
-        g = (p[2, i], p[2, i])
-        out[0, i], out[1, i] = imul(imul(iconst(2.0), x), iadd(imul(iconst(-1.0), ipow(Omega, 2)), imul(imul(iconst(2.0), a), g)))
-        out[2, i], out[3, i] = isqrt(iadd(imul(imul(iconst(4.0), ipow(a, 2)), ipow(x, 2)), iconst(1.0)))
-
-
-# The same formulas over a namespace of operations: extended precision evaluates these.
-
+# The same formulas over a namespace of operations, for extended precision.
 
 def exact_x(op, x, p):
     """Horizontal coordinate."""
     return x
-
 
 def exact_z(op, x, p):
     """Height."""
     a = p[0]
     return a*x**2
 
-
 def exact_ds(op, x, p):
     """ds/dx."""
     a = p[0]
     return op.sqrt(4*a**2*x**2 + 1)
 
-
 def exact_kappa(op, x, p):
-    """Signed curvature."""
+    """Signed curvature (paper, eq. 8)."""
     a = p[0]
     return 2*a/(4*a**2*x**2 + 1)**(op.mpf(3)/2)
 
-
-def exact_reaction(op, x, p):
-    """Contact force per unit mass of a body at rest."""
-    a = p[0]
-    Omega = p[1]
-    g = p[2]
+def exact_static_normal_load(op, x, p):
+    """n0 = N/m of a body at rest, so that N = m*(kappa*V**2 + n0) (paper, eq. 15)."""
+    a, Omega, g = p[0], p[1], p[2]
     _t0 = x**2
     return (2*Omega**2*_t0*a + g)/op.sqrt(4*_t0*a**2 + 1)
 
+def exact_effective_potential(op, x, p):
+    """U, so that V**2 + 2*U is constant (paper, eq. 13)."""
+    a, Omega, g = p[0], p[1], p[2]
+    return x**2*(-Omega**2/2 + a*g)
 
-def exact_climb(op, x, p):
-    """What V**2 loses in climbing, up to a constant."""
-    a = p[0]
-    Omega = p[1]
-    g = p[2]
-    return x**2*(-Omega**2 + 2*a*g)
-
-
-def exact_climb_slope(op, x, p):
-    """Its derivative by x."""
-    a = p[0]
-    Omega = p[1]
-    g = p[2]
-    return 2*x*(-Omega**2 + 2*a*g)
-
+def exact_effective_potential_slope(op, x, p):
+    """dU/dx."""
+    a, Omega, g = p[0], p[1], p[2]
+    return x*(-Omega**2 + 2*a*g)
 
 def exact_domain(op, p):
     """Both ends of the domain, and the period; None where there is none."""
     return None, None, None
 
-
 def exact_axes(op, p):
     """A place about which V**2 and ds are even, and the distance to the next; None where there is none."""
     return 0, None
-
-
-MODEL = CompiledModel(
-    name='rotating_parabola',
-    parameter='x',
-    parameters=PARAMETERS,
-    positive=(),
-    addresses=Addresses(frame.address, climb.address, rise.address, bend.address, bounds.address),
-    loads=loads,
-    each=Each(rise=rise_each, bend=bend_each, swing=swing_each, top=top_each, crest=crest_each, bounds=bounds_each, top_held=1),
-    domain_of=exact_domain,
-    axes_of=exact_axes,
-    monotone=True,
-    exact=ExactFormulas(exact_x, exact_z, exact_ds, exact_kappa, exact_reaction, exact_climb, exact_climb_slope),
-)
 
 
 def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = None, a: Any = '0.6', Omega: Any = '2.5', g: Any = '9.81', m: Any = '1.4') -> Pass1:
@@ -318,7 +170,7 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = 
     Pass1
         Arrays x, z, ds, kappa, v2 and normal_force.
     """
-    return MODEL.pass1(LaunchRequest(lam0, v0, direction), (a, Omega, g, m,), lam, out)
+    return MODEL.pass1(LaunchRequest(lam0, v0, direction), (a, Omega, g, m), lam, out)
 
 
 def solve(
@@ -355,7 +207,7 @@ def solve(
     GQMError
         For a launch or a parameter that cannot be; the message says what would be right.
     """
-    return MODEL.solve(LaunchRequest(lam0, v0, direction, point, t_max, contact), (a, Omega, g, m,))
+    return MODEL.solve(LaunchRequest(lam0, v0, direction, point, t_max, contact), (a, Omega, g, m))
 
 
 def sweep(
@@ -391,7 +243,123 @@ def sweep(
     Returns
     -------
     Sweep
-        ``values``, NaN where there is none, and ``reasons``, 0 where there is one; ``why()`` counts the others.
+        ``values``, NaN where there is none; ``status``, 0 where there is one, and ``route``, how each was found.
+        ``status_counts()`` counts the launches without a value.
     """
     launches = LaunchRequest(lam0, v0, direction, None, t_max, contact)
-    return MODEL.sweep(quantity, launches, (a, Omega, g, m,), lam=lam, client=client, source=__file__)
+    return MODEL.sweep(quantity, launches, (a, Omega, g, m), lam=lam, client=client, source=__file__)
+
+
+# ---- The same formulas once more, only for speed: a load map in one call, and many orbits at once for sweeps. ----
+
+
+@compiled(LOAD_MAP, later=True)
+def load_map(n, w0, level, places, p, out):
+    """x, z, ds/dx, kappa, V**2 = w0 - 2*(U - level), N (paper, eqs. 8, 13, 15), size of U's terms."""
+    places, p, out = carray(places, n), carray(p, 4), carray(out, (7, n))
+    a, Omega, g, m = p[0], p[1], p[2], p[3]
+    _t5 = Omega**2
+    _c0 = fabs(a)
+    _c1 = fabs(g)
+    _t6 = _t5/2
+    for i in range(n):
+        x = places[i]
+        _t0 = x**2
+        _t1 = _t0*a
+        _t2 = 4*_t0*a**2 + 1
+        _t3 = sqrt(_t2)
+        _t4 = 2*a/sqrt(_t2)**3
+        _t7 = speed_squared_from_potential(w0, _t0*(-_t6 + a*g), level)
+        out[0, i] = x
+        out[1, i] = _t1
+        out[2, i] = _t3
+        out[3, i] = _t4
+        out[4, i] = _t7
+        out[5, i] = m*(_t4*_t7 + (2*_t1*_t5 + g)/_t3)
+        out[6, i] = _t0*(_c0*_c1 + _t6)
+
+
+@compiled(POTENTIAL_DIVDIFF1_BATCH, later=True)
+def potential_divdiff1_batch(n, starts, places, offsets, p, out):
+    """U[a, x], ds/dx and dU/dx."""
+    starts, places, offsets, p, out = carray(starts, n), carray(places, n), carray(offsets, n), carray(p, (4, n)), carray(out, (3, n))
+    for i in range(n):
+        a, Omega, g, _a, x = p[0, i], p[1, i], p[2, i], starts[i], places[i]
+        _t0 = Omega**2
+        out[0, i] = (_a + x)*(-_t0/2 + a*g)
+        out[1, i] = sqrt(4*a**2*x**2 + 1)
+        out[2, i] = x*(-_t0 + 2*a*g)
+
+
+@compiled(POTENTIAL_DIVDIFF2_BATCH, later=True)
+def potential_divdiff2_batch(n, lows, highs, left, right, p, out):
+    """U[a, x, b] and ds/dx; NaN where the points lie too far apart for the closed form."""
+    lows, highs, left, right, p, out = carray(lows, n), carray(highs, n), carray(left, n), carray(right, n), carray(p, (4, n)), carray(out, (2, n))
+    for i in range(n):
+        a, Omega, g, _a, b, da, db = p[0, i], p[1, i], p[2, i], lows[i], highs[i], left[i], right[i]
+        x = place_from_ends(_a, b, da, db)
+        out[0, i] = -Omega**2/2 + a*g
+        out[1, i] = sqrt(4*a**2*x**2 + 1)
+
+
+@compiled(TIME_INTEGRAND_BATCH, later=True)
+def time_integrand_batch(n, fall, rise, p, out):
+    """(dt/du)**2 at sin(u)**2 = fall = 1 - rise, and its divisor; dt/du integrates to the half period (eq. 17)."""
+    p, out = carray(p, (5, n)), carray(out, (2, n))
+    for i in range(n):
+        a, Omega, g, top = p[0, i], p[1, i], p[2, i], p[4, i]
+        _t0 = -Omega**2 + 2*a*g
+        out[0, i] = (4*a**2*fall*top + 1)/_t0
+        out[1, i] = _t0
+
+
+@compiled(INTEGRAND_INVARIANTS_BATCH, later=True)
+def integrand_invariants_batch(n, halves, p, out):
+    """Terms that are constant along an orbit: ``time_integrand_batch`` reads them behind the parameters."""
+    halves, p, out = carray(halves, n), carray(p, (4, n)), carray(out, (1, n))
+    for i in range(n):
+        half = halves[i]
+        out[0, i] = half**2
+
+
+@compiled(TURNING_POINT_BATCH, later=True)
+def turning_point_batch(n, offsets, launches, p, out):
+    """From V**2 at an offset: half the orbit's width (paper, eq. 14), -dV**2/dq, and a sine's square q at the turn."""
+    offsets, launches, p, out = carray(offsets, n), carray(launches, n), carray(p, (4, n)), carray(out, (3, n))
+    for i in range(n):
+        a, Omega, g, offset, launch = p[0, i], p[1, i], p[2, i], offsets[i], launches[i]
+        _t0 = -Omega**2 + 2*a*g
+        out[0, i] = sqrt(offset**2 + launch/_t0)
+        out[1, i] = _t0
+        out[2, i] = 0
+
+
+@compiled(BOUNDS_BATCH, later=True)
+def bounds_batch(n, lo, hi, p, out):
+    """Bounds of dU/dx and ds/dx for lo <= x <= hi."""
+    lo, hi, p, out = carray(lo, n), carray(hi, n), carray(p, (4, n)), carray(out, (4, n))
+    for i in range(n):
+        x = (lo[i], hi[i])
+        a, Omega, g = (p[0, i], p[0, i]), (p[1, i], p[1, i]), (p[2, i], p[2, i])
+        out[0, i], out[1, i] = imul(x, iadd(imul(iconst(-1.0), ipow(Omega, 2)), imul(imul(iconst(2.0), a), g)))
+        out[2, i], out[3, i] = isqrt(iadd(imul(imul(iconst(4.0), ipow(a, 2)), ipow(x, 2)), iconst(1.0)))
+
+
+MODEL = CompiledModel(
+    name='rotating_parabola', parameter='x', parameters=PARAMETERS, positive=(),
+    addresses=Addresses(
+        path_and_contact_force.address, effective_potential.address, potential_divdiff1.address,
+        potential_divdiff2.address, bounds.address,
+    ),
+    load_map=load_map,
+    batch=BatchFunctions(
+        potential_divdiff1=potential_divdiff1_batch, potential_divdiff2=potential_divdiff2_batch,
+        time_integrand=time_integrand_batch, integrand_invariants=integrand_invariants_batch,
+        turning_point=turning_point_batch, bounds=bounds_batch, integrand_rows=1,
+    ),
+    domain_of=exact_domain, axes_of=exact_axes, monotone=True,
+    exact=ExactFormulas(
+        exact_x, exact_z, exact_ds, exact_kappa, exact_static_normal_load, exact_effective_potential,
+        exact_effective_potential_slope,
+    ),
+)

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "track". Do not edit: change its declaration and generate again.
-# interface 8, input f6b2958be28b, body cf49f9b905e2
+# interface 8, input e49691f04fda, body d91f833331d6
 """Hills of a roller coaster, as surveyed
 
 x              = x(s)
@@ -27,17 +27,15 @@ from gqm_sym.runtime import compiler
 compiled = compiler(__file__, interface=8)
 
 from gqm_sym.runtime.vocabulary import (
-    BEND, BOUNDS, CLIMB, FRAME, RISE, Addresses, CompiledModel, ExactClimb, LaunchRequest, Pass1, Sampled, chart_alpha,
-    chart_kappa, chart_of, chart_x, chart_z, chart_z1, chart_z2, cos, ichart_alpha, iconst, imul, isin, nearest, sin,
+    BOUNDS, EFFECTIVE_POTENTIAL, PATH_AND_CONTACT_FORCE, POTENTIAL_DIVDIFF1, POTENTIAL_DIVDIFF2, Addresses,
+    CompiledModel, ExactPotential, LaunchRequest, Pass1, Sampled, chart_alpha, chart_kappa, chart_of, chart_x, chart_z,
+    cos, divdiff1_chart_z, divdiff2_chart_z, ichart_alpha, iconst, imul, isin, place_from_ends, sin,
 )
 
 if TYPE_CHECKING:
     from gqm_sym.runtime import Motion, Sweep
 
-PARAMETERS = {
-    'g': '9.81',
-    'm': '1',
-}
+PARAMETERS = {'g': '9.81', 'm': '1'}
 
 POINTS = """
 0.0 14.0000
@@ -104,15 +102,14 @@ POINTS = """
 """
 
 
-@compiled(FRAME)
-def frame(n, places, speeds, p, out):
-    """x, z, ds/ds, signed curvature and contact force, given V**2 (paper, eq. 15)."""
+@compiled(PATH_AND_CONTACT_FORCE)
+def path_and_contact_force(n, places, speeds, p, out):
+    """x, z, ds/ds, curvature kappa, contact force N = m*(kappa*V**2 + n0), given V**2 (paper, eqs. 8, 15)."""
     chart = chart_of(p, 2)
     places, speeds, p, out = carray(places, n), carray(speeds, n), carray(p, 2), carray(out, (5, n))
     g, m = p[0], p[1]
     for i in range(n):
-        s = places[i]
-        v2 = speeds[i]
+        s, v2 = places[i], speeds[i]
         _t0 = chart_kappa(chart, s)
         out[0, i] = chart_x(chart, s)
         out[1, i] = chart_z(chart, s)
@@ -121,78 +118,60 @@ def frame(n, places, speeds, p, out):
         out[4, i] = m*(_t0*v2 + g*cos(chart_alpha(chart, s)))
 
 
-@compiled(CLIMB)
-def climb(n, places, p, out):
-    """What V**2 loses in climbing to s, up to a constant, and its derivative (paper, eq. 13)."""
+@compiled(EFFECTIVE_POTENTIAL)
+def effective_potential(n, places, p, out):
+    """U per unit mass, V**2 = v0**2 - 2*(U(s) - U(lam0)), and dU/ds (paper, eq. 13)."""
     chart = chart_of(p, 2)
     places, p, out = carray(places, n), carray(p, 2), carray(out, (2, n))
     g = p[0]
-    _t0 = 2*g
     for i in range(n):
         s = places[i]
-        out[0, i] = _t0*chart_z(chart, s)
-        out[1, i] = _t0*sin(chart_alpha(chart, s))
+        out[0, i] = g*chart_z(chart, s)
+        out[1, i] = g*sin(chart_alpha(chart, s))
 
 
-@compiled(RISE)
-def rise(n, a, places, offsets, p, out):
-    """climb[a, s] = (climb(s) - climb(a))/(s - a) without cancellation, and ds/ds."""
+@compiled(POTENTIAL_DIVDIFF1)
+def potential_divdiff1(n, a, places, offsets, p, out):
+    """U[a, s] = (U(s) - U(a))/(s - a) without cancellation, and ds/ds (MATHS, s. 3)."""
     chart = chart_of(p, 2)
     places, offsets, p, out = carray(places, n), carray(offsets, n), carray(p, 2), carray(out, (2, n))
     g = p[0]
     for i in range(n):
-        s = places[i]
-        d = offsets[i]
-        out[0, i] = 2*g*chart_z1(chart, a, s, d)
+        s, d = places[i], offsets[i]
+        out[0, i] = g*divdiff1_chart_z(chart, a, s, d)
         out[1, i] = 1
 
 
-@compiled(BEND)
-def bend(n, a, b, left, right, p, out):
-    """climb[a, s, b] = V**2/((s - a)*(b - s)) between turning points, without cancellation, and ds/ds."""
+@compiled(POTENTIAL_DIVDIFF2)
+def potential_divdiff2(n, a, b, left, right, p, out):
+    """U[a, s, b] = V**2/(2*(s - a)*(b - s)) from turn a to turn b, and ds/ds (MATHS, s. 3)."""
     chart = chart_of(p, 2)
     left, right, p, out = carray(left, n), carray(right, n), carray(p, 2), carray(out, (2, n))
     g = p[0]
     for i in range(n):
-        da = left[i]
-        db = right[i]
-        s = nearest(a, b, da, db)
-        out[0, i] = 2*g*chart_z2(chart, a, s, b, da, db)
+        da, db = left[i], right[i]
+        s = place_from_ends(a, b, da, db)
+        out[0, i] = g*divdiff2_chart_z(chart, a, s, b, da, db)
         out[1, i] = 1
 
 
 @compiled(BOUNDS)
 def bounds(lo, hi, p, out):
-    """Bounds of the climb's slope and of ds/ds for lo <= s <= hi."""
+    """Bounds of dU/ds and ds/ds for lo <= s <= hi, by interval arithmetic."""
     chart = chart_of(p, 2)
     p, out = carray(p, 2), carray(out, 4)
     s = (lo, hi)
     g = (p[0], p[0])
-    out[0], out[1] = imul(imul(iconst(2.0), g), isin(ichart_alpha(chart, s)))
+    out[0], out[1] = imul(g, isin(ichart_alpha(chart, s)))
     out[2], out[3] = iconst(1.0)
 
 
-# The same formulas over a namespace of operations: extended precision evaluates these.
+# The same formulas over a namespace of operations, for extended precision.
 
-
-def exact_climb(op, x, z, p):
-    """What V**2 loses in climbing, up to a constant, and its derivatives by x and z."""
+def exact_effective_potential(op, x, z, p):
+    """U, so that V**2 + 2*U is constant, and its derivatives by x and z (paper, eq. 13)."""
     g = p[0]
-    _t0 = 2*g
-    return _t0*z, 0, _t0
-
-
-CHART = Sampled(POINTS, kind='spline', closed=False)
-
-MODEL = CompiledModel(
-    name='track',
-    parameter='s',
-    parameters=PARAMETERS,
-    positive=(),
-    addresses=Addresses(frame.address, climb.address, rise.address, bend.address, bounds.address),
-    chart=CHART,
-    exact=ExactClimb(exact_climb),
-)
+    return g*z, 0, g
 
 
 def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = None, g: Any = '9.81', m: Any = '1') -> Pass1:
@@ -214,7 +193,7 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = 
     Pass1
         Arrays x, z, ds, kappa, v2 and normal_force.
     """
-    return MODEL.pass1(LaunchRequest(lam0, v0, direction), (g, m,), lam, out)
+    return MODEL.pass1(LaunchRequest(lam0, v0, direction), (g, m), lam, out)
 
 
 def solve(
@@ -251,7 +230,7 @@ def solve(
     GQMError
         For a launch or a parameter that cannot be; the message says what would be right.
     """
-    return MODEL.solve(LaunchRequest(lam0, v0, direction, point, t_max, contact), (g, m,))
+    return MODEL.solve(LaunchRequest(lam0, v0, direction, point, t_max, contact), (g, m))
 
 
 def sweep(
@@ -287,7 +266,24 @@ def sweep(
     Returns
     -------
     Sweep
-        ``values``, NaN where there is none, and ``reasons``, 0 where there is one; ``why()`` counts the others.
+        ``values``, NaN where there is none; ``status``, 0 where there is one, and ``route``, how each was found.
+        ``status_counts()`` counts the launches without a value.
     """
     launches = LaunchRequest(lam0, v0, direction, None, t_max, contact)
-    return MODEL.sweep(quantity, launches, (g, m,), lam=lam, client=client, source=__file__)
+    return MODEL.sweep(quantity, launches, (g, m), lam=lam, client=client, source=__file__)
+
+
+CHART = Sampled(POINTS, kind='spline', closed=False)
+
+
+MODEL = CompiledModel(
+    name='track', parameter='s', parameters=PARAMETERS, positive=(),
+    addresses=Addresses(
+        path_and_contact_force.address, effective_potential.address, potential_divdiff1.address,
+        potential_divdiff2.address, bounds.address,
+    ),
+    chart=CHART,
+    exact=ExactPotential(
+        exact_effective_potential,
+    ),
+)

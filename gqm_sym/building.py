@@ -18,9 +18,11 @@ import tempfile
 from pathlib import Path
 from types import ModuleType
 
+from gqm_sym.arguments import checked, instance, short
 from gqm_sym.derivation import Model
 from gqm_sym.emission import body_digests, emit
-from gqm_sym.errors import HandEditedError, InputError
+from gqm_sym.errors import ArgumentError, HandEditedError, InputError
+from gqm_sym.expressions import check_module_name
 from gqm_sym.loading import load
 
 __all__ = ["build", "difference", "load", "write_bytes", "write_module", "write_text"]
@@ -28,6 +30,7 @@ __all__ = ["build", "difference", "load", "write_bytes", "write_module", "write_
 FOLDER = "generated"
 
 
+@checked("build")
 def build(model: Model, *, name: str, folder: str | os.PathLike[str] = FOLDER, force: bool = False) -> ModuleType:
     """Write ``folder/name.py`` for a model and import it.
 
@@ -36,7 +39,7 @@ def build(model: Model, *, name: str, folder: str | os.PathLike[str] = FOLDER, f
     model : Model
         What `derive` returned.
     name : str
-        The module's name, a Python identifier.
+        The module's name, a Python identifier that no installed module has.
     folder : path
         Where to write; made if missing.
     force : bool
@@ -49,7 +52,12 @@ def build(model: Model, *, name: str, folder: str | os.PathLike[str] = FOLDER, f
     InputError
         If what is there is no file.
     """
-    path = Path(folder) / f"{name}.py"
+    check_module_name(name, where="build: name")
+    try:
+        path = Path(folder) / f"{name}.py"
+    except TypeError:
+        raise ArgumentError(f"build: folder: must be a path, got {short(folder)}") from None
+    instance(model, Model, where="build: model", what="a model, as derive(curve, kernel) returns one")
     write_module(emit(model, name=name), path, force=force)
     return load(path, name)
 

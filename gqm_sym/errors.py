@@ -3,7 +3,8 @@
 Every message says, in this order: where, what was given, what would be right.
 """
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Mapping
+from typing import NoReturn
 
 
 class GQMError(Exception):
@@ -24,6 +25,10 @@ class NumberError(InputError):
 
 class DeclarationError(InputError):
     """A curve, a kernel or a model that is declared inconsistently."""
+
+
+class ArgumentError(DeclarationError, TypeError):
+    """Arguments that a function does not have, or of a type that it cannot use."""
 
 
 class SpecFileError(InputError):
@@ -76,3 +81,40 @@ class SolutionError(GQMError):
 
 class OutdatedModuleError(GQMError):
     """A generated module made for another version of the runtime's interface."""
+
+
+class NoisyPointsWarning(UserWarning):
+    """Surveyed points whose scatter is most of the curvature of the track through them."""
+
+
+def renamed(old_to_new: Mapping[str, str], owner: str) -> Callable[..., NoReturn]:
+    """A ``__getattr__`` for a class or a module that tells the new name of an attribute that was renamed.
+
+    Parameters
+    ----------
+    old_to_new : mapping of str to str
+        The old names, each with its new name.
+    owner : str
+        What has the attributes, as the message shall call it ("a motion", "module 'gqm_sym'").
+
+    Returns
+    -------
+    callable
+        It takes the arguments of ``__getattr__``, of which the last is the attribute's name, and raises an
+        AttributeError.
+
+    Examples
+    --------
+    >>> class Tank:
+    ...     __getattr__ = renamed({"amount": "volume"}, "a tank")
+    >>> Tank().amount
+    Traceback (most recent call last):
+    AttributeError: a tank has no attribute 'amount'; it is called 'volume' now
+    """
+
+    def missing(*arguments: object) -> NoReturn:
+        name = str(arguments[-1])
+        remedy = f"; it is called {old_to_new[name]!r} now" if name in old_to_new else ""
+        raise AttributeError(f"{owner} has no attribute {name!r}{remedy}", name=name)
+
+    return missing

@@ -5,10 +5,15 @@ sin cos tan asin acos atan sinh cosh tanh asinh acosh atanh exp log. It holds no
 that is complex or infinite.
 """
 
+import importlib.util
 import keyword
-from collections.abc import Callable, Collection, Mapping
+import math
+import sys
+import sysconfig
+from collections.abc import Callable, Collection, Iterable, Mapping
 from decimal import Decimal
 from fractions import Fraction
+from pathlib import Path
 from typing import TypeAlias, TypeVar
 
 import sympy as sp
@@ -25,8 +30,15 @@ Source: TypeAlias = str | int | float | Fraction | Decimal | sp.Expr
 
 S = TypeVar("S")
 
-# Names that ``solve`` and its kin have arguments of; CONTRACT, "The YAML".
-RESERVED_NAMES = frozenset({"lam", "lam0", "v0", "direction", "t_max", "contact", "point", "quantity", "client", "out"})
+# Names that ``solve`` and its kin have arguments of, or will have.
+RESERVED_NAMES = frozenset(
+    {
+        *("lam", "lam0", "v0", "direction", "t_max", "contact", "point", "quantity", "client", "out"),
+        *("wrt", "gradient", "after", "restitution", "scene", "velocity", "spin", "slow", "device"),
+    }
+)
+# Of a name; longer ones fit into no line of a message or of a generated module.
+MAX_NAME = 60
 
 # Size in bits of all rational numbers that one operation may melt into one, and of any that stays.
 # SymPy looks for the factors of a number it takes a root of: 3000 bits take it seconds.
@@ -97,6 +109,15 @@ def read_expression(source: Source, *, where: str) -> sp.Expr:
         return evaluate(tree, _SymPy(), where=where)
 
 
+def common_measure(numbers: Iterable[sp.Rational]) -> sp.Rational:
+    """Return the largest number of which each of some rational ones is a whole multiple.
+
+    SymPy's own ``gcd_list`` stops at the first 1 that it comes to: of 1, 3 and 7/6 it says 1.
+    """
+    listed = tuple(numbers)
+    return sp.Rational(math.gcd(*(int(number.p) for number in listed)), math.lcm(*(int(number.q) for number in listed)))
+
+
 def is_real_at(form: sp.Expr, values: Mapping[sp.Symbol, sp.Expr]) -> bool | None:
     """Whether a form is a finite real number where its symbols have some values; None where the grammar has no word.
 
@@ -131,6 +152,8 @@ def check_name(name: str, *, where: str, reserved: Collection[str] = RESERVED_NA
     reason = None
     if not NAME.fullmatch(name):
         reason = "a name is made of ASCII letters, digits and _, and begins with a letter"
+    elif len(name) > MAX_NAME:
+        reason = f"it is longer than {MAX_NAME} characters"
     elif keyword.iskeyword(name):
         reason = "it is a word of Python's; choose another"
     elif name in FUNCTIONS:
@@ -142,6 +165,30 @@ def check_name(name: str, *, where: str, reserved: Collection[str] = RESERVED_NA
     if reason is not None:
         raise ExpressionError(f"{where}: {name[:40]!r} cannot be a name: {reason}")
     return name
+
+
+def check_module_name(name: str, *, where: str) -> str:
+    """Return ``name`` if a generated module can be called so, else say why not."""
+    check_name(name, where=where)
+    if name in sys.stdlib_module_names or name == "gqm_sym" or _is_installed(name):
+        raise ExpressionError(
+            f"{where}: {name!r} is the name of a module that Python has already, which a generated one would hide; "
+            f"choose another, as {name}_motion"
+        )
+    return name
+
+
+def _is_installed(name: str) -> bool:
+    """Whether a package that is installed has a module of this name; one in the user's own folders is no obstacle."""
+    try:
+        spec = importlib.util.find_spec(name)
+    except (ImportError, ValueError):
+        return False
+    if spec is None:
+        return False
+    folders = [sysconfig.get_paths()[key] for key in ("stdlib", "platlib", "purelib")]
+    places = [spec.origin or "", *(spec.submodule_search_locations or ())]
+    return any(Path(place).is_relative_to(folder) for place in places if place for folder in folders)
 
 
 def name_or_value(source: S, default_name: str) -> tuple[str, S | None]:

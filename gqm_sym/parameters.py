@@ -9,6 +9,7 @@ from typing import TypeAlias
 
 import sympy as sp
 
+from gqm_sym.arguments import names, short
 from gqm_sym.errors import DeclarationError, NumberError
 from gqm_sym.expressions import check_name, name_or_value, read_expression
 
@@ -82,16 +83,17 @@ def read_parameters(
     elif isinstance(given, Mapping):
         declared = dict(given)
     else:
-        declared = dict.fromkeys([given] if isinstance(given, str) else given)
+        declared = dict.fromkeys(names(given, where=f"{where}: parameters"))
     for name in declared:
+        if not isinstance(name, str):
+            raise DeclarationError(f"{where}: parameters: {name!r:.60} is no name; names are text")
         if name not in order:
             raise DeclarationError(
-                f"{where}: parameter {name!r} is declared but not used; "
+                f"{where}: parameter {short(name)} is declared but not used; "
                 f"remove it or use it (in use: {', '.join(order) or 'none'})"
             )
-    names = (*declared, *(name for name in order if name not in declared))
     pairs: list[tuple[str, Value | None]] = []
-    for name in names:
+    for name in (*declared, *(name for name in order if name not in declared)):
         check_parameter(name, where=where)
         value = declared.get(name, COMMON_DEFAULTS.get(name))
         pairs.append((name, None if value is None else read_value(value, where=f"{where}: {name}")))
@@ -125,6 +127,26 @@ def read_argument(given: Given | None, name: str, *, where: str) -> tuple[str, V
 def exact_value(value: Value) -> sp.Expr:
     """Return the number that a default means, exactly."""
     return read_expression(value, where="default")
+
+
+def tried_values(defaults: Mapping[str, Value | None]) -> dict[sp.Symbol, sp.Expr]:
+    """Values of parameters to try a form with: their defaults, or numbers like 1."""
+    return {
+        sp.Symbol(name, real=True): sp.Rational(17 + 2 * place, 16 + place) if value is None else exact_value(value)
+        for place, (name, value) in enumerate(defaults.items())
+    }
+
+
+def in_words(defaults: Mapping[str, Value | None], units: Mapping[str, str]) -> str:
+    """Name parameters with their defaults and units, on one line: ``L = 2 m, b (1/m, no default)``."""
+    told = []
+    for name, value in defaults.items():
+        unit = "" if units.get(name, "1") == "1" else units[name]
+        if value is None:
+            told.append(f"{name} ({unit + ', ' if unit else ''}no default)")
+        else:
+            told.append(f"{name} = {value} {unit}".rstrip())
+    return ", ".join(told) or "none"
 
 
 def is_positive(value: Value | None) -> bool:
@@ -175,4 +197,5 @@ __all__ = [
     "read_parameters",
     "read_value",
     "refuse_out_of_range",
+    "tried_values",
 ]

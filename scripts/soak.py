@@ -125,7 +125,7 @@ def faults(module: ModuleType, call: dict[str, Any], draw: random.Random, closel
     if module.MODEL.dissipation is not None:
         # With losses V**2 depends on the way: pass 1 tells that of the first leg, if places in doubles tell it apart.
         held = (t <= legs[0].t_end) & (abs(legs[0].lam_end - legs[0].lam_start) > SLACK * bit)
-    share = PACED if any(piece.stretch.from_exact for piece in motion._course(0.0).pieces) else ENERGY
+    share = PACED if any(timed.segment.from_multiprecision for timed in motion._trajectory(0.0).segments) else ENERGY
     if not np.all((np.abs(v2 - told) <= share * most + unsure)[held]):
         told, unsure = speed_squared(module, motion, lam, bit, launch, True, most)  # heights may cancel in themselves
     off = np.abs(v2 - told)[held]
@@ -184,7 +184,8 @@ def speed_squared(
         told, *beside = module.pass1(np.array([lam, lam - bit, lam + bit]), **launch).v2
         return told, sum(np.nan_to_num(np.abs(other - told)) for other in beside)  # off the leg there is none
     functions, lam0 = motion.problem.functions, launch["lam0"]
-    heights, slopes = potential_at(functions.addresses, functions.p, np.array([lam0 - 1.0, lam0 + 1.0, lam0, *lam]))
+    around = np.array([lam0 - 1.0, lam0 + 1.0, lam0, *lam])
+    heights, slopes = 2.0 * potential_at(functions.addresses, functions.p, around)
     moved, rounding = 2.0 * bit * np.abs(slopes[3:]), ROUNDED * np.nanmax(np.abs(heights))
     if module.MODEL.exact is None or not (closely or rounding > LEFT * most):
         return launch["v0"] ** 2 + (heights[2] - heights[3:]), moved + rounding
@@ -196,18 +197,18 @@ def exactly(module: ModuleType, lam: Any, launch: dict[str, Any]) -> tuple[Any, 
     """V**2 at places from exact heights, and the rounding of a chart."""
     with mp.workdps(40):
         p = tuple(mpf(launch[name]) for name in module.PARAMETERS)
-        start, *heights = (climb(module, float(place), launch, p) for place in (launch["lam0"], *lam))
+        start, *heights = (lost(module, float(place), launch, p) for place in (launch["lam0"], *lam))
         size = 0.0 if hasattr(module.MODEL.exact, "x") else ROUNDED * float(max(map(abs, heights)))
         return np.array([float(mpf(launch["v0"]) ** 2 + start - height) for height in heights]), size
 
 
-def climb(module: ModuleType, lam: float, launch: dict[str, Any], p: tuple[Any, ...]) -> Any:
-    """What V**2 loses in climbing to a place, up to a constant; on charts by its coordinates."""
+def lost(module: ModuleType, lam: float, launch: dict[str, Any], p: tuple[Any, ...]) -> Any:
+    """What V**2 loses on the way to a place, up to a constant; on charts by its coordinates."""
     exact = module.MODEL.exact
     if hasattr(exact, "x"):
-        return exact.climb(mp, mpf(lam), p)
+        return 2 * exact.effective_potential(mp, mpf(lam), p)
     frame = module.pass1(lam, **launch)
-    return exact.climb(mp, mpf(float(frame.x)), mpf(float(frame.z)), p)[0]
+    return 2 * exact.effective_potential(mp, mpf(float(frame.x)), mpf(float(frame.z)), p)[0]
 
 
 def swept(module: ModuleType, call: dict[str, Any], period: float) -> list[str]:

@@ -190,7 +190,7 @@ def test_a_module_that_is_not_there(name: str, tmp_path: Path) -> None:
 def test_a_module_for_another_interface(version: int, text: str, path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """It is refused as it is imported, with what to run, before anything is compiled."""
     path.write_text(text.replace(f"interface={INTERFACE})", f"interface={version})"), encoding="utf-8")
-    monkeypatch.setattr(jit, "CFunc", _failing(AssertionError("compiled")))
+    monkeypatch.setattr(jit.COMPILER, "callback", _failing(AssertionError("compiled")))
     with pytest.raises(OutdatedModuleError, match=rf"bowl\.py: .*interface {version} .*{INTERFACE}; run gqm-gen"):
         load(path, "outdated")
     path.write_text(text, encoding="utf-8")
@@ -239,13 +239,11 @@ def test_one_module_in_two_folders(text: str, path: Path, tmp_path: Path) -> Non
     twin = tmp_path / "twin" / "bowl.py"
     write_module(text, twin)
     first, second = load(path, "bowl"), load(twin, "bowl")
-    assert half_period(first) == half_period(second) > 0.0
-    files = [Path(module.__file__ or "") for module in (first, second)]
-    assert files == [path.resolve(), twin.resolve()]
-    path.unlink()
-    assert (
-        half_period(second) == half_period(load(twin, "bowl")) == half_period(first)
-    )  # neither needs the other's file
+    halves = [half_period(module) for module in (first, second)]
+    assert halves[0] == halves[1] > 0.0
+    assert [Path(module.__file__ or "") for module in (first, second)] == [path.resolve(), twin.resolve()]
+    path.unlink()  # neither needs the other's file
+    assert [half_period(module) for module in (first, second, load(twin, "bowl"))] == [*halves, halves[0]]
 
 
 def test_a_new_version_in_the_same_place(path: Path) -> None:

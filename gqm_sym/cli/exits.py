@@ -3,11 +3,13 @@
 import os
 import sys
 import traceback
+import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
-from gqm_sym.errors import GQMError, InputError, SpecFileError
+from gqm_sym.errors import GQMError, InputError, NoisyPointsWarning, SpecFileError
 
 DONE = 0
 DIFFERENT = 1  # --check found a file that is not what would be written
@@ -32,7 +34,8 @@ def guarded(program: str, work: Callable[[], int]) -> int:
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="backslashreplace")
     try:
-        code = work()
+        with _warnings_as_lines(program):
+            code = work()
         sys.stdout.flush()
         return code
     except SystemExit as stop:  # argparse: 0 after --help, 2 after a usage error
@@ -56,6 +59,22 @@ def guarded(program: str, work: Callable[[], int]) -> int:
         where = f"{Path(frame.filename).name}:{frame.lineno}"
         what = f"{type(error).__name__}: {error}".replace("\n", " ")
         return _end(f"{program}: internal error ({where}): {what}; please report it, with the input", FAILED)
+
+
+@contextmanager
+def _warnings_as_lines(program: str) -> Iterator[None]:
+    """Print a warning of ours as one line; where in the package it arose helps nobody."""
+    with warnings.catch_warnings():
+        shown = warnings.showwarning
+
+        def show(message: Warning | str, category: type[Warning], *where: Any, **rest: Any) -> None:
+            if issubclass(category, NoisyPointsWarning):
+                print(f"{program}: warning: {message}", file=sys.stderr)
+            else:
+                shown(message, category, *where, **rest)
+
+        warnings.showwarning = show
+        yield
 
 
 def code_of(error: GQMError) -> int:

@@ -32,6 +32,9 @@ def forms(spec: "Spec", model: "Model") -> Iterator[str]:
     yield from table((_parameter(spec, *pair) for pair in model.defaults), right=())
     for note in model.notes:
         yield f"  note: {note}"
+    if spec.curve.smoothing is not None:
+        yield ""
+        yield from (f"  {line}" for line in str(spec.curve.smoothing).splitlines())
 
 
 def _parameter(spec: "Spec", name: str, value: object) -> tuple[str, ...]:
@@ -56,7 +59,7 @@ def motion(found: "Motion", parameter: str) -> Iterator[str]:
     elif isfinite(found.t_end):
         yield f"  ends after      {_number(found.t_end)} s"
     yield f"  quadrature      within {found.quadrature_error:.1e} of a time"
-    yield f"  conditioning    {found.conditioning:.1e} (a relative change of the launch, magnified in a time)"
+    yield f"  condition       {found.condition_number:.1e} (relative change of a time per that of the launch)"
     if found.legs:
         yield ""
         yield from table(_legs(found, parameter), right=range(1, 6))
@@ -91,18 +94,18 @@ def _states(
 
 
 def swept(quantities: Iterable[str], data: "Dataset") -> Iterator[str]:
-    """Yield what came of a sweep, line by line: its size, and what there is no value of, and why."""
-    from gqm_sym.runtime.sweep.sweep import REASONS
+    """Yield a summary of a sweep line by line: its size, and how many launches have no value and why."""
+    from gqm_sym.runtime.sweep.quantities import STATUS_SENTENCES
 
     yield f"  {' x '.join(f'{size} {name}' for name, size in data.sizes.items())}: {', '.join(quantities)}"
     refused: dict[str, None] = {}
     for quantity in quantities:
-        why = data[f"{quantity}_reason"]
-        for code, reason in enumerate(REASONS):
-            count = int((why == code).sum())
-            if reason and count:
-                yield f"  {quantity}: {count} without a value: {reason}"
-        refused[why.attrs.get("first_refused", "")] = None
+        status = data[f"{quantity}_status"]
+        for code, sentence in enumerate(STATUS_SENTENCES):
+            count = int((status == code).sum())
+            if sentence and count:
+                yield f"  {quantity}: {count} without a value: {sentence}"
+        refused[status.attrs.get("first_refused", "")] = None
     yield from (f"  refused {first}" for first in refused if first)
 
 

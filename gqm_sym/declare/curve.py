@@ -1,20 +1,23 @@
 """A planar curve as it was declared: coordinates, parameter, domain and run-time parameters."""
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import sympy as sp
 
-from gqm_sym.declare.ends import Ends, check_ends, read_ends
+from gqm_sym.arguments import checked, names, one_line, short
+from gqm_sym.declare.closing import check_period, found_period
+from gqm_sym.declare.ends import Ends, check_ends, check_order, read_ends
+from gqm_sym.declare.measures import told
 from gqm_sym.errors import DeclarationError
 from gqm_sym.expressions import check_name, read_expression
 from gqm_sym.parameters import Parameters, Value, names_in_order, read_parameters
 from gqm_sym.sympy_charts import chart_x, chart_z
 
 if TYPE_CHECKING:
-    from gqm_sym.declare.implicit import Level
     from gqm_sym.declare.piecewise import Piece
+    from gqm_sym.smoothing import Smoothing
 
 Source: TypeAlias = str | int | sp.Expr
 
@@ -35,7 +38,7 @@ class Curve:
     domain
         Ends of the parameter's range, each an expression in run-time parameters or None (open).
     period
-        The parameter period of a closed curve.
+        The parameter period of a closed curve: as given, or found where the formulas tell it.
     defaults
         The run-time parameters in order, each with its default or None.
     title
@@ -66,7 +69,11 @@ class Curve:
                 f"{self.kind} curve: neither coordinate depends on the parameter "
                 f"{self.parameter.name!r}; x = {self.x}, z = {self.z} is a point, not a curve"
             )
+        one_line(self.title, where=f"{self.kind} curve: title")
         check_ends(self.kind, self.domain, self.period, self.parameter)
+        check_order(self.kind, self.domain, self.period, dict(self.defaults))
+        if self.period is not None:
+            check_period(self.kind, (self.x, self.z), self.parameter, self.period, dict(self.defaults))
 
     @property
     def parameters(self) -> tuple[str, ...]:
@@ -78,7 +85,17 @@ class Curve:
         """Whether the parameter is arc length, and the coordinates are known by numbers only."""
         return self.definition is not None
 
+    def __str__(self) -> str:
+        """A few lines for people: what it is, where it goes, and what its parameters are measured in."""
+        return told(self)
+
+    @property
+    def smoothing(self) -> "Smoothing | None":
+        """What smoothing did to the points of a sampled track; None where nothing was smoothed."""
+        return getattr(self.definition, "smoothing", None)
+
     @classmethod
+    @checked("Curve.graph")
     def graph(
         cls,
         z: Source,
@@ -98,9 +115,11 @@ class Curve:
         """
         symbol = _symbol(parameter, "graph")
         height = read_expression(z, where="graph: z")
-        return _declare("graph", symbol, height, symbol, domain, None, parameters, title, positive)
+        forms = cls(kind="graph", x=symbol, z=height, parameter=symbol, title=title)
+        return _declare(forms, domain, parameters, positive)
 
     @classmethod
+    @checked("Curve.parametric")
     def parametric(
         cls,
         *,
@@ -115,6 +134,8 @@ class Curve:
     ) -> "Curve":
         """Declare a curve by both coordinates.
 
+        Without ``period`` and ``domain`` it is closed where both are made of waves of commensurate rates.
+
         Examples
         --------
         >>> Curve.parametric(x="L*sin(u)", z="-L*cos(u)", parameter="u", period="2*pi").period
@@ -123,9 +144,11 @@ class Curve:
         symbol = _symbol(parameter, "parametric")
         first = read_expression(x, where="parametric: x")
         second = read_expression(z, where="parametric: z")
-        return _declare("parametric", first, second, symbol, domain, period, parameters, title, positive)
+        forms = cls(kind="parametric", x=first, z=second, parameter=symbol, title=title)
+        return _declare(forms, domain, parameters, positive, period)
 
     @classmethod
+    @checked("Curve.polar")
     def polar(
         cls,
         r: Source,
@@ -140,20 +163,12 @@ class Curve:
         """Declare ``r = r(θ)``, θ from the positive x axis; r may be negative."""
         symbol = _symbol(parameter, "polar")
         radius = read_expression(r, where="polar: r")
-        return _declare(
-            "polar",
-            radius * sp.cos(symbol),
-            radius * sp.sin(symbol),
-            symbol,
-            domain,
-            period,
-            parameters,
-            title,
-            positive,
-            radius,
-        )
+        x, z = radius * sp.cos(symbol), radius * sp.sin(symbol)
+        forms = cls(kind="polar", x=x, z=z, parameter=symbol, title=title, radius=radius)
+        return _declare(forms, domain, parameters, positive, period)
 
     @classmethod
+    @checked("Curve.implicit")
     def implicit(
         cls,
         F: Source,
@@ -191,17 +206,20 @@ class Curve:
         level = read_level(F, start=start, tangent=tangent, parameter=symbol.name)
         ends = read_ends(domain, "implicit")
         check_domain(*ends)
-        return _declare(
-            "implicit", chart_x(symbol), chart_z(symbol), symbol, ends, None, parameters, title, positive, level=level
-        )
+        x, z = chart_x(symbol), chart_z(symbol)
+        forms = cls(kind="implicit", x=x, z=z, parameter=symbol, title=title, definition=level)
+        return _declare(forms, ends, parameters, positive, names_of_level=level.names)
 
     @classmethod
+    @checked("Curve.sampled")
     def sampled(
         cls,
-        points: Iterable[Any],
+        points: Any,
+        z: Any = None,
         *,
         kind: str = "spline",
         closed: bool | None = None,
+        smoothing: float | str | None = None,
         title: str = "",
     ) -> "Curve":
         """Declare the track through points, in arc length from the first of them.
@@ -209,26 +227,48 @@ class Curve:
         Parameters
         ----------
         points
-            Rows of x and z: an (n, 2) array, or pairs of numbers or of decimal text, which is kept as it is.
+            Rows of x and z: an (n, 2) array, or pairs of numbers or of decimal text, which is kept as it is; or a
+            table with columns x and z, as a DataFrame or a mapping; or, where ``z`` is given, the x of all points.
+        z
+            The heights of the points, where ``points`` are their x: ``Curve.sampled(x, z)``.
         kind
             "spline": the interpolating quintic spline. "linear": planes stitched together (paper, eq. 1); at their
             corners the speed is kept. A body at rest on a corner stays where both planes rise from it or hold it; on a
             ridge that lets it slide down either side it goes in the direction of launch.
         closed
             Whether the track closes; None: if its last point is its first.
+        smoothing
+            For measured points, whose scatter would be a hundredfold in curvature and loads: their standard deviation
+            in metres, or "auto", to find it by cross-validation. The track is then the smoothing spline of degree 5;
+            what it changed, and how good its curvature is, is in the attribute ``smoothing`` of the curve. None: the
+            track goes through the points.
 
         Raises
         ------
         DeclarationError
             If a row is no point, or points are too few, repeated, out of order or far away.
+
+        Warns
+        -----
+        NoisyPointsWarning
+            If the curvature of the track goes up and down from point to point.
+
+        Examples
+        --------
+        >>> from math import cos
+        >>> ruler = [(x / 10, round(cos(x / 10), 2)) for x in range(60)]  # heights to the centimetre
+        >>> track = Curve.sampled(ruler, smoothing=0.003)
+        >>> round(track.smoothing.rms, 4)
+        0.0021
         """
         from gqm_sym.declare.sampled import read_track
 
         s = sp.Symbol("s", real=True)
-        track = read_track(points, kind=kind, closed=closed)
+        track = read_track(points, z, kind=kind, closed=closed, smoothing=smoothing)
         return cls(kind="sampled", x=chart_x(s), z=chart_z(s), parameter=s, title=title, definition=track)
 
     @classmethod
+    @checked("Curve.piecewise")
     def piecewise(
         cls,
         pieces: "Iterable[Piece | Curve]",
@@ -282,49 +322,37 @@ class Curve:
 
 
 def _symbol(name: str, kind: str) -> sp.Symbol:
-    return sp.Symbol(_check_parameter_name(name, kind), real=True)
+    return sp.Symbol(check_parameter_name(name, kind), real=True)
 
 
-def _check_parameter_name(name: str, kind: str) -> str:
-    # "lam" is reserved because emitted functions call their argument so; a curve's own parameter
-    # is that argument, so it alone may have the name.
-    return name if name == "lam" else check_name(name, where=f"{kind}: parameter")
+def check_parameter_name(name: str, kind: str) -> str:
+    """Return the name of a curve's own parameter, which alone may be called ``lam``."""
+    # "lam" is reserved because emitted functions call their argument so, and that is the curve's parameter.
+    own = isinstance(name, str) and name == "lam"
+    return name if own else check_name(name, where=f"{kind}: parameter")
 
 
 def _declare(
-    kind: str,
-    x: sp.Expr,
-    z: sp.Expr,
-    symbol: sp.Symbol,
+    forms: Curve,
     domain: Iterable[Source | None] | None,
-    period: Source | None,
     parameters: Parameters | None,
-    title: str,
     positive: Iterable[str],
-    radius: sp.Expr | None = None,
-    level: "Level | None" = None,
+    period: Source | None = None,
+    names_of_level: tuple[str, ...] = (),
 ) -> Curve:
+    """The curve of these coordinates with its domain, its period and its run-time parameters, read and checked."""
+    kind, symbol = forms.kind, forms.parameter
     ends = read_ends(domain, kind)
     turn = None if period is None else read_expression(period, where=f"{kind}: period")
-    written = (x, z) if radius is None else (radius,)
+    written = (forms.x, forms.z) if forms.radius is None else (forms.radius,)
     given = tuple(end for end in (*ends, turn) if end is not None)
-    names = (*names_in_order(*written), *(() if level is None else level.names), *names_in_order(*given))
-    found = tuple(name for name in dict.fromkeys(names) if name != symbol.name)
+    used = (*names_in_order(*written), *names_of_level, *names_in_order(*given))
+    found = tuple(name for name in dict.fromkeys(used) if name != symbol.name)
     defaults = read_parameters(parameters, found=found, where=f"{kind} curve")
-    promised = tuple(positive)
+    if turn is None and kind in ("parametric", "polar") and ends == (None, None):
+        turn = found_period((forms.x, forms.z), symbol)
+    promised = names(positive, where=f"{kind}: positive")
     for name in promised:
         if name not in found:
-            raise DeclarationError(f"{kind} curve: {name!r} is promised to be positive but not used; remove it")
-    return Curve(
-        kind=kind,
-        x=x,
-        z=z,
-        parameter=symbol,
-        domain=ends,
-        period=turn,
-        defaults=defaults,
-        title=title,
-        positive=promised,
-        radius=radius,
-        definition=level,
-    )
+            raise DeclarationError(f"{kind} curve: {short(name)} is promised to be positive but not used; remove it")
+    return replace(forms, domain=ends, period=turn, defaults=defaults, positive=promised)

@@ -10,8 +10,9 @@ from dataclasses import dataclass
 
 import sympy as sp
 
-from gqm_sym.declare.curve import Curve, Source
-from gqm_sym.errors import DeclarationError
+from gqm_sym.arguments import checked, flag, short, unknown_argument
+from gqm_sym.declare.curve import Curve, Source, check_parameter_name
+from gqm_sym.errors import ArgumentError, DeclarationError
 from gqm_sym.expressions import read_expression
 from gqm_sym.parameters import Given, Parameters, Value, read_argument
 
@@ -46,7 +47,7 @@ class Family:
 
     def __call__(
         self,
-        *,
+        *unnamed: object,
         parameter: str | None = None,
         domain: Iterable[Source | None] | None = None,
         inverted: bool = False,
@@ -66,13 +67,15 @@ class Family:
             For each argument of the family another name or a value.
         """
         where = f"families.{self.name}"
+        if unnamed:
+            named = ", ".join(f"{n}={short(v)}" for n, v in zip(self.arguments, unnamed, strict=False))
+            raise ArgumentError(f"{where}: takes arguments by name only; write {where}({named})")
         for given in arguments:
             if given not in self.arguments:
-                raise DeclarationError(
-                    f"{where}: there is no argument {given!r}; "
-                    f"it takes {', '.join((*self.arguments, 'parameter, domain, inverted'))}"
-                )
-        called = parameter or self.parameter
+                names_here = (*self.arguments, "parameter", "domain", "inverted")
+                raise ArgumentError(unknown_argument(where, given, names_here))
+        flag(inverted, where=f"{where}: inverted")
+        called = self.parameter if parameter is None else check_parameter_name(parameter, where)
         names: dict[str, Value | None] = {}
         renamed = {_symbol(self.parameter): _symbol(called)}
         positive: list[str] = []
@@ -201,6 +204,7 @@ FAMILIES: dict[str, Family] = {
 }
 
 
+@checked("families.cartesian_graph")
 def cartesian_graph(
     phi: Source,
     *,
@@ -212,6 +216,7 @@ def cartesian_graph(
     return Curve.graph(phi, parameter=parameter, domain=domain, parameters=parameters)
 
 
+@checked("families.implicit")
 def implicit(
     F: Source,
     *,

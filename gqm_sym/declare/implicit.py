@@ -2,9 +2,11 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from numbers import Real
 
 import sympy as sp
 
+from gqm_sym.arguments import several, short
 from gqm_sym.errors import DeclarationError
 from gqm_sym.expressions import Source, read_expression
 from gqm_sym.parameters import COORDINATES, names_in_order
@@ -63,9 +65,9 @@ def read_level(F: Source, *, start: Iterable[Source], tangent: int, parameter: s
     value = read_expression(F, where="implicit: F")
     if not value.free_symbols & {X, Z}:
         raise DeclarationError(f"implicit: F: contains neither x nor z, got {value}; the curve is where F(x, z) = 0")
-    pair = None if isinstance(start, str | sp.Expr) else tuple(start)
-    if pair is None or len(pair) != 2:
-        raise DeclarationError(f"implicit: start: must be a point (x, z) of the curve, got {start!r}")
+    pair = several(start, where="implicit: start", what="a point (x, z) of the curve")
+    if len(pair) != 2:
+        raise DeclarationError(f"implicit: start: must be a point (x, z) of the curve, got {short(start)}")
     place = (read_expression(pair[0], where="implicit: start"), read_expression(pair[1], where="implicit: start"))
     for coordinate in place:
         if coordinate.free_symbols & {X, Z}:
@@ -73,9 +75,9 @@ def read_level(F: Source, *, start: Iterable[Source], tangent: int, parameter: s
                 f"implicit: start: {coordinate} contains a coordinate; "
                 "only numbers and run-time parameters may stand there"
             )
-    if isinstance(tangent, bool) or tangent not in (1, -1):
+    if isinstance(tangent, bool) or not isinstance(tangent, Real | sp.Integer) or tangent not in (1, -1):
         raise DeclarationError(
-            f"implicit: tangent: must be 1, for (-F_z, F_x)/|grad F|, or -1, for the opposite; got {tangent!r}"
+            f"implicit: tangent: must be 1, for (-F_z, F_x)/|grad F|, or -1, for the opposite; got {short(tangent)}"
         )
     level = Level(value=value, start=place, tangent=int(tangent))
     if parameter in level.names:

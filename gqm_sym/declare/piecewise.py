@@ -6,6 +6,7 @@ from typing import Protocol, runtime_checkable
 
 import sympy as sp
 
+from gqm_sym.arguments import checked, flag, several, short
 from gqm_sym.errors import DeclarationError
 from gqm_sym.expressions import Source, read_expression
 from gqm_sym.parameters import Parameters, Value, names_in_order, read_parameters
@@ -81,16 +82,19 @@ class Rail:
     closed: bool
 
 
+@checked("line")
 def line(*, length: Source) -> Piece:
     """A straight piece of a rail."""
     return _standard("line", length)
 
 
+@checked("arc")
 def arc(*, radius: Source, angle: Source) -> Piece:
     """A piece of a circle; a positive angle turns left, a negative one right."""
     return _standard("arc", radius, angle)
 
 
+@checked("clothoid")
 def clothoid(*, length: Source, kappa_start: Source, kappa_end: Source) -> Piece:
     """A piece whose signed curvature is linear in arc length."""
     return _standard("clothoid", length, kappa_start, kappa_end)
@@ -121,9 +125,9 @@ def declare_rail(
     rail, defaults, positive
         The definition, the run-time parameters with their defaults, and those promised to be positive.
     """
-    if not isinstance(closed, bool):
-        raise DeclarationError(f"piecewise: closed: must be True or False, got {closed!r}")
-    given = tuple(pieces)
+    flag(closed, where="piecewise: closed")
+    what = "pieces in a list, as in [line(length=2), arc(radius=1, angle=pi)]"
+    given = several(pieces, where="piecewise: pieces", what=what)
     if not given:
         raise DeclarationError(
             "piecewise: no pieces; give one or more, as in [line(length=2), arc(radius=1, angle=pi)]"
@@ -138,9 +142,7 @@ def _piece(given: Piece | FormulaCurve, where: str) -> Piece:
     if isinstance(given, Piece):
         return given
     if not isinstance(given, FormulaCurve):
-        raise DeclarationError(
-            f"{where}: {type(given).__name__} given; give line, arc, clothoid or a curve with formulas"
-        )
+        raise DeclarationError(f"{where}: {short(given)} given; give line, arc, clothoid or a curve with formulas")
     if given.charted:
         raise DeclarationError(f"{where}: a curve of kind {given.kind!r} cannot be a piece; give one with formulas")
     low, high = given.domain
@@ -156,9 +158,9 @@ def _start(start: Sequence[Source] | None, heading: Source | None, first: Piece)
                 "piecewise: start: the first piece is a curve with a place of its own; leave start and heading out"
             )
         return None
-    place = (0, 0) if start is None else start
-    if isinstance(place, str) or not isinstance(place, Sequence) or len(place) != 2:
-        raise DeclarationError(f"piecewise: start: must be a pair (x, z), got {start!r}")
+    place = (0, 0) if start is None else several(start, where="piecewise: start", what="a pair (x, z)")
+    if len(place) != 2:
+        raise DeclarationError(f"piecewise: start: must be a pair (x, z), got {short(start)}")
     numbers = (*place, 0 if heading is None else heading)
     return tuple(
         read_expression(number, where=f"piecewise: {name}")

@@ -1,15 +1,24 @@
-"""Tracks given by points: checked row by row, and kept as the exact text of their coordinates."""
+"""Tracks given by points: checked row by row, and kept as the exact text of their coordinates.
+
+Points that were smoothed are kept instead of those that were measured: a module has no more to do than to go through
+them, and a smooth track needs fewer of them.
+"""
 
 import re
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+import warnings
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from decimal import Decimal
 from itertools import pairwise
 from math import atan2, hypot, isfinite, pi
 from statistics import median
-from typing import Any
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
-from gqm_sym.errors import DeclarationError
+from gqm_sym.arguments import one_of, several, short
+from gqm_sym.errors import DeclarationError, NoisyPointsWarning
+
+if TYPE_CHECKING:
+    from gqm_sym.smoothing import Smoothing
 
 KINDS = ("spline", "linear")
 # The fewest different points: a quintic polynomial has six; a closed ring of planes is a triangle.
@@ -24,6 +33,20 @@ SHARPEST = pi / 2
 BACKWARDS = pi - 1e-6
 # A chord of a smooth track that is this many times as long as half of all chords jumps to another place.
 JUMP = 100.0
+# A chord of measured points that is this many times as long as they scatter tells the direction of the track.
+LONG = 8.0
+# Cross-validation needs more points than a spline does.
+FEWEST_AUTO = 12
+# Curvature that rises and falls by turns between more than this share of neighbours is scatter,
+RESTLESS = 0.5
+# if it changes loads by this many g where a body is as fast as after a fall from one side of the track to the other.
+FELT = 0.1
+
+Place: TypeAlias = tuple[float, float]
+# So many turns in a row, each to the other side and by more than this, are a zigzag that no smooth track goes through:
+# the lengths of the spline between such points never settle.
+ZIGZAGS = 3
+ZIGZAG = pi / 9
 
 _DECIMAL = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 
@@ -40,38 +63,58 @@ class Track:
         A quintic spline, or planes stitched together.
     closed : bool
         Whether the track goes on from the last point to the first.
+    smoothing : Smoothing or None
+        What smoothing did to the points as measured, if they were smoothed.
     """
 
     points: str
     kind: str
     closed: bool
+    smoothing: "Smoothing | None" = field(default=None, compare=False, repr=False)
 
 
-def read_track(points: Iterable[Any], *, kind: str = "spline", closed: bool | None = None) -> Track:
+def read_track(
+    points: Any,
+    z: Any = None,
+    *,
+    kind: str = "spline",
+    closed: bool | None = None,
+    smoothing: float | str | None = None,
+) -> Track:
     """Read and check the points of a track.
 
     Parameters
     ----------
     points
-        Rows of x and z: an (n, 2) array, or pairs of numbers or of decimal text, which is kept as it is.
+        Rows of x and z: an (n, 2) array, or pairs of numbers or of decimal text, which is kept as it is; or a table
+        with columns x and z; or the x of all points.
+    z
+        The heights of the points, where ``points`` are their x.
     kind
         "spline" or "linear".
     closed
         Whether the track closes; None: if its last point is its first.
+    smoothing
+        The standard deviation of the points in metres, "auto", or None: the track goes through them.
 
     Raises
     ------
     DeclarationError
         If a row is no point, or points are too few, repeated, out of order or far away; the message names the row,
         counted from 1.
+
+    Warns
+    -----
+    NoisyPointsWarning
+        If the track's curvature goes up and down from point to point.
     """
-    if kind not in KINDS:
-        raise DeclarationError(f"sampled: kind: must be one of {', '.join(KINDS)}, got {kind!r}")
+    one_of(kind, KINDS, where="sampled: kind")
     if not (closed is None or isinstance(closed, bool)):
-        raise DeclarationError(f"sampled: closed: must be True, False or None, got {closed!r}")
+        raise DeclarationError(f"sampled: closed: must be True, False or None, got {short(closed)}")
+    deviation = _read_smoothing(smoothing, kind)
     texts: list[str] = []
-    places: list[tuple[float, float]] = []
-    for text, place in _read_rows(points):
+    places: list[Place] = []
+    for text, place in _read_rows(_rows(points, z)):
         texts.append(text)
         places.append(place)
     size = _size(places)
@@ -79,26 +122,100 @@ def read_track(points: Iterable[Any], *, kind: str = "spline", closed: bool | No
     joined = repeated if closed is None else closed
     if joined and repeated:
         del texts[-1], places[-1]
-    fewest = FEWEST[kind, joined]
+    rows = list(range(1, len(places) + 1))
+    if deviation is not None:  # what a recorder that waits for news says again was not measured again
+        rows = [row for row in rows if row == 1 or places[row - 1] != places[row - 2]]
+        places = [places[row - 1] for row in rows]
+    fewest = FEWEST_AUTO if deviation == "auto" else FEWEST[kind, joined]
     if len(places) < fewest:
         what = "a closed" if joined else "an open"
+        how = f"kind {kind!r}" if deviation is None else f"smoothing {smoothing!r}"
+        raise DeclarationError(f"sampled: {len(places)} different points; {what} track of {how} needs {fewest} or more")
+    if deviation is None:
+        _check_order(places, size, kind, joined)
+        if kind == "spline":
+            _warn_of_scatter(places, joined, "give their standard deviation in metres as smoothing, or 'auto'")
+        return Track(points="\n".join(texts), kind=kind, closed=joined)
+    _check_survey(places, rows, joined, 0.0 if deviation == "auto" else deviation)
+    smoothed, report = _smoothed(places, rows, joined, deviation)
+    _warn_of_scatter(smoothed, joined, f"smoothing {smoothing!r} is less than their scatter")
+    kept = "\n".join(f"{x!r} {z!r}" for x, z in smoothed)
+    return Track(points=kept, kind=kind, closed=joined, smoothing=report)
+
+
+def _read_smoothing(given: Any, kind: str) -> float | Literal["auto"] | None:
+    """The standard deviation of points, "auto" for cross-validation, or None for points that are exact."""
+    if given is None:
+        return None
+    if kind != "spline":
+        raise DeclarationError(f"sampled: smoothing: is for kind 'spline'; a track of kind {kind!r} has its corners")
+    if isinstance(given, str) and given == "auto":
+        return "auto"
+    try:
+        deviation = float("nan") if isinstance(given, bool | str) else float(given)
+    except (TypeError, ValueError, OverflowError):
+        deviation = float("nan")
+    if not (isfinite(deviation) and deviation > 0.0):
         raise DeclarationError(
-            f"sampled: {len(places)} different points; {what} track of kind {kind!r} needs {fewest} or more"
+            "sampled: smoothing: must be the standard deviation of the points in metres, a positive number, 'auto' or "
+            f"None, got {given!r:.40}"
         )
-    _check_order(places, size, kind, joined)
-    return Track(points="\n".join(texts), kind=kind, closed=joined)
+    return deviation
 
 
-def _read_rows(points: Iterable[Any]) -> Iterator[tuple[str, tuple[float, float]]]:
+def _smoothed(
+    places: list[Place], rows: list[int], joined: bool, deviation: float | Literal["auto"]
+) -> tuple[list[Place], "Smoothing"]:
+    """The points of the smooth track, and what smoothing did."""
+    from gqm_sym.smoothing import smooth
+
+    found, report = smooth(places, rows, closed=joined, deviation=None if deviation == "auto" else deviation)
+    return [(x, z) for x, z in found.tolist()], report
+
+
+def _rows(points: Any, z: Any) -> Any:
+    """Points as rows, whichever way they were given."""
+    if z is not None:
+        return _paired(points, z, "sampled: x and z")
+    # Any kind of table will do, whoever made it.
+    names = points if isinstance(points, Mapping) else getattr(points, "columns", None)
+    if names is None:
+        return points
+    columns = {name.strip().lower(): name for name in names if isinstance(name, str)}
+    if not columns.keys() >= {"x", "z"}:
+        raise DeclarationError(
+            f"sampled: points: a table must have columns x and z, got {short(list(names))}; rename them, or give "
+            "both columns, as in Curve.sampled(table['distance'], table['height'])"
+        )
+    return _paired(points[columns["x"]], points[columns["z"]], "sampled: columns x and z")
+
+
+def _paired(x: Any, z: Any, where: str) -> list[tuple[Any, Any]]:
+    """Rows of two columns."""
+    first, second = (_column(column, where) for column in (x, z))
+    if len(first) != len(second):
+        raise DeclarationError(f"{where}: must be of one length, got {len(first)} and {len(second)} values")
+    return list(zip(first, second, strict=True))
+
+
+def _column(values: Any, where: str) -> tuple[Any, ...]:
+    listed = values.tolist() if hasattr(values, "tolist") else values
+    return several(listed, where=where, what="two columns of numbers")
+
+
+def _read_rows(points: Iterable[Any]) -> Iterator[tuple[str, Place]]:
     # An array of numbers gives Python's own floats at once, which is many times quicker than row by row.
     rows = points.tolist() if hasattr(points, "tolist") else points
     try:
         numbered = enumerate(rows, start=1)
     except TypeError:
-        raise DeclarationError(f"sampled: points: must be rows of x and z, got {type(points).__name__}") from None
+        raise DeclarationError(f"sampled: points: must be rows of x and z, got {short(points)}") from None
     for count, row in numbered:
         if isinstance(row, str) or not isinstance(row, Sequence) or len(row) != 2:
-            raise DeclarationError(f"sampled: row {count}: must be two numbers, x and z, got {row!r:.60}")
+            raise DeclarationError(
+                f"sampled: row {count}: must be two numbers, x and z, got {short(row)}; "
+                "for one array of each write Curve.sampled(x, z)"
+            )
         (x, first), (z, second) = (_read(value, count) for value in row)
         yield f"{x} {z}", (first, second)
 
@@ -122,7 +239,7 @@ def _read(value: Any, count: int) -> tuple[str, float]:
     return text, number
 
 
-def _size(places: list[tuple[float, float]]) -> float:
+def _size(places: list[Place]) -> float:
     """The longer side of the box around all points."""
     if not places:
         return 0.0
@@ -130,32 +247,111 @@ def _size(places: list[tuple[float, float]]) -> float:
     return float(max(max(xs) - min(xs), max(zs) - min(zs)))
 
 
-def _distance(one: tuple[float, float], two: tuple[float, float]) -> float:
+def _distance(one: Place, two: Place) -> float:
     return hypot(two[0] - one[0], two[1] - one[1])
 
 
-def _check_order(places: list[tuple[float, float]], size: float, kind: str, joined: bool) -> None:
-    """Refuse points that are repeated, out of order or far away from the rest."""
-    around = [*places, places[0]] if joined else places
-    chords = [_distance(one, two) for one, two in pairwise(around)]
+def _check_survey(places: list[Place], rows: list[int], joined: bool, scatter: float) -> None:
+    """Refuse measured points that are far away from the rest, or out of order beyond what scatter explains."""
+    chords = _chords(places, joined)
     usual = median(chords)
     for count, chord in enumerate(chords, start=1):
-        row = count % len(places) + 1
-        if chord <= SAME * size:
-            raise DeclarationError(f"sampled: row {row}: repeats row {count}; leave one of them out")
-        if kind == "spline" and chord > JUMP * usual:
-            raise DeclarationError(
-                f"sampled: row {row}: is {chord:.3g} from row {count}, where half of all points are within {usual:.3g} "
-                "of the next; leave out stray points, or sample the gap"
-            )
+        _check_gap(chord, usual, rows[count - 1], rows[count % len(rows)])
+    around = [*places, *places[:2]] if joined else places
+    bends = [
+        _distance((0.5 * (one[0] + three[0]), 0.5 * (one[1] + three[1])), two)
+        for one, two, three in zip(around, around[1:], around[2:], strict=False)
+    ]
+    long = LONG * max(scatter, median(bends))
+    for count, (turn, pair) in enumerate(zip(_turns(places, joined), pairwise([*chords, chords[0]]), strict=False), 1):
+        if abs(turn) > SHARPEST and min(pair) > long:
+            _refuse_turn(turn, rows[count % len(rows)])
+
+
+def _check_gap(chord: float, usual: float, before: int, row: int) -> None:
+    if chord > JUMP * usual:
+        raise DeclarationError(
+            f"sampled: row {row}: is {chord:.3g} from row {before}, where half of all points are within "
+            f"{usual:.3g} of the next; leave out stray points, or sample the gap"
+        )
+
+
+def _chords(places: list[Place], joined: bool) -> list[float]:
+    around = [*places, places[0]] if joined else places
+    return [_distance(one, two) for one, two in pairwise(around)]
+
+
+def _turns(places: list[Place], joined: bool) -> list[float]:
+    """By how much the track turns at each point between two others."""
+    around = [*places, *places[:2]] if joined else places
     angles = [atan2(two[1] - one[1], two[0] - one[0]) for one, two in pairwise(around)]
-    if joined:
-        angles.append(angles[0])
+    return [(after - before + pi) % (2.0 * pi) - pi for before, after in pairwise(angles)]
+
+
+def _check_order(places: list[Place], size: float, kind: str, joined: bool) -> None:
+    """Refuse points that are repeated, out of order or far away from the rest."""
+    chords = _chords(places, joined)
+    usual = median(chords)
+    for count, chord in enumerate(chords, start=1):
+        if chord <= SAME * size:
+            row = count % len(places) + 1
+            raise DeclarationError(f"sampled: row {row}: repeats row {count}; leave one of them out")
+        if kind == "spline":
+            _check_gap(chord, usual, count, count % len(places) + 1)
     most = SHARPEST if kind == "spline" else BACKWARDS
-    for count, (before, after) in enumerate(pairwise(angles), start=1):
-        turn = abs((after - before + pi) % (2.0 * pi) - pi)
-        if turn > most:
+    for count, turn in enumerate(_turns(places, joined), start=1):
+        if abs(turn) > most:
+            _refuse_turn(turn, count % len(places) + 1)
+    if kind == "spline":
+        _check_zigzag(_turns(places, joined))
+
+
+def _refuse_turn(turn: float, row: int) -> None:
+    raise DeclarationError(
+        f"sampled: row {row}: the track turns by {abs(turn) * 180.0 / pi:.0f} degrees there; are the points in order "
+        "along it, without a stray one, and close enough? (If they scatter farther than they are apart, give smoothing)"
+    )
+
+
+def _warn_of_scatter(places: list[Place], joined: bool, remedy: str) -> None:
+    """Warn of a track whose curvature goes up and down from point to point, as that of the track does not.
+
+    Scatter of points at distances h is in the curvature over h**2. Where it is most of that, the sign changes between
+    most neighbours; that the sign of the curvature's changes does shows it earlier, and on a loop as well.
+    """
+    chords = _chords(places, joined)
+    if joined:
+        chords.append(chords[0])
+    bends = [
+        2.0 * turn / (before + after)
+        for turn, (before, after) in zip(_turns(places, joined), pairwise(chords), strict=True)
+    ]
+    steps = [after - before for before, after in pairwise(bends)]
+    swings = [abs(after - before) / 4.0 for before, after in pairwise(steps) if before * after < 0.0]
+    if len(swings) <= RESTLESS * (len(steps) - 1):
+        return
+    felt = 2.0 * _size(places) * median(swings)
+    if felt > FELT:
+        changes = sum(before * after < 0.0 for before, after in pairwise(bends))
+        warnings.warn(
+            f"sampled: the curvature goes up and down from point to point (its sign changes between {changes} of "
+            f"{len(bends) - 1} neighbours), and loads with it, by about {felt:.2g} g where a body is fast: the points "
+            f"scatter, or are too far apart; {remedy}",
+            NoisyPointsWarning,
+            stacklevel=4,
+        )
+
+
+def _check_zigzag(turns: list[float]) -> None:
+    """Refuse points between which a smooth track would swing to and fro."""
+    run = 0
+    for count, turn in enumerate(turns):
+        swings = run and turn * turns[count - 1] < 0.0
+        run = 0 if abs(turn) <= ZIGZAG else run + 1 if swings else 1
+        if run == ZIGZAGS:
+            first = count + 3 - ZIGZAGS
             raise DeclarationError(
-                f"sampled: row {count % len(places) + 1}: the track turns by {turn * 180.0 / pi:.0f} degrees there; "
-                "are the points in order along it, without a stray one, and close enough?"
+                f"sampled: row {first}: the track turns to and fro there, {ZIGZAGS} times by more than "
+                f"{ZIGZAG * 180.0 / pi:.0f} degrees; no smooth track goes through a zigzag: give more points, points "
+                "without their noise, or kind='linear' for planes"
             )

@@ -61,7 +61,7 @@ def _refuse_own_names(names: tuple[str, ...]) -> None:
 def _refuse_strangers(kernel: Kernel, names: tuple[str, ...]) -> None:
     """Refuse what a law of the user's own calls by a name that nothing has here."""
     known = {*names, *COORDINATES, W.name, DIRECTION.name}
-    for symbol in sorted(kernel.extra.free_symbols, key=str):
+    for symbol in sorted(kernel.tangential_law.free_symbols, key=str):
         if symbol.name not in known:
             raise DeclarationError(
                 f"derive: law: {symbol.name!r} is not known on this curve, whose parameter is {names[0]!r}; "

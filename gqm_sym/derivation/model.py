@@ -1,14 +1,20 @@
 """The model: every closed form of a motion on a curve under a force law, as one frozen value."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import sympy as sp
 
+from gqm_sym.arguments import checked, instance, one_line, short
 from gqm_sym.budgets import budget
 from gqm_sym.declare import Curve
+from gqm_sym.declare.closing import check_period
+from gqm_sym.declare.ends import check_order
+from gqm_sym.declare.measures import curve_formulas
 from gqm_sym.derivation.algebra.rewrite import check_real, without_poles
 from gqm_sym.derivation.algebra.signs import Signs
+from gqm_sym.derivation.corners import check_corners, check_powers, without_known_bars
 from gqm_sym.derivation.defaults import join
 from gqm_sym.derivation.forces.dissipation import LOAD, PUSH, SIGMA, TILT, TURN, Dissipation, dissipation
 from gqm_sym.derivation.forces.forces import Forces, forces
@@ -19,11 +25,26 @@ from gqm_sym.derivation.geometry.offset_curve import beside
 from gqm_sym.derivation.reality import check_somewhere_real
 from gqm_sym.derivation.wells.swing import Swing, swing
 from gqm_sym.derivation.wells.symmetry import Symmetry, symmetry
-from gqm_sym.kernels.base import CONTACT_SIGN, DIRECTION, KAPPA, MASS, Kernel, W, X, Z
-from gqm_sym.parameters import Given, Value, is_positive
+from gqm_sym.dimensions import COMMON, found_dimensions, unit_of
+from gqm_sym.errors import ArgumentError, renamed
+from gqm_sym.kernels.base import (
+    CONTACT_SIGN,
+    DIRECTION,
+    KAPPA,
+    MASS,
+    Kernel,
+    W,
+    X,
+    Z,
+    kernel_formulas,
+    units_by_role,
+)
+from gqm_sym.parameters import Given, Value, in_words, is_positive
 
 LAM1 = sp.Symbol("lam1", real=True)
 LAM2 = sp.Symbol("lam2", real=True)
+# Characters of a closed form that a printed model shows.
+MOST_SHOWN = 160
 # Variables of integration, as texts and as LaTeX.
 _DASHES = (("_", "'"), ("__", "''"))
 
@@ -52,13 +73,13 @@ class Model:
         A smooth factor of σ that changes sign or vanishes at the cusps; None without cusps.
     potential, inertia
         Φ per unit mass along the curve, and 1 + β.
-    climb, climb_slope
-        2Φ/inertia, so that W + climb is constant along a motion, and its derivative by λ.
+    effective_potential, effective_potential_slope
+        U = Φ/inertia, so that W + 2U is constant along a motion, and dU/dλ.
     symmetry
-        Where climb and σ are even; None where no such place was found, or nothing repeats.
+        Where the effective potential and σ are even; None where no such place was found, or nothing repeats.
     swing
         The time of an orbit about such a place as an integral without sines; None where there is no such form.
-    reaction
+    static_normal_load
         n₀ with N/m = κ W + n₀.
     dissipation
         What a force law that is not conservative does along the curve; None for a conservative one.
@@ -72,8 +93,8 @@ class Model:
         N, positive along the normal to the left of growing λ.
     side_force
         What a track that turns about the z axis carries out of its plane; 0 for one at rest.
-    kernel
-        Tangential acceleration A, so that dW/ds = 2 A; of a dissipative model in ``W``.
+    tangential_acceleration
+        A, so that dW/ds = 2 A; of a dissipative model in ``W``.
     time_integrand
         dt/dλ = σ/√W.
     regularised_integrand
@@ -112,17 +133,17 @@ class Model:
     cusp: sp.Expr | None
     potential: sp.Expr
     inertia: sp.Expr
-    climb: sp.Expr
-    climb_slope: sp.Expr
+    effective_potential: sp.Expr
+    effective_potential_slope: sp.Expr
     symmetry: Symmetry | None
     swing: Swing | None
-    reaction: sp.Expr
+    static_normal_load: sp.Expr
     dissipation: Dissipation | None
     speed_squared: sp.Expr
     speed_squared_form: str
     normal_force: sp.Expr
     side_force: sp.Expr
-    kernel: sp.Expr
+    tangential_acceleration: sp.Expr
     time_integrand: sp.Expr
     regularised_integrand: sp.Expr
     turning_point_equation: sp.Eq
@@ -133,6 +154,15 @@ class Model:
     at_least: tuple[tuple[str, str], ...]
     notes: tuple[str, ...]
     level_set: LevelSet | None = None
+
+    if not TYPE_CHECKING:
+        __getattr__ = renamed(
+            {
+                **{"climb": "2*effective_potential", "climb_slope": "2*effective_potential_slope"},
+                **{"kernel": "tangential_acceleration", "reaction": "static_normal_load"},
+            },
+            "a model",
+        )
 
     @property
     def parameters(self) -> tuple[str, ...]:
@@ -158,7 +188,7 @@ class Model:
         force, side, rate = self.normal_force, self.side_force, self.time_integrand
         turning, liftoff = self.turning_point_equation, self.liftoff_equation
         if self.dissipation is not None:
-            pressure = self.kappa * W + self.reaction
+            pressure = self.kappa * W + self.static_normal_load
             force, rate = self.mass * pressure, self.ds / sp.sqrt(W)
             turning, liftoff = (sp.Eq(form, 0, evaluate=False) for form in (W, pressure))
             side = 2 * self.mass * self.force.spin * DIRECTION * sp.sqrt(W) * self.dxds
@@ -174,11 +204,26 @@ class Model:
             ("V**2" if self.dissipation is None else "W = V**2", self.speed_squared),
             ("N", force),
             *((("N_b", side),) if side else ()),
-            ("A", self.kernel),
+            ("A", self.tangential_acceleration),
             (f"dt/d{lam}", rate),
             ("turning points", turning),
             ("liftoff", liftoff),
         )
+
+    def __str__(self) -> str:
+        """A few lines for people: the closed forms that a motion follows, and the parameters with their units."""
+        formulas = curve_formulas(self.curve) + kernel_formulas(self.force)
+        found = found_dimensions(formulas, COMMON)
+        units = {**units_by_role(self.force), **{name: unit for name in found if (unit := unit_of(found[name]))}}
+        said = {"kappa": " [1/m]", "V**2": " [m**2/s**2]", "W = V**2": " [m**2/s**2]", "N": " [N]", "A": " [m/s**2]"}
+        lines = [f"{self.title or 'Model'}: {self.curve.kind} curve, {', '.join(name for name, _ in self.force.terms)}"]
+        for label, form in self.closed_forms():
+            if label in said or label in ("x", "z", f"ds/d{self.parameter.name}"):
+                text = str(form)
+                shown = text if len(text) <= MOST_SHOWN else text[: MOST_SHOWN - 3] + "..."
+                lines.append(f"  {label}{said.get(label, '')} = {shown}")
+        lines.append(f"  parameters: {in_words(dict(self.defaults), units)}")
+        return "\n".join([*lines, *(f"  {note}" for note in self.notes)])
 
     def latex(self) -> str:
         """Return the closed forms as one aligned LaTeX block, without delimiters."""
@@ -229,6 +274,7 @@ class Model:
         return f"$\\displaystyle {self.latex()}$"
 
 
+@checked("derive")
 @budget("derivation", 60.0, "declare the curve and the forces by shorter expressions")
 def derive(
     curve: Curve,
@@ -257,24 +303,41 @@ def derive(
     BudgetError
         If it takes more than a minute of processor time, or is nested too deeply.
     """
+    instance(curve, Curve, where="derive: curve", what="a curve, as Curve.graph or a family makes one")
+    instance(kernel, Kernel, where="derive: kernel", what="a force law, as Gravity() + CoulombFriction()")
+    given = {} if parameters is None else parameters
+    if not isinstance(given, Mapping):
+        raise ArgumentError(f"derive: parameters: must be names with values, as in {{'mu': 0.1}}, got {short(given)}")
+    called = curve.title if title is None else one_line(title, where="derive: title")
     lam = curve.parameter
     kernel = kernel.along(lam)
-    defaults = join(curve, kernel, parameters or {})
+    defaults = join(curve, kernel, given)
+    check_order(curve.kind, curve.domain, curve.period, dict(defaults))
     values = dict(defaults)
+    if not curve.charted:
+        if curve.period is not None:
+            check_period(curve.kind, (curve.x, curve.z), lam, curve.period, values)
+        check_powers((("x", curve.x), ("z", curve.z)), curve, values)
+        check_corners(curve, values)
+        signs = Signs(parameter=lam, domain=curve.domain, positive=curve.positive, may_be_positive=())
+        curve = replace(curve, **{name: without_known_bars(getattr(curve, name), signs) for name in ("x", "z")})
     track = geometry(curve, may_be_positive=tuple(name for name in values if is_positive(values[name])))
     x, z, shape = beside(without_poles(curve.x), without_poles(curve.z), track, kernel.radius)
-    law = forces(x, z, kernel, shape)
+    law = forces(x, z, kernel, shape, lam)
+    if not curve.charted:
+        check_powers((("potential", law.potential),), curve, values)
     loss, speed, level = None, conservative_speed(law, lam), level_set(curve)
     if not kernel.conservative:
         loss = _losses(curve, kernel, x, z, law, shape)
         speed = dissipative_speed(kernel, law, shape, loss, curve)
-    pressure = shape.kappa * speed.held + law.reaction
-    axes = None if loss or curve.charted else symmetry(law.climb, law.climb_slope, shape.ds, lam)
+    pressure = shape.kappa * speed.held + law.static_normal_load
+    potential, slope = law.effective_potential, law.effective_potential_slope
+    axes = None if loss or curve.charted else symmetry(potential, slope, shape.ds, lam)
     start = {lam: LAM0}
     model = Model(
         curve=curve,
         force=kernel,
-        title=curve.title if title is None else title,
+        title=called,
         parameter=lam,
         lam0=LAM0,
         v0=V0,
@@ -290,22 +353,22 @@ def derive(
         cusp=shape.cusp,
         potential=law.potential,
         inertia=kernel.inertia,
-        climb=law.climb,
-        climb_slope=law.climb_slope,
+        effective_potential=potential,
+        effective_potential_slope=slope,
         symmetry=axes,
-        swing=swing(law.climb, shape.ds, lam, axes),
-        reaction=law.reaction,
+        swing=swing(2 * potential, shape.ds, lam, axes),
+        static_normal_load=law.static_normal_load,
         dissipation=loss,
         speed_squared=speed.squared,
         speed_squared_form=speed.form,
         normal_force=MASS * pressure,
         side_force=2 * MASS * kernel.spin * DIRECTION * sp.sqrt(speed.held) * shape.dxds,
-        kernel=law.push / kernel.inertia if loss is None else loss.along(loss.acceleration),
+        tangential_acceleration=law.push / kernel.inertia if loss is None else loss.along(loss.acceleration),
         time_integrand=shape.ds / sp.sqrt(speed.held),
         regularised_integrand=shape.ds * sp.sqrt((lam - LAM1) * (LAM2 - lam) / speed.held),
         turning_point_equation=sp.Eq(speed.squared, 0, evaluate=False),
         liftoff_equation=sp.Eq(pressure, 0, evaluate=False),
-        liftoff_speed_squared=_liftoff_speed(speed, shape.kappa, law.reaction),
+        liftoff_speed_squared=_liftoff_speed(speed, shape.kappa, law.static_normal_load),
         defaults=defaults,
         positive=shape.positive,
         at_least=kernel.at_least,
@@ -327,7 +390,7 @@ def _losses(curve: Curve, kernel: Kernel, x: sp.Expr, z: sp.Expr, law: Forces, s
     coordinates = {symbol: form for symbol, form in ((X, x), (Z, z)) if symbol != lam}
     pieces = {
         **{SIGMA: shape.ds, KAPPA: shape.kappa, TURN: shape.turning_rate, TILT: shape.dxds},
-        **{PUSH: law.push, LOAD: law.reaction},
+        **{PUSH: law.push, LOAD: law.static_normal_load},
     }
     loss = dissipation(kernel, pieces, coordinates, signs)
     for way, form in zip(("forwards", "backwards"), loss.holds, strict=True):
@@ -335,8 +398,8 @@ def _losses(curve: Curve, kernel: Kernel, x: sp.Expr, z: sp.Expr, law: Forces, s
     return loss
 
 
-def _liftoff_speed(speed: SpeedField, kappa: sp.Expr, reaction: sp.Expr) -> sp.Expr | None:
+def _liftoff_speed(speed: SpeedField, kappa: sp.Expr, load: sp.Expr) -> sp.Expr | None:
     """Solve kappa*W + n0 = 0 for v0**2."""
     if speed.gain is None or not kappa:
         return None
-    return -(reaction / kappa + speed.squared.xreplace({V0: sp.S.Zero})) / speed.gain
+    return -(load / kappa + speed.squared.xreplace({V0: sp.S.Zero})) / speed.gain

@@ -15,6 +15,7 @@ from gqm_sym.runtime.launch.functions import BoundFunctions
 from gqm_sym.runtime.launch.problem import bind
 from gqm_sym.runtime.launch.request import CONTACTS, LaunchRequest, read_launch
 from gqm_sym.runtime.launch.speed import path_and_force_at, speed_squared_at
+from gqm_sym.runtime.motion.extremes import grid_peaks
 
 # Places at which the range is looked at first: a summit narrower than their distance may be overlooked.
 LOOKS = 4096
@@ -100,7 +101,7 @@ def least_speed(
 
 
 def _range(formulas: Formulas, p: Any, start: float, between: tuple[Any, Any] | None) -> tuple[float, float]:
-    low, high, period = formulas.domain(p)[:3]
+    low, high, period = formulas.domain(p).numbers[:3]
     if between is not None:
         ends = sorted(read_number(end, where="between").value for end in between)
         if not max(low, ends[0]) <= start <= min(high, ends[1]) or ends[0] < low or ends[1] > high:
@@ -147,11 +148,6 @@ class _Needs:
 
 def _largest(function: Callable[[Array], Array], low: float, high: float) -> tuple[float, float]:
     """Where a function is largest in a range, and its value there."""
-    lam = np.linspace(low, high, LOOKS + 1)
-    step = lam[1] - lam[0]
-    place = float(lam[np.argmax(function(lam))])
-    for _ in range(ROUNDS):
-        lam = np.clip(np.linspace(place - step, place + step, ZOOM), low, high)
-        place = float(lam[np.argmax(function(lam))])
-        step *= 2.0 / (ZOOM - 1)
-    return place, float(function(np.array([place]))[0])
+    first = next(grid_peaks(function, low, high, LOOKS + 1))
+    *_, peak = grid_peaks(function, first.low, first.high, ZOOM, ROUNDS)
+    return peak.place, peak.value

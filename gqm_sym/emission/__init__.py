@@ -49,7 +49,10 @@ def _source(model: Model, name: str) -> str:
 
     curve = model.curve
     parts = [name, model.title, model.parameter.name, exact(curve.x), exact(curve.z)]
-    parts += [exact(e) for e in (*curve.domain, curve.period, model.climb, model.reaction, model.inertia)]
+    parts += [
+        exact(e)
+        for e in (*curve.domain, curve.period, model.effective_potential, model.static_normal_load, model.inertia)
+    ]
     parts += [repr(model.defaults), repr(model.positive)]
     if model.at_least:
         parts.append(repr(model.at_least))

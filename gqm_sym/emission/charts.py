@@ -1,7 +1,7 @@
-"""What the module of a charted curve holds besides its formulas: the maker of its chart, one for each kind of curve."""
+"""The part of a module that makes the chart of its curve, for each kind of curve without formulas."""
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
+from dataclasses import replace
 
 from sympy import Function, Symbol
 
@@ -11,27 +11,23 @@ from gqm_sym.declare.piecewise import Rail
 from gqm_sym.declare.sampled import Track
 from gqm_sym.derivation.algebra.differentiate import differentiate
 from gqm_sym.derivation.geometry.geometry import geometry
+from gqm_sym.emission.context import Lowering
 from gqm_sym.emission.ir import ChartIR, ExactIR, FunctionIR
 from gqm_sym.emission.printer import check_emittable
 
-if TYPE_CHECKING:
-    from gqm_sym.emission.context import Lowering
 
-
-def _implicit(lowering: "Lowering") -> ChartIR:
-    """F and its derivatives at many points, the start point and the ends of arc length."""
+def _implicit(lowering: Lowering) -> ChartIR:
+    """An implicit curve: F and its derivatives, the start point, and the ends in arc length."""
     model = lowering.model
     found = model.level_set
     assert found is not None
     for row in found.rows:
         check_emittable(row, {X.name, Z.name, *lowering.order}, where="implicit: F")
-    count, across, up = (lowering.names(name) for name in ("n", "xs", "zs"))
+    across, up = (lowering.names(name) for name in ("xs", "zs"))
     field = lowering.function(
         "field",
-        "FIELD",
         (across, up),
-        "F and its derivatives: F, F_x, F_z, F_xx, F_xz and F_zz (paper, eq. 36).",
-        views=((across, count), (up, count)),
+        "F, F_x, F_z, F_xx, F_xz and F_zz: the curve is F(x, z) = 0 (paper, eq. 36).",
         inside=[(place, Function("at")(Symbol(array, real=True))) for place, array in ((X, across), (Z, up))],
         outputs=found.rows,
     )
@@ -51,8 +47,8 @@ def _implicit(lowering: "Lowering") -> ChartIR:
     )
 
 
-def _sampled(lowering: "Lowering") -> ChartIR:
-    """The points, as text."""
+def _sampled(lowering: Lowering) -> ChartIR:
+    """A sampled curve: its points, as text."""
     track = lowering.model.curve.definition
     assert isinstance(track, Track)
     return ChartIR(
@@ -62,15 +58,15 @@ def _sampled(lowering: "Lowering") -> ChartIR:
     )
 
 
-def _rail(lowering: "Lowering") -> ChartIR:
-    """What each piece is given by, and a function for each curve among them."""
+def _rail(lowering: Lowering) -> ChartIR:
+    """A piecewise curve: the numbers of each piece, and a function for each piece that is a curve with formulas."""
     rail = lowering.model.curve.definition
     assert isinstance(rail, Rail)
     curves = [piece.curve for piece in rail.pieces if isinstance(piece.curve, Curve)]
     functions = tuple(_segment(lowering, curve, f"segment_{count}") for count, curve in enumerate(curves, start=1))
     formulas = tuple(_exact_segment(lowering, curve, f.name) for curve, f in zip(curves, functions, strict=True))
     given = (*(rail.start or ()), *(number for piece in rail.pieces for number in piece.numbers))
-    doc = "Where the rail starts, and what each of its pieces is given by."
+    doc = "The start of the rail, then the numbers of each piece."
     numbers = lowering.exact_function("rail", doc, given)
     arguments = [
         f"numbers={numbers.name}",
@@ -90,38 +86,37 @@ def _rail(lowering: "Lowering") -> ChartIR:
     )
 
 
-def _segment(lowering: "Lowering", curve: Curve, name: str) -> FunctionIR:
-    """The shape of a curve that is a piece, in its own parameter."""
+def _segment(lowering: Lowering, curve: Curve, name: str) -> FunctionIR:
+    """Position, metric and curvature of a piece that is a curve with formulas, in its own parameter."""
     shape = geometry(curve, may_be_positive=())
     place, places = lowering.place, lowering.names("places")
     rows = (curve.x, curve.z, shape.ds, shape.dxds, shape.dzds, shape.kappa)
     outputs = tuple(row.xreplace({curve.parameter: place}) for row in rows)
     for row in outputs:
         check_emittable(row, {place.name, *lowering.order}, where=f"piecewise: {curve.kind}")
-    return lowering.function(
+    function = lowering.function(
         name,
-        "SEGMENT",
         (places,),
-        f"x, z, length, unit tangent and signed curvature of a piece, by its own parameter {curve.parameter.name}.",
-        views=((places, lowering.names("n")),),
+        f"x, z, ds/d{curve.parameter}, dx/ds, dz/ds and curvature of a piece by its own parameter (paper, eqs. 6, 8).",
         inside=[(place, Function("at")(Symbol(places, real=True)))],
         outputs=outputs,
     )
+    return replace(function, signature="SEGMENT")
 
 
-def _exact_segment(lowering: "Lowering", curve: Curve, name: str) -> ExactIR:
-    """Its coordinates and their derivatives over a namespace of operations."""
+def _exact_segment(lowering: Lowering, curve: Curve, name: str) -> ExactIR:
+    """The coordinates of such a piece and their derivatives, over a namespace of operations."""
     place = curve.parameter
     rows = (curve.x, curve.z, differentiate(curve.x, place), differentiate(curve.z, place))
     outputs = tuple(row.xreplace({place: lowering.place}) for row in rows)
     return lowering.exact_function(name, "x, z and their derivatives by its own parameter.", outputs, (lowering.place,))
 
 
-MAKERS: dict[str, Callable[["Lowering"], ChartIR]] = {"implicit": _implicit, "piecewise": _rail, "sampled": _sampled}
-"""By the curve's kind."""
+MAKERS: dict[str, Callable[[Lowering], ChartIR]] = {"implicit": _implicit, "piecewise": _rail, "sampled": _sampled}
+"""The function that describes the chart, by the kind of the curve."""
 
 
-def chart_maker(lowering: "Lowering") -> ChartIR | None:
+def chart_maker(lowering: Lowering) -> ChartIR | None:
     """The maker of a model's chart; None for a curve with formulas."""
     curve = lowering.model.curve
     return MAKERS[curve.kind](lowering) if curve.charted else None

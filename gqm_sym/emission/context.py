@@ -36,15 +36,16 @@ class Lowering:
         self.names = Names([self.place.name, *self.order])
 
     def bounds(self) -> FunctionIR:
-        """Interval enclosures of the climb's slope and of ds."""
-        outputs = (self.model.climb_slope, self.model.ds)
+        """Interval enclosures of the effective potential's slope and of ds."""
+        outputs = (self.model.effective_potential_slope, self.model.ds)
         replaced, reduced = sympy.cse(outputs, symbols=sympy.numbered_symbols("_t", real=True), order="canonical")
+        lam = self.place
         lo, hi, p, out = (self.names(name) for name in ("lo", "hi", "p", "out"))
         return FunctionIR(
             name="bounds",
             signature="BOUNDS",
             arguments=(lo, hi, p, out),
-            doc=f"Bounds of the climb's slope and of ds/d{self.place} for {lo} <= {self.place} <= {hi}.",
+            doc=f"Bounds of dU/d{lam} and ds/d{lam} for {lo} <= {lam} <= {hi}, by interval arithmetic.",
             views=((p, str(len(self.order))), (out, "4")),
             parameters=self.used(outputs),
             before=(),
@@ -80,43 +81,52 @@ class Lowering:
     def function(
         self,
         name: str,
-        signature: str,
-        arguments: tuple[str, ...],
+        arguments: tuple[str | Symbol, ...],
         doc: str,
         *,
-        views: tuple[tuple[str, str], ...],
         inside: list[tuple[Symbol, Expr]],
         outputs: tuple[Expr, ...],
-        each: bool = False,
-        held: int = 0,
-        later: bool = False,
+        batch: bool = False,
+        rows_behind: int = 0,
     ) -> FunctionIR:
         """Share common subexpressions, and move what does not depend on the place in front of the loop.
 
-        With ``each`` the run-time parameters belong to the place, and ``held`` rows follow behind them.
+        Parameters
+        ----------
+        name, doc
+            The function's name, and what its docstring says.
+        arguments
+            Between the number of places and the run-time parameters: the name of an array that has one element for
+            each place, or the symbol of a single number.
+        inside
+            What the loop begins with: each symbol that depends on the place, and its value.
+        outputs
+            One form for each row of ``out``.
+        batch, rows_behind
+            In a function of a batch each place has run-time parameters of its own, and so many more rows stand behind
+            them.
         """
         check_size(outputs, where=name)
         n, p, out = (self.names(s) for s in ("n", "p", "out"))
         used = self.used([*outputs, *(value for _, value in inside)])
-        if each:
+        if batch:
             inside, used = [*((Symbol(s, real=True), at(p, row)) for s, row in used), *inside], ()
         before, kept, results = straight_line(outputs, inside)
         return FunctionIR(
             name=name,
-            signature=signature,
-            arguments=(n, *arguments, p, out),
-            doc=doc.format(self.place.name),
+            signature=name.upper(),
+            arguments=(n, *map(str, arguments), p, out),
+            doc=doc,
             views=(
-                *views,
-                (p, f"({len(self.order) + held}, {n})" if each else str(len(self.order))),
+                *((array, n) for array in arguments if isinstance(array, str)),
+                (p, f"({len(self.order) + rows_behind}, {n})" if batch else str(len(self.order))),
                 (out, f"({len(outputs)}, {n})"),
             ),
             parameters=used,
             before=before,
             inside=kept,
             outputs=results,
-            each=each,
-            later=later,
+            batch=batch,
         )
 
     def used(self, expressions: Iterable[Expr]) -> tuple[tuple[str, int], ...]:

@@ -1,4 +1,4 @@
-"""What the printer receives: functions as straight-line assignments, with everything already decided."""
+"""The data that are printed: functions as straight-line assignments, in their final form."""
 
 from dataclasses import dataclass
 
@@ -33,10 +33,10 @@ class FunctionIR:
         What does not depend on the place, and what does.
     outputs : tuple of Expr
         One value a row of ``out``.
-    each : bool
+    batch : bool
         Whether every place has run-time parameters of its own. Such a function is compiled when it is first needed.
     later : bool
-        Whether another function is compiled only then.
+        Whether a function that is not of a batch is compiled only then, too.
     """
 
     name: str
@@ -48,7 +48,7 @@ class FunctionIR:
     before: tuple[Assignment, ...]
     inside: tuple[Assignment, ...]
     outputs: tuple[Expr, ...]
-    each: bool = False
+    batch: bool = False
     later: bool = False
 
 
@@ -69,7 +69,7 @@ class ExactIR:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ChartIR:
-    """How a module makes the chart of its curve.
+    """The part of a module that makes the chart of its curve.
 
     Attributes
     ----------
@@ -94,10 +94,11 @@ class ChartIR:
 class ModuleIR:
     """A whole module, ready to print.
 
-    ``dissipation`` holds what is said of a force law that is not conservative; then there are no ``bounds``.
-    ``body`` is the radius of a rolling body that must fit into its track, empty for any other; ``grip`` names beta and
-    mu_static of one that may slip. ``monotone`` says that there are no cusps, and that the climb rises or falls all the
-    way between places of symmetry.
+    ``functions`` and ``bounds`` serve one motion, ``batch`` and ``bounds_batch`` exist only for speed: they serve load
+    maps and sweeps. ``dissipation`` holds what is said of a force law that is not conservative; then there are no
+    ``bounds``. ``rolling_radius`` is the radius of a rolling body that must fit into its track, empty for any other;
+    ``static_friction_limit`` names beta and mu_static of one that may slip. ``monotone`` says that there are no cusps,
+    and that the effective potential rises or falls all the way between places of symmetry.
     """
 
     name: str
@@ -110,10 +111,11 @@ class ModuleIR:
     notes: tuple[str, ...]
     functions: tuple[FunctionIR, ...]
     bounds: FunctionIR | None
-    bounds_each: FunctionIR | None
+    batch: tuple[FunctionIR, ...]
+    bounds_batch: FunctionIR | None
     exact: tuple[ExactIR, ...]
     monotone: bool
     dissipation: tuple[tuple[str, bool], ...]
-    body: str
-    grip: tuple[str, str] | None
+    rolling_radius: str
+    static_friction_limit: tuple[str, str] | None
     chart: ChartIR | None

@@ -5,12 +5,12 @@ from sympy import Expr, Function, Symbol
 from gqm_sym.derivation import Model
 from gqm_sym.derivation.algebra.difference import Differences
 from gqm_sym.derivation.algebra.differentiate import differentiate
+from gqm_sym.emission.batches import batch_functions, bounds_batch
 from gqm_sym.emission.charts import chart_maker
 from gqm_sym.emission.context import Lowering
-from gqm_sym.emission.dissipative import drive, hold
-from gqm_sym.emission.each import bounds_each, each
+from gqm_sym.emission.dissipative import speed_equation, static_balance
 from gqm_sym.emission.ir import ExactIR, FunctionIR, ModuleIR
-from gqm_sym.emission.loads import loads
+from gqm_sym.emission.load_map import load_map
 from gqm_sym.emission.printer import check_emittable
 from gqm_sym.emission.subscripts import at
 from gqm_sym.kernels.base import CONTACT_SIGN, DIRECTION, W
@@ -26,10 +26,10 @@ def lower(model: Model, *, name: str, forms: tuple[tuple[str, Expr], ...]) -> Mo
     lowering = _ModelLowering(model)
     loss = model.dissipation
     if loss is None:
-        functions: tuple[FunctionIR, ...] = (*loads(lowering), lowering.climb(), lowering.rise(), lowering.bend())
-        many = each(lowering)
+        functions = lowering.potentials()
+        batch = (*load_map(lowering), *batch_functions(lowering))
     else:
-        functions, many = (drive(lowering, loss), hold(lowering, loss)), ()
+        functions, batch = (speed_equation(lowering, loss), static_balance(lowering, loss)), ()
     exact = lowering.exact() if loss is None else ()
     return ModuleIR(
         name=name,
@@ -40,14 +40,15 @@ def lower(model: Model, *, name: str, forms: tuple[tuple[str, Expr], ...]) -> Mo
         at_least=model.at_least,
         forms=forms,
         notes=model.notes,
-        functions=(lowering.frame(), *functions, *many),
+        functions=(lowering.path_and_contact_force(), *functions),
         bounds=lowering.bounds() if loss is None else None,
-        bounds_each=bounds_each(lowering) if many else None,
+        batch=batch,
+        bounds_batch=bounds_batch(lowering) if any(function.batch for function in batch) else None,
         exact=exact if model.curve.charted else (*exact, lowering.domain(), *lowering.axes()),
         monotone=model.symmetry is not None and model.symmetry.monotone and model.cusp is None,
         dissipation=() if loss is None else tuple((flag, getattr(loss, flag)) for flag in FLAGS),
-        body=str(model.force.radius) if model.force.radius else "",
-        grip=model.force.grip,
+        rolling_radius=str(model.force.radius) if model.force.radius else "",
+        static_friction_limit=model.force.static_friction_limit,
         chart=chart_maker(lowering),
     )
 
@@ -57,12 +58,14 @@ def _check(model: Model) -> None:
     names = {model.parameter.name, *model.parameters}
     low, high = model.domain
     forms = {
-        **{"x": model.x, "z": model.z, "ds": model.ds, "kappa": model.kappa, "reaction": model.reaction},
+        **{"x": model.x, "z": model.z, "ds": model.ds, "kappa": model.kappa},
+        **{"static_normal_load": model.static_normal_load},
         **{"domain, low": low, "domain, high": high, "period": model.period},
     }
     loss = model.dissipation
     if loss is None:
-        forms |= {"climb": model.climb, "climb_slope": model.climb_slope}
+        forms |= {"effective_potential": model.effective_potential}
+        forms |= {"effective_potential_slope": model.effective_potential_slope}
     else:
         names |= {DIRECTION.name, CONTACT_SIGN.name, W.name}
         laws = {"P": loss.drive, "Q": loss.decay, "A at rest": loss.holds[0], "A at rest, backwards": loss.holds[1]}
@@ -75,93 +78,99 @@ def _check(model: Model) -> None:
 class _ModelLowering(Lowering):
     """The functions that every conservative or dissipative module has."""
 
-    def frame(self) -> FunctionIR:
+    def path_and_contact_force(self) -> FunctionIR:
         """Position, metric, curvature and contact force, given the speed squared."""
         model, v2 = self.model, self.names.symbol("v2")
-        force = Symbol("m", real=True) * (model.kappa * v2 + model.reaction)
-        places, speeds = self.names("places"), self.names("speeds")
+        force = Symbol("m", real=True) * (model.kappa * v2 + model.static_normal_load)
+        lam, places, speeds = self.place, self.names("places"), self.names("speeds")
         return self.function(
-            "frame",
-            "FRAME",
+            "path_and_contact_force",
             (places, speeds),
-            "x, z, ds/d{0}, signed curvature and contact force, given V**2 (paper, eq. 15).",
-            views=((places, self.names("n")), (speeds, self.names("n"))),
-            inside=[(self.place, at(places)), (v2, at(speeds))],
+            f"x, z, ds/d{lam}, curvature kappa, contact force N = m*(kappa*V**2 + n0), given V**2 (paper, eqs. 8, 15).",
+            inside=[(lam, at(places)), (v2, at(speeds))],
             outputs=(model.x, model.z, model.ds, model.kappa, force),
         )
 
-    def climb(self) -> FunctionIR:
-        """The climb and its slope."""
-        places = self.names("places")
+    def potentials(self) -> tuple[FunctionIR, ...]:
+        """The effective potential and its divided differences."""
+        return self.effective_potential(), self.potential_divdiff1(), self.potential_divdiff2()
+
+    def effective_potential(self) -> FunctionIR:
+        """The effective potential and its slope."""
+        lam, places = self.place, self.names("places")
         return self.function(
-            "climb",
-            "CLIMB",
+            "effective_potential",
             (places,),
-            "What V**2 loses in climbing to {0}, up to a constant, and its derivative (paper, eq. 13).",
-            views=((places, self.names("n")),),
-            inside=[(self.place, at(places))],
-            outputs=(self.model.climb, self.model.climb_slope),
+            f"U per unit mass, V**2 = v0**2 - 2*(U({lam}) - U(lam0)), and dU/d{lam} (paper, eq. 13).",
+            inside=[(lam, at(places))],
+            outputs=(self.model.effective_potential, self.model.effective_potential_slope),
         )
 
-    def rise(self) -> FunctionIR:
-        """First divided difference of the climb, from one place."""
+    def potential_divdiff1(self) -> FunctionIR:
+        """First divided difference of the effective potential, from one place."""
         a, d = self.names.symbol("a"), self.names.symbol("d")
         places, offsets = self.names("places"), self.names("offsets")
         differences = Differences(self.place, (a, self.place), {(0, 1): d})
+        lam = self.place
         return self.function(
-            "rise",
-            "RISE",
-            (a.name, places, offsets),
-            "climb[a, {0}] = (climb({0}) - climb(a))/({0} - a) without cancellation, and ds/d{0}.",
-            views=((places, self.names("n")), (offsets, self.names("n"))),
+            "potential_divdiff1",
+            (a, places, offsets),
+            f"U[a, {lam}] = (U({lam}) - U(a))/({lam} - a) without cancellation, and ds/d{lam} (MATHS, s. 3).",
             inside=[(self.place, at(places)), (d, at(offsets))],
-            outputs=(differences.first(self.model.climb, 0, 1), self.model.ds),
+            outputs=(differences.first(self.model.effective_potential, 0, 1), self.model.ds),
         )
 
-    def bend(self) -> FunctionIR:
-        """Second divided difference of the climb, over two ends and a place between."""
+    def potential_divdiff2(self) -> FunctionIR:
+        """Second divided difference of the effective potential, over two ends and a place between."""
         a, b, da, db = (self.names.symbol(s) for s in ("a", "b", "da", "db"))
         left, right = self.names("left"), self.names("right")
         differences = Differences(self.place, (a, self.place, b), {(0, 1): da, (1, 2): db, (0, 2): b - a})
+        lam = self.place
         return self.function(
-            "bend",
-            "BEND",
-            (a.name, b.name, left, right),
-            "climb[a, {0}, b] = V**2/(({0} - a)*(b - {0})) between turning points, without cancellation, and ds/d{0}.",
-            views=((left, self.names("n")), (right, self.names("n"))),
+            "potential_divdiff2",
+            (a, b, left, right),
+            f"U[a, {lam}, b] = V**2/(2*({lam} - a)*(b - {lam})) from turn a to turn b, and ds/d{lam} (MATHS, s. 3).",
             inside=[
                 (da, at(left)),
                 (db, at(right)),
-                (self.place, Function("nearest")(a, b, da, db)),
+                (self.place, Function("place_from_ends")(a, b, da, db)),
             ],
-            outputs=(differences.second(self.model.climb), self.model.ds),
+            outputs=(differences.second(self.model.effective_potential), self.model.ds),
         )
 
     def exact(self) -> tuple[ExactIR, ...]:
         """The formulas that extended precision needs; of a charted curve the forces' alone, by coordinates."""
         model = self.model
         if model.curve.charted:
-            return self.exact_climb()
+            return self.exact_potential()
         named: tuple[tuple[str, str, tuple[Expr, ...]], ...] = (
             ("x", "Horizontal coordinate.", (model.x,)),
             ("z", "Height.", (model.z,)),
             ("ds", f"ds/d{self.place}.", (model.ds,)),
-            ("kappa", "Signed curvature.", (model.kappa,)),
-            ("reaction", "Contact force per unit mass of a body at rest.", (model.reaction,)),
-            ("climb", "What V**2 loses in climbing, up to a constant.", (model.climb,)),
-            ("climb_slope", f"Its derivative by {self.place}.", (model.climb_slope,)),
+            ("kappa", "Signed curvature (paper, eq. 8).", (model.kappa,)),
+            (
+                "static_normal_load",
+                "n0 = N/m of a body at rest, so that N = m*(kappa*V**2 + n0) (paper, eq. 15).",
+                (model.static_normal_load,),
+            ),
+            (
+                "effective_potential",
+                "U, so that V**2 + 2*U is constant (paper, eq. 13).",
+                (model.effective_potential,),
+            ),
+            ("effective_potential_slope", f"dU/d{self.place}.", (model.effective_potential_slope,)),
         )
         return tuple(self.exact_function(*entry, (self.place,)) for entry in named)
 
-    def exact_climb(self) -> tuple[ExactIR, ...]:
-        """The climb and its gradient by coordinates; nothing where it depends on more than those."""
+    def exact_potential(self) -> tuple[ExactIR, ...]:
+        """The effective potential and its gradient by coordinates; nothing where it depends on more than those."""
         x, z = self.names.symbol("x"), self.names.symbol("z")
-        climb = self.model.climb.xreplace({chart_x(self.place): x, chart_z(self.place): z})
-        if self.place in climb.free_symbols or self.model.ds != 1:
+        potential = self.model.effective_potential.xreplace({chart_x(self.place): x, chart_z(self.place): z})
+        if self.place in potential.free_symbols or self.model.ds != 1:
             return ()
-        outputs = (climb, differentiate(climb, x), differentiate(climb, z))
-        doc = "What V**2 loses in climbing, up to a constant, and its derivatives by x and z."
-        return (self.exact_function("climb", doc, outputs, (x, z)),)
+        outputs = (potential, differentiate(potential, x), differentiate(potential, z))
+        doc = "U, so that V**2 + 2*U is constant, and its derivatives by x and z (paper, eq. 13)."
+        return (self.exact_function("effective_potential", doc, outputs, (x, z)),)
 
     def domain(self) -> ExactIR:
         """The range of the curve's parameter."""

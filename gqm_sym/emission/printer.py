@@ -13,9 +13,9 @@ from sympy.printing.str import StrPrinter
 from gqm_sym.errors import EmissionError
 
 # Up to this every integer is a double.
-MOST_INTEGER = 2**53
+MAX_INTEGER = 2**53
 
-# SymPy heads and what the standard library calls them.
+# The standard library's names of SymPy's functions.
 FUNCTIONS = {
     "sin": "sin",
     "cos": "cos",
@@ -36,11 +36,11 @@ FUNCTIONS = {
 
 # Rows of a chart, which compiled code reads from the array ``chart``.
 CHARTED = frozenset({"chart_x", "chart_z", "chart_alpha", "chart_kappa"})
-_CHART_CALL = re.compile(r"chart_[a-z]+[12]?")
+_CHART_CALL = re.compile(r"(divdiff[12]_)?chart_[a-z]+")
 
 
 def check_emittable(expr: Expr, names: Collection[str], *, where: str) -> None:
-    """Refuse what the printers below have no text for, by name.
+    """Refuse a form that holds something the printers below have no text for; the message names it.
 
     Parameters
     ----------
@@ -69,7 +69,7 @@ def _has_text(node: Basic) -> bool:
 
 
 def as_double(number: Rational) -> float:
-    """The double nearest to a rational number; refused where there is none."""
+    """The double nearest to a rational number; an error if that is beyond their range."""
     try:
         value: float = number.p / number.q
     except OverflowError:
@@ -82,7 +82,7 @@ def as_double(number: Rational) -> float:
 
 def is_double(number: Rational) -> bool:
     """Whether numerator and denominator are doubles, and integers that compiled code can hold."""
-    return all(abs(part) <= MOST_INTEGER for part in (number.p, number.q))
+    return all(abs(part) <= MAX_INTEGER for part in (number.p, number.q))
 
 
 class CodePrinter(StrPrinter):  # type: ignore[misc]

@@ -2,7 +2,7 @@
 
 import hashlib
 import re
-from collections.abc import Iterable
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -11,8 +11,9 @@ from jinja2 import meta
 from sympy import Equality
 from sympy.printing.str import StrPrinter
 
-from gqm_sym.emission.ir import Assignment, ExactIR, FunctionIR, ModuleIR
-from gqm_sym.emission.printer import FUNCTIONS, CodePrinter, ExactPrinter, IntervalPrinter
+from gqm_sym.emission.functions import enclosure, exact_formula, loop
+from gqm_sym.emission.ir import ModuleIR
+from gqm_sym.emission.printer import FUNCTIONS
 from gqm_sym.errors import EmissionError
 
 # The version of gqm_sym.runtime.interface that emitted code is written for (a test holds the two together).
@@ -25,91 +26,81 @@ _RUNTIME = ("Addresses", "CompiledModel", "LaunchRequest", "Pass1")
 # Columns of the emitted import list.
 _WIDTH = 116
 # Functions that every module hands over, as the interface orders them.
-_ADDRESSES = ("frame", "climb", "rise", "bend", "bounds")
+_ADDRESSES = (
+    "path_and_contact_force",
+    "effective_potential",
+    "potential_divdiff1",
+    "potential_divdiff2",
+    "bounds",
+)
 # Names that mean something in every emitted module: no run-time parameter may take them.
 _OWN = frozenset(
     {
         *_RUNTIME,
-        "Any",
-        "CHART",
-        "Dissipation",
-        "Each",
-        "ExactClimb",
-        "ExactFormulas",
-        "MODEL",
-        "Motion",
-        "PARAMETERS",
-        "Sweep",
-        "TYPE_CHECKING",
-        "carray",
-        "chart",
-        "chart_of",
-        "compiled",
-        "compiler",
-        "fabs",
-        "range",
-        "op",
-        "self",
-        "nearest",
+        *("Any", "BatchFunctions", "CHART", "Dissipation", "ExactFormulas", "ExactPotential", "MODEL", "Motion"),
+        *("PARAMETERS", "Sweep", "TYPE_CHECKING", "carray", "chart", "chart_of", "compiled", "compiler", "fabs"),
+        *("op", "pass1", "place_from_ends", "range", "self", "solve", "sweep"),
     }
 )
-_OWN |= {"pass1", "solve", "sweep"}
+
+
+@dataclass
+class _Functions:
+    """The compiled functions of a module as the template prints them, and the names that they call."""
+
+    single: list[dict[str, Any]] = field(default_factory=list)
+    batch: list[dict[str, Any]] = field(default_factory=list)
+    called: set[str] = field(default_factory=set)
+    intervals: set[str] = field(default_factory=set)
+
+    def add(self, module: ModuleIR) -> None:
+        """All functions of a module, in the order in which they are printed."""
+        chart = module.chart
+        groups = (
+            (self.single, (*module.functions, *(chart.functions if chart else ())), module.bounds),
+            (self.batch, module.batch, module.bounds_batch),
+        )
+        for texts, functions, enclosing in groups:
+            for function in functions:
+                text, names = loop(function)
+                texts.append(text)
+                self.called |= names
+            if enclosing is not None:
+                text, names = enclosure(enclosing, module.parameter)
+                texts.append(text)
+                self.intervals |= names
+
+    @property
+    def all(self) -> list[dict[str, Any]]:
+        """Those for one motion, and those for many."""
+        return [*self.single, *self.batch]
 
 
 def render(module: ModuleIR, *, source: str) -> str:
     """The text of a module. ``source`` is the canonical text of what it was made from, for its digest."""
-    functions, used = [], set[str]()
-    chart = module.chart
-    for function in (*module.functions, *(chart.functions if chart else ())):
-        text, names = _loop(function)
-        functions.append(text)
-        used |= names
-    intervals = set[str]()
-    for enclosing in (module.bounds, module.bounds_each):
-        if enclosing is not None:
-            bounds, names = _bounds(enclosing, module.parameter)
-            functions.append(bounds)
-            intervals |= names
-    runtime = {*_RUNTIME, *(f["signature"] for f in functions)}
-    if chart:
-        runtime |= set(chart.imports)
-    exact = _exact_formulas(module)
-    runtime |= {exact.partition("(")[0]} if exact else set()
-    if module.dissipation:
-        runtime.add("Dissipation")
-    if module.bounds_each is not None:
-        runtime.add("Each")
-    if any(name.removeprefix("i").startswith("chart_") for name in used | intervals):
-        runtime.add("chart_of")
-    _refuse_own_names(module, used | intervals | runtime | {f["name"] for f in functions})
+    functions, chart = _Functions(), module.chart
+    functions.add(module)
+    runtime = _imported(module, functions)
+    _refuse_own_names(module, functions.called | functions.intervals | runtime | {f["name"] for f in functions.all})
+    defaults = ", ".join(f"{name!r}: {value!r}" for name, value in module.defaults)
     environment = _environment()
     fields: dict[str, Any] = {
         "interface": INTERFACE,
         "title": _quoted(module.title or module.name),
         "forms": [_quoted(line) for line in _forms(module)],
-        "math": sorted(used & _MATH),
-        "runtime": _listed(sorted(runtime | (used - _MATH) | intervals, key=_as_imported)),
+        "math": sorted(functions.called & _MATH),
+        "runtime": _listed(sorted(runtime | (functions.called - _MATH) | functions.intervals, key=_as_imported)),
         "defaults": [(repr(name), repr(value)) for name, value in module.defaults],
-        "functions": functions,
-        "exact": [_exact(f) for f in (*module.exact, *(chart.exact if chart else ()))],
-        "chart": chart.statement if chart else "",
+        "defaults_line": defaults if len(defaults) <= _WIDTH - len("PARAMETERS = {}") else "",
+        "functions": functions.single,
+        "batch_functions": functions.batch,
+        "exact": [exact_formula(f) for f in (*module.exact, *(chart.exact if chart else ()))],
         "data": list(chart.data) if chart else [],
-        "name_text": repr(module.name),
         "parameter": module.parameter,
-        "parameter_text": repr(module.parameter),
-        "positive": repr(module.positive),
-        "at_least": repr(module.at_least) if module.at_least else "",
-        "body": repr(module.body) if module.body else "",
-        "grip": repr(module.grip) if module.grip else "",
-        "addresses": ", ".join(f"{f['name']}.address" for f in functions if f["name"] in _ADDRESSES),
-        "exact_formulas": exact,
-        "axes": next((f.name for f in module.exact if f.name == "exact_axes"), ""),
-        "monotone": module.monotone,
-        "loads": next((f["name"] for f in functions if f["signature"] == "LOADS"), ""),
-        "each": ", ".join(_each(module, [f["name"] for f in functions if f["each"]])),
-        "dissipation": ", ".join(f"{flag}={value}" for flag, value in module.dissipation),
         "keywords": ", ".join(f"{name}: Any = {value!r}" for name, value in module.defaults),
-        "names": ", ".join(name for name, _ in module.defaults),
+        "names": f"({', '.join(name for name, _ in module.defaults)}{',' if len(module.defaults) == 1 else ''})",
+        "names_text": ", ".join(name for name, _ in module.defaults),
+        **_model_fields(module, [f["name"] for f in functions.all]),
     }
     body = _tidied(_fill(environment, "body.py.j2", fields))
     header = {
@@ -121,22 +112,65 @@ def render(module: ModuleIR, *, source: str) -> str:
     return _fill(environment, "header.py.j2", header) + body
 
 
-def _exact_formulas(module: ModuleIR) -> str:
-    """What a conservative module hands over of its formulas over a namespace; nothing where there are none."""
-    names = [function.name for function in module.exact if function.places]
-    kind = "ExactClimb" if module.chart else "ExactFormulas"
-    return f"{kind}({', '.join(names)})" if names else ""
+def _imported(module: ModuleIR, functions: _Functions) -> set[str]:
+    """Names of the runtime that a module needs besides the functions that its formulas call."""
+    names = {*_RUNTIME, *(f["signature"] for f in functions.all), *(module.chart.imports if module.chart else ())}
+    if _exact_formulas(module):
+        names.add(_exact_class(module))
+    if module.dissipation:
+        names.add("Dissipation")
+    if module.bounds_batch is not None:
+        names.add("BatchFunctions")
+    if any("chart_" in name for name in functions.called | functions.intervals):
+        names.add("chart_of")
+    return names
 
 
-def _each(module: ModuleIR, names: list[str]) -> list[str]:
-    """What a module hands over of its functions for sweeps."""
-    rows = {f.name: len(f.outputs) for f in module.functions}
-    held = [f"{row}={rows[name]}" for row, name in (("held", "orbit_each"), ("top_held", "top_each")) if name in rows]
-    return [*(f"{name.removesuffix('_each')}={name}" for name in names), *held]
+def _model_fields(module: ModuleIR, names: list[str]) -> dict[str, Any]:
+    """The arguments of ``CompiledModel``, as text; empty ones are left out of the module."""
+    return {
+        "name_text": repr(module.name),
+        "parameter_text": repr(module.parameter),
+        "positive": repr(module.positive),
+        "at_least": repr(module.at_least) if module.at_least else "",
+        "rolling_radius": repr(module.rolling_radius) if module.rolling_radius else "",
+        "static_friction_limit": repr(module.static_friction_limit) if module.static_friction_limit else "",
+        "addresses": _listed([f"{name}.address" for name in _ADDRESSES if name in names], _WIDTH - 8),
+        "load_map": "load_map" if "load_map" in names else "",
+        "batch": _listed(_batch(module), _WIDTH - 8),
+        "chart": module.chart.statement if module.chart else "",
+        "axes": next((f.name for f in module.exact if f.name == "exact_axes"), ""),
+        "monotone": module.monotone,
+        "dissipation": ", ".join(f"{flag}={value}" for flag, value in module.dissipation),
+        "exact_class": _exact_class(module),
+        "exact_formulas": _listed(_exact_formulas(module), _WIDTH - 8),
+    }
+
+
+def _exact_formulas(module: ModuleIR) -> list[str]:
+    """The formulas over a namespace that a conservative module hands over; empty where there are none."""
+    return [function.name for function in module.exact if function.places]
+
+
+def _exact_class(module: ModuleIR) -> str:
+    """The record that takes them."""
+    return "ExactPotential" if module.chart else "ExactFormulas"
+
+
+def _batch(module: ModuleIR) -> list[str]:
+    """The functions for many orbits that a module hands over, and how many rows those fill that others read."""
+    if module.bounds_batch is None:
+        return []
+    rows = {f.name: len(f.outputs) for f in (*module.batch, module.bounds_batch) if f.batch}
+    counted = (("orbit_rows", "orbit_invariants_batch"), ("integrand_rows", "integrand_invariants_batch"))
+    return [
+        *(f"{name.removesuffix('_batch')}={name}" for name in rows),
+        *(f"{keyword}={rows[name]}" for keyword, name in counted if name in rows),
+    ]
 
 
 def body_digests(text: str) -> tuple[str, str] | None:
-    """The body's digest as the header states it, and as it is; None if the text has no such header."""
+    """The body's digest as the header states it, and as computed; None if the text has no such header."""
     first, _, rest = text.partition("\n")
     second, _, body = rest.partition("\n")
     if not first.startswith("# Made by gqm-gen") or " body " not in second:
@@ -144,11 +178,11 @@ def body_digests(text: str) -> tuple[str, str] | None:
     return second.rpartition(" body ")[2].strip(), _digest(body)
 
 
-def _listed(names: list[str]) -> list[str]:
-    """Names with commas, as many on a line as fit."""
-    lines = [""]
+def _listed(names: list[str], width: int = _WIDTH) -> list[str]:
+    """Names followed by commas, as many on each line as fit."""
+    lines = [""] if names else []
     for name in names:
-        if lines[-1] and len(lines[-1]) + len(name) + 2 > _WIDTH:
+        if lines[-1] and len(lines[-1]) + len(name) + 2 > width:
             lines.append("")
         lines[-1] += f"{' ' if lines[-1] else ''}{name},"
     return lines
@@ -160,7 +194,7 @@ def _as_imported(name: str) -> tuple[int, str]:
 
 
 def _tidied(text: str) -> str:
-    """No blanks at ends of lines, at most two empty lines together, one newline at the end."""
+    """Remove blanks at ends of lines, all but two of consecutive empty lines, and all but one newline at the end."""
     lines = "\n".join(line.rstrip() for line in text.splitlines())
     return re.sub(r"\n{4,}", "\n\n\n", lines).strip() + "\n"
 
@@ -170,7 +204,7 @@ def _digest(text: str) -> str:
 
 
 def _quoted(text: str) -> str:
-    """Text as it may stand inside a docstring, whatever it holds."""
+    """Change any text so that it can stand inside a docstring."""
     plain = "".join(c if c.isprintable() else " " for c in text)
     return plain.replace("\\", "\\\\").replace('"', "'")
 
@@ -191,98 +225,6 @@ def _forms(module: ModuleIR) -> list[str]:
         else:
             lines.append(f"{label:<{width}} = {printer.doprint(form)}")
     return [*lines, *(["", *module.notes] if module.notes else [])]
-
-
-def _statements(assignments: Iterable[Assignment], printer: CodePrinter) -> list[str]:
-    return [f"{a.name} = {printer.doprint(a.value)}" for a in assignments]
-
-
-def _unpacked(parameters: tuple[tuple[str, int], ...], p: str) -> list[str]:
-    return [f"{name} = {p}[{i}]" for name, i in parameters]
-
-
-def _loop(function: FunctionIR) -> tuple[dict[str, Any], set[str]]:
-    taken = {name for name, _ in function.parameters} | {a.name for a in function.inside}
-    index = "_i" if "i" in taken else "i"
-    printer = CodePrinter(index)
-    count, out = function.arguments[0], function.arguments[-1]
-    before = [_views(function)]
-    if function.parameters:
-        left = ", ".join(n for n, _ in function.parameters)
-        right = ", ".join(f"{function.arguments[-2]}[{i}]" for _, i in function.parameters)
-        before.append(f"{left} = {right}")
-    before += _statements(function.before, printer)
-    inside = _statements(function.inside, printer)
-    inside += [f"{out}[{row}, {index}] = {printer.doprint(e)}" for row, e in enumerate(function.outputs)]
-    before = _chart_view(function, printer) + before
-    fields = {
-        "name": function.name,
-        "signature": function.signature,
-        "arguments": ", ".join(function.arguments),
-        "doc": function.doc,
-        "before": before,
-        "loop": True,
-        "index": index,
-        "count": count,
-        "inside": inside,
-        "each": function.each,
-        "later": function.each or function.later,
-    }
-    return fields, printer.used
-
-
-def _views(function: FunctionIR) -> str:
-    """Arguments that are seen as arrays."""
-    names = ", ".join(name for name, _ in function.views)
-    return f"{names} = {', '.join(f'carray({name}, {shape})' for name, shape in function.views)}"
-
-
-def _chart_view(function: FunctionIR, printer: CodePrinter) -> list[str]:
-    """Where a function reads its curve's chart: behind the run-time parameters."""
-    p, count = function.views[-2]
-    return [f"chart = chart_of({p}, {count})"] if any("chart_" in name for name in printer.used) else []
-
-
-def _bounds(function: FunctionIR, parameter: str) -> tuple[dict[str, Any], set[str]]:
-    printer = IntervalPrinter()
-    *count, lo, hi, p, out = function.arguments
-    index = "_i" if "i" in {parameter} | {name for name, _ in function.parameters} else "i"
-    here, row = (f"[{index}]", f", {index}") if function.each else ("", "")
-    inside = [f"{parameter} = ({lo}{here}, {hi}{here})"]
-    inside += [f"{name} = ({p}[{i}{row}], {p}[{i}{row}])" for name, i in function.parameters]
-    inside += _statements(function.inside, printer)
-    for k, e in enumerate(function.outputs):
-        inside.append(f"{out}[{2 * k}{row}], {out}[{2 * k + 1}{row}] = {printer.doprint(e)}")
-    fields = {
-        "name": function.name,
-        "signature": function.signature,
-        "arguments": ", ".join(function.arguments),
-        "doc": function.doc,
-        "before": [*_chart_view(function, printer), _views(function)],
-        "loop": function.each,
-        "index": index,
-        "count": count[0] if count else "",
-        "inside": inside,
-        "each": function.each,
-        "later": function.each or function.later,
-    }
-    return fields, printer.used
-
-
-def _exact(function: ExactIR) -> dict[str, Any]:
-    printer = ExactPrinter()
-    p = "_p" if "p" in {*function.places, *(name for name, _ in function.parameters)} else "p"
-    inside = _unpacked(function.parameters, p)
-    inside += _statements(function.inside, printer)
-    values = ["None" if e is None else printer.doprint(e) for e in function.outputs]
-    inside.append(f"return {', '.join(values)}")
-    arguments = ("op", *function.places, p)
-    return {
-        "name": function.name,
-        "arguments": ", ".join(arguments),
-        "doc": function.doc,
-        "inside": inside,
-    }
 
 
 def _environment() -> jinja2.Environment:

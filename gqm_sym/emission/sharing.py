@@ -1,4 +1,4 @@
-"""Expressions of one function as straight-line code: each common part once, before the loop what is the same in it."""
+"""Expressions of one function as straight-line code: common parts once, constant ones in front of the loop."""
 
 from collections.abc import Iterable, Sequence
 
@@ -13,7 +13,7 @@ MAX_SIZE = 200_000
 
 
 def check_size(outputs: Iterable[Expr], *, where: str) -> None:
-    """Refuse what is too large to be gone through term by term, as SymPy does at every step.
+    """Refuse expressions that are too large, because SymPy goes through them term by term at every step.
 
     Divided differences share most of their parts, so that one of a thousand parts may be of 10**12 when written out.
     """
@@ -40,7 +40,7 @@ def straight_line(
     Parameters
     ----------
     inside
-        What the loop begins with: each symbol that depends on the place, and what it is.
+        What the loop begins with: each symbol that depends on the place, and its value.
     """
     moving = {symbol for symbol, _ in inside}
     prepared, fixed = hoist([_half_powers(e) for e in outputs], moving)
@@ -75,7 +75,7 @@ def _sorted(assignments: list[Assignment]) -> tuple[Assignment, ...]:
 
 
 def _half_powers(e: Expr) -> Expr:
-    """Powers of whole and a half as powers of a root: a root costs a tenth of a general power."""
+    """Write half-integer powers as powers of a square root, which costs a tenth of a general power."""
 
     def replace(power: Expr) -> Expr:
         return Function("sqrt")(power.base) ** power.exp.p
@@ -99,7 +99,7 @@ def hoist(outputs: Sequence[Expr], moving: set[Symbol]) -> tuple[list[Expr], lis
 
 
 def _fixed_calls(outputs: Sequence[Expr], moving: set[Symbol]) -> list[Expr]:
-    """Calls that do not depend on the place and are no part of another such call."""
+    """The outermost calls that do not depend on the place."""
     calls = {
         call
         for e in outputs

@@ -6,6 +6,7 @@ events are told apart by their markers.
 
 from gqm_sym.figures.motions import animate, loads, portrait, sampled, track
 from gqm_sym.figures.portraits import period_against_amplitude, phase_portrait
+from gqm_sym.figures.surveys import smoothing
 
 __all__ = [
     "animate",
@@ -14,5 +15,6 @@ __all__ = [
     "phase_portrait",
     "portrait",
     "sampled",
+    "smoothing",
     "track",
 ]

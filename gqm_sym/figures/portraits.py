@@ -16,6 +16,7 @@ from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.launch.domain import Domain
 from gqm_sym.runtime.launch.request import LaunchRequest
 from gqm_sym.runtime.model import CompiledModel
+from gqm_sym.runtime.motion.extremes import grid_peaks
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -210,11 +211,14 @@ def _extremes(climb: Array) -> Iterator[tuple[int, int]]:
 
 
 def _narrowed(climb_at: Any, low: float, high: float, sign: int) -> float:
-    for _ in range(ZOOMS):
-        places = np.linspace(low, high, PLACES)
-        k = int(np.nanargmax(sign * climb_at(places)))
-        low, high = places[max(k - 1, 0)], places[min(k + 1, PLACES - 1)]
-    return float(0.5 * (low + high))
+    """The middle of the interval that the finest grid leaves for an extremum; places without a value do not count."""
+
+    def signed(places: Array) -> Array:
+        heights: Array = sign * climb_at(places)
+        return np.where(np.isnan(heights), -np.inf, heights)
+
+    *_, peak = grid_peaks(signed, low, high, PLACES, ZOOMS)
+    return 0.5 * (peak.low + peak.high)
 
 
 def _energies(field: _Levels, levels: int) -> Array:

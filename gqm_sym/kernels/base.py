@@ -8,16 +8,31 @@ on the mathematics)::
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
 
 import sympy as sp
 
-from gqm_sym.errors import DeclarationError
+from gqm_sym.arguments import checked, instance
+from gqm_sym.dimensions import (
+    ACCELERATION,
+    LENGTH,
+    NUMBER,
+    SPEED_SQUARED,
+    Dimension,
+    Formulas,
+    dimension,
+    found_dimensions,
+    unit_of,
+)
+from gqm_sym.dimensions import COMMON as COMMON_DIMENSIONS
+from gqm_sym.errors import DeclarationError, renamed
 from gqm_sym.expressions import read_expression
 from gqm_sym.parameters import (
     COMMON,
     COORDINATES,
     Given,
     Value,
+    in_words,
     names_in_order,
     read_argument,
     read_parameters,
@@ -55,14 +70,14 @@ class Kernel:
         Coefficient of V**2 in what opposes motion, 1/length.
     friction, static_friction
         Coefficients of the contact force in what opposes motion, and in what holds a body at rest.
-    extra
+    tangential_law
         Tangential acceleration of the user's own, in the curve's parameter, coordinates, `W` and `DIRECTION`.
     spin
         Angular velocity of a frame that turns about the z axis: its Coriolis force presses out of the plane.
     radius
         Of a body that rolls to the left of growing λ (negative: to the right), whose centre moves on a path of its own.
-    grip
-        Of a rolling body whose static friction is known: its parameters beta and mu_static.
+    static_friction_limit
+        Of a rolling body whose static friction is known: the names of its parameters beta and mu_static.
     terms
         Name and one line of text of every force in it.
     defaults
@@ -80,18 +95,22 @@ class Kernel:
     drag: sp.Expr = field(default=sp.S.Zero)
     friction: sp.Expr = field(default=sp.S.Zero)
     static_friction: sp.Expr = field(default=sp.S.Zero)
-    extra: sp.Expr = field(default=sp.S.Zero)
+    tangential_law: sp.Expr = field(default=sp.S.Zero)
     spin: sp.Expr = field(default=sp.S.Zero)
     radius: sp.Expr = field(default=sp.S.Zero)
-    grip: tuple[str, str] | None = None
+    static_friction_limit: tuple[str, str] | None = None
     defaults: tuple[tuple[str, Value | None], ...] = ()
     positive: tuple[str, ...] = ()
     at_least: tuple[tuple[str, str], ...] = ()
+
+    if not TYPE_CHECKING:
+        __getattr__ = renamed({"extra": "tangential_law", "grip": "static_friction_limit"}, "a kernel")
 
     def __post_init__(self) -> None:
         refuse_out_of_range(dict(self.defaults), self.positive, self.at_least, where="kernel")
 
     @classmethod
+    @checked("Kernel.law")
     def law(
         cls,
         A: str | sp.Expr,
@@ -118,9 +137,17 @@ class Kernel:
         found = tuple(name for name in names_in_order(written) if name not in known)
         return cls(
             terms=(("law", f"tangential acceleration {written}"),),
-            extra=written,
+            tangential_law=written,
             defaults=read_parameters(parameters, found=found, where="law"),
         )
+
+    def __str__(self) -> str:
+        """A few lines for people: every force, and what its parameters are measured in."""
+        found = found_dimensions(kernel_formulas(self), COMMON_DIMENSIONS)
+        units = {**units_by_role(self), **{name: unit for name in found if (unit := unit_of(found[name]))}}
+        loss = "conservative" if self.conservative else "dissipative"
+        lines = [f"Force law, {loss}", *(f"  {name}: {text}" for name, text in self.terms)]
+        return "\n".join([*lines, f"  parameters: {in_words(dict(self.defaults), units)}"])
 
     @property
     def parameters(self) -> tuple[str, ...]:
@@ -130,17 +157,16 @@ class Kernel:
     @property
     def conservative(self) -> bool:
         """Whether V**2 depends on the place alone."""
-        return not any((self.resistance, self.drag, self.friction, self.extra))
+        return not any((self.resistance, self.drag, self.friction, self.tangential_law))
 
     def along(self, parameter: sp.Symbol) -> "Kernel":
         """Return the law on a curve of this parameter, which a law of the user's own may name."""
-        if parameter not in self.extra.free_symbols:
+        if parameter not in self.tangential_law.free_symbols:
             return self
         return replace(self, defaults=tuple(pair for pair in self.defaults if pair[0] != parameter.name))
 
     def __add__(self, other: "Kernel") -> "Kernel":
-        if not isinstance(other, Kernel):
-            return NotImplemented
+        instance(other, Kernel, where="kernel: +", what="two kernels, as in Gravity() + CoulombFriction()")
         _refuse_clashes(self, other)
         known = dict(self.defaults)
         return Kernel(
@@ -152,14 +178,20 @@ class Kernel:
             drag=self.drag + other.drag,
             friction=self.friction + other.friction,
             static_friction=self.static_friction + other.static_friction,
-            extra=self.extra + other.extra,
+            tangential_law=self.tangential_law + other.tangential_law,
             spin=self.spin + other.spin,
             radius=self.radius + other.radius,
-            grip=other.grip if self.grip is None else self.grip,
+            static_friction_limit=self.static_friction_limit or other.static_friction_limit,
             defaults=(*self.defaults, *(pair for pair in other.defaults if pair[0] not in known)),
             positive=tuple(dict.fromkeys(self.positive + other.positive)),
             at_least=tuple(dict.fromkeys(self.at_least + other.at_least)),
         )
+
+    def __radd__(self, other: object) -> "Kernel":
+        # Python's sum() begins with 0.
+        if isinstance(other, int) and other == 0:
+            return self
+        return instance(other, Kernel, where="kernel: +", what="two kernels, as in Gravity() + CoulombFriction()")
 
 
 def _refuse_clashes(first: Kernel, second: Kernel) -> None:
@@ -188,6 +220,43 @@ def _refuse_clashes(first: Kernel, second: Kernel) -> None:
 # Forces that act on a body as a whole: a second one is a mistake, not a sum.
 _ONCE = frozenset({"gravity", "rolling", "coulomb", "rotating_frame"})
 _EXCLUSIVE = frozenset({"rolling", "coulomb"})
+
+
+# What the parameters of the kernels are measured in, by their usual names.
+UNITS = {
+    "g": "m/s**2",
+    "Omega": "rad/s",
+    "k": "m**3/s**2",
+    "beta": "1",
+    "radius": "m",
+    "mu": "1",
+    "mu_static": "1",
+    "b": "kg/m",
+    "gamma": "N/m",
+    "ell_c": "m",
+}
+
+
+def kernel_formulas(kernel: Kernel) -> Formulas:
+    """Return the formulas of a force law with their dimensions.
+
+    Those of a resistance are left out: the printed form of surface tension takes its numbers in SI.
+    """
+    fields = (
+        (kernel.potential, SPEED_SQUARED),
+        (kernel.tangential_law, ACCELERATION),
+        (kernel.drag, dimension(metre=-1)),
+    )
+    numbers = ((kernel.friction, NUMBER), (kernel.static_friction, NUMBER), (kernel.inertia - 1, NUMBER))
+    others = ((kernel.spin, dimension(second=-1)), (kernel.radius, LENGTH))
+    variables: dict[str, Dimension | None] = {X.name: LENGTH, Z.name: LENGTH, W.name: SPEED_SQUARED}
+    return Formulas([*fields, *numbers, *others], {**variables, DIRECTION.name: NUMBER})
+
+
+def units_by_role(kernel: Kernel) -> dict[str, str]:
+    """Return the units of parameters that formulas alone do not tell, where they have their usual names."""
+    droplet = any(name == "surface_tension" for name, _ in kernel.terms)
+    return {name: UNITS[name] for name in ("gamma", "ell_c") if droplet and name in kernel.parameters}
 
 
 def parameter(given: Given | None, name: str, *, where: str) -> tuple[sp.Symbol, tuple[str, Value | None]]:

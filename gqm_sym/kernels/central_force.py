@@ -4,12 +4,14 @@ from collections.abc import Iterable
 
 import sympy as sp
 
+from gqm_sym.arguments import checked, several
 from gqm_sym.errors import DeclarationError
 from gqm_sym.expressions import read_expression
 from gqm_sym.kernels.base import Kernel, X, Z, parameter
 from gqm_sym.parameters import COORDINATES, Given, names_in_order, read_parameters
 
 
+@checked("CentralForce")
 def CentralForce(*, centre: Iterable[str | int | sp.Expr] = (0, 0), k: Given | None = None) -> Kernel:
     """Return the attraction ``k/r**2`` towards ``centre``.
 
@@ -20,9 +22,12 @@ def CentralForce(*, centre: Iterable[str | int | sp.Expr] = (0, 0), k: Given | N
     k
         The strength (G times the mass of the centre), or another name for it.
     """
-    place = tuple(read_expression(part, where="central_force: centre") for part in centre)
+    where = "central_force: centre"
+    place = tuple(
+        read_expression(part, where=where) for part in several(centre, where=where, what="two coordinates (x, z)")
+    )
     if len(place) != 2:
-        raise DeclarationError(f"central_force: centre: must be two coordinates (x, z), got {len(place)}")
+        raise DeclarationError(f"{where}: must be two coordinates (x, z), got {len(place)}")
     found = names_in_order(*place)
     for name in COORDINATES:
         if name in found:

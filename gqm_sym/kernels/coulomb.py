@@ -1,9 +1,11 @@
 """Dry friction between a body and its track."""
 
+from gqm_sym.arguments import checked
 from gqm_sym.kernels.base import Kernel, parameter
 from gqm_sym.parameters import Given
 
 
+@checked("CoulombFriction")
 def CoulombFriction(*, mu: Given | None = None, mu_static: Given | None = None) -> Kernel:
     """Return sliding friction ``mu*|N|``, and static friction up to ``mu_static*|N|``.
 

@@ -1,9 +1,11 @@
 """Drag of a medium, quadratic in the speed."""
 
+from gqm_sym.arguments import checked
 from gqm_sym.kernels.base import MASS, Kernel, parameter
 from gqm_sym.parameters import Given
 
 
+@checked("QuadraticDrag")
 def QuadraticDrag(*, b: Given | None = None) -> Kernel:
     """Return the drag force ``b*V**2`` against the motion.
 

@@ -1,9 +1,11 @@
 """Uniform gravity."""
 
+from gqm_sym.arguments import checked
 from gqm_sym.kernels.base import Kernel, Z, parameter
 from gqm_sym.parameters import Given
 
 
+@checked("Gravity")
 def Gravity(*, g: Given | None = None) -> Kernel:
     """Return uniform gravity, downwards.
 

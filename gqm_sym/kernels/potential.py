@@ -4,11 +4,13 @@ from collections.abc import Iterable, Mapping
 
 import sympy as sp
 
+from gqm_sym.arguments import checked
 from gqm_sym.expressions import read_expression
 from gqm_sym.kernels.base import Kernel
 from gqm_sym.parameters import COORDINATES, Given, names_in_order, read_parameters
 
 
+@checked("Potential")
 def Potential(
     U: str | sp.Expr,
     *,

@@ -2,10 +2,12 @@
 
 import sympy as sp
 
+from gqm_sym.arguments import checked
 from gqm_sym.kernels.base import Kernel, parameter
 from gqm_sym.parameters import Given
 
 
+@checked("Rolling")
 def Rolling(*, beta: Given | None = None, radius: Given | None = None, mu_static: Given | None = None) -> Kernel:
     """Return the inertia of a body that rolls.
 
@@ -21,7 +23,7 @@ def Rolling(*, beta: Given | None = None, radius: Given | None = None, mu_static
         motion asks for more. It goes on as if the body still rolled.
     """
     symbol, pair = parameter(beta, "beta", where="rolling")
-    size, grip = sp.S.Zero, None
+    size, limit = sp.S.Zero, None
     pairs, text = [pair], ""
     if radius is not None:
         size, another = parameter(radius, "radius", where="rolling")
@@ -29,13 +31,13 @@ def Rolling(*, beta: Given | None = None, radius: Given | None = None, mu_static
         text = f", a body of radius {size}"
     if mu_static is not None:
         _, another = parameter(mu_static, "mu_static", where="rolling")
-        grip = (pair[0], another[0])
+        limit = (pair[0], another[0])
         pairs.append(another)
     return Kernel(
         terms=(("rolling", f"rolling without slipping, inertia 1 + {symbol}{text}"),),
         inertia=1 + symbol,
         radius=size,
-        grip=grip,
+        static_friction_limit=limit,
         defaults=tuple(pairs),
         at_least=tuple((name, "0") for name, _ in pairs if name != str(size)),
     )

@@ -1,9 +1,11 @@
 """A track that turns about the vertical axis x = 0."""
 
+from gqm_sym.arguments import checked
 from gqm_sym.kernels.base import Kernel, X, parameter
 from gqm_sym.parameters import Given
 
 
+@checked("RotatingFrame")
 def RotatingFrame(*, Omega: Given | None = None) -> Kernel:
     """Return the centrifugal force of a track that turns about the z axis.
 

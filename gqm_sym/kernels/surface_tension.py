@@ -2,13 +2,14 @@
 
 import sympy as sp
 
-from gqm_sym.errors import DeclarationError
+from gqm_sym.arguments import checked, one_of
 from gqm_sym.kernels.base import KAPPA, MASS, Kernel, parameter
 from gqm_sym.parameters import Given
 
 FORMS = ("resistance", "printed")
 
 
+@checked("SurfaceTension")
 def SurfaceTension(*, gamma: Given | None = None, ell_c: Given | None = None, form: str = "resistance") -> Kernel:
     """Return the resistance of a droplet's contact line, in proportion to the curvature.
 
@@ -20,8 +21,7 @@ def SurfaceTension(*, gamma: Given | None = None, ell_c: Given | None = None, fo
         ``resistance``: ``gamma*ell_c**2*|kappa|/m`` against the motion. ``printed``: the paper's
         ``gamma*ell_c*kappa/m``, numbers in SI; it drives a droplet where the curvature is negative.
     """
-    if form not in FORMS:
-        raise DeclarationError(f"surface_tension: form: must be one of {', '.join(FORMS)}, got {form!r}")
+    one_of(form, FORMS, where="surface_tension: form")
     tension, first = parameter(gamma, "gamma", where="surface_tension")
     length, second = parameter(ell_c, "ell_c", where="surface_tension")
     coefficient = tension * length**2 if form == "resistance" else tension * length

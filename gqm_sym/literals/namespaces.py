@@ -1,4 +1,4 @@
-"""The operations of exact formulas over floats and over NumPy arrays, as an mpmath context has them over its numbers."""
+"""The operations of exact formulas over floats and over NumPy arrays, named as an mpmath context names them."""
 
 import math
 from math import e, pi

@@ -1,7 +1,7 @@
-"""What generated modules run on: quadrature, turning points, legs, inversion, and the motions and sweeps made of them.
+"""The numerical library that generated modules run on: motions and sweeps, and all that they are computed with.
 
-A generated module imports `compiler` from here, which tells another version of the runtime from a broken one, and all
-else from `vocabulary`.
+A generated module imports `compiler` from here, which refuses a module made for another version of the runtime, and
+everything else from `vocabulary`.
 """
 
 from importlib import import_module

@@ -1,57 +1,68 @@
 """What generated modules and the runtime agree on.
 
-A generated module fills arrays at many places a call. Its functions reach the runtime by address, so the
-runtime is compiled once per installation and shared by every module.
+A generated module evaluates its formulas at many places in one call. Its functions reach the runtime by address, so
+the runtime is compiled once per installation and shared by every module.
 
-=========== ============================================= ==========================================
-function    arguments                                     rows of ``out``
-=========== ============================================= ==========================================
-frame       n, lam, v2, p, out                            x, z, ds, kappa, normal force
-loads       n, w0, level, lam, p, out                     x, z, ds, kappa, V**2, normal force, size
-climb       n, lam, p, out                                climb, d climb/d lam
-rise        n, a, lam, d, p, out                          climb[a, lam], ds(lam); d = lam - a
-bend        n, a, b, da, db, p, out                       climb[a, lam, b], ds(lam)
-bounds      lo, hi, p, out                                enclosure of climb', enclosure of ds
-rise_each   n, a, lam, d, p, out                          climb[a, lam], ds(lam), climb'(lam)
-bend_each   n, a, b, da, db, p, out                       climb[a, lam, b], ds(lam)
-bounds_each n, lo, hi, p, out                             enclosure of climb', enclosure of ds
-orbit_each  n, a, b, p, out                               what bend_each finds behind p
-swing_each  n, fall, rise, p, out                         (dt/du)**2, what that is divided by
-top_each    n, half, p, out                               what swing_each finds behind p
-crest_each  n, offset, v2, p, out                         half an orbit's width, growth of the climb, sine squared
-mean_each   n, half, p, out                               squares of two numbers, of pi over the half period
-drive       n, lam, v2, v, nu, p, out                     ds, P, Q, n0, kappa
-hold        n, lam, p, out                                A(lam, 0; +1), A(lam, 0; -1), static friction
-segment     n, lam, p, out                                x, z, ds, dx/ds, dz/ds, kappa
-field       n, x, z, p, out                               F, F_x, F_z, F_xx, F_xz, F_zz
-=========== ============================================= ==========================================
+Below, U is the effective potential per unit mass, Φ/(1 + β), so that ``V**2 = v0**2 - 2*(U(lam) - U(lam0))`` (MATHS,
+section 2). Square brackets are divided differences (MATHS, section 3), whose gaps ``d = lam - a``, ``da = lam - a`` and
+``db = b - lam`` are given as they were computed, and are never subtracted again. Units are SI; [lam] is the unit of the
+curve's parameter.
 
-A conservative model has ``climb``, ``rise``, ``bend`` and ``bounds``; a dissipative one ``drive`` and ``hold`` instead.
+====================== ============================== ===============================================================
+function               arguments                      rows of ``out``
+====================== ============================== ===============================================================
+path_and_contact_force n, lam, v2, p, out             x [m], z [m], ds/dlam [m/[lam]], curvature kappa [1/m], contact
+                                                      force N = m*(kappa*v2 + n0) [N]
+load_map               n, w0, level, lam, p, out      x, z, ds/dlam, kappa, V**2 [m2/s2], N, and the size of the terms
+                                                      of U [m2/s2], whose roundings are shares of it
+effective_potential    n, lam, p, out                 U [m2/s2], dU/dlam [m2/s2/[lam]]
+potential_divdiff1     n, a, lam, d, p, out           U[a, lam] [m2/s2/[lam]], ds/dlam at lam
+potential_divdiff2     n, a, b, da, db, p, out        U[a, lam, b] [m2/s2/[lam]**2], ds/dlam at lam
+bounds                 lo, hi, p, out                 lower and upper bound of dU/dlam, then of ds/dlam
+speed_equation         n, lam, v2, v, nu, p, out      ds/dlam, P [m2/s2/[lam]], Q [1/[lam]], n0 [m/s2], kappa
+static_balance         n, lam, p, out                 tangential acceleration of a body at rest that is about to move
+                                                      forwards, and backwards, its static friction included [m/s2]
+segment                n, lam, p, out                 x, z, ds/dlam, dx/ds, dz/ds, kappa of a piece of a rail
+field                  n, x, z, p, out                F, F_x, F_z, F_xx, F_xz, F_zz of an implicit curve F = 0
+====================== ============================== ===============================================================
 
-The functions ``_each`` are for sweeps: their ``a``, ``b``, ``lo``, ``hi`` and ``p`` are arrays too, a launch and
-parameters for each place (``p`` has a row for each parameter). They are compiled when a sweep first asks for them.
-``bend_each`` may give NaN where points lie too far apart for its closed forms; ``bend`` never does. What is the same
-all along an orbit, ``orbit_each`` works out once: those rows stand behind the parameters in the ``p`` of ``bend_each``.
+A conservative model has ``effective_potential``, ``potential_divdiff1``, ``potential_divdiff2`` and ``bounds``; a
+dissipative one has ``speed_equation`` and ``static_balance`` instead. On a leg with the signs v = sgn(ds/dt) and
+nu = sgn(N), ``dW/dlam = P - Q*W`` with W = V**2 (MATHS, section 2). For a law that is not linear in W, P and Q are its
+linearisation at the ``v2`` given: ``P - Q*v2`` is the law itself there. The contact force is ``N = m*(kappa*W + n0)``.
 
-Orbits about an axis of symmetry may have ``swing_each``: their time as an integral over u in which the square of the
-coordinate sqrt(top)*sin(u) is the share ``fall`` = sin(u)**2 of its largest, ``rise`` being the rest. ``half`` is half
-of an orbit's width. Where that is a complete elliptic integral of the first kind they have ``mean_each`` instead: pi
-over the half period is the arithmetic-geometric mean of two numbers. In a well that is monotone on either side, where
-V**2 is used up may have a closed form: ``crest_each``, from the offset and V**2 of a launch.
+``load_map`` fills all that a load map shows, with V**2 = ``w0`` - 2*(U(lam) - ``level``). A module has it only where
+the size of the terms of U is known.
 
-A curve with formulas that is a piece of a rail has ``segment`` (`rail`), in its own parameter; an implicit curve F = 0
-has ``field``, by which it is traced (`tracing`).
+The functions of a batch serve sweeps. Their ``a``, ``b``, ``lo``, ``hi`` and ``p`` are arrays too: every place has a
+launch and run-time parameters of its own, and ``p`` has one row for each parameter. They are compiled when a sweep
+first asks for them.
 
-``loads`` is for load maps: V**2 is ``w0`` less the climb from ``level``, and ``size`` is what the climb's roundings are
-shares of. There is none where that is not known.
+========================== ======================== =================================================================
+function of a batch        arguments                rows of ``out``
+========================== ======================== =================================================================
+potential_divdiff1_batch   n, a, lam, d, p, out     U[a, lam], ds/dlam, dU/dlam
+potential_divdiff2_batch   n, a, b, da, db, p, out  U[a, lam, b], ds/dlam; NaN where the points lie too far apart for
+                                                    the closed form
+orbit_invariants_batch     n, a, b, p, out          terms that are constant along an orbit, which
+                                                    potential_divdiff2_batch reads behind the parameters
+bounds_batch               n, lo, hi, p, out        lower and upper bound of dU/dlam, then of ds/dlam
+time_integrand_batch       n, fall, rise, p, out    (dt/du)**2 [s2], and its divisor: where that is small, digits are
+                                                    lost
+integrand_invariants_batch n, half, p, out          terms that are constant along an orbit, which
+                                                    time_integrand_batch reads behind the parameters
+agm_arguments_batch        n, half, p, out          squares of two numbers [1/s2]
+turning_point_batch        n, offset, v2, p, out    half the orbit's width [[lam]]; loss of V**2 for each unit of the
+                                                    square that it is written in; the square of the sine at the
+                                                    turning point, above 1 where V**2 never vanishes
+========================== ======================== =================================================================
 
-``climb`` is twice the potential per unit mass over the inertia factor, so that ``V**2 + climb`` is constant
-(MATHS, section 2). Square brackets are divided differences (MATHS, section 3): ``da = lam - a`` and
-``db = b - lam`` are given as computed, never re-subtracted.
-
-On a leg with signs v = sgn(ds/dt) and nu = sgn(N), ``dW/dlam = P - Q W`` with W = V**2 (MATHS, section 2). For a law
-that is not linear in W, P and Q are its linearisation at the ``v2`` given: ``P - Q v2`` is the law itself there. The
-contact force is ``N = m (kappa W + n0)``.
+Orbits about an axis of symmetry may have ``time_integrand_batch``: their half period is an integral over the angle u,
+in which ``fall`` = sin(u)**2 is the square of a coordinate as a share of its largest value, and ``rise`` = cos(u)**2.
+``half`` is half of an orbit's width. Where that integral is a complete elliptic one of the first kind, a module has
+``agm_arguments_batch`` instead: pi over the half period is the arithmetic-geometric mean of two numbers. In a well that
+is monotone on either side the turning point may have a closed form, ``turning_point_batch``, from the launch's offset
+from the axis and its V**2.
 """
 
 from collections.abc import Callable
@@ -65,29 +76,30 @@ INTERFACE = 8
 REAL = types.float64
 MANY = types.CPointer(REAL)
 
-FRAME = types.void(types.intp, MANY, MANY, MANY, MANY)
-LOADS = types.void(types.intp, REAL, REAL, MANY, MANY, MANY)
-CLIMB = types.void(types.intp, MANY, MANY, MANY)
-RISE = types.void(types.intp, REAL, MANY, MANY, MANY, MANY)
-BEND = types.void(types.intp, REAL, REAL, MANY, MANY, MANY, MANY)
+PATH_AND_CONTACT_FORCE = types.void(types.intp, MANY, MANY, MANY, MANY)
+LOAD_MAP = types.void(types.intp, REAL, REAL, MANY, MANY, MANY)
+EFFECTIVE_POTENTIAL = types.void(types.intp, MANY, MANY, MANY)
+POTENTIAL_DIVDIFF1 = types.void(types.intp, REAL, MANY, MANY, MANY, MANY)
+POTENTIAL_DIVDIFF2 = types.void(types.intp, REAL, REAL, MANY, MANY, MANY, MANY)
 BOUNDS = types.void(REAL, REAL, MANY, MANY)
 
-RISE_EACH = types.void(types.intp, MANY, MANY, MANY, MANY, MANY)
-BEND_EACH = types.void(types.intp, MANY, MANY, MANY, MANY, MANY, MANY)
-BOUNDS_EACH = types.void(types.intp, MANY, MANY, MANY, MANY)
-ORBIT_EACH = types.void(types.intp, MANY, MANY, MANY, MANY)
-SWING_EACH = types.void(types.intp, REAL, REAL, MANY, MANY)
-TOP_EACH = types.void(types.intp, MANY, MANY, MANY)
-CREST_EACH = types.void(types.intp, MANY, MANY, MANY, MANY)
-MEAN_EACH = types.void(types.intp, MANY, MANY, MANY)
+POTENTIAL_DIVDIFF1_BATCH = types.void(types.intp, MANY, MANY, MANY, MANY, MANY)
+POTENTIAL_DIVDIFF2_BATCH = types.void(types.intp, MANY, MANY, MANY, MANY, MANY, MANY)
+BOUNDS_BATCH = types.void(types.intp, MANY, MANY, MANY, MANY)
+ORBIT_INVARIANTS_BATCH = types.void(types.intp, MANY, MANY, MANY, MANY)
+TIME_INTEGRAND_BATCH = types.void(types.intp, REAL, REAL, MANY, MANY)
+INTEGRAND_INVARIANTS_BATCH = types.void(types.intp, MANY, MANY, MANY)
+AGM_ARGUMENTS_BATCH = types.void(types.intp, MANY, MANY, MANY)
+TURNING_POINT_BATCH = types.void(types.intp, MANY, MANY, MANY, MANY)
 
-DRIVE = types.void(types.intp, MANY, MANY, REAL, REAL, MANY, MANY)
-HOLD = types.void(types.intp, MANY, MANY, MANY)
+SPEED_EQUATION = types.void(types.intp, MANY, MANY, REAL, REAL, MANY, MANY)
+STATIC_BALANCE = types.void(types.intp, MANY, MANY, MANY)
 
 FIELD = types.void(types.intp, MANY, MANY, MANY, MANY)
 SEGMENT = types.void(types.intp, MANY, MANY, MANY)
 
-FRAME_ROWS, LOAD_ROWS = 5, 7
+# Rows of path_and_contact_force and of load_map.
+PATH_ROWS, LOAD_MAP_ROWS = 5, 7
 
 
 class Addresses(NamedTuple):
@@ -113,34 +125,37 @@ class BatchAddresses(NamedTuple):
     turning_point: int = 0
 
 
-class Each(NamedTuple):
-    """The functions of a sweep over many orbits at once: each has an ``address`` (`jit.Later`).
+class BatchFunctions(NamedTuple):
+    """The functions of one module that serve many orbits at once, each compiled when it is first needed (`jit.Later`).
 
-    ``held`` and ``top_held`` are how many rows ``orbit`` and ``top`` fill. None and 0 where nothing is the same all
-    along an orbit, and where orbits have no swing.
+    A function that a module does not have is None. ``orbit_rows`` and ``integrand_rows`` are how many rows
+    ``orbit_invariants`` and ``integrand_invariants`` fill.
     """
 
-    rise: Any
-    bend: Any
+    potential_divdiff1: Any
+    potential_divdiff2: Any
     bounds: Any
-    orbit: Any = None
-    swing: Any = None
-    top: Any = None
-    mean: Any = None
-    crest: Any = None
-    held: int = 0
-    top_held: int = 0
+    orbit_invariants: Any = None
+    time_integrand: Any = None
+    integrand_invariants: Any = None
+    agm_arguments: Any = None
+    turning_point: Any = None
+    orbit_rows: int = 0
+    integrand_rows: int = 0
 
     def addresses(self) -> BatchAddresses:
         """Where they lie in memory; 0 for one that there is not."""
-        return BatchAddresses(*(function.address if function else 0 for function in self[:8]))
+        functions = (getattr(self, name) for name in BatchAddresses._fields)
+        return BatchAddresses(*(function.address if function else 0 for function in functions))
 
 
 class Dissipation(NamedTuple):
-    """What a dissipative model adds: the addresses of ``drive`` and ``hold``, and of what kind its forces are.
+    """What a dissipative model adds: the addresses of two functions, and of what kind its forces are.
 
     Attributes
     ----------
+    speed_equation, static_balance : int
+        Where these functions lie in memory.
     friction : bool
         Whether the force depends on the sign of N: then a leg ends where N changes sign.
     kinked : bool
@@ -149,26 +164,29 @@ class Dissipation(NamedTuple):
         Whether it is linear in V**2.
     """
 
-    drive: int
-    hold: int
+    speed_equation: int
+    static_balance: int
     friction: bool
     kinked: bool
     linear: bool
 
 
-class ExactClimb(NamedTuple):
-    """What a module of a charted curve has of them: ``f(op, x, z, p)``, the climb and its derivatives by x and z."""
+class ExactPotential(NamedTuple):
+    """The exact formula of a charted curve: ``f(op, x, z, p)`` gives U and its derivatives by x and z."""
 
-    climb: Callable[..., Any]
+    effective_potential: Callable[..., Any]
 
 
 class ExactFormulas(NamedTuple):
-    """The same formulas as plain Python over a namespace of operations: ``f(op, lam, p)``."""
+    """The same formulas as plain Python over a namespace of operations: ``f(op, lam, p)``.
+
+    ``static_normal_load`` is n0 [m/s2], the contact force per unit mass of a body at rest.
+    """
 
     x: Callable[..., Any]
     z: Callable[..., Any]
     ds: Callable[..., Any]
     kappa: Callable[..., Any]
-    reaction: Callable[..., Any]
-    climb: Callable[..., Any]
-    climb_slope: Callable[..., Any]
+    static_normal_load: Callable[..., Any]
+    effective_potential: Callable[..., Any]
+    effective_potential_slope: Callable[..., Any]

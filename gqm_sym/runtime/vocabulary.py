@@ -7,17 +7,41 @@ from importlib import import_module
 from typing import Any
 
 _NAMES_BY_HOME = {
-    "arithmetic.divided_differences.first": "abs1 acos1 acosh1 asin1 asinh1 atan1 atanh1 cos1 cosh1 exp1 ipow1 log1 rpow1 sin1 sinh1 tan1 tanh1",
-    "arithmetic.divided_differences.second": "abs2 acos2 acosh2 asin2 asinh2 atan2 atanh2 ipow2 log2 rpow2",
-    "arithmetic.divided_differences.trigonometric": "cos2 cosh2 exp2 near_cos2 near_cosh2 near_even near_odd near_sin2 near_sinc near_sinh2 sin2 sinh2 tan2 tanh2",
+    "arithmetic.divided_differences.first": (
+        "divdiff1_abs divdiff1_acos divdiff1_acosh divdiff1_asin divdiff1_asinh divdiff1_atan divdiff1_atanh "
+        "divdiff1_cos divdiff1_cosh divdiff1_exp divdiff1_ipow divdiff1_log divdiff1_rpow divdiff1_sin "
+        "divdiff1_sinh divdiff1_tan divdiff1_tanh"
+    ),
+    "arithmetic.divided_differences.second": (
+        "divdiff2_abs divdiff2_acos divdiff2_acosh divdiff2_asin divdiff2_asinh divdiff2_atan divdiff2_atanh "
+        "divdiff2_ipow divdiff2_log divdiff2_rpow"
+    ),
+    "arithmetic.divided_differences.trigonometric": (
+        "divdiff1_cos_in_square divdiff1_sinc_in_square divdiff2_cos divdiff2_cos_near divdiff2_cosh "
+        "divdiff2_cosh_near divdiff2_exp divdiff2_sin divdiff2_sin_near divdiff2_sinh divdiff2_sinh_near "
+        "divdiff2_tan divdiff2_tanh sinc_near"
+    ),
     "arithmetic.elementary": "atan cos cosh exp sin sinh",
-    "arithmetic.intervals": "iabs iacos iacosh iadd iasin iasinh iatan iatanh iconst icos icosh idiv iexp iinv ilog imul ipi ipoint ipow irpow isin isinh isqrt itan itanh",
-    "arithmetic.offsets": "left_of nearest",
-    "charts.evaluate": "chart_alpha chart_alpha1 chart_alpha2 chart_kappa chart_of chart_x chart_x1 chart_x2 chart_z chart_z1 chart_z2 ichart_alpha ichart_kappa ichart_x ichart_z",
+    "arithmetic.intervals": (
+        "iabs iacos iacosh iadd iasin iasinh iatan iatanh iconst icos icosh idiv iexp iinv ilog imul ipi "
+        "ipoint ipow irpow isin isinh isqrt itan itanh"
+    ),
+    "arithmetic.offsets": "place_from_ends speed_squared_from_potential",
+    "charts.evaluate": (
+        "chart_alpha chart_kappa chart_of chart_x chart_z divdiff1_chart_alpha divdiff1_chart_x "
+        "divdiff1_chart_z divdiff2_chart_alpha divdiff2_chart_x divdiff2_chart_z ichart_alpha ichart_kappa "
+        "ichart_x ichart_z"
+    ),
     "charts.rail": "Rail",
     "charts.sampled": "Sampled",
     "charts.tracing": "Traced",
-    "interface": "Addresses BEND BEND_EACH BOUNDS BOUNDS_EACH CLIMB CREST_EACH DRIVE Dissipation Each ExactClimb ExactFormulas FIELD FRAME HOLD LOADS MEAN_EACH ORBIT_EACH RISE RISE_EACH SEGMENT SWING_EACH TOP_EACH",
+    "interface": (
+        "AGM_ARGUMENTS_BATCH Addresses BOUNDS BOUNDS_BATCH BatchFunctions Dissipation EFFECTIVE_POTENTIAL "
+        "ExactFormulas ExactPotential FIELD INTEGRAND_INVARIANTS_BATCH LOAD_MAP ORBIT_INVARIANTS_BATCH "
+        "PATH_AND_CONTACT_FORCE POTENTIAL_DIVDIFF1 POTENTIAL_DIVDIFF1_BATCH POTENTIAL_DIVDIFF2 "
+        "POTENTIAL_DIVDIFF2_BATCH SEGMENT SPEED_EQUATION STATIC_BALANCE TIME_INTEGRAND_BATCH "
+        "TURNING_POINT_BATCH"
+    ),
     "launch.request": "LaunchRequest",
     "launch.speed": "Pass1",
     "model": "CompiledModel",

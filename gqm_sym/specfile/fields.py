@@ -12,7 +12,7 @@ from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Fie
 from pydantic_core import PydanticCustomError
 
 from gqm_sym.errors import InputError, NumberError
-from gqm_sym.expressions import RESERVED_NAMES, check_name
+from gqm_sym.expressions import RESERVED_NAMES, check_module_name, check_name
 from gqm_sym.literals.grammar import parse
 from gqm_sym.parameters import check_parameter, exact_value, read_value
 from gqm_sym.specfile.nodes import shown
@@ -83,6 +83,19 @@ def _check_number(text: str) -> object:
     return text
 
 
+def _check_scatter(text: str) -> object:
+    if text == "auto":
+        return text
+    try:
+        _check_number(text)
+        right = bool(exact_value(text) > 0)
+    except InputError:
+        right = False
+    if not right:
+        raise NumberError(f"must be a standard deviation, a positive number, or auto, got {shown(text)}")
+    return text
+
+
 def _read_flag(value: object) -> object:
     if value not in ("true", "false"):
         raise _mistake(f"must be true or false, got {shown(str(value))}")
@@ -101,12 +114,13 @@ def _read_sign(of: str) -> BeforeValidator:
 _TEXT_OR_NUMBER = {"type": ["string", "number"]}
 
 Line: TypeAlias = Annotated[str, AfterValidator(_check_line)]
-Name: TypeAlias = Annotated[str, _checked(lambda text: check_name(text, where=""))]
+Name: TypeAlias = Annotated[str, _checked(lambda text: check_module_name(text, where=""))]
 CurveParameter: TypeAlias = Annotated[str, _checked(_check_curve_parameter)]
 ParameterName: TypeAlias = Annotated[str, _checked(lambda text: check_parameter(text, where=""))]
 UnitText: TypeAlias = Annotated[str, _checked(lambda text: text and read_unit(text, where=""))]
 Expression: TypeAlias = Annotated[str, _checked(lambda text: parse(text, where="")), WithJsonSchema(_TEXT_OR_NUMBER)]
 Number: TypeAlias = Annotated[str, _checked(_check_number), WithJsonSchema(_TEXT_OR_NUMBER)]
+ScatterText: TypeAlias = Annotated[str, _checked(_check_scatter), WithJsonSchema(_TEXT_OR_NUMBER)]
 Flag: TypeAlias = Annotated[bool, BeforeValidator(_read_flag), WithJsonSchema({"type": "boolean"})]
 Direction: TypeAlias = Annotated[int, _read_sign("ds/dt at launch"), WithJsonSchema({"enum": [1, -1]})]
 Tangent: TypeAlias = Annotated[int, _read_sign("the tangent (-F_z, F_x)"), WithJsonSchema({"enum": [1, -1]})]

@@ -100,8 +100,7 @@ class _Reader:
         launch = self._section(Launch, "launch")
         if isinstance(self.data.get("launch"), dict):
             self._check_place({"lam0", "point"} & set(self.data["launch"]), curve)
-        if curve is not None and kernel is not None:
-            self._check_units(declared, launch)
+        self._check_units(declared, launch, curve, kernel)
         if launch is not None:
             self._check_launch(_arguments(launch), curve, declared)
         if self.mistakes or curve is None or kernel is None:
@@ -222,9 +221,14 @@ class _Reader:
         elif not given:
             self.mistakes.add(mark, "launch: lam0 is missing", "add lam0: -pi/2 + 6/5")
 
-    def _check_units(self, declared: Parameters, launch: Launch | None) -> None:
-        """Note units of another dimension than what they are given for has."""
-        units, starts = expected_units(self.data), launch_units(self.data)
+    def _check_units(
+        self, declared: Parameters, launch: Launch | None, curve: Curve | None, kernel: Kernel | None
+    ) -> None:
+        """Note units of another dimension than what they are given for has, whatever else is wrong."""
+        written = {name: entry.unit for name, entry in declared.items() if entry is not None and entry.unit}
+        if kernel is not None and curve is not None:
+            kernel = kernel.along(curve.parameter)
+        units, starts = expected_units(self.data, curve, kernel, written), launch_units(curve)
         given = [(("parameters", name), entry, units.get(name)) for name, entry in declared.items()]
         given += [(("launch", key), entry, starts.get(key)) for key, entry in launch or ()]
         for path, entry, wanted in given:

@@ -41,7 +41,7 @@ from gqm_sym.specfile.fields import (
     UnitText,
 )
 from gqm_sym.specfile.rails import RailSchema
-from gqm_sym.specfile.track import POINTS, Points, declare_track
+from gqm_sym.specfile.track import POINTS, Points, Scatter, declare_track
 
 _DOMAIN = Field(
     default=None,
@@ -304,6 +304,8 @@ def model_at(path: tuple[str, ...]) -> Any:
             return RAILS.model_at(steps)
         case ("curve", "points"):
             return Points
+        case ("curve", "points", "smoothing"):
+            return Scatter
         case ("curve", kind) if kind in CURVES and kind != "family":
             return CURVES[kind].model
         case ("kernel",):

@@ -1,6 +1,6 @@
 """The file that ``gqm-gen --init`` writes: a first curve file, with what else could stand in it as comments."""
 
-from gqm_sym.expressions import check_name
+from gqm_sym.expressions import check_module_name
 
 _TEXT = """\
 # A curve, the forces on a body that moves along it, and a launch.
@@ -57,4 +57,4 @@ def starter(name: str) -> str:
     ExpressionError
         If it may not be called so.
     """
-    return _TEXT.format(name=check_name(name, where="name"))
+    return _TEXT.format(name=check_module_name(name, where="name"))

@@ -1,18 +1,38 @@
 """Points of a track from a CSV file beside the YAML."""
 
 import re
+import warnings
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeAlias
 
-from pydantic import Field
+from pydantic import Field, GetJsonSchemaHandler
+from pydantic.json_schema import JsonSchemaValue
+from pydantic_core import CoreSchema
 
 from gqm_sym.declare import Curve
-from gqm_sym.errors import DeclarationError, InputError
+from gqm_sym.errors import DeclarationError, InputError, NoisyPointsWarning
+from gqm_sym.parameters import exact_value
 from gqm_sym.specfile.beside import read_beside, read_rows
-from gqm_sym.specfile.fields import Flag, Line, Section, wrapped
+from gqm_sym.specfile.fields import ABSENT, Flag, Line, ScatterText, Section, UnitText, wrapped
+from gqm_sym.specfile.units import check_unit, in_si
 
 _COLUMNS = ["x", "z"]
 _ROW = re.compile(r"row (\d+)")
+
+
+class Scatter(Section):
+    """How far measured points scatter: their standard deviation in metres or in the unit that it names, or auto."""
+
+    value: ScatterText = Field(
+        description="the standard deviation of each coordinate; auto: found by cross-validation",
+        examples=["0.01", "auto"],
+    )
+    unit: UnitText = Field(default="", description="of length", examples=["mm", "cm"])
+
+    @classmethod
+    def __get_pydantic_json_schema__(cls, core_schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
+        """Describe the short form too: the value alone."""
+        return {"anyOf": [{"type": ["string", "number"]}, handler.resolve_ref_schema(handler(core_schema))]}
 
 
 class Points(Section):
@@ -21,6 +41,11 @@ class Points(Section):
     file: Line = Field(description="path from this file's folder on, inside it", examples=["track.csv"])
     kind: Literal["spline", "linear"] = Field(default="spline", description="a quintic spline, or stitched planes")
     closed: Flag = Field(default=False, description="whether the track closes; else if its last point is its first")
+    smoothing: Annotated[Scatter, wrapped("value", str)] = Field(
+        default=ABSENT,
+        description="for measured points: their standard deviation, or auto; else the track goes through them",
+        examples=["auto", {"value": 8, "unit": "mm"}],
+    )
 
 
 POINTS: TypeAlias = Annotated[Points, wrapped("file", str)]
@@ -32,7 +57,7 @@ def declare_track(given: dict[str, Any], folder: Path) -> Curve:
     Parameters
     ----------
     given
-        ``file``, and where they are given ``kind`` and ``closed``.
+        ``file``, and where they are given ``kind``, ``closed`` and ``smoothing``.
     folder
         Of the YAML file; the points are in it, or in a folder inside.
 
@@ -46,8 +71,30 @@ def declare_track(given: dict[str, Any], folder: Path) -> Curve:
     header, rows = read_rows(name, read_beside(name, folder, wanted="a CSV file with columns x, z"))
     if header and [field.lower() for field in header] != _COLUMNS:
         raise InputError(f"{name!r}, row 1: the columns must be x, z, got {','.join(header)!r:.60}")
+    if "smoothing" in given:
+        given["smoothing"] = _deviation(**given["smoothing"])
     try:
-        return Curve.sampled(rows, **given)
+        with warnings.catch_warnings(record=True) as noted:
+            curve = Curve.sampled(rows, **given)
     except DeclarationError as error:
         what = str(error).removeprefix("sampled: ")
+        if what.startswith("smoothing: "):
+            raise DeclarationError(what) from None
         raise DeclarationError(f"{name!r}, {_ROW.sub(lambda m: f'row {int(m[1]) + bool(header)}', what)}") from None
+    for one in noted:
+        warnings.warn(f"{name!r}, {str(one.message).removeprefix('sampled: ')}", NoisyPointsWarning, stacklevel=2)
+    return curve
+
+
+def _deviation(value: str, unit: str = "") -> float | str:
+    """What was written as smoothing, in metres."""
+    try:
+        if unit:
+            check_unit(unit, "m")
+    except InputError as error:
+        raise DeclarationError(f"smoothing: unit: {error}") from None
+    if value == "auto":
+        if unit:
+            raise DeclarationError("smoothing: unit: auto has none; leave it out, or give a number")
+        return value
+    return float(exact_value(in_si(value, unit)))

@@ -8,15 +8,19 @@ from collections.abc import Mapping
 from decimal import Decimal, Inexact, localcontext
 from fractions import Fraction
 from functools import lru_cache
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import sympy as sp
 
 from gqm_sym.budgets import apart
-from gqm_sym.declare.families import FAMILIES
+from gqm_sym.declare import Curve
+from gqm_sym.declare.measures import curve_formulas, parameter_dimension
+from gqm_sym.dimensions import NUMBER, Dimension, Formulas, dimension, found_dimensions, unit_of
 from gqm_sym.errors import InputError
 from gqm_sym.expressions import name_or_value
-from gqm_sym.kernels import KERNELS
+from gqm_sym.kernels import KERNELS, Kernel
+from gqm_sym.kernels.base import UNITS, kernel_formulas
 from gqm_sym.literals import rationals
 from gqm_sym.literals.grammar import parse
 from gqm_sym.literals.trees import evaluate
@@ -65,21 +69,8 @@ _SI = {
     "J": Unit(kilogram=1, metre=2, second=-2),
 }
 
-# What is measured in what: parameters of the kernels by their arguments, those of the families that are no
-# lengths, and the numbers of a launch.
-KERNEL_UNITS = {
-    "g": "m/s**2",
-    "Omega": "rad/s",
-    "k": "m**3/s**2",
-    "beta": "1",
-    "radius": "m",
-    "mu": "1",
-    "mu_static": "1",
-    "b": "kg/m",
-    "gamma": "N/m",
-    "ell_c": "m",
-}
-FAMILY_UNITS = {("parabola", "a"): "1/m", ("log_spiral", "b"): "1"}
+# What is measured in what: parameters of the kernels by their arguments, and the numbers of a launch.
+KERNEL_UNITS = UNITS
 LAUNCH_UNITS = {"v0": "m/s", "t_max": "s"}
 
 
@@ -120,35 +111,64 @@ def in_si(value: str, unit: str) -> str:
     return _decimal(exact) if exact.is_Rational else str(read_value(exact, where="value"))
 
 
-def expected_units(data: Mapping[str, Any]) -> dict[str, str]:
-    """What the run-time parameters of a curve file are measured in, as far as their roles tell it.
+def expected_units(
+    data: Mapping[str, Any],
+    curve: Curve | None,
+    kernel: Kernel | None,
+    given: Mapping[str, str] = MappingProxyType({}),
+) -> dict[str, str]:
+    """What the run-time parameters of a curve file are measured in: by their roles, and by the formulas they stand in.
 
     Parameters
     ----------
     data
-        The file, its curve and kernel known to be right.
+        The file, as far as it is right.
+    curve, kernel
+        What it declares, None where that is wrong.
+    given
+        Units of parameters, in order: where formulas leave several free, the first tell what the next must be.
     """
-    family = data["curve"].get("family", {})
-    row = FAMILIES.get(family.get("name"))
+    units = _by_role(data)
+    formulas = Formulas() if curve is None else curve_formulas(curve)
+    if kernel is not None:
+        formulas += kernel_formulas(kernel)
+    if curve is not None and not curve.charted:
+        formulas.variables[curve.parameter.name] = parameter_dimension(curve)
+    known = {name: _dimension(unit) for name, unit in units.items()}
+    for name, unit in given.items():
+        if name not in (found := found_dimensions(formulas, known)) and name not in units:
+            known[name] = _dimension(unit)
+        elif unit_of(found.get(name)):
+            units.setdefault(name, unit_of(found[name]))
+    last = {name: unit_of(own) for name, own in found_dimensions(formulas, known).items()}
+    told = {name: unit for name, unit in last.items() if unit and name not in {*given, *formulas.variables}}
+    return {**told, **units}
+
+
+def _by_role(data: Mapping[str, Any]) -> dict[str, str]:
+    """Units of what the kernels are given, as far as they are mappings of names and values."""
+    terms = data.get("kernel")
     units: dict[str, str] = {}
-    for argument in row.arguments if row else ():
-        units[_called(family.get(argument), argument)] = FAMILY_UNITS.get((family["name"], argument), "m")
-    for key, term in data["kernel"].items():
+    for key, term in terms.items() if isinstance(terms, Mapping) else ():
+        if key not in KERNELS or not isinstance(term, Mapping):
+            continue
         for argument in KERNELS[key].arguments:
-            if argument in KERNEL_UNITS:
-                units[_called(term.get(argument), argument)] = KERNEL_UNITS[argument]
+            called = term.get(argument)
+            if argument in KERNEL_UNITS and (called is None or isinstance(called, str)):
+                units[_called(called, argument)] = KERNEL_UNITS[argument]
     return {**units, "m": "kg", "g": "m/s**2"}
 
 
-def launch_units(data: Mapping[str, Any]) -> dict[str, str]:
+def launch_units(curve: Curve | None) -> dict[str, str]:
     """What the numbers of a launch are measured in; the curve's parameter only where the kind of curve tells it."""
-    ((kind, curve),) = data["curve"].items()
-    row = FAMILIES.get(curve.get("name")) if kind == "family" else None
-    if row is not None:
-        kind = "graph" if row.x == row.parameter else "polar"
-    # A parametric curve's parameter may be anything.
-    lam0 = {} if kind == "parametric" else {"lam0": "rad" if kind == "polar" else "m"}
+    own = None if curve is None else parameter_dimension(curve)
+    # A parametric curve's parameter may be anything; that of its waves is an angle.
+    lam0 = {} if own is None else {"lam0": "rad" if own == NUMBER else "m"}
     return {**LAUNCH_UNITS, **lam0}
+
+
+def _dimension(unit: str) -> Dimension:
+    return dimension(*read_unit(unit, where="unit").dimension)
 
 
 def _called(given: str | None, argument: str) -> str:

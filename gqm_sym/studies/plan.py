@@ -18,8 +18,9 @@ from gqm_sym.specfile.units import Unit
 
 Array = NDArray[np.float64]
 
-# Points of a part, where each is answered in a microsecond and where each is solved for itself: about a second of work.
-SWIFT, SOLVED = 2**15, 2**7
+# The number of points of a part, about a second of work: where compiled loops answer most points, and where each point
+# is solved by itself.
+POINTS_IN_LOOPS, POINTS_SOLVED = 2**15, 2**7
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

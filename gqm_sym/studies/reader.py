@@ -21,7 +21,7 @@ from gqm_sym.specfile.locations import locate, node_at, place_of
 from gqm_sym.specfile.nodes import MapNode, Mistakes, plain
 from gqm_sym.specfile.units import check_unit, expected_units, in_si, launch_units, read_unit
 from gqm_sym.specfile.yamltext import read_text, read_tree
-from gqm_sym.studies.plan import SOLVED, SWIFT, Axis, Plan, evenly, in_doubles
+from gqm_sym.studies.plan import POINTS_IN_LOOPS, POINTS_SOLVED, Axis, Plan, evenly, in_doubles
 from gqm_sym.studies.schema import MOST_POINTS, SweepFile, model_at
 
 SECONDS = 0.5
@@ -83,8 +83,8 @@ class _Reader:
                 return None
             spec, model = found
             self.known = (*_LAUNCH, *(name for name, _ in model.defaults))
-            data = plain(spec.tree)
-            units = {**expected_units(data), **launch_units(data)}
+            kernel = spec.kernel.along(spec.curve.parameter)
+            units = {**expected_units(plain(spec.tree), spec.curve, kernel), **launch_units(spec.curve)}
             self.units = {**units, "direction": "1", **({"lam": units["lam0"]} if "lam0" in units else {})}
             axes = self._axes(file)
         fixed = self._fixed(file, spec)
@@ -95,7 +95,7 @@ class _Reader:
         notes = {name: note.unit for name, note in spec.notes.items() if note.unit}
         with apart():
             module = emit(model, name=spec.name)
-        swift = not (model.curve.charted or model.dissipation is not None or {"t_max", "contact"} & set(fixed))
+        solved_singly = model.curve.charted or model.dissipation is not None or {"t_max", "contact"} & set(fixed)
         return Plan(
             title=file.title,
             quantities=tuple(dict.fromkeys(file.quantities)),
@@ -106,7 +106,7 @@ class _Reader:
             name=spec.name,
             module=module,
             origin=self.origin,
-            part=SWIFT if swift else SOLVED,
+            part=POINTS_SOLVED if solved_singly else POINTS_IN_LOOPS,
         )
 
     def _curve(self, name: str) -> tuple[Spec, Model] | None:

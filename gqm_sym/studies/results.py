@@ -1,4 +1,4 @@
-"""Results of a sweep as a labelled dataset, and as a file of netCDF or Zarr."""
+"""The results of a sweep as a labelled dataset, and as a file in the netCDF or Zarr format."""
 
 import re
 import shutil
@@ -13,7 +13,8 @@ import numpy as np
 
 from gqm_sym.errors import InputError
 from gqm_sym.optional import require
-from gqm_sym.runtime.sweep.sweep import REASONS, Sweep
+from gqm_sym.runtime.sweep.quantities import STATUS_SENTENCES
+from gqm_sym.runtime.sweep.sweep import Sweep
 from gqm_sym.studies.plan import Plan
 
 if TYPE_CHECKING:
@@ -24,9 +25,10 @@ _ENGINES: dict[str, dict[str, Any]] = {
     ".zarr": {"engine": "zarr", "consolidated": False},
 }
 DIGEST = "sweep_digest"
-_PLACE = "lam0"  # what is a value of the curve's parameter has the launch place's unit
+# The unit of whatever is a value of the curve's parameter: that of the launch place.
+_PLACE = "lam0"
 
-# What the columns hold, and its unit.
+# What each column holds, and the unit of it.
 DESCRIBED = {
     "half_period": ("time from one turning point to the other", "s"),
     "period": ("time after which the motion repeats", "s"),
@@ -48,7 +50,7 @@ DESCRIBED = {
 
 @require("data")
 def check_format(target: Path) -> None:
-    """Refuse a file whose ending is no known format, or that could not be written, before anything is computed."""
+    """Refuse a file in an unknown format, or one that cannot be written, before anything is computed."""
     if target.suffix.lower() not in _ENGINES:
         raise InputError(f"{target}: cannot tell the format of the results; end its name in {' or '.join(_ENGINES)}")
     for package in ("xarray", _ENGINES[target.suffix.lower()]["engine"]):
@@ -57,12 +59,21 @@ def check_format(target: Path) -> None:
 
 @require("data")
 def dataset(plan: Plan, swept: Mapping[str, Sweep], refusals: Mapping[str, str]) -> "Dataset":
-    """All quantities over what varies, with names, units, why there is no value, and what it was made from.
+    """All quantities of a sweep over its axes, with names, units, statuses, and a record of what they were made from.
 
     Parameters
     ----------
-    refusals
-        Of each quantity, why the first refused launch is refused; empty where none is.
+    plan : Plan
+        What was computed.
+    swept : mapping
+        The result for each quantity.
+    refusals : mapping
+        For each quantity, why the first refused launch is refused; empty where none is.
+
+    Returns
+    -------
+    xarray.Dataset
+        A variable for each column, and beside it ``<quantity>_status``: 0 where there is a value.
     """
     from xarray import Dataset
 
@@ -77,8 +88,8 @@ def dataset(plan: Plan, swept: Mapping[str, Sweep], refusals: Mapping[str, str])
         if name == "turning_points":
             columns = {f"turning_point_{side}": one.values[..., k] for k, side in enumerate(("lower", "upper"))}
         for column, values in columns.items():
-            variables[column] = (dims, values, {**_attributes(plan, column), "ancillary_variables": f"{name}_reason"})
-        variables[f"{name}_reason"] = (dims, one.reasons, _why(name, refusals[name]))
+            variables[column] = (dims, values, {**_attributes(plan, column), "ancillary_variables": f"{name}_status"})
+        variables[f"{name}_status"] = (dims, one.status, _status_attributes(name, refusals[name]))
     attributes = {
         "title": plan.title or f"sweep over {plan.name}",
         "source": f"gqm_sym {version('gqm_sym')}",
@@ -96,12 +107,12 @@ def _attributes(plan: Plan, name: str) -> dict[str, str]:
     return {"long_name": text, **({"units": unit} if unit else {})}
 
 
-def _why(name: str, refusal: str) -> dict[str, Any]:
-    """Attributes of the reasons, in the convention for flags (CF 3.5)."""
-    meanings = ["answered", *(re.sub(r"\W+", "_", text) for text in REASONS[1:])]
+def _status_attributes(name: str, refusal: str) -> dict[str, Any]:
+    """Attributes of a variable of status codes, in the convention for flags (CF 3.5)."""
+    meanings = ["answered", *(re.sub(r"\W+", "_", text) for text in STATUS_SENTENCES[1:])]
     return {
-        "long_name": f"why there is no {name}",
-        "flag_values": np.arange(len(REASONS), dtype=np.int8),
+        "long_name": f"status of {name}: why there is no value",
+        "flag_values": np.arange(len(STATUS_SENTENCES), dtype=np.int8),
         "flag_meanings": " ".join(meanings),
         **({"first_refused": refusal} if refusal else {}),
     }
@@ -109,7 +120,7 @@ def _why(name: str, refusal: str) -> dict[str, Any]:
 
 @require("data")
 def write(data: "Dataset", target: Path) -> None:
-    """Write a dataset, whole or not at all; the same dataset gives the same bytes."""
+    """Write a complete dataset or nothing at all; the same dataset gives the same bytes."""
     target.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(prefix=f".{target.name}.", dir=target.parent) as folder:
         written = Path(folder) / target.name
@@ -131,7 +142,7 @@ def remove(target: Path) -> None:
 
 @require("data")
 def stored(target: Path, plan: Plan) -> "Dataset | None":
-    """The results of a plan from their file; None if that holds anything else."""
+    """The results of a plan from their file; None if the file holds anything else."""
     from xarray import open_dataset
 
     try:

@@ -1,4 +1,4 @@
-"""Run a sweep: part by part, here or on a cluster, each stored as it is finished."""
+"""Run a sweep part by part, here or on a cluster, and store each part as soon as it is finished."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import partial
@@ -13,7 +13,8 @@ from gqm_sym.errors import GQMError, InputError
 from gqm_sym.loading import load
 from gqm_sym.runtime.compiled.jit import STAMP
 from gqm_sym.runtime.sweep.cluster import answer, finished
-from gqm_sym.runtime.sweep.sweep import QUANTITIES, REFUSED, Sweep
+from gqm_sym.runtime.sweep.quantities import QUANTITIES, REFUSED, SOLVE
+from gqm_sym.runtime.sweep.sweep import Sweep
 from gqm_sym.studies.plan import Plan
 from gqm_sym.studies.results import check_format, dataset, remove, stored, write
 from gqm_sym.studies.store import Store
@@ -22,27 +23,27 @@ if TYPE_CHECKING:
     from xarray import Dataset
 
 
-# Told how many points are done, and of how many.
+# A function that is called with the number of points done and that of all points.
 Progress = Callable[[int, int], None]
 
 
 def run(
     plan: Plan, target: Path | str, *, client: Any = None, force: bool = False, progress: Progress | None = None
 ) -> "Dataset":
-    """Compute a plan into a file; what an interrupted run has stored is not computed again.
+    """Compute a plan into a file; parts that an interrupted run has stored are not computed again.
 
     Parameters
     ----------
     plan : Plan
         What to compute.
     target : path
-        The file, ``.nc`` (netCDF) or ``.zarr``. Until it is complete, parts lie beside it in ``FILE.parts``.
+        The file, ``.nc`` (netCDF) or ``.zarr``. Until it is complete, its parts lie beside it in ``FILE.parts``.
     client : distributed.Client, optional
         A Dask cluster to do the work, with the same numbers.
     force : bool
-        Begin anew, whatever is there.
+        Begin anew and overwrite what is there.
     progress : callable, optional
-        Told how many points are done, and of how many.
+        Called with the number of points done and that of all points.
 
     Returns
     -------
@@ -70,15 +71,15 @@ def run(
     write_text(plan.module, source)
     lengths = {number: store.length(number) for number in store.missing()}
     done, missing = plan.size - sum(lengths.values()), list(lengths)
-    tell = progress or (lambda done, size: None)
-    tell(done, plan.size)
+    report = progress or (lambda done, size: None)
+    report(done, plan.size)
     jobs = ((STAMP, str(source), plan.module, plan.name, plan.quantities, plan.arguments(k)) for k in missing)
-    for which, swept in _here(jobs) if client is None else finished(client, answer_all, jobs):
-        store.put(missing[which], swept)
+    for which, part in _here(jobs) if client is None else finished(client, answer_all, jobs):
+        store.put(missing[which], part)
         done += lengths[missing[which]]
-        tell(done, plan.size)
-    whole = store.whole()
-    data = dataset(plan, whole, {name: _refusal(plan, source, one) for name, one in whole.items()})
+        report(done, plan.size)
+    swept = store.joined()
+    data = dataset(plan, swept, {name: _refusal(plan, source, one) for name, one in swept.items()})
     write(data, target)
     store.remove()
     return data
@@ -92,7 +93,10 @@ def _here(jobs: Iterable[tuple[Any, ...]]) -> Iterator[tuple[int, dict[str, Swee
 def answer_all(
     stamp: str, source: str, text: str, name: str, quantities: tuple[str, ...], arguments: Mapping[str, Any]
 ) -> dict[str, Sweep]:
-    """Answer one part, here or on a worker: every quantity at each of its points. Parameters as of `cluster.answer`."""
+    """Answer one part, here or on a worker: every quantity at each of its points.
+
+    The parameters are those of `cluster.answer`.
+    """
     out = {}
     for quantity in quantities:
         given = {key: value for key, value in arguments.items() if key != "lam" or quantity == "time_at"}
@@ -101,7 +105,7 @@ def answer_all(
 
 
 def _answered(ask: Callable[[Mapping[str, Any]], Sweep], quantity: str, arguments: Mapping[str, Any]) -> Sweep:
-    """Values and reasons; points that cannot be are found by halving, and do not stop the others."""
+    """The answer at all points; points that are refused are found by halving, and do not stop the others."""
     try:
         return ask(arguments)
     except InputError:
@@ -109,15 +113,15 @@ def _answered(ask: Callable[[Mapping[str, Any]], Sweep], quantity: str, argument
         size = next(iter(arrays.values())).size
         if size == 1:
             shape = (1, 2) if isinstance(QUANTITIES[quantity].columns, slice) else (1,)
-            return Sweep(np.full(shape, nan), np.full(1, REFUSED, dtype=np.int8))
+            return Sweep(np.full(shape, nan), *(np.full(1, code, dtype=np.int8) for code in (REFUSED, SOLVE)))
         cuts = slice(0, size // 2), slice(size // 2, size)
         halves = [_answered(ask, quantity, {**arguments, **{k: a[cut] for k, a in arrays.items()}}) for cut in cuts]
         return Sweep(*(np.concatenate(both) for both in zip(*halves, strict=True)))
 
 
 def _refusal(plan: Plan, source: Path, swept: Sweep) -> str:
-    """Why the first of the launches that are refused is, in words; empty where none is."""
-    refused = np.flatnonzero(swept.reasons == REFUSED)
+    """Why the first refused launch is refused, in words; empty where none is."""
+    refused = np.flatnonzero(swept.status == REFUSED)
     if not refused.size:
         return ""
     given = plan.point(int(refused[0]))

@@ -5,7 +5,7 @@ from typing import Annotated, Any, Literal, TypeAlias
 from pydantic import BeforeValidator, Field, WithJsonSchema
 from pydantic_core import PydanticCustomError
 
-from gqm_sym.runtime.sweep.sweep import QUANTITIES
+from gqm_sym.runtime.sweep.quantities import QUANTITIES
 from gqm_sym.specfile.fields import ABSENT, Line, Number, Section, UnitText, wrapped
 from gqm_sym.specfile.nodes import shown
 from gqm_sym.specfile.schema import Quantity, json_schema, read_default

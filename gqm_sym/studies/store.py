@@ -1,4 +1,4 @@
-"""Parts of a sweep on disk: each whole or not there, so that a run that was cut off goes on from them."""
+"""The parts of a sweep on disk. Each is complete or absent, so that an interrupted run continues from them."""
 
 import io
 import json
@@ -18,7 +18,7 @@ _PLAN = "plan.json"
 
 
 class Store:
-    """The folder ``FILE.parts`` beside the file that the results will be in.
+    """The folder ``FILE.parts`` beside the file that the results will be written to.
 
     Parameters
     ----------
@@ -65,14 +65,14 @@ class Store:
         return self.folder / f"{number:06}.npz"
 
     def put(self, number: int, swept: Mapping[str, Sweep]) -> None:
-        """Store a part: values and reasons of each quantity."""
+        """Store a part: the values, the status and the route of each quantity."""
         stream = io.BytesIO()
         arrays = {f"{name} {field}": getattr(one, field) for name, one in swept.items() for field in one._fields}
         np.savez(stream, allow_pickle=False, **arrays)
         write_bytes(stream.getvalue(), self._path(number))
 
     def get(self, number: int) -> dict[str, Sweep] | None:
-        """A stored part; None where there is none, or a damaged one."""
+        """A stored part; None if it is absent or damaged."""
         try:
             with self._path(number).open("rb") as file, np.load(file, allow_pickle=False) as found:
                 swept = {
@@ -81,20 +81,20 @@ class Store:
                 }
         except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
             return None
-        whole = all(len(array) == self.length(number) for one in swept.values() for array in one)
-        return swept if whole else None
+        complete = all(len(array) == self.length(number) for one in swept.values() for array in one)
+        return swept if complete else None
 
     def missing(self) -> list[int]:
         """The parts that are not stored."""
         return [number for number in range(self._plan.parts) if self.get(number) is None]
 
-    def whole(self) -> dict[str, Sweep]:
+    def joined(self) -> dict[str, Sweep]:
         """All parts together, in the plan's shape."""
         parts = [self.get(number) or {} for number in range(self._plan.parts)]
         shape, out = self._plan.shape, {}
         for name in self._plan.quantities:
-            values, reasons = (np.concatenate([part[name][k] for part in parts]) for k in (0, 1))
-            out[name] = Sweep(values.reshape(shape + values.shape[1:]), reasons.reshape(shape))
+            fields = (np.concatenate(pieces) for pieces in zip(*(part[name] for part in parts), strict=True))
+            out[name] = Sweep(*(field.reshape(shape + field.shape[1:]) for field in fields))
         return out
 
     def remove(self) -> None:

@@ -278,7 +278,7 @@ def test_a_law_that_is_not_linear_is_an_equation() -> None:
     model = gqm.derive(gqm.families.circle(), gqm.Gravity() + gqm.CoulombFriction() + gqm.RotatingFrame())
     assert model.speed_squared_form == "equation"
     assert "not linear" in model.notes[-1]
-    assert sp.Symbol("W", real=True) in model.kernel.free_symbols
+    assert sp.Symbol("W", real=True) in model.tangential_acceleration.free_symbols
     assert not model.dissipation.linear
     assert r"\sqrt{W}" in model.latex()
 

@@ -174,7 +174,7 @@ def test_separatrices_are_ill_conditioned_and_say_so(edge_motion: MotionOf) -> N
         motion = edge_motion(edge)
         assert motion.quadrature_error < 1e-14
         if edge.hard.startswith("1e-14"):
-            assert motion.conditioning > 1e5
+            assert motion.condition_number > 1e5
 
 
 @pytest.mark.parametrize("short", [1e-3, 1e-6, 1e-9])

@@ -15,13 +15,14 @@ import numba
 import pytest
 from numba import types
 from numba.core import event
-from numba.core.caching import IndexDataCacheFile, NullCache
+from numba.core.caching import IndexDataCacheFile
 from paths import ROOT
 
 import gqm_sym as gqm
 from gqm_sym.building import load, write_module
 from gqm_sym.errors import OutdatedModuleError
 from gqm_sym.runtime.compiled import jit
+from gqm_sym.runtime.compiled.numba_internals import KeyedCache
 from gqm_sym.runtime.interface import INTERFACE
 
 FILE = "name: bowl\ntitle: Größe λ\ncurve: {graph: {z: 6*x**2, parameter: x}}\nkernel: {gravity: {}}\n"
@@ -177,7 +178,7 @@ def test_inner_functions_know_the_stamp_too() -> None:
     """What compiled code calls is kept under the same key: else an edit of what that calls would not be seen."""
     from gqm_sym.runtime.arithmetic.doubledouble import two_sum
 
-    assert isinstance(two_sum.dispatcher._cache, jit.ReadyCache)
+    assert isinstance(two_sum.dispatcher._cache, KeyedCache)
 
 
 @pytest.mark.parametrize("number", [errno.ENOSPC, errno.EROFS, errno.EACCES])
@@ -196,8 +197,8 @@ def test_a_cache_that_cannot_be_written(
 
 def test_no_folder_for_a_cache(monkeypatch: pytest.MonkeyPatch, function: Callable[[float], Any]) -> None:
     """Where nothing can be written at all, everything works, compiled anew in every process."""
-    monkeypatch.setattr(jit.ReadyCache._impl_class, "_locator_classes", [])
-    assert isinstance(jit._cache_of(function(2.0)), NullCache)
+    monkeypatch.setattr(KeyedCache._impl_class, "_locator_classes", [])
+    assert jit.COMPILER.cache_of(function(2.0)) is None
     assert function(2.0)(1.0) == 3.0
 
 
@@ -231,13 +232,13 @@ print("loaded")
 SMALL = f"""from numba import carray
 
 from gqm_sym.runtime import compiler
-from gqm_sym.runtime.vocabulary import CLIMB
+from gqm_sym.runtime.vocabulary import EFFECTIVE_POTENTIAL
 
 compiled = compiler(__file__, interface={INTERFACE})
 
 
-@compiled(CLIMB)
-def climb(n, places, p, out):
+@compiled(EFFECTIVE_POTENTIAL)
+def effective_potential(n, places, p, out):
     out = carray(out, (2, n))
     for i in range(n):
         out[0, i] = out[1, i] = 1.0

@@ -130,16 +130,16 @@ def test_the_error_bound_holds_at_any_time(motion_of: MotionOf) -> None:
             assert error(lam, lowest + pendulum(amplitude, frequency, mpf(float(t)))) <= bound
 
 
-def test_quadrature_and_conditioning_are_told_apart(motion_of: MotionOf) -> None:
+def test_quadrature_error_and_condition_number_are_told_apart(motion_of: MotionOf) -> None:
     """Near a separatrix the quadrature is as good as elsewhere; it is the launch that says less and less."""
     calm, near = motion_of(EXAMPLE), motion_of(PROBLEMS["pendulum_nearly_upright"])
     assert calm.quadrature_error < 1e-14
     assert near.quadrature_error < 1e-14
-    assert calm.conditioning < 2
+    assert calm.condition_number < 2
     # An angle of 1e-6 below the hilltop: V**2's regular factor is the square of that at the top.
-    assert near.conditioning > 1e5
+    assert near.condition_number > 1e5
     rest = motion_of(PROBLEMS["pendulum_at_the_bottom"])
-    assert (rest.quadrature_error, rest.conditioning) == (0.0, 1.0)
+    assert (rest.quadrature_error, rest.condition_number) == (0.0, 1.0)
 
 
 @pytest.mark.parametrize("problem", **named(where(samples=True)))

@@ -209,7 +209,7 @@ REFUSED: dict[str, tuple[str, tuple[str, ...]]] = {
     "no launch": (PENDULUM.partition("launch")[0], ("swing.yaml:1:1: launch is missing",)),
     "no value": (PENDULUM.replace("value: 1,", "value: null,"), ("swing.yaml:8:3: parameters.L",)),
     "outside the domain": (
-        PENDULUM.replace(CURVE, "  graph: {z: L*x**2, domain: [0, 1]}"),
+        PENDULUM.replace(CURVE, "  graph: {z: L*sin(x), domain: [0, 1]}"),
         ("swing.yaml:9:16: launch.lam0: 1.2 is outside the curve's domain",),
     ),
     "negative speed": (

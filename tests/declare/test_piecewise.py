@@ -83,7 +83,10 @@ def test_numbers_that_cannot_be(
         (lambda: gqm.arc(radius=2, angle=0), "arc: angle: must not be zero"),
         (lambda: gqm.clothoid(length="1 +", kappa_start=0, kappa_end=1), "clothoid: length: "),
         (lambda: gqm.Curve.piecewise([]), "piecewise: no pieces; give one or more"),
-        (lambda: gqm.Curve.piecewise(["line"]), "piecewise: piece 1: str given; give line, arc, clothoid or a curve"),
+        (
+            lambda: gqm.Curve.piecewise(["line"]),
+            "piecewise: piece 1: 'line' given; give line, arc, clothoid or a curve",
+        ),
         (
             lambda: gqm.Curve.piecewise([gqm.Curve.graph("x**2")]),
             r"piecewise: piece 1 \(graph\): domain: must have two ends",

@@ -42,7 +42,7 @@ def test_gravity_may_be_in_the_curve_too() -> None:
     """It is one parameter then: the height of a curve that is declared by it."""
     model = gqm.derive(gqm.Curve.graph("x**2/g"), gqm.Gravity())
     assert model.parameters == ("g", "m")
-    assert sp.simplify(model.climb_slope - 4 * sp.Symbol("x", real=True)) == 0
+    assert sp.simplify(model.effective_potential_slope - 2 * sp.Symbol("x", real=True)) == 0
 
 
 @pytest.mark.parametrize(
@@ -145,8 +145,8 @@ def test_a_formula_that_is_too_large_is_counted_and_not_walked() -> None:
     shared = t
     for _ in range(40):
         shared = sp.Function("f")(shared, shared)
-    with pytest.raises(EmissionError, match=f"climb: a formula of {2**41 - 1} operations, and at most"):
-        sharing.check_size([shared], where="climb")
+    with pytest.raises(EmissionError, match=f"potential: a formula of {2**41 - 1} operations, and at most"):
+        sharing.check_size([shared], where="potential")
 
 
 def test_templates_that_are_missing(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

@@ -150,9 +150,9 @@ def test_forms_agree_with_numerical_differentiation(name, place):
             (model.kappa, turn / ds),
             (model.turning_rate, turn),
             (turned, turn),
-            (model.reaction, gravity * dx / ds),
-            (model.kernel, -gravity * dz / ds),
-            (model.climb_slope, 2 * gravity * dz),
+            (model.static_normal_load, gravity * dx / ds),
+            (model.tangential_acceleration, -gravity * dz / ds),
+            (model.effective_potential_slope, gravity * dz),
         ):
             error = abs(value(form, {**values, model.parameter: lam}) - truth)
             assert error < DIFFERENCE_TOLERANCE * max(1, abs(truth)), form
@@ -271,10 +271,10 @@ def test_the_pendulum_in_full():
     )
     assert (model.dxds, model.dzds) == (sp.cos(theta), sp.sin(theta))
     assert model.potential == -g * length * sp.cos(theta)
-    assert model.climb == -2 * g * length * sp.cos(theta)
-    assert model.climb_slope == 2 * g * length * sp.sin(theta)
-    assert model.reaction == g * sp.cos(theta)
-    assert model.kernel == -g * sp.sin(theta)
+    assert model.effective_potential == -g * length * sp.cos(theta)
+    assert model.effective_potential_slope == g * length * sp.sin(theta)
+    assert model.static_normal_load == g * sp.cos(theta)
+    assert model.tangential_acceleration == -g * sp.sin(theta)
     speed = v0**2 + 2 * g * length * (sp.cos(theta) - sp.cos(lam0))
     assert model.speed_squared == speed
     assert model.normal_force == m * (speed / length + g * sp.cos(theta))

@@ -163,11 +163,11 @@ class Loss:
     def drive(self, lam: float, w: float, v: int, nu: int) -> np.ndarray:
         """ds, P, Q, n0 and kappa, at the second of two places."""
         lines = [np.array([0.5, lam]), np.array([1.0, w])]
-        return self._fill(self.dissipation.drive, 5, lines, [float(v), float(nu)])[:, 1]
+        return self._fill(self.dissipation.speed_equation, 5, lines, [float(v), float(nu)])[:, 1]
 
     def hold(self, lam: float) -> np.ndarray:
         """A forwards and backwards from rest."""
-        return self._fill(self.dissipation.hold, 2, [np.array([0.5, lam])], [])[:, 1]
+        return self._fill(self.dissipation.static_balance, 2, [np.array([0.5, lam])], [])[:, 1]
 
 
 @pytest.fixture(scope="module", params=CASES, ids=[name.replace(" ", "-") for name in CASES])
@@ -265,14 +265,14 @@ def test_the_law_can_be_read_in_the_module() -> None:
         "out[1, i] = 2*ds*(-mu*n0*nu*v + push)",
         "out[2, i] = 2*mu*nu*turn*v",
         "out[0, i] = -mu*fabs(n0) + push",
-        "addresses=Addresses(frame.address),",
-        "dissipation=Dissipation(drive.address, hold.address, friction=True, kinked=False, linear=True),",
+        "path_and_contact_force.address,",
+        "dissipation=Dissipation(speed_equation.address, static_balance.address, friction=True, kinked=False, ",
         "at_least=(('mu', '0'),),",
         "W = V**2       = v0**2*exp(",
         "V**2: spectral antiderivative, no elementary form found",
     ):
         assert line in text
-    for word in ("climb", "BEND", "nearest", "intervals", "ExactFormulas", "exact_x"):
+    for word in ("effective_potential", "DIVDIFF", "place_from_ends", "intervals", "ExactFormulas", "exact_x"):
         assert word not in text
 
 
@@ -281,5 +281,5 @@ def test_names_of_the_law_may_be_the_user_s() -> None:
     curve = gqm.Curve.graph("nu*u**2 + ds*u + push", parameter="u")
     force = gqm.Gravity() + gqm.CoulombFriction(mu="kappa") + gqm.QuadraticDrag(b="v") + gqm.SurfaceTension(gamma="n0")
     text = gqm.emit(gqm.derive(curve, force), name="names")
-    assert "def drive(n, places, speeds, _v, _nu, p, out):" in text
+    assert "def speed_equation(n, places, speeds, _v, _nu, p, out):" in text
     assert "_ds = sqrt(" in text

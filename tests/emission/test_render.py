@@ -117,9 +117,9 @@ def test_numbers_of_every_head(head: str, folder: Path) -> None:
             ("z", z, size),
             ("ds", ds, ds),
             ("kappa", bend / ds**3, size / ds**3),
-            ("reaction", p[-2] / ds, p[-2] / ds),
-            ("climb", 2 * p[-2] * z, p[-2] * size),
-            ("climb_slope", 2 * p[-2] * slope, p[-2] * size),
+            ("static_normal_load", p[-2] / ds, p[-2] / ds),
+            ("effective_potential", p[-2] * z, p[-2] * size),
+            ("effective_potential_slope", p[-2] * slope, p[-2] * size),
         ):
             assert abs(getattr(exact, name)(mp, place, p) - truth) <= EXACT * scale, name
         assert module.MODEL.domain_of(mp, p) == (None, None, None)
@@ -156,9 +156,10 @@ def test_taken_names_as_the_curves_parameter(name: str, folder: Path) -> None:
 @pytest.mark.parametrize(
     "name",
     [
-        *("frame", "climb", "rise", "bend", "bounds", "pass1", "solve", "op", "Any", "MODEL", "PARAMETERS", "FRAME"),
-        *("carray", "compiled", "compiler", "range", "fabs", "nearest", "Motion", "CompiledModel", "exact_z"),
-        *("cos1", "cos2", "iconst", "imul", "isin"),
+        *("path_and_contact_force", "effective_potential", "potential_divdiff1", "potential_divdiff2", "bounds"),
+        *("pass1", "solve", "op", "Any", "MODEL", "PARAMETERS", "BOUNDS", "carray", "compiled", "compiler", "range"),
+        *("fabs", "place_from_ends", "Motion", "CompiledModel", "exact_z"),
+        *("divdiff1_cos", "divdiff2_cos", "imul", "isin"),
     ],
 )
 def test_names_of_the_module_are_refused(name: str) -> None:
@@ -244,7 +245,7 @@ def test_the_input_digest() -> None:
     ],
     ids=lambda value: value if isinstance(value, str) else "",
 )
-@pytest.mark.parametrize("where", ["x", "climb_slope", "kappa"])
+@pytest.mark.parametrize("where", ["x", "effective_potential_slope", "kappa"])
 def test_what_has_no_text_is_refused_by_name(form: sp.Expr, name: str, where: str) -> None:
     """A model made by hand gets no further than one that was derived."""
     with pytest.raises(EmissionError, match=rf"^{where}: {re.escape(name)}"):

@@ -113,17 +113,17 @@ def test_the_force_along_a_curve_is_minus_the_gradient(kernel: Kernel, potential
     length = sp.sqrt(tangent[0] ** 2 + tangent[1] ** 2)
     along = (push[0] * tangent[0] + push[1] * tangent[1]) / length
     normal = (-push[0] * tangent[1] + push[1] * tangent[0]) / length
-    assert abs(model.kernel.subs(place).evalf(40) - along) < 1e-37
-    assert abs(model.reaction.subs(place).evalf(40) + normal) < 1e-37
+    assert abs(model.tangential_acceleration.subs(place).evalf(40) - along) < 1e-37
+    assert abs(model.static_normal_load.subs(place).evalf(40) + normal) < 1e-37
 
 
 def test_rolling_divides_what_drives_but_not_what_presses():
     """W and A are those of sliding over 1 + β; n₀ is that of sliding."""
     sliding = derive(families.parabola(), Gravity())
     rolling = derive(families.parabola(), Gravity() + Rolling())
-    assert sp.simplify(rolling.climb * (1 + beta) - sliding.climb) == 0
-    assert sp.simplify(rolling.kernel * (1 + beta) - sliding.kernel) == 0
-    assert rolling.reaction == sliding.reaction
+    assert sp.simplify(rolling.effective_potential * (1 + beta) - sliding.effective_potential) == 0
+    assert sp.simplify(rolling.tangential_acceleration * (1 + beta) - sliding.tangential_acceleration) == 0
+    assert rolling.static_normal_load == sliding.static_normal_load
 
 
 def test_the_table_of_kernels_makes_each_of_them():
@@ -142,7 +142,7 @@ def test_lossy_slots_add() -> None:
     law = Gravity() + CoulombFriction(mu_static="mu_s") + QuadraticDrag() + SurfaceTension() + Kernel.law("k*W")
     assert (law.friction, law.static_friction) == (mu, sp.Symbol("mu_s", real=True))
     assert (law.drag, law.resistance) == (b / MASS, gamma * ell_c**2 * sp.Abs(KAPPA) / MASS)
-    assert (law.extra, law.potential, law.inertia) == (k * W, g * z, 1)
+    assert (law.tangential_law, law.potential, law.inertia) == (k * W, g * z, 1)
     assert law.parameters == ("g", "mu", "mu_s", "b", "gamma", "ell_c", "k")
     assert not law.conservative
     assert (Gravity() + Rolling() + RotatingFrame() + CentralForce()).conservative
@@ -241,3 +241,22 @@ def test_a_turning_track_is_loaded_sideways() -> None:
     assert sp.simplify(v**2 - sp.Symbol("direction", real=True) ** 2 * model.speed_squared) == 0
     assert "N_b" in dict(model.closed_forms())
     assert derive(families.circle(), Gravity()).side_force == 0
+
+
+@pytest.mark.parametrize(
+    ("owner", "old", "new"),
+    [
+        (Gravity(), "extra", "tangential_law"),
+        (Gravity(), "grip", "static_friction_limit"),
+        (derive(families.circle(), Gravity()), "kernel", "tangential_acceleration"),
+        (derive(families.circle(), Gravity()), "climb", "effective_potential"),
+        (derive(families.circle(), Gravity()), "reaction", "static_normal_load"),
+    ],
+)
+def test_an_old_name_says_the_new_one(owner, old, new):
+    """A name of before raises an AttributeError with the new name, and any other an ordinary one."""
+    with pytest.raises(AttributeError, match=rf"{old!r}; it is called '(2\*)?{new}' now$"):
+        getattr(owner, old)
+    with pytest.raises(AttributeError, match=r"has no attribute 'other'$"):
+        owner.other  # noqa: B018
+    assert hasattr(owner, new)

@@ -91,7 +91,7 @@ WRONG: dict[str, tuple[str | bytes, list[str]]] = {
     ),
     "a domain the wrong way round": (
         edited(("[-2, 2]", "[2, -2]")),
-        ["a.yaml:3:44: curve.graph.domain: must have lo < hi, got (2, -2)"],
+        ["a.yaml:3:44: curve.graph.domain: must have lo < hi, got (2, -2); write the lower end first"],
     ),
     "an undefined symbol": (
         edited(("h*x**2", "h*x**2 + kk")),

@@ -1,5 +1,6 @@
 """Units in curve files: converted exactly, checked against what they are given for, never run or rounded."""
 
+import re
 import subprocess
 import sys
 from fractions import Fraction
@@ -184,3 +185,76 @@ def test_loading_the_library_is_not_reading(tmp_path: Path) -> None:
     path.write_text(FILE.replace("km/h", "furlong/day"))
     done = subprocess.run([sys.executable, "-c", code, str(path)], timeout=120, check=False, capture_output=True)
     assert done.returncode == 0, done.stderr.decode()
+
+
+WRONG = """\
+name: wrong
+curve:
+  CURVE
+kernel: {gravity: {}}
+parameters: {PARAMETERS}
+launch: {lam0: 0.5}
+"""
+
+
+@pytest.mark.parametrize(
+    ("curve", "parameters", "wanted"),
+    [
+        ("graph: {z: a*x**2}", "a: {value: 1, unit: kg}", "in 1/m or a multiple"),
+        ("graph: {z: A*cos(k*x)}", "A: {value: 1, unit: m}, k: {value: 1, unit: m}", "in 1/m or a multiple"),
+        ("parametric: {x: a*cos(u), z: a*sin(u), parameter: u}", "a: {value: 140, unit: kg}", "in m or a multiple"),
+        (
+            "parametric: {x: a*u, z: b*u**2, parameter: u}",
+            "a: {value: 1, unit: m/s}, b: {value: 1, unit: m/s}",
+            "in m/s**2",
+        ),
+        ("polar: {r: p/(1 + ecc*cos(theta))}", "p: {value: 1, unit: m}, ecc: {value: 0, unit: m}", "a plain number"),
+        ("family: {name: ellipse, a: 1}", "b: {value: 1, unit: deg}", "in m or a multiple"),
+        ("implicit: {F: x**2 + z**2 - R**2, start: [R, 0]}", "R: {value: 1, unit: s}", "in m or a multiple"),
+        (
+            "pieces: [{line: {length: 2}}, {arc: {radius: R, angle: phi}}]",
+            "R: 1, phi: {value: 1, unit: m}",
+            "a plain number",
+        ),
+        ("graph: {z: a*x**2, domain: [c, null]}", "a: 1, c: {value: 0, unit: deg}", "in m or a multiple"),
+    ],
+)
+def test_units_of_a_curve_s_parameters_are_checked(curve: str, parameters: str, wanted: str, tmp_path: Path) -> None:
+    """By the dimensions of its coordinates."""
+    text = WRONG.replace("CURVE", curve).replace("PARAMETERS", parameters)
+    with pytest.raises(InputError, match=rf"a.yaml:5:\d+: parameters.\w+.unit: must be {re.escape(wanted)}.*, got "):
+        read(tmp_path, text)
+
+
+@pytest.mark.parametrize(
+    ("curve", "parameters"),
+    [
+        ("graph: {z: h*(x**4 - 2*x**2)}", "h: {value: 1, unit: m}"),
+        ("graph: {z: h*(x**4 - 2*x**2)}", "h: {value: 1, unit: 1/m**3}"),
+        ("graph: {z: A*cos(k*x)}", "A: {value: 1, unit: ft}, k: {value: 1, unit: deg/m}"),
+        ("parametric: {x: a*u, z: b*u**2, parameter: u}", "a: {value: 1, unit: km/h}, b: {value: 1, unit: m/s**2}"),
+        ("parametric: {x: R*(u - sin(u)), z: R*cos(u), parameter: u}", "R: {value: 1, unit: cm}"),
+    ],
+)
+def test_units_that_fit_are_let_pass(curve: str, parameters: str, tmp_path: Path) -> None:
+    """Also where a number hides one."""
+    read(tmp_path, WRONG.replace("CURVE", curve).replace("PARAMETERS", parameters))
+
+
+def test_wrong_units_are_reported_with_everything_else(tmp_path: Path) -> None:
+    """Whatever other mistakes there are: in the kernel, in the curve, in the launch."""
+    text = WRONG.replace("CURVE", "graph: {z: a*x**2}").replace("PARAMETERS", "a: {value: 1, unit: kg}, q: 1")
+    for old, new in (("{gravity: {}}", "{gravity: {h: 1}}"), ("lam0: 0.5", "lam0: 0.5, v0: {value: 1, unit: kg}")):
+        text = text.replace(old, new)
+    with pytest.raises(SpecFileError) as caught:
+        read(tmp_path, text)
+    message = str(caught.value)
+    for part in ("kernel.gravity", "parameters.a.unit: must be in 1/m", "launch.v0.unit: must be in m/s"):
+        assert part in message
+    broken = (
+        text.replace("a*x**2", "a*x**").replace("{h: 1}", "{g: g_moon}").replace("q: 1", "g_moon: {value: 1, unit: m}")
+    )
+    with pytest.raises(SpecFileError) as caught:
+        read(tmp_path, broken)
+    for part in ("curve.graph.z", "parameters.g_moon.unit: must be in m/s**2", "launch.v0.unit: must be in m/s"):
+        assert part in str(caught.value)

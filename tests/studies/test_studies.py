@@ -21,7 +21,7 @@ from gqm_sym.cli import tool
 from gqm_sym.cli.progress import Bar
 from gqm_sym.errors import InputError, SpecFileError
 from gqm_sym.runtime.sweep import cluster
-from gqm_sym.runtime.sweep.sweep import QUANTITIES, REASONS
+from gqm_sym.runtime.sweep.quantities import QUANTITIES, STATUS_SENTENCES
 from gqm_sym.studies import read_sweep, run, sweep_schema
 from gqm_sym.studies.plan import evenly
 from gqm_sym.studies.results import DESCRIBED
@@ -87,7 +87,7 @@ def test_a_grid(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
             assert abs(value - truth) <= ULPS * np.spacing(truth)
     assert data.turning_point_upper.values[:, 0].tolist() == data.lam0.values.tolist()
     assert data.turning_point_lower.values[:, 1] == pytest.approx(-data.lam0.values, rel=4e-16)
-    assert not data.half_period_reason.values.any()
+    assert not data.half_period_status.values.any()
     assert (data.title, data.fixed_v0, data.sweep_file) == ("Pendulums", "0", PERIODS)
     assert data.curve_file == Path("swing.yaml").read_text()
     assert sorted(path.name for path in here.iterdir()) == ["floor.yaml", "periods.nc", "periods.yaml", "swing.yaml"]
@@ -111,13 +111,13 @@ def test_a_table_of_bodies_that_come_to_rest(here: Path) -> None:
     assert data.v_max.values[:2] == pytest.approx(v0, rel=5e-16)
     assert data.normal_force_min.values[:2] == pytest.approx(9.81, rel=1e-15)
     assert data.time_at.values[:2] == pytest.approx((v0 - np.sqrt(v0**2 - 2 * mu * g * 0.1)) / (mu * g), rel=1e-14)
-    assert [REASONS[k] for k in data.period_reason.values[[0, 1]]] == [REASONS[2]] * 2
+    assert [STATUS_SENTENCES[k] for k in data.period_status.values[[0, 1]]] == [STATUS_SENTENCES[2]] * 2
     assert np.isnan(data.rest_position.values[2])
-    assert "refused" in REASONS[data.rest_position_reason.values[2]]
-    assert data.rest_position_reason.first_refused == (
+    assert "refused" in STATUS_SENTENCES[data.rest_position_status.values[2]]
+    assert data.rest_position_status.first_refused == (
         "at v0 = 2.0, mu = 0.5, lam = 0.1: mu_static: must be at least mu = 0.5, got 0.3"
     )
-    assert (data.rest_position.values[3], data.rest_position_reason.values[3]) == (0.0, 0)
+    assert (data.rest_position.values[3], data.rest_position_status.values[3]) == (0.0, 0)
     with xarray.open_zarr("rest.zarr", consolidated=False) as again:
         assert again.load().identical(data)
 
@@ -407,7 +407,7 @@ def test_a_cluster_gives_the_same_numbers(client: Any, here: Path, capsys: pytes
         near, far = (module.sweep(quantity, lam0, L=length, client=at) for at in (None, client))
         assert far.values.tobytes() == near.values.tobytes()
         assert far.values.shape == near.values.shape
-        assert (far.reasons == near.reasons).all()
+        assert (far.status == near.status).all()
     one = module.sweep("period", "6/5", client=client)
     assert one.values == module.sweep("period", "6/5").values
     with pytest.raises(InputError, match="v0: is a speed"):
@@ -427,6 +427,6 @@ def test_a_worker_of_another_version_is_refused(client: Any, here: Path, monkeyp
 def test_no_scheduler(here: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
     """An address where nobody answers."""
     pytest.importorskip("distributed")
-    monkeypatch.setattr(cluster, "PATIENCE", 0.1)
+    monkeypatch.setattr(cluster, "TIMEOUT", 0.1)
     assert tool.main(["sweep", "periods.yaml", "--scheduler", "tcp://127.0.0.1:1"]) == 2
     assert "no Dask scheduler answers there" in capsys.readouterr().err

@@ -9,7 +9,7 @@ import ctypes
 import importlib
 import math
 import pkgutil
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from functools import cache, wraps
 from inspect import signature
 from types import FunctionType, SimpleNamespace
@@ -96,12 +96,14 @@ def _copy(width: int) -> Callable[..., None]:
     return copy
 
 
-def _drive(address: int, n: int, work: Any, lam: int, v2: int, v: float, nu: float, p: Any, out: int) -> None:
-    """Fill five rows of a line of numbers from others of it, as `crossing.call_drive` does."""
+def _speed_equation(address: int, n: int, work: Any, rows: tuple[int, ...], v: float, nu: float, p: Any) -> None:
+    """Fill five rows of a line of numbers from others of it, as `calls.call_speed_equation` does."""
+    lam, v2, out = rows
     _FUNCTIONS[address](n, work[lam:], work[v2:], v, nu, p, work[out:])
 
 
-_QUICK = {"uncounted": lambda array: array, "least_and_greatest": _extent, "size": _size, "call_drive": _drive}
+_QUICK = {"uncounted": lambda array: array, "least_and_greatest": _extent, "size": _size}
+_QUICK |= {"call_speed_equation": _speed_equation}
 _QUICK |= {"fma": lambda x, y, z: np.float64(_fma(x, y, z)), "nearest_whole": np.rint, "whole_below": np.floor}
 _QUICK |= {"choose": lambda condition, x, y: np.float64(x if condition else y)}
 _QUICK |= {
@@ -161,17 +163,22 @@ def _rebuilt(function: FunctionType, names: dict[str, Any]) -> Any:
     return FunctionType(code.replace(co_consts=numbers), names, function.__name__, function.__defaults__)
 
 
+def _like(value: Any, items: Iterable[Any]) -> Any:
+    """Give a tuple of the same class, which may be a named one."""
+    return type(value)(*items) if hasattr(value, "_fields") else tuple(items)
+
+
 def _numpy(value: Any) -> Any:
     """Give numbers that divide by zero as compiled ones do."""
     if isinstance(value, tuple):
-        return tuple(_numpy(one) for one in value)
+        return _like(value, (_numpy(one) for one in value))
     return np.float64(value) if isinstance(value, float) else value
 
 
 def _python(value: Any) -> Any:
     """Give what numba returns: Python's own numbers."""
     if isinstance(value, tuple):
-        return tuple(_python(one) for one in value)
+        return _like(value, (_python(one) for one in value))
     return value.item() if isinstance(value, np.generic) else value
 
 

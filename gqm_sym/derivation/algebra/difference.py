@@ -3,8 +3,8 @@
 For ``u`` along a curve with parameter lam, ``u[x, y] = (u(y) - u(x))/(y - x)`` and the second difference ``u[a,
 lam, b]``
 follow from the expression's tree (MATHS, section 3). A function of the tree's nodes contributes its own divided
-differences, as calls of small helpers of the runtime: ``sin1(x, y, h)`` is sin[x, y] with h = y - x, and
-``sin2(x, y, w, h1, h2)`` is sin[x, y, w]. The gaps h are formed from the given offsets, never from the values.
+differences, as calls of small helpers of the runtime: ``divdiff1_sin(x, y, h)`` is sin[x, y] with h = y - x, and
+``divdiff2_sin(x, y, w, h1, h2)`` is sin[x, y, w]. The gaps h are formed from the given offsets, never from the values.
 """
 
 from dataclasses import dataclass, field
@@ -16,7 +16,7 @@ from gqm_sym.budgets import spend
 from gqm_sym.errors import EmissionError
 from gqm_sym.sympy_charts import chart_alpha, chart_x, chart_z
 
-# Heads with helpers `<name>1` and `<name>2` in the runtime.
+# Heads with helpers `divdiff1_<name>` and `divdiff2_<name>` in the runtime.
 HELPERS = {
     sympy.sin: "sin",
     sympy.cos: "cos",
@@ -133,10 +133,10 @@ class _Named:
     name: str
 
     def first(self, x: Expr, y: Expr, h: Expr) -> Expr:
-        return Function(self.name + "1")(x, y, h)
+        return Function(f"divdiff1_{self.name}")(x, y, h)
 
     def second(self, x: Expr, y: Expr, w: Expr, h1: Expr, h2: Expr) -> Expr:
-        return Function(self.name + "2")(x, y, w, h1, h2)
+        return Function(f"divdiff2_{self.name}")(x, y, w, h1, h2)
 
 
 @dataclass(frozen=True, slots=True)
@@ -155,7 +155,7 @@ class _Power:
             return -1 / (x * y)
         if n == Rational(1, 2):
             return 1 / (sympy.sqrt(x) + sympy.sqrt(y))
-        return self._helper("1")(x, y, h, n)
+        return self._helper(1)(x, y, h, n)
 
     def second(self, x: Expr, y: Expr, w: Expr, h1: Expr, h2: Expr) -> Expr:
         n = self.exponent
@@ -170,10 +170,10 @@ class _Power:
         if n == Rational(1, 2):
             root = [sympy.sqrt(t) for t in (x, y, w)]
             return -1 / ((root[0] + root[1]) * (root[1] + root[2]) * (root[2] + root[0]))
-        return self._helper("2")(x, y, w, h1, h2, n)
+        return self._helper(2)(x, y, w, h1, h2, n)
 
-    def _helper(self, order: str) -> Function:
-        return Function(("ipow" if isinstance(self.exponent, Integer) else "rpow") + order)
+    def _helper(self, order: int) -> Function:
+        return Function(f"divdiff{order}_{'ipow' if isinstance(self.exponent, Integer) else 'rpow'}")
 
 
 def _outermost(u: Expr, parameter: Symbol) -> tuple[_Named | _Power, Expr]:

@@ -86,6 +86,10 @@ def _rule(node: sp.Basic, variable: sp.Symbol, visit: Callable[[sp.Basic], sp.Ex
         if variable in exponent.free_symbols:
             result += node * sp.log(base) * visit(exponent)
         return result
+    if isinstance(node, sp.atan2):
+        # The angle of a tangent: a curve that a law reads by its turning holds one.
+        up, along = node.args
+        return (along * visit(up) - up * visit(along)) / (along**2 + up**2)
     outer = _OUTER.get(node.func)
     if outer is None:
         raise DerivationError(

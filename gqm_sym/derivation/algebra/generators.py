@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import sympy as sp
 
 from gqm_sym.derivation.algebra.differentiate import differentiate
+from gqm_sym.expressions import common_measure
 
 MAX_GENERATORS = 14
 CIRCULAR, HYPERBOLIC, EXPONENTIAL = "circular", "hyperbolic", "exponential"
@@ -113,7 +114,7 @@ def _number(atoms: Iterable[sp.Basic], angles: dict[Angle, set[sp.Rational]], ha
     steps: dict[Angle, sp.Rational] = {}
     for angle, factors in angles.items():
         kind, bare = angle
-        step = sp.gcd_list([abs(factor) for factor in factors])
+        step = common_measure([abs(factor) for factor in factors])
         if kind == EXPONENTIAL and all(factor < 0 for factor in factors):
             # exp(-u) stays so: its reciprocal may overflow where exp(-u) is only small.
             step = -step

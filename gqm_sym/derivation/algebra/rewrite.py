@@ -11,6 +11,7 @@ from math import prod
 
 import sympy as sp
 
+from gqm_sym.budgets import spend
 from gqm_sym.derivation.algebra.algebra import Algebra, Fraction, Polynomial
 from gqm_sym.derivation.algebra.factors import factors
 from gqm_sym.derivation.algebra.normal_form import MAX_SPELLED, in_multiple_angles, minus_signs, shortest, spell
@@ -34,6 +35,52 @@ def tidy(expression: sp.Expr) -> sp.Expr:
     if sp.count_ops(expression) > MAX_TIDIED:
         return expression
     return shortest([expression, sp.factor_terms(expression)])
+
+
+def without_waves(expression: sp.Expr) -> sp.Expr:
+    """Write sin(u)**2 + cos(u)**2 as 1 in every sum, with whatever factors the two squares share.
+
+    Forces along polar curves are full of it, for x**2 + z**2 is r**2*cos(u)**2 + r**2*sin(u)**2. Each step makes a
+    sum shorter by one term, and nothing else is rewritten.
+    """
+    known: dict[sp.Basic, sp.Basic] = {}
+
+    def visit(node: sp.Basic) -> sp.Basic:
+        if not (node.args and node.has(sp.sin)):
+            return node
+        if node not in known:
+            spend()
+            args = [visit(part) for part in node.args]
+            if isinstance(node, sp.Add):
+                known[node] = _without_unit(args)
+            else:
+                known[node] = node if list(node.args) == args else node.func(*args)
+        return known[node]
+
+    return visit(expression)
+
+
+def _without_unit(terms: list[sp.Expr]) -> sp.Expr:
+    """Add terms, with each pair w*sin(u)**2 + w*cos(u)**2 as w."""
+    left = dict.fromkeys(terms)
+    for term in terms:
+        for base, power in term.as_powers_dict().items():
+            if not (isinstance(base, sp.sin) and power.is_Integer and power >= 2) or term not in left:
+                continue
+            shared = term / base**2
+            partner = shared * sp.cos(base.args[0]) ** 2
+            if partner in left and partner != term:
+                del left[term], left[partner]
+                return _without_unit([*left, shared])
+    return sp.Add(*terms)
+
+
+def multiplied_out(expression: sp.Expr) -> sp.Expr:
+    """Multiply sums of products out where squares of sines and cosines then add up, and that is shorter."""
+    terms = sum(prod(len(f.args) for f in sp.Mul.make_args(part) if f.is_Add) for part in sp.Add.make_args(expression))
+    if terms > MAX_EXPANDED * MAX_EXPANDED or sp.count_ops(expression) > MAX_TIDIED:
+        return expression
+    return shortest([expression, tidy(without_waves(sp.expand_mul(expression)))])
 
 
 def without_poles(expression: sp.Expr) -> sp.Expr:

@@ -67,7 +67,7 @@ def dissipation(
     """
     v, nu = DIRECTION, CONTACT_SIGN
     resistance = _without_bars(kernel.resistance, pieces[KAPPA], signs)
-    extra = kernel.extra.xreplace(coordinates)
+    extra = kernel.tangential_law.xreplace(coordinates)
     sliding, other = v * nu * kernel.friction, extra
     if kernel.spin:
         # The contact force has a part out of the plane: friction is not linear in W.

@@ -62,12 +62,13 @@ class SpeedField:
         """What kind of form it is, and what the signs in it are."""
         meanings = {DIRECTION: "the sign of ds/dt", CONTACT_SIGN: "the sign of N"}
         found = [f"{s.name} is {text}" for s, text in meanings.items() if s in self.squared.free_symbols]
-        return "; ".join([f"V**2: {_TEXTS[self.form]}", *found])
+        jumps = ["atan2 is continued without its jumps by 2*pi"] if self.squared.has(sp.atan2) else []
+        return "; ".join([f"V**2: {_TEXTS[self.form]}", *found, *jumps])
 
 
 def conservative_speed(law: Forces, lam: sp.Symbol) -> SpeedField:
     """W of a motion that loses nothing."""
-    squared = V0**2 + tidy(law.climb.xreplace({lam: LAM0}) - law.climb)
+    squared = V0**2 + tidy(2 * (law.effective_potential.xreplace({lam: LAM0}) - law.effective_potential))
     return SpeedField(squared=squared, form=CLOSED, gain=sp.S.One)
 
 
@@ -82,11 +83,10 @@ def dissipative_speed(
     lam = curve.parameter
     if not loss.linear:
         return SpeedField(squared=sp.Function(W.name, real=True)(lam), form=EQUATION)
-    half = sp.Rational(1, 2)
     bend = sp.Symbol("|κ|/κ", real=True)
     # What the law takes of a curve, without the absolute values in σ, and antiderivatives where those are known.
     table = {
-        SIGMA * PUSH: (-half * kernel.inertia * law.climb_slope, -half * kernel.inertia * law.climb),
+        SIGMA * PUSH: (-kernel.inertia * law.effective_potential_slope, -kernel.inertia * law.effective_potential),
         SIGMA * LOAD: (law.pressure, None),
         TURN: (shape.turning_rate, shape.angle),
         sp.Abs(TURN): (bend * shape.turning_rate, bend * shape.angle),

@@ -13,7 +13,7 @@ _WAVES = (sp.sin, sp.cos)
 
 @dataclass(frozen=True, slots=True)
 class Symmetry:
-    """Where a climb and σ are even functions of the distance.
+    """Where an effective potential and σ are even functions of the distance.
 
     Attributes
     ----------
@@ -22,7 +22,7 @@ class Symmetry:
     step
         From each to the next, None for a lone one: two mirrors make one of every multiple of their distance.
     monotone
-        Whether the climb is proved to rise or fall all the way between two of them that are neighbours.
+        Whether the potential is proved to rise or fall all the way between two of them that are neighbours.
     """
 
     place: sp.Expr
@@ -30,20 +30,20 @@ class Symmetry:
     monotone: bool
 
 
-def symmetry(climb: sp.Expr, climb_slope: sp.Expr, ds: sp.Expr, lam: sp.Symbol) -> Symmetry | None:
-    """Return where climb and ds are even; None where no such place was found.
+def symmetry(potential: sp.Expr, slope: sp.Expr, ds: sp.Expr, lam: sp.Symbol) -> Symmetry | None:
+    """Return where the effective potential and ds are even; None where no such place was found.
 
     Tried are zeros of the arguments of all functions, steps of a quarter turn from those of sines and cosines, 0, and
     what the two highest powers of a polynomial ask for.
     """
-    forms = (climb, ds)
+    forms = (potential, ds)
     if any(_is_longer(form, MAX_LENGTH) for form in forms):
         return None
     found = [place for place in dict.fromkeys(_candidates(forms, lam)) if all(_is_even(f, lam, place) for f in forms)]
     if not found:
         return None
     step = min((abs(place - found[0]) for place in found[1:]), key=_size, default=None)
-    return Symmetry(found[0], step, _only_there(climb_slope, lam, found[0], step))
+    return Symmetry(found[0], step, _only_there(slope, lam, found[0], step))
 
 
 def _is_longer(form: sp.Expr, length: int) -> bool:

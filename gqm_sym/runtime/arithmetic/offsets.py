@@ -1,4 +1,4 @@
-"""Where a place lies that is given by its distances from two ends, and what a climb there leaves of V**2."""
+"""A place from its distances to two ends, and V**2 from the effective potential."""
 
 from math import fabs
 
@@ -6,12 +6,12 @@ from gqm_sym.runtime.compiled.jit import Inlined
 
 
 @Inlined
-def nearest(a, b, da, db):  # type: ignore[no-untyped-def]
+def place_from_ends(a, b, da, db):  # type: ignore[no-untyped-def]
     """``a + da``, or ``b - db`` where that end is nearer: the rounding is then that of the shorter distance."""
     return a + da if fabs(da) <= fabs(db) else b - db
 
 
 @Inlined
-def left_of(w0, climb, level):  # type: ignore[no-untyped-def]
-    """What a climb from a level leaves of V**2 = w0: all of it at that level, to the last bit."""
-    return w0 - (climb - level)
+def speed_squared_from_potential(w0, potential, level):  # type: ignore[no-untyped-def]
+    """V**2 = w0 - 2*(U - level), where the effective potential is U: w0 to the last bit where it is ``level``."""
+    return w0 - 2.0 * (potential - level)

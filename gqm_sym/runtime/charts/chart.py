@@ -9,7 +9,7 @@ differences lose nothing. Compiled code reads a chart from one flat array that f
 
 from collections.abc import Hashable
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numba import types
@@ -131,14 +131,32 @@ class Chart:
         return float(place), float(np.hypot(row[0] - x, row[1] - z))
 
 
+class PieceData(NamedTuple):
+    """What the pieces of a chart are made from.
+
+    Attributes
+    ----------
+    anchors : (n, 2) array
+        x and z at the left edge of each piece.
+    angles, curvatures : (n, TERMS) arrays
+        alpha and kappa at the nodes.
+    tangents : (n, 2, TERMS) array, optional
+        Cosine and sine of alpha at the nodes, if they are known more accurately than from alpha (near pi, for example).
+    anchor_lows : (n, 2) array, optional
+        The low parts of anchors that are known as two doubles.
+    """
+
+    anchors: Any
+    angles: Any
+    curvatures: Any
+    tangents: Any = None
+    anchor_lows: Any = 0.0
+
+
 def assemble(
-    *,
     edges: Any,
-    anchors: Any,
-    angles: Any,
-    curvatures: Any,
-    tangents: Any = None,
-    rests: Any = 0.0,
+    data: PieceData,
+    *,
     period: float = 0.0,
     turn: float = 0.0,
     ends: tuple[str, str] = ("domain-end", "domain-end"),
@@ -146,25 +164,20 @@ def assemble(
     corners: Any = (),
     origins: Any = (),
 ) -> Chart:
-    """Put pieces together.
+    """Assemble a chart from its pieces.
 
     Parameters
     ----------
     edges : (n+1,) array
-        Arc length at the edges of the pieces, growing.
-    anchors : (n, 2) array
-        x and z at the left edge of each piece.
-    angles, curvatures : (n, TERMS) arrays
-        alpha and kappa at the nodes.
-    tangents : (n, 2, TERMS) array, optional
-        Cosine and sine of alpha at the nodes, where they are known better than from alpha, which is near pi, say.
-    rests : (n, 2) array, optional
-        What the anchors, as doubles, leave over.
+        Arc length at the edges of the pieces, increasing.
+    data : PieceData
+        The pieces.
     period, turn : float
-        Length of a closed curve, and by how much alpha grows once round.
+        Length of a closed curve, and the increase of alpha over it.
     ends, breaks, corners, origins
         As `Chart` has them.
     """
+    anchors, angles, curvatures, tangents, rests = data
     edges, anchors = np.asarray(edges, dtype=np.float64), np.asarray(anchors, dtype=np.float64)
     angles, half = np.asarray(angles, dtype=np.float64), 0.5 * np.diff(edges)
     count = half.size

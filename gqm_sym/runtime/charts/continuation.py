@@ -1,59 +1,73 @@
-"""Piece after piece along a curve F(x, z) = 0, one way from its start, until it closes or ends."""
+"""Continuation of a curve F(x, z) = 0 piece by piece from its start in one direction, until it closes or ends."""
 
 from math import cos, fabs, inf, isfinite, pi
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import types
 
 from gqm_sym.runtime.arithmetic.doubledouble import two_sum
 from gqm_sym.runtime.charts.evaluate import TERMS
-from gqm_sym.runtime.charts.level_pieces import ANCHOR, BREAK, END, POINTS, SMOOTH, compare, follow, growth, look
-from gqm_sym.runtime.compiled.jit import Inner, entry
+from gqm_sym.runtime.charts.level_pieces import (
+    ANCHOR,
+    BREAK,
+    END,
+    POINTS,
+    SMOOTH,
+    LevelCurve,
+    compare,
+    evaluate_points,
+    growth,
+    solve_piece,
+)
+from gqm_sym.runtime.compiled.jit import Inlined, Inner, entry
 from gqm_sym.runtime.compiled.types import MATRIX, VECTOR
 
-PIECES = 2000
-"""Most pieces that are laid one way."""
-REACH = 1e9
-"""A curve that goes on is followed this many times the length of its first piece."""
+# Pieces that are laid in one direction.
+MAX_PIECES = 2000
 
-# What ends a march.
+# An open curve without a limit is followed over this many times the length of its first piece.
+MAX_REACH = 1e9
+
+# Why the continuation ended: at the limit, back at the start, at a singular point, after MAX_PIECES or MAX_REACH, or
+# where F is no longer real.
 LIMIT, CLOSED, SINGULAR, FAR, UNREAL = range(5)
 PIECE_ROWS = 11
 
-# A point where grad F vanishes is predicted by the fall of |grad F|; no piece goes farther towards it than this share.
-TOWARDS = 0.75
+# A point where grad F vanishes is predicted from the fall of |grad F|; no piece covers more than this share of the way.
+MAX_APPROACH = 0.75
 
-# Of the size of the coordinates: the march ends at a singular point that is nearer than this, or nearer than that where
-# no piece can be laid; a piece shorter than the least is none.
-NEAR_SINGULAR = 1e-10
-SINGULAR_AHEAD = 1e-4
-LEAST = 1e-15
+# Relative to the size of the coordinates: the continuation ends at a singular point that is nearer than the first, or
+# nearer than the second if no piece can be laid; pieces shorter than the third are not laid.
+MAX_SINGULAR_DISTANCE = 1e-10
+MAX_SINGULAR_AHEAD = 1e-4
+MIN_LENGTH = 1e-15
 
-# Pieces get as short as this only where F is not smooth: one break in each such stretch.
-SHORT = 1e-12
-STRETCH = 1e-9
+# Pieces become shorter than the first only where F is not smooth. Such edges closer than the second are one break.
+MAX_BREAK_PIECE = 1e-12
+BREAK_DISTANCE = 1e-9
 
-# The loop is closed when it comes back to the start in its direction, beside it by no more than this share of a piece.
-BESIDE = 1e-9
+# The curve is closed if it returns to the start in the same direction, with at most this gap, as a share of a piece.
+MAX_GAP = 1e-9
 
-# A piece that would leave less than a quarter of its length to the start leaves half of the way instead.
-BEYOND = 1.25
+# If the start lies within this many lengths of a piece, the rest of the way is divided into equal pieces.
+MAX_RETURN = 1.25
 
-# Places this share of a piece, or of the whole length, apart may differ by rounding alone.
-SAME = 1e-6
-SAME_LENGTH = 1e-12
+# Places that differ by less than this share of a piece, or of the whole length, differ by rounding only.
+MAX_SAME_PLACE = 1e-6
+MAX_SAME_LENGTH = 1e-12
 
 
 @Inner
-def ahead(piece, point):  # type: ignore[no-untyped-def]
-    """How far ahead a singular point would be if |grad F| fell evenly; infinite where it grows."""
+def predicted_distance(piece, point):  # type: ignore[no-untyped-def]
+    """Return the distance to a singular point if |grad F| fell linearly; infinite if it grows."""
     slope = piece[8, point]
     return -piece[7, point] / slope if slope < 0.0 else inf
 
 
 @Inner
 def _advance(at, piece):  # type: ignore[no-untyped-def]
-    """The right end of a piece: x and z as two doubles each."""
+    """Return the right end of a piece: x and z as two doubles each."""
     out = np.empty(4)
     for row in range(2):
         s, e = two_sum(at[2 * row], piece[row, END])
@@ -63,7 +77,7 @@ def _advance(at, piece):  # type: ignore[no-untyped-def]
 
 @Inner
 def _gap(start, at, along, across):  # type: ignore[no-untyped-def]
-    """How far a place is behind the start along its tangent, and how far beside it."""
+    """Return how far a place lies behind the start along the tangent there, and how far beside it."""
     dx = (start[0] - at[0]) + (start[1] - at[1])
     dz = (start[2] - at[2]) + (start[3] - at[3])
     return dx * along + dz * across, dz * along - dx * across
@@ -71,7 +85,7 @@ def _gap(start, at, along, across):  # type: ignore[no-untyped-def]
 
 @Inner
 def _return(start, at, piece, length):  # type: ignore[no-untyped-def]
-    """About where on a piece, or a little beyond it, it comes back to the start; negative where it does not."""
+    """Estimate the length at which a piece, or its continuation, returns to the start; negative if it does not."""
     nearest, where = inf, 0
     x = (start[0] - at[0]) + (start[1] - at[1])
     z = (start[2] - at[2]) + (start[3] - at[3])
@@ -84,50 +98,50 @@ def _return(start, at, piece, length):  # type: ignore[no-untyped-def]
     dx, dz = x - piece[0, where], z - piece[1, where]
     behind = dx * piece[2, where] + dz * piece[3, where]
     beside = dz * piece[2, where] - dx * piece[3, where]
-    if fabs(beside) > 0.5 * fabs(behind) + BESIDE * length:
+    if fabs(beside) > 0.5 * fabs(behind) + MAX_GAP * length:
         return -1.0
     share = 1.0 if where == END else cos(0.5 * pi * (where + 0.5) / TERMS) ** 2
     place = share * length + behind
-    return place if place <= BEYOND * length else -1.0
+    return place if place <= MAX_RETURN * length else -1.0
 
 
 @Inner
-def _close(field, p, sign, start, at, length, way, piece):  # type: ignore[no-untyped-def]
-    """The length of the piece that ends at the start, laid; negative where the curve passes beside it."""
+def _close(curve, start, at, length, direction, piece):  # type: ignore[no-untyped-def]
+    """Lay the piece that ends at the start, and return its length; negative if the curve passes beside the start."""
     for _ in range(8):
-        if not (length > 0.0 and follow(field, p, sign, at, length, piece)):
+        if not (length > 0.0 and solve_piece(curve, at, length, piece)):
             return -1.0
         end = _advance(at, piece)
-        behind, beside = _gap(start, end, way[0], way[1])
-        if fabs(beside) > BESIDE * length + fabs(behind):
+        behind, beside = _gap(start, end, direction[0], direction[1])
+        if fabs(beside) > MAX_GAP * length + fabs(behind):
             return -1.0
         if fabs(behind) <= 1e-17 * (fabs(start[0]) + fabs(start[2]) + length):
             break
         length += behind
-    level = piece[2, END] * way[0] + piece[3, END] * way[1]
-    return length if level > 0.99 and fabs(beside) <= BESIDE * length else -1.0
+    level = piece[2, END] * direction[0] + piece[3, END] * direction[1]
+    return length if level > 0.99 and fabs(beside) <= MAX_GAP * length else -1.0
 
 
 @Inner
-def _hop(field, p, sign, at, last, piece, length):  # type: ignore[no-untyped-def]
-    """Step over a place where F is not smooth; whether the curve goes on there. Moves ``at``."""
+def _step_over(curve, at, last, piece, length):  # type: ignore[no-untyped-def]
+    """Move ``at`` beyond a place where F is not smooth; whether the curve continues there."""
     at[0] += length * last[0]
     at[2] += length * last[1]
     piece[:2] = 0.0
     for _ in range(4):
-        if not look(field, p, sign, at, piece):
+        if not evaluate_points(curve, at, piece):
             return False
-        shift = -sign * piece[6, ANCHOR] / piece[7, ANCHOR]
+        shift = -curve.sign * piece[6, ANCHOR] / piece[7, ANCHOR]
         at[0] += shift * piece[3, ANCHOR]
         at[2] -= shift * piece[2, ANCHOR]
     return True
 
 
 @Inner
-def _flag(jumps, edges, at, what, stretch):  # type: ignore[no-untyped-def]
-    """Say what is at an edge: of edges close together, at that with the shortest piece before it."""
+def _mark(jumps, edges, at, what, distance):  # type: ignore[no-untyped-def]
+    """Record what is at an edge; of edges closer than ``distance``, only at that with the shortest piece before it."""
     k = at - 1
-    while k > 0 and edges[at] - edges[k] <= stretch:
+    while k > 0 and edges[at] - edges[k] <= distance:
         shorter = edges[k] - edges[k - 1] <= edges[at] - edges[at - 1]
         if jumps[k] > what or (jumps[k] == what and shorter):
             return
@@ -138,9 +152,78 @@ def _flag(jumps, edges, at, what, stretch):  # type: ignore[no-untyped-def]
 
 @Inner
 def _first_length(piece, size):  # type: ignore[no-untyped-def]
-    """A length to begin with: of the radius of curvature, and of where |grad F| changes."""
+    """Return the length of the first piece, from the radius of curvature and the scale on which |grad F| changes."""
     length = 0.5 * min(1.0 / piece[5, ANCHOR], piece[7, ANCHOR] / fabs(piece[8, ANCHOR]))
     return length if isfinite(length) else max(size, 1.0)
+
+
+@Inlined
+def _next_edge(s, limit, length, distance):  # type: ignore[no-untyped-def]
+    """Return the length at which the next piece should end: before a singular point, and in halves before the limit."""
+    remaining = limit - s
+    length = min(length, MAX_APPROACH * distance)
+    if remaining < 1.5 * length:
+        length = remaining if remaining <= length else 0.5 * remaining
+    return limit if length == remaining else s + length
+
+
+@Inner
+def _try_piece(curve, here, length, piece, after_break):  # type: ignore[no-untyped-def]
+    """Solve for a piece from ``here``; return the change of length for the next one, negative if this one is too long.
+
+    Between the beginning and the first node F may not be smooth; that is not checked right after a break.
+    """
+    if not solve_piece(curve, here, length, piece):
+        return -0.5
+    change = growth(piece, length)
+    if not after_break and compare(piece[2, ANCHOR], piece[3, ANCHOR], piece[4, ANCHOR], piece, 0, length) != SMOOTH:
+        return -0.5
+    return change
+
+
+@Inlined
+def _distance_to_singular(before, distance, length):  # type: ignore[no-untyped-def]
+    """Return the distance to a singular point from the predictions at both ends of a piece.
+
+    |grad F| falls like some power of the distance, and two predictions determine the power.
+    """
+    if isfinite(before) and isfinite(distance) and before > distance:
+        return distance * min(max(length / (before - distance), 0.2), 20.0)
+    return distance
+
+
+class Trace(NamedTuple):
+    """Pieces that have been laid, as `trace_one_way` returns them."""
+
+    edges: Any
+    anchors: Any
+    nodes: Any
+    jumps: Any
+
+
+@Inner
+def _pass_break(curve, at, last, piece, trace, count, size):  # type: ignore[no-untyped-def]
+    """Move ``at`` over a place where F is not smooth, with a straight piece; whether the curve continues there."""
+    trace.anchors[count] = at
+    trace.nodes[count, 0], trace.nodes[count, 1], trace.nodes[count, 2] = last[0], last[1], last[2]
+    length = 2.0 * MIN_LENGTH * size
+    if not _step_over(curve, at, last, piece, length):
+        return False
+    trace.edges[count + 1] = trace.edges[count] + length
+    _mark(trace.jumps, trace.edges, count + 1, BREAK, BREAK_DISTANCE * size)
+    return True
+
+
+@Inner
+def _append(trace, count, here, last, piece, length, size):  # type: ignore[no-untyped-def]
+    """Store a piece that begins ``here``, and what is at its left edge; ``last`` becomes what is at its right edge."""
+    anchors, nodes = trace.anchors, trace.nodes
+    anchors[count] = here
+    nodes[count, 0], nodes[count, 1], nodes[count, 2] = piece[2, :TERMS], piece[3, :TERMS], piece[4, :TERMS]
+    if count > 0:
+        jump = compare(last[0], last[1], last[2], piece, 0, length)
+        _mark(trace.jumps, trace.edges, count, jump, BREAK_DISTANCE * size)
+    last[0], last[1], last[2] = piece[2, END], piece[3, END], piece[4, END]
 
 
 @entry(
@@ -148,8 +231,8 @@ def _first_length(piece, size):  # type: ignore[no-untyped-def]
         types.int64, VECTOR, types.float64, VECTOR, types.float64, types.boolean
     )
 )
-def march(field, p, sign, start, limit, may_close):  # type: ignore[no-untyped-def]
-    """Lay pieces from the start on.
+def trace_one_way(field, p, sign, start, limit, may_close):  # type: ignore[no-untyped-def]
+    """Lay pieces from the start.
 
     Parameters
     ----------
@@ -158,18 +241,18 @@ def march(field, p, sign, start, limit, may_close):  # type: ignore[no-untyped-d
     p : array
         Run-time parameters.
     sign : float
-        +1 along (-F_z, F_x)/|grad F|, -1 the other way.
+        +1 along (-F_z, F_x)/|grad F|, -1 in the opposite direction.
     start : (4,) array
         x and z on the curve, two doubles each.
     limit : float
-        Length after which to stop; infinite where there is none.
+        Length at which to stop; infinite if there is none.
     may_close : bool
-        Whether to look for the return to the start.
+        Whether the curve may return to the start.
 
     Returns
     -------
     end : int
-        LIMIT, CLOSED, SINGULAR, FAR (as far as curves are followed) or UNREAL (F is not real and regular beyond).
+        LIMIT, CLOSED, SINGULAR, FAR or UNREAL.
     edges : (count + 1,) array
         Length at the edges of the pieces.
     anchors : (count + 1, 4) array
@@ -179,90 +262,62 @@ def march(field, p, sign, start, limit, may_close):  # type: ignore[no-untyped-d
     jumps : (count + 1,) array
         What is at the edges: SMOOTH, BREAK or CORNER.
     last : (4,) array
-        Tangent and curvature at the end, and how far beyond it the singular point is.
+        Tangent and curvature at the end, and the distance from there to the singular point.
     """
-    edges = np.zeros(PIECES + 1)
-    anchors = np.empty((PIECES + 1, 4))
-    nodes = np.empty((PIECES, 3, TERMS))
-    jumps = np.zeros(PIECES + 1, dtype=np.int64)
-    piece = np.zeros((PIECE_ROWS, POINTS))
-    at = start.copy()
-    look(field, p, sign, at, piece)
-    way = piece[2:4, ANCHOR].copy()
-    last = np.array([way[0], way[1], piece[4, ANCHOR], 0.0])
+    curve = LevelCurve(field, p, sign)
+    edges, jumps = np.zeros(MAX_PIECES + 1), np.zeros(MAX_PIECES + 1, dtype=np.int64)
+    anchors, nodes = np.empty((MAX_PIECES + 1, 4)), np.empty((MAX_PIECES, 3, TERMS))
+    trace = Trace(edges, anchors, nodes, jumps)
+    piece, at = np.zeros((PIECE_ROWS, POINTS)), start.copy()
+    evaluate_points(curve, at, piece)
+    direction = piece[2:4, ANCHOR].copy()
+    last = np.array([direction[0], direction[1], piece[4, ANCHOR], 0.0])
     size = max(fabs(at[0]), fabs(at[2]))
-    distance = ahead(piece, ANCHOR)
-    length = _first_length(piece, size)
-    count, end, s, reach, hopped = 0, FAR, 0.0, inf, False
-    while count < PIECES and s < reach:
-        rest = limit - s
-        if rest <= 0.0:
-            end = LIMIT
+    distance, length = predicted_distance(piece, ANCHOR), _first_length(piece, size)
+    count, end, s, reach, after_break = 0, FAR, 0.0, inf, False
+    while count < MAX_PIECES and s < reach:
+        if limit - s <= 0.0 or distance <= MAX_SINGULAR_DISTANCE * size:
+            end = LIMIT if limit - s <= 0.0 else SINGULAR
             break
-        if distance <= NEAR_SINGULAR * size:
-            end = SINGULAR
-            break
-        length = min(length, TOWARDS * distance)
-        if rest < 1.5 * length:
-            length = rest if rest <= length else 0.5 * rest
-        edge = limit if length == rest else s + length
+        edge = _next_edge(s, limit, length, distance)
         length = edge - s
-        if length <= LEAST * size or length == 0.0:
-            if distance <= SINGULAR_AHEAD * size:
+        if length <= MIN_LENGTH * size or length == 0.0:
+            if distance <= MAX_SINGULAR_AHEAD * size:
                 end = SINGULAR
                 break
-            # Something is there that is not smooth: go over it by a piece that is straight.
-            anchors[count] = at
-            nodes[count, 0], nodes[count, 1], nodes[count, 2] = last[0], last[1], last[2]
-            hop = 2.0 * LEAST * size
-            if not _hop(field, p, sign, at, last, piece, hop):
+            if not _pass_break(curve, at, last, piece, trace, count, size):
                 end = UNREAL
                 break
-            s += hop
             count += 1
-            edges[count], hopped = s, True
-            _flag(jumps, edges, count, BREAK, STRETCH * size)
-            distance, length = ahead(piece, ANCHOR), _first_length(piece, size)
+            s, after_break = edges[count], True
+            distance, length = predicted_distance(piece, ANCHOR), _first_length(piece, size)
             continue
         here = at.copy()
-        if not follow(field, p, sign, here, length, piece):
-            length *= 0.5
-            continue
-        change = growth(piece, length)
-        if not hopped and compare(piece[2, ANCHOR], piece[3, ANCHOR], piece[4, ANCHOR], piece, 0, length) != SMOOTH:
-            change = -0.5  # between the beginning and the first node, F is not smooth
+        change = _try_piece(curve, here, length, piece, after_break)
         if change < 0.0:
             length *= -change
             continue
         back = _return(start, here, piece, length) if may_close and count > 0 else -1.0
-        if back > (1.0 + SAME) * length and edge < limit:
+        if back > (1.0 + MAX_SAME_PLACE) * length and edge < limit:
             length = 0.5 * back
             continue
-        if back > 0.0 and (edge < limit or back <= length + SAME_LENGTH * limit):
-            other = at.copy()
-            closing = np.zeros((PIECE_ROWS, POINTS))
-            back = _close(field, p, sign, start, other, back, way, closing)
+        if back > 0.0 and (edge < limit or back <= length + MAX_SAME_LENGTH * limit):
+            other, closing = at.copy(), np.zeros((PIECE_ROWS, POINTS))
+            back = _close(curve, start, other, back, direction, closing)
             if back > 0.0:
                 here, piece, edge, end = other, closing, s + back, CLOSED
-        anchors[count] = here
-        nodes[count, 0], nodes[count, 1], nodes[count, 2] = piece[2, :TERMS], piece[3, :TERMS], piece[4, :TERMS]
+        _append(trace, count, here, last, piece, edge - s, size)
         at = _advance(here, piece)
-        if count > 0:
-            _flag(jumps, edges, count, compare(last[0], last[1], last[2], piece, 0, edge - s), STRETCH * size)
-        last[0], last[1], last[2] = piece[2, END], piece[3, END], piece[4, END]
         size = max(size, fabs(at[0]), fabs(at[2]))
-        before, distance = distance, ahead(piece, END)
-        # |grad F| falls as some power of the distance: two predictions tell which.
-        last[3] = distance
-        if isfinite(before) and isfinite(distance) and before > distance:
-            last[3] = distance * min(max((edge - s) / (before - distance), 0.2), 20.0)
+        before, distance = distance, predicted_distance(piece, END)
+        last[3] = _distance_to_singular(before, distance, edge - s)
         count += 1
-        edges[count], hopped = edge, False
-        if edge - s <= SHORT * size and edge < limit:
-            _flag(jumps, edges, count, BREAK, STRETCH * size)
+        edges[count], after_break = edge, False
+        if edge - s <= MAX_BREAK_PIECE * size and edge < limit:
+            _mark(jumps, edges, count, BREAK, BREAK_DISTANCE * size)
         s = edge
         if count == 1 and limit == inf:
-            reach = REACH * length
+            reach = MAX_REACH * length
         if end == CLOSED:
             break
         length *= change

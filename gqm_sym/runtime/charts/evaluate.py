@@ -197,37 +197,37 @@ def _second(chart, row, r, s, t, h1, h2):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def chart_x1(chart, s, t, h):  # type: ignore[no-untyped-def]
+def divdiff1_chart_x(chart, s, t, h):  # type: ignore[no-untyped-def]
     """x[s, t] with h = t - s."""
     return _first(chart, 0, s, t, h)
 
 
 @Inner
-def chart_z1(chart, s, t, h):  # type: ignore[no-untyped-def]
+def divdiff1_chart_z(chart, s, t, h):  # type: ignore[no-untyped-def]
     """z[s, t] with h = t - s."""
     return _first(chart, 1, s, t, h)
 
 
 @Inner
-def chart_alpha1(chart, s, t, h):  # type: ignore[no-untyped-def]
+def divdiff1_chart_alpha(chart, s, t, h):  # type: ignore[no-untyped-def]
     """alpha[s, t] with h = t - s."""
     return _first(chart, 2, s, t, h)
 
 
 @Inner
-def chart_x2(chart, r, s, t, h1, h2):  # type: ignore[no-untyped-def]
+def divdiff2_chart_x(chart, r, s, t, h1, h2):  # type: ignore[no-untyped-def]
     """x[r, s, t] with h1 = s - r and h2 = t - s."""
     return _second(chart, 0, r, s, t, h1, h2)
 
 
 @Inner
-def chart_z2(chart, r, s, t, h1, h2):  # type: ignore[no-untyped-def]
+def divdiff2_chart_z(chart, r, s, t, h1, h2):  # type: ignore[no-untyped-def]
     """z[r, s, t] with h1 = s - r and h2 = t - s."""
     return _second(chart, 1, r, s, t, h1, h2)
 
 
 @Inner
-def chart_alpha2(chart, r, s, t, h1, h2):  # type: ignore[no-untyped-def]
+def divdiff2_chart_alpha(chart, r, s, t, h1, h2):  # type: ignore[no-untyped-def]
     """alpha[r, s, t] with h1 = s - r and h2 = t - s."""
     return _second(chart, 2, r, s, t, h1, h2)
 

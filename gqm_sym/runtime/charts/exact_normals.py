@@ -62,8 +62,8 @@ class ChartTrack:
     ----------
     maker, chart
         What made the curve's chart, and the chart.
-    climb
-        ``f(op, x, z, p)``: the climb and its derivatives by x and z.
+    potential
+        ``f(op, x, z, p)``: the effective potential and its derivatives by x and z.
     point, lam0
         The launch by its coordinates, where it was given so, and by arc length from the start point.
     context, values
@@ -74,14 +74,15 @@ class ChartTrack:
         self,
         maker: ChartMaker,
         chart: Chart,
-        climb: Callable[..., Any],
+        potential: Callable[..., Any],
         point: tuple[Number, Number] | None,
         lam0: Number,
         context: Any,
         values: tuple[Any, ...],
     ) -> None:
         curve: TrueCurve = maker.true_curve(context, values, chart)
-        self._context, self._values, self._chart, self._curve, self._climb = context, values, chart, curve, climb
+        self._context, self._values, self._chart, self._curve = context, values, chart, curve
+        self._potential = potential
         self._near = lam0.value
         self._edges = chart.edges.tolist()
         count = len(self._edges) - 1
@@ -103,15 +104,15 @@ class ChartTrack:
         """The place that a double stands for: as far from the launch as from the launch's double."""
         return self.lam0 + (self._context.mpf(lam) - self._near)
 
-    def climb(self, lam: Any) -> Any:
-        """What V**2 loses in climbing to a place, up to a constant."""
+    def effective_potential(self, lam: Any) -> Any:
+        """U, so that V**2 + 2*U is constant."""
         spot = self.spot(lam)
-        return self._climb(self._context, spot.x, spot.z, self._values)[0]
+        return self._potential(self._context, spot.x, spot.z, self._values)[0]
 
-    def climb_slope(self, lam: Any) -> Any:
+    def effective_potential_slope(self, lam: Any) -> Any:
         """Its derivative."""
         spot = self.spot(lam)
-        _, by_x, by_z = self._climb(self._context, spot.x, spot.z, self._values)
+        _, by_x, by_z = self._potential(self._context, spot.x, spot.z, self._values)
         return (by_x * spot.tx + by_z * spot.tz) * spot.ds
 
     def ds(self, lam: Any) -> Any:

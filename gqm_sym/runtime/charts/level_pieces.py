@@ -7,6 +7,7 @@ how far the whole piece lies beside F = 0, and the piece is moved by as much alo
 """
 
 from math import fabs, inf, isfinite, sqrt
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -75,33 +76,52 @@ _GAIN = np.ascontiguousarray(_ALONG @ _FIT)
 _ENDS = np.ascontiguousarray(np.array([(-1.0) ** np.arange(TERMS), np.ones(TERMS)]) @ _FIT)
 
 
+class LevelCurve(NamedTuple):
+    """A curve F(x, z) = 0 with a direction.
+
+    Attributes
+    ----------
+    field : int
+        Address of the compiled function that fills F and its derivatives.
+    p : array
+        Run-time parameters.
+    sign : float
+        +1 for the tangent (-F_z, F_x)/|grad F|, -1 for the opposite one.
+    """
+
+    field: Any
+    p: Any
+    sign: Any
+
+
 @Inner
-def look(field, p, sign, at, piece):  # type: ignore[no-untyped-def]
-    """Tangent, curvature, value and scales of F at all points of a piece; whether all are finite.
+def evaluate_points(curve, at, piece):  # type: ignore[no-untyped-def]
+    """Fill a piece with tangents, curvatures, values and scales of F at all its points; whether all are finite.
 
     Parameters
     ----------
-    sign : float
-        +1 for the tangent (-F_z, F_x)/|grad F|, -1 for the opposite.
+    curve : LevelCurve
+        The curve.
     at : (4,) array
         The anchor: x and z as two doubles each.
     piece : (11, POINTS) array
         Rows 0 and 1 are offsets from the anchor; the others are filled: tangent (2, 3), curvature (4), sum of the
         magnitudes of the curvature's terms (5), F (6), |grad F| (7), its derivative by arc length (8), places (9, 10).
     """
+    sign = curve.sign
     offsets, x, z = piece, piece[9], piece[10]
-    rest = np.empty((2, POINTS))
+    lows = np.empty((2, POINTS))
     rows = np.empty((ROWS, POINTS))
     for i in range(POINTS):
         s, e = two_sum(at[0], offsets[0, i])
-        x[i], rest[0, i] = two_sum(s, e + at[1])
+        x[i], lows[0, i] = two_sum(s, e + at[1])
         s, e = two_sum(at[2], offsets[1, i])
-        z[i], rest[1, i] = two_sum(s, e + at[3])
-    call_field(field, POINTS, x, z, p, rows)
+        z[i], lows[1, i] = two_sum(s, e + at[3])
+    call_field(curve.field, POINTS, x, z, curve.p, rows)
     finite = True
     for i in range(POINTS):
         xx, xz, zz = rows[3, i], rows[4, i], rows[5, i]
-        dx, dz = rest[0, i], rest[1, i]
+        dx, dz = lows[0, i], lows[1, i]
         fx = rows[1, i] + (xx * dx + xz * dz)
         fz = rows[2, i] + (xz * dx + zz * dz)
         largest = max(fabs(fx), fabs(fz))
@@ -123,11 +143,11 @@ def look(field, p, sign, at, piece):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def follow(field, p, sign, at, length, piece):  # type: ignore[no-untyped-def]
-    """Solve for the piece of a given length from ``at``; whether that succeeds. Moves ``at`` onto F = 0."""
-    half = 0.5 * length
+def solve_piece(curve, at, length, piece):  # type: ignore[no-untyped-def]
+    """Solve for the piece of a given length from ``at``; whether that succeeds. ``at`` is moved onto F = 0."""
+    half, sign = 0.5 * length, curve.sign
     piece[:2] = 0.0
-    if not look(field, p, sign, at, piece):
+    if not evaluate_points(curve, at, piece):
         return False
     bend = piece[4, ANCHOR]
     for i in range(TERMS + 1):
@@ -136,7 +156,7 @@ def follow(field, p, sign, at, length, piece):  # type: ignore[no-untyped-def]
         piece[1, i] = s * (piece[3, ANCHOR] + 0.5 * s * bend * piece[2, ANCHOR])
     before, moved = inf, False
     for _ in range(ROUNDS):
-        if not look(field, p, sign, at, piece):
+        if not evaluate_points(curve, at, piece):
             return False
         change = 0.0
         for row in range(2):

@@ -17,7 +17,7 @@ from numpy.polynomial.legendre import leggauss
 from gqm_sym.errors import BudgetError, DeclarationError, ParameterError
 from gqm_sym.literals.namespaces import FLOATS
 from gqm_sym.runtime.charts.arc_length import MOST_PIECES, Indices, Pieces, joined, rectify, summed
-from gqm_sym.runtime.charts.chart import NODES, Chart, assemble
+from gqm_sym.runtime.charts.chart import NODES, Chart, PieceData, assemble
 from gqm_sym.runtime.charts.exact_parts import Part, Parts, spiral
 from gqm_sym.runtime.compiled.calls import call_segment
 from gqm_sym.runtime.compiled.jit import entry
@@ -147,10 +147,8 @@ class Rail:
             turn = 2.0 * pi * round((end.angle - start.angle) / (2.0 * pi))
             inner = joints[:-1]
         return assemble(
-            edges=edges,
-            anchors=pieces.anchors,
-            angles=pieces.angles,
-            curvatures=pieces.curvatures,
+            edges,
+            PieceData(pieces.anchors, pieces.angles, pieces.curvatures),
             period=edges[-1] if self.closed else 0.0,
             turn=turn,
             origins=np.column_stack([parts, pieces.places]),

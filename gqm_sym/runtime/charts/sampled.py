@@ -16,7 +16,7 @@ from gqm_sym.budgets import spend
 from gqm_sym.errors import SolutionError
 from gqm_sym.literals.numbers import read_number
 from gqm_sym.runtime.charts.arc_length import Indices, Pieces, rectify, summed, unwrapped
-from gqm_sym.runtime.charts.chart import NODES, Chart, assemble
+from gqm_sym.runtime.charts.chart import NODES, Chart, PieceData, assemble
 from gqm_sym.runtime.charts.exact_parts import Part, Parts, polynomial
 from gqm_sym.runtime.compiled.jit import Inner, entry
 from gqm_sym.runtime.compiled.types import MATRIX, Array
@@ -167,10 +167,8 @@ def _assembled(
     pieces: Pieces, parts: Indices, edges: Array, turn: float, closed: bool, breaks: object, corners: object
 ) -> Chart:
     return assemble(
-        edges=edges,
-        anchors=pieces.anchors,
-        angles=pieces.angles,
-        curvatures=pieces.curvatures,
+        edges,
+        PieceData(pieces.anchors, pieces.angles, pieces.curvatures),
         period=edges[-1] if closed else 0.0,
         turn=turn,
         breaks=breaks,

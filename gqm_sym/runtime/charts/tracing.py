@@ -2,7 +2,7 @@
 
 The parameter is arc length, 0 at the start point, and grows along ±(-F_z, F_x)/|grad F|; for the upper sign the
 curvature is the Hessian form (F_xx F_z**2 - 2 F_xz F_x F_z + F_zz F_x**2)/|grad F|**3, for the lower its negative
-(paper, eq. 36; ERRATA A9). Pieces, and how they are solved, are in `level_pieces`; `march` lays them one by one.
+(paper, eq. 36; ERRATA A9). Pieces, and how they are solved, are in `level_pieces`; `continuation` lays them one by one.
 """
 
 from collections.abc import Callable
@@ -16,10 +16,10 @@ from numba import types
 from gqm_sym.errors import LaunchError, SolutionError
 from gqm_sym.literals.namespaces import FLOATS
 from gqm_sym.runtime.arithmetic.doubledouble import add
-from gqm_sym.runtime.charts.chart import NODES, Chart, assemble
-from gqm_sym.runtime.charts.continuation import CLOSED, FAR, PIECE_ROWS, PIECES, SINGULAR, march
+from gqm_sym.runtime.charts.chart import NODES, Chart, PieceData, assemble
+from gqm_sym.runtime.charts.continuation import CLOSED, FAR, MAX_PIECES, PIECE_ROWS, SINGULAR, trace_one_way
 from gqm_sym.runtime.charts.evaluate import TERMS
-from gqm_sym.runtime.charts.level_pieces import ANCHOR, CORNER, POINTS, SMOOTH, look
+from gqm_sym.runtime.charts.level_pieces import ANCHOR, CORNER, POINTS, SMOOTH, LevelCurve, evaluate_points
 from gqm_sym.runtime.compiled.jit import entry
 from gqm_sym.runtime.compiled.types import VECTOR, Array
 
@@ -36,9 +36,9 @@ SINGULAR_START = 1e-9
 
 @entry(VECTOR(types.int64, VECTOR, types.float64, VECTOR))
 def _rows_at(field, p, sign, at):  # type: ignore[no-untyped-def]
-    """What `look` fills at one place, x and z as two doubles each; the first row says whether all is finite."""
+    """Return whether all is finite, then what `evaluate_points` fills at a place (x and z as two doubles each)."""
     piece = np.zeros((PIECE_ROWS, POINTS))
-    found = look(field, p, sign, at, piece)
+    found = evaluate_points(LevelCurve(field, p, sign), at, piece)
     out = piece[:, ANCHOR].copy()
     out[0] = 1.0 if found else 0.0
     return out
@@ -58,9 +58,9 @@ class Side(NamedTuple):
     angles, curvatures : (n, TERMS) arrays
         At the nodes.
     jumps : (n+1,) array
-        What is at the edges, as `march` tells it.
+        What is at the edges, as `continuation.trace_one_way` returns it.
     end : int
-        What is at the far end, as `march` tells it.
+        What is at the far end, as `continuation.trace_one_way` returns it.
     """
 
     edges: Array
@@ -114,9 +114,9 @@ class Traced:
     def chart(self, p: tuple[float, ...]) -> Chart:
         """Trace the curve.
 
-        It is followed until it closes, to a singular point (grad F = 0), to the ends of its domain, or, where it has
-        none, over `march.PIECES` pieces or `march.REACH` times the length of the first, each way. It also ends where F
-        is no longer real.
+        It is followed each way until it closes, to a singular point (grad F = 0), or to the end of its domain. Without
+        a domain it is followed over `continuation.MAX_PIECES` pieces or `continuation.MAX_REACH` times the length of
+        the first. It also ends where F is no longer real.
 
         Raises
         ------
@@ -186,10 +186,10 @@ class Traced:
     def _side(self, values: Array, start: Array, direction: int, limit: float) -> Side:
         """What lies ahead of the start, or behind it."""
         sign = float(direction * self.tangent)
-        end, edges, anchors, nodes, jumps, last = march(self.field, values, sign, start, limit, direction > 0)
+        end, edges, anchors, nodes, jumps, last = trace_one_way(self.field, values, sign, start, limit, direction > 0)
         if end == FAR and isfinite(limit):
             raise SolutionError(
-                f"the curve cannot be followed to the end of its domain: {PIECES} pieces reach s = "
+                f"the curve cannot be followed to the end of its domain: {MAX_PIECES} pieces reach s = "
                 f"{direction * edges[-1]:.9g} only, near ({anchors[-1, 0]:.9g}, {anchors[-1, 2]:.9g}); "
                 "end the domain before that place"
             )
@@ -292,11 +292,13 @@ def _pieces(side: Side) -> dict[str, Any]:
     """The arguments of `assemble` that every chart has."""
     return {
         "edges": side.edges,
-        "anchors": side.anchors[:, ::2],
-        "rests": side.anchors[:, 1::2],
-        "tangents": side.tangents,
-        "angles": side.angles,
-        "curvatures": side.curvatures,
+        "data": PieceData(
+            side.anchors[:, ::2],
+            side.angles,
+            side.curvatures,
+            tangents=side.tangents,
+            anchor_lows=side.anchors[:, 1::2],
+        ),
         "breaks": side.edges[side.jumps != SMOOTH],
         "corners": side.edges[side.jumps == CORNER],
     }

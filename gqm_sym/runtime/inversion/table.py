@@ -1,12 +1,12 @@
-"""Pass 3: the anomaly as a function of time, tabulated as polynomials on segments of time.
+"""Pass 3: the phase angle as a function of time, tabulated as polynomials on segments of time.
 
-Each panel's time is analytic and grows with the anomaly, so its inverse is analytic too. It is cut into equal
-segments, as few as a
-Chebyshev fit of fixed degree needs to be resolved to rounding. A small uniform index over time finds the segment at
-once.
+On each panel, time is an analytic and increasing function of the phase angle, so its inverse is analytic too. The
+panel's time is divided into equal segments, as few as a Chebyshev fit of fixed degree needs to be resolved to rounding.
+A small uniform index over time finds the segment of a time at once.
 """
 
 from math import fabs
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import types
@@ -17,90 +17,138 @@ from gqm_sym.runtime.compiled.buffers import longer, taller
 from gqm_sym.runtime.compiled.intrinsics import fma
 from gqm_sym.runtime.compiled.jit import Inner, entry
 from gqm_sym.runtime.compiled.types import MATRIX, VECTOR
-from gqm_sym.runtime.quadrature.time_panels import NOTHING, derivative
+from gqm_sym.runtime.quadrature.time_panels import NEGLIGIBLE_SHARE, derivative
 
+# Coefficients of a segment's polynomial, and the last of them.
 TERMS = 15
 LAST = TERMS - 1
 
-# cos(j theta_i) at the nodes of the fit, both ends of a segment among them; there the fit adds no error of its own.
-# They come from angles within a quarter turn: the rounding of larger ones would be the table's largest error.
+# COSINES[j, i] = cos(j*theta_i) at the nodes of the fit. Both ends of a segment are nodes, where the fit adds no error.
+# The angles are reduced to a quarter turn first: rounding of larger ones would be the largest error of the table.
 _HALF_TURNS = np.abs((np.outer(np.arange(TERMS), np.arange(TERMS)) + LAST) % (2 * LAST) - LAST)
 COSINES = np.sin(np.pi * (0.5 * LAST - _HALF_TURNS) / LAST)
-RESOLVED = 2e-16  # last two Chebyshev coefficients against the whole range of the anomaly
-MOST_CUTS = 2**52  # at a cusp the anomaly goes like the root of the time that is left: ever shorter segments
-MOST_AT_FIRST = 8
-LEVEL = 1e-13  # coefficients that have stopped falling below this share are rounding noise
 
-# From so many cuts of a panel on, an anomaly that is off by no more than this share of the whole time is good enough:
-# at a cusp the rounding of the time moves it further than a table can tell.
-DEEP = 2**12
-TIMED = 4e-16
-NEWTON = 1e-10
+# A fit is resolved when its last two coefficients are below this share of the largest phase angle.
+MAX_TAIL_RATIO = 2e-16
 
-# Times looked up together.
+# Coefficients that stop falling below this share are rounding noise.
+MAX_NOISE_RATIO = 1e-13
+
+# Near a cusp the phase angle goes like the square root of the time that remains, so segments become ever shorter.
+MAX_CUTS = 2**52
+MAX_FIRST_CUTS = 8
+
+# Where a panel is divided into at least so many segments, an error of the phase angle is accepted that corresponds to
+# no more than this share of the whole time: near a cusp, the rounding of the time itself changes it more.
+MANY_CUTS = 2**12
+MAX_TIME_ERROR = 4e-16
+
+# Newton's method ends with a step this short: the error after it is its square, below rounding.
+LAST_NEWTON_STEP = 1e-10
+
+# Times that are looked up together.
 BLOCK = 64
 
 
+class Table(NamedTuple):
+    """Polynomials for the phase angle over time, on n segments of time.
+
+    Attributes
+    ----------
+    middles, lows : (n,) arrays
+        The middle of each segment in s, as two doubles.
+    scales : (n,) array
+        One over half its length, in 1/s.
+    powers : (n, TERMS) array
+        Coefficients of the phase angle in powers of ``(t - middle) * scale``.
+    index : (k,) array of int
+        The first segment that can contain a time in each of k equal parts of the whole time.
+    ends : (n,) array
+        The end of each segment in s.
+    """
+
+    middles: Any
+    lows: Any
+    scales: Any
+    powers: Any
+    index: Any
+    ends: Any
+
+
 @Inner
-def anomaly_on(terms, rates_sum, target, guess):  # type: ignore[no-untyped-def]
-    """The place x in [-1, 1] of a panel where its time is ``target``, by Newton's method inside a bracket."""
+def place_on_panel(terms, slope_terms, target, guess):  # type: ignore[no-untyped-def]
+    """Return the place x in [-1, 1] of a panel where its time is ``target``, by Newton's method inside a bracket.
+
+    ``terms`` are the Legendre coefficients of the time, and ``slope_terms`` those of its derivative.
+    """
     lo, hi, x = -1.0, 1.0, guess
     for _ in range(60):
-        miss = legendre_sum(terms, x) - target
-        if miss > 0.0:
+        residual = legendre_sum(terms, x) - target
+        if residual > 0.0:
             hi = x
         else:
             lo = x
-        slope = legendre_sum(rates_sum, x)
-        new = x - miss / slope if slope > 0.0 else 0.5 * (lo + hi)
+        slope = legendre_sum(slope_terms, x)
+        new = x - residual / slope if slope > 0.0 else 0.5 * (lo + hi)
         if not (lo <= new <= hi):
             new = 0.5 * (lo + hi)
-        # Steps shrink as their squares: after one this short the next would be below rounding.
-        if fabs(new - x) <= NEWTON or hi - lo <= 1.2e-16:
+        if fabs(new - x) <= LAST_NEWTON_STEP or hi - lo <= 1.2e-16:
             return new
         x = new
     return x
 
 
 @Inner
-def tabulate(edges, times, times_low, time_terms):  # type: ignore[no-untyped-def]
-    """Polynomials for the anomaly over time.
+def _index_of(ends, total):  # type: ignore[no-untyped-def]
+    """Return the index over time of segments that end at ``ends``."""
+    index = np.empty(4 * ends.size, dtype=np.int64)
+    segment = 0
+    for i in range(index.size):
+        while segment < ends.size - 1 and ends[segment] <= total * i / index.size:
+            segment += 1
+        index[i] = segment
+    return index
 
-    ``times + times_low`` is the clock at the panels' edges: short panels that come late, where the body rushes, keep
-    their own digits. Each panel's own time runs at the pace that meets the clock at both edges.
+
+@Inner
+def tabulate(edges, times, times_low, time_terms):  # type: ignore[no-untyped-def]
+    """Fit polynomials to the phase angle over time.
+
+    Parameters
+    ----------
+    edges : (m+1,) array
+        Phase angles at the edges of the panels.
+    times, times_low : (m+1,) arrays
+        The time at the edges as two doubles: so short panels keep their own digits after a long time. The time on each
+        panel is scaled such that it agrees with these at both edges.
+    time_terms : (m, DEGREE) array
+        Legendre coefficients of the time on each panel.
 
     Returns
     -------
-    middles, lows, scales : (n,) arrays
-        Middle of each segment in time, as two doubles, and one over half its length.
-    powers : (n, TERMS) array
-        Coefficients of the anomaly in powers of ``(t - middle) * scale``.
-    index : (k,) array of int
-        First segment that can hold a time in each of k equal parts of the whole time.
-    ends : (n,) array
-        Where each segment ends in time.
+    middles, lows, scales, powers, index, ends
+        As `Table` has them.
     errors : (n,) array
-        Unresolved part of the anomaly on each segment, beyond what ``TIMED`` allows.
+        The unresolved part of the phase angle on each segment, beyond what MAX_TIME_ERROR permits.
     """
-    room = 32
-    middles, lows, scales, ends = np.empty(room), np.empty(room), np.empty(room), np.empty(room)
-    errors = np.empty(room)
-    powers = np.empty((room, TERMS))
-    values, c = np.empty(TERMS), np.empty(TERMS)
-    slope_terms = np.empty(time_terms.shape[1])
-    scale = max(fabs(edges[0]), fabs(edges[-1]))
+    capacity = 32
+    middles, lows, scales = np.empty(capacity), np.empty(capacity), np.empty(capacity)
+    ends, errors = np.empty(capacity), np.empty(capacity)
+    powers = np.empty((capacity, TERMS))
+    values, c, slope_terms = np.empty(TERMS), np.empty(TERMS), np.empty(time_terms.shape[1])
+    size = max(fabs(edges[0]), fabs(edges[-1]))
     count, cuts = 0, 1
     for k in range(edges.size - 1):
         left, half = edges[k], 0.5 * (edges[k + 1] - edges[k])
         duration = (times[k + 1] - times[k]) + (times_low[k + 1] - times_low[k])
-        if k > 0 and duration <= NOTHING * times[k]:
+        if k > 0 and duration <= NEGLIGIBLE_SHARE * times[k]:
             continue
-        pace = legendre_sum(time_terms[k], 1.0) / duration
+        scale = legendre_sum(time_terms[k], 1.0) / duration
         derivative(time_terms[k], slope_terms)
-        # ``done`` of ``cuts`` equal segments of the panel's time are laid; the panel before tells how many to try.
-        done, cuts = 0, min(cuts, MOST_AT_FIRST)
+        # ``done`` of ``cuts`` equal segments are complete; the panel before suggests how many cuts to try first.
+        done, cuts = 0, min(cuts, MAX_FIRST_CUTS)
         while done < cuts:
-            # From the panel's left edge.
+            # Times from the panel's left edge.
             start, stop = duration * done / cuts, duration * (done + 1) / cuts
             middle, reach = 0.5 * (start + stop), 0.5 * (stop - start)
             guess, steepest = 2.0 * (done + 0.5) / cuts - 1.0, 0.0
@@ -110,14 +158,14 @@ def tabulate(edges, times, times_low, time_terms):  # type: ignore[no-untyped-de
                 elif i == LAST and done == 0:
                     guess = -1.0
                 else:
-                    target = (middle + reach * COSINES[1, i]) * pace
-                    guess = anomaly_on(time_terms[k], slope_terms, target, guess)
+                    target = (middle + reach * COSINES[1, i]) * scale
+                    guess = place_on_panel(time_terms[k], slope_terms, target, guess)
                 values[i] = guess
                 slope = legendre_sum(slope_terms, guess)
                 steepest = max(steepest, slope)
                 if i < LAST and slope > 0.0:
-                    ahead = guess + pace * reach * (COSINES[1, i + 1] - COSINES[1, i]) / slope
-                    guess = min(max(ahead, -1.0), 1.0)
+                    next_guess = guess + scale * reach * (COSINES[1, i + 1] - COSINES[1, i]) / slope
+                    guess = min(max(next_guess, -1.0), 1.0)
             for j in range(TERMS):
                 total = 0.5 * (values[0] * COSINES[j, 0] + values[LAST] * COSINES[j, LAST])
                 for i in range(1, LAST):
@@ -127,46 +175,34 @@ def tabulate(edges, times, times_low, time_terms):  # type: ignore[no-untyped-de
             c[LAST] *= 0.5
             tail = half * max(fabs(c[LAST]), fabs(c[LAST - 1]))
             before = half * max(fabs(c[LAST - 4]), fabs(c[LAST - 5]))
-            settled = tail <= RESOLVED * scale or (before <= LEVEL * scale and tail > 0.2 * before)
-            timed = not settled and cuts >= DEEP and tail / half * steepest <= TIMED * times[-1]
-            if not settled and not timed and cuts < MOST_CUTS:
+            resolved = tail <= MAX_TAIL_RATIO * size or (before <= MAX_NOISE_RATIO * size and tail > 0.2 * before)
+            accepted = not resolved and cuts >= MANY_CUTS and tail / half * steepest <= MAX_TIME_ERROR * times[-1]
+            if not resolved and not accepted and cuts < MAX_CUTS:
                 done, cuts = 2 * done, 2 * cuts
                 continue
-            if count == room:
-                room *= 2
-                middles, lows, errors, scales, ends = (
-                    longer(middles, room),
-                    longer(lows, room),
-                    longer(errors, room),
-                    longer(scales, room),
-                    longer(ends, room),
-                )
-                powers = taller(powers, room)
+            if count == capacity:
+                capacity *= 2
+                middles, lows, scales = longer(middles, capacity), longer(lows, capacity), longer(scales, capacity)
+                ends, errors = longer(ends, capacity), longer(errors, capacity)
+                powers = taller(powers, capacity)
             middles[count], low = two_sum(times[k], middle)
             lows[count], scales[count], ends[count] = low + times_low[k], 1.0 / reach, times[k] + stop
-            errors[count] = 0.0 if timed else tail
+            errors[count] = 0.0 if accepted else tail
             _to_powers(c, powers[count])
             for j in range(TERMS):
                 powers[count, j] *= half
             powers[count, 0] += left + half
             count += 1
             done += 1
-            while done % 2 == 0 and cuts > 1 and done < cuts:  # widen again where the panel allows it
+            while done % 2 == 0 and cuts > 1 and done < cuts:  # try segments of twice the length next
                 done, cuts = done // 2, cuts // 2
-    whole = times[-1]
-    ends[count - 1] = whole
-    index = np.empty(4 * count, dtype=np.int64)
-    segment = 0
-    for i in range(index.size):
-        while segment < count - 1 and ends[segment] <= whole * i / index.size:
-            segment += 1
-        index[i] = segment
+    ends[count - 1] = times[-1]
     return (
         middles[:count].copy(),
         lows[:count].copy(),
         scales[:count].copy(),
         powers[:count].copy(),
-        index,
+        _index_of(ends[:count], times[-1]),
         ends[:count].copy(),
         errors[:count].copy(),
     )
@@ -174,7 +210,10 @@ def tabulate(edges, times, times_low, time_terms):  # type: ignore[no-untyped-de
 
 @Inner
 def _to_powers(c, out):  # type: ignore[no-untyped-def]
-    """Powers of x from Chebyshev coefficients (which fall fast enough for this to keep every digit)."""
+    """Fill ``out`` with coefficients of powers of x from Chebyshev coefficients ``c``.
+
+    No digits are lost, because the coefficients fall fast.
+    """
     n = c.size
     one, two = np.zeros(n), np.zeros(n)
     out[:] = 0.0
@@ -194,11 +233,21 @@ def _to_powers(c, out):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def look_up(middles, lows, scales, powers, index, ends, t, t_low, n, segments, x, out):  # type: ignore[no-untyped-def]
-    """The anomalies at n times t + t_low of a table, side by side, and on which segments they are.
+def look_up(table, t, t_low, n, segments, x, out):  # type: ignore[no-untyped-def]
+    """Fill ``out`` with the phase angles at n times, in vector registers.
 
-    ``x`` is room for n numbers.
+    Parameters
+    ----------
+    table : Table
+        The table.
+    t, t_low : (n,) arrays
+        Times in s, as two doubles each.
+    segments : (n,) array of int
+        Filled with the index of each time's segment.
+    x : (n,) array
+        Work space.
     """
+    middles, lows, scales, powers, index, ends = table
     slots = index.size / ends[-1] if ends[-1] > 0.0 else 0.0
     for i in range(n):
         segment = index[min(max(np.int64(t[i] * slots), 0), index.size - 1)]
@@ -214,28 +263,22 @@ def look_up(middles, lows, scales, powers, index, ends, t, t_low, n, segments, x
             out[i] = fma(out[i], x[i], powers[segments[i], j])
 
 
-@Inner
-def look_up_many(middles, lows, scales, powers, index, ends, t, t_low, out):  # type: ignore[no-untyped-def]
-    """The anomaly at many times of one table."""
-    segments, x = np.empty(BLOCK, dtype=np.int64), np.empty(BLOCK)
-    for start in range(0, t.size, BLOCK):
-        n = min(BLOCK, t.size - start)
-        place = slice(start, start + n)
-        look_up(middles, lows, scales, powers, index, ends, t[place], t_low[place], n, segments, x, out[place])
-
-
 TABLE_TYPE = types.Tuple((VECTOR, VECTOR, VECTOR, MATRIX, types.int64[::1], VECTOR, VECTOR))
 
 
 @entry(TABLE_TYPE(VECTOR, VECTOR, VECTOR, MATRIX))
 def build_table(edges, times, times_low, time_terms):  # type: ignore[no-untyped-def]
-    """`inversion.tabulate`, for Python."""
+    """Call `tabulate` from Python."""
     return tabulate(edges, times, times_low, time_terms)
 
 
 @entry(VECTOR(VECTOR, VECTOR, VECTOR, MATRIX, types.int64[::1], VECTOR, VECTOR, VECTOR))
-def anomalies(middles, lows, scales, powers, index, ends, t, t_low):  # type: ignore[no-untyped-def]
-    """`inversion.look_up_many`, for Python."""
-    out = np.empty(t.size)
-    look_up_many(middles, lows, scales, powers, index, ends, t, t_low, out)
+def phase_angles(middles, lows, scales, powers, index, ends, t, t_low):  # type: ignore[no-untyped-def]
+    """Return the phase angles at many times, as two doubles each; the other arguments are those of `Table`."""
+    out, table = np.empty(t.size), Table(middles, lows, scales, powers, index, ends)
+    segments, x = np.empty(BLOCK, dtype=np.int64), np.empty(BLOCK)
+    for start in range(0, t.size, BLOCK):
+        n = min(BLOCK, t.size - start)
+        block = slice(start, start + n)
+        look_up(table, t[block], t_low[block], n, segments, x, out[block])
     return out

@@ -1,1 +1,1 @@
-"""One launch: checked, bound to its functions, and where its motion ends."""
+"""One launch: its numbers checked, its functions bound to them, and the ends of its motion."""

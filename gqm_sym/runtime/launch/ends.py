@@ -1,210 +1,291 @@
-"""How far a motion reaches each way from its launch, and what ends it there."""
+"""How far a motion can go in each direction from its launch, and what ends it there."""
 
 from dataclasses import dataclass
 from math import fabs, inf, isfinite
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numba import types
 
+from gqm_sym.budgets import spend
 from gqm_sym.errors import LaunchError, SolutionError
 from gqm_sym.runtime.compiled.calls import call_effective_potential
 from gqm_sym.runtime.compiled.intrinsics import choose, whole_below
 from gqm_sym.runtime.compiled.jit import Inner, entry
 from gqm_sym.runtime.compiled.types import ADDRESSES, REAL, VECTOR
 from gqm_sym.runtime.launch import zeros
+from gqm_sym.runtime.launch.kinds import EndKind
 from gqm_sym.runtime.launch.problem import Problem
 from gqm_sym.runtime.launch.speed import path_and_force_at
-from gqm_sym.runtime.launch.zeros import CRITICAL, LIMIT, TURN, first_zero, speed_squared
+from gqm_sym.runtime.launch.zeros import CRITICAL, LIMIT, TURN, FoundEnd, SearchArrays, first_zero, speed_squared
 from gqm_sym.runtime.multiprecision.exact_panels import DIGITS
+from gqm_sym.runtime.multiprecision.exact_problem import End
+from gqm_sym.runtime.quadrature.trapezoid import CIRCULATION, LIBRATION
 
+# A `FoundEnd` as Python gets it: making a plain tuple is faster.
 END_TYPE = types.Tuple((types.int64, REAL, REAL))
 
-# A launch from rest on a slope below this share of the climb's size may be an equilibrium: exact numbers decide.
-FLAT = 1e-12
+# `orbit_kind` of a motion that is no periodic one, or that doubles cannot decide.
+NO_ORBIT = -1
 
-# A launch this near to an axis is not mirrored by what doubles know of it, nor one beyond this share of the way to the
-# next: there it may be an equilibrium.
-UNCLEAR, ALL_BUT = 1e-6, 0.9
+# A launch from rest may be an equilibrium if the change of the effective potential over the first step, by its slope,
+# is below this share of the potential's size: the problem in extended precision then decides.
+FLAT_SHARE = 1e-12
+
+# The mirror image of a launch from rest is not used if the launch is this near to an axis (as a share of the
+# parameter), or beyond the second share of the way from one axis to the next: it may be an equilibrium there.
+NEAR_AXIS, MAX_AXIS_STEP_SHARE = 1e-6, 0.9
+
+# ds at an end of the domain, as a share of its value at the launch, up to which the end is a cusp.
+CUSP_SHARE = 1e-7
+
+# Distance from a place at which ds is compared with that at the place itself, to tell whether it is a cusp; as a share
+# of the first step.
+NEAR_CUSP = 1e-3
+
+# Places at which V**2 nearly vanishes that a search passes.
+MAX_BARRIERS = 100
 
 
 @Inner
-def first_step(low, high, period):  # type: ignore[no-untyped-def]
-    """A step to begin a walk with: an eighth of the curve where that is known."""
-    if period > 0.0:
-        return period / 8.0
-    if isfinite(high - low):
-        return (high - low) / 8.0
+def first_step(domain):  # type: ignore[no-untyped-def]
+    """The step that a search begins with: an eighth of the curve where its length is known."""
+    if domain.period > 0.0:
+        return domain.period / 8.0
+    if isfinite(domain.high - domain.low):
+        return (domain.high - domain.low) / 8.0
     return 1.0
 
 
 @entry(END_TYPE(ADDRESSES, VECTOR, REAL, REAL, types.int64, REAL, REAL, REAL))
-def first_zero_from(fns, p, lam0, w0, direction, begin, reach, step):  # type: ignore[no-untyped-def]
-    """`search.walk`, for Python."""
-    return first_zero(fns, p, lam0, w0, direction, begin, reach, step)
+def first_zero_from(fns, p, lam0, w0, direction, begin, length, step):  # type: ignore[no-untyped-def]
+    """`zeros.first_zero`, to be called from Python."""
+    found = first_zero(fns, p, lam0, w0, direction, begin, length, step)
+    return found.what, found.near, found.far
 
 
 @Inner
-def distance_to_axis(start, way, place, step):  # type: ignore[no-untyped-def]
-    """How far the first axis of symmetry is ahead; of a lone one (``step`` 0) less than nothing where it is behind."""
-    away = way * (place - start)
+def distance_to_axis(start, direction, axis, step):  # type: ignore[no-untyped-def]
+    """How far the first axis of symmetry is ahead; negative if there is one only (``step`` 0) and it is behind."""
+    away = direction * (axis - start)
     return choose(step > 0.0, away - step * whole_below(away / step), away)
 
 
 @Inner
-def mirror_image(fns, p, lam0, direction, reach, place, step):  # type: ignore[no-untyped-def]
-    """How far a body released at rest comes in an even well, beyond the first axis ahead; 0 where walking must tell.
+def mirror_image(fns, p, lam0, direction, length, domain):  # type: ignore[no-untyped-def]
+    """The offset of the turning point of a body released at rest in an even well; 0 where a search must find it.
 
-    V**2 rises all the way to the axis and falls all the way to the next, ``step`` farther (0: there is no other).
+    V**2 grows all the way to the first axis ahead and falls all the way from there to the next, so the turning point is
+    the mirror image of the launch place.
     """
-    ahead = distance_to_axis(lam0, float(direction), place, step)
+    axis, step = domain.axis, domain.axis_step
+    ahead = distance_to_axis(lam0, float(direction), axis, step)
     guess = 2.0 * ahead
-    # NaN where no axis is known; next to one, or to where the body would just come over the next, walking is safer.
-    if not (ahead > UNCLEAR * (fabs(lam0) + fabs(place)) and guess <= reach) or (step > 0.0 and ahead > ALL_BUT * step):
+    # The first comparison is false (NaN) where no axis is known.
+    near_axis = not (ahead > NEAR_AXIS * (fabs(lam0) + fabs(axis)) and guess <= length)
+    if near_axis or (step > 0.0 and ahead > MAX_AXIS_STEP_SHARE * step):
         return 0.0
     guess *= direction
-    spot, rows = np.empty(2), np.empty((2, 1))
-    left, _size = speed_squared(fns, p, lam0, 0.0, guess, spot, rows)
-    call_effective_potential(fns.effective_potential, 1, spot, p, rows)
-    more = left / rows[1, 0]  # a step of Newton's method, for what the axis is rounded by
-    return guess + more if fabs(more) <= UNCLEAR * fabs(guess) else 0.0
+    arrays = SearchArrays(np.empty(2), np.empty((2, 1)), np.empty(0))
+    v2, _size = speed_squared(fns, p, lam0, 0.0, guess, arrays)
+    call_effective_potential(fns.effective_potential, 1, arrays.point, p, arrays.rows)
+    correction = v2 / (2.0 * arrays.rows[1, 0])  # one step of Newton's method, because the axis is rounded
+    return guess + correction if fabs(correction) <= NEAR_AXIS * fabs(guess) else 0.0
 
 
 @Inner
-def ends(fns, p, lam0, v0, direction, low, high, period, place, step):  # type: ignore[no-untyped-def]
-    """How far a motion reaches each way, and which way it goes.
+def downhill(fns, p, lam0, step):  # type: ignore[no-untyped-def]
+    """The direction in which a body released at rest falls; 0 next to an equilibrium, which doubles cannot decide."""
+    rows, size = np.empty((2, 3)), 0.0
+    call_effective_potential(fns.effective_potential, 3, lam0 + step * np.array([0.0, 1.0, -1.0]), p, rows)
+    for potential in rows[0]:
+        if isfinite(potential):
+            size = max(size, fabs(potential))
+    if not fabs(rows[1, 0]) * step > FLAT_SHARE * size:
+        return 0
+    return -1 if rows[1, 0] > 0.0 else 1
 
-    ``place`` and ``step`` are of even wells between whose axes V**2 rises or falls all the way; else ``place`` is NaN.
+
+@Inner
+def ends(fns, p, lam0, v0, direction, domain):  # type: ignore[no-untyped-def]
+    """How far a motion can go in each direction, and in which direction it begins.
 
     Returns
     -------
     direction : int
-        The sign of ds/dt after launch (a body released at rest goes where it falls); 0 where exact numbers must decide.
-    ahead, behind : (what, near, far)
-        As `search.walk` returns them; ``behind`` is walked only if ``ahead`` is a turning point.
+        The sign of ds/dt after launch (a body released at rest goes where it falls); 0 where doubles cannot decide.
+    ahead, behind : FoundEnd
+        What `zeros.first_zero` found in this direction, and in the other if ``ahead`` is a turning point.
     """
-    nothing = (LIMIT, 0.0, 0.0)
-    w0 = v0 * v0
-    begin = first_step(low, high, period)
+    nothing = FoundEnd(LIMIT, 0.0, 0.0)
+    w0, period = v0 * v0, domain.period
+    step = first_step(domain)
     if w0 == 0.0:
-        rows, size = np.empty((2, 3)), 0.0
-        call_effective_potential(fns.effective_potential, 3, lam0 + begin * np.array([0.0, 1.0, -1.0]), p, rows)
-        for height in rows[0]:
-            if isfinite(height):
-                size = max(size, fabs(height))
-        if not fabs(rows[1, 0]) * begin > FLAT * size:
-            return 0, (CRITICAL, 0.0, 0.0), nothing
-        direction = -1 if rows[1, 0] > 0.0 else 1
-    reach = period if period > 0.0 else (high - lam0 if direction > 0 else lam0 - low)
+        direction = downhill(fns, p, lam0, step)
+        if direction == 0:
+            return 0, FoundEnd(CRITICAL, 0.0, 0.0), nothing
+    length = period if period > 0.0 else (domain.high - lam0 if direction > 0 else lam0 - domain.low)
     if w0 == 0.0:
-        turn = mirror_image(fns, p, lam0, direction, reach, place, step)
+        turn = mirror_image(fns, p, lam0, direction, length, domain)
         if turn != 0.0:
-            return direction, (TURN, turn, turn), (TURN, 0.0, 0.0)
-    ahead = first_zero(fns, p, lam0, w0, direction, 0.0, reach, begin)
-    if ahead[0] != TURN:
+            return direction, FoundEnd(TURN, turn, turn), FoundEnd(TURN, 0.0, 0.0)
+    ahead = first_zero(fns, p, lam0, w0, direction, 0.0, length, step)
+    if ahead.what != TURN:
         return direction, ahead, nothing
     if w0 == 0.0:
-        return direction, ahead, (TURN, 0.0, 0.0)
-    reach = period - fabs(ahead[1]) if period > 0.0 else (lam0 - low if direction > 0 else high - lam0)
-    return direction, ahead, first_zero(fns, p, lam0, w0, -direction, 0.0, reach, begin)
+        return direction, ahead, FoundEnd(TURN, 0.0, 0.0)
+    length = period - fabs(ahead.near) if period > 0.0 else (lam0 - domain.low if direction > 0 else domain.high - lam0)
+    return direction, ahead, first_zero(fns, p, lam0, w0, -direction, 0.0, length, step)
+
+
+@Inner
+def orbit_kind(direction, ahead, behind, v0, period):  # type: ignore[no-untyped-def]
+    """LIBRATION or CIRCULATION, by what `ends` found; NO_ORBIT for any other motion, and where that is not decided."""
+    if direction == 0:
+        return NO_ORBIT
+    if ahead.what == TURN and behind.what == TURN:
+        return LIBRATION
+    return CIRCULATION if ahead.what == LIMIT and period > 0.0 and v0 > 0.0 else NO_ORBIT
 
 
 @dataclass(frozen=True, slots=True)
 class EndOfMotion:
-    """How far the motion goes one way, and what is there.
+    """How far the motion can go in one direction, and what is there.
 
-    ``what`` is "turn", "equilibrium", "domain-end", "singular-point", "cusp", "closed", or "open" (towards infinity or
-    a pole). ``level`` marks a cusp at which V**2 vanishes as well: it is reached in finite time all the same.
-    ``offset`` is a turning point's from the launch, which keeps its digits where both are one place in doubles.
+    Attributes
+    ----------
+    what : str
+        One of `kinds.EndKind`.
+    place : float
+        The curve parameter there, infinite if the motion goes on for ever.
+    multiprecision : mpf or None
+        The same in extended precision, where it was found so.
+    zero_v2 : bool
+        Of a cusp, whether V**2 vanishes there as well: the motion comes to it in finite time nevertheless.
+    offset : float
+        Of a turning point, its signed distance from the launch place, which keeps its digits where both are the same
+        double.
     """
 
-    what: str
+    what: EndKind
     place: float
-    exact: Any = None
-    level: bool = False
+    multiprecision: Any = None
+    zero_v2: bool = False
     offset: float = 0.0
 
 
-# ds at an end of the domain, against its value at the launch, that makes the end a cusp.
-CUSP_SHARE = 1e-7
-
-# How far from a place ds is looked at to tell whether it is a cusp, and where a walk from one begins; in first steps.
-NEAR_CUSP = 1e-3
-
-
 def starting_step(problem: Problem) -> float:
-    """A step along the curve to begin with."""
-    step: float = first_step.py_func(*problem.domain[:3])
+    """The step along the curve that a search begins with, in units of the curve parameter."""
+    step: float = first_step.py_func(problem.domain.numbers)
     return step
 
 
-def _room(problem: Problem, direction: int) -> float:
+def distance_to_end(problem: Problem, direction: int) -> float:
+    """The distance from the launch place to the end of the domain in one direction."""
     return problem.high - problem.lam0 if direction > 0 else problem.lam0 - problem.low
 
 
-def _reach(problem: Problem, direction: int, walked: tuple[int, float, float]) -> EndOfMotion:
-    """What a walk found, with the exact problem asked where doubles could not decide."""
+def search_beyond_barriers(
+    problem: Problem, direction: int, found: tuple[int, float, float], length: float, step: float
+) -> tuple[tuple[int, float, float], End | None]:
+    """Continue a search beyond places that doubles cannot decide and where V**2 is positive in extended precision.
+
+    Parameters
+    ----------
+    found : (what, near, far)
+        What the search has found so far (`zeros.FoundEnd`).
+    length, step : float
+        How far from the launch place to search, and the first step behind such a place.
+
+    Returns
+    -------
+    found : (what, near, far)
+        What ended the search. If that is CRITICAL, extended precision has decided:
+    end : End or None
+        what lies there, a turning point or an equilibrium.
+    """
     f, lam0 = problem.functions, problem.lam0
-    limit = problem.period or _room(problem, direction)
-    for _ in range(100):
-        what, near, far = walked
-        if what == zeros.CRITICAL:
-            end = problem.decider.resolve(lam0 + near, lam0 + far, direction)
-            if end.what == "equilibrium" and _is_cusp(problem, float(end.place)):
-                return EndOfMotion("cusp", float(end.place), end.place, level=True)
-            if end.what != "clear":
-                origin = lam0 if f.exact is None else f.exact.at(DIGITS).lam0
-                return EndOfMotion(end.what, float(end.place), end.place, offset=float(end.place - origin))
-            walked = first_zero_from(
-                f.addresses,
-                f.p,
-                lam0,
-                problem.w0,
-                direction,
-                max(abs(far), 1e-300),
-                limit,
-                starting_step(problem),
-            )
-            continue
-        if what == zeros.TURN:
-            return EndOfMotion("turn", lam0 + near, offset=near)
-        if what == zeros.LIMIT:
-            if problem.period and problem.w0 == 0.0:  # back at the launch place, where V**2 is zero again
-                walked = (zeros.CRITICAL, near * (1.0 - 1e-4), near)
-                continue
-            if problem.period:
-                return EndOfMotion("closed", lam0 + direction * problem.period)
-            return domain_end(problem, direction)
-        if what == zeros.CUSP:
-            return EndOfMotion("cusp", lam0 + far)
-        if what == zeros.MARCHED:
-            return EndOfMotion("open", direction * inf)
-        return EndOfMotion("open", lam0 + far)  # a pole: how long it takes to get there, stretch by stretch
-    raise SolutionError(
-        f"turning points from {problem.formulas.parameter} = {lam0!r}: too many places at which V**2 nearly vanishes"
+    for _ in range(MAX_BARRIERS):
+        spend()
+        what, near, far = found
+        if what != CRITICAL:
+            return found, None
+        end = problem.decider.resolve(lam0 + near, lam0 + far, direction)
+        if end.what != "clear":
+            return found, end
+        begin = max(abs(far), 1e-300)
+        found = first_zero_from(f.addresses, f.p, lam0, problem.w0, direction, begin, length, step)
+    raise _too_many_barriers(problem)
+
+
+def _too_many_barriers(problem: Problem) -> SolutionError:
+    """The error for a curve with too many places that doubles cannot decide."""
+    return SolutionError(
+        f"turning points from {problem.formulas.parameter} = {problem.lam0!r}: "
+        "too many places at which V**2 nearly vanishes"
     )
 
 
+def end_of_motion(problem: Problem, direction: int, found: tuple[int, float, float]) -> EndOfMotion:
+    """What ends the motion in one direction, by what a search found and, where needed, by extended precision."""
+    lam0, period, step = problem.lam0, problem.period, starting_step(problem)
+    length = period or distance_to_end(problem, direction)
+    for _ in range(MAX_BARRIERS):
+        found, end = search_beyond_barriers(problem, direction, found, length, step)
+        if found[0] != LIMIT or not period or problem.w0 > 0.0:
+            break
+        # The search is back at the launch place of a body released from rest, where V**2 is zero again.
+        found = (CRITICAL, found[1] * (1.0 - 1e-4), found[1])
+    else:
+        raise _too_many_barriers(problem)
+    if end is not None:
+        return _decided_end(problem, end)
+    what, near, far = found
+    if what == zeros.TURN:
+        return EndOfMotion("turn", lam0 + near, offset=near)
+    if what == zeros.LIMIT:
+        return EndOfMotion("closed", lam0 + direction * period) if period else domain_end(problem, direction)
+    if what == zeros.CUSP:
+        return EndOfMotion("cusp", lam0 + far)
+    if what == zeros.STEPS_SPENT:
+        return EndOfMotion("open", direction * inf)
+    return EndOfMotion("open", lam0 + far)  # a pole: the time to it is computed segment by segment
+
+
+def _decided_end(problem: Problem, end: End) -> EndOfMotion:
+    """The turning point or the equilibrium that was found in extended precision."""
+    place = float(end.place)
+    if end.what == "equilibrium" and is_cusp(problem, place):
+        return EndOfMotion("cusp", place, end.place, zero_v2=True)
+    exact = problem.functions.exact
+    origin = problem.lam0 if exact is None else exact.at(DIGITS).lam0
+    what: EndKind = "equilibrium" if end.what == "equilibrium" else "turn"
+    return EndOfMotion(what, place, end.place, offset=float(end.place - origin))
+
+
 def domain_end(problem: Problem, direction: int) -> EndOfMotion:
-    """The end of the domain one way: what is there."""
-    place, name = (problem.high, problem.domain.ends[1]) if direction > 0 else (problem.low, problem.domain.ends[0])
+    """The end of the domain in one direction, and what is there."""
+    upper = direction > 0
+    place = problem.high if upper else problem.low
     if not isfinite(place):
         return EndOfMotion("open", place)
     f = problem.functions
     here = np.array([problem.lam0, place])
     ds = path_and_force_at(f.addresses, f.p, here, np.zeros(2))[2]
-    return EndOfMotion("cusp" if ds[1] <= CUSP_SHARE * ds[0] else name, place)
+    if ds[1] <= CUSP_SHARE * ds[0]:
+        return EndOfMotion("cusp", place)
+    return EndOfMotion(cast(EndKind, problem.domain.ends[1 if upper else 0]), place)
 
 
-def _is_cusp(problem: Problem, place: float) -> bool:
-    """Whether ds vanishes at a place, against its values near by."""
+def is_cusp(problem: Problem, place: float) -> bool:
+    """Whether ds vanishes at a place, as a share of its values near by."""
     f, near = problem.functions, NEAR_CUSP * starting_step(problem)
     ds = path_and_force_at(f.addresses, f.p, place + near * np.array([0.0, -1.0, 1.0]), np.zeros(3))[2]
     return bool(ds[0] <= 1e-10 * np.nanmax(ds[1:]))
 
 
 def leaving_at_once(problem: Problem, direction: int, what: str) -> LaunchError:
-    """What to say where a launch would leave the curve at once."""
+    """The error for a launch that would leave the curve at once."""
     return LaunchError(
         f"lam0: {problem.lam0!r} is the {what} itself, and the motion would leave through it at once; "
         f"launch with direction={-direction} or from a place inside the domain"

@@ -4,32 +4,42 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from gqm_sym.budgets import budget
-from gqm_sym.errors import ParameterError
+from gqm_sym.errors import ParameterError, renamed
 from gqm_sym.literals.namespaces import FLOATS
 from gqm_sym.literals.numbers import Number, read_number
 from gqm_sym.runtime.charts.chart import Chart, ChartMaker
 from gqm_sym.runtime.compiled.jit import Later
 from gqm_sym.runtime.compiled.types import Array
-from gqm_sym.runtime.interface import Addresses, Dissipation, Each, ExactClimb, ExactFormulas
-from gqm_sym.runtime.launch.domain import Domain
+from gqm_sym.runtime.interface import Addresses, BatchFunctions, Dissipation, ExactFormulas, ExactPotential
+from gqm_sym.runtime.launch.domain import Domain, DomainNumbers
 
 
 class ParameterValues(tuple[Number, ...]):
-    """Run-time parameters, and what follows from them alone: the same for every launch with them."""
+    """Exact values of the run-time parameters, and what follows from them alone: it is the same for all launches.
+
+    Attributes
+    ----------
+    values : array
+        The values as doubles.
+    domain : Domain or None
+        The range of the curve parameter, once it has been asked for.
+    functions : launch.functions.BoundFunctions or None
+        The compiled functions bound to these values, once they have been asked for.
+    """
 
     values: Array
     domain: Domain | None = None
-    functions: Any = None  # `launch.problem.BoundFunctions` of all launches with these parameters
+    functions: Any = None
 
 
 @lru_cache(maxsize=8)
 def _chart(maker: ChartMaker, values: tuple[float, ...]) -> Chart:
-    """A curve's chart, made once for the same values of the run-time parameters."""
+    """The chart of a curve; it is made once for the same values of the run-time parameters."""
     with budget("chart", 60.0, "give fewer points, or shorter and simpler pieces"):
         return maker.chart(values)
 
@@ -41,33 +51,38 @@ class Formulas:
     Attributes
     ----------
     name, parameter : str
-        Its name, and the name of the curve's parameter.
+        The module's name, and the name of the curve parameter.
     parameters : dict
-        Run-time parameters and their defaults, None where one must be given.
+        The run-time parameters and their defaults; None for one that must be given.
     positive : tuple of str
-        Parameters for which the closed forms assume a positive value.
+        The parameters for which the closed forms assume a positive value.
     at_least : tuple of (str, str)
-        Parameters with what they must not fall below: a number, or another parameter.
-    body : str
-        The radius of a rolling body whose centre's path was derived from its track; empty for any other.
-    grip : tuple of str, optional
-        Of a rolling body whose static friction is known: its inertia beta and its coefficient mu_static.
-    domain_of
-        ``f(op, p)``: both ends of the parameter's range and its period, None where there is none. A chart has its own.
-    axes_of
-        ``f(op, p)``: a place about which V**2 and ds are even, and the distance to the next; None where there is none.
-    monotone
-        Whether V**2 is proved to rise or fall all the way between two such places, and ds to vanish nowhere.
-    exact
-        The formulas over a namespace of operations, of a charted curve those of the forces; None where there are none.
-    chart
+        Parameters, each with its lower limit: a number, or the name of another parameter.
+    rolling_radius : str
+        The name of the parameter that is the radius of a rolling body, if the path of its centre was derived from the
+        track; empty otherwise.
+    static_friction_limit : (str, str), optional
+        For a rolling body whose static friction is known, the names of its inertia factor beta and of its coefficient
+        mu_static.
+    domain_of : callable or None
+        ``f(op, p)`` gives both ends of the parameter's range and its period, None for each that does not exist. None
+        for a charted curve, whose chart has its own range.
+    axes_of : callable or None
+        ``f(op, p)`` gives one place about which V**2 and ds are even, and the distance to the next; None for each that
+        does not exist.
+    monotone : bool
+        Whether it is proved that V**2 rises or falls all the way between two neighbouring axes, and that ds vanishes
+        nowhere.
+    exact : ExactFormulas, ExactPotential or None
+        The formulas over a namespace of operations; those of the forces only for a charted curve.
+    chart : ChartMaker or None
         What makes the chart of a curve that has no formulas.
-    dissipation
+    dissipation : Dissipation or None
         What a dissipative model adds; None for a conservative one.
-    loads
-        What fills a load map at once; None where there is no such function.
-    each
-        The functions of a sweep; None where motions are solved one by one.
+    load_map : Later or None
+        The function that fills a load map in one pass; None if there is none.
+    batch : BatchFunctions or None
+        The functions that serve many orbits at once; None if motions are solved one by one.
     """
 
     name: str
@@ -78,30 +93,51 @@ class Formulas:
     domain_of: Callable[..., Any] | None = None
     axes_of: Callable[..., Any] | None = None
     monotone: bool = False
-    exact: ExactFormulas | ExactClimb | None = None
+    exact: ExactFormulas | ExactPotential | None = None
     chart: ChartMaker | None = None
     dissipation: Dissipation | None = None
-    loads: Later | None = None
-    each: Each | None = None
+    load_map: Later | None = None
+    batch: BatchFunctions | None = None
     at_least: tuple[tuple[str, str], ...] = ()
-    body: str = ""
-    grip: tuple[str, str] | None = None
+    rolling_radius: str = ""
+    static_friction_limit: tuple[str, str] | None = None
     _read: Callable[..., "ParameterValues"] = field(init=False, repr=False, compare=False)
 
+    if not TYPE_CHECKING:
+        __getattr__ = renamed(
+            {
+                **{"body": "rolling_radius", "each": "batch"},
+                **{"grip": "static_friction_limit", "loads": "load_map"},
+            },
+            "a compiled model",
+        )
+
     def __post_init__(self) -> None:
-        # Most launches come with the parameters of one before; 1 and 1.0 are told apart, for their texts differ.
+        # Most launches have the parameters of a launch before. The integer 1 and the float 1.0 are kept apart, because
+        # their texts differ.
         object.__setattr__(self, "_read", lru_cache(maxsize=16, typed=True)(self._numbers))
 
-    def numbers(self, given: tuple[Any, ...]) -> "ParameterValues":
-        """The run-time parameters as exact numbers, checked."""
-        try:
-            return self._read(*given)
-        except TypeError:  # what cannot be hashed
-            return self._numbers(*given)
+    def numbers(self, values: tuple[Any, ...]) -> "ParameterValues":
+        """The run-time parameters as exact numbers, checked.
 
-    def _numbers(self, *given: Any) -> "ParameterValues":
+        Parameters
+        ----------
+        values : tuple
+            A value for each parameter, in the order of ``parameters``; None for one that has no default.
+
+        Raises
+        ------
+        ParameterError
+            If a value is missing, not a number, not positive where it must be, or below its lower limit.
+        """
+        try:
+            return self._read(*values)
+        except TypeError:  # a value that cannot be hashed, such as an array
+            return self._numbers(*values)
+
+    def _numbers(self, *values: Any) -> "ParameterValues":
         out = []
-        for name, value in zip(self.parameters, given, strict=True):
+        for name, value in zip(self.parameters, values, strict=True):
             if value is None:
                 raise ParameterError(f"{name}: has no default and was not given; pass {name}=...")
             number = read_number(value, where=name)
@@ -110,17 +146,17 @@ class Formulas:
                     f"{name}: must be positive, got {number.text}; the closed forms hold for {name} > 0"
                 )
             out.append(number)
-        self._check_least(dict(zip(self.parameters, out, strict=True)))
+        self._check_lower_limits(dict(zip(self.parameters, out, strict=True)))
         p = ParameterValues(out)
         p.values = np.array([number.value for number in out])
         return p
 
-    def _check_least(self, values: dict[str, Number]) -> None:
-        """Refuse a parameter below what it must not fall below."""
-        for name, least in self.at_least:
-            bound = values.get(least) or read_number(least, where=least)
+    def _check_lower_limits(self, values: dict[str, Number]) -> None:
+        """Refuse a parameter below its lower limit."""
+        for name, limit in self.at_least:
+            bound = values.get(limit) or read_number(limit, where=limit)
             if values[name].value < bound.value:
-                what = f"{least} = {bound.text}" if least in values else least
+                what = f"{limit} = {bound.text}" if limit in values else limit
                 raise ParameterError(f"{name}: must be at least {what}, got {values[name].text}")
 
     def charted(self, p: ParameterValues) -> Chart:
@@ -129,7 +165,7 @@ class Formulas:
         return _chart(self.chart, tuple(p.values.tolist()))
 
     def domain(self, p: ParameterValues) -> Domain:
-        """The range of the curve's parameter."""
+        """The range of the curve parameter."""
         if p.domain is None:
             p.domain = self._domain(p)
         return p.domain
@@ -138,22 +174,30 @@ class Formulas:
         if self.chart is not None:
             chart = self.charted(p)
             if chart.period:
-                return Domain(-math.inf, math.inf, chart.period)
-            return Domain(chart.low, chart.high, 0.0, chart.ends)
+                return Domain(DomainNumbers(-math.inf, math.inf, chart.period))
+            return Domain(DomainNumbers(chart.low, chart.high, 0.0), chart.ends)
         values = tuple(number.value for number in p)
         low, high, period = self.ends(FLOATS, values)
         axis, step = self.axes(FLOATS, values) if self.monotone else (None, None)
-        ends = (-math.inf if low is None else float(low), math.inf if high is None else float(high))
         return Domain(
-            *ends, float(period or 0.0), axis=math.nan if axis is None else float(axis), axis_step=float(step or 0.0)
+            DomainNumbers(
+                low=-math.inf if low is None else float(low),
+                high=math.inf if high is None else float(high),
+                period=float(period or 0.0),
+                axis=math.nan if axis is None else float(axis),
+                axis_step=float(step or 0.0),
+            )
         )
 
     def ends(self, op: Any, values: tuple[Any, ...]) -> tuple[Any, Any, Any]:
-        """Both ends of the parameter's range and its period, None where there is none: on a closed curve no ends."""
+        """Both ends of the parameter's range and its period, None for each that does not exist.
+
+        A closed curve has no ends.
+        """
         assert self.domain_of is not None
         low, high, period = self.domain_of(op, values)
         return (low, high, None) if period is None else (None, None, period)
 
     def axes(self, op: Any, values: tuple[Any, ...]) -> tuple[Any, Any]:
-        """A place of symmetry and the distance to the next, None where there is none."""
+        """One place of symmetry and the distance to the next; None for each that does not exist."""
         return (None, None) if self.axes_of is None else self.axes_of(op, values)

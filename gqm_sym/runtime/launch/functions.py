@@ -1,4 +1,4 @@
-"""The compiled functions of one motion, bound to what they are given."""
+"""The compiled functions of one module, bound to the values of its parameters."""
 
 from typing import NamedTuple
 
@@ -10,20 +10,20 @@ from gqm_sym.runtime.multiprecision.exact_problem import NOWHERE, ExactProblem
 
 
 class BoundFunctions(NamedTuple):
-    """One motion's compiled functions and what they are given.
+    """The compiled functions of one module with the values that they take.
 
     Attributes
     ----------
     addresses : Addresses
-        Of the compiled functions.
+        The addresses of the compiled functions.
     p : array
-        The run-time parameters, and behind them the curve's chart where it has one.
+        The values of the run-time parameters, followed by the curve's chart if it has one.
     exact : ExactProblem or None
-        The same problem exactly; None where the curve is known by doubles only.
+        The same problem in extended precision; None if the curve is known in doubles only.
     breaks, corners : arrays
-        Places at which the curve is not smooth, and those where its tangent jumps; repeated with the period.
+        The places at which the curve is not smooth, and those at which its tangent jumps, within one period.
     period : float
-        Of a closed curve, else 0.
+        The period of a closed curve in units of its parameter, 0 otherwise.
     """
 
     addresses: Addresses
@@ -34,7 +34,7 @@ class BoundFunctions(NamedTuple):
     period: float = 0.0
 
     def between(self, places: Array, a: float, b: float) -> Array:
-        """Those of some places that lie strictly between two, round a closed curve as often as it takes."""
+        """The places that lie strictly between a and b; on a closed curve they are repeated with the period."""
         low, high = min(a, b), max(a, b)
         if self.period and places.size:
             laps = np.arange(np.floor((low - places[-1]) / self.period), np.ceil((high - places[0]) / self.period) + 1)

@@ -1,4 +1,4 @@
-"""One launch of one module: its compiled functions bound to their parameters, and the same problem in extended precision."""
+"""One launch of one module: compiled functions bound to their parameters, and the problem in extended precision."""
 
 from dataclasses import dataclass
 from functools import partial
@@ -6,7 +6,7 @@ from functools import partial
 import numpy as np
 
 from gqm_sym.runtime.charts.exact_normals import ChartTrack
-from gqm_sym.runtime.interface import ExactClimb, ExactFormulas
+from gqm_sym.runtime.interface import ExactFormulas, ExactPotential
 from gqm_sym.runtime.launch.domain import Domain
 from gqm_sym.runtime.launch.formulas import Formulas, ParameterValues
 from gqm_sym.runtime.launch.functions import BoundFunctions
@@ -17,7 +17,7 @@ from gqm_sym.runtime.multiprecision.exact_tracks import FormulaTrack
 
 
 def bind(formulas: Formulas, p: ParameterValues, launch: Launch) -> BoundFunctions:
-    """The compiled functions with what they are given, and the exact problem of one launch."""
+    """The compiled functions bound to parameter values, with one launch's problem in extended precision."""
     if p.functions is None:
         p.functions = _bind_all(formulas, p)
     bound: BoundFunctions = p.functions
@@ -28,7 +28,7 @@ def bind(formulas: Formulas, p: ParameterValues, launch: Launch) -> BoundFunctio
 
 
 def _bind_all(formulas: Formulas, p: ParameterValues) -> BoundFunctions:
-    """What all launches with these parameters share."""
+    """The bound functions that all launches with these parameters share."""
     addresses = formulas.addresses
     if formulas.chart is None:
         return BoundFunctions(addresses, p.values)
@@ -39,7 +39,21 @@ def _bind_all(formulas: Formulas, p: ParameterValues) -> BoundFunctions:
 
 @dataclass(slots=True)
 class Problem:
-    """One launch of one module, in doubles and exactly."""
+    """One launch of one module, in doubles and in extended precision.
+
+    Attributes
+    ----------
+    formulas : Formulas
+        The module's record.
+    launch : Launch
+        Where and how the motion begins.
+    p : ParameterValues
+        The exact values of the run-time parameters.
+    functions : BoundFunctions
+        The compiled functions bound to these values.
+    domain : Domain
+        The range of the curve parameter.
+    """
 
     formulas: Formulas
     launch: Launch
@@ -59,30 +73,30 @@ class Problem:
 
     @property
     def period(self) -> float:
-        """The parameter's period; 0 where there is none."""
+        """The period of the parameter on a closed curve, 0 otherwise."""
         return self.domain.period
 
     @property
     def exact(self) -> ExactProblem:
-        """The exact problem, where there is one."""
+        """The problem in extended precision; only for curves that are known by formulas."""
         exact = self.functions.exact
         assert exact is not None
         return exact
 
     @property
     def arc_origin(self) -> float:
-        """Arc length at launch: 0, or on a charted curve its distance from the start point."""
+        """Arc length at launch in m: 0, or on a charted curve the distance from its start point."""
         return self.lam0 if self.formulas.chart is not None else 0.0
 
     @property
     def decider(self) -> ExactProblem | RoundedProblem:
-        """Who answers what doubles cannot decide."""
+        """What decides where doubles cannot: extended precision if there is any, else tests with rounding margins."""
         exact = self.functions.exact
         return RoundedProblem(self.functions, self.lam0, self.w0) if exact is None else exact
 
     @property
     def lam0(self) -> float:
-        """The launch place, as the nearest double."""
+        """The launch place, rounded to a double."""
         return self.launch.lam0.value
 
     @property
@@ -92,14 +106,14 @@ class Problem:
 
 
 def exact_problem(formulas: "Formulas", p: "ParameterValues", launch: "Launch") -> ExactProblem | None:
-    """The exact problem of one launch, where there is one."""
+    """The problem of one launch in extended precision; None if the curve is known in doubles only."""
     exact, maker = formulas.exact, formulas.chart
     if isinstance(exact, ExactFormulas) and formulas.domain_of is not None:
         track = partial(FormulaTrack, exact, formulas.domain_of, launch.lam0)
         return ExactProblem(track, NOWHERE, p, launch.lam0, launch.v0)
-    if isinstance(exact, ExactClimb) and maker is not None:
+    if isinstance(exact, ExactPotential) and maker is not None:
         chart = formulas.charted(p)
         if maker.is_exact(chart):
-            along = partial(ChartTrack, maker, chart, exact.climb, launch.point, launch.lam0)
+            along = partial(ChartTrack, maker, chart, exact.effective_potential, launch.point, launch.lam0)
             return ExactProblem(along, chart.edges, p, launch.lam0, launch.v0)
     return None

@@ -1,4 +1,4 @@
-"""A launch as a user asks for it, and the same launch checked: in numbers that mean exactly what was given."""
+"""A launch as a user gives it, and the same launch checked and read as exact numbers."""
 
 from typing import Any, NamedTuple
 
@@ -8,24 +8,24 @@ from gqm_sym.errors import LaunchError
 from gqm_sym.literals.numbers import Number, read_number
 from gqm_sym.runtime.launch.formulas import Formulas, ParameterValues
 
-# How far off a charted curve a launch point may be: a share of its larger coordinate or of the piece it is near to, for
-# a curve as a whole may be followed very far.
-POINT_TOLERANCE = 1e-6
+# The largest distance of a launch point from a charted curve, as a share of the point's larger coordinate or of the
+# length of the nearest piece (a curve as a whole may be very long).
+MAX_POINT_DISTANCE_SHARE = 1e-6
 
 CONTACTS = ("bilateral", "above", "below")
 
 
 class LaunchRequest(NamedTuple):
-    """A launch, or arrays of launches, as they were given: the arguments of a module's ``solve`` and ``sweep``.
+    """A launch, or arrays of launches, as given to a module's ``solve`` and ``sweep``.
 
     Attributes
     ----------
     lam0, v0, direction
-        Launch place, speed in m/s, and the sign of ds/dt at launch.
+        The launch place as a value of the curve parameter, the speed in m/s, and the sign of ds/dt at launch.
     point : pair of numbers, optional
-        The launch place by its coordinates in m, instead of ``lam0``.
+        The coordinates of the launch place in m, instead of ``lam0``.
     t_max : number, optional
-        Horizon of time in s.
+        The time in s up to which the motion is computed (the horizon).
     contact : str
         One of `CONTACTS`: which side of the track can push.
     """
@@ -39,7 +39,21 @@ class LaunchRequest(NamedTuple):
 
 
 class Launch(NamedTuple):
-    """Where and how a motion begins, in numbers that mean exactly what was given."""
+    """Where and how a motion begins, in exact numbers.
+
+    Attributes
+    ----------
+    lam0, v0 : Number
+        The launch place, and the speed in m/s.
+    direction : int
+        The sign of ds/dt at launch.
+    contact : str
+        One of `CONTACTS`.
+    t_max : Number or None
+        The horizon in s.
+    point : pair of Number, optional
+        The coordinates of the launch place in m, if it was given by them.
+    """
 
     lam0: Number
     v0: Number
@@ -55,7 +69,7 @@ def read_launch(formulas: Formulas, p: ParameterValues, request: LaunchRequest) 
     Raises
     ------
     LaunchError
-        If it cannot be a launch of this model; the message names the argument and says what would be right.
+        If the model cannot be launched so; the message names the argument and says what would be right.
     """
     lam0, v0, direction, point, t_max, contact = request
     if point is None and lam0 is not None:
@@ -74,7 +88,7 @@ def read_launch(formulas: Formulas, p: ParameterValues, request: LaunchRequest) 
     horizon = None if t_max is None else read_number(t_max, where="t_max")
     if horizon is not None and not horizon.value > 0.0:
         raise LaunchError(f"t_max: must be positive, got {horizon.text}")
-    domain = formulas.domain(p)
+    domain = formulas.domain(p).numbers
     if not domain.low <= place.value <= domain.high:
         ends = f"[{domain.low!r}, {domain.high!r}]"
         raise LaunchError(f"lam0: must lie in the domain {ends} of {formulas.parameter}, got {place.text}")
@@ -84,7 +98,7 @@ def read_launch(formulas: Formulas, p: ParameterValues, request: LaunchRequest) 
 def _read_place(
     formulas: Formulas, p: ParameterValues, lam0: Any, point: Any
 ) -> tuple[Number, tuple[Number, Number] | None]:
-    """The launch place by the curve's parameter, and its coordinates if those were given."""
+    """The launch place as a value of the curve parameter, and its coordinates if these were given."""
     if point is None:
         raise LaunchError(f"lam0: not given; it is the value of {formulas.parameter} to launch from")
     if formulas.chart is None:
@@ -100,7 +114,7 @@ def _read_place(
     chart, x, z = formulas.charted(p), at_x.value, at_z.value
     s, distance = chart.nearest(x, z)
     piece = np.diff(chart.edges)[max(int(np.searchsorted(chart.edges, s)) - 1, 0)]
-    if distance > POINT_TOLERANCE * min(chart.high - chart.low, max(abs(x), abs(z), piece)):
+    if distance > MAX_POINT_DISTANCE_SHARE * min(chart.high - chart.low, max(abs(x), abs(z), piece)):
         there = chart.points([s])[:2, 0]
         raise LaunchError(
             f"point: ({x!r}, {z!r}) is {distance:.3g} off the curve; the nearest point on it is "

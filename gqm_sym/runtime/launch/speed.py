@@ -1,7 +1,9 @@
-"""Load maps: Pass 1 at many places of a conservative model, block by block, so that what lies between stays in cache.
+"""Pass 1: position, curvature, V**2 and contact force at given places of a conservative model.
 
-V**2 is the launch's less the climb to a place. Where most of that cancels, as near a launch from rest, the climb's
-first divided difference from the launch place keeps the digits that subtracting heights loses.
+A load map has all of these at many places. It is filled block by block, so that intermediate results stay in cache.
+V**2 is its value at launch less the change of the effective potential. Where most of that cancels, as near a launch
+from rest, the first divided difference of the potential from the launch place keeps the digits that a subtraction of
+potentials loses.
 """
 
 from itertools import pairwise
@@ -21,20 +23,38 @@ from gqm_sym.runtime.compiled.calls import (
 from gqm_sym.runtime.compiled.jit import Inlined, Inner, entry
 from gqm_sym.runtime.compiled.streaming import put, settle
 from gqm_sym.runtime.compiled.types import ADDRESSES, INTEGER, MATRIX, REAL, VECTOR, Array
-from gqm_sym.runtime.interface import FRAME_ROWS, LOAD_ROWS
+from gqm_sym.runtime.interface import LOAD_MAP_ROWS, PATH_ROWS
 
-# Places filled at a time: few enough that what is streamed drains into memory while the next are worked out.
+# Places filled at a time: few enough that what is streamed drains into memory while the next are computed.
 BLOCK = 256
 
-# Rows that are asked for.
-SHOWN = 6
+# The rows of a load map.
+MAP_ROWS = 6
 
-# Heights may be of this many times the size of V**2 at launch or of its change: then both ways round alike.
-LEVELLED = 2.0
+# The largest size of the potential's terms for which V**2 by subtraction keeps its digits, in units of V**2 at launch
+# or of its change: the divided difference is then no more accurate.
+MAX_TERMS_RATIO = 1.0
 
 
 class Pass1(NamedTuple):
-    """Position, metric, curvature, V**2 and contact force at places of a curve, each an array of the places' shape."""
+    """What pass 1 finds at places of a curve (paper, section "Pass 1"; MATHS, section 2).
+
+    Each field is an array of the shape of the places, or of that of ``out``.
+
+    Attributes
+    ----------
+    x, z : array
+        Coordinates in m; z is up.
+    ds : array
+        Arc length per unit of the curve parameter, ds/dlam, in m.
+    kappa : array
+        Signed curvature in 1/m, positive where the track bends to the left of growing parameter.
+    v2 : array
+        Squared speed V**2 in m**2/s**2; negative where a conservative motion cannot come, NaN beyond the first turn of
+        a dissipative one.
+    normal_force : array
+        Contact force N in N along the normal, which is to the left of growing parameter.
+    """
 
     x: Array
     z: Array
@@ -44,13 +64,41 @@ class Pass1(NamedTuple):
     normal_force: Array
 
 
-def room(shape: tuple[int, ...], lam: Array, out: Any) -> Pass1:
-    """Arrays for a load map: new ones, or those of ``out`` where they will do.
+class LaunchNumbers(NamedTuple):
+    """A launch in doubles, and what a load map keeps of it.
+
+    Attributes
+    ----------
+    lam0, w0 : float
+        The launch place, and V**2 there.
+    v2_correction : float
+        What V**2 gains because the launch place is given more exactly than by a double.
+    size : float
+        Size of the terms of the effective potential at launch; NaN where it is not known.
+    """
+
+    lam0: float
+    w0: float
+    v2_correction: float
+    size: float
+
+
+def load_map_arrays(shape: tuple[int, ...], lam: Array, out: Any) -> Pass1:
+    """The arrays of a load map: those of ``out``, or new ones if it is None.
+
+    Parameters
+    ----------
+    shape : tuple of int
+        The shape of the places.
+    lam : array
+        The places, with which no array of ``out`` may share memory.
+    out : tuple or list of six arrays, or None
+        Arrays of doubles to be filled, in the order of `Pass1`.
 
     Raises
     ------
     InputError
-        If ``out`` is not six arrays of doubles of that shape, each with memory of its own.
+        If ``out`` is not six writable, contiguous arrays of doubles of that shape, each with memory of its own.
     """
     if out is None:
         return Pass1(*(np.empty(shape) for _ in Pass1._fields))
@@ -73,7 +121,7 @@ def room(shape: tuple[int, ...], lam: Array, out: Any) -> Pass1:
 
 
 def _check(where: str, array: Any, shape: tuple[int, ...]) -> None:
-    """Refuse what compiled code cannot fill in place."""
+    """Refuse an array that compiled code cannot fill."""
     if not isinstance(array, np.ndarray):
         raise InputError(f"{where} is {type(array).__name__}; give an array of float64")
     if array.dtype != np.float64:
@@ -87,79 +135,98 @@ def _check(where: str, array: Any, shape: tuple[int, ...]) -> None:
 
 
 @Inlined
-def keeps(w0, v2, sizes):  # type: ignore[no-untyped-def]
-    """Whether subtracting heights of some size has left V**2 its digits; never of what is not a number."""
-    return sizes <= LEVELLED * max(fabs(w0 - v2), w0)
+def keeps_digits(w0, v2, sizes):  # type: ignore[no-untyped-def]
+    """Whether V**2 has kept its digits though terms of some size were subtracted; false if one is not a number."""
+    return sizes <= MAX_TERMS_RATIO * max(fabs(w0 - v2), w0)
 
 
 @Inner
-def mend(fns, p, lam0, gained, w0, size, here, rests, field, known):  # type: ignore[no-untyped-def]
-    """What `fill_loads` has in ``field``, with V**2 from the climb's divided difference wherever that has more digits.
+def fill_by_difference(fns, p, launch, places, low_parts, field):  # type: ignore[no-untyped-def]
+    """Fill V**2 and the contact force by the divided difference of the potential wherever that has more digits.
 
-    Without ``known`` there is nothing in it yet.
+    ``field`` holds the rows of a block of a load map. If the size of the potential's terms at launch is not known,
+    there is nothing in it yet, and all of its rows are filled.
     """
-    n = here.size
-    rise, offsets, exact, frame = np.empty(2 * n), here - lam0, np.empty(n), np.empty(FRAME_ROWS * n)
+    n, lam0, w0, size = places.size, launch.lam0, launch.w0, launch.size
+    is_filled = size >= 0.0
+    divdiff, offsets = np.empty(2 * n), places - lam0
+    better, frame = np.empty(n), np.empty(PATH_ROWS * n)
     v2, force, sizes = field[4 * n : 5 * n], field[5 * n : 6 * n], field[6 * n : 7 * n]
-    if rests.size:
-        offsets += rests
-    call_potential_divdiff1(fns.potential_divdiff1, n, lam0, here, offsets, p, rise)
+    if low_parts.size:
+        offsets += low_parts
+    call_potential_divdiff1(fns.potential_divdiff1, n, lam0, places, offsets, p, divdiff)
     for i in range(n):
-        slow = w0 - (offsets[i] * rise[i] - gained)
-        exact[i] = v2[i] if known and keeps(w0, v2[i], size + sizes[i]) else slow
-    call_path_and_contact_force(fns.path_and_contact_force, n, here, exact, p, frame)
-    if not known:
+        by_difference = w0 - (2.0 * offsets[i] * divdiff[i] - launch.v2_correction)
+        better[i] = v2[i] if is_filled and keeps_digits(w0, v2[i], size + sizes[i]) else by_difference
+    call_path_and_contact_force(fns.path_and_contact_force, n, places, better, p, frame)
+    if not is_filled:
         field[: 4 * n] = frame[: 4 * n]
     for i in range(n):
-        force[i] = force[i] if known and keeps(w0, v2[i], size + sizes[i]) else frame[4 * n + i]
-    v2[:] = exact
+        force[i] = force[i] if is_filled and keeps_digits(w0, v2[i], size + sizes[i]) else frame[4 * n + i]
+    v2[:] = better
 
 
 @entry(
     types.void(
-        *(ADDRESSES, INTEGER, VECTOR, REAL, REAL, REAL, VECTOR, VECTOR),
-        *(types.UniTuple(VECTOR, SHOWN), INTEGER, INTEGER, types.boolean),
+        *(ADDRESSES, INTEGER, VECTOR, types.UniTuple(REAL, 3), types.UniTuple(VECTOR, 2)),
+        *(types.UniTuple(VECTOR, MAP_ROWS), types.UniTuple(INTEGER, 2), types.boolean),
     ),
     nogil=True,
 )
-def fill_loads(fns, loads, p, lam0, lam0_low, w0, places, rests, rows, begin, end, past):  # type: ignore[no-untyped-def]
-    """Fill rows x, z, ds, kappa, V**2 and contact force from the index ``begin`` to ``end``; ``past`` as in `put`.
+def fill_load_map(fns, load_map, p, launch, places, rows, part, past_cache):  # type: ignore[no-untyped-def]
+    """Fill a part of the rows x, z, ds, kappa, V**2 and contact force of a load map.
 
-    ``loads`` is the address of the module's function, 0 where it has none. ``rests`` are what the places leave over as
-    doubles; empty where they leave nothing.
+    Python hands over plain tuples, whose types numba finds faster than those of named ones.
+
+    Parameters
+    ----------
+    load_map : int
+        The address of the module's function for load maps; 0 if there is none.
+    launch : (lam0, lam0_low, w0)
+        The launch place as two doubles, and V**2 there.
+    places : (lam, low_parts)
+        The places as two doubles each; ``low_parts`` is empty if all of them are zero.
+    rows : tuple of six arrays
+        The rows to be filled.
+    part : (begin, end)
+        Which places.
+    past_cache : bool
+        Whether the rows are written past the caches (`streaming.put`).
     """
-    launch, field = np.empty((2, 1)), np.empty(LOAD_ROWS * BLOCK)
+    (lam0, lam0_low, w0), (lam, low_parts), (begin, end) = launch, places, part
+    slopes, field = np.empty((2, 1)), np.empty(LOAD_MAP_ROWS * BLOCK)
     start = np.array([lam0])
-    call_effective_potential(fns.effective_potential, 1, start, p, launch)
-    gained = lam0_low * launch[1, 0]
-    level, size = 0.0, nan  # nothing is kept of sizes that are not known
-    if loads and not rests.size:
-        call_load_map(loads, 1, 0.0, 0.0, start, p, field)
-        level, size = gained - field[4], field[6]
-    known = size >= 0.0
+    call_effective_potential(fns.effective_potential, 1, start, p, slopes)
+    correction = 2.0 * lam0_low * slopes[1, 0]
+    level, size = 0.0, nan
+    if load_map and not low_parts.size:
+        call_load_map(load_map, 1, 0.0, 0.0, start, p, field)
+        level, size = 0.5 * (correction - field[4]), field[6]
+    numbers = LaunchNumbers(lam0, w0, correction, size)
+    by_subtraction = size >= 0.0
     x, z, ds, kappa, v2, force = rows
     for first in range(begin, end, BLOCK):
         n = min(BLOCK, end - first)
-        lost = n
-        if known:
-            call_load_map(loads, n, w0, level, places[first : first + n], p, field)
-            lost = 0
+        inaccurate = n
+        if by_subtraction:
+            call_load_map(load_map, n, w0, level, lam[first : first + n], p, field)
+            inaccurate = 0
             for i in range(n):
-                lost += 0 if keeps(w0, field[4 * n + i], size + field[6 * n + i]) else 1
-        if lost:
-            mend(fns, p, lam0, gained, w0, size, places[first : first + n], rests[first : first + n], field, known)
-        put(x, first, field, 0, n, past)
-        put(z, first, field, n, n, past)
-        put(ds, first, field, 2 * n, n, past)
-        put(kappa, first, field, 3 * n, n, past)
-        put(v2, first, field, 4 * n, n, past)
-        put(force, first, field, 5 * n, n, past)
+                inaccurate += 0 if keeps_digits(w0, field[4 * n + i], size + field[6 * n + i]) else 1
+        if inaccurate:
+            fill_by_difference(fns, p, numbers, lam[first : first + n], low_parts[first : first + n], field)
+        put(x, first, field, 0, n, past_cache)
+        put(z, first, field, n, n, past_cache)
+        put(ds, first, field, 2 * n, n, past_cache)
+        put(kappa, first, field, 3 * n, n, past_cache)
+        put(v2, first, field, 4 * n, n, past_cache)
+        put(force, first, field, 5 * n, n, past_cache)
     settle(x)
 
 
 @entry(MATRIX(ADDRESSES, VECTOR, VECTOR, VECTOR))
 def path_and_force_at(fns, p, lam, v2):  # type: ignore[no-untyped-def]
-    """x, z, ds, kappa and the contact force at many places, given V**2 there."""
+    """Rows x, z, ds, kappa and contact force at places ``lam``, given V**2 there."""
     out = np.empty((5, lam.size))
     call_path_and_contact_force(fns.path_and_contact_force, lam.size, lam, v2, p, out)
     return out
@@ -167,7 +234,7 @@ def path_and_force_at(fns, p, lam, v2):  # type: ignore[no-untyped-def]
 
 @entry(MATRIX(ADDRESSES, VECTOR, VECTOR))
 def potential_at(fns, p, lam):  # type: ignore[no-untyped-def]
-    """The climb and its slope at many places."""
+    """Rows of the effective potential and of its slope at places ``lam``."""
     out = np.empty((2, lam.size))
     call_effective_potential(fns.effective_potential, lam.size, lam, p, out)
     return out
@@ -175,11 +242,11 @@ def potential_at(fns, p, lam):  # type: ignore[no-untyped-def]
 
 @entry(VECTOR(ADDRESSES, VECTOR, REAL, REAL, REAL, VECTOR, VECTOR))
 def speed_squared_at(fns, p, lam0, lam0_low, w0, places, offsets):  # type: ignore[no-untyped-def]
-    """V**2 at many places and their offsets from lam0, launched from lam0 + lam0_low, without subtracting heights."""
+    """V**2 at places and their offsets from lam0, launched from lam0 + lam0_low, without subtracting potentials."""
     rows, launch = np.empty((2, offsets.size)), np.empty((2, 1))
     call_potential_divdiff1(fns.potential_divdiff1, offsets.size, lam0, places, offsets, p, rows)
     call_effective_potential(fns.effective_potential, 1, np.array([lam0]), p, launch)
     out = np.empty(offsets.size)
     for i in range(offsets.size):
-        out[i] = w0 - (offsets[i] * rows[0, i] - lam0_low * launch[1, 0])
+        out[i] = w0 - 2.0 * (offsets[i] * rows[0, i] - lam0_low * launch[1, 0])
     return out

@@ -1,61 +1,108 @@
-"""The first place where V**2 vanishes, each way from the launch, none missed.
+"""The first place where V**2 vanishes in one direction from the launch, with proof that none is missed.
 
-The curve is walked in steps from the launch. On each step interval bounds of the climb's slope prove one of three
-things: V**2 keeps away from zero, or it grows, or it falls throughout (then its sign at the far end decides). What
-they cannot prove is halved. Bounds of ds find cusps the same way (MATHS, section 3).
+The curve is searched in steps from the launch. On each step, interval bounds of the slope of the effective potential
+prove one of three things: V**2 stays away from zero, or it grows, or it falls throughout (then its sign at the far end
+of the step decides). A step on which they prove none of these is halved. Bounds of ds find cusps in the same way
+(MATHS, section 3).
 """
 
 from math import fabs, inf, isfinite
+from typing import NamedTuple
 
 import numpy as np
 
 from gqm_sym.runtime.compiled.calls import call_bounds, call_effective_potential, call_potential_divdiff1
 from gqm_sym.runtime.compiled.jit import Inner
+from gqm_sym.runtime.compiled.types import Array
 
-# What ended a walk.
-TURN, LIMIT, CRITICAL, CUSP, MARCHED, BROKEN = range(6)
-MOST_STEPS = 4096
+# What ends a search: a zero of V**2, the length to search, a place that doubles cannot decide, a cusp, the count of
+# steps, a value that is not finite.
+TURN, LIMIT, CRITICAL, CUSP, STEPS_SPENT, NOT_FINITE = range(6)
+MAX_STEPS = 4096
 
-# As good as infinity: powers of a parameter this large still lie within the range of doubles.
-FARTHEST = 1e50
+# Limit of the parameter, as a multiple of its value at the launch: it counts as infinite beyond. Powers of a parameter
+# this large still lie within the range of doubles.
+MAX_PARAMETER = 1e50
 
-# V**2 beyond which a value that is not finite means overflow, not a pole.
-OVERFLOWING = 1e100
+# V**2 above which a value that is not finite means overflow, not a pole.
+OVERFLOW_V2 = 1e100
 
-# V**2 whose possible change over a step is this small against its parts is as good as constant in doubles.
-UNRESOLVED = 1e-13
+# V**2 counts as constant in doubles over a step if its possible change is below this share of the terms it consists of.
+CONSTANT_SHARE = 1e-13
 
 # ds below this share of its largest value so far, on the narrowest step, is a cusp.
 CUSP_SHARE = 1e-6
 
-# A step of a few units in the last place of the parameter.
-NARROW = 1e-15
+# Width of the narrowest step as a share of the parameter: a few units in the last place.
+MIN_STEP_SHARE = 1e-15
+
+# Half-width of the surroundings of a zero that are searched for an equilibrium, as a share of the parameter.
+MAX_ZERO_ERROR_SHARE = 1e-6
+
+
+class FoundEnd(NamedTuple):
+    """What a search found.
+
+    Attributes
+    ----------
+    what : int
+        TURN (V**2 has its first zero at ``near``), LIMIT (searched as far as was asked), CUSP (ds vanishes at ``far``),
+        CRITICAL (V**2 and its slope are too close to zero between ``near`` and ``far`` for doubles to decide),
+        STEPS_SPENT (as many steps as are allowed were taken with V**2 > 0, up to ``near``) or NOT_FINITE (a value is
+        not finite near ``far``).
+    near, far : float
+        Signed offsets from the launch place.
+    """
+
+    what: int
+    near: float
+    far: float
+
+
+class SearchArrays(NamedTuple):
+    """Arrays that a search works in.
+
+    Attributes
+    ----------
+    point : (2,) array
+        A place and its offset from the launch.
+    rows : (2, 1) array
+        What the model's functions fill in for one place.
+    bounds : (4,) array
+        Enclosures of the effective potential's slope and of ds.
+    """
+
+    point: Array
+    rows: Array
+    bounds: Array
 
 
 @Inner
-def speed_squared(fns, p, lam0, w0, offset, spot, rows):  # type: ignore[no-untyped-def]
-    """V**2 at lam0 + offset, and the size of its parts, without subtracting heights."""
-    spot[0], spot[1] = lam0 + offset, offset
-    call_potential_divdiff1(fns.potential_divdiff1, 1, lam0, spot[:1], spot[1:], p, rows)
-    lost = offset * rows[0, 0]
+def speed_squared(fns, p, lam0, w0, offset, arrays):  # type: ignore[no-untyped-def]
+    """V**2 at lam0 + offset, and the size of its terms, without subtracting potentials."""
+    point, rows = arrays.point, arrays.rows
+    point[0], point[1] = lam0 + offset, offset
+    call_potential_divdiff1(fns.potential_divdiff1, 1, lam0, point[:1], point[1:], p, rows)
+    lost = 2.0 * offset * rows[0, 0]
     return w0 - lost, w0 + fabs(lost)
 
 
 @Inner
-def polish_zero(fns, p, lam0, w0, lo, hi, spot, rows):  # type: ignore[no-untyped-def]
+def polish_zero(fns, p, lam0, w0, lo, hi, arrays):  # type: ignore[no-untyped-def]
     """The zero of V**2 between offsets lo (V**2 > 0) and hi (V**2 < 0), by Newton's method kept inside the bracket."""
+    point, rows = arrays.point, arrays.rows
     x = 0.5 * (lo + hi)
     for _ in range(200):
-        value, _size = speed_squared(fns, p, lam0, w0, x, spot, rows)
+        value, _size = speed_squared(fns, p, lam0, w0, x, arrays)
         if value == 0.0:
             return x
         if value > 0.0:
             lo = x
         else:
             hi = x
-        spot[0] = lam0 + x
-        call_effective_potential(fns.effective_potential, 1, spot, p, rows)
-        slope = -rows[1, 0]
+        point[0] = lam0 + x
+        call_effective_potential(fns.effective_potential, 1, point, p, rows)
+        slope = -2.0 * rows[1, 0]
         new = x - value / slope if slope != 0.0 else inf
         if not (min(lo, hi) < new < max(lo, hi)):
             new = 0.5 * (lo + hi)
@@ -66,78 +113,102 @@ def polish_zero(fns, p, lam0, w0, lo, hi, spot, rows):  # type: ignore[no-untype
 
 
 @Inner
-def first_zero(fns, p, lam0, w0, direction, begin, reach, step):  # type: ignore[no-untyped-def]
-    """Walk from lam0 + direction * begin to ``reach`` (may be infinite) from lam0, beginning with steps of ``step``.
+def zero_on_step(fns, p, lam0, w0, near, far, size, arrays):  # type: ignore[no-untyped-def]
+    """The zero of V**2 on a step on which it falls throughout: TURN, or CRITICAL next to an equilibrium.
+
+    ``near`` and ``far`` are the signed offsets of the ends of the step, and ``size`` that of the terms of V**2.
+    """
+    point, rows, bounds = arrays
+    direction = 1.0 if far > near else -1.0
+    root = polish_zero(fns, p, lam0, w0, near, far, arrays)
+    # How far rounding may move the zero: if an equilibrium is that close, doubles cannot decide.
+    point[0] = lam0 + root
+    call_effective_potential(fns.effective_potential, 1, point, p, rows)
+    largest = max(fabs(far) - fabs(near), MAX_ZERO_ERROR_SHARE * (fabs(lam0) + fabs(root)))
+    slope = 2.0 * fabs(rows[1, 0])
+    error = min(CONSTANT_SHARE * size / slope, largest) if slope > 0.0 else largest
+    call_bounds(fns.bounds, lam0 + root - error, lam0 + root + error, p, bounds)
+    if bounds[0] <= 0.0 <= bounds[1]:
+        return FoundEnd(CRITICAL, near, root + direction * error)
+    return FoundEnd(TURN, root, far)
+
+
+@Inner
+def stays_positive(lower, upper, width, narrow, v2_near, v2_far, size):  # type: ignore[no-untyped-def]
+    """Whether V**2 > 0 all along a step, by the bounds of its slope and its values at both ends.
+
+    Returns 1 if it is, 0 if the step must be halved to tell, and -1 if doubles cannot tell.
+    """
+    least = max(v2_near + lower * width, v2_far - upper * width)
+    if upper <= 0.0 or least > CONSTANT_SHARE * size:
+        return 1
+    change = max(fabs(lower), fabs(upper)) * width
+    if narrow or change <= CONSTANT_SHARE * size:
+        return 1 if min(v2_near, v2_far) > 10.0 * CONSTANT_SHARE * size else -1
+    return 0
+
+
+@Inner
+def first_zero(fns, p, lam0, w0, direction, begin, length, step):  # type: ignore[no-untyped-def]
+    """Search from lam0 + direction * begin to lam0 + direction * length, beginning with a step of ``step``.
+
+    Parameters
+    ----------
+    lam0, w0 : float
+        The launch place, and V**2 there.
+    begin, length : float
+        Distances from the launch place; the second may be infinite.
 
     Returns
     -------
-    what : int
-        TURN (V**2 has its first zero at ``near``), LIMIT (walked all of ``reach``), CUSP (ds vanishes at ``far``),
-        CRITICAL (V**2 and its slope are too close to zero between ``near`` and ``far`` for doubles to decide), MARCHED
-        (steps spent with V**2 > 0 up to ``near``) or BROKEN (a value that is not a number near ``far``).
-    near, far : float
-        Offsets from lam0, signed.
+    FoundEnd
+        What was found first.
     """
-    spot, rows, box = np.empty(2), np.empty((2, 1)), np.empty(4)
-    left, w_left = begin, w0
+    arrays = SearchArrays(np.empty(2), np.empty((2, 1)), np.empty(4))
+    bounds = arrays.bounds
+    near, v2_near = begin, w0
     if begin > 0.0:
-        w_left, _size = speed_squared(fns, p, lam0, w0, direction * begin, spot, rows)
+        v2_near, _size = speed_squared(fns, p, lam0, w0, direction * begin, arrays)
     widest_ds, size = 0.0, w0
-    for _ in range(MOST_STEPS):
-        if left >= reach:
-            return LIMIT, direction * reach, direction * reach
-        right = min(left + step, reach)
-        if right > FARTHEST * max(1.0, fabs(lam0)):
-            return MARCHED, direction * left, direction * left
-        narrow = right - left <= NARROW * max(fabs(lam0), right)
-        here, there = lam0 + direction * left, lam0 + direction * right
-        call_bounds(fns.bounds, min(here, there), max(here, there), p, box)
-        # Change of V**2 per unit of offset: its climb is lost going forward, gained going back.
-        lower, upper = (-box[1], -box[0]) if direction > 0 else (box[0], box[1])
-        if box[2] <= 0.0:
+    for _ in range(MAX_STEPS):
+        if near >= length:
+            return FoundEnd(LIMIT, direction * length, direction * length)
+        far = min(near + step, length)
+        if far > MAX_PARAMETER * max(1.0, fabs(lam0)):
+            return FoundEnd(STEPS_SPENT, direction * near, direction * near)
+        width = far - near
+        narrow = width <= MIN_STEP_SHARE * max(fabs(lam0), far)
+        here, there = lam0 + direction * near, lam0 + direction * far
+        call_bounds(fns.bounds, min(here, there), max(here, there), p, bounds)
+        # Bounds of the change of V**2 per unit of distance: -2*dU/dlam going forwards, 2*dU/dlam going back.
+        lower, upper = (-2.0 * bounds[1], -2.0 * bounds[0]) if direction > 0 else (2.0 * bounds[0], 2.0 * bounds[1])
+        ds_low, ds_high = bounds[2], bounds[3]
+        if ds_low <= 0.0:
             if narrow:
-                if box[3] <= CUSP_SHARE * widest_ds or not isfinite(box[3]):
-                    return CUSP, direction * left, direction * right
-                return BROKEN, direction * left, direction * right
-            step = 0.5 * (right - left)
-            continue
-        w_right, parts = speed_squared(fns, p, lam0, w0, direction * right, spot, rows)
-        widest_ds = max(widest_ds, rows[1, 0])
-        width = right - left
-        if not isfinite(w_right):
-            if w_left > OVERFLOWING:
-                return MARCHED, direction * left, direction * left
-            if narrow:
-                return BROKEN, direction * left, direction * right
+                is_cusp = ds_high <= CUSP_SHARE * widest_ds or not isfinite(ds_high)
+                return FoundEnd(CUSP if is_cusp else NOT_FINITE, direction * near, direction * far)
             step = 0.5 * width
             continue
-        size = max(size, parts)
-        clear = lower >= 0.0
-        if not clear:
-            if upper <= 0.0 and w_right <= 0.0:
-                root = polish_zero(fns, p, lam0, w0, direction * left, direction * right, spot, rows)
-                # What doubles know of the root: an equilibrium that close makes it another matter.
-                spot[0] = lam0 + root
-                call_effective_potential(fns.effective_potential, 1, spot, p, rows)
-                farthest = max(width, 1e-6 * (fabs(lam0) + fabs(root)))
-                slope = fabs(rows[1, 0])
-                unsure = min(UNRESOLVED * size / slope, farthest) if slope > 0.0 else farthest
-                call_bounds(fns.bounds, lam0 + root - unsure, lam0 + root + unsure, p, box)
-                if box[0] <= 0.0 <= box[1]:
-                    return CRITICAL, direction * left, root + direction * unsure
-                return TURN, root, direction * right
-            # The least V**2 can be, from either end of the step.
-            least = max(w_left + lower * width, w_right - upper * width)
-            clear = upper <= 0.0 or least > UNRESOLVED * size
-            change = max(fabs(lower), fabs(upper)) * width
-            if not clear and (narrow or change <= UNRESOLVED * size):
-                if min(w_left, w_right) > 10.0 * UNRESOLVED * size:
-                    clear = True
-                else:
-                    return CRITICAL, direction * left, direction * right
-        if clear:
-            left, w_left = right, w_right
+        v2_far, terms = speed_squared(fns, p, lam0, w0, direction * far, arrays)
+        widest_ds = max(widest_ds, arrays.rows[1, 0])
+        if not isfinite(v2_far):
+            if v2_near > OVERFLOW_V2:
+                return FoundEnd(STEPS_SPENT, direction * near, direction * near)
+            if narrow:
+                return FoundEnd(NOT_FINITE, direction * near, direction * far)
+            step = 0.5 * width
+            continue
+        size = max(size, terms)
+        positive = 1
+        if not lower >= 0.0:
+            if upper <= 0.0 and v2_far <= 0.0:
+                return zero_on_step(fns, p, lam0, w0, direction * near, direction * far, size, arrays)
+            positive = stays_positive(lower, upper, width, narrow, v2_near, v2_far, size)
+        if positive < 0:
+            return FoundEnd(CRITICAL, direction * near, direction * far)
+        if positive:
+            near, v2_near = far, v2_far
             step = 2.0 * width
         else:
             step = 0.5 * width
-    return MARCHED, direction * left, direction * left
+    return FoundEnd(STEPS_SPENT, direction * near, direction * near)

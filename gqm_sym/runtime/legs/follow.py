@@ -1,8 +1,8 @@
 """V**2 along the legs of a dissipative motion, panel after panel: to where they end, and back from where they turn.
 
-A leg is run once from its start (`leg_runs`), and time is counted on the way, as long as V**2 is large. If it ends at a
-turn, time is counted from there back to where it was left off: near a turn V**2 is a small difference when seen from
-the start, and none when seen from the turn.
+A leg is run once from its start (`leg_run`), and time is counted on the way as long as V**2 is large. If the leg ends
+at a turn, time is counted from there back to where it was left off: next to a turn V**2 is a small difference when it
+is computed from the start, but has all its digits when it is computed from the turn.
 """
 
 from math import sqrt
@@ -13,159 +13,169 @@ from gqm_sym.runtime.compiled.calls import call_static_balance
 from gqm_sym.runtime.compiled.jit import Inner, entry
 from gqm_sym.runtime.compiled.registers import uncounted
 from gqm_sym.runtime.compiled.types import INTEGER, REAL, VECTOR
-from gqm_sym.runtime.legs.approach import LOST, NO_ROOM, approach
-from gqm_sym.runtime.legs.leg_breaks import between, grain, within
-from gqm_sym.runtime.legs.leg_equation import W, panel_room, set_nodes
-from gqm_sym.runtime.legs.leg_panels import ALWAYS, MOST_TRIES, next_panel, next_stop
+from gqm_sym.runtime.interface import Dissipation
+from gqm_sym.runtime.legs.approach import LOST, NO_SPACE, approach
+from gqm_sym.runtime.legs.leg_breaks import clearance, span_before, within
+from gqm_sym.runtime.legs.leg_equation import Forces, March, Panel, W, panel_buffer, set_nodes
+from gqm_sym.runtime.legs.leg_panels import ALWAYS, MAX_PANELS, PanelRequest, next_panel, next_stop
 from gqm_sym.runtime.legs.leg_record import (
-    AFTER,
-    BEFORE,
+    CHANGE_COUNT,
     COLUMNS,
     END,
     END_LOW,
+    HALF_C,
     HEAD,
-    MET,
     MIDDLE,
     MIDDLE_LOW,
-    SLACK,
-    has_room,
-    keep,
-    total,
+    TIME_FROM_END,
+    TIME_FROM_START,
+    add_panel,
+    has_space,
+    total_time,
 )
-from gqm_sym.runtime.legs.leg_run import ASYMPTOTE, DIPPED, FULL, SPENT, TURN, run, spot_room
+from gqm_sym.runtime.legs.leg_run import ASYMPTOTE, FULL, SLOWED, SPENT, TURN, Route, Start, point_buffer, run
 from gqm_sym.runtime.legs.polynomials import COUNT
 
+_FLAGS = (types.boolean, types.boolean, types.boolean)
+DISSIPATION = types.NamedTuple((INTEGER, INTEGER, *_FLAGS), Dissipation)
+START = types.NamedTuple((REAL, REAL, REAL, INTEGER, INTEGER, REAL, REAL), Start)
+ROUTE = types.NamedTuple((VECTOR, REAL, REAL, INTEGER), Route)
+
 
 @Inner
-def run_back(drive, p, flags, turn, whole, v, nu, met, breaks, off, step, record, used):  # type: ignore[no-untyped-def]
-    """Follow the leg that turns at ``turn``, two doubles, back from there over the distance ``whole``.
+def run_back(forces, end, breaks, off, record, used):  # type: ignore[no-untyped-def]
+    """Enter the panels of a leg that turns, followed back from the turn to the middle of its run.
 
-    ``nu`` is the sign of N at the turn, which has changed ``met`` times on the way. The panels are entered behind what
-    is ``used`` of a record. Returns how many they are; NO_ROOM where there is none, LOST where it could not be
-    followed. ``off`` is as `leg_breaks.between` has it.
+    Parameters and Returns are those of `approach`, with panels for rows.
     """
-    work = panel_room()
+    work = panel_buffer()
     set_nodes(work)
-    count, base, left, gone, u, step = 0, 0.0, 0.0, 0.0, -v, sqrt(step)
-    coming, passed = met - 1, breaks.size - 1
-    for _ in range(MOST_TRIES):
-        stop, coming, passed, nu = next_stop(turn, u, gone, whole, record, breaks, coming, passed, nu)
-        room, at = sqrt(stop) - left, used + count * COLUMNS
-        if room <= 0.0:
+    v, march = forces.direction, March(end.place, -forces.direction, 1.0, 0.0)
+    # By the same differences as in `next_stop`, for the middle may be a break.
+    length = v * ((end.place[0] - end.middle[0]) + end.place[1]) - v * end.middle[1]
+    count, v2, left, passed, step = 0, 0.0, 0.0, 0.0, sqrt(end.step)
+    remaining = (end.change_count - 1, breaks.size - 1, end.contact_sign)
+    for _ in range(MAX_PANELS):
+        stop, remaining = next_stop(march, passed, length, record, breaks, remaining)
+        max_width, at = sqrt(stop) - left, used + count * COLUMNS
+        if max_width <= 0.0:
             break
-        if not has_room(record, at, met):
-            return NO_ROOM
-        span = between(breaks, passed + 1, v, off)
-        width, step, _ = next_panel(
-            *(drive, p, flags, turn, span, u, 1.0, 0.0, left, room, step, base, v, nu, 0.0, ALWAYS, False, work)
-        )
+        if not has_space(record, at, end.change_count):
+            return NO_SPACE
+        panel = Panel(left, v2, remaining[2], span_before(breaks, remaining[1] + 1, v, off))
+        request = PanelRequest(max_width, step, 0.0, ALWAYS, False)
+        width, step, _timed = next_panel(forces, march, panel, request, work)
         if width == 0.0:
             break
-        gone, left = (stop, sqrt(stop)) if width == room else ((left + width) * (left + width), left + width)
-        keep(record, at, left, width, work)
-        count, base = count + 1, work[W + COUNT]
-        if gone >= whole:
+        right = left + width
+        passed, left = (stop, sqrt(stop)) if width == max_width else (right * right, right)
+        add_panel(record, at, left, width, work)
+        count, v2 = count + 1, work[W + COUNT]
+        if passed >= length:
             break
-    return count if left >= sqrt(whole) else LOST
+    return count if left >= sqrt(length) else LOST
 
 
 @Inner
-def released(hold, p, behind, ahead, asked):  # type: ignore[no-untyped-def]
-    """Which way a body leaves a place where it is at rest, 0 if it stays; whether it could stay at some slope.
+def released(static_balance, p, behind, ahead, preferred):  # type: ignore[no-untyped-def]
+    """The direction in which a body at rest leaves a place, 0 if it stays; and whether it could stay at some slope.
 
-    The place is given by one on either side of it, which differ where it is a break. From a ridge it leaves either way:
-    that which is ``asked``.
+    The place is given by one on either side of it; these differ where it is a break. From a ridge the body may leave in
+    either direction, and takes the ``preferred`` one.
     """
-    spot, rates = spot_room(), spot_room()
-    spot[0] = ahead
-    call_static_balance(hold, 1, spot, p, rates)
+    point, rates = point_buffer(), point_buffer()
+    point[0] = ahead
+    call_static_balance(static_balance, 1, point, p, rates)
     forwards, backwards = rates[0], rates[1]
     if behind != ahead:
-        spot[0] = behind
-        call_static_balance(hold, 1, spot, p, rates)
+        point[0] = behind
+        call_static_balance(static_balance, 1, point, p, rates)
         backwards = rates[1]
     if forwards <= 0.0 <= backwards:
-        way = 0
+        direction = 0
     elif forwards > 0.0 > backwards:
-        way = asked
+        direction = preferred
     else:
-        way = 1 if forwards > 0.0 else -1
-    return way, forwards < backwards
+        direction = 1 if forwards > 0.0 else -1
+    return direction, forwards < backwards
 
 
 @entry(INTEGER(INTEGER, VECTOR, REAL, REAL, INTEGER))
-def way_from_rest(hold, p, behind, ahead, asked):  # type: ignore[no-untyped-def]
-    """The way that `released` tells, for Python."""
-    return released(hold, p, behind, ahead, asked)[0]
+def direction_from_rest(static_balance, p, behind, ahead, preferred):  # type: ignore[no-untyped-def]
+    """The direction that `released` finds, for Python."""
+    return released(static_balance, p, behind, ahead, preferred)[0]
+
+
+@Inner
+def run_to_end(forces, start, route, off, record):  # type: ignore[no-untyped-def]
+    """`run`, begun again with the turn expected later where it slows down before its first panel."""
+    while True:
+        end = run(forces, start, route, off, record)
+        if end.what != SLOWED or end.panel_count > 0:
+            return end
+        start = Start(
+            *(start.place, start.place_low, start.v2, start.direction, start.contact_sign, start.step),
+            end.no_turn_until,
+        )
 
 
 @entry(
     types.Tuple((INTEGER, INTEGER, INTEGER, types.boolean, INTEGER, INTEGER, REAL, REAL, REAL, REAL, REAL))(
-        *(INTEGER, INTEGER, types.boolean, types.boolean, types.boolean, VECTOR, REAL, REAL, REAL, INTEGER, INTEGER),
-        VECTOR,
-        *(REAL, REAL, REAL, INTEGER, REAL, VECTOR),
+        *(DISSIPATION, VECTOR, START, ROUTE, VECTOR),
     ),
     checked=False,
 )
-def follow(  # type: ignore[no-untyped-def]
-    drive,
-    hold,
-    friction,
-    kinked,
-    linear,
-    p,
-    start,
-    start_low,
-    w,
-    v,
-    nu,
-    breaks,
-    limit,
-    reach,
-    step,
-    side,
-    strict,
-    record,
-):
-    """`run`, and from where that ends with V**2 = 0 back to its ``middle``; what it finds stands in the record.
+def follow(dissipation, p, start, route, record):  # type: ignore[no-untyped-def]
+    """Run a leg, and follow it back from where it ends with V**2 = 0; the rest of what it finds is in the record.
 
-    It begins at ``start + start_low``. The forces are told of as by `interface.Dissipation`.
+    Parameters
+    ----------
+    dissipation : Dissipation
+        The module's compiled functions, and of what kind its forces are.
+    p : array
+        Run-time parameters.
+    start : Start
+    route : Route
+    record : array
+        Filled in (`leg_record`).
 
     Returns
     -------
-    what, nu
-        As `run` has them.
-    way, held : int, bool
-        At a turn, what `released` says; else the direction as it was, and True.
+    what, contact_sign : int
+        As of `leg_run.End`.
+    direction : int
+        At a turn, the one that `released` finds; otherwise that of the motion.
+    could_stay : bool
+        At a turn, whether the body could stay there at some slope; otherwise True.
     ahead, back : int
-        How many panels there are from the start, and how many panels or rows of a field from the end.
-    place, w, step, strict
-        As `run` has them, the place as the nearest double.
+        The number of panels from the start, and of panels or rows of a field from the end.
+    place, v2, step, no_turn_until : float
+        As of `leg_run.End`, the place as the nearest double.
     time : float
-        Of the whole leg.
+        Of the whole leg, in seconds.
     """
-    flags, p, breaks, record = (friction, kinked, linear), uncounted(p), uncounted(breaks), uncounted(record)
-    origin, off = (start, start_low), grain(start, limit) if breaks.size else 0.0
-    while True:
-        what, place, w1, n, onwards, next_strict, middle, slack, met, kept, coming = run(
-            drive, p, flags, origin, w, v, nu, breaks, off, limit, reach, step, side, strict, record
-        )
-        if what != DIPPED or kept > 0:
-            break
-        strict = next_strict
-    used, back, after, way, held = HEAD + kept * COLUMNS, 0, 0.0, v, True
+    p, breaks, record = uncounted(p), uncounted(route.breaks), uncounted(record)
+    route = Route(breaks, route.limit, route.pause, route.only_sign)
+    forces = Forces(dissipation.drive, p, dissipation.friction, dissipation.kinked, dissipation.linear, start.direction)
+    off = clearance(start.place, route.limit) if breaks.size else 0.0
+    end = run_to_end(forces, start, route, off, record)
+    what, used, back, time_from_end = end.what, HEAD + end.panel_count * COLUMNS, 0, 0.0
+    direction, could_stay = start.direction, True
     if what == TURN:
-        # As `next_stop` has the distance of a break, if the middle is one.
-        whole = v * ((place[0] - middle[0]) + place[1]) - v * middle[1]
-        back = run_back(drive, p, flags, place, whole, v, n, met, breaks, off, onwards, record, used)
-        after = total(record, used, back)
-        here = within(place[0], between(breaks, coming, v, off))
-        way, held = released(hold, p, here, here, v)
+        back = run_back(forces, end, breaks, off, record, used)
+        time_from_end = total_time(record, used, back)
+        here = within(end.place[0], span_before(breaks, end.upcoming, direction, off))
+        direction, could_stay = released(dissipation.hold, p, here, here, direction)
     elif what == ASYMPTOTE:
-        back = approach(drive, p, flags, place[0], middle[0], v, n, met, breaks, off, onwards, record, used)
-    before = total(record, HEAD, kept)
-    record[END], record[END_LOW], record[MIDDLE], record[MIDDLE_LOW] = place[0], place[1], middle[0], middle[1]
-    record[SLACK], record[BEFORE], record[AFTER], record[MET] = slack, before, after, met
+        back = approach(forces, end, breaks, off, record, used)
+    time_from_start = total_time(record, HEAD, end.panel_count)
+    record[END], record[END_LOW] = end.place
+    record[MIDDLE], record[MIDDLE_LOW] = end.middle
+    record[HALF_C], record[CHANGE_COUNT] = end.half_c, end.change_count
+    record[TIME_FROM_START], record[TIME_FROM_END] = time_from_start, time_from_end
     if back < 0:
-        what = FULL if back == NO_ROOM else SPENT
-    return what, n, way, held, kept, back, place[0], w1, onwards, next_strict, before + after
+        what = FULL if back == NO_SPACE else SPENT
+    return (
+        *(what, end.contact_sign, direction, could_stay, end.panel_count, back),
+        *(end.place[0], end.v2, end.step, end.no_turn_until, time_from_start + time_from_end),
+    )

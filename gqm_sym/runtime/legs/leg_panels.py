@@ -1,37 +1,39 @@
-"""The panels of a leg: as wide as V**2, the forces and the pace of time on them can be resolved."""
+"""The panels of a leg: each as wide as V**2, the forces and the time rate can be resolved on it by a polynomial."""
 
 from math import fabs, inf
+from typing import NamedTuple
 
 from gqm_sym.runtime.compiled.intrinsics import bits, from_bits
 from gqm_sym.runtime.compiled.jit import Inlined, Inner
 from gqm_sym.runtime.legs.leg_breaks import offset
 from gqm_sym.runtime.legs.leg_equation import (
-    BARE,
     DS,
     FORCE,
     KAPPA,
     LOAD,
     MEAN,
     N0,
-    PACE,
-    PLACE,
-    PULL,
+    OFFSET,
+    Q_RATE,
     SERIES,
     SIZES,
     TAILS,
+    TIME_RATE,
+    W_FACTOR,
     D,
     P,
     W,
-    as_bare,
+    as_factor,
     begin_panel,
     distance,
-    pace,
+    fill_rates,
+    load_row,
+    load_size_row,
     product,
-    push,
-    push_sizes,
+    slope_at,
     solve_panel,
 )
-from gqm_sym.runtime.legs.leg_record import change_at, last_of
+from gqm_sym.runtime.legs.leg_record import change_at, tail_of
 from gqm_sym.runtime.legs.polynomials import (
     COUNT,
     LEBESGUE,
@@ -43,124 +45,147 @@ from gqm_sym.runtime.legs.polynomials import (
     to_tails,
 )
 
-# Last coefficients against the largest: noise in them is about 1e-16.
-TAIL = 4e-16
+# The last coefficients of a resolved function against the largest one; noise in them is about 1e-16.
+TAIL_RATIO = 4e-16
 
-# Coefficients that have stopped falling below this level are rounding noise, not structure.
-PLATEAU = 1e-9
+# Below this ratio coefficients that no longer decrease are rounding noise, not structure.
+NOISE_LEVEL = 1e-9
 
-# Last coefficients of N against the largest where it has one sign at all nodes, for its changes of sign are decided to
-# no more than that (`legs.TOUCHED`); and where the polynomial is far from nothing throughout.
-ONE_SIGN, CLEAR = 1e-14, 1e-7
+# The last coefficients of N against the largest one that suffice where N has one sign at all nodes, because its changes
+# of sign are decided to no more than that (`leg_run.ZERO_TOLERANCE`); and those where it is far from zero throughout.
+ONE_SIGN_RATIO, FAR_FROM_ZERO_RATIO = 1e-14, 1e-7
 
-# What may be left of a function where all of it cancels, as a share of its parts.
-NOISE = 1e-15
+# What rounding may leave of a function that vanishes by cancellation, as a share of its parts.
+CANCELLATION_NOISE = 1e-15
 
-# A width of a few units in the last place of the parameter.
-NARROW = 1e-15
+# A width of a few units in the last place of the curve's parameter.
+MIN_RELATIVE_WIDTH = 1e-15
 
-# Coefficients that fall by this factor a degree reach TAIL with the last ones but one; those in the middle are as many
-# degrees from the first.
-FALL, DEGREES = 5.4, 15
+# Coefficients that decrease by this factor with each degree reach TAIL_RATIO at the end; those in the middle are this
+# many degrees from the first.
+DECREASE, DEGREES = 5.4, 15
 
-# Bits of 1.0, and what x**(-1/DEGREES) would have if logarithms were straight lines between powers of two.
+# The bits of 1.0, and those that x**(-1/DEGREES) has for x = 1 if logarithms are linear between powers of two.
 ONE = 0x3FF0000000000000
-STRAIGHT = ONE + ONE // DEGREES
+LINEAR_LOGARITHM = ONE + ONE // DEGREES
 
-# By what coefficients of time are then larger than those of all else.
-TURNING = 10.0
+# From this ratio on of its coefficients to all others the time rate is taken to have a turning point ahead.
+TURNING_RATIO = 10.0
 
-# How far, in half widths from the middle of a panel, what is not smooth may be for coefficients to fall so.
-REACH = 0.5 * (FALL + 1.0 / FALL)
+# How far a singularity is from the panel's middle, in half widths, if coefficients decrease by that factor.
+SINGULARITY_DISTANCE = 0.5 * (DECREASE + 1.0 / DECREASE)
 
-# A panel is made this much narrower than it would seem to be allowed to be, and at most that many times wider.
-CAUTION, GROWTH = 0.9, 4.0
+# A factor by which panels are narrower than they seem to be allowed to be, and the most by which they grow.
+SAFETY_FACTOR, MAX_GROWTH = 0.9, 4.0
 
-# V**2 at a panel's end against the largest so far from which on time is resolved: below, a turn is expected, and time
-# is counted from there.
-HIGH = 0.25
+# The ratio of V**2 at a panel's end to the largest V**2 so far above which time is resolved. Below it a turn is
+# expected, and time is counted from there.
+HIGH_V2_RATIO = 0.25
 
-# A part this small of a panel on which V**2 is resolved tells noise from structure.
-SLIVER = 2.0**-20
+# The share of a panel on which V**2 is resolved within which structure of the time rate can only be noise.
+NOISE_WIDTH_RATIO = 2.0**-20
 
-# Panels that are tried in a row along a leg.
-MOST_TRIES = 20000
+# The most panels of a leg, and the most widths that are tried for one.
+MAX_PANELS, MAX_WIDTHS = 20000, 2100
 
-# Whether time is to be resolved.
+# Whether time has to be resolved.
 NEVER, MAYBE, ALWAYS = range(3)
+
+
+class PanelRequest(NamedTuple):
+    """What is asked of the next panel.
+
+    Attributes
+    ----------
+    max_width : float
+        How wide it may be, in the march variable.
+    step : float
+        The width to begin with.
+    largest_v2 : float
+        The largest V**2 on the leg so far, less what resistance alone takes of it since.
+    timing : int
+        ALWAYS if time must be resolved, NEVER if not; MAYBE if it must unless V**2 is below HIGH_V2_RATIO of the
+        largest at both ends.
+    resolve_load : bool
+        Whether N must be resolved as far as its changes of sign need it.
+    """
+
+    max_width: float
+    step: float
+    largest_v2: float
+    timing: int
+    resolve_load: bool
 
 
 @Inlined
 def size_at(row):  # type: ignore[no-untyped-def]
-    """Where the size is kept that a row's coefficients are held against."""
+    """The index of the size that a row's coefficients are compared with."""
     return SIZES + row // WIDE
 
 
 @Inner
-def weigh(base, bare, work):  # type: ignore[no-untyped-def]
-    """What the coefficients of each function but the pace are held against; the largest V**2 on the panel.
+def set_sizes(v2, factor, work):  # type: ignore[no-untyped-def]
+    """Set the sizes that coefficients are compared with, but that of the time rate; returns the largest V**2.
 
-    The panel begins with V**2 = ``base``, which is ``bare`` in the units of BARE.
+    At the panel's start V**2 has the value ``v2``, which is ``factor`` in the unit of W_FACTOR.
     """
-    push_sizes(work, MEAN, DS, N0, KAPPA, W)
-    highest, pull = max(base, extent(work, W)[1]), size_of(work, PULL)
-    width = work[PLACE + COUNT]
+    load_size_row(work, MEAN, DS, N0, KAPPA, W)
+    largest_v2, q_rate = max(v2, extent(work, W)[1]), size_of(work, Q_RATE)
+    width = work[OFFSET + COUNT]
     work[size_at(DS)] = size_of(work, DS)
-    work[size_at(FORCE)] = max(size_of(work, FORCE), pull * highest * width / work[D + COUNT])
-    work[size_at(PULL)] = max(pull, 1.0 / width)
-    work[size_at(BARE)] = max(size_of(work, BARE), bare)
+    work[size_at(FORCE)] = max(size_of(work, FORCE), q_rate * largest_v2 * width / work[D + COUNT])
+    work[size_at(Q_RATE)] = max(q_rate, 1.0 / width)
+    work[size_at(W_FACTOR)] = max(size_of(work, W_FACTOR), factor)
     work[size_at(LOAD)] = extent(work, MEAN)[1]
-    return highest
+    return largest_v2
 
 
 @Inner
-def falls(work, row, size):  # type: ignore[no-untyped-def]
-    """The size of a function's last coefficients and of some in the middle, and whether it is resolved."""
+def examine(work, row, size):  # type: ignore[no-untyped-def]
+    """The size of a function's last coefficients, that of some in the middle, and whether the function is resolved."""
     to_tails(work, row, work, TAILS)
-    tail, level = last_of(work), max(fabs(work[TAILS + 3]), max(fabs(work[TAILS + 4]), fabs(work[TAILS + 5])))
-    return tail, level, tail <= TAIL * size or (level <= PLATEAU * size and tail >= 0.05 * level)
+    tail, middle = tail_of(work), max(fabs(work[TAILS + 3]), max(fabs(work[TAILS + 4]), fabs(work[TAILS + 5])))
+    return tail, middle, tail <= TAIL_RATIO * size or (middle <= NOISE_LEVEL * size and tail >= 0.05 * middle)
 
 
 @Inner
-def resolved(work, first, last):  # type: ignore[no-untyped-def]
-    """Whether the functions from ``first`` to before ``last`` are resolved, and how large coefficients in their middle
-    are, against the largest.
-    """
-    fine, worst = True, 0.0
+def are_resolved(work, first, last):  # type: ignore[no-untyped-def]
+    """Whether rows ``first`` to ``last`` (excluded) are resolved; and their largest ratio of middle coefficients."""
+    resolved, worst = True, 0.0
     for row in range(first, last, WIDE):
         size = work[size_at(row)]
-        tail, level, ok = falls(work, row, size)
-        if not (tail < inf and level < inf):
+        tail, middle, fine = examine(work, row, size)
+        if not (tail < inf and middle < inf):
             return False, inf
         if size > 0.0:
-            worst = max(worst, level / size)
-        fine = fine and ok
-    return fine, worst
+            worst = max(worst, middle / size)
+        resolved = resolved and fine
+    return resolved, worst
 
 
 @Inner
-def rate(worst):  # type: ignore[no-untyped-def]
-    """By what coefficients fall a degree, to a few per cent, if ``worst`` is the size of those in the middle."""
-    return from_bits(STRAIGHT - bits(worst) // DEGREES)
+def decrease(ratio):  # type: ignore[no-untyped-def]
+    """The factor by which coefficients decrease with each degree, by those in the middle; right to a few per cent."""
+    return from_bits(LINEAR_LOGARITHM - bits(ratio) // DEGREES)
 
 
 @Inner
-def growth(worst):  # type: ignore[no-untyped-def]
-    """By what a panel's width may be multiplied: coefficients are powers of the distance of what is not smooth."""
-    return min(CAUTION / FALL * rate(worst), GROWTH) if worst < inf else 0.5
+def growth(ratio):  # type: ignore[no-untyped-def]
+    """The factor by which a panel may grow, if coefficients are powers of the distance to a singularity."""
+    return min(SAFETY_FACTOR / DECREASE * decrease(ratio), MAX_GROWTH) if ratio < inf else 0.5
 
 
 @Inner
-def ahead(worst, side):  # type: ignore[no-untyped-def]
-    """The same where what is not smooth lies ahead, as for time a turn: for the panel once more, or for the next.
+def growth_towards(ratio, side):  # type: ignore[no-untyped-def]
+    """The factor by which a panel may grow if the singularity lies ahead, as a turn does for time.
 
-    ``side`` is 1 for the panel itself, -1 for that which begins at its end. Coefficients fall as on an ellipse through
-    what is ahead.
+    It is meant for the panel itself (``side`` 1) or for the one that begins at its end (-1). Coefficients decrease as
+    for an ellipse through the singularity.
     """
-    if not worst < inf:
+    if not ratio < inf:
         return 0.5
-    fall = rate(worst)
-    return min(CAUTION * (0.5 * (fall + 1.0 / fall) + side) / (REACH + 1.0), GROWTH)
+    factor = decrease(ratio)
+    return min(SAFETY_FACTOR * (0.5 * (factor + 1.0 / factor) + side) / (SINGULARITY_DISTANCE + 1.0), MAX_GROWTH)
 
 
 @Inner
@@ -171,30 +196,30 @@ def narrower(width, factor):  # type: ignore[no-untyped-def]
 
 @Inner
 def keeps_sign(work, row, noise):  # type: ignore[no-untyped-def]
-    """Whether values of a function are so far from nothing that the polynomial through them changes sign nowhere."""
+    """Whether a function's values are so far from zero that the polynomial through them has no zero."""
     low, high = extent(work, row)
     return fabs(0.5 * (low + high)) > 0.5 * LEBESGUE * (high - low) + noise
 
 
 @Inner
-def told(work):  # type: ignore[no-untyped-def]
-    """Whether N is resolved as far as its changes of sign on a panel ask for, and how large its coefficients are."""
+def is_load_resolved(work):  # type: ignore[no-untyped-def]
+    """Whether N is resolved as far as its changes of sign need it, and its ratio of middle coefficients."""
     size = work[size_at(LOAD)]
-    tail, level, fine = falls(work, LOAD, size)
-    if not (tail < inf and level < inf):
+    tail, middle, fine = examine(work, LOAD, size)
+    if not (tail < inf and middle < inf):
         return False, inf
     if not fine:
         low, high = extent(work, LOAD)
-        same = low * high > 0.0 and low * work[LOAD + COUNT] > 0.0
-        fine = (same and tail <= ONE_SIGN * size) or (
-            tail <= CLEAR * size and keeps_sign(work, LOAD, 4.0 * CLEAR * size)
+        one_sign = low * high > 0.0 and low * work[LOAD + COUNT] > 0.0
+        fine = (one_sign and tail <= ONE_SIGN_RATIO * size) or (
+            tail <= FAR_FROM_ZERO_RATIO * size and keeps_sign(work, LOAD, 4.0 * FAR_FROM_ZERO_RATIO * size)
         )
-    return fine, 0.0 if fine else level / size
+    return fine, 0.0 if fine else middle / size
 
 
 @Inner
-def change_of(work, row, sign, noise):  # type: ignore[no-untyped-def]
-    """`first_change` of a function by its values; its coefficients are found only where values leave a doubt."""
+def first_change_of(work, row, sign, noise):  # type: ignore[no-untyped-def]
+    """`first_change` of a row of values; coefficients are computed only if the values leave a doubt."""
     if keeps_sign(work, row, noise):
         found = 1 if work[row] > 0.0 else -1
         if sign == 0 or found == sign:
@@ -204,127 +229,145 @@ def change_of(work, row, sign, noise):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def to_kink(work):  # type: ignore[no-untyped-def]
-    """The place x up to which the curvature keeps its sign: 2 if throughout, -1 if that is not resolved.
+def kink(work):  # type: ignore[no-untyped-def]
+    """The place x where the curvature changes sign: 2 if it does not, -1 if that is not resolved.
 
-    The sign is that of ds kappa, which is smooth at cusps too.
+    The sign is taken from ds kappa, which is smooth at cusps too.
     """
     product(work, LOAD, DS, KAPPA)
     size = size_of(work, LOAD)
-    if not falls(work, LOAD, size)[2]:
+    if not examine(work, LOAD, size)[2]:
         return -1.0
-    return change_of(work, LOAD, 0, NOISE * size)[0]
+    return first_change_of(work, LOAD, 0, CANCELLATION_NOISE * size)[0]
 
 
 @Inner
-def next_panel(  # type: ignore[no-untyped-def]
-    drive,
-    p,
-    flags,
-    origin,
-    span,
-    u,
-    g,
-    c,
-    left,
-    room,
-    step,
-    base,
-    v,
-    nu,
-    ceiling,
-    ask,
-    watch,
-    work,
-):
-    """The widest panel that can be resolved, no wider than ``room`` and ``step``; on the piece within ``span``.
+def is_curve_resolved(width, work):  # type: ignore[no-untyped-def]
+    """Whether the rows that do not depend on V**2 are resolved, and their largest ratio of middle coefficients."""
+    work[size_at(DS)], work[size_at(Q_RATE)] = size_of(work, DS), max(size_of(work, Q_RATE), 1.0 / width)
+    return are_resolved(work, Q_RATE, P)
 
-    Time on it is resolved too: where ``ask`` is ALWAYS; never where it is NEVER; where it is MAYBE, unless V**2 falls
-    below a part of the largest so far, ``ceiling``. N is resolved as well as its changes of sign ask for, and not at
-    all unless ``watch`` is set.
+
+@Inner
+def resolve_time(march, panel, request, largest_v2, worst, is_sliver, work):  # type: ignore[no-untyped-def]
+    """Whether a panel will do as far as time is concerned.
+
+    ``worst`` is the ratio of middle coefficients of the other functions. On so small a part of a smooth panel that it
+    ``is_sliver`` only noise is unresolved, which the error of the time includes.
+
+    Returns
+    -------
+    done : bool
+        Whether the panel will do.
+    factor : float
+        By how much the next panel may be wider; or this one, if it will not do.
+    timed : bool
+        Whether time is resolved.
+    """
+    top, end, factor = max(request.largest_v2, largest_v2), work[W + COUNT], growth(worst)
+    is_high = end >= HIGH_V2_RATIO * top or panel.v2 < HIGH_V2_RATIO * top
+    needed = request.timing == ALWAYS or (request.timing == MAYBE and is_high)
+    timed, ratio = False, 0.0
+    if request.timing != NEVER:
+        fill_rates(march, panel, work)
+        work[size_at(TIME_RATE)] = size_of(work, TIME_RATE)
+        timed, ratio = are_resolved(work, TIME_RATE, LOAD)
+    timed = timed or (needed and is_sliver and work[TAILS] < inf)
+    # Where only time needs narrow panels while V**2 decreases, there is a turn ahead.
+    turning = end < panel.v2 and ratio > TURNING_RATIO * worst
+    if timed:
+        factor = min(factor, growth_towards(ratio, -1.0) if turning else growth(ratio))
+    elif needed:
+        factor = growth_towards(ratio, 1.0) if turning else growth(ratio)
+    return timed or not needed, factor, timed
+
+
+@Inner
+def next_panel(forces, march, panel, request, work):  # type: ignore[no-untyped-def]
+    """The widest panel from a start on that can be resolved.
 
     Returns
     -------
     width : float
-        In the march variable; 0 if none is wide enough to be one.
+        In the march variable; 0 if no width suffices that doubles can represent.
     step : float
-        To go on with.
+        The width to begin with on the next panel.
     timed : bool
         Whether time is resolved.
     """
-    width, kink, widest = min(step, room), False, 0.0
-    gone, near = distance(left, g, c), 2.0 * g * left + c
-    here = origin[0] + u * gone
-    for _ in range(2100):
-        run = width * (near + g * width)
-        # As narrow as its room, a panel may be narrower than places in doubles: distances on it keep their digits.
-        if (run <= NARROW * max(fabs(here), gone) and width < room) or run < 1e-300:
+    width, step, ends_at_kink, widest = min(request.step, request.max_width), request.step, False, 0.0
+    start, slope = distance(panel.left, march), slope_at(panel.left, march)
+    unit = MIN_RELATIVE_WIDTH * max(fabs(march.origin[0] + march.direction * start), start)
+    # Where rows are known before V**2 is, they show most panels that are too wide.
+    curve_first = forces.linear and not forces.kinked
+    last = Q_RATE if curve_first else P
+    for _ in range(MAX_WIDTHS):
+        length = width * (slope + march.g * width)
+        # A panel may be narrower than places in doubles if its end is given: distances on it keep their digits.
+        if (length <= unit and width < request.max_width) or length < 1e-300:
             return 0.0, step, False
-        begin_panel(drive, p, flags[2], origin, span, u, g, c, left, width, base, v, nu, work)
-        untold, worst = P, 0.0
-        if not flags[1] and flags[2]:  # most that is too wide is told from the curve alone
-            work[size_at(DS)], work[size_at(PULL)] = size_of(work, DS), max(size_of(work, PULL), 1.0 / width)
-            fine, worst = resolved(work, PULL, P)
+        begin_panel(forces, march, panel, width, work)
+        ratio = 0.0
+        if curve_first:
+            fine, ratio = is_curve_resolved(width, work)
             if not fine:
-                width = narrower(width, growth(worst))
+                width = narrower(width, growth(ratio))
                 continue
-            untold = PULL
-        far = solve_panel(drive, p, flags[2], u, g, c, left, base, v, nu, work)
-        if flags[1] and not kink and (far < inf or flags[2]):
-            x = to_kink(work)
-            kinked = width * (0.5 * (1.0 + x) if x > -1.0 else 0.5)
-            # A run that begins at a kink may begin a rounding before it.
-            if x <= 1.0 and kinked * (near + g * kinked) > NARROW * max(fabs(here), gone):
-                width, kink = kinked, x > -1.0
+        q = solve_panel(forces, march, panel, work)
+        if forces.kinked and not ends_at_kink and (q < inf or forces.linear):
+            x = kink(work)
+            to_kink = width * (0.5 * (1.0 + x) if x > -1.0 else 0.5)
+            # A leg that begins at a kink may begin a rounding before it.
+            if x <= 1.0 and to_kink * (slope + march.g * to_kink) > unit:
+                width, ends_at_kink = to_kink, x > -1.0
                 continue
-            push(work, LOAD, DS, N0, KAPPA, W)
-        if not far < inf:
-            width, kink = 0.5 * width, False
+            load_row(work, LOAD, DS, N0, KAPPA, W)
+        if not q < inf:
+            width, ends_at_kink = 0.5 * width, False
             continue
-        highest = weigh(base, as_bare(base, g, c, left), work)
-        fine, more = resolved(work, BARE, untold)
-        worst = max(worst, more)
-        if watch:
-            enough, more = told(work)
-            fine, worst = fine and enough, max(worst, more)
+        largest_v2 = set_sizes(panel.v2, as_factor(panel.v2, march, panel.left), work)
+        fine, worst = are_resolved(work, W_FACTOR, last)
+        worst = max(worst, ratio)
+        if request.resolve_load:
+            load_fine, ratio = is_load_resolved(work)
+            fine, worst = fine and load_fine, max(worst, ratio)
         factor = growth(worst)
         if fine:
             widest = max(widest, width)
-            top, end = max(ceiling, highest), work[W + COUNT]
-            needed = ask == ALWAYS or (ask == MAYBE and (end >= HIGH * top or base < HIGH * top))
-            timed, more = False, 0.0
-            if ask != NEVER:
-                pace(g, c, left, base, work)
-                work[size_at(PACE)] = size_of(work, PACE)
-                timed, more = resolved(work, PACE, LOAD)
-            # On so small a part of what is smooth it is noise that is not resolved; the error says so.
-            timed = timed or (needed and width <= SLIVER * widest and work[TAILS] < inf)
-            # Where time alone asks for narrow panels while V**2 falls, it is for a turn.
-            turning = end < base and more > TURNING * worst
-            if timed:
-                factor = min(factor, ahead(more, -1.0) if turning else growth(more))
-            if timed or not needed:
-                step = max(step, width * factor) if kink or width == room else width * factor
-                return width, step, timed
-            factor = ahead(more, 1.0) if turning else growth(more)
-        width, kink = narrower(width, factor), False
+            is_sliver = width <= NOISE_WIDTH_RATIO * widest
+            done, factor, timed = resolve_time(march, panel, request, largest_v2, worst, is_sliver, work)
+            if done:
+                grown = width * factor
+                return width, max(step, grown) if ends_at_kink or width == request.max_width else grown, timed
+        width, ends_at_kink = narrower(width, factor), False
     return 0.0, step, False
 
 
 @Inner
-def next_stop(origin, u, gone, whole, record, breaks, met, passed, nu):  # type: ignore[no-untyped-def]
-    """On the way back: the distance at which the next panel must end, and what has been passed.
+def next_stop(march, passed, whole, record, breaks, remaining):  # type: ignore[no-untyped-def]
+    """On the way back, the distance at which the next panel must end.
 
-    ``met`` and ``passed`` are the last changes of N's sign ``nu`` and the last breaks that are still to come.
+    Parameters
+    ----------
+    passed, whole : float
+        The distance that was followed back so far, and that to follow.
+    remaining : (int, int, int)
+        The index of the next change of N's sign, that of the next break, and the sign of N.
+
+    Returns
+    -------
+    stop : float
+    remaining : (int, int, int)
     """
-    stop = whole
-    # By distances, for what has been run to is as far as it was said to be: a place may be a rounding farther.
-    while met >= 0 and offset(record[change_at(record, met)], origin, u) <= gone:
-        met, nu = met - 1, -nu
-    while passed >= 0 and offset(breaks[passed], origin, u) <= gone:
-        passed -= 1
-    if met >= 0:
-        stop = min(stop, offset(record[change_at(record, met)], origin, u))
-    if passed >= 0:
-        stop = min(stop, offset(breaks[passed], origin, u))
-    return stop, met, passed, nu
+    change, upcoming, contact_sign = remaining
+    origin, u, stop = march.origin, march.direction, whole
+    # Distances are compared, because the distance to a stop was given as such: its place may be a rounding farther.
+    while change >= 0 and offset(record[change_at(record, change)], origin, u) <= passed:
+        change, contact_sign = change - 1, -contact_sign
+    while upcoming >= 0 and offset(breaks[upcoming], origin, u) <= passed:
+        upcoming -= 1
+    if change >= 0:
+        stop = min(stop, offset(record[change_at(record, change)], origin, u))
+    if upcoming >= 0:
+        stop = min(stop, offset(breaks[upcoming], origin, u))
+    return stop, (change, upcoming, contact_sign)

@@ -1,60 +1,70 @@
-"""The record of a leg: one line of numbers that compiled code fills and Python reads when somebody asks.
+"""The record of a leg: one line of numbers that compiled code fills, and Python reads when it is needed.
 
-At its beginning stands what the leg is known by; behind that its panels from the start, and what was followed back from
-its end: panels from a turn, or a field from an equilibrium (`fields`); at its end, backwards, the places at which N
-changes sign.
+==================== ============================================================================================
+number               meaning
+==================== ============================================================================================
+END, END_LOW         where the leg ends, as two doubles
+MIDDLE, MIDDLE_LOW   the place up to which time is counted from the start, as two doubles
+HALF_C               c/2 of the march variable (`leg_equation.March`); inf where it is the distance itself
+TIME_FROM_START      the time from the start to the middle
+TIME_FROM_END        the time from the middle to a turn
+CHANGE_COUNT         how often N changes sign
+from HEAD on         the panels from the start; after them what was followed back from the end: panels from a turn, or
+                     the field next to an equilibrium (`approach`)
+at the end           the places at which N changes sign, the first one last
+==================== ============================================================================================
+
+A panel is a row of COLUMNS numbers: at its nodes the rates of time and of arc length, and Y; after each of these one
+more number, RIGHT (the march variable at its end), TIME, and TIME_ERROR (what the time may be wrong by).
 """
 
 from gqm_sym.runtime.arithmetic.doubledouble import two_sum
 from gqm_sym.runtime.compiled.jit import Inlined, Inner
 from gqm_sym.runtime.compiled.registers import copied
-from gqm_sym.runtime.legs.leg_equation import ARC, PACE, SPEED, TAILS
+from gqm_sym.runtime.legs.leg_equation import ARC_RATE, SPEED, TAILS, TIME_RATE
 from gqm_sym.runtime.legs.polynomials import COUNT, WIDE, to_tails
 
-# Where the leg ends and up to where time is counted from the start, each as two doubles; c/2 of the march variable,
-# infinite where it is the distance itself; the times from the start and from the turn; how often N changes sign.
-END, END_LOW, MIDDLE, MIDDLE_LOW, SLACK, BEFORE, AFTER, MET, HEAD = range(9)
+END, END_LOW, MIDDLE, MIDDLE_LOW, HALF_C, TIME_FROM_START, TIME_FROM_END, CHANGE_COUNT, HEAD = range(9)
 
-# A panel: at its nodes the pace of time, that of arc length, and Y; behind each of them one of where the panel ends,
-# its time, and what that may be off by.
 COLUMNS = 3 * WIDE
-RIGHT, TIME, ERROR = range(COUNT, COLUMNS, WIDE)
+RIGHT, TIME, TIME_ERROR = range(COUNT, COLUMNS, WIDE)
 copy = copied(WIDE)
 
 
 @Inlined
-def has_room(record, used, met):  # type: ignore[no-untyped-def]
-    """Whether there is room for a panel, and for one more change of sign."""
-    return used + COLUMNS + met < record.size
+def has_space(record, used, change_count):  # type: ignore[no-untyped-def]
+    """Whether the record has space for one more panel and one more change of sign."""
+    return used + COLUMNS + change_count < record.size
 
 
 @Inlined
 def change_at(record, k):  # type: ignore[no-untyped-def]
-    """Where in a record a change of N's sign stands."""
+    """The index of the k-th change of N's sign in a record."""
     return record.size - 1 - k
 
 
 @Inlined
-def last_of(work):  # type: ignore[no-untyped-def]
-    """The largest of the last coefficients of the function that was looked at before."""
+def tail_of(work):  # type: ignore[no-untyped-def]
+    """The largest of the last coefficients of the row examined last."""
     return max(abs(work[TAILS]), max(abs(work[TAILS + 1]), abs(work[TAILS + 2])))
 
 
 @Inner
-def keep(record, at, right, width, work):  # type: ignore[no-untyped-def]
-    """Enter a panel that ends at w = ``right``, from ``at`` on."""
-    to_tails(work, PACE, work, TAILS)
-    copy(record, at, work, PACE)
-    copy(record, at + WIDE, work, ARC)
+def add_panel(record, at, right, width, work):  # type: ignore[no-untyped-def]
+    """Write a panel that ends at w = ``right`` into the record, from ``at`` on."""
+    to_tails(work, TIME_RATE, work, TAILS)
+    copy(record, at, work, TIME_RATE)
+    copy(record, at + WIDE, work, ARC_RATE)
     copy(record, at + 2 * WIDE, work, SPEED)
-    record[at + RIGHT], record[at + TIME], record[at + ERROR] = right, width * work[TAILS + 6], width * last_of(work)
+    record[at + RIGHT] = right
+    record[at + TIME], record[at + TIME_ERROR] = width * work[TAILS + 6], width * tail_of(work)
 
 
 @Inner
-def total(record, begin, count):  # type: ignore[no-untyped-def]
-    """The time of panels that stand from ``begin`` on."""
+def total_time(record, begin, count):  # type: ignore[no-untyped-def]
+    """The time on ``count`` panels, the first of which stands at ``begin``."""
     high, low = 0.0, 0.0
     for k in range(count):
-        high, rest = two_sum(high, record[begin + k * COLUMNS + TIME])
-        low += rest
+        high, rounding = two_sum(high, record[begin + k * COLUMNS + TIME])
+        low += rounding
     return high + low

@@ -1,268 +1,512 @@
-"""A run of the body along the curve where forces dissipate: panel after panel, to where it turns, ends or may pause.
+"""A run of the body along the curve where forces dissipate: panel after panel, until it turns, ends or may pause.
 
-Time is counted on the way, as long as V**2 is large; from where it falls for good the run is only followed to its end.
+Time is counted on the way as long as V**2 is large. From where V**2 decreases for good the run is only followed to its
+end, from which time is then counted back (`follow`).
 """
 
 from math import fabs, inf, sqrt
+from typing import NamedTuple
 
 from gqm_sym.runtime.arithmetic.clenshaw import chebyshev_sum
 from gqm_sym.runtime.compiled.calls import call_speed_equation
 from gqm_sym.runtime.compiled.jit import Inner
 from gqm_sym.runtime.compiled.registers import on_stack
-from gqm_sym.runtime.legs.leg_breaks import between, located, offset, within
+from gqm_sym.runtime.compiled.types import Array
+from gqm_sym.runtime.legs.leg_breaks import located, offset, span_before, within
 from gqm_sym.runtime.legs.leg_equation import (
-    BARE,
+    EXPM1_Q,
     FORCE,
     LOAD,
     MEAN,
-    PLACE,
+    OFFSET,
     SERIES,
-    SWELL,
-    as_bare,
+    W_FACTOR,
+    March,
+    P,
+    Panel,
+    Q,
+    W,
+    as_factor,
     begin_panel,
     distance,
+    fill_rates,
     marched,
-    pace,
-    panel_room,
+    panel_buffer,
     set_nodes,
+    slope_at,
     solve_panel,
 )
-from gqm_sym.runtime.legs.leg_equation import P as GAIN
-from gqm_sym.runtime.legs.leg_equation import Q as LOSS
-from gqm_sym.runtime.legs.leg_equation import W as V2
 from gqm_sym.runtime.legs.leg_panels import (
     ALWAYS,
-    HIGH,
+    CANCELLATION_NOISE,
+    HIGH_V2_RATIO,
+    MAX_PANELS,
     MAYBE,
-    MOST_TRIES,
-    NARROW,
+    MIN_RELATIVE_WIDTH,
     NEVER,
-    NOISE,
-    change_of,
+    PanelRequest,
+    first_change_of,
     next_panel,
     size_at,
 )
-from gqm_sym.runtime.legs.leg_record import COLUMNS, HEAD, change_at, has_room, keep
+from gqm_sym.runtime.legs.leg_record import COLUMNS, HEAD, add_panel, change_at, has_space
 from gqm_sym.runtime.legs.polynomials import COUNT, extent, size_of, to_coefficients
 
-# What ended a run along the curve.
-TURN, LIMIT, LIFTOFF, ASYMPTOTE, PAUSED, NARROWED, SPENT, DIPPED, FULL = range(9)
+# What ended a run:
+#
+# ========== ==================================================================================================
+# TURN       V**2 vanished, and the body turns or rests
+# LIMIT      the end of the domain, or of the range of breaks that were given
+# LIFTOFF    N took the sign that it cannot have
+# ASYMPTOTE  V**2 and the force vanish together: the body approaches an equilibrium
+# PAUSED     it has run far enough for once
+# NARROWED   a place where the functions are not smooth: no panel that doubles can represent is narrow enough
+# SPENT      too many panels were needed
+# SLOWED     the body becomes slow from the place given, but does not turn; it has to be run again from there
+# FULL       the record is full
+# ========== ==================================================================================================
+#
+# GOES_ON is the code of a run that has not ended.
+TURN, LIMIT, LIFTOFF, ASYMPTOTE, PAUSED, NARROWED, SPENT, SLOWED, FULL = range(9)
+GOES_ON = -1
 
-# What may be left of N where it cancels, against the parts it is the sum of: the curvature of a chart has a digit less.
-TOUCHED = 5e-14
+# The ratio of N to the sum of the sizes of its parts below which it counts as zero: the curvature of a chart has a
+# digit less than doubles.
+ZERO_TOLERANCE = 5e-14
 
-# A body this close to a turn, as a share of what has been run, is there: for laws that have no value beyond it.
-NEAR = 1e-11
+# A body this close to a turn, as a share of the distance it has run, counts as being there; some laws have no value
+# beyond a turn.
+NEAR_TURN = 1e-11
 
-# The first panel of a leg, and the first behind a break, against the way on which the acceleration there would stop the
-# body.
-SOONER = 2.0
-MOST_PANELS = 512
+# The width of the first panel of a leg, and of the first one after a break, against the distance on which the
+# acceleration there would stop the body.
+STOPPING_SHARE = 2.0
 
-# Room for one place, V**2, and what is found there.
-spot_room = on_stack(7)
+# The number of panels after which a run pauses.
+PANELS_PER_RUN = 512
+
+# A buffer for one place, V**2 there, and the five numbers of the speed equation.
+point_buffer = on_stack(7)
+
+
+class Start(NamedTuple):
+    """Where a run begins.
+
+    Attributes
+    ----------
+    place, place_low : float
+        The place as two doubles.
+    v2 : float
+        V**2.
+    direction : int
+        The sign of dlam/dt.
+    contact_sign : int
+        The sign of N; 0 if it has to be found out.
+    step : float
+        The distance to begin with.
+    no_turn_until : float
+        The distance up to which no turn is expected, however slow the body becomes.
+    """
+
+    place: float
+    place_low: float
+    v2: float
+    direction: int
+    contact_sign: int
+    step: float
+    no_turn_until: float
+
+
+class Route(NamedTuple):
+    """The curve ahead of a run.
+
+    Attributes
+    ----------
+    breaks : array
+        Places where panels have to begin, in the order in which they are passed; some may lie behind.
+    limit : float
+        The end of the domain.
+    pause : float
+        The distance from which on the run may pause.
+    only_sign : int
+        The only sign that N can have; 0 if it can have both.
+    """
+
+    breaks: Array
+    limit: float
+    pause: float
+    only_sign: int
+
+
+class Ahead(NamedTuple):
+    """What is ahead of a panel.
+
+    Attributes
+    ----------
+    upcoming : int
+        The index of the next break.
+    span : (float, float)
+        The places between which the curve may be evaluated (`leg_breaks`).
+    widest : float
+        The width that the panel may have at most; infinite but for the first panel and those after a break.
+    """
+
+    upcoming: int
+    span: tuple[float, float]
+    widest: float
+
+
+class Change(NamedTuple):
+    """The first places on a panel, as x in [-1, 1], where something ends; 2 where it does not.
+
+    Attributes
+    ----------
+    turn : float
+        Where V**2 becomes negative.
+    touch : float
+        Where V**2 vanishes within its noise without changing its sign.
+    load : float
+        Where N changes its sign.
+    first : float
+        The smallest of these.
+    """
+
+    turn: float
+    touch: float
+    load: float
+    first: float
+
+
+class Timed(NamedTuple):
+    """The last point of a run up to which time is counted.
+
+    Attributes
+    ----------
+    distance, v2 : float
+        The distance from the origin, and V**2 there.
+    contact_sign, change_count : int
+        The sign of N there, and how often it has changed so far.
+    """
+
+    distance: float
+    v2: float
+    contact_sign: int
+    change_count: int
+
+
+class End(NamedTuple):
+    """How a run ended.
+
+    Attributes
+    ----------
+    what : int
+        TURN to FULL.
+    place : (float, float)
+        The place as two doubles.
+    v2 : float
+        V**2 there.
+    contact_sign : int
+        The sign of N there.
+    step, no_turn_until : float
+        As in `Start`, from here on.
+    middle : (float, float)
+        The place up to which time is counted, as two doubles.
+    half_c : float
+        c/2 of the march variable (`leg_equation.March`); infinite where it is the distance itself.
+    change_count, panel_count : int
+        How often N has changed its sign, and how many panels were recorded.
+    upcoming : int
+        The index of the next break.
+    """
+
+    what: int
+    place: tuple[float, float]
+    v2: float
+    contact_sign: int
+    step: float
+    no_turn_until: float
+    middle: tuple[float, float]
+    half_c: float
+    change_count: int
+    panel_count: int
+    upcoming: int
 
 
 @Inner
-def bottom(work, v, touch):  # type: ignore[no-untyped-def]
-    """The place x near ``touch`` where V**2, all but zero there, is least: the force vanishes."""
+def equilibrium_near(work, direction, touch):  # type: ignore[no-untyped-def]
+    """The place x near ``touch`` where V**2, which almost vanishes there, is smallest, because the force vanishes."""
     for j in range(COUNT):
-        work[MEAN + j] = v * (work[GAIN + j] - work[LOSS + j] * work[V2 + j])
+        work[MEAN + j] = direction * (work[P + j] - work[Q + j] * work[W + j])
     to_coefficients(work, MEAN, work, SERIES)
     c = work[SERIES : SERIES + COUNT]
     x, new = touch, touch + 1e-4
     before = chebyshev_sum(c, x)
-    for _ in range(30):
-        slope = chebyshev_sum(c, new)
-        if slope == before:
+    for _ in range(30):  # the secant method
+        value = chebyshev_sum(c, new)
+        if value == before:
             break
-        x, before, new = new, slope, new - slope * (new - x) / (slope - before)
+        x, before, new = new, value, new - value * (new - x) / (value - before)
     return new if fabs(new - touch) <= 1e-2 else touch
 
 
 @Inner
-def rise(drive, p, place, v2, v, nu, spot):  # type: ignore[no-untyped-def]
-    """By how much V**2 grows per distance run in direction v."""
-    spot[0], spot[1] = place, v2
-    call_speed_equation(drive, 1, spot, 0, 1, float(v), float(nu), p, 2)
-    return v * (spot[3] - spot[4] * v2)
+def slope_of_v2(forces, place, v2, contact_sign, point):  # type: ignore[no-untyped-def]
+    """By how much V**2 grows per distance run; also fills ``point`` from index 2 on with DS to KAPPA."""
+    v, nu = float(forces.direction), float(contact_sign)
+    point[0], point[1] = place, v2
+    call_speed_equation(forces.speed_equation, 1, point, (0, 1, 2), v, nu, forces.params)
+    return forces.direction * (point[3] - point[4] * v2)
 
 
 @Inner
-def run(drive, p, flags, origin, w, v, nu, breaks, off, limit, reach, step, side, strict, record):  # type: ignore[no-untyped-def]
-    """Follow the body from ``origin``, two doubles, with V**2 = w in direction v, to the first turn, end or pause.
+def sign_of_load(forces, place, v2, point):  # type: ignore[no-untyped-def]
+    """The sign of N at a place; 0 where it is zero within rounding."""
+    slope_of_v2(forces, place, v2, 0, point)
+    load, centripetal = point[5], point[6] * v2
+    if fabs(load + centripetal) > ZERO_TOLERANCE * (fabs(load) + fabs(centripetal)):
+        return 1 if load + centripetal > 0.0 else -1
+    return 0
+
+
+@Inner
+def begin_march(forces, start, place, contact_sign, point):  # type: ignore[no-untyped-def]
+    """The march variable from a start on, and the width that the first panel may have at most."""
+    origin, g, c, widest = (start.place, start.place_low), 1.0, 0.0, inf
+    if start.v2 > 0.0:
+        slope = slope_of_v2(forces, place, start.v2, contact_sign, point)
+        slow = slope > 0.0 and start.v2 <= slope * start.step
+        g, c = (1.0, 2.0 * sqrt(start.v2 / slope)) if slow else (0.0, 1.0)
+        # V**2 at launch is exact; a turn near the launch has all digits on a panel that is no wider than this.
+        widest = STOPPING_SHARE * start.v2 / -slope if slope < 0.0 else inf
+    return March(origin, start.direction, g, c), widest
+
+
+@Inner
+def begin(forces, start, route, off, point):  # type: ignore[no-untyped-def]
+    """The march variable of a run, the sign of N with which it begins, and what is ahead of it."""
+    breaks, origin, upcoming = route.breaks, (start.place, start.place_low), 0
+    while upcoming < breaks.size and offset(breaks[upcoming], origin, start.direction) <= 0.0:
+        upcoming += 1
+    span, contact_sign = span_before(breaks, upcoming, start.direction, off), start.contact_sign
+    place = within(start.place, span)
+    if contact_sign == 0:
+        contact_sign = sign_of_load(forces, place, start.v2, point)
+    march, widest = begin_march(forces, start, place, contact_sign, point)
+    return march, contact_sign, Ahead(upcoming, span, widest)
+
+
+@Inner
+def pass_break(forces, march, route, off, panel, ahead, gone, point):  # type: ignore[no-untyped-def]
+    """What is ahead of a panel that begins at the distance ``gone``.
+
+    V**2 at a break is as exact as at launch, so that the panel after it is as narrow as the first one.
+    """
+    upcoming, breaks, v = ahead.upcoming, route.breaks, march.direction
+    if upcoming == breaks.size or offset(breaks[upcoming], march.origin, v) > gone:
+        return ahead
+    upcoming, widest = upcoming + 1, inf
+    span = span_before(breaks, upcoming, v, off)
+    if panel.v2 > 0.0:
+        place = within(march.origin[0] + v * gone, span)
+        slope = slope_of_v2(forces, place, panel.v2, panel.contact_sign, point)
+        if slope < 0.0:
+            widest = marched(gone + STOPPING_SHARE * panel.v2 / -slope, march) - panel.left
+    return Ahead(upcoming, span, widest)
+
+
+@Inner
+def end_where_narrowed(forces, march, panel, gone, point):  # type: ignore[no-untyped-def]
+    """What ends a run where no panel can be laid, at what distance and with what V**2: a turn, if one is near."""
+    if not forces.linear and panel.v2 > 0.0:
+        here = march.origin[0] + march.direction * gone
+        slope = slope_of_v2(forces, within(here, panel.span), panel.v2, panel.contact_sign, point)
+        if slope < 0.0 and panel.v2 <= -slope * NEAR_TURN * max(fabs(here), gone):
+            return TURN, gone - panel.v2 / slope, 0.0
+    return NARROWED, gone, panel.v2
+
+
+@Inner
+def first_changes(march, panel, largest_v2, load_change, work):  # type: ignore[no-untyped-def]
+    """The first changes on a panel, on which N changes its sign at x = ``load_change``."""
+    if panel.v2 == 0.0:
+        scale = size_of(work, FORCE)
+    else:
+        scale = max(as_factor(largest_v2, march, panel.left), work[size_at(W_FACTOR)])
+    turn, _, touch = first_change_of(work, W_FACTOR, 1, CANCELLATION_NOISE * scale)
+    if touch <= -1.0 and panel.v2 == 0.0:
+        touch = 2.0
+    return Change(turn, touch, load_change, min(turn, touch, load_change))
+
+
+@Inner
+def changes_at_once(march, panel, width, change, gone):  # type: ignore[no-untyped-def]
+    """Whether N is zero at the panel's start, so that what follows decides its sign."""
+    if change.first == change.load and change.first <= 1.0:
+        where = distance(panel.left + width * (0.5 * (1.0 + change.first)), march)
+        here = march.origin[0] + march.direction * gone
+        return where <= gone + MIN_RELATIVE_WIDTH * max(fabs(here), gone)
+    return False
+
+
+@Inner
+def cut_panel(forces, march, panel, width, change, gone, work, point):  # type: ignore[no-untyped-def]
+    """Lay a panel once more, so that it ends at the first change; returns the march variable there.
+
+    Its own sum has more digits than the series of a wider panel.
+    """
+    x = change.first
+    if x == change.touch and x != change.turn:
+        x = equilibrium_near(work, forces.direction, change.touch)
+    right = panel.left + width * (0.5 * (1.0 + x))
+    begin_panel(forces, march, panel, right - panel.left, work)
+    solve_panel(forces, march, panel, work)
+    fill_rates(march, panel, work)
+    if change.first == change.turn and forces.linear:
+        v2, there = work[W + COUNT], distance(right, march)
+        place = within(march.origin[0] + march.direction * there, panel.span)
+        slope = slope_of_v2(forces, place, v2, panel.contact_sign, point)
+        if fabs(v2) < fabs(slope) * 1e-6 * (there - gone):
+            right = marched(there - v2 / slope, march)
+    elif change.first == change.load and change.first != change.touch:
+        # N at the panel's end has no error of a series, nor has the distance left to where it vanishes.
+        load, load_before = work[LOAD + COUNT], work[LOAD + COUNT - 1]
+        rate = (load - load_before) / (work[OFFSET + COUNT] - work[OFFSET + COUNT - 1])
+        if fabs(load) < fabs(rate) * 1e-6 * (right - panel.left):
+            right -= load / rate
+    return right
+
+
+@Inner
+def enter_change(record, count, place):  # type: ignore[no-untyped-def]
+    """Enter a place where N changes its sign in the record; returns the number of changes."""
+    record[change_at(record, count)] = place
+    return count + 1
+
+
+@Inner
+def largest_after(largest_v2, v2, ends_here, work):  # type: ignore[no-untyped-def]
+    """The largest V**2 so far, of which resistance alone leaves the share exp(-q) on a panel beginning with ``v2``."""
+    damped = largest_v2 if ends_here else largest_v2 / (1.0 + work[EXPM1_Q + COUNT])
+    return max(damped, max(v2, extent(work, W)[1]))
+
+
+@Inner
+def what_after(change, at_limit, may_pause):  # type: ignore[no-untyped-def]
+    """What ends a run after a panel, or GOES_ON."""
+    if change.first <= 1.0:
+        if change.first == change.turn:
+            return TURN
+        return ASYMPTOTE if change.first == change.touch else GOES_ON
+    if at_limit:
+        return LIMIT
+    return PAUSED if may_pause else GOES_ON
+
+
+@Inner
+def what_before(contact_sign, only_sign, has_room, fast_again, at_limit):  # type: ignore[no-untyped-def]
+    """What ends a run before a panel, or GOES_ON."""
+    if contact_sign != 0 and contact_sign == -only_sign:
+        return LIFTOFF
+    if not has_room:
+        return FULL
+    if fast_again:
+        return SLOWED
+    return LIMIT if at_limit else GOES_ON
+
+
+@Inner
+def conclude(route, march, end, timed, searching, gone):  # type: ignore[no-untyped-def]
+    """The end of a run at the distance ``gone``; ``end`` has all of it but the places."""
+    breaks, v, what = route.breaks, march.direction, end.what
+    middle = located(march.origin, v, timed.distance, breaks, end.upcoming)
+    v2, sign, changes, no_turn_until = end.v2, end.contact_sign, end.change_count, end.no_turn_until - gone
+    place = middle
+    if what == TURN or what == ASYMPTOTE:
+        place = located(march.origin, v, gone, breaks, end.upcoming)
+    elif searching and what != FULL:
+        no_turn_until = gone - timed.distance if what == PAUSED or what == SLOWED else inf
+        what, v2, sign, changes = SLOWED, timed.v2, timed.contact_sign, timed.change_count
+    else:
+        place = (route.limit, 0.0) if what == LIMIT else located(march.origin, v, gone, breaks, end.upcoming)
+        middle = place
+    count, upcoming = end.panel_count, end.upcoming
+    return End(what, place, v2, sign, end.step, no_turn_until, middle, end.half_c, changes, count, upcoming)
+
+
+@Inner
+def run(forces, start, route, off, record):  # type: ignore[no-untyped-def]
+    """Follow the body from a start to the first turn, end or pause.
 
     Parameters
     ----------
-    flags : (friction, kinked, linear)
-        Of what kind the forces are.
-    nu : int
-        The sign of N; 0 to find it out.
-    breaks : array
-        Places at which panels must begin, in the order they are met; some may lie behind.
+    forces : Forces
+    start : Start
+    route : Route
     off : float
-        How far off them the curve is asked (`leg_breaks`).
-    limit, reach : float
-        The end of the domain; the distance from which on the run may pause.
-    step : float
-        A distance to begin with.
-    side : int
-        The only sign that N can have; 0 where it can have both.
-    strict : float
-        The distance up to which there is no turn to be expected, however slow the body gets.
+        How far from the breaks the curve is evaluated (`leg_breaks`).
     record : array
-        For panels up to ``middle``, and changes of N's sign (`leg_records`).
+        Filled with panels up to the middle, and changes of N's sign (`leg_record`).
 
     Returns
     -------
-    what : int
-        TURN, LIMIT, LIFTOFF, ASYMPTOTE (V**2 and the force vanish together), PAUSED, NARROWED (a place where the
-        functions are not smooth), SPENT, DIPPED (the body gets slow from here on, but does not turn: to be run
-        again), FULL (the record is).
-    place, w, nu : (float, float), float, int
-        Where, as two doubles, with what V**2, and the sign of N.
-    step : float
-        The distance to go on with.
-    strict : float
-        The same from here on.
-    middle : (float, float)
-        The place up to which time is counted, as two doubles.
-    slack : float
-        c/2 of the march variable (`leg_panels`); infinite where it is the distance itself.
-    met, kept : int
-        How many changes of N's sign there are on the way, and how many panels.
-    coming : int
-        Which break is next, where the run ends.
+    End
     """
-    work, spot = panel_room(), spot_room()
+    work, point, v, step = panel_buffer(), point_buffer(), start.direction, start.step
     set_nodes(work)
-    g, c, sooner, coming, start = 1.0, 0.0, inf, 0, origin[0]
-    while coming < breaks.size and offset(breaks[coming], origin, v) <= 0.0:
-        coming += 1
-    span = between(breaks, coming, v, off)
-    first = within(start, span)
-    if nu == 0:
-        rise(drive, p, first, w, v, nu, spot)
-        load, turned = spot[5], spot[6] * w
-        if fabs(load + turned) > TOUCHED * (fabs(load) + fabs(turned)):
-            nu = 1 if load + turned > 0.0 else -1
-    if w > 0.0:
-        slope = rise(drive, p, first, w, v, nu, spot)
-        slow = slope > 0.0 and w <= slope * step
-        g, c = (1.0, 2.0 * sqrt(w / slope)) if slow else (0.0, 1.0)
-        # V**2 at launch is exact: a turn that is near has its digits on a panel no wider than this.
-        sooner = SOONER * w / -slope if slope < 0.0 else inf
-    count, met, what = 0, 0, SPENT
-    base, left, gone, ceiling, step = w, 0.0, 0.0, w, marched(step, g, c)
-    # The last distance up to which time is counted, and what is known there; a turn is searched for beyond it.
-    searching, kept, mark, mark_base, mark_nu, mark_met = False, 0, 0.0, w, nu, 0
-    for _ in range(MOST_TRIES):
-        if nu != 0 and nu == -side:
-            what = LIFTOFF
+    march, nu, ahead = begin(forces, start, route, off, point)
+    v2, left, gone, largest_v2, step = start.v2, 0.0, 0.0, start.v2, marched(step, march)
+    what, panel_count, recorded, change_count = SPENT, 0, 0, 0
+    # Once time is not counted any more, a turn is searched for.
+    searching, timed = False, Timed(gone, v2, nu, change_count)
+    for _ in range(MAX_PANELS):
+        late = v2 < HIGH_V2_RATIO * largest_v2
+        has_room = has_space(record, HEAD + recorded * COLUMNS, change_count)
+        ahead = pass_break(forces, march, route, off, Panel(left, v2, nu, ahead.span), ahead, gone, point)
+        at_end = ahead.upcoming == route.breaks.size
+        stop = offset(route.limit if at_end else route.breaks[ahead.upcoming], march.origin, v)
+        code = what_before(nu, route.only_sign, has_room, searching and not late, stop <= gone)
+        if code != GOES_ON:
+            what = code
             break
-        if not has_room(record, HEAD + kept * COLUMNS, met):
-            what = FULL
-            break
-        here, late = start + v * gone, base < HIGH * ceiling
-        if searching and not late:
-            what = DIPPED
-            break
-        if coming < breaks.size and offset(breaks[coming], origin, v) <= gone:
-            coming += 1
-            span = between(breaks, coming, v, off)
-            slope = rise(drive, p, within(here, span), base, v, nu, spot) if base > 0.0 else 0.0
-            # V**2 at a break is as exact as at launch.
-            sooner = marched(gone + SOONER * base / -slope, g, c) - left if slope < 0.0 else inf
-        stop = offset(breaks[coming] if coming < breaks.size else limit, origin, v)
-        if stop <= gone:
-            what = LIMIT
-            break
-        room = marched(stop, g, c) - left
-        part = min(room, sooner)
-        ask = ALWAYS if gone < strict else (NEVER if searching or late else MAYBE)
-        width, step, timed = next_panel(
-            *(drive, p, flags, origin, span, v, g, c, left, part, step, base, v, nu, ceiling, ask, True, work)
-        )
+        panel, max_width = Panel(left, v2, nu, ahead.span), marched(stop, march) - left
+        timing = ALWAYS if gone < start.no_turn_until else (NEVER if searching or late else MAYBE)
+        request = PanelRequest(min(max_width, ahead.widest), step, largest_v2, timing, True)
+        width, step, is_timed = next_panel(forces, march, panel, request, work)
         if width == 0.0:
-            what = NARROWED
-            if not flags[2] and base > 0.0:
-                slope = rise(drive, p, within(here, span), base, v, nu, spot)
-                if slope < 0.0 and base <= -slope * NEAR * max(fabs(here), gone):
-                    what, gone, base = TURN, gone - base / slope, 0.0
+            what, gone, v2 = end_where_narrowed(forces, march, panel, gone, point)
             break
-        turn_of_force, before, _ = change_of(work, LOAD, nu, TOUCHED * work[size_at(LOAD)])
-        if nu == 0 and before != 0:
-            nu = before
-            if flags[0] or nu == -side:
-                continue
-        # V**2, or what it is divided by the distance from the turning point it begins with.
-        scale = size_of(work, FORCE) if base == 0.0 else max(as_bare(ceiling, g, c, left), work[size_at(BARE)])
-        at_rest, _, touch = change_of(work, BARE, 1, NOISE * scale)
-        if touch <= -1.0 and base == 0.0:
-            touch = 2.0
-        end = min(at_rest, touch, turn_of_force)
-        if end == turn_of_force and end <= 1.0:
-            soon = distance(left + width * (0.5 * (1.0 + end)), g, c)
-            if soon <= gone + NARROW * max(fabs(here), gone):
-                nu = -nu  # N is zero here: what follows decides its sign
-                if left > 0.0:
-                    record[change_at(record, met)] = here
-                    met += 1
-                continue
-        if not searching and ask != ALWAYS and (late or not timed):
-            searching, mark, mark_base, mark_nu, mark_met = True, gone, base, nu, met
-        right = left + width
-        if end <= 1.0:
-            x = bottom(work, v, touch) if end == touch and end != at_rest else end
-            # Once more on a panel that ends there: its own sum has more digits than the series of a wider one.
-            right = left + width * (0.5 * (1.0 + x))
-            begin_panel(drive, p, flags[2], origin, span, v, g, c, left, right - left, base, v, nu, work)
-            solve_panel(drive, p, flags[2], v, g, c, left, base, v, nu, work)
-            pace(g, c, left, base, work)
-            if end == at_rest and flags[2]:
-                over, there = work[V2 + COUNT], distance(right, g, c)
-                slope = rise(drive, p, within(start + v * there, span), over, v, nu, spot)
-                if fabs(over) < fabs(slope) * 1e-6 * (there - gone):
-                    right = marched(there - over / slope, g, c)
-            elif end == turn_of_force and end != touch:
-                # N at the panel's end has no error of a series, nor has what is left of the way to where it vanishes.
-                end_load, before_end = work[LOAD + COUNT], work[LOAD + COUNT - 1]
-                rate = (end_load - before_end) / (work[PLACE + COUNT] - work[PLACE + COUNT - 1])
-                if fabs(end_load) < fabs(rate) * 1e-6 * (right - left):
-                    right -= end_load / rate
+        load_change, sign, _ = first_change_of(work, LOAD, nu, ZERO_TOLERANCE * work[size_at(LOAD)])
+        if nu == 0 and sign != 0:
+            nu = sign
+            if forces.friction or nu == -route.only_sign:
+                continue  # with forces of this sign
+        change = first_changes(march, panel, largest_v2, load_change, work)
+        if changes_at_once(march, panel, width, change, gone):
+            change_count = enter_change(record, change_count, start.place + v * gone) if left > 0.0 else change_count
+            nu = -nu
+            continue
+        if not searching and timing != ALWAYS and (late or not is_timed):
+            searching, timed = True, Timed(gone, v2, nu, change_count)
+        right, ends_here = left + width, change.first <= 1.0
+        if ends_here:
+            right = cut_panel(forces, march, Panel(left, v2, nu, ahead.span), width, change, gone, work, point)
         if not searching:
-            keep(record, HEAD + kept * COLUMNS, right, right - left, work)
-            kept += 1
-        count += 1
-        highest = max(base, extent(work, V2)[1])
-        # What resistance alone leaves of it: exp(-q).
-        ceiling = max(ceiling / (1.0 + work[SWELL + COUNT]) if end > 1.0 else ceiling, highest)
-        full = end > 1.0 and width == room
-        base, left = max(work[V2 + COUNT], 0.0), right
-        gone, sooner = stop if full else distance(right, g, c), inf
-        if not searching:
-            mark = gone
-        if end <= 1.0:
-            if end == at_rest or end == touch:
-                what, base = (TURN if end == at_rest else ASYMPTOTE), 0.0
-                break
-            record[change_at(record, met)] = start + v * gone
-            met, nu = met + 1, -nu
-        elif full and coming == breaks.size:
-            what = LIMIT
+            add_panel(record, HEAD + recorded * COLUMNS, right, right - left, work)
+            recorded += 1
+        panel_count += 1
+        largest_v2 = largest_after(largest_v2, v2, ends_here, work)
+        at_stop = not ends_here and width == max_width
+        v2, left, gone = max(work[W + COUNT], 0.0), right, stop if at_stop else distance(right, march)
+        ahead = Ahead(ahead.upcoming, ahead.span, inf)
+        timed = timed if searching else Timed(gone, v2, nu, change_count)
+        may_pause = (gone >= route.pause and 2.0 * v2 >= largest_v2) or panel_count >= PANELS_PER_RUN
+        code = what_after(change, at_stop and at_end, may_pause)
+        if code != GOES_ON:
+            what, v2 = code, 0.0 if ends_here else v2
             break
-        elif (gone >= reach and 2.0 * base >= ceiling) or count >= MOST_PANELS:
-            what = PAUSED
-            break
-    middle = located(origin, v, mark, breaks, coming)
-    onwards, strict = step * (2.0 * g * left + c + g * step), strict - gone
-    if what == TURN or what == ASYMPTOTE:
-        place = located(origin, v, gone, breaks, coming)
-    elif searching and what != FULL:
-        strict = gone - mark if what == PAUSED or what == DIPPED else inf
-        what, place, base, nu, met = DIPPED, middle, mark_base, mark_nu, mark_met
-    else:
-        place = (limit, 0.0) if what == LIMIT else located(origin, v, gone, breaks, coming)
-        middle = place
-    slack = 0.5 * c if g > 0.0 else inf
-    return what, place, base, nu, onwards, strict, middle, slack, met, kept, coming
+        if ends_here:
+            change_count, nu = enter_change(record, change_count, start.place + v * gone), -nu
+    onwards, half_c = step * (slope_at(left, march) + march.g * step), 0.5 * march.c if march.g > 0.0 else inf
+    origin, no_turn, upcoming = march.origin, start.no_turn_until, ahead.upcoming
+    end = End(what, origin, v2, nu, onwards, no_turn, origin, half_c, change_count, recorded, upcoming)
+    return conclude(route, march, end, timed, searching, gone)

@@ -1,4 +1,4 @@
-"""Stretches of a dissipative motion, from the panels of its legs."""
+"""Segments of a dissipative motion, from the panels of its legs."""
 
 from math import inf
 from typing import NamedTuple
@@ -12,14 +12,15 @@ from gqm_sym.runtime.compiled.jit import entry
 from gqm_sym.runtime.compiled.types import MATRIX, VECTOR, Array
 from gqm_sym.runtime.launch.functions import BoundFunctions
 from gqm_sym.runtime.legs.approach import COLUMNS as FIELD
-from gqm_sym.runtime.legs.leg_record import COLUMNS, ERROR, HEAD, MET, RIGHT, SLACK, TIME
+from gqm_sym.runtime.legs.leg_record import CHANGE_COUNT, COLUMNS, HALF_C, HEAD, RIGHT, TIME, TIME_ERROR
 from gqm_sym.runtime.legs.polynomials import COUNT, TO_COEFFICIENTS, WIDE
 from gqm_sym.runtime.motion.segment import Segment
-from gqm_sym.runtime.quadrature.integrands import FROM_TURN, REGULAR, TO_EQUILIBRIUM
+from gqm_sym.runtime.quadrature.substitution import FROM_TURN, REGULAR, TO_EQUILIBRIUM
 from gqm_sym.runtime.quadrature.time_panels import CONVERGED
 
-# An equilibrium is approached until the distance left is exp(-this) of the leg: all that doubles have.
-CLOSEST = 690.0
+# The largest phase angle on a leg that tends to an equilibrium. The distance from there is then exp(-MAX_PHASE_ANGLE)
+# times the length of the leg, the smallest that doubles can represent.
+MAX_PHASE_ANGLE = 690.0
 
 
 def _to_legendre() -> tuple[Array, Array]:
@@ -47,12 +48,12 @@ to_plain, to_integral = multiply(PLAIN_BY_NODE), multiply(INTEGRAL_BY_NODE)
 
 @entry(types.Tuple((VECTOR, VECTOR, VECTOR, MATRIX, MATRIX, MATRIX, types.float64))(MATRIX, types.float64))
 def read_panels(panels, time):  # type: ignore[no-untyped-def]
-    """What `panels.lay` would have of a leg's panels, whose times add up to ``time``.
+    """A leg's panels as `time_panels.lay` has them; their times add up to ``time``.
 
     Returns
     -------
     edges, clock, lengths, time_terms, length_terms : arrays
-        As `panels.lay` has them; the last anomaly is 1.
+        As of `time_panels.lay`; the last phase angle is 1.
     speed_terms : (n, WIDE) array
         Legendre coefficients of Y.
     error : float
@@ -75,13 +76,29 @@ def read_panels(panels, time):  # type: ignore[no-untyped-def]
             length += length_terms[k, j]
         edges[k + 1] = panels[k, RIGHT] / last
         clock[k + 1], lengths[k + 1] = clock[k] + panels[k, TIME], lengths[k] + length
-        error += panels[k, ERROR]
+        error += panels[k, TIME_ERROR]
     clock[n] = time
     return edges, clock, lengths, time_terms, length_terms, speed_terms, error / time + ULP if time > 0.0 else ULP
 
 
 class Run(NamedTuple):
-    """One run of the body as compiled code tells of it (`legs.follow`), not yet made into pieces."""
+    """One run of the body as compiled code found it (`follow`), from which segments are made when they are needed.
+
+    Attributes
+    ----------
+    start : Pair
+        The place where it begins, as two doubles.
+    ahead, back : int
+        The number of panels from the start, and of panels or rows of a field from the end.
+    record : array
+        The record of the leg (`leg_record`).
+    what : int
+        What ended it (`leg_run`).
+    end : str
+        The name of its end, as of `Leg.end`.
+    laps : int
+        Whole laps of a closed curve that are not part of its places.
+    """
 
     start: Pair
     ahead: int
@@ -92,19 +109,19 @@ class Run(NamedTuple):
     laps: int
 
     def pair(self, at: int) -> Pair:
-        """Two doubles of the record: a place, or the times from the start and from the turn."""
+        """Two doubles of the record: a place, or the times from the start and from the end."""
         high, low = self.record[at : at + 2].tolist()
         return high, low
 
     @property
-    def slack(self) -> float:
-        """C/2 of the march variable; infinite where that is the distance."""
-        return float(self.record[SLACK])
+    def half_c(self) -> float:
+        """``c/2`` of the march variable; infinite where that is the distance."""
+        return float(self.record[HALF_C])
 
     @property
     def changes(self) -> list[float]:
         """Places at which N changes sign."""
-        places: list[float] = self.record[self.record.size - int(self.record[MET]) :].tolist()
+        places: list[float] = self.record[self.record.size - int(self.record[CHANGE_COUNT]) :].tolist()
         return places
 
     @property
@@ -119,33 +136,33 @@ class Run(NamedTuple):
 
     @property
     def field(self) -> Array:
-        """V**2 next to an equilibrium (`fields`)."""
+        """V**2 next to an equilibrium (`quadrature.equilibrium`)."""
         return self._rows(HEAD + self.ahead * COLUMNS, self.back, FIELD)
 
     def _rows(self, begin: int, count: int, columns: int) -> Array:
         return self.record[begin : begin + count * columns].reshape(count, columns)
 
 
-def along_panels(f: BoundFunctions, a: Pair, b: Pair, slack: float, time: float, panels: Array) -> Segment:
-    """A stretch by its panels (`leg_panels`), whose times add up to ``time``; its ends as two doubles each.
+def along_panels(f: BoundFunctions, a: Pair, b: Pair, half_c: float, time: float, panels: Array) -> Segment:
+    """A segment by its panels, whose times add up to ``time``; its ends are two doubles each.
 
-    ``slack`` is c/2 of their march variable, infinite where that is the distance.
+    ``half_c`` is c/2 of the march variable of the panels, infinite where that is the distance.
     """
     *laid, speed_terms, error = read_panels(panels, time)
     last = float(panels[-1, RIGHT])
     return Segment(
         functions=f,
-        kind=REGULAR if slack == inf else FROM_TURN,
+        kind=REGULAR if half_c == inf else FROM_TURN,
         a=a[0],
         b=b[0],
-        lows=(a[1], b[1]),
-        slack=0.0 if slack == inf else slack / last,
-        laid=(*laid, error, 1.0, CONVERGED),
-        paces=(last, speed_terms),
+        low_parts=(a[1], b[1]),
+        turn_offset=0.0 if half_c == inf else half_c / last,
+        stored_panels=(*laid, error, 1.0, CONVERGED),
+        speed_series=(last, speed_terms),
     )
 
 
 def along_field(f: BoundFunctions, a: float, b: float, field: Array) -> Segment:
-    """A stretch towards an equilibrium b where V**2 is a field; its panels begin where the field's do."""
+    """A segment towards an equilibrium b by the field of V**2 there; its panels begin where those of the field do."""
     hints = tuple(float(place) for place in b + np.sign(a - b) * field[:-1, 1])
-    return Segment(functions=f, kind=TO_EQUILIBRIUM, a=a, b=b, v2=field, stop=CLOSEST, hints=hints)
+    return Segment(functions=f, kind=TO_EQUILIBRIUM, a=a, b=b, v2=field, stop=MAX_PHASE_ANGLE, panel_breaks=hints)

@@ -1,7 +1,7 @@
-"""Polynomials on a panel: from values at Chebyshev nodes to coefficients, running means, and proven changes of sign.
+"""Polynomials on a panel: from values at Chebyshev nodes to coefficients, running means, and proved changes of sign.
 
-The nodes are those of the first kind, so that no sum ever asks for a function at a panel's ends: one of them may be a
-cusp, or the end of the domain. ``x`` runs from -1 at the end where the panel begins to 1.
+The nodes are those of the first kind, so that no function is ever needed at a panel's ends, one of which may be a cusp
+or the end of the domain. ``x`` runs from -1 at the end where the panel begins to 1.
 """
 
 from math import cos, fabs, fsum, pi, sin
@@ -12,14 +12,14 @@ from gqm_sym.runtime.arithmetic.matrices import largest, multiply, span
 from gqm_sym.runtime.compiled.intrinsics import fma
 from gqm_sym.runtime.compiled.jit import Inner
 
-# With the panel's end these fill three registers.
+# The number of nodes; together with the panel's end they fill three registers.
 COUNT = 23
 
 
 def _tables() -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """The nodes as shares of the panel, the matrices of running means, and that of Chebyshev coefficients.
 
-    In whole numbers, and rounded at the end: an error of some roundings here would be one of every integral.
+    They are computed in integers and rounded at the end, because an error here would be one of every integral.
     """
     quarter = [
         sin(0.5 * pi * m / COUNT) if 2 * m <= COUNT else cos(0.5 * pi * (COUNT - m) / COUNT) for m in range(COUNT)
@@ -59,29 +59,35 @@ def _tables() -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
 # last row that over the whole panel; ``GRADED_MEANS`` those with respect to the square of the share.
 SHARES, MEANS, GRADED_MEANS, TO_COEFFICIENTS = _tables()
 
-# A row of values at the nodes is padded to whole registers, behind them the panel's end; so are what tables make of it.
+# A row has the values at the nodes and one at the panel's end, which fills it up to whole registers.
 WIDE = 24
 ENDS_BY_NODE = np.pad(np.append(SHARES, 1.0), (0, WIDE - COUNT - 1))
 to_means, to_graded_means, to_coefficients = (multiply(table.T) for table in (MEANS, GRADED_MEANS, TO_COEFFICIENTS))
 
-# Coefficients that tell how well a function is resolved, three at the end and three in the middle; the mean over
-# the panel.
+# The coefficients that show how well a function is resolved, three at the end and three in the middle; `to_tails` also
+# gives the mean over the panel.
 LAST, MIDDLE = slice(COUNT - 3, COUNT), slice(14, 17)
 to_tails = multiply(np.vstack([TO_COEFFICIENTS[LAST], TO_COEFFICIENTS[MIDDLE], MEANS[COUNT]]).T)
 extent, size_of = span(COUNT), largest(COUNT)
 
-# A polynomial on the panel is nowhere further from a number than this many times its values at the nodes.
+# A bound of the Lebesgue constant: the polynomial differs from a number nowhere by more than this times the largest
+# difference at the nodes.
 LEBESGUE = 3.0
 
-# How finely a panel is searched for a change of sign that bounds cannot settle.
-FINEST = 2.0**-30
+# The smallest part of a panel that is searched for a change of sign that bounds do not decide.
+MIN_PART = 2.0**-30
 
-# Where a search keeps the part it looks at, what that is told from, and the ends of parts that wait.
-PART, TWICE, ABOVE, BELOW, WAITING = range(0, 5 * WIDE, WIDE)
-ROOM = WAITING + 64
+# Rows of the buffer of a search: the series on the part that is searched, three rows of Clenshaw's scheme by which it
+# is found, and the ends of the parts that are still to search.
+PART, TWICE_X, NEXT_SUM, SUM_AFTER, STACK = range(0, 5 * WIDE, WIDE)
+BUFFER_SIZE = STACK + 64
 
-# The last step of Newton's method for a zero in [-1, 1]: the next would be of the size of its square.
-NEWTON = 1e-9
+# The step of Newton's method for a zero in [-1, 1] after which it ends: the next one would be about its square.
+LAST_STEP = 1e-9
+
+
+# What bounds say of a series on a part of the panel (`_on_part`).
+ONE_SIGN, TO_ZERO, OTHER_SIGN, CROSSES, ZERO, UNDECIDED = range(6)
 
 
 @Inner
@@ -95,42 +101,45 @@ def _at_ends(c):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def _restrict(c, lo, hi, room):  # type: ignore[no-untyped-def]
-    """The series' coefficients on [lo, hi] alone, at ``room[PART]``."""
+def _restrict(c, lo, hi, buffer):  # type: ignore[no-untyped-def]
+    """Fill ``buffer[PART]`` with the coefficients of the series on [lo, hi] alone."""
     for j in range(WIDE):
-        room[TWICE + j] = 2.0 * (lo + (hi - lo) * ENDS_BY_NODE[j])
-        room[ABOVE + j], room[BELOW + j] = 0.0, 0.0
+        buffer[TWICE_X + j] = 2.0 * (lo + (hi - lo) * ENDS_BY_NODE[j])
+        buffer[NEXT_SUM + j], buffer[SUM_AFTER + j] = 0.0, 0.0
     for k in range(COUNT - 1, 0, -1):
         term = c[k]
         for j in range(WIDE):
-            before = room[ABOVE + j]
-            room[ABOVE + j], room[BELOW + j] = term + room[TWICE + j] * before - room[BELOW + j], before
+            before = buffer[NEXT_SUM + j]
+            buffer[NEXT_SUM + j], buffer[SUM_AFTER + j] = (
+                term + buffer[TWICE_X + j] * before - buffer[SUM_AFTER + j],
+                before,
+            )
     for j in range(WIDE):
-        room[TWICE + j] = c[0] + 0.5 * room[TWICE + j] * room[ABOVE + j] - room[BELOW + j]
-    to_coefficients(room, TWICE, room, PART)
+        buffer[TWICE_X + j] = c[0] + 0.5 * buffer[TWICE_X + j] * buffer[NEXT_SUM + j] - buffer[SUM_AFTER + j]
+    to_coefficients(buffer, TWICE_X, buffer, PART)
 
 
 @Inner
 def _is_monotone(c):  # type: ignore[no-untyped-def]
-    """Whether bounds prove that the series rises or falls throughout."""
-    # The derivative's coefficients, from the last one down; two apart they build on each other.
-    second, first, rest = 0.0, 0.0, 0.0
+    """Whether bounds of its derivative prove that the series is monotone."""
+    # The derivative's coefficients from the last one down; each follows from the one two degrees higher.
+    second, first, others = 0.0, 0.0, 0.0
     for k in range(c.size - 1, 0, -1):
         second, first = first, second + 2.0 * k * c[k]
         if k > 1:
-            rest += fabs(first)
-    return fabs(0.5 * first) > rest
+            others += fabs(first)
+    return fabs(0.5 * first) > others
 
 
 @Inner
 def _sum_and_slope(c, x):  # type: ignore[no-untyped-def]
     """The series and its derivative at x."""
-    high, low, steep, flat = 0.0, 0.0, 0.0, 0.0
+    value, value_after, slope, slope_after = 0.0, 0.0, 0.0, 0.0
     twice = 2.0 * x
     for k in range(COUNT - 1, 0, -1):
-        steep, flat = fma(twice, steep, fma(2.0, high, -flat)), steep
-        high, low = fma(twice, high, c[k] - low), high
-    return fma(x, high, c[0] - low), high + fma(x, steep, -flat)
+        slope, slope_after = fma(twice, slope, fma(2.0, value, -slope_after)), slope
+        value, value_after = fma(twice, value, c[k] - value_after), value
+    return fma(x, value, c[0] - value_after), value + fma(x, slope, -slope_after)
 
 
 @Inner
@@ -149,75 +158,109 @@ def _crossing(c, low, high):  # type: ignore[no-untyped-def]
         new = x - value / slope
         if not lo <= new <= hi:
             new = 0.5 * (lo + hi)
-        if fabs(new - x) <= NEWTON or hi - lo <= 2e-16:
+        if fabs(new - x) <= LAST_STEP or hi - lo <= 2e-16:
             return new
         x = new
     return x
 
 
 @Inner
-def first_change(c, sign, noise):  # type: ignore[no-untyped-def]
-    """The first place in [-1, 1] where a series takes the other sign; none is missed.
+def _sign(value, noise):  # type: ignore[no-untyped-def]
+    """The sign of a number; 0 if it is no more than noise."""
+    return 0 if fabs(value) <= noise else (1 if value > 0.0 else -1)
 
-    The panel is halved until bounds by the coefficients prove one sign, or a monotone run. A part where the series is
-    nothing but ``noise`` has no sign of its own: zero touched without a change of sign is no change.
+
+@Inner
+def _on_part(part, before, noise, smallest):  # type: ignore[no-untyped-def]
+    """What bounds by the coefficients say of a series on a part of the panel.
 
     Parameters
     ----------
+    before : int
+        The sign so far; 0 if none was definite.
+    smallest : bool
+        Whether the part must not be halved again.
+
+    Returns
+    -------
+    verdict : int
+        ONE_SIGN, the one so far, to its end; TO_ZERO, the one so far, but its end is no more than noise; OTHER_SIGN
+        throughout; CROSSES from the one so far to the other, or has the other one; ZERO, no more than noise, or
+        undecided on a smallest part; else UNDECIDED.
+    before : int
+        The sign with which it starts, if it was not known before.
+    x : float
+        Where in [-1, 1] it crosses zero.
+    """
+    spread = 0.0
+    for k in range(1, COUNT):
+        spread += fabs(part[k])
+    if fabs(part[0]) > spread + noise:
+        found = 1 if part[0] > 0.0 else -1
+        before = found if before == 0 else before
+        return (ONE_SIGN if found == before else OTHER_SIGN), before, 2.0
+    if fabs(part[0]) + spread > noise and _is_monotone(part):
+        left, right = _at_ends(part)
+        before = _sign(left, noise) if before == 0 else before
+        found = _sign(right, noise)
+        if found == 0:
+            return TO_ZERO, before, 2.0
+        before = found if before == 0 else before
+        if found == before:
+            return ONE_SIGN, before, 2.0
+        return CROSSES, before, -1.0 if left * found >= 0.0 else _crossing(part, left, right)
+    return (ZERO if fabs(part[0]) + spread <= noise or smallest else UNDECIDED), before, 2.0
+
+
+@Inner
+def first_change(c, sign, noise):  # type: ignore[no-untyped-def]
+    """The first place in [-1, 1] where a series takes the other sign; none is missed.
+
+    The panel is halved until bounds by the coefficients prove that the series has one sign or is monotone. On a part
+    where it is no more than ``noise`` it has no sign, so that touching zero without a change of sign is no change.
+
+    Parameters
+    ----------
+    c : array
+        COUNT Chebyshev coefficients.
     sign : int
-        The sign it starts with; 0 to take its first definite one.
+        The sign with which the series starts; 0 to take its first definite one.
+    noise : float
+        The size of errors of the series.
 
     Returns
     -------
     x : float
-        Where it changes sign; 2 if it does not.
+        Where it changes its sign; 2 if it does not.
     before : int
-        The sign it starts with.
+        The sign with which it starts.
     touch : float
-        The first place before ``x`` where it is no more than noise and does not run through; 2 if there is none.
+        The first place before ``x`` where it is no more than noise but is not proved to cross zero; 2 if there is none.
     """
-    part, room, lo, hi, waiting, halved = c, c, -1.0, 1.0, 0, False
-    before, unsure, touch = sign, 2.0, 2.0
+    part, buffer, lo, hi, waiting, halved = c, c, -1.0, 1.0, 0, False
+    before, zero_from, touch = sign, 2.0, 2.0
     while True:
-        spread = 0.0
-        for k in range(1, COUNT):
-            spread += fabs(part[k])
-        if fabs(part[0]) > spread + noise:
-            found = 1 if part[0] > 0.0 else -1
-            if before == 0:
-                before = found
-            if found != before:
-                return (lo if unsure > 1.0 else 0.5 * (unsure + lo)), before, touch
-            unsure = 2.0
-        elif fabs(part[0]) + spread > noise and _is_monotone(part):
-            left, right = _at_ends(part)
-            if before == 0:
-                before = 0 if fabs(left) <= noise else (1 if left > 0.0 else -1)
-            if fabs(right) > noise:
-                found = 1 if right > 0.0 else -1
-                if before == 0:
-                    before = found
-                if found != before:
-                    if left * found >= 0.0:
-                        return lo, before, touch
-                    return lo + 0.5 * (hi - lo) * (1.0 + _crossing(part, left, right)), before, touch
-                unsure = 2.0
-        elif fabs(part[0]) + spread <= noise or hi - lo <= FINEST:
-            if unsure > 1.0:
-                unsure = lo
-            if touch > 1.0:
-                touch = lo
-        else:
+        verdict, before, x = _on_part(part, before, noise, hi - lo <= MIN_PART)
+        if verdict == CROSSES:
+            return lo + 0.5 * (hi - lo) * (1.0 + x), before, touch
+        if verdict == OTHER_SIGN:
+            return (lo if zero_from > 1.0 else 0.5 * (zero_from + lo)), before, touch
+        if verdict == ONE_SIGN:
+            zero_from = 2.0
+        elif verdict == ZERO:
+            zero_from = lo if zero_from > 1.0 else zero_from
+            touch = lo if touch > 1.0 else touch
+        elif verdict == UNDECIDED:
             if not halved:
-                room, halved = np.empty(ROOM), True
-                part = room[PART : PART + COUNT]
-            room[WAITING + waiting] = hi
+                buffer, halved = np.empty(BUFFER_SIZE), True
+                part = buffer[PART : PART + COUNT]
+            buffer[STACK + waiting] = hi
             waiting += 1
             hi = 0.5 * (lo + hi)
-            _restrict(c, lo, hi, room)
+            _restrict(c, lo, hi, buffer)
             continue
         if waiting == 0:
             return 2.0, before, touch
-        lo, hi = hi, room[WAITING + waiting - 1]
+        lo, hi = hi, buffer[STACK + waiting - 1]
         waiting -= 1
-        _restrict(c, lo, hi, room)
+        _restrict(c, lo, hi, buffer)

@@ -1,4 +1,4 @@
-"""What the rounding of a launch does to V**2 on a stretch that is measured from one place."""
+"""How much the rounding of a launch changes V**2 on a segment on which it is measured from one place."""
 
 import numpy as np
 
@@ -6,26 +6,29 @@ from gqm_sym.literals.numbers import Number
 from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.launch.speed import potential_at, speed_squared_at
 
-# Shares of a stretch at which it is looked at: a slow start may be short.
-LOOKS = 0.5 ** np.arange(48)
+# Shares of a segment at which V**2 is examined: halved again and again, since the part with small V**2 may be short.
+SHARES = 0.5 ** np.arange(48)
 
 
-def off_launch(addresses: tuple[int, ...], p: Array, lam0: Number) -> float:
-    """What V**2 at the double nearest to the launch place has over that at the launch place itself."""
-    return lam0.low * float(potential_at(addresses, p, np.array([lam0.value]))[1, 0]) if lam0.low else 0.0
+def v2_correction(addresses: tuple[int, ...], p: Array, lam0: Number) -> float:
+    """How much larger V**2 is at the double nearest to the launch place than at the launch place itself."""
+    return 2.0 * lam0.low * float(potential_at(addresses, p, np.array([lam0.value]))[1, 0]) if lam0.low else 0.0
 
 
-def magnified(addresses: tuple[int, ...], p: Array, a: float, b: float, ref: float, w: float) -> float:
-    """How many times V**2 magnifies a relative change of ``ref``, where it is ``w``, at most from a to b.
+def launch_condition_number(
+    addresses: tuple[int, ...], p: Array, a: float, b: float, ref: float, ref_v2: float
+) -> float:
+    """The largest relative change of V**2 from a to b per relative change of ``ref``, where V**2 is ``ref_v2``.
 
-    V**2 = w - (lam - ref)*D(ref, lam): a shift of both places changes it by the difference of the slopes there. Beside
-    a hilltop that is much against V**2 itself.
+    V**2 = ref_v2 - 2*(lam - ref)*U[ref, lam], with the divided difference of the effective potential U. A shift of
+    both places changes this by twice the difference of the slopes at them, which beside a maximum of the potential is
+    large in comparison with V**2.
     """
-    offsets = (a - ref) + (b - a) * LOOKS
+    offsets = (a - ref) + (b - a) * SHARES
     places = np.append(ref + offsets, ref)
-    slopes = potential_at(addresses, p, places)[1]
+    slopes = 2.0 * potential_at(addresses, p, places)[1]
     with np.errstate(all="ignore"):
         ratio = np.abs(
-            (slopes[:-1] - slopes[-1]) * ref / speed_squared_at(addresses, p, ref, 0.0, w, places[:-1], offsets)
+            (slopes[:-1] - slopes[-1]) * ref / speed_squared_at(addresses, p, ref, 0.0, ref_v2, places[:-1], offsets)
         )
     return float(np.max(ratio, initial=1.0, where=np.isfinite(ratio)))

@@ -1,4 +1,4 @@
-"""From a launch to a motion: how far it reaches each way, of what kind it is, and the stretches it runs through."""
+"""The motion of a conservative model that a launch begins: its ends, its kind, and the segments that it consists of."""
 
 from math import inf, isfinite
 
@@ -8,15 +8,16 @@ from gqm_sym.errors import LaunchError
 from gqm_sym.runtime.launch import zeros
 from gqm_sym.runtime.launch.ends import (
     EndOfMotion,
-    _is_cusp,
-    _reach,
-    _room,
+    distance_to_end,
+    end_of_motion,
     first_zero_from,
+    is_cusp,
     leaving_at_once,
     starting_step,
 )
 from gqm_sym.runtime.launch.formulas import Formulas, ParameterValues
 from gqm_sym.runtime.launch.functions import BoundFunctions
+from gqm_sym.runtime.launch.kinds import MotionKind
 from gqm_sym.runtime.launch.problem import Problem, bind
 from gqm_sym.runtime.launch.request import Launch
 from gqm_sym.runtime.launch.speed import path_and_force_at, speed_squared_at
@@ -26,89 +27,110 @@ from gqm_sym.runtime.motion.motion import Motion
 from gqm_sym.runtime.motion.periodic import PeriodicMotion
 from gqm_sym.runtime.motion.segment import Segment, between_turns, from_turn, through
 from gqm_sym.runtime.multiprecision.exact_panels import DIGITS, lay_exactly
-from gqm_sym.runtime.quadrature.integrands import REGULAR
-from gqm_sym.runtime.quadrature.time_panels import LEAST_BALANCE
+from gqm_sym.runtime.quadrature.substitution import REGULAR
+from gqm_sym.runtime.quadrature.time_panels import MIN_CANCELLATION_RATIO
 
-OFF_CUSP = 1e-6
+# Distance from a cusp or a corner, as a share of the first step, at which V**2 is evaluated and a search begins.
+NEAR_CUSP = 1e-6
 
 
 def solve(formulas: Formulas, p: ParameterValues, launch: Launch) -> Motion:
-    """The motion that a launch begins, as long as contact lasts."""
-    motion = _bilateral(formulas, p, launch)
+    """The motion that a launch begins, as long as contact lasts.
+
+    Parameters
+    ----------
+    formulas : Formulas
+        The record of a conservative module.
+    p : ParameterValues
+        The exact values of its run-time parameters.
+    launch : Launch
+        Where and how the motion begins.
+
+    Returns
+    -------
+    Motion
+        The motion, which computes what it is asked for.
+
+    Raises
+    ------
+    LaunchError
+        If the curve has no point at the launch place, or the motion would leave the domain at once.
+    SolutionError
+        If the kind of the motion cannot be decided.
+    """
+    motion = _as_bilateral(formulas, p, launch)
     if launch.contact == "bilateral" or not isinstance(motion, PeriodicMotion):
-        return motion  # a passage looks after its contact itself
-    passage = AperiodicMotion(motion.problem, "transit", motion.direction)
-    for piece in motion.one_period:
-        passage.append(piece)
-    return passage.finish() if passage.lifted_off else motion
+        return motion  # an aperiodic motion finds by itself where contact is lost
+    until_liftoff = AperiodicMotion(motion.problem, "transit", motion.direction)
+    for timed in motion.one_period:
+        until_liftoff.append(timed)
+    return until_liftoff.finish() if until_liftoff.lifted_off else motion
 
 
-def _bilateral(formulas: Formulas, p: ParameterValues, launch: Launch) -> Motion:
-    low, high, period, _, place, step = domain = formulas.domain(p)
+def _as_bilateral(formulas: Formulas, p: ParameterValues, launch: Launch) -> Motion:
+    """The motion if contact is never lost; of an aperiodic one the part for which contact lasts."""
+    domain = formulas.domain(p)
     f = bind(formulas, p, launch)
     problem = Problem(formulas, launch, p, f, domain)
     lam0, v0 = launch.lam0.value, launch.v0.value
     if v0 == 0.0 and _is_in_corner(problem):
         return MotionAtRest(problem)
-    direction, ahead, behind, time = survey(
-        f.addresses, f.p, lam0, v0, launch.direction, low, high, period, place, step
-    )
-    stuck = ahead[0] in (zeros.CUSP, zeros.BROKEN) and ahead[1] == 0.0
-    if direction == 0 or stuck or time != time:
+    direction, ahead, behind, time = survey(f.addresses, f.p, lam0, v0, launch.direction, domain.numbers)
+    is_stuck = ahead[0] in (zeros.CUSP, zeros.NOT_FINITE) and ahead[1] == 0.0
+    if direction == 0 or is_stuck or time != time:
         _check_place(problem)
-    if (direction == 0 or stuck) and _is_cusp(problem, lam0):
+    if (direction == 0 or is_stuck) and is_cusp(problem, lam0):
         return _from_cusp(problem)
     if direction == 0:
         sign = problem.decider.slope_sign()
         if sign == 0:
             return MotionAtRest(problem)
         direction = -sign
-        reach = period or _room(problem, direction)
-        ahead = first_zero_from(f.addresses, f.p, lam0, 0.0, direction, 0.0, reach, starting_step(problem))
-    known = time if time == time and f.breaks.size == 0 else None
-    if known is not None and ahead[0] == zeros.TURN:  # a libration without difficulties
-        a, b = lam0 + ahead[1], lam0 + behind[1]
-        offsets = abs(min(ahead[1], behind[1])), abs(max(ahead[1], behind[1]))
-        return PeriodicMotion(problem, "libration", direction, between_turns(f, min(a, b), max(a, b), known), offsets)
-    front = _reach(problem, direction, ahead)
+        length = problem.period or distance_to_end(problem, direction)
+        ahead = first_zero_from(f.addresses, f.p, lam0, 0.0, direction, 0.0, length, starting_step(problem))
+    known_duration = time if time == time and f.breaks.size == 0 else None
+    if known_duration is not None and ahead[0] == zeros.TURN:  # doubles have found all of a libration
+        near, far = min(ahead[1], behind[1]), max(ahead[1], behind[1])
+        segment = between_turns(f, lam0 + near, lam0 + far, known_duration)
+        return PeriodicMotion(problem, "libration", direction, segment, (abs(near), abs(far)))
+    front = end_of_motion(problem, direction, ahead)
     if front.what == "closed":
-        end = lam0 + direction * period
-        stretch = through(f, lam0, end, lam0, problem.w0, known=known)
-        return PeriodicMotion(problem, "circulation", direction, stretch)
+        end = lam0 + direction * problem.period
+        segment = through(f, lam0, end, lam0, problem.w0, known_duration=known_duration)
+        return PeriodicMotion(problem, "circulation", direction, segment)
     if front.what != "turn":
-        return _outward(problem, direction, front)
+        return _without_turn(problem, direction, front)
+    back = _opposite_end(problem, direction, front)
+    if back.what != "turn":
+        return _with_one_turn(problem, direction, front, back)
+    low, high = sorted((front, back), key=lambda end: end.place)
+    segment = between_turns(f, low.place, high.place, ends=(low.multiprecision, high.multiprecision))
+    return PeriodicMotion(problem, "libration", direction, segment, (abs(low.offset), abs(high.offset)))
+
+
+def _opposite_end(problem: Problem, direction: int, front: EndOfMotion) -> EndOfMotion:
+    """What ends the motion behind the launch place, if there is a turning point ahead."""
     if problem.w0 == 0.0:
-        back = EndOfMotion("turn", problem.lam0)
-    else:
-        step = starting_step(problem)
-        limit = period - abs(front.place - problem.lam0) if period else _room(problem, -direction)
-        start = first_zero_from(f.addresses, f.p, problem.lam0, problem.w0, -direction, 0.0, limit, step)
-        back = _reach(problem, -direction, start)
-    if back.what == "turn":
-        ends = sorted((front, back), key=lambda reach: reach.place)
-        exact = (ends[0].exact, ends[1].exact)
-        return PeriodicMotion(
-            problem,
-            "libration",
-            direction,
-            between_turns(f, ends[0].place, ends[1].place, ends=exact),
-            (abs(ends[0].offset), abs(ends[1].offset)),
-        )
-    return _returning(problem, direction, front, back)
+        return EndOfMotion("turn", problem.lam0)
+    f, period = problem.functions, problem.period
+    length = period - abs(front.place - problem.lam0) if period else distance_to_end(problem, -direction)
+    step = starting_step(problem)
+    found = first_zero_from(f.addresses, f.p, problem.lam0, problem.w0, -direction, 0.0, length, step)
+    return end_of_motion(problem, -direction, found)
 
 
 def _is_in_corner(problem: Problem) -> bool:
-    """Whether the launch place is a corner from which the curve rises both ways."""
+    """Whether the launch place is a corner from which the effective potential grows in both directions."""
     f, lam0 = problem.functions, problem.lam0
     if not f.between(f.corners, *np.nextafter(lam0, (-inf, inf)).tolist()).size:
         return False
-    offsets = OFF_CUSP * starting_step(problem) * np.array([-1.0, 1.0])
-    w = speed_squared_at(f.addresses, f.p, lam0, problem.launch.lam0.low, 0.0, lam0 + offsets, offsets)
-    return bool(np.all(w < 0.0))
+    offsets = NEAR_CUSP * starting_step(problem) * np.array([-1.0, 1.0])
+    v2 = speed_squared_at(f.addresses, f.p, lam0, problem.launch.lam0.low, 0.0, lam0 + offsets, offsets)
+    return bool(np.all(v2 < 0.0))
 
 
 def _check_place(problem: Problem) -> None:
-    """Refuse a launch where the coordinates are no numbers: a root of what is negative with these parameters."""
+    """Refuse a launch where the curve has no point, because a coordinate is the root of a negative number."""
     f, lam0 = problem.functions, problem.lam0
     x, z = (float(row[0]) for row in path_and_force_at(f.addresses, f.p, np.array([lam0]), np.zeros(1))[:2])
     if not (isfinite(x) and isfinite(z)):
@@ -119,113 +141,124 @@ def _check_place(problem: Problem) -> None:
 
 
 def _from_cusp(problem: Problem) -> Motion:
-    """A motion that begins at a cusp: it leaves into the domain, and the way it falls if it is released there."""
-    f, lam0, w0, asked = problem.functions, problem.lam0, problem.w0, problem.launch.direction
-    begin = OFF_CUSP * starting_step(problem)
-    while True:
-        offsets = np.array([begin, -begin]) * asked
-        w = speed_squared_at(f.addresses, f.p, lam0, problem.launch.lam0.low, w0, lam0 + offsets, offsets)
-        ways = [way for way, rate in zip((asked, -asked), w, strict=True) if rate > 0.0 and _room(problem, way) > begin]
-        if ways:
-            break
-        if w0 == 0.0:
-            return MotionAtRest(problem)
-        begin *= 1e-3  # so slow a launch turns sooner
-    direction = ways[0] if w0 == 0.0 else asked
-    if direction not in ways:
+    """A motion that begins at a cusp: it goes into the domain, and downhill if the body is released there."""
+    f, lam0, w0 = problem.functions, problem.lam0, problem.w0
+    begin, directions = _directions_from_cusp(problem)
+    if not directions:
+        return MotionAtRest(problem)
+    direction = directions[0] if w0 == 0.0 else problem.launch.direction
+    if direction not in directions:
         raise leaving_at_once(problem, direction, "cusp")
-    walked = first_zero_from(
-        f.addresses, f.p, lam0, w0, direction, begin, problem.period or _room(problem, direction), begin
+    length = problem.period or distance_to_end(problem, direction)
+    front = end_of_motion(
+        problem, direction, first_zero_from(f.addresses, f.p, lam0, w0, direction, begin, length, begin)
     )
-    front = _reach(problem, direction, walked)
-    passage = AperiodicMotion(problem, "transit", direction)
+    motion = AperiodicMotion(problem, "transit", direction)
     if w0 > 0.0 and front.what in ("cusp", "domain-end", "singular-point"):
-        # A slow body gathers and loses its speed over distances that even steps would miss: panels grow from both ends.
+        # A slow body gains and loses its speed over distances that equal steps would miss, so panels grow from both
+        # ends.
         steps = np.geomspace(1e-12, 0.25, 25) * (front.place - lam0)
-        hints = (*(lam0 + steps), *(front.place - steps))
-        passage.add(through(f, lam0, front.place, lam0, w0, hints=hints), 1, front.what)
-        return passage.finish()
+        panel_breaks = (*(lam0 + steps), *(front.place - steps))
+        motion.add(through(f, lam0, front.place, lam0, w0, panel_breaks=panel_breaks), 1, front.what)
+        return motion.finish()
     if front.what != "turn":
-        return _outward(problem, direction, front)
+        return _without_turn(problem, direction, front)
     if w0 == 0.0:
-        swing, sense = between_turns(f, lam0, front.place), 1
+        segment, sense = between_turns(f, lam0, front.place), 1
     else:
-        swing, sense = from_turn(f, front.place, lam0), -1
-    passage.add(swing, sense, "turn")
-    passage.add(swing, -sense, "cusp")
-    return passage.finish()
+        segment, sense = from_turn(f, front.place, lam0), -1
+    motion.add(segment, sense, "turn")
+    motion.add(segment, -sense, "cusp")
+    return motion.finish()
 
 
-def _outward(problem: Problem, direction: int, front: EndOfMotion) -> Motion:
-    """A motion that leaves the launch place for good, without turning."""
+def _directions_from_cusp(problem: Problem) -> tuple[float, list[int]]:
+    """A distance from the cusp, and the directions in which V**2 > 0 there; that of the launch comes first."""
+    f, lam0, w0, first = problem.functions, problem.lam0, problem.w0, problem.launch.direction
+    distance = NEAR_CUSP * starting_step(problem)
+    while True:
+        offsets = np.array([distance, -distance]) * first
+        v2 = speed_squared_at(f.addresses, f.p, lam0, problem.launch.lam0.low, w0, lam0 + offsets, offsets)
+        directions = [
+            direction
+            for direction, value in zip((first, -first), v2, strict=True)
+            if value > 0.0 and distance_to_end(problem, direction) > distance
+        ]
+        if directions or w0 == 0.0:
+            return distance, directions
+        distance *= 1e-3  # the slower the launch is, the sooner the body turns
+
+
+def _without_turn(problem: Problem, direction: int, front: EndOfMotion) -> Motion:
+    """A motion that has no turning point ahead."""
     f, lam0 = problem.functions, problem.lam0
     if abs(front.place - lam0) <= 1e-15 * max(abs(lam0), 1.0):
         raise leaving_at_once(problem, direction, front.what)
-    kind = "asymptotic" if front.what == "equilibrium" else "transit"
-    passage = AperiodicMotion(problem, kind, direction)
+    kind: MotionKind = "asymptotic" if front.what == "equilibrium" else "transit"
+    motion = AperiodicMotion(problem, kind, direction)
     if problem.w0 > 0.0:
         if front.what == "equilibrium":
-            passage.approach(_gathering_speed(passage, front.place), front.place)
+            motion.approach(_to_half_way(motion, front.place), front.place)
         elif front.what == "open":
-            passage.open_end = OpenEnd(lam0, direction, front.place)
+            motion.open_end = OpenEnd(lam0, direction, front.place)
         else:
-            ref, w = (front.place, 0.0) if front.level else (lam0, problem.w0)
-            passage.add(through(f, lam0, front.place, ref, w), 1, front.what)
-        return passage.finish()
+            ref, ref_v2 = (front.place, 0.0) if front.zero_v2 else (lam0, problem.w0)
+            motion.add(through(f, lam0, front.place, ref, ref_v2), 1, front.what)
+        return motion.finish()
     if front.what == "equilibrium":
         middle = 0.5 * (lam0 + front.place)
-        passage.add(from_turn(f, lam0, middle), 1, "")
-        passage.approach(middle, front.place)
+        motion.add(from_turn(f, lam0, middle), 1, "")
+        motion.approach(middle, front.place)
     elif front.what == "open":
         middle = lam0 + direction * min(1.0, 0.5 * abs(front.place - lam0))
-        passage.add(from_turn(f, lam0, middle), 1, "")
-        passage.open_end = OpenEnd(middle, direction, front.place)
+        motion.add(from_turn(f, lam0, middle), 1, "")
+        motion.open_end = OpenEnd(middle, direction, front.place)
     else:
-        passage.add(_swing(f, lam0, front), 1, front.what)
-    return passage.finish()
+        motion.add(_from_turn_to(f, lam0, front), 1, front.what)
+    return motion.finish()
 
 
-def _swing(f: BoundFunctions, turn: float, end: EndOfMotion) -> Segment:
-    """From a turning point to an end: where V**2 vanishes there too, as between two turning points."""
-    return between_turns(f, turn, end.place) if end.level else from_turn(f, turn, end.place)
+def _from_turn_to(f: BoundFunctions, turn: float, end: EndOfMotion) -> Segment:
+    """The segment from a turning point to an end; if V**2 vanishes there too, it is one between two turning points."""
+    return between_turns(f, turn, end.place) if end.zero_v2 else from_turn(f, turn, end.place)
 
 
-def _gathering_speed(passage: AperiodicMotion, top: float) -> float:
-    """Run from a launch that is slow against what follows to half-way to the equilibrium; where that comes to.
+def _to_half_way(motion: AperiodicMotion, equilibrium: float) -> float:
+    """Add the first half of the way to an equilibrium if the launch is slow; returns where the rest begins.
 
-    Seen from the equilibrium, V**2 at a slow launch is the small difference of large numbers.
+    Measured from the equilibrium, V**2 at a slow launch is the small difference of large numbers.
     """
-    problem, f, lam0, w0 = passage.problem, passage.problem.functions, passage.problem.lam0, passage.problem.w0
-    middle = 0.5 * (lam0 + top)
+    problem, f, lam0, w0 = motion.problem, motion.problem.functions, motion.problem.lam0, motion.problem.w0
+    middle = 0.5 * (lam0 + equilibrium)
     places = np.array([middle])
-    fastest = speed_squared_at(f.addresses, f.p, lam0, problem.launch.lam0.low, w0, places, places - lam0)[0]
-    if w0 >= fastest:
+    middle_v2 = speed_squared_at(f.addresses, f.p, lam0, problem.launch.lam0.low, w0, places, places - lam0)[0]
+    if w0 >= middle_v2:
         return lam0
-    if w0 >= LEAST_BALANCE * fastest or f.exact is None:
-        passage.add(through(f, lam0, middle, lam0, w0), 1, "")
+    if w0 >= MIN_CANCELLATION_RATIO * middle_v2 or f.exact is None:
+        motion.add(through(f, lam0, middle, lam0, w0), 1, "")
         return middle
-    # As slow as this the launch is next to an equilibrium, its place to be taken as exactly as it was given.
+    # A launch as slow as this is next to another equilibrium, and its place is needed as exactly as it was given.
     scale = f.exact.at(DIGITS)
     panels = lay_exactly(f.exact, REGULAR, (scale.lam0, scale.mpf(middle)), 1.0)
-    slow = Segment(functions=f, kind=REGULAR, a=lam0, b=middle, ref=lam0, w=w0, laid=panels)
-    passage.add(slow, 1, "")
+    slow = Segment(functions=f, kind=REGULAR, a=lam0, b=middle, ref=lam0, ref_v2=w0, stored_panels=panels)
+    motion.add(slow, 1, "")
     return middle
 
 
-def _returning(problem: Problem, direction: int, front: EndOfMotion, back: EndOfMotion) -> Motion:
-    """A motion that turns once and leaves the other way."""
+def _with_one_turn(problem: Problem, direction: int, front: EndOfMotion, back: EndOfMotion) -> Motion:
+    """A motion that has a turning point ahead and none behind the launch place."""
     f, lam0 = problem.functions, problem.lam0
-    kind = "asymptotic" if back.what == "equilibrium" else "transit"
-    passage = AperiodicMotion(problem, kind, direction)
+    kind: MotionKind = "asymptotic" if back.what == "equilibrium" else "transit"
+    motion = AperiodicMotion(problem, kind, direction)
     inbound = from_turn(f, front.place, lam0)
-    passage.add(inbound, -1, "turn")
+    motion.add(inbound, -1, "turn")
     if back.what == "open":
-        passage.add(inbound, 1, "")
-        passage.open_end = OpenEnd(lam0, -direction, back.place)
+        motion.add(inbound, 1, "")
+        motion.open_end = OpenEnd(lam0, -direction, back.place)
     elif back.what == "equilibrium":
         middle = 0.5 * (front.place + back.place)
-        passage.add(from_turn(f, front.place, middle), 1, "")
-        passage.approach(middle, back.place)
+        motion.add(from_turn(f, front.place, middle), 1, "")
+        motion.approach(middle, back.place)
     else:
-        passage.add(_swing(f, front.place, back), 1, back.what)
-    return passage.finish()
+        motion.add(_from_turn_to(f, front.place, back), 1, back.what)
+    return motion.finish()

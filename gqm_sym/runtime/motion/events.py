@@ -1,4 +1,4 @@
-"""What happens along a motion: turns, changes of contact, ends."""
+"""Events along a motion: turning points, changes of contact, corners and ends."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -12,24 +12,37 @@ from gqm_sym.runtime.launch.speed import path_and_force_at
 from gqm_sym.runtime.motion.segment import Segment
 from gqm_sym.runtime.motion.trajectory import TimedSegment, Trajectory
 
-# Places a panel at which the contact force is looked at: its sign changes are then narrowed down.
-LOOKS = 24
+# Places on each panel at which the sign of the contact force is sampled; its changes are then located by bisection.
+SAMPLES_PER_PANEL = 24
 
-# A contact force below this share of the parts that it is the sum of is zero but for rounding: what follows decides
-# its sign. (On a planet's own orbit it is zero all round.)
-TOUCH = 4e-15
+# A contact force below this share of the two terms that it is the sum of is zero within rounding, and has no sign. (On
+# the orbit of a planet it is zero everywhere.)
+ROUNDING_SHARE = 4e-15
 
-# The same against the middling size of those parts on a stretch: where the curvature and the load vanish together, what
-# is left of N is the rounding of both.
-LEVEL = 2e-14
+# The same as a share of the median of these terms on a segment: where the curvature and the load both vanish, N is the
+# rounding of both.
+MEDIAN_ROUNDING_SHARE = 2e-14
 
-# A change of sign this close to the launch, as a share of the stretch, is that of the launch itself.
-AT_LAUNCH = 1e-14
+# A change of sign this close to the launch, as a share of the segment, is at the launch itself.
+LAUNCH_SHARE = 1e-14
 
 
 @dataclass(frozen=True, slots=True)
 class Event:
-    """Something that happens at one time: ``kind`` as the ends of legs, or "contact-sign"."""
+    """Something that happens at one time of a motion.
+
+    Attributes
+    ----------
+    kind : str
+        "turn", "rest", "contact-sign", "liftoff", "domain-end", "cusp", "corner", "singular-point", "asymptote",
+        "horizon" or "slip" (`gqm_sym.runtime.launch.kinds` says what each means).
+    t : float
+        Time from launch in s.
+    lam : float
+        The curve parameter there, in its unit; on a closed curve laps are counted.
+    x, z : float
+        Coordinates in m; z is up.
+    """
 
     kind: str
     t: float
@@ -40,7 +53,20 @@ class Event:
 
 @dataclass(frozen=True, slots=True)
 class Leg:
-    """A part of the motion in one direction, and what ends it."""
+    """A part of the motion in one direction, and what ends it.
+
+    Attributes
+    ----------
+    lam_start, lam_end : float
+        The curve parameter at the start and at the end, in its unit; on a closed curve laps are counted.
+    t_start, t_end : float
+        Times from launch in s; the second is infinite for an approach to an equilibrium.
+    direction : int
+        The sign of ds/dt.
+    end : str
+        "turn", "rest", "contact-sign" (with friction only), "liftoff", "domain-end", "cusp", "corner",
+        "singular-point", "asymptote" or "horizon" (`gqm_sym.runtime.launch.kinds` says what each means).
+    """
 
     lam_start: float
     lam_end: float
@@ -50,49 +76,56 @@ class Leg:
     end: str
 
 
-def contact_force(stretch: Segment, phi: Array) -> Array:
-    """The contact force N at anomalies of a stretch."""
-    f = stretch.functions
-    force: Array = path_and_force_at(f.addresses, f.p, stretch.places(phi), stretch.speeds(phi) ** 2)[4]
+def contact_force(segment: Segment, phi: Array) -> Array:
+    """The contact force N in N at phase angles of a segment."""
+    f = segment.functions
+    force: Array = path_and_force_at(f.addresses, f.p, segment.places(phi), segment.speeds(phi) ** 2)[4]
     return force
 
 
-def contact_signs(stretch: Segment, phi: Array) -> Array:
-    """The sign of N at anomalies of a stretch; 0 where N is zero but for rounding, or not a number."""
-    f, places = stretch.functions, stretch.places(phi)
-    force = contact_force(stretch, phi)
+def contact_signs(segment: Segment, phi: Array) -> Array:
+    """The sign of N at phase angles of a segment; 0 where N is zero within rounding, or not a number."""
+    f, places = segment.functions, segment.places(phi)
+    force = contact_force(segment, phi)
     load = path_and_force_at(f.addresses, f.p, places, np.zeros_like(phi))[4]
     parts = np.abs(force - load) + np.abs(load)
     finite = np.isfinite(parts)
-    least = np.maximum(TOUCH * parts, LEVEL * np.median(parts[finite])) if finite.any() else np.inf
+    least = (
+        np.maximum(ROUNDING_SHARE * parts, MEDIAN_ROUNDING_SHARE * np.median(parts[finite])) if finite.any() else np.inf
+    )
     signs: Array = np.where(np.isfinite(force) & (np.abs(force) > least), np.sign(force), 0.0)
     return signs
 
 
-def contact_changes(stretch: Segment) -> Array:
-    """Anomalies of a stretch at which N changes sign, in rising order."""
+def contact_changes(segment: Segment) -> Array:
+    """The phase angles of a segment at which N changes sign, in ascending order."""
     return sign_changes(
-        stretch,
-        lambda phi: contact_signs(stretch, phi),
-        lambda phi: np.sign(contact_force(stretch, phi)),
+        segment,
+        lambda phi: contact_signs(segment, phi),
+        lambda phi: np.sign(contact_force(segment, phi)),
     )
 
 
-def sign_changes(stretch: Segment, signs: Callable[[Array], Array], narrowing: Callable[[Array], Array]) -> Array:
-    """Anomalies of a stretch at which a sign changes, in rising order.
+def sign_changes(segment: Segment, signs: Callable[[Array], Array], narrowing: Callable[[Array], Array]) -> Array:
+    """The phase angles of a segment at which a sign changes, in ascending order.
 
-    ``signs`` tells it at many anomalies, 0 where it is not sure; ``narrowing`` close to a change.
+    Parameters
+    ----------
+    signs : callable
+        Gives the signs at an array of phase angles, 0 where the sign is not certain.
+    narrowing : callable
+        Gives the signs close to a change; it is used for bisection.
     """
-    steps = np.arange(LOOKS) / LOOKS
-    edges = stretch.edges
+    steps = np.arange(SAMPLES_PER_PANEL) / SAMPLES_PER_PANEL
+    edges = segment.edges
     phi = np.append((edges[:-1, None] + np.diff(edges)[:, None] * steps).ravel(), edges[-1])
     sign = signs(phi)
     known = np.flatnonzero(sign)
-    turns = known[:-1][sign[known[:-1]] != sign[known[1:]]]
+    changes = known[:-1][sign[known[:-1]] != sign[known[1:]]]
     after = {int(k): int(n) for k, n in pairwise(known)}
-    lo = np.array([phi[k] for k in turns])
-    hi = np.array([phi[after[int(k)]] for k in turns])
-    before = sign[turns]
+    lo = np.array([phi[k] for k in changes])
+    hi = np.array([phi[after[int(k)]] for k in changes])
+    before = sign[changes]
     while lo.size and np.any(hi - lo > 2.5e-16 * np.maximum(1.0, hi)):
         middle = 0.5 * (lo + hi)
         if np.all((middle == lo) | (middle == hi)):
@@ -103,72 +136,78 @@ def sign_changes(stretch: Segment, signs: Callable[[Array], Array], narrowing: C
     return zeros
 
 
-def crossings(piece: TimedSegment, phi: Array, pace: float) -> list[tuple[Pair, float]]:
-    """When a piece passes anomalies of its stretch, in the order of time; those outside the piece are left out."""
+def crossings(timed: TimedSegment, phi: Array, time_scale_error: float) -> list[tuple[Pair, float]]:
+    """The times at which a timed segment passes phase angles, in the order of time; those outside it are left out.
+
+    ``time_scale_error`` is that of the trajectory (`Trajectory`). Each item is a time in s as two doubles, and a phase
+    angle.
+    """
     out = []
-    low, high = sorted((piece.r_start[0], piece.r_stop[0]))
-    for angle, r in zip(phi, piece.stretch.times(phi), strict=True):
-        exact = (float(r), -float(r) * pace)
+    low, high = sorted((timed.r_start[0], timed.r_stop[0]))
+    for angle, r in zip(phi, timed.segment.times(phi), strict=True):
+        exact = (float(r), -float(r) * time_scale_error)
         if low < r < high:
-            spent = minus(exact, piece.r_start)
+            spent = minus(exact, timed.r_start)
             out.append(
                 (
-                    plus(piece.t_start, (piece.sense * spent[0], piece.sense * spent[1])),
+                    plus(timed.t_start, (timed.sense * spent[0], timed.sense * spent[1])),
                     float(angle),
                 )
             )
     return sorted(out)
 
 
-def passages(pieces: Sequence[TimedSegment], course: Trajectory, lam: float, low: float) -> list[float]:
-    """Times of passing a place, the first on each of some pieces."""
+def passages(segments: Sequence[TimedSegment], trajectory: Trajectory, lam: float, low: float) -> list[float]:
+    """Times in s at which timed segments pass the place lam + low, the first time on each of them."""
     out = []
-    for piece in pieces:
-        stretch = piece.stretch
-        within = lam - piece.laps * course.lap
-        inside, outside = stretch.offsets(within, low)
-        if inside * stretch.direction < 0.0 or outside * stretch.direction < 0.0:
+    for timed in segments:
+        segment = timed.segment
+        lam_in_lap = lam - timed.laps * trajectory.lap
+        inside, outside = segment.offsets(lam_in_lap, low)
+        if inside * segment.direction < 0.0 or outside * segment.direction < 0.0:
             continue
-        phi = np.array([stretch.anomaly_of(inside, outside)])
-        if phi[0] > stretch.edges[-1]:
+        phi = np.array([segment.phase_angle_of(inside, outside)])
+        if phi[0] > segment.edges[-1]:
             continue
-        out += [when[0] + when[1] for when, _ in crossings(piece, phi, course.pace)]
-        if phi[0] in (0.0, stretch.edges[-1]) and piece.r_stop[0] in (0.0, stretch.duration):
-            at_stop = stretch.a if piece.sense < 0 else stretch.b
-            if within == at_stop:
-                out.append(piece.t_stop[0])
+        out += [when[0] + when[1] for when, _ in crossings(timed, phi, trajectory.time_scale_error)]
+        if phi[0] in (0.0, segment.edges[-1]) and timed.r_stop[0] in (0.0, segment.duration):
+            at_stop = segment.a if timed.sense < 0 else segment.b
+            if lam_in_lap == at_stop:
+                out.append(timed.t_stop[0])
     return out
 
 
-def corners_met(piece: TimedSegment, pace: float) -> list[tuple[Pair, float]]:
-    """When a piece passes corners of the curve, and the anomalies there."""
-    stretch = piece.stretch
-    places = stretch.functions.between(stretch.functions.corners, stretch.a, stretch.b)
-    phi = np.array([stretch.anomaly_of(*stretch.offsets(place)) for place in places])
-    return crossings(piece, phi, pace)
+def corner_crossings(timed: TimedSegment, time_scale_error: float) -> list[tuple[Pair, float]]:
+    """The times at which a timed segment passes corners of the curve, each with its phase angle."""
+    segment = timed.segment
+    places = segment.functions.between(segment.functions.corners, segment.a, segment.b)
+    phi = np.array([segment.phase_angle_of(*segment.offsets(place)) for place in places])
+    return crossings(timed, phi, time_scale_error)
 
 
-def liftoff(piece: TimedSegment, side: int, *, first: bool) -> tuple[Pair, float] | None:
-    """When and where contact is lost on a piece: time from its stretch's end ``a``, and anomaly; None if it lasts.
+def liftoff(timed: TimedSegment, side: int, *, first: bool) -> tuple[Pair, float] | None:
+    """When and where contact is lost on a timed segment: time from the segment's end ``a``, and phase angle.
+
+    The result is None if contact lasts.
 
     Parameters
     ----------
     side : int
-        +1 where the track can only push along the normal (N >= 0), -1 where against it.
+        +1 if the track can only push along the normal (N >= 0), -1 if only against it (N <= 0).
     first : bool
-        Whether the motion begins with this piece: it may be out of contact at once.
+        Whether the motion begins with this segment; contact may then be lost at launch.
     """
-    changes = contact_changes(piece.stretch)
-    met = crossings(piece, changes, 0.0)
+    changes = contact_changes(timed.segment)
+    crossed = crossings(timed, changes, 0.0)
     if first:
-        start, stop = piece.phi_start, piece.phi_stop
-        met = [(when, phi) for when, phi in met if abs(phi - start) > AT_LAUNCH * piece.stretch.stop]
-        ahead = met[0][1] if met else stop
-        # N may vanish at the launch itself: what follows decides.
-        here, then = contact_signs(piece.stretch, np.array([start, 0.5 * (start + ahead)])) * side
+        start, stop = timed.phi_start, timed.phi_stop
+        crossed = [(when, phi) for when, phi in crossed if abs(phi - start) > LAUNCH_SHARE * timed.segment.stop]
+        ahead = crossed[0][1] if crossed else stop
+        # N may vanish at the launch itself; its sign half-way to the first change then decides.
+        here, then = contact_signs(timed.segment, np.array([start, 0.5 * (start + ahead)])) * side
         if (here or then) < 0.0:
-            return piece.r_start, piece.phi_start
-    if not met:
+            return timed.r_start, timed.phi_start
+    if not crossed:
         return None
-    phi = met[0][1]
-    return (float(piece.stretch.times(np.array([phi]))[0]), 0.0), phi
+    phi = crossed[0][1]
+    return (float(timed.segment.times(np.array([phi]))[0]), 0.0), phi

@@ -1,31 +1,52 @@
-"""The motion that a launch begins, as a value that answers questions."""
+"""The motion that a launch begins, and the states, events and errors that can be asked of it."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from itertools import pairwise
 from math import inf, isfinite
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from gqm_sym.errors import InputError, SolutionError
+from gqm_sym.errors import InputError, SolutionError, renamed
 from gqm_sym.export.html import page
 from gqm_sym.literals.numbers import read_number, read_numbers
 from gqm_sym.runtime.arithmetic.doubledouble import ULP, Pair
 from gqm_sym.runtime.compiled.types import Array
+from gqm_sym.runtime.launch.kinds import MotionKind
 from gqm_sym.runtime.launch.problem import Problem
 from gqm_sym.runtime.launch.speed import path_and_force_at
-from gqm_sym.runtime.motion.events import Event, Leg, contact_changes, corners_met, crossings, passages
+from gqm_sym.runtime.motion.events import Event, Leg, contact_changes, corner_crossings, crossings, passages
 from gqm_sym.runtime.motion.rolling import slip_times
 from gqm_sym.runtime.motion.rows import Rows
 from gqm_sym.runtime.motion.trajectory import PhasePoints, TimedSegment, Trajectory, locate
 
 
 class State(NamedTuple):
-    """The state of the body at times; arrays of the times' shape.
+    """The state of the body at given times.
 
-    ``s`` is arc length, 0 at launch and growing with the parameter; ``v`` is ds/dt with its sign; ``error`` is what
-    ``lam`` can be off by (`Motion.error_bound`).
+    Each field is a float if one time was given, else an array of the shape of the times.
+
+    Attributes
+    ----------
+    t : float or array
+        Times from launch in s, as given.
+    lam : float or array
+        The curve parameter, in its unit; in circulation laps are counted.
+    s : float or array
+        Arc length in m: 0 at launch and growing with the parameter. On a charted curve it is 0 at the start point.
+    x, z : float or array
+        Coordinates in m; z is up.
+    v : float or array
+        Velocity ds/dt in m/s, with its sign.
+    v2 : float or array
+        Squared speed V**2 in m**2/s**2.
+    kappa : float or array
+        Signed curvature in 1/m, positive where the track bends to the left of growing parameter.
+    normal_force : float or array
+        Contact force N in N along the normal, which is to the left of growing parameter.
+    error : float or array
+        A bound of the error of ``lam``, in the unit of the parameter (`Motion.error_bound`).
     """
 
     t: Any
@@ -41,23 +62,26 @@ class State(NamedTuple):
 
 
 class Motion(ABC):
-    """A motion along a curve.
+    """A motion along a curve, computed as far as it is asked for.
 
     Attributes
     ----------
     kind : str
-        "libration", "circulation", "transit", "asymptotic" or "rest" (MATHS, section 6).
+        "libration", "circulation", "transit", "asymptotic", "rest" or "dissipative" (MATHS, section 6). A motion to
+        infinity is a transit, and any motion with friction, drag or resistance that moves at all is dissipative.
     direction : int
         The sign of ds/dt after launch.
     t_end : float
-        When the motion ends; infinite if it does not.
+        The time in s at which the motion ends; infinite if it does not.
+    problem : Problem
+        The launch and the module that it is of.
     """
 
-    kind: str
+    kind: MotionKind
     direction: int
     t_end: float = inf
 
-    def __init__(self, problem: Problem, kind: str, direction: int) -> None:
+    def __init__(self, problem: Problem, kind: MotionKind, direction: int) -> None:
         self.problem = problem
         self.kind = kind
         self.direction = direction
@@ -65,96 +89,170 @@ class Motion(ABC):
         if horizon is not None:
             self.t_end = horizon.value
 
+    if not TYPE_CHECKING:
+        __getattr__ = renamed({"conditioning": "condition_number"}, "a motion")
+
     # -- what subclasses say ------------------------------------------------------------------
 
     @property
-    def _joints(self) -> tuple[str, ...]:
-        """Ends of pieces that end no leg."""
+    def _internal_ends(self) -> tuple[str, ...]:
+        """Ends of timed segments that end no leg."""
         return ("",)
 
     @abstractmethod
-    def _course(self, reach: float) -> Trajectory:
-        """The pieces of the motion, good for times up to ``reach`` from launch."""
+    def _trajectory(self, end_time: float) -> Trajectory:
+        """The trajectory, computed for times up to ``end_time`` from launch at least."""
 
     @abstractmethod
-    def _clock_error(self, t: Array) -> Array:
-        """Estimated error of the time at which the body comes to its piece of the course."""
+    def _time_error(self, t: Array) -> Array:
+        """Estimated error in s of the time at which the body comes to its segment of the trajectory."""
 
     @property
     def turning_points(self) -> tuple[float, ...]:
-        """Values of the curve's parameter, in the order met; a launch from rest counts as met at t = 0."""
+        """The turning points, as values of the curve parameter in the order of time.
+
+        A launch from rest counts as a turning point at t = 0.
+        """
         return ()
 
     # -- periods ------------------------------------------------------------------------------
 
     @property
     def half_period(self) -> float:
-        """Time from one turning point to the other (libration only)."""
+        """Time in s from one turning point to the other (libration only; MATHS, section 4).
+
+        Raises
+        ------
+        SolutionError
+            If the motion is of another kind.
+        """
         raise SolutionError(f"half_period: only a libration has one; this motion is of kind {self.kind!r}")
 
     @property
     def period(self) -> float:
-        """Time after which the motion repeats (libration and circulation)."""
+        """Time in s after which the motion repeats (libration and circulation).
+
+        Raises
+        ------
+        SolutionError
+            If the motion does not repeat.
+        """
         raise SolutionError(f"period: this motion is of kind {self.kind!r} and does not repeat")
 
     def period_to(self, digits: int) -> str:
-        """The period as a decimal string with that many correct digits."""
+        """The period in s as a decimal string.
+
+        Parameters
+        ----------
+        digits : int
+            The number of correct digits, from 1 to 1000.
+
+        Returns
+        -------
+        str
+            The decimal string, rounded to nearest.
+
+        Raises
+        ------
+        InputError
+            If the number of digits is out of range.
+        SolutionError
+            If the motion does not repeat, or its curve is known in doubles only.
+        """
         raise SolutionError(f"period_to: this motion is of kind {self.kind!r} and does not repeat")
 
-    # -- how far to trust it --------------------------------------------------------------------
+    # -- accuracy -----------------------------------------------------------------------------
 
     @property
     def quadrature_error(self) -> float:
-        """Estimated relative error of a time of flight by quadrature, for the numbers that were given."""
-        return max((piece.stretch.relative_error for piece in self._course(0.0).pieces), default=0.0)
+        """Estimated relative error of a time of flight by quadrature, for the exact numbers of the launch."""
+        return max((timed.segment.relative_error for timed in self._trajectory(0.0).segments), default=0.0)
 
     @property
-    def conditioning(self) -> float:
-        """How many times a relative change of those numbers may change a time of flight.
+    def condition_number(self) -> float:
+        """The largest relative change of a time of flight per relative change of the numbers of the launch.
 
-        A property of the problem: near a separatrix it is large, and 16 digits of a launch then say that much less
-        about the motion. From 100 on, the computation itself runs in extended precision.
+        It is a property of the problem. Near a separatrix it is large, and a launch of 16 digits then determines the
+        motion to correspondingly fewer digits. From 100 on, the computation itself uses extended precision.
         """
-        return max((piece.stretch.conditioning for piece in self._course(0.0).pieces), default=1.0)
+        return max((timed.segment.condition_number for timed in self._trajectory(0.0).segments), default=1.0)
 
     # -- positions ----------------------------------------------------------------------------
 
     def lam(self, t: Any) -> Any:
-        """The curve's parameter at times.
+        """The curve parameter at times (the inverse of the time of flight; MATHS, section 5).
 
         Parameters
         ----------
         t : number or array_like
-            Times in seconds from launch, at most ``t_end``; negative ones too where the motion is periodic.
-            Strings, ints and Fractions are taken exactly.
+            Times in s from launch, at most ``t_end``; they may be negative if the motion is periodic. Strings, ints
+            and Fractions are exact.
 
         Returns
         -------
         float or ndarray
-            Of the shape of ``t``. In circulation the parameter grows lap by lap.
+            Values of the shape of ``t``. In circulation the parameter grows lap by lap.
+
+        Raises
+        ------
+        InputError
+            If a time is not a number, negative where the motion does not repeat, or beyond ``t_end``.
+        SolutionError
+            If the motion cannot be followed so far.
         """
         times, low, shape = self._times(t)
-        located = self._located(times, low)
-        return _shaped(self._places(located) + located.laps * located.course.lap, shape)
+        points = self._phase_points(times, low)
+        return _shaped(self._places(points) + points.laps * points.trajectory.lap, shape)
 
     def state(self, t: Any) -> State:
-        """Everything about the body at times: parameter, arc length, position, speed, curvature, contact force.
+        """Curve parameter, arc length, position, velocity, curvature and contact force at times.
 
-        Times as in `lam`.
+        Parameters
+        ----------
+        t : number or array_like
+            Times in s from launch, as for `lam`.
+
+        Returns
+        -------
+        State
+            Floats, or arrays of the shape of ``t``.
+
+        Raises
+        ------
+        InputError
+            If a time is not a number, negative where the motion does not repeat, or beyond ``t_end``.
+        SolutionError
+            If the motion cannot be followed so far.
         """
         times, low, shape = self._times(t)
-        located = self._located(times, low)
-        f, course = self.problem.functions, located.course
-        reduced, s, v = self._places(located), located.arc_lengths(), self._velocities(located)
+        points = self._phase_points(times, low)
+        f, trajectory = self.problem.functions, points.trajectory
+        reduced, s, v = self._places(points), points.arc_lengths(), self._velocities(points)
         v2 = v**2
         x, z, ds, kappa, force = path_and_force_at(f.addresses, f.p, reduced, v2)
-        error = self._bound(times, located, reduced, v, ds)
-        lam = reduced + located.laps * course.lap
-        s = (s + located.laps * course.lap_length) + self.problem.arc_origin
+        error = self._bound(times, points, reduced, v, ds)
+        lam = reduced + points.laps * trajectory.lap
+        s = (s + points.laps * trajectory.lap_length) + self.problem.arc_origin
         return State(*(_shaped(array, shape) for array in (times, lam, s, x, z, v, v2, kappa, force, error)))
 
     def time_at(self, lam: Any) -> float:
-        """When the body is first at a place of the curve."""
+        """The first time at which the body is at a place.
+
+        Parameters
+        ----------
+        lam : number
+            A value of the curve parameter, in its unit; on a closed curve laps count (lam + period is the next lap).
+
+        Returns
+        -------
+        float
+            Time in s from launch; 0.0 at the launch place.
+
+        Raises
+        ------
+        SolutionError
+            If the motion is never there before ``t_end``.
+        """
         place = read_number(lam, where=self.problem.formulas.parameter)
         origin = self.problem.launch.lam0
         if place.value == origin.value and place.low == origin.low:
@@ -162,68 +260,94 @@ class Motion(ABC):
         times = self._first_passages(place.value, place.low)
         times = [t for t in times if t <= self.t_end]
         if not times:
-            raise SolutionError(
-                f"time_at: the motion is never at {self.problem.formulas.parameter} = {place.text}; {self._extent()}"
-            )
+            where = f"{self.problem.formulas.parameter} = {place.text}"
+            raise SolutionError(f"time_at: the motion is never at {where}; {self._extent_text()}")
         return min(times)
 
     def error_bound(self, t: Any) -> Any:
-        """What ``lam(t)`` can be off by: the clock's part and the inversion's (paper, eq. 32), rounding included.
+        """A bound of the error of ``lam(t)``: the parts of quadrature and of inversion (paper, eq. 32), and rounding.
 
-        It holds for the exact numbers that were given, and for times that are exact.
+        Parameters
+        ----------
+        t : number or array_like
+            Times in s from launch, as for `lam`.
+
+        Returns
+        -------
+        float or ndarray
+            Bounds in the unit of the curve parameter, of the shape of ``t``. They hold for the exact numbers of the
+            launch and for exact times.
+
+        Raises
+        ------
+        InputError
+            As `lam`.
         """
         times, low, shape = self._times(t)
-        located = self._located(times, low)
-        f, reduced, v = self.problem.functions, self._places(located), self._velocities(located)
+        points = self._phase_points(times, low)
+        f, reduced, v = self.problem.functions, self._places(points), self._velocities(points)
         ds = path_and_force_at(f.addresses, f.p, reduced, v**2)[2]
-        return _shaped(self._bound(times, located, reduced, v, ds), shape)
+        return _shaped(self._bound(times, points, reduced, v, ds), shape)
 
-    def _bound(self, times: Array, located: PhasePoints, reduced: Array, v: Array, ds: Array) -> Array:
-        """`error_bound`, with the places within the lap, the velocities and ds/dlam there."""
+    def _bound(self, times: Array, points: PhasePoints, reduced: Array, v: Array, ds: Array) -> Array:
+        """`error_bound`, from the places within the lap, the velocities and ds/dlam."""
         with np.errstate(divide="ignore", invalid="ignore"):
             rate = np.where(ds > 0.0, np.abs(v) / ds, 0.0)
-        clock, inversion = self._clock_error(times), np.zeros_like(times)
-        for piece, mask, phi in located.pieces:
-            clock[mask] += piece.stretch.clock_error(phi)
-            inversion[mask] = piece.stretch.inversion_error(phi)
-        # A lap is rounded, and so are so many of them and the sum.
-        rounding = ULP * (1.5 * np.abs(located.laps * located.course.lap) + 2.0 * np.abs(reduced))
-        bound: Array = rate * clock + inversion + rounding
+        time_error, inversion_error = self._time_error(times), np.zeros_like(times)
+        for timed, mask, phi in points.segments:
+            time_error[mask] += timed.segment.time_error(phi)
+            inversion_error[mask] = timed.segment.inversion_error(phi)
+        # The length of a lap, its multiple and the sum are rounded.
+        rounding = ULP * (1.5 * np.abs(points.laps * points.trajectory.lap) + 2.0 * np.abs(reduced))
+        bound: Array = rate * time_error + inversion_error + rounding
         return bound
 
     # -- history ------------------------------------------------------------------------------
 
     @property
     def legs(self) -> tuple[Leg, ...]:
-        """The motion leg by leg; over one period from launch where it is periodic."""
-        legs = []
-        pace, lap = self._course(0.0).pace, self._course(0.0).lap
-        for piece in self._history():
-            marks = [(piece.t_start, piece.phi_start), *corners_met(piece, pace), (piece.t_stop, piece.phi_stop)]
-            lam = self._marked(piece, marks) + piece.laps * lap
-            for k, ((start, _), (stop, _)) in enumerate(pairwise(marks)):
-                end = piece.end if k == len(marks) - 2 else "corner"
-                legs.append(Leg(float(lam[k]), float(lam[k + 1]), start[0], stop[0], piece.direction, end))
-        return Rows(self._told(_merged(legs, self._joints)))
+        """The legs of the motion in the order of time, over one period from launch if it is periodic.
 
-    def _marked(self, piece: TimedSegment, marks: Sequence[tuple[Pair, float]]) -> Array:
-        """Places at times and anomalies of a piece; the one at launch is the one given, to its last bit."""
-        lam = piece.stretch.places(np.array([phi for _, phi in marks]))
-        lam[[when[0] == 0.0 for when, _ in marks]] = self.problem.lam0
+        Returns
+        -------
+        tuple of Leg
+            A motion that goes on for ever is listed as far as it has been computed.
+        """
+        legs = []
+        time_scale_error, lap = self._trajectory(0.0).time_scale_error, self._trajectory(0.0).lap
+        for timed in self._history():
+            corners = corner_crossings(timed, time_scale_error)
+            marks = [(timed.t_start, timed.phi_start), *corners, (timed.t_stop, timed.phi_stop)]
+            lam = self._places_at(timed, marks) + timed.laps * lap
+            for k, ((start, _), (stop, _)) in enumerate(pairwise(marks)):
+                end = timed.end if k == len(marks) - 2 else "corner"
+                legs.append(Leg(float(lam[k]), float(lam[k + 1]), start[0], stop[0], timed.direction, end))
+        return Rows(self._up_to_horizon(_merged(legs, self._internal_ends)))
+
+    def _places_at(self, timed: TimedSegment, marks: Sequence[tuple[Pair, float]]) -> Array:
+        """The places at phase angles of a segment, each with its time; at launch it is exactly the launch place."""
+        lam = timed.segment.places(np.array([phi for _, phi in marks]))
+        lam[[time[0] == 0.0 for time, _ in marks]] = self.problem.lam0
         return lam
 
     @property
     def events(self) -> tuple[Event, ...]:
-        """What happens, in the order of time; over one period from launch where the motion is periodic."""
+        """The events of the motion in the order of time, over one period from launch if it is periodic.
+
+        Returns
+        -------
+        tuple of Event
+            For a periodic motion, `events_between` gives those of other periods.
+        """
         found = []
-        course = self._course(0.0)
-        for piece in self._history():
-            met = [("contact-sign", *m) for m in self._contact_changes(piece)]
-            met += [("corner", *m) for m in corners_met(piece, course.pace)]
-            met += [("slip", *m) for m in slip_times(self.problem, piece, course.pace)]
-            found += [self._event(kind, when, piece, phi) for kind, when, phi in sorted(met, key=lambda m: m[1])]
-            if piece.end not in ("", "horizon"):
-                found.append(self._event(piece.end, piece.t_stop, piece, piece.phi_stop))
+        trajectory = self._trajectory(0.0)
+        for timed in self._history():
+            found_here = [("contact-sign", *m) for m in self._contact_changes(timed)]
+            found_here += [("corner", *m) for m in corner_crossings(timed, trajectory.time_scale_error)]
+            found_here += [("slip", *m) for m in slip_times(self.problem, timed, trajectory.time_scale_error)]
+            found += [self._event(kind, when, timed, phi) for kind, when, phi in sorted(found_here, key=lambda m: m[1])]
+            if timed.end not in ("", "horizon"):
+                found.append(self._event(timed.end, timed.t_stop, timed, timed.phi_stop))
         if self.t_end < inf and not (found and found[-1].t == self.t_end):
             found = [event for event in found if event.t < self.t_end]
             state = self.state(self.t_end)
@@ -231,12 +355,28 @@ class Motion(ABC):
         return Rows(found)
 
     def events_between(self, t1: Any, t2: Any) -> tuple[Event, ...]:
-        """Events at times from t1 to t2."""
+        """The events from one time to another, over as many periods as that takes.
+
+        Parameters
+        ----------
+        t1, t2 : number
+            Times in s from launch, both of them included.
+
+        Returns
+        -------
+        tuple of Event
+            The events in the order of time; none beyond ``t_end``.
+
+        Raises
+        ------
+        InputError
+            If a time is not a number.
+        """
         start, stop = read_number(t1, where="t1").value, read_number(t2, where="t2").value
         return Rows(event for event in self.events if start <= event.t <= stop)
 
-    def _told(self, legs: list[Leg]) -> list[Leg]:
-        """Legs as far as the horizon."""
+    def _up_to_horizon(self, legs: list[Leg]) -> list[Leg]:
+        """The legs up to the horizon, at which the last one is cut."""
         out = [leg for leg in legs if leg.t_start < self.t_end or leg.t_end == self.t_end]
         if out and (out[-1].t_end > self.t_end or out[-1].end == ""):
             last = out.pop()
@@ -261,13 +401,30 @@ class Motion(ABC):
         Returns
         -------
         matplotlib.figure.Figure
+            The figure.
+
+        Raises
+        ------
+        InputError
+            If ``what`` is another word.
         """
         from gqm_sym.figures.motions import drawing
 
         return drawing(self, what, axes)
 
     def to_xarray(self, t: Any = None) -> Any:
-        """The states at times as an xarray Dataset, with units and provenance; evenly over the motion without ``t``."""
+        """The states at times as an xarray Dataset, with units and with what the motion was computed from.
+
+        Parameters
+        ----------
+        t : array_like, optional
+            Times in s from launch; equally spaced over one period, or over the whole motion, if not given.
+
+        Returns
+        -------
+        xarray.Dataset
+            One variable for each field of `State`, over the coordinate t.
+        """
         from gqm_sym.export.datasets import dataset
 
         return dataset(self, t)
@@ -278,18 +435,18 @@ class Motion(ABC):
     # -- inside -------------------------------------------------------------------------------
 
     def _history(self) -> tuple[TimedSegment, ...]:
-        """The pieces that `legs` and `events` tell of."""
-        return self._course(0.0).pieces
+        """The timed segments that `legs` and `events` list."""
+        return self._trajectory(0.0).segments
 
-    def _contact_changes(self, piece: TimedSegment) -> list[tuple[Pair, float]]:
-        """When N changes sign within a piece, and the anomalies there."""
-        return crossings(piece, contact_changes(piece.stretch), self._course(0.0).pace)
+    def _contact_changes(self, timed: TimedSegment) -> list[tuple[Pair, float]]:
+        """The times at which N changes sign on a timed segment, each with its phase angle."""
+        return crossings(timed, contact_changes(timed.segment), self._trajectory(0.0).time_scale_error)
 
-    def _event(self, kind: str, when: Pair, piece: TimedSegment, phi: float) -> Event:
+    def _event(self, kind: str, when: Pair, timed: TimedSegment, phi: float) -> Event:
         f = self.problem.functions
-        lam = self._marked(piece, [(when, phi)])
+        lam = self._places_at(timed, [(when, phi)])
         x, z = path_and_force_at(f.addresses, f.p, lam, np.zeros(1))[:2, 0]
-        return Event(kind, when[0], float(lam[0]) + piece.laps * self._course(0.0).lap, float(x), float(z))
+        return Event(kind, when[0], float(lam[0]) + timed.laps * self._trajectory(0.0).lap, float(x), float(z))
 
     def _times(self, t: Any) -> tuple[Array, Array, tuple[int, ...]]:
         times, low, shape = read_numbers(t, where="t")
@@ -297,46 +454,46 @@ class Motion(ABC):
             if np.isnan(times).any():
                 raise InputError("t: must be numbers, got NaN")
             self._check_end(float(times.max()))
-            if times.min() < 0.0 and self._course(0.0).period is None:
+            if times.min() < 0.0 and self._trajectory(0.0).period is None:
                 raise InputError(f"t: cannot be negative for a motion that does not repeat, got {float(times.min())!r}")
         return times, low, shape
 
     def _check_end(self, t: float) -> None:
-        """Refuse a time beyond the motion's end."""
+        """Refuse a time beyond the end of the motion."""
         if t > self.t_end:
-            raise InputError(f"t: the motion ends at {self.t_end!r} s ({self._how_it_ends()}), got {t!r}")
+            raise InputError(f"t: the motion ends at {self.t_end!r} s ({self._end_text()}), got {t!r}")
 
-    def _how_it_ends(self) -> str:
+    def _end_text(self) -> str:
         return "the horizon t_max"
 
-    def _extent(self) -> str:
+    def _extent_text(self) -> str:
         return "it moves " + ", ".join(f"from {leg.lam_start!r} to {leg.lam_end!r}" for leg in self.legs)
 
-    def _located(self, t: Array, t_low: Array) -> PhasePoints:
-        return locate(self._course(float(np.abs(t).max()) if t.size else 0.0), t, t_low)
+    def _phase_points(self, t: Array, t_low: Array) -> PhasePoints:
+        return locate(self._trajectory(float(np.abs(t).max()) if t.size else 0.0), t, t_low)
 
-    def _places(self, located: PhasePoints) -> Array:
-        """The parameter within the lap; exactly the launch place at launch."""
-        return located.places(self.problem.lam0)
+    def _places(self, points: PhasePoints) -> Array:
+        """The curve parameter within the lap; at launch it is exactly the launch place."""
+        return points.places(self.problem.lam0)
 
-    def _velocities(self, located: PhasePoints) -> Array:
-        return located.velocities(self.direction * self.problem.launch.v0.value)
+    def _velocities(self, points: PhasePoints) -> Array:
+        return points.velocities(self.direction * self.problem.launch.v0.value)
 
     def _first_passages(self, lam: float, low: float) -> list[float]:
-        """Times of passing a place, the first on each piece."""
-        course = self._course(0.0)
-        return passages(course.pieces, course, lam, low)
+        """Times at which the body passes a place, the first time on each segment."""
+        trajectory = self._trajectory(0.0)
+        return passages(trajectory.segments, trajectory, lam, low)
 
 
 def _shaped(array: Array, shape: tuple[int, ...]) -> Any:
     return float(array[0]) if shape == () else array.reshape(shape)
 
 
-def _merged(legs: list[Leg], joints: tuple[str, ...]) -> list[Leg]:
-    """Legs without the joints that end none: those that only the computation knows of, first of all."""
+def _merged(legs: list[Leg], internal_ends: tuple[str, ...]) -> list[Leg]:
+    """The legs, joined where the end of one matters to the computation only."""
     out: list[Leg] = []
     for leg in legs:
-        if out and out[-1].end in joints:
+        if out and out[-1].end in internal_ends:
             last = out.pop()
             leg = Leg(last.lam_start, leg.lam_end, last.t_start, leg.t_end, leg.direction, leg.end)
         out.append(leg)
@@ -344,7 +501,7 @@ def _merged(legs: list[Leg], joints: tuple[str, ...]) -> list[Leg]:
 
 
 def horizon(motion: "Motion") -> float:
-    """How long to show a motion that may never end."""
+    """The time in s from launch up to which a motion is shown: one period, its end, or what has been computed of it."""
     if motion.kind in ("libration", "circulation"):
         return motion.period
     if isfinite(motion.t_end):

@@ -9,6 +9,7 @@ from gqm_sym.errors import SolutionError
 from gqm_sym.literals.numbers import read_number
 from gqm_sym.runtime.arithmetic.doubledouble import ULP, ZERO
 from gqm_sym.runtime.compiled.types import Array
+from gqm_sym.runtime.launch.kinds import MotionKind
 from gqm_sym.runtime.launch.problem import Problem
 from gqm_sym.runtime.motion import timing
 from gqm_sym.runtime.motion.events import Event
@@ -20,88 +21,106 @@ from gqm_sym.runtime.motion.trajectory import TimedSegment, Trajectory, libratio
 from gqm_sym.runtime.multiprecision.exact_problem import NOWHERE
 from gqm_sym.runtime.quadrature.time_panels import slopes
 
-# A turning point may be told this share of it beside the end of the stretch.
-BESIDE = 1e-14
+# The largest difference between a turning point and the rounded end of the segment, as a share of its value.
+MAX_TURN_ROUNDING = 1e-14
 
-# What the rounding of a chart may do to a period, of it: most at flat bottoms and on splines (14 roundings measured).
-CHARTED = 16 * ULP
+# The largest relative change of a period by the rounding of a chart. It is largest at flat minima of the potential and
+# on splines (14 roundings were measured).
+CHART_ROUNDING = 16 * ULP
 
-# Pieces of a chart that a stretch may have for its times to be taken in extended precision unasked.
-MOST_PIECES = 250
+# The most pieces of a chart on a segment whose times are computed in extended precision without being asked for.
+MAX_CHART_PIECES = 250
 
 
 class PeriodicMotion(Motion):
-    """A libration or a circulation: one stretch, repeated for ever.
+    """A libration or a circulation: one segment that is repeated for ever.
 
-    Its course is first built from times in doubles. Beyond one period from launch the period is needed as two
-    doubles; it is then evaluated once in extended precision. ``offsets`` are the distances of a libration's ends from
-    the launch.
+    Its trajectory is first made with times in doubles. For times beyond one period from launch the period is needed as
+    two doubles; it is then evaluated once in extended precision.
+
+    Parameters
+    ----------
+    problem : Problem
+        The launch and the module that it is of.
+    kind : {"libration", "circulation"}
+        The kind of motion.
+    direction : int
+        The sign of ds/dt after launch.
+    segment : Segment
+        The segment from one turning point to the other, or a lap from the launch.
+    offsets : (float, float)
+        The distances of a libration's lower and upper end from the launch, in units of the curve parameter.
     """
 
     def __init__(
-        self, problem: Problem, kind: str, direction: int, stretch: Segment, offsets: tuple[float, float] = (0.0, 0.0)
+        self,
+        problem: Problem,
+        kind: MotionKind,
+        direction: int,
+        segment: Segment,
+        offsets: tuple[float, float] = (0.0, 0.0),
     ) -> None:
         super().__init__(problem, kind, direction)
-        self._stretch, self._offsets = stretch, offsets
-        self._plain: Trajectory | None = None
-        self._precise: Trajectory | None = None
-        self._exact: timing.Timing | None = None
+        self._segment, self._offsets = segment, offsets
+        self._double_trajectory: Trajectory | None = None
+        self._precise_trajectory: Trajectory | None = None
+        self._exact_timing: timing.Timing | None = None
         self._sampler: Sampler | None = None
 
     @property
     def turning_points(self) -> tuple[float, ...]:
-        """Both turning points of a libration, each the double nearest to the exact one."""
+        """The turning points of a libration in the order of time, each the double nearest to the exact one."""
         if self.kind != "libration":
             return ()
-        low, high = self._stretch.a, self._stretch.b
-        if self._is_exact:
-            low, high = timing.turning_points(self.problem, self._stretch)
-        met = (high, low) if self.direction > 0 else (low, high)
-        return (self.problem.lam0, met[0]) if self.problem.w0 == 0.0 else met
+        low, high = self._segment.a, self._segment.b
+        if self._has_multiprecision:
+            low, high = timing.turning_points(self.problem, self._segment)
+        in_order = (high, low) if self.direction > 0 else (low, high)
+        return (self.problem.lam0, in_order[0]) if self.problem.w0 == 0.0 else in_order
 
     @property
-    def _is_exact(self) -> bool:
-        """Whether more digits can be had than doubles hold, in some seconds at most."""
-        f, s = self.problem.functions, self._stretch
-        return f.exact is not None and f.between(f.exact.edges, s.a, s.b).size <= MOST_PIECES
+    def _has_multiprecision(self) -> bool:
+        """Whether the period can be computed to more digits than doubles hold, within some seconds."""
+        f, s = self.problem.functions, self._segment
+        return f.exact is not None and f.between(f.exact.edges, s.a, s.b).size <= MAX_CHART_PIECES
 
     @property
     def _timing(self) -> timing.Timing:
-        if not self._is_exact:
-            return timing.plain(self.kind, self._stretch, self._offsets)
-        if self._exact is None:
-            self._exact = timing.exact(self.problem, self.kind, self.direction, self._stretch)
-        return self._exact
+        if not self._has_multiprecision:
+            return timing.in_doubles(self.kind, self._segment, self._offsets)
+        if self._exact_timing is None:
+            self._exact_timing = timing.in_multiprecision(self.problem, self.kind, self.direction, self._segment)
+        return self._exact_timing
 
     @property
     def one_period(self) -> tuple[TimedSegment, ...]:
-        """The pieces of one period from launch."""
-        return self._course(0.0).pieces
+        """The timed segments of one period from launch."""
+        return self._trajectory(0.0).segments
 
     @property
     def half_period(self) -> float:
-        """Time from one turning point to the other, the double nearest to the exact one (libration only)."""
+        """Time in s from one turning point to the other, the double nearest to the exact one (libration only)."""
         if self.kind != "libration":
             return super().half_period
         return self._timing.duration[0]
 
     @property
     def period(self) -> float:
-        """Time after which the motion repeats, the double nearest to the exact one."""
+        """Time in s after which the motion repeats, the double nearest to the exact one."""
         duration = self._timing.duration[0]
         return 2.0 * duration if self.kind == "libration" else duration
 
     def period_to(self, digits: int) -> str:
-        """The period as a decimal string with that many correct digits (up to 1000)."""
+        """The period in s as a decimal string with that many correct digits (up to 1000); see `Motion.period_to`."""
         if self.problem.functions.exact is None:
             raise SolutionError(
                 "period_to: this curve is a chart in doubles, whose period has no more digits than `period`; "
                 "declare the curve by formulas for more"
             )
-        return timing.period_to(self.problem, self.kind, self.direction, self._stretch, digits)
+        return timing.period_to(self.problem, self.kind, self.direction, self._segment, digits)
 
     def lam(self, t: Any) -> Any:
-        """The curve's parameter at times, as `Motion.lam`; doubles take one compiled loop."""
+        """The curve parameter at times; see `Motion.lam`. For doubles this is one call of compiled code."""
         time = plain_time(t)
         if time is not None:
             sampler = self._sampler_for(time, time)
@@ -113,90 +132,96 @@ class PeriodicMotion(Motion):
         return sampler.places(times[0]).reshape(t.shape)
 
     def state(self, t: Any) -> State:
-        """Everything about the body at times, as `Motion.state`; doubles take one compiled loop."""
+        """The state of the body at times; see `Motion.state`. For doubles this is one call of compiled code."""
         time = plain_time(t)
         times = plain_times(t) if time is None else (NOWHERE, time, time)
         sampler = None if times is None else self._sampler_for(times[1], times[2])
         if times is None or sampler is None:
             return super().state(t)
-        if self._stretch.from_exact:  # its speeds are known to its panels alone
+        if self._segment.from_multiprecision:  # its speeds can be computed from its panels only
             return super().state(t)._replace(lam=self.lam(t))
         if time is not None:
             return State(*sampler.state(time))
         return State(t, *sampler.states(times[0]).reshape(-1, *t.shape))
 
     def _sampler_for(self, least: float, greatest: float) -> Sampler | None:
-        """What samples times from ``least`` to ``greatest``; None for times that cannot be, or not as doubles."""
-        reach = max(-least, greatest)
-        if not (reach < inf and greatest <= self.t_end):
+        """The sampler for times from ``least`` to ``greatest``; None if they are impossible or too late for doubles."""
+        end_time = max(-least, greatest)
+        if not (end_time < inf and greatest <= self.t_end):
             return None
         sampler = self._sampler
-        if sampler is not None and sampler.course is self._precise and reach <= sampler.reach:
+        if sampler is not None and sampler.trajectory is self._precise_trajectory and end_time <= sampler.max_time:
             return sampler
-        course = self._course(reach)
-        if sampler is None or sampler.course is not course:
-            clock = self._timing if course is self._precise else timing.plain(self.kind, self._stretch, self._offsets)
+        trajectory = self._trajectory(end_time)
+        if sampler is None or sampler.trajectory is not trajectory:
+            is_precise = trajectory is self._precise_trajectory
+            times = self._timing if is_precise else timing.in_doubles(self.kind, self._segment, self._offsets)
             sampler = self._sampler = Sampler(
-                self.problem, course, clock.phase, self.direction, lambda: self._clock_drift(course)
+                self.problem, trajectory, times.phase_time, self.direction, lambda: self._time_drift(trajectory)
             )
-        return sampler if reach <= sampler.reach else None
+        return sampler if end_time <= sampler.max_time else None
 
-    def _course(self, reach: float) -> Trajectory:
-        whole = self._stretch.duration * (2.0 if self.kind == "libration" else 1.0)
+    def _trajectory(self, end_time: float) -> Trajectory:
+        one_period_time = self._segment.duration * (2.0 if self.kind == "libration" else 1.0)
         if (
-            self._is_exact
-            and self._precise is None
-            and (reach > whole or self._exact is not None or self._stretch.from_exact)
+            self._has_multiprecision
+            and self._precise_trajectory is None
+            and (end_time > one_period_time or self._exact_timing is not None or self._segment.from_multiprecision)
         ):
-            self._precise = self._build(self._timing)
-        if self._precise is not None:
-            return self._precise
-        if self._plain is None:
-            self._plain = self._build(timing.plain(self.kind, self._stretch, self._offsets))
-        return self._plain
+            self._precise_trajectory = self._build(self._timing)
+        if self._precise_trajectory is not None:
+            return self._precise_trajectory
+        if self._double_trajectory is None:
+            self._double_trajectory = self._build(timing.in_doubles(self.kind, self._segment, self._offsets))
+        return self._double_trajectory
 
-    def _build(self, clock: timing.Timing) -> Trajectory:
-        tau = clock.duration
-        stretch = self._stretch if clock.marks is None else self._stretch.timed(clock.marks)
-        own = stretch.whole
-        pace = ((own[0] - tau[0]) + (own[1] - tau[1])) / tau[0]
+    def _build(self, times: timing.Timing) -> Trajectory:
+        duration = times.duration
+        segment = self._segment if times.edge_times is None else self._segment.with_edge_times(times.edge_times)
+        total = segment.total_time
+        time_scale_error = ((total[0] - duration[0]) + (total[1] - duration[1])) / duration[0]
         if self.kind == "libration":
-            phi = stretch.anomaly_of(*clock.offsets)
-            pieces = libration(stretch, direction=self.direction, tau=tau, phase=clock.phase, phi=phi)
-            return Trajectory(pieces=pieces, period=(2.0 * tau[0], 2.0 * tau[1]), pace=pace)
-        piece = TimedSegment(
-            stretch=stretch,
+            phi = segment.phase_angle_of(*times.offsets)
+            segments = libration(
+                segment, direction=self.direction, duration=duration, phase_time=times.phase_time, phi=phi
+            )
+            period = (2.0 * duration[0], 2.0 * duration[1])
+            return Trajectory(segments=segments, period=period, time_scale_error=time_scale_error)
+        timed = TimedSegment(
+            segment=segment,
             sense=1,
             r_start=ZERO,
-            r_stop=tau,
+            r_stop=duration,
             phi_start=0.0,
-            phi_stop=stretch.stop,
+            phi_stop=segment.stop,
             t_start=ZERO,
             s_a=0.0,
             end="horizon",
         )
-        lap, length = self.direction * self.problem.period, self.direction * stretch.length
-        return Trajectory(pieces=(piece,), period=tau, lap=lap, lap_length=length, pace=pace)
+        lap, length = self.direction * self.problem.period, self.direction * segment.length
+        return Trajectory(
+            segments=(timed,), period=duration, lap=lap, lap_length=length, time_scale_error=time_scale_error
+        )
 
-    def _clock_error(self, t: Array) -> Array:
-        late, drift = self._clock_drift(self._course(float(np.abs(t).max()) if t.size else 0.0))
-        return late + np.abs(t) * drift
+    def _time_error(self, t: Array) -> Array:
+        at_launch, drift = self._time_drift(self._trajectory(float(np.abs(t).max()) if t.size else 0.0))
+        return at_launch + np.abs(t) * drift
 
-    def _clock_drift(self, course: Trajectory) -> tuple[float, float]:
-        """Estimated error of a course's clock at launch, and by how much it grows with time."""
-        if course is self._precise:
+    def _time_drift(self, trajectory: Trajectory) -> tuple[float, float]:
+        """Estimated error in s of a trajectory's times at launch, and its growth per second."""
+        if trajectory is self._precise_trajectory:
             return 0.0, 2.0**-104
-        # What the stretch's own clock says of the launch and of the period, and the rounded anomaly of the launch.
-        stretch, start = self._stretch, np.array([course.pieces[0].phi_start])
-        launch = stretch.clock_error(start) + ULP * start * slopes(stretch.edges, stretch.panels[3], start)
-        rounding = ULP if self.problem.formulas.chart is None else CHARTED
-        return float(launch[0]), stretch.relative_error + rounding
+        # The quadrature errors of the time to the launch and of the period; the rounding of the launch's phase angle.
+        segment, start = self._segment, np.array([trajectory.segments[0].phi_start])
+        launch = segment.time_error(start) + ULP * start * slopes(segment.edges, segment.panels[3], start)
+        rounding = ULP if self.problem.formulas.chart is None else CHART_ROUNDING
+        return float(launch[0]), segment.relative_error + rounding
 
     def events_between(self, t1: Any, t2: Any) -> tuple[Event, ...]:
-        """Events at times from t1 to t2, over as many periods as that takes."""
+        """The events from time t1 to t2 over as many periods as that takes; see `Motion.events_between`."""
         start, stop = read_number(t1, where="t1").value, read_number(t2, where="t2").value
         period = self.period
-        lap = self._course(0.0).lap
+        lap = self._trajectory(0.0).lap
         out = []
         for k in range(int(np.floor(start / period)), int(np.floor(stop / period)) + 1):
             for event in self._one_period():
@@ -209,15 +234,15 @@ class PeriodicMotion(Motion):
         return tuple(event for event in self.events if event.kind != "horizon")
 
     def _at_end(self, lam: float, low: float) -> float:
-        """The end of the stretch where a place is a turning point as `turning_points` rounds it, else the place."""
-        for end in (self._stretch.a, self._stretch.b):
-            beside = 0.0 < abs(lam - end) <= BESIDE * abs(end)
-            if beside and low == 0.0 and lam in self.turning_points:
+        """The end of the segment if a place is a turning point as `turning_points` rounds it, else the place."""
+        for end in (self._segment.a, self._segment.b):
+            is_near = 0.0 < abs(lam - end) <= MAX_TURN_ROUNDING * abs(end)
+            if is_near and low == 0.0 and lam in self.turning_points:
                 return end
         return lam
 
     def _first_passages(self, lam: float, low: float) -> list[float]:
-        lap = self._course(0.0).lap
+        lap = self._trajectory(0.0).lap
         if not lap:
             return super()._first_passages(self._at_end(lam, low), low)
         count = np.floor((lam - self.problem.lam0) / lap)

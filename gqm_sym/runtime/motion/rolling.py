@@ -1,4 +1,4 @@
-"""Rolling bodies: whether static friction can hold them, and whether they fit into their track."""
+"""Rolling bodies: whether static friction is sufficient, and whether the body fits into its track."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
@@ -18,41 +18,42 @@ if TYPE_CHECKING:
     from gqm_sym.runtime.launch.problem import Problem
 
 
-def slip_times(problem: "Problem", piece: TimedSegment, pace: float) -> list[tuple[Pair, float]]:
-    """When, and at which anomalies, a body on a piece of its motion begins to slip; at launch too, if it slips there.
+def slip_times(problem: "Problem", timed: TimedSegment, time_scale_error: float) -> list[tuple[Pair, float]]:
+    """The times at which a rolling body begins to slip on a timed segment, each with its phase angle.
 
-    The motion goes on as if it rolled. Told of conservative motions, whose climb knows F.t.
+    A body that slips at launch begins to slip then. The motion is computed as if the body rolled on. Only conservative
+    motions are examined, since the slope of the effective potential gives the tangential force F.t.
     """
-    if problem.formulas.grip is None or problem.formulas.dissipation is not None:
+    if problem.formulas.static_friction_limit is None or problem.formulas.dissipation is not None:
         return []
     values = dict(zip(problem.formulas.parameters, problem.p, strict=True))
-    beta, mu, mass = (values[name].value for name in (*problem.formulas.grip, "m"))
+    beta, mu, mass = (values[name].value for name in (*problem.formulas.static_friction_limit, "m"))
 
-    def spare(phi: Array) -> Array:
-        """The sign of what static friction could carry beyond what it must."""
-        f, places = piece.stretch.functions, piece.stretch.places(phi)
-        _, _, ds, _, force = path_and_force_at(f.addresses, f.p, places, piece.stretch.speeds(phi) ** 2)
-        # Half the slope of the climb by arc length is |F.t|/(1 + beta).
-        needed = 0.5 * beta * np.abs(potential_at(f.addresses, f.p, places)[1]) / ds
+    def friction_margin(phi: Array) -> Array:
+        """The sign of the largest possible static friction less the friction that rolling needs."""
+        f, places = timed.segment.functions, timed.segment.places(phi)
+        _, _, ds, _, force = path_and_force_at(f.addresses, f.p, places, timed.segment.speeds(phi) ** 2)
+        # The slope of the effective potential by arc length is -F.t/(1 + beta).
+        needed = beta * np.abs(potential_at(f.addresses, f.p, places)[1]) / ds
         signs: Array = np.sign(mu * np.abs(force) / mass - needed)
         return signs
 
-    met = crossings(piece, sign_changes(piece.stretch, spare, spare), pace)
-    first = met[0][1] if met else piece.phi_stop
-    rolls = spare(np.array([0.5 * (piece.phi_start + first)]))[0] >= 0.0
-    begun = [] if rolls or piece.t_start[0] != 0.0 else [(piece.t_start, piece.phi_start)]
-    return begun + met[0 if rolls else 1 :: 2]
+    changes = crossings(timed, sign_changes(timed.segment, friction_margin, friction_margin), time_scale_error)
+    first = changes[0][1] if changes else timed.phi_stop
+    rolls = friction_margin(np.array([0.5 * (timed.phi_start + first)]))[0] >= 0.0
+    at_launch = [] if rolls or timed.t_start[0] != 0.0 else [(timed.t_start, timed.phi_start)]
+    return at_launch + changes[0 if rolls else 1 :: 2]
 
 
 def check_launch(formulas: "Formulas", f: BoundFunctions, lam0: float) -> None:
-    """Refuse a launch where the body does not fit."""
+    """Refuse a launch at a place where the body does not fit into the track."""
     ds = path_and_force_at(f.addresses, f.p, np.array([lam0]), np.zeros(1))[2, 0]
     if not ds > 0.0:
         raise LaunchError(f"lam0: {_what(formulas, lam0)}; launch elsewhere, or {_remedy(formulas)}")
 
 
 def check_end(formulas: "Formulas", legs: Sequence[Leg]) -> None:
-    """Refuse a motion that comes to where the body no longer fits: the centre's path has a cusp there."""
+    """Refuse a motion to a place where the body no longer fits: the path of its centre has a cusp there."""
     last = legs[-1] if legs else None
     if last is not None and last.end == "cusp":
         what = f"{_what(formulas, last.lam_end)}, where it comes after {last.t_end!r} s"
@@ -60,8 +61,9 @@ def check_end(formulas: "Formulas", legs: Sequence[Leg]) -> None:
 
 
 def _what(formulas: "Formulas", place: float) -> str:
-    return f"a body of radius {formulas.body} does not fit into the track at {formulas.parameter} = {place!r}"
+    return f"a body of radius {formulas.rolling_radius} does not fit into the track at {formulas.parameter} = {place!r}"
 
 
 def _remedy(formulas: "Formulas") -> str:
-    return f"give {formulas.body} so that 1 - kappa*{formulas.body} > 0, kappa being the track's curvature"
+    radius = formulas.rolling_radius
+    return f"give {radius} so that 1 - kappa*{radius} > 0, kappa being the track's curvature"

@@ -10,7 +10,7 @@ HEADINGS = {"t": "t (s)", "x": "x (m)", "z": "z (m)", "t_start": "t from (s)", "
 
 
 class Rows(tuple[T, ...]):
-    """A tuple of records of one kind, which notebooks show as a table."""
+    """A tuple of records of one class, which notebooks display as a table."""
 
     __slots__ = ()
 
@@ -22,7 +22,7 @@ class Rows(tuple[T, ...]):
 
 
 def table(titles: Sequence[str], rows: Iterable[Iterable[Any]]) -> str:
-    """An HTML table; numbers are the shortest texts that read back as the same doubles."""
+    """An HTML table; each number is the shortest text that is read back as the same double."""
     head = "".join(f"<th>{escape(title)}</th>" for title in titles)
     body = "".join(f"<tr>{''.join(f'<td>{_text(cell)}</td>' for cell in row)}</tr>" for row in rows)
     return f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"

@@ -1,4 +1,4 @@
-"""Sampling of periodic motions: times in, places or states out, one crossing into compiled code a call."""
+"""Places and states of a periodic motion at many times, with one call of compiled code."""
 
 from collections.abc import Callable
 from typing import Any
@@ -12,25 +12,27 @@ from gqm_sym.runtime.inversion import records
 from gqm_sym.runtime.inversion.fourier import fit_wave
 from gqm_sym.runtime.launch.problem import Problem
 from gqm_sym.runtime.motion.trajectory import Trajectory
-from gqm_sym.runtime.quadrature.integrands import TURN_TURN
+from gqm_sym.runtime.quadrature.substitution import TURN_TURN
 
-# Times a thread is worth starting for.
-PLACES, STATES = 2**16, 2**12
+# The fewest times for which another thread is started.
+MIN_PLACES_PER_THREAD, MIN_STATES_PER_THREAD = 2**16, 2**12
 
-# Counts of periods beyond which times are reduced one by one.
-MOST_PERIODS = 2.0**50
-ROWS = 9
+# The most periods after which compiled code reduces times exactly; later ones are reduced one by one.
+MAX_PERIODS = 2.0**50
+
+# The number of fields of a state other than the time.
+STATE_ROWS = 9
 
 
 def plain_time(t: Any) -> float | None:
-    """A time that is a double as it stands; None for any other."""
+    """A time that is a double or equal to one; None for any other."""
     if type(t) is float:
         return t
     return float(t) if type(t) is int and abs(t) < 2**53 else None
 
 
 def plain_times(t: Any) -> tuple[Array, float, float] | None:
-    """Times that are doubles as they stand, the least and the greatest; None where they need reading."""
+    """Times that are an array of doubles, with the least and the greatest; None if they must be read one by one."""
     if isinstance(t, np.ndarray) and t.dtype == np.float64 and t.size:
         flat = np.ascontiguousarray(t).reshape(-1)
         return flat, float(flat.min()), float(flat.max())
@@ -38,83 +40,88 @@ def plain_times(t: Any) -> tuple[Array, float, float] | None:
 
 
 class Sampler:
-    """Where one periodic motion is.
+    """The places and states of one periodic motion.
 
     Attributes
     ----------
-    course : Course
-        Whose times it goes by.
-    reach : float
-        Times this far from launch either way are reduced to rounding.
+    trajectory : Trajectory
+        The trajectory that is sampled.
+    max_time : float
+        The largest distance in s of a time from launch, later or earlier, that is reduced exactly.
     """
 
     def __init__(
-        self, problem: Problem, course: Trajectory, phase: Pair, direction: int, drift: Callable[[], Pair]
+        self, problem: Problem, trajectory: Trajectory, phase_time: Pair, direction: int, time_drift: Callable[[], Pair]
     ) -> None:
-        assert course.period is not None
-        stretch = course.pieces[0].stretch
-        self.course = course
-        self.reach = MOST_PERIODS * course.period[0]
-        self._problem, self._stretch = problem, stretch
-        there_and_back = stretch.kind == TURN_TURN
-        way = direction if there_and_back else 1
-        start, start_low = way * phase[0], way * phase[1]
-        ends = (stretch.a, stretch.b, problem.lam0, course.lap)
-        self._v0, self._drift = direction * problem.launch.v0.value, drift
+        assert trajectory.period is not None
+        segment = trajectory.segments[0].segment
+        self.trajectory = trajectory
+        self.max_time = MAX_PERIODS * trajectory.period[0]
+        self._problem, self._segment = problem, segment
+        there_and_back = segment.kind == TURN_TURN
+        sign = direction if there_and_back else 1
+        start, start_low = sign * phase_time[0], sign * phase_time[1]
+        ends = (segment.a, segment.b, problem.lam0, trajectory.lap)
+        self._v0, self._time_drift = direction * problem.launch.v0.value, time_drift
+        own_times = (*segment.total_time, segment.stop, trajectory.time_scale_error)
         self._sections = {
-            records.FUNCTIONS: np.array([*problem.functions.addresses, stretch.kind], dtype=np.int64),
-            records.DIAL: np.array([*course.period, *_inverse(course.period), start, start_low, *ends]),
-            records.CLOCK: np.array([*course.period, start, start_low, *stretch.whole, stretch.stop, course.pace]),
+            records.FUNCTIONS: np.array([*problem.functions.addresses, segment.kind], dtype=np.int64),
+            records.WAVE: np.array([*trajectory.period, *_inverse(trajectory.period), start, start_low, *ends]),
+            records.CLOCK: np.array([*trajectory.period, start, start_low, *own_times]),
         }
         f = problem.functions
-        if not f.between(f.breaks, stretch.a, stretch.b).size:
-            series = fit_wave(stretch.edges, *stretch.clock, stretch.panels[3], there_and_back)
+        if not f.between(f.breaks, segment.a, segment.b).size:
+            series = fit_wave(segment.edges, *segment.edge_times, segment.panels[3], there_and_back)
             self._sections[records.COSINES], self._sections[records.SINES] = series
         if not len(self._sections.get(records.COSINES, ())):
             self._tabulate()
-        self._short = records.record(self._sections)
-        self._whole: Array | None = None
+        self._place_record = records.record(self._sections)
+        self._state_record: Array | None = None
 
     def _tabulate(self) -> None:
         names = (records.MIDDLES, records.LOWS, records.SCALES, records.POWERS, records.INDEX, records.ENDS)
-        self._sections.update(zip(names, self._stretch.table[:6], strict=True))
+        self._sections.update(zip(names, self._segment.table[:6], strict=True))
 
     @property
     def _record(self) -> Array:
-        """All that is known, for states; places take less."""
-        if self._whole is None:
+        """The record for states, which holds more than that for places."""
+        if self._state_record is None:
             self._tabulate()
-            stretch, panels, problem = self._stretch, self._stretch.panels, self._problem
-            lengths = self.course.lap_length, problem.arc_origin, self.course.pieces[0].s_a
-            segments = stretch.table[3]
-            owners = np.clip(np.searchsorted(stretch.edges, segments[:, 0], side="right") - 1, 0, len(panels[2]) - 2)
-            middles = 0.5 * (stretch.edges[1:] + stretch.edges[:-1])
+            segment, panels, problem = self._segment, self._segment.panels, self._problem
+            lengths = self.trajectory.lap_length, problem.arc_origin, self.trajectory.segments[0].s_a
+            intervals = segment.table[3]
+            owners = np.clip(np.searchsorted(segment.edges, intervals[:, 0], side="right") - 1, 0, len(panels[2]) - 2)
+            middles = 0.5 * (segment.edges[1:] + segment.edges[:-1])
             self._sections |= {
-                records.LAUNCH: np.array([problem.lam0, self._v0, *lengths, *self._drift()], dtype=np.float64),
-                records.SHAPE: np.array([stretch.a, stretch.b, stretch.ref, stretch.w, stretch.spread]),
+                records.LAUNCH: np.array([problem.lam0, self._v0, *lengths, *self._time_drift()], dtype=np.float64),
+                records.SHAPE: np.array([segment.a, segment.b, segment.ref, segment.ref_v2, segment.width_ratio]),
                 records.EDGES: panels[0],
                 records.LENGTHS: panels[2],
                 records.ARCS: panels[4],
-                records.CLOCK_ERRORS: stretch.clock_error(middles),
-                records.TABLE_ERRORS: stretch.inversion_error(segments.sum(axis=1)),
+                records.TIME_ERRORS: segment.time_error(middles),
+                records.TABLE_ERRORS: segment.inversion_error(intervals.sum(axis=1)),
                 records.OWNERS: owners.astype(np.int64),
             }
-            self._whole = records.record(self._sections)
-        return self._whole
+            self._state_record = records.record(self._sections)
+        return self._state_record
 
     def place(self, t: float) -> float:
-        """The curve's parameter at one time."""
-        place: float = records.place_at_time(self._short, t)
+        """The curve parameter at one time."""
+        place: float = records.place_at_time(self._place_record, t)
         return place
 
     def places(self, t: Array) -> Array:
-        """The curve's parameter at times."""
+        """The curve parameter at times."""
         out = np.empty_like(t)
-        run_in_threads(lambda part: records.places_along(self._short, t, out, part.start, part.stop), t.size, PLACES)
+        run_in_threads(
+            lambda part: records.places_along(self._place_record, t, out, part.start, part.stop),
+            t.size,
+            MIN_PLACES_PER_THREAD,
+        )
         return out
 
     def state(self, t: float) -> tuple[float, ...]:
-        """The time, and as `states` has it: what there is to say of it."""
+        """The time, and the items of a column of `states`."""
         row = list(records.state_at_time(self._record, self._problem.functions.p, t))
         if self._problem.formulas.chart is not None:
             row[2] = row[1]
@@ -122,15 +129,17 @@ class Sampler:
 
     def states(self, t: Array) -> Array:
         """Rows of lam, s, x, z, v, v**2, kappa, normal force and error of lam at times."""
-        record, p, out = self._record, self._problem.functions.p, np.empty((ROWS, t.size))
-        run_in_threads(lambda part: records.states_along(record, p, t, out, part.start, part.stop), t.size, STATES)
+        record, p, out = self._record, self._problem.functions.p, np.empty((STATE_ROWS, t.size))
+        run_in_threads(
+            lambda part: records.states_along(record, p, t, out, part.start, part.stop), t.size, MIN_STATES_PER_THREAD
+        )
         if self._problem.formulas.chart is not None:
-            out[1] = out[0]  # a chart's parameter is its arc length
+            out[1] = out[0]  # the parameter of a chart is its arc length
         return out
 
 
 def _inverse(period: Pair) -> Pair:
-    """One over a period, as two doubles."""
+    """The inverse of a period, as two doubles."""
     inverse = 1.0 / period[0]
     product, rest = two_product.py_func(inverse, period[0])
     return inverse, -((product - 1.0) + rest + inverse * period[1]) * inverse

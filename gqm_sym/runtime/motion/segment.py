@@ -1,4 +1,4 @@
-"""A stretch of the curve that is run through in one direction, with its clock."""
+"""A segment of the curve that the body moves through in one direction, with the times along it."""
 
 from copy import copy
 from dataclasses import dataclass, field
@@ -10,57 +10,70 @@ import numpy as np
 from gqm_sym.errors import SolutionError
 from gqm_sym.runtime.arithmetic.doubledouble import ULP, running_totals
 from gqm_sym.runtime.compiled.types import Array
-from gqm_sym.runtime.inversion.table import TIMED, anomalies, build_table
+from gqm_sym.runtime.inversion.table import MAX_TIME_ERROR, build_table, phase_angles
 from gqm_sym.runtime.launch.functions import BoundFunctions
-from gqm_sym.runtime.motion.conditioning import magnified, off_launch
+from gqm_sym.runtime.motion.conditioning import launch_condition_number, v2_correction
 from gqm_sym.runtime.multiprecision.exact_panels import DIGITS, exact_ends, lay_exactly
-from gqm_sym.runtime.quadrature.integrands import FROM_TURN, REGULAR, TO_EQUILIBRIUM, TURN_TURN, speeds_along, speeds_at
-from gqm_sym.runtime.quadrature.substitution import phase_angle_of, places_at
+from gqm_sym.runtime.quadrature.integrands import speeds_along, speeds_at
+from gqm_sym.runtime.quadrature.substitution import (
+    FROM_TURN,
+    REGULAR,
+    TO_EQUILIBRIUM,
+    TURN_TURN,
+    phase_angle_of,
+    places_at,
+)
 from gqm_sym.runtime.quadrature.time_panels import (
     FAILED,
     ILL_CONDITIONED,
-    LEAST_BALANCE,
+    MIN_CANCELLATION_RATIO,
     lay_along,
     lay_panels,
     read_off_many,
     slopes,
 )
 
-# Below this share of its ends, the width of a stretch is too rounded for a speed, and for a time from one turn.
-LEAST_WIDTH = 1.0 / 32.0
-LEAST_TIMED = 2.0**-10
+# Widths of a segment, as shares of its ends, below which the rounding of the ends spoils its speeds, and its times from
+# one turning point.
+MIN_WIDTH_SHARE = 1.0 / 32.0
+MIN_TIMED_WIDTH_SHARE = 2.0**-10
 
 
 @dataclass(slots=True, kw_only=True)
 class Segment:
-    """One stretch: time and arc length grow from ``a``, with the anomaly.
+    """One segment: time and arc length grow from its end ``a`` with the phase angle of the substitution lam(phi).
+
+    Its panels hold time and arc length as polynomials of the phase angle (MATHS, section 4).
 
     Attributes
     ----------
+    functions : BoundFunctions
+        The model's functions.
     kind : int
-        Which of its ends are special (`panels`).
+        TURN_TURN, FROM_TURN, TO_EQUILIBRIUM or REGULAR (`quadrature.integrands`): at which of its ends V**2 vanishes.
     a, b : float
-        Its ends. ``a`` is the turning point where only one end is; ``b`` the equilibrium where there is one.
-    lows : (float, float)
-        What its ends are more than those doubles.
-    ref, w : float
-        Where no end is special: a place and V**2 there.
+        Its ends. A single turning point is ``a``, and an equilibrium is ``b``.
+    low_parts : (float, float)
+        The low parts of both ends as two doubles.
+    ref, ref_v2 : float
+        If V**2 vanishes at neither end, a place, and V**2 there.
     stop : float
-        The last anomaly.
-    hints : tuple of float
-        Places at which panels begin besides the curve's own breaks: the rate changes there on a scale that even steps
-        would miss.
+        The last phase angle; the first is 0.
+    panel_breaks : tuple of float
+        Places at which panels begin, in addition to those at which the curve is not smooth: the integrand changes there
+        on a scale that equal steps would miss.
     v2 : array or None
-        V**2 towards an equilibrium where forces dissipate: a field (`fields`).
-    slack : float
-        Where ``a`` is no turning point but the body is slow there: how far behind ``a`` one would be, as a share of the
-        last anomaly, in the anomaly.
-    laid : tuple, optional
-        Its panels, if they were laid in extended precision, or with a leg.
-    paces : (float, array), optional
-        Of panels laid with a leg: the last value of the march variable, and the Legendre coefficients of Y (`legs`).
-    known : float, optional
-        Its duration, where that is known to be good in doubles: panels are then laid when first asked for.
+        V**2 on the approach to an equilibrium with dissipative forces (`quadrature.equilibrium`).
+    turn_offset : float
+        If ``a`` is no turning point but the body is slow there, the phase angle from ``a`` back to where the turning
+        point would be, as a share of the last phase angle.
+    stored_panels : tuple, optional
+        Its panels, if they were computed in extended precision or with a leg.
+    speed_series : (float, array), optional
+        For panels computed with a leg, the last value of the time-like variable and the Legendre coefficients of Y
+        (`legs.leg_equation`).
+    known_duration : float, optional
+        Its duration in s, if doubles have given that accurately; panels are then computed when they are first needed.
     ends : pair
         Its ends in extended precision, where they are known.
     """
@@ -69,119 +82,123 @@ class Segment:
     kind: int
     a: float
     b: float
-    lows: tuple[float, float] = (0.0, 0.0)
+    low_parts: tuple[float, float] = (0.0, 0.0)
     ref: float = 0.0
-    w: float = 0.0
+    ref_v2: float = 0.0
     stop: float = 1.0
-    hints: tuple[float, ...] = ()
+    panel_breaks: tuple[float, ...] = ()
     v2: Array | None = None
-    slack: float = 0.0
-    laid: Any = None
-    paces: tuple[float, Array] | None = None
-    known: float | None = None
+    turn_offset: float = 0.0
+    stored_panels: Any = None
+    speed_series: tuple[float, Array] | None = None
+    known_duration: float | None = None
     ends: tuple[Any, Any] = (None, None)
-    _from_exact: bool = False
-    _conditioning: float = field(default=1.0, init=False)
-    _clock: Any = field(default=None, repr=False)
-    _is_timed: bool = field(default=False, repr=False)
-    _stretched: float | None = field(default=None, repr=False)
+    _from_multiprecision: bool = False
+    _condition_number: float = field(default=1.0, init=False)
+    _edge_times: Any = field(default=None, repr=False)
+    _has_given_times: bool = field(default=False, repr=False)
+    _width_ratio: float | None = field(default=None, repr=False)
     _table: Any = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
-        if self.known is None:
-            self._settle()
+        if self.known_duration is None:
+            self._lay_panels()
 
-    def _settle(self) -> None:
-        """Lay its panels, in extended precision where doubles would lose too much."""
+    def _lay_panels(self) -> None:
+        """Compute its panels, in extended precision where too much of V**2 cancels for doubles."""
         f = self.functions
-        if self.paces is not None:
+        if self.speed_series is not None:
             return
-        self._from_exact = self.laid is not None
+        self._from_multiprecision = self.stored_panels is not None
         if self.v2 is not None:
-            self.laid = lay_along(self.a, self.b, self.v2, self._marks())
-        elif self.laid is None:
-            self.w += self._off_launch()
-            self.laid = lay_panels(f.addresses, f.p, self.kind, self.a, self.b, self.ref, self.w, self._marks())
-        self._conditioning = max(1.0 / self.balance if self.balance > 0.0 else inf, self._magnified())
-        hard = self._conditioning > 1.0 / LEAST_BALANCE or (self.kind == FROM_TURN and self._is_short(LEAST_TIMED))
-        if f.exact is not None and not self._from_exact and hard:
+            self.stored_panels = lay_along(self.a, self.b, self.v2, self._initial_edges())
+        elif self.stored_panels is None:
+            self.ref_v2 += self._v2_correction()
+            self.stored_panels = lay_panels(
+                f.addresses, f.p, self.kind, self.a, self.b, self.ref, self.ref_v2, self._initial_edges()
+            )
+        self._condition_number = max(1.0 / self.balance if self.balance > 0.0 else inf, self._launch_condition_number())
+        needs_multiprecision = self._condition_number > 1.0 / MIN_CANCELLATION_RATIO or (
+            self.kind == FROM_TURN and self._is_short(MIN_TIMED_WIDTH_SHARE)
+        )
+        if f.exact is not None and not self._from_multiprecision and needs_multiprecision:
             self.ends = exact_ends(f.exact, DIGITS, self.kind, self.a, self.b, self.ends)
             self.a, self.b = float(self.ends[0]), float(self.ends[1])
-            self.laid = lay_exactly(f.exact, self.kind, self.ends, self.stop)
-            self._from_exact = True
-        if self.laid[7] == ILL_CONDITIONED:
+            self.stored_panels = lay_exactly(f.exact, self.kind, self.ends, self.stop)
+            self._from_multiprecision = True
+        if self.stored_panels[7] == ILL_CONDITIONED:
             raise SolutionError(
-                f"time of flight from {self.a!r} to {self.b!r}: V**2 all but vanishes inside, and this curve is known "
-                "by doubles only; launch a little faster or slower, or declare the curve by formulas"
+                f"time of flight from {self.a!r} to {self.b!r}: V**2 nearly vanishes between them, and this curve "
+                "is known in doubles only; launch a little faster or slower, or declare the curve by formulas"
             )
-        if self.laid[7] == FAILED:
+        if self.stored_panels[7] == FAILED:
             raise SolutionError(
                 f"time of flight from {self.a!r} to {self.b!r}: the integrand is not finite there; "
-                "is the curve regular and the potential finite on this stretch?"
+                "is the curve regular and the potential finite on this segment?"
             )
 
-    def _ready(self) -> "Segment":
-        """Itself, its panels laid."""
-        if self.laid is None:
-            self._settle()
+    def _with_panels(self) -> "Segment":
+        """The segment itself, with its panels computed."""
+        if self.stored_panels is None:
+            self._lay_panels()
         return self
 
     @property
     def panels(self) -> Any:
-        """Its panels, as `panels.lay` returns them."""
-        return self._ready().laid
+        """Its panels, as `quadrature.time_panels.lay` returns them."""
+        return self._with_panels().stored_panels
 
     @property
-    def from_exact(self) -> bool:
-        """Whether its panels were laid in extended precision."""
-        return self._ready()._from_exact
+    def from_multiprecision(self) -> bool:
+        """Whether its panels were computed in extended precision."""
+        return self._with_panels()._from_multiprecision
 
     @property
-    def conditioning(self) -> float:
-        """How many times its times magnify, at most, the rounding of what they depend on."""
-        return self._ready()._conditioning
+    def condition_number(self) -> float:
+        """The largest relative change of its times per relative change of the numbers that they depend on."""
+        return self._with_panels()._condition_number
 
-    def timed(self, clock: tuple[Array, Array]) -> "Segment":
-        """The same stretch by a better clock."""
-        better = copy(self._ready())
-        better._clock, better._table, better._is_timed, better.known = clock, None, True, None
-        return better
+    def with_edge_times(self, edge_times: tuple[Array, Array]) -> "Segment":
+        """The same segment with more accurate times at the edges of its panels."""
+        other = copy(self._with_panels())
+        other._edge_times, other._table, other._has_given_times, other.known_duration = edge_times, None, True, None
+        return other
 
     @property
-    def clock(self) -> tuple[Array, Array]:
-        """Time at the panels' edges, each as two doubles."""
-        if self._clock is None:
-            self._clock = running_totals(self.panels[1], self.panels[3])
-        times, low = self._clock
+    def edge_times(self) -> tuple[Array, Array]:
+        """The time in s from ``a`` to each edge of the panels, as two doubles."""
+        if self._edge_times is None:
+            self._edge_times = running_totals(self.panels[1], self.panels[3])
+        times, low = self._edge_times
         return times, low
 
-    def _marks(self) -> Array:
-        """The first and the last anomaly, and those at which the curve is not smooth."""
+    def _initial_edges(self) -> Array:
+        """The first and the last phase angle, and those at which panels must begin."""
         places = self.functions.between(self.functions.breaks, self.a, self.b)
-        inside = [self.anomaly_of(*self.offsets(place)) for place in (*places, *self.hints)]
+        inside = [self.phase_angle_of(*self.offsets(place)) for place in (*places, *self.panel_breaks)]
         return np.array(sorted({0.0, *(phi for phi in inside if 0.0 < phi < self.stop), self.stop}))
 
     @property
     def edges(self) -> Array:
-        """Panel edges in the anomaly."""
+        """The phase angles of the panels' edges."""
         edges: Array = self.panels[0]
         return edges
 
     @property
     def duration(self) -> float:
-        """Time from one end to the other."""
-        return self.whole[0] if self.known is None else self.known
+        """Time in s from one end to the other."""
+        return self.total_time[0] if self.known_duration is None else self.known_duration
 
     @property
-    def whole(self) -> tuple[float, float]:
-        """The same as two doubles, as its clock shows it."""
-        if self._clock is None:  # not asked for yet
+    def total_time(self) -> tuple[float, float]:
+        """The time in s from one end to the other as two doubles, as its panels have it."""
+        if self._edge_times is None:
             return float(self.panels[1][-1]), 0.0
-        return float(self._clock[0][-1]), float(self._clock[1][-1])
+        return float(self._edge_times[0][-1]), float(self._edge_times[1][-1])
 
     @property
     def length(self) -> float:
-        """Arc length from one end to the other."""
+        """Arc length in m from one end to the other."""
         return float(self.panels[2][-1])
 
     @property
@@ -189,47 +206,50 @@ class Segment:
         """Estimated relative error of the duration by quadrature."""
         return float(self.panels[5])
 
-    def clock_error(self, phi: Array) -> Array:
-        """Estimated error of its clock at anomalies: of the whole time, or of the panel's where its edges are exact."""
-        error = self.relative_error + ULP + TIMED
+    def time_error(self, phi: Array) -> Array:
+        """Estimated error in s of its times at phase angles.
+
+        It is a share of the whole duration, or of the panel's where the times of its edges are exact.
+        """
+        error = self.relative_error + ULP + MAX_TIME_ERROR
         which = np.clip(np.searchsorted(self.edges, phi, side="right") - 1, 0, len(self.edges) - 2)
-        times = self.clock[0]
-        if self._is_timed:
+        times = self.edge_times[0]
+        if self._has_given_times:
             spans: Array = np.diff(times)[which]
-        elif self.kind == TO_EQUILIBRIUM:  # how far it goes on was a matter of choice
+        elif self.kind == TO_EQUILIBRIUM:  # its end is arbitrary
             spans = times[which + 1]
         else:
             spans = np.full_like(phi, self.duration)
         return error * spans
 
     def inversion_error(self, phi: Array) -> Array:
-        """Estimated error of the table at anomalies, in the curve's parameter, rounding included."""
+        """Estimated error of places by the table at phase angles, in units of the curve parameter, with rounding."""
         ends = self.table[3].sum(axis=1)
         errors = self.table[6][np.clip(np.searchsorted(ends, phi), 0, len(ends) - 1)]
         width = abs(self.width)
         if self.kind == TO_EQUILIBRIUM:
-            left: Array = width * np.exp(-phi) * (errors + 3.0 * ULP * np.maximum(phi, 1.0))
-            return left
-        swing = {TURN_TURN: 0.5, FROM_TURN: 2.0, REGULAR: 1.0}[self.kind]  # dlam/dphi at most, in widths
-        moved: Array = width * (swing * errors + 3.0 * ULP)
-        return moved
+            near_equilibrium: Array = width * np.exp(-phi) * (errors + 3.0 * ULP * np.maximum(phi, 1.0))
+            return near_equilibrium
+        max_slope = {TURN_TURN: 0.5, FROM_TURN: 2.0, REGULAR: 1.0}[self.kind]  # of lam(phi), in widths
+        bounded: Array = width * (max_slope * errors + 3.0 * ULP)
+        return bounded
 
     @property
     def balance(self) -> float:
-        """How much of V**2's regular factor is left where most of it cancels: this stretch's conditioning."""
+        """The least value of the regular factor of V**2 as a share of its terms: how much cancellation leaves of it."""
         return float(self.panels[6])
 
-    def _off_launch(self) -> float:
-        """What V**2 at the double nearest to the launch place has over that at the launch place itself."""
+    def _v2_correction(self) -> float:
+        """How much larger V**2 is at the double nearest to the launch place than at the launch place itself."""
         f = self.functions
         if f.exact is None or self.kind != REGULAR or self.ref != f.exact.lam0.value:
             return 0.0
-        return off_launch(f.addresses, f.p, f.exact.lam0)
+        return v2_correction(f.addresses, f.p, f.exact.lam0)
 
-    def _magnified(self) -> float:
+    def _launch_condition_number(self) -> float:
         f, ref = self.functions, self.a if self.kind == FROM_TURN else self.ref
         one_sided = self.kind in (FROM_TURN, REGULAR)
-        return magnified(f.addresses, f.p, self.a, self.b, ref, self.w) if one_sided else 1.0
+        return launch_condition_number(f.addresses, f.p, self.a, self.b, ref, self.ref_v2) if one_sided else 1.0
 
     @property
     def direction(self) -> int:
@@ -238,93 +258,98 @@ class Segment:
 
     @property
     def width(self) -> float:
-        """The change of the parameter from end to end: of exact ends where those in doubles are one place."""
+        """The change of the curve parameter from ``a`` to ``b``.
+
+        It is that of the ends in extended precision if both are the same double.
+        """
         if self.a == self.b and self.ends[0] is not None:
             return float(self.ends[1] - self.ends[0])
-        return (self.b - self.a) + (self.lows[1] - self.lows[0])
+        return (self.b - self.a) + (self.low_parts[1] - self.low_parts[0])
 
     def offsets(self, place: float, low: float = 0.0) -> tuple[float, float]:
-        """A place's signed distances from the end ``a`` and to the end ``b``; the double next to an end is that end."""
+        """The signed distances of place + low from ``a`` and to ``b``; the double of an end means that end."""
         if low == 0.0 and place in (self.a, self.b):
             return (0.0, self.width) if place == self.a else (self.width, 0.0)
-        return (place - self.a) + (low - self.lows[0]), (self.b - place) + (self.lows[1] - low)
+        return (place - self.a) + (low - self.low_parts[0]), (self.b - place) + (self.low_parts[1] - low)
 
     def _is_short(self, share: float) -> bool:
         return abs(self.b - self.a) <= share * max(abs(self.a), abs(self.b))
 
     @property
     def table(self) -> Any:
-        """The anomaly over time, tabulated when first asked for."""
+        """The phase angle as a function of time, tabulated when it is first needed (MATHS, section 5)."""
         if self._table is None:
-            self._table = build_table(self.panels[0], *self.clock, self.panels[3])
+            self._table = build_table(self.panels[0], *self.edge_times, self.panels[3])
         return self._table
 
-    def anomaly(self, t: Array, t_low: Array) -> Array:
-        """The anomaly at times ``t + t_low`` from the end ``a``; exactly the first and the last one at both ends."""
-        phi: Array = anomalies(*self.table[:6], t, t_low)
-        whole = self.whole
+    def phase_angle(self, t: Array, t_low: Array) -> Array:
+        """The phase angle at times t + t_low in s from the end ``a``; at both ends it is exact."""
+        phi: Array = phase_angles(*self.table[:6], t, t_low)
+        total_time = self.total_time
         phi[t + t_low <= 0.0] = 0.0
-        phi[(t - whole[0]) + (t_low - whole[1]) >= 0.0] = self.edges[-1]
+        phi[(t - total_time[0]) + (t_low - total_time[1]) >= 0.0] = self.edges[-1]
         return phi
 
-    def anomaly_of(self, offset_a: float, offset_b: float) -> float:
-        """The anomaly of a place given by its signed offsets ``lam - a`` and ``b - lam``."""
+    def phase_angle_of(self, offset_a: float, offset_b: float) -> float:
+        """The phase angle of a place, which is given by its signed distances ``lam - a`` and ``b - lam``."""
         ahead, behind = max(offset_a * self.direction, 0.0), max(offset_b * self.direction, 0.0)
-        return phase_angle_of(self.kind, self.slack, ahead, behind, abs(self.width))
+        return phase_angle_of(self.kind, self.turn_offset, ahead, behind, abs(self.width))
 
     def places(self, phi: Array) -> Array:
-        """The curve's parameter at anomalies, from the nearer end."""
-        return places_at(self.kind, self.slack, (self.a, self.lows[0]), (self.b, self.lows[1]), self.width, phi)
+        """The curve parameter at phase angles, computed from the nearer end."""
+        return places_at(
+            self.kind, self.turn_offset, (self.a, self.low_parts[0]), (self.b, self.low_parts[1]), self.width, phi
+        )
 
     def speeds(self, phi: Array) -> Array:
-        """|ds/dt| at anomalies."""
+        """|ds/dt| in m/s at phase angles."""
         f = self.functions
-        if self.from_exact:
-            return self._paced(phi)
+        if self.from_multiprecision:
+            return self._speeds_from_panels(phi)
         if self.v2 is not None:
             along: Array = speeds_along(self.a, self.b, self.v2, phi)
             return along
-        if self.paces is not None:
-            last, terms = self.paces
+        if self.speed_series is not None:
+            last, terms = self.speed_series
             smooth: Array = read_off_many(self.edges, np.zeros_like(self.edges), terms, phi)
-            return smooth * (last * (phi + self.slack)) if self.kind == FROM_TURN else smooth
-        speeds: Array = speeds_at(f.addresses, f.p, self.kind, self.a, self.b, self.ref, self.w, phi)
-        return speeds * self.spread
+            return smooth * (last * (phi + self.turn_offset)) if self.kind == FROM_TURN else smooth
+        speeds: Array = speeds_at(f.addresses, f.p, self.kind, self.a, self.b, self.ref, self.ref_v2, phi)
+        return speeds * self.width_ratio
 
-    def _paced(self, phi: Array) -> Array:
-        """|ds/dt| from the panels themselves, where doubles cannot tell V**2 from nothing."""
-        paced: Array = slopes(self.edges, self.panels[4], phi) / slopes(self.edges, self.panels[3], phi)
-        return paced
+    def _speeds_from_panels(self, phi: Array) -> Array:
+        """|ds/dt| from the slopes of arc length and time, for segments on which V**2 in doubles is rounding only."""
+        speeds: Array = slopes(self.edges, self.panels[4], phi) / slopes(self.edges, self.panels[3], phi)
+        return speeds
 
     def times(self, phi: Array) -> Array:
-        """Time from the end ``a`` to anomalies."""
-        times: Array = read_off_many(self.panels[0], self.clock[0], self.panels[3], phi)
+        """Time in s from the end ``a`` to phase angles."""
+        times: Array = read_off_many(self.panels[0], self.edge_times[0], self.panels[3], phi)
         return times
 
     def lengths(self, phi: Array) -> Array:
-        """Arc length from the end ``a`` to anomalies."""
+        """Arc length in m from the end ``a`` to phase angles."""
         lengths: Array = read_off_many(self.panels[0], self.panels[2], self.panels[4], phi)
-        return lengths * self.spread
+        return lengths * self.width_ratio
 
     @property
-    def spread(self) -> float:
-        """The exact width of a short stretch between two turning points, against that of the rounded ones."""
+    def width_ratio(self) -> float:
+        """The exact width of a short segment between two turning points, divided by that of the rounded ends."""
         exact, width = self.functions.exact, self.b - self.a
-        if exact is None or self.kind != TURN_TURN or not self._is_short(LEAST_WIDTH):
+        if exact is None or self.kind != TURN_TURN or not self._is_short(MIN_WIDTH_SHARE):
             return 1.0
-        if self._stretched is None:
+        if self._width_ratio is None:
             low, high = exact_ends(exact, DIGITS, self.kind, self.a, self.b, self.ends)
-            self._stretched = float((high - low) / width)
-        return self._stretched
+            self._width_ratio = float((high - low) / width)
+        return self._width_ratio
 
 
-def toward_equilibrium(functions: BoundFunctions, start: float, top: float, duration: float) -> Segment:
-    """A stretch from ``start`` that comes as close to an equilibrium as takes at least ``duration``."""
+def toward_equilibrium(functions: BoundFunctions, start: float, equilibrium: float, duration: float) -> Segment:
+    """A segment from ``start`` towards an equilibrium, so close to it that it takes more than ``duration`` in s."""
     stop = 8.0
     while True:
-        stretch = Segment(functions=functions, kind=TO_EQUILIBRIUM, a=start, b=top, stop=stop)
-        if stretch.duration > duration or exp(-stop) * abs(start - top) < 1e-300:
-            return stretch
+        segment = Segment(functions=functions, kind=TO_EQUILIBRIUM, a=start, b=equilibrium, stop=stop)
+        if segment.duration > duration or exp(-stop) * abs(start - equilibrium) < 1e-300:
+            return segment
         stop *= 2.0
 
 
@@ -332,15 +357,15 @@ def between_turns(
     functions: BoundFunctions,
     a: float,
     b: float,
-    known: float | None = None,
+    known_duration: float | None = None,
     ends: tuple[Any, Any] = (None, None),
 ) -> Segment:
-    """A stretch between two turning points."""
-    return Segment(functions=functions, kind=TURN_TURN, a=a, b=b, stop=pi, known=known, ends=ends)
+    """A segment between two turning points."""
+    return Segment(functions=functions, kind=TURN_TURN, a=a, b=b, stop=pi, known_duration=known_duration, ends=ends)
 
 
 def from_turn(functions: BoundFunctions, turn: float, end: float) -> Segment:
-    """A stretch from a turning point to a place where the speed is not zero."""
+    """A segment from a turning point to a place where the speed is not zero."""
     return Segment(functions=functions, kind=FROM_TURN, a=turn, b=end)
 
 
@@ -349,10 +374,19 @@ def through(
     start: float,
     end: float,
     ref: float,
-    w: float,
+    ref_v2: float,
     *,
-    known: float | None = None,
-    hints: tuple[float, ...] = (),
+    known_duration: float | None = None,
+    panel_breaks: tuple[float, ...] = (),
 ) -> Segment:
-    """A stretch without special ends; ``w`` is V**2 at ``ref``."""
-    return Segment(functions=functions, kind=REGULAR, a=start, b=end, ref=ref, w=w, known=known, hints=hints)
+    """A segment at both ends of which the speed is not zero; ``ref_v2`` is V**2 at ``ref``."""
+    return Segment(
+        functions=functions,
+        kind=REGULAR,
+        a=start,
+        b=end,
+        ref=ref,
+        ref_v2=ref_v2,
+        known_duration=known_duration,
+        panel_breaks=panel_breaks,
+    )

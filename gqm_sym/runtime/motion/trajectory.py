@@ -1,4 +1,4 @@
-"""Where a motion is at a time: segments that follow each other, repeated where the motion is periodic."""
+"""Where a motion is at a time: segments in the order of time, repeated if the motion is periodic."""
 
 from dataclasses import dataclass
 
@@ -12,27 +12,29 @@ from gqm_sym.runtime.motion.segment import Segment
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TimedSegment:
-    """A part of a stretch that is run through once.
+    """A segment, or a part of one, that the body moves through once, with its times.
 
     Attributes
     ----------
+    segment : Segment
+        The segment.
     sense : int
-        +1 where it is run from the stretch's end ``a``, -1 where towards it.
+        +1 if the body moves away from the segment's end ``a``, -1 if towards it.
     r_start, r_stop : pair of float
-        Time from the stretch's end ``a`` at the piece's start and stop, each as two doubles.
+        Time in s from the segment's end ``a`` at the start and at the stop, each as two doubles.
     phi_start, phi_stop : float
-        The anomalies there.
+        The phase angles there.
     t_start : pair of float
-        When it begins.
+        Time in s from launch at the start, as two doubles.
     s_a : float
-        Arc length of the stretch's end ``a``, from the launch.
+        Arc length in m from the launch to the segment's end ``a``.
     end : str
-        What ends it.
+        What ends it, one of `launch.kinds.LEG_ENDS`; empty where the next segment continues it.
     laps : int
-        How many times the closed curve has been run round before: places on the stretch are within one lap.
+        The number of laps of a closed curve before it; places on the segment are within one lap.
     """
 
-    stretch: Segment
+    segment: Segment
     sense: int
     r_start: Pair
     r_stop: Pair
@@ -45,80 +47,84 @@ class TimedSegment:
 
     @property
     def t_stop(self) -> Pair:
-        """When it ends."""
+        """Time in s from launch at the stop, as two doubles."""
         spent = minus(self.r_stop, self.r_start)
         return plus(self.t_start, (self.sense * spent[0], self.sense * spent[1]))
 
     @property
     def direction(self) -> int:
         """The sign of ds/dt."""
-        return self.sense * self.stretch.direction
+        return self.sense * self.segment.direction
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Trajectory:
-    """Pieces in the order of time.
+    """The timed segments of a motion.
 
     Attributes
     ----------
-    pieces : tuple of Piece
+    segments : tuple of TimedSegment
+        The segments in the order of time.
     period : pair of float or None
-        After which they repeat.
+        The time in s after which they repeat, as two doubles; None if they do not.
     lap, lap_length : float
-        By how much the parameter and the arc length grow in a period (circulation).
-    pace : float
-        Relative difference of the stretches' own clocks from the exact time, where that is known.
+        The growth of the curve parameter and of the arc length (in m) in one period of a circulation, 0 otherwise.
+    time_scale_error : float
+        The relative error of the times of the segments' own quadrature, where the exact time is known.
     """
 
-    pieces: tuple[TimedSegment, ...]
+    segments: tuple[TimedSegment, ...]
     period: Pair | None = None
     lap: float = 0.0
     lap_length: float = 0.0
-    pace: float = 0.0
+    time_scale_error: float = 0.0
 
-    def reduced(self, t: Array, t_low: Array) -> tuple[Array, Array, Array]:
-        """Whole periods, and the time that is left."""
+    def reduce(self, t: Array, t_low: Array) -> tuple[Array, Array, Array]:
+        """The number of whole periods in each time, and the remaining time as two doubles."""
         if self.period is None:
             return np.zeros_like(t), t, t_low
-        count, rest, rest_low = reduce_many(t, t_low, *self.period)
-        return count, rest, rest_low
+        count, reduced, reduced_low = reduce_many(t, t_low, *self.period)
+        return count, reduced, reduced_low
 
-    def piece_of(self, rest: Array) -> np.ndarray:
-        """Which piece each reduced time falls on."""
-        starts = np.array([piece.t_start[0] for piece in self.pieces])
-        return np.clip(np.searchsorted(starts, rest, side="right") - 1, 0, len(self.pieces) - 1)
+    def segment_indices(self, reduced: Array) -> np.ndarray:
+        """The index of the segment that each reduced time falls on."""
+        starts = np.array([timed.t_start[0] for timed in self.segments])
+        return np.clip(np.searchsorted(starts, reduced, side="right") - 1, 0, len(self.segments) - 1)
 
-    def anomalies(self, piece: TimedSegment, rest: Array, rest_low: Array) -> Array:
-        """Anomalies on a piece's stretch at reduced times."""
-        s, e = two_sum.py_func(rest, -piece.t_start[0])
-        e = e + (rest_low - piece.t_start[1])
-        r, low = two_sum.py_func(piece.r_start[0], piece.sense * s)
-        low = low + (piece.r_start[1] + piece.sense * e)
-        # The table runs on the stretch's own clock, which may be a unit in the last place fast or slow.
-        low = low + r * self.pace
-        return piece.stretch.anomaly(np.ascontiguousarray(r), np.ascontiguousarray(low))
+    def phase_angles(self, timed: TimedSegment, reduced: Array, reduced_low: Array) -> Array:
+        """The phase angles on a timed segment at reduced times."""
+        s, e = two_sum.py_func(reduced, -timed.t_start[0])
+        e = e + (reduced_low - timed.t_start[1])
+        r, low = two_sum.py_func(timed.r_start[0], timed.sense * s)
+        low = low + (timed.r_start[1] + timed.sense * e)
+        # The table has the times of the segment's own quadrature, whose total may be wrong in the last place.
+        low = low + r * self.time_scale_error
+        return timed.segment.phase_angle(np.ascontiguousarray(r), np.ascontiguousarray(low))
 
 
-def libration(stretch: Segment, *, direction: int, tau: Pair, phase: Pair, phi: float) -> tuple[TimedSegment, ...]:
-    """One period between two turning points.
+def libration(
+    segment: Segment, *, direction: int, duration: Pair, phase_time: Pair, phi: float
+) -> tuple[TimedSegment, ...]:
+    """One period between two turning points, from the launch.
 
-    ``phase`` is the time from the end ``a`` to the launch place, whose anomaly is ``phi``.
+    ``duration`` is the half period, and ``phase_time`` the time from the end ``a`` to the launch place, whose phase
+    angle is ``phi``.
     """
-    a, b, launch = (ZERO, 0.0), (tau, stretch.stop), (phase, phi)
+    a, b, launch = (ZERO, 0.0), (duration, segment.stop), (phase_time, phi)
     first, second = (a, b) if direction > 0 else (b, a)
-    cuts = [
+    runs = [
         (direction, launch, second, "turn"),
         (-direction, second, first, "turn"),
         (direction, first, launch, "horizon"),
     ]
-    s_a = -float(stretch.lengths(np.array([phi]))[0])
-    pieces: list[TimedSegment] = []
+    s_a = -float(segment.lengths(np.array([phi]))[0])
+    segments: list[TimedSegment] = []
     t = ZERO
-    for sense, (start, phi_start), (stop, phi_stop), end in cuts:
+    for sense, (start, phi_start), (stop, phi_stop), end in runs:
         if start == stop:
             continue
-        piece = TimedSegment(
-            stretch=stretch,
+        timed = TimedSegment(
+            segment=segment,
             sense=sense,
             r_start=start,
             r_stop=stop,
@@ -128,53 +134,65 @@ def libration(stretch: Segment, *, direction: int, tau: Pair, phase: Pair, phi: 
             s_a=s_a,
             end=end,
         )
-        pieces.append(piece)
-        t = piece.t_stop
-    return tuple(pieces)
+        segments.append(timed)
+        t = timed.t_stop
+    return tuple(segments)
 
 
 @dataclass(frozen=True, slots=True)
 class PhasePoints:
-    """Where a motion is at times: which of them fall on a piece, and the anomalies of its stretch there."""
+    """Where a motion is at given times.
 
-    pieces: tuple[tuple[TimedSegment, NDArray[np.bool_], Array], ...]
+    Attributes
+    ----------
+    segments : tuple
+        For each timed segment that times fall on: the segment, which of the times these are, and the phase angles.
+    at_launch : array of bool
+        Which times are those of the launch, or of a return to it after whole periods.
+    laps : array
+        The number of laps at each time.
+    trajectory : Trajectory
+        The trajectory that the segments are of.
+    """
+
+    segments: tuple[tuple[TimedSegment, NDArray[np.bool_], Array], ...]
     at_launch: NDArray[np.bool_]
     laps: Array
-    course: Trajectory
+    trajectory: Trajectory
 
     def places(self, launch: float) -> Array:
-        """The parameter within the lap; exactly the launch place at launch."""
+        """The curve parameter within the lap; at launch it is exactly the launch place."""
         lam = np.full_like(self.laps, launch)
-        for piece, mask, phi in self.pieces:
-            lam[mask] = piece.stretch.places(phi)
+        for timed, mask, phi in self.segments:
+            lam[mask] = timed.segment.places(phi)
         lam[self.at_launch] = launch
         return lam
 
     def arc_lengths(self) -> Array:
-        """Arc length from the launch, within the lap."""
+        """Arc length in m from the launch, within the lap."""
         s = np.zeros_like(self.laps)
-        for piece, mask, phi in self.pieces:
-            s[mask] = piece.s_a + piece.stretch.direction * piece.stretch.lengths(phi)
+        for timed, mask, phi in self.segments:
+            s[mask] = timed.s_a + timed.segment.direction * timed.segment.lengths(phi)
         s[self.at_launch] = 0.0
         return s
 
     def velocities(self, launch: float) -> Array:
-        """ds/dt; exactly that of the launch at launch."""
+        """ds/dt in m/s; at launch it is exactly that of the launch."""
         v = np.zeros_like(self.laps)
-        for piece, mask, phi in self.pieces:
-            v[mask] = piece.direction * piece.stretch.speeds(phi)
+        for timed, mask, phi in self.segments:
+            v[mask] = timed.direction * timed.segment.speeds(phi)
         v[self.at_launch] = launch
         return v
 
 
-def locate(course: Trajectory, t: Array, t_low: Array) -> PhasePoints:
-    """Where on a course times fall."""
-    laps, rest, rest_low = course.reduced(t, t_low)
-    which = course.piece_of(rest)
-    pieces = []
+def locate(trajectory: Trajectory, t: Array, t_low: Array) -> PhasePoints:
+    """The segments and phase angles that times fall on; a time is t + t_low."""
+    laps, reduced, reduced_low = trajectory.reduce(t, t_low)
+    which = trajectory.segment_indices(reduced)
+    segments = []
     for k in np.unique(which):
-        piece, mask = course.pieces[k], which == k
-        laps[mask] += piece.laps
-        phi = course.anomalies(piece, rest[mask], rest_low[mask])
-        pieces.append((piece, mask, np.clip(phi, 0.0, piece.stretch.edges[-1])))
-    return PhasePoints(tuple(pieces), (rest == 0.0) & (rest_low == 0.0), laps, course)
+        timed, mask = trajectory.segments[k], which == k
+        laps[mask] += timed.laps
+        phi = trajectory.phase_angles(timed, reduced[mask], reduced_low[mask])
+        segments.append((timed, mask, np.clip(phi, 0.0, timed.segment.edges[-1])))
+    return PhasePoints(tuple(segments), (reduced == 0.0) & (reduced_low == 0.0), laps, trajectory)

@@ -1,8 +1,7 @@
-"""Panels laid in extended precision, where doubles cannot tell V**2 from nothing (next to a separatrix).
+"""Panels of time and arc length laid in extended precision, where doubles cannot resolve V**2 (near a separatrix).
 
-The panels are of the same kind as those of `panels.lay`, with values right to the last bit; only their nodes are
-evaluated elsewhere.
-Speed is no concern here.
+The panels are those of `time_panels`, but the integrands at their nodes are computed with mpmath and are accurate to
+the last bit. Speed does not matter here.
 """
 
 from typing import Any
@@ -12,50 +11,91 @@ import numpy as np
 from gqm_sym.budgets import budget
 from gqm_sym.errors import SolutionError
 from gqm_sym.runtime.multiprecision.exact_problem import ExactProblem
-from gqm_sym.runtime.quadrature.integrands import FROM_TURN, TURN_TURN
 from gqm_sym.runtime.quadrature.kronrod import KRONROD_WEIGHTS, NODES
-from gqm_sym.runtime.quadrature.time_panels import CONVERGED, COUNT, DEGREE, EXHAUSTED, NOTHING, TAIL, antiderivative
+from gqm_sym.runtime.quadrature.substitution import FROM_TURN, TURN_TURN
+from gqm_sym.runtime.quadrature.time_panels import (
+    CONVERGED,
+    COUNT,
+    DEGREE,
+    EXHAUSTED,
+    MAX_TAIL_RATIO,
+    NEGLIGIBLE_SHARE,
+    Panels,
+    antiderivative,
+)
 
-DIGITS = 80  # a gap of 1e-30 to a barrier still leaves doubles their digits
-MOST_PANELS = 400
+# Decimal digits: enough for all digits of a double at a distance of 1e-30 from a barrier.
+DIGITS = 80
+MAX_EXACT_PANELS = 400
 
 
 def exact_ends(
     exact: ExactProblem, digits: int, kind: int, a: float, b: float, known: tuple[Any, Any]
 ) -> tuple[Any, Any]:
-    """The ends of a stretch in extended precision; the launch place is kept as it was given."""
+    """Return the ends of a segment in extended precision.
+
+    Parameters
+    ----------
+    exact : ExactProblem
+        The launch.
+    digits : int
+        Decimal digits.
+    kind : int
+        The segment's kind (`substitution`).
+    a, b : float
+        Its ends as doubles. An end that is the launch place is taken as it was given.
+    known : pair
+        Its ends in extended precision, or None where they are not known.
+    """
     scale = exact.at(digits)
     turns = {TURN_TURN: (True, True), FROM_TURN: (True, False)}.get(kind, (False, False))
     out = []
-    for place, turn, given in zip((a, b), turns, known, strict=True):
-        if place == exact.lam0.value and not (turn and exact.v0.value):
+    for place, is_turn, more in zip((a, b), turns, known, strict=True):
+        if place == exact.lam0.value and not (is_turn and exact.v0.value):
             out.append(scale.lam0)
-        elif turn:
-            out.append(scale.turning_point(place if given is None else given))
+        elif is_turn:
+            out.append(scale.turning_point(place if more is None else more))
         else:
-            out.append(scale.mpf(place if given is None else given))
+            out.append(scale.mpf(place if more is None else more))
     return out[0], out[1]
 
 
 @budget("quadrature", 60.0, "launch a little farther from the equilibrium")
-def lay_exactly(exact: ExactProblem, kind: int, ends: tuple[Any, Any], stop: float) -> Any:
-    """Panels as `panels.lay` returns them."""
+def lay_exactly(exact: ExactProblem, kind: int, ends: tuple[Any, Any], stop: float) -> Panels:
+    """Lay panels over a segment in extended precision.
+
+    Parameters
+    ----------
+    exact : ExactProblem
+        The launch.
+    kind : int
+        The segment's kind (`substitution`), which is not TO_EQUILIBRIUM.
+    ends : pair
+        Its ends, from `exact_ends`.
+    stop : float
+        Its last phase angle.
+
+    Raises
+    ------
+    SolutionError
+        If V**2 is not positive inside the segment.
+    """
     scale = exact.at(DIGITS)
-    rate = scale.anomaly_rate(kind, *ends)
+    rate = scale.time_rate(kind, *ends)
     nodes = np.concatenate([-NODES[:0:-1], NODES])
     weights = np.concatenate([KRONROD_WEIGHTS[:0:-1], KRONROD_WEIGHTS])
     edges, times, lengths = [0.0], [0.0], [0.0]
     time_terms, length_terms = [], []
-    # The last anomaly is pi itself, not its nearest double: at a barrier the difference takes time.
+    # The last phase angle is pi itself, not its nearest double: near a barrier, that difference takes a long time.
     end = scale.context.pi if kind == TURN_TURN else scale.mpf(stop)
-    joints = scale.anomalies(kind, *ends, scale.track.joints(*ends) or ())
+    joints = scale.phase_angles(kind, *ends, scale.track.joints(*ends) or ())
     pending = [stop, *reversed([phi for phi in joints if 0 < phi < stop])]
-    left, error, status, most = 0.0, 0.0, CONVERGED, MOST_PANELS + len(pending)
+    left, error, status, max_panels = 0.0, 0.0, CONVERGED, MAX_EXACT_PANELS + len(pending)
     while pending:
         right = pending[-1]
-        # Nodes are not rounded: next to a peak as narrow as 1e-6 that would be noise.
-        far = end if right == stop else scale.mpf(right)
-        reach, middle = (far - left) / 2, (far + left) / 2
+        # The nodes are not rounded to doubles: next to a peak of width 1e-6 that would be noise.
+        high = end if right == stop else scale.mpf(right)
+        reach, middle = (high - left) / 2, (high + left) / 2
         half = float(reach)
         values = np.empty((2, COUNT))
         for i, x in enumerate(map(float, nodes)):
@@ -63,20 +103,20 @@ def lay_exactly(exact: ExactProblem, kind: int, ends: tuple[Any, Any], stop: flo
             if duration.imag or w.imag or not (duration > 0 and w > 0):
                 raise SolutionError(
                     f"time of flight from {float(ends[0])!r} to {float(ends[1])!r}: "
-                    "V**2 is not positive inside this stretch"
+                    "V**2 is not positive inside this segment"
                 )
             values[:, i] = float(duration), float(duration * scale.sqrt(w))
         c, terms = np.empty(DEGREE + 1), np.empty((2, DEGREE))
         length_size, length_tail, _ = antiderivative(values[1], half, c, terms[1])
         size, tail, _ = antiderivative(values[0], half, c, terms[0])
-        settled = tail <= TAIL * size and length_tail <= 10.0 * TAIL * length_size
+        resolved = tail <= MAX_TAIL_RATIO * size and length_tail <= 10.0 * MAX_TAIL_RATIO * length_size
         time, length = half * (weights @ values[0]), half * (weights @ values[1])
-        settled = settled or (time <= NOTHING * times[-1] and length <= NOTHING * lengths[-1])
-        full = len(edges) + len(pending) >= most or half <= 2.0**-50 * stop
-        if not settled and not full:
+        resolved = resolved or (time <= NEGLIGIBLE_SHARE * times[-1] and length <= NEGLIGIBLE_SHARE * lengths[-1])
+        full = len(edges) + len(pending) >= max_panels or half <= 2.0**-50 * stop
+        if not resolved and not full:
             pending.append((left + right) / 2)
             continue
-        status = status if settled else EXHAUSTED
+        status = status if resolved else EXHAUSTED
         error += tail / size * float(time) if size else 0.0
         edges.append(float(right))
         times.append(times[-1] + float(time))
@@ -84,7 +124,7 @@ def lay_exactly(exact: ExactProblem, kind: int, ends: tuple[Any, Any], stop: flo
         time_terms.append(terms[0])
         length_terms.append(terms[1])
         left = pending.pop()
-    return (
+    return Panels(
         np.array(edges),
         np.array(times),
         np.array(lengths),

@@ -1,8 +1,7 @@
-"""The exact problem in extended precision: what doubles cannot decide, and digits beyond them.
+"""One launch in extended precision, for what doubles cannot decide, and for more digits than a double has.
 
-A generated module carries its formulas as plain Python over a namespace of operations. Here they are evaluated with
-mpmath
-for exactly the numbers that were given. mpmath is imported when first asked for, never with the runtime.
+A generated module contains its formulas as plain Python over a namespace of operations. Here they are evaluated with
+mpmath, for exactly the numbers that the user gave. mpmath is imported when it is first needed, not with the runtime.
 """
 
 from collections.abc import Callable, Sequence
@@ -18,22 +17,26 @@ from gqm_sym.literals.numbers import Number
 from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.multiprecision.exact_tracks import Track, TrackMaker
 from gqm_sym.runtime.multiprecision.gauss_legendre import gauss
-from gqm_sym.runtime.quadrature.integrands import FROM_TURN, REGULAR, TURN_TURN
+from gqm_sym.runtime.quadrature.substitution import FROM_TURN, REGULAR, TURN_TURN
 
 NOWHERE: Array = np.empty(0)
 
-# Precisions at which a sign is asked for, in decimal digits; what is zero to the last counts as zero.
-LADDER = (40, 80, 210)
-SPARE = 15  # digits that evaluation and cancellation may cost at each rung
+# Decimal digits with which a sign is determined, one after the other; what is zero with the last counts as zero.
+PRECISIONS = (40, 80, 210)
 
-# A stretch that took this many panels has a peak that the trapezoidal rule would need too many nodes for.
-SMOOTH_PANELS = 8
-MOST_NODES = 1 << 13  # at 34 digits; a curve that is not smooth would take them without end
+# Digits that rounding and cancellation may cost.
+GUARD_DIGITS = 15
+
+# A segment with more panels than this has a peak for which the trapezoidal rule would need too many nodes.
+MAX_SMOOTH_PANELS = 8
+
+# Nodes of the trapezoidal rule at up to 128 digits, if the curve is not smooth.
+MAX_NODES = 1 << 13
 
 
 @dataclass(frozen=True, slots=True)
 class End:
-    """Where a walk along the curve ends, exactly: ``what`` is "turn", "equilibrium" or "clear"."""
+    """What lies ahead of a place of the curve: ``what`` is "turn", "equilibrium" or "clear", ``place`` where it is."""
 
     what: str
     place: Any = None
@@ -41,9 +44,18 @@ class End:
 
 @dataclass(slots=True)
 class ExactProblem:
-    """One launch of one model, to be evaluated at any precision.
+    """One launch of one model, which can be evaluated with any precision.
 
-    ``edges`` are those of the pieces of a charted curve: each must be integrated by itself.
+    Attributes
+    ----------
+    track
+        Makes the curve with its forces at a precision.
+    edges : array
+        Edges of the pieces of a charted curve, in arc length; each piece must be integrated by itself.
+    parameters : tuple of Number
+        Run-time parameters.
+    lam0, v0 : Number
+        Launch place and speed in m/s.
     """
 
     track: TrackMaker
@@ -54,48 +66,50 @@ class ExactProblem:
     _scales: dict[int, "Arithmetic"] = field(default_factory=dict)
 
     def at(self, digits: int) -> "Arithmetic":
-        """The problem's functions at a working precision of that many decimal digits."""
+        """Return the problem at a working precision of so many decimal digits."""
         if digits not in self._scales:
             self._scales[digits] = Arithmetic(self, digits)
         return self._scales[digits]
 
     def slope_sign(self) -> int:
-        """The sign of the climb's slope at the launch place, zero included."""
-        for digits in LADDER:
+        """Return the sign of the effective potential's slope at the launch place, which may be zero."""
+        for digits in PRECISIONS:
             a = self.at(digits)
-            slope = a.climb_slope(a.lam0)
-            if abs(slope) > a.mpf(10) ** (SPARE - digits) * (1 + abs(a.climb(a.lam0))):
+            slope = a.effective_potential_slope(a.lam0)
+            if abs(slope) > a.mpf(10) ** (GUARD_DIGITS - digits) * (a.mpf(0.5) + abs(a.effective_potential(a.lam0))):
                 return 1 if slope > 0 else -1
         return 0
 
     @budget("search for turning points", 60.0, "launch a little farther from the equilibrium")
     def resolve(self, near: float, far: float, direction: int) -> End:
-        """What lies between two places that doubles cannot tell apart from an equilibrium.
+        """Decide what lies between two places that doubles cannot distinguish from an equilibrium.
 
         Parameters
         ----------
         near, far : float
-            Places on the curve with V**2 >= 0 at the first of them.
+            Places on the curve; V**2 >= 0 at the first of them.
+        direction : int
+            The sign of far - near.
         """
-        for digits in LADDER:
+        for digits in PRECISIONS:
             a = self.at(digits)
             here, there = a.track.place(near), a.track.place(far)
             top = a.equilibrium(here, there)
             if top is not None and (top - here) * direction <= 0:
-                top = None  # it lies behind
-            if top is None:  # V**2 is monotonic: its sign at the far end decides
+                top = None  # it lies behind the first place
+            if top is None:  # V**2 is monotone: its sign at the far place decides
                 w = a.speed_squared(there)
                 guess = here + (there - here) / 2
             else:
                 w = a.speed_squared(top)
-                bend = abs(a.climb_bend(top))
-                guess = top - direction * a.sqrt(2 * abs(w) / bend) if bend else here
-            lost = a.mpf(10) ** (2 * SPARE - digits) * a.size
-            # A launch that slow turns where heights cancel to fewer digits than doubles have.
-            if abs(w) <= lost or (0 < a.w0 <= lost and digits < LADDER[-1]):
+                curvature = abs(a.potential_curvature(top))
+                guess = top - direction * a.sqrt(abs(w) / curvature) if curvature else here
+            lost = a.mpf(10) ** (2 * GUARD_DIGITS - digits) * a.size
+            # A launch this slow turns where the potential cancels to fewer digits than a double has.
+            if abs(w) <= lost or (0 < a.w0 <= lost and digits < PRECISIONS[-1]):
                 continue
             if w > 0 and top is not None and a.speed_squared(there) < 0:
-                guess, w = there, -w  # a bottom, and a wall behind it
+                guess, w = there, -w  # a minimum of the potential, and a turning point behind it
             if w > 0:
                 return End("clear")
             return End("turn", a.turning_point(guess))
@@ -104,7 +118,21 @@ class ExactProblem:
 
 @dataclass(slots=True)
 class Arithmetic:
-    """An exact problem at one precision."""
+    """A launch at one precision.
+
+    Attributes
+    ----------
+    context
+        An mpmath context.
+    track : Track
+        The curve with its forces.
+    lam0, w0
+        The launch place, and V**2 there.
+    base
+        The effective potential at the launch place.
+    size
+        The size of V**2 and of the effective potential, against which rounding is judged.
+    """
 
     problem: ExactProblem
     digits: int
@@ -124,56 +152,56 @@ class Arithmetic:
         self.track = self.problem.track(self.context, values)
         self.lam0 = self.track.lam0
         self.w0 = self.problem.v0.at(self.context) ** 2
-        self.base = self.climb(self.lam0)
-        self.size = self.w0 + abs(self.base) + abs(self.climb(self.track.elsewhere()) - self.base)
+        self.base = self.effective_potential(self.lam0)
+        self.size = self.w0 + 2 * abs(self.base) + 2 * abs(self.effective_potential(self.track.elsewhere()) - self.base)
 
     def mpf(self, value: Any) -> Any:
-        """A number of this precision."""
+        """Return a number of this precision."""
         return self.context.mpf(value)
 
     def sqrt(self, value: Any) -> Any:
-        """Square root."""
+        """Return the square root."""
         return self.context.sqrt(value)
 
-    def climb(self, lam: Any) -> Any:
-        """What V**2 loses in climbing to a place, up to a constant."""
+    def effective_potential(self, lam: Any) -> Any:
+        """Return U = Phi/(1 + beta) per unit mass, so that V**2 + 2*U is constant."""
         spend()
-        return self.track.climb(lam)
+        return self.track.effective_potential(lam)
 
-    def climb_slope(self, lam: Any) -> Any:
-        """Its derivative."""
+    def effective_potential_slope(self, lam: Any) -> Any:
+        """Return its derivative by lam."""
         spend()
-        return self.track.climb_slope(lam)
+        return self.track.effective_potential_slope(lam)
 
-    def climb_bend(self, lam: Any) -> Any:
-        """Second derivative of the climb, to about half of the digits."""
+    def potential_curvature(self, lam: Any) -> Any:
+        """Return its second derivative by lam, to about half of the digits."""
         h = self.mpf(10) ** (-(self.digits // 3))
-        return (self.climb_slope(lam + h) - self.climb_slope(lam - h)) / (2 * h)
+        return (self.effective_potential_slope(lam + h) - self.effective_potential_slope(lam - h)) / (2 * h)
 
     def ds(self, lam: Any) -> Any:
-        """ds/dlam."""
+        """Return ds/dlam."""
         return self.track.ds(lam)
 
     def speed_squared(self, lam: Any) -> Any:
-        """V**2, by subtraction."""
-        return self.w0 + self.base - self.climb(lam)
+        """Return V**2, by subtraction."""
+        return self.w0 + 2 * self.base - 2 * self.effective_potential(lam)
 
     def equilibrium(self, near: Any, far: Any) -> Any | None:
-        """The zero of the climb's slope next to two places, or None if there is none."""
+        """Return the zero of the effective potential's slope near two places, or None if there is none."""
         y, width = far, abs(far - near)
         tolerance = self.mpf(10) ** (-(self.digits // 2))
         for _ in range(60):
-            slope = self.climb_slope(y)
+            slope = self.effective_potential_slope(y)
             if slope == 0:
                 return y
             first, second = (
-                self.context.diff(self.climb_slope, y, 1),
-                self.context.diff(self.climb_slope, y, 2),
+                self.context.diff(self.effective_potential_slope, y, 1),
+                self.context.diff(self.effective_potential_slope, y, 2),
             )
             below = first**2 - slope * second
             if below == 0:
                 return None
-            step = slope * first / below  # Schroeder's: quadratic at a flat top as well
+            step = slope * first / below  # Schroeder's method: quadratic at a flat maximum as well
             y -= step
             if abs(y - near) > 1000 * width + abs(far) * self.mpf(10) ** -6:
                 return None
@@ -182,21 +210,23 @@ class Arithmetic:
         return None
 
     def turning_point(self, guess: Any) -> Any:
-        """The zero of V**2 that Newton's method reaches from ``guess``."""
+        """Return the zero of V**2 that Newton's method reaches from ``guess``."""
         x = self.mpf(guess)
-        tolerance = self.mpf(10) ** (-(self.digits // 2))  # quadratic: the step that is this small leaves rounding only
+        tolerance = self.mpf(10) ** (
+            -(self.digits // 2)
+        )  # convergence is quadratic: after such a step only rounding remains
         for _ in range(100):
-            slope = self.climb_slope(x)
+            slope = 2 * self.effective_potential_slope(x)
             if slope == 0:
                 break
             step = self.speed_squared(x) / slope
             x += step
             if abs(step) <= tolerance * (abs(x) + abs(x - self.lam0)):
                 return x
-        raise SolutionError(f"turning point near {float(guess)!r}: extended precision does not settle on it")
+        raise SolutionError(f"turning point near {float(guess)!r}: extended precision does not converge to it")
 
-    def anomaly_rate(self, kind: int, a: Any, b: Any) -> Callable[[Any], tuple[Any, Any]]:
-        """dt/dphi and V**2 along a stretch, as `panels` has them, by subtraction at the working precision."""
+    def time_rate(self, kind: int, a: Any, b: Any) -> Callable[[Any], tuple[Any, Any]]:
+        """Return a function of phi that gives dt/dphi and V**2 on a segment, by subtraction."""
         context = self.context
 
         def turn_turn(phi: Any) -> tuple[Any, Any]:
@@ -204,9 +234,9 @@ class Arithmetic:
             left, right = (b - a) * s**2, (b - a) * c**2
             lam = a + left
             if s == 0:
-                w, q = self.mpf(0), -self.climb_slope(a) / (b - a)
+                w, q = self.mpf(0), -2 * self.effective_potential_slope(a) / (b - a)
             elif phi == context.pi:
-                w, q = self.mpf(0), self.climb_slope(b) / (b - a)
+                w, q = self.mpf(0), 2 * self.effective_potential_slope(b) / (b - a)
             else:
                 w = self.speed_squared(lam)
                 q = w / (left * right)
@@ -225,29 +255,30 @@ class Arithmetic:
         return {TURN_TURN: turn_turn, FROM_TURN: from_turn, REGULAR: regular}[kind]
 
     def trapezoid(self, rate: Callable[[Any], tuple[Any, Any]], stop: Any, digits: int) -> Any | None:
-        """The integral over [0, stop] of a rate that is smooth and periodic (or even about both ends).
+        """Integrate over [0, stop] a function that is smooth and periodic, or even about both ends.
 
-        Halving the spacing squares the error, so the next-to-last difference bounds it; None if the nodes run out.
+        Halving the spacing squares the error, so the last but one difference bounds it. The result is None if too many
+        nodes would be needed.
         """
         n = 16
         total = (rate(self.mpf(0))[0] + rate(stop)[0]) / 2 + sum(rate(stop * k / n)[0] for k in range(1, n))
         value, before = total * stop / n, None
-        while n < max(MOST_NODES, 64 * digits):
+        while n < max(MAX_NODES, 64 * digits):
             total += sum(rate(stop * (2 * k + 1) / (2 * n))[0] for k in range(n))
             n *= 2
             new = total * stop / n
             change = abs(new - value)
             value = new
             if before is not None:
-                # Where it falls geometrically, the next change is at most this one times their ratio.
+                # If the changes fall geometrically, the next one is at most this one times their ratio.
                 ratio = change / before if change < before / 1000 else 1
                 if change * ratio <= abs(value) * self.mpf(10) ** (-digits - 2):
                     return value
             before = change
         return None
 
-    def anomalies(self, kind: int, a: Any, b: Any, places: Sequence[Any]) -> list[Any]:
-        """The anomalies of places on a stretch from a to b."""
+    def phase_angles(self, kind: int, a: Any, b: Any, places: Sequence[Any]) -> list[Any]:
+        """Return the phase angles of places on a segment from a to b (`substitution`)."""
         c = self.context
         shares = [(place - a) / (b - a) for place in places]
         if kind == TURN_TURN:
@@ -255,12 +286,19 @@ class Arithmetic:
         return [c.sqrt(share) for share in shares] if kind == FROM_TURN else shares
 
     def gauss(self, kind: int, a: Any, b: Any, edges: Sequence[Any], digits: int) -> list[Any]:
-        """Time over each panel of those that resolved its rate in doubles, by Gauss-Legendre rules.
+        """Return the time on each panel by Gauss-Legendre rules.
 
-        At joints of the curve the panels are parted.
+        Parameters
+        ----------
+        kind, a, b
+            The segment.
+        edges : sequence
+            Phase angles at the edges of the panels. A panel is divided at joints of the curve.
+        digits : int
+            Decimal digits of the result.
         """
-        rate = self.anomaly_rate(kind, a, b)
-        joints = self.anomalies(kind, a, b, self.track.joints(a, b) or ())
+        rate = self.time_rate(kind, a, b)
+        joints = self.phase_angles(kind, a, b, self.track.joints(a, b) or ())
         parts = []
         for left, right in pairwise(edges):
             cuts = [left, *(phi for phi in joints if left < phi < right), right]
@@ -269,6 +307,6 @@ class Arithmetic:
 
 
 def two_doubles(value: Any) -> tuple[float, float]:
-    """A number of extended precision as an unevaluated sum of two doubles."""
+    """Return a number of extended precision as two doubles, whose sum it is."""
     high = float(value)
     return high, float(value - high)

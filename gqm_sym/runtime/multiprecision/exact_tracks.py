@@ -1,4 +1,4 @@
-"""Where a place is and what the climb is there, in extended precision: what the exact problem asks of a curve."""
+"""A curve with its forces in extended precision: the effective potential and ds/dlam at a place."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -13,32 +13,32 @@ class Track(Protocol):
 
     @property
     def lam0(self) -> Any:
-        """The launch place."""
+        """Return the launch place."""
 
     def place(self, lam: float) -> Any:
-        """The place that a double stands for."""
+        """Return the place that a double stands for."""
 
-    def climb(self, lam: Any) -> Any:
-        """What V**2 loses in climbing to a place, up to a constant."""
+    def effective_potential(self, lam: Any) -> Any:
+        """Return U = Phi/(1 + beta) per unit mass, so that V**2 + 2*U is constant."""
 
-    def climb_slope(self, lam: Any) -> Any:
-        """Its derivative."""
+    def effective_potential_slope(self, lam: Any) -> Any:
+        """Return its derivative by lam."""
 
     def ds(self, lam: Any) -> Any:
-        """ds/dlam."""
+        """Return ds/dlam."""
 
     def period(self) -> Any:
-        """The period of the places of a closed curve."""
+        """Return the period of lam on a closed curve."""
 
     def elsewhere(self) -> Any:
-        """A place away from the launch: the climb there tells its size."""
+        """Return a place away from the launch, where the size of the effective potential is taken."""
 
     def joints(self, low: Any, high: Any) -> Sequence[Any] | None:
-        """Places between two, in their order, at which the curve is not analytic; None where there can be none."""
+        """Return the places between two others at which the curve is not analytic; None if there are none anywhere."""
 
 
 TrackMaker = Callable[[Any, tuple[Any, ...]], Track]
-"""From an mpmath context and the run-time parameters in it."""
+"""A function of an mpmath context and of the run-time parameters in it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,33 +53,33 @@ class FormulaTrack:
 
     @property
     def lam0(self) -> Any:
-        """The launch place."""
+        """Return the launch place."""
         return self.launch.at(self.context)
 
     def place(self, lam: float) -> Any:
-        """The place that a double stands for: just that."""
+        """Return the number that a double is."""
         return self.context.mpf(lam)
 
-    def climb(self, lam: Any) -> Any:
-        """What V**2 loses in climbing to a place, up to a constant."""
-        return self.formulas.climb(self.context, lam, self.values)
+    def effective_potential(self, lam: Any) -> Any:
+        """Return U = Phi/(1 + beta) per unit mass, so that V**2 + 2*U is constant."""
+        return self.formulas.effective_potential(self.context, lam, self.values)
 
-    def climb_slope(self, lam: Any) -> Any:
-        """Its derivative."""
-        return self.formulas.climb_slope(self.context, lam, self.values)
+    def effective_potential_slope(self, lam: Any) -> Any:
+        """Return its derivative by lam."""
+        return self.formulas.effective_potential_slope(self.context, lam, self.values)
 
     def ds(self, lam: Any) -> Any:
-        """ds/dlam."""
+        """Return ds/dlam."""
         return self.formulas.ds(self.context, lam, self.values)
 
     def period(self) -> Any:
-        """The period of the parameter of a closed curve."""
+        """Return the period of lam on a closed curve."""
         return self.domain(self.context, self.values)[2]
 
     def elsewhere(self) -> Any:
-        """One unit of the parameter away."""
+        """Return a place at a distance of one unit of the parameter."""
         return self.lam0 + 1
 
     def joints(self, low: Any, high: Any) -> None:
-        """Formulas are analytic."""
+        """Return None: formulas are analytic."""
         return

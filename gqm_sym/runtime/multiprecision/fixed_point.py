@@ -1,4 +1,4 @@
-"""Polynomials in extended precision, evaluated in whole numbers: that costs a tenth of mpmath's arithmetic."""
+"""Polynomials in extended precision, evaluated in integers, which takes a tenth of the time of mpmath's floats."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -7,9 +7,16 @@ GUARD_BITS = 30
 
 
 class Polynomials:
-    """Some polynomials of one argument of size 1 or so, by their powers, with two derivatives.
+    """Polynomials of one argument of size about 1, with two derivatives.
 
-    Whatever the working precision is, they are evaluated to it: mpmath raises it to differentiate.
+    They are evaluated with the context's current precision, which mpmath raises while it differentiates.
+
+    Parameters
+    ----------
+    context
+        An mpmath context.
+    rows : sequence of sequences
+        Coefficients of each polynomial, lowest power first.
     """
 
     def __init__(self, context: Any, rows: Sequence[Sequence[Any]]) -> None:
@@ -25,7 +32,7 @@ class Polynomials:
         ]
 
     def __call__(self, at: Any) -> list[tuple[Any, Any, Any]]:
-        """Value and first two derivatives of each."""
+        """Return the value and the first two derivatives of each polynomial."""
         context = self._context
         if context.prec + GUARD_BITS != self._bits:
             self._fix(context.prec + GUARD_BITS)

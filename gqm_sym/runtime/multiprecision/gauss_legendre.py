@@ -1,4 +1,4 @@
-"""Gauss-Legendre quadrature in extended precision, by as many nodes as each panel needs."""
+"""Gauss-Legendre quadrature in extended precision, with as many nodes as each panel needs."""
 
 from collections.abc import Callable, Sequence
 from functools import lru_cache
@@ -8,53 +8,53 @@ from typing import Any
 
 from gqm_sym.errors import SolutionError
 
-# Nodes to begin with, and of the smallest rule.
-FIRST, FEWEST = 20, 8
+# Nodes of the first rule, and of the smallest one.
+FIRST_NODES, MIN_NODES = 20, 8
 
-# Halvings of a panel; what is not smooth after so many is not analytic.
-MOST_HALVINGS = 40
+# A function that is not resolved after so many halvings of a panel is not analytic.
+MAX_HALVINGS = 40
 
 
 def gauss(context: Any, rate: Callable[[Any], Any], edges: Sequence[Any], digits: int) -> list[Any]:
-    """The integral over each panel between edges of a function that is analytic on it.
+    """Integrate a function over each panel between edges, on which it is analytic.
 
-    The rule with n nodes leaves about the coefficient 2n of the Legendre series, which falls geometrically: the square
-    of its coefficient n. The last two that the nodes themselves tell say whether they were enough, and how many the
-    next panel will take.
+    The error of the rule with n nodes is about the coefficient 2n of the Legendre series. The coefficients fall
+    geometrically, so this is about the square of coefficient n. The last two coefficients that the nodes give decide
+    whether the rule has converged, and how many nodes the next panel gets.
 
     Raises
     ------
     SolutionError
-        If it is not analytic, as far as can be seen.
+        If the rules do not converge.
     """
-    most = 2 * ceil(digits / 2) + 8
-    settled = context.mpf(10) ** (-(digits // 2) - 2)
-    count, parts = min(FIRST, most), []
+    max_nodes = 2 * ceil(digits / 2) + 8
+    tolerance = context.mpf(10) ** (-(digits // 2) - 2)
+    count, parts = min(FIRST_NODES, max_nodes), []
     for left, right in pairwise(edges):
         total, pending, halvings = context.mpf(0), [right], 0
         while pending:
             value, tail = _panel(context, rate, left, pending[-1], count)
-            if tail <= settled:
+            if tail <= tolerance:
                 total += value
                 left = pending.pop()
-            elif count < most:
-                count = most
+            elif count < max_nodes:
+                count = max_nodes
                 continue
-            elif halvings < MOST_HALVINGS:
+            elif halvings < MAX_HALVINGS:
                 pending.append((left + pending[-1]) / 2)
                 halvings += 1
                 continue
             else:
-                raise SolutionError("extended precision: the time of flight is not analytic where it should be")
-            # From how fast the coefficients fell, by fours: every rule has to be made.
+                raise SolutionError("extended precision: the integrand of the time of flight is not analytic")
+            # From how fast the coefficients fall; a multiple of four, because every new rule must be computed.
             fall = -float(context.log10(tail)) / count if tail else 2.0
-            count = min(max(4 * ceil((digits / 2 + 4) / fall / 4), FEWEST), most)
+            count = min(max(4 * ceil((digits / 2 + 4) / fall / 4), MIN_NODES), max_nodes)
         parts.append(total)
     return parts
 
 
 def _panel(context: Any, rate: Callable[[Any], Any], left: Any, right: Any, count: int) -> tuple[Any, Any]:
-    """The integral over one panel, and the size of its last Legendre coefficients against the first."""
+    """Return the integral over one panel, and its last two Legendre coefficients as a share of the first."""
     half, middle = (right - left) / 2, (right + left) / 2
     total = odd = even = context.mpf(0)
     for x, weight, last in legendre_rule(count, context.dps):
@@ -70,7 +70,7 @@ def _panel(context: Any, rate: Callable[[Any], Any], left: Any, right: Any, coun
 
 @lru_cache(maxsize=256)
 def legendre_rule(count: int, digits: int) -> tuple[tuple[Any, Any, Any], ...]:
-    """Positive nodes of the Gauss-Legendre rule with an even number of them, weights, and P_(count-1) there."""
+    """Return the positive nodes of a Gauss-Legendre rule of even size, its weights there, and P_(count-1) there."""
     import numpy as np
     from mpmath.ctx_mp import MPContext
 
@@ -88,6 +88,6 @@ def legendre_rule(count: int, digits: int) -> tuple[tuple[Any, Any, Any], ...]:
             step = here / slope
             x -= step
             if abs(step) <= context.mpf(10) ** -digits:
-                break  # only now: the weight needs the slope at the node itself
+                break  # slope and P_(count-1) are those at the node, up to this negligible step
         rule.append((x, 2 / ((1 - x * x) * slope**2), before))
     return tuple(rule)

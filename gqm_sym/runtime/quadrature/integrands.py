@@ -1,21 +1,13 @@
-"""The pace of time and of arc length along one stretch of the curve.
+"""Integrands of time and of arc length along one segment of the curve, and the speed there.
 
-A *stretch* is a part of the curve that is run through in one direction. Its ends decide the substitution that makes
-the integrands smooth (MATHS, section 4); the new variable is the stretch's *anomaly* ``phi``:
-
-=============== ======================================= ================================
-kind            lam                                     phi
-=============== ======================================= ================================
-TURN_TURN       a + (b-a) sin(phi/2)**2                 0 to pi
-FROM_TURN       a + (b-a) phi**2                        0 to 1
-REGULAR         a + (b-a) phi                           0 to 1
-TO_EQUILIBRIUM  b + (a-b) exp(-phi)                     0 onwards
-=============== ======================================= ================================
-
-V**2 comes from the climb, or, next to an equilibrium where forces dissipate, from a field (`fields`).
+A *segment* is a part of the curve that the body runs through in one direction. Its ends decide the substitution
+lam(phi) that makes the integrands smooth; phi is the segment's *phase angle* (`substitution`, MATHS section 4).
+V**2 is computed from divided differences of the effective potential, or, next to an equilibrium where forces dissipate,
+from polynomials in the distance (`equilibrium`).
 """
 
 from math import cos, exp, fabs, inf, sin, sqrt
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import types
@@ -26,25 +18,65 @@ from gqm_sym.runtime.compiled.calls import call_potential_divdiff1, call_potenti
 from gqm_sym.runtime.compiled.jit import Inner, entry
 from gqm_sym.runtime.compiled.types import ADDRESSES, MATRIX, REAL, VECTOR
 from gqm_sym.runtime.interface import Addresses
-from gqm_sym.runtime.quadrature.equilibrium import along
+from gqm_sym.runtime.quadrature.equilibrium import speed_and_length_factors
+from gqm_sym.runtime.quadrature.substitution import FROM_TURN, REGULAR, TO_EQUILIBRIUM, TURN_TURN
 
-# Where V**2 is a field of its own, no function of the model is called.
+# Where V**2 is given by polynomials, no function of the model is called.
 NO_FUNCTIONS = Addresses(0, 0, 0, 0, 0)
 
-TURN_TURN, FROM_TURN, REGULAR, TO_EQUILIBRIUM = range(4)
+
+class Integrand(NamedTuple):
+    """What the integrands along a segment depend on.
+
+    Attributes
+    ----------
+    fns : Addresses
+        Addresses of the model's compiled functions.
+    p : array
+        Run-time parameters.
+    kind : int
+        TURN_TURN, FROM_TURN, REGULAR or TO_EQUILIBRIUM.
+    a, b : float
+        Values of the curve parameter at both ends.
+    ref, w0 : float
+        A place and V**2 there, in (m/s)**2; used by REGULAR segments.
+    field : (n, m) array
+        V**2 next to the equilibrium ``b`` where forces dissipate (`equilibrium`), else empty.
+    """
+
+    fns: Any
+    p: Any
+    kind: Any
+    a: Any
+    b: Any
+    ref: Any
+    w0: Any
+    field: Any
 
 
 @Inner
-def rates(fns, p, kind, a, b, ref, w, field, phi, work, out):  # type: ignore[no-untyped-def]
-    """Fill ``out`` with dt/dphi and ds/dphi at each phi. ``w`` is V**2 at ``ref`` (used where no end is special)."""
+def fill_rates(integrand, phi, work, out):  # type: ignore[no-untyped-def]
+    """Fill ``out`` with dt/dphi and ds/dphi.
+
+    Parameters
+    ----------
+    phi : (n,) array
+        Phase angles.
+    work : (4, n) array
+        Work space. Afterwards its first row holds the offsets from ``a`` or ``ref``, and its third row the regular
+        factor of V**2, or the first divided difference of the effective potential (`cancellation_range`).
+    out : (2, n) array
+        dt/dphi in s, ds/dphi in m.
+    """
+    fns, p, kind, a, b, ref, w0, field = integrand
     n = phi.size
     da, db, rows = work[0, :n], work[1, :n], work[2:4, :n]
     if field.size > 0:
-        whole = fabs(b - a)
+        width = fabs(b - a)
         for i in range(n):
-            d = whole * exp(-phi[i])
-            share, ds = along(field, d)
-            out[0, i] = ds / sqrt(share)
+            d = width * exp(-phi[i])
+            factor, ds = speed_and_length_factors(field, d)
+            out[0, i] = ds / sqrt(factor)
             out[1, i] = ds * d
     elif kind == TURN_TURN:
         for i in range(n):
@@ -53,7 +85,7 @@ def rates(fns, p, kind, a, b, ref, w, field, phi, work, out):  # type: ignore[no
             db[i] = (b - a) * c * c
         call_potential_divdiff2(fns.potential_divdiff2, n, a, b, da, db, p, rows)
         for i in range(n):
-            out[0, i] = rows[1, i] / sqrt(rows[0, i])
+            out[0, i] = rows[1, i] / sqrt(2.0 * rows[0, i])
             out[1, i] = rows[1, i] * sqrt(da[i] * db[i])
     elif kind == FROM_TURN:
         for i in range(n):
@@ -62,7 +94,7 @@ def rates(fns, p, kind, a, b, ref, w, field, phi, work, out):  # type: ignore[no
         call_potential_divdiff1(fns.potential_divdiff1, n, a, db, da, p, rows)
         root = 2.0 * sqrt(fabs(b - a))
         for i in range(n):
-            fall = -rows[0, i] if b > a else rows[0, i]
+            fall = -2.0 * rows[0, i] if b > a else 2.0 * rows[0, i]
             out[0, i] = rows[1, i] * root / sqrt(fall)
             out[1, i] = rows[1, i] * 2.0 * fabs(b - a) * phi[i]
     elif kind == REGULAR:
@@ -71,7 +103,7 @@ def rates(fns, p, kind, a, b, ref, w, field, phi, work, out):  # type: ignore[no
             db[i] = ref + da[i]
         call_potential_divdiff1(fns.potential_divdiff1, n, ref, db, da, p, rows)
         for i in range(n):
-            out[0, i] = rows[1, i] * fabs(b - a) / sqrt(w - da[i] * rows[0, i])
+            out[0, i] = rows[1, i] * fabs(b - a) / sqrt(w0 - 2.0 * da[i] * rows[0, i])
             out[1, i] = rows[1, i] * fabs(b - a)
     else:
         for i in range(n):
@@ -79,20 +111,24 @@ def rates(fns, p, kind, a, b, ref, w, field, phi, work, out):  # type: ignore[no
             db[i] = -da[i]
         call_potential_divdiff2(fns.potential_divdiff2, n, b, b, da, db, p, rows)
         for i in range(n):
-            out[0, i] = rows[1, i] / sqrt(-rows[0, i])
+            out[0, i] = rows[1, i] / sqrt(-2.0 * rows[0, i])
             out[1, i] = rows[1, i] * fabs(da[i])
 
 
 @Inner
-def speeds(fns, p, kind, a, b, ref, w, field, phi, work, out):  # type: ignore[no-untyped-def]
-    """Fill ``out`` with V at each phi: no difference of heights, and exactly zero at a turning point."""
+def fill_speeds(integrand, phi, work, out):  # type: ignore[no-untyped-def]
+    """Fill ``out`` with V in m/s at each phase angle, without cancellation and exactly zero at a turning point.
+
+    ``work`` is a work space of four rows.
+    """
+    fns, p, kind, a, b, ref, w0, field = integrand
     n = phi.size
     da, db, rows = work[0, :n], work[1, :n], work[2:4, :n]
     if field.size > 0:
-        whole = fabs(b - a)
+        width = fabs(b - a)
         for i in range(n):
-            d = whole * exp(-phi[i])
-            out[i] = d * sqrt(along(field, d)[0])
+            d = width * exp(-phi[i])
+            out[i] = d * sqrt(speed_and_length_factors(field, d)[0])
     elif kind == TURN_TURN:
         for i in range(n):
             s, c = sine(0.5 * phi[i]), cosine(0.5 * phi[i])
@@ -100,14 +136,14 @@ def speeds(fns, p, kind, a, b, ref, w, field, phi, work, out):  # type: ignore[n
             db[i] = (b - a) * c * c
         call_potential_divdiff2(fns.potential_divdiff2, n, a, b, da, db, p, rows)
         for i in range(n):
-            out[i] = sqrt(da[i] * db[i] * rows[0, i])
+            out[i] = sqrt(2.0 * da[i] * db[i] * rows[0, i])
     elif kind == TO_EQUILIBRIUM:
         for i in range(n):
             da[i] = (a - b) * exp(-phi[i])
             db[i] = -da[i]
         call_potential_divdiff2(fns.potential_divdiff2, n, b, b, da, db, p, rows)
-        for i in range(n):  # V**2 may lie below the least double
-            out[i] = fabs(da[i]) * sqrt(-rows[0, i])
+        for i in range(n):  # V**2 itself may be smaller than the smallest double
+            out[i] = fabs(da[i]) * sqrt(-2.0 * rows[0, i])
     else:
         start = a if kind == FROM_TURN else ref
         for i in range(n):
@@ -115,53 +151,62 @@ def speeds(fns, p, kind, a, b, ref, w, field, phi, work, out):  # type: ignore[n
             db[i] = start + da[i]
         call_potential_divdiff1(fns.potential_divdiff1, n, start, db, da, p, rows)
         for i in range(n):
-            out[i] = sqrt(max(w - da[i] * rows[0, i], 0.0))
+            out[i] = sqrt(max(w0 - 2.0 * da[i] * rows[0, i], 0.0))
 
 
 @Inner
-def shares(kind, w, field, work, n, peak):  # type: ignore[no-untyped-def]
-    """What is left of V**2 where it cancels, over the places last filled.
+def cancellation_range(integrand, work, n, peak):  # type: ignore[no-untyped-def]
+    """How much of V**2 is lost by cancellation at the n places that `fill_rates` filled last.
 
-    Between two turning points that is its regular factor, least and largest. From where V**2 is known it is V**2
-    itself, against the largest on the way, ``peak``: a body that has been fast and is slow again passes a barrier.
+    Between two turning points this is measured by the regular factor of V**2, its smallest value against its largest.
+    Starting from a place where V**2 is known it is measured by V**2 itself against the largest V**2 so far: a body that
+    has been fast and becomes slow is passing over a barrier.
+
+    Parameters
+    ----------
+    work : (4, n) array
+        As `fill_rates` leaves it.
+    peak : float
+        The largest V**2 before these places.
 
     Returns
     -------
     low, high : float
-        Their ratio is the share that is left.
+        Their ratio is the part of V**2 that cancellation leaves.
     peak : float
-        The largest V**2 on the way up to the last place.
+        The largest V**2 up to the last place.
     """
+    kind, w0 = integrand.kind, integrand.w0
     low, high = 1.0, 1.0
-    if field.size > 0:
+    if integrand.field.size > 0:
         return low, high, peak
     if kind == TURN_TURN:
         low, high = inf, 0.0
         for i in range(n):
             low, high = min(low, work[2, i]), max(high, work[2, i])
     elif kind != TO_EQUILIBRIUM:
-        # Towards the place where V**2 is known it only grows more certain.
+        # Towards the place where V**2 is known, its relative error only falls.
         outwards = fabs(work[0, 0]) <= fabs(work[0, n - 1])
         for i in range(n):
-            lost = work[0, i] * work[2, i]
+            loss = 2.0 * work[0, i] * work[2, i]
             if outwards:
-                peak = max(peak, w - lost)
+                peak = max(peak, w0 - loss)
             if peak > 0.0 or not outwards:
-                low = min(low, (w - lost) / max(peak, w + fabs(lost)))
+                low = min(low, (w0 - loss) / max(peak, w0 + fabs(loss)))
     return low, high, peak
 
 
 @entry(VECTOR(ADDRESSES, VECTOR, types.int64, REAL, REAL, REAL, REAL, VECTOR))
-def speeds_at(fns, p, kind, a, b, ref, w, phi):  # type: ignore[no-untyped-def]
-    """V at many anomalies of a stretch."""
+def speeds_at(fns, p, kind, a, b, ref, w0, phi):  # type: ignore[no-untyped-def]
+    """V in m/s at many phase angles of a segment; the other arguments are those of `Integrand`."""
     out = np.empty(phi.size)
-    speeds(fns, p, kind, a, b, ref, w, np.empty((0, 0)), phi, np.empty((4, phi.size)), out)
+    fill_speeds(Integrand(fns, p, kind, a, b, ref, w0, np.empty((0, 0))), phi, np.empty((4, phi.size)), out)
     return out
 
 
 @entry(VECTOR(REAL, REAL, MATRIX, VECTOR))
 def speeds_along(a, b, field, phi):  # type: ignore[no-untyped-def]
-    """V at many anomalies of a stretch towards an equilibrium b where V**2 is a field."""
+    """V in m/s at many phase angles of a segment from ``a`` to an equilibrium ``b``, with V**2 from `equilibrium`."""
     out, work = np.empty(phi.size), np.empty((4, phi.size))
-    speeds(NO_FUNCTIONS, np.empty(0), TO_EQUILIBRIUM, a, b, a, 0.0, field, phi, work, out)
+    fill_speeds(Integrand(NO_FUNCTIONS, np.empty(0), TO_EQUILIBRIUM, a, b, a, 0.0, field), phi, work, out)
     return out

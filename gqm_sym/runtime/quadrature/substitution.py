@@ -1,36 +1,88 @@
-"""Between places on a stretch and its anomaly (`integrands`)."""
+"""The substitution lam(phi) between the curve parameter and the phase angle of a segment (MATHS, section 4).
+
+It depends on which ends of the segment [a, b] are special, such that dt/dphi is smooth:
+
+=============== ======================================= ================================
+kind            lam                                     phi
+=============== ======================================= ================================
+TURN_TURN       a + (b-a) sin(phi/2)**2                 0 to pi
+FROM_TURN       a + (b-a) phi**2                        0 to 1
+REGULAR         a + (b-a) phi                           0 to 1
+TO_EQUILIBRIUM  b + (a-b) exp(-phi)                     0 onwards
+=============== ======================================= ================================
+
+Three forms of it are here: for one place, for an array, and for compiled loops. `integrands` and `trapezoid` need the
+offsets of a place from both ends instead of the place, and compute them where they use them, in loops that vectorise.
+"""
 
 from math import atan2, inf, log, pi, sqrt
 
 import numpy as np
 
+from gqm_sym.runtime.arithmetic.elementary import cos, sin
+from gqm_sym.runtime.compiled.intrinsics import choose
+from gqm_sym.runtime.compiled.jit import Inlined
 from gqm_sym.runtime.compiled.types import Array
-from gqm_sym.runtime.quadrature.integrands import FROM_TURN, REGULAR, TO_EQUILIBRIUM, TURN_TURN
+
+# Kinds of segments: between turning points, from a turning point, without special ends, towards an equilibrium.
+TURN_TURN, FROM_TURN, REGULAR, TO_EQUILIBRIUM = range(4)
 
 
-def phase_angle_of(kind: int, slack: float, ahead: float, behind: float, whole: float) -> float:
-    """The anomaly of a place by its distances from both ends of a stretch, neither of them negative."""
+def phase_angle_of(kind: int, offset: float, from_a: float, to_b: float, width: float) -> float:
+    """Return the phase angle of a place.
+
+    Parameters
+    ----------
+    kind : int
+        The segment's kind.
+    offset : float
+        For a FROM_TURN segment whose turning point lies a little before ``a``: the phase angle from there to ``a``.
+    from_a, to_b : float
+        Distances from the ends of the segment, in units of the curve parameter; neither is negative.
+    width : float
+        The distance between the ends.
+    """
     if kind == TURN_TURN:
-        return 2.0 * atan2(sqrt(ahead), sqrt(behind))
+        return 2.0 * atan2(sqrt(from_a), sqrt(to_b))
     if kind == TO_EQUILIBRIUM:
-        return -log(behind / whole) if behind > 0.0 else inf
-    share = ahead / whole if ahead <= behind else 1.0 - behind / whole
+        return -log(to_b / width) if to_b > 0.0 else inf
+    share = from_a / width if from_a <= to_b else 1.0 - to_b / width
     if kind == REGULAR or share <= 0.0:
         return share
-    most = share * (1.0 + 2.0 * slack)
-    return most / (slack + sqrt(slack**2 + most))
+    scaled = share * (1.0 + 2.0 * offset)
+    return scaled / (offset + sqrt(offset**2 + scaled))
 
 
 def places_at(
-    kind: int, slack: float, start: tuple[float, float], stop: tuple[float, float], width: float, phi: Array
+    kind: int, offset: float, start: tuple[float, float], stop: tuple[float, float], width: float, phi: Array
 ) -> Array:
-    """The curve's parameter at anomalies, from the nearer end; the ends as two doubles each."""
+    """Return the curve parameter at phase angles, computed from the nearer end.
+
+    Parameters
+    ----------
+    kind, offset, width
+        As for `phase_angle_of`, but the width has the sign of b - a.
+    start, stop : (float, float)
+        Both ends, as two doubles each.
+    phi : (n,) array
+        Phase angles.
+    """
     (a, a_low), (b, b_low) = start, stop
     if kind == TURN_TURN:
-        ahead, behind = width * np.sin(0.5 * phi) ** 2, width * np.cos(0.5 * phi) ** 2
-        return np.where(phi < 0.5 * pi, a + (a_low + ahead), b - (behind - b_low))
+        from_a, to_b = width * np.sin(0.5 * phi) ** 2, width * np.cos(0.5 * phi) ** 2
+        return np.where(phi < 0.5 * pi, a + (a_low + from_a), b - (to_b - b_low))
     if kind == TO_EQUILIBRIUM:
-        away: Array = b - width * np.exp(-phi)
-        return away
-    share = phi * (phi + 2.0 * slack) / (1.0 + 2.0 * slack) if kind == FROM_TURN else phi
+        places: Array = b - width * np.exp(-phi)
+        return places
+    share = phi * (phi + 2.0 * offset) / (1.0 + 2.0 * offset) if kind == FROM_TURN else phi
     return np.where(share <= 0.5, a + (a_low + width * share), b - (width * (1.0 - share) - b_low))
+
+
+@Inlined
+def place_at(kind, a, b, phi):  # type: ignore[no-untyped-def]
+    """Return the curve parameter at one phase angle of a TURN_TURN or REGULAR segment, from the nearer end."""
+    width = b - a
+    if kind == TURN_TURN:
+        s, c = sin(0.5 * phi), cos(0.5 * phi)
+        return choose(phi < 0.5 * pi, a + width * (s * s), b - width * (c * c))
+    return choose(phi <= 0.5, a + width * phi, b - width * (1.0 - phi))

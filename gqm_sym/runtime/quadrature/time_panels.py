@@ -1,42 +1,107 @@
-"""Pass 2: adaptive Gauss-Kronrod panels for time and arc length along one stretch of the curve.
+"""Pass 2: adaptive Gauss-Kronrod panels for time and arc length along one segment of the curve.
 
-Each accepted panel keeps the Legendre coefficients of both antiderivatives, so that time and arc length can be read off
-anywhere on it.
+Each accepted panel stores the Legendre coefficients of both antiderivatives, so that time and arc length can be
+evaluated anywhere on it.
 """
 
 from math import fabs, inf, pi
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import types
 
 from gqm_sym.runtime.arithmetic.clenshaw import DECAY, GROWTH, legendre_sum
 from gqm_sym.runtime.compiled.buffers import longer, taller
-from gqm_sym.runtime.compiled.jit import Inner, entry
+from gqm_sym.runtime.compiled.jit import Inlined, Inner, entry
 from gqm_sym.runtime.compiled.types import ADDRESSES, MATRIX, REAL, VECTOR
-from gqm_sym.runtime.quadrature.integrands import NO_FUNCTIONS, REGULAR, TO_EQUILIBRIUM, TURN_TURN, rates, shares
+from gqm_sym.runtime.quadrature.integrands import NO_FUNCTIONS, Integrand, cancellation_range, fill_rates
 from gqm_sym.runtime.quadrature.kronrod import EVEN, GAUSS_WEIGHTS, KRONROD_WEIGHTS, NODES, ODD
+from gqm_sym.runtime.quadrature.substitution import REGULAR, TO_EQUILIBRIUM, TURN_TURN
 
-# How a stretch's quadrature ended.
+# Status of a segment's quadrature.
 CONVERGED, FLOOR, EXHAUSTED, FAILED, ILL_CONDITIONED = range(5)
+
+# Nodes of a panel, and coefficients of its antiderivatives.
 COUNT = 21
-DEGREE = 22  # coefficients of an antiderivative
-LONGEST = 32  # of a series in Legendre polynomials
-TAIL = 2e-15  # last Legendre coefficients against the largest: noise in them is about 5e-16
-PLATEAU = 1e-7  # coefficients that have stopped falling below this level are rounding noise, not structure
-MOST_PANELS = 4096
+DEGREE = 22
 
-# Below this balance doubles keep too few digits of V**2 to be worth laying panels on.
-HOPELESS = 1e-9
+# A panel is resolved when its last Legendre coefficients are below this share of the largest: they hold rounding noise
+# of about 5e-16.
+MAX_TAIL_RATIO = 2e-15
 
-# Below this balance the half period in doubles is off by more than a few units in the last place.
-LEAST_BALANCE = 1e-2
-LEAST_WIDTH = 2.0**-48  # of the stretch
-NOTHING = 2.0**-104  # a share of the time so far that two doubles do not hold
+# Coefficients that stop falling below this share of the largest are rounding noise, not structure.
+MAX_NOISE_RATIO = 1e-7
+
+# They have stopped falling when the last ones are at least this share of those in the middle.
+MIN_FLAT_RATIO = 0.05
+
+# Kronrod's and Gauss's value of a resolved panel differ by no more than this share.
+MAX_RULE_DIFFERENCE = 1e-6
+
+MAX_PANELS = 4096
+
+# If cancellation leaves less than this part of V**2, panels in doubles are not worth laying.
+MIN_USABLE_RATIO = 1e-9
+
+# If cancellation leaves less than this part of V**2, the half period in doubles is off by more than a few ulp.
+MIN_CANCELLATION_RATIO = 1e-2
+
+# The shortest panel, as a share of the segment.
+MIN_PANEL_SHARE = 2.0**-48
+
+# A duration below this share of the time so far does not change it, even as two doubles.
+NEGLIGIBLE_SHARE = 2.0**-104
+
+
+class Panels(NamedTuple):
+    """The panels of a segment.
+
+    Attributes
+    ----------
+    edges : (n+1,) array
+        Phase angles at the edges of the panels.
+    times, lengths : (n+1,) arrays
+        Time in s and arc length in m from the first edge to each edge.
+    time_terms, length_terms : (n, DEGREE) arrays
+        Legendre coefficients of both antiderivatives on each panel.
+    error : float
+        Estimated relative error of the whole time by quadrature, rounding included.
+    cancellation : float
+        The part of V**2 that cancellation leaves: its smallest regular factor against the largest. It is small near a
+        separatrix.
+    status : int
+        CONVERGED, FLOOR (the coefficients level off above rounding), EXHAUSTED (too many panels), FAILED (an integrand
+        is not finite) or ILL_CONDITIONED (V**2 nearly vanishes inside: panels must be laid in extended precision).
+    """
+
+    edges: Any
+    times: Any
+    lengths: Any
+    time_terms: Any
+    length_terms: Any
+    error: Any
+    cancellation: Any
+    status: Any
 
 
 @Inner
 def antiderivative(values, half, c, out):  # type: ignore[no-untyped-def]
-    """Legendre coefficients of the integral from the left end; returns size, tail and plateau of the integrand's."""
+    """Fill ``out`` with the Legendre coefficients of an integral from the left end of a panel.
+
+    Parameters
+    ----------
+    values : (COUNT,) array
+        The integrand at the nodes.
+    half : float
+        Half the width of the panel.
+    c : (DEGREE + 1,) array
+        Filled with the integrand's Legendre coefficients.
+
+    Returns
+    -------
+    size, tail, middle : float
+        The largest coefficient of the integrand, the largest of the last three, and of three in the middle.
+    """
     for j in range(11):
         total = EVEN[11 * j] * values[10]
         for i in range(1, 11):
@@ -59,47 +124,62 @@ def antiderivative(values, half, c, out):  # type: ignore[no-untyped-def]
     return size, tail, middle
 
 
+@Inlined
+def _accumulate(total, low, value):  # type: ignore[no-untyped-def]
+    """Add a value to a running total of two doubles."""
+    new = total + (value + low)
+    return new, (value + low) - (new - total)
+
+
 @Inner
-def lay(fns, p, kind, a, b, ref, w, field, marks):  # type: ignore[no-untyped-def]
+def _panel_sums(values, half):  # type: ignore[no-untyped-def]
+    """Duration and length of a panel by Kronrod's rule, and how far Gauss's rule is from that duration."""
+    gauss, duration, length = 0.0, 0.0, 0.0
+    for i in range(10, 0, -1):
+        pair = values[0, 10 + i] + values[0, 10 - i]
+        duration += KRONROD_WEIGHTS[i] * pair
+        gauss += GAUSS_WEIGHTS[i] * pair
+        length += KRONROD_WEIGHTS[i] * (values[1, 10 + i] + values[1, 10 - i])
+    duration = half * (duration + KRONROD_WEIGHTS[0] * values[0, 10])
+    length = half * (length + KRONROD_WEIGHTS[0] * values[1, 10])
+    return duration, length, fabs(duration - half * gauss)
+
+
+@Inlined
+def _is_noise(size, tail, middle):  # type: ignore[no-untyped-def]
+    """Whether coefficients have stopped falling at the level of rounding noise."""
+    return middle <= MAX_NOISE_RATIO * size and tail >= MIN_FLAT_RATIO * middle
+
+
+@Inner
+def lay(integrand, marks):  # type: ignore[no-untyped-def]
     """Lay panels until time and arc length are resolved to rounding.
 
-    ``field`` is V**2 along the stretch where forces dissipate, else empty. ``marks`` are anomalies: the first and the
-    last, and between them those at which a panel must begin because the curve is not smooth there.
+    Parameters
+    ----------
+    integrand : Integrand
+        The segment.
+    marks : (m,) array
+        Phase angles: the first and the last one, and between them those at which a panel must begin because the curve
+        is not smooth there.
 
     Returns
     -------
-    edges, times, lengths : (n+1,) arrays
-        Panel edges in phi; time and arc length from ``start`` at each edge.
-    time_terms, length_terms : (n, DEGREE) arrays
-        Legendre coefficients of both antiderivatives on each panel.
-    error : float
-        Estimated relative error of the whole time by quadrature, rounding included.
-    balance : float
-        Smallest against largest regular factor of V**2: what is left of it where most of it cancels. Near a
-        separatrix it is small.
-    status : int
-        CONVERGED, FLOOR (coefficients levelled off above rounding), EXHAUSTED (too many panels), FAILED (not
-        finite) or ILL_CONDITIONED (V**2 all but vanishes
-        inside: extended precision must lay the panels).
+    Panels
     """
-    room = 16
-    edges, times, lengths = np.empty(room + 1), np.empty(room + 1), np.empty(room + 1)
-    time_terms, length_terms = np.empty((room, DEGREE)), np.empty((room, DEGREE))
-    phi, work, values, c = (
-        np.empty(COUNT),
-        np.empty((4, COUNT)),
-        np.empty((2, COUNT)),
-        np.empty(DEGREE + 1),
-    )
+    capacity = 16
+    edges, times, lengths = np.empty(capacity + 1), np.empty(capacity + 1), np.empty(capacity + 1)
+    time_terms, length_terms = np.empty((capacity, DEGREE)), np.empty((capacity, DEGREE))
+    phi, work, values, c = np.empty(COUNT), np.empty((4, COUNT)), np.empty((2, COUNT)), np.empty(DEGREE + 1)
     start, stop = marks[0], marks[-1]
     waiting = marks.size - 1
-    pending = np.empty(waiting + 128)  # right edges still to do, nearest last
+    pending = np.empty(waiting + 128)  # right edges of the panels that remain, the next one last
     pending[:waiting] = marks[:0:-1]
-    most = MOST_PANELS + waiting
+    max_panels = MAX_PANELS + waiting
     edges[0], times[0], lengths[0] = start, 0.0, 0.0
     left, count, error, status = start, 0, 0.0, CONVERGED
     time_low, length_low = 0.0, 0.0
-    least = LEAST_WIDTH * fabs(stop - start)
+    min_width = MIN_PANEL_SHARE * fabs(stop - start)
     smallest, largest, peak = inf, 0.0, 0.0
     while waiting > 0:
         right = pending[waiting - 1]
@@ -107,79 +187,62 @@ def lay(fns, p, kind, a, b, ref, w, field, marks):  # type: ignore[no-untyped-de
         for i in range(11):
             phi[10 + i] = middle + half * NODES[i]
             phi[10 - i] = middle - half * NODES[i]
-        rates(fns, p, kind, a, b, ref, w, field, phi, work, values)
-        low, high, reached = shares(kind, w, field, work, COUNT, peak)
+        fill_rates(integrand, phi, work, values)
+        low, high, new_peak = cancellation_range(integrand, work, COUNT, peak)
         smallest, largest = min(smallest, low), max(largest, high)
-        if largest > 0.0 and smallest < HOPELESS * largest:
+        if largest > 0.0 and smallest < MIN_USABLE_RATIO * largest:
             status = ILL_CONDITIONED
             break
-        if count == room:
-            room *= 2
+        if count == capacity:
+            capacity *= 2
             edges, times, lengths = (
-                longer(edges, room + 1),
-                longer(times, room + 1),
-                longer(lengths, room + 1),
+                longer(edges, capacity + 1),
+                longer(times, capacity + 1),
+                longer(lengths, capacity + 1),
             )
-            time_terms, length_terms = taller(time_terms, room), taller(length_terms, room)
+            time_terms, length_terms = taller(time_terms, capacity), taller(length_terms, capacity)
         length_size, length_tail, length_middle = antiderivative(values[1], half, c, length_terms[count])
         size, tail, level = antiderivative(values[0], half, c, time_terms[count])
-        kronrod, gauss, duration, length = 0.0, 0.0, 0.0, 0.0
-        for i in range(10, 0, -1):
-            pair = values[0, 10 + i] + values[0, 10 - i]
-            duration += KRONROD_WEIGHTS[i] * pair
-            gauss += GAUSS_WEIGHTS[i] * pair
-            length += KRONROD_WEIGHTS[i] * (values[1, 10 + i] + values[1, 10 - i])
-        duration = half * (duration + KRONROD_WEIGHTS[0] * values[0, 10])
-        length = half * (length + KRONROD_WEIGHTS[0] * values[1, 10])
-        kronrod = fabs(duration - half * gauss)
-        settled = tail <= TAIL * size and length_tail <= TAIL * length_size and kronrod <= 1e-6 * duration
-        floor = (
-            level <= PLATEAU * size
-            and tail >= 0.05 * level
-            and (
-                length_tail <= TAIL * length_size
-                or (length_middle <= PLATEAU * length_size and length_tail >= 0.05 * length_middle)
-            )
+        duration, length, difference = _panel_sums(values, half)
+        length_resolved = length_tail <= MAX_TAIL_RATIO * length_size
+        resolved = tail <= MAX_TAIL_RATIO * size and length_resolved and difference <= MAX_RULE_DIFFERENCE * duration
+        noise = _is_noise(size, tail, level) and (length_resolved or _is_noise(length_size, length_tail, length_middle))
+        narrow = fabs(right - left) <= min_width
+        full = count + waiting >= max_panels or waiting >= pending.size - 1
+        # At the end of a spiral, which winds on below the last bit of the time and the length so far.
+        negligible = (
+            duration >= 0.0
+            and duration <= NEGLIGIBLE_SHARE * times[count]
+            and length <= NEGLIGIBLE_SHARE * lengths[count]
         )
-        narrow = fabs(right - left) <= least
-        full = count + waiting >= most or waiting >= pending.size - 1
-        # At the end of a spiral, where it winds on below the last bit of what there is.
-        nothing = duration >= 0.0 and duration <= NOTHING * times[count] and length <= NOTHING * lengths[count]
-        if not ((duration > 0.0 or nothing) and duration < inf):
+        if not ((duration > 0.0 or negligible) and duration < inf):
             if narrow or full:
                 status = FAILED
                 break
-        elif settled or floor or narrow or full or nothing:
-            if not (settled or nothing):
-                if floor and tail > 50.0 * TAIL * size:
+        elif resolved or noise or narrow or full or negligible:
+            if not (resolved or negligible):
+                if noise and tail > 50.0 * MAX_TAIL_RATIO * size:
                     status = max(status, FLOOR)
-                elif not floor:
+                elif not noise:
                     status = EXHAUSTED
             error += tail / size * duration if size > 0.0 else 0.0
-            # Two-sum: the running totals keep what a double would lose.
-            total = times[count] + (duration + time_low)
-            time_low = (duration + time_low) - (total - times[count])
-            times[count + 1] = total
-            total = lengths[count] + (length + length_low)
-            length_low = (length + length_low) - (total - lengths[count])
-            lengths[count + 1] = total
-            edges[count + 1] = right
-            left = right
-            peak = reached
+            times[count + 1], time_low = _accumulate(times[count], time_low, duration)
+            lengths[count + 1], length_low = _accumulate(lengths[count], length_low, length)
+            left = edges[count + 1] = right
+            peak = new_peak
             count += 1
             waiting -= 1
             continue
         pending[waiting] = middle
         waiting += 1
-    whole = times[count]
-    relative = error / whole + 2.3e-16 if whole > 0.0 else inf
-    return (
+    total = times[count]
+    return Panels(
         edges[: count + 1].copy(),
         times[: count + 1].copy(),
         lengths[: count + 1].copy(),
         time_terms[:count].copy(),
         length_terms[:count].copy(),
-        relative,
+        error / total + 2.3e-16 if total > 0.0 else inf,
         smallest / largest if largest > 0.0 else 0.0,
         status,
     )
@@ -187,13 +250,25 @@ def lay(fns, p, kind, a, b, ref, w, field, marks):  # type: ignore[no-untyped-de
 
 @Inner
 def panel_of(edges, phi):  # type: ignore[no-untyped-def]
-    """The panel on which an anomaly lies."""
+    """Return the index of the panel on which a phase angle lies."""
     return min(max(np.searchsorted(edges, phi, side="right") - 1, 0), edges.size - 2)
 
 
 @Inner
 def read_off(edges, marks, terms, phi):  # type: ignore[no-untyped-def]
-    """Time (or arc length) from the first edge to anomaly phi."""
+    """Return the time (or the arc length) from the first edge to a phase angle.
+
+    Parameters
+    ----------
+    edges : (n+1,) array
+        Phase angles at the edges of the panels.
+    marks : (n+1,) array
+        Time (or arc length) at the edges.
+    terms : (n, DEGREE) array
+        Legendre coefficients on each panel.
+    phi : float
+        The phase angle.
+    """
     k = panel_of(edges, phi)
     half = 0.5 * (edges[k + 1] - edges[k])
     x = ((phi - edges[k]) - half) / half
@@ -202,7 +277,7 @@ def read_off(edges, marks, terms, phi):  # type: ignore[no-untyped-def]
 
 @Inner
 def read_off_block(edges, marks, terms, phi, n, panels, work, out):  # type: ignore[no-untyped-def]
-    """`read_off` at n anomalies on known panels, side by side; ``work`` is room for three rows of n."""
+    """Evaluate `read_off` at n phase angles on known panels, in vector registers; ``work`` has three rows of n."""
     x, high, low = work[0], work[1], work[2]
     for i in range(n):
         left, half = edges[panels[i]], 0.5 * (edges[panels[i] + 1] - edges[panels[i]])
@@ -216,24 +291,24 @@ def read_off_block(edges, marks, terms, phi, n, panels, work, out):  # type: ign
         out[i] = marks[panels[i]] + (terms[panels[i], 0] + x[i] * high[i] - 0.5 * low[i])
 
 
-PANELS_TYPE = types.Tuple((VECTOR, VECTOR, VECTOR, MATRIX, MATRIX, REAL, REAL, types.int64))
+PANELS_TYPE = types.NamedTuple((VECTOR, VECTOR, VECTOR, MATRIX, MATRIX, REAL, REAL, types.int64), Panels)
 
 
 @entry(PANELS_TYPE(ADDRESSES, VECTOR, types.int64, REAL, REAL, REAL, REAL, VECTOR))
-def lay_panels(fns, p, kind, a, b, ref, w, marks):  # type: ignore[no-untyped-def]
-    """`panels.lay`, for Python."""
-    return lay(fns, p, kind, a, b, ref, w, np.empty((0, 0)), marks)
+def lay_panels(fns, p, kind, a, b, ref, w0, marks):  # type: ignore[no-untyped-def]
+    """Call `lay` from Python; the arguments are those of `Integrand`."""
+    return lay(Integrand(fns, p, kind, a, b, ref, w0, np.empty((0, 0))), marks)
 
 
 @entry(PANELS_TYPE(REAL, REAL, MATRIX, VECTOR))
 def lay_along(a, b, field, marks):  # type: ignore[no-untyped-def]
-    """`panels.lay` towards an equilibrium b where V**2 is a field."""
-    return lay(NO_FUNCTIONS, np.empty(0), TO_EQUILIBRIUM, a, b, a, 0.0, field, marks)
+    """Call `lay` from Python for a segment from ``a`` to an equilibrium ``b``, with V**2 from `equilibrium`."""
+    return lay(Integrand(NO_FUNCTIONS, np.empty(0), TO_EQUILIBRIUM, a, b, a, 0.0, field), marks)
 
 
 @entry(VECTOR(VECTOR, MATRIX, VECTOR))
 def slopes(edges, terms, phi):  # type: ignore[no-untyped-def]
-    """Derivatives of the panels' Legendre series at anomalies."""
+    """Return the derivatives by phi of the panels' Legendre series at phase angles."""
     out, series = np.empty(phi.size), np.empty(terms.shape[1])
     for i in range(phi.size):
         k = panel_of(edges, phi[i])
@@ -245,7 +320,7 @@ def slopes(edges, terms, phi):  # type: ignore[no-untyped-def]
 
 @entry(VECTOR(VECTOR, VECTOR, MATRIX, VECTOR))
 def read_off_many(edges, marks, terms, phi):  # type: ignore[no-untyped-def]
-    """Time or arc length from the first edge to many anomalies."""
+    """Evaluate `read_off` at many phase angles."""
     out = np.empty(phi.size)
     for i in range(phi.size):
         out[i] = read_off(edges, marks, terms, phi[i])
@@ -253,21 +328,24 @@ def read_off_many(edges, marks, terms, phi):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def orbit_panels(fns, p, going_round, a, b, lam0, w0):  # type: ignore[no-untyped-def]
-    """Adaptive panels over half a libration, or over a lap: one call, for compiling each takes long."""
-    kind, ref, w, stop = (REGULAR, lam0, w0, 1.0) if going_round else (TURN_TURN, a, 0.0, pi)
-    return lay(fns, p, kind, a, b, ref, w, np.empty((0, 0)), np.array([0.0, stop]))
+def orbit_panels(fns, p, is_circulation, a, b, lam0, w0):  # type: ignore[no-untyped-def]
+    """Lay panels over half a period of a libration, or over a lap of a circulation.
+
+    Both share one call of `lay`, because each call takes long to compile.
+    """
+    kind, ref, w, stop = (REGULAR, lam0, w0, 1.0) if is_circulation else (TURN_TURN, a, 0.0, pi)
+    return lay(Integrand(fns, p, kind, a, b, ref, w, np.empty((0, 0))), np.array([0.0, stop]))
 
 
 @Inner
-def to_rounding(panels):  # type: ignore[no-untyped-def]
-    """Whether panels tell time to the last places."""
-    return not (panels[7] >= FLOOR or panels[6] < LEAST_BALANCE)
+def are_accurate(panels):  # type: ignore[no-untyped-def]
+    """Whether the time by these panels is accurate to a few ulp."""
+    return not (panels.status >= FLOOR or panels.cancellation < MIN_CANCELLATION_RATIO)
 
 
 @Inner
 def derivative(terms, out):  # type: ignore[no-untyped-def]
-    """Legendre coefficients of the derivative (with respect to x) of a Legendre series."""
+    """Fill ``out`` with the Legendre coefficients of the derivative of a Legendre series."""
     n = terms.size
     out[:] = 0.0
     for k in range(n - 1, 0, -1):

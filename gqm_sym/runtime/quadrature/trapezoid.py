@@ -1,29 +1,65 @@
-"""Half periods and loop times by the trapezoidal rule, which converges geometrically on a periodic integrand."""
+"""Half periods and lap times by the trapezoidal rule, which converges geometrically on a periodic integrand.
+
+The nodes are phase angles (`substitution`): a half period is an integral over [0, pi], a lap time over [0, 1].
+"""
 
 from math import fabs, inf, pi, sqrt
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from gqm_sym.runtime.compiled.calls import call_potential_divdiff1, call_potential_divdiff2
 from gqm_sym.runtime.compiled.jit import Inner
 from gqm_sym.runtime.compiled.registers import on_stack
-from gqm_sym.runtime.quadrature.time_panels import LEAST_BALANCE, orbit_panels, to_rounding
+from gqm_sym.runtime.quadrature.time_panels import MIN_CANCELLATION_RATIO, are_accurate, orbit_panels
 
 # Kinds of orbits.
 LIBRATION, CIRCULATION = range(2)
 
-# The trapezoidal rule doubles its nodes so often, from FEWEST intervals on.
+# The rule begins with MIN_INTERVALS intervals and doubles their number at most MAX_DOUBLINGS times.
 MIN_INTERVALS, MAX_DOUBLINGS = 8, 7
 MAX_NODES = MIN_INTERVALS * 2**MAX_DOUBLINGS
 
-# The rule's error is a sum of terms c*r**nodes, times a cosine of the nodes. It squares with each doubling, over c,
-# which branch points of ds make as small as 1e-5. A change may also be small by accident; two in a row hardly are.
+# The error of the rule is a sum of terms c*r**n times a cosine of the number n of nodes. Each doubling replaces r**n by
+# its square, and c may be as small as 1e-5 because of branch points of ds/dlam. A change between two levels may be
+# small by accident, but two changes in a row hardly are: so both are limited.
 MAX_LAST_CHANGE, MAX_CHANGE_BEFORE = 1e-11, 3e-6
-work_room, rate_room = on_stack(4 * MAX_NODES), on_stack(MAX_NODES)
+
+# Work space of `fill_integrand`, on the stack.
+trapezoid_workspace, trapezoid_rates = on_stack(4 * MAX_NODES), on_stack(MAX_NODES)
 
 
-def _anomalies() -> np.ndarray:
-    """Anomalies of all levels of the rule over [0, 1] half periods: the first's, then what each doubling adds."""
+class Orbit(NamedTuple):
+    """What the integrand of a half period or of a lap time depends on.
+
+    Attributes
+    ----------
+    fns : Addresses
+        Addresses of the model's compiled functions.
+    p : array
+        Run-time parameters.
+    kind : int
+        LIBRATION or CIRCULATION.
+    lam0, w0 : float
+        The launch place, and V**2 there in (m/s)**2.
+    a, b : float
+        Turning points, or both ends of a lap.
+    width : float
+        b - a from the offsets of both ends, which is more accurate than the difference of the rounded ends.
+    """
+
+    fns: Any
+    p: Any
+    kind: Any
+    lam0: Any
+    w0: Any
+    a: Any
+    b: Any
+    width: Any
+
+
+def _node_shares() -> np.ndarray:
+    """Return the nodes of all levels as shares of the interval: the first level's, then what each doubling adds."""
     levels = [np.arange(MIN_INTERVALS + 1) / MIN_INTERVALS]
     for k in range(MAX_DOUBLINGS):
         n = MIN_INTERVALS * 2**k
@@ -31,49 +67,69 @@ def _anomalies() -> np.ndarray:
     return np.concatenate(levels)
 
 
-SHARES = _anomalies()
-FROM_A, FROM_B = np.sin(0.5 * pi * SHARES) ** 2, np.cos(0.5 * pi * SHARES) ** 2
+# The nodes, and the offsets from both turning points at them as shares of the width (`substitution`, TURN_TURN).
+NODE_SHARES = _node_shares()
+OFFSETS_FROM_A, OFFSETS_TO_B = np.sin(0.5 * pi * NODE_SHARES) ** 2, np.cos(0.5 * pi * NODE_SHARES) ** 2
 
 
 @Inner
-def fill_integrand(fns, p, kind, lam0, w0, a, b, width, first, n, work, rates):  # type: ignore[no-untyped-def]
-    """dt/dphi at n nodes of the rule from the ``first`` on; returns the least and largest regular factor of V**2.
+def fill_integrand(orbit, first, n, work, rates):  # type: ignore[no-untyped-def]
+    """Fill ``rates`` with the integrand at n nodes.
 
-    ``width`` is the orbit's, from offsets: closer than the difference of its rounded ends.
+    Parameters
+    ----------
+    orbit : Orbit
+        The orbit.
+    first : int
+        Index of the first node in NODE_SHARES.
+    work : (4*n,) array
+        Work space.
+    rates : (n,) array
+        Filled with the time per share of the interval, in s.
+
+    Returns
+    -------
+    low, high : float
+        The smallest and the largest regular factor of V**2; their ratio is the part that cancellation leaves.
     """
+    fns, p, kind, lam0, w0, a, b, width = orbit
     da, db, rows = work[:n], work[n : 2 * n], work[2 * n : 4 * n]
     low, high = inf, 0.0
     if kind == LIBRATION:
         for i in range(n):
-            da[i], db[i] = width * FROM_A[first + i], width * FROM_B[first + i]
+            da[i], db[i] = width * OFFSETS_FROM_A[first + i], width * OFFSETS_TO_B[first + i]
         call_potential_divdiff2(fns.potential_divdiff2, n, a, b, da, db, p, rows)
         for i in range(n):
-            rates[i] = pi * rows[n + i] / sqrt(rows[i])
+            rates[i] = pi * rows[n + i] / sqrt(2.0 * rows[i])
             low, high = min(low, rows[i]), max(high, rows[i])
     else:
         for i in range(n):
-            db[i] = width * SHARES[first + i]
+            db[i] = width * NODE_SHARES[first + i]
             da[i] = lam0 + db[i]
         call_potential_divdiff1(fns.potential_divdiff1, n, lam0, da, db, p, rows)
         for i in range(n):
-            lost = db[i] * rows[i]
-            rates[i] = fabs(width) * rows[n + i] / sqrt(w0 - lost)
-            low = min(low, (w0 - lost) / (w0 + fabs(lost)))
+            loss = 2.0 * db[i] * rows[i]
+            rates[i] = fabs(width) * rows[n + i] / sqrt(w0 - loss)
+            low = min(low, (w0 - loss) / (w0 + fabs(loss)))
         high = 1.0
     return low, high
 
 
 @Inner
 def has_converged(before, change):  # type: ignore[no-untyped-def]
-    """Whether the trapezoidal rule has come to its value, by its last two relative changes."""
+    """Whether the trapezoidal rule has converged, judged by its last two relative changes."""
     return (before <= MAX_CHANGE_BEFORE) & (change <= MAX_LAST_CHANGE)
 
 
 @Inner
 def time_by_trapezoid(fns, p, kind, lam0, w0, a, b, width):  # type: ignore[no-untyped-def]
-    """Half period or loop time by the trapezoidal rule; NaN where it did not converge or V**2 all but vanishes."""
-    work, rates = work_room(), rate_room()
-    low, high = fill_integrand(fns, p, kind, lam0, w0, a, b, width, 0, MIN_INTERVALS + 1, work, rates)
+    """Return the half period or the lap time in s by the trapezoidal rule; the arguments are those of `Orbit`.
+
+    It is NaN where the rule did not converge, or where V**2 nearly vanishes.
+    """
+    orbit = Orbit(fns, p, kind, lam0, w0, a, b, width)
+    work, rates = trapezoid_workspace(), trapezoid_rates()
+    low, high = fill_integrand(orbit, 0, MIN_INTERVALS + 1, work, rates)
     total = 0.5 * (rates[0] + rates[MIN_INTERVALS])
     half = total
     for i in range(1, MIN_INTERVALS):
@@ -82,14 +138,14 @@ def time_by_trapezoid(fns, p, kind, lam0, w0, a, b, width):  # type: ignore[no-u
     value, n, first = total / MIN_INTERVALS, MIN_INTERVALS, MIN_INTERVALS + 1
     before = fabs(2.0 * half - total) / total
     while n < MAX_NODES:
-        least, most = fill_integrand(fns, p, kind, lam0, w0, a, b, width, first, n, work, rates)
-        low, high = min(low, least), max(high, most)
-        if not low > LEAST_BALANCE * high:
+        new_low, new_high = fill_integrand(orbit, first, n, work, rates)
+        low, high = min(low, new_low), max(high, new_high)
+        if not low > MIN_CANCELLATION_RATIO * high:
             return np.nan
-        more = 0.0
+        added = 0.0
         for i in range(n):
-            more += rates[i]
-        total += more
+            added += rates[i]
+        total += added
         first += n
         n *= 2
         new = total / n
@@ -103,8 +159,8 @@ def time_by_trapezoid(fns, p, kind, lam0, w0, a, b, width):  # type: ignore[no-u
 
 @Inner
 def time_by_panels(fns, p, kind, lam0, w0, a, b):  # type: ignore[no-untyped-def]
-    """Half period or loop time by adaptive panels; NaN where they did not converge."""
+    """Return the half period or the lap time in s by adaptive panels; NaN where they are not accurate."""
     panels = orbit_panels(fns, p, kind == CIRCULATION, a, b, lam0, w0)
-    if not to_rounding(panels):
+    if not are_accurate(panels):
         return np.nan
-    return panels[1][-1]
+    return panels.times[-1]

@@ -1,4 +1,4 @@
-"""When one of many orbits is first at a place: the time as a sine series in the anomaly, or by panels."""
+"""The first time at a place on one of many orbits, by a sine series in the phase angle or by panels."""
 
 from math import atan2, cos, fabs, inf, pi, sin, sqrt
 
@@ -8,18 +8,22 @@ from gqm_sym.runtime.arithmetic.matrices import multiply
 from gqm_sym.runtime.compiled.calls import call_effective_potential, call_potential_divdiff1, call_potential_divdiff2
 from gqm_sym.runtime.compiled.intrinsics import fma
 from gqm_sym.runtime.compiled.jit import Inner
-from gqm_sym.runtime.quadrature.time_panels import LEAST_BALANCE, orbit_panels, read_off, to_rounding
+from gqm_sym.runtime.quadrature.time_panels import MIN_CANCELLATION_RATIO, are_accurate, orbit_panels, read_off
+from gqm_sym.runtime.sweep.orbit import Orbit
 
-# Terms of the series that are tried; how small the last ones must be against the first, for the time they stand for is
-# divided by their number.
-SHORT, LONG, LONGEST, LAST, SMALL = 32, 64, 128, 4, 1e-14
+# Terms of the series that are tried in turn.
+FEW_TERMS, MORE_TERMS, MAX_TERMS = 32, 64, 128
 
-# A turning point is near a launch within this share of the orbit's width.
+# How many of the last coefficients must be small, and how small against the first. Integration divides a coefficient by
+# its number, so that their share of the time is smaller still.
+TAIL_LENGTH, TAIL_RATIO = 4, 1e-14
+
+# The share of an orbit's width within which a turning point counts as near the launch.
 NEAR_LAUNCH = 1e-3
 
 
 def _cosines(n: int) -> np.ndarray:
-    """The matrix from values at n + 1 equal steps of half a turn to coefficients of cosines: a row for each node."""
+    """The matrix from values at n + 1 equal steps over [0, pi] to coefficients of cosines, a row for each node."""
     steps = np.outer(np.arange(n + 1), np.arange(n + 1)) % (2 * n)
     matrix = np.array([cos(pi * m / n) for m in range(2 * n)])[steps] * (2.0 / n)
     matrix[[0, n]] *= 0.5
@@ -27,118 +31,148 @@ def _cosines(n: int) -> np.ndarray:
     return matrix
 
 
-OF_LONGEST = _cosines(LONGEST)
-of_short, of_long = multiply(_cosines(SHORT)), multiply(_cosines(LONG))
-NEAR = np.sin(0.5 * pi * np.arange(LONGEST + 1) / LONGEST) ** 2
+COSINES = _cosines(MAX_TERMS)
+few_cosines, more_cosines = multiply(_cosines(FEW_TERMS)), multiply(_cosines(MORE_TERMS))
+
+# The distances of the nodes from the lower end, as shares of the width; from the upper end they are the same reversed.
+WIDTH_SHARES = np.sin(0.5 * pi * np.arange(MAX_TERMS + 1) / MAX_TERMS) ** 2
 
 
 @Inner
-def pace_series(fns, p, a, b, width, n, work, series):  # type: ignore[no-untyped-def]
-    """Fill the cosine series of dt/dphi over half a turn; returns whether it is resolved, and V**2 balanced."""
+def fill_time_rate_series(fns, p, a, b, width, n, work, series):  # type: ignore[no-untyped-def]
+    """Fill the cosine series of dt/dphi over [0, pi]; returns whether it is resolved and V**2 is far from vanishing."""
     m = n + 1
     da, db, rows = work[:m], work[m : 2 * m], work[2 * m : 4 * m]
     for j in range(m):
-        node = j * (LONGEST // n)
-        da[j], db[j] = width * NEAR[node], width * NEAR[LONGEST - node]
+        node = j * (MAX_TERMS // n)
+        da[j], db[j] = width * WIDTH_SHARES[node], width * WIDTH_SHARES[MAX_TERMS - node]
     call_potential_divdiff2(fns.potential_divdiff2, m, a, b, da, db, p, rows)
     low, high, tail = inf, 0.0, 0.0
     for j in range(m):
         q = rows[j]
         low, high = min(low, q), max(high, q)
-        da[j] = rows[m + j] / sqrt(q)
-    if n == SHORT:
-        of_short(work, 0, series, 0)
-    elif n == LONG:
-        of_long(work, 0, series, 0)
+        da[j] = rows[m + j] / sqrt(2.0 * q)
+    if n == FEW_TERMS:
+        few_cosines(work, 0, series, 0)
+    elif n == MORE_TERMS:
+        more_cosines(work, 0, series, 0)
     else:
         for k in range(m):
             series[k] = 0.0
         for j in range(m):
             for k in range(m):
-                series[k] += OF_LONGEST[j, k] * da[j]
-    for k in range(n - LAST, n + 1):
+                series[k] += COSINES[j, k] * da[j]
+    for k in range(n - TAIL_LENGTH, n + 1):
         tail = max(tail, fabs(series[k]))
-    return tail <= SMALL * series[0] and low > LEAST_BALANCE * high
+    return tail <= TAIL_RATIO * series[0] and low > MIN_CANCELLATION_RATIO * high
 
 
 @Inner
 def times_from(series, n, phi, psi, flip):  # type: ignore[no-untyped-def]
-    """The times from an end to two anomalies; ``flip`` is -1 for the second end.
+    """The times from an end to two phase angles; ``flip`` is 1 for the lower end and -1 for the upper one.
 
-    The integral of a cosine series, by Clenshaw's scheme for sines: two sums side by side, for each step waits for the
-    one before.
+    They are the integral of a cosine series, summed by Clenshaw's scheme for sines. Both sums run side by side, because
+    each step of one has to wait for the step before.
     """
-    twice, double, sign = 2.0 * cos(phi), 2.0 * cos(psi), flip if n % 2 else 1.0
-    one, two, first, second = 0.0, 0.0, 0.0, 0.0
+    two_cos_phi, two_cos_psi, sign = 2.0 * cos(phi), 2.0 * cos(psi), flip if n % 2 else 1.0
+    phi_sum, phi_before, psi_sum, psi_before = 0.0, 0.0, 0.0, 0.0
     for k in range(n, 0, -1):
         term = sign * series[k] / k
-        one, two = fma(twice, one, term - two), one
-        first, second = fma(double, first, term - second), first
+        phi_sum, phi_before = fma(two_cos_phi, phi_sum, term - phi_before), phi_sum
+        psi_sum, psi_before = fma(two_cos_psi, psi_sum, term - psi_before), psi_sum
         sign *= flip
-    return series[0] * phi + one * sin(phi), series[0] * psi + first * sin(psi)
+    return series[0] * phi + phi_sum * sin(phi), series[0] * psi + psi_sum * sin(psi)
 
 
 @Inner
-def sharpened(fns, p, lam0, w0, end, width, work):  # type: ignore[no-untyped-def]
-    """How far a turning point is from the launch, with all digits: one that is near may be known as a rounded sum."""
-    if w0 == 0.0 or fabs(end) > NEAR_LAUNCH * width:
+def refined_end(fns, p, orbit, end, work):  # type: ignore[no-untyped-def]
+    """The offset of a turning point from the launch with all its digits.
+
+    One that is near the launch may be known only as a rounded sum; there one step of Newton's method is taken.
+    """
+    width = orbit.high - orbit.low
+    if orbit.v2 == 0.0 or fabs(end) > NEAR_LAUNCH * width:
         return end
-    spot, offset, rows = work[:1], work[1:2], work[2:4]
-    spot[0], offset[0] = lam0 + end, end
-    call_potential_divdiff1(fns.potential_divdiff1, 1, lam0, spot, offset, p, rows)
-    left = w0 - end * rows[0]
-    call_effective_potential(fns.effective_potential, 1, spot, p, rows)
-    better = end + left / rows[1]
+    place, offset, rows = work[:1], work[1:2], work[2:4]
+    place[0], offset[0] = orbit.lam0 + end, end
+    call_potential_divdiff1(fns.potential_divdiff1, 1, orbit.lam0, place, offset, p, rows)
+    v2 = orbit.v2 - 2.0 * end * rows[0]
+    call_effective_potential(fns.effective_potential, 1, place, p, rows)
+    better = end + v2 / (2.0 * rows[1])
     return better if better * end >= 0.0 and fabs(better) <= NEAR_LAUNCH * width else end
 
 
 @Inner
-def arrival(fns, p, going_round, direction, lam0, w0, least, most, place, work, series):  # type: ignore[no-untyped-def]
-    """When the body is first at a place; NaN for the exact problem, infinity if never.
+def phase_of(below, above):  # type: ignore[no-untyped-def]
+    """The phase angle of a place by its distances from the lower and the upper end."""
+    return 2.0 * atan2(sqrt(below), sqrt(above))
 
-    ``least`` and ``most`` are offsets of both ends from the launch, or of a lap.
+
+@Inner
+def arrival_on_lap(fns, p, orbit, ahead):  # type: ignore[no-untyped-def]
+    """The time at which a body on a closed curve has gone the offset ``ahead``; as `arrival` returns it."""
+    lap = orbit.direction * (orbit.high - orbit.low)
+    laps = np.floor(ahead / lap)
+    if laps < 0.0:
+        return inf
+    panels = orbit_panels(fns, p, True, orbit.lam0, orbit.lam0 + lap, orbit.lam0, orbit.v2)
+    if not are_accurate(panels):
+        return np.nan
+    return laps * panels.times[-1] + read_off(panels.edges, panels.times, panels.time_terms, ahead / lap - laps)
+
+
+@Inner
+def times_from_end(fns, p, orbit, width, ahead, work, series):  # type: ignore[no-untyped-def]
+    """The times that a body takes from one end of a libration to the launch and to the offset ``ahead``.
+
+    The end is the one nearer to the launch, so that the times of a launch close to it have all their digits.
+
+    Returns
+    -------
+    half_period, start, stop : float
+        Times in seconds; NaN where they are left to the exact problem.
+    from_upper : bool
+        Whether the end is the upper one.
     """
-    ahead = place - lam0
+    low, high, a, b = orbit.low, orbit.high, orbit.lam0 + orbit.low, orbit.lam0 + orbit.high
+    n, resolved = FEW_TERMS // 2, False
+    while n < MAX_TERMS and not resolved:
+        n *= 2
+        resolved = fill_time_rate_series(fns, p, a, b, width, n, work, series)
+    from_upper = -low > high
+    if resolved:
+        near, far = (high, -low) if from_upper else (-low, high)
+        to_near, to_far = (high - ahead, ahead - low) if from_upper else (ahead - low, high - ahead)
+        launch, target = phase_of(near, far), phase_of(max(to_near, 0.0), max(to_far, 0.0))
+        start, stop = times_from(series, n, launch, target, -1.0 if from_upper else 1.0)
+        return series[0] * pi, start, stop, from_upper
+    panels = orbit_panels(fns, p, False, a, b, orbit.lam0, orbit.v2)
+    if not are_accurate(panels):
+        return np.nan, np.nan, np.nan, from_upper
+    half_period = panels.times[-1]
+    start = read_off(panels.edges, panels.times, panels.time_terms, phase_of(-low, high))
+    target = phase_of(max(ahead - low, 0.0), max(high - ahead, 0.0))
+    stop = read_off(panels.edges, panels.times, panels.time_terms, target)
+    if from_upper:
+        start, stop = half_period - start, half_period - stop
+    return half_period, start, stop, from_upper
+
+
+@Inner
+def arrival(fns, p, orbit, place, work, series):  # type: ignore[no-untyped-def]
+    """The first time at which the body is at ``place``: NaN if it is left to the exact problem, inf if never."""
+    ahead = place - orbit.lam0
     if ahead == 0.0:
         return 0.0
-    if going_round:
-        lap = direction * (most - least)
-        laps = np.floor(ahead / lap)
-        if laps < 0.0:
-            return inf
-        panels = orbit_panels(fns, p, going_round, lam0, lam0 + lap, lam0, w0)
-        if not to_rounding(panels):
-            return np.nan
-        return laps * panels[1][-1] + read_off(panels[0], panels[1], panels[3], ahead / lap - laps)
-    width = most - least
-    least = sharpened(fns, p, lam0, w0, least, width, work)
-    most = sharpened(fns, p, lam0, w0, most, width, work)
-    a, b = lam0 + least, lam0 + most
-    if not a <= place <= b:
+    if orbit.circulates:
+        return arrival_on_lap(fns, p, orbit, ahead)
+    width = orbit.high - orbit.low
+    low, high = refined_end(fns, p, orbit, orbit.low, work), refined_end(fns, p, orbit, orbit.high, work)
+    if not orbit.lam0 + low <= place <= orbit.lam0 + high:
         return inf
-    n, resolved = SHORT // 2, False
-    while n < LONGEST and not resolved:
-        n *= 2
-        resolved = pace_series(fns, p, a, b, width, n, work, series)
-    # Times are told from the end that is nearer to the launch: of a launch there they have all their digits.
-    from_b = -least > most
-    near, far = (most, -least) if from_b else (-least, most)
-    there = (most - ahead, ahead - least) if from_b else (ahead - least, most - ahead)
-    if resolved:
-        here = 2.0 * atan2(sqrt(near), sqrt(far))
-        then = 2.0 * atan2(sqrt(max(there[0], 0.0)), sqrt(max(there[1], 0.0)))
-        whole, (start, stop) = series[0] * pi, times_from(series, n, here, then, -1.0 if from_b else 1.0)
-    else:
-        panels = orbit_panels(fns, p, going_round, a, b, lam0, w0)
-        if not to_rounding(panels):
-            return np.nan
-        whole = panels[1][-1]
-        start = read_off(panels[0], panels[1], panels[3], 2.0 * atan2(sqrt(-least), sqrt(most)))
-        at = 2.0 * atan2(sqrt(max(ahead - least, 0.0)), sqrt(max(most - ahead, 0.0)))
-        stop = read_off(panels[0], panels[1], panels[3], at)
-        if from_b:
-            start, stop = whole - start, whole - stop
-    onwards = direction * ahead > 0.0
-    if (direction > 0) == from_b:  # towards that end
+    orbit = Orbit(False, orbit.even, orbit.direction, orbit.lam0, orbit.v2, low, high)
+    half_period, start, stop, from_upper = times_from_end(fns, p, orbit, width, ahead, work, series)
+    onwards = orbit.direction * ahead > 0.0
+    if (orbit.direction > 0) == from_upper:  # the body is launched towards that end
         return start - stop if onwards else start + stop
-    return stop - start if onwards else (whole - start) + (whole - stop)
+    return stop - start if onwards else (half_period - start) + (half_period - stop)

@@ -1,6 +1,6 @@
-"""Sweeps on a Dask cluster: cut into jobs that carry the module's text, answered by its workers, put together here.
+"""Sweeps on a Dask cluster: they are cut into jobs, which carry the module's text to the workers, and joined here.
 
-The cut is the same whoever answers, and a job is answered as here, so that the numbers are the same.
+The cut does not depend on the workers, and a job is answered as it would be here, so that the numbers are the same.
 """
 
 import tempfile
@@ -22,11 +22,11 @@ from gqm_sym.runtime.sweep.sweep import Sweep, broadcast_shape
 
 T = TypeVar("T")
 
-# Launches of one job, and jobs that wait in line for each thread of a worker.
-JOB, WAITING = 2**13, 3
+# The number of launches of one job, and of jobs that wait in the queue for each thread of a worker.
+LAUNCHES_PER_JOB, JOBS_PER_THREAD = 2**13, 3
 
-# Seconds in which a scheduler must answer.
-PATIENCE = 10
+# The seconds within which a scheduler must answer.
+TIMEOUT = 10
 
 
 @require("dask")
@@ -41,7 +41,7 @@ def connected(address: str) -> Any:
     from distributed import Client
 
     try:
-        return Client(address, timeout=PATIENCE)
+        return Client(address, timeout=TIMEOUT)
     except (OSError, ValueError) as error:
         raise InputError(
             f"{address}: no Dask scheduler answers there ({error}); give an address as tcp://host:8786"
@@ -50,7 +50,7 @@ def connected(address: str) -> Any:
 
 @require("dask")
 def finished(client: Any, work: Callable[..., T], jobs: Iterable[tuple[Any, ...]]) -> Iterator[tuple[int, T]]:
-    """Do ``work`` on the arguments of each job, on a cluster; yield number and outcome of each job as it is finished.
+    """Do ``work`` on the arguments of each job on a cluster; yield the number and result of each job once finished.
 
     Parameters
     ----------
@@ -58,7 +58,7 @@ def finished(client: Any, work: Callable[..., T], jobs: Iterable[tuple[Any, ...]
     work
         A function that the workers can import.
     jobs
-        Taken as there is room for them.
+        The arguments of each job; they are taken when the queue has space for them.
     """
     from distributed import as_completed
 
@@ -71,12 +71,12 @@ def finished(client: Any, work: Callable[..., T], jobs: Iterable[tuple[Any, ...]
             yield future
 
     queue = enumerate(jobs)
-    line = as_completed(list(sent(islice(queue, WAITING * max(sum(client.nthreads().values()), 2)))))
+    line = as_completed(list(sent(islice(queue, JOBS_PER_THREAD * max(sum(client.nthreads().values()), 2)))))
     return _outcomes(line, numbers, sent(queue))
 
 
 def _outcomes(line: Any, numbers: dict[str, int], others: Iterator[Any]) -> Iterator[tuple[int, Any]]:
-    """Yield what is done; another one joins the line for each."""
+    """Yield each finished job, and submit another one in its place."""
     for future in line:
         outcome = future.result()
         line.update(islice(others, 1))
@@ -89,11 +89,11 @@ def answer(stamp: str, source: str, text: str, name: str, quantity: str, argumen
     Parameters
     ----------
     stamp
-        Of the runtime that asks.
+        The digest of the runtime that asks (`jit.STAMP`).
     source, text, name
-        The module: where its file was, what is in it, and what it is called.
+        The file of the module, its text, and its name.
     quantity, arguments
-        As of the module's ``sweep``.
+        Those of the module's ``sweep``.
     """
     if stamp != STAMP:
         raise SolutionError("client: a worker runs another version of gqm_sym; install the same one everywhere")
@@ -103,7 +103,7 @@ def answer(stamp: str, source: str, text: str, name: str, quantity: str, argumen
 
 @lru_cache(maxsize=16)
 def _module(source: str, text: str, name: str) -> ModuleType:
-    """A module by its text: from the same file where this machine has it, for what was compiled lies beside it."""
+    """A module by its text, from the same file if this machine has it, because compiled code lies beside the file."""
     path = Path(source)
     if path.is_file() and path.read_text(encoding="utf-8", errors="replace") == text:
         return load(path, name)
@@ -119,18 +119,18 @@ def sweep_on(client: Any, source: str, name: str, quantity: str, arguments: Mapp
     Parameters
     ----------
     source, name
-        The generated module's file, and what it is called.
+        The file of the generated module, and its name.
     """
     text = Path(source).read_text(encoding="utf-8")
     given = {key: value for key, value in arguments.items() if value is not None}
-    # Lists stay lists of what they hold: text would otherwise become text of NumPy's.
+    # Arrays of objects keep exact numbers and text as they are.
     arrays = {k: v if isinstance(v, np.ndarray) else np.array(v, dtype=object) for k, v in given.items() if np.ndim(v)}
     shape = broadcast_shape(arrays)
     flat = {key: np.broadcast_to(array, shape).reshape(-1) for key, array in arrays.items()}
-    cuts = [slice(begin, begin + JOB) for begin in range(0, max(prod(shape), 1), JOB)]
+    cuts = [slice(begin, begin + LAUNCHES_PER_JOB) for begin in range(0, max(prod(shape), 1), LAUNCHES_PER_JOB)]
     parts = ({**given, **{key: column[cut] for key, column in flat.items()}} for cut in cuts)
     found = dict(finished(client, answer, ((STAMP, source, text, name, quantity, part) for part in parts)))
     if not arrays:
         return found[0]
-    values, reasons = (np.concatenate([found[k][field] for k in range(len(cuts))]) for field in (0, 1))
-    return type(found[0])(values.reshape(shape + values.shape[1:]), reasons.reshape(shape))
+    fields = (np.concatenate(parts) for parts in zip(*(found[k] for k in range(len(cuts))), strict=True))
+    return Sweep(*(field.reshape(shape + field.shape[1:]) for field in fields))

@@ -1,7 +1,7 @@
-"""One number a launch, for many launches in one compiled loop: what `sweep` asks for.
+"""One quantity for each of many launches, in one compiled loop over the launches.
 
-Doubles alone, no tables kept. An orbit that doubles cannot decide, or cannot time to the last places, is left to the
-exact problem (`sweeping`).
+The loop answers the launches that batches leave, in doubles and without tables. An orbit that doubles cannot decide,
+or whose time they cannot give to the last places, stays undecided, and `sweep` solves it by itself.
 """
 
 from math import inf, isfinite
@@ -9,7 +9,7 @@ from math import inf, isfinite
 import numpy as np
 from numba import types
 
-from gqm_sym.runtime.compiled.jit import entry
+from gqm_sym.runtime.compiled.jit import Inner, entry
 from gqm_sym.runtime.compiled.registers import uncounted
 from gqm_sym.runtime.compiled.strided import (
     AXIS,
@@ -25,20 +25,22 @@ from gqm_sym.runtime.compiled.strided import (
     element,
 )
 from gqm_sym.runtime.compiled.types import ADDRESSES, MATRIX, VECTOR
-from gqm_sym.runtime.launch.ends import ends
-from gqm_sym.runtime.launch.zeros import LIMIT, TURN
+from gqm_sym.runtime.launch.domain import DomainNumbers
+from gqm_sym.runtime.launch.ends import NO_ORBIT, ends, orbit_kind
 from gqm_sym.runtime.quadrature.trapezoid import (
     CIRCULATION,
     LIBRATION,
-    rate_room,
     time_by_panels,
     time_by_trapezoid,
-    work_room,
+    trapezoid_rates,
+    trapezoid_workspace,
 )
 from gqm_sym.runtime.sweep.arrivals import arrival
+from gqm_sym.runtime.sweep.orbit import Orbit
 from gqm_sym.runtime.sweep.orbit_extremes import extreme
 from gqm_sym.runtime.sweep.quantities import (
     ANSWERED,
+    ANSWERS,
     ARRIVAL_TIME,
     HALF_PERIOD,
     MAX_FORCE,
@@ -49,82 +51,113 @@ from gqm_sym.runtime.sweep.quantities import (
     NOT_PERIODIC,
     OUTSIDE_DOMAIN,
     PERIOD,
+    SINGLE,
     SPAN_KNOWN,
     TURNING_POINTS,
     UNDECIDED,
 )
 
 
+@Inner
+def find_orbit(fns, p, columns, k, monotone, spans, known):  # type: ignore[no-untyped-def]
+    """The status of launch k, ANSWERED where it has an orbit, and that orbit; its span is looked up where ``known``."""
+    lam0, v0, direction = element(columns, LAM0, k), element(columns, V0, k), int(element(columns, DIRECTION, k))
+    first, last, period = (
+        element(columns, DOMAIN_LOW, k),
+        element(columns, DOMAIN_HIGH, k),
+        element(columns, DOMAIN_PERIOD, k),
+    )
+    axis, step = element(columns, AXIS, k) if monotone else np.nan, element(columns, AXIS_STEP, k)
+    even, v2 = axis == axis, v0 * v0
+    none = Orbit(False, even, direction, lam0, v2, 0.0, 0.0)
+    if not (isfinite(lam0) and isfinite(v0) and isfinite(p.sum())):
+        return NOT_FINITE, none
+    if not first <= lam0 <= last:
+        return OUTSIDE_DOMAIN, none
+    if known:
+        low, high = spans[k, 0], spans[k, 1]
+        circulates = high != high
+        if circulates:
+            low, high = min(low, 0.0), max(low, 0.0)
+        elif v0 == 0.0:
+            direction = 1 if high > -low else -1
+        return ANSWERED, Orbit(circulates, even, direction, lam0, v2, low, high)
+    domain = DomainNumbers(first, last, period, axis, step)
+    direction, ahead, behind = ends(fns, p, lam0, v0, direction, domain)
+    kind = orbit_kind(direction, ahead, behind, v0, period)
+    if kind == NO_ORBIT:
+        return UNDECIDED, none
+    circulates = kind == CIRCULATION
+    one, other = (direction * period, 0.0) if circulates else (ahead.near, behind.near)
+    return ANSWERED, Orbit(circulates, even, direction, lam0, v2, min(one, other), max(one, other))
+
+
+@Inner
+def orbit_time(fns, p, orbit):  # type: ignore[no-untyped-def]
+    """The half period of a libration, or the time of a circulation's lap; NaN where doubles cannot give it."""
+    kind, width = LIBRATION, orbit.high - orbit.low
+    a, b = orbit.lam0 + orbit.low, orbit.lam0 + orbit.high
+    if orbit.circulates:
+        kind, width = CIRCULATION, orbit.high + orbit.low  # one of them is zero
+        a, b = orbit.lam0, orbit.lam0 + width
+    value = time_by_trapezoid(fns, p, kind, orbit.lam0, orbit.v2, a, b, width)
+    return value if value > 0.0 else time_by_panels(fns, p, kind, orbit.lam0, orbit.v2, a, b)
+
+
+@Inner
+def fill_answer(fns, p, orbit, quantity, target, work, series, out):  # type: ignore[no-untyped-def]
+    """Fill the row ``out`` with a quantity of an orbit; returns the status. ``target`` is the place of ARRIVAL_TIME."""
+    if orbit.circulates and quantity in (HALF_PERIOD, TURNING_POINTS):
+        return NOT_PERIODIC
+    if quantity in (HALF_PERIOD, PERIOD):
+        time = orbit_time(fns, p, orbit)
+        out[0] = 2.0 * time if quantity == PERIOD and not orbit.circulates else time
+    elif quantity == TURNING_POINTS:
+        out[0], out[1] = orbit.lam0 + orbit.low, orbit.lam0 + orbit.high
+    elif quantity == ARRIVAL_TIME:
+        out[0] = arrival(fns, p, orbit, target, work, series)
+        if out[0] == inf:
+            out[0] = np.nan
+            return NEVER_THERE
+    else:
+        force, sign = quantity in (MIN_FORCE, MAX_FORCE), 1.0 if quantity in (MAX_SPEED, MAX_FORCE) else -1.0
+        out[0] = extreme(fns, p, orbit, force, sign)
+    return ANSWERED if isfinite(out[0]) else UNDECIDED
+
+
 @entry(
-    types.void(
-        *(ADDRESSES, types.int64[:, ::1], types.boolean, types.int64, MATRIX, MATRIX, types.int8[::1], VECTOR),
-    ),
+    types.void(ADDRESSES, types.int64[:, ::1], types.boolean, types.int64, MATRIX, ANSWERS, VECTOR),
     nogil=True,
 )
-def answer_one_by_one(fns, columns, monotone, asked, spans, out, reasons, held):  # type: ignore[no-untyped-def]
-    """Fill a row of ``out`` and of ``reasons`` for each launch that is HARD or SPANNED so far.
+def answer_one_by_one(fns, columns, monotone, quantity, spans, answers, parameters):  # type: ignore[no-untyped-def]
+    """Answer each launch whose status is UNDECIDED or SPAN_KNOWN so far, as far as doubles decide it.
 
-    ``columns`` are launches as `columns.pointers` gives them; V**2 is ``monotone`` between the axes of symmetry;
-    ``spans`` are those that batches found. A row of ``out`` holds both turning points (PLACES), or one number. ``held``
-    is room for the parameters of one launch.
+    Parameters
+    ----------
+    fns : Addresses
+        The module's compiled functions.
+    columns : array
+        The launches, as `strided.pointers` gives them.
+    monotone : bool
+        Whether V**2 is monotone between neighbouring axes of symmetry.
+    quantity : int
+        One of HALF_PERIOD to MAX_FORCE.
+    spans : (n, 2) array
+        For each launch of status SPAN_KNOWN what batches answered to SPANS.
+    answers : Answers
+        Filled in: both turning points, or one number in the first column.
+    parameters : array
+        A buffer for the parameters of one launch.
     """
-    work, series, p = work_room(), rate_room(), uncounted(held)
-    for k in range(reasons.size):
-        spanned = reasons[k] == SPAN_KNOWN
-        if reasons[k] != UNDECIDED and not spanned:
+    work, series, p = trapezoid_workspace(), trapezoid_rates(), uncounted(parameters)
+    for k in range(answers.status.size):
+        known = answers.status[k] == SPAN_KNOWN
+        if answers.status[k] != UNDECIDED and not known:
             continue
         for row in range(p.size):
             p[row] = element(columns, PARAMETERS + row, k)
-        lam0, v0, way = element(columns, LAM0, k), element(columns, V0, k), int(element(columns, DIRECTION, k))
-        low, high, period = (
-            element(columns, DOMAIN_LOW, k),
-            element(columns, DOMAIN_HIGH, k),
-            element(columns, DOMAIN_PERIOD, k),
-        )
-        mirror, step = element(columns, AXIS, k) if monotone else np.nan, element(columns, AXIS_STEP, k)
-        if not (isfinite(lam0) and isfinite(v0) and isfinite(p.sum())):
-            reasons[k] = NOT_FINITE
-            continue
-        if not low <= lam0 <= high:
-            reasons[k] = OUTSIDE_DOMAIN
-            continue
-        if spanned:
-            least, most = spans[k, 0], spans[k, 1]
-            going_round = most != most
-            if going_round:
-                least, most = min(least, 0.0), max(least, 0.0)
-            elif v0 == 0.0:
-                way = 1 if most > -least else -1
-        else:
-            way, ahead, behind = ends(fns, p, lam0, v0, way, low, high, period, mirror, step)
-            going_round = way != 0 and ahead[0] == LIMIT and period > 0.0 and v0 > 0.0
-            if not (going_round or (way != 0 and ahead[0] == TURN and behind[0] == TURN)):
-                reasons[k] = UNDECIDED
-                continue
-            one, other = (way * period, 0.0) if going_round else (ahead[1], behind[1])
-            least, most = min(one, other), max(one, other)
-        if going_round and asked in (HALF_PERIOD, TURNING_POINTS):
-            reasons[k] = NOT_PERIODIC
-            continue
-        reasons[k] = ANSWERED
-        w0, a, b = v0 * v0, lam0 + least, lam0 + most
-        if asked in (HALF_PERIOD, PERIOD):
-            kind, width = (CIRCULATION, way * period) if going_round else (LIBRATION, most - least)
-            a, b = (lam0, lam0 + width) if going_round else (a, b)
-            value = time_by_trapezoid(fns, p, kind, lam0, w0, a, b, width)
-            if not value > 0.0:
-                value = time_by_panels(fns, p, kind, lam0, w0, a, b)
-            out[k, 0] = 2.0 * value if asked == PERIOD and kind == LIBRATION else value
-        elif asked == TURNING_POINTS:
-            out[k, 0], out[k, 1] = a, b
-        elif asked == ARRIVAL_TIME:
-            place = element(columns, TARGET, k)
-            out[k, 0] = arrival(fns, p, going_round, way, lam0, w0, least, most, place, work, series)
-            if out[k, 0] == inf:
-                out[k, 0], reasons[k] = np.nan, NEVER_THERE
-                continue
-        else:
-            force, sign = asked in (MIN_FORCE, MAX_FORCE), 1.0 if asked in (MAX_SPEED, MAX_FORCE) else -1.0
-            out[k, 0] = extreme(fns, p, going_round, mirror == mirror, lam0, w0, least, most, force, sign)
-        if not isfinite(out[k, 0]):
-            reasons[k] = UNDECIDED
+        status, orbit = find_orbit(fns, p, columns, k, monotone, spans, known)
+        if status == ANSWERED:
+            target = element(columns, TARGET, k)
+            status = fill_answer(fns, p, orbit, quantity, target, work, series, uncounted(answers.values[k]))
+        answers.status[k], answers.route[k] = status, SINGLE

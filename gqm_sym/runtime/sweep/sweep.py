@@ -1,11 +1,12 @@
 """One quantity over arrays of launches and parameters.
 
-Most orbits are answered by one compiled loop (`swift`); those that it leaves are solved one by one, as `solve` does.
+Most orbits are answered side by side in batches, others by a compiled loop over single launches (`scalar`); those that
+both leave undecided are solved one by one, as `solve` does it.
 """
 
 from collections.abc import Callable, Iterator, Mapping
 from functools import lru_cache
-from math import inf, isfinite, nan, prod
+from math import inf, nan, prod
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -18,115 +19,93 @@ from gqm_sym.runtime.compiled.strided import PARAMETERS, lay_out, pointers, wide
 from gqm_sym.runtime.compiled.threads import run_in_threads
 from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.launch.request import CONTACTS, LaunchRequest
-from gqm_sym.runtime.launch.speed import path_and_force_at
-from gqm_sym.runtime.motion.extremes import over_legs
 from gqm_sym.runtime.sweep import quantities, scalar
 from gqm_sym.runtime.sweep.batch.batches import answer_batches
+from gqm_sym.runtime.sweep.quantities import QUANTITIES, ROUTES, STATUS_SENTENCES, Answers, Quantity
 
 if TYPE_CHECKING:
     from gqm_sym.runtime.launch.formulas import Formulas
 
 
-# Launches a thread is worth starting for, and those that are laid out at a time.
-LEAST, CHUNK = 2**9, 2**16
+# From how many launches on a thread is worth starting, and how many are laid out at a time.
+MIN_LAUNCHES_PER_THREAD, CHUNK = 2**9, 2**16
 
-# What the compiled loop is never asked.
-NEVER = -1
+# The motion of one launch with the parameters given.
+Solve = Callable[[LaunchRequest, tuple[Any, ...]], Any]
 
-# Why there is no value, by code; 0 where there is one.
-REASONS = (
-    "",
-    "left to the exact problem",
-    "the motion is not of a kind that has this quantity",
-    "the launch or a parameter is not a finite number",
-    "the launch place lies outside the domain",
-    "the motion is never at the place asked for",
-    "the launch is refused; solve says why",
-)
-REFUSED = 6
+# Quantities that are answered by batches themselves; for others batches find the span of an orbit.
+ANSWERED_BY_BATCHES = (quantities.HALF_PERIOD, quantities.PERIOD, quantities.TURNING_POINTS)
+
+# What public names of earlier versions are called now.
+RENAMED = {"reasons": "status", "why": "status_counts()"}
 
 
 class Sweep(NamedTuple):
-    """Values over all launches, NaN where there is none, and why not: codes into `REASONS`, 0 where there is one."""
+    """The values of one quantity over many launches.
+
+    ``np.asarray(sweep)`` is the array of the values.
+
+    Attributes
+    ----------
+    values : float array
+        The quantity of each launch, in the shape that the arguments broadcast to; NaN where there is none. Times
+        (``half_period``, ``period``, ``time_at``, ``t_end``) are in seconds, speeds (``v_min``, ``v_max``) in m/s,
+        forces (``normal_force_min``, ``normal_force_max``) in newtons; places (``turning_points``,
+        ``rest_position``) are values of the curve's parameter, in its unit. ``turning_points`` has one more axis of
+        length 2, for the lower and the upper one.
+    status : int8 array
+        0 for each launch that has a value; otherwise a code that says why there is none. `status_counts` gives the
+        sentences, which stand in `quantities.STATUS_SENTENCES`.
+    route : int8 array
+        How each launch was answered, as an index into `quantities.ROUTES`: 0 "batch", in a batch of orbits side by
+        side; 1 "single", alone in a compiled loop; 2 "solve", solved as ``solve`` does it. The values do not depend
+        on it beyond rounding, but the time that they take does.
+    """
 
     values: Array
-    reasons: NDArray[np.int8]
+    status: NDArray[np.int8]
+    route: NDArray[np.int8]
 
-    def why(self) -> dict[str, int]:
-        """Count the launches without a value, by reason."""
-        codes, counts = np.unique(self.reasons[self.reasons > 0], return_counts=True)
-        return {REASONS[code]: int(count) for code, count in zip(codes, counts, strict=True)}
+    def status_counts(self) -> dict[str, int]:
+        """Count the launches that have no value.
 
+        Returns
+        -------
+        dict
+            The number of launches for each sentence that says why there is no value; empty if all have one.
+        """
+        return _counts(self.status, STATUS_SENTENCES, 1)
 
-class Quantity(NamedTuple):
-    """One quantity: what is asked of the compiled loop, the numbers it answers, which of them, and of one motion."""
+    def route_counts(self) -> dict[str, int]:
+        """Count the launches by the route on which they were answered.
 
-    asked: int
-    width: int
-    columns: slice | int
-    of_motion: Callable[[Any, Any], Any]
+        Returns
+        -------
+        dict
+            The number of launches for each of "batch", "single" and "solve" that occurs.
+        """
+        return _counts(self.route, ROUTES, 0)
 
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> Array:
+        """The values, as `numpy.asarray` asks for them."""
+        return self.values.astype(dtype or self.values.dtype, copy=bool(copy))
 
-def _turning_points(motion: Any, _: Any) -> Any:
-    return sorted(motion.turning_points) if motion.kind == "libration" else (nan, nan)
+    def __getattr__(self, name: str) -> Any:
+        """Say what an attribute of an earlier version is called now.
 
-
-def _rest_position(motion: Any, _: Any) -> float:
-    if motion.kind == "rest":
-        return float(motion.problem.lam0)
-    rests = motion.kind == "dissipative" and isfinite(motion.t_end) and motion.legs[-1].end == "rest"
-    return motion.legs[-1].lam_end if rests else nan
-
-
-def _extreme(load: Callable[[Any, Array], Array], of_state: str, sign: int) -> Callable[[Any, Any], float]:
-    """The largest or least load: of a periodic motion the best of many places, closer and closer."""
-
-    def of_motion(motion: Any, _: Any) -> float:
-        if motion.kind not in ("libration", "circulation") or isfinite(motion.t_end):
-            return over_legs(motion, _STATES[of_state], sign)
-        stretch = motion.one_period[0].stretch
-        low, high = 0.0, stretch.stop
-        for _round in range(8):
-            phi = np.linspace(low, high, 129)
-            values = load(motion, phi)
-            best = int(np.argmax(sign * values))
-            low, high = phi[max(best - 1, 0)], phi[min(best + 1, phi.size - 1)]
-        return float(values[best])
-
-    return of_motion
+        Raises
+        ------
+        AttributeError
+            Always, as there is no attribute of this name.
+        """
+        hint = f"; it is now called {RENAMED[name]}" if name in RENAMED else ""
+        raise AttributeError(f"Sweep has no attribute {name!r}{hint}", name=name, obj=self)
 
 
-def _speed(motion: Any, phi: Array) -> Array:
-    speeds: Array = motion.one_period[0].stretch.speeds(phi)
-    return speeds
-
-
-# The same of states.
-_STATES: dict[str, Callable[[Any], Array]] = {
-    "speed": lambda state: np.abs(state.v),
-    "force": lambda state: state.normal_force,
-}
-
-
-def _force(motion: Any, phi: Array) -> Array:
-    stretch = motion.one_period[0].stretch
-    f = stretch.functions
-    forces: Array = path_and_force_at(f.addresses, f.p, stretch.places(phi), stretch.speeds(phi) ** 2)[4]
-    return forces
-
-
-QUANTITIES = {
-    "half_period": Quantity(quantities.HALF_PERIOD, 1, 0, lambda motion, _: motion.half_period),
-    "period": Quantity(quantities.PERIOD, 1, 0, lambda motion, _: motion.period),
-    "turning_points": Quantity(quantities.TURNING_POINTS, 2, slice(0, 2), _turning_points),
-    "v_min": Quantity(quantities.MIN_SPEED, 1, 0, _extreme(_speed, "speed", -1)),
-    "v_max": Quantity(quantities.MAX_SPEED, 1, 0, _extreme(_speed, "speed", 1)),
-    "normal_force_min": Quantity(quantities.MIN_FORCE, 1, 0, _extreme(_force, "force", -1)),
-    "normal_force_max": Quantity(quantities.MAX_FORCE, 1, 0, _extreme(_force, "force", 1)),
-    "time_at": Quantity(quantities.ARRIVAL_TIME, 1, 0, lambda motion, place: motion.time_at(place)),
-    "t_end": Quantity(NEVER, 1, 0, lambda motion, _: motion.t_end if isfinite(motion.t_end) else nan),
-    "rest_position": Quantity(NEVER, 1, 0, _rest_position),
-}
+def _counts(codes: NDArray[np.int8], names: tuple[str, ...], first: int) -> dict[str, int]:
+    """How often each code from ``first`` on occurs, by the codes' names."""
+    found, counts = np.unique(codes[codes >= first], return_counts=True)
+    return {names[code]: int(count) for code, count in zip(found, counts, strict=True)}
 
 
 def sweep(
@@ -135,12 +114,35 @@ def sweep(
     launches: LaunchRequest,
     given: tuple[Any, ...],
     lam: Any,
-    solve: Callable[[LaunchRequest, tuple[Any, ...]], Any],
+    solve: Solve,
 ) -> Sweep:
-    """One quantity of the motion of each launch; all arguments but contact and t_max broadcast against each other."""
+    """One quantity of the motion of each launch; all arguments but contact and t_max broadcast against each other.
+
+    Parameters
+    ----------
+    formulas : Formulas
+        The model of a generated module.
+    quantity : str
+        A name in `quantities.QUANTITIES`.
+    launches : LaunchRequest
+        Its ``lam0``, ``v0`` and ``direction`` may be arrays.
+    given : tuple
+        A number or an array for each run-time parameter.
+    lam : number or array, optional
+        The place that "time_at" asks about.
+    solve : callable
+        ``solve(request, parameters)`` is the motion of one launch.
+
+    Raises
+    ------
+    InputError
+        If the quantity, the contact or ``lam`` cannot be, shapes do not broadcast, or a launch is impossible.
+    ParameterError
+        If a parameter is missing or outside of what the closed forms hold for.
+    """
     lam0, v0, direction, _, t_max, contact = launches
-    asked = QUANTITIES.get(quantity)
-    if asked is None:
+    found = QUANTITIES.get(quantity)
+    if found is None:
         raise InputError(f"quantity: must be one of {', '.join(QUANTITIES)}, got {quantity!r}")
     if (lam is None) == (quantity == "time_at"):
         raise InputError(f"lam: is the place that 'time_at' asks about, got {lam!r} with {quantity!r}")
@@ -148,31 +150,38 @@ def sweep(
         raise InputError(f"contact: must be one of {', '.join(CONTACTS)}, got {contact!r}")
     names = ("lam0", "v0", "direction", "lam", *formulas.parameters)
     sources = (lam0, v0, direction, 0.0 if lam is None else lam, *given)
-    columns = [_column(value, name) for value, name in zip(sources, names, strict=True)]
-    _check(formulas, dict(zip(names, columns, strict=True)))
-    shape = broadcast_shape(dict(zip(names, columns, strict=True)))
-    _check_least(formulas, dict(zip(names, columns, strict=True)))
-    plain, columns = columns, [widen(column, shape) for column in columns]
+    arrays = [_column(value, name) for value, name in zip(sources, names, strict=True)]
+    named = dict(zip(names, arrays, strict=True))
+    _check(formulas, named)
+    shape = broadcast_shape(named)
+    _check_lower_bounds(formulas, named)
+    columns = [widen(array, shape) for array in arrays]
     size = prod(shape)
-    out, reasons = np.full((size, asked.width), nan), np.full(size, quantities.UNDECIDED, dtype=np.int8)
-    if is_swift(formulas, asked, t_max, contact):
-        known = [widen(value, shape) for value in _known(formulas, plain[4:])]
-        rows = [*columns[:4], *known, *columns[4:]]
-        run_in_threads(lambda part: _answer(formulas, asked, rows, part, out, reasons), size, LEAST)
-    values = out[:, asked.columns]
-    for k in np.flatnonzero(reasons == quantities.UNDECIDED):
+    answers = Answers(
+        np.full((size, found.width), nan),
+        np.full(size, quantities.UNDECIDED, dtype=np.int8),
+        np.full(size, quantities.BATCH, dtype=np.int8),
+    )
+    if has_compiled_route(formulas, found, t_max, contact):
+        domain = [widen(value, shape) for value in _domain_columns(formulas, arrays[4:])]
+        rows = [*columns[:4], *domain, *columns[4:]]
+        run_in_threads(lambda part: _answer(formulas, found, rows, part, answers), size, MIN_LAUNCHES_PER_THREAD)
+    values = answers.values[:, found.columns]
+    for k in np.flatnonzero(answers.status == quantities.UNDECIDED):
         here = [s if np.ndim(s) == 0 else float(c.flat[k % c.size]) for s, c in zip(sources, columns, strict=True)]
-        values[k], reasons[k] = _solved(solve, asked, here, t_max, contact)
-    return Sweep(values.reshape(shape + values.shape[1:]), reasons.reshape(shape))
+        values[k], answers.status[k] = _solved(solve, found, here, t_max, contact)
+        answers.route[k] = quantities.SOLVE
+    return Sweep(values.reshape(shape + values.shape[1:]), answers.status.reshape(shape), answers.route.reshape(shape))
 
 
-def is_swift(formulas: "Formulas", asked: "Quantity", t_max: Any, contact: str) -> bool:
-    """Whether the compiled loop answers most launches.
+def has_compiled_route(formulas: "Formulas", quantity: Quantity, t_max: Any, contact: str) -> bool:
+    """Whether compiled loops answer most launches.
 
-    Charts, dissipative motions, bodies that must fit their track or may leave it, and horizons have no swift way.
+    They do not for curves without formulas, motions that lose energy, bodies that must fit their track or may leave it,
+    and motions with a last time.
     """
-    plain = formulas.chart is None and formulas.dissipation is None and not formulas.body
-    return plain and asked.asked != NEVER and t_max is None and contact == "bilateral"
+    conservative = formulas.chart is None and formulas.dissipation is None and not formulas.rolling_radius
+    return conservative and quantity.code != quantities.NOT_COMPILED and t_max is None and contact == "bilateral"
 
 
 def broadcast_shape(columns: Mapping[str, Array]) -> tuple[int, ...]:
@@ -215,69 +224,68 @@ def _check(formulas: "Formulas", columns: dict[str, Array]) -> None:
             raise ParameterError(f"{name}: must be positive; the closed forms hold for {name} > 0")
 
 
-def _check_least(formulas: "Formulas", columns: dict[str, Array]) -> None:
-    """Refuse parameters below what they must not fall below."""
-    for name, least in formulas.at_least:
-        bound = columns[least] if least in columns else read_number(least, where=least).value
+def _check_lower_bounds(formulas: "Formulas", columns: dict[str, Array]) -> None:
+    """Refuse parameters below the bounds that the model has for them."""
+    for name, lower in formulas.at_least:
+        bound = columns[lower] if lower in columns else read_number(lower, where=lower).value
         if (columns[name] < bound).any():
-            raise ParameterError(f"{name}: must be at least {least}")
+            raise ParameterError(f"{name}: must be at least {lower}")
 
 
-def _known(formulas: "Formulas", p: list[Array]) -> Iterator[Array]:
-    """What is known of each launch's curve, in the order of `columns`."""
+def _domain_columns(formulas: "Formulas", p: list[Array]) -> Iterator[Array]:
+    """The domain and the axes of symmetry of each launch's curve, in the order of `strided`."""
     place, step = formulas.axes(ARRAYS, tuple(p))
-    known = (*formulas.ends(ARRAYS, tuple(p)), place, _left_over(formulas, place, p), step)
-    for value, missing in zip(known, (-inf, inf, 0.0, nan, nan, 0.0), strict=True):
-        yield np.asarray(missing if value is None else value, dtype=np.float64)
+    found = (*formulas.ends(ARRAYS, tuple(p)), place, _rounding_of_axis(formulas, place, p), step)
+    for value, default in zip(found, (-inf, inf, 0.0, nan, nan, 0.0), strict=True):
+        yield np.asarray(default if value is None else value, dtype=np.float64)
 
 
-def _left_over(formulas: "Formulas", place: Any, p: list[Array]) -> float | None:
-    """What a place of symmetry leaves over as a double, if it is the same for all launches."""
+def _rounding_of_axis(formulas: "Formulas", place: Any, p: list[Array]) -> float | None:
+    """The difference between the axis of symmetry and its nearest double, if the axis is the same for all launches."""
     if place is None or np.ndim(place) or not all(column.size for column in p):
         return None
-    return _rest_of(formulas.axes, float(place), tuple(float(column.flat[0]) for column in p))
+    return _rounding_of(formulas.axes, float(place), tuple(float(column.flat[0]) for column in p))
 
 
 @lru_cache(maxsize=256)
-def _rest_of(axes: Callable[..., Any], place: float, values: tuple[float, ...]) -> float:
+def _rounding_of(axes: Callable[..., Any], place: float, values: tuple[float, ...]) -> float:
     from mpmath import mp
 
     with mp.workdps(40):
         return float(mp.mpf(axes(mp, tuple(map(mp.mpf, values)))[0]) - mp.mpf(place))
 
 
-def _answer(
-    formulas: "Formulas", asked: Quantity, columns: list[Array], part: slice, out: Array, reasons: NDArray[np.int8]
-) -> None:
-    """Answer a part of all launches."""
+def _answer(formulas: "Formulas", quantity: Quantity, columns: list[Array], part: slice, answers: Answers) -> None:
+    """Answer a part of all launches by compiled loops, as far as they decide them."""
+    code, batches = quantity.code, formulas.batch
     for begin in range(part.start, part.stop, CHUNK):
         chunk = slice(begin, min(begin + CHUNK, part.stop))
         lines = lay_out(columns, chunk.start, chunk.stop)
-        launches, values, codes = (pointers(lines), formulas.monotone), out[chunk], reasons[chunk]
-        alone = asked.asked not in (
-            quantities.HALF_PERIOD,
-            quantities.PERIOD,
-            quantities.TURNING_POINTS,
-        )  # batches find its span, no more
-        spans = np.empty((codes.size, 2)) if alone else values
-        if formulas.each is not None:
-            each, held = formulas.each.addresses(), (formulas.each.held, formulas.each.top_held)
-            answer_batches(each, held, *launches, quantities.SPANS if alone else asked.asked, spans, codes)
-        room = np.empty(len(lines) - PARAMETERS)
-        scalar.answer_one_by_one(formulas.addresses, *launches, asked.asked, spans, values, codes, room)
+        launches, found = (pointers(lines), formulas.monotone), answers.part(chunk)
+        spans = found.values if code in ANSWERED_BY_BATCHES else np.empty((found.status.size, 2))
+        if batches is not None:
+            asked = code if code in ANSWERED_BY_BATCHES else quantities.SPANS
+            counts = (batches.orbit_rows, batches.integrand_rows)
+            answer_batches(batches.addresses(), counts, *launches, asked, found._replace(values=spans))
+        parameters = np.empty(len(lines) - PARAMETERS)
+        scalar.answer_one_by_one(formulas.addresses, *launches, code, spans, found, parameters)
 
 
 def _solved(
-    solve: Callable[[LaunchRequest, tuple[Any, ...]], Any], asked: Quantity, here: list[Any], t_max: Any, contact: str
+    solve: Solve,
+    quantity: Quantity,
+    here: list[Any],
+    t_max: Any,
+    contact: str,
 ) -> tuple[Any, int]:
-    """The quantity of one launch, solved by itself."""
+    """The quantity of one launch that is solved by itself, and its status."""
     lam0, v0, direction, place, *given = here
     try:
         motion = solve(LaunchRequest(lam0, v0, int(direction), None, t_max, contact), tuple(given))
     except GQMError:
-        return nan, REFUSED
+        return nan, quantities.REFUSED
     try:
-        value = asked.of_motion(motion, place)
+        value = quantity.of_motion(motion, place)
     except SolutionError:
-        return nan, quantities.NEVER_THERE if asked.asked == quantities.ARRIVAL_TIME else quantities.NOT_PERIODIC
+        return nan, quantities.NEVER_THERE if quantity.code == quantities.ARRIVAL_TIME else quantities.NOT_PERIODIC
     return value, quantities.NOT_PERIODIC if np.isnan(value).any() else quantities.ANSWERED

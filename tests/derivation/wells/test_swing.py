@@ -83,12 +83,12 @@ def by_swing(model: gqm.Model, half: mpf) -> mpf:
 def by_heights(model: gqm.Model, half: mpf) -> mpf:
     """The half period as the integral of ds/V, over an angle: digits that cancel are there in plenty."""
     assert model.symmetry is not None
-    climb, ds = functions(model, model.climb, model.ds, by=(model.parameter,))
+    potential, ds = functions(model, model.effective_potential, model.ds, by=(model.parameter,))
     axis = mpf(sp.N(model.symmetry.place, mp.dps))
 
     def rate(u: mpf) -> mpf:
         place = axis + half * mp.sin(u)
-        return ds(place) * half * mp.cos(u) / mp.sqrt(climb(axis + half) - climb(place))
+        return ds(place) * half * mp.cos(u) / mp.sqrt(2 * (potential(axis + half) - potential(place)))
 
     return 2 * integral(rate)
 
@@ -130,16 +130,16 @@ def test_a_half_period_is_pi_over_a_mean(name: str) -> None:
 @pytest.mark.parametrize("share", ["-0.99", "-1/3", "0", "0.7"])
 @pytest.mark.parametrize("name", CRESTS)
 def test_where_a_body_comes_to_rest(name: str, share: str) -> None:
-    """Launched anywhere in the well with what V**2 it has there, it has the well's width; the climb grows outwards."""
+    """Launched anywhere in the well, with the V**2 it has there, an orbit has the well's width."""
     model, half = model_of(name), CASES[name][-1]
     assert model.swing is not None
     assert model.swing.crest is not None
     assert model.symmetry is not None
-    (climb,) = functions(model, model.climb, by=(model.parameter,))
+    (potential,) = functions(model, model.effective_potential, by=(model.parameter,))
     width, growth, square = functions(model, *model.swing.crest, by=(OFFSET, LAUNCH))
     with mp.workdps(40):
         axis, offset = mpf(sp.N(model.symmetry.place, 40)), mpf(half) * mp.mpf(sp.Rational(share))
-        left = climb(axis + mpf(half)) - climb(axis + offset)
+        left = 2 * (potential(axis + mpf(half)) - potential(axis + offset))
         assert abs(width(offset, left) / mpf(half) - 1) < mpf("1e-30")
         assert growth(offset, left) > 0
         assert 0 <= square(offset, left) < 1

@@ -37,14 +37,14 @@ def test_symmetry(name: str) -> None:
         sp.Symbol(key, real=True): value for key, value in (("L", sp.Rational(7, 5)), ("g", sp.Rational(981, 100)))
     }
     with mp.workdps(30):
-        climb, ds, slope = (
+        potential, ds, slope = (
             sp.lambdify(model.parameter, form.xreplace(values), "mpmath")
-            for form in (model.climb, model.ds, model.climb_slope)
+            for form in (model.effective_potential, model.ds, model.effective_potential_slope)
         )
         axes = [mpf(sp.N(place + k * (step or 0), 40)) for k in (0, 1, -3)]
         for axis in axes:
             for away in map(mpf, ("0.3", "1.7", "2.9")):
-                for form in (climb, ds):
+                for form in (potential, ds):
                     assert abs(form(axis + away) - form(axis - away)) <= mpf("1e-25") * (1 + abs(form(axis + away)))
         signs = {mp.sign(slope(axes[0] + (axes[1] - axes[0] or 9) * mpf(k) / 10)) for k in range(1, 10)}
     assert not monotone or len(signs) == 1

@@ -16,7 +16,7 @@ from gqm_sym.emission import charts
 from gqm_sym.emission.ir import ChartIR
 from gqm_sym.errors import LaunchError, SolutionError
 from gqm_sym.runtime.charts import evaluate
-from gqm_sym.runtime.charts.chart import NODES, Chart, assemble
+from gqm_sym.runtime.charts.chart import NODES, Chart, PieceData, assemble
 from gqm_sym.sympy_charts import chart_x, chart_z
 
 ULP = 2.0**-52
@@ -37,10 +37,12 @@ class Ring:
         s = edges[:-1, None] + 0.5 * np.diff(edges)[:, None] * (1.0 + NODES)
         start = edges[:-1] / radius
         return assemble(
-            edges=edges,
-            anchors=np.stack([radius * np.sin(start), -radius * np.cos(start)], axis=1),
-            angles=s / radius,
-            curvatures=np.full_like(s, 1.0 / radius),
+            edges,
+            PieceData(
+                anchors=np.stack([radius * np.sin(start), -radius * np.cos(start)], axis=1),
+                angles=s / radius,
+                curvatures=np.full_like(s, 1.0 / radius),
+            ),
             period=edges[-1] if self.closed else 0.0,
             turn=2.0 * np.pi,
         )
@@ -119,11 +121,13 @@ def test_differences_far_from_the_origin() -> None:
         anchors = np.array([float(x(start)) for start in edges[:-1]])
         rests = np.array([float(x(start) - mpf(float(anchor))) for start, anchor in zip(edges, anchors, strict=False)])
         chart = assemble(
-            edges=edges,
-            anchors=np.stack([anchors, -RADIUS * np.cos(edges[:-1] / RADIUS)], axis=1),
-            rests=np.stack([rests, np.zeros(9)], axis=1),
-            angles=s / RADIUS,
-            curvatures=np.full_like(s, 1.0 / RADIUS),
+            edges,
+            PieceData(
+                anchors=np.stack([anchors, -RADIUS * np.cos(edges[:-1] / RADIUS)], axis=1),
+                anchor_lows=np.stack([rests, np.zeros(9)], axis=1),
+                angles=s / RADIUS,
+                curvatures=np.full_like(s, 1.0 / RADIUS),
+            ),
         )
         for k in range(6):
             a, b = float(edges[k] + 0.3), float(edges[k + 3] - 0.2)
@@ -155,10 +159,12 @@ def test_differences_of_the_angle_across_joints(size: float) -> None:
         return Fraction(0.3) * winding / 2 + Fraction(0.7) * max(s - Fraction(jump), Fraction(0))
 
     chart = assemble(
-        edges=edges,
-        anchors=np.zeros((edges.size - 1, 2)),
-        angles=[[float(angle(Fraction(place))) for place in row] for row in s],
-        curvatures=0.3 * np.maximum(2.25 - np.abs(s - 5.25), 0.0) + np.where(s > jump, 0.7, 0.0),
+        edges,
+        PieceData(
+            anchors=np.zeros((edges.size - 1, 2)),
+            angles=[[float(angle(Fraction(place))) for place in row] for row in s],
+            curvatures=0.3 * np.maximum(2.25 - np.abs(s - 5.25), 0.0) + np.where(s > jump, 0.7, 0.0),
+        ),
     )
     for joint in edges[1:-1]:
         for shares in ((-0.7, -0.2, 0.9), (-0.6, 0.3, 0.8)):
@@ -191,7 +197,7 @@ def test_nearest_point() -> None:
     assert abs(s - RADIUS * np.arctan2(0.5, 0.9)) <= 4 * ULP
     assert abs(distance - (RADIUS - np.hypot(0.5, 0.9))) <= 4 * ULP
     flat = np.zeros((2, NODES.size))
-    line = assemble(edges=[0.0, 1.0, 2.0], anchors=[[0.0, 0.0], [1.0, 0.0]], angles=flat, curvatures=flat)
+    line = assemble([0.0, 1.0, 2.0], PieceData([[0.0, 0.0], [1.0, 0.0]], flat, flat))
     for x, end in ((-1.0, 0.0), (3.0, 2.0)):  # beyond an end that is the nearest
         assert line.nearest(x, 1.0) == pytest.approx((end, np.sqrt(2.0)), rel=4 * ULP)
 

@@ -248,7 +248,7 @@ LINE = [(float(i), 0.1 * i * i) for i in range(12)]
         ([], {}, "0 different points"),
         (LINE[:2], {"kind": "linear", "closed": True}, "2 different points; a closed track of kind 'linear' needs 3"),
         ([*LINE[:4], LINE[2]], {"kind": "linear"}, "row 4: the track turns by 180 degrees"),
-        (7, {}, "points: must be rows of x and z, got int"),
+        (7, {}, "points: must be rows of x and z, got 7"),
         (LINE, {"kind": "cubic"}, "kind: must be one of spline, linear, got 'cubic'"),
         (LINE, {"closed": "yes"}, "closed: must be True, False or None, got 'yes'"),
     ],

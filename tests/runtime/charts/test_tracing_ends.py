@@ -9,7 +9,7 @@ from naive import error, ulps
 from traced import BEND, ROOT, ROUNDING, SQUARE, WAVE, other, trace
 
 from gqm_sym.errors import LaunchError, SolutionError
-from gqm_sym.runtime.charts.continuation import PIECES
+from gqm_sym.runtime.charts.continuation import MAX_PIECES
 
 
 @pytest.mark.parametrize("domain", [(0, 2 * math.pi), (-1, 7), (0, None), (None, 7)])
@@ -92,9 +92,9 @@ def test_end_of_what_is_real() -> None:
 
 def test_budget() -> None:
     """A domain that takes too many pieces is refused; a wave without one is followed as far as they reach."""
-    with pytest.raises(SolutionError, match=f"the end of its domain: {PIECES} pieces reach s = -"):
+    with pytest.raises(SolutionError, match=f"the end of its domain: {MAX_PIECES} pieces reach s = -"):
         other(WAVE, (0.0, 0.0), (-1e6, 0.0))
     chart = other(WAVE, (0.0, 0.0))
-    assert chart.edges.size == 2 * PIECES + 1
+    assert chart.edges.size == 2 * MAX_PIECES + 1
     x, z, _, _ = chart.points(np.linspace(chart.low, chart.high, 999))
     assert np.abs(z - np.sin(x)).max() <= 2e-13

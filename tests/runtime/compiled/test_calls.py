@@ -45,10 +45,10 @@ def test_one_crossing_a_solve_and_a_time(launch: tuple[float, float], module_of:
 def test_panels_are_laid_when_asked_for(module_of: ModuleOf) -> None:
     """A solved motion knows its turning points and its time; panels come with the first position."""
     motion = module_of("circle").solve(1.0, 0.5, L=1)
-    assert motion._stretch.laid is None
-    before = motion._stretch.duration
+    assert motion._segment.stored_panels is None
+    before = motion._segment.duration
     motion.lam(0.1)
-    assert motion._stretch.laid is not None
+    assert motion._segment.stored_panels is not None
     assert before == pytest.approx(motion.half_period, rel=5e-16)
 
 

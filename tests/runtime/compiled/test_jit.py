@@ -11,11 +11,12 @@ import pytest
 
 from gqm_sym.runtime.arithmetic.doubledouble import two_sum
 from gqm_sym.runtime.compiled import jit
+from gqm_sym.runtime.compiled.numba_internals import KeyedFiles
 
 
 def _key() -> tuple[Any, ...]:
     codegen = SimpleNamespace(magic_tuple=lambda: ("a processor",))
-    return jit.ReadyCache(two_sum.py_func)._index_key("a signature", codegen)
+    return jit.COMPILER.cache_of(two_sum.py_func)._index_key("a signature", codegen)
 
 
 def test_an_edit_anywhere_in_the_runtime_compiles_anew(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -68,12 +69,12 @@ def test_compiling_the_runtime_is_announced_once(stream: Any, said: int, monkeyp
 
 def test_what_is_kept_is_found_again_by_its_key_alone(tmp_path: Path) -> None:
     """Under its key and stamp; a file that holds another key, or was made of another text, is not read."""
-    files = jit.KeyedFiles(str(tmp_path), "name", "stamp")
+    files = KeyedFiles(str(tmp_path), "name", "stamp")
     assert files.load(("key", 1)) is None
     files.save(("key", 1), "code")
     assert files.load(("key", 1)) == "code"
     assert files.load(("key", 2)) is None
     (kept,) = tmp_path.iterdir()
-    kept.rename(tmp_path / files._file_of(("key", 2)))
+    kept.rename(tmp_path / files.file_name(("key", 2)))
     assert files.load(("key", 2)) is None
-    assert jit.KeyedFiles(str(tmp_path), "name", "another").load(("key", 1)) is None
+    assert KeyedFiles(str(tmp_path), "name", "another").load(("key", 1)) is None

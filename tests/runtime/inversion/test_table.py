@@ -1,4 +1,4 @@
-"""The table of the anomaly over time is the inverse of the panels' time."""
+"""The table of the phase angle over time is the inverse of the panels' time."""
 
 import math
 from collections.abc import Callable
@@ -9,25 +9,25 @@ import numpy as np
 import pytest
 from mpmath import mp, mpf
 
-from gqm_sym.runtime.inversion.table import anomalies, build_table
+from gqm_sym.runtime.inversion.table import build_table, phase_angles
 from gqm_sym.runtime.launch.problem import bind
 from gqm_sym.runtime.launch.request import LaunchRequest, read_launch
-from gqm_sym.runtime.quadrature.integrands import FROM_TURN, REGULAR, TO_EQUILIBRIUM, TURN_TURN
+from gqm_sym.runtime.quadrature.substitution import FROM_TURN, REGULAR, TO_EQUILIBRIUM, TURN_TURN
 from gqm_sym.runtime.quadrature.time_panels import lay_panels, read_off_many
 
 ModuleOf = Callable[[str], ModuleType]
 
 ULP = 2.0**-52
-# Reading the panels back at the table's anomaly: units in the last place of the whole time, and of the last anomaly.
+# Reading the panels back at the table's phase angle: units in the last place of the whole time, and of the last angle.
 # Worst measured 3 (at a cusp, and on a tiny swing of one segment).
 THERE_AND_BACK = 4.0
-# Anomalies against closed forms, in units of the last place of the last anomaly: measured 5.1.
+# Phase angles against closed forms, in units of the last place of the last phase angle: measured 5.1.
 ANOMALY = 6.0
 # What a first-level cache holds of rows of fifteen numbers is 300; at a cusp they shrink to the time's last place.
 MOST_SEGMENTS = 300
 ROOT = 3e-8
 
-# Track, parameters, kind of stretch, its ends, V**2 at its start, and its last anomaly.
+# Track, parameters, kind of stretch, its ends, V**2 at its start, and its last phase angle.
 STRETCHES: dict[str, tuple[str, dict[str, Any], int, float, float, float, float]] = {
     "pendulum": ("circle", {"L": 1}, TURN_TURN, -1.2, 1.2, 0.0, math.pi),
     "tiny swing": ("circle", {"L": 1}, TURN_TURN, -1e-8, 1e-8, 0.0, math.pi),
@@ -59,10 +59,10 @@ class Table:
         self.table = build_table(self.edges, self.marks, np.zeros_like(self.marks), self.terms)
         self.whole, self.stop = float(self.marks[-1]), stop
 
-    def anomalies(self, t: Any, low: Any = None) -> Any:
-        """The table's anomalies."""
+    def phase_angles(self, t: Any, low: Any = None) -> Any:
+        """The table's phase angles."""
         t = np.asarray(t, dtype=float)
-        return anomalies(*self.table[:6], t, np.zeros_like(t) if low is None else np.asarray(low))
+        return phase_angles(*self.table[:6], t, np.zeros_like(t) if low is None else np.asarray(low))
 
     def times(self, phi: Any) -> Any:
         """The panels' times."""
@@ -92,11 +92,11 @@ def table_of(module_of: ModuleOf) -> Callable[[str], Table]:
 
 
 @pytest.mark.parametrize("name", REACHABLE)
-def test_the_time_at_the_anomaly_is_the_time_asked_for(name: str, table_of: Callable[[str], Table]) -> None:
-    """There and back costs the rounding of the time and of the anomaly, near a separatrix and at a cusp too."""
+def test_the_time_at_the_phase_angle_is_the_time_asked_for(name: str, table_of: Callable[[str], Table]) -> None:
+    """There and back costs the rounding of the time and of the phase angle, near a separatrix and at a cusp too."""
     table = table_of(name)
     t = table.asked()
-    phi = table.anomalies(t)
+    phi = table.phase_angles(t)
     rounding = ULP * table.stop
     beside = [np.clip(phi + k * rounding, 0.0, table.stop) for k in (-THERE_AND_BACK, THERE_AND_BACK)]
     slack = THERE_AND_BACK * math.ulp(table.whole)
@@ -105,10 +105,10 @@ def test_the_time_at_the_anomaly_is_the_time_asked_for(name: str, table_of: Call
 
 
 @pytest.mark.parametrize("name", REACHABLE)
-def test_the_anomaly_grows_with_time(name: str, table_of: Callable[[str], Table]) -> None:
-    """From 0 to the last anomaly, never backwards by more than rounding, and in one piece across segments."""
+def test_the_phase_angle_grows_with_time(name: str, table_of: Callable[[str], Table]) -> None:
+    """From 0 to the last phase angle, never backwards by more than rounding, and in one piece across segments."""
     table = table_of(name)
-    phi = table.anomalies(table.asked())
+    phi = table.phase_angles(table.asked())
     rounding = (ROOT if "cusp" in name else ANOMALY * ULP) * table.stop
     assert abs(phi[0]) <= rounding
     assert abs(phi[-1] - table.stop) <= rounding
@@ -127,7 +127,7 @@ def test_a_table_is_small_and_knows_its_error(name: str, table_of: Callable[[str
     slots = table.whole * np.arange(len(index)) / len(index)
     assert (index <= np.searchsorted(ends, slots, side="right")).all()
     assert len(ends) <= MOST_SEGMENTS
-    # At a cusp the anomaly is as the root of the time left: as much is lost there as the time's last place takes.
+    # At a cusp the phase angle is as the root of the time left: as much is lost there as the time's last place takes.
     assert errors.max() <= (ROOT if "cusp" in name else 1e-14) * table.stop
 
 
@@ -135,7 +135,7 @@ def test_the_tautochrone_s_table_against_its_closed_form(table_of: Callable[[str
     """Arc length oscillates harmonically: sin(u/2) = -sin(A/2) cos(w t) and u = -A cos(phi)."""
     table = table_of("tautochrone")
     t = np.linspace(0.0, table.whole, 101)[1:-1]
-    phi = table.anomalies(t)
+    phi = table.phase_angles(t)
     with mp.workdps(40):
         w = mp.sqrt(mpf("9.81") / 8)
         for k, time in enumerate(t):
@@ -147,7 +147,7 @@ def test_the_separatrix_s_table_against_its_closed_form(table_of: Callable[[str]
     """Towards the hilltop what is left of the angle is 4 atan(exp(-w t)) = pi exp(-phi)."""
     table = table_of("to the hilltop")
     t = np.linspace(0.0, table.whole, 101)
-    phi = table.anomalies(t)
+    phi = table.phase_angles(t)
     with mp.workdps(60):
         w = mp.sqrt(mpf("9.81"))
         for k, time in enumerate(t):
@@ -156,9 +156,9 @@ def test_the_separatrix_s_table_against_its_closed_form(table_of: Callable[[str]
 
 
 def test_a_time_of_two_doubles_is_taken_whole(table_of: Callable[[str], Table]) -> None:
-    """The low part moves the anomaly as it should: half a last place of the time twice is one of them."""
+    """The low part moves the phase angle as it should: half a last place of the time twice is one of them."""
     table = table_of("to the hilltop")
     t = np.linspace(0.1, 0.9, 9) * table.whole
     low = 1e-9 * t
-    apart = table.anomalies(t, low) - table.anomalies(t + low)
+    apart = table.phase_angles(t, low) - table.phase_angles(t + low)
     assert np.abs(apart).max() <= ANOMALY * ULP * table.stop

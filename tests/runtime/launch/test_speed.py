@@ -12,7 +12,7 @@ from mpmath import mp, mpf
 from numba import njit
 
 import gqm_sym as gqm
-from gqm_sym.emission.loads import rounded_size
+from gqm_sym.emission.load_map import rounded_size
 from gqm_sym.errors import InputError
 from gqm_sym.runtime.compiled import threads
 from gqm_sym.runtime.compiled.streaming import LARGE, LINE, put
@@ -218,11 +218,11 @@ def test_sizes_of_what_is_rounded(form: sp.Expr, size: sp.Expr | None) -> None:
         assert abs(sp.N((found - size).subs(at), 20)) < 1e-15
 
 
-def test_a_climb_of_unknown_roundings(generated_folder: Any) -> None:
+def test_a_potential_of_unknown_roundings(generated_folder: Any) -> None:
     """It is told by divided differences alone: V**2 = 2 g log1p((x - a)/a) here, to its last digits."""
     model = gqm.derive(gqm.Curve.graph("-log(x)", parameter="x", domain=("1/100", None)), gqm.Gravity())
     module = gqm.build(model, name="loads_log", folder=generated_folder)
-    assert module.MODEL.loads is None
+    assert module.MODEL.load_map is None
     lam = 0.5 + 10.0 ** np.linspace(-12, 1, 40)
     field = module.pass1(lam, 0.5, 0.0)
     with mp.workdps(40):

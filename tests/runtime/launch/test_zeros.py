@@ -17,7 +17,7 @@ from gqm_sym.errors import LaunchError
 from gqm_sym.runtime.launch.ends import first_zero_from
 from gqm_sym.runtime.launch.problem import bind
 from gqm_sym.runtime.launch.request import LaunchRequest, read_launch
-from gqm_sym.runtime.launch.zeros import CUSP, LIMIT, MARCHED, TURN
+from gqm_sym.runtime.launch.zeros import CUSP, LIMIT, STEPS_SPENT, TURN
 
 ModuleOf = Callable[[str], ModuleType]
 
@@ -185,8 +185,8 @@ def test_a_walk_without_end_goes_on(far: float, module_of: ModuleOf) -> None:
     what, place, _ = walk(line, 0.0, v0, 1, math.inf, k=slope, c=0.0)
     assert what == TURN
     assert place == pytest.approx(far, rel=1e-14)
-    assert walk(line, 0.0, v0, -1, math.inf, k=slope, c=0.0)[0] == MARCHED
-    assert walk(module_of("cubic"), -1.0, 1.0, -1, math.inf)[0] == MARCHED
+    assert walk(line, 0.0, v0, -1, math.inf, k=slope, c=0.0)[0] == STEPS_SPENT
+    assert walk(module_of("cubic"), -1.0, 1.0, -1, math.inf)[0] == STEPS_SPENT
 
 
 def test_the_end_of_the_domain_is_the_limit(module_of: ModuleOf) -> None:

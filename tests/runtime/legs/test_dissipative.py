@@ -114,7 +114,7 @@ def test_what_a_sweep_has_no_number_for(slope: ModuleType) -> None:
     for quantity in ("v_max", "turning_points"):
         swept = slope.sweep(quantity, lam0=[0.0, 1.0], mu=0.1)
         assert np.isnan(swept.values).all()
-        assert list(swept.why()) == ["the motion is not of a kind that has this quantity"]
+        assert list(swept.status_counts()) == ["the motion is not of a kind that has this quantity"]
 
 
 def test_pass1_of_a_body_at_rest(slope: ModuleType) -> None:
@@ -129,7 +129,7 @@ def test_out_of_the_domain_at_once(build: Build) -> None:
     module = build("bounded", gqm.Curve.graph("x**2", domain=(0, 1)), gqm.QuadraticDrag(b="1"))
     with pytest.raises(LaunchError, match=r"1\.0 is the end of the domain itself, .* launch with direction=-1"):
         module.solve(lam0=1, v0=1)
-    assert module.sweep("t_end", lam0=[1.0], v0=1.0).why() == {"the launch is refused; solve says why": 1}
+    assert module.sweep("t_end", lam0=[1.0], v0=1.0).status_counts() == {"the launch is refused; solve says why": 1}
 
 
 @pytest.fixture(scope="module")

@@ -13,7 +13,7 @@ from numpy.polynomial import chebyshev, legendre
 import generated.cubic_coulomb as cubic_coulomb
 from gqm_sym.runtime.compiled.registers import LANES, copied, on_stack, over_rows, uncounted
 from gqm_sym.runtime.legs import dissipative
-from gqm_sym.runtime.legs.leg_panels import CAUTION, DEGREES, FALL, GROWTH, ahead, growth
+from gqm_sym.runtime.legs.leg_panels import DECREASE, DEGREES, MAX_GROWTH, SAFETY_FACTOR, growth, growth_towards
 from gqm_sym.runtime.legs.leg_segments import INTEGRAL_BY_NODE, PLAIN_BY_NODE
 from gqm_sym.runtime.legs.polynomials import (
     COUNT,
@@ -167,16 +167,16 @@ def test_rows_in_registers() -> None:
 @pytest.mark.parametrize("worst", [1e-300, 3e-17, 4.1e-9, 0.02, 0.5, 1.0, 7.0, 1e5])
 def test_how_much_wider_a_panel_may_be(worst: float) -> None:
     """A root to a few per cent, and never more than the most."""
-    exact = min(CAUTION * worst ** (-1.0 / DEGREES) / FALL, GROWTH)
+    exact = min(SAFETY_FACTOR * worst ** (-1.0 / DEGREES) / DECREASE, MAX_GROWTH)
     assert growth(worst) == pytest.approx(exact, rel=0.065)
-    assert growth(worst) <= GROWTH
+    assert growth(worst) <= MAX_GROWTH
 
 
 def test_a_record_that_is_too_short(monkeypatch: pytest.MonkeyPatch) -> None:
     """A leg of more panels than a record has room for is followed once more, to the same digits."""
     times = np.linspace(0.0, 3.0, 40)
     expected = cubic_coulomb.solve(-1.0, 6.2088).lam(times)
-    monkeypatch.setattr(dissipative, "FEW", 1)
+    monkeypatch.setattr(dissipative, "FEW_PANELS", 1)
     assert np.array_equal(cubic_coulomb.solve(-1.0, 6.2088).lam(times), expected)
 
 
@@ -193,8 +193,8 @@ def test_how_far_a_panel_may_reach_toward_a_turn(distance: float) -> None:
         return float(np.abs(c[14:17]).max() / np.abs(c).max())
 
     level = middle(1.0, distance)
-    again, onwards = ahead(level, 1.0), ahead(level, -1.0)
+    again, onwards = growth_towards(level, 1.0), growth_towards(level, -1.0)
     if again < 1.0 + distance:
-        assert middle(again, 1.0 + distance - again) <= (FALL / 1.1) ** -DEGREES
-    assert middle(onwards, distance - onwards) <= (FALL / 1.1) ** -DEGREES
-    assert middle(1.6 * onwards, max(distance - 1.6 * onwards, 1e-9)) >= FALL**-DEGREES
+        assert middle(again, 1.0 + distance - again) <= (DECREASE / 1.1) ** -DEGREES
+    assert middle(onwards, distance - onwards) <= (DECREASE / 1.1) ** -DEGREES
+    assert middle(1.6 * onwards, max(distance - 1.6 * onwards, 1e-9)) >= DECREASE**-DEGREES

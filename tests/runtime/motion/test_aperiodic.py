@@ -371,7 +371,7 @@ def test_a_fall_into_a_spiral_is_tabulated(generated_folder: Any) -> None:
     launch = {"lam0": 1.3490766955876934, "v0": 3.2020412377682295, "r0": 0.23362934079070044}
     launch |= {"b": 0.16404457011909193, "g": 12.030635764538687}
     motion = spiral.solve(**launch)
-    assert len(motion._course(0.0).pieces[1].stretch.table[0]) < 1000
+    assert len(motion._trajectory(0.0).segments[1].segment.table[0]) < 1000
     with mp.workdps(30):
         r0, b, v0, lam0, g = (mpf(launch[name]) for name in ("r0", "b", "v0", "lam0", "g"))
 

@@ -83,7 +83,7 @@ def test_the_compiled_loop_agrees_with_exact_reading(motion: Any) -> None:
         t = np.append(np.linspace(-reach, reach, 501), [0.0, 0.5 * period])
         state, plain = motion.state(t), Motion.state(motion, t)
         assert (motion.lam(t) == state.lam).all()
-        width = abs(motion._stretch.b - motion._stretch.a)
+        width = abs(motion._segment.b - motion._segment.a)
         for name, got, old in zip(state._fields, state, plain, strict=True):
             if name == "error":  # an estimate: of one size either way
                 assert np.all((got <= 2.0 * old) & (old <= 2.0 * got))
@@ -155,8 +155,8 @@ def test_events_of_later_periods(module_of: ModuleOf) -> None:
 
 def series(motion: Any, there_and_back: bool) -> tuple[np.ndarray, np.ndarray]:
     """The coefficients of a motion's series."""
-    stretch = motion._stretch
-    return fit_wave(stretch.edges, *stretch.clock, stretch.panels[3], there_and_back)
+    segment = motion._segment
+    return fit_wave(segment.edges, *segment.edge_times, segment.panels[3], there_and_back)
 
 
 @pytest.mark.parametrize("amplitude", [0.1, 1.2, 2.9])

@@ -13,8 +13,9 @@ import gqm_sym as gqm
 from gqm_sym.runtime.arithmetic.clenshaw import legendre_sum
 from gqm_sym.runtime.launch.problem import bind
 from gqm_sym.runtime.launch.request import LaunchRequest, read_launch
-from gqm_sym.runtime.quadrature.integrands import FROM_TURN, REGULAR, TO_EQUILIBRIUM, TURN_TURN, speeds_at
+from gqm_sym.runtime.quadrature.integrands import speeds_at
 from gqm_sym.runtime.quadrature.kronrod import GAUSS_WEIGHTS, KRONROD_WEIGHTS, NODES
+from gqm_sym.runtime.quadrature.substitution import FROM_TURN, REGULAR, TO_EQUILIBRIUM, TURN_TURN
 from gqm_sym.runtime.quadrature.time_panels import (
     CONVERGED,
     COUNT,
@@ -22,7 +23,7 @@ from gqm_sym.runtime.quadrature.time_panels import (
     EXHAUSTED,
     FAILED,
     ILL_CONDITIONED,
-    LEAST_WIDTH,
+    MIN_PANEL_SHARE,
     antiderivative,
     lay_panels,
     read_off_many,
@@ -75,15 +76,15 @@ class Laid:
         return float(self.marks[-1])
 
     def times(self, phi: Any) -> Any:
-        """Times at anomalies."""
+        """Times at phase angles."""
         return read_off_many(self.edges, self.marks, self.time_terms, np.asarray(phi, dtype=float))
 
     def arcs(self, phi: Any) -> Any:
-        """Arc lengths at anomalies."""
+        """Arc lengths at phase angles."""
         return read_off_many(self.edges, self.lengths, self.length_terms, np.asarray(phi, dtype=float))
 
     def speeds(self, phi: Any) -> Any:
-        """Speeds at anomalies."""
+        """Speeds at phase angles."""
         return speeds_at(*self.at, np.asarray(phi, dtype=float))
 
 
@@ -196,8 +197,8 @@ def test_the_tautochrone_between_its_turns(end: float, module_of: ModuleOf) -> N
     with mp.workdps(40):
         frequency, reach = mp.sqrt(mpf("9.81") / 8), 8 * mp.sin(mpf(end) / 2)
         assert share(laid.whole, mp.pi / frequency, laid.whole) <= TIME
-        for k, anomaly in enumerate(phi[:-1]):
-            s = 8 * mp.sin(-mpf(end) * mp.cos(mpf(anomaly)) / 2)
+        for k, phase_angle in enumerate(phi[:-1]):
+            s = 8 * mp.sin(-mpf(end) * mp.cos(mpf(phase_angle)) / 2)
             assert share(times[k], mp.acos(-s / reach) / frequency, laid.whole) <= TIME
             assert share(arcs[k], s + reach, float(2 * reach)) <= TIME
             assert share(speeds[k], frequency * mp.sqrt(reach**2 - s**2), float(frequency * reach)) <= SPEED
@@ -212,13 +213,13 @@ def test_the_separatrix_of_the_pendulum(start: float, module_of: ModuleOf) -> No
     assert laid.status == CONVERGED
     with mp.workdps(40):
         w, whole = mp.sqrt(mpf("9.81")), mpf(math.pi) - start
-        for k, anomaly in enumerate(phi):
-            left = whole * mp.exp(-mpf(anomaly))
+        for k, phase_angle in enumerate(phi):
+            left = whole * mp.exp(-mpf(phase_angle))
             truth = (mp.log(mp.tan(whole / 4)) - mp.log(mp.tan(left / 4))) / w
             assert share(times[k], truth, laid.whole) <= TIME
             v = 2 * w * mp.sin(left / 2)
-            # The exponential of an anomaly of 64 has a rounding of its own in units of the anomaly's last place.
-            assert share(speeds[k], v, float(v)) <= SPEED + math.ulp(anomaly)
+            # The exponential of an phase_angle of 64 has a rounding of its own in units of the anomaly's last place.
+            assert share(speeds[k], v, float(v)) <= SPEED + math.ulp(phase_angle)
 
 
 def test_a_corner_is_narrowed_down_or_owned_up_to(vee: ModuleType) -> None:
@@ -238,7 +239,7 @@ def test_an_end_taken_for_regular_that_is_not(slope: ModuleType) -> None:
     with mp.workdps(40):
         truth = mp.sqrt(10 / (mpf("9.81") * mp.sin(mpf("0.5"))))
     assert laid.status == EXHAUSTED
-    assert np.diff(laid.edges).min() >= LEAST_WIDTH / 2
+    assert np.diff(laid.edges).min() >= MIN_PANEL_SHARE / 2
     assert share(laid.whole, truth, float(truth)) <= laid.error <= 1e-6
 
 

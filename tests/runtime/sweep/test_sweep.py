@@ -1,5 +1,6 @@
 """Sweeps over launches and parameters: against closed forms, and against motions solved one by one."""
 
+import pickle
 from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
@@ -12,7 +13,7 @@ from mpmath import mp, mpf
 import gqm_sym as gqm
 from gqm_sym.errors import InputError, ParameterError
 from gqm_sym.runtime.compiled import threads
-from gqm_sym.runtime.sweep.sweep import REASONS
+from gqm_sym.runtime.sweep.quantities import STATUS_SENTENCES
 
 ModuleOf = Callable[[str], ModuleType]
 
@@ -36,7 +37,7 @@ def test_half_periods_of_pendulums(module_of: ModuleOf) -> None:
     rng = np.random.default_rng(11)
     amplitude, length = np.append(rng.uniform(1e-6, 2.5, 150), [1e-8, 1e-3]), rng.uniform(0.1, 10.0, 152)
     got = module_of("circle").sweep("half_period", amplitude, L=length)
-    assert not got.reasons.any()
+    assert not got.status.any()
     for value, a, el in zip(got.values, amplitude, length, strict=True):
         truth = _pendulum(float(a), float(el))
         assert abs(mpf(float(value)) - truth) <= ULPS * np.spacing(float(truth))
@@ -48,7 +49,7 @@ def test_launched_with_speed_it_is_the_orbit_that_counts(module_of: ModuleOf) ->
     places = np.linspace(-1.2, 1.2, 7)
     speeds = np.sqrt(2 * 9.81 * (np.cos(places) - np.cos(top)))
     got = module_of("circle").sweep("period", places[:, None], speeds[:, None], [1, -1], L=1)
-    assert got.values.shape == got.reasons.shape == (7, 2)
+    assert got.values.shape == got.status.shape == (7, 2)
     # Speeds are rounded, and the period follows the amplitude they mean.
     assert got.values == pytest.approx(2 * float(_pendulum(top, 1.0)), rel=1e-15)
 
@@ -64,7 +65,7 @@ def test_launched_anywhere_on_any_turn(turns: int, reach: float, module_of: Modu
     lam0 = 2 * np.pi * turns + rng.uniform(-2.0, 2.0, 24)
     v0 = reach * np.sqrt(2 * 9.81 * (1 + np.cos(lam0)))
     swept = module_of("circle").sweep("half_period", lam0, v0, rng.choice([-1, 1], 24), L=1)
-    assert not swept.reasons.any()
+    assert not swept.status.any()
     with mp.workdps(40):
         for value, place, speed in zip(swept.values, map(float, lam0), map(float, v0), strict=True):
 
@@ -90,7 +91,7 @@ def test_loop_times_of_whirling_pendulums(module_of: ModuleOf) -> None:
     for quantity in ("half_period", "turning_points"):
         none = circle.sweep(quantity, 0.0, v0, L=1)
         assert np.isnan(none.values).all()
-        assert none.why() == {REASONS[2]: 20}
+        assert none.status_counts() == {STATUS_SENTENCES[2]: 20}
 
 
 def test_next_to_a_barrier_the_exact_problem_answers(module_of: ModuleOf) -> None:
@@ -145,9 +146,9 @@ def test_arrivals(module_of: ModuleOf) -> None:
         motion = circle.solve(lam0, v0, way, L=1)
         places = np.array([-0.4, 0.2, 0.5, 0.52, 4.0, -9.0])
         got = circle.sweep("time_at", lam0, v0, way, lam=places, L=1)
-        for value, place, reason in zip(got.values, places, got.reasons, strict=True):
+        for value, place, reason in zip(got.values, places, got.status, strict=True):
             if reason:
-                assert REASONS[reason] == "the motion is never at the place asked for"
+                assert STATUS_SENTENCES[reason] == "the motion is never at the place asked for"
                 assert np.isnan(value)
                 assert motion.kind == "libration" or (place - lam0) * way < 0
             else:
@@ -168,7 +169,7 @@ def test_arrivals_of_released_pendulums(module_of: ModuleOf) -> None:
     """All digits, in the first moments too."""
     start, places = _falls(40)
     swept = module_of("circle").sweep("time_at", start, lam=places, L=1)
-    assert not swept.reasons.any()
+    assert not swept.status.any()
     for value, a, x in zip(swept.values, map(float, start), map(float, places), strict=True):
         with mp.workdps(40):
             k = mp.sin(mpf(a) / 2)
@@ -182,7 +183,7 @@ def test_arrivals_on_ellipses(speed: float, module_of: ModuleOf) -> None:
     start, places = (distances - np.pi / 2 for distances in _falls(24))
     ellipse = module_of("ellipse")
     swept = ellipse.sweep("time_at", start, speed, -1, lam=places, a=2, b=1)
-    assert not swept.reasons.any()
+    assert not swept.status.any()
     for value, a, x in zip(swept.values, map(float, start), map(float, places), strict=True):
         motion = ellipse.solve(a, speed, -1, a=2, b=1)
         # A single motion reads times off places that are rounded, as differences of times since the turn.
@@ -219,12 +220,12 @@ def test_what_has_no_answer_says_why(module_of: ModuleOf) -> None:
     """NaN in, a place outside the domain, and a motion that leaves: codes, not exceptions."""
     got = module_of("cycloid_arch").sweep("period", [np.nan, 99.0, 3.5], R=1)
     assert np.isnan(got.values).all()
-    assert [REASONS[code] for code in got.reasons] == [
+    assert [STATUS_SENTENCES[code] for code in got.status] == [
         "the launch or a parameter is not a finite number",
         "the launch place lies outside the domain",
         "the motion is not of a kind that has this quantity",
     ]
-    assert sum(got.why().values()) == 3
+    assert sum(got.status_counts().values()) == 3
 
 
 def test_a_long_sweep_is_cut_and_joined(module_of: ModuleOf) -> None:
@@ -255,7 +256,7 @@ def test_columns_may_be_read_only(module_of: ModuleOf) -> None:
     """Arrays that must not be written to, as a memory map's, are columns too."""
     amplitude = np.linspace(0.1, 1.0, 5)
     amplitude.flags.writeable = False
-    assert not module_of("circle").sweep("half_period", amplitude, L=1).reasons.any()
+    assert not module_of("circle").sweep("half_period", amplitude, L=1).status.any()
 
 
 def test_mistakes_are_named(module_of: ModuleOf) -> None:
@@ -295,3 +296,31 @@ def test_cores_where_the_system_tells_no_more(monkeypatch: pytest.MonkeyPatch) -
         monkeypatch.setattr(threads.os, "cpu_count", lambda count=count: count)
         assert threads.cores() == cores
     threads.cores.cache_clear()
+
+
+def test_a_sweep_is_an_array_of_its_values(module_of: ModuleOf) -> None:
+    """NumPy reads the values; statuses, routes and pickles are of the same shape."""
+    swept = module_of("circle").sweep("half_period", [0.1, 0.2, np.nan], L=1)
+    assert np.array_equal(np.asarray(swept), swept.values, equal_nan=True)
+    assert np.asarray(swept, dtype=np.float32).dtype == np.float32
+    assert (swept.status == [0, 0, 3]).all()
+    assert swept.status_counts() == {STATUS_SENTENCES[3]: 1}
+    again = pickle.loads(pickle.dumps(swept))
+    assert type(again) is type(swept)
+    assert all(np.array_equal(one, other, equal_nan=True) for one, other in zip(again, swept, strict=True))
+
+
+def test_the_route_of_each_launch(module_of: ModuleOf) -> None:
+    """Batches answer ordinary orbits, a loop answers extremes, and `solve` what doubles do not decide."""
+    circle = module_of("circle")
+    places = np.linspace(-1.0, 1.0, 40)
+    assert circle.sweep("half_period", places).route_counts() == {"batch": 40}
+    assert circle.sweep("v_max", places).route_counts() == {"single": 40}
+    assert circle.sweep("t_end", places).route_counts() == {"solve": 40}
+
+
+@pytest.mark.parametrize(("old", "new"), [("reasons", "status"), ("why", "status_counts")])
+def test_old_names_of_a_sweep(old: str, new: str, module_of: ModuleOf) -> None:
+    """An earlier name is refused with the present one."""
+    with pytest.raises(AttributeError, match=f"{old}.* {new}"):
+        getattr(module_of("circle").sweep("period", 0.5), old)

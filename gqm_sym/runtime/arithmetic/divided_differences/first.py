@@ -1,6 +1,6 @@
 """First divided differences of the elementary functions, without subtracting nearly equal numbers.
 
-``f1(x, y, h)`` is ``f[x,y]``, the derivative where the points coincide. The gap ``h = y - x`` is
+``divdiff1_f(x, y, h)`` is ``f[x,y]``, the derivative where the points coincide. The gap ``h = y - x`` is
 trusted to its last digit and never formed again from the points, which are only as good as their
 own rounding (MATHS, section 3).
 """
@@ -14,24 +14,24 @@ from gqm_sym.runtime.arithmetic.elementary import cos, cosh, exp, expm1_below, s
 from gqm_sym.runtime.compiled.intrinsics import choose
 from gqm_sym.runtime.compiled.jit import Inlined, Inner
 
-# Below this t, 1 + t**2 is 1 to the last digit. Keeps quotients of subnormal numbers out.
-TINY = 1e-9
+# Below this t, 1 + t**2 is 1 to the last digit. The limit keeps quotients of subnormal numbers out.
+TINY_ARGUMENT = 1e-9
 
 # Beyond this, the atanh of a difference of logarithms loses digits and the logarithm does not.
-FAR = 0.5
+FAR_QUOTIENT = 0.5
 
 
 @Inlined
 def sinc(t):  # type: ignore[no-untyped-def]
     """sin(t)/t."""
-    ordinary = fabs(t) > TINY
+    ordinary = fabs(t) > TINY_ARGUMENT
     return choose(ordinary, sin(t) / choose(ordinary, t, 1.0), 1.0)
 
 
 @Inlined
 def sinhc(t):  # type: ignore[no-untyped-def]
     """sinh(t)/t."""
-    ordinary = fabs(t) > TINY
+    ordinary = fabs(t) > TINY_ARGUMENT
     return choose(ordinary, sinh(t) / choose(ordinary, t, 1.0), 1.0)
 
 
@@ -44,49 +44,49 @@ def expc(t):  # type: ignore[no-untyped-def]
 @Inner
 def atanc(t):  # type: ignore[no-untyped-def]
     """atan(t)/t."""
-    return atan(t) / t if fabs(t) > TINY else 1.0
+    return atan(t) / t if fabs(t) > TINY_ARGUMENT else 1.0
 
 
 @Inner
 def atanhc(t):  # type: ignore[no-untyped-def]
     """atanh(t)/t."""
-    return atanh(t) / t if fabs(t) > TINY else 1.0
+    return atanh(t) / t if fabs(t) > TINY_ARGUMENT else 1.0
 
 
 @Inlined
-def sin1(x, y, h):  # type: ignore[no-untyped-def]
-    """sin[x,y] = cos((x+y)/2) sinc(h/2), with what rounding takes from x + y: near a zero of the cosine it counts."""
+def divdiff1_sin(x, y, h):  # type: ignore[no-untyped-def]
+    """sin[x,y] = cos((x+y)/2) sinc(h/2); near a zero of the cosine the rounding of x + y counts."""
     middle, rest = two_sum(x, y)
     return (cos(0.5 * middle) - 0.5 * rest * sin(0.5 * middle)) * sinc(0.5 * h)
 
 
 @Inlined
-def cos1(x, y, h):  # type: ignore[no-untyped-def]
-    """cos[x,y] = -sin((x+y)/2) sinc(h/2), with what rounding takes from x + y: near a zero of the sine it counts."""
+def divdiff1_cos(x, y, h):  # type: ignore[no-untyped-def]
+    """cos[x,y] = -sin((x+y)/2) sinc(h/2); near a zero of the sine the rounding of x + y counts."""
     middle, rest = two_sum(x, y)
     return -(sin(0.5 * middle) + 0.5 * rest * cos(0.5 * middle)) * sinc(0.5 * h)
 
 
 @Inner
-def tan1(x, y, h):  # type: ignore[no-untyped-def]
+def divdiff1_tan(x, y, h):  # type: ignore[no-untyped-def]
     """tan[x,y] = sinc(h)/(cos x cos y)."""
     return sinc(h) / (cos(x) * cos(y))
 
 
 @Inlined
-def sinh1(x, y, h):  # type: ignore[no-untyped-def]
+def divdiff1_sinh(x, y, h):  # type: ignore[no-untyped-def]
     """sinh[x,y] = cosh((x+y)/2) sinhc(h/2)."""
     return cosh(0.5 * (x + y)) * sinhc(0.5 * h)
 
 
 @Inlined
-def cosh1(x, y, h):  # type: ignore[no-untyped-def]
+def divdiff1_cosh(x, y, h):  # type: ignore[no-untyped-def]
     """cosh[x,y] = sinh((x+y)/2) sinhc(h/2)."""
     return sinh(0.5 * (x + y)) * sinhc(0.5 * h)
 
 
 @Inner
-def tanh1(x, y, h):  # type: ignore[no-untyped-def]
+def divdiff1_tanh(x, y, h):  # type: ignore[no-untyped-def]
     """tanh[x,y] = sinhc(h)/(cosh x cosh y), with the growing exponentials cancelled by hand."""
     p, q = exp(-2.0 * fabs(x)), exp(-2.0 * fabs(y))
     decay = max(p, q) if x * y > 0.0 else 1.0
@@ -94,24 +94,24 @@ def tanh1(x, y, h):  # type: ignore[no-untyped-def]
 
 
 @Inlined
-def exp1(x, y, h):  # type: ignore[no-untyped-def]
+def divdiff1_exp(x, y, h):  # type: ignore[no-untyped-def]
     """exp[x,y] = exp(y) (1 - exp(-h))/h, y the larger."""
     return exp(choose(x > y, x, y)) * expc(fabs(h))
 
 
 @Inner
-def log1(x, y, h):  # type: ignore[no-untyped-def]
+def divdiff1_log(x, y, h):  # type: ignore[no-untyped-def]
     """log[x,y] = log1p(h/x)/h, x the smaller."""
     gap, least = fabs(h), min(x, y)
     ratio = gap / least
-    return log1p(ratio) / gap if ratio > 0.1 * TINY * TINY else 1.0 / least
+    return log1p(ratio) / gap if ratio > 0.1 * TINY_ARGUMENT * TINY_ARGUMENT else 1.0 / least
 
 
 @Inner
-def atan1(x, y, h):  # type: ignore[no-untyped-def]
+def divdiff1_atan(x, y, h):  # type: ignore[no-untyped-def]
     """atan[x,y] = atan(h/(1+xy))/h."""
     p = 1.0 + x * y
-    return angle(h, p) / h if fabs(h) > FAR * p else atanc(h / p) / p
+    return angle(h, p) / h if fabs(h) > FAR_QUOTIENT * p else atanc(h / p) / p
 
 
 @Inner
@@ -139,26 +139,26 @@ def one_less_product(x, y):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def asin1(x, y, h):  # type: ignore[no-untyped-def]
+def divdiff1_asin(x, y, h):  # type: ignore[no-untyped-def]
     """asin[x,y] = 2 atan(h/(cx+cy))/h, c = sqrt(1 - x**2)."""
     p = root_below(x) + root_below(y)
     r = h / p
-    return 2.0 * atan(r) / h if fabs(r) > FAR else 2.0 * atanc(r) / p
+    return 2.0 * atan(r) / h if fabs(r) > FAR_QUOTIENT else 2.0 * atanc(r) / p
 
 
 @Inner
-def acos1(x, y, h):  # type: ignore[no-untyped-def]
+def divdiff1_acos(x, y, h):  # type: ignore[no-untyped-def]
     """acos[x,y] = -asin[x,y]."""
-    return -asin1(x, y, h)
+    return -divdiff1_asin(x, y, h)
 
 
 @Inner
-def asinh1(x, y, h):  # type: ignore[no-untyped-def]
+def divdiff1_asinh(x, y, h):  # type: ignore[no-untyped-def]
     """asinh[x,y] = 2 atanh(h/(cx+cy))/h, c = sqrt(1 + x**2), or the quotient if far apart."""
     cx, cy = root_above(x), root_above(y)
     p = cx + cy
     r = h / p
-    if fabs(r) <= FAR:
+    if fabs(r) <= FAR_QUOTIENT:
         return 2.0 * atanhc(r) / p
     if x * y < 0.0:
         return (asinh(y) - asinh(x)) / h
@@ -166,26 +166,26 @@ def asinh1(x, y, h):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def acosh1(x, y, h):  # type: ignore[no-untyped-def]
+def divdiff1_acosh(x, y, h):  # type: ignore[no-untyped-def]
     """acosh[x,y] = 2 atanh(h/(sx+sy))/h, s = sqrt(x**2 - 1), or the quotient if far apart."""
     sx, sy = root_beyond(x), root_beyond(y)
     p = sx + sy
     r = h / p
-    return log((y + sy) / (x + sx)) / h if fabs(r) > FAR else 2.0 * atanhc(r) / p
+    return log((y + sy) / (x + sx)) / h if fabs(r) > FAR_QUOTIENT else 2.0 * atanhc(r) / p
 
 
 @Inner
-def atanh1(x, y, h):  # type: ignore[no-untyped-def]
+def divdiff1_atanh(x, y, h):  # type: ignore[no-untyped-def]
     """atanh[x,y] = atanh(h/(1-xy))/h, or the quotient if far apart."""
     p = one_less_product(x, y)
     r = h / p
-    if fabs(r) > FAR:
+    if fabs(r) > FAR_QUOTIENT:
         return 0.5 * log((1.0 + y) * (1.0 - x) / ((1.0 - y) * (1.0 + x))) / h
     return atanhc(r) / p
 
 
 @Inner
-def abs1(x, y, h):  # type: ignore[no-untyped-def]
+def divdiff1_abs(x, y, h):  # type: ignore[no-untyped-def]
     """|u|[x,y]: 1 or -1 where the points have one sign, else (x+y)/|h|."""
     if min(x, y) >= 0.0:
         return 1.0
@@ -193,15 +193,15 @@ def abs1(x, y, h):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def ipow1(x, y, h, n):  # type: ignore[no-untyped-def]
+def divdiff1_ipow(x, y, h, n):  # type: ignore[no-untyped-def]
     """(u**n)[x,y], n an integer: the sum of x**i y**j over i+j = n-1; a negative n by 1/u."""
     if n < 0:
-        return -ipow1_sum(1.0 / x, 1.0 / y, -n) / (x * y)
-    return ipow1_sum(x, y, n)
+        return -divdiff1_ipow_sum(1.0 / x, 1.0 / y, -n) / (x * y)
+    return divdiff1_ipow_sum(x, y, n)
 
 
 @Inner
-def ipow1_sum(x, y, n):  # type: ignore[no-untyped-def]
+def divdiff1_ipow_sum(x, y, n):  # type: ignore[no-untyped-def]
     """The sum of x**i y**j over i+j = n-1, by (u**(k+1))[x,y] = y (u**k)[x,y] + x**k."""
     first, value = 0.0, 1.0
     for _ in range(n):
@@ -211,10 +211,10 @@ def ipow1_sum(x, y, n):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def rpow1(x, y, h, p):  # type: ignore[no-untyped-def]
+def divdiff1_rpow(x, y, h, p):  # type: ignore[no-untyped-def]
     """(u**p)[x,y] = x**p expm1(p log(y/x))/h, x the smaller, or the quotient if far."""
     gap, least = fabs(h), min(x, y)
-    if gap * (1.0 + fabs(p)) <= TINY * least:
+    if gap * (1.0 + fabs(p)) <= TINY_ARGUMENT * least:
         middle = 0.5 * (x + y)
         return p * power(middle, p) / middle  # p - 1 would be rounded
     t = p * log1p(gap / least)

@@ -1,10 +1,11 @@
 """Turning points and times of many orbits at once, an orbit in each lane of a vector register.
 
-Orbits for which `batch_search` proves no turning points, or whose time does not converge, are left to `swift`, which
-takes them one by one. Columns of a batch are whole registers: the last orbit is repeated to fill one.
+Orbits without proved turning points, or whose time does not converge, are left to the loop over single launches
+(`scalar`).
 """
 
 from math import nan
+from typing import NamedTuple
 
 import numpy as np
 from numba import types
@@ -16,160 +17,211 @@ from gqm_sym.runtime.compiled.types import BATCH_ADDRESSES
 from gqm_sym.runtime.quadrature.trapezoid import CIRCULATION, LIBRATION
 from gqm_sym.runtime.sweep.batch.rows import (
     BATCH,
+    END_HIGH,
+    END_LOW,
     FOUND,
+    INDEX,
     LANES,
-    LASTING,
-    LEAST,
-    MOST,
+    LAUNCH_PLACE,
+    LAUNCH_V2,
     NOWHERE,
-    REACH,
+    OFFSET_HIGH,
+    OFFSET_LOW,
     ROWS,
-    SPEED,
-    START,
+    SEARCH_DIRECTION,
+    SEARCH_LENGTH,
     STATE,
+    TIME_ROWS,
     TRIAL,
-    WAY,
-    WHO,
-    A,
-    B,
-    any_is,
+    Orbits,
+    Scratch,
+    contains,
     gather,
-    part,
+    partition,
     shrink,
 )
-from gqm_sym.runtime.sweep.batch.times import MEANS, SWING, half_periods_by_agm, times
-from gqm_sym.runtime.sweep.batch.turning_points import judge, launch, prove, seek, set_ends, turn_round
-from gqm_sym.runtime.sweep.quantities import ANSWERED, NOT_PERIODIC, PERIOD, SPAN_KNOWN, SPANS, TURNING_POINTS
+from gqm_sym.runtime.sweep.batch.times import AGM_LIBRATION, AXIS_LIBRATION, half_periods_by_agm, times_by_trapezoid
+from gqm_sym.runtime.sweep.batch.turning_points import (
+    classify,
+    prove,
+    search,
+    set_ends,
+    start_search,
+    start_search_behind,
+)
+from gqm_sym.runtime.sweep.quantities import ANSWERED, ANSWERS, NOT_PERIODIC, PERIOD, SPAN_KNOWN, SPANS, TURNING_POINTS
 
-# Pieces of an orbit, or of half a mirrored one, for its proof: a few first, more where those do not suffice.
-FEW_PIECES, FEW_OF_HALF, MANY_PIECES = 3, 2, 12
+# Into how many pieces an orbit, or half of an even one, is cut for its proof: first into few, then into more.
+FEW_PIECES, FEW_PIECES_OF_HALF, MANY_PIECES = 3, 2, 12
+
+
+class OrbitKind(NamedTuple):
+    """What the orbits of a batch have in common.
+
+    Attributes
+    ----------
+    kind : int
+        LIBRATION, CIRCULATION, AXIS_LIBRATION or AGM_LIBRATION.
+    mirrored : bool
+        Whether each is even about an axis of symmetry.
+    proved : bool
+        Whether their turning points need no further proof.
+    """
+
+    kind: int
+    mirrored: bool
+    proved: bool
 
 
 @Inner
-def settle(fns, kind, mirrored, known, n, s, flat, t, spare, count, held, chosen, others, work, asked, out, reasons):  # type: ignore[no-untyped-def]
-    """Prove orbits of one kind that are not ``known``, and answer for those that are proved.
+def answer_spans(orbits, kind, quantity, answers):  # type: ignore[no-untyped-def]
+    """Answer SPANS, TURNING_POINTS, or that circulations have no half period."""
+    rows, out, status = orbits.rows, answers.values, answers.status
+    circulates = kind == CIRCULATION
+    if quantity == SPANS:
+        for j in range(orbits.size):
+            k, low, high = int(rows[INDEX, j]), rows[OFFSET_LOW, j], rows[OFFSET_HIGH, j]
+            out[k, 0] = low + high if circulates else low
+            out[k, 1], status[k] = choose(circulates, nan, high), SPAN_KNOWN
+    elif circulates:
+        for j in range(orbits.size):
+            status[int(rows[INDEX, j])] = NOT_PERIODIC
+    else:
+        for j in range(orbits.size):
+            k = int(rows[INDEX, j])
+            out[k, 0], out[k, 1], status[k] = rows[END_LOW, j], rows[END_HIGH, j], ANSWERED
 
-    ``t`` and ``spare`` take the others meanwhile.
-    """
-    for pieces in (FEW_OF_HALF if mirrored else FEW_PIECES, MANY_PIECES):
+
+@Inner
+def answer_orbits(fns, kind, orbits, spare, scratch, quantity, answers):  # type: ignore[no-untyped-def]
+    """Prove orbits of one kind, and answer for those that are proved; ``spare`` takes the others meanwhile."""
+    count = scratch.param_count
+    for pieces in (FEW_PIECES_OF_HALF if kind.mirrored else FEW_PIECES, MANY_PIECES):
+        n, rows = orbits.size, orbits.rows
         proved, left = n, 0
-        if not known:
-            prove(fns, kind, mirrored, pieces, n, s, flat[: count * n].reshape(count, n), work)
-            proved, left = part(s[STATE, :n], chosen, others)
-        rest = gather(s, flat, count, n, others, left, t, spare, ROWS)
-        m = shrink(s, flat, count, n, chosen, proved, LASTING)
-        if asked == SPANS:
-            for j in range(m):
-                k, least, most = int(s[WHO, j]), s[LEAST, j], s[MOST, j]
-                going_round = kind == CIRCULATION
-                out[k, 0] = least + most if going_round else least
-                out[k, 1], reasons[k] = choose(going_round, nan, most), SPAN_KNOWN
-        elif asked != PERIOD and kind == CIRCULATION:
-            for j in range(m):
-                reasons[int(s[WHO, j])] = NOT_PERIODIC
-        elif asked == TURNING_POINTS:
-            for j in range(m):
-                k = int(s[WHO, j])
-                out[k, 0], out[k, 1], reasons[k] = s[A, j], s[B, j], ANSWERED
-        elif m and kind == MEANS:
-            half_periods_by_agm(fns, m, s, flat, count, work, asked, out, reasons)
-        elif m:
-            times(fns, kind, mirrored, m, s, flat, count, held, chosen, work, asked, out, reasons)
+        if not kind.proved:
+            p = orbits.params[: count * n].reshape(count, n)
+            prove(fns, kind.kind, kind.mirrored, pieces, n, rows, p, scratch.work)
+            proved, left = partition(rows[STATE, :n], scratch.chosen, scratch.others)
+        waiting = gather(orbits, count, scratch.others, left, spare, ROWS)
+        orbits = shrink(orbits, count, scratch.chosen, proved, TIME_ROWS)
+        if quantity in (SPANS, TURNING_POINTS) or (quantity != PERIOD and kind.kind == CIRCULATION):
+            answer_spans(orbits, kind.kind, quantity, answers)
+        elif orbits.size and kind.kind == AGM_LIBRATION:
+            half_periods_by_agm(fns, orbits, scratch, quantity, answers)
+        elif orbits.size:
+            times_by_trapezoid(fns, kind.kind, kind.mirrored, orbits, scratch, quantity, answers)
         if left == 0:
             return
-        n, s, flat, t, spare = rest, t, spare, s, flat
+        orbits, spare = Orbits(waiting, spare.rows, spare.params), orbits
+
+
+@Inner
+def load_launches(columns, begin, number, orbits, domain, scratch):  # type: ignore[no-untyped-def]
+    """Copy ``number`` launches into a batch; SEARCH_DIRECTION is 0 for those that are not finite."""
+    n, rows, count = orbits.size, orbits.rows, scratch.param_count
+    p = orbits.params[: count * n].reshape(count, n)
+    for row in range(PARAMETERS - DOMAIN_LOW):
+        if begin == 0 or columns[DOMAIN_LOW + row, 1] != 0:
+            fill_row(columns, DOMAIN_LOW + row, begin, number, domain[row, :n])
+    index, place, v2 = rows[INDEX, :n], rows[LAUNCH_PLACE, :n], rows[LAUNCH_V2, :n]
+    direction, total = rows[SEARCH_DIRECTION, :n], scratch.work[0, :n]
+    fill_row(columns, LAM0, begin, number, place)
+    fill_row(columns, V0, begin, number, v2)
+    fill_row(columns, DIRECTION, begin, number, direction)
+    for j in range(n):
+        index[j], total[j] = begin + min(j, number - 1), place[j] + v2[j]
+        v2[j] *= v2[j]
+    for row in range(count):
+        values = p[row]
+        fill_row(columns, PARAMETERS + row, begin, number, values)
+        for j in range(n):
+            total[j] += values[j]
+    for j in range(n):
+        direction[j] = choose(total[j] - total[j] == 0.0, direction[j], 0.0)
+
+
+@Inner
+def find_orbits(fns, orbits, laps, domain, monotone, scratch):  # type: ignore[no-untyped-def]
+    """Search both turning points of each launch; returns the librations, and how many launches circulate.
+
+    Circulations are copied to ``laps``. Launches with neither drop out.
+    """
+    count, lap_count = scratch.param_count, 0
+    for ahead in (True, False):
+        n, rows = orbits.size, orbits.rows
+        p = orbits.params[: count * n].reshape(count, n)
+        if ahead:
+            start_search(fns, n, rows, p, domain, monotone, scratch.work)
+        else:
+            start_search_behind(n, rows)
+        search(fns, n, rows, p, scratch.work)
+        classify(n, rows)
+        if ahead and contains(rows[TRIAL, :n], FOUND):
+            lap_count, _ = partition(rows[TRIAL, :n], scratch.others, scratch.chosen)
+            lap_count = gather(orbits, count, scratch.others, lap_count, laps, ROWS)
+        found, _ = partition(rows[STATE, :n], scratch.chosen, scratch.others)
+        orbits = shrink(orbits, count, scratch.chosen, found, ROWS)
+        if orbits.size == 0:
+            break
+    set_ends(orbits.size, orbits.rows)
+    for j in range(lap_count):
+        lap = laps.rows[SEARCH_DIRECTION, j] * laps.rows[SEARCH_LENGTH, j]
+        laps.rows[OFFSET_LOW, j], laps.rows[OFFSET_HIGH, j] = min(lap, 0.0), max(lap, 0.0)
+    return orbits, lap_count
+
+
+@Inner
+def kind_of_librations(fns, orbits, monotone):  # type: ignore[no-untyped-def]
+    """What librations have in common: whether all are even, and the fastest way to their time."""
+    n, rows = orbits.size, orbits.rows
+    mirrored, one_axis = not contains(rows[STATE, :n], NOWHERE), not contains(rows[TRIAL, :n], NOWHERE)
+    kind = LIBRATION
+    if mirrored and one_axis and (fns.time_integrand or fns.agm_arguments):
+        kind = AGM_LIBRATION if fns.agm_arguments else AXIS_LIBRATION
+    return OrbitKind(kind, mirrored, monotone and mirrored and one_axis)
 
 
 @entry(
     types.void(
-        *(
-            BATCH_ADDRESSES,
-            types.UniTuple(types.int64, 2),
-            types.int64[:, ::1],
-            types.boolean,
-            types.int64,
-        ),
-        *(types.float64[:, ::1], types.int8[::1]),
+        *(BATCH_ADDRESSES, types.UniTuple(types.int64, 2), types.int64[:, ::1], types.boolean, types.int64, ANSWERS)
     ),
     nogil=True,
 )
-def answer_batches(fns, held, columns, monotone, asked, out, reasons):  # type: ignore[no-untyped-def]
-    """Fill rows of ``out`` and of ``reasons`` for the launches that this can answer, as `swift.answer_many` does.
+def answer_batches(fns, invariant_counts, columns, monotone, quantity, answers):  # type: ignore[no-untyped-def]
+    """Answer the launches that batches can answer; the others keep their status.
 
-    The others keep their reason. ``monotone`` says that V**2 rises or falls all the way between axes of symmetry and
-    that ds is nowhere 0; ``asked`` is HALF, WHOLE, PLACES or SPANS.
+    Parameters
+    ----------
+    fns : BatchAddresses
+        The module's compiled functions for batches.
+    invariant_counts : (int, int)
+        How many numbers `orbit_invariants` and `integrand_invariants` fill for an orbit.
+    columns : array
+        The launches, as `strided.pointers` gives them.
+    monotone : bool
+        Whether V**2 is monotone between neighbouring axes of symmetry and ds vanishes nowhere.
+    quantity : int
+        HALF_PERIOD, PERIOD, TURNING_POINTS or SPANS.
+    answers : Answers
+        Filled in.
     """
     count = columns.shape[0] - PARAMETERS
-    rows = count + max(held[0], held[1])
-    s, t, u = np.empty((ROWS, BATCH)), np.empty((ROWS, BATCH)), np.empty((ROWS, BATCH))
-    flat, spare, other = np.empty(rows * BATCH), np.empty(rows * BATCH), np.empty(rows * BATCH)
-    known, work = np.empty((PARAMETERS - DOMAIN_LOW, BATCH)), np.empty((13, BATCH))
+    size = (count + max(invariant_counts[0], invariant_counts[1])) * BATCH
+    domain = np.empty((PARAMETERS - DOMAIN_LOW, BATCH))
     chosen, others = np.empty(BATCH, dtype=np.int64), np.empty(BATCH, dtype=np.int64)
-    for begin in range(0, reasons.size, BATCH):
-        m = min(BATCH, reasons.size - begin)
-        n = -(-m // LANES) * LANES
-        p = flat[: count * n].reshape(count, n)
-        for row in range(PARAMETERS - DOMAIN_LOW):
-            if begin == 0 or columns[DOMAIN_LOW + row, 1] != 0:
-                fill_row(columns, DOMAIN_LOW + row, begin, m, known[row, :n])
-        who, start, speed, way, total = s[WHO, :n], s[START, :n], s[SPEED, :n], s[WAY, :n], work[0, :n]
-        fill_row(columns, LAM0, begin, m, start)
-        fill_row(columns, V0, begin, m, speed)
-        fill_row(columns, DIRECTION, begin, m, way)
-        for j in range(n):
-            who[j], total[j] = begin + min(j, m - 1), start[j] + speed[j]
-            speed[j] *= speed[j]
-        for row in range(count):
-            given = p[row]
-            fill_row(columns, PARAMETERS + row, begin, m, given)
-            for j in range(n):
-                total[j] += given[j]
-        for j in range(n):
-            way[j] = choose(total[j] - total[j] == 0.0, way[j], 0.0)
-        laps = 0
-        for ahead in (True, False):
-            p = flat[: count * n].reshape(count, n)
-            if ahead:
-                launch(fns, n, s, p, known, monotone, work)
-            else:
-                turn_round(n, s)
-            seek(fns, n, s, p, work)
-            judge(n, s)
-            if ahead and any_is(s[TRIAL, :n], FOUND):
-                laps, _rest = part(s[TRIAL, :n], others, chosen)
-                laps = gather(s, flat, count, n, others, laps, u, other, ROWS)
-            kept, _rest = part(s[STATE, :n], chosen, others)
-            n = shrink(s, flat, count, n, chosen, kept, ROWS)
-            if n == 0:
-                break
-        set_ends(n, s)
-        mirrored, alone = not any_is(s[STATE, :n], NOWHERE), not any_is(s[TRIAL, :n], NOWHERE)
-        about_one = LIBRATION
-        if mirrored and alone and (fns.time_integrand or fns.agm_arguments):
-            about_one = MEANS if fns.agm_arguments else SWING
-        for j in range(laps):
-            lap = u[WAY, j] * u[REACH, j]
-            u[LEAST, j], u[MOST, j] = min(lap, 0.0), max(lap, 0.0)
-        for kind in (about_one, CIRCULATION):
-            if kind == CIRCULATION:
-                n, s, flat, u, other, mirrored = laps, u, other, s, flat, False
-            if n:
-                settle(
-                    fns,
-                    kind,
-                    mirrored,
-                    monotone and mirrored and alone,
-                    n,
-                    s,
-                    flat,
-                    t,
-                    spare,
-                    count,
-                    held,
-                    chosen,
-                    others,
-                    work,
-                    asked,
-                    out,
-                    reasons,
-                )
+    scratch = Scratch(count, invariant_counts, chosen, others, np.empty((13, BATCH)))
+    first = Orbits(0, np.empty((ROWS, BATCH)), np.empty(size))
+    spare = Orbits(0, np.empty((ROWS, BATCH)), np.empty(size))
+    laps = Orbits(0, np.empty((ROWS, BATCH)), np.empty(size))
+    for begin in range(0, answers.status.size, BATCH):
+        number = min(BATCH, answers.status.size - begin)
+        orbits = Orbits(-(-number // LANES) * LANES, first.rows, first.params)
+        load_launches(columns, begin, number, orbits, domain, scratch)
+        orbits, lap_count = find_orbits(fns, orbits, laps, domain, monotone, scratch)
+        if orbits.size:
+            kind = kind_of_librations(fns, orbits, monotone)
+            answer_orbits(fns, kind, orbits, spare, scratch, quantity, answers)
+        if lap_count:
+            laps_found, kind = Orbits(lap_count, laps.rows, laps.params), OrbitKind(CIRCULATION, False, False)
+            answer_orbits(fns, kind, laps_found, spare, scratch, quantity, answers)

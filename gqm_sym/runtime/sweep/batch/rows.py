@@ -1,31 +1,105 @@
 """A batch of orbits: an array with a row for each quantity and a column for each orbit.
 
-Run-time parameters lie beside it, a row each. Every step over a batch is a loop over the columns without branches,
-which vectorises; columns are whole registers.
+The run-time parameters lie beside it, a row each. Every step over a batch is a loop over the columns without branches,
+which vectorises. Columns come in whole registers; the last orbit is repeated to fill one.
+
+==================== ==================================================================== ======================
+row                  meaning                                                              used by
+==================== ==================================================================== ======================
+INDEX                index of the launch in the caller's arrays                           all
+SUM                  sum of the time integrand over all nodes so far                      time
+VALUE                the time by the last level of nodes                                  time
+CHANGE               relative change of the time by that level                            time
+FACTOR_LOW           smallest value of V**2's regular factor at the nodes                 time
+FACTOR_HIGH          its largest value                                                    time
+OFFSET_LOW           offset of the lower end of the orbit from the launch place           time, proof
+OFFSET_HIGH          offset of the upper end                                              time, proof
+END_LOW, END_HIGH    both ends as values of the curve's parameter                         time of librations
+LAUNCH_PLACE         the launch place                                                     all
+LAUNCH_V2            V**2 at launch                                                       all
+SEARCH_DIRECTION     the sign of the direction in which is searched; 0 for none           search
+SEARCH_LENGTH        how far the search goes at most                                      search
+LENGTH_BEHIND        how far it goes the other way; CLOSED on a closed curve              search
+STATE                SEEKING, FOUND or NOWHERE                                            search, proof
+BRACKET_LOW          distance up to which V**2 > 0 is known of Newton's method            search
+BRACKET_HIGH         smallest distance at which V**2 < 0 is known, or inf                 search
+TRIAL                distance that Newton's method tries next                             search
+ZERO                 distance of the zero of V**2 ahead                                   search
+AXIS_DISTANCE        distance to the axis of symmetry that the orbit may have             search, proof
+AXIS_SPACING         distance from one axis to the next, 0 if there is only one           search
+ZERO_BEHIND          distance of the zero of V**2 behind; NaN while it is not known       search
+==================== ==================================================================== ======================
+
+The quadrature needs only the rows before TIME_ROWS, and of librations only those before LIBRATION_ROWS.
 """
 
-from gqm_sym.runtime.compiled.jit import Inner
+from typing import NamedTuple
 
-# Orbits of a batch: its arrays stay in the first-level cache. Orbits of a full register, at most.
+import numpy as np
+from numpy.typing import NDArray
+
+from gqm_sym.runtime.compiled.jit import Inner
+from gqm_sym.runtime.compiled.types import Array
+
+# Orbits of a batch: its arrays stay in the first-level cache. The largest number of orbits in a register.
 BATCH, LANES = 128, 8
 
-# Rows of a batch: which launch, and what the quadrature keeps of it; offsets of both ends from it, both ends; the
-# launch's place and V**2, which the quadrature needs of laps alone; what the search needs: which way it goes and how
-# far at most, and how far the other way, its state, bracket, trial and the zero, how far the axis of symmetry is that
-# the orbit may have, the step from one axis to the next, and how far the zero behind is where that is known (NaN).
-WHO, SUM, VALUE, CHANGE, LOW, HIGH, LEAST, MOST, A, B, START, SPEED, LASTING = range(13)
-WAY, REACH, BACK, STATE, LEFT, RIGHT, TRIAL, AHEAD, AXIS, STEP, BEHIND, ROWS = range(12, 24)
+INDEX, SUM, VALUE, CHANGE, FACTOR_LOW, FACTOR_HIGH, OFFSET_LOW, OFFSET_HIGH = range(8)
+END_LOW, END_HIGH, LAUNCH_PLACE, LAUNCH_V2, SEARCH_DIRECTION, SEARCH_LENGTH = range(8, 14)
+LENGTH_BEHIND, STATE, BRACKET_LOW, BRACKET_HIGH, TRIAL = range(14, 19)
+ZERO, AXIS_DISTANCE, AXIS_SPACING, ZERO_BEHIND, ROWS = range(19, 24)
+TIME_ROWS, LIBRATION_ROWS, AXIS_LIBRATION_ROWS = SEARCH_DIRECTION, LAUNCH_PLACE, OFFSET_LOW
 
-# How far back it is on a closed curve: both zeros lie within one period.
+# The LENGTH_BEHIND of a closed curve: both zeros lie within one period.
 CLOSED = -1.0
 
 # What a search has come to.
 SEEKING, FOUND, NOWHERE = 0.0, 1.0, 2.0
 
 
+class Orbits(NamedTuple):
+    """Orbits side by side.
+
+    Attributes
+    ----------
+    size : int
+        The number of columns that are filled, a multiple of LANES.
+    rows : (ROWS, BATCH) array
+        A row for each quantity.
+    params : array
+        The rows of run-time parameters and of invariants, ``size`` numbers each, one after the other.
+    """
+
+    size: int
+    rows: Array
+    params: Array
+
+
+class Scratch(NamedTuple):
+    """What a batch needs while it is worked on.
+
+    Attributes
+    ----------
+    param_count : int
+        The number of run-time parameters.
+    invariant_counts : (int, int)
+        How many numbers `orbit_invariants` and `integrand_invariants` of the module fill for an orbit.
+    chosen, others : int arrays
+        Lists of columns.
+    work : (13, BATCH) array
+        Rows for numbers that are used at once.
+    """
+
+    param_count: int
+    invariant_counts: tuple[int, int]
+    chosen: NDArray[np.int64]
+    others: NDArray[np.int64]
+    work: Array
+
+
 @Inner
-def any_is(row, value):  # type: ignore[no-untyped-def]
-    """Whether a value is in a row: a loop of its own, for a loop that also counts stays scalar."""
+def contains(row, value):  # type: ignore[no-untyped-def]
+    """Whether a value is in a row. It is a loop of its own, because one that also counts stays scalar."""
     found = False
     for v in row:
         found |= v == value
@@ -33,38 +107,42 @@ def any_is(row, value):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def gather(s, p, count, n, chosen, kept, t, q, rows):  # type: ignore[no-untyped-def]
-    """Copy ``chosen`` columns, ``kept`` of them, and their parameters; returns how many columns that fills."""
-    full = -(-kept // LANES) * LANES
-    for row in range(rows):
-        for j in range(kept):
-            t[row, j] = s[row, chosen[j]]
-        for j in range(kept, full):
-            t[row, j] = t[row, kept - 1]
-    for row in range(count):
-        for j in range(kept):
-            q[row * full + j] = p[row * n + chosen[j]]
-        for j in range(kept, full):
-            q[row * full + j] = q[row * full + kept - 1]
+def gather(orbits, param_count, columns, number, target, row_count):  # type: ignore[no-untyped-def]
+    """Copy ``number`` columns and their parameters to ``target``; returns how many columns that fills."""
+    rows, params, n = orbits.rows, orbits.params, orbits.size
+    to_rows, to_params, full = target.rows, target.params, -(-number // LANES) * LANES
+    for row in range(row_count):
+        for j in range(number):
+            to_rows[row, j] = rows[row, columns[j]]
+        for j in range(number, full):
+            to_rows[row, j] = to_rows[row, number - 1]
+    for row in range(param_count):
+        for j in range(number):
+            to_params[row * full + j] = params[row * n + columns[j]]
+        for j in range(number, full):
+            to_params[row * full + j] = to_params[row * full + number - 1]
     return full
 
 
 @Inner
-def shrink(s, p, count, n, chosen, kept, rows):  # type: ignore[no-untyped-def]
-    """Close up to the ``kept`` columns that are ``chosen``, in ascending order; returns how many columns are left."""
-    return n if kept == n else gather(s, p, count, n, chosen, kept, s, p, rows)
+def shrink(orbits, param_count, columns, number, row_count):  # type: ignore[no-untyped-def]
+    """Keep only ``number`` columns, listed in ascending order; returns the orbits that are left."""
+    n = orbits.size
+    if number != n:
+        n = gather(orbits, param_count, columns, number, orbits, row_count)
+    return Orbits(n, orbits.rows, orbits.params)
 
 
 @Inner
-def part(state, found, others):  # type: ignore[no-untyped-def]
+def partition(state, found, others):  # type: ignore[no-untyped-def]
     """List the columns whose state is FOUND, and the others; returns how many there are of each."""
-    if not any_is(state, NOWHERE):
+    if not contains(state, NOWHERE):
         for j in range(state.size):
             found[j] = j
         return state.size, 0
-    kept, left = 0, 0
+    found_count, other_count = 0, 0
     for j in range(state.size):
-        found[kept] = others[left] = j
-        kept += state[j] == FOUND
-        left += state[j] != FOUND
-    return kept, left
+        found[found_count] = others[other_count] = j
+        found_count += state[j] == FOUND
+        other_count += state[j] != FOUND
+    return found_count, other_count

@@ -1,7 +1,7 @@
 """The turning points of many orbits at once.
 
-By their closed form where there is one (`derivation.swing`), which symbols prove; else guessed by Newton's method, and
-proved by interval bounds.
+They are computed by a closed form where there is one (`derivation.swing`), which is proved symbolically. Otherwise they
+are approximated by Newton's method and then proved by interval bounds.
 """
 
 from math import fabs, inf, nan
@@ -9,246 +9,307 @@ from math import fabs, inf, nan
 from gqm_sym.runtime.compiled.calls import (
     call_bounds_batch,
     call_potential_divdiff1_batch,
-    call_turning_by_closed_form_batch,
+    call_turning_point_batch,
 )
 from gqm_sym.runtime.compiled.intrinsics import choose, fma, whole_below
 from gqm_sym.runtime.compiled.jit import Inner
-from gqm_sym.runtime.launch.ends import ALL_BUT, UNCLEAR, distance_to_axis
-from gqm_sym.runtime.launch.zeros import UNRESOLVED
+from gqm_sym.runtime.launch.ends import MAX_AXIS_STEP_SHARE, NEAR_AXIS, distance_to_axis
+from gqm_sym.runtime.launch.zeros import CONSTANT_SHARE
 from gqm_sym.runtime.quadrature.trapezoid import CIRCULATION
 from gqm_sym.runtime.sweep.batch.rows import (
-    AHEAD,
-    AXIS,
-    BACK,
-    BEHIND,
+    AXIS_DISTANCE,
+    AXIS_SPACING,
+    BRACKET_HIGH,
+    BRACKET_LOW,
     CLOSED,
+    END_HIGH,
+    END_LOW,
     FOUND,
-    LEAST,
-    LEFT,
-    MOST,
+    LAUNCH_PLACE,
+    LAUNCH_V2,
+    LENGTH_BEHIND,
     NOWHERE,
-    REACH,
-    RIGHT,
+    OFFSET_HIGH,
+    OFFSET_LOW,
+    SEARCH_DIRECTION,
+    SEARCH_LENGTH,
     SEEKING,
-    SPEED,
-    START,
     STATE,
-    STEP,
     TRIAL,
-    WAY,
-    A,
-    B,
-    any_is,
+    ZERO,
+    ZERO_BEHIND,
+    contains,
 )
 
-# Trials of a search, and the relative step after which the next would be below rounding.
-TRIALS, CLOSE = 40, 1e-9
+# The most trials of a search, and the relative step after which the next one would be below rounding.
+MAX_TRIALS, LAST_STEP = 40, 1e-9
 
-# Roundings by which the middle of an orbit may miss the axis that makes it its own mirror image.
-ROUNDINGS = 8.0 * 2.0**-52
+# By how much, relative to the places, the middle of an orbit may miss the axis about which it is even.
+EVEN_TOLERANCE = 8.0 * 2.0**-52
 
-# An orbit about one axis that reaches its neighbours, twice a step apart, is at rest there.
-NEIGHBOURING = 1.999
+# The width of an orbit about one axis, in steps between axes, from which on it reaches the neighbouring axes.
+MAX_WIDTH = 1.999
 
-# A body that comes this near to the top, by the square of a sine, is left to the search. Above the other share rounding
-# of that square moves the turning point by more than its own.
-TOP, STEEP = 1e-9, 0.5
+# The turning point is given by the square of a sine, which is 1 at a potential maximum. Within NEAR_MAXIMUM of 1 the
+# closed form is not used; above INACCURATE rounding of that square moves the turning point by more than a rounding.
+NEAR_MAXIMUM, INACCURATE = 1e-9, 0.5
 
 
 @Inner
-def by_closed_form(fns, n, s, p, known, work):  # type: ignore[no-untyped-def]
-    """Set AHEAD and BEHIND, and WAY of bodies at rest, by how wide the orbit about the nearest well is; else NaN.
+def by_closed_form(fns, n, rows, p, domain, work):  # type: ignore[no-untyped-def]
+    """Set both zeros, and the direction of bodies at rest, by the closed form of the width of the orbit in its well.
 
-    The state is NOWHERE for bodies that pass over the top, and SEEKING for all others.
+    Where that does not hold ZERO_BEHIND is NaN. The state is NOWHERE for bodies that pass the maximum next to the well,
+    and SEEKING for all others.
     """
-    start, w0, way, state = s[START, :n], s[SPEED, :n], s[WAY, :n], s[STATE, :n]
-    ahead, behind, axis = s[AHEAD, :n], s[BEHIND, :n], s[AXIS, :n]
-    places, places_low, steps = known[3, :n], known[4, :n], known[5, :n]
-    rows, halves, offsets, steep = work[:3].reshape(-1)[: 3 * n].reshape(3, n), work[3, :n], work[4, :n], work[5, :n]
+    start, w0, direction, state = (
+        rows[LAUNCH_PLACE, :n],
+        rows[LAUNCH_V2, :n],
+        rows[SEARCH_DIRECTION, :n],
+        rows[STATE, :n],
+    )
+    ahead, behind, axis = rows[ZERO, :n], rows[ZERO_BEHIND, :n], rows[AXIS_DISTANCE, :n]
+    places, places_low, steps = domain[3, :n], domain[4, :n], domain[5, :n]
+    out, halves, offsets, inaccurate = (
+        work[:3].reshape(-1)[: 3 * n].reshape(3, n),
+        work[3, :n],
+        work[4, :n],
+        work[5, :n],
+    )
     for j in range(n):
         axis[j] = (start[j] - places[j]) - places_low[j]
-    call_turning_by_closed_form_batch(fns.turning_point, n, axis, w0, p, rows)
+    call_turning_point_batch(fns.turning_point, n, axis, w0, p, out)
     for j in range(n):
-        turn, rests = 2.0 * steps[j], w0[j] == 0.0
-        turns = choose(turn > 0.0, whole_below(axis[j] / turn + 0.5), 0.0)
-        offsets[j] = fma(-turns, turn, axis[j])
-        halves[j] = choose(rests & (turns == 0.0), fabs(axis[j]), rows[0, j])
-        ahead[j] = choose(rests, choose(offsets[j] < 0.0, 1.0, -1.0), way[j])
-        steep[j] = choose((turns == 0.0) & (w0[j] > 0.0) & (rows[2, j] > STEEP), 1.0, 0.0)
-    if any_is(steep, 1.0):
+        period, rests = 2.0 * steps[j], w0[j] == 0.0
+        periods = choose(period > 0.0, whole_below(axis[j] / period + 0.5), 0.0)
+        offsets[j] = fma(-periods, period, axis[j])
+        halves[j] = choose(rests & (periods == 0.0), fabs(axis[j]), out[0, j])
+        ahead[j] = choose(rests, choose(offsets[j] < 0.0, 1.0, -1.0), direction[j])
+        inaccurate[j] = choose((periods == 0.0) & (w0[j] > 0.0) & (out[2, j] > INACCURATE), 1.0, 0.0)
+    if contains(inaccurate, 1.0):
         near, ends, widths = work[6, :n], work[7, :n], work[8, :n]
-        rise = work[9:12].reshape(-1)[: 3 * n].reshape(3, n)
+        slopes = work[9:12].reshape(-1)[: 3 * n].reshape(3, n)
         for j in range(n):
             near[j], ends[j] = places[j] + offsets[j], places[j] + ahead[j] * halves[j]
             widths[j] = ahead[j] * halves[j] - offsets[j]
-        call_potential_divdiff1_batch(fns.potential_divdiff1, n, near, ends, widths, p, rise)
+        call_potential_divdiff1_batch(fns.potential_divdiff1, n, near, ends, widths, p, slopes)
         for j in range(n):
-            missed = ahead[j] * ((w0[j] - widths[j] * rise[0, j]) / rise[2, j])
-            halves[j] += choose(steep[j] == 1.0, missed, 0.0)
+            missed = ahead[j] * ((w0[j] - 2.0 * widths[j] * slopes[0, j]) / (2.0 * slopes[2, j]))
+            halves[j] += choose(inaccurate[j] == 1.0, missed, 0.0)
     for j in range(n):
         offset, half, sense, step, rests = offsets[j], halves[j], ahead[j], steps[j], w0[j] == 0.0
         size, alone = fabs(offset), step == 0.0
-        well = (rows[1, j] > 0.0) & (alone | (size < step))
-        clear = (size > UNCLEAR * (fabs(start[j]) + fabs(places[j]))) & (alone | (size < ALL_BUT * step))
-        inside = choose(size > half, half, size)  # many turns away the offset is rounded more than the width
-        uphill = choose(sense * offset < 0.0, -inside, inside)
-        known_well = well & ((rests & clear) | ((w0[j] > 0.0) & (rows[2, j] < 1.0 - TOP)))
-        ahead[j], behind[j] = choose(known_well, half - uphill, 0.0), choose(known_well, half + uphill, nan)
-        way[j] = choose(known_well, sense, way[j])
+        well = (out[1, j] > 0.0) & (alone | (size < step))
+        clear = (size > NEAR_AXIS * (fabs(start[j]) + fabs(places[j]))) & (alone | (size < MAX_AXIS_STEP_SHARE * step))
+        inside = choose(size > half, half, size)  # many periods away the offset is rounded more than the width
+        ascent = choose(sense * offset < 0.0, -inside, inside)
+        known_well = well & ((rests & clear) | ((w0[j] > 0.0) & (out[2, j] < 1.0 - NEAR_MAXIMUM)))
+        ahead[j], behind[j] = choose(known_well, half - ascent, 0.0), choose(known_well, half + ascent, nan)
+        direction[j] = choose(known_well, sense, direction[j])
         axis[j] = -sense * offset
-        state[j] = choose(well & (rows[2, j] > 1.0 + TOP), NOWHERE, SEEKING)
+        state[j] = choose(well & (out[2, j] > 1.0 + NEAR_MAXIMUM), NOWHERE, SEEKING)
 
 
 @Inner
-def launch(fns, n, s, p, known, monotone, work):  # type: ignore[no-untyped-def]
-    """Set up the search ahead: a body released at rest goes where it falls. ``known`` has the columns FIRST to NEXT.
+def start_search(fns, n, rows, p, domain, monotone, work):  # type: ignore[no-untyped-def]
+    """Set up the search ahead of each launch. A body at rest starts in the direction of the force.
 
-    Where V**2 is ``monotone`` between axes it comes to rest at its mirror image, and nothing is to be searched.
+    ``domain`` has the rows DOMAIN_LOW to AXIS_STEP of `strided`. Where V**2 is ``monotone`` between axes a body
+    released at rest turns at its mirror image, and no search is needed.
     """
-    start, w0, way, state = s[START, :n], s[SPEED, :n], s[WAY, :n], s[STATE, :n]
-    reach, back, trial = s[REACH, :n], s[BACK, :n], s[TRIAL, :n]
-    lows, highs, periods = known[0, :n], known[1, :n], known[2, :n]
-    places, places_low, steps = known[3, :n], known[4, :n], known[5, :n]
-    axis, next_axis, zero, behind = s[AXIS, :n], s[STEP, :n], s[AHEAD, :n], s[BEHIND, :n]
+    start, w0, direction, state = (
+        rows[LAUNCH_PLACE, :n],
+        rows[LAUNCH_V2, :n],
+        rows[SEARCH_DIRECTION, :n],
+        rows[STATE, :n],
+    )
+    length, length_behind, trial = rows[SEARCH_LENGTH, :n], rows[LENGTH_BEHIND, :n], rows[TRIAL, :n]
+    lows, highs, periods = domain[0, :n], domain[1, :n], domain[2, :n]
+    places, places_low, steps = domain[3, :n], domain[4, :n], domain[5, :n]
+    axis, next_axis, zero, behind = (
+        rows[AXIS_DISTANCE, :n],
+        rows[AXIS_SPACING, :n],
+        rows[ZERO, :n],
+        rows[ZERO_BEHIND, :n],
+    )
     if monotone and fns.turning_point:
-        by_closed_form(fns, n, s, p, known, work)
+        by_closed_form(fns, n, rows, p, domain, work)
     else:
         behind[:], zero[:], state[:] = nan, 0.0, SEEKING
-    none, undecided, rows = work[0, :n], work[1, :n], work[2:5].reshape(-1)[: 3 * n].reshape(3, n)
+    none, undecided, out = work[0, :n], work[1, :n], work[2:5].reshape(-1)[: 3 * n].reshape(3, n)
     for j in range(n):
         undecided[j] = choose((w0[j] == 0.0) & (behind[j] != behind[j]), 1.0, 0.0)
-    if any_is(undecided, 1.0):
+    if contains(undecided, 1.0):
         none[:] = 0.0
-        call_potential_divdiff1_batch(fns.potential_divdiff1, n, start, start, none, p, rows)
+        call_potential_divdiff1_batch(fns.potential_divdiff1, n, start, start, none, p, out)
         for j in range(n):
-            falls = (rows[2, j] < 0.0) * 1.0 - (rows[2, j] > 0.0) * 1.0
-            way[j] = choose(undecided[j] == 1.0, falls, way[j])
+            falls = (out[2, j] < 0.0) * 1.0 - (out[2, j] > 0.0) * 1.0
+            direction[j] = choose(undecided[j] == 1.0, falls, direction[j])
     for j in range(n):
         low, high, period = lows[j], highs[j], periods[j]
-        forwards, closed, length = way[j] > 0.0, period > 0.0, high - low
-        reach[j] = choose(closed, period, choose(forwards, high - start[j], start[j] - low))
-        back[j] = choose(closed, CLOSED, choose(forwards, start[j] - low, high - start[j]))
-        trial[j] = choose(closed, 0.125 * period, choose(length < inf, 0.125 * length, 1.0))
-        state[j] = choose((way[j] != 0.0) & (low <= start[j]) & (start[j] <= high), state[j], NOWHERE)
+        forwards, closed, extent = direction[j] > 0.0, period > 0.0, high - low
+        length[j] = choose(closed, period, choose(forwards, high - start[j], start[j] - low))
+        length_behind[j] = choose(closed, CLOSED, choose(forwards, start[j] - low, high - start[j]))
+        trial[j] = choose(closed, 0.125 * period, choose(extent < inf, 0.125 * extent, 1.0))
+        state[j] = choose((direction[j] != 0.0) & (low <= start[j]) & (start[j] <= high), state[j], NOWHERE)
     for j in range(n):
-        step, low, itself = steps[j], places_low[j], way[j] * (places[j] - start[j])
-        first = distance_to_axis(start[j], way[j], places[j], step)
+        step, low, itself = steps[j], places_low[j], direction[j] * (places[j] - start[j])
+        first = distance_to_axis(start[j], direction[j], places[j], step)
         known_well = monotone & (low == low) & (first == itself)  # steps are rounded, and so are axes by them
-        first += choose(known_well, way[j] * low, 0.0)
-        # Released at rest it falls towards the axis, and comes to rest on the other side.
+        first += choose(known_well, direction[j] * low, 0.0)
+        # A body released at rest moves towards the axis and turns on the other side of it.
         mirrored = choose((w0[j] == 0.0) & (first > 0.0), 2.0 * first, trial[j])
-        trial[j] = choose(mirrored < reach[j], mirrored, reach[j])
-        away = (first > UNCLEAR * (fabs(start[j]) + fabs(places[j]))) & ((step == 0.0) | (first < ALL_BUT * step))
-        given = behind[j] == behind[j]
-        there = given | (known_well & (w0[j] == 0.0) & away)
-        zero[j] = choose(given, zero[j], mirrored)
-        state[j] = choose(there & (zero[j] <= reach[j]) & (state[j] == SEEKING), FOUND, state[j])
-        axis[j], next_axis[j] = choose(given, axis[j], first), step
+        trial[j] = choose(mirrored < length[j], mirrored, length[j])
+        away = (first > NEAR_AXIS * (fabs(start[j]) + fabs(places[j]))) & (
+            (step == 0.0) | (first < MAX_AXIS_STEP_SHARE * step)
+        )
+        known = behind[j] == behind[j]
+        decided = known | (known_well & (w0[j] == 0.0) & away)
+        zero[j] = choose(known, zero[j], mirrored)
+        state[j] = choose(decided & (zero[j] <= length[j]) & (state[j] == SEEKING), FOUND, state[j])
+        axis[j], next_axis[j] = choose(known, axis[j], first), step
 
 
 @Inner
-def turn_round(n, s):  # type: ignore[no-untyped-def]
-    """Set up the search behind: none for a launch from rest. What was ahead is kept as an offset, in ``A``.
+def start_search_behind(n, rows):  # type: ignore[no-untyped-def]
+    """Set up the search behind each launch; a launch from rest needs none.
 
-    The axis is the last before that, now as an offset; it mirrors what was found to the first trial.
+    The zero ahead is stored as an offset in END_LOW. AXIS_DISTANCE becomes the offset of the last axis before it, about
+    which its mirror image is the first trial.
     """
-    way, reach, back, state = s[WAY, :n], s[REACH, :n], s[BACK, :n], s[STATE, :n]
-    trial, zero, axis, next_axis, end, w0 = s[TRIAL, :n], s[AHEAD, :n], s[AXIS, :n], s[STEP, :n], s[A, :n], s[SPEED, :n]
-    behind = s[BEHIND, :n]
+    direction, length, length_behind, state = (
+        rows[SEARCH_DIRECTION, :n],
+        rows[SEARCH_LENGTH, :n],
+        rows[LENGTH_BEHIND, :n],
+        rows[STATE, :n],
+    )
+    trial, zero, axis, next_axis, end, w0 = (
+        rows[TRIAL, :n],
+        rows[ZERO, :n],
+        rows[AXIS_DISTANCE, :n],
+        rows[AXIS_SPACING, :n],
+        rows[END_LOW, :n],
+        rows[LAUNCH_V2, :n],
+    )
+    behind = rows[ZERO_BEHIND, :n]
     for j in range(n):
         ahead, step = zero[j], next_axis[j]
         last = axis[j] + choose(step > 0.0, step * whole_below((ahead - axis[j]) / step), 0.0)
-        end[j], axis[j] = way[j] * ahead, way[j] * last
-        reach[j] = choose(back[j] == CLOSED, reach[j] - ahead, back[j])
+        end[j], axis[j] = direction[j] * ahead, direction[j] * last
+        length[j] = choose(length_behind[j] == CLOSED, length[j] - ahead, length_behind[j])
         mirrored = choose(ahead > 2.0 * last, ahead - 2.0 * last, ahead)
-        trial[j] = choose(mirrored < reach[j], mirrored, reach[j])
+        trial[j] = choose(mirrored < length[j], mirrored, length[j])
     for j in range(n):
-        given = behind[j] == behind[j]
-        way[j], zero[j] = -way[j], choose(given, behind[j], 0.0)
+        known = behind[j] == behind[j]
+        direction[j], zero[j] = -direction[j], choose(known, behind[j], 0.0)
         state[j] = choose((w0[j] > 0.0) & (behind[j] != behind[j]), SEEKING, FOUND)
 
 
 @Inner
-def seek(fns, n, s, p, work):  # type: ignore[no-untyped-def]
-    """Guess how far the first zero of V**2 is from each launch, from first trials.
+def search(fns, n, rows, p, work):  # type: ignore[no-untyped-def]
+    """Approximate the distance of the first zero of V**2 from each launch, beginning at TRIAL.
 
-    Newton's method on V**2/distance, which has no zero at a launch from rest. Until a trial has V**2 < 0, trials go at
-    most four times as far.
+    Newton's method is applied to V**2/distance, which has no zero at a launch from rest. Until a trial has V**2 < 0,
+    the next one is at most four times as far.
     """
-    offsets, places, rows = work[0, :n], work[1, :n], work[2:5].reshape(-1)[: 3 * n].reshape(3, n)
-    start, w0, way, reach = s[START, :n], s[SPEED, :n], s[WAY, :n], s[REACH, :n]
-    state, left, right, trial, zero = s[STATE, :n], s[LEFT, :n], s[RIGHT, :n], s[TRIAL, :n], s[AHEAD, :n]
-    if not any_is(state, SEEKING):
+    offsets, places, out = work[0, :n], work[1, :n], work[2:5].reshape(-1)[: 3 * n].reshape(3, n)
+    start, w0, direction, length = (
+        rows[LAUNCH_PLACE, :n],
+        rows[LAUNCH_V2, :n],
+        rows[SEARCH_DIRECTION, :n],
+        rows[SEARCH_LENGTH, :n],
+    )
+    state, left, right, trial, zero = (
+        rows[STATE, :n],
+        rows[BRACKET_LOW, :n],
+        rows[BRACKET_HIGH, :n],
+        rows[TRIAL, :n],
+        rows[ZERO, :n],
+    )
+    if not contains(state, SEEKING):
         return
     for j in range(n):
         left[j], right[j] = 0.0, inf
-    for _ in range(TRIALS):
+    for _ in range(MAX_TRIALS):
         for j in range(n):
-            offsets[j] = way[j] * trial[j]
+            offsets[j] = direction[j] * trial[j]
             places[j] = start[j] + offsets[j]
-        call_potential_divdiff1_batch(fns.potential_divdiff1, n, start, places, offsets, p, rows)
+        call_potential_divdiff1_batch(fns.potential_divdiff1, n, start, places, offsets, p, out)
         for j in range(n):
-            at, w = trial[j], w0[j] - offsets[j] * rows[0, j]
+            at, w = trial[j], w0[j] - 2.0 * offsets[j] * out[0, j]
             before = w > 0.0
             low, high = choose(before, at, left[j]), choose(before, right[j], at)
-            better = at + at * (w / (offsets[j] * rows[2, j] + w))
-            close = fabs(better - at) <= CLOSE * at
+            better = at + at * (w / (2.0 * offsets[j] * out[2, j] + w))
+            close = fabs(better - at) <= LAST_STEP * at
             bracketed = high < inf
             within = (better > low) & (better < choose(bracketed, high, 4.0 * at))
             new = choose(within, better, choose(bracketed, 0.5 * (low + high), 2.0 * at))
-            new = choose(new > reach[j], reach[j], new)
-            lost = (w != w) | (before & (at >= reach[j]))
+            new = choose(new > length[j], length[j], new)
+            lost = (w != w) | (before & (at >= length[j]))
             live = state[j] == SEEKING
             zero[j] = choose(live & close, better, zero[j])
             trial[j] = choose(live, new, at)
             left[j], right[j] = low, high
             state[j] = choose(live, choose(close, FOUND, choose(lost, NOWHERE, SEEKING)), state[j])
-        if not any_is(state, SEEKING):
+        if not contains(state, SEEKING):
             return
 
 
 @Inner
-def judge(n, s):  # type: ignore[no-untyped-def]
-    """Set the state by whether the turning point ahead is one, and the trial by whether the body goes round instead."""
-    state, trial, zero, reach = s[STATE, :n], s[TRIAL, :n], s[AHEAD, :n], s[REACH, :n]
-    way, w0, back = s[WAY, :n], s[SPEED, :n], s[BACK, :n]
+def classify(n, rows):  # type: ignore[no-untyped-def]
+    """Set STATE to FOUND where there is a turning point ahead, and TRIAL to FOUND where the body circulates instead."""
+    state, trial, zero, length = rows[STATE, :n], rows[TRIAL, :n], rows[ZERO, :n], rows[SEARCH_LENGTH, :n]
+    direction, w0, length_behind = rows[SEARCH_DIRECTION, :n], rows[LAUNCH_V2, :n], rows[LENGTH_BEHIND, :n]
     for j in range(n):
-        round_it = (state[j] == NOWHERE) & (way[j] * w0[j] != 0.0) & (back[j] == CLOSED)
-        trial[j] = choose(round_it, FOUND, NOWHERE)
+        circulates = (state[j] == NOWHERE) & (direction[j] * w0[j] != 0.0) & (length_behind[j] == CLOSED)
+        trial[j] = choose(circulates, FOUND, NOWHERE)
     for j in range(n):
-        state[j] = choose((state[j] == FOUND) & (zero[j] <= reach[j]), FOUND, NOWHERE)
+        state[j] = choose((state[j] == FOUND) & (zero[j] <= length[j]), FOUND, NOWHERE)
 
 
 @Inner
-def set_ends(n, s):  # type: ignore[no-untyped-def]
-    """Set both ends; the state by whether the orbit is its own mirror image, the trial by whether about one axis."""
-    start, least, most, a, b = s[START, :n], s[LEAST, :n], s[MOST, :n], s[A, :n], s[B, :n]
-    way, zero, axis, step, state, trial = s[WAY, :n], s[AHEAD, :n], s[AXIS, :n], s[STEP, :n], s[STATE, :n], s[TRIAL, :n]
+def set_ends(n, rows):  # type: ignore[no-untyped-def]
+    """Set both ends; STATE to FOUND where the orbit is even, and TRIAL to FOUND where only one axis lies within it."""
+    start, least, most, a, b = (
+        rows[LAUNCH_PLACE, :n],
+        rows[OFFSET_LOW, :n],
+        rows[OFFSET_HIGH, :n],
+        rows[END_LOW, :n],
+        rows[END_HIGH, :n],
+    )
+    direction, zero, axis, step, state, trial = (
+        rows[SEARCH_DIRECTION, :n],
+        rows[ZERO, :n],
+        rows[AXIS_DISTANCE, :n],
+        rows[AXIS_SPACING, :n],
+        rows[STATE, :n],
+        rows[TRIAL, :n],
+    )
     for j in range(n):
-        first, second = a[j], way[j] * zero[j]
+        first, second = a[j], direction[j] * zero[j]
         missed = fabs(0.5 * (first + second) - axis[j])
-        even = missed <= ROUNDINGS * (fabs(start[j]) + fabs(first) + fabs(second))
-        between = (step[j] == 0.0) | (fabs(first - second) < NEIGHBOURING * step[j])
+        even = missed <= EVEN_TOLERANCE * (fabs(start[j]) + fabs(first) + fabs(second))
+        between = (step[j] == 0.0) | (fabs(first - second) < MAX_WIDTH * step[j])
         state[j], trial[j] = choose(even, FOUND, NOWHERE), choose(between, FOUND, NOWHERE)
     for j in range(n):
-        first, second = a[j], way[j] * zero[j]
+        first, second = a[j], direction[j] * zero[j]
         least[j], most[j] = choose(first < second, first, second), choose(first < second, second, first)
         a[j], b[j] = start[j] + least[j], start[j] + most[j]
 
 
 @Inner
-def prove(fns, kind, mirrored, pieces, n, s, p, work):  # type: ignore[no-untyped-def]
-    """Set the state to FOUND where V**2 > 0 and ds > 0 between both ends is certain, else to NOWHERE.
+def prove(fns, kind, mirrored, pieces, n, rows, p, work):  # type: ignore[no-untyped-def]
+    """Set STATE to FOUND where V**2 > 0 and ds > 0 is certain between both ends, else to NOWHERE.
 
-    V**2 is zero at both ends of a libration, and what it is at launch at both ends of a lap. Over the piece at a zero
-    the slope must have its sign throughout: the zero is simple, and the only one there. Half of an orbit that is
-    ``mirrored`` is enough, up to the axis.
+    V**2 is zero at both ends of a libration, and has its launch value at both ends of a lap. On the piece next to a
+    zero the slope must have one sign throughout, so that the zero is simple and the only one there. Of an orbit that is
+    ``mirrored`` the half up to the axis is enough.
     """
     places, behind, lo, hi = work[0, :n], work[1, :n], work[2, :n], work[3, :n]
     offsets, speeds, box = work[4, :n], work[5, :n], work[6:10].reshape(-1)[: 4 * n].reshape(4, n)
-    rows = work[10:13].reshape(-1)[: 3 * n].reshape(3, n)
-    start, w0, least, state = s[START, :n], s[SPEED, :n], s[LEAST, :n], s[STATE, :n]
-    most = s[AXIS if mirrored else MOST, :n]
+    out = work[10:13].reshape(-1)[: 3 * n].reshape(3, n)
+    start, w0, least, state = rows[LAUNCH_PLACE, :n], rows[LAUNCH_V2, :n], rows[OFFSET_LOW, :n], rows[STATE, :n]
+    most = rows[AXIS_DISTANCE if mirrored else OFFSET_HIGH, :n]
     for j in range(n):
         behind[j], speeds[j], state[j] = start[j] + least[j], w0[j], FOUND
     for k in range(1, pieces + 1):
@@ -261,19 +322,19 @@ def prove(fns, kind, mirrored, pieces, n, s, p, work):  # type: ignore[no-untype
             lo[j], hi[j] = behind[j], places[j]
         call_bounds_batch(fns.bounds, n, lo, hi, p, box)
         if end:
-            rows[0] = 0.0
+            out[0] = 0.0
         else:
-            call_potential_divdiff1_batch(fns.potential_divdiff1, n, start, places, offsets, p, rows)
+            call_potential_divdiff1_batch(fns.potential_divdiff1, n, start, places, offsets, p, out)
         for j in range(n):
-            lost = offsets[j] * rows[0, j]
-            w, clear = w0[j] - lost, UNRESOLVED * (w0[j] + fabs(lost))
-            # The most that V**2 may lose, and gain, for each unit of the parameter, and so the least it can be.
-            loss, gain, from_w = box[1, j], -box[0, j], speeds[j]
-            valley = (loss * w + gain * from_w - loss * gain * (hi[j] - lo[j])) / (loss + gain)
-            lowest = choose((loss > 0.0) & (gain > 0.0), valley, choose(w < from_w, w, from_w))
-            # On the way to the axis it grows, but for rounding.
-            grown = 0.5 * from_w - choose(loss > 0.0, loss, 0.0) * (hi[j] - lo[j])
-            good = choose(first, -loss, choose(last, -gain, choose(half, grown, lowest - clear))) > 0.0
+            lost = 2.0 * offsets[j] * out[0, j]
+            w, clear = w0[j] - lost, CONSTANT_SHARE * (w0[j] + fabs(lost))
+            # Bounds of the rates at which V**2 may fall and grow, and the smallest value that they allow.
+            fall, growth, from_w = 2.0 * box[1, j], -2.0 * box[0, j], speeds[j]
+            valley = (fall * w + growth * from_w - fall * growth * (hi[j] - lo[j])) / (fall + growth)
+            lowest = choose((fall > 0.0) & (growth > 0.0), valley, choose(w < from_w, w, from_w))
+            # Towards the axis it grows, except by rounding.
+            grown = 0.5 * from_w - choose(fall > 0.0, fall, 0.0) * (hi[j] - lo[j])
+            good = choose(first, -fall, choose(last, -growth, choose(half, grown, lowest - clear))) > 0.0
             good = good & (last | half | (w > clear)) & (box[2, j] > 0.0)
             state[j] = choose(good, state[j], NOWHERE)
             behind[j], speeds[j] = places[j], w

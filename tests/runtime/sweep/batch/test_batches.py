@@ -37,10 +37,11 @@ def answered(
     columns = [np.asarray(v, dtype=float) for v in (lam0, v0, ways, 0.0, *known, *p)]
     n = max(column.size for column in columns)
     lines = [np.broadcast_to(column, n) for column in columns]
-    out, reasons = np.full((n, 2), np.nan), np.full(n, quantities.UNDECIDED, dtype=np.int8)
+    out, status = np.full((n, 2), np.nan), np.full(n, quantities.UNDECIDED, dtype=np.int8)
+    answers = quantities.Answers(out, status, np.zeros_like(status))
     each = module.MODEL.each
-    answer_batches(each.addresses(), (each.held, each.top_held), pointers(lines), monotone, asked, out, reasons)
-    return out, reasons
+    answer_batches(each.addresses(), (each.held, each.top_held), pointers(lines), monotone, asked, answers)
+    return out, status
 
 
 CIRCLE = (-np.inf, np.inf, 2 * np.pi)
@@ -58,18 +59,18 @@ def test_every_pendulum_away_from_the_top_is_answered(count: int, said: str, mod
     """Whatever the number of launches: half periods of all, within a few last places."""
     amplitude = np.linspace(0.01, 2.6, count)
     p = [1.0, 9.81, 1.0]
-    out, reasons = answered(
+    out, status = answered(
         module_of("circle"), amplitude, 0.0, 1, p, CIRCLE, asked=quantities.HALF_PERIOD, **SAID[said]
     )
-    assert (reasons == quantities.ANSWERED).all()
+    assert (status == quantities.ANSWERED).all()
     for value, a in zip(out[:, 0], amplitude, strict=True):
         with mp.workdps(40):
             truth = 2 * mp.ellipk(mp.sin(mpf(float(a)) / 2) ** 2) / mp.sqrt(mpf("9.81"))
         assert abs(mpf(float(value)) - truth) <= ULPS * np.spacing(float(truth))
 
 
-# Of 300 launches those that are left to be solved one by one where nothing is said of symmetry: all of them go downhill
-# and then far up the other side, and bounds of the slope over the whole way are too wide to prove that nothing stops them.
+# So many of 300 launches are left to be solved one by one where nothing is said of symmetry: they go downhill, far up
+# the other side, and bounds of the slope over the whole way do not prove that nothing stops them before.
 UNPROVED = {1: 50, -1: 49}
 
 
@@ -103,8 +104,8 @@ def test_laps(way: int, said: str, module_of: ModuleOf) -> None:
     places = np.linspace(-3.0, 3.0, 13)
     v0 = np.sqrt(8.0**2 - 2 * 9.81 * (1 - np.cos(places)))
     p = [1.0, 9.81, 1.0]
-    out, reasons = answered(module_of("circle"), places, v0, way, p, CIRCLE, asked=quantities.PERIOD, **SAID[said])
-    assert (reasons == quantities.ANSWERED).all()
+    out, status = answered(module_of("circle"), places, v0, way, p, CIRCLE, asked=quantities.PERIOD, **SAID[said])
+    assert (status == quantities.ANSWERED).all()
     with mp.workdps(40):
         truth = float(4 * mp.ellipk(4 * mpf("9.81") / 64) / 8)
     # Speeds are rounded, and the loop time follows the energy they mean.
@@ -181,8 +182,8 @@ def test_what_cannot_be_proved_is_left(said: str, module_of: ModuleOf) -> None:
     """Launches at the top, next to it, and what is not a number."""
     lam0 = [np.pi, np.pi - 1e-9, np.nan, 0.3]
     p = [1.0, 9.81, 1.0]
-    out, reasons = answered(module_of("circle"), lam0, 0.0, 1, p, CIRCLE, asked=quantities.HALF_PERIOD, **SAID[said])
-    assert list(reasons) == [quantities.UNDECIDED, quantities.UNDECIDED, quantities.UNDECIDED, quantities.ANSWERED]
+    out, status = answered(module_of("circle"), lam0, 0.0, 1, p, CIRCLE, asked=quantities.HALF_PERIOD, **SAID[said])
+    assert list(status) == [quantities.UNDECIDED, quantities.UNDECIDED, quantities.UNDECIDED, quantities.ANSWERED]
     assert np.isnan(out[:3, 0]).all()
 
 

@@ -1,48 +1,43 @@
-"""What a load map calls: all its rows at once, V**2 by subtracting heights, and the size of what is rounded there."""
+"""The function of a load map: all its rows in one call, with V**2 by subtraction and the size of what it rounds."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from math import prod
-from typing import TYPE_CHECKING
 
 from sympy import Abs, Expr, Function, Pow, Rational, Symbol, cos, cosh, exp, ordered, sin, sinh
 
+from gqm_sym.emission.context import Lowering
 from gqm_sym.emission.ir import FunctionIR
 from gqm_sym.emission.subscripts import at
 
-if TYPE_CHECKING:
-    from gqm_sym.emission.context import Lowering
 
-
-def loads(lowering: "Lowering") -> tuple[FunctionIR, ...]:
-    """The function of a load map; none where it is not known how far heights are rounded."""
+def load_map(lowering: Lowering) -> tuple[FunctionIR, ...]:
+    """The function of a load map; none where the size of the terms of the effective potential is not known."""
     model, names = lowering.model, lowering.names
-    climb = _without_constant(model.climb, lowering.place)
-    size = rounded_size(climb, lowering.place)
+    potential = _without_constant(model.effective_potential, lowering.place)
+    size = rounded_size(potential, lowering.place)
     if size is None:
         return ()
     w0, level, places = names.symbol("w0"), names.symbol("level"), names("places")
-    v2 = Function("left_of")(w0, climb, level)
-    force = Symbol("m", real=True) * (model.kappa * v2 + model.reaction)
+    v2 = Function("speed_squared_from_potential")(w0, potential, level)
+    force = Symbol("m", real=True) * (model.kappa * v2 + model.static_normal_load)
     grown, outputs = rising((model.x, model.z, model.ds, model.kappa, v2, force, size), names.symbol)
     function = lowering.function(
-        "loads",
-        "LOADS",
-        (w0.name, level.name, places),
-        "x, z, ds/d{0}, signed curvature, V**2, contact force (paper, eq. 15), and the size of the heights in V**2.",
-        views=((places, names("n")),),
+        "load_map",
+        (w0, level, places),
+        f"x, z, ds/d{lowering.place}, kappa, V**2 = w0 - 2*(U - level), N (paper, eqs. 8, 13, 15), size of U's terms.",
         inside=[(lowering.place, at(places)), *grown],
         outputs=outputs,
-        later=True,
     )
-    return (function,)
+    return (replace(function, later=True),)
 
 
 def rising(
     forms: tuple[Expr, ...], symbol: Callable[[str], Symbol]
 ) -> tuple[list[tuple[Symbol, Expr]], tuple[Expr, ...]]:
-    """Exponentials whose reciprocals occur too, by names of their own, and the forms with these.
+    """Give names to exponentials whose reciprocals occur as well; return them and the forms that use them.
 
-    A division costs a third of an exponential, and what 1/exp(u) stands for, SymPy writes as exp(-u).
+    SymPy writes 1/exp(u) as exp(-u). A division costs a third of a second exponential.
     """
     calls = {call for form in forms for call in form.atoms(exp)}
     both = [call for call in ordered(calls) if exp(-call.exp) in calls and not call.exp.could_extract_minus_sign()]
@@ -51,14 +46,14 @@ def rising(
     return named, tuple(form.xreplace(by_name) for form in forms)
 
 
-def _without_constant(climb: Expr, place: Symbol) -> Expr:
-    """The climb less what is the same everywhere: that would only be rounded."""
-    factor, rest = climb.as_independent(place, as_Add=False)
+def _without_constant(potential: Expr, place: Symbol) -> Expr:
+    """The potential without its constant term, which would only add rounding."""
+    factor, rest = potential.as_independent(place, as_Add=False)
     return factor * rest.as_independent(place, as_Add=True)[1]
 
 
 def rounded_size(form: Expr, place: Symbol) -> Expr | None:
-    """What the roundings of a form are shares of: its own size where nothing cancels in it; None where not known."""
+    """The size that the roundings of a form are shares of: its own where nothing cancels in it; None if unknown."""
     if form.is_Symbol or form.is_number:
         return Abs(form)
     if form.is_Pow and not form.base.has(place) and not form.exp.has(place):
@@ -72,7 +67,7 @@ def rounded_size(form: Expr, place: Symbol) -> Expr | None:
 
 
 def _composed(form: Expr, sizes: list[Expr], place: Symbol) -> Expr | None:
-    """The same, given the sizes of the form's parts."""
+    """The size of a form, given the sizes of its parts."""
     if form.is_Add:
         return sum(sizes[1:], sizes[0])
     if form.is_Mul:
@@ -92,6 +87,6 @@ def _composed(form: Expr, sizes: list[Expr], place: Symbol) -> Expr | None:
 
 
 def _is_exact(form: Expr, place: Symbol) -> bool:
-    """Whether a form is the place times a power of two, and so not rounded."""
+    """Whether a form is the place times a power of two, which is not rounded."""
     factor = form / place
     return isinstance(factor, Rational) and all(part & (part - 1) == 0 for part in (abs(factor.p), factor.q))

@@ -1,62 +1,54 @@
-"""What a sweep calls for orbits about an axis of symmetry, whose time is an integral without sines."""
-
-from typing import TYPE_CHECKING
+"""The functions of a batch for orbits about an axis of symmetry, whose time is an integral without sines."""
 
 from sympy import Expr
 
 from gqm_sym.derivation.wells.swing import HALF, LAUNCH, OFFSET, Swing, at_share
+from gqm_sym.emission.context import Lowering
 from gqm_sym.emission.ir import FunctionIR
 from gqm_sym.emission.sharing import hoist
 from gqm_sym.emission.subscripts import at
 
-if TYPE_CHECKING:
-    from gqm_sym.emission.context import Lowering
 
-
-def swing_each(lowering: "Lowering") -> tuple[FunctionIR, ...]:
-    """The time of many orbits about an axis: by a mean, or else by their pace and what is the same all along each."""
+def axis_orbits_batch(lowering: Lowering) -> tuple[FunctionIR, ...]:
+    """Times of orbits about an axis, by an arithmetic-geometric mean or by an integrand, and their turning points."""
     swing = lowering.model.swing
     if swing is None:
         return ()
-    times = (_mean_each(lowering, swing.means),) if swing.means else _pace_each(lowering, swing)
+    times = (_agm_arguments(lowering, swing.means),) if swing.means else _time_integrand(lowering, swing)
     symmetry = lowering.model.symmetry
     if swing.crest is None or symmetry is None or not symmetry.monotone:
         return times
-    return (*times, _crest_each(lowering, swing.crest))
+    return (*times, _turning_point(lowering, swing.crest))
 
 
-def _crest_each(lowering: "Lowering", crest: tuple[Expr, ...]) -> FunctionIR:
+def _turning_point(lowering: Lowering, crest: tuple[Expr, ...]) -> FunctionIR:
     names = lowering.names
     offset, launch = names.symbol("offset"), names.symbol("launch")
     offsets, launches = names("offsets"), names("launches")
     return lowering.function(
-        "crest_each",
-        "CREST_EACH",
+        "turning_point_batch",
         (offsets, launches),
-        "Half an orbit's width, where V**2 at an offset is used up; how the climb grows; above 1 where it never is.",
-        views=((offsets, names("n")), (launches, names("n"))),
+        "From V**2 at an offset: half the orbit's width (paper, eq. 14), -dV**2/dq, and a sine's square q at the turn.",
         inside=[(offset, at(offsets)), (launch, at(launches))],
         outputs=tuple(form.xreplace({OFFSET: offset, LAUNCH: launch}) for form in crest),
-        each=True,
+        batch=True,
     )
 
 
-def _mean_each(lowering: "Lowering", means: tuple[Expr, Expr]) -> FunctionIR:
+def _agm_arguments(lowering: Lowering, means: tuple[Expr, Expr]) -> FunctionIR:
     names = lowering.names
     half, halves = names.symbol("half"), names("halves")
     return lowering.function(
-        "mean_each",
-        "MEAN_EACH",
+        "agm_arguments_batch",
         (halves,),
-        "Squares of two numbers, each pair for an orbit of its own: its half period is pi over their agm (Gauss).",
-        views=((halves, names("n")),),
+        "a**2, b**2: the half period (paper, eq. 17) is pi over the arithmetic-geometric mean of a and b (Gauss).",
         inside=[(half, at(halves))],
         outputs=tuple(square.xreplace({HALF: half}) for square in means),
-        each=True,
+        batch=True,
     )
 
 
-def _pace_each(lowering: "Lowering", swing: Swing) -> tuple[FunctionIR, ...]:
+def _time_integrand(lowering: Lowering, swing: Swing) -> tuple[FunctionIR, ...]:
     names = lowering.names
     fall, rise = names.symbol("fall"), names.symbol("rise")
     own = {symbol: names.symbol(symbol.name.removeprefix("_")) for symbol in (HALF, *dict(swing.ends))}
@@ -68,27 +60,23 @@ def _pace_each(lowering: "Lowering", swing: Swing) -> tuple[FunctionIR, ...]:
     held = [(symbol, value) for symbol, value in held if symbol in used]
     behind = len(lowering.order)
     pace = lowering.function(
-        "swing_each",
-        "SWING_EACH",
-        (fall.name, rise.name),
-        "(dt/du)**2 where sin(u)**2 = fall = 1 - rise, and what that is divided by, each for an orbit of its own.",
-        views=(),
+        "time_integrand_batch",
+        (fall, rise),
+        "(dt/du)**2 at sin(u)**2 = fall = 1 - rise, and its divisor; dt/du integrates to the half period (eq. 17).",
         inside=[(symbol, at(names("p"), behind + row)) for row, (symbol, _) in enumerate(held)],
         outputs=tuple(outputs),
-        each=True,
-        held=len(held),
+        batch=True,
+        rows_behind=len(held),
     )
     if not held:
         return (pace,)
     halves = names("halves")
     turn = lowering.function(
-        "top_each",
-        "TOP_EACH",
+        "integrand_invariants_batch",
         (halves,),
-        "What is the same all along a swing: ``swing_each`` finds it behind the run-time parameters.",
-        views=((halves, names("n")),),
+        "Terms that are constant along an orbit: ``time_integrand_batch`` reads them behind the parameters.",
         inside=[(own[HALF], at(halves))],
         outputs=tuple(value for _, value in held),
-        each=True,
+        batch=True,
     )
     return pace, turn

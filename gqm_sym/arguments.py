@@ -1,0 +1,147 @@
+"""Arguments of what a user calls: by their names, of the right types, and refused with a remedy.
+
+Python's own errors say that a function takes no positional arguments; these say what to write instead.
+"""
+
+import difflib
+import inspect
+from collections.abc import Callable, Iterable, Mapping, Set
+from functools import wraps
+from typing import Any, ParamSpec, TypeVar
+
+from gqm_sym.errors import ArgumentError, DeclarationError
+
+P = ParamSpec("P")
+R = TypeVar("R")
+T = TypeVar("T")
+
+_BY_NAME = inspect.Parameter.KEYWORD_ONLY
+_BY_PLACE = (inspect.Parameter.POSITIONAL_ONLY, inspect.Parameter.POSITIONAL_OR_KEYWORD)
+# Arguments that a method does not get from its caller.
+_OWN = frozenset({"cls", "self"})
+
+
+def checked(called: str, also: Iterable[str] = ()) -> Callable[[Callable[P, R]], Callable[P, R]]:
+    """Make a decorator that refuses arguments which a function does not have, with the remedy.
+
+    Parameters
+    ----------
+    called
+        The function's name as a user writes it: ``Gravity``, ``Curve.graph``.
+    also
+        Names that the function takes in a mapping of its own.
+    """
+
+    def decorate(function: Callable[P, R]) -> Callable[P, R]:
+        signature = inspect.signature(function)
+
+        @wraps(function)
+        def wrapper(*args: P.args, **kwargs: P.kwargs) -> R:
+            try:
+                signature.bind(*args, **kwargs)
+            except TypeError:
+                raise ArgumentError(_reason(called, signature, tuple(also), args, kwargs)) from None
+            return function(*args, **kwargs)
+
+        return wrapper
+
+    return decorate
+
+
+def _reason(
+    called: str, signature: inspect.Signature, also: tuple[str, ...], args: tuple[Any, ...], kwargs: Mapping[str, Any]
+) -> str:
+    """Say what is wrong with a call, and what would be right."""
+    own = [parameter for name, parameter in signature.parameters.items() if name in _OWN]
+    parameters = [parameter for name, parameter in signature.parameters.items() if name not in _OWN]
+    by_place = [parameter.name for parameter in parameters if parameter.kind in _BY_PLACE]
+    by_name = [*also, *(parameter.name for parameter in parameters if parameter.kind == _BY_NAME)]
+    given, names = args[len(own) :], [*by_place, *by_name]
+    if strangers := [name for name in kwargs if name not in names]:
+        return unknown_argument(called, strangers[0], names)
+    if len(given) > len(by_place):
+        free = [name for name in by_name if name not in kwargs]
+        surplus = [f"{name}={short(value)}" for name, value in zip(free, given[len(by_place) :], strict=False)]
+        placed = [short(value) for value in given[: len(by_place)]]
+        remedy = f"write {called}({', '.join([*placed, *surplus])})" if surplus else f"it takes {', '.join(names)}"
+        what = "arguments by name only" if not by_place else f"only {' and '.join(by_place)} without a name"
+        return f"{called}: takes {what}, got {short(given[len(by_place)])} without one; {remedy}"
+    twice = [name for name in by_place[: len(given)] if name in kwargs]
+    if twice:
+        return f"{called}: {twice[0]!r} is given twice; give it once"
+    known = {*by_place[: len(given)], *kwargs}
+    needed = [p.name for p in parameters if p.default is p.empty and p.name in names and p.name not in known]
+    return f"{called}: {' and '.join(map(repr, needed))} must be given; it takes {', '.join(names)}"
+
+
+def unknown_argument(called: str, name: str, names: Iterable[str]) -> str:
+    """``called: there is no argument 'name'``, the nearest known one if it is near, and all of them."""
+    listed = list(names)
+    near = difflib.get_close_matches(name.lower(), [known.lower() for known in listed], n=1)
+    same = [known for known in listed if near and known.lower() == near[0]]
+    hint = f"did you mean {same[0]!r}? " if same else ""
+    return f"{called}: there is no argument {name!r}; {hint}it takes {', '.join(listed) or 'none'}"
+
+
+def short(value: object) -> str:
+    """A value as a message shows it: on one line, and not too long."""
+    text = " ".join(repr(value).split())
+    return text if len(text) <= 60 else text[:57] + "..."
+
+
+def several(given: Any, *, where: str, what: str) -> tuple[Any, ...]:
+    """Return the items of what must be several things in order: no text, no mapping, no set.
+
+    Parameters
+    ----------
+    given
+        What a user gave.
+    where, what
+        What it is for, and what it must be, for the message.
+    """
+    if not isinstance(given, str | bytes | Mapping | Set):
+        try:
+            return tuple(given)
+        except TypeError:
+            pass
+    raise DeclarationError(f"{where}: must be {what}, got {short(given)}")
+
+
+def names(given: Any, *, where: str) -> tuple[str, ...]:
+    """Return names, of which one may stand alone."""
+    what = "names, as in ('a', 'b')"
+    listed = (given,) if isinstance(given, str) else several(given, where=where, what=what)
+    for name in listed:
+        if not isinstance(name, str):
+            raise DeclarationError(f"{where}: must be {what}, got {short(name)} among them")
+    return listed
+
+
+def one_line(given: Any, *, where: str) -> str:
+    """Return a text for people."""
+    if not isinstance(given, str):
+        raise DeclarationError(f"{where}: must be text, got {short(given)}")
+    return given
+
+
+def flag(given: Any, *, where: str) -> bool:
+    """Return True or False, given as nothing else."""
+    if not isinstance(given, bool):
+        raise DeclarationError(f"{where}: must be True or False, got {short(given)}")
+    return given
+
+
+def one_of(given: Any, known: tuple[str, ...], *, where: str) -> str:
+    """Return one of some words."""
+    if not (isinstance(given, str) and given in known):
+        raise DeclarationError(f"{where}: must be one of {', '.join(known)}, got {short(given)}")
+    return given
+
+
+def instance(given: Any, kind: type[T], *, where: str, what: str) -> T:
+    """Return what is of a class, or say what it should be."""
+    if isinstance(given, kind):
+        return given
+    name = getattr(given, "__name__", getattr(given, "name", "it"))
+    remedy = f"; call it first, as in {name}()" if callable(given) else ""
+    raise ArgumentError(f"{where}: must be {what}, got {short(given)}{remedy}")

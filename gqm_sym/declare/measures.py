@@ -1,0 +1,137 @@
+"""What the formulas of a curve are measured in, and the curve in words: coordinates are lengths, angles numbers."""
+
+from typing import Protocol, cast
+
+import sympy as sp
+
+from gqm_sym.declare.implicit import Level
+from gqm_sym.declare.piecewise import FormulaCurve, Rail
+from gqm_sym.declare.sampled import Track
+from gqm_sym.dimensions import COMMON, LENGTH, NUMBER, Dimension, Formulas, dimension, found_dimensions, unit_of
+from gqm_sym.parameters import in_words
+
+
+class DeclaredCurve(FormulaCurve, Protocol):
+    """What is read of a curve here (`curve.Curve` is one)."""
+
+    @property
+    def x(self) -> sp.Expr:
+        """The horizontal coordinate."""
+
+    @property
+    def z(self) -> sp.Expr:
+        """The height."""
+
+    @property
+    def radius(self) -> sp.Expr | None:
+        """Of a polar curve."""
+
+    @property
+    def parameter(self) -> sp.Symbol:
+        """The curve's own parameter."""
+
+    @property
+    def period(self) -> sp.Expr | None:
+        """Of a closed curve."""
+
+    @property
+    def title(self) -> str:
+        """One line for people."""
+
+    @property
+    def definition(self) -> object:
+        """What a charted curve is made from."""
+
+
+PER_LENGTH = dimension(metre=-1)
+_PIECES: dict[str, tuple[Dimension, ...]] = {
+    "line": (LENGTH,),
+    "arc": (LENGTH, NUMBER),
+    "clothoid": (LENGTH, PER_LENGTH, PER_LENGTH),
+}
+_PLANE: dict[str, Dimension | None] = {"x": LENGTH, "z": LENGTH}
+
+
+def curve_formulas(curve: DeclaredCurve) -> Formulas:
+    """Return the formulas of a curve with their dimensions."""
+    lam = curve.parameter
+    if isinstance(curve.definition, Level):
+        level = curve.definition
+        places = [(form, LENGTH) for form in (*level.start, *curve.domain) if form is not None]
+        return Formulas([(level.value, None), *places], _PLANE)
+    if isinstance(curve.definition, Rail):
+        return _rail_formulas(curve.definition)
+    if curve.charted:
+        return Formulas()
+    own = parameter_dimension(curve)
+    coordinates = (curve.x, curve.z) if curve.radius is None else (curve.radius,)
+    ends = [(end, own) for end in (*curve.domain, curve.period) if end is not None and own is not None]
+    return Formulas([*((form, LENGTH) for form in coordinates), *ends], {lam.name: own})
+
+
+def parameter_dimension(curve: DeclaredCurve) -> Dimension | None:
+    """Return what a curve's parameter is measured in; None where its formulas do not tell it at once."""
+    lam = curve.parameter
+    if curve.kind == "parametric":
+        # The argument of a wave with a number for its rate is an angle.
+        waves = [node for form in (curve.x, curve.z) for node in form.atoms(sp.sin, sp.cos, sp.tan)]
+        return NUMBER if any(node.args[0].free_symbols == {lam} for node in waves) else None
+    return NUMBER if curve.kind == "polar" else LENGTH
+
+
+def _rail_formulas(rail: Rail) -> Formulas:
+    total = Formulas()
+    if rail.start is not None:
+        total += Formulas(list(zip(rail.start, (LENGTH, LENGTH, NUMBER), strict=True)))
+    for count, piece in enumerate(rail.pieces, start=1):
+        if piece.curve is None:
+            total += Formulas(list(zip(piece.numbers, _PIECES[piece.kind], strict=True)))
+            continue
+        # Each curve has a parameter of its own, by whatever name.
+        curve = cast(DeclaredCurve, piece.curve)
+        lam = curve.parameter
+        own = sp.Symbol(f"{lam.name} of {count}", real=True)
+        inside = curve_formulas(curve)
+        equal = [(form.xreplace({lam: own}), wanted) for form, wanted in inside.equal]
+        total += Formulas(equal, {own.name: inside.variables[lam.name]})
+    return total
+
+
+def told(curve: DeclaredCurve) -> str:
+    """Describe a curve in a few lines."""
+    units = {name: unit_of(found) for name, found in found_dimensions(curve_formulas(curve), COMMON).items()}
+    lines = [f"{curve.title or 'Curve'}: {_what(curve)}", *(f"  {name} = {form}" for name, form in _forms(curve))]
+    low, high = curve.domain
+    if low is not None or high is not None:
+        ends = f"{'-oo' if low is None else low} <= {curve.parameter} <= {'oo' if high is None else high}"
+        lines.append(f"  domain: {ends}")
+    if curve.period is not None:
+        lines.append(f"  closed: period {curve.period} of {curve.parameter}")
+    lines.append(f"  parameters: {in_words(dict(curve.defaults), units)}")
+    return "\n".join(lines)
+
+
+def _what(curve: DeclaredCurve) -> str:
+    made = curve.definition
+    if isinstance(made, Track):
+        count = made.points.count("\n") + 1
+        between = "a quintic spline" if made.kind == "spline" else "stitched planes"
+        return f"{between} through {count} points, {'closed' if made.closed else 'open'}, in arc length s [m]"
+    if isinstance(made, Rail):
+        kinds = ", ".join(piece.kind for piece in made.pieces[:8]) + (", ..." if len(made.pieces) > 8 else "")
+        return f"{'closed ' if made.closed else ''}rail of {len(made.pieces)} pieces ({kinds}), in arc length s [m]"
+    if isinstance(made, Level):
+        return f"implicit, in arc length {curve.parameter} [m] from its start"
+    own = parameter_dimension(curve)
+    unit = {NUMBER: " [rad]", LENGTH: " [m]"}.get(own, "") if own is not None else ""
+    return f"{curve.kind}, in {curve.parameter}{unit}; coordinates in m, z upwards"
+
+
+def _forms(curve: DeclaredCurve) -> list[tuple[str, sp.Expr]]:
+    made = curve.definition
+    if isinstance(made, Level):
+        x, z = made.start
+        return [("F", made.value), ("start", sp.Tuple(x, z))]
+    if curve.charted:
+        return []
+    return [("r", curve.radius)] if curve.radius is not None else [("x", curve.x), ("z", curve.z)]

@@ -1,0 +1,210 @@
+"""Places inside a curve where its formulas have no continuous tangent or curvature, and powers that need a side.
+
+A corner takes a rule for what a body does there, and an infinite curvature an infinite contact force: neither is a
+formula's. Where curvature jumps, the contact force does, and a motion must be followed to the joint and on from it.
+A cusp is allowed: the tangent turns round, and a motion ends there. Where an argument of an absolute value changes its
+sign, or the base of a root has a zero of even order, tangents and curvatures to both sides are compared.
+"""
+
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from itertools import pairwise
+from math import isfinite
+
+import sympy as sp
+
+from gqm_sym.budgets import spend
+from gqm_sym.declare import Curve
+from gqm_sym.derivation.algebra.algebra import Algebra
+from gqm_sym.derivation.algebra.differentiate import differentiate
+from gqm_sym.derivation.algebra.factors import factors
+from gqm_sym.derivation.algebra.generators import Angle, OverBudget
+from gqm_sym.derivation.algebra.rewrite import product, spell_factors
+from gqm_sym.derivation.algebra.signs import Signs
+from gqm_sym.errors import DeclarationError
+from gqm_sym.parameters import Value, tried_values
+
+# Places of a range that are looked at, and their distance where it has no ends.
+PLACES = 120
+STEP = sp.Rational(37, 100)
+# To both sides of a place, relative to its size, and digits to see them by.
+NEAR, NEARER, DIGITS = sp.Float("1e-12", 90), sp.Float("1e-24", 90), 90
+# Unit tangents that differ by less than this are one; curvatures that grow by more, towards a place, grow for ever.
+SAME, GROWS = 1e-3, 10
+
+Function = Callable[[float], float]
+Vector = tuple[sp.Expr, sp.Expr]
+
+
+def check_corners(curve: Curve, defaults: Mapping[str, Value | None]) -> None:
+    """Refuse a curve inside whose domain the tangent jumps, or the curvature does or is infinite.
+
+    Raises
+    ------
+    DeclarationError
+        With the place, for the defaults; parameters without one are taken to be of the order of 1.
+    """
+    lam, values = curve.parameter, tried_values(defaults)
+    for zero in dict.fromkeys(_zeros((curve.x, curve.z), lam)):
+        spend()
+        for low, high in _changes(_function(zero, lam, values), curve, values):
+            _compare(curve, values, zero, _root(zero.xreplace(values), lam, low, high))
+
+
+def check_powers(
+    forms: Iterable[tuple[str, sp.Expr]],
+    curve: Curve,
+    defaults: Mapping[str, Value | None],
+) -> None:
+    """Refuse u**n with n given at run time where u is negative somewhere: whether it is real there depends on n.
+
+    Raises
+    ------
+    DeclarationError
+        Which names the form, the power and what to write instead.
+    """
+    lam, values = curve.parameter, tried_values(defaults)
+    for label, form in forms:
+        for power in sorted(form.atoms(sp.Pow), key=sp.default_sort_key):
+            base, exponent = power.args
+            if exponent.is_number or lam in exponent.free_symbols or lam not in base.free_symbols:
+                continue
+            spend()
+            negative = [at for at, value in _sampled(_function(base, lam, values), curve, values) if value < 0.0]
+            if negative:
+                given = ", ".join(sorted(symbol.name for symbol in exponent.free_symbols))
+                raise DeclarationError(
+                    f"{label}: {power}: {base} is negative at {lam.name} = {negative[0]:.3g}, where the power is real "
+                    f"for some values of {given} only; write the exponent as a number, or give a domain on which "
+                    f"{base} is positive"
+                )
+
+
+def without_known_bars(form: sp.Expr, signs: Signs) -> sp.Expr:
+    """Write |u| as u or -u where u has one sign on the domain."""
+    known = {bar: signs.sign(bar.args[0]) for bar in form.atoms(sp.Abs)}
+    return form.xreplace({bar: sign * bar.args[0] for bar, sign in known.items() if sign is not None})
+
+
+def _zeros(forms: Iterable[sp.Expr], lam: sp.Symbol) -> Iterator[sp.Expr]:
+    """What may change its sign under an absolute value, or in even powers under a root."""
+    for form in forms:
+        for node in sorted(form.atoms(sp.Abs, sp.Pow), key=sp.default_sort_key):
+            inner = node.args[0]
+            if lam not in inner.free_symbols:
+                continue
+            if isinstance(node, sp.Abs):
+                yield inner
+            elif not node.exp.is_Integer:
+                yield from _even_factors(inner, lam)
+
+
+def _even_factors(form: sp.Expr, lam: sp.Symbol) -> list[sp.Expr]:
+    halved: frozenset[Angle] = frozenset()
+    try:
+        while True:
+            algebra = Algebra((form,), lam, halved)
+            fraction = algebra.fraction(form)
+            uneven = algebra.uneven((fraction.top,)) - halved
+            if not uneven:
+                break
+            halved |= uneven
+        found = [(factor, 1) for factor, power in factors(algebra, fraction.top)[1] if power % 2 == 0]
+        written = [product([power]) for power in spell_factors(algebra, found)[1]]
+    except OverBudget:
+        return []
+    return [factor for factor in written if lam in factor.free_symbols]
+
+
+def _function(form: sp.Expr, lam: sp.Symbol, values: Mapping[sp.Symbol, sp.Expr]) -> Function:
+    return sp.lambdify(lam, form.xreplace(values), "math")  # type: ignore[no-any-return]
+
+
+def _sampled(function: Function, curve: Curve, values: Mapping[sp.Symbol, sp.Expr]) -> Iterator[tuple[float, float]]:
+    """Places inside the domain with the values there, where these are real numbers."""
+    low, high = (None if end is None else end.xreplace(values) for end in curve.domain)
+    if low is not None and high is not None:
+        places = [low + (high - low) * sp.Rational(2 * k + 1, 2 * PLACES) for k in range(PLACES)]
+    elif low is not None:
+        places = [low + STEP * (k + sp.Rational(1, 7)) for k in range(PLACES)]
+    elif high is not None:
+        places = [high - STEP * (k + sp.Rational(1, 7)) for k in range(PLACES)]
+    else:
+        places = [STEP * (k + sp.Rational(1, 7)) for k in range(-PLACES // 2, PLACES // 2)]
+    for place in sorted(map(float, places)):
+        try:
+            value = float(function(place))
+        except (ArithmeticError, TypeError, ValueError):
+            continue
+        if isfinite(value):
+            yield place, value
+
+
+def _changes(function: Function, curve: Curve, values: Mapping[sp.Symbol, sp.Expr]) -> Iterator[tuple[float, float]]:
+    """Pairs of places between which a function changes its sign."""
+    pairs = pairwise(_sampled(function, curve, values))
+    found = [(low, high) for (low, before), (high, after) in pairs if before * after < 0.0]
+    # Those near 0 first, where people look.
+    yield from sorted(found, key=lambda ends: abs(ends[0] + ends[1]))
+
+
+def _root(form: sp.Expr, lam: sp.Symbol, low: float, high: float) -> sp.Expr:
+    """Halve an interval until it is one place, in many digits."""
+    a, b = sp.Float(low, DIGITS), sp.Float(high, DIGITS)
+    rising = form.xreplace({lam: b}).evalf(DIGITS) > 0
+    while abs(b - a) > sp.Float("1e-80", DIGITS):
+        spend()
+        middle = (a + b) / 2
+        value = form.xreplace({lam: middle}).evalf(DIGITS)
+        if not value.is_real or value == 0:
+            return middle
+        a, b = (a, middle) if bool(value > 0) == bool(rising) else (middle, b)
+    return (a + b) / 2
+
+
+def _compare(curve: Curve, values: Mapping[sp.Symbol, sp.Expr], zero: sp.Expr, at: sp.Expr) -> None:
+    """Compare the tangents to both sides of a place, and the curvature with that nearer to it."""
+    lam = curve.parameter
+    first = [differentiate(form, lam) for form in (curve.x, curve.z)]
+    forms = [form.xreplace(values) for form in (*first, *(differentiate(form, lam) for form in first))]
+    size = 1 + abs(at)
+    sides = [_seen(forms, lam, at + way * step * size) for way in (-1, 1) for step in (NEAR, NEARER)]
+    if None in sides:
+        return
+    (_, left_far), (left, left_near), (_, right_far), (right, right_near) = (side for side in sides if side)
+    gap = abs(left[0] - right[0]) + abs(left[1] - right[1])
+    turned = abs(left[0] + right[0]) + abs(left[1] + right[1])
+    if turned < SAME:
+        return
+    shown = 0.0 if abs(at) < NEARER else float(at)
+    place = f"at {lam.name} = {shown:.6g}, where {zero} changes its sign"
+    if gap > SAME:
+        degrees = float(sp.acos(left[0] * right[0] + left[1] * right[1]) * 180 / sp.pi)
+        raise DeclarationError(
+            f"{curve.kind} curve: the tangent turns by {degrees:.3g} degrees {place}: a corner, for which formulas "
+            "have no rule; end the domain there, round it off, as sqrt(x**2 + r**2) for abs(x), or stitch planes by "
+            "Curve.sampled(points, kind='linear'), at whose corners the speed is kept"
+        )
+    near, far = (max(map(abs, pair)) for pair in ((left_near, right_near), (left_far, right_far)))
+    if near > GROWS * far and near > 1:
+        raise DeclarationError(
+            f"{curve.kind} curve: the curvature, and with it the contact force, is infinite {place}, though the "
+            "tangent is continuous; end the domain there, or round it off, as (x**2 + r**2)**p for (x**2)**p"
+        )
+
+    jump, before = abs(left_near - right_near), abs(left_far - right_far)
+    if jump > SAME and jump > before / 2:
+        raise DeclarationError(
+            f"{curve.kind} curve: the curvature jumps {place}, from {float(left_near):.4g} to {float(right_near):.4g}; "
+            "join the two sides, each with its domain, by Curve.piecewise, which knows of joints"
+        )
+
+
+def _seen(forms: list[sp.Expr], lam: sp.Symbol, place: sp.Expr) -> tuple[Vector, sp.Expr] | None:
+    """The unit tangent and the signed curvature at a place; None where they are not real numbers."""
+    dx, dz, ddx, ddz = (form.xreplace({lam: place}).evalf(DIGITS) for form in forms)
+    if not all(value.is_real and value.is_finite for value in (dx, dz, ddx, ddz)):
+        return None
+    speed = sp.sqrt(dx**2 + dz**2).evalf(DIGITS)
+    if speed == 0:
+        return None
+    return (dx / speed, dz / speed), (dx * ddz - dz * ddx) / speed**3

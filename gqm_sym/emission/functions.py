@@ -1,0 +1,128 @@
+"""Lowered functions as lines of text: the fields that the template prints, and the names that they call."""
+
+from collections.abc import Iterable
+from typing import Any
+
+from sympy import Function
+
+from gqm_sym.emission.ir import Assignment, ExactIR, FunctionIR
+from gqm_sym.emission.printer import CodePrinter, ExactPrinter, IntervalPrinter
+
+# Columns up to which several loads of a value stand on one line.
+WIDTH = 112
+
+
+def _statements(assignments: Iterable[Assignment], printer: CodePrinter) -> list[str]:
+    """One assignment a line, but loads of elements of arrays together on one."""
+    lines: list[str] = []
+    loads: list[tuple[str, str]] = []
+    for a in assignments:
+        text = printer.doprint(a.value)
+        if isinstance(a.value, Function) and a.value.func.__name__ == "at":
+            loads.append((a.name, text))
+            continue
+        lines += [*_together(loads), f"{a.name} = {text}"]
+        loads = []
+    return [*lines, *_together(loads)]
+
+
+def _together(loads: list[tuple[str, str]]) -> list[str]:
+    """``a, b = p[0], p[1]``: as many loads on a line as fit."""
+    lines: list[str] = []
+    some: list[tuple[str, str]] = []
+    for load in loads:
+        if some and len(_loads([*some, load])) > WIDTH:
+            lines.append(_loads(some))
+            some = []
+        some.append(load)
+    return [*lines, _loads(some)] if some else lines
+
+
+def _loads(some: list[tuple[str, str]]) -> str:
+    return f"{', '.join(name for name, _ in some)} = {', '.join(value for _, value in some)}"
+
+
+def _unpacked(parameters: tuple[tuple[str, int], ...], p: str) -> list[str]:
+    return _together([(name, f"{p}[{i}]") for name, i in parameters])
+
+
+def loop(function: FunctionIR) -> tuple[dict[str, Any], set[str]]:
+    """The template's fields of a function over many places, and the names that it calls."""
+    taken = {name for name, _ in function.parameters} | {a.name for a in function.inside}
+    index = "_i" if "i" in taken else "i"
+    printer = CodePrinter(index)
+    count, out = function.arguments[0], function.arguments[-1]
+    before = [_views(function)]
+    before += _unpacked(function.parameters, function.arguments[-2])
+    before += _statements(function.before, printer)
+    inside = _statements(function.inside, printer)
+    inside += [f"{out}[{row}, {index}] = {printer.doprint(e)}" for row, e in enumerate(function.outputs)]
+    before = _chart_view(function, printer) + before
+    fields = {
+        "name": function.name,
+        "signature": function.signature,
+        "arguments": ", ".join(function.arguments),
+        "doc": function.doc,
+        "before": before,
+        "loop": True,
+        "index": index,
+        "count": count,
+        "inside": inside,
+        "later": function.batch or function.later,
+    }
+    return fields, printer.used
+
+
+def _views(function: FunctionIR) -> str:
+    """The line that turns pointers into arrays."""
+    names = ", ".join(name for name, _ in function.views)
+    return f"{names} = {', '.join(f'carray({name}, {shape})' for name, shape in function.views)}"
+
+
+def _chart_view(function: FunctionIR, printer: CodePrinter) -> list[str]:
+    """The line that finds the chart of the curve, which stands behind the run-time parameters."""
+    p, count = function.views[-2]
+    return [f"chart = chart_of({p}, {count})"] if any("chart_" in name for name in printer.used) else []
+
+
+def enclosure(function: FunctionIR, parameter: str) -> tuple[dict[str, Any], set[str]]:
+    """The template's fields of a function over intervals, and the names that it calls."""
+    printer = IntervalPrinter()
+    *count, lo, hi, p, out = function.arguments
+    index = "_i" if "i" in {parameter} | {name for name, _ in function.parameters} else "i"
+    here, row = (f"[{index}]", f", {index}") if function.batch else ("", "")
+    inside = [f"{parameter} = ({lo}{here}, {hi}{here})"]
+    inside += _together([(name, f"({p}[{i}{row}], {p}[{i}{row}])") for name, i in function.parameters])
+    inside += _statements(function.inside, printer)
+    for k, e in enumerate(function.outputs):
+        inside.append(f"{out}[{2 * k}{row}], {out}[{2 * k + 1}{row}] = {printer.doprint(e)}")
+    fields = {
+        "name": function.name,
+        "signature": function.signature,
+        "arguments": ", ".join(function.arguments),
+        "doc": function.doc,
+        "before": [*_chart_view(function, printer), _views(function)],
+        "loop": function.batch,
+        "index": index,
+        "count": count[0] if count else "",
+        "inside": inside,
+        "later": function.batch or function.later,
+    }
+    return fields, printer.used
+
+
+def exact_formula(function: ExactIR) -> dict[str, Any]:
+    """The template's fields of a function over a namespace of operations."""
+    printer = ExactPrinter()
+    p = "_p" if "p" in {*function.places, *(name for name, _ in function.parameters)} else "p"
+    inside = _unpacked(function.parameters, p)
+    inside += _statements(function.inside, printer)
+    values = ["None" if e is None else printer.doprint(e) for e in function.outputs]
+    inside.append(f"return {', '.join(values)}")
+    arguments = ("op", *function.places, p)
+    return {
+        "name": function.name,
+        "arguments": ", ".join(arguments),
+        "doc": function.doc,
+        "inside": inside,
+    }

@@ -1,0 +1,86 @@
+"""The figure of a surveyed track: its points, what smoothing did to them, and how good its curvature is."""
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from gqm_sym.errors import InputError
+from gqm_sym.figures.axes import finished, new_figure
+from gqm_sym.optional import require
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+POINT, TRACK, BAND = "#d55e00", "#333333", "#0072b2"
+# Points that are drawn, at most.
+MOST = 20_000
+# Standard errors on each side of the band: some 95 of 100 places are inside.
+ERRORS = 2.0
+# How far the largest shift is drawn beside the track, as a share of the track's size.
+FAR = 0.06
+MILLIMETRES = 1e3
+
+
+@require("plot")
+def smoothing(curve: Any, axes: Any = None) -> "Figure":
+    """Draw what smoothing did to the points of a sampled track: shifts, and curvature with the band of its error.
+
+    Parameters
+    ----------
+    curve : Curve
+        Declared with ``Curve.sampled(points, smoothing=...)``.
+    axes : three matplotlib Axes, optional
+        For the track with its points, for the shifts, and for the curvature.
+    """
+    report = getattr(curve, "smoothing", None)
+    if report is None:
+        raise InputError("smoothing: the curve was not smoothed; declare it by Curve.sampled(points, smoothing=...)")
+    if axes is None:
+        figure = new_figure(7, 8)
+        above, middle, below = figure.subplots(3, 1, height_ratios=(1.4, 1, 1))
+        below.sharex(middle)
+    else:
+        above, middle, below = axes
+    kept = np.unique(np.linspace(0, len(report.points) - 1, MOST).astype(np.int64))
+    order = np.argsort(report.places_s)
+    size = float(np.ptp(report.places, axis=0).max())
+    enlarged = _round(FAR * size / report.largest_shift) if report.largest_shift > 0.0 else 1.0
+    drawn = report.places + enlarged * (report.points - report.places)
+    above.plot(*report.places[order].T, color=TRACK, linewidth=1.2, label="smooth track")
+    what = f"measured points, their shifts enlarged {enlarged:g} times" if enlarged > 1.0 else "measured points"
+    above.plot(*drawn[kept].T, ".", color=POINT, markersize=3, label=what, rasterized=len(kept) > MOST // 4)
+    above.set_aspect("equal", adjustable="datalim")
+    finished(above, "x (m)", "z (m)")
+    above.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2, fontsize="small", frameon=False)
+    middle.plot(
+        report.places_s[kept],
+        MILLIMETRES * report.shifts[kept],
+        ".",
+        color=POINT,
+        markersize=3,
+        rasterized=len(kept) > MOST // 4,
+    )
+    middle.axhline(0.0, color=TRACK, linewidth=0.8)
+    rms = f"root mean square {MILLIMETRES * report.rms:.3g} mm, largest {MILLIMETRES * report.largest_shift:.3g} mm"
+    middle.set_title(rms, fontsize="small")
+    finished(middle, "arc length s (m)", "shift to the left (mm)")
+    off = ERRORS * report.curvature_error
+    below.fill_between(
+        report.s,
+        report.curvature - off,
+        report.curvature + off,
+        color=BAND,
+        alpha=0.3,
+        linewidth=0.0,
+        label=f"± {ERRORS:g} standard errors",
+    )
+    below.plot(report.s, report.curvature, color=BAND, linewidth=1.2, label="curvature")
+    return finished(below, "arc length s (m)", "curvature (1/m)")
+
+
+def _round(number: float) -> float:
+    """The next smaller of 1, 2, 5, 10, 20 and so on; 1 at least."""
+    if number <= 1.0:
+        return 1.0
+    power = 10.0 ** np.floor(np.log10(number))
+    return float(power * max(digit for digit in (1.0, 2.0, 5.0) if digit <= number / power))

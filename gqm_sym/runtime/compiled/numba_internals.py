@@ -1,0 +1,273 @@
+"""The only file that uses names which numba does not document. Each of them saves time; none of them is needed.
+
+=================================== ==================================== ===============================================
+name                                what it is used for                  what is done where numba lacks it
+=================================== ==================================== ===============================================
+``caching.FunctionCache``,          a disk cache that notices an edit    ``cache=True``, in a cache folder named by the
+``caching.IndexDataCacheFile``,     of any file of the runtime, and is   runtime's digest; only functions called from
+``_cache`` of a compiled function   read before numba prepares to        Python or by address are cached, and each
+                                    compile (`KeyedCache`)               process takes 0.4 s of CPU time longer to start
+``ccallback.CFunc``                 the same cache for functions         ``numba.cfunc(..., cache=True)``: 0.4 s longer
+                                    called by address
+``runtime.rtsys``                   code from the cache runs without     the preparation: 0.4 s longer
+                                    numba's preparation
+``environment.Environment``,        code from the cache is read          reading imports them: 0.2 s longer
+``environment.lookup_environment``  without importing numba's modules
+``entry_point`` of an overload      calls without a check of the         each call takes 0.5 microseconds longer
+                                    arguments' types
+=================================== ==================================== ===============================================
+
+The digits of all results are the same in every case (`tests/runtime/compiled/test_numba_internals.py`).
+"""
+
+import hashlib
+import os
+import pickle
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from inspect import getfile
+from pathlib import Path
+from threading import RLock
+from types import ModuleType
+from typing import Any
+
+import llvmlite.binding
+import numba
+from numba import njit
+
+try:
+    from numba.core.caching import FunctionCache, IndexDataCacheFile
+except ImportError:
+    FunctionCache = IndexDataCacheFile = object
+try:
+    from numba.core import ccallback
+except ImportError:
+    ccallback = None  # type: ignore[assignment]
+try:
+    from numba.core.environment import Environment, lookup_environment
+except ImportError:
+    Environment = lookup_environment = None
+try:
+    from numba.core.runtime import rtsys
+except ImportError:
+    rtsys = None
+
+
+def _has(owner: object, *names: str) -> bool:
+    return all(hasattr(owner, name) for name in names)
+
+
+HAS_CACHE = _has(FunctionCache, "load_overload", "save_overload", "_load_overload", "_index_key") and _has(
+    IndexDataCacheFile, "_save_data", "_data_path"
+)
+HAS_CALLBACKS = _has(ccallback, "CFunc")
+HAS_ENVIRONMENTS = _has(Environment, "_memo")
+HAS_RUNTIME = _has(rtsys, "initialize")
+
+# numba.config is one for the whole process; it is changed while a function is made whose code numba itself caches.
+_CONFIG = RLock()
+
+
+def _environment(module: str, constants: Any, name: str) -> Any:
+    """Rebuild the environment of a compiled function without importing the module that the function is from.
+
+    An environment holds Python objects that compiled code uses, and the code here uses none. numba's own functions,
+    such as ``np.empty``, have environments too, and importing their modules takes longer than everything else.
+    """
+    found = lookup_environment(name)
+    if found is None:
+        found = Environment(vars(sys.modules.get(module, ModuleType(module))))
+        found.consts[:], found.env_name = constants, name
+        Environment._memo[name] = found
+    return found
+
+
+class _Reader(pickle.Unpickler):
+    """A reader of compiled code that imports no modules for its environments."""
+
+    def find_class(self, module: str, name: str) -> Any:
+        if HAS_ENVIRONMENTS and (module, name) == (Environment.__module__, "_rebuild_env"):
+            return _environment
+        return super().find_class(module, name)
+
+
+class KeyedFiles(IndexDataCacheFile):  # type: ignore[misc]
+    """Files of one function's compiled code: one for each key, which is named by the key and holds it.
+
+    numba's own scheme numbers the files in an index that is written before the code. Processes that compile versions
+    of a function at the same time may give both the same number, and a process that is killed in between leaves the
+    number of an older file behind: the next process would then run code that it did not ask for.
+    """
+
+    def __init__(self, folder: str, base: str, source_stamp: Any) -> None:
+        super().__init__(folder, base, source_stamp)
+        self._base, self._stamp = base, source_stamp
+
+    def file_name(self, key: Any) -> str:
+        """Name of the file that belongs to a key."""
+        digest = hashlib.sha256(repr((numba.__version__, self._stamp, key)).encode()).hexdigest()[:16]
+        return f"{self._base}.{digest}.nbc"
+
+    def save(self, key: Any, data: Any) -> None:
+        """Store compiled code under its key."""
+        self._save_data(self.file_name(key), (self._stamp, key, data))
+
+    def load(self, key: Any) -> Any:
+        """Read the compiled code that was stored under a key; None where there is none."""
+        try:
+            with Path(self._data_path(self.file_name(key))).open("rb") as file:
+                stamp, stored_key, data = _Reader(file).load()
+        except FileNotFoundError:
+            return None
+        return data if (stamp, stored_key) == (self._stamp, key) else None
+
+
+class KeyedCache(FunctionCache):  # type: ignore[misc]
+    """numba's disk cache, read before numba prepares to compile, and aware of changes anywhere in the runtime.
+
+    The preparation imports and registers everything that compiling may need (SciPy's linear algebra as well) and takes
+    0.4 s; code from the cache needs none of it. numba itself notices changes of a function's own
+    file only, but compiled code contains functions of several files: the key holds ``stamp``, the digest of the
+    runtime's text, and the module's name, which for generated modules is made from their text (`jit.compiler`). A file
+    that cannot be read is compiled again, and a file that cannot be written is left out.
+
+    Parameters
+    ----------
+    function
+        The Python function.
+    stamp : str
+        Digest of the runtime's text.
+    on_miss
+        Called before a function is compiled that is not in the cache.
+    """
+
+    def __init__(self, function: Any, stamp: str, on_miss: Callable[[Any], None]) -> None:
+        super().__init__(function)
+        source_stamp = self._impl.locator.get_source_stamp()
+        self._cache_file: Any = KeyedFiles(self.cache_path, self._impl.filename_base, source_stamp)
+        self._function, self._stamp, self._on_miss = function, stamp, on_miss
+
+    def _index_key(self, sig: Any, codegen: Any) -> Any:
+        return (*super()._index_key(sig, codegen), self._function.__module__, self._stamp)
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """Read the compiled function; None where it must be compiled."""
+        found = None
+        if HAS_RUNTIME:
+            rtsys.initialize(target_context)  # code from the cache counts references to its arrays
+            found = self._read(self._load_overload, sig, target_context)
+        if found is None:  # there may be code that cannot be read without the preparation
+            found = self._read(super().load_overload, sig, target_context)
+        if found is None:
+            self._on_miss(self._function)
+        return found
+
+    def _read(self, load: Callable[..., Any], *arguments: Any) -> Any:
+        try:
+            return load(*arguments)
+        except Exception:  # whatever unpickling does with a file that was cut off or overwritten
+            return None
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        """Store a compiled function, unless the disk is full or the folder has become read-only."""
+        with suppress(OSError):
+            super().save_overload(sig, data)
+
+
+class Compiler:
+    """How functions are compiled and cached; `jit` holds the only one.
+
+    Parameters
+    ----------
+    options : dict
+        numba's options for every function.
+    stamp
+        ``f()``: the digest of the runtime's text.
+    on_miss
+        Called before a function is compiled that is not in the cache.
+    """
+
+    def __init__(self, options: dict[str, Any], stamp: Callable[[], str], on_miss: Callable[[Any], None]) -> None:
+        self._options, self._stamp, self._on_miss = options, stamp, on_miss
+
+    def cache_of(self, function: Any) -> Any:
+        """Return the disk cache of a function; None where no folder can be written, or numba lacks what it needs."""
+        if not HAS_CACHE:
+            return None
+        with suppress(RuntimeError, AttributeError):
+            return KeyedCache(function, self._stamp(), self._on_miss)
+        return None
+
+    def inner(self, function: Any, *, forceinline: bool = False) -> Any:
+        """Return numba's dispatcher of a function that other compiled functions call."""
+        dispatcher = njit(forceinline=forceinline, **self._options)(function)
+        self._attach(dispatcher, function)
+        return dispatcher
+
+    def entry(self, function: Any, signature: Any, *, nogil: bool, checked: bool) -> Callable[..., Any]:
+        """Compile a function that Python calls, for one signature.
+
+        Unless ``checked``, numba does not look whether arrays are of doubles and contiguous.
+        """
+        dispatcher = njit(nogil=nogil, **self._options)(function)
+        if self._attach(dispatcher, function):
+            dispatcher.compile(signature)
+        else:
+            dispatcher = self._by_public_cache(
+                function, lambda cache: njit(signature, nogil=nogil, cache=cache, **self._options)(function)
+            )
+        dispatcher.disable_compile()
+        (overload,) = dispatcher.overloads.values()
+        direct = not checked and _has(overload, "entry_point")
+        return overload.entry_point if direct else dispatcher  # type: ignore[no-any-return]
+
+    def callback(self, function: Any, signature: Any) -> Any:
+        """Compile a function that is called by its ``address``."""
+        if HAS_CALLBACKS:
+            callback: Any = ccallback.CFunc(function, (signature.args, signature.return_type), {}, self._options)
+            if self._attach(callback, function):
+                callback.compile()
+                return callback
+        return self._by_public_cache(
+            function, lambda cache: numba.cfunc(signature, cache=cache, **self._options)(function)
+        )
+
+    def _attach(self, target: Any, function: Any) -> bool:
+        """Give numba's object a disk cache of ours; whether that was possible."""
+        cache = self.cache_of(function)
+        possible = cache is not None and _has(target, "_cache")
+        if possible:
+            target._cache = cache
+        return possible
+
+    def _by_public_cache(self, function: Any, make: Callable[[bool], Any]) -> Any:
+        """Compile a function by numba's documented ways alone.
+
+        numba numbers the files of a function, and looks only whether the function's own file has changed. So the folder
+        is named by everything else that the code depends on, the processor included: in it there is one version only.
+        """
+        parts = (numba.__version__, self._stamp(), function.__module__, llvmlite.binding.get_host_cpu_name())
+        name = hashlib.sha256("\n".join((*parts, str(llvmlite.binding.get_host_cpu_features()))).encode()).hexdigest()
+        with self._folder(Path(getfile(function)).parent, name[:16]) as usable:
+            if usable:
+                with suppress(Exception):  # a damaged file; whatever else is wrong comes again below
+                    return make(True)
+            return make(False)
+
+    @contextmanager
+    def _folder(self, beside: Path, name: str) -> Iterator[bool]:
+        """Have numba cache in a folder of this name meanwhile; whether it can be written."""
+        with _CONFIG:
+            before = numba.config.CACHE_DIR
+            folder = Path(before or beside / "__pycache__") / f"gqm_sym_{name}"
+            try:
+                folder.mkdir(parents=True, exist_ok=True)
+                usable = os.access(folder, os.W_OK)
+            except OSError:
+                usable = False
+            numba.config.CACHE_DIR = str(folder)
+            try:
+                yield usable
+            finally:
+                numba.config.CACHE_DIR = before

@@ -1,0 +1,34 @@
+"""The words for kinds of motion, for what ends a motion or a leg of it, and for events.
+
+=================== ====================================================================================
+word                what it means as the end of a leg or the kind of an event
+=================== ====================================================================================
+"turn"              V**2 vanishes and the motion goes back
+"rest"              the body stays where it is
+"contact-sign"      the contact force N changes sign; this ends a leg only with friction
+"liftoff"           contact is lost, because the track can push from one side only
+"domain-end"        the end of the curve parameter's range
+"cusp"              ds/dlam vanishes
+"corner"            the tangent of the curve jumps
+"singular-point"    the curve or the forces have no value there
+"asymptote"         the motion approaches an equilibrium for ever
+"horizon"           the horizon t_max, or the end of the first period
+"slip"              of events only: static friction no longer holds a rolling body
+=================== ====================================================================================
+"""
+
+from typing import Literal, TypeAlias
+
+# Kinds of motion (MATHS, section 6).
+MotionKind: TypeAlias = Literal["libration", "circulation", "transit", "asymptotic", "rest", "dissipative"]
+
+# What lies where a motion can go no farther in one direction. "closed" is the launch place again after a whole lap of
+# a closed curve, and "open" infinity or a pole of the curve or of the potential.
+EndKind: TypeAlias = Literal["turn", "equilibrium", "domain-end", "singular-point", "cusp", "closed", "open"]
+
+# Ends of legs, and kinds of events.
+LEG_ENDS = (
+    *("turn", "rest", "contact-sign", "liftoff", "domain-end", "cusp", "corner", "singular-point"),
+    *("asymptote", "horizon"),
+)
+EVENT_KINDS = (*LEG_ENDS, "slip")

@@ -1,0 +1,263 @@
+"""Surveyed points to a smooth track: where along it each point belongs, the spline, and what is known of its errors.
+
+Where along the track the points belong is unknown as well. Chord lengths from point to point are a beginning, but noise
+lengthens them; so the track is fitted again a few times, each time at the arc lengths of its places nearest to the
+points. What is taken for bends of the track once would be followed ever after. So the first rounds, in which noise
+along the track is in the residual too, take the smoother one of what cross-validation says and what is given.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from math import ceil, pi, sqrt
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from gqm_sym.budgets import spend
+from gqm_sym.errors import DeclarationError
+from gqm_sym.smoothing.report import Smoothing
+from gqm_sym.smoothing.selection import APART, Choice, choose
+from gqm_sym.smoothing.splines import Array
+
+# Rounds of fitting; from the second on little changes.
+ROUNDS = 4
+LAST = 2
+# How far from an end its third derivative is looked for, in widths.
+REACH = 6.0
+# Newton steps to the place nearest to a point.
+STEPS = 4
+# The least share of its value on a straight track that the derivative of a distance is taken to have.
+STEEP = 0.3
+# Nodes for the length of half a piece of spline.
+NODES = 6
+# Points of the smoothed track in a width: the interpolant through them has its curvature to some 1e-4.
+A_WIDTH = 4.0
+# The fewest points of a smoothed track, and the fewest places at which its errors are told.
+FEWEST = 16
+# A point this many times as far from the track as usual, and by this share of the usual chord, is stray.
+STRAY = 10.0
+OFF = 0.1
+# A normal deviate's standard deviation, in medians of its size.
+MEDIAN = 1.4826
+# A track that turns by more than this within its width, or from point to point, is out of order.
+SHARPEST = 0.5 * pi
+# Places at which errors are told, at most, and how much work they may be.
+PLACES = 2000
+WORK = 100_000_000
+
+
+class _Track(NamedTuple):
+    """A spline through points, where along it they belong, and its period if it has one."""
+
+    choice: Choice
+    spline: Any
+    u: Array
+    period: float | None
+
+    def at(self, u: Array) -> Array:
+        """Points of the track; beyond open ends it is straight."""
+        basis = self.choice.smoother.basis
+        inside = u if basis.closed else np.clip(u, basis.low, basis.high)
+        points: Array = self.spline(inside) + self.spline(inside, 1) * (u - inside)[:, None]
+        return points
+
+    def heading(self, u: Array) -> Array:
+        """Its tangents, of length 1."""
+        basis = self.choice.smoother.basis
+        first = self.spline(u if basis.closed else np.clip(u, basis.low, basis.high), 1)
+        tangents: Array = first / np.hypot(*first.T)[:, None]
+        return tangents
+
+
+def smooth(
+    given: Sequence[Sequence[float]], rows: Sequence[int], *, closed: bool, deviation: float | None
+) -> tuple[Array, Smoothing]:
+    """Smooth the points of a track.
+
+    Parameters
+    ----------
+    given : (n, 2) array
+        Points; a closed track does not repeat its first one.
+    rows : (n,) ints
+        What messages call the points.
+    closed : bool
+        Whether the track goes on from the last point to the first.
+    deviation : float or None
+        The standard deviation of the points in each coordinate; None: by cross-validation.
+
+    Returns
+    -------
+    places : (m, 2) array
+        Points of the smooth track, as many as the interpolating spline needs to be it.
+    report : Smoothing
+        What smoothing changed, and how good the track is.
+
+    Raises
+    ------
+    DeclarationError
+        If a point is far away from the track through the others, or the track turns too sharply to be one.
+    """
+    points: Array = np.asarray(given, dtype=np.float64)
+    middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
+    centred = points - middle  # all digits are for the shape
+    track = _fitted(centred, closed, deviation)
+    nearest = track.at(track.u)
+    off, along = centred - nearest, track.heading(track.u)
+    shifts = along[:, 0] * off[:, 1] - along[:, 1] * off[:, 0]
+    _check_shifts(np.abs(shifts), centred, rows, deviation)
+    places = _places(track, closed)
+    report = _report(track, places, deviation, shifts)
+    _check_turns(track, report, rows)
+    return middle + track.at(places), replace(report, points=points, places=middle + nearest)
+
+
+def _fitted(points: Array, closed: bool, deviation: float | None) -> _Track:
+    """The smooth track, in its own arc length from the place of the first point."""
+    around = np.concatenate([points, points[:1]]) if closed else points
+    lengths = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(around, axis=0).T))])
+    u, period = lengths[: len(points)], float(lengths[-1]) if closed else None
+    for count in range(1, ROUNDS + 1):
+        deviations = [deviation] if deviation is None or count > ROUNDS - LAST else [None, sqrt(2.0) * deviation]
+        choice = choose(u, points, period, deviations)
+        track = _Track(choice, choice.smoother.basis.spline(choice.fit.coefficients), u, period)
+        u = _nearest(track, points)
+        if count < ROUNDS:
+            u, period = _measured(track, u)
+    return track._replace(u=u)
+
+
+def _nearest(track: _Track, points: Array) -> Array:
+    """The places of a track that are nearest to points, by Newton's method from where they were."""
+    basis, u = track.choice.smoother.basis, track.u
+    for _ in range(STEPS):
+        spend()
+        inside = u if basis.closed else np.clip(u, basis.low, basis.high)
+        first, second, off = track.spline(inside, 1), track.spline(inside, 2), points - track.at(u)
+        square = np.square(first).sum(axis=1)
+        slope = square - np.where(u == inside, (off * second).sum(axis=1), 0.0)
+        farthest = np.sqrt(np.square(off).sum(axis=1) / square)
+        u = u + np.clip((off * first).sum(axis=1) / np.maximum(slope, STEEP * square), -farthest, farthest)
+    return u
+
+
+def _measured(track: _Track, u: Array) -> tuple[Array, float | None]:
+    """Arc length at places of a track from that of the first point, within one round, and that of the round."""
+    from scipy.interpolate import CubicHermiteSpline
+
+    basis, spline = track.choice.smoother.basis, track.spline
+    sites = np.unique(basis.knots[(basis.low <= basis.knots) & (basis.knots <= basis.high)])
+    edges = np.unique(np.concatenate([sites, 0.5 * (sites[1:] + sites[:-1])]))
+    nodes, weights = np.polynomial.legendre.leggauss(NODES)
+    half = 0.5 * np.diff(edges)
+    inside = (edges[:-1] + half)[:, None] + half[:, None] * nodes
+    lengths = np.concatenate([[0.0], np.cumsum(half * (_speed(spline, inside) @ weights))])
+    speeds = _speed(spline, edges)
+    length = CubicHermiteSpline(edges, lengths, speeds)
+    if basis.closed:
+        first, *_ = around = length(basis.low + np.remainder(u - basis.low, basis.high - basis.low))
+        return np.remainder(around - first, lengths[-1]), float(lengths[-1])
+    within = np.clip(u, basis.low, basis.high)
+    ends = np.where(u < basis.low, speeds[0], speeds[-1])
+    straight: Array = length(within) + (u - within) * ends
+    return straight - straight[0], None
+
+
+def _speed(spline: Any, u: Array) -> Array:
+    first = np.moveaxis(spline(u, 1), -1, 0)
+    speed: Array = np.hypot(first[0], first[1])
+    return speed
+
+
+def _places(track: _Track, closed: bool) -> Array:
+    """Where the track is taken from its spline: at the points' places, or as often as its width asks for."""
+    choice, basis = track.choice, track.choice.smoother.basis
+    low, high = track.u[0], track.u[-1]
+    if closed:
+        high = low + basis.high - basis.low
+    else:
+        low, high = max(low, basis.low), min(high, basis.high)
+    if choice.places is not None and choice.width < np.median(np.diff(choice.places)):
+        period = basis.high - basis.low
+        inner = np.sort(low + np.remainder(choice.places - low, period)) if closed else choice.places
+        least = APART * float(np.median(np.diff(inner)))
+        inner = inner[(inner > low + least) & (inner < high - least)]
+        places = np.concatenate([[low], inner, [high]])
+    else:
+        places = np.linspace(low, high, max(FEWEST, ceil(A_WIDTH * (high - low) / choice.width)) + 1)
+    return places[:-1] if closed else places
+
+
+def _report(track: _Track, places: Array, deviation: float | None, shifts: Array) -> Smoothing:
+    """What is known of a smooth track; its points are put in by whom they are known to."""
+    choice = track.choice
+    fit = choice.fit
+    estimate = sqrt(fit.residual / max(len(shifts) - fit.freedom, 1.0))
+    most = max(FEWEST, min(PLACES, WORK // choice.smoother.basis.size))
+    told = places if len(places) <= most else places[np.linspace(0, len(places) - 1, most).astype(np.int64)]
+    first, second = track.spline(told, 1), track.spline(told, 2)
+    speed = np.hypot(*first.T)
+    lengths, _ = _measured(track._replace(u=told), told)
+    scatter = estimate if deviation is None else deviation
+    return Smoothing(
+        given=deviation,
+        standard_deviation=estimate,
+        rms=sqrt(float(np.square(shifts).mean())),
+        largest_shift=float(np.abs(shifts).max()),
+        parameter=choice.weight,
+        width=choice.width,
+        degrees_of_freedom=fit.freedom,
+        s=lengths,
+        curvature=(first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]) / speed**3,
+        curvature_error=np.hypot(scatter * choice.smoother.spread(fit, told, 2), _end_errors(track, told)) / speed**2,
+        points=np.empty((0, 2)),
+        places=np.empty((0, 2)),
+        places_s=_measured(track, track.u)[0],
+        shifts=shifts,
+    )
+
+
+def _end_errors(track: _Track, u: Array) -> Array:
+    """What the condition at open ends, that the third derivative vanishes, takes from the second derivative near them.
+
+    Where the true one is b, it is 2 b times the width at the end, and dies away within some widths: the solution of
+    ``d = width**6 D^6 d`` that has ``D^3 d = -b`` and no higher derivatives there. As b the largest third derivative
+    nearby is taken. (To draw the spline's ends to a third derivative from inside was tried: it is wrong as often.)
+    """
+    choice, basis = track.choice, track.choice.smoother.basis
+    errors: Array = np.zeros(len(u))
+    if basis.closed:
+        return errors
+    for end, sign in ((basis.low, 1.0), (basis.high, -1.0)):
+        near = np.clip(end + sign * np.linspace(0.0, REACH, 10 * int(REACH)) * choice.width, basis.low, basis.high)
+        largest = float(np.hypot(*track.spline(near, 3).T).max())
+        x = np.maximum(sign * (u - end), 0.0) / choice.width
+        turn = 0.5 * sqrt(3.0) * x
+        taken = np.exp(-x) + np.exp(-0.5 * x) * (np.cos(turn) + np.sin(turn) / sqrt(3.0))
+        errors = np.hypot(errors, choice.width * largest * taken)
+    return errors
+
+
+def _check_shifts(shifts: Array, points: Array, rows: Sequence[int], deviation: float | None) -> None:
+    """Refuse a point that is far away from the track through all of them."""
+    usual = max(MEDIAN * float(np.median(shifts)), deviation or 0.0)
+    worst = int(shifts.argmax())
+    chord = float(np.median(np.hypot(*np.diff(points, axis=0).T)))
+    if shifts[worst] > max(STRAY * usual, OFF * chord):
+        raise DeclarationError(
+            f"sampled: row {rows[worst]}: is {shifts[worst]:.3g} m from the smooth track, where the points scatter by "
+            f"{usual:.3g} m; leave it out if it is stray, or give the standard deviation as smoothing"
+        )
+
+
+def _check_turns(track: _Track, report: Smoothing, rows: Sequence[int]) -> None:
+    """Refuse a track that folds back."""
+    k = int(np.abs(report.curvature).argmax())
+    usual = float(np.median(np.abs(np.diff(track.u))))
+    turn = abs(float(report.curvature[k])) * max(report.width, usual)
+    if turn > SHARPEST:
+        row = rows[int(np.abs(report.places_s - report.s[k]).argmin())]
+        raise DeclarationError(
+            f"sampled: row {row}: the smooth track turns by {turn * 180.0 / pi:.0f} degrees there within "
+            f"{max(report.width, usual):.3g} m; are the points in "
+            "order along it, without a stray one, and is smoothing as large as their scatter?"
+        )

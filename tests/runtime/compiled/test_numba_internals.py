@@ -1,0 +1,128 @@
+"""Names that numba does not document may disappear: the results are then the same digits, by its documented ways."""
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from paths import ROOT
+
+# Every private name that `numba_internals` uses: what it imports, and attributes of that.
+IMPORTED = ("FunctionCache", "IndexDataCacheFile", "ccallback", "Environment", "lookup_environment", "rtsys")
+ATTRIBUTES = ("_load_overload", "_index_key", "_save_data", "CFunc", "_memo", "initialize", "entry_point", "_cache")
+
+# While `numba_internals` is imported, the modules that it imports from lack the names; and it finds no such attributes.
+PROGRAM = """
+import builtins, sys
+from numba.core import caching, ccallback, environment, runtime
+
+folder, *hidden = sys.argv[1:]
+real, gone = hasattr, []
+for module in (caching, environment, runtime, sys.modules["numba.core"]):
+    gone += [(module, name, vars(module).pop(name)) for name in hidden if name in vars(module)]
+if "ccallback" in hidden:
+    sys.modules["numba.core.ccallback"] = None
+builtins.hasattr = lambda owner, name: name not in hidden and real(owner, name)
+from gqm_sym.runtime.compiled import numba_internals
+numba_internals.hasattr, builtins.hasattr = builtins.hasattr, real
+sys.modules["numba.core.ccallback"] = ccallback
+for module, name, value in gone:
+    setattr(module, name, value)
+
+sys.path.insert(0, folder)
+import functions
+print(functions.total(2.0, functions.np.arange(5.0)).hex(), functions.unchecked(3.0).hex())
+print(functions.run(functions.square.address, 1.7).hex())
+"""
+
+FUNCTIONS = """
+import numpy as np
+from numba import carray, types
+from gqm_sym.runtime.arithmetic.doubledouble import two_sum
+from gqm_sym.runtime.compiled import jit
+from gqm_sym.runtime.compiled.calls import call_static_balance
+from gqm_sym.runtime.interface import INTERFACE
+
+compiled = jit.compiler(__file__, interface=INTERFACE)
+POINTER = types.CPointer(types.float64)
+
+
+@jit.entry(types.float64(types.float64, types.float64[::1]))
+def total(x, values):
+    high, low = two_sum(x, 2.0**-60)
+    copy = np.empty(values.size)
+    for k in range(values.size):
+        copy[k] = np.sin(values[k]) * high + low
+    return copy.sum()
+
+
+@jit.entry(types.float64(types.float64), checked=False)
+def unchecked(x):
+    return x / 0.7
+
+
+@compiled(types.void(types.intp, POINTER, POINTER, POINTER))
+def square(n, lam, p, out):
+    lam, out = carray(lam, n), carray(out, (2, n))
+    for i in range(n):
+        out[0, i], out[1, i] = lam[i] ** 2 / 3.0, p[0]
+
+
+@jit.entry(types.float64(types.int64, types.float64))
+def run(address, x):
+    lam, p, out = np.full(1, x), np.full(1, 0.25), np.empty((2, 1))
+    call_static_balance(address, 1, lam, p, out)
+    return out[0, 0] + out[1, 0]
+"""
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Write the functions that every process compiles."""
+    path = tmp_path_factory.mktemp("functions")
+    (path / "functions.py").write_text(FUNCTIONS, encoding="utf-8")
+    return path
+
+
+def _answers(folder: Path, cache: Path, *hidden: str) -> str:
+    done = subprocess.run(
+        [sys.executable, "-c", PROGRAM, str(folder), *hidden],
+        cwd=ROOT,
+        env={"NUMBA_CACHE_DIR": str(cache), "PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+@pytest.fixture(scope="module")
+def truth(folder: Path, tmp_path_factory: pytest.TempPathFactory) -> str:
+    """Give the answers with all of numba's names."""
+    return _answers(folder, tmp_path_factory.mktemp("cache"))
+
+
+@pytest.mark.parametrize(
+    "hidden", [*((name,) for name in (*IMPORTED, *ATTRIBUTES)), (*IMPORTED, *ATTRIBUTES)], ids=" ".join
+)
+def test_without_a_private_name_the_digits_are_the_same(
+    hidden: tuple[str, ...], folder: Path, truth: str, tmp_path: Path
+) -> None:
+    """Compiled at first, and then from the cache, by a process that lacks the name."""
+    assert _answers(folder, tmp_path, *hidden) == truth
+    stored = {path: path.stat().st_mtime_ns for path in tmp_path.rglob("*.nbc")}
+    assert len(stored) >= 4
+    if len(hidden) > 1 or hidden[0] in ("rtsys", "Environment", "IndexDataCacheFile", "ccallback"):
+        assert _answers(folder, tmp_path, *hidden) == truth
+        assert {path: path.stat().st_mtime_ns for path in tmp_path.rglob("*.nbc")} == stored
+
+
+def test_no_other_file_uses_private_names() -> None:
+    """Modules of numba that its manual does not name are imported in one file; it names `extending` and `cgutils`."""
+    private = re.compile(r"\s*(from|import) numba\.(?!extending|core import cgutils|core\.cgutils)")
+    files = (ROOT / "gqm_sym").rglob("*.py")
+    assert {
+        path.name for path in files for line in path.read_text(encoding="utf-8").splitlines() if private.match(line)
+    } == {"numba_internals.py"}

@@ -1,0 +1,57 @@
+"""The words of motions: documented fields and kinds, and names that were changed."""
+
+import typing
+from dataclasses import fields
+from typing import Any
+
+import pytest
+
+from gqm_sym.errors import renamed
+from gqm_sym.runtime.launch import kinds
+from gqm_sym.runtime.launch.speed import Pass1
+from gqm_sym.runtime.motion.aperiodic import MotionAtRest
+from gqm_sym.runtime.motion.events import Event, Leg
+from gqm_sym.runtime.motion.extremes import grid_peaks
+from gqm_sym.runtime.motion.motion import Motion, State
+
+
+def test_a_renamed_attribute_says_its_new_name() -> None:
+    """As an attribute of an object and of a module; any other missing name is refused as usual."""
+    motion: Any = object.__new__(MotionAtRest)
+    with pytest.raises(
+        AttributeError, match="a motion has no attribute 'conditioning'; it is called 'condition_number'"
+    ):
+        motion.conditioning  # noqa: B018
+    with pytest.raises(AttributeError, match=r"a motion has no attribute 'nonsense'$"):
+        motion.nonsense  # noqa: B018
+    assert not hasattr(motion, "__deepcopy__")
+    of_module = renamed({"old": "new"}, "module 'm'")
+    with pytest.raises(AttributeError, match="module 'm' has no attribute 'old'; it is called 'new' now"):
+        of_module("old")
+
+
+@pytest.mark.parametrize("record", [State, Pass1, Event, Leg])
+def test_every_field_of_a_result_is_documented(record: Any) -> None:
+    """With its unit or meaning, under "Attributes"."""
+    names = getattr(record, "_fields", None) or [field.name for field in fields(record)]
+    described = [line.split(":")[0] for line in record.__doc__.splitlines() if " : " in line and line[4:5] != " "]
+    assert {name.strip() for line in described for name in line.split(",")} == set(names)
+
+
+def test_every_kind_and_end_is_documented() -> None:
+    """Where a user looks: in `Motion`, `Event` and `Leg`."""
+    for kind in typing.get_args(kinds.MotionKind):
+        assert f'"{kind}"' in str(Motion.__doc__)
+    for kind in kinds.EVENT_KINDS:
+        assert f'"{kind}"' in str(Event.__doc__)
+        assert f'"{kind}"' in str(kinds.__doc__)
+    for end in kinds.LEG_ENDS:
+        assert f'"{end}"' in str(Leg.__doc__)
+
+
+def test_ever_finer_grids_find_a_peak() -> None:
+    """Inside the range to a step of the last grid, and at an end of it exactly."""
+    *_, inside = grid_peaks(lambda x: -abs(x - 0.3), 0.0, 1.0)
+    assert abs(inside.place - 0.3) <= 2**-49
+    *_, at_end = grid_peaks(lambda x: x, 0.0, 1.0)
+    assert (at_end.place, at_end.value) == (1.0, 1.0)

@@ -1,0 +1,274 @@
+"""What careless and hostile callers write: refused by one clear error, or understood."""
+
+import math
+import random
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import gqm_sym as gqm
+from gqm_sym.errors import ArgumentError, DeclarationError, GQMError, InputError
+from gqm_sym.expressions import RESERVED_NAMES, check_module_name
+from gqm_sym.runtime.charts.sampled import Sampled
+from gqm_sym.specfile import read_spec
+
+TRACK = gqm.Curve.graph("a*x**2", parameters={"a": 2})
+FORCE = gqm.Gravity()
+LINE = gqm.line(length=1)
+ZIGZAG = [(0, 1), (1, 0), (2, 1)]
+
+THINGS = (
+    *(None, True, 0, -1, 2.5, math.nan, math.inf, 1j, "", "a b", "x" * 5000, b"x", [], (1, 2, 3), {}, {1: 2}, set()),
+    *(np.float64(2), np.int64(3), np.array([1.0, 2.0]), np.array([1j]), np.array(["a"]), object(), gqm.Gravity, LINE),
+    *(TRACK, FORCE, np.zeros((2, 9)), range(10**6), ("x", "z"), float("-inf"), np.datetime64("2020-01-01")),
+)
+
+CALLS = {
+    "graph z": lambda v: gqm.Curve.graph(v),
+    "graph parameter": lambda v: gqm.Curve.graph("x**2", parameter=v),
+    "graph domain": lambda v: gqm.Curve.graph("x**2", domain=v),
+    "graph end": lambda v: gqm.Curve.graph("x**2", domain=(v, 1)),
+    "graph parameters": lambda v: gqm.Curve.graph("a*x**2", parameters=v),
+    "graph default": lambda v: gqm.Curve.graph("a*x**2", parameters={"a": v}),
+    "graph title": lambda v: gqm.Curve.graph("x**2", title=v),
+    "graph positive": lambda v: gqm.Curve.graph("a*x**2", positive=v),
+    "parametric x": lambda v: gqm.Curve.parametric(x=v, z="sin(u)", parameter="u"),
+    "parametric period": lambda v: gqm.Curve.parametric(x="cos(u)", z="sin(u)", parameter="u", period=v),
+    "polar r": lambda v: gqm.Curve.polar(v),
+    "implicit F": lambda v: gqm.Curve.implicit(v, start=(1, 0)),
+    "implicit start": lambda v: gqm.Curve.implicit("x**2 + z**2 - 1", start=v),
+    "implicit start x": lambda v: gqm.Curve.implicit("x**2 + z**2 - 1", start=(v, 0)),
+    "implicit tangent": lambda v: gqm.Curve.implicit("x**2 + z**2 - 1", start=(1, 0), tangent=v),
+    "sampled": lambda v: gqm.Curve.sampled(v),
+    "sampled z": lambda v: gqm.Curve.sampled([0, 1, 2], v),
+    "sampled row": lambda v: gqm.Curve.sampled([v, (0, 1), (1, 0)]),
+    "sampled value": lambda v: gqm.Curve.sampled([(v, 0), (1, 0), (2, 1)], kind="linear"),
+    "sampled kind": lambda v: gqm.Curve.sampled(ZIGZAG, kind=v),
+    "sampled closed": lambda v: gqm.Curve.sampled(ZIGZAG, kind="linear", closed=v),
+    "piecewise": lambda v: gqm.Curve.piecewise(v),
+    "piecewise piece": lambda v: gqm.Curve.piecewise([v]),
+    "piecewise start": lambda v: gqm.Curve.piecewise([LINE], start=v),
+    "piecewise heading": lambda v: gqm.Curve.piecewise([LINE], heading=v),
+    "piecewise closed": lambda v: gqm.Curve.piecewise([LINE], closed=v),
+    "line": lambda v: gqm.line(length=v),
+    "arc": lambda v: gqm.arc(radius=1, angle=v),
+    "clothoid": lambda v: gqm.clothoid(length=1, kappa_start=v, kappa_end=0),
+    "family argument": lambda v: gqm.families.ellipse(a=v),
+    "family by place": lambda v: gqm.families.ellipse(v),
+    "family inverted": lambda v: gqm.families.ellipse(inverted=v),
+    "family parameter": lambda v: gqm.families.ellipse(parameter=v),
+    "family domain": lambda v: gqm.families.ellipse(domain=v),
+    "gravity": lambda v: gqm.Gravity(g=v),
+    "gravity by place": lambda v: gqm.Gravity(v),
+    "coulomb": lambda v: gqm.CoulombFriction(mu=v, mu_static=v),
+    "rolling": lambda v: gqm.Rolling(beta=v, radius=v),
+    "drag": lambda v: gqm.QuadraticDrag(b=v),
+    "droplet": lambda v: gqm.SurfaceTension(form=v),
+    "frame": lambda v: gqm.RotatingFrame(Omega=v),
+    "potential": lambda v: gqm.Potential(v),
+    "potential parameters": lambda v: gqm.Potential("k*x", parameters=v),
+    "central": lambda v: gqm.CentralForce(centre=v),
+    "central x": lambda v: gqm.CentralForce(centre=(v, 0)),
+    "law": lambda v: gqm.Kernel.law(v),
+    "plus": lambda v: FORCE + v,
+    "plus, the other way": lambda v: v + FORCE,
+    "derive curve": lambda v: gqm.derive(v, FORCE),
+    "derive kernel": lambda v: gqm.derive(TRACK, v),
+    "derive parameters": lambda v: gqm.derive(TRACK, FORCE, parameters=v),
+    "derive default": lambda v: gqm.derive(TRACK, FORCE, parameters={"g": v}),
+    "derive title": lambda v: gqm.derive(TRACK, FORCE, title=v),
+}
+
+
+@pytest.mark.parametrize("call", CALLS)
+def test_whatever_is_given_is_understood_or_refused_clearly(call):
+    """No error of Python's, NumPy's or SymPy's own comes through, and each message says what was wrong."""
+    for thing in THINGS:
+        try:
+            CALLS[call](thing)
+        except GQMError as error:
+            assert ": " in str(error), (call, thing)
+            assert len(str(error)) < 1000, (call, thing)
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda: gqm.Gravity(9.81), r"write Gravity\(g=9.81\)"),
+        (lambda: gqm.CoulombFriction(0.1, 0.2), r"write CoulombFriction\(mu=0.1, mu_static=0.2\)"),
+        (lambda: gqm.families.circle(1), r"write families.circle\(L=1\)"),
+        (lambda: gqm.line(2), r"write line\(length=2\)"),
+        (lambda: gqm.Gravity(G=1.62), "no argument 'G'; did you mean 'g'?"),
+        (lambda: gqm.CoulombFriction(nu=1), "it takes mu, mu_static"),
+        (lambda: gqm.families.ellipse(c=1), "it takes a, b, parameter, domain, inverted"),
+        (lambda: gqm.Curve.graph("x", domian=(0, 1)), "did you mean 'domain'?"),
+        (lambda: gqm.Curve.graph(), "'z' must be given"),
+        (lambda: gqm.Curve.parametric("cos(u)", "sin(u)", "u"), r"write Curve.parametric\(x='cos\(u\)', z="),
+        (lambda: gqm.Curve.parametric(x="cos(u)", z="sin(u)"), "'parameter' must be given"),
+        (lambda: gqm.derive(TRACK), "'kernel' must be given"),
+        (lambda: gqm.derive(TRACK, gqm.Gravity), r"call it first, as in Gravity\(\)"),
+        (lambda: gqm.derive(gqm.families.circle, FORCE), r"call it first, as in circle\(\)"),
+        (lambda: gqm.derive(FORCE, TRACK), "must be a curve"),
+        (lambda: gqm.derive(TRACK, FORCE, paramters={}), "did you mean 'parameters'?"),
+        (lambda: gqm.build(gqm.derive(TRACK, FORCE), "hill"), "write build"),
+        (lambda: gqm.build(TRACK, name="hill"), "must be a model"),
+        (lambda: FORCE + 9.81, "must be two kernels"),
+    ],
+)
+def test_the_message_names_the_remedy(call, message):
+    """What Python calls a TypeError is one still, with what to write instead."""
+    with pytest.raises(ArgumentError, match=message) as raised:
+        call()
+    assert isinstance(raised.value, TypeError)
+    assert isinstance(raised.value, DeclarationError)
+
+
+def test_kernels_can_be_summed():
+    """Python's sum() begins with 0."""
+    assert sum([gqm.Gravity(), gqm.QuadraticDrag()]) == gqm.Gravity() + gqm.QuadraticDrag()
+
+
+# Names
+
+
+@pytest.mark.parametrize("name", sorted(RESERVED_NAMES))
+def test_reserved_names_are_refused_everywhere(name, tmp_path):
+    """In Python as in YAML, before anything is built with them; a curve's own parameter alone may be called lam."""
+    for declare in (
+        lambda: gqm.Curve.graph(f"{name}*x**2"),
+        lambda: gqm.Curve.implicit(f"x - {name}*z", start=(0, 0)),
+        lambda: gqm.Potential(f"{name}*z"),
+        lambda: gqm.Gravity(g=name),
+        lambda: gqm.families.circle(L=name),
+        lambda: gqm.Curve.piecewise([gqm.line(length=name)]),
+    ):
+        with pytest.raises(InputError, match="reserved"):
+            declare()
+    path = tmp_path / "curve.yaml"
+    path.write_text(
+        f"name: c\ncurve: {{graph: {{z: {name}*x**2}}}}\nkernel: {{gravity: {{}}}}\nparameters: {{{name}: 1}}\n"
+    )
+    with pytest.raises(InputError, match="reserved"):
+        read_spec(path)
+
+
+@pytest.mark.parametrize("name", ["numpy", "numba", "math", "json", "gqm_sym", "pytest", "sys", "class"])
+def test_a_module_hides_no_other(name, tmp_path):
+    """`name="numpy"` would be imported for NumPy from then on, in a folder that Python looks into."""
+    with pytest.raises(InputError, match=name):
+        gqm.build(gqm.derive(TRACK, FORCE), name=name, folder=tmp_path)
+    path = tmp_path / "curve.yaml"
+    path.write_text(f"name: {name}\ncurve: {{graph: {{z: x**2}}}}\nkernel: {{gravity: {{}}}}\n")
+    with pytest.raises(InputError, match=f"curve.yaml:1:7: .*{name}"):
+        read_spec(path)
+    assert [entry.name for entry in tmp_path.iterdir()] == ["curve.yaml"]
+
+
+def test_a_module_of_ones_own_may_be_made_again(tmp_path, monkeypatch):
+    """What Python finds under the name in the user's folder is no obstacle."""
+    (tmp_path / "my_own_track.py").write_text("")
+    monkeypatch.syspath_prepend(tmp_path)
+    assert check_module_name("my_own_track", where="name") == "my_own_track"
+
+
+# Domains
+
+
+@pytest.mark.parametrize("domain", [(1, 0), (1, 1), ("pi", 3), ("a", "-a"), (0, "a - 2")])
+def test_a_reversed_domain_is_refused(domain):
+    """As soon as defaults make numbers of its ends."""
+    for declare in (
+        lambda: gqm.Curve.graph("a*x**2", domain=domain, parameters={"a": 2}),
+        lambda: gqm.derive(gqm.Curve.graph("a*x**2", domain=domain), FORCE, parameters={"a": 2}),
+    ):
+        with pytest.raises(DeclarationError, match="lo < hi"):
+            declare()
+
+
+def test_an_undecided_domain_is_no_mistake():
+    """Ends that are known at run time only are left to it."""
+    assert gqm.Curve.graph("a*x**2", domain=("a", "-a")).domain[0].name == "a"
+
+
+# Points
+
+
+class Table(dict):
+    """What a DataFrame is to `Curve.sampled`."""
+
+    @property
+    def columns(self):
+        return list(self)
+
+
+X = np.linspace(0.0, 3.0, 9)
+Z = np.cos(X)
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda: gqm.Curve.sampled(X, Z),
+        lambda: gqm.Curve.sampled(list(X), list(Z)),
+        lambda: gqm.Curve.sampled(zip(X, Z, strict=True)),
+        lambda: gqm.Curve.sampled({"x": X, "z": Z}),
+        lambda: gqm.Curve.sampled(Table(time=X, X=X, z=Z)),
+    ],
+)
+def test_points_are_taken_in_any_shape(make):
+    """Rows, columns and tables give the same track."""
+    assert make() == gqm.Curve.sampled(np.column_stack([X, Z]))
+
+
+def test_a_data_frame_is_a_table():
+    """With whichever columns beside x and z."""
+    pandas = pytest.importorskip("pandas")
+    frame = pandas.DataFrame({"z": Z, "note": "a", "x": X})
+    assert gqm.Curve.sampled(frame) == gqm.Curve.sampled(X, Z)
+    assert gqm.Curve.sampled(frame["x"], frame["z"]) == gqm.Curve.sampled(X, Z)
+    with pytest.raises(DeclarationError, match="columns x and z"):
+        gqm.Curve.sampled(frame.rename(columns={"x": "distance"}))
+
+
+@pytest.mark.parametrize(
+    ("points", "message"),
+    [
+        ((X, Z), r"Curve.sampled\(x, z\)"),
+        (np.stack([X, Z]), r"Curve.sampled\(x, z\)"),
+        ({"x": X, "y": Z}, "columns x and z"),
+        ({"x": X, "z": Z[:-1]}, "one length"),
+    ],
+)
+def test_points_in_the_wrong_shape_are_told_the_right_one(points, message):
+    """Two rows of many numbers are two columns lying down."""
+    with pytest.raises(DeclarationError, match=message):
+        gqm.Curve.sampled(points)
+
+
+@pytest.mark.parametrize("degrees", [21, 30, 60, 89])
+@pytest.mark.parametrize("count", [8, 40])
+def test_a_zigzag_is_refused(degrees, count):
+    """The spline's lengths never settle on one: SciPy was asked, and answered of collocation matrices."""
+    height = math.tan(math.radians(degrees / 2))
+    with pytest.raises(DeclarationError, match=r"row 2: .*to and fro"):
+        gqm.Curve.sampled([(i, height * (i % 2)) for i in range(count)])
+
+
+@settings(deadline=None, max_examples=60)
+@given(seed=st.integers(0, 10**6), noise=st.floats(0.0, 0.6), kind=st.sampled_from(["line", "ring"]))
+def test_noisy_points_make_a_track_or_are_refused(seed, noise, kind):
+    """Noise of any size: a chart whose pieces have lengths, or one clear error."""
+    random_ = random.Random(seed)
+    count = random_.randrange(6, 30)
+    angle = [2 * math.pi * i / count for i in range(count)]
+    points = [(i, 0.0) for i in range(count)] if kind == "line" else [(math.cos(a), math.sin(a)) for a in angle]
+    size = noise * math.dist(points[0], points[1])
+    points = [(x + random_.gauss(0, size) * (kind == "ring"), z + random_.gauss(0, size)) for x, z in points]
+    try:
+        track = gqm.Curve.sampled(points, closed=kind == "ring").definition
+        edges = np.asarray(Sampled(track.points, "spline", track.closed).chart(()).edges)
+    except GQMError:
+        return
+    assert np.all(np.diff(edges) > 0)
