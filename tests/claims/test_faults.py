@@ -209,9 +209,11 @@ def test_a_module_of_an_older_interface_is_named(text: str, tmp_path: Path) -> N
     """Names that the runtime no longer has are not asked for before the version: the message says what to run."""
     path = tmp_path / "old.py"
     old = text.replace(f"interface={INTERFACE})", f"interface={INTERFACE - 1})")
-    for name in ("BEND", "CompiledModel"):
-        path.write_text(old.replace(f"    {name},\n", f"    {name},\n    GONE,\n"), encoding="utf-8")
-        assert "GONE" in path.read_text(encoding="utf-8")
+    imports = "from gqm_sym.runtime.vocabulary import ("
+    assert imports in old
+    for gone in (old.replace(imports, f"{imports}GONE, "), old.replace("CompiledModel, ", "CompiledModel, GONE, ")):
+        assert gone != old
+        path.write_text(gone, encoding="utf-8")
         with pytest.raises(OutdatedModuleError, match=rf"old\.py: .*interface {INTERFACE - 1} .*run gqm-gen"):
             load(path, "old")
     path.write_text(old.replace("runtime.vocabulary", "runtime.gone"), encoding="utf-8")

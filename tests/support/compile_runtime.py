@@ -38,7 +38,8 @@ def compile_entries(name: str) -> str:
         is_entry = isinstance(call, FunctionType) and call.__code__.co_name == "call"
         if is_entry and call.__module__ == module.__name__:
             given = inspect.getclosurevars(call).nonlocals
-            jit._dispatcher_of(given["function"], nogil=given["nogil"]).compile(given["signature"])
+            options = {name: given[name] for name in ("nogil", "checked")}
+            jit.COMPILER.entry(given["function"], given["signature"], **options)
     return name
 
 
