@@ -1,11 +1,12 @@
-# Everything runs in a virtual environment of the project's own, made on first use.
+# Everything runs in a virtual environment of the project's own, made on first use. The targets types, current and site
+# are parts of lint that run at the same time.
 PYTHON  ?= python3
 WORKERS ?= 2
 VENV    := .venv
 BIN     := $(VENV)/bin
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test lint generate docs soak fuzz bench coverage mutate
+.PHONY: help demo test lint types current site generate docs soak fuzz bench coverage mutate
 
 help: ## show this list
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-9s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -14,14 +15,22 @@ demo: $(VENV)/.run ## take the paper's Example 1 from a YAML file to digits, bes
 	$(BIN)/python scripts/demo.py
 
 test: $(VENV)/.dev ## run every test, notebooks included
+	$(BIN)/python tests/support/compile_runtime.py $(WORKERS)
 	$(BIN)/python -m pytest -n $(WORKERS)
 
 lint: $(VENV)/.dev ## check format, style, types and documentation, and that generated files are current
 	$(BIN)/ruff format --check
 	$(BIN)/ruff check
+	$(MAKE) --no-print-directory --jobs $(WORKERS) types current site
+
+types:
 	$(BIN)/mypy
+
+current:
 	$(BIN)/gqm-gen --check --quiet -o generated curves/*.yaml
 	$(BIN)/python scripts/make_family_pages.py --check
+
+site:
 	$(BIN)/python -m sphinx -W --keep-going --quiet -D nb_execution_mode=off -b html docs docs/_build/lint
 
 generate: $(VENV)/.dev ## write generated/ afresh from curves/, and the pages of the families
@@ -57,20 +66,26 @@ bench: $(VENV)/.bench ## time each stage, and set accuracy and time beside the a
 	$(BIN)/python benchmarks/scale.py
 	$(BIN)/python benchmarks/comparison.py
 
-$(VENV)/.run: pyproject.toml
+# Python compiles the files that it imports; pip would compile all of them, most of which nothing here imports.
+INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile
+
+$(BIN)/python:
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable .
+
+$(VENV)/.run: pyproject.toml | $(BIN)/python
+	$(INSTALL) --editable .
 	touch $@
 
 $(VENV)/.bench: $(VENV)/.run
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[bench,plot]'
-	-$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[peers]'
+	$(INSTALL) --editable '.[bench,plot]'
+	-$(INSTALL) --editable '.[peers]'
 	touch $@
 
-$(VENV)/.dev: $(VENV)/.run
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[dev]'
-	touch $@
+# What it installs holds all that .run does, which is therefore made with it.
+$(VENV)/.dev: pyproject.toml | $(BIN)/python
+	$(INSTALL) --editable '.[dev]'
+	touch $(VENV)/.run $@
 
 $(VENV)/.docs: $(VENV)/.run
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[docs]'
+	$(INSTALL) --editable '.[docs]'
 	touch $@

@@ -239,8 +239,11 @@ def test_one_module_in_two_folders(text: str, path: Path, tmp_path: Path) -> Non
     twin = tmp_path / "twin" / "bowl.py"
     write_module(text, twin)
     first, second = load(path, "bowl"), load(twin, "bowl")
-    assert half_period(first) == half_period(second)
-    assert first.MODEL.addresses != second.MODEL.addresses or first.bounds is not second.bounds
+    halves = [half_period(module) for module in (first, second)]
+    assert halves[0] == halves[1] > 0.0
+    assert [Path(module.__file__ or "") for module in (first, second)] == [path.resolve(), twin.resolve()]
+    path.unlink()  # neither needs the other's file
+    assert [half_period(module) for module in (first, second, load(twin, "bowl"))] == [*halves, halves[0]]
 
 
 def test_a_new_version_in_the_same_place(path: Path) -> None:

@@ -4,6 +4,7 @@ import ast
 import sys
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
+from functools import cache
 from graphlib import TopologicalSorter
 from pathlib import Path
 from typing import NamedTuple
@@ -57,6 +58,74 @@ KNOWS_NO_RUNTIME = {"emission", "derivation", "declare", "kernels", "parameters"
 
 # No folder of the package holds more files than a reader takes in at a glance.
 MAX_FILES = 16
+
+# Files of the runtime without a test file of their name in their room, and the tests that would fail with them.
+DIFFERENCES = "runtime/arithmetic/divided_differences/test_differences.py"
+TESTED_THROUGH = {
+    "arithmetic/clenshaw.py": "runtime/motion/test_sampler.py",
+    "arithmetic/divided_differences/first.py": DIFFERENCES,
+    "arithmetic/divided_differences/points.py": DIFFERENCES,
+    "arithmetic/divided_differences/second.py": DIFFERENCES,
+    "arithmetic/matrices.py": "runtime/legs/test_polynomials.py",
+    "arithmetic/offsets.py": "claims/test_degenerate.py",
+    "charts/arc_length.py": "runtime/charts/test_rail.py",
+    "charts/continuation.py": "runtime/charts/test_tracing_ends.py",
+    "charts/evaluate.py": "runtime/charts/test_chart.py",
+    "charts/exact_parts.py": "runtime/charts/test_exact_normals.py",
+    "charts/level_pieces.py": "runtime/charts/test_tracing.py",
+    "compiled/buffers.py": "runtime/charts/test_tracing.py",
+    "compiled/intrinsics.py": "runtime/arithmetic/test_elementary.py",
+    "compiled/registers.py": "runtime/legs/test_polynomials.py",
+    "compiled/streaming.py": "runtime/launch/test_speed.py",
+    "compiled/strided.py": "runtime/sweep/test_sweep.py",
+    "compiled/threads.py": "runtime/launch/test_speed.py",
+    "compiled/types.py": "runtime/compiled/test_jit.py",
+    "interface.py": "claims/test_faults.py",
+    "inversion/fourier.py": "runtime/motion/test_sampler.py",
+    "inversion/records.py": "runtime/motion/test_sampler.py",
+    "launch/domain.py": "runtime/launch/test_request.py",
+    "launch/ends.py": "runtime/launch/test_zeros.py",
+    "launch/formulas.py": "emission/test_render.py",
+    "launch/functions.py": "runtime/inversion/test_table.py",
+    "launch/kinds.py": "runtime/motion/test_aperiodic.py",
+    "launch/problem.py": "runtime/launch/test_zeros.py",
+    "launch/survey.py": "runtime/compiled/test_calls.py",
+    "legs/approach.py": "runtime/legs/test_dissipative.py",
+    "legs/follow.py": "runtime/legs/test_dissipative.py",
+    "legs/leg_equation.py": "claims/test_closed_forms.py",
+    "legs/leg_panels.py": "runtime/legs/test_polynomials.py",
+    "legs/leg_record.py": "claims/test_dissipative.py",
+    "legs/leg_run.py": "claims/test_dissipative.py",
+    "legs/leg_segments.py": "runtime/legs/test_polynomials.py",
+    "model.py": "claims/test_reference.py",
+    "motion/conditioning.py": "claims/test_degenerate.py",
+    "motion/extremes.py": "design/test_least_speed.py",
+    "motion/motion.py": "claims/test_reference.py",
+    "motion/periodic.py": "claims/test_properties.py",
+    "motion/rolling.py": "claims/test_rolling.py",
+    "motion/rows.py": "export/test_datasets.py",
+    "motion/segment.py": "runtime/motion/test_aperiodic.py",
+    "motion/trajectory.py": "runtime/motion/test_aperiodic.py",
+    "multiprecision/exact_problem.py": "claims/test_degenerate.py",
+    "multiprecision/exact_tracks.py": "runtime/charts/test_exact_normals.py",
+    "multiprecision/fixed_point.py": "runtime/charts/test_exact_normals.py",
+    "multiprecision/gauss_legendre.py": "runtime/charts/test_exact_normals.py",
+    "quadrature/equilibrium.py": "claims/test_dissipative.py",
+    "quadrature/integrands.py": "runtime/quadrature/test_time_panels.py",
+    "quadrature/kronrod.py": "runtime/quadrature/test_time_panels.py",
+    "quadrature/substitution.py": "runtime/quadrature/test_time_panels.py",
+    "quadrature/trapezoid.py": "runtime/sweep/test_sweep.py",
+    "sweep/arrivals.py": "runtime/sweep/test_sweep.py",
+    "sweep/batch/rows.py": "runtime/sweep/batch/test_batches.py",
+    "sweep/batch/times.py": "runtime/sweep/batch/test_batches.py",
+    "sweep/batch/turning_points.py": "runtime/sweep/batch/test_batches.py",
+    "sweep/cluster.py": "studies/test_studies.py",
+    "sweep/orbit.py": "runtime/sweep/test_sweep.py",
+    "sweep/orbit_extremes.py": "runtime/sweep/test_sweep.py",
+    "sweep/quantities.py": "runtime/sweep/test_sweep.py",
+    "sweep/scalar.py": "runtime/sweep/test_sweep.py",
+    "vocabulary.py": DIFFERENCES,
+}
 
 # Packages that only some parts import.
 ONLY_IN = {
@@ -148,7 +217,13 @@ def _modules(target: str, names: Sequence[str]) -> Iterator[str]:
         yield f"{target}.{name}" if inside in FILES else target
 
 
-def _imports() -> Iterator[Import]:
+@cache
+def _imports() -> tuple[Import, ...]:
+    """Every import of the package."""
+    return tuple(_read_imports())
+
+
+def _read_imports() -> Iterator[Import]:
     for parts, path in FILES.items():
         tree = ast.parse(path.read_text(encoding="utf-8"))
         inside = {id(node) for outer in ast.walk(tree) if _waits(outer) for node in ast.walk(outer)}
@@ -159,9 +234,6 @@ def _imports() -> Iterator[Import]:
                     for module in _modules(target, names):
                         file = path.relative_to(PACKAGE).as_posix()
                         yield Import(file, _unit(parts) if parts else "", module, id(node) in inside)
-
-
-IMPORTS = tuple(_imports())
 
 
 def _upward(rows: Iterable[Import]) -> list[str]:
@@ -184,7 +256,7 @@ def test_every_unit_has_its_place() -> None:
 
 def test_imports_go_downwards() -> None:
     """No unit imports one beside or above it but for the presentation hooks."""
-    assert _upward(IMPORTS) == []
+    assert _upward(_imports()) == []
 
 
 @pytest.mark.parametrize("unit", sorted(set(LEVEL) - {"cli"}))
@@ -199,7 +271,7 @@ def test_there_are_no_import_circles() -> None:
     """No file imports itself through others: waiting imports count, and those for type checkers; hooks do not."""
     graph: dict[str, set[str]] = {}
     names = {path.relative_to(PACKAGE).as_posix(): ".".join(("gqm_sym", *parts)) for parts, path in FILES.items()}
-    for row in IMPORTS:
+    for row in _imports():
         if row.target.startswith("gqm_sym") and row.unit and (row.file, row.target) not in PRESENTATION_HOOKS:
             graph.setdefault(names[row.file], set()).add(row.target)
     assert list(TopologicalSorter(graph).static_order())  # raises CycleError, which names the circle
@@ -209,6 +281,25 @@ def test_no_folder_holds_too_many_files() -> None:
     """A folder that outgrows its reader is cut into rooms."""
     counts = Counter(path.parent.relative_to(PACKAGE).as_posix() for path in FILES.values())
     assert {folder: count for folder, count in counts.items() if count > MAX_FILES} == {}
+
+
+def _untested(files: Iterable[str], through: dict[str, str]) -> list[str]:
+    """Files of the runtime that have neither tests of their own nor a row in the table, or a row that is wrong."""
+    own = {file: f"runtime/{Path(file).parent.as_posix()}/test_{Path(file).name}" for file in files}
+    missing = {file for file, test in own.items() if (ROOT / "tests" / test).is_file() == (file in through)}
+    return sorted(missing | {file for file, test in through.items() if not (ROOT / "tests" / test).is_file()})
+
+
+def test_one_can_find_the_tests_of_each_file_of_the_runtime() -> None:
+    """They lie in the room of its name, or the table says where they are; a file has one of both, and rows are true."""
+    runtime = {
+        path.relative_to(PACKAGE / "runtime").as_posix() for parts, path in FILES.items() if parts[:1] == ("runtime",)
+    }
+    files = {file for file in runtime if not file.endswith("__init__.py")}
+    assert _untested(files, TESTED_THROUGH) == []
+    assert set(TESTED_THROUGH) <= files
+    assert _untested(["legs/new.py"], {}) == ["legs/new.py"]
+    assert _untested(["legs/new.py"], {"legs/new.py": "gone/test_new.py"}) == ["legs/new.py"]
 
 
 def test_each_room_says_what_it_is_for() -> None:
@@ -221,7 +312,7 @@ def test_each_room_says_what_it_is_for() -> None:
 
 def test_the_front_loads_nothing_heavy() -> None:
     """What ``import gqm_sym`` runs at once is the errors alone."""
-    loaded = {row.target for row in IMPORTS if not row.unit and not row.waits}
+    loaded = {row.target for row in _imports() if not row.unit and not row.waits}
     outside = {target for target in loaded if target.split(".")[0] not in sys.stdlib_module_names}
     assert outside <= {"gqm_sym.errors"}
 
@@ -229,17 +320,17 @@ def test_the_front_loads_nothing_heavy() -> None:
 @pytest.mark.parametrize("package", ONLY_IN)
 def test_a_package_is_imported_where_it_belongs(package: str) -> None:
     """Each dependency has its units; what they need of it, others ask them for."""
-    users = {row.unit.split(".")[0] for row in IMPORTS if row.target.split(".")[0] == package}
+    users = {row.unit.split(".")[0] for row in _imports() if row.target.split(".")[0] == package}
     assert users <= ONLY_IN[package]
 
 
 def test_no_other_package_is_imported() -> None:
     """The dependencies are those of the table above and the standard library."""
-    names = {row.target.split(".")[0] for row in IMPORTS}
+    names = {row.target.split(".")[0] for row in _imports()}
     assert names - sys.stdlib_module_names - {"gqm_sym"} <= set(ONLY_IN)
 
 
 def test_some_imports_wait() -> None:
     """Packages that few calls need are imported inside the functions that need them."""
-    eager = [row.file for row in IMPORTS if row.target.split(".")[0] in ONLY_INSIDE_FUNCTIONS and not row.waits]
+    eager = [row.file for row in _imports() if row.target.split(".")[0] in ONLY_INSIDE_FUNCTIONS and not row.waits]
     assert eager == []

@@ -17,14 +17,20 @@ from problems import DIGITS, number
 
 import gqm_sym as gqm
 
-HALF_PERIOD_ULPS = 4.0
-POSITION = 1e-14
-SAMPLE = 1e-13
-TURNING = 1e-14
-TIME = 1e-14
+# Half periods and periods are the doubles nearest to the truth. Worst measured: 0.49.
+NEAREST = 0.51
+# Of the motion's extent or its largest speed, to thousands of periods; worst measured: 1.7e-15 (speeds), else 1.0e-15.
+POSITION = 2e-15
+# V**2, N and so on of the largest of their kind; worst measured: 2.5e-16.
+SAMPLE = 1e-15
+# Turning points, of the extent, and the time to the first; worst measured: 8e-17 and 5e-17.
+TURNING = 2.3e-16
+TIME = 2.3e-16
 
-KEPLER_POSITION = 1e-13
-KEPLER_FIELD = 1e-14
+# Of where the planet is, which after thousands of turns is a large angle; and of the largest V**2 and N.
+# Worst measured: 3.4e-16 and 5.5e-16.
+KEPLER_POSITION = 1e-15
+KEPLER_FIELD = 2e-15
 
 ModuleNamed = Callable[[str], ModuleType]
 
@@ -136,7 +142,7 @@ def test_turning_points_and_half_period(case: PaperCase, module_named: ModuleNam
     lam = max(*(abs(float(row["lam"])) for row in points), extent(points, "lam"))
     for actual, row in zip(sorted(motion.turning_points), points, strict=True):
         assert error(actual, row["lam"]) <= TURNING * lam
-    assert ulps(motion.half_period, expected["half_period"]) <= HALF_PERIOD_ULPS
+    assert ulps(motion.half_period, expected["half_period"]) <= NEAREST
     first = expected["time_to_first_turning_point"]
     assert error(motion.legs[0].t_end, first) <= TIME * float(first)
 
@@ -214,7 +220,7 @@ def test_a_planet_keeps_kepler_s_laws(e: str, module_named: ModuleNamed) -> None
     motion = module_named("kepler").solve(**orbital(e))
     period = orbital_period()
     assert motion.kind == "circulation"
-    assert ulps(motion.period, period) <= HALF_PERIOD_ULPS
+    assert ulps(motion.period, period) <= NEAREST
     for t in (*np.linspace(0.05, float(period), 25).tolist(), 20.0, 1000.0, 123456.75):
         truth = eccentric_anomaly(e, t)
         assert error(motion.lam(t), truth) <= KEPLER_POSITION * float(max(truth, 2 * mp.pi))
@@ -227,7 +233,7 @@ def test_the_centre_may_be_anywhere(e: str, module_named: ModuleNamed) -> None:
     del launch["ecc"]
     launch["k_sun"] = launch.pop("k")
     module = module_named("kepler_off_centre")
-    assert ulps(module.solve(**launch).period, orbital_period()) <= HALF_PERIOD_ULPS
+    assert ulps(module.solve(**launch).period, orbital_period()) <= NEAREST
     field = module.pass1(np.linspace(-3.0, 3.0, 13), **launch)
     assert np.abs(field.normal_force).max() <= KEPLER_FIELD * np.abs(field.kappa * field.v2).max()
 
@@ -241,7 +247,7 @@ def test_a_harmonic_well_is_isochronous(lam0: str, v0: str, module_named: Module
     w, lowest = number("1.3"), number("-24/25")
     motion = module_named("harmonic_line").solve(lam0, v0, w="1.3")
     with mp.workdps(DIGITS):
-        assert ulps(motion.half_period, mp.pi / w) <= HALF_PERIOD_ULPS
+        assert ulps(motion.half_period, mp.pi / w) <= NEAREST
         # ds = 5/4 dx
         away, speed = number(lam0) - lowest, number(v0) * 4 / 5
         amplitude = mp.hypot(away, speed / w)
@@ -280,11 +286,11 @@ def test_a_sum_of_forces_is_the_potential_written_out(
     lams = np.linspace(-2.5, -0.5, 9)
     for name in ("v2", "normal_force"):
         values = [getattr(module.pass1(lams, **launch), name) for module in (first, second)]
-        assert np.abs(values[0] - values[1]).max() <= 1e-14 * np.abs(values[0]).max()
+        assert np.abs(values[0] - values[1]).max() <= SAMPLE * np.abs(values[0]).max()
     motions = [module.solve(**launch) for module in (first, second)]
     assert motions[0].kind == motions[1].kind == "libration"
-    assert ulps(motions[0].half_period, mpf(motions[1].half_period)) <= HALF_PERIOD_ULPS
-    assert error(motions[0].lam(777), mpf(motions[1].lam(777))) <= POSITION * 4
+    assert motions[0].half_period == motions[1].half_period
+    assert motions[0].lam(777) == motions[1].lam(777)
 
 
 # Off its own orbit -------------------------------------------------------------------------------
@@ -315,7 +321,7 @@ def test_off_speed_the_track_carries_what_is_missing(factor: str, module_named: 
         for actual, lam in zip(field.normal_force, lams, strict=True):
             kappa = a * b / mp.sqrt((a * mp.sin(lam)) ** 2 + (b * mp.cos(lam)) ** 2) ** 3
             truth = mpf("1.5") * kappa * (number(factor) ** 2 - 1) * speed**2
-            assert error(actual, truth) <= 1e-14 * float(mpf("1.5") * kappa * speed**2)
+            assert error(actual, truth) <= KEPLER_FIELD * float(mpf("1.5") * kappa * speed**2)
 
 
 def test_through_the_centre_nothing_is_nan(generated_folder: Path) -> None:

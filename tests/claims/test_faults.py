@@ -30,8 +30,20 @@ GENERATE = "import sys\nfrom gqm_sym.cli.gen import main\n"
 PR_CAPBSET_DROP, CAP_DAC_OVERRIDE = 24, 1
 
 
-def python(code: str, *arguments: str | Path, before: Callable[[], None] | None = None, **environment: str) -> Any:
-    """Run Python code in a fresh process."""
+def interruptible() -> None:
+    """Take Ctrl-C as from a terminal, also where the tests run in the background: jobs there begin by ignoring it."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+
+def uninterruptible() -> None:
+    """Ignore Ctrl-C, as jobs in the background do from their beginning."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+def python(
+    code: str, *arguments: str | Path, before: Callable[[], None] = interruptible, **environment: str
+) -> subprocess.CompletedProcess[bytes]:
+    """Run Python code in a fresh process, after a call in that process."""
     return subprocess.run(
         [sys.executable, "-c", code, *map(str, arguments)],
         cwd=ROOT,
@@ -197,9 +209,11 @@ def test_a_module_of_an_older_interface_is_named(text: str, tmp_path: Path) -> N
     """Names that the runtime no longer has are not asked for before the version: the message says what to run."""
     path = tmp_path / "old.py"
     old = text.replace(f"interface={INTERFACE})", f"interface={INTERFACE - 1})")
-    for name in ("BEND", "CompiledModel"):
-        path.write_text(old.replace(f"    {name},\n", f"    {name},\n    GONE,\n"), encoding="utf-8")
-        assert "GONE" in path.read_text(encoding="utf-8")
+    imports = "from gqm_sym.runtime.vocabulary import ("
+    assert imports in old
+    for gone in (old.replace(imports, f"{imports}GONE, "), old.replace("CompiledModel, ", "CompiledModel, GONE, ")):
+        assert gone != old
+        path.write_text(gone, encoding="utf-8")
         with pytest.raises(OutdatedModuleError, match=rf"old\.py: .*interface {INTERFACE - 1} .*run gqm-gen"):
             load(path, "old")
     path.write_text(old.replace("runtime.vocabulary", "runtime.gone"), encoding="utf-8")
@@ -273,6 +287,14 @@ def test_interrupted_while_writing(yaml: Path) -> None:
     done = python(KILLED, "SIGINT", "-o", out, yaml)
     assert (done.returncode, done.stdout, done.stderr) == (130, b"", b"gqm-gen: interrupted\n")
     assert names_in(out) == []
+
+
+def test_an_interruption_that_is_ignored_stays_so(yaml: Path) -> None:
+    """A job in the background ignores Ctrl-C, which is meant for the one in the foreground, and ends its work."""
+    out = yaml.parent / "out"
+    done = python(KILLED, "SIGINT", "-o", out, yaml, before=uninterruptible)
+    assert (done.returncode, done.stdout, done.stderr) == (0, b"", b"")
+    assert names_in(out) == ["bowl.py"]
 
 
 INTERRUPTED = """

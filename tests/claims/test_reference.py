@@ -14,22 +14,19 @@ from problems import PROBLEMS, TRACKS, Problem, number, where
 MotionOf = Callable[[Problem], Any]
 ModuleOf = Callable[[str], ModuleType]
 
-# Half periods. Of the paper's example 1 unit in the last place; of the other well-conditioned
-# motions 4. Where a barrier is close or heights agree to many digits: 1e-12, relative.
-HALF_PERIOD_ULPS = 4.0
-EXAMPLE_HALF_PERIOD_ULPS = 1.0
-HARD_TIME = 1e-12
+# Half periods and periods, also where a barrier is close or heights agree to many digits: the double nearest to the
+# truth. Worst measured: 0.49.
+NEAREST = 0.51
 
-# Positions in the first ten periods, of their scale.
+# Positions in the first ten periods, of their scale. Worst measured: 5.0e-16.
 TEN_PERIODS = 10.0
-POSITION = 1e-14
+POSITION = 1e-15
 # Where the orbit is small and far from the origin, rounding the place and its coordinates comes in.
 COORDINATE_ULPS = 2.0
 
-# The paper's example: lam(t) in its first period and after 1000 s, of the scale of lam.
-FIRST_PERIOD = 1e-15
-AFTER_1000_S = 2e-13
-FIRST_PASSAGE = 1e-15
+# The paper's example: lam(t) in its first period and after 1000 s, of the scale of lam. Worst measured: 1.8e-16.
+FIRST_PERIOD = 4e-16
+AFTER_1000_S = 4e-16
 
 # The speed field at a float: V**2, N, kappa, ds.
 FIELD_ULPS = 4.0
@@ -40,19 +37,13 @@ COMPOSED_ULPS = 6.0
 # A turning point is meant to be the nearest double.
 TURNING_POINT_ULPS = 1.0
 
-# Times of single events: the half period's tolerance and the inversion's.
-EVENT_TIME = 1e-14
+# Times of single events, relative. Worst measured: 6.3e-16.
+EVENT_TIME = 1e-15
 
 # What the error bound may exceed the truth by: the larger of a last place of the scale and the decade's largest error.
 USEFUL = 100.0
 
 EXAMPLE = PROBLEMS["example1_pendulum"]
-EASY_SOURCES = ("paper_cases.json", "curves.json")
-
-
-def is_well_conditioned(problem: Problem) -> bool:
-    """Whether a truth of the problem can be asked for to a few units in the last place."""
-    return problem.source in EASY_SOURCES
 
 
 def named(problems: list[Problem]) -> dict[str, Any]:
@@ -67,14 +58,10 @@ def test_kind(problem: Problem, motion_of: MotionOf) -> None:
 
 @pytest.mark.parametrize("problem", **named(where(half_period=True)))
 def test_half_period(problem: Problem, motion_of: MotionOf) -> None:
-    """Half periods are right to the last digits, and the period is twice as long."""
+    """A half period is the nearest double, and the period is twice as long."""
     motion = motion_of(problem)
     assert problem.half_period is not None
-    if is_well_conditioned(problem):
-        allowed = EXAMPLE_HALF_PERIOD_ULPS if problem is EXAMPLE else HALF_PERIOD_ULPS
-        assert ulps(motion.half_period, problem.half_period) <= allowed
-    else:
-        assert error(motion.half_period, problem.half_period) <= HARD_TIME * motion.half_period
+    assert ulps(motion.half_period, problem.half_period) <= NEAREST
     assert motion.period == 2 * motion.half_period
 
 
@@ -83,10 +70,7 @@ def test_loop_time(problem: Problem, motion_of: MotionOf) -> None:
     """The period of a circulation is the time once round."""
     period = motion_of(problem).period
     assert problem.loop_time is not None
-    if is_well_conditioned(problem):
-        assert ulps(period, problem.loop_time) <= HALF_PERIOD_ULPS
-    else:
-        assert error(period, problem.loop_time) <= HARD_TIME * period
+    assert ulps(period, problem.loop_time) <= NEAREST
 
 
 @pytest.mark.parametrize(
@@ -104,25 +88,19 @@ def test_turning_points(problem: Problem, motion_of: MotionOf) -> None:
 
 @pytest.mark.parametrize("problem", **named(where(positions=True)))
 def test_positions(problem: Problem, motion_of: MotionOf) -> None:
-    """In the first ten periods lam, x, z and v are right to rounding, of their scales.
-
-    Where the period itself may be off by HARD_TIME, the clock may: the body is then where it was
-    or will be that much earlier or later.
-    """
+    """In the first ten periods lam, x, z and v are right to rounding, of their scales."""
     motion, track = motion_of(problem), TRACKS[problem.track]
     of = scale(problem, track)
     for row in problem.within(TEN_PERIODS):
         truth = point(problem, track, number(row.lam))
-        clock = 0.0 if is_well_conditioned(problem) else HARD_TIME * float(row.t)
         state = motion.state(row.t)
-        along = POSITION * of.lam + clock * of.v / float(truth.ds)
-        assert error(motion.lam(row.t), row.lam) <= along
-        assert error(state.lam, row.lam) <= along
+        assert error(motion.lam(row.t), row.lam) <= POSITION * of.lam
+        assert error(state.lam, row.lam) <= POSITION * of.lam
         for actual, expected in ((state.x, truth.x), (state.z, truth.z)):
             place = math.ulp(float(expected)) + float(truth.ds) * math.ulp(float(row.lam))
             rounding = COORDINATE_ULPS * place
-            assert error(actual, expected) <= POSITION * of.place + clock * of.v + rounding
-        assert error(state.v, row.v) <= POSITION * of.v + clock * 9.81
+            assert error(actual, expected) <= POSITION * of.place + rounding
+        assert error(state.v, row.v) <= POSITION * of.v
 
 
 @pytest.mark.parametrize("problem", **named(where(positions=True)))
@@ -225,7 +203,7 @@ def scale_of_v2(problem: Problem) -> float:
 
 
 def test_the_paper_s_example_in_its_first_period(motion_of: MotionOf) -> None:
-    """lam(t) agrees with Jacobi's elliptic functions within 1e-15 of its scale."""
+    """lam(t) agrees with Jacobi's elliptic functions within 4e-16 of its scale."""
     motion = motion_of(EXAMPLE)
     allowed = FIRST_PERIOD * scale(EXAMPLE, TRACKS["pendulum"]).lam
     for row in EXAMPLE.within(1.0):
@@ -238,7 +216,7 @@ def test_the_paper_s_example_in_its_first_period(motion_of: MotionOf) -> None:
 
 
 def test_the_paper_s_example_after_1000_seconds(motion_of: MotionOf) -> None:
-    """After 454 periods lam(t) is still within 2e-13 of its scale."""
+    """After 454 periods lam(t) is still as near."""
     (row,) = (row for row in EXAMPLE.positions if row.t == "1000")
     allowed = AFTER_1000_S * scale(EXAMPLE, TRACKS["pendulum"]).lam
     assert error(motion_of(EXAMPLE).lam(1000), row.lam) <= allowed
@@ -251,11 +229,10 @@ def test_the_paper_s_example_after_1000_seconds(motion_of: MotionOf) -> None:
 def test_first_passages(problem: Problem, motion_of: MotionOf) -> None:
     """The first time at a place is right to the last digits, for an exact place."""
     motion = motion_of(problem)
-    allowed = FIRST_PASSAGE if problem is EXAMPLE else EVENT_TIME
     for row in problem.samples:
         if row.t_first_passage is not None:
             expected = float(row.t_first_passage)
-            assert error(motion.time_at(row.lam), row.t_first_passage) <= allowed * expected
+            assert error(motion.time_at(row.lam), row.t_first_passage) <= EVENT_TIME * expected
 
 
 @pytest.mark.parametrize("problem", **named(where(passage=True)))

@@ -10,6 +10,9 @@ import gqm_sym as gqm
 from gqm_sym.errors import InputError
 from gqm_sym.figures import motions
 
+# Lengths of lines of 800 pieces, and of the way towards an equilibrium that is reached in no time.
+SHOWN = 1e-3
+
 
 @pytest.fixture(scope="module")
 def circle(tmp_path_factory: pytest.TempPathFactory) -> ModuleType:
@@ -61,12 +64,26 @@ def test_a_liftoff_is_marked_where_it_is(circle: ModuleType) -> None:
     assert mark.get_xydata().tolist() == [[event.x, event.z]]
 
 
-@pytest.mark.parametrize("launch", [{"lam0": 0}, {"lam0": 0, "v0": 20}, {"lam0": "pi/2", "v0": "sqrt(2*9.81)"}])
-def test_every_kind_can_be_drawn(circle: ModuleType, launch: dict[str, object]) -> None:
-    """Rest, circulation, and a motion that takes for ever."""
+@pytest.mark.parametrize(
+    ("kind", "launch", "arc"),
+    [
+        ("rest", {"lam0": 0}, 0.0),
+        ("circulation", {"lam0": 0, "v0": 20}, 2 * np.pi),
+        ("asymptotic", {"lam0": "pi/2", "v0": "sqrt(2*9.81)"}, np.pi / 2),
+    ],
+)
+def test_every_kind_can_be_drawn(circle: ModuleType, kind: str, launch: dict[str, object], arc: float) -> None:
+    """Rest, circulation, and a motion that takes for ever: each figure shows the arc that is run through."""
     motion = circle.solve(**launch)
-    for what in ("track", "loads", "portrait"):
-        motion.plot(what).draw_without_rendering()
+    assert motion.kind == kind
+    track, speeds, portrait = (motion.plot(what) for what in ("track", "loads", "portrait"))
+    for figure in (track, speeds, portrait):
+        figure.draw_without_rendering()
+    points = track.axes[0].lines[0].get_xydata()
+    assert np.hypot(*np.diff(points, axis=0).T).sum() == pytest.approx(arc, rel=SHOWN)
+    assert np.ptp(speeds.axes[0].lines[0].get_xdata()) == pytest.approx(arc, rel=SHOWN)
+    curves = [line.get_ydata() for line in portrait.axes[0].lines]
+    assert sum(np.isfinite(curve).any() for curve in curves) > 1
 
 
 def test_notebooks_show_figures(circle: ModuleType) -> None:

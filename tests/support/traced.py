@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -20,7 +21,12 @@ ROUNDING = 1e-15
 DEGREE = 6
 
 
-@cfunc(FIELD, error_model="numpy")
+@cache
+def _compiled(field: Callable[..., None]) -> Any:
+    """Compile a function of this file when a test first needs it, not when the tests are collected."""
+    return cfunc(FIELD, error_model="numpy")(field)
+
+
 def _polynomial(n, xs, zs, p, out):
     """F = sum of p[j, k] x**j z**k and its derivatives."""
     xs, zs, p, out = carray(xs, n), carray(zs, n), carray(p, (DEGREE + 1, DEGREE + 1)), carray(out, (6, n))
@@ -49,7 +55,6 @@ def _polynomial(n, xs, zs, p, out):
 SQUARE, BEND, ROOT, WAVE = range(4)
 
 
-@cfunc(FIELD, error_model="numpy")
 def _other(n, xs, zs, p, out):
     """|x| + |z| - 1, z - x|x|, z - sqrt(x) and z - sin(x), by the number p[0]."""
     xs, zs, p, out = carray(xs, n), carray(zs, n), carray(p, 1), carray(out, (6, n))
@@ -91,7 +96,7 @@ def other(which: int, start: tuple[float, float], domain: tuple[float | None, fl
 
 def _maker(field: Any, start: tuple[float, float], tangent: int, domain: tuple[float | None, float | None]) -> Traced:
     return Traced(
-        field=field.address,
+        field=_compiled(field).address,
         start=lambda op, p: start,
         tangent=tangent,
         level=lambda op, x, z, p: None,  # charts do without extended precision

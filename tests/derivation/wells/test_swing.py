@@ -1,6 +1,7 @@
 """Orbits about an axis as integrals without sines: their times are those of the motion."""
 
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -42,6 +43,13 @@ CASES: dict[str, tuple[gqm.Curve, Any, str]] = {
     "Duffing": (graph("0*x"), gqm.Potential("2*x**2 + 3*x**4"), "1.3"),
     "spring": (graph("x**2/3"), gqm.Gravity() + gqm.Potential("3*(x**2 + (z - 1)**2)"), "1.5"),
 }
+
+
+@cache
+def model_of(name: str) -> gqm.Model:
+    """The model of a case, derived once."""
+    curve, force, _ = CASES[name]
+    return gqm.derive(curve, force)
 
 
 def functions(model: gqm.Model, *forms: sp.Expr | None, by: tuple[sp.Symbol, ...]) -> list[Callable[..., Any]]:
@@ -88,29 +96,28 @@ def by_heights(model: gqm.Model, half: mpf) -> mpf:
 @pytest.mark.parametrize("name", CASES)
 def test_the_time_is_that_of_the_motion(name: str) -> None:
     """Both integrals have the same value."""
-    curve, force, half = CASES[name]
-    model = gqm.derive(curve, force)
+    model, half = model_of(name), CASES[name][-1]
     with mp.workdps(60):
         truth = by_heights(model, mpf(half))
     with mp.workdps(30):
         assert abs(by_swing(model, mpf(half)) / truth - 1) < mpf("1e-20")
 
 
-MEANS = [name for name, (curve, force, _) in CASES.items() if gqm.derive(curve, force).swing.means]  # type: ignore[union-attr]
-CRESTS = [name for name, (curve, force, _) in CASES.items() if gqm.derive(curve, force).swing.crest]  # type: ignore[union-attr]
+MEANS = ["pendulum", "Duffing"]
+CRESTS = [name for name in CASES if name != "root of a wave"]
 
 
 def test_which_have_closed_forms() -> None:
     """Pendulum and Duffing's oscillator are elliptic of the first kind; V**2 = 0 is solved up to squares."""
-    assert MEANS == ["pendulum", "Duffing"]
-    assert set(CASES) - set(CRESTS) == {"root of a wave"}
+    swings = {name: model_of(name).swing for name in CASES}
+    assert [name for name, swing in swings.items() if swing is not None and swing.means] == MEANS
+    assert [name for name, swing in swings.items() if swing is not None and swing.crest] == CRESTS
 
 
 @pytest.mark.parametrize("name", MEANS)
 def test_a_half_period_is_pi_over_a_mean(name: str) -> None:
     """Of two numbers, the arithmetic-geometric one."""
-    curve, force, half = CASES[name]
-    model = gqm.derive(curve, force)
+    model, half = model_of(name), CASES[name][-1]
     assert model.swing is not None
     assert model.swing.means is not None
     with mp.workdps(30):
@@ -124,8 +131,7 @@ def test_a_half_period_is_pi_over_a_mean(name: str) -> None:
 @pytest.mark.parametrize("name", CRESTS)
 def test_where_a_body_comes_to_rest(name: str, share: str) -> None:
     """Launched anywhere in the well, with the V**2 it has there, an orbit has the well's width."""
-    curve, force, half = CASES[name]
-    model = gqm.derive(curve, force)
+    model, half = model_of(name), CASES[name][-1]
     assert model.swing is not None
     assert model.swing.crest is not None
     assert model.symmetry is not None

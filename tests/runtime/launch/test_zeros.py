@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from mpmath import mp, mpf
 
@@ -147,14 +147,13 @@ def test_random_landscapes(
     a, b, c, d, f = abcdf
     heights = {
         "waves": lambda x: a * np.cos(x) + b * np.cos(2 * x + c) + d * np.cos(5 * x + f),
-        "quintic": lambda x: a * x + b * x**2 + c * x**3 + d * x**4 + f * x**5,
+        "quintic": lambda x: x * (a + x * (b + x * (c + x * (d + x * f)))),  # powers would take most of the time
     }
     reach = 7.0
     truth = first_turn(heights[name], start, v0, direction, reach)
     given_ = {"a": a, "b": b, "c": c, "d": d, "f": f}
     what, place, _ = walk(field(name), start, v0, direction, reach, **given_)
-    if truth is None:
-        return
+    assume(truth is not None)  # else the sample cannot tell
     if math.isinf(truth):
         assert what == LIMIT
     else:

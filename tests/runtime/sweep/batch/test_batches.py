@@ -69,6 +69,11 @@ def test_every_pendulum_away_from_the_top_is_answered(count: int, said: str, mod
         assert abs(mpf(float(value)) - truth) <= ULPS * np.spacing(float(truth))
 
 
+# So many of 300 launches are left to be solved one by one where nothing is said of symmetry: they go downhill, far up
+# the other side, and bounds of the slope over the whole way do not prove that nothing stops them before.
+UNPROVED = {1: 50, -1: 49}
+
+
 @pytest.mark.parametrize("said", SAID)
 @pytest.mark.parametrize("way", [1, -1])
 def test_what_is_said_of_symmetry_changes_nothing(way: int, said: str, module_of: ModuleOf) -> None:
@@ -80,7 +85,9 @@ def test_what_is_said_of_symmetry_changes_nothing(way: int, said: str, module_of
     launch = (lowest + place, v0, way, [1.0, 9.81, 1.0], CIRCLE)
     ends, why = answered(module_of("circle"), *launch, asked=quantities.TURNING_POINTS, **SAID[said])
     done = why == quantities.ANSWERED
-    assert done.all() if said == "all" else done.mean() > 0.8
+    left = UNPROVED[way] if said == "nothing" else 0
+    assert np.count_nonzero(~done) == left
+    assert (place[~done] * way < 0).all()
     assert ends[done] == pytest.approx(np.column_stack([lowest - reach, lowest + reach])[done], rel=4e-15, abs=4e-15)
     times, why = answered(module_of("circle"), *launch, asked=quantities.HALF_PERIOD, **SAID[said])
     assert ((why == quantities.ANSWERED) == done).all()
