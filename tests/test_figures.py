@@ -42,10 +42,10 @@ def test_track(circle: ModuleType) -> None:
     assert bar.get_ylabel() == "contact force N (N)"
 
 
-def test_loads(circle: ModuleType) -> None:
+def test_speed_and_force(circle: ModuleType) -> None:
     """Speed above, force below, over the arc from turn to turn."""
     motion = circle.solve(2.5)
-    above, below = motion.plot("loads").axes
+    above, below = motion.plot("speed_and_force").axes
     s, speed = above.lines[0].get_data()
     assert abs((s.max() - s.min()) - 5.0) <= 1e-13
     assert abs(speed.max() - motion.state(motion.period / 4).v.__abs__()) <= 1e-4
@@ -65,13 +65,13 @@ def test_a_liftoff_is_marked_where_it_is(circle: ModuleType) -> None:
 def test_every_kind_can_be_drawn(circle: ModuleType, launch: dict[str, object]) -> None:
     """Rest, circulation, and a motion that takes for ever."""
     motion = circle.solve(**launch)
-    for what in ("track", "loads", "portrait"):
+    for what in ("track", "speed_and_force", "portrait"):
         motion.plot(what).draw_without_rendering()
 
 
 def test_notebooks_show_figures(circle: ModuleType) -> None:
     """Each is a picture to IPython, without pyplot."""
-    for what in ("track", "loads", "portrait"):
+    for what in ("track", "speed_and_force", "portrait"):
         assert circle.solve(1.0).plot(what)._repr_png_().startswith(b"\x89PNG")
 
 
@@ -83,12 +83,12 @@ def test_axes_of_the_caller(circle: ModuleType) -> None:
     axes = figure.subplots()
     assert circle.solve(1.0).plot(axes=axes) is figure
     pair = Figure()
-    assert circle.solve(1.0).plot("loads", axes=pair.subplots(2, 1)) is pair
+    assert circle.solve(1.0).plot("speed_and_force", axes=pair.subplots(2, 1)) is pair
 
 
 def test_an_unknown_figure(circle: ModuleType) -> None:
     """The message lists what there is."""
-    with pytest.raises(InputError, match="plot: what: must be one of track, loads, portrait, got 'map'"):
+    with pytest.raises(InputError, match="plot: what: must be one of track, speed_and_force, portrait, got 'map'"):
         circle.solve(1.0).plot("map")
 
 

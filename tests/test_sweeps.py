@@ -24,7 +24,7 @@ from gqm_sym.runtime.sweep import cluster
 from gqm_sym.runtime.sweep.sweep import QUANTITIES, REASONS
 from gqm_sym.studies import read_sweep, run, sweep_schema
 from gqm_sym.studies.plan import evenly
-from gqm_sym.studies.results import DESCRIBED
+from gqm_sym.studies.results import VARIABLES
 
 CURVES = {
     "swing": "curve: {family: {name: circle, L: L}}\nkernel: {gravity: {}}\nparameters: {L: {value: 1, unit: m}}\n"
@@ -87,7 +87,7 @@ def test_a_grid(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
             assert abs(value - truth) <= ULPS * np.spacing(truth)
     assert data.turning_point_upper.values[:, 0].tolist() == data.lam0.values.tolist()
     assert data.turning_point_lower.values[:, 1] == pytest.approx(-data.lam0.values, rel=4e-16)
-    assert not data.half_period_reason.values.any()
+    assert not data.half_period_status.values.any()
     assert (data.title, data.fixed_v0, data.sweep_file) == ("Pendulums", "0", PERIODS)
     assert data.curve_file == Path("swing.yaml").read_text()
     assert sorted(path.name for path in here.iterdir()) == ["floor.yaml", "periods.nc", "periods.yaml", "swing.yaml"]
@@ -111,13 +111,13 @@ def test_a_table_of_bodies_that_come_to_rest(here: Path) -> None:
     assert data.v_max.values[:2] == pytest.approx(v0, rel=5e-16)
     assert data.normal_force_min.values[:2] == pytest.approx(9.81, rel=1e-15)
     assert data.time_at.values[:2] == pytest.approx((v0 - np.sqrt(v0**2 - 2 * mu * g * 0.1)) / (mu * g), rel=1e-14)
-    assert [REASONS[k] for k in data.period_reason.values[[0, 1]]] == [REASONS[2]] * 2
+    assert [REASONS[k] for k in data.period_status.values[[0, 1]]] == [REASONS[2]] * 2
     assert np.isnan(data.rest_position.values[2])
-    assert "refused" in REASONS[data.rest_position_reason.values[2]]
-    assert data.rest_position_reason.first_refused == (
+    assert "refused" in REASONS[data.rest_position_status.values[2]]
+    assert data.rest_position_status.first_refused == (
         "at v0 = 2.0, mu = 0.5, lam = 0.1: mu_static: must be at least mu = 0.5, got 0.3"
     )
-    assert (data.rest_position.values[3], data.rest_position_reason.values[3]) == (0.0, 0)
+    assert (data.rest_position.values[3], data.rest_position_status.values[3]) == (0.0, 0)
     with xarray.open_zarr("rest.zarr", consolidated=False) as again:
         assert again.load().identical(data)
 
@@ -161,10 +161,14 @@ def test_evenly_spaced_numbers_are_the_nearest_doubles() -> None:
         (
             "[half_period, turning",
             "[time_at, turning",
-            "3:1: 'time_at' needs lam, the place that it asks about; add it",
+            "3:1: 'time_at' needs lam, the place of which it is the time; give lam",
         ),
-        ("grid:", "table: a.csv\ngrid:", "4:1: grid and table are given; give one of them"),
-        ("start: 0.1, ", "", "5:3: grid.lam0: does not say what its values are; give start, stop and num, or values"),
+        ("grid:", "table: a.csv\ngrid:", "4:1: both grid and table are given; give only one of them"),
+        (
+            "start: 0.1, ",
+            "",
+            "5:3: grid.lam0: has no values, or too many keys; give either start, stop and num, or values",
+        ),
         ("num: 30", "num: 30.5", "5:36: grid.lam0.num: must be a whole number from 2 to 10000000, got '30.5'"),
         ("num: 30", "num: 6000000", "6:3: grid: has more than 10000000 points; give fewer values"),
         ("stop: 3", "stop: 1/0", "5:30: grid.lam0.stop: division by zero"),
@@ -175,8 +179,12 @@ def test_evenly_spaced_numbers_are_the_nearest_doubles() -> None:
         ("[50, 100]", "[-50, 100]", "6:3: grid: L must be positive"),
         ("  L: {values: [50, 100], unit: cm}", "  v0: [-1]", "6:3: grid: v0 is a speed and cannot be negative"),
         ("  L: {values: [50, 100], unit: cm}", "  direction: [0]", "6:3: grid: direction must be 1 or -1"),
-        ("grid:", "fixed: {L: 2}\ngrid:", "4:9: fixed: 'L' varies; give its values in one place"),
-        ("grid:", "fixed: {lam: 2}\ngrid:", "3:1: lam is for 'time_at', which is not asked; ask it, or remove lam"),
+        ("grid:", "fixed: {L: 2}\ngrid:", "4:9: fixed: 'L' varies as well; give its values in one place only"),
+        (
+            "grid:",
+            "fixed: {lam: 2}\ngrid:",
+            "3:1: lam is given, but only 'time_at' uses it; add 'time_at' to the quantities",
+        ),
         ("swing.yaml", "floor.yaml", "1:1: mu_static has no value; add fixed: {mu_static: ...}, or let it vary"),
         (PERIODS, "[]", "1:1: the file holds a list, not a mapping; begin with 'curve: ...'"),
         (PERIODS, "", "1:1: the file is empty; give at least curve, quantities and grid"),
@@ -201,9 +209,9 @@ def test_mistakes_have_their_place(line: str, instead: str, message: str, here: 
         ("lam0\n", "'a.csv', row 1: must name the columns"),
         ("lam0,lam0\n1,2\n", "'a.csv', row 1: names a column twice"),
         ("lam0,v0\n1,2\n3\n", "'a.csv', row 3: must have 2 numbers, has 1"),
-        ("lam0,v0\n1,pi\n", "'a.csv', row 2: 'pi' is no finite decimal number"),
-        ("lam0,v0\n1,inf\n", "'a.csv', row 2: 'inf' is no finite decimal number"),
-        ("lam0,v0\n1,1e-400000000\n", "'a.csv', row 2: '1e-400000000' is no finite decimal number"),
+        ("lam0,v0\n1,pi\n", "'a.csv', row 2: 'pi' is not a finite decimal number"),
+        ("lam0,v0\n1,inf\n", "'a.csv', row 2: 'inf' is not a finite decimal number"),
+        ("lam0,v0\n1,1e-400000000\n", "'a.csv', row 2: '1e-400000000' is not a finite decimal number"),
         ("lam0,v_0\n1,2\n", "there is no 'v_0' in swing.yaml; did you mean v0?"),
     ],
 )
@@ -243,7 +251,7 @@ def test_files_that_are_none_are_refused(here: Path) -> None:
 
 def test_every_quantity_has_a_name_and_a_unit() -> None:
     """What is swept is described in the results."""
-    assert set(QUANTITIES) - {"turning_points"} <= set(DESCRIBED)
+    assert set(QUANTITIES) - {"turning_points"} <= set(VARIABLES)
 
 
 def test_the_schema_describes_what_is_read(capsys: pytest.CaptureFixture[str]) -> None:
@@ -329,7 +337,7 @@ def test_an_interruption_says_what_to_do(
 
     monkeypatch.setattr(sweeps, "run", interrupted)
     assert tool.main(["sweep", "periods.yaml"]) == 130
-    assert "what is done is stored; the same command goes on from there" in capsys.readouterr().err
+    assert "the results so far are stored; the same command continues from there" in capsys.readouterr().err
 
 
 def test_what_is_there_is_not_lost(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -341,7 +349,7 @@ def test_what_is_there_is_not_lost(here: Path, capsys: pytest.CaptureFixture[str
     Path("periods.yaml").write_text(PERIODS.replace("num: 30", "num: 3"))
     capsys.readouterr()
     assert tool.main(["sweep", "periods.yaml", "-o", "a.nc"]) == 2
-    assert "a.nc: is there already, and is not of this sweep" in capsys.readouterr().err
+    assert "a.nc: already exists and does not hold the results of this sweep" in capsys.readouterr().err
     Path("notes.nc").write_text("mine")
     assert tool.main(["sweep", "periods.yaml", "-o", "notes.nc"]) == 2
     Path("b.nc.parts").mkdir()

@@ -1,4 +1,4 @@
-"""Sweep files: one question to many launches, stored as it is answered."""
+"""Sweep files: quantities of many motions, computed part by part and stored on disk."""
 
 from gqm_sym.studies.plan import Plan
 from gqm_sym.studies.reader import read_sweep

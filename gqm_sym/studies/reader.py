@@ -1,4 +1,4 @@
-"""Read a sweep file: every mistake at its line, as of a curve file."""
+"""Read a sweep file; every mistake is reported with its line, as for a curve file."""
 
 import difflib
 import re
@@ -21,36 +21,41 @@ from gqm_sym.specfile.locations import locate, node_at, place_of
 from gqm_sym.specfile.nodes import MapNode, Mistakes, plain
 from gqm_sym.specfile.units import check_unit, expected_units, in_si, launch_units, read_unit
 from gqm_sym.specfile.yamltext import read_text, read_tree
-from gqm_sym.studies.plan import SOLVED, SWIFT, Axis, Plan, evenly, in_doubles
-from gqm_sym.studies.schema import MOST_POINTS, SweepFile, model_at
+from gqm_sym.studies.plan import SOLVED_PART, VECTORISED_PART, Axis, Plan, evenly, in_doubles
+from gqm_sym.studies.schema import MAX_POINTS, SweepFile, model_at
 
-SECONDS = 0.5
+MAX_SECONDS = 0.5
 
-# An exponent of more digits would make exact numbers that fill the memory.
+# Exponents have at most three digits: with more, the exact numbers would fill the memory.
 _DECIMAL = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d{1,3})?", re.ASCII)
 _NEEDED = "curve, quantities and grid"
 _LAUNCH = ("lam0", "v0", "direction", "lam")
 
 
 def read_sweep(path: Path | str) -> Plan:
-    """Read a sweep file, and the curve file that it names.
+    """Read a sweep file and the curve file that it names.
 
     Parameters
     ----------
-    path
-        Of a YAML file, at most 64 KiB.
+    path : path
+        The path of a YAML file of at most 64 KiB.
+
+    Returns
+    -------
+    Plan
+        What the sweep computes, for `gqm_sym.studies.run`.
 
     Raises
     ------
     SpecFileError
-        With every mistake, one line each: ``file:line:column: what; what would be right``.
+        If the file has mistakes. Each is one line: ``file:line:column: what is wrong; what would be right``.
     """
     mistakes = Mistakes(path)
     text = read_text(Path(path), mistakes)
     tree = read_tree(text, mistakes, needed=_NEEDED)
     if isinstance(tree, MapNode):
         try:
-            with budget("reading", SECONDS, "write fewer and simpler numbers"):
+            with budget("reading", MAX_SECONDS, "write fewer and simpler numbers"):
                 plan = _Reader(tree, mistakes, text).read()
         except BudgetError as error:
             raise SpecFileError(f"{path}: {error}") from None
@@ -62,7 +67,7 @@ def read_sweep(path: Path | str) -> Plan:
 
 
 class _Reader:
-    """Goes through one file's tree; notes what is wrong and goes on with the rest."""
+    """Reads the tree of one file; after a mistake it continues, so that all mistakes are reported together."""
 
     def __init__(self, tree: MapNode, mistakes: Mistakes, text: str) -> None:
         self.tree, self.mistakes, self.text = tree, mistakes, text
@@ -77,7 +82,7 @@ class _Reader:
             for detail in error.errors(include_url=False, include_input=False):
                 explain(detail, self.tree, self.mistakes, model_at, spoilt=spoilt)
             return None
-        with apart():  # curve files, derivations and emissions have budgets of their own
+        with apart():  # reading the curve file, derivation and emission have time limits of their own
             found = self._curve(file.curve)
             if found is None:
                 return None
@@ -95,7 +100,7 @@ class _Reader:
         notes = {name: note.unit for name, note in spec.notes.items() if note.unit}
         with apart():
             module = emit(model, name=spec.name)
-        swift = not (model.curve.charted or model.dissipation is not None or {"t_max", "contact"} & set(fixed))
+        vectorised = not (model.curve.charted or model.dissipation is not None or {"t_max", "contact"} & set(fixed))
         return Plan(
             title=file.title,
             quantities=tuple(dict.fromkeys(file.quantities)),
@@ -106,11 +111,11 @@ class _Reader:
             name=spec.name,
             module=module,
             origin=self.origin,
-            part=SWIFT if swift else SOLVED,
+            part=VECTORISED_PART if vectorised else SOLVED_PART,
         )
 
     def _curve(self, name: str) -> tuple[Spec, Model] | None:
-        """The curve file, and what is derived from it; its own mistakes are its own."""
+        """Read the curve file and derive its model. Mistakes in that file are raised as errors of that file."""
         try:
             path = path_beside(name, self.folder, wanted="a curve file")
         except InputError as error:
@@ -120,13 +125,17 @@ class _Reader:
         self.origin["curve_file"] = path.read_text(encoding="utf-8-sig")
         return spec, spec.derive()
 
-    # -- what varies, and what does not -----------------------------------------------------------
+    # -- arguments that vary, and arguments that do not ---------------------------------------------
 
     def _axes(self, file: SweepFile) -> list[Axis]:
         given = {"grid", "table"} & file.model_fields_set
         if len(given) != 1:
-            what = "grid and table are given" if given else "grid is missing"
-            remedy = "give one of them" if given else "say what varies, as in grid: {lam0: [0.5, 1]}, or give a table"
+            what = "both grid and table are given" if given else "grid is missing"
+            remedy = (
+                "give only one of them"
+                if given
+                else "give the values that vary, such as grid: {lam0: [0.5, 1]}, or a table"
+            )
             self.mistakes.add(place_of(self.tree, ("table",)), what, remedy)
             return []
         return list(self._grid(file) if "grid" in given else self._table(file))
@@ -142,12 +151,12 @@ class _Reader:
                 exact = [in_si(value, axis.unit) for value in (axis.start, axis.stop)]
                 points *= axis.num
             else:
-                what = f"grid.{name}: does not say what its values are"
-                self.mistakes.add(mark, what, "give start, stop and num, or values")
+                what = f"grid.{name}: has no values, or too many keys"
+                self.mistakes.add(mark, what, "give either start, stop and num, or values")
                 continue
             self._check_unit(name, axis.unit, "grid", name, "unit")
-            if points > MOST_POINTS:
-                self.mistakes.add(mark, f"grid: has more than {MOST_POINTS} points", "give fewer values")
+            if points > MAX_POINTS:
+                self.mistakes.add(mark, f"grid: has more than {MAX_POINTS} points", "give fewer values")
                 return
             values = [read_number(value, where=name).value for value in exact] if "values" in given else None
             yield Axis(name=name, values=evenly(exact[0], exact[1], axis.num) if values is None else np.array(values))
@@ -175,9 +184,9 @@ class _Reader:
             yield Axis(name=column, values=in_doubles(cells, unit))
 
     def _columns(self, name: str, header: list[str], rows: list[list[str]]) -> dict[str, list[str]]:
-        """The cells of a table by its columns, each a finite decimal number."""
+        """Return the cells of each column of a table, after checking that they are finite decimal numbers."""
         if not header or not rows:
-            raise InputError(f"{name!r}, row 1: must name the columns, as in lam0,v0, with values in the rows below")
+            raise InputError(f"{name!r}, row 1: must name the columns, such as lam0,v0, with values in the rows below")
         if len(set(header)) < len(header):
             raise InputError(f"{name!r}, row 1: names a column twice: {', '.join(header)}")
         for number, row in enumerate(rows, start=2):
@@ -185,11 +194,11 @@ class _Reader:
                 raise InputError(f"{name!r}, row {number}: must have {len(header)} numbers, has {len(row)}")
             for cell in row:
                 if not _is_decimal(cell):
-                    raise InputError(f"{name!r}, row {number}: {cell!r:.60} is no finite decimal number")
+                    raise InputError(f"{name!r}, row {number}: {cell!r:.60} is not a finite decimal number")
         return dict(zip(header, map(list, zip(*rows, strict=True)), strict=True))
 
     def _fixed(self, file: SweepFile, spec: Spec) -> dict[str, str]:
-        """What is the same at all points: of the curve file's launch, and of this file."""
+        """Return the arguments that are the same at all points: the launch of the curve file and ``fixed`` here."""
         launch = {key: str(value) for key, value in (spec.launch or {}).items() if key != "point"}
         given = {}
         for name, entry in file.fixed.items():
@@ -201,7 +210,7 @@ class _Reader:
             del launch["contact"]
         return launch | given
 
-    # -- what is wrong with it --------------------------------------------------------------------
+    # -- checks -----------------------------------------------------------------------------------
 
     def _check_unit(self, name: str, unit: str, *path: str) -> None:
         if unit:
@@ -211,7 +220,7 @@ class _Reader:
                 self.mistakes.add(node_at(self.tree, path).mark, f"{'.'.join(path)}: {error}")
 
     def _check_names(self, axes: list[Axis], fixed: dict[str, str], file: SweepFile, spec: Spec, model: Model) -> None:
-        """Note names that nothing is called by, and those that lack a value; of two values, one goes."""
+        """Report unknown names and missing values. A value that varies replaces the one of the curve file."""
         grid = "grid" in file.model_fields_set
         places = {axis.name: ("grid", axis.name) if grid else ("table",) for axis in axes}
         for name, path in [*places.items(), *((name, ("fixed", name)) for name in file.fixed)]:
@@ -219,10 +228,10 @@ class _Reader:
             mark = place_of(self.tree, path)
             if name not in known:
                 near = difflib.get_close_matches(name, known, n=1)
-                remedy = f"did you mean {near[0]}?" if near else f"known are {', '.join(known)}"
+                remedy = f"did you mean {near[0]}?" if near else f"known names are {', '.join(known)}"
                 self.mistakes.add(mark, f"{path[0]}: there is no {name!r} in {spec.path}", remedy)
             elif path[0] == "fixed" and name in places:
-                self.mistakes.add(mark, f"fixed: {name!r} varies", "give its values in one place")
+                self.mistakes.add(mark, f"fixed: {name!r} varies as well", "give its values in one place only")
         for axis in axes:
             fixed.pop(axis.name, None)
         given = {axis.name for axis in axes} | set(fixed)
@@ -230,17 +239,18 @@ class _Reader:
         for name in needed:
             if name not in given:
                 self.mistakes.add(self.tree.mark, f"{name} has no value", f"add fixed: {{{name}: ...}}, or let it vary")
-        asks = "time_at" in file.quantities
-        if asks != ("lam" in given):
+        needs_lam = "time_at" in file.quantities
+        if needs_lam != ("lam" in given):
             what = (
-                "'time_at' needs lam, the place that it asks about"
-                if asks
-                else "lam is for 'time_at', which is not asked"
+                "'time_at' needs lam, the place of which it is the time"
+                if needs_lam
+                else "lam is given, but only 'time_at' uses it"
             )
-            self.mistakes.add(place_of(self.tree, ("quantities",)), what, "add it" if asks else "ask it, or remove lam")
+            remedy = "give lam" if needs_lam else "add 'time_at' to the quantities, or remove lam"
+            self.mistakes.add(place_of(self.tree, ("quantities",)), what, remedy)
 
     def _check_values(self, axes: list[Axis], fixed: Mapping[str, str], model: Model) -> None:
-        """Note values that no motion can have, wherever they are given."""
+        """Report values that no motion can have, wherever they are given."""
         columns = [(axis.name, axis.values, True) for axis in axes]
         columns += [
             (name, np.array([read_number(v, where=name).value]), False)
@@ -263,7 +273,7 @@ class _Reader:
 
 
 def _si(unit: str) -> str:
-    """The SI unit of what is measured in a unit; none for a number."""
+    """Return the SI unit that belongs to a unit; empty for a pure number."""
     return read_unit(unit, where="unit").name if unit != "1" else ""
 
 

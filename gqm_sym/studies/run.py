@@ -1,4 +1,4 @@
-"""Run a sweep: part by part, here or on a cluster, each stored as it is finished."""
+"""Run a sweep part by part, in this process or on a cluster; each part is stored as soon as it is computed."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import partial
@@ -15,43 +15,45 @@ from gqm_sym.runtime.compiled.jit import STAMP
 from gqm_sym.runtime.sweep.cluster import answer, finished
 from gqm_sym.runtime.sweep.sweep import QUANTITIES, REFUSED, Sweep
 from gqm_sym.studies.plan import Plan
-from gqm_sym.studies.results import check_format, dataset, remove, stored, write
+from gqm_sym.studies.results import check_format, dataset, read_results, remove, write
 from gqm_sym.studies.store import Store
 
 if TYPE_CHECKING:
     from xarray import Dataset
 
 
-# Told how many points are done, and of how many.
+# Called with the number of points that are done and the number of all points.
 Progress = Callable[[int, int], None]
 
 
 def run(
     plan: Plan, target: Path | str, *, client: Any = None, force: bool = False, progress: Progress | None = None
 ) -> "Dataset":
-    """Compute a plan into a file; what an interrupted run has stored is not computed again.
+    """Compute a sweep and write its results to a file; an interrupted run is continued.
 
     Parameters
     ----------
     plan : Plan
-        What to compute.
+        What to compute, as `read_sweep` returns it.
     target : path
-        The file, ``.nc`` (netCDF) or ``.zarr``. Until it is complete, parts lie beside it in ``FILE.parts``.
+        The file, ``.nc`` (netCDF) or ``.zarr``. Until it is complete, finished parts are stored beside it in the folder
+        ``FILE.parts``.
     client : distributed.Client, optional
-        A Dask cluster to do the work, with the same numbers.
+        A Dask cluster that does the work. The numbers are the same.
     force : bool
-        Begin anew, whatever is there.
+        Whether to start again and overwrite what is stored.
     progress : callable, optional
-        Told how many points are done, and of how many.
+        Called with the number of points that are done and the number of all points.
 
     Returns
     -------
     xarray.Dataset
+        The results, as they are in the file.
 
     Raises
     ------
     InputError
-        If other results are there.
+        If the file or the folder of parts holds the results of another sweep, or the format is unknown.
     """
     target = Path(target)
     check_format(target)
@@ -59,10 +61,10 @@ def run(
         remove(target)
         remove(Store.folder_of(target))
     elif target.exists():
-        data = stored(target, plan)
+        data = read_results(target, plan)
         if data is None:
-            what = "is there already, and is not of this sweep"
-            raise InputError(f"{target}: {what}; choose another name, or begin anew with force (--force)")
+            what = "already exists and does not hold the results of this sweep"
+            raise InputError(f"{target}: {what}; choose another name, or overwrite it with force=True (--force)")
         remove(Store.folder_of(target))
         return data
     store = Store(target, plan)
@@ -70,21 +72,21 @@ def run(
     write_text(plan.module, source)
     lengths = {number: store.length(number) for number in store.missing()}
     done, missing = plan.size - sum(lengths.values()), list(lengths)
-    tell = progress or (lambda done, size: None)
-    tell(done, plan.size)
+    report = progress or (lambda done, size: None)
+    report(done, plan.size)
     jobs = ((STAMP, str(source), plan.module, plan.name, plan.quantities, plan.arguments(k)) for k in missing)
-    for which, swept in _here(jobs) if client is None else finished(client, answer_all, jobs):
-        store.put(missing[which], swept)
-        done += lengths[missing[which]]
-        tell(done, plan.size)
-    whole = store.whole()
-    data = dataset(plan, whole, {name: _refusal(plan, source, one) for name, one in whole.items()})
+    for number, swept in _computed_here(jobs) if client is None else finished(client, answer_all, jobs):
+        store.put(missing[number], swept)
+        done += lengths[missing[number]]
+        report(done, plan.size)
+    results = store.results()
+    data = dataset(plan, results, {name: _refusal(plan, source, one) for name, one in results.items()})
     write(data, target)
     store.remove()
     return data
 
 
-def _here(jobs: Iterable[tuple[Any, ...]]) -> Iterator[tuple[int, dict[str, Sweep]]]:
+def _computed_here(jobs: Iterable[tuple[Any, ...]]) -> Iterator[tuple[int, dict[str, Sweep]]]:
     for number, job in enumerate(jobs):
         yield number, answer_all(*job)
 
@@ -92,7 +94,7 @@ def _here(jobs: Iterable[tuple[Any, ...]]) -> Iterator[tuple[int, dict[str, Swee
 def answer_all(
     stamp: str, source: str, text: str, name: str, quantities: tuple[str, ...], arguments: Mapping[str, Any]
 ) -> dict[str, Sweep]:
-    """Answer one part, here or on a worker: every quantity at each of its points. Parameters as of `cluster.answer`."""
+    """Compute every quantity at each point of one part, here or on a worker; arguments as for `cluster.answer`."""
     out = {}
     for quantity in quantities:
         given = {key: value for key, value in arguments.items() if key != "lam" or quantity == "time_at"}
@@ -100,10 +102,10 @@ def answer_all(
     return out
 
 
-def _answered(ask: Callable[[Mapping[str, Any]], Sweep], quantity: str, arguments: Mapping[str, Any]) -> Sweep:
-    """Values and reasons; points that cannot be are found by halving, and do not stop the others."""
+def _answered(compute: Callable[[Mapping[str, Any]], Sweep], quantity: str, arguments: Mapping[str, Any]) -> Sweep:
+    """Return values and status. Bisection isolates points with invalid arguments, so that the others are computed."""
     try:
-        return ask(arguments)
+        return compute(arguments)
     except InputError:
         arrays = {key: value for key, value in arguments.items() if isinstance(value, np.ndarray)}
         size = next(iter(arrays.values())).size
@@ -111,13 +113,13 @@ def _answered(ask: Callable[[Mapping[str, Any]], Sweep], quantity: str, argument
             shape = (1, 2) if isinstance(QUANTITIES[quantity].columns, slice) else (1,)
             return Sweep(np.full(shape, nan), np.full(1, REFUSED, dtype=np.int8))
         cuts = slice(0, size // 2), slice(size // 2, size)
-        halves = [_answered(ask, quantity, {**arguments, **{k: a[cut] for k, a in arrays.items()}}) for cut in cuts]
+        halves = [_answered(compute, quantity, {**arguments, **{k: a[cut] for k, a in arrays.items()}}) for cut in cuts]
         return Sweep(*(np.concatenate(both) for both in zip(*halves, strict=True)))
 
 
 def _refusal(plan: Plan, source: Path, swept: Sweep) -> str:
-    """Why the first of the launches that are refused is, in words; empty where none is."""
-    refused = np.flatnonzero(swept.reasons == REFUSED)
+    """Return why the first refused launch is refused; empty if none is."""
+    refused = np.flatnonzero(swept[1] == REFUSED)
     if not refused.size:
         return ""
     given = plan.point(int(refused[0]))

@@ -1,4 +1,4 @@
-"""The shape of a sweep file, as `specfile.schema` has that of a curve file."""
+"""The structure of a sweep file; `specfile.schema` describes that of a curve file."""
 
 from typing import Annotated, Any, Literal, TypeAlias
 
@@ -10,72 +10,79 @@ from gqm_sym.specfile.fields import ABSENT, Line, Number, Section, UnitText, wra
 from gqm_sym.specfile.nodes import shown
 from gqm_sym.specfile.schema import Quantity, json_schema, read_default
 
-MOST_POINTS = 10**7
+MAX_POINTS = 10**7
 
 
 def _read_count(value: object) -> object:
     text = str(value)
-    if not (text.isascii() and text.isdigit() and len(text) <= 9 and 2 <= int(text) <= MOST_POINTS):
-        what = f"must be a whole number from 2 to {MOST_POINTS}, got {shown(text)}"
+    if not (text.isascii() and text.isdigit() and len(text) <= 9 and 2 <= int(text) <= MAX_POINTS):
+        what = f"must be a whole number from 2 to {MAX_POINTS}, got {shown(text)}"
         raise PydanticCustomError("gqm", "{what}", {"what": what, "column": 0})
     return int(text)
 
 
-_COUNT = {"type": "integer", "minimum": 2, "maximum": MOST_POINTS}
+_COUNT = {"type": "integer", "minimum": 2, "maximum": MAX_POINTS}
 Count: TypeAlias = Annotated[int, BeforeValidator(_read_count), WithJsonSchema(_COUNT)]
-Asked: TypeAlias = Literal[tuple(QUANTITIES)]  # type: ignore[valid-type]
+QuantityName: TypeAlias = Literal[tuple(QUANTITIES)]  # type: ignore[valid-type]
 Name: TypeAlias = str
 
 
 class Axis(Section):
-    """The values that one thing takes: evenly from start to stop, both included, or a list; which alone will do."""
+    """The values of one argument: start, stop and num for evenly spaced values with both ends, or a list of values."""
 
     start: Number = Field(default=ABSENT, description="the first value", examples=["0.1"])
     stop: Number = Field(default=ABSENT, description="the last value", examples=["3"])
-    num: Count = Field(default=ABSENT, description="how many values", examples=[300])
-    values: list[Number] = Field(default=ABSENT, description="instead of those: the values", examples=[[0.5, 1, 2]])
-    unit: UnitText = Field(default="", description="converted to SI", examples=["cm", "deg"])
+    num: Count = Field(default=ABSENT, description="number of values", examples=[300])
+    values: list[Number] = Field(
+        default=ABSENT, description="the values themselves, instead of start, stop and num", examples=[[0.5, 1, 2]]
+    )
+    unit: UnitText = Field(
+        default="", description="unit of the values, which are converted to SI", examples=["cm", "deg"]
+    )
 
 
 class Table(Section):
-    """A CSV file whose first line names its columns; its path alone will do."""
+    """A CSV file whose first line names its columns. The path alone may stand for the mapping."""
 
-    file: Line = Field(description="path from this file's folder on, inside it", examples=["launches.csv"])
+    file: Line = Field(
+        description="path relative to the folder of this file, and inside that folder", examples=["launches.csv"]
+    )
     units: dict[Name, UnitText] = Field(
         default_factory=dict, description="units of columns, converted to SI", examples=[{"L": "cm"}]
     )
 
 
 class SweepFile(Section):
-    """Quantities of the motions that many launches on one curve begin."""
+    """Quantities of the motions of many launches on one curve."""
 
-    title: Line = Field(default="", description="one line for people")
+    title: Line = Field(default="", description="one line of description")
     curve: Line = Field(
-        description="the curve file: its path from this file's folder on, inside it", examples=["pendulum.yaml"]
+        description="the curve file: its path relative to the folder of this file, and inside that folder",
+        examples=["pendulum.yaml"],
     )
-    quantities: Annotated[list[Asked], Field(min_length=1)] = Field(
-        description="what is asked of each motion", examples=[["half_period", "v_max"]]
+    quantities: Annotated[list[QuantityName], Field(min_length=1)] = Field(
+        description="the quantities to compute for each motion", examples=[["half_period", "v_max"]]
     )
     grid: dict[Name, Annotated[Axis, wrapped("values", list)]] = Field(
         default=ABSENT,
-        description="all combinations of these values of lam0, v0, direction, lam (for time_at) and parameters",
+        description="values of lam0, v0, direction, lam (for time_at) and parameters; all combinations are computed",
         examples=[{"lam0": {"start": "0.1", "stop": "3", "num": 300}}],
     )
     table: Annotated[Table, wrapped("file", str)] = Field(
-        default=ABSENT, description="instead of a grid: one point a row", examples=["launches.csv"]
+        default=ABSENT, description="instead of a grid: a table with one point per row", examples=["launches.csv"]
     )
     fixed: dict[Name, Annotated[Quantity, BeforeValidator(read_default)]] = Field(
         default_factory=dict,
-        description="launch, t_max and parameters that are the same at all points, where the curve file has others",
+        description="launch, t_max and parameters that are the same at all points and replace those of the curve file",
         examples=[{"v0": "1.5"}],
     )
     contact: Literal["bilateral", "above", "below"] = Field(
-        default=ABSENT, description="which side of the track can push, where the curve file says otherwise"
+        default=ABSENT, description="the side of the track on which the body runs; replaces that of the curve file"
     )
 
 
 def model_at(path: tuple[str, ...]) -> Any:
-    """Return the model of the mapping at a place of the file; None if there is none there."""
+    """Return the model of the mapping at a path in the file, or None if there is no mapping."""
     match path:
         case ():
             return SweepFile
