@@ -1,7 +1,7 @@
-"""Where the time of one call goes: a solve, a place, a state, a leg, an orbit of a sweep.
+"""The time that each step of a call takes: a solve, a position, a state, a leg, an orbit of a sweep.
 
-Each row is the least of many short runs in one process, so that other work on the machine weighs little; the numbers
-are for reading, not for passing. ``make bench`` puts them into ``docs/benchmarks.md``.
+Each row is the shortest of many runs in one process, which other work on the machine affects least. The numbers are for
+information and are not tested. ``make bench`` writes them to ``docs/benchmarks.md``.
 """
 
 from math import inf
@@ -26,7 +26,7 @@ from gqm_sym.runtime.sweep.batch import batches, rows, times, turning_points
 
 
 def conservative() -> list[tuple[str, float]]:
-    """Parts of a pendulum's solve, and what is asked of its motion."""
+    """Return the steps of solving a pendulum, and of questions about its motion."""
     model, given = pendulum.MODEL, tuple(pendulum.PARAMETERS.values())
     p = model.numbers(given)
     launch = read_launch(model, p, LaunchRequest(-0.37))
@@ -41,11 +41,11 @@ def conservative() -> list[tuple[str, float]]:
 
     return [
         ("`solve` of a pendulum, released from rest", least(lambda: pendulum.solve(-0.37))),
-        ("- parameters read, from the cache", least(lambda: model.numbers(given))),
-        ("- launch checked", least(lambda: read_launch(model, p, LaunchRequest(-0.37)))),
-        ("- functions and the exact problem", least(lambda: bind(model, p, launch))),
+        ("- reading the parameters, from the cache", least(lambda: model.numbers(given))),
+        ("- checking the launch", least(lambda: read_launch(model, p, LaunchRequest(-0.37)))),
+        ("- binding the functions and the exact problem", least(lambda: bind(model, p, launch))),
         (
-            "- the crossing: turning points, kind, half period",
+            "- compiled code: turning points, kind, half period",
             least(lambda: survey(f.addresses, f.p, -0.37, 0.0, 1, low, high, period, place, step)),
         ),
         ("`lam` at one time", least(lambda: motion.lam(1000.0))),
@@ -53,17 +53,17 @@ def conservative() -> list[tuple[str, float]]:
         ("`solve` and the first `lam`", least(lambda: first("lam"))),
         ("`solve` and the first `state`", least(lambda: first("state"))),
         (
-            "- panels of time",
+            "- panels of the time integral",
             least(
                 lambda: time_panels.lay_panels(f.addresses, f.p, 0, stretch.a, stretch.b, 0.0, 0.0, panels[0][[0, -1]])
             ),
         ),
-        ("- table of the anomaly", least(lambda: table.build_table(panels[0], *clock, panels[3]))),
+        ("- table that inverts time", least(lambda: table.build_table(panels[0], *clock, panels[3]))),
     ]
 
 
 def dissipative() -> list[tuple[str, float]]:
-    """Parts of the first leg of the paper's Example 2."""
+    """Return the steps of the first leg of the paper's Example 2."""
     model = friction.MODEL
     p = model.numbers(tuple(friction.PARAMETERS.values()))
     loss = model.dissipation
@@ -75,15 +75,15 @@ def dissipative() -> list[tuple[str, float]]:
     run = Run(-1.0, ahead, count, record, what, "turn", 0)
     back, time = run.panels_back, run.pair(BEFORE)[1]
     return [
-        ("`solve` of Example 2: its leg to the turn", least(lambda: friction.solve(-1.0, 6.2088))),
-        ("- the crossing: the leg, its events, its time", least(lambda: follow.follow(*leg))),
-        ("the leg's panels read, when a position is asked for", least(lambda: read_panels(back, time))),
+        ("`solve` of Example 2, to its turning point", least(lambda: friction.solve(-1.0, 6.2088))),
+        ("- compiled code: the leg, its events and its time", least(lambda: follow.follow(*leg))),
+        ("reading the panels of the leg, for the first position", least(lambda: read_panels(back, time))),
         ("`solve` and the first `lam`", least(lambda: friction.solve(-1.0, 6.2088).lam(0.1), 5)),
     ]
 
 
 def sweeping() -> list[tuple[str, float]]:
-    """Parts of an orbit's share of a sweep over pendulums, on one core."""
+    """Return the steps of one orbit in a sweep over pendulums, on one core."""
     each, n = pendulum.MODEL.each, rows.BATCH
     fns, held = each.addresses(), (each.held, each.top_held)
     launch, seek, turn_round, prove = (
@@ -133,23 +133,26 @@ def sweeping() -> list[tuple[str, float]]:
     found[rows.B] = found[rows.START] + found[rows.MOST]
     return [
         (
-            "an orbit of a sweep: its turning points, in closed form",
+            "turning points of an orbit in a sweep: in closed form",
             least(lambda: search(s, start, p, known, True, work)) / n,
         ),
-        ("- guessed by Newton's method", least(lambda: search(s, start, p, known, False, work)) / n),
-        ("- proved by intervals, where symbols do not tell", least(lambda: proof(s, found, p, work)) / n),
-        ("- its half period by a mean", least(lambda: mean(s, found, given, work, out, reasons)) / n),
+        ("- by Newton's method, without proof", least(lambda: search(s, start, p, known, False, work)) / n),
+        ("- proof by intervals, where symbols do not suffice", least(lambda: proof(s, found, p, work)) / n),
         (
-            "- by the trapezoidal rule, error controlled",
+            "half period of an orbit in a sweep: by an arithmetic-geometric mean",
+            least(lambda: mean(s, found, given, work, out, reasons)) / n,
+        ),
+        (
+            "- by the trapezoidal rule, with error control",
             least(lambda: clock(s, found, flat, given, work, chosen, out, reasons)) / n,
         ),
     ]
 
 
 def profile() -> list[str]:
-    """Give the table, line by line."""
+    """Return the lines of the table."""
     rows = conservative() + dissipative() + sweeping()
-    return ["| what | least time |", "|---|---|", *(f"| {what} | {readable(time)} |" for what, time in rows)]
+    return ["| step | shortest time |", "|---|---|", *(f"| {what} | {readable(time)} |" for what, time in rows)]
 
 
 if __name__ == "__main__":

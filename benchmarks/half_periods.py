@@ -25,7 +25,7 @@ ORBITS = 100_000
 
 
 def half_periods() -> list[Row]:
-    """Half periods, one by one and in a sweep."""
+    """Return the rows for half periods, one by one and in a sweep."""
     amplitudes = np.random.default_rng(1).uniform(0.05, 2.5, ORBITS)
     lam0 = amplitudes - pi / 2
     # The sweep is given doubles, so its amplitudes are what those mean.
@@ -81,7 +81,7 @@ def half_periods() -> list[Row]:
             unit="ulp",
         ),
         Row(
-            "the same, its turning points alone",
+            "turning points of an orbit",
             ours,
             on_one_core(lambda: pendulum.sweep("turning_points", lam0).values),
             lambda values: ulps(values[:300, 0], [-mp.pi - mpf(float(v)) for v in lam0[:300]]),
@@ -90,7 +90,7 @@ def half_periods() -> list[Row]:
             unit="ulp",
         ),
         Row(
-            "the greatest contact force on an orbit",
+            "largest contact force on an orbit",
             ours,
             on_one_core(lambda: pendulum.sweep("normal_force_max", lam0).values),
             lambda values: ulps(values, [mpf(G) * (3 - 2 * mp.cos(mpf(float(v)) + mp.pi / 2)) for v in lam0[:300]]),
@@ -99,7 +99,7 @@ def half_periods() -> list[Row]:
             unit="ulp",
         ),
         Row(
-            "when a body is first at the bottom",
+            "first time at the lowest point",
             ours,
             on_one_core(lambda: pendulum.sweep("time_at", lam0, lam=-pi / 2).values),
             lambda values: ulps(values, [half / 2 for half in exact]),
@@ -118,7 +118,7 @@ def half_periods() -> list[Row]:
         ),
         Row(
             work,
-            "one launch after the other in a compiled loop, turning points found",
+            "a compiled loop over single launches, turning points found",
             lambda: in_a_loop(f.addresses, f.p, few - pi / 2, known),
             lambda values: ulps(values, alone),
             each=100,
@@ -153,7 +153,7 @@ def half_periods() -> list[Row]:
         ),
         Row(
             work,
-            "QUADPACK on the raw integrand, in Python, turning points given",
+            "QUADPACK on the singular integrand, in Python, turning points given",
             lambda: [raw(a) for a in few],
             lambda values: ulps(values, truths),
             each=100,
@@ -169,7 +169,7 @@ def half_periods() -> list[Row]:
 
 
 def launched(amplitudes: Any, ours: str) -> list[Row]:
-    """The same orbits from anywhere on them, with the speed there; the truth is that of doubles."""
+    """Return rows for the same orbits, launched at random places; the references use those doubles."""
     lam0 = amplitudes * np.random.default_rng(2).uniform(-1.0, 1.0, ORBITS)
     v0 = np.sqrt(2 * 9.81 * (np.cos(lam0) - np.cos(amplitudes)))
 
@@ -192,7 +192,7 @@ def launched(amplitudes: Any, ours: str) -> list[Row]:
 
 
 def on_an_ellipse(ours: str) -> list[Row]:
-    """Half periods on an ellipse twice as wide as it is high, of orbits that need up to 32 nodes between turns."""
+    """Return rows for an ellipse twice as wide as high, with orbits that need up to 32 nodes."""
     a, b = 2.0, 1.0
     amplitudes = np.random.default_rng(3).uniform(0.05, 1.2, ORBITS)
 
