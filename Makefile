@@ -33,9 +33,10 @@ current:
 site:
 	$(BIN)/python -m sphinx -W --keep-going --quiet -D nb_execution_mode=off -b html docs docs/_build/lint
 
-generate: $(VENV)/.dev ## write generated/ afresh from curves/, and the pages of the families
+generate: $(VENV)/.dev ## write generated/ afresh from curves/, and the pages made from the code
 	$(BIN)/gqm-gen --quiet -o generated curves/*.yaml
 	$(BIN)/python scripts/make_family_pages.py
+	$(BIN)/python docs/made.py
 
 docs: $(VENV)/.docs ## build the documentation into docs/_build/html; a warning is an error
 	$(BIN)/python -m sphinx -W --keep-going --quiet -b html docs docs/_build/html

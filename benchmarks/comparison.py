@@ -1,7 +1,7 @@
-"""Side by side: this package and its alternatives, accuracy beside time, in one process; run by ``make bench``.
+"""Accuracy and time of this package and its alternatives, measured in one process; run by ``make bench``.
 
-All errors are against truths of 40 digits. A row of ours fails the run when its accuracy misses its line; times
-never do. Writes ``docs/benchmarks.md``.
+All errors are differences from references of 40 digits. The run fails if the error of one of our rows exceeds its
+limit, whatever the times. Writes ``docs/benchmarks.md``.
 """
 
 import argparse
@@ -28,25 +28,29 @@ def page(results: list[Result], start: tuple[float, float]) -> str:
     lines = [
         "# Benchmarks",
         "",
-        "Made by `make bench`; errors are the worst of some hundred, against closed forms in 40 digits. Times are",
-        f"medians on {platform.machine()}, Python {platform.python_version()}; compare them with each other.",
+        "Written by `make bench`. Each error is the largest of some hundred cases, compared with closed forms of 40",
+        f"digits. Times are medians on {platform.machine()} with Python {platform.python_version()};",
+        "only their ratios are meaningful.",
         "",
-        "| work | by | time | error | against ours |",
+        "| work | method | time | error | time relative to ours |",
         "|---|---|---|---|---|",
     ]
     ours: dict[str, float] = {}
     for result in results:
         row = result.row
         ratio = result.seconds / ours.setdefault(row.work, result.seconds)
-        wrong = f"{result.error:.2g} {row.unit}" + (f" **misses {row.line:g}**" if result.missed else "")
+        wrong = f"{result.error:.2g} {row.unit}" + (f" **exceeds {row.line:g}**" if result.missed else "")
         lines.append(f"| {row.work} | {row.who} | {readable(result.seconds)} | {wrong} | {ratio:.3g} |")
-    lines += ["", f"Start, in a second process: `import numba` {start[0]:.2f} s, from there to a solved pendulum"]
-    lines += [f"{start[1]:.2f} s.", ""]
-    lines += [f"- {peer}: {presence(peer)}" for peer in PEERS]
-    lines += ["", "## Where the time goes", "", "From Python, one core, the least of many runs.", "", *profile()]
     lines += [
         "",
-        "## How it grows",
+        f"Start of a second process: `import numba` takes {start[0]:.2f} s, and from there to a solved pendulum",
+    ]
+    lines += [f"{start[1]:.2f} s.", ""]
+    lines += [f"- {peer}: {presence(peer)}" for peer in PEERS]
+    lines += ["", "## Where the time goes", "", "The shortest of many runs from Python, on one core.", "", *profile()]
+    lines += [
+        "",
+        "## How the cost grows",
         "",
         "![Cost against time, legs, launches and length of formulas](figures/scale.svg)",
     ]
@@ -54,11 +58,11 @@ def page(results: list[Result], start: tuple[float, float]) -> str:
 
 
 def main() -> int:
-    """Measure all rows, write the page, and fail if an accuracy of ours misses its line."""
+    """Measure all rows, write the page, and fail if the error of one of our rows exceeds its limit."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("-o", "--output", type=Path, default=PAGE)
     output = parser.parse_args().output
-    warnings.simplefilter("ignore", IntegrationWarning)  # what QUADPACK doubts, the errors show
+    warnings.simplefilter("ignore", IntegrationWarning)  # the errors show what QUADPACK warns about
     results = []
     for row in [*half_periods(), *sampling(), *legs(), *load_maps()]:
         results.append(measured(row))
@@ -66,7 +70,7 @@ def main() -> int:
     output.write_text(page(results, second_process()), encoding="utf-8")
     missed = [result.row for result in results if result.missed]
     for row in missed:
-        print(f"{row.work}, {row.who}: the error misses its line, {row.line:g} {row.unit}", file=sys.stderr)
+        print(f"{row.work}, {row.who}: the error exceeds its limit, {row.line:g} {row.unit}", file=sys.stderr)
     return 1 if missed else 0
 
 

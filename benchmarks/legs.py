@@ -17,7 +17,7 @@ START, SPEED, G, MU = -1.0, 6.2088, 9.81, 0.1
 
 
 def by_integrator() -> tuple[float, float]:
-    """Time and place of the turn by DOP853, one stretch for each sign of the contact force."""
+    """Return time and place of the turning point by DOP853, run separately for each sign of the contact force."""
 
     def forces(y: Any) -> tuple[float, float, float]:
         ds = sqrt(1 + 9 * y[0] ** 4)
@@ -46,7 +46,7 @@ def by_integrator() -> tuple[float, float]:
 
 
 def legs() -> list[Row]:
-    """Ours, an integrator with events, and those of others."""
+    """Return the rows for this package, DOP853 with events, and installed peers."""
     cases = json.loads(CASES.read_text(encoding="utf-8"))["cases"]
     (known,) = (case["expected"]["events"] for case in cases if case["id"] == "example2_cubic_coulomb")
     (turn,) = (event for event in known if event["leg"] == 1 and event["kind"] == "turning_point")
@@ -63,7 +63,7 @@ def legs() -> list[Row]:
     return [
         Row(
             work,
-            "`solve`: the leg, its contact change, its turn, its time",
+            "`solve`: leg, contact change, turning point and time",
             repeated(lambda: cubic.solve(START, SPEED), 100),
             told,
             each=100,
@@ -71,5 +71,5 @@ def legs() -> list[Row]:
             unit="s and m",
         ),
         *peers.example2(work, error),
-        Row(work, "DOP853 with events, a tolerance of 1e-13", by_integrator, error, unit="s and m"),
+        Row(work, "DOP853 with events, tolerance 1e-13", by_integrator, error, unit="s and m"),
     ]

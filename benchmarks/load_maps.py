@@ -1,4 +1,4 @@
-"""Pass 1 over many places, for all families: beside loops written by hand, and lambdified NumPy."""
+"""Pass 1 at many places, for all families, compared with hand-written loops and lambdified NumPy."""
 
 import importlib
 from collections.abc import Callable
@@ -55,7 +55,7 @@ def quartic(u):  # type: ignore[no-untyped-def]  # noqa: D103
 
 
 class Range(NamedTuple):
-    """A family's textbook formulas, and the places to look at."""
+    """Return the textbook formulas of a family, and the places at which they are evaluated."""
 
     form: Callable[..., Any]
     low: float
@@ -74,7 +74,7 @@ RANGES = (
 
 
 def by_hand(form: Callable[..., Any]) -> Callable[..., Any]:
-    """Give the loop that one would write over textbook formulas."""
+    """Return the loop that one would write from textbook formulas."""
     inner = njit(error_model="numpy")(form)
 
     @njit(error_model="numpy")
@@ -92,7 +92,7 @@ def by_hand(form: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def lambdified(form: Callable[..., Any], count: int) -> Callable[..., Any]:
-    """Give what SymPy prints of the same formulas for NumPy."""
+    """Return the same formulas as SymPy prints them for NumPy."""
     u, start, v0, g, m, *p = sp.symbols(f"u start v0 g m p:{count}", positive=True)
     of = FunctionType(form.__code__, {name: getattr(sp, name, None) for name in form.__code__.co_names})
     x, z, ds, kappa, slope = of(u, *p)
@@ -104,7 +104,7 @@ def lambdified(form: Callable[..., Any], count: int) -> Callable[..., Any]:
 
 
 def truths(form: Callable[..., Any], lam: Any, lam0: float, p: tuple[float, ...], g: float, m: float) -> list[mpf]:
-    """Contact forces in 40 digits."""
+    """Return contact forces to 40 digits."""
     of = FunctionType(form.__code__, {name: getattr(mp, name, None) for name in form.__code__.co_names})
     exact = tuple(map(mpf, p))
     top = mpf(SPEED) ** 2 + 2 * mpf(g) * of(mpf(lam0), *exact)[1]
@@ -116,7 +116,7 @@ def truths(form: Callable[..., Any], lam: Any, lam0: float, p: tuple[float, ...]
 
 
 def rows_of(family: Range) -> list[Row]:
-    """Some ways to one family's load map."""
+    """Return the rows for the load map of one family."""
     name = family.form.__name__
     module = importlib.import_module(f"generated.{name}")
     given = {key: float(value) for key, value in module.PARAMETERS.items()}
@@ -131,18 +131,18 @@ def rows_of(family: Range) -> list[Row]:
         return apart(np.asarray(values[5])[few], known, scale)
 
     loop, printed = by_hand(family.form), lambdified(family.form, len(p))
-    work = f"load map, {name.replace('_', ' ')}, a place"
+    work = f"load map, {name.replace('_', ' ')}, per place"
     field = module.pass1(lam, lam0, SPEED)
     calls: tuple[tuple[str, Callable[[], Any], float], ...] = (
         ("`pass1`, one core", on_one_core(lambda: module.pass1(lam, lam0, SPEED)), 1e-15),
         ("`pass1(..., out=field)`, one core", on_one_core(lambda: module.pass1(lam, lam0, SPEED, out=field)), 1e-15),
         ("`pass1`, all cores", lambda: module.pass1(lam, lam0, SPEED), 1e-15),
-        ("a numba loop by hand, one core", lambda: loop(lam, lam0, SPEED, p, g, m), np.inf),
+        ("a hand-written numba loop, one core", lambda: loop(lam, lam0, SPEED, p, g, m), np.inf),
         ("`lambdify(..., cse=True)` to NumPy", lambda: printed(lam, lam0, SPEED, p, g, m), np.inf),
     )
     return [Row(work, who, call, error, each=PLACES, line=line, unit="of scale") for who, call, line in calls]
 
 
 def load_maps() -> list[Row]:
-    """Rows of all families."""
+    """Return the rows of all families."""
     return [row for family in RANGES for row in rows_of(family)]

@@ -1,4 +1,4 @@
-"""What a benchmark row is, how it is timed, and how its error is measured."""
+"""Rows of the benchmarks: how they are timed, and how their errors are measured."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -14,7 +14,7 @@ from mpmath import mp, mpf
 from gqm_sym.runtime.compiled import threads
 
 Work = Callable[[], Any]
-# Digits of all truths.
+# Digits of all reference values.
 mp.dps = 40
 
 
@@ -22,7 +22,7 @@ mp.dps = 40
 class Row:
     """One way of doing some work.
 
-    ``each`` is how many results a call gives, ``line`` the error it may have (ours only), ``unit`` what errors are in.
+    ``each`` is the number of results of a call, ``line`` the limit of its error (ours only), ``unit`` that of errors.
     """
 
     work: str
@@ -37,7 +37,7 @@ class Row:
 
 @dataclass(frozen=True)
 class Result:
-    """A row with what was measured."""
+    """A row with its measurements."""
 
     row: Row
     seconds: float
@@ -45,12 +45,12 @@ class Result:
 
     @property
     def missed(self) -> bool:
-        """Whether the accuracy misses the row's line."""
+        """Whether the error exceeds the limit of the row."""
         return not self.error <= self.row.line
 
 
 def measured(row: Row) -> Result:
-    """Time a row: the median of some calls after a first."""
+    """Measure a row: the median time of some calls, after a first call that is not counted."""
     value = row.call()
     times = []
     for _ in range(row.repeats):
@@ -61,7 +61,7 @@ def measured(row: Row) -> Result:
 
 
 def least(work: Work, count: int = 20, repeats: int = 300) -> float:
-    """Return the least time of one call, in seconds: other work on the machine weighs little in it."""
+    """Return the shortest time of one call in seconds, which other work on the machine affects least."""
     times = []
     for _ in range(repeats):
         start = perf_counter()
@@ -72,19 +72,19 @@ def least(work: Work, count: int = 20, repeats: int = 300) -> float:
 
 
 def ulps(values: Any, truths: list[mpf]) -> float:
-    """Worst error in units of the last place."""
+    """Return the largest error in units of the last place."""
     return max(
         float(abs(mpf(float(v)) - t)) / float(np.spacing(abs(float(t)))) for v, t in zip(values, truths, strict=False)
     )
 
 
 def apart(values: Any, truths: list[mpf], scale: float) -> float:
-    """Worst error as a share of a scale."""
+    """Return the largest error relative to a scale."""
     return max(float(abs(mpf(float(v)) - t)) / scale for v, t in zip(values, truths, strict=False))
 
 
 def readable(seconds: float) -> str:
-    """Write a time with its unit."""
+    """Return a time as text with its unit."""
     for unit, size in (("s", 1.0), ("ms", 1e-3), ("µs", 1e-6)):
         if seconds >= size:
             return f"{seconds / size:.3g} {unit}"
@@ -93,7 +93,7 @@ def readable(seconds: float) -> str:
 
 @contextmanager
 def one_core() -> Iterator[None]:
-    """Keep compiled loops on one core."""
+    """Restrict compiled loops to one core."""
     kept = threads.cores
     threads.cores = lambda: 1
     try:
@@ -103,7 +103,7 @@ def one_core() -> Iterator[None]:
 
 
 def on_one_core(call: Work) -> Work:
-    """Give the same work, done on one core."""
+    """Return the same work, restricted to one core."""
 
     def limited() -> Any:
         with one_core():
@@ -113,7 +113,7 @@ def on_one_core(call: Work) -> Work:
 
 
 def repeated(call: Work, count: int) -> Work:
-    """Give the same work, done some times over."""
+    """Return the same work, repeated several times."""
 
     def many() -> Any:
         for _ in range(count - 1):

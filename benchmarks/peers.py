@@ -1,4 +1,4 @@
-"""Rows of other programs that not every machine can install; the page says which are absent."""
+"""Rows for programs that cannot be installed on every machine; the page says which are absent."""
 
 import importlib
 import importlib.util
@@ -21,7 +21,7 @@ Amplitudes = NDArray[np.float64]
 
 
 def heyoka_half_periods(work: str, amplitudes: Amplitudes, error: Error) -> list[Row]:
-    """Give its compiled function of our formula, and its integrator on Legendre's form, both in batches."""
+    """Return rows for its compiled function of our formula and its integrator on Legendre's form, both in batches."""
     hy = importlib.import_module("heyoka")
     a, tau = hy.make_vars("a"), hy.make_vars("tau")
     terms = [1 / hy.sqrt(hy.sin(a) / a)]
@@ -60,7 +60,7 @@ def heyoka_half_periods(work: str, amplitudes: Amplitudes, error: Error) -> list
 
 
 def quadax_half_periods(work: str, amplitudes: Amplitudes, error: Error) -> list[Row]:
-    """Give its Gauss-Kronrod rule on Legendre's form, mapped over orbits and compiled by JAX."""
+    """Return the row for its Gauss-Kronrod rule on Legendre's form, mapped over orbits and compiled by JAX."""
     jax = importlib.import_module("jax")
     jax.config.update("jax_enable_x64", True)
     jnp, rule = importlib.import_module("jax.numpy"), importlib.import_module("quadax").quadgk
@@ -75,29 +75,29 @@ def quadax_half_periods(work: str, amplitudes: Amplitudes, error: Error) -> list
 
 
 def half_periods(work: str, amplitudes: Amplitudes, error: Error) -> list[Row]:
-    """Give the rows of the peers that are installed."""
+    """Return the rows of the installed peers."""
     rows = heyoka_half_periods(work, amplitudes, error) if has("heyoka") else []
     return rows + (quadax_half_periods(work, amplitudes, error) if has("quadax") else [])
 
 
 def swing(lam0: float) -> Any:
-    """Give heyoka's integrator of the pendulum, its angle from the horizontal."""
+    """Return heyoka's integrator of the pendulum, whose angle is measured from the horizontal."""
     hy = importlib.import_module("heyoka")
     u, w = hy.make_vars("u", "w")
     return hy.taylor_adaptive([(u, w), (w, -9.81 * hy.cos(u))], state=[lam0, 0.0], tol=np.finfo(float).eps)
 
 
 def sampling(work: str, lam0: float, t: Any, error: Error) -> list[Row]:
-    """Give heyoka's continuous output at random times, the integration apart."""
+    """Return the row for heyoka's continuous output at random times, without the integration."""
     if not has("heyoka"):
         return []
     out = swing(lam0).propagate_until(float(t.max()), c_output=True)[4]
-    who = "heyoka's continuous output (integration apart)"
+    who = "heyoka's continuous output (without the integration)"
     return [Row(work, who, lambda: out(t)[:, 0].copy(), error, each=t.size, repeats=5, unit="of scale")]
 
 
 def far(work: str, lam0: float, t: float, error: Error) -> list[Row]:
-    """Give heyoka's way to a late state: step by step."""
+    """Return the row for a late state by heyoka, step by step."""
     if not has("heyoka"):
         return []
     body = swing(lam0)
@@ -111,7 +111,7 @@ def far(work: str, lam0: float, t: float, error: Error) -> list[Row]:
 
 
 def example2(work: str, error: Error) -> list[Row]:
-    """Give heyoka's integrator with events: where the contact force changes sign, and where the body turns."""
+    """Return the row for heyoka's integrator with events at contact changes and turning points."""
     if not has("heyoka"):
         return []
     hy = importlib.import_module("heyoka")
@@ -141,7 +141,7 @@ def example2(work: str, error: Error) -> list[Row]:
     return [
         Row(
             work,
-            "heyoka's integrator with events, compiled before",
+            "heyoka's integrator with events (without compilation)",
             repeated(integrated, 20),
             error,
             each=20,

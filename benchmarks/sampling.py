@@ -1,4 +1,4 @@
-"""Places of the pendulum at many times, and at a late one."""
+"""Positions of the pendulum at many times, and at a late one."""
 
 from math import cos, pi, sin, sqrt
 from typing import Any
@@ -20,7 +20,7 @@ FAR = 1e6
 
 
 def sampling() -> list[Row]:
-    """Places at many random times, and at one late one."""
+    """Return the rows for positions at many random times, and at a late one."""
     lam0 = TOP - pi / 2
     top = mpf(lam0) + mp.pi / 2
     motion = pendulum.solve(lam0)
@@ -49,7 +49,7 @@ def sampling() -> list[Row]:
     def error(values: Any) -> float:
         return apart(values, truths, scale)
 
-    work, once = f"λ(t) at {TIMES:,} random times in 100 s, each", "the state at 10⁶ s"
+    work, once = f"λ(t) at {TIMES:,} random times within 100 s, per time", "state at 10⁶ s"
     return [
         Row(
             work,
@@ -73,7 +73,7 @@ def sampling() -> list[Row]:
         ),
         Row(
             work,
-            "DOP853's dense output (integration apart)",
+            "DOP853's dense output (without the integration)",
             lambda: dense(t[:100_000])[0],
             error,
             each=100_000,
@@ -101,8 +101,8 @@ def sampling() -> list[Row]:
         ),
         *peers.far(once, lam0, FAR, lambda values: apart(values, late, scale)),
         Row(
-            "one orbit from Python, λ at one time",
-            "`solve`, turning points, quadrature, table and series",
+            "one orbit from Python, λ at a single time",
+            "`solve` with turning points, quadrature, table and series",
             lambda: [pendulum.solve(lam0).lam(0.7) for _ in range(20)],
             lambda values: apart(values, [place(top, 0.7)], scale),
             each=20,

@@ -1,6 +1,6 @@
-"""How cost grows: with the time asked for, the count of legs, the size of a sweep and that of the formulas.
+"""How the cost grows with the time, the number of legs, the size of a sweep and the length of the formulas.
 
-Draws ``docs/figures/scale.svg``; run by ``make bench``. Each point is the least of some runs.
+Draws ``docs/figures/scale.svg``; run by ``make bench``. Each point is the shortest of several runs.
 """
 
 import json
@@ -35,14 +35,14 @@ print(perf_counter() - start, 1024 * resource.getrusage(resource.RUSAGE_SELF).ru
 
 
 def late_states() -> tuple[list[float], list[float]]:
-    """Time of one state against the time at which it is asked for."""
+    """Measure the computation of one state at different times of the motion."""
     motion, when = pendulum.solve("-pi/2 + 6/5"), [10.0**k for k in range(10)]
     motion.state(1e9)
     return when, [least(lambda t=t: motion.state(t), 100, 20) for t in when]  # type: ignore[misc]
 
 
 def many_legs() -> tuple[list[int], list[float]]:
-    """Time to follow a pendulum with drag over so many half swings."""
+    """Measure the computation of many half swings of a pendulum with drag."""
     counts = [10, 100, 1000, 10000]
     swing = 1.05  # half a period of its small swings, about
     solved = [least(lambda n=n: dragged.solve(1.0, t_max=swing * n).legs, 1, 2) for n in counts]  # type: ignore[misc]
@@ -50,7 +50,7 @@ def many_legs() -> tuple[list[int], list[float]]:
 
 
 def large_sweeps() -> tuple[list[int], list[float], list[float]]:
-    """Time and memory of a sweep over so many launches, each in a process of its own."""
+    """Measure time and memory of sweeps of different sizes, each in a process of its own."""
     counts, seconds, sizes = [10**4, 10**5, 10**6, 10**7], [], []
     for count in counts:
         done = subprocess.run(
@@ -63,7 +63,7 @@ def large_sweeps() -> tuple[list[int], list[float], list[float]]:
 
 
 def long_formulas() -> tuple[list[int], list[float]]:
-    """Time to derive and emit a graph that is a sum of so many waves, against its length."""
+    """Measure derivation and emission of graphs that are sums of many sines."""
 
     def emitted(terms: int, slowest: int) -> int:
         text = " + ".join(f"sin({k + slowest}*x)/{k + slowest}" for k in range(terms))
@@ -76,7 +76,7 @@ def long_formulas() -> tuple[list[int], list[float]]:
 
 
 def main() -> None:
-    """Measure, draw, and print what is drawn."""
+    """Measure, print the numbers and draw them."""
     states, legs, sweeps, formulas = late_states(), many_legs(), large_sweeps(), long_formulas()
     print(json.dumps({"states": states, "legs": legs, "sweeps": sweeps, "formulas": formulas}, indent=1))
     mpl.rcParams.update({"svg.hashsalt": "gqm_sym", "svg.fonttype": "none", "font.size": 9})

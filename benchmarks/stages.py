@@ -1,6 +1,6 @@
 """Time each stage from a YAML file to a warm solve; run by ``make bench``.
 
-The numbers are for reading, not for passing: nothing here is a test.
+The numbers are for information and are not tested.
 """
 
 import os

@@ -1,4 +1,4 @@
-"""Closed forms of the pendulum of length 1, in 40 digits: the truth of most rows."""
+"""Closed forms of the pendulum of length 1 in 40 digits, the reference of most rows."""
 
 from measure import mp, mpf  # with the digits of all truths
 

@@ -1,4 +1,4 @@
-"""How the documentation is built: ``make docs``."""
+"""Configuration of the documentation site, which ``make docs`` builds."""
 
 import re
 import sys
@@ -12,7 +12,7 @@ import made  # noqa: E402
 
 import gqm_sym  # noqa: E402
 
-made.write_all(Path(__file__).parent / "made")
+made.copy_notebooks(Path(__file__).parent / "made")
 
 project = "gqm_sym"
 author = "the gqm_sym developers"
@@ -37,7 +37,7 @@ html_copy_source = False
 
 
 def _split_names(app: Any, what: str, name: str, obj: Any, options: Any, lines: list[str]) -> None:
-    """Give each of several attributes that are described together a line of its own."""
+    """Give each attribute a line of its own where a docstring describes several together."""
     found = [(line, re.fullmatch(r":ivar (\w+(?:, \w+)+): (.*)", line)) for line in lines]
     lines[:] = [
         text
@@ -46,6 +46,12 @@ def _split_names(app: Any, what: str, name: str, obj: Any, options: Any, lines: 
     ]
 
 
+def _link_notebooks(app: Any, page: str, source: list[str]) -> None:
+    """Let links to notebooks, which are files of the repository, lead to their pages on the site."""
+    source[0] = re.sub(r"\]\(\.\./((?:\.\./)*)notebooks/(\w+)\.ipynb\)", r"](\1made/\2.ipynb)", source[0])
+
+
 def setup(app: Any) -> None:
-    """Connect after napoleon, which writes those lines."""
+    """Connect the functions above; the first one after napoleon, which writes the lines that it splits."""
     app.connect("autodoc-process-docstring", _split_names, priority=600)
+    app.connect("source-read", _link_notebooks)

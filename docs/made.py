@@ -1,4 +1,7 @@
-"""Pages of the documentation that are made from the code when it is built, so that they cannot fall behind it."""
+"""Reference pages that are made from the code, so that they cannot differ from it.
+
+``python docs/made.py`` writes them into ``docs/reference``; a test compares the files with what would be written.
+"""
 
 import argparse
 import shutil
@@ -12,58 +15,97 @@ from gqm_sym.kernels import KERNELS
 from gqm_sym.specfile import json_schema
 from gqm_sym.studies import sweep_schema
 
-ROOT = Path(__file__).parent.parent
+DOCS = Path(__file__).parent
+ROOT = DOCS.parent
 
 
-def write_all(folder: Path) -> None:
-    """Write every page into a folder, and copy the notebooks beside them."""
+def pages() -> dict[str, str]:
+    """Return the text of each page by its name."""
+    made = {"command_line": command_line(), "yaml": curve_files(), "forces": forces()}
+    return {name: "\n".join(lines) + "\n" for name, lines in made.items()}
+
+
+def write_pages(folder: Path) -> None:
+    """Write every page into a folder."""
     folder.mkdir(exist_ok=True)
-    for name, lines in (("command_line", command_line()), ("yaml", curve_files()), ("forces", forces())):
-        (folder / f"{name}.md").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    for name, text in pages().items():
+        (folder / f"{name}.md").write_text(text, encoding="utf-8")
+
+
+def copy_notebooks(folder: Path) -> None:
+    """Copy the notebooks and their data into a folder, where Sphinx finds them."""
+    folder.mkdir(exist_ok=True)
     for pattern in ("*.ipynb", "*.csv"):
         for file in sorted((ROOT / "notebooks").glob(pattern)):
             shutil.copy(file, folder / file.name)
 
 
+def write_all(folder: Path) -> None:
+    """Write every page into a folder, and copy the notebooks there."""
+    write_pages(folder)
+    copy_notebooks(folder)
+
+
 def command_line() -> Iterator[str]:
-    """Yield what every command says of itself."""
+    """Yield the options of every command. argparse's own help differs from one version of Python to the next."""
     yield "# Command line"
     yield ""
-    yield "Exit codes: 0 done; 130 interrupted; 1 `--check` found a difference; 2 the input is wrong, with file,"
-    yield "line and column; 3 the derivation or the solution failed."
+    yield "Exit codes: 0 done; 130 interrupted; 1 `--check` found a difference; 2 the input is wrong (the message gives"
+    yield "file, line and column); 3 the derivation or the solution failed. `COMMAND --help` prints the same"
+    yield "information."
     for parser in (gen._parser(), tool._parser()):
-        yield from _help(parser)
+        yield from _options(parser)
         for action in parser._actions:
             if isinstance(action, argparse._SubParsersAction):
-                for command in action.choices.values():
-                    yield from _help(command)
+                summaries = {choice.dest: choice.help or "" for choice in action._choices_actions}
+                for name, command in action.choices.items():
+                    yield from _options(command, summaries[name])
 
 
-def _help(parser: argparse.ArgumentParser) -> Iterator[str]:
-    yield from ("", f"## {parser.prog}", "", "```text", parser.format_help().rstrip(), "```")
+def _options(parser: argparse.ArgumentParser, summary: str = "") -> Iterator[str]:
+    yield from ("", f"## {parser.prog}", "", _cell(parser.description or f"{summary[:1].upper()}{summary[1:]}."))
+    rows = [(_spelled(action), action.help or "") for action in parser._actions if _is_documented(action)]
+    if rows:
+        yield from ("", "| argument | meaning |", "|---|---|")
+        yield from (f"| `{spelled}` | {_cell(text)} |" for spelled, text in rows)
+    if parser.epilog and not parser.epilog.startswith("Exit codes"):
+        yield from ("", _cell(parser.epilog))
+
+
+def _is_documented(action: argparse.Action) -> bool:
+    return not isinstance(action, argparse._HelpAction | argparse._SubParsersAction)
+
+
+def _spelled(action: argparse.Action) -> str:
+    """Return an argument as it is typed, such as ``-o, --output DIR``."""
+    value = action.metavar or ("{" + ",".join(map(str, action.choices)) + "}" if action.choices else "")
+    if action.nargs == 0:
+        value = ""
+    repeated = " ..." if action.nargs == "*" else ""
+    return f"{', '.join(action.option_strings)} {value}{repeated}".strip()
 
 
 def forces() -> Iterator[str]:
     """Yield the tables of forces and of families."""
-    yield from ("# Forces and families", "", "## Forces", "", "| in YAML | in Python | what it is |", "|---|---|---|")
+    yield from ("# Forces and families", "", "## Forces", "", "| in YAML | in Python | description |", "|---|---|---|")
     for row in KERNELS.values():
         arguments = ", ".join(row.arguments)
-        yield f"| `{row.name}: {{{arguments}}}` | `{row.make.__name__}({arguments})` | {_cell(row.summary)} |"
-    yield from ("", "Forces add with `+`. Each argument takes another name for its parameter, or a value.", "")
-    yield from ("## Families of curves", "", "| name | parameters | what it is |", "|---|---|---|")
-    yield "| `cartesian_graph` | those of `phi` | the graph of any function of x |"
-    yield "| `implicit` | those of `F` | any curve F(x, z) = 0, from a start point |"
+        yield f"| `{row.name}: {{{arguments}}}` | `{row.make.__qualname__}({arguments})` | {_cell(row.summary)} |"
+    yield from ("", "Forces are added with `+`. Each argument is a value or another name for its parameter.", "")
+    yield from ("## Families of curves", "", "| name | parameters | description |", "|---|---|---|")
+    yield "| `cartesian_graph` | those of `phi` | the graph of a function of x |"
+    yield "| `implicit` | those of `F` | a curve F(x, z) = 0 through a start point |"
     for family in FAMILIES.values():
         note = f"; {family.note}" if family.note else ""
         yield f"| `{family.name}` | `{', '.join(family.arguments)}` | {_cell(family.title + note)} |"
-    yield from ("", "Their closed forms: [](../families/index.md).")
+    yield from ("", "Their closed forms are on the pages of the [families](../families/index.md).")
 
 
 def curve_files() -> Iterator[str]:
     """Yield the tables of the keys of curve files and sweep files, from their schemas."""
     yield from ("# Curve files and sweep files (YAML)", "")
-    yield "`gqm schema` and `gqm schema --sweep` print this as JSON Schema (draft 7) for editors, and"
-    yield "`gqm-gen --init NAME` writes a commented file to start from. Numbers are kept as text and are exact."
+    yield "`gqm schema` and `gqm schema --sweep` print these keys as JSON Schema (draft 7) for editors, and"
+    yield "`gqm-gen --init NAME` writes a commented file to start from. Numbers are read as text and are exact."
     yield ""
     yield from _file("A curve file", json_schema())
     yield from _file("A sweep file", sweep_schema())
@@ -72,7 +114,7 @@ def curve_files() -> Iterator[str]:
 def _file(title: str, schema: dict[str, Any]) -> Iterator[str]:
     yield from _keys(title, schema)
     for name, definition in schema["definitions"].items():
-        # A parameter may be written in short as well: what is described is its long form.
+        # A parameter may also be written in a short form; the long form is described.
         forms = [form for form in definition.get("anyOf", [definition]) if "properties" in form]
         for form in forms:
             yield from _keys(name.replace("_", ": ", 1).replace("_", " "), form)
@@ -84,14 +126,15 @@ def _keys(title: str, schema: dict[str, Any]) -> Iterator[str]:
         "",
         _cell(schema.get("description", "")),
         "",
-        "| key | what it is | as in |",
+        "| key | meaning | example |",
         "|---|---|---|",
     )
     required = schema.get("required", [])
     for key, entry in schema["properties"].items():
         example = entry.get("examples", [entry.get("default", "")])[0]
-        must = " (needed)" if key in required else ""
-        yield f"| `{key}`{must} | {_cell(entry.get('description', ''))} | {f'`{_flow(example)}`' if example else ''} |"
+        needed = " (required)" if key in required else ""
+        shown = f"`{_flow(example)}`" if example else ""
+        yield f"| `{key}`{needed} | {_cell(entry.get('description', ''))} | {shown} |"
     yield ""
 
 
@@ -105,3 +148,7 @@ def _flow(value: Any) -> str:
 
 def _cell(text: str) -> str:
     return " ".join(text.split()).replace("|", "\\|").replace("*", "\\*")
+
+
+if __name__ == "__main__":
+    write_pages(DOCS / "reference")

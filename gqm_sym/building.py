@@ -1,7 +1,7 @@
-"""The whole chain on one page: a model becomes a file, and the file a module.
+"""The whole chain on one page: a model is written to a file, and the file is imported as a module.
 
 =========  ==========================  ==============
-stage      from                        to
+stage      takes                       returns
 =========  ==========================  ==============
 derive     `Curve`, `Kernel`           `Model`
 emit       `Model`, name               text
@@ -41,16 +41,23 @@ def build(model: Model, *, name: str, folder: str | os.PathLike[str] = FOLDER, f
     name : str
         The module's name, a Python identifier that no installed module has.
     folder : path
-        Where to write; made if missing.
+        The folder to write to; it is created if it does not exist.
     force : bool
-        Overwrite a file that was edited by hand.
+        Whether to overwrite a file that was edited by hand.
+
+    Returns
+    -------
+    module
+        The generated module, with ``PARAMETERS``, ``pass1``, ``solve`` and ``sweep``.
 
     Raises
     ------
     HandEditedError
-        If the file there is not what gqm-gen wrote.
+        If the existing file was not written by gqm_sym, or was edited since.
     InputError
-        If what is there is no file.
+        If the path is that of a folder or a device, or the name is not allowed.
+    EmissionError
+        If the model has an expression that no module can hold.
     """
     check_module_name(name, where="build: name")
     try:
@@ -63,11 +70,33 @@ def build(model: Model, *, name: str, folder: str | os.PathLike[str] = FOLDER, f
 
 
 def write_module(text: str, path: str | os.PathLike[str], *, force: bool = False) -> bool:
-    """Write a generated module, whole or not at all. Returns whether the file changed."""
+    """Write the text of a generated module to a file, completely or not at all.
+
+    Parameters
+    ----------
+    text : str
+        What `emit` returned.
+    path : path
+        The file; missing folders are created.
+    force : bool
+        Whether to overwrite a file that was edited by hand.
+
+    Returns
+    -------
+    bool
+        Whether the file changed.
+
+    Raises
+    ------
+    HandEditedError
+        If the existing file was not written by gqm_sym, or was edited since.
+    InputError
+        If the path is that of a folder or a device.
+    """
     target = Path(path)
     if target.exists():
         if not target.is_file() and not target.is_symlink():
-            raise InputError(f"{target}: is a folder or a device; give a file for the module to be written to")
+            raise InputError(f"{target}: is a folder or a device; give the path of a file")
         present = _read(target)
         if present == text:
             return False
@@ -75,7 +104,7 @@ def write_module(text: str, path: str | os.PathLike[str], *, force: bool = False
         if not force and (digests is None or digests[0] != digests[1]):
             raise HandEditedError(
                 f"{target}: was not written by gqm-gen, or was edited since; "
-                "move it away, or give --force to overwrite it"
+                "move it away, or overwrite it with force=True (--force)"
             )
     write_text(text, target)
     with contextlib.suppress(OSError, NotImplementedError):
@@ -84,12 +113,12 @@ def write_module(text: str, path: str | os.PathLike[str], *, force: bool = False
 
 
 def write_text(text: str, path: str | os.PathLike[str]) -> None:
-    """Write a text file, whole or not at all."""
+    """Write a text file in UTF-8, completely or not at all."""
     write_bytes(text.encode("utf-8"), path)
 
 
 def write_bytes(data: bytes, path: str | os.PathLike[str]) -> None:
-    """Write a file, whole or not at all: to a neighbour first, which then takes its place."""
+    """Write a file completely or not at all: a temporary file beside it is written first and then takes its place."""
     target = Path(path)
     target.parent.mkdir(parents=True, exist_ok=True)
     handle, temporary = tempfile.mkstemp(prefix=f".{target.name}.", suffix=".tmp", dir=target.parent)
@@ -106,7 +135,7 @@ def write_bytes(data: bytes, path: str | os.PathLike[str]) -> None:
 
 
 def difference(text: str, path: str | os.PathLike[str]) -> str:
-    """The unified diff from the file on disk to ``text``; empty if they are the same."""
+    """Return the unified diff from the file on disk to ``text``; it is empty if they agree."""
     target = Path(path)
     present = _read(target)
     lines = difflib.unified_diff(
@@ -119,7 +148,7 @@ def difference(text: str, path: str | os.PathLike[str]) -> str:
 
 
 def _read(path: Path) -> str:
-    """Text of a file; nothing where there is none, as behind a link to a device, which may have no end."""
+    """Return the text of a file, or nothing if it is not a plain file: a device may have no end."""
     if not path.is_file():
         return ""
     try:

@@ -1,6 +1,7 @@
-"""A motion as one self-contained page: formulas as MathML, figures as inline SVG, tables, and what it was made from.
+"""A report on a motion, as one self-contained page with formulas (MathML), figures (inline SVG), tables and the input.
 
-The page is HTML and well-formed XML at once, needs no network and no script, and is the same bytes for the same input.
+The page is both HTML and well-formed XML, needs neither a network nor scripts, and is the same bytes for the same
+input.
 """
 
 import io
@@ -28,15 +29,15 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 FIGURES = {
-    "track": "The track as far as the motion runs, coloured by the contact force",
-    "loads": "Speed and contact force against arc length",
-    "portrait": "Phase portrait, with the orbit of the launch",
+    "track": "The part of the track that the body runs through, coloured by the contact force",
+    "speed_and_force": "Speed and contact force against arc length",
+    "portrait": "Phase portrait, with the orbit of this launch",
 }
 
-# SymPy writes names of functions as they are.
+# SymPy prints the names of functions as they are written.
 _GREEK = {"alpha": "α", "kappa": "κ"}
 
-# dF/dx, d2F/dx2, d2F/dxdz.
+# Labels of partial derivatives: dF/dx, d2F/dx2, d2F/dxdz.
 _PARTIAL = re.compile(r"d(2?)F/d(\w)d?(\w?)")
 
 STYLE = """
@@ -54,16 +55,23 @@ pre { background: #f6f6f6; padding: 1rem; white-space: pre-wrap; }
 
 @require("plot")
 def report(spec: Spec, model: Model, motion: Motion, text: str) -> str:
-    """The page about one motion.
+    """Return the report on one motion as HTML.
 
     Parameters
     ----------
-    spec, model
-        The curve file, and what was derived from it.
-    motion
-        What was launched.
-    text
-        Of the curve file.
+    spec : Spec
+        The curve file, as `read_spec` returns it.
+    model : Model
+        The model that was derived from it.
+    motion : Motion
+        The motion to report on.
+    text : str
+        The text of the curve file, which is printed in the report.
+
+    Returns
+    -------
+    str
+        The page.
     """
     title = escape(f"{spec.name}: {model.title}" if model.title else spec.name)
     parts = [
@@ -79,7 +87,7 @@ def report(spec: Spec, model: Model, motion: Motion, text: str) -> str:
         *_formulas(model),
         "<h2>Parameters</h2>",
         _parameters(spec, motion),
-        "<h2>Made from</h2>",
+        "<h2>Input</h2>",
         f"<pre>{escape(text)}</pre>",
         _facts(_provenance(motion)),
     ]
@@ -100,7 +108,7 @@ def _parameters(spec: Spec, motion: Motion) -> str:
     for name, number in zip(motion.problem.formulas.parameters, motion.problem.p, strict=True):
         note = spec.notes.get(name)
         rows.append((name, number.text, note.unit if note else "", note.description if note else ""))
-    return table(("name", "value", "unit", "what it is"), rows)
+    return table(("name", "value", "unit", "description"), rows)
 
 
 def _provenance(motion: Motion) -> Iterator[tuple[str, str]]:
@@ -108,8 +116,8 @@ def _provenance(motion: Motion) -> Iterator[tuple[str, str]]:
     yield "launch", f"lam0 = {launch.lam0.text}, v0 = {launch.v0.text}, direction = {launch.direction:+d}"
     yield "contact", launch.contact
     if launch.t_max is not None:
-        yield "followed for", f"{launch.t_max.text} s"
-    yield "error bound of the parameter at the last event", f"{motion.error_bound(_last(motion)):.1e}"
+        yield "t_max", f"{launch.t_max.text} s"
+    yield "error bound of the curve parameter at the last event", f"{motion.error_bound(_last(motion)):.1e}"
     for package in ("gqm_sym", "sympy", "numpy", "numba"):
         yield package, version(package)
     yield "Python", platform.python_version()
@@ -125,13 +133,13 @@ def _last(motion: Motion) -> float:
 def _formulas(model: Model) -> Iterator[str]:
     """Yield each closed form as a block of MathML."""
     lam = model.parameter.name
-    named = {model.lam0: sp.Symbol(f"{lam}_0"), model.v0: sp.Symbol("V_0")}
-    named |= {DIRECTION: sp.Symbol("sgn V"), CONTACT_SIGN: sp.Symbol("sgn N")}
+    symbols = {model.lam0: sp.Symbol(f"{lam}_0"), model.v0: sp.Symbol("V_0")}
+    symbols |= {DIRECTION: sp.Symbol("sgn V"), CONTACT_SIGN: sp.Symbol("sgn N")}
     for label, form in model.closed_forms():
         charted = {head: sp.Function(_GREEK.get(head.row, head.row))(*head.args) for head in form.atoms(ChartFunction)}
         for integral in form.atoms(sp.Integral):
-            named |= {bound: sp.Symbol(f"{bound.name.strip('_')}'") for bound in integral.variables}
-        shown = form.xreplace(charted).xreplace(named)
+            symbols |= {bound: sp.Symbol(f"{bound.name.strip('_')}'") for bound in integral.variables}
+        shown = form.xreplace(charted).xreplace(symbols)
         if isinstance(shown, sp.Equality):
             note = f'<mspace width="2em"/><mtext>({escape(label)})</mtext>'
             inner = f"{_mathml(shown.lhs)}<mo>=</mo>{_mathml(shown.rhs)}{note}"
@@ -144,7 +152,7 @@ def _formulas(model: Model) -> Iterator[str]:
 
 
 def _label(label: str) -> str:
-    """The left side of a closed form, such as ds/dtheta, V**2 or W = V**2."""
+    """Return the left side of a closed form, such as ds/dtheta, V**2 or W = V**2, as MathML."""
     if " = " in label:
         return "<mo>=</mo>".join(map(_label, label.split(" = ")))
     if found := _PARTIAL.fullmatch(label):
@@ -163,13 +171,13 @@ def _power(base: str, exponent: str) -> str:
 
 
 def _mathml(form: sp.Basic) -> str:
-    # Entities that HTML names are unknown to XML.
+    # XML does not know the named entities of HTML.
     text: str = sp.mathml(form, printer="presentation")
-    return re.sub(r"&[A-Za-z]\w+;", lambda found: _kept(found[0]), _unfenced(text))
+    return re.sub(r"&[A-Za-z]\w+;", lambda found: _character(found[0]), _unfenced(text))
 
 
 def _unfenced(text: str) -> str:
-    """Parentheses as signs: SymPy before 1.14 has an element for them that browsers no longer draw."""
+    """Write parentheses as characters: SymPy before 1.14 uses an element for them that browsers no longer draw."""
     closing: list[str] = []
 
     def replaced(found: re.Match[str]) -> str:
@@ -182,8 +190,8 @@ def _unfenced(text: str) -> str:
     return re.sub(r"</?mfenced[^>]*>", replaced, text)
 
 
-def _kept(entity: str) -> str:
-    # SymPy's e is a letter that few fonts have.
+def _character(entity: str) -> str:
+    # XML's own entities stay. SymPy's double-struck e is missing from most fonts and becomes a plain one.
     return entity if entity in ("&lt;", "&gt;", "&amp;", "&quot;") else unescape(entity).replace("\u2147", "e")
 
 
@@ -192,13 +200,13 @@ def _kept(entity: str) -> str:
 
 def _figures(motion: Motion) -> Iterator[str]:
     for what, caption in FIGURES.items():
-        # With friction there is no portrait of energies.
+        # A motion that loses energy has no phase portrait.
         with suppress(SolutionError):
             yield _svg(motion.plot(what), what, caption)
 
 
 def _svg(figure: "Figure", name: str, caption: str) -> str:
-    """A figure as an element of the page; its ids are made its own."""
+    """Return a figure as an element of the page; the prefix ``name`` makes its ids unique there."""
     import matplotlib as mpl
 
     stream = io.StringIO()
@@ -208,5 +216,5 @@ def _svg(figure: "Figure", name: str, caption: str) -> str:
     text = text[text.index("<svg") :]
     text = re.sub(r"<metadata>.*?</metadata>", "", text, flags=re.DOTALL)
     text = re.sub(r'(\bid="|href="#|url\(#)', rf"\g<1>{name}-", text)
-    said = escape(caption)
-    return f'<figure role="img" aria-label="{said}">{text.strip()}<figcaption>{said}</figcaption></figure>'
+    label = escape(caption)
+    return f'<figure role="img" aria-label="{label}">{text.strip()}<figcaption>{label}</figcaption></figure>'

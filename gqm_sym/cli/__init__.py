@@ -1,4 +1,4 @@
-"""The two commands: arguments, printing and exit codes; the work is done elsewhere.
+"""The two commands: their arguments, what they print and their exit codes. The work is done by other packages.
 
-`gqm-gen` (``gen``) makes modules from curve files, `gqm` (``tool``) does what is not generation.
+`gqm-gen` (``gen``) makes modules from curve files; `gqm` (``tool``) does everything else.
 """

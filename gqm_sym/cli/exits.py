@@ -1,4 +1,4 @@
-"""The one place where errors become a line and an exit code."""
+"""The one place where an error becomes a line of text and an exit code."""
 
 import os
 import sys
@@ -12,25 +12,25 @@ from typing import Any
 from gqm_sym.errors import GQMError, InputError, NoisyPointsWarning, SpecFileError
 
 DONE = 0
-DIFFERENT = 1  # --check found a file that is not what would be written
+DIFFERENT = 1  # --check found a file that differs from what would be written
 WRONG_INPUT = 2
 FAILED = 3
 INTERRUPTED = 130
-READER_GONE = 141  # as of a program that SIGPIPE ended
+BROKEN_PIPE = 141  # what a shell reports for a program that SIGPIPE ended
 
 
 def guarded(program: str, work: Callable[[], int]) -> int:
-    """Run a command; what goes wrong becomes one clear message and an exit code.
+    """Run a command, and turn any error into one clear message and an exit code.
 
     Parameters
     ----------
     program
-        Its name, for messages.
+        The name of the command, for messages.
     work
-        Does everything, the reading of arguments included, and returns the exit code.
+        The whole command, including the reading of its arguments. It returns the exit code.
     """
     for stream in (sys.stdout, sys.stderr):
-        # A title in a script that the terminal lacks is no reason to fail.
+        # A title with characters that the terminal cannot show must not make the command fail.
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="backslashreplace")
     try:
@@ -45,7 +45,7 @@ def guarded(program: str, work: Callable[[], int]) -> int:
     except BrokenPipeError:
         # The interpreter flushes once more at exit, which must not fail again.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return READER_GONE
+        return BROKEN_PIPE
     except GQMError as error:
         return _end(message_of(error, program), code_of(error))
     except OSError as error:
@@ -54,7 +54,7 @@ def guarded(program: str, work: Callable[[], int]) -> int:
     except (RecursionError, MemoryError) as error:
         what = "nested too deeply" if isinstance(error, RecursionError) else "too large"
         return _end(f"{program}: an expression is {what}; write it in a simpler form", FAILED)
-    except Exception as error:  # a mistake of ours: still no traceback, but where to look
+    except Exception as error:  # a defect of this package: no traceback even then, but where it happened
         frame = traceback.extract_tb(error.__traceback__)[-1]
         where = f"{Path(frame.filename).name}:{frame.lineno}"
         what = f"{type(error).__name__}: {error}".replace("\n", " ")
@@ -78,17 +78,17 @@ def _warnings_as_lines(program: str) -> Iterator[None]:
 
 
 def code_of(error: GQMError) -> int:
-    """Return the exit code that an error means."""
+    """Return the exit code for an error."""
     return WRONG_INPUT if isinstance(error, InputError) else FAILED
 
 
 def message_of(error: GQMError, source: str) -> str:
-    """Return an error as it is printed; ``source`` is named unless the error names its own."""
+    """Return the text that is printed for an error. It begins with ``source`` unless the error names its own file."""
     return str(error) if isinstance(error, SpecFileError) else f"{source}: {error}"
 
 
 class Failures:
-    """Errors of several files: each is printed when it comes, and the rest goes on."""
+    """Errors in several files: each is printed as it occurs, and the work on the other files continues."""
 
     def __init__(self) -> None:
         self._codes: list[int] = []
@@ -98,12 +98,12 @@ class Failures:
 
     @property
     def code(self) -> int:
-        """The exit code: wrong input before failed, and 0 without either."""
+        """The exit code: wrong input takes precedence over a failure; 0 if there was neither."""
         return min(self._codes, default=DONE)
 
     @contextmanager
-    def noting(self, source: str) -> Iterator[None]:
-        """Note an error that ends the block; ``source`` is the file it is about."""
+    def recording(self, source: str) -> Iterator[None]:
+        """Record and print an error that ends the block; ``source`` is the file that it concerns."""
         try:
             yield
         except GQMError as error:

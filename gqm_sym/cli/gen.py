@@ -23,7 +23,7 @@ FOLDER = "generated"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Product:
-    """What one curve file leads to."""
+    """What is made from one curve file: the model, the text of its module and where the module is written."""
 
     spec: "Spec"
     model: "Model"
@@ -39,24 +39,30 @@ def main(argv: Sequence[str] | None = None) -> int:
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog=PROGRAM,
-        description="Derive the closed forms of a motion on a curve and write its module.",
+        description="Derive the closed forms of motion along a curve and write its module.",
         epilog="Exit codes: 0 done, 1 --check found a difference, 2 the input is wrong, "
         "3 the derivation or the solution failed, 130 interrupted.",
     )
     parser.add_argument("files", nargs="*", metavar="FILE", help="a curve file (YAML)")
-    parser.add_argument("--init", metavar="NAME", help="write NAME.yaml, a commented file to start from, and no module")
-    parser.add_argument("-o", "--output", metavar="DIR", default=FOLDER, help=f"where to write (default: {FOLDER})")
-    mode = parser.add_mutually_exclusive_group()
-    mode.add_argument("--check", action="store_true", help="write nothing; fail if a file is not current")
-    mode.add_argument("--stdout", action="store_true", help="print the module, write no file")
-    mode.add_argument("--solve", action="store_true", help="also run the launch in the file and print its table")
-    parser.add_argument("--diff", action="store_true", help="with --check: show the differences")
-    parser.add_argument("--latex", metavar="FILE", help="also write the closed forms as LaTeX")
     parser.add_argument(
-        "--plot", metavar="FILE", help="also run the launch in the file and draw its motion (png, svg, pdf)"
+        "--init", metavar="NAME", help="write NAME.yaml, a commented curve file to start from, and do nothing else"
+    )
+    parser.add_argument(
+        "-o", "--output", metavar="DIR", default=FOLDER, help=f"folder to write modules into (default: {FOLDER})"
+    )
+    mode = parser.add_mutually_exclusive_group()
+    mode.add_argument("--check", action="store_true", help="write nothing; exit with 1 if a module is not up to date")
+    mode.add_argument("--stdout", action="store_true", help="print the module and write no file")
+    mode.add_argument(
+        "--solve", action="store_true", help="also run the launch in the file and print the motion as a table"
+    )
+    parser.add_argument("--diff", action="store_true", help="with --check: print the differences")
+    parser.add_argument("--latex", metavar="FILE", help="also write the closed forms into a LaTeX file")
+    parser.add_argument(
+        "--plot", metavar="FILE", help="also run the launch in the file and draw its motion (.png, .svg, .pdf)"
     )
     parser.add_argument("--force", action="store_true", help="overwrite a module that was edited by hand")
-    parser.add_argument("-q", "--quiet", action="store_true", help="print no closed forms")
+    parser.add_argument("-q", "--quiet", action="store_true", help="do not print the closed forms")
     return parser
 
 
@@ -65,42 +71,46 @@ def _arguments(argv: Sequence[str] | None) -> argparse.Namespace:
     options = parser.parse_args(argv)
     if options.init is not None:
         if options != parser.parse_args(["--init", options.init]):
-            parser.error("--init: takes one NAME and nothing else")
+            parser.error("--init: takes one NAME and no other argument")
         return options
     if not options.files:
         parser.error("the following arguments are required: FILE (or --init NAME)")
     if options.diff and not options.check:
-        parser.error("--diff: shows what --check finds; give both")
+        parser.error("--diff: prints what --check finds; give both options")
     if options.latex is not None and options.check:
-        parser.error("--latex: writes a file, and --check writes nothing; give one of them")
+        parser.error("--latex: writes a file, but --check writes nothing; give only one of them")
     if options.plot is not None and (options.check or options.stdout):
-        parser.error("--plot: runs the module that is written; give it without --check and --stdout")
-    singles = {"--stdout": options.stdout, "--latex": options.latex is not None, "--plot": options.plot is not None}
-    for option, one_only in singles.items():
-        if one_only and len(options.files) > 1:
+        parser.error("--plot: runs the module that is written; leave out --check and --stdout")
+    single_file_options = {
+        "--stdout": options.stdout,
+        "--latex": options.latex is not None,
+        "--plot": options.plot is not None,
+    }
+    for option, given in single_file_options.items():
+        if given and len(options.files) > 1:
             parser.error(f"{option}: takes one FILE, got {len(options.files)}")
     return options
 
 
 def _run(options: argparse.Namespace) -> int:
-    """Read everything, make everything, and only then write: a mistake leaves all files alone."""
+    """Read all files and make all modules before anything is written, so that a mistake leaves every file unchanged."""
     if options.init is not None:
         return _init(options.init)
     failures = Failures()
     specs: list[Spec] = []
     for file in options.files:
-        with failures.noting(file):
+        with failures.recording(file):
             specs.append(_read(file, specs))
     products: list[Product] = []
     for spec in specs:
-        with failures.noting(spec.path):
+        with failures.recording(spec.path):
             products.append(_make(spec, options))
     if failures:
         return failures.code
     if options.check:
         return _check(products, options)
     for product in products:
-        with failures.noting(product.spec.path):
+        with failures.recording(product.spec.path):
             _deliver(product, options)
     return failures.code
 
@@ -113,7 +123,7 @@ def _init(name: str) -> int:
         with path.open("x", encoding="utf-8", newline="\n") as file:
             file.write(text)
     except FileExistsError:
-        raise InputError(f"{path}: is there already and is left alone; choose another name") from None
+        raise InputError(f"{path}: already exists and was not changed; choose another name") from None
     print(f"wrote {path}")
     return DONE
 
@@ -125,8 +135,8 @@ def _read(file: str, others: "Sequence[Spec]") -> "Spec":
     for other in others:
         if other.name == spec.name:
             raise spec.mistake(
-                f"name: {spec.name} is the name in {other.path} too, and both would be one file; "
-                "give one of them another"
+                f"name: {spec.name} is also the name in {other.path}, and both would be written to the same file; "
+                "rename one of them"
             )
     return spec
 
@@ -149,10 +159,10 @@ def _check(products: Sequence[Product], options: argparse.Namespace) -> int:
         changes = difference(product.text, product.path)
         if changes:
             code = DIFFERENT
-            what = "is not what" if product.path.exists() else "is missing, and is what"
+            what = "differs from what" if product.path.exists() else "is missing; it is what"
             print(
                 f"{product.path}: {what} {product.spec.path} gives; "
-                f"write it by {PROGRAM} -o {options.output} {product.spec.path}",
+                f"write it with {PROGRAM} -o {options.output} {product.spec.path}",
                 file=sys.stderr,
             )
             if options.diff:
@@ -163,7 +173,7 @@ def _check(products: Sequence[Product], options: argparse.Namespace) -> int:
 
 
 def _deliver(product: Product, options: argparse.Namespace) -> None:
-    """Print or write what was asked for."""
+    """Print and write what the options ask for."""
     from gqm_sym.building import write_module, write_text
 
     if options.latex is not None:
@@ -187,7 +197,7 @@ def _deliver(product: Product, options: argparse.Namespace) -> None:
         if not options.quiet:
             print(f"wrote {options.plot}")
     if options.solve:
-        # Complete before the first line is printed: it may fail half way.
+        # The table is complete before its first line is printed, since it may fail half way.
         table = list(show.motion(motion, product.model.parameter.name))
         print(f"{product.spec.name}:" if options.quiet else "")
         for line in table:
@@ -195,7 +205,7 @@ def _deliver(product: Product, options: argparse.Namespace) -> None:
 
 
 def _motion(product: Product) -> "Motion":
-    """The motion that the launch of the file begins."""
+    """Return the motion that starts from the launch in the file."""
     from gqm_sym.building import load
 
     spec = product.spec

@@ -1,4 +1,4 @@
-"""Figures from the command line."""
+"""Figures written by the command line."""
 
 from io import BytesIO
 from pathlib import Path
@@ -15,18 +15,27 @@ FORMATS = (".png", ".svg", ".pdf")
 def save_figure(motion: "Motion", file: str, what: str) -> None:
     """Draw a motion into a file.
 
+    Parameters
+    ----------
+    motion : Motion
+        The motion.
+    file : str
+        The file to write; its extension selects the format.
+    what : str
+        The figure to draw, as for `Motion.plot`.
+
     Raises
     ------
     InputError
-        For a file whose ending is no known format, or that cannot be written.
+        If the extension is not that of a known format.
     """
     from gqm_sym.building import write_bytes
 
-    ending = Path(file).suffix.lower()
-    if ending not in FORMATS:
-        raise InputError(f"{file}: cannot tell the format of the figure; end its name in {', '.join(FORMATS)}")
-    # The same motion gives the same bytes: no date of making.
-    dated = {".png": {}, ".svg": {"Date": None}, ".pdf": {"CreationDate": None}}
-    drawn = BytesIO()
-    motion.plot(what).savefig(drawn, format=ending[1:], metadata=dated[ending])
-    write_bytes(drawn.getvalue(), file)
+    extension = Path(file).suffix.lower()
+    if extension not in FORMATS:
+        raise InputError(f"{file}: the format of the figure is unknown; use a name that ends in {', '.join(FORMATS)}")
+    # Without the date of creation the same motion gives the same bytes.
+    metadata = {".png": {}, ".svg": {"Date": None}, ".pdf": {"CreationDate": None}}
+    image = BytesIO()
+    motion.plot(what).savefig(image, format=extension[1:], metadata=metadata[extension])
+    write_bytes(image.getvalue(), file)

@@ -1,4 +1,4 @@
-"""Closed forms, parameters and motions as text for people."""
+"""Closed forms, parameters, motions and sweeps as text."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from math import isfinite
@@ -25,7 +25,7 @@ def forms(spec: "Spec", model: "Model") -> Iterator[str]:
     yield ""
     width = max(len(label) for label, _ in model.closed_forms())
     for label, form in model.closed_forms():
-        # The label of an equation says what it holds for; anything else is equal to its label.
+        # The label of an equation says what the equation describes; any other form is equal to its label.
         sign = "  " if isinstance(form, sp.Equality) else " ="
         yield f"  {label:<{width}}{sign} {text(form)}"
     yield ""
@@ -38,7 +38,7 @@ def forms(spec: "Spec", model: "Model") -> Iterator[str]:
 
 
 def _parameter(spec: "Spec", name: str, value: object) -> tuple[str, ...]:
-    """Row of the table of parameters."""
+    """Return one row of the table of parameters."""
     note = spec.notes.get(name)
     unit, description = (note.unit, note.description) if note else ("", "")
     given = "to be given at run time" if value is None else f"= {value}"
@@ -47,7 +47,7 @@ def _parameter(spec: "Spec", name: str, value: object) -> tuple[str, ...]:
 
 
 def motion(found: "Motion", parameter: str) -> Iterator[str]:
-    """Yield a motion line by line: its kind and times, its legs, its events."""
+    """Yield a motion line by line: its kind and times, its legs and its events."""
     yield f"  kind            {found.kind}"
     if found.turning_points:
         places = ", ".join(_number(place) for place in found.turning_points)
@@ -58,7 +58,7 @@ def motion(found: "Motion", parameter: str) -> Iterator[str]:
         yield f"  period          {_number(found.period)} s"
     elif isfinite(found.t_end):
         yield f"  ends after      {_number(found.t_end)} s"
-    yield f"  quadrature      within {found.quadrature_error:.1e} of a time"
+    yield f"  quadrature      {found.quadrature_error:.1e} (estimated relative error of a time)"
     yield f"  condition       {found.condition_number:.1e} (relative change of a time per that of the launch)"
     if found.legs:
         yield ""
@@ -94,23 +94,23 @@ def _states(
 
 
 def swept(quantities: Iterable[str], data: "Dataset") -> Iterator[str]:
-    """Yield a summary of a sweep line by line: its size, and how many launches have no value and why."""
+    """Yield the result of a sweep line by line: its size, how many values are missing, and why."""
     from gqm_sym.runtime.sweep.quantities import STATUS_SENTENCES
 
     yield f"  {' x '.join(f'{size} {name}' for name, size in data.sizes.items())}: {', '.join(quantities)}"
     refused: dict[str, None] = {}
     for quantity in quantities:
         status = data[f"{quantity}_status"]
-        for code, sentence in enumerate(STATUS_SENTENCES):
+        for code, reason in enumerate(STATUS_SENTENCES):
             count = int((status == code).sum())
-            if sentence and count:
-                yield f"  {quantity}: {count} without a value: {sentence}"
+            if reason and count:
+                yield f"  {quantity}: {count} without a value: {reason}"
         refused[status.attrs.get("first_refused", "")] = None
-    yield from (f"  refused {first}" for first in refused if first)
+    yield from (f"  first refused launch: {first}" for first in refused if first)
 
 
 def table(rows: Iterable[Sequence[str]], *, right: Iterable[int]) -> Iterator[str]:
-    """Yield aligned rows, indented by two; the columns in ``right`` are flush right."""
+    """Yield aligned rows, indented by two spaces; the columns listed in ``right`` are right-aligned."""
     rows = [tuple(row) for row in rows]
     flush = frozenset(right)
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
@@ -123,5 +123,5 @@ def table(rows: Iterable[Sequence[str]], *, right: Iterable[int]) -> Iterator[st
 
 
 def _number(value: float) -> str:
-    # The shortest text that reads back as the same double; no "-0.0".
+    # The shortest text that is read back as the same double; adding 0.0 avoids "-0.0".
     return repr(float(value) + 0.0)

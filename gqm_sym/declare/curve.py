@@ -190,7 +190,7 @@ class Curve:
         start
             x and z of a point of the curve, where arc length is 0: numbers or expressions in run-time parameters.
         tangent
-            1: arc length grows along (-F_z, F_x)/|grad F|; -1: along the opposite.
+            1: arc length grows along ``(-F_z, F_x)/|grad F|``; -1: along the opposite.
         domain
             Ends of the arc length, which contain 0. Without them the curve is followed until it closes or comes to a
             singular point, where grad F = 0.

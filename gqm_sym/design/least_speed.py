@@ -1,4 +1,4 @@
-"""The least launch speed for which a body passes everywhere without losing contact."""
+"""The least launch speed with which a body passes a range of a track without losing contact."""
 
 from collections.abc import Callable
 from math import isfinite, sqrt
@@ -17,13 +17,14 @@ from gqm_sym.runtime.launch.request import CONTACTS, LaunchRequest, read_launch
 from gqm_sym.runtime.launch.speed import path_and_force_at, speed_squared_at
 from gqm_sym.runtime.motion.extremes import grid_peaks
 
-# Places at which the range is looked at first: a summit narrower than their distance may be overlooked.
-LOOKS = 4096
+# Steps of the first grid over the range; a maximum narrower than one step may be missed.
+FIRST_STEPS = 4096
 
-# Places at which the surroundings of a summit are then looked at, and how often: 16**12 is 2**48.
-ZOOM, ROUNDS = 33, 12
+# Points of each finer grid around the maximum, and the number of such grids: each step is a 16th of the one before, so
+# that the last is 2**-48 of the first.
+FINE_POINTS, FINE_GRIDS = 33, 12
 
-# Contact that fails by less, as a share of v0**2, holds but for rounding.
+# Contact counts as kept if it is lost by less than this, relative to v0**2: that much is rounding.
 ROUNDING = 1e-13
 
 
@@ -35,31 +36,43 @@ def least_speed(
     contact: str = "above",
     **parameters: Any,
 ) -> float:
-    """The least speed at ``lam0`` with which a body passes a range of a track and keeps in contact all the way.
+    """Return the least speed at ``lam0`` with which a body passes a range of a track and stays in contact throughout.
 
     Parameters
     ----------
-    module
-        A generated module of a conservative model.
-    lam0
-        Launch place, in the range.
-    between
-        Ends of the range, as values of the curve's parameter: the whole curve if nothing is said.
+    module : module
+        A generated module of a model without friction, drag or resistance.
+    lam0 : number
+        Launch place (a value of the curve parameter), inside the range.
+    between : pair of numbers, optional
+        Ends of the range, as values of the curve parameter. Without it the range is the whole curve.
     contact : {"above", "below", "bilateral"}
-        Which side of the track can push; of a bilateral track V**2 >= 0 is all that is asked.
+        The side of the track on which the body runs, as for ``module.solve``. A bilateral track holds the body on both
+        sides, so that only V**2 >= 0 is required.
     parameters
         Run-time parameters, as for ``module.solve``.
 
     Returns
     -------
     float
-        The speed. With it N (or V**2) vanishes at one place of the range: launch a little faster. It is where a smooth
-        function is largest, and as accurate as that function.
+        The speed in m/s. At exactly this speed N (or V**2) vanishes at one place of the range, so launch slightly
+        faster. The speed is accurate to rounding of the function whose maximum it is.
 
     Raises
     ------
+    LaunchError
+        If ``lam0``, ``between`` or ``contact`` is not valid.
+    ParameterError
+        If a parameter is unknown or has no value.
     SolutionError
-        If there is no such speed: where the track bends away, contact asks for a speed that is not too high.
+        If the model loses energy, or if no speed keeps contact: where the track curves away from the body, contact
+        also limits the speed from above.
+
+    Notes
+    -----
+    Where V**2 = v0**2 - h(lam), V**2 >= 0 requires v0**2 >= h. With N/m = kappa*V**2 + n0, contact above also requires
+    v0**2 >= h - n0/kappa where the track curves towards the body and the static load n0 is negative, and
+    v0**2 <= h - n0/kappa where it curves away.
 
     Examples
     --------
@@ -75,29 +88,33 @@ def least_speed(
     """
     formulas: Formulas = module.MODEL
     if formulas.dissipation is not None:
-        raise SolutionError(f"least_speed: {formulas.name} is dissipative, and its V**2 depends on the way taken")
+        raise SolutionError(
+            f"least_speed: {formulas.name} loses energy, so that V**2 depends on the path taken; use module.solve"
+        )
     if contact not in CONTACTS:
         raise LaunchError(f"contact: must be one of {', '.join(CONTACTS)}, got {contact!r}")
     for name in parameters:
         if name not in formulas.parameters:
             known = ", ".join(formulas.parameters)
-            raise ParameterError(f"{name}: is no parameter of {formulas.name}, which has {known}")
+            raise ParameterError(f"{name}: is not a parameter of {formulas.name}; its parameters are {known}")
     p = formulas.numbers(tuple((dict(formulas.parameters) | parameters).values()))
     launch = read_launch(formulas, p, LaunchRequest(lam0, 0))
     start = launch.lam0.value
     low, high = _range(formulas, p, start, between)
     mass = dict(zip(formulas.parameters, p, strict=True))["m"].value
-    needs = _Needs(bind(formulas, p, launch), mass, start, contact)
-    where, least = _largest(needs.least, low, high)
-    least = max(least, 0.0)
-    narrow, most = _largest(lambda lam: -needs.most(lam), low, high)
-    if -most < least - ROUNDING * abs(least):
-        ask = "none" if -most < 0.0 else f"at most {sqrt(-most)!r}"
+    bounds = _SpeedBounds(bind(formulas, p, launch), mass, start, contact)
+    slow_place, lower = _maximum(bounds.lower, low, high)
+    lower = max(lower, 0.0)
+    fast_place, negative_upper = _maximum(lambda lam: -bounds.upper(lam), low, high)
+    upper = -negative_upper
+    if upper < lower - ROUNDING * abs(lower):
+        limit = "no speed is low enough" if upper < 0.0 else f"it must be at most {sqrt(upper)!r}"
         raise SolutionError(
             f"least_speed: no speed keeps contact {contact} the track for {formulas.parameter} in [{low!r}, {high!r}]: "
-            f"at {where!r} it must be at least {sqrt(least)!r} at launch, at {narrow!r} {ask}; take a shorter range"
+            f"because of {slow_place!r} the launch speed must be at least {sqrt(lower)!r}, because of {fast_place!r} "
+            f"{limit}; take a shorter range"
         )
-    return sqrt(least)
+    return sqrt(lower)
 
 
 def _range(formulas: Formulas, p: Any, start: float, between: tuple[Any, Any] | None) -> tuple[float, float]:
@@ -106,17 +123,19 @@ def _range(formulas: Formulas, p: Any, start: float, between: tuple[Any, Any] | 
         ends = sorted(read_number(end, where="between").value for end in between)
         if not max(low, ends[0]) <= start <= min(high, ends[1]) or ends[0] < low or ends[1] > high:
             known = f"[{low!r}, {high!r}]"
-            raise LaunchError(f"between: must be a range in {known} that holds lam0 = {start!r}, got {ends}")
+            raise LaunchError(f"between: must be a range within {known} that contains lam0 = {start!r}, got {ends}")
         return ends[0], ends[1]
     if period:
         return start, start + period
     if not (isfinite(low) and isfinite(high)):
-        raise LaunchError(f"between: {formulas.name} has no ends; give the range of {formulas.parameter} to be passed")
+        raise LaunchError(
+            f"between: the curve of {formulas.name} extends to infinity; give a range of {formulas.parameter}"
+        )
     return low, high
 
 
-class _Needs:
-    """What v0**2 must be at least, and at most, for the sake of one place."""
+class _SpeedBounds:
+    """The lower and upper bounds on v0**2 that contact at each place imposes."""
 
     def __init__(self, functions: BoundFunctions, mass: float, start: float, contact: str) -> None:
         self._functions, self._start = functions, start
@@ -124,30 +143,30 @@ class _Needs:
         self._mass = mass
 
     def _terms(self, lam: Array) -> tuple[Array, Array, Array]:
-        """What is lost in climbing, and curvature and n0 as seen from the side that can push."""
+        """Return the loss of V**2 since launch, and curvature and static load n0 with the sign of the contact side."""
         f = self._functions
-        climbed = -speed_squared_at(f.addresses, f.p, self._start, 0.0, 0.0, lam, lam - self._start)
+        loss = -speed_squared_at(f.addresses, f.p, self._start, 0.0, 0.0, lam, lam - self._start)
         _, _, _, kappa, load = path_and_force_at(f.addresses, f.p, lam, np.zeros_like(lam))
-        return climbed, self._side * kappa, self._side * load / self._mass
+        return loss, self._side * kappa, self._side * load / self._mass
 
-    def least(self, lam: Array) -> Array:
-        """So that V**2 >= 0, and N >= 0 where the track bends towards the body."""
-        climbed, kappa, load = self._terms(lam)
+    def lower(self, lam: Array) -> Array:
+        """Return the bound below which V**2 < 0, or N < 0 where the track curves towards the body."""
+        loss, kappa, load = self._terms(lam)
         inwards = kappa > 0.0
-        return climbed + np.where(inwards & (load < 0.0), -load / np.where(inwards, kappa, 1.0), 0.0)
+        return loss + np.where(inwards & (load < 0.0), -load / np.where(inwards, kappa, 1.0), 0.0)
 
-    def most(self, lam: Array) -> Array:
-        """So that N >= 0 where the track bends away from the body."""
-        climbed, kappa, load = self._terms(lam)
+    def upper(self, lam: Array) -> Array:
+        """Return the bound above which N < 0 where the track curves away from the body; infinite elsewhere."""
+        loss, kappa, load = self._terms(lam)
         away = kappa < 0.0
-        bound = climbed + load / np.where(away, -kappa, 1.0)
+        bound = loss + load / np.where(away, -kappa, 1.0)
         straight = np.where((kappa == 0.0) & (load < 0.0), -np.inf, np.inf)
         out: Array = np.where(away, bound, straight)
         return out
 
 
-def _largest(function: Callable[[Array], Array], low: float, high: float) -> tuple[float, float]:
-    """Where a function is largest in a range, and its value there."""
-    first = next(grid_peaks(function, low, high, LOOKS + 1))
-    *_, peak = grid_peaks(function, first.low, first.high, ZOOM, ROUNDS)
+def _maximum(function: Callable[[Array], Array], low: float, high: float) -> tuple[float, float]:
+    """Return the place of the maximum of a function in a range, and the maximum."""
+    first = next(grid_peaks(function, low, high, FIRST_STEPS + 1))
+    *_, peak = grid_peaks(function, first.low, first.high, FINE_POINTS, FINE_GRIDS)
     return peak.place, peak.value

@@ -1,1 +1,1 @@
-"""Motions in other formats: labelled datasets and HTML."""
+"""Conversion of motions to labelled datasets and HTML."""

@@ -1,4 +1,4 @@
-"""A motion sampled in time as a labelled dataset: names, units, and what it was computed from."""
+"""A motion sampled in time as a labelled dataset, with names, units and the input it was computed from."""
 
 from typing import TYPE_CHECKING, Any
 
@@ -14,29 +14,36 @@ if TYPE_CHECKING:
 
 SAMPLES = 201
 
-# What the variables are called and measured in. The unit of the curve's parameter is the declaration's own affair.
+# Long name and unit of each variable. The unit of the curve parameter depends on the declaration and is not known here.
 VARIABLES = {
-    "lam": ("parameter of the curve", None),
+    "lam": ("curve parameter", None),
     "s": ("arc length from the launch", "m"),
     "x": ("horizontal coordinate", "m"),
     "z": ("height", "m"),
     "v": ("velocity ds/dt", "m/s"),
     "v2": ("squared speed", "m2/s2"),
     "kappa": ("signed curvature", "1/m"),
-    "normal_force": ("contact force along the normal, left of growing parameter", "N"),
+    "normal_force": ("contact force along the normal, which points to the left of increasing parameter", "N"),
 }
 
 
 @require("data")
 def dataset(motion: "Motion", t: Any = None) -> "Dataset":
-    """Sample a motion into an xarray Dataset over its time.
+    """Sample a motion into an xarray Dataset; `Motion.to_xarray` is the public way to do so.
 
     Parameters
     ----------
     motion : Motion
         The motion.
     t : array_like, optional
-        Times in seconds; evenly over one period, or over the whole motion, if not given.
+        Times in seconds from the launch. Without it 201 times are spaced evenly over one period, or over the whole
+        motion if it does not repeat.
+
+    Returns
+    -------
+    xarray.Dataset
+        The variables of a `State` over the dimension ``t``, and ``lam_error``, the bound of the error of ``lam``. The
+        attributes hold the module, the launch and the parameters as they were given.
     """
     from xarray import Dataset
 
@@ -47,7 +54,7 @@ def dataset(motion: "Motion", t: Any = None) -> "Dataset":
     columns["lam"][2]["parameter"] = formulas.parameter
     error = np.atleast_1d(motion.error_bound(times))
     columns["lam_error"] = (("t",), error, _attributes("bound of the error of lam", None))
-    clock = ("t", np.atleast_1d(state.t), _attributes("time from the launch", "s"))
+    time = ("t", np.atleast_1d(state.t), _attributes("time from the launch", "s"))
     provenance = {
         "module": formulas.name,
         "kind": motion.kind,
@@ -57,7 +64,7 @@ def dataset(motion: "Motion", t: Any = None) -> "Dataset":
         "contact": launch.contact,
         **{f"parameter_{name}": p.text for name, p in zip(formulas.parameters, motion.problem.p, strict=True)},
     }
-    return Dataset(columns, coords={"t": clock}, attrs=provenance)
+    return Dataset(columns, coords={"t": time}, attrs=provenance)
 
 
 def _attributes(long_name: str, units: str | None) -> dict[str, str]:

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
 
 def summary(motion: "Motion") -> list[tuple[str, Any]]:
-    """What there is to say of a motion in a few lines: its launch, kind, turning points and times."""
+    """Return the kind, launch, turning points, times and parameters of a motion as pairs of label and value."""
     problem = motion.problem
     name = problem.formulas.parameter
     rows: list[tuple[str, Any]] = [("kind", motion.kind), (f"launch at {name}", problem.launch.lam0.text)]
@@ -29,7 +29,7 @@ def summary(motion: "Motion") -> list[tuple[str, Any]]:
 
 
 def page(motion: "Motion") -> str:
-    """A motion as HTML: its summary and its events."""
+    """Return the summary and the events of a motion as HTML."""
     lines = "".join(f"<tr><th>{escape(label)}</th><td>{_text(value)}</td></tr>" for label, value in summary(motion))
     events = Rows(motion.events)._repr_html_()
     return f"<p><b>{escape(motion.problem.formulas.name)}</b></p><table><tbody>{lines}</tbody></table>{events}"

@@ -1,20 +1,32 @@
-"""Figures of motions and models, drawn with Matplotlib, which is imported when first asked for.
+"""Figures of motions and models, drawn with Matplotlib, which is imported when a figure is first drawn.
 
-Colours are safe for colour-blind readers and differ in brightness, so that they survive a black-and-white print;
-events are told apart by their markers.
+The colours can be told apart by colour-blind readers and differ in brightness, so that they survive a black-and-white
+print; the kinds of events differ in their markers.
 """
 
-from gqm_sym.figures.motions import animate, loads, portrait, sampled, track
+from typing import Any
+
+from gqm_sym.figures.motions import animate, portrait, sampled, speed_and_force, track
 from gqm_sym.figures.portraits import period_against_amplitude, phase_portrait
 from gqm_sym.figures.surveys import smoothing
 
 __all__ = [
     "animate",
-    "loads",
     "period_against_amplitude",
     "phase_portrait",
     "portrait",
     "sampled",
     "smoothing",
+    "speed_and_force",
     "track",
 ]
+
+# Public names of earlier versions, and what they are called now.
+RENAMED = {"loads": "speed_and_force"}
+
+
+def __getattr__(name: str) -> Any:
+    """Say the new name of a function that was renamed."""
+    if name in RENAMED:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}; its new name is {RENAMED[name]!r}")
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

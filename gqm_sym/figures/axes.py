@@ -1,4 +1,4 @@
-"""What all figures share: axes to draw on, and how they are labelled."""
+"""Axes, labels and legends, which all figures share."""
 
 from functools import lru_cache
 from io import BytesIO
@@ -10,7 +10,7 @@ if TYPE_CHECKING:
 
 
 def new_axes(axes: "Axes | None") -> "Axes":
-    """Axes to draw on: those given, or those of a new figure."""
+    """Return the given axes, or those of a new figure if none are given."""
     if axes is not None:
         return axes
     new: Axes = new_figure(7, 4.5).subplots()
@@ -18,42 +18,42 @@ def new_axes(axes: "Axes | None") -> "Axes":
 
 
 def new_figure(width: float, height: float) -> "Figure":
-    """An empty figure, its size in inches, which notebooks show whether pyplot is in use or not."""
-    return _shown()(figsize=(width, height), layout="constrained")
+    """Return an empty figure of a size in inches. Notebooks show it with and without pyplot."""
+    return _displayable_figure()(figsize=(width, height), layout="constrained")
 
 
 @lru_cache(maxsize=1)
-def _shown() -> "type[Figure]":
+def _displayable_figure() -> "type[Figure]":
     from matplotlib.figure import Figure
 
-    class Shown(Figure):
-        """A figure that is a picture to IPython."""
+    class DisplayableFigure(Figure):
+        """A figure that IPython displays as an image."""
 
         def _repr_png_(self) -> bytes:
             stream = BytesIO()
             self.savefig(stream, format="png")
             return stream.getvalue()
 
-    return Shown
+    return DisplayableFigure
 
 
 def figure_of(axes: "Axes") -> "Figure":
-    """The figure that axes are part of."""
+    """Return the figure that the axes belong to."""
     from matplotlib.figure import Figure
 
     figure = axes.figure
-    while not isinstance(figure, Figure):  # a figure within a figure
+    while not isinstance(figure, Figure):  # a SubFigure
         figure = figure.figure
     return figure
 
 
 def finished(axes: "Axes", x: str, y: str) -> "Figure":
-    """Label the axes and list each kind of mark once."""
+    """Label the axes, put each kind of mark once into the legend, and return the figure."""
     axes.set_xlabel(x)
     axes.set_ylabel(y)
     axes.grid(visible=True, alpha=0.3)
     handles, labels = axes.get_legend_handles_labels()
-    once = dict(zip(labels, handles, strict=True))
-    if once:
-        axes.legend(once.values(), once.keys(), loc="best", fontsize="small")
+    entries = dict(zip(labels, handles, strict=True))
+    if entries:
+        axes.legend(entries.values(), entries.keys(), loc="best", fontsize="small")
     return figure_of(axes)

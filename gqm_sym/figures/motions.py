@@ -21,14 +21,15 @@ if TYPE_CHECKING:
 
     from gqm_sym.runtime.motion.motion import Motion, State
 
-SAMPLES = 801
+# Number of states that are drawn, and the least number between two events.
+MAX_SAMPLES, MIN_SAMPLES = 801, 33
 
-# How far a portrait reaches beyond its motion, as a share of the motion's extent.
-MARGIN = 0.4
+# How far a phase portrait extends beyond its motion on each side, as a fraction of the motion's range.
+PORTRAIT_MARGIN = 0.4
 
-# Orange where the contact force is along the normal (left of growing parameter), purple where against it.
-COLOURS = "PuOr_r"
-LINE = "#333333"
+# Orange where the contact force points along the normal (to the left of increasing parameter), purple where against it.
+FORCE_COLOURS = "PuOr_r"
+LINE_COLOUR = "#333333"
 MARKERS = {
     "launch": (">", "#000000"),
     "turn": ("o", "#0072b2"),
@@ -39,19 +40,24 @@ MARKERS = {
     "cusp": ("*", "#cc79a7"),
     "slip": ("P", "#56b4e9"),
 }
-OTHER = ("X", "#666666")
+OTHER_MARKER = ("X", "#666666")
 
 
 @require("plot")
 def track(motion: "Motion", axes: "Axes | None" = None) -> "Figure":
-    """Draw the part of the track that a motion runs through, coloured by the contact force, with its events.
+    """Draw the part of the track that the body runs through, coloured by the contact force, with the events.
 
     Parameters
     ----------
     motion : Motion
-        A periodic one is drawn over one period.
+        The motion; a periodic one is drawn over one period.
     axes : matplotlib Axes, optional
-        Where to draw; a new figure if not given.
+        Where to draw. Without it a new figure is made.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        Coordinates are in metres, contact forces in newtons.
     """
     from matplotlib.collections import LineCollection
     from matplotlib.colors import TwoSlopeNorm
@@ -64,15 +70,15 @@ def track(motion: "Motion", axes: "Axes | None" = None) -> "Figure":
     line = LineCollection(
         list(np.stack([points[:-1], points[1:]], axis=1)),
         array=force,
-        cmap=COLOURS,
+        cmap=FORCE_COLOURS,
         norm=TwoSlopeNorm(0.0, -largest, largest),
         linewidth=4,
         capstyle="round",
     )
-    axes.plot(path.x, path.z, color=LINE, linewidth=5.5, solid_capstyle="round", zorder=1)
+    axes.plot(path.x, path.z, color=LINE_COLOUR, linewidth=5.5, solid_capstyle="round", zorder=1)
     axes.add_collection(line)
     for kind, x, z in _marks(motion):
-        marker, colour = MARKERS.get(kind, OTHER)
+        marker, colour = MARKERS.get(kind, OTHER_MARKER)
         axes.plot(x, z, marker, color=colour, markeredgecolor="white", markersize=9, linestyle="none", label=kind)
     figure = figure_of(axes)
     figure.colorbar(line, ax=axes, label="contact force N (N)")
@@ -82,13 +88,20 @@ def track(motion: "Motion", axes: "Axes | None" = None) -> "Figure":
 
 
 @require("plot")
-def loads(motion: "Motion", axes: Any = None) -> "Figure":
-    """Draw speed and contact force against arc length, with the events.
+def speed_and_force(motion: "Motion", axes: Any = None) -> "Figure":
+    """Draw the speed and the contact force against the arc length, with the events.
 
     Parameters
     ----------
+    motion : Motion
+        The motion; a periodic one is drawn over one period.
     axes : pair of matplotlib Axes, optional
-        Above for the speed, below for the load.
+        Where to draw: the speed on the first, the contact force on the second. Without it a new figure is made.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        Arc length from the launch in metres, speed in m/s, contact force along the normal in newtons.
     """
     if axes is None:
         axes = new_figure(7, 5).subplots(2, 1, sharex=True)
@@ -96,10 +109,10 @@ def loads(motion: "Motion", axes: Any = None) -> "Figure":
     path = sampled(motion)
     above.plot(path.s, np.abs(path.v), color="#0072b2")
     below.plot(path.s, path.normal_force, color="#d55e00")
-    below.axhline(0.0, color=LINE, linewidth=0.8)
+    below.axhline(0.0, color=LINE_COLOUR, linewidth=0.8)
     for event in motion.events:
         state = motion.state(min(event.t, motion.t_end))
-        marker, colour = MARKERS.get(event.kind, OTHER)
+        marker, colour = MARKERS.get(event.kind, OTHER_MARKER)
         for axis, value in ((above, abs(state.v)), (below, state.normal_force)):
             axis.plot(state.s, value, marker, color=colour, markeredgecolor="white", linestyle="none", label=event.kind)
     above.set_ylabel("speed |V| (m/s)")
@@ -109,19 +122,30 @@ def loads(motion: "Motion", axes: Any = None) -> "Figure":
 
 @require("plot")
 def portrait(motion: "Motion", axes: "Axes | None" = None) -> "Figure":
-    """Draw the phase portrait round the orbit of a conservative motion, with its separatrices; see `phase_portrait`.
+    """Draw the phase portrait around the orbit of a conservative motion, with its separatrices; see `phase_portrait`.
 
     Parameters
     ----------
+    motion : Motion
+        A motion without friction, drag or resistance.
     axes : matplotlib Axes, optional
-        Where to draw; a new figure if not given.
+        Where to draw. Without it a new figure is made.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+
+    Raises
+    ------
+    SolutionError
+        If the motion loses energy.
     """
     problem = motion.problem
     span = None
     if not problem.period:
         lam = sampled(motion).lam
         low, high = float(lam.min()), float(lam.max())
-        margin = MARGIN * (high - low) or 1.0
+        margin = PORTRAIT_MARGIN * (high - low) or 1.0
         span = (max(low - margin, problem.low), min(high + margin, problem.high))
     launch = (problem.launch.lam0.value, motion.direction * problem.launch.v0.value)
     given = tuple(number.text for number in problem.p)
@@ -135,12 +159,20 @@ def animate(motion: "Motion", path: "str | Path", *, duration: float | None = No
 
     Parameters
     ----------
+    motion : Motion
+        The motion to show.
     path : path
-        Of the file; its ending says the format (gif, or mp4 where ffmpeg is installed).
+        The file to write. Its extension selects the format: ``.gif``, or ``.mp4`` where ffmpeg is installed.
     duration : float, optional
-        Seconds of motion to show; one period, or the whole motion, if not given.
+        Length of the animation in seconds of motion, from the launch on. Without it one period is shown, or the whole
+        motion if it does not repeat.
     rate : int
-        Frames a second.
+        Frames per second.
+
+    Raises
+    ------
+    InputError
+        If ``duration`` is not positive.
     """
     from matplotlib.animation import FuncAnimation
 
@@ -159,13 +191,26 @@ def animate(motion: "Motion", path: "str | Path", *, duration: float | None = No
 
 
 def sampled(motion: "Motion") -> "State":
-    """States at times that crowd where the body is fast."""
+    """Return states at times that lie closer together next to events, for smooth lines.
+
+    Parameters
+    ----------
+    motion : Motion
+        A periodic motion is sampled over one period, any other from the launch to its end.
+
+    Returns
+    -------
+    State
+        Arrays of some 800 states, in order of time.
+    """
     end = horizon(motion)
     marks = sorted({0.0, end, *(event.t for event in motion.events if event.t < end)})
-    share = max(SAMPLES // max(len(marks) - 1, 1), 33)
-    # Even steps in the angle of a half turn: a body is slow next to a turning point.
-    turn = 0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, share))
-    times: Array = np.concatenate([start + (stop - start) * turn for start, stop in pairwise(marks)] or [np.zeros(1)])
+    count = max(MAX_SAMPLES // max(len(marks) - 1, 1), MIN_SAMPLES)
+    # Steps that shorten towards both ends resolve the turning points, where the curves of speed and force are steep.
+    fractions = 0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, count))
+    times: Array = np.concatenate(
+        [start + (stop - start) * fractions for start, stop in pairwise(marks)] or [np.zeros(1)]
+    )
     return motion.state(np.minimum(times, motion.t_end))
 
 
@@ -175,8 +220,8 @@ def _marks(motion: "Motion") -> list[tuple[str, float, float]]:
 
 
 def drawing(motion: "Motion", what: str, axes: Any) -> "Figure":
-    """Draw one of the figures of a motion by its name."""
-    figures = {"track": track, "loads": loads, "portrait": portrait}
+    """Draw one of the figures of a motion, given by name; `Motion.plot` is the public way to do so."""
+    figures = {"track": track, "speed_and_force": speed_and_force, "portrait": portrait}
     if what not in figures:
         raise InputError(f"plot: what: must be one of {', '.join(figures)}, got {what!r}")
     return figures[what](motion, axes)

@@ -1,1 +1,1 @@
-"""Numbers and formulas as people write them, read without SymPy and kept exact."""
+"""Reading of numbers and arithmetic text, exactly and without SymPy."""

@@ -1,4 +1,4 @@
-"""Numbers p + q*pi with rational p and q, enclosed by fractions: the angles people write, without mpmath."""
+"""Numbers of the form p + q*pi with rational p and q, enclosed by fractions without mpmath: the common angles."""
 
 import ast
 from fractions import Fraction
@@ -6,14 +6,14 @@ from fractions import Fraction
 from gqm_sym.errors import ExpressionError
 from gqm_sym.literals.trees import evaluate
 
-# 100 decimals of pi, cut off.
+# The first 100 decimals of pi.
 _DIGITS = int("31415926535897932384626433832795028841971693993751058209749445923078164062862089986280348253421170679")
 _PI = (Fraction(_DIGITS, 10**100), Fraction(_DIGITS + 1, 10**100))
 Pair = tuple[Fraction, Fraction]
 
 
 def enclose_angle(tree: ast.expr, *, where: str) -> Pair | None:
-    """Bounds of a tree's value to a hundred digits of pi, or None if it is of another form."""
+    """Return bounds of the value of a tree from a hundred digits of pi, or None if the tree has another form."""
     try:
         rational, turns = evaluate(tree, _Angles(), where=where)
     except ExpressionError:
@@ -23,7 +23,7 @@ def enclose_angle(tree: ast.expr, *, where: str) -> Pair | None:
 
 
 class _Angles:
-    """The algebra of pairs (p, q). What leaves it is refused; the caller then takes the general way."""
+    """The algebra of pairs (p, q). An operation that leads out of it is refused, for the caller to use `enclose`."""
 
     def number(self, value: Fraction) -> Pair:
         return value, Fraction(0)

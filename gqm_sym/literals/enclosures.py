@@ -1,11 +1,11 @@
-"""Rigorous values of trees without names: exact where rational, else intervals, as narrow as asked.
+"""Rigorous values of trees without names: exact fractions, or intervals of any required width.
 
-Precision rises until every question (is this negative? inside the domain of asin?) has an answer.
-What is still undecided at the last precision, and equal to 200 digits, counts as equal:
+The precision is raised until every question (Is this number negative? Is it in the domain of asin?) has an answer.
+Numbers that cannot be told apart at the last precision, where they agree to 200 digits, count as equal:
 ``sqrt(2)**2 - 2`` is zero.
 
-mpmath is imported when the first irrational number is met. Its ``libmp`` works without global
-state, so this is safe in threads.
+mpmath is imported when the first irrational number occurs. Its ``libmp`` has no global state, so that this is safe in
+threads.
 """
 
 import ast
@@ -22,14 +22,14 @@ from gqm_sym.literals.trees import evaluate
 
 Mpf: TypeAlias = tuple[int, int, int, int]
 Interval: TypeAlias = tuple[Mpf, Mpf]
-Value: TypeAlias = Fraction | Interval | None  # None: it depends on a name
+Value: TypeAlias = Fraction | Interval | None  # None if it depends on a name
 GUARD_BITS = 32
 LAST_BITS = 4096
 
-# Two numbers closer than 2**-700 of their size, 210 digits, are the same.
+# Two numbers whose relative difference is below 2**-700 (210 digits) count as equal.
 EQUAL_BITS = 700
 
-# Binary exponents of intermediate results and of the argument of exp: wide, but quick to compute.
+# Limits on the binary exponents of intermediate results and of the argument of exp, which keep computations short.
 MAX_SCALE = 2**21
 MAX_EXP_SCALE = 20
 _ODD = ("sin", "tan", "asin", "atan", "sinh", "tanh", "asinh", "atanh", "sqrt", "cbrt")
@@ -42,7 +42,7 @@ _EXACT: dict[tuple[str, int], int] = {
     ("cbrt", -1): -1,
 }
 
-# Where functions are real, and whether the ends belong to it.
+# The domain in which a function is real: its ends, and whether they belong to it.
 _DOMAINS: dict[str, tuple[int, int | None, bool]] = {
     "asin": (-1, 1, True),
     "acos": (-1, 1, True),
@@ -65,17 +65,24 @@ _GROWING = ("asin", "atan", "sinh", "tanh", "asinh", "atanh", "exp", "log", "sqr
 def enclose(
     tree: ast.expr, bits: int, *, where: str, values: Mapping[str, ast.expr] = MappingProxyType({})
 ) -> Fraction | Interval:
-    """Value of a tree: exact, or an interval no wider than ``2**-bits`` of its size.
+    """Return the value of a tree: exact, or an interval whose relative width is at most ``2**-bits``.
 
     Parameters
     ----------
+    tree
+        The tree.
+    bits
+        The required relative precision, in bits.
+    where
+        What the tree is, for messages of errors.
     values
-        What names in it mean, as trees without names: nearly, so that no exact number grows long.
+        Values of the names in the tree, as trees without names. They are used as intervals, so that no exact number
+        becomes long.
 
     Raises
     ------
     ExpressionError
-        If it is not a finite real number, or has another name in it.
+        If the value is not a finite real number, or the tree contains a name that is not in ``values``.
     """
     precision = bits + GUARD_BITS
     last = bits + LAST_BITS
@@ -83,18 +90,18 @@ def enclose(
         algebra = _Enclosures(min(precision, last), last=precision >= last, values=values)
         try:
             value = evaluate(tree, algebra, where=where)
-            assert value is not None  # `name` has refused what it knows no number of
+            assert value is not None  # `name` has refused all unknown names
             if isinstance(value, Fraction) or algebra.is_narrow(value, bits):
                 return value
         except _Undecided:
             pass
         if precision >= last:
-            raise ExpressionError(f"{where}: its digits cancel; write it in another way")
+            raise ExpressionError(f"{where}: its digits cancel; write it in another form")
         precision *= 2
 
 
 def check_constants(tree: ast.expr, *, where: str) -> None:
-    """Refuse a tree any part of which is, whatever its names may mean, no finite real number."""
+    """Refuse a tree if some part of it cannot be a finite real number for any values of its names."""
     precision = 64
     while True:
         algebra = _Enclosures(precision, last=precision >= LAST_BITS, names=True)
@@ -106,7 +113,7 @@ def check_constants(tree: ast.expr, *, where: str) -> None:
 
 
 class _Undecided(Exception):
-    """More bits are needed to tell."""
+    """More bits are needed for a decision."""
 
 
 class _Enclosures:
@@ -117,11 +124,11 @@ class _Enclosures:
     bits
         Working precision.
     last
-        Whether no more than these will be tried: then what is undecided is decided.
+        Whether this is the highest precision, at which every question is decided.
     names
-        Whether names are allowed; what depends on them is None.
+        Whether unknown names are allowed; the value of what depends on them is None.
     values
-        Names that are allowed anyway, and what they mean.
+        Values of known names.
     """
 
     def __init__(
@@ -158,7 +165,7 @@ class _Enclosures:
             return self.interval(value) if isinstance(value, Fraction) else value
         if self.names:
             return None
-        raise ValueError(f"{name!r} is no number; write one such as 9.81 or pi/2")
+        raise ValueError(f"{name!r} is not a number; write a number such as 9.81 or pi/2")
 
     def negate(self, value: Value) -> Value:
         if isinstance(value, tuple):
@@ -179,7 +186,7 @@ class _Enclosures:
             low = self.mp.mpf_add(low, other_low, self.bits, "f")
             high = self.mp.mpf_add(high, other_high, self.bits, "c")
         scale = max(_scale(end) for interval in intervals for end in interval)
-        return self.settled((low, high), scale)
+        return self.checked((low, high), scale)
 
     def product(self, factors: list[Value]) -> Value:
         if any(factor is None for factor in factors):
@@ -191,12 +198,12 @@ class _Enclosures:
         result = self.interval(exact)
         for interval in intervals:
             result = self.mp.mpi_mul(result, interval, self.bits)
-        return self.settled(result)
+        return self.checked(result)
 
     def reciprocal(self, value: Value) -> Value:
         if isinstance(value, tuple):
             self.sign(value)
-            return self.settled(self.mp.mpi_div(self.interval(Fraction(1)), value, self.bits))
+            return self.checked(self.mp.mpi_div(self.interval(Fraction(1)), value, self.bits))
         return None if value is None else rationals.reciprocal(value)
 
     def power(self, base: Value, exponent: Value) -> Value:
@@ -207,9 +214,9 @@ class _Enclosures:
         if isinstance(exponent, Fraction) and exponent.denominator == 1:
             if isinstance(base, Fraction):
                 return rationals.power(base, exponent.numerator)
-            return self.whole_power(base, exponent.numerator)
+            return self.integer_power(base, exponent.numerator)
         if self.sign(base) < 0:
-            raise ValueError("a negative number to a power that is not whole, which is not real")
+            raise ValueError("a negative number to a power that is not an integer, which is not real")
         if base == 0:
             if self.sign(exponent) < 0:
                 raise ValueError("division by zero")
@@ -234,7 +241,7 @@ class _Enclosures:
                 above = self.call(over, argument) if over else Fraction(1)
                 return self.product([above, self.reciprocal(self.call(under, argument))])
             case "acosh":
-                # Not by log(x + sqrt(x**2 - 1)), which has no digits left near x = 1.
+                # The formula log(x + sqrt(x**2 - 1)) would lose all digits near x = 1.
                 x = self.inside(function, argument)
                 half = self.product([self.total([x, Fraction(-1)]), Fraction(1, 2)])
                 return self.product([Fraction(2), self.call("asinh", self.call("sqrt", half))])
@@ -243,9 +250,9 @@ class _Enclosures:
                     return self.negate(self.power(self.negate(argument), Fraction(1, 3)))
                 return self.power(argument, Fraction(1, 3))
         low, high = self.interval(self.inside(function, argument))
-        return self.settled(self.real_function(function, low, high))
+        return self.checked(self.real_function(function, low, high))
 
-    # Steps of it.
+    # Parts of the operations.
 
     def interval(self, value: Fraction | Interval) -> Interval:
         if isinstance(value, tuple):
@@ -268,10 +275,10 @@ class _Enclosures:
         width = self.mp.mpf_sub(high, low, self.bits, "c")
         return width == self.mp.fzero or _scale(width) < min(_scale(low), _scale(high)) - bits
 
-    def settled(self, value: Interval, scale: int = 0) -> Fraction | Interval:
-        """Check the size, and call zero what cannot be told from zero at the last precision.
+    def checked(self, value: Interval, scale: int = 0) -> Fraction | Interval:
+        """Check the size of a value; at the last precision a value that may be zero is zero.
 
-        ``scale`` is the binary exponent of what the value was made from.
+        ``scale`` is the binary exponent of the terms that the value is the sum of.
         """
         low, high = value
         if max(abs(_scale(low)), abs(_scale(high))) > MAX_SCALE:
@@ -279,16 +286,16 @@ class _Enclosures:
         if not self.last or self.mp.mpf_sign(low) * self.mp.mpf_sign(high) > 0:
             return value
         if _scale(self.mp.mpf_sub(high, low, self.bits, "c")) > scale - EQUAL_BITS:
-            raise ValueError("the digits of it cancel; write it in another way")
+            raise ValueError("its digits cancel; write it in another form")
         return Fraction(0)
 
-    def whole_power(self, base: Interval, exponent: int) -> Fraction | Interval:
+    def integer_power(self, base: Interval, exponent: int) -> Fraction | Interval:
         if exponent == 0:
             return Fraction(1)
         negative = self.sign(base) < 0
         low, high = self.mp.mpi_abs(base, self.bits)
         size = abs(exponent)
-        result: Value = self.settled(
+        result: Value = self.checked(
             (
                 self.mp.mpf_pow_int(low, size, self.bits, "f"),
                 self.mp.mpf_pow_int(high, size, self.bits, "c"),
@@ -309,7 +316,7 @@ class _Enclosures:
         return None
 
     def inside(self, function: str, argument: Fraction | Interval) -> Fraction | Interval:
-        """The part of the argument where the function is real."""
+        """Return the argument, or the end of the domain that it equals; refuse it outside the domain."""
         if function not in _DOMAINS:
             return argument
         low, high, closed = _DOMAINS[function]
@@ -338,23 +345,23 @@ class _Enclosures:
         elif function == "acos":
             low, high = high, low
         elif function not in _GROWING:
-            raise ValueError(f"no function {function!r}")
+            raise ValueError(f"unknown function {function!r}")
         monotone: Callable[..., Mpf] = getattr(mp, f"mpf_{function}")
-        return self.widened(monotone(low, bits + 10, "n"), monotone(high, bits + 10, "n"))
+        return self.widen(monotone(low, bits + 10, "n"), monotone(high, bits + 10, "n"))
 
     def circular(self, function: Callable[..., Mpf], low: Mpf, high: Mpf) -> Interval:
-        """Sine or cosine, no steeper than 1."""
+        """Return sine or cosine of an interval, whose slope is at most 1."""
         mp, bits = self.mp, self.bits
         radius = mp.mpf_sub(high, low, bits, "c")
         if _scale(radius) > -2:
             if self.last:
                 raise ValueError("sine or cosine of a number too large for its digits")
             raise _Undecided
-        low, high = self.widened(*[function(low, bits + 10, "n")] * 2)
+        low, high = self.widen(*[function(low, bits + 10, "n")] * 2)
         return mp.mpf_sub(low, radius, bits, "f"), mp.mpf_add(high, radius, bits, "c")
 
-    def widened(self, low: Mpf, high: Mpf) -> Interval:
-        """Outwards by the last bit, which mpmath's functions do not promise."""
+    def widen(self, low: Mpf, high: Mpf) -> Interval:
+        """Return an interval widened by its last bit, which mpmath does not guarantee for these functions."""
         mp, bits = self.mp, self.bits
         ulp = mp.mpf_shift(mp.fone, 1 - bits)
         below = mp.mpf_mul(mp.mpf_abs(low), ulp, bits, "c")
@@ -363,7 +370,7 @@ class _Enclosures:
 
 
 def _scale(value: Mpf) -> int:
-    """Binary exponent: ``|value| < 2**scale``; of zero, the smallest."""
+    """Return the binary exponent, for which ``|value| < 2**scale``; for zero, the smallest."""
     _, mantissa, exponent, bits = value
     if not mantissa and exponent:
         return MAX_SCALE + 1  # infinite, or not a number

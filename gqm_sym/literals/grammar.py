@@ -1,4 +1,4 @@
-"""The one reader of arithmetic text: text -> tree (``evaluate``, beside it, makes values of trees).
+"""The only parser of arithmetic text; `gqm_sym.literals.trees.evaluate` evaluates the trees that it returns.
 
 ::
 
@@ -8,10 +8,9 @@
     power    = operand ["**" signed]
     operand  = number | name | function "(" sum ")" | "(" sum ")"
 
-A tree is made of Python's own ``ast`` nodes (BinOp, UnaryOp, Call, Name, Constant), so that
-``ast.walk`` works on it, but not by Python's parser: that one knows far more than arithmetic, reads
-``9.81`` as a double, and can be overrun by deep nesting. Constants hold Fractions. Nothing here can
-run what the text says.
+A tree consists of Python's ``ast`` nodes (BinOp, UnaryOp, Call, Name, Constant), so that ``ast.walk`` works on it.
+Python's own parser is not used: it accepts far more than arithmetic, reads ``9.81`` as a double, and can be overrun by
+deep nesting. Constants hold Fractions. Text is never executed.
 """
 
 import ast
@@ -35,10 +34,10 @@ FUNCTIONS = (
 CONSTANTS = ("pi", "e")
 MAX_LENGTH = 4000
 
-# Deeper than anyone writes. SymPy differentiates by recursion, and stands 30 in an empty stack.
+# Deeper than anyone writes. SymPy differentiates by recursion and survives 30 levels on an empty stack.
 MAX_DEPTH = 25
 
-# More than anyone measures: what ``period_to`` prints can be read again.
+# More than any measurement has, so that what ``period_to`` prints can be read back.
 MAX_DIGITS = 400
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 _TOKEN = re.compile(
@@ -56,16 +55,16 @@ _HINTS = {
     "{": "write parentheses",
     ".": "there are no attributes; " + _ALLOWED,
 }
-_LOOK_ALIKES = {
+_REPLACEMENTS = {
     **dict.fromkeys("\N{MINUS SIGN}\N{EN DASH}\N{EM DASH}\N{HYPHEN}\N{NON-BREAKING HYPHEN}", "-"),
     **dict.fromkeys("\N{MULTIPLICATION SIGN}\N{MIDDLE DOT}\N{DOT OPERATOR}\N{ASTERISK OPERATOR}", "*"),
     **dict.fromkeys("\N{DIVISION SIGN}\N{DIVISION SLASH}\N{FRACTION SLASH}", "/"),
     **{"\N{SUPERSCRIPT TWO}": "**2", "\N{SUPERSCRIPT THREE}": "**3", "\N{SQUARE ROOT}": "sqrt( )"},
 }
 
-# How tightly operators bind; a sign stands between products and powers: -2**2 is -(2**2).
-_BINDING = {"+": 1, "-": 1, "*": 2, "/": 2, "**": 4}
-_SIGN = 3
+# Precedence of operators; that of a sign lies between products and powers: -2**2 is -(2**2).
+_PRECEDENCE = {"+": 1, "-": 1, "*": 2, "/": 2, "**": 4}
+_SIGN_PRECEDENCE = 3
 _OPERATORS: dict[str, type[ast.operator]] = {
     "+": ast.Add,
     "-": ast.Sub,
@@ -81,31 +80,31 @@ def parse(text: str, *, where: str) -> ast.expr:
     Parameters
     ----------
     text
-        At most 4000 characters of ASCII.
+        At most 4000 ASCII characters.
     where
-        What the text is, as errors should call it: ``curve.graph.z``.
+        What the text is, for messages of errors: ``curve.graph.z``.
 
     Returns
     -------
     ast.expr
-        A tree that ``evaluate`` takes. Columns (``col_offset``) count from 0 in ``text``.
+        A tree for ``evaluate``. Columns (``col_offset``) count from 0 in ``text``.
 
     Raises
     ------
     ExpressionError
-        With the column, counted from 1, of what is not in the grammar.
+        If the text is not in the grammar; the message gives the column, counted from 1.
     """
     if not isinstance(text, str):
-        raise ExpressionError(f"{where}: {type(text).__name__} given; an expression is text")
+        raise ExpressionError(f"{where}: {type(text).__name__} given; write an expression as text")
     if len(text) > MAX_LENGTH:
-        raise ExpressionError(f"{where}: {len(text)} characters; at most {MAX_LENGTH} are read")
-    tree = _Parser(_tokens(text, where), where).whole()
+        raise ExpressionError(f"{where}: {len(text)} characters; an expression has at most {MAX_LENGTH}")
+    tree = _Parser(_tokens(text, where), where).parse()
     check_exponents(tree, where=where)
     return tree
 
 
 def unknown(what: str, given: str, known: tuple[str, ...]) -> str:
-    """``unknown <what> '<given>'``, the nearest known one if it is near, and all of them."""
+    """Return a message about an unknown name, with the most similar known one and all known ones."""
     near = difflib.get_close_matches(given.lower(), known, n=1)
     hint = f"did you mean {near[0]!r}? " if near else ""
     return f"unknown {what} {given!r}; {hint}known {what}s are {', '.join(known)}"
@@ -127,7 +126,7 @@ def _tokens(text: str, where: str) -> list[_Token]:
     while column < len(text):
         match = _TOKEN.match(text, column)
         if match is None:
-            raise _refuse(where, column, _strange(text[column]))
+            raise _refuse(where, column, _unexpected(text[column]))
         if match.lastgroup != "space":
             tokens.append(_Token(str(match.lastgroup), match.group(), column))
         column = match.end()
@@ -136,12 +135,12 @@ def _tokens(text: str, where: str) -> list[_Token]:
     return [*tokens, _Token("end", "", column)]
 
 
-def _strange(character: str) -> str:
-    """Why a character is not read, and what to write for it."""
+def _unexpected(character: str) -> str:
+    """Return the message about a character that is not in the grammar, with what to write instead."""
     if character.isascii():
         return f"unexpected {character!r}; {_HINTS.get(character, _ALLOWED)}"
     name = unicodedata.name(character, "")
-    plain = _LOOK_ALIKES.get(character) or unicodedata.normalize("NFKC", character)
+    plain = _REPLACEMENTS.get(character) or unicodedata.normalize("NFKC", character)
     if "GREEK" in name and " LETTER " in name:
         plain = name.split(" LETTER ")[1].split()[0].lower()
     written = f"U+{ord(character):04X}" + (f" ({name.lower()})" if name else "")
@@ -150,7 +149,7 @@ def _strange(character: str) -> str:
 
 
 class _Parser:
-    """Precedence climbing over the tokens, whose last one is the end."""
+    """A precedence-climbing parser over tokens, the last of which marks the end."""
 
     def __init__(self, tokens: list[_Token], where: str) -> None:
         self.tokens = tokens
@@ -158,31 +157,31 @@ class _Parser:
         self.at = 0
         self.depth = 0
 
-    def whole(self) -> ast.expr:
+    def parse(self) -> ast.expr:
         tree = self.expression(0)
         token = self.tokens[self.at]
         if token.kind != "end":
             raise self.misplaced(token)
         return tree
 
-    def expression(self, looser: int) -> ast.expr:
-        """What binds tighter than ``looser``."""
+    def expression(self, lower: int) -> ast.expr:
+        """Read operators whose precedence is higher than ``lower``."""
         left = self.operand()
         while True:
             token = self.tokens[self.at]
-            binding = _BINDING.get(token.text, 0)
-            if binding <= looser:
+            precedence = _PRECEDENCE.get(token.text, 0)
+            if precedence <= lower:
                 return left
             self.at += 1
-            # A power binds from the right, and takes a sign there: 2**-3**2.
-            right = self.nested(token, _SIGN) if token.text == "**" else self.expression(binding)
+            # Powers associate to the right, and a sign may follow: 2**-3**2.
+            right = self.nested(token, _SIGN_PRECEDENCE) if token.text == "**" else self.expression(precedence)
             left = at_column(ast.BinOp(left, _OPERATORS[token.text](), right), token.column)
 
-    def nested(self, token: _Token, looser: int) -> ast.expr:
+    def nested(self, token: _Token, lower: int) -> ast.expr:
         self.depth += 1
         if self.depth > MAX_DEPTH:
-            raise _refuse(self.where, token.column, f"nested deeper than {MAX_DEPTH} levels; write it flatter")
-        inner = self.expression(looser)
+            raise _refuse(self.where, token.column, f"nested deeper than {MAX_DEPTH} levels; name its parts")
+        inner = self.expression(lower)
         self.depth -= 1
         return inner
 
@@ -194,7 +193,7 @@ class _Parser:
         if token.kind == "name":
             return self.name(token)
         if token.text in ("+", "-"):
-            inner = self.nested(token, _SIGN)
+            inner = self.nested(token, _SIGN_PRECEDENCE)
             return inner if token.text == "+" else at_column(ast.UnaryOp(ast.USub(), inner), token.column)
         if token.text == "(":
             return self.parenthesis(token)
@@ -216,7 +215,7 @@ class _Parser:
         if token.text.startswith("_"):
             raise _refuse(self.where, token.column, f"{token.text!r}: names begin with a letter")
         if keyword.iskeyword(token.text):
-            what = f"{token.text!r} is a word of Python's and cannot be a name; choose another"
+            what = f"{token.text!r} is a keyword of Python and cannot be a name; choose another"
             raise _refuse(self.where, token.column, what)
         if following.text == "(":
             if token.text not in FUNCTIONS:
@@ -232,7 +231,7 @@ class _Parser:
         return at_column(ast.Name(token.text, ast.Load()), token.column)
 
     def literal(self, token: _Token) -> Fraction:
-        """Exactly what is spelled, never by way of a double."""
+        """Return the exact value of a number, which is never rounded to a double."""
         mantissa, _, exponent = token.text.lower().partition("e")
         if sum(character.isdigit() for character in mantissa) > MAX_DIGITS:
             raise _refuse(self.where, token.column, f"a number of more than {MAX_DIGITS} digits")
@@ -242,7 +241,7 @@ class _Parser:
         return Fraction(token.text)
 
     def misplaced(self, token: _Token) -> ExpressionError:
-        """A token where an operator or the end should stand."""
+        """Return the error for a token in the place of an operator or the end."""
         if token.text == ")":
             return _refuse(self.where, token.column, "')' closes no '('")
         before = self.tokens[self.at - 1].text

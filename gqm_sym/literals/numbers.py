@@ -1,8 +1,7 @@
-"""Numbers that mean exactly what was written, without SymPy.
+"""Numbers whose value is exactly what was written, read without SymPy.
 
-A float means its binary value; an int, text such as ``"9.81"`` or ``"-pi/2 + 6/5"``, a Decimal, a
-Fraction and a SymPy number mean what they say. mpmath is imported for irrational numbers alone, and
-for ``Number.at``.
+A float stands for its binary value. An int, text such as ``"9.81"`` or ``"-pi/2 + 6/5"``, a Decimal, a Fraction and a
+SymPy number stand for exactly the number written. mpmath is imported only for irrational numbers and for ``Number.at``.
 """
 
 import ast
@@ -24,42 +23,42 @@ from gqm_sym.literals.sympy_tree import is_sympy, tree_of
 if TYPE_CHECKING:
     from decimal import Decimal
 
-# Enough that both halves of a double-double are correctly rounded, but for cases of chance 2**-80.
+# Precision at which both parts of a double-double are correctly rounded, except with a probability of 2**-80.
 _PAIR_BITS = 192
 
-# Rounding what is known to more digits than these first takes away the last doubt: a tie is a tie.
+# Precision to which a number next to the midpoint of two doubles is rounded first, so that a tie is recognised.
 _TIE_BITS = 700
 
-# Beyond the precision asked for by ``at``, so that it can be rounded once.
+# Extra bits beyond the precision that ``at`` returns, so that its result is rounded only once.
 _GUARD_BITS = 16
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Number:
-    """A finite real number, known exactly. Made by ``read_number``.
+    """A finite real number that is known exactly. Made by ``read_number``.
 
     Attributes
     ----------
-    value
-        Nearest double.
+    value : float
+        The nearest double.
     """
 
     value: float
-    # For what is not a double: what it is beyond ``value``, what it was made from, and its text.
-    _beyond: tuple[float, Fraction | ast.expr, str] | None
+    # If the number is not a double: the nearest double of the remainder, the source of the number, and its text.
+    _remainder: tuple[float, Fraction | ast.expr, str] | None
 
     @property
     def low(self) -> float:
-        """Nearest double of what the number is beyond ``value``."""
-        return 0.0 if self._beyond is None else self._beyond[0]
+        """The double nearest to the difference between the number and ``value``."""
+        return 0.0 if self._remainder is None else self._remainder[0]
 
     @property
     def _source(self) -> float | Fraction | ast.expr:
-        return self.value if self._beyond is None else self._beyond[1]
+        return self.value if self._remainder is None else self._remainder[1]
 
     @property
     def fraction(self) -> Fraction | None:
-        """Exact value if the number is rational as it was written, else None."""
+        """The exact value if the number was written as a rational number, else None."""
         if isinstance(self._source, ast.expr):
             return None
         return Fraction(self._source)
@@ -67,12 +66,12 @@ class Number:
     @property
     def text(self) -> str:
         """The number as it was written."""
-        return repr(self.value) if self._beyond is None else self._beyond[2]
+        return repr(self.value) if self._remainder is None else self._remainder[2]
 
     def at(self, ctx: Any) -> Any:
-        """The number in an mpmath context, at its working precision.
+        """Return the number in an mpmath context at its working precision.
 
-        Rounded once in ``mpmath.mp`` and its like; in ``mpmath.iv`` an interval that contains it.
+        In ``mpmath.mp`` it is rounded once; in ``mpmath.iv`` it is an interval that contains the number.
         """
         from mpmath import MPIntervalContext, libmp
 
@@ -101,7 +100,7 @@ class Number:
         return f"Number({self.text!r})"
 
     def __eq__(self, other: object) -> bool:
-        """Equality of exact values; irrational numbers are told apart by their first 32 digits."""
+        """Compare exact values; irrational numbers are compared by their first 32 digits."""
         if not isinstance(other, Number):
             return NotImplemented
         return (self.value, self.low, self.fraction) == (other.value, other.low, other.fraction)
@@ -110,33 +109,37 @@ class Number:
         return hash((self.value, self.low))
 
 
-# Two numbers are made for every launch, doubles mostly: past the constructor, which is slow for what is frozen.
-_new, _set_value, _set_beyond = object.__new__, *(vars(Number)[name].__set__ for name in Number.__slots__)
+# Two numbers, usually doubles, are made for every launch. This avoids the constructor of a frozen class, which is slow.
+_new, _set_value, _set_remainder = object.__new__, *(vars(Number)[name].__set__ for name in Number.__slots__)
 Doubles: TypeAlias = NDArray[np.float64]
 Source: TypeAlias = "str | int | float | Fraction | Decimal | Number | Any"
 
 
 def read_number(value: Source, *, where: str) -> Number:
-    """Read a number.
+    """Read a number exactly.
 
     Parameters
     ----------
     value
         A float, int, text, Decimal, Fraction, NumPy scalar, mpmath float, SymPy number or Number.
     where
-        What the number is, as errors should call it: ``lam0``.
+        What the number is, for messages of errors: ``lam0``.
+
+    Returns
+    -------
+    Number
 
     Raises
     ------
     NumberError
-        If it is no finite real number, or none that can be evaluated within bounds.
+        If the value is not a finite real number, or is too large to be evaluated.
     """
     if type(value) is float:
         if value - value != 0.0:
             raise NumberError(f"{where}: {value!r} given; give a finite number")
         number = _new(Number)
         _set_value(number, value)
-        _set_beyond(number, None)
+        _set_remainder(number, None)
         return number
     if isinstance(value, Number):
         return value
@@ -156,7 +159,7 @@ def read_number(value: Source, *, where: str) -> Number:
 
 
 def read_numbers(values: Any, *, where: str) -> tuple[Doubles, Doubles, tuple[int, ...]]:
-    """Numbers, or arrays of them, as flat arrays of doubles, flat arrays of what those leave over, and their shape."""
+    """Read a number or an array of numbers into a flat array of doubles, one of remainders, and the shape."""
     if isinstance(values, np.ndarray) and values.dtype == np.float64:
         flat = np.ascontiguousarray(values).reshape(-1)
         return flat, np.zeros_like(flat), values.shape
@@ -169,7 +172,7 @@ def read_numbers(values: Any, *, where: str) -> tuple[Doubles, Doubles, tuple[in
 
 @lru_cache(maxsize=1024)
 def _read_text(text: str, where: str) -> Number:
-    # Defaults are read at every launch.
+    # The cache is for the defaults of parameters, which are read at every launch.
     return _from_tree(parse(text, where=where), text.strip(), where)
 
 
@@ -178,36 +181,36 @@ def _from_tree(tree: ast.expr, text: str, where: str) -> Number:
     if angle is not None and angle[0] != angle[1]:
         near = _split(angle[0], where)
         if near == _split(angle[1], where):
-            return _written(near, tree, text)
+            return _number(near, tree, text)
     exact = enclose(tree, _PAIR_BITS, where=where)
     if isinstance(exact, Fraction):
         return _from_fraction(exact, text, where)
     low, high = (_split(rationals.from_mpf(end), where) for end in exact)
     if low != high:
-        # It lies on the border between two doubles, or next to it: sqrt(2)**2.
+        # The number is at or next to the midpoint of two doubles, as sqrt(2)**2 may be.
         exact = enclose(tree, _TIE_BITS + _GUARD_BITS, where=where)
         low = _split(_nearest(exact), where)
-    return _written(low, tree, text)
+    return _number(low, tree, text)
 
 
 def _from_fraction(exact: Fraction, text: str, where: str) -> Number:
-    return _written(_split(exact, where), exact, text)
+    return _number(_split(exact, where), exact, text)
 
 
-def _written(pair: tuple[float, float], source: Fraction | ast.expr, text: str) -> Number:
+def _number(pair: tuple[float, float], source: Fraction | ast.expr, text: str) -> Number:
     value, low = pair
     return Number(value, (low, source, text))
 
 
 def _split(exact: Fraction, where: str) -> tuple[float, float]:
-    """Nearest double, and the nearest double of the rest; division of integers rounds correctly."""
+    """Return the nearest double and that of the remainder. Python divides integers with correct rounding."""
     try:
         value = exact.numerator / exact.denominator
     except OverflowError:
         what = "beyond the largest double, 1.8e308; give a smaller number"
         raise NumberError(f"{where}: {what}") from None
-    rest = exact - Fraction(value)
-    return value, rest.numerator / rest.denominator
+    remainder = exact - Fraction(value)
+    return value, remainder.numerator / remainder.denominator
 
 
 def _nearest(exact: Fraction | Interval) -> Fraction:

@@ -1,7 +1,7 @@
-"""Exact rational numbers of bounded size: read from Python's number types, and their arithmetic.
+"""Exact rational numbers of bounded size: conversion from Python's number types, and arithmetic.
 
-The bound is what keeps ``9**9**9**9`` from being computed. Arithmetic refuses with ``ValueError``,
-whose text says why; the caller knows where.
+The bound prevents ``9**9**9**9`` from being computed. Arithmetic raises ``ValueError`` with the reason, to which the
+caller adds the place.
 """
 
 import math
@@ -13,26 +13,26 @@ from typing import Any
 
 from gqm_sym.errors import NumberError
 
-# No double needs an exponent beyond this: 2**1000 is near the largest.
+# The largest exponent of a constant power: 2**1000 is close to the largest double.
 MAX_EXPONENT = 1000
 
-# Decimal exponents of literals and of Decimal objects.
+# The largest decimal exponent of a literal or of a Decimal.
 MAX_DECIMAL_EXPONENT = 400
 
-# Of numerator or denominator, 4200 digits: enough for 1.0001**1000, cheap to compute with, and less
-# than the 4300 digits from which Python refuses to print an integer.
+# The largest size of a numerator or denominator (4200 digits). It is enough for 1.0001**1000, keeps arithmetic fast,
+# and stays below the 4300 digits beyond which Python refuses to print an integer.
 MAX_BITS = 14_000
 
 
 def bounded(value: Fraction) -> Fraction:
-    """Return ``value``, or refuse it for its size."""
+    """Return ``value``, or raise ValueError if it is too large."""
     if max(value.numerator.bit_length(), value.denominator.bit_length()) > MAX_BITS:
         raise ValueError("an exact number of more than 4200 digits; write it as a decimal")
     return value
 
 
 def total(terms: Iterable[Fraction]) -> Fraction:
-    """Sum, refused as soon as it outgrows the bound."""
+    """Return a sum, or raise ValueError as soon as it is too large."""
     result = Fraction(0)
     for term in terms:
         result = bounded(result + term)
@@ -40,7 +40,7 @@ def total(terms: Iterable[Fraction]) -> Fraction:
 
 
 def product(factors: Iterable[Fraction]) -> Fraction:
-    """Product, refused as soon as it outgrows the bound."""
+    """Return a product, or raise ValueError as soon as it is too large."""
     result = Fraction(1)
     for factor in factors:
         result = bounded(result * factor)
@@ -48,24 +48,24 @@ def product(factors: Iterable[Fraction]) -> Fraction:
 
 
 def reciprocal(value: Fraction) -> Fraction:
-    """``1/value``."""
+    """Return ``1/value``."""
     if value == 0:
         raise ValueError("division by zero")
     return 1 / value
 
 
 def check_exponent(exponent: Fraction) -> None:
-    """Refuse a constant exponent that no double could stand."""
+    """Raise ValueError for a constant exponent that is too large for doubles."""
     if abs(exponent) > MAX_EXPONENT:
         raise ValueError(f"an exponent beyond {MAX_EXPONENT}; exponents lie within -1000 and 1000")
 
 
 def power(base: Fraction, exponent: int) -> Fraction:
-    """``base**exponent`` for a whole exponent; the size is checked before anything is computed."""
+    """Return ``base**exponent`` for an integer exponent; the size is checked before anything is computed."""
     check_exponent(Fraction(exponent))
     if base == 0 and exponent < 0:
         raise ValueError("division by zero")
-    # floor(log2) of the larger part, so that powers of 1 and -1 cost nothing and are never refused.
+    # floor(log2) of the larger of numerator and denominator; it is 0 for 1 and -1, all powers of which are allowed.
     bits = max(abs(base.numerator), base.denominator).bit_length() - 1
     if bits * abs(exponent) > MAX_BITS:
         raise ValueError("an exact power of more than 4200 digits; write it as a decimal")
@@ -73,7 +73,7 @@ def power(base: Fraction, exponent: int) -> Fraction:
 
 
 def from_mpf(value: Any) -> Fraction:
-    """Binary value of an mpmath or SymPy float, by its ``(sign, mantissa, exponent, bits)``."""
+    """Return the exact value of an mpmath or SymPy float from its ``(sign, mantissa, exponent, bits)``."""
     sign, mantissa, exponent, _ = value
     if mantissa == 0 and exponent != 0:
         raise ValueError("not a finite number")
@@ -84,20 +84,19 @@ def from_mpf(value: Any) -> Fraction:
 
 
 def read_exact(value: object, *, where: str) -> Fraction | None:
-    """Exact value of a number object; None if it is none of the types that are rational by nature.
+    """Return the exact value of an object of a rational number type, or None for any other object.
 
     Parameters
     ----------
     value
-        An int, float, Fraction, Decimal, NumPy scalar, or mpmath or SymPy float; anything else
-        gives None.
+        An int, float, Fraction, Decimal, NumPy scalar, or mpmath or SymPy float; anything else gives None.
     where
-        What the value is for, as errors should call it.
+        What the value is, for messages of errors.
 
     Raises
     ------
     NumberError
-        If it is a truth value, complex, not finite, or of an absurd size.
+        If the value is a truth value, complex, not finite, or too large.
     """
     name = type(value).__name__
     if isinstance(value, bool | complex) or name in ("bool", "bool_", "complex64", "clongdouble"):
@@ -113,7 +112,7 @@ def read_exact(value: object, *, where: str) -> Fraction | None:
             return bounded(Fraction(value))
         if hasattr(value, "_mpf_"):
             return bounded(from_mpf(value._mpf_))
-        # Python's floats and NumPy's of any width, of which only one is a float to Python.
+        # NumPy has floats of several widths, of which only float64 is a subclass of Python's float.
         if isinstance(value, float) or _is_numpy_float(value):
             return Fraction(*value.as_integer_ratio())  # type: ignore[attr-defined]
     except (ValueError, OverflowError) as error:
@@ -127,7 +126,7 @@ def _is_numpy_float(value: object) -> bool:
 
 
 def _is_special(value: Any) -> bool:
-    """NaN or an infinity, of whatever type; a signalling NaN even refuses to be compared."""
+    """Whether a value is NaN or infinite; comparing a signalling NaN raises an error."""
     try:
         return not -math.inf < value < math.inf
     except (ArithmeticError, TypeError, ValueError):

@@ -1,7 +1,6 @@
-"""A SymPy expression -> the tree that the same expression would give as text.
+"""Conversion of a SymPy expression to the tree that the same expression would give as text.
 
-One grammar then serves for both. SymPy is recognised, not imported: where it was never loaded,
-nothing is of its types.
+One grammar thus serves for both. SymPy is not imported here: its objects are recognised by the names of their classes.
 """
 
 import ast
@@ -15,7 +14,7 @@ from gqm_sym.literals import rationals
 from gqm_sym.literals.grammar import CONSTANTS, FUNCTIONS, MAX_DEPTH, NAME
 from gqm_sym.literals.trees import constant
 
-# A pair of parentheses in text is up to three levels of a tree: 1 + x*sin(...).
+# One pair of parentheses in text may be three levels of a tree: 1 + x*sin(...).
 _MAX_LEVELS = 3 * MAX_DEPTH
 _CONSTANTS = {"Pi": "pi", "Exp1": "e"}
 _FUNCTIONS = {"Abs": "abs", **{name: name for name in FUNCTIONS if name != "abs"}}
@@ -29,17 +28,17 @@ _NOT_REAL = {
 
 
 def is_sympy(value: object) -> bool:
-    """Whether ``value`` is an object of SymPy's."""
+    """Whether ``value`` is a SymPy object."""
     return any((base.__module__ or "").partition(".")[0] == "sympy" for base in type(value).__mro__)
 
 
 def tree_of(value: object, *, where: str) -> ast.expr:
-    """Tree of a SymPy expression; Floats are taken at their exact binary value.
+    """Return the tree of a SymPy expression; a Float stands for its exact binary value.
 
     Raises
     ------
     ExpressionError
-        Naming the first part that the grammar has no word for.
+        If the expression has a part that is not in the grammar; the message names it.
     """
     return _tree(value, where, 0)
 
@@ -57,7 +56,7 @@ def _tree(node: Any, where: str, depth: int) -> ast.expr:
     if head == "Symbol":
         return _symbol(node, where)
     arguments: tuple[Any, ...] = getattr(node, "args", ())
-    # An undefined function may bear any name, "sin" too: what counts is where its class was made.
+    # An undefined function may have any name, even "sin"; the module of its class tells it from SymPy's own functions.
     known = (type(node).__module__ or "").startswith("sympy.")
     if known and head in ("Add", "Mul", "Pow"):
         operator = {"Add": ast.Add, "Mul": ast.Mult, "Pow": ast.Pow}[head]
@@ -67,9 +66,9 @@ def _tree(node: Any, where: str, depth: int) -> ast.expr:
         function = ast.Name(_FUNCTIONS[head], ast.Load())
         return ast.Call(function, [_tree(arguments[0], where, depth + 1)], [])
     if type(type(node)).__name__ == "UndefinedFunction":
-        raise ExpressionError(f"{where}: function {head!r} is undefined; write out what it is")
+        raise ExpressionError(f"{where}: function {head!r} is undefined; write its definition instead")
     raise ExpressionError(
-        f"{where}: {head} is no part of the grammar; use + - * / **, pi, E and functions of one "
+        f"{where}: {head} is not in the grammar; use + - * / **, pi, E and functions of one "
         f"argument: {', '.join(FUNCTIONS)}"
     )
 
@@ -86,13 +85,13 @@ def _constant(node: Any, where: str) -> ast.expr:
 def _symbol(node: Any, where: str) -> ast.expr:
     if node.name in (*FUNCTIONS, *CONSTANTS) or keyword.iskeyword(node.name):
         raise ExpressionError(
-            f"{where}: symbol {node.name!r} is called like a function, a constant or a word of "
-            "Python's; choose another name"
+            f"{where}: symbol {node.name!r} has the name of a function, a constant or a keyword of Python; "
+            "choose another name"
         )
     if not NAME.fullmatch(node.name):
         raise ExpressionError(
-            f"{where}: symbol {node.name!r}; a name is made of ASCII letters, digits and _, and begins with a letter"
+            f"{where}: symbol {node.name!r}: a name consists of ASCII letters, digits and _, and begins with a letter"
         )
     if node.is_real is False:
-        raise ExpressionError(f"{where}: symbol {node.name!r} is declared not real; drop that")
+        raise ExpressionError(f"{where}: symbol {node.name!r} is declared as not real; remove that assumption")
     return ast.Name(node.name, ast.Load())

@@ -1,7 +1,6 @@
-"""Trees of arithmetic, and their value in any algebra.
+"""Trees of arithmetic, and their evaluation in any algebra.
 
-A tree is made of ``ast`` nodes: BinOp, UnaryOp, Call with one argument, Name, and Constant holding
-a Fraction.
+A tree consists of ``ast`` nodes: BinOp, UnaryOp, Call with one argument, Name, and Constant holding a Fraction.
 """
 
 import ast
@@ -18,41 +17,46 @@ N = TypeVar("N", bound=ast.expr)
 
 
 class Algebra(Protocol[T]):
-    """What trees can be evaluated in.
+    """The operations that `evaluate` needs.
 
-    Methods refuse with ``ValueError`` or ``ArithmeticError``; ``evaluate`` adds where that was.
-    Sums and products come whole: adding term by term takes quadratic time in some algebras.
+    A method raises ``ValueError`` or ``ArithmeticError`` for what it cannot compute; ``evaluate`` adds the place. Sums
+    and products are passed as a whole, since adding term by term takes quadratic time in some algebras.
     """
 
     def number(self, value: Fraction, /) -> T:
-        """A literal."""
+        """Return the value of a literal."""
 
     def name(self, name: str, /) -> T:
-        """A constant of the grammar, ``pi`` or ``e``, or a name of the user's."""
+        """Return the value of a constant of the grammar (``pi`` or ``e``) or of a name."""
 
     def negate(self, value: T, /) -> T:
-        """``-value``."""
+        """Return ``-value``."""
 
     def total(self, terms: list[T], /) -> T:
-        """Sum of two terms or more."""
+        """Return the sum of two or more terms."""
 
     def product(self, factors: list[T], /) -> T:
-        """Product of two factors or more."""
+        """Return the product of two or more factors."""
 
     def reciprocal(self, value: T, /) -> T:
-        """``1/value``."""
+        """Return ``1/value``."""
 
     def power(self, base: T, exponent: T, /) -> T:
-        """``base**exponent``."""
+        """Return ``base**exponent``."""
 
     def call(self, function: str, argument: T, /) -> T:
-        """One of the grammar's functions."""
+        """Return the value of one of the functions of the grammar."""
 
 
 def evaluate(tree: ast.expr, algebra: Algebra[T], *, where: str) -> T:
-    """Value of a tree in an algebra.
+    """Return the value of a tree in an algebra.
 
-    Sums and products are walked in a loop, so that the stack grows with nesting alone.
+    A loop evaluates the terms of sums and products, so that only nesting needs stack.
+
+    Raises
+    ------
+    ExpressionError
+        If the algebra refuses an operation, or the tree has a node that is not arithmetic.
     """
 
     def at(node: ast.expr, operation: Callable[..., T], *operands: object) -> T:
@@ -88,29 +92,29 @@ def evaluate(tree: ast.expr, algebra: Algebra[T], *, where: str) -> T:
                 factor = evaluate(node, algebra, where=where)
                 factors.append(at(node, algebra.reciprocal, factor) if inverse else factor)
             return at(tree, algebra.product, factors)
-    raise ExpressionError(f"{where}: {type(tree).__name__} is no part of arithmetic")
+    raise ExpressionError(f"{where}: {type(tree).__name__} is not part of arithmetic")
 
 
 def check_exponents(tree: ast.expr, *, where: str) -> None:
-    """Refuse constant powers too large to hold, ``9**9**9**9``, before anything is computed."""
+    """Refuse constant powers that are too large, such as ``9**9**9**9``, before anything is computed."""
     evaluate(tree, _Exponents(), where=where)
 
 
 def constant(value: Fraction, column: int | None = None) -> ast.Constant:
-    """Leaf of a tree; ``column`` is where it stood in the text, if it was read from text."""
-    # A Constant may hold any object; the type stubs know only what Python's parser makes.
+    """Return a leaf of a tree; ``column`` is its place in the text, if it was read from text."""
+    # A Constant may hold any object; the type stubs allow only what Python's parser makes.
     leaf = ast.Constant(cast(Any, value))
     return leaf if column is None else at_column(leaf, column)
 
 
 def at_column(node: N, column: int) -> N:
-    """The same node, marked with where it stood, counted from 0."""
+    """Return the same node, with its column, counted from 0."""
     node.lineno, node.col_offset = 1, column
     return node
 
 
 def _chain(tree: ast.expr, direct: type[ast.operator], inverse: type[ast.operator]) -> list[tuple[ast.expr, bool]]:
-    """Operands of a chain of one precedence, in order, with whether each is inverted."""
+    """Return the operands of a chain of operators of one precedence, in order, each with whether it is inverted."""
     operands = []
     while isinstance(tree, ast.BinOp) and isinstance(tree.op, direct | inverse):
         operands.append((tree.right, isinstance(tree.op, inverse)))
@@ -120,13 +124,13 @@ def _chain(tree: ast.expr, direct: type[ast.operator], inverse: type[ast.operato
 
 
 def _place(node: ast.expr) -> str:
-    """``column n: ``, for trees that were read from text."""
+    """Return ``column n: `` for a node that was read from text, else nothing."""
     column = getattr(node, "col_offset", None)
     return "" if column is None else f"column {column + 1}: "
 
 
 class _Exponents:
-    """Rational numbers; whatever else there is, is None."""
+    """The algebra of rational numbers, in which every other value is None."""
 
     def number(self, value: Fraction) -> Fraction | None:
         return value

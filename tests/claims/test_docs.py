@@ -18,6 +18,7 @@ from gqm_sym.specfile import read_spec
 from gqm_sym.studies import read_sweep
 
 DOCS = ROOT / "docs"
+MARK = "-- next block --"
 BLOCK = re.compile(r"^```(\w*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 WITH_CODE = [
     page for page in (ROOT / "README.md", *sorted(DOCS.rglob("*.md"))) if "```python\nimport" in page.read_text()
@@ -28,16 +29,18 @@ WITH_CODE = [
 def test_code_runs(
     page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """The blocks of a page are one program; an output that is printed below the last of them is its output."""
+    """The blocks of a page are one program; an output that is shown below a block is what that block prints."""
     blocks = BLOCK.findall(page.read_text(encoding="utf-8"))
     monkeypatch.chdir(tmp_path)
     program = tmp_path / "program.py"
-    program.write_text("\n".join(text for language, text in blocks if language == "python"), encoding="utf-8")
+    code = [text for language, text in blocks if language == "python"]
+    program.write_text(f"\nprint({MARK!r})\n".join(code), encoding="utf-8")
     runpy.run_path(str(program))
-    said = capsys.readouterr().out
-    for (language, _), (answer, text) in pairwise(blocks):
+    outputs = iter(capsys.readouterr().out.split(f"{MARK}\n"))
+    for (language, _), (answer, text) in pairwise([*blocks, ("end", "")]):
+        output = next(outputs) if language == "python" else ""
         if language == "python" and answer in ("", "text"):
-            assert text == said
+            assert text == output
 
 
 def test_the_pages_are_some() -> None:

@@ -142,7 +142,9 @@ def test_check_goes_through_all_states(here: Commands) -> None:
     before = module.read_text()
     outdated = here.gen("--check", "--diff", "swing.yaml")
     assert outdated.code == 1
-    assert outdated.err == (f"{module}: is not what swing.yaml gives; write it by gqm-gen -o generated swing.yaml\n")
+    assert outdated.err == (
+        f"{module}: differs from what swing.yaml gives; write it with gqm-gen -o generated swing.yaml\n"
+    )
     assert outdated.out.startswith("--- ")
     assert "'2'" in outdated.out
     assert module.read_text() == before
@@ -258,7 +260,7 @@ def test_two_files_of_one_name(here: Commands) -> None:
     Path("copy.yaml").write_text(PENDULUM)
     code, _, err = here.gen("swing.yaml", "copy.yaml")
     assert code == 2
-    assert err.startswith("copy.yaml:1:7: name: swing is the name in swing.yaml too")
+    assert err.startswith("copy.yaml:1:7: name: swing is also the name in swing.yaml")
     assert not Path("generated").exists()
 
 
@@ -416,7 +418,7 @@ def test_a_figure_in_each_format(here: Commands, ending: str, begins: bytes) -> 
     """The same from both commands, twice the same bytes."""
     assert here.gen("-q", "--plot", f"one.{ending}", "swing.yaml") == (0, "", "")
     assert Path(f"one.{ending}").read_bytes().startswith(begins)
-    drawn = here.gqm("plot", "swing.yaml", f"two.{ending}", "--what", "loads", "--v0", "1")
+    drawn = here.gqm("plot", "swing.yaml", f"two.{ending}", "--what", "speed_and_force", "--v0", "1")
     assert drawn == (0, f"wrote two.{ending}\n", "")
     assert Path(f"two.{ending}").read_bytes().startswith(begins)
     if ending != "svg":  # whose identifiers differ
@@ -429,7 +431,7 @@ def test_a_figure_of_no_known_format(here: Commands) -> None:
     code, _, err = here.gqm("plot", "swing.yaml", "swing.gif")
     assert (code, err) == (
         2,
-        "gqm: swing.gif: cannot tell the format of the figure; end its name in .png, .svg, .pdf\n",
+        "gqm: swing.gif: the format of the figure is unknown; use a name that ends in .png, .svg, .pdf\n",
     )
     assert not Path("swing.gif").exists()
     assert here.gqm("plot", "bowl.yaml", "bowl.png").code == 2
@@ -441,7 +443,7 @@ def test_what_a_figure_goes_with(here: Commands) -> None:
         code, _, err = here.gen("--plot", "one.png", option, "swing.yaml")
         assert (code, err.splitlines()[-1]) == (
             2,
-            "gqm-gen: error: --plot: runs the module that is written; give it without --check and --stdout",
+            "gqm-gen: error: --plot: runs the module that is written; leave out --check and --stdout",
         )
     assert here.gen("--plot", "one.png", "swing.yaml").out.endswith("wrote one.png\n")
     Path("arch.yaml").write_text(

@@ -45,10 +45,10 @@ def test_track(circle: ModuleType) -> None:
     assert bar.get_ylabel() == "contact force N (N)"
 
 
-def test_loads(circle: ModuleType) -> None:
+def test_speed_and_force(circle: ModuleType) -> None:
     """Speed above, force below, over the arc from turn to turn."""
     motion = circle.solve(2.5)
-    above, below = motion.plot("loads").axes
+    above, below = motion.plot("speed_and_force").axes
     s, speed = above.lines[0].get_data()
     assert abs((s.max() - s.min()) - 5.0) <= 1e-13
     assert abs(speed.max() - motion.state(motion.period / 4).v.__abs__()) <= 1e-4
@@ -76,7 +76,7 @@ def test_every_kind_can_be_drawn(circle: ModuleType, kind: str, launch: dict[str
     """Rest, circulation, and a motion that takes for ever: each figure shows the arc that is run through."""
     motion = circle.solve(**launch)
     assert motion.kind == kind
-    track, speeds, portrait = (motion.plot(what) for what in ("track", "loads", "portrait"))
+    track, speeds, portrait = (motion.plot(what) for what in ("track", "speed_and_force", "portrait"))
     for figure in (track, speeds, portrait):
         figure.draw_without_rendering()
     points = track.axes[0].lines[0].get_xydata()
@@ -88,7 +88,7 @@ def test_every_kind_can_be_drawn(circle: ModuleType, kind: str, launch: dict[str
 
 def test_notebooks_show_figures(circle: ModuleType) -> None:
     """Each is a picture to IPython, without pyplot."""
-    for what in ("track", "loads", "portrait"):
+    for what in ("track", "speed_and_force", "portrait"):
         assert circle.solve(1.0).plot(what)._repr_png_().startswith(b"\x89PNG")
 
 
@@ -100,12 +100,12 @@ def test_axes_of_the_caller(circle: ModuleType) -> None:
     axes = figure.subplots()
     assert circle.solve(1.0).plot(axes=axes) is figure
     pair = Figure()
-    assert circle.solve(1.0).plot("loads", axes=pair.subplots(2, 1)) is pair
+    assert circle.solve(1.0).plot("speed_and_force", axes=pair.subplots(2, 1)) is pair
 
 
 def test_an_unknown_figure(circle: ModuleType) -> None:
     """The message lists what there is."""
-    with pytest.raises(InputError, match="plot: what: must be one of track, loads, portrait, got 'map'"):
+    with pytest.raises(InputError, match="plot: what: must be one of track, speed_and_force, portrait, got 'map'"):
         circle.solve(1.0).plot("map")
 
 

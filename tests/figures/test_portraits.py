@@ -93,7 +93,7 @@ def test_a_launch_is_on_its_orbit(circle: ModuleType) -> None:
         ({}, InputError, "give the range"),
         ({"lam": (1, 1)}, InputError, "must be a range"),
         ({"lam": (0, 1), "levels": 0}, InputError, "levels: must be at least 1"),
-        ({"lam": (0, 1), "h": 2}, ParameterError, "h: is no parameter; there are g, m"),
+        ({"lam": (0, 1), "h": 2}, ParameterError, "h: is not a parameter of this module; its parameters are g, m"),
     ],
 )
 def test_what_cannot_be_drawn(options: dict, error: type[Exception], said: str, wells: ModuleType) -> None:
@@ -109,7 +109,7 @@ def test_period_against_amplitude(circle: ModuleType) -> None:
     amplitude, period = line.get_data()
     assert np.abs(amplitude - [2.0, 4.0, 8.0]).max() <= 1e-13
     assert period.tolist() == [circle.solve(place, L=4).period for place in ("1/2", 1, 2)]
-    with pytest.raises(SolutionError, match="nothing librates"):
+    with pytest.raises(SolutionError, match="never librates"):
         gqm.figures.period_against_amplitude(circle, ["pi", 0])
 
 

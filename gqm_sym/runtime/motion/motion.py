@@ -392,11 +392,11 @@ class Motion(ABC):
 
         Parameters
         ----------
-        what : {"track", "loads", "portrait"}
+        what : {"track", "speed_and_force", "portrait"}
             The track, coloured by the sign and size of the contact force; speed and contact force against arc
             length; or the phase portrait round the orbit. All events are marked on the first two.
         axes : matplotlib Axes, optional
-            Where to draw (a pair of them for "loads"); a new figure if not given.
+            Where to draw (a pair of them for "speed_and_force"); a new figure if not given.
 
         Returns
         -------

@@ -1,0 +1,122 @@
+"""The glossary has every public name, each word once, and the reference page lists everything that is exported."""
+
+import re
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+import gqm_sym as gqm
+from gqm_sym import errors, figures, runtime
+from gqm_sym.declare import families
+from gqm_sym.runtime import Event, Leg, Motion, Sweep
+
+DOCS = Path(__file__).parent.parent / "docs"
+REFERENCE = DOCS / "reference"
+
+# Names that are being replaced, with the names by which the glossary has them.
+RENAMED = {
+    "Kernel.extra": "Kernel.tangential_law",
+    "Kernel.grip": "Kernel.static_friction_limit",
+    "Model.climb": "Model.effective_potential",
+    "Model.climb_slope": "Model.effective_potential_slope",
+    "Model.kernel": "Model.tangential_acceleration",
+    "Model.reaction": "Model.static_normal_load",
+    "Motion.conditioning": "Motion.condition_number",
+    "Sweep.reasons": "Sweep.status",
+    "Sweep.why": "Sweep.status_counts",
+}
+
+# In the contract, but not in every version.
+COMING = {"Sweep.route"}
+
+CLASSES = (gqm.Curve, gqm.Kernel, gqm.Model, Motion, Event, Leg, Sweep)
+
+
+def rows() -> Iterator[str]:
+    """Yield the first cell of each row of the tables below the symbols."""
+    text = (REFERENCE / "glossary.md").read_text(encoding="utf-8").partition("## Declaring")[2]
+    for line in text.splitlines():
+        first = line.split("|")[1].strip() if line.startswith("| ") else ""
+        if first and first not in ("name", "word"):
+            yield first
+
+
+def defined() -> list[str]:
+    """List the names in backticks that the first cells define."""
+    return [name for row in rows() for name in re.findall(r"`([\w.]+)`", row)]
+
+
+def members(owner: type) -> Iterator[str]:
+    """Yield the public names of a class with its name before them."""
+    inherited = set(dir(tuple))
+    fields = getattr(owner, "__annotations__", {})
+    for name in {*dir(owner), *fields}:
+        if not name.startswith("_") and (name not in inherited or name in fields):
+            yield f"{owner.__name__}.{name}"
+
+
+def public() -> set[str]:
+    """Return every public name, renamed ones by their new names."""
+    names = {*gqm.__all__, *runtime.__all__} - {"compiler"}
+    names |= {f"families.{name}" for name in families.names()} | {f"figures.{name}" for name in figures.__all__}
+    for owner in CLASSES:
+        names |= {RENAMED.get(name, name) for name in members(owner)}
+    return names - {f"{owner.__name__}.{name}" for owner in (Event,) for name in ("t", "lam", "x", "z")}
+
+
+def test_every_public_name_is_explained() -> None:
+    """What is exported, and each public member, has a row; fields of states and events share one."""
+    shared = {"Curve.x", "Curve.z", "Leg.lam_start", "Leg.lam_end"}
+    assert sorted(public() - set(defined()) - shared) == []
+
+
+def test_every_explained_name_exists() -> None:
+    """A name with a dot in it is a member of its class or package."""
+    dotted = {name for name in defined() if "." in name and not name.startswith("State.")}
+    assert sorted(dotted - public() - COMING) == []
+
+
+def test_each_is_explained_once() -> None:
+    """No row begins as another does."""
+    assert [row for row, count in Counter(rows()).items() if count > 1] == []
+
+
+@pytest.mark.parametrize("name", [*gqm.__all__, *(f"figures.{name}" for name in figures.__all__)])
+def test_the_reference_page_lists(name: str) -> None:
+    """Every name that is exported stands on the page, by its full name."""
+    page = (REFERENCE / "api.md").read_text(encoding="utf-8")
+    assert re.search(rf"gqm_sym\.{re.escape(name)}\b", page)
+
+
+def test_the_reference_page_lists_the_runtime_and_the_errors() -> None:
+    """What `solve` and `sweep` return; the errors come all together."""
+    page = (REFERENCE / "api.md").read_text(encoding="utf-8")
+    missing = [name for name in ("Motion", "State", "Pass1", "Event", "Leg", "Sweep") if f"runtime.{name}" not in page]
+    assert missing == []
+    assert errors.__name__ in page
+
+
+def test_the_made_pages_are_current(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The committed tables are what `python docs/made.py` writes."""
+    monkeypatch.syspath_prepend(str(DOCS))
+    monkeypatch.delitem(__import__("sys").modules, "made", raising=False)
+    import made
+
+    for name, text in made.pages().items():
+        assert (REFERENCE / f"{name}.md").read_text(encoding="utf-8") == text, name
+
+
+def test_links_are_words_and_lead_to_files() -> None:
+    """Pages are read as files too: each link has a text, and what it leads to is in the repository."""
+    wrong = []
+    for page in (DOCS.parent / "README.md", *DOCS.rglob("*.md")):
+        if {"made", "_build"} & set(page.relative_to(DOCS.parent).parts):
+            continue
+        text = re.sub(r"^```.*?^```$", "", page.read_text(encoding="utf-8"), flags=re.MULTILINE | re.DOTALL)
+        for words, target in re.findall(r"(?<!\\)\[([^\]\n]*)\]\(([^)\s]+)\)", text):
+            path = target.partition("#")[0]
+            if not words or (path and "://" not in path and not (page.parent / path).exists()):
+                wrong.append(f"{page.name}: [{words}]({target})")
+    assert wrong == []
