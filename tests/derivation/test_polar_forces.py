@@ -70,7 +70,7 @@ def test_no_form_keeps_what_adds_up_to_one():
     ):
         assert not form.has(sp.cos(model.parameter) ** 2 + sp.sin(model.parameter) ** 2)
     spiral = gqm.derive(gqm.families.log_spiral(), gqm.CentralForce())
-    assert not spiral.kernel.has(sp.sin, sp.cos)
+    assert not spiral.tangential_acceleration.has(sp.sin, sp.cos)
     assert not spiral.normal_force.has(sp.sin, sp.cos)
 
 

@@ -156,7 +156,9 @@ def follow(dissipation, p, start, route, record):  # type: ignore[no-untyped-def
     """
     p, breaks, record = uncounted(p), uncounted(route.breaks), uncounted(record)
     route = Route(breaks, route.limit, route.pause, route.only_sign)
-    forces = Forces(dissipation.drive, p, dissipation.friction, dissipation.kinked, dissipation.linear, start.direction)
+    forces = Forces(
+        dissipation.speed_equation, p, dissipation.friction, dissipation.kinked, dissipation.linear, start.direction
+    )
     off = clearance(start.place, route.limit) if breaks.size else 0.0
     end = run_to_end(forces, start, route, off, record)
     what, used, back, time_from_end = end.what, HEAD + end.panel_count * COLUMNS, 0, 0.0
@@ -165,7 +167,7 @@ def follow(dissipation, p, start, route, record):  # type: ignore[no-untyped-def
         back = run_back(forces, end, breaks, off, record, used)
         time_from_end = total_time(record, used, back)
         here = within(end.place[0], span_before(breaks, end.upcoming, direction, off))
-        direction, could_stay = released(dissipation.hold, p, here, here, direction)
+        direction, could_stay = released(dissipation.static_balance, p, here, here, direction)
     elif what == ASYMPTOTE:
         back = approach(forces, end, breaks, off, record, used)
     time_from_start = total_time(record, HEAD, end.panel_count)
