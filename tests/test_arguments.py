@@ -256,6 +256,7 @@ def test_a_zigzag_is_refused(degrees, count):
         gqm.Curve.sampled([(i, height * (i % 2)) for i in range(count)])
 
 
+@pytest.mark.filterwarnings("ignore::gqm_sym.errors.NoisyPointsWarning")
 @settings(deadline=None, max_examples=60)
 @given(seed=st.integers(0, 10**6), noise=st.floats(0.0, 0.6), kind=st.sampled_from(["line", "ring"]))
 def test_noisy_points_make_a_track_or_are_refused(seed, noise, kind):

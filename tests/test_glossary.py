@@ -15,22 +15,6 @@ from gqm_sym.runtime import Event, Leg, Motion, Sweep
 DOCS = Path(__file__).parent.parent / "docs"
 REFERENCE = DOCS / "reference"
 
-# Names that are being replaced, with the names by which the glossary has them.
-RENAMED = {
-    "Kernel.extra": "Kernel.tangential_law",
-    "Kernel.grip": "Kernel.static_friction_limit",
-    "Model.climb": "Model.effective_potential",
-    "Model.climb_slope": "Model.effective_potential_slope",
-    "Model.kernel": "Model.tangential_acceleration",
-    "Model.reaction": "Model.static_normal_load",
-    "Motion.conditioning": "Motion.condition_number",
-    "Sweep.reasons": "Sweep.status",
-    "Sweep.why": "Sweep.status_counts",
-}
-
-# In the contract, but not in every version.
-COMING = {"Sweep.route"}
-
 CLASSES = (gqm.Curve, gqm.Kernel, gqm.Model, Motion, Event, Leg, Sweep)
 
 
@@ -58,11 +42,11 @@ def members(owner: type) -> Iterator[str]:
 
 
 def public() -> set[str]:
-    """Return every public name, renamed ones by their new names."""
+    """Return every public name."""
     names = {*gqm.__all__, *runtime.__all__} - {"compiler"}
     names |= {f"families.{name}" for name in families.names()} | {f"figures.{name}" for name in figures.__all__}
     for owner in CLASSES:
-        names |= {RENAMED.get(name, name) for name in members(owner)}
+        names |= set(members(owner))
     return names - {f"{owner.__name__}.{name}" for owner in (Event,) for name in ("t", "lam", "x", "z")}
 
 
@@ -75,7 +59,7 @@ def test_every_public_name_is_explained() -> None:
 def test_every_explained_name_exists() -> None:
     """A name with a dot in it is a member of its class or package."""
     dotted = {name for name in defined() if "." in name and not name.startswith("State.")}
-    assert sorted(dotted - public() - COMING) == []
+    assert sorted(dotted - public()) == []
 
 
 def test_each_is_explained_once() -> None:

@@ -45,7 +45,7 @@ FELT = 0.1
 Place: TypeAlias = tuple[float, float]
 # So many turns in a row, each to the other side and by more than this, are a zigzag that no smooth track goes through:
 # the lengths of the spline between such points never settle.
-ZIGZAGS = 3
+ZIGZAGS = 5
 ZIGZAG = pi / 9
 
 _DECIMAL = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
@@ -353,5 +353,5 @@ def _check_zigzag(turns: list[float]) -> None:
             raise DeclarationError(
                 f"sampled: row {first}: the track turns to and fro there, {ZIGZAGS} times by more than "
                 f"{ZIGZAG * 180.0 / pi:.0f} degrees; no smooth track goes through a zigzag: give more points, points "
-                "without their noise, or kind='linear' for planes"
+                "without their noise (smoothing takes it out), or kind='linear' for planes"
             )

@@ -279,7 +279,7 @@ def test_a_sum_of_forces_is_the_potential_written_out(
 ) -> None:
     """Closed forms, field and motion are the same."""
     ours, theirs = MODELS[summed](), MODELS[written]()
-    for form in ("speed_squared", "normal_force", "kernel", "kappa"):
+    for form in ("speed_squared", "normal_force", "tangential_acceleration", "kappa"):
         assert sp.simplify(getattr(ours, form) - getattr(theirs, form)) == 0
     first, second = (module_named(name) for name in (summed, written))
     launch = SUM_LAUNCH | more

@@ -34,7 +34,7 @@ PLAIN = {
     "z": "h*x**2",
     "kernel": "gravity: {}",
     "value": "1",
-    "unit": "m",
+    "unit": "1/m",
     "description": "d",
     "lam0": "1/2",
 }

@@ -49,7 +49,18 @@ def test_a_slow_launch_from_the_bottom_of_a_well(well: ModuleType) -> None:
 
 
 def _with(motion: Any, **changes: Callable[..., Any]) -> SimpleNamespace:
-    names = ("kind", "legs", "turning_points", "t_end", "state", "lam", "error_bound", "time_at", "problem", "_course")
+    names = (
+        "kind",
+        "legs",
+        "turning_points",
+        "t_end",
+        "state",
+        "lam",
+        "error_bound",
+        "time_at",
+        "problem",
+        "_trajectory",
+    )
     told = {name: getattr(motion, name) for name in names}
     if motion.kind != "rest":
         told["period"] = motion.period

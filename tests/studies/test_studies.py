@@ -329,7 +329,7 @@ def test_an_interruption_says_what_to_do(
 
     monkeypatch.setattr(sweeps, "run", interrupted)
     assert tool.main(["sweep", "periods.yaml"]) == 130
-    assert "what is done is stored; the same command goes on from there" in capsys.readouterr().err
+    assert "the results so far are stored; the same command continues from there" in capsys.readouterr().err
 
 
 def test_what_is_there_is_not_lost(here: Path, capsys: pytest.CaptureFixture[str]) -> None:

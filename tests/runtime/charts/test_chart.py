@@ -11,10 +11,10 @@ import sympy as sp
 from mpmath import mp, mpf
 
 import gqm_sym as gqm
-from gqm_sym import runtime
 from gqm_sym.emission import charts
 from gqm_sym.emission.ir import ChartIR
 from gqm_sym.errors import LaunchError, SolutionError
+from gqm_sym.runtime import vocabulary
 from gqm_sym.runtime.charts import evaluate
 from gqm_sym.runtime.charts.chart import NODES, Chart, PieceData, assemble
 from gqm_sym.sympy_charts import chart_x, chart_z
@@ -61,7 +61,7 @@ def ring(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ModuleType]:
     )
     with pytest.MonkeyPatch.context() as patch:
         patch.setitem(charts.MAKERS, "ring", lambda _: ChartIR(statement="Ring()", imports=("Ring",)))
-        patch.setattr(runtime, "Ring", Ring, raising=False)
+        patch.setattr(vocabulary, "Ring", Ring, raising=False)
         yield gqm.build(gqm.derive(curve, gqm.Gravity()), name="ring", folder=tmp_path_factory.mktemp("ring"))
 
 
@@ -102,10 +102,10 @@ def test_divided_differences(size: float) -> None:
             c = b + size * rng.uniform()
             first = (height(mpf(b)) - height(mpf(a))) / (mpf(b) - mpf(a))
             second = ((height(mpf(c)) - height(mpf(b))) / (mpf(c) - mpf(b)) - first) / (mpf(c) - mpf(a))
-            assert abs(evaluate.chart_z1(chart.block, a, b, b - a) - first) <= 16 * ULP
+            assert abs(evaluate.divdiff1_chart_z(chart.block, a, b, b - a) - first) <= 16 * ULP
             # Next to a joint a second difference is a derivative of the fit: 16 nodes cost it three digits.
-            assert abs(evaluate.chart_z2(chart.block, a, b, c, b - a, c - b) - second) <= 4e-13
-            swapped = evaluate.chart_z2(chart.block, c, a, b, a - c, b - a)
+            assert abs(evaluate.divdiff2_chart_z(chart.block, a, b, c, b - a, c - b) - second) <= 4e-13
+            swapped = evaluate.divdiff2_chart_z(chart.block, c, a, b, a - c, b - a)
             assert abs(swapped - second) <= 4e-13
 
 
@@ -131,7 +131,9 @@ def test_differences_far_from_the_origin() -> None:
         )
         for k in range(6):
             a, b = float(edges[k] + 0.3), float(edges[k + 3] - 0.2)
-            assert abs(evaluate.chart_x1(chart.block, a, b, b - a) - (x(b) - x(a)) / (mpf(b) - mpf(a))) <= 16 * ULP
+            assert (
+                abs(evaluate.divdiff1_chart_x(chart.block, a, b, b - a) - (x(b) - x(a)) / (mpf(b) - mpf(a))) <= 16 * ULP
+            )
 
 
 def test_two_places_at_one_joint() -> None:
@@ -139,7 +141,7 @@ def test_two_places_at_one_joint() -> None:
     chart = Ring().chart((RADIUS,))
     for edge in map(float, chart.edges[1:-1]):
         beside = np.nextafter(edge, 0.0)
-        slope = evaluate.chart_z1(chart.block, beside, edge, 0.1 * (edge - beside))
+        slope = evaluate.divdiff1_chart_z(chart.block, beside, edge, 0.1 * (edge - beside))
         assert abs(slope - np.sin(edge / RADIUS)) <= 1e-14
 
 
@@ -171,7 +173,7 @@ def test_differences_of_the_angle_across_joints(size: float) -> None:
             a, b, c = (float(joint) + size * share for share in shares)
             u, v, w = map(Fraction, (a, b, c))
             truth = float(((angle(w) - angle(v)) / (w - v) - (angle(v) - angle(u)) / (v - u)) / (w - u))
-            found = evaluate.chart_alpha2(chart.block, a, b, c, b - a, c - b)
+            found = evaluate.divdiff2_chart_alpha(chart.block, a, b, c, b - a, c - b)
             # It is a derivative of the fit, which costs short pieces five digits; and the distances from the joint
             # count, which are known to an ulp of the place.
             assert abs(found - truth) <= 2e-11 + abs(truth) * 8 * ULP / size

@@ -213,6 +213,7 @@ def swing_time(rate: Callable[[mpf], mpf], low: mpf, high: mpf, cuts: list[mpf])
     return half(low, 1) + half(high, -1)
 
 
+@pytest.mark.filterwarnings("ignore::gqm_sym.errors.NoisyPointsWarning")
 def test_spline(generated_folder: Path) -> None:
     """The period is that of the spline with just the coefficients that interpolate in doubles."""
     points = np.array([(-3.0, 2.0), (-2.0, 0.5), (-0.5, -0.25), (1.0, 0.125), (2.0, 1.0), (3.5, 3.0), (4.0, 5.0)])

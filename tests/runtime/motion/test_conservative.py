@@ -34,7 +34,7 @@ def arch(tmp_path_factory: pytest.TempPathFactory) -> ModuleType:
 @pytest.fixture(scope="module")
 def chain(tmp_path_factory: pytest.TempPathFactory) -> ModuleType:
     """Hanging cycloids side by side: cusps inside the curve, at odd multiples of pi."""
-    curve = gqm.Curve.parametric(x="R*(u + sin(u))", z="R*(1 - cos(u))", parameter="u", period="2*pi")
+    curve = gqm.Curve.parametric(x="R*(u + sin(u))", z="R*(1 - cos(u))", parameter="u")
     model = gqm.derive(curve, gqm.Gravity(), parameters={"R": "1/2"})
     return gqm.build(model, name="chain", folder=tmp_path_factory.mktemp("chain"))
 

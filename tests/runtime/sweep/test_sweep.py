@@ -314,13 +314,13 @@ def test_the_route_of_each_launch(module_of: ModuleOf) -> None:
     """Batches answer ordinary orbits, a loop answers extremes, and `solve` what doubles do not decide."""
     circle = module_of("circle")
     places = np.linspace(-1.0, 1.0, 40)
-    assert circle.sweep("half_period", places).route_counts() == {"batch": 40}
-    assert circle.sweep("v_max", places).route_counts() == {"single": 40}
-    assert circle.sweep("t_end", places).route_counts() == {"solve": 40}
+    assert circle.sweep("half_period", places, L=1).route_counts() == {"batch": 40}
+    assert circle.sweep("v_max", places, L=1).route_counts() == {"single": 40}
+    assert circle.sweep("t_end", places, L=1).route_counts() == {"solve": 40}
 
 
 @pytest.mark.parametrize(("old", "new"), [("reasons", "status"), ("why", "status_counts")])
 def test_old_names_of_a_sweep(old: str, new: str, module_of: ModuleOf) -> None:
     """An earlier name is refused with the present one."""
     with pytest.raises(AttributeError, match=f"{old}.* {new}"):
-        getattr(module_of("circle").sweep("period", 0.5), old)
+        getattr(module_of("circle").sweep("period", 0.5, L=1), old)

@@ -39,8 +39,8 @@ def answered(
     lines = [np.broadcast_to(column, n) for column in columns]
     out, status = np.full((n, 2), np.nan), np.full(n, quantities.UNDECIDED, dtype=np.int8)
     answers = quantities.Answers(out, status, np.zeros_like(status))
-    each = module.MODEL.each
-    answer_batches(each.addresses(), (each.held, each.top_held), pointers(lines), monotone, asked, answers)
+    each = module.MODEL.batch
+    answer_batches(each.addresses(), (each.orbit_rows, each.integrand_rows), pointers(lines), monotone, asked, answers)
     return out, status
 
 
