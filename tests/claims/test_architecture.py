@@ -77,6 +77,7 @@ TESTED_THROUGH = {
     "compiled/intrinsics.py": "runtime/arithmetic/test_elementary.py",
     "compiled/registers.py": "runtime/legs/test_polynomials.py",
     "compiled/streaming.py": "runtime/launch/test_speed.py",
+    "compiled/stamps.py": "runtime/compiled/test_jit.py",
     "compiled/strided.py": "runtime/sweep/test_sweep.py",
     "compiled/threads.py": "runtime/launch/test_speed.py",
     "compiled/types.py": "runtime/compiled/test_jit.py",

@@ -135,7 +135,7 @@ def test_a_cache_of_other_code_is_not_used(
 ) -> None:
     """Another runtime at the same place, with the same times and sizes, gets code of its own."""
     assert function(2.0)(1.0) == 3.0
-    monkeypatch.setattr(jit, "STAMP", "another")
+    monkeypatch.setattr(jit, "stamp_for", lambda _: "another")
     assert function(5.0)(1.0) == 6.0
 
 
@@ -162,7 +162,7 @@ def test_two_at_once_keep_their_own_code(
             for index in cache.rglob("*.nbi"):
                 index.unlink()  # as if the other had looked before it was written
             with monkeypatch.context() as patch:
-                patch.setattr(jit, "STAMP", "another")
+                patch.setattr(jit, "stamp_for", lambda _: "another")
                 assert function(5.0)(1.0) == 6.0
         save(self, name, data)
 
@@ -170,7 +170,7 @@ def test_two_at_once_keep_their_own_code(
     assert function(2.0)(1.0) == 3.0
     monkeypatch.undo()
     monkeypatch.setattr(numba.config, "CACHE_DIR", str(cache))
-    monkeypatch.setattr(jit, "STAMP", "another")
+    monkeypatch.setattr(jit, "stamp_for", lambda _: "another")
     assert function(5.0)(1.0) == 6.0
 
 

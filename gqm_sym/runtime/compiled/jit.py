@@ -17,28 +17,21 @@ from numba.extending import typeof_impl
 
 from gqm_sym.errors import OutdatedModuleError
 from gqm_sym.runtime.compiled.numba_internals import Compiler
+from gqm_sym.runtime.compiled.stamps import RUNTIME, Stamps
 from gqm_sym.runtime.interface import INTERFACE
 
 COMPILE: dict[str, Any] = {"error_model": "numpy"}
 
 
-# The package that every function belongs to which compiled code calls.
-RUNTIME = "gqm_sym.runtime"
+STAMPS = Stamps()
+
+# The digest of the whole runtime, by which processes and stored parts of studies know that they belong together.
+STAMP = STAMPS.of_all
 
 
-def stamp_of(folder: Path) -> str:
-    """Return the digest of all Python files in a folder and its sub-folders, by their paths and contents.
-
-    Their times of change do not count: those of an installed wheel are all the same.
-    """
-    digest = hashlib.sha256()
-    for path, file in sorted((file.relative_to(folder).as_posix(), file) for file in folder.rglob("*.py")):
-        text = file.read_bytes()
-        digest.update(f"{path} {len(text)}\n".encode() + text)
-    return digest.hexdigest()
-
-
-STAMP = stamp_of(Path(__file__).parent.parent)
+def stamp_for(function: Any) -> str:
+    """Return the digest of all files of the runtime that a function's compiled code may come from."""
+    return STAMPS.of(function.__module__)
 
 
 @lru_cache(maxsize=1)
@@ -54,7 +47,7 @@ def _announce_runtime(function: Any) -> None:
         announce()
 
 
-COMPILER = Compiler(COMPILE, lambda: STAMP, _announce_runtime)
+COMPILER = Compiler(COMPILE, lambda function: stamp_for(function), _announce_runtime)
 
 
 class Inner:

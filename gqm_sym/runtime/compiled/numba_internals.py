@@ -128,16 +128,16 @@ class KeyedCache(FunctionCache):  # type: ignore[misc]
 
     The preparation imports and registers everything that compiling may need (SciPy's linear algebra as well) and takes
     0.4 s; code from the cache needs none of it. numba itself notices changes of a function's own
-    file only, but compiled code contains functions of several files: the key holds ``stamp``, the digest of the
-    runtime's text, and the module's name, which for generated modules is made from their text (`jit.compiler`). A file
-    that cannot be read is compiled again, and a file that cannot be written is left out.
+    file only, but compiled code contains functions of several files: the key holds ``stamp``, the digest of the files
+    that it may come from (`stamps`), and the module's name, which for generated modules is made from their text
+    (`jit.compiler`). A file that cannot be read is compiled again, and a file that cannot be written is left out.
 
     Parameters
     ----------
     function
         The Python function.
     stamp : str
-        Digest of the runtime's text.
+        Digest of the files that the function's code may come from.
     on_miss
         Called before a function is compiled that is not in the cache.
     """
@@ -183,12 +183,12 @@ class Compiler:
     options : dict
         numba's options for every function.
     stamp
-        ``f()``: the digest of the runtime's text.
+        ``f(function)``: the digest of the text of all files that the function's code may come from.
     on_miss
         Called before a function is compiled that is not in the cache.
     """
 
-    def __init__(self, options: dict[str, Any], stamp: Callable[[], str], on_miss: Callable[[Any], None]) -> None:
+    def __init__(self, options: dict[str, Any], stamp: Callable[[Any], str], on_miss: Callable[[Any], None]) -> None:
         self._options, self._stamp, self._on_miss = options, stamp, on_miss
 
     def cache_of(self, function: Any) -> Any:
@@ -196,7 +196,7 @@ class Compiler:
         if not HAS_CACHE:
             return None
         with suppress(RuntimeError, AttributeError):
-            return KeyedCache(function, self._stamp(), self._on_miss)
+            return KeyedCache(function, self._stamp(function), self._on_miss)
         return None
 
     def inner(self, function: Any, *, forceinline: bool = False) -> Any:
@@ -247,7 +247,7 @@ class Compiler:
         numba numbers the files of a function, and looks only whether the function's own file has changed. So the folder
         is named by everything else that the code depends on, the processor included: in it there is one version only.
         """
-        parts = (numba.__version__, self._stamp(), function.__module__, llvmlite.binding.get_host_cpu_name())
+        parts = (numba.__version__, self._stamp(function), function.__module__, llvmlite.binding.get_host_cpu_name())
         name = hashlib.sha256("\n".join((*parts, str(llvmlite.binding.get_host_cpu_features()))).encode()).hexdigest()
         with self._folder(Path(getfile(function)).parent, name[:16]) as usable:
             if usable:

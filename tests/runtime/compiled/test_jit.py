@@ -1,5 +1,6 @@
 """What the disk cache knows of, and what is compiled when."""
 
+import ast
 import io
 import os
 import shutil
@@ -9,9 +10,12 @@ from typing import Any
 
 import pytest
 
+from gqm_sym.runtime import vocabulary
 from gqm_sym.runtime.arithmetic.doubledouble import two_sum
 from gqm_sym.runtime.compiled import jit
 from gqm_sym.runtime.compiled.numba_internals import KeyedFiles
+from gqm_sym.runtime.compiled.stamps import CALLED_BY_MODULES, Stamps
+from gqm_sym.runtime.vocabulary import HOMES
 
 
 def _key() -> tuple[Any, ...]:
@@ -19,11 +23,11 @@ def _key() -> tuple[Any, ...]:
     return jit.COMPILER.cache_of(two_sum.py_func)._index_key("a signature", codegen)
 
 
-def test_an_edit_anywhere_in_the_runtime_compiles_anew(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The cache's key changes with any file of the runtime, though numba looks at one file only."""
+def test_the_key_of_the_cache_has_the_stamp(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The cache's key has the digest of all files that code may come from, though numba looks at one file only."""
     before = _key()
     assert before == _key()
-    monkeypatch.setattr(jit, "STAMP", "0" * 64)
+    monkeypatch.setattr(jit, "stamp_for", lambda _: "0" * 64)
     assert _key() != before
 
 
@@ -37,13 +41,57 @@ ONE_OF_EACH_ROOM = sorted(
 def test_the_stamp_has_every_file_of_the_runtime(name: str, tmp_path: Path) -> None:
     """A changed character in a file of any room changes the stamp, though its time and size stay; a copy does not."""
     copy = shutil.copytree(RUNTIME, tmp_path / "runtime", ignore=shutil.ignore_patterns("__pycache__"))
-    assert jit.stamp_of(copy) == jit.STAMP
+    assert Stamps(copy).of_all == jit.STAMP
     changed = copy / name
     status = changed.stat()
     changed.write_bytes(changed.read_bytes()[:-1] + b" ")
     os.utime(changed, ns=(status.st_atime_ns, status.st_mtime_ns))
     assert changed.stat().st_size == status.st_size
-    assert jit.stamp_of(copy) != jit.STAMP
+    assert Stamps(copy).of_all != jit.STAMP
+
+
+def _imported(name: str) -> set[str]:
+    """The files of the runtime that a file imports anywhere, by Python's own parser."""
+    path = RUNTIME.joinpath(*name.split("."))
+    found: set[str] = set()
+    for node in ast.walk(ast.parse(path.with_suffix(".py").read_text(encoding="utf-8"))):
+        if not isinstance(node, ast.Import | ast.ImportFrom):
+            continue
+        names = [alias.name for alias in node.names]
+        begin = getattr(node, "module", None)
+        whole = [begin, *(f"{begin}.{each}" for each in names)] if begin else names
+        found |= {each.removeprefix("gqm_sym.runtime.") for each in whole if each.startswith("gqm_sym.runtime.")}
+    return {each for each in found if RUNTIME.joinpath(*each.split(".")).with_suffix(".py").is_file()}
+
+
+MODULES = sorted(
+    ".".join(file.relative_to(RUNTIME).with_suffix("").parts) for file in RUNTIME.rglob("*.py") if file.stem[0] != "_"
+)
+
+
+def test_code_is_compiled_anew_after_an_edit_of_what_it_may_come_from(tmp_path: Path) -> None:
+    """The stamp of each module changes with an edit of every module that it imports, directly or through others."""
+    reached = {name: _imported(name) | {name} for name in MODULES}
+    for _ in MODULES:
+        reached = {name: set().union(found, *(reached[each] for each in found)) for name, found in reached.items()}
+    copy = shutil.copytree(RUNTIME, tmp_path / "runtime", ignore=shutil.ignore_patterns("__pycache__"))
+    before = {name: Stamps(copy).of(f"gqm_sym.runtime.{name}") for name in MODULES}
+    for edited in MODULES:
+        file = copy.joinpath(*edited.split(".")).with_suffix(".py")
+        text = file.read_bytes()
+        file.write_bytes(text + b"#")
+        after = Stamps(copy)
+        changed = {name for name in MODULES if after.of(f"gqm_sym.runtime.{name}") != before[name]}
+        file.write_bytes(text)
+        assert changed >= {name for name in MODULES if edited in reached[name]}
+    assert Stamps(copy).of("gqm_sym.runtime.arithmetic.doubledouble") == before["arithmetic.doubledouble"]
+
+
+def test_code_of_generated_modules_is_made_of_what_they_import() -> None:
+    """Every function that a generated module can call stands in a file that the stamp of its code knows."""
+    homes = {home for name, home in HOMES.items() if isinstance(getattr(vocabulary, name), jit.Inner)}
+    assert homes
+    assert all(any(f"{home}.".startswith(f"{begin}.") for begin in CALLED_BY_MODULES) for home in homes)
 
 
 def test_an_inner_function_works_from_python() -> None:
