@@ -159,7 +159,7 @@ class Model:
         __getattr__ = renamed(
             {
                 **{"climb": "2*effective_potential", "climb_slope": "2*effective_potential_slope"},
-                **{"kernel": "tangential_acceleration", "reaction": "static_normal_load"},
+                **{"kernel": "tangential_acceleration", "reaction": "static_normal_load", "swing": "symmetric_orbits"},
             },
             "a model",
         )

@@ -27,8 +27,8 @@ DEGREE = 5
 MAX_LAST_CHANGE = 1e-9
 MAX_ITERATIONS = 10
 
-# A spline whose distance from a point is below this share of the track's length passes through it to rounding. No points
-# are left out any more when only MIN_POINTS remain.
+# A spline whose distance from a point is below this share of the track's length passes through it to rounding. No
+# points are left out any more when only MIN_POINTS remain.
 MAX_FIT_ERROR = 8.0 * 2.0**-52
 MIN_POINTS = 64
 
@@ -63,7 +63,7 @@ class Sampled:
         return True
 
     def true_curve(self, context: Any, p: tuple[Any, ...], chart: Chart) -> Parts:
-        """Return the track in extended precision: planes between the points as written, or the spline by its coefficients."""
+        """Return the track in extended precision, by its points as written or by the coefficients of its spline."""
         spline = _made(self)[1]
         if spline is not None:
             return Parts(context, chart, lambda k: _exact_polynomial(context, spline.t, spline.c, k))
