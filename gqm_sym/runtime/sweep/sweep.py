@@ -21,6 +21,7 @@ from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.launch.request import CONTACTS, LaunchRequest
 from gqm_sym.runtime.sweep import quantities, scalar
 from gqm_sym.runtime.sweep.batch.batches import answer_batches
+from gqm_sym.runtime.sweep.dissipative_loop import answer_driven, is_driven
 from gqm_sym.runtime.sweep.quantities import QUANTITIES, ROUTES, STATUS_SENTENCES, Answers, Quantity
 
 if TYPE_CHECKING:
@@ -162,7 +163,9 @@ def sweep(
         np.full(size, quantities.UNDECIDED, dtype=np.int8),
         np.full(size, quantities.BATCH, dtype=np.int8),
     )
-    if has_compiled_route(formulas, found, t_max, contact):
+    if is_driven(formulas, quantity, t_max):
+        answer_driven(formulas, quantity, (sources, columns), t_max, contact, answers)
+    elif has_compiled_route(formulas, found, t_max, contact):
         domain = [widen(value, shape) for value in _domain_columns(formulas, arrays[4:])]
         rows = [*columns[:4], *domain, *columns[4:]]
         run_in_threads(lambda part: _answer(formulas, found, rows, part, answers), size, MIN_LAUNCHES_PER_THREAD)
