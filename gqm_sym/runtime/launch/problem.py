@@ -19,7 +19,7 @@ from gqm_sym.runtime.multiprecision.exact_tracks import FormulaTrack
 def bind(formulas: Formulas, p: ParameterValues, launch: Launch) -> BoundFunctions:
     """The compiled functions bound to parameter values, with one launch's problem in extended precision."""
     if p.functions is None:
-        p.functions = bind_all(formulas, p)
+        p.functions = _bind_all(formulas, p)
     bound: BoundFunctions = p.functions
     if formulas.exact is None:
         return bound
@@ -27,7 +27,7 @@ def bind(formulas: Formulas, p: ParameterValues, launch: Launch) -> BoundFunctio
     return BoundFunctions(addresses, values, exact_problem(formulas, p, launch), breaks, corners, period)
 
 
-def bind_all(formulas: Formulas, p: ParameterValues) -> BoundFunctions:
+def _bind_all(formulas: Formulas, p: ParameterValues) -> BoundFunctions:
     """The bound functions that all launches with these parameters share."""
     addresses = formulas.addresses
     if formulas.chart is None:

@@ -1,24 +1,29 @@
 """One quantity for each of many launches where forces dissipate, by driving all bodies in compiled code."""
 
-from collections.abc import Iterator, Sequence
 from math import inf, nan
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gqm_sym.errors import GQMError
-from gqm_sym.literals.namespaces import ARRAYS
 from gqm_sym.literals.numbers import read_number
-from gqm_sym.runtime.compiled.threads import run_in_threads
+from gqm_sym.runtime.compiled.strided import (
+    DIRECTION,
+    DOMAIN_HIGH,
+    DOMAIN_LOW,
+    DOMAIN_PERIOD,
+    LAM0,
+    PARAMETERS,
+    TARGET,
+    V0,
+    lay_out,
+)
 from gqm_sym.runtime.compiled.types import Array
-from gqm_sym.runtime.launch.problem import bind_all
 from gqm_sym.runtime.launch.request import ONLY_SIGN
 from gqm_sym.runtime.legs import answers as legs
 from gqm_sym.runtime.legs.advance import Joints, room_ahead
 from gqm_sym.runtime.legs.body import STATUS, VALUE, launched
 from gqm_sym.runtime.legs.leg_record import COLUMNS
-from gqm_sym.runtime.multiprecision.exact_problem import NOWHERE
 from gqm_sym.runtime.sweep import quantities
 from gqm_sym.runtime.sweep.quantities import Answers
 
@@ -42,7 +47,7 @@ QUESTIONS = {
 
 
 class Asked(NamedTuple):
-    """What is asked of all launches.
+    """What is asked of all bodies.
 
     Attributes
     ----------
@@ -59,135 +64,70 @@ class Asked(NamedTuple):
     only_sign: int
 
 
-class Group(NamedTuple):
-    """Launches on the same curve.
-
-    Attributes
-    ----------
-    members : array of int
-        Their indices.
-    parameters : array or None
-        The row of parameters that all of them have, the chart behind them; None where each has its own.
-    domain : tuple
-        The ends of the curve parameter's range and its period, numbers or an array over all launches.
-    breaks, corners : arrays
-        As of `legs.advance.Joints`.
-    """
-
-    members: NDArray[np.int64]
-    parameters: Array | None
-    domain: tuple[Any, Any, Any]
-    breaks: Array
-    corners: Array
-
-
-def is_driven(formulas: "Formulas", quantity: str, t_max: Any) -> bool:
-    """Whether a quantity is found by driving bodies in compiled code; bodies that must fit their track are not."""
+def asked_of_bodies(formulas: "Formulas", quantity: str, t_max: Any, contact: str) -> Asked | None:
+    """What compiled code is asked for a quantity; None where motions are solved, or no energy is lost."""
     if formulas.dissipation is None or formulas.rolling_radius or quantity not in QUESTIONS:
-        return False
-    return t_max is None or bool(read_number(t_max, where="t_max").value > 0.0)
+        return None
+    horizon = inf if t_max is None else read_number(t_max, where="t_max").value
+    return Asked(QUESTIONS[quantity], horizon, ONLY_SIGN[contact]) if horizon > 0.0 else None
 
 
 def answer_driven(
     formulas: "Formulas",
-    quantity: str,
-    launches: tuple[Sequence[Any], Sequence[Array]],
-    t_max: Any,
-    contact: str,
+    asked: Asked,
+    curve: tuple[Array, Array, Array],
+    columns: list[Array],
     answers: Answers,
+    part: slice,
 ) -> None:
-    """Answer all launches that compiled code decides.
+    """Answer a part of launches on one curve, as far as compiled code decides them.
 
     Parameters
     ----------
-    quantity : str
-        A name in QUESTIONS.
-    launches : (sequence, sequence)
-        Places, speeds, directions, targets and parameters as they were given, and as arrays of one shape or of one
-        number.
-    t_max, contact
-        As of `launch.request.LaunchRequest`.
+    curve : (array, array, array)
+        The chart, empty for a curve with formulas; all places where it is not smooth, and those that are corners.
+    columns : list of arrays
+        The launches, in the order of `compiled.strided`.
     answers : Answers
-        Filled in.
+        Filled in for this part.
     """
-    horizon = inf if t_max is None else read_number(t_max, where="t_max").value
-    asked = Asked(QUESTIONS[quantity], horizon, ONLY_SIGN[contact])
-    given, columns = launches[0], [column.reshape(-1) for column in launches[1]]
-    for group in _groups(formulas, given, columns, answers.status.size):
-
-        def drive(part: slice, group: Group = group) -> None:
-            for begin in range(part.start, part.stop, CHUNK):
-                which = group.members[begin : min(begin + CHUNK, part.stop)]
-                _drive(formulas, asked, group, columns, which, answers)
-
-        run_in_threads(drive, group.members.size, MIN_BODIES_PER_THREAD)
-
-
-def _groups(formulas: "Formulas", given: Sequence[Any], columns: Sequence[Array], size: int) -> Iterator[Group]:
-    """Launches by the curve that they are on; those that no motion begins with are left out."""
-    possible = np.ones(size, dtype=bool)
-    for column in columns:
-        possible &= np.isfinite(_lines(column, slice(None)))
-    members = np.flatnonzero(possible)
-    if formulas.chart is None:
-        domain = formulas.ends(ARRAYS, tuple(columns[4:]))
-        low, high, period = (
-            default if end is None else np.asarray(end, dtype=np.float64)
-            for end, default in zip(domain, (-inf, inf, 0.0), strict=True)
-        )
-        inside = (columns[0] >= low) & (columns[0] <= high)
-        members = members[np.broadcast_to(_lines(np.asarray(inside), slice(None)), size)[members]]
-        yield Group(members, None, (low, high, period), NOWHERE, NOWHERE)
-        return
-    varied = [k for k, column in enumerate(columns[4:]) if column.size > 1]
-    rows = np.column_stack([_lines(columns[4 + k], members) for k in varied]) if varied else np.zeros((members.size, 0))
-    kinds, which = np.unique(rows, axis=0, return_inverse=True) if varied else (rows[:1], np.zeros(members.size, int))
-    for number, kind in enumerate(kinds):
-        values = list(given[4:])
-        for k, value in zip(varied, kind.tolist(), strict=True):
-            values[k] = value
-        try:
-            p = formulas.numbers(tuple(values))
-            ends, f = formulas.domain(p).numbers, bind_all(formulas, p)
-        except GQMError:
-            continue  # each of them is refused by itself
-        here = members[which.reshape(-1) == number]
-        places = _lines(columns[0], here)
-        here = here[np.broadcast_to((places >= ends.low) & (places <= ends.high), here.shape)]
-        yield Group(here, f.p, (ends.low, ends.high, ends.period), f.breaks, f.corners)
+    chart, breaks, corners = curve
+    joints = Joints(breaks, corners, np.empty(room_ahead(breaks.size)))
+    record, mass = np.empty(MAX_PANELS * COLUMNS), PARAMETERS + list(formulas.parameters).index("m")
+    for begin in range(part.start, part.stop, CHUNK):
+        chunk = slice(begin, min(begin + CHUNK, part.stop))
+        lines, found = lay_out(columns, chunk.start, chunk.stop), answers.part(chunk)
+        chosen = np.flatnonzero(_are_possible(lines, found.status.size))
+        some = [line if line.size == 1 else line[chosen] for line in lines]
+        ends = (some[DOMAIN_LOW], some[DOMAIN_HIGH], some[DOMAIN_PERIOD])
+        asks = (some[DIRECTION], asked.only_sign, asked.horizon, some[TARGET])
+        bodies = launched(chosen.size, some[LAM0], *ends, *asks, some[V0] * some[V0])
+        legs.drive(formulas.dissipation, _rows(some[PARAMETERS:], chart), joints, asked.question, bodies, record)
+        values, ended = bodies[:, VALUE], bodies[:, STATUS]
+        if asked.question in (legs.LEAST_LOAD, legs.MOST_LOAD):
+            values = values * some[mass]
+        none = quantities.NEVER_THERE if asked.question == legs.ARRIVAL else quantities.NOT_PERIODIC
+        decided = ended != legs.LEFT
+        there = chosen[decided]
+        found.values[there, 0] = np.where(ended == legs.FOUND, values, nan)[decided]
+        found.status[there] = np.where(ended == legs.FOUND, quantities.ANSWERED, none)[decided]
+        found.route[there] = quantities.SINGLE
 
 
-def _lines(column: Any, which: Any) -> Any:
-    """The numbers of some launches, or the one number that all of them have."""
-    line = np.asarray(column).reshape(-1)
-    return line if line.size == 1 else line[which]
+def _are_possible(lines: list[Array], count: int) -> NDArray[np.bool_]:
+    """Which launches are of numbers, and inside the domain; `solve` refuses the others."""
+    possible = np.ones(count, dtype=np.bool_)
+    for line in (*lines[: TARGET + 1], *lines[PARAMETERS:]):
+        possible &= np.isfinite(line)
+    possible &= (lines[LAM0] >= lines[DOMAIN_LOW]) & (lines[LAM0] <= lines[DOMAIN_HIGH])
+    return possible
 
 
-def _drive(
-    formulas: "Formulas", asked: Asked, group: Group, columns: Sequence[Array], which: Any, answers: Answers
-) -> None:
-    """Drive some bodies of a group, and enter what is found."""
-    lam0, v0, direction, target, *parameters = (_lines(column, which) for column in columns)
-    low, high, period = (_lines(end, which) for end in group.domain)
-    bodies = launched(
-        which.size, *(lam0, low, high, period, direction, asked.only_sign, asked.horizon, target), v0 * v0
-    )
-    if group.parameters is not None:
-        rows = group.parameters.reshape(1, -1)
-    else:
-        count = max((column.size for column in parameters), default=1)
-        rows = np.empty((count, len(parameters)))
-        for k, column in enumerate(parameters):
-            rows[:, k] = column
-    joints = Joints(group.breaks, group.corners, np.empty(room_ahead(group.breaks.size)))
-    loss, record = formulas.dissipation, np.empty(MAX_PANELS * COLUMNS)
-    legs.drive(loss, rows, joints, asked.question, bodies, record)
-    values, found = bodies[:, VALUE], bodies[:, STATUS]
-    if asked.question in (legs.LEAST_LOAD, legs.MOST_LOAD):
-        values = values * parameters[list(formulas.parameters).index("m")]
-    none = quantities.NEVER_THERE if asked.question == legs.ARRIVAL else quantities.NOT_PERIODIC
-    decided = found != legs.LEFT
-    there = which[decided]
-    answers.values[there, 0] = np.where(found == legs.FOUND, values, nan)[decided]
-    answers.status[there] = np.where(found == legs.FOUND, quantities.ANSWERED, none)[decided]
-    answers.route[there] = quantities.SINGLE
+def _rows(parameters: list[Array], chart: Array) -> Array:
+    """The parameters of each body as a row; one row where all bodies have the same, the chart behind it."""
+    if chart.size:
+        return np.concatenate([*(column[:1] for column in parameters), chart]).reshape(1, -1)
+    rows = np.empty((max((column.size for column in parameters), default=1), len(parameters)))
+    for k, column in enumerate(parameters):
+        rows[:, k] = column
+    return rows

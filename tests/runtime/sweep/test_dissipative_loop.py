@@ -105,7 +105,11 @@ CASES = {
         gqm.CoulombFriction,
         {"mu": 0.15},
     ),
-    "closed": (lambda: gqm.Curve.implicit("x**2 + 2*z**2 - 1", start=(0, "-sqrt(2)/2")), gqm.CoulombFriction, {"mu": 0.15}),
+    "closed": (
+        lambda: gqm.Curve.implicit("x**2 + 2*z**2 - 1", start=(0, "-sqrt(2)/2")),
+        gqm.CoulombFriction,
+        {"mu": 0.15},
+    ),
 }
 
 
