@@ -33,6 +33,7 @@ from gqm_sym.runtime.legs.leg_run import ASYMPTOTE, FULL, LIFTOFF, LIMIT, NARROW
 from gqm_sym.runtime.legs.leg_segments import Run, along_field, along_panels
 from gqm_sym.runtime.motion.aperiodic import MotionAtRest
 from gqm_sym.runtime.motion.events import passages
+from gqm_sym.runtime.motion.locking import locked
 from gqm_sym.runtime.motion.motion import Motion
 from gqm_sym.runtime.motion.segment import Segment
 from gqm_sym.runtime.motion.trajectory import TimedSegment, Trajectory
@@ -86,7 +87,6 @@ class DissipativeMotion(Motion):
     motion that never ends cover what has been computed so far, and at least the first leg.
     """
 
-    _horizon = inf
     _ending = ""
     _arc = 0.0
     _whole: Trajectory | None = None
@@ -108,16 +108,14 @@ class DissipativeMotion(Motion):
     # -- what the motion answers --------------------------------------------------------------
 
     @property
+    @locked
     def t_end(self) -> float:
         """The time in s at which the body rests or leaves the track, or ``t_max``; infinite if there is neither."""
         self._look_ahead()
         return self._known_end()
 
-    @t_end.setter
-    def t_end(self, value: float) -> None:
-        self._horizon = value
-
     @property
+    @locked
     def turning_points(self) -> tuple[float, ...]:
         """The turning points so far in the order of time; the place of a launch from rest is one."""
         turns = [leg.lam_end for leg in self.legs if leg.end == "turn"]
