@@ -23,6 +23,10 @@ ROUNDING_SHARE = 4e-15
 # rounding of both.
 MEDIAN_ROUNDING_SHARE = 2e-14
 
+# A change of sign this close to a singular point, as a share of the segment, is the rounding of a curvature that has no
+# value there.
+SINGULAR_SHARE = 1e-8
+
 # A change of sign this close to the launch, as a share of the segment, is at the launch itself.
 LAUNCH_SHARE = 1e-14
 
@@ -97,13 +101,17 @@ def contact_signs(segment: Segment, phi: Array) -> Array:
     return signs
 
 
-def contact_changes(segment: Segment) -> Array:
-    """The phase angles of a segment at which N changes sign, in ascending order."""
-    return sign_changes(
+def contact_changes(timed: TimedSegment) -> Array:
+    """The phase angles of a timed segment at which N changes sign, in ascending order."""
+    segment = timed.segment
+    changes = sign_changes(
         segment,
         lambda phi: contact_signs(segment, phi),
         lambda phi: np.sign(contact_force(segment, phi)),
     )
+    if timed.end == "singular-point":
+        return changes[np.abs(changes - timed.phi_stop) > SINGULAR_SHARE * segment.stop]
+    return changes
 
 
 def sign_changes(segment: Segment, signs: Callable[[Array], Array], narrowing: Callable[[Array], Array]) -> Array:
@@ -170,10 +178,8 @@ def passages(segments: Sequence[TimedSegment], trajectory: Trajectory, lam: floa
         if phi[0] > segment.edges[-1]:
             continue
         out += [when[0] + when[1] for when, _ in crossings(timed, phi, trajectory.time_scale_error)]
-        if phi[0] in (0.0, segment.edges[-1]) and timed.r_stop[0] in (0.0, segment.duration):
-            at_stop = segment.a if timed.sense < 0 else segment.b
-            if lam_in_lap == at_stop:
-                out.append(timed.t_stop[0])
+        if phi[0] in (0.0, segment.edges[-1]) and phi[0] == timed.phi_stop:
+            out.append(timed.t_stop[0])
     return out
 
 
@@ -197,7 +203,7 @@ def liftoff(timed: TimedSegment, side: int, *, first: bool) -> tuple[Pair, float
     first : bool
         Whether the motion begins with this segment; contact may then be lost at launch.
     """
-    changes = contact_changes(timed.segment)
+    changes = contact_changes(timed)
     crossed = crossings(timed, changes, 0.0)
     if first:
         start, stop = timed.phi_start, timed.phi_stop

@@ -34,7 +34,7 @@ def plain_time(t: Any) -> float | None:
 
 def plain_times(t: Any) -> tuple[Array, float, float] | None:
     """Times that are an array of doubles, with the least and the greatest; None if they must be read one by one."""
-    if isinstance(t, np.ndarray) and t.dtype == np.float64 and t.size:
+    if isinstance(t, np.ndarray) and t.dtype == np.float64 and t.ndim and t.size:
         flat = np.ascontiguousarray(t).reshape(-1)
         return flat, float(flat.min()), float(flat.max())
     return None

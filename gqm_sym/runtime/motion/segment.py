@@ -43,6 +43,12 @@ MIN_TIMED_WIDTH_SHARE = 2.0**-10
 # (`Segment._end_errors`); 0.6 was the most that was measured.
 MAX_END_ROUNDINGS = 2.0
 
+# The distance from a turning point, as a share of the width, within which offsets are computed from the exact one.
+NEAR_TURN = 1e-3
+
+# The rounding of a place that is given by text, as two doubles.
+MAX_TEXT_ROUNDING = 2.0**-105
+
 # The distance from an equilibrium up to which an approach to it is computed, near the least that doubles know.
 NEAREST = 1e-300
 
@@ -310,7 +316,25 @@ class Segment:
         """The signed distances of place + low from ``a`` and to ``b``; the double of an end means that end."""
         if low == 0.0 and place in (self.a, self.b):
             return (0.0, self.width) if place == self.a else (self.width, 0.0)
-        return (place - self.a) + (low - self.low_parts[0]), (self.b - place) + (self.low_parts[1] - low)
+        ahead, behind = (place - self.a) + (low - self.low_parts[0]), (self.b - place) + (self.low_parts[1] - low)
+        turns = {TURN_TURN: (ahead, behind), FROM_TURN: (ahead,)}.get(self.kind, ())
+        if min(map(abs, turns), default=inf) > NEAR_TURN * abs(self.width) or not self._is_conservative:
+            return ahead, behind
+        return self._exact_offsets(place, low)
+
+    @property
+    def _is_conservative(self) -> bool:
+        return self.functions.exact is not None and self.v2 is None and self.speed_series is None
+
+    def _exact_offsets(self, place: float, low: float) -> tuple[float, float]:
+        """`offsets` from the exact ends, next to which the rounding of an end is much of the time to it."""
+        exact = self.functions.exact
+        assert exact is not None
+        start, stop = exact_ends(exact, DIGITS, self.kind, self.a, self.b, self.ends)
+        at = exact.at(DIGITS).track.place(place) + low
+        rounding = MAX_TEXT_ROUNDING * max(abs(self.a), abs(self.b))
+        ahead, behind = float(at - start), float(stop - at)
+        return (0.0 if abs(ahead) <= rounding else ahead), (0.0 if abs(behind) <= rounding else behind)
 
     def _is_short(self, share: float) -> bool:
         return abs(self.b - self.a) <= share * max(abs(self.a), abs(self.b))
