@@ -149,13 +149,9 @@ def test_the_contact_force_before_a_node(build: Build) -> None:
 
 
 def test_a_ball_does_not_roll_over_corners(build: Build) -> None:
-    """The centre of a ball has no path beside a corner, whichever way it turns; without corners planes will do."""
-    for height in ("0", "2"):
-        corner = gqm.Curve.sampled([("0", "1"), ("1", height), ("2", "1")], kind="linear")
-        with pytest.raises(LaunchError, match=r"radius: the track has a corner at s = 1\.414.*round the corners off"):
-            build(f"corner_{height}", corner, BALL).solve("1/10")
-    flat = gqm.Curve.sampled([("0", "1"), ("1", "0"), ("2", "-1")], kind="linear")
-    assert build("flat", flat, BALL).solve("1/10").events[-1].kind == "domain-end"
+    """The centre of a ball has no path beside a corner."""
+    with pytest.raises(LaunchError, match=r"radius: the track has a corner at s = 1\.414.*round the corners off"):
+        build("ball_on_planes", VEE, BALL).solve("1/10")
 
 
 def test_a_ball_that_will_not_fit_is_told_at_once(build: Build) -> None:
@@ -247,3 +243,44 @@ def test_what_is_no_model_is_refused_by_name() -> None:
         with pytest.raises((GQMError, TypeError), match="model"):
             gqm.emit(given, name="none")
     assert issubclass(DeclarationError, GQMError)
+
+
+@pytest.mark.parametrize(
+    ("name", "force"), [("vee", gqm.Gravity()), ("rough_vee", gqm.Gravity() + gqm.CoulombFriction(mu="1/10"))]
+)
+def test_a_corner_is_an_event_with_friction_and_without(name: str, force: Any, build: Build) -> None:
+    """Its speed kept, the body passes each corner between two turns, and a leg ends there; at rest on it it stays."""
+    motion = build(name, VEE, force).solve(1)
+    first = [(event.kind, event.lam) for event in motion.events[:4] if event.kind == "corner"]
+    assert first == [("corner", pytest.approx(math.sqrt(2), rel=1e-15))] * 2
+    assert [leg.end for leg in motion.legs[:4]] == ["corner", "turn", "corner", "turn"]
+    before, after = motion.legs[:2]
+    assert (before.lam_end, before.t_end) == (after.lam_start, after.t_start)
+    assert motion.events[0].t == before.t_end
+    resting = build(name, VEE, force).solve("sqrt(2)")
+    assert (resting.kind, [event.kind for event in resting.events]) == ("rest", ["rest"])
+
+
+def test_at_rest_at_a_cusp(build: Build) -> None:
+    """A body stays where the tangent of the cusp is level, as nothing moves it, and falls from any other cusp."""
+    deltoid = gqm.Curve.parametric(x="2*cos(t) + cos(2*t)", z="2*sin(t) - sin(2*t)", parameter="t", period="2*pi")
+    nephroid = gqm.Curve.parametric(x="3*cos(t) - cos(3*t)", z="3*sin(t) - sin(3*t)", parameter="t", period="2*pi")
+    for name, curve, level in (("deltoid", deltoid, ("0",)), ("nephroid", nephroid, ("0", "pi"))):
+        for lam0 in level:
+            assert build(name, curve, gqm.Gravity()).solve(lam0).kind == "rest"
+    motion = build("deltoid", deltoid, gqm.Gravity()).solve("2*pi/3")
+    assert [event.kind for event in motion.events] == ["contact-sign", "cusp"]
+    # Down the arc to the lowest cusp: dt = ds/V.
+    rate = lambda t: 4 * abs(mp.sin(3 * t / 2)) / mp.sqrt(2 * G * (mp.sqrt(27) / 2 - 2 * mp.sin(t) + mp.sin(2 * t)))  # noqa: E731
+    fall = mp.quad(rate, mp.linspace(2 * mp.pi / 3, 4 * mp.pi / 3, 5))
+    assert motion.t_end == pytest.approx(float(mp.re(fall)), rel=1e-13)
+
+
+@pytest.mark.parametrize("height", ["1/1000", "1/100"])
+def test_a_very_flat_bowl(height: str, build: Build) -> None:
+    """Released on z = x**20 a body takes up to 10**26 s to the other side, by the beta function."""
+    motion = build("flat_bowl", gqm.Curve.graph("x**20", parameter="x"), gqm.Gravity()).solve(height)
+    a, power = mpf(1) / int(height.split("/")[1]), mpf(1) / 20
+    half = 2 * a**-9 * mp.sqrt(mp.pi / (2 * G)) * mp.gamma(1 + power) / mp.gamma(mpf(1) / 2 + power)
+    assert motion.turning_points == (float(a), -float(a))
+    assert motion.half_period == pytest.approx(float(half), rel=1e-15)

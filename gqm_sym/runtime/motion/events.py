@@ -3,14 +3,16 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from math import sqrt
 
 import numpy as np
 
-from gqm_sym.runtime.arithmetic.doubledouble import Pair, minus, plus
+from gqm_sym.runtime.arithmetic.doubledouble import ZERO, Pair, minus, plus
 from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.launch.speed import path_and_force_at
 from gqm_sym.runtime.motion.segment import Segment
 from gqm_sym.runtime.motion.trajectory import TimedSegment, Trajectory
+from gqm_sym.runtime.quadrature.substitution import REGULAR
 
 # Places on each panel at which the sign of the contact force is sampled; its changes are then located by bisection.
 SAMPLES_PER_PANEL = 24
@@ -110,8 +112,16 @@ def contact_changes(timed: TimedSegment) -> Array:
         lambda phi: np.sign(contact_force(segment, phi)),
     )
     if timed.end == "singular-point":
-        return changes[np.abs(changes - timed.phi_stop) > SINGULAR_SHARE * segment.stop]
+        changes = changes[np.abs(changes - timed.phi_stop) > SINGULAR_SHARE * segment.stop]
+    if timed.t_start == ZERO:
+        changes = changes[np.abs(changes - timed.phi_start) > _launch_share(timed) * segment.stop]
     return changes
+
+
+def _launch_share(timed: TimedSegment) -> float:
+    """The distance in phase angle from the launch that is the launch itself, as a share of the segment."""
+    at_turn = timed.segment.kind != REGULAR and timed.phi_start in (0.0, timed.segment.stop)
+    return sqrt(LAUNCH_SHARE) if at_turn else LAUNCH_SHARE
 
 
 def sign_changes(segment: Segment, signs: Callable[[Array], Array], narrowing: Callable[[Array], Array]) -> Array:
@@ -184,11 +194,18 @@ def passages(segments: Sequence[TimedSegment], trajectory: Trajectory, lam: floa
 
 
 def corner_crossings(timed: TimedSegment, time_scale_error: float) -> list[tuple[Pair, float]]:
-    """The times at which a timed segment passes corners of the curve, each with its phase angle."""
-    segment = timed.segment
-    places = segment.functions.between(segment.functions.corners, segment.a, segment.b)
+    """The times at which a timed segment passes corners of the curve, each with its phase angle.
+
+    With losses segments end at corners, and the body passes to the next.
+    """
+    segment, f = timed.segment, timed.segment.functions
+    places = f.between(f.corners, segment.a, segment.b)
     phi = np.array([segment.phase_angle_of(*segment.offsets(place)) for place in places])
-    return crossings(timed, phi, time_scale_error)
+    found = crossings(timed, phi, time_scale_error)
+    stop = segment.b if timed.phi_stop > timed.phi_start else segment.a
+    if timed.end == "" and f.between(f.corners, *np.nextafter(stop, (-np.inf, np.inf)).tolist()).size:
+        found.append((timed.t_stop, timed.phi_stop))
+    return found
 
 
 def liftoff(timed: TimedSegment, side: int, *, first: bool) -> tuple[Pair, float] | None:
@@ -206,11 +223,13 @@ def liftoff(timed: TimedSegment, side: int, *, first: bool) -> tuple[Pair, float
     changes = contact_changes(timed)
     crossed = crossings(timed, changes, 0.0)
     if first:
-        start, stop = timed.phi_start, timed.phi_stop
-        crossed = [(when, phi) for when, phi in crossed if abs(phi - start) > LAUNCH_SHARE * timed.segment.stop]
+        start, stop, share = timed.phi_start, timed.phi_stop, _launch_share(timed)
+        crossed = [(when, phi) for when, phi in crossed if abs(phi - start) > share * timed.segment.stop]
         ahead = crossed[0][1] if crossed else stop
         # N may vanish at the launch itself; its sign half-way to the first change then decides.
-        here, then = contact_signs(timed.segment, np.array([start, 0.5 * (start + ahead)])) * side
+        # At a cusp it is infinity times zero, so that places a little ahead are looked at.
+        near = start + share * (stop - start)
+        here, then = contact_signs(timed.segment, np.array([near, 0.5 * (start + ahead)])) * side
         if (here or then) < 0.0:
             return timed.r_start, timed.phi_start
     if not crossed:
