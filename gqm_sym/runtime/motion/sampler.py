@@ -11,6 +11,7 @@ from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.inversion import records
 from gqm_sym.runtime.inversion.fourier import fit_wave
 from gqm_sym.runtime.launch.problem import Problem
+from gqm_sym.runtime.motion.timing import Timing
 from gqm_sym.runtime.motion.trajectory import Trajectory
 from gqm_sym.runtime.quadrature.substitution import TURN_TURN
 
@@ -51,16 +52,16 @@ class Sampler:
     """
 
     def __init__(
-        self, problem: Problem, trajectory: Trajectory, phase_time: Pair, direction: int, time_drift: Callable[[], Pair]
+        self, problem: Problem, trajectory: Trajectory, times: Timing, direction: int, time_drift: Callable[[], Pair]
     ) -> None:
         assert trajectory.period is not None
         segment = trajectory.segments[0].segment
         self.trajectory = trajectory
-        self.max_time = MAX_PERIODS * trajectory.period[0]
+        self.max_time = min(MAX_PERIODS * trajectory.period[0], times.max_time)
         self._problem, self._segment = problem, segment
         there_and_back = segment.kind == TURN_TURN
         sign = direction if there_and_back else 1
-        start, start_low = sign * phase_time[0], sign * phase_time[1]
+        start, start_low = sign * times.phase_time[0], sign * times.phase_time[1]
         ends = (segment.a, segment.b, problem.lam0, trajectory.lap)
         self._v0, self._time_drift = direction * problem.launch.v0.value, time_drift
         own_times = (*segment.total_time, segment.stop, trajectory.time_scale_error)
