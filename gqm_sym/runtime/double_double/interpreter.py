@@ -124,7 +124,8 @@ def evaluate(operations, first, last, work, n):  # type: ignore[no-untyped-def]
     rows = carray(operations, (last, 4))
     for k in range(first, last):
         operation, at, left, right = rows[k, 0], rows[k, 1], rows[k, 2], rows[k, 3]
-        registers = carray(work, max(at + 2 * ROW, left + ROW, right + ROW))
+        results = 2 if operation == SINE_COSINE else 1
+        registers = carray(work, max(at + results * ROW, left + ROW, right + ROW))
         out, a, b = registers[at : at + ROW], registers[left : left + ROW], registers[right : right + ROW]
         if operation == MULTIPLY:
             fill_products(n, a, b, out)

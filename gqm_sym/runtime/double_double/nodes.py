@@ -7,7 +7,7 @@ import numpy as np
 
 from gqm_sym.runtime.arithmetic.elementary import QUARTER
 from gqm_sym.runtime.compiled.jit import entry
-from gqm_sym.runtime.compiled.types import INTEGER, MATRIX
+from gqm_sym.runtime.compiled.types import INTEGER, MATRIX, Array
 from gqm_sym.runtime.double_double.arithmetic import add, divide, multiply, sine_and_cosine
 from gqm_sym.runtime.quadrature.trapezoid import LIBRATION
 
@@ -78,4 +78,15 @@ def legendre_rule():  # type: ignore[no-untyped-def]
     return rows
 
 
-trapezoidal_nodes, panel_rule = cache(node_tables), cache(legendre_rule)
+@cache
+def trapezoidal_nodes(kind: int) -> Array:
+    """Return the table of `node_tables`, which is made once."""
+    table: Array = node_tables(kind)
+    return table
+
+
+@cache
+def panel_rule() -> Array:
+    """Return the rule of `legendre_rule`, which is made once."""
+    rule: Array = legendre_rule()
+    return rule
