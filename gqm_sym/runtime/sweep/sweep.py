@@ -5,7 +5,7 @@ both leave undecided are solved one by one, as `solve` does it.
 """
 
 from collections.abc import Callable, Iterator, Mapping
-from functools import lru_cache
+from functools import lru_cache, partial
 from math import inf, nan, prod
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -19,8 +19,10 @@ from gqm_sym.runtime.compiled.strided import PARAMETERS, lay_out, pointers, wide
 from gqm_sym.runtime.compiled.threads import run_in_threads
 from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.launch.request import CONTACTS, LaunchRequest
+from gqm_sym.runtime.multiprecision.exact_problem import NOWHERE
 from gqm_sym.runtime.sweep import quantities, scalar
 from gqm_sym.runtime.sweep.batch.batches import answer_batches
+from gqm_sym.runtime.sweep.dissipative_loop import MIN_BODIES_PER_THREAD, answer_driven, asked_of_bodies
 from gqm_sym.runtime.sweep.quantities import QUANTITIES, ROUTES, STATUS_SENTENCES, Answers, Quantity
 
 if TYPE_CHECKING:
@@ -162,10 +164,18 @@ def sweep(
         np.full(size, quantities.UNDECIDED, dtype=np.int8),
         np.full(size, quantities.BATCH, dtype=np.int8),
     )
-    if has_compiled_route(formulas, found, t_max, contact):
-        domain = [widen(value, shape) for value in _domain_columns(formulas, arrays[4:])]
-        rows = [*columns[:4], *domain, *columns[4:]]
-        run_in_threads(lambda part: _answer(formulas, found, rows, part, answers), size, MIN_LAUNCHES_PER_THREAD)
+    asked = asked_of_bodies(formulas, quantity, t_max, contact)
+    if asked is not None or has_compiled_route(formulas, found, t_max, contact):
+        for group, chosen in _groups(formulas, columns, shape):
+            some = answers if chosen is None else answers.part(chosen)
+            if asked is not None:
+                curve = (group.chart, group.joints, group.corners)
+                work, least = partial(answer_driven, formulas, asked, curve, group.columns, some), MIN_BODIES_PER_THREAD
+            else:
+                work, least = partial(_answer, formulas, found, group, some), MIN_LAUNCHES_PER_THREAD
+            run_in_threads(work, some.status.size, least)
+            if chosen is not None:
+                answers.put(chosen, some)
     values = answers.values[:, found.columns]
     for k in np.flatnonzero(answers.status == quantities.UNDECIDED):
         here = [s if np.ndim(s) == 0 else float(c.flat[k % c.size]) for s, c in zip(sources, columns, strict=True)]
@@ -177,10 +187,10 @@ def sweep(
 def has_compiled_route(formulas: "Formulas", quantity: Quantity, t_max: Any, contact: str) -> bool:
     """Whether compiled loops answer most launches.
 
-    They do not for curves without formulas, motions that lose energy, bodies that must fit their track or may leave it,
-    and motions with a last time.
+    They do not for motions that lose energy, bodies that must fit their track or may leave it, and motions with a last
+    time.
     """
-    conservative = formulas.chart is None and formulas.dissipation is None and not formulas.rolling_radius
+    conservative = formulas.dissipation is None and not formulas.rolling_radius
     return conservative and quantity.code != quantities.NOT_COMPILED and t_max is None and contact == "bilateral"
 
 
@@ -255,8 +265,67 @@ def _rounding_of(axes: Callable[..., Any], place: float, values: tuple[float, ..
         return float(mp.mpf(axes(mp, tuple(map(mp.mpf, values)))[0]) - mp.mpf(place))
 
 
-def _answer(formulas: "Formulas", quantity: Quantity, columns: list[Array], part: slice, answers: Answers) -> None:
-    """Answer a part of all launches by compiled loops, as far as they decide them."""
+class Group(NamedTuple):
+    """Launches on curves of one shape.
+
+    Attributes
+    ----------
+    columns : list of arrays
+        The launches, in the order of `strided`; each array has one number, or one for each launch.
+    chart, joints, corners : arrays
+        What compiled code reads behind the parameters, and the places within one period at which the curve is not
+        smooth, and at which its tangent jumps; all are empty for a curve with formulas.
+    """
+
+    columns: list[Array]
+    chart: Array = NOWHERE
+    joints: Array = NOWHERE
+    corners: Array = NOWHERE
+
+
+def _groups(
+    formulas: "Formulas", columns: list[Array], shape: tuple[int, ...]
+) -> Iterator[tuple[Group, NDArray[np.intp] | None]]:
+    """The launches, grouped by the shape of their curve, and which they are; None where all are of one shape.
+
+    Launches whose curve cannot be made are in no group.
+    """
+    if formulas.chart is None:
+        domain = [widen(value, shape) for value in _domain_columns(formulas, columns[4:])]
+        yield Group([*columns[:4], *domain, *columns[4:]]), None
+        return
+    for values, chosen in _distinct(columns[4:], shape):
+        try:
+            chart = formulas.chart_with(values)
+        except GQMError:
+            continue  # `solve` says why
+        domain = [np.array(value) for value in (*chart.range, nan, nan, 0.0)]
+        some = columns if chosen is None else [_chosen(column, shape, chosen) for column in columns]
+        yield Group([*some[:4], *domain, *some[4:]], chart.block, chart.breaks, chart.corners), chosen
+
+
+def _distinct(
+    columns: list[Array], shape: tuple[int, ...]
+) -> Iterator[tuple[tuple[float, ...], NDArray[np.intp] | None]]:
+    """The different sets of values that columns have, and which elements have each; None where all have the same."""
+    if all(column.size == 1 for column in columns):
+        yield tuple(float(column.flat[0]) for column in columns), None
+        return
+    rows = np.column_stack([np.broadcast_to(column, shape).reshape(-1) for column in columns])
+    different, which = np.unique(rows, axis=0, return_inverse=True)
+    order = np.argsort(which.reshape(-1), kind="stable")
+    parts = np.split(order, np.cumsum(np.bincount(which.reshape(-1)))[:-1])
+    yield from zip(map(tuple, different.tolist()), parts, strict=True)
+
+
+def _chosen(column: Array, shape: tuple[int, ...], chosen: NDArray[np.intp]) -> Array:
+    """Elements of a column, which is broadcast to a shape."""
+    return column if column.size == 1 else np.broadcast_to(column, shape).reshape(-1)[chosen]
+
+
+def _answer(formulas: "Formulas", quantity: Quantity, group: Group, answers: Answers, part: slice) -> None:
+    """Answer a part of a group of launches by compiled loops, as far as they decide them."""
+    columns, chart, joints = group.columns, group.chart, group.joints
     code, batches = quantity.code, formulas.batch
     for begin in range(part.start, part.stop, CHUNK):
         chunk = slice(begin, min(begin + CHUNK, part.stop))
@@ -267,8 +336,8 @@ def _answer(formulas: "Formulas", quantity: Quantity, columns: list[Array], part
             asked = code if code in ANSWERED_BY_BATCHES else quantities.SPANS
             counts = (batches.orbit_rows, batches.integrand_rows)
             answer_batches(batches.addresses(), counts, *launches, asked, found._replace(values=spans))
-        parameters = np.empty(len(lines) - PARAMETERS)
-        scalar.answer_one_by_one(formulas.addresses, *launches, code, spans, found, parameters)
+        parameters = np.concatenate([np.empty(len(lines) - PARAMETERS), chart])
+        scalar.answer_one_by_one(formulas.addresses, *launches, code, spans, found, parameters, joints)
 
 
 def _solved(
