@@ -1,5 +1,5 @@
 # Made by gqm-gen for "catenary". Do not edit: change its declaration and generate again.
-# interface 9, input 2558bd3a8d44, body 014c15da3aaf
+# interface 9, input 2558bd3a8d44, body 139253eaf818
 """Bead on a hanging chain
 
 x              = x
@@ -326,14 +326,14 @@ def potential_divdiff2_batch(n, lows, highs, left, right, p, out):
 
 
 @compiled(TIME_INTEGRAND_BATCH, later=True)
-def time_integrand_batch(n, fall, rise, p, out):
-    """(dt/du)**2 at sin(u)**2 = fall = 1 - rise, and its divisor; dt/du integrates to the half period (eq. 17)."""
+def time_integrand_batch(n, sine2, cosine2, p, out):
+    """(dt/du)**2 at sine2 = sin(u)**2, and its divisor; dt/du integrates to the half period (paper, eq. 17)."""
     p, out = carray(p, (7, n)), carray(out, (2, n))
     for i in range(n):
-        c, g, top, top_lack, top_apart, stretch = p[0, i], p[1, i], p[3, i], p[4, i], p[5, i], p[6, i]
-        _t0 = fall*top_apart + rise
-        _t1 = fall*top
-        out[0, i] = c*(4*_t1 + (_t1 + 1)**2)**2/(_t0*g*stretch*(fall*top_lack + rise)**4)
+        c, g, t, one_minus_t, one_minus_tt, cosine_fourth = p[0, i], p[1, i], p[3, i], p[4, i], p[5, i], p[6, i]
+        _t0 = cosine2 + one_minus_tt*sine2
+        _t1 = sine2*t
+        out[0, i] = c*(4*_t1 + (_t1 + 1)**2)**2/(_t0*cosine_fourth*g*(cosine2 + one_minus_t*sine2)**4)
         out[1, i] = 4*_t0*c*g
 
 

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "circle_rotating". Do not edit: change its declaration and generate again.
-# interface 9, input a74aedd594f9, body 1d1718882cb9
+# interface 9, input a74aedd594f9, body e0653fa7d621
 """Bead on a hoop that turns about its vertical diameter
 
 x              = L*sin(theta)
@@ -349,19 +349,20 @@ def orbit_invariants_batch(n, lows, highs, p, out):
 
 
 @compiled(TIME_INTEGRAND_BATCH, later=True)
-def time_integrand_batch(n, fall, rise, p, out):
-    """(dt/du)**2 at sin(u)**2 = fall = 1 - rise, and its divisor; dt/du integrates to the half period (eq. 17)."""
+def time_integrand_batch(n, sine2, cosine2, p, out):
+    """(dt/du)**2 at sine2 = sin(u)**2, and its divisor; dt/du integrates to the half period (paper, eq. 17)."""
     p, out = carray(p, (8, n)), carray(out, (2, n))
     for i in range(n):
-        L, Omega, g, top, top_apart, top_sine, stretch = p[0, i], p[1, i], p[2, i], p[4, i], p[5, i], p[6, i], p[7, i]
-        _t0 = fall*top
-        _t1 = (_t0 + 1)**2
-        _t2 = fall*top_apart + rise
+        L, Omega, g, t, one_minus_tt, sine_squared = p[0, i], p[1, i], p[2, i], p[4, i], p[5, i], p[6, i]
+        cosine_fourth = p[7, i]
+        _t0 = cosine2 + one_minus_tt*sine2
+        _t1 = sine2*t
+        _t2 = (_t1 + 1)**2
         _t3 = Omega**2
         _t4 = L*_t3
-        _t5 = L*_t1*_t3 - 4*_t0*_t4 - _t1*_t4*top_sine - _t1*g
-        out[0, i] = -L*_t1/(_t2*_t5*stretch)
-        out[1, i] = -4*L*_t2*_t5/_t1
+        _t5 = L*_t2*_t3 - 4*_t1*_t4 - _t2*_t4*sine_squared - _t2*g
+        out[0, i] = -L*_t2/(_t0*_t5*cosine_fourth)
+        out[1, i] = -4*L*_t0*_t5/_t2
 
 
 @compiled(INTEGRAND_INVARIANTS_BATCH, later=True)

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "double_well". Do not edit: change its declaration and generate again.
-# interface 9, input 876b66f15f50, body 836ccae67c19
+# interface 9, input 876b66f15f50, body fe22d7d8fd9b
 """Bead between two wells
 
 x              = x
@@ -331,13 +331,13 @@ def potential_divdiff2_batch(n, lows, highs, left, right, p, out):
 
 
 @compiled(TIME_INTEGRAND_BATCH, later=True)
-def time_integrand_batch(n, fall, rise, p, out):
-    """(dt/du)**2 at sin(u)**2 = fall = 1 - rise, and its divisor; dt/du integrates to the half period (eq. 17)."""
+def time_integrand_batch(n, sine2, cosine2, p, out):
+    """(dt/du)**2 at sine2 = sin(u)**2, and its divisor; dt/du integrates to the half period (paper, eq. 17)."""
     p, out = carray(p, (4, n)), carray(out, (2, n))
     for i in range(n):
-        h, g, top = p[0, i], p[1, i], p[3, i]
-        _t0 = fall*top
-        _t1 = _t0 + top - 2
+        h, g, t = p[0, i], p[1, i], p[3, i]
+        _t0 = sine2*t
+        _t1 = _t0 + t - 2
         out[0, i] = (16*_t0*h**2*(_t0 - 1)**2 + 1)/(2*_t1*g*h)
         out[1, i] = 2*_t1*g*h
 

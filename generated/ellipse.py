@@ -1,5 +1,5 @@
 # Made by gqm-gen for "ellipse". Do not edit: change its declaration and generate again.
-# interface 9, input 81dc4ee20e82, body 4e1c8c8ce52e
+# interface 9, input 81dc4ee20e82, body 480de3646f8a
 """Bead on an ellipse, by the eccentric angle
 
 x              = a*cos(theta)
@@ -346,16 +346,17 @@ def orbit_invariants_batch(n, lows, highs, p, out):
 
 
 @compiled(TIME_INTEGRAND_BATCH, later=True)
-def time_integrand_batch(n, fall, rise, p, out):
-    """(dt/du)**2 at sin(u)**2 = fall = 1 - rise, and its divisor; dt/du integrates to the half period (eq. 17)."""
+def time_integrand_batch(n, sine2, cosine2, p, out):
+    """(dt/du)**2 at sine2 = sin(u)**2, and its divisor; dt/du integrates to the half period (paper, eq. 17)."""
     p, out = carray(p, (8, n)), carray(out, (2, n))
     for i in range(n):
-        a, b, g, top, top_lack, top_apart, stretch = p[0, i], p[1, i], p[2, i], p[4, i], p[5, i], p[6, i], p[7, i]
-        _t0 = fall*top
-        _t1 = fall*top_apart + rise
-        _t2 = (fall*top_lack + rise)**2
-        out[0, i] = (16*_t0*_t2*b**2 + a**2*(-4*_t0 + _t2)**2)/(_t1*b*g*stretch*(_t0 + 1)**4)
-        out[1, i] = 4*_t1*b*g
+        a, b, g, t, one_minus_t, one_minus_tt = p[0, i], p[1, i], p[2, i], p[4, i], p[5, i], p[6, i]
+        cosine_fourth = p[7, i]
+        _t0 = cosine2 + one_minus_tt*sine2
+        _t1 = sine2*t
+        _t2 = (cosine2 + one_minus_t*sine2)**2
+        out[0, i] = (16*_t1*_t2*b**2 + a**2*(-4*_t1 + _t2)**2)/(_t0*b*cosine_fourth*g*(_t1 + 1)**4)
+        out[1, i] = 4*_t0*b*g
 
 
 @compiled(INTEGRAND_INVARIANTS_BATCH, later=True)

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "kepler". Do not edit: change its declaration and generate again.
-# interface 9, input a0162e77d64e, body c0dfec70179f
+# interface 9, input a0162e77d64e, body 61fe8010229c
 """Planet on its own ellipse, by the eccentric anomaly
 
 x              = a*(-ecc + cos(E))
@@ -464,28 +464,28 @@ def orbit_invariants_batch(n, lows, highs, p, out):
 
 
 @compiled(TIME_INTEGRAND_BATCH, later=True)
-def time_integrand_batch(n, fall, rise, p, out):
-    """(dt/du)**2 at sin(u)**2 = fall = 1 - rise, and its divisor; dt/du integrates to the half period (eq. 17)."""
+def time_integrand_batch(n, sine2, cosine2, p, out):
+    """(dt/du)**2 at sine2 = sin(u)**2, and its divisor; dt/du integrates to the half period (paper, eq. 17)."""
     p, out = carray(p, (12, n)), carray(out, (2, n))
     for i in range(n):
-        a, ecc, k, top, top_lack, top_apart, top_sine = p[0, i], p[1, i], p[2, i], p[4, i], p[5, i], p[6, i], p[7, i]
-        stretch, _c0, _c1, _c2 = p[8, i], p[9, i], p[10, i], p[11, i]
-        _t0 = fall*top
-        _t1 = _t0 + 1
-        _t2 = _t1**2
-        _t3 = 1/_t2
-        _t4 = fall*top_apart + rise
-        _t5 = (fall*top_lack + rise)**2
-        _t6 = 16*_t0
+        a, ecc, k, t, one_minus_t, one_minus_tt = p[0, i], p[1, i], p[2, i], p[4, i], p[5, i], p[6, i]
+        sine_squared, cosine_fourth, _c0, _c1, _c2 = p[7, i], p[8, i], p[9, i], p[10, i], p[11, i]
+        _t0 = cosine2 + one_minus_tt*sine2
+        _t1 = sine2*t
+        _t2 = _t1 + 1
+        _t3 = _t2**2
+        _t4 = 1/_t3
+        _t5 = (cosine2 + one_minus_t*sine2)**2
+        _t6 = 16*_t1
         _t7 = 1 - ecc**2
-        _t8 = 4*_t0
-        _t9 = _t2*ecc
-        _t10 = _t2 + _t8*ecc + _t9*top_sine - _t9
-        _t11 = -_t2
-        _t12 = sqrt((_t6*_t7*(-_t11 - _t8) + (-8*_t0 - _t11 - _t9)**2)/_t1**4)
+        _t8 = 4*_t1
+        _t9 = _t3*ecc
+        _t10 = _t3 + _t8*ecc + _t9*sine_squared - _t9
+        _t11 = -_t3
+        _t12 = sqrt((_t6*_t7*(-_t11 - _t8) + (-8*_t1 - _t11 - _t9)**2)/_t2**4)
         _t13 = _c2 + _t12
-        out[0, i] = _c0*_c2*_t12*_t13*_t3*a**2*(_t5*_t6 + _t7*(_t5 - _t8)**2)/(2*_t10*_t4*ecc*k*stretch)
-        out[1, i] = 8*_c1*_t10*_t3*_t4*ecc*k/(_c0*_t12*_t13)
+        out[0, i] = _c0*_c2*_t12*_t13*_t4*a**2*(_t5*_t6 + _t7*(_t5 - _t8)**2)/(2*_t0*_t10*cosine_fourth*ecc*k)
+        out[1, i] = 8*_c1*_t0*_t10*_t4*ecc*k/(_c0*_t12*_t13)
 
 
 @compiled(INTEGRAND_INVARIANTS_BATCH, later=True)

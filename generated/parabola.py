@@ -1,5 +1,5 @@
 # Made by gqm-gen for "parabola". Do not edit: change its declaration and generate again.
-# interface 9, input 2c8bf584b06a, body 51a21f446074
+# interface 9, input 2c8bf584b06a, body 6401f7bd6f0b
 """Bead in a parabolic bowl
 
 x              = x
@@ -318,12 +318,12 @@ def potential_divdiff2_batch(n, lows, highs, left, right, p, out):
 
 
 @compiled(TIME_INTEGRAND_BATCH, later=True)
-def time_integrand_batch(n, fall, rise, p, out):
-    """(dt/du)**2 at sin(u)**2 = fall = 1 - rise, and its divisor; dt/du integrates to the half period (eq. 17)."""
+def time_integrand_batch(n, sine2, cosine2, p, out):
+    """(dt/du)**2 at sine2 = sin(u)**2, and its divisor; dt/du integrates to the half period (paper, eq. 17)."""
     p, out = carray(p, (4, n)), carray(out, (2, n))
     for i in range(n):
-        a, g, top = p[0, i], p[1, i], p[3, i]
-        out[0, i] = (4*a**2*fall*top + 1)/(2*a*g)
+        a, g, t = p[0, i], p[1, i], p[3, i]
+        out[0, i] = (4*a**2*sine2*t + 1)/(2*a*g)
         out[1, i] = 2*a*g
 
 

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "quartic". Do not edit: change its declaration and generate again.
-# interface 9, input 79764b04feb4, body a1336e80628a
+# interface 9, input 79764b04feb4, body 495a032f17f9
 """Bead in a quartic bowl
 
 x              = x
@@ -310,13 +310,13 @@ def potential_divdiff2_batch(n, lows, highs, left, right, p, out):
 
 
 @compiled(TIME_INTEGRAND_BATCH, later=True)
-def time_integrand_batch(n, fall, rise, p, out):
-    """(dt/du)**2 at sin(u)**2 = fall = 1 - rise, and its divisor; dt/du integrates to the half period (eq. 17)."""
+def time_integrand_batch(n, sine2, cosine2, p, out):
+    """(dt/du)**2 at sine2 = sin(u)**2, and its divisor; dt/du integrates to the half period (paper, eq. 17)."""
     p, out = carray(p, (3, n)), carray(out, (2, n))
     for i in range(n):
-        g, top = p[0, i], p[2, i]
-        _t0 = fall*top + top
-        out[0, i] = (16*fall**3*top**3 + 1)/(2*_t0*g)
+        g, t = p[0, i], p[2, i]
+        _t0 = sine2*t + t
+        out[0, i] = (16*sine2**3*t**3 + 1)/(2*_t0*g)
         out[1, i] = 2*_t0*g
 
 

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "rotating_parabola". Do not edit: change its declaration and generate again.
-# interface 9, input 33421e752297, body a994f297800b
+# interface 9, input 33421e752297, body 99a5c7aead49
 """Bead in a turning parabolic bowl
 
 x              = x
@@ -323,13 +323,13 @@ def potential_divdiff2_batch(n, lows, highs, left, right, p, out):
 
 
 @compiled(TIME_INTEGRAND_BATCH, later=True)
-def time_integrand_batch(n, fall, rise, p, out):
-    """(dt/du)**2 at sin(u)**2 = fall = 1 - rise, and its divisor; dt/du integrates to the half period (eq. 17)."""
+def time_integrand_batch(n, sine2, cosine2, p, out):
+    """(dt/du)**2 at sine2 = sin(u)**2, and its divisor; dt/du integrates to the half period (paper, eq. 17)."""
     p, out = carray(p, (5, n)), carray(out, (2, n))
     for i in range(n):
-        a, Omega, g, top = p[0, i], p[1, i], p[2, i], p[4, i]
+        a, Omega, g, t = p[0, i], p[1, i], p[2, i], p[4, i]
         _t0 = -Omega**2 + 2*a*g
-        out[0, i] = (4*a**2*fall*top + 1)/_t0
+        out[0, i] = (4*a**2*sine2*t + 1)/_t0
         out[1, i] = _t0
 
 

@@ -23,7 +23,7 @@ from gqm_sym.derivation.geometry.geometry import Geometry, geometry
 from gqm_sym.derivation.geometry.level_set import LevelSet, level_set
 from gqm_sym.derivation.geometry.offset_curve import beside
 from gqm_sym.derivation.reality import check_somewhere_real
-from gqm_sym.derivation.wells.swing import Swing, swing
+from gqm_sym.derivation.wells.symmetric_orbits import SymmetricOrbits, symmetric_orbits
 from gqm_sym.derivation.wells.symmetry import Symmetry, symmetry
 from gqm_sym.dimensions import COMMON, found_dimensions, unit_of
 from gqm_sym.errors import ArgumentError, renamed
@@ -80,8 +80,8 @@ class Model:
         U = Φ/inertia, so that W + 2U is constant along a motion, and dU/dλ.
     symmetry
         Where the effective potential and σ are even; None where no such place was found, or nothing repeats.
-    swing
-        The time of an orbit about such a place as an integral without sines; None where there is no such form.
+    symmetric_orbits
+        The time of orbits about such a place as an integral without sines; None where there is no such form.
     static_normal_load
         n₀ with N/m = κ W + n₀.
     dissipation
@@ -139,7 +139,7 @@ class Model:
     effective_potential: sp.Expr
     effective_potential_slope: sp.Expr
     symmetry: Symmetry | None
-    swing: Swing | None
+    symmetric_orbits: SymmetricOrbits | None
     static_normal_load: sp.Expr
     dissipation: Dissipation | None
     speed_squared: sp.Expr
@@ -162,7 +162,7 @@ class Model:
         __getattr__ = renamed(
             {
                 **{"climb": "2*effective_potential", "climb_slope": "2*effective_potential_slope"},
-                **{"kernel": "tangential_acceleration", "reaction": "static_normal_load"},
+                **{"kernel": "tangential_acceleration", "reaction": "static_normal_load", "swing": "symmetric_orbits"},
             },
             "a model",
         )
@@ -388,7 +388,7 @@ def derive(
         effective_potential=potential,
         effective_potential_slope=slope,
         symmetry=axes,
-        swing=swing(2 * potential, shape.ds, lam, axes),
+        symmetric_orbits=symmetric_orbits(2 * potential, shape.ds, lam, axes),
         static_normal_load=law.static_normal_load,
         dissipation=loss,
         speed_squared=speed.squared,

@@ -2,7 +2,7 @@
 
 from sympy import Expr
 
-from gqm_sym.derivation.wells.swing import HALF, LAUNCH, OFFSET, Swing, at_share
+from gqm_sym.derivation.wells.symmetric_orbits import HALF, LAUNCH, OFFSET, SymmetricOrbits, at_place
 from gqm_sym.emission.context import Lowering
 from gqm_sym.emission.ir import FunctionIR
 from gqm_sym.emission.sharing import hoist
@@ -11,17 +11,19 @@ from gqm_sym.emission.subscripts import at
 
 def axis_orbits_batch(lowering: Lowering) -> tuple[FunctionIR, ...]:
     """Times of orbits about an axis, by an arithmetic-geometric mean or by an integrand, and their turning points."""
-    swing = lowering.model.swing
-    if swing is None:
+    orbits = lowering.model.symmetric_orbits
+    if orbits is None:
         return ()
-    times = (_agm_arguments(lowering, swing.means),) if swing.means else _time_integrand(lowering, swing)
+    times = (
+        (_agm_arguments(lowering, orbits.agm_arguments),) if orbits.agm_arguments else _time_integrand(lowering, orbits)
+    )
     symmetry = lowering.model.symmetry
-    if swing.crest is None or symmetry is None or not symmetry.monotone:
+    if orbits.turning_point is None or symmetry is None or not symmetry.monotone:
         return times
-    return (*times, _turning_point(lowering, swing.crest))
+    return (*times, _turning_point(lowering, orbits.turning_point))
 
 
-def _turning_point(lowering: Lowering, crest: tuple[Expr, ...]) -> FunctionIR:
+def _turning_point(lowering: Lowering, forms: tuple[Expr, ...]) -> FunctionIR:
     names = lowering.names
     offset, launch = names.symbol("offset"), names.symbol("launch")
     offsets, launches = names("offsets"), names("launches")
@@ -30,12 +32,12 @@ def _turning_point(lowering: Lowering, crest: tuple[Expr, ...]) -> FunctionIR:
         (offsets, launches),
         "From V**2 at an offset: half the orbit's width (paper, eq. 14), -dV**2/dq, and a sine's square q at the turn.",
         inside=[(offset, at(offsets)), (launch, at(launches))],
-        outputs=tuple(form.xreplace({OFFSET: offset, LAUNCH: launch}) for form in crest),
+        outputs=tuple(form.xreplace({OFFSET: offset, LAUNCH: launch}) for form in forms),
         batch=True,
     )
 
 
-def _agm_arguments(lowering: Lowering, means: tuple[Expr, Expr]) -> FunctionIR:
+def _agm_arguments(lowering: Lowering, squares: tuple[Expr, Expr]) -> FunctionIR:
     names = lowering.names
     half, halves = names.symbol("half"), names("halves")
     return lowering.function(
@@ -43,35 +45,35 @@ def _agm_arguments(lowering: Lowering, means: tuple[Expr, Expr]) -> FunctionIR:
         (halves,),
         "a**2, b**2: the half period (paper, eq. 17) is pi over the arithmetic-geometric mean of a and b (Gauss).",
         inside=[(half, at(halves))],
-        outputs=tuple(square.xreplace({HALF: half}) for square in means),
+        outputs=tuple(square.xreplace({HALF: half}) for square in squares),
         batch=True,
     )
 
 
-def _time_integrand(lowering: Lowering, swing: Swing) -> tuple[FunctionIR, ...]:
+def _time_integrand(lowering: Lowering, orbits: SymmetricOrbits) -> tuple[FunctionIR, ...]:
     names = lowering.names
-    fall, rise = names.symbol("fall"), names.symbol("rise")
-    own = {symbol: names.symbol(symbol.name.removeprefix("_")) for symbol in (HALF, *dict(swing.ends))}
-    here = own | at_share(own, fall, rise)
-    outputs, calls = hoist([form.xreplace(here) for form in (swing.pace, swing.factor)], {fall, rise})
-    ends = {own[symbol]: end.xreplace(own) for symbol, end in swing.ends}
+    sine2, cosine2 = names.symbol("sine2"), names.symbol("cosine2")
+    own = {symbol: names.symbol(symbol.name.removeprefix("_")) for symbol in (HALF, *dict(orbits.invariants))}
+    here = own | at_place(own, sine2, cosine2)
+    outputs, calls = hoist([form.xreplace(here) for form in (orbits.time_integrand, orbits.divisor)], {sine2, cosine2})
+    ends = {own[symbol]: end.xreplace(own) for symbol, end in orbits.invariants}
     used = set().union(*(form.free_symbols for form in outputs))
     held = [*ends.items(), *((symbol, call.xreplace(ends)) for symbol, call in calls)]
     held = [(symbol, value) for symbol, value in held if symbol in used]
     behind = len(lowering.order)
-    pace = lowering.function(
+    integrand = lowering.function(
         "time_integrand_batch",
-        (fall, rise),
-        "(dt/du)**2 at sin(u)**2 = fall = 1 - rise, and its divisor; dt/du integrates to the half period (eq. 17).",
+        (sine2, cosine2),
+        "(dt/du)**2 at sine2 = sin(u)**2, and its divisor; dt/du integrates to the half period (paper, eq. 17).",
         inside=[(symbol, at(names("p"), behind + row)) for row, (symbol, _) in enumerate(held)],
         outputs=tuple(outputs),
         batch=True,
         rows_behind=len(held),
     )
     if not held:
-        return (pace,)
+        return (integrand,)
     halves = names("halves")
-    turn = lowering.function(
+    invariants = lowering.function(
         "integrand_invariants_batch",
         (halves,),
         "Terms that are constant along an orbit: ``time_integrand_batch`` reads them behind the parameters.",
@@ -79,4 +81,4 @@ def _time_integrand(lowering: Lowering, swing: Swing) -> tuple[FunctionIR, ...]:
         outputs=tuple(value for _, value in held),
         batch=True,
     )
-    return pace, turn
+    return integrand, invariants

@@ -48,8 +48,8 @@ potential_divdiff2_batch   n, a, b, da, db, p, out  U[a, lam, b], ds/dlam; NaN w
 orbit_invariants_batch     n, a, b, p, out          terms that are constant along an orbit, which
                                                     potential_divdiff2_batch reads behind the parameters
 bounds_batch               n, lo, hi, p, out        lower and upper bound of dU/dlam, then of ds/dlam
-time_integrand_batch       n, fall, rise, p, out    (dt/du)**2 [s2], and its divisor: where that is small, digits are
-                                                    lost
+time_integrand_batch       n, sine2, cosine2, p,    (dt/du)**2 [s2], and its divisor: where that is small, digits are
+                           out                      lost
 integrand_invariants_batch n, half, p, out          terms that are constant along an orbit, which
                                                     time_integrand_batch reads behind the parameters
 agm_arguments_batch        n, half, p, out          squares of two numbers [1/s2]
@@ -59,7 +59,8 @@ turning_point_batch        n, offset, v2, p, out    half the orbit's width [[lam
 ========================== ======================== =================================================================
 
 Orbits about an axis of symmetry may have ``time_integrand_batch``: their half period is an integral over the angle u,
-in which ``fall`` = sin(u)**2 is the square of a coordinate as a share of its largest value, and ``rise`` = cos(u)**2.
+in which ``sine2`` = sin(u)**2 is the square of a coordinate as a share of its largest value, and ``cosine2`` =
+cos(u)**2.
 ``half`` is half of an orbit's width. Where that integral is a complete elliptic one of the first kind, a module has
 ``agm_arguments_batch`` instead: pi over the half period is the arithmetic-geometric mean of two numbers. In a well that
 is monotone on either side the turning point may have a closed form, ``turning_point_batch``, from the launch's offset

@@ -1,12 +1,13 @@
 """Sines, cosines, arc tangents and exponentials that vectorise.
 
-numba calls the C library for ``math.sin``, one number at a time, so a loop over it stays scalar. These are polynomials
-of a reduced argument without branches, which LLVM spreads over vector registers once it has put them into the loop.
+numba calls the C library for ``math.sin``, one number at a time, so a loop over it is not vectorised. The functions
+here are polynomials of a reduced argument without branches; LLVM inlines them into a loop and vectorises it.
 
-The argument is reduced by a multiple of pi/2 (or log 2) held in parts (Cody and Waite, Software Manual for the
-Elementary Functions, 1980), and its rounding is carried along as a second double. The error is below one unit in the
-last place, of sin and cos for ``|x|`` < 1e9; beyond, the result is the sine of ``x*(1 + eps)`` with eps a few
-roundings. What is not a number gives NaN, and so do sin and cos of infinities; the others have their limits there.
+The argument is reduced by a multiple of pi/2 (or log 2) that is held in parts (Cody and Waite, Software Manual for the
+Elementary Functions, 1980), and the rounding error of the reduction is kept in a second double. The error is below one
+unit in the last place; of sin and cos this holds for ``|x|`` < 1e9, and beyond that the result is the sine of
+``x*(1 + eps)``, where eps is a few roundings. All functions give NaN for NaN. At infinities sin and cos give NaN, and
+the others their limits.
 """
 
 from math import fabs, factorial, inf, pi
@@ -17,7 +18,7 @@ from gqm_sym.runtime.compiled.jit import Inlined, Inner
 # Adding this rounds to a whole number, which the lowest bits of the sum then hold.
 ROUND = 1.5 * 2.0**52
 
-# pi/2 as three doubles: with a fused product the first difference is exact.
+# pi/2 as the sum of three doubles. The first difference of the reduction is exact, since its product is fused.
 QUARTER = (1.5707963267948966, 6.123233995736766e-17, -1.4973849048591833e-33)
 TWO_OVER_PI = 0.6366197723675814
 
@@ -58,8 +59,9 @@ ARC = (
     -0.3333333333333333,
 )
 
-# Where its argument is inverted, or seen from 1; beyond WIDE it is a quarter turn to the last bit.
-INVERTED, SEEN_FROM_ONE, WIDE = 2.0, 0.5, 2.0**60
+# The arc tangent is taken of -1/x beyond MIN_INVERTED, of (x - 1)/(x + 1) from MAX_DIRECT on, and of x itself below.
+# Beyond MAX_ARGUMENT it is pi/2 to the last bit.
+MIN_INVERTED, MAX_DIRECT, MAX_ARGUMENT = 2.0, 0.5, 2.0**60
 
 # (exp(r) - 1 - r)/r**2 for |r| <= log(2)/2, highest power first, interpolated at Chebyshev points: within 4e-19 of exp.
 EXPONENTIAL = (
@@ -76,29 +78,29 @@ EXPONENTIAL = (
     0.5,
 )
 
-# log 2 as two doubles, the first with zeros at its end: a whole number below 2**11 times it is exact.
+# log 2 as the sum of two doubles. The first ends in zeros, so that its product with an integer below 2**11 is exact.
 LOG2, LOG2_LOW, ONE_OVER_LOG2 = 0.6931471803691238, 1.9082149292705877e-10, 1.4426950408889634
 
-# Beyond BEYOND exp overflows, or is nothing, whatever its argument; beyond FAR sinh and cosh overflow.
-BEYOND, FAR = 1000.0, 710.4758600739439
+# Beyond MAX_EXPONENT exp overflows or underflows; beyond MAX_HYPERBOLIC sinh and cosh overflow.
+MAX_EXPONENT, MAX_HYPERBOLIC = 1000.0, 710.4758600739439
 
-# Below this exp is less than half an ulp of one.
-LEVEL = -45.0
+# Below this argument exp is less than half an ulp of 1.
+NEGLIGIBLE_EXPONENT = -45.0
 
-# (sinh(x) - x)/x**3 in x**2 up to |x| = 1, cut below 1e-19.
+# (sinh(x) - x)/x**3 in powers of x**2 for |x| <= 1; what is left out is below 1e-19.
 SINHC = tuple(1.0 / factorial(2 * k + 1) for k in reversed(range(1, 10)))
 
 
 @Inlined
 def reduced(x):  # type: ignore[no-untyped-def]
-    """The quarter turns in x, of which the lowest bits count, what is left of it, and by how much that is too large."""
+    """The number of quarter turns in x, modulo 4; the rest r of x; and the rounding error by which r is too large."""
     shifted = fma(x, TWO_OVER_PI, ROUND)
     k = shifted - ROUND
     t = fma(-k, QUARTER[0], x)
     p = k * QUARTER[1]
-    r = t - p  # what this is rounded by is a double: t is a multiple of 2**-53, or p is zero
+    r = t - p  # the rounding error of this is a double, since t is a multiple of 2**-53 or p is zero
     over = fma(k, QUARTER[2], fma(k, QUARTER[1], -p)) - ((t - r) - p)
-    lost = fabs(r) > 1.0  # beyond 1e15 the multiple is not known to one
+    lost = fabs(r) > 1.0  # beyond 1e15 the number of turns is not known to 1
     return bits(shifted), choose(lost, 1.0, r), choose(lost, 0.0, over)
 
 
@@ -136,16 +138,16 @@ def cos(x):  # type: ignore[no-untyped-def]
 
 @Inlined
 def atan(x):  # type: ignore[no-untyped-def]
-    """The arc tangent: of -1/x next to a quarter turn, of (x - 1)/(x + 1) next to half of one."""
-    size = choose(fabs(x) > WIDE, WIDE, fabs(x))
-    far, near = size > INVERTED, size <= SEEN_FROM_ONE
+    """The arc tangent, by that of -1/x where x is large and that of (x - 1)/(x + 1) where x is near 1."""
+    size = choose(fabs(x) > MAX_ARGUMENT, MAX_ARGUMENT, fabs(x))
+    far, near = size > MIN_INVERTED, size <= MAX_DIRECT
     more = size + 1.0
     top = choose(far, -1.0, choose(near, size, size - 1.0))
     bottom = choose(far, size, choose(near, 1.0, more))
     lost = choose(far | near, 0.0, choose(size > 1.0, 1.0 - (more - size), size - (more - 1.0)))
     inverse = 1.0 / bottom
     z = top * inverse
-    low = (fma(-z, bottom, top) - z * lost) * inverse  # what the quotient is rounded by
+    low = (fma(-z, bottom, top) - z * lost) * inverse  # the rounding error of the quotient
     start = choose(far, 1.0, choose(near, 0.0, 0.5))
     lead = start * QUARTER[0] + z
     rounded = (start * QUARTER[0] - lead) + z
@@ -156,7 +158,7 @@ def atan(x):  # type: ignore[no-untyped-def]
 
 @Inlined
 def scaled_exp(x):  # type: ignore[no-untyped-def]
-    """exp(x) = (lead + low)*2**k for ``|x| <= BEYOND``, and bits that `power_of_two` takes for k."""
+    """exp(x) = (lead + low)*2**k for ``|x| <= MAX_EXPONENT``; the bits of k are those that `power_of_two` takes."""
     shifted = fma(x, ONE_OVER_LOG2, ROUND)
     k = shifted - ROUND
     high, low = fma(-k, LOG2, x), -k * LOG2_LOW
@@ -169,15 +171,15 @@ def scaled_exp(x):  # type: ignore[no-untyped-def]
 
 @Inlined
 def power_of_two(k):  # type: ignore[no-untyped-def]
-    """2**k for a normal number; of k the lowest twelve bits count."""
+    """2**k where that is a normal number; only the lowest twelve bits of k are read."""
     return from_bits((k + 1023) << 52)
 
 
 @Inlined
 def exp(x):  # type: ignore[no-untyped-def]
     """The exponential; subnormal results are rounded twice."""
-    below = choose(x > BEYOND, BEYOND, x)
-    lead, low, k = scaled_exp(choose(below < -BEYOND, -BEYOND, below))
+    below = choose(x > MAX_EXPONENT, MAX_EXPONENT, x)
+    lead, low, k = scaled_exp(choose(below < -MAX_EXPONENT, -MAX_EXPONENT, below))
     half = k >> 1
     return (lead + low) * power_of_two(half) * power_of_two(k - half)
 
@@ -185,13 +187,13 @@ def exp(x):  # type: ignore[no-untyped-def]
 @Inlined
 def expm1_below(x):  # type: ignore[no-untyped-def]
     """exp(x) - 1 for x <= 0, without cancellation next to zero."""
-    lead, low, k = scaled_exp(choose(x < LEVEL, LEVEL, x))
+    lead, low, k = scaled_exp(choose(x < NEGLIGIBLE_EXPONENT, NEGLIGIBLE_EXPONENT, x))
     return ((lead - power_of_two(-k)) + low) * power_of_two(k)
 
 
 @Inlined
 def half_exp(x):  # type: ignore[no-untyped-def]
-    """exp(x)/2 and exp(-x)/2 for ``0 <= x <= FAR``, the first as two doubles."""
+    """exp(x)/2 and exp(-x)/2 for ``0 <= x <= MAX_HYPERBOLIC``, the first as two doubles."""
     lead, low, k = scaled_exp(x)
     high = lead + low
     scale = power_of_two(k - 2)
@@ -202,29 +204,30 @@ def half_exp(x):  # type: ignore[no-untyped-def]
 def cosh(x):  # type: ignore[no-untyped-def]
     """The hyperbolic cosine."""
     size = fabs(x)
-    up, low, down = half_exp(choose(size > FAR, FAR, size))
-    return choose(size > FAR, inf, up + (down + low))
+    up, low, down = half_exp(choose(size > MAX_HYPERBOLIC, MAX_HYPERBOLIC, size))
+    return choose(size > MAX_HYPERBOLIC, inf, up + (down + low))
 
 
 @Inlined
 def sinh(x):  # type: ignore[no-untyped-def]
     """The hyperbolic sine."""
     size = fabs(x)
-    up, low, down = half_exp(choose(size > FAR, FAR, size))
-    far = choose(size > FAR, inf, up - (down - low))
+    up, low, down = half_exp(choose(size > MAX_HYPERBOLIC, MAX_HYPERBOLIC, size))
+    far = choose(size > MAX_HYPERBOLIC, inf, up - (down - low))
     return choose(size < 1.0, fma(x * (x * x), polynomial(SINHC, x * x), x), choose(x < 0.0, -far, far))
 
 
-# 2 pi as two doubles, and the Taylor coefficients of sin(2 pi g) from g**3 on: cut below 2e-18 at g = 1/4.
+# 2 pi as the sum of two doubles, and the Taylor coefficients of sin(2 pi g) from g**3 on. What is left out of the
+# series is below 2e-18 at g = 1/4.
 ONE_TURN, ONE_TURN_LOW = 2.0 * pi, 2.4492935982947064e-16
 TURN_SINE_SERIES = tuple((-1.0) ** k * ONE_TURN ** (2 * k + 1) / factorial(2 * k + 1) for k in reversed(range(1, 12)))
 
 
 @Inner
 def turn_sine(g, low):  # type: ignore[no-untyped-def]
-    """sin(2 pi (g + low)) for ``|g|`` <= 1/4 and ``low`` a rounding of g."""
+    """sin(2 pi (g + low)) for ``|g|`` <= 1/4 and ``low`` of the size of its rounding error."""
     z = g * g
-    slope = fma(fma(64.9, z, -19.7), z, 1.0)  # of the sine: enough digits for what a rounding does
+    slope = fma(fma(64.9, z, -19.7), z, 1.0)  # of the sine, with enough digits for the effect of a rounding error
     tail = 0.0
     for c in TURN_SINE_SERIES:
         tail = fma(tail, z, c)
@@ -234,7 +237,7 @@ def turn_sine(g, low):  # type: ignore[no-untyped-def]
 
 @Inner
 def turn_cosine(f, low):  # type: ignore[no-untyped-def]
-    """cos(2 pi (f + low)) for ``|f|`` <= 1/2 and ``low`` a rounding of f."""
+    """cos(2 pi (f + low)) for ``|f|`` <= 1/2 and ``low`` of the size of its rounding error."""
     g = 0.25 - fabs(f)
     lost = (0.25 - g) - fabs(f)
     return turn_sine(g, lost + (low if f < 0.0 else -low))

@@ -1,9 +1,8 @@
 """Interval arithmetic for proofs about signs: each result holds every value over the arguments.
 
-An interval is a tuple ``(lo, hi)`` of floats, infinities allowed, never NaN. Ends are rounded
-outwards by a few units in the last place. A function met outside its domain, even on a part of the
-interval, gives ``(-inf, inf)``: nothing may be proved across a gap in the domain. Zeros that are
-exact stay exact, so that signs are not lost to rounding.
+An interval is a tuple ``(lo, hi)`` of floats, which may be infinite but never NaN. Ends are rounded outwards by a few
+units in the last place. A function gives ``(-inf, inf)`` where a part of the interval lies outside its domain, because
+nothing may be proved across a gap in the domain. Exact zeros stay exact, so that rounding does not hide a sign.
 """
 
 from math import acos, acosh, asin, asinh, atan, atanh, fabs, inf, log, pi, sqrt, tan, tanh
@@ -13,84 +12,85 @@ from gqm_sym.runtime.arithmetic.elementary import cos, cosh, exp, sin, sinh
 from gqm_sym.runtime.compiled.intrinsics import choose, whole_below
 from gqm_sym.runtime.compiled.jit import Inlined, Inner
 
-# One rounding is at most 2**-53 of the result; the C library's functions stay within four ulps.
-ROUNDED = 2.0**-52
-LIBRARY = 2.0**-50
+# The relative error of one operation, which is at most 2**-53, and that of the C library's functions, which are right
+# to four ulps; both with a margin.
+ROUNDING_ERROR = 2.0**-52
+LIBRARY_ERROR = 2.0**-50
 
-# Four subnormal steps: what relative widening cannot give to the smallest numbers.
-LEAST = 2e-323
-MOST = 1.7976931348623157e308
+# Four times the smallest subnormal number, by which ends are widened besides, and the largest number.
+SMALLEST = 2e-323
+LARGEST = 1.7976931348623157e308
 
-# Beyond this the phase of a sine is not worth its reduction.
-FAR_PHASE = 1e8
+# Beyond this argument sines are bounded by -1 and 1 only.
+MAX_ARGUMENT = 1e8
 
 
 @Inlined
 def lower(v, share):  # type: ignore[no-untyped-def]
-    """A lower bound of what was rounded to v: a zero is exact, infinity an overflow."""
-    bound = v - fabs(v) * share - LEAST
-    bound = choose(bound == bound, bound, choose(v > 0.0, MOST, -inf))
+    """A lower bound of the number that was rounded to v. A zero is taken as exact, an infinity as an overflow."""
+    bound = v - fabs(v) * share - SMALLEST
+    bound = choose(bound == bound, bound, choose(v > 0.0, LARGEST, -inf))
     return choose(v == 0.0, 0.0, bound)
 
 
 @Inlined
 def upper(v, share):  # type: ignore[no-untyped-def]
-    """An upper bound of what was rounded to v, mirrored."""
+    """An upper bound of the number that was rounded to v."""
     return -lower(-v, share)
 
 
 @Inlined
-def kept(v, sign):  # type: ignore[no-untyped-def]
-    """The float v, or a tiny one of the given sign if it underflowed to zero."""
-    return choose(v != 0.0, v, choose(sign < 0.0, -LEAST, LEAST))
+def not_underflowed(v, sign):  # type: ignore[no-untyped-def]
+    """The float v; if it underflowed to zero, the smallest one of the given sign."""
+    return choose(v != 0.0, v, choose(sign < 0.0, -SMALLEST, SMALLEST))
 
 
 @Inlined
-def least(x, y):  # type: ignore[no-untyped-def]
+def smaller(x, y):  # type: ignore[no-untyped-def]
     """The smaller of two ends."""
     return choose(x < y, x, y)
 
 
 @Inlined
-def greatest(x, y):  # type: ignore[no-untyped-def]
+def larger(x, y):  # type: ignore[no-untyped-def]
     """The larger of two ends."""
     return choose(x > y, x, y)
 
 
 @Inlined
-def ordinary(a):  # type: ignore[no-untyped-def]
-    """Whether both ends are numbers."""
+def is_known(a):  # type: ignore[no-untyped-def]
+    """Whether neither end is NaN."""
     return (a[0] == a[0]) & (a[1] == a[1])
 
 
 @Inlined
 def product(u, v):  # type: ignore[no-untyped-def]
-    """The product of two ends; an infinite end is never reached, so zero times it is zero."""
-    return choose((u != 0.0) & (v != 0.0), kept(u * v, choose(u < 0.0, -v, v)), 0.0)
+    """The product of two ends. Zero times an infinite end is zero, since the interval does not contain infinity."""
+    return choose((u != 0.0) & (v != 0.0), not_underflowed(u * v, choose(u < 0.0, -v, v)), 0.0)
 
 
 @Inlined
 def iconst(c):  # type: ignore[no-untyped-def]
-    """A number that is exactly c."""
+    """The interval of the exact number c."""
     return (float(c), float(c)) if c == c else (-inf, inf)
 
 
 @Inlined
 def ipoint(v):  # type: ignore[no-untyped-def]
-    """A number whose nearest float is v."""
-    return lower(float(v), ROUNDED), upper(float(v), ROUNDED)
+    """An interval that holds every number whose nearest float is v."""
+    return lower(float(v), ROUNDING_ERROR), upper(float(v), ROUNDING_ERROR)
 
 
 @Inlined
 def ipi():  # type: ignore[no-untyped-def]
-    """The number pi, which lies just above its nearest float."""
+    """An interval that holds pi, which lies just above its nearest float."""
     return pi, 3.1415926535897936
 
 
 @Inlined
 def iadd(a, b):  # type: ignore[no-untyped-def]
     """The sum a + b."""
-    return lower(a[0] + b[0], ROUNDED), upper(a[1] + b[1], ROUNDED)
+    return lower(a[0] + b[0], ROUNDING_ERROR), upper(a[1] + b[1], ROUNDING_ERROR)
 
 
 @Inlined
@@ -98,20 +98,20 @@ def imul(a, b):  # type: ignore[no-untyped-def]
     """The product a*b."""
     p, q = product(a[0], b[0]), product(a[0], b[1])
     r, s = product(a[1], b[0]), product(a[1], b[1])
-    known = ordinary(a) & ordinary(b)
+    known = is_known(a) & is_known(b)
     return (
-        choose(known, lower(least(least(p, q), least(r, s)), ROUNDED), -inf),
-        choose(known, upper(greatest(greatest(p, q), greatest(r, s)), ROUNDED), inf),
+        choose(known, lower(smaller(smaller(p, q), smaller(r, s)), ROUNDING_ERROR), -inf),
+        choose(known, upper(larger(larger(p, q), larger(r, s)), ROUNDING_ERROR), inf),
     )
 
 
 @Inlined
 def iinv(a):  # type: ignore[no-untyped-def]
-    """The inverse 1/a: everything if zero lies inside, half of it if zero is an end."""
+    """The inverse 1/a. It is unbounded on both sides if zero lies inside of a, and on one side if zero is an end."""
     lo, hi = a
-    known = ordinary(a) & ((lo >= 0.0) | (hi <= 0.0))
-    below = choose(known & (hi != 0.0), lower(kept(1.0 / hi, hi), ROUNDED), -inf)
-    above = choose(known & (lo != 0.0), upper(kept(1.0 / lo, lo), ROUNDED), inf)
+    known = is_known(a) & ((lo >= 0.0) | (hi <= 0.0))
+    below = choose(known & (hi != 0.0), lower(not_underflowed(1.0 / hi, hi), ROUNDING_ERROR), -inf)
+    above = choose(known & (lo != 0.0), upper(not_underflowed(1.0 / lo, lo), ROUNDING_ERROR), inf)
     return below, above
 
 
@@ -124,28 +124,28 @@ def idiv(a, b):  # type: ignore[no-untyped-def]
 @Inlined
 def iabs(a):  # type: ignore[no-untyped-def]
     """The absolute value of a."""
-    return greatest(greatest(a[0], -a[1]), 0.0), greatest(-a[0], a[1])
+    return larger(larger(a[0], -a[1]), 0.0), larger(-a[0], a[1])
 
 
 @Inlined
-def grown(lo, hi):  # type: ignore[no-untyped-def]
-    """From the values of the C library at the ends."""
-    return lower(lo, LIBRARY), upper(hi, LIBRARY)
+def widened(lo, hi):  # type: ignore[no-untyped-def]
+    """The interval between two values that are right to LIBRARY_ERROR."""
+    return lower(lo, LIBRARY_ERROR), upper(hi, LIBRARY_ERROR)
 
 
 @Inlined
 def natural_power(x, n):  # type: ignore[no-untyped-def]
-    """The power x**n for n > 0, never an inexact zero."""
+    """The power x**n for an integer n > 0. It is zero only where x is."""
     value = x
     for _ in range(n - 1):
         value *= x
-    return choose(x != 0.0, kept(value, choose(n % 2 == 1, x, 1.0)), 0.0)
+    return choose(x != 0.0, not_underflowed(value, choose(n % 2 == 1, x, 1.0)), 0.0)
 
 
 @Inlined
 def natural_ipow(a, n):  # type: ignore[no-untyped-def]
-    """The power a**n for n > 0, rounded n - 1 times."""
-    b, share = a if n % 2 else iabs(a), ROUNDED * n
+    """The power a**n for an integer n > 0, which takes n - 1 roundings."""
+    b, share = a if n % 2 else iabs(a), ROUNDING_ERROR * n
     return lower(natural_power(b[0], n), share), upper(natural_power(b[1], n), share)
 
 
@@ -159,10 +159,10 @@ def ipow(a, n):  # type: ignore[no-untyped-def]
 
 @Inner
 def real_power(x, p):  # type: ignore[no-untyped-def]
-    """The power x**p for x >= 0, never an inexact zero, and the share by which it may be off."""
+    """The power x**p for x >= 0, which is zero only where x is, and its relative error."""
     if x == 0.0 or x == inf:
-        return power(x, p), LIBRARY
-    return kept(power(x, p), 1.0), LIBRARY + ROUNDED * fabs(p * log(x))
+        return power(x, p), LIBRARY_ERROR
+    return not_underflowed(power(x, p), 1.0), LIBRARY_ERROR + ROUNDING_ERROR * fabs(p * log(x))
 
 
 @Inner
@@ -179,115 +179,115 @@ def irpow(a, p):  # type: ignore[no-untyped-def]
 def isqrt(a):  # type: ignore[no-untyped-def]
     """The values of sqrt."""
     known = a[0] >= 0.0
-    return choose(known, lower(sqrt(a[0]), ROUNDED), -inf), choose(known, upper(sqrt(a[1]), ROUNDED), inf)
+    return choose(known, lower(sqrt(a[0]), ROUNDING_ERROR), -inf), choose(known, upper(sqrt(a[1]), ROUNDING_ERROR), inf)
 
 
 @Inlined
 def iexp(a):  # type: ignore[no-untyped-def]
     """The values of exp."""
-    return grown(kept(exp(a[0]), 1.0), kept(exp(a[1]), 1.0))
+    return widened(not_underflowed(exp(a[0]), 1.0), not_underflowed(exp(a[1]), 1.0))
 
 
 @Inner
 def ilog(a):  # type: ignore[no-untyped-def]
     """The values of log."""
-    return grown(log(a[0]), log(a[1])) if a[0] >= 0.0 and a[1] > 0.0 else (-inf, inf)
+    return widened(log(a[0]), log(a[1])) if a[0] >= 0.0 and a[1] > 0.0 else (-inf, inf)
 
 
 @Inlined
 def meets(a, point, period):  # type: ignore[no-untyped-def]
-    """Whether point + k*period may lie in the interval for a whole k; yes when in doubt."""
+    """Whether point + k*period may lie in the interval for an integer k; true in doubt."""
     slack = 1e-15 * (2.0 + fabs(a[0]) + fabs(a[1]))
     return whole_below((a[1] - point) / period + slack) >= (a[0] - point) / period - slack
 
 
 @Inlined
-def unphased(a):  # type: ignore[no-untyped-def]
-    """Whether the interval is too wide or too far out to know the phase (or not a number)."""
-    return not ((a[0] >= -FAR_PHASE) & (a[1] <= FAR_PHASE) & (a[1] - a[0] < 2.0 * pi))
+def spans_a_turn(a):  # type: ignore[no-untyped-def]
+    """Whether the interval is a turn wide or wider, lies beyond MAX_ARGUMENT, or is not known."""
+    return not ((a[0] >= -MAX_ARGUMENT) & (a[1] <= MAX_ARGUMENT) & (a[1] - a[0] < 2.0 * pi))
 
 
 @Inlined
-def wave(a, left, right, trough, crest):  # type: ignore[no-untyped-def]
-    """A wave with the values left and right at the ends, and a trough and a crest once a turn."""
-    lo, hi = grown(least(left, right), greatest(left, right))
-    unknown = unphased(a)
+def between_extremes(a, left, right, lowest, highest):  # type: ignore[no-untyped-def]
+    """The values of a sine with the values left and right at the ends; once a turn it is -1 at lowest, 1 at highest."""
+    lo, hi = widened(smaller(left, right), larger(left, right))
+    unknown = spans_a_turn(a)
     return (
-        choose(unknown | meets(a, trough, 2.0 * pi), -1.0, greatest(lo, -1.0)),
-        choose(unknown | meets(a, crest, 2.0 * pi), 1.0, least(hi, 1.0)),
+        choose(unknown | meets(a, lowest, 2.0 * pi), -1.0, larger(lo, -1.0)),
+        choose(unknown | meets(a, highest, 2.0 * pi), 1.0, smaller(hi, 1.0)),
     )
 
 
 @Inlined
 def isin(a):  # type: ignore[no-untyped-def]
     """The values of sin."""
-    return wave(a, sin(a[0]), sin(a[1]), -0.5 * pi, 0.5 * pi)
+    return between_extremes(a, sin(a[0]), sin(a[1]), -0.5 * pi, 0.5 * pi)
 
 
 @Inlined
 def icos(a):  # type: ignore[no-untyped-def]
     """The values of cos."""
-    return wave(a, cos(a[0]), cos(a[1]), pi, 0.0)
+    return between_extremes(a, cos(a[0]), cos(a[1]), pi, 0.0)
 
 
 @Inner
 def itan(a):  # type: ignore[no-untyped-def]
     """The values of tan."""
-    return (-inf, inf) if unphased(a) or meets(a, 0.5 * pi, pi) else grown(tan(a[0]), tan(a[1]))
+    return (-inf, inf) if spans_a_turn(a) or meets(a, 0.5 * pi, pi) else widened(tan(a[0]), tan(a[1]))
 
 
 @Inner
 def iatan(a):  # type: ignore[no-untyped-def]
     """The values of atan."""
-    return grown(atan(a[0]), atan(a[1]))
+    return widened(atan(a[0]), atan(a[1]))
 
 
 @Inner
 def iasin(a):  # type: ignore[no-untyped-def]
     """The values of asin."""
-    return grown(asin(a[0]), asin(a[1])) if a[0] >= -1.0 and a[1] <= 1.0 else (-inf, inf)
+    return widened(asin(a[0]), asin(a[1])) if a[0] >= -1.0 and a[1] <= 1.0 else (-inf, inf)
 
 
 @Inner
 def iacos(a):  # type: ignore[no-untyped-def]
     """The values of acos."""
-    return grown(acos(a[1]), acos(a[0])) if a[0] >= -1.0 and a[1] <= 1.0 else (-inf, inf)
+    return widened(acos(a[1]), acos(a[0])) if a[0] >= -1.0 and a[1] <= 1.0 else (-inf, inf)
 
 
 @Inlined
 def isinh(a):  # type: ignore[no-untyped-def]
     """The values of sinh."""
-    return grown(sinh(a[0]), sinh(a[1]))
+    return widened(sinh(a[0]), sinh(a[1]))
 
 
 @Inlined
 def icosh(a):  # type: ignore[no-untyped-def]
     """The values of cosh."""
     b = iabs(a)
-    lo, hi = grown(cosh(b[0]), cosh(b[1]))
-    return greatest(lo, 1.0), hi
+    lo, hi = widened(cosh(b[0]), cosh(b[1]))
+    return larger(lo, 1.0), hi
 
 
 @Inner
 def itanh(a):  # type: ignore[no-untyped-def]
     """The values of tanh."""
-    lo, hi = grown(tanh(a[0]), tanh(a[1]))
+    lo, hi = widened(tanh(a[0]), tanh(a[1]))
     return max(lo, -1.0), min(hi, 1.0)
 
 
 @Inner
 def iasinh(a):  # type: ignore[no-untyped-def]
     """The values of asinh."""
-    return grown(asinh(a[0]), asinh(a[1]))
+    return widened(asinh(a[0]), asinh(a[1]))
 
 
 @Inner
 def iacosh(a):  # type: ignore[no-untyped-def]
     """The values of acosh."""
-    return grown(acosh(a[0]), acosh(a[1])) if a[0] >= 1.0 else (-inf, inf)
+    return widened(acosh(a[0]), acosh(a[1])) if a[0] >= 1.0 else (-inf, inf)
 
 
 @Inner
 def iatanh(a):  # type: ignore[no-untyped-def]
     """The values of atanh."""
-    return grown(atanh(a[0]), atanh(a[1])) if a[0] >= -1.0 and a[1] <= 1.0 else (-inf, inf)
+    return widened(atanh(a[0]), atanh(a[1])) if a[0] >= -1.0 and a[1] <= 1.0 else (-inf, inf)

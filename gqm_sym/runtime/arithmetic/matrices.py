@@ -1,8 +1,8 @@
-"""Small matrices of fixed size times vectors, and the span of a vector, in vector registers.
+"""Products of small constant matrices with vectors, and the extremes of a vector, in vector registers.
 
-numba keeps the order in which a dot product is summed, and so keeps it scalar. Summed over the rows of the transposed
-matrix, eight results side by side, the same order fills the registers; some sums of every other row side by side keep
-them busy, for a sum waits for the one before.
+numba keeps the order in which a dot product is summed, so it is not vectorised. Here eight results are summed side by
+side, row by row of the transposed matrix. Since each sum must wait for the one before, several of them, over
+alternating rows, run at the same time.
 """
 
 from functools import partial, reduce
@@ -16,20 +16,21 @@ from numba.extending import intrinsic
 
 from gqm_sym.runtime.compiled.registers import INDEX, LANES, REAL, REGISTER, Lanes, line_of, operation, register, spread
 
-# Sums at work at a time.
-SUMS = 6
+# How many sums run at the same time.
+PARALLEL_SUMS = 6
 
 
 def multiply(table: Any) -> Any:
-    """A compiled function ``f(values, at, out, to)`` for a table of some rows, each filled up to whole registers by 0.
+    """Return the compiled function ``f(values, at, out, to)`` that multiplies a vector with a constant matrix.
 
-    It does ``out[to : to + width] = values[at : at + rows] @ table``, the arrays read as one line of numbers: a slice
-    would cost more than the sums. Nothing is checked.
+    It does ``out[to : to + width] = values[at : at + rows] @ table``, where the rows of the table are filled up with
+    zeros to whole registers. The arrays are read as sequences of numbers from the given indices on, because a slice
+    would take longer than the sums. Nothing is checked.
     """
     table = np.pad(table, ((0, 0), (0, -table.shape[1] % LANES)))
     rows, width = table.shape
     blocks = width // LANES
-    chains = max(SUMS // blocks, 1)
+    chains = max(PARALLEL_SUMS // blocks, 1)
     numbers = ir.Constant(ir.ArrayType(REAL, table.size), table.ravel().tolist())
 
     def lower(context: Any, builder: Any, signature: Any, args: Any) -> Any:
@@ -38,10 +39,10 @@ def multiply(table: Any) -> Any:
         )
         held = global_constant(builder, "table", numbers)
         held.align = 8 * LANES
-        # A table that LLVM sees through is so many constants to it, each loaded from an address of its own, and kept on
-        # the stack around a loop.
-        unseen = ir.FunctionType(REAL.as_pointer(), [REAL.as_pointer()])
-        entries = builder.asm(unseen, "", "=r,0", [builder.bitcast(held, REAL.as_pointer())], side_effect=False)
+        # LLVM would take the entries of a table that it knows for single constants: it would load each from an address
+        # of its own, and keep all of them on the stack during a loop. An empty piece of assembly hides the table.
+        opaque = ir.FunctionType(REAL.as_pointer(), [REAL.as_pointer()])
+        entries = builder.asm(opaque, "", "=r,0", [builder.bitcast(held, REAL.as_pointer())], side_effect=False)
         totals = [[ir.Constant(REGISTER, [0.0] * LANES)] * blocks for _ in range(chains)]
         for row in range(rows):
             each = spread(builder, builder.load(builder.gep(values, [ir.Constant(INDEX, row)])))
@@ -63,7 +64,7 @@ def multiply(table: Any) -> Any:
 
 
 def _folded(builder: Any, order: str, value: Any) -> Any:
-    """The least or the greatest of a register's lanes."""
+    """The smallest or the largest of a register's lanes."""
     lanes = LANES
     while lanes > 1:
         lanes //= 2
@@ -80,15 +81,15 @@ def _of_two(builder: Any, order: str, one: Any, other: Any) -> Any:
 
 
 def _registers(context: Any, builder: Any, signature: Any, args: Any, count: int) -> list[Any]:
-    """What holds ``count`` numbers of an array, some of them twice."""
+    """Registers that hold ``count`` numbers of an array, some of them twice."""
     values = builder.gep(line_of(context, builder, signature.args[0], args[0]), [args[1]])
     return [builder.load(register(builder, values, min(at, count - LANES)), align=8) for at in range(0, count, LANES)]
 
 
 def span(count: int) -> Any:
-    """A compiled function ``f(values, at)``: the least and the greatest of ``count`` numbers, eight or more.
+    """Return the compiled function ``f(values, at)``: the smallest and the largest of ``count`` numbers, eight or more.
 
-    What is not a number may be passed over.
+    NaN among them may be ignored.
     """
 
     def lower(context: Any, builder: Any, signature: Any, args: Any) -> Any:
@@ -97,15 +98,15 @@ def span(count: int) -> Any:
         return context.make_tuple(builder, signature.return_type, ends)
 
     @intrinsic
-    def least_and_greatest(_, values, at):  # type: ignore[no-untyped-def]
-        """The least and the greatest."""
+    def smallest_and_largest(_, values, at):  # type: ignore[no-untyped-def]
+        """The smallest and the largest."""
         return types.UniTuple(types.float64, 2)(values, types.intp), lower
 
-    return least_and_greatest
+    return smallest_and_largest
 
 
 def largest(count: int) -> Any:
-    """A compiled function ``f(values, at)``: the largest of ``count`` numbers whatever their signs, as `span` does."""
+    """Return the compiled function ``f(values, at)``: the largest absolute value of ``count`` numbers, as in `span`."""
 
     def lower(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         found = _registers(context, builder, signature, args, count)
@@ -114,7 +115,7 @@ def largest(count: int) -> Any:
 
     @intrinsic
     def size(_, values, at):  # type: ignore[no-untyped-def]
-        """The largest."""
+        """The largest absolute value."""
         return types.float64(values, types.intp), lower
 
     return size

@@ -9,6 +9,7 @@ differences do not cancel. Compiled code reads a chart from one flat array that 
 
 from collections.abc import Hashable
 from dataclasses import dataclass, field
+from math import inf
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
@@ -93,6 +94,11 @@ class Chart:
     breaks: Array = field(default_factory=lambda: np.empty(0))
     corners: Array = field(default_factory=lambda: np.empty(0))
     origins: Array = field(default_factory=lambda: np.empty((0, 3)))
+
+    @property
+    def range(self) -> tuple[float, float, float]:
+        """Return both ends of the arc length, infinite for a closed curve, and the period, 0 for an open one."""
+        return (-inf, inf, self.period) if self.period else (self.low, self.high, 0.0)
 
     @property
     def edges(self) -> Array:

@@ -1,7 +1,7 @@
 """Tracks given by points: an interpolating spline, or planes stitched together (paper, eq. 1).
 
-The spline is quintic, so that its curvature has two continuous derivatives, and its parameter at the points is its own
-arc length: chord lengths at first, then the lengths of the spline through them, until they settle.
+The spline is quintic, so that its curvature has two continuous derivatives. Its knots are its own arc lengths at the
+points: the lengths of the chords at first, then those of the spline found before, until they no longer change.
 """
 
 from dataclasses import dataclass
@@ -23,16 +23,16 @@ from gqm_sym.runtime.compiled.types import MATRIX, Array
 
 DEGREE = 5
 
-# The lengths between points have converged when they change by less than this share; each round gains some digits.
+# The lengths between points have converged when their relative change is below this; each iteration gains some digits.
 MAX_LAST_CHANGE = 1e-9
-MAX_ROUNDS = 10
+MAX_ITERATIONS = 10
 
-# Points that the spline meets within this share of the track's length are met to rounding. No more points are left out
-# when only so many remain.
+# A spline whose distance from a point is below this share of the track's length passes through it to rounding. No
+# points are left out any more when only MIN_POINTS remain.
 MAX_FIT_ERROR = 8.0 * 2.0**-52
 MIN_POINTS = 64
 
-# The smallest turn between stitched planes, relative to the rounding of the points; less is rounding.
+# A turn between stitched planes that is smaller than this, relative to the rounding of the points, is no corner.
 MIN_TURN = 8.0 * 2.0**-52
 
 
@@ -43,11 +43,11 @@ class Sampled:
     Attributes
     ----------
     points : str
-        x and z of each point in turn, separated by blanks.
+        x and z of the points one after the other, separated by blanks.
     kind : {"spline", "linear"}
         What lies between the points.
     closed : bool
-        Whether the track goes on from the last point to the first, which is not repeated.
+        Whether the track continues from the last point to the first. The first point is not repeated.
     """
 
     points: str
@@ -59,11 +59,11 @@ class Sampled:
         return _made(self)[0]
 
     def is_exact(self, chart: Chart) -> bool:
-        """A track of polynomials is."""
+        """Return True: a track of polynomials is known exactly."""
         return True
 
     def true_curve(self, context: Any, p: tuple[Any, ...], chart: Chart) -> Parts:
-        """The track in extended precision: planes between the points as written, the spline of its coefficients."""
+        """Return the track in extended precision, by its points as written or by the coefficients of its spline."""
         spline = _made(self)[1]
         if spline is not None:
             return Parts(context, chart, lambda k: _exact_polynomial(context, spline.t, spline.c, k))
@@ -78,7 +78,7 @@ class Sampled:
 
 
 def _exact_polynomial(context: Any, t: Array, c: Array, k: int) -> Part:
-    """The polynomial of a spline on [t_k, t_(k+1)], by de Boor's algorithm on powers of the share of that interval."""
+    """The polynomial of a spline on [t_k, t_(k+1)] in powers of the share of that interval, by de Boor's algorithm."""
     knots = [context.mpf(float(knot)) for knot in t[k - DEGREE : k + DEGREE + 1]]
     unit = knots[DEGREE + 1] - knots[DEGREE]
     rows = []
@@ -97,7 +97,7 @@ def _exact_polynomial(context: Any, t: Array, c: Array, k: int) -> Part:
 
 @lru_cache(maxsize=4)
 def _made(track: Sampled) -> tuple[Chart, Any]:
-    """A track's chart, and its spline where it has one."""
+    """The chart of a track, and its spline; None for stitched planes."""
     points = np.array(track.points.split(), dtype=np.float64).reshape(-1, 2)
     if track.closed:
         points = np.concatenate([points, points[:1]])
@@ -111,7 +111,7 @@ def _planes(points: Array, closed: bool) -> Chart:
     edges = summed(lengths)
     angles = np.repeat(np.arctan2(steps[:, 1], steps[:, 0])[:, None], NODES.size, axis=1)
     angles = unwrapped(angles, float(angles[0, 0]))
-    # From the plane before each point to the one after it; the last plane comes before the first point.
+    # The turn at each point, from the plane before it to the one after it. Before the first point is the last plane.
     turns = np.diff(angles[:, 0], prepend=angles[-1, 0])
     turns[0] = np.remainder(turns[0] + np.pi, 2.0 * np.pi) - np.pi
     shorter = np.minimum(np.roll(lengths, 1), lengths)
@@ -127,9 +127,9 @@ def _planes(points: Array, closed: bool) -> Chart:
 
 
 def _splined(points: Array, closed: bool) -> tuple[Chart, Any]:
-    """Return the chart of the interpolating spline, each of whose polynomials becomes one or more pieces."""
+    """Return the chart of the interpolating spline; each of its polynomials becomes one or more pieces of the chart."""
     knots = summed(np.hypot(*np.diff(points, axis=0).T))
-    for _ in range(MAX_ROUNDS):
+    for _ in range(MAX_ITERATIONS):
         spend()
         terms = _polynomials(points, knots, closed)
         lengths = _lengths(knots, terms)
@@ -151,9 +151,10 @@ def _splined(points: Array, closed: bool) -> tuple[Chart, Any]:
 
 
 def _thinned(points: Array, knots: Array, closed: bool) -> tuple[Array, Array]:
-    """The points without those that the spline through every second one meets to rounding.
+    """Leave out every second point as long as the spline through the others passes through all points to rounding.
 
-    Curvature from points at a distance h carries their rounding over h**2: closer points than are needed do harm.
+    The curvature of a spline has the rounding of its points divided by the square of their distance. So points that are
+    closer than necessary make it worse.
     """
     while len(knots) > MIN_POINTS:
         used = np.unique(np.append(np.arange(0, len(knots), 2), len(knots) - 1))
@@ -213,7 +214,7 @@ def velocity(terms, t):  # type: ignore[no-untyped-def]
 
 @entry(types.float64[::1](types.float64[::1], types.float64[:, :, ::1]))
 def _measure(knots, terms):  # type: ignore[no-untyped-def]
-    """The length of each polynomial by Simpson's rule on halves and its Richardson step: what settling needs."""
+    """The length of each polynomial, by Simpson's rule with one step of Richardson's extrapolation."""
     out = np.empty(knots.size - 1)
     for k in range(out.size):
         width = knots[k + 1] - knots[k]

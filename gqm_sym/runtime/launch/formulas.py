@@ -174,8 +174,12 @@ class Formulas:
 
     def charted(self, p: ParameterValues) -> Chart:
         """The chart of a charted curve."""
+        return self.chart_with(tuple(p.values.tolist()))
+
+    def chart_with(self, values: tuple[float, ...]) -> Chart:
+        """The chart of a charted curve for values of all parameters."""
         assert self.chart is not None
-        return _chart(self.chart, tuple(p.values.tolist()))
+        return _chart(self.chart, values)
 
     def domain(self, p: ParameterValues) -> Domain:
         """The range of the curve parameter."""
@@ -186,9 +190,7 @@ class Formulas:
     def _domain(self, p: ParameterValues) -> Domain:
         if self.chart is not None:
             chart = self.charted(p)
-            if chart.period:
-                return Domain(DomainNumbers(-math.inf, math.inf, chart.period))
-            return Domain(DomainNumbers(chart.low, chart.high, 0.0), chart.ends)
+            return Domain(DomainNumbers(*chart.range), chart.ends)
         values = tuple(number.value for number in p)
         low, high, period = self.ends(FLOATS, values)
         axis, step = self.axes(FLOATS, values) if self.monotone else (None, None)

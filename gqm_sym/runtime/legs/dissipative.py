@@ -23,6 +23,7 @@ from gqm_sym.runtime.legs.leg_run import ASYMPTOTE, FULL, LIFTOFF, LIMIT, NARROW
 from gqm_sym.runtime.legs.leg_segments import Run, along_field, along_panels
 from gqm_sym.runtime.motion.aperiodic import MotionAtRest
 from gqm_sym.runtime.motion.events import passages
+from gqm_sym.runtime.motion.locking import locked
 from gqm_sym.runtime.motion.motion import Motion
 from gqm_sym.runtime.motion.segment import Segment
 from gqm_sym.runtime.motion.trajectory import TimedSegment, Trajectory
@@ -100,7 +101,6 @@ class DissipativeMotion(Motion):
     """
 
     # The state with which a motion begins.
-    _horizon = inf
     _ending = ""
     _elapsed = _elapsed_low = _arc = _no_turn_until = _low = 0.0
     # The time since the last turn, and the two times from turn to turn before it.
@@ -123,16 +123,14 @@ class DissipativeMotion(Motion):
     # -- what the motion answers --------------------------------------------------------------
 
     @property
+    @locked
     def t_end(self) -> float:
         """The time in s at which the body rests or leaves the track, or ``t_max``; infinite if there is neither."""
         self._look_ahead()
         return self._known_end()
 
-    @t_end.setter
-    def t_end(self, value: float) -> None:
-        self._horizon = value
-
     @property
+    @locked
     def turning_points(self) -> tuple[float, ...]:
         """The turning points so far in the order of time; the place of a launch from rest is one."""
         turns = [leg.lam_end for leg in self.legs if leg.end == "turn"]

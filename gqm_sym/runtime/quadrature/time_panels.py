@@ -4,7 +4,7 @@ Each accepted panel stores the Legendre coefficients of both antiderivatives, so
 evaluated anywhere on it.
 """
 
-from math import fabs, inf, pi
+from math import atan2, ceil, fabs, floor, inf, pi, sqrt
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -328,13 +328,40 @@ def read_off_many(edges, marks, terms, phi):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def orbit_panels(fns, p, is_circulation, a, b, lam0, w0):  # type: ignore[no-untyped-def]
-    """Lay panels over half a period of a libration, or over a lap of a circulation.
+def joints_between(joints, period, low, high):  # type: ignore[no-untyped-def]
+    """The places strictly between ``low`` and ``high`` at which the curve is not smooth, in ascending order.
 
-    Both share one call of `lay`, because each call takes long to compile.
+    ``joints`` are those within one period; on a closed curve they are repeated with the period.
+    """
+    first, laps = 0.0, 1
+    if joints.size == 0:
+        return joints
+    if period > 0.0:
+        first = floor((low - joints[-1]) / period)
+        laps = int(ceil((high - joints[0]) / period) - first) + 1
+    found, count = np.empty(laps * joints.size), 0
+    for lap in range(laps):
+        for joint in joints:
+            place = joint + (first + lap) * period
+            if low < place < high:
+                found[count] = place
+                count += 1
+    return found[:count]
+
+
+@Inner
+def orbit_panels(fns, p, is_circulation, a, b, lam0, w0, joints):  # type: ignore[no-untyped-def]
+    """Lay panels over half a period of a libration, or over a lap of a circulation, from joint to joint.
+
+    Both share one call of `lay`, because each call takes long to compile. ``joints`` are those inside the segment.
     """
     kind, ref, w, stop = (REGULAR, lam0, w0, 1.0) if is_circulation else (TURN_TURN, a, 0.0, pi)
-    return lay(Integrand(fns, p, kind, a, b, ref, w, np.empty((0, 0))), np.array([0.0, stop]))
+    marks = np.empty(joints.size + 2)
+    marks[0], marks[-1] = 0.0, stop
+    for i in range(joints.size):
+        place = joints[i] if b > a else joints[joints.size - 1 - i]
+        marks[i + 1] = (place - a) / (b - a) if is_circulation else 2.0 * atan2(sqrt(place - a), sqrt(b - place))
+    return lay(Integrand(fns, p, kind, a, b, ref, w, np.empty((0, 0))), marks)
 
 
 @Inner

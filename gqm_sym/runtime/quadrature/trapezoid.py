@@ -158,9 +158,9 @@ def time_by_trapezoid(fns, p, kind, lam0, w0, a, b, width):  # type: ignore[no-u
 
 
 @Inner
-def time_by_panels(fns, p, kind, lam0, w0, a, b):  # type: ignore[no-untyped-def]
-    """Return the half period or the lap time in s by adaptive panels; NaN where they are not accurate."""
-    panels = orbit_panels(fns, p, kind == CIRCULATION, a, b, lam0, w0)
+def time_by_panels(fns, p, kind, lam0, w0, a, b, joints):  # type: ignore[no-untyped-def]
+    """Return the half period or the lap time in s by adaptive panels from joint to joint; NaN if not accurate."""
+    panels = orbit_panels(fns, p, kind == CIRCULATION, a, b, lam0, w0, joints)
     if not are_accurate(panels):
         return np.nan
     return panels.times[-1]

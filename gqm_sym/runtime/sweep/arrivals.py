@@ -8,7 +8,13 @@ from gqm_sym.runtime.arithmetic.matrices import multiply
 from gqm_sym.runtime.compiled.calls import call_effective_potential, call_potential_divdiff1, call_potential_divdiff2
 from gqm_sym.runtime.compiled.intrinsics import fma
 from gqm_sym.runtime.compiled.jit import Inner
-from gqm_sym.runtime.quadrature.time_panels import MIN_CANCELLATION_RATIO, are_accurate, orbit_panels, read_off
+from gqm_sym.runtime.quadrature.time_panels import (
+    MIN_CANCELLATION_RATIO,
+    are_accurate,
+    joints_between,
+    orbit_panels,
+    read_off,
+)
 from gqm_sym.runtime.sweep.orbit import Orbit
 
 # Terms of the series that are tried in turn.
@@ -109,20 +115,22 @@ def phase_of(below, above):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def arrival_on_lap(fns, p, orbit, ahead):  # type: ignore[no-untyped-def]
+def arrival_on_lap(curve, orbit, ahead):  # type: ignore[no-untyped-def]
     """The time at which a body on a closed curve has gone the offset ``ahead``; as `arrival` returns it."""
     lap = orbit.direction * (orbit.high - orbit.low)
     laps = np.floor(ahead / lap)
     if laps < 0.0:
         return inf
-    panels = orbit_panels(fns, p, True, orbit.lam0, orbit.lam0 + lap, orbit.lam0, orbit.v2)
+    end = orbit.lam0 + lap
+    joints = joints_between(curve.joints, curve.period, min(orbit.lam0, end), max(orbit.lam0, end))
+    panels = orbit_panels(curve.fns, curve.p, True, orbit.lam0, end, orbit.lam0, orbit.v2, joints)
     if not are_accurate(panels):
         return np.nan
     return laps * panels.times[-1] + read_off(panels.edges, panels.times, panels.time_terms, ahead / lap - laps)
 
 
 @Inner
-def times_from_end(fns, p, orbit, width, ahead, work, series):  # type: ignore[no-untyped-def]
+def times_from_end(curve, orbit, width, ahead, work, series):  # type: ignore[no-untyped-def]
     """The times that a body takes from one end of a libration to the launch and to the offset ``ahead``.
 
     The end is the one nearer to the launch, so that the times of a launch close to it have all their digits.
@@ -135,10 +143,11 @@ def times_from_end(fns, p, orbit, width, ahead, work, series):  # type: ignore[n
         Whether the end is the upper one.
     """
     low, high, a, b = orbit.low, orbit.high, orbit.lam0 + orbit.low, orbit.lam0 + orbit.high
-    n, resolved = FEW_TERMS // 2, False
+    joints = joints_between(curve.joints, curve.period, a, b)
+    n, resolved = FEW_TERMS // 2 if joints.size == 0 else MAX_TERMS, False
     while n < MAX_TERMS and not resolved:
         n *= 2
-        resolved = fill_time_rate_series(fns, p, a, b, width, n, work, series)
+        resolved = fill_time_rate_series(curve.fns, curve.p, a, b, width, n, work, series)
     from_upper = -low > high
     if resolved:
         near, far = (high, -low) if from_upper else (-low, high)
@@ -146,7 +155,7 @@ def times_from_end(fns, p, orbit, width, ahead, work, series):  # type: ignore[n
         launch, target = phase_of(near, far), phase_of(max(to_near, 0.0), max(to_far, 0.0))
         start, stop = times_from(series, n, launch, target, -1.0 if from_upper else 1.0)
         return series[0] * pi, start, stop, from_upper
-    panels = orbit_panels(fns, p, False, a, b, orbit.lam0, orbit.v2)
+    panels = orbit_panels(curve.fns, curve.p, False, a, b, orbit.lam0, orbit.v2, joints)
     if not are_accurate(panels):
         return np.nan, np.nan, np.nan, from_upper
     half_period = panels.times[-1]
@@ -159,19 +168,20 @@ def times_from_end(fns, p, orbit, width, ahead, work, series):  # type: ignore[n
 
 
 @Inner
-def arrival(fns, p, orbit, place, work, series):  # type: ignore[no-untyped-def]
+def arrival(curve, orbit, place, work, series):  # type: ignore[no-untyped-def]
     """The first time at which the body is at ``place``: NaN if it is left to the exact problem, inf if never."""
     ahead = place - orbit.lam0
     if ahead == 0.0:
         return 0.0
     if orbit.circulates:
-        return arrival_on_lap(fns, p, orbit, ahead)
+        return arrival_on_lap(curve, orbit, ahead)
     width = orbit.high - orbit.low
-    low, high = refined_end(fns, p, orbit, orbit.low, work), refined_end(fns, p, orbit, orbit.high, work)
+    low = refined_end(curve.fns, curve.p, orbit, orbit.low, work)
+    high = refined_end(curve.fns, curve.p, orbit, orbit.high, work)
     if not orbit.lam0 + low <= place <= orbit.lam0 + high:
         return inf
     orbit = Orbit(False, orbit.even, orbit.direction, orbit.lam0, orbit.v2, low, high)
-    half_period, start, stop, from_upper = times_from_end(fns, p, orbit, width, ahead, work, series)
+    half_period, start, stop, from_upper = times_from_end(curve, orbit, width, ahead, work, series)
     onwards = orbit.direction * ahead > 0.0
     if (orbit.direction > 0) == from_upper:  # the body is launched towards that end
         return start - stop if onwards else start + stop

@@ -1,6 +1,27 @@
-"""One periodic orbit, as the compiled loop of a sweep finds it for a launch."""
+"""One curve and one periodic orbit on it, as the compiled loop of a sweep has them for a launch."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
+
+
+class SweptCurve(NamedTuple):
+    """The curve of a launch, with the forces on it.
+
+    Attributes
+    ----------
+    fns : Addresses
+        The module's compiled functions.
+    p : array
+        Run-time parameters, and behind them the curve's chart if it has one.
+    joints : array
+        The places at which the curve is not smooth, within one period.
+    period : float
+        The period of a closed curve, 0 otherwise.
+    """
+
+    fns: Any
+    p: Any
+    joints: Any
+    period: Any
 
 
 class Orbit(NamedTuple):

@@ -47,9 +47,13 @@ class Answers(NamedTuple):
     status: NDArray[np.int8]
     route: NDArray[np.int8]
 
-    def part(self, which: slice) -> "Answers":
-        """The same of some of the launches."""
+    def part(self, which: Any) -> "Answers":
+        """The same of some of the launches: views for a slice, copies for indices."""
         return Answers(self.values[which], self.status[which], self.route[which])
+
+    def put(self, which: Any, some: "Answers") -> None:
+        """Set the answers of some of the launches."""
+        self.values[which], self.status[which], self.route[which] = some
 
 
 ANSWERS = types.NamedTuple((MATRIX, types.int8[::1], types.int8[::1]), Answers)

@@ -4,12 +4,12 @@ The loop answers the launches that batches leave, in doubles and without tables.
 or whose time they cannot give to the last places, stays undecided, and `sweep` solves it by itself.
 """
 
-from math import inf, isfinite
+from math import inf, isfinite, nan
 
 import numpy as np
 from numba import types
 
-from gqm_sym.runtime.compiled.jit import Inner, entry
+from gqm_sym.runtime.compiled.jit import Inlined, Inner, entry
 from gqm_sym.runtime.compiled.registers import uncounted
 from gqm_sym.runtime.compiled.strided import (
     AXIS,
@@ -27,6 +27,7 @@ from gqm_sym.runtime.compiled.strided import (
 from gqm_sym.runtime.compiled.types import ADDRESSES, MATRIX, VECTOR
 from gqm_sym.runtime.launch.domain import DomainNumbers
 from gqm_sym.runtime.launch.ends import NO_ORBIT, ends, orbit_kind
+from gqm_sym.runtime.quadrature.time_panels import joints_between
 from gqm_sym.runtime.quadrature.trapezoid import (
     CIRCULATION,
     LIBRATION,
@@ -36,7 +37,7 @@ from gqm_sym.runtime.quadrature.trapezoid import (
     trapezoid_workspace,
 )
 from gqm_sym.runtime.sweep.arrivals import arrival
-from gqm_sym.runtime.sweep.orbit import Orbit
+from gqm_sym.runtime.sweep.orbit import Orbit, SweptCurve
 from gqm_sym.runtime.sweep.orbit_extremes import extreme
 from gqm_sym.runtime.sweep.quantities import (
     ANSWERED,
@@ -58,8 +59,8 @@ from gqm_sym.runtime.sweep.quantities import (
 )
 
 
-@Inner
-def find_orbit(fns, p, columns, k, monotone, spans, known):  # type: ignore[no-untyped-def]
+@Inlined
+def find_orbit(curve, columns, k, monotone, spans, known):  # type: ignore[no-untyped-def]
     """The status of launch k, ANSWERED where it has an orbit, and that orbit; its span is looked up where ``known``."""
     lam0, v0, direction = element(columns, LAM0, k), element(columns, V0, k), int(element(columns, DIRECTION, k))
     first, last, period = (
@@ -70,7 +71,10 @@ def find_orbit(fns, p, columns, k, monotone, spans, known):  # type: ignore[no-u
     axis, step = element(columns, AXIS, k) if monotone else np.nan, element(columns, AXIS_STEP, k)
     even, v2 = axis == axis, v0 * v0
     none = Orbit(False, even, direction, lam0, v2, 0.0, 0.0)
-    if not (isfinite(lam0) and isfinite(v0) and isfinite(p.sum())):
+    total = lam0 + v0
+    for row in range(columns.shape[0] - PARAMETERS):
+        total += curve.p[row]
+    if not isfinite(total):
         return NOT_FINITE, none
     if not first <= lam0 <= last:
         return OUTSIDE_DOMAIN, none
@@ -83,7 +87,7 @@ def find_orbit(fns, p, columns, k, monotone, spans, known):  # type: ignore[no-u
             direction = 1 if high > -low else -1
         return ANSWERED, Orbit(circulates, even, direction, lam0, v2, low, high)
     domain = DomainNumbers(first, last, period, axis, step)
-    direction, ahead, behind = ends(fns, p, lam0, v0, direction, domain)
+    direction, ahead, behind = ends(curve.fns, curve.p, lam0, v0, direction, domain)
     kind = orbit_kind(direction, ahead, behind, v0, period)
     if kind == NO_ORBIT:
         return UNDECIDED, none
@@ -93,43 +97,47 @@ def find_orbit(fns, p, columns, k, monotone, spans, known):  # type: ignore[no-u
 
 
 @Inner
-def orbit_time(fns, p, orbit):  # type: ignore[no-untyped-def]
+def orbit_time(curve, orbit):  # type: ignore[no-untyped-def]
     """The half period of a libration, or the time of a circulation's lap; NaN where doubles cannot give it."""
     kind, width = LIBRATION, orbit.high - orbit.low
     a, b = orbit.lam0 + orbit.low, orbit.lam0 + orbit.high
     if orbit.circulates:
         kind, width = CIRCULATION, orbit.high + orbit.low  # one of them is zero
         a, b = orbit.lam0, orbit.lam0 + width
-    value = time_by_trapezoid(fns, p, kind, orbit.lam0, orbit.v2, a, b, width)
-    return value if value > 0.0 else time_by_panels(fns, p, kind, orbit.lam0, orbit.v2, a, b)
+    joints = joints_between(curve.joints, curve.period, min(a, b), max(a, b))
+    value = nan
+    if joints.size == 0:
+        value = time_by_trapezoid(curve.fns, curve.p, kind, orbit.lam0, orbit.v2, a, b, width)
+    return value if value > 0.0 else time_by_panels(curve.fns, curve.p, kind, orbit.lam0, orbit.v2, a, b, joints)
 
 
 @Inner
-def fill_answer(fns, p, orbit, quantity, target, work, series, out):  # type: ignore[no-untyped-def]
+def fill_answer(curve, orbit, quantity, target, work, series, out):  # type: ignore[no-untyped-def]
     """Fill the row ``out`` with a quantity of an orbit; returns the status. ``target`` is the place of ARRIVAL_TIME."""
     if orbit.circulates and quantity in (HALF_PERIOD, TURNING_POINTS):
         return NOT_PERIODIC
     if quantity in (HALF_PERIOD, PERIOD):
-        time = orbit_time(fns, p, orbit)
+        time = orbit_time(curve, orbit)
         out[0] = 2.0 * time if quantity == PERIOD and not orbit.circulates else time
     elif quantity == TURNING_POINTS:
         out[0], out[1] = orbit.lam0 + orbit.low, orbit.lam0 + orbit.high
     elif quantity == ARRIVAL_TIME:
-        out[0] = arrival(fns, p, orbit, target, work, series)
+        out[0] = arrival(curve, orbit, target, work, series)
         if out[0] == inf:
             out[0] = np.nan
             return NEVER_THERE
     else:
         force, sign = quantity in (MIN_FORCE, MAX_FORCE), 1.0 if quantity in (MAX_SPEED, MAX_FORCE) else -1.0
-        out[0] = extreme(fns, p, orbit, force, sign)
+        inside = joints_between(curve.joints, curve.period, orbit.lam0 + orbit.low, orbit.lam0 + orbit.high)
+        out[0] = nan if inside.size else extreme(curve.fns, curve.p, orbit, force, sign)
     return ANSWERED if isfinite(out[0]) else UNDECIDED
 
 
 @entry(
-    types.void(ADDRESSES, types.int64[:, ::1], types.boolean, types.int64, MATRIX, ANSWERS, VECTOR),
+    types.void(ADDRESSES, types.int64[:, ::1], types.boolean, types.int64, MATRIX, ANSWERS, VECTOR, VECTOR),
     nogil=True,
 )
-def answer_one_by_one(fns, columns, monotone, quantity, spans, answers, parameters):  # type: ignore[no-untyped-def]
+def answer_one_by_one(fns, columns, monotone, quantity, spans, answers, parameters, joints):  # type: ignore[no-untyped-def]
     """Answer each launch whose status is UNDECIDED or SPAN_KNOWN so far, as far as doubles decide it.
 
     Parameters
@@ -147,19 +155,23 @@ def answer_one_by_one(fns, columns, monotone, quantity, spans, answers, paramete
     answers : Answers
         Filled in: both turning points, or one number in the first column.
     parameters : array
-        A buffer for the parameters of one launch.
+        A buffer for the parameters of one launch, and behind it the chart that all launches share, if there is one.
+    joints : array
+        The places at which the curve is not smooth, within one period.
     """
     work, series, p = trapezoid_workspace(), trapezoid_rates(), uncounted(parameters)
     columns, spans, values = uncounted(columns), uncounted(spans), uncounted(answers.values)
     statuses, routes = uncounted(answers.status), uncounted(answers.route)
+    joints = uncounted(joints)
     for k in range(statuses.size):
         known = statuses[k] == SPAN_KNOWN
         if statuses[k] != UNDECIDED and not known:
             continue
-        for row in range(p.size):
+        for row in range(columns.shape[0] - PARAMETERS):
             p[row] = element(columns, PARAMETERS + row, k)
-        status, orbit = find_orbit(fns, p, columns, k, monotone, spans, known)
+        curve = SweptCurve(fns, p, joints, element(columns, DOMAIN_PERIOD, k))
+        status, orbit = find_orbit(curve, columns, k, monotone, spans, known)
         if status == ANSWERED:
             target = element(columns, TARGET, k)
-            status = fill_answer(fns, p, orbit, quantity, target, work, series, values[k])
+            status = fill_answer(curve, orbit, quantity, target, work, series, values[k])
         statuses[k], routes[k] = status, SINGLE

@@ -5,11 +5,12 @@ both leave undecided are solved one by one, as `solve` does it.
 """
 
 from collections.abc import Callable, Iterator, Mapping
-from functools import lru_cache
+from functools import lru_cache, partial
 from math import inf, nan, prod
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gqm_sym.errors import GQMError, InputError, ParameterError, SolutionError
 from gqm_sym.literals.namespaces import ARRAYS
@@ -18,6 +19,7 @@ from gqm_sym.runtime.compiled.strided import PARAMETERS, lay_out, pointers, wide
 from gqm_sym.runtime.compiled.threads import run_in_threads
 from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.launch.request import CONTACTS, LaunchRequest
+from gqm_sym.runtime.multiprecision.exact_problem import NOWHERE
 from gqm_sym.runtime.sweep import quantities, scalar
 from gqm_sym.runtime.sweep.batch.batches import answer_batches
 from gqm_sym.runtime.sweep.quantities import QUANTITIES, Answers, Quantity
@@ -92,9 +94,11 @@ def sweep(
         np.full(size, quantities.BATCH, dtype=np.int8),
     )
     if has_compiled_route(formulas, found, t_max, contact):
-        domain = [widen(value, shape) for value in _domain_columns(formulas, arrays[4:])]
-        rows = [*columns[:4], *domain, *columns[4:]]
-        run_in_threads(lambda part: _answer(formulas, found, rows, part, answers), size, MIN_LAUNCHES_PER_THREAD)
+        for group, chosen in _groups(formulas, columns, shape):
+            some = answers if chosen is None else answers.part(chosen)
+            run_in_threads(partial(_answer, formulas, found, group, some), some.status.size, MIN_LAUNCHES_PER_THREAD)
+            if chosen is not None:
+                answers.put(chosen, some)
     values = answers.values[:, found.columns]
     for k in np.flatnonzero(answers.status == quantities.UNDECIDED):
         here = [s if np.ndim(s) == 0 else float(c.flat[k % c.size]) for s, c in zip(sources, columns, strict=True)]
@@ -106,10 +110,10 @@ def sweep(
 def has_compiled_route(formulas: "Formulas", quantity: Quantity, t_max: Any, contact: str) -> bool:
     """Whether compiled loops answer most launches.
 
-    They do not for curves without formulas, motions that lose energy, bodies that must fit their track or may leave it,
-    and motions with a last time.
+    They do not for motions that lose energy, bodies that must fit their track or may leave it, and motions with a last
+    time.
     """
-    conservative = formulas.chart is None and formulas.dissipation is None and not formulas.rolling_radius
+    conservative = formulas.dissipation is None and not formulas.rolling_radius
     return conservative and quantity.code != quantities.NOT_COMPILED and t_max is None and contact == "bilateral"
 
 
@@ -184,8 +188,66 @@ def _rounding_of(axes: Callable[..., Any], place: float, values: tuple[float, ..
         return float(mp.mpf(axes(mp, tuple(map(mp.mpf, values)))[0]) - mp.mpf(place))
 
 
-def _answer(formulas: "Formulas", quantity: Quantity, columns: list[Array], part: slice, answers: Answers) -> None:
-    """Answer a part of all launches by compiled loops, as far as they decide them."""
+class Group(NamedTuple):
+    """Launches on curves of one shape.
+
+    Attributes
+    ----------
+    columns : list of arrays
+        The launches, in the order of `strided`; each array has one number, or one for each launch.
+    chart, joints : arrays
+        What compiled code reads behind the parameters, and the places within one period at which the curve is not
+        smooth; both are empty for a curve with formulas.
+    """
+
+    columns: list[Array]
+    chart: Array = NOWHERE
+    joints: Array = NOWHERE
+
+
+def _groups(
+    formulas: "Formulas", columns: list[Array], shape: tuple[int, ...]
+) -> Iterator[tuple[Group, NDArray[np.intp] | None]]:
+    """The launches, grouped by the shape of their curve, and which they are; None where all are of one shape.
+
+    Launches whose curve cannot be made are in no group.
+    """
+    if formulas.chart is None:
+        domain = [widen(value, shape) for value in _domain_columns(formulas, columns[4:])]
+        yield Group([*columns[:4], *domain, *columns[4:]]), None
+        return
+    for values, chosen in _distinct(columns[4:], shape):
+        try:
+            chart = formulas.chart_with(values)
+        except GQMError:
+            continue  # `solve` says why
+        domain = [np.array(value) for value in (*chart.range, nan, nan, 0.0)]
+        some = columns if chosen is None else [_chosen(column, shape, chosen) for column in columns]
+        yield Group([*some[:4], *domain, *some[4:]], chart.block, chart.breaks), chosen
+
+
+def _distinct(
+    columns: list[Array], shape: tuple[int, ...]
+) -> Iterator[tuple[tuple[float, ...], NDArray[np.intp] | None]]:
+    """The different sets of values that columns have, and which elements have each; None where all have the same."""
+    if all(column.size == 1 for column in columns):
+        yield tuple(float(column.flat[0]) for column in columns), None
+        return
+    rows = np.column_stack([np.broadcast_to(column, shape).reshape(-1) for column in columns])
+    different, which = np.unique(rows, axis=0, return_inverse=True)
+    order = np.argsort(which.reshape(-1), kind="stable")
+    parts = np.split(order, np.cumsum(np.bincount(which.reshape(-1)))[:-1])
+    yield from zip(map(tuple, different.tolist()), parts, strict=True)
+
+
+def _chosen(column: Array, shape: tuple[int, ...], chosen: NDArray[np.intp]) -> Array:
+    """Elements of a column, which is broadcast to a shape."""
+    return column if column.size == 1 else np.broadcast_to(column, shape).reshape(-1)[chosen]
+
+
+def _answer(formulas: "Formulas", quantity: Quantity, group: Group, answers: Answers, part: slice) -> None:
+    """Answer a part of a group of launches by compiled loops, as far as they decide them."""
+    columns, chart, joints = group
     code, batches = quantity.code, formulas.batch
     for begin in range(part.start, part.stop, CHUNK):
         chunk = slice(begin, min(begin + CHUNK, part.stop))
@@ -196,8 +258,8 @@ def _answer(formulas: "Formulas", quantity: Quantity, columns: list[Array], part
             asked = code if code in ANSWERED_BY_BATCHES else quantities.SPANS
             counts = (batches.orbit_rows, batches.integrand_rows)
             answer_batches(batches.addresses(), counts, *launches, asked, found._replace(values=spans))
-        parameters = np.empty(len(lines) - PARAMETERS)
-        scalar.answer_one_by_one(formulas.addresses, *launches, code, spans, found, parameters)
+        parameters = np.concatenate([np.empty(len(lines) - PARAMETERS), chart])
+        scalar.answer_one_by_one(formulas.addresses, *launches, code, spans, found, parameters, joints)
 
 
 def _solved(

@@ -1,6 +1,7 @@
 """The turning points of many orbits at once.
 
-They are computed by a closed form where there is one (`derivation.swing`), which is proved symbolically. Otherwise they
+They are computed by a closed form where there is one (`derivation.wells.symmetric_orbits`), which is proved
+symbolically. Otherwise they
 are approximated by Newton's method and then proved by interval bounds.
 """
 

@@ -12,7 +12,18 @@ import sympy as sp
 from mpmath import mp, mpf
 
 import gqm_sym as gqm
-from gqm_sym.derivation.wells.swing import APART, GAP, HALF, LACK, LAUNCH, OFFSET, SQUARE, TOP, TOP_APART, TOP_LACK
+from gqm_sym.derivation.wells.symmetric_orbits import (
+    HALF,
+    LAUNCH,
+    OFFSET,
+    ONE_MINUS_T,
+    ONE_MINUS_TT,
+    ONE_MINUS_Y,
+    ONE_MINUS_YT,
+    T_MINUS_Y,
+    T,
+    Y,
+)
 
 ModuleOf = Callable[[str], ModuleType]
 
@@ -63,19 +74,21 @@ def integral(rate: Callable[[Any], Any]) -> mpf:
     return mp.quad(rate, mp.linspace(0, mp.pi / 2, 7), method="gauss-legendre")
 
 
-def by_swing(model: gqm.Model, half: mpf) -> mpf:
+def by_integral(model: gqm.Model, half: mpf) -> mpf:
     """The half period by the integral over u."""
-    swing = model.swing
-    assert swing is not None
-    at_ends = dict(zip(dict(swing.ends), functions(model, *dict(swing.ends).values(), by=(HALF,)), strict=True))
+    orbits = model.symmetric_orbits
+    assert orbits is not None
+    at_ends = dict(
+        zip(dict(orbits.invariants), functions(model, *dict(orbits.invariants).values(), by=(HALF,)), strict=True)
+    )
     ends = {symbol: value(half) for symbol, value in at_ends.items()}
-    (pace,) = functions(model, swing.pace, by=(SQUARE, GAP, LACK, APART, *ends))
+    (integrand,) = functions(model, orbits.time_integrand, by=(Y, T_MINUS_Y, ONE_MINUS_Y, ONE_MINUS_YT, *ends))
 
     def rate(u: mpf) -> mpf:
-        fall, rise = mp.sin(u) ** 2, mp.cos(u) ** 2
-        lack, apart = rise + ends.get(TOP_LACK, 0) * fall, rise + ends.get(TOP_APART, 0) * fall
-        place = [ends[TOP] * fall, ends[TOP] * rise, lack, apart]
-        return mp.sqrt(pace(*place, *ends.values()))
+        sine2, cosine2 = mp.sin(u) ** 2, mp.cos(u) ** 2
+        rest = [cosine2 + ends.get(symbol, 0) * sine2 for symbol in (ONE_MINUS_T, ONE_MINUS_TT)]
+        place = [ends[T] * sine2, ends[T] * cosine2, *rest]
+        return mp.sqrt(integrand(*place, *ends.values()))
 
     return 2 * integral(rate)
 
@@ -100,43 +113,45 @@ def test_the_time_is_that_of_the_motion(name: str) -> None:
     with mp.workdps(60):
         truth = by_heights(model, mpf(half))
     with mp.workdps(30):
-        assert abs(by_swing(model, mpf(half)) / truth - 1) < mpf("1e-20")
+        assert abs(by_integral(model, mpf(half)) / truth - 1) < mpf("1e-20")
 
 
-MEANS = ["pendulum", "Duffing"]
-CRESTS = [name for name in CASES if name != "root of a wave"]
+AGM = ["pendulum", "Duffing"]
+TURNING_POINTS = [name for name in CASES if name != "root of a wave"]
 
 
 def test_which_have_closed_forms() -> None:
     """Pendulum and Duffing's oscillator are elliptic of the first kind; V**2 = 0 is solved up to squares."""
-    swings = {name: model_of(name).swing for name in CASES}
-    assert [name for name, swing in swings.items() if swing is not None and swing.means] == MEANS
-    assert [name for name, swing in swings.items() if swing is not None and swing.crest] == CRESTS
+    orbits_of = {name: model_of(name).symmetric_orbits for name in CASES}
+    assert [name for name, orbits in orbits_of.items() if orbits is not None and orbits.agm_arguments] == AGM
+    assert [name for name, orbits in orbits_of.items() if orbits is not None and orbits.turning_point] == TURNING_POINTS
 
 
-@pytest.mark.parametrize("name", MEANS)
+@pytest.mark.parametrize("name", AGM)
 def test_a_half_period_is_pi_over_a_mean(name: str) -> None:
     """Of two numbers, the arithmetic-geometric one."""
     model, half = model_of(name), CASES[name][-1]
-    assert model.swing is not None
-    assert model.swing.means is not None
+    assert model.symmetric_orbits is not None
+    assert model.symmetric_orbits.agm_arguments is not None
     with mp.workdps(30):
-        one, other = (square(mpf(half)) for square in functions(model, *model.swing.means, by=(HALF,)))
+        one, other = (
+            square(mpf(half)) for square in functions(model, *model.symmetric_orbits.agm_arguments, by=(HALF,))
+        )
         with mp.workdps(60):
             truth = by_heights(model, mpf(half))
         assert abs(mp.pi / mp.agm(mp.sqrt(one), mp.sqrt(other)) / truth - 1) < mpf("1e-25")
 
 
 @pytest.mark.parametrize("share", ["-0.99", "-1/3", "0", "0.7"])
-@pytest.mark.parametrize("name", CRESTS)
+@pytest.mark.parametrize("name", TURNING_POINTS)
 def test_where_a_body_comes_to_rest(name: str, share: str) -> None:
     """Launched anywhere in the well, with the V**2 it has there, an orbit has the well's width."""
     model, half = model_of(name), CASES[name][-1]
-    assert model.swing is not None
-    assert model.swing.crest is not None
+    assert model.symmetric_orbits is not None
+    assert model.symmetric_orbits.turning_point is not None
     assert model.symmetry is not None
     (potential,) = functions(model, model.effective_potential, by=(model.parameter,))
-    width, growth, square = functions(model, *model.swing.crest, by=(OFFSET, LAUNCH))
+    width, growth, square = functions(model, *model.symmetric_orbits.turning_point, by=(OFFSET, LAUNCH))
     with mp.workdps(40):
         axis, offset = mpf(sp.N(model.symmetry.place, 40)), mpf(half) * mp.mpf(sp.Rational(share))
         left = 2 * (potential(axis + mpf(half)) - potential(axis + offset))
@@ -150,18 +165,20 @@ def test_where_a_body_comes_to_rest(name: str, share: str) -> None:
 )
 def test_there_is_none(z: str) -> None:
     """Of wells that are not even, of unlike heads, and of waves of which one is many times as fast."""
-    assert gqm.derive(graph(z), gqm.Gravity()).swing is None
+    assert gqm.derive(graph(z), gqm.Gravity()).symmetric_orbits is None
 
 
 def test_a_pendulum_has_the_elliptic_integral() -> None:
     """After Landen's transformation, (1 + k1)**2/(1 - k1**2*sin(u)**2) with k1 = tan(half/2/2)**2."""
-    swing = gqm.derive(PENDULUM, gqm.Gravity()).swing
-    assert swing is not None
+    orbits = gqm.derive(PENDULUM, gqm.Gravity()).symmetric_orbits
+    assert orbits is not None
     length, g = sp.Symbol("L", real=True), sp.Symbol("g", real=True)
-    stretch = dict(swing.ends)[swing.pace.free_symbols.difference({APART, length, g}).pop()]
-    assert swing.pace.free_symbols >= {APART, length, g}
-    assert stretch == sp.cos(HALF / 4) ** 4
-    assert dict(swing.ends)[TOP] == (sp.sin(HALF / 4) / sp.cos(HALF / 4)) ** 2
+    cosine_fourth = dict(orbits.invariants)[
+        orbits.time_integrand.free_symbols.difference({ONE_MINUS_YT, length, g}).pop()
+    ]
+    assert orbits.time_integrand.free_symbols >= {ONE_MINUS_YT, length, g}
+    assert cosine_fourth == sp.cos(HALF / 4) ** 4
+    assert dict(orbits.invariants)[T] == (sp.sin(HALF / 4) / sp.cos(HALF / 4)) ** 2
 
 
 def test_names_of_parameters_that_are_ours(tmp_path: Path) -> None:

@@ -1,0 +1,252 @@
+"""Orbits about an axis of symmetry, whose time is an algebraic integral in a suitable coordinate (MATHS, section 3).
+
+At the distance d from the axis, sines and cosines of rate k are rational functions of Y = tan(k d/4)**2, hyperbolic
+ones of Y = tanh(k d/4)**2, and even powers of d are powers of Y = d**2. With Y = T at the turning points, y = sqrt(Y)
+moves as sqrt(T)*sin(u), and V**2 = (T - Y)*D with the divided difference D = U2[Y, T], where U2 is twice the effective
+potential. So the time is the integral over u of the square root of (ds/dy)**2/D, which contains no sine of u. For a
+pendulum it is the elliptic integral after Landen's transformation, for which the trapezoidal rule needs no more nodes
+than in the angle itself. Where D/(ds/dy)**2 is linear in the square of the sine, as for the pendulum and for Duffing's
+oscillator, the integral is a complete elliptic one of the first kind, which is given by Gauss's arithmetic-geometric
+mean.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from math import gcd, inf, lcm
+
+import sympy as sp
+
+from gqm_sym.derivation.algebra.difference import Differences
+from gqm_sym.derivation.wells.symmetry import MAX_OPERATIONS, Symmetry, is_half_turn
+
+# A sine or cosine is written by powers of the slowest one if its rate is at most this multiple of that one's.
+MAX_MULTIPLE = 8
+
+
+def _symbol(name: str) -> sp.Symbol:
+    return sp.Symbol(f"_{name}", real=True)
+
+
+# Of one place of an orbit: Y, 1 - Y, T - Y, 1 - Y*T.
+Y, ONE_MINUS_Y, T_MINUS_Y, ONE_MINUS_YT = (_symbol(name) for name in ("y", "one_minus_y", "t_minus_y", "one_minus_yt"))
+
+# Of the whole orbit: half its width; T, which is Y at its ends, 1 - T, 1 - T**2; the square of the sine there, and the
+# fourth power of the cosine of half its argument.
+HALF, T, ONE_MINUS_T, ONE_MINUS_TT = (_symbol(name) for name in ("half", "t", "one_minus_t", "one_minus_tt"))
+SINE_SQUARED, COSINE_FOURTH = _symbol("sine_squared"), _symbol("cosine_fourth")
+
+# Of a launch: the distance from the axis, and V**2 there.
+OFFSET, LAUNCH = _symbol("offset"), _symbol("launch")
+
+# For intermediate results: the squares of the sine and of the cosine of half the argument.
+_SINE, _COSINE = _symbol("sine"), _symbol("cosine")
+
+
+@dataclass(frozen=True, slots=True)
+class SymmetricOrbits:
+    """The time of an orbit about an axis of symmetry as an integral over u, and its turning points.
+
+    Attributes
+    ----------
+    time_integrand
+        (dt/du)**2 in the symbols of this module and the run-time parameters.
+    divisor
+        The divisor of ``time_integrand``. Next to a barrier it nearly vanishes at some places, and digits are lost.
+    invariants
+        The symbols of the whole orbit, each with its value as a function of HALF.
+    turning_point
+        As functions of OFFSET and LAUNCH: half the orbit's width; by how much U2 grows with the square in which it is
+        written, that of a sine or of the distance, so that it is positive in a well; and the square of the sine at the
+        turning point, which is above 1 where the body passes over the barrier (0 for other squares). None where U2 has
+        a third or higher power of that square, or is no polynomial.
+    agm_arguments
+        Squares of two numbers as functions of HALF: the half period is pi over their arithmetic-geometric mean. None
+        where it is no complete elliptic integral of the first kind.
+    """
+
+    time_integrand: sp.Expr
+    divisor: sp.Expr
+    invariants: tuple[tuple[sp.Symbol, sp.Expr], ...]
+    turning_point: tuple[sp.Expr, sp.Expr, sp.Expr] | None
+    agm_arguments: tuple[sp.Expr, sp.Expr] | None
+
+
+@dataclass(frozen=True, slots=True)
+class _Waves:
+    """A pair of functions with cosine**2 = 1 + sign*sine**2."""
+
+    sine: type[sp.Function]
+    cosine: type[sp.Function]
+    sign: int
+
+
+_CIRCULAR, _HYPERBOLIC = _Waves(sp.sin, sp.cos, -1), _Waves(sp.sinh, sp.cosh, 1)
+
+
+def symmetric_orbits(
+    potential: sp.Expr, ds: sp.Expr, lam: sp.Symbol, symmetry: Symmetry | None
+) -> SymmetricOrbits | None:
+    """Return the time of orbits about an axis of symmetry; None where there is no such axis or coordinate.
+
+    Parameters
+    ----------
+    potential
+        U2, twice the effective potential.
+    ds
+        ds/dlam.
+    lam
+        The curve's parameter.
+    symmetry
+        The axes of symmetry.
+    """
+    forms = (potential, ds**2)
+    if symmetry is None or any(form.count_ops() > MAX_OPERATIONS for form in forms):
+        return None
+    d = sp.Dummy("d", real=True)
+    forms = tuple(form.xreplace({lam: symmetry.place + d}) for form in forms)
+    functions = {type(call) for form in forms for call in form.atoms(sp.Function) if call.has(d)}
+    if not functions:
+        height, metric = (_even(form, d, Y) for form in forms)
+        if height is None or metric is None:
+            return None
+        slope = _divided_difference(height, Y, T, T_MINUS_Y)
+        if not slope:
+            return None
+        square, growth = _turn(height, Y, OFFSET**2)
+        turning_point = square and (sp.sqrt(square), growth, sp.S.Zero)
+        return _with_agm(metric / slope, slope, ((T, HALF**2),), turning_point)
+    waves = next((waves for waves in (_CIRCULAR, _HYPERBOLIC) if functions <= {waves.sine, waves.cosine}), None)
+    found = None if waves is None else _of_waves(forms, d, waves)
+    if waves is None or found is None or (waves.sign < 0 and not is_half_turn(symmetry.step, found[0])):
+        return None  # beyond half a turn Y decreases
+    rate, height, metric = found
+    less, more = (ONE_MINUS_Y, 1 + Y) if waves.sign < 0 else (1 + Y, ONE_MINUS_Y)
+    # V**2 = (SINE_SQUARED - _SINE)*slope, where the difference is a product of factors without cancellation.
+    sine_gap = 4 * T_MINUS_Y * ONE_MINUS_YT * COSINE_FOURTH / more**2
+    height = height.xreplace({_COSINE: 1 + waves.sign * _SINE})
+    slope = _divided_difference(height, _SINE, SINE_SQUARED, sine_gap)
+    if not slope:
+        return None
+    by_square = {_SINE: 4 * Y / more**2, _COSINE: less**2 / more**2}
+    divisor = sp.together(slope.xreplace(by_square)) * ONE_MINUS_YT  # each takes one division
+    integrand = 4 * sp.together(metric.xreplace(by_square)) / (rate**2 * COSINE_FOURTH * divisor)
+    sine, cosine = waves.sine(rate * HALF / 4), waves.cosine(rate * HALF / 4)
+    double = waves.cosine(rate * HALF / 2)
+    invariants = (
+        (T, (sine / cosine) ** 2),
+        (ONE_MINUS_T, (double if waves.sign < 0 else 1) / cosine**2),
+        (ONE_MINUS_TT, double / cosine**4),
+        (SINE_SQUARED, waves.sine(rate * HALF / 2) ** 2),
+        (COSINE_FOURTH, cosine**4),
+    )
+    square, growth = _turn(height, _SINE, waves.sine(rate * OFFSET / 2) ** 2)
+    if square is None:
+        return _with_agm(integrand, divisor, invariants, None)
+    turn, share = 2 * sp.asinh(sp.sqrt(square)) / abs(rate), sp.S.Zero
+    if waves.sign < 0:
+        turn, share = 4 * sp.atan(sp.sqrt(square) / (1 + sp.sqrt(1 - square))) / abs(rate), square
+    return _with_agm(integrand, divisor, invariants, (turn, growth, share))
+
+
+def _turn(height: sp.Expr, square: sp.Symbol, start: sp.Expr) -> tuple[sp.Expr | None, sp.Expr]:
+    """The square at the turning point, and by how much U2 grows with it; None where that takes more than a root."""
+    if not 0 < _degree(height, {square}) <= 2:
+        return None, sp.S.Zero
+    growth, second = (height.diff(square, k).xreplace({square: sp.S.Zero}) / k for k in (1, 2))
+    if second:
+        growth += 2 * second * start
+        growth = (growth + sp.sqrt(growth**2 + 4 * second * LAUNCH)) / 2
+    return start + LAUNCH / growth, growth
+
+
+def at_place(invariants: Mapping[sp.Symbol, sp.Expr], sine2: sp.Expr, cosine2: sp.Expr) -> dict[sp.Symbol, sp.Expr]:
+    """The symbols of one place, where Y = ``sine2``*T and ``sine2 + cosine2`` = 1, as sums without cancellation."""
+    return {
+        Y: invariants.get(T, T) * sine2,
+        T_MINUS_Y: invariants.get(T, T) * cosine2,
+        ONE_MINUS_Y: cosine2 + invariants.get(ONE_MINUS_T, ONE_MINUS_T) * sine2,
+        ONE_MINUS_YT: cosine2 + invariants.get(ONE_MINUS_TT, ONE_MINUS_TT) * sine2,
+    }
+
+
+def _degree(form: sp.Expr, symbols: set[sp.Symbol]) -> float:
+    """The degree of a polynomial as it is written, since expanding it may take very long; infinite for other forms."""
+    if not form.free_symbols & symbols:
+        return 0
+    if form.is_Symbol:
+        return 1
+    if form.is_Add:
+        return max(_degree(part, symbols) for part in form.args)
+    if form.is_Mul:
+        return sum(_degree(part, symbols) for part in form.args)
+    if form.is_Pow and form.exp.is_Integer and form.exp > 0:
+        return int(form.exp) * _degree(form.base, symbols)
+    return inf
+
+
+def _with_agm(
+    integrand: sp.Expr,
+    divisor: sp.Expr,
+    invariants: tuple[tuple[sp.Symbol, sp.Expr], ...],
+    turning_point: tuple[sp.Expr, sp.Expr, sp.Expr] | None,
+) -> SymmetricOrbits:
+    """The record, with the arguments of the arithmetic-geometric mean where there are any."""
+    sine2, cosine2 = _symbol("sine2"), _symbol("cosine2")
+    inverse = 1 / integrand.xreplace(at_place({}, sine2, cosine2))
+    arguments = None
+    if _degree(inverse, {sine2, cosine2}) <= 1:
+        ends = ({cosine2: sp.S.One, sine2: sp.S.Zero}, {cosine2: sp.S.Zero, sine2: sp.S.One})
+        arguments = tuple(inverse.xreplace(end).xreplace(dict(invariants)) for end in ends)
+    return SymmetricOrbits(integrand, divisor, invariants, turning_point, arguments)
+
+
+def _divided_difference(height: sp.Expr, square: sp.Symbol, top: sp.Symbol, gap: sp.Expr) -> sp.Expr:
+    """``height[square, top]``; 0 where the height is constant."""
+    difference = Differences(square, (square, top), {(0, 1): gap}).first(height, 0, 1)
+    # Products are written out: their terms may cancel, as those of cos**2 and sin**2 do.
+    return sp.Mul(*(sp.expand(f) if f.is_polynomial(square, top) else f for f in sp.Mul.make_args(difference)))
+
+
+def _even(form: sp.Expr | None, root: sp.Symbol, square: sp.Expr) -> sp.Expr | None:
+    """A form that has only even powers of ``root``, in terms of its square; None where it has others."""
+    for f in () if form is None else (form, sp.expand(form)):
+        found = f.replace(
+            lambda t: t.is_Pow and t.base == root and t.exp.is_Integer and t.exp % 2 == 0,
+            lambda t: square ** (t.exp / 2),
+        )
+        if not found.has(root):
+            return found
+    return None
+
+
+def _of_waves(forms: Sequence[sp.Expr], d: sp.Symbol, waves: _Waves) -> tuple[sp.Expr, sp.Expr, sp.Expr] | None:
+    """A rate for which the forms are functions of the square of a sine, and these functions; None if there is none."""
+    calls = {call for form in forms for call in form.atoms(waves.sine, waves.cosine) if call.has(d)}
+    shifted = {call: call.func(sp.expand(call.args[0])) for call in calls}
+    forms = [form.xreplace(shifted) for form in forms]
+    calls = {call for form in forms for call in form.atoms(waves.sine, waves.cosine) if call.has(d)}
+    rates = {call: call.args[0].diff(d) for call in calls}
+    if not calls or any(rate.has(d) or sp.expand(call.args[0] - rate * d) != 0 for call, rate in rates.items()):
+        return None
+    first = min(rates.values(), key=sp.default_sort_key)
+    ratios = {call: sp.cancel(rate / first) for call, rate in rates.items()}
+    if not all(ratio.is_Rational for ratio in ratios.values()):
+        return None
+    common = sp.Rational(gcd(*(int(r.p) for r in ratios.values())), lcm(*(int(r.q) for r in ratios.values())))
+    multiples = {call: int(ratio / common) for call, ratio in ratios.items()}
+    if max(map(abs, multiples.values())) > MAX_MULTIPLE:
+        return None
+    c, s, c2, s2 = sp.symbols("c s c2 s2", cls=sp.Dummy, real=True)
+    by_first = {
+        call: sp.chebyshevt(abs(n), c) if call.func is waves.cosine else sp.sign(n) * s * sp.chebyshevu(abs(n) - 1, c)
+        for call, n in multiples.items()
+    }
+    even = [_even(form.xreplace(by_first), s, s2) for form in forms]
+    squares = [_even(form, c, c2) for form in even]
+    # Where only squares appear, they are functions of twice the rate.
+    if None in squares:
+        rate, found, names = common * first, even, {c: _COSINE + waves.sign * _SINE, s2: 4 * _SINE * _COSINE}
+    else:
+        rate, found, names = 2 * common * first, squares, {c2: _COSINE, s2: _SINE}
+    height, metric = (form if form is None else form.xreplace(names) for form in found)
+    return None if height is None or metric is None else (rate, height, metric)

@@ -1,0 +1,95 @@
+"""Sweeps along curves without formulas: against closed forms, quadrature of the definition, and motions solved."""
+
+from types import ModuleType
+
+import numpy as np
+import pytest
+from mpmath import mp, mpf
+from railed import built
+
+import gqm_sym as gqm
+
+G = mpf("9.81")
+
+# Half periods in units of the last place: on a ring as on a circle with formulas, on rails and measured tracks.
+ULPS = 4.0
+
+# Times and loads on a rail whose parts are given in doubles, relative.
+ROUNDING = 2e-15
+
+
+@pytest.fixture(scope="module")
+def ring(tmp_path_factory: pytest.TempPathFactory) -> ModuleType:
+    """A ring of radius 1 as an implicit curve; arc length is the angle from its lowest place."""
+    curve = gqm.Curve.implicit("x**2 + z**2 - 1", start=(0, -1))
+    return gqm.build(gqm.derive(curve, gqm.Gravity()), name="implicit_ring", folder=tmp_path_factory.mktemp("ring"))
+
+
+@pytest.fixture(scope="module")
+def bend(tmp_path_factory: pytest.TempPathFactory) -> ModuleType:
+    """Two inclines at 45 degrees, tangent to an arc between them."""
+    pieces = [gqm.line(length=3), gqm.arc(radius="R", angle="pi/2"), gqm.line(length=3)]
+    return built(tmp_path_factory.mktemp("bend"), "bend", pieces, start=(0, 0), heading="-pi/4")
+
+
+@pytest.fixture(scope="module")
+def track(tmp_path_factory: pytest.TempPathFactory) -> ModuleType:
+    """A spline of degree 5 through 61 points."""
+    x = np.linspace(-2, 2, 61)
+    curve = gqm.Curve.sampled(np.column_stack([x, 0.5 * x * x + 0.01 * np.cos(3 * x)]))
+    return gqm.build(gqm.derive(curve, gqm.Gravity()), name="measured", folder=tmp_path_factory.mktemp("measured"))
+
+
+def _half_period_on_bend(distance: float, radius: float) -> tuple[mpf, mpf]:
+    """Half period of a body released on an incline so far from the arc, and V**2 in the middle of the arc."""
+    with mp.workdps(30):
+        d, r, root = mpf(distance), mpf(radius), mp.sqrt(2) / 2
+        fall = 2 * G * d * root
+        arc = 2 * r * mp.quad(lambda a: 1 / mp.sqrt(fall + 2 * G * r * (mp.cos(a) - root)), [0, mp.pi / 4])
+        return 2 * mp.sqrt(2 * d / (G * root)) + arc, fall + 2 * G * r * (1 - root)
+
+
+def test_half_periods_on_a_ring(ring: ModuleType) -> None:
+    """As the pendulum's closed form has them, and the same times round the ring."""
+    amplitude = np.random.default_rng(3).uniform(1e-3, 2.5, 100)
+    swept = ring.sweep("half_period", amplitude)
+    assert swept.route_counts() == {"single": 100}
+    for value, a in zip(swept.values, amplitude, strict=True):
+        truth = 2 * mp.ellipk(mp.sin(mpf(a) / 2) ** 2) / mp.sqrt(G)
+        assert abs(mpf(value) - truth) <= ULPS * np.spacing(value)
+    speed = np.linspace(7.0, 20.0, 9)
+    for value, v in zip(ring.sweep("period", 0.0, speed).values, speed, strict=True):
+        assert float(value) == pytest.approx(float(4 * mp.ellipk(4 * G / mpf(v) ** 2) / mpf(v)), rel=ROUNDING)
+
+
+def test_times_on_a_rail_with_joints(bend: ModuleType) -> None:
+    """Panels begin where the curvature jumps; places on both inclines are passed when uniform acceleration says."""
+    places = np.random.default_rng(4).uniform(0.05, 2.9, 60)
+    radius = np.where(np.arange(60) % 2, 1.0, 0.25)  # two curves in one sweep
+    half, ends = bend.sweep("half_period", places, R=radius), bend.sweep("turning_points", places, R=radius)
+    assert not half.status.any()
+    there = places + 0.5 * (3.0 - places)
+    arrival = bend.sweep("time_at", places, lam=there, R=radius)
+    for k, place in enumerate(places.tolist()):
+        truth, _ = _half_period_on_bend(3.0 - place, float(radius[k]))
+        assert float(half.values[k]) == pytest.approx(float(truth), rel=ROUNDING)
+        length = 6.0 + np.pi / 2 * radius[k]
+        assert list(ends.values[k]) == pytest.approx([place, length - place], rel=ROUNDING)
+        assert arrival.values[k] == pytest.approx(float(mp.sqrt((there[k] - place) * 4 / (G * mp.sqrt(2)))), rel=4e-15)
+
+
+def test_parameters_of_every_launch(bend: ModuleType) -> None:
+    """Parameters of every launch, and one of which no rail can be made: only that one is refused."""
+    mass, radius = np.linspace(1.0, 20.0, 12), np.where(np.arange(12) == 5, -1.0, 0.5)
+    swept, good = bend.sweep("half_period", 1.0, m=mass, R=radius), np.arange(12) != 5
+    assert np.array_equal(swept.values[good], np.full(11, bend.sweep("half_period", 1.0, R=0.5).values))
+    assert np.flatnonzero(swept.status).tolist() == [5]
+
+
+def test_half_periods_on_a_measured_track(track: ModuleType) -> None:
+    """As `solve` gives them from extended precision, over dozens of pieces."""
+    places = np.random.default_rng(6).uniform(3.3, 4.8, 4)
+    swept = track.sweep("half_period", places)
+    assert swept.route_counts() == {"single": 4}
+    for value, place in zip(swept.values, places.tolist(), strict=True):
+        assert value == pytest.approx(track.solve(place).half_period, rel=ROUNDING)
