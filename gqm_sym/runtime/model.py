@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 import numpy as np
 
 from gqm_sym.arguments import unknown_argument
-from gqm_sym.errors import ArgumentError
+from gqm_sym.errors import ArgumentError, SolutionError
 from gqm_sym.literals.numbers import read_numbers
 from gqm_sym.loading import load_text
 from gqm_sym.runtime.compiled.streaming import LARGE
@@ -256,7 +256,17 @@ class CompiledModel(Formulas):
         return self
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """By its module's text, which is imported where the copy is made."""
+        """By its module's text, which is imported where the copy is made.
+
+        Raises
+        ------
+        SolutionError
+            If the module was not imported from a file.
+        """
+        if not self.text:
+            raise SolutionError(
+                f"{self.name}: was not imported from a file, so its motions cannot be pickled; build it"
+            )
         return _model_of, (self.source, self.text, self.name)
 
 

@@ -128,7 +128,8 @@ class Formulas:
         # Most launches have the parameters of a launch before. The integer 1 and the float 1.0 are kept apart, because
         # their texts differ.
         object.__setattr__(self, "_read", lru_cache(maxsize=16, typed=True)(self._numbers))
-        object.__setattr__(self, "text", Path(self.source).read_text(encoding="utf-8") if self.source else "")
+        file = Path(self.source)
+        object.__setattr__(self, "text", file.read_text(encoding="utf-8") if file.is_file() else "")
 
     def numbers(self, values: tuple[Any, ...]) -> "ParameterValues":
         """The run-time parameters as exact numbers, checked.
