@@ -264,9 +264,7 @@ class CompiledModel(Formulas):
             If the module was not imported from a file.
         """
         if not self.text:
-            raise SolutionError(
-                f"{self.name}: was not imported from a file, so its motions cannot be pickled; build it"
-            )
+            raise SolutionError(f"{self.name}: is not imported from a file, so it cannot be pickled; build it first")
         return _model_of, (self.source, self.text, self.name)
 
 

@@ -14,6 +14,7 @@ from gqm_sym.runtime.launch import zeros
 from gqm_sym.runtime.launch.ends import first_zero_from, search_beyond_barriers
 from gqm_sym.runtime.launch.kinds import MotionKind
 from gqm_sym.runtime.launch.problem import Problem
+from gqm_sym.runtime.launch.request import ONLY_SIGN
 from gqm_sym.runtime.launch.speed import path_and_force_at
 from gqm_sym.runtime.launch.zeros import MAX_PARAMETER, MIN_STEP_SHARE
 from gqm_sym.runtime.motion.events import Event, Leg, liftoff
@@ -23,9 +24,6 @@ from gqm_sym.runtime.motion.rows import Rows
 from gqm_sym.runtime.motion.segment import Segment, through, toward_equilibrium
 from gqm_sym.runtime.motion.trajectory import PhasePoints, TimedSegment, Trajectory
 from gqm_sym.runtime.quadrature.time_panels import NEGLIGIBLE_SHARE
-
-# The sign of the contact forces that each kind of contact allows; 0 if it allows both.
-SIDES = {"bilateral": 0, "above": 1, "below": -1}
 
 # How many segments of a motion to infinity `legs` and `events` cover, and how many panels: on these its end is searched
 # for. Each segment is twice as long as the one before, so that they reach as far as for motions with losses.
@@ -133,7 +131,7 @@ class AperiodicMotion(Motion):
         """Append a timed segment, as far as contact lasts."""
         if self.lifted_off:
             return
-        side = SIDES[self.problem.launch.contact]
+        side = ONLY_SIGN[self.problem.launch.contact]
         lost = liftoff(timed, side, first=not self._segments) if side else None
         if lost is not None:
             timed = replace(timed, r_stop=lost[0], phi_stop=lost[1], end="liftoff")
@@ -331,6 +329,6 @@ class MotionAtRest(Motion):
 
 def _is_pulled(problem: Problem) -> bool:
     """Whether a track that can push from one side only would have to pull a body at rest at the launch place."""
-    f, side = problem.functions, SIDES[problem.launch.contact]
+    f, side = problem.functions, ONLY_SIGN[problem.launch.contact]
     force = path_and_force_at(f.addresses, f.p, np.array([problem.lam0]), np.zeros(1))[4, 0]
     return bool(side * force < 0.0)

@@ -22,6 +22,7 @@ from gqm_sym.runtime.launch.request import CONTACTS, LaunchRequest
 from gqm_sym.runtime.multiprecision.exact_problem import NOWHERE
 from gqm_sym.runtime.sweep import quantities, scalar
 from gqm_sym.runtime.sweep.batch.batches import answer_batches
+from gqm_sym.runtime.sweep.dissipative_loop import MIN_BODIES_PER_THREAD, answer_driven, asked_of_bodies
 from gqm_sym.runtime.sweep.quantities import QUANTITIES, Answers, Quantity
 from gqm_sym.runtime.sweep.result import Sweep
 
@@ -93,10 +94,16 @@ def sweep(
         np.full(size, quantities.UNDECIDED, dtype=np.int8),
         np.full(size, quantities.BATCH, dtype=np.int8),
     )
-    if has_compiled_route(formulas, found, t_max, contact):
+    asked = asked_of_bodies(formulas, quantity, t_max, contact)
+    if asked is not None or has_compiled_route(formulas, found, t_max, contact):
         for group, chosen in _groups(formulas, columns, shape):
             some = answers if chosen is None else answers.part(chosen)
-            run_in_threads(partial(_answer, formulas, found, group, some), some.status.size, MIN_LAUNCHES_PER_THREAD)
+            if asked is not None:
+                curve = (group.chart, group.joints, group.corners)
+                work, least = partial(answer_driven, formulas, asked, curve, group.columns, some), MIN_BODIES_PER_THREAD
+            else:
+                work, least = partial(_answer, formulas, found, group, some), MIN_LAUNCHES_PER_THREAD
+            run_in_threads(work, some.status.size, least)
             if chosen is not None:
                 answers.put(chosen, some)
     values = answers.values[:, found.columns]
@@ -195,14 +202,15 @@ class Group(NamedTuple):
     ----------
     columns : list of arrays
         The launches, in the order of `strided`; each array has one number, or one for each launch.
-    chart, joints : arrays
+    chart, joints, corners : arrays
         What compiled code reads behind the parameters, and the places within one period at which the curve is not
-        smooth; both are empty for a curve with formulas.
+        smooth, and at which its tangent jumps; all are empty for a curve with formulas.
     """
 
     columns: list[Array]
     chart: Array = NOWHERE
     joints: Array = NOWHERE
+    corners: Array = NOWHERE
 
 
 def _groups(
@@ -223,7 +231,7 @@ def _groups(
             continue  # `solve` says why
         domain = [np.array(value) for value in (*chart.range, nan, nan, 0.0)]
         some = columns if chosen is None else [_chosen(column, shape, chosen) for column in columns]
-        yield Group([*some[:4], *domain, *some[4:]], chart.block, chart.breaks), chosen
+        yield Group([*some[:4], *domain, *some[4:]], chart.block, chart.breaks, chart.corners), chosen
 
 
 def _distinct(
@@ -247,7 +255,7 @@ def _chosen(column: Array, shape: tuple[int, ...], chosen: NDArray[np.intp]) -> 
 
 def _answer(formulas: "Formulas", quantity: Quantity, group: Group, answers: Answers, part: slice) -> None:
     """Answer a part of a group of launches by compiled loops, as far as they decide them."""
-    columns, chart, joints = group
+    columns, chart, joints = group.columns, group.chart, group.joints
     code, batches = quantity.code, formulas.batch
     for begin in range(part.start, part.stop, CHUNK):
         chunk = slice(begin, min(begin + CHUNK, part.stop))
