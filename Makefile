@@ -66,6 +66,7 @@ bench: $(VENV)/.bench ## time each stage, and set accuracy and time beside the a
 	$(BIN)/python benchmarks/stages.py
 	$(BIN)/python benchmarks/scale.py
 	$(BIN)/python benchmarks/comparison.py
+	-$(BIN)/python benchmarks/matrix.py
 
 # Python compiles the files that it imports; pip would compile all of them, most of which nothing here imports.
 INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile

@@ -14,6 +14,7 @@ from calls import profile
 from half_periods import half_periods
 from legs import legs
 from load_maps import load_maps
+from many_launches import many_launches
 from measure import Result, measured, readable
 from peers import PEERS, presence
 from sampling import sampling
@@ -64,7 +65,7 @@ def main() -> int:
     output = parser.parse_args().output
     warnings.simplefilter("ignore", IntegrationWarning)  # the errors show what QUADPACK warns about
     results = []
-    for row in [*half_periods(), *sampling(), *legs(), *load_maps()]:
+    for row in [*half_periods(), *sampling(), *legs(), *load_maps(), *many_launches()]:
         results.append(measured(row))
         print(f"{row.work:<45} {row.who:<60} {readable(results[-1].seconds):>9} {results[-1].error:9.2g}", flush=True)
     output.write_text(page(results, second_process()), encoding="utf-8")

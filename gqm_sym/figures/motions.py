@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+    from gqm_sym.runtime.motion.events import Event
     from gqm_sym.runtime.motion.motion import Motion, State
 
 # Number of states that are drawn, and the least number between two events.
@@ -110,8 +111,8 @@ def speed_and_force(motion: "Motion", axes: Any = None) -> "Figure":
     above.plot(path.s, np.abs(path.v), color="#0072b2")
     below.plot(path.s, path.normal_force, color="#d55e00")
     below.axhline(0.0, color=LINE_COLOUR, linewidth=0.8)
-    for event in motion.events:
-        state = motion.state(min(event.t, motion.t_end))
+    for event in _shown_events(motion):
+        state = motion.state(min(event.t, horizon(motion)))
         marker, colour = MARKERS.get(event.kind, OTHER_MARKER)
         for axis, value in ((above, abs(state.v)), (below, state.normal_force)):
             axis.plot(state.s, value, marker, color=colour, markeredgecolor="white", linestyle="none", label=event.kind)
@@ -204,7 +205,7 @@ def sampled(motion: "Motion") -> "State":
         Arrays of some 800 states, in order of time.
     """
     end = horizon(motion)
-    marks = sorted({0.0, end, *(event.t for event in motion.events if event.t < end)})
+    marks = sorted({0.0, end, *(event.t for event in _shown_events(motion) if event.t < end)})
     count = max(MAX_SAMPLES // max(len(marks) - 1, 1), MIN_SAMPLES)
     # Steps that shorten towards both ends resolve the turning points, where the curves of speed and force are steep.
     fractions = 0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, count))
@@ -216,7 +217,13 @@ def sampled(motion: "Motion") -> "State":
 
 def _marks(motion: "Motion") -> list[tuple[str, float, float]]:
     start = motion.state(0.0)
-    return [("launch", start.x, start.z), *((event.kind, event.x, event.z) for event in motion.events)]
+    return [("launch", start.x, start.z), *((event.kind, event.x, event.z) for event in _shown_events(motion))]
+
+
+def _shown_events(motion: "Motion") -> list["Event"]:
+    """The events up to the time up to which the motion is drawn, and what it approaches for ever."""
+    end = horizon(motion)
+    return [event for event in motion.events if event.t <= end or event.kind == "asymptote"]
 
 
 def drawing(motion: "Motion", what: str, axes: Any) -> "Figure":

@@ -12,7 +12,9 @@ from gqm_sym.runtime.launch.formulas import Formulas, ParameterValues
 # length of the nearest piece (a curve as a whole may be very long).
 MAX_POINT_DISTANCE_SHARE = 1e-6
 
-CONTACTS = ("bilateral", "above", "below")
+# Which side of the track can push, and the only sign that N can have then; 0 if it can have both.
+ONLY_SIGN = {"bilateral": 0, "above": 1, "below": -1}
+CONTACTS = tuple(ONLY_SIGN)
 
 
 class LaunchRequest(NamedTuple):

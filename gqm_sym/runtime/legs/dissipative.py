@@ -1,41 +1,42 @@
 """Motions with friction, drag or resistance: leg after leg, each computed when it is needed."""
 
-from math import inf, isfinite
-from typing import Any
+from itertools import pairwise
+from math import inf, isfinite, nan
 
 import numpy as np
 
 from gqm_sym.errors import BudgetError, InputError, SolutionError
-from gqm_sym.runtime.arithmetic.doubledouble import ULP, ZERO, Pair, two_sum
+from gqm_sym.runtime.arithmetic.doubledouble import ULP, ZERO, Pair
 from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.interface import Dissipation
-from gqm_sym.runtime.launch.ends import CUSP_SHARE, domain_end, leaving_at_once, starting_step
+from gqm_sym.runtime.launch.ends import CUSP_SHARE, domain_end, leaving_at_once
 from gqm_sym.runtime.launch.formulas import Formulas, ParameterValues
-from gqm_sym.runtime.launch.functions import BoundFunctions
 from gqm_sym.runtime.launch.problem import Problem, bind
-from gqm_sym.runtime.launch.request import Launch
+from gqm_sym.runtime.launch.request import ONLY_SIGN, Launch
 from gqm_sym.runtime.launch.speed import path_and_force_at
-from gqm_sym.runtime.launch.zeros import MAX_PARAMETER
-from gqm_sym.runtime.legs import follow
-from gqm_sym.runtime.legs.leg_breaks import clearance
-from gqm_sym.runtime.legs.leg_record import COLUMNS, END, END_LOW, MIDDLE, TIME_FROM_START
-from gqm_sym.runtime.legs.leg_run import ASYMPTOTE, FULL, LIFTOFF, LIMIT, NARROWED, PAUSED, SPENT, TURN, Route, Start
+from gqm_sym.runtime.legs import answers
+from gqm_sym.runtime.legs.advance import AT_ONCE, BEYOND, LEAVES, RESTS, Joints, room_ahead
+from gqm_sym.runtime.legs.answers import LEG, MAX_PAUSES, MAX_TURNS
+from gqm_sym.runtime.legs.body import (
+    DIRECTION,
+    ELAPSED,
+    ENDING,
+    LAPS,
+    MAY_REST,
+    PAUSES,
+    PLACE,
+    TURNS,
+    launched,
+)
+from gqm_sym.runtime.legs.leg_record import BEGIN, COLUMNS, END, HEADING, MIDDLE, START, TIME_FROM_START
+from gqm_sym.runtime.legs.leg_run import ASYMPTOTE, FULL, LIFTOFF, LIMIT, NARROWED, SPENT, TURN
 from gqm_sym.runtime.legs.leg_segments import Run, along_field, along_panels
 from gqm_sym.runtime.motion.aperiodic import MotionAtRest
 from gqm_sym.runtime.motion.events import passages
+from gqm_sym.runtime.motion.locking import locked
 from gqm_sym.runtime.motion.motion import Motion
 from gqm_sym.runtime.motion.segment import Segment
 from gqm_sym.runtime.motion.trajectory import TimedSegment, Trajectory
-from gqm_sym.runtime.multiprecision.exact_problem import NOWHERE
-
-# The first panel as a share of the first step of a search. The shorter it is, the more digits early times have.
-FIRST_PANEL_SHARE = 0.25
-
-# On a curve without ends, after how many runs in a row without a turn `legs` and `events` no longer look for one.
-MAX_PAUSES = 12
-
-# The number of turns after which `legs` and `events` no longer look for the place where the body comes to rest.
-MAX_TURNS = 20000
 
 # The most segments that are stored; each takes some kilobytes.
 MAX_SEGMENTS = 250_000
@@ -43,18 +44,22 @@ MAX_SEGMENTS = 250_000
 # How many panels a record has space for at first; a leg with more is followed again with a larger record.
 FEW_PANELS = 12
 
-# The only sign that N can have for each kind of contact; 0 if it can have both.
-ONLY_SIGN = {"bilateral": 0, "above": 1, "below": -1}
+# The names of what ends a run, where the code alone says it.
+END_NAMES = {
+    TURN: "turn",
+    RESTS: "rest",
+    LIFTOFF: "liftoff",
+    AT_ONCE: "liftoff",
+    ASYMPTOTE: "asymptote",
+}
 
 
 def dissipate(formulas: Formulas, p: ParameterValues, launch: Launch) -> Motion:
     """The motion of a launch where forces dissipate."""
     functions = bind(formulas, p, launch)
     problem = Problem(formulas, launch, p, functions, formulas.domain(p))
-    if problem.w0 > 0.0:
-        return DissipativeMotion(problem, launch.direction)
-    direction = _direction_from_rest(problem, problem.lam0, launch.direction)
-    return DissipativeMotion(problem, direction) if direction else MotionAtRest(problem)
+    motion = DissipativeMotion(problem)
+    return motion if motion.direction else MotionAtRest(problem)
 
 
 def launch_leg(formulas: Formulas, p: ParameterValues, launch: Launch, places: Array) -> Array:
@@ -65,23 +70,6 @@ def launch_leg(formulas: Formulas, p: ParameterValues, launch: Launch, places: A
         motion.fill_launch_leg(places, v2)
     v2[places == launch.lam0.value] = launch.v0.value**2
     return v2
-
-
-def _direction_from_rest(problem: Problem, lam: float, preferred: int) -> int:
-    """The direction in which a body at rest leaves a place; 0 if it stays.
-
-    At a corner both planes decide; where it could slide down either of them, it takes the ``preferred`` direction.
-    """
-    f, domain = problem.functions, problem.domain
-    off = clearance.py_func(lam, domain.period or max(abs(domain.low), abs(domain.high))) if _is_break(f, lam) else 0.0
-    balance = _loss(problem).static_balance
-    direction: int = follow.direction_from_rest(balance, f.p, lam - off, lam + off, preferred)
-    return direction
-
-
-def _is_break(f: BoundFunctions, lam: float) -> bool:
-    """Whether the curve is not smooth at a place."""
-    return bool(f.between(f.breaks, *np.nextafter(lam, (-inf, inf)).tolist()).size)
 
 
 def _loss(problem: Problem) -> Dissipation:
@@ -99,40 +87,35 @@ class DissipativeMotion(Motion):
     motion that never ends cover what has been computed so far, and at least the first leg.
     """
 
-    # The state with which a motion begins.
-    _horizon = inf
     _ending = ""
-    _elapsed = _elapsed_low = _arc = _no_turn_until = _low = 0.0
-    # The time since the last turn, and the two times from turn to turn before it.
-    _leg_time = 0.0
-    _leg_times = (inf, inf)
-    _contact_sign = _laps = _turns = _pauses = 0
-    _could_stay = True
+    _arc = 0.0
     _whole: Trajectory | None = None
 
-    def __init__(self, problem: Problem, direction: int) -> None:
-        self._runs: list[tuple[Any, ...]] = []
+    def __init__(self, problem: Problem) -> None:
+        self._runs: list[Run] = []
         self._segments: list[TimedSegment] = []
-        super().__init__(problem, "dissipative", direction)
-        launch = problem.launch
-        self._place, self._w, self._direction = launch.lam0.value, launch.v0.value**2, direction
-        step = starting_step(problem)
-        self._step, self._reach = FIRST_PANEL_SHARE * step, problem.period or step
+        launch, domain, f = problem.launch, problem.domain, problem.functions
+        super().__init__(problem, "dissipative", launch.direction)
+        self._joints = Joints(f.breaks, f.corners, np.empty(room_ahead(f.breaks.size)))
+        self._body = launched(
+            *(1, launch.lam0.value, domain.low, domain.high, domain.period),
+            *(launch.direction, ONLY_SIGN[launch.contact], self._horizon, nan, problem.w0),
+        )
+        self._at = self._body[0].tolist()
         self._go_on()
+        self.direction = int(self._runs[0].record[HEADING]) if self._runs else 0
 
     # -- what the motion answers --------------------------------------------------------------
 
     @property
+    @locked
     def t_end(self) -> float:
         """The time in s at which the body rests or leaves the track, or ``t_max``; infinite if there is neither."""
         self._look_ahead()
         return self._known_end()
 
-    @t_end.setter
-    def t_end(self, value: float) -> None:
-        self._horizon = value
-
     @property
+    @locked
     def turning_points(self) -> tuple[float, ...]:
         """The turning points so far in the order of time; the place of a launch from rest is one."""
         turns = [leg.lam_end for leg in self.legs if leg.end == "turn"]
@@ -157,8 +140,19 @@ class DissipativeMotion(Motion):
 
     def _is_ahead(self, places: Array) -> bool:
         """Whether one of the places lies ahead of what has been computed."""
-        reached = self._place + self._laps * self.problem.period
-        return bool(np.any((places - reached) * self._direction > 0.0))
+        return bool(np.any((places - self._reached) * self._at[DIRECTION] > 0.0))
+
+    @property
+    def _reached(self) -> float:
+        """The place up to which the motion has been computed."""
+        place: float = self._at[PLACE] + self._at[LAPS] * self.problem.period
+        return place
+
+    @property
+    def _elapsed(self) -> float:
+        """The time in s up to which the motion has been computed."""
+        elapsed: float = self._at[ELAPSED]
+        return elapsed
 
     # -- what `Motion` needs ------------------------------------------------------------------
 
@@ -169,7 +163,7 @@ class DissipativeMotion(Motion):
     def _trajectory(self, reach: float) -> Trajectory:
         if isfinite(self._horizon):
             reach = max(reach, self._horizon)
-        while not self._ending and self._elapsed + self._elapsed_low < reach:
+        while not self._ending and self._elapsed < reach:
             self._go_on()
         if self._whole is None or len(self._whole.segments) != len(self._pieces):
             self._whole = Trajectory(segments=tuple(self._pieces), lap=self.problem.period)
@@ -190,7 +184,7 @@ class DissipativeMotion(Motion):
         if self._ending == "asymptote" and t > self._pieces[-1].t_stop[0]:
             raise SolutionError(
                 f"t = {t!r}: by then the body is closer to the equilibrium at "
-                f"{self.problem.formulas.parameter} = {self._place!r} than doubles can tell"
+                f"{self.problem.formulas.parameter} = {self._at[PLACE]!r} than doubles can tell"
             )
 
     def _time_error(self, t: Array) -> Array:
@@ -199,11 +193,9 @@ class DissipativeMotion(Motion):
         return np.abs(t) * (worst + 4.0 * ULP)
 
     def _end_text(self) -> str:
-        if not self._ending or self._pieces[-1].t_stop[0] > self._horizon:
+        if not self._ending or self._elapsed > self._horizon:
             return super()._end_text()
-        return (
-            f"{self._ending} at {self.problem.formulas.parameter} = {self._place + self._laps * self.problem.period!r}"
-        )
+        return f"{self._ending} at {self.problem.formulas.parameter} = {self._reached!r}"
 
     def _first_passages(self, lam: float, low: float) -> list[float]:
         done = 0
@@ -212,8 +204,8 @@ class DissipativeMotion(Motion):
             found = passages(trajectory.segments[done:], trajectory, lam, low)
             done = len(trajectory.segments)
             # A body that turns at two points reaches no place outside of them any more.
-            settled = self._turns >= 2 or (self._turns and self.problem.w0 == 0.0)
-            if found or self._ending or settled or trajectory.segments[-1].t_stop[0] >= self._horizon:
+            settled = self._at[TURNS] >= (1.0 if self.problem.w0 == 0.0 else 2.0)
+            if found or self._ending or settled or self._elapsed >= self._horizon:
                 return found
             self._go_on()
 
@@ -222,15 +214,15 @@ class DissipativeMotion(Motion):
     def _known_end(self) -> float:
         """The time at which the motion ends, as far as is known; infinite if it is not."""
         ends = self._ending not in ("", "asymptote")
-        return min(self._horizon, self._pieces[-1].t_stop[0] if ends else inf)
+        return min(self._horizon, self._elapsed if ends else inf)
 
     def _look_ahead(self) -> None:
         """Compute the whole motion if it ends, and at least its first leg if it does not."""
         if isfinite(self._horizon):
             self._trajectory(self._horizon)
             return
-        while not self._ending and self._pauses < MAX_PAUSES:
-            if self._turns and (not self._could_stay or self._turns > MAX_TURNS):
+        while not self._ending and self._at[PAUSES] < MAX_PAUSES:
+            if self._at[TURNS] and (not self._at[MAY_REST] or self._at[TURNS] > MAX_TURNS):
                 return
             self._go_on()
 
@@ -238,7 +230,7 @@ class DissipativeMotion(Motion):
     def _pieces(self) -> list[TimedSegment]:
         """All segments so far."""
         for run in self._runs:
-            self._lay(Run(*run))
+            self._lay(run)
         self._runs.clear()
         return self._segments
 
@@ -249,130 +241,59 @@ class DissipativeMotion(Motion):
                 f"motion: {MAX_SEGMENTS} pieces of legs reach t = {self._pieces[-1].t_stop[0]!r} only; "
                 "give a shorter t_max, or ask for earlier times and nearer places"
             )
-        problem, direction, start, low = self.problem, self._direction, self._place, self._low
-        domain, period = problem.domain, problem.domain.period
-        end = domain.high if direction > 0 else domain.low
-        # The breaks of a closed curve are listed for some laps.
-        limit = start + direction * 8.0 * period if period else end
-        pause = inf if isfinite(end) else self._reach
-        route = Route(self._breaks_before(limit), limit, pause, ONLY_SIGN[problem.launch.contact])
-        launch = Start(start, low, self._w, direction, self._contact_sign, self._step, self._no_turn_until)
-        dissipation, p, size = _loss(problem), problem.functions.p, FEW_PANELS * COLUMNS
+        problem, size = self.problem, FEW_PANELS * COLUMNS
+        parameters = problem.functions.p.reshape(1, -1)
         while True:
             record = np.empty(size)
-            what, contact_sign, new_direction, could_stay, ahead, back, place, v2, step, no_turn_until, time = (
-                follow.follow(dissipation, p, launch, route, record)
-            )
+            what = answers.drive(_loss(problem), parameters, self._joints, LEG, self._body, record)
             if what != FULL:
                 break
             size *= 4
-        if what == LIFTOFF and not ahead:
-            self._lift_off_at_once(launch, route)
-            return
-        if not ahead and what == LIMIT:
-            raise leaving_at_once(problem, direction, "end of the domain")
-        if not (ahead or back) or what == SPENT or (what == ASYMPTOTE and not back):
+        if self._body[0, DIRECTION] == 0.0 and not self._body[0, TURNS]:
+            return  # the body stays where it is
+        self._at = self._body[0].tolist()
+        heading = int(record[HEADING])
+        if what == LEAVES:
+            raise leaving_at_once(problem, heading, "end of the domain")
+        if what == SPENT:
             raise SolutionError(
-                f"V**2 beyond {problem.formulas.parameter} = {place!r} could not be followed; "
+                f"V**2 beyond {problem.formulas.parameter} = {float(record[END])!r} could not be followed; "
                 "are the curve and the force smooth there?"
             )
-        new_low = float(record[END_LOW])
-        self._leg_time += time
-        if what == TURN:
-            stays = new_direction == 0 or (place == start and new_low == low and self._w == 0.0)
-            name = "rest" if stays or self._comes_to_rest_between(place, time) else "turn"
-            self._leg_times, self._leg_time = (self._leg_times[1], self._leg_time), 0.0
-        else:
-            name = self._end_name(what, place)
-        self._runs.append(((start, low), ahead, back, record, what, name, self._laps))
-        self._place, self._low, self._w, self._direction = place, new_low, v2, new_direction
-        self._contact_sign, self._step, self._no_turn_until = contact_sign, step, no_turn_until
-        self._elapsed, rounding = two_sum.py_func(self._elapsed, time)
-        self._elapsed_low += rounding
-        if what == TURN:
-            self._turns, self._could_stay, self._no_turn_until, self._pauses = self._turns + 1, could_stay, 0.0, 0
-        else:
-            self._pauses = self._pauses + 1 if what == PAUSED and not period and not isfinite(end) else 0
-        if name not in ("", "turn", "contact-sign"):
+        name = self._end_name(what, record, heading)
+        self._runs.append(Run(record, what, name))
+        if self._at[ENDING]:
             self._ending = name
-            return
-        if period:
-            self._fold(period)
-        if abs(place) > MAX_PARAMETER and abs(place) > MAX_PARAMETER * abs(problem.lam0):
+        if what == BEYOND:
             raise SolutionError(
-                f"the motion leaves the range of doubles at {problem.formulas.parameter} = {place!r}; "
+                f"the motion leaves the range of doubles at {problem.formulas.parameter} = {self._at[PLACE]!r}; "
                 "give a shorter t_max"
             )
-        if what == PAUSED and not period:
-            self._reach *= 2.0
 
-    def _breaks_before(self, limit: float) -> Array:
-        """The breaks from here to a limit in the order of the motion.
-
-        They include those a little behind, which show on which piece of the curve the body is.
-        """
-        f, direction = self.problem.functions, self._direction
-        if not f.breaks.size:
-            return NOWHERE
-        begin = self._place - direction * starting_step(self.problem)
-        return np.ascontiguousarray(f.between(f.breaks, begin, limit)[::direction])
-
-    def _fold(self, period: float) -> None:
-        """Count whole laps of a closed curve separately, so that places keep their digits."""
-        count = int(np.trunc((self._place - self.problem.lam0) / period))
-        self._place, low = two_sum.py_func(self._place, -count * period)
-        self._low += low
-        self._laps += count
-
-    def _comes_to_rest_between(self, place: float, time: float) -> bool:
-        """Whether the body, which turns at a place, has come to rest on a corner there as far as times can tell.
-
-        Between two planes the times from turn to turn decrease geometrically, those in either direction by the same
-        factor. The body is at rest if the sum of all that follow is less than a rounding of the time.
-        """
-        f, (before_last, last), leg_time = self.problem.functions, self._leg_times, self._leg_time
-        if not (f.corners.size and before_last < inf and leg_time < before_last):
-            return False
-        remaining = leg_time * (last + leg_time) / (before_last - leg_time)
-        now = self._elapsed + time
-        return now + remaining == now and _is_break(f, place) and _direction_from_rest(self.problem, place, 0) == 0
-
-    def _end_name(self, what: int, place: float) -> str:
-        """The name of the end of a run that does not turn."""
-        problem, f, start = self.problem, self.problem.functions, self._place
+    def _end_name(self, what: int, record: Array, heading: int) -> str:
+        """The name of what ended a run."""
+        problem, f = self.problem, self.problem.functions
         if what == LIMIT and not problem.period:
-            return domain_end(problem, self._direction).what
+            return domain_end(problem, heading).what
         if what == NARROWED:
-            ds = path_and_force_at(f.addresses, f.p, np.array([start, place]), np.zeros(2))[2]
+            ds = path_and_force_at(f.addresses, f.p, record[[START, END]], np.zeros(2))[2]
             return "cusp" if ds[1] <= CUSP_SHARE * ds[0] else "singular-point"
-        return {LIFTOFF: "liftoff", ASYMPTOTE: "asymptote"}.get(what, "")
-
-    def _lift_off_at_once(self, launch: Start, route: Route) -> None:
-        """End the motion as it begins, because the track would have to pull the body at once."""
-        record = np.empty(FEW_PANELS * COLUMNS)
-        launch, route = launch._replace(no_turn_until=inf), route._replace(pause=0.0, only_sign=0)
-        what, _, _, _, ahead, *_ = follow.follow(_loss(self.problem), self.problem.functions.p, launch, route, record)
-        first = Run((self._place, self._low), ahead, 0, record, what, "liftoff", self._laps)
-        segment = self._panels_of(first)
-        self._segments.append(self._piece(segment, 1, (ZERO, 0.0), (ZERO, 0.0), "liftoff", self._laps))
-        self._ending = "liftoff"
+        return END_NAMES.get(what, "")
 
     def _lay(self, run: Run) -> None:
         """Make segments of a run."""
         f, end, middle = self.problem.functions, run.pair(END), run.pair(MIDDLE)
+        self._clock, (ahead, back) = run.pair(BEGIN), run.pair(TIME_FROM_START)
         if run.ahead:
-            self._add(self._panels_of(run), 1, run, "" if run.back else run.end)
+            segment = along_panels(f, run.pair(START), middle, run.half_c, ahead, run.panels_ahead)
+            if run.what == AT_ONCE:
+                self._append(segment, 1, [(ZERO, 0.0)] * 2, run.end, run.laps)
+                return
+            self._add(segment, 1, run, "" if run.back else run.end)
         if run.what == ASYMPTOTE:
             self._add(along_field(f, middle[0], end[0], run.field), 1, run, run.end)
         elif run.back:
-            self._add(
-                along_panels(f, end, middle, 0.0, run.pair(TIME_FROM_START)[1], run.panels_back), -1, run, run.end
-            )
-
-    def _panels_of(self, run: Run) -> Segment:
-        """The segment from a run's start to the place up to which time is counted from there."""
-        f, middle, (before, _) = self.problem.functions, run.pair(MIDDLE), run.pair(TIME_FROM_START)
-        return along_panels(f, run.start, middle, run.half_c, before, run.panels_ahead)
+            self._add(along_panels(f, end, middle, 0.0, back, run.panels_back), -1, run, run.end)
 
     def _add(self, segment: Segment, sense: int, run: Run, end: str) -> None:
         """Append a segment to the motion, cut where N changes its sign."""
@@ -384,23 +305,23 @@ class DissipativeMotion(Motion):
         marks = [(ZERO, 0.0), *(((float(r), 0.0), phi) for r, phi in zip(times, cuts, strict=True))]
         marks.append(((segment.duration, 0.0), segment.stop))
         marks.sort(key=lambda mark: sense * mark[1])
-        for k in range(len(marks) - 1):
-            name = end if k == len(marks) - 2 else "contact-sign"
-            self._segments.append(self._piece(segment, sense, marks[k], marks[k + 1], name, run.laps))
-        self._arc += sense * segment.direction * segment.length
+        self._append(segment, sense, marks, end, run.laps)
 
-    def _piece(
-        self, segment: Segment, sense: int, start: tuple[Pair, float], stop: tuple[Pair, float], end: str, laps: int
-    ) -> TimedSegment:
-        return TimedSegment(
-            segment=segment,
-            sense=sense,
-            r_start=start[0],
-            r_stop=stop[0],
-            phi_start=start[1],
-            phi_stop=stop[1],
-            t_start=self._segments[-1].t_stop if self._segments else ZERO,
-            s_a=self._arc if sense > 0 else self._arc - segment.direction * segment.length,
-            end=end,
-            laps=laps,
-        )
+    def _append(self, segment: Segment, sense: int, marks: list[tuple[Pair, float]], end: str, laps: int) -> None:
+        """Append the parts of a segment between marks, each a time from its end ``a`` and a phase angle."""
+        for k, ((r_start, phi_start), (r_stop, phi_stop)) in enumerate(pairwise(marks)):
+            piece = TimedSegment(
+                segment=segment,
+                sense=sense,
+                r_start=r_start,
+                r_stop=r_stop,
+                phi_start=phi_start,
+                phi_stop=phi_stop,
+                t_start=self._clock,
+                s_a=self._arc if sense > 0 else self._arc - segment.direction * segment.length,
+                end=end if k == len(marks) - 2 else "contact-sign",
+                laps=laps,
+            )
+            self._segments.append(piece)
+            self._clock = piece.t_stop
+        self._arc += sense * segment.direction * segment.length

@@ -6,19 +6,17 @@ is computed from the start, but has all its digits when it is computed from the 
 """
 
 from math import sqrt
-
-from numba import types
+from typing import NamedTuple
 
 from gqm_sym.runtime.compiled.calls import call_static_balance
-from gqm_sym.runtime.compiled.jit import Inner, entry
-from gqm_sym.runtime.compiled.registers import uncounted
-from gqm_sym.runtime.compiled.types import INTEGER, REAL, VECTOR
-from gqm_sym.runtime.interface import Dissipation
+from gqm_sym.runtime.compiled.jit import Inner
 from gqm_sym.runtime.legs.approach import LOST, NO_SPACE, approach
 from gqm_sym.runtime.legs.leg_breaks import clearance, span_before, within
 from gqm_sym.runtime.legs.leg_equation import Forces, March, Panel, W, panel_buffer, set_nodes
 from gqm_sym.runtime.legs.leg_panels import ALWAYS, MAX_PANELS, PanelRequest, next_panel, next_stop
 from gqm_sym.runtime.legs.leg_record import (
+    AHEAD,
+    BACK,
     CHANGE_COUNT,
     COLUMNS,
     END,
@@ -33,13 +31,8 @@ from gqm_sym.runtime.legs.leg_record import (
     has_space,
     total_time,
 )
-from gqm_sym.runtime.legs.leg_run import ASYMPTOTE, FULL, SLOWED, SPENT, TURN, Route, Start, point_buffer, run
+from gqm_sym.runtime.legs.leg_run import ASYMPTOTE, FULL, SLOWED, SPENT, TURN, Start, point_buffer, run
 from gqm_sym.runtime.legs.polynomials import COUNT
-
-_FLAGS = (types.boolean, types.boolean, types.boolean)
-DISSIPATION = types.NamedTuple((INTEGER, INTEGER, *_FLAGS), Dissipation)
-START = types.NamedTuple((REAL, REAL, REAL, INTEGER, INTEGER, REAL, REAL), Start)
-ROUTE = types.NamedTuple((VECTOR, REAL, REAL, INTEGER), Route)
 
 
 @Inner
@@ -100,12 +93,6 @@ def released(static_balance, p, behind, ahead, preferred):  # type: ignore[no-un
     return direction, forwards < backwards
 
 
-@entry(INTEGER(INTEGER, VECTOR, REAL, REAL, INTEGER))
-def direction_from_rest(static_balance, p, behind, ahead, preferred):  # type: ignore[no-untyped-def]
-    """The direction that `released` finds, for Python."""
-    return released(static_balance, p, behind, ahead, preferred)[0]
-
-
 @Inner
 def run_to_end(forces, start, route, off, record):  # type: ignore[no-untyped-def]
     """`run`, begun again with the turn expected later where it slows down before its first panel."""
@@ -119,14 +106,33 @@ def run_to_end(forces, start, route, off, record):  # type: ignore[no-untyped-de
         )
 
 
-@entry(
-    types.Tuple((INTEGER, INTEGER, INTEGER, types.boolean, INTEGER, INTEGER, REAL, REAL, REAL, REAL, REAL))(
-        *(DISSIPATION, VECTOR, START, ROUTE, VECTOR),
-    ),
-    checked=False,
-)
+class Followed(NamedTuple):
+    """What became of a leg that was followed; the rest of it is in the record.
+
+    Attributes
+    ----------
+    what, contact_sign : int
+        As of `leg_run.End`.
+    direction : int
+        At a turn, the one that `released` finds; otherwise that of the motion.
+    could_stay : bool
+        At a turn, whether the body could stay there at some slope; otherwise True.
+    step, no_turn_until, v2 : float
+        As of `leg_run.End`.
+    """
+
+    what: int
+    contact_sign: int
+    direction: int
+    could_stay: bool
+    step: float
+    no_turn_until: float
+    v2: float
+
+
+@Inner
 def follow(dissipation, p, start, route, record):  # type: ignore[no-untyped-def]
-    """Run a leg, and follow it back from where it ends with V**2 = 0; the rest of what it finds is in the record.
+    """Run a leg, and follow it back from where it ends with V**2 = 0.
 
     Parameters
     ----------
@@ -141,21 +147,9 @@ def follow(dissipation, p, start, route, record):  # type: ignore[no-untyped-def
 
     Returns
     -------
-    what, contact_sign : int
-        As of `leg_run.End`.
-    direction : int
-        At a turn, the one that `released` finds; otherwise that of the motion.
-    could_stay : bool
-        At a turn, whether the body could stay there at some slope; otherwise True.
-    ahead, back : int
-        The number of panels from the start, and of panels or rows of a field from the end.
-    place, v2, step, no_turn_until : float
-        As of `leg_run.End`, the place as the nearest double.
-    time : float
-        Of the whole leg, in seconds.
+    Followed
     """
-    p, breaks, record = uncounted(p), uncounted(route.breaks), uncounted(record)
-    route = Route(breaks, route.limit, route.pause, route.only_sign)
+    breaks = route.breaks
     forces = Forces(
         dissipation.speed_equation, p, dissipation.friction, dissipation.kinked, dissipation.linear, start.direction
     )
@@ -170,14 +164,11 @@ def follow(dissipation, p, start, route, record):  # type: ignore[no-untyped-def
         direction, could_stay = released(dissipation.static_balance, p, here, here, direction)
     elif what == ASYMPTOTE:
         back = approach(forces, end, breaks, off, record, used)
-    time_from_start = total_time(record, HEAD, end.panel_count)
     record[END], record[END_LOW] = end.place
     record[MIDDLE], record[MIDDLE_LOW] = end.middle
     record[HALF_C], record[CHANGE_COUNT] = end.half_c, end.change_count
-    record[TIME_FROM_START], record[TIME_FROM_END] = time_from_start, time_from_end
+    record[TIME_FROM_START], record[TIME_FROM_END] = total_time(record, HEAD, end.panel_count), time_from_end
+    record[AHEAD], record[BACK] = end.panel_count, max(back, 0)
     if back < 0:
         what = FULL if back == NO_SPACE else SPENT
-    return (
-        *(what, end.contact_sign, direction, could_stay, end.panel_count, back),
-        *(end.place[0], end.v2, end.step, end.no_turn_until, time_from_start + time_from_end),
-    )
+    return Followed(what, end.contact_sign, direction, could_stay, end.step, end.no_turn_until, end.v2)

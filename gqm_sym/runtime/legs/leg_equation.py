@@ -84,6 +84,7 @@ graded_integral_row = over_rows(lambda y, mean, graded, slope: y * (slope * mean
 damped_row = over_rows(lambda mean, expm1: mean / (1.0 + expm1), WIDE)
 factor_row = over_rows(lambda w, y, shift: w / ((y + shift) * (y + shift)), WIDE)
 load_row = over_rows(lambda ds, n0, kappa, w: ds * (n0 + kappa * w), WIDE)
+load_per_mass_row = over_rows(lambda n0, kappa, w: n0 + kappa * w, WIDE)
 load_size_row = over_rows(lambda ds, n0, kappa, w: abs(ds) * (abs(n0) + abs(kappa * w)), WIDE)
 root_row = over_rows(np.sqrt, WIDE)
 time_rate_row = over_rows(lambda ds, speed, factor: factor * ds / speed, WIDE)

@@ -3,31 +3,50 @@
 ==================== ============================================================================================
 number               meaning
 ==================== ============================================================================================
+START, START_LOW     where the leg begins, as two doubles within one lap
+LAPS_BEFORE          the whole laps before it
+HEADING              the sign of dlam/dt
+BEGIN, BEGIN_LOW     the time from launch at which it begins, as two doubles
 END, END_LOW         where the leg ends, as two doubles
 MIDDLE, MIDDLE_LOW   the place up to which time is counted from the start, as two doubles
 HALF_C               c/2 of the march variable (`leg_equation.March`); inf where it is the distance itself
 TIME_FROM_START      the time from the start to the middle
 TIME_FROM_END        the time from the middle to a turn
 CHANGE_COUNT         how often N changes sign
+AHEAD, BACK          how many panels there are from the start, and how many panels or rows of a field from the end
 from HEAD on         the panels from the start; after them what was followed back from the end: panels from a turn, or
                      the field next to an equilibrium (`approach`)
 at the end           the places at which N changes sign, the first one last
 ==================== ============================================================================================
 
-A panel is a row of COLUMNS numbers: at its nodes the rates of time and of arc length, and Y; after each of these one
-more number, RIGHT (the march variable at its end), TIME, and TIME_ERROR (what the time may be wrong by).
+A panel is a row of COLUMNS numbers: at its nodes the rates of time and of arc length, Y, and the contact force per mass
+(from NORMAL_LOAD on); after each of the first three one more number, RIGHT (the march variable at its end), TIME, and
+TIME_ERROR (what the time may be wrong by).
 """
 
 from gqm_sym.runtime.arithmetic.doubledouble import two_sum
 from gqm_sym.runtime.compiled.jit import Inlined, Inner
 from gqm_sym.runtime.compiled.registers import copied
-from gqm_sym.runtime.legs.leg_equation import ARC_RATE, SPEED, TAILS, TIME_RATE
+from gqm_sym.runtime.legs.leg_equation import (
+    ARC_RATE,
+    KAPPA,
+    MEAN,
+    N0,
+    SPEED,
+    TAILS,
+    TIME_RATE,
+    W,
+    load_per_mass_row,
+)
 from gqm_sym.runtime.legs.polynomials import COUNT, WIDE, to_tails
 
-END, END_LOW, MIDDLE, MIDDLE_LOW, HALF_C, TIME_FROM_START, TIME_FROM_END, CHANGE_COUNT, HEAD = range(9)
+START, START_LOW, LAPS_BEFORE, HEADING, BEGIN, BEGIN_LOW = range(6)
+END, END_LOW, MIDDLE, MIDDLE_LOW, HALF_C, TIME_FROM_START, TIME_FROM_END, CHANGE_COUNT = range(6, 14)
+AHEAD, BACK, HEAD = range(14, 17)
 
-COLUMNS = 3 * WIDE
-RIGHT, TIME, TIME_ERROR = range(COUNT, COLUMNS, WIDE)
+COLUMNS = 4 * WIDE
+RIGHT, TIME, TIME_ERROR = range(COUNT, 3 * WIDE, WIDE)
+Y_ROW, NORMAL_LOAD = 2 * WIDE, 3 * WIDE
 copy = copied(WIDE)
 
 
@@ -55,7 +74,9 @@ def add_panel(record, at, right, width, work):  # type: ignore[no-untyped-def]
     to_tails(work, TIME_RATE, work, TAILS)
     copy(record, at, work, TIME_RATE)
     copy(record, at + WIDE, work, ARC_RATE)
-    copy(record, at + 2 * WIDE, work, SPEED)
+    copy(record, at + Y_ROW, work, SPEED)
+    load_per_mass_row(work, MEAN, N0, KAPPA, W)
+    copy(record, at + NORMAL_LOAD, work, MEAN)
     record[at + RIGHT] = right
     record[at + TIME], record[at + TIME_ERROR] = width * work[TAILS + 6], width * tail_of(work)
 

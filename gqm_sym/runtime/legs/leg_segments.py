@@ -7,13 +7,25 @@ import numpy as np
 from numba import types
 
 from gqm_sym.runtime.arithmetic.doubledouble import ULP, Pair
-from gqm_sym.runtime.arithmetic.matrices import multiply
 from gqm_sym.runtime.compiled.jit import entry
 from gqm_sym.runtime.compiled.types import MATRIX, VECTOR, Array
 from gqm_sym.runtime.launch.functions import BoundFunctions
 from gqm_sym.runtime.legs.approach import COLUMNS as FIELD
-from gqm_sym.runtime.legs.leg_record import CHANGE_COUNT, COLUMNS, HALF_C, HEAD, RIGHT, TIME, TIME_ERROR
-from gqm_sym.runtime.legs.polynomials import COUNT, TO_COEFFICIENTS, WIDE
+from gqm_sym.runtime.legs.leg_reading import to_integral, to_plain
+from gqm_sym.runtime.legs.leg_record import (
+    AHEAD,
+    BACK,
+    CHANGE_COUNT,
+    COLUMNS,
+    HALF_C,
+    HEAD,
+    LAPS_BEFORE,
+    RIGHT,
+    TIME,
+    TIME_ERROR,
+    Y_ROW,
+)
+from gqm_sym.runtime.legs.polynomials import WIDE
 from gqm_sym.runtime.motion.segment import Segment
 from gqm_sym.runtime.quadrature.substitution import FROM_TURN, REGULAR, TO_EQUILIBRIUM
 from gqm_sym.runtime.quadrature.time_panels import CONVERGED
@@ -21,29 +33,6 @@ from gqm_sym.runtime.quadrature.time_panels import CONVERGED
 # The largest phase angle on a leg that tends to an equilibrium. The distance from there is then exp(-MAX_PHASE_ANGLE)
 # times the length of the leg, the smallest that doubles can represent.
 MAX_PHASE_ANGLE = 690.0
-
-
-def _to_legendre() -> tuple[Array, Array]:
-    """Legendre coefficients of a function on [-1, 1], and of its integral from -1, from values at a panel's nodes."""
-    # x P_j = ((j + 1) P_(j+1) + j P_(j-1))/(2 j + 1), and T_(k+1) = 2 x T_k - T_(k-1).
-    j = np.arange(WIDE + 1)
-    series = np.zeros((COUNT, WIDE + 1))
-    series[0, 0] = series[1, 1] = 1.0
-    for k in range(2, COUNT):
-        row = series[k - 1]
-        series[k, 1:] += 2.0 * (j[1:] / (2 * j[1:] - 1)) * row[:-1]
-        series[k, :-1] += 2.0 * (j[1:] / (2 * j[1:] + 1)) * row[1:]
-        series[k] -= series[k - 2]
-    plain = TO_COEFFICIENTS.T @ series
-    integral = np.zeros((COUNT, WIDE))
-    integral[:, 0] = plain[:, 0] - plain[:, 1] / 3.0
-    i = np.arange(1, WIDE)
-    integral[:, 1:] = plain[:, i - 1] / (2 * i - 1) - plain[:, i + 1] / (2 * i + 3)
-    return np.ascontiguousarray(plain[:, :WIDE]), integral
-
-
-PLAIN_BY_NODE, INTEGRAL_BY_NODE = _to_legendre()
-to_plain, to_integral = multiply(PLAIN_BY_NODE), multiply(INTEGRAL_BY_NODE)
 
 
 @entry(types.Tuple((VECTOR, VECTOR, VECTOR, MATRIX, MATRIX, MATRIX, types.float64))(MATRIX, types.float64))
@@ -68,7 +57,7 @@ def read_panels(panels, time):  # type: ignore[no-untyped-def]
         at = k * COLUMNS
         to_integral(panels, at, out, 0)
         to_integral(panels, at + WIDE, out, WIDE)
-        to_plain(panels, at + 2 * WIDE, out, 2 * WIDE)
+        to_plain(panels, at + Y_ROW, out, 2 * WIDE)
         length = 0.0
         for j in range(WIDE):
             time_terms[k, j], length_terms[k, j] = half * out[j], half * out[WIDE + j]
@@ -86,27 +75,32 @@ class Run(NamedTuple):
 
     Attributes
     ----------
-    start : Pair
-        The place where it begins, as two doubles.
-    ahead, back : int
-        The number of panels from the start, and of panels or rows of a field from the end.
     record : array
         The record of the leg (`leg_record`).
     what : int
         What ended it (`leg_run`).
     end : str
         The name of its end, as of `Leg.end`.
-    laps : int
-        Whole laps of a closed curve that are not part of its places.
     """
 
-    start: Pair
-    ahead: int
-    back: int
     record: Array
     what: int
     end: str
-    laps: int
+
+    @property
+    def laps(self) -> int:
+        """Whole laps of a closed curve that are not part of its places."""
+        return int(self.record[LAPS_BEFORE])
+
+    @property
+    def ahead(self) -> int:
+        """The number of panels from the start."""
+        return int(self.record[AHEAD])
+
+    @property
+    def back(self) -> int:
+        """The number of panels or rows of a field from the end."""
+        return int(self.record[BACK])
 
     def pair(self, at: int) -> Pair:
         """Two doubles of the record: a place, or the times from the start and from the end."""

@@ -1,26 +1,39 @@
 """Motions that do not repeat: to an end of the curve, to an equilibrium, to infinity or a pole, and rest."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import inf, isfinite
 
 import numpy as np
 
 from gqm_sym.budgets import budget
-from gqm_sym.errors import InputError, SolutionError
+from gqm_sym.errors import SolutionError
 from gqm_sym.runtime.arithmetic.doubledouble import ULP, ZERO, plus
 from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.launch import zeros
 from gqm_sym.runtime.launch.ends import first_zero_from, search_beyond_barriers
 from gqm_sym.runtime.launch.kinds import MotionKind
 from gqm_sym.runtime.launch.problem import Problem
+from gqm_sym.runtime.launch.request import ONLY_SIGN
 from gqm_sym.runtime.launch.speed import path_and_force_at
 from gqm_sym.runtime.launch.zeros import MAX_PARAMETER, MIN_STEP_SHARE
-from gqm_sym.runtime.motion.events import Event, liftoff
+from gqm_sym.runtime.motion.events import Event, Leg, liftoff
+from gqm_sym.runtime.motion.locking import locked
 from gqm_sym.runtime.motion.motion import Motion
 from gqm_sym.runtime.motion.rows import Rows
 from gqm_sym.runtime.motion.segment import Segment, through, toward_equilibrium
 from gqm_sym.runtime.motion.trajectory import PhasePoints, TimedSegment, Trajectory
 from gqm_sym.runtime.quadrature.time_panels import NEGLIGIBLE_SHARE
+
+# How many segments of a motion to infinity `legs` and `events` cover, and how many panels: on these its end is searched
+# for. Each segment is twice as long as the one before, so that they reach as far as for motions with losses.
+MAX_SEGMENTS_AHEAD, MAX_PANELS_AHEAD = 12, 200
+
+# The next segment is twice as long unless the last one has more panels than this.
+MAX_PANELS_TO_DOUBLE = 64
+
+# The phase angle up to which the approach to an equilibrium is shown: the rest is less than a thousandth of it.
+SHOWN_PHASE = 8.0
 
 
 @dataclass(slots=True)
@@ -55,14 +68,27 @@ class OpenEnd:
 class AperiodicMotion(Motion):
     """A motion that does not repeat: its segments follow each other, and each is passed once in each direction at most.
 
-    If the track can push from one side only, the motion ends as soon as contact is lost.
+    If the track can push from one side only, the motion ends as soon as contact is lost. A motion to infinity or to a
+    pole is continued when later times or farther places are asked for; `t_end`, `legs` and `events` tell of as many
+    segments as `MAX_SEGMENTS_AHEAD` and `MAX_PANELS_AHEAD` say, whatever has been asked for before.
     """
 
     def __init__(self, problem: Problem, kind: MotionKind, direction: int) -> None:
         super().__init__(problem, kind, direction)
         self._segments: list[TimedSegment] = []
         self.open_end: OpenEnd | None = None
-        self._approached: tuple[float, float] | None = None
+        # Why a motion to infinity cannot be followed any farther.
+        self._obstacle = ""
+        self._segments_at_first, self._is_endless = 0, False
+
+    @property
+    @locked
+    def t_end(self) -> float:
+        """The time in s at which the motion ends, or the horizon ``t_max``; infinite if there is neither.
+
+        A motion to infinity is searched for its end some way ahead only.
+        """
+        return min(self._horizon, _end_time(self._history()))
 
     @property
     def lifted_off(self) -> bool:
@@ -105,29 +131,27 @@ class AperiodicMotion(Motion):
         """Append a timed segment, as far as contact lasts."""
         if self.lifted_off:
             return
-        side = {"bilateral": 0, "above": 1, "below": -1}[self.problem.launch.contact]
+        side = ONLY_SIGN[self.problem.launch.contact]
         lost = liftoff(timed, side, first=not self._segments) if side else None
         if lost is not None:
             timed = replace(timed, r_stop=lost[0], phi_stop=lost[1], end="liftoff")
-            self.kind = "transit"
-            self.open_end = self._approached = None
+            self.kind, self.open_end = "transit", None
         self._segments.append(timed)
-        if lost is not None:
-            self.t_end = min(self.t_end, timed.t_stop[0])
 
     def approach(self, start: float, equilibrium: float) -> None:
         """Append the approach to an equilibrium from ``start``, which takes infinite time."""
-        if self.lifted_off:
-            return
-        self._approached = (start, equilibrium)
-        self.add(toward_equilibrium(self.problem.functions, start, equilibrium, 0.0), 1, "asymptote")
+        if not self.lifted_off:
+            self.add(toward_equilibrium(self.problem.functions, start, equilibrium), 1, "asymptote")
 
     def finish(self) -> "AperiodicMotion":
-        """Compute the first segment at least, and find the end in time; returns the motion itself."""
-        if self.open_end is not None and not self._segments:
+        """Compute the first segment at least; returns the motion itself."""
+        end = self.open_end
+        self._is_endless = end is not None and not isfinite(end.limit)
+        if end is not None and not self._segments:
             self._extend()
-        if self.open_end is None and self._approached is None:
-            self.t_end = min(self.t_end, self._segments[-1].t_stop[0])
+            if not self._segments:
+                raise SolutionError(self._obstacle)
+        self._segments_at_first = len(self._segments)
         return self
 
     @property
@@ -141,66 +165,82 @@ class AperiodicMotion(Motion):
         return last.s_a + (last.segment.direction * last.segment.length if last.sense > 0 else 0.0)
 
     def _trajectory(self, end_time: float) -> Trajectory:
-        end_time = max(end_time, self.t_end if isfinite(self.t_end) else 0.0)
-        while self._segments[-1].t_stop[0] < end_time:
-            if self.open_end is not None:
-                self._extend()
-            elif self._approached is not None:
-                last = self._segments[-1]
-                longer = toward_equilibrium(self.problem.functions, *self._approached, end_time - last.t_start[0])
-                if not longer.duration > last.segment.duration:
-                    raise SolutionError(
-                        f"t = {end_time!r}: by then the body is closer to the equilibrium at "
-                        f"{self.problem.formulas.parameter} = {self._approached[1]!r} than doubles can tell"
-                    )
-                self._segments.pop()
-                self.add(longer, 1, "asymptote")
-            else:
-                break
-        if end_time > self.t_end:
-            raise InputError(f"t: the motion ends at {self.t_end!r} s ({self._end_text()}), got {end_time!r}")
+        while self.open_end is not None and self._segments[-1].t_stop[0] <= end_time:
+            self._extend()
+        if self._obstacle and self._segments[-1].t_stop[0] < end_time:
+            raise SolutionError(self._obstacle)
         return Trajectory(segments=tuple(self._segments))
 
-    def _first_passages(self, lam: float, low: float) -> list[float]:
-        while self._is_ahead(lam, low) and self._segments[-1].t_stop[0] < self.t_end:
-            if self.open_end is not None:
-                self._extend()
-            else:
-                self._trajectory(min(2.0 * self._segments[-1].t_stop[0], self.t_end))
-        return super()._first_passages(lam, low)
+    def _history(self) -> tuple[TimedSegment, ...]:
+        if isfinite(self._horizon):
+            return self._trajectory(self._horizon).segments
+        # One segment more shows whether the last of them leads to the end.
+        while self.open_end is not None and len(self._segments) <= self._segments_ahead():
+            self._extend()
+        count = self._segments_ahead()
+        return tuple(self._segments if count == inf else self._segments[: int(count)])
 
-    def _is_ahead(self, lam: float, low: float) -> bool:
+    def _segments_ahead(self) -> float:
+        """How many segments `legs` and `events` cover; infinite if there are not so many yet, or all lead to a pole."""
+        panels = 0
+        for k, timed in enumerate(self._segments if self._is_endless else ()):
+            panels += timed.segment.edges.size
+            if k + 1 == MAX_SEGMENTS_AHEAD or panels >= MAX_PANELS_AHEAD:
+                return k + 1
+        return inf
+
+    def _known_end(self) -> float:
+        return min(self._horizon, _end_time(self._segments))
+
+    def _check_end(self, t: float) -> None:
+        super()._check_end(t)
+        last = self._segments[-1]
+        if last.end == "asymptote" and t > last.t_stop[0]:
+            raise SolutionError(
+                f"t = {t!r}: by then the body is closer to the equilibrium at "
+                f"{self.problem.formulas.parameter} = {last.segment.b!r} than doubles can tell"
+            )
+
+    def _first_passages(self, lam: float, low: float) -> list[float]:
+        while self._is_ahead(lam) and self._segments[-1].t_stop[0] < self._horizon:
+            self._extend()
+        found = super()._first_passages(lam, low)
+        if self._obstacle and not found:
+            raise SolutionError(self._obstacle)
+        return found
+
+    def _is_ahead(self, lam: float) -> bool:
         """Whether the motion will come to a place beyond what has been computed of it."""
-        end, last = self.open_end, self._segments[-1].segment
-        if end is not None:
-            return (lam - end.place) * end.direction > 0.0 and (end.limit - lam) * end.direction > 0.0
-        if self._approached is None or (last.b - lam) * last.direction <= 0.0:
-            return False
-        return bool(last.phase_angle_of(*last.offsets(lam, low)) > last.edges[-1])
+        end = self.open_end
+        return end is not None and (lam - end.place) * end.direction > 0.0 and (end.limit - lam) * end.direction > 0.0
+
+    def _shown_time(self) -> float:
+        last = self._segments[self._segments_at_first - 1]
+        if last.end != "asymptote":
+            return last.t_stop[0]
+        return last.t_start[0] + float(last.segment.times(np.array([SHOWN_PHASE]))[0])
 
     @budget("motion", 60.0, "give a shorter t_max, or ask for earlier times")
     def _extend(self) -> None:
         """Append one more segment of a motion to infinity or to a pole."""
         end, problem = self.open_end, self.problem
         assert end is not None
-        f, lam0 = problem.functions, problem.lam0
+        f, lam0, name = problem.functions, problem.lam0, problem.formulas.parameter
         target = end.target
         if abs(target - end.place) <= MIN_STEP_SHARE * max(abs(end.place), abs(lam0)):
             self._end_here()
             return
         if abs(target) > MAX_PARAMETER * max(1.0, abs(lam0)):
-            raise SolutionError(
-                f"the motion leaves the range of doubles at {problem.formulas.parameter} = {end.place!r}; "
-                "give a shorter t_max"
-            )
+            self._stop_following(f"the motion leaves the range of doubles at {name} = {end.place!r}")
+            return
         begin, length = abs(end.place - lam0), abs(target - lam0)
         found = first_zero_from(f.addresses, f.p, lam0, problem.w0, end.direction, begin, length, end.step)
         (what, near, _), _ = search_beyond_barriers(problem, end.direction, found, length, end.step)
-        if what != zeros.LIMIT:
-            raise SolutionError(
-                f"the motion beyond {problem.formulas.parameter} = {lam0 + near!r} could not be followed; "
-                "give a domain that ends there"
-            )
+        if what == zeros.STEPS_SPENT and abs(near) > begin:
+            target = lam0 + near  # as far as one search goes; the next one begins there
+        elif what != zeros.LIMIT:
+            self._stop_following(f"the motion beyond {name} = {lam0 + near!r} could not be followed")
+            return
         segment = through(f, end.place, target, lam0, problem.w0)
         if self._segments and (
             segment.duration <= NEGLIGIBLE_SHARE * self._segments[-1].t_stop[0]
@@ -209,12 +249,17 @@ class AperiodicMotion(Motion):
             self._end_here()  # the motion along a spiral has come to its centre
             return
         self.add(segment, 1, "")
-        end.place, end.step = target, 2.0 * end.step
+        end.place = target
+        if segment.edges.size <= MAX_PANELS_TO_DOUBLE:
+            end.step *= 2.0
+
+    def _stop_following(self, why: str) -> None:
+        """Compute no more of a motion to infinity."""
+        self.open_end, self._obstacle = None, f"{why}; give a shorter t_max, or a domain that ends there"
 
     def _end_here(self) -> None:
         """End the motion at a singular point: the rest of it takes no time, and has no length, within rounding."""
         self._segments[-1] = replace(self._segments[-1], end="singular-point")
-        self.t_end = min(self.t_end, self._segments[-1].t_stop[0])
         self.open_end = None
 
     def _time_error(self, t: Array) -> Array:
@@ -227,8 +272,16 @@ class AperiodicMotion(Motion):
         return before
 
     def _end_text(self) -> str:
-        end = self._segments[-1].end
-        return f"{end} at {self.problem.formulas.parameter} = {self.legs[-1].lam_end!r}" if self.t_end < inf else end
+        last = self._segments[-1]
+        if last.t_stop[0] > self._horizon:
+            return super()._end_text()
+        place = float(self._places_at(last, [(last.t_stop, last.phi_stop)])[0])
+        return f"{last.end} at {self.problem.formulas.parameter} = {place!r}"
+
+
+def _end_time(segments: Sequence[TimedSegment]) -> float:
+    """The time in s at which the last of these segments ends the motion; infinite if it does not."""
+    return segments[-1].t_stop[0] if segments[-1].end not in ("", "asymptote") else inf
 
 
 class MotionAtRest(Motion):
@@ -236,21 +289,46 @@ class MotionAtRest(Motion):
 
     def __init__(self, problem: Problem) -> None:
         super().__init__(problem, "rest", problem.launch.direction)
+        self._lifts_off = _is_pulled(problem)
+        if self._lifts_off:
+            self.kind = "transit"
 
     def _phase_points(self, t: Array, t_low: Array) -> PhasePoints:
         return PhasePoints((), np.ones(t.shape, dtype=bool), np.zeros_like(t), self._trajectory(0.0))
 
     def _trajectory(self, end_time: float) -> Trajectory:
-        return Trajectory(segments=(), period=ZERO)
+        return Trajectory(segments=(), period=None if self._lifts_off else ZERO)
+
+    def _known_end(self) -> float:
+        return 0.0 if self._lifts_off else super()._known_end()
 
     def _time_error(self, t: Array) -> Array:
         return np.zeros_like(t)
 
     @property
+    def legs(self) -> tuple[Leg, ...]:
+        """None, or one of no length if contact is lost at once."""
+        lam0 = self.problem.lam0
+        return Rows([Leg(lam0, lam0, 0.0, 0.0, self.direction, "liftoff")] if self._lifts_off else [])
+
+    @property
     def events(self) -> tuple[Event, ...]:
-        """The one event "rest", at the launch."""
+        """The one event at the launch: "rest", or "liftoff" if the track would have to pull the body."""
         state = self.state(0.0)
-        return Rows([Event("rest", 0.0, state.lam, state.x, state.z)])
+        return Rows([Event("liftoff" if self._lifts_off else "rest", 0.0, state.lam, state.x, state.z)])
+
+    def _events_along(self, segments: Sequence[TimedSegment], until: float = inf) -> list[Event]:
+        return list(self.events)
+
+    def _end_text(self) -> str:
+        return f"liftoff at {self.problem.formulas.parameter} = {self.problem.lam0!r}"
 
     def _extent_text(self) -> str:
-        return f"it rests at {self.problem.lam0!r}"
+        return f"it {'lifts off' if self._lifts_off else 'rests'} at {self.problem.lam0!r}"
+
+
+def _is_pulled(problem: Problem) -> bool:
+    """Whether a track that can push from one side only would have to pull a body at rest at the launch place."""
+    f, side = problem.functions, ONLY_SIGN[problem.launch.contact]
+    force = path_and_force_at(f.addresses, f.p, np.array([problem.lam0]), np.zeros(1))[4, 0]
+    return bool(side * force < 0.0)

@@ -2,6 +2,7 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import pairwise
 from math import inf, isfinite
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -17,6 +18,7 @@ from gqm_sym.runtime.launch.kinds import MotionKind
 from gqm_sym.runtime.launch.problem import Problem
 from gqm_sym.runtime.launch.speed import path_and_force_at
 from gqm_sym.runtime.motion.events import Event, Leg, contact_changes, corner_crossings, crossings, passages
+from gqm_sym.runtime.motion.locking import Lock, locked
 from gqm_sym.runtime.motion.rolling import slip_times
 from gqm_sym.runtime.motion.rows import Rows
 from gqm_sym.runtime.motion.trajectory import PhasePoints, TimedSegment, Trajectory, locate
@@ -62,7 +64,7 @@ class State(NamedTuple):
 
 
 class Motion(ABC):
-    """A motion along a curve, computed as far as it is asked for.
+    """A motion along a curve, computed as far as it is asked for; many threads may ask at once.
 
     Attributes
     ----------
@@ -71,23 +73,20 @@ class Motion(ABC):
         infinity is a transit, and any motion with friction, drag or resistance that moves at all is dissipative.
     direction : int
         The sign of ds/dt after launch.
-    t_end : float
-        The time in s at which the motion ends; infinite if it does not.
     problem : Problem
         The launch and the module that it is of.
     """
 
     kind: MotionKind
     direction: int
-    t_end: float = inf
 
     def __init__(self, problem: Problem, kind: MotionKind, direction: int) -> None:
         self.problem = problem
         self.kind = kind
         self.direction = direction
+        self._lock = Lock()
         horizon = problem.launch.t_max
-        if horizon is not None:
-            self.t_end = horizon.value
+        self._horizon = inf if horizon is None else horizon.value
 
     if not TYPE_CHECKING:
         __getattr__ = renamed({"conditioning": "condition_number"}, "a motion")
@@ -114,6 +113,11 @@ class Motion(ABC):
         A launch from rest counts as a turning point at t = 0.
         """
         return ()
+
+    @property
+    def t_end(self) -> float:
+        """The time in s at which the motion ends, or the horizon ``t_max``; infinite if there is neither."""
+        return self._known_end()
 
     # -- periods ------------------------------------------------------------------------------
 
@@ -164,21 +168,24 @@ class Motion(ABC):
     # -- accuracy -----------------------------------------------------------------------------
 
     @property
+    @locked
     def quadrature_error(self) -> float:
         """Estimated relative error of a time of flight by quadrature, for the exact numbers of the launch."""
-        return max((timed.segment.relative_error for timed in self._trajectory(0.0).segments), default=0.0)
+        return max((timed.segment.relative_error for timed in self._history()), default=0.0)
 
     @property
+    @locked
     def condition_number(self) -> float:
         """The largest relative change of a time of flight per relative change of the numbers of the launch.
 
         It is a property of the problem. Near a separatrix it is large, and a launch of 16 digits then determines the
         motion to correspondingly fewer digits. From 100 on, the computation itself uses extended precision.
         """
-        return max((timed.segment.condition_number for timed in self._trajectory(0.0).segments), default=1.0)
+        return max((timed.segment.condition_number for timed in self._history()), default=1.0)
 
     # -- positions ----------------------------------------------------------------------------
 
+    @locked
     def lam(self, t: Any) -> Any:
         """The curve parameter at times (the inverse of the time of flight; MATHS, section 5).
 
@@ -204,6 +211,7 @@ class Motion(ABC):
         points = self._phase_points(times, low)
         return _shaped(self._places(points) + points.laps * points.trajectory.lap, shape)
 
+    @locked
     def state(self, t: Any) -> State:
         """Curve parameter, arc length, position, velocity, curvature and contact force at times.
 
@@ -235,6 +243,7 @@ class Motion(ABC):
         s = (s + points.laps * trajectory.lap_length) + self.problem.arc_origin
         return State(*(_shaped(array, shape) for array in (times, lam, s, x, z, v, v2, kappa, force, error)))
 
+    @locked
     def time_at(self, lam: Any) -> float:
         """The first time at which the body is at a place.
 
@@ -258,12 +267,13 @@ class Motion(ABC):
         if place.value == origin.value and place.low == origin.low:
             return 0.0
         times = self._first_passages(place.value, place.low)
-        times = [t for t in times if t <= self.t_end]
+        times = [t for t in times if t <= self._horizon]
         if not times:
             where = f"{self.problem.formulas.parameter} = {place.text}"
             raise SolutionError(f"time_at: the motion is never at {where}; {self._extent_text()}")
         return min(times)
 
+    @locked
     def error_bound(self, t: Any) -> Any:
         """A bound of the error of ``lam(t)``: the parts of quadrature and of inversion (paper, eq. 32), and rounding.
 
@@ -305,13 +315,14 @@ class Motion(ABC):
     # -- history ------------------------------------------------------------------------------
 
     @property
+    @locked
     def legs(self) -> tuple[Leg, ...]:
         """The legs of the motion in the order of time, over one period from launch if it is periodic.
 
         Returns
         -------
         tuple of Leg
-            A motion that goes on for ever is listed as far as it has been computed.
+            Of a motion that goes on for ever, those of its beginning; ``t_max`` says how far to go.
         """
         legs = []
         time_scale_error, lap = self._trajectory(0.0).time_scale_error, self._trajectory(0.0).lap
@@ -322,6 +333,8 @@ class Motion(ABC):
             for k, ((start, _), (stop, _)) in enumerate(pairwise(marks)):
                 end = timed.end if k == len(marks) - 2 else "corner"
                 legs.append(Leg(float(lam[k]), float(lam[k + 1]), start[0], stop[0], timed.direction, end))
+            if timed.end == "asymptote":
+                legs[-1] = replace(legs[-1], lam_end=timed.segment.b + timed.laps * lap, t_end=inf)
         return Rows(self._up_to_horizon(_merged(legs, self._internal_ends)))
 
     def _places_at(self, timed: TimedSegment, marks: Sequence[tuple[Pair, float]]) -> Array:
@@ -331,29 +344,39 @@ class Motion(ABC):
         return lam
 
     @property
+    @locked
     def events(self) -> tuple[Event, ...]:
         """The events of the motion in the order of time, over one period from launch if it is periodic.
 
         Returns
         -------
         tuple of Event
-            For a periodic motion, `events_between` gives those of other periods.
+            For a periodic motion, `events_between` gives those of other periods; of any other motion that goes on for
+            ever these are the events of its beginning.
         """
-        found = []
-        trajectory = self._trajectory(0.0)
-        for timed in self._history():
-            found_here = [("contact-sign", *m) for m in self._contact_changes(timed)]
-            found_here += [("corner", *m) for m in corner_crossings(timed, trajectory.time_scale_error)]
-            found_here += [("slip", *m) for m in slip_times(self.problem, timed, trajectory.time_scale_error)]
-            found += [self._event(kind, when, timed, phi) for kind, when, phi in sorted(found_here, key=lambda m: m[1])]
-            if timed.end not in ("", "horizon"):
-                found.append(self._event(timed.end, timed.t_stop, timed, timed.phi_stop))
-        if self.t_end < inf and not (found and found[-1].t == self.t_end):
-            found = [event for event in found if event.t < self.t_end]
-            state = self.state(self.t_end)
-            found.append(Event("horizon", self.t_end, state.lam, state.x, state.z))
-        return Rows(found)
+        return Rows(self._events_along(self._history()))
 
+    def _events_along(self, segments: Sequence[TimedSegment], until: float = inf) -> list[Event]:
+        """The events on timed segments from launch, and the horizon if it is not later than a time in s."""
+        found: list[Event] = []
+        time_scale_error = self._trajectory(0.0).time_scale_error
+        for timed in segments:
+            found_here = [("contact-sign", *m) for m in self._contact_changes(timed)]
+            found_here += [("corner", *m) for m in corner_crossings(timed, time_scale_error)]
+            found_here += [("slip", *m) for m in slip_times(self.problem, timed, time_scale_error)]
+            found += [self._event(kind, when, timed, phi) for kind, when, phi in sorted(found_here, key=lambda m: m[1])]
+            if timed.end == "asymptote":
+                found.append(self._asymptote(timed))
+            elif timed.end not in ("", "horizon"):
+                found.append(self._event(timed.end, timed.t_stop, timed, timed.phi_stop))
+        end = self._known_end()
+        if end < inf and end <= until and not (found and found[-1].t == end):
+            found = [event for event in found if event.t < end]
+            state = self.state(end)
+            found.append(Event("horizon", end, state.lam, state.x, state.z))
+        return found
+
+    @locked
     def events_between(self, t1: Any, t2: Any) -> tuple[Event, ...]:
         """The events from one time to another, over as many periods as that takes.
 
@@ -373,15 +396,17 @@ class Motion(ABC):
             If a time is not a number.
         """
         start, stop = read_number(t1, where="t1").value, read_number(t2, where="t2").value
-        return Rows(event for event in self.events if start <= event.t <= stop)
+        found = self._events_along(self._trajectory(min(stop, self._horizon)).segments, stop)
+        return Rows(event for event in found if start <= event.t <= stop)
 
     def _up_to_horizon(self, legs: list[Leg]) -> list[Leg]:
         """The legs up to the horizon, at which the last one is cut."""
-        out = [leg for leg in legs if leg.t_start < self.t_end or leg.t_end == self.t_end]
-        if out and (out[-1].t_end > self.t_end or out[-1].end == ""):
+        end = self._horizon
+        out = [leg for leg in legs if leg.t_start < end or leg.t_end == end]
+        if out and (out[-1].t_end > end or out[-1].end == ""):
             last = out.pop()
-            cut = last.t_end > self.t_end
-            place, when = (float(self.lam(self.t_end)), self.t_end) if cut else (last.lam_end, last.t_end)
+            cut = last.t_end > end
+            place, when = (float(self.lam(end)), end) if cut else (last.lam_end, last.t_end)
             out.append(Leg(last.lam_start, place, last.t_start, when, last.direction, "horizon"))
         return out
 
@@ -432,6 +457,10 @@ class Motion(ABC):
     def _repr_html_(self) -> str:
         return page(self)
 
+    def _shown_time(self) -> float:
+        """The time in s up to which a motion without an end is shown in pictures and tables."""
+        return max((leg.t_end for leg in self.legs if isfinite(leg.t_end)), default=1.0)
+
     # -- inside -------------------------------------------------------------------------------
 
     def _history(self) -> tuple[TimedSegment, ...]:
@@ -442,6 +471,12 @@ class Motion(ABC):
         """The times at which N changes sign on a timed segment, each with its phase angle."""
         return crossings(timed, contact_changes(timed.segment), self._trajectory(0.0).time_scale_error)
 
+    def _asymptote(self, timed: TimedSegment) -> Event:
+        """The approach to an equilibrium, which the body reaches after infinite time."""
+        f, lam = self.problem.functions, timed.segment.b
+        x, z = path_and_force_at(f.addresses, f.p, np.array([lam]), np.zeros(1))[:2, 0]
+        return Event("asymptote", inf, lam + timed.laps * self._trajectory(0.0).lap, float(x), float(z))
+
     def _event(self, kind: str, when: Pair, timed: TimedSegment, phi: float) -> Event:
         f = self.problem.functions
         lam = self._places_at(timed, [(when, phi)])
@@ -451,8 +486,8 @@ class Motion(ABC):
     def _times(self, t: Any) -> tuple[Array, Array, tuple[int, ...]]:
         times, low, shape = read_numbers(t, where="t")
         if times.size:
-            if np.isnan(times).any():
-                raise InputError("t: must be numbers, got NaN")
+            if not np.isfinite(times).all():
+                raise InputError("t: must be finite numbers, got NaN or an infinite one")
             self._check_end(float(times.max()))
             if times.min() < 0.0 and self._trajectory(0.0).period is None:
                 raise InputError(f"t: cannot be negative for a motion that does not repeat, got {float(times.min())!r}")
@@ -460,8 +495,14 @@ class Motion(ABC):
 
     def _check_end(self, t: float) -> None:
         """Refuse a time beyond the end of the motion."""
-        if t > self.t_end:
-            raise InputError(f"t: the motion ends at {self.t_end!r} s ({self._end_text()}), got {t!r}")
+        self._trajectory(min(t, self._horizon))
+        end = self._known_end()
+        if t > end:
+            raise InputError(f"t: the motion ends at {end!r} s ({self._end_text()}), got {t!r}")
+
+    def _known_end(self) -> float:
+        """The time in s at which the motion ends by what has been computed of it; infinite if that is not known."""
+        return self._horizon
 
     def _end_text(self) -> str:
         return "the horizon t_max"
@@ -506,7 +547,4 @@ def horizon(motion: "Motion") -> float:
         return motion.period
     if isfinite(motion.t_end):
         return motion.t_end
-    legs = motion.legs
-    if motion.kind == "rest" or not legs:
-        return 1.0
-    return max(leg.t_end for leg in legs if isfinite(leg.t_end))
+    return motion._shown_time()

@@ -13,6 +13,7 @@ from gqm_sym.runtime.launch.kinds import MotionKind
 from gqm_sym.runtime.launch.problem import Problem
 from gqm_sym.runtime.motion import timing
 from gqm_sym.runtime.motion.events import Event
+from gqm_sym.runtime.motion.locking import locked
 from gqm_sym.runtime.motion.motion import Motion, State
 from gqm_sym.runtime.motion.rows import Rows
 from gqm_sym.runtime.motion.sampler import Sampler, plain_time, plain_times
@@ -68,6 +69,7 @@ class PeriodicMotion(Motion):
         self._sampler: Sampler | None = None
 
     @property
+    @locked
     def turning_points(self) -> tuple[float, ...]:
         """The turning points of a libration in the order of time, each the double nearest to the exact one."""
         if self.kind != "libration":
@@ -93,11 +95,13 @@ class PeriodicMotion(Motion):
         return self._exact_timing
 
     @property
+    @locked
     def one_period(self) -> tuple[TimedSegment, ...]:
         """The timed segments of one period from launch."""
         return self._trajectory(0.0).segments
 
     @property
+    @locked
     def half_period(self) -> float:
         """Time in s from one turning point to the other, the double nearest to the exact one (libration only)."""
         if self.kind != "libration":
@@ -105,11 +109,13 @@ class PeriodicMotion(Motion):
         return self._timing.duration[0]
 
     @property
+    @locked
     def period(self) -> float:
         """Time in s after which the motion repeats, the double nearest to the exact one."""
         duration = self._timing.duration[0]
         return 2.0 * duration if self.kind == "libration" else duration
 
+    @locked
     def period_to(self, digits: int) -> str:
         """The period in s as a decimal string with that many correct digits (up to 1000); see `Motion.period_to`."""
         if self.problem.functions.exact is None:
@@ -152,12 +158,23 @@ class PeriodicMotion(Motion):
         sampler = self._sampler
         if sampler is not None and sampler.trajectory is self._precise_trajectory and end_time <= sampler.max_time:
             return sampler
+        return self._new_sampler_for(end_time)
+
+    @locked
+    def _new_sampler_for(self, end_time: float) -> Sampler | None:
+        """The sampler for times up to ``end_time``, made if there is none yet."""
+        sampler = self._sampler
         trajectory = self._trajectory(end_time)
         if sampler is None or sampler.trajectory is not trajectory:
             is_precise = trajectory is self._precise_trajectory
             times = self._timing if is_precise else timing.in_doubles(self.kind, self._segment, self._offsets)
             sampler = self._sampler = Sampler(
-                self.problem, trajectory, times.phase_time, self.direction, lambda: self._time_drift(trajectory)
+                self.problem,
+                trajectory,
+                times.phase_time,
+                self.direction,
+                lambda: self._time_drift(trajectory),
+                self._lock,
             )
         return sampler if end_time <= sampler.max_time else None
 
@@ -217,6 +234,7 @@ class PeriodicMotion(Motion):
         rounding = ULP if self.problem.formulas.chart is None else CHART_ROUNDING
         return float(launch[0]), segment.relative_error + rounding
 
+    @locked
     def events_between(self, t1: Any, t2: Any) -> tuple[Event, ...]:
         """The events from time t1 to t2 over as many periods as that takes; see `Motion.events_between`."""
         start, stop = read_number(t1, where="t1").value, read_number(t2, where="t2").value

@@ -11,6 +11,7 @@ from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.inversion import records
 from gqm_sym.runtime.inversion.fourier import fit_wave
 from gqm_sym.runtime.launch.problem import Problem
+from gqm_sym.runtime.motion.locking import Lock, locked
 from gqm_sym.runtime.motion.trajectory import Trajectory
 from gqm_sym.runtime.quadrature.substitution import TURN_TURN
 
@@ -51,7 +52,13 @@ class Sampler:
     """
 
     def __init__(
-        self, problem: Problem, trajectory: Trajectory, phase_time: Pair, direction: int, time_drift: Callable[[], Pair]
+        self,
+        problem: Problem,
+        trajectory: Trajectory,
+        phase_time: Pair,
+        direction: int,
+        time_drift: Callable[[], Pair],
+        lock: Lock,
     ) -> None:
         assert trajectory.period is not None
         segment = trajectory.segments[0].segment
@@ -75,7 +82,7 @@ class Sampler:
             self._sections[records.COSINES], self._sections[records.SINES] = series
         if not len(self._sections.get(records.COSINES, ())):
             self._tabulate()
-        self._place_record = records.record(self._sections)
+        self._place_record, self._lock = records.record(self._sections), lock
         self._state_record: Array | None = None
 
     def _tabulate(self) -> None:
@@ -85,6 +92,11 @@ class Sampler:
     @property
     def _record(self) -> Array:
         """The record for states, which holds more than that for places."""
+        return self._make_state_record() if self._state_record is None else self._state_record
+
+    @locked
+    def _make_state_record(self) -> Array:
+        """Make the record for states, unless another thread has made it meanwhile."""
         if self._state_record is None:
             self._tabulate()
             segment, panels, problem = self._segment, self._segment.panels, self._problem

@@ -2,7 +2,7 @@
 
 from copy import copy
 from dataclasses import dataclass, field
-from math import exp, inf, pi
+from math import exp, inf, log, pi
 from typing import Any
 
 import numpy as np
@@ -37,6 +37,12 @@ from gqm_sym.runtime.quadrature.time_panels import (
 # one turning point.
 MIN_WIDTH_SHARE = 1.0 / 32.0
 MIN_TIMED_WIDTH_SHARE = 2.0**-10
+
+# The distance from an equilibrium up to which an approach to it is computed, near the least that doubles know.
+NEAREST = 1e-300
+
+# Phase angles of such an approach at which panels begin: near its start, panels must be short.
+APPROACH_MARKS = (8.0, 16.0, 32.0, 64.0, 128.0, 256.0)
 
 
 @dataclass(slots=True, kw_only=True)
@@ -343,14 +349,11 @@ class Segment:
         return self._width_ratio
 
 
-def toward_equilibrium(functions: BoundFunctions, start: float, equilibrium: float, duration: float) -> Segment:
-    """A segment from ``start`` towards an equilibrium, so close to it that it takes more than ``duration`` in s."""
-    stop = 8.0
-    while True:
-        segment = Segment(functions=functions, kind=TO_EQUILIBRIUM, a=start, b=equilibrium, stop=stop)
-        if segment.duration > duration or exp(-stop) * abs(start - equilibrium) < 1e-300:
-            return segment
-        stop *= 2.0
+def toward_equilibrium(functions: BoundFunctions, start: float, equilibrium: float) -> Segment:
+    """A segment from ``start`` towards an equilibrium, as near to it as doubles can tell."""
+    stop = log(abs(start - equilibrium) / NEAREST)
+    marks = tuple(equilibrium + (start - equilibrium) * exp(-phi) for phi in APPROACH_MARKS)
+    return Segment(functions=functions, kind=TO_EQUILIBRIUM, a=start, b=equilibrium, stop=stop, panel_breaks=marks)
 
 
 def between_turns(

@@ -26,6 +26,7 @@ from gqm_sym.runtime.multiprecision.exact_problem import NOWHERE
 from gqm_sym.runtime.sweep import quantities, scalar
 from gqm_sym.runtime.sweep.batch.batches import answer_batches
 from gqm_sym.runtime.sweep.curve_table import NO_TABLE, CurveTable, tabulate
+from gqm_sym.runtime.sweep.dissipative_loop import MIN_BODIES_PER_THREAD, answer_driven, asked_of_bodies
 from gqm_sym.runtime.sweep.quantities import QUANTITIES, ROUTES, STATUS_SENTENCES, Answers, Quantity
 
 if TYPE_CHECKING:
@@ -167,10 +168,16 @@ def sweep(
         np.full(size, quantities.UNDECIDED, dtype=np.int8),
         np.full(size, quantities.BATCH, dtype=np.int8),
     )
-    if has_compiled_route(formulas, found, t_max, contact):
+    asked = asked_of_bodies(formulas, quantity, t_max, contact)
+    if asked is not None or has_compiled_route(formulas, found, t_max, contact):
         for group, chosen in _groups(formulas, columns, shape):
             some = answers if chosen is None else answers.part(chosen)
-            run_in_threads(partial(_answer, formulas, found, group, some), some.status.size, MIN_LAUNCHES_PER_THREAD)
+            if asked is not None:
+                curve = (group.chart, group.joints, group.corners)
+                work, least = partial(answer_driven, formulas, asked, curve, group.columns, some), MIN_BODIES_PER_THREAD
+            else:
+                work, least = partial(_answer, formulas, found, group, some), MIN_LAUNCHES_PER_THREAD
+            run_in_threads(work, some.status.size, least)
             if chosen is not None:
                 answers.put(chosen, some)
     values = answers.values[:, found.columns]
@@ -269,16 +276,17 @@ class Group(NamedTuple):
     ----------
     columns : list of arrays
         The launches, in the order of `strided`; each array has one number, or one for each launch.
-    chart, joints : arrays
+    chart, joints, corners : arrays
         What compiled code reads behind the parameters, and the places within one period at which the curve is not
-        smooth; both are empty for a curve with formulas.
+        smooth, and at which its tangent jumps; all are empty for a curve with formulas.
     table : CurveTable
-        The curve tabulated, where all launches have the same parameters.
+        The curve tabulated, where all launches have the same parameters and no energy is lost.
     """
 
     columns: list[Array]
     chart: Array = NOWHERE
     joints: Array = NOWHERE
+    corners: Array = NOWHERE
     table: CurveTable = NO_TABLE
 
 
@@ -293,6 +301,7 @@ def _groups(
         domain = [widen(value, shape) for value in _domain_columns(formulas, columns[4:])]
         yield Group([*columns[:4], *domain, *columns[4:]]), None
         return
+    mass = list(formulas.parameters).index("m")
     for values, chosen in _distinct(columns[4:], shape):
         try:
             chart = chart_with(formulas.chart, values)
@@ -300,8 +309,8 @@ def _groups(
             continue  # `solve` says why
         domain = [np.array(value) for value in (*chart.range, nan, nan, 0.0)]
         some = columns if chosen is None else [_chosen(column, shape, chosen) for column in columns]
-        table = _tabulated(formulas.chart, formulas.addresses, values, list(formulas.parameters).index("m"))
-        yield Group([*some[:4], *domain, *some[4:]], chart.block, chart.breaks, table), chosen
+        table = NO_TABLE if formulas.dissipation else _tabulated(formulas.chart, formulas.addresses, values, mass)
+        yield Group([*some[:4], *domain, *some[4:]], chart.block, chart.breaks, chart.corners, table), chosen
 
 
 @lru_cache(maxsize=8)
@@ -332,7 +341,7 @@ def _chosen(column: Array, shape: tuple[int, ...], chosen: NDArray[np.intp]) -> 
 
 def _answer(formulas: "Formulas", quantity: Quantity, group: Group, answers: Answers, part: slice) -> None:
     """Answer a part of a group of launches by compiled loops, as far as they decide them."""
-    columns, chart, joints, table = group
+    columns, chart, joints, table = group.columns, group.chart, group.joints, group.table
     code, batches = quantity.code, formulas.batch
     for begin in range(part.start, part.stop, CHUNK):
         chunk = slice(begin, min(begin + CHUNK, part.stop))

@@ -12,7 +12,7 @@ from mpmath import mp, mpf
 import generated.circle_coulomb
 import gqm_sym as gqm
 from gqm_sym.errors import InputError, LaunchError, SolutionError
-from gqm_sym.runtime.legs import follow, leg_run
+from gqm_sym.runtime.legs import answers, leg_record, leg_run
 
 G = 9.81
 Build = Callable[..., ModuleType]
@@ -187,18 +187,17 @@ def test_an_approach_has_a_last_digit(build: Build) -> None:
         motion.lam(3600.0)
 
 
-def test_an_approach_that_cannot_be_followed_back(slope: ModuleType, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Without a field there is nothing to read speeds off: refused, and no memory is read that is not there."""
-    followed = follow.follow
+def test_a_leg_that_cannot_be_followed(slope: ModuleType, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The error names the place up to which it was followed."""
 
-    def lost(*arguments: Any) -> Any:
-        found = list(followed(*arguments))
-        found[0], found[5] = leg_run.ASYMPTOTE, 0
-        return tuple(found)
+    def lost(*arguments: Any) -> int:
+        arguments[-1][leg_record.END] = 0.5
+        return leg_run.SPENT
 
-    monkeypatch.setattr(follow, "follow", lost)
-    with pytest.raises(SolutionError, match="could not be followed"):
-        slope.solve(lam0=0, mu=0.1).lam(1.0)
+    motion = slope.solve(lam0=0, mu=0.1)
+    monkeypatch.setattr(answers, "drive", lost)
+    with pytest.raises(SolutionError, match=r"V\*\*2 beyond x = 0\.5 could not be followed"):
+        motion.lam(10.0)
 
 
 def test_over_a_joint_and_back(build: Build) -> None:

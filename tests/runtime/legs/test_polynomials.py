@@ -14,7 +14,7 @@ import generated.cubic_coulomb as cubic_coulomb
 from gqm_sym.runtime.compiled.registers import LANES, copied, on_stack, over_rows, uncounted
 from gqm_sym.runtime.legs import dissipative
 from gqm_sym.runtime.legs.leg_panels import DECREASE, DEGREES, MAX_GROWTH, SAFETY_FACTOR, growth, growth_towards
-from gqm_sym.runtime.legs.leg_segments import INTEGRAL_BY_NODE, PLAIN_BY_NODE
+from gqm_sym.runtime.legs.leg_reading import INTEGRAL_BY_NODE, PLAIN_BY_NODE
 from gqm_sym.runtime.legs.polynomials import (
     COUNT,
     GRADED_MEANS,

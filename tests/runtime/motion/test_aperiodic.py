@@ -386,3 +386,105 @@ def test_a_fall_into_a_spiral_is_tabulated(generated_folder: Any) -> None:
         up = mp.quad(lambda q: 2 * q * slowness(turn - q * q), [0, mp.sqrt(turn - lam0)]).real
         assert off(motion.legs[0].t_end, up) <= TIME * up
         assert off(motion.t_end, 2 * up + down) <= TIME * down
+
+
+def answers(motion: Any) -> list[Any]:
+    """What a motion tells of itself without being asked about a time."""
+    return [motion.kind, motion.t_end, motion.turning_points, *motion.legs, *motion.events, motion.condition_number]
+
+
+@pytest.mark.parametrize("contact", ["bilateral", "above", "below"])
+@pytest.mark.parametrize(
+    ("track", "launch"),
+    [
+        ("waves", {"lam0": 0, "v0": 8, "direction": -1}),
+        ("waves", {"lam0": "pi/2", "v0": 2}),
+        ("waves", {"lam0": "pi/2", "v0": 0}),
+        ("waves", {"lam0": 0, "v0": "sqrt(2*981/100)"}),
+        ("waves", {"lam0": 0, "v0": 30, "t_max": 7}),
+        ("cubic", {"lam0": -1, "v0": 3}),
+        ("fall", {"lam0": 1}),
+        ("fall", {"lam0": 1, "v0": 1, "t_max": 10}),
+        ("fall", {"lam0": 1, "v0": 2}),
+    ],
+)
+def test_no_answer_depends_on_what_was_asked_before(
+    track: str, launch: dict[str, Any], contact: str, open_tracks: dict[str, ModuleType]
+) -> None:
+    """A motion tells the same of itself before and after it was followed far, and the same as one followed at once."""
+    asked, fresh = (open_tracks[track].solve(**launch, contact=contact) for _ in range(2))
+    before = answers(asked)
+    end = min(asked.t_end, 80.0)
+    if end > 0.0:
+        assert asked.state(end).t == end
+        if math.isinf(asked.t_end) and track == "waves" and asked.kind == "transit":
+            assert asked.time_at(asked.lam(end / 2)) == pytest.approx(end / 2, rel=1e-12)
+    assert answers(asked) == before
+    if end > 0.0:
+        fresh.state(end)
+    assert answers(fresh) == before
+    early, late = (
+        motion.events_between(0, min(end, 20.0))
+        for motion in (asked, open_tracks[track].solve(**launch, contact=contact))
+    )
+    assert early == late
+    assert (
+        early[: len(asked.events)] == tuple(event for event in asked.events if event.t <= min(end, 20.0))[: len(early)]
+    )
+
+
+@pytest.fixture(scope="module")
+def open_tracks(generated_folder: Any, module_of: ModuleOf) -> dict[str, ModuleType]:
+    """Tracks without ends: waves, a cubic, and a line through the centre of an attraction."""
+    waves = gqm.derive(gqm.Curve.graph("sin(x)", parameter="x"), gqm.Gravity())
+    fall = gqm.derive(gqm.Curve.graph("0*x", parameter="x"), gqm.CentralForce(k=1))
+    return {
+        "waves": gqm.build(waves, name="waves", folder=generated_folder),
+        "fall": gqm.build(fall, name="fall", folder=generated_folder),
+        "cubic": module_of("cubic"),
+    }
+
+
+def test_contact_lost_on_waves(open_tracks: dict[str, ModuleType]) -> None:
+    """Thrown along z = sin(x) at 8 m/s a body leaves where N = 0, before anything is asked of it."""
+    motion = open_tracks["waves"].solve("0", 8, -1, contact="above")
+    with mp.workdps(40):
+        n = lambda x: (64 - 2 * G * mp.sin(x)) * -mp.sin(x) + G * (1 + mp.cos(x) ** 2)  # noqa: E731
+        place = mp.findroot(n, (-3.5, -3.4))
+        assert off(motion.legs[-1].lam_end, place) <= 1e-13
+        rate = lambda x: mp.sqrt((1 + mp.cos(x) ** 2) / (64 - 2 * G * mp.sin(x)))  # noqa: E731
+        assert off(motion.t_end, mp.quad(rate, [place, -2, -1, 0])) <= TIME
+    assert [event.kind for event in motion.events] == ["liftoff"]
+    bilateral = open_tracks["waves"].solve("0", 8, -1)
+    assert len(bilateral.events_between(0, 5)) == 10
+    assert {event.kind for event in bilateral.events} == {"contact-sign"}
+
+
+def test_a_fall_into_a_centre_ends(open_tracks: dict[str, ModuleType]) -> None:
+    """From rest at distance 1 it takes pi/2**(3/2), which is known without the body being followed first."""
+    for launch in ({}, {"t_max": 10}):
+        motion = open_tracks["fall"].solve(1, **launch)
+        assert off(motion.t_end, mp.pi / mp.sqrt(8)) <= TIME * 2
+        assert [event.kind for event in motion.events] == ["singular-point"]
+
+
+@pytest.mark.parametrize(("place", "side"), [("pi/2", "below"), ("3*pi/2", "below"), ("-pi/2", "below")])
+def test_rest_on_the_wrong_side(place: str, side: str, open_tracks: dict[str, ModuleType]) -> None:
+    """A body released at an equilibrium under a track that cannot hold it falls off at once, as beside it."""
+    for lam0 in (place, f"{place} + 1/1000"):
+        motion = open_tracks["waves"].solve(lam0, contact=side)
+        assert (motion.kind, motion.t_end, motion.state(0).v) == ("transit", 0.0, 0.0)
+        assert [event.kind for event in motion.events] == [leg.end for leg in motion.legs] == ["liftoff"]
+        with pytest.raises(InputError, match="liftoff"):
+            motion.lam(1e-300)
+    assert open_tracks["waves"].solve(place, contact="above").kind == "rest"
+
+
+def test_rest_with_friction_on_the_wrong_side() -> None:
+    """Static friction does not hold a body that the track cannot hold."""
+    from generated import circle_coulomb
+
+    held = {"lam0": 0, "mu": "1/10"}
+    assert circle_coulomb.solve(**held, contact="above").kind == "rest"
+    motion = circle_coulomb.solve(**held, contact="below")
+    assert (motion.t_end, motion.events[0].kind) == (0.0, "liftoff")

@@ -1,0 +1,257 @@
+"""A body leg after leg: what it does after each of them, and what ends its motion."""
+
+from math import fabs, inf, isfinite
+from typing import NamedTuple
+
+from gqm_sym.runtime.arithmetic.doubledouble import add, two_sum
+from gqm_sym.runtime.compiled.jit import Inner
+from gqm_sym.runtime.compiled.types import Array
+from gqm_sym.runtime.launch.domain import DomainNumbers
+from gqm_sym.runtime.launch.ends import first_step
+from gqm_sym.runtime.launch.zeros import MAX_PARAMETER
+from gqm_sym.runtime.legs.body import (
+    CONTACT_SIGN,
+    DIRECTION,
+    ELAPSED,
+    ELAPSED_LOW,
+    ENDING,
+    FIRST_STEP,
+    FROM_REST,
+    HIGH,
+    LAM0,
+    LAPS,
+    LAST_LEG,
+    LEG_BEFORE,
+    LEG_TIME,
+    LOW,
+    MAY_REST,
+    NO_TURN_UNTIL,
+    ONLY_SIGN,
+    PAUSES,
+    PERIOD,
+    PLACE,
+    PLACE_LOW,
+    PREFERRED,
+    REACH,
+    STEP,
+    TURNS,
+    V2,
+)
+from gqm_sym.runtime.legs.follow import follow, released
+from gqm_sym.runtime.legs.leg_breaks import clearance
+from gqm_sym.runtime.legs.leg_record import (
+    AHEAD,
+    BACK,
+    BEGIN,
+    BEGIN_LOW,
+    END,
+    END_LOW,
+    HEADING,
+    LAPS_BEFORE,
+    START,
+    START_LOW,
+    TIME_FROM_END,
+    TIME_FROM_START,
+)
+from gqm_sym.runtime.legs.leg_run import ASYMPTOTE, FULL, LIFTOFF, LIMIT, NARROWED, PAUSED, SPENT, TURN, Route, Start
+
+# What became of a body that was to advance, beside the codes of `leg_run`; in place of TURN where it stays, and ENDING
+# has the same code where the motion ends. AT_ONCE: the track would have to pull it at once, so that it lifts off where
+# it is. LEAVES: it would leave the domain at once. BEYOND: it has left the range of doubles.
+RESTS, AT_ONCE, LEAVES, BEYOND = range(10, 14)
+
+# The first panel as a share of the first step of a search. The shorter it is, the more digits early times have.
+FIRST_PANEL_SHARE = 0.25
+
+# How many laps of a closed curve are followed in one run at most: so far its breaks are listed.
+LAPS_AHEAD = 8
+
+
+class Joints(NamedTuple):
+    """Where a curve is not smooth.
+
+    Attributes
+    ----------
+    breaks, corners : arrays
+        All such places, and those at which the tangent jumps, within one lap.
+    ahead : array
+        A buffer for the breaks ahead of a body; `room_ahead` says how long it must be.
+    """
+
+    breaks: Array
+    corners: Array
+    ahead: Array
+
+
+def room_ahead(breaks: int) -> int:
+    """How many breaks may lie ahead of a body on a curve with so many of them a lap."""
+    return (LAPS_AHEAD + 3) * breaks
+
+
+@Inner
+def breaks_before(joints, period, direction, begin, limit):  # type: ignore[no-untyped-def]
+    """The breaks strictly between two places, in the order in which they are passed from ``begin`` on."""
+    breaks, ahead, count = joints.breaks, joints.ahead, 0
+    low, high = min(begin, limit), max(begin, limit)
+    first, last = 0, 0
+    if period > 0.0 and breaks.size > 0:
+        first, last = int((low - breaks[-1]) // period), -int((breaks[0] - high) // period)
+    laps = last - first + 1
+    for i in range(laps):
+        lap = (first + i if direction > 0 else last - i) * period
+        for j in range(breaks.size):
+            place = breaks[j if direction > 0 else breaks.size - 1 - j] + lap
+            if low < place < high and count < ahead.size:
+                ahead[count] = place
+                count += 1
+    return ahead[:count]
+
+
+@Inner
+def is_break(breaks, period, place):  # type: ignore[no-untyped-def]
+    """Whether the curve is not smooth at a place."""
+    for known in breaks:
+        lap = period * round((place - known) / period) if period > 0.0 else 0.0
+        if known + lap == place:
+            return True
+    return False
+
+
+@Inner
+def leaving(dissipation, p, joints, body, place, preferred):  # type: ignore[no-untyped-def]
+    """The direction in which a body at rest leaves a place; 0 if it stays.
+
+    At a corner both planes decide; where it could slide down either of them, it takes the ``preferred`` direction.
+    """
+    off, period = 0.0, body[PERIOD]
+    if is_break(joints.breaks, period, place):
+        off = clearance(place, period if period > 0.0 else max(fabs(body[LOW]), fabs(body[HIGH])))
+    return released(dissipation.static_balance, p, place - off, place + off, preferred)[0]
+
+
+@Inner
+def launch(dissipation, p, joints, body):  # type: ignore[no-untyped-def]
+    """Set what a body begins with."""
+    lam0, period = body[LAM0], body[PERIOD]
+    step = first_step(DomainNumbers(body[LOW], body[HIGH], period, 0.0, 0.0))
+    preferred = int(body[PREFERRED])
+    body[PLACE], body[MAY_REST], body[FIRST_STEP], body[STEP] = lam0, 1.0, step, FIRST_PANEL_SHARE * step
+    body[REACH] = period if period > 0.0 else step
+    body[FROM_REST], body[DIRECTION] = 1.0 if body[V2] == 0.0 else 0.0, preferred
+    if body[V2] == 0.0:
+        body[DIRECTION] = leaving(dissipation, p, joints, body, lam0, preferred)
+
+
+@Inner
+def rests_between(dissipation, p, joints, body, place):  # type: ignore[no-untyped-def]
+    """Whether the body, which turns at a place, has come to rest on a corner there as far as times can tell.
+
+    Between two planes the times from turn to turn decrease geometrically, those in either direction by the same
+    factor. The body is at rest if the sum of all that follow is less than a rounding of the time.
+    """
+    before, last, now = body[LEG_BEFORE], body[LAST_LEG], body[ELAPSED]
+    this = body[LEG_TIME]
+    if joints.corners.size == 0 or not this < before:
+        return False
+    if now + this * (last + this) / (before - this) != now or not is_break(joints.breaks, body[PERIOD], place):
+        return False
+    return leaving(dissipation, p, joints, body, place, 0) == 0
+
+
+@Inner
+def fold(body):  # type: ignore[no-untyped-def]
+    """Count whole laps of a closed curve separately, so that places keep their digits."""
+    period = body[PERIOD]
+    if period > 0.0:
+        laps = float(int((body[PLACE] - body[LAM0]) / period))
+        body[PLACE], low = two_sum(body[PLACE], -laps * period)
+        body[PLACE_LOW] += low
+        body[LAPS] += laps
+
+
+@Inner
+def next_leg(dissipation, p, joints, body, record):  # type: ignore[no-untyped-def]
+    """Follow a body to its next turn, or as far as one run goes.
+
+    A body that the track would have to pull at once is followed a little way without contact, and AT_ONCE is in ENDING.
+    """
+    place, direction, period = body[PLACE], int(body[DIRECTION]), body[PERIOD]
+    end = body[HIGH] if direction > 0 else body[LOW]
+    limit = place + direction * LAPS_AHEAD * period if period > 0.0 else end
+    # Breaks a little behind show on which piece of the curve the body is.
+    breaks = breaks_before(joints, period, direction, place - direction * body[FIRST_STEP], limit)
+    record[START], record[START_LOW], record[LAPS_BEFORE] = place, body[PLACE_LOW], body[LAPS]
+    record[HEADING], record[BEGIN], record[BEGIN_LOW] = direction, body[ELAPSED], body[ELAPSED_LOW]
+    pause, only_sign, no_turn_until = inf if isfinite(end) else body[REACH], int(body[ONLY_SIGN]), body[NO_TURN_UNTIL]
+    while True:
+        start = Start(
+            *(place, body[PLACE_LOW], body[V2], direction, int(body[CONTACT_SIGN]), body[STEP], no_turn_until),
+        )
+        found = follow(dissipation, p, start, Route(breaks, limit, pause, only_sign), record)
+        if found.what != LIFTOFF or record[AHEAD] > 0.0:
+            return found
+        pause, only_sign, no_turn_until, body[ENDING] = 0.0, 0, inf, AT_ONCE
+
+
+@Inner
+def after_turn(dissipation, p, joints, body, found, record):  # type: ignore[no-untyped-def]
+    """Whether a body rests where V**2 has vanished, and what it remembers of a turn otherwise."""
+    place, low = record[END], record[END_LOW]
+    stays = found.direction == 0 or (place == body[PLACE] and low == body[PLACE_LOW] and body[V2] == 0.0)
+    rests = stays or rests_between(dissipation, p, joints, body, place)
+    body[LEG_BEFORE], body[LAST_LEG], body[LEG_TIME] = body[LAST_LEG], body[LEG_TIME], 0.0
+    body[TURNS] += 1.0
+    body[PAUSES], body[NO_TURN_UNTIL], body[MAY_REST] = 0.0, 0.0, 1.0 if found.could_stay else 0.0
+    return rests
+
+
+@Inner
+def advance(dissipation, p, joints, body, record):  # type: ignore[no-untyped-def]
+    """Take a body to its next turn, to the end of its motion, or as far as one run goes.
+
+    Parameters
+    ----------
+    dissipation : Dissipation
+        The module's compiled functions, and of what kind its forces are.
+    p : array
+        Run-time parameters.
+    joints : Joints
+    body : array
+        The line of the body (`legs.body`), which was launched; it is as before where the record is FULL.
+    record : array
+        Filled in (`leg_record`).
+
+    Returns
+    -------
+    int
+        RESTS if it comes to rest, one of the codes of `leg_run` for what ended the run, LEAVES or
+        BEYOND; SPENT if it could not be followed.
+    """
+    found, period = next_leg(dissipation, p, joints, body, record), body[PERIOD]
+    what, ahead, back, place = found.what, record[AHEAD] > 0.0, record[BACK] > 0.0, record[END]
+    if what == FULL or body[ENDING] == AT_ONCE:
+        return AT_ONCE if body[ENDING] == AT_ONCE else FULL
+    if what == LIMIT and not ahead:
+        return LEAVES
+    if what == SPENT or not (ahead or back) or (what == ASYMPTOTE and not back):
+        return SPENT
+    body[LEG_TIME] += record[TIME_FROM_START] + record[TIME_FROM_END]
+    elapsed, low = add(body[ELAPSED], body[ELAPSED_LOW], record[TIME_FROM_START], 0.0)
+    body[ELAPSED], body[ELAPSED_LOW] = add(elapsed, low, record[TIME_FROM_END], 0.0)
+    body[NO_TURN_UNTIL] = found.no_turn_until
+    if what == TURN:
+        what = RESTS if after_turn(dissipation, p, joints, body, found, record) else TURN
+    else:
+        endless = what == PAUSED and period == 0.0 and not isfinite(body[HIGH] if body[DIRECTION] > 0.0 else body[LOW])
+        body[PAUSES] = body[PAUSES] + 1.0 if endless else 0.0
+    body[PLACE], body[PLACE_LOW], body[V2], body[DIRECTION] = place, record[END_LOW], found.v2, found.direction
+    body[CONTACT_SIGN], body[STEP] = found.contact_sign, found.step
+    if what in (RESTS, NARROWED, LIFTOFF, ASYMPTOTE) or (what == LIMIT and period == 0.0):
+        body[ENDING] = what
+        return what
+    fold(body)
+    if fabs(body[PLACE]) > MAX_PARAMETER and fabs(body[PLACE]) > MAX_PARAMETER * fabs(body[LAM0]):
+        return BEYOND
+    if what == PAUSED and period == 0.0:
+        body[REACH] *= 2.0
+    return what

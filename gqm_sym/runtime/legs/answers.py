@@ -1,0 +1,195 @@
+"""Bodies driven along the curve by compiled code: one leg of one body, or one number for the motion of each of many."""
+
+from math import inf, isfinite
+from typing import NamedTuple
+
+import numpy as np
+from numba import types
+
+from gqm_sym.runtime.compiled.jit import Inner, entry
+from gqm_sym.runtime.compiled.registers import uncounted
+from gqm_sym.runtime.compiled.types import INTEGER, MATRIX, VECTOR
+from gqm_sym.runtime.interface import Dissipation
+from gqm_sym.runtime.legs.advance import AT_ONCE, BEYOND, LEAVES, RESTS, Joints, advance, launch
+from gqm_sym.runtime.legs.body import (
+    DIRECTION,
+    ELAPSED,
+    ENDING,
+    FROM_REST,
+    HORIZON,
+    LAM0,
+    LAPS,
+    MAY_REST,
+    ONLY_SIGN,
+    PAUSES,
+    PERIOD,
+    PLACE,
+    STATUS,
+    STEP,
+    TARGET,
+    TURNS,
+    VALUE,
+)
+from gqm_sym.runtime.legs.leg_equation import Forces
+from gqm_sym.runtime.legs.leg_reading import passage, peak_of_leg
+from gqm_sym.runtime.legs.leg_record import BEGIN, BEGIN_LOW, LAPS_BEFORE
+from gqm_sym.runtime.legs.leg_run import ASYMPTOTE, FULL, SPENT, point_buffer, slope_of_v2
+
+# What is asked of each body; LEG is to advance by one leg.
+LEG, END_TIME, REST_PLACE, ARRIVAL, LEAST_SPEED, MOST_SPEED, LEAST_LOAD, MOST_LOAD = range(8)
+
+# Whether there is an answer: LEFT is the status of a body that the loop does not decide.
+FOUND, LEFT, NONE = range(3)
+
+# On a curve without ends, after how many runs in a row without a turn no end is looked for any more.
+MAX_PAUSES = 12
+
+# The number of turns after which the place where the body comes to rest is not looked for any more.
+MAX_TURNS = 20000
+
+# The most legs of one body.
+MAX_LEGS = 250_000
+
+_FLAGS = (types.boolean, types.boolean, types.boolean)
+DISSIPATION = types.NamedTuple((INTEGER, INTEGER, *_FLAGS), Dissipation)
+JOINTS = types.NamedUniTuple(VECTOR, 3, Joints)
+
+
+class Sight(NamedTuple):
+    """What was seen of a motion so far.
+
+    Attributes
+    ----------
+    arrival : float
+        The time of the first arrival at the target; infinite so far.
+    peak : float
+        The largest of what is asked for, or minus the smallest.
+    """
+
+    arrival: float
+    peak: float
+
+
+@Inner
+def goes_on(body, question, arrival):  # type: ignore[no-untyped-def]
+    """Whether the next leg has to be seen too."""
+    if body[ENDING] != 0.0 or arrival < inf:
+        return False
+    if isfinite(body[HORIZON]):
+        return body[ELAPSED] < body[HORIZON]
+    if question == ARRIVAL:
+        # A body that turns at two points reaches no place outside of them any more.
+        return body[TURNS] < (1.0 if body[FROM_REST] else 2.0)
+    return body[PAUSES] < MAX_PAUSES and not (body[TURNS] > 0.0 and (body[MAY_REST] == 0.0 or body[TURNS] > MAX_TURNS))
+
+
+@Inner
+def seen_on_leg(body, question, sight, record):  # type: ignore[no-untyped-def]
+    """What is seen when one more leg has been run."""
+    begin, low = record[BEGIN], record[BEGIN_LOW]
+    if question == ARRIVAL and body[ENDING] != AT_ONCE:
+        spent = passage(record, body[TARGET] - record[LAPS_BEFORE] * body[PERIOD])
+        return Sight(begin + (low + spent), sight.peak)
+    if question >= LEAST_SPEED:
+        until = 0.0 if body[ENDING] == AT_ONCE else (body[HORIZON] - begin) - low
+        asked = (question >= LEAST_LOAD, 1.0 if question in (MOST_SPEED, MOST_LOAD) else -1.0)
+        return Sight(sight.arrival, peak_of_leg(record, until, asked, sight.peak))
+    return sight
+
+
+@Inner
+def at_rest(dissipation, p, body, question):  # type: ignore[no-untyped-def]
+    """The answer for a body that stays where it is, and its status."""
+    if body[ONLY_SIGN] != 0.0:
+        return np.nan, LEFT
+    if question == END_TIME:
+        return (body[HORIZON], FOUND) if isfinite(body[HORIZON]) else (np.nan, NONE)
+    if question == REST_PLACE:
+        return body[LAM0], FOUND
+    if question == ARRIVAL:
+        return (0.0, FOUND) if body[TARGET] == body[LAM0] else (np.nan, NONE)
+    if question < LEAST_LOAD:
+        return 0.0, FOUND
+    point = point_buffer()
+    slope_of_v2(Forces(dissipation.speed_equation, p, False, False, True, 1), body[LAM0], 0.0, 0, point)
+    return point[5], FOUND
+
+
+@Inner
+def conclude(body, question, sight):  # type: ignore[no-untyped-def]
+    """The answer for a body that has been seen long enough, and its status."""
+    ends = body[ENDING] != 0.0 and body[ENDING] != ASYMPTOTE
+    end = min(body[HORIZON], body[ELAPSED] if ends else inf)
+    if question == ARRIVAL:
+        return (sight.arrival, FOUND) if sight.arrival <= end and sight.arrival < inf else (np.nan, NONE)
+    if not isfinite(end):
+        return np.nan, NONE
+    if question == END_TIME:
+        return end, FOUND
+    if question == REST_PLACE:
+        rests = body[ENDING] == RESTS and body[ELAPSED] <= body[HORIZON]
+        return (body[PLACE] + body[LAPS] * body[PERIOD], FOUND) if rests else (np.nan, NONE)
+    if body[ENDING] == ASYMPTOTE:
+        return np.nan, LEFT
+    return sight.peak if question in (MOST_SPEED, MOST_LOAD) else -sight.peak, FOUND
+
+
+@Inner
+def answer(dissipation, p, joints, question, body, record):  # type: ignore[no-untyped-def]
+    """The number that is asked for of one body, and its status."""
+    sight = Sight(inf, -inf)
+    for _ in range(MAX_LEGS):
+        what = advance(dissipation, p, joints, body, record)
+        if what in (FULL, SPENT, LEAVES, BEYOND):
+            break
+        if question == ARRIVAL and body[TARGET] == body[LAM0]:
+            return 0.0, FOUND
+        sight = seen_on_leg(body, question, sight, record)
+        if sight.arrival != sight.arrival:
+            break
+        if not goes_on(body, question, sight.arrival):
+            return conclude(body, question, sight)
+    return np.nan, LEFT
+
+
+@entry(
+    INTEGER(DISSIPATION, MATRIX, JOINTS, INTEGER, MATRIX, VECTOR),
+    nogil=True,
+    checked=False,
+)
+def drive(dissipation, parameters, joints, question, bodies, record):  # type: ignore[no-untyped-def]
+    """Drive bodies along the curve, each until a question about its motion is answered.
+
+    Parameters
+    ----------
+    dissipation : Dissipation
+        The module's compiled functions, and of what kind its forces are.
+    parameters : array
+        A row of run-time parameters for each body, or one for all of them.
+    joints : Joints
+    question : int
+        LEG to MOST_LOAD. The answer to all but LEG is in VALUE and STATUS of the body; LEAST_LOAD and MOST_LOAD mean
+        the contact force per mass.
+    bodies : (n, SIZE) array
+        The bodies (`legs.body`), which are moved on.
+    record : array
+        Filled in with the last leg of the last body (`leg_record`).
+
+    Returns
+    -------
+    int
+        What became of the last body on its leg (`advance`).
+    """
+    joints = Joints(uncounted(joints.breaks), uncounted(joints.corners), uncounted(joints.ahead))
+    parameters, bodies, record, what = uncounted(parameters), uncounted(bodies), uncounted(record), RESTS
+    for k in range(bodies.shape[0]):
+        p, body = parameters[k if parameters.shape[0] > 1 else 0], bodies[k]
+        if body[STEP] == 0.0:
+            launch(dissipation, p, joints, body)
+        if question == LEG:
+            what = advance(dissipation, p, joints, body, record) if body[DIRECTION] != 0.0 else RESTS
+        elif body[DIRECTION] != 0.0:
+            body[VALUE], body[STATUS] = answer(dissipation, p, joints, question, body, record)
+        else:
+            body[VALUE], body[STATUS] = at_rest(dissipation, p, body, question)
+    return what

@@ -1,0 +1,65 @@
+"""A body on its way along the curve: one line of numbers that compiled code reads and rewrites leg after leg.
+
+===================== ===========================================================================================
+number                meaning
+===================== ===========================================================================================
+LAM0                  the launch place
+LOW, HIGH, PERIOD     the range of the curve parameter; the period is 0 on an open curve
+PREFERRED             the direction of the launch, which a body released on a ridge takes
+ONLY_SIGN             the only sign that N can have; 0 if it can have both
+HORIZON               the time at which the motion ends at the latest, infinite if there is none
+TARGET                the place whose time of arrival is asked for
+V2                    V**2 where the body is
+===================== ===========================================================================================
+
+These are set by who launches the body, as `launched` does it; all other numbers are zero until its first leg.
+
+===================== ===========================================================================================
+number                meaning
+===================== ===========================================================================================
+PLACE, PLACE_LOW      the place, as two doubles, within one lap
+LAPS                  the whole laps before it
+DIRECTION             the sign of dlam/dt of the next leg; 0 if the body stays where it is
+CONTACT_SIGN, STEP,   as of `leg_run.Start`
+NO_TURN_UNTIL
+FIRST_STEP            the step of a search along the curve (`launch.ends.first_step`)
+REACH                 on a curve without ends, the distance after which a run pauses
+ELAPSED, ELAPSED_LOW  the time from launch, as two doubles
+LEG_TIME              the time since the last turn
+LAST_LEG, LEG_BEFORE  the times of the last leg from turn to turn, and of the one before it; 0 if there was none
+TURNS, PAUSES         how often the body has turned, and how many runs in a row have paused since
+MAY_REST              whether the body could stay at its last turn, were the curve less steep; 1 before the first turn
+FROM_REST             1 if the launch was from rest
+ENDING                the code of what has ended the motion (`advance`), or 0
+VALUE, STATUS         the quantity that was asked for, and whether it has a value (`answers`)
+===================== ===========================================================================================
+"""
+
+import numpy as np
+
+from gqm_sym.runtime.compiled.types import Array
+
+LAM0, LOW, HIGH, PERIOD, PREFERRED, ONLY_SIGN, HORIZON, TARGET, V2 = range(9)
+PLACE, PLACE_LOW, LAPS, DIRECTION, CONTACT_SIGN, STEP, NO_TURN_UNTIL, FIRST_STEP, REACH = range(9, 18)
+ELAPSED, ELAPSED_LOW, LEG_TIME, LAST_LEG, LEG_BEFORE, TURNS, PAUSES, MAY_REST = range(18, 26)
+FROM_REST, ENDING, VALUE, STATUS, SIZE = range(26, 31)
+
+
+def launched(count: int, *given: float | Array) -> Array:
+    """Bodies at their launch.
+
+    Parameters
+    ----------
+    count : int
+        The number of bodies.
+    *given : float or array
+        LAM0 to V2, one number for all bodies or an array.
+
+    Returns
+    -------
+    (count, SIZE) array
+    """
+    bodies = np.zeros((count, SIZE))
+    for column, values in enumerate(given):
+        bodies[:, column] = values
+    return bodies

@@ -1,0 +1,237 @@
+"""What the record of a leg says: the time at a place, the place at a time, and the largest speed or contact force."""
+
+from math import fabs, inf, sqrt
+
+import numpy as np
+
+from gqm_sym.runtime.arithmetic.clenshaw import chebyshev_sum, legendre_sum
+from gqm_sym.runtime.arithmetic.matrices import multiply
+from gqm_sym.runtime.compiled.jit import Inner
+from gqm_sym.runtime.compiled.registers import on_stack
+from gqm_sym.runtime.compiled.types import Array
+from gqm_sym.runtime.legs.leg_breaks import offset
+from gqm_sym.runtime.legs.leg_equation import March, marched
+from gqm_sym.runtime.legs.leg_record import (
+    AHEAD,
+    BACK,
+    COLUMNS,
+    END,
+    END_LOW,
+    HALF_C,
+    HEAD,
+    HEADING,
+    MIDDLE,
+    MIDDLE_LOW,
+    NORMAL_LOAD,
+    RIGHT,
+    START,
+    START_LOW,
+    TIME,
+    TIME_FROM_END,
+    TIME_FROM_START,
+    Y_ROW,
+)
+from gqm_sym.runtime.legs.polynomials import COUNT, SHARES, TO_COEFFICIENTS, WIDE, to_coefficients
+
+
+def _to_legendre() -> tuple[Array, Array]:
+    """Legendre coefficients of a function on [-1, 1], and of its integral from -1, from values at a panel's nodes."""
+    # x P_j = ((j + 1) P_(j+1) + j P_(j-1))/(2 j + 1), and T_(k+1) = 2 x T_k - T_(k-1).
+    j = np.arange(WIDE + 1)
+    series = np.zeros((COUNT, WIDE + 1))
+    series[0, 0] = series[1, 1] = 1.0
+    for k in range(2, COUNT):
+        row = series[k - 1]
+        series[k, 1:] += 2.0 * (j[1:] / (2 * j[1:] - 1)) * row[:-1]
+        series[k, :-1] += 2.0 * (j[1:] / (2 * j[1:] + 1)) * row[1:]
+        series[k] -= series[k - 2]
+    plain = TO_COEFFICIENTS.T @ series
+    integral = np.zeros((COUNT, WIDE))
+    integral[:, 0] = plain[:, 0] - plain[:, 1] / 3.0
+    i = np.arange(1, WIDE)
+    integral[:, 1:] = plain[:, i - 1] / (2 * i - 1) - plain[:, i + 1] / (2 * i + 3)
+    return np.ascontiguousarray(plain[:, :WIDE]), integral
+
+
+PLAIN_BY_NODE, INTEGRAL_BY_NODE = _to_legendre()
+to_plain, to_integral = multiply(PLAIN_BY_NODE), multiply(INTEGRAL_BY_NODE)
+
+# Values at a panel's nodes, and two series.
+terms_buffer, sample_buffer = on_stack(2 * WIDE), on_stack(2 * WIDE)
+
+# The most steps of a search within a panel, and the part of it that is not searched any more.
+MAX_STEPS, LAST_STEP = 60, 4e-16
+
+# An extreme is searched to this part of a panel, because the function is flat there.
+FLAT_PART = 1e-9
+
+
+@Inner
+def edge(record, begin, k):  # type: ignore[no-untyped-def]
+    """The march variable where the k-th of some panels begins, the first of which stands at ``begin``."""
+    return record[begin + (k - 1) * COLUMNS + RIGHT] if k > 0 else 0.0
+
+
+@Inner
+def time_to(record, begin, count, w):  # type: ignore[no-untyped-def]
+    """The time from where ``count`` panels begin to a march variable on one of them."""
+    terms, time, k = terms_buffer(), 0.0, 0
+    while k < count - 1 and record[begin + k * COLUMNS + RIGHT] <= w:
+        time += record[begin + k * COLUMNS + TIME]
+        k += 1
+    left, right = edge(record, begin, k), record[begin + k * COLUMNS + RIGHT]
+    if w >= right:
+        return time + record[begin + k * COLUMNS + TIME]
+    to_integral(record, begin + k * COLUMNS, terms, 0)
+    return time + 0.5 * (right - left) * legendre_sum(terms[:WIDE], 2.0 * (w - left) / (right - left) - 1.0)
+
+
+@Inner
+def marched_in(record, begin, count, time):  # type: ignore[no-untyped-def]
+    """The march variable at a time from where ``count`` panels begin: the inverse of `time_to`."""
+    terms, k = terms_buffer(), 0
+    while k < count - 1 and record[begin + k * COLUMNS + TIME] <= time:
+        time -= record[begin + k * COLUMNS + TIME]
+        k += 1
+    at = begin + k * COLUMNS
+    half = 0.5 * (record[at + RIGHT] - edge(record, begin, k))
+    to_integral(record, at, terms, 0)
+    to_plain(record, at, terms, WIDE)
+    lo, hi, share = -1.0, 1.0, time / record[at + TIME]
+    x = min(max(2.0 * share - 1.0, -1.0), 1.0)
+    for _ in range(MAX_STEPS):
+        late = half * legendre_sum(terms[:WIDE], x) - time
+        lo, hi = (lo, x) if late > 0.0 else (x, hi)
+        new = x - late / (half * legendre_sum(terms[WIDE:], x))
+        if not lo <= new <= hi:
+            new = 0.5 * (lo + hi)
+        if fabs(new - x) <= LAST_STEP:
+            break
+        x = new
+    return edge(record, begin, k) + half * (1.0 + x)
+
+
+@Inner
+def march_of(record):  # type: ignore[no-untyped-def]
+    """The march variable of the panels from a leg's start."""
+    half_c, start, v = record[HALF_C], (record[START], record[START_LOW]), int(record[HEADING])
+    return March(start, v, 1.0, 2.0 * half_c) if half_c < inf else March(start, v, 0.0, 1.0)
+
+
+@Inner
+def passage(record, place):  # type: ignore[no-untyped-def]
+    """The time from a leg's start at which the body passes a place; inf if it does not, NaN if the record has none."""
+    ahead, back, march = int(record[AHEAD]), int(record[BACK]), march_of(record)
+    v, gone = march.direction, offset(place, march.origin, march.direction)
+    left = 0.0 if place == record[END] else -offset(place, (record[END], record[END_LOW]), v)
+    if gone <= 0.0 or left < 0.0:
+        return inf
+    if offset(place, (record[MIDDLE], record[MIDDLE_LOW]), v) <= 0.0 and ahead > 0:
+        return time_to(record, HEAD, ahead, marched(gone, march))
+    if back == 0 or record[TIME_FROM_END] == 0.0:
+        return np.nan
+    from_end = time_to(record, HEAD + ahead * COLUMNS, back, sqrt(left))
+    return record[TIME_FROM_START] + (record[TIME_FROM_END] - from_end)
+
+
+@Inner
+def peak(terms, lo, hi, sign):  # type: ignore[no-untyped-def]
+    """The largest value of ``sign`` times a Chebyshev series between two places on either side of its peak."""
+    third = (hi - lo) / 3.0
+    best, x, step = -inf, 0.5 * (lo + hi), third
+    for _ in range(MAX_STEPS):
+        f0, f1, f2 = (
+            sign * chebyshev_sum(terms, x - step),
+            sign * chebyshev_sum(terms, x),
+            sign * chebyshev_sum(terms, x + step),
+        )
+        best = max(best, f1)
+        bend = f0 - 2.0 * f1 + f2
+        move = min(max(0.5 * step * (f0 - f2) / bend, -step), step) if bend < 0.0 else (step if f2 > f0 else -step)
+        x = min(max(x + move, lo), hi)
+        if step <= FLAT_PART or (fabs(move) <= 1e-3 * step and step <= 1e-4):
+            break
+        step = max(min(0.5 * step, fabs(move)), 0.0625 * step)
+    return max(best, sign * chebyshev_sum(terms, x))
+
+
+@Inner
+def peak_of_panel(values, first, last, sign, best):  # type: ignore[no-untyped-def]
+    """The larger of ``best`` and the largest value of ``sign`` times a function on a part of a panel.
+
+    Parameters
+    ----------
+    values : array
+        The function at the panel's nodes, and room for its series.
+    first, last : float
+        The ends of the part, within [-1, 1].
+    """
+    top, bottom = -inf, inf
+    for j in range(COUNT):
+        top, bottom = max(top, sign * values[j]), min(bottom, sign * values[j])
+    # Between the nodes a polynomial exceeds them by less than their spread (`polynomials.LEBESGUE`).
+    if top + (top - bottom) <= best:
+        return best
+    to_coefficients(values, 0, values, WIDE)
+    terms = values[WIDE : WIDE + COUNT]
+    best = max(best, max(sign * chebyshev_sum(terms, first), sign * chebyshev_sum(terms, last)))
+    for j in range(COUNT):
+        before, after = sign * values[max(j - 1, 0)], sign * values[min(j + 1, COUNT - 1)]
+        here, x = sign * values[j], 2.0 * SHARES[j] - 1.0
+        if first < x < last:
+            best = max(best, here)
+            if here >= before and here >= after and here + (top - bottom) > best:
+                lo = 2.0 * SHARES[j - 1] - 1.0 if j > 0 else -1.0
+                hi = 2.0 * SHARES[j + 1] - 1.0 if j < COUNT - 1 else 1.0
+                best = max(best, peak(terms, max(lo, first), min(hi, last), sign))
+    return best
+
+
+@Inner
+def peak_between(record, panels, half_c, between, asked, best):  # type: ignore[no-untyped-def]
+    """The larger of ``best`` and the peak of some panels between two values of the march variable.
+
+    Parameters
+    ----------
+    panels : (int, int)
+        Where the first of the panels stands, and their number.
+    half_c : float
+        c/2 of their march variable; infinite where that is the distance.
+    between : (float, float)
+    asked : (bool, float)
+        Whether the contact force per mass is asked for instead of the speed; 1 for the largest, -1 for the smallest.
+    """
+    (begin, count), (low, high), (force, sign) = panels, between, asked
+    values = sample_buffer()
+    if half_c == 0.0 and low == 0.0 and sign < 0.0 and not force:
+        return max(best, 0.0)  # the body is slowest where it turns
+    for k in range(count):
+        at, left = begin + k * COLUMNS, edge(record, begin, k)
+        width = record[at + RIGHT] - left
+        first, last = 2.0 * (low - left) / width - 1.0, 2.0 * (high - left) / width - 1.0
+        if first > 1.0 or last < -1.0:
+            continue
+        for j in range(COUNT):
+            growth = left + width * SHARES[j] + half_c if half_c < inf else 1.0
+            values[j] = record[at + NORMAL_LOAD + j] if force else growth * record[at + Y_ROW + j]
+        best = peak_of_panel(values, max(first, -1.0), min(last, 1.0), sign, best)
+    return best
+
+
+@Inner
+def peak_of_leg(record, until, asked, best):  # type: ignore[no-untyped-def]
+    """The larger of ``best`` and the peak of a leg up to a time from its start; ``asked`` as of `peak_between`.
+
+    With the sign -1 it is minus the smallest value.
+    """
+    ahead, back = int(record[AHEAD]), int(record[BACK])
+    if ahead > 0:
+        whole = until >= record[TIME_FROM_START]
+        last = edge(record, HEAD, ahead) if whole else marched_in(record, HEAD, ahead, max(until, 0.0))
+        best = peak_between(record, (HEAD, ahead), record[HALF_C], (0.0, last), asked, best)
+    remaining = record[TIME_FROM_START] + record[TIME_FROM_END] - until
+    if back > 0 and remaining <= record[TIME_FROM_END]:
+        begin = HEAD + ahead * COLUMNS
+        first = marched_in(record, begin, back, remaining) if remaining > 0.0 else 0.0
+        best = peak_between(record, (begin, back), 0.0, (first, edge(record, begin, back)), asked, best)
+    return best

@@ -1,0 +1,133 @@
+"""One quantity for each of many launches where forces dissipate, by driving all bodies in compiled code."""
+
+from math import inf, nan
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gqm_sym.literals.numbers import read_number
+from gqm_sym.runtime.compiled.strided import (
+    DIRECTION,
+    DOMAIN_HIGH,
+    DOMAIN_LOW,
+    DOMAIN_PERIOD,
+    LAM0,
+    PARAMETERS,
+    TARGET,
+    V0,
+    lay_out,
+)
+from gqm_sym.runtime.compiled.types import Array
+from gqm_sym.runtime.launch.request import ONLY_SIGN
+from gqm_sym.runtime.legs import answers as legs
+from gqm_sym.runtime.legs.advance import Joints, room_ahead
+from gqm_sym.runtime.legs.body import STATUS, VALUE, launched
+from gqm_sym.runtime.legs.leg_record import COLUMNS
+from gqm_sym.runtime.sweep import quantities
+from gqm_sym.runtime.sweep.quantities import Answers
+
+if TYPE_CHECKING:
+    from gqm_sym.runtime.launch.formulas import Formulas
+
+# How many panels the record of a leg has space for, how many bodies are driven at a time, and from how many on a thread
+# is worth starting.
+MAX_PANELS, CHUNK, MIN_BODIES_PER_THREAD = 128, 2**12, 2**5
+
+# What the driver is asked for each quantity, by its name. Motions that lose energy have no period.
+QUESTIONS = {
+    "t_end": legs.END_TIME,
+    "rest_position": legs.REST_PLACE,
+    "time_at": legs.ARRIVAL,
+    "v_min": legs.LEAST_SPEED,
+    "v_max": legs.MOST_SPEED,
+    "normal_force_min": legs.LEAST_LOAD,
+    "normal_force_max": legs.MOST_LOAD,
+}
+
+
+class Asked(NamedTuple):
+    """What is asked of all bodies.
+
+    Attributes
+    ----------
+    question : int
+        A code of `legs.answers`.
+    horizon : float
+        The last time in s, infinite if there is none.
+    only_sign : int
+        The only sign that N can have; 0 if it can have both.
+    """
+
+    question: int
+    horizon: float
+    only_sign: int
+
+
+def asked_of_bodies(formulas: "Formulas", quantity: str, t_max: Any, contact: str) -> Asked | None:
+    """What compiled code is asked for a quantity; None where motions are solved, or no energy is lost."""
+    if formulas.dissipation is None or formulas.rolling_radius or quantity not in QUESTIONS:
+        return None
+    horizon = inf if t_max is None else read_number(t_max, where="t_max").value
+    return Asked(QUESTIONS[quantity], horizon, ONLY_SIGN[contact]) if horizon > 0.0 else None
+
+
+def answer_driven(
+    formulas: "Formulas",
+    asked: Asked,
+    curve: tuple[Array, Array, Array],
+    columns: list[Array],
+    answers: Answers,
+    part: slice,
+) -> None:
+    """Answer a part of launches on one curve, as far as compiled code decides them.
+
+    Parameters
+    ----------
+    curve : (array, array, array)
+        The chart, empty for a curve with formulas; all places where it is not smooth, and those that are corners.
+    columns : list of arrays
+        The launches, in the order of `compiled.strided`.
+    answers : Answers
+        Filled in for this part.
+    """
+    chart, breaks, corners = curve
+    joints = Joints(breaks, corners, np.empty(room_ahead(breaks.size)))
+    record, mass = np.empty(MAX_PANELS * COLUMNS), PARAMETERS + list(formulas.parameters).index("m")
+    for begin in range(part.start, part.stop, CHUNK):
+        chunk = slice(begin, min(begin + CHUNK, part.stop))
+        lines, found = lay_out(columns, chunk.start, chunk.stop), answers.part(chunk)
+        chosen = np.flatnonzero(_are_possible(lines, found.status.size))
+        some = [line if line.size == 1 else line[chosen] for line in lines]
+        ends = (some[DOMAIN_LOW], some[DOMAIN_HIGH], some[DOMAIN_PERIOD])
+        asks = (some[DIRECTION], asked.only_sign, asked.horizon, some[TARGET])
+        bodies = launched(chosen.size, some[LAM0], *ends, *asks, some[V0] * some[V0])
+        legs.drive(formulas.dissipation, _rows(some[PARAMETERS:], chart), joints, asked.question, bodies, record)
+        values, ended = bodies[:, VALUE], bodies[:, STATUS]
+        if asked.question in (legs.LEAST_LOAD, legs.MOST_LOAD):
+            values = values * some[mass]
+        none = quantities.NEVER_THERE if asked.question == legs.ARRIVAL else quantities.NOT_PERIODIC
+        decided = ended != legs.LEFT
+        there = chosen[decided]
+        found.values[there, 0] = np.where(ended == legs.FOUND, values, nan)[decided]
+        found.status[there] = np.where(ended == legs.FOUND, quantities.ANSWERED, none)[decided]
+        found.route[there] = quantities.SINGLE
+
+
+def _are_possible(lines: list[Array], count: int) -> NDArray[np.bool_]:
+    """Which launches are of numbers, and inside the domain; `solve` refuses the others."""
+    possible = np.ones(count, dtype=np.bool_)
+    for line in (*lines[: TARGET + 1], *lines[PARAMETERS:]):
+        possible &= np.isfinite(line)
+    possible &= (lines[LAM0] >= lines[DOMAIN_LOW]) & (lines[LAM0] <= lines[DOMAIN_HIGH])
+    return possible
+
+
+def _rows(parameters: list[Array], chart: Array) -> Array:
+    """The parameters of each body as a row; one row where all bodies have the same, the chart behind it."""
+    if chart.size:
+        return np.concatenate([*(column[:1] for column in parameters), chart]).reshape(1, -1)
+    rows = np.empty((max((column.size for column in parameters), default=1), len(parameters)))
+    for k, column in enumerate(parameters):
+        rows[:, k] = column
+    return rows

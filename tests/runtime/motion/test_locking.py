@@ -1,0 +1,93 @@
+"""Motions that many threads read at once give each of them what one thread alone is given."""
+
+import copy
+import pickle
+import sys
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from importlib import import_module
+from pathlib import Path
+from threading import Barrier
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import pytest
+
+import gqm_sym as gqm
+from gqm_sym.runtime.motion.locking import Lock
+
+ModuleOf = Callable[[str], ModuleType]
+
+THREADS = 6
+TIMES = np.linspace(0.0, 40.0, 23)[1:]
+
+# A transit to infinity, an approach to a hilltop, a libration whose panels extended precision lays, a circulation, a
+# launch place that is no double, and a motion with friction.
+LAUNCHES: dict[str, tuple[str, dict[str, Any]]] = {
+    "open": ("waves", {"lam0": 0, "v0": 8, "direction": -1}),
+    "approach": ("pendulum", {"lam0": "-pi/2", "v0": "2*sqrt(981/100)", "L": 1}),
+    "libration": ("pendulum", {"lam0": "3/2", "L": 1}),
+    "circulation": ("pendulum", {"lam0": "1/3", "v0": 9, "L": 1}),
+    "passage": ("waves", {"lam0": "1/3", "v0": "1/7"}),
+    "friction": ("circle_coulomb", {"lam0": "1/3", "mu": "1/100"}),
+}
+
+
+@pytest.fixture(scope="module")
+def module_named(generated_folder: Path) -> ModuleOf:
+    """Give a committed module, or that of the waves z = sin(x)."""
+    waves = gqm.Curve.graph("sin(x)", parameter="x")
+    sine = gqm.build(gqm.derive(waves, gqm.Gravity()), name="waves", folder=generated_folder)
+    return lambda name: sine if name == "waves" else import_module(f"generated.{name}")
+
+
+@pytest.fixture(autouse=True)
+def eager_switches() -> Iterator[None]:
+    """Let threads take turns as often as the interpreter can."""
+    interval = sys.getswitchinterval()
+    sys.setswitchinterval(1e-6)
+    yield
+    sys.setswitchinterval(interval)
+
+
+def answers(motion: Any) -> list[Any]:
+    """What is asked of a motion: alone, in a column, and by place."""
+    end = min(float(motion.t_end), 40.0)
+    times = np.minimum(TIMES * (end / 40.0), end)
+    state = motion.state(times)
+    one = [motion.lam(float(t)) for t in times]
+    events = [(event.kind, event.t, event.lam) for event in motion.events_between(0, end / 4)]
+    return [
+        *(np.asarray(row).tolist() for row in state),
+        *(one, motion.state("1/3"), motion.error_bound(times).tolist(), events),
+        *(motion.turning_points, list(motion.legs), motion.condition_number, motion.time_at(motion.lam(end / 40))),
+    ]
+
+
+@pytest.mark.parametrize("name", LAUNCHES)
+def test_six_threads_are_told_what_one_is(name: str, module_named: ModuleOf) -> None:
+    """Each of them begins at another question, and all begin at once."""
+    track, launch = LAUNCHES[name]
+    module = module_named(track)
+    expected = answers(module.solve(**launch))
+    for _ in range(3):
+        motion, start = module.solve(**launch), Barrier(THREADS)
+
+        def ask(number: int, motion: Any = motion, start: Barrier = start) -> list[Any]:
+            start.wait(60.0)
+            if number % 2:
+                motion.state(0.4)
+            return answers(motion)
+
+        with ThreadPoolExecutor(THREADS) as pool:
+            for given in pool.map(ask, range(THREADS)):
+                assert given == expected
+
+
+def test_a_lock_is_copied_as_a_new_one() -> None:
+    """A copy can be taken while the lock itself is held, as a motion's copy must be."""
+    lock = Lock()
+    with lock, ThreadPoolExecutor(1) as pool:
+        for other in (copy.deepcopy(lock), pickle.loads(pickle.dumps(lock))):
+            assert pool.submit(other.__enter__).result(60.0) is None

@@ -1,0 +1,171 @@
+"""Sweeps of motions that lose energy: closed forms, what `solve` says of each launch, the same bits on any cores."""
+
+import math
+from collections.abc import Callable
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import pytest
+from mpmath import mp, mpf
+
+import gqm_sym as gqm
+from gqm_sym.errors import GQMError, SolutionError
+from gqm_sym.runtime.compiled import threads
+from gqm_sym.runtime.sweep import quantities
+
+G = 9.81
+# Of elementary closed forms.
+FEW = 1e-14
+# A sweep reads the same panels as a solved motion, which makes other polynomials of them.
+ROUNDING = 4e-14
+
+Build = Callable[..., ModuleType]
+EXTREMES = ("v_min", "v_max", "normal_force_min", "normal_force_max")
+
+
+@pytest.fixture(scope="module")
+def build(generated_folder: Path) -> Build:
+    """Build a module once."""
+    built: dict[str, ModuleType] = {}
+
+    def module(name: str, curve: Any, force: Any) -> ModuleType:
+        if name not in built:
+            built[name] = gqm.build(gqm.derive(curve, gqm.Gravity() + force), name=name, folder=generated_folder)
+        return built[name]
+
+    return module
+
+
+def ring() -> Any:
+    """A full circle, its angle from the bottom."""
+    return gqm.Curve.parametric(x="sin(th)", z="-cos(th)", parameter="th", period="2*pi")
+
+
+def test_a_spring_with_friction(generated_folder: Path) -> None:
+    """On a level line the body swings about +-mu m g/k, and each swing is 2 mu m g/k shorter on its side.
+
+    Half a swing takes pi sqrt(m/k); the body rests at the first turn within mu m g/k of the middle.
+    """
+    force = gqm.Gravity() + gqm.Potential("k*x**2/2") + gqm.CoulombFriction()
+    module = gqm.build(gqm.derive(gqm.Curve.graph("0*x"), force), name="swept_spring", folder=generated_folder)
+    k, mu = 40.0, 0.02
+    starts = np.random.default_rng(1).uniform(0.05, 1.0, 50) * np.where(np.arange(50) % 2, 1.0, -1.0)
+    offset, half = mu * G / k, math.pi / math.sqrt(k)
+    turns = np.ceil((np.abs(starts) - offset) / (2.0 * offset)).astype(int)
+    given: dict[str, Any] = {"k": k, "mu": mu}
+    ends = module.sweep("t_end", starts, **given)
+    assert ends.route_counts() == {"single": 50}
+    assert ends.values == pytest.approx(turns * half, rel=FEW)
+    rest = np.sign(starts) * (-1.0) ** turns * (np.abs(starts) - 2.0 * offset * turns)
+    assert module.sweep("rest_position", starts, **given).values == pytest.approx(rest, rel=0.0, abs=1e-14)
+    fastest = math.sqrt(k) * (np.abs(starts) - offset)
+    assert module.sweep("v_max", starts, **given).values == pytest.approx(fastest, rel=FEW)
+    assert (module.sweep("v_min", starts, **given).values == 0.0).all()
+    for quantity in ("normal_force_min", "normal_force_max"):
+        assert module.sweep(quantity, starts, m=2, **given | {"k": 2 * k}).values == pytest.approx(2 * G, rel=FEW)
+    # The middle is passed after a quarter of a swing and a little more.
+    first = np.arccos(-np.sign(1.0) * offset / (np.abs(starts) - offset)) / math.sqrt(k)
+    assert module.sweep("time_at", starts, lam=0.0, **given).values == pytest.approx(first, rel=FEW)
+    beyond = module.sweep("time_at", starts, lam=2.0, **given)
+    assert (beyond.status == quantities.NEVER_THERE).all()
+
+
+def test_drag_on_a_ring_to_a_horizon(build: Build) -> None:
+    """On the way down W' = -2 g sin - 2 c W is linear; N = W + g cos is largest where its derivative vanishes."""
+    module = build("swept_ring", ring(), gqm.QuadraticDrag(b="c"))
+    c, start = 0.3, 2.0
+    with mp.workdps(30):
+        k, g = 2 * mpf(c), mpf("9.81")
+
+        def wave(a: mpf) -> mpf:  # W on a leg in the direction of falling angles, as a function of -angle
+            return 2 * g / (1 + k * k) * (mp.cos(a) - k * mp.sin(a))
+
+        def w(a: mpf) -> mpf:
+            return wave(a) - wave(mpf(-start)) * mp.exp(-k * (a + start))
+
+        fastest = mp.findroot(lambda a: mp.diff(w, a), -0.2)
+        heaviest = mp.findroot(lambda a: mp.diff(w, a) - g * mp.sin(a), -0.1)
+        expected = mp.sqrt(w(fastest)), w(heaviest) + g * mp.cos(heaviest), g * mp.cos(start)
+    for quantity, value in zip(("v_max", "normal_force_max", "normal_force_min"), expected, strict=True):
+        swept = module.sweep(quantity, [start, -start], c=c, t_max=30.0)
+        assert swept.values == pytest.approx([float(value)] * 2, rel=FEW)
+    assert module.sweep("t_end", [start], c=c, t_max=30.0).values == 30.0
+    assert module.sweep("t_end", [start], c=c).status == quantities.NOT_PERIODIC
+
+
+CASES = {
+    "friction": (ring, gqm.CoulombFriction, {"mu": 0.15}),
+    "drag": (ring, lambda: gqm.QuadraticDrag(b="c"), {"c": 0.2}),
+    "droplet": (lambda: gqm.families.parabola(a=1), gqm.SurfaceTension, {"gamma": 0.05, "ell_c": 0.1}),
+    "law": (lambda: gqm.families.parabola(a=1), lambda: gqm.Kernel.law(A="-direction*r/(1 + W/2)"), {"r": 0.8}),
+    "rail": (
+        lambda: gqm.Curve.piecewise([gqm.line(length=2), gqm.arc(radius=1, angle="pi/2")], start=(-2, 0)),
+        gqm.CoulombFriction,
+        {"mu": 0.15},
+    ),
+    "closed": (
+        lambda: gqm.Curve.implicit("x**2 + 2*z**2 - 1", start=(0, "-sqrt(2)/2")),
+        gqm.CoulombFriction,
+        {"mu": 0.15},
+    ),
+}
+
+
+def of_solved(quantity: str, motion: Any, target: float) -> float:
+    """The quantity of a solved motion; NaN if there is none."""
+    try:
+        return float(quantities.QUANTITIES[quantity].of_motion(motion, target))
+    except SolutionError:
+        return math.nan
+
+
+@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize("contact", ["bilateral", "above", "below"])
+def test_as_each_launch_is_solved(name: str, contact: str, build: Build) -> None:
+    """All quantities to a horizon and without one; what a sweep leaves has no number or is refused there too."""
+    curve, force, given = CASES[name]
+    module = build(f"swept_{name}", curve(), force())
+    rng = np.random.default_rng(len(name))
+    starts, speeds = rng.uniform(0.2, 1.6, 3), np.where(rng.random(3) < 0.5, 0.0, rng.uniform(0.0, 5.0, 3))
+    for quantity in ("t_end", "rest_position", "time_at", *EXTREMES):
+        # A droplet may turn thousands of times before it rests.
+        for horizon in (None, 2.5) if quantity not in EXTREMES and name != "droplet" else (1.5,):
+            arguments = {**given, "t_max": horizon, "contact": contact}
+            asked = {"lam": 0.9} if quantity == "time_at" else {}
+            swept = module.sweep(quantity, starts, speeds, 1, **arguments, **asked)
+            for start, speed, value, status in zip(starts, speeds, swept.values, swept.status, strict=True):
+                try:
+                    motion = module.solve(start, speed, 1, **arguments)
+                except GQMError:
+                    assert status == quantities.REFUSED
+                    continue
+                expected = of_solved(quantity, motion, 0.9)
+                assert value == pytest.approx(expected, rel=ROUNDING, abs=ROUNDING, nan_ok=True)
+                assert (status == quantities.ANSWERED) == (not math.isnan(expected))
+
+
+def test_the_same_bits_on_any_number_of_cores(build: Build, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A launch is answered by itself, with parameters of its own."""
+    module = build("swept_friction", ring(), gqm.CoulombFriction())
+    starts = np.linspace(-2.0, 2.0, 300)
+    mu = np.linspace(0.05, 0.3, 300)
+    whole = {q: module.sweep(q, starts, 1.0, mu=mu, t_max=5.0).values for q in ("t_end", "normal_force_max")}
+    monkeypatch.setattr(threads, "cores", lambda: 3)
+    for quantity, values in whole.items():
+        assert np.array_equal(module.sweep(quantity, starts, 1.0, mu=mu, t_max=5.0).values, values)
+        some = module.sweep(quantity, starts[7:9], 1.0, mu=mu[7:9], t_max=5.0).values
+        assert np.array_equal(some, values[7:9])
+
+
+def test_a_curve_for_each_parameter(build: Build) -> None:
+    """Launches are grouped by the parameters of the chart; those that cannot be are refused one by one."""
+    rail = gqm.Curve.piecewise([gqm.line(length="a"), gqm.arc(radius=1, angle="pi/2")])
+    module = build("swept_lengths", rail, gqm.CoulombFriction(mu="mu"))
+    lengths = np.array([2.0, 3.0, 2.0, 3.0])
+    swept = module.sweep("t_end", [0.5, 0.5, 1.5, 99.0], 4.0, mu=0.25, a=lengths)
+    for start, length, value in zip((0.5, 0.5, 1.5), lengths, swept.values, strict=False):
+        assert value == pytest.approx(module.solve(start, 4.0, mu=0.25, a=float(length)).t_end, rel=ROUNDING)
+    assert swept.status.tolist() == [0, 0, 0, quantities.REFUSED]
+    assert swept.route.tolist() == [quantities.SINGLE] * 3 + [quantities.SOLVE]
