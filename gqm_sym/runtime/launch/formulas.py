@@ -39,7 +39,7 @@ class ParameterValues(tuple[Number, ...]):
 
 
 @lru_cache(maxsize=8)
-def _chart(maker: ChartMaker, values: tuple[float, ...]) -> Chart:
+def chart_with(maker: ChartMaker, values: tuple[float, ...]) -> Chart:
     """The chart of a curve; it is made once for the same values of the run-time parameters."""
     with budget("chart", 60.0, "give fewer points, or shorter and simpler pieces"):
         return maker.chart(values)
@@ -175,12 +175,8 @@ class Formulas:
 
     def charted(self, p: ParameterValues) -> Chart:
         """The chart of a charted curve."""
-        return self.chart_with(tuple(p.values.tolist()))
-
-    def chart_with(self, values: tuple[float, ...]) -> Chart:
-        """The chart of a charted curve for values of all parameters."""
         assert self.chart is not None
-        return _chart(self.chart, values)
+        return chart_with(self.chart, tuple(p.values.tolist()))
 
     def domain(self, p: ParameterValues) -> Domain:
         """The range of the curve parameter."""
