@@ -6,6 +6,8 @@ from functools import partial
 import numpy as np
 
 from gqm_sym.runtime.charts.exact_normals import ChartTrack
+from gqm_sym.runtime.double_double.recording import BoundTape
+from gqm_sym.runtime.double_double.recording import bind as bind_tape
 from gqm_sym.runtime.interface import ExactFormulas, ExactPotential
 from gqm_sym.runtime.launch.domain import Domain
 from gqm_sym.runtime.launch.formulas import Formulas, ParameterValues
@@ -18,23 +20,23 @@ from gqm_sym.runtime.multiprecision.exact_tracks import FormulaTrack
 
 def bind(formulas: Formulas, p: ParameterValues, launch: Launch) -> BoundFunctions:
     """The compiled functions bound to parameter values, with one launch's problem in extended precision."""
-    if p.functions is None:
-        p.functions = _bind_all(formulas, p)
-    bound: BoundFunctions = p.functions
+    bound = bind_all(formulas, p)
     if formulas.exact is None:
         return bound
     addresses, values, _, breaks, corners, period = bound
     return BoundFunctions(addresses, values, exact_problem(formulas, p, launch), breaks, corners, period)
 
 
-def _bind_all(formulas: Formulas, p: ParameterValues) -> BoundFunctions:
+def bind_all(formulas: Formulas, p: ParameterValues) -> BoundFunctions:
     """The bound functions that all launches with these parameters share."""
-    addresses = formulas.addresses
-    if formulas.chart is None:
-        return BoundFunctions(addresses, p.values)
-    chart = formulas.charted(p)
-    block = np.concatenate([p.values, chart.block])
-    return BoundFunctions(addresses, block, None, chart.breaks, chart.corners, chart.period)
+    if p.functions is None:
+        p.functions = BoundFunctions(formulas.addresses, p.values)
+        if formulas.chart is not None:
+            chart = formulas.charted(p)
+            block = np.concatenate([p.values, chart.block])
+            p.functions = BoundFunctions(formulas.addresses, block, None, chart.breaks, chart.corners, chart.period)
+    bound: BoundFunctions = p.functions
+    return bound
 
 
 @dataclass(slots=True)
@@ -82,6 +84,16 @@ class Problem:
         exact = self.functions.exact
         assert exact is not None
         return exact
+
+    @property
+    def tape(self) -> BoundTape | None:
+        """The exact formulas for double-double arithmetic; None for a chart, and for formulas that are too long."""
+        if self.p.tape is None:
+            exact, domain = self.formulas.exact, self.formulas.domain_of
+            if isinstance(exact, ExactFormulas) and domain is not None:
+                self.p.tape = bind_tape(exact, domain, self.p)
+            self.p.tape = self.p.tape or False
+        return self.p.tape or None
 
     @property
     def arc_origin(self) -> float:

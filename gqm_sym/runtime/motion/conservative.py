@@ -76,7 +76,7 @@ def _as_bilateral(formulas: Formulas, p: ParameterValues, launch: Launch) -> Mot
     f = bind(formulas, p, launch)
     problem = Problem(formulas, launch, p, f, domain)
     lam0, v0 = launch.lam0.value, launch.v0.value
-    if v0 == 0.0 and _is_in_corner(problem):
+    if v0 == 0.0 and f.corners.size and _is_in_corner(problem):
         return MotionAtRest(problem)
     direction, ahead, behind, time = survey(f.addresses, f.p, lam0, v0, launch.direction, domain.numbers)
     is_stuck = ahead[0] in (zeros.CUSP, zeros.NOT_FINITE) and ahead[1] == 0.0
