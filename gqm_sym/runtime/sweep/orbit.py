@@ -16,12 +16,15 @@ class SweptCurve(NamedTuple):
         The places at which the curve is not smooth, within one period.
     period : float
         The period of a closed curve, 0 otherwise.
+    table : CurveTable
+        The curve tabulated for all launches; empty where each has parameters of its own, and for formulas.
     """
 
     fns: Any
     p: Any
     joints: Any
     period: Any
+    table: Any
 
 
 class Orbit(NamedTuple):

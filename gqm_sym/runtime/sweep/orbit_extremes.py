@@ -1,6 +1,6 @@
 """The smallest and largest speed or contact force on one of many orbits: the best point of a grid, refined."""
 
-from math import pi, sqrt
+from math import inf, pi, sqrt
 
 import numpy as np
 
@@ -9,10 +9,24 @@ from gqm_sym.runtime.compiled.calls import call_path_and_contact_force, call_pot
 from gqm_sym.runtime.compiled.jit import Inner
 from gqm_sym.runtime.compiled.registers import on_stack
 from gqm_sym.runtime.interface import PATH_ROWS
+from gqm_sym.runtime.sweep.curve_table import (
+    KAPPA_SAMPLES,
+    KAPPA_TERMS,
+    LOAD_SAMPLES,
+    LOAD_TERMS,
+    POTENTIAL_SAMPLES,
+    SAMPLE_POINTS,
+    SAMPLES,
+    potential_on,
+    value_on,
+)
 
 # Intervals of the first grid, in equal steps of the phase angle; how often the best point is refined; and the factor by
 # which the step shrinks each time.
 GRID_INTERVALS, REFINEMENTS, STEP_RATIO = 64, 2, 16.0
+
+# Half the width of the first parabola on a panel of a tabulated curve, which is 2 wide.
+FIRST_STEP = 0.25
 
 # The grid as shares of a lap, and as shares of a libration's width.
 LAP_SHARES = np.arange(GRID_INTERVALS + 1) / GRID_INTERVALS
@@ -86,3 +100,78 @@ def extreme(fns, p, orbit, force, sign):  # type: ignore[no-untyped-def]
         f1, f0, f2 = found[0], found[1], found[2]
         value = max(value, f1) if sign > 0.0 else min(value, f1)
     return value
+
+
+@Inner
+def load_on(rows, k, slack, force, x):  # type: ignore[no-untyped-def]
+    """V**2, or the contact force if ``force`` is set, at a place of panel k; V**2/2 is ``slack`` at its left edge."""
+    v2 = 2.0 * (slack - potential_on(rows, k, x))
+    return value_on(rows, k, KAPPA_TERMS, x) * v2 + value_on(rows, k, LOAD_TERMS, x) if force else v2
+
+
+@Inner
+def refined(rows, k, slack, force, sign, x, ends):  # type: ignore[no-untyped-def]
+    """The largest (``sign`` 1) or smallest (-1) value next to a place between two ends on panel k, by parabolas."""
+    low, high = ends
+    best, step = load_on(rows, k, slack, force, x), FIRST_STEP
+    for _ in range(REFINEMENTS + 1):
+        left, right = max(x - step, low), min(x + step, high)
+        if not left < x < right:
+            x = 0.5 * (left + right)
+        f0 = load_on(rows, k, slack, force, left)
+        f1 = load_on(rows, k, slack, force, x)
+        f2 = load_on(rows, k, slack, force, right)
+        before, after = (x - left) * (f1 - f2), (x - right) * (f1 - f0)
+        if before != after:
+            vertex = x - 0.5 * ((x - left) * before - (x - right) * after) / (before - after)
+            x = min(max(vertex, left), right)
+        found = load_on(rows, k, slack, force, x)
+        best = sign * max(sign * best, sign * f0, sign * f1, sign * f2, sign * found)
+        step /= STEP_RATIO
+    return best
+
+
+@Inner
+def best_sample(curve, passage, slacks, force, sign):  # type: ignore[no-untyped-def]
+    """The largest value times ``sign`` of V**2 or of the contact force at the samples, its panel, and where on it."""
+    rows, count, last = curve.table.rows, curve.table.tops.size, passage.panels - 1
+    best, best_j, best_x = -inf, 0, 0.0
+    for j in range(passage.panels):
+        k, slack = (passage.first + j) % count, slacks[j]
+        low, high = passage.low_x if j == 0 else -1.0, passage.high_x if j == last else 1.0
+        for i in range(SAMPLES):
+            x = SAMPLE_POINTS[i]
+            if 0 < j < last:
+                v2 = 2.0 * (slack - rows[k, POTENTIAL_SAMPLES + i])
+                value = rows[k, KAPPA_SAMPLES + i] * v2 + rows[k, LOAD_SAMPLES + i] if force else v2
+            else:
+                x = low + (high - low) * i / (SAMPLES - 1)
+                value = load_on(rows, k, slack, force, x)
+            if sign * value > best:
+                best, best_j, best_x = sign * value, j, x
+    return best, best_j, best_x
+
+
+@Inner
+def passage_extreme(curve, orbit, passage, slacks, force, sign):  # type: ignore[no-untyped-def]
+    """As `extreme`, on a tabulated curve: the best of each panel's samples, refined on the panels that have it.
+
+    At a joint the values on both sides count.
+    """
+    if not (orbit.circulates or force or sign > 0.0):
+        return 0.0  # at a turning point
+    rows, count, last = curve.table.rows, curve.table.tops.size, passage.panels - 1
+    best, best_j, best_x = best_sample(curve, passage, slacks, force, sign)
+    for step in range(-1, 2):
+        # On the panel itself, and on that which it shares the place with.
+        j, x, shared = best_j + step, best_x, step == 0
+        if step != 0 and best_x == float(step):
+            x, shared = -best_x, 0 <= j <= last
+        if orbit.circulates and step != 0 and not 0 <= j <= last:
+            j, shared = last - best_j, best_x in (passage.low_x, passage.high_x)
+        if shared:
+            ends = passage.low_x if j == 0 else -1.0, passage.high_x if j == last else 1.0
+            k = (passage.first + j) % count
+            best = max(best, sign * refined(rows, k, slacks[j], force, sign, x, ends))
+    value = sign * best
+    return value if force else sqrt(max(value, 0.0))

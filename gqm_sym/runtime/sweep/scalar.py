@@ -5,6 +5,7 @@ or whose time they cannot give to the last places, stays undecided, and `sweep` 
 """
 
 from math import inf, isfinite, nan
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import types
@@ -24,7 +25,7 @@ from gqm_sym.runtime.compiled.strided import (
     V0,
     element,
 )
-from gqm_sym.runtime.compiled.types import ADDRESSES, MATRIX, VECTOR
+from gqm_sym.runtime.compiled.types import ADDRESSES, MATRIX, VECTOR, Array
 from gqm_sym.runtime.launch.domain import DomainNumbers
 from gqm_sym.runtime.launch.ends import NO_ORBIT, ends, orbit_kind
 from gqm_sym.runtime.quadrature.time_panels import joints_between
@@ -37,8 +38,10 @@ from gqm_sym.runtime.quadrature.trapezoid import (
     trapezoid_workspace,
 )
 from gqm_sym.runtime.sweep.arrivals import arrival
+from gqm_sym.runtime.sweep.curve_table import TABLE, CurveTable
 from gqm_sym.runtime.sweep.orbit import Orbit, SweptCurve
-from gqm_sym.runtime.sweep.orbit_extremes import extreme
+from gqm_sym.runtime.sweep.orbit_extremes import extreme, passage_extreme
+from gqm_sym.runtime.sweep.passage import Passage, fill_slacks, find_passage, passage_arrival, passage_time
 from gqm_sym.runtime.sweep.quantities import (
     ANSWERED,
     ANSWERS,
@@ -59,9 +62,41 @@ from gqm_sym.runtime.sweep.quantities import (
 )
 
 
+class GivenCurve(NamedTuple):
+    """What the launches of a loop share.
+
+    Attributes
+    ----------
+    parameters : array
+        A buffer for the parameters of one launch, and behind it the chart if the curve has one.
+    joints : array
+        The places at which the curve is not smooth, within one period.
+    table : CurveTable
+        The curve tabulated, if all launches have the same parameters; else an empty one.
+    """
+
+    parameters: Array
+    joints: Array
+    table: CurveTable
+
+
+GIVEN = types.NamedTuple((VECTOR, VECTOR, TABLE), GivenCurve)
+
+
+class Buffers(NamedTuple):
+    """Work space: for the trapezoidal rule (``work``, ``series``), and V**2/2 at the edges of panels."""
+
+    work: Any
+    series: Any
+    slacks: Any
+
+
 @Inlined
 def find_orbit(curve, columns, k, monotone, spans, known):  # type: ignore[no-untyped-def]
-    """The status of launch k, ANSWERED where it has an orbit, and that orbit; its span is looked up where ``known``."""
+    """The status of launch k, ANSWERED where it has an orbit, that orbit, and the panels that it passes in a table.
+
+    The orbit's span is looked up where ``known``.
+    """
     lam0, v0, direction = element(columns, LAM0, k), element(columns, V0, k), int(element(columns, DIRECTION, k))
     first, last, period = (
         element(columns, DOMAIN_LOW, k),
@@ -70,14 +105,14 @@ def find_orbit(curve, columns, k, monotone, spans, known):  # type: ignore[no-un
     )
     axis, step = element(columns, AXIS, k) if monotone else np.nan, element(columns, AXIS_STEP, k)
     even, v2 = axis == axis, v0 * v0
-    none = Orbit(False, even, direction, lam0, v2, 0.0, 0.0)
+    none, nowhere = Orbit(False, even, direction, lam0, v2, 0.0, 0.0), Passage(0, 0, 0.0, 0.0, 0.0)
     total = lam0 + v0
     for row in range(columns.shape[0] - PARAMETERS):
         total += curve.p[row]
     if not isfinite(total):
-        return NOT_FINITE, none
+        return NOT_FINITE, none, nowhere
     if not first <= lam0 <= last:
-        return OUTSIDE_DOMAIN, none
+        return OUTSIDE_DOMAIN, none, nowhere
     if known:
         low, high = spans[k, 0], spans[k, 1]
         circulates = high != high
@@ -85,15 +120,18 @@ def find_orbit(curve, columns, k, monotone, spans, known):  # type: ignore[no-un
             low, high = min(low, 0.0), max(low, 0.0)
         elif v0 == 0.0:
             direction = 1 if high > -low else -1
-        return ANSWERED, Orbit(circulates, even, direction, lam0, v2, low, high)
+        return ANSWERED, Orbit(circulates, even, direction, lam0, v2, low, high), nowhere
+    orbit, passage = find_passage(curve, lam0, v0, direction)
+    if passage.panels > 0:
+        return ANSWERED, orbit, passage
     domain = DomainNumbers(first, last, period, axis, step)
     direction, ahead, behind = ends(curve.fns, curve.p, lam0, v0, direction, domain)
     kind = orbit_kind(direction, ahead, behind, v0, period)
     if kind == NO_ORBIT:
-        return UNDECIDED, none
+        return UNDECIDED, none, nowhere
     circulates = kind == CIRCULATION
     one, other = (direction * period, 0.0) if circulates else (ahead.near, behind.near)
-    return ANSWERED, Orbit(circulates, even, direction, lam0, v2, min(one, other), max(one, other))
+    return ANSWERED, Orbit(circulates, even, direction, lam0, v2, min(one, other), max(one, other)), nowhere
 
 
 @Inner
@@ -112,32 +150,54 @@ def orbit_time(curve, orbit):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def fill_answer(curve, orbit, quantity, target, work, series, out):  # type: ignore[no-untyped-def]
+def value_from_table(curve, orbit, passage, quantity, target, slacks):  # type: ignore[no-untyped-def]
+    """The half period or lap time, the arrival or an extreme on a tabulated curve; NaN where that is not accurate."""
+    if not (passage.panels > 1 and fill_slacks(curve, passage, orbit.v2, orbit.circulates, slacks)):
+        return nan
+    if quantity in (HALF_PERIOD, PERIOD):
+        return passage_time(curve, orbit, passage, slacks)
+    if quantity == ARRIVAL_TIME:
+        return passage_arrival(curve, orbit, passage, slacks, target)
+    force, sign = quantity in (MIN_FORCE, MAX_FORCE), 1.0 if quantity in (MAX_SPEED, MAX_FORCE) else -1.0
+    return passage_extreme(curve, orbit, passage, slacks, force, sign)
+
+
+@Inner
+def value_by_itself(curve, orbit, quantity, target, buffers):  # type: ignore[no-untyped-def]
+    """The same without a table."""
+    if quantity in (HALF_PERIOD, PERIOD):
+        return orbit_time(curve, orbit)
+    if quantity == ARRIVAL_TIME:
+        return arrival(curve, orbit, target, buffers.work, buffers.series)
+    inside = joints_between(curve.joints, curve.period, orbit.lam0 + orbit.low, orbit.lam0 + orbit.high)
+    if inside.size:
+        return nan
+    force, sign = quantity in (MIN_FORCE, MAX_FORCE), 1.0 if quantity in (MAX_SPEED, MAX_FORCE) else -1.0
+    return extreme(curve.fns, curve.p, orbit, force, sign)
+
+
+@Inner
+def fill_answer(curve, orbit, passage, quantity, target, buffers, out):  # type: ignore[no-untyped-def]
     """Fill the row ``out`` with a quantity of an orbit; returns the status. ``target`` is the place of ARRIVAL_TIME."""
     if orbit.circulates and quantity in (HALF_PERIOD, TURNING_POINTS):
         return NOT_PERIODIC
-    if quantity in (HALF_PERIOD, PERIOD):
-        time = orbit_time(curve, orbit)
-        out[0] = 2.0 * time if quantity == PERIOD and not orbit.circulates else time
-    elif quantity == TURNING_POINTS:
+    if quantity == TURNING_POINTS:
         out[0], out[1] = orbit.lam0 + orbit.low, orbit.lam0 + orbit.high
-    elif quantity == ARRIVAL_TIME:
-        out[0] = arrival(curve, orbit, target, work, series)
-        if out[0] == inf:
-            out[0] = np.nan
-            return NEVER_THERE
-    else:
-        force, sign = quantity in (MIN_FORCE, MAX_FORCE), 1.0 if quantity in (MAX_SPEED, MAX_FORCE) else -1.0
-        inside = joints_between(curve.joints, curve.period, orbit.lam0 + orbit.low, orbit.lam0 + orbit.high)
-        out[0] = nan if inside.size else extreme(curve.fns, curve.p, orbit, force, sign)
-    return ANSWERED if isfinite(out[0]) else UNDECIDED
+        return ANSWERED
+    value = value_from_table(curve, orbit, passage, quantity, target, buffers.slacks)
+    if value != value:
+        value = value_by_itself(curve, orbit, quantity, target, buffers)
+    if value == inf:
+        return NEVER_THERE
+    out[0] = 2.0 * value if quantity == PERIOD and not orbit.circulates else value
+    return ANSWERED if isfinite(value) else UNDECIDED
 
 
 @entry(
-    types.void(ADDRESSES, types.int64[:, ::1], types.boolean, types.int64, MATRIX, ANSWERS, VECTOR, VECTOR),
+    types.void(ADDRESSES, types.int64[:, ::1], types.boolean, types.int64, MATRIX, ANSWERS, GIVEN),
     nogil=True,
 )
-def answer_one_by_one(fns, columns, monotone, quantity, spans, answers, parameters, joints):  # type: ignore[no-untyped-def]
+def answer_one_by_one(fns, columns, monotone, quantity, spans, answers, given):  # type: ignore[no-untyped-def]
     """Answer each launch whose status is UNDECIDED or SPAN_KNOWN so far, as far as doubles decide it.
 
     Parameters
@@ -154,24 +214,23 @@ def answer_one_by_one(fns, columns, monotone, quantity, spans, answers, paramete
         For each launch of status SPAN_KNOWN what batches answered to SPANS.
     answers : Answers
         Filled in: both turning points, or one number in the first column.
-    parameters : array
-        A buffer for the parameters of one launch, and behind it the chart that all launches share, if there is one.
-    joints : array
-        The places at which the curve is not smooth, within one period.
+    given : GivenCurve
+        What all launches share.
     """
-    work, series, p = trapezoid_workspace(), trapezoid_rates(), uncounted(parameters)
+    buffers = Buffers(trapezoid_workspace(), trapezoid_rates(), np.empty(given.table.tops.size + 1))
+    p, joints = uncounted(given.parameters), uncounted(given.joints)
+    table = CurveTable(uncounted(given.table.edges), uncounted(given.table.tops), uncounted(given.table.rows))
     columns, spans, values = uncounted(columns), uncounted(spans), uncounted(answers.values)
     statuses, routes = uncounted(answers.status), uncounted(answers.route)
-    joints = uncounted(joints)
     for k in range(statuses.size):
         known = statuses[k] == SPAN_KNOWN
         if statuses[k] != UNDECIDED and not known:
             continue
         for row in range(columns.shape[0] - PARAMETERS):
             p[row] = element(columns, PARAMETERS + row, k)
-        curve = SweptCurve(fns, p, joints, element(columns, DOMAIN_PERIOD, k))
-        status, orbit = find_orbit(curve, columns, k, monotone, spans, known)
+        curve = SweptCurve(fns, p, joints, element(columns, DOMAIN_PERIOD, k), table)
+        status, orbit, passage = find_orbit(curve, columns, k, monotone, spans, known)
         if status == ANSWERED:
             target = element(columns, TARGET, k)
-            status = fill_answer(curve, orbit, quantity, target, work, series, values[k])
+            status = fill_answer(curve, orbit, passage, quantity, target, buffers, values[k])
         statuses[k], routes[k] = status, SINGLE

@@ -15,15 +15,20 @@ from numpy.typing import NDArray
 from gqm_sym.errors import GQMError, InputError, ParameterError, SolutionError
 from gqm_sym.literals.namespaces import ARRAYS
 from gqm_sym.literals.numbers import read_number
+from gqm_sym.runtime.charts.chart import ChartMaker
 from gqm_sym.runtime.compiled.strided import PARAMETERS, lay_out, pointers, widen
 from gqm_sym.runtime.compiled.threads import run_in_threads
 from gqm_sym.runtime.compiled.types import Array
+from gqm_sym.runtime.interface import Addresses
+from gqm_sym.runtime.launch.formulas import chart_with
 from gqm_sym.runtime.launch.request import CONTACTS, LaunchRequest
 from gqm_sym.runtime.multiprecision.exact_problem import NOWHERE
 from gqm_sym.runtime.sweep import quantities, scalar
 from gqm_sym.runtime.sweep.batch.batches import answer_batches
+from gqm_sym.runtime.sweep.curve_table import NO_TABLE, CurveTable, tabulate
 from gqm_sym.runtime.sweep.dissipative_loop import MIN_BODIES_PER_THREAD, answer_driven, asked_of_bodies
-from gqm_sym.runtime.sweep.quantities import QUANTITIES, ROUTES, STATUS_SENTENCES, Answers, Quantity
+from gqm_sym.runtime.sweep.quantities import QUANTITIES, Answers, Quantity
+from gqm_sym.runtime.sweep.result import Sweep
 
 if TYPE_CHECKING:
     from gqm_sym.runtime.launch.formulas import Formulas
@@ -37,77 +42,6 @@ Solve = Callable[[LaunchRequest, tuple[Any, ...]], Any]
 
 # Quantities that are answered by batches themselves; for others batches find the span of an orbit.
 ANSWERED_BY_BATCHES = (quantities.HALF_PERIOD, quantities.PERIOD, quantities.TURNING_POINTS)
-
-# What public names of earlier versions are called now.
-RENAMED = {"reasons": "status", "why": "status_counts()"}
-
-
-class Sweep(NamedTuple):
-    """The values of one quantity over many launches.
-
-    ``np.asarray(sweep)`` is the array of the values.
-
-    Attributes
-    ----------
-    values : float array
-        The quantity of each launch, in the shape that the arguments broadcast to; NaN where there is none. Times
-        (``half_period``, ``period``, ``time_at``, ``t_end``) are in seconds, speeds (``v_min``, ``v_max``) in m/s,
-        forces (``normal_force_min``, ``normal_force_max``) in newtons; places (``turning_points``,
-        ``rest_position``) are values of the curve's parameter, in its unit. ``turning_points`` has one more axis of
-        length 2, for the lower and the upper one.
-    status : int8 array
-        0 for each launch that has a value; otherwise a code that says why there is none. `status_counts` gives the
-        sentences, which stand in `quantities.STATUS_SENTENCES`.
-    route : int8 array
-        How each launch was answered, as an index into `quantities.ROUTES`: 0 "batch", in a batch of orbits side by
-        side; 1 "single", alone in a compiled loop; 2 "solve", solved as ``solve`` does it. The values do not depend
-        on it beyond rounding, but the time that they take does.
-    """
-
-    values: Array
-    status: NDArray[np.int8]
-    route: NDArray[np.int8]
-
-    def status_counts(self) -> dict[str, int]:
-        """Count the launches that have no value.
-
-        Returns
-        -------
-        dict
-            The number of launches for each sentence that says why there is no value; empty if all have one.
-        """
-        return _counts(self.status, STATUS_SENTENCES, 1)
-
-    def route_counts(self) -> dict[str, int]:
-        """Count the launches by the route on which they were answered.
-
-        Returns
-        -------
-        dict
-            The number of launches for each of "batch", "single" and "solve" that occurs.
-        """
-        return _counts(self.route, ROUTES, 0)
-
-    def __array__(self, dtype: Any = None, copy: bool | None = None) -> Array:
-        """The values, as `numpy.asarray` asks for them."""
-        return self.values.astype(dtype or self.values.dtype, copy=bool(copy))
-
-    def __getattr__(self, name: str) -> Any:
-        """Say what an attribute of an earlier version is called now.
-
-        Raises
-        ------
-        AttributeError
-            Always, as there is no attribute of this name.
-        """
-        hint = f"; it is now called {RENAMED[name]}" if name in RENAMED else ""
-        raise AttributeError(f"Sweep has no attribute {name!r}{hint}", name=name, obj=self)
-
-
-def _counts(codes: NDArray[np.int8], names: tuple[str, ...], first: int) -> dict[str, int]:
-    """How often each code from ``first`` on occurs, by the codes' names."""
-    found, counts = np.unique(codes[codes >= first], return_counts=True)
-    return {names[code]: int(count) for code, count in zip(found, counts, strict=True)}
 
 
 def sweep(
@@ -275,12 +209,15 @@ class Group(NamedTuple):
     chart, joints, corners : arrays
         What compiled code reads behind the parameters, and the places within one period at which the curve is not
         smooth, and at which its tangent jumps; all are empty for a curve with formulas.
+    table : CurveTable
+        The curve tabulated, where all launches have the same parameters and no energy is lost.
     """
 
     columns: list[Array]
     chart: Array = NOWHERE
     joints: Array = NOWHERE
     corners: Array = NOWHERE
+    table: CurveTable = NO_TABLE
 
 
 def _groups(
@@ -294,14 +231,23 @@ def _groups(
         domain = [widen(value, shape) for value in _domain_columns(formulas, columns[4:])]
         yield Group([*columns[:4], *domain, *columns[4:]]), None
         return
+    mass = list(formulas.parameters).index("m")
     for values, chosen in _distinct(columns[4:], shape):
         try:
-            chart = formulas.chart_with(values)
+            chart = chart_with(formulas.chart, values)
         except GQMError:
             continue  # `solve` says why
         domain = [np.array(value) for value in (*chart.range, nan, nan, 0.0)]
         some = columns if chosen is None else [_chosen(column, shape, chosen) for column in columns]
-        yield Group([*some[:4], *domain, *some[4:]], chart.block, chart.breaks, chart.corners), chosen
+        table = NO_TABLE if formulas.dissipation else _tabulated(formulas.chart, formulas.addresses, values, mass)
+        yield Group([*some[:4], *domain, *some[4:]], chart.block, chart.breaks, chart.corners, table), chosen
+
+
+@lru_cache(maxsize=8)
+def _tabulated(maker: ChartMaker, fns: Addresses, values: tuple[float, ...], mass: int) -> CurveTable:
+    """The table of a chart; it is made once for the same parameters. ``mass`` is the index of the body's mass."""
+    chart = chart_with(maker, values)
+    return CurveTable(*tabulate(fns, np.concatenate([values, chart.block]), chart.edges, values[mass]))
 
 
 def _distinct(
@@ -325,7 +271,7 @@ def _chosen(column: Array, shape: tuple[int, ...], chosen: NDArray[np.intp]) -> 
 
 def _answer(formulas: "Formulas", quantity: Quantity, group: Group, answers: Answers, part: slice) -> None:
     """Answer a part of a group of launches by compiled loops, as far as they decide them."""
-    columns, chart, joints = group.columns, group.chart, group.joints
+    columns, chart, joints, table = group.columns, group.chart, group.joints, group.table
     code, batches = quantity.code, formulas.batch
     for begin in range(part.start, part.stop, CHUNK):
         chunk = slice(begin, min(begin + CHUNK, part.stop))
@@ -336,8 +282,8 @@ def _answer(formulas: "Formulas", quantity: Quantity, group: Group, answers: Ans
             asked = code if code in ANSWERED_BY_BATCHES else quantities.SPANS
             counts = (batches.orbit_rows, batches.integrand_rows)
             answer_batches(batches.addresses(), counts, *launches, asked, found._replace(values=spans))
-        parameters = np.concatenate([np.empty(len(lines) - PARAMETERS), chart])
-        scalar.answer_one_by_one(formulas.addresses, *launches, code, spans, found, parameters, joints)
+        given = scalar.GivenCurve(np.concatenate([np.empty(len(lines) - PARAMETERS), chart]), joints, table)
+        scalar.answer_one_by_one(formulas.addresses, *launches, code, spans, found, given)
 
 
 def _solved(

@@ -78,6 +78,35 @@ def test_times_on_a_rail_with_joints(bend: ModuleType) -> None:
         assert arrival.values[k] == pytest.approx(float(mp.sqrt((there[k] - place) * 4 / (G * mp.sqrt(2)))), rel=4e-15)
 
 
+def test_extremes_on_a_rail_with_joints(bend: ModuleType) -> None:
+    """N jumps where the arc begins: its least is on the inclines, its largest in the middle of the arc."""
+    places = np.linspace(0.05, 2.9, 25)
+    largest, least = bend.sweep("normal_force_max", places, R=1), bend.sweep("normal_force_min", places, R=1)
+    fastest = bend.sweep("v_max", places, R=1)
+    assert largest.route_counts() == {"single": 25}
+    for k, place in enumerate(places.tolist()):
+        _, v2 = _half_period_on_bend(3.0 - place, 1.0)
+        assert largest.values[k] == pytest.approx(float(G + v2), rel=ROUNDING)
+        assert least.values[k] == pytest.approx(float(G) / np.sqrt(2.0), rel=ROUNDING)
+        assert fastest.values[k] == pytest.approx(float(mp.sqrt(v2)), rel=ROUNDING)
+
+
+def test_extremes_and_arrivals_on_a_ring(ring: ModuleType) -> None:
+    """Whirling in both directions: N = 3 g cos(s) - 2 g + V0**2, and arrivals by the incomplete elliptic integral."""
+    for lam0, sense, ahead in ((0.3, 1, 9.0), (-2.0, -1, 3.1), (3.0, 1, 0.4)):
+        w0 = 9.0**2 - 2 * float(G) * (1 - np.cos(lam0))
+        launch = (lam0, np.sqrt(w0), sense)
+        assert ring.sweep("v_max", *launch).values == pytest.approx(9.0, rel=ROUNDING)
+        assert ring.sweep("v_min", *launch).values == pytest.approx(np.sqrt(81 - 4 * float(G)), rel=ROUNDING)
+        assert ring.sweep("normal_force_max", *launch).values == pytest.approx(float(G) + 81.0, rel=ROUNDING)
+        place = lam0 + sense * ahead
+        first, last = sorted((lam0 / 2, place / 2))
+        with mp.workdps(30):
+            modulus = 4 * G / 81
+            truth = 2 * (mp.ellipf(mpf(last), modulus) - mp.ellipf(mpf(first), modulus)) / 9
+        assert ring.sweep("time_at", *launch, lam=place).values == pytest.approx(float(truth), rel=4e-15)
+
+
 def test_parameters_of_every_launch(bend: ModuleType) -> None:
     """Parameters of every launch, and one of which no rail can be made: only that one is refused."""
     mass, radius = np.linspace(1.0, 20.0, 12), np.where(np.arange(12) == 5, -1.0, 0.5)

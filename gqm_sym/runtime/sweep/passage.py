@@ -1,0 +1,412 @@
+"""Where a body goes on a tabulated curve, and how long that takes (`curve_table`).
+
+On a panel far from turning points V**2 is evaluated at the panel's own Gauss points. On other panels the Gauss points
+are phase angles of the orbit, and V**2 is a divided difference of the panel's polynomial next to a turning point, so
+that nothing cancels.
+"""
+
+from math import atan2, fabs, floor, sqrt
+from typing import NamedTuple
+
+import numpy as np
+
+from gqm_sym.runtime.arithmetic.elementary import cos, sin
+from gqm_sym.runtime.compiled.calls import call_potential_divdiff1
+from gqm_sym.runtime.compiled.jit import Inlined, Inner
+from gqm_sym.runtime.compiled.registers import on_stack
+from gqm_sym.runtime.launch.zeros import CONSTANT_SHARE, CRITICAL, LIMIT, TURN
+from gqm_sym.runtime.quadrature.time_panels import MIN_CANCELLATION_RATIO
+from gqm_sym.runtime.sweep.curve_table import (
+    BASE,
+    DS_TERMS,
+    FEW_NODES,
+    FEW_POTENTIAL,
+    FEW_REACH,
+    FEW_WEIGHTS,
+    FIT,
+    GAUSS_WEIGHTS,
+    LEFT_TERMS,
+    MIDDLE,
+    NODES,
+    POINTS,
+    POTENTIAL,
+    REACH,
+    RISE,
+    SLOPE_SIGN,
+    WEIGHTS,
+    difference_on,
+    potential_on,
+    value_on,
+)
+from gqm_sym.runtime.sweep.orbit import Orbit
+
+# By how much V**2 at the middle of a panel must exceed what the panel's rule needs.
+SAFETY = 1.05
+
+# The last Legendre coefficients of an integrand, as a share of the first, up to which its integral is accurate to
+# rounding: they belong to degrees 14 and 15, the error to degree 32. Otherwise the part is halved, so often at most.
+MAX_TAIL_RATIO, MAX_HALVINGS = 2e-8, 5
+
+# How near to an equilibrium a turning point may lie, as a share of the panel, for doubles to decide that it is one.
+MAX_ZERO_ERROR = 1e-6
+
+few_rates, rates_buffer, angle_buffer = on_stack(FEW_NODES), on_stack(NODES), on_stack(NODES)
+
+
+class Passage(NamedTuple):
+    """The panels that an orbit passes, from its lower end to its upper one.
+
+    Attributes
+    ----------
+    first, panels : int
+        The index of the first panel, and how many there are. On a closed curve indices go on from lap to lap.
+    low_x, high_x : float
+        The places of both ends on their panels, in [-1, 1].
+    width : float
+        The distance between both ends.
+    """
+
+    first: int
+    panels: int
+    low_x: float
+    high_x: float
+    width: float
+
+
+@Inner
+def locate(table, period, place):  # type: ignore[no-untyped-def]
+    """The index of the panel that a place lies on, and where in [-1, 1] on it."""
+    edges = table.edges
+    count, laps = table.tops.size, 0.0
+    if period > 0.0:
+        laps = floor((place - edges[0]) / period)
+        place = place - laps * period
+    below, above = 0, count
+    while above - below > 1:
+        middle = (below + above) // 2
+        if place >= edges[middle]:
+            below = middle
+        else:
+            above = middle
+    left, right = edges[below], edges[below + 1]
+    x = ((place - left) - (right - place)) / (right - left)
+    return below + int(laps) * count, min(max(x, -1.0), 1.0)
+
+
+@Inner
+def edge_place(table, period, index):  # type: ignore[no-untyped-def]
+    """The place of the left edge of a panel; on a closed curve by its index over all laps."""
+    count = table.tops.size
+    if period == 0.0:
+        return table.edges[index]
+    lap = index // count
+    return table.edges[index - lap * count] + lap * period
+
+
+@Inner
+def zero_on_panel(rows, k, slack, near, far):  # type: ignore[no-untyped-def]
+    """Where the potential of panel k reaches ``slack`` between a place below it and one above it."""
+    x = 0.5 * (near + far)
+    for _ in range(60):
+        value, slope = 0.0, 0.0
+        for j in range(NODES - 1, -1, -1):
+            slope = slope * x + value
+            value = value * x + rows[k, LEFT_TERMS + j]
+        slope, value = value + (1.0 + x) * slope, (1.0 + x) * value
+        if value < slack:
+            near = x
+        else:
+            far = x
+        new = x - (value - slack) / slope
+        if not min(near, far) < new < max(near, far):
+            new = 0.5 * (near + far)
+        if fabs(new - x) <= 2.0**-52:
+            return new
+        x = new
+    return x
+
+
+@Inner
+def turn_from(curve, start, x, w0, direction):  # type: ignore[no-untyped-def]
+    """What ends a motion in one direction from a place on the table: what it is, the panel, and the place on it.
+
+    It is TURN, LIMIT (an end of the curve, or a whole lap) or CRITICAL where the table does not decide it.
+    """
+    table, period = curve.table, curve.period
+    rows, count = table.rows, table.tops.size
+    index = start
+    k = index % count
+    energy = 0.5 * w0 + rows[k, BASE] + potential_on(rows, k, x)
+    margin = CONSTANT_SHARE * (0.5 * w0 + fabs(energy))
+    for passed in range(count + 1):
+        if not table.tops[k] < energy - margin - CONSTANT_SHARE * fabs(rows[k, BASE]):
+            sign, slack = rows[k, SLOPE_SIGN] * direction, energy - rows[k, BASE]
+            if sign == 0.0 or not table.tops[k] < np.inf:
+                return CRITICAL, index, x
+            if sign > 0.0:
+                error = margin + CONSTANT_SHARE * fabs(rows[k, BASE])
+                left = slack - (rows[k, RISE] if direction > 0 else 0.0)
+                if fabs(left) <= error:
+                    return CRITICAL, index, x
+                if left < 0.0:
+                    near = x if passed == 0 else -float(direction)
+                    zero = zero_on_panel(rows, k, slack, near, float(direction))
+                    is_simple = error <= MAX_ZERO_ERROR * fabs(difference_on(rows, k, zero, zero))
+                    return TURN if is_simple else CRITICAL, index, zero
+        if passed == count:
+            break
+        index += direction
+        if period == 0.0 and not 0 <= index < count:
+            break
+        k = index % count
+    return LIMIT, index, float(direction)
+
+
+@Inner
+def polished(curve, lam0, w0, index, x):  # type: ignore[no-untyped-def]
+    """The offset of a turning point from the launch, and its place on its panel, by a step of Newton's method."""
+    table = curve.table
+    k = index % table.tops.size
+    left, half = edge_place(table, curve.period, index), 0.5 * (table.edges[k + 1] - table.edges[k])
+    place, offset, out = np.empty(1), np.empty(1), np.empty((2, 1))
+    offset[0] = (left - lam0) + half * (1.0 + x)
+    place[0] = lam0 + offset[0]
+    call_potential_divdiff1(curve.fns.potential_divdiff1, 1, lam0, place, offset, curve.p, out)
+    step = (0.5 * w0 - offset[0] * out[0, 0]) / (difference_on(table.rows, k, x, x) / half)
+    return offset[0] + step, x + step / half
+
+
+@Inner
+def find_passage(curve, lam0, v0, direction):  # type: ignore[no-untyped-def]
+    """The orbit of a launch and the panels that it passes; no panels where the table does not decide."""
+    table, w0 = curve.table, v0 * v0
+    count = table.tops.size
+    none = Orbit(False, False, direction, lam0, w0, 0.0, 0.0), Passage(0, 0, 0.0, 0.0, 0.0)
+    if count == 0:
+        return none
+    start, x = locate(table, curve.period, lam0)
+    if w0 == 0.0:
+        direction = -int(table.rows[start % count, SLOPE_SIGN])
+        if direction == 0 or fabs(x) == 1.0:
+            return none
+    ahead, front, front_x = turn_from(curve, start, x, w0, direction)
+    if ahead == LIMIT and curve.period > 0.0 and w0 > 0.0:
+        lap = direction * curve.period
+        orbit = Orbit(True, False, direction, lam0, w0, min(lap, 0.0), max(lap, 0.0))
+        return orbit, Passage(start if direction > 0 else start - count, count + 1, x, x, curve.period)
+    if ahead != TURN:
+        return none
+    offset, front_x = polished(curve, lam0, w0, front, front_x)
+    other, back, back_x = 0.0, start, x
+    if w0 > 0.0:
+        behind, back, back_x = turn_from(curve, start, x, w0, -direction)
+        if behind != TURN:
+            return none
+        other, back_x = polished(curve, lam0, w0, back, back_x)
+    low, first, low_x, high, end, high_x = other, back, back_x, offset, front, front_x
+    if direction < 0:
+        low, first, low_x, high, end, high_x = offset, front, front_x, other, back, back_x
+    orbit = Orbit(False, False, direction, lam0, w0, low, high)
+    return orbit, Passage(first, end - first + 1, low_x, high_x, high - low)
+
+
+@Inner
+def fill_slacks(curve, passage, w0, circulates, slacks):  # type: ignore[no-untyped-def]
+    """Fill V**2/2 at the left edge of each panel of a passage; returns whether they keep enough digits.
+
+    They are sums from the nearer turning point. On a panel that has one they are as if the curve went on beyond it.
+    """
+    rows, count, last = curve.table.rows, curve.table.tops.size, passage.panels - 1
+    middle = last if circulates else last // 2
+    k, high = passage.first % count, (passage.first + last) % count
+    slacks[0] = potential_on(rows, k, passage.low_x) + (0.5 * w0 if circulates else 0.0)
+    slack = (passage.low_x - 1.0) * difference_on(rows, k, passage.low_x, 1.0) + (0.5 * w0 if circulates else 0.0)
+    peak, least = max(slack, 0.5 * w0), 1.0
+    for j in range(1, middle + 1):
+        slacks[j] = slack
+        peak = max(peak, slack)
+        least = min(least, slack / peak)
+        slack -= rows[(passage.first + j) % count, RISE]
+    if circulates:
+        return least >= MIN_CANCELLATION_RATIO
+    slack, top = (passage.high_x + 1.0) * difference_on(rows, high, -1.0, passage.high_x), 0.0
+    slacks[last] = slack
+    for j in range(last - 1, middle, -1):
+        top = max(top, slack)
+        least = min(least, slack / top)
+        slack += rows[(passage.first + j) % count, RISE]
+        slacks[j] = slack
+    top = max(top, slack)
+    # Neither end may be next to an equilibrium.
+    edges = curve.table.edges
+    slope = min(
+        -difference_on(rows, k, passage.low_x, passage.low_x) / (edges[k + 1] - edges[k]),
+        difference_on(rows, high, passage.high_x, passage.high_x) / (edges[high + 1] - edges[high]),
+    )
+    enough = 0.5 * MIN_CANCELLATION_RATIO * max(top, peak)
+    return min(least, slack / top) >= MIN_CANCELLATION_RATIO and slope * passage.width >= enough
+
+
+@Inlined
+def is_upper(passage, j):  # type: ignore[no-untyped-def]
+    """Whether phase angles on panel j of a passage are counted from the upper end."""
+    return 2 * j >= passage.panels
+
+
+@Inner
+def fill_rates(table, passage, circulates, j, slack, gap, u, out):  # type: ignore[no-untyped-def]
+    """Fill the time per unit of u on panel j of a passage at the Gauss points u.
+
+    u is the orbit's phase angle, or the place on the panel if the body circulates. Phase angles are counted from the
+    nearer end, because a small time next to it needs a small angle with all digits. ``slack`` and ``gap`` belong to the
+    panel's edge that is nearer to that end: V**2/2 there, and the distance from the end.
+    """
+    rows, last = table.rows, passage.panels - 1
+    k = (passage.first + j) % table.tops.size
+    half = 0.5 * (table.edges[k + 1] - table.edges[k])
+    for i in range(NODES):
+        x, numerator, fall = u[i], half * half, 0.0
+        if not circulates:
+            s, c = sin(0.5 * u[i]), cos(0.5 * u[i])
+            below, above = passage.width * s * s, passage.width * c * c
+            if is_upper(passage, j):
+                below, above = above, below
+            if j == 0:
+                x = passage.low_x + below / half
+                numerator, fall = above * half, -difference_on(rows, k, passage.low_x, x)
+            elif j == last:
+                x = passage.high_x - above / half
+                numerator, fall = below * half, difference_on(rows, k, x, passage.high_x)
+            elif is_upper(passage, j):
+                x, numerator = 1.0 - (above - gap) / half, below * above
+                fall = slack + (1.0 - x) * difference_on(rows, k, x, 1.0)
+            else:
+                x, numerator = (below - gap) / half - 1.0, below * above
+                fall = slack - (1.0 + x) * difference_on(rows, k, -1.0, x)
+        else:
+            fall = slack - potential_on(rows, k, x)
+        out[i] = value_on(rows, k, DS_TERMS, x) * sqrt(numerator / (2.0 * fall))
+
+
+@Inner
+def time_on_part(table, passage, circulates, j, slack, gap, begin, end):  # type: ignore[no-untyped-def]
+    """The time between two values of u (`fill_rates`) on panel j of a passage; NaN where it is not accurate."""
+    u, rates = angle_buffer(), rates_buffer()
+    parts = 1
+    for _ in range(MAX_HALVINGS):
+        total, resolved = 0.0, True
+        half = 0.5 * (end - begin) / parts
+        for part in range(parts):
+            middle = begin + (2 * part + 1) * half
+            for i in range(NODES):
+                u[i] = middle + half * POINTS[i]
+            fill_rates(table, passage, circulates, j, slack, gap, u, rates)
+            size, last, before = 0.0, 0.0, 0.0
+            for i in range(NODES):
+                size += GAUSS_WEIGHTS[i] * rates[i]
+                last += FIT[i, NODES - 1] * rates[i]
+                before += FIT[i, NODES - 2] * rates[i]
+            total += half * size
+            resolved &= max(fabs(last), fabs(before)) <= MAX_TAIL_RATIO * size
+        if resolved:
+            return total
+        parts *= 2
+    return np.nan
+
+
+@Inner
+def time_on_panel(rows, k, slack):  # type: ignore[no-untyped-def]
+    """The time on a whole panel far from turning points by its own Gauss points; NaN if it is too near to one."""
+    distance, total = slack - rows[k, MIDDLE], 0.0
+    if distance > SAFETY * rows[k, FEW_REACH]:
+        few = few_rates()
+        for i in range(FEW_NODES):
+            few[i] = rows[k, FEW_WEIGHTS + i] / sqrt(2.0 * (slack - rows[k, FEW_POTENTIAL + i]))
+        for i in range(FEW_NODES):
+            total += few[i]
+        return total
+    if distance > SAFETY * rows[k, REACH]:
+        rates = rates_buffer()
+        for i in range(NODES):
+            rates[i] = rows[k, WEIGHTS + i] / sqrt(2.0 * (slack - rows[k, POTENTIAL + i]))
+        for i in range(NODES):
+            total += rates[i]
+        return total
+    return np.nan
+
+
+@Inner
+def phase_of(below, above):  # type: ignore[no-untyped-def]
+    """The phase angle of a place by its distances from the lower and the upper end."""
+    return 2.0 * atan2(sqrt(max(below, 0.0)), sqrt(max(above, 0.0)))
+
+
+@Inner
+def time_between(curve, orbit, passage, slacks, lower, upper):  # type: ignore[no-untyped-def]
+    """The time that a body takes from one place of its orbit to a higher one; NaN where it is not accurate.
+
+    ``lower`` and ``upper`` are the distances of each from both ends of the orbit.
+    """
+    table, total = curve.table, 0.0
+    count, last, right = table.tops.size, passage.panels - 1, 0.0
+    for j in range(passage.panels):
+        k = (passage.first + j) % count
+        size = table.edges[k + 1] - table.edges[k]
+        left = right if j > 0 else -0.5 * (1.0 + passage.low_x) * size
+        right = left + size if j > 0 else 0.5 * (1.0 - passage.low_x) * size
+        if left >= upper[0]:
+            break
+        if right <= lower[0]:
+            continue
+        begins, ends = left <= lower[0], right >= upper[0]
+        if not (begins or ends):
+            time = time_on_panel(table.rows, k, slacks[j])
+            if time == time:
+                total += time
+                continue
+        slack, gap = slacks[j], left
+        if orbit.circulates:
+            half = 0.5 * size
+            begin = (lower[0] - left) / half - 1.0 if begins else -1.0
+            end = (upper[0] - left) / half - 1.0 if ends else 1.0
+        else:
+            first = lower if begins else (left, passage.width - left)
+            second = upper if ends else (right, passage.width - right)
+            if is_upper(passage, j):
+                first, second = (second[1], second[0]), (first[1], first[0])
+                if j < last:
+                    slack = slacks[j + 1]
+                    beyond = (passage.first + last) % count
+                    rest = 0.5 * (1.0 + passage.high_x) * (table.edges[beyond + 1] - table.edges[beyond])
+                    gap = rest if j == last - 1 else passage.width - right
+            begin, end = phase_of(first[0], first[1]), phase_of(second[0], second[1])
+        total += time_on_part(table, passage, orbit.circulates, j, slack, gap, begin, end)
+    return total
+
+
+@Inner
+def passage_time(curve, orbit, passage, slacks):  # type: ignore[no-untyped-def]
+    """The half period of a libration, or the time of a circulation's lap; NaN where it is not accurate."""
+    return time_between(curve, orbit, passage, slacks, (0.0, passage.width), (passage.width, 0.0))
+
+
+@Inner
+def passage_arrival(curve, orbit, passage, slacks, place):  # type: ignore[no-untyped-def]
+    """The first time at which a body is at a place: NaN where it is not accurate, inf if never."""
+    ahead, width, laps = place - orbit.lam0, passage.width, 0.0
+    here, start, end = (-orbit.low, orbit.high), (0.0, width), (width, 0.0)
+    if orbit.circulates:
+        laps = floor(orbit.direction * ahead / width)
+        ahead -= orbit.direction * laps * width
+    there = (ahead - orbit.low, orbit.high - ahead)
+    if laps < 0.0 or not (there[0] >= 0.0 and there[1] >= 0.0):
+        return np.inf
+    time = laps * passage_time(curve, orbit, passage, slacks) if laps > 0.0 else 0.0
+    onwards = orbit.direction * ahead >= 0.0
+    # First to the place or to the end ahead, then back from there.
+    for stretch in range(1 if onwards else 2):
+        target = there if onwards or stretch == 1 else here
+        other = here if onwards else (end if orbit.direction > 0 else start)
+        lower, upper = (target, other) if target[0] < other[0] else (other, target)
+        time += time_between(curve, orbit, passage, slacks, lower, upper)
+    return time
