@@ -154,7 +154,7 @@ def half_of_leg(forces, march, panels, v2, errors, record):  # type: ignore[no-u
         for j in range(WIDE):
             kept = damping / (1.0 + work[EXPM1_Q + j])
             grows = (right - left) * (slope_at(left, march) + 2.0 * march.g * work[OFFSET + j])
-            bend = u * work[MEAN + j] / (grows * work[DS + j])
+            bend = work[MEAN + j] / (grows * work[DS + j])
             change = (u * (work[P + j] - work[Q + j] * work[W + j]) - slope * kept) / work[W + j]
             work[LOAD + j] = work[TIME_RATE + j] * (bend - 0.5 * change)
             work[MEAN + j] = work[TIME_RATE + j] * kept / work[W + j]
