@@ -426,9 +426,9 @@ def _units(curve: Curve, kernel: Kernel) -> dict[str, str]:
     found = found_dimensions(curve_formulas(curve) + kernel_formulas(kernel), COMMON)
     units = {**units_by_role(kernel), **{name: unit for name in found if (unit := unit_of(found[name]))}}
     own = parameter_dimension(curve)
-    names = {curve.parameter.name, *dict(curve.defaults), *dict(kernel.defaults), "m", "g"}
+    names = dict.fromkeys((curve.parameter.name, *dict(curve.defaults), *dict(kernel.defaults), "g", "m"))
     told = units if own is None else {**units, curve.parameter.name: unit_of(own)}
-    return {name: unit for name, unit in told.items() if name in names}
+    return {name: told[name] for name in names if name in told}
 
 
 def _losses(curve: Curve, kernel: Kernel, x: sp.Expr, z: sp.Expr, law: Forces, shape: Geometry) -> Dissipation:

@@ -75,7 +75,8 @@ def read_launch(formulas: Formulas, p: ParameterValues, request: LaunchRequest) 
     """
     lam0, v0, direction, point, t_max, contact = request
     if point is None and lam0 is not None:
-        place, at = read_number(lam0, where="lam0", unit=formulas.units.get(formulas.parameter)), None
+        unit = None if type(lam0) is float else formulas.units.get(formulas.parameter)
+        place, at = read_number(lam0, where="lam0", unit=unit), None
     else:
         place, at = _read_place(formulas, p, lam0, point)
     if direction not in (1, -1):
