@@ -31,11 +31,14 @@ class ParameterValues(tuple[Number, ...]):
         The range of the curve parameter, once it has been asked for.
     functions : launch.functions.BoundFunctions or None
         The compiled functions bound to these values, once they have been asked for.
+    tape : double_double.recording.BoundTape or None
+        The exact formulas as a tape, once it has been asked for; False if there is none.
     """
 
     values: Array
     domain: Domain | None = None
     functions: Any = None
+    tape: Any = None
 
 
 @lru_cache(maxsize=8)
