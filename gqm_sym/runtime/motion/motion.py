@@ -240,7 +240,8 @@ class Motion(ABC):
         SolutionError
             If the motion is never there before ``t_end``.
         """
-        place = read_number(lam, where=self.problem.formulas.parameter)
+        formulas = self.problem.formulas
+        place = read_number(lam, where=formulas.parameter, unit=formulas.units.get(formulas.parameter))
         origin = self.problem.launch.lam0
         if place.value == origin.value and place.low == origin.low:
             return 0.0
@@ -441,7 +442,7 @@ class Motion(ABC):
         InputError
             If a time is not a number.
         """
-        start, stop = read_number(t1, where="t1").value, read_number(t2, where="t2").value
+        start, stop = read_number(t1, where="t1", unit="s").value, read_number(t2, where="t2", unit="s").value
         found = self._events_along(self._trajectory(min(stop, self._horizon)).segments, stop)
         return Rows(event for event in found if start <= event.t <= stop)
 
@@ -547,7 +548,7 @@ class Motion(ABC):
         return Event(kind, when[0], float(lam[0]) + timed.laps * self._trajectory(0.0).lap, float(x), float(z))
 
     def _times(self, t: Any) -> tuple[Array, Array, tuple[int, ...]]:
-        times, low, shape = read_numbers(t, where="t")
+        times, low, shape = read_numbers(t, where="t", unit="s")
         if times.size:
             if not np.isfinite(times).all():
                 raise InputError("t: must be finite numbers, got NaN or an infinite one")
