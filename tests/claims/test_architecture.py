@@ -152,7 +152,7 @@ ONLY_IN = {
     "numba": {"runtime"},
     "pandas": {"export"},
     "numpy": {"runtime", "literals", "figures", "export", "design", "studies", "smoothing"},
-    "pint": {"specfile"},
+    "pint": {"literals"},
     "pydantic": {"specfile", "studies"},
     "pydantic_core": {"specfile", "studies"},
     "ruamel": {"specfile"},

@@ -268,7 +268,7 @@ class PeriodicMotion(Motion):
     @locked
     def events_between(self, t1: Any, t2: Any) -> tuple[Event, ...]:
         """The events from time t1 to t2 over as many periods as that takes; see `Motion.events_between`."""
-        start, stop = read_number(t1, where="t1").value, read_number(t2, where="t2").value
+        start, stop = read_number(t1, where="t1", unit="s").value, read_number(t2, where="t2", unit="s").value
         period = self.period
         lap = self._trajectory(0.0).lap
         out = []
