@@ -19,6 +19,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+import numpy as np
 from mpmath import mp, mpf
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
@@ -31,7 +32,7 @@ DIGITS = 40
 NODES, TOLERANCE = 24, mpf(10) ** -19
 MAX_DEPTH = 40
 # Places on the way to the next turning point at which a motion is looked at, as shares of the phase angle.
-SHARES = (0.01, 0.1, 0.4, 0.7, 0.95, 1.0)
+SHARES = (0.003, 0.01, 0.03, 0.1, 0.2, 0.4, 0.6, 0.8, 0.9, 0.97, 0.99, 1.0)
 # A bound of more than this share of the width, per unit of the condition number, is of no use.
 USELESS = 1e-11
 
@@ -158,12 +159,16 @@ def times(family: Family, p: dict[str, Any], ends: tuple[Any, Any], energy: Any,
 
 
 def _nodes() -> list[tuple[Any, Any]]:
-    """The Gauss-Legendre rule of `NODES` nodes."""
-    if not _RULE:
-        for k in range(1, NODES + 1):
-            x = mp.findroot(lambda x: mp.legendre(NODES, x), mp.cos(mp.pi * (k - mpf(1) / 4) / (NODES + mpf(1) / 2)))
-            slope = NODES * (x * mp.legendre(NODES, x) - mp.legendre(NODES - 1, x)) / (x**2 - 1)
-            _RULE.append((x, 2 / ((1 - x**2) * slope**2)))
+    """The Gauss-Legendre rule of `NODES` nodes, by Newton's method from its nodes in doubles."""
+    for guess in () if _RULE else np.polynomial.legendre.leggauss(NODES)[0].tolist():
+        x = mpf(guess)
+        for _ in range(3):
+            before, value = mpf(1), x
+            for n in range(2, NODES + 1):
+                before, value = value, ((2 * n - 1) * x * value - (n - 1) * before) / n
+            slope = NODES * (x * value - before) / (x**2 - 1)
+            x -= value / slope
+        _RULE.append((x, 2 / ((1 - x**2) * slope**2)))
     return _RULE
 
 

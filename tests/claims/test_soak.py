@@ -14,6 +14,7 @@ from paths import ROOT
 sys.path.append(str(ROOT / "scripts"))
 
 import soak
+import soak_bounds
 
 SLOW = {"lam0": -1.0, "v0": 2.0116e-06, "direction": 1, "h": 0.18013, "g": 7.62668, "m": 1.0}
 
@@ -123,3 +124,31 @@ def test_a_sweep_that_differs_is_reported(well: ModuleType) -> None:
     period = well.solve(**call).period
     assert soak.swept(well, call, period) == []
     assert soak.swept(well, call, period * (1.0 + 2e-15))
+
+
+@pytest.fixture(scope="module")
+def families(tmp_path_factory: pytest.TempPathFactory) -> dict[str, ModuleType]:
+    """The modules of the random curves."""
+    return soak_bounds.build(tmp_path_factory.mktemp("families"))
+
+
+def test_random_librations_keep_to_their_bounds(families: dict[str, ModuleType]) -> None:
+    """A thousand places of random librations lie within the bounds that they state, and no bound is useless."""
+    tally, failed = soak_bounds.soak(85, 19, families)
+    assert failed == []
+    assert tally["checks"] >= 900
+
+
+def test_a_bound_that_does_not_hold_is_reported(
+    families: dict[str, ModuleType], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Bounds a million times smaller are broken, and larger ones useless."""
+    family = soak_bounds.FAMILIES["ellipse"]
+    module = families["ellipse"]
+    call = {"lam0": 1.0, "v0": 0.0, "direction": 1, "a": 1.0, "b": 1.0, "k": 0.5, "g": 9.81}
+    assert soak_bounds.faults(module, family, call) == ([], len(soak_bounds.SHARES))
+    motion = type(module.solve(**call))
+    stated = motion.error_bound
+    for factor, word in ((1e-6, "outside"), (1e9, "useless")):
+        monkeypatch.setattr(motion, "error_bound", lambda self, t, factor=factor: factor * stated(self, t))
+        assert any(found.startswith(word) for found in soak_bounds.faults(module, family, call)[0])
