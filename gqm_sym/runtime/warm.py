@@ -7,6 +7,7 @@ compiled twice.
 
 import inspect
 import os
+import re
 from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from importlib import import_module
@@ -18,13 +19,16 @@ from gqm_sym.loading import load
 from gqm_sym.runtime.compiled import jit
 from gqm_sym.runtime.compiled.stamps import FOLDER, RUNTIME
 
+# What stands in a file that has an entry point, or a function that is called by its address.
+ENTRY = re.compile(r"^(@entry\(|\w.*= Later\(|@.*\bLater\()", re.MULTILINE)
+
 # Where the entry points that take longest are: all processes are busy to the end when these come first.
 LONGEST = ("legs.answers", "sweep.scalar", "sweep.batch.batches", "double_double.orbit_time", "launch.speed")
 
 
 def rooms() -> list[str]:
     """The files of the runtime that have entry points, by their dotted names, the slow ones first."""
-    files = (path for path in sorted(FOLDER.rglob("*.py")) if "\n@entry(" in path.read_text(encoding="utf-8"))
+    files = (path for path in sorted(FOLDER.rglob("*.py")) if ENTRY.search(path.read_text(encoding="utf-8")))
     names = [".".join(path.relative_to(FOLDER).with_suffix("").parts) for path in files]
     return sorted(names, key=lambda name: LONGEST.index(name) if name in LONGEST else len(LONGEST))
 
@@ -33,6 +37,8 @@ def compile_room(name: str) -> str:
     """Compile the entry points of a file of the runtime into the cache; returns its name."""
     module = import_module(f"{RUNTIME}.{name}")
     for call in vars(module).values():
+        if isinstance(call, jit.Later):
+            _ = call.address
         is_entry = isinstance(call, FunctionType) and call.__code__.co_name == "call"
         if is_entry and call.__module__ == module.__name__:
             given = inspect.getclosurevars(call).nonlocals

@@ -80,6 +80,10 @@ class Motion(ABC):
     def _time_error(self, t: Array) -> Array:
         """Estimated error in s of the time at which the body comes to its segment of the trajectory."""
 
+    def _errors_before(self, timed: TimedSegment, phi: Array) -> tuple[float, Array]:
+        """Bounds of the errors from before a timed segment: of its place, and of the times at phase angles."""
+        return 0.0, np.zeros_like(phi)
+
     @property
     def turning_points(self) -> tuple[float, ...]:
         """The turning points, as values of the curve parameter in the order of time.
@@ -280,8 +284,9 @@ class Motion(ABC):
             rate = np.where(ds > 0.0, np.abs(v) / ds, 0.0)
         time_error, inversion_error = self._time_error(times), np.zeros_like(times)
         for timed, mask, phi in points.segments:
-            time_error[mask] += timed.segment.time_error(phi)
-            inversion_error[mask] = timed.segment.inversion_error(phi)
+            place_before, time_before = self._errors_before(timed, phi)
+            time_error[mask] += time_before + timed.segment.time_error(phi)
+            inversion_error[mask] = place_before + timed.segment.inversion_error(phi)
         # The length of a lap, its multiple and the sum are rounded.
         rounding = ULP * (1.5 * np.abs(points.laps * points.trajectory.lap) + 2.0 * np.abs(reduced))
         bound: Array = rate * time_error + inversion_error + rounding

@@ -69,6 +69,7 @@ class PeriodicMotion(Motion):
         self._double_trajectory: Trajectory | None = None
         self._precise_trajectory: Trajectory | None = None
         self._exact_timing: timing.Timing | None = None
+        self._is_period_known = False  # to more digits than doubles hold
         self._sampler: Sampler | None = None
 
     @property
@@ -101,7 +102,7 @@ class PeriodicMotion(Motion):
         """The times with as many digits as a phase needs at ``end_time`` in s from launch."""
         if not self._has_multiprecision:
             return timing.in_doubles(self.kind, self._segment, self._offsets)
-        launch = self.problem, self.kind, self.direction
+        launch, self._is_period_known = (self.problem, self.kind, self.direction), True
         if self._exact_timing is None:
             self._exact_timing = timing.in_double_double(*launch, self._segment, self._offsets)
         if self._exact_timing is None or end_time > self._exact_timing.max_time:
@@ -112,7 +113,7 @@ class PeriodicMotion(Motion):
     @property
     def _duration(self) -> float:
         """Half period or loop time in s, the double nearest to the exact one."""
-        orbit = self._orbit
+        orbit, self._is_period_known = self._orbit, True
         if orbit is not None and orbit.duration.is_decided:
             return orbit.duration.high
         return self._timing(inf).duration[0]
@@ -148,12 +149,13 @@ class PeriodicMotion(Motion):
         return timing.period_to(self.problem, self.kind, self.direction, self._segment, digits)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """As `Motion`, with whether its period is known as two doubles: the last digit of a place depends on it."""
-        return *super().__reduce__(), self._exact_timing is not None
+        """As `Motion`, with how exactly its period is known: the last digit of a place depends on it."""
+        known_until = self._exact_timing.max_time if self._exact_timing is not None else 0.0
+        end_time = None if not self._is_period_known else inf if known_until == inf else 0.0
+        return *super().__reduce__(), end_time
 
-    def __setstate__(self, has_exact_timing: bool) -> None:
-        if has_exact_timing:
-            _ = self._timing
+    def __setstate__(self, end_time: float) -> None:
+        self._timing(end_time)
 
     def lam(self, t: Any) -> Any:
         """The curve parameter at times; see `Motion.lam`. For doubles this is one call of compiled code."""
@@ -210,8 +212,9 @@ class PeriodicMotion(Motion):
 
     def _trajectory(self, end_time: float) -> Trajectory:
         one_period_time = self._segment.duration * (2.0 if self.kind == "libration" else 1.0)
-        is_known = self._exact_timing is not None or "_orbit" in vars(self)
-        if self._has_multiprecision and (end_time > one_period_time or is_known or self._segment.from_multiprecision):
+        if self._has_multiprecision and (
+            end_time > one_period_time or self._is_period_known or self._segment.from_multiprecision
+        ):
             times = self._timing(end_time)
             if self._precise_trajectory is None:
                 self._precise_trajectory = self._build(times)
