@@ -8,7 +8,7 @@ from gqm_sym.runtime.compiled.stamps import FOLDER
 
 
 def test_every_entry_point_is_found() -> None:
-    """The files with a function under ``entry`` or with a `Later`, as Python's own parser sees them; the slow ones come first."""
+    """The files with an entry point or a `Later`, as Python's own parser sees them; the slow ones come first."""
 
     def has_entry(path: Path) -> bool:
         tree = ast.parse(path.read_text(encoding="utf-8"))
