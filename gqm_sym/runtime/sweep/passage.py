@@ -211,6 +211,21 @@ def find_passage(curve, lam0, v0, direction):  # type: ignore[no-untyped-def]
 
 
 @Inner
+def passage_of(curve, orbit):  # type: ignore[no-untyped-def]
+    """The panels that a known orbit passes; none if the curve is not tabulated."""
+    table = curve.table
+    if table.tops.size == 0:
+        return Passage(0, 0, 0.0, 0.0, 0.0)
+    first, low_x = locate(table, curve.period, orbit.lam0 + orbit.low)
+    if orbit.circulates:
+        return Passage(first, table.tops.size + 1, low_x, low_x, curve.period)
+    last, high_x = locate(table, curve.period, orbit.lam0 + orbit.high)
+    inside = table.edges[0] <= orbit.lam0 + orbit.low and orbit.lam0 + orbit.high <= table.edges[-1]
+    panels = last - first + 1 if inside or curve.period > 0.0 else 0
+    return Passage(first, panels, low_x, high_x, orbit.high - orbit.low)
+
+
+@Inner
 def fill_slacks(curve, passage, w0, circulates, slacks):  # type: ignore[no-untyped-def]
     """Fill V**2/2 at the left edge of each panel of a passage; returns whether they keep enough digits.
 

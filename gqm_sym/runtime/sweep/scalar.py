@@ -25,7 +25,7 @@ from gqm_sym.runtime.compiled.strided import (
     V0,
     element,
 )
-from gqm_sym.runtime.compiled.types import ADDRESSES, MATRIX, VECTOR, Array
+from gqm_sym.runtime.compiled.types import ADDRESSES, MATRIX, REAL, VECTOR, Array
 from gqm_sym.runtime.launch.domain import DomainNumbers
 from gqm_sym.runtime.launch.ends import NO_ORBIT, ends, orbit_kind
 from gqm_sym.runtime.quadrature.time_panels import joints_between
@@ -39,13 +39,15 @@ from gqm_sym.runtime.quadrature.trapezoid import (
 )
 from gqm_sym.runtime.sweep.arrivals import arrival
 from gqm_sym.runtime.sweep.curve_table import TABLE, CurveTable
+from gqm_sym.runtime.sweep.liftoff import liftoff_place
 from gqm_sym.runtime.sweep.orbit import Orbit, SweptCurve
 from gqm_sym.runtime.sweep.orbit_extremes import extreme, passage_extreme
-from gqm_sym.runtime.sweep.passage import Passage, fill_slacks, find_passage, passage_arrival, passage_time
+from gqm_sym.runtime.sweep.passage import Passage, fill_slacks, find_passage, passage_arrival, passage_of, passage_time
 from gqm_sym.runtime.sweep.quantities import (
     ANSWERED,
     ANSWERS,
     ARRIVAL_TIME,
+    END_TIME,
     HALF_PERIOD,
     MAX_FORCE,
     MAX_SPEED,
@@ -73,14 +75,20 @@ class GivenCurve(NamedTuple):
         The places at which the curve is not smooth, within one period.
     table : CurveTable
         The curve tabulated, if all launches have the same parameters; else an empty one.
+    side : int
+        1 if the track can only push along the normal, -1 if only against it, 0 if it can push and pull.
+    t_max : float
+        The last time in s, infinite if there is none; only END_TIME depends on it.
     """
 
     parameters: Array
     joints: Array
     table: CurveTable
+    side: int
+    t_max: float
 
 
-GIVEN = types.NamedTuple((VECTOR, VECTOR, TABLE), GivenCurve)
+GIVEN = types.NamedTuple((VECTOR, VECTOR, TABLE, types.int64, REAL), GivenCurve)
 
 
 class Buffers(NamedTuple):
@@ -131,7 +139,8 @@ def find_orbit(curve, columns, k, monotone, spans, known):  # type: ignore[no-un
         return UNDECIDED, none, nowhere
     circulates = kind == CIRCULATION
     one, other = (direction * period, 0.0) if circulates else (ahead.near, behind.near)
-    return ANSWERED, Orbit(circulates, even, direction, lam0, v2, min(one, other), max(one, other)), nowhere
+    orbit = Orbit(circulates, even, direction, lam0, v2, min(one, other), max(one, other))
+    return ANSWERED, orbit, passage_of(curve, orbit)
 
 
 @Inner
@@ -177,8 +186,47 @@ def value_by_itself(curve, orbit, quantity, target, buffers):  # type: ignore[no
 
 
 @Inner
-def fill_answer(curve, orbit, passage, quantity, target, buffers, out):  # type: ignore[no-untyped-def]
-    """Fill the row ``out`` with a quantity of an orbit; returns the status. ``target`` is the place of ARRIVAL_TIME."""
+def liftoff(curve, orbit, passage, side, buffers):  # type: ignore[no-untyped-def]
+    """The place where a body leaves the track; NaN if it never does, inf where that is not decided."""
+    if side == 0:
+        return nan
+    if passage.panels == 0 or not fill_slacks(curve, passage, orbit.v2, orbit.circulates, buffers.slacks):
+        return inf
+    return liftoff_place(curve, orbit, passage, buffers.slacks, side)
+
+
+@Inner
+def fill_end_time(curve, orbit, passage, ends, buffers, out):  # type: ignore[no-untyped-def]
+    """Fill ``out`` with the time of liftoff, or the last time if that is sooner; ``ends`` are that place and time."""
+    place, time = ends
+    if place == place:
+        when = value_from_table(curve, orbit, passage, ARRIVAL_TIME, place, buffers.slacks)
+        if when != when:
+            when = value_by_itself(curve, orbit, ARRIVAL_TIME, place, buffers)
+        if not isfinite(when):
+            return UNDECIDED
+        time = min(time, when)
+    if time == inf:
+        return NOT_PERIODIC
+    out[0] = time
+    return ANSWERED
+
+
+@Inner
+def fill_answer(curve, orbit, passage, asked, buffers, out):  # type: ignore[no-untyped-def]
+    """Fill the row ``out`` with a quantity of an orbit; returns the status.
+
+    ``asked`` is the quantity, the place of ARRIVAL_TIME, and side and last time as `GivenCurve` has them.
+    """
+    quantity, target, side, t_max = asked
+    if side != 0 or quantity == END_TIME:
+        place = liftoff(curve, orbit, passage, side, buffers)
+        if place == inf:
+            return UNDECIDED
+        if quantity == END_TIME:
+            return fill_end_time(curve, orbit, passage, (place, t_max), buffers, out)
+        if place == place:
+            return NOT_PERIODIC if quantity in (HALF_PERIOD, PERIOD, TURNING_POINTS) else UNDECIDED
     if orbit.circulates and quantity in (HALF_PERIOD, TURNING_POINTS):
         return NOT_PERIODIC
     if quantity == TURNING_POINTS:
@@ -218,7 +266,7 @@ def answer_one_by_one(fns, columns, monotone, quantity, spans, answers, given): 
         What all launches share.
     """
     buffers = Buffers(trapezoid_workspace(), trapezoid_rates(), np.empty(given.table.tops.size + 1))
-    p, joints = uncounted(given.parameters), uncounted(given.joints)
+    p, joints, side, t_max = uncounted(given.parameters), uncounted(given.joints), given.side, given.t_max
     table = CurveTable(uncounted(given.table.edges), uncounted(given.table.tops), uncounted(given.table.rows))
     columns, spans, values = uncounted(columns), uncounted(spans), uncounted(answers.values)
     statuses, routes = uncounted(answers.status), uncounted(answers.route)
@@ -232,5 +280,5 @@ def answer_one_by_one(fns, columns, monotone, quantity, spans, answers, given): 
         status, orbit, passage = find_orbit(curve, columns, k, monotone, spans, known)
         if status == ANSWERED:
             target = element(columns, TARGET, k)
-            status = fill_answer(curve, orbit, passage, quantity, target, buffers, values[k])
+            status = fill_answer(curve, orbit, passage, (quantity, target, side, t_max), buffers, values[k])
         statuses[k], routes[k] = status, SINGLE
