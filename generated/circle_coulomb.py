@@ -1,5 +1,5 @@
 # Made by gqm-gen for "circle_coulomb". Do not edit: change its declaration and generate again.
-# interface 8, input b0d8ff0ac753, body ac19edcd18ec
+# interface 9, input b0d8ff0ac753, body 6815514bbd40
 """Bead on a rough ring
 
 x              = L*sin(theta)
@@ -27,15 +27,15 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=8)
+compiled = compiler(__file__, interface=9)
 
 from gqm_sym.runtime.vocabulary import (
-    PATH_AND_CONTACT_FORCE, SPEED_EQUATION, STATIC_BALANCE, Addresses, CompiledModel, Dissipation, LaunchRequest, Pass1,
-    cos, sin,
+    BOUNDS, EFFECTIVE_POTENTIAL, PATH_AND_CONTACT_FORCE, SPEED_EQUATION, STATIC_BALANCE, Addresses, CompiledModel,
+    Dissipation, LaunchRequest, Pass1, cos, imul, isin, sin,
 )
 
 if TYPE_CHECKING:
-    from gqm_sym.runtime import Motion, Sweep
+    from gqm_sym.runtime import Equilibrium, Motion, Sweep
 
 PARAMETERS = {'L': '1', 'mu': '0.15', 'mu_static': '0.2', 'g': '9.81', 'm': '1'}
 
@@ -87,6 +87,28 @@ def static_balance(n, places, p, out):
         out[1, i] = mu_static*fabs(n0) + push
 
 
+@compiled(EFFECTIVE_POTENTIAL, later=True)
+def effective_potential(n, places, p, out):
+    """U per unit mass, V**2 = v0**2 - 2*(U(theta) - U(lam0)), and dU/dtheta (paper, eq. 13)."""
+    places, p, out = carray(places, n), carray(p, 5), carray(out, (2, n))
+    L, g = p[0], p[3]
+    _t0 = L*g
+    for i in range(n):
+        theta = places[i]
+        out[0, i] = -_t0*cos(theta)
+        out[1, i] = _t0*sin(theta)
+
+
+@compiled(BOUNDS, later=True)
+def bounds(lo, hi, p, out):
+    """Bounds of dU/dtheta and ds/dtheta for lo <= theta <= hi, by interval arithmetic."""
+    p, out = carray(p, 5), carray(out, 4)
+    theta = (lo, hi)
+    L, g = (p[0], p[0]), (p[3], p[3])
+    out[0], out[1] = imul(imul(L, g), isin(theta))
+    out[2], out[3] = L
+
+
 # The same formulas over a namespace of operations, for extended precision.
 
 def exact_domain(op, p):
@@ -94,7 +116,7 @@ def exact_domain(op, p):
     return None, None, 2*op.pi
 
 
-def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = None, L: Any = '1', mu: Any = '0.15', mu_static: Any = '0.2', g: Any = '9.81', m: Any = '1') -> Pass1:
+def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = None, L: Any = '1', mu: Any = '0.15', mu_static: Any = '0.2', g: Any = '9.81', m: Any = '1', **unknown: Any) -> Pass1:
     """Position, metric, curvature, V**2 and contact force at places of the curve (Pass 1, no quadrature).
 
     Parameters
@@ -113,7 +135,7 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = 
     Pass1
         Arrays x, z, ds, kappa, v2 and normal_force.
     """
-    return MODEL.pass1(LaunchRequest(lam0, v0, direction), (L, mu, mu_static, g, m), lam, out)
+    return MODEL.pass1(LaunchRequest(lam0, v0, direction), (L, mu, mu_static, g, m), lam, out, unknown)
 
 
 def solve(
@@ -125,6 +147,7 @@ def solve(
     t_max: Any = None,
     contact: str = "bilateral",
     L: Any = '1', mu: Any = '0.15', mu_static: Any = '0.2', g: Any = '9.81', m: Any = '1',
+    **unknown: Any,
 ) -> "Motion":
     """The motion that a launch begins (Passes 1 to 3).
 
@@ -150,7 +173,7 @@ def solve(
     GQMError
         For a launch or a parameter that cannot be; the message says what would be right.
     """
-    return MODEL.solve(LaunchRequest(lam0, v0, direction, point, t_max, contact), (L, mu, mu_static, g, m))
+    return MODEL.solve(LaunchRequest(lam0, v0, direction, point, t_max, contact), (L, mu, mu_static, g, m), unknown)
 
 
 def sweep(
@@ -164,6 +187,7 @@ def sweep(
     contact: str = "bilateral",
     client: Any = None,
     L: Any = '1', mu: Any = '0.15', mu_static: Any = '0.2', g: Any = '9.81', m: Any = '1',
+    **unknown: Any,
 ) -> "Sweep":
     """One quantity over arrays of launches and parameters, on all cores; all arguments broadcast.
 
@@ -190,15 +214,35 @@ def sweep(
         ``status_counts()`` counts the launches without a value.
     """
     launches = LaunchRequest(lam0, v0, direction, None, t_max, contact)
-    return MODEL.sweep(quantity, launches, (L, mu, mu_static, g, m), lam=lam, client=client, source=__file__)
+    return MODEL.sweep(quantity, launches, (L, mu, mu_static, g, m), lam=lam, client=client, unknown=unknown)
+
+
+def equilibria(*, between: Any = None, L: Any = '1', mu: Any = '0.15', mu_static: Any = '0.2', g: Any = '9.81', m: Any = '1', **unknown: Any) -> "tuple[Equilibrium, ...]":
+    """Where a body at rest stays, whether it is stable there, and the frequency of small oscillations.
+
+    Parameters
+    ----------
+    between : pair of numbers, optional
+        The range of theta to look in: the whole domain, or one period, if not given.
+    L, mu, mu_static, g, m
+        Run-time parameters; `PARAMETERS` holds their defaults.
+
+    Returns
+    -------
+    tuple of Equilibrium
+        Each with lam, stable and frequency (rad/s).
+    """
+    return MODEL.equilibria((L, mu, mu_static, g, m), between, unknown)
 
 
 MODEL = CompiledModel(
     name='circle_coulomb', parameter='theta', parameters=PARAMETERS, positive=('L',),
+    source=__file__,
     at_least=(('mu', '0'), ('mu_static', 'mu')),
     addresses=Addresses(
         path_and_contact_force.address,
     ),
+    effective_potential=effective_potential, bounds=bounds,
     domain_of=exact_domain,
     dissipation=Dissipation(speed_equation.address, static_balance.address, friction=True, kinked=False, linear=True),
 )

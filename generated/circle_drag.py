@@ -1,5 +1,5 @@
 # Made by gqm-gen for "circle_drag". Do not edit: change its declaration and generate again.
-# interface 8, input f2f11f54325e, body 262b432325fa
+# interface 9, input f2f11f54325e, body ff6aaabdf614
 """Pendulum in air
 
 x              = L*sin(theta)
@@ -26,15 +26,15 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=8)
+compiled = compiler(__file__, interface=9)
 
 from gqm_sym.runtime.vocabulary import (
-    PATH_AND_CONTACT_FORCE, SPEED_EQUATION, STATIC_BALANCE, Addresses, CompiledModel, Dissipation, LaunchRequest, Pass1,
-    cos, sin,
+    BOUNDS, EFFECTIVE_POTENTIAL, PATH_AND_CONTACT_FORCE, SPEED_EQUATION, STATIC_BALANCE, Addresses, CompiledModel,
+    Dissipation, LaunchRequest, Pass1, cos, imul, isin, sin,
 )
 
 if TYPE_CHECKING:
-    from gqm_sym.runtime import Motion, Sweep
+    from gqm_sym.runtime import Equilibrium, Motion, Sweep
 
 PARAMETERS = {'L': '1', 'b': '0.1', 'g': '9.81', 'm': '1'}
 
@@ -85,6 +85,28 @@ def static_balance(n, places, p, out):
         out[1, i] = push
 
 
+@compiled(EFFECTIVE_POTENTIAL, later=True)
+def effective_potential(n, places, p, out):
+    """U per unit mass, V**2 = v0**2 - 2*(U(theta) - U(lam0)), and dU/dtheta (paper, eq. 13)."""
+    places, p, out = carray(places, n), carray(p, 4), carray(out, (2, n))
+    L, g = p[0], p[2]
+    _t0 = L*g
+    for i in range(n):
+        theta = places[i]
+        out[0, i] = -_t0*cos(theta)
+        out[1, i] = _t0*sin(theta)
+
+
+@compiled(BOUNDS, later=True)
+def bounds(lo, hi, p, out):
+    """Bounds of dU/dtheta and ds/dtheta for lo <= theta <= hi, by interval arithmetic."""
+    p, out = carray(p, 4), carray(out, 4)
+    theta = (lo, hi)
+    L, g = (p[0], p[0]), (p[2], p[2])
+    out[0], out[1] = imul(imul(L, g), isin(theta))
+    out[2], out[3] = L
+
+
 # The same formulas over a namespace of operations, for extended precision.
 
 def exact_domain(op, p):
@@ -92,7 +114,7 @@ def exact_domain(op, p):
     return None, None, 2*op.pi
 
 
-def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = None, L: Any = '1', b: Any = '0.1', g: Any = '9.81', m: Any = '1') -> Pass1:
+def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = None, L: Any = '1', b: Any = '0.1', g: Any = '9.81', m: Any = '1', **unknown: Any) -> Pass1:
     """Position, metric, curvature, V**2 and contact force at places of the curve (Pass 1, no quadrature).
 
     Parameters
@@ -111,7 +133,7 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = 
     Pass1
         Arrays x, z, ds, kappa, v2 and normal_force.
     """
-    return MODEL.pass1(LaunchRequest(lam0, v0, direction), (L, b, g, m), lam, out)
+    return MODEL.pass1(LaunchRequest(lam0, v0, direction), (L, b, g, m), lam, out, unknown)
 
 
 def solve(
@@ -123,6 +145,7 @@ def solve(
     t_max: Any = None,
     contact: str = "bilateral",
     L: Any = '1', b: Any = '0.1', g: Any = '9.81', m: Any = '1',
+    **unknown: Any,
 ) -> "Motion":
     """The motion that a launch begins (Passes 1 to 3).
 
@@ -148,7 +171,7 @@ def solve(
     GQMError
         For a launch or a parameter that cannot be; the message says what would be right.
     """
-    return MODEL.solve(LaunchRequest(lam0, v0, direction, point, t_max, contact), (L, b, g, m))
+    return MODEL.solve(LaunchRequest(lam0, v0, direction, point, t_max, contact), (L, b, g, m), unknown)
 
 
 def sweep(
@@ -162,6 +185,7 @@ def sweep(
     contact: str = "bilateral",
     client: Any = None,
     L: Any = '1', b: Any = '0.1', g: Any = '9.81', m: Any = '1',
+    **unknown: Any,
 ) -> "Sweep":
     """One quantity over arrays of launches and parameters, on all cores; all arguments broadcast.
 
@@ -188,15 +212,35 @@ def sweep(
         ``status_counts()`` counts the launches without a value.
     """
     launches = LaunchRequest(lam0, v0, direction, None, t_max, contact)
-    return MODEL.sweep(quantity, launches, (L, b, g, m), lam=lam, client=client, source=__file__)
+    return MODEL.sweep(quantity, launches, (L, b, g, m), lam=lam, client=client, unknown=unknown)
+
+
+def equilibria(*, between: Any = None, L: Any = '1', b: Any = '0.1', g: Any = '9.81', m: Any = '1', **unknown: Any) -> "tuple[Equilibrium, ...]":
+    """Where a body at rest stays, whether it is stable there, and the frequency of small oscillations.
+
+    Parameters
+    ----------
+    between : pair of numbers, optional
+        The range of theta to look in: the whole domain, or one period, if not given.
+    L, b, g, m
+        Run-time parameters; `PARAMETERS` holds their defaults.
+
+    Returns
+    -------
+    tuple of Equilibrium
+        Each with lam, stable and frequency (rad/s).
+    """
+    return MODEL.equilibria((L, b, g, m), between, unknown)
 
 
 MODEL = CompiledModel(
     name='circle_drag', parameter='theta', parameters=PARAMETERS, positive=('L',),
+    source=__file__,
     at_least=(('b', '0'),),
     addresses=Addresses(
         path_and_contact_force.address,
     ),
+    effective_potential=effective_potential, bounds=bounds,
     domain_of=exact_domain,
     dissipation=Dissipation(speed_equation.address, static_balance.address, friction=False, kinked=False, linear=True),
 )

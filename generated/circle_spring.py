@@ -1,5 +1,5 @@
 # Made by gqm-gen for "circle_spring". Do not edit: change its declaration and generate again.
-# interface 8, input bcc7b1afa151, body 0ad41cfdb11c
+# interface 9, input bcc7b1afa151, body 4741e07678a8
 """Bead on a ring, tied by a spring to a point above its centre
 
 x              = L*sin(theta)
@@ -25,7 +25,7 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=8)
+compiled = compiler(__file__, interface=9)
 
 from gqm_sym.runtime.vocabulary import (
     AGM_ARGUMENTS_BATCH, BOUNDS, BOUNDS_BATCH, EFFECTIVE_POTENTIAL, LOAD_MAP, ORBIT_INVARIANTS_BATCH,
@@ -36,7 +36,7 @@ from gqm_sym.runtime.vocabulary import (
 )
 
 if TYPE_CHECKING:
-    from gqm_sym.runtime import Motion, Sweep
+    from gqm_sym.runtime import Equilibrium, Motion, Sweep
 
 PARAMETERS = {'L': '1', 'w': '3', 'h': '0.5', 'g': '9.81', 'm': '1'}
 
@@ -171,7 +171,7 @@ def exact_axes(op, p):
     return 0, op.pi
 
 
-def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = None, L: Any = '1', w: Any = '3', h: Any = '0.5', g: Any = '9.81', m: Any = '1') -> Pass1:
+def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = None, L: Any = '1', w: Any = '3', h: Any = '0.5', g: Any = '9.81', m: Any = '1', **unknown: Any) -> Pass1:
     """Position, metric, curvature, V**2 and contact force at places of the curve (Pass 1, no quadrature).
 
     Parameters
@@ -190,7 +190,7 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = 
     Pass1
         Arrays x, z, ds, kappa, v2 and normal_force.
     """
-    return MODEL.pass1(LaunchRequest(lam0, v0, direction), (L, w, h, g, m), lam, out)
+    return MODEL.pass1(LaunchRequest(lam0, v0, direction), (L, w, h, g, m), lam, out, unknown)
 
 
 def solve(
@@ -202,6 +202,7 @@ def solve(
     t_max: Any = None,
     contact: str = "bilateral",
     L: Any = '1', w: Any = '3', h: Any = '0.5', g: Any = '9.81', m: Any = '1',
+    **unknown: Any,
 ) -> "Motion":
     """The motion that a launch begins (Passes 1 to 3).
 
@@ -227,7 +228,7 @@ def solve(
     GQMError
         For a launch or a parameter that cannot be; the message says what would be right.
     """
-    return MODEL.solve(LaunchRequest(lam0, v0, direction, point, t_max, contact), (L, w, h, g, m))
+    return MODEL.solve(LaunchRequest(lam0, v0, direction, point, t_max, contact), (L, w, h, g, m), unknown)
 
 
 def sweep(
@@ -241,6 +242,7 @@ def sweep(
     contact: str = "bilateral",
     client: Any = None,
     L: Any = '1', w: Any = '3', h: Any = '0.5', g: Any = '9.81', m: Any = '1',
+    **unknown: Any,
 ) -> "Sweep":
     """One quantity over arrays of launches and parameters, on all cores; all arguments broadcast.
 
@@ -267,7 +269,25 @@ def sweep(
         ``status_counts()`` counts the launches without a value.
     """
     launches = LaunchRequest(lam0, v0, direction, None, t_max, contact)
-    return MODEL.sweep(quantity, launches, (L, w, h, g, m), lam=lam, client=client, source=__file__)
+    return MODEL.sweep(quantity, launches, (L, w, h, g, m), lam=lam, client=client, unknown=unknown)
+
+
+def equilibria(*, between: Any = None, L: Any = '1', w: Any = '3', h: Any = '0.5', g: Any = '9.81', m: Any = '1', **unknown: Any) -> "tuple[Equilibrium, ...]":
+    """Where a body at rest stays, whether it is stable there, and the frequency of small oscillations.
+
+    Parameters
+    ----------
+    between : pair of numbers, optional
+        The range of theta to look in: the whole domain, or one period, if not given.
+    L, w, h, g, m
+        Run-time parameters; `PARAMETERS` holds their defaults.
+
+    Returns
+    -------
+    tuple of Equilibrium
+        Each with lam, stable and frequency (rad/s).
+    """
+    return MODEL.equilibria((L, w, h, g, m), between, unknown)
 
 
 # ---- The same formulas once more, only for speed: a load map in one call, and many orbits at once for sweeps. ----
@@ -383,6 +403,7 @@ def bounds_batch(n, lo, hi, p, out):
 
 MODEL = CompiledModel(
     name='circle_spring', parameter='theta', parameters=PARAMETERS, positive=('L',),
+    source=__file__,
     addresses=Addresses(
         path_and_contact_force.address, effective_potential.address, potential_divdiff1.address,
         potential_divdiff2.address, bounds.address,

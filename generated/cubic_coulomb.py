@@ -1,5 +1,5 @@
 # Made by gqm-gen for "cubic_coulomb". Do not edit: change its declaration and generate again.
-# interface 8, input f472752dd3ba, body 42262cabc6e8
+# interface 9, input f472752dd3ba, body f0f3c70a392d
 """Cubic track with Coulomb friction
 
 x              = x
@@ -27,14 +27,15 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=8)
+compiled = compiler(__file__, interface=9)
 
 from gqm_sym.runtime.vocabulary import (
-    PATH_AND_CONTACT_FORCE, SPEED_EQUATION, STATIC_BALANCE, Addresses, CompiledModel, Dissipation, LaunchRequest, Pass1,
+    BOUNDS, EFFECTIVE_POTENTIAL, PATH_AND_CONTACT_FORCE, SPEED_EQUATION, STATIC_BALANCE, Addresses, CompiledModel,
+    Dissipation, LaunchRequest, Pass1, iadd, iconst, imul, ipow, isqrt,
 )
 
 if TYPE_CHECKING:
-    from gqm_sym.runtime import Motion, Sweep
+    from gqm_sym.runtime import Equilibrium, Motion, Sweep
 
 PARAMETERS = {'mu': '0.1', 'g': '9.81', 'm': '1'}
 
@@ -92,6 +93,27 @@ def static_balance(n, places, p, out):
         out[1, i] = mu*fabs(n0) + push
 
 
+@compiled(EFFECTIVE_POTENTIAL, later=True)
+def effective_potential(n, places, p, out):
+    """U per unit mass, V**2 = v0**2 - 2*(U(x) - U(lam0)), and dU/dx (paper, eq. 13)."""
+    places, p, out = carray(places, n), carray(p, 3), carray(out, (2, n))
+    g = p[1]
+    for i in range(n):
+        x = places[i]
+        out[0, i] = g*x**3
+        out[1, i] = 3*g*x**2
+
+
+@compiled(BOUNDS, later=True)
+def bounds(lo, hi, p, out):
+    """Bounds of dU/dx and ds/dx for lo <= x <= hi, by interval arithmetic."""
+    p, out = carray(p, 3), carray(out, 4)
+    x = (lo, hi)
+    g = (p[1], p[1])
+    out[0], out[1] = imul(imul(iconst(3.0), g), ipow(x, 2))
+    out[2], out[3] = isqrt(iadd(imul(iconst(9.0), ipow(x, 4)), iconst(1.0)))
+
+
 # The same formulas over a namespace of operations, for extended precision.
 
 def exact_domain(op, p):
@@ -99,7 +121,7 @@ def exact_domain(op, p):
     return None, None, None
 
 
-def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = None, mu: Any = '0.1', g: Any = '9.81', m: Any = '1') -> Pass1:
+def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = None, mu: Any = '0.1', g: Any = '9.81', m: Any = '1', **unknown: Any) -> Pass1:
     """Position, metric, curvature, V**2 and contact force at places of the curve (Pass 1, no quadrature).
 
     Parameters
@@ -118,7 +140,7 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = 
     Pass1
         Arrays x, z, ds, kappa, v2 and normal_force.
     """
-    return MODEL.pass1(LaunchRequest(lam0, v0, direction), (mu, g, m), lam, out)
+    return MODEL.pass1(LaunchRequest(lam0, v0, direction), (mu, g, m), lam, out, unknown)
 
 
 def solve(
@@ -130,6 +152,7 @@ def solve(
     t_max: Any = None,
     contact: str = "bilateral",
     mu: Any = '0.1', g: Any = '9.81', m: Any = '1',
+    **unknown: Any,
 ) -> "Motion":
     """The motion that a launch begins (Passes 1 to 3).
 
@@ -155,7 +178,7 @@ def solve(
     GQMError
         For a launch or a parameter that cannot be; the message says what would be right.
     """
-    return MODEL.solve(LaunchRequest(lam0, v0, direction, point, t_max, contact), (mu, g, m))
+    return MODEL.solve(LaunchRequest(lam0, v0, direction, point, t_max, contact), (mu, g, m), unknown)
 
 
 def sweep(
@@ -169,6 +192,7 @@ def sweep(
     contact: str = "bilateral",
     client: Any = None,
     mu: Any = '0.1', g: Any = '9.81', m: Any = '1',
+    **unknown: Any,
 ) -> "Sweep":
     """One quantity over arrays of launches and parameters, on all cores; all arguments broadcast.
 
@@ -195,15 +219,35 @@ def sweep(
         ``status_counts()`` counts the launches without a value.
     """
     launches = LaunchRequest(lam0, v0, direction, None, t_max, contact)
-    return MODEL.sweep(quantity, launches, (mu, g, m), lam=lam, client=client, source=__file__)
+    return MODEL.sweep(quantity, launches, (mu, g, m), lam=lam, client=client, unknown=unknown)
+
+
+def equilibria(*, between: Any = None, mu: Any = '0.1', g: Any = '9.81', m: Any = '1', **unknown: Any) -> "tuple[Equilibrium, ...]":
+    """Where a body at rest stays, whether it is stable there, and the frequency of small oscillations.
+
+    Parameters
+    ----------
+    between : pair of numbers, optional
+        The range of x to look in: the whole domain, or one period, if not given.
+    mu, g, m
+        Run-time parameters; `PARAMETERS` holds their defaults.
+
+    Returns
+    -------
+    tuple of Equilibrium
+        Each with lam, stable and frequency (rad/s).
+    """
+    return MODEL.equilibria((mu, g, m), between, unknown)
 
 
 MODEL = CompiledModel(
     name='cubic_coulomb', parameter='x', parameters=PARAMETERS, positive=(),
+    source=__file__,
     at_least=(('mu', '0'),),
     addresses=Addresses(
         path_and_contact_force.address,
     ),
+    effective_potential=effective_potential, bounds=bounds,
     domain_of=exact_domain,
     dissipation=Dissipation(speed_equation.address, static_balance.address, friction=True, kinked=False, linear=True),
 )

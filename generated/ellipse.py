@@ -1,5 +1,5 @@
 # Made by gqm-gen for "ellipse". Do not edit: change its declaration and generate again.
-# interface 8, input 81dc4ee20e82, body 51fc2935d1b3
+# interface 9, input 81dc4ee20e82, body 480de3646f8a
 """Bead on an ellipse, by the eccentric angle
 
 x              = a*cos(theta)
@@ -25,7 +25,7 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=8)
+compiled = compiler(__file__, interface=9)
 
 from gqm_sym.runtime.vocabulary import (
     BOUNDS, BOUNDS_BATCH, EFFECTIVE_POTENTIAL, INTEGRAND_INVARIANTS_BATCH, LOAD_MAP, ORBIT_INVARIANTS_BATCH,
@@ -36,7 +36,7 @@ from gqm_sym.runtime.vocabulary import (
 )
 
 if TYPE_CHECKING:
-    from gqm_sym.runtime import Motion, Sweep
+    from gqm_sym.runtime import Equilibrium, Motion, Sweep
 
 PARAMETERS = {'a': '2', 'b': '1', 'g': '9.81', 'm': '1'}
 
@@ -153,7 +153,7 @@ def exact_axes(op, p):
     return -op.pi/2, op.pi
 
 
-def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = None, a: Any = '2', b: Any = '1', g: Any = '9.81', m: Any = '1') -> Pass1:
+def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = None, a: Any = '2', b: Any = '1', g: Any = '9.81', m: Any = '1', **unknown: Any) -> Pass1:
     """Position, metric, curvature, V**2 and contact force at places of the curve (Pass 1, no quadrature).
 
     Parameters
@@ -172,7 +172,7 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = 
     Pass1
         Arrays x, z, ds, kappa, v2 and normal_force.
     """
-    return MODEL.pass1(LaunchRequest(lam0, v0, direction), (a, b, g, m), lam, out)
+    return MODEL.pass1(LaunchRequest(lam0, v0, direction), (a, b, g, m), lam, out, unknown)
 
 
 def solve(
@@ -184,6 +184,7 @@ def solve(
     t_max: Any = None,
     contact: str = "bilateral",
     a: Any = '2', b: Any = '1', g: Any = '9.81', m: Any = '1',
+    **unknown: Any,
 ) -> "Motion":
     """The motion that a launch begins (Passes 1 to 3).
 
@@ -209,7 +210,7 @@ def solve(
     GQMError
         For a launch or a parameter that cannot be; the message says what would be right.
     """
-    return MODEL.solve(LaunchRequest(lam0, v0, direction, point, t_max, contact), (a, b, g, m))
+    return MODEL.solve(LaunchRequest(lam0, v0, direction, point, t_max, contact), (a, b, g, m), unknown)
 
 
 def sweep(
@@ -223,6 +224,7 @@ def sweep(
     contact: str = "bilateral",
     client: Any = None,
     a: Any = '2', b: Any = '1', g: Any = '9.81', m: Any = '1',
+    **unknown: Any,
 ) -> "Sweep":
     """One quantity over arrays of launches and parameters, on all cores; all arguments broadcast.
 
@@ -249,7 +251,25 @@ def sweep(
         ``status_counts()`` counts the launches without a value.
     """
     launches = LaunchRequest(lam0, v0, direction, None, t_max, contact)
-    return MODEL.sweep(quantity, launches, (a, b, g, m), lam=lam, client=client, source=__file__)
+    return MODEL.sweep(quantity, launches, (a, b, g, m), lam=lam, client=client, unknown=unknown)
+
+
+def equilibria(*, between: Any = None, a: Any = '2', b: Any = '1', g: Any = '9.81', m: Any = '1', **unknown: Any) -> "tuple[Equilibrium, ...]":
+    """Where a body at rest stays, whether it is stable there, and the frequency of small oscillations.
+
+    Parameters
+    ----------
+    between : pair of numbers, optional
+        The range of theta to look in: the whole domain, or one period, if not given.
+    a, b, g, m
+        Run-time parameters; `PARAMETERS` holds their defaults.
+
+    Returns
+    -------
+    tuple of Equilibrium
+        Each with lam, stable and frequency (rad/s).
+    """
+    return MODEL.equilibria((a, b, g, m), between, unknown)
 
 
 # ---- The same formulas once more, only for speed: a load map in one call, and many orbits at once for sweeps. ----
@@ -382,6 +402,7 @@ def bounds_batch(n, lo, hi, p, out):
 
 MODEL = CompiledModel(
     name='ellipse', parameter='theta', parameters=PARAMETERS, positive=('a', 'b'),
+    source=__file__,
     addresses=Addresses(
         path_and_contact_force.address, effective_potential.address, potential_divdiff1.address,
         potential_divdiff2.address, bounds.address,

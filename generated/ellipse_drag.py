@@ -1,5 +1,5 @@
 # Made by gqm-gen for "ellipse_drag". Do not edit: change its declaration and generate again.
-# interface 8, input f2717a5ad91f, body 519764070200
+# interface 9, input f2717a5ad91f, body 42d003ed4fcb
 """Bead on an ellipse, in air
 
 x              = a*cos(theta)
@@ -27,15 +27,15 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=8)
+compiled = compiler(__file__, interface=9)
 
 from gqm_sym.runtime.vocabulary import (
-    PATH_AND_CONTACT_FORCE, SPEED_EQUATION, STATIC_BALANCE, Addresses, CompiledModel, Dissipation, LaunchRequest, Pass1,
-    cos, sin,
+    BOUNDS, EFFECTIVE_POTENTIAL, PATH_AND_CONTACT_FORCE, SPEED_EQUATION, STATIC_BALANCE, Addresses, CompiledModel,
+    Dissipation, LaunchRequest, Pass1, cos, iadd, icos, imul, ipow, isin, isqrt, sin,
 )
 
 if TYPE_CHECKING:
-    from gqm_sym.runtime import Motion, Sweep
+    from gqm_sym.runtime import Equilibrium, Motion, Sweep
 
 PARAMETERS = {'a': '1.5', 'b': '1', 'b_air': '0.3', 'g': '9.81', 'm': '2'}
 
@@ -94,6 +94,29 @@ def static_balance(n, places, p, out):
         out[1, i] = push
 
 
+@compiled(EFFECTIVE_POTENTIAL, later=True)
+def effective_potential(n, places, p, out):
+    """U per unit mass, V**2 = v0**2 - 2*(U(theta) - U(lam0)), and dU/dtheta (paper, eq. 13)."""
+    places, p, out = carray(places, n), carray(p, 5), carray(out, (2, n))
+    b, g = p[1], p[3]
+    _t0 = b*g
+    for i in range(n):
+        theta = places[i]
+        out[0, i] = _t0*sin(theta)
+        out[1, i] = _t0*cos(theta)
+
+
+@compiled(BOUNDS, later=True)
+def bounds(lo, hi, p, out):
+    """Bounds of dU/dtheta and ds/dtheta for lo <= theta <= hi, by interval arithmetic."""
+    p, out = carray(p, 5), carray(out, 4)
+    theta = (lo, hi)
+    a, b, g = (p[0], p[0]), (p[1], p[1]), (p[3], p[3])
+    _t0 = icos(theta)
+    out[0], out[1] = imul(imul(_t0, b), g)
+    out[2], out[3] = isqrt(iadd(imul(ipow(_t0, 2), ipow(b, 2)), imul(ipow(a, 2), ipow(isin(theta), 2))))
+
+
 # The same formulas over a namespace of operations, for extended precision.
 
 def exact_domain(op, p):
@@ -101,7 +124,7 @@ def exact_domain(op, p):
     return None, None, 2*op.pi
 
 
-def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = None, a: Any = '1.5', b: Any = '1', b_air: Any = '0.3', g: Any = '9.81', m: Any = '2') -> Pass1:
+def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = None, a: Any = '1.5', b: Any = '1', b_air: Any = '0.3', g: Any = '9.81', m: Any = '2', **unknown: Any) -> Pass1:
     """Position, metric, curvature, V**2 and contact force at places of the curve (Pass 1, no quadrature).
 
     Parameters
@@ -120,7 +143,7 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = 
     Pass1
         Arrays x, z, ds, kappa, v2 and normal_force.
     """
-    return MODEL.pass1(LaunchRequest(lam0, v0, direction), (a, b, b_air, g, m), lam, out)
+    return MODEL.pass1(LaunchRequest(lam0, v0, direction), (a, b, b_air, g, m), lam, out, unknown)
 
 
 def solve(
@@ -132,6 +155,7 @@ def solve(
     t_max: Any = None,
     contact: str = "bilateral",
     a: Any = '1.5', b: Any = '1', b_air: Any = '0.3', g: Any = '9.81', m: Any = '2',
+    **unknown: Any,
 ) -> "Motion":
     """The motion that a launch begins (Passes 1 to 3).
 
@@ -157,7 +181,7 @@ def solve(
     GQMError
         For a launch or a parameter that cannot be; the message says what would be right.
     """
-    return MODEL.solve(LaunchRequest(lam0, v0, direction, point, t_max, contact), (a, b, b_air, g, m))
+    return MODEL.solve(LaunchRequest(lam0, v0, direction, point, t_max, contact), (a, b, b_air, g, m), unknown)
 
 
 def sweep(
@@ -171,6 +195,7 @@ def sweep(
     contact: str = "bilateral",
     client: Any = None,
     a: Any = '1.5', b: Any = '1', b_air: Any = '0.3', g: Any = '9.81', m: Any = '2',
+    **unknown: Any,
 ) -> "Sweep":
     """One quantity over arrays of launches and parameters, on all cores; all arguments broadcast.
 
@@ -197,15 +222,35 @@ def sweep(
         ``status_counts()`` counts the launches without a value.
     """
     launches = LaunchRequest(lam0, v0, direction, None, t_max, contact)
-    return MODEL.sweep(quantity, launches, (a, b, b_air, g, m), lam=lam, client=client, source=__file__)
+    return MODEL.sweep(quantity, launches, (a, b, b_air, g, m), lam=lam, client=client, unknown=unknown)
+
+
+def equilibria(*, between: Any = None, a: Any = '1.5', b: Any = '1', b_air: Any = '0.3', g: Any = '9.81', m: Any = '2', **unknown: Any) -> "tuple[Equilibrium, ...]":
+    """Where a body at rest stays, whether it is stable there, and the frequency of small oscillations.
+
+    Parameters
+    ----------
+    between : pair of numbers, optional
+        The range of theta to look in: the whole domain, or one period, if not given.
+    a, b, b_air, g, m
+        Run-time parameters; `PARAMETERS` holds their defaults.
+
+    Returns
+    -------
+    tuple of Equilibrium
+        Each with lam, stable and frequency (rad/s).
+    """
+    return MODEL.equilibria((a, b, b_air, g, m), between, unknown)
 
 
 MODEL = CompiledModel(
     name='ellipse_drag', parameter='theta', parameters=PARAMETERS, positive=('a', 'b'),
+    source=__file__,
     at_least=(('b_air', '0'),),
     addresses=Addresses(
         path_and_contact_force.address,
     ),
+    effective_potential=effective_potential, bounds=bounds,
     domain_of=exact_domain,
     dissipation=Dissipation(speed_equation.address, static_balance.address, friction=False, kinked=False, linear=True),
 )

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "kepler". Do not edit: change its declaration and generate again.
-# interface 8, input a0162e77d64e, body ef6dfe944033
+# interface 9, input a0162e77d64e, body 61fe8010229c
 """Planet on its own ellipse, by the eccentric anomaly
 
 x              = a*(-ecc + cos(E))
@@ -25,7 +25,7 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=8)
+compiled = compiler(__file__, interface=9)
 
 from gqm_sym.runtime.vocabulary import (
     BOUNDS, BOUNDS_BATCH, EFFECTIVE_POTENTIAL, INTEGRAND_INVARIANTS_BATCH, LOAD_MAP, ORBIT_INVARIANTS_BATCH,
@@ -36,7 +36,7 @@ from gqm_sym.runtime.vocabulary import (
 )
 
 if TYPE_CHECKING:
-    from gqm_sym.runtime import Motion, Sweep
+    from gqm_sym.runtime import Equilibrium, Motion, Sweep
 
 PARAMETERS = {'a': '3/2', 'ecc': '3/5', 'k': '7/2', 'm': '1'}
 
@@ -219,7 +219,7 @@ def exact_axes(op, p):
     return 0, op.pi
 
 
-def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = None, a: Any = '3/2', ecc: Any = '3/5', k: Any = '7/2', m: Any = '1') -> Pass1:
+def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = None, a: Any = '3/2', ecc: Any = '3/5', k: Any = '7/2', m: Any = '1', **unknown: Any) -> Pass1:
     """Position, metric, curvature, V**2 and contact force at places of the curve (Pass 1, no quadrature).
 
     Parameters
@@ -238,7 +238,7 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = 
     Pass1
         Arrays x, z, ds, kappa, v2 and normal_force.
     """
-    return MODEL.pass1(LaunchRequest(lam0, v0, direction), (a, ecc, k, m), lam, out)
+    return MODEL.pass1(LaunchRequest(lam0, v0, direction), (a, ecc, k, m), lam, out, unknown)
 
 
 def solve(
@@ -250,6 +250,7 @@ def solve(
     t_max: Any = None,
     contact: str = "bilateral",
     a: Any = '3/2', ecc: Any = '3/5', k: Any = '7/2', m: Any = '1',
+    **unknown: Any,
 ) -> "Motion":
     """The motion that a launch begins (Passes 1 to 3).
 
@@ -275,7 +276,7 @@ def solve(
     GQMError
         For a launch or a parameter that cannot be; the message says what would be right.
     """
-    return MODEL.solve(LaunchRequest(lam0, v0, direction, point, t_max, contact), (a, ecc, k, m))
+    return MODEL.solve(LaunchRequest(lam0, v0, direction, point, t_max, contact), (a, ecc, k, m), unknown)
 
 
 def sweep(
@@ -289,6 +290,7 @@ def sweep(
     contact: str = "bilateral",
     client: Any = None,
     a: Any = '3/2', ecc: Any = '3/5', k: Any = '7/2', m: Any = '1',
+    **unknown: Any,
 ) -> "Sweep":
     """One quantity over arrays of launches and parameters, on all cores; all arguments broadcast.
 
@@ -315,7 +317,25 @@ def sweep(
         ``status_counts()`` counts the launches without a value.
     """
     launches = LaunchRequest(lam0, v0, direction, None, t_max, contact)
-    return MODEL.sweep(quantity, launches, (a, ecc, k, m), lam=lam, client=client, source=__file__)
+    return MODEL.sweep(quantity, launches, (a, ecc, k, m), lam=lam, client=client, unknown=unknown)
+
+
+def equilibria(*, between: Any = None, a: Any = '3/2', ecc: Any = '3/5', k: Any = '7/2', m: Any = '1', **unknown: Any) -> "tuple[Equilibrium, ...]":
+    """Where a body at rest stays, whether it is stable there, and the frequency of small oscillations.
+
+    Parameters
+    ----------
+    between : pair of numbers, optional
+        The range of E to look in: the whole domain, or one period, if not given.
+    a, ecc, k, m
+        Run-time parameters; `PARAMETERS` holds their defaults.
+
+    Returns
+    -------
+    tuple of Equilibrium
+        Each with lam, stable and frequency (rad/s).
+    """
+    return MODEL.equilibria((a, ecc, k, m), between, unknown)
 
 
 # ---- The same formulas once more, only for speed: a load map in one call, and many orbits at once for sweeps. ----
@@ -510,6 +530,7 @@ def bounds_batch(n, lo, hi, p, out):
 
 MODEL = CompiledModel(
     name='kepler', parameter='E', parameters=PARAMETERS, positive=('a',),
+    source=__file__,
     addresses=Addresses(
         path_and_contact_force.address, effective_potential.address, potential_divdiff1.address,
         potential_divdiff2.address, bounds.address,

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "line_spring". Do not edit: change its declaration and generate again.
-# interface 8, input 702c9ef6b67b, body 9d4ee8063bc0
+# interface 9, input 702c9ef6b67b, body 221dd9dd13ef
 """Bead on a sloping line, tied to the origin by a spring
 
 x              = x
@@ -25,7 +25,7 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=8)
+compiled = compiler(__file__, interface=9)
 
 from gqm_sym.runtime.vocabulary import (
     AGM_ARGUMENTS_BATCH, BOUNDS, BOUNDS_BATCH, EFFECTIVE_POTENTIAL, LOAD_MAP, PATH_AND_CONTACT_FORCE,
@@ -35,7 +35,7 @@ from gqm_sym.runtime.vocabulary import (
 )
 
 if TYPE_CHECKING:
-    from gqm_sym.runtime import Motion, Sweep
+    from gqm_sym.runtime import Equilibrium, Motion, Sweep
 
 PARAMETERS = {'w': '1.3', 'm': '1'}
 
@@ -139,7 +139,7 @@ def exact_axes(op, p):
     return op.mpf(-24)/25, None
 
 
-def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = None, w: Any = '1.3', m: Any = '1') -> Pass1:
+def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = None, w: Any = '1.3', m: Any = '1', **unknown: Any) -> Pass1:
     """Position, metric, curvature, V**2 and contact force at places of the curve (Pass 1, no quadrature).
 
     Parameters
@@ -158,7 +158,7 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = 
     Pass1
         Arrays x, z, ds, kappa, v2 and normal_force.
     """
-    return MODEL.pass1(LaunchRequest(lam0, v0, direction), (w, m), lam, out)
+    return MODEL.pass1(LaunchRequest(lam0, v0, direction), (w, m), lam, out, unknown)
 
 
 def solve(
@@ -170,6 +170,7 @@ def solve(
     t_max: Any = None,
     contact: str = "bilateral",
     w: Any = '1.3', m: Any = '1',
+    **unknown: Any,
 ) -> "Motion":
     """The motion that a launch begins (Passes 1 to 3).
 
@@ -195,7 +196,7 @@ def solve(
     GQMError
         For a launch or a parameter that cannot be; the message says what would be right.
     """
-    return MODEL.solve(LaunchRequest(lam0, v0, direction, point, t_max, contact), (w, m))
+    return MODEL.solve(LaunchRequest(lam0, v0, direction, point, t_max, contact), (w, m), unknown)
 
 
 def sweep(
@@ -209,6 +210,7 @@ def sweep(
     contact: str = "bilateral",
     client: Any = None,
     w: Any = '1.3', m: Any = '1',
+    **unknown: Any,
 ) -> "Sweep":
     """One quantity over arrays of launches and parameters, on all cores; all arguments broadcast.
 
@@ -235,7 +237,25 @@ def sweep(
         ``status_counts()`` counts the launches without a value.
     """
     launches = LaunchRequest(lam0, v0, direction, None, t_max, contact)
-    return MODEL.sweep(quantity, launches, (w, m), lam=lam, client=client, source=__file__)
+    return MODEL.sweep(quantity, launches, (w, m), lam=lam, client=client, unknown=unknown)
+
+
+def equilibria(*, between: Any = None, w: Any = '1.3', m: Any = '1', **unknown: Any) -> "tuple[Equilibrium, ...]":
+    """Where a body at rest stays, whether it is stable there, and the frequency of small oscillations.
+
+    Parameters
+    ----------
+    between : pair of numbers, optional
+        The range of x to look in: the whole domain, or one period, if not given.
+    w, m
+        Run-time parameters; `PARAMETERS` holds their defaults.
+
+    Returns
+    -------
+    tuple of Equilibrium
+        Each with lam, stable and frequency (rad/s).
+    """
+    return MODEL.equilibria((w, m), between, unknown)
 
 
 # ---- The same formulas once more, only for speed: a load map in one call, and many orbits at once for sweeps. ----
@@ -307,6 +327,7 @@ def bounds_batch(n, lo, hi, p, out):
 
 MODEL = CompiledModel(
     name='line_spring', parameter='x', parameters=PARAMETERS, positive=(),
+    source=__file__,
     addresses=Addresses(
         path_and_contact_force.address, effective_potential.address, potential_divdiff1.address,
         potential_divdiff2.address, bounds.address,

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "loop". Do not edit: change its declaration and generate again.
-# interface 8, input e5eeff356595, body 0c55c25a7324
+# interface 9, input e5eeff356595, body 6d852cd0f3cb
 """Loop of a roller coaster
 
 x              = x(s)
@@ -24,7 +24,7 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=8)
+compiled = compiler(__file__, interface=9)
 
 from gqm_sym.runtime.vocabulary import (
     BOUNDS, EFFECTIVE_POTENTIAL, PATH_AND_CONTACT_FORCE, POTENTIAL_DIVDIFF1, POTENTIAL_DIVDIFF2, Addresses,
@@ -33,7 +33,7 @@ from gqm_sym.runtime.vocabulary import (
 )
 
 if TYPE_CHECKING:
-    from gqm_sym.runtime import Motion, Sweep
+    from gqm_sym.runtime import Equilibrium, Motion, Sweep
 
 PARAMETERS = {'a': '2', 'c': '2', 'R': '1.5', 'g': '9.81', 'm': '1'}
 
@@ -116,7 +116,7 @@ def exact_rail(op, p):
     return 0, 0, 0, a, c, 0, _t0, R, -_t0*c + 2*op.pi, c, _t0, 0, a
 
 
-def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = None, a: Any = '2', c: Any = '2', R: Any = '1.5', g: Any = '9.81', m: Any = '1') -> Pass1:
+def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = None, a: Any = '2', c: Any = '2', R: Any = '1.5', g: Any = '9.81', m: Any = '1', **unknown: Any) -> Pass1:
     """Position, metric, curvature, V**2 and contact force at places of the curve (Pass 1, no quadrature).
 
     Parameters
@@ -135,7 +135,7 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = 
     Pass1
         Arrays x, z, ds, kappa, v2 and normal_force.
     """
-    return MODEL.pass1(LaunchRequest(lam0, v0, direction), (a, c, R, g, m), lam, out)
+    return MODEL.pass1(LaunchRequest(lam0, v0, direction), (a, c, R, g, m), lam, out, unknown)
 
 
 def solve(
@@ -147,6 +147,7 @@ def solve(
     t_max: Any = None,
     contact: str = "bilateral",
     a: Any = '2', c: Any = '2', R: Any = '1.5', g: Any = '9.81', m: Any = '1',
+    **unknown: Any,
 ) -> "Motion":
     """The motion that a launch begins (Passes 1 to 3).
 
@@ -172,7 +173,7 @@ def solve(
     GQMError
         For a launch or a parameter that cannot be; the message says what would be right.
     """
-    return MODEL.solve(LaunchRequest(lam0, v0, direction, point, t_max, contact), (a, c, R, g, m))
+    return MODEL.solve(LaunchRequest(lam0, v0, direction, point, t_max, contact), (a, c, R, g, m), unknown)
 
 
 def sweep(
@@ -186,6 +187,7 @@ def sweep(
     contact: str = "bilateral",
     client: Any = None,
     a: Any = '2', c: Any = '2', R: Any = '1.5', g: Any = '9.81', m: Any = '1',
+    **unknown: Any,
 ) -> "Sweep":
     """One quantity over arrays of launches and parameters, on all cores; all arguments broadcast.
 
@@ -212,7 +214,25 @@ def sweep(
         ``status_counts()`` counts the launches without a value.
     """
     launches = LaunchRequest(lam0, v0, direction, None, t_max, contact)
-    return MODEL.sweep(quantity, launches, (a, c, R, g, m), lam=lam, client=client, source=__file__)
+    return MODEL.sweep(quantity, launches, (a, c, R, g, m), lam=lam, client=client, unknown=unknown)
+
+
+def equilibria(*, between: Any = None, a: Any = '2', c: Any = '2', R: Any = '1.5', g: Any = '9.81', m: Any = '1', **unknown: Any) -> "tuple[Equilibrium, ...]":
+    """Where a body at rest stays, whether it is stable there, and the frequency of small oscillations.
+
+    Parameters
+    ----------
+    between : pair of numbers, optional
+        The range of s to look in: the whole domain, or one period, if not given.
+    a, c, R, g, m
+        Run-time parameters; `PARAMETERS` holds their defaults.
+
+    Returns
+    -------
+    tuple of Equilibrium
+        Each with lam, stable and frequency (rad/s).
+    """
+    return MODEL.equilibria((a, c, R, g, m), between, unknown)
 
 
 CHART = Rail(
@@ -224,6 +244,7 @@ CHART = Rail(
 
 MODEL = CompiledModel(
     name='loop', parameter='s', parameters=PARAMETERS, positive=(),
+    source=__file__,
     addresses=Addresses(
         path_and_contact_force.address, effective_potential.address, potential_divdiff1.address,
         potential_divdiff2.address, bounds.address,

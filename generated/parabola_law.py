@@ -1,5 +1,5 @@
 # Made by gqm-gen for "parabola_law". Do not edit: change its declaration and generate again.
-# interface 8, input 6669068dcbd5, body 87e78712bb58
+# interface 9, input 6669068dcbd5, body b59a77e36c7a
 """Bead on a parabola, with a resistance that falls with speed
 
 x              = x
@@ -27,14 +27,15 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=8)
+compiled = compiler(__file__, interface=9)
 
 from gqm_sym.runtime.vocabulary import (
-    PATH_AND_CONTACT_FORCE, SPEED_EQUATION, STATIC_BALANCE, Addresses, CompiledModel, Dissipation, LaunchRequest, Pass1,
+    BOUNDS, EFFECTIVE_POTENTIAL, PATH_AND_CONTACT_FORCE, SPEED_EQUATION, STATIC_BALANCE, Addresses, CompiledModel,
+    Dissipation, LaunchRequest, Pass1, iadd, iconst, imul, ipow, isqrt,
 )
 
 if TYPE_CHECKING:
-    from gqm_sym.runtime import Motion, Sweep
+    from gqm_sym.runtime import Equilibrium, Motion, Sweep
 
 PARAMETERS = {'a': '0.7', 'r': '0.8', 'w1': '2', 'g': '9.81', 'm': '1'}
 
@@ -96,6 +97,28 @@ def static_balance(n, places, p, out):
         out[1, i] = push + r
 
 
+@compiled(EFFECTIVE_POTENTIAL, later=True)
+def effective_potential(n, places, p, out):
+    """U per unit mass, V**2 = v0**2 - 2*(U(x) - U(lam0)), and dU/dx (paper, eq. 13)."""
+    places, p, out = carray(places, n), carray(p, 5), carray(out, (2, n))
+    a, g = p[0], p[3]
+    _t0 = a*g
+    for i in range(n):
+        x = places[i]
+        out[0, i] = _t0*x**2
+        out[1, i] = 2*_t0*x
+
+
+@compiled(BOUNDS, later=True)
+def bounds(lo, hi, p, out):
+    """Bounds of dU/dx and ds/dx for lo <= x <= hi, by interval arithmetic."""
+    p, out = carray(p, 5), carray(out, 4)
+    x = (lo, hi)
+    a, g = (p[0], p[0]), (p[3], p[3])
+    out[0], out[1] = imul(imul(imul(iconst(2.0), a), g), x)
+    out[2], out[3] = isqrt(iadd(imul(imul(iconst(4.0), ipow(a, 2)), ipow(x, 2)), iconst(1.0)))
+
+
 # The same formulas over a namespace of operations, for extended precision.
 
 def exact_domain(op, p):
@@ -103,7 +126,7 @@ def exact_domain(op, p):
     return None, None, None
 
 
-def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = None, a: Any = '0.7', r: Any = '0.8', w1: Any = '2', g: Any = '9.81', m: Any = '1') -> Pass1:
+def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = None, a: Any = '0.7', r: Any = '0.8', w1: Any = '2', g: Any = '9.81', m: Any = '1', **unknown: Any) -> Pass1:
     """Position, metric, curvature, V**2 and contact force at places of the curve (Pass 1, no quadrature).
 
     Parameters
@@ -122,7 +145,7 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = 
     Pass1
         Arrays x, z, ds, kappa, v2 and normal_force.
     """
-    return MODEL.pass1(LaunchRequest(lam0, v0, direction), (a, r, w1, g, m), lam, out)
+    return MODEL.pass1(LaunchRequest(lam0, v0, direction), (a, r, w1, g, m), lam, out, unknown)
 
 
 def solve(
@@ -134,6 +157,7 @@ def solve(
     t_max: Any = None,
     contact: str = "bilateral",
     a: Any = '0.7', r: Any = '0.8', w1: Any = '2', g: Any = '9.81', m: Any = '1',
+    **unknown: Any,
 ) -> "Motion":
     """The motion that a launch begins (Passes 1 to 3).
 
@@ -159,7 +183,7 @@ def solve(
     GQMError
         For a launch or a parameter that cannot be; the message says what would be right.
     """
-    return MODEL.solve(LaunchRequest(lam0, v0, direction, point, t_max, contact), (a, r, w1, g, m))
+    return MODEL.solve(LaunchRequest(lam0, v0, direction, point, t_max, contact), (a, r, w1, g, m), unknown)
 
 
 def sweep(
@@ -173,6 +197,7 @@ def sweep(
     contact: str = "bilateral",
     client: Any = None,
     a: Any = '0.7', r: Any = '0.8', w1: Any = '2', g: Any = '9.81', m: Any = '1',
+    **unknown: Any,
 ) -> "Sweep":
     """One quantity over arrays of launches and parameters, on all cores; all arguments broadcast.
 
@@ -199,14 +224,34 @@ def sweep(
         ``status_counts()`` counts the launches without a value.
     """
     launches = LaunchRequest(lam0, v0, direction, None, t_max, contact)
-    return MODEL.sweep(quantity, launches, (a, r, w1, g, m), lam=lam, client=client, source=__file__)
+    return MODEL.sweep(quantity, launches, (a, r, w1, g, m), lam=lam, client=client, unknown=unknown)
+
+
+def equilibria(*, between: Any = None, a: Any = '0.7', r: Any = '0.8', w1: Any = '2', g: Any = '9.81', m: Any = '1', **unknown: Any) -> "tuple[Equilibrium, ...]":
+    """Where a body at rest stays, whether it is stable there, and the frequency of small oscillations.
+
+    Parameters
+    ----------
+    between : pair of numbers, optional
+        The range of x to look in: the whole domain, or one period, if not given.
+    a, r, w1, g, m
+        Run-time parameters; `PARAMETERS` holds their defaults.
+
+    Returns
+    -------
+    tuple of Equilibrium
+        Each with lam, stable and frequency (rad/s).
+    """
+    return MODEL.equilibria((a, r, w1, g, m), between, unknown)
 
 
 MODEL = CompiledModel(
     name='parabola_law', parameter='x', parameters=PARAMETERS, positive=(),
+    source=__file__,
     addresses=Addresses(
         path_and_contact_force.address,
     ),
+    effective_potential=effective_potential, bounds=bounds,
     domain_of=exact_domain,
     dissipation=Dissipation(speed_equation.address, static_balance.address, friction=False, kinked=False, linear=False),
 )

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "parabola_rolling". Do not edit: change its declaration and generate again.
-# interface 8, input 6fc25406b912, body 2f9040741f82
+# interface 9, input 6fc25406b912, body 7e7f479a3d81
 """Ball rolling in a parabolic bowl
 
 x              = x*(-2*a*rho/sqrt(4*a**2*x**2 + 1) + 1)
@@ -25,7 +25,7 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=8)
+compiled = compiler(__file__, interface=9)
 
 from gqm_sym.runtime.vocabulary import (
     BOUNDS, EFFECTIVE_POTENTIAL, LOAD_MAP, PATH_AND_CONTACT_FORCE, POTENTIAL_DIVDIFF1, POTENTIAL_DIVDIFF2, Addresses,
@@ -34,7 +34,7 @@ from gqm_sym.runtime.vocabulary import (
 )
 
 if TYPE_CHECKING:
-    from gqm_sym.runtime import Motion, Sweep
+    from gqm_sym.runtime import Equilibrium, Motion, Sweep
 
 PARAMETERS = {'a': '0.6', 'beta': '2/5', 'rho': '0.25', 'g': '9.81', 'm': '1'}
 
@@ -176,6 +176,11 @@ def exact_effective_potential_slope(op, x, p):
     _t1 = 2*a
     return _t1*g*x*(_t0 - _t1*rho)/(_t0*(beta + 1))
 
+def exact_inertia(op, p):
+    """1 + beta, so that the kinetic energy is m*(1 + beta)*V**2/2, and the potential energy m*(1 + beta)*U."""
+    beta = p[1]
+    return beta + 1
+
 def exact_domain(op, p):
     """Both ends of the domain, and the period; None where there is none."""
     return None, None, None
@@ -185,7 +190,7 @@ def exact_axes(op, p):
     return 0, None
 
 
-def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = None, a: Any = '0.6', beta: Any = '2/5', rho: Any = '0.25', g: Any = '9.81', m: Any = '1') -> Pass1:
+def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = None, a: Any = '0.6', beta: Any = '2/5', rho: Any = '0.25', g: Any = '9.81', m: Any = '1', **unknown: Any) -> Pass1:
     """Position, metric, curvature, V**2 and contact force at places of the curve (Pass 1, no quadrature).
 
     Parameters
@@ -204,7 +209,7 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = 
     Pass1
         Arrays x, z, ds, kappa, v2 and normal_force.
     """
-    return MODEL.pass1(LaunchRequest(lam0, v0, direction), (a, beta, rho, g, m), lam, out)
+    return MODEL.pass1(LaunchRequest(lam0, v0, direction), (a, beta, rho, g, m), lam, out, unknown)
 
 
 def solve(
@@ -216,6 +221,7 @@ def solve(
     t_max: Any = None,
     contact: str = "bilateral",
     a: Any = '0.6', beta: Any = '2/5', rho: Any = '0.25', g: Any = '9.81', m: Any = '1',
+    **unknown: Any,
 ) -> "Motion":
     """The motion that a launch begins (Passes 1 to 3).
 
@@ -241,7 +247,7 @@ def solve(
     GQMError
         For a launch or a parameter that cannot be; the message says what would be right.
     """
-    return MODEL.solve(LaunchRequest(lam0, v0, direction, point, t_max, contact), (a, beta, rho, g, m))
+    return MODEL.solve(LaunchRequest(lam0, v0, direction, point, t_max, contact), (a, beta, rho, g, m), unknown)
 
 
 def sweep(
@@ -255,6 +261,7 @@ def sweep(
     contact: str = "bilateral",
     client: Any = None,
     a: Any = '0.6', beta: Any = '2/5', rho: Any = '0.25', g: Any = '9.81', m: Any = '1',
+    **unknown: Any,
 ) -> "Sweep":
     """One quantity over arrays of launches and parameters, on all cores; all arguments broadcast.
 
@@ -281,7 +288,25 @@ def sweep(
         ``status_counts()`` counts the launches without a value.
     """
     launches = LaunchRequest(lam0, v0, direction, None, t_max, contact)
-    return MODEL.sweep(quantity, launches, (a, beta, rho, g, m), lam=lam, client=client, source=__file__)
+    return MODEL.sweep(quantity, launches, (a, beta, rho, g, m), lam=lam, client=client, unknown=unknown)
+
+
+def equilibria(*, between: Any = None, a: Any = '0.6', beta: Any = '2/5', rho: Any = '0.25', g: Any = '9.81', m: Any = '1', **unknown: Any) -> "tuple[Equilibrium, ...]":
+    """Where a body at rest stays, whether it is stable there, and the frequency of small oscillations.
+
+    Parameters
+    ----------
+    between : pair of numbers, optional
+        The range of x to look in: the whole domain, or one period, if not given.
+    a, beta, rho, g, m
+        Run-time parameters; `PARAMETERS` holds their defaults.
+
+    Returns
+    -------
+    tuple of Equilibrium
+        Each with lam, stable and frequency (rad/s).
+    """
+    return MODEL.equilibria((a, beta, rho, g, m), between, unknown)
 
 
 # ---- The same formulas once more, only for speed: a load map in one call, and many orbits at once for sweeps. ----
@@ -319,6 +344,7 @@ def load_map(n, w0, level, places, p, out):
 
 MODEL = CompiledModel(
     name='parabola_rolling', parameter='x', parameters=PARAMETERS, positive=(),
+    source=__file__,
     at_least=(('beta', '0'),),
     rolling_radius='rho',
     addresses=Addresses(
@@ -326,6 +352,7 @@ MODEL = CompiledModel(
         potential_divdiff2.address, bounds.address,
     ),
     load_map=load_map,
+    inertia=exact_inertia,
     domain_of=exact_domain, axes_of=exact_axes,
     exact=ExactFormulas(
         exact_x, exact_z, exact_ds, exact_kappa, exact_static_normal_load, exact_effective_potential,

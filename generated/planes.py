@@ -1,5 +1,5 @@
 # Made by gqm-gen for "planes". Do not edit: change its declaration and generate again.
-# interface 8, input 1c6e3a707056, body 33b251cb4a3d
+# interface 9, input 1c6e3a707056, body 73d9151c11d3
 """Stitched planes through surveyed points
 
 x              = x(s)
@@ -24,7 +24,7 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=8)
+compiled = compiler(__file__, interface=9)
 
 from gqm_sym.runtime.vocabulary import (
     BOUNDS, EFFECTIVE_POTENTIAL, PATH_AND_CONTACT_FORCE, POTENTIAL_DIVDIFF1, POTENTIAL_DIVDIFF2, Addresses,
@@ -33,7 +33,7 @@ from gqm_sym.runtime.vocabulary import (
 )
 
 if TYPE_CHECKING:
-    from gqm_sym.runtime import Motion, Sweep
+    from gqm_sym.runtime import Equilibrium, Motion, Sweep
 
 PARAMETERS = {'g': '9.81', 'm': '1'}
 
@@ -174,7 +174,7 @@ def exact_effective_potential(op, x, z, p):
     return g*z, 0, g
 
 
-def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = None, g: Any = '9.81', m: Any = '1') -> Pass1:
+def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = None, g: Any = '9.81', m: Any = '1', **unknown: Any) -> Pass1:
     """Position, metric, curvature, V**2 and contact force at places of the curve (Pass 1, no quadrature).
 
     Parameters
@@ -193,7 +193,7 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = 
     Pass1
         Arrays x, z, ds, kappa, v2 and normal_force.
     """
-    return MODEL.pass1(LaunchRequest(lam0, v0, direction), (g, m), lam, out)
+    return MODEL.pass1(LaunchRequest(lam0, v0, direction), (g, m), lam, out, unknown)
 
 
 def solve(
@@ -205,6 +205,7 @@ def solve(
     t_max: Any = None,
     contact: str = "bilateral",
     g: Any = '9.81', m: Any = '1',
+    **unknown: Any,
 ) -> "Motion":
     """The motion that a launch begins (Passes 1 to 3).
 
@@ -230,7 +231,7 @@ def solve(
     GQMError
         For a launch or a parameter that cannot be; the message says what would be right.
     """
-    return MODEL.solve(LaunchRequest(lam0, v0, direction, point, t_max, contact), (g, m))
+    return MODEL.solve(LaunchRequest(lam0, v0, direction, point, t_max, contact), (g, m), unknown)
 
 
 def sweep(
@@ -244,6 +245,7 @@ def sweep(
     contact: str = "bilateral",
     client: Any = None,
     g: Any = '9.81', m: Any = '1',
+    **unknown: Any,
 ) -> "Sweep":
     """One quantity over arrays of launches and parameters, on all cores; all arguments broadcast.
 
@@ -270,7 +272,25 @@ def sweep(
         ``status_counts()`` counts the launches without a value.
     """
     launches = LaunchRequest(lam0, v0, direction, None, t_max, contact)
-    return MODEL.sweep(quantity, launches, (g, m), lam=lam, client=client, source=__file__)
+    return MODEL.sweep(quantity, launches, (g, m), lam=lam, client=client, unknown=unknown)
+
+
+def equilibria(*, between: Any = None, g: Any = '9.81', m: Any = '1', **unknown: Any) -> "tuple[Equilibrium, ...]":
+    """Where a body at rest stays, whether it is stable there, and the frequency of small oscillations.
+
+    Parameters
+    ----------
+    between : pair of numbers, optional
+        The range of s to look in: the whole domain, or one period, if not given.
+    g, m
+        Run-time parameters; `PARAMETERS` holds their defaults.
+
+    Returns
+    -------
+    tuple of Equilibrium
+        Each with lam, stable and frequency (rad/s).
+    """
+    return MODEL.equilibria((g, m), between, unknown)
 
 
 CHART = Sampled(POINTS, kind='linear', closed=False)
@@ -278,6 +298,7 @@ CHART = Sampled(POINTS, kind='linear', closed=False)
 
 MODEL = CompiledModel(
     name='planes', parameter='s', parameters=PARAMETERS, positive=(),
+    source=__file__,
     addresses=Addresses(
         path_and_contact_force.address, effective_potential.address, potential_divdiff1.address,
         potential_divdiff2.address, bounds.address,

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "rolling_circle". Do not edit: change its declaration and generate again.
-# interface 8, input 2a76ceb4277a, body 3ce3cb6a8352
+# interface 9, input 2a76ceb4277a, body 0a85be3fef98
 """Solid sphere rolling in a circular bowl
 
 x              = L*sin(theta)
@@ -25,7 +25,7 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=8)
+compiled = compiler(__file__, interface=9)
 
 from gqm_sym.runtime.vocabulary import (
     AGM_ARGUMENTS_BATCH, BOUNDS, BOUNDS_BATCH, EFFECTIVE_POTENTIAL, LOAD_MAP, ORBIT_INVARIANTS_BATCH,
@@ -36,7 +36,7 @@ from gqm_sym.runtime.vocabulary import (
 )
 
 if TYPE_CHECKING:
-    from gqm_sym.runtime import Motion, Sweep
+    from gqm_sym.runtime import Equilibrium, Motion, Sweep
 
 PARAMETERS = {'L': '2', 'beta': '2/5', 'g': '9.81', 'm': '0.3'}
 
@@ -139,6 +139,11 @@ def exact_effective_potential_slope(op, theta, p):
     L, beta, g = p[0], p[1], p[2]
     return L*g*op.sin(theta)/(beta + 1)
 
+def exact_inertia(op, p):
+    """1 + beta, so that the kinetic energy is m*(1 + beta)*V**2/2, and the potential energy m*(1 + beta)*U."""
+    beta = p[1]
+    return beta + 1
+
 def exact_domain(op, p):
     """Both ends of the domain, and the period; None where there is none."""
     return None, None, 2*op.pi
@@ -148,7 +153,7 @@ def exact_axes(op, p):
     return 0, op.pi
 
 
-def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = None, L: Any = '2', beta: Any = '2/5', g: Any = '9.81', m: Any = '0.3') -> Pass1:
+def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = None, L: Any = '2', beta: Any = '2/5', g: Any = '9.81', m: Any = '0.3', **unknown: Any) -> Pass1:
     """Position, metric, curvature, V**2 and contact force at places of the curve (Pass 1, no quadrature).
 
     Parameters
@@ -167,7 +172,7 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = 
     Pass1
         Arrays x, z, ds, kappa, v2 and normal_force.
     """
-    return MODEL.pass1(LaunchRequest(lam0, v0, direction), (L, beta, g, m), lam, out)
+    return MODEL.pass1(LaunchRequest(lam0, v0, direction), (L, beta, g, m), lam, out, unknown)
 
 
 def solve(
@@ -179,6 +184,7 @@ def solve(
     t_max: Any = None,
     contact: str = "bilateral",
     L: Any = '2', beta: Any = '2/5', g: Any = '9.81', m: Any = '0.3',
+    **unknown: Any,
 ) -> "Motion":
     """The motion that a launch begins (Passes 1 to 3).
 
@@ -204,7 +210,7 @@ def solve(
     GQMError
         For a launch or a parameter that cannot be; the message says what would be right.
     """
-    return MODEL.solve(LaunchRequest(lam0, v0, direction, point, t_max, contact), (L, beta, g, m))
+    return MODEL.solve(LaunchRequest(lam0, v0, direction, point, t_max, contact), (L, beta, g, m), unknown)
 
 
 def sweep(
@@ -218,6 +224,7 @@ def sweep(
     contact: str = "bilateral",
     client: Any = None,
     L: Any = '2', beta: Any = '2/5', g: Any = '9.81', m: Any = '0.3',
+    **unknown: Any,
 ) -> "Sweep":
     """One quantity over arrays of launches and parameters, on all cores; all arguments broadcast.
 
@@ -244,7 +251,25 @@ def sweep(
         ``status_counts()`` counts the launches without a value.
     """
     launches = LaunchRequest(lam0, v0, direction, None, t_max, contact)
-    return MODEL.sweep(quantity, launches, (L, beta, g, m), lam=lam, client=client, source=__file__)
+    return MODEL.sweep(quantity, launches, (L, beta, g, m), lam=lam, client=client, unknown=unknown)
+
+
+def equilibria(*, between: Any = None, L: Any = '2', beta: Any = '2/5', g: Any = '9.81', m: Any = '0.3', **unknown: Any) -> "tuple[Equilibrium, ...]":
+    """Where a body at rest stays, whether it is stable there, and the frequency of small oscillations.
+
+    Parameters
+    ----------
+    between : pair of numbers, optional
+        The range of theta to look in: the whole domain, or one period, if not given.
+    L, beta, g, m
+        Run-time parameters; `PARAMETERS` holds their defaults.
+
+    Returns
+    -------
+    tuple of Equilibrium
+        Each with lam, stable and frequency (rad/s).
+    """
+    return MODEL.equilibria((L, beta, g, m), between, unknown)
 
 
 # ---- The same formulas once more, only for speed: a load map in one call, and many orbits at once for sweeps. ----
@@ -344,12 +369,14 @@ def bounds_batch(n, lo, hi, p, out):
 
 MODEL = CompiledModel(
     name='rolling_circle', parameter='theta', parameters=PARAMETERS, positive=('L',),
+    source=__file__,
     at_least=(('beta', '0'),),
     addresses=Addresses(
         path_and_contact_force.address, effective_potential.address, potential_divdiff1.address,
         potential_divdiff2.address, bounds.address,
     ),
     load_map=load_map,
+    inertia=exact_inertia,
     batch=BatchFunctions(
         potential_divdiff1=potential_divdiff1_batch, potential_divdiff2=potential_divdiff2_batch,
         orbit_invariants=orbit_invariants_batch, agm_arguments=agm_arguments_batch,

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "spiral_central". Do not edit: change its declaration and generate again.
-# interface 8, input cd2a37956d84, body 1f11f8fc0f8b
+# interface 9, input cd2a37956d84, body 4330f59a31e9
 """Bead on a logarithmic spiral, drawn to its pole
 
 x              = r0*exp(b*theta)*cos(theta)
@@ -25,7 +25,7 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=8)
+compiled = compiler(__file__, interface=9)
 
 from gqm_sym.runtime.vocabulary import (
     BOUNDS, BOUNDS_BATCH, EFFECTIVE_POTENTIAL, LOAD_MAP, ORBIT_INVARIANTS_BATCH, PATH_AND_CONTACT_FORCE,
@@ -35,7 +35,7 @@ from gqm_sym.runtime.vocabulary import (
 )
 
 if TYPE_CHECKING:
-    from gqm_sym.runtime import Motion, Sweep
+    from gqm_sym.runtime import Equilibrium, Motion, Sweep
 
 PARAMETERS = {'r0': '1', 'b': '0.15', 'k': '2', 'm': '1'}
 
@@ -158,7 +158,7 @@ def exact_domain(op, p):
     return None, None, None
 
 
-def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = None, r0: Any = '1', b: Any = '0.15', k: Any = '2', m: Any = '1') -> Pass1:
+def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = None, r0: Any = '1', b: Any = '0.15', k: Any = '2', m: Any = '1', **unknown: Any) -> Pass1:
     """Position, metric, curvature, V**2 and contact force at places of the curve (Pass 1, no quadrature).
 
     Parameters
@@ -177,7 +177,7 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = 
     Pass1
         Arrays x, z, ds, kappa, v2 and normal_force.
     """
-    return MODEL.pass1(LaunchRequest(lam0, v0, direction), (r0, b, k, m), lam, out)
+    return MODEL.pass1(LaunchRequest(lam0, v0, direction), (r0, b, k, m), lam, out, unknown)
 
 
 def solve(
@@ -189,6 +189,7 @@ def solve(
     t_max: Any = None,
     contact: str = "bilateral",
     r0: Any = '1', b: Any = '0.15', k: Any = '2', m: Any = '1',
+    **unknown: Any,
 ) -> "Motion":
     """The motion that a launch begins (Passes 1 to 3).
 
@@ -214,7 +215,7 @@ def solve(
     GQMError
         For a launch or a parameter that cannot be; the message says what would be right.
     """
-    return MODEL.solve(LaunchRequest(lam0, v0, direction, point, t_max, contact), (r0, b, k, m))
+    return MODEL.solve(LaunchRequest(lam0, v0, direction, point, t_max, contact), (r0, b, k, m), unknown)
 
 
 def sweep(
@@ -228,6 +229,7 @@ def sweep(
     contact: str = "bilateral",
     client: Any = None,
     r0: Any = '1', b: Any = '0.15', k: Any = '2', m: Any = '1',
+    **unknown: Any,
 ) -> "Sweep":
     """One quantity over arrays of launches and parameters, on all cores; all arguments broadcast.
 
@@ -254,7 +256,25 @@ def sweep(
         ``status_counts()`` counts the launches without a value.
     """
     launches = LaunchRequest(lam0, v0, direction, None, t_max, contact)
-    return MODEL.sweep(quantity, launches, (r0, b, k, m), lam=lam, client=client, source=__file__)
+    return MODEL.sweep(quantity, launches, (r0, b, k, m), lam=lam, client=client, unknown=unknown)
+
+
+def equilibria(*, between: Any = None, r0: Any = '1', b: Any = '0.15', k: Any = '2', m: Any = '1', **unknown: Any) -> "tuple[Equilibrium, ...]":
+    """Where a body at rest stays, whether it is stable there, and the frequency of small oscillations.
+
+    Parameters
+    ----------
+    between : pair of numbers, optional
+        The range of theta to look in: the whole domain, or one period, if not given.
+    r0, b, k, m
+        Run-time parameters; `PARAMETERS` holds their defaults.
+
+    Returns
+    -------
+    tuple of Equilibrium
+        Each with lam, stable and frequency (rad/s).
+    """
+    return MODEL.equilibria((r0, b, k, m), between, unknown)
 
 
 # ---- The same formulas once more, only for speed: a load map in one call, and many orbits at once for sweeps. ----
@@ -338,6 +358,7 @@ def bounds_batch(n, lo, hi, p, out):
 
 MODEL = CompiledModel(
     name='spiral_central', parameter='theta', parameters=PARAMETERS, positive=('r0',),
+    source=__file__,
     addresses=Addresses(
         path_and_contact_force.address, effective_potential.address, potential_divdiff1.address,
         potential_divdiff2.address, bounds.address,

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "superellipse". Do not edit: change its declaration and generate again.
-# interface 8, input fe6d2f95d843, body d2ef657561bc
+# interface 9, input fe6d2f95d843, body bd7b63e24717
 """Bead inside a superellipse, flat at its lowest point
 
 F              = -1 + z**4/b**4 + x**4/a**4
@@ -32,7 +32,7 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=8)
+compiled = compiler(__file__, interface=9)
 
 from gqm_sym.runtime.vocabulary import (
     BOUNDS, EFFECTIVE_POTENTIAL, FIELD, PATH_AND_CONTACT_FORCE, POTENTIAL_DIVDIFF1, POTENTIAL_DIVDIFF2, Addresses,
@@ -41,7 +41,7 @@ from gqm_sym.runtime.vocabulary import (
 )
 
 if TYPE_CHECKING:
-    from gqm_sym.runtime import Motion, Sweep
+    from gqm_sym.runtime import Equilibrium, Motion, Sweep
 
 PARAMETERS = {'a': '1.4', 'b': '0.9', 'g': '9.81', 'm': '1'}
 
@@ -147,7 +147,7 @@ def exact_level(op, x, z, p):
     return _t0*x**4 + _t1*z**4 - 1, 4*_t0*x**3, 4*_t1*z**3
 
 
-def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = None, a: Any = '1.4', b: Any = '0.9', g: Any = '9.81', m: Any = '1') -> Pass1:
+def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = None, a: Any = '1.4', b: Any = '0.9', g: Any = '9.81', m: Any = '1', **unknown: Any) -> Pass1:
     """Position, metric, curvature, V**2 and contact force at places of the curve (Pass 1, no quadrature).
 
     Parameters
@@ -166,7 +166,7 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = 
     Pass1
         Arrays x, z, ds, kappa, v2 and normal_force.
     """
-    return MODEL.pass1(LaunchRequest(lam0, v0, direction), (a, b, g, m), lam, out)
+    return MODEL.pass1(LaunchRequest(lam0, v0, direction), (a, b, g, m), lam, out, unknown)
 
 
 def solve(
@@ -178,6 +178,7 @@ def solve(
     t_max: Any = None,
     contact: str = "bilateral",
     a: Any = '1.4', b: Any = '0.9', g: Any = '9.81', m: Any = '1',
+    **unknown: Any,
 ) -> "Motion":
     """The motion that a launch begins (Passes 1 to 3).
 
@@ -203,7 +204,7 @@ def solve(
     GQMError
         For a launch or a parameter that cannot be; the message says what would be right.
     """
-    return MODEL.solve(LaunchRequest(lam0, v0, direction, point, t_max, contact), (a, b, g, m))
+    return MODEL.solve(LaunchRequest(lam0, v0, direction, point, t_max, contact), (a, b, g, m), unknown)
 
 
 def sweep(
@@ -217,6 +218,7 @@ def sweep(
     contact: str = "bilateral",
     client: Any = None,
     a: Any = '1.4', b: Any = '0.9', g: Any = '9.81', m: Any = '1',
+    **unknown: Any,
 ) -> "Sweep":
     """One quantity over arrays of launches and parameters, on all cores; all arguments broadcast.
 
@@ -243,7 +245,25 @@ def sweep(
         ``status_counts()`` counts the launches without a value.
     """
     launches = LaunchRequest(lam0, v0, direction, None, t_max, contact)
-    return MODEL.sweep(quantity, launches, (a, b, g, m), lam=lam, client=client, source=__file__)
+    return MODEL.sweep(quantity, launches, (a, b, g, m), lam=lam, client=client, unknown=unknown)
+
+
+def equilibria(*, between: Any = None, a: Any = '1.4', b: Any = '0.9', g: Any = '9.81', m: Any = '1', **unknown: Any) -> "tuple[Equilibrium, ...]":
+    """Where a body at rest stays, whether it is stable there, and the frequency of small oscillations.
+
+    Parameters
+    ----------
+    between : pair of numbers, optional
+        The range of s to look in: the whole domain, or one period, if not given.
+    a, b, g, m
+        Run-time parameters; `PARAMETERS` holds their defaults.
+
+    Returns
+    -------
+    tuple of Equilibrium
+        Each with lam, stable and frequency (rad/s).
+    """
+    return MODEL.equilibria((a, b, g, m), between, unknown)
 
 
 CHART = Traced(field=field.address, start=exact_start, tangent=1, level=exact_level)
@@ -251,6 +271,7 @@ CHART = Traced(field=field.address, start=exact_start, tangent=1, level=exact_le
 
 MODEL = CompiledModel(
     name='superellipse', parameter='s', parameters=PARAMETERS, positive=(),
+    source=__file__,
     addresses=Addresses(
         path_and_contact_force.address, effective_potential.address, potential_divdiff1.address,
         potential_divdiff2.address, bounds.address,

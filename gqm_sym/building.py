@@ -17,15 +17,20 @@ import os
 import tempfile
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
-from gqm_sym.arguments import checked, instance, short
-from gqm_sym.derivation import Model
+from gqm_sym.arguments import checked, instance, short, unknown_argument
+from gqm_sym.declare import Curve
+from gqm_sym.declare.outline import SAMPLES, outline, values_of
+from gqm_sym.derivation import Model, derive
 from gqm_sym.emission import body_digests, emit
 from gqm_sym.errors import ArgumentError, HandEditedError, InputError
 from gqm_sym.expressions import check_module_name
-from gqm_sym.loading import load
+from gqm_sym.kernels import Gravity
+from gqm_sym.literals.numbers import read_number
+from gqm_sym.loading import load, load_text
 
-__all__ = ["build", "difference", "load", "write_bytes", "write_module", "write_text"]
+__all__ = ["build", "difference", "load", "transient", "write_bytes", "write_module", "write_text"]
 
 FOLDER = "generated"
 
@@ -67,6 +72,27 @@ def build(model: Model, *, name: str, folder: str | os.PathLike[str] = FOLDER, f
     instance(model, Model, where="build: model", what="a model, as derive(curve, kernel) returns one")
     write_module(emit(model, name=name), path, force=force)
     return load(path, name)
+
+
+def transient(model: Model) -> ModuleType:
+    """Import the module of a model without leaving a file; it is compiled once a process."""
+    return load_text("", emit(model, name="model"), "model")
+
+
+def draw_curve(curve: Curve, lam: Any, axes: Any, parameters: dict[str, Any]) -> Any:
+    """Draw a curve; `Curve.plot` is the public way to it."""
+    from gqm_sym.figures.curves import drawn
+
+    for name in parameters.keys() - set(curve.parameters):
+        raise ArgumentError(unknown_argument("Curve.plot", name, ("lam", "axes", *curve.parameters)))
+    if not curve.charted:
+        return drawn(*outline(curve, lam, parameters), curve.title, axes)
+    values_of(curve, parameters)
+    model = transient(derive(curve, Gravity())).MODEL
+    chart = model.charted(model.numbers(tuple({**model.parameters, **parameters}.values())))
+    low, high = (chart.low, chart.high) if lam is None else (read_number(end, where="lam").value for end in lam)
+    x, z = chart.points([low + (high - low) * k / SAMPLES for k in range(SAMPLES + 1)])[:2]
+    return drawn(x, z, curve.title, axes)
 
 
 def write_module(text: str, path: str | os.PathLike[str], *, force: bool = False) -> bool:

@@ -2,6 +2,8 @@
 
 import importlib.util
 import os
+import tempfile
+from functools import lru_cache
 from importlib.machinery import SourceFileLoader
 from pathlib import Path
 from types import CodeType, ModuleType
@@ -27,3 +29,23 @@ def load(path: str | os.PathLike[str], name: str) -> ModuleType:
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module
+
+
+@lru_cache(maxsize=16)
+def load_text(source: str, text: str, name: str) -> ModuleType:
+    """Import a generated module by its text, in another process or on another machine.
+
+    The file is used where it is the same here, because compiled code lies beside it.
+
+    Parameters
+    ----------
+    source, text, name
+        The path of the module's file where it was written, its text, and its name.
+    """
+    path = Path(source)
+    if path.is_file() and path.read_text(encoding="utf-8", errors="replace") == text:
+        return load(path, name)
+    with tempfile.TemporaryDirectory(prefix="gqm-") as folder:
+        path = Path(folder) / f"{name}.py"
+        path.write_text(text, encoding="utf-8")
+        return load(path, name)

@@ -89,6 +89,34 @@ class Curve:
         """A few lines for people: what it is, where it goes, and what its parameters are measured in."""
         return told(self)
 
+    def plot(self, lam: Any = None, *, axes: Any = None, **parameters: Any) -> Any:
+        """Draw the curve with Matplotlib, its start marked and its direction shown by an arrow.
+
+        Parameters
+        ----------
+        lam
+            The range of the parameter to draw, a pair of numbers. Without it the domain is drawn or one period; where
+            there is neither, a graph from -1 to 1, and other curves from 0 to 2*pi.
+        axes
+            The Matplotlib axes to draw on; a new figure if not given.
+        parameters
+            Values of run-time parameters, by name; others have their defaults.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+
+        Raises
+        ------
+        ArgumentError
+            If there is no such parameter.
+        ParameterError
+            If a parameter has no value.
+        """
+        from gqm_sym.building import draw_curve
+
+        return draw_curve(self, lam, axes, parameters)
+
     @property
     def smoothing(self) -> "Smoothing | None":
         """What smoothing did to the points of a sampled track; None where nothing was smoothed."""

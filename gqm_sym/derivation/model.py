@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import sympy as sp
 
@@ -40,6 +40,9 @@ from gqm_sym.kernels.base import (
     units_by_role,
 )
 from gqm_sym.parameters import Given, Value, in_words, is_positive
+
+if TYPE_CHECKING:
+    from gqm_sym.runtime.launch.equilibria import Equilibrium
 
 LAM1 = sp.Symbol("lam1", real=True)
 LAM2 = sp.Symbol("lam2", real=True)
@@ -209,6 +212,35 @@ class Model:
             ("turning points", turning),
             ("liftoff", liftoff),
         )
+
+    def equilibria(self, *, between: Any = None, **parameters: Any) -> "tuple[Equilibrium, ...]":
+        """Find where a body at rest stays, whether it is stable there, and how fast it swings about it.
+
+        Parameters
+        ----------
+        between
+            The range of the curve parameter to look in, a pair of numbers; the whole domain, or one period, if not
+            given.
+        parameters
+            Run-time parameters, by name.
+
+        Returns
+        -------
+        tuple of Equilibrium
+            In ascending order, each with ``lam``, ``stable`` and ``frequency``: the angular frequency of small
+            oscillations in rad/s. Friction, drag and resistance do not count.
+
+        Raises
+        ------
+        InputError
+            If a parameter is unknown or missing, or the range is none.
+        SolutionError
+            If a body rests anywhere on a stretch, or there are too many equilibria to be listed.
+        """
+        from gqm_sym.building import transient
+
+        found: tuple[Equilibrium, ...] = transient(self).equilibria(between=between, **parameters)
+        return found
 
     def __str__(self) -> str:
         """A few lines for people: the closed forms that a motion follows, and the parameters with their units."""

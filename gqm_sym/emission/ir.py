@@ -95,8 +95,9 @@ class ModuleIR:
     """A whole module, ready to print.
 
     ``functions`` and ``bounds`` serve one motion, ``batch`` and ``bounds_batch`` exist only for speed: they serve load
-    maps and sweeps. ``dissipation`` holds what is said of a force law that is not conservative; then there are no
-    ``bounds``. ``rolling_radius`` is the radius of a rolling body that must fit into its track, empty for any other;
+    maps and sweeps. ``dissipation`` holds what is said of a force law that is not conservative; then ``bounds`` and
+    the effective potential are compiled when they are first needed. ``rolling_radius`` is the radius of a rolling body
+    that must fit into its track, empty for any other;
     ``static_friction_limit`` names beta and mu_static of one that may slip. ``monotone`` says that there are no cusps,
     and that the effective potential rises or falls all the way between places of symmetry.
     """

@@ -1,5 +1,7 @@
 """From a model's closed forms to functions as straight-line code."""
 
+from dataclasses import replace
+
 from sympy import Expr, Function, Symbol
 
 from gqm_sym.derivation import Model
@@ -29,8 +31,9 @@ def lower(model: Model, *, name: str, forms: tuple[tuple[str, Expr], ...]) -> Mo
         functions = lowering.potentials()
         batch = (*load_map(lowering), *batch_functions(lowering))
     else:
-        functions, batch = (speed_equation(lowering, loss), static_balance(lowering, loss)), ()
-    exact = lowering.exact() if loss is None else ()
+        energy = replace(lowering.effective_potential(), later=True)
+        functions, batch = (speed_equation(lowering, loss), static_balance(lowering, loss), energy), ()
+    exact = (*(lowering.exact() if loss is None else ()), *lowering.inertia())
     return ModuleIR(
         name=name,
         title=model.title,
@@ -41,7 +44,7 @@ def lower(model: Model, *, name: str, forms: tuple[tuple[str, Expr], ...]) -> Mo
         forms=forms,
         notes=model.notes,
         functions=(lowering.path_and_contact_force(), *functions),
-        bounds=lowering.bounds() if loss is None else None,
+        bounds=lowering.bounds() if loss is None else replace(lowering.bounds(), later=True),
         batch=batch,
         bounds_batch=bounds_batch(lowering) if any(function.batch for function in batch) else None,
         exact=exact if model.curve.charted else (*exact, lowering.domain(), *lowering.axes()),
@@ -59,14 +62,13 @@ def _check(model: Model) -> None:
     low, high = model.domain
     forms = {
         **{"x": model.x, "z": model.z, "ds": model.ds, "kappa": model.kappa},
-        **{"static_normal_load": model.static_normal_load},
+        **{"static_normal_load": model.static_normal_load, "inertia": model.inertia},
+        **{"effective_potential": model.effective_potential},
+        **{"effective_potential_slope": model.effective_potential_slope},
         **{"domain, low": low, "domain, high": high, "period": model.period},
     }
     loss = model.dissipation
-    if loss is None:
-        forms |= {"effective_potential": model.effective_potential}
-        forms |= {"effective_potential_slope": model.effective_potential_slope}
-    else:
+    if loss is not None:
         names |= {DIRECTION.name, CONTACT_SIGN.name, W.name}
         laws = {"P": loss.drive, "Q": loss.decay, "A at rest": loss.holds[0], "A at rest, backwards": loss.holds[1]}
         forms |= {label: loss.along(form) for label, form in laws.items()}
@@ -177,6 +179,11 @@ class _ModelLowering(Lowering):
         curve = self.model.curve
         doc = "Both ends of the domain, and the period; None where there is none."
         return self.constants("exact_domain", doc, (*curve.domain, curve.period))
+
+    def inertia(self) -> tuple[ExactIR, ...]:
+        """The factor 1 + beta by which a rolling body is harder to accelerate; nothing where it is 1."""
+        doc = "1 + beta, so that the kinetic energy is m*(1 + beta)*V**2/2, and the potential energy m*(1 + beta)*U."
+        return () if self.model.inertia == 1 else (self.constants("exact_inertia", doc, (self.model.inertia,)),)
 
     def axes(self) -> tuple[ExactIR, ...]:
         """Places of symmetry, where there are any."""

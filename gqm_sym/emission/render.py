@@ -17,7 +17,7 @@ from gqm_sym.emission.printer import FUNCTIONS
 from gqm_sym.errors import EmissionError
 
 # The version of gqm_sym.runtime.interface that emitted code is written for (a test holds the two together).
-INTERFACE = 8
+INTERFACE = 9
 
 # Functions that the runtime has in forms that fill vector registers; the rest is the standard library's.
 _ELEMENTARY = frozenset({"atan", "cos", "cosh", "exp", "sin", "sinh"})
@@ -40,6 +40,7 @@ _OWN = frozenset(
         *("Any", "BatchFunctions", "CHART", "Dissipation", "ExactFormulas", "ExactPotential", "MODEL", "Motion"),
         *("PARAMETERS", "Sweep", "TYPE_CHECKING", "carray", "chart", "chart_of", "compiled", "compiler", "fabs"),
         *("op", "pass1", "place_from_ends", "range", "self", "solve", "sweep"),
+        *("Equilibrium", "between", "equilibria", "unknown"),
     }
 )
 
@@ -128,6 +129,7 @@ def _imported(module: ModuleIR, functions: _Functions) -> set[str]:
 
 def _model_fields(module: ModuleIR, names: list[str]) -> dict[str, Any]:
     """The arguments of ``CompiledModel``, as text; empty ones are left out of the module."""
+    later = {f.name for f in (*module.functions, module.bounds) if f is not None and f.later}
     return {
         "name_text": repr(module.name),
         "parameter_text": repr(module.parameter),
@@ -135,7 +137,11 @@ def _model_fields(module: ModuleIR, names: list[str]) -> dict[str, Any]:
         "at_least": repr(module.at_least) if module.at_least else "",
         "rolling_radius": repr(module.rolling_radius) if module.rolling_radius else "",
         "static_friction_limit": repr(module.static_friction_limit) if module.static_friction_limit else "",
-        "addresses": _listed([f"{name}.address" for name in _ADDRESSES if name in names], _WIDTH - 8),
+        "addresses": _listed(
+            [f"{name}.address" for name in _ADDRESSES if name in names and name not in later], _WIDTH - 8
+        ),
+        "later": ", ".join(f"{name}={name}" for name in _ADDRESSES if name in later),
+        "inertia": next((f.name for f in module.exact if f.name == "exact_inertia"), ""),
         "load_map": "load_map" if "load_map" in names else "",
         "batch": _listed(_batch(module), _WIDTH - 8),
         "chart": module.chart.statement if module.chart else "",

@@ -1,4 +1,4 @@
-"""A motion sampled in time as a labelled dataset, with names, units and the input it was computed from."""
+"""Motions, states and sweeps as pandas tables and xarray datasets, with names, units and what they came from."""
 
 from typing import TYPE_CHECKING, Any
 
@@ -6,11 +6,13 @@ import numpy as np
 
 from gqm_sym.optional import require
 from gqm_sym.runtime.motion.motion import horizon
+from gqm_sym.runtime.sweep.result import DESCRIBED, PLACE, Sweep, columns_of
 
 if TYPE_CHECKING:
     from xarray import Dataset
 
     from gqm_sym.runtime.motion.motion import Motion
+    from gqm_sym.runtime.motion.state import State
 
 SAMPLES = 201
 
@@ -69,3 +71,57 @@ def dataset(motion: "Motion", t: Any = None) -> "Dataset":
 
 def _attributes(long_name: str, units: str | None) -> dict[str, str]:
     return {"long_name": long_name, **({"units": units} if units else {})}
+
+
+@require("data")
+def state_frame(state: "State") -> Any:
+    """The states at times as a pandas table; `State.to_pandas` is the public way to it."""
+    from pandas import DataFrame
+
+    return DataFrame({name: np.atleast_1d(np.asarray(field)).reshape(-1) for name, field in state._asdict().items()})
+
+
+@require("data")
+def sweep_frame(sweep: Sweep) -> Any:
+    """The launches of a sweep as a pandas table; `Sweep.to_pandas` is the public way to it."""
+    from pandas import DataFrame
+
+    table = DataFrame(columns_of(sweep))
+    table.attrs |= {name: value for name, value in sweep.arguments.items() if not np.ndim(value)}
+    return table
+
+
+@require("data")
+def sweep_dataset(sweep: Sweep) -> "Dataset":
+    """A sweep as an xarray dataset; `Sweep.to_xarray` is the public way to it."""
+    from xarray import Dataset
+
+    shape = sweep.status.shape
+    varied = {name: np.asarray(value) for name, value in sweep.arguments.items() if np.ndim(value)}
+    aligned = {name: value.reshape((1,) * (len(shape) - value.ndim) + value.shape) for name, value in varied.items()}
+    dims = [_axis_name(axis, aligned) for axis in range(len(shape))]
+    fixed = {name: value for name, value in sweep.arguments.items() if name not in varied}
+
+    def described(name: str) -> dict[str, str]:
+        long_name, unit = DESCRIBED.get(name, (name, ""))
+        return _attributes(long_name, None if unit in ("", PLACE) else unit)
+
+    coordinates: dict[str, Any] = {}
+    for name, value in aligned.items():
+        if name in dims:
+            coordinates[name] = ((name,), value.reshape(-1), described(name))
+        else:
+            coordinates[name] = (tuple(dims), np.broadcast_to(value, shape), described(name))
+    names = [sweep.quantity] if sweep.values.ndim == len(shape) else ["turning_point_lower", "turning_point_upper"]
+    values = sweep.values.reshape(*shape, len(names))
+    columns: dict[str, Any] = {name: (tuple(dims), values[..., k], described(name)) for k, name in enumerate(names)}
+    columns["status"] = (tuple(dims), sweep.status, _attributes("0 where there is a value", None))
+    columns["route"] = (tuple(dims), sweep.route, _attributes("how the launch was answered", None))
+    return Dataset(columns, coords=coordinates, attrs=fixed)
+
+
+def _axis_name(axis: int, arguments: dict[str, Any]) -> str:
+    """The name of the argument that varies along an axis and along no other; another name where there is none."""
+    along = [name for name, value in arguments.items() if value.shape[axis] != 1]
+    alone = len(along) == 1 and arguments[along[0]].size == arguments[along[0]].shape[axis]
+    return along[0] if alone else f"axis_{axis}"

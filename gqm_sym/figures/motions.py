@@ -20,7 +20,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from gqm_sym.runtime.motion.events import Event
-    from gqm_sym.runtime.motion.motion import Motion, State
+    from gqm_sym.runtime.motion.motion import Motion
+    from gqm_sym.runtime.motion.state import State
 
 # Number of states that are drawn, and the least number between two events.
 MAX_SAMPLES, MIN_SAMPLES = 801, 33

@@ -10,22 +10,40 @@ from typing import TYPE_CHECKING, Any
 from gqm_sym.runtime.compiled.jit import compiler
 
 if TYPE_CHECKING:
+    from gqm_sym.runtime.launch.equilibria import Equilibrium
     from gqm_sym.runtime.launch.speed import Pass1
     from gqm_sym.runtime.model import CompiledModel
     from gqm_sym.runtime.motion.events import Event, Leg
-    from gqm_sym.runtime.motion.motion import Motion, State
-    from gqm_sym.runtime.sweep.sweep import Sweep
+    from gqm_sym.runtime.motion.extremes import Extreme
+    from gqm_sym.runtime.motion.motion import Motion
+    from gqm_sym.runtime.motion.state import Energy, State
+    from gqm_sym.runtime.sweep.result import Sweep
 
-__all__ = ["CompiledModel", "Event", "Leg", "Motion", "Pass1", "State", "Sweep", "compiler"]
+__all__ = [
+    "CompiledModel",
+    "Energy",
+    "Equilibrium",
+    "Event",
+    "Extreme",
+    "Leg",
+    "Motion",
+    "Pass1",
+    "State",
+    "Sweep",
+    "compiler",
+]
 
 _HOMES = {
     "CompiledModel": "model",
+    "Energy": "motion.state",
+    "Equilibrium": "launch.equilibria",
     "Event": "motion.events",
+    "Extreme": "motion.extremes",
     "Leg": "motion.events",
     "Motion": "motion.motion",
     "Pass1": "launch.speed",
-    "State": "motion.motion",
-    "Sweep": "sweep.sweep",
+    "State": "motion.state",
+    "Sweep": "sweep.result",
 }
 
 

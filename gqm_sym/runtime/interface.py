@@ -27,7 +27,8 @@ field                  n, x, z, p, out                F, F_x, F_z, F_xx, F_xz, F
 ====================== ============================== ===============================================================
 
 A conservative model has ``effective_potential``, ``potential_divdiff1``, ``potential_divdiff2`` and ``bounds``; a
-dissipative one has ``speed_equation`` and ``static_balance`` instead. On a leg with the signs v = sgn(ds/dt) and
+dissipative one has ``speed_equation`` and ``static_balance`` instead, and the first and the last of the former for its
+energy and its equilibria, compiled when these are first asked for. On a leg with the signs v = sgn(ds/dt) and
 nu = sgn(N), ``dW/dlam = P - Q*W`` with W = V**2 (MATHS, section 2). For a law that is not linear in W, P and Q are its
 linearisation at the ``v2`` given: ``P - Q*v2`` is the law itself there. The contact force is ``N = m*(kappa*W + n0)``.
 
@@ -72,7 +73,7 @@ from typing import Any, NamedTuple
 from numba import types
 
 # Raised with every change of a signature here, or of a number that runtime code puts into generated modules.
-INTERFACE = 8
+INTERFACE = 9
 
 REAL = types.float64
 MANY = types.CPointer(REAL)

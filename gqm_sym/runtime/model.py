@@ -1,12 +1,16 @@
 """The model of a generated module, which answers for pass 1, single motions and sweeps."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import cache
-from typing import TYPE_CHECKING, Any
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, NoReturn
 
 import numpy as np
 
+from gqm_sym.arguments import unknown_argument
+from gqm_sym.errors import ArgumentError, SolutionError
 from gqm_sym.literals.numbers import read_numbers
+from gqm_sym.loading import load_text
 from gqm_sym.runtime.compiled.streaming import LARGE
 from gqm_sym.runtime.compiled.threads import run_in_threads
 from gqm_sym.runtime.compiled.types import Array
@@ -16,13 +20,24 @@ from gqm_sym.runtime.launch.request import Launch, LaunchRequest, read_launch
 from gqm_sym.runtime.launch.speed import Pass1, fill_load_map, load_map_arrays, path_and_force_at
 
 if TYPE_CHECKING:
+    from gqm_sym.runtime.launch.equilibria import Equilibrium
     from gqm_sym.runtime.motion.motion import Motion
-    from gqm_sym.runtime.sweep.sweep import Sweep
+    from gqm_sym.runtime.sweep.result import Sweep
 
 # The fewest places of a load map for which another thread is started.
 MIN_PLACES_PER_THREAD = 2**16
 
 NO_LOW_PARTS: Array = np.empty(0)
+
+# What the functions of a module take besides its run-time parameters.
+ARGUMENTS = {
+    "pass1": ("lam", "lam0", "v0", "direction", "out"),
+    "solve": LaunchRequest._fields,
+    "sweep": ("quantity", "lam0", "v0", "direction", "lam", "t_max", "contact", "client"),
+    "equilibria": ("between",),
+}
+
+NOTHING: Mapping[str, Any] = MappingProxyType({})
 
 
 @cache
@@ -46,7 +61,27 @@ class CompiledModel(Formulas):
 
     __slots__ = ()
 
-    def pass1(self, request: LaunchRequest, parameters: tuple[Any, ...], lam: Any, out: Any = None) -> Pass1:
+    def refuse(self, called: str, unknown: Mapping[str, Any]) -> NoReturn:
+        """Say that a function of the module has no argument of a name, which was probably meant, and which there are.
+
+        Parameters
+        ----------
+        called : str
+            One of the functions in `ARGUMENTS`.
+        unknown : mapping
+            The arguments that it does not have.
+        """
+        known = (*ARGUMENTS[called], *self.parameters)
+        raise ArgumentError(unknown_argument(f"{self.name}.{called}", next(iter(unknown)), known))
+
+    def pass1(
+        self,
+        request: LaunchRequest,
+        parameters: tuple[Any, ...],
+        lam: Any,
+        out: Any = None,
+        unknown: Mapping[str, Any] = NOTHING,
+    ) -> Pass1:
         """Position, curvature, V**2 and contact force at places of the curve (MATHS, section 2).
 
         Parameters
@@ -59,6 +94,8 @@ class CompiledModel(Formulas):
             Places, as values of the curve parameter; strings, ints and Fractions are exact.
         out : tuple of six arrays, optional
             Arrays of doubles of the shape of ``lam`` to be filled; new ones are made if not given.
+        unknown : mapping, optional
+            Arguments that the module's function does not have, which are refused.
 
         Returns
         -------
@@ -70,6 +107,8 @@ class CompiledModel(Formulas):
         InputError
             If a number cannot be read, the launch is impossible, or ``out`` cannot be filled.
         """
+        if unknown:
+            self.refuse("pass1", unknown)
         p = self.numbers(parameters)
         launch = read_launch(self, p, request)
         f = bind(self, p, launch)
@@ -99,7 +138,9 @@ class CompiledModel(Formulas):
         run_in_threads(fill, places.size, MIN_PLACES_PER_THREAD)
         return arrays
 
-    def solve(self, request: LaunchRequest, parameters: tuple[Any, ...]) -> "Motion":
+    def solve(
+        self, request: LaunchRequest, parameters: tuple[Any, ...], unknown: Mapping[str, Any] = NOTHING
+    ) -> "Motion":
         """The motion that a launch begins.
 
         Parameters
@@ -108,6 +149,8 @@ class CompiledModel(Formulas):
             The launch.
         parameters : tuple
             Values of the run-time parameters, in the order of the attribute ``parameters``.
+        unknown : mapping, optional
+            Arguments that the module's function does not have, which are refused.
 
         Returns
         -------
@@ -121,6 +164,8 @@ class CompiledModel(Formulas):
         SolutionError
             If the motion cannot be computed, or a rolling body comes to where it does not fit into its track.
         """
+        if unknown:
+            self.refuse("solve", unknown)
         p = self.numbers(parameters)
         launch = read_launch(self, p, request)
         solve = _solver(self.dissipation is not None)
@@ -134,7 +179,14 @@ class CompiledModel(Formulas):
         return motion
 
     def sweep(
-        self, quantity: str, launches: LaunchRequest, parameters: tuple[Any, ...], *, lam: Any, client: Any, source: str
+        self,
+        quantity: str,
+        launches: LaunchRequest,
+        parameters: tuple[Any, ...],
+        *,
+        lam: Any,
+        client: Any,
+        unknown: Mapping[str, Any] = NOTHING,
     ) -> "Sweep":
         """One quantity over arrays of launches and parameters, on this machine or on a Dask cluster.
 
@@ -150,8 +202,8 @@ class CompiledModel(Formulas):
             The places that "time_at" asks about.
         client : distributed.Client or None
             The cluster; None for this machine.
-        source : str
-            The path of the generated module, whose text is sent to a cluster.
+        unknown : mapping, optional
+            Arguments that the module's function does not have, which are refused.
 
         Returns
         -------
@@ -163,13 +215,59 @@ class CompiledModel(Formulas):
         InputError
             If the quantity is unknown, or numbers cannot be read or do not broadcast.
         """
+        if unknown:
+            self.refuse("sweep", unknown)
+        named = dict(zip(self.parameters, parameters, strict=True))
+        arguments = {**launches._asdict(), "lam": lam, **named}
+        del arguments["point"]
+        from gqm_sym.runtime.sweep.result import told
+
         if client is not None:
             from gqm_sym.runtime.sweep.cluster import sweep_on
 
-            named = dict(zip(self.parameters, parameters, strict=True))
-            arguments = {**launches._asdict(), "lam": lam, **named}
-            del arguments["point"]
-            return sweep_on(client, source, self.name, quantity, arguments)
+            module = self.source, self.text, self.name
+            return told(sweep_on(client, module, quantity, arguments), quantity, arguments)
         from gqm_sym.runtime.sweep.sweep import sweep
 
-        return sweep(self, quantity, launches, parameters, lam, self.solve)
+        return told(sweep(self, quantity, launches, parameters, lam, self.solve), quantity, arguments)
+
+    def equilibria(
+        self, parameters: tuple[Any, ...], between: Any = None, unknown: Mapping[str, Any] = NOTHING
+    ) -> "tuple[Equilibrium, ...]":
+        """The places where a body at rest stays, in ascending order; see `gqm_sym.runtime.launch.equilibria`.
+
+        Parameters
+        ----------
+        parameters : tuple
+            Values of the run-time parameters, in the order of the attribute ``parameters``.
+        between : pair of numbers, optional
+            The range of the curve parameter to look in; the whole domain, or one period, if not given.
+        unknown : mapping, optional
+            Arguments that the module's function does not have, which are refused.
+        """
+        if unknown:
+            self.refuse("equilibria", unknown)
+        from gqm_sym.runtime.launch.equilibria import equilibria
+
+        return equilibria(self, self.numbers(parameters), between)
+
+    def __deepcopy__(self, memo: Any) -> "CompiledModel":
+        """The same model: it is never changed."""
+        return self
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """By its module's text, which is imported where the copy is made.
+
+        Raises
+        ------
+        SolutionError
+            If the module was not imported from a file.
+        """
+        if not self.text:
+            raise SolutionError(f"{self.name}: is not imported from a file, so it cannot be pickled; build it first")
+        return _model_of, (self.source, self.text, self.name)
+
+
+def _model_of(source: str, text: str, name: str) -> Any:
+    """The model of a generated module that has this text."""
+    return load_text(source, text, name).MODEL

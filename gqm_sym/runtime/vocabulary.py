@@ -46,7 +46,7 @@ _NAMES_BY_HOME = {
     "launch.speed": "Pass1",
     "model": "CompiledModel",
     "motion.motion": "Motion",
-    "sweep.sweep": "Sweep",
+    "sweep.result": "Sweep",
 }
 HOMES = {name: home for home, names in _NAMES_BY_HOME.items() for name in names.split()}
 

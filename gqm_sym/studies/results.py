@@ -14,7 +14,7 @@ import numpy as np
 from gqm_sym.errors import InputError
 from gqm_sym.optional import require
 from gqm_sym.runtime.sweep.quantities import STATUS_SENTENCES
-from gqm_sym.runtime.sweep.sweep import Sweep
+from gqm_sym.runtime.sweep.result import DESCRIBED, PLACE, Sweep
 from gqm_sym.studies.plan import Plan
 
 if TYPE_CHECKING:
@@ -25,27 +25,6 @@ _ENGINES: dict[str, dict[str, Any]] = {
     ".zarr": {"engine": "zarr", "consolidated": False},
 }
 DIGEST = "sweep_digest"
-# The unit of whatever is a value of the curve's parameter: that of the launch place.
-_PLACE = "lam0"
-
-# What each column holds, and the unit of it.
-DESCRIBED = {
-    "half_period": ("time from one turning point to the other", "s"),
-    "period": ("time after which the motion repeats", "s"),
-    "turning_point_lower": ("lower turning point, as a value of the curve's parameter", _PLACE),
-    "turning_point_upper": ("upper turning point, as a value of the curve's parameter", _PLACE),
-    "v_min": ("least speed", "m/s"),
-    "v_max": ("largest speed", "m/s"),
-    "normal_force_min": ("least contact force along the normal", "N"),
-    "normal_force_max": ("largest contact force along the normal", "N"),
-    "time_at": ("first time at the place lam", "s"),
-    "t_end": ("time at which the motion ends", "s"),
-    "rest_position": ("where the body rests in the end, as a value of the curve's parameter", _PLACE),
-    "lam0": ("launch place, as a value of the curve's parameter", _PLACE),
-    "v0": ("launch speed", "m/s"),
-    "direction": ("sign of ds/dt at launch", ""),
-    "lam": ("place asked about, as a value of the curve's parameter", _PLACE),
-}
 
 
 @require("data")
@@ -103,7 +82,7 @@ def dataset(plan: Plan, swept: Mapping[str, Sweep], refusals: Mapping[str, str])
 
 def _attributes(plan: Plan, name: str) -> dict[str, str]:
     text, unit = DESCRIBED.get(name, (f"parameter {name}", plan.units.get(name, "")))
-    unit = plan.units.get(_PLACE, "") if unit == _PLACE else unit
+    unit = plan.units.get(PLACE, "") if unit == PLACE else unit
     return {"long_name": text, **({"units": unit} if unit else {})}
 
 

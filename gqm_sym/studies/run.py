@@ -14,7 +14,7 @@ from gqm_sym.loading import load
 from gqm_sym.runtime.compiled.jit import STAMP
 from gqm_sym.runtime.sweep.cluster import answer, finished
 from gqm_sym.runtime.sweep.quantities import QUANTITIES, REFUSED, SOLVE
-from gqm_sym.runtime.sweep.sweep import Sweep
+from gqm_sym.runtime.sweep.result import Sweep
 from gqm_sym.studies.plan import Plan
 from gqm_sym.studies.results import check_format, dataset, remove, stored, write
 from gqm_sym.studies.store import Store

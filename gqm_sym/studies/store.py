@@ -11,7 +11,7 @@ import numpy as np
 
 from gqm_sym.building import write_bytes, write_text
 from gqm_sym.errors import InputError
-from gqm_sym.runtime.sweep.sweep import Sweep
+from gqm_sym.runtime.sweep.result import Sweep
 from gqm_sym.studies.plan import Plan
 
 _PLAN = "plan.json"

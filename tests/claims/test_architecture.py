@@ -51,7 +51,12 @@ LAYERS = (
 PRESENTATION_HOOKS = {
     ("runtime/motion/motion.py", "gqm_sym.figures.motions"),  # Motion.plot
     ("runtime/motion/motion.py", "gqm_sym.export.datasets"),  # Motion.to_xarray
-    ("runtime/motion/motion.py", "gqm_sym.export.html"),  # Motion._repr_html_
+    ("runtime/motion/motion.py", "gqm_sym.export.html"),  # Motion._repr_html_, Motion.__str__
+    ("declare/curve.py", "gqm_sym.building"),  # Curve.plot
+    ("derivation/model.py", "gqm_sym.building"),  # Model.equilibria
+    ("derivation/model.py", "gqm_sym.runtime.launch.equilibria"),  # the type of what it returns
+    ("runtime/motion/state.py", "gqm_sym.export.datasets"),  # State.to_pandas
+    ("runtime/sweep/result.py", "gqm_sym.export.datasets"),  # Sweep.to_pandas, Sweep.to_xarray
 }
 
 # Not above the runtime though it lies in a layer above it: they know it by name only.
@@ -105,7 +110,6 @@ TESTED_THROUGH = {
     "legs/leg_segments.py": "runtime/legs/test_polynomials.py",
     "model.py": "claims/test_reference.py",
     "motion/conditioning.py": "claims/test_degenerate.py",
-    "motion/extremes.py": "design/test_least_speed.py",
     "motion/motion.py": "claims/test_reference.py",
     "motion/periodic.py": "claims/test_properties.py",
     "motion/rolling.py": "claims/test_rolling.py",
@@ -144,6 +148,7 @@ ONLY_IN = {
     "matplotlib": {"figures", "report"},
     "mpmath": {"runtime", "literals", "figures"},
     "numba": {"runtime"},
+    "pandas": {"export"},
     "numpy": {"runtime", "literals", "figures", "export", "design", "studies", "smoothing"},
     "pint": {"specfile"},
     "pydantic": {"specfile", "studies"},
@@ -167,7 +172,7 @@ ONLY_IN = {
 }
 
 # Imported when exact digits, splines, pictures, datasets or units are asked for, so never by a module as it loads.
-ONLY_INSIDE_FUNCTIONS = {"distributed", "matplotlib", "mpmath", "pint", "scipy", "xarray"}
+ONLY_INSIDE_FUNCTIONS = {"distributed", "matplotlib", "mpmath", "pandas", "pint", "scipy", "xarray"}
 
 
 class Import(NamedTuple):

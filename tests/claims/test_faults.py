@@ -247,16 +247,16 @@ def effective_potential(n, places, p, out):
 """
 
 
-def test_eight_processes_at_once(tmp_path: Path) -> None:
+def test_four_processes_at_once(tmp_path: Path) -> None:
     """All write and import the same module, with one cache: each gets it whole, and nothing is left beside it."""
     source, path = tmp_path / "text", tmp_path / "out" / "small.py"
     source.write_text(SMALL, encoding="utf-8")
     environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path / "cache")}
     command = [sys.executable, "-c", WRITE_AND_LOAD, str(source), str(path)]
-    running = [subprocess.Popen(command, cwd=ROOT, env=environment, stdout=subprocess.PIPE) for _ in range(8)]
+    running = [subprocess.Popen(command, cwd=ROOT, env=environment, stdout=subprocess.PIPE) for _ in range(4)]
     printed = [process.communicate()[0] for process in running]
-    assert [process.returncode for process in running] == [0] * 8
-    assert printed == [b"loaded\n"] * 8
+    assert [process.returncode for process in running] == [0] * 4
+    assert printed == [b"loaded\n"] * 4
     assert names_in(path.parent) == ["small.py"]
     assert path.read_text(encoding="utf-8") == SMALL
 

@@ -4,6 +4,7 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -83,6 +84,12 @@ class Formulas:
         The function that fills a load map in one pass; None if there is none.
     batch : BatchFunctions or None
         The functions that serve many orbits at once; None if motions are solved one by one.
+    source, text : str
+        The path of the module's file, and its text when it was imported: by them a motion is taken to another process.
+    effective_potential, bounds : Later or None
+        Of a dissipative module: the functions of the interface that `addresses` holds for a conservative one.
+    inertia : callable or None
+        ``f(op, p)`` gives 1 + beta of a rolling body; None where it is 1.
     """
 
     name: str
@@ -101,6 +108,11 @@ class Formulas:
     at_least: tuple[tuple[str, str], ...] = ()
     rolling_radius: str = ""
     static_friction_limit: tuple[str, str] | None = None
+    source: str = ""
+    effective_potential: Later | None = None
+    bounds: Later | None = None
+    inertia: Callable[..., Any] | None = None
+    text: str = field(init=False, repr=False, compare=False)
     _read: Callable[..., "ParameterValues"] = field(init=False, repr=False, compare=False)
 
     if not TYPE_CHECKING:
@@ -116,6 +128,8 @@ class Formulas:
         # Most launches have the parameters of a launch before. The integer 1 and the float 1.0 are kept apart, because
         # their texts differ.
         object.__setattr__(self, "_read", lru_cache(maxsize=16, typed=True)(self._numbers))
+        file = Path(self.source)
+        object.__setattr__(self, "text", file.read_text(encoding="utf-8") if file.is_file() else "")
 
     def numbers(self, values: tuple[Any, ...]) -> "ParameterValues":
         """The run-time parameters as exact numbers, checked.

@@ -18,23 +18,23 @@ from gqm_sym.runtime.multiprecision.exact_tracks import FormulaTrack
 
 def bind(formulas: Formulas, p: ParameterValues, launch: Launch) -> BoundFunctions:
     """The compiled functions bound to parameter values, with one launch's problem in extended precision."""
-    if p.functions is None:
-        p.functions = _bind_all(formulas, p)
-    bound: BoundFunctions = p.functions
+    bound = bind_all(formulas, p)
     if formulas.exact is None:
         return bound
     addresses, values, _, breaks, corners, period = bound
     return BoundFunctions(addresses, values, exact_problem(formulas, p, launch), breaks, corners, period)
 
 
-def _bind_all(formulas: Formulas, p: ParameterValues) -> BoundFunctions:
+def bind_all(formulas: Formulas, p: ParameterValues) -> BoundFunctions:
     """The bound functions that all launches with these parameters share."""
-    addresses = formulas.addresses
-    if formulas.chart is None:
-        return BoundFunctions(addresses, p.values)
-    chart = formulas.charted(p)
-    block = np.concatenate([p.values, chart.block])
-    return BoundFunctions(addresses, block, None, chart.breaks, chart.corners, chart.period)
+    if p.functions is None:
+        p.functions = BoundFunctions(formulas.addresses, p.values)
+        if formulas.chart is not None:
+            chart = formulas.charted(p)
+            block = np.concatenate([p.values, chart.block])
+            p.functions = BoundFunctions(formulas.addresses, block, None, chart.breaks, chart.corners, chart.period)
+    bound: BoundFunctions = p.functions
+    return bound
 
 
 @dataclass(slots=True)

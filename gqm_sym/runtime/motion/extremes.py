@@ -1,21 +1,32 @@
-"""Extremes of a function on an interval by ever finer grids, and of a quantity along a motion that ends."""
+"""Extremes of a function on an interval by ever finer grids, and of speed and contact force along a motion."""
 
 from collections.abc import Callable, Iterator
-from math import isfinite, nan
-from typing import TYPE_CHECKING, NamedTuple
+from math import isfinite
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.polynomial import chebyshev
 
+from gqm_sym.errors import SolutionError
+from gqm_sym.runtime.arithmetic.doubledouble import ULP, minus, plus
 from gqm_sym.runtime.compiled.types import Array
-
-if TYPE_CHECKING:
-    from gqm_sym.runtime.motion.motion import Motion, State
+from gqm_sym.runtime.motion.segment import Segment
+from gqm_sym.runtime.motion.trajectory import TimedSegment, Trajectory
 
 # Points of each of the finer grids, and how many of them follow each other: each is 64 times as fine as the one before.
 GRID_POINTS, GRIDS = 129, 8
 
-# Points of the first grid on each leg of a motion, and of how many of the largest values the surroundings are refined.
-LEG_POINTS, MAX_PEAKS = 257, 4
+# Samples on each panel of a segment, and of how many of the largest ones the surroundings are searched.
+SAMPLES_PER_PANEL, MAX_PEAKS = 16, 4
+
+# Nodes of the polynomial by which a peak is located, and the share of its last coefficients below which it is exact.
+PEAK_NODES, MAX_TAIL = 13, 1e-12
+
+# The distance from an end of a segment at which a peak is at the end, as a share of the segment.
+END_SHARE = 1e-9
+
+# Values that differ by less than so many roundings are equal: the earlier one is told.
+EQUAL_ROUNDINGS = 8
 
 
 class Peak(NamedTuple):
@@ -57,26 +68,138 @@ def grid_peaks(
         yield Peak(float(places[k]), float(values[k]), float(low), float(high))
 
 
-def over_legs(motion: "Motion", quantity: Callable[["State"], Array], sign: int) -> float:
-    """The largest (sign 1) or least (-1) value from launch to the end; NaN for a motion that does not end."""
+class Extreme(NamedTuple):
+    """The largest or the least value of a quantity along a motion.
+
+    Attributes
+    ----------
+    value : float
+        The value, in its SI unit.
+    t : float
+        The time in s from launch at which it is first reached.
+    lam : float
+        The curve parameter there, in its unit; in circulation laps are counted.
+    """
+
+    value: float
+    t: float
+    lam: float
+
+
+def speeds(segment: Segment, phi: Array) -> Array:
+    """|ds/dt| in m/s at phase angles of a segment."""
+    return segment.speeds(phi)
+
+
+def extreme(motion: Any, quantity: Callable[[Segment, Array], Array], sign: int) -> Extreme:
+    """The largest (sign 1) or least (-1) value over one period, or from launch to the end.
+
+    It is looked for in phase angles, in which panels resolve the motion also where it is slow or short.
+
+    Parameters
+    ----------
+    motion : motion.Motion
+        The motion.
+    quantity : callable
+        Gives the values at phase angles of a segment.
+    sign : int
+        1 for the largest value, -1 for the least.
+
+    Raises
+    ------
+    SolutionError
+        If the motion goes on for ever without repeating.
+    """
     if motion.kind == "rest":
-        return float(quantity(motion.state(0.0)))
-    if not isfinite(motion.t_end):
-        return nan
+        state = motion.state(0.0)
+        return Extreme(abs(state.v) if quantity is speeds else state.normal_force, 0.0, state.lam)
+    if motion.kind not in ("libration", "circulation") and not isfinite(motion.t_end):
+        raise SolutionError(
+            "this motion goes on for ever and does not repeat; launch it with a horizon, t_max, for its extremes"
+        )
+    repeats = motion.kind in ("libration", "circulation")
+    end = min(motion.t_end, motion.period) if repeats else motion.t_end
+    trajectory = motion._trajectory(0.0 if repeats else end)
+    best: Extreme | None = None
+    for timed in trajectory.segments:
+        if timed.t_start[0] >= end and best is not None:
+            break
+        size, peaks = _on_segment(timed, trajectory, quantity, sign, end)
+        for value, t, lam in peaks:
+            if best is None or sign * (value - best.value) > EQUAL_ROUNDINGS * ULP * size:
+                best = Extreme(value, t, lam)
+    assert best is not None
+    if best.t == 0.0:  # as it was given, without rounding
+        launch = motion.problem.launch
+        return Extreme(launch.v0.value if quantity is speeds else best.value, 0.0, launch.lam0.value)
+    return best
 
-    def signed(times: Array) -> Array:
-        return sign * quantity(motion.state(times))
 
-    peaks: list[tuple[float, float, float]] = []
-    for leg in motion.legs:
-        # Equal steps of an angle over half a turn: a body is slow next to a turning point.
-        times = leg.t_start + (leg.t_end - leg.t_start) * (0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, LEG_POINTS)))
-        times[-1] = min(leg.t_end, motion.t_end)
-        values = signed(times)
-        padded = np.concatenate([[-np.inf], values, [-np.inf]])
-        local = np.flatnonzero((values >= padded[:-2]) & (values >= padded[2:]))
-        peaks += [(float(values[k]), times[max(k - 1, 0)], times[min(k + 1, LEG_POINTS - 1)]) for k in local.tolist()]
-    peaks.sort(reverse=True)
-    return sign * max(
-        max(value, *(peak.value for peak in grid_peaks(signed, low, high))) for value, low, high in peaks[:MAX_PEAKS]
-    )
+def _on_segment(
+    timed: TimedSegment, trajectory: Trajectory, quantity: Callable[[Segment, Array], Array], sign: int, end: float
+) -> tuple[float, list[Extreme]]:
+    """The size of a quantity on a timed segment up to the time ``end``, and its peaks in the order of time."""
+    segment = timed.segment
+    start, stop = timed.phi_start, timed.phi_stop
+    if timed.t_stop[0] > end:
+        stop = float(trajectory.phase_angles(timed, np.array([end]), np.zeros(1))[0])
+    low, high = min(start, stop), max(start, stop)
+    edges = segment.edges
+    steps = np.arange(SAMPLES_PER_PANEL) / SAMPLES_PER_PANEL
+    inside = (edges[:-1, None] + np.diff(edges)[:, None] * steps).ravel()
+    phi = np.unique([low, *inside[(inside > low) & (inside < high)], high])
+
+    def signed(angles: Array) -> Array:
+        return sign * quantity(segment, angles)
+
+    values = signed(phi)
+    padded = np.concatenate([[-np.inf], values, [-np.inf]])
+    peaks = np.flatnonzero((values >= padded[:-2]) & (values >= padded[2:]))
+    found = []
+    for k in sorted(peaks.tolist(), key=lambda k: -float(values[k]))[:MAX_PEAKS]:
+        angle = _peak(signed, float(phi[max(k - 1, 0)]), float(phi[k]), float(phi[min(k + 1, phi.size - 1)]))
+        # A peak at an end of the segment, which is flat there, is found beside it within rounding.
+        near = min((start, stop), key=lambda end: abs(end - angle))
+        if abs(near - angle) < END_SHARE * (high - low):
+            angle = near
+        found.append(_extreme_at(timed, trajectory, angle, sign * float(signed(np.array([angle]))[0])))
+    return float(np.abs(values).max()), sorted(found, key=lambda peak: peak.t)
+
+
+def _peak(function: Callable[[Array], Array], low: float, middle: float, high: float) -> float:
+    """Where a function is largest between two places, given its largest sample between them."""
+    if low == high:
+        return middle
+    nodes = np.cos(np.pi * (np.arange(PEAK_NODES) + 0.5) / PEAK_NODES)
+    values = function(0.5 * (low + high) + 0.5 * (high - low) * nodes)
+    candidates = [low, middle, high]
+    if np.isfinite(values).all():
+        terms = chebyshev.chebfit(nodes, values, PEAK_NODES - 1)
+        if np.abs(terms[-2:]).max() <= MAX_TAIL * np.abs(terms).max():
+            roots = chebyshev.chebroots(chebyshev.chebder(terms))
+            real = roots.real[(np.abs(roots.imag) < 1e-6) & (np.abs(roots.real) <= 1.0)]
+            candidates += (0.5 * (low + high) + 0.5 * (high - low) * real).tolist()
+            return _largest(function, candidates)
+    *_, peak = grid_peaks(function, low, high)
+    return _largest(function, [*candidates, peak.place])
+
+
+def _largest(function: Callable[[Array], Array], places: list[float]) -> float:
+    """The place with the largest value; of equal ones within rounding the last, which was computed most carefully."""
+    values = function(np.array(places))
+    size = np.abs(values).max()
+    return [place for place, value in zip(places, values, strict=True) if value >= values.max() - 2.0 * ULP * size][-1]
+
+
+def _extreme_at(timed: TimedSegment, trajectory: Trajectory, phi: float, value: float) -> Extreme:
+    """An extreme with the time and the place of a phase angle."""
+    if phi == timed.phi_start:
+        when = timed.t_start
+    elif phi == timed.phi_stop:
+        when = timed.t_stop
+    else:
+        r = float(timed.segment.times(np.array([phi]))[0])
+        spent = minus((r, -r * trajectory.time_scale_error), timed.r_start)
+        when = plus(timed.t_start, (timed.sense * spent[0], timed.sense * spent[1]))
+    lam = float(timed.segment.places(np.array([phi]))[0]) + timed.laps * trajectory.lap
+    return Extreme(value, when[0], lam)

@@ -5,62 +5,36 @@ from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
 from math import inf, isfinite
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from gqm_sym.errors import InputError, SolutionError, renamed
-from gqm_sym.export.html import page
-from gqm_sym.literals.numbers import read_number, read_numbers
+from gqm_sym.export.html import page, summary
+from gqm_sym.literals.namespaces import FLOATS
+from gqm_sym.literals.numbers import Number, read_number, read_numbers
 from gqm_sym.runtime.arithmetic.doubledouble import ULP, Pair
 from gqm_sym.runtime.compiled.types import Array
+from gqm_sym.runtime.launch.equilibria import Potential
 from gqm_sym.runtime.launch.kinds import MotionKind
 from gqm_sym.runtime.launch.problem import Problem
+from gqm_sym.runtime.launch.request import Launch, LaunchRequest
 from gqm_sym.runtime.launch.speed import path_and_force_at
-from gqm_sym.runtime.motion.events import Event, Leg, contact_changes, corner_crossings, crossings, passages
+from gqm_sym.runtime.motion.events import (
+    Event,
+    Leg,
+    contact_changes,
+    contact_force,
+    corner_crossings,
+    crossings,
+    passages,
+)
+from gqm_sym.runtime.motion.extremes import Extreme, extreme, speeds
 from gqm_sym.runtime.motion.locking import Lock, locked
 from gqm_sym.runtime.motion.rolling import slip_times
 from gqm_sym.runtime.motion.rows import Rows
+from gqm_sym.runtime.motion.state import Energy, State
 from gqm_sym.runtime.motion.trajectory import PhasePoints, TimedSegment, Trajectory, locate
-
-
-class State(NamedTuple):
-    """The state of the body at given times.
-
-    Each field is a float if one time was given, else an array of the shape of the times.
-
-    Attributes
-    ----------
-    t : float or array
-        Times from launch in s, as given.
-    lam : float or array
-        The curve parameter, in its unit; in circulation laps are counted.
-    s : float or array
-        Arc length in m: 0 at launch and growing with the parameter. On a charted curve it is 0 at the start point.
-    x, z : float or array
-        Coordinates in m; z is up.
-    v : float or array
-        Velocity ds/dt in m/s, with its sign.
-    v2 : float or array
-        Squared speed V**2 in m**2/s**2.
-    kappa : float or array
-        Signed curvature in 1/m, positive where the track bends to the left of growing parameter.
-    normal_force : float or array
-        Contact force N in N along the normal, which is to the left of growing parameter.
-    error : float or array
-        A bound of the error of ``lam``, in the unit of the parameter (`Motion.error_bound`).
-    """
-
-    t: Any
-    lam: Any
-    s: Any
-    x: Any
-    z: Any
-    v: Any
-    v2: Any
-    kappa: Any
-    normal_force: Any
-    error: Any
 
 
 class Motion(ABC):
@@ -312,6 +286,73 @@ class Motion(ABC):
         bound: Array = rate * time_error + inversion_error + rounding
         return bound
 
+    # -- energy and extremes ------------------------------------------------------------------
+
+    @locked
+    def energy(self, t: Any) -> Energy:
+        """Kinetic and potential energy at times, and what has been lost since launch (MATHS, section 2).
+
+        Parameters
+        ----------
+        t : number or array_like
+            Times in s from launch, as for `lam`.
+
+        Returns
+        -------
+        Energy
+            Floats, or arrays of the shape of ``t``, in J.
+
+        Raises
+        ------
+        InputError
+            As `state`.
+        """
+        state, launch = self.state(t), self.state(0.0)
+        formulas, p = self.problem.formulas, self.problem.p
+        mass = float(p.values[list(formulas.parameters).index("m")])
+        inertia = 1.0 if formulas.inertia is None else float(formulas.inertia(FLOATS, p.values.tolist()))
+        potential = Potential(formulas, p)
+
+        def energies(at: State) -> tuple[Array, Array]:
+            level = potential.rows(at.lam)[0].reshape(np.shape(at.lam))
+            return 0.5 * mass * inertia * np.asarray(at.v2), mass * inertia * level
+
+        kinetic, height = energies(state)
+        lost = np.zeros_like(kinetic)
+        if formulas.dissipation is not None:
+            lost = sum(energies(launch)) - (kinetic + height)
+        return Energy(*(_shaped(np.atleast_1d(array), np.shape(state.t)) for array in (kinetic, height, lost)))
+
+    @property
+    @locked
+    def v_max(self) -> Extreme:
+        """The largest speed, its time and its place, over one period or over the whole motion.
+
+        Raises
+        ------
+        SolutionError
+            If the motion goes on for ever without repeating; give it a horizon, ``t_max``.
+        """
+        return extreme(self, speeds, 1)
+
+    @property
+    @locked
+    def v_min(self) -> Extreme:
+        """The least speed; as `v_max`. It is 0 at a turning point."""
+        return extreme(self, speeds, -1)
+
+    @property
+    @locked
+    def normal_force_max(self) -> Extreme:
+        """The largest contact force along the normal; as `v_max`."""
+        return extreme(self, contact_force, 1)
+
+    @property
+    @locked
+    def normal_force_min(self) -> Extreme:
+        """The least contact force along the normal, which may be negative; as `v_max`."""
+        return extreme(self, contact_force, -1)
+
     # -- history ------------------------------------------------------------------------------
 
     @property
@@ -457,6 +498,23 @@ class Motion(ABC):
     def _repr_html_(self) -> str:
         return page(self)
 
+    def __str__(self) -> str:
+        """A few lines for people: the kind, the launch, times and parameters."""
+        rows = summary(self)
+        width = max(len(label) for label, _ in rows)
+        texts = ((label, repr(value) if isinstance(value, float) else value) for label, value in rows)
+        lines = (f"  {label:<{width}}  {text}" for label, text in texts)
+        return "\n".join([f"Motion of {self.problem.formulas.name}", *lines])
+
+    def __repr__(self) -> str:
+        launch = self.problem.launch
+        return f"<{self.kind} of {self.problem.formulas.name}: lam0 = {launch.lam0.text}, v0 = {launch.v0.text}>"
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """By its model, launch and parameters: the copy is solved again, and answers with the same digits."""
+        problem = self.problem
+        return _solved_again, (problem.formulas, problem.launch, tuple(problem.p))
+
     def _shown_time(self) -> float:
         """The time in s up to which a motion without an end is shown in pictures and tables."""
         return max((leg.t_end for leg in self.legs if isfinite(leg.t_end)), default=1.0)
@@ -524,6 +582,15 @@ class Motion(ABC):
         """Times at which the body passes a place, the first time on each segment."""
         trajectory = self._trajectory(0.0)
         return passages(trajectory.segments, trajectory, lam, low)
+
+
+def _solved_again(model: Any, launch: Launch, parameters: tuple[Number, ...]) -> "Motion":
+    """The motion that a launch of a compiled model begins, as it began before."""
+    lam0, v0, direction, contact, t_max, point = launch
+    place = (lam0, None) if point is None else (None, point)
+    request = LaunchRequest(place[0], v0, direction, place[1], t_max, contact)
+    motion: Motion = model.solve(request, parameters)
+    return motion
 
 
 def _shaped(array: Array, shape: tuple[int, ...]) -> Any:

@@ -14,10 +14,11 @@ from gqm_sym.runtime.launch.problem import Problem
 from gqm_sym.runtime.motion import timing
 from gqm_sym.runtime.motion.events import Event
 from gqm_sym.runtime.motion.locking import locked
-from gqm_sym.runtime.motion.motion import Motion, State
+from gqm_sym.runtime.motion.motion import Motion
 from gqm_sym.runtime.motion.rows import Rows
 from gqm_sym.runtime.motion.sampler import Sampler, plain_time, plain_times
 from gqm_sym.runtime.motion.segment import Segment
+from gqm_sym.runtime.motion.state import State
 from gqm_sym.runtime.motion.trajectory import TimedSegment, Trajectory, libration
 from gqm_sym.runtime.multiprecision.exact_problem import NOWHERE
 from gqm_sym.runtime.quadrature.time_panels import slopes
@@ -124,6 +125,14 @@ class PeriodicMotion(Motion):
                 "declare the curve by formulas for more"
             )
         return timing.period_to(self.problem, self.kind, self.direction, self._segment, digits)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """As `Motion`, with whether its period is known as two doubles: the last digit of a place depends on it."""
+        return *super().__reduce__(), self._exact_timing is not None
+
+    def __setstate__(self, has_exact_timing: bool) -> None:
+        if has_exact_timing:
+            _ = self._timing
 
     def lam(self, t: Any) -> Any:
         """The curve parameter at times; see `Motion.lam`. For doubles this is one call of compiled code."""

@@ -6,7 +6,13 @@ from html import escape
 from typing import Any, TypeVar
 
 T = TypeVar("T")
-HEADINGS = {"t": "t (s)", "x": "x (m)", "z": "z (m)", "t_start": "t from (s)", "t_end": "t to (s)"}
+
+# The titles of columns that have a unit; that of the curve parameter depends on the curve.
+HEADINGS = {
+    **{"t": "t (s)", "x": "x (m)", "z": "z (m)", "t_start": "t from (s)", "t_end": "t to (s)", "s": "s (m)"},
+    **{"v": "v (m/s)", "v2": "v2 (m2/s2)", "kappa": "kappa (1/m)", "normal_force": "normal_force (N)"},
+    **{"frequency": "frequency (rad/s)"},
+}
 
 
 class Rows(tuple[T, ...]):
@@ -26,6 +32,13 @@ def table(titles: Sequence[str], rows: Iterable[Iterable[Any]]) -> str:
     head = "".join(f"<th>{escape(title)}</th>" for title in titles)
     body = "".join(f"<tr>{''.join(f'<td>{_text(cell)}</td>' for cell in row)}</tr>" for row in rows)
     return f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
+
+
+def text_table(titles: Sequence[str], rows: Iterable[Iterable[Any]]) -> list[str]:
+    """Aligned lines of text; each number is written as in `table`."""
+    cells = [list(titles), *([repr(float(c) + 0.0) if isinstance(c, float) else str(c) for c in row] for row in rows)]
+    widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
+    return ["  " + "  ".join(c.ljust(width) for c, width in zip(row, widths, strict=True)).rstrip() for row in cells]
 
 
 def _text(cell: Any) -> str:

@@ -29,12 +29,14 @@ def plain_time(t: Any) -> float | None:
     """A time that is a double or equal to one; None for any other."""
     if type(t) is float:
         return t
+    if isinstance(t, np.ndarray) and t.ndim == 0 and t.dtype == np.float64:
+        return float(t)
     return float(t) if type(t) is int and abs(t) < 2**53 else None
 
 
 def plain_times(t: Any) -> tuple[Array, float, float] | None:
     """Times that are an array of doubles, with the least and the greatest; None if they must be read one by one."""
-    if isinstance(t, np.ndarray) and t.dtype == np.float64 and t.size:
+    if isinstance(t, np.ndarray) and t.dtype == np.float64 and t.size and t.ndim:
         flat = np.ascontiguousarray(t).reshape(-1)
         return flat, float(flat.min()), float(flat.max())
     return None

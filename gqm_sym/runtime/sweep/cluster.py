@@ -3,22 +3,19 @@
 The cut does not depend on the workers, and a job is answered as it would be here, so that the numbers are the same.
 """
 
-import tempfile
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from functools import lru_cache
 from itertools import islice
 from math import prod
-from pathlib import Path
-from types import ModuleType
 from typing import Any, TypeVar
 
 import numpy as np
 
 from gqm_sym.errors import InputError, SolutionError
-from gqm_sym.loading import load
+from gqm_sym.loading import load_text
 from gqm_sym.optional import require
 from gqm_sym.runtime.compiled.jit import STAMP
-from gqm_sym.runtime.sweep.sweep import Sweep, broadcast_shape
+from gqm_sym.runtime.sweep.result import Sweep
+from gqm_sym.runtime.sweep.sweep import broadcast_shape
 
 T = TypeVar("T")
 
@@ -97,31 +94,18 @@ def answer(stamp: str, source: str, text: str, name: str, quantity: str, argumen
     """
     if stamp != STAMP:
         raise SolutionError("client: a worker runs another version of gqm_sym; install the same one everywhere")
-    swept: Sweep = _module(source, text, name).sweep(quantity, **arguments)
+    swept: Sweep = load_text(source, text, name).sweep(quantity, **arguments)
     return swept
 
 
-@lru_cache(maxsize=16)
-def _module(source: str, text: str, name: str) -> ModuleType:
-    """A module by its text, from the same file if this machine has it, because compiled code lies beside the file."""
-    path = Path(source)
-    if path.is_file() and path.read_text(encoding="utf-8", errors="replace") == text:
-        return load(path, name)
-    with tempfile.TemporaryDirectory(prefix="gqm-") as folder:
-        path = Path(folder) / f"{name}.py"
-        path.write_text(text, encoding="utf-8")
-        return load(path, name)
-
-
-def sweep_on(client: Any, source: str, name: str, quantity: str, arguments: Mapping[str, Any]) -> Sweep:
+def sweep_on(client: Any, module: tuple[str, str, str], quantity: str, arguments: Mapping[str, Any]) -> Sweep:
     """``module.sweep`` on a cluster; the arguments broadcast against each other.
 
     Parameters
     ----------
-    source, name
-        The file of the generated module, and its name.
+    module
+        The file of the generated module, its text and its name.
     """
-    text = Path(source).read_text(encoding="utf-8")
     given = {key: value for key, value in arguments.items() if value is not None}
     # Arrays of objects keep exact numbers and text as they are.
     arrays = {k: v if isinstance(v, np.ndarray) else np.array(v, dtype=object) for k, v in given.items() if np.ndim(v)}
@@ -129,7 +113,7 @@ def sweep_on(client: Any, source: str, name: str, quantity: str, arguments: Mapp
     flat = {key: np.broadcast_to(array, shape).reshape(-1) for key, array in arrays.items()}
     cuts = [slice(begin, begin + LAUNCHES_PER_JOB) for begin in range(0, max(prod(shape), 1), LAUNCHES_PER_JOB)]
     parts = ({**given, **{key: column[cut] for key, column in flat.items()}} for cut in cuts)
-    found = dict(finished(client, answer, ((STAMP, source, text, name, quantity, part) for part in parts)))
+    found = dict(finished(client, answer, ((STAMP, *module, quantity, part) for part in parts)))
     if not arrays:
         return found[0]
     fields = (np.concatenate(parts) for parts in zip(*(found[k] for k in range(len(cuts))), strict=True))

@@ -12,8 +12,6 @@ from numba import types
 from numpy.typing import NDArray
 
 from gqm_sym.runtime.compiled.types import MATRIX, Array
-from gqm_sym.runtime.launch.speed import path_and_force_at
-from gqm_sym.runtime.motion.extremes import grid_peaks, over_legs
 
 # The quantities that compiled code computes. SPANS is asked of batches only, on the way to another quantity: the
 # offsets of both turning points from the launch, or for a circulation the length of a lap and NaN.
@@ -95,42 +93,11 @@ def _rest_position(motion: Any, _: Any) -> float:
     return motion.legs[-1].lam_end if rests else nan
 
 
-def _speeds(motion: Any, phi: Array) -> Array:
-    speeds: Array = motion.one_period[0].segment.speeds(phi)
-    return speeds
-
-
-def _forces(motion: Any, phi: Array) -> Array:
-    segment = motion.one_period[0].segment
-    f = segment.functions
-    forces: Array = path_and_force_at(f.addresses, f.p, segment.places(phi), segment.speeds(phi) ** 2)[4]
-    return forces
-
-
-def _speeds_of(state: Any) -> Array:
-    speeds: Array = np.abs(state.v)
-    return speeds
-
-
-def _forces_of(state: Any) -> Array:
-    forces: Array = state.normal_force
-    return forces
-
-
-def _extreme(
-    at_phase_angles: Callable[[Any, Array], Array], of_state: Callable[[Any], Array], sign: int
-) -> Callable[[Any, Any], float]:
-    """The largest (``sign`` 1) or smallest (-1) value of a function on a motion.
-
-    On a periodic motion it is found on a grid of phase angles, which is refined about its best point.
-    """
+def _extreme(name: str) -> Callable[[Any, Any], float]:
+    """The value of one of a motion's extremes."""
 
     def of_motion(motion: Any, _: Any) -> float:
-        if motion.kind not in ("libration", "circulation") or isfinite(motion.t_end):
-            return over_legs(motion, of_state, sign)
-        stop = motion.one_period[0].segment.stop
-        *_, peak = grid_peaks(lambda phi: sign * at_phase_angles(motion, phi), 0.0, stop)
-        return float(sign * peak.value)
+        return float(getattr(motion, name).value)
 
     return of_motion
 
@@ -139,10 +106,10 @@ QUANTITIES = {
     "half_period": Quantity(HALF_PERIOD, 1, 0, lambda motion, _: motion.half_period),
     "period": Quantity(PERIOD, 1, 0, lambda motion, _: motion.period),
     "turning_points": Quantity(TURNING_POINTS, 2, slice(0, 2), _turning_points),
-    "v_min": Quantity(MIN_SPEED, 1, 0, _extreme(_speeds, _speeds_of, -1)),
-    "v_max": Quantity(MAX_SPEED, 1, 0, _extreme(_speeds, _speeds_of, 1)),
-    "normal_force_min": Quantity(MIN_FORCE, 1, 0, _extreme(_forces, _forces_of, -1)),
-    "normal_force_max": Quantity(MAX_FORCE, 1, 0, _extreme(_forces, _forces_of, 1)),
+    "v_min": Quantity(MIN_SPEED, 1, 0, _extreme("v_min")),
+    "v_max": Quantity(MAX_SPEED, 1, 0, _extreme("v_max")),
+    "normal_force_min": Quantity(MIN_FORCE, 1, 0, _extreme("normal_force_min")),
+    "normal_force_max": Quantity(MAX_FORCE, 1, 0, _extreme("normal_force_max")),
     "time_at": Quantity(ARRIVAL_TIME, 1, 0, lambda motion, lam: motion.time_at(lam)),
     "t_end": Quantity(END_TIME, 1, 0, lambda motion, _: motion.t_end if isfinite(motion.t_end) else nan),
     "rest_position": Quantity(NOT_COMPILED, 1, 0, _rest_position),

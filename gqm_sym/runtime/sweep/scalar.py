@@ -42,7 +42,7 @@ from gqm_sym.runtime.sweep.curve_table import TABLE, CurveTable
 from gqm_sym.runtime.sweep.liftoff import liftoff_place
 from gqm_sym.runtime.sweep.orbit import Orbit, SweptCurve
 from gqm_sym.runtime.sweep.orbit_extremes import extreme, passage_extreme
-from gqm_sym.runtime.sweep.passage import Passage, fill_slacks, find_passage, passage_arrival, passage_of, passage_time
+from gqm_sym.runtime.sweep.passage import Passage, fill_slacks, find_passage, passage_of, travel_time
 from gqm_sym.runtime.sweep.quantities import (
     ANSWERED,
     ANSWERS,
@@ -52,6 +52,7 @@ from gqm_sym.runtime.sweep.quantities import (
     MAX_FORCE,
     MAX_SPEED,
     MIN_FORCE,
+    MIN_SPEED,
     NEVER_THERE,
     NOT_FINITE,
     NOT_PERIODIC,
@@ -161,14 +162,13 @@ def orbit_time(curve, orbit):  # type: ignore[no-untyped-def]
 @Inner
 def value_from_table(curve, orbit, passage, quantity, target, slacks):  # type: ignore[no-untyped-def]
     """The half period or lap time, the arrival or an extreme on a tabulated curve; NaN where that is not accurate."""
-    if not (passage.panels > 1 and fill_slacks(curve, passage, orbit.v2, orbit.circulates, slacks)):
-        return nan
-    if quantity in (HALF_PERIOD, PERIOD):
-        return passage_time(curve, orbit, passage, slacks)
-    if quantity == ARRIVAL_TIME:
-        return passage_arrival(curve, orbit, passage, slacks, target)
-    force, sign = quantity in (MIN_FORCE, MAX_FORCE), 1.0 if quantity in (MAX_SPEED, MAX_FORCE) else -1.0
-    return passage_extreme(curve, orbit, passage, slacks, force, sign)
+    if quantity in (MIN_SPEED, MAX_SPEED, MIN_FORCE, MAX_FORCE):
+        force, sign = quantity in (MIN_FORCE, MAX_FORCE), 1.0 if quantity in (MAX_SPEED, MAX_FORCE) else -1.0
+        return passage_extreme(curve, orbit, passage, slacks, force, sign)
+    low, high = orbit.lam0 + orbit.low, orbit.lam0 + orbit.high
+    if passage.panels <= 2 and joints_between(curve.joints, curve.period, low, high).size == 0:
+        return nan  # the orbit itself has more digits than a part of a panel
+    return travel_time(curve, orbit, passage, slacks, target if quantity == ARRIVAL_TIME else nan)
 
 
 @Inner
@@ -186,58 +186,38 @@ def value_by_itself(curve, orbit, quantity, target, buffers):  # type: ignore[no
 
 
 @Inner
-def liftoff(curve, orbit, passage, side, buffers):  # type: ignore[no-untyped-def]
-    """The place where a body leaves the track; NaN if it never does, inf where that is not decided."""
-    if side == 0:
-        return nan
-    if passage.panels == 0 or not fill_slacks(curve, passage, orbit.v2, orbit.circulates, buffers.slacks):
-        return inf
-    return liftoff_place(curve, orbit, passage, buffers.slacks, side)
-
-
-@Inner
-def fill_end_time(curve, orbit, passage, ends, buffers, out):  # type: ignore[no-untyped-def]
-    """Fill ``out`` with the time of liftoff, or the last time if that is sooner; ``ends`` are that place and time."""
-    place, time = ends
-    if place == place:
-        when = value_from_table(curve, orbit, passage, ARRIVAL_TIME, place, buffers.slacks)
-        if when != when:
-            when = value_by_itself(curve, orbit, ARRIVAL_TIME, place, buffers)
-        if not isfinite(when):
-            return UNDECIDED
-        time = min(time, when)
-    if time == inf:
-        return NOT_PERIODIC
-    out[0] = time
-    return ANSWERED
-
-
-@Inner
 def fill_answer(curve, orbit, passage, asked, buffers, out):  # type: ignore[no-untyped-def]
     """Fill the row ``out`` with a quantity of an orbit; returns the status.
 
     ``asked`` is the quantity, the place of ARRIVAL_TIME, and side and last time as `GivenCurve` has them.
     """
-    quantity, target, side, t_max = asked
+    (quantity, target, side, t_max), limit, slacks = asked, inf, buffers.slacks
+    tabulated = quantity != TURNING_POINTS or side != 0
+    tabulated = tabulated and passage.panels > 0 and fill_slacks(curve, passage, orbit.v2, orbit.circulates, slacks)
     if side != 0 or quantity == END_TIME:
-        place = liftoff(curve, orbit, passage, side, buffers)
-        if place == inf:
+        if side != 0 and not tabulated:
             return UNDECIDED
+        place = liftoff_place(curve, orbit, passage, slacks, side) if side != 0 else nan
+        if place == place and quantity in (HALF_PERIOD, PERIOD, TURNING_POINTS):
+            return NOT_PERIODIC
+        if quantity != END_TIME and place == place:
+            return UNDECIDED
+        if quantity == END_TIME and place != place:
+            out[0] = t_max if t_max < inf else nan
+            return ANSWERED if t_max < inf else NOT_PERIODIC
         if quantity == END_TIME:
-            return fill_end_time(curve, orbit, passage, (place, t_max), buffers, out)
-        if place == place:
-            return NOT_PERIODIC if quantity in (HALF_PERIOD, PERIOD, TURNING_POINTS) else UNDECIDED
+            quantity, target, limit = ARRIVAL_TIME, place, t_max
     if orbit.circulates and quantity in (HALF_PERIOD, TURNING_POINTS):
         return NOT_PERIODIC
     if quantity == TURNING_POINTS:
         out[0], out[1] = orbit.lam0 + orbit.low, orbit.lam0 + orbit.high
         return ANSWERED
-    value = value_from_table(curve, orbit, passage, quantity, target, buffers.slacks)
+    value = value_from_table(curve, orbit, passage, quantity, target, slacks) if tabulated else nan
     if value != value:
         value = value_by_itself(curve, orbit, quantity, target, buffers)
     if value == inf:
         return NEVER_THERE
-    out[0] = 2.0 * value if quantity == PERIOD and not orbit.circulates else value
+    out[0] = 2.0 * value if quantity == PERIOD and not orbit.circulates else min(value, limit)
     return ANSWERED if isfinite(value) else UNDECIDED
 
 

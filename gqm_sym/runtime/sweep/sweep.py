@@ -28,7 +28,8 @@ from gqm_sym.runtime.sweep import quantities, scalar
 from gqm_sym.runtime.sweep.batch.batches import answer_batches
 from gqm_sym.runtime.sweep.curve_table import NO_TABLE, CurveTable, tabulate
 from gqm_sym.runtime.sweep.dissipative_loop import MIN_BODIES_PER_THREAD, answer_driven, asked_of_bodies
-from gqm_sym.runtime.sweep.quantities import QUANTITIES, ROUTES, STATUS_SENTENCES, Answers, Quantity
+from gqm_sym.runtime.sweep.quantities import QUANTITIES, Answers, Quantity
+from gqm_sym.runtime.sweep.result import Sweep
 
 if TYPE_CHECKING:
     from gqm_sym.runtime.launch.formulas import Formulas
@@ -49,77 +50,6 @@ CONTACT_SIDES = {"bilateral": 0, "above": 1, "below": -1}
 # Into how many pieces a curve with formulas is cut at least before it is tabulated, and how often the range of places
 # is doubled to contain all motions.
 MIN_PIECES, MAX_DOUBLINGS = 64, 8
-
-# What public names of earlier versions are called now.
-RENAMED = {"reasons": "status", "why": "status_counts()"}
-
-
-class Sweep(NamedTuple):
-    """The values of one quantity over many launches.
-
-    ``np.asarray(sweep)`` is the array of the values.
-
-    Attributes
-    ----------
-    values : float array
-        The quantity of each launch, in the shape that the arguments broadcast to; NaN where there is none. Times
-        (``half_period``, ``period``, ``time_at``, ``t_end``) are in seconds, speeds (``v_min``, ``v_max``) in m/s,
-        forces (``normal_force_min``, ``normal_force_max``) in newtons; places (``turning_points``,
-        ``rest_position``) are values of the curve's parameter, in its unit. ``turning_points`` has one more axis of
-        length 2, for the lower and the upper one.
-    status : int8 array
-        0 for each launch that has a value; otherwise a code that says why there is none. `status_counts` gives the
-        sentences, which stand in `quantities.STATUS_SENTENCES`.
-    route : int8 array
-        How each launch was answered, as an index into `quantities.ROUTES`: 0 "batch", in a batch of orbits side by
-        side; 1 "single", alone in a compiled loop; 2 "solve", solved as ``solve`` does it. The values do not depend
-        on it beyond rounding, but the time that they take does.
-    """
-
-    values: Array
-    status: NDArray[np.int8]
-    route: NDArray[np.int8]
-
-    def status_counts(self) -> dict[str, int]:
-        """Count the launches that have no value.
-
-        Returns
-        -------
-        dict
-            The number of launches for each sentence that says why there is no value; empty if all have one.
-        """
-        return _counts(self.status, STATUS_SENTENCES, 1)
-
-    def route_counts(self) -> dict[str, int]:
-        """Count the launches by the route on which they were answered.
-
-        Returns
-        -------
-        dict
-            The number of launches for each of "batch", "single" and "solve" that occurs.
-        """
-        return _counts(self.route, ROUTES, 0)
-
-    def __array__(self, dtype: Any = None, copy: bool | None = None) -> Array:
-        """The values, as `numpy.asarray` asks for them."""
-        return self.values.astype(dtype or self.values.dtype, copy=bool(copy))
-
-    def __getattr__(self, name: str) -> Any:
-        """Say what an attribute of an earlier version is called now.
-
-        Raises
-        ------
-        AttributeError
-            Always, as there is no attribute of this name.
-        """
-        hint = f"; it is now called {RENAMED[name]}" if name in RENAMED else ""
-        raise AttributeError(f"Sweep has no attribute {name!r}{hint}", name=name, obj=self)
-
-
-def _counts(codes: NDArray[np.int8], names: tuple[str, ...], first: int) -> dict[str, int]:
-    """How often each code from ``first`` on occurs, by the codes' names."""
-    found, counts = np.unique(codes[codes >= first], return_counts=True)
-    return {names[code]: int(count) for code, count in zip(found, counts, strict=True)}
 
 
 def sweep(

@@ -1,0 +1,102 @@
+"""The state of a body at given times, and its energy."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from gqm_sym.runtime.motion.rows import HEADINGS, table, text_table
+
+# The most times that a printed state or its table in a notebook shows.
+MAX_ROWS_SHOWN = 10
+
+
+class State(NamedTuple):
+    """The state of the body at given times.
+
+    Each field is a float if one time was given, else an array of the shape of the times.
+
+    Attributes
+    ----------
+    t : float or array
+        Times from launch in s, as given.
+    lam : float or array
+        The curve parameter, in its unit; in circulation laps are counted.
+    s : float or array
+        Arc length in m: 0 at launch and growing with the parameter. On a charted curve it is 0 at the start point.
+    x, z : float or array
+        Coordinates in m; z is up.
+    v : float or array
+        Velocity ds/dt in m/s, with its sign.
+    v2 : float or array
+        Squared speed V**2 in m**2/s**2.
+    kappa : float or array
+        Signed curvature in 1/m, positive where the track bends to the left of growing parameter.
+    normal_force : float or array
+        Contact force N in N along the normal, which is to the left of growing parameter.
+    error : float or array
+        A bound of the error of ``lam``, in the unit of the parameter (`Motion.error_bound`).
+    """
+
+    t: Any
+    lam: Any
+    s: Any
+    x: Any
+    z: Any
+    v: Any
+    v2: Any
+    kappa: Any
+    normal_force: Any
+    error: Any
+
+    def to_pandas(self) -> Any:
+        """The states as a table with a row for each time.
+
+        Returns
+        -------
+        pandas.DataFrame
+            A column for each field; arrays of times of more than one dimension are taken in order.
+        """
+        from gqm_sym.export.datasets import state_frame
+
+        return state_frame(self)
+
+    def _rows(self) -> tuple[list[str], list[tuple[float, ...]]]:
+        """The titles with units, and a row for each of the first times, as they are shown."""
+        columns = [np.atleast_1d(np.asarray(field)).reshape(-1)[:MAX_ROWS_SHOWN].tolist() for field in self]
+        return [HEADINGS.get(name, name) for name in self._fields], list(zip(*columns, strict=True))
+
+    def __str__(self) -> str:
+        """A table with units, of the first times."""
+        titles, rows = self._rows()
+        if len(rows) == 1:  # one under the other
+            width = max(map(len, titles))
+            return "\n".join(f"  {title:<{width}}  {value!r}" for title, value in zip(titles, rows[0], strict=True))
+        hidden = np.size(self.t) - len(rows)
+        return "\n".join([*text_table(titles, rows), *([f"  ... and {hidden} more"] if hidden else [])])
+
+    def _repr_html_(self) -> str:
+        titles, rows = self._rows()
+        hidden = np.size(self.t) - len(rows)
+        return f"{table(titles, rows)}{f'<p>... and {hidden} more</p>' if hidden else ''}"
+
+
+class Energy(NamedTuple):
+    """The energy of the body at given times.
+
+    Each field is a float if one time was given, else an array of the shape of the times.
+
+    Attributes
+    ----------
+    kinetic : float or array
+        m*(1 + beta)*V**2/2 in J: of the motion along the curve and, of a rolling body, of its rotation.
+    potential : float or array
+        m times the potential per unit mass in J: m*g*z for gravity alone. In a rotating frame it contains the
+        centrifugal potential.
+    lost : float or array
+        What friction, drag or resistance have taken since launch in J; 0 for a conservative model. It is a difference
+        of energies, so its error is some roundings of these.
+    """
+
+    kinetic: Any
+    potential: Any
+    lost: Any

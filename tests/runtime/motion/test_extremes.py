@@ -1,0 +1,96 @@
+"""Extremes of speed and of the contact force with their times and places, against closed forms and dense samples."""
+
+from math import cos, pi, sqrt
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+import pytest
+
+import gqm_sym as gqm
+from gqm_sym.errors import SolutionError
+from gqm_sym.runtime import Motion
+
+NAMES = ("v_max", "v_min", "normal_force_max", "normal_force_min")
+
+
+@pytest.fixture(scope="module")
+def swing(tmp_path_factory: pytest.TempPathFactory) -> ModuleType:
+    """A pendulum of one metre."""
+    return gqm.build(
+        gqm.derive(gqm.families.circle(L=1), gqm.Gravity()), name="swing", folder=tmp_path_factory.mktemp("a")
+    )
+
+
+def test_a_pendulum(swing: ModuleType) -> None:
+    """Fastest and heaviest at the bottom after a quarter of the period; at rest and lightest at launch."""
+    motion = swing.solve(1)
+    top, quarter = 2 * 9.81 * (1 - cos(1)), motion.period / 4
+    assert motion.v_max.value == pytest.approx(sqrt(top), rel=1e-15)
+    assert motion.v_max.lam == pytest.approx(0.0, abs=1e-12)
+    assert motion.v_max.t == pytest.approx(quarter, rel=1e-12)
+    assert motion.normal_force_max.value == pytest.approx(9.81 + top, rel=1e-14)
+    assert motion.normal_force_max.t == pytest.approx(quarter, rel=1e-12)
+    assert motion.v_min == (0.0, 0.0, 1.0)
+    assert motion.normal_force_min == (pytest.approx(9.81 * cos(1), rel=1e-14), 0.0, 1.0)
+
+
+def test_a_circulation(swing: ModuleType) -> None:
+    """Slowest at the top; laps count in the place."""
+    motion = swing.solve(0, 8)
+    assert motion.v_min.value == pytest.approx(sqrt(64 - 4 * 9.81), rel=1e-14)
+    assert motion.v_min.t == pytest.approx(motion.period / 2, rel=1e-12)
+    assert motion.v_min.lam == pytest.approx(pi, rel=1e-12)
+    assert motion.v_max == (8.0, 0.0, 0.0)
+
+
+def test_near_the_separatrix_the_peak_is_short(swing: ModuleType) -> None:
+    """The fast part is a thousandth of the period, and found."""
+    motion = swing.solve("pi - 1/1000000000000")
+    assert motion.v_max.value == pytest.approx(sqrt(4 * 9.81), rel=1e-14)
+    assert motion.v_max.lam == pytest.approx(0.0, abs=1e-9)
+
+
+def sampled(motion: Motion, name: str) -> float:
+    """The extreme among very many states."""
+    end = min(motion.t_end, motion.period) if motion.kind in ("libration", "circulation") else motion.t_end
+    state = motion.state(np.linspace(0.0, end, 20001))
+    values = np.abs(state.v) if name.startswith("v_") else state.normal_force
+    return float(values.max() if name.endswith("max") else values.min())
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_against_many_states(name: str, swing: ModuleType, tmp_path: Path) -> None:
+    """No state is beyond an extreme, some are close, and the state at its time and place has that value."""
+    force = gqm.Gravity() + gqm.CoulombFriction(mu="1/5")
+    rough = gqm.build(gqm.derive(gqm.families.ellipse(a=2, b=1), force), name="rough", folder=tmp_path)
+    motions = [
+        swing.solve("1/3", 3),
+        swing.solve(1, 9, -1),
+        swing.solve(1, t_max="1/5"),
+        swing.solve("1/3", 30, t_max=5),
+        rough.solve("1/4", 2),
+        rough.solve("-1/4", 7, -1, t_max="3/2"),
+        swing.solve("3*pi/4", 0, contact="above"),
+    ]
+    for motion in motions:
+        found, sign = getattr(motion, name), 1 if name.endswith("max") else -1
+        size = max(abs(found.value), 1.0)
+        assert sign * (sampled(motion, name) - found.value) <= 1e-13 * size
+        assert sign * (found.value - sampled(motion, name)) <= 2e-3 * size  # at a turning point speeds are steep
+        state = motion.state(found.t)
+        there = abs(state.v) if name.startswith("v_") else state.normal_force
+        # At a turning point the speed is as steep as the acceleration: a rounding of the time is one of the speed.
+        assert there == pytest.approx(found.value, rel=1e-12, abs=1e-12)
+        assert state.lam == pytest.approx(found.lam, rel=1e-9, abs=1e-9)
+
+
+def test_rest_and_motions_without_end(swing: ModuleType, tmp_path: Path) -> None:
+    """A body at rest has its weight; a motion to infinity wants a horizon."""
+    still = swing.solve(0)
+    assert still.v_max == (0.0, 0.0, 0.0)
+    assert still.normal_force_max.value == pytest.approx(9.81)
+    slope = gqm.build(gqm.derive(gqm.Curve.graph("x"), gqm.Gravity()), name="slope", folder=tmp_path)
+    with pytest.raises(SolutionError, match="t_max"):
+        _ = slope.solve(0).v_max
+    assert slope.solve(0, t_max=2).v_max.value == pytest.approx(2 * 9.81 * sqrt(0.5), rel=1e-14)

@@ -1,0 +1,162 @@
+"""What one can do with a motion: print and copy it, tables of its states, its energy."""
+
+import copy
+import pickle
+import subprocess
+import sys
+from itertools import pairwise
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import gqm_sym as gqm
+from gqm_sym.runtime import Energy, State
+
+
+@pytest.fixture(scope="module")
+def swing(tmp_path_factory: pytest.TempPathFactory) -> ModuleType:
+    """A pendulum of one metre."""
+    return gqm.build(
+        gqm.derive(gqm.families.circle(L=1), gqm.Gravity()), name="swing", folder=tmp_path_factory.mktemp("a")
+    )
+
+
+@pytest.fixture(scope="module")
+def dragged(tmp_path_factory: pytest.TempPathFactory) -> ModuleType:
+    """The same with drag."""
+    force = gqm.Gravity() + gqm.QuadraticDrag(b="1/10")
+    return gqm.build(gqm.derive(gqm.families.circle(L=1), force), name="dragged", folder=tmp_path_factory.mktemp("b"))
+
+
+TIMES = np.linspace(0.0, 2.0, 9)
+
+
+@pytest.mark.parametrize("launch", [{"lam0": 1}, {"lam0": "1/3", "v0": 20}, {"lam0": 1, "t_max": 3}, {"lam0": 0}])
+def test_copies_answer_the_same_bits(swing: ModuleType, dragged: ModuleType, launch: dict[str, object]) -> None:
+    """Copied and pickled, with exact numbers and parameters; the copy is a motion of its own."""
+    for module in (swing, dragged):
+        motion = module.solve(**launch, L="11/10")
+        for twin in (copy.deepcopy(motion), pickle.loads(pickle.dumps(motion))):
+            assert twin is not motion
+            assert (twin.kind, twin.t_end) == (motion.kind, motion.t_end)
+            for mine, other in zip(motion.state(TIMES), twin.state(TIMES), strict=True):
+                assert np.array_equal(mine, other)
+
+
+def test_a_copy_after_its_period_was_asked_for(swing: ModuleType) -> None:
+    """The period is then known as two doubles, on which last digits depend."""
+    motion = swing.solve(1)
+    _ = motion.period
+    assert np.array_equal(copy.deepcopy(motion).lam(TIMES), motion.lam(TIMES))
+
+
+def test_a_motion_goes_to_another_process(swing: ModuleType, tmp_path: Path) -> None:
+    """By the text of its module, also where the file is gone; the answers are the same to the last bit."""
+    motion = swing.solve("5/2", 1)
+    file = tmp_path / "motion.pickle"
+    file.write_bytes(pickle.dumps(motion))
+    code = f"import pickle; m = pickle.load(open({str(file)!r}, 'rb')); print(m.lam(0.7).hex(), m.kind)"
+    said = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
+    assert said == [motion.lam(0.7).hex(), "libration"]
+
+
+def test_a_launch_by_a_point_is_copied(tmp_path: Path) -> None:
+    """The copy is launched by the point again."""
+    ring = gqm.Curve.implicit("x**2 + z**2 - 1", start=(1, 0))
+    module = gqm.build(gqm.derive(ring, gqm.Gravity()), name="ring", folder=tmp_path)
+    motion = module.solve(point=("3/5", "-4/5"), v0=1)
+    assert np.array_equal(copy.deepcopy(motion).lam(TIMES), motion.lam(TIMES))
+
+
+def test_a_motion_is_told(swing: ModuleType) -> None:
+    """Kind, launch as it was written, times with units, parameters; one line where there is no room."""
+    motion = swing.solve("5/2")
+    text = str(motion)
+    for part in ("Motion of swing", "libration", "5/2", "period (s)", "9.81"):
+        assert part in text
+    assert repr(motion) == "<libration of swing: lam0 = 5/2, v0 = 0.0>"
+
+
+def test_a_state_is_told(swing: ModuleType) -> None:
+    """One under the other for one time, a table for some, the first of many; with units."""
+    motion = swing.solve(1)
+    assert "v (m/s)" in str(motion.state(0.5))
+    lines = str(motion.state(TIMES)).splitlines()
+    assert len(lines) == 1 + TIMES.size
+    assert "normal_force (N)" in lines[0]
+    assert str(motion.state(np.linspace(0, 1, 50))).splitlines()[-1] == "  ... and 40 more"
+    assert motion.state(TIMES)._repr_html_().count("<tr>") == 1 + TIMES.size
+
+
+def test_states_as_a_table(swing: ModuleType) -> None:
+    """A column for each field and a row for each time; one time is one row."""
+    state = swing.solve(1).state(TIMES)
+    table = state.to_pandas()
+    assert isinstance(table, pd.DataFrame)
+    assert tuple(table.columns) == State._fields
+    assert len(table) == TIMES.size
+    assert np.array_equal(table["lam"], state.lam)
+    assert len(swing.solve(1).state(0.5).to_pandas()) == 1
+
+
+@pytest.mark.parametrize("launch", [(1, 0), ("1/3", 20), (0, 0)])
+def test_one_time_is_a_float_and_one_element_an_array(
+    swing: ModuleType, dragged: ModuleType, launch: tuple[object, ...]
+) -> None:
+    """Whatever the kind of motion, and whatever holds the number."""
+    for motion in (swing.solve(*launch), dragged.solve(*launch)):
+        for t in (0.1, np.float64(0.1), np.array(0.1), "1/10"):
+            for answer in (motion.lam(t), *motion.state(t), motion.error_bound(t), *motion.energy(t)):
+                assert type(answer) is float
+        for t in ([0.1], np.array([0.1]), (0.1,)):
+            for answer in (motion.lam(t), *motion.state(t), motion.error_bound(t), *motion.energy(t)):
+                assert isinstance(answer, np.ndarray)
+                assert answer.shape == (1,)
+
+
+def test_energy_is_kept(swing: ModuleType) -> None:
+    """m*V**2/2 and m*g*z; nothing is lost."""
+    motion = swing.solve(1, 2, m=3, g=5)
+    energy, state = motion.energy(TIMES), motion.state(TIMES)
+    assert isinstance(energy, Energy)
+    assert energy.kinetic == pytest.approx(1.5 * state.v2, rel=1e-15)
+    assert energy.potential == pytest.approx(15 * state.z, rel=1e-14, abs=1e-14)
+    assert np.array_equal(energy.lost, np.zeros(TIMES.size))
+    assert energy.kinetic + energy.potential == pytest.approx(np.full(TIMES.size, 6 - 15 * np.cos(1)), rel=1e-13)
+
+
+def test_a_rolling_body_turns_too(tmp_path: Path) -> None:
+    """The kinetic energy has the factor 1 + beta, the potential energy has not."""
+    force = gqm.Gravity() + gqm.Rolling(beta="2/5")
+    module = gqm.build(gqm.derive(gqm.Curve.graph("x**2"), force), name="ball", folder=tmp_path)
+    motion = module.solve(1, m=2)
+    energy, state = motion.energy(0.3), motion.state(0.3)
+    assert energy.kinetic == pytest.approx(1.4 * state.v2, rel=1e-14)
+    assert energy.potential == pytest.approx(2 * 9.81 * state.z, rel=1e-14)
+
+
+def test_what_drag_takes(dragged: ModuleType) -> None:
+    """The work of b*V**2 along the path, by Gauss-Legendre quadrature of the power b*|V|**3."""
+    motion = dragged.solve(1, m=2)
+    nodes, weights = np.polynomial.legendre.leggauss(60)
+    stops = [0.0, *(event.t for event in motion.events_between(0, 2) if event.kind == "turn" and 0 < event.t < 2), 2.0]
+    total = 0.0
+    for start, stop in pairwise(stops):
+        times = 0.5 * (start + stop) + 0.5 * (stop - start) * nodes
+        total += 0.5 * (stop - start) * float(weights @ (0.1 * np.abs(motion.state(times).v) ** 3))
+    assert motion.energy(2.0).lost == pytest.approx(total, rel=1e-11)
+    assert motion.energy(0.0).lost == 0.0
+
+
+def test_what_friction_takes(tmp_path: Path) -> None:
+    """On a slope the work of friction is mu*N times the path, until the body rests."""
+    slope = gqm.Curve.graph("x/2")
+    force = gqm.Gravity() + gqm.CoulombFriction(mu="9/10")
+    module = gqm.build(gqm.derive(slope, force), name="slope", folder=tmp_path)
+    motion = module.solve(0, 3)
+    end = motion.state(motion.t_end)
+    assert motion.energy(motion.t_end).lost == pytest.approx(0.9 * end.normal_force * end.s, rel=1e-12)
+    assert motion.energy(motion.t_end).kinetic == pytest.approx(0.0, abs=1e-14)
