@@ -1,5 +1,5 @@
 # Made by gqm-gen for "catenary". Do not edit: change its declaration and generate again.
-# interface 9, input 2558bd3a8d44, body 139253eaf818
+# interface 9, input 2558bd3a8d44, body ba67cf0825e3
 """Bead on a hanging chain
 
 x              = x
@@ -381,6 +381,7 @@ def bounds_batch(n, lo, hi, p, out):
 MODEL = CompiledModel(
     name='catenary', parameter='x', parameters=PARAMETERS, positive=('c',),
     source=__file__,
+    units={'c': 'm', 'g': 'm/s**2', 'm': 'kg', 'x': 'm'},
     addresses=Addresses(
         path_and_contact_force.address, effective_potential.address, potential_divdiff1.address,
         potential_divdiff2.address, bounds.address,

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "circle". Do not edit: change its declaration and generate again.
-# interface 9, input 8861fdb976fb, body 16ba297c185b
+# interface 9, input 8861fdb976fb, body efa513449ba9
 """Bead that loops round a circle
 
 x              = L*sin(theta)
@@ -362,6 +362,7 @@ def bounds_batch(n, lo, hi, p, out):
 MODEL = CompiledModel(
     name='circle', parameter='theta', parameters=PARAMETERS, positive=('L',),
     source=__file__,
+    units={'L': 'm', 'g': 'm/s**2', 'm': 'kg', 'theta': '1'},
     addresses=Addresses(
         path_and_contact_force.address, effective_potential.address, potential_divdiff1.address,
         potential_divdiff2.address, bounds.address,

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "circle_drag". Do not edit: change its declaration and generate again.
-# interface 9, input f2f11f54325e, body ff6aaabdf614
+# interface 9, input f2f11f54325e, body 5963e588697a
 """Pendulum in air
 
 x              = L*sin(theta)
@@ -236,6 +236,7 @@ def equilibria(*, between: Any = None, L: Any = '1', b: Any = '0.1', g: Any = '9
 MODEL = CompiledModel(
     name='circle_drag', parameter='theta', parameters=PARAMETERS, positive=('L',),
     source=__file__,
+    units={'L': 'm', 'b': 'kg/m', 'g': 'm/s**2', 'm': 'kg', 'theta': '1'},
     at_least=(('b', '0'),),
     addresses=Addresses(
         path_and_contact_force.address,

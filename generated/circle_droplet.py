@@ -1,5 +1,5 @@
 # Made by gqm-gen for "circle_droplet". Do not edit: change its declaration and generate again.
-# interface 9, input 38113942f710, body fd4c90008205
+# interface 9, input 38113942f710, body 2db2b52fdf57
 """Droplet in a round channel
 
 x              = L*sin(theta)
@@ -237,6 +237,7 @@ def equilibria(*, between: Any = None, L: Any = '0.02', gamma: Any = '0.072', el
 MODEL = CompiledModel(
     name='circle_droplet', parameter='theta', parameters=PARAMETERS, positive=('L',),
     source=__file__,
+    units={'L': 'm', 'ell_c': 'm', 'g': 'm/s**2', 'gamma': 'N/m', 'm': 'kg', 'theta': '1'},
     at_least=(('gamma', '0'), ('ell_c', '0')),
     addresses=Addresses(
         path_and_contact_force.address,

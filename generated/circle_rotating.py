@@ -1,5 +1,5 @@
 # Made by gqm-gen for "circle_rotating". Do not edit: change its declaration and generate again.
-# interface 9, input a74aedd594f9, body e0653fa7d621
+# interface 9, input a74aedd594f9, body eba1e9da4ae4
 """Bead on a hoop that turns about its vertical diameter
 
 x              = L*sin(theta)
@@ -395,6 +395,7 @@ def bounds_batch(n, lo, hi, p, out):
 MODEL = CompiledModel(
     name='circle_rotating', parameter='theta', parameters=PARAMETERS, positive=('L',),
     source=__file__,
+    units={'L': 'm', 'Omega': '1/s', 'g': 'm/s**2', 'm': 'kg', 'theta': '1'},
     addresses=Addresses(
         path_and_contact_force.address, effective_potential.address, potential_divdiff1.address,
         potential_divdiff2.address, bounds.address,

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "circle_spring". Do not edit: change its declaration and generate again.
-# interface 9, input bcc7b1afa151, body 4741e07678a8
+# interface 9, input bcc7b1afa151, body 1f4ffa430cc5
 """Bead on a ring, tied by a spring to a point above its centre
 
 x              = L*sin(theta)
@@ -404,6 +404,7 @@ def bounds_batch(n, lo, hi, p, out):
 MODEL = CompiledModel(
     name='circle_spring', parameter='theta', parameters=PARAMETERS, positive=('L',),
     source=__file__,
+    units={'L': 'm', 'g': 'm/s**2', 'h': 'm', 'm': 'kg', 'theta': '1', 'w': '1/s'},
     addresses=Addresses(
         path_and_contact_force.address, effective_potential.address, potential_divdiff1.address,
         potential_divdiff2.address, bounds.address,

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "cubic_coulomb". Do not edit: change its declaration and generate again.
-# interface 9, input f472752dd3ba, body f0f3c70a392d
+# interface 9, input f472752dd3ba, body 43265023f788
 """Cubic track with Coulomb friction
 
 x              = x
@@ -243,6 +243,7 @@ def equilibria(*, between: Any = None, mu: Any = '0.1', g: Any = '9.81', m: Any 
 MODEL = CompiledModel(
     name='cubic_coulomb', parameter='x', parameters=PARAMETERS, positive=(),
     source=__file__,
+    units={'g': 'm/s**2', 'm': 'kg', 'mu': '1', 'x': 'm'},
     at_least=(('mu', '0'),),
     addresses=Addresses(
         path_and_contact_force.address,

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "cycloid". Do not edit: change its declaration and generate again.
-# interface 9, input 350ae6cf923a, body 5b9463bf6a90
+# interface 9, input 350ae6cf923a, body 013b10c9f8ba
 """Bead on an arch of a cycloid
 
 x              = R*(theta - sin(theta))
@@ -348,6 +348,7 @@ def bounds_batch(n, lo, hi, p, out):
 MODEL = CompiledModel(
     name='cycloid', parameter='theta', parameters=PARAMETERS, positive=('R',),
     source=__file__,
+    units={'R': 'm', 'g': 'm/s**2', 'm': 'kg', 'theta': '1'},
     addresses=Addresses(
         path_and_contact_force.address, effective_potential.address, potential_divdiff1.address,
         potential_divdiff2.address, bounds.address,

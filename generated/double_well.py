@@ -1,5 +1,5 @@
 # Made by gqm-gen for "double_well". Do not edit: change its declaration and generate again.
-# interface 9, input 876b66f15f50, body fe22d7d8fd9b
+# interface 9, input 876b66f15f50, body e89896da68d7
 """Bead between two wells
 
 x              = x
@@ -367,6 +367,7 @@ def bounds_batch(n, lo, hi, p, out):
 MODEL = CompiledModel(
     name='double_well', parameter='x', parameters=PARAMETERS, positive=(),
     source=__file__,
+    units={'g': 'm/s**2', 'm': 'kg', 'x': 'm'},
     addresses=Addresses(
         path_and_contact_force.address, effective_potential.address, potential_divdiff1.address,
         potential_divdiff2.address, bounds.address,

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "ellipse". Do not edit: change its declaration and generate again.
-# interface 9, input 81dc4ee20e82, body 480de3646f8a
+# interface 9, input 81dc4ee20e82, body b74f2e71bccc
 """Bead on an ellipse, by the eccentric angle
 
 x              = a*cos(theta)
@@ -403,6 +403,7 @@ def bounds_batch(n, lo, hi, p, out):
 MODEL = CompiledModel(
     name='ellipse', parameter='theta', parameters=PARAMETERS, positive=('a', 'b'),
     source=__file__,
+    units={'a': 'm', 'b': 'm', 'g': 'm/s**2', 'm': 'kg', 'theta': '1'},
     addresses=Addresses(
         path_and_contact_force.address, effective_potential.address, potential_divdiff1.address,
         potential_divdiff2.address, bounds.address,

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "ellipse_drag". Do not edit: change its declaration and generate again.
-# interface 9, input f2717a5ad91f, body 42d003ed4fcb
+# interface 9, input f2717a5ad91f, body 04fc7fd7a998
 """Bead on an ellipse, in air
 
 x              = a*cos(theta)
@@ -246,6 +246,7 @@ def equilibria(*, between: Any = None, a: Any = '1.5', b: Any = '1', b_air: Any 
 MODEL = CompiledModel(
     name='ellipse_drag', parameter='theta', parameters=PARAMETERS, positive=('a', 'b'),
     source=__file__,
+    units={'a': 'm', 'b': 'm', 'b_air': 'kg/m', 'g': 'm/s**2', 'm': 'kg', 'theta': '1'},
     at_least=(('b_air', '0'),),
     addresses=Addresses(
         path_and_contact_force.address,

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "kepler". Do not edit: change its declaration and generate again.
-# interface 9, input a0162e77d64e, body 61fe8010229c
+# interface 9, input a0162e77d64e, body 58de6f2008a3
 """Planet on its own ellipse, by the eccentric anomaly
 
 x              = a*(-ecc + cos(E))
@@ -531,6 +531,7 @@ def bounds_batch(n, lo, hi, p, out):
 MODEL = CompiledModel(
     name='kepler', parameter='E', parameters=PARAMETERS, positive=('a',),
     source=__file__,
+    units={'E': '1', 'a': 'm', 'ecc': '1', 'g': 'm/s**2', 'k': 'm**3/s**2', 'm': 'kg'},
     addresses=Addresses(
         path_and_contact_force.address, effective_potential.address, potential_divdiff1.address,
         potential_divdiff2.address, bounds.address,

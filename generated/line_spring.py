@@ -1,5 +1,5 @@
 # Made by gqm-gen for "line_spring". Do not edit: change its declaration and generate again.
-# interface 9, input 702c9ef6b67b, body 221dd9dd13ef
+# interface 9, input 702c9ef6b67b, body 7da88834dc16
 """Bead on a sloping line, tied to the origin by a spring
 
 x              = x
@@ -328,6 +328,7 @@ def bounds_batch(n, lo, hi, p, out):
 MODEL = CompiledModel(
     name='line_spring', parameter='x', parameters=PARAMETERS, positive=(),
     source=__file__,
+    units={'g': 'm/s**2', 'm': 'kg', 'w': '1/s', 'x': 'm'},
     addresses=Addresses(
         path_and_contact_force.address, effective_potential.address, potential_divdiff1.address,
         potential_divdiff2.address, bounds.address,

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "log_spiral". Do not edit: change its declaration and generate again.
-# interface 9, input 8cb1e254c2ba, body c698c8a559fa
+# interface 9, input 8cb1e254c2ba, body e66facb0d5cd
 """Bead on a logarithmic spiral
 
 x              = r0*exp(b*theta)*cos(theta)
@@ -371,6 +371,7 @@ def bounds_batch(n, lo, hi, p, out):
 MODEL = CompiledModel(
     name='log_spiral', parameter='theta', parameters=PARAMETERS, positive=('r0',),
     source=__file__,
+    units={'b': '1', 'g': 'm/s**2', 'm': 'kg', 'r0': 'm', 'theta': '1'},
     addresses=Addresses(
         path_and_contact_force.address, effective_potential.address, potential_divdiff1.address,
         potential_divdiff2.address, bounds.address,

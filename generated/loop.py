@@ -1,5 +1,5 @@
 # Made by gqm-gen for "loop". Do not edit: change its declaration and generate again.
-# interface 9, input e5eeff356595, body 6d852cd0f3cb
+# interface 9, input e5eeff356595, body ffccce8adb67
 """Loop of a roller coaster
 
 x              = x(s)
@@ -245,6 +245,7 @@ CHART = Rail(
 MODEL = CompiledModel(
     name='loop', parameter='s', parameters=PARAMETERS, positive=(),
     source=__file__,
+    units={'R': 'm', 'a': 'm', 'c': 'm', 'g': 'm/s**2', 'm': 'kg', 's': 'm'},
     addresses=Addresses(
         path_and_contact_force.address, effective_potential.address, potential_divdiff1.address,
         potential_divdiff2.address, bounds.address,

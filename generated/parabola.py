@@ -1,5 +1,5 @@
 # Made by gqm-gen for "parabola". Do not edit: change its declaration and generate again.
-# interface 9, input 2c8bf584b06a, body 6401f7bd6f0b
+# interface 9, input 2c8bf584b06a, body 1159df1ae14f
 """Bead in a parabolic bowl
 
 x              = x
@@ -361,6 +361,7 @@ def bounds_batch(n, lo, hi, p, out):
 MODEL = CompiledModel(
     name='parabola', parameter='x', parameters=PARAMETERS, positive=(),
     source=__file__,
+    units={'a': '1/m', 'g': 'm/s**2', 'm': 'kg', 'x': 'm'},
     addresses=Addresses(
         path_and_contact_force.address, effective_potential.address, potential_divdiff1.address,
         potential_divdiff2.address, bounds.address,

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "parabola_droplet". Do not edit: change its declaration and generate again.
-# interface 9, input 016fa3c6503a, body c764d3cbc25e
+# interface 9, input 016fa3c6503a, body 9ce7589a2f80
 """Droplet in a parabolic channel
 
 x              = x
@@ -246,6 +246,7 @@ def equilibria(*, between: Any = None, a: Any = '0.5', gamma: Any = '0.5', ell_c
 MODEL = CompiledModel(
     name='parabola_droplet', parameter='x', parameters=PARAMETERS, positive=(),
     source=__file__,
+    units={'a': '1/m', 'ell_c': 'm', 'g': 'm/s**2', 'gamma': 'N/m', 'm': 'kg', 'x': 'm'},
     at_least=(('gamma', '0'), ('ell_c', '0')),
     addresses=Addresses(
         path_and_contact_force.address,

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "parabola_rolling". Do not edit: change its declaration and generate again.
-# interface 9, input 6fc25406b912, body 7e7f479a3d81
+# interface 9, input 6fc25406b912, body 04a6b5720e06
 """Ball rolling in a parabolic bowl
 
 x              = x*(-2*a*rho/sqrt(4*a**2*x**2 + 1) + 1)
@@ -345,6 +345,7 @@ def load_map(n, w0, level, places, p, out):
 MODEL = CompiledModel(
     name='parabola_rolling', parameter='x', parameters=PARAMETERS, positive=(),
     source=__file__,
+    units={'a': '1/m', 'beta': '1', 'g': 'm/s**2', 'm': 'kg', 'rho': 'm', 'x': 'm'},
     at_least=(('beta', '0'),),
     rolling_radius='rho',
     addresses=Addresses(

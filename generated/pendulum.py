@@ -1,5 +1,5 @@
 # Made by gqm-gen for "pendulum". Do not edit: change its declaration and generate again.
-# interface 9, input f60615287831, body 0b7d25b3797b
+# interface 9, input f60615287831, body 807804eabb5f
 """Simple pendulum, angle from the horizontal
 
 x              = L*cos(theta)
@@ -362,6 +362,7 @@ def bounds_batch(n, lo, hi, p, out):
 MODEL = CompiledModel(
     name='pendulum', parameter='theta', parameters=PARAMETERS, positive=('L',),
     source=__file__,
+    units={'L': 'm', 'g': 'm/s**2', 'm': 'kg', 'theta': '1'},
     addresses=Addresses(
         path_and_contact_force.address, effective_potential.address, potential_divdiff1.address,
         potential_divdiff2.address, bounds.address,

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "planes". Do not edit: change its declaration and generate again.
-# interface 9, input 1c6e3a707056, body 73d9151c11d3
+# interface 9, input 1c6e3a707056, body adc4ddc24af9
 """Stitched planes through surveyed points
 
 x              = x(s)
@@ -299,6 +299,7 @@ CHART = Sampled(POINTS, kind='linear', closed=False)
 MODEL = CompiledModel(
     name='planes', parameter='s', parameters=PARAMETERS, positive=(),
     source=__file__,
+    units={'g': 'm/s**2', 'm': 'kg', 's': 'm'},
     addresses=Addresses(
         path_and_contact_force.address, effective_potential.address, potential_divdiff1.address,
         potential_divdiff2.address, bounds.address,

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "quartic". Do not edit: change its declaration and generate again.
-# interface 9, input 79764b04feb4, body 495a032f17f9
+# interface 9, input 79764b04feb4, body 7775cc2c093b
 """Bead in a quartic bowl
 
 x              = x
@@ -356,6 +356,7 @@ def bounds_batch(n, lo, hi, p, out):
 MODEL = CompiledModel(
     name='quartic', parameter='x', parameters=PARAMETERS, positive=(),
     source=__file__,
+    units={'g': 'm/s**2', 'm': 'kg', 'x': 'm'},
     addresses=Addresses(
         path_and_contact_force.address, effective_potential.address, potential_divdiff1.address,
         potential_divdiff2.address, bounds.address,

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "rolling_circle". Do not edit: change its declaration and generate again.
-# interface 9, input 2a76ceb4277a, body 0a85be3fef98
+# interface 9, input 2a76ceb4277a, body d38244cf874e
 """Solid sphere rolling in a circular bowl
 
 x              = L*sin(theta)
@@ -370,6 +370,7 @@ def bounds_batch(n, lo, hi, p, out):
 MODEL = CompiledModel(
     name='rolling_circle', parameter='theta', parameters=PARAMETERS, positive=('L',),
     source=__file__,
+    units={'L': 'm', 'beta': '1', 'g': 'm/s**2', 'm': 'kg', 'theta': '1'},
     at_least=(('beta', '0'),),
     addresses=Addresses(
         path_and_contact_force.address, effective_potential.address, potential_divdiff1.address,

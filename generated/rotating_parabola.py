@@ -1,5 +1,5 @@
 # Made by gqm-gen for "rotating_parabola". Do not edit: change its declaration and generate again.
-# interface 9, input 33421e752297, body 99a5c7aead49
+# interface 9, input 33421e752297, body 34e695f9fae0
 """Bead in a turning parabolic bowl
 
 x              = x
@@ -368,6 +368,7 @@ def bounds_batch(n, lo, hi, p, out):
 MODEL = CompiledModel(
     name='rotating_parabola', parameter='x', parameters=PARAMETERS, positive=(),
     source=__file__,
+    units={'Omega': '1/s', 'a': '1/m', 'g': 'm/s**2', 'm': 'kg', 'x': 'm'},
     addresses=Addresses(
         path_and_contact_force.address, effective_potential.address, potential_divdiff1.address,
         potential_divdiff2.address, bounds.address,

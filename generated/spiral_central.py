@@ -1,5 +1,5 @@
 # Made by gqm-gen for "spiral_central". Do not edit: change its declaration and generate again.
-# interface 9, input cd2a37956d84, body 4330f59a31e9
+# interface 9, input cd2a37956d84, body 4e82ea1e6855
 """Bead on a logarithmic spiral, drawn to its pole
 
 x              = r0*exp(b*theta)*cos(theta)
@@ -359,6 +359,7 @@ def bounds_batch(n, lo, hi, p, out):
 MODEL = CompiledModel(
     name='spiral_central', parameter='theta', parameters=PARAMETERS, positive=('r0',),
     source=__file__,
+    units={'b': '1', 'g': 'm/s**2', 'k': 'm**3/s**2', 'm': 'kg', 'r0': 'm', 'theta': '1'},
     addresses=Addresses(
         path_and_contact_force.address, effective_potential.address, potential_divdiff1.address,
         potential_divdiff2.address, bounds.address,

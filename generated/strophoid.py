@@ -1,5 +1,5 @@
 # Made by gqm-gen for "strophoid". Do not edit: change its declaration and generate again.
-# interface 9, input 761b603021f8, body 1c9b1a2b21c7
+# interface 9, input 761b603021f8, body 528a92d97212
 """Bead on the hanging loop of a right strophoid
 
 F              = x**2*(a - z) - z**2*(a + z)
@@ -279,6 +279,7 @@ CHART = Traced(field=field.address, start=exact_start, tangent=-1, level=exact_l
 MODEL = CompiledModel(
     name='strophoid', parameter='s', parameters=PARAMETERS, positive=(),
     source=__file__,
+    units={'a': 'm', 'g': 'm/s**2', 'm': 'kg', 's': 'm'},
     addresses=Addresses(
         path_and_contact_force.address, effective_potential.address, potential_divdiff1.address,
         potential_divdiff2.address, bounds.address,

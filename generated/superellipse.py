@@ -1,5 +1,5 @@
 # Made by gqm-gen for "superellipse". Do not edit: change its declaration and generate again.
-# interface 9, input fe6d2f95d843, body bd7b63e24717
+# interface 9, input fe6d2f95d843, body 783efe41748a
 """Bead inside a superellipse, flat at its lowest point
 
 F              = -1 + z**4/b**4 + x**4/a**4
@@ -272,6 +272,7 @@ CHART = Traced(field=field.address, start=exact_start, tangent=1, level=exact_le
 MODEL = CompiledModel(
     name='superellipse', parameter='s', parameters=PARAMETERS, positive=(),
     source=__file__,
+    units={'a': 'm', 'b': 'm', 'g': 'm/s**2', 'm': 'kg', 's': 'm'},
     addresses=Addresses(
         path_and_contact_force.address, effective_potential.address, potential_divdiff1.address,
         potential_divdiff2.address, bounds.address,

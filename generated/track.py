@@ -1,5 +1,5 @@
 # Made by gqm-gen for "track". Do not edit: change its declaration and generate again.
-# interface 9, input e49691f04fda, body b8ae09112f99
+# interface 9, input e49691f04fda, body 4aec208476fe
 """Hills of a roller coaster, as surveyed
 
 x              = x(s)
@@ -299,6 +299,7 @@ CHART = Sampled(POINTS, kind='spline', closed=False)
 MODEL = CompiledModel(
     name='track', parameter='s', parameters=PARAMETERS, positive=(),
     source=__file__,
+    units={'g': 'm/s**2', 'm': 'kg', 's': 'm'},
     addresses=Addresses(
         path_and_contact_force.address, effective_potential.address, potential_divdiff1.address,
         potential_divdiff2.address, bounds.address,

@@ -1,17 +1,18 @@
 """Names of run-time parameters and the exact values they have where none is given."""
 
 from collections.abc import Iterable, Mapping
-from decimal import Decimal
+from decimal import Decimal, Inexact, localcontext
 from fractions import Fraction
 from math import isfinite
 from numbers import Integral, Real
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import sympy as sp
 
 from gqm_sym.arguments import names, short
 from gqm_sym.errors import DeclarationError, NumberError
 from gqm_sym.expressions import check_name, name_or_value, read_expression
+from gqm_sym.literals.units import Unit, is_quantity, read_unit, scale_of, split_unit, unit_of_quantity
 
 Value: TypeAlias = float | int | str
 """A default: a float means its binary value, an int or a text exactly what it spells."""
@@ -21,6 +22,9 @@ Given: TypeAlias = Value | Decimal | Fraction | sp.Expr
 Parameters: TypeAlias = Mapping[str, Given | None] | Iterable[str]
 """What a user may write for a value."""
 
+# More places than this are not written as a decimal.
+_PLACES = 60
+
 # Mass and gravity mean the same everywhere, so several sources may use these two names.
 COMMON = ("g", "m")
 COMMON_DEFAULTS: dict[str, Value] = {"g": "9.81", "m": "1"}
@@ -29,11 +33,20 @@ COMMON_DEFAULTS: dict[str, Value] = {"g": "9.81", "m": "1"}
 COORDINATES = ("x", "z")
 
 
-def read_value(given: Given, *, where: str) -> Value:
+def read_value(given: Given | Any, *, where: str) -> Value:
     """Return a finite real number as it will be kept: exactly as it was given."""
     if isinstance(given, bool):
         raise NumberError(f"{where}: must be a number, got {given}")
+    if isinstance(given, Measured):
+        return given
+    if is_quantity(given):
+        unit = unit_of_quantity(given)
+        quantity: Any = given
+        return Measured(in_si(read_value(quantity.magnitude, where=where), unit), unit)
     if isinstance(given, str):
+        measured = split_unit(given)
+        if measured is not None:
+            return Measured(in_si(read_value(measured[0], where=where), measured[2]), measured[2])
         _check_number(read_expression(given, where=where), given, where)
         return given.strip()
     if isinstance(given, Integral):
@@ -52,6 +65,71 @@ def read_value(given: Given, *, where: str) -> Value:
             raise NumberError(f"{where}: must be a finite number, got {float(given)!r}")
         return float(given)
     raise NumberError(f"{where}: must be a number, got {type(given).__name__}")
+
+
+class Measured(str):
+    """A default that was given with a unit: the number in SI units, with the dimension that it must have.
+
+    Attributes
+    ----------
+    unit : str
+        The unit that was given.
+    """
+
+    unit: str
+
+    def __new__(cls, number: str, unit: str) -> "Measured":
+        """Make the text of a number that was given in a unit."""
+        made = super().__new__(cls, number)
+        made.unit = unit
+        return made
+
+    def __reduce__(self) -> tuple[type["Measured"], tuple[str, str]]:
+        return Measured, (str(self), self.unit)
+
+
+def in_si(value: Value, unit: str) -> str:
+    """The text of an exact number given in a unit, as the same number in SI base units."""
+    scale = read_unit(unit, where="") if unit else Unit()
+    if scale.is_si and isinstance(value, str):
+        return value
+    factor = sp.Rational(scale.factor.numerator, scale.factor.denominator) * sp.pi**scale.turns
+    exact = exact_value(value) * factor
+    return _decimal(exact) if exact.is_Rational else str(read_value(exact, where="value"))
+
+
+def check_measured(defaults: Mapping[str, Value | None], units: Mapping[str, str], *, where: str, final: bool) -> None:
+    """Refuse defaults that were given in units of another dimension than their parameters have.
+
+    Parameters
+    ----------
+    defaults
+        Parameters with their defaults.
+    units
+        What they are measured in, as far as that is known.
+    final
+        Whether a parameter of which nothing is known is refused too.
+
+    Raises
+    ------
+    DeclarationError
+    """
+    for name, value in defaults.items():
+        if isinstance(value, Measured) and (units.get(name) or final):
+            try:
+                scale_of(value.unit, units.get(name) or None, where=f"{where}: {name}")
+            except NumberError as error:
+                raise DeclarationError(str(error)) from None
+
+
+def _decimal(number: sp.Rational) -> str:
+    """A rational number as a decimal where it ends, else as a fraction."""
+    with localcontext(prec=_PLACES) as context:
+        context.traps[Inexact] = True
+        try:
+            return f"{Decimal(number.p) / Decimal(number.q):f}"
+        except Inexact:
+            return str(number)
 
 
 def _check_number(expression: sp.Expr, given: object, where: str) -> None:

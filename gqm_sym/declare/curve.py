@@ -9,10 +9,10 @@ import sympy as sp
 from gqm_sym.arguments import checked, names, one_line, short
 from gqm_sym.declare.closing import check_period, found_period
 from gqm_sym.declare.ends import Ends, check_ends, check_order, read_ends
-from gqm_sym.declare.measures import told
+from gqm_sym.declare.measures import told, units_of
 from gqm_sym.errors import DeclarationError
 from gqm_sym.expressions import check_name, read_expression
-from gqm_sym.parameters import Parameters, Value, names_in_order, read_parameters
+from gqm_sym.parameters import Parameters, Value, check_measured, names_in_order, read_parameters
 from gqm_sym.sympy_charts import chart_x, chart_z
 
 if TYPE_CHECKING:
@@ -383,4 +383,6 @@ def _declare(
     for name in promised:
         if name not in found:
             raise DeclarationError(f"{kind} curve: {short(name)} is promised to be positive but not used; remove it")
-    return replace(forms, domain=ends, period=turn, defaults=defaults, positive=promised)
+    curve = replace(forms, domain=ends, period=turn, defaults=defaults, positive=promised)
+    check_measured(dict(defaults), units_of(curve), where=f"{kind} curve", final=False)
+    return curve

@@ -97,9 +97,14 @@ def _rail_formulas(rail: Rail) -> Formulas:
     return total
 
 
+def units_of(curve: DeclaredCurve) -> dict[str, str]:
+    """The SI units of the parameters of a curve, as far as its formulas tell them."""
+    return {name: unit_of(found) for name, found in found_dimensions(curve_formulas(curve), COMMON).items()}
+
+
 def told(curve: DeclaredCurve) -> str:
     """Describe a curve in a few lines."""
-    units = {name: unit_of(found) for name, found in found_dimensions(curve_formulas(curve), COMMON).items()}
+    units = units_of(curve)
     lines = [f"{curve.title or 'Curve'}: {_what(curve)}", *(f"  {name} = {form}" for name, form in _forms(curve))]
     low, high = curve.domain
     if low is not None or high is not None:

@@ -16,6 +16,8 @@ from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 from gqm_sym.arguments import one_of, several, short
 from gqm_sym.errors import DeclarationError, NoisyPointsWarning
+from gqm_sym.literals.numbers import read_numbers
+from gqm_sym.literals.units import is_quantity
 
 if TYPE_CHECKING:
     from gqm_sym.smoothing import Smoothing
@@ -73,6 +75,22 @@ class Track:
     smoothing: "Smoothing | None" = field(default=None, compare=False, repr=False)
 
 
+def in_metres(given: Any) -> Any:
+    """Lengths that were given as quantities, alone or in sequences, as numbers of metres; anything else as it is."""
+    if is_quantity(given):
+        high, _, shape = read_numbers(given, where="sampled", unit="m")
+        return high.reshape(shape).tolist()
+    if isinstance(given, Mapping):
+        return {key: in_metres(value) for key, value in given.items()}
+    if isinstance(given, list | tuple) and any(map(_holds_quantity, given)):
+        return [in_metres(value) for value in given]
+    return given
+
+
+def _holds_quantity(given: Any) -> bool:
+    return is_quantity(given) or (isinstance(given, list | tuple) and any(map(is_quantity, given)))
+
+
 def read_track(
     points: Any,
     z: Any = None,
@@ -111,7 +129,8 @@ def read_track(
     one_of(kind, KINDS, where="sampled: kind")
     if not (closed is None or isinstance(closed, bool)):
         raise DeclarationError(f"sampled: closed: must be True, False or None, got {short(closed)}")
-    deviation = _read_smoothing(smoothing, kind)
+    points, z = in_metres(points), in_metres(z)
+    deviation = _read_smoothing(in_metres(smoothing), kind)
     texts: list[str] = []
     places: list[Place] = []
     for text, place in _read_rows(_rows(points, z)):

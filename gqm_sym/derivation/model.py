@@ -11,7 +11,7 @@ from gqm_sym.budgets import budget
 from gqm_sym.declare import Curve
 from gqm_sym.declare.closing import check_period
 from gqm_sym.declare.ends import check_order
-from gqm_sym.declare.measures import curve_formulas
+from gqm_sym.declare.measures import curve_formulas, parameter_dimension
 from gqm_sym.derivation.algebra.rewrite import check_real, without_poles
 from gqm_sym.derivation.algebra.signs import Signs
 from gqm_sym.derivation.corners import check_corners, check_powers, without_known_bars
@@ -39,7 +39,7 @@ from gqm_sym.kernels.base import (
     kernel_formulas,
     units_by_role,
 )
-from gqm_sym.parameters import Given, Value, in_words, is_positive
+from gqm_sym.parameters import Given, Value, check_measured, in_words, is_positive
 
 if TYPE_CHECKING:
     from gqm_sym.runtime.launch.equilibria import Equilibrium
@@ -182,6 +182,14 @@ class Model:
         """The parameter period of a closed curve."""
         return self.curve.period
 
+    @property
+    def units(self) -> dict[str, str]:
+        """SI units of the curve's parameter and of the run-time parameters, as far as the formulas tell them.
+
+        A plain number and an angle have "1".
+        """
+        return _units(self.curve, self.force)
+
     def closed_forms(self) -> tuple[tuple[str, sp.Basic], ...]:
         """Return the forms for people, in the order to print them, each with its label.
 
@@ -244,9 +252,6 @@ class Model:
 
     def __str__(self) -> str:
         """A few lines for people: the closed forms that a motion follows, and the parameters with their units."""
-        formulas = curve_formulas(self.curve) + kernel_formulas(self.force)
-        found = found_dimensions(formulas, COMMON)
-        units = {**units_by_role(self.force), **{name: unit for name in found if (unit := unit_of(found[name]))}}
         said = {"kappa": " [1/m]", "V**2": " [m**2/s**2]", "W = V**2": " [m**2/s**2]", "N": " [N]", "A": " [m/s**2]"}
         lines = [f"{self.title or 'Model'}: {self.curve.kind} curve, {', '.join(name for name, _ in self.force.terms)}"]
         for label, form in self.closed_forms():
@@ -254,7 +259,7 @@ class Model:
                 text = str(form)
                 shown = text if len(text) <= MOST_SHOWN else text[: MOST_SHOWN - 3] + "..."
                 lines.append(f"  {label}{said.get(label, '')} = {shown}")
-        lines.append(f"  parameters: {in_words(dict(self.defaults), units)}")
+        lines.append(f"  parameters: {in_words(dict(self.defaults), self.units)}")
         return "\n".join([*lines, *(f"  {note}" for note in self.notes)])
 
     def latex(self) -> str:
@@ -344,6 +349,7 @@ def derive(
     lam = curve.parameter
     kernel = kernel.along(lam)
     defaults = join(curve, kernel, given)
+    check_measured(dict(defaults), _units(curve, kernel), where="derive", final=True)
     check_order(curve.kind, curve.domain, curve.period, dict(defaults))
     values = dict(defaults)
     if not curve.charted:
@@ -413,6 +419,16 @@ def derive(
         tried = (("x", x), ("z", z), (f"ds/d{lam.name}", shape.ds), ("potential", law.potential))
         check_somewhere_real(tried, lam, curve.domain, values)
     return model
+
+
+def _units(curve: Curve, kernel: Kernel) -> dict[str, str]:
+    """SI units of the curve's parameter and of the run-time parameters, as far as the formulas tell them."""
+    found = found_dimensions(curve_formulas(curve) + kernel_formulas(kernel), COMMON)
+    units = {**units_by_role(kernel), **{name: unit for name in found if (unit := unit_of(found[name]))}}
+    own = parameter_dimension(curve)
+    names = dict.fromkeys((curve.parameter.name, *dict(curve.defaults), *dict(kernel.defaults), "g", "m"))
+    told = units if own is None else {**units, curve.parameter.name: unit_of(own)}
+    return {name: told[name] for name in names if name in told}
 
 
 def _losses(curve: Curve, kernel: Kernel, x: sp.Expr, z: sp.Expr, law: Forces, shape: Geometry) -> Dissipation:

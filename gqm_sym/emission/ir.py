@@ -97,8 +97,9 @@ class ModuleIR:
     ``functions`` and ``bounds`` serve one motion, ``batch`` and ``bounds_batch`` exist only for speed: they serve load
     maps and sweeps. ``dissipation`` holds what is said of a force law that is not conservative; then ``bounds`` and
     the effective potential are compiled when they are first needed. ``rolling_radius`` is the radius of a rolling body
-    that must fit into its track, empty for any other;
-    ``static_friction_limit`` names beta and mu_static of one that may slip. ``monotone`` says that there are no cusps,
+    that must fit into its track, empty for any other; ``static_friction_limit`` names beta and mu_static of one that
+    may slip. ``units`` are the SI units of the curve's parameter and of the run-time parameters, as far as they are
+    known. ``monotone`` says that there are no cusps,
     and that the effective potential rises or falls all the way between places of symmetry.
     """
 
@@ -119,4 +120,5 @@ class ModuleIR:
     dissipation: tuple[tuple[str, bool], ...]
     rolling_radius: str
     static_friction_limit: tuple[str, str] | None
+    units: tuple[tuple[str, str], ...]
     chart: ChartIR | None

@@ -52,6 +52,7 @@ def lower(model: Model, *, name: str, forms: tuple[tuple[str, Expr], ...]) -> Mo
         dissipation=() if loss is None else tuple((flag, getattr(loss, flag)) for flag in FLAGS),
         rolling_radius=str(model.force.radius) if model.force.radius else "",
         static_friction_limit=model.force.static_friction_limit,
+        units=tuple(model.units.items()),
         chart=chart_maker(lowering),
     )
 

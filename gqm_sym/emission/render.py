@@ -134,6 +134,7 @@ def _model_fields(module: ModuleIR, names: list[str]) -> dict[str, Any]:
         "name_text": repr(module.name),
         "parameter_text": repr(module.parameter),
         "positive": repr(module.positive),
+        "units": repr(dict(sorted(module.units))) if module.units else "",
         "at_least": repr(module.at_least) if module.at_least else "",
         "rolling_radius": repr(module.rolling_radius) if module.rolling_radius else "",
         "static_friction_limit": repr(module.static_friction_limit) if module.static_friction_limit else "",

@@ -31,7 +31,9 @@ from gqm_sym.parameters import (
     COMMON,
     COORDINATES,
     Given,
+    Measured,
     Value,
+    check_measured,
     in_words,
     names_in_order,
     read_argument,
@@ -108,6 +110,8 @@ class Kernel:
 
     def __post_init__(self) -> None:
         refuse_out_of_range(dict(self.defaults), self.positive, self.at_least, where="kernel")
+        if any(isinstance(value, Measured) for _, value in self.defaults):
+            check_measured(dict(self.defaults), units_of(self), where="kernel", final=False)
 
     @classmethod
     @checked("Kernel.law")
@@ -143,11 +147,9 @@ class Kernel:
 
     def __str__(self) -> str:
         """A few lines for people: every force, and what its parameters are measured in."""
-        found = found_dimensions(kernel_formulas(self), COMMON_DIMENSIONS)
-        units = {**units_by_role(self), **{name: unit for name in found if (unit := unit_of(found[name]))}}
         loss = "conservative" if self.conservative else "dissipative"
         lines = [f"Force law, {loss}", *(f"  {name}: {text}" for name, text in self.terms)]
-        return "\n".join([*lines, f"  parameters: {in_words(dict(self.defaults), units)}"])
+        return "\n".join([*lines, f"  parameters: {in_words(dict(self.defaults), units_of(self))}"])
 
     @property
     def parameters(self) -> tuple[str, ...]:
@@ -251,6 +253,12 @@ def kernel_formulas(kernel: Kernel) -> Formulas:
     others = ((kernel.spin, dimension(second=-1)), (kernel.radius, LENGTH))
     variables: dict[str, Dimension | None] = {X.name: LENGTH, Z.name: LENGTH, W.name: SPEED_SQUARED}
     return Formulas([*fields, *numbers, *others], {**variables, DIRECTION.name: NUMBER})
+
+
+def units_of(kernel: Kernel) -> dict[str, str]:
+    """The SI units of the parameters of a force law, as far as its formulas and their roles tell them."""
+    found = found_dimensions(kernel_formulas(kernel), COMMON_DIMENSIONS)
+    return {**units_by_role(kernel), **{name: unit for name in found if (unit := unit_of(found[name]))}}
 
 
 def units_by_role(kernel: Kernel) -> dict[str, str]:

@@ -19,6 +19,7 @@ from gqm_sym.literals.angles import enclose_angle
 from gqm_sym.literals.enclosures import Interval, enclose
 from gqm_sym.literals.grammar import parse
 from gqm_sym.literals.sympy_tree import is_sympy, tree_of
+from gqm_sym.literals.units import is_quantity, scale_of, split_unit, unit_of_quantity
 
 if TYPE_CHECKING:
     from decimal import Decimal
@@ -28,6 +29,9 @@ _PAIR_BITS = 192
 
 # Precision to which a number next to the midpoint of two doubles is rounded first, so that a tie is recognised.
 _TIE_BITS = 700
+
+# pi with the digits of extended doubles, where the machine has them.
+_PI = np.longdouble("3.14159265358979323846264338327950288")
 
 # Extra bits beyond the precision that ``at`` returns, so that its result is rounded only once.
 _GUARD_BITS = 16
@@ -115,15 +119,18 @@ Doubles: TypeAlias = NDArray[np.float64]
 Source: TypeAlias = "str | int | float | Fraction | Decimal | Number | Any"
 
 
-def read_number(value: Source, *, where: str) -> Number:
+def read_number(value: Source, *, where: str, unit: str | None = None) -> Number:
     """Read a number exactly.
 
     Parameters
     ----------
     value
-        A float, int, text, Decimal, Fraction, NumPy scalar, mpmath float, SymPy number or Number.
+        A float, int, text, quantity, Decimal, Fraction, NumPy scalar, mpmath float, SymPy number or Number.
     where
         What the number is, for messages of errors: ``lam0``.
+    unit
+        The SI unit of what it is, "1" of a plain number or an angle: quantities of pint, and text such as "30 deg", are
+        converted. None if it is not known: then they are refused.
 
     Returns
     -------
@@ -145,7 +152,9 @@ def read_number(value: Source, *, where: str) -> Number:
         return value
     try:
         if isinstance(value, str):
-            return _read_text(value, where)
+            return _read_text(value, where, unit)
+        if is_quantity(value):
+            return _of_quantity(value, where, unit)
         exact = rationals.read_exact(value, where=where)
         if exact is not None:
             return _from_fraction(exact, str(value), where)
@@ -158,22 +167,94 @@ def read_number(value: Source, *, where: str) -> Number:
     raise NumberError(f"{where}: {type(value).__name__} given; give a number, or text such as '9.81' or 'pi/2'")
 
 
-def read_numbers(values: Any, *, where: str) -> tuple[Doubles, Doubles, tuple[int, ...]]:
-    """Read a number or an array of numbers into a flat array of doubles, one of remainders, and the shape."""
+def read_numbers(values: Any, *, where: str, unit: str | None = None) -> tuple[Doubles, Doubles, tuple[int, ...]]:
+    """Read a number or an array of numbers into a flat array of doubles, one of remainders, and the shape.
+
+    The arguments are those of `read_number`.
+    """
     if isinstance(values, np.ndarray) and values.dtype == np.float64:
         flat = np.ascontiguousarray(values).reshape(-1)
         return flat, np.zeros_like(flat), values.shape
-    array = np.asarray(values, dtype=object)
-    numbers = [read_number(v, where=where) for v in array.reshape(-1)]
+    if is_quantity(values) and np.ndim(values.magnitude):
+        return _of_quantities(values, where, unit)
+    array = np.asarray(_plain(values, where, unit), dtype=object)
+    numbers = [read_number(v, where=where, unit=unit) for v in array.reshape(-1)]
     high = np.array([n.value for n in numbers], dtype=np.float64)
     low = np.array([n.low for n in numbers], dtype=np.float64)
     return high, low, array.shape
 
 
 @lru_cache(maxsize=1024)
-def _read_text(text: str, where: str) -> Number:
+def _read_text(text: str, where: str, unit: str | None) -> Number:
     # The cache is for the defaults of parameters, which are read at every launch.
-    return _from_tree(parse(text, where=where), text.strip(), where)
+    try:
+        tree = parse(text, where=where)
+    except ExpressionError:
+        measured = split_unit(text)
+        if measured is None:
+            raise
+        scale = scale_of(measured[2], unit, where=where)
+        text = f"({measured[0]})*({scale.factor})*pi**({scale.turns})"
+        tree = parse(text, where=where)
+    return _from_tree(tree, text.strip(), where)
+
+
+def _of_quantity(value: Any, where: str, unit: str | None) -> Number:
+    """The number of SI units that a quantity is."""
+    scale = scale_of(unit_of_quantity(value), unit, where=where)
+    number = read_number(value.magnitude, where=where)
+    if scale.is_si:
+        return number
+    if number.fraction is None:
+        return _read_text(f"({number.text})*({scale.factor})*pi**({scale.turns})", where, None)
+    exact = number.fraction * scale.factor
+    if scale.turns == 0:
+        return _from_fraction(exact, str(exact), where)
+    return _read_text(f"{exact.numerator}*pi**({scale.turns})/{exact.denominator}", where, None)
+
+
+def _of_quantities(values: Any, where: str, unit: str | None) -> tuple[Doubles, Doubles, tuple[int, ...]]:
+    """The numbers of SI units in an array of quantities; doubles are converted all at once."""
+    scale = scale_of(unit_of_quantity(values), unit, where=where)
+    magnitude = np.asarray(values.magnitude)
+    if scale.is_si:
+        return read_numbers(magnitude, where=where)
+    if magnitude.dtype == object:
+        high, low, _ = read_numbers([v * values.units for v in magnitude.reshape(-1)], where=where, unit=unit)
+        return high, low, magnitude.shape
+    exact = magnitude.astype(np.longdouble) * scale.factor.numerator / scale.factor.denominator * _PI**scale.turns
+    if not np.isfinite(exact).all():
+        raise NumberError(f"{where}: not a finite number among the quantities; give finite ones")
+    high = exact.astype(np.float64).reshape(-1)
+    return high, (exact.reshape(-1) - high).astype(np.float64), magnitude.shape
+
+
+def without_unit(value: Any, *, where: str, unit: str | None) -> Any:
+    """Convert quantities, or texts with units, and return anything else as it is.
+
+    The arguments are those of `read_number`.
+    """
+    if type(value) is float or value is None or (isinstance(value, np.ndarray) and value.dtype != object):
+        return value
+    if isinstance(value, str):
+        return read_number(value, where=where, unit=unit) if split_unit(value) else value
+    if is_quantity(value) and np.ndim(value.magnitude):
+        high, _, shape = read_numbers(value, where=where, unit=unit)
+        return high.reshape(shape)
+    if is_quantity(value):
+        return read_number(value, where=where, unit=unit)
+    if isinstance(value, list | tuple):
+        return [without_unit(item, where=where, unit=unit) for item in value]
+    return value
+
+
+def _plain(values: Any, where: str, unit: str | None) -> Any:
+    """The same with quantities in it read: NumPy would strip their units."""
+    if is_quantity(values):
+        return read_number(values, where=where, unit=unit)
+    if isinstance(values, list | tuple):
+        return [_plain(value, where, unit) for value in values]
+    return values
 
 
 def _from_tree(tree: ast.expr, text: str, where: str) -> Number:

@@ -9,7 +9,7 @@ import numpy as np
 
 from gqm_sym.arguments import unknown_argument
 from gqm_sym.errors import ArgumentError, SolutionError
-from gqm_sym.literals.numbers import read_numbers
+from gqm_sym.literals.numbers import read_numbers, without_unit
 from gqm_sym.loading import load_text
 from gqm_sym.runtime.compiled.streaming import LARGE
 from gqm_sym.runtime.compiled.threads import run_in_threads
@@ -116,7 +116,7 @@ class CompiledModel(Formulas):
             aligned = lam if lam.flags.aligned else lam.copy()
             places, low_parts, shape = np.ascontiguousarray(aligned).reshape(-1), NO_LOW_PARTS, lam.shape
         else:
-            places, low_parts, shape = read_numbers(lam, where=self.parameter)
+            places, low_parts, shape = read_numbers(lam, where=self.parameter, unit=self.units.get(self.parameter))
             low_parts = low_parts if low_parts.any() else NO_LOW_PARTS
         arrays = load_map_arrays(shape, places, out)
         if self.dissipation is not None:
@@ -218,7 +218,14 @@ class CompiledModel(Formulas):
         if unknown:
             self.refuse("sweep", unknown)
         named = dict(zip(self.parameters, parameters, strict=True))
-        arguments = {**launches._asdict(), "lam": lam, **named}
+        own = self.units.get(self.parameter)
+        units = {**self.units, "lam0": own, "lam": own, "v0": "m/s", "t_max": "s"}
+        arguments = {
+            name: without_unit(value, where=name, unit=units.get(name))
+            for name, value in {**launches._asdict(), "lam": lam, **named}.items()
+        }
+        launches, lam = LaunchRequest(**{name: arguments[name] for name in LaunchRequest._fields}), arguments["lam"]
+        parameters = tuple(arguments[name] for name in self.parameters)
         del arguments["point"]
         from gqm_sym.runtime.sweep.result import told
 

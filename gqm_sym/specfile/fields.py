@@ -14,9 +14,9 @@ from pydantic_core import PydanticCustomError
 from gqm_sym.errors import InputError, NumberError
 from gqm_sym.expressions import RESERVED_NAMES, check_module_name, check_name
 from gqm_sym.literals.grammar import parse
+from gqm_sym.literals.units import read_unit
 from gqm_sym.parameters import check_parameter, exact_value, read_value
 from gqm_sym.specfile.nodes import shown
-from gqm_sym.specfile.units import read_unit
 
 LINE_LIMIT = 200
 

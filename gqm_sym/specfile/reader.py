@@ -17,7 +17,8 @@ from gqm_sym.budgets import apart, budget, spend
 from gqm_sym.declare import Curve
 from gqm_sym.errors import BudgetError, InputError, SpecFileError
 from gqm_sym.kernels import KERNELS, Kernel
-from gqm_sym.parameters import exact_value, refuse_out_of_range
+from gqm_sym.literals.units import check_unit, read_unit
+from gqm_sym.parameters import exact_value, in_si, refuse_out_of_range
 from gqm_sym.specfile.explain import explain
 from gqm_sym.specfile.locations import locate, mention, node_at, place_of
 from gqm_sym.specfile.nodes import MapNode, Mark, Mistakes, plain
@@ -33,7 +34,7 @@ from gqm_sym.specfile.schema import (
     read_default,
 )
 from gqm_sym.specfile.spec import Note, Spec
-from gqm_sym.specfile.units import check_unit, expected_units, in_si, launch_units, read_unit
+from gqm_sym.specfile.units import expected_units, launch_units
 from gqm_sym.specfile.yamltext import read_text, read_tree
 
 Parameters: TypeAlias = Mapping[str, Parameter | None]

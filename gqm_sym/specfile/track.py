@@ -11,10 +11,10 @@ from pydantic_core import CoreSchema
 
 from gqm_sym.declare import Curve
 from gqm_sym.errors import DeclarationError, InputError, NoisyPointsWarning
-from gqm_sym.parameters import exact_value
+from gqm_sym.literals.units import check_unit
+from gqm_sym.parameters import exact_value, in_si
 from gqm_sym.specfile.beside import read_beside, read_rows
 from gqm_sym.specfile.fields import ABSENT, Flag, Line, ScatterText, Section, UnitText, wrapped
-from gqm_sym.specfile.units import check_unit, in_si
 
 _COLUMNS = ["x", "z"]
 _ROW = re.compile(r"row (\d+)")

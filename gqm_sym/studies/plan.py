@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gqm_sym.literals.numbers import read_number
+from gqm_sym.literals.units import Unit
 from gqm_sym.runtime.compiled.jit import STAMP
-from gqm_sym.specfile.units import Unit
 
 Array = NDArray[np.float64]
 

@@ -14,12 +14,14 @@ from gqm_sym.derivation import Model
 from gqm_sym.emission import emit
 from gqm_sym.errors import BudgetError, InputError, SpecFileError
 from gqm_sym.literals.numbers import read_number
+from gqm_sym.literals.units import check_unit, read_unit
+from gqm_sym.parameters import in_si
 from gqm_sym.specfile import Spec, read_spec
 from gqm_sym.specfile.beside import path_beside, read_beside, read_rows
 from gqm_sym.specfile.explain import explain
 from gqm_sym.specfile.locations import locate, node_at, place_of
 from gqm_sym.specfile.nodes import MapNode, Mistakes, plain
-from gqm_sym.specfile.units import check_unit, expected_units, in_si, launch_units, read_unit
+from gqm_sym.specfile.units import expected_units, launch_units
 from gqm_sym.specfile.yamltext import read_text, read_tree
 from gqm_sym.studies.plan import POINTS_IN_LOOPS, POINTS_SOLVED, Axis, Plan, evenly, in_doubles
 from gqm_sym.studies.schema import MOST_POINTS, SweepFile, model_at

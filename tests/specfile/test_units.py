@@ -13,8 +13,10 @@ from paths import ROOT
 import gqm_sym as gqm
 from gqm_sym.errors import InputError, SpecFileError
 from gqm_sym.kernels import KERNELS
+from gqm_sym.literals.units import Unit, check_unit, read_unit
+from gqm_sym.parameters import in_si
 from gqm_sym.specfile.schema import _KERNEL_ARGUMENTS
-from gqm_sym.specfile.units import KERNEL_UNITS, Unit, check_unit, in_si, read_unit
+from gqm_sym.specfile.units import KERNEL_UNITS
 
 # Values of the SI brochure and of the international yard and pound agreement of 1959.
 EXACT = {

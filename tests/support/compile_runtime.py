@@ -7,6 +7,7 @@ several of them call may still be compiled twice.
 
 import inspect
 import os
+import re
 import sys
 from concurrent.futures import ProcessPoolExecutor
 from importlib import import_module
@@ -24,7 +25,7 @@ LONGEST = ("sweep.scalar", "sweep.batch.batches", "legs.answers", "launch.speed"
 
 def modules() -> list[str]:
     """The modules of the runtime that have entry points, the slow ones first."""
-    files = (path for path in sorted(RUNTIME.rglob("*.py")) if "entry(" in path.read_text(encoding="utf-8"))
+    files = (path for path in sorted(RUNTIME.rglob("*.py")) if re.search(r"entry\(|Later\(", path.read_text("utf-8")))
     names = [".".join(path.relative_to(RUNTIME).with_suffix("").parts) for path in files]
     return sorted(names, key=lambda name: LONGEST.index(name) if name in LONGEST else len(LONGEST))
 
@@ -35,6 +36,8 @@ def compile_entries(name: str) -> str:
 
     module = import_module(f"gqm_sym.runtime.{name}")
     for call in vars(module).values():
+        if isinstance(call, jit.Later):
+            assert call.address
         is_entry = isinstance(call, FunctionType) and call.__code__.co_name == "call"
         if is_entry and call.__module__ == module.__name__:
             given = inspect.getclosurevars(call).nonlocals

@@ -247,4 +247,5 @@ def install() -> None:
             elif value is jit.compiler:
                 setattr(module, name, _compiler)
     jit.Inner.__call__ = lambda self, *arguments: _entry(self.py_func)(*arguments)
+    jit.COMPILER.callback = lambda function, signature: _callback(signature)(function)  # type: ignore[method-assign]
     numba.carray, numba.cfunc = _carray, _callback

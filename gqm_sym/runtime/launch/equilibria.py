@@ -156,7 +156,9 @@ def _range(formulas: Formulas, domain: Any, between: Any) -> tuple[float, float]
             return low, low + domain.period
         return max(domain.low, -MAX_PLACE), min(domain.high, MAX_PLACE)
     try:
-        low, high = (read_number(value, where="between").value for value in between)
+        low, high = (
+            read_number(value, where="between", unit=formulas.units.get(formulas.parameter)).value for value in between
+        )
     except (TypeError, ValueError):
         raise InputError(f"between: must be a pair of numbers (low, high), got {between!r}") from None
     if not domain.low <= low < high <= domain.high:

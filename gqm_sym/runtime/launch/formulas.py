@@ -31,11 +31,14 @@ class ParameterValues(tuple[Number, ...]):
         The range of the curve parameter, once it has been asked for.
     functions : launch.functions.BoundFunctions or None
         The compiled functions bound to these values, once they have been asked for.
+    tape : double_double.recording.BoundTape or None
+        The exact formulas as a tape, once it has been asked for; False if there is none.
     """
 
     values: Array
     domain: Domain | None = None
     functions: Any = None
+    tape: Any = None
 
 
 @lru_cache(maxsize=8)
@@ -88,6 +91,9 @@ class Formulas:
         The path of the module's file, and its text when it was imported: by them a motion is taken to another process.
     effective_potential, bounds : Later or None
         Of a dissipative module: the functions of the interface that `addresses` holds for a conservative one.
+    units : mapping of str to str
+        SI units of the curve's parameter and of the run-time parameters, as far as they are known; "1" of plain numbers
+        and angles.
     inertia : callable or None
         ``f(op, p)`` gives 1 + beta of a rolling body; None where it is 1.
     """
@@ -112,6 +118,7 @@ class Formulas:
     effective_potential: Later | None = None
     bounds: Later | None = None
     inertia: Callable[..., Any] | None = None
+    units: Mapping[str, str] = field(default_factory=dict)
     text: str = field(init=False, repr=False, compare=False)
     _read: Callable[..., "ParameterValues"] = field(init=False, repr=False, compare=False)
 
@@ -154,7 +161,7 @@ class Formulas:
         for name, value in zip(self.parameters, values, strict=True):
             if value is None:
                 raise ParameterError(f"{name}: has no default and was not given; pass {name}=...")
-            number = read_number(value, where=name)
+            number = read_number(value, where=name, unit=self.units.get(name))
             if (name in self.positive or name == "m") and not number.value > 0.0:
                 raise ParameterError(
                     f"{name}: must be positive, got {number.text}; the closed forms hold for {name} > 0"

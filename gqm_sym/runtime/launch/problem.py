@@ -6,6 +6,8 @@ from functools import partial
 import numpy as np
 
 from gqm_sym.runtime.charts.exact_normals import ChartTrack
+from gqm_sym.runtime.double_double.recording import BoundTape
+from gqm_sym.runtime.double_double.recording import bind as bind_tape
 from gqm_sym.runtime.interface import ExactFormulas, ExactPotential
 from gqm_sym.runtime.launch.domain import Domain
 from gqm_sym.runtime.launch.formulas import Formulas, ParameterValues
@@ -82,6 +84,16 @@ class Problem:
         exact = self.functions.exact
         assert exact is not None
         return exact
+
+    @property
+    def tape(self) -> BoundTape | None:
+        """The exact formulas for double-double arithmetic; None for a chart, and for formulas that are too long."""
+        if self.p.tape is None:
+            exact, domain = self.formulas.exact, self.formulas.domain_of
+            if isinstance(exact, ExactFormulas) and domain is not None:
+                self.p.tape = bind_tape(exact, domain, self.p)
+            self.p.tape = self.p.tape or False
+        return self.p.tape or None
 
     @property
     def arc_origin(self) -> float:

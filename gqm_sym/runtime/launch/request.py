@@ -75,19 +75,20 @@ def read_launch(formulas: Formulas, p: ParameterValues, request: LaunchRequest) 
     """
     lam0, v0, direction, point, t_max, contact = request
     if point is None and lam0 is not None:
-        place, at = read_number(lam0, where="lam0"), None
+        unit = None if type(lam0) is float else formulas.units.get(formulas.parameter)
+        place, at = read_number(lam0, where="lam0", unit=unit), None
     else:
         place, at = _read_place(formulas, p, lam0, point)
     if direction not in (1, -1):
         raise LaunchError(f"direction: must be 1 or -1 (the sign of ds/dt at launch), got {direction!r}")
     if contact not in CONTACTS:
         raise LaunchError(f"contact: must be one of {', '.join(CONTACTS)}, got {contact!r}")
-    speed = read_number(v0, where="v0")
+    speed = read_number(v0, where="v0", unit="m/s")
     if speed.value < 0.0:
         raise LaunchError(
             f"v0: is a speed and cannot be negative, got {speed.text}; use direction=-1 to launch the other way"
         )
-    horizon = None if t_max is None else read_number(t_max, where="t_max")
+    horizon = None if t_max is None else read_number(t_max, where="t_max", unit="s")
     if horizon is not None and not horizon.value > 0.0:
         raise LaunchError(f"t_max: must be positive, got {horizon.text}")
     domain = formulas.domain(p).numbers
@@ -110,7 +111,7 @@ def _read_place(
     if lam0 is not None:
         raise LaunchError("lam0, point: give one of them; both say where to launch from")
     try:
-        at_x, at_z = (read_number(value, where="point") for value in point)
+        at_x, at_z = (read_number(value, where="point", unit="m") for value in point)
     except (TypeError, ValueError):
         raise LaunchError(f"point: must be a pair of numbers (x, z), got {point!r}") from None
     chart, x, z = formulas.charted(p), at_x.value, at_z.value

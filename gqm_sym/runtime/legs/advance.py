@@ -3,9 +3,12 @@
 from math import fabs, inf, isfinite
 from typing import NamedTuple
 
+from numba import types
+
 from gqm_sym.runtime.arithmetic.doubledouble import add, two_sum
 from gqm_sym.runtime.compiled.jit import Inner
-from gqm_sym.runtime.compiled.types import Array
+from gqm_sym.runtime.compiled.types import INTEGER, Array
+from gqm_sym.runtime.interface import Dissipation
 from gqm_sym.runtime.launch.domain import DomainNumbers
 from gqm_sym.runtime.launch.ends import first_step
 from gqm_sym.runtime.launch.zeros import MAX_PARAMETER
@@ -38,7 +41,8 @@ from gqm_sym.runtime.legs.body import (
     V2,
 )
 from gqm_sym.runtime.legs.follow import follow, released
-from gqm_sym.runtime.legs.leg_breaks import clearance
+from gqm_sym.runtime.legs.leg_breaks import CLEARANCE_SHARE, clearance
+from gqm_sym.runtime.legs.leg_equation import Forces
 from gqm_sym.runtime.legs.leg_record import (
     AHEAD,
     BACK,
@@ -50,21 +54,45 @@ from gqm_sym.runtime.legs.leg_record import (
     LAPS_BEFORE,
     START,
     START_LOW,
+    START_V2,
     TIME_FROM_END,
     TIME_FROM_START,
 )
-from gqm_sym.runtime.legs.leg_run import ASYMPTOTE, FULL, LIFTOFF, LIMIT, NARROWED, PAUSED, SPENT, TURN, Route, Start
+from gqm_sym.runtime.legs.leg_run import (
+    ASYMPTOTE,
+    FULL,
+    LIFTOFF,
+    LIMIT,
+    NARROWED,
+    PAUSED,
+    SPENT,
+    TURN,
+    Route,
+    Start,
+    point_buffer,
+    sign_of_load,
+    slope_of_v2,
+)
 
 # What became of a body that was to advance, beside the codes of `leg_run`; in place of TURN where it stays, and ENDING
 # has the same code where the motion ends. AT_ONCE: the track would have to pull it at once, so that it lifts off where
 # it is. LEAVES: it would leave the domain at once. BEYOND: it has left the range of doubles.
 RESTS, AT_ONCE, LEAVES, BEYOND = range(10, 14)
 
+DISSIPATION = types.NamedTuple((INTEGER, INTEGER, types.boolean, types.boolean, types.boolean), Dissipation)
+
 # The first panel as a share of the first step of a search. The shorter it is, the more digits early times have.
 FIRST_PANEL_SHARE = 0.25
 
 # How many laps of a closed curve are followed in one run at most: so far its breaks are listed.
 LAPS_AHEAD = 8
+
+# The first panel of a body released near an equilibrium in units of the distance to it, and how often the step to it is
+# halved at most.
+FIRST_STEPS, MAX_HALVINGS = 8.0, 1000
+
+# V**2 of a body at rest, for laws that take its root.
+LEAST_V2 = 1e-300
 
 
 class Joints(NamedTuple):
@@ -130,6 +158,24 @@ def leaving(dissipation, p, joints, body, place, preferred):  # type: ignore[no-
 
 
 @Inner
+def near_start(dissipation, p, place, direction, step):  # type: ignore[no-untyped-def]
+    """A distance over which the force on a body released at a place keeps its sign, where ``step`` is too long.
+
+    Next to an equilibrium a body turns after a distance that no other length of the curve tells of.
+    """
+    v, point = int(direction), point_buffer()
+    forces = Forces(dissipation.speed_equation, p, dissipation.friction, False, dissipation.linear, v)
+    contact_sign = sign_of_load(forces, place, 0.0, point)
+    slope = slope_of_v2(forces, place, LEAST_V2, contact_sign, point)
+    for _ in range(MAX_HALVINGS):
+        ahead = slope_of_v2(forces, place + v * step, LEAST_V2, contact_sign, point)
+        if ahead > 0.0 or not slope > 0.0 or step <= CLEARANCE_SHARE * fabs(place):
+            break
+        step *= 0.5
+    return FIRST_STEPS * step
+
+
+@Inner
 def launch(dissipation, p, joints, body):  # type: ignore[no-untyped-def]
     """Set what a body begins with."""
     lam0, period = body[LAM0], body[PERIOD]
@@ -140,6 +186,7 @@ def launch(dissipation, p, joints, body):  # type: ignore[no-untyped-def]
     body[FROM_REST], body[DIRECTION] = 1.0 if body[V2] == 0.0 else 0.0, preferred
     if body[V2] == 0.0:
         body[DIRECTION] = leaving(dissipation, p, joints, body, lam0, preferred)
+        body[STEP] = min(body[STEP], near_start(dissipation, p, lam0, body[DIRECTION], step))
 
 
 @Inner
@@ -181,6 +228,7 @@ def next_leg(dissipation, p, joints, body, record):  # type: ignore[no-untyped-d
     # Breaks a little behind show on which piece of the curve the body is.
     breaks = breaks_before(joints, period, direction, place - direction * body[FIRST_STEP], limit)
     record[START], record[START_LOW], record[LAPS_BEFORE] = place, body[PLACE_LOW], body[LAPS]
+    record[START_V2] = body[V2]
     record[HEADING], record[BEGIN], record[BEGIN_LOW] = direction, body[ELAPSED], body[ELAPSED_LOW]
     pause, only_sign, no_turn_until = inf if isfinite(end) else body[REACH], int(body[ONLY_SIGN]), body[NO_TURN_UNTIL]
     while True:

@@ -9,8 +9,7 @@ from numba import types
 from gqm_sym.runtime.compiled.jit import Inner, entry
 from gqm_sym.runtime.compiled.registers import uncounted
 from gqm_sym.runtime.compiled.types import INTEGER, MATRIX, VECTOR
-from gqm_sym.runtime.interface import Dissipation
-from gqm_sym.runtime.legs.advance import AT_ONCE, BEYOND, LEAVES, RESTS, Joints, advance, launch
+from gqm_sym.runtime.legs.advance import AT_ONCE, BEYOND, DISSIPATION, LEAVES, RESTS, Joints, advance, launch
 from gqm_sym.runtime.legs.body import (
     DIRECTION,
     ELAPSED,
@@ -50,8 +49,6 @@ MAX_TURNS = 20000
 # The most legs of one body.
 MAX_LEGS = 250_000
 
-_FLAGS = (types.boolean, types.boolean, types.boolean)
-DISSIPATION = types.NamedTuple((INTEGER, INTEGER, *_FLAGS), Dissipation)
 JOINTS = types.NamedUniTuple(VECTOR, 3, Joints)
 
 

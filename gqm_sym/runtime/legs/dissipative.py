@@ -28,7 +28,8 @@ from gqm_sym.runtime.legs.body import (
     TURNS,
     launched,
 )
-from gqm_sym.runtime.legs.leg_record import BEGIN, COLUMNS, END, HEADING, MIDDLE, START, TIME_FROM_START
+from gqm_sym.runtime.legs.leg_errors import Errors, carry
+from gqm_sym.runtime.legs.leg_record import BEGIN, COLUMNS, END, HEADING, INHERITED, MIDDLE, START, TIME_FROM_START
 from gqm_sym.runtime.legs.leg_run import ASYMPTOTE, FULL, LIFTOFF, LIMIT, NARROWED, SPENT, TURN
 from gqm_sym.runtime.legs.leg_segments import Run, along_field, along_panels
 from gqm_sym.runtime.motion.aperiodic import MotionAtRest
@@ -94,6 +95,7 @@ class DissipativeMotion(Motion):
     def __init__(self, problem: Problem) -> None:
         self._runs: list[Run] = []
         self._segments: list[TimedSegment] = []
+        self._laid: list[Run] = []
         launch, domain, f = problem.launch, problem.domain, problem.functions
         super().__init__(problem, "dissipative", launch.direction)
         self._joints = Joints(f.breaks, f.corners, np.empty(room_ahead(f.breaks.size)))
@@ -102,6 +104,9 @@ class DissipativeMotion(Motion):
             *(launch.direction, ONLY_SIGN[launch.contact], self._horizon, nan, problem.w0),
         )
         self._at = self._body[0].tolist()
+        v0 = launch.v0
+        # The errors with which the legs begin.
+        self._errors = [Errors(abs(launch.lam0.low), 2.0 * v0.value * abs(v0.low) + ULP * problem.w0, 0.0)]
         self._go_on()
         self.direction = int(self._runs[0].record[HEADING]) if self._runs else 0
 
@@ -188,9 +193,22 @@ class DissipativeMotion(Motion):
             )
 
     def _time_error(self, t: Array) -> Array:
-        trajectory = self._trajectory(float(np.abs(t).max()) if t.size else 0.0)
-        worst = max(piece.segment.relative_error for piece in trajectory.segments)
-        return np.abs(t) * (worst + 4.0 * ULP)
+        return np.zeros_like(t)
+
+    def _errors_before(self, timed: TimedSegment, phi: Array) -> tuple[float, Array]:
+        loss, p = _loss(self.problem), self.problem.functions.p
+        while len(self._errors) <= timed.leg + 1:
+            run, before = self._laid[len(self._errors) - 1], self._errors[-1]
+            self._errors.append(Errors(*carry(loss, p, run.what in (TURN, RESTS), before, run.record)))
+        run, (before, after) = self._laid[timed.leg], self._errors[timed.leg : timed.leg + 2]
+        if timed.segment.v2 is not None:  # the approach to an equilibrium
+            return after.place, np.full_like(phi, after.time)
+        panels = run.panels_ahead if timed.sense > 0 else run.panels_back
+        which = np.clip(np.searchsorted(timed.segment.edges, phi, side="right") - 1, 0, len(panels) - 1)
+        inherited = panels[which, INHERITED]
+        if timed.sense > 0:
+            return before.place, before.time + inherited
+        return after.place, after.time + after.place * inherited
 
     def _end_text(self) -> str:
         if not self._ending or self._elapsed > self._horizon:
@@ -283,6 +301,7 @@ class DissipativeMotion(Motion):
     def _lay(self, run: Run) -> None:
         """Make segments of a run."""
         f, end, middle = self.problem.functions, run.pair(END), run.pair(MIDDLE)
+        self._laid.append(run)
         self._clock, (ahead, back) = run.pair(BEGIN), run.pair(TIME_FROM_START)
         if run.ahead:
             segment = along_panels(f, run.pair(START), middle, run.half_c, ahead, run.panels_ahead)
@@ -321,6 +340,7 @@ class DissipativeMotion(Motion):
                 s_a=self._arc if sense > 0 else self._arc - segment.direction * segment.length,
                 end=end if k == len(marks) - 2 else "contact-sign",
                 laps=laps,
+                leg=len(self._laid) - 1,
             )
             self._segments.append(piece)
             self._clock = piece.t_stop

@@ -4,6 +4,7 @@
 number               meaning
 ==================== ============================================================================================
 START, START_LOW     where the leg begins, as two doubles within one lap
+START_V2             V**2 there
 LAPS_BEFORE          the whole laps before it
 HEADING              the sign of dlam/dt
 BEGIN, BEGIN_LOW     the time from launch at which it begins, as two doubles
@@ -21,7 +22,7 @@ at the end           the places at which N changes sign, the first one last
 
 A panel is a row of COLUMNS numbers: at its nodes the rates of time and of arc length, Y, and the contact force per mass
 (from NORMAL_LOAD on); after each of the first three one more number, RIGHT (the march variable at its end), TIME, and
-TIME_ERROR (what the time may be wrong by).
+TIME_ERROR (what the time may be wrong by); at last INHERITED (`leg_errors`).
 """
 
 from gqm_sym.runtime.arithmetic.doubledouble import two_sum
@@ -40,13 +41,13 @@ from gqm_sym.runtime.legs.leg_equation import (
 )
 from gqm_sym.runtime.legs.polynomials import COUNT, WIDE, to_tails
 
-START, START_LOW, LAPS_BEFORE, HEADING, BEGIN, BEGIN_LOW = range(6)
-END, END_LOW, MIDDLE, MIDDLE_LOW, HALF_C, TIME_FROM_START, TIME_FROM_END, CHANGE_COUNT = range(6, 14)
-AHEAD, BACK, HEAD = range(14, 17)
+START, START_LOW, START_V2, LAPS_BEFORE, HEADING, BEGIN, BEGIN_LOW = range(7)
+END, END_LOW, MIDDLE, MIDDLE_LOW, HALF_C, TIME_FROM_START, TIME_FROM_END, CHANGE_COUNT = range(7, 15)
+AHEAD, BACK, HEAD = range(15, 18)
 
 COLUMNS = 4 * WIDE
 RIGHT, TIME, TIME_ERROR = range(COUNT, 3 * WIDE, WIDE)
-Y_ROW, NORMAL_LOAD = 2 * WIDE, 3 * WIDE
+Y_ROW, NORMAL_LOAD, INHERITED = 2 * WIDE, 3 * WIDE, 3 * WIDE + COUNT
 copy = copied(WIDE)
 
 

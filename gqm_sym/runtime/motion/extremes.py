@@ -110,7 +110,7 @@ def extreme(motion: Any, quantity: Callable[[Segment, Array], Array], sign: int)
     SolutionError
         If the motion goes on for ever without repeating.
     """
-    if motion.kind == "rest":
+    if motion.kind == "rest" or motion.t_end == 0.0:  # it stays, or lifts off at once
         state = motion.state(0.0)
         return Extreme(abs(state.v) if quantity is speeds else state.normal_force, 0.0, state.lam)
     if motion.kind not in ("libration", "circulation") and not isfinite(motion.t_end):

@@ -80,6 +80,10 @@ class Motion(ABC):
     def _time_error(self, t: Array) -> Array:
         """Estimated error in s of the time at which the body comes to its segment of the trajectory."""
 
+    def _errors_before(self, timed: TimedSegment, phi: Array) -> tuple[float, Array]:
+        """Bounds of the errors from before a timed segment: of its place, and of the times at phase angles."""
+        return 0.0, np.zeros_like(phi)
+
     @property
     def turning_points(self) -> tuple[float, ...]:
         """The turning points, as values of the curve parameter in the order of time.
@@ -236,7 +240,8 @@ class Motion(ABC):
         SolutionError
             If the motion is never there before ``t_end``.
         """
-        place = read_number(lam, where=self.problem.formulas.parameter)
+        formulas = self.problem.formulas
+        place = read_number(lam, where=formulas.parameter, unit=formulas.units.get(formulas.parameter))
         origin = self.problem.launch.lam0
         if place.value == origin.value and place.low == origin.low:
             return 0.0
@@ -279,8 +284,9 @@ class Motion(ABC):
             rate = np.where(ds > 0.0, np.abs(v) / ds, 0.0)
         time_error, inversion_error = self._time_error(times), np.zeros_like(times)
         for timed, mask, phi in points.segments:
-            time_error[mask] += timed.segment.time_error(phi)
-            inversion_error[mask] = timed.segment.inversion_error(phi)
+            place_before, time_before = self._errors_before(timed, phi)
+            time_error[mask] += time_before + timed.segment.time_error(phi)
+            inversion_error[mask] = place_before + timed.segment.inversion_error(phi)
         # The length of a lap, its multiple and the sum are rounded.
         rounding = ULP * (1.5 * np.abs(points.laps * points.trajectory.lap) + 2.0 * np.abs(reduced))
         bound: Array = rate * time_error + inversion_error + rounding
@@ -436,7 +442,7 @@ class Motion(ABC):
         InputError
             If a time is not a number.
         """
-        start, stop = read_number(t1, where="t1").value, read_number(t2, where="t2").value
+        start, stop = read_number(t1, where="t1", unit="s").value, read_number(t2, where="t2", unit="s").value
         found = self._events_along(self._trajectory(min(stop, self._horizon)).segments, stop)
         return Rows(event for event in found if start <= event.t <= stop)
 
@@ -542,7 +548,7 @@ class Motion(ABC):
         return Event(kind, when[0], float(lam[0]) + timed.laps * self._trajectory(0.0).lap, float(x), float(z))
 
     def _times(self, t: Any) -> tuple[Array, Array, tuple[int, ...]]:
-        times, low, shape = read_numbers(t, where="t")
+        times, low, shape = read_numbers(t, where="t", unit="s")
         if times.size:
             if not np.isfinite(times).all():
                 raise InputError("t: must be finite numbers, got NaN or an infinite one")

@@ -1,5 +1,6 @@
 """Motions that repeat: libration between two turning points, and circulation round a closed curve."""
 
+from functools import cached_property
 from math import inf
 from typing import Any
 
@@ -9,6 +10,7 @@ from gqm_sym.errors import SolutionError
 from gqm_sym.literals.numbers import read_number
 from gqm_sym.runtime.arithmetic.doubledouble import ULP, ZERO
 from gqm_sym.runtime.compiled.types import Array
+from gqm_sym.runtime.double_double.orbit_time import Orbit
 from gqm_sym.runtime.launch.kinds import MotionKind
 from gqm_sym.runtime.launch.problem import Problem
 from gqm_sym.runtime.motion import timing
@@ -38,7 +40,7 @@ class PeriodicMotion(Motion):
     """A libration or a circulation: one segment that is repeated for ever.
 
     Its trajectory is first made with times in doubles. For times beyond one period from launch the period is needed as
-    two doubles; it is then evaluated once in extended precision.
+    two doubles; it is then computed in double-double arithmetic, or where that does not suffice in extended precision.
 
     Parameters
     ----------
@@ -67,6 +69,7 @@ class PeriodicMotion(Motion):
         self._double_trajectory: Trajectory | None = None
         self._precise_trajectory: Trajectory | None = None
         self._exact_timing: timing.Timing | None = None
+        self._is_period_known = False  # to more digits than doubles hold
         self._sampler: Sampler | None = None
 
     @property
@@ -76,7 +79,10 @@ class PeriodicMotion(Motion):
         if self.kind != "libration":
             return ()
         low, high = self._segment.a, self._segment.b
-        if self._has_multiprecision:
+        orbit = self._orbit
+        if orbit is not None and orbit.low.is_decided and orbit.high.is_decided:
+            low, high = orbit.low.high, orbit.high.high
+        elif self._has_multiprecision:
             low, high = timing.turning_points(self.problem, self._segment)
         in_order = (high, low) if self.direction > 0 else (low, high)
         return (self.problem.lam0, in_order[0]) if self.problem.w0 == 0.0 else in_order
@@ -87,13 +93,30 @@ class PeriodicMotion(Motion):
         f, s = self.problem.functions, self._segment
         return f.exact is not None and f.between(f.exact.edges, s.a, s.b).size <= MAX_CHART_PIECES
 
-    @property
-    def _timing(self) -> timing.Timing:
+    @cached_property
+    def _orbit(self) -> Orbit | None:
+        """Duration and turning points in double-double arithmetic; None where that does not suffice."""
+        return timing.orbit_of(self.problem, self.kind, self.direction, self._offsets)
+
+    def _timing(self, end_time: float) -> timing.Timing:
+        """The times with as many digits as a phase needs at ``end_time`` in s from launch."""
         if not self._has_multiprecision:
             return timing.in_doubles(self.kind, self._segment, self._offsets)
+        launch, self._is_period_known = (self.problem, self.kind, self.direction), True
         if self._exact_timing is None:
-            self._exact_timing = timing.in_multiprecision(self.problem, self.kind, self.direction, self._segment)
+            self._exact_timing = timing.in_double_double(*launch, self._segment, self._offsets)
+        if self._exact_timing is None or end_time > self._exact_timing.max_time:
+            self._exact_timing = timing.in_multiprecision(*launch, self._segment)
+            self._precise_trajectory = None
         return self._exact_timing
+
+    @property
+    def _duration(self) -> float:
+        """Half period or loop time in s, the double nearest to the exact one."""
+        orbit, self._is_period_known = self._orbit, True
+        if orbit is not None and orbit.duration.is_decided:
+            return orbit.duration.high
+        return self._timing(inf).duration[0]
 
     @property
     @locked
@@ -107,14 +130,13 @@ class PeriodicMotion(Motion):
         """Time in s from one turning point to the other, the double nearest to the exact one (libration only)."""
         if self.kind != "libration":
             return super().half_period
-        return self._timing.duration[0]
+        return self._duration
 
     @property
     @locked
     def period(self) -> float:
         """Time in s after which the motion repeats, the double nearest to the exact one."""
-        duration = self._timing.duration[0]
-        return 2.0 * duration if self.kind == "libration" else duration
+        return 2.0 * self._duration if self.kind == "libration" else self._duration
 
     @locked
     def period_to(self, digits: int) -> str:
@@ -127,12 +149,13 @@ class PeriodicMotion(Motion):
         return timing.period_to(self.problem, self.kind, self.direction, self._segment, digits)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """As `Motion`, with whether its period is known as two doubles: the last digit of a place depends on it."""
-        return *super().__reduce__(), self._exact_timing is not None
+        """As `Motion`, with how exactly its period is known: the last digit of a place depends on it."""
+        known_until = self._exact_timing.max_time if self._exact_timing is not None else 0.0
+        end_time = None if not self._is_period_known else inf if known_until == inf else 0.0
+        return *super().__reduce__(), end_time
 
-    def __setstate__(self, has_exact_timing: bool) -> None:
-        if has_exact_timing:
-            _ = self._timing
+    def __setstate__(self, end_time: float) -> None:
+        self._timing(end_time)
 
     def lam(self, t: Any) -> Any:
         """The curve parameter at times; see `Motion.lam`. For doubles this is one call of compiled code."""
@@ -176,11 +199,11 @@ class PeriodicMotion(Motion):
         trajectory = self._trajectory(end_time)
         if sampler is None or sampler.trajectory is not trajectory:
             is_precise = trajectory is self._precise_trajectory
-            times = self._timing if is_precise else timing.in_doubles(self.kind, self._segment, self._offsets)
+            times = self._timing(end_time) if is_precise else timing.in_doubles(self.kind, self._segment, self._offsets)
             sampler = self._sampler = Sampler(
                 self.problem,
                 trajectory,
-                times.phase_time,
+                times,
                 self.direction,
                 lambda: self._time_drift(trajectory),
                 self._lock,
@@ -189,13 +212,12 @@ class PeriodicMotion(Motion):
 
     def _trajectory(self, end_time: float) -> Trajectory:
         one_period_time = self._segment.duration * (2.0 if self.kind == "libration" else 1.0)
-        if (
-            self._has_multiprecision
-            and self._precise_trajectory is None
-            and (end_time > one_period_time or self._exact_timing is not None or self._segment.from_multiprecision)
+        if self._has_multiprecision and (
+            end_time > one_period_time or self._is_period_known or self._segment.from_multiprecision
         ):
-            self._precise_trajectory = self._build(self._timing)
-        if self._precise_trajectory is not None:
+            times = self._timing(end_time)
+            if self._precise_trajectory is None:
+                self._precise_trajectory = self._build(times)
             return self._precise_trajectory
         if self._double_trajectory is None:
             self._double_trajectory = self._build(timing.in_doubles(self.kind, self._segment, self._offsets))
@@ -236,7 +258,7 @@ class PeriodicMotion(Motion):
     def _time_drift(self, trajectory: Trajectory) -> tuple[float, float]:
         """Estimated error in s of a trajectory's times at launch, and its growth per second."""
         if trajectory is self._precise_trajectory:
-            return 0.0, 2.0**-104
+            return 0.0, self._timing(0.0).relative_error
         # The quadrature errors of the time to the launch and of the period; the rounding of the launch's phase angle.
         segment, start = self._segment, np.array([trajectory.segments[0].phi_start])
         launch = segment.time_error(start) + ULP * start * slopes(segment.edges, segment.panels[3], start)
@@ -246,7 +268,7 @@ class PeriodicMotion(Motion):
     @locked
     def events_between(self, t1: Any, t2: Any) -> tuple[Event, ...]:
         """The events from time t1 to t2 over as many periods as that takes; see `Motion.events_between`."""
-        start, stop = read_number(t1, where="t1").value, read_number(t2, where="t2").value
+        start, stop = read_number(t1, where="t1", unit="s").value, read_number(t2, where="t2", unit="s").value
         period = self.period
         lap = self._trajectory(0.0).lap
         out = []

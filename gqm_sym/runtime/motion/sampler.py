@@ -12,6 +12,7 @@ from gqm_sym.runtime.inversion import records
 from gqm_sym.runtime.inversion.fourier import fit_wave
 from gqm_sym.runtime.launch.problem import Problem
 from gqm_sym.runtime.motion.locking import Lock, locked
+from gqm_sym.runtime.motion.timing import Timing
 from gqm_sym.runtime.motion.trajectory import Trajectory
 from gqm_sym.runtime.quadrature.substitution import TURN_TURN
 
@@ -57,7 +58,7 @@ class Sampler:
         self,
         problem: Problem,
         trajectory: Trajectory,
-        phase_time: Pair,
+        times: Timing,
         direction: int,
         time_drift: Callable[[], Pair],
         lock: Lock,
@@ -65,11 +66,11 @@ class Sampler:
         assert trajectory.period is not None
         segment = trajectory.segments[0].segment
         self.trajectory = trajectory
-        self.max_time = MAX_PERIODS * trajectory.period[0]
+        self.max_time = min(MAX_PERIODS * trajectory.period[0], times.max_time)
         self._problem, self._segment = problem, segment
         there_and_back = segment.kind == TURN_TURN
         sign = direction if there_and_back else 1
-        start, start_low = sign * phase_time[0], sign * phase_time[1]
+        start, start_low = sign * times.phase_time[0], sign * times.phase_time[1]
         ends = (segment.a, segment.b, problem.lam0, trajectory.lap)
         self._v0, self._time_drift = direction * problem.launch.v0.value, time_drift
         own_times = (*segment.total_time, segment.stop, trajectory.time_scale_error)

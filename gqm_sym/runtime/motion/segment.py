@@ -222,7 +222,9 @@ class Segment:
         times = self.edge_times[0]
         if self._has_given_times:
             spans: Array = np.diff(times)[which]
-        elif self.kind == TO_EQUILIBRIUM:  # its end is arbitrary
+        elif (
+            self.kind == TO_EQUILIBRIUM or self.speed_series is not None
+        ):  # its end is arbitrary, or it grows from ``a``
             spans = times[which + 1]
         else:
             spans = np.full_like(phi, self.duration)

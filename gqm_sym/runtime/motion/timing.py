@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import accumulate
-from math import ceil, log10
+from math import ceil, inf
 from typing import Any
 
 import numpy as np
@@ -12,6 +12,7 @@ from gqm_sym.budgets import budget
 from gqm_sym.errors import InputError, SolutionError
 from gqm_sym.runtime.arithmetic.doubledouble import ZERO, Pair
 from gqm_sym.runtime.compiled.types import Array
+from gqm_sym.runtime.double_double.orbit_time import NO_TIMES, Orbit, time_orbit
 from gqm_sym.runtime.launch.problem import Problem
 from gqm_sym.runtime.motion.segment import Segment
 from gqm_sym.runtime.multiprecision.exact_panels import exact_ends
@@ -26,6 +27,10 @@ MAX_DIGITS = 1000
 
 # Digits of V**2 that may cancel on all of a segment before the working precision is raised.
 MAX_LOST_DIGITS = 4
+
+
+# The relative error of two doubles that were rounded from extended precision.
+EXACT_ERROR = 2.0**-104
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,12 +48,20 @@ class Timing:
     edge_times : pair of arrays, or None
         The time at each edge of the segment's panels, if there are many panels: the relative error of their times in
         doubles then differs from panel to panel.
+    relative_error : float
+        Bound on the relative error of the duration.
     """
 
     duration: Pair
     phase_time: Pair
     offsets: tuple[float, float]
     edge_times: tuple[Array, Array] | None = None
+    relative_error: float = EXACT_ERROR
+
+    @property
+    def max_time(self) -> float:
+        """The time in s up to which a phase is as good as doubles have it, however many periods have gone by."""
+        return inf if self.relative_error <= EXACT_ERROR else self.duration[0] * 2.0**-54 / self.relative_error
 
 
 def in_doubles(kind: str, segment: Segment, offsets: tuple[float, float]) -> Timing:
@@ -60,6 +73,53 @@ def in_doubles(kind: str, segment: Segment, offsets: tuple[float, float]) -> Tim
         return Timing(duration, duration, offsets)
     phase_time = float(segment.times(np.array([segment.phase_angle_of(*offsets)]))[0])
     return Timing(duration, (phase_time, 0.0), offsets)
+
+
+def orbit_of(
+    problem: Problem, kind: str, direction: int, offsets: tuple[float, float], times: Array = NO_TIMES
+) -> Orbit | None:
+    """The duration and the turning points in double-double arithmetic; None where that does not suffice.
+
+    Parameters
+    ----------
+    offsets : (float, float)
+        The distances of a libration's turning points from the launch.
+    times : (3, n) array
+        Phase angles, and room for the times there (`double_double.orbit_time.fill_times`).
+    """
+    if problem.tape is None:
+        return None
+    sense, launch = direction if kind == "circulation" else 0, (problem.launch.lam0, problem.launch.v0)
+    return time_orbit(problem.tape, launch, sense, offsets, times)
+
+
+def in_double_double(
+    problem: Problem, kind: str, direction: int, segment: Segment, offsets: tuple[float, float]
+) -> Timing | None:
+    """The times from double-double arithmetic; None where that does not suffice."""
+    if segment.from_multiprecision:
+        return None
+    is_smooth = len(segment.edges) - 1 <= MAX_SMOOTH_PANELS
+    is_thrown = kind == "libration" and problem.w0 > 0.0
+    times = np.zeros((3, 1 if is_smooth else len(segment.edges) - 1))
+    times[0] = segment.edges[: times.shape[1]]
+    times[0, 0] = 1.0 if is_thrown else 0.0
+    orbit = orbit_of(problem, kind, direction, offsets, times)
+    if orbit is None:
+        return None
+    duration, lam0 = orbit.duration[:2], problem.launch.lam0
+    edge_times = None
+    if not is_smooth:
+        high, low = (np.append([0.0, *times[row, 1:]], duration[row - 1]) for row in (1, 2))
+        edge_times = high, low
+    if kind == "circulation":
+        found = duration, ZERO, (0.0, segment.b - segment.a)
+    else:
+        a, b = orbit.low, orbit.high
+        offsets = (lam0.value - a.high) + (lam0.low - a.low), (b.high - lam0.value) + (b.low - lam0.low)
+        at_rest = ZERO if offsets[0] < offsets[1] else duration
+        found = duration, (times[1, 0], times[2, 0]) if is_thrown else at_rest, offsets
+    return Timing(*found, edge_times, orbit.duration.error / duration[0])
 
 
 @budget("quadrature", 60.0, "launch a little farther from the equilibrium, or cut the curve at its narrow places")
@@ -110,9 +170,10 @@ def _arithmetic(problem: Problem, segment: Segment, digits: int) -> Arithmetic:
     """Arithmetic in which V**2, by subtraction of potentials, keeps that many digits at every node."""
     working_digits = digits + 20 + (60 if segment.from_multiprecision else 0)
     rough = problem.exact.at(working_digits)
-    middle = rough.mpf(0.5 * (segment.a + segment.b))
-    top = abs(rough.speed_squared(middle)) / rough.size
-    lost = ceil(-log10(float(top))) if 0 < top < 1 else 0
+    middle = 0.5 * (segment.a + segment.b)
+    while not (top := abs(rough.speed_squared(rough.mpf(middle))) / rough.size) and rough.digits < MAX_DIGITS:
+        rough = problem.exact.at(2 * rough.digits)  # all digits cancel
+    lost = ceil(-rough.context.log10(top)) if 0 < top < 1 else 0
     return problem.exact.at(working_digits + lost) if lost > MAX_LOST_DIGITS else rough
 
 

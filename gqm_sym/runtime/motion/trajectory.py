@@ -32,6 +32,8 @@ class TimedSegment:
         What ends it, one of `launch.kinds.LEG_ENDS`; empty where the next segment continues it.
     laps : int
         The number of laps of a closed curve before it; places on the segment are within one lap.
+    leg : int
+        For motions that lose energy, the number of the leg that it is part of.
     """
 
     segment: Segment
@@ -44,6 +46,7 @@ class TimedSegment:
     s_a: float
     end: str
     laps: int = 0
+    leg: int = 0
 
     @property
     def t_stop(self) -> Pair:

@@ -1,0 +1,209 @@
+"""Units of measurement: read as exact multiples of SI units, as text or as the units of quantities of pint.
+
+Units are written in the grammar of expressions, ``km/h`` or ``m/s**2``; their names are pint's, which is imported only
+for a name that is not in `_SI`. Nothing is rounded: a foot is 381/1250 m, and a degree is pi/180. A quantity is told by
+its attributes, so that pint is not imported to look whether something is one.
+"""
+
+import re
+from ast import expr
+from fractions import Fraction
+from functools import lru_cache
+from typing import Any, NamedTuple
+
+from gqm_sym.budgets import apart
+from gqm_sym.errors import ExpressionError, InputError, NumberError
+from gqm_sym.literals import rationals
+from gqm_sym.literals.grammar import parse
+from gqm_sym.literals.trees import evaluate
+
+
+class Unit(NamedTuple):
+    """``factor * pi**turns * m**metre * kg**kilogram * s**second * rad**radian``, everything exact."""
+
+    factor: Fraction = Fraction(1)
+    turns: int = 0
+    kilogram: int = 0
+    metre: int = 0
+    radian: int = 0
+    second: int = 0
+
+    @property
+    def dimension(self) -> tuple[int, int, int]:
+        """Powers of mass, length and time; an angle is a number."""
+        return self.kilogram, self.metre, self.second
+
+    @property
+    def name(self) -> str:
+        """The SI unit of the same dimension, in base units; empty for a number."""
+        powers = zip(("kg", "m", "rad", "s"), self[2:], strict=True)
+        known = {symbol: power for symbol, power in powers if power}
+        above = "*".join(_power(symbol, power) for symbol, power in known.items() if power > 0)
+        below = "/".join(_power(symbol, -power) for symbol, power in known.items() if power < 0)
+        return "/".join(part for part in (above or ("1" if below else ""), below) if part)
+
+    @property
+    def is_si(self) -> bool:
+        """Whether values in it are values in SI."""
+        return self.factor == 1 and self.turns == 0
+
+
+_SI = {
+    "kg": Unit(kilogram=1),
+    "m": Unit(metre=1),
+    "rad": Unit(radian=1),
+    "s": Unit(second=1),
+    "N": Unit(kilogram=1, metre=1, second=-2),
+    "J": Unit(kilogram=1, metre=2, second=-2),
+}
+
+# What stands between a number and its unit, in a text such as "30 deg".
+_GAP = re.compile(r"(?<=[\w.)])\s+(?=[A-Za-z\u00b0\u00b5])")
+# Signs for which the grammar has no word.
+_SIGNS = {"\u00b0": "deg", "\u00b5": "micro", "%": "percent"}
+
+
+def read_unit(text: str, *, where: str) -> Unit:
+    """Read a unit of mechanics.
+
+    Raises
+    ------
+    ExpressionError
+        If it is none, with the column of what is wrong.
+    """
+    unit = evaluate(parse(text, where=where), _Units(), where=where)
+    if not unit.factor:
+        raise InputError(f"{where}: {text} is nothing; a unit is more than that")
+    return unit
+
+
+def check_unit(text: str, wanted: str | None) -> None:
+    """Refuse a unit of another dimension than that of ``wanted``; None: any will do.
+
+    Raises
+    ------
+    InputError
+    """
+    if wanted is None or read_unit(text, where="").dimension == read_unit(wanted, where="").dimension:
+        return
+    right = "a plain number or an angle" if wanted == "1" else f"in {wanted} or a multiple of it"
+    raise InputError(f"must be {right}, got {text}")
+
+
+def is_quantity(value: object) -> bool:
+    """Whether a value has a magnitude and units, as a quantity of pint has."""
+    return hasattr(value, "magnitude") and hasattr(value, "units")
+
+
+def unit_of_quantity(value: Any) -> str:
+    """The units of a quantity as text that `read_unit` reads."""
+    text = f"{value.units:D}"
+    return "1" if text in ("", "dimensionless") else text
+
+
+def split_unit(text: str) -> tuple[str, expr, str] | None:
+    """Split a text such as "30 deg" into a number, its tree, and a unit; None if it is no such text."""
+    for gap in _GAP.finditer(text):
+        number, unit = text[: gap.start()], text[gap.end() :]
+        for sign, name in _SIGNS.items():
+            unit = unit.replace(sign, name)
+        try:
+            tree = parse(number, where="number")
+            read_unit(unit, where="unit")
+        except InputError:
+            continue
+        return number.strip(), tree, unit.strip()
+    return None
+
+
+def scale_of(unit: str, wanted: str | None, *, where: str) -> Unit:
+    """How many SI units a unit is, if it is one of the dimension that is wanted.
+
+    Parameters
+    ----------
+    unit
+        The unit that was given.
+    wanted
+        The SI unit of what it was given for, "1" for a plain number or an angle; None if that is not known.
+
+    Raises
+    ------
+    NumberError
+        If it is of another dimension, or no dimension is known.
+    """
+    try:
+        if wanted is None:
+            raise InputError(f"a unit is not known for it, got {unit}; give a plain number, in SI units and radians")
+        check_unit(unit, wanted)
+        return read_unit(unit, where="")
+    except ExpressionError as error:
+        raise NumberError(f"{where}: unit {unit}: {error}") from None
+    except InputError as error:
+        raise NumberError(f"{where}: {error}") from None
+
+
+def _power(symbol: str, power: int) -> str:
+    return symbol if power == 1 else f"{symbol}**{power}"
+
+
+@lru_cache(maxsize=1)
+def _registry() -> Any:
+    with apart():  # loading takes longer than a file may, once a process
+        from pint import UnitRegistry
+
+        return UnitRegistry(non_int_type=Fraction)
+
+
+def _named(name: str) -> Unit:
+    """A unit that pint knows by name."""
+    registry = _registry()
+    from pint import PintError  # only now: the registry imports pint apart from what reading may take
+
+    try:
+        one = registry.Quantity(Fraction(1), name).to_root_units()
+    except (PintError, AttributeError, TypeError, ValueError):
+        raise ValueError(f"there is no unit {name!r}; known are m, cm, ft, kg, s, min, deg, N and the like") from None
+    powers = {str(base): power for base, power in one._units.items()}
+    known = {"meter", "gram", "second", "radian"}
+    if not powers.keys() <= known or any(power.denominator != 1 for power in powers.values()):
+        raise ValueError(f"{name!r} is no unit of mechanics, made of lengths, masses, times and angles")
+    length, mass, time, angle = (int(powers.get(base, 0)) for base in ("meter", "gram", "second", "radian"))
+    # pint measures mass in grams, and writes pi with 50 digits: whichever power of it leaves a short number is right.
+    factor = Fraction(one.magnitude) / 1000**mass
+    pi = Fraction(registry.get_root_units("pi")[0])
+    turns = min((0, 1, -1, 2, -2), key=lambda k: (factor / pi**k).numerator * (factor / pi**k).denominator)
+    return Unit(factor / pi**turns, turns, kilogram=mass, metre=length, radian=angle, second=time)
+
+
+class _Units:
+    """The algebra of units: products, quotients and whole powers."""
+
+    def number(self, value: Fraction) -> Unit:
+        return Unit(value)
+
+    def name(self, name: str) -> Unit:
+        if name == "pi":
+            return Unit(turns=1)
+        return _SI[name] if name in _SI else _named(name)
+
+    def negate(self, value: Unit) -> Unit:
+        raise ValueError("a unit has no sign; write it with the value")
+
+    def total(self, terms: list[Unit]) -> Unit:
+        raise ValueError("units cannot be added; write products and quotients, as in m/s**2")
+
+    def product(self, factors: list[Unit]) -> Unit:
+        powers = (sum(column) for column in zip(*(unit[1:] for unit in factors), strict=True))
+        return Unit(rationals.product(unit.factor for unit in factors), *powers)
+
+    def reciprocal(self, value: Unit) -> Unit:
+        return Unit(rationals.reciprocal(value.factor), *(-power for power in value[1:]))
+
+    def power(self, base: Unit, exponent: Unit) -> Unit:
+        n = exponent.factor
+        if exponent[1:] != Unit()[1:] or n.denominator != 1:
+            raise ValueError("an exponent must be a whole number")
+        return Unit(rationals.power(base.factor, int(n)), *(power * int(n) for power in base[1:]))
+
+    def call(self, function: str, argument: Unit) -> Unit:
+        raise ValueError(f"{function} is no part of a unit")

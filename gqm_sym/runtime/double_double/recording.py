@@ -1,0 +1,282 @@
+"""Tapes of the exact formulas of a module, recorded when they are first needed.
+
+A module contains its formulas as plain Python over a namespace of operations. Called with numbers that write down what
+is done to them, a formula becomes a tape for the interpreter, which takes less than a millisecond, and the module needs
+to contain nothing but the formula.
+"""
+
+from collections.abc import Callable, Sequence
+from fractions import Fraction
+from functools import lru_cache
+from itertools import accumulate, chain
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gqm_sym.literals.numbers import Number
+from gqm_sym.runtime.arithmetic.elementary import QUARTER
+from gqm_sym.runtime.compiled.types import Array
+from gqm_sym.runtime.double_double import interpreter
+from gqm_sym.runtime.double_double.arithmetic import UNIT, split
+from gqm_sym.runtime.double_double.interpreter import ERROR, LOW, ROW
+from gqm_sym.runtime.interface import ExactFormulas
+
+# pi and e as two doubles each.
+PI, E = (2.0 * QUARTER[0], 2.0 * QUARTER[1]), (2.718281828459045, 1.4456468917292502e-16)
+
+# The register of what there is not.
+NOWHERE = -1
+
+# A tape with more registers is not used: its work space would not fit into the processor's caches.
+MAX_REGISTERS = 1000
+
+
+class Tape(NamedTuple):
+    """The formulas of one module as operations.
+
+    Attributes
+    ----------
+    operations : (m, 4) array of int
+        What `interpreter.evaluate` carries out: first what does not depend on the place, then what the effective
+        potential and ds/dlam need, then what only the potential's slope needs.
+    parts : tuple of int
+        Where these three parts end.
+    registers : tuple of int
+        Where in the work space the registers begin of: the first run-time parameter, the place, the effective
+        potential U, ds/dlam, dU/dlam, and the period of the curve's parameter (negative where there is none).
+    """
+
+    operations: NDArray[np.int64]
+    parts: tuple[int, int, int]
+    registers: tuple[int, int, int, int, int, int]
+
+
+class BoundTape(NamedTuple):
+    """A tape with the space that it is carried out in, and the run-time parameters.
+
+    Attributes
+    ----------
+    tape : Tape
+        The operations.
+    work : array
+        The registers, of which those of constants are filled. Compiled code changes the others while no other thread
+        runs.
+    parameters : (2, n) array
+        The run-time parameters as two doubles each.
+    """
+
+    tape: Tape
+    work: Array
+    parameters: Array
+
+
+class _Number:
+    """A number in a formula that is being recorded: a rational number, or the register that will contain it."""
+
+    __slots__ = ("_tape", "known", "register")
+
+    def __init__(self, tape: "_Recorder", register: int = -1, known: Fraction | None = None) -> None:
+        self._tape, self.register, self.known = tape, register, known
+
+    def _with(self, code: int, other: Any, *, turned: bool = False) -> "_Number":
+        other = self._tape.number(other)
+        a, b = (other, self) if turned else (self, other)
+        if a.known is not None and b.known is not None and not (code == interpreter.DIVIDE and b.known == 0):
+            exact: dict[int, Callable[[Any], Any]] = {
+                interpreter.ADD: a.known.__add__,
+                interpreter.SUBTRACT: a.known.__sub__,
+                interpreter.MULTIPLY: a.known.__mul__,
+                interpreter.DIVIDE: a.known.__truediv__,
+            }
+            return self._tape.number(exact[code](b.known))
+        return self._tape.result(code, a, b)
+
+    def __add__(self, other: Any) -> "_Number":
+        return self._with(interpreter.ADD, other)
+
+    def __sub__(self, other: Any) -> "_Number":
+        return self._with(interpreter.SUBTRACT, other)
+
+    def __rsub__(self, other: Any) -> "_Number":
+        return self._with(interpreter.SUBTRACT, other, turned=True)
+
+    def __mul__(self, other: Any) -> "_Number":
+        return self._with(interpreter.MULTIPLY, other)
+
+    def __truediv__(self, other: Any) -> "_Number":
+        return self._with(interpreter.DIVIDE, other)
+
+    def __rtruediv__(self, other: Any) -> "_Number":
+        return self._with(interpreter.DIVIDE, other, turned=True)
+
+    __radd__, __rmul__ = __add__, __mul__
+
+    def __neg__(self) -> "_Number":
+        return -1 * self
+
+    def __abs__(self) -> "_Number":
+        return self._tape.result(interpreter.ABSOLUTE, self)
+
+    def __pow__(self, other: Any) -> "_Number":
+        exponent = self._tape.number(other)
+        if exponent.known is None or exponent.known.denominator > 2:
+            return self._tape.exp(exponent * self._tape.log(self))
+        base = self if exponent.known.denominator == 1 else self._tape.sqrt(self)
+        power = base.to(abs(exponent.known.numerator))
+        return 1 / power if exponent.known < 0 else power
+
+    def __rpow__(self, other: Any) -> "_Number":
+        return self._tape.number(other) ** self
+
+    def to(self, count: int) -> "_Number":
+        """Return the product of so many factors."""
+        if count < 2:
+            return self if count else self._tape.number(1)
+        half = self.to(count // 2)
+        return half * half * self if count % 2 else half * half
+
+
+class _Recorder:
+    """The namespace of operations that formulas are recorded over: the functions have the names that mpmath has."""
+
+    def __init__(self, parameters: int) -> None:
+        # Each entry is what is done and to which registers. A constant is its doubles.
+        self.entries: list[tuple[Any, ...]] = [*((("parameter", k)) for k in range(parameters)), ("place",)]
+        self._known: dict[tuple[Any, ...], int] = {entry: k for k, entry in enumerate(self.entries)}
+        self.values = tuple(_Number(self, k) for k in range(parameters))
+        self.place = _Number(self, parameters)
+        self.pi, self.e = self._constant(PI), self._constant(E)
+
+    def _entry(self, *entry: Any) -> int:
+        if entry not in self._known:
+            self._known[entry] = len(self.entries)
+            self.entries.append(entry)
+            if entry[0] == interpreter.SINE_COSINE:
+                self.entries.append(("cosine", entry[1]))
+        return self._known[entry]
+
+    def _constant(self, pair: tuple[float, float]) -> _Number:
+        return _Number(self, self._entry("constant", *pair))
+
+    def number(self, value: Any) -> _Number:
+        """Return an operand as a number of this tape."""
+        return value if isinstance(value, _Number) else _Number(self, known=Fraction(value))
+
+    mpf = number
+
+    def register(self, value: Any) -> int:
+        """Return the register of an operand."""
+        number = self.number(value)
+        return number.register if number.known is None else self._entry("constant", *split(number.known))
+
+    def result(self, code: int, *operands: _Number) -> _Number:
+        """Record an operation, unless it has been recorded before, and return its result."""
+        return _Number(self, self._entry(code, *map(self.register, operands)))
+
+    def sqrt(self, x: Any) -> _Number:
+        return self.result(interpreter.SQUARE_ROOT, self.number(x))
+
+    def exp(self, x: Any) -> _Number:
+        return self.result(interpreter.EXPONENTIAL, self.number(x))
+
+    def log(self, x: Any) -> _Number:
+        return self.result(interpreter.LOGARITHM, self.number(x))
+
+    def sin(self, x: Any) -> _Number:
+        return self.result(interpreter.SINE_COSINE, self.number(x))
+
+    def cos(self, x: Any) -> _Number:
+        return _Number(self, self.sin(x).register + 1)
+
+    def tan(self, x: Any) -> _Number:
+        return self.sin(x) / self.cos(x)
+
+    def atan(self, x: Any) -> _Number:
+        return self.result(interpreter.ARC_TANGENT, self.number(x))
+
+    def asin(self, x: Any) -> _Number:
+        return self.atan(x / self.sqrt(1 - x * x))
+
+    def acos(self, x: Any) -> _Number:
+        return self.pi / 2 - self.asin(x)
+
+    def cosh(self, x: Any) -> _Number:
+        return (self.exp(x) + 1 / self.exp(x)) / 2
+
+    def sinh(self, x: Any) -> _Number:
+        return (self.exp(x) - 1 / self.exp(x)) / 2
+
+    def tanh(self, x: Any) -> _Number:
+        return self.sinh(x) / self.cosh(x)
+
+    def asinh(self, x: Any) -> _Number:
+        return self.log(x + self.sqrt(x * x + 1))
+
+    def acosh(self, x: Any) -> _Number:
+        return self.log(x + self.sqrt(x * x - 1))
+
+    def atanh(self, x: Any) -> _Number:
+        return self.log((1 + x) / (1 - x)) / 2
+
+    def depend_on_place(self) -> list[bool]:
+        """Return of each entry whether it depends on the place."""
+        depends: list[bool] = []
+        for code, *operands in self.entries:
+            is_operation = not isinstance(code, str) or code == "cosine"
+            depends.append(any(depends[k] for k in operands) if is_operation else code == "place")
+        return depends
+
+
+@lru_cache(maxsize=64)
+def record(formulas: ExactFormulas, domain: Callable[..., Any], parameters: int) -> tuple[Tape, Array] | None:
+    """Return the tape of a module's formulas and registers with its constants; None where they are too long.
+
+    Parameters
+    ----------
+    formulas : ExactFormulas
+        The formulas.
+    domain : callable
+        ``f(op, p)`` gives the ends of the parameter's range and its period.
+    parameters : int
+        The number of run-time parameters.
+    """
+    op = _Recorder(parameters)
+    potential = op.register(formulas.effective_potential(op, op.place, op.values))
+    ds = op.register(formulas.ds(op, op.place, op.values))
+    period = domain(op, op.values)[2]
+    period_register = NOWHERE if period is None else op.register(period)
+    before_slope = len(op.entries)
+    slope = op.register(formulas.effective_potential_slope(op, op.place, op.values))
+    if len(op.entries) > MAX_REGISTERS:
+        return None
+    depends = op.depend_on_place()
+    operations = [k for k, entry in enumerate(op.entries) if not isinstance(entry[0], str)]
+    groups = (
+        [k for k in operations if not depends[k]],
+        [k for k in operations if depends[k] and k < before_slope],
+        [k for k in operations if depends[k] and k >= before_slope],
+    )
+    codes = np.zeros((len(operations), 4), dtype=np.int64)
+    for row, k in zip(codes, chain(*groups), strict=True):
+        code, *operands = op.entries[k]
+        row[: 2 + len(operands)] = code, ROW * k, *(ROW * operand for operand in operands)
+    work = np.zeros(ROW * len(op.entries))
+    for k, (code, *pair) in enumerate(op.entries):
+        if code == "constant":
+            register = work[ROW * k : ROW * (k + 1)]
+            register[:LOW], register[LOW:ERROR], register[ERROR:] = (
+                *pair,
+                0.25 * UNIT * abs(pair[0]) if pair[1] else 0.0,
+            )
+    first, second, third = accumulate(len(group) for group in groups)
+    registers = (0, ROW * parameters, ROW * potential, ROW * ds, ROW * slope, ROW * period_register)
+    return Tape(codes, (first, second, third), registers), work
+
+
+def bind(formulas: ExactFormulas, domain: Callable[..., Any], parameters: Sequence[Number]) -> BoundTape | None:
+    """Return the tape of a module's formulas with values of its parameters; None where the formulas are too long."""
+    found = record(formulas, domain, len(parameters))
+    if found is None:
+        return None
+    return BoundTape(*found, np.array([[p.value for p in parameters], [p.low for p in parameters]]))

@@ -1,0 +1,230 @@
+"""How errors grow along a leg: of the place where it begins, of V**2 there and of the time, by their derivatives.
+
+Let the body start at a, at rest, and turn at b. With q the integral of Q from a on, V**2 at a place changes by
+``-P(a) exp(-q) da``, and so the turn by ``db/da = P(a) exp(-q)/P(b)``. At a given distance from a, V**2 changes by
+``(P - Q W - P(a) exp(-q)) da``: this is small next to a, and gives the change of the time from a to the middle of the
+run. From b to the middle it is the same with the direction reversed. What rounding makes of V**2 is a few units in the
+last place of all that it gained and lost, less what resistance has taken of that.
+"""
+
+from math import fabs, inf
+from typing import NamedTuple
+
+import numpy as np
+from numba import types
+
+from gqm_sym.runtime.arithmetic.doubledouble import ULP
+from gqm_sym.runtime.arithmetic.matrices import multiply
+from gqm_sym.runtime.compiled.jit import Inner, entry
+from gqm_sym.runtime.compiled.registers import uncounted
+from gqm_sym.runtime.compiled.types import REAL, VECTOR, Array
+from gqm_sym.runtime.legs.advance import DISSIPATION
+from gqm_sym.runtime.legs.leg_equation import (
+    DS,
+    EXPM1_Q,
+    FORCE,
+    LOAD,
+    MEAN,
+    OFFSET,
+    TAILS,
+    TIME_RATE,
+    D,
+    Forces,
+    March,
+    P,
+    Panel,
+    Q,
+    W,
+    begin_panel,
+    fill_rates,
+    panel_buffer,
+    set_nodes,
+    slope_at,
+    solve_panel,
+)
+from gqm_sym.runtime.legs.leg_reading import march_of
+from gqm_sym.runtime.legs.leg_record import (
+    AHEAD,
+    BACK,
+    COLUMNS,
+    END,
+    END_LOW,
+    HEAD,
+    INHERITED,
+    NORMAL_LOAD,
+    RIGHT,
+    START,
+    START_V2,
+    TIME_ERROR,
+    TIME_FROM_END,
+    TIME_FROM_START,
+)
+from gqm_sym.runtime.legs.leg_run import point_buffer, slope_of_v2
+from gqm_sym.runtime.legs.polynomials import COUNT, SHARES, TO_COEFFICIENTS, WIDE, size_of, to_tails
+
+# Roundings of V**2, of a place and of a time, in units in the last place.
+V2_ROUNDINGS, PLACE_ROUNDINGS, TIME_ROUNDINGS = 4.0, 1.0, 8.0
+
+
+def _slopes() -> Array:
+    """The matrix from values at a panel's nodes to the derivative by the share of the panel, a row for each node."""
+    degree, x = np.arange(COUNT), 2.0 * SHARES - 1.0
+    angle = np.arccos(np.clip(x, -1.0, 1.0))
+    at_nodes = 2.0 * degree * np.sin(np.outer(angle, degree)) / np.sin(angle)[:, None]
+    slopes: Array = at_nodes @ TO_COEFFICIENTS
+    return slopes
+
+
+to_slopes = multiply(_slopes().T)
+
+
+class Errors(NamedTuple):
+    """Bounds of the errors with which a leg begins.
+
+    Attributes
+    ----------
+    place : float
+        Of the place.
+    v2 : float
+        Of V**2 there; 0 where the body turns.
+    time : float
+        Of the time in s.
+    """
+
+    place: float
+    v2: float
+    time: float
+
+
+class Half(NamedTuple):
+    """What some panels say of the motion between the place where they begin and the middle of the run.
+
+    Attributes
+    ----------
+    by_place, by_v2 : float
+        The changes of the time by the place where they begin, at a given distance from there, and by V**2 there.
+    damping : float
+        What resistance leaves of a change of V**2.
+    gained : float
+        The sum of all gains and losses of V**2, less what resistance took of them.
+    slope : float
+        By how much V**2 grows per distance where they begin.
+    rate : float
+        The time rate per distance in the middle; 0 if there are no panels.
+    """
+
+    by_place: float
+    by_v2: float
+    damping: float
+    gained: float
+    slope: float
+    rate: float
+
+
+@Inner
+def half_of_leg(forces, march, panels, v2, errors, record):  # type: ignore[no-untyped-def]
+    """Solve the panels of a half of the leg once more, and sum up how errors grow on them.
+
+    Parameters
+    ----------
+    panels : (int, int)
+        Where the first of them stands in the record, and their number.
+    v2 : float
+        V**2 where they begin.
+    errors : (float, float)
+        Errors of the place where they begin and of V**2 there. INHERITED of each panel becomes the largest error that
+        these make in the times to places of the panel that are given by their distance from there.
+    """
+    work = panel_buffer()
+    set_nodes(work)
+    (begin, count), left, u = panels, 0.0, float(march.direction)
+    by_place, by_v2, damping, gained, slope, rate = 0.0, 0.0, 1.0, v2, 0.0, 0.0
+    for k in range(count):
+        at = begin + k * COLUMNS
+        right = record[at + RIGHT]
+        contact_sign = 1 if record[at + NORMAL_LOAD + COUNT // 2] > 0.0 else -1
+        panel = Panel(left, v2, contact_sign, (-inf, inf))
+        begin_panel(forces, march, panel, right - left, work)
+        if not solve_panel(forces, march, panel, work) < inf:
+            return Half(inf, inf, 1.0, inf, slope, rate)
+        fill_rates(march, panel, work)
+        if k == 0:
+            slope = u * (work[P] - work[Q] * work[W])
+        to_slopes(work, DS, work, MEAN)
+        for j in range(WIDE):
+            kept = damping / (1.0 + work[EXPM1_Q + j])
+            grows = (right - left) * (slope_at(left, march) + 2.0 * march.g * work[OFFSET + j])
+            bend = work[MEAN + j] / (grows * work[DS + j])
+            change = (u * (work[P + j] - work[Q + j] * work[W + j]) - slope * kept) / work[W + j]
+            work[LOAD + j] = work[TIME_RATE + j] * (bend - 0.5 * change)
+            work[MEAN + j] = work[TIME_RATE + j] * kept / work[W + j]
+        to_tails(work, LOAD, work, TAILS)
+        inherited = fabs(by_place) * errors[0] + fabs(by_v2) * errors[1]
+        by_place += (right - left) * work[TAILS + 6]
+        to_tails(work, MEAN, work, TAILS)
+        by_v2 -= 0.5 * (right - left) * work[TAILS + 6]
+        record[at + INHERITED] = max(inherited, fabs(by_place) * errors[0] + fabs(by_v2) * errors[1])
+        rest = 1.0 / (1.0 + work[EXPM1_Q + COUNT])
+        damping, gained = damping * rest, (gained + size_of(work, FORCE) * work[D + COUNT]) * rest
+        last = right - 0.5 * (right - left) * (1.0 - SHARES[COUNT - 1])
+        rate = work[TIME_RATE + COUNT - 1] / slope_at(last, march)
+        left, v2 = right, max(work[W + COUNT], 0.0)
+    return Half(by_place, by_v2, damping, gained, slope, rate)
+
+
+@Inner
+def own_time_error(record, begin, count):  # type: ignore[no-untyped-def]
+    """The sum of what the times of panels may be wrong by, as their last coefficients show."""
+    error = 0.0
+    for k in range(count):
+        error += record[begin + k * COLUMNS + TIME_ERROR]
+    return error
+
+
+@entry(types.UniTuple(REAL, 3)(DISSIPATION, VECTOR, types.boolean, types.NamedUniTuple(REAL, 3, Errors), VECTOR))
+def carry(dissipation, p, turns, before, record):  # type: ignore[no-untyped-def]
+    """The errors at the end of a leg, which are those with which the next one begins.
+
+    Parameters
+    ----------
+    dissipation : Dissipation
+        The module's compiled functions, and of what kind its forces are.
+    p : array
+        Run-time parameters.
+    turns : bool
+        Whether V**2 vanishes where the leg ends, and times are counted back from there.
+    before : Errors
+    record : array
+        The record of the leg (`leg_record`). INHERITED is filled in: for panels from the end it is that of an error of
+        1 of the place of the end.
+
+    Returns
+    -------
+    place, v2, time : float
+        As of `Errors`.
+    """
+    p, record, forward = uncounted(p), uncounted(record), march_of(record)
+    ahead, back, v = int(record[AHEAD]), int(record[BACK]), forward.direction
+    forces = Forces(dissipation.speed_equation, p, dissipation.friction, dissipation.kinked, dissipation.linear, v)
+    first = half_of_leg(forces, forward, (HEAD, ahead), record[START_V2], (before.place, before.v2), record)
+    rounding = PLACE_ROUNDINGS * ULP * max(fabs(record[START]), fabs(record[END]))
+    own = own_time_error(record, HEAD, ahead) + TIME_ROUNDINGS * ULP * record[TIME_FROM_START]
+    if not turns or back == 0:
+        moved = fabs(first.by_place - first.rate) * before.place + fabs(first.by_v2) * before.v2
+        of_v2 = first.damping * (before.v2 + fabs(first.slope) * before.place)
+        return rounding, of_v2 + V2_ROUNDINGS * ULP * first.gained, before.time + moved + own
+    backward = March((record[END], record[END_LOW]), -v, 1.0, 0.0)
+    second = half_of_leg(forces, backward, (HEAD + ahead * COLUMNS, back), 0.0, (1.0, 0.0), record)
+    damping = first.damping / second.damping
+    gained = (first.gained + second.gained) / second.damping
+    start_slope, rate = first.slope, first.rate
+    if ahead == 0:
+        start_slope, rate = slope_of_v2(forces, record[START], record[START_V2], 0, point_buffer()), second.rate
+    by_place, by_v2 = -start_slope * damping / second.slope, damping / second.slope
+    at_end = rate - second.by_place  # the time from the middle to the end, by the place of the end
+    of_end = V2_ROUNDINGS * ULP * gained / second.slope + rounding
+    place = fabs(by_place) * before.place + fabs(by_v2) * before.v2 + of_end
+    moved = fabs(first.by_place - rate + by_place * at_end) * before.place
+    moved += fabs(first.by_v2 + by_v2 * at_end) * before.v2 + fabs(at_end) * of_end
+    own += own_time_error(record, HEAD + ahead * COLUMNS, back) + TIME_ROUNDINGS * ULP * record[TIME_FROM_END]
+    return place, 0.0, before.time + moved + own

@@ -1,0 +1,131 @@
+"""Bounds of motions that lose energy: at turns and between, over many legs, at any amplitude, by closed forms."""
+
+import math
+from collections.abc import Callable
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import pytest
+from mpmath import mp, mpf
+
+import gqm_sym as gqm
+
+Build = Callable[..., ModuleType]
+G = mpf("9.81")
+
+# A bound that is larger than the error by more than this is of no use.
+USELESS = 1e5
+
+
+@pytest.fixture(scope="module")
+def build(generated_folder: Path) -> Build:
+    """Build a module once."""
+    built: dict[str, ModuleType] = {}
+
+    def module(name: str, curve: Any, force: Any) -> ModuleType:
+        if name not in built:
+            built[name] = gqm.build(gqm.derive(curve, gqm.Gravity() + force), name=name, folder=generated_folder)
+        return built[name]
+
+    return module
+
+
+def spring(build: Build, name: str, loss: Any) -> ModuleType:
+    """A level line with a spring, on which each leg has a closed form."""
+    return build(name, gqm.Curve.graph("0*x"), gqm.Potential("k*x**2/2") + loss)
+
+
+def assert_bounded(motion: Any, times: Any, truth: Callable[[float], Any], scale: Any) -> None:
+    """Places are within their bounds, and these are small against the amplitude."""
+    for t, place, error in zip(times, motion.lam(times), motion.error_bound(times), strict=True):
+        with mp.workdps(60):
+            assert abs(mpf(float(place)) - truth(float(t))) <= error
+        assert error <= USELESS * 2.3e-16 * float(scale)
+
+
+def test_a_spring_with_weak_friction(build: Build) -> None:
+    """Half swings about +-mu g/k, each the same time long; 470 turns inherit the errors of all before."""
+    module = spring(build, "weak_friction", gqm.CoulombFriction())
+    motion = module.solve("1/2", mu="1/10000", k="40", t_max=250)
+    with mp.workdps(60):
+        root = mp.sqrt(40)
+        half, shift = mp.pi / root, mpf("9.81") / 400000
+
+    def truth(t: float) -> Any:
+        turns = int(mp.floor(t / half))
+        swing = mpf("0.5") - 2 * shift * turns - shift
+        return (-1) ** turns * (shift + swing * mp.cos(root * (t - turns * half)))
+
+    turns = np.array([leg.t_end for leg in motion.legs[:-1]])
+    assert len(turns) > 470
+    assert_bounded(motion, np.concatenate([turns[::5], turns[::7] - 0.1, turns[::9] - 0.3]), truth, "0.5")
+
+
+def dragged_swing(amplitude: mpf, k: mpf, b: mpf, digits: int) -> tuple[mpf, mpf]:
+    """The next amplitude of a spring with quadratic drag, and the time to it."""
+    with mp.workdps(digits):
+        c = k / (2 * b * b)
+
+        def w(x: mpf) -> mpf:
+            return c * ((1 - 2 * b * x) - (1 + 2 * b * amplitude) * mp.exp(-2 * b * (x + amplitude)))
+
+        guess = amplitude * (1 - mpf(4) / 3 * b * amplitude)
+        other = mp.findroot(w, (guess * (1 - mpf("1e-6")), guess))
+        middle, width = (other - amplitude) / 2, (other + amplitude) / 2
+
+    def rate(angle: mpf) -> mpf:
+        with mp.workdps(digits):
+            return width * mp.cos(angle) / mp.sqrt(w(middle + width * mp.sin(angle)))
+
+    with mp.workdps(25):
+        return other, mp.quad(rate, [-mp.pi / 2, 0, mp.pi / 2], method="gauss-legendre")
+
+
+@pytest.mark.parametrize("amplitude", ["1", "1e-3", "1e-10", "2e-13", "1e-30", "1e-100"])
+def test_any_amplitude_with_drag(amplitude: str, build: Build) -> None:
+    """The steps of a leg are as long as the leg itself, so that turns and their times have all their digits."""
+    motion = spring(build, "dragged_spring", gqm.QuadraticDrag(b="b")).solve(amplitude, b="1/10", k="40", t_max=3)
+    digits = 60 - 3 * int(mp.log10(mpf(amplitude)))
+    place, time, sign = mpf(amplitude), mpf(0), 1
+    for leg in motion.legs[:-1]:
+        with mp.workdps(digits):
+            place, spent = dragged_swing(place, mpf(40), mpf("0.1"), digits)
+            time, sign = time + spent, -sign
+            assert abs(mpf(leg.lam_end) - sign * place) <= 4e-15 * place
+            assert abs(mpf(leg.t_end) - time) <= 1e-15 * time
+            assert abs(mpf(leg.lam_end) - sign * place) <= motion.state(leg.t_end).error <= 1e-13 * place
+    assert len(motion.legs) == 7
+
+
+@pytest.mark.parametrize("amplitude", ["1e-10", "1e-60"])
+def test_small_swings_in_a_valley(amplitude: str, build: Build) -> None:
+    """At the bottom of z = x**2 the swing is a cosine, less what drag takes of so small a motion."""
+    module = build("valley", gqm.Curve.graph("x**2"), gqm.QuadraticDrag(b="b"))
+    state = module.solve(amplitude, b="1/10").state(3.0)
+    with mp.workdps(40):
+        swing = mpf(amplitude) * mp.cos(3 * mp.sqrt(2 * G))
+    assert abs(state.lam - swing) <= state.error + mpf(amplitude) ** 2
+    assert state.error <= 1e-12 * float(amplitude)
+
+
+def test_a_resistance_that_never_stops_a_swing(build: Build) -> None:
+    """Resistance c V on a ring: small swings last for ever, each damped by exp(-c/2 half)."""
+    module = build("viscous_ring", gqm.families.circle(L=1), gqm.Kernel.law("-c*direction*sqrt(W)"))
+    motion = module.solve(0.1, c=1, t_max=60)
+    legs = motion.legs
+    assert [leg.end for leg in legs] == ["turn"] * (len(legs) - 1) + ["horizon"]
+    omega = math.sqrt(9.81 - 0.25)
+    assert legs[50].t_end - legs[49].t_end == pytest.approx(math.pi / omega, rel=1e-13)
+    assert legs[50].lam_end / legs[49].lam_end == pytest.approx(-math.exp(-0.5 * math.pi / omega), rel=1e-13)
+
+
+@pytest.mark.parametrize("t", [1.0, 1e3, 1e100])
+def test_drag_alone(t: float, build: Build) -> None:
+    """On a level line x = log(1 + b v0 t)/b: time grows exponentially with the place, and its error with it."""
+    module = build("level", gqm.Curve.graph("0*x"), gqm.QuadraticDrag(b="b"))
+    state = module.solve(0, 2, b="1/10").state(t)
+    with mp.workdps(130):
+        error = abs(mpf(state.lam) - 10 * mp.log(1 + mpf(t) / 5))
+    assert error <= state.error <= 1e-9
