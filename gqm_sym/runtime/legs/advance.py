@@ -64,6 +64,7 @@ from gqm_sym.runtime.legs.leg_run import (
     LIFTOFF,
     LIMIT,
     NARROWED,
+    PANELS_PER_RUN,
     PAUSED,
     SPENT,
     TURN,
@@ -90,6 +91,10 @@ LAPS_AHEAD = 8
 # The first panel of a body released near an equilibrium in units of the distance to it, and how often the step to it is
 # halved at most.
 FIRST_STEPS, MAX_HALVINGS = 8.0, 1000
+
+# The length of a panel, as a share of the first step of a search, at which a body that pauses creeps towards an
+# equilibrium that it never reaches.
+CREEPING_SHARE = 1e-6
 
 # V**2 of a body at rest, for laws that take its root.
 LEAST_V2 = 1e-300
@@ -290,7 +295,9 @@ def advance(dissipation, p, joints, body, record):  # type: ignore[no-untyped-de
     if what == TURN:
         what = RESTS if after_turn(dissipation, p, joints, body, found, record) else TURN
     else:
-        endless = what == PAUSED and period == 0.0 and not isfinite(body[HIGH] if body[DIRECTION] > 0.0 else body[LOW])
+        is_open = period == 0.0 and not isfinite(body[HIGH] if body[DIRECTION] > 0.0 else body[LOW])
+        creeps = record[AHEAD] >= PANELS_PER_RUN and found.step <= CREEPING_SHARE * body[FIRST_STEP]
+        endless = what == PAUSED and (is_open or creeps)
         body[PAUSES] = body[PAUSES] + 1.0 if endless else 0.0
     body[PLACE], body[PLACE_LOW], body[V2], body[DIRECTION] = place, record[END_LOW], found.v2, found.direction
     body[CONTACT_SIGN], body[STEP] = found.contact_sign, found.step

@@ -121,6 +121,26 @@ def test_a_resistance_that_never_stops_a_swing(build: Build) -> None:
     assert legs[50].lam_end / legs[49].lam_end == pytest.approx(-math.exp(-0.5 * math.pi / omega), rel=1e-13)
 
 
+@pytest.mark.parametrize("t", [0.01, 1.0, 5.0])
+def test_a_creeping_spring(t: float, build: Build) -> None:
+    """Far beyond critical damping the body creeps for ever: x = exp(-c t/2) (cosh d t + c/(2 d) sinh d t)."""
+    motion = spring(build, "creeping", gqm.Kernel.law("-c*direction*sqrt(W)")).solve("1", c="20", k="10")
+    with mp.workdps(40):
+        d = mp.sqrt(90)
+        truth = mp.exp(-10 * mpf(t)) * (mp.cosh(d * t) + 10 / d * mp.sinh(d * t))
+    state = motion.state(t)
+    assert abs(state.lam - truth) <= state.error <= 1e-10
+    assert motion.t_end == math.inf
+
+
+def test_creeping_on_a_ring_has_no_end(build: Build) -> None:
+    """An end is looked for only as long as steps are no millionth of the curve (took over a minute)."""
+    module = build("viscous_ring", gqm.families.circle(L=1), gqm.Kernel.law("-c*direction*sqrt(W)"))
+    motion = module.solve(1.0, c=100)
+    assert motion.t_end == math.inf
+    assert motion.lam(1.0) == pytest.approx(2 * math.atan(math.tan(0.5) * math.exp(-9.81 / 100)), rel=1e-3)
+
+
 @pytest.mark.parametrize("t", [1.0, 1e3, 1e100])
 def test_drag_alone(t: float, build: Build) -> None:
     """On a level line x = log(1 + b v0 t)/b: time grows exponentially with the place, and its error with it."""
