@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from gqm_sym.errors import SolutionError
+from gqm_sym.errors import InputError, SolutionError
 from gqm_sym.literals.numbers import read_number
 from gqm_sym.runtime.arithmetic.doubledouble import ULP, ZERO
 from gqm_sym.runtime.compiled.types import Array
@@ -31,6 +31,9 @@ MAX_TURN_ROUNDING = 1e-14
 # The largest relative change of a period by the rounding of a chart. It is largest at flat minima of the potential and
 # on splines (14 roundings were measured).
 CHART_ROUNDING = 16 * ULP
+
+# The most events that `events_between` lists.
+MAX_EVENTS = 1_000_000
 
 # The most pieces of a chart on a segment whose times are computed in extended precision without being asked for.
 MAX_CHART_PIECES = 250
@@ -270,10 +273,18 @@ class PeriodicMotion(Motion):
         """The events from time t1 to t2 over as many periods as that takes; see `Motion.events_between`."""
         start, stop = read_number(t1, where="t1", unit="s").value, read_number(t2, where="t2", unit="s").value
         period = self.period
-        lap = self._trajectory(0.0).lap
+        lap, within = self._trajectory(0.0).lap, self._one_period()
+        first, last = int(np.floor(start / period)), int(np.floor(min(stop, self.t_end) / period))
+        if (last - first) * len(within) > MAX_EVENTS:
+            raise InputError(
+                f"events_between: {len(within)} events in each of {last - first} periods are more than {MAX_EVENTS}; "
+                "ask for a shorter interval"
+            )
         out = []
-        for k in range(int(np.floor(start / period)), int(np.floor(stop / period)) + 1):
-            for event in self._one_period():
+        for k in range(first, last + 1):
+            for event in within:
+                if k and event.kind == "slip" and event.t == 0.0:
+                    continue  # a body that slips at launch begins to slip then, and once only
                 t = event.t + k * period
                 if start <= t <= min(stop, self.t_end):
                     out.append(Event(event.kind, t, event.lam + k * lap, event.x, event.z))
