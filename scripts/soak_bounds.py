@@ -10,7 +10,6 @@ import math
 import random
 import sys
 import tempfile
-import time
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -222,7 +221,6 @@ def soak(count: int, seed: int, modules: dict[str, ModuleType]) -> tuple[Counter
     draw, tally, failed = random.Random(seed), Counter[str](), []
     for _ in range(count):
         name, call = drawn(draw)
-        begin = time.process_time()
         try:
             found, checks = faults(modules[name], FAMILIES[name], call)
             tally["checks"] += checks
@@ -230,8 +228,6 @@ def soak(count: int, seed: int, modules: dict[str, ModuleType]) -> tuple[Counter
         except GQMError as error:
             tally[type(error).__name__] += 1
             found = []
-        if time.process_time() - begin > 10.0:
-            found.append(f"slow by {time.process_time() - begin:.0f} s")
         shown = ", ".join(f"{key}={value!r}" for key, value in call.items())
         failed += [f"{what}: {name}.solve({shown})" for what in found]
     return tally, failed
