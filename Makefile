@@ -15,7 +15,7 @@ demo: $(VENV)/.run ## take the paper's Example 1 from a YAML file to digits, bes
 	$(BIN)/python scripts/demo.py
 
 test: $(VENV)/.dev ## run every test, notebooks included
-	$(BIN)/python tests/support/compile_runtime.py $(WORKERS)
+	$(BIN)/gqm warm --processes $(WORKERS)
 	$(BIN)/python -m pytest -n $(WORKERS)
 
 lint: $(VENV)/.dev ## check format, style, types and documentation, and that generated files are current

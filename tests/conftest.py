@@ -11,9 +11,14 @@ import pytest
 from hypothesis import settings
 from problems import PROBLEMS, TRACKS, Problem
 
+from gqm_sym.runtime.compiled import jit
+
 # The first example of a test may compile for seconds; and a failure must show again.
 settings.register_profile("suite", deadline=None, derandomize=True, print_blob=True)
 settings.load_profile("suite")
+
+# On a machine that others use compiling takes any time, and tests look at what is said on standard error.
+jit.ANNOUNCER.seconds = 1e6
 
 if numba.config.DISABLE_JIT:
     import uncompiled

@@ -7,18 +7,26 @@ BAR_WIDTH = 30
 
 
 class Bar:
-    """A progress bar on a terminal, redrawn in place. Nothing is drawn if the stream is not a terminal."""
+    """A progress bar on a terminal, redrawn in place. Nothing is drawn if the stream is not a terminal.
 
-    def __init__(self, stream: TextIO | None = None) -> None:
-        self._stream = stream or sys.stderr
+    Parameters
+    ----------
+    stream
+        Where to draw; standard error if not given.
+    things
+        What is counted.
+    """
+
+    def __init__(self, stream: TextIO | None = None, things: str = "points") -> None:
+        self._stream, self._things = stream or sys.stderr, things
         self._visible = self._stream.isatty()
 
     def __call__(self, done: int, size: int) -> None:
-        """Draw the bar for ``done`` points out of ``size``."""
+        """Draw the bar for ``done`` things out of ``size``."""
         if self._visible:
             filled = BAR_WIDTH * done // size
             bar = "#" * filled + "." * (BAR_WIDTH - filled)
-            self._stream.write(f"\r[{bar}] {100 * done // size:3d}%  {done} of {size} points")
+            self._stream.write(f"\r[{bar}] {100 * done // size:3d}%  {done} of {size} {self._things}")
             self._stream.flush()
 
     def close(self) -> None:

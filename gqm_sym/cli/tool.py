@@ -1,4 +1,4 @@
-"""`gqm`: solve, plot, report, sweep and list; everything but the generation of modules."""
+"""`gqm`: solve, plot, report, sweep, compile and list; everything but the generation of modules."""
 
 import argparse
 import json
@@ -155,6 +155,18 @@ def _parser() -> argparse.ArgumentParser:
     sweep.add_argument("--force", action="store_true", help="start again and overwrite stored results")
     sweep.set_defaults(command=_sweep)
 
+    warm = commands.add_parser(
+        "warm",
+        help="compile everything for this machine now",
+        description="Compile the numerical library, and generated modules if files are given, for this machine. "
+        "Otherwise each function is compiled when it is first needed. The machine code is cached.",
+    )
+    warm.add_argument("files", metavar="MODULE", nargs="*", help="a generated module (generated/NAME.py)")
+    warm.add_argument(
+        "--processes", type=int, default=0, metavar="N", help="work in this many processes (default: one for each core)"
+    )
+    warm.set_defaults(command=_warm)
+
     schema = commands.add_parser("schema", help="print the JSON Schema of curve files, for editors")
     schema.add_argument("--sweep", action="store_true", help="print the schema of sweep files instead")
     schema.set_defaults(command=_schema)
@@ -255,6 +267,20 @@ def _sweep(options: argparse.Namespace) -> None:
     for line in show.swept(plan.quantities, data):
         print(line)
     print(f"wrote {target}")
+
+
+def _warm(options: argparse.Namespace) -> None:
+    from time import monotonic
+
+    from gqm_sym.cli.progress import Bar
+    from gqm_sym.runtime.warm import warm
+
+    bar, started = Bar(things="files"), monotonic()
+    try:
+        count = warm(tuple(options.files), max(options.processes, 0), bar)
+    finally:
+        bar.close()
+    print(f"compiled {count} files for this machine in {monotonic() - started:.0f} s")
 
 
 # -- lists -----------------------------------------------------------------------------------

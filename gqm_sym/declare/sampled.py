@@ -249,7 +249,8 @@ def _read(value: Any, count: int) -> tuple[str, float]:
         raise DeclarationError(f"sampled: row {count}: {value} is no number")
     else:
         try:
-            text = repr(float(value))
+            # All digits of a float, which means its binary value and not the shortest decimal that is read as it.
+            text = str(value) if isinstance(value, int) else str(Decimal(float(value)))
         except (TypeError, ValueError, OverflowError):
             raise DeclarationError(f"sampled: row {count}: {value!r:.40} is no number") from None
     number = float(text)

@@ -5,6 +5,7 @@ import keyword
 import sympy
 from sympy import Expr
 
+from gqm_sym.arguments import instance
 from gqm_sym.budgets import budget
 from gqm_sym.derivation import Model
 from gqm_sym.emission.lower import lower
@@ -38,6 +39,7 @@ def emit(model: Model, *, name: str) -> str:
         raise InputError(
             f"name: {name!r} cannot be a module's; write a Python identifier of ASCII letters, digits and _"
         )
+    instance(model, Model, where="emit: model", what="a model, as derive(curve, kernel) returns one")
     return render(lower(model, name=name, forms=model.closed_forms()), source=_source(model, name))
 
 

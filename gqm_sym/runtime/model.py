@@ -2,10 +2,12 @@
 
 from collections.abc import Callable, Mapping
 from functools import cache
+from math import nan
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NoReturn
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gqm_sym.arguments import unknown_argument
 from gqm_sym.errors import ArgumentError, SolutionError
@@ -100,7 +102,8 @@ class CompiledModel(Formulas):
         Returns
         -------
         Pass1
-            Arrays of the shape of ``lam``.
+            Arrays of the shape of ``lam``. Formulas are evaluated at any place; beyond the ends of a track that is
+            known by points, by pieces or by an equation, all values are NaN.
 
         Raises
         ------
@@ -118,14 +121,14 @@ class CompiledModel(Formulas):
         else:
             places, low_parts, shape = read_numbers(lam, where=self.parameter, unit=self.units.get(self.parameter))
             low_parts = low_parts if low_parts.any() else NO_LOW_PARTS
-        arrays = load_map_arrays(shape, places, out)
+        arrays, beyond = load_map_arrays(shape, places, out), self._beyond_ends(p, places)
         if self.dissipation is not None:
             from gqm_sym.runtime.legs.dissipative import launch_leg
 
             v2 = launch_leg(self, p, launch, places)
             x, z, ds, kappa, force = path_and_force_at(f.addresses, f.p, places, v2)
             for array, values in zip(arrays, (x, z, ds, kappa, v2, force), strict=True):
-                array[...] = values.reshape(shape)
+                array[...] = (values if beyond is None else np.where(beyond, nan, values)).reshape(shape)
             return arrays
         start = (launch.lam0.value, launch.lam0.low, launch.v0.value**2)
         load_map = 0 if self.load_map is None else self.load_map.address
@@ -136,7 +139,18 @@ class CompiledModel(Formulas):
             fill_load_map(f.addresses, load_map, f.p, start, (places, low_parts), rows, ends, past_cache)
 
         run_in_threads(fill, places.size, MIN_PLACES_PER_THREAD)
+        if beyond is not None:
+            for row in rows:
+                row[beyond] = nan
         return arrays
+
+    def _beyond_ends(self, p: ParameterValues, places: Array) -> NDArray[np.bool_] | None:
+        """Which places lie beyond the ends of a curve without formulas, where there is nothing; None if none does."""
+        numbers = self.domain(p).numbers
+        if self.chart is None or not places.size or (numbers.low <= places.min() and places.max() <= numbers.high):
+            return None
+        beyond: NDArray[np.bool_] = (places < numbers.low) | (places > numbers.high)
+        return beyond
 
     def solve(
         self, request: LaunchRequest, parameters: tuple[Any, ...], unknown: Mapping[str, Any] = NOTHING

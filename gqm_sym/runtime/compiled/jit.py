@@ -6,8 +6,10 @@ Division by zero gives infinity, as in IEEE arithmetic, and is not an exception.
 
 import hashlib
 import sys
+import threading
+import time
 from collections.abc import Callable
-from functools import lru_cache, wraps
+from functools import wraps
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -34,20 +36,45 @@ def stamp_for(function: Any) -> str:
     return STAMPS.of(function.__module__)
 
 
-@lru_cache(maxsize=1)
-def announce() -> None:
-    """Print once, if the output is a terminal, that the runtime is being compiled, because that takes minutes."""
-    if sys.stderr is not None and sys.stderr.isatty():
-        print("gqm_sym: compiling the runtime, once per installation", file=sys.stderr, flush=True)
+class Announcer:
+    """Says on standard error that something is compiled for this machine, if that takes long.
+
+    Parameters
+    ----------
+    seconds : float
+        The processor time after which it says so.
+    """
+
+    def __init__(self, seconds: float = 2.0) -> None:
+        self.seconds = seconds
+        self._own = threading.local()
+
+    def begin(self, function: Any) -> None:
+        """Note that a function is compiled; those that are compiled for it belong to it."""
+        if getattr(self._own, "done", None) is None:
+            self._own.done = threading.Event()
+            room = function.__module__.removeprefix(f"{RUNTIME}.")
+            what = room if room != function.__module__ else f"{function.__name__} of a generated module"
+            threading.Thread(target=self._watch, args=(what, self._own.done), daemon=True).start()
+
+    def end(self) -> None:
+        """Note that nothing is compiled in this thread any more."""
+        done = getattr(self._own, "done", None)
+        if done is not None:
+            done.set()
+            self._own.done = None
+
+    def _watch(self, what: str, done: threading.Event) -> None:
+        started = time.process_time()
+        while not done.wait(0.25 * self.seconds):
+            if time.process_time() - started >= self.seconds:
+                if sys.stderr is not None:
+                    print(f"gqm_sym: compiling for this machine, once: {what}", file=sys.stderr, flush=True)
+                return
 
 
-def _announce_runtime(function: Any) -> None:
-    """Announce that a function is compiled, if it belongs to the runtime."""
-    if function.__module__.startswith(f"{RUNTIME}."):
-        announce()
-
-
-COMPILER = Compiler(COMPILE, lambda function: stamp_for(function), _announce_runtime)
+ANNOUNCER = Announcer()
+COMPILER = Compiler(COMPILE, lambda function: stamp_for(function), ANNOUNCER.begin)
 
 
 class Inner:
@@ -73,7 +100,10 @@ class Inner:
 
     def __call__(self, *arguments: Any) -> Any:
         """Call the compiled function from Python."""
-        return self.dispatcher(*arguments)
+        try:
+            return self.dispatcher(*arguments)
+        finally:
+            ANNOUNCER.end()
 
 
 class Inlined(Inner):
@@ -111,7 +141,10 @@ def entry(signature: Any, *, nogil: bool = False, checked: bool = True) -> Calla
         def call(*arguments: Any) -> Any:
             nonlocal compiled
             if compiled is None:
-                compiled = COMPILER.entry(function, signature, nogil=nogil, checked=checked)
+                try:
+                    compiled = COMPILER.entry(function, signature, nogil=nogil, checked=checked)
+                finally:
+                    ANNOUNCER.end()
             return compiled(*arguments)
 
         return call
@@ -166,7 +199,10 @@ def compiler(file: str, *, interface: int) -> Callable[..., Callable[[Any], Any]
     def compiled(signature: Any, *, later: bool = False) -> Callable[[Any], Any]:
         def compile_it(function: Any) -> Any:
             function.__module__ = alias
-            return COMPILER.callback(function, signature)
+            try:
+                return COMPILER.callback(function, signature)
+            finally:
+                ANNOUNCER.end()
 
         return (lambda function: Later(lambda: compile_it(function))) if later else compile_it
 

@@ -17,7 +17,7 @@ from numba import types
 from numba.extending import intrinsic
 
 from gqm_sym.runtime.arithmetic.doubledouble import two_sum
-from gqm_sym.runtime.arithmetic.elementary import ONE_OVER_LOG2, QUARTER, ROUND, TWO_OVER_PI, atan, power_of_two
+from gqm_sym.runtime.arithmetic.elementary import ONE_OVER_LOG2, QUARTER, ROUND, TWO_OVER_PI, power_of_two
 from gqm_sym.runtime.compiled.intrinsics import bits, choose, fma, polynomial
 from gqm_sym.runtime.compiled.jit import Inlined
 
@@ -182,19 +182,16 @@ def exponential(x, x_low):  # type: ignore[no-untyped-def]
 
 
 @Inlined
-def improved_logarithm(x, x_low, guess):  # type: ignore[no-untyped-def]
-    """Return log(x) within 2 UNIT of max(1, |log(x)|), from the double nearest to it."""
-    e, e_low = exponential(-guess, 0.0)
+def improved_logarithm(x, x_low, guess, e, e_low):  # type: ignore[no-untyped-def]
+    """Return log(x) within 2 UNIT of max(1, |log(x)|), from the double nearest to it, and exp of minus that."""
     p, p_low = multiply(x, x_low, e, e_low)
     rest = (p - 1.0) + p_low
     return fast_sum(guess, rest - 0.5 * rest * rest)
 
 
 @Inlined
-def arc_tangent(x, x_low):  # type: ignore[no-untyped-def]
-    """Return the arc tangent within 2 UNIT of one: that in doubles, corrected by a sine and a cosine."""
-    guess = atan(x)
-    s, s_low, c, c_low = sine_and_cosine(guess, 0.0)
-    p, p_low = multiply(x, x_low, c, c_low)
-    rest, rest_low = add(p, p_low, -s, -s_low)
-    return fast_sum(guess, (rest + rest_low) / (c + x * s))
+def improved_arc_tangent(x, x_low, guess, sine, cosine):  # type: ignore[no-untyped-def]
+    """Return the arc tangent within 2 UNIT of one, from the double nearest to it with its sine and cosine."""
+    p, p_low = multiply(x, x_low, cosine[0], cosine[1])
+    rest, rest_low = add(p, p_low, -sine[0], -sine[1])
+    return fast_sum(guess, (rest + rest_low) / (cosine[0] + x * sine[0]))

@@ -12,13 +12,15 @@ from llvmlite import ir
 from numba import carray, types
 from numba.extending import intrinsic
 
+from gqm_sym.runtime.arithmetic.elementary import atan
 from gqm_sym.runtime.compiled.jit import COMPILER, Inner, Later
+from gqm_sym.runtime.compiled.registers import on_stack
 from gqm_sym.runtime.double_double.arithmetic import (
     UNIT,
     add,
-    arc_tangent,
     divide,
     exponential,
+    improved_arc_tangent,
     improved_logarithm,
     multiply,
     sine_and_cosine,
@@ -31,6 +33,9 @@ LOW, ERROR, ROW = BLOCK, 2 * BLOCK, 3 * BLOCK
 
 # Operations. SINE_COSINE fills its register with the sine, and the next one with the cosine.
 ADD, SUBTRACT, MULTIPLY, DIVIDE, SQUARE_ROOT, SINE_COSINE, EXPONENTIAL, LOGARITHM, ARC_TANGENT, ABSOLUTE = range(10)
+
+
+stacked_scratch = on_stack(2 * ROW)
 
 
 @Inner
@@ -84,20 +89,26 @@ def fill_exponentials(n, a, out):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def fill_logarithms(n, a, out):  # type: ignore[no-untyped-def]
-    """Fill a register with logarithms."""
+def fill_logarithms(n, a, out, powers):  # type: ignore[no-untyped-def]
+    """Fill a register with logarithms, and another one with the inverses of their exponentials."""
     for i in range(n):
-        out[ERROR + i] = log(a[i])
+        guess = log(a[i])
+        out[i], out[LOW + i], out[ERROR + i] = -guess, 0.0, 0.0
+    fill_exponentials(n, out, powers)
     for i in range(n):
-        out[i], out[LOW + i] = improved_logarithm(a[i], a[LOW + i], out[ERROR + i])
+        out[i], out[LOW + i] = improved_logarithm(a[i], a[LOW + i], -out[i], powers[i], powers[LOW + i])
         out[ERROR + i] = a[ERROR + i] / a[i] + 2.0 * UNIT * max(1.0, fabs(out[i]))
 
 
 @Inner
-def fill_arc_tangents(n, a, out):  # type: ignore[no-untyped-def]
-    """Fill a register with arc tangents."""
+def fill_arc_tangents(n, a, out, sines, cosines):  # type: ignore[no-untyped-def]
+    """Fill a register with arc tangents, and two others with their sines and cosines."""
     for i in range(n):
-        out[i], out[LOW + i] = arc_tangent(a[i], a[LOW + i])
+        out[i], out[LOW + i], out[ERROR + i] = atan(a[i]), 0.0, 0.0
+    fill_sines(n, out, sines, cosines)
+    for i in range(n):
+        sine, cosine = (sines[i], sines[LOW + i]), (cosines[i], cosines[LOW + i])
+        out[i], out[LOW + i] = improved_arc_tangent(a[i], a[LOW + i], out[i], sine, cosine)
         out[ERROR + i] = a[ERROR + i] / (1.0 + a[i] * a[i]) + 2.0 * UNIT
 
 
@@ -121,7 +132,7 @@ def evaluate(operations, first, last, work, n):  # type: ignore[no-untyped-def]
     n : int
         Places, at most BLOCK.
     """
-    rows = carray(operations, (last, 4))
+    rows, scratch = carray(operations, (last, 4)), stacked_scratch()
     for k in range(first, last):
         operation, at, left, right = rows[k, 0], rows[k, 1], rows[k, 2], rows[k, 3]
         results = 2 if operation == SINE_COSINE else 1
@@ -140,9 +151,9 @@ def evaluate(operations, first, last, work, n):  # type: ignore[no-untyped-def]
         elif operation == EXPONENTIAL:
             fill_exponentials(n, a, out)
         elif operation == LOGARITHM:
-            fill_logarithms(n, a, out)
+            fill_logarithms(n, a, out, scratch[:ROW])
         elif operation == ARC_TANGENT:
-            fill_arc_tangents(n, a, out)
+            fill_arc_tangents(n, a, out, scratch[:ROW], scratch[ROW:])
         else:
             fill_absolute_values(n, a, out)
 

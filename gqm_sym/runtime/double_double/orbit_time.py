@@ -11,15 +11,15 @@ import numpy as np
 from numba import types
 
 from gqm_sym.literals.numbers import Number
-from gqm_sym.runtime.arithmetic.elementary import QUARTER
+from gqm_sym.runtime.arithmetic.elementary import QUARTER, atan
 from gqm_sym.runtime.compiled.jit import Inner, entry
 from gqm_sym.runtime.compiled.registers import on_stack, uncounted
 from gqm_sym.runtime.compiled.types import INTEGER, MATRIX, REAL, VECTOR, Array
 from gqm_sym.runtime.double_double.arithmetic import (
     UNIT,
     add,
-    arc_tangent,
     divide,
+    improved_arc_tangent,
     multiply,
     sine_and_cosine,
     square_root,
@@ -47,8 +47,10 @@ MAX_ERROR = 1e-17
 # the orbit's width at most.
 NEWTON_STEPS, MAX_STEP = 2, 1e-6
 
-OPERATIONS = types.int64[:, ::1]
+# Types of what compiled functions take: a tape behind the interpreter's address, a number with its error, and an orbit.
+TAPE = types.Tuple((INTEGER, types.int64[:, ::1], types.UniTuple(INTEGER, 3), types.UniTuple(INTEGER, 6)))
 BOUNDED = types.UniTuple(REAL, 3)
+LEVEL_AND_INTERVAL = types.Tuple((BOUNDED, types.UniTuple(REAL, 2), types.UniTuple(REAL, 2)))
 
 stacked_sums = on_stack(ROW)
 NO_TIMES = np.empty((3, 0))
@@ -272,17 +274,43 @@ def launch_angle(integrand, launch):  # type: ignore[no-untyped-def]
     ahead, ahead_low = add(width[0], width[1], -behind, -behind_low)
     ratio, ratio_low = divide(behind, behind_low, ahead, ahead_low)
     root, root_low = square_root(ratio, ratio_low)
-    half, half_low = arc_tangent(root, root_low)
+    guess = atan(root)
+    s, s_low, c, c_low = sine_and_cosine(guess, 0.0)
+    half, half_low = improved_arc_tangent(root, root_low, guess, (s, s_low), (c, c_low))
     return 2.0 * half, 2.0 * half_low
 
 
-@Inner
-def fill_times(integrand, kind, launch, rule, times):  # type: ignore[no-untyped-def]
-    """Fill the times at phase angles, and in the first column that at the launch (`orbit_time`)."""
+@entry(
+    types.void(TAPE, VECTOR, MATRIX, types.UniTuple(REAL, 4), INTEGER, LEVEL_AND_INTERVAL, MATRIX, MATRIX),
+    checked=False,
+)
+def fill_times(tape, work, p, launch, kind, orbit, rule, times):  # type: ignore[no-untyped-def]
+    """Fill the times at phase angles of an orbit.
+
+    Parameters
+    ----------
+    tape, work, p, launch
+        As for `orbit_time`.
+    kind : int
+        LIBRATION or CIRCULATION.
+    orbit : (level, start, width)
+        As in `Integrand`, from `orbit_time`.
+    rule : (4, n) array
+        The nodes of panels (`nodes.legendre_rule`).
+    times : (3, n) array
+        The first row has phase angles, in ascending order from the second on. The others are filled with the time from
+        the lower turning point, or from the launch of a lap, as two doubles. The first column is that of the launch,
+        whose angle is computed unless zero is given.
+    """
+    work, p, rule, times = uncounted(work), uncounted(p), uncounted(rule), uncounted(times)
+    address, operations, parts, registers = tape
+    tape = (address, uncounted(operations), parts, registers)
+    fill_parameters(tape, p, work)
+    integrand = Integrand(tape, work, *orbit)
     zero, at, high, low = (0.0, 0.0), (0.0, 0.0), 0.0, 0.0
+    times[1, 0], times[2, 0] = 0.0, 0.0
     if times[0, 0] != 0.0:
         angle = launch_angle(integrand, launch)
-        times[0, 0] = angle[0]
         times[1, 0], times[2, 0] = time_between(integrand, kind, zero, angle, rule)
     for k in range(1, times.shape[1]):
         angle = (times[0, k], 0.0)
@@ -292,14 +320,13 @@ def fill_times(integrand, kind, launch, rule, times):  # type: ignore[no-untyped
 
 
 @entry(
-    types.UniTuple(BOUNDED, 3)(
-        *(types.Tuple((INTEGER, OPERATIONS, types.UniTuple(INTEGER, 3), types.UniTuple(INTEGER, 6))), VECTOR, MATRIX),
-        *(types.UniTuple(REAL, 4), types.UniTuple(REAL, 2), INTEGER, types.UniTuple(MATRIX, 2), MATRIX),
+    types.Tuple((BOUNDED, BOUNDED, BOUNDED, LEVEL_AND_INTERVAL))(
+        TAPE, VECTOR, MATRIX, types.UniTuple(REAL, 4), types.UniTuple(REAL, 2), INTEGER, MATRIX
     ),
     checked=False,
 )
-def orbit_time(tape, work, p, launch, offsets, direction, rules, times):  # type: ignore[no-untyped-def]
-    """Return the duration and the turning points of an orbit, NaN where they are not found, and fill times on the way.
+def orbit_time(tape, work, p, launch, offsets, direction, nodes):  # type: ignore[no-untyped-def]
+    """Return the duration and the turning points of an orbit, NaN where they are not found.
 
     Parameters
     ----------
@@ -315,39 +342,29 @@ def orbit_time(tape, work, p, launch, offsets, direction, rules, times):  # type
         How far the lower and the upper turning point are from the launch, approximately.
     direction : int
         0 for a libration, else the sign of ds/dt on a lap.
-    rules : (array, array)
-        The nodes of the trapezoidal rule (`nodes.trapezoidal_nodes`) and of panels (`nodes.legendre_rule`).
-    times : (3, n) array
-        The first row has phase angles, in ascending order from the second on. The others are filled with the time from
-        the lower turning point, or from the launch of a lap, as two doubles. The first column is that of the launch,
-        whose angle is computed unless zero is given.
+    nodes : (4, n) array
+        The nodes of the trapezoidal rule (`nodes.trapezoidal_nodes`).
 
     Returns
     -------
     duration, low, high : (high, low, error)
         Half period or lap time, and both turning points, as two doubles each with a bound on the error.
+    orbit : (level, start, width)
+        What `fill_times` needs of the orbit.
     """
-    work, p, nodes, rule, times = (
-        uncounted(work),
-        uncounted(p),
-        uncounted(rules[0]),
-        uncounted(rules[1]),
-        uncounted(times),
-    )
+    work, p, nodes = uncounted(work), uncounted(p), uncounted(nodes)
     address, operations, parts, registers = tape
     operations = uncounted(operations)
     tape = (address, operations, parts, registers)
     fill_parameters(tape, p, work)
     _, place, _, _, _, period = registers
     if direction == 0:
-        kind = LIBRATION
         level, errors = find_turns(tape, work, launch, offsets)
         start, end = (work[place], work[place + LOW]), (work[place + 1], work[place + LOW + 1])
         width = add(end[0], end[1], -start[0], -start[1])
         ends = mean_at_ends(work, registers, width)
         scale = multiply(width[0], width[1], 2.0 * QUARTER[0], 2.0 * QUARTER[1])
     else:
-        kind = CIRCULATION
         for i in range(ENDS):
             at = place + i
             work[at], work[at + LOW], work[at + ERROR] = launch[0], launch[1], 0.25 * UNIT * fabs(launch[0])
@@ -355,14 +372,11 @@ def orbit_time(tape, work, p, launch, offsets, direction, rules, times):  # type
         level, errors, ends = energy_level(work, registers, launch, 2), (0.0, 0.0), (0.0, 0.0, 0.0)
         start, end, scale = (launch[0], launch[1]), (launch[0], launch[1]), (work[period], work[period + LOW])
         width = (direction * scale[0], direction * scale[1])
-    integrand = Integrand(tape, work, level, start, width)
-    mean = mean_by_trapezoid(integrand, nodes, ends)
-    if times.shape[1] > 0:
-        fill_times(integrand, kind, launch, rule, times)
+    mean = mean_by_trapezoid(Integrand(tape, work, level, start, width), nodes, ends)
     high, low = multiply(mean[0], mean[1], scale[0], scale[1])
     duration = (high, low, scale[0] * mean[2] + 4.0 * UNIT * high)
     low_error, high_error = errors[0] + UNIT * fabs(start[0]), errors[1] + UNIT * fabs(end[0])
-    return duration, (start[0], start[1], low_error), (end[0], end[1], high_error)
+    return duration, (start[0], start[1], low_error), (end[0], end[1], high_error), (level, start, width)
 
 
 class Orbit(NamedTuple):
@@ -401,15 +415,18 @@ def time_orbit(
     offsets : (float, float)
         The distances of the lower and the upper turning point from the launch, as doubles know them.
     times : (3, n) array
-        Phase angles, and room for the times there (`orbit_time`).
+        Phase angles, and room for the times there (`fill_times`).
     """
     lam0, v0 = launch
-    rules = trapezoidal_nodes(CIRCULATION if direction else LIBRATION), panel_rule() if times.size else times
-    numbers = (lam0.value, lam0.low, v0.value, v0.low)
     tape, work, p = formulas
-    found = orbit_time(
-        (INTERPRETER.address, *tape), work, p, numbers, (-offsets[0], offsets[1]), direction, rules, times
-    )
+    kind = CIRCULATION if direction else LIBRATION
+    given = (INTERPRETER.address, *tape), work, p, (lam0.value, lam0.low, v0.value, v0.low)
+    *found, orbit = orbit_time(*given, (-offsets[0], offsets[1]), direction, trapezoidal_nodes(kind))
     duration, low, high = map(Bounded._make, found)
-    is_known = duration.error <= MAX_ERROR * duration.high and not np.isnan(times).any()
-    return Orbit(duration, low, high) if is_known else None
+    if not duration.error <= MAX_ERROR * duration.high:
+        return None
+    if times.size:
+        fill_times(*given, kind, orbit, panel_rule(), times)
+        if np.isnan(times).any():
+            return None
+    return Orbit(duration, low, high)

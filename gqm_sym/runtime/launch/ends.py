@@ -16,7 +16,8 @@ from gqm_sym.runtime.compiled.types import ADDRESSES, REAL, VECTOR
 from gqm_sym.runtime.launch import zeros
 from gqm_sym.runtime.launch.kinds import EndKind
 from gqm_sym.runtime.launch.problem import Problem
-from gqm_sym.runtime.launch.speed import path_and_force_at
+from gqm_sym.runtime.launch.rounded import ZERO_SHARE
+from gqm_sym.runtime.launch.speed import path_and_force_at, potential_at, speed_squared_at
 from gqm_sym.runtime.launch.zeros import CRITICAL, LIMIT, TURN, FoundEnd, SearchArrays, first_zero, speed_squared
 from gqm_sym.runtime.multiprecision.exact_panels import DIGITS
 from gqm_sym.runtime.multiprecision.exact_problem import End
@@ -38,6 +39,9 @@ NEAR_AXIS, MAX_AXIS_STEP_SHARE = 1e-6, 0.9
 
 # ds at an end of the domain, as a share of its value at the launch, up to which the end is a cusp.
 CUSP_SHARE = 1e-7
+
+# V**2 at an end of the domain above which it is no turning point, as a share of the size of its terms.
+LIP_SHARE = 1e-12
 
 # Distance from a place at which ds is compared with that at the place itself, to tell whether it is a cusp; as a share
 # of the first step.
@@ -244,12 +248,34 @@ def end_of_motion(problem: Problem, direction: int, found: tuple[int, float, flo
     if what == zeros.TURN:
         return EndOfMotion("turn", lam0 + near, offset=near)
     if what == zeros.LIMIT:
-        return EndOfMotion("closed", lam0 + direction * period) if period else domain_end(problem, direction)
+        return EndOfMotion("closed", lam0 + direction * period) if period else _end_of_curve(problem, direction)
     if what == zeros.CUSP:
         return EndOfMotion("cusp", lam0 + far)
     if what == zeros.STEPS_SPENT:
         return EndOfMotion("open", direction * inf)
     return EndOfMotion("open", lam0 + far)  # a pole: the time to it is computed segment by segment
+
+
+def _end_of_curve(problem: Problem, direction: int) -> EndOfMotion:
+    """The end of the domain, or a turning point if V**2 vanishes there: a body released at one lip of a half pipe.
+
+    The ends of a chart are known to a rounding only; V**2 counts as zero there if it is zero within that.
+    """
+    end, exact, f, lam0 = domain_end(problem, direction), problem.functions.exact, problem.functions, problem.lam0
+    if end.what != "domain-end":
+        return end
+    places = np.array([lam0, end.place])
+    v2 = speed_squared_at(f.addresses, f.p, lam0, problem.launch.lam0.low, problem.w0, places[1:], places[1:] - lam0)[0]
+    size = problem.w0 + 2.0 * float(np.abs(potential_at(f.addresses, f.p, places)[0]).sum())
+    if v2 > LIP_SHARE * size:
+        return end
+    if exact is None or problem.formulas.domain_of is None:
+        stops = abs(v2) <= ZERO_SHARE * size
+    else:
+        scale = exact.at(DIGITS)
+        ends = problem.formulas.domain_of(scale.context, tuple(number.at(scale.context) for number in problem.p))
+        stops = scale.speed_squared(ends[1 if direction > 0 else 0]) <= scale.mpf(10) ** (-DIGITS // 2) * scale.size
+    return EndOfMotion("turn", end.place, offset=end.place - lam0) if stops else end
 
 
 def _decided_end(problem: Problem, end: End) -> EndOfMotion:

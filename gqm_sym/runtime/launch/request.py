@@ -16,6 +16,12 @@ MAX_POINT_DISTANCE_SHARE = 1e-6
 ONLY_SIGN = {"bilateral": 0, "above": 1, "below": -1}
 CONTACTS = tuple(ONLY_SIGN)
 
+# The largest speed in m/s whose square is in the range of doubles with room for what it is multiplied by.
+MAX_SPEED = 1e150
+
+# The largest launch place on a closed curve, in laps: beyond, doubles know places to a thousandth of a lap or worse.
+MAX_LAPS = 2.0**43
+
 
 class LaunchRequest(NamedTuple):
     """A launch, or arrays of launches, as given to a module's ``solve`` and ``sweep``.
@@ -79,7 +85,7 @@ def read_launch(formulas: Formulas, p: ParameterValues, request: LaunchRequest) 
         place, at = read_number(lam0, where="lam0", unit=unit), None
     else:
         place, at = _read_place(formulas, p, lam0, point)
-    if direction not in (1, -1):
+    if isinstance(direction, np.ndarray | list | tuple) or direction not in (1, -1):
         raise LaunchError(f"direction: must be 1 or -1 (the sign of ds/dt at launch), got {direction!r}")
     if contact not in CONTACTS:
         raise LaunchError(f"contact: must be one of {', '.join(CONTACTS)}, got {contact!r}")
@@ -88,6 +94,8 @@ def read_launch(formulas: Formulas, p: ParameterValues, request: LaunchRequest) 
         raise LaunchError(
             f"v0: is a speed and cannot be negative, got {speed.text}; use direction=-1 to launch the other way"
         )
+    if speed.value > MAX_SPEED:
+        raise LaunchError(f"v0: must be at most {MAX_SPEED:g} m/s, for its square is computed with, got {speed.text}")
     horizon = None if t_max is None else read_number(t_max, where="t_max", unit="s")
     if horizon is not None and not horizon.value > 0.0:
         raise LaunchError(f"t_max: must be positive, got {horizon.text}")
@@ -95,6 +103,11 @@ def read_launch(formulas: Formulas, p: ParameterValues, request: LaunchRequest) 
     if not domain.low <= place.value <= domain.high:
         ends = f"[{domain.low!r}, {domain.high!r}]"
         raise LaunchError(f"lam0: must lie in the domain {ends} of {formulas.parameter}, got {place.text}")
+    if domain.period and abs(place.value) > MAX_LAPS * domain.period:
+        raise LaunchError(
+            f"lam0: {place.text} is so many laps away that doubles cannot tell places there; the curve repeats after "
+            f"{domain.period!r}"
+        )
     return Launch(place, speed, int(direction), contact, horizon, at)
 
 

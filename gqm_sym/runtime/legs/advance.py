@@ -64,6 +64,7 @@ from gqm_sym.runtime.legs.leg_run import (
     LIFTOFF,
     LIMIT,
     NARROWED,
+    PANELS_PER_RUN,
     PAUSED,
     SPENT,
     TURN,
@@ -88,8 +89,12 @@ FIRST_PANEL_SHARE = 0.25
 LAPS_AHEAD = 8
 
 # The first panel of a body released near an equilibrium in units of the distance to it, and how often the step to it is
-# halved at most.
-FIRST_STEPS, MAX_HALVINGS = 8.0, 1000
+# halved at most; over such a distance the force grows by this factor at most.
+FIRST_STEPS, MAX_HALVINGS, MAX_FORCE_GROWTH = 8.0, 1000, 4.0
+
+# The length of a panel, as a share of the first step of a search, at which a body that pauses creeps towards an
+# equilibrium that it never reaches.
+CREEPING_SHARE = 1e-6
 
 # V**2 of a body at rest, for laws that take its root.
 LEAST_V2 = 1e-300
@@ -159,9 +164,9 @@ def leaving(dissipation, p, joints, body, place, preferred):  # type: ignore[no-
 
 @Inner
 def near_start(dissipation, p, place, direction, step):  # type: ignore[no-untyped-def]
-    """A distance over which the force on a body released at a place keeps its sign, where ``step`` is too long.
+    """A distance over which the force on a body released at a place is about the same, where ``step`` is too long.
 
-    Next to an equilibrium a body turns after a distance that no other length of the curve tells of.
+    Next to an equilibrium a body turns, or moves on, by a distance that no other length of the curve tells of.
     """
     v, point = int(direction), point_buffer()
     forces = Forces(dissipation.speed_equation, p, dissipation.friction, False, dissipation.linear, v)
@@ -169,7 +174,7 @@ def near_start(dissipation, p, place, direction, step):  # type: ignore[no-untyp
     slope = slope_of_v2(forces, place, LEAST_V2, contact_sign, point)
     for _ in range(MAX_HALVINGS):
         ahead = slope_of_v2(forces, place + v * step, LEAST_V2, contact_sign, point)
-        if ahead > 0.0 or not slope > 0.0 or step <= CLEARANCE_SHARE * fabs(place):
+        if 0.0 < ahead <= MAX_FORCE_GROWTH * slope or not slope > 0.0 or step <= CLEARANCE_SHARE * fabs(place):
             break
         step *= 0.5
     return FIRST_STEPS * step
@@ -290,7 +295,9 @@ def advance(dissipation, p, joints, body, record):  # type: ignore[no-untyped-de
     if what == TURN:
         what = RESTS if after_turn(dissipation, p, joints, body, found, record) else TURN
     else:
-        endless = what == PAUSED and period == 0.0 and not isfinite(body[HIGH] if body[DIRECTION] > 0.0 else body[LOW])
+        is_open = period == 0.0 and not isfinite(body[HIGH] if body[DIRECTION] > 0.0 else body[LOW])
+        creeps = record[AHEAD] >= PANELS_PER_RUN and found.step <= CREEPING_SHARE * body[FIRST_STEP]
+        endless = what == PAUSED and (is_open or creeps)
         body[PAUSES] = body[PAUSES] + 1.0 if endless else 0.0
     body[PLACE], body[PLACE_LOW], body[V2], body[DIRECTION] = place, record[END_LOW], found.v2, found.direction
     body[CONTACT_SIGN], body[STEP] = found.contact_sign, found.step

@@ -27,7 +27,7 @@ REACH                 on a curve without ends, the distance after which a run pa
 ELAPSED, ELAPSED_LOW  the time from launch, as two doubles
 LEG_TIME              the time since the last turn
 LAST_LEG, LEG_BEFORE  the times of the last leg from turn to turn, and of the one before it; 0 if there was none
-TURNS, PAUSES         how often the body has turned, and how many runs in a row have paused since
+TURNS, PAUSES         how often the body has turned, and how many runs without an end have paused since
 MAY_REST              whether the body could stay at its last turn, were the curve less steep; 1 before the first turn
 FROM_REST             1 if the launch was from rest
 ENDING                the code of what has ended the motion (`advance`), or 0

@@ -235,9 +235,13 @@ class AperiodicMotion(Motion):
             return
         begin, length = abs(end.place - lam0), abs(target - lam0)
         found = first_zero_from(f.addresses, f.p, lam0, problem.w0, end.direction, begin, length, end.step)
-        (what, near, _), _ = search_beyond_barriers(problem, end.direction, found, length, end.step)
+        (what, near, far), _ = search_beyond_barriers(problem, end.direction, found, length, end.step)
         if what == zeros.STEPS_SPENT and abs(near) > begin:
             target = lam0 + near  # as far as one search goes; the next one begins there
+        elif what == zeros.CUSP:
+            self.add(through(f, end.place, lam0 + far, lam0, problem.w0), 1, "cusp")
+            self.open_end = None
+            return
         elif what != zeros.LIMIT:
             self._stop_following(f"the motion beyond {name} = {lam0 + near!r} could not be followed")
             return

@@ -20,7 +20,7 @@ from gqm_sym.runtime.launch.functions import BoundFunctions
 from gqm_sym.runtime.launch.kinds import MotionKind
 from gqm_sym.runtime.launch.problem import Problem, bind
 from gqm_sym.runtime.launch.request import Launch
-from gqm_sym.runtime.launch.speed import path_and_force_at, speed_squared_at
+from gqm_sym.runtime.launch.speed import path_and_force_at, potential_at, speed_squared_at
 from gqm_sym.runtime.launch.survey import survey
 from gqm_sym.runtime.motion.aperiodic import AperiodicMotion, MotionAtRest, OpenEnd
 from gqm_sym.runtime.motion.motion import Motion
@@ -32,6 +32,9 @@ from gqm_sym.runtime.quadrature.time_panels import MIN_CANCELLATION_RATIO
 
 # Distance from a cusp or a corner, as a share of the first step, at which V**2 is evaluated and a search begins.
 NEAR_CUSP = 1e-6
+
+# The lesser of two distances from a cusp, as a share of the first step, at which the tangential force is compared.
+FORCE_SHARE = 1e-4
 
 
 def solve(formulas: Formulas, p: ParameterValues, launch: Launch) -> Motion:
@@ -144,7 +147,7 @@ def _from_cusp(problem: Problem) -> Motion:
     """A motion that begins at a cusp: it goes into the domain, and downhill if the body is released there."""
     f, lam0, w0 = problem.functions, problem.lam0, problem.w0
     begin, directions = _directions_from_cusp(problem)
-    if not directions:
+    if not directions or (w0 == 0.0 and _is_level_cusp(problem)):
         return MotionAtRest(problem)
     direction = directions[0] if w0 == 0.0 else problem.launch.direction
     if direction not in directions:
@@ -170,6 +173,19 @@ def _from_cusp(problem: Problem) -> Motion:
     motion.add(segment, sense, "turn")
     motion.add(segment, -sense, "cusp")
     return motion.finish()
+
+
+def _is_level_cusp(problem: Problem) -> bool:
+    """Whether the tangential force vanishes at the cusp at which the body is at rest, so that it stays.
+
+    Where the tangent of a cusp is level, the force decreases to zero with the distance; elsewhere it tends to a limit.
+    """
+    f, step = problem.functions, starting_step(problem)
+    places = problem.lam0 + step * np.array([[FORCE_SHARE, -FORCE_SHARE], [10.0 * FORCE_SHARE, -10.0 * FORCE_SHARE]])
+    slopes = potential_at(f.addresses, f.p, places.ravel())[1]
+    ds = path_and_force_at(f.addresses, f.p, places.ravel(), np.zeros(4))[2]
+    nearer, farther = np.abs(slopes / ds).reshape(2, 2)
+    return not np.any(nearer > 0.5 * farther)
 
 
 def _directions_from_cusp(problem: Problem) -> tuple[float, list[int]]:

@@ -3,14 +3,16 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from math import sqrt
 
 import numpy as np
 
-from gqm_sym.runtime.arithmetic.doubledouble import Pair, minus, plus
+from gqm_sym.runtime.arithmetic.doubledouble import ZERO, Pair, minus, plus
 from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.launch.speed import path_and_force_at
 from gqm_sym.runtime.motion.segment import Segment
 from gqm_sym.runtime.motion.trajectory import TimedSegment, Trajectory
+from gqm_sym.runtime.quadrature.substitution import REGULAR
 
 # Places on each panel at which the sign of the contact force is sampled; its changes are then located by bisection.
 SAMPLES_PER_PANEL = 24
@@ -22,6 +24,10 @@ ROUNDING_SHARE = 4e-15
 # The same as a share of the median of these terms on a segment: where the curvature and the load both vanish, N is the
 # rounding of both.
 MEDIAN_ROUNDING_SHARE = 2e-14
+
+# A change of sign this close to a singular point, as a share of the segment, is the rounding of a curvature that has no
+# value there.
+SINGULAR_SHARE = 1e-8
 
 # A change of sign this close to the launch, as a share of the segment, is at the launch itself.
 LAUNCH_SHARE = 1e-14
@@ -97,13 +103,25 @@ def contact_signs(segment: Segment, phi: Array) -> Array:
     return signs
 
 
-def contact_changes(segment: Segment) -> Array:
-    """The phase angles of a segment at which N changes sign, in ascending order."""
-    return sign_changes(
+def contact_changes(timed: TimedSegment) -> Array:
+    """The phase angles of a timed segment at which N changes sign, in ascending order."""
+    segment = timed.segment
+    changes = sign_changes(
         segment,
         lambda phi: contact_signs(segment, phi),
         lambda phi: np.sign(contact_force(segment, phi)),
     )
+    if timed.end == "singular-point":
+        changes = changes[np.abs(changes - timed.phi_stop) > SINGULAR_SHARE * segment.stop]
+    if timed.t_start == ZERO:
+        changes = changes[np.abs(changes - timed.phi_start) > _launch_share(timed) * segment.stop]
+    return changes
+
+
+def _launch_share(timed: TimedSegment) -> float:
+    """The distance in phase angle from the launch that is the launch itself, as a share of the segment."""
+    at_turn = timed.segment.kind != REGULAR and timed.phi_start in (0.0, timed.segment.stop)
+    return sqrt(LAUNCH_SHARE) if at_turn else LAUNCH_SHARE
 
 
 def sign_changes(segment: Segment, signs: Callable[[Array], Array], narrowing: Callable[[Array], Array]) -> Array:
@@ -170,19 +188,24 @@ def passages(segments: Sequence[TimedSegment], trajectory: Trajectory, lam: floa
         if phi[0] > segment.edges[-1]:
             continue
         out += [when[0] + when[1] for when, _ in crossings(timed, phi, trajectory.time_scale_error)]
-        if phi[0] in (0.0, segment.edges[-1]) and timed.r_stop[0] in (0.0, segment.duration):
-            at_stop = segment.a if timed.sense < 0 else segment.b
-            if lam_in_lap == at_stop:
-                out.append(timed.t_stop[0])
+        if phi[0] in (0.0, segment.edges[-1]) and phi[0] == timed.phi_stop:
+            out.append(timed.t_stop[0])
     return out
 
 
 def corner_crossings(timed: TimedSegment, time_scale_error: float) -> list[tuple[Pair, float]]:
-    """The times at which a timed segment passes corners of the curve, each with its phase angle."""
-    segment = timed.segment
-    places = segment.functions.between(segment.functions.corners, segment.a, segment.b)
+    """The times at which a timed segment passes corners of the curve, each with its phase angle.
+
+    With losses segments end at corners, and the body passes to the next.
+    """
+    segment, f = timed.segment, timed.segment.functions
+    places = f.between(f.corners, segment.a, segment.b)
     phi = np.array([segment.phase_angle_of(*segment.offsets(place)) for place in places])
-    return crossings(timed, phi, time_scale_error)
+    found = crossings(timed, phi, time_scale_error)
+    stop = segment.b if timed.phi_stop > timed.phi_start else segment.a
+    if timed.end == "" and f.between(f.corners, *np.nextafter(stop, (-np.inf, np.inf)).tolist()).size:
+        found.append((timed.t_stop, timed.phi_stop))
+    return found
 
 
 def liftoff(timed: TimedSegment, side: int, *, first: bool) -> tuple[Pair, float] | None:
@@ -197,14 +220,16 @@ def liftoff(timed: TimedSegment, side: int, *, first: bool) -> tuple[Pair, float
     first : bool
         Whether the motion begins with this segment; contact may then be lost at launch.
     """
-    changes = contact_changes(timed.segment)
+    changes = contact_changes(timed)
     crossed = crossings(timed, changes, 0.0)
     if first:
-        start, stop = timed.phi_start, timed.phi_stop
-        crossed = [(when, phi) for when, phi in crossed if abs(phi - start) > LAUNCH_SHARE * timed.segment.stop]
+        start, stop, share = timed.phi_start, timed.phi_stop, _launch_share(timed)
+        crossed = [(when, phi) for when, phi in crossed if abs(phi - start) > share * timed.segment.stop]
         ahead = crossed[0][1] if crossed else stop
         # N may vanish at the launch itself; its sign half-way to the first change then decides.
-        here, then = contact_signs(timed.segment, np.array([start, 0.5 * (start + ahead)])) * side
+        # At a cusp it is infinity times zero, so that places a little ahead are looked at.
+        near = start + share * (stop - start)
+        here, then = contact_signs(timed.segment, np.array([near, 0.5 * (start + ahead)])) * side
         if (here or then) < 0.0:
             return timed.r_start, timed.phi_start
     if not crossed:

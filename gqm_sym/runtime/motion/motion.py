@@ -375,10 +375,12 @@ class Motion(ABC):
         time_scale_error, lap = self._trajectory(0.0).time_scale_error, self._trajectory(0.0).lap
         for timed in self._history():
             corners = corner_crossings(timed, time_scale_error)
+            last = "corner" if corners and corners[-1][1] == timed.phi_stop else timed.end
+            corners = corners[:-1] if last != timed.end else corners
             marks = [(timed.t_start, timed.phi_start), *corners, (timed.t_stop, timed.phi_stop)]
             lam = self._places_at(timed, marks) + timed.laps * lap
             for k, ((start, _), (stop, _)) in enumerate(pairwise(marks)):
-                end = timed.end if k == len(marks) - 2 else "corner"
+                end = last if k == len(marks) - 2 else "corner"
                 legs.append(Leg(float(lam[k]), float(lam[k + 1]), start[0], stop[0], timed.direction, end))
             if timed.end == "asymptote":
                 legs[-1] = replace(legs[-1], lam_end=timed.segment.b + timed.laps * lap, t_end=inf)
@@ -533,7 +535,7 @@ class Motion(ABC):
 
     def _contact_changes(self, timed: TimedSegment) -> list[tuple[Pair, float]]:
         """The times at which N changes sign on a timed segment, each with its phase angle."""
-        return crossings(timed, contact_changes(timed.segment), self._trajectory(0.0).time_scale_error)
+        return crossings(timed, contact_changes(timed), self._trajectory(0.0).time_scale_error)
 
     def _asymptote(self, timed: TimedSegment) -> Event:
         """The approach to an equilibrium, which the body reaches after infinite time."""

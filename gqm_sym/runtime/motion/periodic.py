@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from gqm_sym.errors import SolutionError
+from gqm_sym.errors import InputError, SolutionError
 from gqm_sym.literals.numbers import read_number
 from gqm_sym.runtime.arithmetic.doubledouble import ULP, ZERO
 from gqm_sym.runtime.compiled.types import Array
@@ -31,6 +31,9 @@ MAX_TURN_ROUNDING = 1e-14
 # The largest relative change of a period by the rounding of a chart. It is largest at flat minima of the potential and
 # on splines (14 roundings were measured).
 CHART_ROUNDING = 16 * ULP
+
+# The most events that `events_between` lists.
+MAX_EVENTS = 1_000_000
 
 # The most pieces of a chart on a segment whose times are computed in extended precision without being asked for.
 MAX_CHART_PIECES = 250
@@ -69,6 +72,7 @@ class PeriodicMotion(Motion):
         self._double_trajectory: Trajectory | None = None
         self._precise_trajectory: Trajectory | None = None
         self._exact_timing: timing.Timing | None = None
+        self._is_period_known = False  # to more digits than doubles hold
         self._sampler: Sampler | None = None
 
     @property
@@ -101,7 +105,7 @@ class PeriodicMotion(Motion):
         """The times with as many digits as a phase needs at ``end_time`` in s from launch."""
         if not self._has_multiprecision:
             return timing.in_doubles(self.kind, self._segment, self._offsets)
-        launch = self.problem, self.kind, self.direction
+        launch, self._is_period_known = (self.problem, self.kind, self.direction), True
         if self._exact_timing is None:
             self._exact_timing = timing.in_double_double(*launch, self._segment, self._offsets)
         if self._exact_timing is None or end_time > self._exact_timing.max_time:
@@ -112,7 +116,7 @@ class PeriodicMotion(Motion):
     @property
     def _duration(self) -> float:
         """Half period or loop time in s, the double nearest to the exact one."""
-        orbit = self._orbit
+        orbit, self._is_period_known = self._orbit, True
         if orbit is not None and orbit.duration.is_decided:
             return orbit.duration.high
         return self._timing(inf).duration[0]
@@ -148,12 +152,13 @@ class PeriodicMotion(Motion):
         return timing.period_to(self.problem, self.kind, self.direction, self._segment, digits)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """As `Motion`, with whether its period is known as two doubles: the last digit of a place depends on it."""
-        return *super().__reduce__(), self._exact_timing is not None
+        """As `Motion`, with how exactly its period is known: the last digit of a place depends on it."""
+        known_until = self._exact_timing.max_time if self._exact_timing is not None else 0.0
+        end_time = None if not self._is_period_known else inf if known_until == inf else 0.0
+        return *super().__reduce__(), end_time
 
-    def __setstate__(self, has_exact_timing: bool) -> None:
-        if has_exact_timing:
-            _ = self._timing
+    def __setstate__(self, end_time: float) -> None:
+        self._timing(end_time)
 
     def lam(self, t: Any) -> Any:
         """The curve parameter at times; see `Motion.lam`. For doubles this is one call of compiled code."""
@@ -210,8 +215,9 @@ class PeriodicMotion(Motion):
 
     def _trajectory(self, end_time: float) -> Trajectory:
         one_period_time = self._segment.duration * (2.0 if self.kind == "libration" else 1.0)
-        is_known = self._exact_timing is not None or "_orbit" in vars(self)
-        if self._has_multiprecision and (end_time > one_period_time or is_known or self._segment.from_multiprecision):
+        if self._has_multiprecision and (
+            end_time > one_period_time or self._is_period_known or self._segment.from_multiprecision
+        ):
             times = self._timing(end_time)
             if self._precise_trajectory is None:
                 self._precise_trajectory = self._build(times)
@@ -267,10 +273,18 @@ class PeriodicMotion(Motion):
         """The events from time t1 to t2 over as many periods as that takes; see `Motion.events_between`."""
         start, stop = read_number(t1, where="t1", unit="s").value, read_number(t2, where="t2", unit="s").value
         period = self.period
-        lap = self._trajectory(0.0).lap
+        lap, within = self._trajectory(0.0).lap, self._one_period()
+        first, last = int(np.floor(start / period)), int(np.floor(min(stop, self.t_end) / period))
+        if (last - first) * len(within) > MAX_EVENTS:
+            raise InputError(
+                f"events_between: {len(within)} events in each of {last - first} periods are more than {MAX_EVENTS}; "
+                "ask for a shorter interval"
+            )
         out = []
-        for k in range(int(np.floor(start / period)), int(np.floor(stop / period)) + 1):
-            for event in self._one_period():
+        for k in range(first, last + 1):
+            for event in within:
+                if k and event.kind == "slip" and event.t == 0.0:
+                    continue  # a body that slips at launch begins to slip then, and once only
                 t = event.t + k * period
                 if start <= t <= min(stop, self.t_end):
                     out.append(Event(event.kind, t, event.lam + k * lap, event.x, event.z))

@@ -12,6 +12,7 @@ from gqm_sym.runtime.arithmetic.doubledouble import ULP, running_totals
 from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.inversion.table import MAX_TIME_ERROR, build_table, phase_angles
 from gqm_sym.runtime.launch.functions import BoundFunctions
+from gqm_sym.runtime.launch.speed import potential_at
 from gqm_sym.runtime.motion.conditioning import launch_condition_number, v2_correction
 from gqm_sym.runtime.multiprecision.exact_panels import DIGITS, exact_ends, lay_exactly
 from gqm_sym.runtime.quadrature.integrands import speeds_along, speeds_at
@@ -37,6 +38,16 @@ from gqm_sym.runtime.quadrature.time_panels import (
 # one turning point.
 MIN_WIDTH_SHARE = 1.0 / 32.0
 MIN_TIMED_WIDTH_SHARE = 2.0**-10
+
+# The error of a turning point in doubles, in roundings of the width times the ratio of the largest Q to that there
+# (`Segment._end_errors`); 0.6 was the most that was measured.
+MAX_END_ROUNDINGS = 2.0
+
+# The distance from a turning point, as a share of the width, within which offsets are computed from the exact one.
+NEAR_TURN = 1e-3
+
+# The rounding of a place that is given by text, as two doubles.
+MAX_TEXT_ROUNDING = 2.0**-105
 
 # The distance from an equilibrium up to which an approach to it is computed, near the least that doubles know.
 NEAREST = 1e-300
@@ -240,7 +251,36 @@ class Segment:
             return near_equilibrium
         max_slope = {TURN_TURN: 0.5, FROM_TURN: 2.0, REGULAR: 1.0}[self.kind]  # of lam(phi), in widths
         bounded: Array = width * (max_slope * errors + 3.0 * ULP)
-        return bounded
+        if self.kind == REGULAR or self.from_multiprecision:
+            return bounded
+        at_a, at_b = self._end_errors()
+        share = phi**2 if self.kind == FROM_TURN else np.sin(0.5 * phi) ** 2
+        return bounded + at_a * (1.0 - share) + at_b * share
+
+    def _end_errors(self) -> tuple[float, float]:
+        """How far its turning points may be from the exact ones, in units of the curve parameter.
+
+        V**2 = (lam - a)*(b - lam)*Q is known to a rounding of its largest values, so that its zero at ``a`` is known
+        to as many roundings of the width as Q is smaller there than at its largest.
+        """
+        if not self.balance > 0.0:
+            return 0.0, 0.0
+        error = MAX_END_ROUNDINGS * ULP * abs(self.width) / self.balance
+        if self.kind == FROM_TURN:
+            return error, 0.0
+        f = self.functions
+        # Q at the ends, but for a factor.
+        steepness = np.abs(potential_at(f.addresses, f.p, np.array([self.a, self.b]))[1])
+        shares = np.divide(steepness.min(), steepness, out=np.ones(2), where=steepness > 0.0)
+        at_a, at_b = (
+            0.0 if known is not None or self._is_launch_from_rest(place) else float(error * share)
+            for place, known, share in zip((self.a, self.b), self.ends, shares, strict=True)
+        )
+        return at_a, at_b
+
+    def _is_launch_from_rest(self, place: float) -> bool:
+        exact = self.functions.exact
+        return exact is not None and place == exact.lam0.value and exact.v0.value == 0.0
 
     @property
     def balance(self) -> float:
@@ -278,7 +318,25 @@ class Segment:
         """The signed distances of place + low from ``a`` and to ``b``; the double of an end means that end."""
         if low == 0.0 and place in (self.a, self.b):
             return (0.0, self.width) if place == self.a else (self.width, 0.0)
-        return (place - self.a) + (low - self.low_parts[0]), (self.b - place) + (self.low_parts[1] - low)
+        ahead, behind = (place - self.a) + (low - self.low_parts[0]), (self.b - place) + (self.low_parts[1] - low)
+        turns = {TURN_TURN: (ahead, behind), FROM_TURN: (ahead,)}.get(self.kind, ())
+        if min(map(abs, turns), default=inf) > NEAR_TURN * abs(self.width) or not self._is_conservative:
+            return ahead, behind
+        return self._exact_offsets(place, low)
+
+    @property
+    def _is_conservative(self) -> bool:
+        return self.functions.exact is not None and self.v2 is None and self.speed_series is None
+
+    def _exact_offsets(self, place: float, low: float) -> tuple[float, float]:
+        """`offsets` from the exact ends, next to which the rounding of an end is much of the time to it."""
+        exact = self.functions.exact
+        assert exact is not None
+        start, stop = exact_ends(exact, DIGITS, self.kind, self.a, self.b, self.ends)
+        at = exact.at(DIGITS).track.place(place) + low
+        rounding = MAX_TEXT_ROUNDING * max(abs(self.a), abs(self.b))
+        ahead, behind = float(at - start), float(stop - at)
+        return (0.0 if abs(ahead) <= rounding else ahead), (0.0 if abs(behind) <= rounding else behind)
 
     def _is_short(self, share: float) -> bool:
         return abs(self.b - self.a) <= share * max(abs(self.a), abs(self.b))

@@ -85,7 +85,7 @@ def orbit_of(
     offsets : (float, float)
         The distances of a libration's turning points from the launch.
     times : (3, n) array
-        Phase angles, and room for the times there (`double_double.orbit_time`).
+        Phase angles, and room for the times there (`double_double.orbit_time.fill_times`).
     """
     if problem.tape is None:
         return None

@@ -30,6 +30,9 @@ GUARD_DIGITS = 15
 # A segment with more panels than this has a peak for which the trapezoidal rule would need too many nodes.
 MAX_SMOOTH_PANELS = 8
 
+# Steps of Newton's method to a turning point; where a potential is flat, each of them gains a small share only.
+MAX_NEWTON_STEPS = 2000
+
 # Nodes of the trapezoidal rule at up to 128 digits, if the curve is not smooth.
 MAX_NODES = 1 << 13
 
@@ -215,7 +218,7 @@ class Arithmetic:
         tolerance = self.mpf(10) ** (
             -(self.digits // 2)
         )  # convergence is quadratic: after such a step only rounding remains
-        for _ in range(100):
+        for _ in range(MAX_NEWTON_STEPS):
             slope = 2 * self.effective_potential_slope(x)
             if slope == 0:
                 break

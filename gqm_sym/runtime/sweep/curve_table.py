@@ -30,6 +30,9 @@ ELLIPSE, FEW_ELLIPSE = 3.2, 10.0
 # if its last two are above the second share.
 MAX_NOISE_RATIO, MAX_TAIL_RATIO = 4e-16, 1e-13
 
+# Values below this share of what is usual on the curve need no relative accuracy of their own.
+NEGLIGIBLE = 1e-2
+
 # How many panels a piece of the curve may be cut into on average.
 MAX_PARTS = 4
 
@@ -122,13 +125,13 @@ def difference_on(rows, k, x, y):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def fill_terms(values, work, row, at):  # type: ignore[no-untyped-def]
+def fill_terms(values, work, row, at, size):  # type: ignore[no-untyped-def]
     """Fit a polynomial to values at the Gauss points; returns whether it is resolved. ``work`` has its Legendre terms.
 
-    Coefficients behind the last significant one are set to zero.
+    Coefficients behind the last significant one are set to zero. ``size`` is how large the values are elsewhere: where
+    they are much smaller than that, they are rounding noise.
     """
     fit(values, 0, work, 0)
-    size = 0.0
     for j in range(NODES):
         size = max(size, fabs(values[j]))
     resolved = max(fabs(work[NODES - 2]), fabs(work[NODES - 1])) <= MAX_TAIL_RATIO * size
@@ -141,8 +144,12 @@ def fill_terms(values, work, row, at):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def fill_row(fns, p, left, right, mass, row):  # type: ignore[no-untyped-def]
-    """Fill the row of one panel, all but its BASE; returns whether its polynomials are resolved, and a bound of ds."""
+def fill_row(fns, p, left, right, mass, slope, row):  # type: ignore[no-untyped-def]
+    """Fill the row of one panel, all but its BASE.
+
+    Returns whether its polynomials are resolved, and the potential's upper bound above the left edge. ``slope`` is how
+    steep the potential is elsewhere on the curve.
+    """
     half = 0.5 * (right - left)
     places, gaps, rests, values = np.empty(NODES), np.empty(NODES), np.empty(NODES), np.empty(NODES)
     work, zeros = np.empty(NODES), np.zeros(NODES)
@@ -153,11 +160,11 @@ def fill_row(fns, p, left, right, mass, row):  # type: ignore[no-untyped-def]
     call_potential_divdiff1(fns.potential_divdiff1, NODES, right, places, rests, p, rows)
     for j in range(NODES):
         values[j] = half * rows[0, j]
-    resolved = fill_terms(values, work, row, RIGHT_TERMS)
+    resolved = fill_terms(values, work, row, RIGHT_TERMS, NEGLIGIBLE * half * slope)
     call_potential_divdiff1(fns.potential_divdiff1, NODES, left, places, gaps, p, rows)
     for j in range(NODES):
         values[j] = half * rows[0, j]
-    resolved &= fill_terms(values, work, row, LEFT_TERMS)
+    resolved &= fill_terms(values, work, row, LEFT_TERMS, NEGLIGIBLE * half * slope)
     call_path_and_contact_force(fns.path_and_contact_force, NODES, places, zeros, p, frame)
     for j in range(NODES):
         values[j] = row[POTENTIAL + j] = gaps[j] * rows[0, j]
@@ -179,16 +186,16 @@ def fill_row(fns, p, left, right, mass, row):  # type: ignore[no-untyped-def]
     top = max(row[RISE], 0.0) if row[SLOPE_SIGN] != 0.0 else work[0] + spread
     for j in range(NODES):
         values[j] = rows[1, j]
-    resolved &= fill_terms(values, work, row, DS_TERMS)
+    resolved &= fill_terms(values, work, row, DS_TERMS, 0.0)
     least_ds = 2.0 * work[0]
     for j in range(NODES):
         least_ds -= fabs(work[j])
     for j in range(NODES):
         values[j] = mass * frame[3, j]
-    resolved &= fill_terms(values, work, row, KAPPA_TERMS)
+    resolved &= fill_terms(values, work, row, KAPPA_TERMS, NEGLIGIBLE * mass / row[WEIGHTS])
     for j in range(NODES):
         values[j] = frame[4, j]
-    resolved &= fill_terms(values, work, row, LOAD_TERMS)
+    resolved &= fill_terms(values, work, row, LOAD_TERMS, NEGLIGIBLE * mass * slope)
     one = row.reshape(1, ROW)
     for j in range(SAMPLES):
         x = SAMPLE_POINTS[j]
@@ -219,7 +226,9 @@ def tabulate(fns, p, pieces, mass):  # type: ignore[no-untyped-def]
     """
     capacity = MAX_PARTS * (pieces.size - 1)
     edges, tops, rows = np.empty(capacity + 1), np.empty(capacity), np.zeros((capacity, ROW))
-    pending, count = np.empty(64), 0
+    pending, count, slopes = np.empty(64), 0, np.empty((2, pieces.size))
+    call_effective_potential(fns.effective_potential, pieces.size, pieces, p, slopes)
+    slope = np.max(np.abs(slopes[1]))
     edges[0] = pieces[0]
     for k in range(pieces.size - 1):
         waiting, left = 1, pieces[k]
@@ -228,7 +237,7 @@ def tabulate(fns, p, pieces, mass):  # type: ignore[no-untyped-def]
             right = pending[waiting - 1]
             if count == capacity or waiting == pending.size:
                 return CurveTable(np.empty(0), np.empty(0), np.empty((0, ROW)))
-            resolved, tops[count] = fill_row(fns, p, left, right, mass, rows[count])
+            resolved, tops[count] = fill_row(fns, p, left, right, mass, slope, rows[count])
             if resolved:
                 count, waiting = count + 1, waiting - 1
                 left = edges[count] = right

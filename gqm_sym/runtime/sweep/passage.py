@@ -211,6 +211,21 @@ def find_passage(curve, lam0, v0, direction):  # type: ignore[no-untyped-def]
 
 
 @Inner
+def passage_of(curve, orbit):  # type: ignore[no-untyped-def]
+    """The panels that a known orbit passes; none if the curve is not tabulated."""
+    table = curve.table
+    if table.tops.size == 0:
+        return Passage(0, 0, 0.0, 0.0, 0.0)
+    first, low_x = locate(table, curve.period, orbit.lam0 + orbit.low)
+    if orbit.circulates:
+        return Passage(first, table.tops.size + 1, low_x, low_x, curve.period)
+    last, high_x = locate(table, curve.period, orbit.lam0 + orbit.high)
+    inside = table.edges[0] <= orbit.lam0 + orbit.low and orbit.lam0 + orbit.high <= table.edges[-1]
+    panels = last - first + 1 if inside or curve.period > 0.0 else 0
+    return Passage(first, panels, low_x, high_x, orbit.high - orbit.low)
+
+
+@Inner
 def fill_slacks(curve, passage, w0, circulates, slacks):  # type: ignore[no-untyped-def]
     """Fill V**2/2 at the left edge of each panel of a passage; returns whether they keep enough digits.
 
@@ -221,7 +236,7 @@ def fill_slacks(curve, passage, w0, circulates, slacks):  # type: ignore[no-unty
     k, high = passage.first % count, (passage.first + last) % count
     slacks[0] = potential_on(rows, k, passage.low_x) + (0.5 * w0 if circulates else 0.0)
     slack = (passage.low_x - 1.0) * difference_on(rows, k, passage.low_x, 1.0) + (0.5 * w0 if circulates else 0.0)
-    peak, least = max(slack, 0.5 * w0), 1.0
+    peak, least = max(slack, 0.5 * w0) if circulates else slack, 1.0
     for j in range(1, middle + 1):
         slacks[j] = slack
         peak = max(peak, slack)
@@ -265,26 +280,26 @@ def fill_rates(table, passage, circulates, j, slack, gap, u, out):  # type: igno
     k = (passage.first + j) % table.tops.size
     half = 0.5 * (table.edges[k + 1] - table.edges[k])
     for i in range(NODES):
-        x, numerator, fall = u[i], half * half, 0.0
-        if not circulates:
+        x, numerator = u[i], half * half
+        if circulates:
+            fall = slack - potential_on(rows, k, x)
+        else:
             s, c = sin(0.5 * u[i]), cos(0.5 * u[i])
             below, above = passage.width * s * s, passage.width * c * c
             if is_upper(passage, j):
                 below, above = above, below
+            # V**2/2 is its value at a turning point or an edge, and what the potential falls from there.
             if j == 0:
-                x = passage.low_x + below / half
-                numerator, fall = above * half, -difference_on(rows, k, passage.low_x, x)
+                x, y, at_y, factor, numerator = passage.low_x + below / half, passage.low_x, 0.0, -1.0, above * half
             elif j == last:
-                x = passage.high_x - above / half
-                numerator, fall = below * half, difference_on(rows, k, x, passage.high_x)
+                x, y, at_y, factor, numerator = passage.high_x - above / half, passage.high_x, 0.0, 1.0, below * half
             elif is_upper(passage, j):
-                x, numerator = 1.0 - (above - gap) / half, below * above
-                fall = slack + (1.0 - x) * difference_on(rows, k, x, 1.0)
+                rest = (above - gap) / half
+                x, y, at_y, factor, numerator = 1.0 - rest, 1.0, slack, rest, below * above
             else:
-                x, numerator = (below - gap) / half - 1.0, below * above
-                fall = slack - (1.0 + x) * difference_on(rows, k, -1.0, x)
-        else:
-            fall = slack - potential_on(rows, k, x)
+                rest = (below - gap) / half
+                x, y, at_y, factor, numerator = rest - 1.0, -1.0, slack, -rest, below * above
+            fall = at_y + factor * difference_on(rows, k, y, x)
         out[i] = value_on(rows, k, DS_TERMS, x) * sqrt(numerator / (2.0 * fall))
 
 
@@ -385,28 +400,32 @@ def time_between(curve, orbit, passage, slacks, lower, upper):  # type: ignore[n
 
 
 @Inner
-def passage_time(curve, orbit, passage, slacks):  # type: ignore[no-untyped-def]
-    """The half period of a libration, or the time of a circulation's lap; NaN where it is not accurate."""
-    return time_between(curve, orbit, passage, slacks, (0.0, passage.width), (passage.width, 0.0))
+def travel_time(curve, orbit, passage, slacks, place):  # type: ignore[no-untyped-def]
+    """The first time at which a body is at a place, or for NaN the time of half a period or of a lap.
 
-
-@Inner
-def passage_arrival(curve, orbit, passage, slacks, place):  # type: ignore[no-untyped-def]
-    """The first time at which a body is at a place: NaN where it is not accurate, inf if never."""
-    ahead, width, laps = place - orbit.lam0, passage.width, 0.0
-    here, start, end = (-orbit.low, orbit.high), (0.0, width), (width, 0.0)
-    if orbit.circulates:
-        laps = floor(orbit.direction * ahead / width)
-        ahead -= orbit.direction * laps * width
-    there = (ahead - orbit.low, orbit.high - ahead)
-    if laps < 0.0 or not (there[0] >= 0.0 and there[1] >= 0.0):
-        return np.inf
-    time = laps * passage_time(curve, orbit, passage, slacks) if laps > 0.0 else 0.0
-    onwards = orbit.direction * ahead >= 0.0
-    # First to the place or to the end ahead, then back from there.
-    for stretch in range(1 if onwards else 2):
-        target = there if onwards or stretch == 1 else here
-        other = here if onwards else (end if orbit.direction > 0 else start)
-        lower, upper = (target, other) if target[0] < other[0] else (other, target)
-        time += time_between(curve, orbit, passage, slacks, lower, upper)
+    It is NaN where it is not accurate, and inf if the body is never there.
+    """
+    width, laps, onwards = passage.width, 0.0, True
+    here, there, start, end = (0.0, width), (width, 0.0), (0.0, width), (width, 0.0)
+    if place == place:
+        ahead = place - orbit.lam0
+        if orbit.circulates:
+            laps = floor(orbit.direction * ahead / width)
+            ahead -= orbit.direction * laps * width
+        here, there = (-orbit.low, orbit.high), (ahead - orbit.low, orbit.high - ahead)
+        if laps < 0.0 or not (there[0] >= 0.0 and there[1] >= 0.0):
+            return np.inf
+        onwards = orbit.direction * ahead >= 0.0
+    turn = end if orbit.direction > 0 else start
+    time = 0.0
+    # To the place, or to the end ahead and back from there to the place; then all laps before that.
+    for stretch in range(1 if onwards and laps == 0.0 else 2):
+        first, last = here, there
+        if not onwards:
+            first, last = (here if stretch == 0 else there), turn
+        elif stretch == 1:
+            first, last = start, end
+        lower, upper = (first, last) if first[0] < last[0] else (last, first)
+        part = time_between(curve, orbit, passage, slacks, lower, upper)
+        time += laps * part if onwards and stretch == 1 else part
     return time

@@ -15,7 +15,9 @@ from gqm_sym.runtime.compiled.types import MATRIX, Array
 
 # The quantities that compiled code computes. SPANS is asked of batches only, on the way to another quantity: the
 # offsets of both turning points from the launch, or for a circulation the length of a lap and NaN.
-HALF_PERIOD, PERIOD, TURNING_POINTS, ARRIVAL_TIME, MIN_SPEED, MAX_SPEED, MIN_FORCE, MAX_FORCE, SPANS = range(9)
+HALF_PERIOD, PERIOD, TURNING_POINTS, ARRIVAL_TIME, MIN_SPEED, MAX_SPEED, MIN_FORCE, MAX_FORCE, SPANS, END_TIME = range(
+    10
+)
 
 # The code of a quantity that compiled code does not compute.
 NOT_COMPILED = -1
@@ -109,6 +111,6 @@ QUANTITIES = {
     "normal_force_min": Quantity(MIN_FORCE, 1, 0, _extreme("normal_force_min")),
     "normal_force_max": Quantity(MAX_FORCE, 1, 0, _extreme("normal_force_max")),
     "time_at": Quantity(ARRIVAL_TIME, 1, 0, lambda motion, lam: motion.time_at(lam)),
-    "t_end": Quantity(NOT_COMPILED, 1, 0, lambda motion, _: motion.t_end if isfinite(motion.t_end) else nan),
+    "t_end": Quantity(END_TIME, 1, 0, lambda motion, _: motion.t_end if isfinite(motion.t_end) else nan),
     "rest_position": Quantity(NOT_COMPILED, 1, 0, _rest_position),
 }

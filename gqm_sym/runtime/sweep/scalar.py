@@ -25,7 +25,7 @@ from gqm_sym.runtime.compiled.strided import (
     V0,
     element,
 )
-from gqm_sym.runtime.compiled.types import ADDRESSES, MATRIX, VECTOR, Array
+from gqm_sym.runtime.compiled.types import ADDRESSES, MATRIX, REAL, VECTOR, Array
 from gqm_sym.runtime.launch.domain import DomainNumbers
 from gqm_sym.runtime.launch.ends import NO_ORBIT, ends, orbit_kind
 from gqm_sym.runtime.quadrature.time_panels import joints_between
@@ -39,17 +39,20 @@ from gqm_sym.runtime.quadrature.trapezoid import (
 )
 from gqm_sym.runtime.sweep.arrivals import arrival
 from gqm_sym.runtime.sweep.curve_table import TABLE, CurveTable
+from gqm_sym.runtime.sweep.liftoff import liftoff_place
 from gqm_sym.runtime.sweep.orbit import Orbit, SweptCurve
 from gqm_sym.runtime.sweep.orbit_extremes import extreme, passage_extreme
-from gqm_sym.runtime.sweep.passage import Passage, fill_slacks, find_passage, passage_arrival, passage_time
+from gqm_sym.runtime.sweep.passage import Passage, fill_slacks, find_passage, passage_of, travel_time
 from gqm_sym.runtime.sweep.quantities import (
     ANSWERED,
     ANSWERS,
     ARRIVAL_TIME,
+    END_TIME,
     HALF_PERIOD,
     MAX_FORCE,
     MAX_SPEED,
     MIN_FORCE,
+    MIN_SPEED,
     NEVER_THERE,
     NOT_FINITE,
     NOT_PERIODIC,
@@ -73,14 +76,20 @@ class GivenCurve(NamedTuple):
         The places at which the curve is not smooth, within one period.
     table : CurveTable
         The curve tabulated, if all launches have the same parameters; else an empty one.
+    side : int
+        1 if the track can only push along the normal, -1 if only against it, 0 if it can push and pull.
+    t_max : float
+        The last time in s, infinite if there is none; only END_TIME depends on it.
     """
 
     parameters: Array
     joints: Array
     table: CurveTable
+    side: int
+    t_max: float
 
 
-GIVEN = types.NamedTuple((VECTOR, VECTOR, TABLE), GivenCurve)
+GIVEN = types.NamedTuple((VECTOR, VECTOR, TABLE, types.int64, REAL), GivenCurve)
 
 
 class Buffers(NamedTuple):
@@ -131,7 +140,8 @@ def find_orbit(curve, columns, k, monotone, spans, known):  # type: ignore[no-un
         return UNDECIDED, none, nowhere
     circulates = kind == CIRCULATION
     one, other = (direction * period, 0.0) if circulates else (ahead.near, behind.near)
-    return ANSWERED, Orbit(circulates, even, direction, lam0, v2, min(one, other), max(one, other)), nowhere
+    orbit = Orbit(circulates, even, direction, lam0, v2, min(one, other), max(one, other))
+    return ANSWERED, orbit, passage_of(curve, orbit)
 
 
 @Inner
@@ -152,14 +162,13 @@ def orbit_time(curve, orbit):  # type: ignore[no-untyped-def]
 @Inner
 def value_from_table(curve, orbit, passage, quantity, target, slacks):  # type: ignore[no-untyped-def]
     """The half period or lap time, the arrival or an extreme on a tabulated curve; NaN where that is not accurate."""
-    if not (passage.panels > 1 and fill_slacks(curve, passage, orbit.v2, orbit.circulates, slacks)):
-        return nan
-    if quantity in (HALF_PERIOD, PERIOD):
-        return passage_time(curve, orbit, passage, slacks)
-    if quantity == ARRIVAL_TIME:
-        return passage_arrival(curve, orbit, passage, slacks, target)
-    force, sign = quantity in (MIN_FORCE, MAX_FORCE), 1.0 if quantity in (MAX_SPEED, MAX_FORCE) else -1.0
-    return passage_extreme(curve, orbit, passage, slacks, force, sign)
+    if quantity in (MIN_SPEED, MAX_SPEED, MIN_FORCE, MAX_FORCE):
+        force, sign = quantity in (MIN_FORCE, MAX_FORCE), 1.0 if quantity in (MAX_SPEED, MAX_FORCE) else -1.0
+        return passage_extreme(curve, orbit, passage, slacks, force, sign)
+    low, high = orbit.lam0 + orbit.low, orbit.lam0 + orbit.high
+    if passage.panels <= 2 and joints_between(curve.joints, curve.period, low, high).size == 0:
+        return nan  # the orbit itself has more digits than a part of a panel
+    return travel_time(curve, orbit, passage, slacks, target if quantity == ARRIVAL_TIME else nan)
 
 
 @Inner
@@ -177,19 +186,38 @@ def value_by_itself(curve, orbit, quantity, target, buffers):  # type: ignore[no
 
 
 @Inner
-def fill_answer(curve, orbit, passage, quantity, target, buffers, out):  # type: ignore[no-untyped-def]
-    """Fill the row ``out`` with a quantity of an orbit; returns the status. ``target`` is the place of ARRIVAL_TIME."""
+def fill_answer(curve, orbit, passage, asked, buffers, out):  # type: ignore[no-untyped-def]
+    """Fill the row ``out`` with a quantity of an orbit; returns the status.
+
+    ``asked`` is the quantity, the place of ARRIVAL_TIME, and side and last time as `GivenCurve` has them.
+    """
+    (quantity, target, side, t_max), limit, slacks = asked, inf, buffers.slacks
+    tabulated = quantity != TURNING_POINTS or side != 0
+    tabulated = tabulated and passage.panels > 0 and fill_slacks(curve, passage, orbit.v2, orbit.circulates, slacks)
+    if side != 0 or quantity == END_TIME:
+        if side != 0 and not tabulated:
+            return UNDECIDED
+        place = liftoff_place(curve, orbit, passage, slacks, side) if side != 0 else nan
+        if place == place and quantity in (HALF_PERIOD, PERIOD, TURNING_POINTS):
+            return NOT_PERIODIC
+        if quantity != END_TIME and place == place:
+            return UNDECIDED
+        if quantity == END_TIME and place != place:
+            out[0] = t_max if t_max < inf else nan
+            return ANSWERED if t_max < inf else NOT_PERIODIC
+        if quantity == END_TIME:
+            quantity, target, limit = ARRIVAL_TIME, place, t_max
     if orbit.circulates and quantity in (HALF_PERIOD, TURNING_POINTS):
         return NOT_PERIODIC
     if quantity == TURNING_POINTS:
         out[0], out[1] = orbit.lam0 + orbit.low, orbit.lam0 + orbit.high
         return ANSWERED
-    value = value_from_table(curve, orbit, passage, quantity, target, buffers.slacks)
+    value = value_from_table(curve, orbit, passage, quantity, target, slacks) if tabulated else nan
     if value != value:
         value = value_by_itself(curve, orbit, quantity, target, buffers)
     if value == inf:
         return NEVER_THERE
-    out[0] = 2.0 * value if quantity == PERIOD and not orbit.circulates else value
+    out[0] = 2.0 * value if quantity == PERIOD and not orbit.circulates else min(value, limit)
     return ANSWERED if isfinite(value) else UNDECIDED
 
 
@@ -218,7 +246,7 @@ def answer_one_by_one(fns, columns, monotone, quantity, spans, answers, given): 
         What all launches share.
     """
     buffers = Buffers(trapezoid_workspace(), trapezoid_rates(), np.empty(given.table.tops.size + 1))
-    p, joints = uncounted(given.parameters), uncounted(given.joints)
+    p, joints, side, t_max = uncounted(given.parameters), uncounted(given.joints), given.side, given.t_max
     table = CurveTable(uncounted(given.table.edges), uncounted(given.table.tops), uncounted(given.table.rows))
     columns, spans, values = uncounted(columns), uncounted(spans), uncounted(answers.values)
     statuses, routes = uncounted(answers.status), uncounted(answers.route)
@@ -232,5 +260,5 @@ def answer_one_by_one(fns, columns, monotone, quantity, spans, answers, given): 
         status, orbit, passage = find_orbit(curve, columns, k, monotone, spans, known)
         if status == ANSWERED:
             target = element(columns, TARGET, k)
-            status = fill_answer(curve, orbit, passage, quantity, target, buffers, values[k])
+            status = fill_answer(curve, orbit, passage, (quantity, target, side, t_max), buffers, values[k])
         statuses[k], routes[k] = status, SINGLE

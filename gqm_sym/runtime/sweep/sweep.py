@@ -6,7 +6,7 @@ both leave undecided are solved one by one, as `solve` does it.
 
 from collections.abc import Callable, Iterator, Mapping
 from functools import lru_cache, partial
-from math import inf, nan, prod
+from math import inf, isfinite, nan, prod
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -22,6 +22,7 @@ from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.interface import Addresses
 from gqm_sym.runtime.launch.formulas import chart_with
 from gqm_sym.runtime.launch.request import CONTACTS, LaunchRequest
+from gqm_sym.runtime.launch.speed import potential_at
 from gqm_sym.runtime.multiprecision.exact_problem import NOWHERE
 from gqm_sym.runtime.sweep import quantities, scalar
 from gqm_sym.runtime.sweep.batch.batches import answer_batches
@@ -42,6 +43,13 @@ Solve = Callable[[LaunchRequest, tuple[Any, ...]], Any]
 
 # Quantities that are answered by batches themselves; for others batches find the span of an orbit.
 ANSWERED_BY_BATCHES = (quantities.HALF_PERIOD, quantities.PERIOD, quantities.TURNING_POINTS)
+
+# Which way a track can push along its normal, 0 for both.
+CONTACT_SIDES = {"bilateral": 0, "above": 1, "below": -1}
+
+# Into how many pieces a curve with formulas is cut at least before it is tabulated, and how often the range of places
+# is doubled to contain all motions.
+MIN_PIECES, MAX_DOUBLINGS = 64, 8
 
 
 def sweep(
@@ -99,14 +107,17 @@ def sweep(
         np.full(size, quantities.BATCH, dtype=np.int8),
     )
     asked = asked_of_bodies(formulas, quantity, t_max, contact)
-    if asked is not None or has_compiled_route(formulas, found, t_max, contact):
-        for group, chosen in _groups(formulas, columns, shape):
+    if asked is not None or has_compiled_route(formulas, found, t_max):
+        for group, chosen in _groups(formulas, columns, shape, may_lift_off=asked is None and contact != "bilateral"):
             some = answers if chosen is None else answers.part(chosen)
             if asked is not None:
                 curve = (group.chart, group.joints, group.corners)
                 work, least = partial(answer_driven, formulas, asked, curve, group.columns, some), MIN_BODIES_PER_THREAD
             else:
-                work, least = partial(_answer, formulas, found, group, some), MIN_LAUNCHES_PER_THREAD
+                ask = Asked(
+                    found.code, CONTACT_SIDES[contact], inf if t_max is None else _column(t_max, "t_max").item()
+                )
+                work, least = partial(_answer, formulas, ask, group, some), MIN_LAUNCHES_PER_THREAD
             run_in_threads(work, some.status.size, least)
             if chosen is not None:
                 answers.put(chosen, some)
@@ -118,14 +129,13 @@ def sweep(
     return Sweep(values.reshape(shape + values.shape[1:]), answers.status.reshape(shape), answers.route.reshape(shape))
 
 
-def has_compiled_route(formulas: "Formulas", quantity: Quantity, t_max: Any, contact: str) -> bool:
+def has_compiled_route(formulas: "Formulas", quantity: Quantity, t_max: Any) -> bool:
     """Whether compiled loops answer most launches.
 
-    They do not for motions that lose energy, bodies that must fit their track or may leave it, and motions with a last
-    time.
+    They do not for motions that lose energy, and of motions with a last time they know only when they end.
     """
-    conservative = formulas.dissipation is None and not formulas.rolling_radius
-    return conservative and quantity.code != quantities.NOT_COMPILED and t_max is None and contact == "bilateral"
+    timely = t_max is None or (quantity.code == quantities.END_TIME and float(_column(t_max, "t_max")) > 0.0)
+    return formulas.dissipation is None and quantity.code != quantities.NOT_COMPILED and timely
 
 
 def broadcast_shape(columns: Mapping[str, Array]) -> tuple[int, ...]:
@@ -199,6 +209,14 @@ def _rounding_of(axes: Callable[..., Any], place: float, values: tuple[float, ..
         return float(mp.mpf(axes(mp, tuple(map(mp.mpf, values)))[0]) - mp.mpf(place))
 
 
+class Asked(NamedTuple):
+    """What is asked of all launches: the code of a quantity, and side and last time as `GivenCurve` has them."""
+
+    code: int
+    side: int
+    t_max: float
+
+
 class Group(NamedTuple):
     """Launches on curves of one shape.
 
@@ -221,15 +239,16 @@ class Group(NamedTuple):
 
 
 def _groups(
-    formulas: "Formulas", columns: list[Array], shape: tuple[int, ...]
+    formulas: "Formulas", columns: list[Array], shape: tuple[int, ...], *, may_lift_off: bool
 ) -> Iterator[tuple[Group, NDArray[np.intp] | None]]:
     """The launches, grouped by the shape of their curve, and which they are; None where all are of one shape.
 
-    Launches whose curve cannot be made are in no group.
+    Launches whose curve cannot be made are in no group. Curves with formulas are tabulated if bodies may lift off.
     """
     if formulas.chart is None:
         domain = [widen(value, shape) for value in _domain_columns(formulas, columns[4:])]
-        yield Group([*columns[:4], *domain, *columns[4:]]), None
+        table = _tabulated_range(formulas, columns, domain) if may_lift_off else NO_TABLE
+        yield Group([*columns[:4], *domain, *columns[4:]], table=table), None
         return
     mass = list(formulas.parameters).index("m")
     for values, chosen in _distinct(columns[4:], shape):
@@ -241,6 +260,34 @@ def _groups(
         some = columns if chosen is None else [_chosen(column, shape, chosen) for column in columns]
         table = NO_TABLE if formulas.dissipation else _tabulated(formulas.chart, formulas.addresses, values, mass)
         yield Group([*some[:4], *domain, *some[4:]], chart.block, chart.breaks, chart.corners, table), chosen
+
+
+def _tabulated_range(formulas: "Formulas", columns: list[Array], domain: list[Array]) -> CurveTable:
+    """The table of a curve with formulas on the range of all motions; empty if launches differ in parameters."""
+    low, high, period = domain[:3]
+    if not all(column.size == 1 for column in (low, high, period, *columns[4:])) or not columns[0].size:
+        return NO_TABLE
+    p = np.array([column.item() for column in columns[4:]])
+    first, last, places = low.item(), high.item(), columns[0].reshape(-1)
+    if period.item() > 0.0:
+        first, last = 0.0, period.item()
+    elif not (isfinite(first) and isfinite(last)):
+        if not np.isfinite(places).all():
+            return NO_TABLE
+        # From all launches outwards, until the potential is above the energy of each.
+        fns, width = formulas.addresses, max(float(np.ptp(places)), 1.0)
+        top = float(np.max(potential_at(fns, p, places)[0] + 0.5 * float(np.max(columns[1])) ** 2))
+        ends = [float(places.min()), float(places.max())]
+        for side, limit in enumerate((first, last)):
+            for _ in range(MAX_DOUBLINGS):
+                ends[side] = max(ends[side] - width, limit) if side == 0 else min(ends[side] + width, limit)
+                if not potential_at(fns, p, np.array(ends[side : side + 1]))[0, 0] < top:
+                    break
+                width *= 2.0
+        first, last = ends
+    pieces = np.linspace(first, last, MIN_PIECES + 1)
+    mass = p[list(formulas.parameters).index("m")]
+    return CurveTable(*tabulate(formulas.addresses, p, pieces, float(mass)))
 
 
 @lru_cache(maxsize=8)
@@ -269,20 +316,21 @@ def _chosen(column: Array, shape: tuple[int, ...], chosen: NDArray[np.intp]) -> 
     return column if column.size == 1 else np.broadcast_to(column, shape).reshape(-1)[chosen]
 
 
-def _answer(formulas: "Formulas", quantity: Quantity, group: Group, answers: Answers, part: slice) -> None:
+def _answer(formulas: "Formulas", asked: Asked, group: Group, answers: Answers, part: slice) -> None:
     """Answer a part of a group of launches by compiled loops, as far as they decide them."""
     columns, chart, joints, table = group.columns, group.chart, group.joints, group.table
-    code, batches = quantity.code, formulas.batch
+    code, batches = asked.code, formulas.batch if asked.side == 0 and asked.code != quantities.END_TIME else None
     for begin in range(part.start, part.stop, CHUNK):
         chunk = slice(begin, min(begin + CHUNK, part.stop))
         lines = lay_out(columns, chunk.start, chunk.stop)
         launches, found = (pointers(lines), formulas.monotone), answers.part(chunk)
         spans = found.values if code in ANSWERED_BY_BATCHES else np.empty((found.status.size, 2))
         if batches is not None:
-            asked = code if code in ANSWERED_BY_BATCHES else quantities.SPANS
+            wanted = code if code in ANSWERED_BY_BATCHES else quantities.SPANS
             counts = (batches.orbit_rows, batches.integrand_rows)
-            answer_batches(batches.addresses(), counts, *launches, asked, found._replace(values=spans))
-        given = scalar.GivenCurve(np.concatenate([np.empty(len(lines) - PARAMETERS), chart]), joints, table)
+            answer_batches(batches.addresses(), counts, *launches, wanted, found._replace(values=spans))
+        parameters = np.concatenate([np.empty(len(lines) - PARAMETERS), chart])
+        given = scalar.GivenCurve(parameters, joints, table, asked.side, asked.t_max)
         scalar.answer_one_by_one(formulas.addresses, *launches, code, spans, found, given)
 
 

@@ -1,9 +1,9 @@
 """What the disk cache knows of, and what is compiled when."""
 
 import ast
-import io
 import os
 import shutil
+import time
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -99,20 +99,18 @@ def test_an_inner_function_works_from_python() -> None:
     assert two_sum(1.0, 2.0**-60) == two_sum.py_func(1.0, 2.0**-60) == (1.0, 2.0**-60)
 
 
-class _Terminal(io.StringIO):
-    def isatty(self) -> bool:
-        return True
-
-
-@pytest.mark.parametrize(("stream", "said"), [(_Terminal, 1), (io.StringIO, 0)])
-def test_compiling_the_runtime_is_announced_once(stream: Any, said: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    """One line at a terminal, nothing in a log."""
-    stderr = stream()
-    monkeypatch.setattr("sys.stderr", stderr)
-    jit.announce.cache_clear()
-    for _ in range(3):
-        jit.announce()
-    assert stderr.getvalue().count("gqm_sym: compiling the runtime, once per installation\n") == said
+@pytest.mark.parametrize(("seconds", "said"), [(0.02, 1), (1e9, 0)])
+def test_long_compilation_is_announced(seconds: float, said: int, capsys: pytest.CaptureFixture[str]) -> None:
+    """Once for an entry point and all that it calls, while it is compiled, and only where it takes long."""
+    announcer = jit.Announcer(seconds)
+    announcer.begin(jit.Announcer.begin)
+    announcer.begin(jit.Announcer.end)
+    started = time.process_time()
+    while time.process_time() - started < 0.3:
+        pass
+    announcer.end()
+    announcer.end()
+    assert capsys.readouterr().err.count("gqm_sym: compiling for this machine, once: compiled.jit\n") == said
 
 
 def test_what_is_kept_is_found_again_by_its_key_alone(tmp_path: Path) -> None:

@@ -110,6 +110,20 @@ def test_small_swings_in_a_valley(amplitude: str, build: Build) -> None:
     assert state.error <= 1e-12 * float(amplitude)
 
 
+@pytest.mark.parametrize("start", ["1e-10", "1e-20", "1e-100"])
+def test_from_beside_a_hilltop(start: str, build: Build) -> None:
+    """So near to the top of z = -x**2/2 the body is at x0 cosh(sqrt(g) t), drag or not."""
+    module = build("hilltop", gqm.Curve.graph("-x**2/2"), gqm.QuadraticDrag(b="b"))
+    for factor in (mpf(3), mpf("1e-15") / mpf(start)) if mpf(start) < mpf("1e-16") else (mpf(2),):
+        with mp.workdps(40):
+            t = mp.acosh(factor) / mp.sqrt(G)
+            exact = mpf(start) * mp.cosh(mp.sqrt(G) * mpf(float(t)))
+        state = module.solve(start, b="1/10").state(float(t))
+        drag = mpf(start) * mpf("1e-9") if start == "1e-10" else 0
+        assert abs(state.lam - exact) <= mpf("1e-13") * exact + drag
+        assert state.error <= 2e-15
+
+
 def test_a_resistance_that_never_stops_a_swing(build: Build) -> None:
     """Resistance c V on a ring: small swings last for ever, each damped by exp(-c/2 half)."""
     module = build("viscous_ring", gqm.families.circle(L=1), gqm.Kernel.law("-c*direction*sqrt(W)"))
@@ -119,6 +133,26 @@ def test_a_resistance_that_never_stops_a_swing(build: Build) -> None:
     omega = math.sqrt(9.81 - 0.25)
     assert legs[50].t_end - legs[49].t_end == pytest.approx(math.pi / omega, rel=1e-13)
     assert legs[50].lam_end / legs[49].lam_end == pytest.approx(-math.exp(-0.5 * math.pi / omega), rel=1e-13)
+
+
+@pytest.mark.parametrize("t", [0.01, 1.0, 5.0])
+def test_a_creeping_spring(t: float, build: Build) -> None:
+    """Far beyond critical damping the body creeps for ever: x = exp(-c t/2) (cosh d t + c/(2 d) sinh d t)."""
+    motion = spring(build, "creeping", gqm.Kernel.law("-c*direction*sqrt(W)")).solve("1", c="20", k="10")
+    with mp.workdps(40):
+        d = mp.sqrt(90)
+        truth = mp.exp(-10 * mpf(t)) * (mp.cosh(d * t) + 10 / d * mp.sinh(d * t))
+    state = motion.state(t)
+    assert abs(state.lam - truth) <= state.error <= 1e-10
+    assert motion.t_end == math.inf
+
+
+def test_creeping_on_a_ring_has_no_end(build: Build) -> None:
+    """An end is looked for only as long as steps are no millionth of the curve (took over a minute)."""
+    module = build("viscous_ring", gqm.families.circle(L=1), gqm.Kernel.law("-c*direction*sqrt(W)"))
+    motion = module.solve(1.0, c=100)
+    assert motion.t_end == math.inf
+    assert motion.lam(1.0) == pytest.approx(2 * math.atan(math.tan(0.5) * math.exp(-9.81 / 100)), rel=1e-3)
 
 
 @pytest.mark.parametrize("t", [1.0, 1e3, 1e100])

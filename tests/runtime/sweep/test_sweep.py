@@ -316,7 +316,8 @@ def test_the_route_of_each_launch(module_of: ModuleOf) -> None:
     places = np.linspace(-1.0, 1.0, 40)
     assert circle.sweep("half_period", places, L=1).route_counts() == {"batch": 40}
     assert circle.sweep("v_max", places, L=1).route_counts() == {"single": 40}
-    assert circle.sweep("t_end", places, L=1).route_counts() == {"solve": 40}
+    assert circle.sweep("t_end", places, L=1, t_max=2).route_counts() == {"single": 40}
+    assert circle.sweep("rest_position", places, L=1).route_counts() == {"solve": 40}
 
 
 @pytest.mark.parametrize(("old", "new"), [("reasons", "status"), ("why", "status_counts")])

@@ -1,0 +1,289 @@
+"""Launches at the edges of what is allowed: lips, corners, nodes, and numbers that are none."""
+
+import math
+from collections.abc import Callable, Iterator
+from decimal import Decimal
+from fractions import Fraction
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import pytest
+from mpmath import mp, mpf
+
+import gqm_sym as gqm
+from gqm_sym.errors import DeclarationError, GQMError, InputError, LaunchError, SolutionError
+from gqm_sym.literals.numbers import read_number
+
+Build = Callable[..., ModuleType]
+
+G = mpf("9.81")
+VEE = gqm.Curve.sampled([("0", "1"), ("1", "0"), ("2", "1")], kind="linear")
+HALF_PIPE = gqm.Curve.piecewise(
+    [gqm.arc(radius=1, angle="pi/2"), gqm.line(length=1), gqm.arc(radius=1, angle="pi/2")],
+    start=(0, 1),
+    heading="-pi/2",
+)
+BALL = gqm.Gravity() + gqm.Rolling(radius="1/20", beta="2/5")
+
+
+@pytest.fixture(scope="module")
+def build(tmp_path_factory: pytest.TempPathFactory) -> Build:
+    """Build a module once, by its name."""
+    folder: Path = tmp_path_factory.mktemp("edges")
+    built: dict[str, ModuleType] = {}
+
+    def make(name: str, curve: Any, force: Any) -> ModuleType:
+        if name not in built:
+            built[name] = gqm.build(gqm.derive(curve, force), name=name, folder=folder)
+        return built[name]
+
+    return make
+
+
+@pytest.mark.parametrize(
+    "launch",
+    [
+        {"lam0": 0},
+        {"lam0": "pi + 1"},
+        {"lam0": math.pi + 1.0},
+        {"point": (0, 1)},
+        {"point": (3, 1)},
+        {"lam0": "pi/2 + 1/2", "v0": "sqrt(2*981/100)"},
+    ],
+)
+def test_from_lip_to_lip(launch: dict[str, Any], build: Build) -> None:
+    """A body released at a lip of a half pipe comes to the other lip: two quarter swings and a metre at full speed."""
+    motion = build("half_pipe", HALF_PIPE, gqm.Gravity()).solve(**launch)
+    assert motion.kind == "libration"
+    assert sorted(motion.turning_points) == pytest.approx([0.0, math.pi + 1.0], abs=1e-15)
+    half = 2 * mp.ellipk(mpf(1) / 2) / mp.sqrt(G) + 1 / mp.sqrt(2 * G)
+    assert motion.half_period == pytest.approx(float(half), rel=1e-14)
+    assert [event.kind for event in motion.events] == ["turn", "turn"]
+
+
+@pytest.mark.parametrize("lam0", [0, "2*sqrt(2)"])
+def test_from_lip_to_lip_of_planes(lam0: Any, build: Build) -> None:
+    """The same on two planes: four times the time down one of them."""
+    motion = build("vee", VEE, gqm.Gravity()).solve(lam0)
+    assert motion.kind == "libration"
+    assert motion.half_period == pytest.approx(2 * math.sqrt(4 / 9.81), rel=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("name", "force"), [("rough", gqm.CoulombFriction(mu="1/10")), ("drag", gqm.QuadraticDrag(b="1/10"))]
+)
+def test_losses_keep_a_body_from_the_other_lip(name: str, force: Any, build: Build) -> None:
+    """With losses it turns before, from either lip at mirrored places."""
+    module = build(name, HALF_PIPE, gqm.Gravity() + force)
+    left, right = (module.solve(lam0).turning_points[:2] for lam0 in (0, "pi + 1"))
+    assert left[1] < math.pi + 1.0
+    assert left[1] == pytest.approx(math.pi + 1.0 - right[1], abs=1e-14)
+
+
+def test_a_faster_body_leaves_over_the_lip(build: Build) -> None:
+    """With some speed at the lip it does not turn there; with what is just enough to come there it does."""
+    module = build("half_pipe", HALF_PIPE, gqm.Gravity())
+    assert module.solve(0, "1/1000").events[-1].kind == "domain-end"
+    bowl = build("bowl", gqm.Curve.graph("x**2", parameter="x", domain=(-1, 1)), gqm.Gravity())
+    for speed in ("sqrt(2*981/100)", "sqrt(2*981/100 - 1/10**30)"):
+        assert bowl.solve(0, speed).kind == "libration"
+    assert bowl.solve(0, "sqrt(2*981/100 + 1/1000000)").kind == "transit"
+
+
+def test_nothing_lies_beyond_the_ends_of_a_track(build: Build) -> None:
+    """pass1 gives NaN there; formulas go on, with the sign of V**2 that they have."""
+    rough = gqm.Gravity() + gqm.CoulombFriction(mu="1/10")
+    tracks = (("vee", VEE, gqm.Gravity()), ("half_pipe", HALF_PIPE, gqm.Gravity()), ("rough", HALF_PIPE, rough))
+    for name, curve, force in tracks:
+        module = build(name, curve, force)
+        end = module.MODEL.domain(module.MODEL.numbers(tuple(module.PARAMETERS.values()))).high
+        places = np.array([-1.0, np.nextafter(0.0, -1.0), 0.0, 0.5, end, np.nextafter(end, 9.0), 50.0])
+        rows = np.array(module.pass1(places, lam0=0.25, v0=9))
+        assert np.isnan(rows[:, [0, 1, 5, 6]]).all()
+        assert np.isfinite(rows[:4, 2:5]).all()
+        assert np.isnan(module.pass1(-1, lam0=0.25, v0=9).x)
+    formula = build("line", gqm.Curve.graph("x", parameter="x", domain=(0, 1)), gqm.Gravity())
+    assert formula.pass1(2.0, lam0=0).v2 == pytest.approx(-2 * 9.81 * 2)
+
+
+def test_the_time_at_a_turning_point_given_exactly(build: Build) -> None:
+    """The offset of a place from a turning point is that of the exact numbers: half of its digits are in the time."""
+    swing = build("swing", gqm.Curve.parametric(x="sin(a)", z="-cos(a)", parameter="a", period="2*pi"), gqm.Gravity())
+    motion = swing.solve(0, "sqrt(2*981/100)")
+    quarter = motion.half_period / 2
+    assert motion.time_at("pi/2") == quarter
+    assert motion.time_at("-pi/2") == pytest.approx(3 * quarter, rel=1e-15)
+    assert motion.time_at(motion.turning_points[0]) == quarter
+    assert swing.solve(1).time_at("-1") == pytest.approx(swing.solve(1).half_period, rel=1e-15)
+    for digits in (6, 12, 20, 29):
+        before = quarter - motion.time_at(f"pi/2 - 1/10**{digits}")
+        assert before == pytest.approx(math.sqrt(2 / 9.81 / 10.0**digits), rel=1e-4, abs=1e-15)
+    with pytest.raises(SolutionError, match="never at"):
+        motion.time_at("pi/2 + 1/10**25")
+    thrown = build("upright", gqm.Curve.parametric(x="0*u", z="u", parameter="u"), gqm.Gravity()).solve(0, 1)
+    assert thrown.time_at("50/981") == pytest.approx(100 / 981, rel=1e-15)
+
+
+def test_a_body_that_slips_at_launch_begins_to_slip_once(build: Build) -> None:
+    """After a period it slips on; that it begins to slip on the way is told in each of them."""
+    circle = gqm.Curve.parametric(x="sin(a)", z="-cos(a)", parameter="a", period="2*pi")
+    force = gqm.Gravity() + gqm.Rolling(beta="2/5", mu_static="1/10")
+    motion = build("slipping", circle, force).solve("3/2")
+    slips = [event.t for event in motion.events_between(0, 4 * motion.period) if event.kind == "slip"]
+    assert slips[0] == 0.0
+    assert len(slips) == 9
+    steps = np.diff(slips[1:])
+    assert steps == pytest.approx(motion.half_period, rel=1e-12)
+
+
+def test_the_contact_force_before_a_node(build: Build) -> None:
+    """N keeps its sign up to the node of a lemniscate, although the curvature is 0/0 in the equation there."""
+    curve = gqm.Curve.implicit("(x**2 + z**2)**2 - x**2 + z**2", start=(1, 0))
+    lemniscate = build("lemniscate", curve, gqm.Gravity())
+    for contact, first in (("bilateral", ["singular-point"]), ("above", ["singular-point"])):
+        motion = lemniscate.solve(0, 6, -1, contact=contact)
+        assert [event.kind for event in motion.events] == first
+    assert [event.kind for event in lemniscate.solve(0, 6).events] == ["contact-sign", "singular-point"]
+
+
+def test_a_ball_does_not_roll_over_corners(build: Build) -> None:
+    """The centre of a ball has no path beside a corner."""
+    with pytest.raises(LaunchError, match=r"radius: the track has a corner at s = 1\.414.*round the corners off"):
+        build("ball_on_planes", VEE, BALL).solve("1/10")
+
+
+def test_a_ball_that_will_not_fit_is_told_at_once(build: Build) -> None:
+    """Waves that become ever narrower: the ball fits where it is launched, and not where it comes to."""
+    waves = build("narrower", gqm.Curve.graph("-x + sin(x**2/20)", parameter="x"), BALL)
+    with pytest.raises(SolutionError, match=r"does not fit into the track at x = 45\.9.* where it comes after 6\.46"):
+        waves.solve(0, 1)
+    assert waves.solve(0, 1, radius="1/1000000").state(1.0).v > 0.0
+
+
+def test_floats_of_points_mean_their_binary_values() -> None:
+    """Every digit of a float is kept, so that the track goes through the very point; text stays as it is written."""
+    floats = gqm.Curve.sampled([(k / 10, (k / 10) ** 2) for k in range(-7, 8)])
+    for given, kept in zip(range(-7, 8), floats.definition.points.splitlines(), strict=True):
+        for value, text in zip((given / 10, (given / 10) ** 2), kept.split(), strict=True):
+            assert read_number(text, where="point").fraction == Fraction(value)
+    texts = gqm.Curve.sampled([(str(k / 10), str(Decimal(k * k) / 100)) for k in range(-7, 8)])
+    assert texts.definition.points.splitlines()[0] == "-0.7 0.49"
+    assert gqm.Curve.sampled([(2**60, 0), (0, 2**60 + 1)], kind="linear").definition.points.endswith(str(2**60 + 1))
+
+
+# What is given for a number: extremes, and what is none.
+ODD: tuple[Any, ...] = (
+    *(5e-324, 1e-320, 1e17, -1e17, 1e155, 1e300, math.nan, math.inf, -math.inf, True, np.bool_(True), 10**400, 1j),
+    *("", "x", "1e400", "nan", "1/0", "(-1)**(1/2)", "0.25 ", b"1", Fraction(1, 3), Decimal("0.1"), Decimal("NaN")),
+    *(Decimal("1e1000"), np.float32(0.25), np.int8(1), np.longdouble("0.3"), np.float64("nan"), None, {}, [], [0.25]),
+    *(np.array(0.25), np.array([0.25]), np.array([0.25, 0.5]), np.array(["a"]), np.array([None]), object(), math.sin),
+    *(np.timedelta64(5, "ms"), np.datetime64("2020-01-01")),
+)
+
+
+def calls(module: ModuleType, odd: Any) -> Iterator[tuple[str, Callable[[], Any]]]:
+    """Calls with an odd number for one argument, by the argument's name."""
+    given = {name: 1 for name, default in module.PARAMETERS.items() if default is None}
+    yield "lam0", lambda: module.solve(odd, **given).state(1e-3)
+    for name in ("v0", "direction", "t_max", "g"):
+        yield name, lambda name=name: module.solve(**{"lam0": 0.3, "t_max": 1.0, **given, name: odd}).state(1e-3)
+    yield "lam", lambda: module.pass1(odd, lam0=0.3, **given)
+    motion = module.solve(0.3, **given, t_max=10.0)
+    for name in ("lam", "state", "error_bound"):
+        yield "t", lambda name=name: getattr(motion, name)(odd)
+    yield "lam", lambda: motion.time_at(odd)
+    yield "t1", lambda: motion.events_between(odd, 0.1)
+    yield "digits", lambda: motion.period_to(odd)
+
+
+@pytest.mark.parametrize("name", ["circle", "circle_coulomb", "track"])
+def test_odd_numbers_are_answered_or_refused(name: str) -> None:
+    """Whatever is given for a number, the answer is one, or an error of this package, or names the argument."""
+    module = __import__(f"generated.{name}", fromlist=[name])
+    for odd in ODD:
+        for argument, call in calls(module, odd):
+            try:
+                call()
+            except GQMError:
+                continue
+            except TypeError as error:
+                assert argument in str(error), (odd, argument)
+
+
+def test_one_element_is_an_array_and_none_is_a_number() -> None:
+    """Arrays of no dimension are numbers; those of one element stay arrays of one element, in every answer."""
+    from generated import circle, circle_coulomb, kepler
+
+    for module in (circle, circle_coulomb, kepler):
+        motion = module.solve("1/3")
+
+        def answers(given: Any, module: Any = module, motion: Any = motion) -> tuple[Any, ...]:
+            return (motion.lam(given), motion.error_bound(given), *motion.state(given), *module.pass1(given, lam0=0.3))
+
+        for number in (0.1, np.float64(0.1), np.array(0.1), "1/10"):
+            assert {np.shape(answer) for answer in answers(number)} == {()}
+        for column in ([0.1], np.array([0.1]), ("1/10",)):
+            assert {np.shape(answer) for answer in answers(column)} == {(1,)}
+        assert {type(motion.lam(t)) for t in (0.1, np.array(0.1), "1/10", np.float32(0.1))} == {float}
+
+
+def test_an_interval_of_too_many_events_is_refused() -> None:
+    """Rather than listed for hours."""
+    from generated import circle
+
+    with pytest.raises(InputError, match=r"events_between: .* ask for a shorter interval"):
+        circle.solve("1/3").events_between(0, 1e9)
+
+
+def test_what_is_no_model_is_refused_by_name() -> None:
+    """The argument is named, and what it must be."""
+    for given in (None, "circle", gqm.Gravity()):
+        with pytest.raises((GQMError, TypeError), match="model"):
+            gqm.emit(given, name="none")
+    assert issubclass(DeclarationError, GQMError)
+
+
+@pytest.mark.parametrize(
+    ("name", "force"), [("vee", gqm.Gravity()), ("rough_vee", gqm.Gravity() + gqm.CoulombFriction(mu="1/10"))]
+)
+def test_a_corner_is_an_event_with_friction_and_without(name: str, force: Any, build: Build) -> None:
+    """Its speed kept, the body passes each corner between two turns, and a leg ends there; at rest on it it stays."""
+    motion = build(name, VEE, force).solve(1)
+    first = [(event.kind, event.lam) for event in motion.events[:4] if event.kind == "corner"]
+    assert first == [("corner", pytest.approx(math.sqrt(2), rel=1e-15))] * 2
+    assert [leg.end for leg in motion.legs[:4]] == ["corner", "turn", "corner", "turn"]
+    before, after = motion.legs[:2]
+    assert (before.lam_end, before.t_end) == (after.lam_start, after.t_start)
+    assert motion.events[0].t == before.t_end
+    resting = build(name, VEE, force).solve("sqrt(2)")
+    assert (resting.kind, [event.kind for event in resting.events]) == ("rest", ["rest"])
+
+
+def test_at_rest_at_a_cusp(build: Build) -> None:
+    """A body stays where the tangent of the cusp is level, as nothing moves it, and falls from any other cusp."""
+    deltoid = gqm.Curve.parametric(x="2*cos(t) + cos(2*t)", z="2*sin(t) - sin(2*t)", parameter="t", period="2*pi")
+    nephroid = gqm.Curve.parametric(x="3*cos(t) - cos(3*t)", z="3*sin(t) - sin(3*t)", parameter="t", period="2*pi")
+    for name, curve, level in (("deltoid", deltoid, ("0",)), ("nephroid", nephroid, ("0", "pi"))):
+        for lam0 in level:
+            assert build(name, curve, gqm.Gravity()).solve(lam0).kind == "rest"
+    motion = build("deltoid", deltoid, gqm.Gravity()).solve("2*pi/3")
+    assert [event.kind for event in motion.events] == ["contact-sign", "cusp"]
+    # Down the arc to the lowest cusp: dt = ds/V, with V**2 = 2 g (z0 - z).
+    with mp.workdps(40):
+        top = mpf(3) * mp.sqrt(3) / 2
+        speed = lambda t: mp.sqrt(2 * mpf("9.81") * (top - 2 * mp.sin(t) + mp.sin(2 * t)))  # noqa: E731
+        edges = mp.linspace(2 * mp.pi / 3, 4 * mp.pi / 3, 9)
+        fall = mp.quad(lambda t: 4 * mp.sin(3 * t / 2) / speed(t), edges, method="gauss-legendre")
+    assert motion.t_end == pytest.approx(float(abs(fall)), rel=1e-14)
+
+
+@pytest.mark.parametrize("height", ["1/1000", "1/100"])
+def test_a_very_flat_bowl(height: str, build: Build) -> None:
+    """Released on z = x**20 a body takes up to 10**26 s to the other side, by the beta function."""
+    motion = build("flat_bowl", gqm.Curve.graph("x**20", parameter="x"), gqm.Gravity()).solve(height)
+    a, power = mpf(1) / int(height.split("/")[1]), mpf(1) / 20
+    half = 2 * a**-9 * mp.sqrt(mp.pi / (2 * G)) * mp.gamma(1 + power) / mp.gamma(mpf(1) / 2 + power)
+    assert motion.turning_points == (float(a), -float(a))
+    assert motion.half_period == pytest.approx(float(half), rel=1e-15)

@@ -1,0 +1,28 @@
+"""Everything can be compiled beforehand, and is then found in the cache."""
+
+import ast
+from pathlib import Path
+
+from gqm_sym.runtime import warm
+from gqm_sym.runtime.compiled.stamps import FOLDER
+
+
+def test_every_entry_point_is_found() -> None:
+    """The files with an entry point or a `Later`, as Python's own parser sees them; the slow ones come first."""
+
+    def has_entry(path: Path) -> bool:
+        tree = ast.parse(path.read_text(encoding="utf-8"))
+        functions = [node for node in tree.body if isinstance(node, ast.FunctionDef)]
+        calls = [d for node in functions for d in node.decorator_list if isinstance(d, ast.Call)]
+        calls += [node.value for node in tree.body if isinstance(node, ast.Assign) and isinstance(node.value, ast.Call)]
+        return any(isinstance(call.func, ast.Name) and call.func.id in ("entry", "Later") for call in calls)
+
+    names = {".".join(p.relative_to(FOLDER).with_suffix("").parts) for p in FOLDER.rglob("*.py") if has_entry(p)}
+    found = warm.rooms()
+    assert set(found) == names
+    assert tuple(found[: len(warm.LONGEST)]) == warm.LONGEST
+
+
+def test_a_room_is_compiled() -> None:
+    """The entry points of a small file; a second time they come from the cache."""
+    assert warm.compile_room("arithmetic.doubledouble") == "arithmetic.doubledouble"
