@@ -89,8 +89,8 @@ FIRST_PANEL_SHARE = 0.25
 LAPS_AHEAD = 8
 
 # The first panel of a body released near an equilibrium in units of the distance to it, and how often the step to it is
-# halved at most.
-FIRST_STEPS, MAX_HALVINGS = 8.0, 1000
+# halved at most; over such a distance the force grows by this factor at most.
+FIRST_STEPS, MAX_HALVINGS, MAX_FORCE_GROWTH = 8.0, 1000, 4.0
 
 # The length of a panel, as a share of the first step of a search, at which a body that pauses creeps towards an
 # equilibrium that it never reaches.
@@ -164,9 +164,9 @@ def leaving(dissipation, p, joints, body, place, preferred):  # type: ignore[no-
 
 @Inner
 def near_start(dissipation, p, place, direction, step):  # type: ignore[no-untyped-def]
-    """A distance over which the force on a body released at a place keeps its sign, where ``step`` is too long.
+    """A distance over which the force on a body released at a place is about the same, where ``step`` is too long.
 
-    Next to an equilibrium a body turns after a distance that no other length of the curve tells of.
+    Next to an equilibrium a body turns, or moves on, by a distance that no other length of the curve tells of.
     """
     v, point = int(direction), point_buffer()
     forces = Forces(dissipation.speed_equation, p, dissipation.friction, False, dissipation.linear, v)
@@ -174,7 +174,7 @@ def near_start(dissipation, p, place, direction, step):  # type: ignore[no-untyp
     slope = slope_of_v2(forces, place, LEAST_V2, contact_sign, point)
     for _ in range(MAX_HALVINGS):
         ahead = slope_of_v2(forces, place + v * step, LEAST_V2, contact_sign, point)
-        if ahead > 0.0 or not slope > 0.0 or step <= CLEARANCE_SHARE * fabs(place):
+        if 0.0 < ahead <= MAX_FORCE_GROWTH * slope or not slope > 0.0 or step <= CLEARANCE_SHARE * fabs(place):
             break
         step *= 0.5
     return FIRST_STEPS * step

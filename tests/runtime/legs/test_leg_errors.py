@@ -110,6 +110,20 @@ def test_small_swings_in_a_valley(amplitude: str, build: Build) -> None:
     assert state.error <= 1e-12 * float(amplitude)
 
 
+@pytest.mark.parametrize("start", ["1e-10", "1e-20", "1e-100"])
+def test_from_beside_a_hilltop(start: str, build: Build) -> None:
+    """So near to the top of z = -x**2/2 the body is at x0 cosh(sqrt(g) t), drag or not."""
+    module = build("hilltop", gqm.Curve.graph("-x**2/2"), gqm.QuadraticDrag(b="b"))
+    for factor in (mpf(3), mpf("1e-15") / mpf(start)) if mpf(start) < mpf("1e-16") else (mpf(2),):
+        with mp.workdps(40):
+            t = mp.acosh(factor) / mp.sqrt(G)
+            exact = mpf(start) * mp.cosh(mp.sqrt(G) * mpf(float(t)))
+        state = module.solve(start, b="1/10").state(float(t))
+        drag = mpf(start) * mpf("1e-9") if start == "1e-10" else 0
+        assert abs(state.lam - exact) <= mpf("1e-13") * exact + drag
+        assert state.error <= 2e-15
+
+
 def test_a_resistance_that_never_stops_a_swing(build: Build) -> None:
     """Resistance c V on a ring: small swings last for ever, each damped by exp(-c/2 half)."""
     module = build("viscous_ring", gqm.families.circle(L=1), gqm.Kernel.law("-c*direction*sqrt(W)"))
