@@ -149,6 +149,25 @@ def test_rolling_in_a_hoop(tmp_path: Path) -> None:
     assert swept.status.tolist() == [0, STATUS_SENTENCES.index("the launch is refused; solve says why")]
 
 
+def test_fastest_place_beside_the_launch(tmp_path: Path) -> None:
+    """Going round an ellipse from beside its lowest place, a ball is fastest behind its launch, as energy has it."""
+    ellipse = gqm.Curve.parametric(x="2*cos(u)", z="sin(u)", parameter="u", period="2*pi")
+    force = gqm.Gravity() + gqm.Rolling(beta="2/5", radius="rho")
+    module = gqm.build(gqm.derive(ellipse, force), name="ellipse_ball", folder=tmp_path)
+    for lam0, sense in ((-1.5528, 1), (-1.5888, -1)):
+        root = np.sqrt(np.cos(lam0) ** 2 + 4 * np.sin(lam0) ** 2)
+        height = 1.0 + np.sin(lam0) - 0.05 * (1.0 + 2 * np.sin(lam0) / root)
+        swept = module.sweep("v_max", lam0, 6.0, sense, rho=0.05)
+        assert float(swept.values) == pytest.approx(np.sqrt(36.0 + 2 * float(G) * height / 1.4), rel=ROUNDING)
+        assert swept.route_counts() == {"single": 1}
+
+
+def test_a_place_far_away_does_not_stop_a_sweep(module_of: Callable[[str], ModuleType]) -> None:
+    """Where doubles no longer tell places apart there is no answer; the other launches have theirs."""
+    swept = module_of("circle").sweep("half_period", [1e17, 0.5], L=1)
+    assert np.isnan(swept.values).tolist() == [True, False]
+
+
 def test_parameters_of_every_launch(bend: ModuleType) -> None:
     """Parameters of every launch, and one of which no rail can be made: only that one is refused."""
     mass, radius = np.linspace(1.0, 20.0, 12), np.where(np.arange(12) == 5, -1.0, 0.5)
