@@ -123,7 +123,9 @@ def test_the_error_bound_holds_at_any_time(motion_of: MotionOf) -> None:
     motion = motion_of(EXAMPLE)
     times = np.geomspace(1e-3, 1e9, 300)
     found, bounds = motion.lam(times), motion.error_bound(times)
-    assert np.allclose(motion.state(times).error, bounds, rtol=1e-9, atol=0.0)
+    # A state has the largest error on its interval of the table.
+    ratio = motion.state(times).error / bounds
+    assert 1.0 - 1e-5 <= ratio.min() <= ratio.max() < 1.25
     with mp.workdps(50):
         frequency, amplitude, lowest = mp.sqrt(number("9.81")), number("6/5"), -mp.pi / 2
         for t, lam, bound in zip(times, found, bounds, strict=True):

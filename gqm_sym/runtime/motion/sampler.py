@@ -106,6 +106,10 @@ class Sampler:
             lengths = self.trajectory.lap_length, problem.arc_origin, self.trajectory.segments[0].s_a
             intervals = segment.table[3]
             owners = np.clip(np.searchsorted(segment.edges, intervals[:, 0], side="right") - 1, 0, len(panels[2]) - 2)
+            # The part of the error that changes within an interval of the table is largest at one of its ends, where
+            # the powers are those of -1 and 1.
+            starts, stops = intervals @ (-1.0) ** np.arange(intervals.shape[1]), intervals.sum(axis=1)
+            both_ends = starts + 1e-9 * (stops - starts), stops
             middles = 0.5 * (segment.edges[1:] + segment.edges[:-1])
             self._sections |= {
                 records.LAUNCH: np.array([problem.lam0, self._v0, *lengths, *self._time_drift()], dtype=np.float64),
@@ -114,7 +118,7 @@ class Sampler:
                 records.LENGTHS: panels[2],
                 records.ARCS: panels[4],
                 records.TIME_ERRORS: segment.time_error(middles),
-                records.TABLE_ERRORS: segment.inversion_error(intervals.sum(axis=1)),
+                records.TABLE_ERRORS: np.maximum(*(segment.inversion_error(phi) for phi in both_ends)),
                 records.OWNERS: owners.astype(np.int64),
             }
             self._state_record = records.record(self._sections)

@@ -208,10 +208,10 @@ def test_closing_is_seen() -> None:
 
 
 def test_text_travels_as_it_is(tmp_path: Path) -> None:
-    """Decimal text is kept to the letter, in the declaration and in the module; other numbers as the nearest double."""
+    """Decimal text is kept to the letter, in the declaration and in the module; other numbers by their doubles."""
     rows = [("0.10", "1"), ("+2.50000000000000000001", "1e-3"), (3, Fraction(1, 3))]
     curve = gqm.Curve.sampled(rows, kind="linear")
-    kept = "0.10 1\n+2.50000000000000000001 1e-3\n3.0 0.3333333333333333"
+    kept = "0.10 1\n+2.50000000000000000001 1e-3\n3 0.333333333333333314829616256247390992939472198486328125"
     assert curve.definition.points == kept
     source = gqm.emit(gqm.derive(curve, gqm.Gravity()), name="exact")
     assert f'POINTS = """\n{kept}\n"""' in source
@@ -270,7 +270,9 @@ def spec(folder: Path, points: str, data: bytes | str | None, file: str = "track
     return gqm.read_spec(folder / "track.yaml").curve
 
 
-ROWS = "\n".join(f"{x!r},{z!r}" for x, z in LINE)
+# A file has decimal text, which is exact, and not the doubles nearest to it.
+TEXTS = [(repr(x), repr(z)) for x, z in LINE]
+ROWS = "\n".join(f"{x},{z}" for x, z in TEXTS)
 
 
 @pytest.mark.parametrize(
@@ -278,14 +280,14 @@ ROWS = "\n".join(f"{x!r},{z!r}" for x, z in LINE)
 )
 def test_points_of_a_file(tmp_path: Path, data: str) -> None:
     """A header may be there; columns are separated by commas, semicolons or blanks."""
-    assert spec(tmp_path, "track.csv", data).definition == gqm.Curve.sampled(LINE).definition
+    assert spec(tmp_path, "track.csv", data).definition == gqm.Curve.sampled(TEXTS).definition
 
 
 def test_options_of_a_file(tmp_path: Path) -> None:
     """The kind and whether it closes, and a folder inside."""
     (tmp_path / "data").mkdir()
     track = spec(tmp_path, "{file: data/a.csv, kind: linear, closed: true}", ROWS, "data/a.csv").definition
-    assert track == gqm.Curve.sampled(LINE, kind="linear", closed=True).definition
+    assert track == gqm.Curve.sampled(TEXTS, kind="linear", closed=True).definition
 
 
 @pytest.mark.parametrize(
