@@ -37,8 +37,8 @@ NEGLIGIBLE = 1e-2
 MAX_PARTS = 4
 
 # A row of the table: values at the Gauss points and weights in m; the same for fewer points; powers of x in [-1, 1] for
-# the potential as (1 + x)*left(x) = INCREASE - (1 - x)*right(x), for ds/dlam, m*kappa and m*n0; the potential, m*kappa and
-# m*n0 at the samples; and single numbers.
+# the potential as (1 + x)*left(x) = INCREASE - (1 - x)*right(x), for ds/dlam, m*kappa and m*n0; the potential, m*kappa
+# and m*n0 at the samples; and single numbers.
 POTENTIAL, WEIGHTS = 0, NODES
 FEW_POTENTIAL, FEW_WEIGHTS = 2 * NODES, 2 * NODES + FEW_NODES
 LEFT_TERMS, RIGHT_TERMS, DS_TERMS, KAPPA_TERMS, LOAD_TERMS = (2 * FEW_NODES + k * NODES for k in range(2, 7))
