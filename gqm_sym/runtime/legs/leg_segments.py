@@ -25,6 +25,7 @@ from gqm_sym.runtime.legs.leg_record import (
     TIME_ERROR,
     Y_ROW,
 )
+from gqm_sym.runtime.legs.local_frame import Frame
 from gqm_sym.runtime.legs.polynomials import WIDE
 from gqm_sym.runtime.motion.segment import Segment
 from gqm_sym.runtime.quadrature.substitution import FROM_TURN, REGULAR, TO_EQUILIBRIUM
@@ -81,11 +82,14 @@ class Run(NamedTuple):
         What ended it (`leg_run`).
     end : str
         The name of its end, as of `Leg.end`.
+    frame : Frame or None
+        The surroundings of an equilibrium by which it was followed.
     """
 
     record: Array
     what: int
     end: str
+    frame: Frame | None
 
     @property
     def laps(self) -> int:
