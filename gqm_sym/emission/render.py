@@ -143,6 +143,7 @@ def _model_fields(module: ModuleIR, names: list[str]) -> dict[str, Any]:
         ),
         "later": ", ".join(f"{name}={name}" for name in _ADDRESSES if name in later),
         "inertia": next((f.name for f in module.exact if f.name == "exact_inertia"), ""),
+        "trigonometric": next((f.name for f in module.exact if f.name == "exact_trigonometric"), ""),
         "load_map": "load_map" if "load_map" in names else "",
         "batch": _listed(_batch(module), _WIDTH - 8),
         "chart": module.chart.statement if module.chart else "",
