@@ -34,6 +34,7 @@ from gqm_sym.runtime.legs.body import (
     TURNS,
     launched,
 )
+from gqm_sym.runtime.legs.frames.local_frame import SMALL_SHARE, Frame, frame_near, may_be_small
 from gqm_sym.runtime.legs.leg_errors import Errors, carry
 from gqm_sym.runtime.legs.leg_record import (
     BEGIN,
@@ -47,7 +48,6 @@ from gqm_sym.runtime.legs.leg_record import (
 )
 from gqm_sym.runtime.legs.leg_run import ASYMPTOTE, FULL, LIFTOFF, LIMIT, NARROWED, SPENT, TURN
 from gqm_sym.runtime.legs.leg_segments import Run, along_field, along_panels
-from gqm_sym.runtime.legs.local_frame import SMALL_SHARE, Frame, frame_near, may_be_small
 from gqm_sym.runtime.motion.aperiodic import MotionAtRest
 from gqm_sym.runtime.motion.events import passages
 from gqm_sym.runtime.motion.locking import locked

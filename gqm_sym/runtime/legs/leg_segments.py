@@ -11,6 +11,7 @@ from gqm_sym.runtime.compiled.jit import entry
 from gqm_sym.runtime.compiled.types import MATRIX, VECTOR, Array
 from gqm_sym.runtime.launch.functions import BoundFunctions
 from gqm_sym.runtime.legs.approach import COLUMNS as FIELD
+from gqm_sym.runtime.legs.frames.local_frame import Frame
 from gqm_sym.runtime.legs.leg_reading import to_integral, to_plain
 from gqm_sym.runtime.legs.leg_record import (
     AHEAD,
@@ -25,7 +26,6 @@ from gqm_sym.runtime.legs.leg_record import (
     TIME_ERROR,
     Y_ROW,
 )
-from gqm_sym.runtime.legs.local_frame import Frame
 from gqm_sym.runtime.legs.polynomials import WIDE
 from gqm_sym.runtime.motion.segment import Segment
 from gqm_sym.runtime.quadrature.substitution import FROM_TURN, REGULAR, TO_EQUILIBRIUM
