@@ -484,6 +484,8 @@ class ChartPassage:
             Two doubles each, with a bound on the error; None where one is not found.
         """
         found, curve = self._found, self._pieces.curve
+        if self._direction and not len(phases):
+            return np.zeros((1, 3))
         if self._direction:
             stops = np.empty((len(phases), 3))
             total = np.sum(curve.lengths[:, 0])
