@@ -140,6 +140,7 @@ TESTED_THROUGH = {
     "sweep/batch/turning_points.py": "runtime/sweep/batch/test_batches.py",
     "sweep/cluster.py": "studies/test_studies.py",
     "sweep/curve_table.py": "runtime/sweep/test_charts.py",
+    "sweep/gradients.py": "runtime/gradients/test_sweep.py",
     "sweep/liftoff.py": "runtime/sweep/test_charts.py",
     "sweep/orbit.py": "runtime/sweep/test_sweep.py",
     "sweep/orbit_extremes.py": "runtime/sweep/test_sweep.py",

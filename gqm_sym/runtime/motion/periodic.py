@@ -12,11 +12,10 @@ from gqm_sym.literals.numbers import read_number
 from gqm_sym.runtime.arithmetic.doubledouble import ULP, ZERO
 from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.double_double.orbit_time import Orbit
-from gqm_sym.runtime.gradients.orbit import UNDECIDED, OrbitDerivatives
+from gqm_sym.runtime.gradients.orbit import OrbitDerivatives
 from gqm_sym.runtime.gradients.quantities import gradient, selected
 from gqm_sym.runtime.gradients.sensitivity import OrbitSensitivity, Sensitivity
 from gqm_sym.runtime.gradients.spectrum import Fourier, fourier
-from gqm_sym.runtime.interface import ExactFormulas
 from gqm_sym.runtime.launch.kinds import MotionKind
 from gqm_sym.runtime.launch.problem import Problem
 from gqm_sym.runtime.motion import timing
@@ -165,10 +164,6 @@ class PeriodicMotion(Motion):
     @cached_property
     def _derivatives(self) -> OrbitDerivatives:
         """The orbit with its derivatives."""
-        if not isinstance(self.problem.formulas.exact, ExactFormulas):
-            raise SolutionError("gradients: curves without formulas have none yet; declare the curve by formulas")
-        if self._orbit is None:
-            raise SolutionError(UNDECIDED)
         return OrbitDerivatives(self.problem, self._orbit, self.direction if self.kind == "circulation" else 0)
 
     @cached_property
