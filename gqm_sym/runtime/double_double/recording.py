@@ -71,7 +71,7 @@ class BoundTape(NamedTuple):
     parameters: Array
 
 
-class _Number:
+class TapeNumber:
     """A number in a formula that is being recorded: a rational number, or the register that will contain it."""
 
     __slots__ = ("_tape", "known", "register")
@@ -79,7 +79,7 @@ class _Number:
     def __init__(self, tape: "_Recorder", register: int = -1, known: Fraction | None = None) -> None:
         self._tape, self.register, self.known = tape, register, known
 
-    def _with(self, code: int, other: Any, *, turned: bool = False) -> "_Number":
+    def _with(self, code: int, other: Any, *, turned: bool = False) -> "TapeNumber":
         other = self._tape.number(other)
         a, b = (other, self) if turned else (self, other)
         if a.known is not None and b.known is not None and not (code == interpreter.DIVIDE and b.known == 0):
@@ -92,33 +92,33 @@ class _Number:
             return self._tape.number(exact[code](b.known))
         return self._tape.result(code, a, b)
 
-    def __add__(self, other: Any) -> "_Number":
+    def __add__(self, other: Any) -> "TapeNumber":
         return self._with(interpreter.ADD, other)
 
-    def __sub__(self, other: Any) -> "_Number":
+    def __sub__(self, other: Any) -> "TapeNumber":
         return self._with(interpreter.SUBTRACT, other)
 
-    def __rsub__(self, other: Any) -> "_Number":
+    def __rsub__(self, other: Any) -> "TapeNumber":
         return self._with(interpreter.SUBTRACT, other, turned=True)
 
-    def __mul__(self, other: Any) -> "_Number":
+    def __mul__(self, other: Any) -> "TapeNumber":
         return self._with(interpreter.MULTIPLY, other)
 
-    def __truediv__(self, other: Any) -> "_Number":
+    def __truediv__(self, other: Any) -> "TapeNumber":
         return self._with(interpreter.DIVIDE, other)
 
-    def __rtruediv__(self, other: Any) -> "_Number":
+    def __rtruediv__(self, other: Any) -> "TapeNumber":
         return self._with(interpreter.DIVIDE, other, turned=True)
 
     __radd__, __rmul__ = __add__, __mul__
 
-    def __neg__(self) -> "_Number":
+    def __neg__(self) -> "TapeNumber":
         return -1 * self
 
-    def __abs__(self) -> "_Number":
+    def __abs__(self) -> "TapeNumber":
         return self._tape.result(interpreter.ABSOLUTE, self)
 
-    def __pow__(self, other: Any) -> "_Number":
+    def __pow__(self, other: Any) -> "TapeNumber":
         exponent = self._tape.number(other)
         if exponent.known is None or exponent.known.denominator > 2:
             return self._tape.exp(exponent * self._tape.log(self))
@@ -126,10 +126,10 @@ class _Number:
         power = base.to(abs(exponent.known.numerator))
         return 1 / power if exponent.known < 0 else power
 
-    def __rpow__(self, other: Any) -> "_Number":
+    def __rpow__(self, other: Any) -> "TapeNumber":
         return self._tape.number(other) ** self
 
-    def to(self, count: int) -> "_Number":
+    def to(self, count: int) -> "TapeNumber":
         """Return the product of so many factors."""
         if count < 2:
             return self if count else self._tape.number(1)
@@ -144,8 +144,8 @@ class _Recorder:
         # Each entry is what is done and to which registers. A constant is its doubles.
         self.entries: list[tuple[Any, ...]] = [*((("parameter", k)) for k in range(parameters)), ("place",)]
         self._known: dict[tuple[Any, ...], int] = {entry: k for k, entry in enumerate(self.entries)}
-        self.values = tuple(_Number(self, k) for k in range(parameters))
-        self.place = _Number(self, parameters)
+        self.values = tuple(TapeNumber(self, k) for k in range(parameters))
+        self.place = TapeNumber(self, parameters)
         self.pi, self.e = self._constant(PI), self._constant(E)
 
     def _entry(self, *entry: Any) -> int:
@@ -156,12 +156,12 @@ class _Recorder:
                 self.entries.append(("cosine", entry[1]))
         return self._known[entry]
 
-    def _constant(self, pair: tuple[float, float]) -> _Number:
-        return _Number(self, self._entry("constant", *pair))
+    def _constant(self, pair: tuple[float, float]) -> TapeNumber:
+        return TapeNumber(self, self._entry("constant", *pair))
 
-    def number(self, value: Any) -> _Number:
+    def number(self, value: Any) -> TapeNumber:
         """Return an operand as a number of this tape."""
-        return value if isinstance(value, _Number) else _Number(self, known=Fraction(value))
+        return value if isinstance(value, TapeNumber) else TapeNumber(self, known=Fraction(value))
 
     mpf = number
 
@@ -170,53 +170,53 @@ class _Recorder:
         number = self.number(value)
         return number.register if number.known is None else self._entry("constant", *split(number.known))
 
-    def result(self, code: int, *operands: _Number) -> _Number:
+    def result(self, code: int, *operands: TapeNumber) -> TapeNumber:
         """Record an operation, unless it has been recorded before, and return its result."""
-        return _Number(self, self._entry(code, *map(self.register, operands)))
+        return TapeNumber(self, self._entry(code, *map(self.register, operands)))
 
-    def sqrt(self, x: Any) -> _Number:
+    def sqrt(self, x: Any) -> TapeNumber:
         return self.result(interpreter.SQUARE_ROOT, self.number(x))
 
-    def exp(self, x: Any) -> _Number:
+    def exp(self, x: Any) -> TapeNumber:
         return self.result(interpreter.EXPONENTIAL, self.number(x))
 
-    def log(self, x: Any) -> _Number:
+    def log(self, x: Any) -> TapeNumber:
         return self.result(interpreter.LOGARITHM, self.number(x))
 
-    def sin(self, x: Any) -> _Number:
+    def sin(self, x: Any) -> TapeNumber:
         return self.result(interpreter.SINE_COSINE, self.number(x))
 
-    def cos(self, x: Any) -> _Number:
-        return _Number(self, self.sin(x).register + 1)
+    def cos(self, x: Any) -> TapeNumber:
+        return TapeNumber(self, self.sin(x).register + 1)
 
-    def tan(self, x: Any) -> _Number:
+    def tan(self, x: Any) -> TapeNumber:
         return self.sin(x) / self.cos(x)
 
-    def atan(self, x: Any) -> _Number:
+    def atan(self, x: Any) -> TapeNumber:
         return self.result(interpreter.ARC_TANGENT, self.number(x))
 
-    def asin(self, x: Any) -> _Number:
+    def asin(self, x: Any) -> TapeNumber:
         return self.atan(x / self.sqrt(1 - x * x))
 
-    def acos(self, x: Any) -> _Number:
+    def acos(self, x: Any) -> TapeNumber:
         return self.pi / 2 - self.asin(x)
 
-    def cosh(self, x: Any) -> _Number:
+    def cosh(self, x: Any) -> TapeNumber:
         return (self.exp(x) + 1 / self.exp(x)) / 2
 
-    def sinh(self, x: Any) -> _Number:
+    def sinh(self, x: Any) -> TapeNumber:
         return (self.exp(x) - 1 / self.exp(x)) / 2
 
-    def tanh(self, x: Any) -> _Number:
+    def tanh(self, x: Any) -> TapeNumber:
         return self.sinh(x) / self.cosh(x)
 
-    def asinh(self, x: Any) -> _Number:
+    def asinh(self, x: Any) -> TapeNumber:
         return self.log(x + self.sqrt(x * x + 1))
 
-    def acosh(self, x: Any) -> _Number:
+    def acosh(self, x: Any) -> TapeNumber:
         return self.log(x + self.sqrt(x * x - 1))
 
-    def atanh(self, x: Any) -> _Number:
+    def atanh(self, x: Any) -> TapeNumber:
         return self.log((1 + x) / (1 - x)) / 2
 
     def depend_on_place(self) -> list[bool]:
@@ -226,6 +226,14 @@ class _Recorder:
             is_operation = not isinstance(code, str) or code == "cosine"
             depends.append(any(depends[k] for k in operands) if is_operation else code == "place")
         return depends
+
+
+class Recorder(_Recorder):
+    """A tape that is being recorded, whose entries may be read to record more of them."""
+
+    def at(self, register: int) -> TapeNumber:
+        """Return the number that a register will contain."""
+        return TapeNumber(self, register)
 
 
 @lru_cache(maxsize=64)

@@ -161,8 +161,8 @@ def peak(terms, lo, hi, sign):  # type: ignore[no-untyped-def]
             sign * chebyshev_sum(terms, x + step),
         )
         best = max(best, f1)
-        bend = f0 - 2.0 * f1 + f2
-        move = min(max(0.5 * step * (f0 - f2) / bend, -step), step) if bend < 0.0 else (step if f2 > f0 else -step)
+        second = f0 - 2.0 * f1 + f2
+        move = min(max(0.5 * step * (f0 - f2) / second, -step), step) if second < 0.0 else (step if f2 > f0 else -step)
         x = min(max(x + move, lo), hi)
         if step <= FLAT_PART or (fabs(move) <= 1e-3 * step and step <= 1e-4):
             break

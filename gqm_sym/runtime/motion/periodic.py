@@ -7,10 +7,16 @@ from typing import Any
 import numpy as np
 
 from gqm_sym.errors import InputError, SolutionError
+from gqm_sym.literals.namespaces import FLOATS
 from gqm_sym.literals.numbers import read_number
 from gqm_sym.runtime.arithmetic.doubledouble import ULP, ZERO
 from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.double_double.orbit_time import Orbit
+from gqm_sym.runtime.gradients.orbit import UNDECIDED, OrbitDerivatives
+from gqm_sym.runtime.gradients.quantities import gradient, selected
+from gqm_sym.runtime.gradients.sensitivity import OrbitSensitivity, Sensitivity
+from gqm_sym.runtime.gradients.spectrum import Fourier, fourier
+from gqm_sym.runtime.interface import ExactFormulas
 from gqm_sym.runtime.launch.kinds import MotionKind
 from gqm_sym.runtime.launch.problem import Problem
 from gqm_sym.runtime.motion import timing
@@ -150,6 +156,53 @@ class PeriodicMotion(Motion):
                 "declare the curve by formulas for more"
             )
         return timing.period_to(self.problem, self.kind, self.direction, self._segment, digits)
+
+    @cached_property
+    def _derivatives(self) -> OrbitDerivatives:
+        """The orbit with its derivatives."""
+        if not isinstance(self.problem.formulas.exact, ExactFormulas):
+            raise SolutionError("gradients: curves without formulas have none yet; declare the curve by formulas")
+        if self._orbit is None:
+            raise SolutionError(UNDECIDED)
+        return OrbitDerivatives(self.problem, self._orbit, self.direction if self.kind == "circulation" else 0)
+
+    @cached_property
+    def _orbit_sensitivity(self) -> OrbitSensitivity:
+        return OrbitSensitivity(self._derivatives)
+
+    @locked
+    def gradient(self, quantity: str, wrt: Any = None) -> dict[str, Any]:
+        """The derivatives of a quantity of this motion by names; see `Motion.gradient`."""
+        return gradient(self._derivatives, self, quantity, wrt)
+
+    @property
+    @locked
+    def action(self) -> float:
+        """The integral of (1 + beta) V ds over one period, per mass, in m2/s."""
+        return self._derivatives.action
+
+    @property
+    @locked
+    def period_slope(self) -> float:
+        """dT/dE, the derivative of the period by the energy per mass, in s3/m2."""
+        formulas = self.problem.formulas
+        inertia = 1.0 if formulas.inertia is None else formulas.inertia(FLOATS, self.problem.p.values.tolist())
+        return float(self._derivatives.period_gradient[-1] / inertia)
+
+    @locked
+    def sensitivity(self, t: Any, wrt: Any = None) -> Sensitivity:
+        """The derivatives of the state at given times; see `Motion.sensitivity`."""
+        rows = selected(self.problem.formulas.parameters, wrt)
+        times, low, shape = self._times(t)
+        points = self._phase_points(times, low)
+        found = self._orbit_sensitivity.at(self, points, self._places(points), self._velocities(points))
+        chosen = [array[list(rows.values())].reshape(len(rows), *shape) for array in found]
+        return Sensitivity(tuple(rows), *chosen)
+
+    @locked
+    def fourier(self, quantity: str, n: int) -> Fourier:
+        """The Fourier coefficients of a quantity over one period; see `Motion.fourier`."""
+        return fourier(self, quantity, n)
 
     def __reduce__(self) -> tuple[Any, ...]:
         """As `Motion`, with how exactly its period is known: the last digit of a place depends on it."""

@@ -55,6 +55,9 @@ NEAREST = 1e-300
 # Phase angles of such an approach at which panels begin: near its start, panels must be short.
 APPROACH_MARKS = (8.0, 16.0, 32.0, 64.0, 128.0, 256.0)
 
+# The slope of the time by the phase angle, as a share of its largest, from which on it has enough digits for a speed.
+MIN_TIME_SLOPE = 1e-6
+
 
 @dataclass(slots=True, kw_only=True)
 class Segment:
@@ -369,22 +372,25 @@ class Segment:
 
     def speeds(self, phi: Array) -> Array:
         """|ds/dt| in m/s at phase angles."""
-        f = self.functions
-        if self.from_multiprecision:
-            return self._speeds_from_panels(phi)
-        if self.v2 is not None:
+        f, exact = self.functions, self.from_multiprecision
+        if self.v2 is not None and not exact:
             along: Array = speeds_along(self.a, self.b, self.v2, phi)
             return along
-        if self.speed_series is not None:
+        if self.speed_series is not None and not exact:
             last, terms = self.speed_series
             smooth: Array = read_off_many(self.edges, np.zeros_like(self.edges), terms, phi)
             return smooth * (last * (phi + self.turn_offset)) if self.kind == FROM_TURN else smooth
         speeds: Array = speeds_at(f.addresses, f.p, self.kind, self.a, self.b, self.ref, self.ref_v2, phi)
-        return speeds * self.width_ratio
+        return self._improved_by_panels(phi, speeds) if exact else speeds * self.width_ratio
 
-    def _speeds_from_panels(self, phi: Array) -> Array:
-        """|ds/dt| from the slopes of arc length and time, for segments on which V**2 in doubles is rounding only."""
-        speeds: Array = slopes(self.edges, self.panels[4], phi) / slopes(self.edges, self.panels[3], phi)
+    def _improved_by_panels(self, phi: Array, speeds: Array) -> Array:
+        """|ds/dt| from the slopes of arc length and time, which has digits where V**2 in doubles is rounding only.
+
+        Where the body is so fast that the time hardly grows, its slope has fewer digits than V**2.
+        """
+        lengths, times = slopes(self.edges, self.panels[4], phi), slopes(self.edges, self.panels[3], phi)
+        limit = MIN_TIME_SLOPE * slopes(self.edges, self.panels[3], self.edges).max()
+        np.divide(lengths, times, out=speeds, where=times > limit)
         return speeds
 
     def times(self, phi: Array) -> Array:

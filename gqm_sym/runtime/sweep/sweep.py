@@ -99,7 +99,7 @@ def sweep(
     _check(formulas, named)
     shape = broadcast_shape(named)
     _check_lower_bounds(formulas, named)
-    columns = [widen(array, shape) for array in arrays]
+    columns = [widen(array, shape) for array in (*arrays, *_trigonometric_columns(formulas, parameters, arrays[4:]))]
     size = prod(shape)
     answers = Answers(
         np.full((size, found.width), nan),
@@ -123,7 +123,7 @@ def sweep(
                 answers.put(chosen, some)
     values = answers.values[:, found.columns]
     for k in np.flatnonzero(answers.status == quantities.UNDECIDED):
-        here = [s if np.ndim(s) == 0 else float(c.flat[k % c.size]) for s, c in zip(sources, columns, strict=True)]
+        here = [s if np.ndim(s) == 0 else float(c.flat[k % c.size]) for s, c in zip(sources, columns, strict=False)]
         values[k], answers.status[k] = _solved(solve, found, here, t_max, contact)
         answers.route[k] = quantities.SOLVE
     return Sweep(values.reshape(shape + values.shape[1:]), answers.status.reshape(shape), answers.route.reshape(shape))
@@ -184,6 +184,16 @@ def _check_lower_bounds(formulas: "Formulas", columns: dict[str, Array]) -> None
         bound = columns[lower] if lower in columns else read_number(lower, where=lower).value
         if (columns[name] < bound).any():
             raise ParameterError(f"{name}: must be at least {lower}")
+
+
+def _trigonometric_columns(formulas: "Formulas", given: tuple[Any, ...], p: list[Array]) -> Iterator[Array]:
+    """What stands behind the parameters, for each launch; exact where no parameter is an array."""
+    if formulas.trigonometric is None:
+        return
+    if all(column.shape == () for column in p):
+        yield from map(np.array, formulas.trigonometric_values(formulas.numbers(given)))
+        return
+    yield from map(np.asarray, formulas.trigonometric(ARRAYS, tuple(p)))
 
 
 def _domain_columns(formulas: "Formulas", p: list[Array]) -> Iterator[Array]:
