@@ -279,11 +279,15 @@ class DissipativeMotion(Motion):
     def _internal_ends(self) -> tuple[str, ...]:
         return ("",) if _loss(self.problem).friction else ("", "contact-sign")
 
-    def _trajectory(self, reach: float) -> Trajectory:
+    def _follow(self, reach: float) -> None:
+        """Compute legs up to a time in s, and up to the horizon if there is one."""
         if isfinite(self._horizon):
             reach = max(reach, self._horizon)
         while not self._ending and self._elapsed < reach:
             self._go_on()
+
+    def _trajectory(self, reach: float) -> Trajectory:
+        self._follow(reach)
         if self._whole is None or len(self._whole.segments) != len(self._pieces):
             self._whole = Trajectory(segments=tuple(self._pieces), lap=self.problem.period)
         return self._whole
@@ -296,7 +300,7 @@ class DissipativeMotion(Motion):
         return []  # segments end there
 
     def _check_end(self, t: float) -> None:
-        self._trajectory(t)
+        self._follow(t)
         end = self._known_end()
         if t > end:
             raise InputError(f"t: the motion ends at {end!r} s ({self._end_text()}), got {t!r}")
@@ -351,7 +355,7 @@ class DissipativeMotion(Motion):
     def _look_ahead(self) -> None:
         """Compute the whole motion if it ends, and at least its first leg if it does not."""
         if isfinite(self._horizon):
-            self._trajectory(self._horizon)
+            self._follow(self._horizon)
             return
         while not self._ending and self._at[PAUSES] < MAX_PAUSES:
             if self._at[TURNS] and (not self._at[MAY_REST] or self._at[TURNS] > MAX_TURNS):
