@@ -20,6 +20,7 @@ from gqm_sym.runtime.gradients.programs import (
     turning_point_program,
 )
 from gqm_sym.runtime.interface import ExactFormulas
+from gqm_sym.runtime.launch.formulas import Formulas
 from gqm_sym.runtime.launch.problem import Problem
 from gqm_sym.runtime.quadrature.trapezoid import CIRCULATION, LIBRATION
 
@@ -33,11 +34,16 @@ UNDECIDED = (
 PI, PI_LOW = np.pi, 1.2246467991473532e-16
 
 
-def source_of(problem: Problem) -> Source:
-    """What the programs of a module are recorded from."""
-    formulas = problem.formulas
-    assert isinstance(formulas.exact, ExactFormulas)
-    assert formulas.domain_of is not None
+def source_of(formulas: Formulas) -> Source:
+    """What the programs of a module are recorded from.
+
+    Raises
+    ------
+    SolutionError
+        If its curve has no formulas.
+    """
+    if not isinstance(formulas.exact, ExactFormulas) or formulas.domain_of is None:
+        raise SolutionError("gradients: curves without formulas have none yet; declare the curve by formulas")
     names = list(formulas.parameters)
     return Source(formulas.exact, formulas.domain_of, formulas.inertia, len(names), names.index("m"))
 
@@ -64,15 +70,17 @@ class OrbitDerivatives:
     ----------
     problem : Problem
         The launch and the module that it is of.
-    orbit : Orbit
-        Duration and turning points in double-double arithmetic.
+    orbit : Orbit or None
+        Duration and turning points in double-double arithmetic, if that suffices.
     direction : int
         0 for a libration, else the sign of ds/dt.
     """
 
-    def __init__(self, problem: Problem, orbit: Orbit, direction: int) -> None:
+    def __init__(self, problem: Problem, orbit: Orbit | None, direction: int) -> None:
         self.direction = direction
-        self.source = source_of(problem)
+        self.source = source_of(problem.formulas)
+        if orbit is None:
+            raise SolutionError(UNDECIDED)
         launch = problem.launch
         given = (*problem.p, launch.lam0, launch.v0)
         numbers = [(n.value, n.low, 0.25 * UNIT * abs(n.value) if n.low else 0.0) for n in given]
@@ -84,7 +92,7 @@ class OrbitDerivatives:
     @cached_property
     def _end_rows(self) -> Array:
         high, low, _ = np.array(self._ends).T
-        return values(turning_point_program(self.source), self.variables, high.copy(), low.copy())
+        return values(turning_point_program(self.source), self.variables, high.copy(), low.copy())[1:]
 
     @property
     def ends(self) -> Array:

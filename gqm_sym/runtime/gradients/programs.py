@@ -136,11 +136,11 @@ def assemble(op: Recorder, outputs: Sequence[Any]) -> Program:
 
 @lru_cache(maxsize=64)
 def turning_point_program(source: Source) -> Program:
-    """The derivatives of a turning point, which is the place, by all variables."""
+    """The step of Newton's method to a turning point from the place, and its derivatives by all variables."""
     op = Recorder(source.variables)
     half = source.half(op, op.place)
     slope, *partials = gradient(op, half, [op.place, *op.values])
-    return assemble(op, [-(partial / slope) for partial in partials])
+    return assemble(op, [-(part / slope) for part in (half, *partials)])
 
 
 def libration_inputs(source: Source) -> int:
@@ -149,12 +149,13 @@ def libration_inputs(source: Source) -> int:
 
 
 @lru_cache(maxsize=64)
-def libration_program(source: Source) -> Program:
+def libration_program(source: Source, wanted: tuple[int, ...] | None = None) -> Program:
     """What is integrated over the phase angle of a libration, with its derivatives at the same phase angle.
 
     The place is the square of the sine of half the phase angle. The inputs behind the variables are both turning points
     and then the derivatives of each. The results are dt/dphi, its derivatives by all variables, V**2 dt/dphi (1+beta)
-    with its derivatives, and the derivatives of ds/dlam by the run-time parameters at the same place.
+    with its derivatives, and the derivatives of ds/dlam by the run-time parameters at the same place. If some variables
+    are ``wanted``, they are the derivatives of dt/dphi by these, and nothing else.
     """
     n, p = source.variables, source.parameters
     op = Recorder(libration_inputs(source))
@@ -175,16 +176,19 @@ def libration_program(source: Source) -> Program:
         longer = (high - low) / width + (ds_partials[k] + ds_slope * moved) / ds
         rates.append(rate * (longer - faster))
         powers.append(power * (longer + faster + by / inertia))
+    if wanted is not None:
+        return assemble(op, [rates[1 + k] for k in wanted])
     return assemble(op, [*rates, *powers, *ds_partials[:p]])
 
 
 @lru_cache(maxsize=64)
-def circulation_program(source: Source, direction: int) -> Program:
+def circulation_program(source: Source, direction: int, wanted: tuple[int, ...] | None = None) -> Program:
     """What is integrated over a lap, as a share of which the place is given, with its derivatives at the same share.
 
     The inputs are the variables, and the place where the lap begins: it is that of the launch, but does not change with
     it. The results are dt/dshare, its derivatives by all variables, V**2 dt/dshare (1+beta) with its derivatives,
-    ds/dshare with its derivatives, and the length of the lap in lam with its derivatives.
+    ds/dshare with its derivatives, and the length of the lap in lam with its derivatives. ``wanted`` is as for a
+    libration.
     """
     op = Recorder(source.variables + 1)
     p = op.values[: source.parameters]
@@ -192,6 +196,8 @@ def circulation_program(source: Source, direction: int) -> Program:
     lam = op.values[source.variables] + lap * op.place
     ds, v2 = source.formulas.ds(op, lam, p), 2 * source.half(op, lam)
     rate = direction * lap * ds / op.sqrt(v2)
+    if wanted is not None:
+        return assemble(op, gradient(op, rate, [op.values[k] for k in wanted]))
     outputs: list[Any] = []
     for quantity in (rate, rate * v2 * source.one_plus_beta(op), lap * ds, lap):
         outputs += [quantity, *gradient(op, quantity, op.values[: source.variables])]

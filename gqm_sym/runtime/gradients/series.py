@@ -6,7 +6,7 @@ from gqm_sym.errors import SolutionError
 from gqm_sym.runtime.compiled.types import Array
 
 # Terms below this share of the largest one are rounding, and the last ones may be this share at most.
-MIN_TERM, MAX_LAST_TERM = 1e-18, 1e-14
+MIN_TERM, MAX_LAST_TERM = 3e-17, 1e-14
 
 # Places that are evaluated together.
 BLOCK = 2048

@@ -94,7 +94,7 @@ def sweep(
         raise InputError(f"contact: must be one of {', '.join(CONTACTS)}, got {contact!r}")
     names = ("lam0", "v0", "direction", "lam", *formulas.parameters)
     sources = (lam0, v0, direction, 0.0 if lam is None else lam, *parameters)
-    arrays = [_column(value, name) for value, name in zip(sources, names, strict=True)]
+    arrays = [as_doubles(value, name) for value, name in zip(sources, names, strict=True)]
     named = dict(zip(names, arrays, strict=True))
     _check(formulas, named)
     shape = broadcast_shape(named)
@@ -115,7 +115,7 @@ def sweep(
                 work, least = partial(answer_driven, formulas, asked, curve, group.columns, some), MIN_BODIES_PER_THREAD
             else:
                 ask = Asked(
-                    found.code, CONTACT_SIDES[contact], inf if t_max is None else _column(t_max, "t_max").item()
+                    found.code, CONTACT_SIDES[contact], inf if t_max is None else as_doubles(t_max, "t_max").item()
                 )
                 work, least = partial(_answer, formulas, ask, group, some), MIN_LAUNCHES_PER_THREAD
             run_in_threads(work, some.status.size, least)
@@ -134,7 +134,7 @@ def has_compiled_route(formulas: "Formulas", quantity: Quantity, t_max: Any) -> 
 
     They do not for motions that lose energy, and of motions with a last time they know only when they end.
     """
-    timely = t_max is None or (quantity.code == quantities.END_TIME and float(_column(t_max, "t_max")) > 0.0)
+    timely = t_max is None or (quantity.code == quantities.END_TIME and float(as_doubles(t_max, "t_max")) > 0.0)
     return formulas.dissipation is None and quantity.code != quantities.NOT_COMPILED and timely
 
 
@@ -147,7 +147,7 @@ def broadcast_shape(columns: Mapping[str, Array]) -> tuple[int, ...]:
         raise InputError(f"sweep: these shapes do not broadcast against each other: {shapes}") from None
 
 
-def _column(value: Any, name: str) -> Array:
+def as_doubles(value: Any, name: str) -> Array:
     """Numbers as doubles; text and exact numbers by their nearest."""
     if type(value) is float:
         return np.array(value)
