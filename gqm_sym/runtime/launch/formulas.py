@@ -36,12 +36,15 @@ class ParameterValues(tuple[Number, ...]):
         The compiled functions bound to these values, once they have been asked for.
     tape : double_double.recording.BoundTape or None
         The exact formulas as a tape, once it has been asked for; False if there is none.
+    true_pieces : charts.true_pieces.TruePieces or None
+        A charted curve in double-double arithmetic, once it has been asked for; False if there is no such thing.
     """
 
     values: Array
     domain: Domain | None = None
     functions: Any = None
     tape: Any = None
+    true_pieces: Any = None
 
 
 @lru_cache(maxsize=8)
@@ -49,6 +52,12 @@ def chart_with(maker: ChartMaker, values: tuple[float, ...]) -> Chart:
     """The chart of a curve; it is made once for the same values of the run-time parameters."""
     with budget("chart", 60.0, "give fewer points, or shorter and simpler pieces"):
         return maker.chart(values)
+
+
+@lru_cache(maxsize=4)
+def true_pieces_of(maker: ChartMaker, p: tuple[Number, ...]) -> Any:
+    """The curve behind a chart in double-double arithmetic, or None; it is made once for the same exact parameters."""
+    return maker.true_pieces(p, chart_with(maker, tuple(number.value for number in p)))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

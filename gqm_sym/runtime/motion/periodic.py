@@ -97,9 +97,14 @@ class PeriodicMotion(Motion):
 
     @property
     def _has_multiprecision(self) -> bool:
-        """Whether the period can be computed to more digits than doubles hold, within some seconds."""
+        """Whether mpmath can compute the period within some seconds."""
         f, s = self.problem.functions, self._segment
         return f.exact is not None and f.between(f.exact.edges, s.a, s.b).size <= MAX_CHART_PIECES
+
+    @cached_property
+    def _is_exact(self) -> bool:
+        """Whether the period can be computed to more digits than doubles hold."""
+        return self._has_multiprecision or self._orbit is not None
 
     @cached_property
     def _orbit(self) -> Orbit | None:
@@ -108,15 +113,15 @@ class PeriodicMotion(Motion):
 
     def _timing(self, end_time: float) -> timing.Timing:
         """The times with as many digits as a phase needs at ``end_time`` in s from launch."""
-        if not self._has_multiprecision:
+        if not self._is_exact:
             return timing.in_doubles(self.kind, self._segment, self._offsets)
         launch, self._is_period_known = (self.problem, self.kind, self.direction), True
         if self._exact_timing is None:
             self._exact_timing = timing.in_double_double(*launch, self._segment, self._offsets)
-        if self._exact_timing is None or end_time > self._exact_timing.max_time:
+        if self._has_multiprecision and (self._exact_timing is None or end_time > self._exact_timing.max_time):
             self._exact_timing = timing.in_multiprecision(*launch, self._segment)
             self._precise_trajectory = None
-        return self._exact_timing
+        return self._exact_timing or timing.in_doubles(self.kind, self._segment, self._offsets)
 
     @property
     def _duration(self) -> float:
@@ -159,7 +164,8 @@ class PeriodicMotion(Motion):
     @cached_property
     def _derivatives(self) -> OrbitDerivatives:
         """The orbit with its derivatives."""
-        return OrbitDerivatives(self.problem, self._orbit, self.direction if self.kind == "circulation" else 0)
+        direction = self.direction if self.kind == "circulation" else 0
+        return OrbitDerivatives(self.problem, self._orbit, direction, self._offsets)
 
     @cached_property
     def _orbit_sensitivity(self) -> OrbitSensitivity:
@@ -263,7 +269,7 @@ class PeriodicMotion(Motion):
 
     def _trajectory(self, end_time: float) -> Trajectory:
         one_period_time = self._segment.duration * (2.0 if self.kind == "libration" else 1.0)
-        if self._has_multiprecision and (
+        if self._is_exact and (
             end_time > one_period_time or self._is_period_known or self._segment.from_multiprecision
         ):
             times = self._timing(end_time)

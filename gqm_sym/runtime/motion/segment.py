@@ -193,9 +193,9 @@ class Segment:
         return times, low
 
     def _initial_edges(self) -> Array:
-        """The first and the last phase angle, and those at which panels must begin."""
+        """The first and the last phase angle, and those at which panels must begin, to the rounding of their places."""
         places = self.functions.between(self.functions.breaks, self.a, self.b)
-        inside = [self.phase_angle_of(*self.offsets(place)) for place in (*places, *self.panel_breaks)]
+        inside = [self.phase_angle_of(*self._offsets_in_doubles(place)) for place in (*places, *self.panel_breaks)]
         return np.array(sorted({0.0, *(phi for phi in inside if 0.0 < phi < self.stop), self.stop}))
 
     @property
@@ -321,11 +321,15 @@ class Segment:
         """The signed distances of place + low from ``a`` and to ``b``; the double of an end means that end."""
         if low == 0.0 and place in (self.a, self.b):
             return (0.0, self.width) if place == self.a else (self.width, 0.0)
-        ahead, behind = (place - self.a) + (low - self.low_parts[0]), (self.b - place) + (self.low_parts[1] - low)
+        ahead, behind = self._offsets_in_doubles(place, low)
         turns = {TURN_TURN: (ahead, behind), FROM_TURN: (ahead,)}.get(self.kind, ())
         if min(map(abs, turns), default=inf) > NEAR_TURN * abs(self.width) or not self._is_conservative:
             return ahead, behind
         return self._exact_offsets(place, low)
+
+    def _offsets_in_doubles(self, place: float, low: float = 0.0) -> tuple[float, float]:
+        """`offsets` from the ends as doubles know them."""
+        return (place - self.a) + (low - self.low_parts[0]), (self.b - place) + (self.low_parts[1] - low)
 
     @property
     def _is_conservative(self) -> bool:
