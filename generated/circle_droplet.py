@@ -1,5 +1,5 @@
 # Made by gqm-gen for "circle_droplet". Do not edit: change its declaration and generate again.
-# interface 9, input 38113942f710, body 2db2b52fdf57
+# interface 9, input 38113942f710, body e2c9dc8caed7
 """Droplet in a round channel
 
 x              = L*sin(theta)
@@ -184,6 +184,7 @@ def sweep(
     lam: Any = None,
     t_max: Any = None,
     contact: str = "bilateral",
+    gradient: Any = None,
     client: Any = None,
     L: Any = '0.02', gamma: Any = '0.072', ell_c: Any = '0.0004', g: Any = '9.81', m: Any = '5e-6',
     **unknown: Any,
@@ -201,6 +202,8 @@ def sweep(
         For "time_at": the place, of which the first time there is asked.
     t_max, contact
         One for all launches, as of ``solve``.
+    gradient : str or sequence of str, optional
+        What derivatives of half periods or periods are by: run-time parameters, "lam0" and "v0".
     client : distributed.Client, optional
         A Dask cluster to do the work, with the same results.
     L, gamma, ell_c, g, m
@@ -210,10 +213,10 @@ def sweep(
     -------
     Sweep
         ``values``, NaN where there is none; ``status``, 0 where there is one, and ``route``, how each was found.
-        ``status_counts()`` counts the launches without a value.
+        ``status_counts()`` counts the launches without a value. ``gradient``, if asked for, has one more axis.
     """
     launches = LaunchRequest(lam0, v0, direction, None, t_max, contact)
-    return MODEL.sweep(quantity, launches, (L, gamma, ell_c, g, m), lam=lam, client=client, unknown=unknown)
+    return MODEL.sweep(quantity, launches, (L, gamma, ell_c, g, m), lam=lam, client=client, gradient=gradient, unknown=unknown)
 
 
 def equilibria(*, between: Any = None, L: Any = '0.02', gamma: Any = '0.072', ell_c: Any = '0.0004', g: Any = '9.81', m: Any = '5e-6', **unknown: Any) -> "tuple[Equilibrium, ...]":

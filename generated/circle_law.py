@@ -1,5 +1,5 @@
 # Made by gqm-gen for "circle_law". Do not edit: change its declaration and generate again.
-# interface 9, input 2718db879066, body 97abfcc6b252
+# interface 9, input 2718db879066, body e1f09a5ca75e
 """Pendulum in dense air
 
 x              = L*sin(theta)
@@ -187,6 +187,7 @@ def sweep(
     lam: Any = None,
     t_max: Any = None,
     contact: str = "bilateral",
+    gradient: Any = None,
     client: Any = None,
     L: Any = '1', c1: Any = '0.05', c2: Any = '0.01', g: Any = '9.81', m: Any = '1',
     **unknown: Any,
@@ -204,6 +205,8 @@ def sweep(
         For "time_at": the place, of which the first time there is asked.
     t_max, contact
         One for all launches, as of ``solve``.
+    gradient : str or sequence of str, optional
+        What derivatives of half periods or periods are by: run-time parameters, "lam0" and "v0".
     client : distributed.Client, optional
         A Dask cluster to do the work, with the same results.
     L, c1, c2, g, m
@@ -213,10 +216,10 @@ def sweep(
     -------
     Sweep
         ``values``, NaN where there is none; ``status``, 0 where there is one, and ``route``, how each was found.
-        ``status_counts()`` counts the launches without a value.
+        ``status_counts()`` counts the launches without a value. ``gradient``, if asked for, has one more axis.
     """
     launches = LaunchRequest(lam0, v0, direction, None, t_max, contact)
-    return MODEL.sweep(quantity, launches, (L, c1, c2, g, m), lam=lam, client=client, unknown=unknown)
+    return MODEL.sweep(quantity, launches, (L, c1, c2, g, m), lam=lam, client=client, gradient=gradient, unknown=unknown)
 
 
 def equilibria(*, between: Any = None, L: Any = '1', c1: Any = '0.05', c2: Any = '0.01', g: Any = '9.81', m: Any = '1', **unknown: Any) -> "tuple[Equilibrium, ...]":

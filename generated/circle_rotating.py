@@ -1,5 +1,5 @@
 # Made by gqm-gen for "circle_rotating". Do not edit: change its declaration and generate again.
-# interface 9, input a74aedd594f9, body eba1e9da4ae4
+# interface 9, input a74aedd594f9, body 4c10b0a84544
 """Bead on a hoop that turns about its vertical diameter
 
 x              = L*sin(theta)
@@ -224,6 +224,7 @@ def sweep(
     lam: Any = None,
     t_max: Any = None,
     contact: str = "bilateral",
+    gradient: Any = None,
     client: Any = None,
     L: Any = '1', Omega: Any = '4', g: Any = '9.81', m: Any = '1',
     **unknown: Any,
@@ -241,6 +242,8 @@ def sweep(
         For "time_at": the place, of which the first time there is asked.
     t_max, contact
         One for all launches, as of ``solve``.
+    gradient : str or sequence of str, optional
+        What derivatives of half periods or periods are by: run-time parameters, "lam0" and "v0".
     client : distributed.Client, optional
         A Dask cluster to do the work, with the same results.
     L, Omega, g, m
@@ -250,10 +253,10 @@ def sweep(
     -------
     Sweep
         ``values``, NaN where there is none; ``status``, 0 where there is one, and ``route``, how each was found.
-        ``status_counts()`` counts the launches without a value.
+        ``status_counts()`` counts the launches without a value. ``gradient``, if asked for, has one more axis.
     """
     launches = LaunchRequest(lam0, v0, direction, None, t_max, contact)
-    return MODEL.sweep(quantity, launches, (L, Omega, g, m), lam=lam, client=client, unknown=unknown)
+    return MODEL.sweep(quantity, launches, (L, Omega, g, m), lam=lam, client=client, gradient=gradient, unknown=unknown)
 
 
 def equilibria(*, between: Any = None, L: Any = '1', Omega: Any = '4', g: Any = '9.81', m: Any = '1', **unknown: Any) -> "tuple[Equilibrium, ...]":

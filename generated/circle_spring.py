@@ -1,5 +1,5 @@
 # Made by gqm-gen for "circle_spring". Do not edit: change its declaration and generate again.
-# interface 9, input bcc7b1afa151, body 1f4ffa430cc5
+# interface 9, input bcc7b1afa151, body 0f6a493ae0f1
 """Bead on a ring, tied by a spring to a point above its centre
 
 x              = L*sin(theta)
@@ -240,6 +240,7 @@ def sweep(
     lam: Any = None,
     t_max: Any = None,
     contact: str = "bilateral",
+    gradient: Any = None,
     client: Any = None,
     L: Any = '1', w: Any = '3', h: Any = '0.5', g: Any = '9.81', m: Any = '1',
     **unknown: Any,
@@ -257,6 +258,8 @@ def sweep(
         For "time_at": the place, of which the first time there is asked.
     t_max, contact
         One for all launches, as of ``solve``.
+    gradient : str or sequence of str, optional
+        What derivatives of half periods or periods are by: run-time parameters, "lam0" and "v0".
     client : distributed.Client, optional
         A Dask cluster to do the work, with the same results.
     L, w, h, g, m
@@ -266,10 +269,10 @@ def sweep(
     -------
     Sweep
         ``values``, NaN where there is none; ``status``, 0 where there is one, and ``route``, how each was found.
-        ``status_counts()`` counts the launches without a value.
+        ``status_counts()`` counts the launches without a value. ``gradient``, if asked for, has one more axis.
     """
     launches = LaunchRequest(lam0, v0, direction, None, t_max, contact)
-    return MODEL.sweep(quantity, launches, (L, w, h, g, m), lam=lam, client=client, unknown=unknown)
+    return MODEL.sweep(quantity, launches, (L, w, h, g, m), lam=lam, client=client, gradient=gradient, unknown=unknown)
 
 
 def equilibria(*, between: Any = None, L: Any = '1', w: Any = '3', h: Any = '0.5', g: Any = '9.81', m: Any = '1', **unknown: Any) -> "tuple[Equilibrium, ...]":

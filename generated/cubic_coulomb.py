@@ -1,5 +1,5 @@
 # Made by gqm-gen for "cubic_coulomb". Do not edit: change its declaration and generate again.
-# interface 9, input f472752dd3ba, body 43265023f788
+# interface 9, input f472752dd3ba, body 3c5d3e61b58d
 """Cubic track with Coulomb friction
 
 x              = x
@@ -190,6 +190,7 @@ def sweep(
     lam: Any = None,
     t_max: Any = None,
     contact: str = "bilateral",
+    gradient: Any = None,
     client: Any = None,
     mu: Any = '0.1', g: Any = '9.81', m: Any = '1',
     **unknown: Any,
@@ -207,6 +208,8 @@ def sweep(
         For "time_at": the place, of which the first time there is asked.
     t_max, contact
         One for all launches, as of ``solve``.
+    gradient : str or sequence of str, optional
+        What derivatives of half periods or periods are by: run-time parameters, "lam0" and "v0".
     client : distributed.Client, optional
         A Dask cluster to do the work, with the same results.
     mu, g, m
@@ -216,10 +219,10 @@ def sweep(
     -------
     Sweep
         ``values``, NaN where there is none; ``status``, 0 where there is one, and ``route``, how each was found.
-        ``status_counts()`` counts the launches without a value.
+        ``status_counts()`` counts the launches without a value. ``gradient``, if asked for, has one more axis.
     """
     launches = LaunchRequest(lam0, v0, direction, None, t_max, contact)
-    return MODEL.sweep(quantity, launches, (mu, g, m), lam=lam, client=client, unknown=unknown)
+    return MODEL.sweep(quantity, launches, (mu, g, m), lam=lam, client=client, gradient=gradient, unknown=unknown)
 
 
 def equilibria(*, between: Any = None, mu: Any = '0.1', g: Any = '9.81', m: Any = '1', **unknown: Any) -> "tuple[Equilibrium, ...]":

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "double_well". Do not edit: change its declaration and generate again.
-# interface 9, input 876b66f15f50, body e89896da68d7
+# interface 9, input 876b66f15f50, body ffa4ce0d6e76
 """Bead between two wells
 
 x              = x
@@ -225,6 +225,7 @@ def sweep(
     lam: Any = None,
     t_max: Any = None,
     contact: str = "bilateral",
+    gradient: Any = None,
     client: Any = None,
     h: Any = '0.25', g: Any = '9.81', m: Any = '1',
     **unknown: Any,
@@ -242,6 +243,8 @@ def sweep(
         For "time_at": the place, of which the first time there is asked.
     t_max, contact
         One for all launches, as of ``solve``.
+    gradient : str or sequence of str, optional
+        What derivatives of half periods or periods are by: run-time parameters, "lam0" and "v0".
     client : distributed.Client, optional
         A Dask cluster to do the work, with the same results.
     h, g, m
@@ -251,10 +254,10 @@ def sweep(
     -------
     Sweep
         ``values``, NaN where there is none; ``status``, 0 where there is one, and ``route``, how each was found.
-        ``status_counts()`` counts the launches without a value.
+        ``status_counts()`` counts the launches without a value. ``gradient``, if asked for, has one more axis.
     """
     launches = LaunchRequest(lam0, v0, direction, None, t_max, contact)
-    return MODEL.sweep(quantity, launches, (h, g, m), lam=lam, client=client, unknown=unknown)
+    return MODEL.sweep(quantity, launches, (h, g, m), lam=lam, client=client, gradient=gradient, unknown=unknown)
 
 
 def equilibria(*, between: Any = None, h: Any = '0.25', g: Any = '9.81', m: Any = '1', **unknown: Any) -> "tuple[Equilibrium, ...]":

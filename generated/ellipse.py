@@ -1,5 +1,5 @@
 # Made by gqm-gen for "ellipse". Do not edit: change its declaration and generate again.
-# interface 9, input 81dc4ee20e82, body b74f2e71bccc
+# interface 9, input 81dc4ee20e82, body 29d535060172
 """Bead on an ellipse, by the eccentric angle
 
 x              = a*cos(theta)
@@ -222,6 +222,7 @@ def sweep(
     lam: Any = None,
     t_max: Any = None,
     contact: str = "bilateral",
+    gradient: Any = None,
     client: Any = None,
     a: Any = '2', b: Any = '1', g: Any = '9.81', m: Any = '1',
     **unknown: Any,
@@ -239,6 +240,8 @@ def sweep(
         For "time_at": the place, of which the first time there is asked.
     t_max, contact
         One for all launches, as of ``solve``.
+    gradient : str or sequence of str, optional
+        What derivatives of half periods or periods are by: run-time parameters, "lam0" and "v0".
     client : distributed.Client, optional
         A Dask cluster to do the work, with the same results.
     a, b, g, m
@@ -248,10 +251,10 @@ def sweep(
     -------
     Sweep
         ``values``, NaN where there is none; ``status``, 0 where there is one, and ``route``, how each was found.
-        ``status_counts()`` counts the launches without a value.
+        ``status_counts()`` counts the launches without a value. ``gradient``, if asked for, has one more axis.
     """
     launches = LaunchRequest(lam0, v0, direction, None, t_max, contact)
-    return MODEL.sweep(quantity, launches, (a, b, g, m), lam=lam, client=client, unknown=unknown)
+    return MODEL.sweep(quantity, launches, (a, b, g, m), lam=lam, client=client, gradient=gradient, unknown=unknown)
 
 
 def equilibria(*, between: Any = None, a: Any = '2', b: Any = '1', g: Any = '9.81', m: Any = '1', **unknown: Any) -> "tuple[Equilibrium, ...]":

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "ellipse_drag". Do not edit: change its declaration and generate again.
-# interface 9, input f2717a5ad91f, body 04fc7fd7a998
+# interface 9, input f2717a5ad91f, body 64759453ac03
 """Bead on an ellipse, in air
 
 x              = a*cos(theta)
@@ -193,6 +193,7 @@ def sweep(
     lam: Any = None,
     t_max: Any = None,
     contact: str = "bilateral",
+    gradient: Any = None,
     client: Any = None,
     a: Any = '1.5', b: Any = '1', b_air: Any = '0.3', g: Any = '9.81', m: Any = '2',
     **unknown: Any,
@@ -210,6 +211,8 @@ def sweep(
         For "time_at": the place, of which the first time there is asked.
     t_max, contact
         One for all launches, as of ``solve``.
+    gradient : str or sequence of str, optional
+        What derivatives of half periods or periods are by: run-time parameters, "lam0" and "v0".
     client : distributed.Client, optional
         A Dask cluster to do the work, with the same results.
     a, b, b_air, g, m
@@ -219,10 +222,10 @@ def sweep(
     -------
     Sweep
         ``values``, NaN where there is none; ``status``, 0 where there is one, and ``route``, how each was found.
-        ``status_counts()`` counts the launches without a value.
+        ``status_counts()`` counts the launches without a value. ``gradient``, if asked for, has one more axis.
     """
     launches = LaunchRequest(lam0, v0, direction, None, t_max, contact)
-    return MODEL.sweep(quantity, launches, (a, b, b_air, g, m), lam=lam, client=client, unknown=unknown)
+    return MODEL.sweep(quantity, launches, (a, b, b_air, g, m), lam=lam, client=client, gradient=gradient, unknown=unknown)
 
 
 def equilibria(*, between: Any = None, a: Any = '1.5', b: Any = '1', b_air: Any = '0.3', g: Any = '9.81', m: Any = '2', **unknown: Any) -> "tuple[Equilibrium, ...]":

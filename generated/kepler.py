@@ -1,5 +1,5 @@
 # Made by gqm-gen for "kepler". Do not edit: change its declaration and generate again.
-# interface 9, input a0162e77d64e, body 58de6f2008a3
+# interface 9, input a0162e77d64e, body 4aa42d810a8c
 """Planet on its own ellipse, by the eccentric anomaly
 
 x              = a*(-ecc + cos(E))
@@ -288,6 +288,7 @@ def sweep(
     lam: Any = None,
     t_max: Any = None,
     contact: str = "bilateral",
+    gradient: Any = None,
     client: Any = None,
     a: Any = '3/2', ecc: Any = '3/5', k: Any = '7/2', m: Any = '1',
     **unknown: Any,
@@ -305,6 +306,8 @@ def sweep(
         For "time_at": the place, of which the first time there is asked.
     t_max, contact
         One for all launches, as of ``solve``.
+    gradient : str or sequence of str, optional
+        What derivatives of half periods or periods are by: run-time parameters, "lam0" and "v0".
     client : distributed.Client, optional
         A Dask cluster to do the work, with the same results.
     a, ecc, k, m
@@ -314,10 +317,10 @@ def sweep(
     -------
     Sweep
         ``values``, NaN where there is none; ``status``, 0 where there is one, and ``route``, how each was found.
-        ``status_counts()`` counts the launches without a value.
+        ``status_counts()`` counts the launches without a value. ``gradient``, if asked for, has one more axis.
     """
     launches = LaunchRequest(lam0, v0, direction, None, t_max, contact)
-    return MODEL.sweep(quantity, launches, (a, ecc, k, m), lam=lam, client=client, unknown=unknown)
+    return MODEL.sweep(quantity, launches, (a, ecc, k, m), lam=lam, client=client, gradient=gradient, unknown=unknown)
 
 
 def equilibria(*, between: Any = None, a: Any = '3/2', ecc: Any = '3/5', k: Any = '7/2', m: Any = '1', **unknown: Any) -> "tuple[Equilibrium, ...]":

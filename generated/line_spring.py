@@ -1,5 +1,5 @@
 # Made by gqm-gen for "line_spring". Do not edit: change its declaration and generate again.
-# interface 9, input 702c9ef6b67b, body 7da88834dc16
+# interface 9, input 702c9ef6b67b, body fd56627876ba
 """Bead on a sloping line, tied to the origin by a spring
 
 x              = x
@@ -208,6 +208,7 @@ def sweep(
     lam: Any = None,
     t_max: Any = None,
     contact: str = "bilateral",
+    gradient: Any = None,
     client: Any = None,
     w: Any = '1.3', m: Any = '1',
     **unknown: Any,
@@ -225,6 +226,8 @@ def sweep(
         For "time_at": the place, of which the first time there is asked.
     t_max, contact
         One for all launches, as of ``solve``.
+    gradient : str or sequence of str, optional
+        What derivatives of half periods or periods are by: run-time parameters, "lam0" and "v0".
     client : distributed.Client, optional
         A Dask cluster to do the work, with the same results.
     w, m
@@ -234,10 +237,10 @@ def sweep(
     -------
     Sweep
         ``values``, NaN where there is none; ``status``, 0 where there is one, and ``route``, how each was found.
-        ``status_counts()`` counts the launches without a value.
+        ``status_counts()`` counts the launches without a value. ``gradient``, if asked for, has one more axis.
     """
     launches = LaunchRequest(lam0, v0, direction, None, t_max, contact)
-    return MODEL.sweep(quantity, launches, (w, m), lam=lam, client=client, unknown=unknown)
+    return MODEL.sweep(quantity, launches, (w, m), lam=lam, client=client, gradient=gradient, unknown=unknown)
 
 
 def equilibria(*, between: Any = None, w: Any = '1.3', m: Any = '1', **unknown: Any) -> "tuple[Equilibrium, ...]":

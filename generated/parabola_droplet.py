@@ -1,5 +1,5 @@
 # Made by gqm-gen for "parabola_droplet". Do not edit: change its declaration and generate again.
-# interface 9, input 016fa3c6503a, body 9ce7589a2f80
+# interface 9, input 016fa3c6503a, body ec71b1f713d6
 """Droplet in a parabolic channel
 
 x              = x
@@ -193,6 +193,7 @@ def sweep(
     lam: Any = None,
     t_max: Any = None,
     contact: str = "bilateral",
+    gradient: Any = None,
     client: Any = None,
     a: Any = '0.5', gamma: Any = '0.5', ell_c: Any = '1', g: Any = '9.81', m: Any = '1',
     **unknown: Any,
@@ -210,6 +211,8 @@ def sweep(
         For "time_at": the place, of which the first time there is asked.
     t_max, contact
         One for all launches, as of ``solve``.
+    gradient : str or sequence of str, optional
+        What derivatives of half periods or periods are by: run-time parameters, "lam0" and "v0".
     client : distributed.Client, optional
         A Dask cluster to do the work, with the same results.
     a, gamma, ell_c, g, m
@@ -219,10 +222,10 @@ def sweep(
     -------
     Sweep
         ``values``, NaN where there is none; ``status``, 0 where there is one, and ``route``, how each was found.
-        ``status_counts()`` counts the launches without a value.
+        ``status_counts()`` counts the launches without a value. ``gradient``, if asked for, has one more axis.
     """
     launches = LaunchRequest(lam0, v0, direction, None, t_max, contact)
-    return MODEL.sweep(quantity, launches, (a, gamma, ell_c, g, m), lam=lam, client=client, unknown=unknown)
+    return MODEL.sweep(quantity, launches, (a, gamma, ell_c, g, m), lam=lam, client=client, gradient=gradient, unknown=unknown)
 
 
 def equilibria(*, between: Any = None, a: Any = '0.5', gamma: Any = '0.5', ell_c: Any = '1', g: Any = '9.81', m: Any = '1', **unknown: Any) -> "tuple[Equilibrium, ...]":

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "parabola_law". Do not edit: change its declaration and generate again.
-# interface 9, input 6669068dcbd5, body 555cb109ab0f
+# interface 9, input 6669068dcbd5, body 639f106406ea
 """Bead on a parabola, with a resistance that falls with speed
 
 x              = x
@@ -195,6 +195,7 @@ def sweep(
     lam: Any = None,
     t_max: Any = None,
     contact: str = "bilateral",
+    gradient: Any = None,
     client: Any = None,
     a: Any = '0.7', r: Any = '0.8', w1: Any = '2', g: Any = '9.81', m: Any = '1',
     **unknown: Any,
@@ -212,6 +213,8 @@ def sweep(
         For "time_at": the place, of which the first time there is asked.
     t_max, contact
         One for all launches, as of ``solve``.
+    gradient : str or sequence of str, optional
+        What derivatives of half periods or periods are by: run-time parameters, "lam0" and "v0".
     client : distributed.Client, optional
         A Dask cluster to do the work, with the same results.
     a, r, w1, g, m
@@ -221,10 +224,10 @@ def sweep(
     -------
     Sweep
         ``values``, NaN where there is none; ``status``, 0 where there is one, and ``route``, how each was found.
-        ``status_counts()`` counts the launches without a value.
+        ``status_counts()`` counts the launches without a value. ``gradient``, if asked for, has one more axis.
     """
     launches = LaunchRequest(lam0, v0, direction, None, t_max, contact)
-    return MODEL.sweep(quantity, launches, (a, r, w1, g, m), lam=lam, client=client, unknown=unknown)
+    return MODEL.sweep(quantity, launches, (a, r, w1, g, m), lam=lam, client=client, gradient=gradient, unknown=unknown)
 
 
 def equilibria(*, between: Any = None, a: Any = '0.7', r: Any = '0.8', w1: Any = '2', g: Any = '9.81', m: Any = '1', **unknown: Any) -> "tuple[Equilibrium, ...]":

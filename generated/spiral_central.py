@@ -1,5 +1,5 @@
 # Made by gqm-gen for "spiral_central". Do not edit: change its declaration and generate again.
-# interface 9, input cd2a37956d84, body 4e82ea1e6855
+# interface 9, input cd2a37956d84, body 167b3b73c9a5
 """Bead on a logarithmic spiral, drawn to its pole
 
 x              = r0*exp(b*theta)*cos(theta)
@@ -227,6 +227,7 @@ def sweep(
     lam: Any = None,
     t_max: Any = None,
     contact: str = "bilateral",
+    gradient: Any = None,
     client: Any = None,
     r0: Any = '1', b: Any = '0.15', k: Any = '2', m: Any = '1',
     **unknown: Any,
@@ -244,6 +245,8 @@ def sweep(
         For "time_at": the place, of which the first time there is asked.
     t_max, contact
         One for all launches, as of ``solve``.
+    gradient : str or sequence of str, optional
+        What derivatives of half periods or periods are by: run-time parameters, "lam0" and "v0".
     client : distributed.Client, optional
         A Dask cluster to do the work, with the same results.
     r0, b, k, m
@@ -253,10 +256,10 @@ def sweep(
     -------
     Sweep
         ``values``, NaN where there is none; ``status``, 0 where there is one, and ``route``, how each was found.
-        ``status_counts()`` counts the launches without a value.
+        ``status_counts()`` counts the launches without a value. ``gradient``, if asked for, has one more axis.
     """
     launches = LaunchRequest(lam0, v0, direction, None, t_max, contact)
-    return MODEL.sweep(quantity, launches, (r0, b, k, m), lam=lam, client=client, unknown=unknown)
+    return MODEL.sweep(quantity, launches, (r0, b, k, m), lam=lam, client=client, gradient=gradient, unknown=unknown)
 
 
 def equilibria(*, between: Any = None, r0: Any = '1', b: Any = '0.15', k: Any = '2', m: Any = '1', **unknown: Any) -> "tuple[Equilibrium, ...]":

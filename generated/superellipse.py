@@ -1,5 +1,5 @@
 # Made by gqm-gen for "superellipse". Do not edit: change its declaration and generate again.
-# interface 9, input fe6d2f95d843, body 783efe41748a
+# interface 9, input fe6d2f95d843, body 8bebfb78e86a
 """Bead inside a superellipse, flat at its lowest point
 
 F              = -1 + z**4/b**4 + x**4/a**4
@@ -216,6 +216,7 @@ def sweep(
     lam: Any = None,
     t_max: Any = None,
     contact: str = "bilateral",
+    gradient: Any = None,
     client: Any = None,
     a: Any = '1.4', b: Any = '0.9', g: Any = '9.81', m: Any = '1',
     **unknown: Any,
@@ -233,6 +234,8 @@ def sweep(
         For "time_at": the place, of which the first time there is asked.
     t_max, contact
         One for all launches, as of ``solve``.
+    gradient : str or sequence of str, optional
+        What derivatives of half periods or periods are by: run-time parameters, "lam0" and "v0".
     client : distributed.Client, optional
         A Dask cluster to do the work, with the same results.
     a, b, g, m
@@ -242,10 +245,10 @@ def sweep(
     -------
     Sweep
         ``values``, NaN where there is none; ``status``, 0 where there is one, and ``route``, how each was found.
-        ``status_counts()`` counts the launches without a value.
+        ``status_counts()`` counts the launches without a value. ``gradient``, if asked for, has one more axis.
     """
     launches = LaunchRequest(lam0, v0, direction, None, t_max, contact)
-    return MODEL.sweep(quantity, launches, (a, b, g, m), lam=lam, client=client, unknown=unknown)
+    return MODEL.sweep(quantity, launches, (a, b, g, m), lam=lam, client=client, gradient=gradient, unknown=unknown)
 
 
 def equilibria(*, between: Any = None, a: Any = '1.4', b: Any = '0.9', g: Any = '9.81', m: Any = '1', **unknown: Any) -> "tuple[Equilibrium, ...]":

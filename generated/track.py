@@ -1,5 +1,5 @@
 # Made by gqm-gen for "track". Do not edit: change its declaration and generate again.
-# interface 9, input e49691f04fda, body 4aec208476fe
+# interface 9, input e49691f04fda, body 1532155fd767
 """Hills of a roller coaster, as surveyed
 
 x              = x(s)
@@ -243,6 +243,7 @@ def sweep(
     lam: Any = None,
     t_max: Any = None,
     contact: str = "bilateral",
+    gradient: Any = None,
     client: Any = None,
     g: Any = '9.81', m: Any = '1',
     **unknown: Any,
@@ -260,6 +261,8 @@ def sweep(
         For "time_at": the place, of which the first time there is asked.
     t_max, contact
         One for all launches, as of ``solve``.
+    gradient : str or sequence of str, optional
+        What derivatives of half periods or periods are by: run-time parameters, "lam0" and "v0".
     client : distributed.Client, optional
         A Dask cluster to do the work, with the same results.
     g, m
@@ -269,10 +272,10 @@ def sweep(
     -------
     Sweep
         ``values``, NaN where there is none; ``status``, 0 where there is one, and ``route``, how each was found.
-        ``status_counts()`` counts the launches without a value.
+        ``status_counts()`` counts the launches without a value. ``gradient``, if asked for, has one more axis.
     """
     launches = LaunchRequest(lam0, v0, direction, None, t_max, contact)
-    return MODEL.sweep(quantity, launches, (g, m), lam=lam, client=client, unknown=unknown)
+    return MODEL.sweep(quantity, launches, (g, m), lam=lam, client=client, gradient=gradient, unknown=unknown)
 
 
 def equilibria(*, between: Any = None, g: Any = '9.81', m: Any = '1', **unknown: Any) -> "tuple[Equilibrium, ...]":

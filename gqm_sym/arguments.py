@@ -74,13 +74,13 @@ def _reason(
     return f"{called}: {' and '.join(map(repr, needed))} must be given; it takes {', '.join(names)}"
 
 
-def unknown_argument(called: str, name: str, names: Iterable[str]) -> str:
+def unknown_argument(called: str, name: str, names: Iterable[str], what: str = "argument") -> str:
     """``called: there is no argument 'name'``, the nearest known one if it is near, and all of them."""
     listed = list(names)
     near = difflib.get_close_matches(name.lower(), [known.lower() for known in listed], n=1)
     same = [known for known in listed if near and known.lower() == near[0]]
     hint = f"did you mean {same[0]!r}? " if same else ""
-    return f"{called}: there is no argument {name!r}; {hint}it takes {', '.join(listed) or 'none'}"
+    return f"{called}: there is no {what} {name!r}; {hint}it takes {', '.join(listed) or 'none'}"
 
 
 def short(value: object) -> str:

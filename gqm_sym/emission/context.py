@@ -3,7 +3,7 @@
 from collections.abc import Iterable
 
 import sympy
-from sympy import Expr, Symbol
+from sympy import Expr, Symbol, cos, ordered, sin, tan
 
 from gqm_sym.derivation import Model
 from gqm_sym.emission.ir import Assignment, ExactIR, FunctionIR
@@ -32,12 +32,35 @@ class Lowering:
     def __init__(self, model: Model) -> None:
         self.model = model
         self.place = model.parameter
-        self.order = {name: i for i, (name, _) in enumerate(model.defaults)}
-        self.names = Names([self.place.name, *self.order])
+        self.names = Names([self.place.name, *(name for name, _ in model.defaults)])
+        self.trigonometric = self._trigonometric()
+        order = (*(name for name, _ in model.defaults), *(symbol.name for symbol in self.trigonometric.values()))
+        self.order = {name: i for i, name in enumerate(order)}
+
+    def _trigonometric(self) -> dict[Expr, Symbol]:
+        """Sines, cosines and tangents of run-time parameters alone, each with a symbol for its value.
+
+        Their values stand behind the parameters: where a parameter is given exactly, such as pi, they are exact too.
+        """
+        model, loss = self.model, self.model.dissipation
+        forms = [model.x, model.z, model.ds, model.kappa, model.static_normal_load]
+        forms += [model.effective_potential, model.effective_potential_slope]
+        forms += [form for _, form in loss.pieces] + [loss.drive, loss.decay, *loss.holds] if loss else []
+        known = {name for name, _ in model.defaults}
+        calls = {call for form in forms for call in form.atoms(sin, cos, tan)}
+        fixed = [call for call in ordered(calls) if {s.name for s in call.free_symbols} <= known]
+        outermost = [call for call in fixed if not any(call != other and other.has(call) for other in fixed)]
+        return {call: Symbol(f"_p{count}", real=True) for count, call in enumerate(outermost)}
+
+    def trigonometric_values(self) -> tuple[ExactIR, ...]:
+        """The function that evaluates them; nothing where there are none."""
+        doc = "What stands behind the run-time parameters in compiled functions."
+        return (self.constants("exact_trigonometric", doc, (*self.trigonometric,)),) if self.trigonometric else ()
 
     def bounds(self) -> FunctionIR:
         """Interval enclosures of the effective potential's slope and of ds."""
-        outputs = (self.model.effective_potential_slope, self.model.ds)
+        forms = (self.model.effective_potential_slope, self.model.ds)
+        outputs = tuple(form.xreplace(self.trigonometric) for form in forms)
         replaced, reduced = sympy.cse(outputs, symbols=sympy.numbered_symbols("_t", real=True), order="canonical")
         lam = self.place
         lo, hi, p, out = (self.names(name) for name in ("lo", "hi", "p", "out"))
@@ -108,6 +131,8 @@ class Lowering:
         """
         check_size(outputs, where=name)
         n, p, out = (self.names(s) for s in ("n", "p", "out"))
+        outputs = tuple(form.xreplace(self.trigonometric) for form in outputs)
+        inside = [(symbol, value.xreplace(self.trigonometric)) for symbol, value in inside]
         used = self.used([*outputs, *(value for _, value in inside)])
         if batch:
             inside, used = [*((Symbol(s, real=True), at(p, row)) for s, row in used), *inside], ()

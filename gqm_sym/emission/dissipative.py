@@ -66,7 +66,12 @@ def _in_pieces(
     lowering: Lowering, loss: Dissipation, name: str, arguments: tuple[str | Symbol, ...], doc: str, law: _Law
 ) -> FunctionIR:
     """A function that evaluates the geometric forms of a law, by name, and then the law as it is written."""
-    values = {piece: form for piece, form in loss.pieces if any(piece in o.free_symbols for o in law.outputs)}
+    law = replace(law, outputs=[form.xreplace(lowering.trigonometric) for form in law.outputs])
+    values = {
+        piece: form.xreplace(lowering.trigonometric)
+        for piece, form in loss.pieces
+        if any(piece in o.free_symbols for o in law.outputs)
+    }
     named = {piece: lowering.names.symbol(_NAMES[piece]) for piece, form in values.items() if not form.is_number}
     numbers = {piece: form for piece, form in values.items() if form.is_number}
     forms = [form.xreplace({**law.symbols, **named, **numbers}) for form in law.outputs]

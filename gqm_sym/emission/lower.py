@@ -33,7 +33,7 @@ def lower(model: Model, *, name: str, forms: tuple[tuple[str, Expr], ...]) -> Mo
     else:
         energy = replace(lowering.effective_potential(), later=True)
         functions, batch = (speed_equation(lowering, loss), static_balance(lowering, loss), energy), ()
-    exact = (*(lowering.exact() if loss is None else ()), *lowering.inertia())
+    exact = (*(lowering.exact() if loss is None else ()), *lowering.inertia(), *lowering.trigonometric_values())
     return ModuleIR(
         name=name,
         title=model.title,

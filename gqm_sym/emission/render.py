@@ -3,6 +3,7 @@
 import hashlib
 import re
 from dataclasses import dataclass, field
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -143,6 +144,7 @@ def _model_fields(module: ModuleIR, names: list[str]) -> dict[str, Any]:
         ),
         "later": ", ".join(f"{name}={name}" for name in _ADDRESSES if name in later),
         "inertia": next((f.name for f in module.exact if f.name == "exact_inertia"), ""),
+        "trigonometric": next((f.name for f in module.exact if f.name == "exact_trigonometric"), ""),
         "load_map": "load_map" if "load_map" in names else "",
         "batch": _listed(_batch(module), _WIDTH - 8),
         "chart": module.chart.statement if module.chart else "",
@@ -240,6 +242,11 @@ def _environment() -> jinja2.Environment:
     folder = next((f for f in (package / "_templates", package.parent / "templates") if f.is_dir()), None)
     if folder is None:
         raise EmissionError(f"{package}: its templates are missing; install gqm_sym again")
+    return _templates_in(folder)
+
+
+@cache
+def _templates_in(folder: Path) -> jinja2.Environment:
     return jinja2.Environment(
         loader=jinja2.FileSystemLoader(folder),
         undefined=jinja2.StrictUndefined,
@@ -250,10 +257,16 @@ def _environment() -> jinja2.Environment:
     )
 
 
-def _fill(environment: jinja2.Environment, template: str, fields: dict[str, Any]) -> str:
+@cache
+def _wanted_by(environment: jinja2.Environment, template: str) -> set[str]:
+    """Names of the fields of a template."""
     loader = environment.loader
     assert loader is not None
-    wanted = meta.find_undeclared_variables(environment.parse(loader.get_source(environment, template)[0]))
+    return meta.find_undeclared_variables(environment.parse(loader.get_source(environment, template)[0]))
+
+
+def _fill(environment: jinja2.Environment, template: str, fields: dict[str, Any]) -> str:
+    wanted = _wanted_by(environment, template)
     if wanted != set(fields):
         raise EmissionError(f"{template}: wants {sorted(wanted)}, is given {sorted(fields)}")
     return environment.get_template(template).render(fields)

@@ -35,7 +35,7 @@ NO_LOW_PARTS: Array = np.empty(0)
 ARGUMENTS = {
     "pass1": ("lam", "lam0", "v0", "direction", "out"),
     "solve": LaunchRequest._fields,
-    "sweep": ("quantity", "lam0", "v0", "direction", "lam", "t_max", "contact", "client"),
+    "sweep": ("quantity", "lam0", "v0", "direction", "lam", "t_max", "contact", "gradient", "client"),
     "equilibria": ("between",),
 }
 
@@ -200,6 +200,7 @@ class CompiledModel(Formulas):
         *,
         lam: Any,
         client: Any,
+        gradient: Any = None,
         unknown: Mapping[str, Any] = NOTHING,
     ) -> "Sweep":
         """One quantity over arrays of launches and parameters, on this machine or on a Dask cluster.
@@ -216,6 +217,8 @@ class CompiledModel(Formulas):
             The places that "time_at" asks about.
         client : distributed.Client or None
             The cluster; None for this machine.
+        gradient : str or sequence of str, optional
+            What derivatives of the quantity are wanted by: run-time parameters, "lam0" and "v0".
         unknown : mapping, optional
             Arguments that the module's function does not have, which are refused.
 
@@ -243,6 +246,11 @@ class CompiledModel(Formulas):
         del arguments["point"]
         from gqm_sym.runtime.sweep.result import told
 
+        if gradient is not None:
+            from gqm_sym.runtime.sweep.gradients import sweep_with_gradient
+
+            swept = sweep_with_gradient(self, quantity, launches, parameters, gradient, self.solve, client)
+            return told(swept, quantity, arguments)
         if client is not None:
             from gqm_sym.runtime.sweep.cluster import sweep_on
 

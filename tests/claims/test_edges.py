@@ -287,3 +287,45 @@ def test_a_very_flat_bowl(height: str, build: Build) -> None:
     half = 2 * a**-9 * mp.sqrt(mp.pi / (2 * G)) * mp.gamma(1 + power) / mp.gamma(mpf(1) / 2 + power)
     assert motion.turning_points == (float(a), -float(a))
     assert motion.half_period == pytest.approx(float(half), rel=1e-15)
+
+
+SLOPE = gqm.Curve.parametric(x="u*cos(alpha)", z="u*sin(alpha)", parameter="u", parameters={"alpha": "1/5"})
+ANGLES = ("pi", "-3*pi", "pi/2", "-pi/2", "pi/3", "2*pi/3", "5*pi/6", "pi/7", "1/5", 3.141592653589793)
+
+
+@pytest.mark.parametrize("alpha", ANGLES)
+def test_an_inclination_means_what_its_text_says(alpha: Any, build: Build) -> None:
+    """Bodies thrown up an incline turn after v0/(g sin(alpha)), and never where the text says that it is level.
+
+    The sine of the double nearest to pi is 1.2e-16, and that of pi is 0.
+    """
+    module = build("slope", SLOPE, gqm.Gravity())
+    with mp.workdps(300):
+        sine = mp.sin(read_number(alpha, where="alpha").at(mp))
+        rise = mpf(0) if abs(sine) < mpf(10) ** -200 else sine * G
+    direction = 1 if rise >= 0 else -1
+    motion = module.solve(0, 2, direction, alpha=alpha)
+    swept = module.sweep("turning_points", [0.0, 0.0], 2, direction, alpha=alpha)
+    assert len(motion.turning_points) == (rise != 0)
+    if rise:
+        assert motion.turning_points[0] == pytest.approx(float(2 / rise), rel=4e-16)
+    else:
+        assert motion.lam("1e12") == 2e12
+        assert motion.time_at("1e12") == 5e11
+        assert np.isnan(swept.values).all()
+
+
+@pytest.mark.parametrize("alpha", ANGLES)
+def test_an_inclination_means_the_same_to_friction(alpha: Any, build: Build) -> None:
+    """On a level line friction alone stops a body, and the way up an incline has a closed form."""
+    module = build("rough_slope", SLOPE, gqm.Gravity() + gqm.CoulombFriction(mu="1/10"))
+    with mp.workdps(50):
+        angle = read_number(alpha, where="alpha").at(mp)
+        up = 1 if mp.sin(angle) >= 0 else -1
+        deceleration = G * (abs(mp.sin(angle)) + abs(mp.cos(angle)) / 10)
+        stop = up * 2 / deceleration
+    motion = module.solve(0, 2, up, alpha=alpha)
+    assert motion.legs[0].lam_end == pytest.approx(float(stop), rel=1e-15)
+    swept = module.sweep("rest_position", [0.0], 2, up, alpha=alpha).values
+    rests = abs(math.sin(float(angle))) < abs(math.cos(float(angle))) / 10
+    assert swept == pytest.approx(float(stop), rel=1e-15) if rests else np.isnan(swept).all()

@@ -110,11 +110,11 @@ class Differences:
         outer, inner = _outermost(u, self.parameter)
         at = [self.value(inner, k) for k in range(3)]
         low, high = self.gap(inner, 0, 1), self.gap(inner, 1, 2)
-        bend = outer.second(at[0], at[1], at[2], low, high) * self.first(inner, 0, 1) * self.first(inner, 0, 2)
+        second = outer.second(at[0], at[1], at[2], low, high) * self.first(inner, 0, 1) * self.first(inner, 0, 2)
         curved = self.second(inner)
         if curved != 0:
-            bend += outer.first(at[1], at[2], high) * curved
-        return bend
+            second += outer.first(at[1], at[2], high) * curved
+        return second
 
 
 def _halves(product: Expr, parameter: Symbol) -> tuple[Expr, Expr]:

@@ -83,19 +83,19 @@ def dissipative_speed(
     lam = curve.parameter
     if not loss.linear:
         return SpeedField(squared=sp.Function(W.name, real=True)(lam), form=EQUATION)
-    bend = sp.Symbol("|κ|/κ", real=True)
+    side = sp.Symbol("|κ|/κ", real=True)
     # What the law takes of a curve, without the absolute values in σ, and antiderivatives where those are known.
     table = {
         SIGMA * PUSH: (-kernel.inertia * law.effective_potential_slope, -kernel.inertia * law.effective_potential),
         SIGMA * LOAD: (law.pressure, None),
         TURN: (shape.turning_rate, shape.angle),
-        sp.Abs(TURN): (bend * shape.turning_rate, bend * shape.angle),
+        sp.Abs(TURN): (side * shape.turning_rate, side * shape.angle),
     }
     drive, decay = (_Sum(form, table, shape.ds, lam) for form in (loss.drive, loss.decay))
     spent = decay.antiderivative()
     ground = drive.antiderivative() if not decay.rate else particular(drive.rate, decay.rate, lam, _SIGNS)
     # One sign on a leg, which ends where κ changes sign; it may begin where κ is zero.
-    signed = {bend: sp.Abs(shape.kappa) / shape.kappa if shape.kappa else sp.S.Zero}
+    signed = {side: sp.Abs(shape.kappa) / shape.kappa if shape.kappa else sp.S.Zero}
     if spent is not None and ground is not None:
         start = {lam: LAM0}
         gain = sp.exp(-tidy(spent - spent.xreplace(start)))

@@ -50,6 +50,12 @@ class ChartMaker(Hashable, Protocol):
     def true_curve(self, context: Any, p: tuple[Any, ...], chart: "Chart") -> Any:
         """Return the curve itself in extended precision (`exact_normals.TrueCurve`)."""
 
+    def true_pieces(self, p: Any, chart: "Chart") -> Any:
+        """Return the curve in double-double arithmetic (`true_pieces.TruePieces`), for parameters as exact numbers.
+
+        It is None if there is no such thing.
+        """
+
     def is_exact(self, chart: "Chart") -> bool:
         """Whether the curve can be evaluated in extended precision everywhere on a chart."""
 

@@ -4,8 +4,13 @@ from collections.abc import Callable, Sequence
 from functools import cache
 from typing import Any
 
+import numpy as np
+
 from gqm_sym.errors import SolutionError
 from gqm_sym.runtime.charts.chart import Chart
+from gqm_sym.runtime.charts.true_pieces import NODES, Samples, sample_places
+from gqm_sym.runtime.double_double.arithmetic import UNIT
+from gqm_sym.runtime.multiprecision.exact_problem import two_doubles
 from gqm_sym.runtime.multiprecision.fixed_point import Polynomials
 from gqm_sym.runtime.multiprecision.gauss_legendre import gauss
 
@@ -39,6 +44,16 @@ class Parts:
             return context.hypot(*self._part(part)(place)[2:])
 
         return gauss(context, speed, [context.mpf(place) for place in places], context.dps)[0]
+
+    def sample(self, k: int) -> Samples:
+        """Return a piece at the Chebyshev points in double-double arithmetic (`true_pieces`)."""
+        context, (part, low, high) = self._context, self._origins[k]
+        at, samples = self._part(part), np.empty((2, 2, NODES))
+        middle, half = (context.mpf(high) + low) / 2, (context.mpf(high) - low) / 2
+        for i, node in enumerate(sample_places().T.tolist()):
+            for row, value in zip(samples, at(middle + half * sum(map(context.mpf, node)))[:2], strict=True):
+                row[:, i] = two_doubles(value)
+        return samples, 4.0 * UNIT * float(np.abs(samples).max())
 
     def meet(self, k: int, u: float, x: Any, z: Any, dx: Any, dz: Any, size: float) -> tuple[Any, Any, Any, Any]:
         """Return where the line through (x, z) perpendicular to (dx, dz) meets the curve, and the tangent there."""

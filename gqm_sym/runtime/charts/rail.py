@@ -4,7 +4,7 @@ The curvature of a standard piece is linear in arc length, so that its angle is 
 integrals of the angle's cosine and sine.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import islice
 from math import atan2, ceil, hypot, pi
@@ -16,9 +16,11 @@ from numpy.polynomial.legendre import leggauss
 
 from gqm_sym.errors import BudgetError, DeclarationError, ParameterError
 from gqm_sym.literals.namespaces import FLOATS
+from gqm_sym.literals.numbers import Number
 from gqm_sym.runtime.charts.arc_length import MAX_PIECES, Indices, Pieces, joined, rectify, summed
 from gqm_sym.runtime.charts.chart import NODES, Chart, PieceData, assemble
 from gqm_sym.runtime.charts.exact_parts import Part, Parts, spiral
+from gqm_sym.runtime.charts.true_pieces import DIGITS, TruePieces
 from gqm_sym.runtime.compiled.calls import call_segment
 from gqm_sym.runtime.compiled.jit import entry
 from gqm_sym.runtime.compiled.types import Array
@@ -137,6 +139,15 @@ class Rail:
             parts.append(spiral(context, pen, length, first, last, count))
             pen = *parts[-1](context.mpf(count))[:2], pen[2] + length * (first + last) / 2
         return Parts(context, chart, parts.__getitem__)
+
+    def true_pieces(self, p: Sequence[Number], chart: Chart) -> TruePieces:
+        """Return the rail in double-double arithmetic."""
+        from mpmath.ctx_mp import MPContext
+
+        context = MPContext()
+        context.dps = DIGITS
+        curve = self.true_curve(context, tuple(number.at(context) for number in p), chart)
+        return TruePieces(chart, curve.sample)
 
     def _assembled(self, pieces: Pieces, parts: Indices, joints: list[float], start: Pen, end: Pen) -> Chart:
         edges = summed(pieces.lengths)

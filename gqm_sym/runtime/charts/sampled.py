@@ -4,6 +4,7 @@ The spline is quintic, so that its curvature has two continuous derivatives. Its
 points: the lengths of the chords at first, then those of the spline found before, until they no longer change.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from math import sqrt
@@ -14,12 +15,16 @@ from numba import types
 
 from gqm_sym.budgets import spend
 from gqm_sym.errors import SolutionError
-from gqm_sym.literals.numbers import read_number
+from gqm_sym.literals.numbers import Number, read_number
+from gqm_sym.runtime.arithmetic.doubledouble import two_sum
 from gqm_sym.runtime.charts.arc_length import Indices, Pieces, rectify, summed, unwrapped
 from gqm_sym.runtime.charts.chart import NODES, Chart, PieceData, assemble
 from gqm_sym.runtime.charts.exact_parts import Part, Parts, polynomial
+from gqm_sym.runtime.charts.true_pieces import NODES as NODES_OF_PIECES
+from gqm_sym.runtime.charts.true_pieces import SAMPLES, TruePieces, sample_places
 from gqm_sym.runtime.compiled.jit import Inner, entry
-from gqm_sym.runtime.compiled.types import MATRIX, Array
+from gqm_sym.runtime.compiled.types import MATRIX, VECTOR, Array
+from gqm_sym.runtime.double_double.arithmetic import UNIT, add, divide, multiply
 
 DEGREE = 5
 
@@ -75,6 +80,63 @@ class Sampled:
             return polynomial(context, 0, 1, (x, to_x - x), (z, to_z - z))
 
         return Parts(context, chart, plane)
+
+    def true_pieces(self, p: Sequence[Number], chart: Chart) -> TruePieces:
+        """Return the track in double-double arithmetic."""
+        spline, nodes = _made(self)[1], sample_places()
+        if spline is None:
+            numbers = np.array(
+                [(n.value, n.low) for n in (read_number(t, where="points") for t in self.points.split())]
+            )
+            corners = numbers.reshape(-1, 4)
+            count = len(corners)
+            return TruePieces(chart, lambda k: sample_plane(corners[k], corners[(k + 1) % count], nodes))
+        t, c = spline.t, np.ascontiguousarray(spline.c)
+        places = [(int(part), low, high) for part, low, high in chart.origins.tolist()]
+        return TruePieces(chart, lambda k: sample_spline(t, c, places[k], nodes))
+
+
+@entry(SAMPLES(VECTOR, VECTOR, MATRIX))
+def sample_plane(begin, end, nodes):  # type: ignore[no-untyped-def]
+    """Return the samples of a plane between two points, each x and z as two doubles each (`true_pieces.Samples`)."""
+    samples = np.empty((2, 2, NODES_OF_PIECES))
+    for i in range(NODES_OF_PIECES):
+        share, share_low = add(0.5 * nodes[0, i], 0.5 * nodes[1, i], 0.5, 0.0)
+        for row in range(2):
+            x, x_low = begin[2 * row], begin[2 * row + 1]
+            gap, gap_low = add(end[2 * row], end[2 * row + 1], -x, -x_low)
+            gap, gap_low = multiply(gap, gap_low, share, share_low)
+            samples[row, 0, i], samples[row, 1, i] = add(x, x_low, gap, gap_low)
+    return samples, 4.0 * UNIT * np.abs(samples).max()
+
+
+@entry(SAMPLES(VECTOR, MATRIX, types.Tuple((types.int64, types.float64, types.float64)), MATRIX))
+def sample_spline(t, c, place, nodes):  # type: ignore[no-untyped-def]
+    """Return the samples of a piece of a spline with the knots t and the coefficients c, by de Boor's algorithm.
+
+    ``place`` is the index of the piece's first knot, and where it begins and ends in the spline's parameter.
+    """
+    k, begin, end = place
+    samples, terms = np.empty((2, 2, NODES_OF_PIECES)), np.empty((DEGREE + 1, 2))
+    width, width_low = two_sum(0.5 * end, -0.5 * begin)
+    for i in range(NODES_OF_PIECES):
+        share, share_low = add(nodes[0, i], nodes[1, i], 1.0, 0.0)
+        at, at_low = multiply(width, width_low, share, share_low)
+        at, at_low = add(at, at_low, begin, 0.0)
+        for row in range(2):
+            for j in range(DEGREE + 1):
+                terms[j, 0], terms[j, 1] = c[k - DEGREE + j, row], 0.0
+            for order in range(1, DEGREE + 1):
+                for j in range(DEGREE, order - 1, -1):
+                    left = t[k - DEGREE + j]
+                    ahead, ahead_low = add(at, at_low, -left, 0.0)
+                    span, span_low = two_sum(t[k + 1 + j - order], -left)
+                    ahead, ahead_low = divide(ahead, ahead_low, span, span_low)
+                    gap, gap_low = add(terms[j, 0], terms[j, 1], -terms[j - 1, 0], -terms[j - 1, 1])
+                    gap, gap_low = multiply(gap, gap_low, ahead, ahead_low)
+                    terms[j, 0], terms[j, 1] = add(terms[j - 1, 0], terms[j - 1, 1], gap, gap_low)
+            samples[row, 0, i], samples[row, 1, i] = terms[DEGREE, 0], terms[DEGREE, 1]
+    return samples, 16.0 * UNIT * np.abs(samples).max()
 
 
 def _exact_polynomial(context: Any, t: Array, c: Array, k: int) -> Part:

@@ -76,7 +76,7 @@ def fill_sines(n, a, out, other):  # type: ignore[no-untyped-def]
     """Fill a register with sines, and another one with cosines."""
     for i in range(n):
         out[i], out[LOW + i], other[i], other[LOW + i] = sine_and_cosine(a[i], a[LOW + i])
-        out[ERROR + i] = fabs(other[i]) * a[ERROR + i] + UNIT
+        out[ERROR + i] = fabs(other[i]) * a[ERROR + i] + UNIT * min(1.0, 2.0 * fabs(a[i]))
         other[ERROR + i] = fabs(out[i]) * a[ERROR + i] + UNIT
 
 

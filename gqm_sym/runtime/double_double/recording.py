@@ -44,7 +44,9 @@ class Tape(NamedTuple):
         Where these three parts end.
     registers : tuple of int
         Where in the work space the registers begin of: the first run-time parameter, the place, the effective
-        potential U, ds/dlam, dU/dlam, and the period of the curve's parameter (negative where there is none).
+        potential U, ds/dlam, dU/dlam, and the period of the curve's parameter (negative where there is none). For a
+        function of the plane (`record_in_plane`): the first run-time parameter, x (z follows), the function, its
+        derivatives by x and z, and nothing.
     """
 
     operations: NDArray[np.int64]
@@ -71,7 +73,11 @@ class BoundTape(NamedTuple):
     parameters: Array
 
 
-class _Number:
+Recorded = tuple[Tape, Array]
+"""A tape, and registers with its constants."""
+
+
+class TapeNumber:
     """A number in a formula that is being recorded: a rational number, or the register that will contain it."""
 
     __slots__ = ("_tape", "known", "register")
@@ -79,7 +85,7 @@ class _Number:
     def __init__(self, tape: "_Recorder", register: int = -1, known: Fraction | None = None) -> None:
         self._tape, self.register, self.known = tape, register, known
 
-    def _with(self, code: int, other: Any, *, turned: bool = False) -> "_Number":
+    def _with(self, code: int, other: Any, *, turned: bool = False) -> "TapeNumber":
         other = self._tape.number(other)
         a, b = (other, self) if turned else (self, other)
         if a.known is not None and b.known is not None and not (code == interpreter.DIVIDE and b.known == 0):
@@ -92,33 +98,33 @@ class _Number:
             return self._tape.number(exact[code](b.known))
         return self._tape.result(code, a, b)
 
-    def __add__(self, other: Any) -> "_Number":
+    def __add__(self, other: Any) -> "TapeNumber":
         return self._with(interpreter.ADD, other)
 
-    def __sub__(self, other: Any) -> "_Number":
+    def __sub__(self, other: Any) -> "TapeNumber":
         return self._with(interpreter.SUBTRACT, other)
 
-    def __rsub__(self, other: Any) -> "_Number":
+    def __rsub__(self, other: Any) -> "TapeNumber":
         return self._with(interpreter.SUBTRACT, other, turned=True)
 
-    def __mul__(self, other: Any) -> "_Number":
+    def __mul__(self, other: Any) -> "TapeNumber":
         return self._with(interpreter.MULTIPLY, other)
 
-    def __truediv__(self, other: Any) -> "_Number":
+    def __truediv__(self, other: Any) -> "TapeNumber":
         return self._with(interpreter.DIVIDE, other)
 
-    def __rtruediv__(self, other: Any) -> "_Number":
+    def __rtruediv__(self, other: Any) -> "TapeNumber":
         return self._with(interpreter.DIVIDE, other, turned=True)
 
     __radd__, __rmul__ = __add__, __mul__
 
-    def __neg__(self) -> "_Number":
+    def __neg__(self) -> "TapeNumber":
         return -1 * self
 
-    def __abs__(self) -> "_Number":
+    def __abs__(self) -> "TapeNumber":
         return self._tape.result(interpreter.ABSOLUTE, self)
 
-    def __pow__(self, other: Any) -> "_Number":
+    def __pow__(self, other: Any) -> "TapeNumber":
         exponent = self._tape.number(other)
         if exponent.known is None or exponent.known.denominator > 2:
             return self._tape.exp(exponent * self._tape.log(self))
@@ -126,10 +132,10 @@ class _Number:
         power = base.to(abs(exponent.known.numerator))
         return 1 / power if exponent.known < 0 else power
 
-    def __rpow__(self, other: Any) -> "_Number":
+    def __rpow__(self, other: Any) -> "TapeNumber":
         return self._tape.number(other) ** self
 
-    def to(self, count: int) -> "_Number":
+    def to(self, count: int) -> "TapeNumber":
         """Return the product of so many factors."""
         if count < 2:
             return self if count else self._tape.number(1)
@@ -140,12 +146,16 @@ class _Number:
 class _Recorder:
     """The namespace of operations that formulas are recorded over: the functions have the names that mpmath has."""
 
-    def __init__(self, parameters: int) -> None:
+    def __init__(self, parameters: int, coordinates: int = 1) -> None:
         # Each entry is what is done and to which registers. A constant is its doubles.
-        self.entries: list[tuple[Any, ...]] = [*((("parameter", k)) for k in range(parameters)), ("place",)]
+        self.entries: list[tuple[Any, ...]] = [
+            *(("parameter", k) for k in range(parameters)),
+            *(("place", k) for k in range(coordinates)),
+        ]
         self._known: dict[tuple[Any, ...], int] = {entry: k for k, entry in enumerate(self.entries)}
-        self.values = tuple(_Number(self, k) for k in range(parameters))
-        self.place = _Number(self, parameters)
+        self.values = tuple(TapeNumber(self, k) for k in range(parameters))
+        self.places = tuple(TapeNumber(self, parameters + k) for k in range(coordinates))
+        self.place = self.places[0]
         self.pi, self.e = self._constant(PI), self._constant(E)
 
     def _entry(self, *entry: Any) -> int:
@@ -156,12 +166,12 @@ class _Recorder:
                 self.entries.append(("cosine", entry[1]))
         return self._known[entry]
 
-    def _constant(self, pair: tuple[float, float]) -> _Number:
-        return _Number(self, self._entry("constant", *pair))
+    def _constant(self, pair: tuple[float, float]) -> TapeNumber:
+        return TapeNumber(self, self._entry("constant", *pair))
 
-    def number(self, value: Any) -> _Number:
+    def number(self, value: Any) -> TapeNumber:
         """Return an operand as a number of this tape."""
-        return value if isinstance(value, _Number) else _Number(self, known=Fraction(value))
+        return value if isinstance(value, TapeNumber) else TapeNumber(self, known=Fraction(value))
 
     mpf = number
 
@@ -170,53 +180,53 @@ class _Recorder:
         number = self.number(value)
         return number.register if number.known is None else self._entry("constant", *split(number.known))
 
-    def result(self, code: int, *operands: _Number) -> _Number:
+    def result(self, code: int, *operands: TapeNumber) -> TapeNumber:
         """Record an operation, unless it has been recorded before, and return its result."""
-        return _Number(self, self._entry(code, *map(self.register, operands)))
+        return TapeNumber(self, self._entry(code, *map(self.register, operands)))
 
-    def sqrt(self, x: Any) -> _Number:
+    def sqrt(self, x: Any) -> TapeNumber:
         return self.result(interpreter.SQUARE_ROOT, self.number(x))
 
-    def exp(self, x: Any) -> _Number:
+    def exp(self, x: Any) -> TapeNumber:
         return self.result(interpreter.EXPONENTIAL, self.number(x))
 
-    def log(self, x: Any) -> _Number:
+    def log(self, x: Any) -> TapeNumber:
         return self.result(interpreter.LOGARITHM, self.number(x))
 
-    def sin(self, x: Any) -> _Number:
+    def sin(self, x: Any) -> TapeNumber:
         return self.result(interpreter.SINE_COSINE, self.number(x))
 
-    def cos(self, x: Any) -> _Number:
-        return _Number(self, self.sin(x).register + 1)
+    def cos(self, x: Any) -> TapeNumber:
+        return TapeNumber(self, self.sin(x).register + 1)
 
-    def tan(self, x: Any) -> _Number:
+    def tan(self, x: Any) -> TapeNumber:
         return self.sin(x) / self.cos(x)
 
-    def atan(self, x: Any) -> _Number:
+    def atan(self, x: Any) -> TapeNumber:
         return self.result(interpreter.ARC_TANGENT, self.number(x))
 
-    def asin(self, x: Any) -> _Number:
+    def asin(self, x: Any) -> TapeNumber:
         return self.atan(x / self.sqrt(1 - x * x))
 
-    def acos(self, x: Any) -> _Number:
+    def acos(self, x: Any) -> TapeNumber:
         return self.pi / 2 - self.asin(x)
 
-    def cosh(self, x: Any) -> _Number:
+    def cosh(self, x: Any) -> TapeNumber:
         return (self.exp(x) + 1 / self.exp(x)) / 2
 
-    def sinh(self, x: Any) -> _Number:
+    def sinh(self, x: Any) -> TapeNumber:
         return (self.exp(x) - 1 / self.exp(x)) / 2
 
-    def tanh(self, x: Any) -> _Number:
+    def tanh(self, x: Any) -> TapeNumber:
         return self.sinh(x) / self.cosh(x)
 
-    def asinh(self, x: Any) -> _Number:
+    def asinh(self, x: Any) -> TapeNumber:
         return self.log(x + self.sqrt(x * x + 1))
 
-    def acosh(self, x: Any) -> _Number:
+    def acosh(self, x: Any) -> TapeNumber:
         return self.log(x + self.sqrt(x * x - 1))
 
-    def atanh(self, x: Any) -> _Number:
+    def atanh(self, x: Any) -> TapeNumber:
         return self.log((1 + x) / (1 - x)) / 2
 
     def depend_on_place(self) -> list[bool]:
@@ -227,9 +237,84 @@ class _Recorder:
             depends.append(any(depends[k] for k in operands) if is_operation else code == "place")
         return depends
 
+    def needed_by(self, registers: Sequence[int]) -> set[int]:
+        """Return the entries that some registers are computed from, and these themselves."""
+        needed, pending = set[int](), list(registers)
+        while pending:
+            k = pending.pop()
+            if k in needed:
+                continue
+            needed.add(k)
+            code, *operands = self.entries[k]
+            if code == "cosine":
+                pending.append(k - 1)  # the sine, with which it is computed
+            elif not isinstance(code, str):
+                pending.extend(operands)
+        return needed
+
+    def finished(self, values: Sequence[int], others: Sequence[int], period: int = NOWHERE) -> Recorded | None:
+        """Return the tape and registers with its constants; None where it is too long.
+
+        Parameters
+        ----------
+        values, others : sequences of int
+            Registers of what is needed at each place, and of what is needed at few places only.
+        period : int
+            The register of the period, if there is one.
+        """
+        if len(self.entries) > MAX_REGISTERS:
+            return None
+        depends, needed = self.depend_on_place(), self.needed_by(values)
+        operations = [k for k, entry in enumerate(self.entries) if not isinstance(entry[0], str)]
+        groups = (
+            [k for k in operations if not depends[k]],
+            [k for k in operations if depends[k] and k in needed],
+            [k for k in operations if depends[k] and k not in needed],
+        )
+        codes = np.zeros((len(operations), 4), dtype=np.int64)
+        for row, k in zip(codes, chain(*groups), strict=True):
+            code, *operands = self.entries[k]
+            row[: 2 + len(operands)] = code, ROW * k, *(ROW * operand for operand in operands)
+        work = np.zeros(ROW * len(self.entries))
+        for k, (code, *pair) in enumerate(self.entries):
+            if code == "constant":
+                register = work[ROW * k : ROW * (k + 1)]
+                register[:LOW], register[LOW:ERROR], register[ERROR:] = (
+                    *pair,
+                    0.25 * UNIT * abs(pair[0]) if pair[1] else 0.0,
+                )
+        first, second, third = accumulate(len(group) for group in groups)
+        found = [ROW * register for register in (*values, *others, period)]
+        return Tape(codes, (first, second, third), (0, ROW * len(self.values), *found)), work  # type: ignore[arg-type]
+
+
+class Recorder(_Recorder):
+    """A tape that is being recorded, whose entries may be read to record more of them.
+
+    Attributes
+    ----------
+    exact : dict
+        For the register of each constant the number that it is, or the name of it.
+    """
+
+    def __init__(self, parameters: int) -> None:
+        super().__init__(parameters)
+        self.exact: dict[int, Fraction | str] = {self.pi.register: "pi", self.e.register: "e"}
+
+    def register(self, value: Any) -> int:
+        """Return the register of an operand."""
+        number, register = self.number(value), super().register(value)
+        if number.known is not None:
+            self.exact[register] = number.known
+        return register
+
+    def at(self, register: int) -> TapeNumber:
+        """Return the number that a register will contain."""
+        return TapeNumber(self, register)
+
 
 @lru_cache(maxsize=64)
-def record(formulas: ExactFormulas, domain: Callable[..., Any], parameters: int) -> tuple[Tape, Array] | None:
+def record(formulas: ExactFormulas, domain: Callable[..., Any], parameters: int) -> Recorded | None:
     """Return the tape of a module's formulas and registers with its constants; None where they are too long.
 
     Parameters
@@ -246,37 +331,23 @@ def record(formulas: ExactFormulas, domain: Callable[..., Any], parameters: int)
     ds = op.register(formulas.ds(op, op.place, op.values))
     period = domain(op, op.values)[2]
     period_register = NOWHERE if period is None else op.register(period)
-    before_slope = len(op.entries)
     slope = op.register(formulas.effective_potential_slope(op, op.place, op.values))
-    if len(op.entries) > MAX_REGISTERS:
-        return None
-    depends = op.depend_on_place()
-    operations = [k for k, entry in enumerate(op.entries) if not isinstance(entry[0], str)]
-    groups = (
-        [k for k in operations if not depends[k]],
-        [k for k in operations if depends[k] and k < before_slope],
-        [k for k in operations if depends[k] and k >= before_slope],
-    )
-    codes = np.zeros((len(operations), 4), dtype=np.int64)
-    for row, k in zip(codes, chain(*groups), strict=True):
-        code, *operands = op.entries[k]
-        row[: 2 + len(operands)] = code, ROW * k, *(ROW * operand for operand in operands)
-    work = np.zeros(ROW * len(op.entries))
-    for k, (code, *pair) in enumerate(op.entries):
-        if code == "constant":
-            register = work[ROW * k : ROW * (k + 1)]
-            register[:LOW], register[LOW:ERROR], register[ERROR:] = (
-                *pair,
-                0.25 * UNIT * abs(pair[0]) if pair[1] else 0.0,
-            )
-    first, second, third = accumulate(len(group) for group in groups)
-    registers = (0, ROW * parameters, ROW * potential, ROW * ds, ROW * slope, ROW * period_register)
-    return Tape(codes, (first, second, third), registers), work
+    return op.finished((potential, ds), (slope,), period_register)
 
 
-def bind(formulas: ExactFormulas, domain: Callable[..., Any], parameters: Sequence[Number]) -> BoundTape | None:
-    """Return the tape of a module's formulas with values of its parameters; None where the formulas are too long."""
-    found = record(formulas, domain, len(parameters))
+@lru_cache(maxsize=64)
+def record_in_plane(function: Callable[..., Any], parameters: int) -> Recorded | None:
+    """Return the tape of a function ``f(op, x, z, p)`` that gives a value and its derivatives by x and z.
+
+    It is None where it is too long.
+    """
+    op = _Recorder(parameters, coordinates=2)
+    value, *slopes = map(op.register, function(op, *op.places, op.values))
+    return op.finished((value,), slopes)
+
+
+def bind(found: Recorded | None, parameters: Sequence[Number]) -> BoundTape | None:
+    """Return a recorded tape with values of its parameters; None where there is no tape."""
     if found is None:
         return None
-    return BoundTape(*found, np.array([[p.value for p in parameters], [p.low for p in parameters]]))
+    return BoundTape(*found, np.array([[p.value for p in parameters], [p.low for p in parameters]]).reshape(2, -1))

@@ -12,7 +12,7 @@ LAUNCH                   place, signed speed, length of a lap, arc length at lau
                          ``a`` measured from the launch; error of the time at launch, and its growth with time
 WAVE                     the constants of `fourier.sum_wave`
 COSINES, SINES           Fourier coefficients of the place; none where the table is to be used
-CLOCK                    the constants of `phase_angles_at`
+TIMING                   the constants of `phase_angles_at`
 MIDDLES ... ENDS         the table (`table.Table`)
 EDGES, LENGTHS, ARCS     panels of the arc length: edges, lengths there, and Legendre coefficients
 TIME_ERRORS              error of the time on each panel
@@ -41,7 +41,7 @@ from gqm_sym.runtime.quadrature.time_panels import DEGREE, read_off_block
 
 # Times that are answered together.
 BLOCK = 128
-FUNCTIONS, SHAPE, LAUNCH, WAVE, COSINES, SINES, CLOCK = range(7)
+FUNCTIONS, SHAPE, LAUNCH, WAVE, COSINES, SINES, TIMING = range(7)
 MIDDLES, LOWS, SCALES, POWERS, INDEX, ENDS = range(7, 13)
 EDGES, LENGTHS, ARCS, TIME_ERRORS, TABLE_ERRORS, OWNERS = range(13, 19)
 SECTIONS = 19
@@ -107,12 +107,12 @@ def table_of(record):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def phase_angles_at(clock, kind, table, t, n, phases):  # type: ignore[no-untyped-def]
+def phase_angles_at(timing, kind, table, t, n, phases):  # type: ignore[no-untyped-def]
     """Fill ``phases`` for n times.
 
     Parameters
     ----------
-    clock : (8,) array
+    timing : (8,) array
         The period, the time from the end ``a`` to the launch and the duration of the segment, in s and as two doubles
         each; the last phase angle; and the relative correction from the period's time to the segment's time.
     kind : int
@@ -125,8 +125,8 @@ def phase_angles_at(clock, kind, table, t, n, phases):  # type: ignore[no-untype
         What is filled.
     """
     phi, sense, laps, work, segments = phases
-    period, period_low, phase, phase_low = clock[0], clock[1], clock[2], clock[3]
-    duration, duration_low, stop, correction = clock[4], clock[5], clock[6], clock[7]
+    period, period_low, phase, phase_low = timing[0], timing[1], timing[2], timing[3]
+    duration, duration_low, stop, correction = timing[4], timing[5], timing[6], timing[7]
     is_libration, times, lows = kind == TURN_TURN, work[0], work[1]
     for i in range(n):
         s, low = two_sum(t[i], phase)
@@ -166,14 +166,14 @@ def find_places(record, t, out, begin, end):  # type: ignore[no-untyped-def]
         sum_wave(section(record, WAVE), cosines, section(record, SINES), t, out, begin, end)
         return
     kind, table = section(record, FUNCTIONS).view(np.int64)[5], table_of(record)
-    clock, wave = section(record, CLOCK), section(record, WAVE)
+    timing, wave = section(record, TIMING), section(record, WAVE)
     a, b, launch, lap = wave[6], wave[7], wave[8], wave[9]
     size = min(BLOCK, end - begin)
     phi, laps = np.empty(size), np.empty(size)
     phases = Phases(phi, np.empty(size), laps, np.empty((3, size)), np.empty(size, dtype=np.int64))
     for start in range(begin, end, BLOCK):
         n = min(BLOCK, end - start)
-        phase_angles_at(clock, kind, table, t[start:], n, phases)
+        phase_angles_at(timing, kind, table, t[start:], n, phases)
         for i in range(n):
             place = place_at(kind, a, b, phi[i]) + laps[i] * lap
             out[start + i] = launch if t[start + i] == 0.0 else place
@@ -200,7 +200,7 @@ def find_states(record, p, t, out, begin, end):  # type: ignore[no-untyped-def]
     a, b, ref, w0, stretching = shape[0], shape[1], shape[2], shape[3], shape[4]
     lam0, v0, lap_length, s0, s_a = launch[0], launch[1], launch[2], launch[3], launch[4]
     time_error, drift = launch[5], launch[6]
-    clock, table, arcs = section(record, CLOCK), table_of(record), section(record, ARCS)
+    timing, table, arcs = section(record, TIMING), table_of(record), section(record, ARCS)
     edges, lengths, length_terms = (
         section(record, EDGES),
         section(record, LENGTHS),
@@ -218,7 +218,7 @@ def find_states(record, p, t, out, begin, end):  # type: ignore[no-untyped-def]
     phases = Phases(phi, sense, laps, spare, segments)
     for start in range(begin, end, BLOCK):
         n = min(BLOCK, end - start)
-        phase_angles_at(clock, kind, table, t[start:], n, phases)
+        phase_angles_at(timing, kind, table, t[start:], n, phases)
         # The functions of a generated module take rows of exactly n numbers.
         flat, frame = work.reshape(-1)[: 4 * n].reshape(4, n), rows.reshape(-1)[: 5 * n].reshape(5, n)
         fill_speeds(integrand, phi[:n], flat, v)

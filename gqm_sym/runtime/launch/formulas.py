@@ -1,7 +1,7 @@
 """The record of one generated module: its functions, formulas and run-time parameters, and the range of its curve."""
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
@@ -19,6 +19,9 @@ from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.interface import Addresses, BatchFunctions, Dissipation, ExactFormulas, ExactPotential
 from gqm_sym.runtime.launch.domain import Domain, DomainNumbers
 
+# Bits to which sines and cosines of parameters such as pi/2 must vanish to count as zero.
+EXACT_BITS = 640
+
 
 class ParameterValues(tuple[Number, ...]):
     """Exact values of the run-time parameters, and what follows from them alone: it is the same for all launches.
@@ -26,19 +29,22 @@ class ParameterValues(tuple[Number, ...]):
     Attributes
     ----------
     values : array
-        The values as doubles.
+        The values as doubles, and behind them the sines, cosines and tangents of parameters alone.
     domain : Domain or None
         The range of the curve parameter, once it has been asked for.
     functions : launch.functions.BoundFunctions or None
         The compiled functions bound to these values, once they have been asked for.
     tape : double_double.recording.BoundTape or None
         The exact formulas as a tape, once it has been asked for; False if there is none.
+    true_pieces : charts.true_pieces.TruePieces or None
+        A charted curve in double-double arithmetic, once it has been asked for; False if there is no such thing.
     """
 
     values: Array
     domain: Domain | None = None
     functions: Any = None
     tape: Any = None
+    true_pieces: Any = None
 
 
 @lru_cache(maxsize=8)
@@ -46,6 +52,12 @@ def chart_with(maker: ChartMaker, values: tuple[float, ...]) -> Chart:
     """The chart of a curve; it is made once for the same values of the run-time parameters."""
     with budget("chart", 60.0, "give fewer points, or shorter and simpler pieces"):
         return maker.chart(values)
+
+
+@lru_cache(maxsize=4)
+def true_pieces_of(maker: ChartMaker, p: tuple[Number, ...]) -> Any:
+    """The curve behind a chart in double-double arithmetic, or None; it is made once for the same exact parameters."""
+    return maker.true_pieces(p, chart_with(maker, tuple(number.value for number in p)))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -96,6 +108,9 @@ class Formulas:
         and angles.
     inertia : callable or None
         ``f(op, p)`` gives 1 + beta of a rolling body; None where it is 1.
+    trigonometric : callable or None
+        ``f(op, p)`` gives sines, cosines and tangents of parameters alone, whose values compiled functions read behind
+        the parameters; None where there are none.
     """
 
     name: str
@@ -118,6 +133,7 @@ class Formulas:
     effective_potential: Later | None = None
     bounds: Later | None = None
     inertia: Callable[..., Any] | None = None
+    trigonometric: Callable[..., Any] | None = None
     units: Mapping[str, str] = field(default_factory=dict)
     text: str = field(init=False, repr=False, compare=False)
     _read: Callable[..., "ParameterValues"] = field(init=False, repr=False, compare=False)
@@ -169,8 +185,24 @@ class Formulas:
             out.append(number)
         self._check_lower_limits(dict(zip(self.parameters, out, strict=True)))
         p = ParameterValues(out)
-        p.values = np.array([number.value for number in out])
+        p.values = np.array([*(number.value for number in out), *self.trigonometric_values(out)])
         return p
+
+    def trigonometric_values(self, numbers: Sequence[Number]) -> tuple[float, ...]:
+        """Sines, cosines and tangents of the run-time parameters, as doubles; of multiples of pi they are exact.
+
+        A value that is zero to `EXACT_BITS` bits counts as zero.
+        """
+        if self.trigonometric is None:
+            return ()
+        if all(number.fraction is not None for number in numbers):
+            return tuple(map(float, self.trigonometric(FLOATS, tuple(number.value for number in numbers))))
+        from mpmath import MPContext
+
+        context = MPContext()
+        context.prec = EXACT_BITS + 64
+        values = self.trigonometric(context, tuple(number.at(context) for number in numbers))
+        return tuple(0.0 if abs(value) < context.mpf(2) ** -EXACT_BITS else float(value) for value in values)
 
     def _check_lower_limits(self, values: dict[str, Number]) -> None:
         """Refuse a parameter below its lower limit."""

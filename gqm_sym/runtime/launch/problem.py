@@ -6,11 +6,12 @@ from functools import partial
 import numpy as np
 
 from gqm_sym.runtime.charts.exact_normals import ChartTrack
-from gqm_sym.runtime.double_double.recording import BoundTape
+from gqm_sym.runtime.charts.true_pieces import TruePieces
+from gqm_sym.runtime.double_double.recording import BoundTape, record, record_in_plane
 from gqm_sym.runtime.double_double.recording import bind as bind_tape
 from gqm_sym.runtime.interface import ExactFormulas, ExactPotential
 from gqm_sym.runtime.launch.domain import Domain
-from gqm_sym.runtime.launch.formulas import Formulas, ParameterValues
+from gqm_sym.runtime.launch.formulas import Formulas, ParameterValues, true_pieces_of
 from gqm_sym.runtime.launch.functions import BoundFunctions
 from gqm_sym.runtime.launch.request import Launch
 from gqm_sym.runtime.launch.rounded import RoundedProblem
@@ -87,13 +88,24 @@ class Problem:
 
     @property
     def tape(self) -> BoundTape | None:
-        """The exact formulas for double-double arithmetic; None for a chart, and for formulas that are too long."""
+        """The exact formulas for double-double arithmetic, of a chart the potential; None where they are too long."""
         if self.p.tape is None:
-            exact, domain = self.formulas.exact, self.formulas.domain_of
+            exact, domain, count, found = self.formulas.exact, self.formulas.domain_of, len(self.p), None
             if isinstance(exact, ExactFormulas) and domain is not None:
-                self.p.tape = bind_tape(exact, domain, self.p)
-            self.p.tape = self.p.tape or False
+                found = record(exact, domain, count)
+            elif isinstance(exact, ExactPotential):
+                found = record_in_plane(exact.effective_potential, count)
+            self.p.tape = bind_tape(found, self.p) or False
         return self.p.tape or None
+
+    @property
+    def true_pieces(self) -> TruePieces | None:
+        """A charted curve in double-double arithmetic; None where there is no such thing."""
+        if self.functions.exact is None or self.formulas.chart is None:
+            return None
+        if self.p.true_pieces is None:
+            self.p.true_pieces = true_pieces_of(self.formulas.chart, self.p) or False
+        return self.p.true_pieces or None
 
     @property
     def arc_origin(self) -> float:

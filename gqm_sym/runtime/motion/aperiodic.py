@@ -143,6 +143,11 @@ class AperiodicMotion(Motion):
         if not self.lifted_off:
             self.add(toward_equilibrium(self.problem.functions, start, equilibrium), 1, "asymptote")
 
+    def leave_open(self, end: OpenEnd) -> None:
+        """Have the motion continued where its segments end, unless contact is lost before."""
+        if not self.lifted_off:
+            self.open_end = end
+
     def finish(self) -> "AperiodicMotion":
         """Compute the first segment at least; returns the motion itself."""
         end = self.open_end

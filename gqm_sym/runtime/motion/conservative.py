@@ -216,7 +216,7 @@ def _without_turn(problem: Problem, direction: int, front: EndOfMotion) -> Motio
         if front.what == "equilibrium":
             motion.approach(_to_half_way(motion, front.place), front.place)
         elif front.what == "open":
-            motion.open_end = OpenEnd(lam0, direction, front.place)
+            motion.leave_open(OpenEnd(lam0, direction, front.place))
         else:
             ref, ref_v2 = (front.place, 0.0) if front.zero_v2 else (lam0, problem.w0)
             motion.add(through(f, lam0, front.place, ref, ref_v2), 1, front.what)
@@ -228,7 +228,7 @@ def _without_turn(problem: Problem, direction: int, front: EndOfMotion) -> Motio
     elif front.what == "open":
         middle = lam0 + direction * min(1.0, 0.5 * abs(front.place - lam0))
         motion.add(from_turn(f, lam0, middle), 1, "")
-        motion.open_end = OpenEnd(middle, direction, front.place)
+        motion.leave_open(OpenEnd(middle, direction, front.place))
     else:
         motion.add(_from_turn_to(f, lam0, front), 1, front.what)
     return motion.finish()
@@ -270,7 +270,7 @@ def _with_one_turn(problem: Problem, direction: int, front: EndOfMotion, back: E
     motion.add(inbound, -1, "turn")
     if back.what == "open":
         motion.add(inbound, 1, "")
-        motion.open_end = OpenEnd(lam0, -direction, back.place)
+        motion.leave_open(OpenEnd(lam0, -direction, back.place))
     elif back.what == "equilibrium":
         middle = 0.5 * (front.place + back.place)
         motion.add(from_turn(f, front.place, middle), 1, "")

@@ -150,7 +150,8 @@ def _on_segment(
     phi = np.unique([low, *inside[(inside > low) & (inside < high)], high])
 
     def signed(angles: Array) -> Array:
-        return sign * quantity(segment, angles)
+        values = sign * quantity(segment, angles)
+        return np.where(np.isnan(values), -np.inf, values)
 
     values = signed(phi)
     padded = np.concatenate([[-np.inf], values, [-np.inf]])
@@ -163,7 +164,7 @@ def _on_segment(
         if abs(near - angle) < END_SHARE * (high - low):
             angle = near
         found.append(_extreme_at(timed, trajectory, angle, sign * float(signed(np.array([angle]))[0])))
-    return float(np.abs(values).max()), sorted(found, key=lambda peak: peak.t)
+    return _size(values), sorted(found, key=lambda peak: peak.t)
 
 
 def _peak(function: Callable[[Array], Array], low: float, middle: float, high: float) -> float:
@@ -187,8 +188,13 @@ def _peak(function: Callable[[Array], Array], low: float, middle: float, high: f
 def _largest(function: Callable[[Array], Array], places: list[float]) -> float:
     """The place with the largest value; of equal ones within rounding the last, which was computed most carefully."""
     values = function(np.array(places))
-    size = np.abs(values).max()
-    return [place for place, value in zip(places, values, strict=True) if value >= values.max() - 2.0 * ULP * size][-1]
+    limit = values.max() - 2.0 * ULP * _size(values)
+    return [place for place, value in zip(places, values, strict=True) if value >= limit][-1]
+
+
+def _size(values: Array) -> float:
+    """The largest absolute value where a quantity is finite."""
+    return float(np.abs(values[np.isfinite(values)]).max(initial=0.0))
 
 
 def _extreme_at(timed: TimedSegment, trajectory: Trajectory, phi: float, value: float) -> Extreme:

@@ -15,6 +15,8 @@ from gqm_sym.literals.namespaces import FLOATS
 from gqm_sym.literals.numbers import Number, read_number, read_numbers
 from gqm_sym.runtime.arithmetic.doubledouble import ULP, Pair
 from gqm_sym.runtime.compiled.types import Array
+from gqm_sym.runtime.gradients.sensitivity import Sensitivity
+from gqm_sym.runtime.gradients.spectrum import Fourier
 from gqm_sym.runtime.launch.equilibria import Potential
 from gqm_sym.runtime.launch.kinds import MotionKind
 from gqm_sym.runtime.launch.problem import Problem
@@ -142,6 +144,107 @@ class Motion(ABC):
             If the motion does not repeat, or its curve is known in doubles only.
         """
         raise SolutionError(f"period_to: this motion is of kind {self.kind!r} and does not repeat")
+
+    # -- gradients ----------------------------------------------------------------------------
+
+    def gradient(self, quantity: str, wrt: Any = None) -> dict[str, Any]:
+        """The derivatives of a quantity of this motion by its launch and run-time parameters.
+
+        Parameters
+        ----------
+        quantity : str
+            "half_period", "period", "turning_points", "v_max", "v_min", "normal_force_max", "normal_force_min" or
+            "action".
+        wrt : str or sequence of str, optional
+            What the derivatives are by: run-time parameters, "lam0" and "v0"; all of them if not given.
+
+        Returns
+        -------
+        dict
+            A float for each name; of turning points a pair, in the order of `turning_points`. At ``v0 = 0`` the
+            derivative by v0 is that for greater speeds.
+
+        Raises
+        ------
+        InputError
+            If there is no such quantity or parameter.
+        SolutionError
+            If the motion does not have the quantity, or gradients are not there yet for motions of its kind.
+        """
+        raise self._without_gradients()
+
+    def sensitivity(self, t: Any, wrt: Any = None) -> Sensitivity:
+        """The derivatives of the state at given times by launch and run-time parameters.
+
+        They are as exact, and take as long, after a million periods as after one.
+
+        Parameters
+        ----------
+        t : number or array_like
+            Times in s from launch, as for `lam`.
+        wrt : str or sequence of str, optional
+            What the derivatives are by, as for `gradient`.
+
+        Returns
+        -------
+        Sensitivity
+            Arrays with one row for each name, of the shape of ``t``.
+
+        Raises
+        ------
+        InputError
+            If there is no such parameter, or as `lam`.
+        SolutionError
+            If gradients are not there yet for motions of this kind.
+        """
+        raise self._without_gradients()
+
+    @property
+    def action(self) -> float:
+        """The integral of (1 + beta) V ds over one period, per mass, in m2/s (libration and circulation).
+
+        Raises
+        ------
+        SolutionError
+            As `gradient`.
+        """
+        raise self._without_gradients()
+
+    @property
+    def period_slope(self) -> float:
+        """dT/dE, the derivative of the period by the energy per mass, in s3/m2; raises what `action` does."""
+        raise self._without_gradients()
+
+    def fourier(self, quantity: str, n: int) -> Fourier:
+        """The Fourier coefficients of a quantity over one period (libration and circulation).
+
+        Parameters
+        ----------
+        quantity : str
+            "x", "z", "v" or "normal_force"; of a libration also "lam" or "s".
+        n : int
+            The order of the last coefficient.
+
+        Returns
+        -------
+        Fourier
+            Arrays ``a`` and ``b`` from order 0 to n: the quantity is the sum of a[k] cos(2 pi k t/T) and
+            b[k] sin(2 pi k t/T), with t from launch.
+
+        Raises
+        ------
+        InputError
+            If there is no such quantity or order.
+        SolutionError
+            If the quantity does not repeat.
+        """
+        raise SolutionError(f"fourier: only a motion that repeats has coefficients; it is of kind {self.kind!r}")
+
+    def _without_gradients(self) -> SolutionError:
+        """What is raised by motions without gradients."""
+        return SolutionError(
+            f"gradients: only librations and circulations have them yet; this motion is of kind {self.kind!r}"
+        )
 
     # -- accuracy -----------------------------------------------------------------------------
 
@@ -384,7 +487,7 @@ class Motion(ABC):
                 legs.append(Leg(float(lam[k]), float(lam[k + 1]), start[0], stop[0], timed.direction, end))
             if timed.end == "asymptote":
                 legs[-1] = replace(legs[-1], lam_end=timed.segment.b + timed.laps * lap, t_end=inf)
-        return Rows(self._up_to_horizon(_merged(legs, self._internal_ends)))
+        return Rows(self._up_to_horizon(merged(legs, self._internal_ends)))
 
     def _places_at(self, timed: TimedSegment, marks: Sequence[tuple[Pair, float]]) -> Array:
         """The places at phase angles of a segment, each with its time; at launch it is exactly the launch place."""
@@ -455,9 +558,13 @@ class Motion(ABC):
         if out and (out[-1].t_end > end or out[-1].end == ""):
             last = out.pop()
             cut = last.t_end > end
-            place, when = (float(self.lam(end)), end) if cut else (last.lam_end, last.t_end)
+            place, when = (self._place_on_last_leg(end), end) if cut else (last.lam_end, last.t_end)
             out.append(Leg(last.lam_start, place, last.t_start, when, last.direction, "horizon"))
         return out
+
+    def _place_on_last_leg(self, t: float) -> float:
+        """The curve parameter at a time on the last of the legs."""
+        return float(self.lam(t))
 
     # -- pictures -----------------------------------------------------------------------------
 
@@ -605,7 +712,7 @@ def _shaped(array: Array, shape: tuple[int, ...]) -> Any:
     return float(array[0]) if shape == () else array.reshape(shape)
 
 
-def _merged(legs: list[Leg], internal_ends: tuple[str, ...]) -> list[Leg]:
+def merged(legs: list[Leg], internal_ends: tuple[str, ...]) -> list[Leg]:
     """The legs, joined where the end of one matters to the computation only."""
     out: list[Leg] = []
     for leg in legs:

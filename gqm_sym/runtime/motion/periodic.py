@@ -7,10 +7,15 @@ from typing import Any
 import numpy as np
 
 from gqm_sym.errors import InputError, SolutionError
+from gqm_sym.literals.namespaces import FLOATS
 from gqm_sym.literals.numbers import read_number
 from gqm_sym.runtime.arithmetic.doubledouble import ULP, ZERO
 from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.double_double.orbit_time import Orbit
+from gqm_sym.runtime.gradients.orbit import OrbitDerivatives
+from gqm_sym.runtime.gradients.quantities import gradient, selected
+from gqm_sym.runtime.gradients.sensitivity import OrbitSensitivity, Sensitivity
+from gqm_sym.runtime.gradients.spectrum import Fourier, fourier
 from gqm_sym.runtime.launch.kinds import MotionKind
 from gqm_sym.runtime.launch.problem import Problem
 from gqm_sym.runtime.motion import timing
@@ -92,9 +97,14 @@ class PeriodicMotion(Motion):
 
     @property
     def _has_multiprecision(self) -> bool:
-        """Whether the period can be computed to more digits than doubles hold, within some seconds."""
+        """Whether mpmath can compute the period within some seconds."""
         f, s = self.problem.functions, self._segment
         return f.exact is not None and f.between(f.exact.edges, s.a, s.b).size <= MAX_CHART_PIECES
+
+    @cached_property
+    def _is_exact(self) -> bool:
+        """Whether the period can be computed to more digits than doubles hold."""
+        return self._has_multiprecision or self._orbit is not None
 
     @cached_property
     def _orbit(self) -> Orbit | None:
@@ -103,15 +113,15 @@ class PeriodicMotion(Motion):
 
     def _timing(self, end_time: float) -> timing.Timing:
         """The times with as many digits as a phase needs at ``end_time`` in s from launch."""
-        if not self._has_multiprecision:
+        if not self._is_exact:
             return timing.in_doubles(self.kind, self._segment, self._offsets)
         launch, self._is_period_known = (self.problem, self.kind, self.direction), True
         if self._exact_timing is None:
             self._exact_timing = timing.in_double_double(*launch, self._segment, self._offsets)
-        if self._exact_timing is None or end_time > self._exact_timing.max_time:
+        if self._has_multiprecision and (self._exact_timing is None or end_time > self._exact_timing.max_time):
             self._exact_timing = timing.in_multiprecision(*launch, self._segment)
             self._precise_trajectory = None
-        return self._exact_timing
+        return self._exact_timing or timing.in_doubles(self.kind, self._segment, self._offsets)
 
     @property
     def _duration(self) -> float:
@@ -150,6 +160,50 @@ class PeriodicMotion(Motion):
                 "declare the curve by formulas for more"
             )
         return timing.period_to(self.problem, self.kind, self.direction, self._segment, digits)
+
+    @cached_property
+    def _derivatives(self) -> OrbitDerivatives:
+        """The orbit with its derivatives."""
+        direction = self.direction if self.kind == "circulation" else 0
+        return OrbitDerivatives(self.problem, self._orbit, direction, self._offsets)
+
+    @cached_property
+    def _orbit_sensitivity(self) -> OrbitSensitivity:
+        return OrbitSensitivity(self._derivatives)
+
+    @locked
+    def gradient(self, quantity: str, wrt: Any = None) -> dict[str, Any]:
+        """The derivatives of a quantity of this motion by names; see `Motion.gradient`."""
+        return gradient(self._derivatives, self, quantity, wrt)
+
+    @property
+    @locked
+    def action(self) -> float:
+        """The integral of (1 + beta) V ds over one period, per mass, in m2/s."""
+        return self._derivatives.action
+
+    @property
+    @locked
+    def period_slope(self) -> float:
+        """dT/dE, the derivative of the period by the energy per mass, in s3/m2."""
+        formulas = self.problem.formulas
+        inertia = 1.0 if formulas.inertia is None else formulas.inertia(FLOATS, self.problem.p.values.tolist())
+        return float(self._derivatives.period_gradient[-1] / inertia)
+
+    @locked
+    def sensitivity(self, t: Any, wrt: Any = None) -> Sensitivity:
+        """The derivatives of the state at given times; see `Motion.sensitivity`."""
+        rows = selected(self.problem.formulas.parameters, wrt)
+        times, low, shape = self._times(t)
+        points = self._phase_points(times, low)
+        found = self._orbit_sensitivity.at(self, points, self._places(points), self._velocities(points))
+        chosen = [array[list(rows.values())].reshape(len(rows), *shape) for array in found]
+        return Sensitivity(tuple(rows), *chosen)
+
+    @locked
+    def fourier(self, quantity: str, n: int) -> Fourier:
+        """The Fourier coefficients of a quantity over one period; see `Motion.fourier`."""
+        return fourier(self, quantity, n)
 
     def __reduce__(self) -> tuple[Any, ...]:
         """As `Motion`, with how exactly its period is known: the last digit of a place depends on it."""
@@ -215,7 +269,7 @@ class PeriodicMotion(Motion):
 
     def _trajectory(self, end_time: float) -> Trajectory:
         one_period_time = self._segment.duration * (2.0 if self.kind == "libration" else 1.0)
-        if self._has_multiprecision and (
+        if self._is_exact and (
             end_time > one_period_time or self._is_period_known or self._segment.from_multiprecision
         ):
             times = self._timing(end_time)

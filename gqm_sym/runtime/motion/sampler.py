@@ -77,7 +77,7 @@ class Sampler:
         self._sections = {
             records.FUNCTIONS: np.array([*problem.functions.addresses, segment.kind], dtype=np.int64),
             records.WAVE: np.array([*trajectory.period, *_inverse(trajectory.period), start, start_low, *ends]),
-            records.CLOCK: np.array([*trajectory.period, start, start_low, *own_times]),
+            records.TIMING: np.array([*trajectory.period, start, start_low, *own_times]),
         }
         f = problem.functions
         if not f.between(f.breaks, segment.a, segment.b).size:

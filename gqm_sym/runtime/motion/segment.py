@@ -55,6 +55,9 @@ NEAREST = 1e-300
 # Phase angles of such an approach at which panels begin: near its start, panels must be short.
 APPROACH_MARKS = (8.0, 16.0, 32.0, 64.0, 128.0, 256.0)
 
+# The slope of the time by the phase angle, as a share of its largest, from which on it has enough digits for a speed.
+MIN_TIME_SLOPE = 1e-6
+
 
 @dataclass(slots=True, kw_only=True)
 class Segment:
@@ -190,9 +193,9 @@ class Segment:
         return times, low
 
     def _initial_edges(self) -> Array:
-        """The first and the last phase angle, and those at which panels must begin."""
+        """The first and the last phase angle, and those at which panels must begin, to the rounding of their places."""
         places = self.functions.between(self.functions.breaks, self.a, self.b)
-        inside = [self.phase_angle_of(*self.offsets(place)) for place in (*places, *self.panel_breaks)]
+        inside = [self.phase_angle_of(*self._offsets_in_doubles(place)) for place in (*places, *self.panel_breaks)]
         return np.array(sorted({0.0, *(phi for phi in inside if 0.0 < phi < self.stop), self.stop}))
 
     @property
@@ -318,11 +321,15 @@ class Segment:
         """The signed distances of place + low from ``a`` and to ``b``; the double of an end means that end."""
         if low == 0.0 and place in (self.a, self.b):
             return (0.0, self.width) if place == self.a else (self.width, 0.0)
-        ahead, behind = (place - self.a) + (low - self.low_parts[0]), (self.b - place) + (self.low_parts[1] - low)
+        ahead, behind = self._offsets_in_doubles(place, low)
         turns = {TURN_TURN: (ahead, behind), FROM_TURN: (ahead,)}.get(self.kind, ())
         if min(map(abs, turns), default=inf) > NEAR_TURN * abs(self.width) or not self._is_conservative:
             return ahead, behind
         return self._exact_offsets(place, low)
+
+    def _offsets_in_doubles(self, place: float, low: float = 0.0) -> tuple[float, float]:
+        """`offsets` from the ends as doubles know them."""
+        return (place - self.a) + (low - self.low_parts[0]), (self.b - place) + (self.low_parts[1] - low)
 
     @property
     def _is_conservative(self) -> bool:
@@ -369,22 +376,25 @@ class Segment:
 
     def speeds(self, phi: Array) -> Array:
         """|ds/dt| in m/s at phase angles."""
-        f = self.functions
-        if self.from_multiprecision:
-            return self._speeds_from_panels(phi)
-        if self.v2 is not None:
+        f, exact = self.functions, self.from_multiprecision
+        if self.v2 is not None and not exact:
             along: Array = speeds_along(self.a, self.b, self.v2, phi)
             return along
-        if self.speed_series is not None:
+        if self.speed_series is not None and not exact:
             last, terms = self.speed_series
             smooth: Array = read_off_many(self.edges, np.zeros_like(self.edges), terms, phi)
             return smooth * (last * (phi + self.turn_offset)) if self.kind == FROM_TURN else smooth
         speeds: Array = speeds_at(f.addresses, f.p, self.kind, self.a, self.b, self.ref, self.ref_v2, phi)
-        return speeds * self.width_ratio
+        return self._improved_by_panels(phi, speeds) if exact else speeds * self.width_ratio
 
-    def _speeds_from_panels(self, phi: Array) -> Array:
-        """|ds/dt| from the slopes of arc length and time, for segments on which V**2 in doubles is rounding only."""
-        speeds: Array = slopes(self.edges, self.panels[4], phi) / slopes(self.edges, self.panels[3], phi)
+    def _improved_by_panels(self, phi: Array, speeds: Array) -> Array:
+        """|ds/dt| from the slopes of arc length and time, which has digits where V**2 in doubles is rounding only.
+
+        Where the body is so fast that the time hardly grows, its slope has fewer digits than V**2.
+        """
+        lengths, times = slopes(self.edges, self.panels[4], phi), slopes(self.edges, self.panels[3], phi)
+        limit = MIN_TIME_SLOPE * slopes(self.edges, self.panels[3], self.edges).max()
+        np.divide(lengths, times, out=speeds, where=times > limit)
         return speeds
 
     def times(self, phi: Array) -> Array:

@@ -11,12 +11,13 @@ import numpy as np
 from gqm_sym.budgets import budget
 from gqm_sym.errors import InputError, SolutionError
 from gqm_sym.runtime.arithmetic.doubledouble import ZERO, Pair
+from gqm_sym.runtime.charts.true_times import ChartPassage, pass_along
 from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.double_double.orbit_time import NO_TIMES, Orbit, time_orbit
 from gqm_sym.runtime.launch.problem import Problem
 from gqm_sym.runtime.motion.segment import Segment
 from gqm_sym.runtime.multiprecision.exact_panels import exact_ends
-from gqm_sym.runtime.multiprecision.exact_problem import MAX_SMOOTH_PANELS, Arithmetic, two_doubles
+from gqm_sym.runtime.multiprecision.exact_problem import MAX_SMOOTH_PANELS, NOWHERE, Arithmetic, two_doubles
 from gqm_sym.runtime.quadrature.substitution import REGULAR, TURN_TURN
 
 # Digits of a period as two doubles, and of the time from a turning point to the launch; the latter needs fewer, because
@@ -75,6 +76,17 @@ def in_doubles(kind: str, segment: Segment, offsets: tuple[float, float]) -> Tim
     return Timing(duration, (phase_time, 0.0), offsets)
 
 
+def passage_of(problem: Problem, kind: str, direction: int, offsets: tuple[float, float]) -> ChartPassage | None:
+    """The orbit along a chart in double-double arithmetic; None where that does not suffice, and for formulas."""
+    pieces, formulas, launch = problem.true_pieces, problem.tape, problem.launch
+    if pieces is None or formulas is None:
+        return None
+    sense = direction if kind == "circulation" else 0
+    ways = (0.0, direction * problem.period) if sense else (-offsets[0], offsets[1])
+    low, high = sorted(launch.lam0.value + way for way in ways)
+    return pass_along(pieces, formulas, (launch.lam0, launch.v0, launch.point), (low, high), sense)
+
+
 def orbit_of(
     problem: Problem, kind: str, direction: int, offsets: tuple[float, float], times: Array = NO_TIMES
 ) -> Orbit | None:
@@ -85,10 +97,13 @@ def orbit_of(
     offsets : (float, float)
         The distances of a libration's turning points from the launch.
     times : (3, n) array
-        Phase angles, and room for the times there (`double_double.orbit_time.fill_times`).
+        Phase angles, and room for the times there (`double_double.orbit_time.fill_times`); not used for charts.
     """
     if problem.tape is None:
         return None
+    if problem.formulas.chart is not None:
+        passage = passage_of(problem, kind, direction, offsets)
+        return None if passage is None else passage.orbit
     sense, launch = direction if kind == "circulation" else 0, (problem.launch.lam0, problem.launch.v0)
     return time_orbit(problem.tape, launch, sense, offsets, times)
 
@@ -100,26 +115,33 @@ def in_double_double(
     if segment.from_multiprecision:
         return None
     is_smooth = len(segment.edges) - 1 <= MAX_SMOOTH_PANELS
-    is_thrown = kind == "libration" and problem.w0 > 0.0
-    times = np.zeros((3, 1 if is_smooth else len(segment.edges) - 1))
-    times[0] = segment.edges[: times.shape[1]]
-    times[0, 0] = 1.0 if is_thrown else 0.0
-    orbit = orbit_of(problem, kind, direction, offsets, times)
-    if orbit is None:
-        return None
-    duration, lam0 = orbit.duration[:2], problem.launch.lam0
+    inner = segment.edges[1:-1] if not is_smooth else NOWHERE
+    is_thrown, lam0 = kind == "libration" and problem.w0 > 0.0, problem.launch.lam0
+    if problem.formulas.chart is not None:
+        passage = passage_of(problem, kind, direction, offsets)
+        orbit = None if passage is None else passage.orbit
+        rows = None if passage is None or orbit is None else passage.times_at(inner, is_thrown=is_thrown)
+        if passage is None or orbit is None or rows is None:
+            return None
+        found, phase_time, offsets = rows[:-1, :2].T, rows[-1, :2].tolist(), passage.offsets
+    else:
+        times = np.zeros((3, 1 + len(inner)))
+        times[0, 0], times[0, 1:] = 1.0 if is_thrown else 0.0, inner
+        orbit = orbit_of(problem, kind, direction, offsets, times)
+        if orbit is None:
+            return None
+        a, b, found, phase_time = orbit.low, orbit.high, times[1:, 1:], times[1:, 0].tolist()
+        offsets = (lam0.value - a.high) + (lam0.low - a.low), (b.high - lam0.value) + (b.low - lam0.low)
+    duration = orbit.duration[:2]
     edge_times = None
     if not is_smooth:
-        high, low = (np.append([0.0, *times[row, 1:]], duration[row - 1]) for row in (1, 2))
+        high, low = (np.append([0.0, *found[row]], duration[row]) for row in (0, 1))
         edge_times = high, low
     if kind == "circulation":
-        found = duration, ZERO, (0.0, segment.b - segment.a)
-    else:
-        a, b = orbit.low, orbit.high
-        offsets = (lam0.value - a.high) + (lam0.low - a.low), (b.high - lam0.value) + (b.low - lam0.low)
-        at_rest = ZERO if offsets[0] < offsets[1] else duration
-        found = duration, (times[1, 0], times[2, 0]) if is_thrown else at_rest, offsets
-    return Timing(*found, edge_times, orbit.duration.error / duration[0])
+        phase_time, offsets = ZERO, (0.0, segment.b - segment.a)
+    elif not is_thrown:
+        phase_time = ZERO if offsets[0] < offsets[1] else duration
+    return Timing(duration, tuple(phase_time), offsets, edge_times, orbit.duration.error / duration[0])
 
 
 @budget("quadrature", 60.0, "launch a little farther from the equilibrium, or cut the curve at its narrow places")

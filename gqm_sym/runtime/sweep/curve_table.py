@@ -37,16 +37,16 @@ NEGLIGIBLE = 1e-2
 MAX_PARTS = 4
 
 # A row of the table: values at the Gauss points and weights in m; the same for fewer points; powers of x in [-1, 1] for
-# the potential as (1 + x)*left(x) = RISE - (1 - x)*right(x), for ds/dlam, m*kappa and m*n0; the potential, m*kappa and
-# m*n0 at the samples; and single numbers.
+# the potential as (1 + x)*left(x) = INCREASE - (1 - x)*right(x), for ds/dlam, m*kappa and m*n0; the potential, m*kappa
+# and m*n0 at the samples; and single numbers.
 POTENTIAL, WEIGHTS = 0, NODES
 FEW_POTENTIAL, FEW_WEIGHTS = 2 * NODES, 2 * NODES + FEW_NODES
 LEFT_TERMS, RIGHT_TERMS, DS_TERMS, KAPPA_TERMS, LOAD_TERMS = (2 * FEW_NODES + k * NODES for k in range(2, 7))
 POTENTIAL_SAMPLES = LOAD_TERMS + NODES
 KAPPA_SAMPLES, LOAD_SAMPLES = POTENTIAL_SAMPLES + SAMPLES, POTENTIAL_SAMPLES + 2 * SAMPLES
-# The potential of the left edge above the reference; the rise from edge to edge; whether the potential rises (1) or
+# The potential of the left edge above the reference; its increase from edge to edge; whether the potential rises (1) or
 # falls (-1) throughout, 0 if neither is certain; its mean; by how much it differs from that in both ellipses, at most.
-BASE, RISE, SLOPE_SIGN, MIDDLE, REACH, FEW_REACH = range(LOAD_SAMPLES + SAMPLES, LOAD_SAMPLES + SAMPLES + 6)
+BASE, INCREASE, SLOPE_SIGN, MIDDLE, REACH, FEW_REACH = range(LOAD_SAMPLES + SAMPLES, LOAD_SAMPLES + SAMPLES + 6)
 ROW = FEW_REACH + 1
 
 
@@ -176,14 +176,14 @@ def fill_row(fns, p, left, right, mass, slope, row):  # type: ignore[no-untyped-
         few_reach += fabs(work[j]) * FEW_GROWTH[j]
         spread += fabs(work[j])
     row[MIDDLE], row[REACH], row[FEW_REACH] = work[0], reach, few_reach
-    total, bend, slope = 0.0, NODES * fabs(row[LEFT_TERMS + NODES - 1]), row[LEFT_TERMS] + row[LEFT_TERMS + 1]
+    total, change, slope = 0.0, NODES * fabs(row[LEFT_TERMS + NODES - 1]), row[LEFT_TERMS] + row[LEFT_TERMS + 1]
     for j in range(NODES):
         total += row[LEFT_TERMS + j]
-        bend += j * fabs(row[LEFT_TERMS + j] + row[LEFT_TERMS + j - 1]) if j > 1 else 0.0
-    row[RISE], row[SLOPE_SIGN] = 2.0 * total, 0.0
-    if fabs(slope) > bend:
+        change += j * fabs(row[LEFT_TERMS + j] + row[LEFT_TERMS + j - 1]) if j > 1 else 0.0
+    row[INCREASE], row[SLOPE_SIGN] = 2.0 * total, 0.0
+    if fabs(slope) > change:
         row[SLOPE_SIGN] = 1.0 if slope > 0.0 else -1.0
-    top = max(row[RISE], 0.0) if row[SLOPE_SIGN] != 0.0 else work[0] + spread
+    top = max(row[INCREASE], 0.0) if row[SLOPE_SIGN] != 0.0 else work[0] + spread
     for j in range(NODES):
         values[j] = rows[1, j]
     resolved &= fill_terms(values, work, row, DS_TERMS, 0.0)

@@ -25,13 +25,13 @@ from gqm_sym.runtime.sweep.curve_table import (
     FEW_WEIGHTS,
     FIT,
     GAUSS_WEIGHTS,
+    INCREASE,
     LEFT_TERMS,
     MIDDLE,
     NODES,
     POINTS,
     POTENTIAL,
     REACH,
-    RISE,
     SLOPE_SIGN,
     WEIGHTS,
     difference_on,
@@ -145,7 +145,7 @@ def turn_from(curve, start, x, w0, direction):  # type: ignore[no-untyped-def]
                 return CRITICAL, index, x
             if sign > 0.0:
                 error = margin + CONSTANT_SHARE * fabs(rows[k, BASE])
-                left = slack - (rows[k, RISE] if direction > 0 else 0.0)
+                left = slack - (rows[k, INCREASE] if direction > 0 else 0.0)
                 if fabs(left) <= error:
                     return CRITICAL, index, x
                 if left < 0.0:
@@ -241,7 +241,7 @@ def fill_slacks(curve, passage, w0, circulates, slacks):  # type: ignore[no-unty
         slacks[j] = slack
         peak = max(peak, slack)
         least = min(least, slack / peak)
-        slack -= rows[(passage.first + j) % count, RISE]
+        slack -= rows[(passage.first + j) % count, INCREASE]
     if circulates:
         return least >= MIN_CANCELLATION_RATIO
     slack, top = (passage.high_x + 1.0) * difference_on(rows, high, -1.0, passage.high_x), 0.0
@@ -249,7 +249,7 @@ def fill_slacks(curve, passage, w0, circulates, slacks):  # type: ignore[no-unty
     for j in range(last - 1, middle, -1):
         top = max(top, slack)
         least = min(least, slack / top)
-        slack += rows[(passage.first + j) % count, RISE]
+        slack += rows[(passage.first + j) % count, INCREASE]
         slacks[j] = slack
     top = max(top, slack)
     # Neither end may be next to an equilibrium.

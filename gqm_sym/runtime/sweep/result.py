@@ -73,9 +73,13 @@ class Sweep(SweepArrays):
         The name of the quantity.
     arguments : mapping of str to number or array
         The launches and parameters, by name, as they were given and before they were broadcast.
+    gradient : float array or None
+        The derivatives of the values, with one more axis for the names that they were asked by; NaN where there are
+        none. None if they were not asked for.
     """
 
     quantity: str = ""
+    gradient: Array | None = None
     arguments: Mapping[str, Any] = MappingProxyType({})
 
     def status_counts(self) -> dict[str, int]:
@@ -170,7 +174,7 @@ class Sweep(SweepArrays):
 def told(sweep: Sweep, quantity: str, arguments: Mapping[str, Any]) -> Sweep:
     """The same values with the quantity and the launches that they belong to."""
     out = Sweep(*sweep)
-    out.quantity = quantity
+    out.quantity, out.gradient = quantity, sweep.gradient
     out.arguments = {name: value for name, value in arguments.items() if value is not None}
     return out
 

@@ -94,12 +94,12 @@ def sweep(
         raise InputError(f"contact: must be one of {', '.join(CONTACTS)}, got {contact!r}")
     names = ("lam0", "v0", "direction", "lam", *formulas.parameters)
     sources = (lam0, v0, direction, 0.0 if lam is None else lam, *parameters)
-    arrays = [_column(value, name) for value, name in zip(sources, names, strict=True)]
+    arrays = [as_doubles(value, name) for value, name in zip(sources, names, strict=True)]
     named = dict(zip(names, arrays, strict=True))
     _check(formulas, named)
     shape = broadcast_shape(named)
     _check_lower_bounds(formulas, named)
-    columns = [widen(array, shape) for array in arrays]
+    columns = [widen(array, shape) for array in (*arrays, *_trigonometric_columns(formulas, parameters, arrays[4:]))]
     size = prod(shape)
     answers = Answers(
         np.full((size, found.width), nan),
@@ -115,7 +115,7 @@ def sweep(
                 work, least = partial(answer_driven, formulas, asked, curve, group.columns, some), MIN_BODIES_PER_THREAD
             else:
                 ask = Asked(
-                    found.code, CONTACT_SIDES[contact], inf if t_max is None else _column(t_max, "t_max").item()
+                    found.code, CONTACT_SIDES[contact], inf if t_max is None else as_doubles(t_max, "t_max").item()
                 )
                 work, least = partial(_answer, formulas, ask, group, some), MIN_LAUNCHES_PER_THREAD
             run_in_threads(work, some.status.size, least)
@@ -123,7 +123,7 @@ def sweep(
                 answers.put(chosen, some)
     values = answers.values[:, found.columns]
     for k in np.flatnonzero(answers.status == quantities.UNDECIDED):
-        here = [s if np.ndim(s) == 0 else float(c.flat[k % c.size]) for s, c in zip(sources, columns, strict=True)]
+        here = [s if np.ndim(s) == 0 else float(c.flat[k % c.size]) for s, c in zip(sources, columns, strict=False)]
         values[k], answers.status[k] = _solved(solve, found, here, t_max, contact)
         answers.route[k] = quantities.SOLVE
     return Sweep(values.reshape(shape + values.shape[1:]), answers.status.reshape(shape), answers.route.reshape(shape))
@@ -134,7 +134,7 @@ def has_compiled_route(formulas: "Formulas", quantity: Quantity, t_max: Any) -> 
 
     They do not for motions that lose energy, and of motions with a last time they know only when they end.
     """
-    timely = t_max is None or (quantity.code == quantities.END_TIME and float(_column(t_max, "t_max")) > 0.0)
+    timely = t_max is None or (quantity.code == quantities.END_TIME and float(as_doubles(t_max, "t_max")) > 0.0)
     return formulas.dissipation is None and quantity.code != quantities.NOT_COMPILED and timely
 
 
@@ -147,7 +147,7 @@ def broadcast_shape(columns: Mapping[str, Array]) -> tuple[int, ...]:
         raise InputError(f"sweep: these shapes do not broadcast against each other: {shapes}") from None
 
 
-def _column(value: Any, name: str) -> Array:
+def as_doubles(value: Any, name: str) -> Array:
     """Numbers as doubles; text and exact numbers by their nearest."""
     if type(value) is float:
         return np.array(value)
@@ -184,6 +184,16 @@ def _check_lower_bounds(formulas: "Formulas", columns: dict[str, Array]) -> None
         bound = columns[lower] if lower in columns else read_number(lower, where=lower).value
         if (columns[name] < bound).any():
             raise ParameterError(f"{name}: must be at least {lower}")
+
+
+def _trigonometric_columns(formulas: "Formulas", given: tuple[Any, ...], p: list[Array]) -> Iterator[Array]:
+    """What stands behind the parameters, for each launch; exact where no parameter is an array."""
+    if formulas.trigonometric is None:
+        return
+    if all(column.shape == () for column in p):
+        yield from map(np.array, formulas.trigonometric_values(formulas.numbers(given)))
+        return
+    yield from map(np.asarray, formulas.trigonometric(ARRAYS, tuple(p)))
 
 
 def _domain_columns(formulas: "Formulas", p: list[Array]) -> Iterator[Array]:

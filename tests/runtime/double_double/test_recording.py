@@ -10,7 +10,7 @@ from mpmath import mp, mpf
 from gqm_sym.literals.numbers import read_number
 from gqm_sym.runtime.double_double import interpreter
 from gqm_sym.runtime.double_double.interpreter import BLOCK, ERROR, LOW, ROW
-from gqm_sym.runtime.double_double.recording import MAX_REGISTERS, BoundTape, bind
+from gqm_sym.runtime.double_double.recording import MAX_REGISTERS, BoundTape, bind, record
 from gqm_sym.runtime.interface import ExactFormulas
 
 # Every function that a formula may contain, each for places between 1.1 and 1.9.
@@ -45,7 +45,8 @@ def values(tape: BoundTape, places: np.ndarray) -> tuple[list[mpf], np.ndarray]:
 def recorded(formula: Any, parameters: int = 1) -> BoundTape | None:
     """The tape of one formula, which stands for all."""
     numbers = [read_number(PARAMETER, where="p")] * parameters
-    return bind(ExactFormulas(*[formula] * 7), lambda op, p: (None, None, 2 * op.pi), numbers)
+    found = record(ExactFormulas(*[formula] * 7), lambda op, p: (None, None, 2 * op.pi), len(numbers))
+    return bind(found, numbers)
 
 
 @pytest.mark.parametrize("name", FUNCTIONS)

@@ -365,6 +365,16 @@ def test_a_spiral_ends_at_its_centre(generated_folder: Any) -> None:
     assert motion.events[-1].kind == "singular-point"
 
 
+def test_contact_lost_at_launch_ends_a_fall(generated_folder: Any) -> None:
+    """A body under the arm of a spiral is let go and falls off at once, though the spiral would lead to its centre."""
+    drawn = gqm.build(gqm.derive(gqm.families.log_spiral(), gqm.CentralForce()), name="let_go", folder=generated_folder)
+    for contact in ("above", "below"):
+        motion = drawn.solve(2, 0, -1, r0=1, b="1/5", k=1, contact=contact)
+        held = motion.state(0.0).normal_force * (1 if contact == "above" else -1) > 0.0
+        assert held == (motion.t_end > 0.0)
+        assert (motion.events[-1].kind, motion.t_end) == ("liftoff", 0.0) or held
+
+
 def test_a_fall_into_a_spiral_is_tabulated(generated_folder: Any) -> None:
     """Its last turns take less than two doubles hold of the time. Found by ``make soak``: panels without end."""
     spiral = gqm.build(gqm.derive(gqm.families.log_spiral(), gqm.Gravity()), name="wound_up", folder=generated_folder)

@@ -94,3 +94,13 @@ def test_rest_and_motions_without_end(swing: ModuleType, tmp_path: Path) -> None
     with pytest.raises(SolutionError, match="t_max"):
         _ = slope.solve(0).v_max
     assert slope.solve(0, t_max=2).v_max.value == pytest.approx(2 * 9.81 * sqrt(0.5), rel=1e-14)
+
+
+def test_into_the_centre_of_a_spiral(tmp_path: Path) -> None:
+    """The body ends where arc length and time stand still; it was fastest where the spiral was lowest before."""
+    spiral = gqm.build(gqm.derive(gqm.families.log_spiral(), gqm.Gravity()), name="wound", folder=tmp_path)
+    motion = spiral.solve(1.6664575248551055, 0.7925274260475293, r0=1, b="3/20")
+    assert motion.events[-1].kind == "cusp"
+    states = motion.state(np.linspace(0.0, motion.t_end * (1.0 - 1e-9), 20_001))
+    assert motion.v_max.value == pytest.approx(np.abs(states.v).max(), rel=1e-6)
+    assert motion.v_max.value >= np.abs(states.v).max()

@@ -1,0 +1,1 @@
+"""How the answers of a periodic motion change with its launch and parameters, in double-double arithmetic."""

@@ -1,0 +1,79 @@
+"""The derivatives of a formula on a tape, recorded as formulas on the same tape (reverse differentiation).
+
+The adjoint of an operation is the derivative of the result by the operation's own. Each hands its adjoint, times its
+partial derivatives, to its operands. So all first derivatives of a formula take a few times as many operations as the
+formula itself, however many they are.
+"""
+
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+from gqm_sym.runtime.double_double import interpreter
+from gqm_sym.runtime.double_double.recording import Recorder, TapeNumber
+
+
+def gradient(op: Recorder, formula: Any, variables: Sequence[TapeNumber]) -> list[TapeNumber]:
+    """Return the derivatives of a formula by variables that are parameters or the place of the tape.
+
+    Parameters
+    ----------
+    op : Recorder
+        The tape, to which the derivatives are added.
+    formula : TapeNumber
+        The formula.
+    variables : sequence of TapeNumber
+        What is differentiated by.
+    """
+    result = op.number(formula)
+    adjoints: dict[int, TapeNumber] = {}
+    if result.known is None:
+        adjoints[result.register] = op.number(1)
+    for k in range(result.register, -1, -1):
+        if k in adjoints:
+            for operand, partial in _partials(op, k):
+                part = _times(adjoints[k], partial)
+                adjoints[operand] = adjoints[operand] + part if operand in adjoints else part
+    return [adjoints.get(variable.register, op.number(0)) for variable in variables]
+
+
+def _times(a: TapeNumber, b: TapeNumber) -> TapeNumber:
+    """Return the product, of which a factor 1 is no operation."""
+    if a.known == 1:
+        return b
+    return a if b.known == 1 else a * b
+
+
+def _partials(op: Recorder, k: int) -> Iterator[tuple[int, TapeNumber]]:
+    """Yield the operands of an entry of a tape, as registers, each with the entry's partial derivative by it."""
+    code, *operands = op.entries[k]
+    if code in ("parameter", "place", "constant"):
+        return
+    out, (a, *rest) = op.at(k), (op.at(operand) for operand in operands)
+    if code == "cosine":
+        yield operands[0], -op.at(k - 1)
+    elif code in (interpreter.ADD, interpreter.SUBTRACT):
+        yield operands[0], op.number(1)
+        yield operands[1], op.number(1 if code == interpreter.ADD else -1)
+    elif code == interpreter.MULTIPLY:
+        yield operands[0], rest[0]
+        yield operands[1], a
+    elif code == interpreter.DIVIDE:
+        yield operands[0], 1 / rest[0]
+        yield operands[1], -(out / rest[0])
+    else:
+        yield operands[0], _slope(op, code, a, out, k)
+
+
+def _slope(op: Recorder, code: int, a: TapeNumber, out: TapeNumber, k: int) -> TapeNumber:
+    """Return the derivative of a function of one number ``a``, whose value is ``out``, in register ``k``."""
+    if code == interpreter.SQUARE_ROOT:
+        return 1 / (2 * out)
+    if code == interpreter.SINE_COSINE:
+        return op.at(k + 1)
+    if code == interpreter.EXPONENTIAL:
+        return out
+    if code == interpreter.LOGARITHM:
+        return 1 / a
+    if code == interpreter.ARC_TANGENT:
+        return 1 / (1 + a * a)
+    return a / out  # of the absolute value

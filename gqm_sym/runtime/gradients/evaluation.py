@@ -1,0 +1,142 @@
+"""Compiled code that carries out programs: at given places, and for means over a half period or a lap.
+
+The means are those of the midpoint rule in phase angles, which converges as fast as the trapezoidal rule and needs no
+values at turning points, where V**2 and the divided differences of the potential vanish together.
+"""
+
+from math import fabs, inf
+
+import numpy as np
+from numba import types
+
+from gqm_sym.runtime.compiled.jit import Inner, entry
+from gqm_sym.runtime.compiled.registers import uncounted
+from gqm_sym.runtime.compiled.types import INTEGER, MATRIX, VECTOR
+from gqm_sym.runtime.double_double.arithmetic import UNIT, add
+from gqm_sym.runtime.double_double.interpreter import BLOCK, ERROR, LOW, ROW, call_interpreter
+from gqm_sym.runtime.double_double.nodes import LEVELS
+
+# The rule has converged if the largest of the changes, each as a share of the mean of the absolute values, has shrunk
+# by this factor and the next one would be smaller than the second number.
+MAX_RATIO, MAX_NEXT_CHANGE = 1e-3, 1e-20
+
+# The largest rounding error of a mean, as a share of the mean of the absolute values.
+MAX_ROUNDING = 1e-17
+
+# What is told instead of the number of nodes: digits were lost, or the nodes are too few whatever the digits.
+LOST_DIGITS, NOT_SMOOTH = 0, -1
+
+# What there is of each mean: the high and the low double, a bound on the error, and the mean of the absolute values.
+MEAN = 4
+
+# A program as compiled code takes it (`programs.Program.operands`), with its work space.
+PROGRAM = types.Tuple((INTEGER, types.int64[:, ::1], INTEGER, INTEGER, types.int64[::1]))
+CUBE = types.float64[:, :, ::1]
+
+
+@Inner
+def begin(program, work, inputs):  # type: ignore[no-untyped-def]
+    """Fill the registers of the inputs, and of all that does not depend on the place."""
+    address, operations, first, count, _ = program
+    for k in range(count):
+        for i in range(BLOCK):
+            for part in range(3):
+                work[k * ROW + part * BLOCK + i] = inputs[part, k]
+    call_interpreter(address, operations, 0, first, work, BLOCK)
+
+
+@Inner
+def evaluate_block(program, work, high, low):  # type: ignore[no-untyped-def]
+    """Evaluate a program at places, at most BLOCK of them."""
+    address, operations, first, count, _ = program
+    for i in range(high.size):
+        at = count * ROW + i
+        work[at], work[at + LOW], work[at + ERROR] = high[i], low[i], UNIT * fabs(high[i]) if low[i] != 0.0 else 0.0
+    call_interpreter(address, operations, first, operations.shape[0], work, high.size)
+
+
+@Inner
+def add_midpoints(program, work, nodes, n, sums):  # type: ignore[no-untyped-def]
+    """Fill the sums over n nodes of each result: the high and the low double, the error, and of absolute values."""
+    outputs = program[4]
+    sums[:, :] = 0.0
+    for start in range(n, 2 * n, BLOCK):
+        stop = min(start + BLOCK, 2 * n)
+        evaluate_block(program, work, nodes[0, start:stop], nodes[1, start:stop])
+        for j in range(outputs.size):
+            high, low, error, size = sums[j, 0], sums[j, 1], sums[j, 2], sums[j, 3]
+            for i in range(stop - start):
+                at = outputs[j] + i
+                high, low = add(high, low, work[at], work[at + LOW])
+                error += work[at + ERROR] + UNIT * fabs(high)
+                size += fabs(work[at])
+            sums[j, 0], sums[j, 1], sums[j, 2], sums[j, 3] = high, low, error, size
+
+
+@Inner
+def fill_means_of(program, work, inputs, nodes, found):  # type: ignore[no-untyped-def]
+    """Fill the means of all results, as `fill_means`."""
+    begin(program, work, inputs)
+    sums, before, rounding = np.empty((found.shape[0], MEAN)), inf, inf
+    for level in range(1, len(LEVELS) - 1):
+        n = LEVELS[level]
+        add_midpoints(program, work, nodes, n, sums)
+        change, rounding = 0.0, 0.0
+        for j in range(found.shape[0]):
+            size = sums[j, 3] / n
+            high, low = sums[j, 0] / n, sums[j, 1] / n
+            if not size <= sums[j, 2] / n:  # else it is zero as far as rounding can tell
+                step = fabs(add(high, low, -found[j, 0], -found[j, 1])[0]) / size
+                change = step if not step <= change else change
+                rounding = max(rounding, sums[j, 2] / (n * size))
+            found[j, 0], found[j, 1], found[j, 2], found[j, 3] = high, low, sums[j, 2] / n, size
+        following = change * change / before if level > 1 else inf
+        has_converged = change <= MAX_RATIO * before and before < inf and following <= MAX_NEXT_CHANGE
+        if level > 2 and rounding <= MAX_ROUNDING and (has_converged or change <= rounding):
+            return n
+        before = change if level > 1 else inf
+    return NOT_SMOOTH if rounding <= MAX_ROUNDING else LOST_DIGITS
+
+
+@entry(INTEGER(PROGRAM, VECTOR, MATRIX, MATRIX, MATRIX), checked=False)
+def fill_means(program, work, inputs, nodes, found):  # type: ignore[no-untyped-def]
+    """Fill the means of all results of a program over its range, and return with how many nodes, or why there are none.
+
+    Parameters
+    ----------
+    program, work
+        The program (`programs.Program.operands`), and its work space.
+    inputs : (3, m) array
+        The inputs: high and low doubles, and bounds on the errors.
+    nodes : (4, n) array
+        The table of shares (`nodes.trapezoidal_nodes`).
+    found : (k, 4) array
+        For each result the mean as two doubles, a bound on its rounding error, and the mean of the absolute values.
+    """
+    address, operations, first, count, outputs = program
+    program = (address, uncounted(operations), first, count, uncounted(outputs))
+    return fill_means_of(program, uncounted(work), uncounted(inputs), uncounted(nodes), uncounted(found))
+
+
+@entry(types.void(PROGRAM, VECTOR, MATRIX, MATRIX, CUBE), checked=False)
+def fill_values(program, work, inputs, places, found):  # type: ignore[no-untyped-def]
+    """Fill the results of a program at places.
+
+    Parameters
+    ----------
+    program, work, inputs
+        As for `fill_means`.
+    places : (2, n) array
+        The places as two doubles each.
+    found : (k, 3, n) array
+        For each result and place the value as two doubles, and a bound on its error.
+    """
+    begin(program, work, inputs)
+    outputs, n = program[4], places.shape[1]
+    for start in range(0, n, BLOCK):
+        stop = min(start + BLOCK, n)
+        evaluate_block(program, work, places[0, start:stop], places[1, start:stop])
+        for j in range(outputs.size):
+            for part in range(3):
+                for i in range(stop - start):
+                    found[j, part, start + i] = work[outputs[j] + part * BLOCK + i]

@@ -1,0 +1,198 @@
+"""A periodic orbit with its derivatives: turning points, duration, action, and how they come about along the orbit."""
+
+from functools import cached_property
+
+import numpy as np
+
+from gqm_sym.errors import SolutionError
+from gqm_sym.runtime.compiled.types import Array
+from gqm_sym.runtime.double_double.arithmetic import UNIT
+from gqm_sym.runtime.double_double.nodes import LEVELS, trapezoidal_nodes
+from gqm_sym.runtime.double_double.orbit_time import Orbit
+from gqm_sym.runtime.gradients.evaluation import LOST_DIGITS, MEAN, NOT_SMOOTH, fill_means, fill_values
+from gqm_sym.runtime.gradients.multiprecision import UNDECIDED, MultiprecisionOrbit
+from gqm_sym.runtime.gradients.programs import (
+    PATH_QUANTITIES,
+    Program,
+    Source,
+    circulation_program,
+    libration_program,
+    path_program,
+    turning_point_program,
+)
+from gqm_sym.runtime.interface import ExactFormulas
+from gqm_sym.runtime.launch.formulas import Formulas
+from gqm_sym.runtime.launch.problem import Problem
+from gqm_sym.runtime.quadrature.trapezoid import CIRCULATION, LIBRATION
+
+# Pi as two doubles.
+PI, PI_LOW = np.pi, 1.2246467991473532e-16
+
+
+def source_of(formulas: Formulas) -> Source:
+    """What the programs of a module are recorded from.
+
+    Raises
+    ------
+    SolutionError
+        If its curve has no formulas.
+    """
+    if not isinstance(formulas.exact, ExactFormulas) or formulas.domain_of is None:
+        raise SolutionError("gradients: curves without formulas have none yet; declare the curve by formulas")
+    names = list(formulas.parameters)
+    return Source(formulas.exact, formulas.domain_of, formulas.inertia, len(names), names.index("m"))
+
+
+def pairs(*numbers: tuple[float, float, float]) -> Array:
+    """Numbers, as two doubles each with a bound on the error, as inputs of a program."""
+    return np.ascontiguousarray(np.array(numbers, dtype=float).reshape(-1, 3).T)
+
+
+def values(program: Program, inputs: Array, high: Array, low: Array | None = None) -> Array:
+    """The results of a program at places, one row for each."""
+    places = np.array([high, np.zeros_like(high) if low is None else low])
+    found = np.empty((program.outputs.size, 3, high.size))
+    fill_values(program.operands, program.work, inputs, places, found)
+    return found
+
+
+class OrbitDerivatives:
+    """A libration or circulation along a curve with formulas, with derivatives by all variables.
+
+    The variables are the run-time parameters, lam0, v0, and the energy per unit mass over 1 + beta (`programs`).
+
+    Parameters
+    ----------
+    problem : Problem
+        The launch and the module that it is of.
+    orbit : Orbit or None
+        Duration and turning points in double-double arithmetic, if that suffices.
+    direction : int
+        0 for a libration, else the sign of ds/dt.
+    offsets : (float, float)
+        The distances of both turning points from the launch, for a libration.
+    """
+
+    def __init__(self, problem: Problem, orbit: Orbit | None, direction: int, offsets: tuple[float, float]) -> None:
+        self.direction = direction
+        self.source = source_of(problem.formulas)
+        self._given = (*problem.p, problem.launch.lam0, problem.launch.v0)
+        numbers = [(n.value, n.low, 0.25 * UNIT * abs(n.value) if n.low else 0.0) for n in self._given]
+        self.variables = pairs(*numbers, (0.0, 0.0, 0.0))
+        self.parameters = np.ascontiguousarray(self.variables[:, : self.source.parameters])
+        self._orbit, self._offsets = orbit, offsets
+
+    @cached_property
+    def _multiprecision(self) -> MultiprecisionOrbit:
+        return MultiprecisionOrbit(self.source, self._program, self._given, self.direction, self._offsets)
+
+    @cached_property
+    def _end_rows(self) -> Array:
+        """The derivatives of both turning points in double-double arithmetic."""
+        assert self._orbit is not None
+        high, low = np.array([self._orbit.low[:2], self._orbit.high[:2]]).T
+        return values(turning_point_program(self.source), self.variables, high.copy(), low.copy())[1:]
+
+    @property
+    def ends(self) -> Array:
+        """The derivatives of the lower and of the upper turning point of a libration, as columns."""
+        return self._multiprecision.ends[1:] if self._orbit is None else self._end_rows[:, 0]
+
+    @property
+    def turning_points(self) -> tuple[float, float]:
+        """The lower and the upper turning point of a libration."""
+        if self._orbit is not None:
+            return self._orbit.low.high, self._orbit.high.high
+        low, high = self._multiprecision.ends[0].tolist()
+        return low, high
+
+    @property
+    def _program(self) -> Program:
+        """What is integrated along the orbit."""
+        return circulation_program(self.source, self.direction) if self.direction else libration_program(self.source)
+
+    @cached_property
+    def _rule(self) -> tuple[Array, Array]:
+        """The inputs of the orbit's program in double-double arithmetic, and the table of nodes."""
+        if self.direction:
+            inputs = np.hstack([self.variables, self.variables[:, [self.source.parameters]]])
+            return np.ascontiguousarray(inputs), trapezoidal_nodes(CIRCULATION)
+        assert self._orbit is not None
+        ends = np.array([self._orbit.low, self._orbit.high]).T
+        inputs = np.hstack([self.variables, ends, self._end_rows[:, :, 0].T, self._end_rows[:, :, 1].T])
+        return np.ascontiguousarray(inputs), trapezoidal_nodes(LIBRATION)
+
+    @cached_property
+    def _means(self) -> tuple[Array, int, bool]:
+        """The means of the orbit's program, the number of nodes, and whether double-double arithmetic found them."""
+        if self._orbit is not None:
+            found = np.zeros((self._program.outputs.size, MEAN))
+            n = fill_means(self._program.operands, self._program.work, *self._rule, found)
+            if n == NOT_SMOOTH:
+                raise SolutionError(UNDECIDED)
+            if n != LOST_DIGITS:
+                return found, n, True
+        return *self._multiprecision.means[:2], False
+
+    def _integrals(self, first: int, count: int) -> Array:
+        """The integrals of results over a half period, or over a lap."""
+        found = self._means[0][first : first + count]
+        is_zero = np.abs(found[:, 0]) <= found[:, 2]  # as far as double-double arithmetic can tell
+        high, low = np.where(is_zero, 0.0, found[:, :2].T)
+        integrals: Array = high + low if self.direction else PI * high + (PI * low + PI_LOW * high)
+        return integrals
+
+    @property
+    def duration_gradient(self) -> Array:
+        """The derivatives of the half period of a libration, or of the time of a lap."""
+        return self._integrals(1, self.source.variables)
+
+    @property
+    def duration_sizes(self) -> Array:
+        """The integrals of absolute values of what `duration_gradient` integrates: its rounding is a share of them."""
+        sizes: Array = self._means[0][1 : 1 + self.source.variables, 3] * (1.0 if self.direction else PI)
+        return sizes
+
+    @property
+    def action(self) -> float:
+        """The integral of V**2 (1 + beta) dt over a period."""
+        return float(self._period_share * self._integrals(1 + self.source.variables, 1)[0])
+
+    @property
+    def action_gradient(self) -> Array:
+        """The derivatives of the action."""
+        n = self.source.variables
+        return self._period_share * self._integrals(2 + n, n)
+
+    @property
+    def period_gradient(self) -> Array:
+        """The derivatives of the period."""
+        return self._period_share * self.duration_gradient
+
+    @property
+    def _period_share(self) -> float:
+        """How many of what is integrated over make a period."""
+        return 1.0 if self.direction else 2.0
+
+    @cached_property
+    def samples(self) -> Array:
+        """The results of the orbit's program at equal steps of the phase angle, over a whole turn of it.
+
+        They are the midpoints of N intervals of [0, 2 pi], or of the share of a lap. In the second half of a libration
+        the values return.
+        """
+        # The means at n nodes are exact as soon as terms of order 2n vanish: twice the nodes show these terms.
+        means, count, is_double_double = self._means
+        n = min(2 * count, LEVELS[-1] // 2)
+        if is_double_double:
+            inputs, nodes = self._rule
+            found = values(self._program, inputs, *nodes[:2, n : 2 * n].copy())[:, 0]
+        else:
+            found = self._multiprecision.samples(n)
+        found[means[:, 3] <= means[:, 2]] = 0.0  # they are rounding
+        return found if self.direction else np.hstack([found, found[:, ::-1]])
+
+    def at_places(self, lam: Array) -> Array:
+        """What `path_program` gives at places: a row for each quantity, of rows for its value and its derivatives."""
+        found = values(path_program(self.source), self.parameters, lam)[:, 0]
+        return found.reshape(PATH_QUANTITIES, self.source.parameters + 2, lam.size)

@@ -1,0 +1,241 @@
+"""What gradients evaluate: formulas of a motion with their derivatives, recorded as tapes.
+
+``half`` below is half of V**2, as a function of a place, the run-time parameters, the launch place lam0, its speed v0,
+and a change of the energy, which is zero: ``half = v0**2/2 + energy + U(lam0) - U(lam)``. The variables are what
+derivatives are taken by: the run-time parameters, lam0, v0 and the energy, in this order.
+"""
+
+from collections.abc import Callable, Sequence
+from fractions import Fraction
+from functools import lru_cache
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gqm_sym.errors import SolutionError
+from gqm_sym.runtime.compiled.types import Array
+from gqm_sym.runtime.double_double.arithmetic import UNIT
+from gqm_sym.runtime.double_double.interpreter import ERROR, INTERPRETER, LOW, ROW
+from gqm_sym.runtime.double_double.recording import Recorder, TapeNumber
+from gqm_sym.runtime.gradients.adjoints import gradient
+from gqm_sym.runtime.interface import ExactFormulas
+
+# What the variables have besides the run-time parameters: launch place, its speed, and the energy.
+LAUNCH_VARIABLES = 3
+
+# How many quantities `path_program` has.
+PATH_QUANTITIES = 6
+
+# A program with more registers is not used: its work space would take tens of megabytes.
+MAX_REGISTERS = 8000
+
+
+class Program(NamedTuple):
+    """Formulas as operations, with the space that they are carried out in.
+
+    Attributes
+    ----------
+    operations : (m, 4) array of int
+        What the interpreter carries out: first what does not depend on the place.
+    first : int
+        How many operations do not depend on the place.
+    inputs : int
+        The number of inputs, whose registers come first; that of the place follows them.
+    outputs : array of int
+        Where in the work space the registers of the results begin.
+    work : array
+        The registers, of which those of constants are filled.
+    constants : tuple
+        The numbers of these registers, and what they are exactly: a number, or "pi" or "e".
+    """
+
+    operations: NDArray[np.int64]
+    first: int
+    inputs: int
+    outputs: NDArray[np.int64]
+    work: Array
+    constants: tuple[tuple[int, Fraction | str], ...]
+
+    @property
+    def operands(self) -> tuple[Any, ...]:
+        """What compiled code takes, the address of the interpreter first."""
+        return INTERPRETER.address, self.operations, self.first, self.inputs, self.outputs
+
+
+class Source(NamedTuple):
+    """The formulas that programs are recorded from.
+
+    Attributes
+    ----------
+    formulas : ExactFormulas
+        The formulas of a module.
+    domain : callable
+        ``f(op, p)`` gives the ends of the parameter's range and its period.
+    inertia : callable or None
+        ``f(op, p)`` gives 1 + beta; None where it is 1.
+    parameters, mass : int
+        The number of run-time parameters, and which of them is the mass.
+    """
+
+    formulas: ExactFormulas
+    domain: Callable[..., Any]
+    inertia: Callable[..., Any] | None
+    parameters: int
+    mass: int
+
+    @property
+    def variables(self) -> int:
+        """How many variables derivatives are taken by."""
+        return self.parameters + LAUNCH_VARIABLES
+
+    def half(self, op: Recorder, lam: TapeNumber) -> TapeNumber:
+        """Record half of V**2 at a place."""
+        p = op.values[: self.parameters]
+        lam0, v0, energy = op.values[self.parameters : self.variables]
+        potential = self.formulas.effective_potential
+        found: TapeNumber = (v0 * v0 / 2 + energy) + (potential(op, lam0, p) - potential(op, lam, p))
+        return found
+
+    def one_plus_beta(self, op: Recorder) -> TapeNumber:
+        """Record 1 + beta."""
+        return op.number(1 if self.inertia is None else self.inertia(op, op.values[: self.parameters]))
+
+
+def assemble(op: Recorder, outputs: Sequence[Any]) -> Program:
+    """Return the operations that results need, with registers for nothing else."""
+    wanted = [op.register(output) for output in outputs]
+    inputs = len(op.values)
+    live, pending = set(range(inputs + 1)), list(wanted)
+    while pending:
+        k = pending.pop()
+        if k in live:
+            continue
+        code, *operands = op.entries[k]
+        if not isinstance(code, str):
+            pending += operands
+        live.add(k)
+        if code == "cosine":
+            pending.append(k - 1)
+        elif not isinstance(code, str) and op.entries[k + 1 : k + 2] == [("cosine", *operands)]:
+            live.add(k + 1)  # the sine's operation fills this register too
+    slots = {k: ROW * slot for slot, k in enumerate(sorted(live))}
+    if len(slots) > MAX_REGISTERS:
+        raise SolutionError("gradients: the formulas of this curve are too long for derivatives by their tape")
+    depends = op.depend_on_place()
+    operations = [k for k in slots if not isinstance(op.entries[k][0], str)]
+    before = [k for k in operations if not depends[k]]
+    codes = np.zeros((len(operations), 4), dtype=np.int64)
+    for row, k in zip(codes, [*before, *(k for k in operations if depends[k])], strict=True):
+        code, *operands = op.entries[k]
+        row[: 2 + len(operands)] = code, slots[k], *(slots[operand] for operand in operands)
+    work = np.zeros(ROW * len(slots))
+    for k, slot in slots.items():
+        code, *pair = op.entries[k]
+        if code == "constant":
+            work[slot : slot + LOW], work[slot + LOW : slot + ERROR] = pair
+            work[slot + ERROR : slot + ROW] = 0.25 * UNIT * abs(pair[0]) if pair[1] else 0.0
+    constants = tuple((slots[k] // ROW, value) for k, value in op.exact.items() if k in slots)
+    return Program(codes, len(before), inputs, np.array([slots[k] for k in wanted], dtype=np.int64), work, constants)
+
+
+@lru_cache(maxsize=64)
+def turning_point_program(source: Source) -> Program:
+    """The step of Newton's method to a turning point from the place, and its derivatives by all variables."""
+    op = Recorder(source.variables)
+    half = source.half(op, op.place)
+    slope, *partials = gradient(op, half, [op.place, *op.values])
+    return assemble(op, [-(part / slope) for part in (half, *partials)])
+
+
+def libration_inputs(source: Source) -> int:
+    """The number of inputs of the program of a libration: variables, turning points a and b, and their derivatives."""
+    return 3 * source.variables + 2
+
+
+@lru_cache(maxsize=64)
+def libration_program(source: Source, wanted: tuple[int, ...] | None = None) -> Program:
+    """What is integrated over the phase angle of a libration, with its derivatives at the same phase angle.
+
+    The place is the square of the sine of half the phase angle. The inputs behind the variables are both turning points
+    and then the derivatives of each. The results are dt/dphi, its derivatives by all variables, V**2 dt/dphi (1+beta)
+    with its derivatives, and the derivatives of ds/dlam by the run-time parameters at the same place. If some variables
+    are ``wanted``, they are the derivatives of dt/dphi by these, and nothing else.
+    """
+    n, p = source.variables, source.parameters
+    op = Recorder(libration_inputs(source))
+    (a, b), share = op.values[n : n + 2], op.place
+    width, lam = b - a, a + (b - a) * share
+    half, ds = source.half(op, lam), source.formulas.ds(op, lam, op.values[:p])
+    inertia = source.one_plus_beta(op)
+    half_slope, *half_partials = gradient(op, half, [lam, *op.values[:n]])
+    ds_slope, *ds_partials = gradient(op, ds, [lam, *op.values[:n]])
+    rate = width * op.sqrt(share * (1 - share)) * ds / op.sqrt(2 * half)
+    power = 2 * rate * half * inertia
+    rates, powers = [rate], [power]
+    for k, by in enumerate(gradient(op, inertia, op.values[:n])):
+        low, high = op.values[n + 2 + k], op.values[2 * n + 2 + k]
+        moved = low + (high - low) * share
+        # First the small change of V**2 as a whole, for near the turning points the parts of it are large.
+        faster = (half_partials[k] + half_slope * moved) / (2 * half)
+        longer = (high - low) / width + (ds_partials[k] + ds_slope * moved) / ds
+        rates.append(rate * (longer - faster))
+        powers.append(power * (longer + faster + by / inertia))
+    if wanted is not None:
+        return assemble(op, [rates[1 + k] for k in wanted])
+    return assemble(op, [*rates, *powers, *ds_partials[:p]])
+
+
+@lru_cache(maxsize=64)
+def circulation_program(source: Source, direction: int, wanted: tuple[int, ...] | None = None) -> Program:
+    """What is integrated over a lap, as a share of which the place is given, with its derivatives at the same share.
+
+    The inputs are the variables, and the place where the lap begins: it is that of the launch, but does not change with
+    it. The results are dt/dshare, its derivatives by all variables, V**2 dt/dshare (1+beta) with its derivatives,
+    ds/dshare with its derivatives, and the length of the lap in lam with its derivatives. ``wanted`` is as for a
+    libration.
+    """
+    op = Recorder(source.variables + 1)
+    p = op.values[: source.parameters]
+    lap = direction * op.number(source.domain(op, p)[2])
+    lam = op.values[source.variables] + lap * op.place
+    ds, v2 = source.formulas.ds(op, lam, p), 2 * source.half(op, lam)
+    rate = direction * lap * ds / op.sqrt(v2)
+    if wanted is not None:
+        return assemble(op, gradient(op, rate, [op.values[k] for k in wanted]))
+    outputs: list[Any] = []
+    for quantity in (rate, rate * v2 * source.one_plus_beta(op), lap * ds, lap):
+        outputs += [quantity, *gradient(op, quantity, op.values[: source.variables])]
+    return assemble(op, outputs)
+
+
+@lru_cache(maxsize=64)
+def path_program(source: Source) -> Program:
+    """What states consist of at a place, each with its derivatives by the run-time parameters and by the place.
+
+    The inputs are the run-time parameters. The results are of x, z, ds/dlam, m*kappa, m*n0 and U.
+    """
+    formulas = source.formulas
+    op = Recorder(source.parameters)
+    arguments = op, op.place, op.values
+    quantities = (
+        *(formula(*arguments) for formula in (formulas.x, formulas.z, formulas.ds)),
+        *(op.values[source.mass] * formula(*arguments) for formula in (formulas.kappa, formulas.static_normal_load)),
+        formulas.effective_potential(*arguments),
+    )
+    return assemble(op, [part for q in quantities for part in (q, *gradient(op, q, [*op.values, op.place]))])
+
+
+@lru_cache(maxsize=64)
+def extreme_program(source: Source, of_speed: bool) -> Program:
+    """Half of V**2, or the contact force, at a place, with its first and second derivative by the place.
+
+    The inputs are the variables; the derivatives by them follow.
+    """
+    op = Recorder(source.variables)
+    quantity, p, formulas = source.half(op, op.place), op.values[: source.parameters], source.formulas
+    if not of_speed:
+        load = 2 * quantity * formulas.kappa(op, op.place, p) + formulas.static_normal_load(op, op.place, p)
+        quantity = op.values[source.mass] * load
+    slope, *partials = gradient(op, quantity, [op.place, *op.values])
+    return assemble(op, [quantity, slope, *gradient(op, slope, [op.place]), *partials])

@@ -1,0 +1,113 @@
+"""Gradients of single numbers of a periodic motion: its period, its turning points, its extremes, its action."""
+
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+
+from gqm_sym.arguments import names, unknown_argument
+from gqm_sym.errors import InputError, SolutionError
+from gqm_sym.runtime.compiled.types import Array
+from gqm_sym.runtime.gradients.orbit import OrbitDerivatives, values
+from gqm_sym.runtime.gradients.programs import extreme_program
+
+# What has a gradient.
+EXTREMES = ("v_max", "v_min", "normal_force_max", "normal_force_min")
+QUANTITIES = ("half_period", "period", "turning_points", *EXTREMES, "action")
+
+# An extreme this near to a turning point is there, as a share of the width of the orbit. The place of another one is
+# improved by Newton's method, whose steps may be this share of the width.
+AT_TURN, MAX_STEP, NEWTON_STEPS = 1e-12, 1e-5, 3
+
+
+def selected(parameters: Iterable[str], wrt: Any) -> dict[str, int]:
+    """The names that derivatives are wanted by, each with its row among the variables.
+
+    Raises
+    ------
+    InputError
+        If a name is none of a run-time parameter, ``lam0`` and ``v0``.
+    """
+    rows = {name: row for row, name in enumerate((*parameters, "lam0", "v0"))}
+    wanted = ("lam0", "v0", *parameters) if wrt is None else names(wrt, where="wrt")
+    for name in wanted:
+        if name not in rows:
+            raise InputError(unknown_argument("wrt", name, rows, what="parameter"))
+    return {name: rows[name] for name in wanted}
+
+
+def gradient(derivatives: OrbitDerivatives, motion: Any, quantity: str, wrt: Any) -> dict[str, Any]:
+    """The derivatives of a quantity of a motion, by names.
+
+    Parameters
+    ----------
+    derivatives : OrbitDerivatives
+        The orbit of the motion.
+    motion : motion.periodic.PeriodicMotion
+        The motion.
+    quantity : str
+        One of `QUANTITIES`.
+    wrt : name, sequence of names, or None
+        What they are by.
+    """
+    rows = selected(motion.problem.formulas.parameters, wrt)
+    if not (isinstance(quantity, str) and quantity in QUANTITIES):
+        raise InputError(unknown_argument("gradient", str(quantity), QUANTITIES, what="quantity"))
+    if quantity in ("half_period", "turning_points") and motion.kind != "libration":
+        raise SolutionError(f"gradient: only a libration has {quantity}; this motion is of kind {motion.kind!r}")
+    if quantity == "turning_points":
+        low, high = derivatives.ends.T
+        in_order = (low, high) if motion.turning_points[0] < motion.turning_points[1] else (high, low)
+        return {name: tuple(float(end[row]) for end in in_order) for name, row in rows.items()}
+    if quantity in EXTREMES:
+        found = extreme_gradient(derivatives, motion, quantity)
+    elif quantity == "action":
+        found = derivatives.action_gradient
+    else:
+        found = derivatives.duration_gradient if quantity == "half_period" else derivatives.period_gradient
+    return {name: float(found[row]) for name, row in rows.items()}
+
+
+def extreme_gradient(derivatives: OrbitDerivatives, motion: Any, quantity: str) -> Array:
+    """The derivatives of an extreme along the motion, by all variables.
+
+    Inside the orbit it changes as the quantity does at a fixed place, since it is stationary there (envelope theorem).
+    At a turning point, or where a horizon cuts the motion, the place changes too.
+    """
+    extreme, of_speed = getattr(motion, quantity), quantity.startswith("v_")
+    found = np.zeros(derivatives.source.variables)
+    if of_speed and extreme.value == 0.0:
+        return found
+    program = extreme_program(derivatives.source, of_speed)
+    place = np.array([extreme.lam])
+    width, moved = abs(motion.problem.period), found
+    if not derivatives.direction:
+        ends = derivatives.turning_points
+        width = ends[1] - ends[0]
+        for end, tangent in zip(ends, derivatives.ends.T, strict=True):
+            if abs(extreme.lam - end) <= AT_TURN * width:
+                moved = tangent
+    if moved is found:
+        place, is_stationary = _improved(derivatives, of_speed, place, width)
+        if not is_stationary and motion.t_end < motion.period:
+            moved = np.append(
+                motion.sensitivity(extreme.t, (*motion.problem.formulas.parameters, "lam0", "v0")).lam, 0.0
+            )
+    (_, slope, _, *partials) = values(program, derivatives.variables, place)[:, 0, 0]
+    total: Array = (np.array(partials) + slope * moved) / (extreme.value if of_speed else 1.0)
+    return total
+
+
+def _improved(derivatives: OrbitDerivatives, of_speed: bool, place: Array, width: float) -> tuple[Array, bool]:
+    """The place of an extreme inside an orbit by Newton's method, and whether the quantity is stationary there.
+
+    Where the quantity is constant, or all but constant, the place does not matter and is left.
+    """
+    program, found = extreme_program(derivatives.source, of_speed), place
+    for _ in range(NEWTON_STEPS):
+        _, slope, curvature, *_ = values(program, derivatives.variables, found)[:, 0]
+        step = np.divide(slope, curvature, where=curvature != 0.0, out=np.zeros(1))
+        if not abs(step[0]) <= MAX_STEP * width:
+            return place, False
+        found = found - step
+    return found, True

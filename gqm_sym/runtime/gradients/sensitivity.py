@@ -1,0 +1,184 @@
+"""How states at given times depend on the launch and the parameters, however many periods have gone by.
+
+At a fixed phase angle everything changes smoothly. A time reaches a phase angle earlier or later when a variable
+changes: by the change of the time along the orbit, of the time at which the launch stands on it, and of the periods
+that have gone by. Below, ``delay`` is how much further on, in time, the body is along the changed orbit.
+"""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from gqm_sym.runtime.compiled.types import Array
+from gqm_sym.runtime.gradients.orbit import OrbitDerivatives
+from gqm_sym.runtime.gradients.series import Series
+
+# The rows of launch place and speed among the variables (`programs.Source`).
+LAM0, V0 = -3, -2
+
+
+class Sensitivity(NamedTuple):
+    """The derivatives of a state at given times.
+
+    Each array has one row for each name in ``wrt``, of the shape of the times.
+
+    Attributes
+    ----------
+    wrt : tuple of str
+        What the derivatives are by: run-time parameters, the launch place ``lam0`` and speed ``v0``.
+    lam, s, x, z, v, normal_force : array
+        Derivatives of the curve parameter, of arc length from launch, of the coordinates, of the velocity ds/dt and of
+        the contact force, at fixed times.
+    """
+
+    wrt: tuple[str, ...]
+    lam: Array
+    s: Array
+    x: Array
+    z: Array
+    v: Array
+    normal_force: Array
+
+
+class _Along(NamedTuple):
+    """What changes along an orbit at fixed shares of its phase: a column for each share, a row for each variable.
+
+    Attributes
+    ----------
+    times : array
+        The change of the time from where the phase begins.
+    places : array
+        The change of the place within the lap.
+    speeds : array
+        The relative change of the velocity.
+    arcs : array
+        The change of arc length from where the phase begins: for a libration between fixed places, for a circulation
+        at a fixed share.
+    acceleration : array
+        The acceleration along the curve in m/s2, without row.
+    path : (6, k, n) array
+        What `path_program` gives there.
+    """
+
+    times: Array
+    places: Array
+    speeds: Array
+    arcs: Array
+    acceleration: Array
+    path: Array
+
+
+class OrbitSensitivity:
+    """The derivatives of the states of one orbit by all variables.
+
+    Parameters
+    ----------
+    derivatives : OrbitDerivatives
+        The orbit.
+    """
+
+    def __init__(self, derivatives: OrbitDerivatives) -> None:
+        self._derivatives = derivatives
+        n, samples = derivatives.source.variables, derivatives.samples
+        rates, arcs = samples[: 1 + n], samples[2 * (1 + n) :]
+        if derivatives.direction:
+            arcs, laps = arcs[1 : 1 + n], arcs[1 + n :, :1]
+            self._scale, self._width, self._lap_gradient = 1.0, float(laps[0, 0]), laps[1:]
+        else:
+            low, high = derivatives.turning_points
+            rise = 0.5 * (high - low) * np.sin(2.0 * np.pi * (np.arange(samples.shape[1]) + 0.5) / samples.shape[1])
+            self._scale, self._width, self._lap_gradient = 2.0 * np.pi, high - low, np.zeros((n, 1))
+            arcs = self._by_all(rise * arcs)
+        self._rates, self._arcs = Series(rates), Series(arcs)
+
+    def _by_all(self, rows: Array) -> Array:
+        """Derivatives by the run-time parameters as derivatives by all variables, of which the others are zero."""
+        return np.vstack([rows, np.zeros((self._derivatives.source.variables - len(rows), rows.shape[1]))])
+
+    def _along(self, share: Array, lam: Array, v: Array) -> _Along:
+        """What changes at shares of the phase, at which the places and velocities are known."""
+        derivatives = self._derivatives
+        (rates, times), arcs = self._rates(share), self._arcs(share)[1]
+        path = derivatives.at_places(lam)
+        if derivatives.direction:
+            places = self._lap_gradient * share
+            widening = self._lap_gradient / self._width
+        else:
+            upper = np.sin(np.pi * share) ** 2
+            low, high = (end[:, None] for end in derivatives.ends.T)
+            places, widening = low * (1.0 - upper) + high * upper, (high - low) / self._width
+        ds, potential = path[2], path[5]
+        stretch = (self._by_all(ds[1:-1]) + ds[-1] * places) / ds[0]
+        return _Along(
+            times=self._scale * times[1:],
+            places=places,
+            speeds=v * (widening + stretch - rates[1:] / rates[0]),
+            arcs=self._scale * arcs,
+            acceleration=-potential[-1] / ds[0],
+            path=path,
+        )
+
+    def _launch_delay(self, launch: _Along, motion: Any) -> Array:
+        """How much later than the lower turning point a libration is launched, by all variables.
+
+        The launch place says when, and so does the launch speed: the one near turning points, the other elsewhere.
+        """
+        direction, given = motion.direction, motion.problem.launch
+        v0, ds, acceleration = given.v0.value, launch.path[2][0], launch.acceleration
+        own: Array = np.zeros_like(launch.times)
+        if v0**2 < abs(acceleration[0]) * ds[0] * self._width:
+            own[V0] = given.direction  # at rest, the direction in which a speed would be
+            passed: Array = direction * (own - launch.speeds) / acceleration
+        else:
+            own[LAM0] = 1.0
+            passed = ds / v0 * (own - launch.places)
+        passed += launch.times
+        return passed
+
+    def at(self, motion: Any, points: Any, lam: Array, v: Array) -> list[Array]:
+        """The derivatives of lam, s, x, z, v and N at times: a row for each variable.
+
+        Parameters
+        ----------
+        motion : motion.periodic.PeriodicMotion
+            The motion.
+        points : motion.trajectory.PhasePoints
+            Where it is at the times.
+        lam, v : array
+            The places within the lap, and the velocities.
+        """
+        share, laps = np.zeros_like(lam), points.laps
+        for _, mask, phi in points.segments:
+            share[mask] = phi / self._scale
+        first, v0 = points.trajectory.segments[0], motion.direction * motion.problem.launch.v0.value
+        start = np.array([first.phi_start / self._scale])
+        along = self._along(share, lam, v)
+        launch = self._along(start, np.array([motion.problem.lam0]), np.array([v0]))
+        delay = self._delay(along, launch, motion, points)
+        arcs = along.arcs - launch.arcs + v * delay
+        arcs[LAM0] -= launch.path[2][0]
+        if self._derivatives.direction:
+            arcs += laps * self._arcs(np.ones(1))[1]
+        else:
+            arcs += along.path[2][0] * along.places
+        places = along.places + v / along.path[2][0] * delay
+        speeds = along.speeds + along.acceleration * delay
+        x, z, _, curvature, load, _ = (self._by_all(rows[1:-1]) + rows[-1] * places for rows in along.path)
+        force = load + v**2 * curvature + 2.0 * v * along.path[3][0] * speeds
+        return [places + laps * self._lap_gradient, arcs, x, z, speeds, force]
+
+    def _delay(self, along: _Along, launch: _Along, motion: Any, points: Any) -> Array:
+        """How much further on, in time, the body is at the times of points."""
+        gradient = self._derivatives.duration_gradient[:, None]
+        if self._derivatives.direction:
+            delay: Array = -along.times - points.laps * gradient
+            delay[LAM0] += motion.direction * launch.path[2][0] / motion.problem.launch.v0.value
+            return delay
+        sense, swings = np.ones_like(points.laps), 2.0 * points.laps
+        first, half_period = points.trajectory.segments[0], 0.5 * points.trajectory.period[0]
+        for timed, mask, _ in points.segments:
+            before = timed.t_start[0] - timed.sense * timed.r_start[0] + motion.direction * first.r_start[0]
+            sense[mask] = timed.sense
+            swings[mask] += round(before / half_period)
+        delay = motion.direction * self._launch_delay(launch, motion) - swings * gradient - sense * along.times
+        return delay

@@ -1,0 +1,51 @@
+"""Fourier series of what changes along an orbit, and their integrals."""
+
+import numpy as np
+
+from gqm_sym.errors import SolutionError
+from gqm_sym.runtime.compiled.types import Array
+
+# Terms below this share of the largest one are rounding if so many follow each other; the last ones may be the third
+# number at most.
+MIN_TERM, TERMS_IN_A_ROW, MAX_LAST_TERM = 1e-16, 8, 1e-14
+
+# Places that are evaluated together.
+BLOCK = 2048
+
+
+class Series:
+    """Functions of a share u, periodic with period 1, by their values at the midpoints of N equal intervals.
+
+    Parameters
+    ----------
+    samples : (k, N) array
+        The values of k functions.
+    """
+
+    def __init__(self, samples: Array) -> None:
+        count = samples.shape[1]
+        terms = np.fft.rfft(samples) / count
+        order = np.arange(terms.shape[1])
+        terms = terms * np.exp(-1j * np.pi * order / count)
+        terms[:, 1:] *= 2.0
+        size = np.abs(terms).max(axis=1, keepdims=True)
+        shares = np.abs(terms) / np.where(size > 0.0, size, 1.0)
+        if shares[:, -3:].max() > MAX_LAST_TERM:
+            raise SolutionError("gradients: the motion bends too sharply along its orbit for its Fourier series")
+        counts = (shares > MIN_TERM).any(axis=0)
+        used = next((k for k in range(1, counts.size) if not counts[k : k + TERMS_IN_A_ROW].any()), counts.size)
+        self._terms, self._order = terms[:, :used], order[:used]
+
+    def __call__(self, share: Array) -> tuple[Array, Array]:
+        """The values at shares, and the integrals from 0 to there: a row for each function."""
+        found = np.empty((2, self._terms.shape[0], share.size))
+        factor = np.divide(
+            1.0, 2j * np.pi * self._order, where=self._order > 0, out=np.zeros(self._order.size, complex)
+        )
+        for start in range(0, share.size, BLOCK):
+            part = slice(start, start + BLOCK)
+            waves = np.exp(2j * np.pi * np.outer(self._order, share[part]))
+            found[0, :, part] = (self._terms @ waves).real
+            rising = self._terms[:, :1].real * share[part]
+            found[1, :, part] = rising + ((self._terms * factor) @ (waves - 1.0)).real
+        return found[0], found[1]

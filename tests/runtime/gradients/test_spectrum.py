@@ -1,0 +1,56 @@
+"""Fourier coefficients against closed forms, and against the motion itself."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from paths import ROOT
+
+from gqm_sym.errors import InputError, SolutionError
+from gqm_sym.loading import load
+
+
+def circle(**launch: Any) -> Any:
+    """A motion on a circle."""
+    return load(str(ROOT / "generated" / "circle.py"), "circle").solve(L=1, g="9.81", **launch)
+
+
+def test_a_pendulum() -> None:
+    """At 1.2 rad: 8 sqrt(q)/(1 + q) and the third coefficient; even ones and sines vanish."""
+    found = circle(lam0="6/5").fourier("lam", 5)
+    assert found.a.shape == found.b.shape == (6,)
+    wanted = [0.0, 1.20976057007855867244104160222, 0.0, -0.00990061091437302041253432191172, 0.0]
+    np.testing.assert_allclose(found.a[:5], wanted, rtol=0, atol=1e-15)
+    np.testing.assert_allclose(found.b, 0.0, atol=1e-15)
+
+
+@pytest.mark.parametrize("quantity", ["x", "z", "v", "normal_force"])
+@pytest.mark.parametrize("launch", [{"lam0": 2.5, "v0": 1.0, "direction": -1}, {"lam0": 0.4, "v0": 7.0}])
+def test_the_sum_is_the_motion(quantity: str, launch: dict[str, Any]) -> None:
+    """At random times, to rounding."""
+    motion = circle(**launch)
+    a, b = motion.fourier(quantity, 90)
+    times = np.random.default_rng(1).uniform(0.0, motion.period, 50)
+    angles = 2 * np.pi / motion.period * np.outer(times, np.arange(91))
+    values = getattr(motion.state(times), quantity)
+    np.testing.assert_allclose(
+        np.cos(angles) @ a + np.sin(angles) @ b, values, atol=2e-13 * np.abs(values).max(), rtol=0
+    )
+
+
+@pytest.mark.parametrize(
+    ("quantity", "n", "launch", "error", "text"),
+    [
+        ("y", 3, {}, InputError, "there is no quantity 'y'"),
+        ("x", -1, {}, InputError, "must be a whole number from 0"),
+        ("x", 1.5, {}, InputError, "must be a whole number from 0"),
+        ("lam", 3, {"v0": 9.0}, SolutionError, "does not repeat"),
+        ("x", 3, {"lam0": 0}, SolutionError, "kind 'rest'"),
+    ],
+)
+def test_what_has_no_coefficients(
+    quantity: str, n: Any, launch: dict[str, Any], error: type[Exception], text: str
+) -> None:
+    """One clear error each."""
+    with pytest.raises(error, match=text):
+        circle(**{"lam0": 1.0, **launch}).fourier(quantity, n)

@@ -1,0 +1,87 @@
+"""Gradients in sweeps against closed forms, and against those of single motions."""
+
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import pytest
+from mpmath import mp, mpf
+from paths import ROOT
+
+from gqm_sym.errors import InputError, SolutionError
+from gqm_sym.loading import load
+
+ULP = 2.0**-52
+
+
+def generated(name: str) -> ModuleType:
+    """A module of the repository."""
+    return load(str(ROOT / "generated" / f"{name}.py"), name)
+
+
+def test_pendulums() -> None:
+    """By amplitude and length, for a table of both: dT/dA in closed form, dT/dL = T/(2L)."""
+    amplitudes, lengths = np.linspace(0.1, 3.0, 15), np.array([[0.5], [2.0]])
+    found = generated("circle").sweep("period", lam0=amplitudes, L=lengths, g=9.81, gradient=("L", "lam0"))
+    assert found.values.shape == (2, 15)
+    assert found.gradient.shape == (2, 15, 2)
+    np.testing.assert_allclose(found.gradient[..., 0], found.values / (2 * lengths), rtol=2 * ULP)
+    for (i, j), value in np.ndenumerate(found.gradient[..., 1]):
+        length, amplitude = lengths[i, 0], amplitudes[j]
+        with mp.workdps(40):
+            k = mp.sin(mpf(amplitude) / 2)
+            shape = mp.ellipe(k**2) / (k * (1 - k**2)) - mp.ellipk(k**2) / k
+            wanted = 2 * mp.sqrt(mpf(length) / mpf(9.81)) * mp.cos(mpf(amplitude) / 2) * shape
+            assert abs(value - wanted) <= 2 * ULP * abs(wanted)
+
+
+@pytest.mark.parametrize("name", ["ellipse", "rolling_circle", "double_well", "circle_spring"])
+def test_as_single_motions(name: str) -> None:
+    """For random launches in both directions, librations and circulations, by all names."""
+    module, random = generated(name), np.random.default_rng(5)
+    lam0, v0 = random.uniform(0.1, 1.4, 300), random.choice([0.0, 1.0, 3.0, 12.0], 300)
+    direction = random.choice([1, -1], 300)
+    names = (*module.PARAMETERS, "lam0", "v0")
+    found = module.sweep("period", lam0=lam0, v0=v0, direction=direction, gradient=names)
+    kinds = set()
+    for k in range(0, 300, 11):
+        if found.status[k] != 0:
+            assert np.isnan(found.gradient[k]).all()
+            continue
+        motion = module.solve(lam0=float(lam0[k]), v0=float(v0[k]), direction=int(direction[k]))
+        wanted = np.array(list(motion.gradient("period", names).values()))
+        kinds.add(motion.kind)
+        np.testing.assert_allclose(found.gradient[k], wanted, rtol=4 * ULP, atol=1e-25)
+    assert kinds >= {"libration"}
+
+
+def test_launches_without_a_value() -> None:
+    """They have no gradient; and without a request there is none."""
+    module = generated("parabola")
+    found = module.sweep("half_period", lam0=[1.0, np.nan, 0.0], gradient="a")
+    assert found.gradient.shape == (3, 1)
+    assert np.isfinite(found.gradient[:, 0]).tolist() == (found.status == 0).tolist() == [True, False, False]
+    assert module.sweep("half_period", lam0=1.0).gradient is None
+    assert module.sweep("half_period", lam0=1.0, gradient="a").gradient.shape == (1,)
+    assert module.sweep("half_period", lam0=[], gradient=("a", "g")).gradient.shape == (0, 2)
+
+
+@pytest.mark.parametrize(
+    ("name", "quantity", "wrt", "error", "text"),
+    [
+        ("circle", "v_max", "L", InputError, "sweeps have it of half_period and period yet, got 'v_max'"),
+        ("circle", "period", "l", InputError, "did you mean 'L'"),
+        ("circle_drag", "period", "L", SolutionError, "motions with losses have none yet"),
+        ("superellipse", "period", "lam0", SolutionError, "curves without formulas have none yet"),
+    ],
+)
+def test_what_has_no_gradient(name: str, quantity: str, wrt: Any, error: type[Exception], text: str) -> None:
+    """One clear error each."""
+    with pytest.raises(error, match=text):
+        generated(name).sweep(quantity, lam0=1.0, gradient=wrt)
+
+
+def test_a_cluster_is_refused() -> None:
+    """The message says what to leave out."""
+    with pytest.raises(InputError, match="leave one of them out"):
+        generated("circle").sweep("period", lam0=1.0, gradient="L", client=object())
