@@ -108,7 +108,6 @@ TESTED_THROUGH = {
     "launch/survey.py": "runtime/compiled/test_calls.py",
     "legs/advance.py": "claims/test_dissipative.py",
     "legs/answers.py": "runtime/sweep/test_dissipative_loop.py",
-    "legs/approach.py": "runtime/legs/test_dissipative.py",
     "legs/body.py": "runtime/sweep/test_dissipative_loop.py",
     "legs/follow.py": "runtime/legs/test_dissipative.py",
     "legs/leg_equation.py": "claims/test_closed_forms.py",

@@ -289,7 +289,24 @@ class _Recorder:
 
 
 class Recorder(_Recorder):
-    """A tape that is being recorded, whose entries may be read to record more of them."""
+    """A tape that is being recorded, whose entries may be read to record more of them.
+
+    Attributes
+    ----------
+    exact : dict
+        For the register of each constant the number that it is, or the name of it.
+    """
+
+    def __init__(self, parameters: int) -> None:
+        super().__init__(parameters)
+        self.exact: dict[int, Fraction | str] = {self.pi.register: "pi", self.e.register: "e"}
+
+    def register(self, value: Any) -> int:
+        """Return the register of an operand."""
+        number, register = self.number(value), super().register(value)
+        if number.known is not None:
+            self.exact[register] = number.known
+        return register
 
     def at(self, register: int) -> TapeNumber:
         """Return the number that a register will contain."""

@@ -23,6 +23,9 @@ MAX_RATIO, MAX_NEXT_CHANGE = 1e-3, 1e-20
 # The largest rounding error of a mean, as a share of the mean of the absolute values.
 MAX_ROUNDING = 1e-17
 
+# What is told instead of the number of nodes: digits were lost, or the nodes are too few whatever the digits.
+LOST_DIGITS, NOT_SMOOTH = 0, -1
+
 # What there is of each mean: the high and the low double, a bound on the error, and the mean of the absolute values.
 MEAN = 4
 
@@ -74,7 +77,7 @@ def add_midpoints(program, work, nodes, n, sums):  # type: ignore[no-untyped-def
 def fill_means_of(program, work, inputs, nodes, found):  # type: ignore[no-untyped-def]
     """Fill the means of all results, as `fill_means`."""
     begin(program, work, inputs)
-    sums, before = np.empty((found.shape[0], MEAN)), inf
+    sums, before, rounding = np.empty((found.shape[0], MEAN)), inf, inf
     for level in range(1, len(LEVELS) - 1):
         n = LEVELS[level]
         add_midpoints(program, work, nodes, n, sums)
@@ -92,12 +95,12 @@ def fill_means_of(program, work, inputs, nodes, found):  # type: ignore[no-untyp
         if level > 2 and rounding <= MAX_ROUNDING and (has_converged or change <= rounding):
             return n
         before = change if level > 1 else inf
-    return 0
+    return NOT_SMOOTH if rounding <= MAX_ROUNDING else LOST_DIGITS
 
 
 @entry(INTEGER(PROGRAM, VECTOR, MATRIX, MATRIX, MATRIX), checked=False)
 def fill_means(program, work, inputs, nodes, found):  # type: ignore[no-untyped-def]
-    """Fill the means of all results of a program over its range, and return with how many nodes; 0 where that fails.
+    """Fill the means of all results of a program over its range, and return with how many nodes, or why there are none.
 
     Parameters
     ----------

@@ -9,7 +9,8 @@ from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.double_double.arithmetic import UNIT
 from gqm_sym.runtime.double_double.nodes import LEVELS, trapezoidal_nodes
 from gqm_sym.runtime.double_double.orbit_time import Orbit
-from gqm_sym.runtime.gradients.evaluation import MEAN, fill_means, fill_values
+from gqm_sym.runtime.gradients.evaluation import LOST_DIGITS, MEAN, NOT_SMOOTH, fill_means, fill_values
+from gqm_sym.runtime.gradients.multiprecision import UNDECIDED, MultiprecisionOrbit
 from gqm_sym.runtime.gradients.programs import (
     PATH_QUANTITIES,
     Program,
@@ -23,12 +24,6 @@ from gqm_sym.runtime.interface import ExactFormulas
 from gqm_sym.runtime.launch.formulas import Formulas
 from gqm_sym.runtime.launch.problem import Problem
 from gqm_sym.runtime.quadrature.trapezoid import CIRCULATION, LIBRATION
-
-# Why an orbit has no derivatives.
-UNDECIDED = (
-    "gradients: double-double arithmetic does not suffice so near an equilibrium, or along a curve that bends so "
-    "sharply; launch a little farther from there"
-)
 
 # Pi as two doubles.
 PI, PI_LOW = np.pi, 1.2246467991473532e-16
@@ -74,51 +69,70 @@ class OrbitDerivatives:
         Duration and turning points in double-double arithmetic, if that suffices.
     direction : int
         0 for a libration, else the sign of ds/dt.
+    offsets : (float, float)
+        The distances of both turning points from the launch, for a libration.
     """
 
-    def __init__(self, problem: Problem, orbit: Orbit | None, direction: int) -> None:
+    def __init__(self, problem: Problem, orbit: Orbit | None, direction: int, offsets: tuple[float, float]) -> None:
         self.direction = direction
         self.source = source_of(problem.formulas)
-        if orbit is None:
-            raise SolutionError(UNDECIDED)
-        launch = problem.launch
-        given = (*problem.p, launch.lam0, launch.v0)
-        numbers = [(n.value, n.low, 0.25 * UNIT * abs(n.value) if n.low else 0.0) for n in given]
+        self._given = (*problem.p, problem.launch.lam0, problem.launch.v0)
+        numbers = [(n.value, n.low, 0.25 * UNIT * abs(n.value) if n.low else 0.0) for n in self._given]
         self.variables = pairs(*numbers, (0.0, 0.0, 0.0))
         self.parameters = np.ascontiguousarray(self.variables[:, : self.source.parameters])
-        self._ends = (orbit.low, orbit.high)
-        self.turning_points = (orbit.low.high, orbit.high.high)
+        self._orbit, self._offsets = orbit, offsets
+
+    @cached_property
+    def _multiprecision(self) -> MultiprecisionOrbit:
+        return MultiprecisionOrbit(self.source, self._program, self._given, self.direction, self._offsets)
 
     @cached_property
     def _end_rows(self) -> Array:
-        high, low, _ = np.array(self._ends).T
+        """The derivatives of both turning points in double-double arithmetic."""
+        assert self._orbit is not None
+        high, low = np.array([self._orbit.low[:2], self._orbit.high[:2]]).T
         return values(turning_point_program(self.source), self.variables, high.copy(), low.copy())[1:]
 
     @property
     def ends(self) -> Array:
         """The derivatives of the lower and of the upper turning point of a libration, as columns."""
-        return self._end_rows[:, 0]
+        return self._multiprecision.ends[1:] if self._orbit is None else self._end_rows[:, 0]
+
+    @property
+    def turning_points(self) -> tuple[float, float]:
+        """The lower and the upper turning point of a libration."""
+        if self._orbit is not None:
+            return self._orbit.low.high, self._orbit.high.high
+        low, high = self._multiprecision.ends[0].tolist()
+        return low, high
+
+    @property
+    def _program(self) -> Program:
+        """What is integrated along the orbit."""
+        return circulation_program(self.source, self.direction) if self.direction else libration_program(self.source)
 
     @cached_property
-    def _rule(self) -> tuple[Program, Array, int]:
-        """The program of the orbit, its inputs, and the kind of its nodes."""
+    def _rule(self) -> tuple[Array, Array]:
+        """The inputs of the orbit's program in double-double arithmetic, and the table of nodes."""
         if self.direction:
             inputs = np.hstack([self.variables, self.variables[:, [self.source.parameters]]])
-            return circulation_program(self.source, self.direction), np.ascontiguousarray(inputs), CIRCULATION
-        inputs = np.hstack(
-            [self.variables, np.array(self._ends).T, self._end_rows[:, :, 0].T, self._end_rows[:, :, 1].T]
-        )
-        return libration_program(self.source), np.ascontiguousarray(inputs), LIBRATION
+            return np.ascontiguousarray(inputs), trapezoidal_nodes(CIRCULATION)
+        assert self._orbit is not None
+        ends = np.array([self._orbit.low, self._orbit.high]).T
+        inputs = np.hstack([self.variables, ends, self._end_rows[:, :, 0].T, self._end_rows[:, :, 1].T])
+        return np.ascontiguousarray(inputs), trapezoidal_nodes(LIBRATION)
 
     @cached_property
-    def _means(self) -> tuple[Array, int]:
-        """The means of the results of the orbit's program, and the number of nodes that they take."""
-        program, inputs, kind = self._rule
-        found = np.zeros((program.outputs.size, MEAN))
-        n = fill_means(program.operands, program.work, inputs, trapezoidal_nodes(kind), found)
-        if n == 0:
-            raise SolutionError(UNDECIDED)
-        return found, n
+    def _means(self) -> tuple[Array, int, bool]:
+        """The means of the orbit's program, the number of nodes, and whether double-double arithmetic found them."""
+        if self._orbit is not None:
+            found = np.zeros((self._program.outputs.size, MEAN))
+            n = fill_means(self._program.operands, self._program.work, *self._rule, found)
+            if n == NOT_SMOOTH:
+                raise SolutionError(UNDECIDED)
+            if n != LOST_DIGITS:
+                return found, n, True
+        return *self._multiprecision.means[:2], False
 
     def _integrals(self, first: int, count: int) -> Array:
         """The integrals of results over a half period, or over a lap."""
@@ -167,11 +181,14 @@ class OrbitDerivatives:
         They are the midpoints of N intervals of [0, 2 pi], or of the share of a lap. In the second half of a libration
         the values return.
         """
-        program, inputs, kind = self._rule
         # The means at n nodes are exact as soon as terms of order 2n vanish: twice the nodes show these terms.
-        n = min(2 * self._means[1], LEVELS[-1] // 2)
-        high, low = trapezoidal_nodes(kind)[:2, n : 2 * n].copy()
-        found = values(program, inputs, high, low)[:, 0]
+        _, count, is_double_double = self._means
+        n = min(2 * count, LEVELS[-1] // 2)
+        if is_double_double:
+            inputs, nodes = self._rule
+            found = values(self._program, inputs, *nodes[:2, n : 2 * n].copy())[:, 0]
+        else:
+            found = self._multiprecision.samples(n)
         return found if self.direction else np.hstack([found, found[:, ::-1]])
 
     def at_places(self, lam: Array) -> Array:

@@ -6,6 +6,7 @@ derivatives are taken by: the run-time parameters, lam0, v0 and the energy, in t
 """
 
 from collections.abc import Callable, Sequence
+from fractions import Fraction
 from functools import lru_cache
 from typing import Any, NamedTuple
 
@@ -45,6 +46,8 @@ class Program(NamedTuple):
         Where in the work space the registers of the results begin.
     work : array
         The registers, of which those of constants are filled.
+    constants : tuple
+        The numbers of these registers, and what they are exactly: a number, or "pi" or "e".
     """
 
     operations: NDArray[np.int64]
@@ -52,6 +55,7 @@ class Program(NamedTuple):
     inputs: int
     outputs: NDArray[np.int64]
     work: Array
+    constants: tuple[tuple[int, Fraction | str], ...]
 
     @property
     def operands(self) -> tuple[Any, ...]:
@@ -131,7 +135,8 @@ def assemble(op: Recorder, outputs: Sequence[Any]) -> Program:
         if code == "constant":
             work[slot : slot + LOW], work[slot + LOW : slot + ERROR] = pair
             work[slot + ERROR : slot + ROW] = 0.25 * UNIT * abs(pair[0]) if pair[1] else 0.0
-    return Program(codes, len(before), inputs, np.array([slots[k] for k in wanted]), work)
+    constants = tuple((slots[k] // ROW, value) for k, value in op.exact.items() if k in slots)
+    return Program(codes, len(before), inputs, np.array([slots[k] for k in wanted], dtype=np.int64), work, constants)
 
 
 @lru_cache(maxsize=64)

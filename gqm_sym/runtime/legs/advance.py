@@ -24,6 +24,7 @@ from gqm_sym.runtime.legs.body import (
     LAM0,
     LAPS,
     LAST_LEG,
+    LAST_WIDTH,
     LEG_BEFORE,
     LEG_TIME,
     LOW,
@@ -39,6 +40,7 @@ from gqm_sym.runtime.legs.body import (
     STEP,
     TURNS,
     V2,
+    WIDTH_BEFORE,
 )
 from gqm_sym.runtime.legs.follow import follow, released
 from gqm_sym.runtime.legs.leg_breaks import CLEARANCE_SHARE, clearance
@@ -222,7 +224,16 @@ def fold(body):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def next_leg(dissipation, p, joints, body, record):  # type: ignore[no-untyped-def]
+def expected_width(body):  # type: ignore[no-untyped-def]
+    """About how long a leg from turn to turn will be: widths decrease in a geometric sequence."""
+    last, before = body[LAST_WIDTH], body[WIDTH_BEFORE]
+    if last > 0.0:
+        return last * (last / before) if before > 0.0 else last
+    return 2.0 * body[STEP]
+
+
+@Inner
+def next_leg(dissipation, p, joints, body, keeps_panels, record):  # type: ignore[no-untyped-def]
     """Follow a body to its next turn, or as far as one run goes.
 
     A body that the track would have to pull at once is followed a little way without contact, and AT_ONCE is in ENDING.
@@ -239,8 +250,9 @@ def next_leg(dissipation, p, joints, body, record):  # type: ignore[no-untyped-d
     while True:
         start = Start(
             *(place, body[PLACE_LOW], body[V2], direction, int(body[CONTACT_SIGN]), body[STEP], no_turn_until),
+            expected_width(body),
         )
-        found = follow(dissipation, p, start, Route(breaks, limit, pause, only_sign), record)
+        found = follow(dissipation, p, start, Route(breaks, limit, pause, only_sign, keeps_panels), record)
         if found.what != LIFTOFF or record[AHEAD] > 0.0:
             return found
         pause, only_sign, no_turn_until, body[ENDING] = 0.0, 0, inf, AT_ONCE
@@ -253,13 +265,15 @@ def after_turn(dissipation, p, joints, body, found, record):  # type: ignore[no-
     stays = found.direction == 0 or (place == body[PLACE] and low == body[PLACE_LOW] and body[V2] == 0.0)
     rests = stays or rests_between(dissipation, p, joints, body, place)
     body[LEG_BEFORE], body[LAST_LEG], body[LEG_TIME] = body[LAST_LEG], body[LEG_TIME], 0.0
+    width = fabs((place - body[PLACE]) + (low - body[PLACE_LOW]))
+    body[WIDTH_BEFORE], body[LAST_WIDTH] = body[LAST_WIDTH], width if body[V2] == 0.0 else 0.0
     body[TURNS] += 1.0
     body[PAUSES], body[NO_TURN_UNTIL], body[MAY_REST] = 0.0, 0.0, 1.0 if found.could_stay else 0.0
     return rests
 
 
 @Inner
-def advance(dissipation, p, joints, body, record):  # type: ignore[no-untyped-def]
+def advance(dissipation, p, joints, body, keeps_panels, record):  # type: ignore[no-untyped-def]
     """Take a body to its next turn, to the end of its motion, or as far as one run goes.
 
     Parameters
@@ -271,6 +285,8 @@ def advance(dissipation, p, joints, body, record):  # type: ignore[no-untyped-de
     joints : Joints
     body : array
         The line of the body (`legs.body`), which was launched; it is as before where the record is FULL.
+    keeps_panels : bool
+        As of `leg_run.Route`.
     record : array
         Filled in (`leg_record`).
 
@@ -280,7 +296,7 @@ def advance(dissipation, p, joints, body, record):  # type: ignore[no-untyped-de
         RESTS if it comes to rest, one of the codes of `leg_run` for what ended the run, LEAVES or
         BEYOND; SPENT if it could not be followed.
     """
-    found, period = next_leg(dissipation, p, joints, body, record), body[PERIOD]
+    found, period = next_leg(dissipation, p, joints, body, keeps_panels, record), body[PERIOD]
     what, ahead, back, place = found.what, record[AHEAD] > 0.0, record[BACK] > 0.0, record[END]
     if what == FULL or body[ENDING] == AT_ONCE:
         return AT_ONCE if body[ENDING] == AT_ONCE else FULL

@@ -136,7 +136,7 @@ def answer(dissipation, p, joints, question, body, record):  # type: ignore[no-u
     """The number that is asked for of one body, and its status."""
     sight = Sight(inf, -inf)
     for _ in range(MAX_LEGS):
-        what = advance(dissipation, p, joints, body, record)
+        what = advance(dissipation, p, joints, body, question >= ARRIVAL, record)
         if what in (FULL, SPENT, LEAVES, BEYOND):
             break
         if question == ARRIVAL and body[TARGET] == body[LAM0]:
@@ -184,7 +184,7 @@ def drive(dissipation, parameters, joints, question, bodies, record):  # type: i
         if body[STEP] == 0.0:
             launch(dissipation, p, joints, body)
         if question == LEG:
-            what = advance(dissipation, p, joints, body, record) if body[DIRECTION] != 0.0 else RESTS
+            what = advance(dissipation, p, joints, body, True, record) if body[DIRECTION] != 0.0 else RESTS
         elif body[DIRECTION] != 0.0:
             body[VALUE], body[STATUS] = answer(dissipation, p, joints, question, body, record)
         else:

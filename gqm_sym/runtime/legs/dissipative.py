@@ -1,14 +1,17 @@
 """Motions with friction, drag or resistance: leg after leg, each computed when it is needed."""
 
 from itertools import pairwise
-from math import inf, isfinite, nan
+from math import inf, isfinite, isnan, nan
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from gqm_sym.errors import BudgetError, InputError, SolutionError
 from gqm_sym.runtime.arithmetic.doubledouble import ULP, ZERO, Pair
+from gqm_sym.runtime.compiled.threads import run_in_threads
 from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.interface import Dissipation
+from gqm_sym.runtime.inversion.leg_tables import places_along_legs, states_along_legs
 from gqm_sym.runtime.launch.ends import CUSP_SHARE, domain_end, leaving_at_once
 from gqm_sym.runtime.launch.formulas import Formulas, ParameterValues
 from gqm_sym.runtime.launch.problem import Problem, bind
@@ -29,18 +32,42 @@ from gqm_sym.runtime.legs.body import (
     launched,
 )
 from gqm_sym.runtime.legs.leg_errors import Errors, carry
-from gqm_sym.runtime.legs.leg_record import BEGIN, COLUMNS, END, HEADING, INHERITED, MIDDLE, START, TIME_FROM_START
+from gqm_sym.runtime.legs.leg_reading import place_at
+from gqm_sym.runtime.legs.leg_record import (
+    BEGIN,
+    BEGIN_LOW,
+    CHANGE_COUNT,
+    COLUMNS,
+    END,
+    HEADING,
+    INHERITED,
+    MIDDLE,
+    START,
+    TIME_FROM_START,
+)
 from gqm_sym.runtime.legs.leg_run import ASYMPTOTE, FULL, LIFTOFF, LIMIT, NARROWED, SPENT, TURN
-from gqm_sym.runtime.legs.leg_segments import Run, along_field, along_panels
+from gqm_sym.runtime.legs.leg_segments import Run, TabulatedPiece, along_field, along_panels, leg_record, tabulated
 from gqm_sym.runtime.motion.aperiodic import MotionAtRest
-from gqm_sym.runtime.motion.events import passages
+from gqm_sym.runtime.motion.events import Leg, passages
 from gqm_sym.runtime.motion.locking import locked
-from gqm_sym.runtime.motion.motion import Motion
+from gqm_sym.runtime.motion.motion import Motion, merged
+from gqm_sym.runtime.motion.rows import Rows
+from gqm_sym.runtime.motion.sampler import (
+    MIN_PLACES_PER_THREAD,
+    MIN_STATES_PER_THREAD,
+    STATE_ROWS,
+    plain_time,
+    plain_times,
+)
 from gqm_sym.runtime.motion.segment import Segment
+from gqm_sym.runtime.motion.state import State
 from gqm_sym.runtime.motion.trajectory import TimedSegment, Trajectory
 
 # The most segments that are stored; each takes some kilobytes.
 MAX_SEGMENTS = 250_000
+
+# The ratio of pieces from which on the record that compiled code reads is made anew for later times.
+MIN_EXTENSION = 1.25
 
 # How many panels a record has space for at first; a leg with more is followed again with a larger record.
 FEW_PANELS = 12
@@ -73,11 +100,32 @@ def launch_leg(formulas: Formulas, p: ParameterValues, launch: Launch, places: A
     return v2
 
 
+def _plain_times(t: Any) -> tuple[Array, float, float] | None:
+    """Times that are one double or an array of them, with the least and the greatest; None if they are not."""
+    time = plain_time(t)
+    return plain_times(t) if time is None else (np.array([time]), time, time)
+
+
 def _loss(problem: Problem) -> Dissipation:
     """The dissipation of the model."""
     loss = problem.formulas.dissipation
     assert loss is not None
     return loss
+
+
+class Reading(NamedTuple):
+    """What compiled code reads of a motion.
+
+    Attributes
+    ----------
+    record : array
+        `leg_segments.leg_record`.
+    until : float
+        The time in s up to which it holds.
+    """
+
+    record: Array
+    until: float
 
 
 class DissipativeMotion(Motion):
@@ -91,11 +139,13 @@ class DissipativeMotion(Motion):
     _ending = ""
     _arc = 0.0
     _whole: Trajectory | None = None
+    _reading = Reading(np.empty(0), -1.0)
 
     def __init__(self, problem: Problem) -> None:
         self._runs: list[Run] = []
         self._segments: list[TimedSegment] = []
         self._laid: list[Run] = []
+        self._tabulated: list[TabulatedPiece] = []
         launch, domain, f = problem.launch, problem.domain, problem.functions
         super().__init__(problem, "dissipative", launch.direction)
         self._joints = Joints(f.breaks, f.corners, np.empty(room_ahead(f.breaks.size)))
@@ -125,6 +175,70 @@ class DissipativeMotion(Motion):
         """The turning points so far in the order of time; the place of a launch from rest is one."""
         turns = [leg.lam_end for leg in self.legs if leg.end == "turn"]
         return (*((self.problem.lam0,) if self.problem.w0 == 0.0 else ()), *turns)
+
+    @property
+    @locked
+    def legs(self) -> tuple[Leg, ...]:
+        """The legs of the motion in the order of time; see `Motion.legs`."""
+        self._look_ahead()
+        runs = [*self._laid, *self._runs]
+        cuts_at_changes = "contact-sign" not in self._internal_ends
+        if self._joints.corners.size or (cuts_at_changes and any(run.record[CHANGE_COUNT] for run in runs)):
+            return super().legs
+        lap, stops = self.problem.period, [*(float(run.record[BEGIN]) for run in runs[1:]), self._elapsed]
+        legs = [run.leg(lap, stop) for run, stop in zip(runs, stops, strict=True)]
+        return Rows(self._up_to_horizon(merged(legs, self._internal_ends)))
+
+    def _place_on_last_leg(self, t: float) -> float:
+        run = next(run for run in reversed([*self._laid, *self._runs]) if run.record[BEGIN] <= t)
+        place = place_at(run.record, (t - run.record[BEGIN]) - run.record[BEGIN_LOW])
+        return float(self.lam(t)) if isnan(place) else place + run.laps * self.problem.period
+
+    def lam(self, t: Any) -> Any:
+        """The curve parameter at times; see `Motion.lam`. For doubles this is one call of compiled code."""
+        times = _plain_times(t)
+        record = None if times is None else self._record_for(times[1], times[2])
+        if times is None or record is None:
+            return super().lam(t)
+        flat, out = times[0], np.empty_like(times[0])
+        run_in_threads(
+            lambda part: places_along_legs(record, flat, out, part.start, part.stop), flat.size, MIN_PLACES_PER_THREAD
+        )
+        return out.reshape(t.shape) if np.ndim(t) else float(out[0])
+
+    def state(self, t: Any) -> State:
+        """The state of the body at times; see `Motion.state`. For doubles this is one call of compiled code."""
+        times = _plain_times(t)
+        record = None if times is None else self._record_for(times[1], times[2])
+        if times is None or record is None:
+            return super().state(t)
+        p, flat, out = self.problem.functions.p, times[0], np.empty((STATE_ROWS, times[0].size))
+        run_in_threads(
+            lambda part: states_along_legs(record, p, flat, out, part.start, part.stop),
+            flat.size,
+            MIN_STATES_PER_THREAD,
+        )
+        return State(t, *out.reshape(-1, *t.shape)) if np.ndim(t) else State(float(flat[0]), *out[:, 0].tolist())
+
+    def _record_for(self, least: float, greatest: float) -> Array | None:
+        """What compiled code reads of times between two; None if it cannot."""
+        record, until = self._reading
+        if least >= 0.0 and greatest <= until:
+            return record
+        return self._extended(greatest) if least >= 0.0 and greatest < inf else None
+
+    @locked
+    def _extended(self, t: float) -> Array | None:
+        """The record of all that has been computed up to a time at least, if enough is new; else None."""
+        self._check_end(t)
+        pieces, done = self._pieces, len(self._tabulated)
+        if self._ending == "asymptote" or len(pieces) < MIN_EXTENSION * done:
+            return None
+        lap, errors = self.problem.period, self._errors_before
+        self._tabulated += [tabulated(timed, lap, errors) for timed in pieces[done:]]
+        record = leg_record(self.problem, self.direction * self.problem.launch.v0.value, self._tabulated)
+        self._reading = Reading(record, min(self._known_end(), pieces[-1].t_stop[0]))
+        return record
 
     def fill_launch_leg(self, places: Array, v2: Array) -> None:
         """Fill in V**2 at the places that lie on the launch leg."""
@@ -165,11 +279,15 @@ class DissipativeMotion(Motion):
     def _internal_ends(self) -> tuple[str, ...]:
         return ("",) if _loss(self.problem).friction else ("", "contact-sign")
 
-    def _trajectory(self, reach: float) -> Trajectory:
+    def _follow(self, reach: float) -> None:
+        """Compute legs up to a time in s, and up to the horizon if there is one."""
         if isfinite(self._horizon):
             reach = max(reach, self._horizon)
         while not self._ending and self._elapsed < reach:
             self._go_on()
+
+    def _trajectory(self, reach: float) -> Trajectory:
+        self._follow(reach)
         if self._whole is None or len(self._whole.segments) != len(self._pieces):
             self._whole = Trajectory(segments=tuple(self._pieces), lap=self.problem.period)
         return self._whole
@@ -182,7 +300,7 @@ class DissipativeMotion(Motion):
         return []  # segments end there
 
     def _check_end(self, t: float) -> None:
-        self._trajectory(t)
+        self._follow(t)
         end = self._known_end()
         if t > end:
             raise InputError(f"t: the motion ends at {end!r} s ({self._end_text()}), got {t!r}")
@@ -237,7 +355,7 @@ class DissipativeMotion(Motion):
     def _look_ahead(self) -> None:
         """Compute the whole motion if it ends, and at least its first leg if it does not."""
         if isfinite(self._horizon):
-            self._trajectory(self._horizon)
+            self._follow(self._horizon)
             return
         while not self._ending and self._at[PAUSES] < MAX_PAUSES:
             if self._at[TURNS] and (not self._at[MAY_REST] or self._at[TURNS] > MAX_TURNS):

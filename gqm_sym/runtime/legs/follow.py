@@ -2,18 +2,31 @@
 
 A leg is run once from its start (`leg_run`), and time is counted on the way as long as V**2 is large. If the leg ends
 at a turn, time is counted from there back to where it was left off: next to a turn V**2 is a small difference when it
-is computed from the start, but has all its digits when it is computed from the turn.
+is computed from the start, but has all its digits when it is computed from the turn. A leg that tends to an equilibrium
+is followed back from there as a field of polynomials (`leg_record`). Before all this, a leg that begins at a turn is
+tried as one polynomial (`whole_leg`).
 """
 
-from math import sqrt
+from math import fabs, sqrt
 from typing import NamedTuple
 
+from gqm_sym.runtime.arithmetic.clenshaw import chebyshev_sum
 from gqm_sym.runtime.compiled.calls import call_static_balance
 from gqm_sym.runtime.compiled.jit import Inner
-from gqm_sym.runtime.legs.approach import LOST, NO_SPACE, approach
 from gqm_sym.runtime.legs.leg_breaks import clearance, span_before, within
-from gqm_sym.runtime.legs.leg_equation import Forces, March, Panel, W, panel_buffer, set_nodes
-from gqm_sym.runtime.legs.leg_panels import ALWAYS, MAX_PANELS, PanelRequest, next_panel, next_stop
+from gqm_sym.runtime.legs.leg_equation import (
+    DS,
+    OFFSET,
+    SERIES,
+    W_FACTOR,
+    Forces,
+    March,
+    Panel,
+    W,
+    panel_buffer,
+    set_nodes,
+)
+from gqm_sym.runtime.legs.leg_panels import ALWAYS, MAX_PANELS, NEVER, PanelRequest, next_panel, next_stop
 from gqm_sym.runtime.legs.leg_record import (
     AHEAD,
     BACK,
@@ -21,6 +34,7 @@ from gqm_sym.runtime.legs.leg_record import (
     COLUMNS,
     END,
     END_LOW,
+    FIELD_COLUMNS,
     HALF_C,
     HEAD,
     MIDDLE,
@@ -32,7 +46,11 @@ from gqm_sym.runtime.legs.leg_record import (
     total_time,
 )
 from gqm_sym.runtime.legs.leg_run import ASYMPTOTE, FULL, SLOWED, SPENT, TURN, Start, point_buffer, run
-from gqm_sym.runtime.legs.polynomials import COUNT
+from gqm_sym.runtime.legs.polynomials import COUNT, to_coefficients
+from gqm_sym.runtime.legs.whole_leg import run_whole
+
+# Why a leg was not followed back.
+NO_SPACE, LOST = -1, -2
 
 
 @Inner
@@ -70,6 +88,59 @@ def run_back(forces, end, breaks, off, record, used):  # type: ignore[no-untyped
 
 
 @Inner
+def approach(forces, end, breaks, off, record, used):  # type: ignore[no-untyped-def]
+    """Enter the field of a leg that tends to an equilibrium, followed back from there to the middle of its run.
+
+    Parameters
+    ----------
+    forces : Forces
+    end : leg_run.End
+        How the leg ends.
+    breaks, off
+        As of `leg_run.run`.
+    record, used
+        The field is entered in the record after the numbers that are used already.
+
+    Returns
+    -------
+    int
+        The number of rows; NO_SPACE if the record has none for them, LOST if the leg could not be followed.
+    """
+    work = panel_buffer()
+    set_nodes(work)
+    march = March((end.place[0], 0.0), -forces.direction, 0.0, 1.0)
+    count, v2, left, linear_part, step = 0, 0.0, 0.0, 0.0, end.step
+    length = fabs(end.middle[0] - end.place[0])
+    remaining = (end.change_count - 1, breaks.size - 1, end.contact_sign)
+    for _ in range(MAX_PANELS):
+        stop, remaining = next_stop(march, left, length, record, breaks, remaining)
+        if stop <= left:
+            break
+        panel = Panel(left, v2, remaining[2], span_before(breaks, remaining[1] + 1, forces.direction, off))
+        request = PanelRequest(stop - left, step, 0.0, NEVER, False)
+        width, step, _timed = next_panel(forces, march, panel, request, work)
+        if width == 0.0:
+            break
+        row, right = used + count * FIELD_COLUMNS, stop if width == stop - left else left + width
+        if not has_space(record, row, end.change_count):
+            return NO_SPACE
+        record[row], record[row + 1] = left, right
+        if count == 0:
+            # V**2/d vanishes at the equilibrium, as the force does; what rounding leaves of it there is subtracted.
+            to_coefficients(work, W_FACTOR, work, SERIES)
+            linear_part = chebyshev_sum(work[SERIES : SERIES + COUNT], -1.0)
+        for j in range(COUNT):
+            d = left + work[OFFSET + j]
+            work[W_FACTOR + j] = (work[W_FACTOR + j] - linear_part) / d if count == 0 else work[W + j] / (d * d)
+        for begin, values in ((2, W_FACTOR), (2 + COUNT, DS)):
+            to_coefficients(work, values, work, SERIES)
+            for k in range(COUNT):
+                record[row + begin + k] = work[SERIES + k]
+        count, v2, left = count + 1, work[W + COUNT], right
+    return count if left >= length else LOST
+
+
+@Inner
 def released(static_balance, p, behind, ahead, preferred):  # type: ignore[no-untyped-def]
     """The direction in which a body at rest leaves a place, 0 if it stays; and whether it could stay at some slope.
 
@@ -103,7 +174,18 @@ def run_to_end(forces, start, route, off, record):  # type: ignore[no-untyped-de
         start = Start(
             *(start.place, start.place_low, start.v2, start.direction, start.contact_sign, start.step),
             end.no_turn_until,
+            start.width,
         )
+
+
+@Inner
+def run_forwards(forces, start, route, off, record):  # type: ignore[no-untyped-def]
+    """`run_to_end`, as one polynomial if that will do; and how many panels from the end have been entered with it."""
+    if start.v2 == 0.0 and forces.linear:
+        end = run_whole(forces, start, route, off, record)
+        if end.what == TURN:
+            return end, 2
+    return run_to_end(forces, start, route, off, record), 0
 
 
 class Followed(NamedTuple):
@@ -154,11 +236,11 @@ def follow(dissipation, p, start, route, record):  # type: ignore[no-untyped-def
         dissipation.speed_equation, p, dissipation.friction, dissipation.kinked, dissipation.linear, start.direction
     )
     off = clearance(start.place, route.limit) if breaks.size else 0.0
-    end = run_to_end(forces, start, route, off, record)
-    what, used, back, time_from_end = end.what, HEAD + end.panel_count * COLUMNS, 0, 0.0
+    end, back = run_forwards(forces, start, route, off, record)
+    what, used, time_from_end = end.what, HEAD + end.panel_count * COLUMNS, 0.0
     direction, could_stay = start.direction, True
     if what == TURN:
-        back = run_back(forces, end, breaks, off, record, used)
+        back = run_back(forces, end, breaks, off, record, used) if back == 0 else back
         time_from_end = total_time(record, used, back)
         here = within(end.place[0], span_before(breaks, end.upcoming, direction, off))
         direction, could_stay = released(dissipation.static_balance, p, here, here, direction)

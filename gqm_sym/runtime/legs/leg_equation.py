@@ -221,8 +221,8 @@ def sample(forces, march, panel, work):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def integrate(march, panel, out, work):  # type: ignore[no-untyped-def]
-    """Fill the row at ``out`` with W for the forces that were sampled; returns q over the panel."""
+def fill_force(march, work):  # type: ignore[no-untyped-def]
+    """Fill the rows EXPM1_Q and FORCE for the forces that were sampled; returns q over the panel, inf if too large."""
     to_means(work, Q_RATE, work, SPEED)
     product(work, SPEED, SPEED, OFFSET)
     total = work[SPEED + COUNT]
@@ -230,6 +230,15 @@ def integrate(march, panel, out, work):  # type: ignore[no-untyped-def]
         return inf
     fill_expm1(work, SPEED, EXPM1_Q)
     force_row(work, FORCE, P, EXPM1_Q, float(march.direction))
+    return total
+
+
+@Inner
+def integrate(march, panel, out, work):  # type: ignore[no-untyped-def]
+    """Fill the row at ``out`` with W for the forces that were sampled; returns q over the panel, inf if too large."""
+    total = fill_force(march, work)
+    if not total < inf:
+        return inf
     # The integral over the distance comes from means, and where g is not zero also from means with the weight y.
     to_means(work, FORCE, work, MEAN)
     if march.g > 0.0:

@@ -3,14 +3,15 @@
 from math import fabs, inf, sqrt
 
 import numpy as np
+from numba import types
 
 from gqm_sym.runtime.arithmetic.clenshaw import chebyshev_sum, legendre_sum
 from gqm_sym.runtime.arithmetic.matrices import multiply
-from gqm_sym.runtime.compiled.jit import Inner
-from gqm_sym.runtime.compiled.registers import on_stack
-from gqm_sym.runtime.compiled.types import Array
+from gqm_sym.runtime.compiled.jit import Inner, entry
+from gqm_sym.runtime.compiled.registers import on_stack, uncounted
+from gqm_sym.runtime.compiled.types import VECTOR, Array
 from gqm_sym.runtime.legs.leg_breaks import offset
-from gqm_sym.runtime.legs.leg_equation import March, marched
+from gqm_sym.runtime.legs.leg_equation import March, distance, marched
 from gqm_sym.runtime.legs.leg_record import (
     AHEAD,
     BACK,
@@ -132,6 +133,20 @@ def passage(record, place):  # type: ignore[no-untyped-def]
         return np.nan
     from_end = time_to(record, HEAD + ahead * COLUMNS, back, sqrt(left))
     return record[TIME_FROM_START] + (record[TIME_FROM_END] - from_end)
+
+
+@entry(types.float64(VECTOR, types.float64))
+def place_at(record, time):  # type: ignore[no-untyped-def]
+    """The place within the lap at a time in s from a leg's start; NaN if the record does not say."""
+    record, ahead, back = uncounted(record), int(record[AHEAD]), int(record[BACK])
+    march, v = march_of(record), record[HEADING]
+    if time <= record[TIME_FROM_START] and ahead > 0:
+        return record[START] + (record[START_LOW] + v * distance(marched_in(record, HEAD, ahead, time), march))
+    remaining = (record[TIME_FROM_START] - time) + record[TIME_FROM_END]
+    if back == 0 or record[TIME_FROM_END] == 0.0 or remaining < 0.0:
+        return np.nan
+    w = marched_in(record, HEAD + ahead * COLUMNS, back, remaining)
+    return record[END] + (record[END_LOW] - v * (w * w))
 
 
 @Inner

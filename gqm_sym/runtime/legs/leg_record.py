@@ -16,13 +16,16 @@ TIME_FROM_END        the time from the middle to a turn
 CHANGE_COUNT         how often N changes sign
 AHEAD, BACK          how many panels there are from the start, and how many panels or rows of a field from the end
 from HEAD on         the panels from the start; after them what was followed back from the end: panels from a turn, or
-                     the field next to an equilibrium (`approach`)
+                     the field next to an equilibrium
 at the end           the places at which N changes sign, the first one last
 ==================== ============================================================================================
 
 A panel is a row of COLUMNS numbers: at its nodes the rates of time and of arc length, Y, and the contact force per mass
 (from NORMAL_LOAD on); after each of the first three one more number, RIGHT (the march variable at its end), TIME, and
 TIME_ERROR (what the time may be wrong by); at last INHERITED (`leg_errors`).
+
+A row of the field of V**2 next to an equilibrium has FIELD_COLUMNS numbers: the distances from the equilibrium between
+which it holds, and the Chebyshev coefficients of V**2/d**2 and of ds/dlam there (`quadrature.equilibrium` reads them).
 """
 
 from gqm_sym.runtime.arithmetic.doubledouble import two_sum
@@ -48,6 +51,7 @@ AHEAD, BACK, HEAD = range(15, 18)
 COLUMNS = 4 * WIDE
 RIGHT, TIME, TIME_ERROR = range(COUNT, 3 * WIDE, WIDE)
 Y_ROW, NORMAL_LOAD, INHERITED = 2 * WIDE, 3 * WIDE, 3 * WIDE + COUNT
+FIELD_COLUMNS = 2 + 2 * COUNT
 copy = copied(WIDE)
 
 

@@ -106,6 +106,8 @@ class Start(NamedTuple):
         The distance to begin with.
     no_turn_until : float
         The distance up to which no turn is expected, however slow the body becomes.
+    width : float
+        About how long the leg is, if it begins at a turn.
     """
 
     place: float
@@ -115,6 +117,7 @@ class Start(NamedTuple):
     contact_sign: int
     step: float
     no_turn_until: float
+    width: float
 
 
 class Route(NamedTuple):
@@ -130,12 +133,15 @@ class Route(NamedTuple):
         The distance from which on the run may pause.
     only_sign : int
         The only sign that N can have; 0 if it can have both.
+    keeps_panels : bool
+        Whether the record's panels are read; where the leg is one polynomial, only their times are entered otherwise.
     """
 
     breaks: Array
     limit: float
     pause: float
     only_sign: int
+    keeps_panels: bool
 
 
 class Ahead(NamedTuple):

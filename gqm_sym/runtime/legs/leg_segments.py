@@ -1,32 +1,43 @@
-"""Segments of a dissipative motion, from the panels of its legs."""
+"""Segments of a dissipative motion, from the panels of its legs, and what compiled code reads of them."""
 
+from collections.abc import Callable, Sequence
 from math import inf
 from typing import NamedTuple
 
 import numpy as np
 from numba import types
 
-from gqm_sym.runtime.arithmetic.doubledouble import ULP, Pair
+from gqm_sym.runtime.arithmetic.doubledouble import ULP, Pair, two_sum
 from gqm_sym.runtime.compiled.jit import entry
 from gqm_sym.runtime.compiled.types import MATRIX, VECTOR, Array
+from gqm_sym.runtime.inversion import leg_tables, records
 from gqm_sym.runtime.launch.functions import BoundFunctions
-from gqm_sym.runtime.legs.approach import COLUMNS as FIELD
+from gqm_sym.runtime.launch.problem import Problem
+from gqm_sym.runtime.legs.advance import AT_ONCE
 from gqm_sym.runtime.legs.leg_reading import to_integral, to_plain
 from gqm_sym.runtime.legs.leg_record import (
     AHEAD,
     BACK,
+    BEGIN,
     CHANGE_COUNT,
     COLUMNS,
+    END,
+    FIELD_COLUMNS,
     HALF_C,
     HEAD,
+    HEADING,
     LAPS_BEFORE,
     RIGHT,
+    START,
     TIME,
     TIME_ERROR,
     Y_ROW,
 )
+from gqm_sym.runtime.legs.leg_run import ASYMPTOTE
 from gqm_sym.runtime.legs.polynomials import WIDE
+from gqm_sym.runtime.motion.events import Leg
 from gqm_sym.runtime.motion.segment import Segment
+from gqm_sym.runtime.motion.trajectory import TimedSegment
 from gqm_sym.runtime.quadrature.substitution import FROM_TURN, REGULAR, TO_EQUILIBRIUM
 from gqm_sym.runtime.quadrature.time_panels import CONVERGED
 
@@ -112,6 +123,14 @@ class Run(NamedTuple):
         """``c/2`` of the march variable; infinite where that is the distance."""
         return float(self.record[HALF_C])
 
+    def leg(self, lap: float, t_end: float) -> Leg:
+        """The leg as one piece, which ends at a time in s; the curve's period is ``lap``, or 0."""
+        record = self.record
+        start, end, before = float(record[START]), float(record[END]), self.laps * lap
+        end = start if self.what == AT_ONCE else end
+        t_end = inf if self.what == ASYMPTOTE else t_end
+        return Leg(start + before, end + before, float(record[BEGIN]), t_end, int(record[HEADING]), self.end)
+
     @property
     def changes(self) -> list[float]:
         """Places at which N changes sign."""
@@ -131,7 +150,7 @@ class Run(NamedTuple):
     @property
     def field(self) -> Array:
         """V**2 next to an equilibrium (`quadrature.equilibrium`)."""
-        return self._rows(HEAD + self.ahead * COLUMNS, self.back, FIELD)
+        return self._rows(HEAD + self.ahead * COLUMNS, self.back, FIELD_COLUMNS)
 
     def _rows(self, begin: int, count: int, columns: int) -> Array:
         return self.record[begin : begin + count * columns].reshape(count, columns)
@@ -160,3 +179,98 @@ def along_field(f: BoundFunctions, a: float, b: float, field: Array) -> Segment:
     """A segment towards an equilibrium b by the field of V**2 there; its panels begin where those of the field do."""
     hints = tuple(float(place) for place in b + np.sign(a - b) * field[:-1, 1])
     return Segment(functions=f, kind=TO_EQUILIBRIUM, a=a, b=b, v2=field, stop=MAX_PHASE_ANGLE, panel_breaks=hints)
+
+
+# How many equal parts of the time there are for each interval, by which the interval of a time is found.
+SLOTS_PER_INTERVAL = 4
+
+ErrorsBefore = Callable[[TimedSegment, Array], tuple[float, Array]]
+
+
+class TabulatedPiece(NamedTuple):
+    """What compiled code needs of a piece of a motion, as rows of the sections of `inversion.leg_tables`.
+
+    Attributes
+    ----------
+    intervals, states, panels : arrays
+        INTERVALS, STATES and PANELS; panels are counted from the first one of the piece.
+    """
+
+    intervals: Array
+    states: Array
+    panels: Array
+
+
+def tabulated(timed: TimedSegment, lap: float, errors_before: ErrorsBefore) -> TabulatedPiece:
+    """What compiled code needs of a piece, which is no approach to an equilibrium."""
+    segment = timed.segment
+    assert segment.speed_series is not None
+    middles, lows, scales, powers, _, ends, _ = segment.table
+    last, speed_terms = segment.speed_series
+    edges, _, lengths, _, length_terms = segment.panels[:5]
+    panel_middles = 0.5 * (edges[1:] + edges[:-1])
+    place_before, time_before = errors_before(timed, panel_middles)
+    # The part of the error that changes within an interval is largest at one of its ends.
+    starts, stops = powers @ (-1.0) ** np.arange(powers.shape[1]), powers.sum(axis=1)
+    both_ends = starts + 1e-9 * (stops - starts), stops
+    owners = np.clip(np.searchsorted(edges, 0.5 * (starts + stops), side="right") - 1, 0, len(edges) - 2)
+    begins = np.append(0.0, ends[:-1])
+    from_turn, offset = float(segment.kind == FROM_TURN), segment.turn_offset
+    sense, share = float(timed.sense), 1.0 / (1.0 + 2.0 * offset)
+
+    def from_launch(r: Array, low: Array) -> tuple[Array, Array]:
+        """Times from the end ``a`` as times from launch, in two doubles."""
+        s, e = two_sum.py_func(r, -timed.r_start[0])
+        high, rest = two_sum.py_func(timed.t_start[0], sense * s)
+        total, error = two_sum.py_func(high, rest + timed.t_start[1] + sense * (e + low - timed.r_start[1]))
+        return total, error
+
+    until = from_launch(ends if sense > 0.0 else begins, np.zeros_like(ends))[0]
+    constants = (
+        *(edges[-1], from_turn * share, 2.0 * offset * share if from_turn else 1.0),
+        *(segment.a, segment.low_parts[0], segment.b, segment.low_parts[1], segment.width, timed.laps * lap),
+    )
+    growth = (last, last * offset) if from_turn else (0.0, 1.0)
+    errors = (
+        (time_before + segment.time_error(panel_middles))[owners],
+        place_before + np.maximum(*(segment.inversion_error(phi) for phi in both_ends)),
+    )
+    rows = np.ones((len(ends), 1))
+    intervals = np.hstack(
+        [np.column_stack([until, *from_launch(middles, lows), sense * scales]), rows * constants, powers]
+    )
+    signs = (segment.direction, timed.direction, timed.s_a, *growth)
+    states = np.column_stack([owners, rows * signs, *errors])
+    kept = (until > timed.t_start[0]) & (from_launch(begins if sense > 0.0 else ends, 0.0 * ends)[0] < timed.t_stop[0])
+    kept[0 if sense < 0.0 else -1] |= not kept.any()
+    order = np.flatnonzero(kept)[:: int(sense)]
+    intervals, states = intervals[order], states[order]
+    intervals[-1, leg_tables.UNTIL] = timed.t_stop[0]
+    panels = np.column_stack([edges[:-1], 0.5 * np.diff(edges), lengths[:-1], length_terms, speed_terms])
+    return TabulatedPiece(intervals, states, panels)
+
+
+def leg_record(problem: Problem, v0: float, pieces: Sequence[TabulatedPiece]) -> Array:
+    """The record by which compiled code finds places and states on pieces that follow each other from launch.
+
+    ``v0`` is the signed speed of the launch.
+    """
+    intervals, states, panels = (np.concatenate(rows) for rows in zip(*pieces, strict=True))
+    counts = [len(piece.panels) for piece in pieces]
+    states[:, leg_tables.PANEL] += np.repeat(np.cumsum([0, *counts[:-1]]), [len(piece.states) for piece in pieces])
+    until = intervals[:, leg_tables.UNTIL]
+    grid = np.linspace(0.0, until[-1], SLOTS_PER_INTERVAL * len(until) + 1)
+    slots = np.minimum(np.searchsorted(until, grid, side="right"), len(until) - 1)
+    # Rounding may put a time into the slot after its own.
+    slots = np.append(slots[:1], slots[:-1]) * leg_tables.INTERVAL_COLUMNS
+    address = problem.functions.addresses.path_and_contact_force
+    return records.record(
+        {
+            leg_tables.FUNCTION: np.array([address], dtype=np.int64),
+            leg_tables.LAUNCH: np.array([problem.lam0, v0, problem.arc_origin, until[-1]], dtype=np.float64),
+            leg_tables.SLOTS: slots.astype(np.int64),
+            leg_tables.INTERVALS: intervals,
+            leg_tables.STATES: states,
+            leg_tables.PANELS: panels,
+        }
+    )

@@ -15,6 +15,19 @@ from gqm_sym.runtime.compiled.jit import Inner
 # The number of nodes; together with the panel's end they fill three registers.
 COUNT = 23
 
+# The fixed point of tables, and pi in it.
+BITS = 240
+PI = 31415926535897932384626433832795028841971693993751058209749445923078164062862 * (1 << BITS) // 10**76
+
+
+def _share(m: int) -> float:
+    """``sin(pi m/(4 COUNT))**2``, correctly rounded: an error of the nodes would be one of every turning point."""
+    square = (PI * m // (2 * COUNT)) ** 2 >> BITS  # of twice the angle
+    total, term, n = 0, square // 2, 2
+    while term:
+        total, term, n = total + term, -(term * square >> BITS) // ((n + 1) * (n + 2)), n + 2
+    return total / (2 << BITS)
+
 
 def _tables() -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """The nodes as shares of the panel, the matrices of running means, and that of Chebyshev coefficients.
@@ -28,12 +41,12 @@ def _tables() -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     wave = [*quarter, *quarter[-2::-1]]
     sines = np.array([*wave, *(-value for value in wave[1:-1])])  # sin(pi m / (2 COUNT))
     degree, odd = np.arange(COUNT), 2 * np.arange(COUNT) + 1
-    shares = np.array([sin(0.25 * pi * m / COUNT) ** 2 for m in odd])
+    shares = np.array([_share(m) for m in odd.tolist()])
     # T_k at node j, with x = -cos(angle).
     at_nodes = (-1.0) ** degree[:, None] * sines[(np.outer(degree, odd) + COUNT) % (4 * COUNT)]
     coefficients = at_nodes * (2.0 / COUNT)
     coefficients[0] *= 0.5
-    one = 1 << 240
+    one = 1 << BITS
 
     def both_means(share: float) -> tuple[list[float], list[float]]:
         """Means of all T_k over [0, y], y a share of the panel, by the measures dy and d(y**2)."""

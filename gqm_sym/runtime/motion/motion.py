@@ -487,7 +487,7 @@ class Motion(ABC):
                 legs.append(Leg(float(lam[k]), float(lam[k + 1]), start[0], stop[0], timed.direction, end))
             if timed.end == "asymptote":
                 legs[-1] = replace(legs[-1], lam_end=timed.segment.b + timed.laps * lap, t_end=inf)
-        return Rows(self._up_to_horizon(_merged(legs, self._internal_ends)))
+        return Rows(self._up_to_horizon(merged(legs, self._internal_ends)))
 
     def _places_at(self, timed: TimedSegment, marks: Sequence[tuple[Pair, float]]) -> Array:
         """The places at phase angles of a segment, each with its time; at launch it is exactly the launch place."""
@@ -558,9 +558,13 @@ class Motion(ABC):
         if out and (out[-1].t_end > end or out[-1].end == ""):
             last = out.pop()
             cut = last.t_end > end
-            place, when = (float(self.lam(end)), end) if cut else (last.lam_end, last.t_end)
+            place, when = (self._place_on_last_leg(end), end) if cut else (last.lam_end, last.t_end)
             out.append(Leg(last.lam_start, place, last.t_start, when, last.direction, "horizon"))
         return out
+
+    def _place_on_last_leg(self, t: float) -> float:
+        """The curve parameter at a time on the last of the legs."""
+        return float(self.lam(t))
 
     # -- pictures -----------------------------------------------------------------------------
 
@@ -708,7 +712,7 @@ def _shaped(array: Array, shape: tuple[int, ...]) -> Any:
     return float(array[0]) if shape == () else array.reshape(shape)
 
 
-def _merged(legs: list[Leg], internal_ends: tuple[str, ...]) -> list[Leg]:
+def merged(legs: list[Leg], internal_ends: tuple[str, ...]) -> list[Leg]:
     """The legs, joined where the end of one matters to the computation only."""
     out: list[Leg] = []
     for leg in legs:

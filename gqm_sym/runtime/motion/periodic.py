@@ -164,7 +164,8 @@ class PeriodicMotion(Motion):
     @cached_property
     def _derivatives(self) -> OrbitDerivatives:
         """The orbit with its derivatives."""
-        return OrbitDerivatives(self.problem, self._orbit, self.direction if self.kind == "circulation" else 0)
+        direction = self.direction if self.kind == "circulation" else 0
+        return OrbitDerivatives(self.problem, self._orbit, direction, self._offsets)
 
     @cached_property
     def _orbit_sensitivity(self) -> OrbitSensitivity:

@@ -1,5 +1,6 @@
 """Sweeps of periods with their gradients: the values as ever, then the derivatives at the same launches."""
 
+from contextlib import suppress
 from math import nan
 from typing import TYPE_CHECKING, Any
 
@@ -54,5 +55,10 @@ def sweep_with_gradient(
     table = np.stack(columns, axis=1)[answered]
     gradient[answered] = period_gradients(formulas, table[:, :-1], table[:, -1], spans[answered], tuple(rows.values()))
     gradient[answered] *= np.where(np.isnan(spans[answered, :1]), 1.0, halves)
+    for k in answered[np.isnan(gradient[answered]).any(axis=1)].tolist():
+        *p, lam0, v0, direction = (column[k].item() for column in columns)
+        motion = solve(LaunchRequest(lam0, v0, int(direction), None, None, launches.contact), tuple(p))
+        with suppress(SolutionError):
+            gradient[k] = list(motion.gradient(quantity, tuple(rows)).values())
     found.gradient = gradient.reshape(*found.status.shape, len(rows))
     return found

@@ -1,0 +1,189 @@
+"""The means of an orbit's program in mpmath, where double-double arithmetic does not have digits enough."""
+
+from collections.abc import Iterator, Sequence
+from functools import cached_property
+from math import ceil, log10
+from typing import Any
+
+import numpy as np
+
+from gqm_sym.budgets import budget
+from gqm_sym.errors import SolutionError
+from gqm_sym.literals.numbers import Number
+from gqm_sym.runtime.compiled.types import Array
+from gqm_sym.runtime.double_double import interpreter
+from gqm_sym.runtime.double_double.interpreter import ROW
+from gqm_sym.runtime.double_double.nodes import LEVELS
+from gqm_sym.runtime.gradients.evaluation import MAX_NEXT_CHANGE, MAX_RATIO
+from gqm_sym.runtime.gradients.programs import Program, Source, turning_point_program
+
+# Why an orbit has no derivatives.
+UNDECIDED = (
+    "gradients: the motion comes too near to an equilibrium, or bends too sharply along its orbit; "
+    "launch a little farther from there"
+)
+
+# Digits to compute with, and by what they are multiplied until two precisions agree to the share AGREEMENT of the means
+# of absolute values. On a small orbit V**2 loses as many as the square of its width, and its derivatives as many again.
+DIGITS, MORE, AGREEMENT = 60, (1, 2, 4), 1e-19
+
+# With so many nodes the changes must be below the second number, or the largest number of nodes will not suffice.
+SLOW = (256, 1e-2)
+
+# A change that is rounding, as a share of the mean of the absolute values.
+MAX_ROUNDING = 1e-30
+
+# Steps of Newton's method to the turning points, of which each doubles the digits, from those of doubles.
+NEWTON_STEPS = 6
+
+
+def carried_out(context: Any, program: Program, inputs: Sequence[Any], places: Sequence[Any]) -> Iterator[list[Any]]:
+    """Yield the results of a program at each of some places, as numbers of an mpmath context."""
+    registers: list[Any] = [None] * (program.work.size // ROW)
+    for slot, value in program.constants:
+        given = getattr(context, value) if isinstance(value, str) else context.mpf(value.numerator) / value.denominator
+        registers[slot] = +given
+    registers[: len(inputs)] = inputs
+    rows = program.operations.tolist()
+    _carry_out(context, rows[: program.first], registers)
+    for place in places:
+        registers[program.inputs] = place
+        _carry_out(context, rows[program.first :], registers)
+        yield [registers[output // ROW] for output in program.outputs]
+
+
+def _carry_out(context: Any, rows: list[list[int]], registers: list[Any]) -> None:
+    """Carry out operations."""
+    functions = {
+        interpreter.SQUARE_ROOT: context.sqrt,
+        interpreter.EXPONENTIAL: context.exp,
+        interpreter.LOGARITHM: context.log,
+        interpreter.ARC_TANGENT: context.atan,
+        interpreter.ABSOLUTE: abs,
+    }
+    for code, *slots in rows:
+        out, left, right = (slot // ROW for slot in slots)
+        if code == interpreter.ADD:
+            registers[out] = registers[left] + registers[right]
+        elif code == interpreter.SUBTRACT:
+            registers[out] = registers[left] - registers[right]
+        elif code == interpreter.MULTIPLY:
+            registers[out] = registers[left] * registers[right]
+        elif code == interpreter.DIVIDE:
+            registers[out] = registers[left] / registers[right]
+        elif code == interpreter.SINE_COSINE:
+            registers[out], registers[out + 1] = context.sin(registers[left]), context.cos(registers[left])
+        else:
+            registers[out] = functions[code](registers[left])
+
+
+class MultiprecisionOrbit:
+    """An orbit with its derivatives in mpmath.
+
+    Parameters
+    ----------
+    source : Source
+        The formulas.
+    program : Program
+        What is integrated along the orbit.
+    numbers : sequence of Number
+        The run-time parameters, the launch place and the launch speed.
+    direction : int
+        0 for a libration, else the sign of ds/dt.
+    offsets : (float, float)
+        The distances of both turning points from the launch, for a libration.
+    """
+
+    def __init__(
+        self, source: Source, program: Program, numbers: Sequence[Number], direction: int, offsets: tuple[float, float]
+    ) -> None:
+        from mpmath import MPContext
+
+        self._source, self._program, self._numbers = source, program, numbers
+        self._direction, self._offsets = direction, offsets
+        self._context = MPContext()
+
+    def _inputs(self) -> list[Any]:
+        """The inputs of the program, as exactly as the context has them."""
+        context = self._context
+        variables = [*(number.at(context) for number in self._numbers), context.mpf(0)]
+        lam0 = variables[self._source.parameters]
+        if self._direction:
+            return [*variables, lam0]
+        turns, ends, rows = turning_point_program(self._source), [], []
+        for offset in (-self._offsets[0], self._offsets[1]):
+            place = lam0 + offset
+            for _ in range(NEWTON_STEPS):
+                ((step, *_),) = carried_out(context, turns, variables, [place])
+                place += step
+            ((_, *row),) = carried_out(context, turns, variables, [place])
+            ends.append(place)
+            rows += row
+        return [*variables, *ends, *rows]
+
+    def _values(self, inputs: Sequence[Any], n: int) -> list[list[Any]]:
+        """The results at n midpoints."""
+        shares = [(self._context.mpf(2 * k) + 1) / (2 * n) for k in range(n)]
+        if not self._direction:
+            shares = [self._context.sin(self._context.pi * share / 2) ** 2 for share in shares]
+        return list(carried_out(self._context, self._program, inputs, shares))
+
+    def _means(self, inputs: Sequence[Any]) -> tuple[list[Any], Array, int]:
+        """The means of the results and of their absolute values, and the number of nodes; 0 if they do not converge."""
+        before, last = np.inf, None
+        for n in LEVELS[1:-1]:
+            columns = list(zip(*self._values(inputs, n), strict=True))
+            means = [sum(column) / n for column in columns]
+            sizes = np.array([float(sum(map(abs, column)) / n) for column in columns])
+            if last is not None:
+                change = _share_of_change(means, last, sizes)
+                if change <= MAX_ROUNDING or (
+                    change <= MAX_RATIO * before < np.inf and change**2 / before <= MAX_NEXT_CHANGE
+                ):
+                    return means, sizes, n
+                if n >= SLOW[0] and change > SLOW[1]:
+                    break
+                before = change
+            last = means
+        return [], np.empty(0), 0
+
+    @cached_property
+    def means(self) -> tuple[Array, int, list[Any]]:
+        """The means as `evaluation.fill_means` gives them, the number of nodes, and the inputs."""
+        return self._found()
+
+    @budget("quadrature", 60.0, "launch a little farther from the equilibrium, or cut the curve at its narrow places")
+    def _found(self) -> tuple[Array, int, list[Any]]:
+        last: list[Any] | None = None
+        try:
+            for factor in MORE:
+                self._context.dps = factor * (DIGITS + 4 * ceil(max(0.0, -log10(sum(self._offsets) or 1.0))))
+                inputs = self._inputs()
+                means, sizes, n = self._means(inputs)
+                if n and last is not None and _share_of_change(means, last, sizes) <= AGREEMENT:
+                    high = np.array([float(mean) for mean in means])
+                    low = np.array([float(mean - value) for mean, value in zip(means, high.tolist(), strict=True)])
+                    return np.stack([high, low, np.zeros_like(sizes), sizes], axis=1), n, inputs
+                last = means if n else None
+        except (ArithmeticError, TypeError, ValueError):  # a root of what must be positive, or a division by zero
+            pass
+        raise SolutionError(UNDECIDED)
+
+    @property
+    def ends(self) -> Array:
+        """Both turning points and, below them, their derivatives, as columns."""
+        inputs, n = self.means[2], self._source.variables
+        numbers = [float(value) for value in inputs[n:]]
+        return np.column_stack([[numbers[k], *numbers[2 + k * n : 2 + (k + 1) * n]] for k in range(2)])
+
+    def samples(self, n: int) -> Array:
+        """The results at n midpoints as doubles, a row for each result."""
+        return np.array([[float(value) for value in row] for row in self._values(self.means[2], n)]).T
+
+
+def _share_of_change(means: list[Any], last: list[Any], sizes: Array) -> float:
+    """The largest change of a mean, as a share of the mean of the absolute values."""
+    if len(means) != len(last):
+        return np.inf
+    shares = [float(abs(a - b) / size) for a, b, size in zip(means, last, sizes.tolist(), strict=True) if size > 0.0]
+    return max(shares, default=0.0)

@@ -1,0 +1,153 @@
+"""The state of a body on a trajectory of many segments at any times, in one call from Python.
+
+What is needed of all segments is stored in one record (`records.record`), because passing many arrays would take
+longer than reading them. All segments are of the kinds FROM_TURN and REGULAR (`quadrature.substitution`), and have
+polynomials for the phase angle over time (`table`), and for arc length and speed over the phase angle. Intervals of
+time follow each other from launch.
+
+=================== ========================================================================================
+section             contents
+=================== ========================================================================================
+FUNCTION            address of the module's `path_and_contact_force`: an integer
+LAUNCH              place, signed speed and arc length at launch; the time in s up to which the record holds
+SLOTS               the first interval of each of many equal parts of that time: integers
+INTERVALS           a row for each interval, by which places are found
+STATES              a row for each interval, by which the rest of the state is found
+PANELS              a row for each panel: edge, half width, arc length there, and the series of arc length and speed
+=================== ========================================================================================
+"""
+
+from math import fabs
+
+import numpy as np
+from numba import types
+
+from gqm_sym.runtime.arithmetic.clenshaw import legendre_sum
+from gqm_sym.runtime.arithmetic.doubledouble import ULP
+from gqm_sym.runtime.compiled.calls import call_path_and_contact_force
+from gqm_sym.runtime.compiled.intrinsics import choose, fma
+from gqm_sym.runtime.compiled.jit import Inlined, Inner, entry
+from gqm_sym.runtime.compiled.types import MATRIX, VECTOR
+from gqm_sym.runtime.inversion.records import section
+from gqm_sym.runtime.inversion.table import LAST, TERMS
+
+FUNCTION, LAUNCH, SLOTS, INTERVALS, STATES, PANELS = range(6)
+
+# Columns of an interval: where it ends; its middle as two doubles, and one over half its length; the last phase angle
+# phi; the share of the way, phi (phi SQUARE + LINEAR); both ends of the segment, as two doubles, and its width; how
+# much whole laps add to places; and the powers of phi.
+UNTIL, MIDDLE, MIDDLE_LOW, SCALE, STOP, SQUARE, LINEAR = range(7)
+PLACE_A, PLACE_A_LOW, PLACE_B, PLACE_B_LOW, WIDTH, LAPS, POWERS = range(7, 14)
+INTERVAL_COLUMNS = POWERS + TERMS
+
+# Columns of a state: its panel; the sign of dlam/dphi, and that of dlam/dt; the arc length at the end ``a``; the speed
+# is Y (GROWTH phi + FIRST_GROWTH); and the errors of the time and of the place.
+PANEL, DIRECTION, HEADING, ARC_A, GROWTH, FIRST_GROWTH, TIME_ERROR, PLACE_ERROR, STATE_COLUMNS = range(9)
+
+# Columns of a panel; the two series have WIDE terms each.
+EDGE, HALF, ARC, SERIES = range(4)
+WIDE = 24
+PANEL_COLUMNS = SERIES + 2 * WIDE
+
+# A phase angle this close to the last one, as a share, is the last one.
+ROUNDED = 4e-16
+
+# States that are found together.
+BLOCK = 64
+
+
+@Inlined
+def interval_at(intervals, slots, rate, t):  # type: ignore[no-untyped-def]
+    """The index at which the row of the interval of a time begins."""
+    at, last = slots[min(np.int64(t * rate), slots.size - 1)], intervals.size - INTERVAL_COLUMNS
+    while at < last and t >= intervals[at + UNTIL]:
+        at += INTERVAL_COLUMNS
+    return at
+
+
+@Inlined
+def phase_angle_at(intervals, at, t):  # type: ignore[no-untyped-def]
+    """The phase angle at a time on the interval whose row begins at an index."""
+    x = ((t - intervals[at + MIDDLE]) - intervals[at + MIDDLE_LOW]) * intervals[at + SCALE]
+    phi, stop = intervals[at + POWERS + LAST], intervals[at + STOP]
+    for m in range(LAST - 1, -1, -1):
+        phi = fma(phi, x, intervals[at + POWERS + m])
+    return choose(stop - phi <= ROUNDED * stop, stop, max(phi, 0.0))
+
+
+@Inlined
+def place_at(intervals, at, phi):  # type: ignore[no-untyped-def]
+    """The curve parameter within a lap at a phase angle, from the nearer end."""
+    share, width = phi * fma(phi, intervals[at + SQUARE], intervals[at + LINEAR]), intervals[at + WIDTH]
+    from_a = intervals[at + PLACE_A] + fma(width, share, intervals[at + PLACE_A_LOW])
+    to_b = intervals[at + PLACE_B] - fma(width, 1.0 - share, -intervals[at + PLACE_B_LOW])
+    return choose(share <= 0.5, from_a, to_b)
+
+
+@Inner
+def find_places(record, t, out, begin, end):  # type: ignore[no-untyped-def]
+    """Fill ``out`` with the curve parameter at times, from the index ``begin`` to ``end``."""
+    intervals, slots, launch = (
+        section(record, INTERVALS),
+        section(record, SLOTS).view(np.int64),
+        section(record, LAUNCH),
+    )
+    lam0, rate = launch[0], (slots.size - 1) / launch[3]
+    for i in range(begin, end):
+        time = t[i]
+        at = interval_at(intervals, slots, rate, time)
+        place = place_at(intervals, at, phase_angle_at(intervals, at, time)) + intervals[at + LAPS]
+        out[i] = choose(time == 0.0, lam0, place)
+
+
+@Inner
+def find_states(record, p, t, out, begin, end):  # type: ignore[no-untyped-def]
+    """Fill the rows of ``out`` with lam, s, x, z, v, v**2, kappa, N/m and the error of lam, as `find_places`."""
+    intervals, slots, launch = (
+        section(record, INTERVALS),
+        section(record, SLOTS).view(np.int64),
+        section(record, LAUNCH),
+    )
+    states, panels = section(record, STATES), section(record, PANELS)
+    address, rate = section(record, FUNCTION).view(np.int64)[0], (slots.size - 1) / launch[3]
+    size = min(BLOCK, end - begin)
+    rows = np.empty(9 * size)
+    for start in range(begin, end, BLOCK):
+        n = min(BLOCK, end - start)
+        for i in range(n):
+            time, j = t[start + i], start + i
+            launched, at = time == 0.0, interval_at(intervals, slots, rate, time)
+            phi, of = phase_angle_at(intervals, at, time), at // INTERVAL_COLUMNS * STATE_COLUMNS
+            panel = np.int64(states[of + PANEL]) * PANEL_COLUMNS
+            x = ((phi - panels[panel + EDGE]) - panels[panel + HALF]) / panels[panel + HALF]
+            series = panel + SERIES
+            arc = panels[panel + ARC] + legendre_sum(panels[series : series + WIDE], x)
+            speed = legendre_sum(panels[series + WIDE : series + 2 * WIDE], x)
+            speed *= fma(states[of + GROWTH], phi, states[of + FIRST_GROWTH])
+            place = choose(launched, launch[0], place_at(intervals, at, phi))
+            v = choose(launched, launch[1], states[of + HEADING] * speed)
+            lam = choose(launched, place, place + intervals[at + LAPS])
+            rows[i], rows[n + i] = place, v * v
+            rows[7 * n + i], rows[8 * n + i] = states[of + TIME_ERROR], states[of + PLACE_ERROR]
+            out[0, j], out[4, j], out[5, j] = lam, v, v * v
+            out[1, j] = launch[2] + choose(launched, 0.0, states[of + ARC_A] + states[of + DIRECTION] * arc)
+        frame = rows[2 * n : 7 * n].reshape((5, n))
+        call_path_and_contact_force(address, n, rows, rows[n:], p, frame)
+        for i in range(n):
+            ds, place, j = frame[2, i], rows[i], start + i
+            rate_of_place = choose(ds > 0.0, fabs(out[4, j]) / ds, 0.0)
+            rounding = ULP * (1.5 * fabs(out[0, j] - place) + 2.0 * fabs(place))
+            out[2, j], out[3, j], out[6, j], out[7, j] = frame[0, i], frame[1, i], frame[3, i], frame[4, i]
+            out[8, j] = rate_of_place * rows[7 * n + i] + rows[8 * n + i] + rounding
+
+
+@entry(types.void(VECTOR, VECTOR, VECTOR, types.int64, types.int64), nogil=True)
+def places_along_legs(record, t, out, begin, end):  # type: ignore[no-untyped-def]
+    """Call `find_places` from Python."""
+    find_places(record, t, out, begin, end)
+
+
+@entry(types.void(VECTOR, VECTOR, VECTOR, MATRIX, types.int64, types.int64), nogil=True)
+def states_along_legs(record, p, t, out, begin, end):  # type: ignore[no-untyped-def]
+    """Call `find_states` from Python."""
+    find_states(record, p, t, out, begin, end)

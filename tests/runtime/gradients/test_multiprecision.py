@@ -1,0 +1,70 @@
+"""Orbits whose derivatives lose more digits than double-double arithmetic has."""
+
+from types import ModuleType
+
+import numpy as np
+import pytest
+from mpmath import mp, mpf
+from paths import ROOT
+
+from gqm_sym.errors import SolutionError
+from gqm_sym.loading import load
+from gqm_sym.runtime.gradients.orbit import OrbitDerivatives, values
+
+ULP = 2.0**-52
+
+
+def generated(name: str) -> ModuleType:
+    """A module of the repository."""
+    return load(str(ROOT / "generated" / f"{name}.py"), name)
+
+
+@pytest.mark.parametrize("amplitude", [1e-3, 1e-9, 1e-30])
+def test_small_swings(amplitude: float) -> None:
+    """dtau/dA in closed form, and d theta/dA = cos(w t) to 2nd order in the amplitude."""
+    motion = generated("circle").solve(lam0=amplitude, L=1, g="9.81")
+    with mp.workdps(120):
+        k, rate = mp.sin(mpf(amplitude) / 2), mp.sqrt(mpf("9.81"))
+        shape = mp.ellipe(k**2) / (k * (1 - k**2)) - mp.ellipk(k**2) / k
+        wanted = mp.cos(mpf(amplitude) / 2) / rate * shape
+        assert abs(motion.gradient("half_period")["lam0"] - wanted) <= 2 * ULP * wanted
+    times = np.linspace(0.0, 5.0, 11)
+    found = motion.sensitivity(times, ("lam0", "m"))
+    np.testing.assert_allclose(found.lam[0], np.cos(float(rate) * times), atol=1e-14 + 4 * amplitude**2)
+    assert not found.lam[1].any()
+
+
+def test_launches_from_rest_in_the_middle() -> None:
+    """On rounds from lam0 = 1e-300, dT/dlam0 = dT/dE g sin(lam0)."""
+    motion = generated("circle").solve(lam0=1e-300, v0=9.0, L=1, g="9.81")
+    assert motion.gradient("period", "lam0")["lam0"] == pytest.approx(motion.period_slope * 9.81e-300, rel=4 * ULP)
+
+
+@pytest.mark.parametrize(("name", "v0"), [("ellipse", 1.0), ("ellipse", 9.0), ("parabola_rolling", 0.5)])
+def test_the_same_as_in_double_double(name: str, v0: float) -> None:
+    """Where both have digits enough, all means, ends and samples agree."""
+    motion = generated(name).solve(lam0=0.25 if name == "parabola_rolling" else -1.25, v0=v0)
+    direction = motion.direction if motion.kind == "circulation" else 0
+    fast, slow = motion._derivatives, OrbitDerivatives(motion.problem, None, direction, motion._offsets)
+    assert fast._means[2]
+    assert not slow._means[2]
+    np.testing.assert_allclose(slow._means[0][:, 0], fast._means[0][:, 0], rtol=1e-15, atol=1e-25)
+    if not direction:
+        np.testing.assert_allclose(slow.ends, fast.ends, rtol=2 * ULP)
+        assert slow.turning_points == fast.turning_points
+    n = slow._means[1]
+    slow_values = slow._multiprecision.samples(n)
+    nodes = fast._rule[1][:2, n : 2 * n].copy()
+    np.testing.assert_allclose(slow_values, values(fast._program, fast._rule[0], *nodes)[:, 0], rtol=1e-15, atol=1e-20)
+
+
+def test_a_swing_that_comes_too_near_to_the_top() -> None:
+    """It is refused soon, and a sweep has no gradient there."""
+    module = generated("circle")
+    for place in (3.1415926, "pi - 1/10**12"):
+        with pytest.raises(SolutionError, match="too near to an equilibrium"):
+            module.solve(lam0=place, L=1).gradient("half_period")
+    found = module.sweep("half_period", lam0=[1.0, 1e-9, 3.1415926], L=1, gradient=("lam0", "L"))
+    assert np.isfinite(found.gradient[:2]).all()
+    assert np.isnan(found.gradient[2]).all()
+    assert found.gradient[1, 0] == module.solve(lam0=1e-9, L=1).gradient("half_period")["lam0"]
