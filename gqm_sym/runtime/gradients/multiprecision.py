@@ -30,6 +30,9 @@ DIGITS, MORE, AGREEMENT = 60, (1, 2, 4), 1e-19
 # With so many nodes the changes must be below the second number, or the largest number of nodes will not suffice.
 SLOW = (256, 1e-2)
 
+# The share of the digits below which a number is zero.
+ZERO_DIGITS = 0.6
+
 # A change that is rounding, as a share of the mean of the absolute values.
 MAX_ROUNDING = 1e-30
 
@@ -136,7 +139,7 @@ class MultiprecisionOrbit:
             means = [sum(column) / n for column in columns]
             sizes = np.array([float(sum(map(abs, column)) / n) for column in columns])
             if last is not None:
-                change = _share_of_change(means, last, sizes)
+                change = self._share_of_change(means, last, sizes)
                 if change <= MAX_ROUNDING or (
                     change <= MAX_RATIO * before < np.inf and change**2 / before <= MAX_NEXT_CHANGE
                 ):
@@ -160,14 +163,26 @@ class MultiprecisionOrbit:
                 self._context.dps = factor * (DIGITS + 4 * ceil(max(0.0, -log10(sum(self._offsets) or 1.0))))
                 inputs = self._inputs()
                 means, sizes, n = self._means(inputs)
-                if n and last is not None and _share_of_change(means, last, sizes) <= AGREEMENT:
+                if n and last is not None and self._share_of_change(means, last, sizes) <= AGREEMENT:
                     high = np.array([float(mean) for mean in means])
                     low = np.array([float(mean - value) for mean, value in zip(means, high.tolist(), strict=True)])
-                    return np.stack([high, low, np.zeros_like(sizes), sizes], axis=1), n, inputs
+                    return np.stack([high, low, np.full_like(sizes, self._zero), sizes], axis=1), n, inputs
                 last = means if n else None
         except (ArithmeticError, TypeError, ValueError):  # a root of what must be positive, or a division by zero
             pass
         raise SolutionError(UNDECIDED)
+
+    @property
+    def _zero(self) -> float:
+        """What is below this is rounding."""
+        return float(10.0 ** (-ZERO_DIGITS * self._context.dps))
+
+    def _share_of_change(self, means: list[Any], last: list[Any], sizes: Array) -> float:
+        """The largest change of a mean, as a share of the mean of the absolute values."""
+        if len(means) != len(last):
+            return np.inf
+        rows = zip(means, last, sizes.tolist(), strict=True)
+        return max((float(abs(a - b) / size) for a, b, size in rows if size > self._zero), default=0.0)
 
     @property
     def ends(self) -> Array:
@@ -179,11 +194,3 @@ class MultiprecisionOrbit:
     def samples(self, n: int) -> Array:
         """The results at n midpoints as doubles, a row for each result."""
         return np.array([[float(value) for value in row] for row in self._values(self.means[2], n)]).T
-
-
-def _share_of_change(means: list[Any], last: list[Any], sizes: Array) -> float:
-    """The largest change of a mean, as a share of the mean of the absolute values."""
-    if len(means) != len(last):
-        return np.inf
-    shares = [float(abs(a - b) / size) for a, b, size in zip(means, last, sizes.tolist(), strict=True) if size > 0.0]
-    return max(shares, default=0.0)

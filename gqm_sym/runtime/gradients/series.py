@@ -5,8 +5,9 @@ import numpy as np
 from gqm_sym.errors import SolutionError
 from gqm_sym.runtime.compiled.types import Array
 
-# Terms below this share of the largest one are rounding, and the last ones may be this share at most.
-MIN_TERM, MAX_LAST_TERM = 3e-17, 1e-14
+# Terms below this share of the largest one are rounding if so many follow each other; the last ones may be the third
+# number at most.
+MIN_TERM, TERMS_IN_A_ROW, MAX_LAST_TERM = 1e-16, 8, 1e-14
 
 # Places that are evaluated together.
 BLOCK = 2048
@@ -31,7 +32,8 @@ class Series:
         shares = np.abs(terms) / np.where(size > 0.0, size, 1.0)
         if shares[:, -3:].max() > MAX_LAST_TERM:
             raise SolutionError("gradients: the motion bends too sharply along its orbit for its Fourier series")
-        used = int(np.flatnonzero((shares > MIN_TERM).any(axis=0)).max(initial=0)) + 1
+        counts = (shares > MIN_TERM).any(axis=0)
+        used = next((k for k in range(1, counts.size) if not counts[k : k + TERMS_IN_A_ROW].any()), counts.size)
         self._terms, self._order = terms[:, :used], order[:used]
 
     def __call__(self, share: Array) -> tuple[Array, Array]:

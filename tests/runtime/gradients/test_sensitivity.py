@@ -140,6 +140,17 @@ def test_from_rest(lam0: float, direction: int) -> None:
     np.testing.assert_allclose(rest.sensitivity(0.0).v[:2], [0.0, direction], atol=1e-15)
 
 
+@pytest.mark.parametrize("lam0", [1.3, 1e-6])
+def test_a_spring_on_a_line(lam0: float) -> None:
+    """It is isochronous, so that derivatives of G vanish; with ds/dx = 5/4, x = x0 cos(w t) + 4 v0 sin(w t)/(5 w)."""
+    module = generated("line_spring")
+    motion = module.solve(lam0=lam0)
+    rate, times = np.pi / motion.half_period, np.linspace(0.0, 9.0, 12)
+    found = motion.sensitivity(times, ("lam0", "v0"))
+    np.testing.assert_allclose(found.lam[0], np.cos(rate * times), atol=2e-14)
+    np.testing.assert_allclose(found.lam[1], np.sin(rate * times) / (1.25 * rate), atol=2e-14)
+
+
 def test_shapes_and_names() -> None:
     """One row for each name, of the shape of the times."""
     motion = generated("circle").solve(lam0=1.0)
