@@ -90,6 +90,7 @@ class OrbitSensitivity:
             self._scale, self._width, self._lap_gradient = 2.0 * np.pi, high - low, np.zeros((n, 1))
             arcs = self._by_all(rise * arcs)
         self._rates, self._arcs = Series(rates), Series(arcs)
+        self._launches: dict[float, _Along] = {}
 
     def _by_all(self, rows: Array) -> Array:
         """Derivatives by the run-time parameters as derivatives by all variables, of which the others are zero."""
@@ -117,6 +118,14 @@ class OrbitSensitivity:
             acceleration=-potential[-1] / ds[0],
             path=path,
         )
+
+    def _at_launch(self, motion: Any, phi: float) -> _Along:
+        """What changes at the launch, whose phase angle has more digits once the period is known exactly."""
+        if phi not in self._launches:
+            v0 = motion.direction * motion.problem.launch.v0.value
+            places = np.array([phi / self._scale]), np.array([motion.problem.lam0]), np.array([v0])
+            self._launches[phi] = self._along(*places)
+        return self._launches[phi]
 
     def _launch_delay(self, launch: _Along, motion: Any) -> Array:
         """How much later than the lower turning point a libration is launched, by all variables.
@@ -150,10 +159,7 @@ class OrbitSensitivity:
         share, laps = np.zeros_like(lam), points.laps
         for _, mask, phi in points.segments:
             share[mask] = phi / self._scale
-        first, v0 = points.trajectory.segments[0], motion.direction * motion.problem.launch.v0.value
-        start = np.array([first.phi_start / self._scale])
-        along = self._along(share, lam, v)
-        launch = self._along(start, np.array([motion.problem.lam0]), np.array([v0]))
+        along, launch = self._along(share, lam, v), self._at_launch(motion, points.trajectory.segments[0].phi_start)
         delay = self._delay(along, launch, motion, points)
         arcs = along.arcs - launch.arcs + v * delay
         arcs[LAM0] -= launch.path[2][0]

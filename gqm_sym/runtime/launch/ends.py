@@ -219,6 +219,8 @@ def search_beyond_barriers(
             return found, end
         begin = max(abs(far), 1e-300)
         found = first_zero_from(f.addresses, f.p, lam0, problem.w0, direction, begin, length, step)
+    if not isfinite(length):  # as far as any search goes on an endless curve
+        return (zeros.STEPS_SPENT, begin, begin), None
     raise _too_many_barriers(problem)
 
 

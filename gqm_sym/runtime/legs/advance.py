@@ -225,11 +225,9 @@ def fold(body):  # type: ignore[no-untyped-def]
 
 @Inner
 def expected_width(body):  # type: ignore[no-untyped-def]
-    """About how long a leg from turn to turn will be: widths decrease in a geometric sequence."""
+    """About how long a leg from turn to turn will be: widths decrease in a geometric sequence. 0 if that is unknown."""
     last, before = body[LAST_WIDTH], body[WIDTH_BEFORE]
-    if last > 0.0:
-        return last * (last / before) if before > 0.0 else last
-    return 2.0 * body[STEP]
+    return last * (last / before) if last > 0.0 and before > 0.0 else last
 
 
 @Inner

@@ -12,7 +12,7 @@ from gqm_sym.runtime.compiled.threads import run_in_threads
 from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.interface import Dissipation
 from gqm_sym.runtime.inversion.leg_tables import places_along_legs, states_along_legs
-from gqm_sym.runtime.launch.ends import CUSP_SHARE, domain_end, leaving_at_once
+from gqm_sym.runtime.launch.ends import CUSP_SHARE, domain_end, leaving_at_once, starting_step
 from gqm_sym.runtime.launch.formulas import Formulas, ParameterValues
 from gqm_sym.runtime.launch.problem import Problem, bind
 from gqm_sym.runtime.launch.request import ONLY_SIGN, Launch
@@ -24,13 +24,20 @@ from gqm_sym.runtime.legs.body import (
     DIRECTION,
     ELAPSED,
     ENDING,
+    FIRST_STEP,
+    HIGH,
+    LAM0,
     LAPS,
+    LOW,
     MAY_REST,
     PAUSES,
+    PERIOD,
     PLACE,
+    PLACE_LOW,
     TURNS,
     launched,
 )
+from gqm_sym.runtime.legs.frames.local_frame import SMALL_SHARE, Frame, frame_near, may_be_small
 from gqm_sym.runtime.legs.leg_errors import Errors, carry
 from gqm_sym.runtime.legs.leg_reading import place_at
 from gqm_sym.runtime.legs.leg_record import (
@@ -61,7 +68,8 @@ from gqm_sym.runtime.motion.sampler import (
 )
 from gqm_sym.runtime.motion.segment import Segment
 from gqm_sym.runtime.motion.state import State
-from gqm_sym.runtime.motion.trajectory import TimedSegment, Trajectory
+from gqm_sym.runtime.motion.trajectory import PhasePoints, TimedSegment, Trajectory
+from gqm_sym.runtime.multiprecision.exact_problem import NOWHERE
 
 # The most segments that are stored; each takes some kilobytes.
 MAX_SEGMENTS = 250_000
@@ -71,6 +79,10 @@ MIN_EXTENSION = 1.25
 
 # How many panels a record has space for at first; a leg with more is followed again with a larger record.
 FEW_PANELS = 12
+
+# A swing about an equilibrium has died away when it is below this share of the last digit of its place, or so small
+# that V**2 and the errors of it come to the end of the range of doubles.
+LAST_DIGIT, LEAST_SWING = ULP / 64.0, 1e-110
 
 # The names of what ends a run, where the code alone says it.
 END_NAMES = {
@@ -137,6 +149,8 @@ class DissipativeMotion(Motion):
     """
 
     _ending = ""
+    # How far from the equilibrium the body turned last, once its swing has died away.
+    _last_swing = 0.0
     _arc = 0.0
     _whole: Trajectory | None = None
     _reading = Reading(np.empty(0), -1.0)
@@ -154,6 +168,9 @@ class DissipativeMotion(Motion):
             *(launch.direction, ONLY_SIGN[launch.contact], self._horizon, nan, problem.w0),
         )
         self._at = self._body[0].tolist()
+        self._frame: Frame | None = None
+        if may_be_small(_loss(problem), f.p, launch.lam0.value, problem.w0):
+            self._enter_frame(launch.lam0.value, launch.lam0.low, problem.w0)
         v0 = launch.v0
         # The errors with which the legs begin.
         self._errors = [Errors(abs(launch.lam0.low), 2.0 * v0.value * abs(v0.low) + ULP * problem.w0, 0.0)]
@@ -304,29 +321,50 @@ class DissipativeMotion(Motion):
         end = self._known_end()
         if t > end:
             raise InputError(f"t: the motion ends at {end!r} s ({self._end_text()}), got {t!r}")
-        if self._ending == "asymptote" and t > self._pieces[-1].t_stop[0]:
+        if self._ending == "asymptote" and not self._last_swing and t > self._pieces[-1].t_stop[0]:
             raise SolutionError(
                 f"t = {t!r}: by then the body is closer to the equilibrium at "
                 f"{self.problem.formulas.parameter} = {self._at[PLACE]!r} than doubles can tell"
             )
 
+    def _phase_points(self, t: Array, t_low: Array) -> PhasePoints:
+        if not self._last_swing:
+            return super()._phase_points(t, t_low)
+        # A swing that has died away stays where it turned last.
+        last, last_low = self._pieces[-1].t_stop
+        return super()._phase_points(np.minimum(t, last), np.where(t < last, t_low, last_low))
+
     def _time_error(self, t: Array) -> Array:
         return np.zeros_like(t)
 
     def _errors_before(self, timed: TimedSegment, phi: Array) -> tuple[float, Array]:
-        loss, p = _loss(self.problem), self.problem.functions.p
         while len(self._errors) <= timed.leg + 1:
-            run, before = self._laid[len(self._errors) - 1], self._errors[-1]
-            self._errors.append(Errors(*carry(loss, p, run.what in (TURN, RESTS), before, run.record)))
+            self._errors.append(self._carried(len(self._errors) - 1))
         run, (before, after) = self._laid[timed.leg], self._errors[timed.leg : timed.leg + 2]
         if timed.segment.v2 is not None:  # the approach to an equilibrium
             return after.place, np.full_like(phi, after.time)
+        of_frame = 0.0 if run.frame is None else run.frame.error
+        if timed.leg == len(self._laid) - 1:
+            of_frame += self._last_swing
         panels = run.panels_ahead if timed.sense > 0 else run.panels_back
         which = np.clip(np.searchsorted(timed.segment.edges, phi, side="right") - 1, 0, len(panels) - 1)
         inherited = panels[which, INHERITED]
         if timed.sense > 0:
-            return before.place, before.time + inherited
-        return after.place, after.time + after.place * inherited
+            return before.place + of_frame, before.time + inherited
+        return after.place + of_frame, after.time + after.place * inherited
+
+    def _carried(self, leg: int) -> Errors:
+        """The errors at the end of a leg, given those with which it begins; in a frame, errors of distances."""
+        run, before = self._laid[leg], self._errors[leg]
+        frame, turns = run.frame, run.what in (TURN, RESTS)
+        if frame is None:
+            return Errors(*carry(_loss(self.problem), self.problem.functions.p, turns, before, run.record))
+        if leg == 0 or self._laid[leg - 1].frame is None:
+            before = before._replace(place=before.place + frame.error)
+        frame.move(run.record, -1)
+        after = Errors(*carry(frame.dissipation, frame.p, turns, before, run.record))
+        frame.move(run.record, 1)
+        return after
 
     def _end_text(self) -> str:
         if not self._ending or self._elapsed > self._horizon:
@@ -377,17 +415,24 @@ class DissipativeMotion(Motion):
                 f"motion: {MAX_SEGMENTS} pieces of legs reach t = {self._pieces[-1].t_stop[0]!r} only; "
                 "give a shorter t_max, or ask for earlier times and nearer places"
             )
-        problem, size = self.problem, FEW_PANELS * COLUMNS
-        parameters = problem.functions.p.reshape(1, -1)
+        problem, size, frame = self.problem, FEW_PANELS * COLUMNS, self._frame
+        loss, parameters = (_loss(problem), problem.functions.p) if frame is None else frame[:2]
         while True:
             record = np.empty(size)
-            what = answers.drive(_loss(problem), parameters, self._joints, LEG, self._body, record)
+            what = answers.drive(loss, parameters.reshape(1, -1), self._joints, LEG, self._body, record)
             if what != FULL:
                 break
             size *= 4
         if self._body[0, DIRECTION] == 0.0 and not self._body[0, TURNS]:
             return  # the body stays where it is
         self._at = self._body[0].tolist()
+        if frame is not None:
+            frame.move(record, 1)
+            self._at[PLACE] = float(record[END])
+        if what == TURN and self._has_died_away(record):
+            self._ending = "asymptote"
+        elif frame is None and what == TURN and abs(record[END] - record[START]) < SMALL_SHARE * abs(record[END]):
+            self._enter_frame(self._at[PLACE], self._at[PLACE_LOW], 0.0)
         heading = int(record[HEADING])
         if what == LEAVES:
             raise leaving_at_once(problem, heading, "end of the domain")
@@ -397,7 +442,7 @@ class DissipativeMotion(Motion):
                 "are the curve and the force smooth there?"
             )
         name = self._end_name(what, record, heading)
-        self._runs.append(Run(record, what, name))
+        self._runs.append(Run(record, what, name, frame))
         if self._at[ENDING]:
             self._ending = name
         if what == BEYOND:
@@ -405,6 +450,31 @@ class DissipativeMotion(Motion):
                 f"the motion leaves the range of doubles at {problem.formulas.parameter} = {self._at[PLACE]!r}; "
                 "give a shorter t_max"
             )
+
+    def _has_died_away(self, record: Array) -> bool:
+        """Whether the body, which has turned, swings so closely about an equilibrium that its place shows no more."""
+        ends, frame = abs(record[[START, END]]), self._frame
+        swing = float(ends.max()) if frame is None else abs(self._body[0, PLACE])
+        if swing >= (LEAST_SWING if frame is None else max(LAST_DIGIT * float(ends[1]), LEAST_SWING)):
+            return False
+        self._last_swing = swing
+        return True
+
+    def _enter_frame(self, place: float, low: float, v2: float) -> None:
+        """Follow the body from here on by its distance from an equilibrium, if it swings closely about one."""
+        problem, line = self.problem, self._body[0]
+        loss, breaks = _loss(problem), problem.functions.breaks
+        ends = [abs(end - place) for end in (problem.low, problem.high, *breaks) if isfinite(end)]
+        reach = min([starting_step(problem), *ends])
+        frame = None if loss.friction or loss.kinked else frame_near(loss, problem.functions.p, (place, low, v2), reach)
+        if frame is None:
+            return
+        self._frame, self._joints = frame, Joints(NOWHERE, NOWHERE, NOWHERE)
+        line[PLACE], line[PLACE_LOW] = frame.distance(place, low)
+        if v2 == 0.0 and abs(line[PLACE]) < LAST_DIGIT * abs(place):
+            line[PLACE] = 0.0  # there it stays
+        line[LAM0], line[LOW], line[HIGH], line[PERIOD] = line[PLACE], -reach, reach, 0.0
+        line[FIRST_STEP] = reach
 
     def _end_name(self, what: int, record: Array, heading: int) -> str:
         """The name of what ended a run."""

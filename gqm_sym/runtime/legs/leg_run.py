@@ -107,7 +107,7 @@ class Start(NamedTuple):
     no_turn_until : float
         The distance up to which no turn is expected, however slow the body becomes.
     width : float
-        About how long the leg is, if it begins at a turn.
+        About how long the leg is, if it begins at a turn; 0 if that is unknown.
     """
 
     place: float
@@ -464,8 +464,10 @@ def run(forces, start, route, off, record):  # type: ignore[no-untyped-def]
     what, panel_count, recorded, change_count = SPENT, 0, 0, 0
     # Once time is not counted any more, a turn is searched for.
     searching, timed = False, Timed(run_length, v2, nu, change_count)
+    # Time on the second half of a leg is counted from its end.
+    middle = 0.5 * start.width if start.v2 == 0.0 and start.width > 0.0 else inf
     for _ in range(MAX_PANELS):
-        late = v2 < HIGH_V2_RATIO * largest_v2
+        late = v2 < HIGH_V2_RATIO * largest_v2 or run_length >= middle
         has_room = has_space(record, HEAD + recorded * COLUMNS, change_count)
         ahead = pass_break(forces, march, route, off, Panel(left, v2, nu, ahead.span), ahead, run_length, point)
         at_end = ahead.upcoming == route.breaks.size

@@ -14,6 +14,7 @@ from gqm_sym.runtime.inversion import leg_tables, records
 from gqm_sym.runtime.launch.functions import BoundFunctions
 from gqm_sym.runtime.launch.problem import Problem
 from gqm_sym.runtime.legs.advance import AT_ONCE
+from gqm_sym.runtime.legs.frames.local_frame import Frame
 from gqm_sym.runtime.legs.leg_reading import to_integral, to_plain
 from gqm_sym.runtime.legs.leg_record import (
     AHEAD,
@@ -92,11 +93,14 @@ class Run(NamedTuple):
         What ended it (`leg_run`).
     end : str
         The name of its end, as of `Leg.end`.
+    frame : Frame or None
+        The surroundings of an equilibrium by which it was followed.
     """
 
     record: Array
     what: int
     end: str
+    frame: Frame | None
 
     @property
     def laps(self) -> int:

@@ -71,6 +71,9 @@ from gqm_sym.runtime.legs.leg_record import (
 from gqm_sym.runtime.legs.leg_run import GOES_ON, TURN, ZERO_TOLERANCE, End, point_buffer, sign_of_load
 from gqm_sym.runtime.legs.polynomials import BITS, COUNT, MEANS, SHARES, TO_COEFFICIENTS, WIDE, size_of, to_means
 
+# The first width to try where none is known, in units of the first panel's.
+FIRST_WIDTH = 2.0
+
 # The most widths that are tried for a leg.
 MAX_TRIES = 12
 
@@ -313,7 +316,8 @@ def run_whole(forces, start, route, off, record):  # type: ignore[no-untyped-def
         work = panel_buffer()
         set_nodes(work)
         panel = Panel(0.0, 0.0, nu, span)
-        h = width_of_leg(forces, march, panel, room, start.width, work)
+        width = start.width if start.width > 0.0 else FIRST_WIDTH * start.step
+        h = width_of_leg(forces, march, panel, room, width, work)
         if h > 0.0 and is_whole(forces, panel, h, work):
             to_half_times(work, TIME_RATE, work, TAILS)
             first, second = work[TAILS], work[TAILS + 1]

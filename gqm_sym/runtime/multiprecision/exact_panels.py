@@ -51,7 +51,8 @@ def exact_ends(
     turns = {TURN_TURN: (True, True), FROM_TURN: (True, False)}.get(kind, (False, False))
     out = []
     for place, is_turn, more in zip((a, b), turns, known, strict=True):
-        if place == exact.lam0.value and not (is_turn and exact.v0.value):
+        # The other end may have the same double.
+        if more is None and place == exact.lam0.value and not (is_turn and exact.v0.value):
             out.append(scale.lam0)
         elif is_turn:
             out.append(scale.turning_point(place if more is None else more))

@@ -39,7 +39,7 @@ line_buffer, pair_buffer, frame_buffer, point_buffer = (
 
 @Inner
 def sample_loads(fns, p, orbit, force, shares, n, out):  # type: ignore[no-untyped-def]
-    """Fill V, or the contact force where ``force`` is set, at n shares of an orbit's width from its lower end.
+    """Fill V**2, or the contact force where ``force`` is set, at n shares of an orbit's width from its lower end.
 
     V**2 is its value at launch less what it loses from there. Next to a turning point this has the digits of the
     largest V**2 on the orbit, not those of the small value itself.
@@ -56,9 +56,6 @@ def sample_loads(fns, p, orbit, force, shares, n, out):  # type: ignore[no-untyp
         call_path_and_contact_force(fns.path_and_contact_force, n, lam, out, p, frame)
         for i in range(n):
             out[i] = frame[4 * n + i]
-    else:
-        for i in range(n):
-            out[i] = sqrt(out[i])
 
 
 @Inner
@@ -66,7 +63,8 @@ def extreme(fns, p, orbit, force, sign):  # type: ignore[no-untyped-def]
     """The largest (``sign`` 1) or smallest (-1) V on an orbit, or contact force where ``force`` is set.
 
     Parabolas through three points are laid again and again with a smaller step. At an extreme the function is flat, so
-    its value has all digits as soon as the place has half of them. In a well that is even, V is largest in the middle.
+    its value has all digits as soon as the place has half of them. They are laid through V**2, for V has a kink where
+    the body all but stops. In a well that is even, V is largest in the middle.
     """
     if not (orbit.circulates or force or sign > 0.0):
         return 0.0  # at a turning point
@@ -74,7 +72,7 @@ def extreme(fns, p, orbit, force, sign):  # type: ignore[no-untyped-def]
     if orbit.even and not (orbit.circulates or force):
         points[0] = 0.5
         sample_loads(fns, p, orbit, force, points, 1, found)
-        return found[0]
+        return sqrt(found[0])
     sample_loads(fns, p, orbit, force, LAP_SHARES if orbit.circulates else WIDTH_SHARES, GRID_POINTS, out)
     best = 0
     for i in range(GRID_POINTS):
@@ -99,7 +97,7 @@ def extreme(fns, p, orbit, force, sign):  # type: ignore[no-untyped-def]
         sample_loads(fns, p, orbit, force, points, 3 if k < REFINEMENTS else 1, found)
         f1, f0, f2 = found[0], found[1], found[2]
         value = max(value, f1) if sign > 0.0 else min(value, f1)
-    return value
+    return value if force else sqrt(value)
 
 
 @Inner

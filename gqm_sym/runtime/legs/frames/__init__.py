@@ -1,0 +1,1 @@
+"""Legs in other coordinates than the curve parameter."""

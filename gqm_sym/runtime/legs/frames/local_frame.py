@@ -1,0 +1,193 @@
+"""Small swings about an equilibrium e that is not at 0: places as distances from e, and the force on them.
+
+Doubles know a place next to e to a rounding of e, and the force there to a rounding of the terms that cancel at e. So
+the force on a body at rest, P(lam), is fitted by a polynomial ``C(d)`` with ``C(0) = 0``, where d is the distance from
+e. Functions of the interface then serve the legs with distances for places: P becomes
+``C(d) + (P(e + d, W) - P(e + d, 0))``, and all else, which does not vanish at e, is evaluated at e + d.
+"""
+
+from functools import cache
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import carray
+from numpy.polynomial import chebyshev
+
+from gqm_sym.runtime.arithmetic.doubledouble import ULP, add
+from gqm_sym.runtime.compiled.calls import call_speed_equation
+from gqm_sym.runtime.compiled.jit import compiler, entry
+from gqm_sym.runtime.compiled.registers import on_stack
+from gqm_sym.runtime.compiled.types import MATRIX, VECTOR, Array
+from gqm_sym.runtime.interface import INTERFACE, SPEED_EQUATION, STATIC_BALANCE, Dissipation
+from gqm_sym.runtime.legs.advance import DISSIPATION, LEAST_V2
+from gqm_sym.runtime.legs.leg_equation import Forces
+from gqm_sym.runtime.legs.leg_record import CHANGE_COUNT, END, MIDDLE, START, change_at
+from gqm_sym.runtime.legs.leg_run import point_buffer, slope_of_v2
+from gqm_sym.runtime.legs.polynomials import WIDE
+
+# A swing is small if it is below these shares of the distance of e from 0, and of the range of the polynomial.
+SMALL_SHARE, RANGE_SHARE = 1e-3, 0.1
+
+# The places at which the force is fitted, as shares of the range; the degree, the size of the last coefficients of a
+# range that is narrow enough, how often it is halved, and how often the fit is moved to where the force vanishes.
+NODES, DEGREE, RESOLVED, MAX_HALVINGS, MAX_MOVES = 64, 20, 1e-14, 12, 4
+SHARES = np.cos(np.pi * (np.arange(NODES) + 0.5) / NODES)
+
+# The force without speed may differ between the two directions by this share: there is no friction.
+FRICTIONLESS_SHARE = 1e-12
+
+# What stands in front of the module's parameters: the address of its speed equation, e as two doubles, the range, and
+# the coefficients of C(d)/d by powers of d over the range.
+ADDRESS, PLACE, PLACE_LOW, RANGE, TERMS = range(5)
+OWN = TERMS + DEGREE
+
+rows_buffer = on_stack(12 * WIDE)
+
+
+class Frame(NamedTuple):
+    """The surroundings of an equilibrium, as a model whose places are distances from it.
+
+    Attributes
+    ----------
+    dissipation : Dissipation
+        Functions that take distances.
+    p : array
+        Their parameters.
+    error : float
+        Of the place of the equilibrium.
+    """
+
+    dissipation: Dissipation
+    p: Array
+    error: float
+
+    def distance(self, place: float, low: float) -> tuple[float, float]:
+        """A place, given as two doubles, as a distance from the equilibrium."""
+        distance: tuple[float, float] = add(place, low, -float(self.p[PLACE]), -float(self.p[PLACE_LOW]))
+        return distance
+
+    def move(self, record: Array, sense: int) -> None:
+        """Write places for distances in the record of a leg, or distances for places where ``sense`` is -1."""
+        place, low = sense * float(self.p[PLACE]), sense * float(self.p[PLACE_LOW])
+        for k in (START, END, MIDDLE):
+            record[k], record[k + 1] = add(float(record[k]), float(record[k + 1]), place, low)
+        for k in range(int(record[CHANGE_COUNT])):
+            record[change_at(record, k)] += place
+
+
+@entry(MATRIX(DISSIPATION, VECTOR, VECTOR))
+def force_at_rest(dissipation, p, places):  # type: ignore[no-untyped-def]
+    """By how much V**2 grows per unit of the curve parameter without speed, a row for each direction of motion."""
+    out, point = np.empty((2, places.size)), point_buffer()
+    for row, v in enumerate((1, -1)):
+        forces = Forces(dissipation.speed_equation, p, False, False, dissipation.linear, v)
+        for i in range(places.size):
+            out[row, i] = v * slope_of_v2(forces, places[i], LEAST_V2, 0, point)
+    return out
+
+
+@cache
+def _functions() -> tuple[Any, Any]:
+    """The speed equation and the static balance of all frames."""
+    compiled = compiler(__file__, interface=INTERFACE)
+
+    @compiled(SPEED_EQUATION)
+    def speed_equation(n, places, speeds, v, nu, p, out):  # type: ignore[no-untyped-def]
+        frame, work = carray(p, OWN + 1), rows_buffer()
+        places, speeds, out = carray(places, n), carray(speeds, n), carray(out, 5 * n)
+        for i in range(n):
+            work[i], work[WIDE + i] = frame[PLACE] + (places[i] + frame[PLACE_LOW]), LEAST_V2
+        at_rest, moving = 2 * WIDE, 7 * WIDE
+        call_speed_equation(int(frame[ADDRESS]), n, work, (0, WIDE, at_rest), v, nu, frame[OWN:])
+        for i in range(n):
+            work[WIDE + i] = speeds[i]
+        call_speed_equation(int(frame[ADDRESS]), n, work, (0, WIDE, moving), v, nu, frame[OWN:])
+        for i in range(n):
+            total, d = 0.0, places[i]
+            for k in range(DEGREE):
+                total = total * (d / frame[RANGE]) + frame[TERMS + DEGREE - 1 - k]
+            for row in range(5):
+                out[row * n + i] = work[moving + row * n + i]
+            out[n + i] = d * total + (work[moving + n + i] - work[at_rest + n + i])
+
+    @compiled(STATIC_BALANCE)
+    def static_balance(n, places, p, out):  # type: ignore[no-untyped-def]
+        frame, places, out = carray(p, OWN), carray(places, n), carray(out, 2 * n)
+        for i in range(n):
+            total = 0.0
+            for k in range(DEGREE):
+                total = total * (places[i] / frame[RANGE]) + frame[TERMS + DEGREE - 1 - k]
+            out[i] = out[n + i] = places[i] * total
+
+    return speed_equation, static_balance
+
+
+def may_be_small(dissipation: Dissipation, p: Array, place: float, v2: float) -> bool:
+    """Whether a swing from a place may be small: the force that drives it changes its sign close by."""
+    if dissipation.friction or dissipation.kinked or place == 0.0:
+        return False
+    reach = SMALL_SHARE * abs(place)
+    behind, ahead = force_at_rest(dissipation, p, np.array([place - reach, place + reach]))[0].tolist()
+    return bool(ahead < 0.0 < behind and v2 < reach * (behind - ahead))
+
+
+def frame_near(dissipation: Dissipation, p: Array, start: tuple[float, float, float], reach: float) -> Frame | None:
+    """The frame of the equilibrium about which a body swings; None if there is none, or the swing is not small.
+
+    Parameters
+    ----------
+    dissipation : Dissipation
+    p : array
+        Run-time parameters.
+    start : (float, float, float)
+        A place as two doubles, and V**2 there.
+    reach : float
+        How far from there functions may be smooth.
+    """
+    middle, size = start[0], reach
+    for _ in range(MAX_HALVINGS):
+        moved, fitted = _fit(dissipation, p, middle, size)
+        if fitted is not None:
+            break
+        size *= 0.5
+    for _ in range(MAX_MOVES):
+        if fitted is None or abs(moved) > 0.5:
+            return None
+        if abs(moved) * size <= ULP * abs(middle):
+            break
+        middle += moved * size
+        moved, fitted = _fit(dissipation, p, middle, size)
+    if fitted is None:
+        return None
+    terms, noise = fitted
+    low, steepness = moved * size, -float(terms[0])
+    away = (start[0] - middle) + (start[1] - low)
+    if not steepness > 0.0 or away**2 + 2.0 * start[2] / steepness > (
+        min(SMALL_SHARE * abs(middle), RANGE_SHARE * size) ** 2
+    ):
+        return None
+    speed_equation, static_balance = _functions()
+    functions = Dissipation(speed_equation.address, static_balance.address, False, False, dissipation.linear)
+    head = [float(dissipation.speed_equation), middle, low, size, *terms]
+    return Frame(functions, np.array([*head, *p]), noise / steepness + ULP * abs(middle))
+
+
+def _fit(dissipation: Dissipation, p: Array, middle: float, size: float) -> tuple[float, tuple[Array, float] | None]:
+    """Where the force vanishes, as a share of the range; the coefficients of C(d)/d, and the noise of the force.
+
+    There are no coefficients if the force is not resolved on the range, or depends on the direction of motion.
+    """
+    forwards, backwards = force_at_rest(dissipation, p, middle + size * np.append(SHARES, 0.0))
+    largest = float(np.max(np.abs(forwards)))
+    if not np.max(np.abs(forwards - backwards)) <= FRICTIONLESS_SHARE * largest:
+        return 0.0, None
+    series = chebyshev.chebfit(SHARES, forwards[:NODES], DEGREE)
+    noise = float(np.max(np.abs(chebyshev.chebval(SHARES, series) - forwards[:NODES])))
+    if not noise <= RESOLVED * largest:
+        return 0.0, None
+    kept = np.flatnonzero(np.abs(series) > noise / np.sqrt(NODES))
+    powers = np.zeros(DEGREE + 1)
+    found = chebyshev.cheb2poly(series[: kept[-1] + 1])
+    powers[: found.size] = found
+    moved = -float(forwards[NODES] / powers[1]) if powers[1] else 1.0
+    return moved, (powers[1:] / size, noise)

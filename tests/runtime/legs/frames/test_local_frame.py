@@ -1,0 +1,96 @@
+"""Small swings about an equilibrium that is not at 0, held against the same swings about one that is."""
+
+import math
+from collections.abc import Callable
+from fractions import Fraction
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import pytest
+from mpmath import mp, mpf
+
+import gqm_sym as gqm
+
+LAWS = {
+    "viscous": gqm.Gravity() + gqm.Kernel.law("-direction*c*sqrt(W)", parameters={"c": "1"}),
+    "drag": gqm.Gravity() + gqm.QuadraticDrag(b="1/10"),
+}
+# Each shape with its equilibrium at 0, and elsewhere.
+SHAPES: dict[str, tuple[Any, Any, str]] = {
+    "pendulum": (
+        gqm.Curve.parametric(x="sin(u)", z="-cos(u)", parameter="u", period="2*pi"),
+        gqm.Curve.parametric(x="cos(u)", z="sin(u)", parameter="u", period="2*pi"),
+        "-pi/2",
+    ),
+    "parabola": (
+        gqm.Curve.graph("x**2/2 + x**3/10", parameter="x"),
+        gqm.Curve.graph("(x - 1)**2/2 + (x - 1)**3/10", parameter="x"),
+        "1",
+    ),
+}
+Pairs = Callable[[str, str], tuple[ModuleType, ModuleType]]
+
+
+@pytest.fixture(scope="module")
+def pairs(tmp_path_factory: pytest.TempPathFactory) -> Pairs:
+    """The modules of a shape with a law, built once."""
+    folder: Path = tmp_path_factory.mktemp("frames")
+    built: dict[tuple[str, str], tuple[ModuleType, ModuleType]] = {}
+
+    def make(shape: str, law: str) -> tuple[ModuleType, ModuleType]:
+        if (shape, law) not in built:
+            models = [gqm.derive(curve, LAWS[law]) for curve in SHAPES[shape][:2]]
+            first, second = (
+                gqm.build(model, name=f"{shape}_{law}_{k}", folder=folder) for k, model in enumerate(models)
+            )
+            built[shape, law] = first, second
+        return built[shape, law]
+
+    return make
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("lam0", ["1/2", "-1e-3", "1e-5", "-1e-9", "1e-13"])
+def test_a_swing_is_the_same_elsewhere(lam0: str, law: str, shape: str, pairs: Pairs) -> None:
+    """Places lie within the sum of the bounds, also at late times, and speeds and turns do accordingly."""
+    centred, elsewhere = pairs(shape, law)
+    e = SHAPES[shape][2]
+    true, motion = centred.solve(lam0), elsewhere.solve(f"{lam0} + ({e})")
+    times = np.array([0.3, 1.0, 4.0, 17.0, 40.0, 60.0])
+    with mp.workdps(50):
+        shift = mp.mpf(1) if e == "1" else -mp.pi / 2
+        for t in times.tolist():
+            apart = abs(mpf(motion.lam(t)) - shift - mpf(true.lam(t)))
+            allowed = motion.error_bound(t) + true.error_bound(t)
+            assert apart <= allowed
+            assert allowed <= 1e-12
+            assert abs(motion.state(t).v - true.state(t).v) <= 4.0 * allowed
+    begins = [[leg.t_start for leg in some.legs[:8]] for some in (true, motion)]
+    assert begins[0] == pytest.approx(begins[1], rel=1e-13, abs=2e-16 / abs(float(Fraction(lam0))))
+
+
+@pytest.mark.parametrize("where", [0, 1])
+def test_a_swing_that_has_died_away_stays(where: int, pairs: Pairs) -> None:
+    """At the equilibrium, within the bound: V**2 leaves the range of doubles, or the place has no digits."""
+    motion = pairs("pendulum", "viscous")[where].solve("1/2 - pi/2" if where else "1/2")
+    assert motion.t_end == math.inf
+    late = motion.state([30.0, 2000.0, 1e9])
+    assert late.t.tolist() == [30.0, 2000.0, 1e9]
+    assert late.v[1:].tolist() == [0.0, 0.0]
+    with mp.workdps(30):
+        for t, lam in zip(late.t.tolist()[1:], late.lam.tolist()[1:], strict=True):
+            assert abs(mpf(lam) + (mp.pi / 2 if where else 0)) <= motion.error_bound(t) <= (1e-14 if where else 1e-105)
+    assert pairs("pendulum", "viscous")[1].solve("1e-19 - pi/2").kind == "rest"
+
+
+@pytest.mark.parametrize("exponent", [9, 15, 16, 17, 20, 30])
+def test_a_small_swing_without_losses(exponent: int, tmp_path_factory: pytest.TempPathFactory) -> None:
+    """About 1 the half period is that of small oscillations, also where both turning points are the same double."""
+    curve = gqm.Curve.graph("(x - 1)**2/2 + (x - 1)**3/10", parameter="x")
+    module = gqm.build(gqm.derive(curve, gqm.Gravity()), name="bowl", folder=tmp_path_factory.getbasetemp() / "bowl")
+    motion = module.solve(f"1 + 1e-{exponent}")
+    assert motion.half_period == pytest.approx(math.pi / math.sqrt(9.81), rel=2e-16)
+    assert motion.turning_points == pytest.approx((1.0, 1.0), abs=10.0**-exponent + 2e-16)

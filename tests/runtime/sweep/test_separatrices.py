@@ -1,0 +1,98 @@
+"""Launches that all but reach a hilltop, or all but stop there: what a sweep says is what solving each of them says."""
+
+import random
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import pytest
+from mpmath import mp, mpf
+
+import gqm_sym as gqm
+from gqm_sym.errors import GQMError
+
+# Curves with hills: their heights as formulas, an estimate of a hilltop, and where to launch from.
+HILLS: dict[str, tuple[Any, Any, float, tuple[float, float]]] = {
+    "two_wells": (gqm.Curve.graph("x**4/4 - x**2/2", parameter="x"), lambda x: x**4 / 4 - x**2 / 2, 0.0, (-1.3, 1.3)),
+    "uneven_wells": (
+        gqm.Curve.graph("x**4/4 - x**2/2 + x/10", parameter="x"),
+        lambda x: x**4 / 4 - x**2 / 2 + x / 10,
+        0.1,
+        (-1.3, 1.2),
+    ),
+    "pendulum": (
+        gqm.Curve.parametric(x="sin(u)", z="-cos(u)", parameter="u", period="2*pi"),
+        lambda u: -mp.cos(u),
+        3.14,
+        (-2.5, 2.5),
+    ),
+    "waves": (gqm.Curve.graph("sin(x)", parameter="x"), mp.sin, 1.57, (-4.0, 1.0)),
+}
+G = mpf("9.81")
+COUNT = 5
+
+
+def launches(name: str) -> tuple[list[float], list[float], list[int], float, Any]:
+    """Places, speeds and directions: energies differ from the hilltop's by shares of 1e-8 to 1e-15; and the hilltop."""
+    _, height, near, (low, high) = HILLS[name]
+    draw = random.Random(name)
+    with mp.workdps(40):
+        top = mp.findroot(lambda x: mp.diff(height, x), near)
+        places = [draw.uniform(low, high) for _ in range(COUNT)]
+        gaps = [draw.choice((1, -1)) * mpf(10) ** -draw.uniform(8, 15) for _ in places]
+        speeds = [
+            float(mp.sqrt(2 * G * (height(top) - height(mpf(lam0))) * (1 + gap)))
+            for lam0, gap in zip(places, gaps, strict=True)
+        ]
+    return places, speeds, [draw.choice((1, -1)) for _ in places], float(top) - 0.01, top
+
+
+@pytest.fixture(scope="module")
+def modules(tmp_path_factory: pytest.TempPathFactory) -> dict[str, ModuleType]:
+    """The module of each curve."""
+    folder: Path = tmp_path_factory.mktemp("hills")
+    return {
+        name: gqm.build(gqm.derive(curve, gqm.Gravity()), name=f"hills_{name}", folder=folder)
+        for name, (curve, *_) in HILLS.items()
+    }
+
+
+def asked(motion: Any, quantity: str, place: float) -> Any:
+    """The quantity of a solved motion; None where it has none."""
+    if quantity == "turning_points":
+        return tuple(sorted(motion.turning_points)) if motion.kind == "libration" else None
+    if quantity in ("v_min", "v_max"):
+        return getattr(motion, quantity).value if motion.kind in ("libration", "circulation") else None
+    try:
+        found = motion.time_at(place) if quantity == "time_at" else getattr(motion, quantity)
+    except GQMError:
+        return None
+    return found if np.isfinite(found) else None
+
+
+@pytest.mark.parametrize("name", HILLS)
+def test_a_sweep_next_to_a_separatrix(name: str, modules: dict[str, ModuleType]) -> None:
+    """The same kinds of motion, and values that differ by roundings times the condition number."""
+    places, speeds, directions, target, top = launches(name)
+    module, height = modules[name], HILLS[name][1]
+    motions = [module.solve(*launch) for launch in zip(places, speeds, directions, strict=True)]
+    conditions = np.array([max(motion.condition_number, 1.0) for motion in motions])
+    for quantity in ("turning_points", "half_period", "period", "time_at", "v_max", "v_min"):
+        lam = {"lam": target} if quantity == "time_at" else {}
+        swept = module.sweep(quantity, np.array(places), np.array(speeds), np.array(directions), **lam)
+        for k, motion in enumerate(motions):
+            told, value = asked(motion, quantity, target), np.asarray(swept.values[k])
+            assert (told is None) == (not np.isfinite(value).all()), (quantity, places[k], speeds[k], told, value)
+            if told is None:
+                continue
+            size = speeds[k] if quantity == "v_min" else np.max(np.abs(told))
+            error = np.max(np.abs(value - told)) / size
+            assert error <= 2e-15 * conditions[k], (quantity, places[k], speeds[k], told, value)
+        if quantity == "v_min":
+            for k in (k for k, motion in enumerate(motions) if motion.kind == "circulation"):
+                with mp.workdps(40):
+                    slowest = mp.sqrt(mpf(speeds[k]) ** 2 - 2 * G * (height(top) - height(mpf(places[k]))))
+                    rounding = mpf(2e-15) * mpf(speeds[k]) ** 2 / slowest
+                    assert abs(mpf(float(swept.values[k])) - slowest) <= rounding
+                    assert abs(mpf(motions[k].v_min.value) - slowest) <= rounding
