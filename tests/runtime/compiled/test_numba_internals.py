@@ -162,7 +162,7 @@ def repeated(x):
 def test_a_function_for_compiled_callers_is_compiled_once_and_only_linked(tmp_path: Path) -> None:
     """Whatever integers its callers pass; Python can call it, and callers are read from the cache without it."""
     (tmp_path / "functions.py").write_text(REPEATED, encoding="utf-8")
-    numbers = f"{36.0.hex()} {1.0.hex()}"
+    numbers = f"{(36.0).hex()} {(1.0).hex()}"
     versions = "['(float64, int64, bool)', '(float64, int64, omitted(default=True))']"
     for expected in ([numbers, versions, "{'LinkedLibrary'}"], [numbers, "[]", "set()"]):
         answer = subprocess.run(
