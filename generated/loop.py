@@ -1,5 +1,5 @@
 # Made by gqm-gen for "loop". Do not edit: change its declaration and generate again.
-# interface 9, input e5eeff356595, body 9efccb29a9a7
+# interface 9, input e5eeff356595, body a52a0c739318
 """Loop of a roller coaster
 
 x              = x(s)
@@ -242,6 +242,7 @@ CHART = Rail(
     numbers=exact_rail,
     placed=True,
     pieces=('line', 'clothoid', 'arc', 'clothoid', 'line'),
+    shaped_by=(0, 1, 2),
 )
 
 

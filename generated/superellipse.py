@@ -1,5 +1,5 @@
 # Made by gqm-gen for "superellipse". Do not edit: change its declaration and generate again.
-# interface 9, input fe6d2f95d843, body 8bebfb78e86a
+# interface 9, input fe6d2f95d843, body 9943b715e1b1
 """Bead inside a superellipse, flat at its lowest point
 
 F              = -1 + z**4/b**4 + x**4/a**4
@@ -269,7 +269,7 @@ def equilibria(*, between: Any = None, a: Any = '1.4', b: Any = '0.9', g: Any = 
     return MODEL.equilibria((a, b, g, m), between, unknown)
 
 
-CHART = Traced(field=field.address, start=exact_start, tangent=1, level=exact_level)
+CHART = Traced(field=field.address, start=exact_start, tangent=1, level=exact_level, shaped_by=(0, 1))
 
 
 MODEL = CompiledModel(

@@ -16,6 +16,11 @@ from gqm_sym.emission.ir import ChartIR, ExactIR, FunctionIR
 from gqm_sym.emission.printer import check_emittable
 
 
+def _shaped_by(*formulas: ExactIR | FunctionIR) -> str:
+    """The argument of a chart's maker that says which run-time parameters, by their place, the curve depends on."""
+    return f"shaped_by={tuple(sorted({place for formula in formulas for _, place in formula.parameters}))!r}"
+
+
 def _implicit(lowering: Lowering) -> ChartIR:
     """An implicit curve: F and its derivatives, the start point, and the ends in arc length."""
     model = lowering.model
@@ -39,6 +44,7 @@ def _implicit(lowering: Lowering) -> ChartIR:
         doc = "Both ends in arc length; None where there is none."
         exact.append(lowering.constants("exact_domain", doc, model.domain))
         arguments.append("domain=exact_domain")
+    arguments.append(_shaped_by(field, *exact))
     return ChartIR(
         statement=f"Traced({', '.join(arguments)})",
         imports=("FIELD", "Traced"),
@@ -78,6 +84,7 @@ def _rail(lowering: Lowering) -> ChartIR:
         arguments.append(f"formulas=({', '.join(formula.name for formula in formulas)},)")
     if rail.closed:
         arguments.append("closed=True")
+    arguments.append(_shaped_by(numbers, *formulas, *functions))
     return ChartIR(
         statement="Rail(\n    " + ",\n    ".join(arguments) + ",\n)",
         imports=("Rail", *(["SEGMENT"] if functions else [])),

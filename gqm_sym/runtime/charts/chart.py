@@ -44,6 +44,10 @@ _SAMPLES = 8
 class ChartMaker(Hashable, Protocol):
     """A curve that makes its chart for values of the run-time parameters."""
 
+    @property
+    def shaped_by(self) -> tuple[int, ...] | None:
+        """The run-time parameters that the curve depends on, by their place; None if that is not known."""
+
     def chart(self, p: tuple[float, ...]) -> "Chart":
         """Return the chart for parameter values in the module's order."""
 

@@ -67,6 +67,8 @@ class Rail:
         The same curves as ``f(op, lam, p)``: x, z and their derivatives.
     closed : bool
         Whether the end is joined to the start.
+    shaped_by : tuple of int or None
+        The run-time parameters that the rail depends on, by their place; None if that is not known.
     """
 
     numbers: Callable[..., Any]
@@ -75,6 +77,7 @@ class Rail:
     segments: tuple[int, ...] = ()
     formulas: tuple[Callable[..., Any], ...] = ()
     closed: bool = False
+    shaped_by: tuple[int, ...] | None = None
 
     def chart(self, p: tuple[float, ...]) -> Chart:
         """Return the chart.

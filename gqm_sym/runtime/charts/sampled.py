@@ -59,6 +59,11 @@ class Sampled:
     kind: str = "spline"
     closed: bool = False
 
+    @property
+    def shaped_by(self) -> tuple[int, ...]:
+        """No run-time parameter."""
+        return ()
+
     def chart(self, p: tuple[float, ...]) -> Chart:
         """Return the chart, which does not depend on the run-time parameters."""
         return _made(self)[0]

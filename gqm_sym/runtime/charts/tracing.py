@@ -114,6 +114,8 @@ class Traced:
         ``f(op, x, z, p)``: F, F_x and F_z.
     domain
         ``f(op, p)``: both ends in arc length, each None if there is none; None instead of a function if there are none.
+    shaped_by
+        The run-time parameters that the curve depends on, by their place; None if that is not known.
     """
 
     field: int
@@ -121,6 +123,7 @@ class Traced:
     tangent: int
     level: Callable[..., Any]
     domain: Callable[..., Any] | None = None
+    shaped_by: tuple[int, ...] | None = None
 
     def chart(self, p: tuple[float, ...]) -> Chart:
         """Trace the curve.

@@ -47,17 +47,31 @@ class ParameterValues(tuple[Number, ...]):
     true_pieces: Any = None
 
 
-@lru_cache(maxsize=8)
+def shape_of(maker: ChartMaker, values: tuple[Any, ...], other: Any) -> tuple[Any, ...]:
+    """The values of the run-time parameters that shape a curve, and one and the same value for the others."""
+    shaping = maker.shaped_by
+    return values if shaping is None else tuple(v if k in shaping else other for k, v in enumerate(values))
+
+
 def chart_with(maker: ChartMaker, values: tuple[float, ...]) -> Chart:
-    """The chart of a curve; it is made once for the same values of the run-time parameters."""
+    """The chart of a curve; it is made once for the same values of the run-time parameters that shape it."""
+    return _chart_with(maker, shape_of(maker, values, 1.0))
+
+
+@lru_cache(maxsize=8)
+def _chart_with(maker: ChartMaker, values: tuple[float, ...]) -> Chart:
     with budget("chart", 60.0, "give fewer points, or shorter and simpler pieces"):
         return maker.chart(values)
 
 
+def true_pieces_of(maker: ChartMaker, p: tuple[Number, ...], chart: Chart) -> Any:
+    """The curve behind a chart in double-double arithmetic, or None; it is made once for one shape."""
+    return _true_pieces_of(maker, shape_of(maker, tuple(p), read_number(1, where="p")), chart)
+
+
 @lru_cache(maxsize=4)
-def true_pieces_of(maker: ChartMaker, p: tuple[Number, ...]) -> Any:
-    """The curve behind a chart in double-double arithmetic, or None; it is made once for the same exact parameters."""
-    return maker.true_pieces(p, chart_with(maker, tuple(number.value for number in p)))
+def _true_pieces_of(maker: ChartMaker, p: tuple[Number, ...], chart: Chart) -> Any:
+    return maker.true_pieces(p, chart)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -104,7 +104,8 @@ class Problem:
         if self.functions.exact is None or self.formulas.chart is None:
             return None
         if self.p.true_pieces is None:
-            self.p.true_pieces = true_pieces_of(self.formulas.chart, self.p) or False
+            chart = self.formulas.charted(self.p)
+            self.p.true_pieces = true_pieces_of(self.formulas.chart, self.p, chart) or False
         return self.p.true_pieces or None
 
     @property

@@ -107,7 +107,10 @@ def _as_bilateral(formulas: Formulas, p: ParameterValues, launch: Launch) -> Mot
     if back.what != "turn":
         return _with_one_turn(problem, direction, front, back)
     low, high = sorted((front, back), key=lambda end: end.place)
-    segment = between_turns(f, low.place, high.place, ends=(low.multiprecision, high.multiprecision))
+    ends = low.multiprecision, high.multiprecision
+    # A curve with many joints has as many panels, which the half period does not need: it comes from the true curve.
+    is_lazy = f.exact is not None and f.breaks.size > 0 and ends == (None, None)
+    segment = between_turns(f, low.place, high.place, ends=ends, is_lazy=is_lazy)
     return PeriodicMotion(problem, "libration", direction, segment, (abs(low.offset), abs(high.offset)))
 
 

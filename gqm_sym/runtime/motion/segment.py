@@ -94,6 +94,8 @@ class Segment:
         (`legs.leg_equation`).
     known_duration : float, optional
         Its duration in s, if doubles have given that accurately; panels are then computed when they are first needed.
+    is_lazy : bool
+        Whether panels are computed when they are first needed though the duration is not known.
     ends : pair
         Its ends in extended precision, where they are known.
     """
@@ -112,6 +114,7 @@ class Segment:
     stored_panels: Any = None
     speed_series: tuple[float, Array] | None = None
     known_duration: float | None = None
+    is_lazy: bool = False
     ends: tuple[Any, Any] = (None, None)
     _from_multiprecision: bool = False
     _condition_number: float = field(default=1.0, init=False)
@@ -121,7 +124,7 @@ class Segment:
     _table: Any = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
-        if self.known_duration is None:
+        if self.known_duration is None and not self.is_lazy:
             self._lay_panels()
 
     def _lay_panels(self) -> None:
@@ -432,9 +435,20 @@ def between_turns(
     b: float,
     known_duration: float | None = None,
     ends: tuple[Any, Any] = (None, None),
+    *,
+    is_lazy: bool = False,
 ) -> Segment:
     """A segment between two turning points."""
-    return Segment(functions=functions, kind=TURN_TURN, a=a, b=b, stop=pi, known_duration=known_duration, ends=ends)
+    return Segment(
+        functions=functions,
+        kind=TURN_TURN,
+        a=a,
+        b=b,
+        stop=pi,
+        known_duration=known_duration,
+        is_lazy=is_lazy,
+        ends=ends,
+    )
 
 
 def from_turn(functions: BoundFunctions, turn: float, end: float) -> Segment:

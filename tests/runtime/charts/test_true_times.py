@@ -14,6 +14,7 @@ from mpmath import mp, mpf
 import gqm_sym as gqm
 from gqm_sym.runtime.charts.true_times import ChartPassage
 from gqm_sym.runtime.double_double.orbit_time import Bounded
+from gqm_sym.runtime.launch.formulas import _chart_with
 from gqm_sym.runtime.motion import timing
 
 G = "9.81"
@@ -174,3 +175,31 @@ def test_a_curve_of_many_pieces(module_for: Callable[..., ModuleType]) -> None:
     assert motion.half_period == graph.solve(lam0=24).half_period
     late = 1e7 * motion.period
     assert motion.lam(late) == pytest.approx(motion.lam(0.0), rel=1e-13)
+
+
+def test_a_shape_with_a_cosine_of_a_parameter(module_for: Callable[..., ModuleType]) -> None:
+    """What compiled functions read behind the parameters shapes the curve too."""
+    curve = gqm.Curve.implicit("x**2 + z**2 - 4*cos(alpha)**2", start=(0, "-2*cos(alpha)"), tangent=-1)
+    module = module_for(curve, "true_cosine")
+    with mp.workdps(DIGITS):
+        for angle, length in (("pi/3", mpf(1)), ("pi/4", mp.sqrt(2)), ("pi/3", mpf(1))):
+            k = mp.sin(mpf("0.75") / (2 * length))
+            holds(module.solve(lam0=0.75, alpha=angle), 2 * mp.ellipk(k**2) * mp.sqrt(length / mpf(G)))
+
+
+def test_other_parameters_share_a_chart(module_for: Callable[..., ModuleType]) -> None:
+    """Launches that differ in mass or gravity only are swept along one chart, and get what each gets alone."""
+    curve = gqm.Curve.implicit("x**2 + z**2 - R**2", start=(0, "-R"), parameters={"R": 1}, tangent=-1)
+    module, before = module_for(curve, "true_shared"), _chart_with.cache_info().misses
+    lam0, g, m = np.linspace(0.3, 2.5, 40), np.linspace(1.6, 24.8, 40), np.linspace(0.5, 2.0, 40)
+    swept = module.sweep("half_period", lam0, g=g, m=m)
+    assert _chart_with.cache_info().misses == before + 1
+    assert swept.route_counts() == {"single": 40}
+    alone = [module.solve(*launch[:1], g=launch[1], m=launch[2]).half_period for launch in zip(lam0, g, m, strict=True)]
+    assert swept.values == pytest.approx(alone, rel=2e-15, abs=0.0)
+    assert _chart_with.cache_info().misses == before + 1
+    # Two shapes are two charts.
+    half = module.sweep("half_period", np.repeat([0.5, 1.0], 20), g=g, R=np.repeat([0.5, 1.0], 20)).values
+    assert half[:20] * np.sqrt(g[:20]) == pytest.approx(half[0] * np.sqrt(g[0]), rel=2e-15)
+    assert half[20:] * np.sqrt(g[20:]) == pytest.approx(half[0] * np.sqrt(2 * g[0]), rel=2e-15)
+    assert _chart_with.cache_info().misses == before + 2
