@@ -90,18 +90,21 @@ class Inner:
         self.py_func = function
         self.__name__, self.__doc__ = function.__name__, function.__doc__
         self._dispatcher: Any = None
+        self._called: Any = None
 
     @property
     def dispatcher(self) -> Any:
-        """The function as numba's dispatcher."""
+        """The function as numba's dispatcher, for compiled callers."""
         if self._dispatcher is None:
             self._dispatcher = COMPILER.inner(self.py_func, forceinline=self.forceinline)
         return self._dispatcher
 
     def __call__(self, *arguments: Any) -> Any:
         """Call the compiled function from Python."""
+        if self._called is None:
+            self._called = COMPILER.called(self.py_func)
         try:
-            return self.dispatcher(*arguments)
+            return self._called(*arguments)
         finally:
             ANNOUNCER.end()
 

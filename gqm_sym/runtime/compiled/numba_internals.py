@@ -9,6 +9,11 @@ name                                what it is used for                  what is
                                     compile (`KeyedCache`)               process takes 0.4 s of CPU time longer to start
 ``ccallback.CFunc``                 the same cache for functions         ``numba.cfunc(..., cache=True)``: 0.4 s longer
                                     called by address
+``codegen.JITCodeLibrary``,         functions that only compiled code    they are: the first compilation takes twice as
+``codegen.JITCPUCodegen``,          calls are not optimised or turned    long
+``compiler.Compiler``               into machine code by themselves
+``get_call_template`` of a          one version of a function for all    one for each: the first compilation takes
+dispatcher                          integers that are written in calls   a sixth longer
 ``runtime.rtsys``                   code from the cache runs without     the preparation: 0.4 s longer
                                     numba's preparation
 ``environment.Environment``,        code from the cache is read          reading imports them: 0.2 s longer
@@ -30,11 +35,11 @@ from inspect import getfile
 from pathlib import Path
 from threading import RLock
 from types import ModuleType
-from typing import Any
+from typing import Any, ClassVar
 
 import llvmlite.binding
 import numba
-from numba import njit
+from numba import njit, types
 
 try:
     from numba.core.caching import FunctionCache, IndexDataCacheFile
@@ -44,6 +49,14 @@ try:
     from numba.core import ccallback
 except ImportError:
     ccallback = None  # type: ignore[assignment]
+try:
+    from numba.core.codegen import JITCodeLibrary, JITCPUCodegen
+except ImportError:
+    JITCodeLibrary = JITCPUCodegen = object
+try:
+    from numba.core.compiler import Compiler as Pipeline
+except ImportError:
+    Pipeline = object
 try:
     from numba.core.environment import Environment, lookup_environment
 except ImportError:
@@ -64,6 +77,14 @@ HAS_CACHE = _has(FunctionCache, "load_overload", "save_overload", "_load_overloa
 HAS_CALLBACKS = _has(ccallback, "CFunc")
 HAS_ENVIRONMENTS = _has(Environment, "_memo")
 HAS_RUNTIME = _has(rtsys, "initialize")
+HAS_LIBRARIES = (
+    HAS_CACHE
+    and HAS_RUNTIME
+    and _has(JITCodeLibrary, "_optimize_functions", "_optimize_final_module", "_finalize_final_module")
+    and _has(JITCodeLibrary, "_finalize_specific", "_finalize_dynamic_globals")
+    and _has(JITCPUCodegen, "_library_class", "_function_pass_manager", "_pass_builder")
+    and _has(Pipeline, "define_pipelines", "compile_extra")
+)
 
 # numba.config is one for the whole process; it is changed while a function is made whose code numba itself caches.
 _CONFIG = RLock()
@@ -90,6 +111,114 @@ class _Reader(pickle.Unpickler):
         if HAS_ENVIRONMENTS and (module, name) == (Environment.__module__, "_rebuild_env"):
             return _environment
         return super().find_class(module, name)
+
+
+class EntryLibrary(JITCodeLibrary):  # type: ignore[misc]
+    """The machine code of a function that Python calls, or that is called by its address, with all that it calls."""
+
+    # How far a function is optimised before it is linked with what it calls.
+    options: ClassVar[dict[str, Any]] = {}
+
+    def _optimize_functions(self, ll_module: Any) -> None:
+        """Optimise each function by itself; numba does the same, and takes as long for each that is only declared."""
+        ll_module.data_layout = self._codegen._data_layout
+        manager, builder = self._codegen._function_pass_manager(**self.options)
+        for function in ll_module.functions:
+            if not function.is_declaration:
+                manager.run(function, builder)
+
+    def _optimize_final_module(self) -> None:
+        """Optimise all functions together, as far as LLVM goes where nobody else can call those that were linked."""
+        for function in self._final_module.functions:
+            if not function.is_declaration and function.linkage == llvmlite.binding.Linkage.linkonce_odr:
+                function.linkage = llvmlite.binding.Linkage.internal
+        super()._optimize_final_module()
+
+    def _finalize_specific(self) -> None:
+        """Make the machine code, and tell it where the environments are of what it was linked with."""
+        super()._finalize_specific()
+        for variable in self._final_module.global_variables if HAS_ENVIRONMENTS else ():
+            found = None if variable.is_declaration else lookup_environment(variable.name)
+            if found is not None:
+                self._codegen.set_env(variable.name, found)
+
+
+class _NoEnvironments:
+    """Stands for a generator of code where there is no code that could read an environment."""
+
+    def set_env(self, name: str, environment: Any) -> None:
+        """Do nothing."""
+
+
+class LinkedLibrary(EntryLibrary):
+    """Code that is linked with that of its callers, and not optimised or turned into machine code by itself.
+
+    numba makes machine code of each function together with all that it calls, and does so again for each function that
+    calls it, up to the entry point. Nearly all of that is thrown away.
+    """
+
+    options: ClassVar[dict[str, Any]] = {"opt": 1, "loop_vectorize": False, "slp_vectorize": False}
+    codegen = _NoEnvironments()
+
+    def _optimize_final_module(self) -> None:
+        """Leave out what is not used."""
+        manager = llvmlite.binding.create_new_module_pass_manager()
+        manager.add_global_dead_code_eliminate_pass()
+        manager.run(self._final_module, self._codegen._pass_builder(**self.options))
+
+    def _finalize_final_module(self) -> None:
+        self._finalize_dynamic_globals()
+        self._finalized = True
+
+    def get_pointer_to_function(self, name: str) -> int:
+        """Return 0: there is no machine code."""
+        return 0
+
+    def serialize_using_object_code(self) -> Any:
+        """Return what is kept on disk."""
+        return self.serialize_using_bitcode()
+
+
+@contextmanager
+def _libraries(codegen: Any, kind: Any) -> Iterator[None]:
+    """Have numba make libraries of a kind; it lets one thread at a time compile."""
+    before, codegen._library_class = codegen._library_class, kind
+    try:
+        yield
+    finally:
+        codegen._library_class = before
+
+
+class CallbackPipeline(Pipeline):  # type: ignore[misc]
+    """numba's steps of compilation, for a function that is called by its address."""
+
+    library: type[Any] = EntryLibrary
+    unneeded: tuple[str, ...] = ()
+
+    def compile_extra(self, function: Any) -> Any:
+        """Compile a function; those of numba's own that it calls are only linked."""
+        with _libraries(self.state.targetctx.codegen(), LinkedLibrary):
+            return super().compile_extra(function)
+
+    def define_pipelines(self) -> Any:
+        """Choose the library and what is made beside the function, and return the steps."""
+        self.state.library = self.library(self.state.targetctx.codegen(), self.state.func_id.func_qualname)
+        self.state.library.enable_object_caching()
+        for wrapper in self.unneeded:
+            setattr(self.state.flags, wrapper, True)
+        return super().define_pipelines()
+
+
+class EntryPipeline(CallbackPipeline):
+    """For a function that Python calls."""
+
+    unneeded = ("no_cfunc_wrapper",)
+
+
+class LinkedPipeline(CallbackPipeline):
+    """For a function that only compiled functions call."""
+
+    library, unneeded = LinkedLibrary, ("no_cfunc_wrapper", "no_cpython_wrapper")
 
 
 class KeyedFiles(IndexDataCacheFile):  # type: ignore[misc]
@@ -140,16 +269,18 @@ class KeyedCache(FunctionCache):  # type: ignore[misc]
         Digest of the files that the function's code may come from.
     on_miss
         Called before a function is compiled that is not in the cache.
+    linked : bool
+        Whether the code is only linked with that of its callers.
     """
 
-    def __init__(self, function: Any, stamp: str, on_miss: Callable[[Any], None]) -> None:
+    def __init__(self, function: Any, stamp: str, on_miss: Callable[[Any], None], *, linked: bool) -> None:
         super().__init__(function)
         source_stamp = self._impl.locator.get_source_stamp()
         self._cache_file: Any = KeyedFiles(self.cache_path, self._impl.filename_base, source_stamp)
-        self._function, self._stamp, self._on_miss = function, stamp, on_miss
+        self._function, self._stamp, self._on_miss, self._linked = function, stamp, on_miss, linked
 
     def _index_key(self, sig: Any, codegen: Any) -> Any:
-        return (*super()._index_key(sig, codegen), self._function.__module__, self._stamp)
+        return (*super()._index_key(sig, codegen), self._function.__module__, self._stamp, self._linked)
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """Read the compiled function; None where it must be compiled."""
@@ -163,9 +294,12 @@ class KeyedCache(FunctionCache):  # type: ignore[misc]
             self._on_miss(self._function)
         return found
 
-    def _read(self, load: Callable[..., Any], *arguments: Any) -> Any:
+    def _read(self, load: Callable[..., Any], sig: Any, target_context: Any) -> Any:
         try:
-            return load(*arguments)
+            if not HAS_LIBRARIES:
+                return load(sig, target_context)
+            with _libraries(target_context.codegen(), LinkedLibrary if self._linked else JITCodeLibrary):
+                return load(sig, target_context)
         except Exception:  # whatever unpickling does with a file that was cut off or overwritten
             return None
 
@@ -173,6 +307,11 @@ class KeyedCache(FunctionCache):  # type: ignore[misc]
         """Store a compiled function, unless the disk is full or the folder has become read-only."""
         with suppress(OSError):
             super().save_overload(sig, data)
+
+
+def _steps(pipeline: type[Any]) -> dict[str, Any]:
+    """Return the option that has numba compile by these steps, where it has what they need."""
+    return {"pipeline_class": pipeline} if HAS_LIBRARIES else {}
 
 
 class Compiler:
@@ -191,17 +330,29 @@ class Compiler:
     def __init__(self, options: dict[str, Any], stamp: Callable[[Any], str], on_miss: Callable[[Any], None]) -> None:
         self._options, self._stamp, self._on_miss = options, stamp, on_miss
 
-    def cache_of(self, function: Any) -> Any:
+    def cache_of(self, function: Any, *, linked: bool = False) -> Any:
         """Return the disk cache of a function; None where no folder can be written, or numba lacks what it needs."""
         if not HAS_CACHE:
             return None
         with suppress(RuntimeError, AttributeError):
-            return KeyedCache(function, self._stamp(function), self._on_miss)
+            return KeyedCache(function, self._stamp(function), self._on_miss, linked=linked)
         return None
 
     def inner(self, function: Any, *, forceinline: bool = False) -> Any:
-        """Return numba's dispatcher of a function that other compiled functions call."""
-        dispatcher = njit(forceinline=forceinline, **self._options)(function)
+        """Return numba's dispatcher of a function that other compiled functions call, and Python does not."""
+        dispatcher = njit(forceinline=forceinline, **self._options, **_steps(LinkedPipeline))(function)
+        self._attach(dispatcher, function, linked=HAS_LIBRARIES)
+        if _has(dispatcher, "get_call_template"):
+            template = dispatcher.get_call_template
+            dispatcher.get_call_template = lambda arguments, keywords: template(
+                [types.unliteral(kind) for kind in arguments],
+                {name: types.unliteral(kind) for name, kind in keywords.items()},
+            )
+        return dispatcher
+
+    def called(self, function: Any) -> Any:
+        """Return numba's dispatcher of a function that Python calls with arguments of any type."""
+        dispatcher = njit(**self._options, **_steps(EntryPipeline))(function)
         self._attach(dispatcher, function)
         return dispatcher
 
@@ -210,7 +361,7 @@ class Compiler:
 
         Unless ``checked``, numba does not look whether arrays are of doubles and contiguous.
         """
-        dispatcher = njit(nogil=nogil, **self._options)(function)
+        dispatcher = njit(nogil=nogil, **self._options, **_steps(EntryPipeline))(function)
         if self._attach(dispatcher, function):
             dispatcher.compile(signature)
         else:
@@ -225,7 +376,8 @@ class Compiler:
     def callback(self, function: Any, signature: Any) -> Any:
         """Compile a function that is called by its ``address``."""
         if HAS_CALLBACKS:
-            callback: Any = ccallback.CFunc(function, (signature.args, signature.return_type), {}, self._options)
+            pair = (signature.args, signature.return_type)
+            callback: Any = ccallback.CFunc(function, pair, {}, self._options, **_steps(CallbackPipeline))
             if self._attach(callback, function):
                 callback.compile()
                 return callback
@@ -233,9 +385,9 @@ class Compiler:
             function, lambda cache: numba.cfunc(signature, cache=cache, **self._options)(function)
         )
 
-    def _attach(self, target: Any, function: Any) -> bool:
+    def _attach(self, target: Any, function: Any, *, linked: bool = False) -> bool:
         """Give numba's object a disk cache of ours; whether that was possible."""
-        cache = self.cache_of(function)
+        cache = self.cache_of(function, linked=linked)
         possible = cache is not None and _has(target, "_cache")
         if possible:
             target._cache = cache

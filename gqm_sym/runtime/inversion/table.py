@@ -224,7 +224,8 @@ def _to_powers(c, out):  # type: ignore[no-untyped-def]
     for j in range(2, n):
         # one, two <- T_(j-1), T_j
         previous = one.copy()
-        one[:] = two
+        for i in range(n):
+            one[i] = two[i]
         two[0] = -previous[0]
         for i in range(1, n):
             two[i] = 2.0 * one[i - 1] - previous[i]

@@ -464,8 +464,8 @@ def run(forces, start, route, off, record):  # type: ignore[no-untyped-def]
     what, panel_count, recorded, change_count = SPENT, 0, 0, 0
     # Once time is not counted any more, a turn is searched for.
     searching, timed = False, Timed(run_length, v2, nu, change_count)
-    # Time on the second half of a leg is counted from its end.
-    middle = 0.5 * start.width if start.v2 == 0.0 and start.width > 0.0 else inf
+    # Time on the second half of a leg is counted from its end; laws that are not linear keep to what is next to it.
+    middle = 0.5 * start.width if forces.linear and start.v2 == 0.0 and start.width > 0.0 else inf
     for _ in range(MAX_PANELS):
         late = v2 < HIGH_V2_RATIO * largest_v2 or run_length >= middle
         has_room = has_space(record, HEAD + recorded * COLUMNS, change_count)

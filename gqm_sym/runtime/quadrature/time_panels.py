@@ -174,7 +174,8 @@ def lay(integrand, marks):  # type: ignore[no-untyped-def]
     start, stop = marks[0], marks[-1]
     waiting = marks.size - 1
     pending = np.empty(waiting + 128)  # right edges of the panels that remain, the next one last
-    pending[:waiting] = marks[:0:-1]
+    for k in range(waiting):
+        pending[k] = marks[waiting - k]
     max_panels = MAX_PANELS + waiting
     edges[0], times[0], lengths[0] = start, 0.0, 0.0
     left, count, error, status = start, 0, 0.0, CONVERGED

@@ -11,15 +11,21 @@ from paths import ROOT
 # Every private name that `numba_internals` uses: what it imports, and attributes of that.
 IMPORTED = ("FunctionCache", "IndexDataCacheFile", "ccallback", "Environment", "lookup_environment", "rtsys")
 ATTRIBUTES = ("_load_overload", "_index_key", "_save_data", "CFunc", "_memo", "initialize", "entry_point", "_cache")
+LIBRARIES = (
+    *("JITCodeLibrary", "JITCPUCodegen", "Compiler", "get_call_template", "_optimize_functions"),
+    *("_optimize_final_module", "_finalize_final_module", "_finalize_specific", "_finalize_dynamic_globals"),
+    *("_library_class", "_function_pass_manager", "_pass_builder", "define_pipelines", "compile_extra"),
+)
+ALL = (*IMPORTED, *ATTRIBUTES, *LIBRARIES)
 
 # While `numba_internals` is imported, the modules that it imports from lack the names; and it finds no such attributes.
 PROGRAM = """
 import builtins, sys
-from numba.core import caching, ccallback, environment, runtime
+from numba.core import caching, ccallback, codegen, compiler, environment, runtime
 
 folder, *hidden = sys.argv[1:]
 real, gone = hasattr, []
-for module in (caching, environment, runtime, sys.modules["numba.core"]):
+for module in (caching, codegen, compiler, environment, runtime, sys.modules["numba.core"]):
     gone += [(module, name, vars(module).pop(name)) for name in hidden if name in vars(module)]
 if "ccallback" in hidden:
     sys.modules["numba.core.ccallback"] = None
@@ -105,7 +111,7 @@ def truth(folder: Path, tmp_path_factory: pytest.TempPathFactory) -> str:
 
 
 @pytest.mark.parametrize(
-    "hidden", [*((name,) for name in (*IMPORTED, *ATTRIBUTES)), (*IMPORTED, *ATTRIBUTES)], ids=" ".join
+    "hidden", [*((name,) for name in (*IMPORTED, *ATTRIBUTES)), LIBRARIES[:3], LIBRARIES[3:], ALL], ids=" ".join
 )
 def test_without_a_private_name_the_digits_are_the_same(
     hidden: tuple[str, ...], folder: Path, truth: str, tmp_path: Path
@@ -126,3 +132,45 @@ def test_no_other_file_uses_private_names() -> None:
     assert {
         path.name for path in files for line in path.read_text(encoding="utf-8").splitlines() if private.match(line)
     } == {"numba_internals.py"}
+
+
+COUNTED = """
+import sys
+sys.path.insert(0, sys.argv[1])
+import functions
+print(functions.repeated(2.0).hex(), functions.helper(1.0, 3).hex())
+print(sorted(str(signature) for signature in functions.helper.dispatcher.overloads))
+print({type(each.library).__name__ for each in functions.helper.dispatcher.overloads.values()})
+"""
+
+REPEATED = """
+from numba import types
+from gqm_sym.runtime.compiled import jit
+
+
+@jit.Inner
+def helper(x, power, plain=True):
+    return x**power if plain else -x
+
+
+@jit.entry(types.float64(types.float64))
+def repeated(x):
+    return helper(x, 1) + helper(x, 2) * helper(x, 3, True) - helper(x, 4, False)
+"""
+
+
+def test_a_function_for_compiled_callers_is_compiled_once_and_only_linked(tmp_path: Path) -> None:
+    """Whatever integers its callers pass; Python can call it, and callers are read from the cache without it."""
+    (tmp_path / "functions.py").write_text(REPEATED, encoding="utf-8")
+    numbers = f"{(36.0).hex()} {(1.0).hex()}"
+    versions = "['(float64, int64, bool)', '(float64, int64, omitted(default=True))']"
+    for expected in ([numbers, versions, "{'LinkedLibrary'}"], [numbers, "[]", "set()"]):
+        answer = subprocess.run(
+            [sys.executable, "-c", COUNTED, str(tmp_path)],
+            cwd=ROOT,
+            env={"NUMBA_CACHE_DIR": str(tmp_path / "cache"), "PYTHONPATH": str(ROOT)},
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+        assert answer.stdout.splitlines() == expected
