@@ -50,7 +50,7 @@ def test_the_truth_is_the_truth(degrees, known):
     assert abs(bounce(degrees) - mpf(known)) < 1e-8
 
 
-@pytest.mark.parametrize("degrees", [80, 60, 45, 30, 20, 16, 15, 10, 5, 3])
+@pytest.mark.parametrize("degrees", [80, 60, 45, 30, 20, 16, 15, 10, 5, 3, 2, 1])
 def test_a_field_line_has_mirror_points(degrees, field_line):
     """However far out the mirror points lie, where the potential grows without bounds."""
     a = np.radians(degrees)

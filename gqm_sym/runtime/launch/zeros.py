@@ -30,6 +30,9 @@ OVERFLOW_V2 = 1e100
 # V**2 counts as constant in doubles over a step if its possible change is below this share of the terms it consists of.
 CONSTANT_SHARE = 1e-13
 
+# By what factor the terms of V**2 near a zero may be larger than at it.
+TERMS_GROWTH = 1e3
+
 # ds below this share of its largest value so far, on the narrowest step, is a cusp.
 CUSP_SHARE = 1e-6
 
@@ -121,6 +124,9 @@ def zero_on_step(fns, p, lam0, w0, near, far, size, arrays):  # type: ignore[no-
     point, rows, bounds = arrays
     direction = 1.0 if far > near else -1.0
     root = polish_zero(fns, p, lam0, w0, near, far, arrays)
+    # The terms of V**2 at the zero; at the far end of the step they may be larger without limit, as next to a pole.
+    _value, terms = speed_squared(fns, p, lam0, w0, root, arrays)
+    size = min(size, TERMS_GROWTH * terms)
     # How far rounding may move the zero: if an equilibrium is that close, doubles cannot decide.
     point[0] = lam0 + root
     call_effective_potential(fns.effective_potential, 1, point, p, rows)

@@ -26,7 +26,7 @@ from gqm_sym.runtime.legs.leg_run import point_buffer, slope_of_v2
 from gqm_sym.runtime.legs.polynomials import WIDE
 
 # A swing is small if it is below these shares of the distance of e from 0, and of the range of the polynomial.
-SMALL_SHARE, RANGE_SHARE = 1e-3, 0.1
+SMALL_SHARE, RANGE_SHARE = 0.25, 0.25
 
 # The places at which the force is fitted, as shares of the range; the degree, the size of the last coefficients of a
 # range that is narrow enough, how often it is halved, and how often the fit is moved to where the force vanishes.
