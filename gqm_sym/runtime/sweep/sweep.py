@@ -20,7 +20,7 @@ from gqm_sym.runtime.compiled.strided import PARAMETERS, lay_out, pointers, wide
 from gqm_sym.runtime.compiled.threads import run_in_threads
 from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.interface import Addresses
-from gqm_sym.runtime.launch.formulas import chart_with, shape_of
+from gqm_sym.runtime.launch.formulas import chart_with
 from gqm_sym.runtime.launch.request import CONTACTS, LaunchRequest
 from gqm_sym.runtime.launch.speed import potential_at
 from gqm_sym.runtime.multiprecision.exact_problem import NOWHERE
@@ -46,9 +46,6 @@ ANSWERED_BY_BATCHES = (quantities.HALF_PERIOD, quantities.PERIOD, quantities.TUR
 
 # Which way a track can push along its normal, 0 for both.
 CONTACT_SIDES = {"bilateral": 0, "above": 1, "below": -1}
-
-# From how many launches with the same parameters on a chart is tabulated.
-MIN_TABULATED = 8
 
 # Into how many pieces a curve with formulas is cut at least before it is tabulated, and how often the range of places
 # is doubled to contain all motions.
@@ -254,7 +251,7 @@ class Group(NamedTuple):
 def _groups(
     formulas: "Formulas", columns: list[Array], shape: tuple[int, ...], *, may_lift_off: bool
 ) -> Iterator[tuple[Group, NDArray[np.intp] | None]]:
-    """The launches, grouped by parameters or by the shape of their curve, and which they are; None if all are in one.
+    """The launches, grouped by the shape of their curve, and which they are; None where all are of one shape.
 
     Launches whose curve cannot be made are in no group. Curves with formulas are tabulated if bodies may lift off.
     """
@@ -263,21 +260,15 @@ def _groups(
         table = _tabulated_range(formulas, columns, domain) if may_lift_off else NO_TABLE
         yield Group([*columns[:4], *domain, *columns[4:]], table=table), None
         return
-    mass, p = list(formulas.parameters).index("m"), columns[4:]
-    # A table is worth its time for several launches. Without one, launches need the same shape of the curve only; but
-    # lift-off is found on tables only, and bodies that lose energy are driven with one set of parameters.
-    groups, is_conservative = list(_distinct(p, shape)), formulas.dissipation is None
-    has_tables = is_conservative and (may_lift_off or len(groups) * MIN_TABULATED <= prod(shape))
-    if is_conservative and not has_tables and len(groups) > 1:
-        groups = list(_distinct(list(shape_of(formulas.chart, tuple(p), np.array(1.0))), shape))
-    for values, chosen in groups:
+    mass = list(formulas.parameters).index("m")
+    for values, chosen in _distinct(columns[4:], shape):
         try:
             chart = chart_with(formulas.chart, values)
         except GQMError:
             continue  # `solve` says why
         domain = [np.array(value) for value in (*chart.range, nan, nan, 0.0)]
         some = columns if chosen is None else [_chosen(column, shape, chosen) for column in columns]
-        table = _tabulated(formulas.chart, formulas.addresses, values, mass) if has_tables else NO_TABLE
+        table = NO_TABLE if formulas.dissipation else _tabulated(formulas.chart, formulas.addresses, values, mass)
         yield Group([*some[:4], *domain, *some[4:]], chart.block, chart.breaks, chart.corners, table), chosen
 
 
