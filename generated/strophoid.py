@@ -1,5 +1,5 @@
 # Made by gqm-gen for "strophoid". Do not edit: change its declaration and generate again.
-# interface 9, input 761b603021f8, body bac0beded4a8
+# interface 9, input 761b603021f8, body 539dbcc44d07
 """Bead on the hanging loop of a right strophoid
 
 F              = x**2*(a - z) - z**2*(a + z)
@@ -276,7 +276,7 @@ def equilibria(*, between: Any = None, a: Any = '1.8', g: Any = '9.81', m: Any =
     return MODEL.equilibria((a, g, m), between, unknown)
 
 
-CHART = Traced(field=field.address, start=exact_start, tangent=-1, level=exact_level)
+CHART = Traced(field=field.address, start=exact_start, tangent=-1, level=exact_level, shaped_by=(0,))
 
 
 MODEL = CompiledModel(

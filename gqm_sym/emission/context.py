@@ -35,7 +35,6 @@ class Lowering:
         self.names = Names([self.place.name, *(name for name, _ in model.defaults)])
         self.trigonometric = self._trigonometric()
         order = (*(name for name, _ in model.defaults), *(symbol.name for symbol in self.trigonometric.values()))
-        order = (*order, "_unused") if len(self.trigonometric) == 1 else order
         self.order = {name: i for i, name in enumerate(order)}
 
     def _trigonometric(self) -> dict[Expr, Symbol]:
@@ -56,9 +55,7 @@ class Lowering:
     def trigonometric_values(self) -> tuple[ExactIR, ...]:
         """The function that evaluates them; nothing where there are none."""
         doc = "What stands behind the run-time parameters in compiled functions."
-        # A function of a single value would return no tuple.
-        values = (*self.trigonometric, *((sympy.Integer(0),) if len(self.trigonometric) == 1 else ()))
-        return (self.constants("exact_trigonometric", doc, values),) if values else ()
+        return (self.constants("exact_trigonometric", doc, (*self.trigonometric,)),) if self.trigonometric else ()
 
     def bounds(self) -> FunctionIR:
         """Interval enclosures of the effective potential's slope and of ds."""

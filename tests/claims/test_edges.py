@@ -315,6 +315,20 @@ def test_an_inclination_means_what_its_text_says(alpha: Any, build: Build) -> No
         assert np.isnan(swept.values).all()
 
 
+@pytest.mark.parametrize("tilt", ["pi/6", "1/2", 0.5])
+def test_a_single_sine_of_a_parameter(tilt: Any, build: Build) -> None:
+    """A bead on a ring whose plane is tilted by an angle is a pendulum with g sin(tilt)."""
+    force = gqm.Potential("g*sin(tilt)*z", parameters={"g": "9.81", "tilt": "1/2"})
+    module = build("tilted_ring", gqm.families.circle(L=1), force)
+    plain = build("plain_ring", gqm.families.circle(L=1), gqm.Gravity())
+    with mp.workdps(30):
+        ratio = mp.sqrt(mp.sin(read_number(tilt, where="tilt").at(mp)))
+        wanted = float(mpf(plain.solve("6/5").period_to(25)) / ratio)
+    assert module.solve("6/5", tilt=tilt).period == wanted
+    swept = module.sweep("period", [1.2, 1.2], tilt=[float(read_number(tilt, where="tilt").value)] * 2)
+    assert swept.values == pytest.approx(wanted, rel=1e-15)
+
+
 @pytest.mark.parametrize("alpha", ANGLES)
 def test_an_inclination_means_the_same_to_friction(alpha: Any, build: Build) -> None:
     """On a level line friction alone stops a body, and the way up an incline has a closed form."""

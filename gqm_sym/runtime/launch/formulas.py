@@ -202,6 +202,11 @@ class Formulas:
         p.values = np.array([*(number.value for number in out), *self.trigonometric_values(out)])
         return p
 
+    def trigonometric_over(self, operations: Any, p: tuple[Any, ...]) -> tuple[Any, ...]:
+        """Sines, cosines and tangents of the run-time parameters, over a namespace of operations."""
+        values = () if self.trigonometric is None else self.trigonometric(operations, p)
+        return values if isinstance(values, tuple) else (values,)
+
     def trigonometric_values(self, numbers: Sequence[Number]) -> tuple[float, ...]:
         """Sines, cosines and tangents of the run-time parameters, as doubles; of multiples of pi they are exact.
 
@@ -210,12 +215,12 @@ class Formulas:
         if self.trigonometric is None:
             return ()
         if all(number.fraction is not None for number in numbers):
-            return tuple(map(float, self.trigonometric(FLOATS, tuple(number.value for number in numbers))))
+            return tuple(map(float, self.trigonometric_over(FLOATS, tuple(number.value for number in numbers))))
         from mpmath import MPContext
 
         context = MPContext()
         context.prec = EXACT_BITS + 64
-        values = self.trigonometric(context, tuple(number.at(context) for number in numbers))
+        values = self.trigonometric_over(context, tuple(number.at(context) for number in numbers))
         return tuple(0.0 if abs(value) < context.mpf(2) ** -EXACT_BITS else float(value) for value in values)
 
     def _check_lower_limits(self, values: dict[str, Number]) -> None:

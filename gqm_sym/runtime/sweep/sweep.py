@@ -193,7 +193,7 @@ def _trigonometric_columns(formulas: "Formulas", given: tuple[Any, ...], p: list
     if all(column.shape == () for column in p):
         yield from map(np.array, formulas.trigonometric_values(formulas.numbers(given)))
         return
-    yield from map(np.asarray, formulas.trigonometric(ARRAYS, tuple(p)))
+    yield from map(np.asarray, formulas.trigonometric_over(ARRAYS, tuple(p)))
 
 
 def _domain_columns(formulas: "Formulas", p: list[Array]) -> Iterator[Array]:
