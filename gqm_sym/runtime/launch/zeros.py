@@ -30,7 +30,7 @@ OVERFLOW_V2 = 1e100
 # V**2 counts as constant in doubles over a step if its possible change is below this share of the terms it consists of.
 CONSTANT_SHARE = 1e-13
 
-# By what factor the terms of V**2 near a zero may be larger than at it.
+# By what factor the terms of V**2 on a step may be larger than at the zero on it and before.
 TERMS_GROWTH = 1e3
 
 # ds below this share of its largest value so far, on the narrowest step, is a cusp.
@@ -116,17 +116,20 @@ def polish_zero(fns, p, lam0, w0, lo, hi, arrays):  # type: ignore[no-untyped-de
 
 
 @Inner
-def zero_on_step(fns, p, lam0, w0, near, far, size, arrays):  # type: ignore[no-untyped-def]
+def zero_on_step(fns, p, lam0, w0, near, far, sizes, arrays):  # type: ignore[no-untyped-def]
     """The zero of V**2 on a step on which it falls throughout: TURN, or CRITICAL next to an equilibrium.
 
-    ``near`` and ``far`` are the signed offsets of the ends of the step, and ``size`` that of the terms of V**2.
+    ``near`` and ``far`` are the signed offsets of the ends of the step, and ``sizes`` those of the terms of V**2 up to
+    the end of the step, and up to its beginning.
     """
     point, rows, bounds = arrays
     direction = 1.0 if far > near else -1.0
     root = polish_zero(fns, p, lam0, w0, near, far, arrays)
-    # The terms of V**2 at the zero; at the far end of the step they may be larger without limit, as next to a pole.
-    _value, terms = speed_squared(fns, p, lam0, w0, root, arrays)
-    size = min(size, TERMS_GROWTH * terms)
+    # At the far end of the step the terms of V**2 may be larger without limit, as next to a pole. At the zero itself
+    # they may all vanish, so those before it count too.
+    terms = max(sizes[1], speed_squared(fns, p, lam0, w0, root, arrays)[1])
+    terms = max(terms, speed_squared(fns, p, lam0, w0, 0.5 * (near + root), arrays)[1])
+    size = min(sizes[0], TERMS_GROWTH * terms)
     # How far rounding may move the zero: if an equilibrium is that close, doubles cannot decide.
     point[0] = lam0 + root
     call_effective_potential(fns.effective_potential, 1, point, p, rows)
@@ -175,7 +178,7 @@ def first_zero(fns, p, lam0, w0, direction, begin, length, step):  # type: ignor
     near, v2_near = begin, w0
     if begin > 0.0:
         v2_near, _size = speed_squared(fns, p, lam0, w0, direction * begin, arrays)
-    widest_ds, size = 0.0, w0
+    widest_ds, size, passed = 0.0, w0, w0
     for _ in range(MAX_STEPS):
         if near >= length:
             return FoundEnd(LIMIT, direction * length, direction * length)
@@ -208,12 +211,12 @@ def first_zero(fns, p, lam0, w0, direction, begin, length, step):  # type: ignor
         positive = 1
         if not lower >= 0.0:
             if upper <= 0.0 and v2_far <= 0.0:
-                return zero_on_step(fns, p, lam0, w0, direction * near, direction * far, size, arrays)
+                return zero_on_step(fns, p, lam0, w0, direction * near, direction * far, (size, passed), arrays)
             positive = stays_positive(lower, upper, width, narrow, v2_near, v2_far, size)
         if positive < 0:
             return FoundEnd(CRITICAL, direction * near, direction * far)
         if positive:
-            near, v2_near = far, v2_far
+            near, v2_near, passed = far, v2_far, max(passed, terms)
             step = 2.0 * width
         else:
             step = 0.5 * width

@@ -29,6 +29,7 @@ class Ring:
 
     pieces: int = 9
     closed: bool = True
+    shaped_by: tuple[int, ...] = (0,)
 
     def chart(self, p: tuple[float, ...]) -> Chart:
         """The chart; its radius is the first run-time parameter."""
