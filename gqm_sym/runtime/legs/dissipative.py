@@ -80,6 +80,9 @@ MIN_EXTENSION = 1.25
 # How many panels a record has space for at first; a leg with more is followed again with a larger record.
 FEW_PANELS = 12
 
+# A change of the contact force's sign this many roundings from the end of a piece is there.
+END_ROUNDINGS = 8.0
+
 # A swing about an equilibrium has died away when it is below this share of the last digit of its place, or so small
 # that V**2 and the errors of it come to the end of the range of doubles.
 LAST_DIGIT, LEAST_SWING = ULP / 64.0, 1e-110
@@ -504,10 +507,12 @@ class DissipativeMotion(Motion):
 
     def _add(self, segment: Segment, sense: int, run: Run, end: str) -> None:
         """Append a segment to the motion, cut where N changes its sign."""
-        if not end and segment.b in run.changes:  # up to there time is counted from the turn
-            end = "contact-sign"
         low, high = sorted((segment.a, segment.b))
-        cuts = [segment.phase_angle_of(*segment.offsets(place)) for place in run.changes if low < place < high]
+        stop, rounding = (segment.b if sense > 0 else segment.a), END_ROUNDINGS * ULP * max(abs(low), abs(high))
+        inside = [place for place in run.changes if low < place < high and abs(place - stop) > rounding]
+        if not end and any(abs(place - stop) <= rounding for place in run.changes):
+            end = "contact-sign"
+        cuts = [segment.phase_angle_of(*segment.offsets(place)) for place in inside]
         times = segment.times(np.array(cuts)) if cuts else ()
         marks = [(ZERO, 0.0), *(((float(r), 0.0), phi) for r, phi in zip(times, cuts, strict=True))]
         marks.append(((segment.duration, 0.0), segment.stop))

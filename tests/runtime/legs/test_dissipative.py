@@ -10,6 +10,7 @@ import pytest
 from mpmath import mp, mpf
 
 import generated.circle_coulomb
+import generated.circle_droplet
 import gqm_sym as gqm
 from gqm_sym.errors import InputError, LaunchError, SolutionError
 from gqm_sym.runtime.legs import answers, leg_record, leg_run
@@ -291,3 +292,21 @@ def test_where_the_contact_force_changes_sign_on_a_ring(lam0: float, v0: float) 
     assert event.lam == pytest.approx(float(place), rel=2e-15)
     assert event.t == pytest.approx(float(time), rel=1e-14)
     assert float(motion.state(event.t).lam) == pytest.approx(float(place), rel=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("lam0", "v0", "direction", "given"),
+    [
+        (-2.0291116600710657, 0.6709674081797035, -1, {"gamma": 0.07927237116812622, "m": 4.717807289149854e-06}),
+        (-0.7386383579964759, 2.0805894804934875, 1, {}),
+        (-1.2150320125272465, 0.6091206453020498, 1, {"gamma": 0.06250398026312583, "m": 4.414315099269242e-06}),
+    ],
+)
+def test_each_change_of_contact_is_an_event(lam0: float, v0: float, direction: int, given: dict[str, float]) -> None:
+    """On many rounds of a droplet some changes were lost that are within a rounding of where a run of panels ends."""
+    motion = generated.circle_droplet.solve(lam0, v0, direction, **given)
+    end = min(motion.t_end, 16.0)
+    times = np.array([0.0, *(event.t for event in motion.events_between(0, end) if event.kind == "contact-sign")])
+    force = motion.state(0.5 * (times[:-1] + times[1:])).normal_force
+    assert len(times) > 20
+    assert np.all(force[:-1] * force[1:] < 0.0)
