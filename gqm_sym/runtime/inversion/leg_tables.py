@@ -17,18 +17,15 @@ PANELS              a row for each panel: edge, half width, arc length there, an
 =================== ========================================================================================
 """
 
-from math import fabs
-
 import numpy as np
 from numba import types
 
 from gqm_sym.runtime.arithmetic.clenshaw import legendre_sum
-from gqm_sym.runtime.arithmetic.doubledouble import ULP
 from gqm_sym.runtime.compiled.calls import call_path_and_contact_force
 from gqm_sym.runtime.compiled.intrinsics import choose, fma
 from gqm_sym.runtime.compiled.jit import Inlined, Inner, entry
 from gqm_sym.runtime.compiled.types import MATRIX, VECTOR
-from gqm_sym.runtime.inversion.records import section
+from gqm_sym.runtime.inversion.records import error_of_place, section
 from gqm_sym.runtime.inversion.table import LAST, TERMS
 
 FUNCTION, LAUNCH, SLOTS, INTERVALS, STATES, PANELS = range(6)
@@ -134,11 +131,9 @@ def find_states(record, p, t, out, begin, end):  # type: ignore[no-untyped-def]
         frame = rows[2 * n : 7 * n].reshape((5, n))
         call_path_and_contact_force(address, n, rows, rows[n:], p, frame)
         for i in range(n):
-            ds, place, j = frame[2, i], rows[i], start + i
-            rate_of_place = choose(ds > 0.0, fabs(out[4, j]) / ds, 0.0)
-            rounding = ULP * (1.5 * fabs(out[0, j] - place) + 2.0 * fabs(place))
+            j, time_error, place_error = start + i, rows[7 * n + i], rows[8 * n + i]
             out[2, j], out[3, j], out[6, j], out[7, j] = frame[0, i], frame[1, i], frame[3, i], frame[4, i]
-            out[8, j] = rate_of_place * rows[7 * n + i] + rows[8 * n + i] + rounding
+            out[8, j] = error_of_place(out[0, j], rows[i], out[4, j], frame[2, i], time_error, place_error)
 
 
 @entry(types.void(VECTOR, VECTOR, VECTOR, types.int64, types.int64), nogil=True)

@@ -29,7 +29,7 @@ from numba import types
 from gqm_sym.runtime.arithmetic.doubledouble import ULP, two_sum
 from gqm_sym.runtime.compiled.calls import call_path_and_contact_force
 from gqm_sym.runtime.compiled.intrinsics import choose, fma, nearest_whole
-from gqm_sym.runtime.compiled.jit import Inner, entry
+from gqm_sym.runtime.compiled.jit import Inlined, Inner, entry
 from gqm_sym.runtime.compiled.streaming import put
 from gqm_sym.runtime.compiled.types import MATRIX, VECTOR, Array
 from gqm_sym.runtime.interface import Addresses
@@ -179,6 +179,13 @@ def find_places(record, t, out, begin, end):  # type: ignore[no-untyped-def]
             out[start + i] = launch if t[start + i] == 0.0 else place
 
 
+@Inlined
+def error_of_place(lam, in_lap, v, ds, time_error, table_error):  # type: ignore[no-untyped-def]
+    """The bound on the error of a curve parameter, from those of the time and of the table, and from its rounding."""
+    rate = choose(ds > 0.0, fabs(v) / ds, 0.0)
+    return rate * time_error + table_error + ULP * (1.5 * fabs(lam - in_lap) + 2.0 * fabs(in_lap))
+
+
 @Inner
 def find_states(record, p, t, out, begin, end):  # type: ignore[no-untyped-def]
     """Fill ``out`` with states at the times from the index ``begin`` to ``end``.
@@ -234,11 +241,8 @@ def find_states(record, p, t, out, begin, end):  # type: ignore[no-untyped-def]
             v2[i], arc[i] = v[i] * v[i], choose(launched, s0, s + s0)
         call_path_and_contact_force(fns.path_and_contact_force, n, reduced, v2, p, frame)
         for i in range(n):
-            ds = frame[2, i]
-            rate = choose(ds > 0.0, fabs(v[i]) / ds, 0.0)
-            rounding = ULP * (1.5 * fabs(lam[i] - reduced[i]) + 2.0 * fabs(reduced[i]))
-            error = rate * (time_error + drift * fabs(block[i]) + time_errors[panels[i]])
-            spare[0, i] = error + table_errors[segments[i]] + rounding
+            of_time = time_error + drift * fabs(block[i]) + time_errors[panels[i]]
+            spare[0, i] = error_of_place(lam[i], reduced[i], v[i], frame[2, i], of_time, table_errors[segments[i]])
         found = (arc, frame[0], frame[1], v, v2, frame[3], frame[4], spare[0])
         for k in range(8):
             put(out[k + 1], start, found[k], 0, n, False)

@@ -1,5 +1,6 @@
 """Motions with friction, drag or resistance: leg after leg, each computed when it is needed."""
 
+from collections.abc import Iterable
 from itertools import pairwise
 from math import inf, isfinite, isnan, nan
 from typing import Any, NamedTuple
@@ -508,10 +509,17 @@ class DissipativeMotion(Motion):
     def _add(self, segment: Segment, sense: int, run: Run, end: str) -> None:
         """Append a segment to the motion, cut where N changes its sign."""
         low, high = sorted((segment.a, segment.b))
-        stop, rounding = (segment.b if sense > 0 else segment.a), END_ROUNDINGS * ULP * max(abs(low), abs(high))
-        inside = [place for place in run.changes if low < place < high and abs(place - stop) > rounding]
-        if not end and any(abs(place - stop) <= rounding for place in run.changes):
-            end = "contact-sign"
+        rounding = END_ROUNDINGS * ULP * max(abs(low), abs(high))
+
+        def without(changes: Iterable[float], place: float) -> list[float]:
+            return [change for change in changes if abs(change - place) > rounding]
+
+        # A change in the middle of a run ends the part before it, and is none of the part behind.
+        changes = without(run.changes, segment.b) if sense < 0 and run.ahead else list(run.changes)
+        if not end:
+            found, changes = len(changes), without(changes, segment.b if sense > 0 else segment.a)
+            end = "contact-sign" if len(changes) < found else ""
+        inside = [place for place in changes if low < place < high]
         cuts = [segment.phase_angle_of(*segment.offsets(place)) for place in inside]
         times = segment.times(np.array(cuts)) if cuts else ()
         marks = [(ZERO, 0.0), *(((float(r), 0.0), phi) for r, phi in zip(times, cuts, strict=True))]
