@@ -1,6 +1,7 @@
 """Motions with friction, drag or resistance: leg after leg, each computed when it is needed."""
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
+from contextlib import suppress
 from itertools import pairwise
 from math import inf, isfinite, isnan, nan
 from typing import Any, NamedTuple
@@ -75,8 +76,9 @@ from gqm_sym.runtime.multiprecision.exact_problem import NOWHERE
 # The most segments that are stored; each takes some kilobytes.
 MAX_SEGMENTS = 250_000
 
-# The ratio of pieces from which on the record that compiled code reads is made anew for later times.
-MIN_EXTENSION = 1.25
+# When the record that compiled code reads is made anew for later times, it has this many times the pieces, so that many
+# questions one after the other do not copy it for each leg.
+EXTENSION = 1.25
 
 # How many panels a record has space for at first; a leg with more is followed again with a larger record.
 FEW_PANELS = 12
@@ -149,7 +151,7 @@ class DissipativeMotion(Motion):
 
     Each leg begins with V**2 = 0 at a turning point, so that its accuracy does not depend on the legs before it; times
     are summed as two doubles. Legs are computed when they are needed. Without ``t_max``, `legs` and `events` of a
-    motion that never ends cover what has been computed so far, and at least the first leg.
+    motion that never ends are those of its beginning, up to its first turn, whatever else has been computed.
     """
 
     _ending = ""
@@ -158,6 +160,8 @@ class DissipativeMotion(Motion):
     _arc = 0.0
     _whole: Trajectory | None = None
     _reading = Reading(np.empty(0), -1.0)
+    # How many runs `_look_ahead` computes of a motion that it finds no end of; 0 while that is not known.
+    _beginning = 0
 
     def __init__(self, problem: Problem) -> None:
         self._runs: list[Run] = []
@@ -193,7 +197,7 @@ class DissipativeMotion(Motion):
     @property
     @locked
     def turning_points(self) -> tuple[float, ...]:
-        """The turning points so far in the order of time; the place of a launch from rest is one."""
+        """The turning points on `legs` in the order of time; the place of a launch from rest is one."""
         turns = [leg.lam_end for leg in self.legs if leg.end == "turn"]
         return (*((self.problem.lam0,) if self.problem.w0 == 0.0 else ()), *turns)
 
@@ -202,11 +206,13 @@ class DissipativeMotion(Motion):
     def legs(self) -> tuple[Leg, ...]:
         """The legs of the motion in the order of time; see `Motion.legs`."""
         self._look_ahead()
-        runs = [*self._laid, *self._runs]
+        everything = [*self._laid, *self._runs]
+        runs = everything[: self._beginning or None]
         cuts_at_changes = "contact-sign" not in self._internal_ends
         if self._joints.corners.size or (cuts_at_changes and any(run.record[CHANGE_COUNT] for run in runs)):
             return super().legs
-        lap, stops = self.problem.period, [*(float(run.record[BEGIN]) for run in runs[1:]), self._elapsed]
+        begins = [*(float(run.record[BEGIN]) for run in everything), self._elapsed]
+        lap, stops = self.problem.period, begins[1 : len(runs) + 1]
         legs = [run.leg(lap, stop) for run, stop in zip(runs, stops, strict=True)]
         return Rows(self._up_to_horizon(merged(legs, self._internal_ends)))
 
@@ -218,48 +224,89 @@ class DissipativeMotion(Motion):
     def lam(self, t: Any) -> Any:
         """The curve parameter at times; see `Motion.lam`. For doubles this is one call of compiled code."""
         times = _plain_times(t)
-        record = None if times is None else self._record_for(times[1], times[2])
-        if times is None or record is None:
+        if times is None or not 0.0 <= times[1] <= times[2] < inf:
             return super().lam(t)
-        flat, out = times[0], np.empty_like(times[0])
-        run_in_threads(
-            lambda part: places_along_legs(record, flat, out, part.start, part.stop), flat.size, MIN_PLACES_PER_THREAD
-        )
+        out = self._read(*times, 1, self._read_places, super().lam)[0]
         return out.reshape(t.shape) if np.ndim(t) else float(out[0])
 
     def state(self, t: Any) -> State:
         """The state of the body at times; see `Motion.state`. For doubles this is one call of compiled code."""
         times = _plain_times(t)
-        record = None if times is None else self._record_for(times[1], times[2])
-        if times is None or record is None:
+        if times is None or not 0.0 <= times[1] <= times[2] < inf:
             return super().state(t)
-        p, flat, out = self.problem.functions.p, times[0], np.empty((STATE_ROWS, times[0].size))
+        out = self._read(*times, STATE_ROWS, self._read_states, lambda later: np.array(Motion.state(self, later)[1:]))
+        return State(t, *out.reshape(-1, *t.shape)) if np.ndim(t) else State(float(times[0][0]), *out[:, 0].tolist())
+
+    def error_bound(self, t: Any) -> Any:
+        """A bound of the error of ``lam(t)``; see `Motion.error_bound`. For doubles it is that of `state`."""
+        times = _plain_times(t)
+        if times is None or not 0.0 <= times[1] <= times[2] < inf:
+            return super().error_bound(t)
+        return self.state(t).error
+
+    def _read(
+        self,
+        times: Array,
+        _: float,
+        greatest: float,
+        rows: int,
+        by_record: Callable[[Array, Array, Array], None],
+        by_segments: Callable[[Array], Array],
+    ) -> Array:
+        """Rows of numbers at times, from the record that compiled code reads as far as it goes."""
+        record, until = self._reading_up_to(greatest)
+        out = np.empty((rows, times.size))
+        if greatest <= until:
+            by_record(record, times, out)
+            return out
+        within = times <= until
+        part = np.empty((rows, np.count_nonzero(within)))
+        by_record(record, times[within], part)
+        out[:, within], out[:, ~within] = part, by_segments(times[~within])
+        return out
+
+    def _read_places(self, record: Array, times: Array, out: Array) -> None:
         run_in_threads(
-            lambda part: states_along_legs(record, p, flat, out, part.start, part.stop),
-            flat.size,
+            lambda part: places_along_legs(record, times, out[0], part.start, part.stop),
+            times.size,
+            MIN_PLACES_PER_THREAD,
+        )
+
+    def _read_states(self, record: Array, times: Array, out: Array) -> None:
+        p = self.problem.functions.p
+        run_in_threads(
+            lambda part: states_along_legs(record, p, times, out, part.start, part.stop),
+            times.size,
             MIN_STATES_PER_THREAD,
         )
-        return State(t, *out.reshape(-1, *t.shape)) if np.ndim(t) else State(float(flat[0]), *out[:, 0].tolist())
 
-    def _record_for(self, least: float, greatest: float) -> Array | None:
-        """What compiled code reads of times between two; None if it cannot."""
-        record, until = self._reading
-        if least >= 0.0 and greatest <= until:
-            return record
-        return self._extended(greatest) if least >= 0.0 and greatest < inf else None
+    def _reading_up_to(self, t: float) -> Reading:
+        """What compiled code reads of the motion up to a time, or up to an approach to an equilibrium before it."""
+        reading = self._reading
+        return reading if t <= reading.until else self._extended(t)
 
     @locked
-    def _extended(self, t: float) -> Array | None:
-        """The record of all that has been computed up to a time at least, if enough is new; else None."""
+    def _extended(self, t: float) -> Reading:
+        """`_reading_up_to`, once the motion is followed so far."""
         self._check_end(t)
-        pieces, done = self._pieces, len(self._tabulated)
-        if self._ending == "asymptote" or len(pieces) < MIN_EXTENSION * done:
-            return None
-        lap, errors = self.problem.period, self._errors_before
-        self._tabulated += [tabulated(timed, lap, errors) for timed in pieces[done:]]
-        record = leg_record(self.problem, self.direction * self.problem.launch.v0.value, self._tabulated)
-        self._reading = Reading(record, min(self._known_end(), pieces[-1].t_stop[0]))
-        return record
+        if t <= self._reading.until:  # another thread has followed it
+            return self._reading
+        self._follow_amply()
+        done = len(self._tabulated)
+        ahead = [timed for timed in self._pieces[done:] if timed.segment.v2 is None]
+        if ahead:
+            lap, errors = self.problem.period, self._errors_before
+            self._tabulated += [tabulated(timed, lap, errors) for timed in ahead]
+            record = leg_record(self.problem, self.direction * self.problem.launch.v0.value, self._tabulated)
+            self._reading = Reading(record, min(self._known_end(), ahead[-1].t_stop[0]))
+        return self._reading
+
+    def _follow_amply(self) -> None:
+        """Follow the motion until there are enough new pieces for another record, or as far as it can be followed."""
+        enough = EXTENSION * len(self._tabulated)
+        with suppress(SolutionError, BudgetError):  # it is raised when that is asked for
+            while len(self._pieces) < enough and not self._ending and self._elapsed < self._horizon:
+                self._go_on()
 
     def fill_launch_leg(self, places: Array, v2: Array) -> None:
         """Fill in V**2 at the places that lie on the launch leg."""
@@ -315,7 +362,8 @@ class DissipativeMotion(Motion):
 
     def _history(self) -> tuple[TimedSegment, ...]:
         self._look_ahead()
-        return self._trajectory(0.0).segments
+        segments = self._trajectory(0.0).segments
+        return tuple(timed for timed in segments if timed.leg < self._beginning) if self._beginning else segments
 
     def _contact_changes(self, piece: TimedSegment) -> list[tuple[Pair, float]]:
         return []  # segments end there
@@ -398,11 +446,14 @@ class DissipativeMotion(Motion):
         """Compute the whole motion if it ends, and at least its first leg if it does not."""
         if isfinite(self._horizon):
             self._follow(self._horizon)
-            return
-        while not self._ending and self._at[PAUSES] < MAX_PAUSES:
-            if self._at[TURNS] and (not self._at[MAY_REST] or self._at[TURNS] > MAX_TURNS):
-                return
+        while not self._ending and not self._beginning and self._elapsed < self._horizon:
             self._go_on()
+
+    @property
+    def _goes_on_for_ever(self) -> bool:
+        """Whether the body has done so much that an end of the motion is not looked for any further."""
+        turns, pauses = self._at[TURNS], self._at[PAUSES]
+        return bool(pauses >= MAX_PAUSES or turns > MAX_TURNS or (turns and not self._at[MAY_REST]))
 
     @property
     def _pieces(self) -> list[TimedSegment]:
@@ -449,6 +500,8 @@ class DissipativeMotion(Motion):
         self._runs.append(Run(record, what, name, frame))
         if self._at[ENDING]:
             self._ending = name
+        if not self._beginning and not isfinite(self._horizon) and not self._ending and self._goes_on_for_ever:
+            self._beginning = len(self._laid) + len(self._runs)
         if what == BEYOND:
             raise SolutionError(
                 f"the motion leaves the range of doubles at {problem.formulas.parameter} = {self._at[PLACE]!r}; "
