@@ -37,6 +37,12 @@ _POWERS = np.array([np.pad(cheb2poly(row[: k + 1]), (0, TERMS - 1 - k)) for k, r
 # Coefficients after the last one above this share of the largest value are rounding noise, and are set to zero.
 MAX_NOISE_RATIO = 2e-16
 
+# How far from a corner, in units in the last place, a place is the corner: places of points are rounded.
+CORNER_ROUNDINGS = 4.0
+
+# How far from a corner its two tangents are read, as a share of the curve's length.
+_BESIDE_CORNER = 2.0**-40
+
 # Places on each piece among which the search for the nearest point begins.
 _SAMPLES = 8
 
@@ -120,6 +126,16 @@ class Chart:
         rows: Array = _read(self.block, np.ascontiguousarray(s, dtype=np.float64).reshape(-1))
         return rows
 
+    @property
+    def bends(self) -> Array:
+        """Return the sign of the tangent's turn at each corner: 1 where the curve bends to the left."""
+        if not self.corners.size:
+            return self.corners
+        off = _BESIDE_CORNER * (self.high - self.low)
+        before, after = self.points(np.append(self.corners - off, self.corners + off))[2].reshape(2, -1)
+        signs: Array = np.sign(after - before)
+        return signs
+
     def nearest(self, x: float, z: float) -> tuple[float, float]:
         """Return the arc length of the point of the curve nearest to (x, z), and the distance to it."""
         edges = self.edges
@@ -143,6 +159,9 @@ class Chart:
             place = new
         if self.period:
             place -= self.period * np.floor((place - self.low) / self.period)
+        for corner in self.corners:
+            if abs(corner - place) <= CORNER_ROUNDINGS * np.spacing(max(abs(place), abs(x), abs(z))):
+                place = float(corner)
         row = self.points([place])[:, 0]
         return float(place), float(np.hypot(row[0] - x, row[1] - z))
 

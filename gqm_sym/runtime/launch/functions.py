@@ -24,6 +24,8 @@ class BoundFunctions(NamedTuple):
         The places at which the curve is not smooth, and those at which its tangent jumps, within one period.
     period : float
         The period of a closed curve in units of its parameter, 0 otherwise.
+    bends : array
+        The sign of the tangent's turn at each corner: 1 where the curve bends to the left.
     """
 
     addresses: Addresses
@@ -32,6 +34,11 @@ class BoundFunctions(NamedTuple):
     breaks: Array = NOWHERE
     corners: Array = NOWHERE
     period: float = 0.0
+    bends: Array = NOWHERE
+
+    def drops(self, only_sign: int) -> Array:
+        """The corners at which a moving body leaves a track that can only push with one sign of N (0: with both)."""
+        return self.corners[self.bends * only_sign < 0.0]
 
     def between(self, places: Array, a: float, b: float) -> Array:
         """The places that lie strictly between a and b; on a closed curve they are repeated with the period."""

@@ -24,8 +24,7 @@ def bind(formulas: Formulas, p: ParameterValues, launch: Launch) -> BoundFunctio
     bound = bind_all(formulas, p)
     if formulas.exact is None:
         return bound
-    addresses, values, _, breaks, corners, period = bound
-    return BoundFunctions(addresses, values, exact_problem(formulas, p, launch), breaks, corners, period)
+    return bound._replace(exact=exact_problem(formulas, p, launch))
 
 
 def bind_all(formulas: Formulas, p: ParameterValues) -> BoundFunctions:
@@ -35,7 +34,8 @@ def bind_all(formulas: Formulas, p: ParameterValues) -> BoundFunctions:
         if formulas.chart is not None:
             chart = formulas.charted(p)
             block = np.concatenate([p.values, chart.block])
-            p.functions = BoundFunctions(formulas.addresses, block, None, chart.breaks, chart.corners, chart.period)
+            shape = (chart.breaks, chart.corners, chart.period, chart.bends)
+            p.functions = BoundFunctions(formulas.addresses, block, None, *shape)
     bound: BoundFunctions = p.functions
     return bound
 

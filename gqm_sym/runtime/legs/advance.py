@@ -109,12 +109,15 @@ class Joints(NamedTuple):
     ----------
     breaks, corners : arrays
         All such places, and those at which the tangent jumps, within one lap.
+    drops : array
+        The corners at which a body that moves leaves the track, which can only push (`BoundFunctions.drops`).
     ahead : array
         A buffer for the breaks ahead of a body; `room_ahead` says how long it must be.
     """
 
     breaks: Array
     corners: Array
+    drops: Array
     ahead: Array
 
 
@@ -124,9 +127,9 @@ def room_ahead(breaks: int) -> int:
 
 
 @Inner
-def breaks_before(joints, period, direction, begin, limit):  # type: ignore[no-untyped-def]
+def breaks_before(breaks, ahead, period, direction, begin, limit):  # type: ignore[no-untyped-def]
     """The breaks strictly between two places, in the order in which they are passed from ``begin`` on."""
-    breaks, ahead, count = joints.breaks, joints.ahead, 0
+    count = 0
     low, high = min(begin, limit), max(begin, limit)
     first, last = 0, 0
     if period > 0.0 and breaks.size > 0:
@@ -239,8 +242,11 @@ def next_leg(dissipation, p, joints, body, keeps_panels, record):  # type: ignor
     place, direction, period = body[PLACE], int(body[DIRECTION]), body[PERIOD]
     end = body[HIGH] if direction > 0 else body[LOW]
     limit = place + direction * LAPS_AHEAD * period if period > 0.0 else end
-    # Breaks a little behind show on which piece of the curve the body is.
-    breaks = breaks_before(joints, period, direction, place - direction * body[FIRST_STEP], limit)
+    drops = breaks_before(joints.drops, joints.ahead, period, direction, place, limit)
+    limit = drops[0] if drops.size else limit
+    # Breaks a little behind show on which piece of the curve the body is, and one at the limit where that piece ends.
+    begin, beyond = place - direction * body[FIRST_STEP], direction * clearance(place, limit)
+    breaks = breaks_before(joints.breaks, joints.ahead, period, direction, begin, limit + beyond)
     record[START], record[START_LOW], record[LAPS_BEFORE] = place, body[PLACE_LOW], body[LAPS]
     record[START_V2] = body[V2]
     record[HEADING], record[BEGIN], record[BEGIN_LOW] = direction, body[ELAPSED], body[ELAPSED_LOW]
@@ -296,6 +302,8 @@ def advance(dissipation, p, joints, body, keeps_panels, record):  # type: ignore
     """
     found, period = next_leg(dissipation, p, joints, body, keeps_panels, record), body[PERIOD]
     what, ahead, back, place = found.what, record[AHEAD] > 0.0, record[BACK] > 0.0, record[END]
+    if what == LIMIT and is_break(joints.drops, period, place):
+        what = LIFTOFF
     if what == FULL or body[ENDING] == AT_ONCE:
         return AT_ONCE if body[ENDING] == AT_ONCE else FULL
     if what == LIMIT and not ahead:

@@ -1,6 +1,6 @@
 """Bodies driven along the curve by compiled code: one leg of one body, or one number for the motion of each of many."""
 
-from math import inf, isfinite
+from math import inf, isfinite, sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -31,7 +31,7 @@ from gqm_sym.runtime.legs.body import (
 )
 from gqm_sym.runtime.legs.leg_equation import Forces
 from gqm_sym.runtime.legs.leg_reading import passage, peak_of_leg
-from gqm_sym.runtime.legs.leg_record import BEGIN, BEGIN_LOW, LAPS_BEFORE
+from gqm_sym.runtime.legs.leg_record import BEGIN, BEGIN_LOW, LAPS_BEFORE, START_V2
 from gqm_sym.runtime.legs.leg_run import ASYMPTOTE, FULL, SPENT, point_buffer, slope_of_v2
 
 # What is asked of each body; LEG is to advance by one leg.
@@ -49,7 +49,7 @@ MAX_TURNS = 20000
 # The most legs of one body.
 MAX_LEGS = 250_000
 
-JOINTS = types.NamedUniTuple(VECTOR, 3, Joints)
+JOINTS = types.NamedUniTuple(VECTOR, 4, Joints)
 
 
 class Sight(NamedTuple):
@@ -87,6 +87,8 @@ def seen_on_leg(body, question, sight, record):  # type: ignore[no-untyped-def]
     if question == ARRIVAL and body[ENDING] != AT_ONCE:
         spent = passage(record, body[TARGET] - record[LAPS_BEFORE] * body[PERIOD])
         return Sight(begin + (low + spent), sight.peak)
+    if body[ENDING] == AT_ONCE and question in (LEAST_SPEED, MOST_SPEED):
+        return Sight(sight.arrival, sqrt(record[START_V2]) * (1.0 if question == MOST_SPEED else -1.0))
     if question >= LEAST_SPEED:
         until = 0.0 if body[ENDING] == AT_ONCE else (body[HORIZON] - begin) - low
         asked = (question >= LEAST_LOAD, 1.0 if question in (MOST_SPEED, MOST_LOAD) else -1.0)
@@ -128,7 +130,7 @@ def conclude(body, question, sight):  # type: ignore[no-untyped-def]
         return (body[PLACE] + body[LAPS] * body[PERIOD], FOUND) if rests else (np.nan, NONE)
     if body[ENDING] == ASYMPTOTE:
         return np.nan, LEFT
-    return sight.peak if question in (MOST_SPEED, MOST_LOAD) else -sight.peak, FOUND
+    return sight.peak if question in (MOST_SPEED, MOST_LOAD) else 0.0 - sight.peak, FOUND
 
 
 @Inner
@@ -177,7 +179,8 @@ def drive(dissipation, parameters, joints, question, bodies, record):  # type: i
     int
         What became of the last body on its leg (`advance`).
     """
-    joints = Joints(uncounted(joints.breaks), uncounted(joints.corners), uncounted(joints.ahead))
+    breaks, corners, drops = uncounted(joints.breaks), uncounted(joints.corners), uncounted(joints.drops)
+    joints = Joints(breaks, corners, drops, uncounted(joints.ahead))
     parameters, bodies, record, what = uncounted(parameters), uncounted(bodies), uncounted(record), RESTS
     for k in range(bodies.shape[0]):
         p, body = parameters[k if parameters.shape[0] > 1 else 0], bodies[k]

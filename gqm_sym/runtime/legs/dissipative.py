@@ -170,7 +170,8 @@ class DissipativeMotion(Motion):
         self._tabulated: list[TabulatedPiece] = []
         launch, domain, f = problem.launch, problem.domain, problem.functions
         super().__init__(problem, "dissipative", launch.direction)
-        self._joints = Joints(f.breaks, f.corners, np.empty(room_ahead(f.breaks.size)))
+        drops = f.drops(ONLY_SIGN[launch.contact])
+        self._joints = Joints(f.breaks, f.corners, drops, np.empty(room_ahead(f.breaks.size)))
         self._body = launched(
             *(1, launch.lam0.value, domain.low, domain.high, domain.period),
             *(launch.direction, ONLY_SIGN[launch.contact], self._horizon, nan, problem.w0),
@@ -526,7 +527,7 @@ class DissipativeMotion(Motion):
         frame = None if loss.friction or loss.kinked else frame_near(loss, problem.functions.p, (place, low, v2), reach)
         if frame is None:
             return
-        self._frame, self._joints = frame, Joints(NOWHERE, NOWHERE, NOWHERE)
+        self._frame, self._joints = frame, Joints(*[NOWHERE] * 4)
         line[PLACE], line[PLACE_LOW] = frame.distance(place, low)
         if v2 == 0.0 and abs(line[PLACE]) < LAST_DIGIT * abs(place):
             line[PLACE] = 0.0  # there it stays

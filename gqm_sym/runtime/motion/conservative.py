@@ -1,10 +1,13 @@
 """The motion of a conservative model that a launch begins: its ends, its kind, and the segments that it consists of."""
 
-from math import inf, isfinite
+from math import isfinite
 
 import numpy as np
 
 from gqm_sym.errors import LaunchError
+from gqm_sym.literals.numbers import read_number
+from gqm_sym.runtime.charts.chart import CORNER_ROUNDINGS
+from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.launch import zeros
 from gqm_sym.runtime.launch.ends import (
     EndOfMotion,
@@ -76,8 +79,17 @@ def _as_bilateral(formulas: Formulas, p: ParameterValues, launch: Launch) -> Mot
     f = bind(formulas, p, launch)
     problem = Problem(formulas, launch, p, f, domain)
     lam0, v0 = launch.lam0.value, launch.v0.value
-    if v0 == 0.0 and f.corners.size and _is_in_corner(problem):
-        return MotionAtRest(problem)
+    near = CORNER_ROUNDINGS * float(np.spacing(abs(lam0)))
+    if v0 == 0.0 and f.between(f.corners, lam0 - near, lam0 + near).size:
+        behind_v2, ahead_v2 = _speeds_beside(problem)
+        if behind_v2 < 0.0 and ahead_v2 < 0.0:
+            return MotionAtRest(problem)
+        # The body slides down the plane that falls, and from a ridge in the direction of launch. It is put beside the
+        # corner, on that plane. No double is the corner itself: more digits might put it on the other plane.
+        direction = launch.direction if behind_v2 > 0.0 and ahead_v2 > 0.0 else 1 if ahead_v2 > behind_v2 else -1
+        lam0 += direction * near
+        f = f._replace(exact=None)
+        problem = Problem(formulas, launch._replace(lam0=read_number(lam0, where="lam0"), point=None), p, f, domain)
     direction, ahead, behind, time = survey(f.addresses, f.p, lam0, v0, launch.direction, domain.numbers)
     is_stuck = ahead[0] in (zeros.CUSP, zeros.NOT_FINITE) and ahead[1] == 0.0
     if direction == 0 or is_stuck or time != time:
@@ -125,14 +137,11 @@ def _opposite_end(problem: Problem, direction: int, front: EndOfMotion) -> EndOf
     return end_of_motion(problem, -direction, found)
 
 
-def _is_in_corner(problem: Problem) -> bool:
-    """Whether the launch place is a corner from which the effective potential grows in both directions."""
+def _speeds_beside(problem: Problem) -> Array:
+    """V**2 a little before and after the launch place, which is a corner, of a body at rest there."""
     f, lam0 = problem.functions, problem.lam0
-    if not f.between(f.corners, *np.nextafter(lam0, (-inf, inf)).tolist()).size:
-        return False
     offsets = NEAR_CUSP * starting_step(problem) * np.array([-1.0, 1.0])
-    v2 = speed_squared_at(f.addresses, f.p, lam0, problem.launch.lam0.low, 0.0, lam0 + offsets, offsets)
-    return bool(np.all(v2 < 0.0))
+    return speed_squared_at(f.addresses, f.p, lam0, problem.launch.lam0.low, 0.0, lam0 + offsets, offsets)
 
 
 def _check_place(problem: Problem) -> None:

@@ -193,17 +193,17 @@ def passages(segments: Sequence[TimedSegment], trajectory: Trajectory, lam: floa
     return out
 
 
-def corner_crossings(timed: TimedSegment, time_scale_error: float) -> list[tuple[Pair, float]]:
-    """The times at which a timed segment passes corners of the curve, each with its phase angle.
+def corner_crossings(timed: TimedSegment, corners: Array, time_scale_error: float) -> list[tuple[Pair, float]]:
+    """The times at which a timed segment passes some corners of the curve, each with its phase angle.
 
     With losses segments end at corners, and the body passes to the next.
     """
     segment, f = timed.segment, timed.segment.functions
-    places = f.between(f.corners, segment.a, segment.b)
+    places = f.between(corners, segment.a, segment.b)
     phi = np.array([segment.phase_angle_of(*segment.offsets(place)) for place in places])
     found = crossings(timed, phi, time_scale_error)
     stop = segment.b if timed.phi_stop > timed.phi_start else segment.a
-    if timed.end == "" and f.between(f.corners, *np.nextafter(stop, (-np.inf, np.inf)).tolist()).size:
+    if timed.end == "" and f.between(corners, *np.nextafter(stop, (-np.inf, np.inf)).tolist()).size:
         found.append((timed.t_stop, timed.phi_stop))
     return found
 
@@ -211,7 +211,7 @@ def corner_crossings(timed: TimedSegment, time_scale_error: float) -> list[tuple
 def liftoff(timed: TimedSegment, side: int, *, first: bool) -> tuple[Pair, float] | None:
     """When and where contact is lost on a timed segment: time from the segment's end ``a``, and phase angle.
 
-    The result is None if contact lasts.
+    The result is None if contact lasts. It is lost where N changes its sign, and at corners where the track bends away.
 
     Parameters
     ----------
@@ -232,7 +232,8 @@ def liftoff(timed: TimedSegment, side: int, *, first: bool) -> tuple[Pair, float
         here, then = contact_signs(timed.segment, np.array([near, 0.5 * (start + ahead)])) * side
         if (here or then) < 0.0:
             return timed.r_start, timed.phi_start
-    if not crossed:
+    lost = sorted([*crossed, *corner_crossings(timed, timed.segment.functions.drops(side), 0.0)])
+    if not lost:
         return None
-    phi = crossed[0][1]
+    phi = lost[0][1]
     return (float(timed.segment.times(np.array([phi]))[0]), 0.0), phi

@@ -163,7 +163,9 @@ def _on_segment(
         near = min((start, stop), key=lambda end: abs(end - angle))
         if abs(near - angle) < END_SHARE * (high - low):
             angle = near
-        found.append(_extreme_at(timed, trajectory, angle, sign * float(signed(np.array([angle]))[0])))
+        at_turn = quantity is speeds and timed.end == "turn" and angle == timed.phi_stop
+        value = 0.0 if at_turn else sign * float(signed(np.array([angle]))[0])
+        found.append(_extreme_at(timed, trajectory, angle, value))
     return _size(values), sorted(found, key=lambda peak: peak.t)
 
 

@@ -477,7 +477,7 @@ class Motion(ABC):
         legs = []
         time_scale_error, lap = self._trajectory(0.0).time_scale_error, self._trajectory(0.0).lap
         for timed in self._history():
-            corners = corner_crossings(timed, time_scale_error)
+            corners = corner_crossings(timed, timed.segment.functions.corners, time_scale_error)
             last = "corner" if corners and corners[-1][1] == timed.phi_stop else timed.end
             corners = corners[:-1] if last != timed.end else corners
             marks = [(timed.t_start, timed.phi_start), *corners, (timed.t_stop, timed.phi_stop)]
@@ -514,7 +514,9 @@ class Motion(ABC):
         time_scale_error = self._trajectory(0.0).time_scale_error
         for timed in segments:
             found_here = [("contact-sign", *m) for m in self._contact_changes(timed)]
-            found_here += [("corner", *m) for m in corner_crossings(timed, time_scale_error)]
+            found_here += [
+                ("corner", *m) for m in corner_crossings(timed, timed.segment.functions.corners, time_scale_error)
+            ]
             found_here += [("slip", *m) for m in slip_times(self.problem, timed, time_scale_error)]
             found += [self._event(kind, when, timed, phi) for kind, when, phi in sorted(found_here, key=lambda m: m[1])]
             if timed.end == "asymptote":

@@ -75,7 +75,7 @@ def asked_of_bodies(formulas: "Formulas", quantity: str, t_max: Any, contact: st
 def answer_driven(
     formulas: "Formulas",
     asked: Asked,
-    curve: tuple[Array, Array, Array],
+    curve: tuple[Array, Array, Array, Array],
     columns: list[Array],
     answers: Answers,
     part: slice,
@@ -84,15 +84,16 @@ def answer_driven(
 
     Parameters
     ----------
-    curve : (array, array, array)
-        The chart, empty for a curve with formulas; all places where it is not smooth, and those that are corners.
+    curve : four arrays
+        The chart, empty for a curve with formulas; all places where it is not smooth, those that are corners, and those
+        at which contact is lost.
     columns : list of arrays
         The launches, in the order of `compiled.strided`.
     answers : Answers
         Filled in for this part.
     """
-    chart, breaks, corners = curve
-    joints = Joints(breaks, corners, np.empty(room_ahead(breaks.size)))
+    chart, *places = curve
+    joints = Joints(*places, np.empty(room_ahead(places[0].size)))
     record, mass = np.empty(MAX_PANELS * COLUMNS), PARAMETERS + list(formulas.parameters).index("m")
     for begin in range(part.start, part.stop, CHUNK):
         chunk = slice(begin, min(begin + CHUNK, part.stop))

@@ -15,13 +15,13 @@ from numpy.typing import NDArray
 from gqm_sym.errors import GQMError, InputError, ParameterError, SolutionError
 from gqm_sym.literals.namespaces import ARRAYS
 from gqm_sym.literals.numbers import read_number
-from gqm_sym.runtime.charts.chart import ChartMaker
-from gqm_sym.runtime.compiled.strided import PARAMETERS, lay_out, pointers, widen
+from gqm_sym.runtime.charts.chart import CORNER_ROUNDINGS, ChartMaker
+from gqm_sym.runtime.compiled.strided import DOMAIN_PERIOD, LAM0, PARAMETERS, V0, lay_out, pointers, widen
 from gqm_sym.runtime.compiled.threads import run_in_threads
 from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.interface import Addresses
 from gqm_sym.runtime.launch.formulas import chart_with
-from gqm_sym.runtime.launch.request import CONTACTS, LaunchRequest
+from gqm_sym.runtime.launch.request import CONTACTS, ONLY_SIGN, LaunchRequest
 from gqm_sym.runtime.launch.speed import potential_at
 from gqm_sym.runtime.multiprecision.exact_problem import NOWHERE
 from gqm_sym.runtime.sweep import quantities, scalar
@@ -43,9 +43,6 @@ Solve = Callable[[LaunchRequest, tuple[Any, ...]], Any]
 
 # Quantities that are answered by batches themselves; for others batches find the span of an orbit.
 ANSWERED_BY_BATCHES = (quantities.HALF_PERIOD, quantities.PERIOD, quantities.TURNING_POINTS)
-
-# Which way a track can push along its normal, 0 for both.
-CONTACT_SIDES = {"bilateral": 0, "above": 1, "below": -1}
 
 # Into how many pieces a curve with formulas is cut at least before it is tabulated, and how often the range of places
 # is doubled to contain all motions.
@@ -108,17 +105,19 @@ def sweep(
     )
     asked = asked_of_bodies(formulas, quantity, t_max, contact)
     if asked is not None or has_compiled_route(formulas, found, t_max):
-        for group, chosen in _groups(formulas, columns, shape, may_lift_off=asked is None and contact != "bilateral"):
+        for group, chosen in _groups(formulas, columns, shape, ONLY_SIGN[contact]):
+            if asked is None and group.drops.size:
+                continue  # tables know no corners
             some = answers if chosen is None else answers.part(chosen)
             if asked is not None:
-                curve = (group.chart, group.joints, group.corners)
+                curve = (group.chart, group.joints, group.corners, group.drops)
                 work, least = partial(answer_driven, formulas, asked, curve, group.columns, some), MIN_BODIES_PER_THREAD
             else:
-                ask = Asked(
-                    found.code, CONTACT_SIDES[contact], inf if t_max is None else as_doubles(t_max, "t_max").item()
-                )
+                ask = Asked(found.code, ONLY_SIGN[contact], inf if t_max is None else as_doubles(t_max, "t_max").item())
                 work, least = partial(_answer, formulas, ask, group, some), MIN_LAUNCHES_PER_THREAD
             run_in_threads(work, some.status.size, least)
+            if asked is None and group.corners.size:
+                some.status[np.broadcast_to(_rests_on_corner(group), some.status.size)] = quantities.UNDECIDED
             if chosen is not None:
                 answers.put(chosen, some)
     values = answers.values[:, found.columns]
@@ -234,9 +233,9 @@ class Group(NamedTuple):
     ----------
     columns : list of arrays
         The launches, in the order of `strided`; each array has one number, or one for each launch.
-    chart, joints, corners : arrays
+    chart, joints, corners, drops : arrays
         What compiled code reads behind the parameters, and the places within one period at which the curve is not
-        smooth, and at which its tangent jumps; all are empty for a curve with formulas.
+        smooth, at which its tangent jumps, and at which contact is lost; all are empty for a curve with formulas.
     table : CurveTable
         The curve tabulated, where all launches have the same parameters and no energy is lost.
     """
@@ -245,11 +244,12 @@ class Group(NamedTuple):
     chart: Array = NOWHERE
     joints: Array = NOWHERE
     corners: Array = NOWHERE
+    drops: Array = NOWHERE
     table: CurveTable = NO_TABLE
 
 
 def _groups(
-    formulas: "Formulas", columns: list[Array], shape: tuple[int, ...], *, may_lift_off: bool
+    formulas: "Formulas", columns: list[Array], shape: tuple[int, ...], only_sign: int
 ) -> Iterator[tuple[Group, NDArray[np.intp] | None]]:
     """The launches, grouped by the shape of their curve, and which they are; None where all are of one shape.
 
@@ -257,6 +257,7 @@ def _groups(
     """
     if formulas.chart is None:
         domain = [widen(value, shape) for value in _domain_columns(formulas, columns[4:])]
+        may_lift_off = only_sign and not formulas.dissipation
         table = _tabulated_range(formulas, columns, domain) if may_lift_off else NO_TABLE
         yield Group([*columns[:4], *domain, *columns[4:]], table=table), None
         return
@@ -269,7 +270,18 @@ def _groups(
         domain = [np.array(value) for value in (*chart.range, nan, nan, 0.0)]
         some = columns if chosen is None else [_chosen(column, shape, chosen) for column in columns]
         table = NO_TABLE if formulas.dissipation else _tabulated(formulas.chart, formulas.addresses, values, mass)
-        yield Group([*some[:4], *domain, *some[4:]], chart.block, chart.breaks, chart.corners, table), chosen
+        joints = (chart.breaks, chart.corners, chart.corners[chart.bends * only_sign < 0.0])
+        yield Group([*some[:4], *domain, *some[4:]], chart.block, *joints, table), chosen
+
+
+def _rests_on_corner(group: Group) -> NDArray[np.bool_]:
+    """Whether each launch is from rest on a corner, so that it takes the direction of launch."""
+    lam0, v0, period = group.columns[LAM0].reshape(-1), group.columns[V0].reshape(-1), group.columns[DOMAIN_PERIOD]
+    near, found = CORNER_ROUNDINGS * np.spacing(np.abs(lam0)), np.zeros(1, dtype=np.bool_)
+    for corner in group.corners if np.any(v0 == 0.0) else ():
+        off = lam0 - corner
+        found = found | (np.abs(off - period * np.round(off / period) if period else off) <= near)
+    return found & (v0 == 0.0)
 
 
 def _tabulated_range(formulas: "Formulas", columns: list[Array], domain: list[Array]) -> CurveTable:
