@@ -262,9 +262,9 @@ class Curve:
         kind
             "spline": the interpolating quintic spline. "linear": planes stitched together (paper, eq. 1); at their
             corners the speed is kept. A body at rest on a corner stays where both planes rise from it or hold it; on a
-            ridge that lets it slide down either side it goes in the direction of launch. A moving body that only one side
-            of the track holds (``contact="above"`` or ``"below"``) leaves it at a corner that bends away from the body,
-            with the event "liftoff", and passes one that bends towards it.
+            ridge that lets it slide down either side it goes in the direction of launch. A moving body that only one
+            side of the track holds (``contact="above"`` or ``"below"``) leaves it at a corner that bends away from the
+            body, with the event "liftoff", and passes one that bends towards it.
         closed
             Whether the track closes; None: if its last point is its first.
         smoothing

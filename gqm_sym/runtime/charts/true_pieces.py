@@ -46,6 +46,9 @@ MAX_DOUBLE_SHARE = 2.0**-57
 # A place on a piece has converged when Newton's method moves it by less than this; then the next step is rounding.
 MAX_LAST_STEP, MAX_STEPS = 1e-17, 12
 
+# The tangent turns by no larger angle on a piece that polynomials of degree 15 resolve.
+MAX_PIECE_TURN = 4.0
+
 # Columns of the points that `fill_points` fills: x, z and their derivatives by u, two doubles each.
 X, X_LOW, Z, Z_LOW, DX, DX_LOW, DZ, DZ_LOW = range(0, 8 * RULE, RULE)
 
@@ -144,7 +147,10 @@ def fill_points(curve, number, n, u, points):  # type: ignore[no-untyped-def]
 
 @Inner
 def arc_on(curve, number, left, right):  # type: ignore[no-untyped-def]
-    """Return the arc length from one place on a piece to another, with its error."""
+    """Return the arc length from one place on a piece to another, with its error.
+
+    Errors of the coordinates along the tangent count at both ends, and others by the angle that the tangent turns by.
+    """
     rule, u, points = curve.rule, stacked_places(), stacked_points()
     width, width_low = add(right[0], right[1], -left[0], -left[1])
     for i in range(RULE):
@@ -164,7 +170,7 @@ def arc_on(curve, number, left, right):  # type: ignore[no-untyped-def]
     tail = (fabs(one) + fabs(two)) / total
     arc, arc_low = multiply(total, low, width, width_low)
     k = piece_of(curve, number)
-    error = fabs(width) * (2.0 * curve.errors[k, 1] + total * (tail * tail + 16.0 * UNIT))
+    error = (2.0 + MAX_PIECE_TURN) * curve.errors[k, 0] + fabs(width) * total * (tail * tail + 16.0 * UNIT)
     return (arc, arc_low), error
 
 

@@ -51,6 +51,9 @@ MAX_TAIL, MAX_HALVINGS = 1e-13, 40
 # On a piece that is nearer to a turning point than so many of its lengths, the nodes are spread for that.
 MAX_NEAR = 4.0
 
+# On a panel from a turning point, how much more the force changes than its mean over the distance from there.
+MAX_FORCE_RATIO = 4.0
+
 # Steps of Newton's method to a turning point, of which the last but one moves it by less than this; and how often it
 # may go to a neighbouring piece.
 MAX_STEPS, MAX_LAST_STEP, MAX_MOVES = 12, 1e-15, 4
@@ -63,7 +66,7 @@ AT_EDGE = 2.0**-98
 MAX_MISMATCH = 1e-6
 
 # Rows of what `locate` finds: the launch, the lower and the upper turning point, and a place between them (number of
-# the piece, place on it as two doubles, error); the energy level, and the arc lengths from the lower turning point to
+# the piece, place on it as two doubles, error); the energy level, with both errors of `Path`, and the arc lengths from the lower turning point to
 # the launch, from there to the upper one, and from the left edge of the piece where it begins to the launch (two
 # doubles, error).
 LAUNCH, LOWER, UPPER, MIDDLE, LEVEL, BEHIND, AHEAD, PLACE = range(8)
@@ -76,7 +79,11 @@ stacked_sums = on_stack(3 * RULE)
 
 
 class Path(NamedTuple):
-    """What the time along a curve depends on: the curve, the tape of the potential, its registers, and the level."""
+    """What the time along a curve depends on: the curve, the tape of the potential, its registers, and the level.
+
+    The energy level is two doubles, a bound on what differences from it are off by at turning points, and one on its
+    own error, by which turning points are shifted.
+    """
 
     curve: Any
     tape: Any
@@ -133,7 +140,11 @@ def fill_places(curve, left, width, spread, u, factors):  # type: ignore[no-unty
 
 @Inner
 def panel_time(path, number, left, right, spread):  # type: ignore[no-untyped-def]
-    """Return the time on a panel of a piece, its error, and its last Legendre coefficients as a share of the first."""
+    """Return the time on a panel of a piece, its error, and its last Legendre coefficients as a share of the first.
+
+    Where the panel begins at a turning point, V**2/2 is q*d at the distance d from there. An error e of the level moves
+    the turning point by e/q, so that V**2 changes, at the same distance, only as the force does on the way.
+    """
     curve, tape, work, level = path
     address, operations, parts, registers = tape
     u, points, factors, sums = stacked_places(), stacked_points(), stacked_places(), stacked_sums()
@@ -144,6 +155,7 @@ def panel_time(path, number, left, right, spread):  # type: ignore[no-untyped-de
     fill_registers(tape, work, RULE, points, curve.errors[k, 0])
     call_interpreter(address, operations, parts[0], parts[1], work, RULE)
     potential, rate_error = work[registers[2] : registers[2] + ROW], curve.errors[k, 1]
+    from_turn, q, shift, rate = spread[0] != 0.0 and left[0] == 0.0, 1.0, level[3], 0.0
     for i in range(RULE):
         half, half_low = add(level[0], level[1], -potential[i], -potential[LOW + i])
         s, s_low = multiply(points[DX + i], points[DX_LOW + i], points[DX + i], points[DX_LOW + i])
@@ -151,9 +163,14 @@ def panel_time(path, number, left, right, spread):  # type: ignore[no-untyped-de
         s, s_low = add(s, s_low, t, t_low)
         t, t_low = divide(0.5 * s, 0.5 * s_low, half, half_low)
         t, t_low = square_root(t, t_low)
+        rate = t
+        if from_turn:
+            d = (width[0] * curve.rule[0, i]) ** 2
+            q = half / d if i == 0 else q
+            shift = level[3] * MAX_FORCE_RATIO * fabs(1.0 - half / (q * d))
         g, g_low = multiply(t, t_low, factors[i], factors[RULE + i])
         sums[i], sums[RULE + i] = g, g_low
-        lost = 0.5 * (level[2] + potential[ERROR + i]) / half + 2.0 * rate_error / sqrt(s)
+        lost = 0.5 * (level[2] + shift + potential[ERROR + i]) / half + 2.0 * rate_error / sqrt(s)
         sums[2 * RULE + i] = fabs(g) * (lost + 16.0 * UNIT)
     one, two, tails = 0.0, 0.0, curve.tails
     for i in range(RULE):
@@ -166,7 +183,8 @@ def panel_time(path, number, left, right, spread):  # type: ignore[no-untyped-de
             sums[i], sums[RULE + i] = add(sums[i], sums[RULE + i], sums[n + i], sums[RULE + n + i])
             sums[2 * RULE + i] += sums[2 * RULE + n + i]
     time = multiply(sums[0], sums[RULE], width[0], width[1])
-    return time, fabs(width[0]) * sums[2 * RULE], (fabs(one) + fabs(two)) / fabs(sums[0])
+    error = fabs(width[0]) * sums[2 * RULE] + (level[3] / q * rate if from_turn else 0.0)
+    return time, error, (fabs(one) + fabs(two)) / fabs(sums[0])
 
 
 @Inner
@@ -298,11 +316,11 @@ def locate(curve, tape, work, p, launch, ends, start, found):  # type: ignore[no
     number, at = place_at(curve, start, (length, length_low))
     if by_point != 0.0:
         at = foot(curve, number, at, (x, x_low, z, z_low))
-    path = Path(curve, tape, work, (0.0, 0.0, 0.0))
+    path = Path(curve, tape, work, (0.0, 0.0, 0.0, 0.0))
     (value, value_low, error), slope, speed = energy_at(path, number, at)
     half, half_low = multiply(v0, v0_low, 0.5 * v0, 0.5 * v0_low)
     high, low = add(value, value_low, half, half_low)
-    level = (high, low, error + UNIT * half + fabs(slope[0]) * (doubt / speed + 4.0 * UNIT))
+    level = (high, low, 0.0, error + UNIT * half + fabs(slope[0]) * (doubt / speed + 4.0 * UNIT))
     found[:] = nan
     found[LAUNCH, 0], found[LAUNCH, 1], found[LAUNCH, 2], found[LAUNCH, 3] = number, at[0], at[1], doubt
     if by_point != 0.0:
@@ -313,11 +331,16 @@ def locate(curve, tape, work, p, launch, ends, start, found):  # type: ignore[no
         for row, place, inward in ((LOWER, ends[0], 1), (UPPER, ends[1], -1)):
             guess, near = place_at(curve, number, (place - position(curve, number, -1.0), 0.0))
             turn, left, fall = find_turn(path, guess, near, inward)
-            found[row, 0], found[row, 1], found[row, 2], found[row, 3] = turn[0], turn[1], turn[2], left / fabs(fall)
+            found[row, 0], found[row, 1], found[row, 2], found[row, 3] = (
+                turn[0],
+                turn[1],
+                turn[2],
+                (left + level[3]) / fabs(fall),
+            )
             rest = max(rest, left)
-        level = (level[0], level[1], level[2] + rest)
+        level = (level[0], level[1], rest, level[3])
         fill_middle(curve, found)
-    found[LEVEL, 0], found[LEVEL, 1], found[LEVEL, 2] = level
+    found[LEVEL, 0], found[LEVEL, 1], found[LEVEL, 2], found[LEVEL, 3] = level
 
 
 @Inner
@@ -400,7 +423,7 @@ def fill_passage(curve, tape, work, p, found, stops, times, middle):  # type: ig
     address, operations, parts, registers = tape
     tape = (address, uncounted(operations), parts, registers)
     fill_parameters(tape, uncounted(p), work)
-    path = Path(curve, tape, work, (found[LEVEL, 0], found[LEVEL, 1], found[LEVEL, 2]))
+    path = Path(curve, tape, work, (found[LEVEL, 0], found[LEVEL, 1], found[LEVEL, 2], found[LEVEL, 3]))
     row = LOWER if middle >= 0 else LAUNCH
     number, at = int(found[row, 0]), (found[row, 1], found[row, 2])
     way = -1 if stops[stops.shape[0] - 1, 0] < number else 1
