@@ -66,9 +66,9 @@ AT_EDGE = 2.0**-98
 MAX_MISMATCH = 1e-6
 
 # Rows of what `locate` finds: the launch, the lower and the upper turning point, and a place between them (number of
-# the piece, place on it as two doubles, error); the energy level, with both errors of `Path`, and the arc lengths from the lower turning point to
-# the launch, from there to the upper one, and from the left edge of the piece where it begins to the launch (two
-# doubles, error).
+# the piece, place on it as two doubles, error); the energy level with both errors of `Path`, and the arc lengths from
+# the lower turning point to the launch, from there to the upper one, and from the left edge of the piece where it
+# begins to the launch (two doubles, error).
 LAUNCH, LOWER, UPPER, MIDDLE, LEVEL, BEHIND, AHEAD, PLACE = range(8)
 ROWS, COLUMNS = 8, 4
 

@@ -30,7 +30,9 @@ OVERFLOW_V2 = 1e100
 # V**2 counts as constant in doubles over a step if its possible change is below this share of the terms it consists of.
 CONSTANT_SHARE = 1e-13
 
-# By what factor the terms of V**2 on a step may be larger than at the zero on it and before.
+# By what factor the terms of V**2 on a step may be larger than at the zero on it and before. It must cover what terms
+# are larger by inside the formulas, which are not seen here: CONSTANT_SHARE allows for 450 roundings, so that divided
+# differences may cancel to their last three or four digits. If it is too large, extended precision is asked in vain.
 TERMS_GROWTH = 1e3
 
 # ds below this share of its largest value so far, on the narrowest step, is a cusp.

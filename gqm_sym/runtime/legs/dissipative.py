@@ -397,8 +397,9 @@ class DissipativeMotion(Motion):
         if timed.segment.v2 is not None:  # the approach to an equilibrium
             return after.place, np.full_like(phi, after.time)
         of_frame = 0.0 if run.frame is None else run.frame.error
-        if timed.leg == len(self._laid) - 1:
-            of_frame += self._last_swing
+        if timed.leg == len(self._laid) - 1 and self._last_swing:
+            # So small a V**2 may have no error in the range of doubles, but the body stays where it swings.
+            return before.place + of_frame + 2.0 * self._last_swing, np.zeros_like(phi)
         panels = run.panels_ahead if timed.sense > 0 else run.panels_back
         which = np.clip(np.searchsorted(timed.segment.edges, phi, side="right") - 1, 0, len(panels) - 1)
         inherited = panels[which, INHERITED]
@@ -527,7 +528,7 @@ class DissipativeMotion(Motion):
         frame = None if loss.friction or loss.kinked else frame_near(loss, problem.functions.p, (place, low, v2), reach)
         if frame is None:
             return
-        self._frame, self._joints = frame, Joints(*[NOWHERE] * 4)
+        self._frame, self._joints = frame, Joints(NOWHERE, NOWHERE, NOWHERE, NOWHERE)
         line[PLACE], line[PLACE_LOW] = frame.distance(place, low)
         if v2 == 0.0 and abs(line[PLACE]) < LAST_DIGIT * abs(place):
             line[PLACE] = 0.0  # there it stays

@@ -141,7 +141,8 @@ def _speeds_beside(problem: Problem) -> Array:
     """V**2 a little before and after the launch place, which is a corner, of a body at rest there."""
     f, lam0 = problem.functions, problem.lam0
     offsets = NEAR_CUSP * starting_step(problem) * np.array([-1.0, 1.0])
-    return speed_squared_at(f.addresses, f.p, lam0, problem.launch.lam0.low, 0.0, lam0 + offsets, offsets)
+    v2: Array = speed_squared_at(f.addresses, f.p, lam0, problem.launch.lam0.low, 0.0, lam0 + offsets, offsets)
+    return v2
 
 
 def _check_place(problem: Problem) -> None:

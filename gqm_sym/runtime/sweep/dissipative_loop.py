@@ -92,8 +92,8 @@ def answer_driven(
     answers : Answers
         Filled in for this part.
     """
-    chart, *places = curve
-    joints = Joints(*places, np.empty(room_ahead(places[0].size)))
+    chart, breaks, corners, drops = curve
+    joints = Joints(breaks, corners, drops, np.empty(room_ahead(breaks.size)))
     record, mass = np.empty(MAX_PANELS * COLUMNS), PARAMETERS + list(formulas.parameters).index("m")
     for begin in range(part.start, part.stop, CHUNK):
         chunk = slice(begin, min(begin + CHUNK, part.stop))

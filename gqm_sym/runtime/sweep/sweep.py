@@ -281,7 +281,8 @@ def _rests_on_corner(group: Group) -> NDArray[np.bool_]:
     for corner in group.corners if np.any(v0 == 0.0) else ():
         off = lam0 - corner
         found = found | (np.abs(off - period * np.round(off / period) if period else off) <= near)
-    return found & (v0 == 0.0)
+    on_corner: NDArray[np.bool_] = found & (v0 == 0.0)
+    return on_corner
 
 
 def _tabulated_range(formulas: "Formulas", columns: list[Array], domain: list[Array]) -> CurveTable:

@@ -25,7 +25,10 @@ from gqm_sym.runtime.legs.leg_record import CHANGE_COUNT, END, MIDDLE, START, ch
 from gqm_sym.runtime.legs.leg_run import point_buffer, slope_of_v2
 from gqm_sym.runtime.legs.polynomials import WIDE
 
-# A swing is small if it is below these shares of the distance of e from 0, and of the range of the polynomial.
+# A swing is small if it is below these shares of the distance of e from 0, and of the range of the polynomial. Wider
+# than a quarter of that distance, it loses two bits at most where its places are rounded as doubles. On the middle
+# quarter of a range the slope of a polynomial has hardly more than DEGREE times its noise, not DEGREE**2 times as at
+# the ends; and the width, which is estimated by the steepness at e, quadruples only where the force is a sixteenth.
 SMALL_SHARE, RANGE_SHARE = 0.25, 0.25
 
 # The places at which the force is fitted, as shares of the range; the degree, the size of the last coefficients of a

@@ -94,3 +94,15 @@ def test_a_small_swing_without_losses(exponent: int, tmp_path_factory: pytest.Te
     motion = module.solve(f"1 + 1e-{exponent}")
     assert motion.half_period == pytest.approx(math.pi / math.sqrt(9.81), rel=2e-16)
     assert motion.turning_points == pytest.approx((1.0, 1.0), abs=10.0**-exponent + 2e-16)
+
+
+@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("exponent", [100, 115, 117, 140, 150])
+def test_the_bound_of_a_swing_at_the_end_of_the_range_of_doubles(exponent: int, law: str, pairs: Pairs) -> None:
+    """It is a number, and holds: below 1e-110 a body is known to stay within its swing (it was NaN below 1e-116)."""
+    lam0, t = 10.0**-exponent, np.array([0.0, 0.1, 1.0, 3.0, 20.0])
+    motion, larger = (pairs("pendulum", law)[0].solve(start, t_max=40) for start in (f"1e-{exponent}", "1e-60"))
+    bounds = np.asarray(motion.error_bound(t))
+    assert np.all((bounds > 0.0) & (bounds <= 2.5 * lam0))
+    # Such small swings are proportional to each other, but for what drag takes of the larger one.
+    assert np.all(np.abs(np.asarray(motion.lam(t)) - 1e60 * lam0 * np.asarray(larger.lam(t))) <= bounds)
