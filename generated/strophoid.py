@@ -1,5 +1,5 @@
 # Made by gqm-gen for "strophoid". Do not edit: change its declaration and generate again.
-# interface 9, input 761b603021f8, body 539dbcc44d07
+# interface 9, input 761b603021f8, body 7de8ef292603
 """Bead on the hanging loop of a right strophoid
 
 F              = x**2*(a - z) - z**2*(a + z)
@@ -36,8 +36,8 @@ compiled = compiler(__file__, interface=9)
 
 from gqm_sym.runtime.vocabulary import (
     BOUNDS, EFFECTIVE_POTENTIAL, FIELD, PATH_AND_CONTACT_FORCE, POTENTIAL_DIVDIFF1, POTENTIAL_DIVDIFF2, Addresses,
-    CompiledModel, ExactPotential, LaunchRequest, Pass1, Traced, chart_alpha, chart_kappa, chart_of, chart_x, chart_z,
-    cos, divdiff1_chart_z, divdiff2_chart_z, ichart_alpha, iconst, imul, isin, place_from_ends, sin,
+    CompiledModel, ExactPotential, LaunchRequest, Pass1, Traced, chart_of, chart_rows, cos, divdiff1_chart_z,
+    divdiff2_chart_z, ichart_alpha, iconst, imul, isin, place_from_ends, sin,
 )
 
 if TYPE_CHECKING:
@@ -52,14 +52,14 @@ def path_and_contact_force(n, places, speeds, p, out):
     chart = chart_of(p, 3)
     places, speeds, p, out = carray(places, n), carray(speeds, n), carray(p, 3), carray(out, (5, n))
     g, m = p[1], p[2]
+    chart_rows(chart, (0, 1, 2, 3), places, out)
     for i in range(n):
-        s, v2 = places[i], speeds[i]
-        _t0 = chart_kappa(chart, s)
-        out[0, i] = chart_x(chart, s)
-        out[1, i] = chart_z(chart, s)
+        _chart_x, _chart_z, _chart_alpha, _t0, v2 = out[1, i], out[2, i], out[3, i], out[4, i], speeds[i]
+        out[0, i] = _chart_x
+        out[1, i] = _chart_z
         out[2, i] = 1
         out[3, i] = _t0
-        out[4, i] = m*(_t0*v2 + g*cos(chart_alpha(chart, s)))
+        out[4, i] = m*(_t0*v2 + g*cos(_chart_alpha))
 
 
 @compiled(EFFECTIVE_POTENTIAL)
@@ -68,10 +68,11 @@ def effective_potential(n, places, p, out):
     chart = chart_of(p, 3)
     places, p, out = carray(places, n), carray(p, 3), carray(out, (2, n))
     g = p[1]
+    chart_rows(chart, (1, 2), places, out)
     for i in range(n):
-        s = places[i]
-        out[0, i] = g*chart_z(chart, s)
-        out[1, i] = g*sin(chart_alpha(chart, s))
+        _chart_z, _chart_alpha = out[0, i], out[1, i]
+        out[0, i] = _chart_z*g
+        out[1, i] = g*sin(_chart_alpha)
 
 
 @compiled(POTENTIAL_DIVDIFF1)

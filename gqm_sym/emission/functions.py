@@ -1,12 +1,18 @@
 """Lowered functions as lines of text: the fields that the template prints, and the names that they call."""
 
 from collections.abc import Iterable
+from dataclasses import replace
 from typing import Any
 
-from sympy import Function
+from sympy import Expr, Function, Symbol
 
 from gqm_sym.emission.ir import Assignment, ExactIR, FunctionIR
 from gqm_sym.emission.printer import CodePrinter, ExactPrinter, IntervalPrinter
+from gqm_sym.emission.subscripts import at
+from gqm_sym.sympy_charts import chart_alpha, chart_kappa, chart_x, chart_z
+
+# The rows of a chart, in their order there.
+CHART_ROWS = (chart_x, chart_z, chart_alpha, chart_kappa)
 
 # Columns up to which several loads of a value stand on one line.
 WIDTH = 112
@@ -46,8 +52,39 @@ def _unpacked(parameters: tuple[tuple[str, int], ...], p: str) -> list[str]:
     return _together([(name, f"{p}[{i}]") for name, i in parameters])
 
 
+def _read_together(function: FunctionIR) -> tuple[FunctionIR, list[str]]:
+    """A function that finds what a chart says of its places in the last rows of ``out``, and the line that fills these.
+
+    Neighbours often share a piece of the chart, which is then looked for once. Without a chart, or where ``out`` has
+    too few rows, the function is as it was.
+    """
+    values = [*(a.value for a in function.inside), *function.outputs]
+    given = {a.name: a.value for a in function.inside if type(a.value).__name__ == "at" and len(a.value.args) == 1}
+    places = {c.args[0].name for v in values for c in v.atoms(*CHART_ROWS) if c.args[0].is_Symbol}
+    if len(places) != 1 or not places <= given.keys():
+        return function, []
+    place = Symbol(places.pop(), real=True)
+    used = [k for k, row in enumerate(CHART_ROWS) if any(v.has(row(place)) for v in values)]
+    out, first = function.arguments[-1], len(function.outputs) - len(used)
+    if first < 0:
+        return function, []
+    names = {a.value: Symbol(a.name, real=True) for a in function.inside}
+    read: dict[Expr, Symbol] = {}
+    for k in used:
+        call = CHART_ROWS[k](place)
+        read[call] = names.get(call, Symbol(f"_{CHART_ROWS[k].__name__}", real=True))
+    rows = [Assignment(name=name.name, value=at(out, first + j)) for j, name in enumerate(read.values())]
+    inside = [Assignment(name=a.name, value=a.value.xreplace(read)) for a in function.inside if a.value not in read]
+    outputs = tuple(value.xreplace(read) for value in function.outputs)
+    needed = {s.name for value in (*(a.value for a in inside), *outputs) for s in value.free_symbols}
+    kept = [a for a in inside if a.name in needed]
+    line = f"chart_rows(chart, {tuple(used)}, {given[place.name].args[0]}, {out})"
+    return replace(function, inside=(*rows, *kept), outputs=outputs), [line]
+
+
 def loop(function: FunctionIR) -> tuple[dict[str, Any], set[str]]:
     """The template's fields of a function over many places, and the names that it calls."""
+    function, filled = _read_together(function)
     taken = {name for name, _ in function.parameters} | {a.name for a in function.inside}
     index = "_i" if "i" in taken else "i"
     printer = CodePrinter(index)
@@ -57,7 +94,9 @@ def loop(function: FunctionIR) -> tuple[dict[str, Any], set[str]]:
     before += _statements(function.before, printer)
     inside = _statements(function.inside, printer)
     inside += [f"{out}[{row}, {index}] = {printer.doprint(e)}" for row, e in enumerate(function.outputs)]
-    before = _chart_view(function, printer) + before
+    if filled:
+        printer.used.add("chart_rows")
+    before = [*_chart_view(function, printer), *before, *filled]
     fields = {
         "name": function.name,
         "signature": function.signature,

@@ -17,7 +17,7 @@ from numba import types
 from numpy.polynomial.chebyshev import cheb2poly, chebint
 
 from gqm_sym.runtime.arithmetic.doubledouble import two_sum
-from gqm_sym.runtime.charts.evaluate import EDGES, RECORD, ROWS, TERMS, chart_row
+from gqm_sym.runtime.charts.evaluate import EDGES, RECORD, ROWS, TERMS, chart_rows
 from gqm_sym.runtime.compiled.jit import entry
 from gqm_sym.runtime.compiled.types import Array
 
@@ -67,9 +67,7 @@ class ChartMaker(Hashable, Protocol):
 @entry(types.float64[:, ::1](types.float64[::1], types.float64[::1]))
 def _read(block, s):  # type: ignore[no-untyped-def]
     out = np.empty((ROWS, s.size))
-    for i in range(s.size):
-        for row in range(ROWS):
-            out[row, i] = chart_row(block, row, s[i])
+    chart_rows(block, (0, 1, 2, 3), s, out)
     return out
 
 

@@ -17,7 +17,8 @@ from math import fabs, floor, inf
 
 from numba import carray
 
-from gqm_sym.runtime.compiled.jit import Inner
+from gqm_sym.runtime.compiled.intrinsics import polynomial
+from gqm_sym.runtime.compiled.jit import Inlined, Inner
 
 TERMS = 16
 ROWS = 4
@@ -36,25 +37,62 @@ def chart_of(p, count):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def find(chart, s):  # type: ignore[no-untyped-def]
-    """Return the piece of an arc length, the place u in [-1, 1] on it, and the number of laps of a closed curve."""
-    count, low, period = int(chart[1]), chart[2], chart[4]
-    laps = 0.0
-    if period > 0.0:
-        laps = floor((s - low) / period)
-        s = s - laps * period
-    below, above = 0, count
+def _piece(chart, s):  # type: ignore[no-untyped-def]
+    """Return the piece of an arc length within the first lap."""
+    below, above = 0, int(chart[1])
     while above - below > 1:
         middle = (below + above) // 2
         if s >= chart[EDGES + middle]:
             below = middle
         else:
             above = middle
-    start = EDGES + 3 * count + 2 + below * RECORD
+    return below
+
+
+@Inner
+def _piece_near(chart, s, k):  # type: ignore[no-untyped-def]
+    """Return the piece of an arc length within the first lap, where that is probably ``k`` or one next to it."""
+    last = int(chart[1]) - 1
+    k += int(s >= chart[EDGES + min(k, last - 1) + 1]) - int(s < chart[EDGES + k])
+    k = min(max(k, 0), last)
+    inside = (s >= chart[EDGES + k] or k == 0) and (s < chart[EDGES + k + 1] or k == last)
+    return k if inside else _piece(chart, s)
+
+
+@Inlined
+def _reduced(chart, s):  # type: ignore[no-untyped-def]
+    """Return an arc length within the first lap of a closed curve, and the laps before it."""
+    period = chart[4]
+    laps = floor((s - chart[2]) / period) if period > 0.0 else 0.0
+    return s - laps * period, laps
+
+
+@Inner
+def find(chart, s):  # type: ignore[no-untyped-def]
+    """Return the piece of an arc length, the place u in [-1, 1] on it, and the number of laps of a closed curve."""
+    s, laps = _reduced(chart, s)
+    below = _piece(chart, s)
+    start = EDGES + 3 * int(chart[1]) + 2 + below * RECORD
     u = (s - chart[start]) * chart[start + 1]
-    if period > 0.0:
+    if chart[4] > 0.0:
         u = min(max(u, -1.0), 1.0)
     return below, u, laps
+
+
+@Inlined
+def _powers(chart, start, row):  # type: ignore[no-untyped-def]
+    """Return the coefficients of a row on the piece whose record begins at ``start``, highest power first."""
+    c, at = chart, start + 6 + row * TERMS
+    high = c[at + 15], c[at + 14], c[at + 13], c[at + 12], c[at + 11], c[at + 10], c[at + 9], c[at + 8]
+    return (*high, c[at + 7], c[at + 6], c[at + 5], c[at + 4], c[at + 3], c[at + 2], c[at + 1], c[at])
+
+
+@Inlined
+def _constant(chart, start, row, laps):  # type: ignore[no-untyped-def]
+    """Return what the polynomial of a row is added to, as two numbers."""
+    if row < 2:
+        return chart[start + 2 + 2 * row], chart[start + 3 + 2 * row]
+    return (laps * chart[5] if row == 2 else 0.0), 0.0
 
 
 @Inner
@@ -62,14 +100,42 @@ def chart_row(chart, row, s):  # type: ignore[no-untyped-def]
     """Return one row of the chart: 0 is x, 1 is z, 2 is alpha, 3 is kappa."""
     k, u, laps = find(chart, s)
     start = EDGES + 3 * int(chart[1]) + 2 + k * RECORD
-    total = 0.0
-    for j in range(TERMS - 1, -1, -1):
-        total = total * u + chart[start + 6 + row * TERMS + j]
-    if row < 2:
-        total = chart[start + 2 + 2 * row] + (chart[start + 3 + 2 * row] + total)
-    elif row == 2:
-        total += laps * chart[5]
-    return total
+    high, low = _constant(chart, start, row, laps)
+    return high + (low + polynomial(_powers(chart, start, row), u))
+
+
+@Inner
+def chart_rows(chart, rows, places, out):  # type: ignore[no-untyped-def]
+    """Fill the last rows of ``out`` with these rows of the chart at many places, which neighbours share a piece of.
+
+    Parameters
+    ----------
+    rows : tuple of int
+        As in `chart_row`.
+    places : (n,) array
+    out : (m, n) array
+        With a row for each of ``rows`` at least.
+    """
+    count, closed = int(chart[1]), chart[4] > 0.0
+    i, n, first, piece = 0, places.size, out.shape[0] - len(rows), count // 2
+    while i < n:
+        s, laps = _reduced(chart, places[i])
+        piece, begin = _piece_near(chart, s, piece), i
+        start = EDGES + 3 * count + 2 + piece * RECORD
+        middle, scale, lap = chart[start], chart[start + 1], laps * chart[4]
+        low = chart[EDGES + piece] if piece > 0 or closed else -inf
+        high = chart[EDGES + piece + 1] if piece < count - 1 or closed else inf
+        i += 1
+        while i < n and low <= places[i] - lap < high:
+            i += 1
+        for k in range(len(rows)):
+            row, powers = rows[k], _powers(chart, start, rows[k])
+            whole, rest = _constant(chart, start, row, laps)
+            for j in range(begin, i):
+                u = ((places[j] - lap) - middle) * scale
+                if closed:
+                    u = min(max(u, -1.0), 1.0)
+                out[first + k, j] = whole + (rest + polynomial(powers, u))
 
 
 @Inner

@@ -86,6 +86,15 @@ def test_rows() -> None:
     assert np.abs(kappa - 1.0 / RADIUS).max() <= ULP
 
 
+@pytest.mark.parametrize("ring_", [Ring(1), Ring(2), Ring(9), Ring(9, closed=False)])
+def test_rows_in_any_order(ring_: Ring) -> None:
+    """What a chart says of a place does not depend on what else it is asked for, outside of an open curve too."""
+    chart, s = ring_.chart((RADIUS,)), np.random.default_rng(5).uniform(-9.0, 12.0, 200)
+    one_by_one = np.hstack([chart.points([place]) for place in s])
+    for order in (np.arange(s.size), np.argsort(s), np.argsort(-s)):
+        assert np.array_equal(chart.points(s[order]), one_by_one[:, order])
+
+
 @pytest.mark.parametrize("size", [3.0, 0.3, 1e-2, 1e-5, 1e-8])
 def test_divided_differences(size: float) -> None:
     """Differences within a piece, over a joint, over many pieces and over the closing point subtract nothing."""
