@@ -14,7 +14,7 @@ from collections.abc import Callable, Collection, Iterable, Mapping
 from decimal import Decimal
 from fractions import Fraction
 from pathlib import Path
-from typing import TypeAlias, TypeVar
+from typing import Any, TypeAlias, TypeVar
 
 import sympy as sp
 
@@ -25,6 +25,7 @@ from gqm_sym.literals.enclosures import check_constants, enclose
 from gqm_sym.literals.grammar import CONSTANTS, FUNCTIONS, NAME, parse
 from gqm_sym.literals.sympy_tree import is_sympy, tree_of
 from gqm_sym.literals.trees import constant, evaluate
+from gqm_sym.literals.units import is_quantity, scale_of, split_unit, unit_of_quantity
 
 Source: TypeAlias = str | int | float | Fraction | Decimal | sp.Expr
 
@@ -72,8 +73,8 @@ _HEADS: dict[str, Callable[[sp.Expr], sp.Expr]] = {
 _IMPROPER = (sp.nan, sp.zoo, sp.oo, -sp.oo, sp.I)
 
 
-def read_expression(source: Source, *, where: str) -> sp.Expr:
-    """Read an expression.
+def read_expression(source: Source, *, where: str, unit: str | None = None) -> sp.Expr:
+    """Read an expression, or a number with a unit.
 
     Parameters
     ----------
@@ -82,6 +83,9 @@ def read_expression(source: Source, *, where: str) -> sp.Expr:
         heads. A float means its binary value, text and every other number exactly what it says.
     where
         What the expression is, as errors should call it: ``curve.graph.z``.
+    unit
+        The SI unit that a quantity, or a text such as "30 deg", is converted to, "1" for a plain number or an angle;
+        None where no unit is known, so that none is taken.
 
     Returns
     -------
@@ -92,9 +96,16 @@ def read_expression(source: Source, *, where: str) -> sp.Expr:
     ------
     ExpressionError
         If it is not in the grammar, or not real and finite.
+    NumberError
+        If it has a unit of another dimension, or where none is known.
     BudgetError
         If SymPy takes too long over it.
     """
+    measured = _measured(source)
+    if measured is not None:
+        scale = scale_of(measured[1], unit, where=where)
+        factor = sp.Rational(scale.factor.numerator, scale.factor.denominator) * sp.pi**scale.turns
+        return read_expression(measured[0], where=where) * factor
     if isinstance(source, str):
         tree = parse(source, where=where)
     elif is_sympy(source):
@@ -107,6 +118,15 @@ def read_expression(source: Source, *, where: str) -> sp.Expr:
     with budget(where, SECONDS, "write a shorter expression"):
         check_constants(tree, where=where)
         return evaluate(tree, _SymPy(), where=where)
+
+
+def _measured(source: object) -> tuple[Any, str] | None:
+    """The number and the unit of a quantity, or of a text such as "30 deg"; None of anything else."""
+    if is_quantity(source):
+        quantity: Any = source
+        return quantity.magnitude, unit_of_quantity(quantity)
+    split = split_unit(source) if isinstance(source, str) else None
+    return None if split is None else (split[0], split[2])
 
 
 def common_measure(numbers: Iterable[sp.Rational]) -> sp.Rational:

@@ -9,7 +9,8 @@ import sympy as sp
 from gqm_sym.arguments import checked, names, one_line, short
 from gqm_sym.declare.closing import check_period, found_period
 from gqm_sym.declare.ends import Ends, check_ends, check_order, read_ends
-from gqm_sym.declare.measures import told, units_of
+from gqm_sym.declare.measures import parameter_dimension, told, units_of
+from gqm_sym.dimensions import unit_of
 from gqm_sym.errors import DeclarationError
 from gqm_sym.expressions import check_name, read_expression
 from gqm_sym.parameters import Parameters, Value, check_measured, names_in_order, read_parameters
@@ -232,7 +233,7 @@ class Curve:
 
         symbol = _symbol(parameter, "implicit")
         level = read_level(F, start=start, tangent=tangent, parameter=symbol.name)
-        ends = read_ends(domain, "implicit")
+        ends = read_ends(domain, "implicit", "m")
         check_domain(*ends)
         x, z = chart_x(symbol), chart_z(symbol)
         forms = cls(kind="implicit", x=x, z=z, parameter=symbol, title=title, definition=level)
@@ -372,8 +373,9 @@ def _declare(
 ) -> Curve:
     """The curve of these coordinates with its domain, its period and its run-time parameters, read and checked."""
     kind, symbol = forms.kind, forms.parameter
-    ends = read_ends(domain, kind)
-    turn = None if period is None else read_expression(period, where=f"{kind}: period")
+    unit = unit_of(parameter_dimension(forms)) or None
+    ends = read_ends(domain, kind, unit)
+    turn = None if period is None else read_expression(period, where=f"{kind}: period", unit=unit)
     written = (forms.x, forms.z) if forms.radius is None else (forms.radius,)
     given = tuple(end for end in (*ends, turn) if end is not None)
     used = (*names_in_order(*written), *names_of_level, *names_in_order(*given))

@@ -13,8 +13,8 @@ from gqm_sym.parameters import Value, exact_value
 Ends: TypeAlias = tuple[sp.Expr | None, sp.Expr | None]
 
 
-def read_ends(domain: Iterable[Source | None] | None, kind: str) -> Ends:
-    """Read both ends of a domain, each None where it is open.
+def read_ends(domain: Iterable[Source | None] | None, kind: str, unit: str | None) -> Ends:
+    """Read both ends of a domain, each None where it is open; ``unit`` is that of the parameter, None if not known.
 
     Raises
     ------
@@ -27,7 +27,7 @@ def read_ends(domain: Iterable[Source | None] | None, kind: str) -> Ends:
     ends = several(domain, where=f"{kind}: domain", what=what)
     if len(ends) != 2:
         raise DeclarationError(f"{kind}: domain: must be {what}; got {len(ends)} of them")
-    low, high = (None if end is None else read_expression(end, where=f"{kind}: domain") for end in ends)
+    low, high = (None if end is None else read_expression(end, where=f"{kind}: domain", unit=unit) for end in ends)
     return (low, high)
 
 

@@ -68,7 +68,8 @@ def read_level(F: Source, *, start: Iterable[Source], tangent: int, parameter: s
     pair = several(start, where="implicit: start", what="a point (x, z) of the curve")
     if len(pair) != 2:
         raise DeclarationError(f"implicit: start: must be a point (x, z) of the curve, got {short(start)}")
-    place = (read_expression(pair[0], where="implicit: start"), read_expression(pair[1], where="implicit: start"))
+    x, z = (read_expression(coordinate, where="implicit: start", unit="m") for coordinate in pair)
+    place = (x, z)
     for coordinate in place:
         if coordinate.free_symbols & {X, Z}:
             raise DeclarationError(

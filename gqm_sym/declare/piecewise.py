@@ -13,6 +13,8 @@ from gqm_sym.parameters import Parameters, Value, names_in_order, read_parameter
 
 # What each standard piece is given by; the first of them must be positive.
 STANDARD = {"line": ("length",), "arc": ("radius", "angle"), "clothoid": ("length", "kappa_start", "kappa_end")}
+# The SI units of these.
+_UNITS = {"length": "m", "radius": "m", "angle": "1", "kappa_start": "1/m", "kappa_end": "1/m"}
 
 
 @runtime_checkable
@@ -102,7 +104,10 @@ def clothoid(*, length: Source, kappa_start: Source, kappa_end: Source) -> Piece
 
 def _standard(kind: str, *given: Source) -> Piece:
     names = STANDARD[kind]
-    numbers = tuple(read_expression(value, where=f"{kind}: {name}") for name, value in zip(names, given, strict=True))
+    numbers = tuple(
+        read_expression(value, where=f"{kind}: {name}", unit=_UNITS[name])
+        for name, value in zip(names, given, strict=True)
+    )
     if numbers[0].is_number and not numbers[0] > 0:
         raise DeclarationError(f"{kind}: {names[0]}: must be positive, got {numbers[0]}")
     if kind == "arc" and numbers[1].is_zero:
@@ -163,7 +168,7 @@ def _start(start: Sequence[Source] | None, heading: Source | None, first: Piece)
         raise DeclarationError(f"piecewise: start: must be a pair (x, z), got {short(start)}")
     numbers = (*place, 0 if heading is None else heading)
     return tuple(
-        read_expression(number, where=f"piecewise: {name}")
+        read_expression(number, where=f"piecewise: {name}", unit="1" if name == "heading" else "m")
         for number, name in zip(numbers, ("start", "start", "heading"), strict=True)
     )
 

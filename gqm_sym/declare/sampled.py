@@ -15,8 +15,8 @@ from statistics import median
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 from gqm_sym.arguments import one_of, several, short
-from gqm_sym.errors import DeclarationError, NoisyPointsWarning
-from gqm_sym.literals.numbers import read_numbers
+from gqm_sym.errors import DeclarationError, NoisyPointsWarning, NumberError
+from gqm_sym.literals.numbers import Number, read_numbers, without_unit
 from gqm_sym.literals.units import is_quantity
 
 if TYPE_CHECKING:
@@ -171,7 +171,11 @@ def _read_smoothing(given: Any, kind: str) -> float | Literal["auto"] | None:
     if isinstance(given, str) and given == "auto":
         return "auto"
     try:
+        given = without_unit(given, where="sampled: smoothing", unit="m")
+        given = given.value if isinstance(given, Number) else given
         deviation = float("nan") if isinstance(given, bool | str) else float(given)
+    except NumberError as error:
+        raise DeclarationError(str(error)) from None
     except (TypeError, ValueError, OverflowError):
         deviation = float("nan")
     if not (isfinite(deviation) and deviation > 0.0):

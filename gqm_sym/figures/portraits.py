@@ -203,7 +203,7 @@ def _range(
     formulas: CompiledModel, domain: Domain, lam: tuple[Any, Any] | None, given: tuple[Any, ...]
 ) -> tuple[float, float]:
     if lam is not None:
-        low, high = (read_number(end, where="lam").value for end in lam)
+        low, high = (read_number(end, where="lam", unit=formulas.units.get(formulas.parameter)).value for end in lam)
         if not low < high:
             raise InputError(f"lam: must be a range (lo, hi) with lo < hi, got {lam!r}")
         return low, high

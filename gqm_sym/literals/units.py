@@ -58,7 +58,7 @@ _SI = {
 }
 
 # What stands between a number and its unit, in a text such as "30 deg".
-_GAP = re.compile(r"(?<=[\w.)])\s+(?=[A-Za-z\u00b0\u00b5])")
+_GAP = re.compile(r"(?<=[\w.)])\s+(?=(?:1\s*/\s*)?[(A-Za-z\u00b0\u00b5])")
 # Signs for which the grammar has no word.
 _SIGNS = {"\u00b0": "deg", "\u00b5": "micro", "%": "percent"}
 

@@ -14,8 +14,8 @@ from pydantic_core import PydanticCustomError
 from gqm_sym.errors import InputError, NumberError
 from gqm_sym.expressions import RESERVED_NAMES, check_module_name, check_name
 from gqm_sym.literals.grammar import parse
-from gqm_sym.literals.units import read_unit
-from gqm_sym.parameters import check_parameter, exact_value, read_value
+from gqm_sym.literals.units import check_unit, read_unit, split_unit
+from gqm_sym.parameters import check_parameter, exact_value, in_si, read_value
 from gqm_sym.specfile.nodes import shown
 
 LINE_LIMIT = 200
@@ -75,7 +75,33 @@ def _check_curve_parameter(text: str) -> object:
     return check_name(text, where="", reserved=RESERVED_NAMES - {"lam"})
 
 
+def split_value(value: object) -> object:
+    """Wrap a bare value into the long form, ``{value, unit}`` where it is a text such as "50 cm"."""
+    measured = split_unit(value) if isinstance(value, str) else None
+    if measured is not None:
+        return {"value": measured[0], "unit": measured[2]}
+    return value if isinstance(value, dict) else {"value": value}
+
+
+def _check_expression(text: str) -> object:
+    return split_unit(text) or parse(text, where="")
+
+
+def _in_metres(text: str) -> str:
+    measured = split_unit(text)
+    if measured is None:
+        return text
+    try:
+        check_unit(measured[2], "m")
+    except InputError as error:
+        raise _mistake(str(error)) from None
+    return in_si(measured[0], measured[2])
+
+
 def _check_number(text: str) -> object:
+    measured = split_unit(text)
+    if measured is not None:
+        raise NumberError(f"must be a number, got {text}; write unit: {measured[2]} beside it")
     if text.lower().lstrip("+-") in _NOT_FINITE:
         raise NumberError(f"must be a finite number, got {text}")
     if abs(exact_value(read_value(text, where=""))) > sys.float_info.max:
@@ -118,12 +144,13 @@ Name: TypeAlias = Annotated[str, _checked(lambda text: check_module_name(text, w
 CurveParameter: TypeAlias = Annotated[str, _checked(_check_curve_parameter)]
 ParameterName: TypeAlias = Annotated[str, _checked(lambda text: check_parameter(text, where=""))]
 UnitText: TypeAlias = Annotated[str, _checked(lambda text: text and read_unit(text, where=""))]
-Expression: TypeAlias = Annotated[str, _checked(lambda text: parse(text, where="")), WithJsonSchema(_TEXT_OR_NUMBER)]
+Expression: TypeAlias = Annotated[str, _checked(_check_expression), WithJsonSchema(_TEXT_OR_NUMBER)]
 Number: TypeAlias = Annotated[str, _checked(_check_number), WithJsonSchema(_TEXT_OR_NUMBER)]
 ScatterText: TypeAlias = Annotated[str, _checked(_check_scatter), WithJsonSchema(_TEXT_OR_NUMBER)]
 Flag: TypeAlias = Annotated[bool, BeforeValidator(_read_flag), WithJsonSchema({"type": "boolean"})]
 Direction: TypeAlias = Annotated[int, _read_sign("ds/dt at launch"), WithJsonSchema({"enum": [1, -1]})]
 Tangent: TypeAlias = Annotated[int, _read_sign("the tangent (-F_z, F_x)"), WithJsonSchema({"enum": [1, -1]})]
 Ends: TypeAlias = Annotated[list[Expression | None], Field(min_length=2, max_length=2)]
-Place: TypeAlias = Annotated[list[Number], Field(min_length=2, max_length=2)]
+Length: TypeAlias = Annotated[str, AfterValidator(_in_metres), _checked(_check_number), WithJsonSchema(_TEXT_OR_NUMBER)]
+Place: TypeAlias = Annotated[list[Length], Field(min_length=2, max_length=2)]
 Centre: TypeAlias = Annotated[list[Expression], Field(min_length=2, max_length=2)]

@@ -20,6 +20,7 @@ from gqm_sym.kernels import KERNELS, Kernel
 from gqm_sym.literals.units import check_unit, read_unit
 from gqm_sym.parameters import exact_value, in_si, refuse_out_of_range
 from gqm_sym.specfile.explain import explain
+from gqm_sym.specfile.fields import split_value
 from gqm_sym.specfile.locations import locate, mention, node_at, place_of
 from gqm_sym.specfile.nodes import MapNode, Mark, Mistakes, plain
 from gqm_sym.specfile.schema import (
@@ -31,7 +32,6 @@ from gqm_sym.specfile.schema import (
     Parameter,
     Quantity,
     model_at,
-    read_default,
 )
 from gqm_sym.specfile.spec import Note, Spec
 from gqm_sym.specfile.units import expected_units, launch_units
@@ -130,7 +130,7 @@ class _Reader:
             value = value[step]
         if any(loc[: len(path)] == path for loc in self.bad):
             return None
-        return model.model_validate(read_default(value) if model is Parameter else value)
+        return model.model_validate(split_value(value) if model is Parameter else value)
 
     # -- what it declares --------------------------------------------------------------------
 

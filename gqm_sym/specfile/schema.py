@@ -39,6 +39,7 @@ from gqm_sym.specfile.fields import (
     Section,
     Tangent,
     UnitText,
+    split_value,
 )
 from gqm_sym.specfile.rails import RailSchema
 from gqm_sym.specfile.track import POINTS, Points, Scatter, declare_track
@@ -221,13 +222,8 @@ KernelSection: type[Section] = create_model(
 )
 
 
-def read_default(value: object) -> object:
-    """Wrap a bare value into the long form."""
-    return value if isinstance(value, dict) else {"value": value}
-
-
 def _read_if_given(value: object) -> object:
-    return None if value is None else read_default(value)
+    return None if value is None else split_value(value)
 
 
 class Quantity(Section):
@@ -258,11 +254,11 @@ class Parameter(Quantity):
 class Launch(Section):
     """Where, how fast and which way the motion starts: at lam0, or at a point of a curve in arc length."""
 
-    lam0: Annotated[Quantity, BeforeValidator(read_default)] = Field(
+    lam0: Annotated[Quantity, BeforeValidator(split_value)] = Field(
         default=ABSENT, description="the curve's parameter at launch", examples=["-pi/2 + 6/5"]
     )
     point: Place = Field(default=ABSENT, description="x and z at launch, instead of lam0", examples=[[1, 0]])
-    v0: Annotated[Quantity, BeforeValidator(read_default)] = Field(
+    v0: Annotated[Quantity, BeforeValidator(split_value)] = Field(
         default="0", validate_default=True, description="speed, never negative", examples=["6.2088"]
     )
     direction: Direction = Field(default=1, description="the sign of ds/dt at launch")
@@ -282,7 +278,7 @@ class CurveFile(Section):
     title: Line = Field(default="", description="one line for people")
     curve: CurveSection = Field(description="exactly one kind", examples=[{"graph": {"z": "x**3", "parameter": "x"}}])
     kernel: KernelSection = Field(description="the forces", examples=[{"gravity": {}}])
-    parameters: dict[ParameterName, Annotated[Parameter, BeforeValidator(read_default)]] = Field(
+    parameters: dict[ParameterName, Annotated[Parameter, BeforeValidator(split_value)]] = Field(
         default_factory=dict,
         description="every free symbol: a number, {value, unit, description}, or null",
     )

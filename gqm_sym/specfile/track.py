@@ -5,7 +5,7 @@ import warnings
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeAlias
 
-from pydantic import Field, GetJsonSchemaHandler
+from pydantic import BeforeValidator, Field, GetJsonSchemaHandler
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
 
@@ -14,7 +14,7 @@ from gqm_sym.errors import DeclarationError, InputError, NoisyPointsWarning
 from gqm_sym.literals.units import check_unit
 from gqm_sym.parameters import exact_value, in_si
 from gqm_sym.specfile.beside import read_beside, read_rows
-from gqm_sym.specfile.fields import ABSENT, Flag, Line, ScatterText, Section, UnitText, wrapped
+from gqm_sym.specfile.fields import ABSENT, Flag, Line, ScatterText, Section, UnitText, split_value, wrapped
 
 _COLUMNS = ["x", "z"]
 _ROW = re.compile(r"row (\d+)")
@@ -41,7 +41,7 @@ class Points(Section):
     file: Line = Field(description="path from this file's folder on, inside it", examples=["track.csv"])
     kind: Literal["spline", "linear"] = Field(default="spline", description="a quintic spline, or stitched planes")
     closed: Flag = Field(default=False, description="whether the track closes; else if its last point is its first")
-    smoothing: Annotated[Scatter, wrapped("value", str)] = Field(
+    smoothing: Annotated[Scatter, BeforeValidator(split_value)] = Field(
         default=ABSENT,
         description="for measured points: their standard deviation, or auto; else the track goes through them",
         examples=["auto", {"value": 8, "unit": "mm"}],

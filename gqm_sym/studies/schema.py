@@ -6,9 +6,9 @@ from pydantic import BeforeValidator, Field, WithJsonSchema
 from pydantic_core import PydanticCustomError
 
 from gqm_sym.runtime.sweep.quantities import QUANTITIES
-from gqm_sym.specfile.fields import ABSENT, Line, Number, Section, UnitText, wrapped
+from gqm_sym.specfile.fields import ABSENT, Line, Number, Section, UnitText, split_value, wrapped
 from gqm_sym.specfile.nodes import shown
-from gqm_sym.specfile.schema import Quantity, json_schema, read_default
+from gqm_sym.specfile.schema import Quantity, json_schema
 
 MOST_POINTS = 10**7
 
@@ -64,7 +64,7 @@ class SweepFile(Section):
     table: Annotated[Table, wrapped("file", str)] = Field(
         default=ABSENT, description="instead of a grid: one point a row", examples=["launches.csv"]
     )
-    fixed: dict[Name, Annotated[Quantity, BeforeValidator(read_default)]] = Field(
+    fixed: dict[Name, Annotated[Quantity, BeforeValidator(split_value)]] = Field(
         default_factory=dict,
         description="launch, t_max and parameters that are the same at all points, where the curve file has others",
         examples=[{"v0": "1.5"}],

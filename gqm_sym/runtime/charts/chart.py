@@ -16,7 +16,7 @@ import numpy as np
 from numba import types
 from numpy.polynomial.chebyshev import cheb2poly, chebint
 
-from gqm_sym.runtime.arithmetic.doubledouble import two_sum
+from gqm_sym.runtime.arithmetic.doubledouble import ULP, two_sum
 from gqm_sym.runtime.charts.evaluate import EDGES, RECORD, ROWS, TERMS, chart_rows
 from gqm_sym.runtime.compiled.jit import entry
 from gqm_sym.runtime.compiled.types import Array
@@ -217,7 +217,7 @@ def assemble(
     curvature = _fitted(np.asarray(curvatures, dtype=np.float64))
     powers, records = np.empty((count, ROWS, TERMS)), np.empty((count, RECORD))
     records[:, 0], records[:, 1] = edges[:-1] + half, 1.0 / half
-    known = np.stack([np.cos(angles), np.sin(angles)], axis=1) if tangents is None else np.asarray(tangents)
+    known = np.stack(tangents_of(angles), axis=1) if tangents is None else np.asarray(tangents)
     anchor_lows = np.broadcast_to(anchor_lows, anchors.shape)
     # Second derivatives are as accurate as first ones: the tangent is integrated from them, only its mean is fitted.
     second = half[:, None, None] * np.asarray(curvatures)[:, None] * np.stack([-known[:, 1], known[:, 0]], axis=1)
@@ -249,6 +249,13 @@ def assemble(
         corners=np.asarray(corners, dtype=np.float64),
         origins=np.asarray(origins, dtype=np.float64).reshape(-1, 3),
     )
+
+
+def tangents_of(angles: Array) -> tuple[Array, Array]:
+    """Return cosines and sines, exactly 0 where an angle is a multiple of pi/2 but for its rounding."""
+    waves = np.cos(angles), np.sin(angles)
+    cosines, sines = (np.where(np.abs(wave) <= ULP * np.abs(angles), 0.0, wave) for wave in waves)
+    return cosines, sines
 
 
 def _fitted(values: Array) -> Array:

@@ -18,7 +18,7 @@ from gqm_sym.errors import BudgetError, DeclarationError, ParameterError
 from gqm_sym.literals.namespaces import FLOATS
 from gqm_sym.literals.numbers import Number
 from gqm_sym.runtime.charts.arc_length import MAX_PIECES, Indices, Pieces, joined, rectify, summed
-from gqm_sym.runtime.charts.chart import NODES, Chart, PieceData, assemble
+from gqm_sym.runtime.charts.chart import NODES, Chart, PieceData, assemble, tangents_of
 from gqm_sym.runtime.charts.exact_parts import Part, Parts, spiral
 from gqm_sym.runtime.charts.true_pieces import DIGITS, TruePieces
 from gqm_sym.runtime.compiled.calls import call_segment
@@ -227,8 +227,8 @@ def _standard(kind: str, numbers: Iterator[Any], pen: Pen, where: str) -> tuple[
     # The difference from a straight piece is integrated; it vanishes with the curvature, so rounded weights do no harm.
     gained = np.concatenate(
         [
-            step * wave(middle) + 0.5 * step * (wave(inside) - wave(middle)) @ weights[:, None]
-            for wave in (np.cos, np.sin)
+            step * at_middle + 0.5 * step * (at_nodes - at_middle) @ weights[:, None]
+            for at_middle, at_nodes in zip(tangents_of(middle), tangents_of(inside), strict=True)
         ],
         axis=1,
     )
