@@ -4,16 +4,19 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.motion.rows import HEADINGS, table, text_table
 
 # The most times that a printed state or its table in a notebook shows.
 MAX_ROWS_SHOWN = 10
 
 
-class State(NamedTuple):
+class State(dict[str, Any]):
     """The state of the body at given times.
 
-    Each field is a float if one time was given, else an array of the shape of the times.
+    Each field is a float if one time was given, else an array of the shape of the times. Fields are read by name, as in
+    ``state.lam`` or ``state["lam"]``, and by position, as from a named tuple: ``t, lam, *rest = state``. From a mapping
+    pandas makes columns, so ``pandas.DataFrame(state)`` has one for each.
 
     Attributes
     ----------
@@ -37,16 +40,38 @@ class State(NamedTuple):
         A bound of the error of ``lam``, in the unit of the parameter (`Motion.error_bound`).
     """
 
-    t: Any
-    lam: Any
-    s: Any
-    x: Any
-    z: Any
-    v: Any
-    v2: Any
-    kappa: Any
-    normal_force: Any
-    error: Any
+    __slots__ = ()
+
+    _fields = ("t", "lam", "s", "x", "z", "v", "v2", "kappa", "normal_force", "error")
+
+    def __init__(self, *values: Any) -> None:
+        super().__init__(zip(self._fields, values, strict=True))
+
+    def __getattr__(self, name: str) -> Any:
+        if name in self._fields:
+            return self[name]
+        raise AttributeError(f"a state has no {name!r}; it has {', '.join(self._fields)}")
+
+    def __getitem__(self, key: Any) -> Any:
+        return super().__getitem__(key) if isinstance(key, str) else tuple(self.values())[key]
+
+    def __iter__(self) -> Any:
+        return iter(self.values())
+
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> Array:
+        return np.array(tuple(self.values()), dtype=dtype)
+
+    def __repr__(self) -> str:
+        return f"State({', '.join(f'{name}={value!r}' for name, value in self.items())})"
+
+    def __reduce__(self) -> tuple[type["State"], tuple[Any, ...]]:
+        return State, tuple(self.values())
+
+    def _replace(self, **changes: Any) -> "State":
+        return State(*{**self._asdict(), **changes}.values())
+
+    def _asdict(self) -> dict[str, Any]:
+        return dict(self.items())
 
     def to_pandas(self) -> Any:
         """The states as a table with a row for each time.

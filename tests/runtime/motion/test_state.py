@@ -160,3 +160,41 @@ def test_what_friction_takes(tmp_path: Path) -> None:
     end = motion.state(motion.t_end)
     assert motion.energy(motion.t_end).lost == pytest.approx(0.9 * end.normal_force * end.s, rel=1e-12)
     assert motion.energy(motion.t_end).kinetic == pytest.approx(0.0, abs=1e-14)
+
+
+def test_a_state_is_read_by_name_by_position_and_as_a_table(swing: ModuleType, dragged: ModuleType) -> None:
+    """pandas takes its fields for columns; taken apart, copied and pickled it is the same."""
+    for module in (swing, dragged):
+        motion = module.solve(1)
+        state = motion.state(TIMES)
+        frame = pd.DataFrame(state)
+        assert list(frame.columns) == list(State._fields)
+        assert frame.shape == (TIMES.size, len(State._fields))
+        assert np.array_equal(frame["lam"], motion.lam(TIMES))
+        assert frame.equals(state.to_pandas())
+        assert pd.DataFrame(motion.state([0.5])).shape == (1, len(State._fields))
+        t, lam, *rest = state
+        assert t is state.t is state["t"] is state[0]
+        assert lam is state.lam
+        assert len(rest) == len(state) - 2
+        assert np.array_equal(np.asarray(state), np.array(tuple(state)))
+        for twin in (copy.copy(state), copy.deepcopy(state), pickle.loads(pickle.dumps(state))):
+            assert type(twin) is State
+            assert np.array_equal(np.asarray(twin), np.asarray(state))
+        assert state._replace(lam=0.0).lam == 0.0
+        assert repr(motion.state(0.5)).startswith("State(t=0.5, lam=")
+        with pytest.raises(AttributeError, match=r"a state has no 'place'; it has t, lam, s"):
+            state.place  # noqa: B018
+
+
+def test_one_number_gives_numbers_and_one_element_an_array(swing: ModuleType, dragged: ModuleType) -> None:
+    """Whatever holds them, for every kind of motion."""
+    for motion in (swing.solve(1), swing.solve(0), swing.solve(0, 20), dragged.solve(1)):
+        asked = (motion.lam, motion.error_bound, lambda t, m=motion: m.state(t).v, lambda t, m=motion: m.energy(t).lost)
+        for ask in asked:
+            for one in (0.25, "1/4", np.float32(0.25), np.array(0.25), 1):
+                assert type(ask(one)) is float
+            for few in ([0.25], (0.25,), ["1/4"], np.array([0.25])):
+                assert ask(few).shape == (1,)
+            assert ask(np.array([[0.25]])).shape == (1, 1)
+            assert ask([]).shape == (0,)
