@@ -145,7 +145,7 @@ def _is_monotone(c):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def _sum_and_slope(c, x):  # type: ignore[no-untyped-def]
+def sum_and_slope(c, x):  # type: ignore[no-untyped-def]
     """The series and its derivative at x."""
     value, value_after, slope, slope_after = 0.0, 0.0, 0.0, 0.0
     twice = 2.0 * x
@@ -161,7 +161,7 @@ def _crossing(c, low, high):  # type: ignore[no-untyped-def]
     lo, hi, rising = -1.0, 1.0, high > 0.0
     x = lo + (hi - lo) * (low / (low - high))
     for _ in range(60):
-        value, slope = _sum_and_slope(c, x)
+        value, slope = sum_and_slope(c, x)
         if value == 0.0:
             return x
         if (value > 0.0) == rising:
