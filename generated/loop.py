@@ -1,5 +1,5 @@
 # Made by gqm-gen for "loop". Do not edit: change its declaration and generate again.
-# interface 9, input e5eeff356595, body f52e62b6cdd3
+# interface 9, input e5eeff356595, body 850ba707ad2a
 """Loop of a roller coaster
 
 x              = x(s)
@@ -27,9 +27,9 @@ from gqm_sym.runtime import compiler
 compiled = compiler(__file__, interface=9)
 
 from gqm_sym.runtime.vocabulary import (
-    BOUNDS, EFFECTIVE_POTENTIAL, PATH_AND_CONTACT_FORCE, POTENTIAL_DIVDIFF1, POTENTIAL_DIVDIFF2, Addresses,
-    CompiledModel, ExactPotential, LaunchRequest, Pass1, Rail, chart_of, chart_rows, cos, divdiff1_chart_z,
-    divdiff2_chart_z, ichart_alpha, iconst, imul, isin, place_from_ends, sin,
+    BOUNDS, EFFECTIVE_POTENTIAL, PATH_AND_CONTACT_FORCE, POTENTIAL_DIVDIFF1, POTENTIAL_DIVDIFF2, SEPARATED_TERMS,
+    Addresses, CompiledModel, ExactPotential, LaunchRequest, Pass1, Rail, SeparatedTerms, chart_of, chart_rows, cos,
+    divdiff1_chart_z, divdiff2_chart_z, ichart_alpha, iconst, imul, isin, place_from_ends, sin,
 )
 
 if TYPE_CHECKING:
@@ -115,6 +115,11 @@ def exact_rail(op, p):
     a, c, R = p[0], p[1], p[2]
     _t0 = 1/R
     return 0, 0, 0, a, c, 0, _t0, R, -_t0*c + 2*op.pi, c, _t0, 0, a
+
+def exact_factors(op, p):
+    """What stands before the parts of U, then before those of n0."""
+    g = p[3]
+    return g, g
 
 
 def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = None, a: Any = '2', c: Any = '2', R: Any = '1.5', g: Any = '9.81', m: Any = '1', **unknown: Any) -> Pass1:
@@ -239,6 +244,23 @@ def equilibria(*, between: Any = None, a: Any = '2', c: Any = '2', R: Any = '1.5
     return MODEL.equilibria((a, c, R, g, m), between, unknown)
 
 
+# ---- The same formulas once more, only for speed: a load map in one call, and many orbits at once for sweeps. ----
+
+
+@compiled(SEPARATED_TERMS, later=True)
+def separated_terms(n, _a, places, offsets, p, out):
+    """Parts of U[a, s] and of n0, whose factors are `exact_factors`; between them ds/ds and kappa."""
+    chart = chart_of(p, 5)
+    places, offsets, p, out = carray(places, n), carray(offsets, n), carray(p, 5), carray(out, (4, n))
+    chart_rows(chart, (2, 3), places, out)
+    for i in range(n):
+        _chart_alpha, _chart_kappa, s, d = out[2, i], out[3, i], places[i], offsets[i]
+        out[0, i] = divdiff1_chart_z(chart, _a, s, d)
+        out[1, i] = 1
+        out[2, i] = _chart_kappa
+        out[3, i] = cos(_chart_alpha)
+
+
 CHART = Rail(
     numbers=exact_rail,
     placed=True,
@@ -256,6 +278,7 @@ MODEL = CompiledModel(
         potential_divdiff2.address, bounds.address,
     ),
     chart=CHART,
+    separated=SeparatedTerms(separated_terms, exact_factors, potentials=1, loads=1, held=()),
     exact=ExactPotential(
         exact_effective_potential,
     ),

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "planes". Do not edit: change its declaration and generate again.
-# interface 9, input 1c6e3a707056, body 74ecfa839f26
+# interface 9, input 1c6e3a707056, body 252f34bccffc
 """Stitched planes through surveyed points
 
 x              = x(s)
@@ -27,9 +27,9 @@ from gqm_sym.runtime import compiler
 compiled = compiler(__file__, interface=9)
 
 from gqm_sym.runtime.vocabulary import (
-    BOUNDS, EFFECTIVE_POTENTIAL, PATH_AND_CONTACT_FORCE, POTENTIAL_DIVDIFF1, POTENTIAL_DIVDIFF2, Addresses,
-    CompiledModel, ExactPotential, LaunchRequest, Pass1, Sampled, chart_of, chart_rows, cos, divdiff1_chart_z,
-    divdiff2_chart_z, ichart_alpha, iconst, imul, isin, place_from_ends, sin,
+    BOUNDS, EFFECTIVE_POTENTIAL, PATH_AND_CONTACT_FORCE, POTENTIAL_DIVDIFF1, POTENTIAL_DIVDIFF2, SEPARATED_TERMS,
+    Addresses, CompiledModel, ExactPotential, LaunchRequest, Pass1, Sampled, SeparatedTerms, chart_of, chart_rows, cos,
+    divdiff1_chart_z, divdiff2_chart_z, ichart_alpha, iconst, imul, isin, place_from_ends, sin,
 )
 
 if TYPE_CHECKING:
@@ -174,6 +174,11 @@ def exact_effective_potential(op, x, z, p):
     g = p[0]
     return g*z, 0, g
 
+def exact_factors(op, p):
+    """What stands before the parts of U, then before those of n0."""
+    g = p[0]
+    return g, g
+
 
 def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = None, g: Any = '9.81', m: Any = '1', **unknown: Any) -> Pass1:
     """Position, metric, curvature, V**2 and contact force at places of the curve (Pass 1, no quadrature).
@@ -297,6 +302,23 @@ def equilibria(*, between: Any = None, g: Any = '9.81', m: Any = '1', **unknown:
     return MODEL.equilibria((g, m), between, unknown)
 
 
+# ---- The same formulas once more, only for speed: a load map in one call, and many orbits at once for sweeps. ----
+
+
+@compiled(SEPARATED_TERMS, later=True)
+def separated_terms(n, a, places, offsets, p, out):
+    """Parts of U[a, s] and of n0, whose factors are `exact_factors`; between them ds/ds and kappa."""
+    chart = chart_of(p, 2)
+    places, offsets, p, out = carray(places, n), carray(offsets, n), carray(p, 2), carray(out, (4, n))
+    chart_rows(chart, (2, 3), places, out)
+    for i in range(n):
+        _chart_alpha, _chart_kappa, s, d = out[2, i], out[3, i], places[i], offsets[i]
+        out[0, i] = divdiff1_chart_z(chart, a, s, d)
+        out[1, i] = 1
+        out[2, i] = _chart_kappa
+        out[3, i] = cos(_chart_alpha)
+
+
 CHART = Sampled(POINTS, kind='linear', closed=False)
 
 
@@ -309,6 +331,7 @@ MODEL = CompiledModel(
         potential_divdiff2.address, bounds.address,
     ),
     chart=CHART,
+    separated=SeparatedTerms(separated_terms, exact_factors, potentials=1, loads=1, held=()),
     exact=ExactPotential(
         exact_effective_potential,
     ),

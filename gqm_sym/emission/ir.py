@@ -91,6 +91,25 @@ class ChartIR:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class SeparatedIR:
+    """Potential and load along a chart as sums of products.
+
+    Attributes
+    ----------
+    function : FunctionIR
+        What depends on the place, as `interface` orders its rows.
+    factors : ExactIR
+        What depends on run-time parameters alone.
+    potentials : int
+        How many of the products belong to the potential.
+    """
+
+    function: FunctionIR
+    factors: ExactIR
+    potentials: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class ModuleIR:
     """A whole module, ready to print.
 
@@ -122,3 +141,4 @@ class ModuleIR:
     static_friction_limit: tuple[str, str] | None
     units: tuple[tuple[str, str], ...]
     chart: ChartIR | None
+    separated: SeparatedIR | None

@@ -14,6 +14,7 @@ from gqm_sym.emission.dissipative import speed_equation, static_balance
 from gqm_sym.emission.ir import ExactIR, FunctionIR, ModuleIR
 from gqm_sym.emission.load_map import load_map
 from gqm_sym.emission.printer import check_emittable
+from gqm_sym.emission.separated import separated_terms
 from gqm_sym.emission.subscripts import at
 from gqm_sym.kernels.base import CONTACT_SIGN, DIRECTION, W
 from gqm_sym.sympy_charts import chart_x, chart_z
@@ -54,6 +55,7 @@ def lower(model: Model, *, name: str, forms: tuple[tuple[str, Expr], ...]) -> Mo
         static_friction_limit=model.force.static_friction_limit,
         units=tuple(model.units.items()),
         chart=chart_maker(lowering),
+        separated=separated_terms(lowering),
     )
 
 

@@ -13,7 +13,7 @@ from sympy import Equality
 from sympy.printing.str import StrPrinter
 
 from gqm_sym.emission.functions import enclosure, exact_formula, loop
-from gqm_sym.emission.ir import ModuleIR
+from gqm_sym.emission.ir import ExactIR, ModuleIR, SeparatedIR
 from gqm_sym.emission.printer import FUNCTIONS
 from gqm_sym.errors import EmissionError
 
@@ -41,7 +41,7 @@ _OWN = frozenset(
         *("Any", "BatchFunctions", "CHART", "Dissipation", "ExactFormulas", "ExactPotential", "MODEL", "Motion"),
         *("PARAMETERS", "Sweep", "TYPE_CHECKING", "carray", "chart", "chart_of", "compiled", "compiler", "fabs"),
         *("op", "pass1", "place_from_ends", "range", "self", "solve", "sweep"),
-        *("Equilibrium", "between", "equilibria", "unknown"),
+        *("Equilibrium", "SeparatedTerms", "between", "equilibria", "unknown"),
     }
 )
 
@@ -57,10 +57,10 @@ class _Functions:
 
     def add(self, module: ModuleIR) -> None:
         """All functions of a module, in the order in which they are printed."""
-        chart = module.chart
+        chart, separated = module.chart, module.separated
         groups = (
             (self.single, (*module.functions, *(chart.functions if chart else ())), module.bounds),
-            (self.batch, module.batch, module.bounds_batch),
+            (self.batch, (*module.batch, *((separated.function,) if separated else ())), module.bounds_batch),
         )
         for texts, functions, enclosing in groups:
             for function in functions:
@@ -96,7 +96,7 @@ def render(module: ModuleIR, *, source: str) -> str:
         "defaults_line": defaults if len(defaults) <= _WIDTH - len("PARAMETERS = {}") else "",
         "functions": functions.single,
         "batch_functions": functions.batch,
-        "exact": [exact_formula(f) for f in (*module.exact, *(chart.exact if chart else ()))],
+        "exact": [exact_formula(f) for f in _exact_functions(module)],
         "data": list(chart.data) if chart else [],
         "parameter": module.parameter,
         "keywords": ", ".join(f"{name}: Any = {value!r}" for name, value in module.defaults),
@@ -121,6 +121,8 @@ def _imported(module: ModuleIR, functions: _Functions) -> set[str]:
         names.add(_exact_class(module))
     if module.dissipation:
         names.add("Dissipation")
+    if module.separated:
+        names.add("SeparatedTerms")
     if module.bounds_batch is not None:
         names.add("BatchFunctions")
     if any("chart_" in name for name in functions.called | functions.intervals):
@@ -148,12 +150,26 @@ def _model_fields(module: ModuleIR, names: list[str]) -> dict[str, Any]:
         "load_map": "load_map" if "load_map" in names else "",
         "batch": _listed(_batch(module), _WIDTH - 8),
         "chart": module.chart.statement if module.chart else "",
+        "separated": _separated(module.separated) if module.separated else "",
         "axes": next((f.name for f in module.exact if f.name == "exact_axes"), ""),
         "monotone": module.monotone,
         "dissipation": ", ".join(f"{flag}={value}" for flag, value in module.dissipation),
         "exact_class": _exact_class(module),
         "exact_formulas": _listed(_exact_formulas(module), _WIDTH - 8),
     }
+
+
+def _exact_functions(module: ModuleIR) -> list[ExactIR]:
+    """All formulas of a module over a namespace of operations, in the order in which they are printed."""
+    chart, separated = module.chart, module.separated
+    return [*module.exact, *(chart.exact if chart else ()), *((separated.factors,) if separated else ())]
+
+
+def _separated(terms: SeparatedIR) -> str:
+    """The arguments of ``SeparatedTerms``."""
+    held, loads = tuple(index for _, index in terms.function.parameters), len(terms.factors.outputs) - terms.potentials
+    counts = f"potentials={terms.potentials}, loads={loads}, held={held!r}"
+    return f"{terms.function.name}, {terms.factors.name}, {counts}"
 
 
 def _exact_formulas(module: ModuleIR) -> list[str]:

@@ -22,6 +22,7 @@ bounds                 lo, hi, p, out                 lower and upper bound of d
 speed_equation         n, lam, v2, v, nu, p, out      ds/dlam, P [m2/s2/[lam]], Q [1/[lam]], n0 [m/s2], kappa
 static_balance         n, lam, p, out                 tangential acceleration of a body at rest that is about to move
                                                       forwards, and backwards, its static friction included [m/s2]
+separated_terms        n, a, lam, d, p, out           parts of U[a, lam], ds/dlam, kappa, parts of n0 = N/m at rest
 segment                n, lam, p, out                 x, z, ds/dlam, dx/ds, dz/ds, kappa of a piece of a rail
 field                  n, x, z, p, out                F, F_x, F_z, F_xx, F_xz, F_zz of an implicit curve F = 0
 ====================== ============================== ===============================================================
@@ -31,6 +32,9 @@ dissipative one has ``speed_equation`` and ``static_balance`` instead, and the f
 energy and its equilibria, compiled when these are first asked for. On a leg with the signs v = sgn(ds/dt) and
 nu = sgn(N), ``dW/dlam = P - Q*W`` with W = V**2 (MATHS, section 2). For a law that is not linear in W, P and Q are its
 linearisation at the ``v2`` given: ``P - Q*v2`` is the law itself there. The contact force is ``N = m*(kappa*W + n0)``.
+
+``separated_terms`` belongs to charted curves: U and n0 are sums of its parts times factors (`SeparatedTerms`), and it
+reads no other run-time parameters than those that it holds. Compiled when a sweep first asks for it.
 
 ``load_map`` fills all that a load map shows, with V**2 = ``w0`` - 2*(U(lam) - ``level``). A module has it only where
 the size of the terms of U is known.
@@ -84,6 +88,7 @@ EFFECTIVE_POTENTIAL = types.void(types.intp, MANY, MANY, MANY)
 POTENTIAL_DIVDIFF1 = types.void(types.intp, REAL, MANY, MANY, MANY, MANY)
 POTENTIAL_DIVDIFF2 = types.void(types.intp, REAL, REAL, MANY, MANY, MANY, MANY)
 BOUNDS = types.void(REAL, REAL, MANY, MANY)
+SEPARATED_TERMS = POTENTIAL_DIVDIFF1
 
 POTENTIAL_DIVDIFF1_BATCH = types.void(types.intp, MANY, MANY, MANY, MANY, MANY)
 POTENTIAL_DIVDIFF2_BATCH = types.void(types.intp, MANY, MANY, MANY, MANY, MANY, MANY)
@@ -171,6 +176,29 @@ class Dissipation(NamedTuple):
     friction: bool
     kinked: bool
     linear: bool
+
+
+class SeparatedTerms(NamedTuple):
+    """Potential and load along a charted curve as sums of products, so that one table serves all factors.
+
+    Attributes
+    ----------
+    function : jit.Later
+        What depends on the place.
+    factors : callable
+        ``f(op, p)`` gives what depends on parameters alone: a factor for each part of U, then for each of n0. ``p`` are
+        the run-time parameters and what stands behind them.
+    potentials, loads : int
+        How many parts U and n0 have.
+    held : tuple of int
+        Where in ``p`` the numbers stand that ``function`` reads.
+    """
+
+    function: Any
+    factors: Callable[..., Any]
+    potentials: int
+    loads: int
+    held: tuple[int, ...]
 
 
 class ExactPotential(NamedTuple):

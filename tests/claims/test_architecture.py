@@ -143,6 +143,7 @@ TESTED_THROUGH = {
     "sweep/liftoff.py": "runtime/sweep/test_charts.py",
     "sweep/orbit.py": "runtime/sweep/test_sweep.py",
     "sweep/orbit_extremes.py": "runtime/sweep/test_sweep.py",
+    "sweep/panel_forces.py": "runtime/sweep/test_charts.py",
     "sweep/passage.py": "runtime/sweep/test_charts.py",
     "sweep/quantities.py": "runtime/sweep/test_sweep.py",
     "sweep/scalar.py": "runtime/sweep/test_sweep.py",

@@ -49,6 +49,7 @@ call_effective_potential = _caller("effective_potential")
 call_potential_divdiff1 = _caller("potential_divdiff1")
 call_potential_divdiff2 = _caller("potential_divdiff2")
 call_bounds = _caller("bounds")
+call_separated_terms = _caller("separated_terms")
 
 call_potential_divdiff1_batch = _caller("potential_divdiff1_batch")
 call_potential_divdiff2_batch = _caller("potential_divdiff2_batch")

@@ -11,12 +11,19 @@ import numpy as np
 
 from gqm_sym.budgets import budget
 from gqm_sym.errors import ParameterError, renamed
-from gqm_sym.literals.namespaces import FLOATS
+from gqm_sym.literals.namespaces import ARRAYS, FLOATS
 from gqm_sym.literals.numbers import Number, read_number
 from gqm_sym.runtime.charts.chart import Chart, ChartMaker
 from gqm_sym.runtime.compiled.jit import Later
 from gqm_sym.runtime.compiled.types import Array
-from gqm_sym.runtime.interface import Addresses, BatchFunctions, Dissipation, ExactFormulas, ExactPotential
+from gqm_sym.runtime.interface import (
+    Addresses,
+    BatchFunctions,
+    Dissipation,
+    ExactFormulas,
+    ExactPotential,
+    SeparatedTerms,
+)
 from gqm_sym.runtime.launch.domain import Domain, DomainNumbers
 
 # Bits to which sines and cosines of parameters such as pi/2 must vanish to count as zero.
@@ -125,6 +132,8 @@ class Formulas:
     trigonometric : callable or None
         ``f(op, p)`` gives sines, cosines and tangents of parameters alone, whose values compiled functions read behind
         the parameters; None where there are none.
+    separated : SeparatedTerms or None
+        Potential and load along a charted curve as sums of products; None where a table belongs to all parameters.
     """
 
     name: str
@@ -148,6 +157,7 @@ class Formulas:
     bounds: Later | None = None
     inertia: Callable[..., Any] | None = None
     trigonometric: Callable[..., Any] | None = None
+    separated: SeparatedTerms | None = None
     units: Mapping[str, str] = field(default_factory=dict)
     text: str = field(init=False, repr=False, compare=False)
     _read: Callable[..., "ParameterValues"] = field(init=False, repr=False, compare=False)
@@ -206,6 +216,17 @@ class Formulas:
         """Sines, cosines and tangents of the run-time parameters, over a namespace of operations."""
         values = () if self.trigonometric is None else self.trigonometric(operations, p)
         return values if isinstance(values, tuple) else (values,)
+
+    def separated_factors(self, p: Sequence[Array]) -> list[Array]:
+        """What stands before the parts of potential and load (`interface.SeparatedTerms`), for arrays of parameters.
+
+        A factor does not depend on how many others are asked for: elementary functions of NumPy may differ in their
+        last bits between single numbers and arrays, and between arrays with and without gaps.
+        """
+        assert self.separated is not None
+        with np.errstate(all="ignore"):
+            found = self.separated.factors(ARRAYS, tuple(np.atleast_1d(np.ascontiguousarray(column)) for column in p))
+        return [np.asarray(factor, dtype=np.float64) for factor in found]
 
     def trigonometric_values(self, numbers: Sequence[Number]) -> tuple[float, ...]:
         """Sines, cosines and tangents of the run-time parameters, as doubles; of multiples of pi they are exact.

@@ -17,6 +17,7 @@ from gqm_sym.runtime.sweep.curve_table import (
     potential_on,
     value_on,
 )
+from gqm_sym.runtime.sweep.panel_forces import FAR, LOAD, NEAR, prepare
 from gqm_sym.runtime.sweep.passage import edge_place, locate
 
 # Steps of the search for a zero of N between two samples.
@@ -24,25 +25,26 @@ MAX_STEPS = 80
 
 
 @Inner
-def signed_force(rows, k, slack, side, x):  # type: ignore[no-untyped-def]
-    """N at a place of panel k, positive where the track pushes; zero where it is zero within rounding."""
-    inertia = 2.0 * value_on(rows, k, KAPPA_TERMS, x) * (slack - potential_on(rows, k, x))
+def signed_force(curve, k, slack, side, x):  # type: ignore[no-untyped-def]
+    """N per unit mass at a place of panel k, positive where the track pushes; zero where it is zero within rounding."""
+    rows = curve.rows
+    inertia = 2.0 * value_on(curve.table.paths, k, KAPPA_TERMS, x) * (slack - potential_on(rows, k, x))
     load = value_on(rows, k, LOAD_TERMS, x)
     force = inertia + load
     return side * force if fabs(force) > ROUNDING_SHARE * (fabs(inertia) + fabs(load)) else 0.0
 
 
 @Inner
-def change_between(rows, k, slack, side, before, after):  # type: ignore[no-untyped-def]
+def change_between(curve, k, slack, side, before, after):  # type: ignore[no-untyped-def]
     """Where N changes its sign between a place of panel k at which the track pushes and one at which it pulls."""
     pushes, pulls = before, after
-    f, g = signed_force(rows, k, slack, side, pushes), signed_force(rows, k, slack, side, pulls)
+    f, g = signed_force(curve, k, slack, side, pushes), signed_force(curve, k, slack, side, pulls)
     for step in range(MAX_STEPS):
         middle = 0.5 * (pushes + pulls)
         x = middle if step % 3 == 2 or not f > g else pushes + (pulls - pushes) * f / (f - g)
         if not min(pushes, pulls) < x < max(pushes, pulls):
             return x if fabs(pulls - pushes) > 2.0**-50 else middle
-        value = signed_force(rows, k, slack, side, x)
+        value = signed_force(curve, k, slack, side, x)
         if value < 0.0:
             pulls, g = x, value
         else:
@@ -69,10 +71,11 @@ def loss_on_way(curve, passage, slacks, side, begin, sense):  # type: ignore[no-
     -------
     j, x : the place; j is -1 if there is none
     """
-    rows, count, last = curve.table.rows, curve.table.tops.size, passage.panels - 1
+    rows, paths, count, last = curve.rows, curve.table.paths, curve.levels.size, passage.panels - 1
     j, start = begin
     while 0 <= j <= last:
         k, slack = (passage.first + j) % count, slacks[j]
+        prepare(curve, k, FAR | LOAD)
         stop = float(sense)
         if j == (last if sense > 0 else 0):
             stop = passage.high_x if sense > 0 else passage.low_x
@@ -82,11 +85,12 @@ def loss_on_way(curve, passage, slacks, side, begin, sense):  # type: ignore[no-
             if whole:
                 at = i if sense > 0 else SAMPLES - 1 - i
                 v2 = 2.0 * (slack - rows[k, POTENTIAL_SAMPLES + at])
-                force = side * (rows[k, KAPPA_SAMPLES + at] * v2 + rows[k, LOAD_SAMPLES + at])
+                force = side * (paths[k, KAPPA_SAMPLES + at] * v2 + rows[k, LOAD_SAMPLES + at])
             if not whole or force < 0.0:
-                force = signed_force(rows, k, slack, side, x)
+                prepare(curve, k, NEAR)
+                force = signed_force(curve, k, slack, side, x)
             if force < 0.0:
-                return j, change_between(rows, k, slack, side, before, x) if i > 0 else x
+                return j, change_between(curve, k, slack, side, before, x) if i > 0 else x
             before = x
         j, start = j + sense, -float(sense)
     return -1, 0.0
@@ -109,7 +113,7 @@ def liftoff_place(curve, orbit, passage, slacks, side):  # type: ignore[no-untyp
         if way == 0 and lost == j and where == x:
             return orbit.lam0
         if lost >= 0:
-            k = (passage.first + lost) % table.tops.size
+            k = (passage.first + lost) % curve.levels.size
             half = 0.5 * (table.edges[k + 1] - table.edges[k])
             return edge_place(table, period, passage.first + lost) + half * (1.0 + where)
     return np.nan

@@ -16,15 +16,25 @@ class SweptCurve(NamedTuple):
         The places at which the curve is not smooth, within one period.
     period : float
         The period of a closed curve, 0 otherwise.
+    mass : float
+        The mass of the body.
     table : CurveTable
-        The curve tabulated for all launches; empty where each has parameters of its own, and for formulas.
+        The curve tabulated; empty if it is not.
+    factors : array
+        What the parts of the potential and of the load in the table are multiplied with.
+    rows, levels : arrays
+        Potential and load of the launch on each panel, and how far they are filled in (`panel_forces`).
     """
 
     fns: Any
     p: Any
     joints: Any
     period: Any
+    mass: Any
     table: Any
+    factors: Any
+    rows: Any
+    levels: Any
 
 
 class Orbit(NamedTuple):

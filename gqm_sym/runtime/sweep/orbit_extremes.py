@@ -20,6 +20,7 @@ from gqm_sym.runtime.sweep.curve_table import (
     potential_on,
     value_on,
 )
+from gqm_sym.runtime.sweep.panel_forces import FAR, LOAD, NEAR, prepare
 
 # Intervals of the first grid, in equal steps of the phase angle; how often the best point is refined; and the factor by
 # which the step shrinks each time.
@@ -101,29 +102,35 @@ def extreme(fns, p, orbit, force, sign):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def load_on(rows, k, slack, force, x):  # type: ignore[no-untyped-def]
-    """V**2, or the contact force if ``force`` is set, at a place of panel k; V**2/2 is ``slack`` at its left edge."""
-    v2 = 2.0 * (slack - potential_on(rows, k, x))
-    return value_on(rows, k, KAPPA_TERMS, x) * v2 + value_on(rows, k, LOAD_TERMS, x) if force else v2
+def load_on(curve, k, slack, force, x):  # type: ignore[no-untyped-def]
+    """V**2, or the contact force per unit mass if ``force`` is set, at a place of panel k.
+
+    V**2/2 is ``slack`` at the panel's left edge.
+    """
+    v2 = 2.0 * (slack - potential_on(curve.rows, k, x))
+    if force:
+        return value_on(curve.table.paths, k, KAPPA_TERMS, x) * v2 + value_on(curve.rows, k, LOAD_TERMS, x)
+    return v2
 
 
 @Inner
-def refined(rows, k, slack, force, sign, x, ends):  # type: ignore[no-untyped-def]
+def refined(curve, k, slack, force, sign, x, ends):  # type: ignore[no-untyped-def]
     """The largest (``sign`` 1) or smallest (-1) value next to a place between two ends on panel k, by parabolas."""
+    prepare(curve, k, NEAR)
     low, high = ends
-    best, step = load_on(rows, k, slack, force, x), FIRST_STEP
+    best, step = load_on(curve, k, slack, force, x), FIRST_STEP
     for _ in range(REFINEMENTS + 1):
         left, right = max(x - step, low), min(x + step, high)
         if not left < x < right:
             x = 0.5 * (left + right)
-        f0 = load_on(rows, k, slack, force, left)
-        f1 = load_on(rows, k, slack, force, x)
-        f2 = load_on(rows, k, slack, force, right)
+        f0 = load_on(curve, k, slack, force, left)
+        f1 = load_on(curve, k, slack, force, x)
+        f2 = load_on(curve, k, slack, force, right)
         before, after = (x - left) * (f1 - f2), (x - right) * (f1 - f0)
         if before != after:
             vertex = x - 0.5 * ((x - left) * before - (x - right) * after) / (before - after)
             x = min(max(vertex, left), right)
-        found = load_on(rows, k, slack, force, x)
+        found = load_on(curve, k, slack, force, x)
         best = sign * max(sign * best, sign * f0, sign * f1, sign * f2, sign * found)
         step /= STEP_RATIO
     return best
@@ -132,19 +139,21 @@ def refined(rows, k, slack, force, sign, x, ends):  # type: ignore[no-untyped-de
 @Inner
 def best_sample(curve, passage, slacks, force, sign):  # type: ignore[no-untyped-def]
     """The largest value times ``sign`` of V**2 or of the contact force at the samples, its panel, and where on it."""
-    rows, count, last = curve.table.rows, curve.table.tops.size, passage.panels - 1
+    rows, paths, count, last = curve.rows, curve.table.paths, curve.levels.size, passage.panels - 1
     best, best_j, best_x = -inf, 0, 0.0
     for j in range(passage.panels):
         k, slack = (passage.first + j) % count, slacks[j]
         low, high = passage.low_x if j == 0 else -1.0, passage.high_x if j == last else 1.0
+        prepare(curve, k, (FAR | LOAD if force else FAR) | (0 if 0 < j < last else NEAR))
         for i in range(SAMPLES):
             x = SAMPLE_POINTS[i]
             if 0 < j < last:
                 v2 = 2.0 * (slack - rows[k, POTENTIAL_SAMPLES + i])
-                value = rows[k, KAPPA_SAMPLES + i] * v2 + rows[k, LOAD_SAMPLES + i] if force else v2
+                value = paths[k, KAPPA_SAMPLES + i] * v2 + rows[k, LOAD_SAMPLES + i] if force else v2
             else:
-                x = low + (high - low) * i / (SAMPLES - 1)
-                value = load_on(rows, k, slack, force, x)
+                # The end itself, for the next panel shares it.
+                x = low + (high - low) * i / (SAMPLES - 1) if i < SAMPLES - 1 else high
+                value = load_on(curve, k, slack, force, x)
             if sign * value > best:
                 best, best_j, best_x = sign * value, j, x
     return best, best_j, best_x
@@ -158,7 +167,7 @@ def passage_extreme(curve, orbit, passage, slacks, force, sign):  # type: ignore
     """
     if not (orbit.circulates or force or sign > 0.0):
         return 0.0  # at a turning point
-    rows, count, last = curve.table.rows, curve.table.tops.size, passage.panels - 1
+    count, last = curve.levels.size, passage.panels - 1
     best, best_j, best_x = best_sample(curve, passage, slacks, force, sign)
     for step in range(-1, 2):
         # On the panel itself, and on that which it shares the place with.
@@ -170,6 +179,6 @@ def passage_extreme(curve, orbit, passage, slacks, force, sign):  # type: ignore
         if shared:
             ends = passage.low_x if j == 0 else -1.0, passage.high_x if j == last else 1.0
             k = (passage.first + j) % count
-            best = max(best, sign * refined(rows, k, slacks[j], force, sign, x, ends))
+            best = max(best, sign * refined(curve, k, slacks[j], force, sign, x, ends))
     value = sign * best
-    return value if force else sqrt(max(value, 0.0))
+    return curve.mass * value if force else sqrt(max(value, 0.0))

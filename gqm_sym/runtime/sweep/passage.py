@@ -18,6 +18,7 @@ from gqm_sym.runtime.launch.zeros import CONSTANT_SHARE, CRITICAL, LIMIT, TURN
 from gqm_sym.runtime.quadrature.time_panels import MIN_CANCELLATION_RATIO
 from gqm_sym.runtime.sweep.curve_table import (
     BASE,
+    BASE_SIZE,
     DS_TERMS,
     FEW_NODES,
     FEW_POTENTIAL,
@@ -32,13 +33,13 @@ from gqm_sym.runtime.sweep.curve_table import (
     POINTS,
     POTENTIAL,
     REACH,
-    SLOPE_SIGN,
     WEIGHTS,
     difference_on,
     potential_on,
     value_on,
 )
 from gqm_sym.runtime.sweep.orbit import Orbit
+from gqm_sym.runtime.sweep.panel_forces import FAR, HIGHEST, NEAR, SLOPE_SIGN, TOP, prepare
 
 # By how much V**2 at the middle of a panel must exceed what the panel's rule needs.
 SAFETY = 1.05
@@ -77,7 +78,7 @@ class Passage(NamedTuple):
 def locate(table, period, place):  # type: ignore[no-untyped-def]
     """The index of the panel that a place lies on, and where in [-1, 1] on it."""
     edges = table.edges
-    count, laps = table.tops.size, 0.0
+    count, laps = edges.size - 1, 0.0
     if period > 0.0:
         laps = floor((place - edges[0]) / period)
         place = place - laps * period
@@ -96,7 +97,7 @@ def locate(table, period, place):  # type: ignore[no-untyped-def]
 @Inner
 def edge_place(table, period, index):  # type: ignore[no-untyped-def]
     """The place of the left edge of a panel; on a closed curve by its index over all laps."""
-    count = table.tops.size
+    count = table.edges.size - 1
     if period == 0.0:
         return table.edges[index]
     lap = index // count
@@ -132,19 +133,23 @@ def turn_from(curve, start, x, w0, direction):  # type: ignore[no-untyped-def]
 
     It is TURN, LIMIT (an end of the curve, or a whole lap) or CRITICAL where the table does not decide it.
     """
-    table, period = curve.table, curve.period
-    rows, count = table.rows, table.tops.size
+    rows, count, period = curve.rows, curve.levels.size, curve.period
     index = start
     k = index % count
+    prepare(curve, k, FAR | NEAR)
     energy = 0.5 * w0 + rows[k, BASE] + potential_on(rows, k, x)
-    margin = CONSTANT_SHARE * (0.5 * w0 + fabs(energy))
+    margin = CONSTANT_SHARE * (0.5 * w0 + max(fabs(energy), rows[k, BASE_SIZE]))
     for passed in range(count + 1):
-        if not table.tops[k] < energy - margin - CONSTANT_SHARE * fabs(rows[k, BASE]):
+        prepare(curve, k, FAR)
+        error = margin + CONSTANT_SHARE * rows[k, BASE_SIZE]
+        may_turn = not rows[k, HIGHEST] < energy - error
+        if may_turn:
+            prepare(curve, k, NEAR)
+        if may_turn and not rows[k, TOP] < energy - error:
             sign, slack = rows[k, SLOPE_SIGN] * direction, energy - rows[k, BASE]
-            if sign == 0.0 or not table.tops[k] < np.inf:
+            if sign == 0.0 or not rows[k, TOP] < np.inf:
                 return CRITICAL, index, x
             if sign > 0.0:
-                error = margin + CONSTANT_SHARE * fabs(rows[k, BASE])
                 left = slack - (rows[k, INCREASE] if direction > 0 else 0.0)
                 if fabs(left) <= error:
                     return CRITICAL, index, x
@@ -166,13 +171,13 @@ def turn_from(curve, start, x, w0, direction):  # type: ignore[no-untyped-def]
 def polished(curve, lam0, w0, index, x):  # type: ignore[no-untyped-def]
     """The offset of a turning point from the launch, and its place on its panel, by a step of Newton's method."""
     table = curve.table
-    k = index % table.tops.size
+    k = index % curve.levels.size
     left, half = edge_place(table, curve.period, index), 0.5 * (table.edges[k + 1] - table.edges[k])
     place, offset, out = np.empty(1), np.empty(1), np.empty((2, 1))
     offset[0] = (left - lam0) + half * (1.0 + x)
     place[0] = lam0 + offset[0]
     call_potential_divdiff1(curve.fns.potential_divdiff1, 1, lam0, place, offset, curve.p, out)
-    step = (0.5 * w0 - offset[0] * out[0, 0]) / (difference_on(table.rows, k, x, x) / half)
+    step = (0.5 * w0 - offset[0] * out[0, 0]) / (difference_on(curve.rows, k, x, x) / half)
     return offset[0] + step, x + step / half
 
 
@@ -180,13 +185,14 @@ def polished(curve, lam0, w0, index, x):  # type: ignore[no-untyped-def]
 def find_passage(curve, lam0, v0, direction):  # type: ignore[no-untyped-def]
     """The orbit of a launch and the panels that it passes; no panels where the table does not decide."""
     table, w0 = curve.table, v0 * v0
-    count = table.tops.size
+    count = curve.levels.size
     none = Orbit(False, False, direction, lam0, w0, 0.0, 0.0), Passage(0, 0, 0.0, 0.0, 0.0)
     if count == 0:
         return none
     start, x = locate(table, curve.period, lam0)
     if w0 == 0.0:
-        direction = -int(table.rows[start % count, SLOPE_SIGN])
+        prepare(curve, start % count, FAR | NEAR)
+        direction = -int(curve.rows[start % count, SLOPE_SIGN])
         if direction == 0 or fabs(x) == 1.0:
             return none
     ahead, front, front_x = turn_from(curve, start, x, w0, direction)
@@ -214,11 +220,11 @@ def find_passage(curve, lam0, v0, direction):  # type: ignore[no-untyped-def]
 def passage_of(curve, orbit):  # type: ignore[no-untyped-def]
     """The panels that a known orbit passes; none if the curve is not tabulated."""
     table = curve.table
-    if table.tops.size == 0:
+    if curve.levels.size == 0:
         return Passage(0, 0, 0.0, 0.0, 0.0)
     first, low_x = locate(table, curve.period, orbit.lam0 + orbit.low)
     if orbit.circulates:
-        return Passage(first, table.tops.size + 1, low_x, low_x, curve.period)
+        return Passage(first, curve.levels.size + 1, low_x, low_x, curve.period)
     last, high_x = locate(table, curve.period, orbit.lam0 + orbit.high)
     inside = table.edges[0] <= orbit.lam0 + orbit.low and orbit.lam0 + orbit.high <= table.edges[-1]
     panels = last - first + 1 if inside or curve.period > 0.0 else 0
@@ -231,7 +237,9 @@ def fill_slacks(curve, passage, w0, circulates, slacks):  # type: ignore[no-unty
 
     They are sums from the nearer turning point. On a panel that has one they are as if the curve went on beyond it.
     """
-    rows, count, last = curve.table.rows, curve.table.tops.size, passage.panels - 1
+    rows, count, last = curve.rows, curve.levels.size, passage.panels - 1
+    for j in range(passage.panels):
+        prepare(curve, (passage.first + j) % count, FAR | NEAR if j in (0, last) else FAR)
     middle = last if circulates else last // 2
     k, high = passage.first % count, (passage.first + last) % count
     slacks[0] = potential_on(rows, k, passage.low_x) + (0.5 * w0 if circulates else 0.0)
@@ -269,16 +277,16 @@ def is_upper(passage, j):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def fill_rates(table, passage, circulates, j, slack, gap, u, out):  # type: ignore[no-untyped-def]
+def fill_rates(curve, passage, circulates, j, slack, gap, u, out):  # type: ignore[no-untyped-def]
     """Fill the time per unit of u on panel j of a passage at the Gauss points u.
 
     u is the orbit's phase angle, or the place on the panel if the body circulates. Phase angles are counted from the
     nearer end, because a small time next to it needs a small angle with all digits. ``slack`` and ``gap`` belong to the
     panel's edge that is nearer to that end: V**2/2 there, and the distance from the end.
     """
-    rows, last = table.rows, passage.panels - 1
-    k = (passage.first + j) % table.tops.size
-    half = 0.5 * (table.edges[k + 1] - table.edges[k])
+    rows, edges, last = curve.rows, curve.table.edges, passage.panels - 1
+    k = (passage.first + j) % curve.levels.size
+    half = 0.5 * (edges[k + 1] - edges[k])
     for i in range(NODES):
         x, numerator = u[i], half * half
         if circulates:
@@ -300,13 +308,14 @@ def fill_rates(table, passage, circulates, j, slack, gap, u, out):  # type: igno
                 rest = (below - gap) / half
                 x, y, at_y, factor, numerator = rest - 1.0, -1.0, slack, -rest, below * above
             fall = at_y + factor * difference_on(rows, k, y, x)
-        out[i] = value_on(rows, k, DS_TERMS, x) * sqrt(numerator / (2.0 * fall))
+        out[i] = value_on(curve.table.paths, k, DS_TERMS, x) * sqrt(numerator / (2.0 * fall))
 
 
 @Inner
-def time_on_part(table, passage, circulates, j, slack, gap, begin, end):  # type: ignore[no-untyped-def]
+def time_on_part(curve, passage, circulates, j, slack, gap, begin, end):  # type: ignore[no-untyped-def]
     """The time between two values of u (`fill_rates`) on panel j of a passage; NaN where it is not accurate."""
     u, rates = angle_buffer(), rates_buffer()
+    prepare(curve, (passage.first + j) % curve.levels.size, NEAR)
     parts = 1
     for _ in range(MAX_HALVINGS):
         total, resolved = 0.0, True
@@ -315,7 +324,7 @@ def time_on_part(table, passage, circulates, j, slack, gap, begin, end):  # type
             middle = begin + (2 * part + 1) * half
             for i in range(NODES):
                 u[i] = middle + half * POINTS[i]
-            fill_rates(table, passage, circulates, j, slack, gap, u, rates)
+            fill_rates(curve, passage, circulates, j, slack, gap, u, rates)
             size, last, before = 0.0, 0.0, 0.0
             for i in range(NODES):
                 size += GAUSS_WEIGHTS[i] * rates[i]
@@ -330,20 +339,22 @@ def time_on_part(table, passage, circulates, j, slack, gap, begin, end):  # type
 
 
 @Inner
-def time_on_panel(rows, k, slack):  # type: ignore[no-untyped-def]
+def time_on_panel(curve, k, slack):  # type: ignore[no-untyped-def]
     """The time on a whole panel far from turning points by its own Gauss points; NaN if it is too near to one."""
+    rows, paths = curve.rows, curve.table.paths
     distance, total = slack - rows[k, MIDDLE], 0.0
     if distance > SAFETY * rows[k, FEW_REACH]:
         few = few_rates()
         for i in range(FEW_NODES):
-            few[i] = rows[k, FEW_WEIGHTS + i] / sqrt(2.0 * (slack - rows[k, FEW_POTENTIAL + i]))
+            few[i] = paths[k, FEW_WEIGHTS + i] / sqrt(2.0 * (slack - rows[k, FEW_POTENTIAL + i]))
         for i in range(FEW_NODES):
             total += few[i]
         return total
     if distance > SAFETY * rows[k, REACH]:
+        prepare(curve, k, NEAR)
         rates = rates_buffer()
         for i in range(NODES):
-            rates[i] = rows[k, WEIGHTS + i] / sqrt(2.0 * (slack - rows[k, POTENTIAL + i]))
+            rates[i] = paths[k, WEIGHTS + i] / sqrt(2.0 * (slack - rows[k, POTENTIAL + i]))
         for i in range(NODES):
             total += rates[i]
         return total
@@ -363,7 +374,7 @@ def time_between(curve, orbit, passage, slacks, lower, upper):  # type: ignore[n
     ``lower`` and ``upper`` are the distances of each from both ends of the orbit.
     """
     table, total = curve.table, 0.0
-    count, last, right = table.tops.size, passage.panels - 1, 0.0
+    count, last, right = curve.levels.size, passage.panels - 1, 0.0
     for j in range(passage.panels):
         k = (passage.first + j) % count
         size = table.edges[k + 1] - table.edges[k]
@@ -375,7 +386,7 @@ def time_between(curve, orbit, passage, slacks, lower, upper):  # type: ignore[n
             continue
         begins, ends = left <= lower[0], right >= upper[0]
         if not (begins or ends):
-            time = time_on_panel(table.rows, k, slacks[j])
+            time = time_on_panel(curve, k, slacks[j])
             if time == time:
                 total += time
                 continue
@@ -395,7 +406,7 @@ def time_between(curve, orbit, passage, slacks, lower, upper):  # type: ignore[n
                     rest = 0.5 * (1.0 + passage.high_x) * (table.edges[beyond + 1] - table.edges[beyond])
                     gap = rest if j == last - 1 else passage.width - right
             begin, end = phase_of(first[0], first[1]), phase_of(second[0], second[1])
-        total += time_on_part(table, passage, orbit.circulates, j, slack, gap, begin, end)
+        total += time_on_part(curve, passage, orbit.circulates, j, slack, gap, begin, end)
     return total
 
 

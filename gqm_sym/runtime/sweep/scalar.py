@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numba import types
+from numpy.typing import NDArray
 
 from gqm_sym.runtime.compiled.jit import Inlined, Inner, entry
 from gqm_sym.runtime.compiled.registers import uncounted
@@ -42,6 +43,7 @@ from gqm_sym.runtime.sweep.curve_table import TABLE, CurveTable
 from gqm_sym.runtime.sweep.liftoff import liftoff_place
 from gqm_sym.runtime.sweep.orbit import Orbit, SweptCurve
 from gqm_sym.runtime.sweep.orbit_extremes import extreme, passage_extreme
+from gqm_sym.runtime.sweep.panel_forces import take_factors
 from gqm_sym.runtime.sweep.passage import Passage, fill_slacks, find_passage, passage_of, travel_time
 from gqm_sym.runtime.sweep.quantities import (
     ANSWERED,
@@ -75,7 +77,13 @@ class GivenCurve(NamedTuple):
     joints : array
         The places at which the curve is not smooth, within one period.
     table : CurveTable
-        The curve tabulated, if all launches have the same parameters; else an empty one.
+        The curve tabulated; empty if it is not.
+    factor_columns : (n, 2) array
+        For each part of its potential and load the factors of the launches, as `strided.pointers` gives them.
+    factors, rows, levels : arrays
+        Buffers for what `SweptCurve` has under these names; the levels are 0.
+    mass : int
+        Which run-time parameter is the mass of the body.
     side : int
         1 if the track can only push along the normal, -1 if only against it, 0 if it can push and pull.
     t_max : float
@@ -85,11 +93,19 @@ class GivenCurve(NamedTuple):
     parameters: Array
     joints: Array
     table: CurveTable
+    factor_columns: NDArray[np.int64]
+    factors: Array
+    rows: Array
+    levels: NDArray[np.int8]
+    mass: int
     side: int
     t_max: float
 
 
-GIVEN = types.NamedTuple((VECTOR, VECTOR, TABLE, types.int64, REAL), GivenCurve)
+GIVEN = types.NamedTuple(
+    (VECTOR, VECTOR, TABLE, types.int64[:, ::1], VECTOR, MATRIX, types.int8[::1], types.int64, types.int64, REAL),
+    GivenCurve,
+)
 
 
 class Buffers(NamedTuple):
@@ -245,9 +261,13 @@ def answer_one_by_one(fns, columns, monotone, quantity, spans, answers, given): 
     given : GivenCurve
         What all launches share.
     """
-    buffers = Buffers(trapezoid_workspace(), trapezoid_rates(), np.empty(given.table.tops.size + 1))
+    panels, count = given.levels.size, given.factors.size
+    buffers = Buffers(trapezoid_workspace(), trapezoid_rates(), np.empty(panels + 1))
+    taken = np.empty(count)
     p, joints, side, t_max = uncounted(given.parameters), uncounted(given.joints), given.side, given.t_max
-    table = CurveTable(uncounted(given.table.edges), uncounted(given.table.tops), uncounted(given.table.rows))
+    edges, paths, parts = uncounted(given.table.edges), uncounted(given.table.paths), uncounted(given.table.parts)
+    table = CurveTable(edges, paths, parts, given.table.potentials)
+    rows, levels, factors = uncounted(given.rows), uncounted(given.levels), uncounted(given.factors)
     columns, spans, values = uncounted(columns), uncounted(spans), uncounted(answers.values)
     statuses, routes = uncounted(answers.status), uncounted(answers.route)
     for k in range(statuses.size):
@@ -256,7 +276,11 @@ def answer_one_by_one(fns, columns, monotone, quantity, spans, answers, given): 
             continue
         for row in range(columns.shape[0] - PARAMETERS):
             p[row] = element(columns, PARAMETERS + row, k)
-        curve = SweptCurve(fns, p, joints, element(columns, DOMAIN_PERIOD, k), table)
+        period = element(columns, DOMAIN_PERIOD, k)
+        curve = SweptCurve(fns, p, joints, period, p[given.mass], table, factors, rows, levels)
+        for i in range(count):
+            taken[i] = element(given.factor_columns, i, k)
+        take_factors(curve, taken)
         status, orbit, passage = find_orbit(curve, columns, k, monotone, spans, known)
         if status == ANSWERED:
             target = element(columns, TARGET, k)

@@ -19,15 +19,15 @@ from gqm_sym.runtime.charts.chart import ChartMaker
 from gqm_sym.runtime.compiled.strided import PARAMETERS, lay_out, pointers, widen
 from gqm_sym.runtime.compiled.threads import run_in_threads
 from gqm_sym.runtime.compiled.types import Array
-from gqm_sym.runtime.interface import Addresses
 from gqm_sym.runtime.launch.formulas import chart_with
 from gqm_sym.runtime.launch.request import CONTACTS, LaunchRequest
 from gqm_sym.runtime.launch.speed import potential_at
 from gqm_sym.runtime.multiprecision.exact_problem import NOWHERE
 from gqm_sym.runtime.sweep import quantities, scalar
 from gqm_sym.runtime.sweep.batch.batches import answer_batches
-from gqm_sym.runtime.sweep.curve_table import NO_TABLE, CurveTable, tabulate
+from gqm_sym.runtime.sweep.curve_table import NO_TABLE, CurveTable, Source, tabulate
 from gqm_sym.runtime.sweep.dissipative_loop import MIN_BODIES_PER_THREAD, answer_driven, asked_of_bodies
+from gqm_sym.runtime.sweep.panel_forces import ROW
 from gqm_sym.runtime.sweep.quantities import QUANTITIES, Answers, Quantity
 from gqm_sym.runtime.sweep.result import Sweep
 
@@ -227,8 +227,12 @@ class Asked(NamedTuple):
     t_max: float
 
 
+# The factors of a potential and a load that are tabulated as a whole.
+_WHOLE = [np.ones(1), np.ones(1)]
+
+
 class Group(NamedTuple):
-    """Launches on curves of one shape.
+    """Launches on curves of one shape, which share a table.
 
     Attributes
     ----------
@@ -238,7 +242,9 @@ class Group(NamedTuple):
         What compiled code reads behind the parameters, and the places within one period at which the curve is not
         smooth, and at which its tangent jumps; all are empty for a curve with formulas.
     table : CurveTable
-        The curve tabulated, where all launches have the same parameters and no energy is lost.
+        The curve tabulated, where no energy is lost.
+    factors : list of arrays
+        What each launch multiplies the parts of potential and load in the table with.
     """
 
     columns: list[Array]
@@ -246,6 +252,7 @@ class Group(NamedTuple):
     joints: Array = NOWHERE
     corners: Array = NOWHERE
     table: CurveTable = NO_TABLE
+    factors: list[Array] = _WHOLE
 
 
 def _groups(
@@ -258,18 +265,43 @@ def _groups(
     if formulas.chart is None:
         domain = [widen(value, shape) for value in _domain_columns(formulas, columns[4:])]
         table = _tabulated_range(formulas, columns, domain) if may_lift_off else NO_TABLE
-        yield Group([*columns[:4], *domain, *columns[4:]], table=table), None
+        yield Group([*columns[:4], *domain, *columns[4:]], table=table, factors=_WHOLE), None
         return
-    mass = list(formulas.parameters).index("m")
-    for values, chosen in _distinct(columns[4:], shape):
+    held, factors = _held(formulas, len(columns) - 4), _WHOLE
+    if formulas.separated is not None and formulas.dissipation is None:
+        factors = [widen(factor, shape) for factor in formulas.separated_factors(columns[4:])]
+    for found, chosen in _distinct([columns[4 + k] for k in held], shape):
+        given = dict(zip(held, found, strict=True))
+        values = tuple(given.get(k, 1.0) for k in range(len(columns) - 4))
         try:
             chart = chart_with(formulas.chart, values)
         except GQMError:
             continue  # `solve` says why
         domain = [np.array(value) for value in (*chart.range, nan, nan, 0.0)]
-        some = columns if chosen is None else [_chosen(column, shape, chosen) for column in columns]
-        table = NO_TABLE if formulas.dissipation else _tabulated(formulas.chart, formulas.addresses, values, mass)
-        yield Group([*some[:4], *domain, *some[4:]], chart.block, chart.breaks, chart.corners, table), chosen
+        table = NO_TABLE if formulas.dissipation else _tabulated(formulas.chart, _source(formulas), values)
+        some, theirs = columns, factors
+        if chosen is not None:
+            some, theirs = ([_chosen(column, shape, chosen) for column in of] for of in (columns, factors))
+        yield Group([*some[:4], *domain, *some[4:]], chart.block, chart.breaks, chart.corners, table, theirs), chosen
+
+
+def _held(formulas: "Formulas", count: int) -> list[int]:
+    """Which run-time parameters, with what stands behind them, launches of one group have in common.
+
+    The curve and its table depend on no others; bodies that lose energy are driven with all parameters the same.
+    """
+    shaped_by = None if formulas.chart is None else formulas.chart.shaped_by
+    if formulas.separated is None or formulas.dissipation is not None or shaped_by is None:
+        return list(range(count))
+    return sorted({*shaped_by, *formulas.separated.held})
+
+
+def _source(formulas: "Formulas") -> Source:
+    """What a table of the model's potential and load is made from."""
+    terms, mass = formulas.separated, list(formulas.parameters).index("m")
+    if terms is None:
+        return Source(formulas.addresses, 0, 1, 1, mass)
+    return Source(formulas.addresses, terms.function.address, terms.potentials, terms.loads, mass)
 
 
 def _tabulated_range(formulas: "Formulas", columns: list[Array], domain: list[Array]) -> CurveTable:
@@ -296,15 +328,14 @@ def _tabulated_range(formulas: "Formulas", columns: list[Array], domain: list[Ar
                 width *= 2.0
         first, last = ends
     pieces = np.linspace(first, last, MIN_PIECES + 1)
-    mass = p[list(formulas.parameters).index("m")]
-    return CurveTable(*tabulate(formulas.addresses, p, pieces, float(mass)))
+    return CurveTable(*tabulate(_source(formulas), p, pieces))
 
 
 @lru_cache(maxsize=8)
-def _tabulated(maker: ChartMaker, fns: Addresses, values: tuple[float, ...], mass: int) -> CurveTable:
-    """The table of a chart; it is made once for the same parameters. ``mass`` is the index of the body's mass."""
+def _tabulated(maker: ChartMaker, source: Source, values: tuple[float, ...]) -> CurveTable:
+    """The table of a chart; it is made once for the same parameters."""
     chart = chart_with(maker, values)
-    return CurveTable(*tabulate(fns, np.concatenate([values, chart.block]), chart.edges, values[mass]))
+    return CurveTable(*tabulate(source, np.concatenate([values, chart.block]), chart.edges))
 
 
 def _distinct(
@@ -329,6 +360,7 @@ def _chosen(column: Array, shape: tuple[int, ...], chosen: NDArray[np.intp]) -> 
 def _answer(formulas: "Formulas", asked: Asked, group: Group, answers: Answers, part: slice) -> None:
     """Answer a part of a group of launches by compiled loops, as far as they decide them."""
     columns, chart, joints, table = group.columns, group.chart, group.joints, group.table
+    mass = list(formulas.parameters).index("m")
     code, batches = asked.code, formulas.batch if asked.side == 0 and asked.code != quantities.END_TIME else None
     for begin in range(part.start, part.stop, CHUNK):
         chunk = slice(begin, min(begin + CHUNK, part.stop))
@@ -340,7 +372,9 @@ def _answer(formulas: "Formulas", asked: Asked, group: Group, answers: Answers, 
             counts = (batches.orbit_rows, batches.integrand_rows)
             answer_batches(batches.addresses(), counts, *launches, wanted, found._replace(values=spans))
         parameters = np.concatenate([np.empty(len(lines) - PARAMETERS), chart])
-        given = scalar.GivenCurve(parameters, joints, table, asked.side, asked.t_max)
+        factors = lay_out(group.factors, chunk.start, chunk.stop)
+        buffers = np.full(len(factors), nan), np.empty((len(table.paths), ROW)), np.zeros(len(table.paths), np.int8)
+        given = scalar.GivenCurve(parameters, joints, table, pointers(factors), *buffers, mass, asked.side, asked.t_max)
         scalar.answer_one_by_one(formulas.addresses, *launches, code, spans, found, given)
 
 

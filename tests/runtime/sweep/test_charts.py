@@ -11,6 +11,7 @@ from railed import built
 
 import gqm_sym as gqm
 from gqm_sym.runtime.sweep.quantities import STATUS_SENTENCES
+from gqm_sym.runtime.sweep.sweep import _tabulated
 
 G = mpf("9.81")
 
@@ -174,6 +175,37 @@ def test_parameters_of_every_launch(bend: ModuleType) -> None:
     swept, good = bend.sweep("half_period", 1.0, m=mass, R=radius), np.arange(12) != 5
     assert np.array_equal(swept.values[good], np.full(11, bend.sweep("half_period", 1.0, R=0.5).values))
     assert np.flatnonzero(swept.status).tolist() == [5]
+
+
+@pytest.mark.parametrize("kind", ["rail", "implicit", "sampled"])
+def test_forces_of_every_launch_share_a_table(kind: str, tmp_path: Path) -> None:
+    """Each launch with its own g, Omega and m is answered as `solve` does it, from one table, alone or with others."""
+    x = np.linspace(-2, 2, 41)
+    curve = {
+        "rail": gqm.Curve.piecewise(
+            [gqm.line(length=1), gqm.arc(radius=2, angle="pi/2"), gqm.line(length=1)], heading="-pi/4"
+        ),
+        "implicit": gqm.Curve.implicit("x**4 + z**4 - x*z/5 - 1", start=(0, -1)),
+        "sampled": gqm.Curve.sampled(np.column_stack([x, 0.5 * x * x + 0.01 * np.cos(3 * x)])),
+    }[kind]
+    module = gqm.build(gqm.derive(curve, gqm.Gravity() + gqm.RotatingFrame()), name=f"shared_{kind}", folder=tmp_path)
+    rng, count = np.random.default_rng(7), 24
+    middle = module.equilibria(Omega=0.3)[-1].lam
+    given = {"g": rng.uniform(5, 20, count), "Omega": rng.uniform(-0.9, 0.9, count), "m": rng.uniform(0.5, 2, count)}
+    launch = (middle + rng.uniform(-0.9, 0.9, count), rng.uniform(0, 1.5, count) * (rng.random(count) < 0.5))
+    made = _tabulated.cache_info().misses
+    swept, force = (module.sweep(what, *launch, **given) for what in ("half_period", "normal_force_max"))
+    assert _tabulated.cache_info().misses == made + 1
+    assert swept.route_counts() == {"single": count}
+    for k in range(count):
+        here = {name: float(values[k]) for name, values in given.items()}
+        motion = module.solve(launch[0][k], launch[1][k], **here)
+        assert bool(swept.status[k]) == (motion.kind != "libration")
+        if motion.kind == "libration":
+            assert swept.values[k] == pytest.approx(motion.half_period, rel=ROUNDING)
+        assert force.values[k] == pytest.approx(motion.normal_force_max.value, rel=ROUNDING)
+        alone = module.sweep("half_period", launch[0][k], launch[1][k], **here)
+        assert np.array_equal(alone.values, swept.values[k], equal_nan=True)
 
 
 def test_half_periods_on_a_measured_track(track: ModuleType) -> None:

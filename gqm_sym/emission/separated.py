@@ -1,0 +1,69 @@
+"""The potential and the load along a charted curve as sums of products: a factor of parameters and a part of places."""
+
+from dataclasses import replace
+
+from sympy import Add, Expr, Mul, S, Symbol, ordered
+
+from gqm_sym.derivation.algebra.difference import Differences
+from gqm_sym.emission.context import Lowering
+from gqm_sym.emission.ir import SeparatedIR
+from gqm_sym.emission.subscripts import at
+
+# Terms of the potential and of the load together that are worth a table each.
+MAX_TERMS = 12
+
+
+def separate(form: Expr, place: Symbol, held: set[Symbol]) -> dict[Expr, Expr]:
+    """The parts of a form that depend on the place, each with the factor that does not.
+
+    A parameter that cannot be brought into a factor is added to ``held``. Sums are multiplied out where that brings a
+    parameter into a factor, but powers are not, for their terms may cancel.
+    """
+    parts: dict[Expr, Expr] = {}
+    waiting = list(Add.make_args(form))
+    while waiting:
+        factor, part = waiting.pop(0).as_independent(place, as_Add=False)
+        if part.free_symbols - held - {place}:
+            factors = Mul.make_args(part)
+            mixed = next((f for f in factors if f.is_Add and f.free_symbols - held - {place}), None)
+            if mixed is not None:
+                rest = factor * Mul(*(f for f in factors if f is not mixed))
+                waiting = [rest * term for term in mixed.args] + waiting
+                continue
+            held |= part.free_symbols - {place}
+        parts[part] = parts.get(part, S.Zero) + factor
+    return {part: parts[part] for part in ordered(parts) if parts[part] != 0}
+
+
+def separated_terms(lowering: Lowering) -> SeparatedIR | None:
+    """Divided differences of the potential's parts, with path and load; None where there is nothing to be gained."""
+    model, place = lowering.model, lowering.place
+    if not model.curve.charted or model.dissipation is not None:
+        return None
+    forms = [form.xreplace(lowering.trigonometric) for form in (model.effective_potential, model.static_normal_load)]
+    path = [form.xreplace(lowering.trigonometric) for form in (model.ds, model.kappa)]
+    held = {symbol for form in path for symbol in form.free_symbols} - {place}
+    while True:
+        before = set(held)
+        potential, load = (separate(form, place, held) for form in forms)
+        if held == before:
+            break
+    potential.pop(S.One, None)  # a constant changes nothing
+    if not potential or not 0 < len(potential) + len(load) <= MAX_TERMS:
+        return None
+    a, d = lowering.names.symbol("a"), lowering.names.symbol("d")
+    places, offsets = lowering.names("places"), lowering.names("offsets")
+    differences = Differences(place, (a, place), {(0, 1): d})
+    function = lowering.function(
+        "separated_terms",
+        (a, places, offsets),
+        f"Parts of U[a, {place}] and of n0, whose factors are `exact_factors`; between them ds/d{place} and kappa.",
+        inside=[(place, at(places)), (d, at(offsets))],
+        outputs=(*(differences.first(part, 0, 1) for part in potential), *path, *load),
+    )
+    factors = lowering.constants(
+        "exact_factors",
+        "What stands before the parts of U, then before those of n0.",
+        (*potential.values(), *load.values()),
+    )
+    return SeparatedIR(function=replace(function, later=True), factors=factors, potentials=len(potential))

@@ -1,0 +1,112 @@
+"""The potential and the load of one launch on the panels that it comes to: parts of a table times its factors.
+
+A launch needs few numbers of most panels that it passes, and more of those next to its turning points. They are put
+together when they are first asked for, and kept for launches with the same factors.
+"""
+
+from math import fabs, inf
+
+from gqm_sym.runtime.compiled.jit import Inner
+from gqm_sym.runtime.sweep.curve_table import (
+    BASE,
+    BASE_SIZE,
+    FEW_REACH,
+    INCREASE,
+    LEFT_TERMS,
+    LOAD_ROW,
+    LOAD_SAMPLES,
+    LOAD_TERMS,
+    MAY_STOP,
+    MIDDLE,
+    NODES,
+    POTENTIAL_ROW,
+    REACH,
+    SAMPLES,
+    SERIES,
+    SPREAD,
+)
+
+# What a panel's row contains so far: numbers that suffice far from turning points, its polynomials, the load.
+FAR, NEAR, LOAD = 1, 2, 4
+
+# A row: as `curve_table` has it for one part; then an upper bound of the potential on the panel above the reference,
+# infinite where ds may vanish; a better one; and whether the potential rises (1) or falls (-1) throughout, 0 if neither
+# is certain.
+HIGHEST, TOP, SLOPE_SIGN = range(LOAD_SAMPLES + SAMPLES, LOAD_SAMPLES + SAMPLES + 3)
+ROW = SLOPE_SIGN + 1
+
+
+@Inner
+def fill_sums(parts, stride, factors, out):  # type: ignore[no-untyped-def]
+    """Fill numbers with sums of parts times their factors; from part to part it is so many columns."""
+    for j in range(out.size):
+        out[j] = factors[0] * parts[j]
+    for i in range(1, factors.size):
+        for j in range(out.size):
+            out[j] += factors[i] * parts[i * stride + j]
+
+
+@Inner
+def fill_far(curve, k):  # type: ignore[no-untyped-def]
+    """Fill what suffices far from turning points."""
+    parts, row, factors, count = curve.table.parts[k], curve.rows[k], curve.factors, curve.table.potentials
+    fill_sums(parts, POTENTIAL_ROW, factors[:count], row[:LEFT_TERMS])
+    spread, reach, few_reach, base_size = 0.0, 0.0, 0.0, 0.0
+    for i in range(count):
+        factor, at = fabs(factors[i]), i * POTENTIAL_ROW
+        spread += factor * parts[at + SPREAD]
+        reach += factor * parts[at + REACH]
+        few_reach += factor * parts[at + FEW_REACH]
+        base_size += factor * parts[at + BASE_SIZE]
+    row[SPREAD], row[REACH], row[FEW_REACH], row[BASE_SIZE] = spread, reach, few_reach, base_size
+    row[HIGHEST] = inf if curve.table.paths[k, MAY_STOP] != 0.0 else row[BASE] + (row[MIDDLE] + spread)
+
+
+@Inner
+def fill_near(curve, k):  # type: ignore[no-untyped-def]
+    """Fill the polynomials, and what they say of the potential's slope and bound."""
+    parts, row, count = curve.table.parts[k], curve.rows[k], curve.table.potentials
+    fill_sums(parts[LEFT_TERMS:], POTENTIAL_ROW, curve.factors[:count], row[LEFT_TERMS:POTENTIAL_ROW])
+    change, slope, spread = NODES * fabs(row[LEFT_TERMS + NODES - 1]), row[LEFT_TERMS] + row[LEFT_TERMS + 1], 0.0
+    for j in range(1, NODES):
+        change += j * fabs(row[LEFT_TERMS + j] + row[LEFT_TERMS + j - 1]) if j > 1 else 0.0
+        spread += fabs(row[SERIES + j])
+    row[SLOPE_SIGN], top = 0.0, row[MIDDLE] + spread
+    if fabs(slope) > change:
+        row[SLOPE_SIGN], top = 1.0 if slope > 0.0 else -1.0, max(row[INCREASE], 0.0)
+    row[TOP] = inf if curve.table.paths[k, MAY_STOP] != 0.0 else row[BASE] + top
+
+
+@Inner
+def fill_load(curve, k):  # type: ignore[no-untyped-def]
+    """Fill the load."""
+    count = curve.table.potentials
+    parts, row = curve.table.parts[k, count * POTENTIAL_ROW :], curve.rows[k]
+    fill_sums(parts, LOAD_ROW, curve.factors[count:], row[LOAD_TERMS : LOAD_TERMS + LOAD_ROW])
+
+
+@Inner
+def prepare(curve, k, wanted):  # type: ignore[no-untyped-def]
+    """Fill the row of panel k, as far as ``wanted`` (FAR, NEAR and LOAD, added up) and not there yet."""
+    missing = wanted & ~curve.levels[k]
+    if missing == 0:
+        return
+    if missing & FAR:
+        fill_far(curve, k)
+    if missing & NEAR:
+        fill_near(curve, k)
+    if missing & LOAD:
+        fill_load(curve, k)
+    curve.levels[k] |= missing
+
+
+@Inner
+def take_factors(curve, given):  # type: ignore[no-untyped-def]
+    """Make factors those of the launch; what was put together with others is forgotten."""
+    changed = False
+    for i in range(given.size):
+        changed |= curve.factors[i] != given[i]
+        curve.factors[i] = given[i]
+    if changed:
+        for k in range(curve.levels.size):
+            curve.levels[k] = 0
