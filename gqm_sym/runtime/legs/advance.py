@@ -263,7 +263,7 @@ def next_leg(dissipation, p, joints, body, reads, record):  # type: ignore[no-un
         found = follow(dissipation, p, start, route, record)
         if found.what != LIFTOFF or record[AHEAD] > 0.0:
             return found
-        pause, only_sign, no_turn_until, body[ENDING] = 0.0, 0, inf, AT_ONCE
+        pause, only_sign, no_turn_until, until, body[ENDING] = 0.0, 0, inf, 0.0, AT_ONCE
 
 
 @Inner
