@@ -58,7 +58,11 @@ def test_parameters_and_launches(part: str, text: str, parameters: dict[str, str
         ("graph: {z: x**2, domain: [-50 cm, 0.5 m]}", (-sp.Rational(1, 2), sp.Rational(1, 2)), None),
         ("parametric: {x: sin(u), z: cos(u), parameter: u, period: 360 deg}", (None, None), 2 * sp.pi),
         ("polar: {r: 1 + theta**2, domain: [-90 deg, 90 °]}", (-sp.pi / 2, sp.pi / 2), None),
-        ("implicit: {F: x**2 + z**2 - 1, start: [1 m, 0], domain: [-50 cm, 50 cm]}", (-sp.Rational(1, 2), sp.Rational(1, 2)), None),
+        (
+            "implicit: {F: x**2 + z**2 - 1, start: [1 m, 0], domain: [-50 cm, 50 cm]}",
+            (-sp.Rational(1, 2), sp.Rational(1, 2)),
+            None,
+        ),
         ("family: {name: ellipse, a: 200 cm, b: 1 m}", (None, None), 2 * sp.pi),
     ],
 )

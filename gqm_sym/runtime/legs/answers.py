@@ -31,7 +31,7 @@ from gqm_sym.runtime.legs.body import (
 )
 from gqm_sym.runtime.legs.leg_equation import Forces
 from gqm_sym.runtime.legs.leg_reading import passage, peak_of_leg
-from gqm_sym.runtime.legs.leg_record import BEGIN, BEGIN_LOW, LAPS_BEFORE, START_V2
+from gqm_sym.runtime.legs.leg_record import BEGIN, BEGIN_LOW, LAPS_BEFORE, PANELS, PASSAGE, PEAKS, START_V2, TIMES
 from gqm_sym.runtime.legs.leg_run import ASYMPTOTE, FULL, SPENT, point_buffer, slope_of_v2
 
 # What is asked of each body; LEG is to advance by one leg.
@@ -88,7 +88,7 @@ def seen_on_leg(body, question, sight, record):  # type: ignore[no-untyped-def]
         spent = passage(record, body[TARGET] - record[LAPS_BEFORE] * body[PERIOD])
         return Sight(begin + (low + spent), sight.peak)
     if body[ENDING] == AT_ONCE and question in (LEAST_SPEED, MOST_SPEED):
-        return Sight(sight.arrival, sqrt(record[START_V2]) * (1.0 if question == MOST_SPEED else -1.0))
+        return Sight(sight.arrival, max(sight.peak, sqrt(record[START_V2]) * (1.0 if question == MOST_SPEED else -1.0)))
     if question >= LEAST_SPEED:
         until = 0.0 if body[ENDING] == AT_ONCE else (body[HORIZON] - begin) - low
         asked = (question >= LEAST_LOAD, 1.0 if question in (MOST_SPEED, MOST_LOAD) else -1.0)
@@ -136,9 +136,9 @@ def conclude(body, question, sight):  # type: ignore[no-untyped-def]
 @Inner
 def answer(dissipation, p, joints, question, body, record):  # type: ignore[no-untyped-def]
     """The number that is asked for of one body, and its status."""
-    sight = Sight(inf, -inf)
+    sight, reads = Sight(inf, -inf), PEAKS if question >= LEAST_SPEED else (PASSAGE if question == ARRIVAL else TIMES)
     for _ in range(MAX_LEGS):
-        what = advance(dissipation, p, joints, body, question >= ARRIVAL, record)
+        what = advance(dissipation, p, joints, body, reads, record)
         if what in (FULL, SPENT, LEAVES, BEYOND):
             break
         if question == ARRIVAL and body[TARGET] == body[LAM0]:
@@ -187,7 +187,7 @@ def drive(dissipation, parameters, joints, question, bodies, record):  # type: i
         if body[STEP] == 0.0:
             launch(dissipation, p, joints, body)
         if question == LEG:
-            what = advance(dissipation, p, joints, body, True, record) if body[DIRECTION] != 0.0 else RESTS
+            what = advance(dissipation, p, joints, body, PANELS, record) if body[DIRECTION] != 0.0 else RESTS
         elif body[DIRECTION] != 0.0:
             body[VALUE], body[STATUS] = answer(dissipation, p, joints, question, body, record)
         else:

@@ -163,7 +163,7 @@ def test_what_friction_takes(tmp_path: Path) -> None:
 
 
 def test_a_state_is_read_by_name_by_position_and_as_a_table(swing: ModuleType, dragged: ModuleType) -> None:
-    """pandas takes its fields for columns; taken apart, copied and pickled it is the same."""
+    """Fields are columns for pandas; taken apart, copied and pickled it is the same."""
     for module in (swing, dragged):
         motion = module.solve(1)
         state = motion.state(TIMES)
