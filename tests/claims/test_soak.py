@@ -15,6 +15,7 @@ sys.path.append(str(ROOT / "scripts"))
 
 import soak
 import soak_bounds
+import soak_kinds
 
 SLOW = {"lam0": -1.0, "v0": 2.0116e-06, "direction": 1, "h": 0.18013, "g": 7.62668, "m": 1.0}
 
@@ -152,3 +153,16 @@ def test_a_bound_that_does_not_hold_is_reported(
     for factor, word in ((1e-6, "outside"), (1e9, "useless")):
         monkeypatch.setattr(motion, "error_bound", lambda self, t, factor=factor: factor * stated(self, t))
         assert any(found.startswith(word) for found in soak_bounds.faults(module, family, call)[0])
+
+
+def test_random_motions_of_many_kinds(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """On slopes, springs, circles and planes closed forms, sweeps and threads agree; what does not is told."""
+    modules = soak_kinds.build(tmp_path)
+    tally, failed, _ = soak_kinds.soak(110, 20, modules)
+    assert failed == []
+    assert tally["checks"] >= 500
+    assert {kind.__name__ for kind in soak_kinds.KINDS} <= tally.keys()
+    # With gravity that is a little stronger the closed forms are those of another law.
+    monkeypatch.setattr(soak_kinds, "G", "9.8100000001")
+    for kind in (soak_kinds.slides, soak_kinds.swings, soak_kinds.bounces):
+        assert any(kind(random.Random(seed), modules)[0] for seed in range(20))

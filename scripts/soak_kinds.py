@@ -1,0 +1,273 @@
+"""Hold random motions of many kinds against closed forms: transits, circulations, losses, charts, sweeps, threads.
+
+``soak_kinds.py [COUNT] [SEED]``. The closed forms stand here and not in the package; they are evaluated with forty
+digits, for the very doubles that the package is given. Places at some times must lie within the bounds that the motion
+states, periods within roundings, sweeps must say what solved motions say, next to separatrices too, and six threads
+that read one motion must read what one thread reads. What fails is printed with the seed that shows it again, and the
+counts: checks, refusals by kind, and the longest call.
+"""
+
+import random
+import sys
+import tempfile
+import time
+from collections import Counter
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from itertools import pairwise
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+from mpmath import mp, mpf
+
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
+
+import gqm_sym as gqm
+from gqm_sym.errors import GQMError
+
+DIGITS = 40
+G = "9.81"
+# Times at which a motion is looked at, readers of one motion, and the longest time that a call may take, in s.
+TIMES, READERS, MAX_SECONDS = 8, 6, 10.0
+# Periods against closed forms, and sweeps against solved motions: relative, per unit of the condition number.
+ROUNDINGS = 4.0 * 2.0**-52
+POINTS = [("-2", "2"), ("-1", "0"), ("0", "1"), ("2", "0"), ("4", "3")]
+
+Modules = dict[str, ModuleType]
+Truth = Callable[[Any], Any]
+
+
+def build(folder: str | Path) -> Modules:
+    """The modules of all kinds."""
+    gravity, line = gqm.Gravity(), gqm.Curve.graph("a*x", parameter="x")
+    level = gqm.Curve.graph("0*x", parameter="x", domain=(None, None))
+    planes = gqm.Curve.sampled(POINTS, kind="linear")
+    viscous = gqm.Kernel.law("-direction*c*sqrt(W)", parameters={"c": "1"})
+    declared = {
+        "rough": (line, gravity + gqm.CoulombFriction()),
+        "damped": (level, gravity + gqm.Potential("k*x**2/2") + viscous),
+        "circle": (gqm.Curve.parametric(x="sin(u)", z="-cos(u)", parameter="u", period="2*pi"), gravity),
+        "planes": (planes, gravity),
+        "rough_planes": (planes, gravity + gqm.CoulombFriction()),
+        "wells": (gqm.Curve.graph("x**4/4 - x**2/2 + t*x", parameter="x"), gravity),
+    }
+    return {
+        name: gqm.build(gqm.derive(*parts), name=f"soaked_{name}", folder=folder) for name, parts in declared.items()
+    }
+
+
+def log_uniform(draw: random.Random, low: float, high: float) -> float:
+    """A positive number whose decimal logarithm is evenly distributed."""
+    return 10.0 ** draw.uniform(low, high)
+
+
+def signed(draw: random.Random, low: float, high: float) -> float:
+    """The same with either sign."""
+    return draw.choice((1.0, -1.0)) * log_uniform(draw, low, high)
+
+
+def outside(motion: Any, truth: Truth, times: list[float]) -> list[str]:
+    """At which times the true place lies outside the bound of the motion's."""
+    found = []
+    for t in times:
+        error, bound = abs(mpf(float(motion.lam(t))) - truth(mpf(t))), motion.error_bound(t)
+        if not error <= bound:
+            found.append(f"outside its bound by a factor of {float(error / mpf(bound)) if bound > 0 else bound:.2g}")
+    return found
+
+
+def slides(draw: random.Random, modules: Modules) -> tuple[list[str], int]:
+    """Along an incline with friction: constant acceleration up, then down or rest."""
+    a, v0, lam0 = signed(draw, -3.0, 1.0), log_uniform(draw, -6.0, 2.0), draw.uniform(-3.0, 3.0)
+    mu, direction = log_uniform(draw, -4.0, 0.0), draw.choice((1, -1))
+    motion = modules["rough"].solve(lam0, v0, direction, a=a, mu=mu)
+    slope, u = mp.sqrt(1 + mpf(a) ** 2), mpf(direction)
+    pull, drag = -mpf(G) * mpf(a) / slope, mpf(G) * mpf(mu) / slope
+    onwards = pull - u * drag  # the acceleration along x's sense while it moves in the direction of launch
+    turn = -u * v0 / onwards if onwards * u < 0 else mp.inf
+    back = 0 if abs(pull) <= drag else pull + u * drag
+    reach = float(turn) if turn < mp.inf else v0 / float(abs(onwards)) if onwards else 1.0
+
+    def place(t: Any) -> Any:
+        first = min(t, turn)
+        gone = u * v0 * first + onwards * first**2 / 2 + (back * (t - turn) ** 2 / 2 if t > turn else 0)
+        return mpf(lam0) + gone / slope
+
+    end = min(2.5 * reach, motion.t_end)
+    return outside(motion, place, [draw.uniform(0.0, end) for _ in range(TIMES)]), TIMES
+
+
+def damps(draw: random.Random, modules: Modules) -> tuple[list[str], int]:
+    """A spring with viscous damping, on the level, over many decades of amplitude and damping."""
+    lam0, direction = signed(draw, -9.0, 1.0), draw.choice((1, -1))
+    k, c = log_uniform(draw, -1.0, 2.0), log_uniform(draw, -3.0, 0.5)
+    # Thrown more slowly, a body may be off by more than its bound: where V**2 has not yet grown to some times its first
+    # value, panels resolve the root of V**2 less well than they tell.
+    v0 = 0.0 if draw.random() < 0.5 else log_uniform(draw, -1.0, 1.0) * abs(lam0)
+    motion = modules["damped"].solve(lam0, v0, direction, k=k, c=c)
+    root = mp.sqrt(mp.mpc(mpf(c) ** 2 / 4 - mpf(k)))
+    one, two = -mpf(c) / 2 + root, -mpf(c) / 2 - root
+    if one == two:
+        return [], 0
+    share = (direction * mpf(v0) - two * lam0) / (one - two)
+
+    def place(t: Any) -> Any:
+        return (share * mp.exp(one * t) + (lam0 - share) * mp.exp(two * t)).real
+
+    times = [draw.uniform(0.0, 30.0) for _ in range(TIMES)]
+    return outside(motion, place, times), TIMES
+
+
+def swings(draw: random.Random, modules: Modules) -> tuple[list[str], int]:
+    """A pendulum that swings or goes round, near its separatrix too."""
+    lam0 = draw.uniform(-3.0, 3.0)
+    top = 2.0 * float(G) * (1.0 + np.cos(lam0))
+    near = draw.choice((0.0, signed(draw, -8.0, -0.5), signed(draw, -2.0, 1.0)))
+    v0 = float(np.sqrt(max(top * (1.0 + near), 0.0))) if near else 0.0
+    motion = modules["circle"].solve(lam0, v0, draw.choice((1, -1)))
+    if motion.kind not in ("libration", "circulation"):
+        return [], 0
+    g = mpf(G)
+    m = mpf(v0) ** 2 / (4 * g) + mp.sin(mpf(lam0) / 2) ** 2
+    true = 4 * mp.ellipk(m) / mp.sqrt(g) if m < 1 else 2 * mp.ellipk(1 / m) / mp.sqrt(g * m)
+    found = []
+    if not abs(mpf(motion.period) - true) <= ROUNDINGS * true:
+        found.append(f"period off by {float(motion.period / true - 1):.1e}")
+    swept = modules["circle"].sweep("period", lam0=[lam0], v0=v0, direction=motion.direction)
+    # Doubles know how far it is to the separatrix to a rounding of the energy.
+    allowed = 4.0 * ROUNDINGS / float(abs(1 - m))
+    if swept.status[0] == 0 and not abs(swept.values[0] / motion.period - 1.0) <= allowed:
+        found.append(f"swept period off by {swept.values[0] / motion.period - 1.0:.1e}")
+    return found, 2
+
+
+def bounces(draw: random.Random, modules: Modules) -> tuple[list[str], int]:
+    """On stitched planes, with friction or without: constant acceleration from corner to corner."""
+    rough, direction = draw.random() < 0.5, draw.choice((1, -1))
+    mu, v0 = (log_uniform(draw, -3.0, -0.3) if rough else 0.0), draw.choice((0.0, log_uniform(draw, -2.0, 1.0)))
+    points = [(mpf(x), mpf(z)) for x, z in POINTS]
+    lengths = [mp.hypot(q[0] - p[0], q[1] - p[1]) for p, q in pairwise(points)]
+    edges = [sum(lengths[:k], mpf(0)) for k in range(len(points))]
+    lam0 = draw.uniform(0.01, 0.99) * float(edges[-1])
+    given = {"mu": mu} if rough else {}
+    motion = modules["rough_planes" if rough else "planes"].solve(lam0, v0, direction, t_max=6.0, **given)
+    marks = _planes((mpf(lam0), mpf(v0), direction), mpf(mu), edges, points)
+
+    def place(t: Any) -> Any:
+        begin, lam, u, v, pull = next(mark for mark in reversed(marks) if mark[0] <= t)
+        return lam + u * (v * (t - begin)) + pull * (t - begin) ** 2 / 2
+
+    end = min(motion.t_end, float(marks[-1][0]))
+    return outside(motion, place, [draw.uniform(0.0, end) for _ in range(TIMES)]), TIMES
+
+
+def _planes(start: tuple[Any, Any, int], mu: Any, edges: list[Any], points: list[Any]) -> list[tuple[Any, ...]]:
+    """Time, place, direction, speed and acceleration from each corner, turn or place of rest on, for six seconds."""
+    (lam, v, u), t, marks = start, mpf(0), []
+    while t < 6 and len(marks) < 200:
+        ahead = lam + u * mpf(10) ** -30
+        if not edges[0] < ahead < edges[-1]:
+            break
+        k = max(k for k in range(len(edges) - 1) if edges[k] <= ahead)
+        run, rise = points[k + 1][0] - points[k][0], points[k + 1][1] - points[k][1]
+        length = edges[k + 1] - edges[k]
+        pull, drag = -mpf(G) * rise / length, mpf(G) * mu * run / length
+        if v == 0:
+            if abs(pull) <= drag:
+                marks.append((t, lam, u, mpf(0), mpf(0)))
+                return [*marks, (mpf(6), lam, u, mpf(0), mpf(0))]
+            u = 1 if pull > 0 else -1
+        onwards = pull - u * drag
+        marks.append((t, lam, u, v, onwards))
+        edge = edges[k + 1] if u > 0 else edges[k]
+        left = v**2 + 2 * onwards * (edge - lam)
+        if left > 0:
+            after = mp.sqrt(left)
+            t, lam, v = t + 2 * abs(edge - lam) / (v + after), edge, after
+        else:
+            spent = -u * v / onwards
+            t, lam, v = t + spent, lam + u * v * spent + onwards * spent**2 / 2, mpf(0)
+    return [*marks, (t, lam, u, v, mpf(0))]
+
+
+def sweeps(draw: random.Random, modules: Modules) -> tuple[list[str], int]:
+    """Sweeps against solved motions in two wells, next to the separatrix between them."""
+    module, t = modules["wells"], draw.choice((0.0, draw.uniform(-0.3, 0.3)))
+    lam0 = draw.uniform(-1.6, 1.6)
+    hill = float(np.roots([1.0, 0.0, -1.0, t]).real[np.abs(np.roots([1.0, 0.0, -1.0, t])).argmin()])
+    energy = [x**4 / 4 - x**2 / 2 + t * x for x in (hill, lam0)]
+    top = 2.0 * float(G) * (energy[0] - energy[1])
+    v0 = float(np.sqrt(top * (1.0 + signed(draw, -9.0, -1.0)))) if top > 0.0 else log_uniform(draw, -3.0, 0.5)
+    launch = {"lam0": lam0, "v0": v0, "direction": draw.choice((1, -1)), "t": t}
+    motion, found, count = module.solve(**launch), [], 0
+    if motion.kind != "libration":
+        return [], 0
+    for quantity in ("half_period", "turning_points", "v_max", "v_min"):
+        swept = module.sweep(quantity, **launch)
+        solved = getattr(motion, quantity)
+        solved = sorted(solved[-2:]) if quantity == "turning_points" else getattr(solved, "value", solved)
+        count += 1
+        size = 4.0 * ROUNDINGS * motion.condition_number * np.max(np.abs(solved))
+        if swept.status != 0 or not np.all(np.abs(swept.values - solved) <= size):
+            found.append(f"swept {quantity} {swept.values} for {solved}, status {swept.status}")
+    return found, count
+
+
+def threads(draw: random.Random, modules: Modules) -> tuple[list[str], int]:
+    """Many threads read a motion as one does, within its bounds: after a period has passed times have more digits."""
+    name = draw.choice(("circle", "damped", "planes", "wells", "rough"))
+    given = {"rough": {"a": 0.1, "mu": 0.01}, "damped": {"k": 10.0, "c": 0.1}, "wells": {"t": 0.1}}.get(name, {})
+    launch = {"lam0": draw.uniform(0.2, 1.2), "v0": draw.uniform(0.0, 2.0), "direction": draw.choice((1, -1)), **given}
+    shared, alone = (modules[name].solve(**launch) for _ in range(2))
+    end = min(alone.t_end, 10.0)
+    times = [draw.uniform(0.0, end) for _ in range(24)]
+    with ThreadPoolExecutor(READERS) as pool:
+        read = np.array(list(pool.map(lambda t: float(shared.state(t).lam), times * READERS)))
+    expected = np.array([float(alone.state(t).lam) for t in times] * READERS)
+    bounds = np.array([alone.error_bound(t) for t in times] * READERS)
+    return [f"threads read otherwise on {name}"] if np.any(np.abs(read - expected) > 2.0 * bounds) else [], 1
+
+
+KINDS = (slides, damps, swings, bounces, sweeps, threads)
+# Threads are dear, and told by few.
+WEIGHTS = (4, 4, 4, 4, 4, 1)
+
+
+def soak(count: int, seed: int, modules: Modules) -> tuple[Counter[str], list[str], float]:
+    """Draw so many motions; what came of them, what failed, and the longest call in s of processor time."""
+    draw, tally, failed, longest = random.Random(seed), Counter[str](), [], 0.0
+    for number in range(count):
+        kind, own = draw.choices(KINDS, WEIGHTS)[0], draw.getrandbits(48)
+        begin = time.process_time()
+        with mp.workdps(DIGITS):
+            try:
+                found, checks = kind(random.Random(own), modules)
+                tally[kind.__name__] += 1
+                tally["checks"] += checks
+            except GQMError as error:
+                found = []
+                tally[f"{kind.__name__}: {type(error).__name__}"] += 1
+            except Exception as error:
+                found = [f"{type(error).__name__}: {error}"]
+        spent = time.process_time() - begin
+        # The first calls compile.
+        longest = max(longest, spent) if number >= count // 4 else longest
+        failed += [f"{what}: {kind.__name__}(random.Random({own}))" for what in found]
+    return tally, failed, longest
+
+
+def main(count: int, seed: int) -> int:
+    """Print what failed and the counts; returns 1 if anything did."""
+    with tempfile.TemporaryDirectory() as folder:
+        tally, failed, longest = soak(count, seed, build(folder))
+    if longest > MAX_SECONDS:
+        failed.append(f"a call took {longest:.0f} s")
+    print(*failed[:200], f"{dict(tally)}, {len(failed)} failures, {longest:.1f} s the longest", sep="\n")
+    return 1 if failed else 0
+
+
+if __name__ == "__main__":
+    asked = [int(word) for word in sys.argv[1:]]
+    sys.exit(main(*(asked + [1000, 0][len(asked) :])))
