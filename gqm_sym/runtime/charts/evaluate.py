@@ -14,11 +14,15 @@ coordinates that are two doubles each.
 """
 
 from math import fabs, floor, inf
+from typing import Any
 
-from numba import carray
+from llvmlite import ir
+from numba import carray, types
+from numba.extending import intrinsic
 
 from gqm_sym.runtime.compiled.intrinsics import polynomial
 from gqm_sym.runtime.compiled.jit import Inlined, Inner
+from gqm_sym.runtime.compiled.registers import INDEX, LANES, REGISTER, line_of, operation, register, spread
 
 TERMS = 16
 ROWS = 4
@@ -104,6 +108,40 @@ def chart_row(chart, row, s):  # type: ignore[no-untyped-def]
     return high + (low + polynomial(_powers(chart, start, row), u))
 
 
+@intrinsic
+def fill_lanes(_, chart, terms, places, at, out, to, first, numbers):  # type: ignore[no-untyped-def]
+    """Fill a register's numbers of ``out``, from ``to`` on, with a row of the chart at the places from ``at`` on.
+
+    Lanes before ``first`` keep what they have. The powers of u stand at ``terms``; ``numbers`` are the length of all
+    laps before, the piece's middle and scale, the limit of u, and two numbers that the polynomial is added to.
+    """
+
+    def lower(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        lines = [line_of(context, builder, signature.args[k], args[k]) for k in (0, 2, 4)]
+        powers, given, target = (builder.gep(line, [args[k]]) for line, k in zip(lines, (1, 3, 5), strict=True))
+        lap, middle, scale, limit, whole, rest = (spread(builder, builder.extract_value(args[7], k)) for k in range(6))
+        s = builder.load(register(builder, given, 0), align=8)
+        u = builder.fmul(builder.fsub(builder.fsub(s, lap), middle), scale)
+        below = builder.fneg(limit)
+        u = builder.select(builder.fcmp_ordered("<", u, below), below, u)
+        u = builder.select(builder.fcmp_ordered(">", u, limit), limit, u)
+        value = ir.Constant(REGISTER, [0.0] * LANES)
+        for k in range(TERMS - 1, -1, -1):
+            term = spread(builder, builder.load(builder.gep(powers, [ir.Constant(INDEX, k)])))
+            value = operation(builder, "fma", value, u, term)
+        value = builder.fadd(whole, builder.fadd(rest, value))
+        old = builder.load(register(builder, target, 0), align=8)
+        lane = ir.Constant(ir.VectorType(ir.IntType(64), LANES), list(range(LANES)))
+        bound = ir.Constant(ir.VectorType(ir.IntType(64), LANES), ir.Undefined)
+        for k in range(LANES):
+            bound = builder.insert_element(bound, args[6], ir.Constant(INDEX, k))
+        kept = builder.icmp_signed("<", lane, bound)
+        builder.store(builder.select(kept, old, value), register(builder, target, 0), align=8)
+        return context.get_dummy_value()
+
+    return types.void(chart, terms, places, at, out, to, first, numbers), lower
+
+
 @Inner
 def chart_rows(chart, rows, places, out):  # type: ignore[no-untyped-def]
     """Fill the last rows of ``out`` with these rows of the chart at many places, which neighbours share a piece of.
@@ -117,6 +155,7 @@ def chart_rows(chart, rows, places, out):  # type: ignore[no-untyped-def]
         With a row for each of ``rows`` at least.
     """
     count, closed = int(chart[1]), chart[4] > 0.0
+    limit = 1.0 if closed else inf
     i, n, first, piece = 0, places.size, out.shape[0] - len(rows), count // 2
     while i < n:
         s, laps = _reduced(chart, places[i])
@@ -129,13 +168,18 @@ def chart_rows(chart, rows, places, out):  # type: ignore[no-untyped-def]
         while i < n and low <= places[i] - lap < high:
             i += 1
         for k in range(len(rows)):
-            row, powers = rows[k], _powers(chart, start, rows[k])
-            whole, rest = _constant(chart, start, row, laps)
-            for j in range(begin, i):
-                u = ((places[j] - lap) - middle) * scale
-                if closed:
-                    u = min(max(u, -1.0), 1.0)
-                out[first + k, j] = whole + (rest + polynomial(powers, u))
+            row = rows[k]
+            terms, (whole, rest) = start + 6 + row * TERMS, _constant(chart, start, row, laps)
+            if n < LANES:
+                for j in range(begin, i):
+                    u = min(max(((places[j] - lap) - middle) * scale, -limit), limit)
+                    out[first + k, j] = whole + (rest + polynomial(_powers(chart, start, row), u))
+                continue
+            # Registers at the end of the places take some before the first one again, and do not store their values.
+            for j in range(begin, i, LANES):
+                at = min(j, n - LANES)
+                numbers = (lap, middle, scale, limit, whole, rest)
+                fill_lanes(chart, terms, places, at, out, (first + k) * n + at, begin - at, numbers)
 
 
 @Inner

@@ -21,6 +21,7 @@ from gqm_sym.runtime.legs.body import (
     FIRST_STEP,
     FROM_REST,
     HIGH,
+    HORIZON,
     LAM0,
     LAPS,
     LAST_LEG,
@@ -38,7 +39,9 @@ from gqm_sym.runtime.legs.body import (
     PREFERRED,
     REACH,
     STEP,
+    TARGET,
     TURNS,
+    UNRESOLVED,
     V2,
     WIDTH_BEFORE,
 )
@@ -97,6 +100,9 @@ FIRST_STEPS, MAX_HALVINGS, MAX_FORCE_GROWTH = 8.0, 1000, 4.0
 # The length of a panel, as a share of the first step of a search, at which a body that pauses creeps towards an
 # equilibrium that it never reaches.
 CREEPING_SHARE = 1e-6
+
+# A leg that is longer than this share of one that was not one polynomial is not tried as one.
+MAX_WHOLE_SHARE = 0.9
 
 # V**2 of a body at rest, for laws that take its root.
 LEAST_V2 = 1e-300
@@ -231,7 +237,7 @@ def expected_width(body):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def next_leg(dissipation, p, joints, body, keeps_panels, record):  # type: ignore[no-untyped-def]
+def next_leg(dissipation, p, joints, body, reads, record):  # type: ignore[no-untyped-def]
     """Follow a body to its next turn, or as far as one run goes.
 
     A body that the track would have to pull at once is followed a little way without contact, and AT_ONCE is in ENDING.
@@ -245,15 +251,19 @@ def next_leg(dissipation, p, joints, body, keeps_panels, record):  # type: ignor
     record[START_V2] = body[V2]
     record[HEADING], record[BEGIN], record[BEGIN_LOW] = direction, body[ELAPSED], body[ELAPSED_LOW]
     pause, only_sign, no_turn_until = inf if isfinite(end) else body[REACH], int(body[ONLY_SIGN]), body[NO_TURN_UNTIL]
+    width = expected_width(body)
+    may_be_whole = width == 0.0 or body[UNRESOLVED] == 0.0 or width <= MAX_WHOLE_SHARE * body[UNRESOLVED]
+    until, target = body[HORIZON] - body[ELAPSED], body[TARGET] - body[LAPS] * period
     while True:
         start = Start(
             *(place, body[PLACE_LOW], body[V2], direction, int(body[CONTACT_SIGN]), body[STEP], no_turn_until),
-            expected_width(body),
+            *(width, may_be_whole),
         )
-        found = follow(dissipation, p, start, Route(breaks, limit, pause, only_sign, keeps_panels), record)
+        route = Route(breaks, limit, pause, only_sign, reads, until, target)
+        found = follow(dissipation, p, start, route, record)
         if found.what != LIFTOFF or record[AHEAD] > 0.0:
             return found
-        pause, only_sign, no_turn_until, body[ENDING] = 0.0, 0, inf, AT_ONCE
+        pause, only_sign, no_turn_until, until, body[ENDING] = 0.0, 0, inf, 0.0, AT_ONCE
 
 
 @Inner
@@ -265,13 +275,15 @@ def after_turn(dissipation, p, joints, body, found, record):  # type: ignore[no-
     body[LEG_BEFORE], body[LAST_LEG], body[LEG_TIME] = body[LAST_LEG], body[LEG_TIME], 0.0
     width = fabs((place - body[PLACE]) + (low - body[PLACE_LOW]))
     body[WIDTH_BEFORE], body[LAST_WIDTH] = body[LAST_WIDTH], width if body[V2] == 0.0 else 0.0
+    if found.is_whole or body[UNRESOLVED] == 0.0 or width <= MAX_WHOLE_SHARE * body[UNRESOLVED]:
+        body[UNRESOLVED] = 0.0 if found.is_whole else body[LAST_WIDTH]
     body[TURNS] += 1.0
     body[PAUSES], body[NO_TURN_UNTIL], body[MAY_REST] = 0.0, 0.0, 1.0 if found.could_stay else 0.0
     return rests
 
 
 @Inner
-def advance(dissipation, p, joints, body, keeps_panels, record):  # type: ignore[no-untyped-def]
+def advance(dissipation, p, joints, body, reads, record):  # type: ignore[no-untyped-def]
     """Take a body to its next turn, to the end of its motion, or as far as one run goes.
 
     Parameters
@@ -283,7 +295,7 @@ def advance(dissipation, p, joints, body, keeps_panels, record):  # type: ignore
     joints : Joints
     body : array
         The line of the body (`legs.body`), which was launched; it is as before where the record is FULL.
-    keeps_panels : bool
+    reads : int
         As of `leg_run.Route`.
     record : array
         Filled in (`leg_record`).
@@ -294,7 +306,7 @@ def advance(dissipation, p, joints, body, keeps_panels, record):  # type: ignore
         RESTS if it comes to rest, one of the codes of `leg_run` for what ended the run, LEAVES or
         BEYOND; SPENT if it could not be followed.
     """
-    found, period = next_leg(dissipation, p, joints, body, keeps_panels, record), body[PERIOD]
+    found, period = next_leg(dissipation, p, joints, body, reads, record), body[PERIOD]
     what, ahead, back, place = found.what, record[AHEAD] > 0.0, record[BACK] > 0.0, record[END]
     if what == FULL or body[ENDING] == AT_ONCE:
         return AT_ONCE if body[ENDING] == AT_ONCE else FULL

@@ -31,7 +31,7 @@ from gqm_sym.runtime.legs.body import (
 )
 from gqm_sym.runtime.legs.leg_equation import Forces
 from gqm_sym.runtime.legs.leg_reading import passage, peak_of_leg
-from gqm_sym.runtime.legs.leg_record import BEGIN, BEGIN_LOW, LAPS_BEFORE
+from gqm_sym.runtime.legs.leg_record import BEGIN, BEGIN_LOW, LAPS_BEFORE, PANELS, PASSAGE, PEAKS, TIMES
 from gqm_sym.runtime.legs.leg_run import ASYMPTOTE, FULL, SPENT, point_buffer, slope_of_v2
 
 # What is asked of each body; LEG is to advance by one leg.
@@ -134,9 +134,9 @@ def conclude(body, question, sight):  # type: ignore[no-untyped-def]
 @Inner
 def answer(dissipation, p, joints, question, body, record):  # type: ignore[no-untyped-def]
     """The number that is asked for of one body, and its status."""
-    sight = Sight(inf, -inf)
+    sight, reads = Sight(inf, -inf), PEAKS if question >= LEAST_SPEED else (PASSAGE if question == ARRIVAL else TIMES)
     for _ in range(MAX_LEGS):
-        what = advance(dissipation, p, joints, body, question >= ARRIVAL, record)
+        what = advance(dissipation, p, joints, body, reads, record)
         if what in (FULL, SPENT, LEAVES, BEYOND):
             break
         if question == ARRIVAL and body[TARGET] == body[LAM0]:
@@ -184,7 +184,7 @@ def drive(dissipation, parameters, joints, question, bodies, record):  # type: i
         if body[STEP] == 0.0:
             launch(dissipation, p, joints, body)
         if question == LEG:
-            what = advance(dissipation, p, joints, body, True, record) if body[DIRECTION] != 0.0 else RESTS
+            what = advance(dissipation, p, joints, body, PANELS, record) if body[DIRECTION] != 0.0 else RESTS
         elif body[DIRECTION] != 0.0:
             body[VALUE], body[STATUS] = answer(dissipation, p, joints, question, body, record)
         else:

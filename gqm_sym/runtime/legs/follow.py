@@ -41,6 +41,7 @@ from gqm_sym.runtime.legs.leg_record import (
     MIDDLE_LOW,
     TIME_FROM_END,
     TIME_FROM_START,
+    WHOLE,
     add_panel,
     has_space,
     total_time,
@@ -173,15 +174,14 @@ def run_to_end(forces, start, route, off, record):  # type: ignore[no-untyped-de
             return end
         start = Start(
             *(start.place, start.place_low, start.v2, start.direction, start.contact_sign, start.step),
-            end.no_turn_until,
-            start.width,
+            *(end.no_turn_until, start.width, False),
         )
 
 
 @Inner
 def run_forwards(forces, start, route, off, record):  # type: ignore[no-untyped-def]
     """`run_to_end`, as one polynomial if that will do; and how many panels from the end have been entered with it."""
-    if start.v2 == 0.0 and forces.linear:
+    if start.v2 == 0.0 and forces.linear and start.may_be_whole:
         end = run_whole(forces, start, route, off, record)
         if end.what == TURN:
             return end, 2
@@ -199,6 +199,8 @@ class Followed(NamedTuple):
         At a turn, the one that `released` finds; otherwise that of the motion.
     could_stay : bool
         At a turn, whether the body could stay there at some slope; otherwise True.
+    is_whole : bool
+        Whether the leg was one polynomial.
     step, no_turn_until, v2 : float
         As of `leg_run.End`.
     """
@@ -207,6 +209,7 @@ class Followed(NamedTuple):
     contact_sign: int
     direction: int
     could_stay: bool
+    is_whole: bool
     step: float
     no_turn_until: float
     v2: float
@@ -236,7 +239,9 @@ def follow(dissipation, p, start, route, record):  # type: ignore[no-untyped-def
         dissipation.speed_equation, p, dissipation.friction, dissipation.kinked, dissipation.linear, start.direction
     )
     off = clearance(start.place, route.limit) if breaks.size else 0.0
+    record[WHOLE] = 0.0
     end, back = run_forwards(forces, start, route, off, record)
+    is_whole = back > 0
     what, used, time_from_end = end.what, HEAD + end.panel_count * COLUMNS, 0.0
     direction, could_stay = start.direction, True
     if what == TURN:
@@ -253,4 +258,4 @@ def follow(dissipation, p, start, route, record):  # type: ignore[no-untyped-def
     record[AHEAD], record[BACK] = end.panel_count, max(back, 0)
     if back < 0:
         what = FULL if back == NO_SPACE else SPENT
-    return Followed(what, end.contact_sign, direction, could_stay, end.step, end.no_turn_until, end.v2)
+    return Followed(what, end.contact_sign, direction, could_stay, is_whole, end.step, end.no_turn_until, end.v2)

@@ -30,9 +30,11 @@ from gqm_sym.runtime.legs.leg_record import (
     TIME,
     TIME_FROM_END,
     TIME_FROM_START,
+    WHOLE,
     Y_ROW,
+    copy,
 )
-from gqm_sym.runtime.legs.polynomials import COUNT, SHARES, TO_COEFFICIENTS, WIDE, to_coefficients
+from gqm_sym.runtime.legs.polynomials import COUNT, SHARES, TO_COEFFICIENTS, WIDE, sum_and_slope, to_coefficients
 
 
 def _to_legendre() -> tuple[Array, Array]:
@@ -151,23 +153,25 @@ def place_at(record, time):  # type: ignore[no-untyped-def]
 
 @Inner
 def peak(terms, lo, hi, sign):  # type: ignore[no-untyped-def]
-    """The largest value of ``sign`` times a Chebyshev series between two places on either side of its peak."""
-    third = (hi - lo) / 3.0
-    best, x, step = -inf, 0.5 * (lo + hi), third
+    """The largest value of ``sign`` times a Chebyshev series that has one extreme at most between two places."""
+    left, rise = sum_and_slope(terms, lo)
+    right, fall = sum_and_slope(terms, hi)
+    best, rise, fall = max(sign * left, sign * right), sign * rise, sign * fall
+    if not rise > 0.0 > fall:
+        return best
+    # The slope's zero, by the rule of false position; the slope at an end that stays is halved (Illinois).
+    moved = 0
     for _ in range(MAX_STEPS):
-        f0, f1, f2 = (
-            sign * chebyshev_sum(terms, x - step),
-            sign * chebyshev_sum(terms, x),
-            sign * chebyshev_sum(terms, x + step),
-        )
-        best = max(best, f1)
-        second = f0 - 2.0 * f1 + f2
-        move = min(max(0.5 * step * (f0 - f2) / second, -step), step) if second < 0.0 else (step if f2 > f0 else -step)
-        x = min(max(x + move, lo), hi)
-        if step <= FLAT_PART or (fabs(move) <= 1e-3 * step and step <= 1e-4):
+        x = min(max(lo + (hi - lo) * (rise / (rise - fall)), lo), hi)
+        value, slope = sum_and_slope(terms, x)
+        best, slope = max(best, sign * value), sign * slope
+        if slope > 0.0:
+            done, lo, rise, fall, moved = x - lo, x, slope, 0.5 * fall if moved == 1 else fall, 1
+        else:
+            done, hi, fall, rise, moved = hi - x, x, slope, 0.5 * rise if moved == -1 else rise, -1
+        if done <= FLAT_PART or slope == 0.0:
             break
-        step = max(min(0.5 * step, fabs(move)), 0.0625 * step)
-    return max(best, sign * chebyshev_sum(terms, x))
+    return best
 
 
 @Inner
@@ -234,11 +238,25 @@ def peak_between(record, panels, half_c, between, asked, best):  # type: ignore[
 
 
 @Inner
+def peak_of_rows(record, asked, best):  # type: ignore[no-untyped-def]
+    """`peak_of_leg` of a leg from turn to turn that the record has as rows."""
+    values, (force, sign) = sample_buffer(), asked
+    if sign < 0.0 and not force:
+        return max(best, 0.0)  # the body is slowest where it turns
+    copy(values, 0, record, HEAD + (NORMAL_LOAD if force else Y_ROW))
+    if force:
+        return peak_of_panel(values, -1.0, 1.0, sign, best)
+    return max(best, sqrt(peak_of_panel(values, -1.0, 1.0, sign, max(best, 0.0) ** 2)))
+
+
+@Inner
 def peak_of_leg(record, until, asked, best):  # type: ignore[no-untyped-def]
     """The larger of ``best`` and the peak of a leg up to a time from its start; ``asked`` as of `peak_between`.
 
     With the sign -1 it is minus the smallest value.
     """
+    if record[WHOLE] > 0.0:
+        return peak_of_rows(record, asked, best)
     ahead, back = int(record[AHEAD]), int(record[BACK])
     if ahead > 0:
         whole = until >= record[TIME_FROM_START]

@@ -14,6 +14,8 @@ HALF_C               c/2 of the march variable (`leg_equation.March`); inf where
 TIME_FROM_START      the time from the start to the middle
 TIME_FROM_END        the time from the middle to a turn
 CHANGE_COUNT         how often N changes sign
+WHOLE                1 if the record has no panels, but one row each of V**2 and of N per mass at nodes of the whole
+                     leg, where the first panel would have Y and N
 AHEAD, BACK          how many panels there are from the start, and how many panels or rows of a field from the end
 from HEAD on         the panels from the start; after them what was followed back from the end: panels from a turn, or
                      the field next to an equilibrium
@@ -46,7 +48,11 @@ from gqm_sym.runtime.legs.polynomials import COUNT, WIDE, to_tails
 
 START, START_LOW, START_V2, LAPS_BEFORE, HEADING, BEGIN, BEGIN_LOW = range(7)
 END, END_LOW, MIDDLE, MIDDLE_LOW, HALF_C, TIME_FROM_START, TIME_FROM_END, CHANGE_COUNT = range(7, 15)
-AHEAD, BACK, HEAD = range(15, 18)
+WHOLE, AHEAD, BACK, HEAD = range(15, 19)
+
+# What is read of a record: the times and places between which the leg runs; the largest or smallest speed or contact
+# force, too; the time at which the body passes a place; or all that panels say.
+TIMES, PEAKS, PASSAGE, PANELS = range(4)
 
 COLUMNS = 4 * WIDE
 RIGHT, TIME, TIME_ERROR = range(COUNT, 3 * WIDE, WIDE)

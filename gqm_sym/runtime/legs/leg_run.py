@@ -108,6 +108,8 @@ class Start(NamedTuple):
         The distance up to which no turn is expected, however slow the body becomes.
     width : float
         About how long the leg is, if it begins at a turn; 0 if that is unknown.
+    may_be_whole : bool
+        Whether the leg is tried as one polynomial, if it begins at a turn.
     """
 
     place: float
@@ -118,6 +120,7 @@ class Start(NamedTuple):
     step: float
     no_turn_until: float
     width: float
+    may_be_whole: bool
 
 
 class Route(NamedTuple):
@@ -133,15 +136,19 @@ class Route(NamedTuple):
         The distance from which on the run may pause.
     only_sign : int
         The only sign that N can have; 0 if it can have both.
-    keeps_panels : bool
-        Whether the record's panels are read; where the leg is one polynomial, only their times are entered otherwise.
+    reads : int
+        What is read of the record (`leg_record`).
+    until, target : float
+        The time from the leg's start up to which peaks are looked for, and the place whose passage is.
     """
 
     breaks: Array
     limit: float
     pause: float
     only_sign: int
-    keeps_panels: bool
+    reads: int
+    until: float
+    target: float
 
 
 class Ahead(NamedTuple):
@@ -155,11 +162,14 @@ class Ahead(NamedTuple):
         The places between which the curve may be evaluated (`leg_breaks`).
     widest : float
         The width that the panel may have at most; infinite but for the first panel and those after a break.
+    is_limited : bool
+        Whether ``widest`` has been found. After a break this waits until the panel turns out to have a turn.
     """
 
     upcoming: int
     span: tuple[float, float]
     widest: float
+    is_limited: bool
 
 
 class Change(NamedTuple):
@@ -298,26 +308,31 @@ def begin(forces, start, route, off, point):  # type: ignore[no-untyped-def]
     if contact_sign == 0:
         contact_sign = sign_of_load(forces, place, start.v2, point)
     march, widest = begin_march(forces, start, place, contact_sign, point)
-    return march, contact_sign, Ahead(upcoming, span, widest)
+    return march, contact_sign, Ahead(upcoming, span, widest, True)
 
 
 @Inner
-def pass_break(forces, march, route, off, panel, ahead, run_length, point):  # type: ignore[no-untyped-def]
-    """What is ahead of a panel that begins at the distance ``run_length``.
-
-    V**2 at a break is as exact as at launch, so that the panel after it is as narrow as the first one.
-    """
+def pass_break(march, route, off, v2, ahead, run_length):  # type: ignore[no-untyped-def]
+    """What is ahead of a panel that begins at the distance ``run_length`` with V**2 = ``v2``."""
     upcoming, breaks, v = ahead.upcoming, route.breaks, march.direction
     if upcoming == breaks.size or offset(breaks[upcoming], march.origin, v) > run_length:
         return ahead
-    upcoming, widest = upcoming + 1, inf
-    span = span_before(breaks, upcoming, v, off)
-    if panel.v2 > 0.0:
-        place = within(march.origin[0] + v * run_length, span)
-        slope = slope_of_v2(forces, place, panel.v2, panel.contact_sign, point)
-        if slope < 0.0:
-            widest = marched(run_length + STOPPING_SHARE * panel.v2 / -slope, march) - panel.left
-    return Ahead(upcoming, span, widest)
+    return Ahead(upcoming + 1, span_before(breaks, upcoming + 1, v, off), inf, v2 == 0.0)
+
+
+@Inner
+def limited(forces, march, panel, ahead, change, run_length, point):  # type: ignore[no-untyped-def]
+    """What is ahead of a panel that begins at the distance ``run_length`` and has these changes.
+
+    V**2 at a break is as exact as at launch, so that a panel after it that has a turn is as narrow as the first one.
+    """
+    if ahead.is_limited or min(change.turn, change.touch) > 1.0:
+        return ahead
+    place, widest = within(march.origin[0] + march.direction * run_length, panel.span), inf
+    slope = slope_of_v2(forces, place, panel.v2, panel.contact_sign, point)
+    if slope < 0.0:
+        widest = marched(run_length + STOPPING_SHARE * panel.v2 / -slope, march) - panel.left
+    return Ahead(ahead.upcoming, ahead.span, widest, True)
 
 
 @Inner
@@ -463,13 +478,14 @@ def run(forces, start, route, off, record):  # type: ignore[no-untyped-def]
     v2, left, run_length, largest_v2, step = start.v2, 0.0, 0.0, start.v2, marched(step, march)
     what, panel_count, recorded, change_count = SPENT, 0, 0, 0
     # Once time is not counted any more, a turn is searched for.
-    searching, timed = False, Timed(run_length, v2, nu, change_count)
-    # Time on the second half of a leg is counted from its end; laws that are not linear keep to what is next to it.
+    searching, at_stop, timed = False, False, Timed(run_length, v2, nu, change_count)
+    # Time on the second half of a leg is counted from its end, unless breaks limit its panels anyway; laws that are not
+    # linear keep to what is next to it.
     middle = 0.5 * start.width if forces.linear and start.v2 == 0.0 and start.width > 0.0 else inf
     for _ in range(MAX_PANELS):
-        late = v2 < HIGH_V2_RATIO * largest_v2 or run_length >= middle
+        late = v2 < HIGH_V2_RATIO * largest_v2 or (run_length >= middle and (searching or not at_stop))
         has_room = has_space(record, HEAD + recorded * COLUMNS, change_count)
-        ahead = pass_break(forces, march, route, off, Panel(left, v2, nu, ahead.span), ahead, run_length, point)
+        ahead = pass_break(march, route, off, v2, ahead, run_length)
         at_end = ahead.upcoming == route.breaks.size
         stop = offset(route.limit if at_end else route.breaks[ahead.upcoming], march.origin, v)
         code = what_before(nu, route.only_sign, has_room, searching and not late, stop <= run_length)
@@ -489,6 +505,9 @@ def run(forces, start, route, off, record):  # type: ignore[no-untyped-def]
             if forces.friction or nu == -route.only_sign:
                 continue  # with forces of this sign
         change = first_changes(march, panel, largest_v2, load_change, work)
+        ahead = limited(forces, march, panel, ahead, change, run_length, point)
+        if ahead.widest < width:
+            continue
         if changes_at_once(march, panel, width, change, run_length):
             change_count = (
                 enter_change(record, change_count, start.place + v * run_length) if left > 0.0 else change_count
@@ -504,10 +523,9 @@ def run(forces, start, route, off, record):  # type: ignore[no-untyped-def]
             add_panel(record, HEAD + recorded * COLUMNS, right, right - left, work)
             recorded += 1
         panel_count += 1
-        largest_v2 = largest_after(largest_v2, v2, ends_here, work)
-        at_stop = not ends_here and width == max_width
+        largest_v2, at_stop = largest_after(largest_v2, v2, ends_here, work), not ends_here and width == max_width
         v2, left, run_length = max(work[W + COUNT], 0.0), right, stop if at_stop else distance(right, march)
-        ahead = Ahead(ahead.upcoming, ahead.span, inf)
+        ahead = Ahead(ahead.upcoming, ahead.span, inf, True)
         timed = timed if searching else Timed(run_length, v2, nu, change_count)
         may_pause = (run_length >= route.pause and 2.0 * v2 >= largest_v2) or panel_count >= PANELS_PER_RUN
         code = what_after(change, at_stop and at_end, may_pause)

@@ -11,6 +11,7 @@ import numpy as np
 from gqm_sym.runtime.arithmetic.matrices import largest, multiply, span
 from gqm_sym.runtime.compiled.intrinsics import fma
 from gqm_sym.runtime.compiled.jit import Inner
+from gqm_sym.runtime.compiled.registers import on_stack, over_rows
 
 # The number of nodes; together with the panel's end they fill three registers.
 COUNT = 23
@@ -93,7 +94,10 @@ MIN_PART = 2.0**-30
 # Rows of the buffer of a search: the series on the part that is searched, three rows of Clenshaw's scheme by which it
 # is found, and the ends of the parts that are still to search.
 PART, TWICE_X, NEXT_SUM, SUM_AFTER, STACK = range(0, 5 * WIDE, WIDE)
-BUFFER_SIZE = STACK + 64
+search_buffer = on_stack(STACK + 64)
+
+next_sum_row = over_rows(lambda twice_x, next_sum, after, term: term + twice_x * next_sum - after, WIDE)
+last_sum_row = over_rows(lambda twice_x, next_sum, after, term: term + 0.5 * twice_x * next_sum - after, WIDE)
 
 # The step of Newton's method for a zero in [-1, 1] after which it ends: the next one would be about its square.
 LAST_STEP = 1e-9
@@ -119,16 +123,10 @@ def _restrict(c, lo, hi, buffer):  # type: ignore[no-untyped-def]
     for j in range(WIDE):
         buffer[TWICE_X + j] = 2.0 * (lo + (hi - lo) * ENDS_BY_NODE[j])
         buffer[NEXT_SUM + j], buffer[SUM_AFTER + j] = 0.0, 0.0
-    for k in range(COUNT - 1, 0, -1):
-        term = c[k]
-        for j in range(WIDE):
-            before = buffer[NEXT_SUM + j]
-            buffer[NEXT_SUM + j], buffer[SUM_AFTER + j] = (
-                term + buffer[TWICE_X + j] * before - buffer[SUM_AFTER + j],
-                before,
-            )
-    for j in range(WIDE):
-        buffer[TWICE_X + j] = c[0] + 0.5 * buffer[TWICE_X + j] * buffer[NEXT_SUM + j] - buffer[SUM_AFTER + j]
+    for k in range(COUNT - 1, 0, -2):  # each sum takes the place of the one before the last
+        next_sum_row(buffer, SUM_AFTER, TWICE_X, NEXT_SUM, SUM_AFTER, c[k])
+        next_sum_row(buffer, NEXT_SUM, TWICE_X, SUM_AFTER, NEXT_SUM, c[k - 1])
+    last_sum_row(buffer, TWICE_X, TWICE_X, NEXT_SUM, SUM_AFTER, c[0])
     to_coefficients(buffer, TWICE_X, buffer, PART)
 
 
@@ -145,7 +143,7 @@ def _is_monotone(c):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def _sum_and_slope(c, x):  # type: ignore[no-untyped-def]
+def sum_and_slope(c, x):  # type: ignore[no-untyped-def]
     """The series and its derivative at x."""
     value, value_after, slope, slope_after = 0.0, 0.0, 0.0, 0.0
     twice = 2.0 * x
@@ -161,7 +159,7 @@ def _crossing(c, low, high):  # type: ignore[no-untyped-def]
     lo, hi, rising = -1.0, 1.0, high > 0.0
     x = lo + (hi - lo) * (low / (low - high))
     for _ in range(60):
-        value, slope = _sum_and_slope(c, x)
+        value, slope = sum_and_slope(c, x)
         if value == 0.0:
             return x
         if (value > 0.0) == rising:
@@ -265,7 +263,7 @@ def first_change(c, sign, noise):  # type: ignore[no-untyped-def]
             touch = lo if touch > 1.0 else touch
         elif verdict == UNDECIDED:
             if not halved:
-                buffer, halved = np.empty(BUFFER_SIZE), True
+                buffer, halved = search_buffer(), True
                 part = buffer[PART : PART + COUNT]
             buffer[STACK + waiting] = hi
             waiting += 1

@@ -16,7 +16,7 @@ from gqm_sym.runtime.arithmetic.matrices import multiply
 from gqm_sym.runtime.compiled.jit import Inner
 from gqm_sym.runtime.compiled.registers import over_rows
 from gqm_sym.runtime.compiled.types import Array
-from gqm_sym.runtime.legs.leg_breaks import located, offset, span_before, within
+from gqm_sym.runtime.legs.leg_breaks import CLEARANCE_SHARE, located, offset, span_before, within
 from gqm_sym.runtime.legs.leg_equation import (
     ARC_RATE,
     DS,
@@ -60,9 +60,13 @@ from gqm_sym.runtime.legs.leg_record import (
     COLUMNS,
     HEAD,
     NORMAL_LOAD,
+    PANELS,
+    PASSAGE,
+    PEAKS,
     RIGHT,
     TIME,
     TIME_ERROR,
+    WHOLE,
     Y_ROW,
     copy,
     has_space,
@@ -294,6 +298,23 @@ def enter_time(record, begin, time, is_read):  # type: ignore[no-untyped-def]
 
 
 @Inner
+def is_read(route, origin, v, h, time):  # type: ignore[no-untyped-def]
+    """Whether anything of a leg of the width ``h`` is read for which it takes panels."""
+    if route.reads == PASSAGE:
+        return 0.0 <= offset(route.target, origin, v) <= h * (1.0 + CLEARANCE_SHARE)
+    return route.reads == PANELS or (route.reads == PEAKS and time > route.until)
+
+
+@Inner
+def enter_rows(record, work):  # type: ignore[no-untyped-def]
+    """Write a leg into the record as one row each of V**2 and N."""
+    load_per_mass_row(work, MEAN, N0, KAPPA, W)
+    copy(record, HEAD + NORMAL_LOAD, work, MEAN)
+    copy(record, HEAD + Y_ROW, work, W)
+    record[WHOLE] = 1.0
+
+
+@Inner
 def run_whole(forces, start, route, off, record):  # type: ignore[no-untyped-def]
     """Follow the body from one turn to the next, if that takes one polynomial only.
 
@@ -321,9 +342,12 @@ def run_whole(forces, start, route, off, record):  # type: ignore[no-untyped-def
         if h > 0.0 and is_whole(forces, panel, h, work):
             to_half_times(work, TIME_RATE, work, TAILS)
             first, second = work[TAILS], work[TAILS + 1]
-            if not route.keeps_panels or enter_parts(record, h, work):
+            has_panels = is_read(route, origin, v, h, first + second)
+            if not has_panels:
+                enter_rows(record, work)
+            if not has_panels or enter_parts(record, h, work):
                 what, middle = TURN, located(origin, v, 0.5 * h, breaks, upcoming)
-                enter_time(record, HEAD, first, route.keeps_panels)
-                enter_time(record, HEAD + 2 * COLUMNS, second, route.keeps_panels)
+                enter_time(record, HEAD, first, has_panels)
+                enter_time(record, HEAD + 2 * COLUMNS, second, has_panels)
     place = located(origin, v, h, breaks, upcoming)
     return End(what, place, 0.0, nu, 0.5 * h, 0.0, middle, 0.0, 0, 2, upcoming)

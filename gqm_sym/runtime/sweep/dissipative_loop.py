@@ -30,8 +30,8 @@ from gqm_sym.runtime.sweep.quantities import Answers
 if TYPE_CHECKING:
     from gqm_sym.runtime.launch.formulas import Formulas
 
-# How many panels the record of a leg has space for, how many bodies are driven at a time, and from how many on a thread
-# is worth starting.
+# How many panels the record of a leg has space for beside one for each break, how many bodies are driven at a time, and
+# from how many on a thread is worth starting.
 MAX_PANELS, CHUNK, MIN_BODIES_PER_THREAD = 128, 2**12, 2**5
 
 # What the driver is asked for each quantity, by its name. Motions that lose energy have no period.
@@ -93,7 +93,7 @@ def answer_driven(
     """
     chart, breaks, corners = curve
     joints = Joints(breaks, corners, np.empty(room_ahead(breaks.size)))
-    record, mass = np.empty(MAX_PANELS * COLUMNS), PARAMETERS + list(formulas.parameters).index("m")
+    record, mass = np.empty((MAX_PANELS + breaks.size) * COLUMNS), PARAMETERS + list(formulas.parameters).index("m")
     for begin in range(part.start, part.stop, CHUNK):
         chunk = slice(begin, min(begin + CHUNK, part.stop))
         lines, found = lay_out(columns, chunk.start, chunk.stop), answers.part(chunk)
