@@ -55,9 +55,6 @@ from gqm_sym.runtime.legs.polynomials import (
 # The last coefficients of a resolved function against the largest one; noise in them is about 1e-16.
 TAIL_RATIO = 4e-16
 
-# The same for FORCE and Q_RATE, which are only integrated: that divides a coefficient by twice its degree.
-INTEGRATED_TAIL_RATIO = 4e-15
-
 # Below this ratio coefficients that no longer decrease are rounding noise, not structure.
 NOISE_LEVEL = 1e-9
 
@@ -158,14 +155,11 @@ def set_sizes(v2, factor, work):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def examine(work, row, size, ratio=TAIL_RATIO):  # type: ignore[no-untyped-def]
-    """The size of a function's last coefficients, that of some in the middle, and whether the function is resolved.
-
-    Its last coefficients may be ``ratio`` of its size.
-    """
+def examine(work, row, size):  # type: ignore[no-untyped-def]
+    """The size of a function's last coefficients, that of some in the middle, and whether the function is resolved."""
     to_tails(work, row, work, TAILS)
     tail, middle = tail_of(work), max(fabs(work[TAILS + 3]), max(fabs(work[TAILS + 4]), fabs(work[TAILS + 5])))
-    return tail, middle, tail <= ratio * size or (middle <= NOISE_LEVEL * size and tail >= 0.05 * middle)
+    return tail, middle, tail <= TAIL_RATIO * size or (middle <= NOISE_LEVEL * size and tail >= 0.05 * middle)
 
 
 @Inner
@@ -174,8 +168,7 @@ def are_resolved(work, first, last):  # type: ignore[no-untyped-def]
     resolved, worst = True, 0.0
     for row in range(first, last, WIDE):
         size = work[size_at(row)]
-        ratio = INTEGRATED_TAIL_RATIO if row == FORCE or row == Q_RATE else TAIL_RATIO
-        tail, middle, fine = examine(work, row, size, ratio)
+        tail, middle, fine = examine(work, row, size)
         if not (tail < inf and middle < inf):
             return False, inf
         if size > 0.0:
@@ -377,7 +370,7 @@ def fill_gap(forces, march, panel, width, gaps, at, work):  # type: ignore[no-un
     if not (is_curve_resolved(width, work)[0] and are_resolved(work, FORCE, Q_RATE)[0]):
         return
     for row in (N0, KAPPA):
-        if not examine(work, row, size_of(work, row), ONE_SIGN_RATIO)[2]:
+        if not examine(work, row, size_of(work, row))[0] <= ONE_SIGN_RATIO * size_of(work, row):
             return
     for k, row in enumerate(GAP_ROWS):
         copy(gaps, at + GAP_HEAD + k * WIDE, work, row)

@@ -516,7 +516,9 @@ def pass_gaps(forces, march, route, contact_sign, before, record, work):  # type
     breaks, gaps, upcoming = route.breaks, route.gaps, ahead.upcoming
     while gaps.size > 0 and upcoming + 1 < breaks.size and v2 >= HIGH_V2_RATIO * largest_v2:
         start, stop, to = breaks[upcoming], breaks[upcoming + 1], HEAD + count * COLUMNS
-        if contact_sign in (0, -route.only_sign) or not has_space(record, to, 0):
+        # A break lies behind already where a panel is laid once more.
+        is_ahead = offset(start, march.origin, v) == run_length
+        if contact_sign in (0, -route.only_sign) or not (is_ahead and has_space(record, to, 0)):
             break
         gap = route.first_gap + (upcoming if v > 0 else -upcoming - 1)
         at, width = GAP_COLUMNS * (4 * gap + (v + 1) + (contact_sign + 1) // 2), fabs(stop - start)
@@ -535,7 +537,9 @@ def pass_gaps(forces, march, route, contact_sign, before, record, work):  # type
             copy(record, to + Y_ROW, work, SPEED)
             copy(record, to + NORMAL_LOAD, work, MEAN)
         record[to + RIGHT], record[to + TIME], record[to + TIME_ERROR] = left, time, -1.0
-    return Passed(left, run_length, v2, largest_v2, Ahead(upcoming, ahead.span, inf, True), count)
+    if upcoming > ahead.upcoming:
+        ahead = Ahead(upcoming, ahead.span, inf, True)
+    return Passed(left, run_length, v2, largest_v2, ahead, count)
 
 
 @Inner

@@ -112,6 +112,11 @@ CASES = {
         {"mu": 0.15},
     ),
     "track": (surveyed, lambda: gqm.CoulombFriction() + gqm.QuadraticDrag(b="c"), {"mu": 0.05, "c": 0.1}),
+    "planes": (
+        lambda: gqm.Curve.sampled([(0, 3), (1, 0), (2, 1), (3, 0.5), (5, -0.25), (6, 4)], kind="linear"),
+        lambda: gqm.CoulombFriction() + gqm.QuadraticDrag(b="c"),
+        {"mu": 0.15, "c": 0.1},
+    ),
     "closed": (
         lambda: gqm.Curve.implicit("x**2 + 2*z**2 - 1", start=(0, "-sqrt(2)/2")),
         gqm.CoulombFriction,
