@@ -1,5 +1,6 @@
 """Fixtures of the whole suite: generated modules and motions, each made once a session."""
 
+import gc
 import os
 from collections.abc import Callable
 from pathlib import Path
@@ -19,6 +20,10 @@ settings.load_profile("suite")
 
 # On a machine that others use compiling takes any time, and tests look at what is said on standard error.
 jit.ANNOUNCER.seconds = 1e6
+
+# A worker comes to hold a million objects of SymPy and numba; to look through them as often as usual takes a twelfth of
+# the time.
+gc.set_threshold(100_000, 20, 50)
 
 if numba.config.DISABLE_JIT:
     import uncompiled

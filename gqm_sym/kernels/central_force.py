@@ -23,11 +23,10 @@ def CentralForce(*, centre: Iterable[str | int | sp.Expr] = (0, 0), k: Given | N
         The strength (G times the mass of the centre), or another name for it.
     """
     where = "central_force: centre"
-    place = tuple(
-        read_expression(part, where=where) for part in several(centre, where=where, what="two coordinates (x, z)")
-    )
-    if len(place) != 2:
-        raise DeclarationError(f"{where}: must be two coordinates (x, z), got {len(place)}")
+    given = several(centre, where=where, what="two coordinates (x, z)")
+    if len(given) != 2:
+        raise DeclarationError(f"{where}: must be two coordinates (x, z), got {len(given)}")
+    place = tuple(read_expression(part, where=where) for part in given)
     found = names_in_order(*place)
     for name in COORDINATES:
         if name in found:

@@ -36,9 +36,9 @@ MAX_RATIO, MAX_NEXT_CHANGE, MAX_CHANGE_BEFORE = 1e-3, 1e-27, 1e-20
 # Places that are evaluated together at the ends: both turning points, the launch, and the launch again.
 ENDS = 8
 
-# The panels of an interval are doubled from MIN_PANELS to MAX_PANELS. Each doubling divides the error by some 2**32 in
-# the end, so a change this small is enough for 22 digits.
-MIN_PANELS, MAX_PANELS, MAX_PANEL_CHANGE = 2, 128, 1e-18
+# The panels of an interval are doubled from MIN_PANELS to MAX_PANELS, until the next change would be smaller than this
+# share of the time, or than its rounding.
+MIN_PANELS, MAX_PANELS, MAX_PANEL_CHANGE = 2, 128, 1e-24
 
 # The largest relative error of a time for which it is of any use.
 MAX_ERROR = 1e-17
@@ -249,21 +249,24 @@ def fill_panel(kind, left, step, panel, rule, nodes):  # type: ignore[no-untyped
 
 @Inner
 def time_between(integrand, kind, left, right, rule):  # type: ignore[no-untyped-def]
-    """Return the time from one phase angle to another; NaN where Gauss's rules do not converge."""
+    """Return the time from one phase angle to another and its error; NaN where Gauss's rules do not converge."""
     width = add(right[0], right[1], -left[0], -left[1])
     scale, scale_low = multiply(width[0], width[1], integrand.width[0], integrand.width[1])
     nodes = np.empty((4, RULE * MAX_PANELS))
-    panels, before, before_low = MIN_PANELS, nan, nan
+    panels, before, before_low, change_before = MIN_PANELS, inf, 0.0, inf
     while panels <= MAX_PANELS:
         step, first = (width[0] / panels, width[1] / panels), LEVELS[0]
         for panel in range(panels):
             fill_panel(kind, left, step, panel, rule, nodes)
         total = add_nodes(integrand, nodes, first, RULE * panels, (0.0, 0.0, 0.0))
         time, low = multiply(scale, scale_low, total[0] / panels, total[1] / panels)
-        if fabs(add(time, low, -before, -before_low)[0]) <= MAX_PANEL_CHANGE * fabs(time):
-            return fabs(time), copysign(low, time * low)
-        panels, before, before_low = 2 * panels, time, low
-    return nan, nan
+        rounding = fabs(scale) * total[2] / panels + 4.0 * UNIT * fabs(time)
+        change = fabs(add(time, low, -before, -before_low)[0])
+        following = min(change, change * (change / change_before)) if change_before > 0.0 else change
+        if following <= max(MAX_PANEL_CHANGE * fabs(time), rounding):
+            return fabs(time), copysign(low, time * low), rounding + following
+        panels, before, before_low, change_before = 2 * panels, time, low, change
+    return nan, nan, nan
 
 
 @Inner
@@ -281,7 +284,7 @@ def launch_angle(integrand, launch):  # type: ignore[no-untyped-def]
 
 
 @entry(
-    types.void(TAPE, VECTOR, MATRIX, types.UniTuple(REAL, 4), INTEGER, LEVEL_AND_INTERVAL, MATRIX, MATRIX),
+    REAL(TAPE, VECTOR, MATRIX, types.UniTuple(REAL, 4), INTEGER, LEVEL_AND_INTERVAL, MATRIX, MATRIX),
     checked=False,
 )
 def fill_times(tape, work, p, launch, kind, orbit, rule, times):  # type: ignore[no-untyped-def]
@@ -301,22 +304,34 @@ def fill_times(tape, work, p, launch, kind, orbit, rule, times):  # type: ignore
         The first row has phase angles, in ascending order from the second on. The others are filled with the time from
         the lower turning point, or from the launch of a lap, as two doubles. The first column is that of the launch,
         whose angle is computed unless zero is given.
+
+    Returns
+    -------
+    float
+        A bound on the error of the times.
     """
     work, p, rule, times = uncounted(work), uncounted(p), uncounted(rule), uncounted(times)
     address, operations, parts, registers = tape
     tape = (address, uncounted(operations), parts, registers)
     fill_parameters(tape, p, work)
     integrand = Integrand(tape, work, *orbit)
-    zero, at, high, low = (0.0, 0.0), (0.0, 0.0), 0.0, 0.0
+    angle, at, high, low, error, of_launch = (0.0, 0.0), (0.0, 0.0), 0.0, 0.0, 0.0, 0.0
     times[1, 0], times[2, 0] = 0.0, 0.0
-    if times[0, 0] != 0.0:
-        angle = launch_angle(integrand, launch)
-        times[1, 0], times[2, 0] = time_between(integrand, kind, zero, angle, rule)
-    for k in range(1, times.shape[1]):
-        angle = (times[0, k], 0.0)
-        part, part_low = time_between(integrand, kind, at, angle, rule)
-        high, low = add(high, low, part, part_low)
-        times[1, k], times[2, k], at = high, low, angle
+    is_thrown = times[0, 0] != 0.0
+    thrown_at = launch_angle(integrand, launch) if is_thrown else angle
+    for k in range(1, times.shape[1] + 1):
+        is_last = k == times.shape[1]
+        if is_thrown and (is_last or thrown_at[0] < times[0, k]):
+            part, part_low, of_part = time_between(integrand, kind, at, thrown_at, rule)
+            times[1, 0], times[2, 0] = add(high, low, part, part_low)
+            is_thrown, of_launch = False, error + of_part
+        if not is_last:
+            # The upper turning point is at pi itself.
+            angle = (times[0, k], 2.0 * QUARTER[1] if times[0, k] == 2.0 * QUARTER[0] else 0.0)
+            part, part_low, of_part = time_between(integrand, kind, at, angle, rule)
+            high, low = add(high, low, part, part_low)
+            times[1, k], times[2, k], at, error = high, low, angle, error + of_part
+    return max(error, of_launch)
 
 
 @entry(
@@ -343,7 +358,7 @@ def orbit_time(tape, work, p, launch, offsets, direction, nodes):  # type: ignor
     direction : int
         0 for a libration, else the sign of ds/dt on a lap.
     nodes : (4, n) array
-        The nodes of the trapezoidal rule (`nodes.trapezoidal_nodes`).
+        The nodes of the trapezoidal rule (`nodes.trapezoidal_nodes`), or none if the duration is not wanted.
 
     Returns
     -------
@@ -372,7 +387,9 @@ def orbit_time(tape, work, p, launch, offsets, direction, nodes):  # type: ignor
         level, errors, ends = energy_level(work, registers, launch, 2), (0.0, 0.0), (0.0, 0.0, 0.0)
         start, end, scale = (launch[0], launch[1]), (launch[0], launch[1]), (work[period], work[period + LOW])
         width = (direction * scale[0], direction * scale[1])
-    mean = mean_by_trapezoid(Integrand(tape, work, level, start, width), nodes, ends)
+    mean = (nan, nan, nan)
+    if nodes.shape[1] > 0:
+        mean = mean_by_trapezoid(Integrand(tape, work, level, start, width), nodes, ends)
     high, low = multiply(mean[0], mean[1], scale[0], scale[1])
     duration = (high, low, scale[0] * mean[2] + 4.0 * UNIT * high)
     low_error, high_error = errors[0] + UNIT * fabs(start[0]), errors[1] + UNIT * fabs(end[0])
@@ -415,18 +432,20 @@ def time_orbit(
     offsets : (float, float)
         The distances of the lower and the upper turning point from the launch, as doubles know them.
     times : (3, n) array
-        Phase angles, and room for the times there (`fill_times`).
+        Phase angles, and room for the times there (`fill_times`). If there are any besides that of the launch, they are
+        the edges of panels up to the end of the orbit, and the duration is found by panels, not by the trapezoidal
+        rule.
     """
     lam0, v0 = launch
     tape, work, p = formulas
-    kind = CIRCULATION if direction else LIBRATION
+    kind, by_panels = CIRCULATION if direction else LIBRATION, times.shape[1] > 1
+    nodes = trapezoidal_nodes(kind)[:, :0] if by_panels else trapezoidal_nodes(kind)
     given = (INTERPRETER.address, *tape), work, p, (lam0.value, lam0.low, v0.value, v0.low)
-    *found, orbit = orbit_time(*given, (-offsets[0], offsets[1]), direction, trapezoidal_nodes(kind))
+    *found, orbit = orbit_time(*given, (-offsets[0], offsets[1]), direction, np.ascontiguousarray(nodes))
     duration, low, high = map(Bounded._make, found)
-    if not duration.error <= MAX_ERROR * duration.high:
-        return None
     if times.size:
-        fill_times(*given, kind, orbit, panel_rule(), times)
+        error = fill_times(*given, kind, orbit, panel_rule(), times)
+        duration = Bounded(float(times[1, -1]), float(times[2, -1]), error) if by_panels else duration
         if np.isnan(times).any():
             return None
-    return Orbit(duration, low, high)
+    return Orbit(duration, low, high) if duration.error <= MAX_ERROR * duration.high else None

@@ -89,14 +89,7 @@ class Problem:
     @property
     def tape(self) -> BoundTape | None:
         """The exact formulas for double-double arithmetic, of a chart the potential; None where they are too long."""
-        if self.p.tape is None:
-            exact, domain, count, found = self.formulas.exact, self.formulas.domain_of, len(self.p), None
-            if isinstance(exact, ExactFormulas) and domain is not None:
-                found = record(exact, domain, count)
-            elif isinstance(exact, ExactPotential):
-                found = record_in_plane(exact.effective_potential, count)
-            self.p.tape = bind_tape(found, self.p) or False
-        return self.p.tape or None
+        return tape_of(self.formulas, self.p)
 
     @property
     def true_pieces(self) -> TruePieces | None:
@@ -130,15 +123,27 @@ class Problem:
         return self.launch.v0.value**2
 
 
+def tape_of(formulas: "Formulas", p: "ParameterValues") -> BoundTape | None:
+    """The exact formulas for double-double arithmetic, of a chart the potential; None where they are too long."""
+    if p.tape is None:
+        exact, domain, found = formulas.exact, formulas.domain_of, None
+        if isinstance(exact, ExactFormulas) and domain is not None:
+            found = record(exact, domain, len(p))
+        elif isinstance(exact, ExactPotential):
+            found = record_in_plane(exact.effective_potential, len(p))
+        p.tape = bind_tape(found, p) or False
+    return p.tape or None
+
+
 def exact_problem(formulas: "Formulas", p: "ParameterValues", launch: "Launch") -> ExactProblem | None:
     """The problem of one launch in extended precision; None if the curve is known in doubles only."""
     exact, maker = formulas.exact, formulas.chart
     if isinstance(exact, ExactFormulas) and formulas.domain_of is not None:
         track = partial(FormulaTrack, exact, formulas.domain_of, launch.lam0)
-        return ExactProblem(track, NOWHERE, p, launch.lam0, launch.v0)
+        return ExactProblem(track, NOWHERE, p, launch.lam0, launch.v0, partial(tape_of, formulas, p))
     if isinstance(exact, ExactPotential) and maker is not None:
         chart = formulas.charted(p)
         if maker.is_exact(chart):
             along = partial(ChartTrack, maker, chart, exact.effective_potential, launch.point, launch.lam0)
-            return ExactProblem(along, chart.edges, p, launch.lam0, launch.v0)
+            return ExactProblem(along, chart.edges, p, launch.lam0, launch.v0, lambda: None)
     return None

@@ -109,7 +109,8 @@ class PeriodicMotion(Motion):
     @cached_property
     def _orbit(self) -> Orbit | None:
         """Duration and turning points in double-double arithmetic; None where that does not suffice."""
-        return timing.orbit_of(self.problem, self.kind, self.direction, self._offsets)
+        times = timing.times_along(self._segment, is_thrown=False)
+        return timing.orbit_of(self.problem, self.kind, self.direction, self._offsets, times)
 
     def _timing(self, end_time: float) -> timing.Timing:
         """The times with as many digits as a phase needs at ``end_time`` in s from launch."""

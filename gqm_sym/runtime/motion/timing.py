@@ -87,6 +87,17 @@ def passage_of(problem: Problem, kind: str, direction: int, offsets: tuple[float
     return pass_along(pieces, formulas, (launch.lam0, launch.v0, launch.point), (low, high), sense)
 
 
+def times_along(segment: Segment, *, is_thrown: bool) -> Array:
+    """Room for the times at the launch and, where the trapezoidal rule would not do, at the edges of the panels.
+
+    It is for `double_double.orbit_time.fill_times`.
+    """
+    edges = segment.edges[1:] if len(segment.edges) - 1 > MAX_SMOOTH_PANELS else NOWHERE
+    times = np.zeros((3, 1 + len(edges)))
+    times[0, 0], times[0, 1:] = 1.0 if is_thrown else 0.0, edges
+    return times
+
+
 def orbit_of(
     problem: Problem, kind: str, direction: int, offsets: tuple[float, float], times: Array = NO_TIMES
 ) -> Orbit | None:
@@ -97,7 +108,7 @@ def orbit_of(
     offsets : (float, float)
         The distances of a libration's turning points from the launch.
     times : (3, n) array
-        Phase angles, and room for the times there (`double_double.orbit_time.fill_times`); not used for charts.
+        From `times_along`; not used for charts.
     """
     if problem.tape is None:
         return None
@@ -112,25 +123,22 @@ def in_double_double(
     problem: Problem, kind: str, direction: int, segment: Segment, offsets: tuple[float, float]
 ) -> Timing | None:
     """The times from double-double arithmetic; None where that does not suffice."""
-    if segment.from_multiprecision:
-        return None
     is_smooth = len(segment.edges) - 1 <= MAX_SMOOTH_PANELS
-    inner = segment.edges[1:-1] if not is_smooth else NOWHERE
     is_thrown, lam0 = kind == "libration" and problem.w0 > 0.0, problem.launch.lam0
     if problem.formulas.chart is not None:
-        passage = passage_of(problem, kind, direction, offsets)
+        inner = segment.edges[1:-1] if not is_smooth else NOWHERE
+        passage = passage_of(problem, kind, direction, offsets) if not segment.from_multiprecision else None
         orbit = None if passage is None else passage.orbit
         rows = None if passage is None or orbit is None else passage.times_at(inner, is_thrown=is_thrown)
         if passage is None or orbit is None or rows is None:
             return None
         found, phase_time, offsets = rows[:-1, :2].T, rows[-1, :2].tolist(), passage.offsets
     else:
-        times = np.zeros((3, 1 + len(inner)))
-        times[0, 0], times[0, 1:] = 1.0 if is_thrown else 0.0, inner
+        times = times_along(segment, is_thrown=is_thrown)
         orbit = orbit_of(problem, kind, direction, offsets, times)
         if orbit is None:
             return None
-        a, b, found, phase_time = orbit.low, orbit.high, times[1:, 1:], times[1:, 0].tolist()
+        a, b, found, phase_time = orbit.low, orbit.high, times[1:, 1:-1], times[1:, 0].tolist()
         offsets = (lam0.value - a.high) + (lam0.low - a.low), (b.high - lam0.value) + (b.low - lam0.low)
     duration = orbit.duration[:2]
     edge_times = None

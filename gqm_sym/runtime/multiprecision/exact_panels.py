@@ -1,7 +1,7 @@
 """Panels of time and arc length laid in extended precision, where doubles cannot resolve V**2 (near a separatrix).
 
-The panels are those of `time_panels`, but the integrands at their nodes are computed with mpmath and are accurate to
-the last bit. Speed does not matter here.
+The panels are those of `time_panels`, but the integrands at their nodes are accurate to the last bit. They are computed
+in double-double arithmetic, and with mpmath where too many of its digits cancel.
 """
 
 from typing import Any
@@ -10,7 +10,9 @@ import numpy as np
 
 from gqm_sym.budgets import budget
 from gqm_sym.errors import SolutionError
-from gqm_sym.runtime.multiprecision.exact_problem import ExactProblem
+from gqm_sym.runtime.compiled.types import Array
+from gqm_sym.runtime.double_double.panel_rates import panel_rates
+from gqm_sym.runtime.multiprecision.exact_problem import ExactProblem, two_doubles
 from gqm_sym.runtime.quadrature.kronrod import KRONROD_WEIGHTS, NODES
 from gqm_sym.runtime.quadrature.substitution import FROM_TURN, TURN_TURN
 from gqm_sym.runtime.quadrature.time_panels import (
@@ -27,6 +29,8 @@ from gqm_sym.runtime.quadrature.time_panels import (
 # Decimal digits: enough for all digits of a double at a distance of 1e-30 from a barrier.
 DIGITS = 80
 MAX_EXACT_PANELS = 400
+
+ALL_NODES = np.concatenate([-NODES[:0:-1], NODES])
 
 
 def exact_ends(
@@ -61,6 +65,35 @@ def exact_ends(
     return out[0], out[1]
 
 
+class _Rates:
+    """The integrands of time and arc length at the nodes of panels of one segment, accurate to the last bit."""
+
+    def __init__(self, exact: ExactProblem, kind: int, ends: tuple[Any, Any]) -> None:
+        self.scale, self.kind, self.ends = exact.at(DIGITS), kind, ends
+        self.launch, self.tape = (exact.lam0, exact.v0), exact.tape()
+        self.segment = two_doubles(ends[0]), two_doubles(ends[1] - ends[0])
+
+    def __call__(self, middle: Any, reach: Any) -> Array:
+        """Return dt/dphi and ds/dphi as two rows."""
+        values = None
+        if self.tape is not None:
+            panel = *self.segment, two_doubles(middle), two_doubles(reach)
+            values = panel_rates(self.tape, self.launch, self.kind, panel, ALL_NODES)
+        return self._by_mpmath(middle, reach) if values is None else values
+
+    def _by_mpmath(self, middle: Any, reach: Any) -> Array:
+        rate, values = self.scale.time_rate(self.kind, *self.ends), np.empty((2, COUNT))
+        for i, x in enumerate(ALL_NODES.tolist()):
+            duration, w = rate(middle + reach * x)
+            if duration.imag or w.imag or not (duration > 0 and w > 0):
+                raise SolutionError(
+                    f"time of flight from {float(self.ends[0])!r} to {float(self.ends[1])!r}: "
+                    "V**2 is not positive inside this segment"
+                )
+            values[:, i] = float(duration), float(duration * self.scale.sqrt(w))
+        return values
+
+
 @budget("quadrature", 60.0, "launch a little farther from the equilibrium")
 def lay_exactly(exact: ExactProblem, kind: int, ends: tuple[Any, Any], stop: float) -> Panels:
     """Lay panels over a segment in extended precision.
@@ -81,9 +114,7 @@ def lay_exactly(exact: ExactProblem, kind: int, ends: tuple[Any, Any], stop: flo
     SolutionError
         If V**2 is not positive inside the segment.
     """
-    scale = exact.at(DIGITS)
-    rate = scale.time_rate(kind, *ends)
-    nodes = np.concatenate([-NODES[:0:-1], NODES])
+    scale, rates_on = exact.at(DIGITS), _Rates(exact, kind, ends)
     weights = np.concatenate([KRONROD_WEIGHTS[:0:-1], KRONROD_WEIGHTS])
     edges, times, lengths = [0.0], [0.0], [0.0]
     time_terms, length_terms = [], []
@@ -97,16 +128,7 @@ def lay_exactly(exact: ExactProblem, kind: int, ends: tuple[Any, Any], stop: flo
         # The nodes are not rounded to doubles: next to a peak of width 1e-6 that would be noise.
         high = end if right == stop else scale.mpf(right)
         reach, middle = (high - left) / 2, (high + left) / 2
-        half = float(reach)
-        values = np.empty((2, COUNT))
-        for i, x in enumerate(map(float, nodes)):
-            duration, w = rate(middle + reach * x)
-            if duration.imag or w.imag or not (duration > 0 and w > 0):
-                raise SolutionError(
-                    f"time of flight from {float(ends[0])!r} to {float(ends[1])!r}: "
-                    "V**2 is not positive inside this segment"
-                )
-            values[:, i] = float(duration), float(duration * scale.sqrt(w))
+        half, values = float(reach), rates_on(middle, reach)
         c, terms = np.empty(DEGREE + 1), np.empty((2, DEGREE))
         length_size, length_tail, _ = antiderivative(values[1], half, c, terms[1])
         size, tail, _ = antiderivative(values[0], half, c, terms[0])

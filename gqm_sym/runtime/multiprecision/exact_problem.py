@@ -15,6 +15,7 @@ from gqm_sym.budgets import budget, spend
 from gqm_sym.errors import SolutionError
 from gqm_sym.literals.numbers import Number
 from gqm_sym.runtime.compiled.types import Array
+from gqm_sym.runtime.double_double.recording import BoundTape
 from gqm_sym.runtime.multiprecision.exact_tracks import Track, TrackMaker
 from gqm_sym.runtime.multiprecision.gauss_legendre import gauss
 from gqm_sym.runtime.quadrature.substitution import FROM_TURN, REGULAR, TURN_TURN
@@ -59,6 +60,8 @@ class ExactProblem:
         Run-time parameters.
     lam0, v0 : Number
         Launch place and speed in m/s.
+    tape : callable
+        Returns the formulas for double-double arithmetic; None for charted curves, and where they are too long.
     """
 
     track: TrackMaker
@@ -66,6 +69,7 @@ class ExactProblem:
     parameters: tuple[Number, ...]
     lam0: Number
     v0: Number
+    tape: Callable[[], BoundTape | None]
     _scales: dict[int, "Arithmetic"] = field(default_factory=dict)
 
     def at(self, digits: int) -> "Arithmetic":

@@ -180,7 +180,7 @@ def arrival(curve, orbit, place, work, series):  # type: ignore[no-untyped-def]
     high = refined_end(curve.fns, curve.p, orbit, orbit.high, work)
     if not orbit.lam0 + low <= place <= orbit.lam0 + high:
         return inf
-    orbit = Orbit(False, orbit.even, orbit.direction, orbit.lam0, orbit.v2, low, high)
+    orbit = Orbit(False, orbit.even, orbit.direction, orbit.lam0, orbit.v2, low, high, 0)
     half_period, start, stop, from_upper = times_from_end(curve, orbit, width, ahead, work, series)
     onwards = orbit.direction * ahead > 0.0
     if (orbit.direction > 0) == from_upper:  # the body is launched towards that end

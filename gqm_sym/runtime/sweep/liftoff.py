@@ -98,7 +98,7 @@ def loss_on_way(curve, passage, slacks, side, begin, sense):  # type: ignore[no-
 
 @Inner
 def liftoff_place(curve, orbit, passage, slacks, side):  # type: ignore[no-untyped-def]
-    """The place at which a body that repeats its motion otherwise leaves the track; NaN if it never does."""
+    """The place at which a body leaves the track before it comes to an end of it; NaN if it never does."""
     table, period = curve.table, curve.period
     index, x = locate(table, period, orbit.lam0)
     j, last = index - passage.first, passage.panels - 1
@@ -107,7 +107,7 @@ def liftoff_place(curve, orbit, passage, slacks, side):  # type: ignore[no-untyp
     at_low, at_high = orbit.low == 0.0, orbit.high == 0.0
     if not orbit.circulates and (at_low or at_high):
         j, x = (0, passage.low_x) if at_low else (last, passage.high_x)
-    for way in range(1 if orbit.circulates else 2):
+    for way in range(1 if orbit.circulates or orbit.leaves == orbit.direction else 2):
         sense = orbit.direction if way == 0 else -orbit.direction
         lost, where = loss_on_way(curve, passage, slacks, side, (j, x), sense)
         if way == 0 and lost == j and where == x:

@@ -16,6 +16,8 @@ class SweptCurve(NamedTuple):
         The places at which the curve is not smooth, within one period.
     period : float
         The period of a closed curve, 0 otherwise.
+    has_ends : bool
+        Whether a body can leave the curve through both ends of the table.
     mass : float
         The mass of the body.
     table : CurveTable
@@ -30,6 +32,7 @@ class SweptCurve(NamedTuple):
     p: Any
     joints: Any
     period: Any
+    has_ends: Any
     mass: Any
     table: Any
     factors: Any
@@ -38,7 +41,7 @@ class SweptCurve(NamedTuple):
 
 
 class Orbit(NamedTuple):
-    """Where a body goes that repeats its motion.
+    """Where a body goes that repeats its motion, or leaves the curve through one end and has at most one turning point.
 
     Attributes
     ----------
@@ -51,7 +54,10 @@ class Orbit(NamedTuple):
     lam0, v2 : float
         The launch place, and V**2 there.
     low, high : float
-        Offsets from the launch place to both turning points, or to both ends of a lap that begins there.
+        Offsets from the launch place to both turning points, or to both ends of a lap that begins there. Of a body that
+        leaves, to the end and to the turning point, or to the end and 0 where there is none.
+    leaves : int
+        1 if it leaves the curve through the upper end, -1 if through the lower one, 0 if it stays.
     """
 
     circulates: bool
@@ -61,3 +67,4 @@ class Orbit(NamedTuple):
     v2: float
     low: float
     high: float
+    leaves: int

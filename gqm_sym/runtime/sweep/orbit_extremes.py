@@ -21,6 +21,7 @@ from gqm_sym.runtime.sweep.curve_table import (
     value_on,
 )
 from gqm_sym.runtime.sweep.panel_forces import FAR, LOAD, NEAR, prepare
+from gqm_sym.runtime.sweep.passage import locate
 
 # Intervals of the first grid, in equal steps of the phase angle; how often the best point is refined; and the factor by
 # which the step shrinks each time.
@@ -137,17 +138,18 @@ def refined(curve, k, slack, force, sign, x, ends):  # type: ignore[no-untyped-d
 
 
 @Inner
-def best_sample(curve, passage, slacks, force, sign):  # type: ignore[no-untyped-def]
+def best_sample(curve, path, passage, slacks, force, sign):  # type: ignore[no-untyped-def]
     """The largest value times ``sign`` of V**2 or of the contact force at the samples, its panel, and where on it."""
-    rows, paths, count, last = curve.rows, curve.table.paths, curve.levels.size, passage.panels - 1
+    rows, paths, count = curve.rows, curve.table.paths, curve.levels.size
     best, best_j, best_x = -inf, 0, 0.0
-    for j in range(passage.panels):
+    (first, low_x), (last, high_x) = path
+    for j in range(first, last + 1):
         k, slack = (passage.first + j) % count, slacks[j]
-        low, high = passage.low_x if j == 0 else -1.0, passage.high_x if j == last else 1.0
-        prepare(curve, k, (FAR | LOAD if force else FAR) | (0 if 0 < j < last else NEAR))
+        low, high = low_x if j == first else -1.0, high_x if j == last else 1.0
+        prepare(curve, k, (FAR | LOAD if force else FAR) | (0 if first < j < last else NEAR))
         for i in range(SAMPLES):
             x = SAMPLE_POINTS[i]
-            if 0 < j < last:
+            if first < j < last:
                 v2 = 2.0 * (slack - rows[k, POTENTIAL_SAMPLES + i])
                 value = paths[k, KAPPA_SAMPLES + i] * v2 + rows[k, LOAD_SAMPLES + i] if force else v2
             else:
@@ -165,19 +167,27 @@ def passage_extreme(curve, orbit, passage, slacks, force, sign):  # type: ignore
 
     At a joint the values on both sides count.
     """
-    if not (orbit.circulates or force or sign > 0.0):
-        return 0.0  # at a turning point
     count, last = curve.levels.size, passage.panels - 1
-    best, best_j, best_x = best_sample(curve, passage, slacks, force, sign)
+    path, begin = ((0, passage.low_x), (last, passage.high_x)), (-1, 0.0)
+    if orbit.leaves == orbit.direction:  # a body that is not in front of its turning point does not come there
+        index, x = locate(curve.table, curve.period, orbit.lam0)
+        begin = index - passage.first, x
+        path = (begin, path[1]) if orbit.leaves > 0 else (path[0], begin)
+    meets_turn = orbit.v2 == 0.0 or not (orbit.circulates or orbit.leaves == orbit.direction)
+    if meets_turn and not (force or sign > 0.0):
+        return 0.0
+    best, best_j, best_x = best_sample(curve, path, passage, slacks, force, sign)
+    if orbit.leaves == orbit.direction and not force and (best_j, best_x) == begin:
+        return sqrt(orbit.v2)
     for step in range(-1, 2):
         # On the panel itself, and on that which it shares the place with.
         j, x, shared = best_j + step, best_x, step == 0
         if step != 0 and best_x == float(step):
-            x, shared = -best_x, 0 <= j <= last
+            x, shared = -best_x, path[0][0] <= j <= path[1][0]
         if orbit.circulates and step != 0 and not 0 <= j <= last:
             j, shared = last - best_j, best_x in (passage.low_x, passage.high_x)
         if shared:
-            ends = passage.low_x if j == 0 else -1.0, passage.high_x if j == last else 1.0
+            ends = path[0][1] if j == path[0][0] else -1.0, path[1][1] if j == path[1][0] else 1.0
             k = (passage.first + j) % count
             best = max(best, sign * refined(curve, k, slacks[j], force, sign, x, ends))
     value = sign * best

@@ -10,8 +10,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from gqm_sym.runtime.arithmetic.doubledouble import two_sum
 from gqm_sym.runtime.arithmetic.elementary import cos, sin
-from gqm_sym.runtime.compiled.calls import call_potential_divdiff1
+from gqm_sym.runtime.compiled.calls import call_effective_potential, call_potential_divdiff1
 from gqm_sym.runtime.compiled.jit import Inlined, Inner
 from gqm_sym.runtime.compiled.registers import on_stack
 from gqm_sym.runtime.launch.zeros import CONSTANT_SHARE, CRITICAL, LIMIT, TURN
@@ -48,10 +49,20 @@ SAFETY = 1.05
 # rounding: they belong to degrees 14 and 15, the error to degree 32. Otherwise the part is halved, so often at most.
 MAX_TAIL_RATIO, MAX_HALVINGS = 2e-8, 5
 
+# What their extrapolation to that degree may be, and what counts as rounding noise.
+MAX_ERROR_RATIO, NOISE_RATIO = 2e-16, 2e-15
+
 # How near to an equilibrium a turning point may lie, as a share of the panel, for doubles to decide that it is one.
 MAX_ZERO_ERROR = 1e-6
 
 few_rates, rates_buffer, angle_buffer = on_stack(FEW_NODES), on_stack(NODES), on_stack(NODES)
+
+
+# Which ends of a passage are turning points.
+BOTH, LOWER, UPPER, NEITHER = range(4)
+
+# V**2 at an end of the curve, as a share of the size of its terms, above which a body certainly leaves there.
+MIN_LEAVING_SHARE = 1e-9
 
 
 class Passage(NamedTuple):
@@ -65,6 +76,10 @@ class Passage(NamedTuple):
         The places of both ends on their panels, in [-1, 1].
     width : float
         The distance between both ends.
+    turns : int
+        Which ends are turning points: BOTH, LOWER or UPPER, or NEITHER of a lap and of a body that runs through.
+    v2 : float
+        V**2 at the lower end if NEITHER is.
     """
 
     first: int
@@ -72,6 +87,8 @@ class Passage(NamedTuple):
     low_x: float
     high_x: float
     width: float
+    turns: int
+    v2: float
 
 
 @Inner
@@ -182,11 +199,25 @@ def polished(curve, lam0, w0, index, x):  # type: ignore[no-untyped-def]
 
 
 @Inner
+def end_ahead(curve, lam0, w0, direction):  # type: ignore[no-untyped-def]
+    """The offset of the end of the curve in one direction, and V**2 there; NaN if a body may not leave there."""
+    edges, place, offset, out = curve.table.edges, np.empty(2), np.empty(1), np.empty((2, 2))
+    place[0], place[1] = edges[-1] if direction > 0 else edges[0], lam0
+    offset[0] = place[0] - lam0
+    call_effective_potential(curve.fns.effective_potential, 2, place, curve.p, out)
+    size = w0 + 2.0 * (fabs(out[0, 0]) + fabs(out[0, 1]))
+    call_potential_divdiff1(curve.fns.potential_divdiff1, 1, lam0, place, offset, curve.p, out.reshape(4))
+    v2 = w0 - 2.0 * offset[0] * out[0, 0]
+    certain = curve.has_ends and offset[0] != 0.0 and v2 > MIN_LEAVING_SHARE * size
+    return offset[0], v2 if certain else np.nan
+
+
+@Inner
 def find_passage(curve, lam0, v0, direction):  # type: ignore[no-untyped-def]
     """The orbit of a launch and the panels that it passes; no panels where the table does not decide."""
     table, w0 = curve.table, v0 * v0
     count = curve.levels.size
-    none = Orbit(False, False, direction, lam0, w0, 0.0, 0.0), Passage(0, 0, 0.0, 0.0, 0.0)
+    none = Orbit(False, False, direction, lam0, w0, 0.0, 0.0, 0), Passage(0, 0, 0.0, 0.0, 0.0, BOTH, 0.0)
     if count == 0:
         return none
     start, x = locate(table, curve.period, lam0)
@@ -198,22 +229,35 @@ def find_passage(curve, lam0, v0, direction):  # type: ignore[no-untyped-def]
     ahead, front, front_x = turn_from(curve, start, x, w0, direction)
     if ahead == LIMIT and curve.period > 0.0 and w0 > 0.0:
         lap = direction * curve.period
-        orbit = Orbit(True, False, direction, lam0, w0, min(lap, 0.0), max(lap, 0.0))
-        return orbit, Passage(start if direction > 0 else start - count, count + 1, x, x, curve.period)
-    if ahead != TURN:
-        return none
-    offset, front_x = polished(curve, lam0, w0, front, front_x)
-    other, back, back_x = 0.0, start, x
+        orbit = Orbit(True, False, direction, lam0, w0, min(lap, 0.0), max(lap, 0.0), 0)
+        return orbit, Passage(start if direction > 0 else start - count, count + 1, x, x, curve.period, NEITHER, w0)
+    leaves, turns, v2, last = 0, BOTH, w0, count - 1
+    if ahead == TURN:
+        offset, front_x = polished(curve, lam0, w0, front, front_x)
+    else:
+        leaves, front, front_x = direction, last if direction > 0 else 0, float(direction)
+        offset, v2 = end_ahead(curve, lam0, w0, direction)
+    other, back, back_x, behind = 0.0, start, x, TURN
     if w0 > 0.0:
         behind, back, back_x = turn_from(curve, start, x, w0, -direction)
-        if behind != TURN:
-            return none
-        other, back_x = polished(curve, lam0, w0, back, back_x)
+        if behind == TURN:
+            other, back_x = polished(curve, lam0, w0, back, back_x)
+        elif leaves != 0:
+            turns, back, back_x = NEITHER, start, x
+        else:
+            leaves, back, back_x = -direction, 0 if direction > 0 else last, float(-direction)
+            other, v2 = end_ahead(curve, lam0, w0, -direction)
+    last_end = ahead if leaves == direction else behind
+    if leaves != 0 and not (last_end == LIMIT and v2 > 0.0 and curve.period == 0.0):
+        return none
     low, first, low_x, high, end, high_x = other, back, back_x, offset, front, front_x
     if direction < 0:
         low, first, low_x, high, end, high_x = offset, front, front_x, other, back, back_x
-    orbit = Orbit(False, False, direction, lam0, w0, low, high)
-    return orbit, Passage(first, end - first + 1, low_x, high_x, high - low)
+    if leaves != 0 and turns != NEITHER:
+        turns = LOWER if leaves > 0 else UPPER
+    orbit = Orbit(False, False, direction, lam0, w0, low, high, leaves)
+    v2 = v2 if direction < 0 else w0
+    return orbit, Passage(first, end - first + 1, low_x, high_x, high - low, turns, v2)
 
 
 @Inner
@@ -221,75 +265,89 @@ def passage_of(curve, orbit):  # type: ignore[no-untyped-def]
     """The panels that a known orbit passes; none if the curve is not tabulated."""
     table = curve.table
     if curve.levels.size == 0:
-        return Passage(0, 0, 0.0, 0.0, 0.0)
+        return Passage(0, 0, 0.0, 0.0, 0.0, BOTH, 0.0)
     first, low_x = locate(table, curve.period, orbit.lam0 + orbit.low)
     if orbit.circulates:
-        return Passage(first, curve.levels.size + 1, low_x, low_x, curve.period)
+        return Passage(first, curve.levels.size + 1, low_x, low_x, curve.period, NEITHER, orbit.v2)
     last, high_x = locate(table, curve.period, orbit.lam0 + orbit.high)
     inside = table.edges[0] <= orbit.lam0 + orbit.low and orbit.lam0 + orbit.high <= table.edges[-1]
     panels = last - first + 1 if inside or curve.period > 0.0 else 0
-    return Passage(first, panels, low_x, high_x, orbit.high - orbit.low)
+    return Passage(first, panels, low_x, high_x, orbit.high - orbit.low, BOTH, 0.0)
 
 
 @Inner
-def fill_slacks(curve, passage, w0, circulates, slacks):  # type: ignore[no-untyped-def]
+def fill_slacks(curve, passage, slacks):  # type: ignore[no-untyped-def]
     """Fill V**2/2 at the left edge of each panel of a passage; returns whether they keep enough digits.
 
-    They are sums from the nearer turning point. On a panel that has one they are as if the curve went on beyond it.
+    They are sums of two doubles from the nearer turning point. On a panel that has one they are as if the curve went on
+    beyond it.
     """
     rows, count, last = curve.rows, curve.levels.size, passage.panels - 1
     for j in range(passage.panels):
         prepare(curve, (passage.first + j) % count, FAR | NEAR if j in (0, last) else FAR)
-    middle = last if circulates else last // 2
+    turns, edges = passage.turns, curve.table.edges
+    middle = last // 2
+    if turns != BOTH:
+        middle = -1 if turns == UPPER else last
     k, high = passage.first % count, (passage.first + last) % count
-    slacks[0] = potential_on(rows, k, passage.low_x) + (0.5 * w0 if circulates else 0.0)
-    slack = (passage.low_x - 1.0) * difference_on(rows, k, passage.low_x, 1.0) + (0.5 * w0 if circulates else 0.0)
-    peak, least = max(slack, 0.5 * w0) if circulates else slack, 1.0
-    for j in range(1, middle + 1):
-        slacks[j] = slack
+    peak, top, least, slope, begin = 0.0, 0.0, 1.0, np.inf, 0.0
+    if turns == NEITHER:
+        peak = begin = 0.5 * passage.v2
+    if turns != UPPER:
+        slacks[0] = potential_on(rows, k, passage.low_x) + begin
+        slack, low = (passage.low_x - 1.0) * difference_on(rows, k, passage.low_x, 1.0) + begin, 0.0
+        for j in range(1, middle + 1):
+            slacks[j] = slack
+            peak = max(peak, slack)
+            least = min(least, slack / peak)
+            slack, error = two_sum(slack, -rows[(passage.first + j) % count, INCREASE])
+            low += error
+            slack, low = two_sum(slack, low)
         peak = max(peak, slack)
-        least = min(least, slack / peak)
-        slack -= rows[(passage.first + j) % count, INCREASE]
-    if circulates:
-        return least >= MIN_CANCELLATION_RATIO
-    slack, top = (passage.high_x + 1.0) * difference_on(rows, high, -1.0, passage.high_x), 0.0
-    slacks[last] = slack
-    for j in range(last - 1, middle, -1):
+        if turns != BOTH:
+            least = min(least, slack / peak)
+        if turns != NEITHER:
+            slope = -difference_on(rows, k, passage.low_x, passage.low_x) / (edges[k + 1] - edges[k])
+    if turns in (BOTH, UPPER):
+        slack, low = (passage.high_x + 1.0) * difference_on(rows, high, -1.0, passage.high_x), 0.0
+        slacks[last] = slack
+        for j in range(last - 1, middle, -1):
+            top = max(top, slack)
+            least = min(least, slack / top)
+            slack, error = two_sum(slack, rows[(passage.first + j) % count, INCREASE])
+            low += error
+            slack, low = two_sum(slack, low)
+            slacks[j] = slack
         top = max(top, slack)
         least = min(least, slack / top)
-        slack += rows[(passage.first + j) % count, INCREASE]
-        slacks[j] = slack
-    top = max(top, slack)
-    # Neither end may be next to an equilibrium.
-    edges = curve.table.edges
-    slope = min(
-        -difference_on(rows, k, passage.low_x, passage.low_x) / (edges[k + 1] - edges[k]),
-        difference_on(rows, high, passage.high_x, passage.high_x) / (edges[high + 1] - edges[high]),
-    )
+        slope_above = difference_on(rows, high, passage.high_x, passage.high_x) / (edges[high + 1] - edges[high])
+        slope = min(slope, slope_above)
+    # Neither turning point may be next to an equilibrium.
     enough = 0.5 * MIN_CANCELLATION_RATIO * max(top, peak)
-    return min(least, slack / top) >= MIN_CANCELLATION_RATIO and slope * passage.width >= enough
+    return least >= MIN_CANCELLATION_RATIO and slope * passage.width >= enough
 
 
 @Inlined
 def is_upper(passage, j):  # type: ignore[no-untyped-def]
     """Whether phase angles on panel j of a passage are counted from the upper end."""
-    return 2 * j >= passage.panels
+    return passage.turns == UPPER or (passage.turns == BOTH and 2 * j >= passage.panels)
 
 
 @Inner
-def fill_rates(curve, passage, circulates, j, slack, gap, u, out):  # type: ignore[no-untyped-def]
+def fill_rates(curve, passage, j, slack, gap, u, out):  # type: ignore[no-untyped-def]
     """Fill the time per unit of u on panel j of a passage at the Gauss points u.
 
-    u is the orbit's phase angle, or the place on the panel if the body circulates. Phase angles are counted from the
-    nearer end, because a small time next to it needs a small angle with all digits. ``slack`` and ``gap`` belong to the
-    panel's edge that is nearer to that end: V**2/2 there, and the distance from the end.
+    u is the orbit's phase angle, or the place on the panel if the passage has no turning point. Phase angles are
+    counted from the nearer one, because a small time next to it needs a small angle with all digits. ``slack`` and
+    ``gap`` belong to the panel's edge that is nearer to it: V**2/2 there, and the distance from the turning point. An
+    end of the curve stands for a turning point that there is not.
     """
     rows, edges, last = curve.rows, curve.table.edges, passage.panels - 1
     k = (passage.first + j) % curve.levels.size
     half = 0.5 * (edges[k + 1] - edges[k])
     for i in range(NODES):
         x, numerator = u[i], half * half
-        if circulates:
+        if passage.turns == NEITHER:
             fall = slack - potential_on(rows, k, x)
         else:
             s, c = sin(0.5 * u[i]), cos(0.5 * u[i])
@@ -297,9 +355,9 @@ def fill_rates(curve, passage, circulates, j, slack, gap, u, out):  # type: igno
             if is_upper(passage, j):
                 below, above = above, below
             # V**2/2 is its value at a turning point or an edge, and what the potential falls from there.
-            if j == 0:
+            if j == 0 and passage.turns != UPPER:
                 x, y, at_y, factor, numerator = passage.low_x + below / half, passage.low_x, 0.0, -1.0, above * half
-            elif j == last:
+            elif j == last and passage.turns != LOWER:
                 x, y, at_y, factor, numerator = passage.high_x - above / half, passage.high_x, 0.0, 1.0, below * half
             elif is_upper(passage, j):
                 rest = (above - gap) / half
@@ -312,7 +370,7 @@ def fill_rates(curve, passage, circulates, j, slack, gap, u, out):  # type: igno
 
 
 @Inner
-def time_on_part(curve, passage, circulates, j, slack, gap, begin, end):  # type: ignore[no-untyped-def]
+def time_on_part(curve, passage, j, slack, gap, begin, end):  # type: ignore[no-untyped-def]
     """The time between two values of u (`fill_rates`) on panel j of a passage; NaN where it is not accurate."""
     u, rates = angle_buffer(), rates_buffer()
     prepare(curve, (passage.first + j) % curve.levels.size, NEAR)
@@ -324,14 +382,20 @@ def time_on_part(curve, passage, circulates, j, slack, gap, begin, end):  # type
             middle = begin + (2 * part + 1) * half
             for i in range(NODES):
                 u[i] = middle + half * POINTS[i]
-            fill_rates(curve, passage, circulates, j, slack, gap, u, rates)
-            size, last, before = 0.0, 0.0, 0.0
+            fill_rates(curve, passage, j, slack, gap, u, rates)
+            size, last, before, earlier, earliest = 0.0, 0.0, 0.0, 0.0, 0.0
             for i in range(NODES):
                 size += GAUSS_WEIGHTS[i] * rates[i]
                 last += FIT[i, NODES - 1] * rates[i]
                 before += FIT[i, NODES - 2] * rates[i]
+                earlier += FIT[i, NODES - 5] * rates[i]
+                earliest += FIT[i, NODES - 6] * rates[i]
             total += half * size
-            resolved &= max(fabs(last), fabs(before)) <= MAX_TAIL_RATIO * size
+            tail, middle = max(fabs(last), fabs(before)), max(fabs(earlier), fabs(earliest))
+            # Sixteen degrees on, the terms are these if they go on to decrease as they do over the last four. Next to a
+            # turning point behind a joint they decrease more slowly than the first ones.
+            beyond = tail * (tail / middle) ** 4 if tail > NOISE_RATIO * size else 0.0
+            resolved &= tail <= MAX_TAIL_RATIO * size and beyond <= MAX_ERROR_RATIO * size
         if resolved:
             return total
         parts *= 2
@@ -368,12 +432,12 @@ def phase_of(below, above):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def time_between(curve, orbit, passage, slacks, lower, upper):  # type: ignore[no-untyped-def]
+def time_between(curve, passage, slacks, lower, upper):  # type: ignore[no-untyped-def]
     """The time that a body takes from one place of its orbit to a higher one; NaN where it is not accurate.
 
     ``lower`` and ``upper`` are the distances of each from both ends of the orbit.
     """
-    table, total = curve.table, 0.0
+    table, total, low = curve.table, 0.0, 0.0
     count, last, right = curve.levels.size, passage.panels - 1, 0.0
     for j in range(passage.panels):
         k = (passage.first + j) % count
@@ -388,10 +452,11 @@ def time_between(curve, orbit, passage, slacks, lower, upper):  # type: ignore[n
         if not (begins or ends):
             time = time_on_panel(curve, k, slacks[j])
             if time == time:
-                total += time
+                total, error = two_sum(total, time)
+                low += error
                 continue
         slack, gap = slacks[j], left
-        if orbit.circulates:
+        if passage.turns == NEITHER:
             half = 0.5 * size
             begin = (lower[0] - left) / half - 1.0 if begins else -1.0
             end = (upper[0] - left) / half - 1.0 if ends else 1.0
@@ -406,18 +471,22 @@ def time_between(curve, orbit, passage, slacks, lower, upper):  # type: ignore[n
                     rest = 0.5 * (1.0 + passage.high_x) * (table.edges[beyond + 1] - table.edges[beyond])
                     gap = rest if j == last - 1 else passage.width - right
             begin, end = phase_of(first[0], first[1]), phase_of(second[0], second[1])
-        total += time_on_part(curve, passage, orbit.circulates, j, slack, gap, begin, end)
-    return total
+        total, error = two_sum(total, time_on_part(curve, passage, j, slack, gap, begin, end))
+        low += error
+    return total + low
 
 
 @Inner
 def travel_time(curve, orbit, passage, slacks, place):  # type: ignore[no-untyped-def]
-    """The first time at which a body is at a place, or for NaN the time of half a period or of a lap.
+    """The first time at which a body is at a place, or for NaN the time of half a period, of a lap or until it leaves.
 
     It is NaN where it is not accurate, and inf if the body is never there.
     """
     width, laps, onwards = passage.width, 0.0, True
     here, there, start, end = (0.0, width), (width, 0.0), (0.0, width), (width, 0.0)
+    if orbit.leaves != 0 and place != place:
+        here, there = (-orbit.low, orbit.high), end if orbit.leaves > 0 else start
+        onwards = orbit.leaves == orbit.direction
     if place == place:
         ahead = place - orbit.lam0
         if orbit.circulates:
@@ -427,6 +496,8 @@ def travel_time(curve, orbit, passage, slacks, place):  # type: ignore[no-untype
         if laps < 0.0 or not (there[0] >= 0.0 and there[1] >= 0.0):
             return np.inf
         onwards = orbit.direction * ahead >= 0.0
+        if not onwards and orbit.leaves == orbit.direction:
+            return np.inf
     turn = end if orbit.direction > 0 else start
     time = 0.0
     # To the place, or to the end ahead and back from there to the place; then all laps before that.
@@ -437,6 +508,6 @@ def travel_time(curve, orbit, passage, slacks, place):  # type: ignore[no-untype
         elif stretch == 1:
             first, last = start, end
         lower, upper = (first, last) if first[0] < last[0] else (last, first)
-        part = time_between(curve, orbit, passage, slacks, lower, upper)
+        part = time_between(curve, passage, slacks, lower, upper)
         time += laps * part if onwards and stretch == 1 else part
     return time

@@ -44,7 +44,7 @@ from gqm_sym.runtime.sweep.liftoff import liftoff_place
 from gqm_sym.runtime.sweep.orbit import Orbit, SweptCurve
 from gqm_sym.runtime.sweep.orbit_extremes import extreme, passage_extreme
 from gqm_sym.runtime.sweep.panel_forces import take_factors
-from gqm_sym.runtime.sweep.passage import Passage, fill_slacks, find_passage, passage_of, travel_time
+from gqm_sym.runtime.sweep.passage import BOTH, Passage, fill_slacks, find_passage, passage_of, travel_time
 from gqm_sym.runtime.sweep.quantities import (
     ANSWERED,
     ANSWERS,
@@ -84,6 +84,8 @@ class GivenCurve(NamedTuple):
         Buffers for what `SweptCurve` has under these names; the levels are 0.
     mass : int
         Which run-time parameter is the mass of the body.
+    has_ends : bool
+        Whether a body can leave the curve through both ends of the table.
     side : int
         1 if the track can only push along the normal, -1 if only against it, 0 if it can push and pull.
     t_max : float
@@ -98,14 +100,13 @@ class GivenCurve(NamedTuple):
     rows: Array
     levels: NDArray[np.int8]
     mass: int
+    has_ends: bool
     side: int
     t_max: float
 
 
-GIVEN = types.NamedTuple(
-    (VECTOR, VECTOR, TABLE, types.int64[:, ::1], VECTOR, MATRIX, types.int8[::1], types.int64, types.int64, REAL),
-    GivenCurve,
-)
+_BUFFERS = types.int64[:, ::1], VECTOR, MATRIX, types.int8[::1]
+GIVEN = types.NamedTuple((VECTOR, VECTOR, TABLE, *_BUFFERS, types.int64, types.boolean, types.int64, REAL), GivenCurve)
 
 
 class Buffers(NamedTuple):
@@ -130,7 +131,7 @@ def find_orbit(curve, columns, k, monotone, spans, known):  # type: ignore[no-un
     )
     axis, step = element(columns, AXIS, k) if monotone else np.nan, element(columns, AXIS_STEP, k)
     even, v2 = axis == axis, v0 * v0
-    none, nowhere = Orbit(False, even, direction, lam0, v2, 0.0, 0.0), Passage(0, 0, 0.0, 0.0, 0.0)
+    none, nowhere = Orbit(False, even, direction, lam0, v2, 0.0, 0.0, 0), Passage(0, 0, 0.0, 0.0, 0.0, BOTH, 0.0)
     total = lam0 + v0
     for row in range(columns.shape[0] - PARAMETERS):
         total += curve.p[row]
@@ -145,7 +146,7 @@ def find_orbit(curve, columns, k, monotone, spans, known):  # type: ignore[no-un
             low, high = min(low, 0.0), max(low, 0.0)
         elif v0 == 0.0:
             direction = 1 if high > -low else -1
-        return ANSWERED, Orbit(circulates, even, direction, lam0, v2, low, high), nowhere
+        return ANSWERED, Orbit(circulates, even, direction, lam0, v2, low, high, 0), nowhere
     orbit, passage = find_passage(curve, lam0, v0, direction)
     if passage.panels > 0:
         return ANSWERED, orbit, passage
@@ -156,7 +157,7 @@ def find_orbit(curve, columns, k, monotone, spans, known):  # type: ignore[no-un
         return UNDECIDED, none, nowhere
     circulates = kind == CIRCULATION
     one, other = (direction * period, 0.0) if circulates else (ahead.near, behind.near)
-    orbit = Orbit(circulates, even, direction, lam0, v2, min(one, other), max(one, other))
+    orbit = Orbit(circulates, even, direction, lam0, v2, min(one, other), max(one, other), 0)
     return ANSWERED, orbit, passage_of(curve, orbit)
 
 
@@ -182,7 +183,7 @@ def value_from_table(curve, orbit, passage, quantity, target, slacks):  # type: 
         force, sign = quantity in (MIN_FORCE, MAX_FORCE), 1.0 if quantity in (MAX_SPEED, MAX_FORCE) else -1.0
         return passage_extreme(curve, orbit, passage, slacks, force, sign)
     low, high = orbit.lam0 + orbit.low, orbit.lam0 + orbit.high
-    if passage.panels <= 2 and joints_between(curve.joints, curve.period, low, high).size == 0:
+    if orbit.leaves == 0 and passage.panels <= 2 and joints_between(curve.joints, curve.period, low, high).size == 0:
         return nan  # the orbit itself has more digits than a part of a panel
     return travel_time(curve, orbit, passage, slacks, target if quantity == ARRIVAL_TIME else nan)
 
@@ -209,7 +210,9 @@ def fill_answer(curve, orbit, passage, asked, buffers, out):  # type: ignore[no-
     """
     (quantity, target, side, t_max), limit, slacks = asked, inf, buffers.slacks
     tabulated = quantity != TURNING_POINTS or side != 0
-    tabulated = tabulated and passage.panels > 0 and fill_slacks(curve, passage, orbit.v2, orbit.circulates, slacks)
+    tabulated = tabulated and passage.panels > 0 and fill_slacks(curve, passage, slacks)
+    if orbit.leaves != 0 and quantity in (HALF_PERIOD, PERIOD, TURNING_POINTS):
+        return NOT_PERIODIC
     if side != 0 or quantity == END_TIME:
         if side != 0 and not tabulated:
             return UNDECIDED
@@ -218,7 +221,7 @@ def fill_answer(curve, orbit, passage, asked, buffers, out):  # type: ignore[no-
             return NOT_PERIODIC
         if quantity != END_TIME and place == place:
             return UNDECIDED
-        if quantity == END_TIME and place != place:
+        if quantity == END_TIME and place != place and orbit.leaves == 0:
             out[0] = t_max if t_max < inf else nan
             return ANSWERED if t_max < inf else NOT_PERIODIC
         if quantity == END_TIME:
@@ -229,7 +232,7 @@ def fill_answer(curve, orbit, passage, asked, buffers, out):  # type: ignore[no-
         out[0], out[1] = orbit.lam0 + orbit.low, orbit.lam0 + orbit.high
         return ANSWERED
     value = value_from_table(curve, orbit, passage, quantity, target, slacks) if tabulated else nan
-    if value != value:
+    if value != value and orbit.leaves == 0:
         value = value_by_itself(curve, orbit, quantity, target, buffers)
     if value == inf:
         return NEVER_THERE
@@ -277,7 +280,7 @@ def answer_one_by_one(fns, columns, monotone, quantity, spans, answers, given): 
         for row in range(columns.shape[0] - PARAMETERS):
             p[row] = element(columns, PARAMETERS + row, k)
         period = element(columns, DOMAIN_PERIOD, k)
-        curve = SweptCurve(fns, p, joints, period, p[given.mass], table, factors, rows, levels)
+        curve = SweptCurve(fns, p, joints, period, given.has_ends, p[given.mass], table, factors, rows, levels)
         for i in range(count):
             taken[i] = element(given.factor_columns, i, k)
         take_factors(curve, taken)

@@ -245,6 +245,8 @@ class Group(NamedTuple):
         The curve tabulated, where no energy is lost.
     factors : list of arrays
         What each launch multiplies the parts of potential and load in the table with.
+    has_ends : bool
+        Whether bodies leave the curve through both ends of the table.
     """
 
     columns: list[Array]
@@ -253,6 +255,7 @@ class Group(NamedTuple):
     corners: Array = NOWHERE
     table: CurveTable = NO_TABLE
     factors: list[Array] = _WHOLE
+    has_ends: bool = False
 
 
 def _groups(
@@ -282,7 +285,9 @@ def _groups(
         some, theirs = columns, factors
         if chosen is not None:
             some, theirs = ([_chosen(column, shape, chosen) for column in of] for of in (columns, factors))
-        yield Group([*some[:4], *domain, *some[4:]], chart.block, chart.breaks, chart.corners, table, theirs), chosen
+        has_ends = not chart.period and chart.ends == ("domain-end", "domain-end")
+        launches = [*some[:4], *domain, *some[4:]]
+        yield Group(launches, chart.block, chart.breaks, chart.corners, table, theirs, has_ends), chosen
 
 
 def _held(formulas: "Formulas", count: int) -> list[int]:
@@ -374,7 +379,8 @@ def _answer(formulas: "Formulas", asked: Asked, group: Group, answers: Answers, 
         parameters = np.concatenate([np.empty(len(lines) - PARAMETERS), chart])
         factors = lay_out(group.factors, chunk.start, chunk.stop)
         buffers = np.full(len(factors), nan), np.empty((len(table.paths), ROW)), np.zeros(len(table.paths), np.int8)
-        given = scalar.GivenCurve(parameters, joints, table, pointers(factors), *buffers, mass, asked.side, asked.t_max)
+        shared = parameters, joints, table, pointers(factors), *buffers, mass, group.has_ends
+        given = scalar.GivenCurve(*shared, asked.side, asked.t_max)
         scalar.answer_one_by_one(formulas.addresses, *launches, code, spans, found, given)
 
 

@@ -86,6 +86,54 @@ def test_times_on_a_rail_with_joints(bend: ModuleType) -> None:
         assert arrival.values[k] == pytest.approx(float(mp.sqrt((there[k] - place) * 4 / (G * mp.sqrt(2)))), rel=4e-15)
 
 
+def _time_round_a_quarter(g: mpf, drop: mpf) -> mpf:
+    """The time for a quarter of a circle of radius 3, from a wall on which the body has fallen so far to the floor."""
+    return mp.quad(lambda angle: 3 / mp.sqrt(2 * g * (drop + 3 * mp.sin(angle))), [0, mp.pi / 4, mp.pi / 2])
+
+
+def test_a_turning_point_beside_a_joint(bend: ModuleType) -> None:
+    """Next to it V**2 has a branch point on the panel behind the joint, which slows the series of dt/dphi down."""
+    for place in (2.9, 2.99, 2.996, 2.9996):
+        truth, _ = _half_period_on_bend(3.0 - place, 3.0)
+        assert float(bend.sweep("half_period", place, R=3).values) == pytest.approx(float(truth), rel=ROUNDING)
+
+
+def test_bodies_that_run_off_the_end(tmp_path: Path) -> None:
+    """Down a wall, round a quarter of a circle and along the floor, or up the wall and over its top."""
+    pieces = [gqm.line(length=1), gqm.arc(radius=3, angle="pi/2"), gqm.line(length=4)]
+    module = built(tmp_path, "wall", pieces, start=(0, 0), heading="-pi/2")
+    rng, count = np.random.default_rng(8), 40
+    place, g = rng.uniform(0.05, 0.95, count), rng.uniform(5, 15, count)
+    speed, sense = rng.uniform(0.2, 3, count) * (np.arange(count) % 4 > 0), 1 - 2 * (np.arange(count) % 3 == 1)
+    launch, floor = (place, speed, sense), 1 + 1.5 * np.pi + 2
+    swept = {
+        what: module.sweep(what, *launch, g=g, **({"lam": floor} if what == "time_at" else {}))
+        for what in ("t_end", "time_at", "v_max", "v_min", "normal_force_max", "half_period")
+    }
+    assert all(one.route_counts() == {"single": count} for one in swept.values())
+    assert set(swept["half_period"].status) == {2}
+    over = 0
+    for k in range(count):
+        s, v, a = mpf(place[k]), mpf(speed[k]), mpf(g[k])
+        falls, turns = sense[k] > 0 or v == 0, v * v < 2 * a * s
+        end, middle, fastest, slowest = (v - mp.sqrt(abs(v * v - 2 * a * s))) / a, None, v, 0
+        if falls or turns:
+            drop = 1 - s + v * v / (2 * a)
+            arc = _time_round_a_quarter(a, drop)
+            fastest, slowest = mp.sqrt(2 * a * (drop + 3)), v if falls else 0
+            end = mp.sqrt(2 * drop / a) + (-v if falls else v) / a + arc + 4 / fastest
+            middle = end - 2 / fastest
+            assert swept["normal_force_max"].values[k] == pytest.approx(float(a + fastest**2 / 3), rel=ROUNDING)
+        else:
+            slowest, over = mp.sqrt(v * v - 2 * a * s), over + 1
+        for what, truth in {"t_end": end, "time_at": middle, "v_max": fastest, "v_min": slowest}.items():
+            if truth is None:
+                assert swept[what].status[k] == STATUS_SENTENCES.index("the motion is never at the place asked for")
+            else:
+                assert swept[what].values[k] == pytest.approx(float(truth), rel=4e-15)
+    assert over > 0
+
+
 def test_extremes_on_a_rail_with_joints(bend: ModuleType) -> None:
     """N jumps where the arc begins: its least is on the inclines, its largest in the middle of the arc."""
     places = np.linspace(0.05, 2.9, 25)
