@@ -30,6 +30,7 @@ from gqm_sym.runtime.legs.body import (
     VALUE,
 )
 from gqm_sym.runtime.legs.leg_equation import Forces
+from gqm_sym.runtime.legs.leg_panels import GAP_COLUMNS
 from gqm_sym.runtime.legs.leg_reading import passage, peak_of_leg
 from gqm_sym.runtime.legs.leg_record import BEGIN, BEGIN_LOW, LAPS_BEFORE, PANELS, PASSAGE, PEAKS, START_V2, TIMES
 from gqm_sym.runtime.legs.leg_run import ASYMPTOTE, FULL, SPENT, point_buffer, slope_of_v2
@@ -49,7 +50,7 @@ MAX_TURNS = 20000
 # The most legs of one body.
 MAX_LEGS = 250_000
 
-JOINTS = types.NamedUniTuple(VECTOR, 4, Joints)
+JOINTS = types.NamedUniTuple(VECTOR, 5, Joints)
 
 
 class Sight(NamedTuple):
@@ -179,11 +180,13 @@ def drive(dissipation, parameters, joints, question, bodies, record):  # type: i
     int
         What became of the last body on its leg (`advance`).
     """
-    breaks, corners, drops = uncounted(joints.breaks), uncounted(joints.corners), uncounted(joints.drops)
-    joints = Joints(breaks, corners, drops, uncounted(joints.ahead))
+    breaks, corners, drops, ahead, gaps = joints
+    joints = Joints(uncounted(breaks), uncounted(corners), uncounted(drops), uncounted(ahead), uncounted(gaps))
     parameters, bodies, record, what = uncounted(parameters), uncounted(bodies), uncounted(record), RESTS
     for k in range(bodies.shape[0]):
         p, body = parameters[k if parameters.shape[0] > 1 else 0], bodies[k]
+        if parameters.shape[0] > 1:
+            joints.gaps[::GAP_COLUMNS] = 0.0
         if body[STEP] == 0.0:
             launch(dissipation, p, joints, body)
         if question == LEG:

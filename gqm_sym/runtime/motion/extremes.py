@@ -9,6 +9,7 @@ from numpy.polynomial import chebyshev
 
 from gqm_sym.errors import SolutionError
 from gqm_sym.runtime.arithmetic.doubledouble import ULP, minus, plus
+from gqm_sym.runtime.charts.chart import CORNER_ROUNDINGS
 from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.motion.segment import Segment
 from gqm_sym.runtime.motion.trajectory import TimedSegment, Trajectory
@@ -24,6 +25,9 @@ PEAK_NODES, MAX_TAIL = 13, 1e-12
 
 # The distance from an end of a segment at which a peak is at the end, as a share of the segment.
 END_SHARE = 1e-9
+
+# The share of a segment that a load is not looked for in before a corner at which contact is lost.
+BEFORE_CORNER = 1e-13
 
 # Values that differ by less than so many roundings are equal: the earlier one is told.
 EQUAL_ROUNDINGS = 8
@@ -143,6 +147,8 @@ def _on_segment(
     start, stop = timed.phi_start, timed.phi_stop
     if timed.t_stop[0] > end:
         stop = float(trajectory.phase_angles(timed, np.array([end]), np.zeros(1))[0])
+    if timed.end == "liftoff" and quantity is not speeds and _ends_at_corner(timed):
+        stop -= BEFORE_CORNER * (stop - start)  # the body has left before the load on the next plane
     low, high = min(start, stop), max(start, stop)
     edges = segment.edges
     steps = np.arange(SAMPLES_PER_PANEL) / SAMPLES_PER_PANEL
@@ -167,6 +173,14 @@ def _on_segment(
         value = 0.0 if at_turn else sign * float(signed(np.array([angle]))[0])
         found.append(_extreme_at(timed, trajectory, angle, value))
     return _size(values), sorted(found, key=lambda peak: peak.t)
+
+
+def _ends_at_corner(timed: TimedSegment) -> bool:
+    """Whether a timed segment ends at a corner of the curve, to rounding."""
+    f, segment = timed.segment.functions, timed.segment
+    place = float(segment.places(np.array([timed.phi_stop]))[0])
+    near = CORNER_ROUNDINGS * float(np.spacing(abs(place)))
+    return bool(f.corners.size and f.between(f.corners, place - near, place + near).size)
 
 
 def _peak(function: Callable[[Array], Array], low: float, middle: float, high: float) -> float:
