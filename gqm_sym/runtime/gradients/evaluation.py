@@ -1,7 +1,8 @@
 """Compiled code that carries out programs: at given places, and for means over a half period or a lap.
 
 The means are those of the midpoint rule in phase angles, which converges as fast as the trapezoidal rule and needs no
-values at turning points, where V**2 and the divided differences of the potential vanish together.
+values at turning points, where V**2 and the divided differences of the potential vanish together. Near a separatrix it
+would need too many nodes; Gauss's rules on the panels of the motion do there.
 """
 
 from math import fabs, inf
@@ -9,12 +10,15 @@ from math import fabs, inf
 import numpy as np
 from numba import types
 
+from gqm_sym.runtime.arithmetic.elementary import QUARTER
 from gqm_sym.runtime.compiled.jit import Inner, entry
 from gqm_sym.runtime.compiled.registers import uncounted
 from gqm_sym.runtime.compiled.types import INTEGER, MATRIX, VECTOR
-from gqm_sym.runtime.double_double.arithmetic import UNIT, add
+from gqm_sym.runtime.double_double.arithmetic import UNIT, add, divide, multiply
 from gqm_sym.runtime.double_double.interpreter import BLOCK, ERROR, LOW, ROW, call_interpreter
-from gqm_sym.runtime.double_double.nodes import LEVELS
+from gqm_sym.runtime.double_double.nodes import LEVELS, RULE
+from gqm_sym.runtime.double_double.orbit_time import MAX_PANELS, MIN_PANELS, fill_panel
+from gqm_sym.runtime.quadrature.trapezoid import LIBRATION
 
 # The rule has converged if the largest of the changes, each as a share of the mean of the absolute values, has shrunk
 # by this factor and the next one would be smaller than the second number.
@@ -22,6 +26,9 @@ MAX_RATIO, MAX_NEXT_CHANGE = 1e-3, 1e-20
 
 # The largest rounding error of a mean, as a share of the mean of the absolute values.
 MAX_ROUNDING = 1e-17
+
+# The change of an integral over a panel when it is halved, as a share of that of the absolute values.
+MAX_PANEL_CHANGE = 1e-20
 
 # What is told instead of the number of nodes: digits were lost, or the nodes are too few whatever the digits.
 LOST_DIGITS, NOT_SMOOTH = 0, -1
@@ -116,6 +123,81 @@ def fill_means(program, work, inputs, nodes, found):  # type: ignore[no-untyped-
     address, operations, first, count, outputs = program
     program = (address, uncounted(operations), first, count, uncounted(outputs))
     return fill_means_of(program, uncounted(work), uncounted(inputs), uncounted(nodes), uncounted(found))
+
+
+@Inner
+def integrate(program, work, kind, left, width, panels, rule, found):  # type: ignore[no-untyped-def]
+    """Fill the integrals of all results over an interval of phase angles, by Gauss's rule on panels of equal width."""
+    outputs, n = program[4], RULE * panels
+    step, nodes = (width[0] / panels, width[1] / panels), np.empty((4, n))
+    for panel in range(panels):
+        fill_panel(kind, left, step, panel, rule, nodes)
+    found[:, :] = 0.0
+    for start in range(0, n, BLOCK):
+        stop = min(start + BLOCK, n)
+        evaluate_block(program, work, nodes[0, start:stop], nodes[1, start:stop])
+        for j in range(outputs.size):
+            for i in range(stop - start):
+                at, k = outputs[j] + i, (start + i) % RULE
+                value, low = multiply(work[at], work[at + LOW], rule[2, k], rule[3, k])
+                found[j, 0], found[j, 1] = add(found[j, 0], found[j, 1], value, low)
+                found[j, 2] += rule[2, k] * work[at + ERROR] + UNIT * fabs(found[j, 0])
+                found[j, 3] += fabs(value)
+    for j in range(outputs.size):
+        found[j, 0], found[j, 1] = multiply(found[j, 0], found[j, 1], step[0], step[1])
+        found[j, 2], found[j, 3] = step[0] * found[j, 2], step[0] * found[j, 3]
+
+
+@entry(INTEGER(PROGRAM, VECTOR, MATRIX, INTEGER, VECTOR, MATRIX, MATRIX), checked=False)
+def fill_panel_means(program, work, inputs, kind, edges, rule, found):  # type: ignore[no-untyped-def]
+    """Fill the means of all results as `fill_means`, where the motion passes near an equilibrium.
+
+    Parameters
+    ----------
+    program, work, inputs, found
+        As for `fill_means`.
+    kind : int
+        LIBRATION or CIRCULATION.
+    edges : (n,) array
+        Phase angles, from the first to the last one, between which the integrands are smooth.
+    rule : (4, n) array
+        The nodes of a panel (`nodes.panel_rule`).
+
+    Returns
+    -------
+    int
+        The number of intervals, or why there are no means.
+    """
+    begin(program, work, inputs)
+    now, before = np.empty((found.shape[0], MEAN)), np.empty((found.shape[0], MEAN))
+    found[:, :] = 0.0
+    for k in range(edges.size - 1):
+        # The upper turning point is at pi itself.
+        right = edges[k + 1], 2.0 * QUARTER[1] if kind == LIBRATION and k == edges.size - 2 else 0.0
+        left, panels, change = (edges[k], 0.0), MIN_PANELS, inf
+        width = add(right[0], right[1], -left[0], 0.0)
+        while not change <= MAX_PANEL_CHANGE:
+            if panels > MAX_PANELS:
+                return NOT_SMOOTH
+            integrate(program, work, kind, left, width, panels, rule, now)
+            change = 0.0 if panels > MIN_PANELS else inf
+            for j in range(found.shape[0]):
+                size = now[j, 3] + found[j, 3]
+                if panels > MIN_PANELS and not size <= now[j, 2]:
+                    step = max(0.0, fabs(add(now[j, 0], now[j, 1], -before[j, 0], -before[j, 1])[0]) - now[j, 2]) / size
+                    change = step if not step <= change else change
+                before[j, 0], before[j, 1] = now[j, 0], now[j, 1]
+            panels *= 2
+        for j in range(found.shape[0]):
+            found[j, 0], found[j, 1] = add(found[j, 0], found[j, 1], now[j, 0], now[j, 1])
+            found[j, 2], found[j, 3] = found[j, 2] + now[j, 2], found[j, 3] + now[j, 3]
+    rounding, whole = 0.0, (edges[edges.size - 1], 2.0 * QUARTER[1] if kind == LIBRATION else 0.0)
+    for j in range(found.shape[0]):
+        if not found[j, 3] <= found[j, 2]:
+            rounding = max(rounding, found[j, 2] / found[j, 3])
+        found[j, 0], found[j, 1] = divide(found[j, 0], found[j, 1], whole[0], whole[1])
+        found[j, 2], found[j, 3] = found[j, 2] / whole[0], found[j, 3] / whole[0]
+    return edges.size - 1 if rounding <= MAX_ROUNDING else LOST_DIGITS
 
 
 @entry(types.void(PROGRAM, VECTOR, MATRIX, MATRIX, CUBE), checked=False)

@@ -7,9 +7,16 @@ import numpy as np
 from gqm_sym.errors import SolutionError
 from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.double_double.arithmetic import UNIT
-from gqm_sym.runtime.double_double.nodes import LEVELS, trapezoidal_nodes
+from gqm_sym.runtime.double_double.nodes import LEVELS, panel_rule, trapezoidal_nodes
 from gqm_sym.runtime.double_double.orbit_time import Orbit
-from gqm_sym.runtime.gradients.evaluation import LOST_DIGITS, MEAN, NOT_SMOOTH, fill_means, fill_values
+from gqm_sym.runtime.gradients.evaluation import (
+    LOST_DIGITS,
+    MEAN,
+    NOT_SMOOTH,
+    fill_means,
+    fill_panel_means,
+    fill_values,
+)
 from gqm_sym.runtime.gradients.multiprecision import UNDECIDED, MultiprecisionOrbit
 from gqm_sym.runtime.gradients.programs import (
     PATH_QUANTITIES,
@@ -71,10 +78,14 @@ class OrbitDerivatives:
         0 for a libration, else the sign of ds/dt.
     offsets : (float, float)
         The distances of both turning points from the launch, for a libration.
+    edges : array
+        Phase angles between which the speed changes smoothly, from the first to the last.
     """
 
-    def __init__(self, problem: Problem, orbit: Orbit | None, direction: int, offsets: tuple[float, float]) -> None:
-        self.direction = direction
+    def __init__(
+        self, problem: Problem, orbit: Orbit | None, direction: int, offsets: tuple[float, float], edges: Array
+    ) -> None:
+        self.direction, self._edges = direction, edges
         self.source = source_of(problem.formulas)
         self._given = (*problem.p, problem.launch.lam0, problem.launch.v0)
         numbers = [(n.value, n.low, 0.25 * UNIT * abs(n.value) if n.low else 0.0) for n in self._given]
@@ -124,11 +135,19 @@ class OrbitDerivatives:
 
     @cached_property
     def _means(self) -> tuple[Array, int, bool]:
-        """The means of the orbit's program, the number of nodes, and whether double-double arithmetic found them."""
+        """The means of the orbit's program, the number of nodes, and whether double-double arithmetic found them.
+
+        The number is 0 if they are those of panels.
+        """
         if self._orbit is not None:
-            found = np.zeros((self._program.outputs.size, MEAN))
-            n = fill_means(self._program.operands, self._program.work, *self._rule, found)
+            found, program = np.zeros((self._program.outputs.size, MEAN)), self._program
+            inputs, nodes = self._rule
+            n = fill_means(program.operands, program.work, inputs, nodes, found)
             if n == NOT_SMOOTH:
+                kind = CIRCULATION if self.direction else LIBRATION
+                n = fill_panel_means(program.operands, program.work, inputs, kind, self._edges, panel_rule(), found)
+                if n > 0:
+                    return found, 0, True
                 raise SolutionError(UNDECIDED)
             if n != LOST_DIGITS:
                 return found, n, True
@@ -146,12 +165,6 @@ class OrbitDerivatives:
     def duration_gradient(self) -> Array:
         """The derivatives of the half period of a libration, or of the time of a lap."""
         return self._integrals(1, self.source.variables)
-
-    @property
-    def duration_sizes(self) -> Array:
-        """The integrals of absolute values of what `duration_gradient` integrates: its rounding is a share of them."""
-        sizes: Array = self._means[0][1 : 1 + self.source.variables, 3] * (1.0 if self.direction else PI)
-        return sizes
 
     @property
     def action(self) -> float:
@@ -183,6 +196,8 @@ class OrbitDerivatives:
         """
         # The means at n nodes are exact as soon as terms of order 2n vanish: twice the nodes show these terms.
         means, count, is_double_double = self._means
+        if not count:
+            raise SolutionError(UNDECIDED)
         n = min(2 * count, LEVELS[-1] // 2)
         if is_double_double:
             inputs, nodes = self._rule

@@ -166,7 +166,7 @@ class PeriodicMotion(Motion):
     def _derivatives(self) -> OrbitDerivatives:
         """The orbit with its derivatives."""
         direction = self.direction if self.kind == "circulation" else 0
-        return OrbitDerivatives(self.problem, self._orbit, direction, self._offsets)
+        return OrbitDerivatives(self.problem, self._orbit, direction, self._offsets, self._segment.edges)
 
     @cached_property
     def _orbit_sensitivity(self) -> OrbitSensitivity:

@@ -45,7 +45,10 @@ def test_the_same_as_in_double_double(name: str, v0: float) -> None:
     """Where both have digits enough, all means, ends and samples agree."""
     motion = generated(name).solve(lam0=0.25 if name == "parabola_rolling" else -1.25, v0=v0)
     direction = motion.direction if motion.kind == "circulation" else 0
-    fast, slow = motion._derivatives, OrbitDerivatives(motion.problem, None, direction, motion._offsets)
+    fast, slow = (
+        motion._derivatives,
+        OrbitDerivatives(motion.problem, None, direction, motion._offsets, motion._segment.edges),
+    )
     assert fast._means[2]
     assert not slow._means[2]
     np.testing.assert_allclose(slow._means[0][:, 0], fast._means[0][:, 0], rtol=1e-15, atol=1e-25)

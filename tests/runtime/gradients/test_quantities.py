@@ -73,6 +73,36 @@ def test_a_pendulum(amplitude: float, length: float, circle: ModuleType) -> None
         assert is_near(motion.gradient("action", "L")["L"], action * 3 / (2 * mpf(length)))
 
 
+@given(gap=st.floats(1.0, 3.7))
+@settings(max_examples=20)
+def test_a_pendulum_nearly_to_the_top(gap: float, circle: ModuleType) -> None:
+    """Down to 2e-4 rad from the top, where the half period changes by thousands of seconds a radian."""
+    with mp.workdps(60):
+        amplitude = float(mp.pi - mpf(10) ** -gap)
+        motion, a = circle.solve(lam0=amplitude, L=1, g="9.81"), mpf(amplitude)
+        found, k, scale = motion.gradient("half_period"), mp.sin(a / 2), mp.sqrt(1 / mpf("9.81"))
+        first, second = mp.ellipk(k**2), mp.ellipe(k**2)
+        assert is_near(found["lam0"], scale * mp.cos(a / 2) * (second / (k * (1 - k**2)) - first / k))
+        assert is_near(found["L"], scale * first)
+        assert is_near(found["g"], -scale * first / mpf("9.81"))
+
+
+@given(gap=st.floats(2.0, 8.0), lam0=st.floats(-2.0, 2.0))
+@settings(max_examples=20)
+def test_rounds_that_all_but_stop(gap: float, lam0: float, circle: ModuleType) -> None:
+    """dT/dv0 of rounds whose energy is above that of the top by shares of 1e-2 to 1e-8."""
+    with mp.workdps(60):
+        g = mpf("9.81")
+        v0 = float(mp.sqrt(4 * g * (1 + mpf(10) ** -gap) - 2 * g * (1 - mp.cos(mpf(lam0)))))
+        square = mpf(v0) ** 2 + 2 * g * (1 - mp.cos(mpf(lam0)))
+        slope = 2 * mp.diff(lambda q: 4 * mp.ellipk(4 * g / q) / mp.sqrt(q), square, h=mpf(10) ** -30)
+        motion = circle.solve(lam0=lam0, v0=v0, L=1, g="9.81")
+        assert is_near(motion.gradient("period")["v0"], slope * v0)
+        if gap > 5.0:
+            with pytest.raises(SolutionError, match="too near to an equilibrium"):
+                motion.sensitivity(0.1)
+
+
 @given(share=st.floats(1.01, 5.0), lam0=st.floats(-3.0, 3.0), direction=st.sampled_from([1, -1]))
 @settings(max_examples=20)
 def test_a_round_on_a_circle(share: float, lam0: float, direction: int, circle: ModuleType) -> None:
@@ -99,7 +129,9 @@ def test_differences(name: str) -> None:
         assert motion.kind == "libration"
         ends = tuple(sorted(motion.turning_points))
         found = [motion.gradient(q) for q in ("half_period", "action", "turning_points")]
-        sizes = dict(zip((*module.PARAMETERS, "lam0", "v0"), motion._derivatives.duration_sizes, strict=False))
+        # The rounding of a gradient is a share of the integral of the absolute values of what it is the integral of.
+        means = motion._derivatives._means[0][1:, 3]
+        sizes = dict(zip((*module.PARAMETERS, "lam0", "v0"), means * np.pi, strict=False))
         with mp.workdps(42):
             for key in launch:
                 time, action, low, high = by_differences(partial(half_orbit, name, near=ends), launch, key)
