@@ -16,7 +16,7 @@ demo: $(VENV)/.run ## take the paper's Example 1 from a YAML file to digits, bes
 
 test: $(VENV)/.dev ## run every test, notebooks included
 	$(BIN)/gqm warm --processes $(WORKERS)
-	$(BIN)/python -m pytest -n $(WORKERS)
+	$(BIN)/python -m pytest -n $(WORKERS) --dist worksteal
 
 lint: $(VENV)/.dev ## check format, style, types and documentation, and that generated files are current
 	$(BIN)/ruff format --check

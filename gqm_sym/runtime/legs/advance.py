@@ -3,6 +3,7 @@
 from math import fabs, inf, isfinite
 from typing import NamedTuple
 
+import numpy as np
 from numba import types
 
 from gqm_sym.runtime.arithmetic.doubledouble import add, two_sum
@@ -48,6 +49,7 @@ from gqm_sym.runtime.legs.body import (
 from gqm_sym.runtime.legs.follow import follow, released
 from gqm_sym.runtime.legs.leg_breaks import CLEARANCE_SHARE, clearance
 from gqm_sym.runtime.legs.leg_equation import Forces
+from gqm_sym.runtime.legs.leg_panels import GAP_COLUMNS
 from gqm_sym.runtime.legs.leg_record import (
     AHEAD,
     BACK,
@@ -57,11 +59,14 @@ from gqm_sym.runtime.legs.leg_record import (
     END_LOW,
     HEADING,
     LAPS_BEFORE,
+    PASSAGE,
+    PEAKS,
     START,
     START_LOW,
     START_V2,
     TIME_FROM_END,
     TIME_FROM_START,
+    TIMES,
 )
 from gqm_sym.runtime.legs.leg_run import (
     ASYMPTOTE,
@@ -108,6 +113,9 @@ MAX_WHOLE_SHARE = 0.9
 LEAST_V2 = 1e-300
 
 
+NOTHING: Array = np.empty(0)
+
+
 class Joints(NamedTuple):
     """Where a curve is not smooth.
 
@@ -117,16 +125,33 @@ class Joints(NamedTuple):
         All such places, and those at which the tangent jumps, within one lap.
     ahead : array
         A buffer for the breaks ahead of a body; `room_ahead` says how long it must be.
+    gaps : array
+        A buffer for what is kept of the curve between its breaks, for the run-time parameters of the body; `room_kept`
+        says how long it must be. It is empty if nothing is kept.
     """
 
     breaks: Array
     corners: Array
     ahead: Array
+    gaps: Array = NOTHING
 
 
 def room_ahead(breaks: int) -> int:
     """How many breaks may lie ahead of a body on a curve with so many of them a lap."""
     return (LAPS_AHEAD + 3) * breaks
+
+
+def room_kept(breaks: int) -> int:
+    """How many numbers are kept of a curve with so many breaks."""
+    return 4 * GAP_COLUMNS * max(breaks - 1, 0)
+
+
+@Inner
+def gaps_on_leg(dissipation, joints, body, reads):  # type: ignore[no-untyped-def]
+    """What is kept of the curve between its breaks, if a leg may be passed by it: its panels cannot be read."""
+    behind = body[DIRECTION] * (body[TARGET] - body[PLACE]) < 0.0
+    is_used = body[PERIOD] == 0.0 and (reads == TIMES or reads == PEAKS or (reads == PASSAGE and behind))
+    return joints.gaps if is_used and dissipation.linear and not dissipation.kinked else joints.gaps[:0]
 
 
 @Inner
@@ -254,16 +279,22 @@ def next_leg(dissipation, p, joints, body, reads, record):  # type: ignore[no-un
     width = expected_width(body)
     may_be_whole = width == 0.0 or body[UNRESOLVED] == 0.0 or width <= MAX_WHOLE_SHARE * body[UNRESOLVED]
     until, target = body[HORIZON] - body[ELAPSED], body[TARGET] - body[LAPS] * period
+    gaps, first_gap = gaps_on_leg(dissipation, joints, body, reads), 0
+    if gaps.size > 0 and breaks.size > 0:
+        first_gap = int(np.searchsorted(joints.breaks, breaks[0]))
     while True:
         start = Start(
             *(place, body[PLACE_LOW], body[V2], direction, int(body[CONTACT_SIGN]), body[STEP], no_turn_until),
             *(width, may_be_whole),
         )
-        route = Route(breaks, limit, pause, only_sign, reads, until, target)
+        route = Route(breaks, limit, pause, only_sign, reads, until, target, gaps, first_gap)
         found = follow(dissipation, p, start, route, record)
-        if found.what != LIFTOFF or record[AHEAD] > 0.0:
+        if found.what == LIFTOFF and record[AHEAD] == 0.0:
+            pause, only_sign, no_turn_until, until, body[ENDING] = 0.0, 0, inf, 0.0, AT_ONCE
+        elif reads == PEAKS and gaps.size > 0 and record[TIME_FROM_START] + record[TIME_FROM_END] > until:
+            gaps = gaps[:0]
+        else:
             return found
-        pause, only_sign, no_turn_until, until, body[ENDING] = 0.0, 0, inf, 0.0, AT_ONCE
 
 
 @Inner

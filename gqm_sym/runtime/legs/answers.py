@@ -30,6 +30,7 @@ from gqm_sym.runtime.legs.body import (
     VALUE,
 )
 from gqm_sym.runtime.legs.leg_equation import Forces
+from gqm_sym.runtime.legs.leg_panels import GAP_COLUMNS
 from gqm_sym.runtime.legs.leg_reading import passage, peak_of_leg
 from gqm_sym.runtime.legs.leg_record import BEGIN, BEGIN_LOW, LAPS_BEFORE, PANELS, PASSAGE, PEAKS, TIMES
 from gqm_sym.runtime.legs.leg_run import ASYMPTOTE, FULL, SPENT, point_buffer, slope_of_v2
@@ -49,11 +50,11 @@ MAX_TURNS = 20000
 # The most legs of one body.
 MAX_LEGS = 250_000
 
-JOINTS = types.NamedUniTuple(VECTOR, 3, Joints)
+JOINTS = types.NamedUniTuple(VECTOR, 4, Joints)
 
 
-class Sight(NamedTuple):
-    """What was seen of a motion so far.
+class Observed(NamedTuple):
+    """What the legs so far have shown.
 
     Attributes
     ----------
@@ -69,7 +70,7 @@ class Sight(NamedTuple):
 
 @Inner
 def goes_on(body, question, arrival):  # type: ignore[no-untyped-def]
-    """Whether the next leg has to be seen too."""
+    """Whether the next leg has to be followed too."""
     if body[ENDING] != 0.0 or arrival < inf:
         return False
     if isfinite(body[HORIZON]):
@@ -81,17 +82,17 @@ def goes_on(body, question, arrival):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def seen_on_leg(body, question, sight, record):  # type: ignore[no-untyped-def]
-    """What is seen when one more leg has been run."""
+def after_leg(body, question, observed, record):  # type: ignore[no-untyped-def]
+    """What the legs so far have shown, once one more has been followed."""
     begin, low = record[BEGIN], record[BEGIN_LOW]
     if question == ARRIVAL and body[ENDING] != AT_ONCE:
         spent = passage(record, body[TARGET] - record[LAPS_BEFORE] * body[PERIOD])
-        return Sight(begin + (low + spent), sight.peak)
+        return Observed(begin + (low + spent), observed.peak)
     if question >= LEAST_SPEED:
         until = 0.0 if body[ENDING] == AT_ONCE else (body[HORIZON] - begin) - low
         asked = (question >= LEAST_LOAD, 1.0 if question in (MOST_SPEED, MOST_LOAD) else -1.0)
-        return Sight(sight.arrival, peak_of_leg(record, until, asked, sight.peak))
-    return sight
+        return Observed(observed.arrival, peak_of_leg(record, until, asked, observed.peak))
+    return observed
 
 
 @Inner
@@ -113,12 +114,12 @@ def at_rest(dissipation, p, body, question):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def conclude(body, question, sight):  # type: ignore[no-untyped-def]
-    """The answer for a body that has been seen long enough, and its status."""
+def conclude(body, question, observed):  # type: ignore[no-untyped-def]
+    """The answer for a body that has been followed long enough, and its status."""
     ends = body[ENDING] != 0.0 and body[ENDING] != ASYMPTOTE
     end = min(body[HORIZON], body[ELAPSED] if ends else inf)
     if question == ARRIVAL:
-        return (sight.arrival, FOUND) if sight.arrival <= end and sight.arrival < inf else (np.nan, NONE)
+        return (observed.arrival, FOUND) if observed.arrival <= end and observed.arrival < inf else (np.nan, NONE)
     if not isfinite(end):
         return np.nan, NONE
     if question == END_TIME:
@@ -128,24 +129,25 @@ def conclude(body, question, sight):  # type: ignore[no-untyped-def]
         return (body[PLACE] + body[LAPS] * body[PERIOD], FOUND) if rests else (np.nan, NONE)
     if body[ENDING] == ASYMPTOTE:
         return np.nan, LEFT
-    return sight.peak if question in (MOST_SPEED, MOST_LOAD) else -sight.peak, FOUND
+    return observed.peak if question in (MOST_SPEED, MOST_LOAD) else -observed.peak, FOUND
 
 
 @Inner
 def answer(dissipation, p, joints, question, body, record):  # type: ignore[no-untyped-def]
     """The number that is asked for of one body, and its status."""
-    sight, reads = Sight(inf, -inf), PEAKS if question >= LEAST_SPEED else (PASSAGE if question == ARRIVAL else TIMES)
+    observed = Observed(inf, -inf)
+    reads = PEAKS if question >= LEAST_SPEED else (PASSAGE if question == ARRIVAL else TIMES)
     for _ in range(MAX_LEGS):
         what = advance(dissipation, p, joints, body, reads, record)
         if what in (FULL, SPENT, LEAVES, BEYOND):
             break
         if question == ARRIVAL and body[TARGET] == body[LAM0]:
             return 0.0, FOUND
-        sight = seen_on_leg(body, question, sight, record)
-        if sight.arrival != sight.arrival:
+        observed = after_leg(body, question, observed, record)
+        if observed.arrival != observed.arrival:
             break
-        if not goes_on(body, question, sight.arrival):
-            return conclude(body, question, sight)
+        if not goes_on(body, question, observed.arrival):
+            return conclude(body, question, observed)
     return np.nan, LEFT
 
 
@@ -177,10 +179,13 @@ def drive(dissipation, parameters, joints, question, bodies, record):  # type: i
     int
         What became of the last body on its leg (`advance`).
     """
-    joints = Joints(uncounted(joints.breaks), uncounted(joints.corners), uncounted(joints.ahead))
+    breaks, corners, ahead, gaps = joints
+    joints = Joints(uncounted(breaks), uncounted(corners), uncounted(ahead), uncounted(gaps))
     parameters, bodies, record, what = uncounted(parameters), uncounted(bodies), uncounted(record), RESTS
     for k in range(bodies.shape[0]):
         p, body = parameters[k if parameters.shape[0] > 1 else 0], bodies[k]
+        if parameters.shape[0] > 1:
+            joints.gaps[::GAP_COLUMNS] = 0.0
         if body[STEP] == 0.0:
             launch(dissipation, p, joints, body)
         if question == LEG:

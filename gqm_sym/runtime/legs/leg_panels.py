@@ -1,6 +1,6 @@
 """The panels of a leg: each as wide as V**2, the forces and the time rate can be resolved on it by a polynomial."""
 
-from math import fabs, inf
+from math import fabs, inf, nan
 from typing import NamedTuple
 
 from gqm_sym.runtime.compiled.intrinsics import bits, from_bits
@@ -8,6 +8,7 @@ from gqm_sym.runtime.compiled.jit import Inlined, Inner
 from gqm_sym.runtime.legs.leg_breaks import offset
 from gqm_sym.runtime.legs.leg_equation import (
     DS,
+    EXPM1_Q,
     FORCE,
     KAPPA,
     LOAD,
@@ -17,6 +18,7 @@ from gqm_sym.runtime.legs.leg_equation import (
     Q_RATE,
     SERIES,
     SIZES,
+    SPEED,
     TAILS,
     TIME_RATE,
     W_FACTOR,
@@ -26,14 +28,18 @@ from gqm_sym.runtime.legs.leg_equation import (
     as_factor,
     begin_panel,
     distance,
+    fill_force,
     fill_rates,
     load_row,
     load_size_row,
     product,
+    root_row,
     slope_at,
+    solution_row,
     solve_panel,
+    time_rate_row,
 )
-from gqm_sym.runtime.legs.leg_record import change_at, tail_of
+from gqm_sym.runtime.legs.leg_record import change_at, copy, tail_of
 from gqm_sym.runtime.legs.polynomials import (
     COUNT,
     LEBESGUE,
@@ -42,14 +48,12 @@ from gqm_sym.runtime.legs.polynomials import (
     first_change,
     size_of,
     to_coefficients,
+    to_means,
     to_tails,
 )
 
 # The last coefficients of a resolved function against the largest one; noise in them is about 1e-16.
 TAIL_RATIO = 4e-16
-
-# The same for FORCE and Q_RATE, which are only integrated: that divides a coefficient by twice its degree.
-INTEGRATED_TAIL_RATIO = 4e-15
 
 # Below this ratio coefficients that no longer decrease are rounding noise, not structure.
 NOISE_LEVEL = 1e-9
@@ -90,6 +94,13 @@ NOISE_WIDTH_RATIO = 2.0**-20
 
 # The most panels of a leg, and the most widths that are tried for one.
 MAX_PANELS, MAX_WIDTHS = 20000, 2100
+
+# What is kept of the curve from one break to the next, for each direction and each sign of N: whether it is FILLED, or
+# REFUSED because it is not resolved; then rows from which V**2, N and time follow for any V**2 at the first break.
+GAP_ROWS = (EXPM1_Q, SPEED, DS, N0, KAPPA)
+GAP_HEAD = 8
+GAP_COLUMNS = GAP_HEAD + len(GAP_ROWS) * WIDE
+FILLED, REFUSED = 1.0, 2.0
 
 # Whether time has to be resolved.
 NEVER, MAYBE, ALWAYS = range(3)
@@ -144,14 +155,11 @@ def set_sizes(v2, factor, work):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def examine(work, row, size, ratio=TAIL_RATIO):  # type: ignore[no-untyped-def]
-    """The size of a function's last coefficients, that of some in the middle, and whether the function is resolved.
-
-    Its last coefficients may be ``ratio`` of its size.
-    """
+def examine(work, row, size):  # type: ignore[no-untyped-def]
+    """The size of a function's last coefficients, that of some in the middle, and whether the function is resolved."""
     to_tails(work, row, work, TAILS)
     tail, middle = tail_of(work), max(fabs(work[TAILS + 3]), max(fabs(work[TAILS + 4]), fabs(work[TAILS + 5])))
-    return tail, middle, tail <= ratio * size or (middle <= NOISE_LEVEL * size and tail >= 0.05 * middle)
+    return tail, middle, tail <= TAIL_RATIO * size or (middle <= NOISE_LEVEL * size and tail >= 0.05 * middle)
 
 
 @Inner
@@ -160,8 +168,7 @@ def are_resolved(work, first, last):  # type: ignore[no-untyped-def]
     resolved, worst = True, 0.0
     for row in range(first, last, WIDE):
         size = work[size_at(row)]
-        ratio = INTEGRATED_TAIL_RATIO if row == FORCE or row == Q_RATE else TAIL_RATIO
-        tail, middle, fine = examine(work, row, size, ratio)
+        tail, middle, fine = examine(work, row, size)
         if not (tail < inf and middle < inf):
             return False, inf
         if size > 0.0:
@@ -348,6 +355,55 @@ def next_panel(forces, march, panel, request, work):  # type: ignore[no-untyped-
                 return width, max(step, grown) if ends_at_kink or width == request.max_width else grown, timed
         width, ends_at_kink = narrower(width, factor), False
     return 0.0, step, False
+
+
+@Inner
+def fill_gap(forces, march, panel, width, gaps, at, work):  # type: ignore[no-untyped-def]
+    """Fill what is kept of a panel from break to break, from ``gaps[at]`` on."""
+    gaps[at] = REFUSED
+    begin_panel(forces, march, panel, width, work)
+    if not fill_force(march, work) < inf:
+        return
+    to_means(work, FORCE, work, MEAN)
+    product(work, SPEED, OFFSET, MEAN)
+    work[size_at(FORCE)] = size_of(work, FORCE)
+    if not (is_curve_resolved(width, work)[0] and are_resolved(work, FORCE, Q_RATE)[0]):
+        return
+    for row in (N0, KAPPA):
+        if not examine(work, row, size_of(work, row))[0] <= ONE_SIGN_RATIO * size_of(work, row):
+            return
+    for k, row in enumerate(GAP_ROWS):
+        copy(gaps, at + GAP_HEAD + k * WIDE, work, row)
+    gaps[at] = FILLED
+
+
+@Inner
+def pass_gap(v2, contact_sign, width, gaps, at, work):  # type: ignore[no-untyped-def]
+    """Fill V**2, Y and the rate of time on a panel from break to break, where V**2 is ``v2`` at its start.
+
+    Returns
+    -------
+    time : float
+        NaN where the curve or time is not resolved, V**2 vanishes or N may change its sign.
+    v2 : float
+        V**2 at its end.
+    """
+    if gaps[at] != FILLED:
+        return nan, nan
+    for k, row in enumerate(GAP_ROWS):
+        copy(work, row, gaps, at + GAP_HEAD + k * WIDE)
+    solution_row(work, W, SPEED, EXPM1_Q, v2)
+    load_row(work, LOAD, DS, N0, KAPPA, W)
+    load_size_row(work, MEAN, DS, N0, KAPPA, W)
+    end = work[W + COUNT]
+    if not (min(extent(work, W)[0], end) > 0.0 and contact_sign * work[LOAD] > 0.0):
+        return nan, end
+    root_row(work, SPEED, W)
+    time_rate_row(work, TIME_RATE, DS, SPEED, 1.0)
+    fine = examine(work, TIME_RATE, size_of(work, TIME_RATE))[2]
+    if not (fine and keeps_sign(work, LOAD, 4.0 * FAR_FROM_ZERO_RATIO * extent(work, MEAN)[1])):
+        return nan, end
+    return width * work[TAILS + 6], end
 
 
 @Inner

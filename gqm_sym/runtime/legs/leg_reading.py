@@ -28,6 +28,7 @@ from gqm_sym.runtime.legs.leg_record import (
     START,
     START_LOW,
     TIME,
+    TIME_ERROR,
     TIME_FROM_END,
     TIME_FROM_START,
     WHOLE,
@@ -231,7 +232,7 @@ def peak_between(record, panels, half_c, between, asked, best):  # type: ignore[
         if first > 1.0 or last < -1.0:
             continue
         for j in range(COUNT):
-            growth = left + width * SHARES[j] + half_c if half_c < inf else 1.0
+            growth = left + width * SHARES[j] + half_c if half_c < inf and record[at + TIME_ERROR] >= 0.0 else 1.0
             values[j] = record[at + NORMAL_LOAD + j] if force else growth * record[at + Y_ROW + j]
         best = peak_of_panel(values, max(first, -1.0), min(last, 1.0), sign, best)
     return best

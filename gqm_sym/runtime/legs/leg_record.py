@@ -24,7 +24,8 @@ at the end           the places at which N changes sign, the first one last
 
 A panel is a row of COLUMNS numbers: at its nodes the rates of time and of arc length, Y, and the contact force per mass
 (from NORMAL_LOAD on); after each of the first three one more number, RIGHT (the march variable at its end), TIME, and
-TIME_ERROR (what the time may be wrong by); at last INHERITED (`leg_errors`).
+TIME_ERROR (what the time may be wrong by); at last INHERITED (`leg_errors`). A panel that was passed by what is kept of
+the curve (`leg_run.pass_gaps`) has its nodes by distance, V for Y, no rates, and TIME_ERROR = -1.
 
 A row of the field of V**2 next to an equilibrium has FIELD_COLUMNS numbers: the distances from the equilibrium between
 which it holds, and the Chebyshev coefficients of V**2/d**2 and of ds/dlam there (`quadrature.equilibrium` reads them).

@@ -12,14 +12,17 @@ from gqm_sym.runtime.compiled.calls import call_speed_equation
 from gqm_sym.runtime.compiled.jit import Inner
 from gqm_sym.runtime.compiled.registers import on_stack
 from gqm_sym.runtime.compiled.types import Array
-from gqm_sym.runtime.legs.leg_breaks import located, offset, span_before, within
+from gqm_sym.runtime.legs.leg_breaks import clearance, located, offset, span_before, within
 from gqm_sym.runtime.legs.leg_equation import (
     EXPM1_Q,
     FORCE,
+    KAPPA,
     LOAD,
     MEAN,
+    N0,
     OFFSET,
     SERIES,
+    SPEED,
     W_FACTOR,
     March,
     P,
@@ -30,6 +33,7 @@ from gqm_sym.runtime.legs.leg_equation import (
     begin_panel,
     distance,
     fill_rates,
+    load_per_mass_row,
     marched,
     panel_buffer,
     set_nodes,
@@ -39,17 +43,33 @@ from gqm_sym.runtime.legs.leg_equation import (
 from gqm_sym.runtime.legs.leg_panels import (
     ALWAYS,
     CANCELLATION_NOISE,
+    GAP_COLUMNS,
     HIGH_V2_RATIO,
     MAX_PANELS,
     MAYBE,
     MIN_RELATIVE_WIDTH,
     NEVER,
     PanelRequest,
+    fill_gap,
     first_change_of,
     next_panel,
+    pass_gap,
     size_at,
 )
-from gqm_sym.runtime.legs.leg_record import COLUMNS, HEAD, add_panel, change_at, has_space
+from gqm_sym.runtime.legs.leg_record import (
+    COLUMNS,
+    HEAD,
+    NORMAL_LOAD,
+    PEAKS,
+    RIGHT,
+    TIME,
+    TIME_ERROR,
+    Y_ROW,
+    add_panel,
+    change_at,
+    copy,
+    has_space,
+)
 from gqm_sym.runtime.legs.polynomials import COUNT, extent, size_of, to_coefficients
 
 # What ended a run:
@@ -140,6 +160,10 @@ class Route(NamedTuple):
         What is read of the record (`leg_record`).
     until, target : float
         The time from the leg's start up to which peaks are looked for, and the place whose passage is.
+    gaps : array
+        What is kept of the curve between its breaks (`leg_panels`); empty if that is not used.
+    first_gap : int
+        The index of the first break of the route among all of the curve.
     """
 
     breaks: Array
@@ -149,6 +173,8 @@ class Route(NamedTuple):
     reads: int
     until: float
     target: float
+    gaps: Array
+    first_gap: int
 
 
 class Ahead(NamedTuple):
@@ -208,6 +234,28 @@ class Timed(NamedTuple):
     v2: float
     contact_sign: int
     change_count: int
+
+
+class Passed(NamedTuple):
+    """How far a run has come.
+
+    Attributes
+    ----------
+    left, run_length : float
+        The march variable and the distance from the origin.
+    v2, largest_v2 : float
+        V**2 there, and the largest so far.
+    ahead : Ahead
+    panel_count : int
+        How many panels were recorded.
+    """
+
+    left: float
+    run_length: float
+    v2: float
+    largest_v2: float
+    ahead: Ahead
+    panel_count: int
 
 
 class End(NamedTuple):
@@ -405,6 +453,13 @@ def enter_change(record, count, place):  # type: ignore[no-untyped-def]
 
 
 @Inner
+def enter_panel(record, count, right, width, work):  # type: ignore[no-untyped-def]
+    """Enter a panel that ends at w = ``right`` in the record; returns the number of panels."""
+    add_panel(record, HEAD + count * COLUMNS, right, width, work)
+    return count + 1
+
+
+@Inner
 def largest_after(largest_v2, v2, ends_here, work):  # type: ignore[no-untyped-def]
     """The largest V**2 so far, of which resistance alone leaves the share exp(-q) on a panel beginning with ``v2``."""
     damped = largest_v2 if ends_here else largest_v2 / (1.0 + work[EXPM1_Q + COUNT])
@@ -455,6 +510,39 @@ def conclude(route, march, end, timed, searching, run_length):  # type: ignore[n
 
 
 @Inner
+def pass_gaps(forces, march, route, contact_sign, before, record, work):  # type: ignore[no-untyped-def]
+    """Go on from the break ahead, from one to the next, as far as V**2 is large and follows from what is kept."""
+    (left, run_length, v2, largest_v2, ahead, count), v = before, march.direction
+    breaks, gaps, upcoming = route.breaks, route.gaps, ahead.upcoming
+    while gaps.size > 0 and upcoming + 1 < breaks.size and v2 >= HIGH_V2_RATIO * largest_v2:
+        start, stop, to = breaks[upcoming], breaks[upcoming + 1], HEAD + count * COLUMNS
+        # A break lies behind already where a panel is laid once more.
+        is_ahead = offset(start, march.origin, v) == run_length
+        if contact_sign in (0, -route.only_sign) or not (is_ahead and has_space(record, to, 0)):
+            break
+        gap = route.first_gap + (upcoming if v > 0 else -upcoming - 1)
+        at, width = GAP_COLUMNS * (4 * gap + (v + 1) + (contact_sign + 1) // 2), fabs(stop - start)
+        if gaps[at] == 0.0:
+            span = span_before(breaks, upcoming + 1, v, clearance(start, stop))
+            panel = Panel(0.0, 0.0, contact_sign, span)
+            fill_gap(forces, March((start, 0.0), v, 0.0, 1.0), panel, width, gaps, at, work)
+        time, end = pass_gap(v2, contact_sign, width, gaps, at, work)
+        if not time > 0.0:
+            break
+        largest_v2, v2, upcoming, count = largest_after(largest_v2, v2, False, work), end, upcoming + 1, count + 1
+        run_length = offset(stop, march.origin, v)
+        left = marched(run_length, march)
+        if route.reads == PEAKS:
+            load_per_mass_row(work, MEAN, N0, KAPPA, W)
+            copy(record, to + Y_ROW, work, SPEED)
+            copy(record, to + NORMAL_LOAD, work, MEAN)
+        record[to + RIGHT], record[to + TIME], record[to + TIME_ERROR] = left, time, -1.0
+    if upcoming > ahead.upcoming:
+        ahead = Ahead(upcoming, ahead.span, inf, True)
+    return Passed(left, run_length, v2, largest_v2, ahead, count)
+
+
+@Inner
 def run(forces, start, route, off, record):  # type: ignore[no-untyped-def]
     """Follow the body from a start to the first turn, end or pause.
 
@@ -476,21 +564,25 @@ def run(forces, start, route, off, record):  # type: ignore[no-untyped-def]
     set_nodes(work)
     march, nu, ahead = begin(forces, start, route, off, point)
     v2, left, run_length, largest_v2, step = start.v2, 0.0, 0.0, start.v2, marched(step, march)
-    what, panel_count, recorded, change_count = SPENT, 0, 0, 0
     # Once time is not counted any more, a turn is searched for.
-    searching, at_stop, timed = False, False, Timed(run_length, v2, nu, change_count)
+    what, panel_count, recorded, change_count, searching, at_stop = GOES_ON, 0, 0, 0, False, False
     # Time on the second half of a leg is counted from its end, unless breaks limit its panels anyway; laws that are not
     # linear keep to what is next to it.
     middle = 0.5 * start.width if forces.linear and start.v2 == 0.0 and start.width > 0.0 else inf
+    timed = Timed(run_length, v2, nu, change_count)
     for _ in range(MAX_PANELS):
+        if at_stop and not searching:
+            left, run_length, v2, largest_v2, ahead, recorded = pass_gaps(
+                *(forces, march, route, nu, Passed(left, run_length, v2, largest_v2, ahead, recorded), record, work)
+            )
+            timed = Timed(run_length, v2, nu, change_count)
         late = v2 < HIGH_V2_RATIO * largest_v2 or (run_length >= middle and (searching or not at_stop))
-        has_room = has_space(record, HEAD + recorded * COLUMNS, change_count)
         ahead = pass_break(march, route, off, v2, ahead, run_length)
         at_end = ahead.upcoming == route.breaks.size
         stop = offset(route.limit if at_end else route.breaks[ahead.upcoming], march.origin, v)
-        code = what_before(nu, route.only_sign, has_room, searching and not late, stop <= run_length)
-        if code != GOES_ON:
-            what = code
+        has_room = has_space(record, HEAD + recorded * COLUMNS, change_count)
+        what = what_before(nu, route.only_sign, has_room, searching and not late, stop <= run_length)
+        if what != GOES_ON:
             break
         panel, max_width = Panel(left, v2, nu, ahead.span), marched(stop, march) - left
         timing = ALWAYS if run_length < start.no_turn_until else (NEVER if searching or late else MAYBE)
@@ -519,22 +611,20 @@ def run(forces, start, route, off, record):  # type: ignore[no-untyped-def]
         right, ends_here = left + width, change.first <= 1.0
         if ends_here:
             right = cut_panel(forces, march, Panel(left, v2, nu, ahead.span), width, change, run_length, work, point)
-        if not searching:
-            add_panel(record, HEAD + recorded * COLUMNS, right, right - left, work)
-            recorded += 1
-        panel_count += 1
-        largest_v2, at_stop = largest_after(largest_v2, v2, ends_here, work), not ends_here and width == max_width
+        recorded = recorded if searching else enter_panel(record, recorded, right, right - left, work)
+        at_stop, panel_count = not ends_here and width == max_width, panel_count + 1
+        largest_v2 = largest_after(largest_v2, v2, ends_here, work)
         v2, left, run_length = max(work[W + COUNT], 0.0), right, stop if at_stop else distance(right, march)
         ahead = Ahead(ahead.upcoming, ahead.span, inf, True)
         timed = timed if searching else Timed(run_length, v2, nu, change_count)
-        may_pause = (run_length >= route.pause and 2.0 * v2 >= largest_v2) or panel_count >= PANELS_PER_RUN
-        code = what_after(change, at_stop and at_end, may_pause)
-        if code != GOES_ON:
-            what, v2 = code, 0.0 if ends_here else v2
+        is_far = run_length >= route.pause and 2.0 * v2 >= largest_v2
+        what = what_after(change, at_stop and at_end, is_far or panel_count >= PANELS_PER_RUN)
+        if what != GOES_ON:
+            v2 = 0.0 if ends_here else v2
             break
         if ends_here:
             change_count, nu = enter_change(record, change_count, start.place + v * run_length), -nu
     onwards, half_c = step * (slope_at(left, march) + march.g * step), 0.5 * march.c if march.g > 0.0 else inf
-    origin, no_turn, upcoming = march.origin, start.no_turn_until, ahead.upcoming
-    end = End(what, origin, v2, nu, onwards, no_turn, origin, half_c, change_count, recorded, upcoming)
+    ends = (SPENT if what == GOES_ON else what, march.origin, v2, nu, onwards, start.no_turn_until, march.origin)
+    end = End(*ends, half_c, change_count, recorded, ahead.upcoming)
     return conclude(route, march, end, timed, searching, run_length)

@@ -21,7 +21,7 @@ from gqm_sym.runtime.compiled.strided import (
 from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.launch.request import ONLY_SIGN
 from gqm_sym.runtime.legs import answers as legs
-from gqm_sym.runtime.legs.advance import Joints, room_ahead
+from gqm_sym.runtime.legs.advance import Joints, room_ahead, room_kept
 from gqm_sym.runtime.legs.body import STATUS, VALUE, launched
 from gqm_sym.runtime.legs.leg_record import COLUMNS
 from gqm_sym.runtime.sweep import quantities
@@ -92,7 +92,7 @@ def answer_driven(
         Filled in for this part.
     """
     chart, breaks, corners = curve
-    joints = Joints(breaks, corners, np.empty(room_ahead(breaks.size)))
+    joints = Joints(breaks, corners, np.empty(room_ahead(breaks.size)), np.zeros(room_kept(breaks.size)))
     record, mass = np.empty((MAX_PANELS + breaks.size) * COLUMNS), PARAMETERS + list(formulas.parameters).index("m")
     for begin in range(part.start, part.stop, CHUNK):
         chunk = slice(begin, min(begin + CHUNK, part.stop))

@@ -43,6 +43,12 @@ def ring() -> Any:
     return gqm.Curve.parametric(x="sin(th)", z="-cos(th)", parameter="th", period="2*pi")
 
 
+def surveyed() -> Any:
+    """A valley of sixty points, where the curve is not smooth."""
+    x = np.linspace(-1.5, 1.6, 60)
+    return gqm.Curve.sampled(np.column_stack([x, 0.4 * x * x + 0.02 * np.cos(4.0 * x)]))
+
+
 def test_a_spring_with_friction(generated_folder: Path) -> None:
     """On a level line the body swings about +-mu m g/k, and each swing is 2 mu m g/k shorter on its side.
 
@@ -105,6 +111,12 @@ CASES = {
         gqm.CoulombFriction,
         {"mu": 0.15},
     ),
+    "track": (surveyed, lambda: gqm.CoulombFriction() + gqm.QuadraticDrag(b="c"), {"mu": 0.05, "c": 0.1}),
+    "planes": (
+        lambda: gqm.Curve.sampled([(0, 3), (1, 0), (2, 1), (3, 0.5), (5, -0.25), (6, 4)], kind="linear"),
+        lambda: gqm.CoulombFriction() + gqm.QuadraticDrag(b="c"),
+        {"mu": 0.15, "c": 0.1},
+    ),
     "closed": (
         lambda: gqm.Curve.implicit("x**2 + 2*z**2 - 1", start=(0, "-sqrt(2)/2")),
         gqm.CoulombFriction,
@@ -157,6 +169,21 @@ def test_the_same_bits_on_any_number_of_cores(build: Build, monkeypatch: pytest.
         assert np.array_equal(module.sweep(quantity, starts, 1.0, mu=mu, t_max=5.0).values, values)
         some = module.sweep(quantity, starts[7:9], 1.0, mu=mu[7:9], t_max=5.0).values
         assert np.array_equal(some, values[7:9])
+
+
+@pytest.mark.parametrize("quantity", ["t_end", "rest_position", "normal_force_max"])
+def test_what_is_kept_of_a_track_is_that_of_any_launch(quantity: str, build: Build) -> None:
+    """Between breaks the same is kept of the curve whichever launch comes first, for the parameters of that launch."""
+    module = build("swept_track", *(make() for make in CASES["track"][:2]))
+    starts, given = np.linspace(0.1, 3.2, 60), {"mu": 0.05, "c": 0.1}
+    values = module.sweep(quantity, starts, 0.5, t_max=20.0, **given).values
+    assert np.array_equal(module.sweep(quantity, starts[::-1], 0.5, t_max=20.0, **given).values[::-1], values)
+    for k in (0, 17, 59):
+        assert module.sweep(quantity, [starts[k]], 0.5, t_max=20.0, **given).values == values[k : k + 1]
+    frictions = np.array([0.02, 0.05, 0.3])
+    swept = module.sweep(quantity, starts[3], 0.5, t_max=20.0, **given | {"mu": frictions}).values
+    alone = [module.sweep(quantity, [starts[3]], 0.5, t_max=20.0, **given | {"mu": mu}).values[0] for mu in frictions]
+    assert np.array_equal(swept, alone)
 
 
 def test_a_curve_for_each_parameter(build: Build) -> None:
