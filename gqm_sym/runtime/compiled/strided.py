@@ -40,7 +40,8 @@ def _line(column: NDArray[np.float64], begin: int, end: int) -> NDArray[np.float
 
 def pointers(lines: list[NDArray[np.float64]]) -> NDArray[np.int64]:
     """Return the address and the step in bytes of each vector, as rows; the caller must keep the vectors alive."""
-    return np.array([(line.ctypes.data, line.strides[0] if line.size > 1 else 0) for line in lines], dtype=np.int64)
+    found = [(line.__array_interface__["data"][0], line.strides[0] if line.size > 1 else 0) for line in lines]
+    return np.array(found, dtype=np.int64).reshape(-1, 2)
 
 
 @intrinsic

@@ -29,6 +29,10 @@ END_SHARE = 1e-9
 # The share of a segment that a load is not looked for in before a corner at which contact is lost.
 BEFORE_CORNER = 1e-13
 
+# The distance from a sample at which a value belongs to the side that it is on, if the quantity jumps at the sample; as
+# a share of the phase angle.
+BESIDE_JOINT = 64.0 * ULP
+
 # Values that differ by less than so many roundings are equal: the earlier one is told.
 EQUAL_ROUNDINGS = 8
 
@@ -189,7 +193,8 @@ def _peak(function: Callable[[Array], Array], low: float, middle: float, high: f
         return middle
     nodes = np.cos(np.pi * (np.arange(PEAK_NODES) + 0.5) / PEAK_NODES)
     values = function(0.5 * (low + high) + 0.5 * (high - low) * nodes)
-    candidates = [low, middle, high]
+    beside = BESIDE_JOINT * max(abs(low), abs(high))
+    candidates = [low + beside, high - beside, low, middle, high]
     if np.isfinite(values).all():
         terms = chebyshev.chebfit(nodes, values, PEAK_NODES - 1)
         if np.abs(terms[-2:]).max() <= MAX_TAIL * np.abs(terms).max():

@@ -30,10 +30,10 @@ from gqm_sym.runtime.sweep.curve_table import (
 FAR, NEAR, LOAD = 1, 2, 4
 
 # A row: as `curve_table` has it for one part; then an upper bound of the potential on the panel above the reference,
-# infinite where ds may vanish; a better one; and whether the potential rises (1) or falls (-1) throughout, 0 if neither
-# is certain.
-HIGHEST, TOP, SLOPE_SIGN = range(LOAD_SAMPLES + SAMPLES, LOAD_SAMPLES + SAMPLES + 3)
-ROW = SLOPE_SIGN + 1
+# infinite where ds may vanish; a better one; whether the potential rises (1) or falls (-1) throughout, 0 if neither is
+# certain; and whether it is certain that it is convex (1).
+HIGHEST, TOP, SLOPE_SIGN, CONVEX = range(LOAD_SAMPLES + SAMPLES, LOAD_SAMPLES + SAMPLES + 4)
+ROW = CONVEX + 1
 
 
 @Inner
@@ -68,9 +68,13 @@ def fill_near(curve, k):  # type: ignore[no-untyped-def]
     parts, row, count = curve.table.parts[k], curve.rows[k], curve.table.potentials
     fill_sums(parts[LEFT_TERMS:], POTENTIAL_ROW, curve.factors[:count], row[LEFT_TERMS:POTENTIAL_ROW])
     change, slope, spread = NODES * fabs(row[LEFT_TERMS + NODES - 1]), row[LEFT_TERMS] + row[LEFT_TERMS + 1], 0.0
+    bend = 2.0 * (row[LEFT_TERMS + 1] + row[LEFT_TERMS + 2]) - (NODES - 1) * change
     for j in range(1, NODES):
-        change += j * fabs(row[LEFT_TERMS + j] + row[LEFT_TERMS + j - 1]) if j > 1 else 0.0
+        term = fabs(row[LEFT_TERMS + j] + row[LEFT_TERMS + j - 1])
+        change += j * term if j > 1 else 0.0
+        bend -= j * (j - 1) * term if j > 2 else 0.0
         spread += fabs(row[SERIES + j])
+    row[CONVEX] = 1.0 if bend > 0.0 else 0.0
     row[SLOPE_SIGN], top = 0.0, row[MIDDLE] + spread
     if fabs(slope) > change:
         row[SLOPE_SIGN], top = 1.0 if slope > 0.0 else -1.0, max(row[INCREASE], 0.0)

@@ -34,13 +34,14 @@ from gqm_sym.runtime.sweep.curve_table import (
     POINTS,
     POTENTIAL,
     REACH,
+    SPREAD,
     WEIGHTS,
     difference_on,
     potential_on,
     value_on,
 )
 from gqm_sym.runtime.sweep.orbit import Orbit
-from gqm_sym.runtime.sweep.panel_forces import FAR, HIGHEST, NEAR, SLOPE_SIGN, TOP, prepare
+from gqm_sym.runtime.sweep.panel_forces import CONVEX, FAR, HIGHEST, NEAR, SLOPE_SIGN, TOP, prepare
 
 # By how much V**2 at the middle of a panel must exceed what the panel's rule needs.
 SAFETY = 1.05
@@ -54,6 +55,10 @@ MAX_ERROR_RATIO, NOISE_RATIO = 2e-16, 2e-15
 
 # How near to an equilibrium a turning point may lie, as a share of the panel, for doubles to decide that it is one.
 MAX_ZERO_ERROR = 1e-6
+
+# The slope of the potential at a launch from rest, as a share of what it spreads over on the panel, above which the
+# body certainly falls.
+MIN_SLOPE_SHARE = 1e-6
 
 few_rates, rates_buffer, angle_buffer = on_stack(FEW_NODES), on_stack(NODES), on_stack(NODES)
 
@@ -164,6 +169,8 @@ def turn_from(curve, start, x, w0, direction):  # type: ignore[no-untyped-def]
             prepare(curve, k, NEAR)
         if may_turn and not rows[k, TOP] < energy - error:
             sign, slack = rows[k, SLOPE_SIGN] * direction, energy - rows[k, BASE]
+            if sign == 0.0 and rows[k, CONVEX] == 1.0:
+                sign = 1.0  # where a convex potential reaches a level that it was below, it rises
             if sign == 0.0 or not rows[k, TOP] < np.inf:
                 return CRITICAL, index, x
             if sign > 0.0:
@@ -182,6 +189,16 @@ def turn_from(curve, start, x, w0, direction):  # type: ignore[no-untyped-def]
             break
         k = index % count
     return LIMIT, index, float(direction)
+
+
+@Inner
+def downhill(curve, k, x):  # type: ignore[no-untyped-def]
+    """The direction in which a body released at a place of panel k falls; 0 next to an equilibrium."""
+    prepare(curve, k, FAR | NEAR)
+    sign, slope = curve.rows[k, SLOPE_SIGN], difference_on(curve.rows, k, x, x)
+    if sign == 0.0 and fabs(slope) > MIN_SLOPE_SHARE * curve.rows[k, SPREAD]:
+        sign = 1.0 if slope > 0.0 else -1.0
+    return -int(sign)
 
 
 @Inner
@@ -222,8 +239,7 @@ def find_passage(curve, lam0, v0, direction):  # type: ignore[no-untyped-def]
         return none
     start, x = locate(table, curve.period, lam0)
     if w0 == 0.0:
-        prepare(curve, start % count, FAR | NEAR)
-        direction = -int(curve.rows[start % count, SLOPE_SIGN])
+        direction = downhill(curve, start % count, x)
         if direction == 0 or fabs(x) == 1.0:
             return none
     ahead, front, front_x = turn_from(curve, start, x, w0, direction)
@@ -247,6 +263,8 @@ def find_passage(curve, lam0, v0, direction):  # type: ignore[no-untyped-def]
         else:
             leaves, back, back_x = -direction, 0 if direction > 0 else last, float(-direction)
             other, v2 = end_ahead(curve, lam0, w0, -direction)
+    if leaves == 0 and (curve.rows[front % count, SLOPE_SIGN] == 0.0 or curve.rows[back % count, SLOPE_SIGN] == 0.0):
+        return none  # a swing about the lowest place of a panel has more digits without the table
     last_end = ahead if leaves == direction else behind
     if leaves != 0 and not (last_end == LIMIT and v2 > 0.0 and curve.period == 0.0):
         return none

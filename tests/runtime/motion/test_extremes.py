@@ -104,3 +104,13 @@ def test_into_the_centre_of_a_spiral(tmp_path: Path) -> None:
     states = motion.state(np.linspace(0.0, motion.t_end * (1.0 - 1e-9), 20_001))
     assert motion.v_max.value == pytest.approx(np.abs(states.v).max(), rel=1e-6)
     assert motion.v_max.value >= np.abs(states.v).max()
+
+
+def test_a_load_that_jumps_at_a_joint(tmp_path: Path) -> None:
+    """Down a wall and round a quarter of a circle to the floor: N is largest where the circle ends, on its side."""
+    pieces = [gqm.line(length=1), gqm.arc(radius=3, angle="pi/2"), gqm.line(length=4)]
+    curve = gqm.Curve.piecewise(pieces, start=(0, 0), heading="-pi/2")
+    motion = gqm.build(gqm.derive(curve, gqm.Gravity()), name="wall_peak", folder=tmp_path).solve("0.2")
+    peak = motion.normal_force_max
+    assert peak.value == pytest.approx(9.81 * (1 + 2 * 3.8 / 3), rel=1e-13)
+    assert peak.lam == pytest.approx(1 + 1.5 * pi, rel=1e-12)

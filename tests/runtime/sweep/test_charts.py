@@ -112,6 +112,13 @@ def test_bodies_that_run_off_the_end(tmp_path: Path) -> None:
     }
     assert all(one.route_counts() == {"single": count} for one in swept.values())
     assert set(swept["half_period"].status) == {2}
+    low = module.sweep("t_end", 1 + 1.5 * np.pi * np.array([0.6, 0.9, 0.99]))  # the arc's slope vanishes where it ends
+    assert low.route_counts() == {"single": 3}
+    for value, share in zip(low.values, (0.6, 0.9, 0.99), strict=True):
+        angle = mp.pi / 2 * (1 - mpf(share))
+        k = mp.sin(angle / 2)
+        truth = mp.sqrt(3 / G) * mp.ellipk(k**2) + 4 / (2 * k * mp.sqrt(3 * G))
+        assert float(value) == pytest.approx(float(truth), rel=4e-15)
     over = 0
     for k in range(count):
         s, v, a = mpf(place[k]), mpf(speed[k]), mpf(g[k])
