@@ -126,6 +126,9 @@ def _compiled(intrinsic: Any) -> Callable[..., Any]:
         lambda a, b, c: f(a, b, c),
         lambda a, b, c, d: f(a, b, c, d),
         lambda a, b, c, d, e: f(a, b, c, d, e),
+        lambda a, b, c, d, e, g: f(a, b, c, d, e, g),
+        lambda a, b, c, d, e, g, h: f(a, b, c, d, e, g, h),
+        lambda a, b, c, d, e, g, h, k: f(a, b, c, d, e, g, h, k),
     )
     count = len(signature(intrinsic._defn).parameters) - 1  # but for the typing context
     dispatcher = CPUDispatcher(forms[count - 1], targetoptions={"nopython": True})
