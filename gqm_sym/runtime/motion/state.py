@@ -14,9 +14,10 @@ MAX_ROWS_SHOWN = 10
 class State(dict[str, Any]):
     """The state of the body at given times.
 
-    Each field is a float if one time was given, else an array of the shape of the times. Fields are read by name, as in
-    ``state.lam`` or ``state["lam"]``, and by position, as from a named tuple: ``t, lam, *rest = state``. From a mapping
-    pandas makes columns, so ``pandas.DataFrame(state)`` has one for each.
+    Each field is a float if one time was given, else an array of the shape of the times. A state is used as a named
+    tuple: fields are read by name, by position and by unpacking (``t, lam, *rest = state``), states are compared with
+    each other and with tuples, and none can be changed. Its base class is a dictionary because pandas makes columns of
+    dictionaries only: ``pandas.DataFrame(state)`` has a column for each field.
 
     Attributes
     ----------
@@ -57,6 +58,19 @@ class State(dict[str, Any]):
 
     def __iter__(self) -> Any:
         return iter(self.values())
+
+    def __eq__(self, other: object) -> bool:
+        values = tuple(other.values()) if isinstance(other, State) else other
+        return tuple(self.values()) == values
+
+    def __hash__(self) -> int:  # type: ignore[override]
+        return hash(tuple(self.values()))
+
+    def _refuse_change(self, *args: Any, **kwargs: Any) -> Any:
+        raise TypeError("a state cannot be changed; state._replace(lam=...) makes another one")
+
+    __setitem__ = __delitem__ = __ior__ = _refuse_change
+    clear = pop = popitem = setdefault = update = _refuse_change
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> Array:
         return np.array(tuple(self.values()), dtype=dtype)

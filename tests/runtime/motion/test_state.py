@@ -187,6 +187,25 @@ def test_a_state_is_read_by_name_by_position_and_as_a_table(swing: ModuleType, d
             state.place  # noqa: B018
 
 
+def test_states_are_compared_and_cannot_be_changed(swing: ModuleType) -> None:
+    """As named tuples."""
+    state = swing.solve(1).state(0.5)
+    twin = swing.solve(1).state(0.5)
+    assert state == twin == tuple(state)
+    assert len({state, twin}) == 1
+    assert state != swing.solve(1).state(0.25)
+    assert state != twin._replace(lam=0.0)
+    for change in (
+        lambda: state.update(lam=0.0),
+        lambda: state.__setitem__("lam", 0.0),
+        lambda: state.pop("lam"),
+        state.clear,
+    ):
+        with pytest.raises(TypeError, match=r"a state cannot be changed; state\._replace"):
+            change()
+    assert state == twin
+
+
 def test_one_number_gives_numbers_and_one_element_an_array(swing: ModuleType, dragged: ModuleType) -> None:
     """Whatever holds them, for every kind of motion."""
     for motion in (swing.solve(1), swing.solve(0), swing.solve(0, 20), dragged.solve(1)):
