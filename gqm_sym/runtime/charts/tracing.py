@@ -26,7 +26,7 @@ from gqm_sym.runtime.charts.true_pieces import NODES as NODES_OF_PIECES
 from gqm_sym.runtime.compiled.jit import Inner, entry
 from gqm_sym.runtime.compiled.types import INTEGER, MATRIX, VECTOR, Array
 from gqm_sym.runtime.double_double.arithmetic import UNIT, add, multiply, product
-from gqm_sym.runtime.double_double.interpreter import ERROR, INTERPRETER, LOW, ROW, call_interpreter
+from gqm_sym.runtime.double_double.interpreter import ERROR, LOW, ROW, call_interpreter
 from gqm_sym.runtime.double_double.orbit_time import TAPE, fill_parameters
 from gqm_sym.runtime.double_double.recording import bind, record_in_plane
 from gqm_sym.runtime.multiprecision.exact_problem import two_doubles
@@ -167,8 +167,7 @@ class Traced:
         context = MPContext()
         context.dps = DIGITS
         x, z = Zeros(self, context, tuple(number.at(context) for number in p)).start
-        tape, work, values = formulas
-        given = chart.block, (INTERPRETER.address, *tape), work, values, sample_places()
+        given = chart.block, *formulas.operands, sample_places()
         count = chart.edges.size - 1
 
         def sample(k: int) -> Samples:

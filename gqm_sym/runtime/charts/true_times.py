@@ -39,7 +39,7 @@ from gqm_sym.runtime.compiled.jit import Inner, entry
 from gqm_sym.runtime.compiled.registers import on_stack, uncounted
 from gqm_sym.runtime.compiled.types import INTEGER, MATRIX, REAL, VECTOR, Array
 from gqm_sym.runtime.double_double.arithmetic import UNIT, add, divide, multiply, sine_and_cosine, square_root
-from gqm_sym.runtime.double_double.interpreter import ERROR, INTERPRETER, LOW, ROW, call_interpreter
+from gqm_sym.runtime.double_double.interpreter import ERROR, LOW, ROW, call_interpreter
 from gqm_sym.runtime.double_double.nodes import RULE
 from gqm_sym.runtime.double_double.orbit_time import MAX_ERROR, TAPE, Bounded, Orbit, fill_parameters
 from gqm_sym.runtime.double_double.recording import BoundTape
@@ -464,8 +464,7 @@ class ChartPassage:
 
     def __init__(self, pieces: TruePieces, formulas: BoundTape, found: Array, direction: int) -> None:
         self._pieces, self._found, self._direction = pieces, found, direction
-        tape, work, p = formulas
-        self._given = pieces.curve, (INTERPRETER.address, *tape), work, p, found
+        self._given = pieces.curve, *formulas.operands, found
 
     def _times(self, stops: Array, middle: int) -> Array:
         """The times to stops, with errors (`fill_passage`)."""

@@ -24,7 +24,7 @@ from gqm_sym.runtime.double_double.arithmetic import (
     sine_and_cosine,
     square_root,
 )
-from gqm_sym.runtime.double_double.interpreter import BLOCK, ERROR, INTERPRETER, LOW, ROW, call_interpreter
+from gqm_sym.runtime.double_double.interpreter import BLOCK, ERROR, LOW, ROW, call_interpreter
 from gqm_sym.runtime.double_double.nodes import LEVELS, RULE, panel_rule, trapezoidal_nodes
 from gqm_sym.runtime.double_double.recording import BoundTape
 from gqm_sym.runtime.quadrature.trapezoid import CIRCULATION, LIBRATION
@@ -437,10 +437,9 @@ def time_orbit(
         rule.
     """
     lam0, v0 = launch
-    tape, work, p = formulas
     kind, by_panels = CIRCULATION if direction else LIBRATION, times.shape[1] > 1
     nodes = trapezoidal_nodes(kind)[:, :0] if by_panels else trapezoidal_nodes(kind)
-    given = (INTERPRETER.address, *tape), work, p, (lam0.value, lam0.low, v0.value, v0.low)
+    given = *formulas.operands, (lam0.value, lam0.low, v0.value, v0.low)
     *found, orbit = orbit_time(*given, (-offsets[0], offsets[1]), direction, np.ascontiguousarray(nodes))
     duration, low, high = map(Bounded._make, found)
     if times.size:

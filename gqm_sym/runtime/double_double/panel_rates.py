@@ -11,7 +11,7 @@ from gqm_sym.runtime.compiled.jit import entry
 from gqm_sym.runtime.compiled.registers import uncounted
 from gqm_sym.runtime.compiled.types import INTEGER, MATRIX, REAL, VECTOR, Array
 from gqm_sym.runtime.double_double.arithmetic import UNIT, add, multiply, sine_and_cosine
-from gqm_sym.runtime.double_double.interpreter import ERROR, INTERPRETER, LOW, ROW, call_interpreter
+from gqm_sym.runtime.double_double.interpreter import ERROR, LOW, ROW, call_interpreter
 from gqm_sym.runtime.double_double.orbit_time import (
     ENDS,
     TAPE,
@@ -113,7 +113,6 @@ def panel_rates(
         At most as many nodes between -1 and 1 as are evaluated together (`interpreter.BLOCK`).
     """
     lam0, v0 = launch
-    tape, work, p = formulas
-    given: Any = (INTERPRETER.address, *tape), work, p, (lam0.value, lam0.low, v0.value, v0.low)
+    given: Any = *formulas.operands, (lam0.value, lam0.low, v0.value, v0.low)
     out = np.empty((2, nodes.size))
     return out if fill_rates(*given, kind, panel, nodes, out) else None

@@ -72,6 +72,11 @@ class BoundTape(NamedTuple):
     work: Array
     parameters: Array
 
+    @property
+    def operands(self) -> tuple[Any, ...]:
+        """What compiled code takes: the tape with the interpreter's address, the work space, the parameters."""
+        return (interpreter.INTERPRETER.address, *self.tape), self.work, self.parameters
+
 
 Recorded = tuple[Tape, Array]
 """A tape, and registers with its constants."""
