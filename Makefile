@@ -5,6 +5,9 @@ WORKERS ?= 2
 VENV    := .venv
 BIN     := $(VENV)/bin
 
+# Machine code is kept in one folder, where modules with the same functions share it.
+export NUMBA_CACHE_DIR ?= $(CURDIR)/$(VENV)/machine_code
+
 .DEFAULT_GOAL := help
 .PHONY: help demo test lint types current site generate docs soak fuzz bench coverage mutate
 

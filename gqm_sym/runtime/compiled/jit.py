@@ -4,21 +4,24 @@ No fast-math: reassociation would break sums and products of two doubles, and Na
 Division by zero gives infinity, as in IEEE arithmetic, and is not an exception.
 """
 
+import builtins
 import hashlib
 import sys
 import threading
 import time
 from collections.abc import Callable
 from functools import wraps
+from itertools import takewhile
 from pathlib import Path
 from types import ModuleType
 from typing import Any
+from weakref import WeakValueDictionary
 
 from numba import types
 from numba.extending import typeof_impl
 
 from gqm_sym.errors import OutdatedModuleError
-from gqm_sym.runtime.compiled.numba_internals import Compiler
+from gqm_sym.runtime.compiled.numba_internals import GENERATED, Compiler
 from gqm_sym.runtime.compiled.stamps import RUNTIME, Stamps
 from gqm_sym.runtime.interface import INTERFACE
 
@@ -171,12 +174,36 @@ class Later:
         return address
 
 
+# The compiled functions of generated modules that are in use, by their text: modules with the same function share it.
+_IN_USE: WeakValueDictionary[str, Any] = WeakValueDictionary()
+
+# Where a function of a generated module finds what other functions of the runtime's stamp are made of.
+_KNOWN = ("gqm_sym.runtime.", "numba.", "math.", "builtins.")
+
+
+def _is_known(function: Any, name: str) -> bool:
+    """Whether a function uses a name for what the stamp of its code knows, or what never changes."""
+    found = vars(builtins).get(name, function.__globals__.get(name))
+    home = getattr(getattr(found, "py_func", found), "__module__", None)
+    return isinstance(home, str) and f"{home}.".startswith(_KNOWN)
+
+
+def _text(function: Any, lines: list[str]) -> list[str]:
+    """The lines of a function with its decorators; all lines if the function uses anything else of the module."""
+    if not all(_is_known(function, name) for name in function.__code__.co_names):
+        return lines
+    begin = function.__code__.co_firstlineno - 1
+    head = list(takewhile(lambda line: line.startswith(("@", "def ")), lines[begin:]))
+    body = takewhile(lambda line: not line or line[0] in " )", lines[begin + len(head) :])
+    return [*head, *body]
+
+
 def compiler(file: str, *, interface: int) -> Callable[..., Callable[[Any], Any]]:
     """Return a decorator factory for the functions of one generated module: ``compiled(signature, later=False)``.
 
     numba's disk cache stores the name of a function's module, imports it on loading, and distinguishes machine code by
-    it. A generated module may be imported under any name, from any folder: so numba sees its functions under a name
-    that is made from the module's own text.
+    it. A generated module may be imported under any name, from any folder: so numba sees each function under a name
+    that is made from the function's own text. What else changes in the module compiles nothing anew.
 
     Parameters
     ----------
@@ -195,18 +222,25 @@ def compiler(file: str, *, interface: int) -> Callable[..., Callable[[Any], Any]
             f"{file}: made for interface {interface} of the runtime, which is now at {INTERFACE}; "
             "run gqm-gen on its declaration again"
         )
-    digest = hashlib.sha256(Path(file).read_bytes()).hexdigest()[:16]
-    alias = f"gqm_sym_generated_{digest}"
-    sys.modules.setdefault(alias, ModuleType(alias))
+    lines = Path(file).read_text(encoding="utf-8").splitlines()
 
     def compiled(signature: Any, *, later: bool = False) -> Callable[[Any], Any]:
-        def compile_it(function: Any) -> Any:
-            function.__module__ = alias
-            try:
-                return COMPILER.callback(function, signature)
-            finally:
-                ANNOUNCER.end()
+        def compile_it(function: Any, alias: str) -> Any:
+            found = _IN_USE.get(alias)
+            if found is None:
+                sys.modules.setdefault(alias, ModuleType(alias))
+                function.__module__ = alias
+                try:
+                    found = _IN_USE[alias] = COMPILER.callback(function, signature)
+                finally:
+                    ANNOUNCER.end()
+            return found
 
-        return (lambda function: Later(lambda: compile_it(function))) if later else compile_it
+        def decorate(function: Any) -> Any:
+            text = "\n".join((function.__name__, *_text(function, lines)))
+            alias = GENERATED + hashlib.sha256(text.encode()).hexdigest()[:16]
+            return Later(lambda: compile_it(function, alias)) if later else compile_it(function, alias)
+
+        return decorate
 
     return compiled

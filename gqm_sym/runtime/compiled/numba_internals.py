@@ -86,6 +86,9 @@ HAS_LIBRARIES = (
     and _has(Pipeline, "define_pipelines", "compile_extra")
 )
 
+# Numba sees a function of a generated module in a module of this name, followed by a digest of the function's text.
+GENERATED = "gqm_sym_generated_"
+
 # numba.config is one for the whole process; it is changed while a function is made whose code numba itself caches.
 _CONFIG = RLock()
 
@@ -240,6 +243,7 @@ class KeyedFiles(IndexDataCacheFile):  # type: ignore[misc]
 
     def save(self, key: Any, data: Any) -> None:
         """Store compiled code under its key."""
+        Path(self._cache_path).mkdir(parents=True, exist_ok=True)
         self._save_data(self.file_name(key), (self._stamp, key, data))
 
     def load(self, key: Any) -> Any:
@@ -258,8 +262,10 @@ class KeyedCache(FunctionCache):  # type: ignore[misc]
     The preparation imports and registers everything that compiling may need (SciPy's linear algebra as well) and takes
     0.4 s; code from the cache needs none of it. numba itself notices changes of a function's own
     file only, but compiled code contains functions of several files: the key holds ``stamp``, the digest of the files
-    that it may come from (`stamps`), and the module's name, which for generated modules is made from their text
-    (`jit.compiler`). A file that cannot be read is compiled again, and a file that cannot be written is left out.
+    that it may come from (`stamps`), and the name of the function's module. For a function of a generated module that
+    name is made from its text (`jit.compiler`), which alone tells it apart: where all machine code is in one folder
+    (``NUMBA_CACHE_DIR``), modules with the same function share it. A file that cannot be read is compiled again, and a
+    file that cannot be written is left out.
 
     Parameters
     ----------
@@ -275,8 +281,12 @@ class KeyedCache(FunctionCache):  # type: ignore[misc]
 
     def __init__(self, function: Any, stamp: str, on_miss: Callable[[Any], None], *, linked: bool) -> None:
         super().__init__(function)
+        folder, base = self.cache_path, self._impl.filename_base
         source_stamp = self._impl.locator.get_source_stamp()
-        self._cache_file: Any = KeyedFiles(self.cache_path, self._impl.filename_base, source_stamp)
+        if function.__module__.startswith(GENERATED):
+            folder = str(Path(numba.config.CACHE_DIR, "gqm_sym_generated")) if numba.config.CACHE_DIR else folder
+            base, source_stamp = function.__name__, ""
+        self._cache_file: Any = KeyedFiles(folder, base, source_stamp)
         self._function, self._stamp, self._on_miss, self._linked = function, stamp, on_miss, linked
 
     def _index_key(self, sig: Any, codegen: Any) -> Any:
