@@ -229,7 +229,7 @@ def test_closed_form_is_the_integral(row: Row) -> None:
         truth = row.truth()
         for v, nu in row.signs:
             launch = {model.lam0: sp.Rational(row.ends[0]), model.v0: sp.Rational(7, 2), direction: v, contact: nu}
-            form = sp.lambdify(model.parameter, model.speed_squared.xreplace(exact | launch), "mpmath")
+            form = sp.lambdify(model.parameter, model.speed_squared.xreplace(exact | launch), "mpmath", cse=True)
             start, end = (mpf(text) for text in row.ends)
             assert abs(form(start) - mpf("12.25")) < AGREED
             total = mp.quad(lambda lam, f=form, v=v, nu=nu: truth.rate(lam, f(lam), v, nu), mp.linspace(start, end, 3))
