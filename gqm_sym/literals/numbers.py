@@ -19,7 +19,7 @@ from gqm_sym.literals.angles import enclose_angle
 from gqm_sym.literals.enclosures import Interval, enclose
 from gqm_sym.literals.grammar import parse
 from gqm_sym.literals.sympy_tree import is_sympy, tree_of
-from gqm_sym.literals.units import is_quantity, scale_of, split_unit, unit_of_quantity
+from gqm_sym.literals.units import Unit, is_quantity, scale_of, split_unit, unit_of_quantity
 
 if TYPE_CHECKING:
     from decimal import Decimal
@@ -102,6 +102,9 @@ class Number:
 
     def __repr__(self) -> str:
         return f"Number({self.text!r})"
+
+    def __str__(self) -> str:
+        return self.text
 
     def __eq__(self, other: object) -> bool:
         """Compare exact values; irrational numbers are compared by their first 32 digits."""
@@ -194,23 +197,32 @@ def _read_text(text: str, where: str, unit: str | None) -> Number:
         if measured is None:
             raise
         scale = scale_of(measured[2], unit, where=where)
-        text = f"({measured[0]})*({scale.factor})*pi**({scale.turns})"
-        tree = parse(text, where=where)
+        return _scaled(_read_text(measured[0], where, None), scale, where)
     return _from_tree(tree, text.strip(), where)
 
 
 def _of_quantity(value: Any, where: str, unit: str | None) -> Number:
     """The number of SI units that a quantity is."""
     scale = scale_of(unit_of_quantity(value), unit, where=where)
-    number = read_number(value.magnitude, where=where)
+    return _scaled(read_number(value.magnitude, where=where), scale, where)
+
+
+def _scaled(number: Number, scale: Unit, where: str) -> Number:
+    """The number of SI units that a number of other units is; its text is what a person would write."""
     if scale.is_si:
         return number
+    power = {0: "", 1: "*pi"}.get(scale.turns, f"*pi**({scale.turns})")
     if number.fraction is None:
-        return _read_text(f"({number.text})*({scale.factor})*pi**({scale.turns})", where, None)
+        return _read_text(f"({number.text})*({scale.factor}){power}", where, None)
     exact = number.fraction * scale.factor
-    if scale.turns == 0:
-        return _from_fraction(exact, str(exact), where)
-    return _read_text(f"{exact.numerator}*pi**({scale.turns})/{exact.denominator}", where, None)
+    if not power:
+        value = repr(_split(exact, where)[0])
+        return _from_fraction(exact, value if Fraction(value) == exact else str(exact), where)
+    if abs(exact.numerator) == 1 and scale.turns == 1:
+        power = "pi" if exact.numerator > 0 else "-pi"
+    else:
+        power = f"{exact.numerator}{power}"
+    return _read_text(power if exact.denominator == 1 else f"{power}/{exact.denominator}", where, None)
 
 
 def _of_quantities(values: Any, where: str, unit: str | None) -> tuple[Doubles, Doubles, tuple[int, ...]]:

@@ -51,6 +51,28 @@ def test_degrees(given: object) -> None:
         assert abs(number.at(mp) - mp.pi / 6) < mp.mpf(10) ** -48
 
 
+@pytest.mark.parametrize(
+    ("given", "unit", "text"),
+    [
+        ("50 cm", "m", "0.5"),
+        ("-60 deg", "1", "-pi/3"),
+        (180 * u.deg, "1", "pi"),
+        (210 * u.deg, "1", "7*pi/6"),
+        ("720 deg", "1", "4*pi"),
+        ("1/3 cm", "m", "1/300"),
+        ("3 m/s", "m/s", "3"),
+        ("sqrt(2) cm", "m", "(sqrt(2))*(1/100)"),
+        ("2 rpm", "1/s", "pi/15"),
+    ],
+)
+def test_numbers_are_shown_as_a_person_would_write_them(given: object, unit: str, text: str) -> None:
+    """In SI units; what is shown is the same number."""
+    number = read_number(given, where="it", unit=unit)
+    assert number.text == str(number) == text
+    again = read_number(text, where="it")
+    assert (again.value, again.low) == (number.value, number.low)
+
+
 def test_arrays_are_converted_at_once() -> None:
     """To two doubles each; shapes are kept, and lists of quantities are read one by one."""
     high, low, shape = read_numbers(np.array([[10.0, 20.0], [30.0, 45.0]]) * u.deg, where="t", unit="1")
