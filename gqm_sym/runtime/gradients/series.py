@@ -38,14 +38,27 @@ class Series:
 
     def __call__(self, share: Array) -> tuple[Array, Array]:
         """The values at shares, and the integrals from 0 to there: a row for each function."""
+        count = self._order.size
         found = np.empty((2, self._terms.shape[0], share.size))
-        factor = np.divide(
-            1.0, 2j * np.pi * self._order, where=self._order > 0, out=np.zeros(self._order.size, complex)
-        )
+        factor = np.divide(1.0, 2j * np.pi * self._order, where=self._order > 0, out=np.zeros(count, complex))
+        values, integrals = (np.hstack([terms.real, -terms.imag]) for terms in (self._terms, self._terms * factor))
         for start in range(0, share.size, BLOCK):
             part = slice(start, start + BLOCK)
-            waves = np.exp(2j * np.pi * np.outer(self._order, share[part]))
-            found[0, :, part] = (self._terms @ waves).real
-            rising = self._terms[:, :1].real * share[part]
-            found[1, :, part] = rising + ((self._terms * factor) @ (waves - 1.0)).real
+            powers = _powers(np.exp(2j * np.pi * share[part]), count)
+            waves = np.vstack([powers.real, powers.imag])
+            found[0, :, part] = values @ waves
+            waves[:count] -= 1.0
+            found[1, :, part] = self._terms[:, :1].real * share[part] + integrals @ waves
         return found[0], found[1]
+
+
+def _powers(bases: Array, count: int) -> Array:
+    """The powers 0 to count - 1 of complex numbers, a row for each; rounding grows with the logarithm of the power."""
+    powers = np.ones((count, bases.size), dtype=complex)
+    powers[1:2] = bases
+    done = 2
+    while done < count:
+        more = min(done, count - done)
+        powers[done : done + more] = powers[:more] * (powers[done - 1] * bases)
+        done += more
+    return powers
