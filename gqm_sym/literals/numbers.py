@@ -170,13 +170,22 @@ def read_number(value: Source, *, where: str, unit: str | None = None) -> Number
     raise NumberError(f"{where}: {type(value).__name__} given; give a number, or text such as '9.81' or 'pi/2'")
 
 
+def flat_doubles(array: Doubles) -> Doubles:
+    """The elements of an array of doubles as compiled code takes them: in one aligned piece that can be written.
+
+    Columns of a DataFrame and arrays made by broadcasting often cannot be written.
+    """
+    flat = np.ascontiguousarray(array).reshape(-1)
+    return flat if flat.flags.writeable and flat.flags.aligned else flat.copy()
+
+
 def read_numbers(values: Any, *, where: str, unit: str | None = None) -> tuple[Doubles, Doubles, tuple[int, ...]]:
     """Read a number or an array of numbers into a flat array of doubles, one of remainders, and the shape.
 
     The arguments are those of `read_number`.
     """
     if isinstance(values, np.ndarray) and values.dtype == np.float64:
-        flat = np.ascontiguousarray(values).reshape(-1)
+        flat = flat_doubles(values)
         return flat, np.zeros_like(flat), values.shape
     if is_quantity(values) and np.ndim(values.magnitude):
         return _of_quantities(values, where, unit)

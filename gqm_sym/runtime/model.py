@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from gqm_sym.arguments import unknown_argument
 from gqm_sym.errors import ArgumentError, SolutionError
-from gqm_sym.literals.numbers import read_numbers, without_unit
+from gqm_sym.literals.numbers import flat_doubles, read_numbers, without_unit
 from gqm_sym.loading import load_text
 from gqm_sym.runtime.compiled.streaming import LARGE
 from gqm_sym.runtime.compiled.threads import run_in_threads
@@ -116,8 +116,7 @@ class CompiledModel(Formulas):
         launch = read_launch(self, p, request)
         f = bind(self, p, launch)
         if isinstance(lam, np.ndarray) and lam.dtype == np.float64:
-            aligned = lam if lam.flags.aligned else lam.copy()
-            places, low_parts, shape = np.ascontiguousarray(aligned).reshape(-1), NO_LOW_PARTS, lam.shape
+            places, low_parts, shape = flat_doubles(lam), NO_LOW_PARTS, lam.shape
         else:
             places, low_parts, shape = read_numbers(lam, where=self.parameter, unit=self.units.get(self.parameter))
             low_parts = low_parts if low_parts.any() else NO_LOW_PARTS

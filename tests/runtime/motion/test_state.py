@@ -217,3 +217,30 @@ def test_one_number_gives_numbers_and_one_element_an_array(swing: ModuleType, dr
                 assert ask(few).shape == (1,)
             assert ask(np.array([[0.25]])).shape == (1, 1)
             assert ask([]).shape == (0,)
+
+
+def test_any_array_of_numbers_is_taken(swing: ModuleType, dragged: ModuleType) -> None:
+    """Arrays that cannot be written, as pandas and broadcasting give them; strided, turned, of other types."""
+    plain = np.linspace(0.125, 1.0, 8)
+    frozen = plain.copy()
+    frozen.setflags(write=False)
+    unaligned = np.frombuffer(b"\0" + plain.tobytes(), dtype=np.uint8)[1:].view(np.float64)
+    assert not unaligned.flags.aligned
+    kinds = (frozen, pd.Series(plain).to_numpy(), np.repeat(plain, 2)[::2], plain.astype(">f8"), unaligned)
+    for module in (swing, dragged):
+        motion = module.solve(1)
+        for t in (*kinds, plain.astype(np.float32), np.broadcast_to(0.5, (8,)), np.asfortranarray(plain.reshape(2, 4))):
+            expected = motion.state(np.array(t, dtype=np.float64))
+            state = motion.state(t)
+            assert state.lam.shape == t.shape
+            for answer in (motion.lam(t), state.lam):  # some are read one by one, and differ in the last place
+                assert (np.abs(answer - expected.lam) <= expected.error).all()
+            assert motion.error_bound(t) == pytest.approx(expected.error, rel=1e-2)
+            assert motion.energy(t).kinetic == pytest.approx(0.5 * expected.v2, rel=1e-13)
+        for places in kinds:
+            assert np.array_equal(module.pass1(places, lam0=1).v2, module.pass1(plain, lam0=1).v2)
+            swept = module.sweep("v_max", places, t_max=3).values
+            assert np.array_equal(swept, module.sweep("v_max", plain, t_max=3).values)
+            assert (swept > 0.0).all()
+    for t in kinds:
+        assert swing.solve(1).sensitivity(t).lam == pytest.approx(swing.solve(1).sensitivity(plain).lam, rel=1e-13)
