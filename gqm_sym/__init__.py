@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from gqm_sym.design.least_speed import least_speed
     from gqm_sym.emission import emit
     from gqm_sym.errors import GQMError
+    from gqm_sym.fitting.fit import fit
     from gqm_sym.kernels import (
         CentralForce,
         CoulombFriction,
@@ -50,6 +51,7 @@ _HOMES = {
     "emit": "gqm_sym.emission",
     "families": "gqm_sym.declare",
     "figures": "gqm_sym.figures",
+    "fit": "gqm_sym.fitting.fit",
     "least_speed": "gqm_sym.design.least_speed",
     "line": "gqm_sym.declare",
     "read_spec": "gqm_sym.specfile",
@@ -76,6 +78,7 @@ __all__ = [
     "emit",
     "families",
     "figures",
+    "fit",
     "least_speed",
     "line",
     "read_spec",

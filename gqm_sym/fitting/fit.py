@@ -1,0 +1,340 @@
+"""Launches and run-time parameters fitted to measurements by least squares, with the exact derivatives of motions."""
+
+from collections.abc import Mapping
+from math import inf, isfinite, nan
+from types import ModuleType
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from gqm_sym.arguments import short, unknown_argument
+from gqm_sym.errors import GQMError, InputError, SolutionError
+from gqm_sym.fitting.data import Measurements, read_measurements
+from gqm_sym.fitting.result import Fit
+from gqm_sym.literals.numbers import read_number
+from gqm_sym.runtime.compiled.types import Array
+from gqm_sym.runtime.model import CompiledModel
+
+# The step of a difference quotient, of the size of the parameter, where a motion has no gradients.
+STEP = 1e-6
+
+# Directions in which a change of the parameters changes the measurements less than this, relative to the direction in
+# which it changes them most, cannot be told from the data. The second holds for difference quotients.
+RANK_TOLERANCE, RANK_TOLERANCE_OF_DIFFERENCES = 1e-9, 1e-6
+
+# Motions that lose energy are followed this much further than the last passage that is looked for.
+AMPLE = 1.5
+
+# Steps of the solver; from a guess that is near it takes ten.
+MAX_STEPS = 200
+
+# Numbers of a launch that may be free, and those that choose among launches.
+LAUNCH, CHOICES = ("lam0", "v0"), ("direction", "contact", "point")
+
+
+class Free(NamedTuple):
+    """What is to be found: names, first guesses and limits, in the same order."""
+
+    names: tuple[str, ...]
+    start: Array
+    low: Array
+    high: Array
+
+
+def fit(module: ModuleType, data: Any, free: Mapping[str, Any], **fixed: Any) -> Fit:
+    """Fit parameters and launch of a motion to measurements by least squares.
+
+    Parameters
+    ----------
+    module : module
+        A generated module.
+    data : mapping or DataFrame
+        One of: ``t`` in s with one or more of ``lam``, ``s``, ``x``, ``z`` and ``v`` at these times; ``period`` or
+        ``half_period``, with columns of launch arguments or run-time parameters where these differ; or ``passages``,
+        the times of consecutive passages through ``place`` (a value of the curve parameter), the first passage first.
+        And ``sigma``, their standard deviation: a number, a column, or a mapping with one for each quantity.
+    free : mapping
+        What is to be found, run-time parameters, "lam0" or "v0": a first guess, limits ``(low, high)``, all three
+        ``(low, guess, high)``, or None for the value that is given by keyword or the model's default.
+    fixed
+        All else of the launch and the parameters, as for ``module.solve``.
+
+    Returns
+    -------
+    Fit
+        Estimates, standard deviations, covariance, residuals, and what the data cannot tell apart.
+
+    Raises
+    ------
+    InputError
+        If a name is unknown, data are not finite or too few, or limits exclude the first guess.
+    SolutionError
+        If there is no motion at the first guess.
+
+    Notes
+    -----
+    Derivatives are those of ``motion.sensitivity`` and of sweeps with ``gradient``, which are exact to rounding, and
+    difference quotients of solved motions where these are not there yet. Without ``sigma`` all measurements have
+    the same unknown standard deviation, which is estimated from the residuals. First guesses for long series of
+    positions must be so near that the fitted motion does not slip by a swing.
+    """
+    from scipy.optimize import least_squares
+
+    model: CompiledModel = module.MODEL
+    unknown = _free(model, free, fixed)
+    known = [*LAUNCH, *CHOICES, *model.parameters]
+    for name in fixed:
+        if name not in known:
+            raise InputError(unknown_argument("fit", name, known))
+    measured = read_measurements(data, _units(model), model.units.get(model.parameter))
+    for name in measured.columns:
+        if name in unknown.names:
+            raise InputError(f"free: {name} is a column of the data, and so it is known")
+    size = sum(values.size for values in measured.values.values())
+    if size < len(unknown.names):
+        raise InputError(f"data: {size} measurements cannot determine {len(unknown.names)} numbers; free fewer of them")
+    residuals = Residuals(module, measured, unknown, fixed)
+    residuals.predicted(unknown.start)  # a launch that is refused says why
+    found = least_squares(
+        residuals,
+        unknown.start,
+        jac=residuals.jacobian,
+        bounds=(unknown.low, unknown.high),
+        x_scale="jac",
+        xtol=1e-12,
+        ftol=1e-14,
+        gtol=1e-14,
+        max_nfev=MAX_STEPS,
+    )
+    return _result(residuals, np.asarray(found.x), bool(found.success))
+
+
+def _units(model: CompiledModel) -> dict[str, str | None]:
+    """The units of all numbers that may be sought or given."""
+    own = model.units.get(model.parameter)
+    return {"lam0": own, "v0": "m/s", **{name: model.units.get(name) for name in model.parameters}}
+
+
+def _free(model: CompiledModel, free: Mapping[str, Any], fixed: Mapping[str, Any]) -> Free:
+    """Names, first guesses and limits of what is to be found."""
+    if not isinstance(free, Mapping) or not free:
+        raise InputError(f"free: must be a mapping from names to first guesses, as {{'L': 1.2}}, got {short(free)}")
+    names = (*LAUNCH, *model.parameters)
+    rows = []
+    for name, given in free.items():
+        if name not in names:
+            raise InputError(unknown_argument("free", str(name), names))
+        if given is not None and name in fixed:
+            raise InputError(f"free: {name} has a first guess here and a value by keyword; give one of them")
+        parts = list(given) if isinstance(given, tuple | list) else [given]
+        unit = _units(model)[name]
+        numbers = [None if p is None else read_number(p, where=f"free: {name}", unit=unit).value for p in parts]
+        if len(numbers) not in (1, 2, 3) or (len(numbers) > 1 and None in numbers):
+            raise InputError(f"free: {name}: must be a guess, (low, high), (low, guess, high) or None, got {given!r}")
+        low, high = (numbers[0], numbers[-1]) if len(numbers) > 1 else (-inf, inf)
+        start = numbers[len(numbers) // 2] if len(numbers) != 2 else 0.5 * (low + high)  # type: ignore[operator]
+        if start is None:
+            value = fixed.get(name, 0 if name == "v0" else model.parameters.get(name))
+            if value is None:
+                raise InputError(f"free: {name}: has no value to begin with; give a first guess")
+            start = read_number(value, where=name, unit=unit).value
+        if not low < high or not low <= start <= high:  # type: ignore[operator]
+            raise InputError(f"free: {name}: the first guess {start!r} must lie between {low!r} and {high!r}")
+        rows.append((start, low, high))
+    columns = np.array(rows, dtype=np.float64).T
+    return Free(tuple(free), *columns)
+
+
+class Residuals:
+    """The differences between a motion and its measurements, in standard deviations, and their derivatives.
+
+    Parameters
+    ----------
+    module : module
+        The generated module.
+    measured : Measurements
+        What was measured.
+    free : Free
+        What is to be found.
+    fixed : mapping
+        All other arguments of ``module.solve``.
+    """
+
+    def __init__(self, module: ModuleType, measured: Measurements, free: Free, fixed: Mapping[str, Any]) -> None:
+        self.module, self.measured, self.free = module, measured, free
+        self.fixed = {name: value for name, value in fixed.items() if name not in free.names}
+        self.exact = True
+        self.values = np.concatenate([*measured.values.values()])
+        sigma = measured.sigma
+        self.sigma = np.ones(self.values.size) if sigma is None else np.concatenate([*sigma.values()])
+        self._loses = module.MODEL.dissipation is not None
+
+    def arguments(self, x: Array) -> dict[str, Any]:
+        """All arguments of ``module.solve`` for values of what is to be found."""
+        return {**self.fixed, **dict(zip(self.free.names, x.tolist(), strict=True))}
+
+    def motion(self, x: Array) -> Any:
+        """The motion for values of what is to be found."""
+        arguments = self.arguments(x)
+        if self.measured.place is not None and self._loses:
+            arguments["t_max"] = AMPLE * float(self.values.max())
+        return self.module.solve(**arguments)
+
+    def __call__(self, x: Array) -> Array:
+        """The residuals; NaN where there is no such motion, which the solver steps back from."""
+        try:
+            residuals: Array = (self.predicted(x) - self.values) / self.sigma
+            return residuals
+        except GQMError:
+            return np.full(self.values.size, nan)
+
+    def predicted(self, x: Array) -> Array:
+        """What would be measured without errors."""
+        names = tuple(self.measured.values)
+        if self.measured.t is not None:
+            motion = self.motion(x)
+            t = self.measured.t
+            if names == ("lam",):
+                return np.asarray(motion.lam(_until_rest(motion, t)))
+            state = motion.state(_until_rest(motion, t))
+            return np.concatenate([getattr(state, name) for name in names])
+        if self.measured.place is not None:
+            return _passages(self.motion(x), self.measured.place)
+        arguments = {**self.arguments(x), **self.measured.columns}
+        return np.concatenate([self._swept(name, arguments) for name in names])
+
+    def _swept(self, name: str, arguments: dict[str, Any]) -> Array:
+        swept = self.module.sweep(name, **{"lam0": 0.0, **arguments})
+        if np.any(swept.status):
+            raise SolutionError(f"{name}: {'; '.join(swept.status_counts())}")
+        return np.broadcast_to(swept.values, (len(self.measured.values[name]),))
+
+    def jacobian(self, x: Array) -> Array:
+        """The derivatives of the residuals: a column for each number that is to be found."""
+        if self.exact:
+            try:
+                return self._derivatives(x) / self.sigma[:, None]
+            except SolutionError:
+                self.exact = False
+        return self._differences(x) / self.sigma[:, None]
+
+    def _derivatives(self, x: Array) -> Array:
+        names, wrt = tuple(self.measured.values), self.free.names
+        if self.measured.t is not None:
+            found = self.motion(x).sensitivity(self.measured.t, wrt=wrt)
+            return np.concatenate([getattr(found, name).T for name in names])
+        if self.measured.place is not None:
+            motion = self.motion(x)
+            times = _passages(motion, self.measured.place)
+            # A change that carries the body further along has it pass the place earlier.
+            sooner: Array = motion.sensitivity(times, wrt=wrt).lam / _rates(motion, times)
+            return -sooner.T
+        arguments = {**self.arguments(x), **self.measured.columns}
+        rows = []
+        for name in names:
+            swept = self.module.sweep(name, **{"lam0": 0.0, **arguments}, gradient=wrt)
+            count = len(self.measured.values[name])
+            rows.append(np.broadcast_to(swept.gradient, (count, len(wrt))))
+        return np.concatenate(rows)
+
+    def _differences(self, x: Array) -> Array:
+        """Difference quotients, central unless a limit is near."""
+        columns = []
+        for k in range(x.size):
+            step = STEP * max(abs(x[k]), 1e-3 * max(abs(self.free.start[k]), 1.0))
+            ends = [min(max(x[k] + d, self.free.low[k]), self.free.high[k]) for d in (-step, step)]
+            values = []
+            for end in ends:
+                moved = x.copy()
+                moved[k] = end
+                values.append(self.predicted(moved))
+            columns.append((values[1] - values[0]) / (ends[1] - ends[0]))
+        return np.stack(columns, axis=1)
+
+
+def _until_rest(motion: Any, t: Array) -> Array:
+    """Times, of which those after the body has come to rest are that of its rest, where it stays."""
+    end = motion.t_end if motion.kind == "dissipative" else inf
+    return np.minimum(t, end) if isfinite(end) and motion.legs[-1].end == "rest" else t
+
+
+def _rates(motion: Any, t: Array) -> Array:
+    """How fast the curve parameter changes at times, by difference quotients."""
+    before, after = np.maximum(t - 1e-5, 0.0), t + 1e-5
+    rates: Array = (np.asarray(motion.lam(after)) - np.asarray(motion.lam(before))) / (after - before)
+    return rates
+
+
+def _passages(motion: Any, places: Array) -> Array:
+    """The times of consecutive passages through places after the launch, the k-th one through the k-th place."""
+    repeats = motion.kind in ("libration", "circulation")
+    period, lap = (motion.period, motion.problem.period) if repeats else (0.0, 0.0)
+    legs = [leg for leg in motion.legs if leg.t_end > leg.t_start]
+    times: list[float] = []
+    for turn in range(places.size + 1 if repeats else 1):
+        for leg in legs:
+            while len(times) < places.size:
+                t = _passage(motion, leg, places[len(times)], lap)
+                t = nan if t is None else t + turn * period
+                if not t > (times[-1] if times else 0.0):
+                    break
+                times.append(t)
+    if len(times) < places.size:
+        raise SolutionError(f"passages: the body passes only {len(times)} times, and {places.size} were measured")
+    return np.array(times)
+
+
+def _passage(motion: Any, leg: Any, place: float, lap: float) -> float | None:
+    """The time at which a body is at a place on a leg; its end belongs to the next leg."""
+    from scipy.optimize import brentq
+
+    low, high = sorted((leg.lam_start, leg.lam_end))
+    if lap and motion.kind == "circulation":
+        place += lap * np.ceil((low - place) / lap)
+    if not low <= place <= high or place == leg.lam_end:
+        return None
+    if place == leg.lam_start:
+        return float(leg.t_start)
+    return float(brentq(lambda t: float(motion.lam(t)) - place, leg.t_start, leg.t_end, xtol=1e-15, rtol=1e-15))
+
+
+def _result(residuals: Residuals, x: Array, converged: bool) -> Fit:
+    """What is told of a fit."""
+    names, measured = residuals.free.names, residuals.measured
+    if not converged:
+        raise SolutionError(
+            f"fit: no minimum was found within {MAX_STEPS} steps; begin nearer than at {short(x.tolist())}"
+        )
+    off, jacobian = residuals(x), residuals.jacobian(x)
+    size = np.linalg.norm(jacobian, axis=0)
+    scaled = jacobian / np.where(size > 0.0, size, 1.0)
+    _, values, rows = np.linalg.svd(scaled, full_matrices=False)
+    tolerance = RANK_TOLERANCE if residuals.exact else RANK_TOLERANCE_OF_DIFFERENCES
+    rank = int(np.count_nonzero(values > tolerance * values[0]))
+    lost = rows[rank:]
+    free = max(residuals.values.size - rank, 0)
+    chi2 = float(off @ off)
+    variance = 1.0 if measured.sigma is not None else (chi2 / free if free else nan)
+    kept = rows[:rank].T / values[:rank]
+    scale = np.where(size > 0.0, size, 1.0)
+    covariance = variance * (kept @ kept.T) / np.outer(scale, scale)
+    for row in lost:
+        blind = np.abs(row) > 1e-3
+        covariance[np.ix_(blind, blind)] = inf
+    split = np.split(-off * residuals.sigma, np.cumsum([v.size for v in measured.values.values()])[:-1])
+    return Fit(
+        names=names,
+        estimates=dict(zip(names, x.tolist(), strict=True)),
+        std=dict(zip(names, np.sqrt(np.diag(covariance)).tolist(), strict=True)),
+        covariance=covariance,
+        residuals=dict(zip(measured.values, split, strict=True)),
+        chi2=chi2,
+        degrees_of_freedom=free,
+        rank=rank,
+        unidentified=tuple(
+            tuple(name for name, part in zip(names, row, strict=True) if abs(part) > 1e-3) for row in lost
+        ),
+        arguments=residuals.arguments(x),
+        measured=measured,
+        predicted=residuals.predicted(x),
+    )

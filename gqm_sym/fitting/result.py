@@ -1,0 +1,143 @@
+"""What a fit found, as numbers, text and a figure."""
+
+from dataclasses import dataclass
+from math import isfinite, sqrt
+from typing import Any
+
+import numpy as np
+
+from gqm_sym.fitting.data import Measurements
+from gqm_sym.optional import require
+from gqm_sym.runtime.compiled.types import Array
+
+# The units of what may be measured, for labels.
+UNITS = {"s": "m", "x": "m", "z": "m", "v": "m/s", "period": "s", "half_period": "s", "passages": "s"}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False, eq=False)
+class Fit:
+    """Launch and run-time parameters that fit measurements best.
+
+    Attributes
+    ----------
+    names : tuple of str
+        What was found, in the order of ``covariance``.
+    estimates : dict
+        The value of each in its unit.
+    std : dict
+        The standard deviation of each; infinite where the data do not tell it.
+    covariance : (k, k) array
+        The covariance of the estimates. Without ``sigma`` it is scaled so that the residuals have the deviation that
+        they show.
+    residuals : dict
+        Measured less fitted values, for each quantity, in its unit.
+    chi2 : float
+        The sum of squares of the residuals in standard deviations; without ``sigma`` in SI units.
+    degrees_of_freedom : int
+        The number of measurements less that of the combinations of parameters that they tell.
+    rank : int
+        How many independent combinations of what was sought the data tell.
+    unidentified : tuple of tuples of str
+        The names that the data cannot tell apart, for each combination that changes nothing that was measured.
+    arguments : dict
+        All arguments of ``module.solve`` that give the fitted motion.
+    measured : data.Measurements
+        The data.
+    predicted : array
+        The fitted values, of all quantities one after the other.
+    """
+
+    names: tuple[str, ...]
+    estimates: dict[str, float]
+    std: dict[str, float]
+    covariance: Array
+    residuals: dict[str, Array]
+    chi2: float
+    degrees_of_freedom: int
+    rank: int
+    unidentified: tuple[tuple[str, ...], ...]
+    arguments: dict[str, Any]
+    measured: Measurements
+    predicted: Array
+
+    @property
+    def correlation(self) -> Array:
+        """The correlations of the estimates, a (k, k) array; NaN where the data do not tell them."""
+        with np.errstate(invalid="ignore"):
+            deviations = np.sqrt(np.diag(self.covariance))
+            correlation: Array = self.covariance / np.outer(deviations, deviations)
+        return correlation
+
+    def __str__(self) -> str:
+        """The estimates with their standard deviations, and how well they fit."""
+        width = max(map(len, self.names))
+        lines = [f"  {name:<{width}}  {self._estimate(name)}" for name in self.names]
+        for names in self.unidentified:
+            what = " and ".join(names)
+            lines.append(f"  the data do not tell {what}{' apart' if len(names) > 1 else ''}")
+        spread = "" if self.measured.sigma is not None else " (standard deviations from the residuals)"
+        return "\n".join(
+            [
+                f"Fit of {len(self.names)} numbers to {self.predicted.size} measurements{spread}",
+                *lines,
+                f"  chi2 {self.chi2:.6g} with {self.degrees_of_freedom} degrees of freedom",
+            ]
+        )
+
+    def _estimate(self, name: str) -> str:
+        value, std = self.estimates[name], self.std[name]
+        if not isfinite(std):
+            return f"{value:.6g}, not determined"
+        if std == 0.0:
+            return f"{value!r}"
+        digits = max(0, 1 - int(np.floor(np.log10(std))))
+        return f"{value:.{digits}f} +- {std:.{digits}f}" if digits < 17 else f"{value!r} +- {std:.1e}"
+
+    def __repr__(self) -> str:
+        return f"<fit of {', '.join(f'{name} = {value!r}' for name, value in self.estimates.items())}>"
+
+    def _repr_html_(self) -> str:
+        rows = "".join(f"<tr><th>{name}</th><td>{self._estimate(name)}</td></tr>" for name in self.names)
+        return f"<table>{rows}</table><pre>{str(self).splitlines()[-1].strip()}</pre>"
+
+    @require("plot")
+    def plot(self) -> Any:
+        """Draw data and fitted values, and the residuals below, for each quantity.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+            Two axes for each quantity. The bars are standard deviations.
+        """
+        from gqm_sym.figures.axes import finished, new_figure
+
+        quantities = self.measured.values
+        figure = new_figure(7.0 * len(quantities), 5.5)
+        grid = figure.subplots(2, len(quantities), sharex="col", squeeze=False, height_ratios=(3, 1))
+        fitted = np.split(self.predicted, np.cumsum([v.size for v in quantities.values()])[:-1])
+        for (name, values), found, (above, below) in zip(quantities.items(), fitted, grid.T, strict=True):
+            across, label = self._across(values.size)
+            order = np.argsort(across)
+            bars = None if self.measured.sigma is None else self.measured.sigma[name]
+            unit = f" ({UNITS[name]})" if name in UNITS else ""
+            above.errorbar(across, values, bars, fmt=".", color="#0072b2", label="measured", zorder=1)
+            above.plot(across[order], found[order], color="#d55e00", label="fitted", zorder=2)
+            finished(above, "", f"{name}{unit}")
+            below.errorbar(across, values - found, bars, fmt=".", color="#0072b2")
+            below.axhline(0.0, color="#d55e00")
+            finished(below, label, f"residual{unit}")
+        return figure
+
+    def _across(self, count: int) -> tuple[Array, str]:
+        """What the horizontal axis shows: times, the only column that differs, or numbers."""
+        if self.measured.t is not None:
+            return self.measured.t, "t (s)"
+        if len(self.measured.columns) == 1:
+            ((name, column),) = self.measured.columns.items()
+            return column, name
+        return np.arange(1.0, count + 1.0), "number"
+
+    @property
+    def reduced_deviation(self) -> float:
+        """The root of chi2 by the degrees of freedom: about 1 if model and standard deviations are right."""
+        return sqrt(self.chi2 / self.degrees_of_freedom) if self.degrees_of_freedom else float("nan")

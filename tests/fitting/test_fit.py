@@ -1,0 +1,196 @@
+"""Fits against the parameters that made the measurements, closed forms, and what data cannot tell."""
+
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+import pandas as pd
+import pint
+import pytest
+from scipy.special import ellipk
+
+import gqm_sym as gqm
+from gqm_sym.errors import InputError, SolutionError
+from gqm_sym.fitting.data import read_measurements
+from gqm_sym.fitting.fit import Free, Residuals, _until_rest
+
+u = pint.UnitRegistry()
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Where the modules of this file are written."""
+    return tmp_path_factory.mktemp("fits")
+
+
+@pytest.fixture(scope="module")
+def pendulum(folder: Path) -> ModuleType:
+    """A pendulum, of one metre unless said otherwise; its angle is counted from below."""
+    return gqm.build(gqm.derive(gqm.families.circle(L=1), gqm.Gravity()), name="fitted_pendulum", folder=folder)
+
+
+@pytest.fixture(scope="module")
+def spring(folder: Path) -> ModuleType:
+    """A body on a level line with a spring and dry friction."""
+    force = gqm.Gravity() + gqm.Potential("k*x**2/2", parameters={"k": 40}) + gqm.CoulombFriction(mu="1/10")
+    return gqm.build(gqm.derive(gqm.Curve.graph("0*x"), force), name="fitted_spring", folder=folder)
+
+
+def test_positions_and_speeds(pendulum: ModuleType) -> None:
+    """Estimates lie within four standard deviations, which are those of the linear theory; chi2 is as expected."""
+    true = pendulum.solve(0.8, 0.3, L=1.3)
+    rng = np.random.default_rng(1)
+    t = np.sort(rng.uniform(0.0, 50.0, 300))
+    state = true.state(t)
+    sigma = {"x": np.full(300, 1e-3), "v": np.full(300, 5e-3)}
+    data = {"t": t, "sigma": sigma, **{q: getattr(state, q) + rng.normal(0.0, s) for q, s in sigma.items()}}
+    found = gqm.fit(pendulum, data, {"L": 1.29, "lam0": (0.6, 1), "v0": (0, 0.5, 1)})
+    for name, value in {"L": 1.3, "lam0": 0.8, "v0": 0.3}.items():
+        assert abs(found.estimates[name] - value) < 4.0 * found.std[name]
+    assert found.names == ("L", "lam0", "v0")
+    assert (found.rank, found.unidentified, found.degrees_of_freedom) == (3, (), 597)
+    assert abs(found.chi2 - 597) < 5.0 * (2.0 * 597) ** 0.5
+    moved = true.sensitivity(t, wrt=found.names)
+    jacobian = np.vstack([moved.x.T / 1e-3, moved.v.T / 5e-3])
+    assert found.covariance == pytest.approx(np.linalg.inv(jacobian.T @ jacobian), rel=2e-2)
+    assert np.diag(found.correlation) == pytest.approx(np.ones(3), rel=1e-12)
+    assert found.residuals["x"] == pytest.approx(data["x"] - pendulum.solve(**found.estimates).state(t).x, abs=1e-12)
+
+
+def test_data_without_noise_are_met(pendulum: ModuleType) -> None:
+    """To rounding times how the measurements depend on what is sought."""
+    t = np.linspace(0.0, 20.0, 50)
+    data = {"t": t, "lam": pendulum.solve(0.8, 0.3, L=1.3).lam(t)}
+    found = gqm.fit(pendulum, data, {"L": 1.2, "lam0": 0.7, "v0": (0, 1)})
+    assert found.estimates == pytest.approx({"L": 1.3, "lam0": 0.8, "v0": 0.3}, rel=1e-12)
+
+
+def test_periods_against_the_complete_elliptic_integral(pendulum: ModuleType) -> None:
+    """Periods at many amplitudes tell the length if g is known; a DataFrame, and quantities, are taken."""
+    lam0 = np.linspace(0.1, 2.8, 12)
+    period = 4.0 * np.sqrt(1.3 / 9.81) * ellipk(np.sin(0.5 * lam0) ** 2)
+    found = gqm.fit(pendulum, pd.DataFrame({"lam0": lam0, "period": period, "sigma": 1e-3}), {"L": None})
+    assert found.estimates["L"] == pytest.approx(1.3, rel=1e-14)
+    # T ~ sqrt(L), so dT/dL = T/(2 L).
+    assert found.std["L"] == pytest.approx(1e-3 * 2.6 / np.linalg.norm(period), rel=1e-9)
+    degrees = {"lam0": np.rad2deg(lam0) * u.deg, "period": period * 1e3 * u.ms}
+    assert gqm.fit(pendulum, degrees, {"L": 1.2}).estimates["L"] == pytest.approx(1.3, rel=1e-13)
+
+
+def test_what_periods_cannot_tell(pendulum: ModuleType) -> None:
+    """Only g/L: that is said, and neither number has a finite standard deviation."""
+    lam0 = np.linspace(0.1, 2.8, 12)
+    period = 4.0 * np.sqrt(1.3 / 9.81) * ellipk(np.sin(0.5 * lam0) ** 2)
+    found = gqm.fit(pendulum, {"lam0": lam0, "period": period, "sigma": 1e-3}, {"L": 1.2, "g": None})
+    assert (found.rank, found.unidentified) == (1, (("L", "g"),))
+    assert found.std == {"L": np.inf, "g": np.inf}
+    assert found.estimates["g"] / found.estimates["L"] == pytest.approx(9.81 / 1.3, rel=1e-9)
+    assert "do not tell L and g apart" in str(found)
+
+
+@pytest.mark.parametrize("launch", [{"lam0": 0.8, "v0": 0.3}, {"lam0": -3.0, "v0": 9.0}])
+def test_passages(pendulum: ModuleType, launch: dict[str, float]) -> None:
+    """Through the lowest point, of swings and of rounds; and through two places in turn."""
+    true = pendulum.solve(**launch, L=1.3)
+    period = true.period if true.kind == "libration" else 2.0 * true.period
+    first = true.time_at(0)
+    times = first + 0.5 * period * np.arange(12)
+    found = gqm.fit(pendulum, {"passages": times, "place": 0}, {"L": 1.25}, **launch)
+    assert found.estimates["L"] == pytest.approx(1.3, rel=1e-11)
+    assert not found.unidentified
+    if true.kind == "libration":
+        some = {"passages": [first, true.time_at(-0.5)], "place": [0, -0.5]}
+        assert gqm.fit(pendulum, some, {"L": 1.25}, **launch).estimates["L"] == pytest.approx(1.3, rel=1e-11)
+
+
+def test_friction(spring: ModuleType) -> None:
+    """Amplitudes of a spring with dry friction fall by 2 mu g/k a half swing; after ten seconds the body rests."""
+    mu, k, start = 0.1, 40.0, 1.0
+    rate, offset = np.sqrt(k), mu * 9.81 / k
+    t = np.linspace(0.0, 8.0, 200)
+    n = np.floor(t * rate / np.pi)
+    last = np.ceil((start - offset) / (2.0 * offset))
+    n = np.minimum(n, last)
+    side, left = (-1.0) ** n, start - (2.0 * n + 1.0) * offset
+    x = side * (offset + left * np.cos(rate * t - np.pi * n))
+    x[n == last] = (-1.0) ** last * (start - 2.0 * last * offset)
+    found = gqm.fit(spring, {"t": t, "x": x}, {"mu": (0, 0.09, 1), "k": (30, 39.9, 50)}, lam0=start)
+    assert found.estimates == pytest.approx({"mu": mu, "k": k}, rel=1e-9)
+    assert _until_rest(spring.solve(1), np.array([5.0, 12.0])) == pytest.approx([5.0, last * np.pi / rate], rel=1e-14)
+    # Through the place of equilibrium of swings to the left: in the middle of these, and later on the swings back.
+    n = np.arange(5)
+    half = np.where(n % 2, np.arccos(-2.0 * offset / (start - (2.0 * n + 1.0) * offset)), 0.5 * np.pi)
+    data = {"passages": (n * np.pi + half) / rate, "place": offset}
+    assert gqm.fit(spring, data, {"k": 39}, lam0=start).estimates["k"] == pytest.approx(k, rel=1e-9)
+
+
+def test_derivatives_are_the_difference_quotients(pendulum: ModuleType) -> None:
+    """Of every kind of measurement, to the accuracy of the quotients."""
+    free = Free(("L", "lam0", "v0"), np.array([1.3, 0.8, 0.3]), np.full(3, -np.inf), np.full(3, np.inf))
+    t = np.linspace(0.5, 9.0, 7)
+    many = {
+        "states": {"t": t, "lam": t, "s": t, "x": t, "z": t, "v": t},
+        "periods": {"period": t, "half_period": t},
+        "passages": {"passages": t, "place": 0.1},
+    }
+    for data in many.values():
+        residuals = Residuals(pendulum, read_measurements(data, {}, None), free, {})
+        exact = residuals.jacobian(free.start)
+        assert residuals.exact
+        quotients = residuals._differences(free.start)
+        assert exact == pytest.approx(quotients, rel=1e-6, abs=1e-7 * np.abs(exact).max())
+
+
+def test_coverage(pendulum: ModuleType) -> None:
+    """Each true value lies within a standard deviation in some 68 % of 150 sets of measurements."""
+    true = pendulum.solve(1, L=1.3)
+    t = np.linspace(0.1, 6.0, 25)
+    exact, rng = true.lam(t), np.random.default_rng(5)
+    within = np.zeros(2)
+    for _ in range(150):
+        data = {"t": t, "lam": exact + rng.normal(0.0, 1e-3, t.size), "sigma": 1e-3}
+        found = gqm.fit(pendulum, data, {"L": 1.29, "lam0": 0.99})
+        within += [abs(found.estimates[name] - value) < found.std[name] for name, value in (("L", 1.3), ("lam0", 1.0))]
+    assert (np.abs(within / 150 - 0.6827) < 0.1).all()
+
+
+BAD = {
+    "no mapping": ([1, 2], {"L": 1}, "data: must be a mapping"),
+    "nothing measured": ({"t": [1]}, {"L": 1}, "data: needs at least one of lam, s, x"),
+    "an unknown column": ({"t": [1], "y": [1], "x": [1]}, {"L": 1}, "there is no column 'y'"),
+    "no times": ({"x": [1, 2]}, {"L": 1}, "data: give t with lam"),
+    "nan": ({"t": [1, 2], "x": [1, np.nan]}, {"L": 1}, "data: x: row 2 is no finite number"),
+    "another length": ({"t": [1, 2], "x": [1, 2, 3]}, {"L": 1}, "data: t: has 2 rows where others have 3"),
+    "too few": ({"t": [1], "x": [1]}, {"L": 1, "lam0": 1}, "1 measurements cannot determine 2 numbers"),
+    "a deviation of zero": ({"t": [1], "x": [1], "sigma": 0}, {"L": 1}, "sigma: standard deviations must be positive"),
+    "no place": ({"passages": [1]}, {"L": 1}, "the place is missing"),
+    "an unknown name": ({"t": [1], "x": [1]}, {"l": 1}, "free: there is no argument 'l'; did you mean 'L'"),
+    "nothing free": ({"t": [1], "x": [1]}, {}, "free: must be a mapping"),
+    "a guess outside": ({"t": [1], "x": [1]}, {"L": (1, 3, 2)}, "free: L: the first guess 3.0 must lie between"),
+    "both": ({"t": [1], "x": [1]}, {"g": 9}, "free: g has a first guess here and a value by keyword"),
+    "too many passages": ({"passages": [1, 2], "place": 3}, {"L": 1}, "the body passes only 0 times"),
+    "a free column": ({"lam0": [1], "period": [1]}, {"lam0": 1}, "free: lam0 is a column of the data"),
+}
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_what_cannot_be_fitted_is_refused(case: str, pendulum: ModuleType) -> None:
+    """With one clear error."""
+    data, free, said = BAD[case]
+    fixed = {} if "lam0" in free or "lam0" in data else {"lam0": 1}
+    with pytest.raises((InputError, SolutionError)) as raised:
+        gqm.fit(pendulum, data, free, g=9.8, **fixed)
+    assert said in str(raised.value)
+
+
+def test_what_is_shown(pendulum: ModuleType) -> None:
+    """Text, a table for a notebook and a figure."""
+    data = {"lam0": [0.5, 1.0], "period": [2.3, 2.4], "sigma": 0.02}
+    found = gqm.fit(pendulum, data, {"L": 1.2})
+    assert "L  1." in str(found)
+    assert "+-" in str(found)
+    assert repr(found).startswith("<fit of L = 1.")
+    assert found._repr_html_().startswith("<table>")
+    figure = found.plot()
+    assert [axes.get_ylabel() for axes in figure.axes] == ["period (s)", "residual (s)"]
+    assert figure.axes[1].get_xlabel() == "lam0"
