@@ -21,7 +21,7 @@ from gqm_sym.runtime.launch.request import ONLY_SIGN, Launch
 from gqm_sym.runtime.launch.speed import path_and_force_at
 from gqm_sym.runtime.legs import answers
 from gqm_sym.runtime.legs.advance import AT_ONCE, BEYOND, CREEPING_SHARE, LEAVES, RESTS, Joints, room_ahead
-from gqm_sym.runtime.legs.answers import LEG, MAX_PAUSES, MAX_TURNS
+from gqm_sym.runtime.legs.answers import LEAST_SWING, LEG, MAX_PAUSES, MAX_TURNS
 from gqm_sym.runtime.legs.body import (
     DIRECTION,
     ELAPSED,
@@ -39,6 +39,7 @@ from gqm_sym.runtime.legs.body import (
     STEP,
     TURNS,
     V2,
+    VALUE,
     launched,
 )
 from gqm_sym.runtime.legs.frames.local_frame import SMALL_SHARE, Frame, frame_near, may_be_small
@@ -50,6 +51,7 @@ from gqm_sym.runtime.legs.leg_record import (
     CHANGE_COUNT,
     COLUMNS,
     END,
+    HEAD,
     HEADING,
     INHERITED,
     MIDDLE,
@@ -82,15 +84,16 @@ MAX_SEGMENTS = 250_000
 # questions one after the other do not copy it for each leg.
 EXTENSION = 1.25
 
-# How many panels a record has space for at first; a leg with more is followed again with a larger record.
-FEW_PANELS = 12
+# How many panels a record has space for at first; a leg with more is followed again with a larger record. How many legs
+# are followed in one call of a motion that has a horizon, whose legs are all needed.
+FEW_PANELS, LEGS_PER_CALL = 12, 8
 
 # A change of the contact force's sign this many roundings from the end of a piece is there.
 END_ROUNDINGS = 8.0
 
-# A swing about an equilibrium has died away when it is below this share of the last digit of its place, or so small
-# that V**2 and the errors of it come to the end of the range of doubles.
-LAST_DIGIT, LEAST_SWING = ULP / 64.0, 1e-110
+# A swing about an equilibrium has died away when it is below this share of the last digit of its place, or below
+# `LEAST_SWING`.
+LAST_DIGIT = ULP / 64.0
 
 # A body that creeps towards an equilibrium, and for which no panel is narrow enough any more, is no farther from it
 # than this share of its place and of the length of the leg.
@@ -479,22 +482,18 @@ class DissipativeMotion(Motion):
                 f"motion: {MAX_SEGMENTS} pieces of legs reach t = {self._pieces[-1].t_stop[0]!r} only; "
                 "give a shorter t_max, or ask for earlier times and nearer places"
             )
-        problem, size, frame = self.problem, FEW_PANELS * COLUMNS, self._frame
-        loss, parameters = (_loss(problem), problem.functions.p) if frame is None else frame[:2]
-        while True:
-            record = np.empty(size)
-            what = answers.drive(loss, parameters.reshape(1, -1), self._joints, LEG, self._body, record)
-            if what != FULL:
-                break
-            size *= 4
+        problem, frame = self.problem, self._frame
+        what, *passed, record = self._followed()
         if self._body[0, DIRECTION] == 0.0 and not self._body[0, TURNS]:
             return  # the body stays where it is
+        self._runs += [Run(before, TURN, END_NAMES[TURN], None) for before in passed]
         self._at = self._body[0].tolist()
         if frame is not None:
             frame.move(record, 1)
             self._at[PLACE] = float(record[END])
-        self._settle(what, record)
-        heading = int(record[HEADING])
+        head = record[:HEAD].tolist()
+        self._settle(what, head[START], head[END])
+        heading = int(head[HEADING])
         if what == LEAVES:
             raise leaving_at_once(problem, heading, "end of the domain")
         if what == SPENT:
@@ -511,14 +510,27 @@ class DissipativeMotion(Motion):
                 "give a shorter t_max"
             )
 
-    def _settle(self, what: int, record: Array) -> None:
+    def _followed(self) -> tuple[Any, ...]:
+        """What ended the last of the next legs (`advance`), and the records of all of them; one if the body stays."""
+        frame, size = self._frame, FEW_PANELS * COLUMNS
+        loss, parameters = (_loss(self.problem), self.problem.functions.p) if frame is None else frame[:2]
+        legs = LEGS_PER_CALL if frame is None and isfinite(self._horizon) else 1
+        while True:
+            records = np.empty((legs, size))
+            what = answers.drive(loss, parameters.reshape(1, -1), self._joints, LEG, self._body, records)
+            count = int(self._body[0, VALUE])
+            if what != FULL or count:
+                return (what if what != FULL else TURN), *records[: max(count, 1)]
+            legs, size = 1, 4 * size
+
+    def _settle(self, what: int, start: float, end: float) -> None:
         """Look whether a run has come so close to an equilibrium that the motion ends there, or goes on in a frame."""
         in_frame, linear = self._frame is not None, _loss(self.problem).linear
-        if what in (TURN, PAUSED) and self._has_died_away(record):
+        if what in (TURN, PAUSED) and self._has_died_away(start, end):
             self._ending = "asymptote"
         elif what == ASYMPTOTE and not linear:
-            self._last_swing = NEAR_EQUILIBRIUM * max(abs(self._at[PLACE]), abs(self._at[PLACE] - record[START]))
-        elif not in_frame and what == TURN and abs(record[END] - record[START]) < SMALL_SHARE * abs(record[END]):
+            self._last_swing = NEAR_EQUILIBRIUM * max(abs(end), abs(end - start))
+        elif not in_frame and what == TURN and abs(end - start) < SMALL_SHARE * abs(end):
             self._enter_frame(self._at[PLACE], self._at[PLACE_LOW], 0.0)
         elif not in_frame and what == PAUSED and self._at[STEP] <= CREEPING_SHARE * self._at[FIRST_STEP]:
             self._enter_frame(self._at[PLACE], self._at[PLACE_LOW], self._at[V2])
@@ -533,11 +545,11 @@ class DissipativeMotion(Motion):
             )
         return SolutionError(f"{place} could not be followed; are the curve and the force smooth there?")
 
-    def _has_died_away(self, record: Array) -> bool:
+    def _has_died_away(self, start: float, end: float) -> bool:
         """Whether the body is, or swings, so closely about an equilibrium that its place shows no more of it."""
-        ends, frame = abs(record[[START, END]]), self._frame
-        swing = float(ends.max()) if frame is None else abs(self._body[0, PLACE])
-        if swing >= (LEAST_SWING if frame is None else max(LAST_DIGIT * float(ends[1]), LEAST_SWING)):
+        frame = self._frame
+        swing = max(abs(start), abs(end)) if frame is None else abs(self._body[0, PLACE])
+        if swing >= (LEAST_SWING if frame is None else max(LAST_DIGIT * abs(end), LEAST_SWING)):
             return False
         self._last_swing = swing
         return True

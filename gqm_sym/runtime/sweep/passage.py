@@ -40,7 +40,7 @@ from gqm_sym.runtime.sweep.curve_table import (
     potential_on,
     value_on,
 )
-from gqm_sym.runtime.sweep.orbit import Orbit
+from gqm_sym.runtime.sweep.orbit import NO_ENDS, Orbit
 from gqm_sym.runtime.sweep.panel_forces import CONVEX, FAR, HIGHEST, NEAR, SLOPE_SIGN, TOP, prepare
 
 # By how much V**2 at the middle of a panel must exceed what the panel's rule needs.
@@ -225,7 +225,7 @@ def end_ahead(curve, lam0, w0, direction):  # type: ignore[no-untyped-def]
     size = w0 + 2.0 * (fabs(out[0, 0]) + fabs(out[0, 1]))
     call_potential_divdiff1(curve.fns.potential_divdiff1, 1, lam0, place, offset, curve.p, out.reshape(4))
     v2 = w0 - 2.0 * offset[0] * out[0, 0]
-    certain = curve.has_ends and offset[0] != 0.0 and v2 > MIN_LEAVING_SHARE * size
+    certain = curve.ends != NO_ENDS and offset[0] != 0.0 and v2 > MIN_LEAVING_SHARE * size
     return offset[0], v2 if certain else np.nan
 
 

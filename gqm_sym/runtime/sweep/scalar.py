@@ -41,7 +41,7 @@ from gqm_sym.runtime.quadrature.trapezoid import (
 from gqm_sym.runtime.sweep.arrivals import arrival
 from gqm_sym.runtime.sweep.curve_table import TABLE, CurveTable
 from gqm_sym.runtime.sweep.liftoff import liftoff_place
-from gqm_sym.runtime.sweep.orbit import Orbit, SweptCurve
+from gqm_sym.runtime.sweep.orbit import CONTACT_ENDS, Orbit, SweptCurve
 from gqm_sym.runtime.sweep.orbit_extremes import extreme, passage_extreme
 from gqm_sym.runtime.sweep.panel_forces import take_factors
 from gqm_sym.runtime.sweep.passage import BOTH, Passage, fill_slacks, find_passage, passage_of, travel_time
@@ -84,8 +84,8 @@ class GivenCurve(NamedTuple):
         Buffers for what `SweptCurve` has under these names; the levels are 0.
     mass : int
         Which run-time parameter is the mass of the body.
-    has_ends : bool
-        Whether a body can leave the curve through both ends of the table.
+    ends : int
+        What both ends of the table are (`SweptCurve`).
     side : int
         1 if the track can only push along the normal, -1 if only against it, 0 if it can push and pull.
     t_max : float
@@ -100,13 +100,13 @@ class GivenCurve(NamedTuple):
     rows: Array
     levels: NDArray[np.int8]
     mass: int
-    has_ends: bool
+    ends: int
     side: int
     t_max: float
 
 
 _BUFFERS = types.int64[:, ::1], VECTOR, MATRIX, types.int8[::1]
-GIVEN = types.NamedTuple((VECTOR, VECTOR, TABLE, *_BUFFERS, types.int64, types.boolean, types.int64, REAL), GivenCurve)
+GIVEN = types.NamedTuple((VECTOR, VECTOR, TABLE, *_BUFFERS, types.int64, types.int64, types.int64, REAL), GivenCurve)
 
 
 class Buffers(NamedTuple):
@@ -214,12 +214,16 @@ def fill_answer(curve, orbit, passage, asked, buffers, out):  # type: ignore[no-
     if orbit.leaves != 0 and quantity in (HALF_PERIOD, PERIOD, TURNING_POINTS):
         return NOT_PERIODIC
     if side != 0 or quantity == END_TIME:
-        if side != 0 and not tabulated:
-            return UNDECIDED
-        place = liftoff_place(curve, orbit, passage, slacks, side) if side != 0 else nan
+        place = liftoff_place(curve, orbit, passage, slacks, side) if side != 0 and tabulated else nan
+        if side != 0 and not tabulated:  # as a small swing: it keeps contact if its least force is one of the track
+            least = value_by_itself(curve, orbit, MIN_FORCE if side > 0 else MAX_FORCE, target, buffers)
+            if orbit.leaves != 0 or not side * least > 0.0:
+                return UNDECIDED
         if place == place and quantity in (HALF_PERIOD, PERIOD, TURNING_POINTS):
             return NOT_PERIODIC
         if quantity != END_TIME and place == place:
+            return UNDECIDED
+        if place != place and orbit.leaves != 0 and curve.ends == CONTACT_ENDS:
             return UNDECIDED
         if quantity == END_TIME and place != place and orbit.leaves == 0:
             out[0] = t_max if t_max < inf else nan
@@ -280,7 +284,7 @@ def answer_one_by_one(fns, columns, monotone, quantity, spans, answers, given): 
         for row in range(columns.shape[0] - PARAMETERS):
             p[row] = element(columns, PARAMETERS + row, k)
         period = element(columns, DOMAIN_PERIOD, k)
-        curve = SweptCurve(fns, p, joints, period, given.has_ends, p[given.mass], table, factors, rows, levels)
+        curve = SweptCurve(fns, p, joints, period, given.ends, p[given.mass], table, factors, rows, levels)
         for i in range(count):
             taken[i] = element(given.factor_columns, i, k)
         take_factors(curve, taken)
