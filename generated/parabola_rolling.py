@@ -1,5 +1,5 @@
 # Made by gqm-gen for "parabola_rolling". Do not edit: change its declaration and generate again.
-# interface 9, input 6fc25406b912, body 217fec37f6f3
+# interface 9, input 6fc25406b912, body bea92408d399
 """Ball rolling in a parabolic bowl
 
 x              = x*(-2*a*rho/sqrt(4*a**2*x**2 + 1) + 1)
@@ -28,9 +28,10 @@ from gqm_sym.runtime import compiler
 compiled = compiler(__file__, interface=9)
 
 from gqm_sym.runtime.vocabulary import (
-    BOUNDS, EFFECTIVE_POTENTIAL, LOAD_MAP, PATH_AND_CONTACT_FORCE, POTENTIAL_DIVDIFF1, POTENTIAL_DIVDIFF2, Addresses,
-    CompiledModel, ExactFormulas, LaunchRequest, Pass1, iadd, iconst, idiv, imul, ipow, isqrt, place_from_ends,
-    speed_squared_from_potential,
+    BOUNDS, BOUNDS_BATCH, EFFECTIVE_POTENTIAL, INTEGRAND_INVARIANTS_BATCH, LOAD_MAP, ORBIT_INVARIANTS_BATCH,
+    PATH_AND_CONTACT_FORCE, POTENTIAL_DIVDIFF1, POTENTIAL_DIVDIFF1_BATCH, POTENTIAL_DIVDIFF2, POTENTIAL_DIVDIFF2_BATCH,
+    TIME_INTEGRAND_BATCH, Addresses, BatchFunctions, CompiledModel, ExactFormulas, LaunchRequest, Pass1, iadd, iconst,
+    idiv, imul, ipow, isqrt, place_from_ends, speed_squared_from_potential,
 )
 
 if TYPE_CHECKING:
@@ -345,6 +346,102 @@ def load_map(n, w0, level, places, p, out):
         out[6, i] = _c1*(_c0*_t1 + _c2*_t3)/_c3
 
 
+@compiled(POTENTIAL_DIVDIFF1_BATCH, later=True)
+def potential_divdiff1_batch(n, starts, places, offsets, p, out):
+    """U[a, x], ds/dx and dU/dx."""
+    starts, places, offsets, p, out = carray(starts, n), carray(places, n), carray(offsets, n), carray(p, (5, n)), carray(out, (3, n))
+    for i in range(n):
+        a, beta, rho, g, _a, x = p[0, i], p[1, i], p[2, i], p[3, i], starts[i], places[i]
+        _t0 = _a + x
+        _t1 = 4*a**2
+        _t2 = sqrt(_a**2*_t1 + 1)
+        _t3 = _t1*x**2 + 1
+        _t4 = sqrt(_t3)
+        _t5 = g/(beta + 1)
+        _t6 = 2*a
+        _t7 = sqrt(_t3)**3
+        _t8 = -_t6*rho + _t7
+        out[0, i] = _t5*(-_t0*_t1*rho/(_t2*_t4*(_t2 + _t4)) + _t0*a)
+        out[1, i] = _t8/_t3
+        out[2, i] = _t5*_t6*_t8*x/_t7
+
+
+@compiled(POTENTIAL_DIVDIFF2_BATCH, later=True)
+def potential_divdiff2_batch(n, lows, highs, left, right, p, out):
+    """U[a, x, b] and ds/dx; NaN where the points lie too far apart for the closed form."""
+    lows, highs, left, right, p, out = carray(lows, n), carray(highs, n), carray(left, n), carray(right, n), carray(p, (9, n)), carray(out, (2, n))
+    for i in range(n):
+        a, beta, rho, g, _c0, _c1, _c2, _c3 = p[0, i], p[1, i], p[2, i], p[3, i], p[5, i], p[6, i], p[7, i], p[8, i]
+        _a, b, da, db = lows[i], highs[i], left[i], right[i]
+        x = place_from_ends(_a, b, da, db)
+        _t0 = a**2
+        _t1 = 4*_t0*x**2 + 1
+        _t2 = sqrt(_t1)
+        _t3 = _c2/_t2
+        _t4 = 16*a**4*(_a + b)*(_a + x)/((_c1 + _c3)*(_c1 + _t2))
+        _t5 = 1/(_c3 + _t2)
+        out[0, i] = g*(a + rho*(_c0*_t3*_t4 - _t3*(4*_t0*_t5 - _t4*_t5)))/(beta + 1)
+        out[1, i] = (-2*a*rho + sqrt(_t1)**3)/_t1
+
+
+@compiled(ORBIT_INVARIANTS_BATCH, later=True)
+def orbit_invariants_batch(n, lows, highs, p, out):
+    """Terms that are constant along an orbit: ``potential_divdiff2_batch`` reads them behind the parameters."""
+    lows, highs, p, out = carray(lows, n), carray(highs, n), carray(p, (5, n)), carray(out, (4, n))
+    for i in range(n):
+        a, _a, b = p[0, i], lows[i], highs[i]
+        _t0 = 4*a**2
+        _t1 = sqrt(_a**2*_t0 + 1)
+        _t2 = sqrt(_t0*b**2 + 1)
+        out[0, i] = 1/_t1
+        out[1, i] = _t1
+        out[2, i] = 1/_t2
+        out[3, i] = _t2
+
+
+@compiled(TIME_INTEGRAND_BATCH, later=True)
+def time_integrand_batch(n, sine2, cosine2, p, out):
+    """(dt/du)**2 at sine2 = sin(u)**2, and its divisor; dt/du integrates to the half period (paper, eq. 17)."""
+    p, out = carray(p, (8, n)), carray(out, (2, n))
+    for i in range(n):
+        a, beta, rho, g, t, _c0, _c1 = p[0, i], p[1, i], p[2, i], p[3, i], p[5, i], p[6, i], p[7, i]
+        _t0 = beta + 1
+        _t1 = 4*a**2
+        _t2 = _t1*sine2*t + 1
+        _t3 = sqrt(_t2)
+        _t4 = -_c0*_t1*rho/(_t3*(_c1 + _t3)) + a
+        out[0, i] = _t0*(-2*a*rho + sqrt(_t2)**3)**2/(2*_t2**2*_t4*g)
+        out[1, i] = 2*_t4*g/_t0
+
+
+@compiled(INTEGRAND_INVARIANTS_BATCH, later=True)
+def integrand_invariants_batch(n, halves, p, out):
+    """Terms that are constant along an orbit: ``time_integrand_batch`` reads them behind the parameters."""
+    halves, p, out = carray(halves, n), carray(p, (5, n)), carray(out, (3, n))
+    for i in range(n):
+        a, half = p[0, i], halves[i]
+        _t0 = half**2
+        _t1 = sqrt(4*_t0*a**2 + 1)
+        out[0, i] = _t0
+        out[1, i] = 1/_t1
+        out[2, i] = _t1
+
+
+@compiled(BOUNDS_BATCH, later=True)
+def bounds_batch(n, lo, hi, p, out):
+    """Bounds of dU/dx and ds/dx for lo <= x <= hi."""
+    lo, hi, p, out = carray(lo, n), carray(hi, n), carray(p, (5, n)), carray(out, (4, n))
+    for i in range(n):
+        x = (lo[i], hi[i])
+        a, beta, rho, g = (p[0, i], p[0, i]), (p[1, i], p[1, i]), (p[2, i], p[2, i]), (p[3, i], p[3, i])
+        _t0 = imul(iconst(2.0), a)
+        _t1 = iadd(imul(imul(iconst(4.0), ipow(a, 2)), ipow(x, 2)), iconst(1.0))
+        _t2 = ipow(isqrt(_t1), 3)
+        _t3 = iadd(imul(imul(iconst(-1.0), _t0), rho), _t2)
+        out[0, i], out[1, i] = imul(imul(imul(imul(imul(_t0, idiv(iconst(1.0), _t2)), _t3), g), x), idiv(iconst(1.0), iadd(beta, iconst(1.0))))
+        out[2, i], out[3, i] = imul(idiv(iconst(1.0), _t1), _t3)
+
+
 MODEL = CompiledModel(
     name='parabola_rolling', parameter='x', parameters=PARAMETERS, positive=(),
     source=__file__,
@@ -357,6 +454,11 @@ MODEL = CompiledModel(
     ),
     load_map=load_map,
     inertia=exact_inertia,
+    batch=BatchFunctions(
+        potential_divdiff1=potential_divdiff1_batch, potential_divdiff2=potential_divdiff2_batch,
+        orbit_invariants=orbit_invariants_batch, time_integrand=time_integrand_batch,
+        integrand_invariants=integrand_invariants_batch, bounds=bounds_batch, orbit_rows=4, integrand_rows=3,
+    ),
     domain_of=exact_domain, axes_of=exact_axes,
     exact=ExactFormulas(
         exact_x, exact_z, exact_ds, exact_kappa, exact_static_normal_load, exact_effective_potential,

@@ -79,45 +79,56 @@ def outside(motion: Any, truth: Truth, times: list[float]) -> list[str]:
 
 
 def slides(draw: random.Random, modules: Modules) -> tuple[list[str], int]:
-    """Along an incline with friction: constant acceleration up, then down or rest."""
+    """Along an incline with friction, some of which all but holds the body."""
     a, v0, lam0 = signed(draw, -3.0, 1.0), log_uniform(draw, -6.0, 2.0), draw.uniform(-3.0, 3.0)
     mu, direction = log_uniform(draw, -4.0, 0.0), draw.choice((1, -1))
-    motion = modules["rough"].solve(lam0, v0, direction, a=a, mu=mu)
-    slope, u = mp.sqrt(1 + mpf(a) ** 2), mpf(direction)
-    pull, drag = -mpf(G) * mpf(a) / slope, mpf(G) * mpf(mu) / slope
+    if draw.random() < 0.3:
+        mu = abs(a) * (1.0 + signed(draw, -12.0, -1.0))
+    return slide(modules, {"lam0": lam0, "v0": v0, "direction": direction, "a": a, "mu": mu}, draw), TIMES
+
+
+def slide(modules: Modules, launch: dict[str, Any], draw: random.Random) -> list[str]:
+    """What is wrong with one motion along an incline: constant acceleration up, then down or rest."""
+    motion = modules["rough"].solve(**launch)
+    lam0, v0, u, a, mu = (mpf(launch[name]) for name in ("lam0", "v0", "direction", "a", "mu"))
+    slope = mp.sqrt(1 + a**2)
+    pull, drag = -mpf(G) * a / slope, mpf(G) * mu / slope
     onwards = pull - u * drag  # the acceleration along x's sense while it moves in the direction of launch
     turn = -u * v0 / onwards if onwards * u < 0 else mp.inf
     back = 0 if abs(pull) <= drag else pull + u * drag
-    reach = float(turn) if turn < mp.inf else v0 / float(abs(onwards)) if onwards else 1.0
+    reach = float(turn) if turn < mp.inf else float(v0 / abs(onwards)) if onwards else 1.0
 
     def place(t: Any) -> Any:
         first = min(t, turn)
         gone = u * v0 * first + onwards * first**2 / 2 + (back * (t - turn) ** 2 / 2 if t > turn else 0)
-        return mpf(lam0) + gone / slope
+        return lam0 + gone / slope
 
     end = min(2.5 * reach, motion.t_end)
-    return outside(motion, place, [draw.uniform(0.0, end) for _ in range(TIMES)]), TIMES
+    return outside(motion, place, [draw.uniform(0.0, end) for _ in range(TIMES)])
 
 
 def damps(draw: random.Random, modules: Modules) -> tuple[list[str], int]:
-    """A spring with viscous damping, on the level, over many decades of amplitude and damping."""
+    """A spring with viscous damping, on the level, over many decades of amplitude, speed and damping."""
     lam0, direction = signed(draw, -9.0, 1.0), draw.choice((1, -1))
     k, c = log_uniform(draw, -1.0, 2.0), log_uniform(draw, -3.0, 0.5)
-    # Thrown more slowly, a body may be off by more than its bound: where V**2 has not yet grown to some times its first
-    # value, panels resolve the root of V**2 less well than they tell.
-    v0 = 0.0 if draw.random() < 0.5 else log_uniform(draw, -1.0, 1.0) * abs(lam0)
-    motion = modules["damped"].solve(lam0, v0, direction, k=k, c=c)
-    root = mp.sqrt(mp.mpc(mpf(c) ** 2 / 4 - mpf(k)))
-    one, two = -mpf(c) / 2 + root, -mpf(c) / 2 - root
+    v0 = 0.0 if draw.random() < 0.5 else log_uniform(draw, -9.0, 1.0) * abs(lam0)
+    return damp(modules, {"lam0": lam0, "v0": v0, "direction": direction, "k": k, "c": c}, draw), TIMES
+
+
+def damp(modules: Modules, launch: dict[str, Any], draw: random.Random) -> list[str]:
+    """What is wrong with one motion on a damped spring: two exponentials, or a swing that decays."""
+    motion = modules["damped"].solve(**launch)
+    lam0, k, c = (mpf(launch[name]) for name in ("lam0", "k", "c"))
+    root = mp.sqrt(mp.mpc(c**2 / 4 - k))
+    one, two = -c / 2 + root, -c / 2 - root
     if one == two:
-        return [], 0
-    share = (direction * mpf(v0) - two * lam0) / (one - two)
+        return []
+    share = (launch["direction"] * mpf(launch["v0"]) - two * lam0) / (one - two)
 
     def place(t: Any) -> Any:
         return (share * mp.exp(one * t) + (lam0 - share) * mp.exp(two * t)).real
 
-    times = [draw.uniform(0.0, 30.0) for _ in range(TIMES)]
-    return outside(motion, place, times), TIMES
+    return outside(motion, place, [draw.uniform(0.0, 30.0) for _ in range(TIMES)])
 
 
 def swings(draw: random.Random, modules: Modules) -> tuple[list[str], int]:

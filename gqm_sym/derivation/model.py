@@ -371,6 +371,8 @@ def derive(
     pressure = shape.kappa * speed.held + law.static_normal_load
     potential, slope = law.effective_potential, law.effective_potential_slope
     axes = None if loss or curve.charted else symmetry(potential, slope, shape.ds, lam)
+    if axes and kernel.radius:  # of the path of a body's centre the sign of σ is known by numbers only
+        axes = replace(axes, monotone=False)
     start = {lam: LAM0}
     model = Model(
         curve=curve,

@@ -164,6 +164,6 @@ def bounds_batch(lowering: Lowering) -> FunctionIR:
 def batch_functions(lowering: Lowering) -> tuple[FunctionIR, ...]:
     """All functions of a batch but the bounds; none for a model whose motions are solved one by one."""
     model = lowering.model
-    if model.dissipation is not None or model.curve.charted or model.force.radius:
+    if model.dissipation is not None or model.curve.charted:
         return ()
     return potential_divdiff1_batch(lowering), *potential_divdiff2_batch(lowering), *axis_orbits_batch(lowering)

@@ -189,7 +189,8 @@ class CompiledModel(Formulas):
 
         check_launch(self, bind(self, p, launch), launch.lam0.value)
         motion = solve(self, p, launch)
-        check_end(self, motion.legs)
+        if motion.kind not in ("libration", "circulation"):
+            check_end(self, motion.legs)
         return motion
 
     def sweep(

@@ -155,9 +155,47 @@ def test_a_bound_that_does_not_hold_is_reported(
         assert any(found.startswith(word) for found in soak_bounds.faults(module, family, call)[0])
 
 
-def test_random_motions_of_many_kinds(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.fixture(scope="module")
+def kinds(tmp_path_factory: pytest.TempPathFactory) -> dict[str, ModuleType]:
+    """The modules of the motions of many kinds."""
+    return soak_kinds.build(tmp_path_factory.mktemp("kinds"))
+
+
+@pytest.mark.parametrize("near", [1e-1, 2.5e-3, 1e-6, 1e-10, -1e-10, -2.5e-3])
+@pytest.mark.parametrize("v0", [0.68, 1e-5, 60.0])
+def test_friction_that_all_but_holds_the_body(near: float, v0: float, kinds: dict[str, ModuleType]) -> None:
+    """The acceleration is a small difference of large terms, whose roundings the bound holds (3.6 times outside)."""
+    for direction in (1, -1):
+        launch = {"lam0": 2.339, "v0": v0, "direction": direction, "a": -0.078156, "mu": 0.078156 * (1.0 - near)}
+        assert soak_kinds.slide(kinds, launch, random.Random(1)) == []
+
+
+DAMPED = {
+    "thrown slowly": (-0.065, 2.9e-7, 1, 0.2307, 0.0875),
+    "slowly against the spring": (-1.3769421491184743e-06, 2.819412749244849e-12, 1, 0.4326, 0.0383),
+    "from rest": (3.495744063186849e-07, 0.0, -1, 2.3434225222512235, 2.079290874827242),
+    "hardly at all": (0.05687488163703877, 2.2816675196297342e-10, -1, 0.1104213369442389, 0.16174555918681344),
+    "a leg of a few roundings": (-0.0012592848079292901, 1.115e-10, -1, 0.33347700500008876, 0.02659599827117379),
+    "seventy legs": (-0.008755379335412601, 0.0, -1, 68.37785985120317, 0.012754252274079185),
+}
+
+
+@pytest.mark.parametrize("case", DAMPED)
+def test_springs_with_viscous_damping(case: str, kinds: dict[str, ModuleType]) -> None:
+    """Each lay outside its bound, or was refused because what was left of a leg had no room for a panel."""
+    launch = dict(zip(("lam0", "v0", "direction", "k", "c"), DAMPED[case], strict=True))
+    assert soak_kinds.damp(kinds, launch, random.Random(1)) == []
+
+
+def test_no_speed_is_negative(kinds: dict[str, ModuleType]) -> None:
+    """At a turn, where rounding left -1.8e-16 of it."""
+    launch = {"lam0": -1.1087799233866897, "v0": 0.05760950449765136, "direction": 1, "t": -0.25721177667548717}
+    assert kinds["wells"].solve(**launch).v_min.value == 0.0
+
+
+def test_random_motions_of_many_kinds(kinds: dict[str, ModuleType], monkeypatch: pytest.MonkeyPatch) -> None:
     """On slopes, springs, circles and planes closed forms, sweeps and threads agree; what does not is told."""
-    modules = soak_kinds.build(tmp_path)
+    modules = kinds
     tally, failed, _ = soak_kinds.soak(110, 20, modules)
     assert failed == []
     assert tally["checks"] >= 500

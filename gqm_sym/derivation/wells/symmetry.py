@@ -22,7 +22,8 @@ class Symmetry:
     step
         From each to the next, None for a lone one: two mirrors make one of every multiple of their distance.
     monotone
-        Whether the potential is proved to rise or fall all the way between two of them that are neighbours.
+        Whether the potential is proved to rise or fall all the way between two of them that are neighbours, on a path
+        on which σ is nowhere negative.
     """
 
     place: sp.Expr

@@ -71,6 +71,7 @@ from gqm_sym.runtime.legs.leg_record import (
 from gqm_sym.runtime.legs.leg_run import (
     ASYMPTOTE,
     FULL,
+    LEAST_V2,
     LIFTOFF,
     LIMIT,
     NARROWED,
@@ -106,11 +107,11 @@ FIRST_STEPS, MAX_HALVINGS, MAX_FORCE_GROWTH = 8.0, 1000, 4.0
 # equilibrium that it never reaches.
 CREEPING_SHARE = 1e-6
 
+# As how many pauses one counts at which a body creeps: it does not come farther and farther.
+CREEPING_PAUSES = 5.0
+
 # A leg that is longer than this share of one that was not one polynomial is not tried as one.
 MAX_WHOLE_SHARE = 0.9
-
-# V**2 of a body at rest, for laws that take its root.
-LEAST_V2 = 1e-300
 
 
 NOTHING: Array = np.empty(0)
@@ -363,7 +364,7 @@ def advance(dissipation, p, joints, body, reads, record):  # type: ignore[no-unt
         is_open = period == 0.0 and not isfinite(body[HIGH] if body[DIRECTION] > 0.0 else body[LOW])
         creeps = record[AHEAD] >= PANELS_PER_RUN and found.step <= CREEPING_SHARE * body[FIRST_STEP]
         endless = what == PAUSED and (is_open or creeps)
-        body[PAUSES] = body[PAUSES] + 1.0 if endless else 0.0
+        body[PAUSES] = body[PAUSES] + (CREEPING_PAUSES if creeps else 1.0) if endless else 0.0
     body[PLACE], body[PLACE_LOW], body[V2], body[DIRECTION] = place, record[END_LOW], found.v2, found.direction
     body[CONTACT_SIGN], body[STEP] = found.contact_sign, found.step
     if what in (RESTS, NARROWED, LIFTOFF, ASYMPTOTE) or (what == LIMIT and period == 0.0):

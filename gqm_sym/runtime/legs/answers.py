@@ -42,7 +42,7 @@ LEG, END_TIME, REST_PLACE, ARRIVAL, LEAST_SPEED, MOST_SPEED, LEAST_LOAD, MOST_LO
 FOUND, LEFT, NONE = range(3)
 
 # On a curve without ends, after how many runs in a row without a turn no end is looked for any more.
-MAX_PAUSES = 12
+MAX_PAUSES = 60
 
 # The number of turns after which the place where the body comes to rest is not looked for any more.
 MAX_TURNS = 20000

@@ -4,7 +4,9 @@ Let the body start at a, at rest, and turn at b. With q the integral of Q from a
 ``-P(a) exp(-q) da``, and so the turn by ``db/da = P(a) exp(-q)/P(b)``. At a given distance from a, V**2 changes by
 ``(P - Q W - P(a) exp(-q)) da``: this is small next to a, and gives the change of the time from a to the middle of the
 run. From b to the middle it is the same with the direction reversed. What rounding makes of V**2 is a few units in the
-last place of all that it gained and lost, less what resistance has taken of that.
+last place of all that its terms gained and lost, less what resistance has taken of that; this also changes the time.
+What drives the body and what resists it may all but cancel: the sum of their sizes is the larger one of the forces on
+bodies that move in either direction.
 """
 
 from math import fabs, inf
@@ -15,14 +17,16 @@ from numba import types
 
 from gqm_sym.runtime.arithmetic.doubledouble import ULP
 from gqm_sym.runtime.arithmetic.matrices import multiply
+from gqm_sym.runtime.compiled.calls import call_speed_equation
 from gqm_sym.runtime.compiled.jit import Inner, entry
-from gqm_sym.runtime.compiled.registers import uncounted
+from gqm_sym.runtime.compiled.registers import on_stack, uncounted
 from gqm_sym.runtime.compiled.types import REAL, VECTOR, Array
 from gqm_sym.runtime.legs.advance import DISSIPATION
 from gqm_sym.runtime.legs.leg_equation import (
+    ARC_RATE,
     DS,
     EXPM1_Q,
-    FORCE,
+    GRADED,
     LOAD,
     MEAN,
     OFFSET,
@@ -59,11 +63,13 @@ from gqm_sym.runtime.legs.leg_record import (
     TIME_FROM_END,
     TIME_FROM_START,
 )
-from gqm_sym.runtime.legs.leg_run import point_buffer, slope_of_v2
-from gqm_sym.runtime.legs.polynomials import COUNT, SHARES, TO_COEFFICIENTS, WIDE, size_of, to_tails
+from gqm_sym.runtime.legs.leg_run import LEAST_V2, point_buffer, slope_of_v2
+from gqm_sym.runtime.legs.polynomials import COUNT, SHARES, TO_COEFFICIENTS, WIDE, to_tails
 
-# Roundings of V**2, of a place and of a time, in units in the last place.
-V2_ROUNDINGS, PLACE_ROUNDINGS, TIME_ROUNDINGS = 4.0, 1.0, 8.0
+# Roundings of V**2, of a place and of a time, in units in the last place. Laws that are not linear in V**2 take many
+# panels to a turn, each of which rounds V**2.
+V2_ROUNDINGS, NONLINEAR_V2_ROUNDINGS = 4.0, 16.0
+PLACE_ROUNDINGS, TIME_ROUNDINGS = 1.0, 6.0
 
 
 def _slopes() -> Array:
@@ -76,6 +82,9 @@ def _slopes() -> Array:
 
 
 to_slopes = multiply(_slopes().T)
+
+# A buffer for places, V**2 there, and the rows of the speed equation.
+other_way_buffer = on_stack(7 * WIDE)
 
 
 class Errors(NamedTuple):
@@ -106,7 +115,9 @@ class Half(NamedTuple):
     damping : float
         What resistance leaves of a change of V**2.
     gained : float
-        The sum of all gains and losses of V**2, less what resistance took of them.
+        The sum of all gains and losses of V**2 by each of its terms, less what resistance took of them.
+    rounded : float
+        The change of the time by a relative error of all these gains and losses.
     slope : float
         By how much V**2 grows per distance where they begin.
     rate : float
@@ -117,8 +128,21 @@ class Half(NamedTuple):
     by_v2: float
     damping: float
     gained: float
+    rounded: float
     slope: float
     rate: float
+
+
+@Inner
+def size_of_terms(forces, panel, work):  # type: ignore[no-untyped-def]
+    """The size of the terms of FORCE on a panel that was just solved (`solve_panel`)."""
+    rows, v, nu, size = other_way_buffer(), -float(forces.direction), float(panel.contact_sign), 0.0
+    for j in range(WIDE):
+        rows[j], rows[WIDE + j] = work[ARC_RATE + j], max(work[W + j], LEAST_V2)
+    call_speed_equation(forces.speed_equation, WIDE, rows, (0, WIDE, 2 * WIDE), v, nu, forces.params)
+    for j in range(COUNT):
+        size = max(size, max(fabs(work[P + j]), fabs(rows[3 * WIDE + j])) * (1.0 + work[EXPM1_Q + j]))
+    return size
 
 
 @Inner
@@ -131,14 +155,15 @@ def half_of_leg(forces, march, panels, v2, errors, record):  # type: ignore[no-u
         Where the first of them stands in the record, and their number.
     v2 : float
         V**2 where they begin.
-    errors : (float, float)
-        Errors of the place where they begin and of V**2 there. INHERITED of each panel becomes the largest error that
-        these make in the times to places of the panel that are given by their distance from there.
+    errors : (float, float, float)
+        Errors of the place where they begin, of V**2 there, and relative ones of gains and losses. INHERITED of each
+        panel becomes the largest error that these make in the times to places of the panel that are given by their
+        distance from there.
     """
     work = panel_buffer()
     set_nodes(work)
     (begin, count), left, u = panels, 0.0, float(march.direction)
-    by_place, by_v2, damping, gained, slope, rate = 0.0, 0.0, 1.0, v2, 0.0, 0.0
+    by_place, by_v2, damping, gained, rounded, slope, rate = 0.0, 0.0, 1.0, v2, 0.0, 0.0, 0.0
     for k in range(count):
         at = begin + k * COLUMNS
         right = record[at + RIGHT]
@@ -146,30 +171,37 @@ def half_of_leg(forces, march, panels, v2, errors, record):  # type: ignore[no-u
         panel = Panel(left, v2, contact_sign, (-inf, inf))
         begin_panel(forces, march, panel, right - left, work)
         if not solve_panel(forces, march, panel, work) < inf:
-            return Half(inf, inf, 1.0, inf, slope, rate)
+            return Half(inf, inf, 1.0, inf, inf, slope, rate)
+        size = size_of_terms(forces, panel, work)
         fill_rates(march, panel, work)
         if k == 0:
             slope = u * (work[P] - work[Q] * work[W])
         to_slopes(work, DS, work, MEAN)
         for j in range(WIDE):
-            kept = damping / (1.0 + work[EXPM1_Q + j])
+            remains = 1.0 / (1.0 + work[EXPM1_Q + j])
+            kept = damping * remains
             grows = (right - left) * (slope_at(left, march) + 2.0 * march.g * work[OFFSET + j])
             bend = work[MEAN + j] / (grows * work[DS + j])
             change = (u * (work[P + j] - work[Q + j] * work[W + j]) - slope * kept) / work[W + j]
             work[LOAD + j] = work[TIME_RATE + j] * (bend - 0.5 * change)
             work[MEAN + j] = work[TIME_RATE + j] * kept / work[W + j]
+            rounding = remains * (gained + size * work[D + j])
+            work[GRADED + j] = work[TIME_RATE + j] * rounding / work[W + j]
         to_tails(work, LOAD, work, TAILS)
-        inherited = fabs(by_place) * errors[0] + fabs(by_v2) * errors[1]
+        inherited = fabs(by_place) * errors[0] + fabs(by_v2) * errors[1] + rounded * errors[2]
         by_place += (right - left) * work[TAILS + 6]
         to_tails(work, MEAN, work, TAILS)
         by_v2 -= 0.5 * (right - left) * work[TAILS + 6]
-        record[at + INHERITED] = max(inherited, fabs(by_place) * errors[0] + fabs(by_v2) * errors[1])
+        to_tails(work, GRADED, work, TAILS)
+        rounded += 0.5 * (right - left) * work[TAILS + 6]
+        carried = fabs(by_place) * errors[0] + fabs(by_v2) * errors[1] + rounded * errors[2]
+        record[at + INHERITED] = max(inherited, carried)
         rest = 1.0 / (1.0 + work[EXPM1_Q + COUNT])
-        damping, gained = damping * rest, (gained + size_of(work, FORCE) * work[D + COUNT]) * rest
+        damping, gained = damping * rest, (gained + size * work[D + COUNT]) * rest
         last = right - 0.5 * (right - left) * (1.0 - SHARES[COUNT - 1])
         rate = work[TIME_RATE + COUNT - 1] / slope_at(last, march)
         left, v2 = right, max(work[W + COUNT], 0.0)
-    return Half(by_place, by_v2, damping, gained, slope, rate)
+    return Half(by_place, by_v2, damping, gained, rounded, slope, rate)
 
 
 @Inner
@@ -206,15 +238,16 @@ def carry(dissipation, p, turns, before, record):  # type: ignore[no-untyped-def
     p, record, forward = uncounted(p), uncounted(record), march_of(record)
     ahead, back, v = int(record[AHEAD]), int(record[BACK]), forward.direction
     forces = Forces(dissipation.speed_equation, p, dissipation.friction, dissipation.kinked, dissipation.linear, v)
-    first = half_of_leg(forces, forward, (HEAD, ahead), record[START_V2], (before.place, before.v2), record)
+    share = (V2_ROUNDINGS if dissipation.linear else NONLINEAR_V2_ROUNDINGS) * ULP
+    first = half_of_leg(forces, forward, (HEAD, ahead), record[START_V2], (before.place, before.v2, share), record)
     rounding = PLACE_ROUNDINGS * ULP * max(fabs(record[START]), fabs(record[END]))
-    own = own_time_error(record, HEAD, ahead) + TIME_ROUNDINGS * ULP * record[TIME_FROM_START]
+    own = own_time_error(record, HEAD, ahead) + TIME_ROUNDINGS * ULP * record[TIME_FROM_START] + share * first.rounded
     if not turns or back == 0:
         moved = fabs(first.by_place - first.rate) * before.place + fabs(first.by_v2) * before.v2
         of_v2 = first.damping * (before.v2 + fabs(first.slope) * before.place)
-        return rounding, of_v2 + V2_ROUNDINGS * ULP * first.gained, before.time + moved + own
+        return rounding, of_v2 + share * first.gained, before.time + moved + own
     backward = March((record[END], record[END_LOW]), -v, 1.0, 0.0)
-    second = half_of_leg(forces, backward, (HEAD + ahead * COLUMNS, back), 0.0, (1.0, 0.0), record)
+    second = half_of_leg(forces, backward, (HEAD + ahead * COLUMNS, back), 0.0, (1.0, 0.0, 0.0), record)
     damping = first.damping / second.damping
     gained = (first.gained + second.gained) / second.damping
     start_slope, rate = first.slope, first.rate
@@ -222,9 +255,10 @@ def carry(dissipation, p, turns, before, record):  # type: ignore[no-untyped-def
         start_slope, rate = slope_of_v2(forces, record[START], record[START_V2], 0, point_buffer()), second.rate
     by_place, by_v2 = -start_slope * damping / second.slope, damping / second.slope
     at_end = rate - second.by_place  # the time from the middle to the end, by the place of the end
-    of_end = V2_ROUNDINGS * ULP * gained / second.slope + rounding
+    of_end = share * gained / second.slope + rounding
     place = fabs(by_place) * before.place + fabs(by_v2) * before.v2 + of_end
     moved = fabs(first.by_place - rate + by_place * at_end) * before.place
     moved += fabs(first.by_v2 + by_v2 * at_end) * before.v2 + fabs(at_end) * of_end
     own += own_time_error(record, HEAD + ahead * COLUMNS, back) + TIME_ROUNDINGS * ULP * record[TIME_FROM_END]
+    own += share * second.rounded
     return place, 0.0, before.time + moved + own

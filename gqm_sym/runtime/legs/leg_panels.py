@@ -1,6 +1,6 @@
 """The panels of a leg: each as wide as V**2, the forces and the time rate can be resolved on it by a polynomial."""
 
-from math import fabs, inf, nan
+from math import fabs, inf, nan, sqrt
 from typing import NamedTuple
 
 from gqm_sym.runtime.compiled.intrinsics import bits, from_bits
@@ -309,9 +309,11 @@ def next_panel(forces, march, panel, request, work):  # type: ignore[no-untyped-
     timed : bool
         Whether time is resolved.
     """
-    width, step, ends_at_kink, widest = min(request.step, request.max_width), request.step, False, 0.0
+    step, ends_at_kink, widest = request.step, False, 0.0
     start, slope = distance(panel.left, march), slope_at(panel.left, march)
     unit = MIN_RELATIVE_WIDTH * max(fabs(march.origin[0] + march.direction * start), start)
+    # What is left of a leg may be hardly wider than the last panel may be narrow.
+    width = min(max(step, 4.0 * unit / (slope + sqrt(slope * slope + 8.0 * march.g * unit))), request.max_width)
     # Where rows are known before V**2 is, they show most panels that are too wide.
     curve_first = forces.linear and not forces.kinked
     last = Q_RATE if curve_first else P

@@ -105,6 +105,12 @@ STOPPING_SHARE = 2.0
 # The number of panels after which a run pauses.
 PANELS_PER_RUN = 512
 
+# The steps by which it is found where a body that moves slowly would have been at rest.
+REST_STEPS = 4
+
+# V**2 of a body at rest, for laws that take its root.
+LEAST_V2 = 1e-300
+
 # A buffer for one place, V**2 there, and the five numbers of the speed equation.
 point_buffer = on_stack(7)
 
@@ -333,13 +339,39 @@ def sign_of_load(forces, place, v2, point):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def begin_march(forces, start, place, contact_sign, point):  # type: ignore[no-untyped-def]
-    """The march variable from a start on, and the width that the first panel may have at most."""
+def distance_from_rest(forces, start, span, contact_sign, slope, point):  # type: ignore[no-untyped-def]
+    """How far behind a start V**2 would vanish, by the steps of Runge and Kutta from speed to speed."""
+    d, u, v = 0.0, sqrt(start.v2), start.direction
+    step, moved, sums = u / REST_STEPS, 2.0 * u / slope, 0.0
+    for k in range(REST_STEPS):
+        for stage in range(4):
+            if k + stage > 0:
+                share = 0.0 if stage == 0 else (1.0 if stage == 3 else 0.5)
+                speed = u - share * step if k + 1 < REST_STEPS or stage < 3 else 0.0
+                place = within(start.place - v * (d + share * step * moved), span)
+                there = slope_of_v2(forces, place, max(speed * speed, LEAST_V2), contact_sign, point)
+                moved = 2.0 * speed / there
+            sums = moved if stage == 0 else sums + (1.0 if stage == 3 else 2.0) * moved
+        d, u = d + step * sums / 6.0, u - step
+    return d
+
+
+@Inner
+def begin_march(forces, start, place, span, contact_sign, point):  # type: ignore[no-untyped-def]
+    """The march variable from a start on, and the width that the first panel may have at most.
+
+    After a slow launch the root of V**2 has its zero where the march variable is ``-c/2``: the speed over it would not
+    be smooth if c were only about right, and panels are too wide to tell.
+    """
     origin, g, c, widest = (start.place, start.place_low), 1.0, 0.0, inf
     if start.v2 > 0.0:
         slope = slope_of_v2(forces, place, start.v2, contact_sign, point)
         slow = slope > 0.0 and start.v2 <= slope * start.step
-        g, c = (1.0, 2.0 * sqrt(start.v2 / slope)) if slow else (0.0, 1.0)
+        if slow:
+            behind = distance_from_rest(forces, start, span, contact_sign, slope, point)
+            g, c = 1.0, 2.0 * sqrt(behind if 0.0 < behind <= start.step else start.v2 / slope)
+        else:
+            g, c = 0.0, 1.0
         # V**2 at launch is exact; a turn near the launch has all digits on a panel that is no wider than this.
         widest = STOPPING_SHARE * start.v2 / -slope if slope < 0.0 else inf
     return March(origin, start.direction, g, c), widest
@@ -355,7 +387,7 @@ def begin(forces, start, route, off, point):  # type: ignore[no-untyped-def]
     place = within(start.place, span)
     if contact_sign == 0:
         contact_sign = sign_of_load(forces, place, start.v2, point)
-    march, widest = begin_march(forces, start, place, contact_sign, point)
+    march, widest = begin_march(forces, start, place, span, contact_sign, point)
     return march, contact_sign, Ahead(upcoming, span, widest, True)
 
 

@@ -1,6 +1,6 @@
 """The motion of a conservative model that a launch begins: its ends, its kind, and the segments that it consists of."""
 
-from math import isfinite
+from math import isfinite, ulp
 
 import numpy as np
 
@@ -79,8 +79,8 @@ def _as_bilateral(formulas: Formulas, p: ParameterValues, launch: Launch) -> Mot
     f = bind(formulas, p, launch)
     problem = Problem(formulas, launch, p, f, domain)
     lam0, v0 = launch.lam0.value, launch.v0.value
-    near = CORNER_ROUNDINGS * float(np.spacing(abs(lam0)))
-    if v0 == 0.0 and f.between(f.corners, lam0 - near, lam0 + near).size:
+    near = CORNER_ROUNDINGS * ulp(lam0)
+    if v0 == 0.0 and f.corners.size and f.between(f.corners, lam0 - near, lam0 + near).size:
         behind_v2, ahead_v2 = _speeds_beside(problem)
         if behind_v2 < 0.0 and ahead_v2 < 0.0:
             return MotionAtRest(problem)

@@ -109,8 +109,14 @@ class PeriodicMotion(Motion):
     @cached_property
     def _orbit(self) -> Orbit | None:
         """Duration and turning points in double-double arithmetic; None where that does not suffice."""
-        times = timing.times_along(self._segment, is_thrown=False)
-        return timing.orbit_of(self.problem, self.kind, self.direction, self._offsets, times)
+        launch = self.problem, self.kind, self.direction, self._offsets
+        is_charted = self.problem.formulas.chart is not None
+        # No panels are needed where the trapezoidal rule has converged in doubles.
+        if is_charted or self._segment.known_duration is not None:
+            orbit = timing.orbit_of(*launch)
+            if is_charted or orbit is not None:
+                return orbit
+        return timing.orbit_of(*launch, timing.times_along(self._segment, is_thrown=False))
 
     def _timing(self, end_time: float) -> timing.Timing:
         """The times with as many digits as a phase needs at ``end_time`` in s from launch."""

@@ -393,12 +393,13 @@ class Segment:
     def _improved_by_panels(self, phi: Array, speeds: Array) -> Array:
         """|ds/dt| from the slopes of arc length and time, which has digits where V**2 in doubles is rounding only.
 
-        Where the body is so fast that the time hardly grows, its slope has fewer digits than V**2.
+        Where the body is so fast that the time hardly grows, its slope has fewer digits than V**2. At a turn rounding
+        leaves of the slope of arc length a little that may be negative, as no speed is.
         """
         lengths, times = slopes(self.edges, self.panels[4], phi), slopes(self.edges, self.panels[3], phi)
         limit = MIN_TIME_SLOPE * slopes(self.edges, self.panels[3], self.edges).max()
         np.divide(lengths, times, out=speeds, where=times > limit)
-        return speeds
+        return np.maximum(speeds, 0.0)
 
     def times(self, phi: Array) -> Array:
         """Time in s from the end ``a`` to phase angles."""

@@ -332,7 +332,7 @@ def _tabulated_range(formulas: "Formulas", columns: list[Array], domain: list[Ar
     if not all(column.size == 1 for column in (low, high, period, *columns[4:])) or not columns[0].size:
         return NO_TABLE
     p = np.array([column.item() for column in columns[4:]])
-    first, last, places = low.item(), high.item(), columns[0].reshape(-1)
+    first, last, places = low.item(), high.item(), np.ascontiguousarray(columns[0]).reshape(-1)
     if period.item() > 0.0:
         first, last = 0.0, period.item()
     elif not (isfinite(first) and isfinite(last)):

@@ -192,6 +192,8 @@ def test_where_a_body_leaves_a_ring(implicit: bool, ring: ModuleType, module_of:
         assert cut.values == pytest.approx(0.9 * float(truth))
     assert sweep("half_period", 0.0, speed, contact="above").status_counts() == {STATUS_SENTENCES[2]: 4}
     assert sweep("t_end", 0.0, speed, contact="below").values.tolist() == [0.0] * 5
+    every_other = np.repeat(0.0, 10)[::2]
+    assert np.array_equal(sweep("t_end", every_other, speed, contact="above").values, swept.values, equal_nan=True)
 
 
 def test_rolling_in_a_hoop(tmp_path: Path) -> None:

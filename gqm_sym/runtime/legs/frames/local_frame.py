@@ -19,10 +19,10 @@ from gqm_sym.runtime.compiled.jit import compiler, entry
 from gqm_sym.runtime.compiled.registers import on_stack
 from gqm_sym.runtime.compiled.types import MATRIX, VECTOR, Array
 from gqm_sym.runtime.interface import INTERFACE, SPEED_EQUATION, STATIC_BALANCE, Dissipation
-from gqm_sym.runtime.legs.advance import DISSIPATION, LEAST_V2
+from gqm_sym.runtime.legs.advance import DISSIPATION
 from gqm_sym.runtime.legs.leg_equation import Forces
 from gqm_sym.runtime.legs.leg_record import CHANGE_COUNT, END, MIDDLE, START, change_at
-from gqm_sym.runtime.legs.leg_run import point_buffer, slope_of_v2
+from gqm_sym.runtime.legs.leg_run import LEAST_V2, point_buffer, slope_of_v2
 from gqm_sym.runtime.legs.polynomials import WIDE
 
 # A swing is small if it is below these shares of the distance of e from 0, and of the range of the polynomial. Wider

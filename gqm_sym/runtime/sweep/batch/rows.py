@@ -27,6 +27,7 @@ TRIAL                distance that Newton's method tries next                   
 ZERO                 distance of the zero of V**2 ahead                                   search
 AXIS_DISTANCE        distance to the axis of symmetry that the orbit may have             search, proof
 AXIS_SPACING         distance from one axis to the next, 0 if there is only one           search
+AXIS_NUMBER          how many such distances that axis is from the one that is known      search
 ZERO_BEHIND          distance of the zero of V**2 behind; NaN while it is not known       search
 ==================== ==================================================================== ======================
 
@@ -47,7 +48,7 @@ BATCH, LANES = 128, 8
 INDEX, SUM, VALUE, CHANGE, FACTOR_LOW, FACTOR_HIGH, OFFSET_LOW, OFFSET_HIGH = range(8)
 END_LOW, END_HIGH, LAUNCH_PLACE, LAUNCH_V2, SEARCH_DIRECTION, SEARCH_LENGTH = range(8, 14)
 LENGTH_BEHIND, STATE, BRACKET_LOW, BRACKET_HIGH, TRIAL = range(14, 19)
-ZERO, AXIS_DISTANCE, AXIS_SPACING, ZERO_BEHIND, ROWS = range(19, 24)
+ZERO, AXIS_DISTANCE, AXIS_SPACING, AXIS_NUMBER, ZERO_BEHIND, ROWS = range(19, 25)
 TIME_ROWS, LIBRATION_ROWS, AXIS_LIBRATION_ROWS = SEARCH_DIRECTION, LAUNCH_PLACE, OFFSET_LOW
 
 # The LENGTH_BEHIND of a closed curve: both zeros lie within one period.

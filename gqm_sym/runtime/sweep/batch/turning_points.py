@@ -19,6 +19,7 @@ from gqm_sym.runtime.launch.zeros import CONSTANT_SHARE
 from gqm_sym.runtime.quadrature.trapezoid import CIRCULATION
 from gqm_sym.runtime.sweep.batch.rows import (
     AXIS_DISTANCE,
+    AXIS_NUMBER,
     AXIS_SPACING,
     BRACKET_HIGH,
     BRACKET_LOW,
@@ -127,9 +128,10 @@ def start_search(fns, n, rows, p, domain, monotone, work):  # type: ignore[no-un
     length, length_behind, trial = rows[SEARCH_LENGTH, :n], rows[LENGTH_BEHIND, :n], rows[TRIAL, :n]
     lows, highs, periods = domain[0, :n], domain[1, :n], domain[2, :n]
     places, places_low, steps = domain[3, :n], domain[4, :n], domain[5, :n]
-    axis, next_axis, zero, behind = (
+    axis, next_axis, number, zero, behind = (
         rows[AXIS_DISTANCE, :n],
         rows[AXIS_SPACING, :n],
+        rows[AXIS_NUMBER, :n],
         rows[ZERO, :n],
         rows[ZERO_BEHIND, :n],
     )
@@ -156,6 +158,7 @@ def start_search(fns, n, rows, p, domain, monotone, work):  # type: ignore[no-un
     for j in range(n):
         step, low, itself = steps[j], places_low[j], direction[j] * (places[j] - start[j])
         first = distance_to_axis(start[j], direction[j], places[j], step)
+        passed = whole_below((first - itself) / step + 0.5)  # from the known axis to the first ahead
         known_well = monotone & (low == low) & (first == itself)  # steps are rounded, and so are axes by them
         first += choose(known_well, direction[j] * low, 0.0)
         # A body released at rest moves towards the axis and turns on the other side of it.
@@ -169,6 +172,7 @@ def start_search(fns, n, rows, p, domain, monotone, work):  # type: ignore[no-un
         zero[j] = choose(known, zero[j], mirrored)
         state[j] = choose(decided & (zero[j] <= length[j]) & (state[j] == SEEKING), FOUND, state[j])
         axis[j], next_axis[j] = choose(known, axis[j], first), step
+        number[j] = choose(known | (step == 0.0), 0.0, direction[j] * passed)
 
 
 @Inner
@@ -184,18 +188,20 @@ def start_search_behind(n, rows):  # type: ignore[no-untyped-def]
         rows[LENGTH_BEHIND, :n],
         rows[STATE, :n],
     )
-    trial, zero, axis, next_axis, end, w0 = (
+    trial, zero, axis, next_axis, number, end, w0 = (
         rows[TRIAL, :n],
         rows[ZERO, :n],
         rows[AXIS_DISTANCE, :n],
         rows[AXIS_SPACING, :n],
+        rows[AXIS_NUMBER, :n],
         rows[END_LOW, :n],
         rows[LAUNCH_V2, :n],
     )
     behind = rows[ZERO_BEHIND, :n]
     for j in range(n):
         ahead, step = zero[j], next_axis[j]
-        last = axis[j] + choose(step > 0.0, step * whole_below((ahead - axis[j]) / step), 0.0)
+        passed = choose(step > 0.0, whole_below((ahead - axis[j]) / step), 0.0)
+        last, number[j] = axis[j] + step * passed, number[j] + direction[j] * passed
         end[j], axis[j] = direction[j] * ahead, direction[j] * last
         length[j] = choose(length_behind[j] == CLOSED, length[j] - ahead, length_behind[j])
         mirrored = choose(ahead > 2.0 * last, ahead - 2.0 * last, ahead)
@@ -270,7 +276,10 @@ def classify(n, rows):  # type: ignore[no-untyped-def]
 
 @Inner
 def set_ends(n, rows):  # type: ignore[no-untyped-def]
-    """Set both ends; STATE to FOUND where the orbit is even, and TRIAL to FOUND where only one axis lies within it."""
+    """Set both ends; STATE to FOUND where the orbit is even, and TRIAL to FOUND where only a known axis lies within it.
+
+    Wells about axes that are an odd number of spacings from the known one may have another shape than those about it.
+    """
     start, offset_low, offset_high, a, b = (
         rows[LAUNCH_PLACE, :n],
         rows[OFFSET_LOW, :n],
@@ -278,11 +287,12 @@ def set_ends(n, rows):  # type: ignore[no-untyped-def]
         rows[END_LOW, :n],
         rows[END_HIGH, :n],
     )
-    direction, zero, axis, step, state, trial = (
+    direction, zero, axis, step, number, state, trial = (
         rows[SEARCH_DIRECTION, :n],
         rows[ZERO, :n],
         rows[AXIS_DISTANCE, :n],
         rows[AXIS_SPACING, :n],
+        rows[AXIS_NUMBER, :n],
         rows[STATE, :n],
         rows[TRIAL, :n],
     )
@@ -290,7 +300,8 @@ def set_ends(n, rows):  # type: ignore[no-untyped-def]
         first, second = a[j], direction[j] * zero[j]
         missed = fabs(0.5 * (first + second) - axis[j])
         even = missed <= EVEN_TOLERANCE * (fabs(start[j]) + fabs(first) + fabs(second))
-        between = (step[j] == 0.0) | (fabs(first - second) < MAX_WIDTH * step[j])
+        known = number[j] == 2.0 * whole_below(0.5 * number[j])
+        between = (step[j] == 0.0) | ((fabs(first - second) < MAX_WIDTH * step[j]) & known)
         state[j], trial[j] = choose(even, FOUND, NOWHERE), choose(between, FOUND, NOWHERE)
     for j in range(n):
         first, second = a[j], direction[j] * zero[j]

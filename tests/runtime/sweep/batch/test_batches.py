@@ -196,3 +196,33 @@ def test_released_beside_the_top(module_of: ModuleOf) -> None:
             k = mp.sin(mpf(float(lam0)) / 2)
             truth = 2 * mp.ellipk(k * k) / mp.sqrt(mpf("9.81"))
             assert abs(mpf(float(value)) - truth) <= ULPS * np.spacing(float(truth))
+
+
+def test_wells_about_neighbouring_axes_differ(tmp_path: Path) -> None:
+    """Swings about both poles of a circle, also of the centre of a rolling body: each has the time of its own well."""
+    law = gqm.Potential("G*z - k*z**2") + gqm.Rolling(radius="rho")
+    module = gqm.build(gqm.derive(gqm.families.circle(L="1"), law), name="two_poles", folder=tmp_path)
+    size, reach = 0.75, np.array([0.05, 0.4, 0.9])
+    given = {"G": 3.0, "k": 8.0, "rho": 1.0 - size, "beta": 0.5}
+
+    def half_period(start: mpf, pole: int) -> mpf:
+        def height(angle: mpf) -> mpf:
+            return -3 * size * mp.cos(angle) - 8 * (size * mp.cos(angle)) ** 2
+
+        half = start - mp.pi * pole
+
+        def rate(u: mpf) -> mpf:
+            drop = height(start) - height(mp.pi * pole + half * mp.sin(u))
+            return half * mp.cos(u) * size * mp.sqrt(mpf(3) / 4 / drop)
+
+        return 2 * mp.quad(rate, [0, mp.pi / 4, mp.pi / 2], method="gauss-legendre")
+
+    for pole in (0, 1, -1, 3, 100):
+        swept = module.sweep("half_period", np.pi * pole + reach, **given)
+        assert swept.route_counts() == {"batch": reach.size}
+        for start, value in zip(np.pi * pole + reach, swept.values.tolist(), strict=True):
+            with mp.workdps(30):
+                assert value == pytest.approx(float(half_period(mpf(start), pole)), rel=4e-15)
+    # A body that is larger than the circle does not fit into it.
+    refused = module.sweep("turning_points", reach, **{**given, "rho": [0.25, 1.25, 1.25]})
+    assert refused.status.tolist() == [quantities.ANSWERED, quantities.REFUSED, quantities.REFUSED]
