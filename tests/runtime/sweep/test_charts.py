@@ -13,7 +13,8 @@ import gqm_sym as gqm
 from gqm_sym.runtime.sweep.quantities import STATUS_SENTENCES
 from gqm_sym.runtime.sweep.sweep import _tabulated
 
-G = mpf("9.81")
+with mp.workdps(40):
+    G = mpf("9.81")
 
 # Half periods: twice the distance from 1 to the next double, relative.
 TWO_ULPS = 2.0 * 2.0**-52
