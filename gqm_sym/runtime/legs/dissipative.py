@@ -21,7 +21,7 @@ from gqm_sym.runtime.launch.request import ONLY_SIGN, Launch
 from gqm_sym.runtime.launch.speed import path_and_force_at
 from gqm_sym.runtime.legs import answers
 from gqm_sym.runtime.legs.advance import AT_ONCE, BEYOND, LEAVES, RESTS, Joints, room_ahead
-from gqm_sym.runtime.legs.answers import LEG, MAX_PAUSES, MAX_TURNS
+from gqm_sym.runtime.legs.answers import LEAST_SWING, LEG, MAX_PAUSES, MAX_TURNS
 from gqm_sym.runtime.legs.body import (
     DIRECTION,
     ELAPSED,
@@ -37,6 +37,7 @@ from gqm_sym.runtime.legs.body import (
     PLACE,
     PLACE_LOW,
     TURNS,
+    VALUE,
     launched,
 )
 from gqm_sym.runtime.legs.frames.local_frame import SMALL_SHARE, Frame, frame_near, may_be_small
@@ -48,6 +49,7 @@ from gqm_sym.runtime.legs.leg_record import (
     CHANGE_COUNT,
     COLUMNS,
     END,
+    HEAD,
     HEADING,
     INHERITED,
     MIDDLE,
@@ -80,15 +82,16 @@ MAX_SEGMENTS = 250_000
 # questions one after the other do not copy it for each leg.
 EXTENSION = 1.25
 
-# How many panels a record has space for at first; a leg with more is followed again with a larger record.
-FEW_PANELS = 12
+# How many panels a record has space for at first; a leg with more is followed again with a larger record. How many legs
+# are followed in one call of a motion that has a horizon, whose legs are all needed.
+FEW_PANELS, LEGS_PER_CALL = 12, 8
 
 # A change of the contact force's sign this many roundings from the end of a piece is there.
 END_ROUNDINGS = 8.0
 
-# A swing about an equilibrium has died away when it is below this share of the last digit of its place, or so small
-# that V**2 and the errors of it come to the end of the range of doubles.
-LAST_DIGIT, LEAST_SWING = ULP / 64.0, 1e-110
+# A swing about an equilibrium has died away when it is below this share of the last digit of its place, or below
+# `LEAST_SWING`.
+LAST_DIGIT = ULP / 64.0
 
 # The names of what ends a run, where the code alone says it.
 END_NAMES = {
@@ -472,25 +475,21 @@ class DissipativeMotion(Motion):
                 f"motion: {MAX_SEGMENTS} pieces of legs reach t = {self._pieces[-1].t_stop[0]!r} only; "
                 "give a shorter t_max, or ask for earlier times and nearer places"
             )
-        problem, size, frame = self.problem, FEW_PANELS * COLUMNS, self._frame
-        loss, parameters = (_loss(problem), problem.functions.p) if frame is None else frame[:2]
-        while True:
-            record = np.empty(size)
-            what = answers.drive(loss, parameters.reshape(1, -1), self._joints, LEG, self._body, record)
-            if what != FULL:
-                break
-            size *= 4
+        problem, frame = self.problem, self._frame
+        what, *passed, record = self._followed()
         if self._body[0, DIRECTION] == 0.0 and not self._body[0, TURNS]:
             return  # the body stays where it is
+        self._runs += [Run(before, TURN, END_NAMES[TURN], None) for before in passed]
         self._at = self._body[0].tolist()
         if frame is not None:
             frame.move(record, 1)
             self._at[PLACE] = float(record[END])
-        if what == TURN and self._has_died_away(record):
+        head = record[:HEAD].tolist()
+        if what == TURN and self._has_died_away(head[START], head[END]):
             self._ending = "asymptote"
-        elif frame is None and what == TURN and abs(record[END] - record[START]) < SMALL_SHARE * abs(record[END]):
+        elif frame is None and what == TURN and abs(head[END] - head[START]) < SMALL_SHARE * abs(head[END]):
             self._enter_frame(self._at[PLACE], self._at[PLACE_LOW], 0.0)
-        heading = int(record[HEADING])
+        heading = int(head[HEADING])
         if what == LEAVES:
             raise leaving_at_once(problem, heading, "end of the domain")
         if what == SPENT:
@@ -510,11 +509,24 @@ class DissipativeMotion(Motion):
                 "give a shorter t_max"
             )
 
-    def _has_died_away(self, record: Array) -> bool:
+    def _followed(self) -> tuple[Any, ...]:
+        """What ended the last of the next legs (`advance`), and the records of all of them; one if the body stays."""
+        frame, size = self._frame, FEW_PANELS * COLUMNS
+        loss, parameters = (_loss(self.problem), self.problem.functions.p) if frame is None else frame[:2]
+        legs = LEGS_PER_CALL if frame is None and isfinite(self._horizon) else 1
+        while True:
+            records = np.empty((legs, size))
+            what = answers.drive(loss, parameters.reshape(1, -1), self._joints, LEG, self._body, records)
+            count = int(self._body[0, VALUE])
+            if what != FULL or count:
+                return (what if what != FULL else TURN), *records[: max(count, 1)]
+            legs, size = 1, 4 * size
+
+    def _has_died_away(self, start: float, end: float) -> bool:
         """Whether the body, which has turned, swings so closely about an equilibrium that its place shows no more."""
-        ends, frame = abs(record[[START, END]]), self._frame
-        swing = float(ends.max()) if frame is None else abs(self._body[0, PLACE])
-        if swing >= (LEAST_SWING if frame is None else max(LAST_DIGIT * float(ends[1]), LEAST_SWING)):
+        frame = self._frame
+        swing = max(abs(start), abs(end)) if frame is None else abs(self._body[0, PLACE])
+        if swing >= (LEAST_SWING if frame is None else max(LAST_DIGIT * abs(end), LEAST_SWING)):
             return False
         self._last_swing = swing
         return True

@@ -45,7 +45,7 @@ from gqm_sym.runtime.sweep.curve_table import (
     rise_on,
     value_on,
 )
-from gqm_sym.runtime.sweep.orbit import Orbit
+from gqm_sym.runtime.sweep.orbit import NO_ENDS, Orbit
 from gqm_sym.runtime.sweep.panel_forces import CONVEX, FAR, HIGHEST, NEAR, SLOPE_SIGN, TOP, prepare
 
 # By how much V**2 at the middle of a panel must exceed what the panel's rule needs.
@@ -341,7 +341,7 @@ def end_ahead(curve, launch, w0, direction):  # type: ignore[no-untyped-def]
             half_v2 = slack_at_edge(curve, launch, w0, 0, -1) + rows[0, INCREASE]
         offset = -way_between(curve.table, end, launch)
     size = 0.5 * w0 + rows[start, BASE_SIZE] + rows[k, BASE_SIZE] + fabs(rows[k, INCREASE])
-    certain = curve.has_ends and offset != 0.0 and half_v2 > MIN_LEAVING_SHARE * size
+    certain = curve.ends != NO_ENDS and offset != 0.0 and half_v2 > MIN_LEAVING_SHARE * size
     return offset, end, 2.0 * half_v2 if certain else np.nan
 
 
@@ -390,6 +390,9 @@ def find_passage(curve, lam0, v0, direction):  # type: ignore[no-untyped-def]
         else:
             leaves = -direction
             other, back, v2 = end_ahead(curve, launch, w0, -direction)
+    signs = curve.rows[front[0] % count, SLOPE_SIGN], curve.rows[back[0] % count, SLOPE_SIGN]
+    if leaves == 0 and not table.is_exact and (signs[0] == 0.0 or signs[1] == 0.0):
+        return none  # a swing about the lowest place of a panel has more digits without the table
     last_end = ahead if leaves == direction else behind
     if leaves != 0 and not (last_end == LIMIT and v2 > 0.0 and curve.period == 0.0):
         return none
