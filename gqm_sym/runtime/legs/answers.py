@@ -1,6 +1,6 @@
 """Bodies driven along the curve by compiled code: one leg of one body, or one number for the motion of each of many."""
 
-from math import inf, isfinite, sqrt
+from math import fabs, inf, isfinite, sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -29,11 +29,23 @@ from gqm_sym.runtime.legs.body import (
     TURNS,
     VALUE,
 )
+from gqm_sym.runtime.legs.frames.local_frame import SMALL_SHARE
 from gqm_sym.runtime.legs.leg_equation import Forces
 from gqm_sym.runtime.legs.leg_panels import GAP_COLUMNS
 from gqm_sym.runtime.legs.leg_reading import passage, peak_of_leg
-from gqm_sym.runtime.legs.leg_record import BEGIN, BEGIN_LOW, LAPS_BEFORE, PANELS, PASSAGE, PEAKS, START_V2, TIMES
-from gqm_sym.runtime.legs.leg_run import ASYMPTOTE, FULL, SPENT, point_buffer, slope_of_v2
+from gqm_sym.runtime.legs.leg_record import (
+    BEGIN,
+    BEGIN_LOW,
+    END,
+    LAPS_BEFORE,
+    PANELS,
+    PASSAGE,
+    PEAKS,
+    START,
+    START_V2,
+    TIMES,
+)
+from gqm_sym.runtime.legs.leg_run import ASYMPTOTE, FULL, SPENT, TURN, point_buffer, slope_of_v2
 
 # What is asked of each body; LEG is to advance by one leg.
 LEG, END_TIME, REST_PLACE, ARRIVAL, LEAST_SPEED, MOST_SPEED, LEAST_LOAD, MOST_LOAD = range(8)
@@ -49,6 +61,10 @@ MAX_TURNS = 20000
 
 # The most legs of one body.
 MAX_LEGS = 250_000
+
+# A swing about an equilibrium at 0 has died away when it is so small that V**2 and the errors of it come to the end of
+# the range of doubles.
+LEAST_SWING = 1e-110
 
 JOINTS = types.NamedUniTuple(VECTOR, 5, Joints)
 
@@ -154,12 +170,34 @@ def answer(dissipation, p, joints, question, body, record):  # type: ignore[no-u
     return np.nan, LEFT
 
 
+@Inner
+def is_tiny(record):  # type: ignore[no-untyped-def]
+    """Whether a leg is so short that the next one may be followed by its distance from an equilibrium, or by none."""
+    start, end = record[START], record[END]
+    return fabs(end - start) < SMALL_SHARE * fabs(end) or max(fabs(start), fabs(end)) < LEAST_SWING
+
+
+@Inner
+def follow_legs(dissipation, p, joints, body, records):  # type: ignore[no-untyped-def]
+    """Advance a body by as many legs as there are records, or to a leg after which something else is decided."""
+    what, count = RESTS, 0
+    while count < records.shape[0]:
+        what = advance(dissipation, p, joints, body, PANELS, records[count])
+        if what == FULL:
+            break
+        count += 1
+        if what != TURN or body[ENDING] != 0.0 or body[ELAPSED] >= body[HORIZON] or is_tiny(records[count - 1]):
+            break
+    body[VALUE] = count
+    return what
+
+
 @entry(
-    INTEGER(DISSIPATION, MATRIX, JOINTS, INTEGER, MATRIX, VECTOR),
+    INTEGER(DISSIPATION, MATRIX, JOINTS, INTEGER, MATRIX, MATRIX),
     nogil=True,
     checked=False,
 )
-def drive(dissipation, parameters, joints, question, bodies, record):  # type: ignore[no-untyped-def]
+def drive(dissipation, parameters, joints, question, bodies, records):  # type: ignore[no-untyped-def]
     """Drive bodies along the curve, each until a question about its motion is answered.
 
     Parameters
@@ -171,20 +209,21 @@ def drive(dissipation, parameters, joints, question, bodies, record):  # type: i
     joints : Joints
     question : int
         LEG to MOST_LOAD. The answer to all but LEG is in VALUE and STATUS of the body; LEAST_LOAD and MOST_LOAD mean
-        the contact force per mass.
+        the contact force per mass. VALUE after LEG is the number of legs that have been followed.
     bodies : (n, SIZE) array
         The bodies (`legs.body`), which are moved on.
-    record : array
-        Filled in with the last leg of the last body (`leg_record`).
+    records : (n, size) array
+        Filled in with the legs of the last body (`leg_record`), of which LEG asks for n at most. The first row is work
+        space of other questions.
 
     Returns
     -------
     int
-        What became of the last body on its leg (`advance`).
+        What became of the last body on its last leg (`advance`).
     """
     breaks, corners, drops, ahead, gaps = joints
     joints = Joints(uncounted(breaks), uncounted(corners), uncounted(drops), uncounted(ahead), uncounted(gaps))
-    parameters, bodies, record, what = uncounted(parameters), uncounted(bodies), uncounted(record), RESTS
+    parameters, bodies, records, what = uncounted(parameters), uncounted(bodies), uncounted(records), RESTS
     for k in range(bodies.shape[0]):
         p, body = parameters[k if parameters.shape[0] > 1 else 0], bodies[k]
         if parameters.shape[0] > 1:
@@ -192,9 +231,9 @@ def drive(dissipation, parameters, joints, question, bodies, record):  # type: i
         if body[STEP] == 0.0:
             launch(dissipation, p, joints, body)
         if question == LEG:
-            what = advance(dissipation, p, joints, body, PANELS, record) if body[DIRECTION] != 0.0 else RESTS
+            what = follow_legs(dissipation, p, joints, body, records) if body[DIRECTION] != 0.0 else RESTS
         elif body[DIRECTION] != 0.0:
-            body[VALUE], body[STATUS] = answer(dissipation, p, joints, question, body, record)
+            body[VALUE], body[STATUS] = answer(dissipation, p, joints, question, body, records[0])
         else:
             body[VALUE], body[STATUS] = at_rest(dissipation, p, body, question)
     return what

@@ -129,11 +129,11 @@ class Run(NamedTuple):
 
     def leg(self, lap: float, t_end: float) -> Leg:
         """The leg as one piece, which ends at a time in s; the curve's period is ``lap``, or 0."""
-        record = self.record
-        start, end, before = float(record[START]), float(record[END]), self.laps * lap
-        end = start if self.what == AT_ONCE else end
+        head = self.record[:HEAD].tolist()
+        start, before = head[START], head[LAPS_BEFORE] * lap
+        end = start if self.what == AT_ONCE else head[END]
         t_end = inf if self.what == ASYMPTOTE else t_end
-        return Leg(start + before, end + before, float(record[BEGIN]), t_end, int(record[HEADING]), self.end)
+        return Leg(start + before, end + before, head[BEGIN], t_end, int(head[HEADING]), self.end)
 
     @property
     def changes(self) -> list[float]:

@@ -94,7 +94,10 @@ def answer_driven(
     """
     chart, breaks, corners, drops = curve
     joints = Joints(breaks, corners, drops, np.empty(room_ahead(breaks.size)), np.zeros(room_kept(breaks.size)))
-    record, mass = np.empty((MAX_PANELS + breaks.size) * COLUMNS), PARAMETERS + list(formulas.parameters).index("m")
+    record, mass = (
+        np.empty((1, (MAX_PANELS + breaks.size) * COLUMNS)),
+        PARAMETERS + list(formulas.parameters).index("m"),
+    )
     for begin in range(part.start, part.stop, CHUNK):
         chunk = slice(begin, min(begin + CHUNK, part.stop))
         lines, found = lay_out(columns, chunk.start, chunk.stop), answers.part(chunk)

@@ -2,6 +2,10 @@
 
 from typing import Any, NamedTuple
 
+# What the ends of a table are: nothing that is known, the ends of the curve, through which bodies leave it, or places
+# where no body is in contact with the track any more.
+NO_ENDS, CURVE_ENDS, CONTACT_ENDS = range(3)
+
 
 class SweptCurve(NamedTuple):
     """The curve of a launch, with the forces on it.
@@ -16,8 +20,8 @@ class SweptCurve(NamedTuple):
         The places at which the curve is not smooth, within one period.
     period : float
         The period of a closed curve, 0 otherwise.
-    has_ends : bool
-        Whether a body can leave the curve through both ends of the table.
+    ends : int
+        What both ends of the table are: NO_ENDS, CURVE_ENDS or CONTACT_ENDS.
     mass : float
         The mass of the body.
     table : CurveTable
@@ -32,7 +36,7 @@ class SweptCurve(NamedTuple):
     p: Any
     joints: Any
     period: Any
-    has_ends: Any
+    ends: Any
     mass: Any
     table: Any
     factors: Any

@@ -41,10 +41,17 @@ from gqm_sym.runtime.quadrature.trapezoid import (
 from gqm_sym.runtime.sweep.arrivals import arrival
 from gqm_sym.runtime.sweep.curve_table import TABLE, CurveTable
 from gqm_sym.runtime.sweep.liftoff import liftoff_place
-from gqm_sym.runtime.sweep.orbit import Orbit, SweptCurve
+from gqm_sym.runtime.sweep.orbit import CONTACT_ENDS, Orbit, SweptCurve
 from gqm_sym.runtime.sweep.orbit_extremes import extreme, passage_extreme
 from gqm_sym.runtime.sweep.panel_forces import take_factors
-from gqm_sym.runtime.sweep.passage import BOTH, Passage, fill_slacks, find_passage, passage_of, travel_time
+from gqm_sym.runtime.sweep.passage import (
+    NOWHERE,
+    fill_slacks,
+    find_passage,
+    passage_of,
+    time_on_panel_of_both,
+    travel_time,
+)
 from gqm_sym.runtime.sweep.quantities import (
     ANSWERED,
     ANSWERS,
@@ -84,8 +91,8 @@ class GivenCurve(NamedTuple):
         Buffers for what `SweptCurve` has under these names; the levels are 0.
     mass : int
         Which run-time parameter is the mass of the body.
-    has_ends : bool
-        Whether a body can leave the curve through both ends of the table.
+    ends : int
+        What both ends of the table are (`SweptCurve`).
     side : int
         1 if the track can only push along the normal, -1 if only against it, 0 if it can push and pull.
     t_max : float
@@ -100,13 +107,13 @@ class GivenCurve(NamedTuple):
     rows: Array
     levels: NDArray[np.int8]
     mass: int
-    has_ends: bool
+    ends: int
     side: int
     t_max: float
 
 
 _BUFFERS = types.int64[:, ::1], VECTOR, MATRIX, types.int8[::1]
-GIVEN = types.NamedTuple((VECTOR, VECTOR, TABLE, *_BUFFERS, types.int64, types.boolean, types.int64, REAL), GivenCurve)
+GIVEN = types.NamedTuple((VECTOR, VECTOR, TABLE, *_BUFFERS, types.int64, types.int64, types.int64, REAL), GivenCurve)
 
 
 class Buffers(NamedTuple):
@@ -131,7 +138,7 @@ def find_orbit(curve, columns, k, monotone, spans, known):  # type: ignore[no-un
     )
     axis, step = element(columns, AXIS, k) if monotone else np.nan, element(columns, AXIS_STEP, k)
     even, v2 = axis == axis, v0 * v0
-    none, nowhere = Orbit(False, even, direction, lam0, v2, 0.0, 0.0, 0), Passage(0, 0, 0.0, 0.0, 0.0, BOTH, 0.0)
+    none, nowhere = Orbit(False, even, direction, lam0, v2, 0.0, 0.0, 0), NOWHERE
     total = lam0 + v0
     for row in range(columns.shape[0] - PARAMETERS):
         total += curve.p[row]
@@ -182,8 +189,8 @@ def value_from_table(curve, orbit, passage, quantity, target, slacks):  # type: 
     if quantity in (MIN_SPEED, MAX_SPEED, MIN_FORCE, MAX_FORCE):
         force, sign = quantity in (MIN_FORCE, MAX_FORCE), 1.0 if quantity in (MAX_SPEED, MAX_FORCE) else -1.0
         return passage_extreme(curve, orbit, passage, slacks, force, sign)
-    low, high = orbit.lam0 + orbit.low, orbit.lam0 + orbit.high
-    if orbit.leaves == 0 and passage.panels <= 2 and joints_between(curve.joints, curve.period, low, high).size == 0:
+    low, high, few = orbit.lam0 + orbit.low, orbit.lam0 + orbit.high, orbit.leaves == 0 and passage.panels <= 2
+    if few and not curve.table.is_exact and joints_between(curve.joints, curve.period, low, high).size == 0:
         return nan  # the orbit itself has more digits than a part of a panel
     return travel_time(curve, orbit, passage, slacks, target if quantity == ARRIVAL_TIME else nan)
 
@@ -214,12 +221,16 @@ def fill_answer(curve, orbit, passage, asked, buffers, out):  # type: ignore[no-
     if orbit.leaves != 0 and quantity in (HALF_PERIOD, PERIOD, TURNING_POINTS):
         return NOT_PERIODIC
     if side != 0 or quantity == END_TIME:
-        if side != 0 and not tabulated:
-            return UNDECIDED
-        place = liftoff_place(curve, orbit, passage, slacks, side) if side != 0 else nan
+        place = liftoff_place(curve, orbit, passage, slacks, side) if side != 0 and tabulated else nan
+        if side != 0 and not tabulated:  # as a small swing: it keeps contact if its least force is one of the track
+            least = value_by_itself(curve, orbit, MIN_FORCE if side > 0 else MAX_FORCE, target, buffers)
+            if orbit.leaves != 0 or not side * least > 0.0:
+                return UNDECIDED
         if place == place and quantity in (HALF_PERIOD, PERIOD, TURNING_POINTS):
             return NOT_PERIODIC
         if quantity != END_TIME and place == place:
+            return UNDECIDED
+        if place != place and orbit.leaves != 0 and curve.ends == CONTACT_ENDS:
             return UNDECIDED
         if quantity == END_TIME and place != place and orbit.leaves == 0:
             out[0] = t_max if t_max < inf else nan
@@ -232,7 +243,9 @@ def fill_answer(curve, orbit, passage, asked, buffers, out):  # type: ignore[no-
         out[0], out[1] = orbit.lam0 + orbit.low, orbit.lam0 + orbit.high
         return ANSWERED
     value = value_from_table(curve, orbit, passage, quantity, target, slacks) if tabulated else nan
-    if value != value and orbit.leaves == 0:
+    if quantity in (HALF_PERIOD, PERIOD) and passage.panels == 1 and passage.is_polished and curve.table.is_exact:
+        value = time_on_panel_of_both(curve, passage)
+    if value != value and orbit.leaves == 0 and not (quantity in (HALF_PERIOD, PERIOD) and curve.table.is_exact):
         value = value_by_itself(curve, orbit, quantity, target, buffers)
     if value == inf:
         return NEVER_THERE
@@ -268,8 +281,9 @@ def answer_one_by_one(fns, columns, monotone, quantity, spans, answers, given): 
     buffers = Buffers(trapezoid_workspace(), trapezoid_rates(), np.empty(panels + 1))
     taken = np.empty(count)
     p, joints, side, t_max = uncounted(given.parameters), uncounted(given.joints), given.side, given.t_max
-    edges, paths, parts = uncounted(given.table.edges), uncounted(given.table.paths), uncounted(given.table.parts)
-    table = CurveTable(edges, paths, parts, given.table.potentials)
+    edges, lows = uncounted(given.table.edges), uncounted(given.table.edge_lows)
+    paths, parts = uncounted(given.table.paths), uncounted(given.table.parts)
+    table = CurveTable(edges, lows, paths, parts, given.table.potentials, given.table.is_exact)
     rows, levels, factors = uncounted(given.rows), uncounted(given.levels), uncounted(given.factors)
     columns, spans, values = uncounted(columns), uncounted(spans), uncounted(answers.values)
     statuses, routes = uncounted(answers.status), uncounted(answers.route)
@@ -280,7 +294,7 @@ def answer_one_by_one(fns, columns, monotone, quantity, spans, answers, given): 
         for row in range(columns.shape[0] - PARAMETERS):
             p[row] = element(columns, PARAMETERS + row, k)
         period = element(columns, DOMAIN_PERIOD, k)
-        curve = SweptCurve(fns, p, joints, period, given.has_ends, p[given.mass], table, factors, rows, levels)
+        curve = SweptCurve(fns, p, joints, period, given.ends, p[given.mass], table, factors, rows, levels)
         for i in range(count):
             taken[i] = element(given.factor_columns, i, k)
         take_factors(curve, taken)

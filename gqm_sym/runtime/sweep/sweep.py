@@ -16,17 +16,20 @@ from gqm_sym.errors import GQMError, InputError, ParameterError, SolutionError
 from gqm_sym.literals.namespaces import ARRAYS
 from gqm_sym.literals.numbers import read_number
 from gqm_sym.runtime.charts.chart import CORNER_ROUNDINGS, ChartMaker
+from gqm_sym.runtime.charts.true_parts import NO_PARTS, parts_along
 from gqm_sym.runtime.compiled.strided import DOMAIN_PERIOD, LAM0, PARAMETERS, V0, lay_out, pointers, widen
 from gqm_sym.runtime.compiled.threads import run_in_threads
 from gqm_sym.runtime.compiled.types import Array
-from gqm_sym.runtime.launch.formulas import chart_with
+from gqm_sym.runtime.interface import ExactPotential
+from gqm_sym.runtime.launch.formulas import chart_with, true_pieces_of
 from gqm_sym.runtime.launch.request import CONTACTS, ONLY_SIGN, LaunchRequest
-from gqm_sym.runtime.launch.speed import potential_at
+from gqm_sym.runtime.launch.speed import path_and_force_at, potential_at
 from gqm_sym.runtime.multiprecision.exact_problem import NOWHERE
 from gqm_sym.runtime.sweep import quantities, scalar
 from gqm_sym.runtime.sweep.batch.batches import answer_batches
 from gqm_sym.runtime.sweep.curve_table import NO_TABLE, CurveTable, Source, tabulate
 from gqm_sym.runtime.sweep.dissipative_loop import MIN_BODIES_PER_THREAD, answer_driven, asked_of_bodies
+from gqm_sym.runtime.sweep.orbit import CONTACT_ENDS, CURVE_ENDS, NO_ENDS
 from gqm_sym.runtime.sweep.panel_forces import ROW
 from gqm_sym.runtime.sweep.quantities import QUANTITIES, Answers, Quantity
 from gqm_sym.runtime.sweep.result import Sweep
@@ -44,9 +47,9 @@ Solve = Callable[[LaunchRequest, tuple[Any, ...]], Any]
 # Quantities that are answered by batches themselves; for others batches find the span of an orbit.
 ANSWERED_BY_BATCHES = (quantities.HALF_PERIOD, quantities.PERIOD, quantities.TURNING_POINTS)
 
-# Into how many pieces a curve with formulas is cut at least before it is tabulated, and how often the range of places
-# is doubled to contain all motions.
-MIN_PIECES, MAX_DOUBLINGS = 64, 8
+# Into how many pieces a curve with formulas is cut at least before it is tabulated. By which share of itself the range
+# of launch places is extended at first, so that it contains all motions, and how often that is doubled.
+MIN_PIECES, FIRST_SHARE, MAX_DOUBLINGS = 64, 0.125, 10
 
 
 def sweep(
@@ -244,8 +247,8 @@ class Group(NamedTuple):
         The curve tabulated, where no energy is lost.
     factors : list of arrays
         What each launch multiplies the parts of potential and load in the table with.
-    has_ends : bool
-        Whether bodies leave the curve through both ends of the table.
+    ends : int
+        What both ends of the table are (`SweptCurve`).
     """
 
     columns: list[Array]
@@ -255,7 +258,7 @@ class Group(NamedTuple):
     drops: Array = NOWHERE
     table: CurveTable = NO_TABLE
     factors: list[Array] = _WHOLE
-    has_ends: bool = False
+    ends: int = NO_ENDS
 
 
 def _groups(
@@ -268,8 +271,8 @@ def _groups(
     if formulas.chart is None:
         domain = [widen(value, shape) for value in _domain_columns(formulas, columns[4:])]
         may_lift_off = only_sign and not formulas.dissipation
-        table = _tabulated_range(formulas, columns, domain) if may_lift_off else NO_TABLE
-        yield Group([*columns[:4], *domain, *columns[4:]], table=table, factors=_WHOLE), None
+        table, ends = _tabulated_range(formulas, columns, domain, only_sign) if may_lift_off else (NO_TABLE, NO_ENDS)
+        yield Group([*columns[:4], *domain, *columns[4:]], table=table, ends=ends), None
         return
     held, factors = _held(formulas, len(columns) - 4), _WHOLE
     if formulas.separated is not None and formulas.dissipation is None:
@@ -282,13 +285,17 @@ def _groups(
         except GQMError:
             continue  # `solve` says why
         domain = [np.array(value) for value in (*chart.range, nan, nan, 0.0)]
-        table = NO_TABLE if formulas.dissipation else _tabulated(formulas.chart, _source(formulas), values)
+        table = NO_TABLE
+        if not formulas.dissipation:
+            made_from = _source(formulas), _exact_parts(formulas), len(formulas.parameters)
+            table = _tabulated(formulas.chart, *made_from, values)
         some, theirs = columns, factors
         if chosen is not None:
             some, theirs = ([_chosen(column, shape, chosen) for column in of] for of in (columns, factors))
         has_ends = not chart.period and chart.ends == ("domain-end", "domain-end")
+        ends = CURVE_ENDS if has_ends else NO_ENDS
         launches, drops = [*some[:4], *domain, *some[4:]], chart.corners[chart.bends * only_sign < 0.0]
-        yield Group(launches, chart.block, chart.breaks, chart.corners, drops, table, theirs, has_ends), chosen
+        yield Group(launches, chart.block, chart.breaks, chart.corners, drops, table, theirs, ends), chosen
 
 
 def _held(formulas: "Formulas", count: int) -> list[int]:
@@ -321,38 +328,74 @@ def _rests_on_corner(group: Group) -> NDArray[np.bool_]:
     return on_corner
 
 
-def _tabulated_range(formulas: "Formulas", columns: list[Array], domain: list[Array]) -> CurveTable:
-    """The table of a curve with formulas on the range of all motions; empty if launches differ in parameters."""
+def _tabulated_range(
+    formulas: "Formulas", columns: list[Array], domain: list[Array], only_sign: int
+) -> tuple[CurveTable, int]:
+    """The table of a curve with formulas on the range of all motions, and what its ends are.
+
+    It is empty if launches differ in parameters.
+    """
     low, high, period = domain[:3]
     if not all(column.size == 1 for column in (low, high, period, *columns[4:])) or not columns[0].size:
-        return NO_TABLE
+        return NO_TABLE, NO_ENDS
     p = np.array([column.item() for column in columns[4:]])
     first, last, places = low.item(), high.item(), np.ascontiguousarray(columns[0]).reshape(-1)
+    ends = NO_ENDS
     if period.item() > 0.0:
         first, last = 0.0, period.item()
-    elif not (isfinite(first) and isfinite(last)):
+    elif isfinite(first) and isfinite(last):
+        ends = CURVE_ENDS
+    else:
         if not np.isfinite(places).all():
-            return NO_TABLE
-        # From all launches outwards, until the potential is above the energy of each.
-        fns, width = formulas.addresses, max(float(np.ptp(places)), 1.0)
-        top = float(np.max(potential_at(fns, p, places)[0] + 0.5 * float(np.max(columns[1])) ** 2))
-        ends = [float(places.min()), float(places.max())]
-        for side, limit in enumerate((first, last)):
+            return NO_TABLE, NO_ENDS
+        # From all launches outwards, until the potential is above the energy of each or none is in contact any more.
+        fns, closed, reach = formulas.addresses, 0, [float(places.min()), float(places.max())]
+        heights, energies = potential_at(fns, p, places)[0], 0.5 * columns[1] ** 2
+        energy = np.array([np.min(heights) + np.min(energies), np.max(heights) + np.max(energies)])
+        for side, (limit, sense) in enumerate(((first, -1.0), (last, 1.0))):
+            width = FIRST_SHARE * float(np.ptp(places)) or 1.0
             for _ in range(MAX_DOUBLINGS):
-                ends[side] = max(ends[side] - width, limit) if side == 0 else min(ends[side] + width, limit)
-                if not potential_at(fns, p, np.array(ends[side : side + 1]))[0, 0] < top:
+                place = reach[side] + sense * width
+                reach[side] = max(place, limit) if side == 0 else min(place, limit)
+                both = np.repeat(reach[side], 2)
+                v2 = 2.0 * (energy - potential_at(fns, p, both)[0])
+                force = path_and_force_at(fns, p, both, np.maximum(v2, 0.0))[4]  # it is linear in the energy
+                if not v2[1] > 0.0 or (only_sign * force < 0.0).all():
+                    closed += 1
                     break
                 width *= 2.0
-        first, last = ends
+        first, last = reach
+        ends = CONTACT_ENDS if closed == 2 else NO_ENDS
     pieces = np.linspace(first, last, MIN_PIECES + 1)
-    return CurveTable(*tabulate(_source(formulas), p, pieces))
+    return CurveTable(*tabulate(_source(formulas), NO_PARTS, p, pieces)), ends
+
+
+def _exact_parts(formulas: "Formulas") -> Callable[..., Any] | None:
+    """The function that gives the parts of the potential by coordinates, and perhaps more behind them."""
+    if formulas.separated is not None:
+        return formulas.separated.parts
+    return formulas.exact.effective_potential if isinstance(formulas.exact, ExactPotential) else None
 
 
 @lru_cache(maxsize=8)
-def _tabulated(maker: ChartMaker, source: Source, values: tuple[float, ...]) -> CurveTable:
-    """The table of a chart; it is made once for the same parameters."""
-    chart = chart_with(maker, values)
-    return CurveTable(*tabulate(source, np.concatenate([values, chart.block]), chart.edges))
+def _tabulated(
+    maker: ChartMaker,
+    source: Source,
+    exact_parts: Callable[..., Any] | None,
+    parameters: int,
+    values: tuple[float, ...],
+) -> CurveTable:
+    """The table of a chart; it is made once for the same parameters. Behind these many stand functions of them."""
+    chart, true = chart_with(maker, values), None
+    if exact_parts is not None and maker.is_exact(chart):
+        p = tuple(read_number(value, where="p") for value in values)
+        try:
+            pieces = true_pieces_of(maker, p[:parameters], chart)
+            true = pieces and parts_along(pieces, exact_parts, source.potentials, p)
+        except GQMError:
+            true = None  # then the table has the digits of the chart
+    p_and_chart = np.concatenate([values, chart.block])
+    return CurveTable(*tabulate(source, true or NO_PARTS, p_and_chart, chart.edges))
 
 
 def _distinct(
@@ -388,10 +431,12 @@ def _answer(formulas: "Formulas", asked: Asked, group: Group, answers: Answers, 
             wanted = code if code in ANSWERED_BY_BATCHES else quantities.SPANS
             counts = (batches.orbit_rows, batches.integrand_rows)
             answer_batches(batches.addresses(), counts, *launches, wanted, found._replace(values=spans))
+            if wanted == code and not (found.status == quantities.UNDECIDED).any():
+                continue
         parameters = np.concatenate([np.empty(len(lines) - PARAMETERS), chart])
         factors = lay_out(group.factors, chunk.start, chunk.stop)
         buffers = np.full(len(factors), nan), np.empty((len(table.paths), ROW)), np.zeros(len(table.paths), np.int8)
-        shared = parameters, joints, table, pointers(factors), *buffers, mass, group.has_ends
+        shared = parameters, joints, table, pointers(factors), *buffers, mass, group.ends
         given = scalar.GivenCurve(*shared, asked.side, asked.t_max)
         scalar.answer_one_by_one(formulas.addresses, *launches, code, spans, found, given)
 

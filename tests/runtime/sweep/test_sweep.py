@@ -325,3 +325,25 @@ def test_old_names_of_a_sweep(old: str, new: str, module_of: ModuleOf) -> None:
     """An earlier name is refused with the present one."""
     with pytest.raises(AttributeError, match=f"{old}.* {new}"):
         getattr(module_of("circle").sweep("period", 0.5, L=1), old)
+
+
+def test_bodies_leave_an_endless_hill(module_of: ModuleOf) -> None:
+    """From the top of a quartic hill (gravity that pulls upwards on a bowl): no body goes on to where it would fall."""
+    speeds, g = np.array([0.5, 1.0, 2.5]), mpf(9.81)
+    swept = module_of("quartic").sweep("t_end", 0.0, speeds, contact="below", g=-9.81)
+    assert swept.route_counts() == {"single": speeds.size}
+
+    def time_of_flight(v0: mpf) -> mpf:
+        place = mp.findroot(lambda x: 12 * v0**2 * x**2 + 8 * g * x**6 - g, 0.5)
+        return mp.quad(lambda x: mp.sqrt((1 + 16 * x**6) / (v0**2 + 2 * g * x**4)), mp.linspace(0, place, 5))
+
+    for v0, value in zip(speeds.tolist(), swept.values.tolist(), strict=True):
+        with mp.workdps(30):
+            assert value == pytest.approx(float(time_of_flight(mpf(v0))), rel=1e-13)
+
+
+def test_small_swings_keep_contact(module_of: ModuleOf) -> None:
+    """Next to the bottom a panel of a table tells less than the orbit, and no launch is solved by itself for that."""
+    swept = module_of("circle").sweep("t_end", 10.0 ** np.linspace(-9, -1, 9), contact="above", t_max=5.0, L=1)
+    assert swept.values.tolist() == [5.0] * 9
+    assert swept.route_counts() == {"single": 9}
