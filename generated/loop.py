@@ -1,5 +1,5 @@
 # Made by gqm-gen for "loop". Do not edit: change its declaration and generate again.
-# interface 9, input e5eeff356595, body 850ba707ad2a
+# interface 9, input e5eeff356595, body 106f856c06e1
 """Loop of a roller coaster
 
 x              = x(s)
@@ -120,6 +120,10 @@ def exact_factors(op, p):
     """What stands before the parts of U, then before those of n0."""
     g = p[3]
     return g, g
+
+def exact_parts(op, x, z, p):
+    """Parts of U, by coordinates."""
+    return z
 
 
 def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = None, a: Any = '2', c: Any = '2', R: Any = '1.5', g: Any = '9.81', m: Any = '1', **unknown: Any) -> Pass1:
@@ -278,7 +282,7 @@ MODEL = CompiledModel(
         potential_divdiff2.address, bounds.address,
     ),
     chart=CHART,
-    separated=SeparatedTerms(separated_terms, exact_factors, potentials=1, loads=1, held=()),
+    separated=SeparatedTerms(separated_terms, exact_factors, potentials=1, loads=1, held=(), parts=exact_parts),
     exact=ExactPotential(
         exact_effective_potential,
     ),

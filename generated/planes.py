@@ -1,5 +1,5 @@
 # Made by gqm-gen for "planes". Do not edit: change its declaration and generate again.
-# interface 9, input 1c6e3a707056, body 252f34bccffc
+# interface 9, input 1c6e3a707056, body 7f0daea45348
 """Stitched planes through surveyed points
 
 x              = x(s)
@@ -179,6 +179,10 @@ def exact_factors(op, p):
     g = p[0]
     return g, g
 
+def exact_parts(op, x, z, p):
+    """Parts of U, by coordinates."""
+    return z
+
 
 def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = None, g: Any = '9.81', m: Any = '1', **unknown: Any) -> Pass1:
     """Position, metric, curvature, V**2 and contact force at places of the curve (Pass 1, no quadrature).
@@ -331,7 +335,7 @@ MODEL = CompiledModel(
         potential_divdiff2.address, bounds.address,
     ),
     chart=CHART,
-    separated=SeparatedTerms(separated_terms, exact_factors, potentials=1, loads=1, held=()),
+    separated=SeparatedTerms(separated_terms, exact_factors, potentials=1, loads=1, held=(), parts=exact_parts),
     exact=ExactPotential(
         exact_effective_potential,
     ),

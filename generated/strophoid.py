@@ -1,5 +1,5 @@
 # Made by gqm-gen for "strophoid". Do not edit: change its declaration and generate again.
-# interface 9, input 761b603021f8, body 76bffc9e6e18
+# interface 9, input 761b603021f8, body 72acaae473d2
 """Bead on the hanging loop of a right strophoid
 
 F              = x**2*(a - z) - z**2*(a + z)
@@ -159,6 +159,10 @@ def exact_factors(op, p):
     g = p[1]
     return g, g
 
+def exact_parts(op, x, z, p):
+    """Parts of U, by coordinates."""
+    return z
+
 
 def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = None, a: Any = '1.8', g: Any = '9.81', m: Any = '1', **unknown: Any) -> Pass1:
     """Position, metric, curvature, V**2 and contact force at places of the curve (Pass 1, no quadrature).
@@ -311,7 +315,7 @@ MODEL = CompiledModel(
         potential_divdiff2.address, bounds.address,
     ),
     chart=CHART,
-    separated=SeparatedTerms(separated_terms, exact_factors, potentials=1, loads=1, held=()),
+    separated=SeparatedTerms(separated_terms, exact_factors, potentials=1, loads=1, held=(), parts=exact_parts),
     exact=ExactPotential(
         exact_effective_potential,
     ),

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "superellipse". Do not edit: change its declaration and generate again.
-# interface 9, input fe6d2f95d843, body 32b04f780140
+# interface 9, input fe6d2f95d843, body d56706dafc05
 """Bead inside a superellipse, flat at its lowest point
 
 F              = -1 + z**4/b**4 + x**4/a**4
@@ -151,6 +151,10 @@ def exact_factors(op, p):
     """What stands before the parts of U, then before those of n0."""
     g = p[2]
     return g, g
+
+def exact_parts(op, x, z, p):
+    """Parts of U, by coordinates."""
+    return z
 
 
 def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = None, a: Any = '1.4', b: Any = '0.9', g: Any = '9.81', m: Any = '1', **unknown: Any) -> Pass1:
@@ -304,7 +308,7 @@ MODEL = CompiledModel(
         potential_divdiff2.address, bounds.address,
     ),
     chart=CHART,
-    separated=SeparatedTerms(separated_terms, exact_factors, potentials=1, loads=1, held=()),
+    separated=SeparatedTerms(separated_terms, exact_factors, potentials=1, loads=1, held=(), parts=exact_parts),
     exact=ExactPotential(
         exact_effective_potential,
     ),

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "track". Do not edit: change its declaration and generate again.
-# interface 9, input e49691f04fda, body ff5c99da7a0f
+# interface 9, input e49691f04fda, body 3f06b599adfe
 """Hills of a roller coaster, as surveyed
 
 x              = x(s)
@@ -179,6 +179,10 @@ def exact_factors(op, p):
     g = p[0]
     return g, g
 
+def exact_parts(op, x, z, p):
+    """Parts of U, by coordinates."""
+    return z
+
 
 def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = None, g: Any = '9.81', m: Any = '1', **unknown: Any) -> Pass1:
     """Position, metric, curvature, V**2 and contact force at places of the curve (Pass 1, no quadrature).
@@ -331,7 +335,7 @@ MODEL = CompiledModel(
         potential_divdiff2.address, bounds.address,
     ),
     chart=CHART,
-    separated=SeparatedTerms(separated_terms, exact_factors, potentials=1, loads=1, held=()),
+    separated=SeparatedTerms(separated_terms, exact_factors, potentials=1, loads=1, held=(), parts=exact_parts),
     exact=ExactPotential(
         exact_effective_potential,
     ),

@@ -100,12 +100,15 @@ class SeparatedIR:
         What depends on the place, as `interface` orders its rows.
     factors : ExactIR
         What depends on run-time parameters alone.
+    parts : ExactIR or None
+        What depends on the place of the potential, by coordinates; None where it depends on more.
     potentials : int
         How many of the products belong to the potential.
     """
 
     function: FunctionIR
     factors: ExactIR
+    parts: ExactIR | None
     potentials: int
 
 

@@ -162,13 +162,15 @@ def _model_fields(module: ModuleIR, names: list[str]) -> dict[str, Any]:
 def _exact_functions(module: ModuleIR) -> list[ExactIR]:
     """All formulas of a module over a namespace of operations, in the order in which they are printed."""
     chart, separated = module.chart, module.separated
-    return [*module.exact, *(chart.exact if chart else ()), *((separated.factors,) if separated else ())]
+    of_parts = (separated.factors, *((separated.parts,) if separated.parts else ())) if separated else ()
+    return [*module.exact, *(chart.exact if chart else ()), *of_parts]
 
 
 def _separated(terms: SeparatedIR) -> str:
     """The arguments of ``SeparatedTerms``."""
     held, loads = tuple(index for _, index in terms.function.parameters), len(terms.factors.outputs) - terms.potentials
     counts = f"potentials={terms.potentials}, loads={loads}, held={held!r}"
+    counts += f", parts={terms.parts.name}" if terms.parts else ""
     return f"{terms.function.name}, {terms.factors.name}, {counts}"
 
 

@@ -192,6 +192,8 @@ class SeparatedTerms(NamedTuple):
         How many parts U and n0 have.
     held : tuple of int
         Where in ``p`` the numbers stand that ``function`` reads.
+    parts : callable or None
+        ``f(op, x, z, p)`` gives the parts of U; None where they depend on more than coordinates.
     """
 
     function: Any
@@ -199,6 +201,7 @@ class SeparatedTerms(NamedTuple):
     potentials: int
     loads: int
     held: tuple[int, ...]
+    parts: Callable[..., Any] | None = None
 
 
 class ExactPotential(NamedTuple):

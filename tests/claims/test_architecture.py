@@ -81,6 +81,7 @@ TESTED_THROUGH = {
     "charts/evaluate.py": "runtime/charts/test_chart.py",
     "charts/exact_parts.py": "runtime/charts/test_exact_normals.py",
     "charts/level_pieces.py": "runtime/charts/test_tracing.py",
+    "charts/true_parts.py": "runtime/sweep/test_charts.py",
     "charts/true_pieces.py": "runtime/charts/test_true_times.py",
     "compiled/buffers.py": "runtime/charts/test_tracing.py",
     "compiled/intrinsics.py": "runtime/arithmetic/test_elementary.py",

@@ -48,6 +48,9 @@ from gqm_sym.runtime.double_double.recording import BoundTape
 # about the square of that. Others are halved, as often as this.
 MAX_TAIL, MAX_HALVINGS = 1e-13, 40
 
+# The largest ratio of the values of y at both ends of a panel behind a turning point on another piece; a power of 2.
+MAX_RATIO = 2.0
+
 # On a piece that is nearer to a turning point than so many of its lengths, the nodes are spread for that.
 MAX_NEAR = 4.0
 
@@ -189,10 +192,17 @@ def panel_time(path, number, left, right, spread):  # type: ignore[no-untyped-de
 
 @Inner
 def time_by_panels(path, number, left, right, spread):  # type: ignore[no-untyped-def]
-    """Return the time between two places of a piece, in panels that are halved until resolved, with its error."""
-    ends = np.empty((MAX_HALVINGS + 1, 2))
+    """Return the time between two places of a piece, in panels that are halved until resolved, with its error.
+
+    Behind a turning point very near the edge of another piece the integrand has terms in 1/y**2 if the curvature jumps
+    there: no panel has ends of too different y, because its nodes would miss them.
+    """
+    ends = np.empty((2 * MAX_HALVINGS + 1, 2))
     ends[0, 0], ends[0, 1] = right
     pending, high, low, error = 1, 0.0, 0.0, 0.0
+    while spread[0] != 0.0 and ends[pending - 1, 0] > MAX_RATIO * left[0] > 0.0 and pending <= MAX_HALVINGS:
+        ends[pending, 0], ends[pending, 1] = ends[pending - 1, 0] / MAX_RATIO, ends[pending - 1, 1] / MAX_RATIO
+        pending += 1
     while pending > 0:
         right = ends[pending - 1, 0], ends[pending - 1, 1]
         time, rounding, tail = panel_time(path, number, left, right, spread)
@@ -202,7 +212,7 @@ def time_by_panels(path, number, left, right, spread):  # type: ignore[no-untype
             high, low = add(high, low, time[0], time[1])
             error += rounding + tail * tail * fabs(time[0])
             left, pending = right, pending - 1
-        elif pending > MAX_HALVINGS:
+        elif pending > 2 * MAX_HALVINGS:
             return (nan, nan), nan
         else:
             half = add(left[0], left[1], right[0], right[1])

@@ -351,6 +351,18 @@ def record_in_plane(function: Callable[..., Any], parameters: int) -> Recorded |
     return op.finished((value,), slopes)
 
 
+@lru_cache(maxsize=64)
+def record_values_in_plane(function: Callable[..., Any], parameters: int, count: int) -> Recorded | None:
+    """Return the tape of the first values that a function ``f(op, x, z, p)`` gives; None where it is too long.
+
+    Its registers are those of the first run-time parameter, of x, of these values, and nothing.
+    """
+    op = _Recorder(parameters, coordinates=2)
+    found = function(op, *op.places, op.values)
+    values = found if isinstance(found, tuple) else (found,)
+    return op.finished([op.register(value) for value in values[:count]], ())
+
+
 def bind(found: Recorded | None, parameters: Sequence[Number]) -> BoundTape | None:
     """Return a recorded tape with values of its parameters; None where there is no tape."""
     if found is None:

@@ -75,7 +75,6 @@ from gqm_sym.runtime.legs.leg_run import (
     LIFTOFF,
     LIMIT,
     NARROWED,
-    PANELS_PER_RUN,
     PAUSED,
     SPENT,
     TURN,
@@ -352,7 +351,7 @@ def advance(dissipation, p, joints, body, reads, record):  # type: ignore[no-unt
         return AT_ONCE if body[ENDING] == AT_ONCE else FULL
     if what == LIMIT and not ahead:
         return LEAVES
-    if what == SPENT or not (ahead or back) or (what == ASYMPTOTE and not back):
+    if what == SPENT or not (ahead or back) or (what == ASYMPTOTE and dissipation.linear and not back):
         return SPENT
     body[LEG_TIME] += record[TIME_FROM_START] + record[TIME_FROM_END]
     elapsed, low = add(body[ELAPSED], body[ELAPSED_LOW], record[TIME_FROM_START], 0.0)
@@ -362,7 +361,7 @@ def advance(dissipation, p, joints, body, reads, record):  # type: ignore[no-unt
         what = RESTS if after_turn(dissipation, p, joints, body, found, record) else TURN
     else:
         is_open = period == 0.0 and not isfinite(body[HIGH] if body[DIRECTION] > 0.0 else body[LOW])
-        creeps = record[AHEAD] >= PANELS_PER_RUN and found.step <= CREEPING_SHARE * body[FIRST_STEP]
+        creeps = found.step <= CREEPING_SHARE * body[FIRST_STEP]
         endless = what == PAUSED and (is_open or creeps)
         body[PAUSES] = body[PAUSES] + (CREEPING_PAUSES if creeps else 1.0) if endless else 0.0
     body[PLACE], body[PLACE_LOW], body[V2], body[DIRECTION] = place, record[END_LOW], found.v2, found.direction

@@ -20,7 +20,7 @@ from gqm_sym.runtime.launch.problem import Problem, bind
 from gqm_sym.runtime.launch.request import ONLY_SIGN, Launch
 from gqm_sym.runtime.launch.speed import path_and_force_at
 from gqm_sym.runtime.legs import answers
-from gqm_sym.runtime.legs.advance import AT_ONCE, BEYOND, LEAVES, RESTS, Joints, room_ahead
+from gqm_sym.runtime.legs.advance import AT_ONCE, BEYOND, CREEPING_SHARE, LEAVES, RESTS, Joints, room_ahead
 from gqm_sym.runtime.legs.answers import LEAST_SWING, LEG, MAX_PAUSES, MAX_TURNS
 from gqm_sym.runtime.legs.body import (
     DIRECTION,
@@ -36,7 +36,9 @@ from gqm_sym.runtime.legs.body import (
     PERIOD,
     PLACE,
     PLACE_LOW,
+    STEP,
     TURNS,
+    V2,
     VALUE,
     launched,
 )
@@ -56,7 +58,7 @@ from gqm_sym.runtime.legs.leg_record import (
     START,
     TIME_FROM_START,
 )
-from gqm_sym.runtime.legs.leg_run import ASYMPTOTE, FULL, LIFTOFF, LIMIT, NARROWED, SPENT, TURN
+from gqm_sym.runtime.legs.leg_run import ASYMPTOTE, FULL, LIFTOFF, LIMIT, NARROWED, PAUSED, SPENT, TURN
 from gqm_sym.runtime.legs.leg_segments import Run, TabulatedPiece, along_field, along_panels, leg_record, tabulated
 from gqm_sym.runtime.motion.aperiodic import MotionAtRest
 from gqm_sym.runtime.motion.events import Leg, passages
@@ -92,6 +94,10 @@ END_ROUNDINGS = 8.0
 # A swing about an equilibrium has died away when it is below this share of the last digit of its place, or below
 # `LEAST_SWING`.
 LAST_DIGIT = ULP / 64.0
+
+# A body that creeps towards an equilibrium, and for which no panel is narrow enough any more, is no farther from it
+# than this share of its place and of the length of the leg.
+NEAR_EQUILIBRIUM = 1e-13
 
 # The names of what ends a run, where the code alone says it.
 END_NAMES = {
@@ -400,15 +406,16 @@ class DissipativeMotion(Motion):
         if timed.segment.v2 is not None:  # the approach to an equilibrium
             return after.place, np.full_like(phi, after.time)
         of_frame = 0.0 if run.frame is None else run.frame.error
-        if timed.leg == len(self._laid) - 1 and self._last_swing:
-            # So small a V**2 may have no error in the range of doubles, but the body stays where it swings.
-            return before.place + of_frame + 2.0 * self._last_swing, np.zeros_like(phi)
+        swing = 2.0 * self._last_swing if timed.leg == len(self._laid) - 1 else 0.0
+        if swing and run.what != ASYMPTOTE:
+            # So small a V**2 may have no error in the range of doubles, but the body stays where it is.
+            return before.place + of_frame + swing, np.zeros_like(phi)
         panels = run.panels_ahead if timed.sense > 0 else run.panels_back
         which = np.searchsorted(timed.segment.edges[1:-1], phi, side="right")
         inherited = panels[which, INHERITED]
         if timed.sense > 0:
-            return before.place + of_frame, before.time + inherited
-        return after.place + of_frame, after.time + after.place * inherited
+            return before.place + of_frame + swing, before.time + inherited
+        return after.place + of_frame + swing, after.time + after.place * inherited
 
     def _carried(self, leg: int) -> Errors:
         """The errors at the end of a leg, given those with which it begins; in a frame, errors of distances."""
@@ -485,18 +492,12 @@ class DissipativeMotion(Motion):
             frame.move(record, 1)
             self._at[PLACE] = float(record[END])
         head = record[:HEAD].tolist()
-        if what == TURN and self._has_died_away(head[START], head[END]):
-            self._ending = "asymptote"
-        elif frame is None and what == TURN and abs(head[END] - head[START]) < SMALL_SHARE * abs(head[END]):
-            self._enter_frame(self._at[PLACE], self._at[PLACE_LOW], 0.0)
+        self._settle(what, head[START], head[END])
         heading = int(head[HEADING])
         if what == LEAVES:
             raise leaving_at_once(problem, heading, "end of the domain")
         if what == SPENT:
-            raise SolutionError(
-                f"V**2 beyond {problem.formulas.parameter} = {float(record[END])!r} could not be followed; "
-                "are the curve and the force smooth there?"
-            )
+            raise self._lost(record)
         name = self._end_name(what, record, heading)
         self._runs.append(Run(record, what, name, frame))
         if self._at[ENDING]:
@@ -522,8 +523,30 @@ class DissipativeMotion(Motion):
                 return (what if what != FULL else TURN), *records[: max(count, 1)]
             legs, size = 1, 4 * size
 
+    def _settle(self, what: int, start: float, end: float) -> None:
+        """Look whether a run has come so close to an equilibrium that the motion ends there, or goes on in a frame."""
+        in_frame, linear = self._frame is not None, _loss(self.problem).linear
+        if what in (TURN, PAUSED) and self._has_died_away(start, end):
+            self._ending = "asymptote"
+        elif what == ASYMPTOTE and not linear:
+            self._last_swing = NEAR_EQUILIBRIUM * max(abs(end), abs(end - start))
+        elif not in_frame and what == TURN and abs(end - start) < SMALL_SHARE * abs(end):
+            self._enter_frame(self._at[PLACE], self._at[PLACE_LOW], 0.0)
+        elif not in_frame and what == PAUSED and self._at[STEP] <= CREEPING_SHARE * self._at[FIRST_STEP]:
+            self._enter_frame(self._at[PLACE], self._at[PLACE_LOW], self._at[V2])
+
+    def _lost(self, record: Array) -> SolutionError:
+        """Why a leg could not be followed."""
+        place = f"V**2 beyond {self.problem.formulas.parameter} = {float(record[END])!r}"
+        if 0.0 < abs(record[[START, END]]).max() < LEAST_SWING:
+            return SolutionError(
+                f"{place} comes to the end of the range of doubles; launch the body more than {LEAST_SWING!r} from the "
+                "equilibrium, or faster"
+            )
+        return SolutionError(f"{place} could not be followed; are the curve and the force smooth there?")
+
     def _has_died_away(self, start: float, end: float) -> bool:
-        """Whether the body, which has turned, swings so closely about an equilibrium that its place shows no more."""
+        """Whether the body is, or swings, so closely about an equilibrium that its place shows no more of it."""
         frame = self._frame
         swing = max(abs(start), abs(end)) if frame is None else abs(self._body[0, PLACE])
         if swing >= (LEAST_SWING if frame is None else max(LAST_DIGIT * abs(end), LEAST_SWING)):
@@ -568,7 +591,7 @@ class DissipativeMotion(Motion):
                 self._append(segment, 1, [(ZERO, 0.0)] * 2, run.end, run.laps)
                 return
             self._add(segment, 1, run, "" if run.back else run.end)
-        if run.what == ASYMPTOTE:
+        if run.what == ASYMPTOTE and run.back:
             self._add(along_field(f, middle[0], end[0], run.field), 1, run, run.end)
         elif run.back:
             self._add(along_panels(f, end, middle, 0.0, back, run.panels_back), -1, run, run.end)

@@ -249,7 +249,7 @@ def follow(dissipation, p, start, route, record):  # type: ignore[no-untyped-def
         time_from_end = total_time(record, used, back)
         here = within(end.place[0], span_before(breaks, end.upcoming, direction, off))
         direction, could_stay = released(dissipation.static_balance, p, here, here, direction)
-    elif what == ASYMPTOTE:
+    elif what == ASYMPTOTE and dissipation.linear:
         back = approach(forces, end, breaks, off, record, used)
     record[END], record[END_LOW] = end.place
     record[MIDDLE], record[MIDDLE_LOW] = end.middle

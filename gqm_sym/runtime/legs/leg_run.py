@@ -78,7 +78,8 @@ from gqm_sym.runtime.legs.polynomials import COUNT, extent, size_of, to_coeffici
 # TURN       V**2 vanished, and the body turns or rests
 # LIMIT      the end of the domain, or of the range of breaks that were given
 # LIFTOFF    N took the sign that it cannot have
-# ASYMPTOTE  V**2 and the force vanish together: the body approaches an equilibrium
+# ASYMPTOTE  V**2 and the force vanish together: the body approaches an equilibrium; by a law that is not linear in
+#            V**2, it is closer to it than its place in doubles can tell
 # PAUSED     it has run far enough for once
 # NARROWED   a place where the functions are not smooth: no panel that doubles can represent is narrow enough
 # SPENT      too many panels were needed
@@ -101,6 +102,10 @@ NEAR_TURN = 1e-11
 # The width of the first panel of a leg, and of the first one after a break, against the distance on which the
 # acceleration there would stop the body.
 STOPPING_SHARE = 2.0
+
+# A body whose place is smaller than where the run began by this factor, and which goes on by hardly more than that, is
+# on its way to an equilibrium at 0: places that are counted from farther away would lose their digits.
+CLOSE_SHARE = 2.0**-10
 
 # The number of panels after which a run pauses.
 PANELS_PER_RUN = 512
@@ -417,13 +422,31 @@ def limited(forces, march, panel, ahead, change, run_length, point):  # type: ig
 
 @Inner
 def end_where_narrowed(forces, march, panel, run_length, point):  # type: ignore[no-untyped-def]
-    """What ends a run where no panel can be laid, at what distance and with what V**2: a turn, if one is near."""
+    """What ends a run where no panel can be laid, at what distance and with what V**2: a turn, if one is near.
+
+    Where a body at rest would go on, it is no turn but an equilibrium, V**2 grows with the square of the distance from
+    there, and the body never comes to it.
+    """
     if not forces.linear and panel.v2 > 0.0:
         here = march.origin[0] + march.direction * run_length
-        slope = slope_of_v2(forces, within(here, panel.span), panel.v2, panel.contact_sign, point)
+        place = within(here, panel.span)
+        goes_on = slope_of_v2(forces, place, LEAST_V2, panel.contact_sign, point) > 0.0
+        slope = slope_of_v2(forces, place, panel.v2, panel.contact_sign, point)
         if slope < 0.0 and panel.v2 <= -slope * NEAR_TURN * max(fabs(here), run_length):
-            return TURN, run_length - panel.v2 / slope, 0.0
+            return (ASYMPTOTE, run_length, panel.v2) if goes_on else (TURN, run_length - panel.v2 / slope, 0.0)
     return NARROWED, run_length, panel.v2
+
+
+@Inner
+def may_pause(forces, march, route, run_length, speeds, panel):  # type: ignore[no-untyped-def]
+    """Whether a body has run far enough for once, or approaches an equilibrium at 0 that the run's start is far from.
+
+    ``speeds`` are V**2 and the largest so far, ``panel`` where the next one begins and how wide it is to be.
+    """
+    here, (left, step) = fabs(march.origin[0] + march.direction * run_length), panel
+    onwards = step * (slope_at(left, march) + march.g * step)
+    is_close = not forces.linear and onwards <= here <= CLOSE_SHARE * fabs(march.origin[0])
+    return is_close or (run_length >= route.pause and 2.0 * speeds[0] >= speeds[1])
 
 
 @Inner
@@ -499,7 +522,7 @@ def largest_after(largest_v2, v2, ends_here, work):  # type: ignore[no-untyped-d
 
 
 @Inner
-def what_after(change, at_limit, may_pause):  # type: ignore[no-untyped-def]
+def what_after(change, at_limit, pauses):  # type: ignore[no-untyped-def]
     """What ends a run after a panel, or GOES_ON."""
     if change.first <= 1.0:
         if change.first == change.turn:
@@ -507,7 +530,7 @@ def what_after(change, at_limit, may_pause):  # type: ignore[no-untyped-def]
         return ASYMPTOTE if change.first == change.touch else GOES_ON
     if at_limit:
         return LIMIT
-    return PAUSED if may_pause else GOES_ON
+    return PAUSED if pauses else GOES_ON
 
 
 @Inner
@@ -523,13 +546,13 @@ def what_before(contact_sign, only_sign, has_room, fast_again, at_limit):  # typ
 
 
 @Inner
-def conclude(route, march, end, timed, searching, run_length):  # type: ignore[no-untyped-def]
+def conclude(forces, route, march, end, timed, searching, run_length):  # type: ignore[no-untyped-def]
     """The end of a run at the distance ``run_length``; ``end`` has all of it but the places."""
     breaks, v, what = route.breaks, march.direction, end.what
     middle = located(march.origin, v, timed.distance, breaks, end.upcoming)
     v2, sign, changes, no_turn_until = end.v2, end.contact_sign, end.change_count, end.no_turn_until - run_length
     place = middle
-    if what == TURN or what == ASYMPTOTE:
+    if what == TURN or (what == ASYMPTOTE and forces.linear):
         place = located(march.origin, v, run_length, breaks, end.upcoming)
     elif searching and what != FULL:
         no_turn_until = run_length - timed.distance if what == PAUSED or what == SLOWED else inf
@@ -592,10 +615,10 @@ def run(forces, start, route, off, record):  # type: ignore[no-untyped-def]
     -------
     End
     """
-    work, point, v, step = panel_buffer(), point_buffer(), start.direction, start.step
+    work, point, v = panel_buffer(), point_buffer(), start.direction
     set_nodes(work)
     march, nu, ahead = begin(forces, start, route, off, point)
-    v2, left, run_length, largest_v2, step = start.v2, 0.0, 0.0, start.v2, marched(step, march)
+    v2, left, run_length, largest_v2, step = start.v2, 0.0, 0.0, start.v2, marched(start.step, march)
     # Once time is not counted any more, a turn is searched for.
     what, panel_count, recorded, change_count, searching, at_stop = GOES_ON, 0, 0, 0, False, False
     # Time on the second half of a leg is counted from its end, unless breaks limit its panels anyway; laws that are not
@@ -649,8 +672,8 @@ def run(forces, start, route, off, record):  # type: ignore[no-untyped-def]
         v2, left, run_length = max(work[W + COUNT], 0.0), right, stop if at_stop else distance(right, march)
         ahead = Ahead(ahead.upcoming, ahead.span, inf, True)
         timed = timed if searching else Timed(run_length, v2, nu, change_count)
-        is_far = run_length >= route.pause and 2.0 * v2 >= largest_v2
-        what = what_after(change, at_stop and at_end, is_far or panel_count >= PANELS_PER_RUN)
+        pauses = may_pause(forces, march, route, run_length, (v2, largest_v2), (left, step))
+        what = what_after(change, at_stop and at_end, pauses or panel_count >= PANELS_PER_RUN)
         if what != GOES_ON:
             v2 = 0.0 if ends_here else v2
             break
@@ -659,4 +682,4 @@ def run(forces, start, route, off, record):  # type: ignore[no-untyped-def]
     onwards, half_c = step * (slope_at(left, march) + march.g * step), 0.5 * march.c if march.g > 0.0 else inf
     ends = (SPENT if what == GOES_ON else what, march.origin, v2, nu, onwards, start.no_turn_until, march.origin)
     end = End(*ends, half_c, change_count, recorded, ahead.upcoming)
-    return conclude(route, march, end, timed, searching, run_length)
+    return conclude(forces, route, march, end, timed, searching, run_length)

@@ -3,7 +3,9 @@
 The curve is cut into panels on which they are polynomials to rounding. The potential on a panel is that above its left
 edge, so that it has all its digits however small the panel is. Potential and load are sums of parts, each times a
 factor that depends on run-time parameters alone (`interface.SeparatedTerms`): the table has the parts, and a launch
-puts together its own potential on the panels that it comes to (`panel_forces`).
+puts together its own potential on the panels that it comes to (`panel_forces`). Where a curve is known in double-double
+arithmetic (`charts.true_parts`), parts of the potential and lengths of panels are rounded from there: the places of a
+chart of many short pieces are doubles, whose differences have few digits.
 """
 
 from math import fabs
@@ -13,14 +15,18 @@ import numpy as np
 from numba import types
 from numpy.polynomial.legendre import leg2poly, leggauss, legvander
 
+from gqm_sym.runtime.arithmetic.doubledouble import add
 from gqm_sym.runtime.arithmetic.matrices import multiply
+from gqm_sym.runtime.charts.true_parts import TRUE_PARTS, fill_differences
 from gqm_sym.runtime.compiled.calls import (
     call_path_and_contact_force,
     call_potential_divdiff1,
     call_separated_terms,
 )
-from gqm_sym.runtime.compiled.jit import Inner, entry
+from gqm_sym.runtime.compiled.jit import Inlined, Inner, entry
 from gqm_sym.runtime.compiled.types import ADDRESSES, MATRIX, VECTOR, Array
+from gqm_sym.runtime.double_double.arithmetic import multiply as multiply_pairs
+from gqm_sym.runtime.double_double.orbit_time import fill_parameters
 from gqm_sym.runtime.interface import PATH_ROWS
 
 # Gauss points of a panel, of the rule for panels far from turning points, and places at which loads are sampled.
@@ -33,6 +39,9 @@ ELLIPSE, FEW_ELLIPSE = 3.2, 10.0
 # if its last two are above the second share.
 MAX_NOISE_RATIO, MAX_TAIL_RATIO = 4e-16, 1e-13
 
+# The second share where values come from double-double arithmetic; and how often the fit is corrected then.
+MAX_TRUE_TAIL_RATIO, CORRECTIONS = 1e-15, 2
+
 # Values below this share of what is usual on the curve need no relative accuracy of their own.
 NEGLIGIBLE = 1e-2
 
@@ -40,18 +49,20 @@ NEGLIGIBLE = 1e-2
 MAX_PARTS = 4
 
 # What a panel has of the path: weights in m at the Gauss points, and at fewer of them; powers of x in [-1, 1] for
-# ds/dlam and kappa; kappa at the samples; and whether ds may vanish.
+# ds/dlam and kappa; kappa at the samples; whether ds may vanish; and half the panel's length in lam.
 WEIGHTS, FEW_WEIGHTS, DS_TERMS, KAPPA_TERMS = 0, NODES, NODES + FEW_NODES, 2 * NODES + FEW_NODES
 KAPPA_SAMPLES = KAPPA_TERMS + NODES
 MAY_STOP = KAPPA_SAMPLES + SAMPLES
-PATH_ROW = MAY_STOP + 1
+HALF = MAY_STOP + 1
+PATH_ROW = HALF + 1
 # What it has of a part of the potential. Numbers that suffice far from turning points: the potential of the left edge
-# above the reference; its increase from edge to edge; its mean; by how much it differs from that on the panel and in
-# both ellipses, at most; the size of what the first is a sum of; and the potential at the samples.
-BASE, INCREASE, MIDDLE, SPREAD, REACH, FEW_REACH, BASE_SIZE, POTENTIAL_SAMPLES = range(8)
+# above the reference, two doubles; its increase from edge to edge; its mean; by how much it differs from that on the
+# panel and in both ellipses, at most; the size of what the first is a sum of; and the potential at the samples.
+BASE, BASE_LOW, INCREASE, MIDDLE, SPREAD, REACH, FEW_REACH, BASE_SIZE, POTENTIAL_SAMPLES = range(9)
 FEW_POTENTIAL = POTENTIAL_SAMPLES + 1
-# Then powers of x for the potential as (1 + x)*left(x) = INCREASE - (1 - x)*right(x), its values at the Gauss points,
-# and its Legendre coefficients.
+# Then the potential from either edge: above that of the left edge it is r*(c0 + r*(c1 + c2*x + ...)) with r = 1 + x,
+# and above that of the right edge the same with r = x - 1, so that it has all its digits next to edges where its slope
+# c0 vanishes. At last its values at the Gauss points, and its Legendre coefficients.
 LEFT_TERMS = POTENTIAL_SAMPLES + SAMPLES
 RIGHT_TERMS, POTENTIAL, SERIES = (LEFT_TERMS + k * NODES for k in range(1, 4))
 POTENTIAL_ROW = SERIES + NODES
@@ -90,18 +101,24 @@ class CurveTable(NamedTuple):
     ----------
     edges : (n+1,) array
         The places at the edges of the panels; n is 0 if there is no table.
+    edge_lows : (n+1,) array
+        What these are rounded by.
     paths : (n, PATH_ROW) array
         What the panels have of the path.
     parts : (n, potentials*POTENTIAL_ROW + loads*LOAD_ROW) array
         What they have of the parts of the potential and of the load.
     potentials : int
         How many parts the potential has.
+    is_exact : bool
+        Whether potential and lengths were rounded from double-double arithmetic.
     """
 
     edges: Any
+    edge_lows: Any
     paths: Any
     parts: Any
     potentials: Any
+    is_exact: Any
 
 
 class Source(NamedTuple):
@@ -126,9 +143,9 @@ class Source(NamedTuple):
     mass: int
 
 
-TABLE = types.NamedTuple((VECTOR, MATRIX, MATRIX, types.int64), CurveTable)
+TABLE = types.NamedTuple((VECTOR, VECTOR, MATRIX, MATRIX, types.int64, types.boolean), CurveTable)
 SOURCE = types.NamedTuple((ADDRESSES, types.int64, types.int64, types.int64, types.int64), Source)
-NO_TABLE = CurveTable(np.empty(0), np.empty((0, PATH_ROW)), np.empty((0, 0)), 0)
+NO_TABLE = CurveTable(np.empty(0), np.empty(0), np.empty((0, PATH_ROW)), np.empty((0, 0)), 0, False)
 
 
 @Inner
@@ -141,9 +158,34 @@ def value_on(rows, k, at, x):  # type: ignore[no-untyped-def]
 
 
 @Inner
+def curved_on(rows, k, at, x):  # type: ignore[no-untyped-def]
+    """The factor c1 + c2*x + ... of the potential on panel k from the edge whose numbers begin at column ``at``."""
+    total = 0.0
+    for j in range(NODES - 1, 0, -1):
+        total = total * x + rows[k, at + j]
+    return total
+
+
+@Inner
+def rise_on(rows, k, at, x, r):  # type: ignore[no-untyped-def]
+    """The potential at a place of panel k above that of an edge, from which it is ``r`` away in halves of the panel."""
+    return r * (rows[k, at] + r * curved_on(rows, k, at, x))
+
+
+@Inner
 def potential_on(rows, k, x):  # type: ignore[no-untyped-def]
     """The potential of panel k above its left edge at a place x in [-1, 1]."""
-    return (1.0 + x) * value_on(rows, k, LEFT_TERMS, x)
+    return rise_on(rows, k, LEFT_TERMS, x, 1.0 + x)
+
+
+@Inner
+def difference_from(rows, k, at, x, r, y, q):  # type: ignore[no-untyped-def]
+    """The first divided difference of the potential of panel k over two places, which are r and q away from an edge."""
+    value, first = 0.0, 0.0
+    for j in range(NODES - 1, 0, -1):
+        first = first * y + value
+        value = value * x + rows[k, at + j]
+    return rows[k, at] + (r + q) * value + q * q * first
 
 
 @Inner
@@ -152,12 +194,16 @@ def difference_on(rows, k, x, y):  # type: ignore[no-untyped-def]
 
     It is taken from the nearer edge: there the slope of a fitted polynomial is less accurate than its value.
     """
-    at, near = (LEFT_TERMS, 1.0 + y) if x + y < 0.0 else (RIGHT_TERMS, y - 1.0)
-    value, first = 0.0, 0.0
-    for j in range(NODES - 1, -1, -1):
-        first = first * y + value
-        value = value * x + rows[k, at + j]
-    return value + near * first
+    at, edge = (LEFT_TERMS, -1.0) if x + y < 0.0 else (RIGHT_TERMS, 1.0)
+    return difference_from(rows, k, at, x, x - edge, y, y - edge)
+
+
+@Inlined
+def power_on(rows, k, j):  # type: ignore[no-untyped-def]
+    """The coefficient of x**j of the potential on panel k, of which j is 1 at least."""
+    beyond = rows[k, LEFT_TERMS + j] if j < NODES else 0.0
+    further = rows[k, LEFT_TERMS + j + 1] if j < NODES - 1 else 0.0
+    return rows[k, LEFT_TERMS + j - 1] + 2.0 * beyond + further
 
 
 @Inner
@@ -167,9 +213,11 @@ def fill_terms(values, work, row, at, size):  # type: ignore[no-untyped-def]
     Coefficients behind the last significant one are set to zero. ``size`` is how large the values are elsewhere: where
     they are much smaller than that, they are rounding noise.
     """
-    fit(values, 0, work, 0)
+    off = np.empty(NODES)
     for j in range(NODES):
-        size = max(size, fabs(values[j]))
+        off[j], size = values[j] - values[0], max(size, fabs(values[j]))
+    fit(off, 0, work, 0)
+    work[0] += values[0]  # so that a constant is fitted without rounding
     resolved = max(fabs(work[NODES - 2]), fabs(work[NODES - 1])) <= MAX_TAIL_RATIO * size
     for j in range(NODES - 1, -1, -1):
         if fabs(work[j]) > MAX_NOISE_RATIO * size:
@@ -177,6 +225,27 @@ def fill_terms(values, work, row, at, size):  # type: ignore[no-untyped-def]
         work[j] = 0.0
     powers(work, 0, row, at)
     return resolved
+
+
+@Inner
+def fill_true_terms(values, work, sums, size):  # type: ignore[no-untyped-def]
+    """As `fill_terms`, from values of two doubles, and with powers of two doubles."""
+    rest, terms, series = values[0].copy(), np.empty(NODES), np.empty(NODES)
+    for j in range(NODES):
+        size, sums[0, j], sums[1, j] = max(size, fabs(rest[j])), 0.0, 0.0
+    for turn in range(CORRECTIONS + 1):
+        fit(rest, 0, series, 0)
+        powers(series, 0, terms, 0)
+        for j in range(NODES):
+            sums[0, j], sums[1, j] = add(sums[0, j], sums[1, j], terms[j], 0.0)
+            work[j] = series[j] if turn == 0 else work[j]
+        for i in range(NODES):
+            value, low = 0.0, 0.0
+            for j in range(NODES - 1, -1, -1):
+                value, low = multiply_pairs(value, low, POINTS[i], 0.0)
+                value, low = add(value, low, sums[0, j], sums[1, j])
+            rest[i] = add(values[0, i], values[1, i], -value, -low)[0]
+    return max(fabs(work[NODES - 2]), fabs(work[NODES - 1])) <= MAX_TRUE_TAIL_RATIO * size
 
 
 @Inner
@@ -201,7 +270,7 @@ def fill_path(half, ds, kappa, row):  # type: ignore[no-untyped-def]
     for j in range(NODES):
         least_ds -= fabs(work[j])
         row[WEIGHTS + j] = half * GAUSS_WEIGHTS[j] * ds[j]
-    row[MAY_STOP] = 0.0 if least_ds > 0.0 else 1.0
+    row[MAY_STOP], row[HALF] = 0.0 if least_ds > 0.0 else 1.0, half
     resolved &= fill_terms(kappa, work, row, KAPPA_TERMS, NEGLIGIBLE / row[WEIGHTS])
     for j in range(SAMPLES):
         row[KAPPA_SAMPLES + j] = value_on(one, 0, KAPPA_TERMS, SAMPLE_POINTS[j])
@@ -211,23 +280,30 @@ def fill_path(half, ds, kappa, row):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def fill_potential(half, from_left, from_right, slope, row):  # type: ignore[no-untyped-def]
+def fill_potential(half, differences, is_exact, slope, row):  # type: ignore[no-untyped-def]
     """Fill what a panel has of a part of the potential, all but its base; returns whether it is resolved.
 
-    ``from_left`` and ``from_right`` are its divided differences from both edges, and ``slope`` is how steep the part is
-    elsewhere on the curve.
+    ``differences`` (2, 2, NODES) are its divided differences from both edges, two doubles each, of which the second
+    count only where ``is_exact``; and ``slope`` is how steep the part is elsewhere on the curve.
     """
-    values, work, one = np.empty(NODES), np.empty(NODES), row.reshape(1, POTENTIAL_ROW)
-    for j in range(NODES):
-        values[j] = half * from_right[j]
-    resolved = fill_terms(values, work, row, RIGHT_TERMS, NEGLIGIBLE * half * slope)
-    for j in range(NODES):
-        values[j] = half * from_left[j]
-    resolved &= fill_terms(values, work, row, LEFT_TERMS, NEGLIGIBLE * half * slope)
+    values, work, one, resolved = np.empty((2, NODES)), np.empty(NODES), row.reshape(1, POTENTIAL_ROW), True
+    sums, size = np.zeros((2, NODES)), NEGLIGIBLE * half * slope
+    for side, at, edge in ((1, RIGHT_TERMS, 1.0), (0, LEFT_TERMS, -1.0)):
+        for j in range(NODES):
+            high, low = differences[side, 0, j], differences[side, 1, j] if is_exact else 0.0
+            values[0, j], values[1, j] = multiply_pairs(half, 0.0, high, low)
+        if is_exact:
+            resolved &= fill_true_terms(values, work, sums, size)
+        else:
+            resolved &= fill_terms(values[0], work, sums[0], 0, size)
+        high, low = 0.0, 0.0
+        for j in range(NODES - 1, -1, -1):
+            high, low = add(sums[0, j], sums[1, j], edge * high, edge * low)
+            row[at + j] = high
     total, reach, few_reach, spread = 0.0, 0.0, 0.0, 0.0
     for j in range(NODES):
-        total += row[LEFT_TERMS + j]
-        row[POTENTIAL + j] = half * (1.0 + POINTS[j]) * from_left[j]
+        total += row[LEFT_TERMS + j] * (1.0 if j == 0 else 2.0)
+        row[POTENTIAL + j] = (1.0 + POINTS[j]) * values[0, j]
     fit(row, POTENTIAL, row, SERIES)
     for j in range(1, NODES):
         size = fabs(row[SERIES + j])
@@ -242,23 +318,48 @@ def fill_potential(half, from_left, from_right, slope, row):  # type: ignore[no-
 
 
 @Inner
-def fill_panel(source, p, left, right, scales, path, parts):  # type: ignore[no-untyped-def]
-    """Fill what a panel has of the path and of all parts, but not their bases; returns whether all are resolved.
+def fill_panel(source, true, p, panel, scales, path, parts):  # type: ignore[no-untyped-def]
+    """Fill what a panel has of the path and of all parts; returns whether all are resolved.
 
-    ``scales`` is how steep the parts of the potential are elsewhere on the curve, and how large those of the load.
+    The values of the potential at its left edge are filled in only where they are known (`fill_bases`).
+
+    Parameters
+    ----------
+    source, true, p
+        As `tabulate` takes them.
+    panel : (left, right, piece, span)
+        The places of its edges, the piece that it lies on, and its beginning and end there.
+    scales : array
+        How steep the parts of the potential are elsewhere on the curve, and how large those of the load.
+    path, parts : arrays
+        Filled.
     """
+    left, right, piece, span = panel
     half, potentials = 0.5 * (right - left), source.potentials
     places, gaps, rests, work = np.empty(NODES), np.empty(NODES), np.empty(NODES), np.empty(NODES)
     from_left, from_right = np.empty((scales.size + 2, NODES)), np.empty((scales.size + 2, NODES))
+    differences, ends, is_exact = (
+        np.empty((2, potentials, 2, NODES)),
+        np.empty((potentials, 2, 2)),
+        true.values.size > 0,
+    )
     for j in range(NODES):
         gaps[j] = half * (1.0 + POINTS[j])
         places[j], rests[j] = left + gaps[j], -half * (1.0 - POINTS[j])
-    fill_terms_at(source, p, NODES, right, places, rests, from_right)
     fill_terms_at(source, p, NODES, left, places, gaps, from_left)
+    if is_exact:
+        half = fill_differences(true, piece, span, POINTS, differences, ends)
+    else:
+        fill_terms_at(source, p, NODES, right, places, rests, from_right)
+        for i in range(potentials):
+            differences[0, i, 0], differences[1, i, 0] = from_left[i], from_right[i]
     resolved = fill_path(half, from_left[potentials], from_left[potentials + 1], path)
     for i in range(potentials):
         part = parts[i * POTENTIAL_ROW : (i + 1) * POTENTIAL_ROW]
-        resolved &= fill_potential(half, from_left[i], from_right[i], scales[i], part)
+        resolved &= fill_potential(half, differences[:, i], is_exact, scales[i], part)
+        if is_exact:
+            part[BASE], part[BASE_LOW] = ends[i, 0, 0], ends[i, 1, 0]
+            part[INCREASE] = add(ends[i, 0, 1], ends[i, 1, 1], -ends[i, 0, 0], -ends[i, 1, 0])[0]
     for i in range(potentials, scales.size):
         at = potentials * POTENTIAL_ROW + (i - potentials) * LOAD_ROW
         part = parts[at : at + LOAD_ROW]
@@ -281,31 +382,44 @@ def scales_of(source, p, pieces):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def fill_bases(source, p, edges, parts):  # type: ignore[no-untyped-def]
-    """Fill the parts of the potential at the left edges of panels, each above the edge where it is lowest."""
-    count = parts.shape[0]
-    lefts, gaps, out = edges[:count], np.empty(count), np.empty((source.potentials + source.loads + 2, count))
-    for i in range(source.potentials):
-        lowest = lefts[0]
-        for step in range(2):
-            for k in range(count):
-                gaps[k] = lefts[k] - lowest
-            fill_terms_at(source, p, count, lowest, lefts, gaps, out)
-            if step == 0:
-                lowest = lefts[np.argmin(gaps * out[i])]
-        for k in range(count):
-            base = gaps[k] * out[i, k]
-            parts[k, i * POTENTIAL_ROW + BASE], parts[k, i * POTENTIAL_ROW + BASE_SIZE] = base, fabs(base)
+def fill_bases(parts, potentials, known):  # type: ignore[no-untyped-def]
+    """Fill the parts of the potential at the left edges of panels, each above the edge where it is lowest.
+
+    They are sums of the increases before, unless they are ``known`` above another reference.
+    """
+    for i in range(potentials):
+        rows = parts[:, i * POTENTIAL_ROW : (i + 1) * POTENTIAL_ROW]
+        base, low, least, least_low = 0.0, 0.0, np.inf, 0.0
+        for k in range(rows.shape[0]):
+            if not known:
+                rows[k, BASE], rows[k, BASE_LOW] = base, low
+                base, low = add(base, low, rows[k, INCREASE], 0.0)
+            if rows[k, BASE] < least:
+                least, least_low = rows[k, BASE], rows[k, BASE_LOW]
+        for k in range(rows.shape[0]):
+            rows[k, BASE], rows[k, BASE_LOW] = add(rows[k, BASE], rows[k, BASE_LOW], -least, -least_low)
+            rows[k, BASE_SIZE] = rows[k, BASE]
 
 
-@entry(TABLE(SOURCE, VECTOR, VECTOR))
-def tabulate(source, p, pieces):  # type: ignore[no-untyped-def]
+@Inlined
+def place_on_piece(true, pieces, k, share):  # type: ignore[no-untyped-def]
+    """The place at a share of piece k, as two doubles."""
+    if true.values.size > 0:
+        high, low, _ = true.curve.lengths[k]
+        return add(true.origins[k, 0], true.origins[k, 1], share * high, share * low)
+    return pieces[k] + share * (pieces[k + 1] - pieces[k]) if share < 1.0 else pieces[k + 1], 0.0
+
+
+@entry(TABLE(SOURCE, TRUE_PARTS, VECTOR, VECTOR))
+def tabulate(source, true, p, pieces):  # type: ignore[no-untyped-def]
     """Tabulate a curve.
 
     Parameters
     ----------
     source : Source
         The module's functions.
+    true : TrueParts
+        The parts of the potential in double-double arithmetic, on the same pieces; of no size if there are none.
     p : array
         Run-time parameters, of which those count that the functions read, and the chart behind them.
     pieces : (n+1,) array
@@ -318,22 +432,28 @@ def tabulate(source, p, pieces):  # type: ignore[no-untyped-def]
     """
     capacity = MAX_PARTS * (pieces.size - 1)
     width = source.potentials * POTENTIAL_ROW + source.loads * LOAD_ROW
-    edges, paths, parts = np.empty(capacity + 1), np.empty((capacity, PATH_ROW)), np.empty((capacity, width))
+    edges, lows = np.empty(capacity + 1), np.empty(capacity + 1)
+    paths, parts = np.empty((capacity, PATH_ROW)), np.empty((capacity, width))
     pending, count, scales = np.empty(64), 0, scales_of(source, p, pieces)
-    edges[0] = pieces[0]
+    if true.values.size > 0:
+        fill_parameters(true.tape, true.parameters, true.work)
     for k in range(pieces.size - 1):
-        waiting, left = 1, pieces[k]
-        pending[0] = pieces[k + 1]
+        waiting, begin = 1, 0.0
+        pending[0] = 1.0
         while waiting > 0:
-            right = pending[waiting - 1]
+            end = pending[waiting - 1]
             if count == capacity or waiting == pending.size:
-                return CurveTable(np.empty(0), np.empty((0, PATH_ROW)), np.empty((0, width)), source.potentials)
-            if fill_panel(source, p, left, right, scales, paths[count], parts[count]):
-                count, waiting = count + 1, waiting - 1
-                left = edges[count] = right
+                none = np.empty((0, PATH_ROW)), np.empty((0, width))
+                return CurveTable(np.empty(0), np.empty(0), none[0], none[1], source.potentials, False)
+            edges[count], lows[count] = place_on_piece(true, pieces, k, begin)
+            edges[count + 1], lows[count + 1] = place_on_piece(true, pieces, k, end)
+            panel = edges[count], edges[count + 1], k, (begin, end)
+            if fill_panel(source, true, p, panel, scales, paths[count], parts[count]):
+                count, waiting, begin = count + 1, waiting - 1, end
             else:
-                pending[waiting] = 0.5 * (left + right)
+                pending[waiting] = 0.5 * (begin + end)
                 waiting += 1
-    parts = parts[:count].copy()
-    fill_bases(source, p, edges, parts)
-    return CurveTable(edges[: count + 1].copy(), paths[:count].copy(), parts, source.potentials)
+    parts, is_exact = parts[:count].copy(), true.values.size > 0
+    fill_bases(parts, source.potentials, is_exact)
+    edges, lows, paths = edges[: count + 1].copy(), lows[: count + 1].copy(), paths[:count].copy()
+    return CurveTable(edges, lows, paths, parts, source.potentials, is_exact)

@@ -7,6 +7,7 @@ import numpy as np
 from gqm_sym.runtime.compiled.jit import Inner
 from gqm_sym.runtime.motion.events import ROUNDING_SHARE
 from gqm_sym.runtime.sweep.curve_table import (
+    HALF,
     KAPPA_SAMPLES,
     KAPPA_TERMS,
     LOAD_SAMPLES,
@@ -100,7 +101,7 @@ def loss_on_way(curve, passage, slacks, side, begin, sense):  # type: ignore[no-
 def liftoff_place(curve, orbit, passage, slacks, side):  # type: ignore[no-untyped-def]
     """The place at which a body leaves the track before it comes to an end of it; NaN if it never does."""
     table, period = curve.table, curve.period
-    index, x = locate(table, period, orbit.lam0)
+    index, x, _ = locate(table, period, orbit.lam0)
     j, last = index - passage.first, passage.panels - 1
     if orbit.circulates and orbit.direction < 0:
         j = last
@@ -114,6 +115,5 @@ def liftoff_place(curve, orbit, passage, slacks, side):  # type: ignore[no-untyp
             return orbit.lam0
         if lost >= 0:
             k = (passage.first + lost) % curve.levels.size
-            half = 0.5 * (table.edges[k + 1] - table.edges[k])
-            return edge_place(table, period, passage.first + lost) + half * (1.0 + where)
+            return edge_place(table, period, passage.first + lost) + table.paths[k, HALF] * (1.0 + where)
     return np.nan

@@ -170,7 +170,7 @@ def passage_extreme(curve, orbit, passage, slacks, force, sign):  # type: ignore
     count, last = curve.levels.size, passage.panels - 1
     path, begin = ((0, passage.low_x), (last, passage.high_x)), (-1, 0.0)
     if orbit.leaves == orbit.direction:  # a body that is not in front of its turning point does not come there
-        index, x = locate(curve.table, curve.period, orbit.lam0)
+        index, x, _ = locate(curve.table, curve.period, orbit.lam0)
         begin = index - passage.first, x
         path = (begin, path[1]) if orbit.leaves > 0 else (path[0], begin)
     meets_turn = orbit.v2 == 0.0 or not (orbit.circulates or orbit.leaves == orbit.direction)

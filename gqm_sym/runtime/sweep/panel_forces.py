@@ -6,9 +6,12 @@ together when they are first asked for, and kept for launches with the same fact
 
 from math import fabs, inf
 
+from gqm_sym.runtime.arithmetic.doubledouble import add
 from gqm_sym.runtime.compiled.jit import Inner
+from gqm_sym.runtime.double_double.arithmetic import multiply
 from gqm_sym.runtime.sweep.curve_table import (
     BASE,
+    BASE_LOW,
     BASE_SIZE,
     FEW_REACH,
     INCREASE,
@@ -24,6 +27,7 @@ from gqm_sym.runtime.sweep.curve_table import (
     SAMPLES,
     SERIES,
     SPREAD,
+    power_on,
 )
 
 # What a panel's row contains so far: numbers that suffice far from turning points, its polynomials, the load.
@@ -51,13 +55,16 @@ def fill_far(curve, k):  # type: ignore[no-untyped-def]
     """Fill what suffices far from turning points."""
     parts, row, factors, count = curve.table.parts[k], curve.rows[k], curve.factors, curve.table.potentials
     fill_sums(parts, POTENTIAL_ROW, factors[:count], row[:LEFT_TERMS])
-    spread, reach, few_reach, base_size = 0.0, 0.0, 0.0, 0.0
+    spread, reach, few_reach, base_size, base, base_low = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for i in range(count):
         factor, at = fabs(factors[i]), i * POTENTIAL_ROW
         spread += factor * parts[at + SPREAD]
         reach += factor * parts[at + REACH]
         few_reach += factor * parts[at + FEW_REACH]
         base_size += factor * parts[at + BASE_SIZE]
+        part, part_low = multiply(factors[i], 0.0, parts[at + BASE], parts[at + BASE_LOW])
+        base, base_low = add(base, base_low, part, part_low)
+    row[BASE], row[BASE_LOW] = base, base_low
     row[SPREAD], row[REACH], row[FEW_REACH], row[BASE_SIZE] = spread, reach, few_reach, base_size
     row[HIGHEST] = inf if curve.table.paths[k, MAY_STOP] != 0.0 else row[BASE] + (row[MIDDLE] + spread)
 
@@ -65,15 +72,14 @@ def fill_far(curve, k):  # type: ignore[no-untyped-def]
 @Inner
 def fill_near(curve, k):  # type: ignore[no-untyped-def]
     """Fill the polynomials, and what they say of the potential's slope and bound."""
-    parts, row, count = curve.table.parts[k], curve.rows[k], curve.table.potentials
+    parts, rows, row, count = curve.table.parts[k], curve.rows, curve.rows[k], curve.table.potentials
     fill_sums(parts[LEFT_TERMS:], POTENTIAL_ROW, curve.factors[:count], row[LEFT_TERMS:POTENTIAL_ROW])
-    change, slope, spread = NODES * fabs(row[LEFT_TERMS + NODES - 1]), row[LEFT_TERMS] + row[LEFT_TERMS + 1], 0.0
-    bend = 2.0 * (row[LEFT_TERMS + 1] + row[LEFT_TERMS + 2]) - (NODES - 1) * change
-    for j in range(1, NODES):
-        term = fabs(row[LEFT_TERMS + j] + row[LEFT_TERMS + j - 1])
-        change += j * term if j > 1 else 0.0
+    change, slope, spread, bend = 0.0, power_on(rows, k, 1), 0.0, 2.0 * power_on(rows, k, 2)
+    for j in range(2, NODES + 1):
+        term = fabs(power_on(rows, k, j))
+        change += j * term
         bend -= j * (j - 1) * term if j > 2 else 0.0
-        spread += fabs(row[SERIES + j])
+        spread += fabs(row[SERIES + j - 1])
     row[CONVEX] = 1.0 if bend > 0.0 else 0.0
     row[SLOPE_SIGN], top = 0.0, row[MIDDLE] + spread
     if fabs(slope) > change:

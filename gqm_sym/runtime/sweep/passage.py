@@ -5,20 +5,20 @@ are phase angles of the orbit, and V**2 is a divided difference of the panel's p
 that nothing cancels.
 """
 
-from math import atan2, fabs, floor, sqrt
+from math import atan2, fabs, floor, pi, sqrt
 from typing import NamedTuple
 
 import numpy as np
 
 from gqm_sym.runtime.arithmetic.doubledouble import two_sum
 from gqm_sym.runtime.arithmetic.elementary import cos, sin
-from gqm_sym.runtime.compiled.calls import call_effective_potential, call_potential_divdiff1
 from gqm_sym.runtime.compiled.jit import Inlined, Inner
 from gqm_sym.runtime.compiled.registers import on_stack
 from gqm_sym.runtime.launch.zeros import CONSTANT_SHARE, CRITICAL, LIMIT, TURN
 from gqm_sym.runtime.quadrature.time_panels import MIN_CANCELLATION_RATIO
 from gqm_sym.runtime.sweep.curve_table import (
     BASE,
+    BASE_LOW,
     BASE_SIZE,
     DS_TERMS,
     FEW_NODES,
@@ -27,6 +27,7 @@ from gqm_sym.runtime.sweep.curve_table import (
     FEW_WEIGHTS,
     FIT,
     GAUSS_WEIGHTS,
+    HALF,
     INCREASE,
     LEFT_TERMS,
     MIDDLE,
@@ -34,10 +35,14 @@ from gqm_sym.runtime.sweep.curve_table import (
     POINTS,
     POTENTIAL,
     REACH,
+    RIGHT_TERMS,
     SPREAD,
     WEIGHTS,
+    difference_from,
     difference_on,
     potential_on,
+    power_on,
+    rise_on,
     value_on,
 )
 from gqm_sym.runtime.sweep.orbit import NO_ENDS, Orbit
@@ -49,6 +54,9 @@ SAFETY = 1.05
 # The last Legendre coefficients of an integrand, as a share of the first, up to which its integral is accurate to
 # rounding: they belong to degrees 14 and 15, the error to degree 32. Otherwise the part is halved, so often at most.
 MAX_TAIL_RATIO, MAX_HALVINGS = 2e-8, 5
+
+# The largest ratio of phase angles at both ends of a part behind an edge that lies next to a turning point.
+MAX_PHASE_RATIO = 4.0
 
 # What their extrapolation to that degree may be, and what counts as rounding noise.
 MAX_ERROR_RATIO, NOISE_RATIO = 2e-16, 2e-15
@@ -79,27 +87,45 @@ class Passage(NamedTuple):
         The index of the first panel, and how many there are. On a closed curve indices go on from lap to lap.
     low_x, high_x : float
         The places of both ends on their panels, in [-1, 1].
+    low_rest, high_rest : float
+        From the lower end to the right edge of its panel, and from the left edge of the last panel to the upper end, in
+        halves of these panels.
     width : float
         The distance between both ends.
     turns : int
         Which ends are turning points: BOTH, LOWER or UPPER, or NEITHER of a lap and of a body that runs through.
     v2 : float
         V**2 at the lower end if NEITHER is.
+    is_polished : bool
+        Whether both ends have all digits.
+    middle : int
+        The last panel on which time is measured from the lower end, and the first on which it is from the upper one: on
+        that in the middle of an orbit with two turning points it is from either. -1 if it is from the upper end only.
     """
 
     first: int
     panels: int
     low_x: float
     high_x: float
+    low_rest: float
+    high_rest: float
     width: float
     turns: int
     v2: float
+    is_polished: bool
+    middle: int
+
+
+NOWHERE = Passage(0, 0, 0.0, 0.0, 0.0, 0.0, 0.0, BOTH, 0.0, False, 0)
+
+# A place on a table is the index of its panel, x in [-1, 1] on it, and the distance from the nearer edge in halves of
+# the panel: the left one if x is not positive. A small distance from an edge has all its digits.
 
 
 @Inner
 def locate(table, period, place):  # type: ignore[no-untyped-def]
-    """The index of the panel that a place lies on, and where in [-1, 1] on it."""
-    edges = table.edges
+    """A place in lam as a place on the table."""
+    edges, lows = table.edges, table.edge_lows
     count, laps = edges.size - 1, 0.0
     if period > 0.0:
         laps = floor((place - edges[0]) / period)
@@ -111,9 +137,9 @@ def locate(table, period, place):  # type: ignore[no-untyped-def]
             below = middle
         else:
             above = middle
-    left, right = edges[below], edges[below + 1]
-    x = ((place - left) - (right - place)) / (right - left)
-    return below + int(laps) * count, min(max(x, -1.0), 1.0)
+    before, behind = (place - edges[below]) - lows[below], (edges[below + 1] - place) + lows[below + 1]
+    near = min(max(min(before, behind), 0.0) / table.paths[below, HALF], 1.0)
+    return below + int(laps) * count, near - 1.0 if before <= behind else 1.0 - near, near
 
 
 @Inner
@@ -127,15 +153,75 @@ def edge_place(table, period, index):  # type: ignore[no-untyped-def]
 
 
 @Inner
+def edge_distance(table, one, other):  # type: ignore[no-untyped-def]
+    """The distance from the left edge of a panel to that of the same or a later one, at most a lap further."""
+    edges, lows, count = table.edges, table.edge_lows, table.edges.size - 1
+    lap = one // count
+    one, other = one - lap * count, other - lap * count
+    if other <= count:
+        return (edges[other] - edges[one]) + (lows[other] - lows[one])
+    other -= count
+    rest = (edges[count] - edges[one]) + (lows[count] - lows[one])
+    return rest + ((edges[other] - edges[0]) + (lows[other] - lows[0]))
+
+
+@Inlined
+def from_left(x, near):  # type: ignore[no-untyped-def]
+    """The distance of a place from the left edge of its panel, in halves of the panel."""
+    return near if x <= 0.0 else 2.0 - near
+
+
+@Inlined
+def from_right(x, near):  # type: ignore[no-untyped-def]
+    """The distance of a place from the right edge of its panel, in halves of the panel."""
+    return near if x > 0.0 else 2.0 - near
+
+
+@Inner
+def way_between(table, lower, higher):  # type: ignore[no-untyped-def]
+    """The distance from a place on a table to a higher one."""
+    (i, x, near), (j, y, close) = lower, higher
+    count, paths = table.edges.size - 1, table.paths
+    if i == j:
+        way = from_right(x, near) - from_right(y, close) if x > 0.0 else from_left(y, close) - from_left(x, near)
+        return way * paths[i % count, HALF]
+    way = from_right(x, near) * paths[i % count, HALF] + from_left(y, close) * paths[j % count, HALF]
+    return way + edge_distance(table, i + 1, j)
+
+
+@Inner
+def rise_from_left(rows, k, x, near):  # type: ignore[no-untyped-def]
+    """The potential at a place of panel k above that of the left edge."""
+    if x <= 0.0:
+        return rise_on(rows, k, LEFT_TERMS, x, near)
+    return rows[k, INCREASE] + rise_on(rows, k, RIGHT_TERMS, x, -near)
+
+
+@Inner
+def rise_from_right(rows, k, x, near):  # type: ignore[no-untyped-def]
+    """The potential at a place of panel k above that of the right edge."""
+    if x > 0.0:
+        return rise_on(rows, k, RIGHT_TERMS, x, -near)
+    return rise_on(rows, k, LEFT_TERMS, x, near) - rows[k, INCREASE]
+
+
+@Inlined
+def rise_between(rows, k, other):  # type: ignore[no-untyped-def]
+    """The potential at the left edge of another panel above that at the left edge of panel k."""
+    return (rows[other, BASE] - rows[k, BASE]) + (rows[other, BASE_LOW] - rows[k, BASE_LOW])
+
+
+@Inner
 def zero_on_panel(rows, k, slack, near, far):  # type: ignore[no-untyped-def]
     """Where the potential of panel k reaches ``slack`` between a place below it and one above it."""
     x = 0.5 * (near + far)
     for _ in range(60):
-        value, slope = 0.0, 0.0
-        for j in range(NODES - 1, -1, -1):
+        value, slope, r = 0.0, 0.0, 1.0 + x
+        for j in range(NODES - 1, 0, -1):
             slope = slope * x + value
             value = value * x + rows[k, LEFT_TERMS + j]
-        slope, value = value + (1.0 + x) * slope, (1.0 + x) * value
+        slope = rows[k, LEFT_TERMS] + r * (2.0 * value + r * slope)
+        value = r * (rows[k, LEFT_TERMS] + r * value)
         if value < slack:
             near = x
         else:
@@ -150,16 +236,16 @@ def zero_on_panel(rows, k, slack, near, far):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def turn_from(curve, start, x, w0, direction):  # type: ignore[no-untyped-def]
+def turn_from(curve, launch, w0, direction):  # type: ignore[no-untyped-def]
     """What ends a motion in one direction from a place on the table: what it is, the panel, and the place on it.
 
     It is TURN, LIMIT (an end of the curve, or a whole lap) or CRITICAL where the table does not decide it.
     """
     rows, count, period = curve.rows, curve.levels.size, curve.period
-    index = start
+    index, x, near_edge = launch
     k = index % count
     prepare(curve, k, FAR | NEAR)
-    energy = 0.5 * w0 + rows[k, BASE] + potential_on(rows, k, x)
+    energy = 0.5 * w0 + rows[k, BASE] + rise_from_left(rows, k, x, near_edge)
     margin = CONSTANT_SHARE * (0.5 * w0 + max(fabs(energy), rows[k, BASE_SIZE]))
     for passed in range(count + 1):
         prepare(curve, k, FAR)
@@ -202,31 +288,70 @@ def downhill(curve, k, x):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def polished(curve, lam0, w0, index, x):  # type: ignore[no-untyped-def]
-    """The offset of a turning point from the launch, and its place on its panel, by a step of Newton's method."""
-    table = curve.table
-    k = index % curve.levels.size
-    left, half = edge_place(table, curve.period, index), 0.5 * (table.edges[k + 1] - table.edges[k])
-    place, offset, out = np.empty(1), np.empty(1), np.empty((2, 1))
-    offset[0] = (left - lam0) + half * (1.0 + x)
-    place[0] = lam0 + offset[0]
-    call_potential_divdiff1(curve.fns.potential_divdiff1, 1, lam0, place, offset, curve.p, out)
-    step = (0.5 * w0 - offset[0] * out[0, 0]) / (difference_on(curve.rows, k, x, x) / half)
-    return offset[0] + step, x + step / half
+def slack_at_edge(curve, launch, w0, index, direction):  # type: ignore[no-untyped-def]
+    """V**2/2 at the edge through which a body comes to a panel, which is another one than that of the launch."""
+    rows, count = curve.rows, curve.levels.size
+    start, x, near = launch
+    k = start % count
+    if direction > 0:
+        return 0.5 * w0 + rise_from_right(rows, k, x, near) - rise_between(rows, (start + 1) % count, index % count)
+    return 0.5 * w0 + rise_from_left(rows, k, x, near) - rise_between(rows, k, (index + 1) % count)
 
 
 @Inner
-def end_ahead(curve, lam0, w0, direction):  # type: ignore[no-untyped-def]
-    """The offset of the end of the curve in one direction, and V**2 there; NaN if a body may not leave there."""
-    edges, place, offset, out = curve.table.edges, np.empty(2), np.empty(1), np.empty((2, 2))
-    place[0], place[1] = edges[-1] if direction > 0 else edges[0], lam0
-    offset[0] = place[0] - lam0
-    call_effective_potential(curve.fns.effective_potential, 2, place, curve.p, out)
-    size = w0 + 2.0 * (fabs(out[0, 0]) + fabs(out[0, 1]))
-    call_potential_divdiff1(curve.fns.potential_divdiff1, 1, lam0, place, offset, curve.p, out.reshape(4))
-    v2 = w0 - 2.0 * offset[0] * out[0, 0]
-    certain = curve.ends != NO_ENDS and offset[0] != 0.0 and v2 > MIN_LEAVING_SHARE * size
-    return offset[0], v2 if certain else np.nan
+def polished(curve, launch, w0, index, x, direction):  # type: ignore[no-untyped-def]
+    """A turning point with all digits, by a step of Newton's method: its offset from the launch, and its place.
+
+    V**2 is measured from the launch if that is on the same panel, else from the edge through which the body comes.
+    """
+    table, rows, count = curve.table, curve.rows, curve.levels.size
+    k = index % count
+    slope, half, (start, at, near) = difference_on(rows, k, x, x), table.paths[k, HALF], launch
+    if index == start:
+        way = x - at
+        way += (0.5 * w0 - way * difference_on(rows, k, at, x)) / slope
+        gap = from_left(at, near) + way
+        gap = gap if gap <= 1.0 else from_right(at, near) - way
+        return half * way, (index, at + way, gap)
+    gap, slack = 1.0 + direction * x, slack_at_edge(curve, launch, w0, index, direction)
+    if direction > 0:
+        gap += (slack - rise_on(rows, k, LEFT_TERMS, x, gap)) / slope
+        turn = index, gap - 1.0, gap if gap <= 1.0 else 2.0 - gap
+        return way_between(table, launch, turn), turn
+    gap -= (slack - rise_on(rows, k, RIGHT_TERMS, x, -gap)) / slope
+    turn = index, 1.0 - gap, gap if gap < 1.0 else 2.0 - gap
+    return -way_between(table, turn, launch), turn
+
+
+@Inner
+def end_ahead(curve, launch, w0, direction):  # type: ignore[no-untyped-def]
+    """The offset of the end of the curve in one direction, its place, and V**2 there; NaN if a body may not leave."""
+    rows, last = curve.rows, curve.levels.size - 1
+    start, x, near = launch
+    if direction > 0:
+        end, k = (last, 1.0, 0.0), last
+        half_v2 = 0.5 * w0 + rise_from_right(rows, start, x, near)
+        if start < last:
+            half_v2 = slack_at_edge(curve, launch, w0, last, 1) - rows[last, INCREASE]
+        offset = way_between(curve.table, launch, end)
+    else:
+        end, k = (0, -1.0, 0.0), 0
+        half_v2 = 0.5 * w0 + rise_from_left(rows, start, x, near)
+        if start > 0:
+            half_v2 = slack_at_edge(curve, launch, w0, 0, -1) + rows[0, INCREASE]
+        offset = -way_between(curve.table, end, launch)
+    size = 0.5 * w0 + rows[start, BASE_SIZE] + rows[k, BASE_SIZE] + fabs(rows[k, INCREASE])
+    certain = curve.ends != NO_ENDS and offset != 0.0 and half_v2 > MIN_LEAVING_SHARE * size
+    return offset, end, 2.0 * half_v2 if certain else np.nan
+
+
+@Inner
+def middle_of(curve, orbit, first, panels, turns):  # type: ignore[no-untyped-def]
+    """The number ``middle`` of a passage."""
+    if turns != BOTH:
+        return -1 if turns == UPPER else panels - 1
+    found = locate(curve.table, curve.period, orbit.lam0 + 0.5 * (orbit.low + orbit.high))
+    return min(max(found[0] - first, 0), panels - 1)
 
 
 @Inner
@@ -234,135 +359,135 @@ def find_passage(curve, lam0, v0, direction):  # type: ignore[no-untyped-def]
     """The orbit of a launch and the panels that it passes; no panels where the table does not decide."""
     table, w0 = curve.table, v0 * v0
     count = curve.levels.size
-    none = Orbit(False, False, direction, lam0, w0, 0.0, 0.0, 0), Passage(0, 0, 0.0, 0.0, 0.0, BOTH, 0.0)
+    none = Orbit(False, False, direction, lam0, w0, 0.0, 0.0, 0), NOWHERE
     if count == 0:
         return none
-    start, x = locate(table, curve.period, lam0)
+    launch = locate(table, curve.period, lam0)
+    start, x, near = launch
     if w0 == 0.0:
         direction = downhill(curve, start % count, x)
-        if direction == 0 or fabs(x) == 1.0:
+        if direction == 0 or near == 0.0:
             return none
-    ahead, front, front_x = turn_from(curve, start, x, w0, direction)
+    ahead, index, zero = turn_from(curve, launch, w0, direction)
     if ahead == LIMIT and curve.period > 0.0 and w0 > 0.0:
         lap = direction * curve.period
         orbit = Orbit(True, False, direction, lam0, w0, min(lap, 0.0), max(lap, 0.0), 0)
-        return orbit, Passage(start if direction > 0 else start - count, count + 1, x, x, curve.period, NEITHER, w0)
-    leaves, turns, v2, last = 0, BOTH, w0, count - 1
+        first, rests = start if direction > 0 else start - count, (from_right(x, near), from_left(x, near))
+        return orbit, Passage(first, count + 1, x, x, rests[0], rests[1], curve.period, NEITHER, w0, True, count)
+    leaves, turns, v2 = 0, BOTH, w0
     if ahead == TURN:
-        offset, front_x = polished(curve, lam0, w0, front, front_x)
+        offset, front = polished(curve, launch, w0, index, zero, direction)
     else:
-        leaves, front, front_x = direction, last if direction > 0 else 0, float(direction)
-        offset, v2 = end_ahead(curve, lam0, w0, direction)
-    other, back, back_x, behind = 0.0, start, x, TURN
+        leaves = direction
+        offset, front, v2 = end_ahead(curve, launch, w0, direction)
+    other, back, behind = 0.0, launch, TURN
     if w0 > 0.0:
-        behind, back, back_x = turn_from(curve, start, x, w0, -direction)
+        behind, index, zero = turn_from(curve, launch, w0, -direction)
         if behind == TURN:
-            other, back_x = polished(curve, lam0, w0, back, back_x)
+            other, back = polished(curve, launch, w0, index, zero, -direction)
         elif leaves != 0:
-            turns, back, back_x = NEITHER, start, x
+            turns = NEITHER
         else:
-            leaves, back, back_x = -direction, 0 if direction > 0 else last, float(-direction)
-            other, v2 = end_ahead(curve, lam0, w0, -direction)
-    if leaves == 0 and (curve.rows[front % count, SLOPE_SIGN] == 0.0 or curve.rows[back % count, SLOPE_SIGN] == 0.0):
+            leaves = -direction
+            other, back, v2 = end_ahead(curve, launch, w0, -direction)
+    signs = curve.rows[front[0] % count, SLOPE_SIGN], curve.rows[back[0] % count, SLOPE_SIGN]
+    if leaves == 0 and not table.is_exact and (signs[0] == 0.0 or signs[1] == 0.0):
         return none  # a swing about the lowest place of a panel has more digits without the table
     last_end = ahead if leaves == direction else behind
     if leaves != 0 and not (last_end == LIMIT and v2 > 0.0 and curve.period == 0.0):
         return none
-    low, first, low_x, high, end, high_x = other, back, back_x, offset, front, front_x
-    if direction < 0:
-        low, first, low_x, high, end, high_x = offset, front, front_x, other, back, back_x
+    low, lower, high, upper = (other, back, offset, front) if direction > 0 else (offset, front, other, back)
     if leaves != 0 and turns != NEITHER:
         turns = LOWER if leaves > 0 else UPPER
     orbit = Orbit(False, False, direction, lam0, w0, low, high, leaves)
-    v2 = v2 if direction < 0 else w0
-    return orbit, Passage(first, end - first + 1, low_x, high_x, high - low, turns, v2)
+    rests = from_right(lower[1], lower[2]), from_left(upper[1], upper[2])
+    first, panels, v2 = lower[0], upper[0] - lower[0] + 1, v2 if direction < 0 else w0
+    middle = middle_of(curve, orbit, first, panels, turns)
+    return orbit, Passage(first, panels, lower[1], upper[1], rests[0], rests[1], high - low, turns, v2, True, middle)
 
 
 @Inner
 def passage_of(curve, orbit):  # type: ignore[no-untyped-def]
     """The panels that a known orbit passes; none if the curve is not tabulated."""
-    table = curve.table
-    if curve.levels.size == 0:
-        return Passage(0, 0, 0.0, 0.0, 0.0, BOTH, 0.0)
-    first, low_x = locate(table, curve.period, orbit.lam0 + orbit.low)
+    table, count = curve.table, curve.levels.size
+    if count == 0:
+        return NOWHERE
+    first, x, near = locate(table, curve.period, orbit.lam0 + orbit.low)
     if orbit.circulates:
-        return Passage(first, curve.levels.size + 1, low_x, low_x, curve.period, NEITHER, orbit.v2)
-    last, high_x = locate(table, curve.period, orbit.lam0 + orbit.high)
+        rests = from_right(x, near), from_left(x, near)
+        return Passage(first, count + 1, x, x, rests[0], rests[1], curve.period, NEITHER, orbit.v2, False, count)
+    last, y, close = locate(table, curve.period, orbit.lam0 + orbit.high)
     inside = table.edges[0] <= orbit.lam0 + orbit.low and orbit.lam0 + orbit.high <= table.edges[-1]
-    panels = last - first + 1 if inside or curve.period > 0.0 else 0
-    return Passage(first, panels, low_x, high_x, orbit.high - orbit.low, BOTH, 0.0)
+    panels, rests = last - first + 1 if inside or curve.period > 0.0 else 0, (from_right(x, near), from_left(y, close))
+    middle = middle_of(curve, orbit, first, panels, BOTH)
+    return Passage(first, panels, x, y, rests[0], rests[1], orbit.high - orbit.low, BOTH, 0.0, False, middle)
 
 
 @Inner
 def fill_slacks(curve, passage, slacks):  # type: ignore[no-untyped-def]
     """Fill V**2/2 at the left edge of each panel of a passage; returns whether they keep enough digits.
 
-    They are sums of two doubles from the nearer turning point. On a panel that has one they are as if the curve went on
-    beyond it.
+    They are measured from the nearer turning point. On a panel that has one they are as if the curve went on beyond it.
     """
     rows, count, last = curve.rows, curve.levels.size, passage.panels - 1
     for j in range(passage.panels):
         prepare(curve, (passage.first + j) % count, FAR | NEAR if j in (0, last) else FAR)
-    turns, edges = passage.turns, curve.table.edges
-    middle = last // 2
-    if turns != BOTH:
-        middle = -1 if turns == UPPER else last
-    k, high = passage.first % count, (passage.first + last) % count
-    peak, top, least, slope, begin = 0.0, 0.0, 1.0, np.inf, 0.0
+    turns, paths, middle, enough = passage.turns, curve.table.paths, passage.middle, True
+    k, high, begin = passage.first % count, (passage.first + last) % count, 0.0
+    peak, slope = 0.0, np.inf
     if turns == NEITHER:
         peak = begin = 0.5 * passage.v2
     if turns != UPPER:
         slacks[0] = potential_on(rows, k, passage.low_x) + begin
-        slack, low = (passage.low_x - 1.0) * difference_on(rows, k, passage.low_x, 1.0) + begin, 0.0
+        slack, after = begin + rise_on(rows, k, RIGHT_TERMS, passage.low_x, -passage.low_rest), (k + 1) % count
         for j in range(1, middle + 1):
-            slacks[j] = slack
+            slacks[j] = slack - rise_between(rows, after, (passage.first + j) % count)
+            peak = max(peak, slacks[j])
+            enough &= slacks[j] >= MIN_CANCELLATION_RATIO * peak
+        if last > 0:
             peak = max(peak, slack)
-            least = min(least, slack / peak)
-            slack, error = two_sum(slack, -rows[(passage.first + j) % count, INCREASE])
-            low += error
-            slack, low = two_sum(slack, low)
-        peak = max(peak, slack)
-        if turns != BOTH:
-            least = min(least, slack / peak)
         if turns != NEITHER:
-            slope = -difference_on(rows, k, passage.low_x, passage.low_x) / (edges[k + 1] - edges[k])
+            slope = -difference_on(rows, k, passage.low_x, passage.low_x) / (2.0 * paths[k, HALF])
     if turns in (BOTH, UPPER):
-        slack, low = (passage.high_x + 1.0) * difference_on(rows, high, -1.0, passage.high_x), 0.0
-        slacks[last] = slack
-        for j in range(last - 1, middle, -1):
-            top = max(top, slack)
-            least = min(least, slack / top)
-            slack, error = two_sum(slack, rows[(passage.first + j) % count, INCREASE])
-            low += error
-            slack, low = two_sum(slack, low)
-            slacks[j] = slack
-        top = max(top, slack)
-        least = min(least, slack / top)
-        slope_above = difference_on(rows, high, passage.high_x, passage.high_x) / (edges[high + 1] - edges[high])
-        slope = min(slope, slope_above)
+        top = slack = rise_on(rows, high, LEFT_TERMS, passage.high_x, passage.high_rest)
+        for j in range(last, middle, -1):
+            slacks[j] = slack - rise_between(rows, high, (passage.first + j) % count)
+            top = max(top, slacks[j])
+            enough &= slacks[j] >= MIN_CANCELLATION_RATIO * top
+        slope_above = difference_on(rows, high, passage.high_x, passage.high_x) / (2.0 * paths[high, HALF])
+        slope, peak = min(slope, slope_above), max(peak, top)
     # Neither turning point may be next to an equilibrium.
-    enough = 0.5 * MIN_CANCELLATION_RATIO * max(top, peak)
-    return least >= MIN_CANCELLATION_RATIO and slope * passage.width >= enough
-
-
-@Inlined
-def is_upper(passage, j):  # type: ignore[no-untyped-def]
-    """Whether phase angles on panel j of a passage are counted from the upper end."""
-    return passage.turns == UPPER or (passage.turns == BOTH and 2 * j >= passage.panels)
+    return enough and slope * passage.width >= 0.5 * MIN_CANCELLATION_RATIO * peak
 
 
 @Inner
-def fill_rates(curve, passage, j, slack, gap, u, out):  # type: ignore[no-untyped-def]
+def difference_to(rows, k, inner, y, q, way):  # type: ignore[no-untyped-def]
+    """The divided difference of the potential of panel k between a place and another one, ``way`` further.
+
+    The place is ``q`` away from the edge whose numbers begin at column ``inner``. The nearer edge is taken.
+    """
+    x = y + way
+    if (x + y < 0.0) == (inner == LEFT_TERMS):
+        return difference_from(rows, k, inner, x, q + way, y, q)
+    return difference_on(rows, k, y, x)
+
+
+@Inner
+def fill_rates(curve, passage, j, from_above, slack, gap, u, out):  # type: ignore[no-untyped-def]
     """Fill the time per unit of u on panel j of a passage at the Gauss points u.
 
     u is the orbit's phase angle, or the place on the panel if the passage has no turning point. Phase angles are
-    counted from the nearer one, because a small time next to it needs a small angle with all digits. ``slack`` and
+    counted from the nearer one, because a small time next to it needs a small angle with all digits; ``from_above``
+    says whether that is the upper one. ``slack`` and
     ``gap`` belong to the panel's edge that is nearer to it: V**2/2 there, and the distance from the turning point. An
     end of the curve stands for a turning point that there is not.
     """
-    rows, edges, last = curve.rows, curve.table.edges, passage.panels - 1
+    rows, last = curve.rows, passage.panels - 1
     k = (passage.first + j) % curve.levels.size
-    half = 0.5 * (edges[k + 1] - edges[k])
+    half = curve.table.paths[k, HALF]
+    if last == 0 and passage.turns == BOTH:
+        fill_rates_within(curve, passage, k, u, out)
+        return
     for i in range(NODES):
         x, numerator = u[i], half * half
         if passage.turns == NEITHER:
@@ -370,25 +495,51 @@ def fill_rates(curve, passage, j, slack, gap, u, out):  # type: ignore[no-untype
         else:
             s, c = sin(0.5 * u[i]), cos(0.5 * u[i])
             below, above = passage.width * s * s, passage.width * c * c
-            if is_upper(passage, j):
+            if from_above:
                 below, above = above, below
             # V**2/2 is its value at a turning point or an edge, and what the potential falls from there.
-            if j == 0 and passage.turns != UPPER:
-                x, y, at_y, factor, numerator = passage.low_x + below / half, passage.low_x, 0.0, -1.0, above * half
-            elif j == last and passage.turns != LOWER:
-                x, y, at_y, factor, numerator = passage.high_x - above / half, passage.high_x, 0.0, 1.0, below * half
-            elif is_upper(passage, j):
-                rest = (above - gap) / half
-                x, y, at_y, factor, numerator = 1.0 - rest, 1.0, slack, rest, below * above
+            if j == 0 and not from_above:
+                x, way = passage.low_x + below / half, below / half
+                fall = -difference_to(rows, k, RIGHT_TERMS, passage.low_x, -passage.low_rest, way)
+                numerator = above * half
+            elif j == last and from_above:
+                x, way = passage.high_x - above / half, above / half
+                fall = difference_to(rows, k, LEFT_TERMS, passage.high_x, passage.high_rest, -way)
+                numerator = below * half
+            elif from_above:
+                rest, numerator = (above - gap) / half, below * above
+                x = 1.0 - rest
+                fall = slack - rise_on(rows, k, RIGHT_TERMS, x, -rest)
             else:
-                rest = (below - gap) / half
-                x, y, at_y, factor, numerator = rest - 1.0, -1.0, slack, -rest, below * above
-            fall = at_y + factor * difference_on(rows, k, y, x)
+                rest, numerator = (below - gap) / half, below * above
+                x = rest - 1.0
+                fall = slack - rise_on(rows, k, LEFT_TERMS, x, rest)
         out[i] = value_on(curve.table.paths, k, DS_TERMS, x) * sqrt(numerator / (2.0 * fall))
 
 
 @Inner
-def time_on_part(curve, passage, j, slack, gap, begin, end):  # type: ignore[no-untyped-def]
+def fill_rates_within(curve, passage, k, u, out):  # type: ignore[no-untyped-def]
+    """Fill the time per phase angle at the Gauss points u where panel k has both turning points.
+
+    V**2/2 is (x - low)*(high - x) times the second divided difference of the potential, whose powers are found once.
+    """
+    rows, low, high, half = curve.rows, passage.low_x, passage.high_x, curve.table.paths[k, HALF]
+    terms, first, second = rates_buffer(), 0.0, 0.0
+    for j in range(NODES, 1, -1):
+        # The powers of the potential divided by x - low, and then by x - high.
+        first = first * low + power_on(rows, k, j)
+        second = second * high + first
+        terms[j - 2] = second
+    for i in range(NODES):
+        s, c = sin(0.5 * u[i]), cos(0.5 * u[i])
+        x, bend = low * c * c + high * s * s, 0.0
+        for j in range(NODES - 2, -1, -1):
+            bend = bend * x + terms[j]
+        out[i] = value_on(curve.table.paths, k, DS_TERMS, x) * half / sqrt(2.0 * bend)
+
+
+@Inner
+def time_on_part(curve, passage, j, from_above, slack, gap, begin, end):  # type: ignore[no-untyped-def]
     """The time between two values of u (`fill_rates`) on panel j of a passage; NaN where it is not accurate."""
     u, rates = angle_buffer(), rates_buffer()
     prepare(curve, (passage.first + j) % curve.levels.size, NEAR)
@@ -400,14 +551,16 @@ def time_on_part(curve, passage, j, slack, gap, begin, end):  # type: ignore[no-
             middle = begin + (2 * part + 1) * half
             for i in range(NODES):
                 u[i] = middle + half * POINTS[i]
-            fill_rates(curve, passage, j, slack, gap, u, rates)
-            size, last, before, earlier, earliest = 0.0, 0.0, 0.0, 0.0, 0.0
+            fill_rates(curve, passage, j, from_above, slack, gap, u, rates)
+            # The weights add up to 2: what differs from one rate is less than a sum of all, and so is its rounding.
+            usual, size, last, before, earlier, earliest = rates[NODES // 2], 0.0, 0.0, 0.0, 0.0, 0.0
             for i in range(NODES):
-                size += GAUSS_WEIGHTS[i] * rates[i]
+                size += GAUSS_WEIGHTS[i] * (rates[i] - usual)
                 last += FIT[i, NODES - 1] * rates[i]
                 before += FIT[i, NODES - 2] * rates[i]
                 earlier += FIT[i, NODES - 5] * rates[i]
                 earliest += FIT[i, NODES - 6] * rates[i]
+            size += 2.0 * usual
             total += half * size
             tail, middle = max(fabs(last), fabs(before)), max(fabs(earlier), fabs(earliest))
             # Sixteen degrees on, the terms are these if they go on to decrease as they do over the last four. Next to a
@@ -418,6 +571,25 @@ def time_on_part(curve, passage, j, slack, gap, begin, end):  # type: ignore[no-
             return total
         parts *= 2
     return np.nan
+
+
+@Inner
+def time_behind_edge(curve, passage, j, from_above, slack, gap, begin, end):  # type: ignore[no-untyped-def]
+    """As `time_on_part`, for a panel that is next to one with a turning point very near the edge.
+
+    Where the curvature jumps at that edge, dt/du has terms in gap/u**2.
+    """
+    total = 0.0
+    while begin > 0.0 and end > MAX_PHASE_RATIO * begin:
+        total += time_on_part(curve, passage, j, from_above, slack, gap, begin, MAX_PHASE_RATIO * begin)
+        begin *= MAX_PHASE_RATIO
+    return total + time_on_part(curve, passage, j, from_above, slack, gap, begin, end)
+
+
+@Inner
+def time_on_panel_of_both(curve, passage):  # type: ignore[no-untyped-def]
+    """The half period of a body both of whose turning points are on one panel; NaN where it is not accurate."""
+    return time_on_part(curve, passage, 0, False, 0.0, 0.0, 0.0, pi)
 
 
 @Inner
@@ -455,41 +627,55 @@ def time_between(curve, passage, slacks, lower, upper):  # type: ignore[no-untyp
 
     ``lower`` and ``upper`` are the distances of each from both ends of the orbit.
     """
-    table, total, low = curve.table, 0.0, 0.0
-    count, last, right = curve.levels.size, passage.panels - 1, 0.0
+    table, total, low, width = curve.table, 0.0, 0.0, passage.width
+    paths, count, last = table.paths, curve.levels.size, passage.panels - 1
+    first, end = passage.first + 1, passage.first + last
+    to_edge = passage.low_rest * paths[(first - 1) % count, HALF]
+    from_edge = passage.high_rest * paths[end % count, HALF]
+    right = 0.0
     for j in range(passage.panels):
         k = (passage.first + j) % count
-        size = table.edges[k + 1] - table.edges[k]
-        left = right if j > 0 else -0.5 * (1.0 + passage.low_x) * size
-        right = left + size if j > 0 else 0.5 * (1.0 - passage.low_x) * size
+        half = paths[k, HALF]
+        left = right if j > 0 else to_edge - 2.0 * half
+        right = left + 2.0 * half
         if left >= upper[0]:
             break
         if right <= lower[0]:
             continue
-        begins, ends = left <= lower[0], right >= upper[0]
+        begins, ends = j == 0 or left <= lower[0], j == last or right >= upper[0]
         if not (begins or ends):
             time = time_on_panel(curve, k, slacks[j])
             if time == time:
                 total, error = two_sum(total, time)
                 low += error
                 continue
-        slack, gap = slacks[j], left
+        part = 0.0
         if passage.turns == NEITHER:
-            half = 0.5 * size
             begin = (lower[0] - left) / half - 1.0 if begins else -1.0
-            end = (upper[0] - left) / half - 1.0 if ends else 1.0
-        else:
-            first = lower if begins else (left, passage.width - left)
-            second = upper if ends else (right, passage.width - right)
-            if is_upper(passage, j):
-                first, second = (second[1], second[0]), (first[1], first[0])
-                if j < last:
-                    slack = slacks[j + 1]
-                    beyond = (passage.first + last) % count
-                    rest = 0.5 * (1.0 + passage.high_x) * (table.edges[beyond + 1] - table.edges[beyond])
-                    gap = rest if j == last - 1 else passage.width - right
-            begin, end = phase_of(first[0], first[1]), phase_of(second[0], second[1])
-        total, error = two_sum(total, time_on_part(curve, passage, j, slack, gap, begin, end))
+            stop = (upper[0] - left) / half - 1.0 if ends else 1.0
+            part = time_on_part(curve, passage, j, False, slacks[j], left, begin, stop)
+        for side in range(2 if passage.turns != NEITHER else 0):
+            from_above, is_middle = side == 1, passage.turns == BOTH and j == passage.middle
+            if from_above != (j > passage.middle) and not (is_middle and last > 0):
+                continue
+            slack, gap, one, other = slacks[j], 0.0, lower, upper
+            from_one, from_other, beyond = begins, ends, to_edge
+            if from_above:
+                one, other = (upper[1], upper[0]), (lower[1], lower[0])
+                from_one, from_other, beyond = ends, begins, from_edge
+            if from_above and j < last:
+                slack, gap = slacks[j + 1], from_edge + edge_distance(table, first + j, end)
+            elif not from_above and j > 0:
+                gap = to_edge + edge_distance(table, first, first + j - 1)
+            if gap > 0.0:
+                beyond = gap + 2.0 * half
+            begin = phase_of(one[0], one[1]) if from_one else phase_of(gap, width - gap)
+            stop = phase_of(other[0], other[1]) if from_other else phase_of(beyond, width - beyond)
+            if is_middle and last > 0:
+                stop = min(stop, 0.5 * pi)
+            if begin < stop:
+                part += time_behind_edge(curve, passage, j, from_above, slack, gap, begin, stop)
+        total, error = two_sum(total, part)
         low += error
     return total + low
 

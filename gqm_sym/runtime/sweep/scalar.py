@@ -44,7 +44,14 @@ from gqm_sym.runtime.sweep.liftoff import liftoff_place
 from gqm_sym.runtime.sweep.orbit import CONTACT_ENDS, Orbit, SweptCurve
 from gqm_sym.runtime.sweep.orbit_extremes import extreme, passage_extreme
 from gqm_sym.runtime.sweep.panel_forces import take_factors
-from gqm_sym.runtime.sweep.passage import BOTH, Passage, fill_slacks, find_passage, passage_of, travel_time
+from gqm_sym.runtime.sweep.passage import (
+    NOWHERE,
+    fill_slacks,
+    find_passage,
+    passage_of,
+    time_on_panel_of_both,
+    travel_time,
+)
 from gqm_sym.runtime.sweep.quantities import (
     ANSWERED,
     ANSWERS,
@@ -131,7 +138,7 @@ def find_orbit(curve, columns, k, monotone, spans, known):  # type: ignore[no-un
     )
     axis, step = element(columns, AXIS, k) if monotone else np.nan, element(columns, AXIS_STEP, k)
     even, v2 = axis == axis, v0 * v0
-    none, nowhere = Orbit(False, even, direction, lam0, v2, 0.0, 0.0, 0), Passage(0, 0, 0.0, 0.0, 0.0, BOTH, 0.0)
+    none, nowhere = Orbit(False, even, direction, lam0, v2, 0.0, 0.0, 0), NOWHERE
     total = lam0 + v0
     for row in range(columns.shape[0] - PARAMETERS):
         total += curve.p[row]
@@ -182,8 +189,8 @@ def value_from_table(curve, orbit, passage, quantity, target, slacks):  # type: 
     if quantity in (MIN_SPEED, MAX_SPEED, MIN_FORCE, MAX_FORCE):
         force, sign = quantity in (MIN_FORCE, MAX_FORCE), 1.0 if quantity in (MAX_SPEED, MAX_FORCE) else -1.0
         return passage_extreme(curve, orbit, passage, slacks, force, sign)
-    low, high = orbit.lam0 + orbit.low, orbit.lam0 + orbit.high
-    if orbit.leaves == 0 and passage.panels <= 2 and joints_between(curve.joints, curve.period, low, high).size == 0:
+    low, high, few = orbit.lam0 + orbit.low, orbit.lam0 + orbit.high, orbit.leaves == 0 and passage.panels <= 2
+    if few and not curve.table.is_exact and joints_between(curve.joints, curve.period, low, high).size == 0:
         return nan  # the orbit itself has more digits than a part of a panel
     return travel_time(curve, orbit, passage, slacks, target if quantity == ARRIVAL_TIME else nan)
 
@@ -236,7 +243,9 @@ def fill_answer(curve, orbit, passage, asked, buffers, out):  # type: ignore[no-
         out[0], out[1] = orbit.lam0 + orbit.low, orbit.lam0 + orbit.high
         return ANSWERED
     value = value_from_table(curve, orbit, passage, quantity, target, slacks) if tabulated else nan
-    if value != value and orbit.leaves == 0:
+    if quantity in (HALF_PERIOD, PERIOD) and passage.panels == 1 and passage.is_polished and curve.table.is_exact:
+        value = time_on_panel_of_both(curve, passage)
+    if value != value and orbit.leaves == 0 and not (quantity in (HALF_PERIOD, PERIOD) and curve.table.is_exact):
         value = value_by_itself(curve, orbit, quantity, target, buffers)
     if value == inf:
         return NEVER_THERE
@@ -272,8 +281,9 @@ def answer_one_by_one(fns, columns, monotone, quantity, spans, answers, given): 
     buffers = Buffers(trapezoid_workspace(), trapezoid_rates(), np.empty(panels + 1))
     taken = np.empty(count)
     p, joints, side, t_max = uncounted(given.parameters), uncounted(given.joints), given.side, given.t_max
-    edges, paths, parts = uncounted(given.table.edges), uncounted(given.table.paths), uncounted(given.table.parts)
-    table = CurveTable(edges, paths, parts, given.table.potentials)
+    edges, lows = uncounted(given.table.edges), uncounted(given.table.edge_lows)
+    paths, parts = uncounted(given.table.paths), uncounted(given.table.parts)
+    table = CurveTable(edges, lows, paths, parts, given.table.potentials, given.table.is_exact)
     rows, levels, factors = uncounted(given.rows), uncounted(given.levels), uncounted(given.factors)
     columns, spans, values = uncounted(columns), uncounted(spans), uncounted(answers.values)
     statuses, routes = uncounted(answers.status), uncounted(answers.route)

@@ -16,10 +16,12 @@ from gqm_sym.errors import GQMError, InputError, ParameterError, SolutionError
 from gqm_sym.literals.namespaces import ARRAYS
 from gqm_sym.literals.numbers import read_number
 from gqm_sym.runtime.charts.chart import CORNER_ROUNDINGS, ChartMaker
+from gqm_sym.runtime.charts.true_parts import NO_PARTS, parts_along
 from gqm_sym.runtime.compiled.strided import DOMAIN_PERIOD, LAM0, PARAMETERS, V0, lay_out, pointers, widen
 from gqm_sym.runtime.compiled.threads import run_in_threads
 from gqm_sym.runtime.compiled.types import Array
-from gqm_sym.runtime.launch.formulas import chart_with
+from gqm_sym.runtime.interface import ExactPotential
+from gqm_sym.runtime.launch.formulas import chart_with, true_pieces_of
 from gqm_sym.runtime.launch.request import CONTACTS, ONLY_SIGN, LaunchRequest
 from gqm_sym.runtime.launch.speed import path_and_force_at, potential_at
 from gqm_sym.runtime.multiprecision.exact_problem import NOWHERE
@@ -283,7 +285,10 @@ def _groups(
         except GQMError:
             continue  # `solve` says why
         domain = [np.array(value) for value in (*chart.range, nan, nan, 0.0)]
-        table = NO_TABLE if formulas.dissipation else _tabulated(formulas.chart, _source(formulas), values)
+        table = NO_TABLE
+        if not formulas.dissipation:
+            made_from = _source(formulas), _exact_parts(formulas), len(formulas.parameters)
+            table = _tabulated(formulas.chart, *made_from, values)
         some, theirs = columns, factors
         if chosen is not None:
             some, theirs = ([_chosen(column, shape, chosen) for column in of] for of in (columns, factors))
@@ -362,14 +367,35 @@ def _tabulated_range(
         first, last = reach
         ends = CONTACT_ENDS if closed == 2 else NO_ENDS
     pieces = np.linspace(first, last, MIN_PIECES + 1)
-    return CurveTable(*tabulate(_source(formulas), p, pieces)), ends
+    return CurveTable(*tabulate(_source(formulas), NO_PARTS, p, pieces)), ends
+
+
+def _exact_parts(formulas: "Formulas") -> Callable[..., Any] | None:
+    """The function that gives the parts of the potential by coordinates, and perhaps more behind them."""
+    if formulas.separated is not None:
+        return formulas.separated.parts
+    return formulas.exact.effective_potential if isinstance(formulas.exact, ExactPotential) else None
 
 
 @lru_cache(maxsize=8)
-def _tabulated(maker: ChartMaker, source: Source, values: tuple[float, ...]) -> CurveTable:
-    """The table of a chart; it is made once for the same parameters."""
-    chart = chart_with(maker, values)
-    return CurveTable(*tabulate(source, np.concatenate([values, chart.block]), chart.edges))
+def _tabulated(
+    maker: ChartMaker,
+    source: Source,
+    exact_parts: Callable[..., Any] | None,
+    parameters: int,
+    values: tuple[float, ...],
+) -> CurveTable:
+    """The table of a chart; it is made once for the same parameters. Behind these many stand functions of them."""
+    chart, true = chart_with(maker, values), None
+    if exact_parts is not None and maker.is_exact(chart):
+        p = tuple(read_number(value, where="p") for value in values)
+        try:
+            pieces = true_pieces_of(maker, p[:parameters], chart)
+            true = pieces and parts_along(pieces, exact_parts, source.potentials, p)
+        except GQMError:
+            true = None  # then the table has the digits of the chart
+    p_and_chart = np.concatenate([values, chart.block])
+    return CurveTable(*tabulate(source, true or NO_PARTS, p_and_chart, chart.edges))
 
 
 def _distinct(

@@ -11,6 +11,7 @@ import pytest
 from mpmath import mp, mpf
 
 import gqm_sym as gqm
+from gqm_sym.errors import SolutionError
 
 Build = Callable[..., ModuleType]
 G = mpf("9.81")
@@ -135,7 +136,7 @@ def test_a_resistance_that_never_stops_a_swing(build: Build) -> None:
     assert legs[50].lam_end / legs[49].lam_end == pytest.approx(-math.exp(-0.5 * math.pi / omega), rel=1e-13)
 
 
-@pytest.mark.parametrize("t", [0.01, 1.0, 5.0])
+@pytest.mark.parametrize("t", [0.01, 1.0, 5.0, 70.0, 400.0])
 def test_a_creeping_spring(t: float, build: Build) -> None:
     """Far beyond critical damping the body creeps for ever: x = exp(-c t/2) (cosh d t + c/(2 d) sinh d t)."""
     motion = spring(build, "creeping", gqm.Kernel.law("-c*direction*sqrt(W)")).solve("1", c="20", k="10")
@@ -145,6 +146,29 @@ def test_a_creeping_spring(t: float, build: Build) -> None:
     state = motion.state(t)
     assert abs(state.lam - truth) <= state.error <= 1e-10
     assert motion.t_end == math.inf
+
+
+def test_creeping_to_the_bottom_of_a_valley(build: Build) -> None:
+    """Next to the bottom the body creeps by x - 3 = A exp(-r t), until it is closer than doubles can tell ("lost")."""
+    valley = gqm.Curve.graph("x**2/2 - 3*x")
+    module = build("viscous_valley", valley, gqm.Kernel.law("-c*direction*sqrt(W)"))
+    motion = module.solve("1", c=30)
+    with mp.workdps(30):
+        rate = 15 - mp.sqrt(225 - G)
+        for t in (50.0, 60.0, 70.0):
+            first, later = (motion.state(time) for time in (t, t + 2.0))
+            ratio, error = (later.lam - 3.0) / (first.lam - 3.0), later.error + first.error
+            assert abs(ratio - mp.exp(-2 * rate)) <= 2 * error / abs(first.lam - 3.0) + abs(first.lam - 3.0)
+            assert error <= 3e-14
+    still = motion.state(1e6)
+    assert abs(still.lam - 3.0) <= still.error <= 1e-14
+    assert motion.t_end == math.inf
+
+
+def test_from_where_v2_is_beyond_doubles(build: Build) -> None:
+    """The words say so (asked whether the curve was smooth)."""
+    with pytest.raises(SolutionError, match="range of doubles"):
+        spring(build, "creeping", gqm.Kernel.law("-c*direction*sqrt(W)")).solve("1e-155", c="1/10", k="10")
 
 
 def test_creeping_on_a_ring_has_no_end(build: Build) -> None:
