@@ -241,9 +241,7 @@ def tabulated(timed: TimedSegment, lap: float, errors_before: ErrorsBefore) -> T
         place_before + segment.inversion_error(both_ends).reshape(2, -1).max(axis=0),
     )
     rows = np.ones((len(ends), 1))
-    intervals = np.hstack(
-        [np.column_stack([until, when, when_low, sense * scales]), rows * constants, powers]
-    )
+    intervals = np.hstack([np.column_stack([until, when, when_low, sense * scales]), rows * constants, powers])
     signs = (segment.direction, timed.direction, timed.s_a, *growth)
     states = np.column_stack([owners, rows * signs, *errors])
     kept = (until > timed.t_start[0]) & (since < timed.t_stop[0])
