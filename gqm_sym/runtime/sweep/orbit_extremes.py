@@ -1,6 +1,6 @@
 """The smallest and largest speed or contact force on one of many orbits: the best point of a grid, refined."""
 
-from math import inf, pi, sqrt
+from math import fabs, inf, pi, sqrt
 
 import numpy as np
 
@@ -27,8 +27,9 @@ from gqm_sym.runtime.sweep.passage import locate
 # which the step shrinks each time.
 GRID_INTERVALS, REFINEMENTS, STEP_RATIO = 64, 2, 16.0
 
-# Half the width of the first parabola on a panel of a tabulated curve, which is 2 wide.
-FIRST_STEP = 0.25
+# Half the widths of the first and of the last parabola on a panel of a tabulated curve, which is 2 wide, and how many
+# there are at most: one whose vertex is far away is followed by one of the same width there.
+FIRST_STEP, LAST_STEP, MAX_PARABOLAS = 0.25, 1e-3, 10
 
 # The grid as shares of a lap, and as shares of a libration's width.
 LAP_SHARES = np.arange(GRID_INTERVALS + 1) / GRID_INTERVALS
@@ -120,7 +121,8 @@ def refined(curve, k, slack, force, sign, x, ends):  # type: ignore[no-untyped-d
     prepare(curve, k, NEAR)
     low, high = ends
     best, step = load_on(curve, k, slack, force, x), FIRST_STEP
-    for _ in range(REFINEMENTS + 1):
+    for _ in range(MAX_PARABOLAS):
+        x_before = x
         left, right = max(x - step, low), min(x + step, high)
         if not left < x < right:
             x = 0.5 * (left + right)
@@ -133,7 +135,9 @@ def refined(curve, k, slack, force, sign, x, ends):  # type: ignore[no-untyped-d
             x = min(max(vertex, left), right)
         found = load_on(curve, k, slack, force, x)
         best = sign * max(sign * best, sign * f0, sign * f1, sign * f2, sign * found)
-        step /= STEP_RATIO
+        if step <= LAST_STEP:
+            break
+        step = min(step, max(step / STEP_RATIO, fabs(x - x_before)))
     return best
 
 

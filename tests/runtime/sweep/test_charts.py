@@ -269,6 +269,42 @@ def test_forces_of_every_launch_share_a_table(kind: str, tmp_path: Path) -> None
         assert np.array_equal(alone.values, swept.values[k], equal_nan=True)
 
 
+def _largest_force(k: mpf, x0: float, z0: float) -> mpf:
+    """The largest N on x**4 + z**4 - x*z/5 = 1 about its lower side, after a start from rest at (x0, z0).
+
+    Besides gravity a spring of stiffness k pulls a body of 1 kg towards (1, 2).
+    """
+
+    def negative_slope(x: mpf) -> mpf:
+        return -mp.diff(force, x)
+
+    def force(x: mpf) -> mpf:
+        z = mp.findroot(lambda z: x**4 + z**4 - x * z / 5 - 1, z0)
+        fx, fz, fxx, fxz, fzz = 4 * x**3 - z / 5, 4 * z**3 - x / 5, 12 * x**2, -mpf(1) / 5, 12 * z**2
+        size = mp.sqrt(fx * fx + fz * fz)
+        kappa = (fxx * fz**2 - 2 * fxz * fx * fz + fzz * fx**2) / size**3
+        fall = G * (z0 - z) + k / 2 * ((x0 - 1) ** 2 + (z0 - 2) ** 2 - (x - 1) ** 2 - (z - 2) ** 2)
+        return 2 * kappa * fall - (k * (x - 1) * fx + (G + k * (z - 2)) * fz) / size
+
+    with mp.workdps(40):
+        x0, z0 = mpf(x0), mpf(z0)
+        return force(mp.findroot(negative_slope, x0 - mpf("0.04")))
+
+
+def test_the_largest_force_on_a_small_swing(tmp_path: Path) -> None:
+    """Where the samples of a panel are far from the peak, parabolas follow it."""
+    curve = gqm.Curve.implicit("x**4+z**4-x*z/5-1", start=(0, -1))
+    force = gqm.Gravity() + gqm.Potential("k*((x-1)**2+(z-2)**2)/2")
+    module = gqm.build(gqm.derive(curve, force), name="pulled", folder=tmp_path)
+    places = np.array([0.3019884852508021, 0.3211793244158188, 0.3349973888307294])
+    swept = module.sweep("normal_force_max", places, k=0.7)
+    for value, place in zip(swept.values, places.tolist(), strict=True):
+        motion = module.solve(place, k=0.7)
+        truth = float(_largest_force(mpf(7) / 10, motion.state(0.0).x, motion.state(0.0).z))
+        assert value == pytest.approx(truth, rel=1e-14)
+        assert motion.normal_force_max.value == pytest.approx(truth, rel=1e-14)
+
+
 def test_half_periods_on_a_measured_track(track: ModuleType) -> None:
     """As `solve` gives them from extended precision, over dozens of pieces."""
     rng, bottom = np.random.default_rng(6), track.equilibria()[0].lam
