@@ -4,8 +4,9 @@ from math import isfinite, ulp
 
 import numpy as np
 
-from gqm_sym.errors import LaunchError
+from gqm_sym.errors import LaunchError, SolutionError
 from gqm_sym.literals.numbers import read_number
+from gqm_sym.runtime.arithmetic.doubledouble import ULP
 from gqm_sym.runtime.charts.chart import CORNER_ROUNDINGS
 from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.launch import zeros
@@ -38,6 +39,10 @@ NEAR_CUSP = 1e-6
 
 # The lesser of two distances from a cusp, as a share of the first step, at which the tangential force is compared.
 FORCE_SHARE = 1e-4
+
+# How many roundings of a place a corner is from an end of the motion if it is not that end; and how many of its terms
+# V**2 may be at a corner on which the body comes to rest.
+RIDGE_ROUNDINGS = 16.0
 
 
 def solve(formulas: Formulas, p: ParameterValues, launch: Launch) -> Motion:
@@ -109,6 +114,7 @@ def _as_bilateral(formulas: Formulas, p: ParameterValues, launch: Launch) -> Mot
         segment = between_turns(f, lam0 + near, lam0 + far, known_duration)
         return PeriodicMotion(problem, "libration", direction, segment, (abs(near), abs(far)))
     front = end_of_motion(problem, direction, ahead)
+    _check_ridges(problem, front.place)
     if front.what == "closed":
         end = lam0 + direction * problem.period
         segment = through(f, lam0, end, lam0, problem.w0, known_duration=known_duration)
@@ -116,6 +122,7 @@ def _as_bilateral(formulas: Formulas, p: ParameterValues, launch: Launch) -> Mot
     if front.what != "turn":
         return _without_turn(problem, direction, front)
     back = _opposite_end(problem, direction, front)
+    _check_ridges(problem, back.place)
     if back.what != "turn":
         return _with_one_turn(problem, direction, front, back)
     low, high = sorted((front, back), key=lambda end: end.place)
@@ -124,6 +131,31 @@ def _as_bilateral(formulas: Formulas, p: ParameterValues, launch: Launch) -> Mot
     is_lazy = f.exact is not None and f.breaks.size > 0 and ends == (None, None)
     segment = between_turns(f, low.place, high.place, ends=ends, is_lazy=is_lazy)
     return PeriodicMotion(problem, "libration", direction, segment, (abs(low.offset), abs(high.offset)))
+
+
+def _check_ridges(problem: Problem, end: float) -> None:
+    """Refuse a motion that comes to rest on a corner between its launch and an end: it may slide off either way.
+
+    Where the curve is smooth a body takes for ever to reach such a place, which is its end. A corner is reached in
+    finite time, with a V**2 that is zero within rounding.
+    """
+    f, lam0 = problem.functions, problem.lam0
+    if not f.corners.size or not isfinite(end):
+        return
+    near = RIDGE_ROUNDINGS * ulp(max(abs(lam0), abs(end)))
+    corners = f.between(f.corners, *sorted((lam0, end)))
+    # A body that is launched at rest on a ridge slides in the direction of launch whenever it comes back.
+    corners = corners[(np.abs(corners - lam0) > near) & (np.abs(corners - end) > near)]
+    if corners.size:
+        v2 = speed_squared_at(f.addresses, f.p, lam0, problem.launch.lam0.low, problem.w0, corners, corners - lam0)
+        heights = np.abs(potential_at(f.addresses, f.p, np.append(corners, lam0))[0])
+        ridges = corners[np.abs(v2) <= RIDGE_ROUNDINGS * ULP * (problem.w0 + 2.0 * heights.max())]
+        if ridges.size:
+            raise SolutionError(
+                f"the body comes to rest on the corner at {problem.formulas.parameter} = {float(ridges[0])!r}, from "
+                "where it may slide either way; launch it a little higher or faster to pass the corner, or lower to "
+                "turn before it"
+            )
 
 
 def _opposite_end(problem: Problem, direction: int, front: EndOfMotion) -> EndOfMotion:

@@ -498,3 +498,16 @@ def test_rest_with_friction_on_the_wrong_side() -> None:
     assert circle_coulomb.solve(**held, contact="above").kind == "rest"
     motion = circle_coulomb.solve(**held, contact="below")
     assert (motion.t_end, motion.events[0].kind) == (0.0, "liftoff")
+
+
+@pytest.mark.parametrize("lam0", ["-1", "1", -1.0])
+def test_a_ridge_as_high_as_the_launch(lam0: Any, generated_folder: Any) -> None:
+    """It is reached never, from either side; one unit from the launch the potential is that of the launch."""
+    module = gqm.build(gqm.derive(gqm.Curve.graph("x**4 - x**2"), gqm.Gravity()), name="ridge", folder=generated_folder)
+    motion = module.solve(lam0)
+    assert (motion.kind, motion.t_end, motion.turning_points) == ("asymptotic", math.inf, (float(lam0),))
+    assert motion.legs[-1].end == "asymptote"
+    assert abs(float(motion.lam(10.0))) <= 1e-15
+    swept = module.sweep("time_at", lam0=float(lam0), lam=0.5 * float(lam0))
+    assert swept.values == pytest.approx(module.solve(lam0).time_at(0.5 * float(lam0)), rel=1e-14)
+    assert np.isnan(module.sweep("period", lam0=float(lam0)).values)

@@ -9,6 +9,7 @@ from types import ModuleType
 import pytest
 
 import gqm_sym as gqm
+from gqm_sym.errors import SolutionError
 
 G = 9.81
 # Two valleys with a ridge between, lower than the sides.
@@ -116,3 +117,17 @@ def test_a_turning_body_has_no_speed(lam0: float, build: Build) -> None:
             swept = float(module.sweep("v_min", lam0=lam0, v0=v0, direction=direction, t_max=horizon).values)
             assert (least, math.copysign(1.0, least)) == (0.0, 1.0)
             assert (swept, math.copysign(1.0, swept)) == (0.0, 1.0)
+
+
+@pytest.mark.parametrize("launch", ["sqrt(5)/2", math.sqrt(5.0) / 2.0])
+def test_a_body_that_comes_to_rest_on_a_ridge_is_refused(launch: str | float, build: Build) -> None:
+    """It could slide off either way (all but its kind raised "not analytic"); a little higher or lower it does not."""
+    module = build("free", False)
+    with pytest.raises(SolutionError, match="comes to rest on the corner"):
+        module.solve(launch)
+    with pytest.raises(SolutionError, match="comes to rest on the corner"):
+        module.solve(EDGES[1], "sqrt(2*9.81)", 1)
+    assert math.isnan(module.sweep("period", lam0=LENGTHS[0] / 2.0).values)
+    over, before = (module.solve(LENGTHS[0] / 2.0 + shift) for shift in (-1e-9, 1e-9))
+    assert over.period > 1.5 * before.period
+    assert over.turning_points[1] > RIDGE > before.turning_points[1]
