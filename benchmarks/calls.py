@@ -4,7 +4,7 @@ Each row is the least of many short runs in one process, so that other work on t
 are for reading, not for passing. ``make bench`` puts them into ``docs/benchmarks.md``.
 """
 
-from math import inf
+from math import inf, nan
 from typing import Any
 
 import numpy as np
@@ -17,10 +17,12 @@ from gqm_sym.runtime.inversion import table
 from gqm_sym.runtime.launch.problem import bind
 from gqm_sym.runtime.launch.request import LaunchRequest, read_launch
 from gqm_sym.runtime.launch.survey import survey
-from gqm_sym.runtime.legs import follow
+from gqm_sym.runtime.legs import answers
+from gqm_sym.runtime.legs.advance import Joints
+from gqm_sym.runtime.legs.body import launched
 from gqm_sym.runtime.legs.leg_record import COLUMNS, TIME_FROM_END
-from gqm_sym.runtime.legs.leg_run import Route, Start
 from gqm_sym.runtime.legs.leg_segments import Run, read_panels
+from gqm_sym.runtime.multiprecision.exact_problem import NOWHERE
 from gqm_sym.runtime.quadrature import time_panels, trapezoid
 from gqm_sym.runtime.sweep import quantities
 from gqm_sym.runtime.sweep.batch import batches, rows, times, turning_points
@@ -69,15 +71,17 @@ def dissipative() -> list[tuple[str, float]]:
     p = model.numbers(tuple(friction.PARAMETERS.values()))
     loss = model.dissipation
     assert loss is not None
-    start, route = Start(-1.0, 0.0, 6.2088**2, 1, 0, 0.25, 0.0), Route(np.empty(0), inf, 1.0, 0)
-    record = np.empty(16 * COLUMNS)
-    leg = (loss, p.values, start, route, record)
-    what, _, _, _, ahead, count, *_ = follow.follow(*leg)
-    run = Run((-1.0, 0.0), ahead, count, record, what, "turn", 0)
-    back, time = run.panels_back, float(record[TIME_FROM_END])
+    launch = launched(1, -1.0, -inf, inf, 0.0, 1, 0, inf, nan, 6.2088**2)
+    joints, records = Joints(NOWHERE, NOWHERE, NOWHERE, NOWHERE), np.empty((1, 16 * COLUMNS))
+
+    def leg() -> int:
+        return answers.drive(loss, p.values.reshape(1, -1), joints, answers.LEG, launch.copy(), records)
+
+    run = Run(records[0], leg(), "turn", None)
+    back, time = run.panels_back, float(run.record[TIME_FROM_END])
     return [
         ("`solve` of Example 2: its leg to the turn", least(lambda: friction.solve(-1.0, 6.2088))),
-        ("- the crossing: the leg, its events, its time", least(lambda: follow.follow(*leg))),
+        ("- the crossing: the leg, its events, its time", least(leg)),
         ("the leg's panels read, when a position is asked for", least(lambda: read_panels(back, time))),
         ("`solve` and the first `lam`", least(lambda: friction.solve(-1.0, 6.2088).lam(0.1), 5)),
     ]
@@ -85,8 +89,9 @@ def dissipative() -> list[tuple[str, float]]:
 
 def sweeping() -> list[tuple[str, float]]:
     """Parts of an orbit's share of a sweep over pendulums, on one core."""
-    each, n = pendulum.MODEL.each, rows.BATCH
-    fns, held = each.addresses(), (each.held, each.top_held)
+    each, n = pendulum.MODEL.batch, rows.BATCH
+    assert each is not None
+    fns, held = each.addresses(), (each.orbit_rows, each.integrand_rows)
     start_search, search_zeros, start_search_behind, prove = (
         getattr(turning_points, name) for name in ("start_search", "search", "start_search_behind", "prove")
     )

@@ -16,12 +16,26 @@ from swing import G, half_period
 import generated.circle as circle
 import generated.ellipse as ellipse
 import generated.pendulum as pendulum
-from gqm_sym.runtime.compiled.jit import Inner
+from gqm_sym.runtime.compiled.jit import Inner, entry
+from gqm_sym.runtime.compiled.types import ADDRESSES, VECTOR
 from gqm_sym.runtime.launch import survey
+from gqm_sym.runtime.launch.domain import DOMAIN
 from gqm_sym.runtime.launch.problem import bind
 from gqm_sym.runtime.launch.request import LaunchRequest, read_launch
 
 ORBITS = 100_000
+
+
+survey_inside = Inner(survey.survey.__wrapped__)
+
+
+@entry(VECTOR(ADDRESSES, VECTOR, VECTOR, DOMAIN))
+def in_a_loop(fns, p, lam0, domain):  # type: ignore[no-untyped-def]
+    """Half periods of launches from rest, one after the other."""
+    out = np.empty(lam0.size)
+    for k in range(lam0.size):
+        out[k] = survey_inside(fns, p, lam0[k], 0.0, 1, domain)[3]
+    return out
 
 
 def half_periods() -> list[Row]:
@@ -34,17 +48,9 @@ def half_periods() -> list[Row]:
     truths = [half_period(float(a)) for a in few]
 
     alone = [half_period(mpf(float(v)) + mp.pi / 2) for v in few - pi / 2]
-    inner_survey = Inner(survey.survey.__wrapped__)
     p = pendulum.MODEL.numbers(tuple(pendulum.PARAMETERS.values()))
     f = bind(pendulum.MODEL, p, read_launch(pendulum.MODEL, p, LaunchRequest(-0.37)))
     domain = pendulum.MODEL.domain(p).numbers
-
-    @njit
-    def in_a_loop(fns: Any, p: Any, lam0: Any, domain: Any) -> Any:
-        out = np.empty(lam0.size)
-        for k in range(lam0.size):
-            out[k] = inner_survey(fns, p, lam0[k], 0.0, 1, domain)[3]
-        return out
 
     def raw(a: float) -> float:
         return quad(lambda u: 1 / sqrt(2 * 9.81 * (cos(u) - cos(a))), -a, a, epsabs=0, epsrel=1e-12, limit=500)[0]

@@ -188,6 +188,8 @@ def cell(curve: str, force: str) -> str:
     given = {**parameters, **({"t_max": HORIZON} if loses else {})}
     launches = np.linspace(low, high, 20_000)
     middle = 0.5 * (low + high)
+    if module.solve(middle, 0.0, 1, **given).kind not in ("libration", "dissipative"):
+        return f"{said[0]}  no body that is released here comes back"
     next_launch = iter(np.random.default_rng(1).uniform(low, high, 100_000).tolist())
 
     def fresh():
@@ -206,8 +208,8 @@ def cell(curve: str, force: str) -> str:
     if loses:
         legs = float(np.mean([len(module.solve(x, 0.0, 1, **given).legs) for x in launches[::2000].tolist()]))
         said.append(f"{legs:.1f} legs")
-    legs_of_ends = [module.solve(x, 0.0, 1, **given).legs[0] for x in (low, high)]
-    spans = [sorted((float(leg.lam_start), float(leg.lam_end))) for leg in legs_of_ends]
+    first_legs = [module.solve(x, 0.0, 1, **given).legs[:1] for x in launches[::2000].tolist()]
+    spans = [sorted((float(leg.lam_start), float(leg.lam_end))) for legs_of_one in first_legs for leg in legs_of_one]
     crossed = 0.5 * (max(span[0] for span in spans) + min(span[1] for span in spans))
     for quantity in (first, "normal_force_max", "time_at"):
         extra = {"lam": crossed} if quantity == "time_at" else {}

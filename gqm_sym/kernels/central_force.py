@@ -26,7 +26,7 @@ def CentralForce(*, centre: Iterable[str | int | sp.Expr] = (0, 0), k: Given | N
     given = several(centre, where=where, what="two coordinates (x, z)")
     if len(given) != 2:
         raise DeclarationError(f"{where}: must be two coordinates (x, z), got {len(given)}")
-    place = tuple(read_expression(part, where=where) for part in given)
+    place = tuple(read_expression(part, where=where, unit="m") for part in given)
     found = names_in_order(*place)
     for name in COORDINATES:
         if name in found:

@@ -89,6 +89,13 @@ def test_a_centre_is_two_numbers(centre):
         CentralForce(centre=centre)
 
 
+def test_a_centre_may_have_units():
+    """Its coordinates are lengths (the unit was refused)."""
+    assert CentralForce(centre=("50 cm", "1 m")) == CentralForce(centre=("1/2", 1))
+    with pytest.raises(InputError, match="must be in m"):
+        CentralForce(centre=("2 s", 0))
+
+
 def test_only_kernels_add():
     """Anything else is a TypeError, as Python's own."""
     with pytest.raises(TypeError):

@@ -411,7 +411,7 @@ class DissipativeMotion(Motion):
             # So small a V**2 may have no error in the range of doubles, but the body stays where it is.
             return before.place + of_frame + swing, np.zeros_like(phi)
         panels = run.panels_ahead if timed.sense > 0 else run.panels_back
-        which = np.clip(np.searchsorted(timed.segment.edges, phi, side="right") - 1, 0, len(panels) - 1)
+        which = np.searchsorted(timed.segment.edges[1:-1], phi, side="right")
         inherited = panels[which, INHERITED]
         if timed.sense > 0:
             return before.place + of_frame + swing, before.time + inherited

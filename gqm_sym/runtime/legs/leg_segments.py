@@ -216,8 +216,8 @@ def tabulated(timed: TimedSegment, lap: float, errors_before: ErrorsBefore) -> T
     place_before, time_before = errors_before(timed, panel_middles)
     # The part of the error that changes within an interval is largest at one of its ends.
     starts, stops = powers @ (-1.0) ** np.arange(powers.shape[1]), powers.sum(axis=1)
-    both_ends = starts + 1e-9 * (stops - starts), stops
-    owners = np.clip(np.searchsorted(edges, 0.5 * (starts + stops), side="right") - 1, 0, len(edges) - 2)
+    both_ends = np.concatenate([starts + 1e-9 * (stops - starts), stops])
+    owners = np.searchsorted(edges[1:-1], 0.5 * (starts + stops), side="right")
     begins = np.append(0.0, ends[:-1])
     from_turn, offset = float(segment.kind == FROM_TURN), segment.turn_offset
     sense, share = float(timed.sense), 1.0 / (1.0 + 2.0 * offset)
@@ -229,7 +229,8 @@ def tabulated(timed: TimedSegment, lap: float, errors_before: ErrorsBefore) -> T
         total, error = two_sum.py_func(high, rest + timed.t_start[1] + sense * (e + low - timed.r_start[1]))
         return total, error
 
-    until = from_launch(ends if sense > 0.0 else begins, np.zeros_like(ends))[0]
+    marks = np.array([middles, ends, begins] if sense > 0.0 else [middles, begins, ends])
+    (when, until, since), (when_low, _, _) = from_launch(marks, np.array([lows, 0.0 * ends, 0.0 * ends]))
     constants = (
         *(edges[-1], from_turn * share, 2.0 * offset * share if from_turn else 1.0),
         *(segment.a, segment.low_parts[0], segment.b, segment.low_parts[1], segment.width, timed.laps * lap),
@@ -237,15 +238,13 @@ def tabulated(timed: TimedSegment, lap: float, errors_before: ErrorsBefore) -> T
     growth = (last, last * offset) if from_turn else (0.0, 1.0)
     errors = (
         (time_before + segment.time_error(panel_middles))[owners],
-        place_before + np.maximum(*(segment.inversion_error(phi) for phi in both_ends)),
+        place_before + segment.inversion_error(both_ends).reshape(2, -1).max(axis=0),
     )
     rows = np.ones((len(ends), 1))
-    intervals = np.hstack(
-        [np.column_stack([until, *from_launch(middles, lows), sense * scales]), rows * constants, powers]
-    )
+    intervals = np.hstack([np.column_stack([until, when, when_low, sense * scales]), rows * constants, powers])
     signs = (segment.direction, timed.direction, timed.s_a, *growth)
     states = np.column_stack([owners, rows * signs, *errors])
-    kept = (until > timed.t_start[0]) & (from_launch(begins if sense > 0.0 else ends, 0.0 * ends)[0] < timed.t_stop[0])
+    kept = (until > timed.t_start[0]) & (since < timed.t_stop[0])
     kept[0 if sense < 0.0 else -1] |= not kept.any()
     order = np.flatnonzero(kept)[:: int(sense)]
     intervals, states = intervals[order], states[order]

@@ -235,8 +235,7 @@ class Segment:
         It is a share of the whole duration, or of the panel's where the times of its edges are exact.
         """
         error = self.relative_error + ULP + MAX_TIME_ERROR
-        which = np.clip(np.searchsorted(self.edges, phi, side="right") - 1, 0, len(self.edges) - 2)
-        times = self.edge_times[0]
+        which, times = np.searchsorted(self.edges[1:-1], phi, side="right"), self.edge_times[0]
         if self._has_given_times:
             spans: Array = np.diff(times)[which]
         elif (
@@ -249,8 +248,8 @@ class Segment:
 
     def inversion_error(self, phi: Array) -> Array:
         """Estimated error of places by the table at phase angles, in units of the curve parameter, with rounding."""
-        ends = self.table[3].sum(axis=1)
-        errors = self.table[6][np.clip(np.searchsorted(ends, phi), 0, len(ends) - 1)]
+        powers, of_intervals = self.table[3], self.table[6]
+        errors = of_intervals[np.searchsorted(powers[:-1].sum(axis=1), phi)]
         width = abs(self.width)
         if self.kind == TO_EQUILIBRIUM:
             near_equilibrium: Array = width * np.exp(-phi) * (errors + 3.0 * ULP * np.maximum(phi, 1.0))
