@@ -10,6 +10,7 @@ from typing import Any
 import numba
 import pytest
 from hypothesis import settings
+from hypothesis.internal.conjecture import providers
 from problems import PROBLEMS, TRACKS, Problem
 
 from gqm_sym.runtime.compiled import jit
@@ -17,6 +18,11 @@ from gqm_sym.runtime.compiled import jit
 # The first example of a test may compile for seconds; and a failure must show again.
 settings.register_profile("suite", deadline=None, derandomize=True, print_blob=True)
 settings.load_profile("suite")
+
+# Hypothesis also draws numbers that stand in the text of modules, of all that are imported so far: what a test draws
+# would depend on the tests before it in the same worker.
+if hasattr(providers, "is_local_module_file"):
+    providers.is_local_module_file = lambda _: False
 
 # On a machine that others use compiling takes any time, and tests look at what is said on standard error.
 jit.ANNOUNCER.seconds = 1e6

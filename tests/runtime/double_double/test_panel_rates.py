@@ -67,7 +67,7 @@ def test_what_cancels_is_left_alone(circle: ModuleType) -> None:
         assert rates(motion, REGULAR, (mpf(1), mpf(1) - mpf("1e-16")), (mpf(0), mpf(1))) is None
 
 
-@given(gap=st.floats(3.0, 12.0), lam0=st.floats(-2.5, 2.5), turns=st.booleans())
+@given(gap=st.floats(3.0, 11.0), lam0=st.floats(-2.5, 2.5), turns=st.booleans())
 @settings(max_examples=40, deadline=None)
 def test_beside_the_separatrix(gap: float, lam0: float, turns: bool, circle: ModuleType) -> None:
     """A swing nearly to the top, or a round that all but stops there: the period to the last bit, without mpmath."""
