@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 
 
 # From how many launches on a thread is worth starting, and how many are laid out at a time.
-MIN_LAUNCHES_PER_THREAD, CHUNK = 2**9, 2**16
+MIN_LAUNCHES_PER_THREAD, CHUNK = 2**11, 2**16
 
 # The motion of one launch with given parameters.
 Solve = Callable[[LaunchRequest, tuple[Any, ...]], Any]
