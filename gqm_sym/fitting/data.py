@@ -14,6 +14,7 @@ from gqm_sym.runtime.compiled.types import Array
 AT_TIMES = {"lam": None, "s": "m", "x": "m", "z": "m", "v": "m/s"}
 OF_LAUNCHES = {"period": "s", "half_period": "s"}
 PASSAGES = "passages"
+UNITS = {**AT_TIMES, **OF_LAUNCHES, PASSAGES: "s"}
 
 
 class Measurements(NamedTuple):
@@ -76,7 +77,7 @@ def read_measurements(data: Any, arguments: Mapping[str, str | None], unit: str 
     for name in given:
         if name not in known:
             raise InputError(unknown_argument("data", name, known, what="column"))
-    units = {**arguments, **AT_TIMES, **OF_LAUNCHES, PASSAGES: "s", "t": "s", "lam": unit, "place": unit}
+    units = {**arguments, **UNITS, "t": "s", "lam": unit, "place": unit}
     sizes = {name: _column(given[name], name, units.get(name)) for name in (*quantities, *columns)}
     count = max(column.size for column in sizes.values())
     full = {name: _spread(column, name, count) for name, column in sizes.items()}

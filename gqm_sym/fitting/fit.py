@@ -1,6 +1,7 @@
 """Launches and run-time parameters fitted to measurements by least squares, with the exact derivatives of motions."""
 
 from collections.abc import Mapping
+from itertools import compress
 from math import inf, isfinite, nan
 from types import ModuleType
 from typing import Any, NamedTuple
@@ -13,6 +14,7 @@ from gqm_sym.fitting.data import Measurements, read_measurements
 from gqm_sym.fitting.result import Fit
 from gqm_sym.literals.numbers import read_number
 from gqm_sym.runtime.compiled.types import Array
+from gqm_sym.runtime.launch.speed import path_and_force_at
 from gqm_sym.runtime.model import CompiledModel
 
 # The step of a difference quotient, of the size of the parameter, where a motion has no gradients.
@@ -21,6 +23,9 @@ STEP = 1e-6
 # Directions in which a change of the parameters changes the measurements less than this, relative to the direction in
 # which it changes them most, cannot be told from the data. The second holds for difference quotients.
 RANK_TOLERANCE, RANK_TOLERANCE_OF_DIFFERENCES = 1e-9, 1e-6
+
+# A parameter takes part in such a direction if its share of it is more than this.
+MIN_SHARE = 1e-3
 
 # Motions that lose energy are followed this much further than the last passage that is looked for.
 AMPLE = 1.5
@@ -200,14 +205,15 @@ class Residuals:
             return np.concatenate([getattr(state, name) for name in names])
         if self.measured.place is not None:
             return _passages(self.motion(x), self.measured.place)
-        arguments = {**self.arguments(x), **self.measured.columns}
-        return np.concatenate([self._swept(name, arguments) for name in names])
+        shape = next(iter(self.measured.values.values())).shape
+        return np.concatenate([np.broadcast_to(self._swept(name, x).values, shape) for name in names])
 
-    def _swept(self, name: str, arguments: dict[str, Any]) -> Array:
-        swept = self.module.sweep(name, **{"lam0": 0.0, **arguments})
+    def _swept(self, name: str, x: Array, **options: Any) -> Any:
+        """A sweep over what differs from one measurement to the next."""
+        swept = self.module.sweep(name, **{"lam0": 0.0, **self.arguments(x), **self.measured.columns}, **options)
         if np.any(swept.status):
             raise SolutionError(f"{name}: {'; '.join(swept.status_counts())}")
-        return np.broadcast_to(swept.values, (len(self.measured.values[name]),))
+        return swept
 
     def jacobian(self, x: Array) -> Array:
         """The derivatives of the residuals: a column for each number that is to be found."""
@@ -229,13 +235,8 @@ class Residuals:
             # A change that carries the body further along has it pass the place earlier.
             sooner: Array = motion.sensitivity(times, wrt=wrt).lam / _rates(motion, times)
             return -sooner.T
-        arguments = {**self.arguments(x), **self.measured.columns}
-        rows = []
-        for name in names:
-            swept = self.module.sweep(name, **{"lam0": 0.0, **arguments}, gradient=wrt)
-            count = len(self.measured.values[name])
-            rows.append(np.broadcast_to(swept.gradient, (count, len(wrt))))
-        return np.concatenate(rows)
+        shape = (*next(iter(self.measured.values.values())).shape, len(wrt))
+        return np.concatenate([np.broadcast_to(self._swept(name, x, gradient=wrt).gradient, shape) for name in names])
 
     def _differences(self, x: Array) -> Array:
         """Difference quotients, central unless a limit is near."""
@@ -259,9 +260,9 @@ def _until_rest(motion: Any, t: Array) -> Array:
 
 
 def _rates(motion: Any, t: Array) -> Array:
-    """How fast the curve parameter changes at times, by difference quotients."""
-    before, after = np.maximum(t - 1e-5, 0.0), t + 1e-5
-    rates: Array = (np.asarray(motion.lam(after)) - np.asarray(motion.lam(before))) / (after - before)
+    """How fast the curve parameter changes at times."""
+    state, f = motion.state(t), motion.problem.functions
+    rates: Array = state.v / path_and_force_at(f.addresses, f.p, state.lam, state.v2)[2]
     return rates
 
 
@@ -307,20 +308,18 @@ def _result(residuals: Residuals, x: Array, converged: bool) -> Fit:
         )
     off, jacobian = residuals(x), residuals.jacobian(x)
     size = np.linalg.norm(jacobian, axis=0)
-    scaled = jacobian / np.where(size > 0.0, size, 1.0)
-    _, values, rows = np.linalg.svd(scaled, full_matrices=False)
+    scale = np.where(size > 0.0, size, 1.0)
+    _, values, rows = np.linalg.svd(jacobian / scale, full_matrices=False)
     tolerance = RANK_TOLERANCE if residuals.exact else RANK_TOLERANCE_OF_DIFFERENCES
     rank = int(np.count_nonzero(values > tolerance * values[0]))
-    lost = rows[rank:]
+    blind = np.abs(rows[rank:]) > MIN_SHARE
     free = max(residuals.values.size - rank, 0)
     chi2 = float(off @ off)
     variance = 1.0 if measured.sigma is not None else (chi2 / free if free else nan)
     kept = rows[:rank].T / values[:rank]
-    scale = np.where(size > 0.0, size, 1.0)
     covariance = variance * (kept @ kept.T) / np.outer(scale, scale)
-    for row in lost:
-        blind = np.abs(row) > 1e-3
-        covariance[np.ix_(blind, blind)] = inf
+    for row in blind:
+        covariance[np.ix_(row, row)] = inf
     split = np.split(-off * residuals.sigma, np.cumsum([v.size for v in measured.values.values()])[:-1])
     return Fit(
         names=names,
@@ -331,10 +330,7 @@ def _result(residuals: Residuals, x: Array, converged: bool) -> Fit:
         chi2=chi2,
         degrees_of_freedom=free,
         rank=rank,
-        unidentified=tuple(
-            tuple(name for name, part in zip(names, row, strict=True) if abs(part) > 1e-3) for row in lost
-        ),
+        unidentified=tuple(tuple(compress(names, row)) for row in blind),
         arguments=residuals.arguments(x),
         measured=measured,
-        predicted=residuals.predicted(x),
     )

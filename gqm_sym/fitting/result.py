@@ -1,17 +1,14 @@
 """What a fit found, as numbers, text and a figure."""
 
 from dataclasses import dataclass
-from math import isfinite, sqrt
+from math import isfinite
 from typing import Any
 
 import numpy as np
 
-from gqm_sym.fitting.data import Measurements
+from gqm_sym.fitting.data import UNITS, Measurements
 from gqm_sym.optional import require
 from gqm_sym.runtime.compiled.types import Array
-
-# The units of what may be measured, for labels.
-UNITS = {"s": "m", "x": "m", "z": "m", "v": "m/s", "period": "s", "half_period": "s", "passages": "s"}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False, eq=False)
@@ -43,8 +40,6 @@ class Fit:
         All arguments of ``module.solve`` that give the fitted motion.
     measured : data.Measurements
         The data.
-    predicted : array
-        The fitted values, of all quantities one after the other.
     """
 
     names: tuple[str, ...]
@@ -58,7 +53,6 @@ class Fit:
     unidentified: tuple[tuple[str, ...], ...]
     arguments: dict[str, Any]
     measured: Measurements
-    predicted: Array
 
     @property
     def correlation(self) -> Array:
@@ -75,10 +69,11 @@ class Fit:
         for names in self.unidentified:
             what = " and ".join(names)
             lines.append(f"  the data do not tell {what}{' apart' if len(names) > 1 else ''}")
+        count = sum(values.size for values in self.residuals.values())
         spread = "" if self.measured.sigma is not None else " (standard deviations from the residuals)"
         return "\n".join(
             [
-                f"Fit of {len(self.names)} numbers to {self.predicted.size} measurements{spread}",
+                f"Fit of {len(self.names)} numbers to {count} measurements{spread}",
                 *lines,
                 f"  chi2 {self.chi2:.6g} with {self.degrees_of_freedom} degrees of freedom",
             ]
@@ -114,16 +109,16 @@ class Fit:
         quantities = self.measured.values
         figure = new_figure(7.0 * len(quantities), 5.5)
         grid = figure.subplots(2, len(quantities), sharex="col", squeeze=False, height_ratios=(3, 1))
-        fitted = np.split(self.predicted, np.cumsum([v.size for v in quantities.values()])[:-1])
-        for (name, values), found, (above, below) in zip(quantities.items(), fitted, grid.T, strict=True):
+        for (name, values), (above, below) in zip(quantities.items(), grid.T, strict=True):
+            residuals = self.residuals[name]
             across, label = self._across(values.size)
             order = np.argsort(across)
             bars = None if self.measured.sigma is None else self.measured.sigma[name]
-            unit = f" ({UNITS[name]})" if name in UNITS else ""
+            unit = f" ({UNITS[name]})" if UNITS[name] else ""
             above.errorbar(across, values, bars, fmt=".", color="#0072b2", label="measured", zorder=1)
-            above.plot(across[order], found[order], color="#d55e00", label="fitted", zorder=2)
+            above.plot(across[order], (values - residuals)[order], color="#d55e00", label="fitted", zorder=2)
             finished(above, "", f"{name}{unit}")
-            below.errorbar(across, values - found, bars, fmt=".", color="#0072b2")
+            below.errorbar(across, residuals, bars, fmt=".", color="#0072b2")
             below.axhline(0.0, color="#d55e00")
             finished(below, label, f"residual{unit}")
         return figure
@@ -136,8 +131,3 @@ class Fit:
             ((name, column),) = self.measured.columns.items()
             return column, name
         return np.arange(1.0, count + 1.0), "number"
-
-    @property
-    def reduced_deviation(self) -> float:
-        """The root of chi2 by the degrees of freedom: about 1 if model and standard deviations are right."""
-        return sqrt(self.chi2 / self.degrees_of_freedom) if self.degrees_of_freedom else float("nan")
