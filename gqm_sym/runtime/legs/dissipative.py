@@ -128,9 +128,10 @@ def launch_leg(formulas: Formulas, p: ParameterValues, launch: Launch, places: A
 
 
 def _plain_times(t: Any) -> tuple[Array, float, float] | None:
-    """Times that are one double or an array of them, with the least and the greatest; None if they are not."""
+    """Times from launch on as doubles, with the least and the greatest; None if they are not that."""
     time = plain_time(t)
-    return plain_times(t) if time is None else (np.array([time]), time, time)
+    times = plain_times(t) if time is None else (np.array([time]), time, time)
+    return times if times is not None and 0.0 <= times[1] <= times[2] < inf else None
 
 
 def _loss(problem: Problem) -> Dissipation:
@@ -234,7 +235,7 @@ class DissipativeMotion(Motion):
     def lam(self, t: Any) -> Any:
         """The curve parameter at times; see `Motion.lam`. For doubles this is one call of compiled code."""
         times = _plain_times(t)
-        if times is None or not 0.0 <= times[1] <= times[2] < inf:
+        if times is None:
             return super().lam(t)
         out = self._read(*times, 1, self._read_places, super().lam)[0]
         return out.reshape(t.shape) if np.ndim(t) else float(out[0])
@@ -242,17 +243,14 @@ class DissipativeMotion(Motion):
     def state(self, t: Any) -> State:
         """The state of the body at times; see `Motion.state`. For doubles this is one call of compiled code."""
         times = _plain_times(t)
-        if times is None or not 0.0 <= times[1] <= times[2] < inf:
+        if times is None:
             return super().state(t)
         out = self._read(*times, STATE_ROWS, self._read_states, lambda later: np.array(Motion.state(self, later)[1:]))
         return State(t, *out.reshape(-1, *t.shape)) if np.ndim(t) else State(float(times[0][0]), *out[:, 0].tolist())
 
     def error_bound(self, t: Any) -> Any:
         """A bound of the error of ``lam(t)``; see `Motion.error_bound`. For doubles it is that of `state`."""
-        times = _plain_times(t)
-        if times is None or not 0.0 <= times[1] <= times[2] < inf:
-            return super().error_bound(t)
-        return self.state(t).error
+        return super().error_bound(t) if _plain_times(t) is None else self.state(t).error
 
     def _read(
         self,
