@@ -487,6 +487,15 @@ class ChartPassage:
         """The distances of the turning points from the launch in arc length."""
         return float(self._found[BEHIND, 0]), float(self._found[AHEAD, 0])
 
+    @property
+    def turning_points(self) -> tuple[Bounded, Bounded]:
+        """The lower and the upper turning point of a libration in arc length."""
+        found = self._found
+        place = minus(found[PLACE, :2].tolist(), self._pieces.start_length)
+        ways = minus((0.0, 0.0), found[BEHIND, :2].tolist()), found[AHEAD, :2].tolist()
+        low, high = (found[PLACE, 2] + found[[BEHIND, AHEAD], 2]).tolist()
+        return Bounded(*plus(place, ways[0]), low), Bounded(*plus(place, ways[1]), high)
+
     @cached_property
     def orbit(self) -> Orbit | None:
         """Duration and turning points; None where double-double arithmetic does not suffice."""
@@ -498,11 +507,7 @@ class ChartPassage:
             ends = (Bounded(nan, nan, nan),) * 2
         else:
             duration = Bounded(*self._times(found[[MIDDLE, UPPER], :3], 0)[-1].tolist())
-            place = minus(found[PLACE, :2].tolist(), self._pieces.start_length)
-            ways = minus((0.0, 0.0), found[BEHIND, :2].tolist()), found[AHEAD, :2].tolist()
-            errors = found[PLACE, 2] + found[[BEHIND, AHEAD], 2]
-            low, high = (Bounded(*plus(place, way), float(error)) for way, error in zip(ways, errors, strict=True))
-            ends = low, high
+            ends = self.turning_points
         return Orbit(duration, *ends) if duration.error <= MAX_ERROR * duration.high else None
 
     def times_at(self, phases: Array, *, is_thrown: bool) -> Array | None:

@@ -412,6 +412,16 @@ class Orbit(NamedTuple):
     high: Bounded
 
 
+def find_turning_points(
+    formulas: BoundTape, launch: tuple[Number, Number], offsets: tuple[float, float]
+) -> tuple[Bounded, Bounded]:
+    """Return the lower and the upper turning point of a libration; the arguments are those of `time_orbit`."""
+    lam0, v0 = launch
+    given = *formulas.operands, (lam0.value, lam0.low, v0.value, v0.low), (-offsets[0], offsets[1])
+    _, low, high, _ = orbit_time(*given, 0, np.ascontiguousarray(trapezoidal_nodes(LIBRATION)[:, :0]))
+    return Bounded(*low), Bounded(*high)
+
+
 def time_orbit(
     formulas: BoundTape,
     launch: tuple[Number, Number],

@@ -73,12 +73,32 @@ class PeriodicMotion(Motion):
         offsets: tuple[float, float] = (0.0, 0.0),
     ) -> None:
         super().__init__(problem, kind, direction)
-        self._segment, self._offsets = segment, offsets
+        self._segment_in_doubles, self._offsets = segment, offsets
         self._double_trajectory: Trajectory | None = None
         self._precise_trajectory: Trajectory | None = None
         self._exact_timing: timing.Timing | None = None
         self._is_period_known = False  # to more digits than doubles hold
         self._sampler: Sampler | None = None
+
+    @cached_property
+    def _segment(self) -> Segment:
+        """Its segment, which ends at the doubles nearest to the true turning points.
+
+        Where terms of the force cancel, as in small swings about an equilibrium of large forces, the turning points in
+        doubles are off by more than their rounding.
+        """
+        segment = self._segment_in_doubles
+        if self.kind != "libration" or segment.ends != (None, None):
+            return segment
+        ends = timing.true_turning_points(self.problem, segment, self._offsets)
+        if ends is None:
+            return segment
+        (a, a_low), (b, b_low), lam0, (behind, ahead) = *ends, self.problem.launch.lam0, self._offsets
+        # A launch from rest is a turning point itself.
+        a, behind = (segment.a, 0.0) if behind == 0.0 else (a, (lam0.value - a) + (lam0.low - a_low))
+        b, ahead = (segment.b, 0.0) if ahead == 0.0 else (b, (b - lam0.value) + (b_low - lam0.low))
+        self._offsets = behind, ahead
+        return segment.with_turning_points(a, b)
 
     @property
     @locked
@@ -112,7 +132,7 @@ class PeriodicMotion(Motion):
         launch = self.problem, self.kind, self.direction, self._offsets
         is_charted = self.problem.formulas.chart is not None
         # No panels are needed where the trapezoidal rule has converged in doubles.
-        if is_charted or self._segment.known_duration is not None:
+        if is_charted or self._segment_in_doubles.known_duration is not None:
             orbit = timing.orbit_of(*launch)
             if is_charted or orbit is not None:
                 return orbit

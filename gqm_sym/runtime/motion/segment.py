@@ -12,7 +12,7 @@ from gqm_sym.runtime.arithmetic.doubledouble import ULP, running_totals
 from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.inversion.table import MAX_TIME_ERROR, build_table, phase_angles
 from gqm_sym.runtime.launch.functions import BoundFunctions
-from gqm_sym.runtime.launch.speed import potential_at
+from gqm_sym.runtime.launch.speed import path_and_force_at, potential_at
 from gqm_sym.runtime.motion.conditioning import launch_condition_number, v2_correction
 from gqm_sym.runtime.multiprecision.exact_panels import DIGITS, exact_ends, lay_exactly
 from gqm_sym.runtime.quadrature.integrands import speeds_along, speeds_at
@@ -42,6 +42,13 @@ MIN_TIMED_WIDTH_SHARE = 2.0**-10
 # The error of a turning point in doubles, in roundings of the width times the ratio of the largest Q to that there
 # (`Segment._end_errors`); 0.6 was the most that was measured.
 MAX_END_ROUNDINGS = 2.0
+
+# The error of the slope of the potential along a chart that no formulas improve, in roundings of the largest slope; and
+# the number of places of a closed one at which that is looked for.
+CHART_ROUNDINGS, AROUND = 8.0, 16
+
+# The error of a place by the rounding of a chart, in roundings of the width of a motion, and of its coordinates.
+MAX_WIDTH_ROUNDINGS, MAX_SIZE_ROUNDINGS = 128.0, 4.0
 
 # The distance from a turning point, as a share of the width, within which offsets are computed from the exact one.
 NEAR_TURN = 1e-3
@@ -188,6 +195,12 @@ class Segment:
         """The largest relative change of its times per relative change of the numbers that they depend on."""
         return self._with_panels()._condition_number
 
+    def with_turning_points(self, a: float, b: float) -> "Segment":
+        """The same segment from one turning point to the other with other doubles for them."""
+        if a == self.a and b == self.b:
+            return self
+        return between_turns(self.functions, a, b, is_lazy=self.stored_panels is None)
+
     def with_edge_times(self, edge_times: tuple[Array, Array]) -> "Segment":
         """The same segment with more accurate times at the edges of its panels."""
         other = copy(self._with_panels())
@@ -273,20 +286,29 @@ class Segment:
         """How far its turning points may be from the exact ones, in units of the curve parameter.
 
         V**2 = (lam - a)*(b - lam)*Q is known to a rounding of its largest values, so that its zero at ``a`` is known
-        to as many roundings of the width as Q is smaller there than at its largest.
+        to as many roundings of the width as Q is smaller there than at its largest. Along a chart Q is rounded too.
         """
         if not self.balance > 0.0:
             return 0.0, 0.0
         error = MAX_END_ROUNDINGS * ULP * abs(self.width) / self.balance
+        f = self.functions
         if self.kind == FROM_TURN:
             return error, 0.0
-        f = self.functions
         # Q at the ends, but for a factor.
-        steepness = np.abs(potential_at(f.addresses, f.p, np.array([self.a, self.b]))[1])
-        shares = np.divide(steepness.min(), steepness, out=np.ones(2), where=steepness > 0.0)
+        ends = np.array([self.a, self.b])
+        steepness, of_chart = np.abs(potential_at(f.addresses, f.p, ends)[1]), 0.0
+        errors = error * np.divide(steepness.min(), steepness, out=np.ones(2), where=steepness > 0.0)
+        if f.exact is None:
+            # Slopes of a chart that no formulas improve are known to a rounding of the largest.
+            around = np.array([*ends, *f.breaks, *np.linspace(0.0, f.period, AROUND)])
+            largest = np.abs(potential_at(f.addresses, f.p, around)[1]).max()
+            errors = errors + CHART_ROUNDINGS * ULP * abs(self.width) * largest / steepness
+        elif f.exact.edges.size:
+            size = float(np.hypot(*path_and_force_at(f.addresses, f.p, ends, np.zeros(2))[:2]).max())
+            of_chart = ULP * min(MAX_WIDTH_ROUNDINGS * abs(self.width), MAX_SIZE_ROUNDINGS * size)
         at_a, at_b = (
-            0.0 if known is not None or self._is_launch_from_rest(place) else float(error * share)
-            for place, known, share in zip((self.a, self.b), self.ends, shares, strict=True)
+            of_chart if known is not None or self._is_launch_from_rest(place) else float(own) + of_chart
+            for place, known, own in zip((self.a, self.b), self.ends, errors, strict=True)
         )
         return at_a, at_b
 

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import accumulate
-from math import ceil, inf
+from math import ceil, inf, nan
 from typing import Any
 
 import numpy as np
@@ -13,10 +13,10 @@ from gqm_sym.errors import InputError, SolutionError
 from gqm_sym.runtime.arithmetic.doubledouble import ZERO, Pair
 from gqm_sym.runtime.charts.true_times import ChartPassage, pass_along
 from gqm_sym.runtime.compiled.types import Array
-from gqm_sym.runtime.double_double.orbit_time import NO_TIMES, Orbit, time_orbit
+from gqm_sym.runtime.double_double.orbit_time import NO_TIMES, Bounded, Orbit, find_turning_points, time_orbit
 from gqm_sym.runtime.launch.problem import Problem
 from gqm_sym.runtime.motion.segment import Segment
-from gqm_sym.runtime.multiprecision.exact_panels import exact_ends
+from gqm_sym.runtime.multiprecision.exact_panels import DIGITS, exact_ends
 from gqm_sym.runtime.multiprecision.exact_problem import MAX_SMOOTH_PANELS, NOWHERE, Arithmetic, two_doubles
 from gqm_sym.runtime.quadrature.substitution import REGULAR, TURN_TURN
 
@@ -29,6 +29,9 @@ MAX_DIGITS = 1000
 # Digits of V**2 that may cancel on all of a segment before the working precision is raised.
 MAX_LOST_DIGITS = 4
 
+
+# The largest error of a turning point in double-double arithmetic, as a share of the width of the libration.
+MAX_TURN_ERROR = 2.0**-54
 
 # The relative error of two doubles that were rounded from extended precision.
 EXACT_ERROR = 2.0**-104
@@ -117,6 +120,28 @@ def orbit_of(
         return None if passage is None else passage.orbit
     sense, launch = direction if kind == "circulation" else 0, (problem.launch.lam0, problem.launch.v0)
     return time_orbit(problem.tape, launch, sense, offsets, times)
+
+
+def true_turning_points(problem: Problem, segment: Segment, offsets: tuple[float, float]) -> tuple[Pair, Pair] | None:
+    """The lower and the upper turning point of a libration as two doubles each; None where no more is known of them.
+
+    They come from double-double arithmetic, and for a curve of formulas from extended precision where that is too
+    little. ``offsets`` are their distances from the launch, as doubles know them.
+    """
+    low = high = Bounded(nan, nan, nan)
+    if problem.formulas.chart is not None:
+        passage = passage_of(problem, "libration", 0, offsets)
+        if passage is not None:
+            low, high = passage.turning_points
+    elif problem.tape is not None:
+        low, high = find_turning_points(problem.tape, (problem.launch.lam0, problem.launch.v0), offsets)
+    largest = MAX_TURN_ERROR * (high.high - low.high)
+    if low.error <= largest and high.error <= largest:
+        return low[:2], high[:2]
+    if problem.formulas.chart is not None or problem.functions.exact is None:
+        return None
+    a, b = exact_ends(problem.exact, DIGITS, TURN_TURN, segment.a, segment.b, segment.ends)
+    return two_doubles(a), two_doubles(b)
 
 
 def in_double_double(
