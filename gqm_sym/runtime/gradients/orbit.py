@@ -1,5 +1,7 @@
 """A periodic orbit with its derivatives: turning points, duration, action, and how they come about along the orbit."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import cached_property
 
 import numpy as np
@@ -34,6 +36,15 @@ from gqm_sym.runtime.quadrature.trapezoid import CIRCULATION, LIBRATION
 
 # Pi as two doubles.
 PI, PI_LOW = np.pi, 1.2246467991473532e-16
+
+
+@contextmanager
+def asked_for(name: str) -> Iterator[None]:
+    """Have errors that speak of gradients name what was asked for."""
+    try:
+        yield
+    except SolutionError as error:
+        raise SolutionError(str(error).replace("gradients:", f"{name}:", 1)) from None
 
 
 def source_of(formulas: Formulas) -> Source:

@@ -171,7 +171,7 @@ class Motion(ABC):
         SolutionError
             If the motion does not have the quantity, or gradients are not there yet for motions of its kind.
         """
-        raise self._without_gradients()
+        raise self._without_gradients("gradient")
 
     def sensitivity(self, t: Any, wrt: Any = None) -> Sensitivity:
         """The derivatives of the state at given times by launch and run-time parameters.
@@ -197,7 +197,7 @@ class Motion(ABC):
         SolutionError
             If gradients are not there yet for motions of this kind.
         """
-        raise self._without_gradients()
+        raise self._without_gradients("sensitivity")
 
     @property
     def action(self) -> float:
@@ -208,12 +208,12 @@ class Motion(ABC):
         SolutionError
             As `gradient`.
         """
-        raise self._without_gradients()
+        raise self._without_gradients("action")
 
     @property
     def period_slope(self) -> float:
         """dT/dE, the derivative of the period by the energy per mass, in s3/m2; raises what `action` does."""
-        raise self._without_gradients()
+        raise self._without_gradients("period_slope")
 
     def fourier(self, quantity: str, n: int) -> Fourier:
         """The Fourier coefficients of a quantity over one period (libration and circulation).
@@ -240,10 +240,10 @@ class Motion(ABC):
         """
         raise SolutionError(f"fourier: only a motion that repeats has coefficients; it is of kind {self.kind!r}")
 
-    def _without_gradients(self) -> SolutionError:
-        """What is raised by motions without gradients."""
+    def _without_gradients(self, asked: str) -> SolutionError:
+        """What is raised by motions without gradients, by the name of what was asked for."""
         return SolutionError(
-            f"gradients: only librations and circulations have them yet; this motion is of kind {self.kind!r}"
+            f"{asked}: only librations and circulations have it yet; this motion is of kind {self.kind!r}"
         )
 
     # -- accuracy -----------------------------------------------------------------------------

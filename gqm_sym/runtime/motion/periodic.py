@@ -12,7 +12,7 @@ from gqm_sym.literals.numbers import read_number
 from gqm_sym.runtime.arithmetic.doubledouble import ULP, ZERO
 from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.double_double.orbit_time import Orbit
-from gqm_sym.runtime.gradients.orbit import OrbitDerivatives
+from gqm_sym.runtime.gradients.orbit import OrbitDerivatives, asked_for
 from gqm_sym.runtime.gradients.quantities import gradient, selected
 from gqm_sym.runtime.gradients.sensitivity import OrbitSensitivity, Sensitivity
 from gqm_sym.runtime.gradients.spectrum import Fourier, fourier
@@ -201,13 +201,15 @@ class PeriodicMotion(Motion):
     @locked
     def gradient(self, quantity: str, wrt: Any = None) -> dict[str, Any]:
         """The derivatives of a quantity of this motion by names; see `Motion.gradient`."""
-        return gradient(self._derivatives, self, quantity, wrt)
+        with asked_for("gradient"):
+            return gradient(self._derivatives, self, quantity, wrt)
 
     @property
     @locked
     def action(self) -> float:
         """The integral of (1 + beta) V ds over one period, per mass, in m2/s."""
-        return self._derivatives.action
+        with asked_for("action"):
+            return self._derivatives.action
 
     @property
     @locked
@@ -215,7 +217,8 @@ class PeriodicMotion(Motion):
         """dT/dE, the derivative of the period by the energy per mass, in s3/m2."""
         formulas = self.problem.formulas
         inertia = 1.0 if formulas.inertia is None else formulas.inertia(FLOATS, self.problem.p.values.tolist())
-        return float(self._derivatives.period_gradient[-1] / inertia)
+        with asked_for("period_slope"):
+            return float(self._derivatives.period_gradient[-1] / inertia)
 
     @locked
     def sensitivity(self, t: Any, wrt: Any = None) -> Sensitivity:
@@ -223,7 +226,8 @@ class PeriodicMotion(Motion):
         rows = selected(self.problem.formulas.parameters, wrt)
         times, low, shape = self._times(t)
         points = self._phase_points(times, low)
-        found = self._orbit_sensitivity.at(self, points, self._places(points), self._velocities(points))
+        with asked_for("sensitivity"):
+            found = self._orbit_sensitivity.at(self, points, self._places(points), self._velocities(points))
         chosen = [array[list(rows.values())].reshape(len(rows), *shape) for array in found]
         return Sensitivity(tuple(rows), *chosen)
 
