@@ -1,5 +1,5 @@
 # Made by gqm-gen for "cubic_coulomb". Do not edit: change its declaration and generate again.
-# interface 9, input f472752dd3ba, body 3c5d3e61b58d
+# interface 9, input f472752dd3ba, body 386c94bb84a9
 """Cubic track with Coulomb friction
 
 x              = x
@@ -31,7 +31,7 @@ compiled = compiler(__file__, interface=9)
 
 from gqm_sym.runtime.vocabulary import (
     BOUNDS, EFFECTIVE_POTENTIAL, PATH_AND_CONTACT_FORCE, SPEED_EQUATION, STATIC_BALANCE, Addresses, CompiledModel,
-    Dissipation, LaunchRequest, Pass1, iadd, iconst, imul, ipow, isqrt,
+    Dissipation, ExactLaw, LaunchRequest, Pass1, iadd, iconst, imul, ipow, isqrt,
 )
 
 if TYPE_CHECKING:
@@ -115,6 +115,35 @@ def bounds(lo, hi, p, out):
 
 
 # The same formulas over a namespace of operations, for extended precision.
+
+def exact_x(op, x, p):
+    """Horizontal coordinate."""
+    return x
+
+def exact_z(op, x, p):
+    """Height."""
+    return x**3
+
+def exact_ds(op, x, p):
+    """ds/dx."""
+    return op.sqrt(9*x**4 + 1)
+
+def exact_kappa(op, x, p):
+    """Signed curvature (paper, eq. 8)."""
+    return 6*x/(9*x**4 + 1)**(op.mpf(3)/2)
+
+def exact_static_normal_load(op, x, p):
+    """n0 = N/m of a body at rest, so that N = m*(kappa*V**2 + n0) (paper, eq. 15)."""
+    g = p[1]
+    return g/op.sqrt(9*x**4 + 1)
+
+def exact_speed_slope(op, x, w, v, nu, p):
+    """dV**2/dx where V**2 = w, v = sgn(ds/dt) and nu = sgn(N) (paper, eq. 19)."""
+    mu, g = p[0], p[1]
+    _t0 = 9*x**4 + 1
+    _t1 = op.sqrt(_t0)
+    _t2 = g/_t1
+    return 2*_t1*(-3*_t2*x**2 - mu*nu*v*(_t2 + 6*w*x/_t0**(op.mpf(3)/2)))
 
 def exact_domain(op, p):
     """Both ends of the domain, and the period; None where there is none."""
@@ -254,4 +283,7 @@ MODEL = CompiledModel(
     effective_potential=effective_potential, bounds=bounds,
     domain_of=exact_domain,
     dissipation=Dissipation(speed_equation.address, static_balance.address, friction=True, kinked=False, linear=True),
+    exact=ExactLaw(
+        exact_x, exact_z, exact_ds, exact_kappa, exact_static_normal_load, exact_speed_slope,
+    ),
 )
