@@ -69,7 +69,7 @@ def path_rows(
     """What `path_program` gives at places: a row for each quantity, of rows for its value and its derivatives."""
     count = parameters.shape[1]
     found = values(path_program(formulas, count, mass), parameters, high, low)[:, 0]
-    return found.reshape(-1, count + 2, high.size)
+    return found.reshape(len(found) // (count + 2), count + 2, high.size)
 
 
 class OrbitDerivatives:

@@ -80,10 +80,7 @@ class Law:
     def __init__(self, problem: Problem) -> None:
         formulas = problem.formulas
         if not isinstance(formulas.exact, ExactLaw):
-            raise SolutionError(
-                "gradients: curves without formulas have none yet, nor have modules that were generated before motions "
-                "with losses had them; declare the curve by formulas, and generate the module again"
-            )
+            raise SolutionError("gradients: curves without formulas have none yet; declare the curve by formulas")
         self.exact, self.count = formulas.exact, len(problem.p)
         self.parameters = pairs(*((n.value, n.low, 0.0) for n in problem.p))
 

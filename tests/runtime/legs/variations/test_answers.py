@@ -281,8 +281,9 @@ def test_what_has_no_gradient(launch: Any, quantity: str, error: type[Exception]
 
 
 def test_ends_that_do_not_move() -> None:
-    """The horizon does not, nor the least speed of a body that turns."""
+    """The horizon does not, nor the least speed of a body that turns; and no times have no changes."""
     module = load(str(ROOT / "generated" / "circle_coulomb.py"), "circle_coulomb")
+    assert module.solve(1).sensitivity(np.empty((0, 2)), "L").normal_force.shape == (1, 0, 2)
     assert module.solve(1, t_max="0.2").gradient("t_end", ("L", "mu")) == {"L": 0.0, "mu": 0.0}
     assert module.solve(3, "0.1", contact="above").gradient("t_end", "L") == {"L": 0.0}
     assert module.solve(1).gradient("v_min", ("L", "mu")) == {"L": 0.0, "mu": 0.0}
