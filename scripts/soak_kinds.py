@@ -14,6 +14,7 @@ import time
 from collections import Counter
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from fractions import Fraction
 from itertools import pairwise
 from pathlib import Path
 from types import ModuleType
@@ -25,7 +26,7 @@ from mpmath import mp, mpf
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 import gqm_sym as gqm
-from gqm_sym.errors import GQMError
+from gqm_sym.errors import GQMError, LaunchError
 
 DIGITS = 40
 G = "9.81"
@@ -46,6 +47,7 @@ def build(folder: str | Path) -> Modules:
     planes = gqm.Curve.sampled(POINTS, kind="linear")
     viscous = gqm.Kernel.law("-direction*c*sqrt(W)", parameters={"c": "1"})
     declared = {
+        "ramp": (gqm.Curve.graph("a*x", parameter="x", domain=("-1", "1/3")), gravity),
         "rough": (line, gravity + gqm.CoulombFriction()),
         "damped": (level, gravity + gqm.Potential("k*x**2/2") + viscous),
         "circle": (gqm.Curve.parametric(x="sin(u)", z="-cos(u)", parameter="u", period="2*pi"), gravity),
@@ -105,6 +107,45 @@ def slide(modules: Modules, launch: dict[str, Any], draw: random.Random) -> list
 
     end = min(2.5 * reach, motion.t_end)
     return outside(motion, place, [draw.uniform(0.0, end) for _ in range(TIMES)])
+
+
+def falls(draw: random.Random, modules: Modules) -> tuple[list[str], int]:
+    """On an incline with two ends: at the ends, next to them and between, from places that are no doubles too."""
+    a, end = signed(draw, -3.0, 1.0), draw.choice(("-1", "1/3"))
+    inwards = Fraction(draw.randint(1, 9), 10 ** draw.randint(1, 15)) * (1 if end == "-1" else -1)
+    lam0: str | float = draw.choice((end, str(Fraction(end) + inwards), "1/7", "-1/7", float(Fraction(end) + inwards)))
+    if float(Fraction(lam0)) == float(Fraction(end)):
+        lam0 = end
+    v0 = draw.choice((0.0, log_uniform(draw, -30.0, 1.0)))
+    return fall(modules, {"lam0": lam0, "v0": v0, "direction": draw.choice((1, -1)), "a": a}, draw)
+
+
+def fall(modules: Modules, launch: dict[str, Any], draw: random.Random) -> tuple[list[str], int]:
+    """What is wrong with one motion along an incline until it leaves it."""
+    exact = Fraction(launch["lam0"])
+    lam0, v0, a = mpf(exact.numerator) / exact.denominator, mpf(launch["v0"]), mpf(launch["a"])
+    slope, (low, high) = mp.sqrt(1 + a**2), (mpf(-1), mpf(1) / 3)
+    pull, u = -mpf(G) * a / slope**2, launch["direction"] * v0 / slope
+    heading = mp.sign(u or pull)
+    if lam0 == (high if heading > 0 else low):
+        try:
+            return [f"leaves its end as a {modules['ramp'].solve(**launch).kind}"], 1
+        except LaunchError:
+            return [], 1
+    motion = modules["ramp"].solve(**launch)
+    ahead = high if heading > 0 else low
+    turns = u * pull < 0 and u**2 < 2 * abs(pull * (ahead - lam0))
+    last = low + high - ahead if turns else ahead
+    at_last = mp.sign(pull if turns else heading) * mp.sqrt(u**2 + 2 * pull * (last - lam0))
+    # Without cancellation, from the speeds at both ends.
+    spent = (at_last - u) / pull if turns else 2 * (last - lam0) / (u + at_last)
+    found = outside(
+        motion, lambda t: lam0 + u * t + pull * t**2 / 2, [draw.uniform(0.0, motion.t_end) for _ in range(TIMES)]
+    )
+    # The end is known to a rounding of its place.
+    if not abs(motion.t_end - spent) <= 16.0 * ROUNDINGS * spent + 2.0**-53 / abs(at_last):
+        found.append(f"ends at {motion.t_end!r}, where {float(spent)!r} is true")
+    return found, TIMES + 1
 
 
 def damps(draw: random.Random, modules: Modules) -> tuple[list[str], int]:
@@ -241,9 +282,9 @@ def threads(draw: random.Random, modules: Modules) -> tuple[list[str], int]:
     return [f"threads read otherwise on {name}"] if np.any(np.abs(read - expected) > 2.0 * bounds) else [], 1
 
 
-KINDS = (slides, damps, swings, bounces, sweeps, threads)
+KINDS = (slides, falls, damps, swings, bounces, sweeps, threads)
 # Threads are dear, and told by few.
-WEIGHTS = (4, 4, 4, 4, 4, 1)
+WEIGHTS = (4, 4, 4, 4, 4, 4, 1)
 
 
 def soak(count: int, seed: int, modules: Modules) -> tuple[Counter[str], list[str], float]:

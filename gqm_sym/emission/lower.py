@@ -1,7 +1,5 @@
 """From a model's closed forms to functions as straight-line code."""
 
-from dataclasses import replace
-
 from sympy import Expr, Function, Symbol
 
 from gqm_sym.derivation import Model
@@ -32,7 +30,7 @@ def lower(model: Model, *, name: str, forms: tuple[tuple[str, Expr], ...]) -> Mo
         functions = lowering.potentials()
         batch = (*load_map(lowering), *batch_functions(lowering))
     else:
-        energy = replace(lowering.effective_potential(), later=True)
+        energy = lowering.effective_potential()
         functions, batch = (speed_equation(lowering, loss), static_balance(lowering, loss), energy), ()
     exact = (*(lowering.exact() if loss is None else ()), *lowering.inertia(), *lowering.trigonometric_values())
     return ModuleIR(
@@ -45,7 +43,7 @@ def lower(model: Model, *, name: str, forms: tuple[tuple[str, Expr], ...]) -> Mo
         forms=forms,
         notes=model.notes,
         functions=(lowering.path_and_contact_force(), *functions),
-        bounds=lowering.bounds() if loss is None else replace(lowering.bounds(), later=True),
+        bounds=lowering.bounds(),
         batch=batch,
         bounds_batch=bounds_batch(lowering) if any(function.batch for function in batch) else None,
         exact=exact if model.curve.charted else (*exact, lowering.domain(), *lowering.axes()),

@@ -9,7 +9,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from mpmath import mp
 from paths import ROOT
+
+from gqm_sym.errors import LaunchError
 
 sys.path.append(str(ROOT / "scripts"))
 
@@ -168,6 +171,31 @@ def test_friction_that_all_but_holds_the_body(near: float, v0: float, kinds: dic
     for direction in (1, -1):
         launch = {"lam0": 2.339, "v0": v0, "direction": direction, "a": -0.078156, "mu": 0.078156 * (1.0 - near)}
         assert soak_kinds.slide(kinds, launch, random.Random(1)) == []
+
+
+FALLING = {
+    "at rest at the end, downhill outwards": ("-1", 0.0, -1, 1.0),
+    "from the end, back to it": ("-1", 1e-30, 1, 1.0),
+    "from the end, outwards": ("1/3", 1e-30, 1, 1.0),
+    "from a place that is no double": ("1/7", 1e-21, -1, 1.0),
+    "uphill from the next double": ("1/10", 1e-12, -1, 1.0),
+    "next to the end": ("-999999999999999/1000000000000000", 0.0, -1, 1.0),
+    "as slow as can be": (0.125, 1e-30, -1, 1.0),
+}
+
+
+@pytest.mark.parametrize("case", FALLING)
+def test_slow_launches_and_ends_of_the_curve(case: str, kinds: dict[str, ModuleType]) -> None:
+    """These raised ZeroDivisionError, turned beyond the end of the curve, or lay up to 1e7 bounds away."""
+    launch = dict(zip(("lam0", "v0", "direction", "a"), FALLING[case], strict=True))
+    with mp.workdps(40):
+        assert soak_kinds.fall(kinds, launch, random.Random(1))[0] == []
+
+
+def test_no_chart_is_left_through_its_end_and_come_back_to(kinds: dict[str, ModuleType]) -> None:
+    """The turn was 1e-24 m beyond the end of the curve, and the next leg began at the end."""
+    with pytest.raises(LaunchError, match="would leave through it at once"):
+        kinds["planes"].solve(0.0, 4.8e-12, -1)
 
 
 DAMPED = {

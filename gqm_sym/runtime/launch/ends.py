@@ -40,8 +40,9 @@ NEAR_AXIS, MAX_AXIS_STEP_SHARE = 1e-6, 0.9
 # ds at an end of the domain, as a share of its value at the launch, up to which the end is a cusp.
 CUSP_SHARE = 1e-7
 
-# V**2 at an end of the domain above which it is no turning point, as a share of the size of its terms.
-LIP_SHARE = 1e-12
+# V**2 at an end of the domain above which it is no turning point, as a share of what it gains and loses on the way; and
+# the number of places at which the slope of the potential on the way is looked at.
+LIP_SHARE, WAY_MARKS = 1e-12, 5
 
 # Distance from a place at which ds is compared with that at the place itself, to tell whether it is a cusp; as a share
 # of the first step.
@@ -261,14 +262,17 @@ def end_of_motion(problem: Problem, direction: int, found: tuple[int, float, flo
 def _end_of_curve(problem: Problem, direction: int) -> EndOfMotion:
     """The end of the domain, or a turning point if V**2 vanishes there: a body released at one lip of a half pipe.
 
-    The ends of a chart are known to a rounding only; V**2 counts as zero there if it is zero within that.
+    The ends of a chart are known to a rounding only; V**2 counts as zero there if it is zero within that. It is judged
+    by what V**2 gains and loses on the way, for a body launched next to the end has a small V**2 of its own there.
     """
     end, exact, f, lam0 = domain_end(problem, direction), problem.functions.exact, problem.functions, problem.lam0
-    if end.what != "domain-end":
+    offset = end.place - lam0
+    if end.what != "domain-end" or offset == 0.0:
         return end
     places = np.array([lam0, end.place])
     v2 = speed_squared_at(f.addresses, f.p, lam0, problem.launch.lam0.low, problem.w0, places[1:], places[1:] - lam0)[0]
-    size = problem.w0 + 2.0 * float(np.abs(potential_at(f.addresses, f.p, places)[0]).sum())
+    slopes = potential_at(f.addresses, f.p, lam0 + offset * np.linspace(0.0, 1.0, WAY_MARKS))[1]
+    size = problem.w0 + 2.0 * abs(offset) * float(np.abs(slopes).max())
     if v2 > LIP_SHARE * size:
         return end
     if exact is None or problem.formulas.domain_of is None:
@@ -276,8 +280,9 @@ def _end_of_curve(problem: Problem, direction: int) -> EndOfMotion:
     else:
         scale = exact.at(DIGITS)
         ends = problem.formulas.domain_of(scale.context, tuple(number.at(scale.context) for number in problem.p))
-        stops = scale.speed_squared(ends[1 if direction > 0 else 0]) <= scale.mpf(10) ** (-DIGITS // 2) * scale.size
-    return EndOfMotion("turn", end.place, offset=end.place - lam0) if stops else end
+        v2_there = scale.speed_squared(ends[1 if direction > 0 else 0])
+        stops = v2_there <= scale.mpf(10) ** (-DIGITS // 2) * size
+    return EndOfMotion("turn", end.place, offset=offset) if stops else end
 
 
 def _decided_end(problem: Problem, end: End) -> EndOfMotion:

@@ -138,7 +138,7 @@ def _loss(problem: Problem) -> Dissipation:
     """The dissipation of the model."""
     loss = problem.formulas.dissipation
     assert loss is not None
-    return loss
+    return loss.addresses()
 
 
 class Reading(NamedTuple):

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from math import inf, isfinite
+from math import inf, isfinite, sqrt
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from gqm_sym.runtime.launch.problem import Problem
 from gqm_sym.runtime.launch.request import ONLY_SIGN
 from gqm_sym.runtime.launch.speed import path_and_force_at
 from gqm_sym.runtime.launch.zeros import MAX_PARAMETER, MIN_STEP_SHARE
+from gqm_sym.runtime.motion.conditioning import v2_correction
 from gqm_sym.runtime.motion.events import Event, Leg, liftoff
 from gqm_sym.runtime.motion.locking import locked
 from gqm_sym.runtime.motion.motion import Motion
@@ -125,7 +126,8 @@ class AperiodicMotion(Motion):
             return 0.0
         f = self.problem.functions
         ds = path_and_force_at(f.addresses, f.p, np.array([self.problem.lam0]), np.zeros(1))[2, 0]
-        return segment.direction * low * float(ds) / speed
+        at_double = sqrt(max(0.0, speed * speed + v2_correction(f.addresses, f.p, self.problem.launch.lam0)))
+        return segment.direction * low * float(ds) * 2.0 / (speed + at_double)
 
     def append(self, timed: TimedSegment) -> None:
         """Append a timed segment, as far as contact lasts."""

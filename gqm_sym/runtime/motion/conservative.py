@@ -253,7 +253,7 @@ def _directions_from_cusp(problem: Problem) -> tuple[float, list[int]]:
 def _without_turn(problem: Problem, direction: int, front: EndOfMotion) -> Motion:
     """A motion that has no turning point ahead."""
     f, lam0 = problem.functions, problem.lam0
-    if abs(front.place - lam0) <= 1e-15 * max(abs(lam0), 1.0):
+    if front.place == lam0:
         raise leaving_at_once(problem, direction, front.what)
     kind: MotionKind = "asymptotic" if front.what == "equilibrium" else "transit"
     motion = AperiodicMotion(problem, kind, direction)

@@ -46,6 +46,9 @@ MAX_END_ROUNDINGS = 2.0
 # The distance from a turning point, as a share of the width, within which offsets are computed from the exact one.
 NEAR_TURN = 1e-3
 
+# How much V**2 at the double next to a launch place may differ from that at the launch place, as a share of the latter.
+MAX_CORRECTION_SHARE = 2.0**-10
+
 # The rounding of a place that is given by text, as two doubles.
 MAX_TEXT_ROUNDING = 2.0**-105
 
@@ -132,17 +135,21 @@ class Segment:
         f = self.functions
         if self.speed_series is not None:
             return
-        self._from_multiprecision = self.stored_panels is not None
+        self._from_multiprecision, is_beside_double = self.stored_panels is not None, False
         if self.v2 is not None:
             self.stored_panels = lay_along(self.a, self.b, self.v2, self._initial_edges())
         elif self.stored_panels is None:
-            self.ref_v2 += self._v2_correction()
+            correction = self._v2_correction()
+            is_beside_double = abs(correction) > MAX_CORRECTION_SHARE * self.ref_v2
+            self.ref_v2 += correction
             self.stored_panels = lay_panels(
                 f.addresses, f.p, self.kind, self.a, self.b, self.ref, self.ref_v2, self._initial_edges()
             )
         self._condition_number = max(1.0 / self.balance if self.balance > 0.0 else inf, self._launch_condition_number())
-        needs_multiprecision = self._condition_number > 1.0 / MIN_CANCELLATION_RATIO or (
-            self.kind == FROM_TURN and self._is_short(MIN_TIMED_WIDTH_SHARE)
+        needs_multiprecision = (
+            self._condition_number > 1.0 / MIN_CANCELLATION_RATIO
+            or is_beside_double
+            or (self.kind == FROM_TURN and self._is_short(MIN_TIMED_WIDTH_SHARE))
         )
         if f.exact is not None and not self._from_multiprecision and needs_multiprecision:
             self.ends = exact_ends(f.exact, DIGITS, self.kind, self.a, self.b, self.ends)

@@ -135,7 +135,7 @@ def lay_exactly(exact: ExactProblem, kind: int, ends: tuple[Any, Any], stop: flo
         resolved = tail <= MAX_TAIL_RATIO * size and length_tail <= 10.0 * MAX_TAIL_RATIO * length_size
         time, length = half * (weights @ values[0]), half * (weights @ values[1])
         resolved = resolved or (time <= NEGLIGIBLE_SHARE * times[-1] and length <= NEGLIGIBLE_SHARE * lengths[-1])
-        full = len(edges) + len(pending) >= max_panels or half <= 2.0**-50 * stop
+        full = len(edges) + len(pending) >= max_panels or half <= 2.0**-50 * right
         if not resolved and not full:
             pending.append((left + right) / 2)
             continue

@@ -46,8 +46,12 @@ MIN_USABLE_RATIO = 1e-9
 # If cancellation leaves less than this part of V**2, the half period in doubles is off by more than a few ulp.
 MIN_CANCELLATION_RATIO = 1e-2
 
-# The shortest panel, as a share of the segment.
-MIN_PANEL_SHARE = 2.0**-48
+# The shortest panel, as a share of its distance from the start of the segment, next to which a slow launch gains its
+# speed over a distance as short as doubles can tell; and the shortest there, as a share of the whole segment.
+MIN_PANEL_SHARE, MIN_FIRST_PANEL_SHARE = 2.0**-48, 2.0**-960
+
+# How many panels may wait while those before them are halved, besides the first ones: as often as the first is halved.
+MAX_WAITING = 1000
 
 # A duration below this share of the time so far does not change it, even as two doubles.
 NEGLIGIBLE_SHARE = 2.0**-104
@@ -173,14 +177,14 @@ def lay(integrand, marks):  # type: ignore[no-untyped-def]
     phi, work, values, c = np.empty(COUNT), np.empty((4, COUNT)), np.empty((2, COUNT)), np.empty(DEGREE + 1)
     start, stop = marks[0], marks[-1]
     waiting = marks.size - 1
-    pending = np.empty(waiting + 128)  # right edges of the panels that remain, the next one last
+    pending = np.empty(waiting + MAX_WAITING)  # right edges of the panels that remain, the next one last
     for k in range(waiting):
         pending[k] = marks[waiting - k]
     max_panels = MAX_PANELS + waiting
     edges[0], times[0], lengths[0] = start, 0.0, 0.0
     left, count, error, status = start, 0, 0.0, CONVERGED
     time_low, length_low = 0.0, 0.0
-    min_width = MIN_PANEL_SHARE * fabs(stop - start)
+    min_width = MIN_FIRST_PANEL_SHARE * fabs(stop - start)
     smallest, largest, peak = inf, 0.0, 0.0
     while waiting > 0:
         right = pending[waiting - 1]
@@ -208,7 +212,7 @@ def lay(integrand, marks):  # type: ignore[no-untyped-def]
         length_resolved = length_tail <= MAX_TAIL_RATIO * length_size
         resolved = tail <= MAX_TAIL_RATIO * size and length_resolved and difference <= MAX_RULE_DIFFERENCE * duration
         noise = _is_noise(size, tail, level) and (length_resolved or _is_noise(length_size, length_tail, length_middle))
-        narrow = fabs(right - left) <= min_width
+        narrow = fabs(right - left) <= max(MIN_PANEL_SHARE * fabs(right - start), min_width)
         full = count + waiting >= max_panels or waiting >= pending.size - 1
         # At the end of a spiral, which winds on below the last bit of the time and the length so far.
         negligible = (

@@ -23,7 +23,7 @@ from gqm_sym.runtime.quadrature.time_panels import (
     EXHAUSTED,
     FAILED,
     ILL_CONDITIONED,
-    MIN_PANEL_SHARE,
+    MIN_FIRST_PANEL_SHARE,
     antiderivative,
     lay_panels,
     read_off_many,
@@ -242,7 +242,7 @@ def test_an_end_taken_for_regular_that_is_not(slope: ModuleType) -> None:
     with mp.workdps(40):
         truth = mp.sqrt(10 / (mpf("9.81") * mp.sin(mpf("0.5"))))
     assert laid.status == EXHAUSTED
-    assert np.diff(laid.edges).min() >= MIN_PANEL_SHARE / 2
+    assert np.diff(laid.edges).min() >= MIN_FIRST_PANEL_SHARE / 2
     assert share(laid.whole, truth, float(truth)) <= laid.error <= 1e-6
 
 
