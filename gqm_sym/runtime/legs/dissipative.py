@@ -84,8 +84,8 @@ MAX_SEGMENTS = 250_000
 # questions one after the other do not copy it for each leg.
 EXTENSION = 1.25
 
-# How many panels a record has space for at first; a leg with more is followed again with a larger record. How many legs
-# are followed in one call of a motion that has a horizon, whose legs are all needed.
+# How many panels a record has space for beside one for each break; a leg with more is followed again with a larger
+# record. How many legs are followed in one call of a motion that has a horizon, whose legs are all needed.
 FEW_PANELS, LEGS_PER_CALL = 12, 8
 
 # A change of the contact force's sign this many roundings from the end of a piece is there.
@@ -182,6 +182,7 @@ class DissipativeMotion(Motion):
         super().__init__(problem, "dissipative", launch.direction)
         drops = f.drops(ONLY_SIGN[launch.contact])
         self._joints = Joints(f.breaks, f.corners, drops, np.empty(room_ahead(f.breaks.size)))
+        self._space = FEW_PANELS + f.breaks.size
         self._body = launched(
             *(1, launch.lam0.value, domain.low, domain.high, domain.period),
             *(launch.direction, ONLY_SIGN[launch.contact], self._horizon, nan, problem.w0),
@@ -510,16 +511,16 @@ class DissipativeMotion(Motion):
 
     def _followed(self) -> tuple[Any, ...]:
         """What ended the last of the next legs (`advance`), and the records of all of them; one if the body stays."""
-        frame, size = self._frame, FEW_PANELS * COLUMNS
+        frame = self._frame
         loss, parameters = (_loss(self.problem), self.problem.functions.p) if frame is None else frame[:2]
         legs = LEGS_PER_CALL if frame is None and isfinite(self._horizon) else 1
         while True:
-            records = np.empty((legs, size))
+            records = np.empty((legs, self._space * COLUMNS))
             what = answers.drive(loss, parameters.reshape(1, -1), self._joints, LEG, self._body, records)
             count = int(self._body[0, VALUE])
             if what != FULL or count:
                 return (what if what != FULL else TURN), *records[: max(count, 1)]
-            legs, size = 1, 4 * size
+            legs, self._space = 1, 4 * self._space
 
     def _settle(self, what: int, start: float, end: float) -> None:
         """Look whether a run has come so close to an equilibrium that the motion ends there, or goes on in a frame."""
@@ -554,11 +555,12 @@ class DissipativeMotion(Motion):
 
     def _enter_frame(self, place: float, low: float, v2: float) -> None:
         """Follow the body from here on by its distance from an equilibrium, if it swings closely about one."""
-        problem, line = self.problem, self._body[0]
-        loss, breaks = _loss(problem), problem.functions.breaks
-        ends = [abs(end - place) for end in (problem.low, problem.high, *breaks) if isfinite(end)]
+        problem, line, loss = self.problem, self._body[0], _loss(self.problem)
+        if loss.friction or loss.kinked:
+            return
+        ends = [abs(end - place) for end in (problem.low, problem.high, *problem.functions.breaks) if isfinite(end)]
         reach = min([starting_step(problem), *ends])
-        frame = None if loss.friction or loss.kinked else frame_near(loss, problem.functions.p, (place, low, v2), reach)
+        frame = frame_near(loss, problem.functions.p, (place, low, v2), reach)
         if frame is None:
             return
         self._frame, self._joints = frame, Joints(NOWHERE, NOWHERE, NOWHERE, NOWHERE)
