@@ -7,7 +7,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from gqm_sym import figures
+    from gqm_sym import design, figures
     from gqm_sym.building import build
     from gqm_sym.declare import Curve, arc, clothoid, families, line
     from gqm_sym.derivation import Model, derive
@@ -48,6 +48,7 @@ _HOMES = {
     "build": "gqm_sym.building",
     "clothoid": "gqm_sym.declare",
     "derive": "gqm_sym.derivation",
+    "design": "gqm_sym.design",
     "emit": "gqm_sym.emission",
     "families": "gqm_sym.declare",
     "figures": "gqm_sym.figures",
@@ -75,6 +76,7 @@ __all__ = [
     "build",
     "clothoid",
     "derive",
+    "design",
     "emit",
     "families",
     "figures",

@@ -32,6 +32,7 @@ _NAMES_BY_HOME = {
         "divdiff1_chart_z divdiff2_chart_alpha divdiff2_chart_x divdiff2_chart_z ichart_alpha ichart_kappa "
         "ichart_x ichart_z"
     ),
+    "charts.polynomials": "Polynomials",
     "charts.rail": "Rail",
     "charts.sampled": "Sampled",
     "charts.tracing": "Traced",

@@ -18,7 +18,7 @@ PACKAGE = ROOT / "gqm_sym"
 # derivation is a unit; the files beside the rooms are units too.
 LAYERS = (
     {"cli"},
-    {"report", "studies"},
+    {"report", "studies", "design"},
     {"building", "specfile"},
     {"emission"},
     {"derivation"},
@@ -30,7 +30,7 @@ LAYERS = (
     {"parameters"},
     {"expressions"},
     {"fitting"},
-    {"figures", "export", "design"},
+    {"figures", "export"},
     {"runtime", "runtime.vocabulary"},
     {"runtime.model"},
     {"runtime.sweep"},
@@ -158,7 +158,7 @@ ONLY_IN = {
     "jinja2": {"emission"},
     "llvmlite": {"runtime"},
     "matplotlib": {"figures", "report"},
-    "mpmath": {"runtime", "literals", "figures"},
+    "mpmath": {"runtime", "literals", "figures", "design"},
     "numba": {"runtime"},
     "pandas": {"export"},
     "numpy": {"runtime", "literals", "figures", "export", "design", "fitting", "studies", "smoothing"},
@@ -166,7 +166,7 @@ ONLY_IN = {
     "pydantic": {"specfile", "studies"},
     "pydantic_core": {"specfile", "studies"},
     "ruamel": {"specfile"},
-    "scipy": {"runtime", "smoothing", "fitting"},
+    "scipy": {"runtime", "smoothing", "fitting", "design"},
     "sympy": {
         "cli",
         "report",
@@ -179,6 +179,7 @@ ONLY_IN = {
         "expressions",
         "sympy_charts",
         "dimensions",
+        "design",
     },
     "xarray": {"cli", "export", "studies"},
 }
