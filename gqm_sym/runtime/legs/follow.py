@@ -185,11 +185,6 @@ def run_forwards(forces, start, route, off, record):  # type: ignore[no-untyped-
         end = run_whole(forces, start, route, off, record)
         if end.what == TURN:
             return end, 2
-        if end.step > 0.0:
-            start = Start(
-                *(start.place, start.place_low, start.v2, start.direction, start.contact_sign, start.step),
-                *(start.no_turn_until, 2.0 * end.step, False),
-            )
     return run_to_end(forces, start, route, off, record), 0
 
 

@@ -147,8 +147,7 @@ def set_sizes(v2, factor, work):  # type: ignore[no-untyped-def]
     largest_v2, q_rate = max(v2, extent(work, W)[1]), size_of(work, Q_RATE)
     width = work[OFFSET + COUNT]
     work[size_at(DS)] = size_of(work, DS)
-    # Integration divides the last coefficients by more than their number.
-    work[size_at(FORCE)] = COUNT * max(size_of(work, FORCE), q_rate * largest_v2 * width / work[D + COUNT])
+    work[size_at(FORCE)] = max(size_of(work, FORCE), q_rate * largest_v2 * width / work[D + COUNT])
     work[size_at(Q_RATE)] = max(q_rate, 1.0 / width)
     work[size_at(W_FACTOR)] = max(size_of(work, W_FACTOR), factor)
     work[size_at(LOAD)] = extent(work, MEAN)[1]

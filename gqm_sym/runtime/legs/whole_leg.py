@@ -323,8 +323,7 @@ def run_whole(forces, start, route, off, record):  # type: ignore[no-untyped-def
     Returns
     -------
     End
-        With GOES_ON for what ended the run where the leg must be followed panel by panel; the step is half its width
-        where that has been found, or 0.
+        With GOES_ON for what ended the run where the leg must be followed panel by panel.
     """
     breaks, origin, v, upcoming = route.breaks, (start.place, start.place_low), start.direction, 0
     while upcoming < breaks.size and offset(breaks[upcoming], origin, v) <= 0.0:
