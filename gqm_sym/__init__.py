@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from gqm_sym.emission import emit
     from gqm_sym.errors import GQMError
     from gqm_sym.fitting.fit import fit
+    from gqm_sym.fitting.uncertainty import uncertainty
     from gqm_sym.kernels import (
         CentralForce,
         CoulombFriction,
@@ -57,6 +58,7 @@ _HOMES = {
     "line": "gqm_sym.declare",
     "read_spec": "gqm_sym.specfile",
     "read_sweep": "gqm_sym.studies",
+    "uncertainty": "gqm_sym.fitting.uncertainty",
 }
 
 __all__ = [
@@ -85,6 +87,7 @@ __all__ = [
     "line",
     "read_spec",
     "read_sweep",
+    "uncertainty",
 ]
 
 
