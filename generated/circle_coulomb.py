@@ -1,5 +1,5 @@
 # Made by gqm-gen for "circle_coulomb". Do not edit: change its declaration and generate again.
-# interface 10, input b0d8ff0ac753, body 1eef785c89df
+# interface 10, input b0d8ff0ac753, body 182a4908ffbc
 """Bead on a rough ring
 
 x              = L*sin(theta)
@@ -31,7 +31,7 @@ compiled = compiler(__file__, interface=10)
 
 from gqm_sym.runtime.vocabulary import (
     BOUNDS, EFFECTIVE_POTENTIAL, PATH_AND_CONTACT_FORCE, SPEED_EQUATION, STATIC_BALANCE, CompiledFunctions,
-    CompiledModel, DissipativeFunctions, LaunchRequest, Pass1, cos, imul, isin, sin,
+    CompiledModel, DissipativeFunctions, ExactLaw, LaunchRequest, Pass1, cos, imul, isin, sin,
 )
 
 if TYPE_CHECKING:
@@ -111,6 +111,36 @@ def bounds(lo, hi, p, out):
 
 
 # The same formulas over a namespace of operations, for extended precision.
+
+def exact_x(op, theta, p):
+    """Horizontal coordinate."""
+    L = p[0]
+    return L*op.sin(theta)
+
+def exact_z(op, theta, p):
+    """Height."""
+    L = p[0]
+    return -L*op.cos(theta)
+
+def exact_ds(op, theta, p):
+    """ds/dtheta."""
+    L = p[0]
+    return L
+
+def exact_kappa(op, theta, p):
+    """Signed curvature (paper, eq. 8)."""
+    L = p[0]
+    return 1/L
+
+def exact_static_normal_load(op, theta, p):
+    """n0 = N/m of a body at rest, so that N = m*(kappa*V**2 + n0) (paper, eq. 15)."""
+    g = p[3]
+    return g*op.cos(theta)
+
+def exact_speed_slope(op, theta, w, v, nu, p):
+    """dV**2/dtheta where V**2 = w, v = sgn(ds/dt) and nu = sgn(N) (paper, eq. 19)."""
+    L, mu, g = p[0], p[1], p[3]
+    return 2*L*(-g*op.sin(theta) - mu*nu*v*(g*op.cos(theta) + w/L))
 
 def exact_domain(op, p):
     """Both ends of the domain, and the period; None where there is none."""
@@ -227,4 +257,7 @@ MODEL = CompiledModel(
     effective_potential=effective_potential, bounds=bounds,
     domain_of=exact_domain,
     dissipation=DissipativeFunctions(speed_equation, static_balance, friction=True, kinked=False, linear=True),
+    exact=ExactLaw(
+        exact_x, exact_z, exact_ds, exact_kappa, exact_static_normal_load, exact_speed_slope,
+    ),
 )

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "circle_law". Do not edit: change its declaration and generate again.
-# interface 10, input 2718db879066, body b731e7d6cd08
+# interface 10, input 2718db879066, body 376efac7ddc6
 """Pendulum in dense air
 
 x              = L*sin(theta)
@@ -30,7 +30,7 @@ compiled = compiler(__file__, interface=10)
 
 from gqm_sym.runtime.vocabulary import (
     BOUNDS, EFFECTIVE_POTENTIAL, PATH_AND_CONTACT_FORCE, SPEED_EQUATION, STATIC_BALANCE, CompiledFunctions,
-    CompiledModel, DissipativeFunctions, LaunchRequest, Pass1, cos, imul, isin, sin,
+    CompiledModel, DissipativeFunctions, ExactLaw, LaunchRequest, Pass1, cos, imul, isin, sin,
 )
 
 if TYPE_CHECKING:
@@ -113,6 +113,36 @@ def bounds(lo, hi, p, out):
 
 
 # The same formulas over a namespace of operations, for extended precision.
+
+def exact_x(op, theta, p):
+    """Horizontal coordinate."""
+    L = p[0]
+    return L*op.sin(theta)
+
+def exact_z(op, theta, p):
+    """Height."""
+    L = p[0]
+    return -L*op.cos(theta)
+
+def exact_ds(op, theta, p):
+    """ds/dtheta."""
+    L = p[0]
+    return L
+
+def exact_kappa(op, theta, p):
+    """Signed curvature (paper, eq. 8)."""
+    L = p[0]
+    return 1/L
+
+def exact_static_normal_load(op, theta, p):
+    """n0 = N/m of a body at rest, so that N = m*(kappa*V**2 + n0) (paper, eq. 15)."""
+    g = p[3]
+    return g*op.cos(theta)
+
+def exact_speed_slope(op, theta, w, v, nu, p):
+    """dV**2/dtheta where V**2 = w, v = sgn(ds/dt) and nu = sgn(N) (paper, eq. 19)."""
+    L, c1, c2, g = p[0], p[1], p[2], p[3]
+    return 2*L*(-g*op.sin(theta) - v*w*(c1 + c2*w))
 
 def exact_domain(op, p):
     """Both ends of the domain, and the period; None where there is none."""
@@ -228,4 +258,7 @@ MODEL = CompiledModel(
     effective_potential=effective_potential, bounds=bounds,
     domain_of=exact_domain,
     dissipation=DissipativeFunctions(speed_equation, static_balance, friction=False, kinked=False, linear=False),
+    exact=ExactLaw(
+        exact_x, exact_z, exact_ds, exact_kappa, exact_static_normal_load, exact_speed_slope,
+    ),
 )

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "cubic_coulomb". Do not edit: change its declaration and generate again.
-# interface 10, input f472752dd3ba, body dab5d3050f35
+# interface 10, input f472752dd3ba, body 88c76d267e03
 """Cubic track with Coulomb friction
 
 x              = x
@@ -31,7 +31,7 @@ compiled = compiler(__file__, interface=10)
 
 from gqm_sym.runtime.vocabulary import (
     BOUNDS, EFFECTIVE_POTENTIAL, PATH_AND_CONTACT_FORCE, SPEED_EQUATION, STATIC_BALANCE, CompiledFunctions,
-    CompiledModel, DissipativeFunctions, LaunchRequest, Pass1, iadd, iconst, imul, ipow, isqrt,
+    CompiledModel, DissipativeFunctions, ExactLaw, LaunchRequest, Pass1, iadd, iconst, imul, ipow, isqrt,
 )
 
 if TYPE_CHECKING:
@@ -116,6 +116,35 @@ def bounds(lo, hi, p, out):
 
 
 # The same formulas over a namespace of operations, for extended precision.
+
+def exact_x(op, x, p):
+    """Horizontal coordinate."""
+    return x
+
+def exact_z(op, x, p):
+    """Height."""
+    return x**3
+
+def exact_ds(op, x, p):
+    """ds/dx."""
+    return op.sqrt(9*x**4 + 1)
+
+def exact_kappa(op, x, p):
+    """Signed curvature (paper, eq. 8)."""
+    return 6*x/(9*x**4 + 1)**(op.mpf(3)/2)
+
+def exact_static_normal_load(op, x, p):
+    """n0 = N/m of a body at rest, so that N = m*(kappa*V**2 + n0) (paper, eq. 15)."""
+    g = p[1]
+    return g/op.sqrt(9*x**4 + 1)
+
+def exact_speed_slope(op, x, w, v, nu, p):
+    """dV**2/dx where V**2 = w, v = sgn(ds/dt) and nu = sgn(N) (paper, eq. 19)."""
+    mu, g = p[0], p[1]
+    _t0 = 9*x**4 + 1
+    _t1 = op.sqrt(_t0)
+    _t2 = g/_t1
+    return 2*_t1*(-3*_t2*x**2 - mu*nu*v*(_t2 + 6*w*x/_t0**(op.mpf(3)/2)))
 
 def exact_domain(op, p):
     """Both ends of the domain, and the period; None where there is none."""
@@ -231,4 +260,7 @@ MODEL = CompiledModel(
     effective_potential=effective_potential, bounds=bounds,
     domain_of=exact_domain,
     dissipation=DissipativeFunctions(speed_equation, static_balance, friction=True, kinked=False, linear=True),
+    exact=ExactLaw(
+        exact_x, exact_z, exact_ds, exact_kappa, exact_static_normal_load, exact_speed_slope,
+    ),
 )

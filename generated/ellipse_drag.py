@@ -1,5 +1,5 @@
 # Made by gqm-gen for "ellipse_drag". Do not edit: change its declaration and generate again.
-# interface 10, input f2717a5ad91f, body 9cfb5fbace8e
+# interface 10, input f2717a5ad91f, body 82e16d108289
 """Bead on an ellipse, in air
 
 x              = a*cos(theta)
@@ -31,7 +31,7 @@ compiled = compiler(__file__, interface=10)
 
 from gqm_sym.runtime.vocabulary import (
     BOUNDS, EFFECTIVE_POTENTIAL, PATH_AND_CONTACT_FORCE, SPEED_EQUATION, STATIC_BALANCE, CompiledFunctions,
-    CompiledModel, DissipativeFunctions, LaunchRequest, Pass1, cos, iadd, icos, imul, ipow, isin, isqrt, sin,
+    CompiledModel, DissipativeFunctions, ExactLaw, LaunchRequest, Pass1, cos, iadd, icos, imul, ipow, isin, isqrt, sin,
 )
 
 if TYPE_CHECKING:
@@ -119,6 +119,39 @@ def bounds(lo, hi, p, out):
 
 
 # The same formulas over a namespace of operations, for extended precision.
+
+def exact_x(op, theta, p):
+    """Horizontal coordinate."""
+    a = p[0]
+    return a*op.cos(theta)
+
+def exact_z(op, theta, p):
+    """Height."""
+    b = p[1]
+    return b*op.sin(theta)
+
+def exact_ds(op, theta, p):
+    """ds/dtheta."""
+    a, b = p[0], p[1]
+    return op.sqrt(a**2*op.sin(theta)**2 + b**2*op.cos(theta)**2)
+
+def exact_kappa(op, theta, p):
+    """Signed curvature (paper, eq. 8)."""
+    a, b = p[0], p[1]
+    return a*b/(a**2*op.sin(theta)**2 + b**2*op.cos(theta)**2)**(op.mpf(3)/2)
+
+def exact_static_normal_load(op, theta, p):
+    """n0 = N/m of a body at rest, so that N = m*(kappa*V**2 + n0) (paper, eq. 15)."""
+    a, b, g = p[0], p[1], p[3]
+    _t0 = op.sin(theta)
+    return -_t0*a*g/op.sqrt(_t0**2*a**2 + b**2*op.cos(theta)**2)
+
+def exact_speed_slope(op, theta, w, v, nu, p):
+    """dV**2/dtheta where V**2 = w, v = sgn(ds/dt) and nu = sgn(N) (paper, eq. 19)."""
+    a, b, b_air, g, m = p[0], p[1], p[2], p[3], p[4]
+    _t0 = op.cos(theta)
+    _t1 = op.sqrt(_t0**2*b**2 + a**2*op.sin(theta)**2)
+    return 2*_t1*(-_t0*b*g/_t1 - b_air*v*w/m)
 
 def exact_domain(op, p):
     """Both ends of the domain, and the period; None where there is none."""
@@ -235,4 +268,7 @@ MODEL = CompiledModel(
     effective_potential=effective_potential, bounds=bounds,
     domain_of=exact_domain,
     dissipation=DissipativeFunctions(speed_equation, static_balance, friction=False, kinked=False, linear=True),
+    exact=ExactLaw(
+        exact_x, exact_z, exact_ds, exact_kappa, exact_static_normal_load, exact_speed_slope,
+    ),
 )

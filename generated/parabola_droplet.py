@@ -1,5 +1,5 @@
 # Made by gqm-gen for "parabola_droplet". Do not edit: change its declaration and generate again.
-# interface 10, input 016fa3c6503a, body f821cee43a4d
+# interface 10, input 016fa3c6503a, body 5f2ecea6699d
 """Droplet in a parabolic channel
 
 x              = x
@@ -31,7 +31,7 @@ compiled = compiler(__file__, interface=10)
 
 from gqm_sym.runtime.vocabulary import (
     BOUNDS, EFFECTIVE_POTENTIAL, PATH_AND_CONTACT_FORCE, SPEED_EQUATION, STATIC_BALANCE, CompiledFunctions,
-    CompiledModel, DissipativeFunctions, LaunchRequest, Pass1, iadd, iconst, imul, ipow, isqrt,
+    CompiledModel, DissipativeFunctions, ExactLaw, LaunchRequest, Pass1, iadd, iconst, imul, ipow, isqrt,
 )
 
 if TYPE_CHECKING:
@@ -119,6 +119,37 @@ def bounds(lo, hi, p, out):
 
 
 # The same formulas over a namespace of operations, for extended precision.
+
+def exact_x(op, x, p):
+    """Horizontal coordinate."""
+    return x
+
+def exact_z(op, x, p):
+    """Height."""
+    a = p[0]
+    return a*x**2
+
+def exact_ds(op, x, p):
+    """ds/dx."""
+    a = p[0]
+    return op.sqrt(4*a**2*x**2 + 1)
+
+def exact_kappa(op, x, p):
+    """Signed curvature (paper, eq. 8)."""
+    a = p[0]
+    return 2*a/(4*a**2*x**2 + 1)**(op.mpf(3)/2)
+
+def exact_static_normal_load(op, x, p):
+    """n0 = N/m of a body at rest, so that N = m*(kappa*V**2 + n0) (paper, eq. 15)."""
+    a, g = p[0], p[3]
+    return g/op.sqrt(4*a**2*x**2 + 1)
+
+def exact_speed_slope(op, x, w, v, nu, p):
+    """dV**2/dx where V**2 = w, v = sgn(ds/dt) and nu = sgn(N) (paper, eq. 19)."""
+    a, gamma, ell_c, g, m = p[0], p[1], p[2], p[3], p[4]
+    _t0 = 4*a**2*x**2 + 1
+    _t1 = op.sqrt(_t0)
+    return 2*_t1*(-2*a*g*x/_t1 - 2*ell_c**2*gamma*v*abs(a)/(_t0**(op.mpf(3)/2)*m))
 
 def exact_domain(op, p):
     """Both ends of the domain, and the period; None where there is none."""
@@ -235,4 +266,7 @@ MODEL = CompiledModel(
     effective_potential=effective_potential, bounds=bounds,
     domain_of=exact_domain,
     dissipation=DissipativeFunctions(speed_equation, static_balance, friction=False, kinked=True, linear=True),
+    exact=ExactLaw(
+        exact_x, exact_z, exact_ds, exact_kappa, exact_static_normal_load, exact_speed_slope,
+    ),
 )

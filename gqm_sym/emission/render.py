@@ -42,7 +42,7 @@ _OWN = frozenset(
         *("Motion", "PARAMETERS", "Sweep", "TYPE_CHECKING", "carray", "chart", "chart_of", "compiled"),
         *("compiler", "fabs"),
         *("op", "pass1", "place_from_ends", "range", "self", "solve", "sweep"),
-        *("Equilibrium", "SeparatedTerms", "between", "equilibria", "unknown"),
+        *("Equilibrium", "ExactLaw", "SeparatedTerms", "between", "equilibria", "unknown"),
     }
 )
 
@@ -174,12 +174,14 @@ def _separated(terms: SeparatedIR) -> str:
 
 
 def _exact_formulas(module: ModuleIR) -> list[str]:
-    """The formulas over a namespace that a conservative module hands over; empty where there are none."""
+    """The formulas over a namespace that a module hands over; empty where there are none."""
     return [function.name for function in module.exact if function.places]
 
 
 def _exact_class(module: ModuleIR) -> str:
     """The record that takes them."""
+    if module.dissipation:
+        return "ExactLaw"
     return "ExactPotential" if module.chart else "ExactFormulas"
 
 

@@ -79,9 +79,9 @@ def fit(module: ModuleType, data: Any, free: Mapping[str, Any], **fixed: Any) ->
     Notes
     -----
     Derivatives are those of ``motion.sensitivity`` and of sweeps with ``gradient``, which are exact to rounding, and
-    difference quotients of solved motions where these are not there yet. Without ``sigma`` all measurements have
-    the same unknown standard deviation, which is estimated from the residuals. First guesses for long series of
-    positions must be so near that the fitted motion does not slip by a swing.
+    difference quotients of solved motions where these are not there yet, as along curves without formulas. Without
+    ``sigma`` all measurements have the same unknown standard deviation, which is estimated from the residuals. First
+    guesses for long series of positions must be so near that the fitted motion does not slip by a swing.
     """
     from scipy.optimize import least_squares
 
@@ -227,8 +227,10 @@ class Residuals:
     def _derivatives(self, x: Array) -> Array:
         names, wrt = tuple(self.measured.values), self.free.names
         if self.measured.t is not None:
-            found = self.motion(x).sensitivity(self.measured.t, wrt=wrt)
-            return np.concatenate([getattr(found, name).T for name in names])
+            motion = self.motion(x)
+            t = _until_rest(motion, self.measured.t)
+            found, moves = motion.sensitivity(t, wrt=wrt), {"v": t == self.measured.t}
+            return np.concatenate([(getattr(found, name) * moves.get(name, 1.0)).T for name in names])
         if self.measured.place is not None:
             motion = self.motion(x)
             times = _passages(motion, self.measured.place)

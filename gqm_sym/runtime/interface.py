@@ -258,3 +258,18 @@ class ExactFormulas(NamedTuple):
     static_normal_load: Callable[..., Any]
     effective_potential: Callable[..., Any]
     effective_potential_slope: Callable[..., Any]
+
+
+class ExactLaw(NamedTuple):
+    """The formulas of a dissipative module: those of the path as of `ExactFormulas`, and the law of motion.
+
+    ``speed_slope`` is dW/dlam [m2/s2/[lam]] with W = V**2: ``f(op, lam, w, v, nu, p)`` with v = sgn(ds/dt), nu =
+    sgn(N).
+    """
+
+    x: Callable[..., Any]
+    z: Callable[..., Any]
+    ds: Callable[..., Any]
+    kappa: Callable[..., Any]
+    static_normal_load: Callable[..., Any]
+    speed_slope: Callable[..., Any]

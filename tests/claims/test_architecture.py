@@ -118,6 +118,7 @@ TESTED_THROUGH = {
     "legs/leg_record.py": "claims/test_dissipative.py",
     "legs/leg_run.py": "claims/test_dissipative.py",
     "legs/leg_segments.py": "runtime/legs/test_polynomials.py",
+    "legs/variations/equation.py": "runtime/legs/variations/test_answers.py",
     "model.py": "claims/test_reference.py",
     "motion/conditioning.py": "claims/test_degenerate.py",
     "motion/motion.py": "claims/test_reference.py",

@@ -272,7 +272,7 @@ def test_the_law_can_be_read_in_the_module() -> None:
         "V**2: spectral antiderivative, no elementary form found",
     ):
         assert line in text
-    for word in ("DIVDIFF", "place_from_ends", "intervals", "ExactFormulas", "exact_x"):
+    for word in ("DIVDIFF", "place_from_ends", "intervals", "ExactFormulas", "exact_effective_potential"):
         assert word not in text
 
 

@@ -21,6 +21,7 @@ from gqm_sym.runtime.interface import (
     CompiledFunctions,
     DissipativeFunctions,
     ExactFormulas,
+    ExactLaw,
     ExactPotential,
     SeparatedTerms,
 )
@@ -112,7 +113,7 @@ class Formulas:
     monotone : bool
         Whether it is proved that V**2 rises or falls all the way between two neighbouring axes, and that ds vanishes
         nowhere.
-    exact : ExactFormulas, ExactPotential or None
+    exact : ExactFormulas, ExactPotential, ExactLaw or None
         The formulas over a namespace of operations; those of the forces only for a charted curve.
     chart : ChartMaker or None
         What makes the chart of a curve that has no formulas.
@@ -146,7 +147,7 @@ class Formulas:
     domain_of: Callable[..., Any] | None = None
     axes_of: Callable[..., Any] | None = None
     monotone: bool = False
-    exact: ExactFormulas | ExactPotential | None = None
+    exact: ExactFormulas | ExactLaw | ExactPotential | None = None
     chart: ChartMaker | None = None
     dissipation: DissipativeFunctions | None = None
     load_map: Later | None = None

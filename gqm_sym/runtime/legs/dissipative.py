@@ -12,6 +12,8 @@ from gqm_sym.errors import BudgetError, InputError, SolutionError
 from gqm_sym.runtime.arithmetic.doubledouble import ULP, ZERO, Pair
 from gqm_sym.runtime.compiled.threads import run_in_threads
 from gqm_sym.runtime.compiled.types import Array
+from gqm_sym.runtime.gradients.quantities import selected
+from gqm_sym.runtime.gradients.sensitivity import Sensitivity
 from gqm_sym.runtime.interface import Dissipation
 from gqm_sym.runtime.inversion.leg_tables import places_along_legs, states_along_legs
 from gqm_sym.runtime.launch.ends import CUSP_SHARE, domain_end, leaving_at_once, starting_step
@@ -60,6 +62,8 @@ from gqm_sym.runtime.legs.leg_record import (
 )
 from gqm_sym.runtime.legs.leg_run import ASYMPTOTE, FULL, LIFTOFF, LIMIT, NARROWED, PAUSED, SPENT, TURN
 from gqm_sym.runtime.legs.leg_segments import Run, TabulatedPiece, along_field, along_panels, leg_record, tabulated
+from gqm_sym.runtime.legs.variations.answers import gradient, states_at
+from gqm_sym.runtime.legs.variations.changes import Changes
 from gqm_sym.runtime.motion.aperiodic import MotionAtRest
 from gqm_sym.runtime.motion.events import Leg, passages
 from gqm_sym.runtime.motion.locking import locked
@@ -169,6 +173,7 @@ class DissipativeMotion(Motion):
     _last_swing = 0.0
     _arc = 0.0
     _whole: Trajectory | None = None
+    _known_changes: Changes | None = None
     _reading = Reading(np.empty(0), -1.0)
     # How many runs `_look_ahead` computes of a motion that it finds no end of; 0 while that is not known.
     _beginning = 0
@@ -316,6 +321,34 @@ class DissipativeMotion(Motion):
         with suppress(SolutionError, BudgetError):  # it is raised when that is asked for
             while len(self._pieces) < enough and not self._ending and self._elapsed < self._horizon:
                 self._go_on()
+
+    @locked
+    def gradient(self, quantity: str, wrt: Any = None) -> dict[str, Any]:
+        """The derivatives of a quantity of this motion by names; see `Motion.gradient`."""
+        rows = selected(self.problem.formulas.parameters, wrt)
+        self._look_ahead()
+        found = gradient(self, self._changes, quantity)
+        return {
+            name: tuple(found[row].tolist()) if found.ndim == 2 else float(found[row]) for name, row in rows.items()
+        }
+
+    @locked
+    def sensitivity(self, t: Any, wrt: Any = None) -> Sensitivity:
+        """The derivatives of the state at given times; see `Motion.sensitivity`."""
+        rows = selected(self.problem.formulas.parameters, wrt)
+        times, low, shape = self._times(t)
+        self._trajectory(float(times.max(initial=0.0)))
+        found = states_at(self, self._changes, times, low)
+        fields = (getattr(found, name) for name in Sensitivity._fields[1:])
+        return Sensitivity(tuple(rows), *(field[list(rows.values())].reshape(len(rows), *shape) for field in fields))
+
+    @property
+    def _changes(self) -> Changes:
+        """How the legs so far change."""
+        pieces = self._pieces
+        if self._known_changes is None or len(self._known_changes.runs) < pieces[-1].leg + 1:
+            self._known_changes = Changes(self.problem, self._laid)
+        return self._known_changes
 
     def fill_launch_leg(self, places: Array, v2: Array) -> None:
         """Fill in V**2 at the places that lie on the launch leg."""

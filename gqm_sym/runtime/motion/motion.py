@@ -153,15 +153,15 @@ class Motion(ABC):
         Parameters
         ----------
         quantity : str
-            "half_period", "period", "turning_points", "v_max", "v_min", "normal_force_max", "normal_force_min" or
-            "action".
+            "turning_points", "v_max", "v_min", "normal_force_max" or "normal_force_min"; of a periodic motion also
+            "half_period", "period" or "action", and of one with losses "t_end" or "rest_position".
         wrt : str or sequence of str, optional
             What the derivatives are by: run-time parameters, "lam0" and "v0"; all of them if not given.
 
         Returns
         -------
         dict
-            A float for each name; of turning points a pair, in the order of `turning_points`. At ``v0 = 0`` the
+            A float for each name; of turning points a tuple, in the order of `turning_points`. At ``v0 = 0`` the
             derivative by v0 is that for greater speeds.
 
         Raises
@@ -176,7 +176,8 @@ class Motion(ABC):
     def sensitivity(self, t: Any, wrt: Any = None) -> Sensitivity:
         """The derivatives of the state at given times by launch and run-time parameters.
 
-        They are as exact, and take as long, after a million periods as after one.
+        Of a periodic motion they are as exact, and take as long, after a million periods as after one. With losses they
+        are carried from leg to leg.
 
         Parameters
         ----------
@@ -243,7 +244,8 @@ class Motion(ABC):
     def _without_gradients(self) -> SolutionError:
         """What is raised by motions without gradients."""
         return SolutionError(
-            f"gradients: only librations and circulations have them yet; this motion is of kind {self.kind!r}"
+            "gradients: only librations, circulations and motions with losses have them yet; "
+            f"this motion is of kind {self.kind!r}"
         )
 
     # -- accuracy -----------------------------------------------------------------------------

@@ -242,12 +242,13 @@ def test_what_has_no_gradient(
 
 
 def test_motions_without_gradients_yet() -> None:
-    """Curves without formulas, and motions with losses."""
+    """Curves without formulas, the action of motions with losses, and bodies at rest."""
     with pytest.raises(SolutionError, match="gradients: curves without formulas"):
         generated("superellipse").solve(lam0=0.5).gradient("period")
     with pytest.raises(SolutionError, match="gradients: curves without formulas"):
         generated("superellipse").solve(lam0=0.5).sensitivity(1.0)
     damped = generated("circle_drag").solve(lam0=1.0, t_max=3)
-    for ask in (lambda: damped.gradient("v_max"), lambda: damped.sensitivity(1.0), lambda: damped.action):
-        with pytest.raises(SolutionError, match="kind 'dissipative'"):
+    resting = generated("circle_drag").solve(lam0=0.0)
+    for ask, kind in ((lambda: damped.action, "dissipative"), (lambda: resting.sensitivity(1.0), "rest")):
+        with pytest.raises(SolutionError, match=f"kind '{kind}'"):
             ask()
