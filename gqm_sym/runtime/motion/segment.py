@@ -43,6 +43,9 @@ MIN_TIMED_WIDTH_SHARE = 2.0**-10
 # (`Segment._end_errors`); 0.6 was the most that was measured.
 MAX_END_ROUNDINGS = 2.0
 
+# The largest slope of lam(phi), in widths, by the kind of the segment; approaches to an equilibrium have none.
+MAX_SLOPES = (0.5, 2.0, 1.0)
+
 # The distance from a turning point, as a share of the width, within which offsets are computed from the exact one.
 NEAR_TURN = 1e-3
 
@@ -261,8 +264,7 @@ class Segment:
         if self.kind == TO_EQUILIBRIUM:
             near_equilibrium: Array = width * np.exp(-phi) * (errors + 3.0 * ULP * np.maximum(phi, 1.0))
             return near_equilibrium
-        max_slope = {TURN_TURN: 0.5, FROM_TURN: 2.0, REGULAR: 1.0}[self.kind]  # of lam(phi), in widths
-        bounded: Array = width * (max_slope * errors + 3.0 * ULP)
+        bounded: Array = width * (MAX_SLOPES[self.kind] * errors + 3.0 * ULP)
         if self.kind == REGULAR or self.from_multiprecision:
             return bounded
         at_a, at_b = self._end_errors()
