@@ -1,5 +1,5 @@
 # Made by gqm-gen for "catenary". Do not edit: change its declaration and generate again.
-# interface 9, input 2558bd3a8d44, body c80404480889
+# interface 10, input 2558bd3a8d44, body ea1a768d6c18
 """Bead on a hanging chain
 
 x              = x
@@ -25,12 +25,12 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=9)
+compiled = compiler(__file__, interface=10)
 
 from gqm_sym.runtime.vocabulary import (
     BOUNDS, BOUNDS_BATCH, EFFECTIVE_POTENTIAL, INTEGRAND_INVARIANTS_BATCH, LOAD_MAP, PATH_AND_CONTACT_FORCE,
     POTENTIAL_DIVDIFF1, POTENTIAL_DIVDIFF1_BATCH, POTENTIAL_DIVDIFF2, POTENTIAL_DIVDIFF2_BATCH, TIME_INTEGRAND_BATCH,
-    TURNING_POINT_BATCH, Addresses, BatchFunctions, CompiledModel, ExactFormulas, LaunchRequest, Pass1, cosh,
+    TURNING_POINT_BATCH, BatchFunctions, CompiledFunctions, CompiledModel, ExactFormulas, LaunchRequest, Pass1, cosh,
     divdiff1_cosh, divdiff2_cosh, divdiff2_cosh_near, iconst, icosh, idiv, imul, isinh, place_from_ends, sinh,
     speed_squared_from_potential,
 )
@@ -38,6 +38,7 @@ from gqm_sym.runtime.vocabulary import (
 if TYPE_CHECKING:
     from gqm_sym.runtime import Equilibrium, Motion, Sweep
 
+# The run-time parameters and their defaults; pass1, solve, sweep and equilibria take them by keyword.
 PARAMETERS = {'c': '0.8', 'g': '9.81', 'm': '1'}
 
 
@@ -165,8 +166,6 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = 
         Launch place, speed and direction (+1 or -1: the sign of ds/dt).
     out : Pass1, optional
         The result of a call before, or six arrays like it, to be filled again.
-    c, g, m
-        Run-time parameters; `PARAMETERS` holds their defaults.
 
     Returns
     -------
@@ -177,15 +176,8 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = 
 
 
 def solve(
-    lam0: Any = None,
-    v0: Any = 0.0,
-    direction: int = 1,
-    *,
-    point: Any = None,
-    t_max: Any = None,
-    contact: str = "bilateral",
-    c: Any = '0.8', g: Any = '9.81', m: Any = '1',
-    **unknown: Any,
+    lam0: Any = None, v0: Any = 0.0, direction: int = 1, *, point: Any = None, t_max: Any = None,
+    contact: str = "bilateral", c: Any = '0.8', g: Any = '9.81', m: Any = '1', **unknown: Any,
 ) -> "Motion":
     """The motion that a launch begins (Passes 1 to 3).
 
@@ -199,8 +191,6 @@ def solve(
         Horizon of time.
     contact : {"bilateral", "above", "below"}
         Which side of the track can push.
-    c, g, m
-        Run-time parameters; `PARAMETERS` holds their defaults.
 
     Returns
     -------
@@ -215,17 +205,8 @@ def solve(
 
 
 def sweep(
-    quantity: str,
-    lam0: Any,
-    v0: Any = 0.0,
-    direction: Any = 1,
-    *,
-    lam: Any = None,
-    t_max: Any = None,
-    contact: str = "bilateral",
-    gradient: Any = None,
-    client: Any = None,
-    c: Any = '0.8', g: Any = '9.81', m: Any = '1',
+    quantity: str, lam0: Any, v0: Any = 0.0, direction: Any = 1, *, lam: Any = None, t_max: Any = None,
+    contact: str = "bilateral", gradient: Any = None, client: Any = None, c: Any = '0.8', g: Any = '9.81', m: Any = '1',
     **unknown: Any,
 ) -> "Sweep":
     """One quantity over arrays of launches and parameters, on all cores; all arguments broadcast.
@@ -242,11 +223,9 @@ def sweep(
     t_max, contact
         One for all launches, as of ``solve``.
     gradient : str or sequence of str, optional
-        What derivatives of half periods or periods are by: run-time parameters, "lam0" and "v0".
+        What derivatives of the quantity are by: run-time parameters, "lam0" and "v0".
     client : distributed.Client, optional
         A Dask cluster to do the work, with the same results.
-    c, g, m
-        Run-time parameters; `PARAMETERS` holds their defaults.
 
     Returns
     -------
@@ -265,8 +244,6 @@ def equilibria(*, between: Any = None, c: Any = '0.8', g: Any = '9.81', m: Any =
     ----------
     between : pair of numbers, optional
         The range of x to look in: the whole domain, or one period, if not given.
-    c, g, m
-        Run-time parameters; `PARAMETERS` holds their defaults.
 
     Returns
     -------
@@ -279,7 +256,7 @@ def equilibria(*, between: Any = None, c: Any = '0.8', g: Any = '9.81', m: Any =
 # ---- The same formulas once more, only for speed: a load map in one call, and many orbits at once for sweeps. ----
 
 
-@compiled(LOAD_MAP, later=True)
+@compiled(LOAD_MAP)
 def load_map(n, w0, level, places, p, out):
     """x, z, ds/dx, kappa, V**2 = w0 - 2*(U - level), N (paper, eqs. 8, 13, 15), size of U's terms."""
     places, p, out = carray(places, n), carray(p, 3), carray(out, (7, n))
@@ -302,7 +279,7 @@ def load_map(n, w0, level, places, p, out):
         out[6, i] = _c0*_c1*_t1
 
 
-@compiled(POTENTIAL_DIVDIFF1_BATCH, later=True)
+@compiled(POTENTIAL_DIVDIFF1_BATCH)
 def potential_divdiff1_batch(n, starts, places, offsets, p, out):
     """U[a, x], ds/dx and dU/dx."""
     starts, places, offsets, p, out = carray(starts, n), carray(places, n), carray(offsets, n), carray(p, (3, n)), carray(out, (3, n))
@@ -315,7 +292,7 @@ def potential_divdiff1_batch(n, starts, places, offsets, p, out):
         out[2, i] = g*sinh(_t1)
 
 
-@compiled(POTENTIAL_DIVDIFF2_BATCH, later=True)
+@compiled(POTENTIAL_DIVDIFF2_BATCH)
 def potential_divdiff2_batch(n, lows, highs, left, right, p, out):
     """U[a, x, b] and ds/dx; NaN where the points lie too far apart for the closed form."""
     lows, highs, left, right, p, out = carray(lows, n), carray(highs, n), carray(left, n), carray(right, n), carray(p, (3, n)), carray(out, (2, n))
@@ -328,7 +305,7 @@ def potential_divdiff2_batch(n, lows, highs, left, right, p, out):
         out[1, i] = cosh(_t1)
 
 
-@compiled(TIME_INTEGRAND_BATCH, later=True)
+@compiled(TIME_INTEGRAND_BATCH)
 def time_integrand_batch(n, sine2, cosine2, p, out):
     """(dt/du)**2 at sine2 = sin(u)**2, and its divisor; dt/du integrates to the half period (paper, eq. 17)."""
     p, out = carray(p, (7, n)), carray(out, (2, n))
@@ -340,7 +317,7 @@ def time_integrand_batch(n, sine2, cosine2, p, out):
         out[1, i] = 4*_t0*c*g
 
 
-@compiled(INTEGRAND_INVARIANTS_BATCH, later=True)
+@compiled(INTEGRAND_INVARIANTS_BATCH)
 def integrand_invariants_batch(n, halves, p, out):
     """Terms that are constant along an orbit: ``time_integrand_batch`` reads them behind the parameters."""
     halves, p, out = carray(halves, n), carray(p, (3, n)), carray(out, (4, n))
@@ -357,7 +334,7 @@ def integrand_invariants_batch(n, halves, p, out):
         out[3, i] = _t4
 
 
-@compiled(TURNING_POINT_BATCH, later=True)
+@compiled(TURNING_POINT_BATCH)
 def turning_point_batch(n, offsets, launches, p, out):
     """From V**2 at an offset: half the orbit's width (paper, eq. 14), -dV**2/dq, and a sine's square q at the turn."""
     offsets, launches, p, out = carray(offsets, n), carray(launches, n), carray(p, (3, n)), carray(out, (3, n))
@@ -369,7 +346,7 @@ def turning_point_batch(n, offsets, launches, p, out):
         out[2, i] = 0
 
 
-@compiled(BOUNDS_BATCH, later=True)
+@compiled(BOUNDS_BATCH)
 def bounds_batch(n, lo, hi, p, out):
     """Bounds of dU/dx and ds/dx for lo <= x <= hi."""
     lo, hi, p, out = carray(lo, n), carray(hi, n), carray(p, (3, n)), carray(out, (4, n))
@@ -385,9 +362,8 @@ MODEL = CompiledModel(
     name='catenary', parameter='x', parameters=PARAMETERS, positive=('c',),
     source=__file__,
     units={'c': 'm', 'g': 'm/s**2', 'm': 'kg', 'x': 'm'},
-    addresses=Addresses(
-        path_and_contact_force.address, effective_potential.address, potential_divdiff1.address,
-        potential_divdiff2.address, bounds.address,
+    functions=CompiledFunctions(
+        path_and_contact_force, effective_potential, potential_divdiff1, potential_divdiff2, bounds,
     ),
     load_map=load_map,
     batch=BatchFunctions(

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "circle_droplet". Do not edit: change its declaration and generate again.
-# interface 9, input 38113942f710, body e2c9dc8caed7
+# interface 10, input 38113942f710, body 6350811b7703
 """Droplet in a round channel
 
 x              = L*sin(theta)
@@ -26,16 +26,17 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=9)
+compiled = compiler(__file__, interface=10)
 
 from gqm_sym.runtime.vocabulary import (
-    BOUNDS, EFFECTIVE_POTENTIAL, PATH_AND_CONTACT_FORCE, SPEED_EQUATION, STATIC_BALANCE, Addresses, CompiledModel,
-    Dissipation, LaunchRequest, Pass1, cos, imul, isin, sin,
+    BOUNDS, EFFECTIVE_POTENTIAL, PATH_AND_CONTACT_FORCE, SPEED_EQUATION, STATIC_BALANCE, CompiledFunctions,
+    CompiledModel, DissipativeFunctions, ExactLaw, LaunchRequest, Pass1, cos, imul, isin, sin,
 )
 
 if TYPE_CHECKING:
     from gqm_sym.runtime import Equilibrium, Motion, Sweep
 
+# The run-time parameters and their defaults; pass1, solve, sweep and equilibria take them by keyword.
 PARAMETERS = {'L': '0.02', 'gamma': '0.072', 'ell_c': '0.0004', 'g': '9.81', 'm': '5e-6'}
 
 
@@ -86,7 +87,7 @@ def static_balance(n, places, p, out):
         out[1, i] = ell_c**2*gamma*kappa/m + push
 
 
-@compiled(EFFECTIVE_POTENTIAL, later=True)
+@compiled(EFFECTIVE_POTENTIAL)
 def effective_potential(n, places, p, out):
     """U per unit mass, V**2 = v0**2 - 2*(U(theta) - U(lam0)), and dU/dtheta (paper, eq. 13)."""
     places, p, out = carray(places, n), carray(p, 5), carray(out, (2, n))
@@ -98,7 +99,7 @@ def effective_potential(n, places, p, out):
         out[1, i] = _t0*sin(theta)
 
 
-@compiled(BOUNDS, later=True)
+@compiled(BOUNDS)
 def bounds(lo, hi, p, out):
     """Bounds of dU/dtheta and ds/dtheta for lo <= theta <= hi, by interval arithmetic."""
     p, out = carray(p, 5), carray(out, 4)
@@ -109,6 +110,36 @@ def bounds(lo, hi, p, out):
 
 
 # The same formulas over a namespace of operations, for extended precision.
+
+def exact_x(op, theta, p):
+    """Horizontal coordinate."""
+    L = p[0]
+    return L*op.sin(theta)
+
+def exact_z(op, theta, p):
+    """Height."""
+    L = p[0]
+    return -L*op.cos(theta)
+
+def exact_ds(op, theta, p):
+    """ds/dtheta."""
+    L = p[0]
+    return L
+
+def exact_kappa(op, theta, p):
+    """Signed curvature (paper, eq. 8)."""
+    L = p[0]
+    return 1/L
+
+def exact_static_normal_load(op, theta, p):
+    """n0 = N/m of a body at rest, so that N = m*(kappa*V**2 + n0) (paper, eq. 15)."""
+    g = p[3]
+    return g*op.cos(theta)
+
+def exact_speed_slope(op, theta, w, v, nu, p):
+    """dV**2/dtheta where V**2 = w, v = sgn(ds/dt) and nu = sgn(N) (paper, eq. 19)."""
+    L, gamma, ell_c, g, m = p[0], p[1], p[2], p[3], p[4]
+    return 2*L*(-g*op.sin(theta) - ell_c**2*gamma*v/(L*m))
 
 def exact_domain(op, p):
     """Both ends of the domain, and the period; None where there is none."""
@@ -126,8 +157,6 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = 
         Launch place, speed and direction (+1 or -1: the sign of ds/dt).
     out : Pass1, optional
         The result of a call before, or six arrays like it, to be filled again.
-    L, gamma, ell_c, g, m
-        Run-time parameters; `PARAMETERS` holds their defaults.
 
     Returns
     -------
@@ -138,15 +167,9 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = 
 
 
 def solve(
-    lam0: Any = None,
-    v0: Any = 0.0,
-    direction: int = 1,
-    *,
-    point: Any = None,
-    t_max: Any = None,
-    contact: str = "bilateral",
-    L: Any = '0.02', gamma: Any = '0.072', ell_c: Any = '0.0004', g: Any = '9.81', m: Any = '5e-6',
-    **unknown: Any,
+    lam0: Any = None, v0: Any = 0.0, direction: int = 1, *, point: Any = None, t_max: Any = None,
+    contact: str = "bilateral", L: Any = '0.02', gamma: Any = '0.072', ell_c: Any = '0.0004', g: Any = '9.81',
+    m: Any = '5e-6', **unknown: Any,
 ) -> "Motion":
     """The motion that a launch begins (Passes 1 to 3).
 
@@ -160,8 +183,6 @@ def solve(
         Horizon of time.
     contact : {"bilateral", "above", "below"}
         Which side of the track can push.
-    L, gamma, ell_c, g, m
-        Run-time parameters; `PARAMETERS` holds their defaults.
 
     Returns
     -------
@@ -176,18 +197,9 @@ def solve(
 
 
 def sweep(
-    quantity: str,
-    lam0: Any,
-    v0: Any = 0.0,
-    direction: Any = 1,
-    *,
-    lam: Any = None,
-    t_max: Any = None,
-    contact: str = "bilateral",
-    gradient: Any = None,
-    client: Any = None,
-    L: Any = '0.02', gamma: Any = '0.072', ell_c: Any = '0.0004', g: Any = '9.81', m: Any = '5e-6',
-    **unknown: Any,
+    quantity: str, lam0: Any, v0: Any = 0.0, direction: Any = 1, *, lam: Any = None, t_max: Any = None,
+    contact: str = "bilateral", gradient: Any = None, client: Any = None, L: Any = '0.02', gamma: Any = '0.072',
+    ell_c: Any = '0.0004', g: Any = '9.81', m: Any = '5e-6', **unknown: Any,
 ) -> "Sweep":
     """One quantity over arrays of launches and parameters, on all cores; all arguments broadcast.
 
@@ -203,11 +215,9 @@ def sweep(
     t_max, contact
         One for all launches, as of ``solve``.
     gradient : str or sequence of str, optional
-        What derivatives of half periods or periods are by: run-time parameters, "lam0" and "v0".
+        What derivatives of the quantity are by: run-time parameters, "lam0" and "v0".
     client : distributed.Client, optional
         A Dask cluster to do the work, with the same results.
-    L, gamma, ell_c, g, m
-        Run-time parameters; `PARAMETERS` holds their defaults.
 
     Returns
     -------
@@ -226,8 +236,6 @@ def equilibria(*, between: Any = None, L: Any = '0.02', gamma: Any = '0.072', el
     ----------
     between : pair of numbers, optional
         The range of theta to look in: the whole domain, or one period, if not given.
-    L, gamma, ell_c, g, m
-        Run-time parameters; `PARAMETERS` holds their defaults.
 
     Returns
     -------
@@ -242,10 +250,13 @@ MODEL = CompiledModel(
     source=__file__,
     units={'L': 'm', 'ell_c': 'm', 'g': 'm/s**2', 'gamma': 'N/m', 'm': 'kg', 'theta': '1'},
     at_least=(('gamma', '0'), ('ell_c', '0')),
-    addresses=Addresses(
-        path_and_contact_force.address,
+    functions=CompiledFunctions(
+        path_and_contact_force,
     ),
     effective_potential=effective_potential, bounds=bounds,
     domain_of=exact_domain,
-    dissipation=Dissipation(speed_equation.address, static_balance.address, friction=False, kinked=False, linear=True),
+    dissipation=DissipativeFunctions(speed_equation, static_balance, friction=False, kinked=False, linear=True),
+    exact=ExactLaw(
+        exact_x, exact_z, exact_ds, exact_kappa, exact_static_normal_load, exact_speed_slope,
+    ),
 )

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "circle_law". Do not edit: change its declaration and generate again.
-# interface 9, input 2718db879066, body e1f09a5ca75e
+# interface 10, input 2718db879066, body a4f918e31b3f
 """Pendulum in dense air
 
 x              = L*sin(theta)
@@ -26,16 +26,17 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=9)
+compiled = compiler(__file__, interface=10)
 
 from gqm_sym.runtime.vocabulary import (
-    BOUNDS, EFFECTIVE_POTENTIAL, PATH_AND_CONTACT_FORCE, SPEED_EQUATION, STATIC_BALANCE, Addresses, CompiledModel,
-    Dissipation, LaunchRequest, Pass1, cos, imul, isin, sin,
+    BOUNDS, EFFECTIVE_POTENTIAL, PATH_AND_CONTACT_FORCE, SPEED_EQUATION, STATIC_BALANCE, CompiledFunctions,
+    CompiledModel, DissipativeFunctions, ExactLaw, LaunchRequest, Pass1, cos, imul, isin, sin,
 )
 
 if TYPE_CHECKING:
     from gqm_sym.runtime import Equilibrium, Motion, Sweep
 
+# The run-time parameters and their defaults; pass1, solve, sweep and equilibria take them by keyword.
 PARAMETERS = {'L': '1', 'c1': '0.05', 'c2': '0.01', 'g': '9.81', 'm': '1'}
 
 
@@ -89,7 +90,7 @@ def static_balance(n, places, p, out):
         out[1, i] = push
 
 
-@compiled(EFFECTIVE_POTENTIAL, later=True)
+@compiled(EFFECTIVE_POTENTIAL)
 def effective_potential(n, places, p, out):
     """U per unit mass, V**2 = v0**2 - 2*(U(theta) - U(lam0)), and dU/dtheta (paper, eq. 13)."""
     places, p, out = carray(places, n), carray(p, 5), carray(out, (2, n))
@@ -101,7 +102,7 @@ def effective_potential(n, places, p, out):
         out[1, i] = _t0*sin(theta)
 
 
-@compiled(BOUNDS, later=True)
+@compiled(BOUNDS)
 def bounds(lo, hi, p, out):
     """Bounds of dU/dtheta and ds/dtheta for lo <= theta <= hi, by interval arithmetic."""
     p, out = carray(p, 5), carray(out, 4)
@@ -112,6 +113,36 @@ def bounds(lo, hi, p, out):
 
 
 # The same formulas over a namespace of operations, for extended precision.
+
+def exact_x(op, theta, p):
+    """Horizontal coordinate."""
+    L = p[0]
+    return L*op.sin(theta)
+
+def exact_z(op, theta, p):
+    """Height."""
+    L = p[0]
+    return -L*op.cos(theta)
+
+def exact_ds(op, theta, p):
+    """ds/dtheta."""
+    L = p[0]
+    return L
+
+def exact_kappa(op, theta, p):
+    """Signed curvature (paper, eq. 8)."""
+    L = p[0]
+    return 1/L
+
+def exact_static_normal_load(op, theta, p):
+    """n0 = N/m of a body at rest, so that N = m*(kappa*V**2 + n0) (paper, eq. 15)."""
+    g = p[3]
+    return g*op.cos(theta)
+
+def exact_speed_slope(op, theta, w, v, nu, p):
+    """dV**2/dtheta where V**2 = w, v = sgn(ds/dt) and nu = sgn(N) (paper, eq. 19)."""
+    L, c1, c2, g = p[0], p[1], p[2], p[3]
+    return 2*L*(-g*op.sin(theta) - v*w*(c1 + c2*w))
 
 def exact_domain(op, p):
     """Both ends of the domain, and the period; None where there is none."""
@@ -129,8 +160,6 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = 
         Launch place, speed and direction (+1 or -1: the sign of ds/dt).
     out : Pass1, optional
         The result of a call before, or six arrays like it, to be filled again.
-    L, c1, c2, g, m
-        Run-time parameters; `PARAMETERS` holds their defaults.
 
     Returns
     -------
@@ -141,14 +170,8 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = 
 
 
 def solve(
-    lam0: Any = None,
-    v0: Any = 0.0,
-    direction: int = 1,
-    *,
-    point: Any = None,
-    t_max: Any = None,
-    contact: str = "bilateral",
-    L: Any = '1', c1: Any = '0.05', c2: Any = '0.01', g: Any = '9.81', m: Any = '1',
+    lam0: Any = None, v0: Any = 0.0, direction: int = 1, *, point: Any = None, t_max: Any = None,
+    contact: str = "bilateral", L: Any = '1', c1: Any = '0.05', c2: Any = '0.01', g: Any = '9.81', m: Any = '1',
     **unknown: Any,
 ) -> "Motion":
     """The motion that a launch begins (Passes 1 to 3).
@@ -163,8 +186,6 @@ def solve(
         Horizon of time.
     contact : {"bilateral", "above", "below"}
         Which side of the track can push.
-    L, c1, c2, g, m
-        Run-time parameters; `PARAMETERS` holds their defaults.
 
     Returns
     -------
@@ -179,18 +200,9 @@ def solve(
 
 
 def sweep(
-    quantity: str,
-    lam0: Any,
-    v0: Any = 0.0,
-    direction: Any = 1,
-    *,
-    lam: Any = None,
-    t_max: Any = None,
-    contact: str = "bilateral",
-    gradient: Any = None,
-    client: Any = None,
-    L: Any = '1', c1: Any = '0.05', c2: Any = '0.01', g: Any = '9.81', m: Any = '1',
-    **unknown: Any,
+    quantity: str, lam0: Any, v0: Any = 0.0, direction: Any = 1, *, lam: Any = None, t_max: Any = None,
+    contact: str = "bilateral", gradient: Any = None, client: Any = None, L: Any = '1', c1: Any = '0.05',
+    c2: Any = '0.01', g: Any = '9.81', m: Any = '1', **unknown: Any,
 ) -> "Sweep":
     """One quantity over arrays of launches and parameters, on all cores; all arguments broadcast.
 
@@ -206,11 +218,9 @@ def sweep(
     t_max, contact
         One for all launches, as of ``solve``.
     gradient : str or sequence of str, optional
-        What derivatives of half periods or periods are by: run-time parameters, "lam0" and "v0".
+        What derivatives of the quantity are by: run-time parameters, "lam0" and "v0".
     client : distributed.Client, optional
         A Dask cluster to do the work, with the same results.
-    L, c1, c2, g, m
-        Run-time parameters; `PARAMETERS` holds their defaults.
 
     Returns
     -------
@@ -229,8 +239,6 @@ def equilibria(*, between: Any = None, L: Any = '1', c1: Any = '0.05', c2: Any =
     ----------
     between : pair of numbers, optional
         The range of theta to look in: the whole domain, or one period, if not given.
-    L, c1, c2, g, m
-        Run-time parameters; `PARAMETERS` holds their defaults.
 
     Returns
     -------
@@ -244,10 +252,13 @@ MODEL = CompiledModel(
     name='circle_law', parameter='theta', parameters=PARAMETERS, positive=('L',),
     source=__file__,
     units={'L': 'm', 'c1': '1/m', 'c2': 's**2/m**3', 'g': 'm/s**2', 'm': 'kg', 'theta': '1'},
-    addresses=Addresses(
-        path_and_contact_force.address,
+    functions=CompiledFunctions(
+        path_and_contact_force,
     ),
     effective_potential=effective_potential, bounds=bounds,
     domain_of=exact_domain,
-    dissipation=Dissipation(speed_equation.address, static_balance.address, friction=False, kinked=False, linear=False),
+    dissipation=DissipativeFunctions(speed_equation, static_balance, friction=False, kinked=False, linear=False),
+    exact=ExactLaw(
+        exact_x, exact_z, exact_ds, exact_kappa, exact_static_normal_load, exact_speed_slope,
+    ),
 )

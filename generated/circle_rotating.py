@@ -1,5 +1,5 @@
 # Made by gqm-gen for "circle_rotating". Do not edit: change its declaration and generate again.
-# interface 9, input a74aedd594f9, body 4c10b0a84544
+# interface 10, input a74aedd594f9, body f915e1e2075b
 """Bead on a hoop that turns about its vertical diameter
 
 x              = L*sin(theta)
@@ -26,12 +26,12 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=9)
+compiled = compiler(__file__, interface=10)
 
 from gqm_sym.runtime.vocabulary import (
     BOUNDS, BOUNDS_BATCH, EFFECTIVE_POTENTIAL, INTEGRAND_INVARIANTS_BATCH, LOAD_MAP, ORBIT_INVARIANTS_BATCH,
     PATH_AND_CONTACT_FORCE, POTENTIAL_DIVDIFF1, POTENTIAL_DIVDIFF1_BATCH, POTENTIAL_DIVDIFF2, POTENTIAL_DIVDIFF2_BATCH,
-    TIME_INTEGRAND_BATCH, Addresses, BatchFunctions, CompiledModel, ExactFormulas, LaunchRequest, Pass1, cos,
+    TIME_INTEGRAND_BATCH, BatchFunctions, CompiledFunctions, CompiledModel, ExactFormulas, LaunchRequest, Pass1, cos,
     divdiff1_cos, divdiff1_cos_in_square, divdiff1_sin, divdiff1_sinc_in_square, divdiff2_cos, divdiff2_sin, iadd,
     iconst, icos, imul, ipow, isin, place_from_ends, sin, sinc_near, speed_squared_from_potential,
 )
@@ -39,6 +39,7 @@ from gqm_sym.runtime.vocabulary import (
 if TYPE_CHECKING:
     from gqm_sym.runtime import Equilibrium, Motion, Sweep
 
+# The run-time parameters and their defaults; pass1, solve, sweep and equilibria take them by keyword.
 PARAMETERS = {'L': '1', 'Omega': '4', 'g': '9.81', 'm': '1'}
 
 
@@ -166,8 +167,6 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = 
         Launch place, speed and direction (+1 or -1: the sign of ds/dt).
     out : Pass1, optional
         The result of a call before, or six arrays like it, to be filled again.
-    L, Omega, g, m
-        Run-time parameters; `PARAMETERS` holds their defaults.
 
     Returns
     -------
@@ -178,15 +177,8 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = 
 
 
 def solve(
-    lam0: Any = None,
-    v0: Any = 0.0,
-    direction: int = 1,
-    *,
-    point: Any = None,
-    t_max: Any = None,
-    contact: str = "bilateral",
-    L: Any = '1', Omega: Any = '4', g: Any = '9.81', m: Any = '1',
-    **unknown: Any,
+    lam0: Any = None, v0: Any = 0.0, direction: int = 1, *, point: Any = None, t_max: Any = None,
+    contact: str = "bilateral", L: Any = '1', Omega: Any = '4', g: Any = '9.81', m: Any = '1', **unknown: Any,
 ) -> "Motion":
     """The motion that a launch begins (Passes 1 to 3).
 
@@ -200,8 +192,6 @@ def solve(
         Horizon of time.
     contact : {"bilateral", "above", "below"}
         Which side of the track can push.
-    L, Omega, g, m
-        Run-time parameters; `PARAMETERS` holds their defaults.
 
     Returns
     -------
@@ -216,18 +206,9 @@ def solve(
 
 
 def sweep(
-    quantity: str,
-    lam0: Any,
-    v0: Any = 0.0,
-    direction: Any = 1,
-    *,
-    lam: Any = None,
-    t_max: Any = None,
-    contact: str = "bilateral",
-    gradient: Any = None,
-    client: Any = None,
-    L: Any = '1', Omega: Any = '4', g: Any = '9.81', m: Any = '1',
-    **unknown: Any,
+    quantity: str, lam0: Any, v0: Any = 0.0, direction: Any = 1, *, lam: Any = None, t_max: Any = None,
+    contact: str = "bilateral", gradient: Any = None, client: Any = None, L: Any = '1', Omega: Any = '4',
+    g: Any = '9.81', m: Any = '1', **unknown: Any,
 ) -> "Sweep":
     """One quantity over arrays of launches and parameters, on all cores; all arguments broadcast.
 
@@ -243,11 +224,9 @@ def sweep(
     t_max, contact
         One for all launches, as of ``solve``.
     gradient : str or sequence of str, optional
-        What derivatives of half periods or periods are by: run-time parameters, "lam0" and "v0".
+        What derivatives of the quantity are by: run-time parameters, "lam0" and "v0".
     client : distributed.Client, optional
         A Dask cluster to do the work, with the same results.
-    L, Omega, g, m
-        Run-time parameters; `PARAMETERS` holds their defaults.
 
     Returns
     -------
@@ -266,8 +245,6 @@ def equilibria(*, between: Any = None, L: Any = '1', Omega: Any = '4', g: Any = 
     ----------
     between : pair of numbers, optional
         The range of theta to look in: the whole domain, or one period, if not given.
-    L, Omega, g, m
-        Run-time parameters; `PARAMETERS` holds their defaults.
 
     Returns
     -------
@@ -280,7 +257,7 @@ def equilibria(*, between: Any = None, L: Any = '1', Omega: Any = '4', g: Any = 
 # ---- The same formulas once more, only for speed: a load map in one call, and many orbits at once for sweeps. ----
 
 
-@compiled(LOAD_MAP, later=True)
+@compiled(LOAD_MAP)
 def load_map(n, w0, level, places, p, out):
     """x, z, ds/dtheta, kappa, V**2 = w0 - 2*(U - level), N (paper, eqs. 8, 13, 15), size of U's terms."""
     places, p, out = carray(places, n), carray(p, 4), carray(out, (7, n))
@@ -305,7 +282,7 @@ def load_map(n, w0, level, places, p, out):
         out[6, i] = _c0*(_c0*_t4/2 + _c1*fabs(_t1))
 
 
-@compiled(POTENTIAL_DIVDIFF1_BATCH, later=True)
+@compiled(POTENTIAL_DIVDIFF1_BATCH)
 def potential_divdiff1_batch(n, starts, places, offsets, p, out):
     """U[a, theta], ds/dtheta and dU/dtheta."""
     starts, places, offsets, p, out = carray(starts, n), carray(places, n), carray(offsets, n), carray(p, (4, n)), carray(out, (3, n))
@@ -318,7 +295,7 @@ def potential_divdiff1_batch(n, starts, places, offsets, p, out):
         out[2, i] = L*_t0*(-_t1*cos(theta) + g)
 
 
-@compiled(POTENTIAL_DIVDIFF2_BATCH, later=True)
+@compiled(POTENTIAL_DIVDIFF2_BATCH)
 def potential_divdiff2_batch(n, lows, highs, left, right, p, out):
     """U[a, theta, b] and ds/dtheta; NaN where the points lie too far apart for the closed form."""
     lows, highs, left, right, p, out = carray(lows, n), carray(highs, n), carray(left, n), carray(right, n), carray(p, (10, n)), carray(out, (2, n))
@@ -334,7 +311,7 @@ def potential_divdiff2_batch(n, lows, highs, left, right, p, out):
         out[1, i] = L
 
 
-@compiled(ORBIT_INVARIANTS_BATCH, later=True)
+@compiled(ORBIT_INVARIANTS_BATCH)
 def orbit_invariants_batch(n, lows, highs, p, out):
     """Terms that are constant along an orbit: ``potential_divdiff2_batch`` reads them behind the parameters."""
     lows, highs, p, out = carray(lows, n), carray(highs, n), carray(p, (4, n)), carray(out, (6, n))
@@ -351,7 +328,7 @@ def orbit_invariants_batch(n, lows, highs, p, out):
         out[5, i] = cos(_t2)
 
 
-@compiled(TIME_INTEGRAND_BATCH, later=True)
+@compiled(TIME_INTEGRAND_BATCH)
 def time_integrand_batch(n, sine2, cosine2, p, out):
     """(dt/du)**2 at sine2 = sin(u)**2, and its divisor; dt/du integrates to the half period (paper, eq. 17)."""
     p, out = carray(p, (8, n)), carray(out, (2, n))
@@ -368,7 +345,7 @@ def time_integrand_batch(n, sine2, cosine2, p, out):
         out[1, i] = -4*L*_t0*_t5/_t2
 
 
-@compiled(INTEGRAND_INVARIANTS_BATCH, later=True)
+@compiled(INTEGRAND_INVARIANTS_BATCH)
 def integrand_invariants_batch(n, halves, p, out):
     """Terms that are constant along an orbit: ``time_integrand_batch`` reads them behind the parameters."""
     halves, p, out = carray(halves, n), carray(p, (4, n)), carray(out, (4, n))
@@ -384,7 +361,7 @@ def integrand_invariants_batch(n, halves, p, out):
         out[3, i] = _t3
 
 
-@compiled(BOUNDS_BATCH, later=True)
+@compiled(BOUNDS_BATCH)
 def bounds_batch(n, lo, hi, p, out):
     """Bounds of dU/dtheta and ds/dtheta for lo <= theta <= hi."""
     lo, hi, p, out = carray(lo, n), carray(hi, n), carray(p, (4, n)), carray(out, (4, n))
@@ -399,9 +376,8 @@ MODEL = CompiledModel(
     name='circle_rotating', parameter='theta', parameters=PARAMETERS, positive=('L',),
     source=__file__,
     units={'L': 'm', 'Omega': '1/s', 'g': 'm/s**2', 'm': 'kg', 'theta': '1'},
-    addresses=Addresses(
-        path_and_contact_force.address, effective_potential.address, potential_divdiff1.address,
-        potential_divdiff2.address, bounds.address,
+    functions=CompiledFunctions(
+        path_and_contact_force, effective_potential, potential_divdiff1, potential_divdiff2, bounds,
     ),
     load_map=load_map,
     batch=BatchFunctions(

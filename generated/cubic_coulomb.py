@@ -1,5 +1,5 @@
 # Made by gqm-gen for "cubic_coulomb". Do not edit: change its declaration and generate again.
-# interface 9, input f472752dd3ba, body 3c5d3e61b58d
+# interface 10, input f472752dd3ba, body ba60a546dbf2
 """Cubic track with Coulomb friction
 
 x              = x
@@ -27,16 +27,17 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=9)
+compiled = compiler(__file__, interface=10)
 
 from gqm_sym.runtime.vocabulary import (
-    BOUNDS, EFFECTIVE_POTENTIAL, PATH_AND_CONTACT_FORCE, SPEED_EQUATION, STATIC_BALANCE, Addresses, CompiledModel,
-    Dissipation, LaunchRequest, Pass1, iadd, iconst, imul, ipow, isqrt,
+    BOUNDS, EFFECTIVE_POTENTIAL, PATH_AND_CONTACT_FORCE, SPEED_EQUATION, STATIC_BALANCE, CompiledFunctions,
+    CompiledModel, DissipativeFunctions, ExactLaw, LaunchRequest, Pass1, iadd, iconst, imul, ipow, isqrt,
 )
 
 if TYPE_CHECKING:
     from gqm_sym.runtime import Equilibrium, Motion, Sweep
 
+# The run-time parameters and their defaults; pass1, solve, sweep and equilibria take them by keyword.
 PARAMETERS = {'mu': '0.1', 'g': '9.81', 'm': '1'}
 
 
@@ -93,7 +94,7 @@ def static_balance(n, places, p, out):
         out[1, i] = mu*fabs(n0) + push
 
 
-@compiled(EFFECTIVE_POTENTIAL, later=True)
+@compiled(EFFECTIVE_POTENTIAL)
 def effective_potential(n, places, p, out):
     """U per unit mass, V**2 = v0**2 - 2*(U(x) - U(lam0)), and dU/dx (paper, eq. 13)."""
     places, p, out = carray(places, n), carray(p, 3), carray(out, (2, n))
@@ -104,7 +105,7 @@ def effective_potential(n, places, p, out):
         out[1, i] = 3*g*x**2
 
 
-@compiled(BOUNDS, later=True)
+@compiled(BOUNDS)
 def bounds(lo, hi, p, out):
     """Bounds of dU/dx and ds/dx for lo <= x <= hi, by interval arithmetic."""
     p, out = carray(p, 3), carray(out, 4)
@@ -115,6 +116,35 @@ def bounds(lo, hi, p, out):
 
 
 # The same formulas over a namespace of operations, for extended precision.
+
+def exact_x(op, x, p):
+    """Horizontal coordinate."""
+    return x
+
+def exact_z(op, x, p):
+    """Height."""
+    return x**3
+
+def exact_ds(op, x, p):
+    """ds/dx."""
+    return op.sqrt(9*x**4 + 1)
+
+def exact_kappa(op, x, p):
+    """Signed curvature (paper, eq. 8)."""
+    return 6*x/(9*x**4 + 1)**(op.mpf(3)/2)
+
+def exact_static_normal_load(op, x, p):
+    """n0 = N/m of a body at rest, so that N = m*(kappa*V**2 + n0) (paper, eq. 15)."""
+    g = p[1]
+    return g/op.sqrt(9*x**4 + 1)
+
+def exact_speed_slope(op, x, w, v, nu, p):
+    """dV**2/dx where V**2 = w, v = sgn(ds/dt) and nu = sgn(N) (paper, eq. 19)."""
+    mu, g = p[0], p[1]
+    _t0 = 9*x**4 + 1
+    _t1 = op.sqrt(_t0)
+    _t2 = g/_t1
+    return 2*_t1*(-3*_t2*x**2 - mu*nu*v*(_t2 + 6*w*x/_t0**(op.mpf(3)/2)))
 
 def exact_domain(op, p):
     """Both ends of the domain, and the period; None where there is none."""
@@ -132,8 +162,6 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = 
         Launch place, speed and direction (+1 or -1: the sign of ds/dt).
     out : Pass1, optional
         The result of a call before, or six arrays like it, to be filled again.
-    mu, g, m
-        Run-time parameters; `PARAMETERS` holds their defaults.
 
     Returns
     -------
@@ -144,15 +172,8 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = 
 
 
 def solve(
-    lam0: Any = None,
-    v0: Any = 0.0,
-    direction: int = 1,
-    *,
-    point: Any = None,
-    t_max: Any = None,
-    contact: str = "bilateral",
-    mu: Any = '0.1', g: Any = '9.81', m: Any = '1',
-    **unknown: Any,
+    lam0: Any = None, v0: Any = 0.0, direction: int = 1, *, point: Any = None, t_max: Any = None,
+    contact: str = "bilateral", mu: Any = '0.1', g: Any = '9.81', m: Any = '1', **unknown: Any,
 ) -> "Motion":
     """The motion that a launch begins (Passes 1 to 3).
 
@@ -166,8 +187,6 @@ def solve(
         Horizon of time.
     contact : {"bilateral", "above", "below"}
         Which side of the track can push.
-    mu, g, m
-        Run-time parameters; `PARAMETERS` holds their defaults.
 
     Returns
     -------
@@ -182,18 +201,9 @@ def solve(
 
 
 def sweep(
-    quantity: str,
-    lam0: Any,
-    v0: Any = 0.0,
-    direction: Any = 1,
-    *,
-    lam: Any = None,
-    t_max: Any = None,
-    contact: str = "bilateral",
-    gradient: Any = None,
-    client: Any = None,
-    mu: Any = '0.1', g: Any = '9.81', m: Any = '1',
-    **unknown: Any,
+    quantity: str, lam0: Any, v0: Any = 0.0, direction: Any = 1, *, lam: Any = None, t_max: Any = None,
+    contact: str = "bilateral", gradient: Any = None, client: Any = None, mu: Any = '0.1', g: Any = '9.81',
+    m: Any = '1', **unknown: Any,
 ) -> "Sweep":
     """One quantity over arrays of launches and parameters, on all cores; all arguments broadcast.
 
@@ -209,11 +219,9 @@ def sweep(
     t_max, contact
         One for all launches, as of ``solve``.
     gradient : str or sequence of str, optional
-        What derivatives of half periods or periods are by: run-time parameters, "lam0" and "v0".
+        What derivatives of the quantity are by: run-time parameters, "lam0" and "v0".
     client : distributed.Client, optional
         A Dask cluster to do the work, with the same results.
-    mu, g, m
-        Run-time parameters; `PARAMETERS` holds their defaults.
 
     Returns
     -------
@@ -232,8 +240,6 @@ def equilibria(*, between: Any = None, mu: Any = '0.1', g: Any = '9.81', m: Any 
     ----------
     between : pair of numbers, optional
         The range of x to look in: the whole domain, or one period, if not given.
-    mu, g, m
-        Run-time parameters; `PARAMETERS` holds their defaults.
 
     Returns
     -------
@@ -248,10 +254,13 @@ MODEL = CompiledModel(
     source=__file__,
     units={'g': 'm/s**2', 'm': 'kg', 'mu': '1', 'x': 'm'},
     at_least=(('mu', '0'),),
-    addresses=Addresses(
-        path_and_contact_force.address,
+    functions=CompiledFunctions(
+        path_and_contact_force,
     ),
     effective_potential=effective_potential, bounds=bounds,
     domain_of=exact_domain,
-    dissipation=Dissipation(speed_equation.address, static_balance.address, friction=True, kinked=False, linear=True),
+    dissipation=DissipativeFunctions(speed_equation, static_balance, friction=True, kinked=False, linear=True),
+    exact=ExactLaw(
+        exact_x, exact_z, exact_ds, exact_kappa, exact_static_normal_load, exact_speed_slope,
+    ),
 )

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "ellipse". Do not edit: change its declaration and generate again.
-# interface 9, input 81dc4ee20e82, body 29d535060172
+# interface 10, input 81dc4ee20e82, body 7925ffb6be42
 """Bead on an ellipse, by the eccentric angle
 
 x              = a*cos(theta)
@@ -25,19 +25,20 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=9)
+compiled = compiler(__file__, interface=10)
 
 from gqm_sym.runtime.vocabulary import (
     BOUNDS, BOUNDS_BATCH, EFFECTIVE_POTENTIAL, INTEGRAND_INVARIANTS_BATCH, LOAD_MAP, ORBIT_INVARIANTS_BATCH,
     PATH_AND_CONTACT_FORCE, POTENTIAL_DIVDIFF1, POTENTIAL_DIVDIFF1_BATCH, POTENTIAL_DIVDIFF2, POTENTIAL_DIVDIFF2_BATCH,
-    TIME_INTEGRAND_BATCH, TURNING_POINT_BATCH, Addresses, BatchFunctions, CompiledModel, ExactFormulas, LaunchRequest,
-    Pass1, atan, cos, divdiff1_cos_in_square, divdiff1_sin, divdiff1_sinc_in_square, divdiff2_sin, iadd, icos, imul,
-    ipow, isin, isqrt, place_from_ends, sin, sinc_near, speed_squared_from_potential,
+    TIME_INTEGRAND_BATCH, TURNING_POINT_BATCH, BatchFunctions, CompiledFunctions, CompiledModel, ExactFormulas,
+    LaunchRequest, Pass1, atan, cos, divdiff1_cos_in_square, divdiff1_sin, divdiff1_sinc_in_square, divdiff2_sin, iadd,
+    icos, imul, ipow, isin, isqrt, place_from_ends, sin, sinc_near, speed_squared_from_potential,
 )
 
 if TYPE_CHECKING:
     from gqm_sym.runtime import Equilibrium, Motion, Sweep
 
+# The run-time parameters and their defaults; pass1, solve, sweep and equilibria take them by keyword.
 PARAMETERS = {'a': '2', 'b': '1', 'g': '9.81', 'm': '1'}
 
 
@@ -164,8 +165,6 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = 
         Launch place, speed and direction (+1 or -1: the sign of ds/dt).
     out : Pass1, optional
         The result of a call before, or six arrays like it, to be filled again.
-    a, b, g, m
-        Run-time parameters; `PARAMETERS` holds their defaults.
 
     Returns
     -------
@@ -176,15 +175,8 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = 
 
 
 def solve(
-    lam0: Any = None,
-    v0: Any = 0.0,
-    direction: int = 1,
-    *,
-    point: Any = None,
-    t_max: Any = None,
-    contact: str = "bilateral",
-    a: Any = '2', b: Any = '1', g: Any = '9.81', m: Any = '1',
-    **unknown: Any,
+    lam0: Any = None, v0: Any = 0.0, direction: int = 1, *, point: Any = None, t_max: Any = None,
+    contact: str = "bilateral", a: Any = '2', b: Any = '1', g: Any = '9.81', m: Any = '1', **unknown: Any,
 ) -> "Motion":
     """The motion that a launch begins (Passes 1 to 3).
 
@@ -198,8 +190,6 @@ def solve(
         Horizon of time.
     contact : {"bilateral", "above", "below"}
         Which side of the track can push.
-    a, b, g, m
-        Run-time parameters; `PARAMETERS` holds their defaults.
 
     Returns
     -------
@@ -214,18 +204,9 @@ def solve(
 
 
 def sweep(
-    quantity: str,
-    lam0: Any,
-    v0: Any = 0.0,
-    direction: Any = 1,
-    *,
-    lam: Any = None,
-    t_max: Any = None,
-    contact: str = "bilateral",
-    gradient: Any = None,
-    client: Any = None,
-    a: Any = '2', b: Any = '1', g: Any = '9.81', m: Any = '1',
-    **unknown: Any,
+    quantity: str, lam0: Any, v0: Any = 0.0, direction: Any = 1, *, lam: Any = None, t_max: Any = None,
+    contact: str = "bilateral", gradient: Any = None, client: Any = None, a: Any = '2', b: Any = '1', g: Any = '9.81',
+    m: Any = '1', **unknown: Any,
 ) -> "Sweep":
     """One quantity over arrays of launches and parameters, on all cores; all arguments broadcast.
 
@@ -241,11 +222,9 @@ def sweep(
     t_max, contact
         One for all launches, as of ``solve``.
     gradient : str or sequence of str, optional
-        What derivatives of half periods or periods are by: run-time parameters, "lam0" and "v0".
+        What derivatives of the quantity are by: run-time parameters, "lam0" and "v0".
     client : distributed.Client, optional
         A Dask cluster to do the work, with the same results.
-    a, b, g, m
-        Run-time parameters; `PARAMETERS` holds their defaults.
 
     Returns
     -------
@@ -264,8 +243,6 @@ def equilibria(*, between: Any = None, a: Any = '2', b: Any = '1', g: Any = '9.8
     ----------
     between : pair of numbers, optional
         The range of theta to look in: the whole domain, or one period, if not given.
-    a, b, g, m
-        Run-time parameters; `PARAMETERS` holds their defaults.
 
     Returns
     -------
@@ -278,7 +255,7 @@ def equilibria(*, between: Any = None, a: Any = '2', b: Any = '1', g: Any = '9.8
 # ---- The same formulas once more, only for speed: a load map in one call, and many orbits at once for sweeps. ----
 
 
-@compiled(LOAD_MAP, later=True)
+@compiled(LOAD_MAP)
 def load_map(n, w0, level, places, p, out):
     """x, z, ds/dtheta, kappa, V**2 = w0 - 2*(U - level), N (paper, eqs. 8, 13, 15), size of U's terms."""
     places, p, out = carray(places, n), carray(p, 4), carray(out, (7, n))
@@ -303,7 +280,7 @@ def load_map(n, w0, level, places, p, out):
         out[6, i] = _c0*_c1*fabs(_t1)
 
 
-@compiled(POTENTIAL_DIVDIFF1_BATCH, later=True)
+@compiled(POTENTIAL_DIVDIFF1_BATCH)
 def potential_divdiff1_batch(n, starts, places, offsets, p, out):
     """U[a, theta], ds/dtheta and dU/dtheta."""
     starts, places, offsets, p, out = carray(starts, n), carray(places, n), carray(offsets, n), carray(p, (4, n)), carray(out, (3, n))
@@ -316,7 +293,7 @@ def potential_divdiff1_batch(n, starts, places, offsets, p, out):
         out[2, i] = _t0*_t1
 
 
-@compiled(POTENTIAL_DIVDIFF2_BATCH, later=True)
+@compiled(POTENTIAL_DIVDIFF2_BATCH)
 def potential_divdiff2_batch(n, lows, highs, left, right, p, out):
     """U[a, theta, b] and ds/dtheta; NaN where the points lie too far apart for the closed form."""
     lows, highs, left, right, p, out = carray(lows, n), carray(highs, n), carray(left, n), carray(right, n), carray(p, (8, n)), carray(out, (2, n))
@@ -333,7 +310,7 @@ def potential_divdiff2_batch(n, lows, highs, left, right, p, out):
         out[1, i] = sqrt(a**2*(_c1*_t4 + _c3*_t5)**2 + b**2*(-_c1*_t5 + _c3*_t4)**2)
 
 
-@compiled(ORBIT_INVARIANTS_BATCH, later=True)
+@compiled(ORBIT_INVARIANTS_BATCH)
 def orbit_invariants_batch(n, lows, highs, p, out):
     """Terms that are constant along an orbit: ``potential_divdiff2_batch`` reads them behind the parameters."""
     lows, highs, p, out = carray(lows, n), carray(highs, n), carray(p, (4, n)), carray(out, (4, n))
@@ -348,7 +325,7 @@ def orbit_invariants_batch(n, lows, highs, p, out):
         out[3, i] = cos(_t2)
 
 
-@compiled(TIME_INTEGRAND_BATCH, later=True)
+@compiled(TIME_INTEGRAND_BATCH)
 def time_integrand_batch(n, sine2, cosine2, p, out):
     """(dt/du)**2 at sine2 = sin(u)**2, and its divisor; dt/du integrates to the half period (paper, eq. 17)."""
     p, out = carray(p, (8, n)), carray(out, (2, n))
@@ -362,7 +339,7 @@ def time_integrand_batch(n, sine2, cosine2, p, out):
         out[1, i] = 4*_t0*b*g
 
 
-@compiled(INTEGRAND_INVARIANTS_BATCH, later=True)
+@compiled(INTEGRAND_INVARIANTS_BATCH)
 def integrand_invariants_batch(n, halves, p, out):
     """Terms that are constant along an orbit: ``time_integrand_batch`` reads them behind the parameters."""
     halves, p, out = carray(halves, n), carray(p, (4, n)), carray(out, (4, n))
@@ -379,7 +356,7 @@ def integrand_invariants_batch(n, halves, p, out):
         out[3, i] = _t4
 
 
-@compiled(TURNING_POINT_BATCH, later=True)
+@compiled(TURNING_POINT_BATCH)
 def turning_point_batch(n, offsets, launches, p, out):
     """From V**2 at an offset: half the orbit's width (paper, eq. 14), -dV**2/dq, and a sine's square q at the turn."""
     offsets, launches, p, out = carray(offsets, n), carray(launches, n), carray(p, (4, n)), carray(out, (3, n))
@@ -391,7 +368,7 @@ def turning_point_batch(n, offsets, launches, p, out):
         out[2, i] = _t0
 
 
-@compiled(BOUNDS_BATCH, later=True)
+@compiled(BOUNDS_BATCH)
 def bounds_batch(n, lo, hi, p, out):
     """Bounds of dU/dtheta and ds/dtheta for lo <= theta <= hi."""
     lo, hi, p, out = carray(lo, n), carray(hi, n), carray(p, (4, n)), carray(out, (4, n))
@@ -407,9 +384,8 @@ MODEL = CompiledModel(
     name='ellipse', parameter='theta', parameters=PARAMETERS, positive=('a', 'b'),
     source=__file__,
     units={'a': 'm', 'b': 'm', 'g': 'm/s**2', 'm': 'kg', 'theta': '1'},
-    addresses=Addresses(
-        path_and_contact_force.address, effective_potential.address, potential_divdiff1.address,
-        potential_divdiff2.address, bounds.address,
+    functions=CompiledFunctions(
+        path_and_contact_force, effective_potential, potential_divdiff1, potential_divdiff2, bounds,
     ),
     load_map=load_map,
     batch=BatchFunctions(

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "ellipse_drag". Do not edit: change its declaration and generate again.
-# interface 9, input f2717a5ad91f, body 64759453ac03
+# interface 10, input f2717a5ad91f, body c3e5821c7259
 """Bead on an ellipse, in air
 
 x              = a*cos(theta)
@@ -27,16 +27,17 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=9)
+compiled = compiler(__file__, interface=10)
 
 from gqm_sym.runtime.vocabulary import (
-    BOUNDS, EFFECTIVE_POTENTIAL, PATH_AND_CONTACT_FORCE, SPEED_EQUATION, STATIC_BALANCE, Addresses, CompiledModel,
-    Dissipation, LaunchRequest, Pass1, cos, iadd, icos, imul, ipow, isin, isqrt, sin,
+    BOUNDS, EFFECTIVE_POTENTIAL, PATH_AND_CONTACT_FORCE, SPEED_EQUATION, STATIC_BALANCE, CompiledFunctions,
+    CompiledModel, DissipativeFunctions, ExactLaw, LaunchRequest, Pass1, cos, iadd, icos, imul, ipow, isin, isqrt, sin,
 )
 
 if TYPE_CHECKING:
     from gqm_sym.runtime import Equilibrium, Motion, Sweep
 
+# The run-time parameters and their defaults; pass1, solve, sweep and equilibria take them by keyword.
 PARAMETERS = {'a': '1.5', 'b': '1', 'b_air': '0.3', 'g': '9.81', 'm': '2'}
 
 
@@ -94,7 +95,7 @@ def static_balance(n, places, p, out):
         out[1, i] = push
 
 
-@compiled(EFFECTIVE_POTENTIAL, later=True)
+@compiled(EFFECTIVE_POTENTIAL)
 def effective_potential(n, places, p, out):
     """U per unit mass, V**2 = v0**2 - 2*(U(theta) - U(lam0)), and dU/dtheta (paper, eq. 13)."""
     places, p, out = carray(places, n), carray(p, 5), carray(out, (2, n))
@@ -106,7 +107,7 @@ def effective_potential(n, places, p, out):
         out[1, i] = _t0*cos(theta)
 
 
-@compiled(BOUNDS, later=True)
+@compiled(BOUNDS)
 def bounds(lo, hi, p, out):
     """Bounds of dU/dtheta and ds/dtheta for lo <= theta <= hi, by interval arithmetic."""
     p, out = carray(p, 5), carray(out, 4)
@@ -118,6 +119,39 @@ def bounds(lo, hi, p, out):
 
 
 # The same formulas over a namespace of operations, for extended precision.
+
+def exact_x(op, theta, p):
+    """Horizontal coordinate."""
+    a = p[0]
+    return a*op.cos(theta)
+
+def exact_z(op, theta, p):
+    """Height."""
+    b = p[1]
+    return b*op.sin(theta)
+
+def exact_ds(op, theta, p):
+    """ds/dtheta."""
+    a, b = p[0], p[1]
+    return op.sqrt(a**2*op.sin(theta)**2 + b**2*op.cos(theta)**2)
+
+def exact_kappa(op, theta, p):
+    """Signed curvature (paper, eq. 8)."""
+    a, b = p[0], p[1]
+    return a*b/(a**2*op.sin(theta)**2 + b**2*op.cos(theta)**2)**(op.mpf(3)/2)
+
+def exact_static_normal_load(op, theta, p):
+    """n0 = N/m of a body at rest, so that N = m*(kappa*V**2 + n0) (paper, eq. 15)."""
+    a, b, g = p[0], p[1], p[3]
+    _t0 = op.sin(theta)
+    return -_t0*a*g/op.sqrt(_t0**2*a**2 + b**2*op.cos(theta)**2)
+
+def exact_speed_slope(op, theta, w, v, nu, p):
+    """dV**2/dtheta where V**2 = w, v = sgn(ds/dt) and nu = sgn(N) (paper, eq. 19)."""
+    a, b, b_air, g, m = p[0], p[1], p[2], p[3], p[4]
+    _t0 = op.cos(theta)
+    _t1 = op.sqrt(_t0**2*b**2 + a**2*op.sin(theta)**2)
+    return 2*_t1*(-_t0*b*g/_t1 - b_air*v*w/m)
 
 def exact_domain(op, p):
     """Both ends of the domain, and the period; None where there is none."""
@@ -135,8 +169,6 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = 
         Launch place, speed and direction (+1 or -1: the sign of ds/dt).
     out : Pass1, optional
         The result of a call before, or six arrays like it, to be filled again.
-    a, b, b_air, g, m
-        Run-time parameters; `PARAMETERS` holds their defaults.
 
     Returns
     -------
@@ -147,14 +179,8 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = 
 
 
 def solve(
-    lam0: Any = None,
-    v0: Any = 0.0,
-    direction: int = 1,
-    *,
-    point: Any = None,
-    t_max: Any = None,
-    contact: str = "bilateral",
-    a: Any = '1.5', b: Any = '1', b_air: Any = '0.3', g: Any = '9.81', m: Any = '2',
+    lam0: Any = None, v0: Any = 0.0, direction: int = 1, *, point: Any = None, t_max: Any = None,
+    contact: str = "bilateral", a: Any = '1.5', b: Any = '1', b_air: Any = '0.3', g: Any = '9.81', m: Any = '2',
     **unknown: Any,
 ) -> "Motion":
     """The motion that a launch begins (Passes 1 to 3).
@@ -169,8 +195,6 @@ def solve(
         Horizon of time.
     contact : {"bilateral", "above", "below"}
         Which side of the track can push.
-    a, b, b_air, g, m
-        Run-time parameters; `PARAMETERS` holds their defaults.
 
     Returns
     -------
@@ -185,18 +209,9 @@ def solve(
 
 
 def sweep(
-    quantity: str,
-    lam0: Any,
-    v0: Any = 0.0,
-    direction: Any = 1,
-    *,
-    lam: Any = None,
-    t_max: Any = None,
-    contact: str = "bilateral",
-    gradient: Any = None,
-    client: Any = None,
-    a: Any = '1.5', b: Any = '1', b_air: Any = '0.3', g: Any = '9.81', m: Any = '2',
-    **unknown: Any,
+    quantity: str, lam0: Any, v0: Any = 0.0, direction: Any = 1, *, lam: Any = None, t_max: Any = None,
+    contact: str = "bilateral", gradient: Any = None, client: Any = None, a: Any = '1.5', b: Any = '1',
+    b_air: Any = '0.3', g: Any = '9.81', m: Any = '2', **unknown: Any,
 ) -> "Sweep":
     """One quantity over arrays of launches and parameters, on all cores; all arguments broadcast.
 
@@ -212,11 +227,9 @@ def sweep(
     t_max, contact
         One for all launches, as of ``solve``.
     gradient : str or sequence of str, optional
-        What derivatives of half periods or periods are by: run-time parameters, "lam0" and "v0".
+        What derivatives of the quantity are by: run-time parameters, "lam0" and "v0".
     client : distributed.Client, optional
         A Dask cluster to do the work, with the same results.
-    a, b, b_air, g, m
-        Run-time parameters; `PARAMETERS` holds their defaults.
 
     Returns
     -------
@@ -235,8 +248,6 @@ def equilibria(*, between: Any = None, a: Any = '1.5', b: Any = '1', b_air: Any 
     ----------
     between : pair of numbers, optional
         The range of theta to look in: the whole domain, or one period, if not given.
-    a, b, b_air, g, m
-        Run-time parameters; `PARAMETERS` holds their defaults.
 
     Returns
     -------
@@ -251,10 +262,13 @@ MODEL = CompiledModel(
     source=__file__,
     units={'a': 'm', 'b': 'm', 'b_air': 'kg/m', 'g': 'm/s**2', 'm': 'kg', 'theta': '1'},
     at_least=(('b_air', '0'),),
-    addresses=Addresses(
-        path_and_contact_force.address,
+    functions=CompiledFunctions(
+        path_and_contact_force,
     ),
     effective_potential=effective_potential, bounds=bounds,
     domain_of=exact_domain,
-    dissipation=Dissipation(speed_equation.address, static_balance.address, friction=False, kinked=False, linear=True),
+    dissipation=DissipativeFunctions(speed_equation, static_balance, friction=False, kinked=False, linear=True),
+    exact=ExactLaw(
+        exact_x, exact_z, exact_ds, exact_kappa, exact_static_normal_load, exact_speed_slope,
+    ),
 )

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "loop". Do not edit: change its declaration and generate again.
-# interface 9, input e5eeff356595, body 106f856c06e1
+# interface 10, input e5eeff356595, body c46e6dbcb7c7
 """Loop of a roller coaster
 
 x              = x(s)
@@ -24,17 +24,18 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=9)
+compiled = compiler(__file__, interface=10)
 
 from gqm_sym.runtime.vocabulary import (
     BOUNDS, EFFECTIVE_POTENTIAL, PATH_AND_CONTACT_FORCE, POTENTIAL_DIVDIFF1, POTENTIAL_DIVDIFF2, SEPARATED_TERMS,
-    Addresses, CompiledModel, ExactPotential, LaunchRequest, Pass1, Rail, SeparatedTerms, chart_of, chart_rows, cos,
-    divdiff1_chart_z, divdiff2_chart_z, ichart_alpha, iconst, imul, isin, place_from_ends, sin,
+    CompiledFunctions, CompiledModel, ExactPotential, LaunchRequest, Pass1, Rail, SeparatedTerms, chart_of, chart_rows,
+    cos, divdiff1_chart_z, divdiff2_chart_z, ichart_alpha, iconst, imul, isin, place_from_ends, sin,
 )
 
 if TYPE_CHECKING:
     from gqm_sym.runtime import Equilibrium, Motion, Sweep
 
+# The run-time parameters and their defaults; pass1, solve, sweep and equilibria take them by keyword.
 PARAMETERS = {'a': '2', 'c': '2', 'R': '1.5', 'g': '9.81', 'm': '1'}
 
 
@@ -137,8 +138,6 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = 
         Launch place, speed and direction (+1 or -1: the sign of ds/dt).
     out : Pass1, optional
         The result of a call before, or six arrays like it, to be filled again.
-    a, c, R, g, m
-        Run-time parameters; `PARAMETERS` holds their defaults.
 
     Returns
     -------
@@ -149,14 +148,8 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = 
 
 
 def solve(
-    lam0: Any = None,
-    v0: Any = 0.0,
-    direction: int = 1,
-    *,
-    point: Any = None,
-    t_max: Any = None,
-    contact: str = "bilateral",
-    a: Any = '2', c: Any = '2', R: Any = '1.5', g: Any = '9.81', m: Any = '1',
+    lam0: Any = None, v0: Any = 0.0, direction: int = 1, *, point: Any = None, t_max: Any = None,
+    contact: str = "bilateral", a: Any = '2', c: Any = '2', R: Any = '1.5', g: Any = '9.81', m: Any = '1',
     **unknown: Any,
 ) -> "Motion":
     """The motion that a launch begins (Passes 1 to 3).
@@ -171,8 +164,6 @@ def solve(
         Horizon of time.
     contact : {"bilateral", "above", "below"}
         Which side of the track can push.
-    a, c, R, g, m
-        Run-time parameters; `PARAMETERS` holds their defaults.
 
     Returns
     -------
@@ -187,18 +178,9 @@ def solve(
 
 
 def sweep(
-    quantity: str,
-    lam0: Any,
-    v0: Any = 0.0,
-    direction: Any = 1,
-    *,
-    lam: Any = None,
-    t_max: Any = None,
-    contact: str = "bilateral",
-    gradient: Any = None,
-    client: Any = None,
-    a: Any = '2', c: Any = '2', R: Any = '1.5', g: Any = '9.81', m: Any = '1',
-    **unknown: Any,
+    quantity: str, lam0: Any, v0: Any = 0.0, direction: Any = 1, *, lam: Any = None, t_max: Any = None,
+    contact: str = "bilateral", gradient: Any = None, client: Any = None, a: Any = '2', c: Any = '2', R: Any = '1.5',
+    g: Any = '9.81', m: Any = '1', **unknown: Any,
 ) -> "Sweep":
     """One quantity over arrays of launches and parameters, on all cores; all arguments broadcast.
 
@@ -214,11 +196,9 @@ def sweep(
     t_max, contact
         One for all launches, as of ``solve``.
     gradient : str or sequence of str, optional
-        What derivatives of half periods or periods are by: run-time parameters, "lam0" and "v0".
+        What derivatives of the quantity are by: run-time parameters, "lam0" and "v0".
     client : distributed.Client, optional
         A Dask cluster to do the work, with the same results.
-    a, c, R, g, m
-        Run-time parameters; `PARAMETERS` holds their defaults.
 
     Returns
     -------
@@ -237,8 +217,6 @@ def equilibria(*, between: Any = None, a: Any = '2', c: Any = '2', R: Any = '1.5
     ----------
     between : pair of numbers, optional
         The range of s to look in: the whole domain, or one period, if not given.
-    a, c, R, g, m
-        Run-time parameters; `PARAMETERS` holds their defaults.
 
     Returns
     -------
@@ -251,7 +229,7 @@ def equilibria(*, between: Any = None, a: Any = '2', c: Any = '2', R: Any = '1.5
 # ---- The same formulas once more, only for speed: a load map in one call, and many orbits at once for sweeps. ----
 
 
-@compiled(SEPARATED_TERMS, later=True)
+@compiled(SEPARATED_TERMS)
 def separated_terms(n, _a, places, offsets, p, out):
     """Parts of U[a, s] and of n0, whose factors are `exact_factors`; between them ds/ds and kappa."""
     chart = chart_of(p, 5)
@@ -277,9 +255,8 @@ MODEL = CompiledModel(
     name='loop', parameter='s', parameters=PARAMETERS, positive=(),
     source=__file__,
     units={'R': 'm', 'a': 'm', 'c': 'm', 'g': 'm/s**2', 'm': 'kg', 's': 'm'},
-    addresses=Addresses(
-        path_and_contact_force.address, effective_potential.address, potential_divdiff1.address,
-        potential_divdiff2.address, bounds.address,
+    functions=CompiledFunctions(
+        path_and_contact_force, effective_potential, potential_divdiff1, potential_divdiff2, bounds,
     ),
     chart=CHART,
     separated=SeparatedTerms(separated_terms, exact_factors, potentials=1, loads=1, held=(), parts=exact_parts),

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "parabola_droplet". Do not edit: change its declaration and generate again.
-# interface 9, input 016fa3c6503a, body ec71b1f713d6
+# interface 10, input 016fa3c6503a, body 26b6586f8b20
 """Droplet in a parabolic channel
 
 x              = x
@@ -27,16 +27,17 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=9)
+compiled = compiler(__file__, interface=10)
 
 from gqm_sym.runtime.vocabulary import (
-    BOUNDS, EFFECTIVE_POTENTIAL, PATH_AND_CONTACT_FORCE, SPEED_EQUATION, STATIC_BALANCE, Addresses, CompiledModel,
-    Dissipation, LaunchRequest, Pass1, iadd, iconst, imul, ipow, isqrt,
+    BOUNDS, EFFECTIVE_POTENTIAL, PATH_AND_CONTACT_FORCE, SPEED_EQUATION, STATIC_BALANCE, CompiledFunctions,
+    CompiledModel, DissipativeFunctions, ExactLaw, LaunchRequest, Pass1, iadd, iconst, imul, ipow, isqrt,
 )
 
 if TYPE_CHECKING:
     from gqm_sym.runtime import Equilibrium, Motion, Sweep
 
+# The run-time parameters and their defaults; pass1, solve, sweep and equilibria take them by keyword.
 PARAMETERS = {'a': '0.5', 'gamma': '0.5', 'ell_c': '1', 'g': '9.81', 'm': '1'}
 
 
@@ -95,7 +96,7 @@ def static_balance(n, places, p, out):
         out[1, i] = ell_c**2*gamma*fabs(kappa)/m + push
 
 
-@compiled(EFFECTIVE_POTENTIAL, later=True)
+@compiled(EFFECTIVE_POTENTIAL)
 def effective_potential(n, places, p, out):
     """U per unit mass, V**2 = v0**2 - 2*(U(x) - U(lam0)), and dU/dx (paper, eq. 13)."""
     places, p, out = carray(places, n), carray(p, 5), carray(out, (2, n))
@@ -107,7 +108,7 @@ def effective_potential(n, places, p, out):
         out[1, i] = 2*_t0*x
 
 
-@compiled(BOUNDS, later=True)
+@compiled(BOUNDS)
 def bounds(lo, hi, p, out):
     """Bounds of dU/dx and ds/dx for lo <= x <= hi, by interval arithmetic."""
     p, out = carray(p, 5), carray(out, 4)
@@ -118,6 +119,37 @@ def bounds(lo, hi, p, out):
 
 
 # The same formulas over a namespace of operations, for extended precision.
+
+def exact_x(op, x, p):
+    """Horizontal coordinate."""
+    return x
+
+def exact_z(op, x, p):
+    """Height."""
+    a = p[0]
+    return a*x**2
+
+def exact_ds(op, x, p):
+    """ds/dx."""
+    a = p[0]
+    return op.sqrt(4*a**2*x**2 + 1)
+
+def exact_kappa(op, x, p):
+    """Signed curvature (paper, eq. 8)."""
+    a = p[0]
+    return 2*a/(4*a**2*x**2 + 1)**(op.mpf(3)/2)
+
+def exact_static_normal_load(op, x, p):
+    """n0 = N/m of a body at rest, so that N = m*(kappa*V**2 + n0) (paper, eq. 15)."""
+    a, g = p[0], p[3]
+    return g/op.sqrt(4*a**2*x**2 + 1)
+
+def exact_speed_slope(op, x, w, v, nu, p):
+    """dV**2/dx where V**2 = w, v = sgn(ds/dt) and nu = sgn(N) (paper, eq. 19)."""
+    a, gamma, ell_c, g, m = p[0], p[1], p[2], p[3], p[4]
+    _t0 = 4*a**2*x**2 + 1
+    _t1 = op.sqrt(_t0)
+    return 2*_t1*(-2*a*g*x/_t1 - 2*ell_c**2*gamma*v*abs(a)/(_t0**(op.mpf(3)/2)*m))
 
 def exact_domain(op, p):
     """Both ends of the domain, and the period; None where there is none."""
@@ -135,8 +167,6 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = 
         Launch place, speed and direction (+1 or -1: the sign of ds/dt).
     out : Pass1, optional
         The result of a call before, or six arrays like it, to be filled again.
-    a, gamma, ell_c, g, m
-        Run-time parameters; `PARAMETERS` holds their defaults.
 
     Returns
     -------
@@ -147,14 +177,8 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = 
 
 
 def solve(
-    lam0: Any = None,
-    v0: Any = 0.0,
-    direction: int = 1,
-    *,
-    point: Any = None,
-    t_max: Any = None,
-    contact: str = "bilateral",
-    a: Any = '0.5', gamma: Any = '0.5', ell_c: Any = '1', g: Any = '9.81', m: Any = '1',
+    lam0: Any = None, v0: Any = 0.0, direction: int = 1, *, point: Any = None, t_max: Any = None,
+    contact: str = "bilateral", a: Any = '0.5', gamma: Any = '0.5', ell_c: Any = '1', g: Any = '9.81', m: Any = '1',
     **unknown: Any,
 ) -> "Motion":
     """The motion that a launch begins (Passes 1 to 3).
@@ -169,8 +193,6 @@ def solve(
         Horizon of time.
     contact : {"bilateral", "above", "below"}
         Which side of the track can push.
-    a, gamma, ell_c, g, m
-        Run-time parameters; `PARAMETERS` holds their defaults.
 
     Returns
     -------
@@ -185,18 +207,9 @@ def solve(
 
 
 def sweep(
-    quantity: str,
-    lam0: Any,
-    v0: Any = 0.0,
-    direction: Any = 1,
-    *,
-    lam: Any = None,
-    t_max: Any = None,
-    contact: str = "bilateral",
-    gradient: Any = None,
-    client: Any = None,
-    a: Any = '0.5', gamma: Any = '0.5', ell_c: Any = '1', g: Any = '9.81', m: Any = '1',
-    **unknown: Any,
+    quantity: str, lam0: Any, v0: Any = 0.0, direction: Any = 1, *, lam: Any = None, t_max: Any = None,
+    contact: str = "bilateral", gradient: Any = None, client: Any = None, a: Any = '0.5', gamma: Any = '0.5',
+    ell_c: Any = '1', g: Any = '9.81', m: Any = '1', **unknown: Any,
 ) -> "Sweep":
     """One quantity over arrays of launches and parameters, on all cores; all arguments broadcast.
 
@@ -212,11 +225,9 @@ def sweep(
     t_max, contact
         One for all launches, as of ``solve``.
     gradient : str or sequence of str, optional
-        What derivatives of half periods or periods are by: run-time parameters, "lam0" and "v0".
+        What derivatives of the quantity are by: run-time parameters, "lam0" and "v0".
     client : distributed.Client, optional
         A Dask cluster to do the work, with the same results.
-    a, gamma, ell_c, g, m
-        Run-time parameters; `PARAMETERS` holds their defaults.
 
     Returns
     -------
@@ -235,8 +246,6 @@ def equilibria(*, between: Any = None, a: Any = '0.5', gamma: Any = '0.5', ell_c
     ----------
     between : pair of numbers, optional
         The range of x to look in: the whole domain, or one period, if not given.
-    a, gamma, ell_c, g, m
-        Run-time parameters; `PARAMETERS` holds their defaults.
 
     Returns
     -------
@@ -251,10 +260,13 @@ MODEL = CompiledModel(
     source=__file__,
     units={'a': '1/m', 'ell_c': 'm', 'g': 'm/s**2', 'gamma': 'N/m', 'm': 'kg', 'x': 'm'},
     at_least=(('gamma', '0'), ('ell_c', '0')),
-    addresses=Addresses(
-        path_and_contact_force.address,
+    functions=CompiledFunctions(
+        path_and_contact_force,
     ),
     effective_potential=effective_potential, bounds=bounds,
     domain_of=exact_domain,
-    dissipation=Dissipation(speed_equation.address, static_balance.address, friction=False, kinked=True, linear=True),
+    dissipation=DissipativeFunctions(speed_equation, static_balance, friction=False, kinked=True, linear=True),
+    exact=ExactLaw(
+        exact_x, exact_z, exact_ds, exact_kappa, exact_static_normal_load, exact_speed_slope,
+    ),
 )

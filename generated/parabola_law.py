@@ -1,5 +1,5 @@
 # Made by gqm-gen for "parabola_law". Do not edit: change its declaration and generate again.
-# interface 9, input 6669068dcbd5, body 639f106406ea
+# interface 10, input 6669068dcbd5, body 1250b92517d7
 """Bead on a parabola, with a resistance that falls with speed
 
 x              = x
@@ -27,16 +27,17 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=9)
+compiled = compiler(__file__, interface=10)
 
 from gqm_sym.runtime.vocabulary import (
-    BOUNDS, EFFECTIVE_POTENTIAL, PATH_AND_CONTACT_FORCE, SPEED_EQUATION, STATIC_BALANCE, Addresses, CompiledModel,
-    Dissipation, LaunchRequest, Pass1, iadd, iconst, imul, ipow, isqrt,
+    BOUNDS, EFFECTIVE_POTENTIAL, PATH_AND_CONTACT_FORCE, SPEED_EQUATION, STATIC_BALANCE, CompiledFunctions,
+    CompiledModel, DissipativeFunctions, ExactLaw, LaunchRequest, Pass1, iadd, iconst, imul, ipow, isqrt,
 )
 
 if TYPE_CHECKING:
     from gqm_sym.runtime import Equilibrium, Motion, Sweep
 
+# The run-time parameters and their defaults; pass1, solve, sweep and equilibria take them by keyword.
 PARAMETERS = {'a': '0.7', 'r': '0.8', 'w1': '2', 'g': '9.81', 'm': '1'}
 
 
@@ -97,7 +98,7 @@ def static_balance(n, places, p, out):
         out[1, i] = push + r
 
 
-@compiled(EFFECTIVE_POTENTIAL, later=True)
+@compiled(EFFECTIVE_POTENTIAL)
 def effective_potential(n, places, p, out):
     """U per unit mass, V**2 = v0**2 - 2*(U(x) - U(lam0)), and dU/dx (paper, eq. 13)."""
     places, p, out = carray(places, n), carray(p, 5), carray(out, (2, n))
@@ -109,7 +110,7 @@ def effective_potential(n, places, p, out):
         out[1, i] = 2*_t0*x
 
 
-@compiled(BOUNDS, later=True)
+@compiled(BOUNDS)
 def bounds(lo, hi, p, out):
     """Bounds of dU/dx and ds/dx for lo <= x <= hi, by interval arithmetic."""
     p, out = carray(p, 5), carray(out, 4)
@@ -120,6 +121,36 @@ def bounds(lo, hi, p, out):
 
 
 # The same formulas over a namespace of operations, for extended precision.
+
+def exact_x(op, x, p):
+    """Horizontal coordinate."""
+    return x
+
+def exact_z(op, x, p):
+    """Height."""
+    a = p[0]
+    return a*x**2
+
+def exact_ds(op, x, p):
+    """ds/dx."""
+    a = p[0]
+    return op.sqrt(4*a**2*x**2 + 1)
+
+def exact_kappa(op, x, p):
+    """Signed curvature (paper, eq. 8)."""
+    a = p[0]
+    return 2*a/(4*a**2*x**2 + 1)**(op.mpf(3)/2)
+
+def exact_static_normal_load(op, x, p):
+    """n0 = N/m of a body at rest, so that N = m*(kappa*V**2 + n0) (paper, eq. 15)."""
+    a, g = p[0], p[3]
+    return g/op.sqrt(4*a**2*x**2 + 1)
+
+def exact_speed_slope(op, x, w, v, nu, p):
+    """dV**2/dx where V**2 = w, v = sgn(ds/dt) and nu = sgn(N) (paper, eq. 19)."""
+    a, r, w1, g = p[0], p[1], p[2], p[3]
+    _t0 = op.sqrt(4*a**2*x**2 + 1)
+    return 2*_t0*(-r*v/(w/w1 + 1) - 2*a*g*x/_t0)
 
 def exact_domain(op, p):
     """Both ends of the domain, and the period; None where there is none."""
@@ -137,8 +168,6 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = 
         Launch place, speed and direction (+1 or -1: the sign of ds/dt).
     out : Pass1, optional
         The result of a call before, or six arrays like it, to be filled again.
-    a, r, w1, g, m
-        Run-time parameters; `PARAMETERS` holds their defaults.
 
     Returns
     -------
@@ -149,14 +178,8 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = 
 
 
 def solve(
-    lam0: Any = None,
-    v0: Any = 0.0,
-    direction: int = 1,
-    *,
-    point: Any = None,
-    t_max: Any = None,
-    contact: str = "bilateral",
-    a: Any = '0.7', r: Any = '0.8', w1: Any = '2', g: Any = '9.81', m: Any = '1',
+    lam0: Any = None, v0: Any = 0.0, direction: int = 1, *, point: Any = None, t_max: Any = None,
+    contact: str = "bilateral", a: Any = '0.7', r: Any = '0.8', w1: Any = '2', g: Any = '9.81', m: Any = '1',
     **unknown: Any,
 ) -> "Motion":
     """The motion that a launch begins (Passes 1 to 3).
@@ -171,8 +194,6 @@ def solve(
         Horizon of time.
     contact : {"bilateral", "above", "below"}
         Which side of the track can push.
-    a, r, w1, g, m
-        Run-time parameters; `PARAMETERS` holds their defaults.
 
     Returns
     -------
@@ -187,18 +208,9 @@ def solve(
 
 
 def sweep(
-    quantity: str,
-    lam0: Any,
-    v0: Any = 0.0,
-    direction: Any = 1,
-    *,
-    lam: Any = None,
-    t_max: Any = None,
-    contact: str = "bilateral",
-    gradient: Any = None,
-    client: Any = None,
-    a: Any = '0.7', r: Any = '0.8', w1: Any = '2', g: Any = '9.81', m: Any = '1',
-    **unknown: Any,
+    quantity: str, lam0: Any, v0: Any = 0.0, direction: Any = 1, *, lam: Any = None, t_max: Any = None,
+    contact: str = "bilateral", gradient: Any = None, client: Any = None, a: Any = '0.7', r: Any = '0.8', w1: Any = '2',
+    g: Any = '9.81', m: Any = '1', **unknown: Any,
 ) -> "Sweep":
     """One quantity over arrays of launches and parameters, on all cores; all arguments broadcast.
 
@@ -214,11 +226,9 @@ def sweep(
     t_max, contact
         One for all launches, as of ``solve``.
     gradient : str or sequence of str, optional
-        What derivatives of half periods or periods are by: run-time parameters, "lam0" and "v0".
+        What derivatives of the quantity are by: run-time parameters, "lam0" and "v0".
     client : distributed.Client, optional
         A Dask cluster to do the work, with the same results.
-    a, r, w1, g, m
-        Run-time parameters; `PARAMETERS` holds their defaults.
 
     Returns
     -------
@@ -237,8 +247,6 @@ def equilibria(*, between: Any = None, a: Any = '0.7', r: Any = '0.8', w1: Any =
     ----------
     between : pair of numbers, optional
         The range of x to look in: the whole domain, or one period, if not given.
-    a, r, w1, g, m
-        Run-time parameters; `PARAMETERS` holds their defaults.
 
     Returns
     -------
@@ -252,10 +260,13 @@ MODEL = CompiledModel(
     name='parabola_law', parameter='x', parameters=PARAMETERS, positive=(),
     source=__file__,
     units={'a': '1/m', 'g': 'm/s**2', 'm': 'kg', 'r': 'm/s**2', 'w1': 'm**2/s**2', 'x': 'm'},
-    addresses=Addresses(
-        path_and_contact_force.address,
+    functions=CompiledFunctions(
+        path_and_contact_force,
     ),
     effective_potential=effective_potential, bounds=bounds,
     domain_of=exact_domain,
-    dissipation=Dissipation(speed_equation.address, static_balance.address, friction=False, kinked=False, linear=False),
+    dissipation=DissipativeFunctions(speed_equation, static_balance, friction=False, kinked=False, linear=False),
+    exact=ExactLaw(
+        exact_x, exact_z, exact_ds, exact_kappa, exact_static_normal_load, exact_speed_slope,
+    ),
 )

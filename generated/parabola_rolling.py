@@ -1,5 +1,5 @@
 # Made by gqm-gen for "parabola_rolling". Do not edit: change its declaration and generate again.
-# interface 9, input 6fc25406b912, body bea92408d399
+# interface 10, input 6fc25406b912, body 8f915d2e9220
 """Ball rolling in a parabolic bowl
 
 x              = x*(-2*a*rho/sqrt(4*a**2*x**2 + 1) + 1)
@@ -25,18 +25,19 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=9)
+compiled = compiler(__file__, interface=10)
 
 from gqm_sym.runtime.vocabulary import (
     BOUNDS, BOUNDS_BATCH, EFFECTIVE_POTENTIAL, INTEGRAND_INVARIANTS_BATCH, LOAD_MAP, ORBIT_INVARIANTS_BATCH,
     PATH_AND_CONTACT_FORCE, POTENTIAL_DIVDIFF1, POTENTIAL_DIVDIFF1_BATCH, POTENTIAL_DIVDIFF2, POTENTIAL_DIVDIFF2_BATCH,
-    TIME_INTEGRAND_BATCH, Addresses, BatchFunctions, CompiledModel, ExactFormulas, LaunchRequest, Pass1, iadd, iconst,
-    idiv, imul, ipow, isqrt, place_from_ends, speed_squared_from_potential,
+    TIME_INTEGRAND_BATCH, BatchFunctions, CompiledFunctions, CompiledModel, ExactFormulas, LaunchRequest, Pass1, iadd,
+    iconst, idiv, imul, ipow, isqrt, place_from_ends, speed_squared_from_potential,
 )
 
 if TYPE_CHECKING:
     from gqm_sym.runtime import Equilibrium, Motion, Sweep
 
+# The run-time parameters and their defaults; pass1, solve, sweep and equilibria take them by keyword.
 PARAMETERS = {'a': '0.6', 'beta': '2/5', 'rho': '0.25', 'g': '9.81', 'm': '1'}
 
 
@@ -202,8 +203,6 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = 
         Launch place, speed and direction (+1 or -1: the sign of ds/dt).
     out : Pass1, optional
         The result of a call before, or six arrays like it, to be filled again.
-    a, beta, rho, g, m
-        Run-time parameters; `PARAMETERS` holds their defaults.
 
     Returns
     -------
@@ -214,14 +213,8 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = 
 
 
 def solve(
-    lam0: Any = None,
-    v0: Any = 0.0,
-    direction: int = 1,
-    *,
-    point: Any = None,
-    t_max: Any = None,
-    contact: str = "bilateral",
-    a: Any = '0.6', beta: Any = '2/5', rho: Any = '0.25', g: Any = '9.81', m: Any = '1',
+    lam0: Any = None, v0: Any = 0.0, direction: int = 1, *, point: Any = None, t_max: Any = None,
+    contact: str = "bilateral", a: Any = '0.6', beta: Any = '2/5', rho: Any = '0.25', g: Any = '9.81', m: Any = '1',
     **unknown: Any,
 ) -> "Motion":
     """The motion that a launch begins (Passes 1 to 3).
@@ -236,8 +229,6 @@ def solve(
         Horizon of time.
     contact : {"bilateral", "above", "below"}
         Which side of the track can push.
-    a, beta, rho, g, m
-        Run-time parameters; `PARAMETERS` holds their defaults.
 
     Returns
     -------
@@ -252,18 +243,9 @@ def solve(
 
 
 def sweep(
-    quantity: str,
-    lam0: Any,
-    v0: Any = 0.0,
-    direction: Any = 1,
-    *,
-    lam: Any = None,
-    t_max: Any = None,
-    contact: str = "bilateral",
-    gradient: Any = None,
-    client: Any = None,
-    a: Any = '0.6', beta: Any = '2/5', rho: Any = '0.25', g: Any = '9.81', m: Any = '1',
-    **unknown: Any,
+    quantity: str, lam0: Any, v0: Any = 0.0, direction: Any = 1, *, lam: Any = None, t_max: Any = None,
+    contact: str = "bilateral", gradient: Any = None, client: Any = None, a: Any = '0.6', beta: Any = '2/5',
+    rho: Any = '0.25', g: Any = '9.81', m: Any = '1', **unknown: Any,
 ) -> "Sweep":
     """One quantity over arrays of launches and parameters, on all cores; all arguments broadcast.
 
@@ -279,11 +261,9 @@ def sweep(
     t_max, contact
         One for all launches, as of ``solve``.
     gradient : str or sequence of str, optional
-        What derivatives of half periods or periods are by: run-time parameters, "lam0" and "v0".
+        What derivatives of the quantity are by: run-time parameters, "lam0" and "v0".
     client : distributed.Client, optional
         A Dask cluster to do the work, with the same results.
-    a, beta, rho, g, m
-        Run-time parameters; `PARAMETERS` holds their defaults.
 
     Returns
     -------
@@ -302,8 +282,6 @@ def equilibria(*, between: Any = None, a: Any = '0.6', beta: Any = '2/5', rho: A
     ----------
     between : pair of numbers, optional
         The range of x to look in: the whole domain, or one period, if not given.
-    a, beta, rho, g, m
-        Run-time parameters; `PARAMETERS` holds their defaults.
 
     Returns
     -------
@@ -316,7 +294,7 @@ def equilibria(*, between: Any = None, a: Any = '0.6', beta: Any = '2/5', rho: A
 # ---- The same formulas once more, only for speed: a load map in one call, and many orbits at once for sweeps. ----
 
 
-@compiled(LOAD_MAP, later=True)
+@compiled(LOAD_MAP)
 def load_map(n, w0, level, places, p, out):
     """x, z, ds/dx, kappa, V**2 = w0 - 2*(U - level), N (paper, eqs. 8, 13, 15), size of U's terms."""
     places, p, out = carray(places, n), carray(p, 5), carray(out, (7, n))
@@ -346,7 +324,7 @@ def load_map(n, w0, level, places, p, out):
         out[6, i] = _c1*(_c0*_t1 + _c2*_t3)/_c3
 
 
-@compiled(POTENTIAL_DIVDIFF1_BATCH, later=True)
+@compiled(POTENTIAL_DIVDIFF1_BATCH)
 def potential_divdiff1_batch(n, starts, places, offsets, p, out):
     """U[a, x], ds/dx and dU/dx."""
     starts, places, offsets, p, out = carray(starts, n), carray(places, n), carray(offsets, n), carray(p, (5, n)), carray(out, (3, n))
@@ -366,7 +344,7 @@ def potential_divdiff1_batch(n, starts, places, offsets, p, out):
         out[2, i] = _t5*_t6*_t8*x/_t7
 
 
-@compiled(POTENTIAL_DIVDIFF2_BATCH, later=True)
+@compiled(POTENTIAL_DIVDIFF2_BATCH)
 def potential_divdiff2_batch(n, lows, highs, left, right, p, out):
     """U[a, x, b] and ds/dx; NaN where the points lie too far apart for the closed form."""
     lows, highs, left, right, p, out = carray(lows, n), carray(highs, n), carray(left, n), carray(right, n), carray(p, (9, n)), carray(out, (2, n))
@@ -384,7 +362,7 @@ def potential_divdiff2_batch(n, lows, highs, left, right, p, out):
         out[1, i] = (-2*a*rho + sqrt(_t1)**3)/_t1
 
 
-@compiled(ORBIT_INVARIANTS_BATCH, later=True)
+@compiled(ORBIT_INVARIANTS_BATCH)
 def orbit_invariants_batch(n, lows, highs, p, out):
     """Terms that are constant along an orbit: ``potential_divdiff2_batch`` reads them behind the parameters."""
     lows, highs, p, out = carray(lows, n), carray(highs, n), carray(p, (5, n)), carray(out, (4, n))
@@ -399,7 +377,7 @@ def orbit_invariants_batch(n, lows, highs, p, out):
         out[3, i] = _t2
 
 
-@compiled(TIME_INTEGRAND_BATCH, later=True)
+@compiled(TIME_INTEGRAND_BATCH)
 def time_integrand_batch(n, sine2, cosine2, p, out):
     """(dt/du)**2 at sine2 = sin(u)**2, and its divisor; dt/du integrates to the half period (paper, eq. 17)."""
     p, out = carray(p, (8, n)), carray(out, (2, n))
@@ -414,7 +392,7 @@ def time_integrand_batch(n, sine2, cosine2, p, out):
         out[1, i] = 2*_t4*g/_t0
 
 
-@compiled(INTEGRAND_INVARIANTS_BATCH, later=True)
+@compiled(INTEGRAND_INVARIANTS_BATCH)
 def integrand_invariants_batch(n, halves, p, out):
     """Terms that are constant along an orbit: ``time_integrand_batch`` reads them behind the parameters."""
     halves, p, out = carray(halves, n), carray(p, (5, n)), carray(out, (3, n))
@@ -427,7 +405,7 @@ def integrand_invariants_batch(n, halves, p, out):
         out[2, i] = _t1
 
 
-@compiled(BOUNDS_BATCH, later=True)
+@compiled(BOUNDS_BATCH)
 def bounds_batch(n, lo, hi, p, out):
     """Bounds of dU/dx and ds/dx for lo <= x <= hi."""
     lo, hi, p, out = carray(lo, n), carray(hi, n), carray(p, (5, n)), carray(out, (4, n))
@@ -448,9 +426,8 @@ MODEL = CompiledModel(
     units={'a': '1/m', 'beta': '1', 'g': 'm/s**2', 'm': 'kg', 'rho': 'm', 'x': 'm'},
     at_least=(('beta', '0'),),
     rolling_radius='rho',
-    addresses=Addresses(
-        path_and_contact_force.address, effective_potential.address, potential_divdiff1.address,
-        potential_divdiff2.address, bounds.address,
+    functions=CompiledFunctions(
+        path_and_contact_force, effective_potential, potential_divdiff1, potential_divdiff2, bounds,
     ),
     load_map=load_map,
     inertia=exact_inertia,

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "spiral_central". Do not edit: change its declaration and generate again.
-# interface 9, input cd2a37956d84, body 167b3b73c9a5
+# interface 10, input cd2a37956d84, body db304879755c
 """Bead on a logarithmic spiral, drawn to its pole
 
 x              = r0*exp(b*theta)*cos(theta)
@@ -25,18 +25,19 @@ from numba import carray
 from gqm_sym.runtime import compiler
 
 # Before anything else is asked of the runtime, so that another version of it is told from a broken one.
-compiled = compiler(__file__, interface=9)
+compiled = compiler(__file__, interface=10)
 
 from gqm_sym.runtime.vocabulary import (
     BOUNDS, BOUNDS_BATCH, EFFECTIVE_POTENTIAL, LOAD_MAP, ORBIT_INVARIANTS_BATCH, PATH_AND_CONTACT_FORCE,
-    POTENTIAL_DIVDIFF1, POTENTIAL_DIVDIFF1_BATCH, POTENTIAL_DIVDIFF2, POTENTIAL_DIVDIFF2_BATCH, Addresses,
-    BatchFunctions, CompiledModel, ExactFormulas, LaunchRequest, Pass1, cos, divdiff1_exp, divdiff2_exp, exp, iabs,
+    POTENTIAL_DIVDIFF1, POTENTIAL_DIVDIFF1_BATCH, POTENTIAL_DIVDIFF2, POTENTIAL_DIVDIFF2_BATCH, BatchFunctions,
+    CompiledFunctions, CompiledModel, ExactFormulas, LaunchRequest, Pass1, cos, divdiff1_exp, divdiff2_exp, exp, iabs,
     iadd, iconst, idiv, iexp, imul, ipow, isqrt, place_from_ends, sin, speed_squared_from_potential,
 )
 
 if TYPE_CHECKING:
     from gqm_sym.runtime import Equilibrium, Motion, Sweep
 
+# The run-time parameters and their defaults; pass1, solve, sweep and equilibria take them by keyword.
 PARAMETERS = {'r0': '1', 'b': '0.15', 'k': '2', 'm': '1'}
 
 
@@ -169,8 +170,6 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = 
         Launch place, speed and direction (+1 or -1: the sign of ds/dt).
     out : Pass1, optional
         The result of a call before, or six arrays like it, to be filled again.
-    r0, b, k, m
-        Run-time parameters; `PARAMETERS` holds their defaults.
 
     Returns
     -------
@@ -181,15 +180,8 @@ def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = 
 
 
 def solve(
-    lam0: Any = None,
-    v0: Any = 0.0,
-    direction: int = 1,
-    *,
-    point: Any = None,
-    t_max: Any = None,
-    contact: str = "bilateral",
-    r0: Any = '1', b: Any = '0.15', k: Any = '2', m: Any = '1',
-    **unknown: Any,
+    lam0: Any = None, v0: Any = 0.0, direction: int = 1, *, point: Any = None, t_max: Any = None,
+    contact: str = "bilateral", r0: Any = '1', b: Any = '0.15', k: Any = '2', m: Any = '1', **unknown: Any,
 ) -> "Motion":
     """The motion that a launch begins (Passes 1 to 3).
 
@@ -203,8 +195,6 @@ def solve(
         Horizon of time.
     contact : {"bilateral", "above", "below"}
         Which side of the track can push.
-    r0, b, k, m
-        Run-time parameters; `PARAMETERS` holds their defaults.
 
     Returns
     -------
@@ -219,18 +209,9 @@ def solve(
 
 
 def sweep(
-    quantity: str,
-    lam0: Any,
-    v0: Any = 0.0,
-    direction: Any = 1,
-    *,
-    lam: Any = None,
-    t_max: Any = None,
-    contact: str = "bilateral",
-    gradient: Any = None,
-    client: Any = None,
-    r0: Any = '1', b: Any = '0.15', k: Any = '2', m: Any = '1',
-    **unknown: Any,
+    quantity: str, lam0: Any, v0: Any = 0.0, direction: Any = 1, *, lam: Any = None, t_max: Any = None,
+    contact: str = "bilateral", gradient: Any = None, client: Any = None, r0: Any = '1', b: Any = '0.15', k: Any = '2',
+    m: Any = '1', **unknown: Any,
 ) -> "Sweep":
     """One quantity over arrays of launches and parameters, on all cores; all arguments broadcast.
 
@@ -246,11 +227,9 @@ def sweep(
     t_max, contact
         One for all launches, as of ``solve``.
     gradient : str or sequence of str, optional
-        What derivatives of half periods or periods are by: run-time parameters, "lam0" and "v0".
+        What derivatives of the quantity are by: run-time parameters, "lam0" and "v0".
     client : distributed.Client, optional
         A Dask cluster to do the work, with the same results.
-    r0, b, k, m
-        Run-time parameters; `PARAMETERS` holds their defaults.
 
     Returns
     -------
@@ -269,8 +248,6 @@ def equilibria(*, between: Any = None, r0: Any = '1', b: Any = '0.15', k: Any = 
     ----------
     between : pair of numbers, optional
         The range of theta to look in: the whole domain, or one period, if not given.
-    r0, b, k, m
-        Run-time parameters; `PARAMETERS` holds their defaults.
 
     Returns
     -------
@@ -283,7 +260,7 @@ def equilibria(*, between: Any = None, r0: Any = '1', b: Any = '0.15', k: Any = 
 # ---- The same formulas once more, only for speed: a load map in one call, and many orbits at once for sweeps. ----
 
 
-@compiled(LOAD_MAP, later=True)
+@compiled(LOAD_MAP)
 def load_map(n, w0, level, places, p, out):
     """x, z, ds/dtheta, kappa, V**2 = w0 - 2*(U - level), N (paper, eqs. 8, 13, 15), size of U's terms."""
     places, p, out = carray(places, n), carray(p, 4), carray(out, (7, n))
@@ -310,7 +287,7 @@ def load_map(n, w0, level, places, p, out):
         out[6, i] = _c0*_t4
 
 
-@compiled(POTENTIAL_DIVDIFF1_BATCH, later=True)
+@compiled(POTENTIAL_DIVDIFF1_BATCH)
 def potential_divdiff1_batch(n, starts, places, offsets, p, out):
     """U[a, theta], ds/dtheta and dU/dtheta."""
     starts, places, offsets, p, out = carray(starts, n), carray(places, n), carray(offsets, n), carray(p, (4, n)), carray(out, (3, n))
@@ -324,7 +301,7 @@ def potential_divdiff1_batch(n, starts, places, offsets, p, out):
         out[2, i] = _t2*exp(_t1)
 
 
-@compiled(POTENTIAL_DIVDIFF2_BATCH, later=True)
+@compiled(POTENTIAL_DIVDIFF2_BATCH)
 def potential_divdiff2_batch(n, lows, highs, left, right, p, out):
     """U[a, theta, b] and ds/dtheta; NaN where the points lie too far apart for the closed form."""
     lows, highs, left, right, p, out = carray(lows, n), carray(highs, n), carray(left, n), carray(right, n), carray(p, (6, n)), carray(out, (2, n))
@@ -337,7 +314,7 @@ def potential_divdiff2_batch(n, lows, highs, left, right, p, out):
         out[1, i] = _c1*r0*exp(_t0)
 
 
-@compiled(ORBIT_INVARIANTS_BATCH, later=True)
+@compiled(ORBIT_INVARIANTS_BATCH)
 def orbit_invariants_batch(n, lows, highs, p, out):
     """Terms that are constant along an orbit: ``potential_divdiff2_batch`` reads them behind the parameters."""
     lows, highs, p, out = carray(lows, n), carray(highs, n), carray(p, (4, n)), carray(out, (2, n))
@@ -347,7 +324,7 @@ def orbit_invariants_batch(n, lows, highs, p, out):
         out[1, i] = sqrt(b**2 + 1)
 
 
-@compiled(BOUNDS_BATCH, later=True)
+@compiled(BOUNDS_BATCH)
 def bounds_batch(n, lo, hi, p, out):
     """Bounds of dU/dtheta and ds/dtheta for lo <= theta <= hi."""
     lo, hi, p, out = carray(lo, n), carray(hi, n), carray(p, (4, n)), carray(out, (4, n))
@@ -363,9 +340,8 @@ MODEL = CompiledModel(
     name='spiral_central', parameter='theta', parameters=PARAMETERS, positive=('r0',),
     source=__file__,
     units={'b': '1', 'g': 'm/s**2', 'k': 'm**3/s**2', 'm': 'kg', 'r0': 'm', 'theta': '1'},
-    addresses=Addresses(
-        path_and_contact_force.address, effective_potential.address, potential_divdiff1.address,
-        potential_divdiff2.address, bounds.address,
+    functions=CompiledFunctions(
+        path_and_contact_force, effective_potential, potential_divdiff1, potential_divdiff2, bounds,
     ),
     load_map=load_map,
     batch=BatchFunctions(

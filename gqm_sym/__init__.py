@@ -7,7 +7,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from gqm_sym import figures
+    from gqm_sym import design, figures
     from gqm_sym.building import build
     from gqm_sym.declare import Curve, arc, clothoid, families, line
     from gqm_sym.derivation import Model, derive
@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from gqm_sym.emission import emit
     from gqm_sym.errors import GQMError
     from gqm_sym.fitting.fit import fit
+    from gqm_sym.fitting.uncertainty import uncertainty
     from gqm_sym.kernels import (
         CentralForce,
         CoulombFriction,
@@ -48,6 +49,7 @@ _HOMES = {
     "build": "gqm_sym.building",
     "clothoid": "gqm_sym.declare",
     "derive": "gqm_sym.derivation",
+    "design": "gqm_sym.design",
     "emit": "gqm_sym.emission",
     "families": "gqm_sym.declare",
     "figures": "gqm_sym.figures",
@@ -56,6 +58,7 @@ _HOMES = {
     "line": "gqm_sym.declare",
     "read_spec": "gqm_sym.specfile",
     "read_sweep": "gqm_sym.studies",
+    "uncertainty": "gqm_sym.fitting.uncertainty",
 }
 
 __all__ = [
@@ -75,6 +78,7 @@ __all__ = [
     "build",
     "clothoid",
     "derive",
+    "design",
     "emit",
     "families",
     "figures",
@@ -83,6 +87,7 @@ __all__ = [
     "line",
     "read_spec",
     "read_sweep",
+    "uncertainty",
 ]
 
 

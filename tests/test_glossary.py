@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 import gqm_sym as gqm
-from gqm_sym import errors, figures, runtime
+from gqm_sym import design, errors, figures, runtime
 from gqm_sym.declare import families
 from gqm_sym.runtime import Event, Leg, Motion, Sweep
 
@@ -45,6 +45,7 @@ def public() -> set[str]:
     """Return every public name."""
     names = {*gqm.__all__, *runtime.__all__} - {"compiler"}
     names |= {f"families.{name}" for name in families.names()} | {f"figures.{name}" for name in figures.__all__}
+    names |= {f"design.{name}" for name in design.__all__}
     for owner in CLASSES:
         names |= set(members(owner))
     return names - {f"{owner.__name__}.{name}" for owner in (Event,) for name in ("t", "lam", "x", "z")}
@@ -67,7 +68,10 @@ def test_each_is_explained_once() -> None:
     assert [row for row, count in Counter(rows()).items() if count > 1] == []
 
 
-@pytest.mark.parametrize("name", [*gqm.__all__, *(f"figures.{name}" for name in figures.__all__)])
+SHOWN = [*gqm.__all__, *(f"{room.__name__[8:]}.{name}" for room in (figures, design) for name in room.__all__)]
+
+
+@pytest.mark.parametrize("name", SHOWN)
 def test_the_reference_page_lists(name: str) -> None:
     """Every name that is exported stands on the page, by its full name."""
     page = (REFERENCE / "api.md").read_text(encoding="utf-8")

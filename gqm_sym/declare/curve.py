@@ -31,7 +31,7 @@ class Curve:
     ----------
     kind
         The form in which it was declared: ``graph``, ``parametric``, ``polar``; of a charted curve ``implicit``,
-        ``sampled`` or ``piecewise``.
+        ``sampled``, ``piecewise`` or ``polynomial``.
     x, z
         The coordinates, in the parameter and the run-time parameters.
     parameter

@@ -6,6 +6,7 @@ import sympy as sp
 
 from gqm_sym.declare.implicit import Level
 from gqm_sym.declare.piecewise import FormulaCurve, Rail
+from gqm_sym.declare.polynomials import PolynomialPieces
 from gqm_sym.declare.sampled import Track
 from gqm_sym.dimensions import COMMON, LENGTH, NUMBER, Dimension, Formulas, dimension, found_dimensions, unit_of
 from gqm_sym.parameters import in_words
@@ -125,6 +126,8 @@ def _what(curve: DeclaredCurve) -> str:
     if isinstance(made, Rail):
         kinds = ", ".join(piece.kind for piece in made.pieces[:8]) + (", ..." if len(made.pieces) > 8 else "")
         return f"{'closed ' if made.closed else ''}rail of {len(made.pieces)} pieces ({kinds}), in arc length s [m]"
+    if isinstance(made, PolynomialPieces):
+        return f"{made.pieces.count(chr(10)) + 1} polynomials joined, in arc length s [m]"
     if isinstance(made, Level):
         return f"implicit, in arc length {curve.parameter} [m] from its start"
     own = parameter_dimension(curve)

@@ -8,6 +8,7 @@ from sympy import Function, Symbol
 from gqm_sym.declare import Curve
 from gqm_sym.declare.implicit import X, Z
 from gqm_sym.declare.piecewise import Rail
+from gqm_sym.declare.polynomials import PolynomialPieces
 from gqm_sym.declare.sampled import Track
 from gqm_sym.derivation.algebra.differentiate import differentiate
 from gqm_sym.derivation.geometry.geometry import geometry
@@ -61,6 +62,17 @@ def _sampled(lowering: Lowering) -> ChartIR:
         statement=f"Sampled(POINTS, kind={track.kind!r}, closed={track.closed})",
         imports=("Sampled",),
         data=(("POINTS", track.points),),
+    )
+
+
+def _polynomial(lowering: Lowering) -> ChartIR:
+    """A curve of polynomials: their coefficients, as text."""
+    made = lowering.model.curve.definition
+    assert isinstance(made, PolynomialPieces)
+    return ChartIR(
+        statement=f"Polynomials(PIECES, origin={made.origin}, breaks={made.breaks!r})",
+        imports=("Polynomials",),
+        data=(("PIECES", made.pieces),),
     )
 
 
@@ -119,7 +131,12 @@ def _exact_segment(lowering: Lowering, curve: Curve, name: str) -> ExactIR:
     return lowering.exact_function(name, "x, z and their derivatives by its own parameter.", outputs, (lowering.place,))
 
 
-MAKERS: dict[str, Callable[[Lowering], ChartIR]] = {"implicit": _implicit, "piecewise": _rail, "sampled": _sampled}
+MAKERS: dict[str, Callable[[Lowering], ChartIR]] = {
+    "implicit": _implicit,
+    "piecewise": _rail,
+    "polynomial": _polynomial,
+    "sampled": _sampled,
+}
 """The function that describes the chart, by the kind of the curve."""
 
 

@@ -8,7 +8,7 @@ from sympy import Expr, Symbol
 
 from gqm_sym.derivation.forces.dissipation import LOAD, PUSH, SIGMA, TILT, TURN, Dissipation
 from gqm_sym.emission.context import Lowering
-from gqm_sym.emission.ir import Assignment, FunctionIR
+from gqm_sym.emission.ir import Assignment, ExactIR, FunctionIR
 from gqm_sym.emission.subscripts import at
 from gqm_sym.kernels.base import CONTACT_SIGN, DIRECTION, KAPPA, W
 
@@ -60,6 +60,14 @@ def static_balance(lowering: Lowering, loss: Dissipation) -> FunctionIR:
     """The accelerations of a body at rest that is about to move forwards, and backwards."""
     doc = "Acceleration from rest forwards, and backwards: a body rests where the first is <= 0 and the second >= 0."
     return _in_pieces(lowering, loss, "static_balance", (lowering.names("places"),), doc, _Law(loss.holds, (), {}))
+
+
+def speed_slope(lowering: Lowering, loss: Dissipation) -> ExactIR:
+    """The law itself over a namespace of operations: dW/dλ by the place, W and both signs."""
+    w, v, nu = (lowering.names.symbol(name) for name in ("w", "v", "nu"))
+    form = loss.along(2 * SIGMA * loss.acceleration).xreplace({W: w, DIRECTION: v, CONTACT_SIGN: nu})
+    doc = f"dV**2/d{lowering.place} where V**2 = {w}, {v} = sgn(ds/dt) and {nu} = sgn(N) (paper, eq. 19)."
+    return lowering.exact_function("speed_slope", doc, (form,), (lowering.place, w, v, nu))
 
 
 def _in_pieces(

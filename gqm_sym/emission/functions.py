@@ -107,7 +107,6 @@ def loop(function: FunctionIR) -> tuple[dict[str, Any], set[str]]:
         "index": index,
         "count": count,
         "inside": inside,
-        "later": function.batch or function.later,
     }
     return fields, printer.used
 
@@ -145,7 +144,6 @@ def enclosure(function: FunctionIR, parameter: str) -> tuple[dict[str, Any], set
         "index": index,
         "count": count[0] if count else "",
         "inside": inside,
-        "later": function.batch or function.later,
     }
     return fields, printer.used
 

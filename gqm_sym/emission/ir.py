@@ -34,9 +34,7 @@ class FunctionIR:
     outputs : tuple of Expr
         One value a row of ``out``.
     batch : bool
-        Whether every place has run-time parameters of its own. Such a function is compiled when it is first needed.
-    later : bool
-        Whether a function that is not of a batch is compiled only then, too.
+        Whether every place has run-time parameters of its own.
     """
 
     name: str
@@ -49,7 +47,6 @@ class FunctionIR:
     inside: tuple[Assignment, ...]
     outputs: tuple[Expr, ...]
     batch: bool = False
-    later: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

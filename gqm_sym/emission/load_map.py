@@ -1,7 +1,6 @@
 """The function of a load map: all its rows in one call, with V**2 by subtraction and the size of what it rounds."""
 
 from collections.abc import Callable
-from dataclasses import replace
 from math import prod
 
 from sympy import Abs, Expr, Function, Pow, Rational, Symbol, cos, cosh, exp, ordered, sin, sinh
@@ -22,14 +21,16 @@ def load_map(lowering: Lowering) -> tuple[FunctionIR, ...]:
     v2 = Function("speed_squared_from_potential")(w0, potential, level)
     force = Symbol("m", real=True) * (model.kappa * v2 + model.static_normal_load)
     grown, outputs = rising((model.x, model.z, model.ds, model.kappa, v2, force, size), names.symbol)
-    function = lowering.function(
-        "load_map",
-        (w0, level, places),
-        f"x, z, ds/d{lowering.place}, kappa, V**2 = w0 - 2*(U - level), N (paper, eqs. 8, 13, 15), size of U's terms.",
-        inside=[(lowering.place, at(places)), *grown],
-        outputs=outputs,
+    return (
+        lowering.function(
+            "load_map",
+            (w0, level, places),
+            f"x, z, ds/d{lowering.place}, kappa, V**2 = w0 - 2*(U - level), N (paper, eqs. 8, 13, 15), "
+            "size of U's terms.",
+            inside=[(lowering.place, at(places)), *grown],
+            outputs=outputs,
+        ),
     )
-    return (replace(function, later=True),)
 
 
 def rising(

@@ -1,7 +1,5 @@
 """From a model's closed forms to functions as straight-line code."""
 
-from dataclasses import replace
-
 from sympy import Expr, Function, Symbol
 
 from gqm_sym.derivation import Model
@@ -10,7 +8,7 @@ from gqm_sym.derivation.algebra.differentiate import differentiate
 from gqm_sym.emission.batches import batch_functions, bounds_batch
 from gqm_sym.emission.charts import chart_maker
 from gqm_sym.emission.context import Lowering
-from gqm_sym.emission.dissipative import speed_equation, static_balance
+from gqm_sym.emission.dissipative import speed_equation, speed_slope, static_balance
 from gqm_sym.emission.ir import ExactIR, FunctionIR, ModuleIR
 from gqm_sym.emission.load_map import load_map
 from gqm_sym.emission.printer import check_emittable
@@ -32,9 +30,9 @@ def lower(model: Model, *, name: str, forms: tuple[tuple[str, Expr], ...]) -> Mo
         functions = lowering.potentials()
         batch = (*load_map(lowering), *batch_functions(lowering))
     else:
-        energy = replace(lowering.effective_potential(), later=True)
+        energy = lowering.effective_potential()
         functions, batch = (speed_equation(lowering, loss), static_balance(lowering, loss), energy), ()
-    exact = (*(lowering.exact() if loss is None else ()), *lowering.inertia(), *lowering.trigonometric_values())
+    exact = (*lowering.exact(), *lowering.inertia(), *lowering.trigonometric_values())
     return ModuleIR(
         name=name,
         title=model.title,
@@ -45,7 +43,7 @@ def lower(model: Model, *, name: str, forms: tuple[tuple[str, Expr], ...]) -> Mo
         forms=forms,
         notes=model.notes,
         functions=(lowering.path_and_contact_force(), *functions),
-        bounds=lowering.bounds() if loss is None else replace(lowering.bounds(), later=True),
+        bounds=lowering.bounds(),
         batch=batch,
         bounds_batch=bounds_batch(lowering) if any(function.batch for function in batch) else None,
         exact=exact if model.curve.charted else (*exact, lowering.domain(), *lowering.axes()),
@@ -144,10 +142,10 @@ class _ModelLowering(Lowering):
         )
 
     def exact(self) -> tuple[ExactIR, ...]:
-        """The formulas that extended precision needs; of a charted curve the forces' alone, by coordinates."""
-        model = self.model
+        """The formulas that extended precision and gradients need; of a charted curve the potential by coordinates."""
+        model, loss = self.model, self.model.dissipation
         if model.curve.charted:
-            return self.exact_potential()
+            return self.exact_potential() if loss is None else ()
         named: tuple[tuple[str, str, tuple[Expr, ...]], ...] = (
             ("x", "Horizontal coordinate.", (model.x,)),
             ("z", "Height.", (model.z,)),
@@ -158,14 +156,15 @@ class _ModelLowering(Lowering):
                 "n0 = N/m of a body at rest, so that N = m*(kappa*V**2 + n0) (paper, eq. 15).",
                 (model.static_normal_load,),
             ),
-            (
-                "effective_potential",
-                "U, so that V**2 + 2*U is constant (paper, eq. 13).",
-                (model.effective_potential,),
-            ),
-            ("effective_potential_slope", f"dU/d{self.place}.", (model.effective_potential_slope,)),
         )
-        return tuple(self.exact_function(*entry, (self.place,)) for entry in named)
+        path = tuple(self.exact_function(*entry, (self.place,)) for entry in named)
+        if loss is not None:
+            return (*path, speed_slope(self, loss))
+        potentials = (
+            ("effective_potential", "U, so that V**2 + 2*U is constant (paper, eq. 13).", model.effective_potential),
+            ("effective_potential_slope", f"dU/d{self.place}.", model.effective_potential_slope),
+        )
+        return (*path, *(self.exact_function(name, doc, (form,), (self.place,)) for name, doc, form in potentials))
 
     def exact_potential(self) -> tuple[ExactIR, ...]:
         """The effective potential and its gradient by coordinates; nothing where it depends on more than those."""

@@ -18,16 +18,16 @@ from gqm_sym.emission.printer import FUNCTIONS
 from gqm_sym.errors import EmissionError
 
 # The version of gqm_sym.runtime.interface that emitted code is written for (a test holds the two together).
-INTERFACE = 9
+INTERFACE = 10
 
 # Functions that the runtime has in forms that fill vector registers; the rest is the standard library's.
 _ELEMENTARY = frozenset({"atan", "cos", "cosh", "exp", "sin", "sinh"})
 _MATH = frozenset({*FUNCTIONS.values(), "sqrt", "pi", "e"} - _ELEMENTARY)
-_RUNTIME = ("Addresses", "CompiledModel", "LaunchRequest", "Pass1")
+_RUNTIME = ("CompiledFunctions", "CompiledModel", "LaunchRequest", "Pass1")
 # Columns of the emitted import list.
 _WIDTH = 116
-# Functions that every module hands over, as the interface orders them.
-_ADDRESSES = (
+# The functions of one motion, as the interface orders them.
+_COMPILED_FUNCTIONS = (
     "path_and_contact_force",
     "effective_potential",
     "potential_divdiff1",
@@ -38,10 +38,11 @@ _ADDRESSES = (
 _OWN = frozenset(
     {
         *_RUNTIME,
-        *("Any", "BatchFunctions", "CHART", "Dissipation", "ExactFormulas", "ExactPotential", "MODEL", "Motion"),
-        *("PARAMETERS", "Sweep", "TYPE_CHECKING", "carray", "chart", "chart_of", "compiled", "compiler", "fabs"),
+        *("Any", "BatchFunctions", "CHART", "DissipativeFunctions", "ExactFormulas", "ExactPotential", "MODEL"),
+        *("Motion", "PARAMETERS", "Sweep", "TYPE_CHECKING", "carray", "chart", "chart_of", "compiled"),
+        *("compiler", "fabs"),
         *("op", "pass1", "place_from_ends", "range", "self", "solve", "sweep"),
-        *("Equilibrium", "SeparatedTerms", "between", "equilibria", "unknown"),
+        *("Equilibrium", "ExactLaw", "SeparatedTerms", "between", "equilibria", "unknown"),
     }
 )
 
@@ -99,9 +100,8 @@ def render(module: ModuleIR, *, source: str) -> str:
         "exact": [exact_formula(f) for f in _exact_functions(module)],
         "data": list(chart.data) if chart else [],
         "parameter": module.parameter,
-        "keywords": ", ".join(f"{name}: Any = {value!r}" for name, value in module.defaults),
+        "keywords": [f"{name}: Any = {value!r}" for name, value in module.defaults],
         "names": f"({', '.join(name for name, _ in module.defaults)}{',' if len(module.defaults) == 1 else ''})",
-        "names_text": ", ".join(name for name, _ in module.defaults),
         **_model_fields(module, [f["name"] for f in functions.all]),
     }
     body = _tidied(_fill(environment, "body.py.j2", fields))
@@ -120,7 +120,7 @@ def _imported(module: ModuleIR, functions: _Functions) -> set[str]:
     if _exact_formulas(module):
         names.add(_exact_class(module))
     if module.dissipation:
-        names.add("Dissipation")
+        names.add("DissipativeFunctions")
     if module.separated:
         names.add("SeparatedTerms")
     if module.bounds_batch is not None:
@@ -132,7 +132,8 @@ def _imported(module: ModuleIR, functions: _Functions) -> set[str]:
 
 def _model_fields(module: ModuleIR, names: list[str]) -> dict[str, Any]:
     """The arguments of ``CompiledModel``, as text; empty ones are left out of the module."""
-    later = {f.name for f in (*module.functions, module.bounds) if f is not None and f.later}
+    compiled = [name for name in _COMPILED_FUNCTIONS if name in names]
+    of_a_motion = 1 if module.dissipation else len(compiled)
     return {
         "name_text": repr(module.name),
         "parameter_text": repr(module.parameter),
@@ -141,10 +142,8 @@ def _model_fields(module: ModuleIR, names: list[str]) -> dict[str, Any]:
         "at_least": repr(module.at_least) if module.at_least else "",
         "rolling_radius": repr(module.rolling_radius) if module.rolling_radius else "",
         "static_friction_limit": repr(module.static_friction_limit) if module.static_friction_limit else "",
-        "addresses": _listed(
-            [f"{name}.address" for name in _ADDRESSES if name in names and name not in later], _WIDTH - 8
-        ),
-        "later": ", ".join(f"{name}={name}" for name in _ADDRESSES if name in later),
+        "compiled_functions": _listed(compiled[:of_a_motion], _WIDTH - 8),
+        "for_equilibria": ", ".join(f"{name}={name}" for name in compiled[of_a_motion:]),
         "inertia": next((f.name for f in module.exact if f.name == "exact_inertia"), ""),
         "trigonometric": next((f.name for f in module.exact if f.name == "exact_trigonometric"), ""),
         "load_map": "load_map" if "load_map" in names else "",
@@ -175,12 +174,14 @@ def _separated(terms: SeparatedIR) -> str:
 
 
 def _exact_formulas(module: ModuleIR) -> list[str]:
-    """The formulas over a namespace that a conservative module hands over; empty where there are none."""
+    """The formulas over a namespace that a module hands over; empty where there are none."""
     return [function.name for function in module.exact if function.places]
 
 
 def _exact_class(module: ModuleIR) -> str:
     """The record that takes them."""
+    if module.dissipation:
+        return "ExactLaw"
     return "ExactPotential" if module.chart else "ExactFormulas"
 
 
@@ -265,7 +266,7 @@ def _environment() -> jinja2.Environment:
 
 @cache
 def _templates_in(folder: Path) -> jinja2.Environment:
-    return jinja2.Environment(
+    environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(folder),
         undefined=jinja2.StrictUndefined,
         trim_blocks=True,
@@ -273,6 +274,8 @@ def _templates_in(folder: Path) -> jinja2.Environment:
         keep_trailing_newline=True,
         autoescape=False,
     )
+    environment.filters["listed"] = _listed
+    return environment
 
 
 @cache

@@ -1,7 +1,5 @@
 """The potential and the load along a charted curve as sums of products: a factor of parameters and a part of places."""
 
-from dataclasses import replace
-
 from sympy import Add, Expr, Mul, S, Symbol, ordered
 
 from gqm_sym.derivation.algebra.difference import Differences
@@ -68,7 +66,7 @@ def separated_terms(lowering: Lowering) -> SeparatedIR | None:
         (*potential.values(), *load.values()),
     )
     return SeparatedIR(
-        function=replace(function, later=True),
+        function=function,
         factors=factors,
         parts=_parts_in_plane(lowering, tuple(potential)),
         potentials=len(potential),

@@ -79,9 +79,9 @@ def fit(module: ModuleType, data: Any, free: Mapping[str, Any], **fixed: Any) ->
     Notes
     -----
     Derivatives are those of ``motion.sensitivity`` and of sweeps with ``gradient``, which are exact to rounding, and
-    difference quotients of solved motions where these are not there yet. Without ``sigma`` all measurements have
-    the same unknown standard deviation, which is estimated from the residuals. First guesses for long series of
-    positions must be so near that the fitted motion does not slip by a swing.
+    difference quotients of solved motions where these are not there yet, as along curves without formulas. Without
+    ``sigma`` all measurements have the same unknown standard deviation, which is estimated from the residuals. First
+    guesses for long series of positions must be so near that the fitted motion does not slip by a swing.
     """
     from scipy.optimize import least_squares
 
@@ -91,7 +91,7 @@ def fit(module: ModuleType, data: Any, free: Mapping[str, Any], **fixed: Any) ->
     for name in fixed:
         if name not in known:
             raise InputError(unknown_argument("fit", name, known))
-    measured = read_measurements(data, _units(model), model.units.get(model.parameter))
+    measured = read_measurements(data, units_of(model), model.units.get(model.parameter))
     for name in measured.columns:
         if name in unknown.names:
             raise InputError(f"free: {name} is a column of the data, and so it is known")
@@ -114,8 +114,8 @@ def fit(module: ModuleType, data: Any, free: Mapping[str, Any], **fixed: Any) ->
     return _result(residuals, np.asarray(found.x), bool(found.success))
 
 
-def _units(model: CompiledModel) -> dict[str, str | None]:
-    """The units of all numbers that may be sought or given."""
+def units_of(model: CompiledModel) -> dict[str, str | None]:
+    """Return the units of all numbers that may be sought or given."""
     own = model.units.get(model.parameter)
     return {"lam0": own, "v0": "m/s", **{name: model.units.get(name) for name in model.parameters}}
 
@@ -132,7 +132,7 @@ def _free(model: CompiledModel, free: Mapping[str, Any], fixed: Mapping[str, Any
         if given is not None and name in fixed:
             raise InputError(f"free: {name} has a first guess here and a value by keyword; give one of them")
         parts = list(given) if isinstance(given, tuple | list) else [given]
-        unit = _units(model)[name]
+        unit = units_of(model)[name]
         numbers = [None if p is None else read_number(p, where=f"free: {name}", unit=unit).value for p in parts]
         if len(numbers) not in (1, 2, 3) or (len(numbers) > 1 and None in numbers):
             raise InputError(f"free: {name}: must be a guess, (low, high), (low, guess, high) or None, got {given!r}")
@@ -227,8 +227,10 @@ class Residuals:
     def _derivatives(self, x: Array) -> Array:
         names, wrt = tuple(self.measured.values), self.free.names
         if self.measured.t is not None:
-            found = self.motion(x).sensitivity(self.measured.t, wrt=wrt)
-            return np.concatenate([getattr(found, name).T for name in names])
+            motion = self.motion(x)
+            t = _until_rest(motion, self.measured.t)
+            found, moves = motion.sensitivity(t, wrt=wrt), {"v": t == self.measured.t}
+            return np.concatenate([(getattr(found, name) * moves.get(name, 1.0)).T for name in names])
         if self.measured.place is not None:
             motion = self.motion(x)
             times = _passages(motion, self.measured.place)

@@ -80,13 +80,7 @@ class Fit:
         )
 
     def _estimate(self, name: str) -> str:
-        value, std = self.estimates[name], self.std[name]
-        if not isfinite(std):
-            return f"{value:.6g}, not determined"
-        if std == 0.0:
-            return f"{value!r}"
-        digits = max(0, 1 - int(np.floor(np.log10(std))))
-        return f"{value:.{digits}f} +- {std:.{digits}f}" if digits < 17 else f"{value!r} +- {std:.1e}"
+        return with_deviation(self.estimates[name], self.std[name])
 
     def __repr__(self) -> str:
         return f"<fit of {', '.join(f'{name} = {value!r}' for name, value in self.estimates.items())}>"
@@ -131,3 +125,13 @@ class Fit:
             ((name, column),) = self.measured.columns.items()
             return column, name
         return np.arange(1.0, count + 1.0), "number"
+
+
+def with_deviation(value: float, std: float) -> str:
+    """Return a value with its standard deviation as text, with the two digits that tell something of it."""
+    if not isfinite(std):
+        return f"{value:.6g}, not determined"
+    if std == 0.0:
+        return f"{value!r}"
+    digits = max(0, 1 - int(np.floor(np.log10(std))))
+    return f"{value:.{digits}f} +- {std:.{digits}f}" if digits < 17 else f"{value!r} +- {std:.1e}"

@@ -71,13 +71,13 @@ is monotone on either side the turning point may have a closed form, ``turning_p
 from the axis and its V**2.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
 from typing import Any, NamedTuple
 
 from numba import types
 
 # Raised with every change of a signature here, or of a number that runtime code puts into generated modules.
-INTERFACE = 9
+INTERFACE = 10
 
 REAL = types.float64
 MANY = types.CPointer(REAL)
@@ -119,6 +119,27 @@ class Addresses(NamedTuple):
     bounds: int = 0
 
 
+class CompiledFunctions(NamedTuple):
+    """The functions of one module that serve one motion, each compiled when its address is first needed (`jit.Later`).
+
+    A function that a module does not have is None.
+    """
+
+    path_and_contact_force: Any
+    effective_potential: Any = None
+    potential_divdiff1: Any = None
+    potential_divdiff2: Any = None
+    bounds: Any = None
+
+    def addresses(self) -> Addresses:
+        """Where they lie in memory; 0 for one that there is not."""
+        return Addresses(*_addresses(self))
+
+
+def _addresses(functions: Iterable[Any]) -> Iterator[int]:
+    return (function.address if function else 0 for function in functions)
+
+
 class BatchAddresses(NamedTuple):
     """Where the compiled functions of one module that serve many orbits at once lie in memory; 0 for missing ones."""
 
@@ -152,12 +173,11 @@ class BatchFunctions(NamedTuple):
 
     def addresses(self) -> BatchAddresses:
         """Where they lie in memory; 0 for one that there is not."""
-        functions = (getattr(self, name) for name in BatchAddresses._fields)
-        return BatchAddresses(*(function.address if function else 0 for function in functions))
+        return BatchAddresses(*_addresses(getattr(self, name) for name in BatchAddresses._fields))
 
 
 class Dissipation(NamedTuple):
-    """What a dissipative model adds: the addresses of two functions, and of what kind its forces are.
+    """What compiled code takes of a dissipative model: the addresses of two functions, and of what kind its forces are.
 
     Attributes
     ----------
@@ -176,6 +196,21 @@ class Dissipation(NamedTuple):
     friction: bool
     kinked: bool
     linear: bool
+
+
+class DissipativeFunctions(NamedTuple):
+    """The functions that a dissipative module adds (`jit.Later`), with the flags of `Dissipation`."""
+
+    speed_equation: Any
+    static_balance: Any
+    friction: bool
+    kinked: bool
+    linear: bool
+
+    def addresses(self) -> Dissipation:
+        """Where they lie in memory, with the flags."""
+        speed_equation, static_balance = _addresses(self[:2])
+        return Dissipation(speed_equation, static_balance, self.friction, self.kinked, self.linear)
 
 
 class SeparatedTerms(NamedTuple):
@@ -223,3 +258,18 @@ class ExactFormulas(NamedTuple):
     static_normal_load: Callable[..., Any]
     effective_potential: Callable[..., Any]
     effective_potential_slope: Callable[..., Any]
+
+
+class ExactLaw(NamedTuple):
+    """The formulas of a dissipative module: those of the path as of `ExactFormulas`, and the law of motion.
+
+    ``speed_slope`` is dW/dlam [m2/s2/[lam]] with W = V**2: ``f(op, lam, w, v, nu, p)`` with v = sgn(ds/dt), nu =
+    sgn(N).
+    """
+
+    x: Callable[..., Any]
+    z: Callable[..., Any]
+    ds: Callable[..., Any]
+    kappa: Callable[..., Any]
+    static_normal_load: Callable[..., Any]
+    speed_slope: Callable[..., Any]

@@ -32,12 +32,14 @@ _NAMES_BY_HOME = {
         "divdiff1_chart_z divdiff2_chart_alpha divdiff2_chart_x divdiff2_chart_z ichart_alpha ichart_kappa "
         "ichart_x ichart_z"
     ),
+    "charts.polynomials": "Polynomials",
     "charts.rail": "Rail",
     "charts.sampled": "Sampled",
     "charts.tracing": "Traced",
     "interface": (
-        "AGM_ARGUMENTS_BATCH Addresses BOUNDS BOUNDS_BATCH BatchFunctions Dissipation EFFECTIVE_POTENTIAL "
-        "ExactFormulas ExactPotential FIELD INTEGRAND_INVARIANTS_BATCH LOAD_MAP ORBIT_INVARIANTS_BATCH "
+        "AGM_ARGUMENTS_BATCH BOUNDS BOUNDS_BATCH BatchFunctions CompiledFunctions DissipativeFunctions "
+        "EFFECTIVE_POTENTIAL ExactFormulas ExactLaw ExactPotential FIELD INTEGRAND_INVARIANTS_BATCH LOAD_MAP "
+        "ORBIT_INVARIANTS_BATCH "
         "PATH_AND_CONTACT_FORCE POTENTIAL_DIVDIFF1 POTENTIAL_DIVDIFF1_BATCH POTENTIAL_DIVDIFF2 "
         "POTENTIAL_DIVDIFF2_BATCH SEGMENT SEPARATED_TERMS SPEED_EQUATION STATIC_BALANCE SeparatedTerms "
         "TIME_INTEGRAND_BATCH TURNING_POINT_BATCH"

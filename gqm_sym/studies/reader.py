@@ -2,12 +2,14 @@
 
 import difflib
 import re
-from collections.abc import Iterator, Mapping
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from math import isfinite
 from pathlib import Path
+from typing import Any, Generic, TypeVar
 
 import numpy as np
-from pydantic import ValidationError
+from pydantic import BaseModel, ValidationError
 
 from gqm_sym.budgets import apart, budget
 from gqm_sym.derivation import Model
@@ -23,14 +25,17 @@ from gqm_sym.specfile.locations import locate, node_at, place_of
 from gqm_sym.specfile.nodes import MapNode, Mistakes, plain
 from gqm_sym.specfile.units import expected_units, launch_units
 from gqm_sym.specfile.yamltext import read_text, read_tree
-from gqm_sym.studies.plan import POINTS_IN_LOOPS, POINTS_SOLVED, Axis, Plan, evenly, in_doubles
-from gqm_sym.studies.schema import MOST_POINTS, SweepFile, model_at
+from gqm_sym.studies.plan import POINTS_IN_LOOPS, POINTS_SOLVED, Array, Axis, Plan, evenly, in_doubles
+from gqm_sym.studies.schema import MOST_POINTS, SweepFile, Table, model_at
 
 SECONDS = 0.5
 
+# What a file asks for, and its schema.
+P = TypeVar("P")
+S = TypeVar("S", bound=BaseModel)
+
 # An exponent of more digits would make exact numbers that fill the memory.
 _DECIMAL = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d{1,3})?", re.ASCII)
-_NEEDED = "curve, quantities and grid"
 _LAUNCH = ("lam0", "v0", "direction", "lam")
 
 
@@ -47,13 +52,18 @@ def read_sweep(path: Path | str) -> Plan:
     SpecFileError
         With every mistake, one line each: ``file:line:column: what; what would be right``.
     """
+    return read_study(path, _SweepReader, needed="curve, quantities and grid")
+
+
+def read_study(path: Path | str, reader: "type[StudyReader[P]]", *, needed: str) -> P:
+    """Read a file that asks something of the motions on the curve of another file, as `read_sweep` does."""
     mistakes = Mistakes(path)
     text = read_text(Path(path), mistakes)
-    tree = read_tree(text, mistakes, needed=_NEEDED)
+    tree = read_tree(text, mistakes, needed=needed)
     if isinstance(tree, MapNode):
         try:
             with budget("reading", SECONDS, "write fewer and simpler numbers"):
-                plan = _Reader(tree, mistakes, text).read()
+                plan = reader(tree, mistakes, text).read()
         except BudgetError as error:
             raise SpecFileError(f"{path}: {error}") from None
         if plan is not None and not mistakes:
@@ -63,33 +73,131 @@ def read_sweep(path: Path | str) -> Plan:
     raise mistakes.error()
 
 
-class _Reader:
+class StudyReader(ABC, Generic[P]):
     """Goes through one file's tree; notes what is wrong and goes on with the rest."""
+
+    known: tuple[str, ...]
+    units: dict[str, str]
 
     def __init__(self, tree: MapNode, mistakes: Mistakes, text: str) -> None:
         self.tree, self.mistakes, self.text = tree, mistakes, text
         self.folder = Path(mistakes.path).parent
-        self.origin = {"sweep_file": text}
+        self.origin: dict[str, str] = {}
 
-    def read(self) -> Plan | None:
+    @abstractmethod
+    def read(self) -> P | None:
+        """Return what the file asks for; None if it cannot be told."""
+
+    def validated(self, schema: type[S], model_at: Callable[[tuple[str, ...]], Any]) -> S | None:
+        """Return the file in the shape of its schema."""
         try:
-            file = SweepFile.model_validate(plain(self.tree))
+            return schema.model_validate(plain(self.tree))
         except ValidationError as error:
             spoilt = self.mistakes.places()
             for detail in error.errors(include_url=False, include_input=False):
                 explain(detail, self.tree, self.mistakes, model_at, spoilt=spoilt)
             return None
+
+    def curve(self, name: str) -> tuple[Spec, Model] | None:
+        """Return the curve file, and what is derived from it; its own mistakes are its own."""
+        try:
+            path = path_beside(name, self.folder, wanted="a curve file")
+        except InputError as error:
+            self.mistakes.add(*locate(self.tree, str(error), ("curve",)))
+            return None
+        spec = read_spec(self.folder / name)
+        self.origin["curve_file"] = path.read_text(encoding="utf-8-sig")
+        model = spec.derive()
+        self.known = (*_LAUNCH, *(name for name, _ in model.defaults))
+        kernel = spec.kernel.along(spec.curve.parameter)
+        units = {**expected_units(plain(spec.tree), spec.curve, kernel), **launch_units(spec.curve)}
+        self.units = {**units, "direction": "1", **({"lam": units["lam0"]} if "lam0" in units else {})}
+        return spec, model
+
+    def table(self, table: Table, key: str) -> Iterator[tuple[str, Array]]:
+        """Yield the columns of a table, in SI."""
+        name, units = table.file, table.units
+        try:
+            text = read_beside(name, self.folder, wanted="a CSV file whose first line names its columns")
+            header, rows = read_rows(name, text)
+            columns = _columns(name, header, rows)
+        except InputError as error:
+            self.mistakes.add(*locate(self.tree, str(error), (key,)))
+            return
+        self.origin["table"] = text
+        for column in units:
+            if column not in columns:
+                mark = place_of(self.tree, (key, "units", column))
+                what = f"{key}.units: {name!r} has no column {column!r}"
+                self.mistakes.add(mark, what, f"it has {', '.join(columns)}")
+            else:
+                self.check_unit(column, units[column], key, "units", column)
+        for column, cells in columns.items():
+            yield column, in_doubles(cells, read_unit(units.get(column) or "1", where="unit"))
+
+    def fixed(self, file: Any, spec: Spec) -> dict[str, str]:
+        """Return what is the same everywhere: of the curve file's launch, and of this file."""
+        launch = {key: str(value) for key, value in (spec.launch or {}).items() if key != "point"}
+        given = {}
+        for name, entry in file.fixed.items():
+            self.check_unit(name, entry.unit, "fixed", name, "unit")
+            given[name] = in_si(entry.value, entry.unit)
+        if "contact" in file.model_fields_set:
+            launch["contact"] = file.contact
+        if launch.get("contact") == "bilateral":
+            del launch["contact"]
+        return launch | given
+
+    def check_unit(self, name: str, unit: str, *path: str) -> None:
+        """Note a unit of another dimension than what it is the unit of."""
+        if unit:
+            try:
+                check_unit(unit, self.units.get(name))
+            except InputError as error:
+                self.mistakes.add(node_at(self.tree, path).mark, f"{'.'.join(path)}: {error}")
+
+    def check_known(self, path: tuple[str, ...], spec: Spec, known: Sequence[str]) -> bool:
+        """Note a name, the last of its path, that nothing is called by."""
+        name = path[-1]
+        if name in known:
+            return True
+        near = difflib.get_close_matches(name, known, n=1)
+        remedy = f"did you mean {near[0]}?" if near else f"known are {', '.join(known)}"
+        self.mistakes.add(place_of(self.tree, path), f"{path[0]}: there is no {name!r} in {spec.path}", remedy)
+        return False
+
+
+def _columns(name: str, header: list[str], rows: list[list[str]]) -> dict[str, list[str]]:
+    """The cells of a table by its columns, each a finite decimal number."""
+    if not header or not rows:
+        raise InputError(f"{name!r}, row 1: must name the columns, as in lam0,v0, with values in the rows below")
+    if len(set(header)) < len(header):
+        raise InputError(f"{name!r}, row 1: names a column twice: {', '.join(header)}")
+    for number, row in enumerate(rows, start=2):
+        if len(row) != len(header):
+            raise InputError(f"{name!r}, row {number}: must have {len(header)} numbers, has {len(row)}")
+        for cell in row:
+            if not _is_decimal(cell):
+                raise InputError(f"{name!r}, row {number}: {cell!r:.60} is no finite decimal number")
+    return dict(zip(header, map(list, zip(*rows, strict=True)), strict=True))
+
+
+class _SweepReader(StudyReader[Plan]):
+    """Reads a sweep file."""
+
+    def read(self) -> Plan | None:
+        """Return the plan of the sweep."""
+        self.origin["sweep_file"] = self.text
+        file = self.validated(SweepFile, model_at)
+        if file is None:
+            return None
         with apart():  # curve files, derivations and emissions have budgets of their own
-            found = self._curve(file.curve)
+            found = self.curve(file.curve)
             if found is None:
                 return None
             spec, model = found
-            self.known = (*_LAUNCH, *(name for name, _ in model.defaults))
-            kernel = spec.kernel.along(spec.curve.parameter)
-            units = {**expected_units(plain(spec.tree), spec.curve, kernel), **launch_units(spec.curve)}
-            self.units = {**units, "direction": "1", **({"lam": units["lam0"]} if "lam0" in units else {})}
             axes = self._axes(file)
-        fixed = self._fixed(file, spec)
+        fixed = self.fixed(file, spec)
         self._check_names(axes, fixed, file, spec, model)
         self._check_values(axes, fixed, model)
         if self.mistakes:
@@ -111,17 +219,6 @@ class _Reader:
             part=POINTS_SOLVED if solved_singly else POINTS_IN_LOOPS,
         )
 
-    def _curve(self, name: str) -> tuple[Spec, Model] | None:
-        """The curve file, and what is derived from it; its own mistakes are its own."""
-        try:
-            path = path_beside(name, self.folder, wanted="a curve file")
-        except InputError as error:
-            self.mistakes.add(*locate(self.tree, str(error), ("curve",)))
-            return None
-        spec = read_spec(self.folder / name)
-        self.origin["curve_file"] = path.read_text(encoding="utf-8-sig")
-        return spec, spec.derive()
-
     # -- what varies, and what does not -----------------------------------------------------------
 
     def _axes(self, file: SweepFile) -> list[Axis]:
@@ -131,7 +228,9 @@ class _Reader:
             remedy = "give one of them" if given else "say what varies, as in grid: {lam0: [0.5, 1]}, or give a table"
             self.mistakes.add(place_of(self.tree, ("table",)), what, remedy)
             return []
-        return list(self._grid(file) if "grid" in given else self._table(file))
+        if "grid" in given:
+            return list(self._grid(file))
+        return [Axis(name=name, values=values) for name, values in self.table(file.table, "table")]
 
     def _grid(self, file: SweepFile) -> Iterator[Axis]:
         points = 1
@@ -147,70 +246,14 @@ class _Reader:
                 what = f"grid.{name}: does not say what its values are"
                 self.mistakes.add(mark, what, "give start, stop and num, or values")
                 continue
-            self._check_unit(name, axis.unit, "grid", name, "unit")
+            self.check_unit(name, axis.unit, "grid", name, "unit")
             if points > MOST_POINTS:
                 self.mistakes.add(mark, f"grid: has more than {MOST_POINTS} points", "give fewer values")
                 return
             values = [read_number(value, where=name).value for value in exact] if "values" in given else None
             yield Axis(name=name, values=evenly(exact[0], exact[1], axis.num) if values is None else np.array(values))
 
-    def _table(self, file: SweepFile) -> Iterator[Axis]:
-        name, units = file.table.file, file.table.units
-        try:
-            text = read_beside(name, self.folder, wanted="a CSV file whose first line names its columns")
-            header, rows = read_rows(name, text)
-            columns = self._columns(name, header, rows)
-        except InputError as error:
-            self.mistakes.add(*locate(self.tree, str(error), ("table",)))
-            return
-        self.origin["table"] = text
-        for column in units:
-            if column not in columns:
-                mark = place_of(self.tree, ("table", "units", column))
-                self.mistakes.add(
-                    mark, f"table.units: {name!r} has no column {column!r}", f"it has {', '.join(columns)}"
-                )
-            else:
-                self._check_unit(column, units[column], "table", "units", column)
-        for column, cells in columns.items():
-            unit = read_unit(units.get(column) or "1", where="unit")
-            yield Axis(name=column, values=in_doubles(cells, unit))
-
-    def _columns(self, name: str, header: list[str], rows: list[list[str]]) -> dict[str, list[str]]:
-        """The cells of a table by its columns, each a finite decimal number."""
-        if not header or not rows:
-            raise InputError(f"{name!r}, row 1: must name the columns, as in lam0,v0, with values in the rows below")
-        if len(set(header)) < len(header):
-            raise InputError(f"{name!r}, row 1: names a column twice: {', '.join(header)}")
-        for number, row in enumerate(rows, start=2):
-            if len(row) != len(header):
-                raise InputError(f"{name!r}, row {number}: must have {len(header)} numbers, has {len(row)}")
-            for cell in row:
-                if not _is_decimal(cell):
-                    raise InputError(f"{name!r}, row {number}: {cell!r:.60} is no finite decimal number")
-        return dict(zip(header, map(list, zip(*rows, strict=True)), strict=True))
-
-    def _fixed(self, file: SweepFile, spec: Spec) -> dict[str, str]:
-        """What is the same at all points: of the curve file's launch, and of this file."""
-        launch = {key: str(value) for key, value in (spec.launch or {}).items() if key != "point"}
-        given = {}
-        for name, entry in file.fixed.items():
-            self._check_unit(name, entry.unit, "fixed", name, "unit")
-            given[name] = in_si(entry.value, entry.unit)
-        if "contact" in file.model_fields_set:
-            launch["contact"] = file.contact
-        if launch.get("contact") == "bilateral":
-            del launch["contact"]
-        return launch | given
-
     # -- what is wrong with it --------------------------------------------------------------------
-
-    def _check_unit(self, name: str, unit: str, *path: str) -> None:
-        if unit:
-            try:
-                check_unit(unit, self.units.get(name))
-            except InputError as error:
-                self.mistakes.add(node_at(self.tree, path).mark, f"{'.'.join(path)}: {error}")
 
     def _check_names(self, axes: list[Axis], fixed: dict[str, str], file: SweepFile, spec: Spec, model: Model) -> None:
         """Note names that nothing is called by, and those that lack a value; of two values, one goes."""
@@ -218,13 +261,10 @@ class _Reader:
         places = {axis.name: ("grid", axis.name) if grid else ("table",) for axis in axes}
         for name, path in [*places.items(), *((name, ("fixed", name)) for name in file.fixed)]:
             known = (*self.known, "t_max") if path[0] == "fixed" else self.known
-            mark = place_of(self.tree, path)
-            if name not in known:
-                near = difflib.get_close_matches(name, known, n=1)
-                remedy = f"did you mean {near[0]}?" if near else f"known are {', '.join(known)}"
-                self.mistakes.add(mark, f"{path[0]}: there is no {name!r} in {spec.path}", remedy)
-            elif path[0] == "fixed" and name in places:
-                self.mistakes.add(mark, f"fixed: {name!r} varies", "give its values in one place")
+            if self.check_known((*path, name) if path == ("table",) else path, spec, known) and (
+                path[0] == "fixed" and name in places
+            ):
+                self.mistakes.add(place_of(self.tree, path), f"fixed: {name!r} varies", "give its values in one place")
         for axis in axes:
             fixed.pop(axis.name, None)
         given = {axis.name for axis in axes} | set(fixed)

@@ -148,7 +148,7 @@ class Loss:
     """The compiled functions of a dissipative module, called by address as the runtime calls them."""
 
     def __init__(self, module: ModuleType, values: dict[str, str]) -> None:
-        self.dissipation = module.MODEL.dissipation
+        self.dissipation = module.MODEL.dissipation.addresses()
         given = module.PARAMETERS | values
         self.p = np.array([n.value for n in module.MODEL.numbers(tuple(given.values()))])
 
@@ -265,14 +265,14 @@ def test_the_law_can_be_read_in_the_module() -> None:
         "out[1, i] = 2*ds*(-mu*n0*nu*v + push)",
         "out[2, i] = 2*mu*nu*turn*v",
         "out[0, i] = -mu*fabs(n0) + push",
-        "path_and_contact_force.address,",
-        "dissipation=Dissipation(speed_equation.address, static_balance.address, friction=True, kinked=False, ",
+        "path_and_contact_force,",
+        "dissipation=DissipativeFunctions(speed_equation, static_balance, friction=True, kinked=False, ",
         "at_least=(('mu', '0'),),",
         "W = V**2       = v0**2*exp(",
         "V**2: spectral antiderivative, no elementary form found",
     ):
         assert line in text
-    for word in ("DIVDIFF", "place_from_ends", "intervals", "ExactFormulas", "exact_x"):
+    for word in ("DIVDIFF", "place_from_ends", "intervals", "ExactFormulas", "exact_effective_potential"):
         assert word not in text
 
 

@@ -115,13 +115,21 @@ def test_friction(spring: ModuleType) -> None:
     x = side * (offset + left * np.cos(rate * t - np.pi * n))
     x[n == last] = (-1.0) ** last * (start - 2.0 * last * offset)
     found = gqm.fit(spring, {"t": t, "x": x}, {"mu": (0, 0.09, 1), "k": (30, 39.9, 50)}, lam0=start)
-    assert found.estimates == pytest.approx({"mu": mu, "k": k}, rel=1e-9)
+    assert found.estimates == pytest.approx({"mu": mu, "k": k}, rel=1e-12)
     assert _until_rest(spring.solve(1), np.array([5.0, 12.0])) == pytest.approx([5.0, last * np.pi / rate], rel=1e-14)
     # Through the place of equilibrium of swings to the left: in the middle of these, and later on the swings back.
     n = np.arange(5)
     half = np.where(n % 2, np.arccos(-2.0 * offset / (start - (2.0 * n + 1.0) * offset)), 0.5 * np.pi)
     data = {"passages": (n * np.pi + half) / rate, "place": offset}
-    assert gqm.fit(spring, data, {"k": 39}, lam0=start).estimates["k"] == pytest.approx(k, rel=1e-9)
+    assert gqm.fit(spring, data, {"k": 39}, lam0=start).estimates["k"] == pytest.approx(k, rel=1e-12)
+    # The derivatives are exact, and after the body has come to rest its speed does not change.
+    free = Free(("mu", "k", "lam0"), np.array([mu, k, start]), np.full(3, -np.inf), np.full(3, np.inf))
+    late = np.array([0.3, 4.1, 12.0])
+    residuals = Residuals(spring, read_measurements({"t": late, "x": late, "v": late}, {}, None), free, {})
+    exact = residuals.jacobian(free.start)
+    assert residuals.exact
+    assert exact == pytest.approx(residuals._differences(free.start), rel=1e-6, abs=1e-7)
+    assert exact[-1].tolist() == [0.0, 0.0, 0.0]
 
 
 def test_derivatives_are_the_difference_quotients(pendulum: ModuleType) -> None:

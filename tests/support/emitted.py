@@ -88,7 +88,7 @@ class Compiled:
     """The compiled functions of a module, called by address as the runtime calls them; or `interpreted` ones."""
 
     def __init__(self, module: ModuleType, values: tuple[float, ...]) -> None:
-        self.addresses = module.MODEL.addresses
+        self.addresses = module.MODEL.functions.addresses()
         self.p = np.array([*values, 9.75, 2.0])
 
     def _call(self, name: str, rows: int, n: int | None, *arguments: float | list[float]) -> np.ndarray:

@@ -28,7 +28,7 @@ class Parts:
         self._context, self._part = context, cache(part)
         self._origins = [(int(part), low, high) for part, low, high in chart.origins.tolist()]
         self.ends = cache(self._ends)
-        self.start = self.ends(0)[0]
+        self.start = self.ends(int(np.argmin(np.abs(chart.edges[:-1]))))[0]  # where arc length is 0
 
     def _ends(self, k: int) -> tuple[tuple[Any, Any], tuple[Any, Any]]:
         """Return the points at which a piece begins and ends."""

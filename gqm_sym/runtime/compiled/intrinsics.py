@@ -1,4 +1,4 @@
-"""Operations of LLVM that Python's ``math`` lacks: fused products, rounding, bits, selection, polynomials.
+"""Operations of LLVM that Python's ``math`` lacks: fused products, rounding, bits, selection, loads, polynomials.
 
 Loops over these vectorise. Loops over functions of the C library, such as ``math.sin``, do not.
 """
@@ -58,6 +58,17 @@ def from_bits(_, n):  # type: ignore[no-untyped-def]
         return builder.bitcast(args[0], ir.DoubleType())
 
     return types.float64(types.int64), lower
+
+
+@intrinsic
+def number_at(_, array, index):  # type: ignore[no-untyped-def]
+    """Return ``array[index]`` of a contiguous array and an index that is not negative, which numba would test for."""
+
+    def lower(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        data = context.make_array(signature.args[0])(context, builder, args[0]).data
+        return builder.load(builder.gep(data, [args[1]]))
+
+    return array.dtype(array, types.intp), lower
 
 
 @intrinsic

@@ -198,8 +198,10 @@ def _text(function: Any, lines: list[str]) -> list[str]:
     return [*head, *body]
 
 
-def compiler(file: str, *, interface: int) -> Callable[..., Callable[[Any], Any]]:
-    """Return a decorator factory for the functions of one generated module: ``compiled(signature, later=False)``.
+def compiler(file: str, *, interface: int) -> Callable[[Any], Callable[[Any], Later]]:
+    """Return a decorator factory for the functions of one generated module: ``compiled(signature)``.
+
+    Each function becomes a `Later`: it is compiled when a launch first needs it.
 
     numba's disk cache stores the name of a function's module, imports it on loading, and distinguishes machine code by
     it. A generated module may be imported under any name, from any folder: so numba sees each function under a name
@@ -215,7 +217,7 @@ def compiler(file: str, *, interface: int) -> Callable[..., Callable[[Any], Any]
     Raises
     ------
     OutdatedModuleError
-        If that is not the version of this runtime; nothing has been compiled then.
+        If that is not the version of this runtime.
     """
     if interface != INTERFACE:
         raise OutdatedModuleError(
@@ -224,7 +226,7 @@ def compiler(file: str, *, interface: int) -> Callable[..., Callable[[Any], Any]
         )
     lines = Path(file).read_text(encoding="utf-8").splitlines()
 
-    def compiled(signature: Any, *, later: bool = False) -> Callable[[Any], Any]:
+    def compiled(signature: Any) -> Callable[[Any], Later]:
         def compile_it(function: Any, alias: str) -> Any:
             found = _IN_USE.get(alias)
             if found is None:
@@ -236,10 +238,10 @@ def compiler(file: str, *, interface: int) -> Callable[..., Callable[[Any], Any]
                     ANNOUNCER.end()
             return found
 
-        def decorate(function: Any) -> Any:
+        def decorate(function: Any) -> Later:
             text = "\n".join((function.__name__, *_text(function, lines)))
             alias = GENERATED + hashlib.sha256(text.encode()).hexdigest()[:16]
-            return Later(lambda: compile_it(function, alias)) if later else compile_it(function, alias)
+            return Later(lambda: compile_it(function, alias))
 
         return decorate
 

@@ -131,10 +131,14 @@ class EntryLibrary(JITCodeLibrary):  # type: ignore[misc]
                 manager.run(function, builder)
 
     def _optimize_final_module(self) -> None:
-        """Optimise all functions together, as far as LLVM goes where nobody else can call those that were linked."""
+        """Optimise all functions together, as far as LLVM goes where nobody else can call those that were linked.
+
+        They take other arguments then, so that they must not have a symbol either: code that is compiled later, such as
+        a function of a user's own that calls the same ones, would find and call them by it.
+        """
         for function in self._final_module.functions:
             if not function.is_declaration and function.linkage == llvmlite.binding.Linkage.linkonce_odr:
-                function.linkage = llvmlite.binding.Linkage.internal
+                function.linkage = llvmlite.binding.Linkage.private
         super()._optimize_final_module()
 
     def _finalize_specific(self) -> None:

@@ -302,8 +302,8 @@ class Recorder(_Recorder):
         For the register of each constant the number that it is, or the name of it.
     """
 
-    def __init__(self, parameters: int) -> None:
-        super().__init__(parameters)
+    def __init__(self, parameters: int, coordinates: int = 1) -> None:
+        super().__init__(parameters, coordinates)
         self.exact: dict[int, Fraction | str] = {self.pi.register: "pi", self.e.register: "e"}
 
     def register(self, value: Any) -> int:

@@ -53,12 +53,18 @@ def begin(program, work, inputs):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def evaluate_block(program, work, high, low):  # type: ignore[no-untyped-def]
-    """Evaluate a program at places, at most BLOCK of them."""
-    address, operations, first, count, _ = program
+def set_coordinate(work, register, high, low):  # type: ignore[no-untyped-def]
+    """Fill the register of a coordinate of places."""
     for i in range(high.size):
-        at = count * ROW + i
+        at = register * ROW + i
         work[at], work[at + LOW], work[at + ERROR] = high[i], low[i], UNIT * fabs(high[i]) if low[i] != 0.0 else 0.0
+
+
+@Inner
+def evaluate_block(program, work, high, low):  # type: ignore[no-untyped-def]
+    """Evaluate a program at places of one coordinate, at most BLOCK of them."""
+    address, operations, first, count, _ = program
+    set_coordinate(work, count, high, low)
     call_interpreter(address, operations, first, operations.shape[0], work, high.size)
 
 
@@ -208,16 +214,18 @@ def fill_values(program, work, inputs, places, found):  # type: ignore[no-untype
     ----------
     program, work, inputs
         As for `fill_means`.
-    places : (2, n) array
-        The places as two doubles each.
+    places : (2*k, n) array
+        The k coordinates of the places, as two doubles each.
     found : (k, 3, n) array
         For each result and place the value as two doubles, and a bound on its error.
     """
     begin(program, work, inputs)
-    outputs, n = program[4], places.shape[1]
+    (address, operations, first, count, outputs), n = program, places.shape[1]
     for start in range(0, n, BLOCK):
         stop = min(start + BLOCK, n)
-        evaluate_block(program, work, places[0, start:stop], places[1, start:stop])
+        for k in range(places.shape[0] // 2):
+            set_coordinate(work, count + k, places[2 * k, start:stop], places[2 * k + 1, start:stop])
+        call_interpreter(address, operations, first, operations.shape[0], work, stop - start)
         for j in range(outputs.size):
             for part in range(3):
                 for i in range(stop - start):

@@ -21,7 +21,6 @@ from gqm_sym.runtime.gradients.evaluation import (
 )
 from gqm_sym.runtime.gradients.multiprecision import UNDECIDED, MultiprecisionOrbit
 from gqm_sym.runtime.gradients.programs import (
-    PATH_QUANTITIES,
     Program,
     Source,
     circulation_program,
@@ -29,7 +28,7 @@ from gqm_sym.runtime.gradients.programs import (
     path_program,
     turning_point_program,
 )
-from gqm_sym.runtime.interface import ExactFormulas
+from gqm_sym.runtime.interface import ExactFormulas, ExactLaw
 from gqm_sym.runtime.launch.formulas import Formulas
 from gqm_sym.runtime.launch.problem import Problem
 from gqm_sym.runtime.quadrature.trapezoid import CIRCULATION, LIBRATION
@@ -47,6 +46,11 @@ def asked_for(name: str) -> Iterator[None]:
         raise SolutionError(str(error).replace("gradients:", f"{name}:", 1)) from None
 
 
+def without_formulas() -> SolutionError:
+    """What is raised for curves that have no gradients."""
+    return SolutionError("gradients: curves without formulas have none yet; declare the curve by formulas")
+
+
 def source_of(formulas: Formulas) -> Source:
     """What the programs of a module are recorded from.
 
@@ -56,7 +60,7 @@ def source_of(formulas: Formulas) -> Source:
         If its curve has no formulas.
     """
     if not isinstance(formulas.exact, ExactFormulas) or formulas.domain_of is None:
-        raise SolutionError("gradients: curves without formulas have none yet; declare the curve by formulas")
+        raise without_formulas()
     names = list(formulas.parameters)
     return Source(formulas.exact, formulas.domain_of, formulas.inertia, len(names), names.index("m"))
 
@@ -66,12 +70,22 @@ def pairs(*numbers: tuple[float, float, float]) -> Array:
     return np.ascontiguousarray(np.array(numbers, dtype=float).reshape(-1, 3).T)
 
 
-def values(program: Program, inputs: Array, high: Array, low: Array | None = None) -> Array:
-    """The results of a program at places, one row for each."""
-    places = np.array([high, np.zeros_like(high) if low is None else low])
+def values(program: Program, inputs: Array, high: Array, low: Array | None = None, *others: Array) -> Array:
+    """The results of a program at places, one row for each; ``others`` are coordinates after the first, as doubles."""
+    zero = np.zeros_like(high)
+    places = np.array([high, zero if low is None else low, *(row for other in others for row in (other, zero))])
     found = np.empty((program.outputs.size, 3, high.size))
     fill_values(program.operands, program.work, inputs, places, found)
     return found
+
+
+def path_rows(
+    formulas: ExactFormulas | ExactLaw, parameters: Array, mass: int, high: Array, low: Array | None = None
+) -> Array:
+    """What `path_program` gives at places: a row for each quantity, of rows for its value and its derivatives."""
+    count = parameters.shape[1]
+    found = values(path_program(formulas, count, mass), parameters, high, low)[:, 0]
+    return found.reshape(len(found) // (count + 2), count + 2, high.size)
 
 
 class OrbitDerivatives:
@@ -219,6 +233,5 @@ class OrbitDerivatives:
         return found if self.direction else np.hstack([found, found[:, ::-1]])
 
     def at_places(self, lam: Array) -> Array:
-        """What `path_program` gives at places: a row for each quantity, of rows for its value and its derivatives."""
-        found = values(path_program(self.source), self.parameters, lam)[:, 0]
-        return found.reshape(PATH_QUANTITIES, self.source.parameters + 2, lam.size)
+        """`path_rows` at places."""
+        return path_rows(self.source.formulas, self.parameters, self.source.mass, lam)

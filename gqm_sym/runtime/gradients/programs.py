@@ -19,13 +19,10 @@ from gqm_sym.runtime.double_double.arithmetic import UNIT
 from gqm_sym.runtime.double_double.interpreter import ERROR, INTERPRETER, LOW, ROW
 from gqm_sym.runtime.double_double.recording import Recorder, TapeNumber
 from gqm_sym.runtime.gradients.adjoints import gradient
-from gqm_sym.runtime.interface import ExactFormulas
+from gqm_sym.runtime.interface import ExactFormulas, ExactLaw
 
 # What the variables have besides the run-time parameters: launch place, its speed, and the energy.
 LAUNCH_VARIABLES = 3
-
-# How many quantities `path_program` has.
-PATH_QUANTITIES = 6
 
 # A program with more registers is not used: its work space would take tens of megabytes.
 MAX_REGISTERS = 8000
@@ -41,7 +38,7 @@ class Program(NamedTuple):
     first : int
         How many operations do not depend on the place.
     inputs : int
-        The number of inputs, whose registers come first; that of the place follows them.
+        The number of inputs, whose registers come first; those of the place's coordinates follow them.
     outputs : array of int
         Where in the work space the registers of the results begin.
     work : array
@@ -106,7 +103,7 @@ def assemble(op: Recorder, outputs: Sequence[Any]) -> Program:
     """Return the operations that results need, with registers for nothing else."""
     wanted = [op.register(output) for output in outputs]
     inputs = len(op.values)
-    live, pending = set(range(inputs + 1)), list(wanted)
+    live, pending = set(range(inputs + len(op.places))), list(wanted)
     while pending:
         k = pending.pop()
         if k in live:
@@ -210,20 +207,55 @@ def circulation_program(source: Source, direction: int, wanted: tuple[int, ...] 
 
 
 @lru_cache(maxsize=64)
-def path_program(source: Source) -> Program:
+def path_program(formulas: ExactFormulas | ExactLaw, parameters: int, mass: int) -> Program:
     """What states consist of at a place, each with its derivatives by the run-time parameters and by the place.
 
-    The inputs are the run-time parameters. The results are of x, z, ds/dlam, m*kappa, m*n0 and U.
+    The inputs are the run-time parameters, of which ``mass`` is the number of the mass. The results are of x, z,
+    ds/dlam, m*kappa, m*n0 and, without losses, U.
     """
-    formulas = source.formulas
-    op = Recorder(source.parameters)
+    op = Recorder(parameters)
     arguments = op, op.place, op.values
-    quantities = (
-        *(formula(*arguments) for formula in (formulas.x, formulas.z, formulas.ds)),
-        *(op.values[source.mass] * formula(*arguments) for formula in (formulas.kappa, formulas.static_normal_load)),
-        formulas.effective_potential(*arguments),
-    )
+    quantities = [formula(*arguments) for formula in (formulas.x, formulas.z, formulas.ds)]
+    for formula in (formulas.kappa, formulas.static_normal_load):
+        quantities.append(op.values[mass] * formula(*arguments))
+    if isinstance(formulas, ExactFormulas):
+        quantities.append(formulas.effective_potential(*arguments))
     return assemble(op, [part for q in quantities for part in (q, *gradient(op, q, [*op.values, op.place]))])
+
+
+@lru_cache(maxsize=64)
+def law_program(law: ExactLaw, parameters: int) -> Program:
+    """The law of a motion with losses at a place and a V**2, the two coordinates.
+
+    The inputs are the run-time parameters, sgn(dlam/dt) and sgn(N). The results are ds/dlam and its derivatives by the
+    place and the parameters; dW/dlam, where W is V**2, and its derivatives by the place, by W and by the parameters;
+    and the slope along the motion of the contact force per mass, with its derivatives by the place and by W.
+    """
+    op = Recorder(parameters + 2, coordinates=2)
+    (lam, w), p, signs = op.places, op.values[:parameters], op.values[parameters:]
+    ds, slope = law.ds(op, lam, p), law.speed_slope(op, lam, w, *signs, p)
+    load = law.kappa(op, lam, p) * w + law.static_normal_load(op, lam, p)
+    load_by_place, load_by_w = gradient(op, load, [lam, w])
+    load_slope = load_by_place + load_by_w * slope
+    return assemble(
+        op,
+        [
+            *(ds, *gradient(op, ds, [lam, *p])),
+            *(slope, *gradient(op, slope, [lam, w, *p])),
+            *(load_slope, *gradient(op, load_slope, [lam, w])),
+        ],
+    )
+
+
+@lru_cache(maxsize=64)
+def range_program(domain: Callable[..., Any], parameters: int) -> Program:
+    """Both ends of the parameter's range and its period, each with its derivatives by the run-time parameters.
+
+    Those that do not exist are zero.
+    """
+    op = Recorder(parameters)
+    numbers = [0 if number is None else number for number in domain(op, op.values)]
+    return assemble(op, [part for number in numbers for part in (number, *gradient(op, number, op.values))])
 
 
 @lru_cache(maxsize=64)

@@ -150,7 +150,7 @@ def phase_angles_at(timing, kind, table, t, n, phases):  # type: ignore[no-untyp
             sense[i], laps[i] = 1.0, choose(over, count - 1.0, count)
         times[i] = choose(over, other, r)
         lows[i] = choose(over, other_low, low) + times[i] * correction
-    look_up(table, times, lows, n, segments, work[2], phi)
+    look_up(table, times, lows, n, segments, phi)
     for i in range(n):
         r, low = times[i], lows[i]
         inside = min(max(phi[i], 0.0), stop)

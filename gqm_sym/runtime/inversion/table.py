@@ -14,7 +14,7 @@ from numba import types
 from gqm_sym.runtime.arithmetic.clenshaw import legendre_sum
 from gqm_sym.runtime.arithmetic.doubledouble import two_sum
 from gqm_sym.runtime.compiled.buffers import longer, taller
-from gqm_sym.runtime.compiled.intrinsics import fma
+from gqm_sym.runtime.compiled.intrinsics import fma, number_at
 from gqm_sym.runtime.compiled.jit import Inner, entry
 from gqm_sym.runtime.compiled.types import MATRIX, VECTOR
 from gqm_sym.runtime.quadrature.time_panels import NEGLIGIBLE_SHARE, derivative
@@ -234,8 +234,8 @@ def _to_powers(c, out):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def look_up(table, t, t_low, n, segments, x, out):  # type: ignore[no-untyped-def]
-    """Fill ``out`` with the phase angles at n times, in vector registers.
+def look_up(table, t, t_low, n, segments, out):  # type: ignore[no-untyped-def]
+    """Fill ``out`` with the phase angles at n times.
 
     Parameters
     ----------
@@ -245,23 +245,19 @@ def look_up(table, t, t_low, n, segments, x, out):  # type: ignore[no-untyped-de
         Times in s, as two doubles each.
     segments : (n,) array of int
         Filled with the index of each time's segment.
-    x : (n,) array
-        Work space.
     """
     middles, lows, scales, powers, index, ends = table
-    slots = index.size / ends[-1] if ends[-1] > 0.0 else 0.0
+    slots, last = index.size / ends[-1] if ends[-1] > 0.0 else 0.0, ends.size - 1
     for i in range(n):
-        segment = index[min(max(np.int64(t[i] * slots), 0), index.size - 1)]
-        while segment < ends.size - 1 and t[i] >= ends[segment]:
-            segment += 1
-        segments[i] = segment
-    for i in range(n):
-        k = segments[i]
-        x[i] = ((t[i] - middles[k]) + (t_low[i] - lows[k])) * scales[k]
-        out[i] = powers[k, LAST]
-    for j in range(LAST - 1, -1, -1):
-        for i in range(n):
-            out[i] = fma(out[i], x[i], powers[segments[i], j])
+        k = number_at(index, min(max(np.int64(t[i] * slots), 0), index.size - 1))
+        while k < last and t[i] >= number_at(ends, k):
+            k += 1
+        segments[i] = k
+        x, at = ((t[i] - number_at(middles, k)) + (t_low[i] - number_at(lows, k))) * number_at(scales, k), k * TERMS
+        phi = number_at(powers, at + LAST)
+        for j in range(LAST - 1, -1, -1):
+            phi = fma(phi, x, number_at(powers, at + j))
+        out[i] = phi
 
 
 TABLE_TYPE = types.Tuple((VECTOR, VECTOR, VECTOR, MATRIX, types.int64[::1], VECTOR, VECTOR))
@@ -277,9 +273,9 @@ def build_table(edges, times, times_low, time_terms):  # type: ignore[no-untyped
 def phase_angles(middles, lows, scales, powers, index, ends, t, t_low):  # type: ignore[no-untyped-def]
     """Return the phase angles at many times, as two doubles each; the other arguments are those of `Table`."""
     out, table = np.empty(t.size), Table(middles, lows, scales, powers, index, ends)
-    segments, x = np.empty(BLOCK, dtype=np.int64), np.empty(BLOCK)
+    segments = np.empty(BLOCK, dtype=np.int64)
     for start in range(0, t.size, BLOCK):
         n = min(BLOCK, t.size - start)
         block = slice(start, start + n)
-        look_up(table, t[block], t_low[block], n, segments, x, out[block])
+        look_up(table, t[block], t_low[block], n, segments, out[block])
     return out

@@ -86,9 +86,8 @@ class Potential:
     def __init__(self, formulas: Formulas, p: ParameterValues) -> None:
         self.bound = bind_all(formulas, p)
         potential, bounds = formulas.effective_potential, formulas.bounds
-        addresses = formulas.addresses
-        self._potential = _POTENTIAL(addresses.effective_potential if potential is None else potential.address)
-        self._bounds = _BOUNDS(addresses.bounds if bounds is None else bounds.address)
+        self._potential = _POTENTIAL((potential or formulas.functions.effective_potential).address)
+        self._bounds = _BOUNDS((bounds or formulas.functions.bounds).address)
         self._p = self.bound.p.ctypes.data_as(_MANY)
 
     def rows(self, places: Any) -> Array:

@@ -17,10 +17,11 @@ from gqm_sym.runtime.charts.chart import Chart, ChartMaker
 from gqm_sym.runtime.compiled.jit import Later
 from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.interface import (
-    Addresses,
     BatchFunctions,
-    Dissipation,
+    CompiledFunctions,
+    DissipativeFunctions,
     ExactFormulas,
+    ExactLaw,
     ExactPotential,
     SeparatedTerms,
 )
@@ -101,6 +102,8 @@ class Formulas:
     static_friction_limit : (str, str), optional
         For a rolling body whose static friction is known, the names of its inertia factor beta and of its coefficient
         mu_static.
+    functions : CompiledFunctions
+        The functions that serve one motion.
     domain_of : callable or None
         ``f(op, p)`` gives both ends of the parameter's range and its period, None for each that does not exist. None
         for a charted curve, whose chart has its own range.
@@ -110,11 +113,11 @@ class Formulas:
     monotone : bool
         Whether it is proved that V**2 rises or falls all the way between two neighbouring axes, and that ds vanishes
         nowhere.
-    exact : ExactFormulas, ExactPotential or None
+    exact : ExactFormulas, ExactPotential, ExactLaw or None
         The formulas over a namespace of operations; those of the forces only for a charted curve.
     chart : ChartMaker or None
         What makes the chart of a curve that has no formulas.
-    dissipation : Dissipation or None
+    dissipation : DissipativeFunctions or None
         What a dissipative model adds; None for a conservative one.
     load_map : Later or None
         The function that fills a load map in one pass; None if there is none.
@@ -123,7 +126,7 @@ class Formulas:
     source, text : str
         The path of the module's file, and its text when it was imported: by them a motion is taken to another process.
     effective_potential, bounds : Later or None
-        Of a dissipative module: the functions of the interface that `addresses` holds for a conservative one.
+        Of a dissipative module: functions that only its equilibria need; a conservative one has them in ``functions``.
     units : mapping of str to str
         SI units of the curve's parameter and of the run-time parameters, as far as they are known; "1" of plain numbers
         and angles.
@@ -140,13 +143,13 @@ class Formulas:
     parameter: str
     parameters: Mapping[str, float | int | str | None]
     positive: tuple[str, ...]
-    addresses: Addresses
+    functions: CompiledFunctions
     domain_of: Callable[..., Any] | None = None
     axes_of: Callable[..., Any] | None = None
     monotone: bool = False
-    exact: ExactFormulas | ExactPotential | None = None
+    exact: ExactFormulas | ExactLaw | ExactPotential | None = None
     chart: ChartMaker | None = None
-    dissipation: Dissipation | None = None
+    dissipation: DissipativeFunctions | None = None
     load_map: Later | None = None
     batch: BatchFunctions | None = None
     at_least: tuple[tuple[str, str], ...] = ()

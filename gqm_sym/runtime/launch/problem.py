@@ -30,12 +30,12 @@ def bind(formulas: Formulas, p: ParameterValues, launch: Launch) -> BoundFunctio
 def bind_all(formulas: Formulas, p: ParameterValues) -> BoundFunctions:
     """The bound functions that all launches with these parameters share."""
     if p.functions is None:
-        p.functions = BoundFunctions(formulas.addresses, p.values)
+        p.functions = BoundFunctions(formulas.functions.addresses(), p.values)
         if formulas.chart is not None:
             chart = formulas.charted(p)
             block = np.concatenate([p.values, chart.block])
             shape = (chart.breaks, chart.corners, chart.period, chart.bends)
-            p.functions = BoundFunctions(formulas.addresses, block, None, *shape)
+            p.functions = BoundFunctions(formulas.functions.addresses(), block, None, *shape)
     bound: BoundFunctions = p.functions
     return bound
 

@@ -59,14 +59,13 @@ from gqm_sym.runtime.legs.leg_record import (
     END_LOW,
     HEADING,
     LAPS_BEFORE,
-    PASSAGE,
+    PANELS,
     PEAKS,
     START,
     START_LOW,
     START_V2,
     TIME_FROM_END,
     TIME_FROM_START,
-    TIMES,
 )
 from gqm_sym.runtime.legs.leg_run import (
     ASYMPTOTE,
@@ -152,8 +151,7 @@ def room_kept(breaks: int) -> int:
 @Inner
 def gaps_on_leg(dissipation, joints, body, reads):  # type: ignore[no-untyped-def]
     """What is kept of the curve between its breaks, if a leg may be passed by it: its panels cannot be read."""
-    behind = body[DIRECTION] * (body[TARGET] - body[PLACE]) < 0.0
-    is_used = body[PERIOD] == 0.0 and (reads == TIMES or reads == PEAKS or (reads == PASSAGE and behind))
+    is_used = body[PERIOD] == 0.0 and reads != PANELS
     return joints.gaps if is_used and dissipation.linear and not dissipation.kinked else joints.gaps[:0]
 
 

@@ -12,6 +12,8 @@ from gqm_sym.errors import BudgetError, InputError, SolutionError
 from gqm_sym.runtime.arithmetic.doubledouble import ULP, ZERO, Pair
 from gqm_sym.runtime.compiled.threads import run_in_threads
 from gqm_sym.runtime.compiled.types import Array
+from gqm_sym.runtime.gradients.quantities import selected
+from gqm_sym.runtime.gradients.sensitivity import Sensitivity
 from gqm_sym.runtime.interface import Dissipation
 from gqm_sym.runtime.inversion.leg_tables import places_along_legs, states_along_legs
 from gqm_sym.runtime.launch.ends import CUSP_SHARE, domain_end, leaving_at_once, starting_step
@@ -60,6 +62,8 @@ from gqm_sym.runtime.legs.leg_record import (
 )
 from gqm_sym.runtime.legs.leg_run import ASYMPTOTE, FULL, LIFTOFF, LIMIT, NARROWED, PAUSED, SPENT, TURN
 from gqm_sym.runtime.legs.leg_segments import Run, TabulatedPiece, along_field, along_panels, leg_record, tabulated
+from gqm_sym.runtime.legs.variations.answers import gradient, states_at
+from gqm_sym.runtime.legs.variations.changes import Changes
 from gqm_sym.runtime.motion.aperiodic import MotionAtRest
 from gqm_sym.runtime.motion.events import Leg, passages
 from gqm_sym.runtime.motion.locking import locked
@@ -84,8 +88,8 @@ MAX_SEGMENTS = 250_000
 # questions one after the other do not copy it for each leg.
 EXTENSION = 1.25
 
-# How many panels a record has space for at first; a leg with more is followed again with a larger record. How many legs
-# are followed in one call of a motion that has a horizon, whose legs are all needed.
+# How many panels a record has space for beside one for each break; a leg with more is followed again with a larger
+# record. How many legs are followed in one call of a motion that has a horizon, whose legs are all needed.
 FEW_PANELS, LEGS_PER_CALL = 12, 8
 
 # A change of the contact force's sign this many roundings from the end of a piece is there.
@@ -138,7 +142,7 @@ def _loss(problem: Problem) -> Dissipation:
     """The dissipation of the model."""
     loss = problem.formulas.dissipation
     assert loss is not None
-    return loss
+    return loss.addresses()
 
 
 class Reading(NamedTuple):
@@ -169,6 +173,7 @@ class DissipativeMotion(Motion):
     _last_swing = 0.0
     _arc = 0.0
     _whole: Trajectory | None = None
+    _known_changes: Changes | None = None
     _reading = Reading(np.empty(0), -1.0)
     # How many runs `_look_ahead` computes of a motion that it finds no end of; 0 while that is not known.
     _beginning = 0
@@ -182,6 +187,7 @@ class DissipativeMotion(Motion):
         super().__init__(problem, "dissipative", launch.direction)
         drops = f.drops(ONLY_SIGN[launch.contact])
         self._joints = Joints(f.breaks, f.corners, drops, np.empty(room_ahead(f.breaks.size)))
+        self._space = FEW_PANELS + f.breaks.size
         self._body = launched(
             *(1, launch.lam0.value, domain.low, domain.high, domain.period),
             *(launch.direction, ONLY_SIGN[launch.contact], self._horizon, nan, problem.w0),
@@ -315,6 +321,33 @@ class DissipativeMotion(Motion):
         with suppress(SolutionError, BudgetError):  # it is raised when that is asked for
             while len(self._pieces) < enough and not self._ending and self._elapsed < self._horizon:
                 self._go_on()
+
+    @locked
+    def _gradient(self, quantity: str, wrt: Any) -> dict[str, Any]:
+        rows = selected(self.problem.formulas.parameters, wrt)
+        self._look_ahead()
+        found = gradient(self, self._changes, quantity)
+        return {
+            name: tuple(found[row].tolist()) if found.ndim == 2 else float(found[row]) for name, row in rows.items()
+        }
+
+    @locked
+    def sensitivity(self, t: Any, wrt: Any = None) -> Sensitivity:
+        """The derivatives of the state at given times; see `Motion.sensitivity`."""
+        rows = selected(self.problem.formulas.parameters, wrt)
+        times, low, shape = self._times(t)
+        self._trajectory(float(times.max(initial=0.0)))
+        found = states_at(self, self._changes, times, low)
+        fields = (getattr(found, name) for name in Sensitivity._fields[1:])
+        return Sensitivity(tuple(rows), *(field[list(rows.values())].reshape(len(rows), *shape) for field in fields))
+
+    @property
+    def _changes(self) -> Changes:
+        """How the legs so far change."""
+        pieces = self._pieces
+        if self._known_changes is None or len(self._known_changes.runs) < pieces[-1].leg + 1:
+            self._known_changes = Changes(self.problem, self._laid)
+        return self._known_changes
 
     def fill_launch_leg(self, places: Array, v2: Array) -> None:
         """Fill in V**2 at the places that lie on the launch leg."""
@@ -510,16 +543,16 @@ class DissipativeMotion(Motion):
 
     def _followed(self) -> tuple[Any, ...]:
         """What ended the last of the next legs (`advance`), and the records of all of them; one if the body stays."""
-        frame, size = self._frame, FEW_PANELS * COLUMNS
+        frame = self._frame
         loss, parameters = (_loss(self.problem), self.problem.functions.p) if frame is None else frame[:2]
         legs = LEGS_PER_CALL if frame is None and isfinite(self._horizon) else 1
         while True:
-            records = np.empty((legs, size))
+            records = np.empty((legs, self._space * COLUMNS))
             what = answers.drive(loss, parameters.reshape(1, -1), self._joints, LEG, self._body, records)
             count = int(self._body[0, VALUE])
             if what != FULL or count:
                 return (what if what != FULL else TURN), *records[: max(count, 1)]
-            legs, size = 1, 4 * size
+            legs, self._space = 1, 4 * self._space
 
     def _settle(self, what: int, start: float, end: float) -> None:
         """Look whether a run has come so close to an equilibrium that the motion ends there, or goes on in a frame."""
@@ -554,11 +587,12 @@ class DissipativeMotion(Motion):
 
     def _enter_frame(self, place: float, low: float, v2: float) -> None:
         """Follow the body from here on by its distance from an equilibrium, if it swings closely about one."""
-        problem, line = self.problem, self._body[0]
-        loss, breaks = _loss(problem), problem.functions.breaks
-        ends = [abs(end - place) for end in (problem.low, problem.high, *breaks) if isfinite(end)]
+        problem, line, loss = self.problem, self._body[0], _loss(self.problem)
+        if loss.friction or loss.kinked:
+            return
+        ends = [abs(end - place) for end in (problem.low, problem.high, *problem.functions.breaks) if isfinite(end)]
         reach = min([starting_step(problem), *ends])
-        frame = None if loss.friction or loss.kinked else frame_near(loss, problem.functions.p, (place, low, v2), reach)
+        frame = frame_near(loss, problem.functions.p, (place, low, v2), reach)
         if frame is None:
             return
         self._frame, self._joints = frame, Joints(NOWHERE, NOWHERE, NOWHERE, NOWHERE)

@@ -60,6 +60,7 @@ from gqm_sym.runtime.legs.leg_record import (
     COLUMNS,
     HEAD,
     NORMAL_LOAD,
+    PASSAGE,
     PEAKS,
     RIGHT,
     TIME,
@@ -573,7 +574,9 @@ def pass_gaps(forces, march, route, contact_sign, before, record, work):  # type
         start, stop, to = breaks[upcoming], breaks[upcoming + 1], HEAD + count * COLUMNS
         # A break lies behind already where a panel is laid once more.
         is_ahead = offset(start, march.origin, v) == run_length
-        if contact_sign in (0, -route.only_sign) or not (is_ahead and has_space(record, to, 0)):
+        # Where the target is, time is read off a panel.
+        has_target = route.reads == PASSAGE and min(start, stop) <= route.target <= max(start, stop)
+        if contact_sign in (0, -route.only_sign) or has_target or not (is_ahead and has_space(record, to, 0)):
             break
         gap = route.first_gap + (upcoming if v > 0 else -upcoming - 1)
         at, width = GAP_COLUMNS * (4 * gap + (v + 1) + (contact_sign + 1) // 2), fabs(stop - start)

@@ -8,9 +8,10 @@ import numpy as np
 from numba import types
 
 from gqm_sym.runtime.arithmetic.doubledouble import ULP, Pair, two_sum
-from gqm_sym.runtime.compiled.jit import entry
+from gqm_sym.runtime.compiled.jit import Inner, entry
 from gqm_sym.runtime.compiled.types import MATRIX, VECTOR, Array
 from gqm_sym.runtime.inversion import leg_tables, records
+from gqm_sym.runtime.inversion.table import MAX_TIME_ERROR, TERMS, tabulate
 from gqm_sym.runtime.launch.functions import BoundFunctions
 from gqm_sym.runtime.launch.problem import Problem
 from gqm_sym.runtime.legs.advance import AT_ONCE
@@ -37,7 +38,7 @@ from gqm_sym.runtime.legs.leg_record import (
 from gqm_sym.runtime.legs.leg_run import ASYMPTOTE
 from gqm_sym.runtime.legs.polynomials import WIDE
 from gqm_sym.runtime.motion.events import Leg
-from gqm_sym.runtime.motion.segment import Segment
+from gqm_sym.runtime.motion.segment import MAX_END_ROUNDINGS, MAX_SLOPES, Segment
 from gqm_sym.runtime.motion.trajectory import TimedSegment
 from gqm_sym.runtime.quadrature.substitution import FROM_TURN, REGULAR, TO_EQUILIBRIUM
 from gqm_sym.runtime.quadrature.time_panels import CONVERGED
@@ -205,52 +206,127 @@ class TabulatedPiece(NamedTuple):
     panels: Array
 
 
+class Timing(NamedTuple):
+    """The numbers by which the table of a segment becomes rows for its times from launch, as of `TimedSegment`.
+
+    Attributes
+    ----------
+    from_turn : float
+        1 if the segment begins at a turning point, or close to one; 0 if it is REGULAR.
+    last, turn_offset : float
+        As of `Segment.speed_series`, and of `Segment`.
+    relative_error, place_error : float
+        Of its times, and of the places with which it begins.
+    lam_before : float
+        By how much the curve parameter has grown in all laps before it.
+    """
+
+    from_turn: float
+    last: float
+    turn_offset: float
+    a: float
+    a_low: float
+    b: float
+    b_low: float
+    width: float
+    lam_before: float
+    sense: float
+    s_a: float
+    r_start: float
+    r_start_low: float
+    t_start: float
+    t_start_low: float
+    t_stop: float
+    relative_error: float
+    place_error: float
+
+
+@Inner
+def time_from_launch(r, r_low, timing):  # type: ignore[no-untyped-def]
+    """A time from the segment's end ``a`` as a time from launch, both in two doubles."""
+    s, e = two_sum(r, -timing.r_start)
+    high, rest = two_sum(timing.t_start, timing.sense * s)
+    return two_sum(high, rest + timing.t_start_low + timing.sense * (e + r_low - timing.r_start_low))
+
+
+TIMING = types.NamedUniTuple(types.float64, len(Timing._fields), Timing)
+
+
+@entry(types.Tuple((MATRIX, MATRIX, MATRIX))(MATRIX, MATRIX, MATRIX, MATRIX, VECTOR, TIMING))
+def tabulate_piece(marks, time_terms, length_terms, speed_terms, time_errors, timing):  # type: ignore[no-untyped-def]
+    """The arrays of a `TabulatedPiece`.
+
+    Parameters
+    ----------
+    marks : (4, n+1) array
+        Phase angles at the edges of n panels, the times there as two doubles, and the arc lengths.
+    time_terms, length_terms, speed_terms : arrays
+        As of `read_panels`.
+    time_errors : (n,) array
+        The error with which the time begins on each panel.
+    timing : Timing
+    """
+    edges, times, lengths = marks[0], marks[1], marks[3]
+    middles, lows, scales, powers, _, ends, errors = tabulate(edges, times, marks[2], time_terms)
+    count, panel_count, sense, width = ends.size, time_errors.size, timing.sense, timing.width
+    intervals, states = np.empty((count, leg_tables.INTERVAL_COLUMNS)), np.empty((count, leg_tables.STATE_COLUMNS))
+    share, is_from_turn = 1.0 / (1.0 + 2.0 * timing.turn_offset), timing.from_turn > 0.0
+    linear = 2.0 * timing.turn_offset * share if is_from_turn else 1.0
+    direction, slope = (1.0 if width > 0.0 else -1.0), MAX_SLOPES[FROM_TURN if is_from_turn else REGULAR]
+    growth = (timing.last, timing.last * timing.turn_offset) if is_from_turn else (0.0, 1.0)
+    kept = 0
+    for k in range(count):
+        i = k if sense > 0.0 else count - 1 - k
+        begin = ends[i - 1] if i > 0 else 0.0
+        until = time_from_launch(ends[i] if sense > 0.0 else begin, 0.0, timing)[0]
+        since = time_from_launch(begin if sense > 0.0 else ends[i], 0.0, timing)[0]
+        if not (until > timing.t_start and since < timing.t_stop) and (kept > 0 or k < count - 1):
+            continue
+        row, state, start, stop = intervals[kept], states[kept], 0.0, 0.0
+        for m in range(TERMS):
+            start, stop = start + (powers[i, m] if m % 2 == 0 else -powers[i, m]), stop + powers[i, m]
+            row[leg_tables.POWERS + m] = powers[i, m]
+        row[leg_tables.UNTIL] = until
+        row[leg_tables.MIDDLE], row[leg_tables.MIDDLE_LOW] = time_from_launch(middles[i], lows[i], timing)
+        row[leg_tables.SCALE], row[leg_tables.STOP] = sense * scales[i], edges[-1]
+        row[leg_tables.SQUARE], row[leg_tables.LINEAR] = timing.from_turn * share, linear
+        row[leg_tables.PLACE_A], row[leg_tables.PLACE_A_LOW] = timing.a, timing.a_low
+        row[leg_tables.PLACE_B], row[leg_tables.PLACE_B_LOW] = timing.b, timing.b_low
+        row[leg_tables.WIDTH], row[leg_tables.LAPS] = width, timing.lam_before
+        panel = min(int(np.searchsorted(edges[1:-1], 0.5 * (start + stop), side="right")), panel_count - 1)
+        state[leg_tables.PANEL], state[leg_tables.DIRECTION] = panel, direction
+        state[leg_tables.HEADING], state[leg_tables.ARC_A] = sense * direction, timing.s_a
+        state[leg_tables.GROWTH], state[leg_tables.FIRST_GROWTH] = growth
+        own_error = (timing.relative_error + ULP + MAX_TIME_ERROR) * times[panel + 1]
+        state[leg_tables.TIME_ERROR] = time_errors[panel] + own_error
+        # The error of a turn as of `Segment`, which is largest next to it.
+        of_turn = MAX_END_ROUNDINGS * ULP * (1.0 - start * start) if is_from_turn else 0.0
+        state[leg_tables.PLACE_ERROR] = timing.place_error + abs(width) * (slope * errors[i] + 3.0 * ULP + of_turn)
+        kept += 1
+    intervals[kept - 1, leg_tables.UNTIL] = timing.t_stop
+    panels = np.empty((panel_count, leg_tables.PANEL_COLUMNS))
+    for k in range(panel_count):
+        panels[k, leg_tables.EDGE], panels[k, leg_tables.HALF] = edges[k], 0.5 * (edges[k + 1] - edges[k])
+        panels[k, leg_tables.ARC] = lengths[k]
+        panels[k, leg_tables.SERIES : leg_tables.SERIES + WIDE] = length_terms[k]
+        panels[k, leg_tables.SERIES + WIDE :] = speed_terms[k]
+    return intervals[:kept].copy(), states[:kept].copy(), panels
+
+
 def tabulated(timed: TimedSegment, lap: float, errors_before: ErrorsBefore) -> TabulatedPiece:
     """What compiled code needs of a piece, which is no approach to an equilibrium."""
     segment = timed.segment
     assert segment.speed_series is not None
-    middles, lows, scales, powers, _, ends, _ = segment.table
+    edges, _, lengths, time_terms, length_terms, error = segment.panels[:6]
     last, speed_terms = segment.speed_series
-    edges, _, lengths, _, length_terms = segment.panels[:5]
-    panel_middles = 0.5 * (edges[1:] + edges[:-1])
-    place_before, time_before = errors_before(timed, panel_middles)
-    # The part of the error that changes within an interval is largest at one of its ends.
-    starts, stops = powers @ (-1.0) ** np.arange(powers.shape[1]), powers.sum(axis=1)
-    both_ends = np.concatenate([starts + 1e-9 * (stops - starts), stops])
-    owners = np.searchsorted(edges[1:-1], 0.5 * (starts + stops), side="right")
-    begins = np.append(0.0, ends[:-1])
-    from_turn, offset = float(segment.kind == FROM_TURN), segment.turn_offset
-    sense, share = float(timed.sense), 1.0 / (1.0 + 2.0 * offset)
-
-    def from_launch(r: Array, low: Array) -> tuple[Array, Array]:
-        """Times from the end ``a`` as times from launch, in two doubles."""
-        s, e = two_sum.py_func(r, -timed.r_start[0])
-        high, rest = two_sum.py_func(timed.t_start[0], sense * s)
-        total, error = two_sum.py_func(high, rest + timed.t_start[1] + sense * (e + low - timed.r_start[1]))
-        return total, error
-
-    marks = np.array([middles, ends, begins] if sense > 0.0 else [middles, begins, ends])
-    (when, until, since), (when_low, _, _) = from_launch(marks, np.array([lows, 0.0 * ends, 0.0 * ends]))
-    constants = (
-        *(edges[-1], from_turn * share, 2.0 * offset * share if from_turn else 1.0),
-        *(segment.a, segment.low_parts[0], segment.b, segment.low_parts[1], segment.width, timed.laps * lap),
+    place_error, time_errors = errors_before(timed, 0.5 * (edges[1:] + edges[:-1]))
+    timing = Timing(
+        *(float(segment.kind == FROM_TURN), last, segment.turn_offset, segment.a, segment.low_parts[0], segment.b),
+        *(segment.low_parts[1], segment.width, timed.laps * lap, float(timed.sense), timed.s_a, *timed.r_start),
+        *(*timed.t_start, timed.t_stop[0], error, place_error),
     )
-    growth = (last, last * offset) if from_turn else (0.0, 1.0)
-    errors = (
-        (time_before + segment.time_error(panel_middles))[owners],
-        place_before + segment.inversion_error(both_ends).reshape(2, -1).max(axis=0),
-    )
-    rows = np.ones((len(ends), 1))
-    intervals = np.hstack([np.column_stack([until, when, when_low, sense * scales]), rows * constants, powers])
-    signs = (segment.direction, timed.direction, timed.s_a, *growth)
-    states = np.column_stack([owners, rows * signs, *errors])
-    kept = (until > timed.t_start[0]) & (since < timed.t_stop[0])
-    kept[0 if sense < 0.0 else -1] |= not kept.any()
-    order = np.flatnonzero(kept)[:: int(sense)]
-    intervals, states = intervals[order], states[order]
-    intervals[-1, leg_tables.UNTIL] = timed.t_stop[0]
-    panels = np.column_stack([edges[:-1], 0.5 * np.diff(edges), lengths[:-1], length_terms, speed_terms])
-    return TabulatedPiece(intervals, states, panels)
+    marks = np.array([edges, *segment.edge_times, lengths])
+    return TabulatedPiece(*tabulate_piece(marks, time_terms, length_terms, speed_terms, time_errors, timing))
 
 
 def leg_record(problem: Problem, v0: float, pieces: Sequence[TabulatedPiece]) -> Array:

@@ -147,21 +147,23 @@ class Motion(ABC):
 
     # -- gradients ----------------------------------------------------------------------------
 
-    def gradient(self, quantity: str, wrt: Any = None) -> dict[str, Any]:
+    def gradient(self, quantity: str, wrt: Any = None, *, lam: Any = None) -> dict[str, Any]:
         """The derivatives of a quantity of this motion by its launch and run-time parameters.
 
         Parameters
         ----------
         quantity : str
-            "half_period", "period", "turning_points", "v_max", "v_min", "normal_force_max", "normal_force_min" or
-            "action".
+            "turning_points", "v_max", "v_min", "normal_force_max", "normal_force_min" or "time_at"; of a periodic
+            motion also "half_period", "period" or "action", and of one with losses "t_end" or "rest_position".
         wrt : str or sequence of str, optional
             What the derivatives are by: run-time parameters, "lam0" and "v0"; all of them if not given.
+        lam : number, optional
+            For "time_at": the place, as of `time_at`.
 
         Returns
         -------
         dict
-            A float for each name; of turning points a pair, in the order of `turning_points`. At ``v0 = 0`` the
+            A float for each name; of turning points a tuple, in the order of `turning_points`. At ``v0 = 0`` the
             derivative by v0 is that for greater speeds.
 
         Raises
@@ -171,12 +173,27 @@ class Motion(ABC):
         SolutionError
             If the motion does not have the quantity, or gradients are not there yet for motions of its kind.
         """
-        raise self._without_gradients("gradient")
+        if (lam is None) == (quantity == "time_at"):
+            raise InputError(f"lam: is the place that 'time_at' asks about, got {lam!r} with {quantity!r}")
+        return self._gradient(quantity, wrt) if lam is None else self._arrival_gradient(lam, wrt)
+
+    def _gradient(self, quantity: str, wrt: Any) -> dict[str, Any]:
+        raise self._without_gradients()
+
+    def _arrival_gradient(self, lam: Any, wrt: Any) -> dict[str, Any]:
+        """The derivatives of the time at which the body is at a place: what carries it on makes that earlier."""
+        t = self.time_at(lam)
+        state, changes, f = self.state(t), self.sensitivity(t, wrt), self.problem.functions
+        if state.v == 0.0:
+            raise SolutionError("gradient: time_at of a place where the body turns has none")
+        rate = state.v / path_and_force_at(f.addresses, f.p, np.array([state.lam]), np.zeros(1))[2, 0]
+        return dict(zip(changes.wrt, (-changes.lam / rate).tolist(), strict=True))
 
     def sensitivity(self, t: Any, wrt: Any = None) -> Sensitivity:
         """The derivatives of the state at given times by launch and run-time parameters.
 
-        They are as exact, and take as long, after a million periods as after one.
+        Of a periodic motion they are as exact, and take as long, after a million periods as after one. With losses they
+        are carried from leg to leg.
 
         Parameters
         ----------
@@ -197,7 +214,7 @@ class Motion(ABC):
         SolutionError
             If gradients are not there yet for motions of this kind.
         """
-        raise self._without_gradients("sensitivity")
+        raise self._without_gradients()
 
     @property
     def action(self) -> float:
@@ -208,12 +225,12 @@ class Motion(ABC):
         SolutionError
             As `gradient`.
         """
-        raise self._without_gradients("action")
+        raise self._without_period("action")
 
     @property
     def period_slope(self) -> float:
         """dT/dE, the derivative of the period by the energy per mass, in s3/m2; raises what `action` does."""
-        raise self._without_gradients("period_slope")
+        raise self._without_period("period_slope")
 
     def fourier(self, quantity: str, n: int) -> Fourier:
         """The Fourier coefficients of a quantity over one period (libration and circulation).
@@ -240,10 +257,17 @@ class Motion(ABC):
         """
         raise SolutionError(f"fourier: only a motion that repeats has coefficients; it is of kind {self.kind!r}")
 
-    def _without_gradients(self, asked: str) -> SolutionError:
-        """What is raised by motions without gradients, by the name of what was asked for."""
+    def _without_period(self, asked: str) -> SolutionError:
+        """What is raised by motions that do not repeat, by the name of what was asked for."""
         return SolutionError(
-            f"{asked}: only librations and circulations have it yet; this motion is of kind {self.kind!r}"
+            f"{asked}: only a libration or a circulation has one; this motion is of kind {self.kind!r}"
+        )
+
+    def _without_gradients(self) -> SolutionError:
+        """What is raised by motions without gradients."""
+        return SolutionError(
+            "gradients: only librations, circulations and motions with losses have them yet; "
+            f"this motion is of kind {self.kind!r}"
         )
 
     # -- accuracy -----------------------------------------------------------------------------

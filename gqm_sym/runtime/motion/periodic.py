@@ -199,10 +199,8 @@ class PeriodicMotion(Motion):
         return OrbitSensitivity(self._derivatives)
 
     @locked
-    def gradient(self, quantity: str, wrt: Any = None) -> dict[str, Any]:
-        """The derivatives of a quantity of this motion by names; see `Motion.gradient`."""
-        with asked_for("gradient"):
-            return gradient(self._derivatives, self, quantity, wrt)
+    def _gradient(self, quantity: str, wrt: Any) -> dict[str, Any]:
+        return gradient(self._derivatives, self, quantity, wrt)
 
     @property
     @locked
@@ -226,8 +224,7 @@ class PeriodicMotion(Motion):
         rows = selected(self.problem.formulas.parameters, wrt)
         times, low, shape = self._times(t)
         points = self._phase_points(times, low)
-        with asked_for("sensitivity"):
-            found = self._orbit_sensitivity.at(self, points, self._places(points), self._velocities(points))
+        found = self._orbit_sensitivity.at(self, points, self._places(points), self._velocities(points))
         chosen = [array[list(rows.values())].reshape(len(rows), *shape) for array in found]
         return Sensitivity(tuple(rows), *chosen)
 

@@ -50,6 +50,9 @@ CHART_ROUNDINGS, AROUND = 8.0, 16
 # The error of a place by the rounding of a chart, in roundings of the width of a motion, and of its coordinates.
 MAX_WIDTH_ROUNDINGS, MAX_SIZE_ROUNDINGS = 128.0, 4.0
 
+# The largest slope of lam(phi), in widths, by the kind of the segment; approaches to an equilibrium have none.
+MAX_SLOPES = (0.5, 2.0, 1.0)
+
 # The distance from a turning point, as a share of the width, within which offsets are computed from the exact one.
 NEAR_TURN = 1e-3
 
@@ -274,8 +277,7 @@ class Segment:
         if self.kind == TO_EQUILIBRIUM:
             near_equilibrium: Array = width * np.exp(-phi) * (errors + 3.0 * ULP * np.maximum(phi, 1.0))
             return near_equilibrium
-        max_slope = {TURN_TURN: 0.5, FROM_TURN: 2.0, REGULAR: 1.0}[self.kind]  # of lam(phi), in widths
-        bounded: Array = width * (max_slope * errors + 3.0 * ULP)
+        bounded: Array = width * (MAX_SLOPES[self.kind] * errors + 3.0 * ULP)
         if self.kind == REGULAR or self.from_multiprecision:
             return bounded
         at_a, at_b = self._end_errors()
@@ -302,7 +304,8 @@ class Segment:
             # Slopes of a chart that no formulas improve are known to a rounding of the largest.
             around = np.array([*ends, *f.breaks, *np.linspace(0.0, f.period, AROUND)])
             largest = np.abs(potential_at(f.addresses, f.p, around)[1]).max()
-            errors = errors + CHART_ROUNDINGS * ULP * abs(self.width) * largest / steepness
+            rounding = CHART_ROUNDINGS * ULP * abs(self.width) * largest
+            errors = errors + np.divide(rounding, steepness, out=np.zeros(2), where=steepness > 0.0)
         elif f.exact.edges.size:
             size = float(np.hypot(*path_and_force_at(f.addresses, f.p, ends, np.zeros(2))[:2]).max())
             of_chart = ULP * min(MAX_WIDTH_ROUNDINGS * abs(self.width), MAX_SIZE_ROUNDINGS * size)

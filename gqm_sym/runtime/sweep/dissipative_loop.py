@@ -94,6 +94,8 @@ def answer_driven(
     """
     chart, breaks, corners, drops = curve
     joints = Joints(breaks, corners, drops, np.empty(room_ahead(breaks.size)), np.zeros(room_kept(breaks.size)))
+    assert formulas.dissipation is not None
+    dissipation = formulas.dissipation.addresses()
     record, mass = (
         np.empty((1, (MAX_PANELS + breaks.size) * COLUMNS)),
         PARAMETERS + list(formulas.parameters).index("m"),
@@ -106,7 +108,7 @@ def answer_driven(
         ends = (some[DOMAIN_LOW], some[DOMAIN_HIGH], some[DOMAIN_PERIOD])
         asks = (some[DIRECTION], asked.only_sign, asked.horizon, some[TARGET])
         bodies = launched(chosen.size, some[LAM0], *ends, *asks, some[V0] * some[V0])
-        legs.drive(formulas.dissipation, _rows(some[PARAMETERS:], chart), joints, asked.question, bodies, record)
+        legs.drive(dissipation, _rows(some[PARAMETERS:], chart), joints, asked.question, bodies, record)
         values, ended = bodies[:, VALUE], bodies[:, STATUS]
         if asked.question in (legs.LEAST_LOAD, legs.MOST_LOAD):
             values = values * some[mass]

@@ -313,8 +313,8 @@ def _source(formulas: "Formulas") -> Source:
     """What a table of the model's potential and load is made from."""
     terms, mass = formulas.separated, list(formulas.parameters).index("m")
     if terms is None:
-        return Source(formulas.addresses, 0, 1, 1, mass)
-    return Source(formulas.addresses, terms.function.address, terms.potentials, terms.loads, mass)
+        return Source(formulas.functions.addresses(), 0, 1, 1, mass)
+    return Source(formulas.functions.addresses(), terms.function.address, terms.potentials, terms.loads, mass)
 
 
 def _rests_on_corner(group: Group) -> NDArray[np.bool_]:
@@ -349,7 +349,7 @@ def _tabulated_range(
         if not np.isfinite(places).all():
             return NO_TABLE, NO_ENDS
         # From all launches outwards, until the potential is above the energy of each or none is in contact any more.
-        fns, closed, reach = formulas.addresses, 0, [float(places.min()), float(places.max())]
+        fns, closed, reach = formulas.functions.addresses(), 0, [float(places.min()), float(places.max())]
         heights, energies = potential_at(fns, p, places)[0], 0.5 * columns[1] ** 2
         energy = np.array([np.min(heights) + np.min(energies), np.max(heights) + np.max(energies)])
         for side, (limit, sense) in enumerate(((first, -1.0), (last, 1.0))):
@@ -438,7 +438,7 @@ def _answer(formulas: "Formulas", asked: Asked, group: Group, answers: Answers, 
         buffers = np.full(len(factors), nan), np.empty((len(table.paths), ROW)), np.zeros(len(table.paths), np.int8)
         shared = parameters, joints, table, pointers(factors), *buffers, mass, group.ends
         given = scalar.GivenCurve(*shared, asked.side, asked.t_max)
-        scalar.answer_one_by_one(formulas.addresses, *launches, code, spans, found, given)
+        scalar.answer_one_by_one(formulas.functions.addresses(), *launches, code, spans, found, given)
 
 
 def _solved(

@@ -9,6 +9,7 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
+from paths import ROOT
 
 from gqm_sym.loading import load
 from gqm_sym.runtime import vocabulary
@@ -195,3 +196,25 @@ def test_what_a_function_uses_of_its_module_is_noticed(
     assert _compilations(text, tmp_path / "one.py", cache) == 1
     assert _compilations(text, tmp_path / "one.py", cache) == 0
     assert _compilations(text.replace(before, after), tmp_path / "one.py", cache) == 1
+
+
+class _Callback:
+    address = 5
+
+
+def test_importing_a_module_compiles_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A function is compiled when its address is first needed, and not again."""
+    compiled = []
+
+    def callback(function: Any, _: Any) -> Any:
+        compiled.append(function.__name__)
+        return _Callback()
+
+    text = (ROOT / "generated" / "pendulum.py").read_text(encoding="utf-8")
+    file = tmp_path / "pendulum_of_this_test.py"
+    file.write_text(text.replace('"""Bounds of', '"""Other bounds of'), encoding="utf-8")
+    monkeypatch.setattr(jit, "COMPILER", SimpleNamespace(callback=callback))
+    functions = load(file, file.stem).MODEL.functions
+    assert compiled == []
+    assert [functions.bounds.address, functions.bounds.address] == [5, 5]
+    assert compiled == ["bounds"]

@@ -174,3 +174,48 @@ def test_a_function_for_compiled_callers_is_compiled_once_and_only_linked(tmp_pa
             check=True,
         )
         assert answer.stdout.splitlines() == expected
+
+
+CALLED_BY_USERS = """
+import numba
+import numpy as np
+from numba import types
+from gqm_sym.runtime.compiled import jit
+
+
+@jit.Inner
+def powers(x, spare, values):
+    for k in range(values.size):
+LINES
+    return values.sum()
+
+
+@jit.entry(types.float64(types.float64[::1], types.float64[::1]))
+def ours(spare, values):
+    return powers(2.0, spare, values) + powers(1.0, spare, values[:3])
+
+
+@numba.njit
+def theirs(spare, values):
+    return powers(2.0, spare, values) + powers(1.0, spare, values[:3])
+
+
+spare, values = np.zeros(3), np.ones(5)
+print(ours(spare, values.copy()) == theirs(spare, values.copy()) == 5 * 2.0**60 + 3 * 2.0**60)
+"""
+
+
+def test_a_function_of_a_user_may_call_what_only_compiled_callers_call(tmp_path: Path) -> None:
+    """A function so long that it is not inlined, which takes other arguments in the machine code of an entry point."""
+    lines = "\n".join("        values[k] *= x if spare.size == 3 else np.sin(values[k])" for _ in range(60))
+    program = CALLED_BY_USERS.replace("LINES", lines)
+    (tmp_path / "functions.py").write_text(program, encoding="utf-8")
+    answer = subprocess.run(
+        [sys.executable, "functions.py"],
+        cwd=tmp_path,
+        env={"NUMBA_CACHE_DIR": str(tmp_path / "cache"), "PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert (answer.returncode, answer.stdout) == (0, "True\n")

@@ -1,6 +1,5 @@
 """Gradients of periods, turning points, extremes and actions against closed forms and differences in mpmath."""
 
-from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from types import ModuleType
@@ -242,18 +241,38 @@ def test_what_has_no_gradient(
         motion.gradient(quantity, wrt)
 
 
-ASKED: dict[str, Callable[[Any], Any]] = {
-    "gradient": lambda motion: motion.gradient("period"),
-    "sensitivity": lambda motion: motion.sensitivity(1.0),
-    "action": lambda motion: motion.action,
-    "period_slope": lambda motion: motion.period_slope,
-}
+@pytest.mark.parametrize("place", [0.4, -1.1, 1.15])
+def test_the_time_at_a_place(place: float, circle: ModuleType) -> None:
+    """Of a pendulum released at rest, in elliptic integrals."""
+    launch = {"lam0": 1.2, "L": 1.25, "g": 9.81}
+    found = circle.solve(**launch).gradient("time_at", tuple(launch), lam=place)
+
+    def time(at: dict[str, Any]) -> list[Any]:
+        k = mp.sin(at["lam0"] / 2)
+        return [mp.sqrt(at["L"] / at["g"]) * (mp.ellipk(k**2) - mp.ellipf(mp.asin(mp.sin(mpf(place) / 2) / k), k**2))]
+
+    for name in launch:
+        with mp.workdps(60):
+            (wanted,) = by_differences(time, launch, name, 25)
+        assert found[name] == pytest.approx(float(wanted), rel=1e-13)
+    with pytest.raises(SolutionError, match="where the body turns"):
+        circle.solve(**launch).gradient("time_at", lam=circle.solve(**launch).turning_points[0])
+    with pytest.raises(InputError, match="lam: is the place"):
+        circle.solve(**launch).gradient("time_at")
 
 
-@pytest.mark.parametrize("name", ASKED)
-def test_motions_without_gradients_yet(name: str) -> None:
-    """Curves without formulas, and motions with losses: what was asked for is named."""
-    with pytest.raises(SolutionError, match=f"^{name}: curves without formulas"):
-        ASKED[name](generated("superellipse").solve(lam0=0.5))
-    with pytest.raises(SolutionError, match=f"^{name}: only librations and circulations .* kind 'dissipative'"):
-        ASKED[name](generated("circle_drag").solve(lam0=1.0, t_max=3))
+def test_motions_without_gradients_yet() -> None:
+    """Curves without formulas, the action of motions with losses, and bodies at rest."""
+    with pytest.raises(SolutionError, match="gradients: curves without formulas"):
+        generated("superellipse").solve(lam0=0.5).gradient("period")
+    with pytest.raises(SolutionError, match="gradients: curves without formulas"):
+        generated("superellipse").solve(lam0=0.5).sensitivity(1.0)
+    damped = generated("circle_drag").solve(lam0=1.0, t_max=3)
+    resting = generated("circle_drag").solve(lam0=0.0)
+    with pytest.raises(SolutionError, match="kind 'rest'"):
+        resting.sensitivity(1.0)
+    for name in ("action", "period_slope"):
+        with pytest.raises(SolutionError, match=f"^{name}: only a libration or a circulation .* kind 'dissipative'"):
+            getattr(damped, name)
+        with pytest.raises(SolutionError, match=f"^{name}: curves without formulas"):
+            getattr(generated("superellipse").solve(lam0=0.5), name)

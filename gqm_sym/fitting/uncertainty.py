@@ -1,0 +1,215 @@
+"""How uncertain an answer is where launch and parameters are: by derivatives, and by many exact answers."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from math import isfinite
+from types import ModuleType
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from gqm_sym.arguments import one_of, short, unknown_argument
+from gqm_sym.errors import InputError, SolutionError
+from gqm_sym.fitting.fit import LAUNCH, units_of
+from gqm_sym.fitting.result import Fit, with_deviation
+from gqm_sym.literals.numbers import read_number
+from gqm_sym.runtime.compiled.types import Array
+from gqm_sym.runtime.model import CompiledModel
+from gqm_sym.runtime.sweep.quantities import QUANTITIES
+
+# Answers in a sample if no number is given, and at most.
+SAMPLES, MAX_SAMPLES = 10_000, 10_000_000
+
+# The step of a difference quotient, as a share of the number or of its standard deviation, whichever is greater.
+STEP = 1e-5
+
+
+class Estimate(NamedTuple):
+    """A value and its standard deviation, in the same unit."""
+
+    value: float
+    std: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False, eq=False)
+class Uncertainty:
+    """An answer with its standard deviation, found in two ways.
+
+    Attributes
+    ----------
+    quantity : str
+        What was asked.
+    linear : Estimate
+        The answer for the given values, and its standard deviation by the derivatives there.
+    sampled : Estimate
+        Mean and standard deviation of the answers for values that were drawn at random.
+    gradient : dict
+        The derivative of the answer by each uncertain number.
+    samples : array
+        The answers for the values that were drawn, without those for which there is none.
+    missing : int
+        For how many of them there is none.
+    """
+
+    quantity: str
+    linear: Estimate
+    sampled: Estimate
+    gradient: dict[str, float]
+    samples: Array
+    missing: int
+
+    def __str__(self) -> str:
+        """Both results, one below the other."""
+        lines = [
+            f"{self.quantity}",
+            f"  linear   {with_deviation(*self.linear)}",
+            f"  sampled  {with_deviation(*self.sampled)}  ({self.samples.size} draws)",
+        ]
+        if self.missing:
+            lines.append(f"  {self.missing} more draws have no {self.quantity}")
+        return "\n".join(lines)
+
+    def __repr__(self) -> str:
+        return f"<uncertainty of {self.quantity}: {with_deviation(*self.linear)}>"
+
+
+def uncertainty(
+    module: ModuleType,
+    quantity: str,
+    uncertain: Mapping[str, Any] | Fit,
+    *,
+    samples: int = SAMPLES,
+    seed: int = 0,
+    **fixed: Any,
+) -> Uncertainty:
+    """Return how uncertain a quantity of a motion is where its launch and parameters are uncertain.
+
+    Parameters
+    ----------
+    module : module
+        A generated module.
+    quantity : str
+        A quantity of ``module.sweep`` that is one number: "period", "v_max", "time_at", ...
+    uncertain : mapping or Fit
+        Run-time parameters, "lam0" or "v0", each with its value and its standard deviation: ``{"L": (1.0, 1e-3)}``.
+        They are independent and normally distributed. Or the result of `fit`, with its covariance.
+    samples : int
+        How many values are drawn.
+    seed : int
+        Of the random numbers; the same seed gives the same samples.
+    fixed
+        All else of the launch and the parameters, as for ``module.sweep``.
+
+    Returns
+    -------
+    Uncertainty
+        ``.linear``, by the derivatives of the quantity, and ``.sampled``, by a sweep. Where they differ, the quantity
+        is not linear within the standard deviations, and the sample is right.
+
+    Raises
+    ------
+    InputError
+        If a name is unknown, a standard deviation is negative, or the data of a fit do not tell what it found.
+    SolutionError
+        If the motion does not have the quantity.
+
+    Notes
+    -----
+    Derivatives are those of ``motion.gradient``, exact to rounding, or difference quotients where there are none.
+    """
+    model: CompiledModel = module.MODEL
+    asked = one_of(quantity, tuple(QUANTITIES), where="uncertainty: quantity")
+    if asked == "turning_points":
+        raise InputError("uncertainty: quantity: turning_points are two numbers; ask for one number")
+    if not (isinstance(samples, int) and 2 <= samples <= MAX_SAMPLES):
+        raise InputError(f"uncertainty: samples: must be a whole number from 2 to {MAX_SAMPLES}, got {short(samples)}")
+    values, covariance = _read(model, uncertain, fixed)
+    known = (*LAUNCH, "direction", "lam", "t_max", "contact", *model.parameters)
+    for name in fixed:
+        if name not in known:
+            raise InputError(unknown_argument("uncertainty", name, known))
+    if isinstance(uncertain, Fit):
+        fixed = {name: given for name, given in uncertain.arguments.items() if name not in values} | fixed
+
+    def answers(columns: Array) -> Array:
+        rows = dict(zip(values, columns.T, strict=True))
+        swept: Array = module.sweep(quantity, **{"lam0": 0.0, **fixed, **rows}).values
+        return swept
+
+    centre = np.array([*values.values()])
+    value = float(answers(centre[None, :])[0])
+    if not isfinite(value):
+        swept = module.sweep(quantity, **{"lam0": 0.0, **fixed, **values})
+        raise SolutionError(f"uncertainty: {quantity}: {'; '.join(swept.status_counts())}")
+    gradient = _gradient(module, quantity, values, fixed)
+    if gradient is None:
+        gradient = _differences(answers, centre, np.sqrt(np.diag(covariance)))
+    found = answers(centre + _draws(covariance, samples, seed))
+    kept = found[np.isfinite(found)]
+    return Uncertainty(
+        quantity=quantity,
+        linear=Estimate(value, float(np.sqrt(gradient @ covariance @ gradient))),
+        sampled=Estimate(float(np.mean(kept)), float(np.std(kept, ddof=1))),
+        gradient=dict(zip(values, gradient.tolist(), strict=True)),
+        samples=kept,
+        missing=int(found.size - kept.size),
+    )
+
+
+def _read(model: CompiledModel, uncertain: Any, fixed: Mapping[str, Any]) -> tuple[dict[str, float], Array]:
+    """Return the uncertain numbers by their names, and their covariance."""
+    if isinstance(uncertain, Fit):
+        if uncertain.unidentified:
+            raise InputError(f"uncertainty: the data of the fit do not tell {' and '.join(uncertain.unidentified[0])}")
+        return uncertain.estimates, uncertain.covariance
+    if not isinstance(uncertain, Mapping) or not uncertain:
+        raise InputError(
+            "uncertainty: must be a mapping from names to values with their standard deviations, as in "
+            f"{{'L': (1.0, 1e-3)}}, or the result of a fit; got {short(uncertain)}"
+        )
+    units = units_of(model)
+    values, deviations = {}, []
+    for name, given in uncertain.items():
+        if name not in units:
+            raise InputError(unknown_argument("uncertainty", str(name), units, what="uncertain number"))
+        if name in fixed:
+            raise InputError(f"uncertainty: {name} is given twice, as an uncertain number and by keyword")
+        if not isinstance(given, tuple | list) or len(given) != 2:
+            raise InputError(f"uncertainty: {name}: must be (value, standard deviation), got {short(given)}")
+        value, deviation = (read_number(part, where=f"uncertainty: {name}", unit=units[name]).value for part in given)
+        if deviation < 0.0:
+            raise InputError(f"uncertainty: {name}: the standard deviation must not be negative, got {deviation!r}")
+        values[name] = value
+        deviations.append(deviation)
+    return values, np.diag(np.square(deviations))
+
+
+def _draws(covariance: Array, samples: int, seed: int) -> Array:
+    """Return normally distributed numbers of mean zero, the same on every machine but for rounding."""
+    deviations = np.sqrt(np.diag(covariance))
+    scale = np.where(deviations > 0.0, deviations, 1.0)
+    correlation = covariance / np.outer(scale, scale)
+    np.fill_diagonal(correlation, 1.0)
+    drawn: Array = np.random.default_rng(seed).standard_normal((samples, scale.size))
+    return deviations * (drawn @ np.linalg.cholesky(correlation).T)
+
+
+def _gradient(module: ModuleType, quantity: str, values: dict[str, float], fixed: Mapping[str, Any]) -> Array | None:
+    """Return the derivatives of a quantity; None where there are none."""
+    launch = {name: value for name, value in fixed.items() if name != "lam"}
+    motion = module.solve(**{"lam0": 0.0, **launch, **values})
+    try:
+        found = motion.gradient(quantity, tuple(values))
+    except (InputError, SolutionError):
+        return None
+    return np.array([*found.values()], dtype=np.float64)
+
+
+def _differences(answers: Any, centre: Array, deviations: Array) -> Array:
+    """Return central difference quotients, of one sweep."""
+    steps = STEP * np.maximum(np.abs(centre), deviations)
+    steps[steps == 0.0] = STEP
+    moves = np.diag(steps)
+    after, before = np.split(answers(np.concatenate([centre + moves, centre - moves])), 2)
+    quotients: Array = (after - before) / (2.0 * steps)
+    return quotients

@@ -1,0 +1,1 @@
+"""How motions with losses change with their launch and parameters: the variational equation along their legs."""

@@ -1,0 +1,188 @@
+"""What is asked of the changes of a motion with losses: states at times, turning points, ends and extremes."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gqm_sym.arguments import unknown_argument
+from gqm_sym.errors import InputError, SolutionError
+from gqm_sym.runtime.compiled.types import Array
+from gqm_sym.runtime.gradients.orbit import path_rows
+from gqm_sym.runtime.gradients.quantities import EXTREMES
+from gqm_sym.runtime.gradients.quantities import QUANTITIES as PERIODIC_QUANTITIES
+from gqm_sym.runtime.legs.leg_record import END, END_LOW, HEADING
+from gqm_sym.runtime.legs.variations.changes import Changes
+from gqm_sym.runtime.legs.variations.equation import LawRows
+from gqm_sym.runtime.motion.trajectory import PhasePoints
+
+# What has a gradient.
+QUANTITIES = ("turning_points", "t_end", "rest_position", *EXTREMES)
+
+# An extreme inside a leg is improved by Newton's method, whose steps may be this share of the time of the motion.
+MAX_STEP, NEWTON_STEPS = 1e-5, 3
+
+# Points that are taken together.
+BLOCK = 4096
+
+# An extreme this near to the end of a motion, as a share of its time, is there.
+AT_END = 1e-12
+
+
+class StateChanges:
+    """How states at points of a motion with losses change: a row for each variable, at fixed times.
+
+    Parameters
+    ----------
+    changes : Changes
+        The changes of its legs.
+    points : PhasePoints
+        Where it is at the times.
+    v : array
+        The velocities there.
+
+    Attributes
+    ----------
+    lam, s, x, z, v, normal_force : arrays
+        As of `gradients.sensitivity.Sensitivity`, but places within the lap.
+    rates : (2, n) array
+        How the velocity and the contact force change with time.
+    law : LawRows
+        The law at the last of the points.
+    """
+
+    law: LawRows
+
+    def __init__(self, changes: Changes, points: PhasePoints, v: Array) -> None:
+        half, w = np.empty(v.size, dtype=np.intp), np.empty(v.size)
+        for timed, here, phi in points.segments:
+            last = np.nan if timed.segment.speed_series is None else timed.segment.speed_series[0]
+            half[here], w[here] = changes.half(timed.leg, timed.sense < 0), phi * last
+        parts = [
+            self._part(changes, half[start : start + BLOCK], w[start : start + BLOCK], v[start : start + BLOCK])
+            for start in range(0, max(v.size, 1), BLOCK)
+        ]
+        found = np.concatenate(parts, axis=-1)
+        self.lam, self.s, self.x, self.z, self.v, self.normal_force = found[:6]
+        self.rates = found[6:, 0]
+
+    def _part(self, changes: Changes, half: NDArray[np.intp], w: Array, v: Array) -> Array:
+        """The attributes for some of the points: a row for each, and for each rate a row of equal rows."""
+        along, mass = changes.along(half, w), changes.law.parameters[0, changes.mass]
+        self.law = law = changes.law.rows(along.places, v**2, along.heading, along.contact_sign)
+        path = path_rows(changes.law.exact, changes.law.parameters, changes.mass, *along.places)
+        lam, acceleration = along.sigma - v / law.ds * along.delay, 0.5 * law.slope / law.ds
+        faster = 0.5 * v * along.y - acceleration * along.delay
+        x, z, _, curvature, load = (changes.by_all(rows[1:-1]) + rows[-1] * lam for rows in path)
+        force = load + v**2 * curvature + 2.0 * v * path[3][0] * faster
+        rates = (np.broadcast_to(rate, lam.shape) for rate in (acceleration, mass * law.load[0] * v / law.ds))
+        return np.array([lam, law.ds * lam + along.arc, x, z, faster, force, *rates])
+
+
+def states_at(motion: Any, changes: Changes, t: Array, low: Array) -> StateChanges:
+    """How the states of a motion at times, of two doubles each, change."""
+    points = motion._phase_points(t, low)
+    found = StateChanges(changes, points, motion._velocities(points))
+    found.lam += points.laps * changes.lap[:, None]
+    return found
+
+
+def gradient(motion: Any, changes: Changes, quantity: str) -> Array:
+    """The derivatives of a quantity of a motion by all variables; of turning points a column for each.
+
+    Parameters
+    ----------
+    motion : legs.dissipative.DissipativeMotion
+        The motion.
+    changes : Changes
+        The changes of its legs.
+    quantity : str
+        One of `QUANTITIES`.
+    """
+    if not (isinstance(quantity, str) and quantity in QUANTITIES):
+        if quantity in PERIODIC_QUANTITIES:
+            raise SolutionError(f"gradient: a motion with losses does not repeat, and so it has no {quantity}")
+        raise InputError(unknown_argument("gradient", str(quantity), QUANTITIES, what="quantity"))
+    if quantity == "turning_points":
+        return turning_points(motion, changes)
+    if quantity in EXTREMES:
+        return extreme(motion, changes, quantity)
+    t_end = motion.t_end
+    if not t_end < np.inf:
+        raise SolutionError(f"gradient: this motion goes on for ever and has no {quantity}")
+    place, delay = end(motion, changes)
+    if quantity == "t_end":
+        return delay
+    if motion.legs[-1].end != "rest":
+        raise SolutionError(f"gradient: this motion has no rest_position; it ends with {motion.legs[-1].end!r}")
+    return place
+
+
+def turning_points(motion: Any, changes: Changes) -> Array:
+    """The derivatives of the turning points of a motion."""
+    turns = [k for k, run in enumerate(changes.runs) if run.end == "turn"]
+    columns = [changes.ends[k].sigma + changes.runs[k].laps * changes.lap for k in turns]
+    if motion.problem.w0 == 0.0:
+        columns.insert(0, np.eye(changes.variables)[-2])
+    return np.array(columns).reshape(-1, changes.variables).T[:, : len(motion.turning_points)]
+
+
+def end(motion: Any, changes: Changes) -> tuple[Array, Array]:
+    """The derivatives of the place and time where a motion ends; zero if ``t_max`` ends it, or if it ends at once."""
+    what, k, zero = motion.legs[-1].end, len(changes.runs) - 1, np.zeros(changes.variables)
+    if what == "horizon" or motion.t_end == 0.0:
+        return zero, zero
+    run, origin = changes.runs[k], changes.ends[k]
+    if what == "rest":
+        return origin.sigma + run.laps * changes.lap, origin.delay
+    if what not in ("liftoff", "domain-end") or not run.ahead:
+        raise SolutionError(f"gradient: the end of a motion by {what!r} has none")
+    law, speed, v = *changes.law_at_end(k), run.record[HEADING]
+    if what == "liftoff":
+        place = np.array([run.record[END]]), np.array([run.record[END_LOW]])
+        path = path_rows(changes.law.exact, changes.law.parameters, changes.mass, *place)[3:, :, 0]
+        curvature, load = path
+        faster = origin.y - law.slope[0] * origin.sigma
+        change = changes.by_all(load[1:-1] + speed**2 * curvature[1:-1]) + curvature[0] * faster
+        moved = -change / (changes.law.parameters[0, changes.mass] * law.load[0, 0])
+    else:
+        moved = changes.ranges[0 if v < 0.0 else 1]
+    return moved + run.laps * changes.lap, origin.delay + v * law.ds[0] * (moved - origin.sigma) / speed
+
+
+def extreme(motion: Any, changes: Changes, quantity: str) -> Array:
+    """The derivatives of an extreme of a motion.
+
+    Inside a leg it changes as the quantity does at a fixed time, since it is stationary there (envelope theorem), and
+    so it does where the horizon cuts the motion. Where the motion ends by itself, its time changes too.
+    """
+    found, of_speed = getattr(motion, quantity), quantity.startswith("v_")
+    if of_speed and found.value == 0.0:
+        return np.zeros(changes.variables)
+    row, t_end = 0 if of_speed else 1, motion.t_end
+    if abs(t_end - found.t) <= AT_END * t_end:
+        at = states_at(motion, changes, np.array([t_end]), np.zeros(1))
+        moved = at.rates[row, 0] * end(motion, changes)[1]
+    else:
+        at, moved = (
+            states_at(motion, changes, np.array([_improved(motion, changes, of_speed, found)]), np.zeros(1)),
+            0.0,
+        )
+    change: Array = (
+        np.sign(motion.state(found.t).v) * (at.v[:, 0] + moved) if of_speed else at.normal_force[:, 0] + moved
+    )
+    return change
+
+
+def _improved(motion: Any, changes: Changes, of_speed: bool, found: Any) -> float:
+    """The time of an extreme inside a leg by Newton's method; it is left where the quantity is not stationary."""
+    t = found.t
+    for _ in range(NEWTON_STEPS):
+        law = states_at(motion, changes, np.array([t]), np.zeros(1)).law
+        slope, by_place, by_w = (law.slope, law.by_place, law.by_w) if of_speed else law.load
+        bend, v = by_place[0] + by_w[0] * law.slope[0], motion.state(t).v
+        step = -slope[0] / bend * law.ds[0] / v if bend and v else np.inf
+        if not abs(step) <= MAX_STEP * motion.t_end or not 0.0 <= t + step <= motion.t_end:
+            return float(found.t)
+        t += step
+    return float(t)

@@ -1,0 +1,258 @@
+"""How a motion with losses changes from leg to leg: its turning points, their times, and its states between them.
+
+Let y, sigma and ``delay`` be the changes of W, of the place and of the time at a given distance from a moving origin
+(`equation`). At a given place W changes by ``y - F sigma``, and the time by ``delay - v sigma ds/V`` with v =
+sgn(dlam/dt). Both halves of a leg agree on these in the middle, which tells how the turn at the end moves. A body that
+is thrown slowly and speeds up is followed from where it would have been at rest, so that nothing is divided by its
+speed.
+"""
+
+from collections.abc import Sequence
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from numpy.polynomial.chebyshev import chebvander
+from numpy.typing import NDArray
+
+from gqm_sym.errors import SolutionError
+from gqm_sym.runtime.compiled.types import Array
+from gqm_sym.runtime.gradients.orbit import values
+from gqm_sym.runtime.gradients.programs import range_program
+from gqm_sym.runtime.launch.problem import Problem
+from gqm_sym.runtime.legs.leg_record import END, HEADING, MIDDLE, START, START_V2
+from gqm_sym.runtime.legs.leg_run import ASYMPTOTE
+from gqm_sym.runtime.legs.leg_segments import Run
+from gqm_sym.runtime.legs.polynomials import COUNT, TO_COEFFICIENTS
+from gqm_sym.runtime.legs.variations.equation import Law, LawRows, Panels
+
+
+class Origin(NamedTuple):
+    """How the beginning of a half of a leg changes; each field has a number, or a row, for each variable.
+
+    The variables are the run-time parameters, lam0 and v0.
+
+    Attributes
+    ----------
+    sigma : array
+        The change of the place.
+    y : array
+        The change of V**2 there, at the place that moves.
+    delay : array
+        The change of the time there, at the place that moves.
+    arc : array
+        The change of arc length from launch, less ds/dlam times that of the place.
+    """
+
+    sigma: Array
+    y: Array
+    delay: Array
+    arc: Array
+
+
+class Along(NamedTuple):
+    """How some states change: a row for each variable.
+
+    Attributes
+    ----------
+    sigma, y, delay, arc : arrays
+        As of `Origin`, at given distances from the origin, with ``y`` as a share of V**2.
+    places : (array, array)
+        The places as two doubles each.
+    heading, contact_sign : arrays
+        The signs of dlam/dt and of N.
+    """
+
+    sigma: Array
+    y: Array
+    delay: Array
+    arc: Array
+    places: tuple[Array, Array]
+    heading: Array
+    contact_sign: Array
+
+
+class Changes:
+    """The changes of a motion with losses along some of its runs, the first one of which is that of the launch.
+
+    Parameters
+    ----------
+    problem : Problem
+        The launch.
+    runs : sequence of Run
+        The runs in the order of time, up to an approach to an equilibrium.
+
+    Attributes
+    ----------
+    law : Law
+        The law of motion.
+    mass : int
+        Which of the run-time parameters is the mass.
+    runs : list of Run
+        The runs.
+    ends : list of Origin
+        For each run, how its end changes: the turn, or a place that moves with the origin of its last half.
+    """
+
+    def __init__(self, problem: Problem, runs: Sequence[Run]) -> None:
+        self.law, self._problem = Law(problem), problem
+        self.mass = list(problem.formulas.parameters).index("m")
+        self.runs = [run for run in runs if run.what != ASYMPTOTE]
+        counts = [(run.ahead, run.back) for run in self.runs]
+        halves = [(k, is_back) for k, count in enumerate(counts) for is_back in (False, True) if count[is_back]]
+        self._where = {half: i for i, half in enumerate(halves)}
+        self.panels = Panels(self.law, [(self.runs[k], is_back) for k, is_back in halves])
+        self._origins: list[Origin] = []
+        self.ends: list[Origin] = []
+        self._follow()
+        self._stacked = np.array(self._origins).transpose(1, 2, 0)
+
+    @property
+    def variables(self) -> int:
+        """How many variables there are."""
+        return self.law.count + 2
+
+    def _marks(self, at: int, v2: list[float], is_back: bool) -> LawRows:
+        """The law at places of the records of all runs, with V**2 there."""
+        places = np.array([run.pair(at) for run in self.runs]).T
+        heading = np.array([run.record[HEADING] for run in self.runs])
+        last = [run.back > 0 if is_back else run.ahead == 0 for run in self.runs]
+        first = [self._half(k, is_last)[0] for k, is_last in enumerate(last)]
+        return self.law.rows((places[0], places[1]), np.array(v2), heading, self.panels.contact_sign[first])
+
+    def _half(self, run: int, is_back: bool) -> tuple[int, int]:
+        """The first panel of a half of the run with a number, and the one behind its last."""
+        k = self._where[run, is_back]
+        return self.panels.first[k], self.panels.first[k + 1]
+
+    def _mixed(self, origin: Origin, rows: Array) -> Array:
+        """The sum of solutions (`equation`) for each variable."""
+        n = self.law.count
+        found: Array = origin.sigma * rows[n] + origin.y * rows[n + 1]
+        found[:n] += rows[:n]
+        return found
+
+    def by_all(self, rows: Array) -> Array:
+        """Derivatives by the run-time parameters as derivatives by all variables, of which the others are zero."""
+        return np.concatenate([rows, np.zeros((2, *rows.shape[1:]))])
+
+    def _follow(self) -> None:
+        runs, panels = self.runs, self.panels
+        speeds = panels.end_speeds
+        start_v2 = [float(run.record[START_V2]) for run in runs]
+        # Where no panels lead from the start, the start is the middle.
+        middle = [
+            float(speeds[self._half(k, False)[1] - 1]) if run.ahead else start_v2[k] ** 0.5
+            for k, run in enumerate(runs)
+        ]
+        starts, ends = self._marks(START, start_v2, False), self._marks(END, [0.0] * len(runs), True)
+        middles = self._marks(MIDDLE, [v**2 for v in middle], False)
+        laps, zero, origin = 0, np.zeros(self.variables), self._launched(starts)
+        for k, run in enumerate(runs):
+            v = float(run.record[HEADING])
+            folded = (run.laps - laps) * self.lap
+            laps = run.laps
+            origin = origin._replace(sigma=origin.sigma - folded, arc=origin.arc + starts.ds[k] * folded)
+            if run.ahead:
+                if start_v2[k] > 0.0 and np.isfinite(run.half_c):
+                    moved = -origin.y / starts.slope[k]
+                    later = origin.delay + v * starts.ds[k] * moved / start_v2[k] ** 0.5
+                    origin = Origin(origin.sigma + moved, zero, later, origin.arc)
+                self._origins.append(origin)
+                last = self._half(k, False)[1] - 1
+                origin = Origin(
+                    origin.sigma,
+                    self._mixed(origin, panels.ends[:, last]),
+                    origin.delay + self._mixed(origin, panels.times[:, last, -1]),
+                    origin.arc + self.by_all(panels.arcs[:, last, -1]),
+                )
+            if run.back:
+                # The end moves as the middle does, and by so much more that both halves agree in the middle.
+                last = self._half(k, True)[1] - 1
+                still = origin._replace(y=zero)
+                more = self._mixed(still, panels.ends[:, last]) - origin.y
+                more /= ends.slope[k] * panels.ends[-1, last]
+                still = still._replace(sigma=origin.sigma + more)
+                delay = (
+                    origin.delay + self._mixed(still, panels.times[:, last, -1]) + v * middles.ds[k] * more / middle[k]
+                )
+                arc = origin.arc - self.by_all(panels.arcs[:, last, -1])
+                origin = Origin(still.sigma, zero, delay, arc)
+                self._origins.append(origin)
+            self.ends.append(origin)
+
+    @cached_property
+    def ranges(self) -> Array:
+        """The derivatives of both ends of the parameter's range and of its period: a row for each, by all variables."""
+        domain = self._problem.formulas.domain_of
+        assert domain is not None
+        found = values(range_program(domain, self.law.count), self.law.parameters, np.zeros(1))[:, 0, 0]
+        return self.by_all(found.reshape(3, -1)[:, 1:].T).T
+
+    @property
+    def lap(self) -> Array:
+        """The derivatives of the period of the curve's parameter."""
+        lap: Array = self.ranges[2]
+        return lap
+
+    def law_at_end(self, k: int) -> tuple[LawRows, float]:
+        """The law where the k-th run ends, and the speed there."""
+        run, last = self.runs[k], self._half(k, False)[1] - 1
+        (place, low), speed = run.pair(END), float(self.panels.end_speeds[last])
+        signs = np.array([run.record[HEADING]]), self.panels.contact_sign[last : last + 1]
+        return self.law.rows((np.array([place]), np.array([low])), np.array([speed**2]), *signs), speed
+
+    def _launched(self, starts: LawRows) -> Origin:
+        """How the launch changes."""
+        n, launch = self.law.count, self._problem.launch
+        sigma, y, delay, arc = np.zeros((4, n + 2))
+        sigma[n], arc[n] = 1.0, -starts.ds[0]
+        y[n + 1] = 2.0 * launch.v0.value
+        if launch.v0.value == 0.0:
+            heading = float(self.runs[0].record[HEADING])
+            slope = starts.slope[0]
+            if launch.direction == heading:
+                delay[n + 1] = -2.0 * starts.ds[0] / abs(slope)
+            else:  # thrown the other way, it comes back with little less speed
+                place, contact_sign = self.runs[0].pair(START), self.panels.contact_sign[:1]
+                places = np.array([place[0]]), np.array([place[1]])
+                upwards = self.law.rows(places, np.zeros(1), np.array([-heading]), contact_sign).slope[0]
+                delay[n + 1] = 2.0 * starts.ds[0] / abs(upwards)
+        return Origin(sigma, y, delay, arc)
+
+    def half(self, leg: int, is_back: bool) -> int:
+        """The number of a half of the run with a number.
+
+        Raises
+        ------
+        SolutionError
+            If the run tends to an equilibrium.
+        """
+        if (leg, is_back) not in self._where:
+            raise SolutionError(
+                "sensitivity: there is none yet where a motion tends to an equilibrium; ask for earlier times"
+            )
+        return self._where[leg, is_back]
+
+    def along(self, half: NDArray[np.intp], w: Array) -> Along:
+        """How states change at march variables on halves with numbers."""
+        panels = self.panels
+        k = panels.panel_at(half, w)
+        x = np.clip(2.0 * (w - panels.begin[k]) / panels.width[k] - 1.0, -1.0, 1.0)
+        weights = TO_COEFFICIENTS.T @ chebvander(x, COUNT - 1).T
+
+        def at(rows: Array) -> Array:
+            found: Array = np.einsum("bmj,jm->bm", rows[:, k, :COUNT], weights)
+            return found
+
+        origin = Origin(*self._stacked[:, :, half])
+        v = panels.heading[k]
+        return Along(
+            sigma=origin.sigma,
+            y=self._mixed(origin, at(panels.shares)),
+            delay=origin.delay + v * panels.u[k] * self._mixed(origin, at(panels.times)),
+            arc=origin.arc + self.by_all(at(panels.arcs)),
+            places=panels.places(k, w),
+            heading=v,
+            contact_sign=panels.contact_sign[k],
+        )

@@ -1,0 +1,249 @@
+"""The variational equation along the panels of legs, in the march variable in which the legs were found.
+
+Let dW/dlam = F(lam, W; p), where W is V**2, and let the place where a half of a leg begins (its *origin*: the start, or
+the turn at the end) move by sigma. At a given distance d from the origin, W changes by y with
+
+    dy/dd = u (F_W y + F_p + F_lam sigma),
+
+where u is the direction in which d grows. This is the equation of the leg itself with another right-hand side, so that
+the same integrating factor solves it. From a turning point y begins with 0 and vanishes as W does, so that y/W and the
+change of the time per w, ``dt/dw (ds_p/ds + ds_lam sigma/ds - y/(2 W))``, are smooth in the march variable w there too.
+The solutions for each parameter (with sigma = 0), for sigma = 1 alone, and for y = 1 at the origin are found for all
+panels at once; the change of a leg is a sum of them (`changes`).
+"""
+
+from collections.abc import Sequence
+from functools import cached_property
+from itertools import pairwise
+from math import ceil, inf, log2
+from typing import NamedTuple
+
+import numpy as np
+from numpy.polynomial.chebyshev import chebvander
+from numpy.typing import NDArray
+
+from gqm_sym.runtime.arithmetic.doubledouble import two_sum
+from gqm_sym.runtime.compiled.types import Array
+from gqm_sym.runtime.gradients.orbit import pairs, values, without_formulas
+from gqm_sym.runtime.gradients.programs import law_program
+from gqm_sym.runtime.interface import ExactLaw
+from gqm_sym.runtime.launch.problem import Problem
+from gqm_sym.runtime.legs.leg_record import END, HEADING, NORMAL_LOAD, RIGHT, START, Y_ROW
+from gqm_sym.runtime.legs.leg_run import LEAST_V2
+from gqm_sym.runtime.legs.leg_segments import Run
+from gqm_sym.runtime.legs.polynomials import COUNT, GRADED_MEANS, MEANS, SHARES, TO_COEFFICIENTS
+
+# The nodes of a panel and its end, as shares of it.
+POINTS = np.append(SHARES, 1.0)
+
+# From values at the nodes to that at the end of a panel.
+TO_END = TO_COEFFICIENTS.sum(axis=0)
+
+
+class LawRows(NamedTuple):
+    """The law of motion at places: a column for each.
+
+    Attributes
+    ----------
+    ds, ds_by_place : (n,) arrays
+        ds/dlam and its derivative by the place.
+    ds_by_parameters : (k, n) array
+        Its derivatives by the run-time parameters.
+    slope, by_place, by_w : (n,) arrays
+        F = dW/dlam and its derivatives by the place and by W.
+    by_parameters : (k, n) array
+        Its derivatives by the run-time parameters.
+    load : (3, n) array
+        The slope of the contact force per mass along the motion, and its derivatives by the place and by W.
+    """
+
+    ds: Array
+    ds_by_place: Array
+    ds_by_parameters: Array
+    slope: Array
+    by_place: Array
+    by_w: Array
+    by_parameters: Array
+    load: Array
+
+
+class Law:
+    """The law of a motion with losses, with its derivatives.
+
+    Parameters
+    ----------
+    problem : Problem
+        The launch and the module that it is of.
+    """
+
+    def __init__(self, problem: Problem) -> None:
+        formulas = problem.formulas
+        if not isinstance(formulas.exact, ExactLaw):
+            raise without_formulas()
+        self.exact, self.count = formulas.exact, len(problem.p)
+        self.parameters = pairs(*((n.value, n.low, 0.0) for n in problem.p))
+
+    def rows(self, places: tuple[Array, Array], w: Array, v: Array, nu: Array) -> LawRows:
+        """The law at places of two doubles each, where V**2 is ``w``, for the signs of dlam/dt and of N."""
+        n, least = self.count, np.maximum(w, LEAST_V2)  # laws may take its root
+        found, program = np.empty((2 * n + 8, w.size)), law_program(self.exact, n)
+        for direction, contact_sign in sorted(set(zip(v.tolist(), nu.tolist(), strict=True))):
+            signs = pairs((direction, 0.0, 0.0), (contact_sign, 0.0, 0.0))
+            here = (v == direction) & (nu == contact_sign)
+            inputs = np.ascontiguousarray(np.hstack([self.parameters, signs]))
+            found[:, here] = values(program, inputs, places[0][here], places[1][here], least[here])[:, 0]
+        ds, slope, load = found[: n + 2], found[n + 2 : 2 * n + 5], found[2 * n + 5 :]
+        return LawRows(ds[0], ds[1], ds[2:], slope[0], slope[1], slope[2], slope[3:], load)
+
+
+class Panels:
+    """The panels of all halves of some runs, one after the other, with the solutions of the variational equation.
+
+    Parameters
+    ----------
+    law : Law
+        The law.
+    halves : sequence of (Run, bool)
+        Runs, each with whether the half from its end is meant.
+
+    Attributes
+    ----------
+    first : list of int
+        Where the panels of each half begin; the last item is their number.
+    begin, width, contact_sign : (n,) arrays
+        The march variable where each panel begins, how far it goes, and the sign of N on it.
+    """
+
+    def __init__(self, law: Law, halves: Sequence[tuple[Run, bool]]) -> None:
+        self._law, rows, parts, counts = law, [], [], []
+        for run, is_back in halves:
+            place, low = run.pair(END if is_back else START)
+            heading, half_c = float(run.record[HEADING]), 0.0 if is_back else run.half_c
+            u = -heading if is_back else heading
+            part = _divided(run.panels_back if is_back else run.panels_ahead, half_c)
+            parts.append(part)
+            counts.append(len(part))
+            rows.append(np.tile([place, low, u, heading, half_c], (len(part), 1)))
+        self.first = np.cumsum([0, *counts]).tolist()
+        self.place, self._low, self.u, self.heading, half_c = np.concatenate(rows).T
+        self._is_distance = half_c == inf
+        self._half_c = np.where(self._is_distance, 0.0, half_c)
+        panels = np.concatenate(parts)
+        (self.begin, self.width, self.contact_sign), self._y = panels[:, :3].T, panels[:, 3:]
+
+    @property
+    def end_speeds(self) -> Array:
+        """V at the end of each panel."""
+        growth = np.where(self._is_distance, 1.0, self.begin + self.width + self._half_c)
+        speeds: Array = growth * (self._y @ TO_END)
+        return speeds
+
+    def panel_at(self, half: NDArray[np.intp], w: Array) -> NDArray[np.intp]:
+        """The panels at march variables w on halves with numbers."""
+        low, high = np.array(self.first)[half], np.array(self.first)[half + 1] - 1
+        while (low < high).any():  # by halving
+            middle = (low + high + 1) // 2
+            is_behind = self.begin[middle] <= w
+            low, high = np.where(is_behind, middle, low), np.where(is_behind, high, middle - 1)
+        return low
+
+    def distances(self, k: NDArray[np.intp], w: Array) -> tuple[Array, Array]:
+        """At march variables w on panels k the distance from the origin, and V over Y there."""
+        distance = np.where(self._is_distance[k], w, w * (w + 2.0 * self._half_c[k]))
+        return distance, np.where(self._is_distance[k], 1.0, w + self._half_c[k])
+
+    def places(self, k: NDArray[np.intp], w: Array) -> tuple[Array, Array]:
+        """The places at march variables w on panels k, as two doubles each."""
+        high, low = two_sum.py_func(self.place[k], self.u[k] * self.distances(k, w)[0])
+        return high, low + self._low[k]
+
+    @cached_property
+    def _solved(self) -> tuple[Array, Array, Array, Array]:
+        n, count = self._law.count, len(self.width)
+        owner = np.repeat(np.arange(count), COUNT)
+        w = self.begin[:, None] + self.width[:, None] * SHARES
+        growth = np.where(self._is_distance[:, None], 1.0, w + self._half_c[:, None])
+        v2, offset = (self._y * growth) ** 2, self.width[:, None] * POINTS
+        signs = np.repeat(self.heading, COUNT), np.repeat(self.contact_sign, COUNT)
+        rows = self._law.rows(self.places(owner, w.ravel()), v2.ravel(), *signs)
+        ds = rows.ds.reshape(count, COUNT)
+        # By w and not by the distance: laws with the root of W have a pole here at a turn, but not times the growth.
+        rate = np.where(self._is_distance, 1.0, 2.0)[:, None] * growth * rows.by_w.reshape(count, COUNT)
+        factor = np.exp(self.u[:, None] * offset * (rate @ MEANS.T))
+        # Sources for each parameter, for sigma, and none for what begins with y = 1.
+        sources = np.vstack([rows.by_parameters, rows.by_place, np.zeros_like(rows.ds)]).reshape(n + 2, count, COUNT)
+        gained = self._over_distance(sources / factor[:, :COUNT])
+        y = factor * (gained + self._chained(gained[:, :, -1], factor[:, -1])[:, :, None])
+        shares = y[:, :, :COUNT] / v2
+        shares[n + 1, ~self._is_distance] = 0.0  # there nothing begins with V**2 > 0
+        stretch = np.vstack([rows.ds_by_parameters, rows.ds_by_place, np.zeros_like(rows.ds)])
+        rates = np.where(self._is_distance, 1.0, 2.0)[:, None] * ds / self._y
+        changes = rates * (stretch.reshape(n + 2, count, COUNT) / ds - 0.5 * shares)
+        times = offset * (changes @ MEANS.T)
+        arcs = self._over_distance(rows.ds_by_parameters.reshape(n, count, COUNT))
+        return shares, times + self._before(times), arcs + self._before(arcs), y[:, :, -1]
+
+    @property
+    def shares(self) -> Array:
+        """For each solution and panel y/W at the nodes."""
+        return self._solved[0]
+
+    @property
+    def times(self) -> Array:
+        """For each solution and panel the change of the time from the origin to the nodes, and to the panel's end."""
+        return self._solved[1]
+
+    @property
+    def arcs(self) -> Array:
+        """For each parameter and panel the integral of the derivative of ds/dlam from the origin to there."""
+        return self._solved[2]
+
+    @property
+    def ends(self) -> Array:
+        """For each solution and panel y at the panel's end."""
+        return self._solved[3]
+
+    def _over_distance(self, rows: Array) -> Array:
+        """Integrals of u times rows over the distance, from the start of each panel to its points."""
+        offset = self.width[:, None] * POINTS
+        slope = np.where(self._is_distance, 1.0, 2.0 * (self.begin + self._half_c))[:, None]
+        graded = np.where(self._is_distance, 0.0, 1.0)[:, None] * offset * (rows @ GRADED_MEANS.T)
+        integrals: Array = self.u[:, None] * offset * (slope * (rows @ MEANS.T) + graded)
+        return integrals
+
+    def _before(self, integrals: Array) -> Array:
+        """What integrals have come to before each panel of its half."""
+        before = np.zeros((*integrals.shape[:2], 1))
+        for first, stop in pairwise(self.first):
+            before[:, first + 1 : stop, 0] = np.cumsum(integrals[:, first : stop - 1, -1], axis=1)
+        return before
+
+    def _chained(self, gained: Array, factors: Array) -> Array:
+        """The values of y with which panels begin: at the origin 0, and 1 for the last of the solutions."""
+        start = np.zeros_like(gained)
+        for first, stop in pairwise(self.first):
+            start[-1, first] = 1.0
+            for k in range(first + 1, stop):
+                start[:, k] = factors[k - 1] * (start[:, k - 1] + gained[:, k - 1])
+        return start
+
+
+def _divided(table: Array, half_c: float) -> Array:
+    """The panels of a half: where each begins, how far it goes, the sign of N on it, and Y at its nodes.
+
+    The march variable of a slow launch begins near a zero of V**2 behind it, at -half_c. There Y is smooth, but changes
+    of it are not: panels are no longer than their distance from it.
+    """
+    right = table[:, RIGHT]
+    left = np.append(0.0, right[:-1])
+    edges = np.append(left, right[-1])
+    if 0.0 < half_c < inf:
+        marks = half_c * (2.0 ** np.arange(1, ceil(log2(right[-1] / half_c + 2.0))) - 1.0)
+        edges = np.unique([*edges, *marks[marks < right[-1]]])
+    begin, width = edges[:-1], np.diff(edges)
+    owner = np.searchsorted(right, begin, side="right")
+    y, sign = table[owner, Y_ROW : Y_ROW + COUNT], np.where(table[owner, NORMAL_LOAD + COUNT // 2] > 0.0, 1.0, -1.0)
+    if begin.size > left.size:
+        x = 2.0 * ((begin - left[owner])[:, None] + width[:, None] * SHARES) / (right - left)[owner, None] - 1.0
+        y = np.einsum("pj,jk,pik->pi", y, TO_COEFFICIENTS.T, chebvander(x, COUNT - 1))
+    return np.column_stack([begin, width, sign, y])

@@ -1,0 +1,61 @@
+"""The brachistochrone with and without friction: times, the cycloid, and that other curves are slower."""
+
+from math import cos, pi, sin, sqrt
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import gqm_sym as gqm
+from gqm_sym.errors import GQMError
+
+# Upper bounds of the least times with mu = 0.3, found by optimisation over splines.
+TIMES = {("1", "-1"): 0.6757788612, ("1", "-0.6"): 0.7222327080, ("1", "-0.45"): 0.804359295}
+
+
+@pytest.mark.parametrize("to", TIMES)
+def test_with_friction(to: tuple[str, str], tmp_path: Path) -> None:
+    """The body gets there in that time, pressed on the track all along."""
+    track = gqm.design.brachistochrone(to, mu="0.3")
+    force = gqm.Gravity() + gqm.CoulombFriction(mu="0.3")
+    motion = gqm.build(gqm.derive(track, force), name="quickest", folder=tmp_path).solve(0, 0)
+    end = motion.state(motion.t_end)
+    assert motion.events[-1].kind == "domain-end"
+    assert (end.x, end.z) == pytest.approx((float(to[0]), float(to[1])), rel=4e-16)
+    assert end.t == pytest.approx(TIMES[to], rel=2e-10)
+    assert end.t <= TIMES[to] + 5e-11
+    assert (motion.state(np.linspace(0.01, end.t, 100)).normal_force > 0.0).all()
+
+
+def test_without_friction(tmp_path: Path) -> None:
+    """A cycloid, to the left too: in sqrt(R/g) times the wheel's angle, and pressed with twice the static load."""
+    track = gqm.design.brachistochrone((-3, -1))
+    motion = gqm.build(gqm.derive(track, gqm.Gravity()), name="cycloid_down", folder=tmp_path).solve(0, 0)
+    angle = 2 * float(track.domain[1])
+    radius = 1 / (1 - cos(angle))
+    assert radius * (angle - sin(angle)) == pytest.approx(3, rel=1e-14)
+    end = motion.time_at(float(track.domain[1]))
+    assert end == pytest.approx(angle * sqrt(radius / 9.81), rel=1e-14)
+    state = motion.state(np.linspace(0.1, 0.99, 20) * end)
+    level = -np.cos(0.5 * state.t * sqrt(9.81 / radius) - pi / 2)  # dx/ds, of a body that goes to the left
+    assert state.normal_force == pytest.approx(2 * 9.81 * level, rel=1e-12)
+
+
+BAD = {
+    "above": (((1, 1),), "more than mu"),
+    "too flat": (((1, "-0.2"), "0.3"), "mu.* = 0.3 m below it"),
+    "straight down": (((0, -1),), "beside the start"),
+    "one number": (((1,),), "a pair"),
+    "no pair": ((1,), "a pair"),
+    "negative friction": (((1, -1), -1), "mu: must not be negative"),
+    "a name": ((("a", -1),), "to: must be a number"),
+    "almost vertical": ((("1e-9", -1),), "too steep"),
+}
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_places_that_cannot_be_reached(case: str) -> None:
+    """Each is one clear error."""
+    (to, *mu), said = BAD[case]
+    with pytest.raises(GQMError, match=said):
+        gqm.design.brachistochrone(to, mu=mu[0] if mu else 0)
