@@ -13,7 +13,7 @@ from gqm_sym.cli import gen, tool
 from gqm_sym.declare.families import FAMILIES
 from gqm_sym.kernels import KERNELS
 from gqm_sym.specfile import json_schema
-from gqm_sym.studies import sweep_schema
+from gqm_sym.studies import fit_schema, sweep_schema
 
 DOCS = Path(__file__).parent
 ROOT = DOCS.parent
@@ -102,13 +102,14 @@ def forces() -> Iterator[str]:
 
 
 def curve_files() -> Iterator[str]:
-    """Yield the tables of the keys of curve files and sweep files, from their schemas."""
-    yield from ("# Curve files and sweep files (YAML)", "")
-    yield "`gqm schema` and `gqm schema --sweep` print these keys as JSON Schema (draft 7) for editors, and"
+    """Yield the tables of the keys of curve files, sweep files and fit files, from their schemas."""
+    yield from ("# Curve files, sweep files and fit files (YAML)", "")
+    yield "`gqm schema`, `gqm schema --sweep` and `gqm schema --fit` print these keys as JSON Schema (draft 7), and"
     yield "`gqm-gen --init NAME` writes a commented file to start from. Numbers are read as text and are exact."
     yield ""
     yield from _file("A curve file", json_schema())
     yield from _file("A sweep file", sweep_schema())
+    yield from _file("A fit file", fit_schema())
 
 
 def _file(title: str, schema: dict[str, Any]) -> Iterator[str]:

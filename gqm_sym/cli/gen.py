@@ -193,7 +193,7 @@ def _deliver(product: Product, options: argparse.Namespace) -> None:
         return
     motion = _motion(product)
     if options.plot is not None:
-        save_figure(motion, options.plot, "track")
+        save_figure(lambda: motion.plot("track"), options.plot)
         if not options.quiet:
             print(f"wrote {options.plot}")
     if options.solve:

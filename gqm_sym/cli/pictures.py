@@ -1,28 +1,24 @@
 """Figures written by the command line."""
 
+from collections.abc import Callable
 from io import BytesIO
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any
 
 from gqm_sym.errors import InputError
-
-if TYPE_CHECKING:
-    from gqm_sym.runtime.motion.motion import Motion
 
 FORMATS = (".png", ".svg", ".pdf")
 
 
-def save_figure(motion: "Motion", file: str, what: str) -> None:
-    """Draw a motion into a file.
+def save_figure(draw: Callable[[], Any], file: str) -> None:
+    """Draw a figure into a file.
 
     Parameters
     ----------
-    motion : Motion
-        The motion.
+    draw : callable
+        Returns a Matplotlib figure.
     file : str
         The file to write; its extension selects the format.
-    what : str
-        The figure to draw, as for `Motion.plot`.
 
     Raises
     ------
@@ -34,8 +30,8 @@ def save_figure(motion: "Motion", file: str, what: str) -> None:
     extension = Path(file).suffix.lower()
     if extension not in FORMATS:
         raise InputError(f"{file}: the format of the figure is unknown; use a name that ends in {', '.join(FORMATS)}")
-    # Without the date of creation the same motion gives the same bytes.
+    # Without the date of creation the same figure gives the same bytes.
     metadata = {".png": {}, ".svg": {"Date": None}, ".pdf": {"CreationDate": None}}
     image = BytesIO()
-    motion.plot(what).savefig(image, format=extension[1:], metadata=metadata[extension])
+    draw().savefig(image, format=extension[1:], metadata=metadata[extension])
     write_bytes(image.getvalue(), file)

@@ -1,4 +1,4 @@
-"""`gqm`: solve, plot, report, sweep, compile and list; everything but the generation of modules."""
+"""`gqm`: solve, plot, report, sweep, fit, compile and list; everything but the generation of modules."""
 
 import argparse
 import json
@@ -155,6 +155,18 @@ def _parser() -> argparse.ArgumentParser:
     sweep.add_argument("--force", action="store_true", help="start again and overwrite stored results")
     sweep.set_defaults(command=_sweep)
 
+    fit = commands.add_parser(
+        "fit",
+        parents=[_modules()],
+        help="fit parameters and a launch to measurements",
+        description="Fit the parameters that a fit file frees to the table of measurements that it names. Print the "
+        "estimates with their standard deviations, and what the measurements cannot tell.",
+    )
+    fit.add_argument("file", metavar="FILE", help="a fit file (YAML)")
+    fit.add_argument("--json", metavar="FILE", help="also write the result to this file")
+    fit.add_argument("--figure", metavar="FILE", help="also draw measurements and residuals (.png, .svg, .pdf)")
+    fit.set_defaults(command=_fit)
+
     warm = commands.add_parser(
         "warm",
         help="compile everything for this machine now",
@@ -168,7 +180,9 @@ def _parser() -> argparse.ArgumentParser:
     warm.set_defaults(command=_warm)
 
     schema = commands.add_parser("schema", help="print the JSON Schema of curve files, for editors")
-    schema.add_argument("--sweep", action="store_true", help="print the schema of sweep files instead")
+    which = schema.add_mutually_exclusive_group()
+    which.add_argument("--sweep", action="store_true", help="print the schema of sweep files instead")
+    which.add_argument("--fit", action="store_true", help="print the schema of fit files instead")
     schema.set_defaults(command=_schema)
     families = commands.add_parser("families", help="list the families of curves")
     families.set_defaults(command=_families)
@@ -201,7 +215,7 @@ def _launched(options: argparse.Namespace) -> "tuple[Spec, Model, Motion]":
 
 def _plot(options: argparse.Namespace) -> None:
     *_, motion = _launched(options)
-    save_figure(motion, options.figure, options.what)
+    save_figure(lambda: motion.plot(options.what), options.figure)
     print(f"wrote {options.figure}")
 
 
@@ -245,7 +259,7 @@ def _module(text: str, name: str, folder: Path) -> Any:
         return load(path, name)
 
 
-# -- sweep -----------------------------------------------------------------------------------
+# -- sweep and fit ---------------------------------------------------------------------------
 
 
 def _sweep(options: argparse.Namespace) -> None:
@@ -269,6 +283,21 @@ def _sweep(options: argparse.Namespace) -> None:
     print(f"wrote {target}")
 
 
+def _fit(options: argparse.Namespace) -> None:
+    from gqm_sym.building import write_text
+    from gqm_sym.studies import read_fit
+
+    plan = read_fit(options.file)
+    found = plan.fit(_module(plan.module, plan.name, Path(options.folder)))
+    print(found)
+    if options.json:
+        write_text(plan.as_json(found), options.json)
+        print(f"wrote {options.json}")
+    if options.figure:
+        save_figure(found.plot, options.figure)
+        print(f"wrote {options.figure}")
+
+
 def _warm(options: argparse.Namespace) -> None:
     from time import monotonic
 
@@ -287,10 +316,10 @@ def _warm(options: argparse.Namespace) -> None:
 
 
 def _schema(options: argparse.Namespace) -> None:
-    if options.sweep:
-        from gqm_sym.studies import sweep_schema
+    if options.sweep or options.fit:
+        from gqm_sym.studies import fit_schema, sweep_schema
 
-        schema = sweep_schema()
+        schema = sweep_schema() if options.sweep else fit_schema()
     else:
         from gqm_sym.specfile import json_schema
 

@@ -1,8 +1,9 @@
-"""Sweep files: one question to many launches, stored as it is answered."""
+"""Study files: one question to many launches, stored as it is answered, and fits to measurements."""
 
+from gqm_sym.studies.fits import FitPlan, fit_schema, read_fit
 from gqm_sym.studies.plan import Plan
 from gqm_sym.studies.reader import read_sweep
 from gqm_sym.studies.run import run
 from gqm_sym.studies.schema import sweep_schema
 
-__all__ = ["Plan", "read_sweep", "run", "sweep_schema"]
+__all__ = ["FitPlan", "Plan", "fit_schema", "read_fit", "read_sweep", "run", "sweep_schema"]
