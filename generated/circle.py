@@ -1,5 +1,5 @@
 # Made by gqm-gen for "circle". Do not edit: change its declaration and generate again.
-# interface 10, input 8861fdb976fb, body a3b4e0261dea
+# interface 10, input 8861fdb976fb, body bc92e9a0da41
 """Bead that loops round a circle
 
 x              = L*sin(theta)
@@ -217,7 +217,7 @@ def sweep(
     t_max, contact
         One for all launches, as of ``solve``.
     gradient : str or sequence of str, optional
-        What derivatives of half periods or periods are by: run-time parameters, "lam0" and "v0".
+        What derivatives of the quantity are by: run-time parameters, "lam0" and "v0".
     client : distributed.Client, optional
         A Dask cluster to do the work, with the same results.
 

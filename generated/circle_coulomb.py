@@ -1,5 +1,5 @@
 # Made by gqm-gen for "circle_coulomb". Do not edit: change its declaration and generate again.
-# interface 10, input b0d8ff0ac753, body 182a4908ffbc
+# interface 10, input b0d8ff0ac753, body a66ab11cdccd
 """Bead on a rough ring
 
 x              = L*sin(theta)
@@ -216,7 +216,7 @@ def sweep(
     t_max, contact
         One for all launches, as of ``solve``.
     gradient : str or sequence of str, optional
-        What derivatives of half periods or periods are by: run-time parameters, "lam0" and "v0".
+        What derivatives of the quantity are by: run-time parameters, "lam0" and "v0".
     client : distributed.Client, optional
         A Dask cluster to do the work, with the same results.
 

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "circle_drag". Do not edit: change its declaration and generate again.
-# interface 10, input f2f11f54325e, body 39dbe11b1174
+# interface 10, input f2f11f54325e, body 13fde27cff78
 """Pendulum in air
 
 x              = L*sin(theta)
@@ -213,7 +213,7 @@ def sweep(
     t_max, contact
         One for all launches, as of ``solve``.
     gradient : str or sequence of str, optional
-        What derivatives of half periods or periods are by: run-time parameters, "lam0" and "v0".
+        What derivatives of the quantity are by: run-time parameters, "lam0" and "v0".
     client : distributed.Client, optional
         A Dask cluster to do the work, with the same results.
 

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "circle_rotating". Do not edit: change its declaration and generate again.
-# interface 10, input a74aedd594f9, body 665589adeaa0
+# interface 10, input a74aedd594f9, body f915e1e2075b
 """Bead on a hoop that turns about its vertical diameter
 
 x              = L*sin(theta)
@@ -224,7 +224,7 @@ def sweep(
     t_max, contact
         One for all launches, as of ``solve``.
     gradient : str or sequence of str, optional
-        What derivatives of half periods or periods are by: run-time parameters, "lam0" and "v0".
+        What derivatives of the quantity are by: run-time parameters, "lam0" and "v0".
     client : distributed.Client, optional
         A Dask cluster to do the work, with the same results.
 

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "circle_spring". Do not edit: change its declaration and generate again.
-# interface 10, input bcc7b1afa151, body 85e2644f0534
+# interface 10, input bcc7b1afa151, body 12b5eb08a996
 """Bead on a ring, tied by a spring to a point above its centre
 
 x              = L*sin(theta)
@@ -241,7 +241,7 @@ def sweep(
     t_max, contact
         One for all launches, as of ``solve``.
     gradient : str or sequence of str, optional
-        What derivatives of half periods or periods are by: run-time parameters, "lam0" and "v0".
+        What derivatives of the quantity are by: run-time parameters, "lam0" and "v0".
     client : distributed.Client, optional
         A Dask cluster to do the work, with the same results.
 

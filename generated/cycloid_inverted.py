@@ -1,5 +1,5 @@
 # Made by gqm-gen for "cycloid_inverted". Do not edit: change its declaration and generate again.
-# interface 10, input 01e055bdd46f, body 7878fb7e6be3
+# interface 10, input 01e055bdd46f, body c31488d67644
 """Bead in an inverted cycloid
 
 x              = R*(theta - sin(theta))
@@ -221,7 +221,7 @@ def sweep(
     t_max, contact
         One for all launches, as of ``solve``.
     gradient : str or sequence of str, optional
-        What derivatives of half periods or periods are by: run-time parameters, "lam0" and "v0".
+        What derivatives of the quantity are by: run-time parameters, "lam0" and "v0".
     client : distributed.Client, optional
         A Dask cluster to do the work, with the same results.
 

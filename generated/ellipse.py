@@ -1,5 +1,5 @@
 # Made by gqm-gen for "ellipse". Do not edit: change its declaration and generate again.
-# interface 10, input 81dc4ee20e82, body 88a907d7a58a
+# interface 10, input 81dc4ee20e82, body 7925ffb6be42
 """Bead on an ellipse, by the eccentric angle
 
 x              = a*cos(theta)
@@ -222,7 +222,7 @@ def sweep(
     t_max, contact
         One for all launches, as of ``solve``.
     gradient : str or sequence of str, optional
-        What derivatives of half periods or periods are by: run-time parameters, "lam0" and "v0".
+        What derivatives of the quantity are by: run-time parameters, "lam0" and "v0".
     client : distributed.Client, optional
         A Dask cluster to do the work, with the same results.
 

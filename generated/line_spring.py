@@ -1,5 +1,5 @@
 # Made by gqm-gen for "line_spring". Do not edit: change its declaration and generate again.
-# interface 10, input 702c9ef6b67b, body 2df639543606
+# interface 10, input 702c9ef6b67b, body 77e0c9873632
 """Bead on a sloping line, tied to the origin by a spring
 
 x              = x
@@ -207,7 +207,7 @@ def sweep(
     t_max, contact
         One for all launches, as of ``solve``.
     gradient : str or sequence of str, optional
-        What derivatives of half periods or periods are by: run-time parameters, "lam0" and "v0".
+        What derivatives of the quantity are by: run-time parameters, "lam0" and "v0".
     client : distributed.Client, optional
         A Dask cluster to do the work, with the same results.
 

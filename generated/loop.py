@@ -1,5 +1,5 @@
 # Made by gqm-gen for "loop". Do not edit: change its declaration and generate again.
-# interface 10, input e5eeff356595, body d618df752354
+# interface 10, input e5eeff356595, body c46e6dbcb7c7
 """Loop of a roller coaster
 
 x              = x(s)
@@ -196,7 +196,7 @@ def sweep(
     t_max, contact
         One for all launches, as of ``solve``.
     gradient : str or sequence of str, optional
-        What derivatives of half periods or periods are by: run-time parameters, "lam0" and "v0".
+        What derivatives of the quantity are by: run-time parameters, "lam0" and "v0".
     client : distributed.Client, optional
         A Dask cluster to do the work, with the same results.
 

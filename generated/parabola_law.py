@@ -1,5 +1,5 @@
 # Made by gqm-gen for "parabola_law". Do not edit: change its declaration and generate again.
-# interface 10, input 6669068dcbd5, body c62194bc8c12
+# interface 10, input 6669068dcbd5, body 1250b92517d7
 """Bead on a parabola, with a resistance that falls with speed
 
 x              = x
@@ -226,7 +226,7 @@ def sweep(
     t_max, contact
         One for all launches, as of ``solve``.
     gradient : str or sequence of str, optional
-        What derivatives of half periods or periods are by: run-time parameters, "lam0" and "v0".
+        What derivatives of the quantity are by: run-time parameters, "lam0" and "v0".
     client : distributed.Client, optional
         A Dask cluster to do the work, with the same results.
 

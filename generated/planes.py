@@ -1,5 +1,5 @@
 # Made by gqm-gen for "planes". Do not edit: change its declaration and generate again.
-# interface 10, input 1c6e3a707056, body ee72c74a92b4
+# interface 10, input 1c6e3a707056, body 5fb9a2bf1ae3
 """Stitched planes through surveyed points
 
 x              = x(s)
@@ -252,7 +252,7 @@ def sweep(
     t_max, contact
         One for all launches, as of ``solve``.
     gradient : str or sequence of str, optional
-        What derivatives of half periods or periods are by: run-time parameters, "lam0" and "v0".
+        What derivatives of the quantity are by: run-time parameters, "lam0" and "v0".
     client : distributed.Client, optional
         A Dask cluster to do the work, with the same results.
 

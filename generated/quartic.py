@@ -1,5 +1,5 @@
 # Made by gqm-gen for "quartic". Do not edit: change its declaration and generate again.
-# interface 10, input 79764b04feb4, body 4b5819c6296c
+# interface 10, input 79764b04feb4, body 4440961246ad
 """Bead in a quartic bowl
 
 x              = x
@@ -211,7 +211,7 @@ def sweep(
     t_max, contact
         One for all launches, as of ``solve``.
     gradient : str or sequence of str, optional
-        What derivatives of half periods or periods are by: run-time parameters, "lam0" and "v0".
+        What derivatives of the quantity are by: run-time parameters, "lam0" and "v0".
     client : distributed.Client, optional
         A Dask cluster to do the work, with the same results.
 

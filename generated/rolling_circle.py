@@ -1,5 +1,5 @@
 # Made by gqm-gen for "rolling_circle". Do not edit: change its declaration and generate again.
-# interface 10, input 2a76ceb4277a, body 6e7b3ef80093
+# interface 10, input 2a76ceb4277a, body 8ee3a8305cd5
 """Solid sphere rolling in a circular bowl
 
 x              = L*sin(theta)
@@ -222,7 +222,7 @@ def sweep(
     t_max, contact
         One for all launches, as of ``solve``.
     gradient : str or sequence of str, optional
-        What derivatives of half periods or periods are by: run-time parameters, "lam0" and "v0".
+        What derivatives of the quantity are by: run-time parameters, "lam0" and "v0".
     client : distributed.Client, optional
         A Dask cluster to do the work, with the same results.
 

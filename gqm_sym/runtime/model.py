@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gqm_sym.arguments import unknown_argument
-from gqm_sym.errors import ArgumentError, SolutionError
+from gqm_sym.errors import ArgumentError, InputError, SolutionError
 from gqm_sym.literals.numbers import flat_doubles, read_numbers, without_unit
 from gqm_sym.loading import load_text
 from gqm_sym.runtime.compiled.streaming import LARGE
@@ -249,7 +249,9 @@ class CompiledModel(Formulas):
         if gradient is not None:
             from gqm_sym.runtime.sweep.gradients import sweep_with_gradient
 
-            swept = sweep_with_gradient(self, quantity, launches, parameters, gradient, self.solve, client)
+            if client is not None:
+                raise InputError("gradient: a sweep on a cluster (client) does not have it yet; leave one of them out")
+            swept = sweep_with_gradient(self, quantity, launches, parameters, lam, self.solve, gradient)
             return told(swept, quantity, arguments)
         if client is not None:
             from gqm_sym.runtime.sweep.cluster import sweep_on

@@ -35,6 +35,11 @@ from gqm_sym.runtime.quadrature.trapezoid import CIRCULATION, LIBRATION
 PI, PI_LOW = np.pi, 1.2246467991473532e-16
 
 
+def without_formulas() -> SolutionError:
+    """What is raised for curves that have no gradients."""
+    return SolutionError("gradients: curves without formulas have none yet; declare the curve by formulas")
+
+
 def source_of(formulas: Formulas) -> Source:
     """What the programs of a module are recorded from.
 
@@ -44,7 +49,7 @@ def source_of(formulas: Formulas) -> Source:
         If its curve has no formulas.
     """
     if not isinstance(formulas.exact, ExactFormulas) or formulas.domain_of is None:
-        raise SolutionError("gradients: curves without formulas have none yet; declare the curve by formulas")
+        raise without_formulas()
     names = list(formulas.parameters)
     return Source(formulas.exact, formulas.domain_of, formulas.inertia, len(names), names.index("m"))
 

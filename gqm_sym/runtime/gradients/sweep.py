@@ -6,7 +6,6 @@ import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
-from gqm_sym.errors import InputError
 from gqm_sym.runtime.arithmetic.elementary import QUARTER
 from gqm_sym.runtime.compiled.jit import Inner, entry
 from gqm_sym.runtime.compiled.threads import run_in_threads
@@ -23,8 +22,8 @@ from gqm_sym.runtime.quadrature.trapezoid import CIRCULATION, LIBRATION
 # From how many launches on a thread is worth starting.
 MIN_LAUNCHES_PER_THREAD = 64
 
-# Quantities whose gradients sweeps have, each with how many half periods it is.
-QUANTITIES = {"half_period": 1.0, "period": 2.0}
+# Quantities whose gradients compiled code has, each with how many half periods it is.
+PERIODS = {"half_period": 1.0, "period": 2.0}
 
 # Steps of Newton's method to the turning points, from doubles.
 NEWTON_STEPS = 2
@@ -129,17 +128,3 @@ def period_gradients(
             fill(circulation_program(source, direction, rows), CIRCULATION, chosen)
     return found
 
-
-def checked(quantity: str, client: object) -> float:
-    """How many half periods a quantity is.
-
-    Raises
-    ------
-    InputError
-        If a sweep has no gradient of it yet.
-    """
-    if quantity not in QUANTITIES:
-        raise InputError(f"gradient: sweeps have it of {' and '.join(QUANTITIES)} yet, got {quantity!r}")
-    if client is not None:
-        raise InputError("gradient: a sweep on a cluster (client) does not have it yet; leave one of them out")
-    return QUANTITIES[quantity]

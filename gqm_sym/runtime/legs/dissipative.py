@@ -323,8 +323,7 @@ class DissipativeMotion(Motion):
                 self._go_on()
 
     @locked
-    def gradient(self, quantity: str, wrt: Any = None) -> dict[str, Any]:
-        """The derivatives of a quantity of this motion by names; see `Motion.gradient`."""
+    def _gradient(self, quantity: str, wrt: Any) -> dict[str, Any]:
         rows = selected(self.problem.formulas.parameters, wrt)
         self._look_ahead()
         found = gradient(self, self._changes, quantity)

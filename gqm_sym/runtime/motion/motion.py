@@ -147,16 +147,18 @@ class Motion(ABC):
 
     # -- gradients ----------------------------------------------------------------------------
 
-    def gradient(self, quantity: str, wrt: Any = None) -> dict[str, Any]:
+    def gradient(self, quantity: str, wrt: Any = None, *, lam: Any = None) -> dict[str, Any]:
         """The derivatives of a quantity of this motion by its launch and run-time parameters.
 
         Parameters
         ----------
         quantity : str
-            "turning_points", "v_max", "v_min", "normal_force_max" or "normal_force_min"; of a periodic motion also
-            "half_period", "period" or "action", and of one with losses "t_end" or "rest_position".
+            "turning_points", "v_max", "v_min", "normal_force_max", "normal_force_min" or "time_at"; of a periodic
+            motion also "half_period", "period" or "action", and of one with losses "t_end" or "rest_position".
         wrt : str or sequence of str, optional
             What the derivatives are by: run-time parameters, "lam0" and "v0"; all of them if not given.
+        lam : number, optional
+            For "time_at": the place, as of `time_at`.
 
         Returns
         -------
@@ -171,7 +173,21 @@ class Motion(ABC):
         SolutionError
             If the motion does not have the quantity, or gradients are not there yet for motions of its kind.
         """
+        if (lam is None) == (quantity == "time_at"):
+            raise InputError(f"lam: is the place that 'time_at' asks about, got {lam!r} with {quantity!r}")
+        return self._gradient(quantity, wrt) if lam is None else self._arrival_gradient(lam, wrt)
+
+    def _gradient(self, quantity: str, wrt: Any) -> dict[str, Any]:
         raise self._without_gradients()
+
+    def _arrival_gradient(self, lam: Any, wrt: Any) -> dict[str, Any]:
+        """The derivatives of the time at which the body is at a place: what carries it on makes that earlier."""
+        t = self.time_at(lam)
+        state, changes, f = self.state(t), self.sensitivity(t, wrt), self.problem.functions
+        if state.v == 0.0:
+            raise SolutionError("gradient: time_at of a place where the body turns has none")
+        rate = state.v / path_and_force_at(f.addresses, f.p, np.array([state.lam]), np.zeros(1))[2, 0]
+        return dict(zip(changes.wrt, (-changes.lam / rate).tolist(), strict=True))
 
     def sensitivity(self, t: Any, wrt: Any = None) -> Sensitivity:
         """The derivatives of the state at given times by launch and run-time parameters.

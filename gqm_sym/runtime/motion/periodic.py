@@ -179,8 +179,7 @@ class PeriodicMotion(Motion):
         return OrbitSensitivity(self._derivatives)
 
     @locked
-    def gradient(self, quantity: str, wrt: Any = None) -> dict[str, Any]:
-        """The derivatives of a quantity of this motion by names; see `Motion.gradient`."""
+    def _gradient(self, quantity: str, wrt: Any) -> dict[str, Any]:
         return gradient(self._derivatives, self, quantity, wrt)
 
     @property

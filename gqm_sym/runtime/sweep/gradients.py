@@ -1,4 +1,7 @@
-"""Sweeps of periods with their gradients: the values as ever, then the derivatives at the same launches."""
+"""Sweeps with gradients: the values as ever, then the derivatives at the same launches.
+
+Compiled code has those of periods; for other quantities, and where its digits do not suffice, each launch is solved.
+"""
 
 from contextlib import suppress
 from math import nan
@@ -6,12 +9,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from gqm_sym.errors import SolutionError
-from gqm_sym.runtime.gradients.orbit import source_of
+from gqm_sym.errors import GQMError, InputError
+from gqm_sym.runtime.gradients.orbit import without_formulas
 from gqm_sym.runtime.gradients.quantities import selected
-from gqm_sym.runtime.gradients.sweep import checked, period_gradients
+from gqm_sym.runtime.gradients.sweep import PERIODS, period_gradients
 from gqm_sym.runtime.launch.request import LaunchRequest
-from gqm_sym.runtime.sweep.quantities import ANSWERED
+from gqm_sym.runtime.sweep.quantities import ANSWERED, SOLVE
 from gqm_sym.runtime.sweep.result import Sweep
 from gqm_sym.runtime.sweep.sweep import Solve, as_doubles, sweep
 
@@ -24,41 +27,44 @@ def sweep_with_gradient(
     quantity: str,
     launches: LaunchRequest,
     parameters: tuple[Any, ...],
-    wrt: Any,
+    lam: Any,
     solve: Solve,
-    client: Any,
+    wrt: Any,
 ) -> Sweep:
-    """Half periods or periods, and their derivatives.
+    """A quantity and its derivatives.
 
     Parameters
     ----------
-    formulas, quantity, launches, parameters, solve
+    formulas, quantity, launches, parameters, lam, solve
         As for `gqm_sym.runtime.sweep.sweep.sweep`.
     wrt : str or sequence of str
         What the derivatives are by.
-    client
-        A cluster, which is refused.
     """
-    rows, halves = selected(formulas.parameters, wrt), checked(quantity, client)
-    if formulas.dissipation is not None:
-        raise SolutionError("gradients: motions with losses have none yet")
-    source_of(formulas)
-    found = sweep(formulas, quantity, launches, parameters, None, solve)
-    spans = sweep(formulas, "turning_points", launches, parameters, None, solve).values.reshape(-1, 2)
-    names = (*formulas.parameters, "lam0", "v0", "direction")
-    given = (*parameters, launches.lam0, launches.v0, launches.direction)
+    rows = selected(formulas.parameters, wrt)
+    if quantity == "turning_points":
+        raise InputError("gradient: sweeps have it of quantities that are one number, not of turning_points")
+    if formulas.chart is not None:
+        raise without_formulas()
+    found = sweep(formulas, quantity, launches, parameters, lam, solve)
+    names = (*formulas.parameters, "lam0", "v0", "direction", "lam")
+    given = (*parameters, launches.lam0, launches.v0, launches.direction, 0.0 if lam is None else lam)
     columns = [
         np.broadcast_to(as_doubles(v, n), found.status.shape).reshape(-1) for v, n in zip(given, names, strict=True)
     ]
     answered = np.flatnonzero(found.status.reshape(-1) == ANSWERED)
-    gradient = np.full((found.status.size, len(rows)), nan)
-    table = np.stack(columns, axis=1)[answered]
-    gradient[answered] = period_gradients(formulas, table[:, :-1], table[:, -1], spans[answered], tuple(rows.values()))
-    gradient[answered] *= np.where(np.isnan(spans[answered, :1]), 1.0, halves)
+    gradient, route = np.full((found.status.size, len(rows)), nan), found.route.reshape(-1)
+    if quantity in PERIODS and formulas.dissipation is None:
+        spans = sweep(formulas, "turning_points", launches, parameters, None, solve).values.reshape(-1, 2)[answered]
+        table = np.stack(columns[:-1], axis=1)[answered]
+        gradient[answered] = period_gradients(formulas, table[:, :-1], table[:, -1], spans, tuple(rows.values()))
+        gradient[answered] *= np.where(np.isnan(spans[:, :1]), 1.0, PERIODS[quantity])
     for k in answered[np.isnan(gradient[answered]).any(axis=1)].tolist():
-        *p, lam0, v0, direction = (column[k].item() for column in columns)
-        motion = solve(LaunchRequest(lam0, v0, int(direction), None, None, launches.contact), tuple(p))
-        with suppress(SolutionError):
-            gradient[k] = list(motion.gradient(quantity, tuple(rows)).values())
+        *p, lam0, v0, direction, place = (column[k].item() for column in columns)
+        motion = solve(LaunchRequest(lam0, v0, int(direction), None, launches.t_max, launches.contact), tuple(p))
+        route[k] = SOLVE
+        with suppress(GQMError):
+            slopes = motion.gradient(quantity, tuple(rows), lam=None if lam is None else place)
+            gradient[k] = list(slopes.values())
+    found.route[...] = route.reshape(found.status.shape)
     found.gradient = gradient.reshape(*found.status.shape, len(rows))
     return found

@@ -241,6 +241,26 @@ def test_what_has_no_gradient(
         motion.gradient(quantity, wrt)
 
 
+@pytest.mark.parametrize("place", [0.4, -1.1, 1.15])
+def test_the_time_at_a_place(place: float, circle: ModuleType) -> None:
+    """Of a pendulum released at rest, in elliptic integrals."""
+    launch = {"lam0": 1.2, "L": 1.25, "g": 9.81}
+    found = circle.solve(**launch).gradient("time_at", tuple(launch), lam=place)
+
+    def time(at: dict[str, Any]) -> list[Any]:
+        k = mp.sin(at["lam0"] / 2)
+        return [mp.sqrt(at["L"] / at["g"]) * (mp.ellipk(k**2) - mp.ellipf(mp.asin(mp.sin(mpf(place) / 2) / k), k**2))]
+
+    for name in launch:
+        with mp.workdps(60):
+            (wanted,) = by_differences(time, launch, name, 25)
+        assert found[name] == pytest.approx(float(wanted), rel=1e-13)
+    with pytest.raises(SolutionError, match="where the body turns"):
+        circle.solve(**launch).gradient("time_at", lam=circle.solve(**launch).turning_points[0])
+    with pytest.raises(InputError, match="lam: is the place"):
+        circle.solve(**launch).gradient("time_at")
+
+
 def test_motions_without_gradients_yet() -> None:
     """Curves without formulas, the action of motions with losses, and bodies at rest."""
     with pytest.raises(SolutionError, match="gradients: curves without formulas"):

@@ -69,9 +69,8 @@ def test_launches_without_a_value() -> None:
 @pytest.mark.parametrize(
     ("name", "quantity", "wrt", "error", "text"),
     [
-        ("circle", "v_max", "L", InputError, "sweeps have it of half_period and period yet, got 'v_max'"),
+        ("circle", "turning_points", "L", InputError, "quantities that are one number, not of turning_points"),
         ("circle", "period", "l", InputError, "did you mean 'L'"),
-        ("circle_drag", "period", "L", SolutionError, "motions with losses have none yet"),
         ("superellipse", "period", "lam0", SolutionError, "curves without formulas have none yet"),
     ],
 )
@@ -79,6 +78,24 @@ def test_what_has_no_gradient(name: str, quantity: str, wrt: Any, error: type[Ex
     """One clear error each."""
     with pytest.raises(error, match=text):
         generated(name).sweep(quantity, lam0=1.0, gradient=wrt)
+
+
+def test_quantities_of_solved_motions() -> None:
+    """On a ring times grow as the root of L/g, and change with the drag as b L/m does; each launch is solved."""
+    amplitudes = np.array([0.3, 1.2, 2.5])
+    names = ("L", "g", "b", "m")
+    found = generated("circle_drag").sweep("time_at", lam0=amplitudes, lam=-0.1, b=0.2, m=2, gradient=names)
+    by_length, by_gravity, by_drag, by_mass = found.gradient.T
+    np.testing.assert_allclose(by_gravity, -0.5 * found.values / 9.81, rtol=1e-12)
+    np.testing.assert_allclose(by_mass, -0.1 * by_drag, rtol=1e-12)
+    np.testing.assert_allclose(by_length, 0.5 * found.values + 0.2 * by_drag, rtol=1e-12)
+    assert found.route_counts() == {"solve": 3}
+    rests = generated("circle_coulomb").sweep("t_end", lam0=amplitudes, L=1.3, gradient=("L", "g"))
+    assert rests.status.tolist() == [0, 0, 0]
+    np.testing.assert_allclose(rests.gradient[:, 0], 0.5 * rests.values / 1.3, rtol=1e-12)
+    np.testing.assert_allclose(rests.gradient[:, 1], -0.5 * rests.values / 9.81, rtol=1e-12)
+    fastest = generated("circle").sweep("v_max", lam0=amplitudes, L=1, gradient="lam0")
+    np.testing.assert_allclose(fastest.gradient[:, 0], np.sqrt(9.81) * np.cos(0.5 * amplitudes), rtol=1e-14)
 
 
 def test_a_cluster_is_refused() -> None:

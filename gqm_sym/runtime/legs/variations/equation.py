@@ -22,10 +22,9 @@ import numpy as np
 from numpy.polynomial.chebyshev import chebvander
 from numpy.typing import NDArray
 
-from gqm_sym.errors import SolutionError
 from gqm_sym.runtime.arithmetic.doubledouble import two_sum
 from gqm_sym.runtime.compiled.types import Array
-from gqm_sym.runtime.gradients.orbit import pairs, values
+from gqm_sym.runtime.gradients.orbit import pairs, values, without_formulas
 from gqm_sym.runtime.gradients.programs import law_program
 from gqm_sym.runtime.interface import ExactLaw
 from gqm_sym.runtime.launch.problem import Problem
@@ -80,7 +79,7 @@ class Law:
     def __init__(self, problem: Problem) -> None:
         formulas = problem.formulas
         if not isinstance(formulas.exact, ExactLaw):
-            raise SolutionError("gradients: curves without formulas have none yet; declare the curve by formulas")
+            raise without_formulas()
         self.exact, self.count = formulas.exact, len(problem.p)
         self.parameters = pairs(*((n.value, n.low, 0.0) for n in problem.p))
 
