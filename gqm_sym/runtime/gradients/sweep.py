@@ -127,4 +127,3 @@ def period_gradients(
         if (chosen := turned & (directions == direction)).any():
             fill(circulation_program(source, direction, rows), CIRCULATION, chosen)
     return found
-
