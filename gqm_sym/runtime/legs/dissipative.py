@@ -62,7 +62,7 @@ from gqm_sym.runtime.legs.leg_record import (
 )
 from gqm_sym.runtime.legs.leg_run import ASYMPTOTE, FULL, LIFTOFF, LIMIT, NARROWED, PAUSED, SPENT, TURN
 from gqm_sym.runtime.legs.leg_segments import Run, TabulatedPiece, along_field, along_panels, leg_record, tabulated
-from gqm_sym.runtime.legs.variations.answers import gradient, states_at
+from gqm_sym.runtime.legs.variations.answers import Switch, gradient, nearest_switch, states_at
 from gqm_sym.runtime.legs.variations.changes import Changes
 from gqm_sym.runtime.motion.aperiodic import MotionAtRest
 from gqm_sym.runtime.motion.events import Leg, passages
@@ -340,6 +340,14 @@ class DissipativeMotion(Motion):
         found = states_at(self, self._changes, times, low)
         fields = (getattr(found, name) for name in Sensitivity._fields[1:])
         return Sensitivity(tuple(rows), *(field[list(rows.values())].reshape(len(rows), *shape) for field in fields))
+
+    @property
+    @locked
+    def nearest_switch(self) -> Switch | None:
+        """The turn at which the motion is nearest to another number of legs; see `Motion.nearest_switch`."""
+        turns = [leg for leg in self.legs if leg.end in ("turn", "rest")]
+        functions = self.problem.functions
+        return nearest_switch(_loss(self.problem).static_balance, functions.p, turns, self.problem.period)
 
     @property
     def _changes(self) -> Changes:

@@ -189,6 +189,19 @@ class Motion(ABC):
         rate = state.v / path_and_force_at(f.addresses, f.p, np.array([state.lam]), np.zeros(1))[2, 0]
         return dict(zip(changes.wrt, (-changes.lam / rate).tolist(), strict=True))
 
+    @property
+    def nearest_switch(self) -> Any:
+        """The turn at which a motion with friction comes nearest to resting, or to one leg more; None if there is none.
+
+        Returns
+        -------
+        Switch or None
+            Its time ``t``, its place ``lam``, and ``margin``: by how much the pull along the track is larger there than
+            what can hold the body, as a share of the latter, negative where it stays. The derivatives of a motion are
+            those for the legs that it has; at a margin of 0 they are one-sided.
+        """
+        return None
+
     def sensitivity(self, t: Any, wrt: Any = None) -> Sensitivity:
         """The derivatives of the state at given times by launch and run-time parameters.
 

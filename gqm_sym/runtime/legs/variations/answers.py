@@ -1,19 +1,23 @@
 """What is asked of the changes of a motion with losses: states at times, turning points, ends and extremes."""
 
-from typing import Any
+from collections.abc import Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gqm_sym.arguments import unknown_argument
 from gqm_sym.errors import InputError, SolutionError
-from gqm_sym.runtime.compiled.types import Array
+from gqm_sym.runtime.compiled.calls import call_static_balance
+from gqm_sym.runtime.compiled.jit import entry
+from gqm_sym.runtime.compiled.types import INTEGER, MATRIX, VECTOR, Array
 from gqm_sym.runtime.gradients.orbit import path_rows
 from gqm_sym.runtime.gradients.quantities import EXTREMES
 from gqm_sym.runtime.gradients.quantities import QUANTITIES as PERIODIC_QUANTITIES
 from gqm_sym.runtime.legs.leg_record import END, END_LOW, HEADING
 from gqm_sym.runtime.legs.variations.changes import Changes
 from gqm_sym.runtime.legs.variations.equation import LawRows
+from gqm_sym.runtime.motion.events import Leg
 from gqm_sym.runtime.motion.trajectory import PhasePoints
 
 # What has a gradient.
@@ -27,6 +31,25 @@ BLOCK = 4096
 
 # An extreme this near to the end of a motion, as a share of its time, is there.
 AT_END = 1e-12
+
+
+class Switch(NamedTuple):
+    """The turn at which a motion with friction comes nearest to another number of legs.
+
+    Attributes
+    ----------
+    t : float
+        Time from launch in s.
+    lam : float
+        The place, in the unit of the curve's parameter.
+    margin : float
+        By how much the pull along the track is larger there than what can hold the body, as a share of the latter. It
+        is negative where the body stays. At 0 one more leg begins or ends, and derivatives are one-sided.
+    """
+
+    t: float
+    lam: float
+    margin: float
 
 
 class StateChanges:
@@ -150,6 +173,38 @@ def end(motion: Any, changes: Changes) -> tuple[Array, Array]:
     return moved + run.laps * changes.lap, origin.delay + v * law.ds[0] * (moved - origin.sigma) / speed
 
 
+@entry(MATRIX(INTEGER, VECTOR, VECTOR))
+def balance_at(static_balance, p, places):  # type: ignore[no-untyped-def]
+    """The accelerations of a body at rest that is about to move forwards, and backwards, at places."""
+    out = np.empty((2, places.size))
+    call_static_balance(static_balance, places.size, places, p, out)
+    return out
+
+
+def nearest_switch(static_balance: int, p: Array, turns: Sequence[Leg], period: float) -> Switch | None:
+    """The turn at which the number of legs is nearest to changing; None if nothing can hold the body at any.
+
+    Parameters
+    ----------
+    static_balance : int
+        The address of the module's function.
+    p : array
+        Run-time parameters.
+    turns : sequence of Leg
+        The legs that end with a turn, or with rest.
+    period : float
+        That of the curve's parameter, or 0.
+    """
+    places = np.array([leg.lam_end for leg in turns])
+    forwards, backwards = balance_at(static_balance, p, np.mod(places, period) if period else places)
+    holds, pull = 0.5 * (backwards - forwards), 0.5 * np.abs(forwards + backwards)
+    margins = np.divide(pull - holds, holds, where=holds > 0.0, out=np.full(places.size, np.inf))
+    if not np.isfinite(margins).any():
+        return None
+    k = int(np.argmin(np.abs(margins)))
+    return Switch(turns[k].t_end, float(places[k]), float(margins[k]))
+
+
 def extreme(motion: Any, changes: Changes, quantity: str) -> Array:
     """The derivatives of an extreme of a motion.
 
@@ -159,19 +214,17 @@ def extreme(motion: Any, changes: Changes, quantity: str) -> Array:
     found, of_speed = getattr(motion, quantity), quantity.startswith("v_")
     if of_speed and found.value == 0.0:
         return np.zeros(changes.variables)
-    row, t_end = 0 if of_speed else 1, motion.t_end
-    if abs(t_end - found.t) <= AT_END * t_end:
-        at = states_at(motion, changes, np.array([t_end]), np.zeros(1))
-        moved = at.rates[row, 0] * end(motion, changes)[1]
+    t, t_end, moved = found.t, motion.t_end, np.zeros(changes.variables)
+    if abs(t_end - t) <= AT_END * t_end:
+        t, moved = t_end, end(motion, changes)[1]
     else:
-        at, moved = (
-            states_at(motion, changes, np.array([_improved(motion, changes, of_speed, found)]), np.zeros(1)),
-            0.0,
-        )
-    change: Array = (
-        np.sign(motion.state(found.t).v) * (at.v[:, 0] + moved) if of_speed else at.normal_force[:, 0] + moved
-    )
-    return change
+        t = _improved(motion, changes, of_speed, found)
+    at = states_at(motion, changes, np.array([t]), np.zeros(1))
+    if of_speed:
+        faster: Array = np.sign(motion.state(t).v) * (at.v[:, 0] + at.rates[0, 0] * moved)
+        return faster
+    stronger: Array = at.normal_force[:, 0] + at.rates[1, 0] * moved
+    return stronger
 
 
 def _improved(motion: Any, changes: Changes, of_speed: bool, found: Any) -> float:

@@ -99,10 +99,18 @@ def test_a_spring_with_dry_friction(build: Build, changed: Launch, direction: in
     """States at any time, turning points, where the body comes to rest and when."""
     module = build("changing_spring", gqm.Curve.graph("0*x"), gqm.Potential("k*x**2/2") + gqm.CoulombFriction())
     launch = {**ROUGH, **changed}
-    motion, start = module.solve(**launch, direction=direction), RoughSpring(**{k: mpf(v) for k, v in launch.items()})
-    end = float(start.end) if direction == 1 else motion.t_end
-    times = end * np.array([0.01, 0.05, 0.2, 0.37, 0.55, 0.77, 0.93, 0.9999])
+    motion = module.solve(**launch, direction=direction)
+    start = RoughSpring(**{k: mpf(v) for k, v in launch.items()}, direction=direction)
+    times = float(start.end) * np.array([0.01, 0.05, 0.2, 0.37, 0.55, 0.77, 0.93, 0.9999])
     assert_states(motion, times, lambda t, **at: RoughSpring(**at, direction=direction).at(t), launch, ("lam", "v"))
+    # At the last two turns the margins are of the same size where both are on one side.
+    margins = [float(start.rate**2 * abs(place) / (mpf(launch["mu"]) * mpf("9.81"))) - 1.0 for place in start.turns]
+    nearest = motion.nearest_switch
+    assert abs(nearest.margin) == pytest.approx(np.abs(margins).min(), rel=1e-12)
+    assert (nearest.lam, nearest.margin) in [
+        (pytest.approx(float(place), rel=1e-12), pytest.approx(margin, rel=1e-12))
+        for place, margin in zip(start.turns, margins, strict=True)
+    ]
     names = [name for name in launch if name != "v0" or launch["v0"] != "0"]
     turns = motion.gradient("turning_points", names)
     rest, last = motion.gradient("rest_position", names), motion.gradient("t_end", names)
@@ -286,4 +294,5 @@ def test_ends_that_do_not_move() -> None:
     assert module.solve(1).sensitivity(np.empty((0, 2)), "L").normal_force.shape == (1, 0, 2)
     assert module.solve(1, t_max="0.2").gradient("t_end", ("L", "mu")) == {"L": 0.0, "mu": 0.0}
     assert module.solve(3, "0.1", contact="above").gradient("t_end", "L") == {"L": 0.0}
+    assert load(str(ROOT / "generated" / "circle_drag.py"), "circle_drag").solve(1).nearest_switch is None
     assert module.solve(1).gradient("v_min", ("L", "mu")) == {"L": 0.0, "mu": 0.0}
