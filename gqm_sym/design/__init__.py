@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from gqm_sym.design.descent import brachistochrone
     from gqm_sym.design.load import constant_load, from_load
+    from gqm_sym.design.optimum import minimise
     from gqm_sym.design.period_law import from_period, height_limit
 
 _HOMES = {
@@ -14,9 +15,10 @@ _HOMES = {
     "from_load": "load",
     "from_period": "period_law",
     "height_limit": "period_law",
+    "minimise": "optimum",
 }
 
-__all__ = ["brachistochrone", "constant_load", "from_load", "from_period", "height_limit"]
+__all__ = ["brachistochrone", "constant_load", "from_load", "from_period", "height_limit", "minimise"]
 
 
 def __getattr__(name: str) -> Any:

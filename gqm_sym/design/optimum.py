@@ -1,0 +1,401 @@
+"""Tracks on which a quantity of the motion is least, under limits on load and shape."""
+
+import tempfile
+import warnings
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
+from math import inf, isfinite, nan
+from typing import Any
+
+import numpy as np
+
+from gqm_sym.arguments import checked, one_of, short, unknown_argument
+from gqm_sym.building import build
+from gqm_sym.declare.curve import Curve
+from gqm_sym.derivation import derive
+from gqm_sym.design.tracks import read_constant
+from gqm_sym.errors import DeclarationError, GQMError, NoisyPointsWarning, SolutionError
+from gqm_sym.kernels import Kernel
+from gqm_sym.parameters import exact_value
+from gqm_sym.runtime.charts.sampled import Sampled
+from gqm_sym.runtime.compiled.types import Array
+from gqm_sym.runtime.launch.request import LaunchRequest
+from gqm_sym.runtime.model import CompiledModel
+from gqm_sym.runtime.sweep.quantities import QUANTITIES
+
+# What may be limited, and its unit.
+LIMITS = {"height": "m", "slope": "1", "curvature": "1/m", "normal_force": "N"}
+
+# Places along the track at which limits are held.
+PLACES = 201
+
+# Steps of the optimiser, and how far a limit may be exceeded, as a share of it.
+MAX_STEPS, MAX_EXCESS = 200, 1e-6
+
+# A body whose motion ends nearer to the end of the track than this share of it has arrived there.
+NEAR_END = 1e-9
+
+# What a track counts, in units of the first guess, along which the motion does not have the quantity.
+PENALTY = 1e3
+
+
+@checked("design.minimise", also=("lam0", "v0", "direction", "lam", "contact"))
+def minimise(
+    quantity: str,
+    track: Any,
+    force: Kernel,
+    *,
+    free: Any,
+    limits: Mapping[str, tuple[Any, Any]] | None = None,
+    between: tuple[Any, Any] | None = None,
+    **given: Any,
+) -> Curve:
+    """Return the track of a family, or through movable points, on which a quantity of the motion is least.
+
+    Parameters
+    ----------
+    quantity : str
+        One of ``module.sweep`` that is one number, as "time_at", "period" or "normal_force_max". The place of "time_at"
+        is the argument ``lam``, or the end of the track.
+    track : Curve or (n, 2) array
+        A curve with run-time parameters, or points of which some may move up and down; the track is then the spline
+        through them (`Curve.sampled`), in arc length.
+    force : Kernel
+        As for `derive`.
+    free : mapping or sequence
+        Of a curve the parameters that are to be found, each with ``(low, high)``, or ``(low, guess, high)``. Of points
+        the numbers of those that may move, counted from 0, or a mapping from them to limits of their heights.
+    limits : mapping, optional
+        ``(low, high)``, either of them None, for "height" in m, "slope" (dz/dx), "curvature" in 1/m or "normal_force"
+        in N. They are held at 201 places along the track.
+    between : pair of numbers, optional
+        Ends of the part of a curve on which limits are held, as values of its parameter; without it the whole domain.
+    given
+        Launch (``lam0``, ``v0``, ``direction``), ``contact``, ``lam`` and all other run-time parameters.
+
+    Returns
+    -------
+    Curve
+        The curve with what was found as defaults, or the track through the points.
+
+    Raises
+    ------
+    DeclarationError
+        If limits contradict each other, or something is unknown.
+    SolutionError
+        If no track meets all limits, or the motion does not have the quantity at the first guess.
+
+    Notes
+    -----
+    SciPy's SLSQP, with the exact derivatives of ``motion.gradient`` where there are some, and difference quotients
+    elsewhere. What it finds is a local minimum.
+
+    Examples
+    --------
+    The quickest plane to a wall 1 m away falls by 45 degrees, but not if it must not be steeper than 40:
+
+    >>> import gqm_sym as gqm
+    >>> plane = gqm.Curve.graph("-k*x", domain=(0, 1), parameters={"k": 1})
+    >>> best = minimise("time_at", plane, gqm.Gravity(), free={"k": (0.1, 0.5, 4)}, lam0=0)
+    >>> round(dict(best.defaults)["k"], 6)
+    1.0
+    """
+    from scipy.optimize import minimize
+
+    where = "design.minimise"
+    asked = one_of(quantity, tuple(QUANTITIES), where=f"{where}: quantity")
+    if asked == "turning_points":
+        raise DeclarationError(f"{where}: quantity: turning_points are two numbers; ask for one number")
+    wanted = _limits(limits or {}, where)
+    kind = _Family if isinstance(track, Curve) else _Points
+    with tempfile.TemporaryDirectory(prefix="gqm-") as folder:
+        tracks = kind(track, force, free, given, folder)
+        first = tracks.answer(asked, tracks.start)
+        if not (isfinite(first) and first != 0.0):
+            raise SolutionError(f"{where}: the motion at the first guess has no {asked}; begin elsewhere")
+
+        def value(x: Array) -> float:
+            found = tracks.answer(asked, x) / first
+            return found if isfinite(found) else PENALTY
+
+        def slopes(x: Array) -> Array:
+            exact = tracks.gradient(asked, x)
+            return _quotients(value, x, tracks) if exact is None else exact / first
+
+        held = [(name, low, high) for name, (low, high) in wanted.items()]
+
+        def margins(x: Array) -> Array:
+            return np.concatenate([np.ones(1), *tracks.margins(x, held, between)])
+
+        def steepness(x: Array) -> Array:
+            return _quotients(margins, x, tracks)
+
+        found = minimize(
+            value,
+            tracks.start,
+            jac=slopes,
+            method="SLSQP",
+            bounds=list(zip(tracks.low, tracks.high, strict=True)),
+            constraints=[{"type": "ineq", "fun": margins, "jac": steepness}] if held else [],
+            options={"maxiter": MAX_STEPS, "ftol": tracks.tolerance},
+        )
+        _check(tracks, np.asarray(found.x), held, between, f"{where}: {found.message}" if found.status == 9 else where)
+        return tracks.track(np.asarray(found.x))
+
+
+def _limits(limits: Mapping[str, tuple[Any, Any]], where: str) -> dict[str, tuple[float, float]]:
+    """Read the limits on load and shape."""
+    found = {}
+    for name, pair in limits.items():
+        if name not in LIMITS:
+            raise DeclarationError(unknown_argument(f"{where}: limits", str(name), LIMITS, what="limit"))
+        if not isinstance(pair, tuple | list) or len(pair) != 2:
+            raise DeclarationError(
+                f"{where}: limits: {name}: must be (low, high), either of them None, got {short(pair)}"
+            )
+        low, high = (
+            side if end is None else float(read_constant(end, f"limits: {name}", where=where, unit=LIMITS[name]))
+            for end, side in zip(pair, (-inf, inf), strict=True)
+        )
+        if not low < high:
+            raise DeclarationError(
+                f"{where}: limits: {name}: the limits contradict each other, got ({low!r}, {high!r})"
+            )
+        found[name] = (low, high)
+    return found
+
+
+def _check(tracks: "_Tracks", x: Array, held: list[Any], between: Any, where: str) -> None:
+    """Refuse what was found where it does not meet the limits, or is no minimum."""
+    for (name, low, high), margins in zip(held, tracks.margins(x, held, between), strict=True):
+        if not margins.min() >= -MAX_EXCESS:
+            raise SolutionError(
+                f"{where}: no track was found that meets all limits; at best {name} exceeds ({low:.6g}, {high:.6g}) by "
+                f"{-margins.min() * _scale(low, high):.3g} {LIMITS[name]}. Begin elsewhere, or allow more"
+            )
+    if where.endswith("limit reached"):
+        raise SolutionError(f"{where} after {MAX_STEPS} steps; begin nearer to the minimum, or free less")
+
+
+def _scale(low: float, high: float) -> float:
+    """The size of a limit, by which its margin is measured."""
+    return max((abs(end) for end in (low, high) if isfinite(end)), default=1.0) or 1.0
+
+
+def _quotients(function: Callable[[Array], Any], x: Array, tracks: "_Tracks") -> Array:
+    """Central difference quotients by everything that is free, which is the last axis; one-sided at its limits."""
+    columns = []
+    for k in range(x.size):
+        step = tracks.step * max(abs(x[k]), tracks.size)
+        ends = [min(max(x[k] + move, tracks.low[k]), tracks.high[k]) for move in (-step, step)]
+        sides = [function(np.where(np.arange(x.size) == k, end, x)) for end in ends]
+        columns.append((sides[1] - sides[0]) / (ends[1] - ends[0]))
+    return np.stack(columns, axis=-1)
+
+
+class _Tracks(ABC):
+    """Tracks that differ by some numbers.
+
+    Attributes
+    ----------
+    start, low, high : (n,) arrays
+        First guesses and limits of what is free.
+    size : float
+        Of what is free, at least.
+    step, tolerance : float
+        The step of a difference quotient as a share of the size, and the relative change of the quantity at which the
+        optimiser ends.
+    """
+
+    start: Array
+    low: Array
+    high: Array
+    size: float = 1e-3
+    step: float = 1e-5
+    tolerance: float = 1e-13
+
+    def __init__(self, track: Any, force: Kernel, free: Any, given: Mapping[str, Any], folder: str) -> None:
+        self._read(track, free)
+        self._given = dict(given)
+        module = build(derive(self._curve, force), name="designed_track", folder=folder)
+        self._compiled: CompiledModel = module.MODEL
+        known = ("lam0", "v0", "direction", "contact", "lam", *self._compiled.parameters)
+        for name in given:
+            if name not in known:
+                raise DeclarationError(unknown_argument("design.minimise", name, known))
+
+    _curve: Curve
+
+    @abstractmethod
+    def _read(self, track: Any, free: Any) -> None:
+        """Read the track, and what is free."""
+
+    @abstractmethod
+    def _candidate(self, x: Array) -> tuple[CompiledModel, dict[str, Any]]:
+        """Return the compiled model of one track, and its run-time parameters."""
+
+    @abstractmethod
+    def track(self, x: Array) -> Curve:
+        """Return one track as it is declared."""
+
+    def gradient(self, quantity: str, x: Array) -> Array | None:
+        """Return the exact derivatives of a quantity; None where there are none."""
+        return None
+
+    def _launch(self, x: Array) -> tuple[CompiledModel, LaunchRequest, tuple[Any, ...], tuple[float, float]]:
+        """Return a model, a launch, run-time parameters, and both ends of the curve."""
+        model, own = self._candidate(x)
+        given = self._given | own
+        parameters = tuple(given.get(name, default) for name, default in model.parameters.items())
+        low, high, *_ = model.domain(model.numbers(parameters)).numbers
+        start = given.get("lam0", low)
+        request = LaunchRequest(
+            start, given.get("v0", 0.0), given.get("direction", 1), None, None, given.get("contact", "bilateral")
+        )
+        return model, request, parameters, (low, high)
+
+    def answer(self, quantity: str, x: Array) -> float:
+        """Return the quantity along one track; NaN where it has none."""
+        try:
+            model, request, parameters, ends = self._launch(x)
+            if quantity == "time_at" and "lam" not in self._given:
+                return _arrival(model.solve(request, parameters), *ends)
+            lam = self._given["lam"] if quantity == "time_at" else None
+            return float(np.ravel(model.sweep(quantity, request, parameters, lam=lam, client=None).values)[0])
+        except GQMError:
+            if x is self.start:
+                raise
+            return nan
+
+    def margins(self, x: Array, held: list[Any], between: Any) -> list[Array]:
+        """Return by how much each limit is met at places along one track, as a share of the limit."""
+        if not held:
+            return []
+        try:
+            rows = self._rows(x, between)
+        except GQMError:
+            if x is self.start:
+                raise
+            return [np.full(2 * PLACES, -1.0) for _ in held]
+        found = []
+        for name, low, high in held:
+            scale = _scale(low, high)
+            both = np.concatenate([(rows[name] - low) / scale, (high - rows[name]) / scale])
+            found.append(np.where(np.isnan(both), -1.0, np.minimum(both, 1e6)))
+        return found
+
+    def _rows(self, x: Array, between: Any) -> dict[str, Array]:
+        """Return heights, slopes, curvatures and contact forces at places along one track."""
+        from scipy.interpolate import CubicSpline
+
+        model, request, parameters, ends = self._launch(x)
+        low, high = ends if between is None else sorted(float(end) for end in between)
+        if not (isfinite(low) and isfinite(high)):
+            raise DeclarationError("design.minimise: between: the curve is endless; say where the limits are held")
+        places = np.linspace(low, high, PLACES)
+        found = model.pass1(request, parameters, places)
+        rises = [CubicSpline(places, row)(places, 1) for row in (found.z, found.x)]
+        with np.errstate(divide="ignore"):
+            slope = rises[0] / rises[1]
+        return {"height": found.z, "slope": slope, "curvature": found.kappa, "normal_force": found.normal_force}
+
+
+def _arrival(motion: Any, low: float, high: float) -> float:
+    """Return the time at which a body leaves the track at its upper end; NaN if it does not."""
+    ends = isfinite(motion.t_end) and abs(motion.legs[-1].lam_end - high) <= NEAR_END * (high - low)
+    return float(motion.t_end) if ends else nan
+
+
+class _Family(_Tracks):
+    """Curves that differ by their run-time parameters."""
+
+    def _read(self, track: Curve, free: Any) -> None:
+        self._curve = track
+        if not isinstance(free, Mapping) or not free:
+            raise DeclarationError(
+                "design.minimise: free: must be a mapping from parameters to limits, as in {'a': (0, 1)}, got "
+                f"{short(free)}"
+            )
+        defaults, rows = dict(track.defaults), []
+        for name, limits in free.items():
+            if name not in defaults:
+                raise DeclarationError(unknown_argument("design.minimise: free", str(name), defaults, what="parameter"))
+            default = defaults[name]
+            guess = None if default is None else float(exact_value(default))
+            rows.append(_bounds(limits, guess, str(name)))
+        self._names = tuple(free)
+        self.low, self.start, self.high = np.array(rows, dtype=np.float64).T.copy()
+
+    def _candidate(self, x: Array) -> tuple[CompiledModel, dict[str, Any]]:
+        return self._compiled, dict(zip(self._names, x.tolist(), strict=True))
+
+    def gradient(self, quantity: str, x: Array) -> Array | None:
+        """Return the derivatives of a solved motion."""
+        model, request, parameters, _ = self._launch(x)
+        try:
+            found = model.solve(request, parameters).gradient(quantity, self._names)
+        except GQMError:
+            return None
+        return np.array([found[name] for name in self._names])
+
+    def track(self, x: Array) -> Curve:
+        """Return the curve with other defaults."""
+        found = dict(zip(self._names, x.tolist(), strict=True))
+        return replace(
+            self._curve, defaults=tuple((name, found.get(name, value)) for name, value in self._curve.defaults)
+        )
+
+
+class _Points(_Tracks):
+    """Splines through points that differ by the heights of some; the lengths of a spline are known to 1e-9."""
+
+    step, tolerance = 1e-4, 1e-9
+
+    def _read(self, track: Any, free: Any) -> None:
+        self._curve = Curve.sampled(track)
+        self._points = np.array([[float(number) for number in row] for row in np.asarray(track).tolist()])
+        self.size = float(np.ptp(self._points, axis=0).max())
+        listed: Iterable[Any] = free if isinstance(free, Mapping | Sequence | range) else ()
+        self._moved = list(listed)
+        rows = []
+        for number in self._moved:
+            if not (isinstance(number, int) and 0 <= number < len(self._points)):
+                raise DeclarationError(
+                    f"design.minimise: free: {short(number)} is none of the points 0 to {len(self._points) - 1}"
+                )
+            limits = free[number] if isinstance(free, Mapping) else None
+            rows.append(_bounds(limits or (-inf, inf), self._points[number, 1], f"point {number}"))
+        if not rows:
+            raise DeclarationError("design.minimise: free: no point may move; give their numbers, as in range(1, 9)")
+        self.low, self.start, self.high = np.array(rows, dtype=np.float64).T.copy()
+
+    def _heights(self, x: Array) -> Array:
+        points = self._points.copy()
+        points[self._moved, 1] = x
+        return points
+
+    def _candidate(self, x: Array) -> tuple[CompiledModel, dict[str, Any]]:
+        text = "\n".join(f"{a!r} {b!r}" for a, b in self._heights(x).tolist())
+        return replace(self._compiled, chart=Sampled(text)), {}
+
+    def track(self, x: Array) -> Curve:
+        """Return the track through the points as they are now; they are not measured, so they do not scatter."""
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", NoisyPointsWarning)
+            return Curve.sampled(self._heights(x))
+
+
+def _bounds(limits: Any, guess: float | None, name: str) -> tuple[float, float, float]:
+    """Read lower limit, first guess and upper limit of what is free."""
+    if not isinstance(limits, tuple | list) or len(limits) not in (2, 3):
+        raise DeclarationError(
+            f"design.minimise: free: {name}: must be (low, high) or (low, guess, high), got {limits!r}"
+        )
+    low, high = float(limits[0]), float(limits[-1])
+    start = float(limits[1]) if len(limits) == 3 else guess
+    if start is None or not low <= start <= high:
+        start = 0.5 * (low + high)
+    if not (low < high and low <= start <= high):
+        raise DeclarationError(f"design.minimise: free: {name}: the limits contradict each other, got {limits!r}")
+    return low, start, high
