@@ -49,7 +49,7 @@ def conservative() -> list[tuple[str, float]]:
         ("- functions and the exact problem", least(lambda: bind(model, p, launch))),
         (
             "- the crossing: turning points, kind, half period",
-            least(lambda: survey(f.addresses, f.p, -0.37, 0.0, 1, domain)),
+            least(lambda: survey(f.addresses, f.p, -0.37, 0.0, 1, domain, True)),
         ),
         ("`lam` at one time", least(lambda: motion.lam(1000.0))),
         ("`state` at one time", least(lambda: motion.state(1000.0))),

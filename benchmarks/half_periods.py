@@ -34,7 +34,7 @@ def in_a_loop(fns, p, lam0, domain):  # type: ignore[no-untyped-def]
     """Half periods of launches from rest, one after the other."""
     out = np.empty(lam0.size)
     for k in range(lam0.size):
-        out[k] = survey_inside(fns, p, lam0[k], 0.0, 1, domain)[3]
+        out[k] = survey_inside(fns, p, lam0[k], 0.0, 1, domain, True)[3]
     return out
 
 

@@ -61,7 +61,7 @@ def from_bits(_, n):  # type: ignore[no-untyped-def]
 
 
 @intrinsic
-def number_at(_, array, index):  # type: ignore[no-untyped-def]
+def item_at(_, array, index):  # type: ignore[no-untyped-def]
     """Return ``array[index]`` of a contiguous array and an index that is not negative, which numba would test for."""
 
     def lower(context: Any, builder: Any, signature: Any, args: Any) -> Any:

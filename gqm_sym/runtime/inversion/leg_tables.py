@@ -22,7 +22,7 @@ from numba import types
 
 from gqm_sym.runtime.arithmetic.clenshaw import legendre_sum
 from gqm_sym.runtime.compiled.calls import call_path_and_contact_force
-from gqm_sym.runtime.compiled.intrinsics import choose, fma, number_at
+from gqm_sym.runtime.compiled.intrinsics import choose, fma, item_at
 from gqm_sym.runtime.compiled.jit import Inlined, Inner, entry
 from gqm_sym.runtime.compiled.types import MATRIX, VECTOR
 from gqm_sym.runtime.inversion.records import error_of_place, section
@@ -56,8 +56,8 @@ BLOCK = 64
 @Inlined
 def interval_at(intervals, slots, rate, t):  # type: ignore[no-untyped-def]
     """The index at which the row of the interval of a time begins."""
-    at, last = number_at(slots, min(np.int64(t * rate), slots.size - 1)), intervals.size - INTERVAL_COLUMNS
-    while at < last and t >= number_at(intervals, at + UNTIL):
+    at, last = item_at(slots, min(np.int64(t * rate), slots.size - 1)), intervals.size - INTERVAL_COLUMNS
+    while at < last and t >= item_at(intervals, at + UNTIL):
         at += INTERVAL_COLUMNS
     return at
 
@@ -65,22 +65,22 @@ def interval_at(intervals, slots, rate, t):  # type: ignore[no-untyped-def]
 @Inlined
 def phase_angle_at(intervals, at, t):  # type: ignore[no-untyped-def]
     """The phase angle at a time on the interval whose row begins at an index."""
-    x = (t - number_at(intervals, at + MIDDLE)) - number_at(intervals, at + MIDDLE_LOW)
-    x *= number_at(intervals, at + SCALE)
-    phi, stop = number_at(intervals, at + POWERS + LAST), number_at(intervals, at + STOP)
+    x = (t - item_at(intervals, at + MIDDLE)) - item_at(intervals, at + MIDDLE_LOW)
+    x *= item_at(intervals, at + SCALE)
+    phi, stop = item_at(intervals, at + POWERS + LAST), item_at(intervals, at + STOP)
     for m in range(LAST - 1, -1, -1):
-        phi = fma(phi, x, number_at(intervals, at + POWERS + m))
+        phi = fma(phi, x, item_at(intervals, at + POWERS + m))
     return choose(stop - phi <= ROUNDED * stop, stop, max(phi, 0.0))
 
 
 @Inlined
 def place_at(intervals, at, phi):  # type: ignore[no-untyped-def]
     """The curve parameter within a lap at a phase angle, from the nearer end."""
-    share = phi * fma(phi, number_at(intervals, at + SQUARE), number_at(intervals, at + LINEAR))
-    width, low_a = number_at(intervals, at + WIDTH), number_at(intervals, at + PLACE_A_LOW)
-    low_b = number_at(intervals, at + PLACE_B_LOW)
-    from_a = number_at(intervals, at + PLACE_A) + fma(width, share, low_a)
-    to_b = number_at(intervals, at + PLACE_B) - fma(width, 1.0 - share, -low_b)
+    share = phi * fma(phi, item_at(intervals, at + SQUARE), item_at(intervals, at + LINEAR))
+    width, low_a = item_at(intervals, at + WIDTH), item_at(intervals, at + PLACE_A_LOW)
+    low_b = item_at(intervals, at + PLACE_B_LOW)
+    from_a = item_at(intervals, at + PLACE_A) + fma(width, share, low_a)
+    to_b = item_at(intervals, at + PLACE_B) - fma(width, 1.0 - share, -low_b)
     return choose(share <= 0.5, from_a, to_b)
 
 
@@ -96,7 +96,7 @@ def find_places(record, t, out, begin, end):  # type: ignore[no-untyped-def]
     for i in range(begin, end):
         time = t[i]
         at = interval_at(intervals, slots, rate, time)
-        place = place_at(intervals, at, phase_angle_at(intervals, at, time)) + number_at(intervals, at + LAPS)
+        place = place_at(intervals, at, phase_angle_at(intervals, at, time)) + item_at(intervals, at + LAPS)
         out[i] = choose(time == 0.0, lam0, place)
 
 
@@ -126,7 +126,7 @@ def find_states(record, p, t, out, begin, end):  # type: ignore[no-untyped-def]
             speed *= fma(states[of + GROWTH], phi, states[of + FIRST_GROWTH])
             place = choose(launched, launch[0], place_at(intervals, at, phi))
             v = choose(launched, launch[1], states[of + HEADING] * speed)
-            lam = choose(launched, place, place + number_at(intervals, at + LAPS))
+            lam = choose(launched, place, place + item_at(intervals, at + LAPS))
             rows[i], rows[n + i] = place, v * v
             rows[7 * n + i], rows[8 * n + i] = states[of + TIME_ERROR], states[of + PLACE_ERROR]
             out[0, j], out[4, j], out[5, j] = lam, v, v * v

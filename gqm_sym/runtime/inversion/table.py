@@ -14,7 +14,7 @@ from numba import types
 from gqm_sym.runtime.arithmetic.clenshaw import legendre_sum
 from gqm_sym.runtime.arithmetic.doubledouble import two_sum
 from gqm_sym.runtime.compiled.buffers import longer, taller
-from gqm_sym.runtime.compiled.intrinsics import fma, number_at
+from gqm_sym.runtime.compiled.intrinsics import fma, item_at
 from gqm_sym.runtime.compiled.jit import Inner, entry
 from gqm_sym.runtime.compiled.types import MATRIX, VECTOR
 from gqm_sym.runtime.quadrature.time_panels import NEGLIGIBLE_SHARE, derivative
@@ -249,14 +249,14 @@ def look_up(table, t, t_low, n, segments, out):  # type: ignore[no-untyped-def]
     middles, lows, scales, powers, index, ends = table
     slots, last = index.size / ends[-1] if ends[-1] > 0.0 else 0.0, ends.size - 1
     for i in range(n):
-        k = number_at(index, min(max(np.int64(t[i] * slots), 0), index.size - 1))
-        while k < last and t[i] >= number_at(ends, k):
+        k = item_at(index, min(max(np.int64(t[i] * slots), 0), index.size - 1))
+        while k < last and t[i] >= item_at(ends, k):
             k += 1
         segments[i] = k
-        x, at = ((t[i] - number_at(middles, k)) + (t_low[i] - number_at(lows, k))) * number_at(scales, k), k * TERMS
-        phi = number_at(powers, at + LAST)
+        x, at = ((t[i] - item_at(middles, k)) + (t_low[i] - item_at(lows, k))) * item_at(scales, k), k * TERMS
+        phi = item_at(powers, at + LAST)
         for j in range(LAST - 1, -1, -1):
-            phi = fma(phi, x, number_at(powers, at + j))
+            phi = fma(phi, x, item_at(powers, at + j))
         out[i] = phi
 
 

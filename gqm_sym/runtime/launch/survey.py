@@ -11,10 +11,12 @@ from gqm_sym.runtime.quadrature.trapezoid import LIBRATION, time_by_trapezoid
 
 
 @entry(
-    types.Tuple((types.int64, END_TYPE, END_TYPE, REAL))(ADDRESSES, VECTOR, REAL, REAL, types.int64, DOMAIN),
+    types.Tuple((types.int64, END_TYPE, END_TYPE, REAL))(
+        ADDRESSES, VECTOR, REAL, REAL, types.int64, DOMAIN, types.boolean
+    ),
     checked=False,
 )
-def survey(fns, p, lam0, v0, direction, domain):  # type: ignore[no-untyped-def]
+def survey(fns, p, lam0, v0, direction, domain, is_smooth):  # type: ignore[no-untyped-def]
     """Find both ends of a motion, and its half period or loop time where that is easy.
 
     Parameters
@@ -25,6 +27,8 @@ def survey(fns, p, lam0, v0, direction, domain):  # type: ignore[no-untyped-def]
         The sign of ds/dt at launch; of a launch from rest it is found.
     domain : DomainNumbers
         The range of the curve parameter.
+    is_smooth : bool
+        Whether the curve is smooth everywhere. The trapezoidal rule does not converge on others.
 
     Returns
     -------
@@ -37,7 +41,7 @@ def survey(fns, p, lam0, v0, direction, domain):  # type: ignore[no-untyped-def]
     """
     direction, ahead, behind = ends(fns, p, lam0, v0, direction, domain)
     kind, time = orbit_kind(direction, ahead, behind, v0, domain.period), np.nan
-    if kind != NO_ORBIT:
+    if kind != NO_ORBIT and is_smooth:
         near, far = min(ahead.near, behind.near), max(ahead.near, behind.near)
         width = far - near if kind == LIBRATION else direction * domain.period
         a, b = (lam0 + near, lam0 + far) if kind == LIBRATION else (lam0, lam0 + width)

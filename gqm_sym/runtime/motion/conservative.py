@@ -95,9 +95,10 @@ def _as_bilateral(formulas: Formulas, p: ParameterValues, launch: Launch) -> Mot
         lam0 += direction * near
         f = f._replace(exact=None)
         problem = Problem(formulas, launch._replace(lam0=read_number(lam0, where="lam0"), point=None), p, f, domain)
-    direction, ahead, behind, time = survey(f.addresses, f.p, lam0, v0, launch.direction, domain.numbers)
+    is_smooth = f.breaks.size == 0
+    direction, ahead, behind, time = survey(f.addresses, f.p, lam0, v0, launch.direction, domain.numbers, is_smooth)
     is_stuck = ahead[0] in (zeros.CUSP, zeros.NOT_FINITE) and ahead[1] == 0.0
-    if direction == 0 or is_stuck or time != time:
+    if direction == 0 or is_stuck or (is_smooth and time != time):
         _check_place(problem)
     if (direction == 0 or is_stuck) and is_cusp(problem, lam0):
         return _from_cusp(problem)
@@ -108,7 +109,7 @@ def _as_bilateral(formulas: Formulas, p: ParameterValues, launch: Launch) -> Mot
         direction = -sign
         length = problem.period or distance_to_end(problem, direction)
         ahead = first_zero_from(f.addresses, f.p, lam0, 0.0, direction, 0.0, length, starting_step(problem))
-    known_duration = time if time == time and f.breaks.size == 0 else None
+    known_duration = time if time == time else None
     if known_duration is not None and ahead[0] == zeros.TURN:  # doubles have found all of a libration
         near, far = min(ahead[1], behind[1]), max(ahead[1], behind[1])
         segment = between_turns(f, lam0 + near, lam0 + far, known_duration)

@@ -12,7 +12,7 @@ from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.launch.speed import path_and_force_at
 from gqm_sym.runtime.motion.segment import Segment
 from gqm_sym.runtime.motion.trajectory import TimedSegment, Trajectory
-from gqm_sym.runtime.quadrature.substitution import REGULAR
+from gqm_sym.runtime.quadrature.substitution import REGULAR, TO_EQUILIBRIUM
 
 # Places on each panel at which the sign of the contact force is sampled; its changes are then located by bisection.
 SAMPLES_PER_PANEL = 24
@@ -186,7 +186,9 @@ def passages(segments: Sequence[TimedSegment], trajectory: Trajectory, lam: floa
             continue
         phi = np.array([segment.phase_angle_of(inside, outside)])
         if phi[0] > segment.edges[-1]:
-            continue
+            if segment.kind == TO_EQUILIBRIUM:
+                continue
+            phi[0] = segment.edges[-1]  # at the end itself it is larger by a rounding
         out += [when[0] + when[1] for when, _ in crossings(timed, phi, trajectory.time_scale_error)]
         if phi[0] in (0.0, segment.edges[-1]) and phi[0] == timed.phi_stop:
             out.append(timed.t_stop[0])

@@ -186,6 +186,26 @@ def test_what_is_kept_of_a_track_is_that_of_any_launch(quantity: str, build: Bui
     assert np.array_equal(swept, alone)
 
 
+@pytest.mark.parametrize("name", ["track", "rail"])
+def test_arrivals_where_the_curve_is_not_smooth(name: str, build: Build) -> None:
+    """A body passes each break between its launch and its first turn before that turn, one after the other.
+
+    There segments and panels end, and a phase angle may be larger by a rounding than the last one.
+    """
+    module = build(f"swept_{name}", *(make() for make in CASES[name][:2]))
+    for start in np.linspace(2.2, 3.3, 23).tolist():
+        motion = module.solve(start, 0.6, -1, **CASES[name][2])
+        turn, breaks = motion.legs[0], motion.problem.functions.breaks
+        passed = breaks[(turn.lam_end < breaks) & (breaks < start)][::-1]
+        swept = module.sweep("time_at", start, 0.6, -1, lam=passed, **CASES[name][2])
+        solved = np.array([motion.time_at(place) for place in passed.tolist()])
+        assert swept.values == pytest.approx(solved, rel=ROUNDING)
+        assert passed.size
+        assert (np.diff(solved) > 0.0).all()
+        assert solved[-1] < turn.t_end
+        assert motion.lam(solved) == pytest.approx(passed, rel=0.0, abs=1e-13)
+
+
 def test_a_curve_for_each_parameter(build: Build) -> None:
     """Launches are grouped by the parameters of the chart; those that cannot be are refused one by one."""
     rail = gqm.Curve.piecewise([gqm.line(length="a"), gqm.arc(radius=1, angle="pi/2")])
