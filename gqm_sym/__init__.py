@@ -7,7 +7,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from gqm_sym import design, figures
+    from gqm_sym import design, figures, jax
     from gqm_sym.building import build
     from gqm_sym.declare import Curve, arc, clothoid, families, line
     from gqm_sym.derivation import Model, derive
@@ -54,6 +54,7 @@ _HOMES = {
     "families": "gqm_sym.declare",
     "figures": "gqm_sym.figures",
     "fit": "gqm_sym.fitting.fit",
+    "jax": "gqm_sym.jax",
     "least_speed": "gqm_sym.design.least_speed",
     "line": "gqm_sym.declare",
     "read_spec": "gqm_sym.specfile",
@@ -83,6 +84,7 @@ __all__ = [
     "families",
     "figures",
     "fit",
+    "jax",
     "least_speed",
     "line",
     "read_spec",

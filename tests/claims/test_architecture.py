@@ -30,7 +30,7 @@ LAYERS = (
     {"parameters"},
     {"expressions"},
     {"fitting"},
-    {"figures", "export"},
+    {"figures", "export", "jax"},
     {"runtime", "runtime.vocabulary"},
     {"runtime.model"},
     {"runtime.sweep"},
@@ -156,13 +156,14 @@ TESTED_THROUGH = {
 # Packages that only some parts import.
 ONLY_IN = {
     "distributed": {"runtime"},
+    "jax": {"jax"},
     "jinja2": {"emission"},
     "llvmlite": {"runtime"},
     "matplotlib": {"figures", "report"},
     "mpmath": {"runtime", "literals", "figures", "design"},
     "numba": {"runtime"},
     "pandas": {"export"},
-    "numpy": {"runtime", "literals", "figures", "export", "design", "fitting", "studies", "smoothing"},
+    "numpy": {"runtime", "literals", "figures", "export", "design", "fitting", "studies", "smoothing", "jax"},
     "pint": {"literals"},
     "pydantic": {"specfile", "studies"},
     "pydantic_core": {"specfile", "studies"},
@@ -186,7 +187,7 @@ ONLY_IN = {
 }
 
 # Imported when exact digits, splines, pictures, datasets or units are asked for, so never by a module as it loads.
-ONLY_INSIDE_FUNCTIONS = {"distributed", "matplotlib", "mpmath", "pandas", "pint", "scipy", "xarray"}
+ONLY_INSIDE_FUNCTIONS = {"distributed", "jax", "matplotlib", "mpmath", "pandas", "pint", "scipy", "xarray"}
 
 
 class Import(NamedTuple):

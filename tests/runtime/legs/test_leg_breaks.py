@@ -18,7 +18,7 @@ TRACKS: dict[str, list[Any]] = {
     "zigzag": [(0, 3), (1, 0), (2, 1), (3, 0.5), (5, -0.25), (6, 4)],
     "level": [(0, 2), (2, 0), (3, 0), (4, 3)],
 }
-LAUNCHES = 30
+LAUNCHES = 16
 # Of times, against the whole; of places.
 TIMES, PLACES = 1e-13, 2e-13
 CORNER = math.sqrt(2.0)

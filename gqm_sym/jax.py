@@ -1,0 +1,109 @@
+"""Functions for JAX: periods of a generated module with their exact derivatives, for ``grad``, ``jit`` and ``vmap``."""
+
+from collections.abc import Callable
+from functools import cache
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+
+from gqm_sym.errors import InputError
+from gqm_sym.optional import require
+
+__all__ = ["half_period", "period"]
+
+
+def half_period(module: ModuleType) -> Callable[..., Any]:
+    """Return the half period of a module's motions as a function for JAX.
+
+    Parameters
+    ----------
+    module : module
+        A generated module of a motion without losses on a curve with formulas.
+
+    Returns
+    -------
+    callable
+        ``f(lam0, v0=0.0, **parameters)``: launch place and speed in m/s and run-time parameters, numbers or arrays
+        that broadcast; the half period in s, NaN where the motion has none. Its derivatives by all of them are those of
+        ``module.sweep(..., gradient=...)``, in forward and reverse mode. It is computed in doubles, and returned in
+        JAX's precision: set ``jax_enable_x64`` to keep all digits.
+
+    Raises
+    ------
+    SolutionError
+        If JAX is not installed (extra ``[jax]``).
+    InputError
+        From the function that is returned, for a name that is no parameter of the module, or a parameter that has no
+        default and was not given.
+
+    Notes
+    -----
+    The derivatives are tangents of the integral (MATHS, section 3; paper, eq. 17), not of the steps of a solver. Second
+    derivatives by JAX are not there.
+
+    Examples
+    --------
+    >>> import jax  # doctest: +SKIP
+    >>> slope = jax.grad(gqm.jax.half_period(pendulum), argnums=0)  # doctest: +SKIP
+    """
+    return _for_jax(module, "half_period")
+
+
+def period(module: ModuleType) -> Callable[..., Any]:
+    """Return the period of a module's motions as a function for JAX; see `half_period`.
+
+    Parameters
+    ----------
+    module : module
+        A generated module of a motion without losses on a curve with formulas.
+
+    Returns
+    -------
+    callable
+        ``f(lam0, v0=0.0, **parameters)``, in s.
+    """
+    return _for_jax(module, "period")
+
+
+@require("jax")
+def _for_jax(module: ModuleType, quantity: str) -> Callable[..., Any]:
+    import jax
+    from jax import numpy as jnp
+
+    def computed(names: tuple[str, ...], wrt: tuple[str, ...], arguments: tuple[Any, ...]) -> Any:
+        """A sweep as one step of JAX: the values, or with names to differentiate by the derivatives, an axis more."""
+
+        def call(*given: Any) -> Any:
+            arrays = {name: np.asarray(array, dtype=np.float64) for name, array in zip(names, given, strict=True)}
+            found = module.sweep(quantity, **arrays, **({"gradient": wrt} if wrt else {}))
+            return np.asarray(found.gradient if wrt else found.values, dtype=out.dtype)
+
+        arrays = jnp.broadcast_arrays(*arguments)
+        out = jax.ShapeDtypeStruct((*arrays[0].shape, *((len(wrt),) if wrt else ())), arrays[0].dtype)
+        return jax.pure_callback(call, out, *arrays, vmap_method="broadcast_all")
+
+    @cache
+    def differentiable(names: tuple[str, ...]) -> Any:
+        value: Any = jax.custom_jvp(lambda *arguments: computed(names, (), arguments))
+
+        def tangent(primals: tuple[Any, ...], tangents: tuple[Any, ...]) -> Any:
+            zero = jax.custom_derivatives.SymbolicZero
+            varied = {name: t for name, t in zip(names, tangents, strict=True) if not isinstance(t, zero)}
+            slopes = computed(names, tuple(varied), primals)
+            return value(*primals), sum(slopes[..., k] * t for k, t in enumerate(varied.values()))
+
+        value.defjvp(tangent, symbolic_zeros=True)
+        return value
+
+    def function(lam0: Any, v0: Any = 0.0, **parameters: Any) -> Any:
+        if unknown := sorted(set(parameters) - set(module.PARAMETERS)):
+            raise InputError(
+                f"{unknown[0]}: is no parameter of {module.MODEL.name}; it has {', '.join(module.PARAMETERS)}"
+            )
+        if unset := [name for name, value in module.PARAMETERS.items() if value is None and name not in parameters]:
+            raise InputError(f"{unset[0]}: has no default and was not given; pass {unset[0]}=...")
+        given = {"lam0": lam0, "v0": v0, **parameters}
+        return differentiable(tuple(given))(*(jnp.asarray(value, dtype=float) for value in given.values()))
+
+    return function
