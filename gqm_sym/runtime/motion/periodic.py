@@ -98,7 +98,11 @@ class PeriodicMotion(Motion):
         a, behind = (segment.a, 0.0) if behind == 0.0 else (a, (lam0.value - a) + (lam0.low - a_low))
         b, ahead = (segment.b, 0.0) if ahead == 0.0 else (b, (b - lam0.value) + (b_low - lam0.low))
         self._offsets = behind, ahead
-        return segment.with_turning_points(a, b)
+        if a == segment.a and b == segment.b:
+            return segment
+        known = segment.known_duration is not None
+        orbit = timing.orbit_of(self.problem, self.kind, self.direction, self._offsets) if known else None
+        return segment.with_turning_points(a, b, None if orbit is None else orbit.duration.high)
 
     @property
     @locked

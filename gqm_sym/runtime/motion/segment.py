@@ -198,11 +198,12 @@ class Segment:
         """The largest relative change of its times per relative change of the numbers that they depend on."""
         return self._with_panels()._condition_number
 
-    def with_turning_points(self, a: float, b: float) -> "Segment":
-        """The same segment from one turning point to the other with other doubles for them."""
-        if a == self.a and b == self.b:
-            return self
-        return between_turns(self.functions, a, b, is_lazy=self.stored_panels is None)
+    def with_turning_points(self, a: float, b: float, duration: float | None) -> "Segment":
+        """The same segment from one turning point to the other with other doubles for them, and its duration if known.
+
+        It is not that of the old doubles: near a separatrix a rounding of the ends is many of the duration.
+        """
+        return between_turns(self.functions, a, b, duration, is_lazy=self.stored_panels is None)
 
     def with_edge_times(self, edge_times: tuple[Array, Array]) -> "Segment":
         """The same segment with more accurate times at the edges of its panels."""
@@ -258,6 +259,9 @@ class Segment:
         It is a share of the whole duration, or of the panel's where the times of its edges are exact.
         """
         error = self.relative_error + ULP + MAX_TIME_ERROR
+        if self.kind == TURN_TURN and self.balance > 0.0 and not self.from_multiprecision:
+            # Rounded ends change V**2 by more where cancellation leaves little of it.
+            error += 0.5 * ULP * max(abs(self.a), abs(self.b)) / (abs(self.width) * self.balance)
         which, times = np.searchsorted(self.edges[1:-1], phi, side="right"), self.edge_times[0]
         if self._has_given_times:
             spans: Array = np.diff(times)[which]

@@ -75,7 +75,9 @@ def in_doubles(kind: str, segment: Segment, offsets: tuple[float, float]) -> Tim
         return Timing(duration, ZERO, offsets)
     if offsets[1] == 0.0:
         return Timing(duration, duration, offsets)
-    phase_time = float(segment.times(np.array([segment.phase_angle_of(*offsets)]))[0])
+    # In the time of the duration, of which the panels' may be off by some roundings.
+    scale = duration[0] / segment.total_time[0]
+    phase_time = scale * float(segment.times(np.array([segment.phase_angle_of(*offsets)]))[0])
     return Timing(duration, (phase_time, 0.0), offsets)
 
 
