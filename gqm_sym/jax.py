@@ -41,11 +41,6 @@ def half_period(module: ModuleType) -> Callable[..., Any]:
     -----
     The derivatives are tangents of the integral (MATHS, section 3; paper, eq. 17), not of the steps of a solver. Second
     derivatives by JAX are not there.
-
-    Examples
-    --------
-    >>> import jax  # doctest: +SKIP
-    >>> slope = jax.grad(gqm.jax.half_period(pendulum), argnums=0)  # doctest: +SKIP
     """
     return _for_jax(module, "half_period")
 

@@ -86,6 +86,8 @@ def test_the_commands_of_the_readme(
     Path("curves").mkdir()
     Path("curves/parabola.yaml").write_text(shown, encoding="utf-8")
     Path("periods.yaml").write_text("curve: curves/parabola.yaml\nquantities: [period]\ngrid: {a: [0.5, 1]}\n")
+    Path("stairwell.yaml").write_text("curve: curves/parabola.yaml\ndata: swings.csv\nfree: {a: null}\n")
+    Path("swings.csv").write_text("t,lam\n0.1,-0.0167\n0.2,0.2633\n0.3,0.5138\n")
     for program, *arguments in (line.split("#")[0].split() for line in re.findall(r"^gqm.*", page, re.MULTILINE)):
         assert {"gqm": tool.main, "gqm-gen": gen.main}[program](arguments) == 0
     assert capsys.readouterr().err == ""

@@ -97,6 +97,8 @@ class PeriodicMotion(Motion):
         # A launch from rest is a turning point itself.
         a, behind = (segment.a, 0.0) if behind == 0.0 else (a, (lam0.value - a) + (lam0.low - a_low))
         b, ahead = (segment.b, 0.0) if ahead == 0.0 else (b, (b - lam0.value) + (b_low - lam0.low))
+        if not a < b:  # the same double: extended precision tells them apart from where doubles have them
+            return segment
         self._offsets = behind, ahead
         if a == segment.a and b == segment.b:
             return segment
