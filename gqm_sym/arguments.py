@@ -83,6 +83,11 @@ def unknown_argument(called: str, name: str, names: Iterable[str], what: str = "
     return f"{called}: there is no {what} {name!r}; {hint}it takes {', '.join(listed) or 'none'}"
 
 
+def not_given(name: str) -> str:
+    """What to do about a parameter that has no value."""
+    return f"{name}: has no default and was not given; pass {name}=..."
+
+
 def short(value: object) -> str:
     """A value as a message shows it: on one line, and not too long."""
     text = " ".join(repr(value).split())

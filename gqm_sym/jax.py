@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from gqm_sym.arguments import not_given
 from gqm_sym.errors import InputError
 from gqm_sym.optional import require
 
@@ -97,7 +98,7 @@ def _for_jax(module: ModuleType, quantity: str) -> Callable[..., Any]:
                 f"{unknown[0]}: is no parameter of {module.MODEL.name}; it has {', '.join(module.PARAMETERS)}"
             )
         if unset := [name for name, value in module.PARAMETERS.items() if value is None and name not in parameters]:
-            raise InputError(f"{unset[0]}: has no default and was not given; pass {unset[0]}=...")
+            raise InputError(not_given(unset[0]))
         given = {"lam0": lam0, "v0": v0, **parameters}
         return differentiable(tuple(given))(*(jnp.asarray(value, dtype=float) for value in given.values()))
 

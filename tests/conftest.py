@@ -63,6 +63,21 @@ def module_of(generated_folder: Path) -> Callable[[str], ModuleType]:
     return module
 
 
+@pytest.fixture(scope="module")
+def build(generated_folder: Path) -> Callable[..., ModuleType]:
+    """Build the module of a curve under gravity and another force, once under one name."""
+    import gqm_sym as gqm
+
+    built: dict[str, ModuleType] = {}
+
+    def module(name: str, curve: Any, force: Any) -> ModuleType:
+        if name not in built:
+            built[name] = gqm.build(gqm.derive(curve, gqm.Gravity() + force), name=name, folder=generated_folder)
+        return built[name]
+
+    return module
+
+
 @pytest.fixture(scope="session")
 def motion_of(module_of: Callable[[str], ModuleType]) -> Callable[[Problem], Any]:
     """Give the motion of a problem, solved once."""

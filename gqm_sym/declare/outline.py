@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import sympy as sp
 
+from gqm_sym.arguments import not_given
 from gqm_sym.errors import ParameterError
 from gqm_sym.parameters import exact_value, read_value
 
@@ -26,7 +27,7 @@ def values_of(curve: "Curve", given: Mapping[str, Any]) -> dict[str, Any]:
     values = {**dict(curve.defaults), **given}
     for name, value in values.items():
         if value is None:
-            raise ParameterError(f"{name}: has no default and was not given; pass {name}=...")
+            raise ParameterError(not_given(name))
     return values
 
 

@@ -4,7 +4,6 @@ import json
 import math
 from collections.abc import Callable
 from itertools import pairwise
-from pathlib import Path
 from types import ModuleType
 from typing import Any
 
@@ -29,19 +28,6 @@ FEW = 2e-14
 G = 9.81
 
 Build = Callable[..., ModuleType]
-
-
-@pytest.fixture(scope="module")
-def build(generated_folder: Path) -> Build:
-    """Build a module once."""
-    built: dict[str, ModuleType] = {}
-
-    def module(name: str, curve: Any, force: Any) -> ModuleType:
-        if name not in built:
-            built[name] = gqm.build(gqm.derive(curve, gqm.Gravity() + force), name=name, folder=generated_folder)
-        return built[name]
-
-    return module
 
 
 def circle() -> Any:

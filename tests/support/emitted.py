@@ -76,7 +76,7 @@ def interpreted(model: Model, name: str) -> ModuleType:
     module = ModuleType(name)
     module.__file__ = f"{name}.py"
 
-    def compiled(_: object, *, later: bool = False) -> Callable[[Any], Any]:
+    def compiled(_: object) -> Callable[[Any], Any]:
         return lambda function: SimpleNamespace(address=function)
 
     with patch.object(runtime, "compiler", lambda *_, **__: compiled):

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from gqm_sym.arguments import not_given
 from gqm_sym.budgets import budget
 from gqm_sym.errors import ParameterError, renamed
 from gqm_sym.literals.namespaces import ARRAYS, FLOATS
@@ -203,7 +204,7 @@ class Formulas:
         out = []
         for name, value in zip(self.parameters, values, strict=True):
             if value is None:
-                raise ParameterError(f"{name}: has no default and was not given; pass {name}=...")
+                raise ParameterError(not_given(name))
             number = read_number(value, where=name, unit=self.units.get(name))
             if (name in self.positive or name == "m") and not number.value > 0.0:
                 raise ParameterError(

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from gqm_sym.arguments import not_given
 from gqm_sym.errors import GQMError, InputError, ParameterError, SolutionError
 from gqm_sym.literals.namespaces import ARRAYS
 from gqm_sym.literals.numbers import read_number
@@ -156,7 +157,7 @@ def as_doubles(value: Any, name: str) -> Array:
     if type(value) is str:
         return np.array(_of_text(value, name))
     if value is None:
-        raise ParameterError(f"{name}: has no default and was not given; pass {name}=...")
+        raise ParameterError(not_given(name))
     if isinstance(value, np.ndarray) and value.dtype != object:
         return value.astype(np.float64, copy=False)
     array = np.asarray(value, dtype=object)

@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Callable
-from pathlib import Path
 from types import ModuleType
 from typing import Any
 
@@ -18,19 +17,6 @@ G = mpf("9.81")
 
 # A bound that is larger than the error by more than this is of no use.
 USELESS = 1e5
-
-
-@pytest.fixture(scope="module")
-def build(generated_folder: Path) -> Build:
-    """Build a module once."""
-    built: dict[str, ModuleType] = {}
-
-    def module(name: str, curve: Any, force: Any) -> ModuleType:
-        if name not in built:
-            built[name] = gqm.build(gqm.derive(curve, gqm.Gravity() + force), name=name, folder=generated_folder)
-        return built[name]
-
-    return module
 
 
 def spring(build: Build, name: str, loss: Any) -> ModuleType:

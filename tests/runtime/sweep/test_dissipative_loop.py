@@ -25,19 +25,6 @@ Build = Callable[..., ModuleType]
 EXTREMES = ("v_min", "v_max", "normal_force_min", "normal_force_max")
 
 
-@pytest.fixture(scope="module")
-def build(generated_folder: Path) -> Build:
-    """Build a module once."""
-    built: dict[str, ModuleType] = {}
-
-    def module(name: str, curve: Any, force: Any) -> ModuleType:
-        if name not in built:
-            built[name] = gqm.build(gqm.derive(curve, gqm.Gravity() + force), name=name, folder=generated_folder)
-        return built[name]
-
-    return module
-
-
 def ring() -> Any:
     """A full circle, its angle from the bottom."""
     return gqm.Curve.parametric(x="sin(th)", z="-cos(th)", parameter="th", period="2*pi")

@@ -1,7 +1,6 @@
 """Derivatives of motions with losses against closed forms in mpmath."""
 
 from collections.abc import Callable, Mapping
-from pathlib import Path
 from types import ModuleType
 from typing import Any
 
@@ -20,19 +19,6 @@ STATES = ("lam", "s", "x", "z", "v", "normal_force")
 
 # The largest error of a derivative: relative to it, or to the largest one at any of the times.
 TOLERANCE = 1e-13
-
-
-@pytest.fixture(scope="module")
-def build(generated_folder: Path) -> Build:
-    """Build a module once."""
-    built: dict[str, ModuleType] = {}
-
-    def module(name: str, curve: Any, force: Any) -> ModuleType:
-        if name not in built:
-            built[name] = gqm.build(gqm.derive(curve, gqm.Gravity() + force), name=name, folder=generated_folder)
-        return built[name]
-
-    return module
 
 
 def derivative(truth: Callable[..., Any], launch: Launch, name: str, digits: int = 60) -> list[Any]:
