@@ -26,7 +26,7 @@ from gqm_sym.runtime.compiled.stamps import FOLDER, RUNTIME
 COLLECTION_THRESHOLDS = (100_000, 20, 50)
 
 # What stands in a file that has an entry point, or a function that is called by its address.
-ENTRY = re.compile(r"^(@entry\(|\w.*= Later\(|@.*\bLater\()", re.MULTILINE)
+ENTRY = re.compile(r"^(@entry\(|@compiled\(|\w.*= Emitted\()", re.MULTILINE)
 
 # Where the entry points that take longest are: all processes are busy to the end when these come first.
 LONGEST = (
@@ -46,8 +46,6 @@ def compile_room(name: str) -> str:
     """Compile the entry points of a file of the runtime into the cache; returns its name."""
     module = import_module(f"{RUNTIME}.{name}")
     for call in vars(module).values():
-        if isinstance(call, jit.Later):
-            _ = call.address
         if isinstance(call, Emitted):
             call.compile()
         is_entry = isinstance(call, FunctionType) and call.__code__.co_name == "call"

@@ -11,6 +11,8 @@ from numba.extending import intrinsic
 from gqm_sym.runtime.compiled.intrinsics import fma
 from gqm_sym.runtime.compiled.jit import Inner
 from gqm_sym.runtime.compiled.registers import LANES, REGISTER, line_of, operation, register, spread
+from gqm_sym.runtime.compiled.uncompiled import fma as plain_fma
+from gqm_sym.runtime.compiled.uncompiled import in_python
 
 # The longest Legendre series that the runtime sums.
 MAX_TERMS = 32
@@ -59,6 +61,15 @@ def sum_group(_, c, x, at, high, low):  # type: ignore[no-untyped-def]
 
     assert c.layout == "C"
     return types.void(c, x, types.intp, high, low), lower
+
+
+@in_python(sum_group)
+def _sum_group(c: Any, x: Any, at: int, high: Any, low: Any) -> None:
+    for k in range(at, at + GROUP):
+        ahead, behind, twice = np.float64(0.0), np.float64(0.0), x[k] + x[k]
+        for term in c[:0:-1]:
+            ahead, behind = plain_fma(twice, ahead, term - behind), ahead
+        high[k], low[k] = ahead, behind
 
 
 @Inner

@@ -15,6 +15,7 @@ from numba.core.cgutils import global_constant
 from numba.extending import intrinsic
 
 from gqm_sym.runtime.compiled.registers import INDEX, LANES, REAL, REGISTER, Lanes, line_of, operation, register, spread
+from gqm_sym.runtime.compiled.uncompiled import fma_of_arrays, go_on, in_python
 
 # How many sums run at the same time.
 PARALLEL_SUMS = 6
@@ -59,7 +60,14 @@ def multiply(table: Any) -> Any:
         """``out[to:] = values[at:] @ table``."""
         return types.void(values, types.intp, out, types.intp), lower
 
-    sums.table = table
+    @in_python(sums)
+    def add_up(values: Any, at: int, out: Any, to: int) -> None:
+        go_on()
+        totals = [np.zeros(width)] * chains
+        for row, value in enumerate(values.reshape(-1)[at : at + rows]):
+            totals[row % chains] = fma_of_arrays(value, table[row], totals[row % chains])
+        out.reshape(-1)[to : to + width] = reduce(np.add, totals)
+
     return sums
 
 
@@ -102,6 +110,11 @@ def span(count: int) -> Any:
         """The smallest and the largest."""
         return types.UniTuple(types.float64, 2)(values, types.intp), lower
 
+    @in_python(smallest_and_largest)
+    def extent(values: Any, at: int) -> tuple[Any, Any]:
+        part = values.reshape(-1)[at : at + count]
+        return np.fmin.reduce(part), np.fmax.reduce(part)
+
     return smallest_and_largest
 
 
@@ -118,4 +131,5 @@ def largest(count: int) -> Any:
         """The largest absolute value."""
         return types.float64(values, types.intp), lower
 
+    in_python(size)(lambda values, at: np.fmax.reduce(np.abs(values.reshape(-1)[at : at + count])))
     return size

@@ -14,7 +14,9 @@ from numba import types
 from numba.extending import intrinsic
 
 from gqm_sym.runtime import interface
+from gqm_sym.runtime.compiled.emitted import run_at
 from gqm_sym.runtime.compiled.registers import line_of
+from gqm_sym.runtime.compiled.uncompiled import in_python
 
 
 def _call(context: Any, builder: Any, signature: Any, args: Any) -> Any:
@@ -40,7 +42,9 @@ def _caller(function: str) -> Any:
     taken = (f"argument_{i}" for i in range(len(getattr(interface, function.upper()).args)))
     names = ("context", "address", *taken)
     call.__signature__ = Signature([Parameter(name, Parameter.POSITIONAL_OR_KEYWORD) for name in names])  # type: ignore[attr-defined]
-    return intrinsic(call)
+    made = intrinsic(call)
+    in_python(made)(run_at)
+    return made
 
 
 call_path_and_contact_force = _caller("path_and_contact_force")
@@ -82,3 +86,9 @@ def call_speed_equation(_, address, n, work, rows, v, nu, p):  # type: ignore[no
         return _call(context, builder, types.void(*kinds), (address, n, places, speeds, v, nu, p, out))
 
     return types.void(address, n, work, rows, v, nu, p), lower
+
+
+@in_python(call_speed_equation)
+def _call_speed_equation(address: int, n: int, work: Any, rows: Any, v: Any, nu: Any, p: Any) -> None:
+    places, speeds, out = (work.ctypes.data + work.itemsize * int(row) for row in rows)
+    run_at(address, n, places, speeds, v, nu, p, out)

@@ -15,12 +15,13 @@ from types import ModuleType
 from typing import Any
 from weakref import WeakValueDictionary
 
+import numpy as np
 from numba import types
 
 from gqm_sym.errors import OutdatedModuleError
 from gqm_sym.runtime.compiled import jit
 from gqm_sym.runtime.compiled.numba_internals import GENERATED
-from gqm_sym.runtime.compiled.uncompiled import plain
+from gqm_sym.runtime.compiled.uncompiled import go_on, plain_by_address
 from gqm_sym.runtime.interface import INTERFACE
 
 # The processor time in seconds that Python may spend on a function of a generated module before it is compiled. To
@@ -35,6 +36,16 @@ def _c_function(signature: Any) -> Any:
     return ctypes.CFUNCTYPE(None, *(kinds.get(kind, ctypes.c_void_p) for kind in signature.args))
 
 
+# The functions that may be called by address, by where their addresses stand.
+_AT: WeakValueDictionary[int, "Emitted"] = WeakValueDictionary()
+
+
+def run_at(address: int, *arguments: Any) -> None:
+    """Run the function whose address stands at an address, for functions that run as plain Python."""
+    go_on()
+    _AT[address].run(*(value.ctypes.data if isinstance(value, np.ndarray) else value for value in arguments))
+
+
 class Emitted:
     """A function of a generated module, which compiled code calls by the address that stands at its ``address``.
 
@@ -47,19 +58,20 @@ class Emitted:
         The function.
     signature
         numba's signature: it returns nothing, and takes numbers and pointers to numbers.
-    text : str
-        The text of the function.
-    alias : str
-        The name under which numba sees its module.
+    text : str, optional
+        The text of the function, if it may contain powers.
+    alias : str, optional
+        The name under which numba sees its module, if it is another one.
     """
 
-    def __init__(self, function: Any, signature: Any, text: str, alias: str) -> None:
+    def __init__(self, function: Any, signature: Any, text: str | None = None, alias: str | None = None) -> None:
         self.function, self.signature, self.text, self._alias = function, signature, text, alias
         self._slot = ctypes.c_void_p()
+        _AT[ctypes.addressof(self._slot)] = self
         self._compiled: Any = None
         self._plain: Any = None
         self._called_from_c: Any = None
-        self._seconds = 0.0
+        self._left = MAX_PYTHON_TIME if alias else jit.MAX_PYTHON_TIME
 
     @property
     def address(self) -> int:
@@ -86,36 +98,42 @@ class Emitted:
             self._slot.value = self._compiled.address
 
     def _as_numba_sees_it(self) -> Any:
-        sys.modules.setdefault(self._alias, ModuleType(self._alias))
-        self.function.__module__ = self._alias
+        if self._alias is not None:
+            sys.modules.setdefault(self._alias, ModuleType(self._alias))
+            self.function.__module__ = self._alias
         return self.function
 
     def _begin(self) -> None:
         """Find code for the function: that of the cache, or Python's."""
-        if not jit.COMPILER.has_cached_callback(self._as_numba_sees_it(), self.signature):
-            self._plain = plain(self.function, self.text)
+        if not jit.COMPILER.has_cached(self._as_numba_sees_it(), self.signature):
+            self._plain = plain_by_address(self.function, self.signature, self.text)
         if self._plain is None:
             self.compile()
             return
-        self._called_from_c = _c_function(self.signature)(self._run)
+        self._called_from_c = _c_function(self.signature)(self._run_for_c)
         self._slot.value = ctypes.cast(self._called_from_c, ctypes.c_void_p).value
 
-    def _run(self, *arguments: Any) -> None:
-        """Run the function in Python, or what is compiled in its place by now."""
+    def run(self, *arguments: Any) -> None:
+        """Run the function in Python, or what is compiled in its place by now; pointers are given as integers."""
+        if not self._slot.value:
+            self._begin()
+        if self._compiled is None:
+            started = time.thread_time()
+            try:
+                self._plain(*arguments)
+            except (ArithmeticError, ValueError):  # where compiled code goes on
+                self._left = -math.inf
+            self._left -= time.thread_time() - started
+            if self._left > 0.0:
+                return
+            self.compile()
+            if self._left > -math.inf:
+                return
+        _c_function(self.signature)(self._slot.value)(*arguments)
+
+    def _run_for_c(self, *arguments: Any) -> None:
         try:
-            if self._compiled is None:
-                started = time.thread_time()
-                try:
-                    self._plain(*arguments)
-                except (ArithmeticError, ValueError):  # where compiled code goes on
-                    self._seconds = math.inf
-                self._seconds += time.thread_time() - started
-                if self._seconds < MAX_PYTHON_TIME:
-                    return
-                self.compile()
-                if self._seconds < math.inf:
-                    return
-            _c_function(self.signature)(self._slot.value)(*arguments)
+            self.run(*arguments)
         except BaseException as error:
             jit.RAISED[threading.get_ident()] = error
 

@@ -16,6 +16,7 @@ from numba.extending import typeof_impl
 
 from gqm_sym.runtime.compiled.numba_internals import Compiler
 from gqm_sym.runtime.compiled.stamps import RUNTIME, Stamps
+from gqm_sym.runtime.compiled.uncompiled import NotPlainError, PlainEntry
 
 COMPILE: dict[str, Any] = {"error_model": "numpy"}
 
@@ -130,8 +131,22 @@ def _type_of_inner(value: Inner, _: Any) -> Any:
     return types.Dispatcher(value.dispatcher)
 
 
+# The time in seconds that Python may spend on an entry point before it is compiled, which takes some seconds.
+MAX_PYTHON_TIME = 1.0
+
+
+def _plain_entry(function: Any, signature: Any) -> PlainEntry:
+    """An entry point as plain Python, unless its compiled code is in the cache."""
+    if COMPILER.has_cached(function, signature):
+        raise NotPlainError
+    return PlainEntry(function, signature, MAX_PYTHON_TIME)
+
+
 def entry(signature: Any, *, nogil: bool = False, checked: bool = True) -> Callable[[Any], Callable[..., Any]]:
-    """Make a function an entry point from Python: it is compiled, or read from the cache, when it is first called.
+    """Make a function an entry point from Python.
+
+    Unless its code is in the cache, the function runs as plain Python at first, and is compiled when that has taken
+    some time. The results are the same to the last bit (`uncompiled`).
 
     Parameters
     ----------
@@ -146,11 +161,17 @@ def entry(signature: Any, *, nogil: bool = False, checked: bool = True) -> Calla
 
     def decorate(function: Any) -> Callable[..., Any]:
         compiled: Any = None
+        plain: Any = None
 
         @wraps(function)
         def call(*arguments: Any) -> Any:
-            nonlocal compiled
+            nonlocal compiled, plain
             if compiled is None:
+                try:
+                    plain = plain or _plain_entry(function, signature)
+                    return plain(arguments)
+                except NotPlainError:
+                    pass
                 try:
                     compiled = COMPILER.entry(function, signature, nogil=nogil, checked=checked)
                 finally:
@@ -163,19 +184,3 @@ def entry(signature: Any, *, nogil: bool = False, checked: bool = True) -> Calla
         return call
 
     return decorate
-
-
-class Later:
-    """A function of the runtime that is called by its address, and compiled when that is first needed."""
-
-    def __init__(self, compile_it: Callable[[], Any]) -> None:
-        self._compile = compile_it
-        self._callback: Any = None
-
-    @property
-    def address(self) -> int:
-        """Address of the compiled function."""
-        if self._callback is None:
-            self._callback = self._compile()
-        address: int = self._callback.address
-        return address

@@ -397,8 +397,8 @@ class Compiler:
         direct = not checked and _has(overload, "entry_point")
         return overload.entry_point if direct else dispatcher  # type: ignore[no-any-return]
 
-    def has_cached_callback(self, function: Any, signature: Any) -> bool:
-        """Whether the cache has, as far as is known, code of a function that is called by its address."""
+    def has_cached(self, function: Any, signature: Any) -> bool:
+        """Whether the cache has, as far as is known, code of a function that is called from Python or by address."""
         cache = self.cache_of(function) if HAS_CALLBACKS else None
         return cache is None or bool(cache.has(signature))
 

@@ -15,6 +15,8 @@ from numba.core import cgutils
 from numba.core.cgutils import get_or_insert_function
 from numba.extending import intrinsic
 
+from gqm_sym.runtime.compiled.uncompiled import go_on, in_python
+
 # Doubles in a register.
 LANES = 8
 REAL, INDEX = ir.DoubleType(), ir.IntType(32)
@@ -128,7 +130,14 @@ def over_rows(formula: Callable[..., Any], width: int) -> Any:
     form = forms[(formula.nin if isinstance(formula, np.ufunc) else formula.__code__.co_argcount) - 1]
     form.__name__ = "fill_row"
     filler = intrinsic(form)
-    filler.formula, filler.width = formula, width
+
+    @in_python(filler)
+    def fill(line: Any, out: int, *given: Any) -> None:
+        go_on()
+        numbers = line.reshape(-1)
+        rows = (value if isinstance(value, float) else numbers[value : value + width] for value in given)
+        numbers[out : out + width] = formula(*rows)
+
     return filler
 
 
@@ -149,7 +158,10 @@ def copied(width: int) -> Any:
         """``target[to:] = line[at:]``."""
         return types.void(target, types.intp, line, types.intp), lower
 
-    copy_row.width = width
+    @in_python(copy_row)
+    def copy(target: Any, to: int, line: Any, at: int) -> None:
+        target.reshape(-1)[to : to + width] = line.reshape(-1)[at : at + width]
+
     return copy_row
 
 
@@ -164,6 +176,11 @@ def uncounted(_, array):  # type: ignore[no-untyped-def]
         return held._getvalue()
 
     return array(array), lower
+
+
+@in_python(uncounted)
+def _same(array: Any) -> Any:
+    return array
 
 
 def on_stack(count: int) -> Any:
@@ -195,5 +212,5 @@ def on_stack(count: int) -> Any:
         """Return the array."""
         return kind(), lower
 
-    stacked.count = count
+    in_python(stacked)(lambda: np.empty(count))
     return stacked

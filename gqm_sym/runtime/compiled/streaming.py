@@ -12,6 +12,7 @@ from numba import types
 from numba.extending import intrinsic
 
 from gqm_sym.runtime.compiled.jit import Inlined
+from gqm_sym.runtime.compiled.uncompiled import in_python
 
 # Doubles in a cache line.
 LINE = 8
@@ -62,6 +63,15 @@ def settle(_, array):  # type: ignore[no-untyped-def]
         return context.get_dummy_value()
 
     return types.void(array), lower
+
+
+@in_python(stream)
+def _store(to: Any, at: int, source: Any, start: int) -> None:
+    to[at : at + LINE] = source[start : start + LINE]
+
+
+in_python(before_line)(lambda array: 0)
+in_python(settle)(lambda array: None)
 
 
 @Inlined

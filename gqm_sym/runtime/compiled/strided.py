@@ -5,6 +5,7 @@ of the curve's domain and its period; an axis of symmetry as two doubles (NaN if
 distance to the next one; and the run-time parameters.
 """
 
+from ctypes import c_double
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,7 @@ from numba.extending import intrinsic
 from numpy.typing import NDArray
 
 from gqm_sym.runtime.compiled.jit import Inner
+from gqm_sym.runtime.compiled.uncompiled import in_python
 
 LAM0, V0, DIRECTION, TARGET, DOMAIN_LOW, DOMAIN_HIGH, DOMAIN_PERIOD, AXIS, PLACE_LOW, AXIS_STEP, PARAMETERS = range(11)
 
@@ -63,6 +65,11 @@ def number_at(_, address):  # type: ignore[no-untyped-def]
         return builder.load(builder.inttoptr(args[0], ir.DoubleType().as_pointer()), align=1)
 
     return types.float64(types.int64), lower
+
+
+@in_python(number_at)
+def _number_at(address: int) -> Any:
+    return np.float64(c_double.from_address(int(address)).value)
 
 
 @Inner

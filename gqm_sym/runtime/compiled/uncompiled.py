@@ -1,7 +1,8 @@
-"""Functions of generated modules as plain Python, which gives the same bits as their compiled code.
+"""Functions that are compiled otherwise as plain Python, which gives the same bits.
 
-Compiling a function takes some 0.2 s, and Python runs it in some 20 microseconds a place. So a new module answers its
-first questions sooner if Python runs its functions (`emitted.Emitted`).
+Compiling a function of a generated module takes some 0.2 s, and Python runs it in some 20 microseconds a place.
+Compiling an entry point takes seconds, and Python runs it in milliseconds. So first answers come sooner if Python runs
+what is not in the cache of compiled code (`emitted.Emitted`, `jit.entry`).
 
 Python's numbers are NumPy's here, which divide by zero as compiled code does, and elementary functions are those of the
 C library that compiled code calls. What cannot be run so is left to the compiler.
@@ -11,10 +12,14 @@ import ast
 import builtins
 import ctypes
 import dis
+import inspect
 import math
-from collections.abc import Callable
+import threading
+import time
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from functools import cache
-from types import CodeType, FunctionType
+from types import CodeType, FunctionType, ModuleType, SimpleNamespace
 from typing import Any
 
 import numba
@@ -30,11 +35,44 @@ _ELEMENTARY = {
 }
 
 # What else a function may use, which means the same in Python.
-_SAME = (abs, int, len, max, min, range)
+_SAME = (abs, bool, enumerate, int, len, max, min, range, round, slice, math.copysign)
+_NUMPY = SimpleNamespace(
+    **{name: getattr(np, name) for name in ("abs", "array", "empty", "int64", "maximum", "searchsorted", "zeros")},
+    **{name: np.float64(getattr(np, name)) for name in ("inf", "nan", "pi")},
+)
 
 
 class NotPlainError(Exception):
     """A function uses what Python cannot run to the same bits."""
+
+
+class TooSlowError(Exception):
+    """Python has had all the time that it was given."""
+
+
+class _Deadline(threading.local):
+    """When Python must have ended in this thread."""
+
+    at = math.inf
+
+
+_DEADLINE = _Deadline()
+
+
+@contextmanager
+def limited(seconds: float) -> Iterator[None]:
+    """Let functions run as plain Python for so long, and no longer."""
+    before, _DEADLINE.at = _DEADLINE.at, time.thread_time() + seconds
+    try:
+        yield
+    finally:
+        _DEADLINE.at = before
+
+
+def go_on() -> None:
+    """Raise TooSlowError if Python has had all the time that it was given."""
+    if time.thread_time() > _DEADLINE.at:
+        raise TooSlowError
 
 
 def _of_library(library: Any, name: str, count: int) -> Callable[..., Any]:
@@ -71,6 +109,9 @@ def fma(x: Any, y: Any, z: Any) -> Any:
     return _operations()[intrinsics.fma](x, y, z)
 
 
+fma_of_arrays = np.frompyfunc(fma, 3, 1)
+
+
 @in_python(intrinsics.polynomial_pair)
 def _polynomial_pair(coefficients: Any, s: Any, t: Any) -> tuple[Any, Any]:
     value, slope = np.float64(0.0), np.float64(0.0)
@@ -80,12 +121,18 @@ def _polynomial_pair(coefficients: Any, s: Any, t: Any) -> tuple[Any, Any]:
     return value, slope
 
 
-def _array(address: int, shape: Any) -> Any:
-    """The array at an address, as `numba.carray` gives it."""
+class _AddressOfIntegers(int):
+    """The address of integers, where others are those of floats."""
+
+
+def _array(address: Any, shape: Any) -> Any:
+    """The array at an address, as `numba.carray` gives it; or the first numbers of an array."""
     count = math.prod(shape) if isinstance(shape, tuple) else shape
-    line: Any = (ctypes.c_double * count).from_address(address) if count else b""
-    numbers = np.frombuffer(line)
-    return numbers.reshape(shape)
+    if isinstance(address, np.ndarray):
+        return address.reshape(-1)[:count].reshape(shape)
+    kind = ctypes.c_int64 if isinstance(address, _AddressOfIntegers) else ctypes.c_double
+    line: Any = (kind * count).from_address(address) if count else b""
+    return np.frombuffer(line, dtype=np.dtype(kind)).reshape(shape)
 
 
 @cache
@@ -97,23 +144,22 @@ def _operations() -> dict[Any, Callable[..., Any]]:
     }
     multiply_add = elementary.pop("fma")
     operations: dict[Any, Callable[..., Any]] = {getattr(math, name): call for name, call in elementary.items()}
-    return (
-        operations
-        | _IN_PYTHON
-        | {
-            float: np.float64,
-            math.fabs: abs,
-            math.floor: lambda x: int(np.floor(x)),
-            numba.carray: _array,
-            intrinsics.fma: multiply_add,
-            intrinsics.nearest_whole: np.rint,
-            intrinsics.whole_below: np.floor,
-            intrinsics.bits: lambda x: int(np.float64(x).view(np.int64)),
-            intrinsics.from_bits: lambda n: np.uint64(n % 2**64).view(np.float64),
-            intrinsics.choose: lambda condition, x, y: np.float64(x if condition else y),
-            intrinsics.polynomial: lambda coefficients, t: _polynomial_pair(coefficients, t, t)[0],
-        }
-    )
+    return operations | {
+        float: np.float64,
+        math.fabs: abs,
+        math.floor: lambda x: int(np.floor(x)),
+        math.ceil: lambda x: int(np.ceil(x)),
+        math.isfinite: np.isfinite,
+        numba.carray: _array,
+        intrinsics.fma: multiply_add,
+        intrinsics.item_at: lambda array, index: array.reshape(-1)[index],
+        intrinsics.nearest_whole: np.rint,
+        intrinsics.whole_below: np.floor,
+        intrinsics.bits: lambda x: int(np.float64(x).view(np.int64)),
+        intrinsics.from_bits: lambda n: np.uint64(n % 2**64).view(np.float64),
+        intrinsics.choose: lambda condition, x, y: np.float64(x if condition else y),
+        intrinsics.polynomial: lambda coefficients, t: _polynomial_pair(coefficients, t, t)[0],
+    }
 
 
 def _is_integer(node: ast.expr) -> bool:
@@ -147,46 +193,79 @@ _POWERS = {True: _integer_power, False: _power}
 
 @cache
 def _plain_inner(inner: Any) -> Callable[..., Any]:
-    function = inner.py_func
-    return _over_plain_names(function.__code__, function.__globals__)
+    return plain_function(inner.py_func)
 
 
 def _plain_value(value: Any) -> Any:
     """What compiled code means by a global value."""
-    if isinstance(value, bool | int | str):
+    if value is None or isinstance(value, bool | int | str | np.ndarray):
         return value
     if isinstance(value, float):
         return np.float64(value)
     if isinstance(value, tuple):
-        items = [_plain_value(item) for item in value]
-        return type(value)(*items) if hasattr(value, "_fields") else tuple(items)
+        return _like(value, (_plain_value(item) for item in value))
+    if isinstance(value, ModuleType):
+        names = {name: each for name, each in vars(value).items() if isinstance(each, int | float)}
+        return _NUMPY if value is np else SimpleNamespace(**{name: _plain_value(each) for name, each in names.items()})
     if hasattr(value, "forceinline"):  # a function that compiled functions call
         return _plain_inner(value)
-    if value in _SAME or value in _POWERS.values():
+    if value in _SAME or value in _POWERS.values() or (isinstance(value, type) and hasattr(value, "_fields")):
         return value
-    if value not in _operations():
+    found = _IN_PYTHON.get(value) or _operations().get(value)
+    if found is None:
         raise NotPlainError
-    return _operations()[value]
+    return found
+
+
+def _like(value: Any, items: Iterable[Any]) -> Any:
+    """A tuple of the same class, which may be a named one."""
+    return type(value)(*items) if hasattr(value, "_fields") else tuple(items)
 
 
 def _over_plain_names(code: CodeType, given: dict[str, Any]) -> Callable[..., Any]:
     """The same code over plain names, its numbers NumPy's."""
-    if any(step.opname == "BINARY_OP" and step.argrepr.startswith("**") for step in dis.get_instructions(code)):
-        raise NotPlainError
     given = vars(builtins) | given
     names = {name: _plain_value(given[name]) for name in code.co_names if name in given}
     numbers = tuple(_plain_value(number) if type(number) in (float, tuple) else number for number in code.co_consts)
+    names["__builtins__"] = builtins  # what NumPy is asked for may import
     return FunctionType(code.replace(co_consts=numbers), names)
 
 
-def plain(function: Callable[..., Any], text: str) -> Callable[..., Any] | None:
-    """Return a function of a generated module as plain Python; None where the compiler must run it.
+def plain_function(function: Any) -> Callable[..., Any]:
+    """The function as plain Python over NumPy's numbers.
+
+    Raises
+    ------
+    NotPlainError
+        If the compiler must run it.
+    """
+    code = function.__code__
+    if any(step.opname == "BINARY_OP" and step.argrepr.startswith("**") for step in dis.get_instructions(code)):
+        code = _of_text(inspect.getsource(function), code.co_filename)
+    return _over_plain_names(code, function.__globals__ | {call.__name__: call for call in _POWERS.values()})
+
+
+def _of_text(text: str, file: str) -> CodeType:
+    """The code of a function from its text, with powers as calls."""
+    definition = ast.parse(text).body[0]
+    if not isinstance(definition, ast.FunctionDef):
+        raise NotPlainError
+    definition.decorator_list = []
+    module = ast.fix_missing_locations(ast.Module([_powers_as_calls(definition)], []))
+    constants = compile(module, file, "exec").co_consts
+    return next(constant for constant in constants if isinstance(constant, CodeType))
+
+
+def plain_by_address(function: Any, signature: Any, text: str | None) -> Callable[..., None] | None:
+    """Return a function that is called by its address as plain Python; None where the compiler must run it.
 
     Parameters
     ----------
     function : callable
         The function.
-    text : str
+    signature
+        numba's signature.
+    text : str, optional
         Its text with its decorators, as it was when the module was imported.
 
     Returns
@@ -194,21 +273,86 @@ def plain(function: Callable[..., Any], text: str) -> Callable[..., Any] | None:
     callable or None
         It takes addresses in place of pointers.
     """
-    definition = ast.parse(text).body[0]
-    if not isinstance(definition, ast.FunctionDef) or definition.name != function.__name__:
-        return None
-    definition.decorator_list = []
     names = {call.__name__: call for call in _POWERS.values()}
     try:
-        module = ast.fix_missing_locations(ast.Module([_powers_as_calls(definition)], []))
-        constants = compile(module, function.__code__.co_filename, "exec").co_consts
-        (code,) = (constant for constant in constants if isinstance(constant, CodeType))
+        code = _of_text(text, function.__code__.co_filename) if text else function.__code__
         run = _over_plain_names(code, function.__globals__ | names)
     except (AttributeError, NotPlainError, OSError, TypeError):  # TypeError: a name for what cannot be hashed
         return None
+    kinds = {numba.types.float64: np.float64, numba.types.CPointer(numba.types.int64): _AddressOfIntegers}
+    given = [kinds.get(kind, int) for kind in signature.args]
 
     def call(*arguments: Any) -> None:
         with np.errstate(all="ignore"):
-            run(*(np.float64(value) if type(value) is float else value for value in arguments))
+            run(*(kind(value) for kind, value in zip(given, arguments, strict=True)))
 
     return call
+
+
+def _given(kind: Any, value: Any) -> Any:
+    """An argument of numba's type as plain Python takes it."""
+    if isinstance(kind, numba.types.Float):
+        return np.float64(value)
+    if isinstance(kind, numba.types.BaseTuple):
+        items = (_given(one, item) for one, item in zip(kind, value, strict=True))
+        return kind.instance_class(*items) if isinstance(kind, numba.types.BaseNamedTuple) else tuple(items)
+    if isinstance(kind, numba.types.Boolean | numba.types.Integer):
+        return bool(value) if isinstance(kind, numba.types.Boolean) else int(value)
+    return value
+
+
+def _result(value: Any) -> Any:
+    """Python's own numbers, as compiled functions return them."""
+    if isinstance(value, tuple):
+        return _like(value, map(_result, value))
+    return value.item() if isinstance(value, np.generic) else value
+
+
+def _arrays(value: Any) -> Iterator[Any]:
+    """The arrays that a function may write into."""
+    if isinstance(value, tuple):
+        for item in value:
+            yield from _arrays(item)
+    elif isinstance(value, np.ndarray) and value.flags.writeable:
+        yield value
+
+
+class PlainEntry:
+    """An entry point as plain Python, as long as that takes less time than compiling it.
+
+    Parameters
+    ----------
+    function : callable
+        The entry point.
+    signature
+        numba's signature.
+    seconds : float
+        The time that Python may take, all calls together.
+    """
+
+    def __init__(self, function: Any, signature: Any, seconds: float) -> None:
+        self._kinds, self._left = signature.args, seconds
+        self._run = plain_function(function)
+
+    def __call__(self, arguments: tuple[Any, ...]) -> Any:
+        """Run the function.
+
+        Raises
+        ------
+        NotPlainError
+            If the compiler must run it, or time has run out; then all arrays are as they were.
+        """
+        arrays = list(_arrays(arguments))
+        before = [array.copy() for array in arrays]
+        started = time.thread_time()
+        try:
+            with limited(self._left), np.errstate(all="ignore"):
+                go_on()
+                return _result(self._run(*map(_given, self._kinds, arguments)))
+        except (ArithmeticError, AttributeError, LookupError, TooSlowError, TypeError, ValueError):
+            import traceback; traceback.print_exc(); self._left = 0.0
+            for array, old in zip(arrays, before, strict=True):
+                array[...] = old
+            raise NotPlainError from None
+        finally:
+            self._left -= time.thread_time() - started

@@ -12,6 +12,7 @@ from fractions import Fraction
 from math import factorial, nan, sqrt
 from typing import Any
 
+import numpy as np
 from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic
@@ -20,6 +21,8 @@ from gqm_sym.runtime.arithmetic.doubledouble import two_sum
 from gqm_sym.runtime.arithmetic.elementary import ONE_OVER_LOG2, QUARTER, ROUND, TWO_OVER_PI, power_of_two
 from gqm_sym.runtime.compiled.intrinsics import bits, choose, fma, polynomial
 from gqm_sym.runtime.compiled.jit import Inlined
+from gqm_sym.runtime.compiled.uncompiled import fma as plain_fma
+from gqm_sym.runtime.compiled.uncompiled import in_python
 
 UNIT = 2.0**-104
 
@@ -28,6 +31,7 @@ LOG2 = (0.6931471805599453, 2.3190468138462996e-17, 5.707708438416212e-34)
 
 # An argument of exp is divided by 2**SQUARINGS; so often is the result then squared.
 SQUARINGS = 5
+SHARE = 0.5**SQUARINGS
 MAX_EXPONENT = 700.0
 
 
@@ -130,6 +134,17 @@ def series(_, coefficients, z, z_low, start):  # type: ignore[no-untyped-def]
     return types.UniTuple(real, 2)(coefficients, real, real, real), lower
 
 
+@in_python(series)
+def _series(coefficients: Any, z: Any, z_low: Any, start: Any) -> tuple[Any, Any]:
+    high, low = start, np.float64(0.0)
+    for c, c_low in zip(coefficients[::2], coefficients[1::2], strict=True):
+        p = high * z
+        e = plain_fma(high, z_low, plain_fma(low, z, plain_fma(high, z, -p)))
+        high = c + p
+        low = (p - (high - c)) + (c_low + e)
+    return high, low
+
+
 @Inlined
 def remainder(x, x_low, k, unit):  # type: ignore[no-untyped-def]
     """Return x - k*unit, of a unit that is three doubles; the first product is nearly x, so that one is exact."""
@@ -167,7 +182,7 @@ def exponential(x, x_low):  # type: ignore[no-untyped-def]
     shifted = fma(x, ONE_OVER_LOG2, ROUND)
     k = shifted - ROUND
     r, r_low = remainder(x, x_low, k, LOG2)
-    r, r_low = r * 0.5**SQUARINGS, r_low * 0.5**SQUARINGS
+    r, r_low = r * SHARE, r_low * SHARE
     f, f_low = series(EXPONENTIAL, r, r_low, polynomial(EXPONENTIAL_TAIL, r))
     # exp(r) - 1, of which (1 + f)**2 - 1 = 2 f + f**2 keeps the digits.
     f, f_low = multiply(f, f_low, r, r_low)

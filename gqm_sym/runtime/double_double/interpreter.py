@@ -13,8 +13,10 @@ from numba import carray, types
 from numba.extending import intrinsic
 
 from gqm_sym.runtime.arithmetic.elementary import atan
-from gqm_sym.runtime.compiled.jit import COMPILER, Inner, Later
+from gqm_sym.runtime.compiled.emitted import Emitted, run_at
+from gqm_sym.runtime.compiled.jit import Inner
 from gqm_sym.runtime.compiled.registers import on_stack
+from gqm_sym.runtime.compiled.uncompiled import in_python
 from gqm_sym.runtime.double_double.arithmetic import (
     UNIT,
     add,
@@ -160,17 +162,15 @@ def evaluate(operations, first, last, work, n):  # type: ignore[no-untyped-def]
 
 # The interpreter, which other compiled functions call by its address: as a part of them it would be optimised anew with
 # each, which takes seconds.
-INTERPRETER = Later(
-    lambda: COMPILER.callback(
-        evaluate,
-        types.void(types.CPointer(types.int64), types.intp, types.intp, types.CPointer(types.float64), types.intp),
-    )
+INTERPRETER = Emitted(
+    evaluate,
+    types.void(types.CPointer(types.int64), types.intp, types.intp, types.CPointer(types.float64), types.intp),
 )
 
 
 @intrinsic
 def call_interpreter(_, address, operations, first, last, work, n):  # type: ignore[no-untyped-def]
-    """Call `evaluate`, which is at an address."""
+    """Call `evaluate`, whose address stands at an address."""
 
     def lower(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         address, operations, first, last, work, n = args
@@ -182,8 +182,11 @@ def call_interpreter(_, address, operations, first, last, work, n):  # type: ign
             n,
         ]
         function = ir.FunctionType(ir.VoidType(), [value.type for value in values])
-        builder.call(builder.inttoptr(address, function.as_pointer()), values)
+        builder.call(builder.load(builder.inttoptr(address, function.as_pointer().as_pointer())), values)
         return context.get_dummy_value()
 
     size = types.intp
     return types.void(address, operations, size, size, work, size), lower
+
+
+in_python(call_interpreter)(run_at)

@@ -90,7 +90,7 @@ class _Compiler:
     def __init__(self) -> None:
         self.compiled: list[str] = []
 
-    def has_cached_callback(self, *_: Any) -> bool:
+    def has_cached(self, *_: Any) -> bool:
         return False
 
     def called(self, function: Any) -> Any:
