@@ -63,9 +63,9 @@ def multiply(table: Any) -> Any:
     @in_python(sums)
     def add_up(values: Any, at: int, out: Any, to: int) -> None:
         go_on()
-        totals = [np.zeros(width)] * chains
+        fma, totals = fma_of_arrays(), [np.zeros(width)] * chains
         for row, value in enumerate(values.reshape(-1)[at : at + rows]):
-            totals[row % chains] = fma_of_arrays(value, table[row], totals[row % chains])
+            totals[row % chains] = fma(value, table[row], totals[row % chains])
         out.reshape(-1)[to : to + width] = reduce(np.add, totals)
 
     return sums

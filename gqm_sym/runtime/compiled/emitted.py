@@ -24,9 +24,9 @@ from gqm_sym.runtime.compiled.numba_internals import GENERATED
 from gqm_sym.runtime.compiled.uncompiled import go_on, plain_by_address
 from gqm_sym.runtime.interface import INTERFACE
 
-# The processor time in seconds that Python may spend on a function of a generated module before it is compiled. To
-# compile it takes some four times as long.
-MAX_PYTHON_TIME = 0.05
+# The time in seconds that Python may spend on a function of a generated module before it is compiled. To
+# compile it takes twice as long.
+MAX_PYTHON_TIME = 0.1
 
 
 @cache
@@ -118,12 +118,12 @@ class Emitted:
         if not self._slot.value:
             self._begin()
         if self._compiled is None:
-            started = time.thread_time()
+            started = time.perf_counter()
             try:
                 self._plain(*arguments)
             except (ArithmeticError, ValueError):  # where compiled code goes on
                 self._left = -math.inf
-            self._left -= time.thread_time() - started
+            self._left -= time.perf_counter() - started
             if self._left > 0.0:
                 return
             self.compile()

@@ -31,7 +31,6 @@ from gqm_sym.runtime.compiled import intrinsics
 _ELEMENTARY = {
     1: "acos acosh asin asinh atan atanh cos cosh exp expm1 log log1p sin sinh sqrt tan tanh",
     2: "atan2 hypot pow",
-    3: "fma",
 }
 
 # What else a function may use, which means the same in Python.
@@ -62,7 +61,7 @@ _DEADLINE = _Deadline()
 @contextmanager
 def limited(seconds: float) -> Iterator[None]:
     """Let functions run as plain Python for so long, and no longer."""
-    before, _DEADLINE.at = _DEADLINE.at, time.thread_time() + seconds
+    before, _DEADLINE.at = _DEADLINE.at, time.perf_counter() + seconds
     try:
         yield
     finally:
@@ -71,13 +70,19 @@ def limited(seconds: float) -> Iterator[None]:
 
 def go_on() -> None:
     """Raise TooSlowError if Python has had all the time that it was given."""
-    if time.thread_time() > _DEADLINE.at:
+    if time.perf_counter() > _DEADLINE.at:
         raise TooSlowError
 
 
-def _of_library(library: Any, name: str, count: int) -> Callable[..., Any]:
-    function = getattr(library, name)
+@cache
+def _of_library(name: str, count: int) -> Callable[..., float]:
+    """A function of the C library that returns and takes doubles."""
+    function: Any = getattr(ctypes.CDLL(None), name)
     function.restype, function.argtypes = ctypes.c_double, [ctypes.c_double] * count
+    return function  # type: ignore[no-any-return]
+
+
+def _over_numpy(function: Callable[..., float]) -> Callable[..., Any]:
     return lambda *arguments: np.float64(function(*arguments))
 
 
@@ -106,19 +111,33 @@ def in_python(operation: Any) -> Callable[[Callable[..., Any]], Callable[..., An
 
 def fma(x: Any, y: Any, z: Any) -> Any:
     """Return x * y + z, rounded once."""
-    return _operations()[intrinsics.fma](x, y, z)
+    return np.float64(_of_library("fma", 3)(x, y, z))
 
 
-fma_of_arrays = np.frompyfunc(fma, 3, 1)
+@cache
+def fma_of_arrays() -> Callable[..., Any]:
+    """Return what gives x * y + z for arrays, each rounded once."""
+    made: Callable[..., Any] = np.frompyfunc(_of_library("fma", 3), 3, 1)
+    return made
 
 
 @in_python(intrinsics.polynomial_pair)
 def _polynomial_pair(coefficients: Any, s: Any, t: Any) -> tuple[Any, Any]:
-    value, slope = np.float64(0.0), np.float64(0.0)
+    go_on()
+    fma, value, slope = _of_library("fma", 3), 0.0, 0.0
     for coefficient in coefficients:
         slope = fma(slope, s, value)
         value = fma(value, t, coefficient)
-    return value, slope
+    return np.float64(value), np.float64(slope)
+
+
+@in_python(intrinsics.polynomial)
+def _polynomial(coefficients: Any, t: Any) -> Any:
+    go_on()
+    fma, value = _of_library("fma", 3), 0.0
+    for coefficient in coefficients:
+        value = fma(value, t, coefficient)
+    return np.float64(value)
 
 
 class _AddressOfIntegers(int):
@@ -138,12 +157,8 @@ def _array(address: Any, shape: Any) -> Any:
 @cache
 def _operations() -> dict[Any, Callable[..., Any]]:
     """For each operation of compiled code what gives the same in Python."""
-    library = ctypes.CDLL(None)
-    elementary = {
-        name: _of_library(library, name, count) for count, names in _ELEMENTARY.items() for name in names.split()
-    }
-    multiply_add = elementary.pop("fma")
-    operations: dict[Any, Callable[..., Any]] = {getattr(math, name): call for name, call in elementary.items()}
+    names = [(name, count) for count, names in _ELEMENTARY.items() for name in names.split()]
+    operations = {getattr(math, name): _over_numpy(_of_library(name, count)) for name, count in names}
     return operations | {
         float: np.float64,
         math.fabs: abs,
@@ -151,14 +166,13 @@ def _operations() -> dict[Any, Callable[..., Any]]:
         math.ceil: lambda x: int(np.ceil(x)),
         math.isfinite: np.isfinite,
         numba.carray: _array,
-        intrinsics.fma: multiply_add,
+        intrinsics.fma: _over_numpy(_of_library("fma", 3)),
         intrinsics.item_at: lambda array, index: array.reshape(-1)[index],
         intrinsics.nearest_whole: np.rint,
         intrinsics.whole_below: np.floor,
         intrinsics.bits: lambda x: int(np.float64(x).view(np.int64)),
         intrinsics.from_bits: lambda n: np.uint64(n % 2**64).view(np.float64),
         intrinsics.choose: lambda condition, x, y: np.float64(x if condition else y),
-        intrinsics.polynomial: lambda coefficients, t: _polynomial_pair(coefficients, t, t)[0],
     }
 
 
@@ -181,14 +195,15 @@ def _powers_as_calls(node: Any) -> Any:
     is_integer = _is_integer(node.right)
     if isinstance(node.left, ast.Constant) or (isinstance(node.right, ast.Constant) and not is_integer):
         raise NotPlainError  # the compiler may write such a power in other terms
-    return ast.Call(ast.Name(_POWERS[is_integer].__name__, ast.Load()), [node.left, node.right], [])
+    return ast.Call(ast.Name("x**n" if is_integer else "x**y", ast.Load()), [node.left, node.right], [])
 
 
 def _power(x: Any, y: Any) -> Any:
     return _operations()[math.pow](x, y)
 
 
-_POWERS = {True: _integer_power, False: _power}
+# What is called in place of powers; no function has such a name.
+_POWERS = {"x**n": _integer_power, "x**y": _power}
 
 
 @cache
@@ -231,6 +246,20 @@ def _over_plain_names(code: CodeType, given: dict[str, Any]) -> Callable[..., An
     return FunctionType(code.replace(co_consts=numbers), names)
 
 
+def _binary_operations(code: CodeType) -> set[int]:
+    """The numbers that Python gives to the binary operations in a function's code."""
+    pairs = zip(code.co_code[::2], code.co_code[1::2], strict=True)
+    return {which for operation, which in pairs if operation == dis.opmap["BINARY_OP"]}
+
+
+def _raised(x: Any, y: Any) -> Any:
+    x **= y
+    return x**y
+
+
+_POWER = _binary_operations(_raised.__code__)
+
+
 def plain_function(function: Any) -> Callable[..., Any]:
     """The function as plain Python over NumPy's numbers.
 
@@ -240,9 +269,9 @@ def plain_function(function: Any) -> Callable[..., Any]:
         If the compiler must run it.
     """
     code = function.__code__
-    if any(step.opname == "BINARY_OP" and step.argrepr.startswith("**") for step in dis.get_instructions(code)):
+    if _binary_operations(code) & _POWER:
         code = _of_text(inspect.getsource(function), code.co_filename)
-    return _over_plain_names(code, function.__globals__ | {call.__name__: call for call in _POWERS.values()})
+    return _over_plain_names(code, function.__globals__ | _POWERS)
 
 
 def _of_text(text: str, file: str) -> CodeType:
@@ -273,10 +302,9 @@ def plain_by_address(function: Any, signature: Any, text: str | None) -> Callabl
     callable or None
         It takes addresses in place of pointers.
     """
-    names = {call.__name__: call for call in _POWERS.values()}
     try:
         code = _of_text(text, function.__code__.co_filename) if text else function.__code__
-        run = _over_plain_names(code, function.__globals__ | names)
+        run = _over_plain_names(code, function.__globals__ | _POWERS)
     except (AttributeError, NotPlainError, OSError, TypeError):  # TypeError: a name for what cannot be hashed
         return None
     kinds = {numba.types.float64: np.float64, numba.types.CPointer(numba.types.int64): _AddressOfIntegers}
@@ -344,15 +372,15 @@ class PlainEntry:
         """
         arrays = list(_arrays(arguments))
         before = [array.copy() for array in arrays]
-        started = time.thread_time()
+        started = time.perf_counter()
         try:
             with limited(self._left), np.errstate(all="ignore"):
                 go_on()
                 return _result(self._run(*map(_given, self._kinds, arguments)))
         except (ArithmeticError, AttributeError, LookupError, TooSlowError, TypeError, ValueError):
-            import traceback; traceback.print_exc(); self._left = 0.0
+            self._left = 0.0
             for array, old in zip(arrays, before, strict=True):
                 array[...] = old
             raise NotPlainError from None
         finally:
-            self._left -= time.thread_time() - started
+            self._left -= time.perf_counter() - started
