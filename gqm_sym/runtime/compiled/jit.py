@@ -11,7 +11,7 @@ from collections.abc import Callable
 from functools import wraps
 from typing import Any
 
-from numba import types
+from numba import typeof, types
 from numba.extending import typeof_impl
 
 from gqm_sym.runtime.compiled.numba_internals import Compiler
@@ -98,6 +98,7 @@ class Inner:
         self.__name__, self.__doc__ = function.__name__, function.__doc__
         self._dispatcher: Any = None
         self._called: Any = None
+        self._plain: Any = None
 
     @property
     def dispatcher(self) -> Any:
@@ -109,7 +110,11 @@ class Inner:
     def __call__(self, *arguments: Any) -> Any:
         """Call the compiled function from Python."""
         if self._called is None:
-            self._called = COMPILER.called(self.py_func)
+            try:
+                self._plain = self._plain or _plain_entry(self.py_func, tuple(map(typeof, arguments)))
+                return self._plain(arguments)
+            except NotPlainError:
+                self._called = COMPILER.called(self.py_func)
         try:
             return self._called(*arguments)
         finally:
@@ -139,7 +144,7 @@ def _plain_entry(function: Any, signature: Any) -> PlainEntry:
     """An entry point as plain Python, unless its compiled code is in the cache."""
     if COMPILER.has_cached(function, signature):
         raise NotPlainError
-    return PlainEntry(function, signature, MAX_PYTHON_TIME)
+    return PlainEntry(function, getattr(signature, "args", signature), MAX_PYTHON_TIME)
 
 
 def entry(signature: Any, *, nogil: bool = False, checked: bool = True) -> Callable[[Any], Callable[..., Any]]:

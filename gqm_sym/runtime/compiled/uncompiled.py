@@ -16,9 +16,10 @@ import inspect
 import math
 import threading
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import cache
+from itertools import count
 from types import CodeType, FunctionType, ModuleType, SimpleNamespace
 from typing import Any
 
@@ -56,6 +57,7 @@ class _Deadline(threading.local):
 
 
 _DEADLINE = _Deadline()
+_STEPS = count()
 
 
 @contextmanager
@@ -75,10 +77,10 @@ def go_on() -> None:
 
 
 @cache
-def _of_library(name: str, count: int) -> Callable[..., float]:
+def _of_library(name: str, arguments: int) -> Callable[..., float]:
     """A function of the C library that returns and takes doubles."""
     function: Any = getattr(ctypes.CDLL(None), name)
-    function.restype, function.argtypes = ctypes.c_double, [ctypes.c_double] * count
+    function.restype, function.argtypes = ctypes.c_double, [ctypes.c_double] * arguments
     return function  # type: ignore[no-any-return]
 
 
@@ -111,6 +113,8 @@ def in_python(operation: Any) -> Callable[[Callable[..., Any]], Callable[..., An
 
 def fma(x: Any, y: Any, z: Any) -> Any:
     """Return x * y + z, rounded once."""
+    if not next(_STEPS) & 255:
+        go_on()
     return np.float64(_of_library("fma", 3)(x, y, z))
 
 
@@ -166,7 +170,7 @@ def _operations() -> dict[Any, Callable[..., Any]]:
         math.ceil: lambda x: int(np.ceil(x)),
         math.isfinite: np.isfinite,
         numba.carray: _array,
-        intrinsics.fma: _over_numpy(_of_library("fma", 3)),
+        intrinsics.fma: fma,
         intrinsics.item_at: lambda array, index: array.reshape(-1)[index],
         intrinsics.nearest_whole: np.rint,
         intrinsics.whole_below: np.floor,
@@ -269,19 +273,23 @@ def plain_function(function: Any) -> Callable[..., Any]:
         If the compiler must run it.
     """
     code = function.__code__
-    if _binary_operations(code) & _POWER:
-        code = _of_text(inspect.getsource(function), code.co_filename)
-    return _over_plain_names(code, function.__globals__ | _POWERS)
+    try:
+        if _binary_operations(code) & _POWER:
+            code = _of_text(inspect.getsource(function), code)
+        return _over_plain_names(code, function.__globals__ | _POWERS)
+    except (AttributeError, OSError, SyntaxError, TypeError):  # TypeError: a name for what cannot be hashed
+        raise NotPlainError from None
 
 
-def _of_text(text: str, file: str) -> CodeType:
+def _of_text(text: str, original: CodeType) -> CodeType:
     """The code of a function from its text, with powers as calls."""
     definition = ast.parse(text).body[0]
     if not isinstance(definition, ast.FunctionDef):
         raise NotPlainError
     definition.decorator_list = []
     module = ast.fix_missing_locations(ast.Module([_powers_as_calls(definition)], []))
-    constants = compile(module, file, "exec").co_consts
+    ast.increment_lineno(module, original.co_firstlineno - 1)
+    constants = compile(module, original.co_filename, "exec").co_consts
     return next(constant for constant in constants if isinstance(constant, CodeType))
 
 
@@ -303,7 +311,7 @@ def plain_by_address(function: Any, signature: Any, text: str | None) -> Callabl
         It takes addresses in place of pointers.
     """
     try:
-        code = _of_text(text, function.__code__.co_filename) if text else function.__code__
+        code = _of_text(text, function.__code__) if text else function.__code__
         run = _over_plain_names(code, function.__globals__ | _POWERS)
     except (AttributeError, NotPlainError, OSError, TypeError):  # TypeError: a name for what cannot be hashed
         return None
@@ -352,14 +360,14 @@ class PlainEntry:
     ----------
     function : callable
         The entry point.
-    signature
-        numba's signature.
+    kinds : sequence
+        numba's types of its arguments.
     seconds : float
         The time that Python may take, all calls together.
     """
 
-    def __init__(self, function: Any, signature: Any, seconds: float) -> None:
-        self._kinds, self._left = signature.args, seconds
+    def __init__(self, function: Any, kinds: Sequence[Any], seconds: float) -> None:
+        self._kinds, self._left = kinds, seconds
         self._run = plain_function(function)
 
     def __call__(self, arguments: tuple[Any, ...]) -> Any:

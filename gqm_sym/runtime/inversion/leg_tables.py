@@ -56,7 +56,8 @@ BLOCK = 64
 @Inlined
 def interval_at(intervals, slots, rate, t):  # type: ignore[no-untyped-def]
     """The index at which the row of the interval of a time begins."""
-    at, last = item_at(slots, min(np.int64(t * rate), slots.size - 1)), intervals.size - INTERVAL_COLUMNS
+    # Where the body rests from the start, t * rate is infinite or not a number: then the last slot is read.
+    at, last = item_at(slots, np.int64(min(slots.size - 1.0, t * rate))), intervals.size - INTERVAL_COLUMNS
     while at < last and t >= item_at(intervals, at + UNTIL):
         at += INTERVAL_COLUMNS
     return at

@@ -93,7 +93,8 @@ class _Compiler:
     def has_cached(self, *_: Any) -> bool:
         return False
 
-    def called(self, function: Any) -> Any:
+    @staticmethod
+    def entry(function: Any, *_: Any, **__: Any) -> Any:
         return function
 
     def callback(self, function: Any, signature: Any) -> Any:
@@ -148,8 +149,8 @@ def test_a_function_is_compiled_when_python_has_taken_long(
     tmp_path: Path, compiler: _Compiler, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Here after the first call."""
-    _, call = _potential(tmp_path, "3.0")
     monkeypatch.setattr(emitted, "MAX_PYTHON_TIME", 0.0)
+    _, call = _potential(tmp_path, "3.0")
     assert call()[2:] == [3.0, 3.0]
     assert compiler.compiled == ["effective_potential"]
     assert call() == [7.0] * 4
@@ -175,7 +176,8 @@ def test_what_is_raised_in_python_passes_through_compiled_code(
 
     monkeypatch.setattr(function, "_plain", interrupted)
     call()
-    from_python = jit.Inner(lambda x: 2.0 * x)
+    from_python = jit.entry(types.float64(types.float64))(lambda x: 2.0 * x)
+    monkeypatch.setattr(jit, "MAX_PYTHON_TIME", 0.0)
     with pytest.raises(error):
         from_python(1.0)
     assert from_python(1.0) == 2.0

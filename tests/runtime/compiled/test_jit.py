@@ -1,20 +1,27 @@
 """What the disk cache knows of, and what is compiled when."""
 
 import ast
+import math
 import os
 import shutil
 import time
+from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
+from numba import types
 
 from gqm_sym.runtime import vocabulary
 from gqm_sym.runtime.arithmetic.doubledouble import two_sum
+from gqm_sym.runtime.arithmetic.elementary import reduced
 from gqm_sym.runtime.compiled import jit
+from gqm_sym.runtime.compiled.intrinsics import fma
 from gqm_sym.runtime.compiled.numba_internals import KeyedFiles
 from gqm_sym.runtime.compiled.stamps import CALLED_BY_MODULES, Stamps
+from gqm_sym.runtime.compiled.uncompiled import NotPlainError, PlainEntry
 from gqm_sym.runtime.vocabulary import HOMES
 
 
@@ -124,3 +131,93 @@ def test_what_is_kept_is_found_again_by_its_key_alone(tmp_path: Path) -> None:
     kept.rename(tmp_path / files.file_name(("key", 2)))
     assert files.load(("key", 2)) is None
     assert KeyedFiles(str(tmp_path), "name", "another").load(("key", 1)) is None
+
+
+@jit.Inner
+def cubed(x):  # type: ignore[no-untyped-def]
+    """A function with a power, which Python would round otherwise."""
+    return x**3
+
+
+def _entry(monkeypatch: pytest.MonkeyPatch, function: Callable[..., Any], signature: Any) -> tuple[Any, list[str]]:
+    """An entry point that is not in the cache, and the list of what is compiled."""
+    compiled = []
+
+    def compile_it(function: Any, *_: Any, **__: Any) -> Any:
+        compiled.append(function.__name__)
+        return lambda *_: "compiled"
+
+    monkeypatch.setattr(jit.COMPILER, "has_cached", lambda *_: False)
+    monkeypatch.setattr(jit.COMPILER, "entry", compile_it)
+    return jit.entry(signature)(function), compiled
+
+
+def test_python_runs_an_entry_point_at_first(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It takes the arguments as compiled code would, divides by zero, and returns Python's own numbers."""
+
+    def run(pair, values, n):  # type: ignore[no-untyped-def]
+        values[0] = cubed(pair[0]) / pair[1]
+        return pair[0] / values[n - 1], np.empty(n).size
+
+    kinds = (types.UniTuple(types.float64, 2), types.float64[::1], types.int64)
+    call, compiled = _entry(monkeypatch, run, types.void(*kinds))
+    values = np.zeros(2)
+    assert call((0.1, 3), values, 2) == (math.inf, 2)
+    assert values[0] == 0.1 * (0.1 * 0.1) / 3.0
+    assert type(call((0.1, 3), values, 2)[0]) is float
+    assert compiled == []
+
+
+@pytest.mark.parametrize("seconds", [1e9, 0.0])
+def test_an_entry_point_is_compiled_where_python_takes_long_or_raises(
+    seconds: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What it has written by then is taken back."""
+
+    def run(values, n):  # type: ignore[no-untyped-def]
+        values[0] = fma(2.0, 3.0, 1.0)
+        return 1 // n
+
+    monkeypatch.setattr(jit, "MAX_PYTHON_TIME", seconds)
+    call, compiled = _entry(monkeypatch, run, types.int64(types.float64[::1], types.int64))
+    values = np.zeros(2)
+    assert call(values, 0) == "compiled"
+    assert (compiled, values[0]) == (["run"], 0.0)
+
+
+def test_python_stops_when_its_time_has_run_out() -> None:
+    """In the middle of a loop."""
+
+    def run(x):  # type: ignore[no-untyped-def]
+        while True:
+            x = reduced(x)[1]
+
+    with pytest.raises(NotPlainError):
+        PlainEntry(run, (types.float64,), 0.05)((1.0,))
+
+
+def norm(x):  # type: ignore[no-untyped-def]
+    """NumPy rounds this in another way than compiled code."""
+    return np.linalg.norm(x)
+
+
+def root(x):  # type: ignore[no-untyped-def]
+    """The compiler may take a square root for this power."""
+    return x**0.5
+
+
+def exponential(x):  # type: ignore[no-untyped-def]
+    """The compiler may take another function for this power."""
+    return 2.0**x
+
+
+def hashed(x):  # type: ignore[no-untyped-def]
+    """Compiled code has hashes of its own."""
+    return hash(x)
+
+
+@pytest.mark.parametrize("run", [norm, root, exponential, hashed])
+def test_what_cannot_be_run_to_the_same_bits_is_compiled(run: Callable[..., Any]) -> None:
+    """Whether that is found when the function is read or when it is run."""
+    with pytest.raises(NotPlainError):
+        PlainEntry(run, (types.float64,), 1e9)((1.0,))

@@ -12,7 +12,7 @@ from paths import ROOT
 from gqm_sym.loading import load
 from gqm_sym.runtime import vocabulary
 from gqm_sym.runtime.compiled.emitted import Emitted
-from gqm_sym.runtime.compiled.uncompiled import plain
+from gqm_sym.runtime.compiled.uncompiled import plain_by_address
 from gqm_sym.runtime.interface import INTERFACE
 
 # Together these have sines, powers, roots, exponentials, arc tangents and the law of friction.
@@ -67,7 +67,7 @@ def test_bits_are_those_of_compiled_code(module: str) -> None:
     functions = _functions(module)
     assert len(functions) >= 5
     for function in functions.values():
-        in_python = plain(function.function, function.text)
+        in_python = plain_by_address(function.function, function.signature, function.text)
         function.compile()
         for seed in range(6):
             for count in (1, 8):
@@ -101,7 +101,7 @@ def test_bits_of_the_arithmetic(tmp_path: Path) -> None:
     file = tmp_path / "arithmetic.py"
     file.write_text(MODULE.format(names=", ".join(calls), rows=len(rows), lines="\n".join(lines)), encoding="utf-8")
     function = load(file, file.stem).everything
-    in_python = plain(function.function, function.text)
+    in_python = plain_by_address(function.function, function.signature, function.text)
     function.compile()
     rng = np.random.default_rng(3)
     for scale in (1e-9, 0.3, 1.0, 4.0, 1e3):
