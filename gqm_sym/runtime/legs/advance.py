@@ -151,8 +151,8 @@ def room_kept(breaks: int) -> int:
 @Inner
 def gaps_on_leg(dissipation, joints, body, reads):  # type: ignore[no-untyped-def]
     """What is kept of the curve between its breaks, if a leg may be passed by it: its panels cannot be read."""
-    is_used = body[PERIOD] == 0.0 and reads != PANELS
-    return joints.gaps if is_used and dissipation.linear and not dissipation.kinked else joints.gaps[:0]
+    is_used = body[PERIOD] == 0.0 and reads != PANELS and dissipation.linear
+    return joints.gaps if is_used else joints.gaps[:0]
 
 
 @Inner
