@@ -8,7 +8,7 @@ import pytest
 from mpmath import mp, mpf
 from paths import ROOT
 
-from gqm_sym.errors import InputError, SolutionError
+from gqm_sym.errors import InputError
 from gqm_sym.loading import load
 
 ULP = 2.0**-52
