@@ -79,9 +79,13 @@ def _reason(
 def unknown_argument(called: str, name: str, names: Iterable[str], what: str = "argument") -> str:
     """``called: there is no argument 'name'``, the nearest known one if it is near, and all of them."""
     listed = list(names)
+    return f"{called}: there is no {what} {name!r}; {_hint(name, listed)}it takes {', '.join(listed) or 'none'}"
+
+
+def _hint(name: str, listed: Iterable[str]) -> str:
+    """The known name that was probably meant, as the beginning of a sentence; nothing if none is near."""
     near = nearest(name, listed)
-    hint = f"did you mean {near!r}? " if near else ""
-    return f"{called}: there is no {what} {name!r}; {hint}it takes {', '.join(listed) or 'none'}"
+    return f"did you mean {near!r}? " if near else ""
 
 
 def nearest(name: str, known: Iterable[str]) -> str | None:
@@ -148,7 +152,8 @@ def flag(given: Any, *, where: str) -> bool:
 def one_of(given: Any, known: tuple[str, ...], *, where: str) -> str:
     """Return one of some words."""
     if not (isinstance(given, str) and given in known):
-        raise DeclarationError(f"{where}: must be one of {', '.join(known)}, got {short(given)}")
+        hint = _hint(given, known) if isinstance(given, str) else ""
+        raise DeclarationError(f"{where}: {hint}must be one of {', '.join(known)}, got {short(given)}")
     return given
 
 
