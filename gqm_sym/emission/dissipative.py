@@ -6,13 +6,17 @@ from dataclasses import dataclass, replace
 import sympy
 from sympy import Expr, Symbol
 
-from gqm_sym.derivation.forces.dissipation import LOAD, PUSH, SIGMA, TILT, TURN, Dissipation
+from gqm_sym.derivation.forces.dissipation import LOAD, LOADS, PUSH, SIGMA, TILT, TURN, TURNS, Dissipation
 from gqm_sym.emission.context import Lowering
 from gqm_sym.emission.ir import Assignment, ExactIR, FunctionIR
 from gqm_sym.emission.subscripts import at
 from gqm_sym.kernels.base import CONTACT_SIGN, DIRECTION, KAPPA, W
 
-_NAMES = {SIGMA: "ds", KAPPA: "kappa", TURN: "turn", LOAD: "n0", PUSH: "push", TILT: "dxds"}
+_NAMES = {
+    **{SIGMA: "ds", KAPPA: "kappa", TURN: "turn", LOAD: "n0", PUSH: "push", TILT: "dxds"},
+    **{symbol: f"turn_{axis}" for symbol, axis in zip(TURNS, "xyz", strict=True)},
+    **{symbol: f"load_{axis}" for symbol, axis in zip(LOADS, "xyz", strict=True)},
+}
 """The names in emitted code of the geometric forms that a force law is written in."""
 
 
@@ -41,7 +45,7 @@ def speed_equation(lowering: Lowering, loss: Dissipation) -> FunctionIR:
     places, speeds, v, nu = names("places"), names("speeds"), names.symbol("v"), names.symbol("nu")
     linearised = "" if loss.linear else ", linearised at V**2 = w"
     law = _Law(
-        outputs=(SIGMA, loss.drive, loss.decay, LOAD, KAPPA),
+        outputs=(SIGMA, loss.drive, loss.decay, *loss.contact),
         begin=() if loss.linear else ((names.symbol("w"), at(speeds)),),
         symbols={DIRECTION: v, CONTACT_SIGN: nu, W: names.symbol("w")},
     )

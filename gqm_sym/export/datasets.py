@@ -26,6 +26,8 @@ VARIABLES = {
     "v2": ("squared speed", "m2/s2"),
     "kappa": ("signed curvature", "1/m"),
     "normal_force": ("contact force along the normal, which points to the left of increasing parameter", "N"),
+    "y": ("horizontal coordinate across x", "m"),
+    **{f"normal_{axis}": (f"contact force along {axis}", "N") for axis in "xyz"},
 }
 
 
@@ -52,7 +54,8 @@ def dataset(motion: "Motion", t: Any = None) -> "Dataset":
     times = np.linspace(0.0, horizon(motion), SAMPLES) if t is None else t
     state = motion.state(times)
     formulas, launch = motion.problem.formulas, motion.problem.launch
-    columns = {name: (("t",), np.atleast_1d(getattr(state, name)), _attributes(*VARIABLES[name])) for name in VARIABLES}
+    known = {name: text for name, text in VARIABLES.items() if name in state._fields}
+    columns = {name: (("t",), np.atleast_1d(getattr(state, name)), _attributes(*text)) for name, text in known.items()}
     columns["lam"][2]["parameter"] = formulas.parameter
     error = np.atleast_1d(motion.error_bound(times))
     columns["lam_error"] = (("t",), error, _attributes("bound of the error of lam", None))

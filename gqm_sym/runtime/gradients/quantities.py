@@ -91,7 +91,7 @@ def extreme_gradient(derivatives: OrbitDerivatives, motion: Any, quantity: str) 
         place, is_stationary = _improved(derivatives, of_speed, place, width)
         if not is_stationary and motion.t_end < motion.period:
             moved = np.append(
-                motion.sensitivity(extreme.t, (*motion.problem.formulas.parameters, "lam0", "v0")).lam, 0.0
+                motion._sensitivity(extreme.t, (*motion.problem.formulas.parameters, "lam0", "v0")).lam, 0.0
             )
     (_, slope, _, *partials) = values(program, derivatives.variables, place)[:, 0, 0]
     total: Array = (np.array(partials) + slope * moved) / (extreme.value if of_speed else 1.0)
