@@ -254,7 +254,7 @@ class Model:
             ("kappa", self.kappa),
             *((("Theta", self.turning_angle),) if self.turning_angle is not None else ()),
             ("V**2" if self.dissipation is None else "W = V**2", self.speed_squared),
-            ("N", force),
+            ("|N|" if self.loads else "N", force),
             *((("N_b", side),) if side else ()),
             ("A", self.tangential_acceleration),
             (f"dt/d{lam}", rate),
@@ -293,7 +293,8 @@ class Model:
 
     def __str__(self) -> str:
         """A few lines for people: the closed forms that a motion follows, and the parameters with their units."""
-        said = {"kappa": " [1/m]", "V**2": " [m**2/s**2]", "W = V**2": " [m**2/s**2]", "N": " [N]", "A": " [m/s**2]"}
+        said = {"kappa": " [1/m]", "V**2": " [m**2/s**2]", "W = V**2": " [m**2/s**2]", "A": " [m/s**2]"}
+        said |= {"N": " [N]", "|N|": " [N]"}
         lines = [f"{self.title or 'Model'}: {self.curve.kind} curve, {', '.join(name for name, _ in self.force.terms)}"]
         for label, form in self.closed_forms():
             if label in said or label in ("x", "y", "z", f"ds/d{self.parameter.name}"):

@@ -49,8 +49,11 @@ def speed_equation(lowering: Lowering, loss: Dissipation) -> FunctionIR:
         begin=() if loss.linear else ((names.symbol("w"), at(speeds)),),
         symbols={DIRECTION: v, CONTACT_SIGN: nu, W: names.symbol("w")},
     )
+    contact, force = "n0, kappa", ", N = m*(kappa*V**2 + n0)"
+    if lowering.model.loads:
+        contact, force = ("|n0|, |kappa|" if loss.linear else "|N|/m, 0"), ""
     doc = (
-        f"ds/d{lam}, P, Q, n0, kappa: dV**2/d{lam} = P - Q*V**2{linearised}, N = m*(kappa*V**2 + n0) (paper, eq. 19); "
+        f"ds/d{lam}, P, Q, {contact}: dV**2/d{lam} = P - Q*V**2{linearised}{force} (paper, eq. 19); "
         "v = sgn(ds/dt), nu = sgn(N)."
     )
     function = _in_pieces(lowering, loss, "speed_equation", (places, speeds, v, nu), doc, law)

@@ -166,16 +166,15 @@ class _ModelLowering(Lowering):
         model, loss = self.model, self.model.dissipation
         if model.curve.charted:
             return self.exact_potential() if loss is None else ()
+        bend, load = "Signed curvature", "n0 = N/m of a body at rest, so that N = m*(kappa*V**2 + n0)"
+        if model.loads:
+            bend, load = "Curvature", "|N|/m of a body at rest"
         named: tuple[tuple[str, str, tuple[Expr, ...]], ...] = (
             ("x", "Horizontal coordinate.", (model.x,)),
             ("z", "Height.", (model.z,)),
             ("ds", f"ds/d{self.place}.", (model.ds,)),
-            ("kappa", "Signed curvature (paper, eq. 8).", (model.kappa,)),
-            (
-                "static_normal_load",
-                "n0 = N/m of a body at rest, so that N = m*(kappa*V**2 + n0) (paper, eq. 15).",
-                (model.static_normal_load,),
-            ),
+            ("kappa", f"{bend} (paper, eq. 8).", (model.kappa,)),
+            ("static_normal_load", f"{load} (paper, eq. 15).", (model.static_normal_load,)),
         )
         path = tuple(self.exact_function(*entry, (self.place,)) for entry in named)
         if loss is not None:

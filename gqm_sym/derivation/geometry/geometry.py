@@ -34,9 +34,10 @@ from gqm_sym.derivation.algebra.rewrite import (
     spell_product,
     spell_quotient,
     spell_ratio,
+    without_waves,
 )
 from gqm_sym.derivation.algebra.signs import Signs
-from gqm_sym.derivation.geometry.turning_angle import tangent_angle
+from gqm_sym.derivation.geometry.turning_angle import tangent_angle, turned
 from gqm_sym.errors import DeclarationError
 from gqm_sym.sympy_charts import chart_alpha, chart_kappa
 
@@ -420,6 +421,12 @@ def _root_of_sum(way: _Direction, signs: Signs) -> _Root:
         # Components at 45 degrees may be simpler.
         halves = (parts[0] + parts[1], parts[0] - parts[1])
         sums.append(_sum_of_squares(algebra, [algebra.normal(half) for half in halves], one) / 2)
+    else:
+        # So may components in a frame that turns about the z axis: the one with the fewest terms is written out.
+        frames = [(along, across, parts[2]) for _, along, across in turned(algebra, parts[0], parts[1])]
+        frame = min(frames, key=lambda frame: sum(map(len, frame)), default=parts)
+        if sum(map(len, frame)) < sum(map(len, parts)):
+            sums.append(without_waves(_sum_of_squares(algebra, frame, one)))
     kept = shortest(sums)
     if all(is_safe(signs, factor) for factor in odd) and text <= sp.count_ops(sp.sqrt(kept)):
         return _Root(powers=whole, square=None, weight=one)

@@ -69,8 +69,8 @@ def asked_of_bodies(formulas: "Formulas", quantity: str, t_max: Any, contact: st
     loss = formulas.dissipation
     if loss is None or formulas.rolling_radius or quantity not in QUESTIONS:
         return None
-    if quantity.startswith("normal_force") and loss.linear and not formulas.signed:
-        return None  # the panels of a leg know N only where the law of motion takes it
+    if quantity.startswith("normal_force") and not formulas.signed:
+        return None  # the panels of a leg resolve its law of motion, and that may know nothing of the contact force
     horizon = inf if t_max is None else read_number(t_max, where="t_max").value
     return Asked(QUESTIONS[quantity], horizon, ONLY_SIGN[contact]) if horizon > 0.0 else None
 

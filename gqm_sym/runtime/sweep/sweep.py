@@ -134,8 +134,11 @@ def sweep(
 def has_compiled_route(formulas: "Formulas", quantity: Quantity, t_max: Any) -> bool:
     """Whether compiled loops answer most launches.
 
-    They do not for motions that lose energy, and of motions with a last time they know only when they end.
+    They do not for motions that lose energy, and of motions with a last time they know only when they end. The grid on
+    which they look for extremes is too coarse for the length of a vector, which may be all but zero somewhere.
     """
+    if not formulas.signed and quantity.code in (quantities.MIN_FORCE, quantities.MAX_FORCE):
+        return False
     timely = t_max is None or (quantity.code == quantities.END_TIME and float(as_doubles(t_max, "t_max")) > 0.0)
     return formulas.dissipation is None and quantity.code != quantities.NOT_COMPILED and timely
 
