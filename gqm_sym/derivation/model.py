@@ -406,6 +406,11 @@ def derive(
         curve = replace(curve, **{name: without_known_bars(form, signs) for name, form in curve.coordinates})
     heading = vertical_plane(curve) if curve.in_space else AHEAD
     if heading is not None and not is_planar(heading, (curve.x, curve.y, curve.z), kernel):
+        if not curve.in_space:
+            raise DeclarationError(
+                "derive: a force acts across the curve's plane, as of a centre with y != 0; declare the curve by "
+                "Curve.space, whose contact force is a vector"
+            )
         heading = None
     may_be_positive = tuple(name for name in values if is_positive(values[name]))
     track = geometry(curve, may_be_positive=may_be_positive, heading=heading)

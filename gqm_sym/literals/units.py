@@ -101,6 +101,7 @@ def unit_of_quantity(value: Any) -> str:
     return "1" if text in ("", "dimensionless") else text
 
 
+@lru_cache(maxsize=256)
 def split_unit(text: str) -> tuple[str, expr, str] | None:
     """Split a text such as "30 deg" into a number, its tree, and a unit; None if it is no such text."""
     for gap in _GAP.finditer(text):

@@ -386,3 +386,5 @@ def test_a_central_force_in_space() -> None:
         assert float(model.normal_force_at(v2).xreplace(place)) == pytest.approx(1.0, rel=1e-14)
     away = gqm.derive(ring, gqm.CentralForce(centre=(0, 2, 0)))
     assert away.effective_potential_slope != 0
+    with pytest.raises(DeclarationError, match="a force acts across the curve's plane"):
+        gqm.derive(gqm.families.circle(), gqm.CentralForce(centre=(0, 2, 0)))

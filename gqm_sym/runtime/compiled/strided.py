@@ -39,9 +39,20 @@ def _line(column: NDArray[np.float64], begin: int, end: int) -> NDArray[np.float
 
 
 def pointers(lines: list[NDArray[np.float64]]) -> NDArray[np.int64]:
-    """Return the address and the step in bytes of each vector, as rows; the caller must keep the vectors alive."""
-    found = [(line.__array_interface__["data"][0], line.strides[0] if line.size > 1 else 0) for line in lines]
-    return np.array(found, dtype=np.int64).reshape(-1, 2)
+    """Return a row for each vector: its address, its step in bytes, and the number itself where it has only one.
+
+    That number's address is its place in the row, because asking NumPy for an address takes as long as a few launches.
+    The caller must keep the other vectors alive.
+    """
+    rows = np.zeros((len(lines), 3), dtype=np.int64)
+    begin, size = rows.ctypes.data, rows.itemsize
+    numbers = rows.view(np.float64)
+    for k, line in enumerate(lines):
+        if line.size == 1:
+            rows[k, 0], numbers[k, 2] = begin + (3 * k + 2) * size, line[0]
+        else:
+            rows[k, 0], rows[k, 1] = line.ctypes.data, line.strides[0]
+    return rows
 
 
 @intrinsic

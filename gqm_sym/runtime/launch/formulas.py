@@ -47,6 +47,8 @@ class ParameterValues(tuple[Number, ...]):
         The exact formulas as a tape, once it has been asked for; False if there is none.
     true_pieces : charts.true_pieces.TruePieces or None
         A charted curve in double-double arithmetic, once it has been asked for; False if there is no such thing.
+    columns : tuple of lists of arrays or None
+        What sweeps lay out of them (`sweep.columns`), once one has been asked for.
     """
 
     values: Array
@@ -54,6 +56,7 @@ class ParameterValues(tuple[Number, ...]):
     functions: Any = None
     tape: Any = None
     true_pieces: Any = None
+    columns: Any = None
 
 
 def shape_of(maker: ChartMaker, values: tuple[Any, ...], other: Any) -> tuple[Any, ...]:

@@ -151,8 +151,8 @@ def room_kept(breaks: int) -> int:
 @Inner
 def gaps_on_leg(dissipation, joints, body, reads):  # type: ignore[no-untyped-def]
     """What is kept of the curve between its breaks, if a leg may be passed by it: its panels cannot be read."""
-    is_used = body[PERIOD] == 0.0 and reads != PANELS
-    return joints.gaps if is_used and dissipation.linear and not dissipation.kinked else joints.gaps[:0]
+    is_used = body[PERIOD] == 0.0 and reads != PANELS and dissipation.linear
+    return joints.gaps if is_used else joints.gaps[:0]
 
 
 @Inner
@@ -197,8 +197,8 @@ def leaving(dissipation, p, joints, body, place, preferred):  # type: ignore[no-
 
 
 @Inner
-def near_start(dissipation, p, place, direction, step):  # type: ignore[no-untyped-def]
-    """A distance over which the force on a body released at a place is about the same, where ``step`` is too long.
+def near_start(dissipation, p, place, direction, v2, step):  # type: ignore[no-untyped-def]
+    """A distance over which the force on a body, or else V**2, is about the same, where ``step`` is too long.
 
     Next to an equilibrium a body turns, or moves on, by a distance that no other length of the curve tells of.
     """
@@ -208,7 +208,8 @@ def near_start(dissipation, p, place, direction, step):  # type: ignore[no-untyp
     slope = slope_of_v2(forces, place, LEAST_V2, contact_sign, point)
     for _ in range(MAX_HALVINGS):
         ahead = slope_of_v2(forces, place + v * step, LEAST_V2, contact_sign, point)
-        if 0.0 < ahead <= MAX_FORCE_GROWTH * slope or not slope > 0.0 or step <= CLEARANCE_SHARE * fabs(place):
+        grows_little = 0.0 < ahead <= MAX_FORCE_GROWTH * slope or (ahead * step <= v2 if v2 > 0.0 else not slope > 0.0)
+        if grows_little or step <= CLEARANCE_SHARE * fabs(place):
             break
         step *= 0.5
     return FIRST_STEPS * step
@@ -225,7 +226,7 @@ def launch(dissipation, p, joints, body):  # type: ignore[no-untyped-def]
     body[FROM_REST], body[DIRECTION] = 1.0 if body[V2] == 0.0 else 0.0, preferred
     if body[V2] == 0.0:
         body[DIRECTION] = leaving(dissipation, p, joints, body, lam0, preferred)
-        body[STEP] = min(body[STEP], near_start(dissipation, p, lam0, body[DIRECTION], step))
+    body[STEP] = min(body[STEP], near_start(dissipation, p, lam0, body[DIRECTION], body[V2], step))
 
 
 @Inner

@@ -135,10 +135,11 @@ def at_rest(dissipation, p, body, question):  # type: ignore[no-untyped-def]
 @Inner
 def conclude(body, question, observed):  # type: ignore[no-untyped-def]
     """The answer for a body that has been followed long enough, and its status."""
+    if question == ARRIVAL:
+        is_there = observed.arrival < inf and observed.arrival <= body[HORIZON]
+        return (observed.arrival, FOUND) if is_there else (np.nan, NONE)
     ends = body[ENDING] != 0.0 and body[ENDING] != ASYMPTOTE
     end = min(body[HORIZON], body[ELAPSED] if ends else inf)
-    if question == ARRIVAL:
-        return (observed.arrival, FOUND) if observed.arrival <= end and observed.arrival < inf else (np.nan, NONE)
     if not isfinite(end):
         return np.nan, NONE
     if question == END_TIME:

@@ -1,10 +1,21 @@
-"""The panels of a leg: each as wide as V**2, the forces and the time rate can be resolved on it by a polynomial."""
+"""The panels of a leg: each as wide as V**2, the forces and the time rate can be resolved on it by a polynomial.
+
+What the forces between two breaks do to a body is kept, and bodies pass that gap by it where forces are linear in V**2.
+Then ``V**2 = (w + G)/(1 + E)`` with w = V**2 at the first break, E = exp(q) - 1, and the integral G of exp(q) P
+(`leg_equation`): E and G depend on the place alone. With the middle M of G's range in ``u = w + M``, and the rest of it
+in ``H = G - M``, the time over the gap is the integral of ``ds sqrt(1 + E)/sqrt(u + H)``. As a series it is a sum of
+powers of 1/u, each with the integral of ``ds sqrt(1 + E) H**k``, which is kept. It is used where H is small against u;
+nearer to a turn V**2 and the rate of time follow at nodes from the rows that are kept.
+"""
 
 from math import fabs, inf, nan, sqrt
 from typing import NamedTuple
 
-from gqm_sym.runtime.compiled.intrinsics import bits, from_bits
+import numpy as np
+
+from gqm_sym.runtime.compiled.intrinsics import bits, fma, from_bits
 from gqm_sym.runtime.compiled.jit import Inlined, Inner
+from gqm_sym.runtime.compiled.registers import over_rows
 from gqm_sym.runtime.legs.leg_breaks import offset
 from gqm_sym.runtime.legs.leg_equation import (
     DS,
@@ -95,12 +106,29 @@ NOISE_WIDTH_RATIO = 2.0**-20
 # The most panels of a leg, and the most widths that are tried for one.
 MAX_PANELS, MAX_WIDTHS = 20000, 2100
 
-# What is kept of the curve from one break to the next, for each direction and each sign of N: whether it is FILLED, or
-# REFUSED because it is not resolved; then rows from which V**2, N and time follow for any V**2 at the first break.
+# The ratio of V**2 to the largest V**2 so far above which gaps are passed. The time that a rounding of the largest V**2
+# costs grows with the root of this ratio, and panels laid one by one take far longer.
+GAP_V2_RATIO = 2.0**-6
+
+# The most that H may be as a share of u, and how many powers are summed then.
+MAX_SHARE, POWERS = 0.1, 16
+
+# What is kept of a gap: whether it is FILLED, or REFUSED because it is not resolved; E and G at its end; M and the
+# largest H; the smallest and the largest 1/(1 + E); bounds of n0 and of the curvature; the factors of the powers; and
+# rows from which V**2, N and time follow.
+STATE, END_EXPM1, END_GAINED, MIDDLE_GAINED, LARGEST_REST, LEAST_DAMPING, MOST_DAMPING = range(7)
+LEAST_N0, MOST_N0, LEAST_KAPPA, MOST_KAPPA = range(7, 11)
+FACTORS = 16
+FIRST_ROW = FACTORS + POWERS
 GAP_ROWS = (EXPM1_Q, SPEED, DS, N0, KAPPA)
-GAP_HEAD = 8
-GAP_COLUMNS = GAP_HEAD + len(GAP_ROWS) * WIDE
+GAP_COLUMNS = FIRST_ROW + len(GAP_ROWS) * WIDE
 FILLED, REFUSED = 1.0, 2.0
+
+# N on a gap is far from zero if it is more than this share of the largest values of its parts.
+FAR_SHARE = 4.0 * FAR_FROM_ZERO_RATIO
+
+undamped_row = over_rows(lambda ds, expm1, width: ds * np.sqrt(1.0 + expm1) * width, WIDE)
+share_row = over_rows(lambda gained, middle, largest: (gained - middle) / largest, WIDE)
 
 # Whether time has to be resolved.
 NEVER, MAYBE, ALWAYS = range(3)
@@ -360,6 +388,14 @@ def next_panel(forces, march, panel, request, work):  # type: ignore[no-untyped-
 
 
 @Inner
+def bounds(work, row):  # type: ignore[no-untyped-def]
+    """Bounds of the polynomial through a row of values."""
+    low, high = extent(work, row)
+    beyond = 0.5 * (LEBESGUE - 1.0) * (high - low)
+    return low - beyond, high + beyond
+
+
+@Inner
 def fill_gap(forces, march, panel, width, gaps, at, work):  # type: ignore[no-untyped-def]
     """Fill what is kept of a panel from break to break, from ``gaps[at]`` on."""
     gaps[at] = REFUSED
@@ -371,41 +407,76 @@ def fill_gap(forces, march, panel, width, gaps, at, work):  # type: ignore[no-un
     work[size_at(FORCE)] = size_of(work, FORCE)
     if not (is_curve_resolved(width, work)[0] and are_resolved(work, FORCE, Q_RATE)[0]):
         return
+    if forces.kinked and not kink(work) > 1.0:
+        return
     for row in (N0, KAPPA):
         if not examine(work, row, size_of(work, row))[0] <= ONE_SIGN_RATIO * size_of(work, row):
             return
     for k, row in enumerate(GAP_ROWS):
-        copy(gaps, at + GAP_HEAD + k * WIDE, work, row)
+        copy(gaps, at + FIRST_ROW + k * WIDE, work, row)
+    (least, most), (low, high) = extent(work, EXPM1_Q), extent(work, SPEED)
+    middle, largest = 0.5 * (low + high), max(0.5 * (high - low), 1e-300)
+    gaps[at + END_EXPM1], gaps[at + END_GAINED] = work[EXPM1_Q + COUNT], work[SPEED + COUNT]
+    gaps[at + MIDDLE_GAINED], gaps[at + LARGEST_REST] = middle, largest
+    gaps[at + LEAST_DAMPING], gaps[at + MOST_DAMPING] = 1.0 / (1.0 + most), 1.0 / (1.0 + least)
+    gaps[at + LEAST_N0], gaps[at + MOST_N0] = bounds(work, N0)
+    gaps[at + LEAST_KAPPA], gaps[at + MOST_KAPPA] = bounds(work, KAPPA)
+    undamped_row(work, SERIES, DS, EXPM1_Q, width)
+    share_row(work, MEAN, SPEED, middle, largest)
+    binomial = 1.0
+    for k in range(POWERS):
+        to_tails(work, SERIES, work, TAILS)
+        gaps[at + FACTORS + k] = binomial * work[TAILS + 6]
+        product(work, SERIES, SERIES, MEAN)
+        binomial *= -(k + 0.5) / (k + 1.0)
     gaps[at] = FILLED
 
 
 @Inner
-def pass_gap(v2, contact_sign, width, gaps, at, work):  # type: ignore[no-untyped-def]
-    """Fill V**2, Y and the rate of time on a panel from break to break, where V**2 is ``v2`` at its start.
+def pass_by_powers(v2, contact_sign, gaps, at):  # type: ignore[no-untyped-def]
+    """The time over a gap at whose start V**2 is ``v2``, V**2 at its end, and the largest V**2 on it.
 
-    Returns
-    -------
-    time : float
-        NaN where the curve or time is not resolved, V**2 vanishes or N may change its sign.
-    v2 : float
-        V**2 at its end.
+    The time is NaN where V**2 changes too much for a few powers, or N may be near zero.
+    """
+    u, h = v2 + gaps[at + MIDDLE_GAINED], gaps[at + LARGEST_REST]
+    if gaps[at] != FILLED or not h <= MAX_SHARE * u:
+        return nan, nan, nan
+    low, high = (u - h) * gaps[at + LEAST_DAMPING], (u + h) * gaps[at + MOST_DAMPING]
+    flat, steep = gaps[at + LEAST_KAPPA], gaps[at + MOST_KAPPA]
+    least, most = gaps[at + LEAST_N0], gaps[at + MOST_N0]
+    size = max(fabs(least), fabs(most)) + max(fabs(flat), fabs(steep)) * high
+    load = least + min(flat * low, flat * high) if contact_sign > 0 else -(most + max(steep * low, steep * high))
+    if not load > FAR_SHARE * size:
+        return nan, nan, nan
+    share, total = h / u, 0.0
+    for k in range(POWERS - 1, -1, -1):
+        total = fma(total, share, gaps[at + FACTORS + k])
+    lost = gaps[at + END_EXPM1]
+    return total / sqrt(u), v2 + (gaps[at + END_GAINED] - v2 * lost) / (1.0 + lost), high
+
+
+@Inner
+def pass_by_rows(v2, contact_sign, width, gaps, at, work):  # type: ignore[no-untyped-def]
+    """`pass_by_powers` from values at nodes: fills V**2, Y and the rate of time there.
+
+    The time is NaN where the curve or time is not resolved, V**2 vanishes or N may change its sign.
     """
     if gaps[at] != FILLED:
-        return nan, nan
+        return nan, nan, nan
     for k, row in enumerate(GAP_ROWS):
-        copy(work, row, gaps, at + GAP_HEAD + k * WIDE)
+        copy(work, row, gaps, at + FIRST_ROW + k * WIDE)
     solution_row(work, W, SPEED, EXPM1_Q, v2)
     load_row(work, LOAD, DS, N0, KAPPA, W)
     load_size_row(work, MEAN, DS, N0, KAPPA, W)
-    end = work[W + COUNT]
-    if not (min(extent(work, W)[0], end) > 0.0 and contact_sign * work[LOAD] > 0.0):
-        return nan, end
+    end, (low, high) = work[W + COUNT], extent(work, W)
+    if not (min(low, end) > 0.0 and contact_sign * work[LOAD] > 0.0):
+        return nan, end, high
     root_row(work, SPEED, W)
     time_rate_row(work, TIME_RATE, DS, SPEED, 1.0)
     fine = examine(work, TIME_RATE, size_of(work, TIME_RATE))[2]
-    if not (fine and keeps_sign(work, LOAD, 4.0 * FAR_FROM_ZERO_RATIO * extent(work, MEAN)[1])):
-        return nan, end
-    return width * work[TAILS + 6], end
+    if not (fine and keeps_sign(work, LOAD, FAR_SHARE * extent(work, MEAN)[1])):
+        return nan, end, high
+    return width * work[TAILS + 6], end, high
 
 
 @Inner

@@ -130,6 +130,8 @@ def passage(record, place):  # type: ignore[no-untyped-def]
     left = 0.0 if place == record[END] else -offset(place, (record[END], record[END_LOW]), v)
     if gone <= 0.0 or left < 0.0:
         return inf
+    if left == 0.0:
+        return record[TIME_FROM_START] + record[TIME_FROM_END]
     if offset(place, (record[MIDDLE], record[MIDDLE_LOW]), v) <= 0.0 and ahead > 0:
         return time_to(record, HEAD, ahead, marched(gone, march))
     if back == 0 or record[TIME_FROM_END] == 0.0:

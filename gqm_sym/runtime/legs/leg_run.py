@@ -4,7 +4,7 @@ Time is counted on the way as long as V**2 is large. From where V**2 decreases f
 end, from which time is then counted back (`follow`).
 """
 
-from math import fabs, inf, sqrt
+from math import fabs, inf, nan, sqrt
 from typing import NamedTuple
 
 from gqm_sym.runtime.arithmetic.clenshaw import chebyshev_sum
@@ -43,7 +43,9 @@ from gqm_sym.runtime.legs.leg_equation import (
 from gqm_sym.runtime.legs.leg_panels import (
     ALWAYS,
     CANCELLATION_NOISE,
+    END_EXPM1,
     GAP_COLUMNS,
+    GAP_V2_RATIO,
     HIGH_V2_RATIO,
     MAX_PANELS,
     MAYBE,
@@ -53,7 +55,8 @@ from gqm_sym.runtime.legs.leg_panels import (
     fill_gap,
     first_change_of,
     next_panel,
-    pass_gap,
+    pass_by_powers,
+    pass_by_rows,
     size_at,
 )
 from gqm_sym.runtime.legs.leg_record import (
@@ -570,7 +573,7 @@ def pass_gaps(forces, march, route, contact_sign, before, record, work):  # type
     """Go on from the break ahead, from one to the next, as far as V**2 is large and follows from what is kept."""
     (left, run_length, v2, largest_v2, ahead, count), v = before, march.direction
     breaks, gaps, upcoming = route.breaks, route.gaps, ahead.upcoming
-    while gaps.size > 0 and upcoming + 1 < breaks.size and v2 >= HIGH_V2_RATIO * largest_v2:
+    while gaps.size > 0 and upcoming + 1 < breaks.size and v2 >= GAP_V2_RATIO * largest_v2:
         start, stop, to = breaks[upcoming], breaks[upcoming + 1], HEAD + count * COLUMNS
         # A break lies behind already where a panel is laid once more.
         is_ahead = offset(start, march.origin, v) == run_length
@@ -584,10 +587,13 @@ def pass_gaps(forces, march, route, contact_sign, before, record, work):  # type
             span = span_before(breaks, upcoming + 1, v, clearance(start, stop))
             panel = Panel(0.0, 0.0, contact_sign, span)
             fill_gap(forces, March((start, 0.0), v, 0.0, 1.0), panel, width, gaps, at, work)
-        time, end = pass_gap(v2, contact_sign, width, gaps, at, work)
+        time, end, top = (nan, nan, nan) if route.reads == PEAKS else pass_by_powers(v2, contact_sign, gaps, at)
+        if not time > 0.0:
+            time, end, top = pass_by_rows(v2, contact_sign, width, gaps, at, work)
         if not time > 0.0:
             break
-        largest_v2, v2, upcoming, count = largest_after(largest_v2, v2, False, work), end, upcoming + 1, count + 1
+        largest_v2 = max(largest_v2 / (1.0 + gaps[at + END_EXPM1]), max(v2, top))
+        v2, upcoming, count = end, upcoming + 1, count + 1
         run_length = offset(stop, march.origin, v)
         left = marched(run_length, march)
         if route.reads == PEAKS:

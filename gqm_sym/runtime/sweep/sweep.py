@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from gqm_sym.arguments import not_given
 from gqm_sym.errors import GQMError, InputError, ParameterError, SolutionError
 from gqm_sym.literals.namespaces import ARRAYS
-from gqm_sym.literals.numbers import read_number
+from gqm_sym.literals.numbers import Number, read_number
 from gqm_sym.runtime.charts.chart import CORNER_ROUNDINGS, ChartMaker
 from gqm_sym.runtime.charts.true_parts import NO_PARTS, parts_along
 from gqm_sym.runtime.compiled.strided import DOMAIN_PERIOD, LAM0, PARAMETERS, V0, lay_out, pointers, widen
@@ -41,6 +41,9 @@ if TYPE_CHECKING:
 
 # From how many launches on a thread is worth starting, and how many are laid out at a time.
 MIN_LAUNCHES_PER_THREAD, CHUNK = 2**11, 2**16
+
+# What one number is given as, and up to where all integers are doubles.
+ONE_NUMBER, MAX_EXACT_INTEGER = (float, int, str, Number), 2**53
 
 # The motion of one launch with given parameters.
 Solve = Callable[[LaunchRequest, tuple[Any, ...]], Any]
@@ -94,12 +97,12 @@ def sweep(
     check_contact(formulas, contact)
     names = ("lam0", "v0", "direction", "lam", *formulas.parameters)
     sources = (lam0, v0, direction, 0.0 if lam is None else lam, *parameters)
-    arrays = [as_doubles(value, name) for value, name in zip(sources, names, strict=True)]
-    named = dict(zip(names, arrays, strict=True))
-    _check(formulas, named)
-    shape = broadcast_shape(named)
-    _check_lower_bounds(formulas, named)
-    columns = [widen(array, shape) for array in (*arrays, *_trigonometric_columns(formulas, parameters, arrays[4:]))]
+    named = {name: as_doubles(value, name) for value, name in zip(sources[:4], names, strict=False)}
+    _check_launches(named["v0"], named["direction"])
+    given, domain = _columns(formulas, parameters, named)
+    arrays = [*named.values(), *given]
+    shape = broadcast_shape(dict(zip(names, arrays, strict=False)))
+    columns, domain = ([widen(array, shape) for array in of] for of in (arrays, domain))
     size = prod(shape)
     answers = Answers(
         np.full((size, found.width), nan),
@@ -108,7 +111,7 @@ def sweep(
     )
     asked = asked_of_bodies(formulas, quantity, t_max, contact)
     if asked is not None or has_compiled_route(formulas, found, t_max):
-        for group, chosen in _groups(formulas, columns, shape, ONLY_SIGN[contact]):
+        for group, chosen in _groups(formulas, columns, domain, shape, ONLY_SIGN[contact]):
             if asked is None and group.drops.size:
                 continue  # tables know no corners
             some = answers if chosen is None else answers.part(chosen)
@@ -145,8 +148,11 @@ def has_compiled_route(formulas: "Formulas", quantity: Quantity, t_max: Any) -> 
 
 def broadcast_shape(columns: Mapping[str, Array]) -> tuple[int, ...]:
     """The shape that named arrays broadcast to."""
+    different = {column.shape for column in columns.values()} - {()}
+    if len(different) <= 1:
+        return next(iter(different), ())
     try:
-        return np.broadcast_shapes(*(column.shape for column in columns.values()))
+        return np.broadcast_shapes(*different)
     except ValueError:
         shapes = ", ".join(f"{name} {column.shape}" for name, column in columns.items() if column.shape)
         raise InputError(f"sweep: these shapes do not broadcast against each other: {shapes}") from None
@@ -154,8 +160,8 @@ def broadcast_shape(columns: Mapping[str, Array]) -> tuple[int, ...]:
 
 def as_doubles(value: Any, name: str) -> Array:
     """Numbers as doubles; text and exact numbers by their nearest."""
-    if type(value) is float:
-        return np.array(value)
+    if type(value) is float or (type(value) is int and abs(value) <= MAX_EXACT_INTEGER):
+        return np.array(float(value))
     if type(value) is str:
         return np.array(_of_text(value, name))
     if value is None:
@@ -172,37 +178,52 @@ def _of_text(value: str, name: str) -> float:
     return read_number(value, where=name).value
 
 
-def _check(formulas: "Formulas", columns: dict[str, Array]) -> None:
+def _check_launches(v0: Array, direction: Array) -> None:
     """Refuse what no launch of a sweep may be."""
-    if (columns["v0"] < 0.0).any():
+    if (v0 < 0.0).any():
         raise InputError("v0: is a speed and cannot be negative; use direction=-1 to launch the other way")
-    if (np.abs(columns["direction"]) != 1.0).any():
+    if (np.abs(direction) != 1.0).any():
         raise InputError("direction: must be 1 or -1 (the sign of ds/dt at launch)")
+
+
+def _check(formulas: "Formulas", columns: dict[str, Array]) -> None:
+    """Refuse parameters for which the closed forms do not hold, and those below the limits that the model has."""
     for name in (*formulas.positive, "m"):
         if (columns[name] <= 0.0).any():
             raise ParameterError(f"{name}: must be positive; the closed forms hold for {name} > 0")
-
-
-def _check_lower_bounds(formulas: "Formulas", columns: dict[str, Array]) -> None:
-    """Refuse parameters below the bounds that the model has for them."""
     for name, lower in formulas.at_least:
         bound = columns[lower] if lower in columns else read_number(lower, where=lower).value
         if (columns[name] < bound).any():
             raise ParameterError(f"{name}: must be at least {lower}")
 
 
-def _trigonometric_columns(formulas: "Formulas", given: tuple[Any, ...], p: list[Array]) -> Iterator[Array]:
-    """What stands behind the parameters, for each launch; exact where no parameter is an array."""
-    if formulas.trigonometric is None:
-        return
-    if all(column.shape == () for column in p):
-        yield from map(np.array, formulas.trigonometric_values(formulas.numbers(given)))
-        return
-    yield from map(np.asarray, formulas.trigonometric_over(ARRAYS, tuple(p)))
+def _columns(
+    formulas: "Formulas", given: tuple[Any, ...], launches: dict[str, Array]
+) -> tuple[list[Array], list[Array]]:
+    """The columns of the parameters, with what stands behind them, and those of the curve's domain.
+
+    Where all launches have the same parameters, they are found once; otherwise they must broadcast with the launches.
+    """
+    if all(isinstance(value, ONE_NUMBER) or not (isinstance(value, np.ndarray) or np.ndim(value)) for value in given):
+        numbers = formulas.numbers(given)
+        if numbers.columns is None:
+            p = list(map(np.array, numbers.values))
+            numbers.columns = p, list(_domain_columns(formulas, p))
+        columns: tuple[list[Array], list[Array]] = numbers.columns
+        return columns
+    named = {name: as_doubles(value, name) for value, name in zip(given, formulas.parameters, strict=True)}
+    _check(formulas, named)
+    broadcast_shape({**launches, **named})
+    p = list(named.values())
+    if formulas.trigonometric is not None:
+        p += map(np.asarray, formulas.trigonometric_over(ARRAYS, tuple(p)))
+    return p, list(_domain_columns(formulas, p))
 
 
 def _domain_columns(formulas: "Formulas", p: list[Array]) -> Iterator[Array]:
-    """The domain and the axes of symmetry of each launch's curve, in the order of `strided`."""
+    """The domain and the axes of symmetry of each launch's curve, in the order of `strided`; none of a chart."""
+    if formulas.chart is not None:
+        return
     place, step = formulas.axes(ARRAYS, tuple(p))
     found = (*formulas.ends(ARRAYS, tuple(p)), place, _rounding_of_axis(formulas, place, p), step)
     for value, default in zip(found, (-inf, inf, 0.0, nan, nan, 0.0), strict=True):
@@ -265,14 +286,13 @@ class Group(NamedTuple):
 
 
 def _groups(
-    formulas: "Formulas", columns: list[Array], shape: tuple[int, ...], only_sign: int
+    formulas: "Formulas", columns: list[Array], domain: list[Array], shape: tuple[int, ...], only_sign: int
 ) -> Iterator[tuple[Group, NDArray[np.intp] | None]]:
     """The launches, grouped by the shape of their curve, and which they are; None where all are of one shape.
 
     Launches whose curve cannot be made are in no group. Curves with formulas are tabulated if bodies may lift off.
     """
     if formulas.chart is None:
-        domain = [widen(value, shape) for value in _domain_columns(formulas, columns[4:])]
         may_lift_off = only_sign and not formulas.dissipation
         table, ends = _tabulated_range(formulas, columns, domain, only_sign) if may_lift_off else (NO_TABLE, NO_ENDS)
         yield Group([*columns[:4], *domain, *columns[4:]], table=table, ends=ends), None

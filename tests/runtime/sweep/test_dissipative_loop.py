@@ -30,10 +30,10 @@ def ring() -> Any:
     return gqm.Curve.parametric(x="sin(th)", z="-cos(th)", parameter="th", period="2*pi")
 
 
-def surveyed() -> Any:
-    """A valley of sixty points, where the curve is not smooth."""
+def surveyed(wave: float = 0.02) -> Any:
+    """A valley of sixty points, where the curve is not smooth; with a wave above 0.05 it bends both ways."""
     x = np.linspace(-1.5, 1.6, 60)
-    return gqm.Curve.sampled(np.column_stack([x, 0.4 * x * x + 0.02 * np.cos(4.0 * x)]))
+    return gqm.Curve.sampled(np.column_stack([x, 0.4 * x * x + wave * np.cos(4.0 * x)]))
 
 
 def test_a_spring_with_friction(generated_folder: Path) -> None:
@@ -91,7 +91,7 @@ def test_drag_on_a_ring_to_a_horizon(build: Build) -> None:
 CASES = {
     "friction": (ring, gqm.CoulombFriction, {"mu": 0.15}),
     "drag": (ring, lambda: gqm.QuadraticDrag(b="c"), {"c": 0.2}),
-    "droplet": (lambda: gqm.families.parabola(a=1), gqm.SurfaceTension, {"gamma": 0.05, "ell_c": 0.1}),
+    "droplet": (lambda: surveyed(0.06), gqm.SurfaceTension, {"gamma": 0.05, "ell_c": 0.1}),
     "law": (lambda: gqm.families.parabola(a=1), lambda: gqm.Kernel.law(A="-direction*r/(1 + W/2)"), {"r": 0.8}),
     "rail": (
         lambda: gqm.Curve.piecewise([gqm.line(length=2), gqm.arc(radius=1, angle="pi/2")], start=(-2, 0)),
@@ -191,6 +191,16 @@ def test_arrivals_where_the_curve_is_not_smooth(name: str, build: Build) -> None
         assert (np.diff(solved) > 0.0).all()
         assert solved[-1] < turn.t_end
         assert motion.lam(solved) == pytest.approx(passed, rel=0.0, abs=1e-13)
+
+
+def test_arrivals_at_the_end_of_a_track(build: Build) -> None:
+    """A body that runs off the track is at the end of it when the motion ends, however its times are rounded."""
+    module = build("swept_track", *(make() for make in CASES["track"][:2]))
+    end, speeds = module.solve(1.0, 9.0, 1, **CASES["track"][2]).legs[-1].lam_end, np.linspace(6.0, 9.0, 40)
+    arrivals = module.sweep("time_at", 1.0, speeds, lam=end, **CASES["track"][2])
+    ends = module.sweep("t_end", 1.0, speeds, **CASES["track"][2])
+    assert (arrivals.status == quantities.ANSWERED).all()
+    assert arrivals.values == pytest.approx(ends.values, rel=2.0**-52)
 
 
 def test_a_curve_for_each_parameter(build: Build) -> None:
