@@ -1,5 +1,5 @@
 # Made by gqm-gen for "helix_coulomb". Do not edit: change its declaration and generate again.
-# interface 10, input 3f2dfaf376e9, body 645f0a355e78
+# interface 10, input 3f2dfaf376e9, body 6ade37195543
 """Bead on a rough helix
 
 x              = R*cos(theta)
@@ -162,7 +162,6 @@ def effective_potential(n, places, p, out):
 def bounds(lo, hi, p, out):
     """Bounds of dU/dtheta and ds/dtheta for lo <= theta <= hi, by interval arithmetic."""
     p, out = carray(p, 5), carray(out, 4)
-    theta = (lo, hi)
     R, c, g = (p[0], p[0]), (p[1], p[1]), (p[3], p[3])
     out[0], out[1] = imul(c, g)
     out[2], out[3] = isqrt(iadd(ipow(R, 2), ipow(c, 2)))

@@ -1,6 +1,7 @@
 """Space curves against truths made elsewhere: 40-digit times and forces, closed forms, DOP853, planar motions."""
 
 import json
+import pickle
 from collections.abc import Callable
 from types import ModuleType
 from typing import Any
@@ -111,6 +112,9 @@ def test_a_state_in_space_is_that_of_pass1() -> None:
     assert one.y == motion.state(np.array([0.25])).y[0]
     assert "normal_z (N)" in str(one)
     assert one._replace(t=0.0).y == one.y
+    assert pickle.loads(pickle.dumps(one)) == one
+    data = motion.to_xarray(np.array([0.25]))
+    assert (data.y.item(), data.normal_y.item(), data.y.units) == (one.y, one.normal_y, "m")
 
 
 def helix_truth(w: str) -> tuple[mpf, mpf]:
