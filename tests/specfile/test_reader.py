@@ -270,8 +270,8 @@ WRONG: dict[str, tuple[str | bytes, list[str]]] = {
     "an unknown family": (
         edited((GRAPH, "family: {name: elipse, a: h, b: 1}")),
         [
-            "a.yaml:3:12: curve.family: unknown family 'elipse'; known are cartesian_graph, "
-            "circle, ellipse, parabola, log_spiral, catenary, cycloid, helix, conical_helix, torus_knot, viviani, implicit"
+            "a.yaml:3:12: curve.family: unknown family 'elipse'; known are cartesian_graph, circle, "
+            "ellipse, parabola, log_spiral, catenary, cycloid, helix, conical_helix, torus_knot, viviani, implicit"
         ],
     ),
     "a name that means two things": (

@@ -20,7 +20,8 @@ from numpy.polynomial import chebyshev
 from gqm_sym.literals.numbers import Number
 from gqm_sym.runtime.arithmetic.doubledouble import ULP, add
 from gqm_sym.runtime.compiled.calls import call_speed_equation
-from gqm_sym.runtime.compiled.jit import compiler, entry
+from gqm_sym.runtime.compiled.emitted import compiler
+from gqm_sym.runtime.compiled.jit import entry
 from gqm_sym.runtime.compiled.registers import on_stack
 from gqm_sym.runtime.compiled.types import MATRIX, VECTOR, Array
 from gqm_sym.runtime.interface import INTERFACE, SPEED_EQUATION, STATIC_BALANCE, Dissipation, ExactLaw
