@@ -177,8 +177,12 @@ class Route(NamedTuple):
         The time from the leg's start up to which peaks are looked for, and the place whose passage is.
     gaps : array
         What is kept of the curve between its breaks (`leg_panels`); empty if that is not used.
-    first_gap : int
+    first_break : int
         The index of the first break of the route among all of the curve.
+    all_breaks : array
+        All breaks of the curve, within one lap.
+    period : float
+        The length of a lap; 0 on an open curve.
     """
 
     breaks: Array
@@ -189,7 +193,9 @@ class Route(NamedTuple):
     until: float
     target: float
     gaps: Array
-    first_gap: int
+    first_break: int
+    all_breaks: Array
+    period: float
 
 
 class Ahead(NamedTuple):
@@ -569,6 +575,12 @@ def conclude(forces, route, march, end, timed, searching, run_length):  # type: 
 
 
 @Inner
+def ends_of_gap(all_breaks, period, gap):  # type: ignore[no-untyped-def]
+    """Between which places a gap lies; the last one of a closed curve goes on to the first break of the next lap."""
+    return all_breaks[gap], (all_breaks[gap + 1] if gap + 1 < all_breaks.size else all_breaks[0] + period)
+
+
+@Inner
 def pass_gaps(forces, march, route, contact_sign, before, record, work):  # type: ignore[no-untyped-def]
     """Go on from the break ahead, from one to the next, as far as V**2 is large and follows from what is kept."""
     (left, run_length, v2, largest_v2, ahead, count), v = before, march.direction
@@ -581,12 +593,13 @@ def pass_gaps(forces, march, route, contact_sign, before, record, work):  # type
         has_target = route.reads == PASSAGE and min(start, stop) <= route.target <= max(start, stop)
         if contact_sign in (0, -route.only_sign) or has_target or not (is_ahead and has_space(record, to, 0)):
             break
-        gap = route.first_gap + (upcoming if v > 0 else -upcoming - 1)
-        at, width = GAP_COLUMNS * (4 * gap + (v + 1) + (contact_sign + 1) // 2), fabs(stop - start)
+        gap = (route.first_break + (upcoming if v > 0 else -upcoming - 1)) % route.all_breaks.size
+        low, high = ends_of_gap(route.all_breaks, route.period, gap)
+        at, width = GAP_COLUMNS * (4 * gap + (v + 1) + (contact_sign + 1) // 2), high - low
         if gaps[at] == 0.0:
-            span = span_before(breaks, upcoming + 1, v, clearance(start, stop))
-            panel = Panel(0.0, 0.0, contact_sign, span)
-            fill_gap(forces, March((start, 0.0), v, 0.0, 1.0), panel, width, gaps, at, work)
+            off, begin_at = clearance(low, high), low if v > 0 else high
+            panel = Panel(0.0, 0.0, contact_sign, (low + off, high - off))
+            fill_gap(forces, March((begin_at, 0.0), v, 0.0, 1.0), panel, width, gaps, at, work)
         time, end, top = (nan, nan, nan) if route.reads == PEAKS else pass_by_powers(v2, contact_sign, gaps, at)
         if not time > 0.0:
             time, end, top = pass_by_rows(v2, contact_sign, width, gaps, at, work)
