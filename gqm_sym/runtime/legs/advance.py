@@ -60,7 +60,6 @@ from gqm_sym.runtime.legs.leg_record import (
     HEADING,
     LAPS_BEFORE,
     PANELS,
-    PEAKS,
     START,
     START_LOW,
     START_V2,
@@ -150,9 +149,9 @@ def room_kept(breaks: int) -> int:
 
 
 @Inner
-def gaps_on_leg(dissipation, joints, reads):  # type: ignore[no-untyped-def]
+def gaps_on_leg(dissipation, joints, reading):  # type: ignore[no-untyped-def]
     """What is kept of the curve between its breaks, if a leg may be passed by it: its panels cannot be read."""
-    return joints.gaps if reads != PANELS and dissipation.linear else joints.gaps[:0]
+    return joints.gaps if reading.what != PANELS and dissipation.linear else joints.gaps[:0]
 
 
 @Inner
@@ -268,14 +267,14 @@ def expected_width(body):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def next_leg(dissipation, p, joints, body, reads, record):  # type: ignore[no-untyped-def]
+def next_leg(dissipation, p, joints, body, reading, record):  # type: ignore[no-untyped-def]
     """Follow a body to its next turn, or as far as one run goes.
 
     A body that the track would have to pull at once is followed a little way without contact, and AT_ONCE is in ENDING.
     """
     place, direction, period = body[PLACE], int(body[DIRECTION]), body[PERIOD]
     end = body[HIGH] if direction > 0 else body[LOW]
-    gaps = gaps_on_leg(dissipation, joints, reads)
+    gaps = gaps_on_leg(dissipation, joints, reading)
     limit = place + direction * (LAPS_AHEAD if gaps.size == 0 else 1) * period if period > 0.0 else end
     drops, _ = breaks_before(joints.drops, joints.ahead, period, direction, place, limit)
     limit = drops[0] if drops.size else limit
@@ -294,12 +293,10 @@ def next_leg(dissipation, p, joints, body, reads, record):  # type: ignore[no-un
             *(place, body[PLACE_LOW], body[V2], direction, int(body[CONTACT_SIGN]), body[STEP], no_turn_until),
             *(width, may_be_whole),
         )
-        route = Route(breaks, limit, pause, only_sign, reads, until, target, gaps, first_break, joints.breaks, period)
+        route = Route(breaks, limit, pause, only_sign, reading, until, target, gaps, first_break, joints.breaks, period)
         found = follow(dissipation, p, start, route, record)
         if found.what == LIFTOFF and record[AHEAD] == 0.0:
             pause, only_sign, no_turn_until, until, body[ENDING] = 0.0, 0, inf, 0.0, AT_ONCE
-        elif reads == PEAKS and gaps.size > 0 and record[TIME_FROM_START] + record[TIME_FROM_END] > until:
-            gaps = gaps[:0]
         else:
             return found
 
@@ -321,7 +318,7 @@ def after_turn(dissipation, p, joints, body, found, record):  # type: ignore[no-
 
 
 @Inner
-def advance(dissipation, p, joints, body, reads, record):  # type: ignore[no-untyped-def]
+def advance(dissipation, p, joints, body, reading, record):  # type: ignore[no-untyped-def]
     """Take a body to its next turn, to the end of its motion, or as far as one run goes.
 
     Parameters
@@ -333,8 +330,7 @@ def advance(dissipation, p, joints, body, reads, record):  # type: ignore[no-unt
     joints : Joints
     body : array
         The line of the body (`legs.body`), which was launched; it is as before where the record is FULL.
-    reads : int
-        As of `leg_run.Route`.
+    reading : leg_run.Reading
     record : array
         Filled in (`leg_record`).
 
@@ -344,7 +340,7 @@ def advance(dissipation, p, joints, body, reads, record):  # type: ignore[no-unt
         RESTS if it comes to rest, one of the codes of `leg_run` for what ended the run, LEAVES or
         BEYOND; SPENT if it could not be followed.
     """
-    found, period = next_leg(dissipation, p, joints, body, reads, record), body[PERIOD]
+    found, period = next_leg(dissipation, p, joints, body, reading, record), body[PERIOD]
     what, ahead, back, place = found.what, record[AHEAD] > 0.0, record[BACK] > 0.0, record[END]
     if what == LIMIT and is_break(joints.drops, period, place):
         what = LIFTOFF
