@@ -79,9 +79,9 @@ def fit(module: ModuleType, data: Any, free: Mapping[str, Any], **fixed: Any) ->
     Notes
     -----
     Derivatives are those of ``motion.sensitivity`` and of sweeps with ``gradient``, which are exact to rounding, and
-    difference quotients of solved motions where these are not there yet, as along curves without formulas. Without
-    ``sigma`` all measurements have the same unknown standard deviation, which is estimated from the residuals. First
-    guesses for long series of positions must be so near that the fitted motion does not slip by a swing.
+    difference quotients of solved motions where these are not there yet, as with losses along curves without formulas.
+    Without ``sigma`` all measurements have the same unknown standard deviation, which is estimated from the residuals.
+    First guesses for long series of positions must be so near that the fitted motion does not slip by a swing.
     """
     from scipy.optimize import least_squares
 

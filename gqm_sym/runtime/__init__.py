@@ -7,7 +7,7 @@ everything else from `vocabulary`.
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from gqm_sym.runtime.compiled.jit import compiler
+from gqm_sym.runtime.compiled.emitted import compiler
 
 if TYPE_CHECKING:
     from gqm_sym.runtime.launch.equilibria import Equilibrium

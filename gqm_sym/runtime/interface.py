@@ -110,7 +110,7 @@ PATH_ROWS, LOAD_MAP_ROWS = 5, 7
 
 
 class Addresses(NamedTuple):
-    """Where the compiled functions of one generated module lie in memory; 0 for those that it has none of."""
+    """Where the addresses of one generated module's functions stand in memory; 0 for those that it has none of."""
 
     path_and_contact_force: int
     effective_potential: int = 0
@@ -120,7 +120,7 @@ class Addresses(NamedTuple):
 
 
 class CompiledFunctions(NamedTuple):
-    """The functions of one module that serve one motion, each compiled when its address is first needed (`jit.Later`).
+    """The functions of one module that serve one motion, each a `emitted.Emitted`.
 
     A function that a module does not have is None.
     """
@@ -132,7 +132,7 @@ class CompiledFunctions(NamedTuple):
     bounds: Any = None
 
     def addresses(self) -> Addresses:
-        """Where they lie in memory; 0 for one that there is not."""
+        """Where their addresses stand in memory; 0 for one that there is not."""
         return Addresses(*_addresses(self))
 
 
@@ -141,7 +141,7 @@ def _addresses(functions: Iterable[Any]) -> Iterator[int]:
 
 
 class BatchAddresses(NamedTuple):
-    """Where the compiled functions of one module that serve many orbits at once lie in memory; 0 for missing ones."""
+    """Where the addresses of one module's functions for many orbits at once stand in memory; 0 for missing ones."""
 
     potential_divdiff1: int
     potential_divdiff2: int
@@ -154,7 +154,7 @@ class BatchAddresses(NamedTuple):
 
 
 class BatchFunctions(NamedTuple):
-    """The functions of one module that serve many orbits at once, each compiled when it is first needed (`jit.Later`).
+    """The functions of one module that serve many orbits at once, each a `emitted.Emitted`.
 
     A function that a module does not have is None. ``orbit_rows`` and ``integrand_rows`` are how many rows
     ``orbit_invariants`` and ``integrand_invariants`` fill.
@@ -172,7 +172,7 @@ class BatchFunctions(NamedTuple):
     integrand_rows: int = 0
 
     def addresses(self) -> BatchAddresses:
-        """Where they lie in memory; 0 for one that there is not."""
+        """Where their addresses stand in memory; 0 for one that there is not."""
         return BatchAddresses(*_addresses(getattr(self, name) for name in BatchAddresses._fields))
 
 
@@ -182,7 +182,7 @@ class Dissipation(NamedTuple):
     Attributes
     ----------
     speed_equation, static_balance : int
-        Where these functions lie in memory.
+        Where the addresses of these functions stand in memory.
     friction : bool
         Whether the force depends on the sign of N: then a leg ends where N changes sign.
     kinked : bool
@@ -199,7 +199,7 @@ class Dissipation(NamedTuple):
 
 
 class DissipativeFunctions(NamedTuple):
-    """The functions that a dissipative module adds (`jit.Later`), with the flags of `Dissipation`."""
+    """The functions that a dissipative module adds (`emitted.Emitted`), with the flags of `Dissipation`."""
 
     speed_equation: Any
     static_balance: Any
@@ -208,7 +208,7 @@ class DissipativeFunctions(NamedTuple):
     linear: bool
 
     def addresses(self) -> Dissipation:
-        """Where they lie in memory, with the flags."""
+        """Where their addresses stand in memory, with the flags."""
         speed_equation, static_balance = _addresses(self[:2])
         return Dissipation(speed_equation, static_balance, self.friction, self.kinked, self.linear)
 
@@ -218,7 +218,7 @@ class SeparatedTerms(NamedTuple):
 
     Attributes
     ----------
-    function : jit.Later
+    function : emitted.Emitted
         What depends on the place.
     factors : callable
         ``f(op, p)`` gives what depends on parameters alone: a factor for each part of U, then for each of n0. ``p`` are

@@ -18,6 +18,7 @@ from types import FunctionType
 
 from gqm_sym.loading import load
 from gqm_sym.runtime.compiled import jit
+from gqm_sym.runtime.compiled.emitted import Emitted
 from gqm_sym.runtime.compiled.stamps import FOLDER, RUNTIME
 
 # numba makes millions of objects, of which little is garbage. To look for it as often as usual takes a tenth of the
@@ -47,6 +48,8 @@ def compile_room(name: str) -> str:
     for call in vars(module).values():
         if isinstance(call, jit.Later):
             _ = call.address
+        if isinstance(call, Emitted):
+            call.compile()
         is_entry = isinstance(call, FunctionType) and call.__code__.co_name == "call"
         if is_entry and call.__module__ == module.__name__:
             given = inspect.getclosurevars(call).nonlocals
@@ -59,8 +62,8 @@ def compile_module(file: str) -> str:
     """Compile all functions of a generated module into the cache; returns its path."""
     module = load(file, Path(file).stem)
     for value in vars(module).values():
-        if isinstance(value, jit.Later):
-            _ = value.address
+        if isinstance(value, Emitted):
+            value.compile()
     return file
 
 

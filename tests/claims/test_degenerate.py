@@ -17,6 +17,7 @@ from paths import DATA
 from problems import TRACKS, Track
 
 import gqm_sym as gqm
+from gqm_sym.errors import SolutionError
 
 # Half periods: nearly all within 1 unit in the last place, all within 2. Worst measured: 0.5.
 MOST_ULPS, MOST_SHARE = 1.0, 0.95
@@ -224,3 +225,25 @@ def test_a_slow_launch_from_a_slope(v0: float, module_of: Callable[[str], Module
             truth = 2 * mp.asin(mp.sqrt(m) * mp.ellipfun("sn", start + mp.sqrt(g) * mpf(t), m=m))
             assert abs(mpf(state.lam) - truth) <= state.error, (t, float(mpf(state.lam) - truth))
             assert state.error <= 2.0 * POSITION
+
+
+@pytest.mark.parametrize("side", [1, -1])
+@pytest.mark.parametrize("exponent", [15, 17, 20, 30])
+def test_from_beside_the_top(exponent: int, side: int, module_of: Callable[[str], ModuleType]) -> None:
+    """On whichever side of the top the nearest double lies; from the other one the body was not followed."""
+    near = f"1/10**{exponent}"
+    motion, other = (module_of("circle").solve(f"{side}*(pi {sign} {near})", L=1) for sign in "-+")
+    with mp.workdps(100):
+        half = 2 * mp.ellipk(mp.cos(mpf(10) ** -exponent / 2) ** 2) / mp.sqrt(mpf("9.81"))
+        ends = float(mp.pi - mpf(10) ** -exponent), float(mp.pi + mpf(10) ** -exponent)
+        far = float(3 * mp.pi - mpf(10) ** -exponent)
+    assert ulps(motion.half_period, half) <= MOST_ULPS
+    assert motion.turning_points == (side * ends[0], -side * ends[0])
+    assert ulps(other.half_period, half) <= MOST_ULPS
+    assert other.turning_points == (side * ends[1], side * far)
+
+
+def test_nearer_to_the_top_than_can_be_told(module_of: Callable[[str], ModuleType]) -> None:
+    """A body launched there is refused with what would be right, where V**2 was divided by although it was zero."""
+    with pytest.raises(SolutionError, match="launch a little farther from the equilibrium"):
+        module_of("circle").solve("pi - 1/10**45", L=1).lam(1.0)

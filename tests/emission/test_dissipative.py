@@ -1,7 +1,7 @@
 """What emitted modules say of friction, drag and resistance: P, Q and what holds, against the textbook equation."""
 
 from collections.abc import Callable
-from ctypes import CFUNCTYPE, POINTER, c_double, c_ssize_t
+from ctypes import CFUNCTYPE, POINTER, c_double, c_ssize_t, c_void_p
 from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
@@ -156,7 +156,7 @@ class Loss:
         out = np.full((rows, lines[0].size), np.nan)
         arrays = [*lines, *numbers, self.p, out]
         kinds = [LINE if isinstance(a, np.ndarray) else c_double for a in arrays]
-        function = CFUNCTYPE(None, c_ssize_t, *kinds)(address)
+        function = CFUNCTYPE(None, c_ssize_t, *kinds)(c_void_p.from_address(address).value)
         function(lines[0].size, *(a.ctypes.data_as(LINE) if isinstance(a, np.ndarray) else a for a in arrays))
         return out
 

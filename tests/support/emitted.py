@@ -2,7 +2,7 @@
 
 import ast
 from collections.abc import Callable
-from ctypes import CFUNCTYPE, POINTER, c_double, c_ssize_t
+from ctypes import CFUNCTYPE, POINTER, c_double, c_ssize_t, c_void_p
 from functools import cache
 from types import ModuleType, SimpleNamespace
 from typing import Any
@@ -99,7 +99,7 @@ class Compiled:
         count = [] if n is None else [c_ssize_t]
         function = getattr(self.addresses, name)
         if not callable(function):
-            function = CFUNCTYPE(None, *count, *types)(function)
+            function = CFUNCTYPE(None, *count, *types)(c_void_p.from_address(function).value)
         with np.errstate(divide="ignore", invalid="ignore"):  # as compiled code does
             function(
                 *([] if n is None else [n]),

@@ -2,18 +2,18 @@
 
 import math
 from collections.abc import Callable
-from functools import cache
 from typing import Any
 
 import numpy as np
 import sympy as sp
 from mpmath import mp, mpf
 from naive import error
-from numba import carray, cfunc
+from numba import carray
 
+from gqm_sym.runtime import compiler
 from gqm_sym.runtime.charts.chart import Chart
 from gqm_sym.runtime.charts.tracing import Traced
-from gqm_sym.runtime.interface import FIELD
+from gqm_sym.runtime.interface import FIELD, INTERFACE
 
 # Of the curve's extent; worst measured 4e-16 where F is computed without cancellation.
 ROUNDING = 1e-15
@@ -21,12 +21,10 @@ ROUNDING = 1e-15
 DEGREE = 6
 
 
-@cache
-def _compiled(field: Callable[..., None]) -> Any:
-    """Compile a function of this file when a test first needs it, not when the tests are collected."""
-    return cfunc(FIELD, error_model="numpy")(field)
+compiled = compiler(__file__, interface=INTERFACE)
 
 
+@compiled(FIELD)
 def _polynomial(n, xs, zs, p, out):
     """F = sum of p[j, k] x**j z**k and its derivatives."""
     xs, zs, p, out = carray(xs, n), carray(zs, n), carray(p, (DEGREE + 1, DEGREE + 1)), carray(out, (6, n))
@@ -55,6 +53,7 @@ def _polynomial(n, xs, zs, p, out):
 SQUARE, BEND, ROOT, WAVE = range(4)
 
 
+@compiled(FIELD)
 def _other(n, xs, zs, p, out):
     """|x| + |z| - 1, z - x|x|, z - sqrt(x) and z - sin(x), by the number p[0]."""
     xs, zs, p, out = carray(xs, n), carray(zs, n), carray(p, 1), carray(out, (6, n))
@@ -96,7 +95,7 @@ def other(which: int, start: tuple[float, float], domain: tuple[float | None, fl
 
 def _maker(field: Any, start: tuple[float, float], tangent: int, domain: tuple[float | None, float | None]) -> Traced:
     return Traced(
-        field=_compiled(field).address,
+        field=field.address,
         start=lambda op, p: start,
         tangent=tangent,
         level=lambda op, x, z, p: None,  # charts do without extended precision

@@ -22,7 +22,7 @@ from numba.core.registry import CPUDispatcher
 
 import gqm_sym.runtime
 from gqm_sym.runtime import interface
-from gqm_sym.runtime.compiled import jit
+from gqm_sym.runtime.compiled import emitted, jit
 from gqm_sym.runtime.legs.polynomials import COUNT
 
 _NAMES = {"asin": "arcsin", "acos": "arccos", "atan": "arctan", "atan2": "arctan2", "pow": "power"}
@@ -202,23 +202,23 @@ def _callback(kind: Any, **_: Any) -> Callable[[Any], Any]:
         names = {name: _alike(value) for name, value in function.__globals__.items()}
         plain = _rebuilt(function, names)
         _KEPT.append(ctypes.CFUNCTYPE(None, *kinds)(_entry(plain)))
-        address = ctypes.cast(_KEPT[-1], ctypes.c_void_p).value
-        assert address is not None
+        slot = ctypes.cast(_KEPT[-1], ctypes.c_void_p)
+        address = ctypes.addressof(slot)
         _FUNCTIONS[address] = plain
-        return SimpleNamespace(address=address)
+        return SimpleNamespace(address=address, call=_KEPT[-1], slot=slot)
 
     return decorate
 
 
 def _compiler(file: str, *, interface: int) -> Callable[..., Callable[[Any], Any]]:
-    """Stand in for `jit.compiler`."""
+    """Stand in for `emitted.compiler`."""
     if interface != INTERFACE:
         return COMPILER(file, interface=interface)
 
     return _callback
 
 
-INTERFACE, COMPILER = interface.INTERFACE, jit.compiler
+INTERFACE, COMPILER = interface.INTERFACE, emitted.compiler
 _C = {numba.types.float64: ctypes.c_double, numba.types.int64: ctypes.c_int64, numba.types.intp: ctypes.c_ssize_t}
 
 
@@ -247,7 +247,7 @@ def install() -> None:
         for name, value in list(vars(module).items()):
             if isinstance(value, FunctionType) and value in entries:
                 setattr(module, name, entries[value])
-            elif value is jit.compiler:
+            elif value is emitted.compiler:
                 setattr(module, name, _compiler)
     jit.Inner.__call__ = lambda self, *arguments: _entry(self.py_func)(*arguments)
     jit.COMPILER.callback = lambda function, signature: _callback(signature)(function)  # type: ignore[method-assign]

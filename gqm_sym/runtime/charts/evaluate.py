@@ -23,6 +23,7 @@ from numba.extending import intrinsic
 from gqm_sym.runtime.compiled.intrinsics import polynomial
 from gqm_sym.runtime.compiled.jit import Inlined, Inner
 from gqm_sym.runtime.compiled.registers import INDEX, LANES, REGISTER, line_of, operation, register, spread
+from gqm_sym.runtime.compiled.uncompiled import fma, in_python
 
 TERMS = 16
 ROWS = 4
@@ -140,6 +141,17 @@ def fill_lanes(_, chart, terms, places, at, out, to, first, numbers):  # type: i
         return context.get_dummy_value()
 
     return types.void(chart, terms, places, at, out, to, first, numbers), lower
+
+
+@in_python(fill_lanes)
+def _fill_lanes(chart: Any, terms: int, places: Any, at: int, out: Any, to: int, first: int, numbers: Any) -> None:
+    lap, middle, scale, limit, whole, rest = numbers
+    for lane in range(max(first, 0), LANES):
+        u = min(max(((places[at + lane] - lap) - middle) * scale, -limit), limit)
+        value = 0.0
+        for k in range(TERMS - 1, -1, -1):
+            value = fma(value, u, chart[terms + k])
+        out.reshape(-1)[to + lane] = whole + (rest + value)
 
 
 @Inner

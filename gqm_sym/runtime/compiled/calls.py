@@ -18,14 +18,14 @@ from gqm_sym.runtime.compiled.registers import line_of
 
 
 def _call(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-    """Lower ``address(arguments...)``: arrays by the address of their data, numbers as they are."""
+    """Lower the call of what stands at an address: arrays by the address of their data, numbers as they are."""
     values = []
     for kind, value in zip(signature.args[1:], args[1:], strict=True):
         if isinstance(kind, types.Array):
             value = context.make_array(kind)(context, builder, value).data
         values.append(value)
     function = ir.FunctionType(ir.VoidType(), [value.type for value in values])
-    builder.call(builder.inttoptr(args[0], function.as_pointer()), values)
+    builder.call(builder.load(builder.inttoptr(args[0], function.as_pointer().as_pointer())), values)
     return context.get_dummy_value()
 
 

@@ -4,26 +4,18 @@ No fast-math: reassociation would break sums and products of two doubles, and Na
 Division by zero gives infinity, as in IEEE arithmetic, and is not an exception.
 """
 
-import builtins
-import hashlib
 import sys
 import threading
 import time
 from collections.abc import Callable
 from functools import wraps
-from itertools import takewhile
-from pathlib import Path
-from types import ModuleType
 from typing import Any
-from weakref import WeakValueDictionary
 
 from numba import types
 from numba.extending import typeof_impl
 
-from gqm_sym.errors import OutdatedModuleError
-from gqm_sym.runtime.compiled.numba_internals import GENERATED, Compiler
+from gqm_sym.runtime.compiled.numba_internals import Compiler
 from gqm_sym.runtime.compiled.stamps import RUNTIME, Stamps
-from gqm_sym.runtime.interface import INTERFACE
 
 COMPILE: dict[str, Any] = {"error_model": "numpy"}
 
@@ -80,6 +72,17 @@ ANNOUNCER = Announcer()
 COMPILER = Compiler(COMPILE, lambda function: stamp_for(function), ANNOUNCER.begin)
 
 
+# What was raised where compiled code had called Python, by thread: Python has no way to raise it through compiled code.
+RAISED: dict[int, BaseException] = {}
+
+
+def raise_raised() -> None:
+    """Raise what was raised while compiled code ran in this thread."""
+    raised = RAISED.pop(threading.get_ident(), None)
+    if raised is not None:
+        raise raised
+
+
 class Inner:
     """A function that other compiled functions call.
 
@@ -110,6 +113,7 @@ class Inner:
             return self._called(*arguments)
         finally:
             ANNOUNCER.end()
+            raise_raised()
 
 
 class Inlined(Inner):
@@ -151,7 +155,10 @@ def entry(signature: Any, *, nogil: bool = False, checked: bool = True) -> Calla
                     compiled = COMPILER.entry(function, signature, nogil=nogil, checked=checked)
                 finally:
                     ANNOUNCER.end()
-            return compiled(*arguments)
+            result = compiled(*arguments)
+            if RAISED:
+                raise_raised()
+            return result
 
         return call
 
@@ -159,7 +166,7 @@ def entry(signature: Any, *, nogil: bool = False, checked: bool = True) -> Calla
 
 
 class Later:
-    """A function of a generated module that is compiled when its address is first needed."""
+    """A function of the runtime that is called by its address, and compiled when that is first needed."""
 
     def __init__(self, compile_it: Callable[[], Any]) -> None:
         self._compile = compile_it
@@ -172,77 +179,3 @@ class Later:
             self._callback = self._compile()
         address: int = self._callback.address
         return address
-
-
-# The compiled functions of generated modules that are in use, by their text: modules with the same function share it.
-_IN_USE: WeakValueDictionary[str, Any] = WeakValueDictionary()
-
-# Where a function of a generated module finds what other functions of the runtime's stamp are made of.
-_KNOWN = ("gqm_sym.runtime.", "numba.", "math.", "builtins.")
-
-
-def _is_known(function: Any, name: str) -> bool:
-    """Whether a function uses a name for what the stamp of its code knows, or what never changes."""
-    found = vars(builtins).get(name, function.__globals__.get(name))
-    home = getattr(getattr(found, "py_func", found), "__module__", None)
-    return isinstance(home, str) and f"{home}.".startswith(_KNOWN)
-
-
-def _text(function: Any, lines: list[str]) -> list[str]:
-    """The lines of a function with its decorators; all lines if the function uses anything else of the module."""
-    if not all(_is_known(function, name) for name in function.__code__.co_names):
-        return lines
-    begin = function.__code__.co_firstlineno - 1
-    head = list(takewhile(lambda line: line.startswith(("@", "def ")), lines[begin:]))
-    body = takewhile(lambda line: not line or line[0] in " )", lines[begin + len(head) :])
-    return [*head, *body]
-
-
-def compiler(file: str, *, interface: int) -> Callable[[Any], Callable[[Any], Later]]:
-    """Return a decorator factory for the functions of one generated module: ``compiled(signature)``.
-
-    Each function becomes a `Later`: it is compiled when a launch first needs it.
-
-    numba's disk cache stores the name of a function's module, imports it on loading, and distinguishes machine code by
-    it. A generated module may be imported under any name, from any folder: so numba sees each function under a name
-    that is made from the function's own text. What else changes in the module compiles nothing anew.
-
-    Parameters
-    ----------
-    file : str
-        Path of the generated module.
-    interface : int
-        Version of the runtime's interface that it was generated for.
-
-    Raises
-    ------
-    OutdatedModuleError
-        If that is not the version of this runtime.
-    """
-    if interface != INTERFACE:
-        raise OutdatedModuleError(
-            f"{file}: made for interface {interface} of the runtime, which is now at {INTERFACE}; "
-            "run gqm-gen on its declaration again"
-        )
-    lines = Path(file).read_text(encoding="utf-8").splitlines()
-
-    def compiled(signature: Any) -> Callable[[Any], Later]:
-        def compile_it(function: Any, alias: str) -> Any:
-            found = _IN_USE.get(alias)
-            if found is None:
-                sys.modules.setdefault(alias, ModuleType(alias))
-                function.__module__ = alias
-                try:
-                    found = _IN_USE[alias] = COMPILER.callback(function, signature)
-                finally:
-                    ANNOUNCER.end()
-            return found
-
-        def decorate(function: Any) -> Later:
-            text = "\n".join((function.__name__, *_text(function, lines)))
-            alias = GENERATED + hashlib.sha256(text.encode()).hexdigest()[:16]
-            return Later(lambda: compile_it(function, alias))
-
-        return decorate
-
-    return compiled

@@ -74,7 +74,7 @@ def _has(owner: object, *names: str) -> bool:
 HAS_CACHE = _has(FunctionCache, "load_overload", "save_overload", "_load_overload", "_index_key") and _has(
     IndexDataCacheFile, "_save_data", "_data_path"
 )
-HAS_CALLBACKS = _has(ccallback, "CFunc")
+HAS_CALLBACKS = _has(ccallback, "CFunc") and _has(ccallback.CFunc, "_targetdescr")
 HAS_ENVIRONMENTS = _has(Environment, "_memo")
 HAS_RUNTIME = _has(rtsys, "initialize")
 HAS_LIBRARIES = (
@@ -250,6 +250,10 @@ class KeyedFiles(IndexDataCacheFile):  # type: ignore[misc]
         Path(self._cache_path).mkdir(parents=True, exist_ok=True)
         self._save_data(self.file_name(key), (self._stamp, key, data))
 
+    def has(self, key: Any) -> bool:
+        """Whether there is a file that belongs to a key."""
+        return Path(self._data_path(self.file_name(key))).exists()
+
     def load(self, key: Any) -> Any:
         """Read the compiled code that was stored under a key; None where there is none."""
         try:
@@ -295,6 +299,12 @@ class KeyedCache(FunctionCache):  # type: ignore[misc]
 
     def _index_key(self, sig: Any, codegen: Any) -> Any:
         return (*super()._index_key(sig, codegen), self._function.__module__, self._stamp, self._linked)
+
+    def has(self, sig: Any) -> bool:
+        """Whether there is code for a signature."""
+        target: Any = ccallback.CFunc._targetdescr  # type: ignore[attr-defined]
+        found: bool = self._cache_file.has(self._index_key(sig, target.target_context.codegen()))
+        return found
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """Read the compiled function; None where it must be compiled."""
@@ -386,6 +396,11 @@ class Compiler:
         (overload,) = dispatcher.overloads.values()
         direct = not checked and _has(overload, "entry_point")
         return overload.entry_point if direct else dispatcher  # type: ignore[no-any-return]
+
+    def has_cached_callback(self, function: Any, signature: Any) -> bool:
+        """Whether the cache has, as far as is known, code of a function that is called by its address."""
+        cache = self.cache_of(function) if HAS_CALLBACKS else None
+        return cache is None or bool(cache.has(signature))
 
     def callback(self, function: Any, signature: Any) -> Any:
         """Compile a function that is called by its ``address``."""

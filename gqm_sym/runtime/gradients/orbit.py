@@ -1,6 +1,7 @@
 """A periodic orbit with its derivatives: turning points, duration, action, and how they come about along the orbit."""
 
-from collections.abc import Iterator
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import cached_property
 
@@ -21,13 +22,16 @@ from gqm_sym.runtime.gradients.evaluation import (
 )
 from gqm_sym.runtime.gradients.multiprecision import UNDECIDED, MultiprecisionOrbit
 from gqm_sym.runtime.gradients.programs import (
+    AnySource,
     Program,
     Source,
     circulation_program,
+    extreme_program,
     libration_program,
     path_program,
     turning_point_program,
 )
+from gqm_sym.runtime.gradients.series import Series
 from gqm_sym.runtime.interface import ExactFormulas, ExactLaw
 from gqm_sym.runtime.launch.formulas import Formulas
 from gqm_sym.runtime.launch.problem import Problem
@@ -48,7 +52,10 @@ def asked_for(name: str) -> Iterator[None]:
 
 def without_formulas() -> SolutionError:
     """What is raised for curves that have no gradients."""
-    return SolutionError("gradients: curves without formulas have none yet; declare the curve by formulas")
+    return SolutionError(
+        "gradients: curves without formulas have none yet where energy is lost, or where the curve is known in doubles "
+        "only; declare the curve by formulas"
+    )
 
 
 def source_of(formulas: Formulas) -> Source:
@@ -70,6 +77,12 @@ def pairs(*numbers: tuple[float, float, float]) -> Array:
     return np.ascontiguousarray(np.array(numbers, dtype=float).reshape(-1, 3).T)
 
 
+def variables_of(problem: Problem) -> Array:
+    """The variables of a launch as inputs of programs; the change of the energy is zero."""
+    numbers = (*problem.p, problem.launch.lam0, problem.launch.v0)
+    return pairs(*((n.value, n.low, 0.25 * UNIT * abs(n.value) if n.low else 0.0) for n in numbers), (0.0, 0.0, 0.0))
+
+
 def values(program: Program, inputs: Array, high: Array, low: Array | None = None, *others: Array) -> Array:
     """The results of a program at places, one row for each; ``others`` are coordinates after the first, as doubles."""
     zero = np.zeros_like(high)
@@ -88,7 +101,106 @@ def path_rows(
     return found.reshape(len(found) // (count + 2), count + 2, high.size)
 
 
-class OrbitDerivatives:
+# Values of functions at shares of the phase, and their integrals from the beginning of it: a row for each function.
+SeriesOf = Callable[[Array], tuple[Array, Array]]
+
+
+class OrbitDerivatives(ABC):
+    """A libration or circulation with derivatives by all variables.
+
+    The variables are the run-time parameters, lam0, v0, and the energy per unit mass over 1 + beta (`programs`).
+
+    Attributes
+    ----------
+    direction : int
+        0 for a libration, else the sign of ds/dt.
+    source : AnySource
+        What programs are recorded from.
+    by_arc_length : bool
+        Whether the parameter of the curve is its arc length. Then parameters may move the curve's points, and
+        derivatives at the points of the curve are not those at given arc lengths.
+    """
+
+    direction: int
+    source: AnySource
+    by_arc_length = False
+
+    @property
+    @abstractmethod
+    def ends(self) -> Array:
+        """The derivatives of the lower and of the upper turning point of a libration, as columns."""
+
+    @property
+    @abstractmethod
+    def turning_points(self) -> tuple[float, float]:
+        """The lower and the upper turning point of a libration."""
+
+    @property
+    @abstractmethod
+    def width(self) -> float:
+        """The width of a libration, or the length of a lap with its sign, in units of the curve parameter."""
+
+    @property
+    @abstractmethod
+    def series(self) -> tuple[SeriesOf, SeriesOf, Array]:
+        """The time per phase with its derivatives, the derivatives of arc length per share, and those of the lap."""
+
+    @abstractmethod
+    def at_places(self, lam: Array) -> Array:
+        """`path_rows` at places."""
+
+    @abstractmethod
+    def extreme_rows(self, place: Array, *, of_speed: bool) -> Array:
+        """Half of V**2, or the contact force, at places: with two derivatives by the place, and those by variables."""
+
+    @abstractmethod
+    def _integrals(self, first: int, count: int) -> Array:
+        """The integrals of results over a half period, or over a lap."""
+
+    @property
+    def moved_ends(self) -> Array:
+        """The derivatives of the turning points of a libration at the points of the curve, which do not move."""
+        return self.ends
+
+    @property
+    def launch_moves(self) -> Array:
+        """How the place of the launch changes, at the points of the curve, which do not move."""
+        moves = np.zeros(self.source.variables)
+        moves[self.source.parameters] = 1.0
+        return moves
+
+    @property
+    def duration_gradient(self) -> Array:
+        """The derivatives of the half period of a libration, or of the time of a lap."""
+        return self._integrals(1, self.source.variables)
+
+    @property
+    def action(self) -> float:
+        """The integral of V**2 (1 + beta) dt over a period."""
+        return float(self._period_share * self._integrals(1 + self.source.variables, 1)[0])
+
+    @property
+    def action_gradient(self) -> Array:
+        """The derivatives of the action."""
+        n = self.source.variables
+        return self._period_share * self._integrals(2 + n, n)
+
+    @property
+    def period_gradient(self) -> Array:
+        """The derivatives of the period."""
+        return self._period_share * self.duration_gradient
+
+    @property
+    def _period_share(self) -> float:
+        """How many of what is integrated over make a period."""
+        return 1.0 if self.direction else 2.0
+
+    def without_shift(self, moved: Array, lam: Array) -> Array:
+        """How a place changes among the points of the curve, which do not move, from how its parameter changes."""
+        return moved
+
+
+class FormulaOrbitDerivatives(OrbitDerivatives):
     """A libration or circulation along a curve with formulas, with derivatives by all variables.
 
     The variables are the run-time parameters, lam0, v0, and the energy per unit mass over 1 + beta (`programs`).
@@ -107,14 +219,15 @@ class OrbitDerivatives:
         Phase angles between which the speed changes smoothly, from the first to the last.
     """
 
+    source: Source
+
     def __init__(
         self, problem: Problem, orbit: Orbit | None, direction: int, offsets: tuple[float, float], edges: Array
     ) -> None:
         self.direction, self._edges = direction, edges
         self.source = source_of(problem.formulas)
         self._given = (*problem.p, problem.launch.lam0, problem.launch.v0)
-        numbers = [(n.value, n.low, 0.25 * UNIT * abs(n.value) if n.low else 0.0) for n in self._given]
-        self.variables = pairs(*numbers, (0.0, 0.0, 0.0))
+        self.variables = variables_of(problem)
         self.parameters = np.ascontiguousarray(self.variables[:, : self.source.parameters])
         self._orbit, self._offsets = orbit, offsets
 
@@ -186,32 +299,6 @@ class OrbitDerivatives:
         integrals: Array = high + low if self.direction else PI * high + (PI * low + PI_LOW * high)
         return integrals
 
-    @property
-    def duration_gradient(self) -> Array:
-        """The derivatives of the half period of a libration, or of the time of a lap."""
-        return self._integrals(1, self.source.variables)
-
-    @property
-    def action(self) -> float:
-        """The integral of V**2 (1 + beta) dt over a period."""
-        return float(self._period_share * self._integrals(1 + self.source.variables, 1)[0])
-
-    @property
-    def action_gradient(self) -> Array:
-        """The derivatives of the action."""
-        n = self.source.variables
-        return self._period_share * self._integrals(2 + n, n)
-
-    @property
-    def period_gradient(self) -> Array:
-        """The derivatives of the period."""
-        return self._period_share * self.duration_gradient
-
-    @property
-    def _period_share(self) -> float:
-        """How many of what is integrated over make a period."""
-        return 1.0 if self.direction else 2.0
-
     @cached_property
     def samples(self) -> Array:
         """The results of the orbit's program at equal steps of the phase angle, over a whole turn of it.
@@ -232,6 +319,30 @@ class OrbitDerivatives:
         found[means[:, 3] <= means[:, 2]] = 0.0  # they are rounding
         return found if self.direction else np.hstack([found, found[:, ::-1]])
 
+    @property
+    def width(self) -> float:
+        """The width of a libration, or the length of a lap with its sign, in units of the curve parameter."""
+        if self.direction:
+            return float(self.samples[3 * (1 + self.source.variables), 0])
+        low, high = self.turning_points
+        return high - low
+
+    @property
+    def series(self) -> tuple[SeriesOf, SeriesOf, Array]:
+        """The time per phase with its derivatives, the derivatives of arc length per share, and those of the lap."""
+        n, samples = self.source.variables, self.samples
+        rates, arcs = samples[: 1 + n], samples[2 * (1 + n) :]
+        if self.direction:
+            return Series(rates), Series(arcs[1 : 1 + n]), arcs[2 + n :, :1]
+        count = samples.shape[1]
+        rise = 0.5 * self.width * np.sin(2.0 * np.pi * (np.arange(count) + 0.5) / count)
+        others = np.zeros((n - self.source.parameters, count))
+        return Series(rates), Series(np.vstack([rise * arcs, others])), np.zeros((n, 1))
+
     def at_places(self, lam: Array) -> Array:
         """`path_rows` at places."""
         return path_rows(self.source.formulas, self.parameters, self.source.mass, lam)
+
+    def extreme_rows(self, place: Array, *, of_speed: bool) -> Array:
+        """Half of V**2, or the contact force, at places: with two derivatives by the place, and those by variables."""
+        return values(extreme_program(self.source, of_speed), self.variables, place)[:, 0]

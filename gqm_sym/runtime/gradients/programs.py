@@ -8,7 +8,7 @@ derivatives are taken by: the run-time parameters, lam0, v0 and the energy, in t
 from collections.abc import Callable, Sequence
 from fractions import Fraction
 from functools import lru_cache
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -60,6 +60,25 @@ class Program(NamedTuple):
         return INTERPRETER.address, self.operations, self.first, self.inputs, self.outputs
 
 
+class Local(NamedTuple):
+    """A motion at a place: half of V**2 and ds/dlam, each with its derivatives by the place and by all variables.
+
+    Attributes
+    ----------
+    half, half_slope, half_partials
+        Half of V**2, its derivative by the place, and those by the variables at a fixed place.
+    ds, ds_slope, ds_partials
+        The same of ds/dlam; there are derivatives by the run-time parameters only.
+    """
+
+    half: TapeNumber
+    half_slope: TapeNumber
+    half_partials: Sequence[TapeNumber]
+    ds: TapeNumber
+    ds_slope: TapeNumber
+    ds_partials: Sequence[TapeNumber]
+
+
 class Source(NamedTuple):
     """The formulas that programs are recorded from.
 
@@ -86,6 +105,16 @@ class Source(NamedTuple):
         """How many variables derivatives are taken by."""
         return self.parameters + LAUNCH_VARIABLES
 
+    @property
+    def inputs(self) -> int:
+        """How many numbers a motion at a place depends on."""
+        return self.variables
+
+    @property
+    def coordinates(self) -> int:
+        """How many coordinates a place has."""
+        return 1
+
     def half(self, op: Recorder, lam: TapeNumber) -> TapeNumber:
         """Record half of V**2 at a place."""
         p = op.values[: self.parameters]
@@ -94,9 +123,44 @@ class Source(NamedTuple):
         found: TapeNumber = (v0 * v0 / 2 + energy) + (potential(op, lam0, p) - potential(op, lam, p))
         return found
 
+    def local(self, op: Recorder, lam: TapeNumber) -> Local:
+        """Record the motion at a place that no variable changes."""
+        half, ds = self.half(op, lam), op.number(self.formulas.ds(op, lam, op.values[: self.parameters]))
+        half_slope, *half_partials = gradient(op, half, [lam, *op.values[: self.variables]])
+        ds_slope, *ds_partials = gradient(op, ds, [lam, *op.values[: self.parameters]])
+        return Local(half, half_slope, half_partials, ds, ds_slope, ds_partials)
+
     def one_plus_beta(self, op: Recorder) -> TapeNumber:
         """Record 1 + beta."""
         return op.number(1 if self.inertia is None else self.inertia(op, op.values[: self.parameters]))
+
+
+class AnySource(Protocol):
+    """Where programs get a motion at a place from: formulas of the curve, or its coordinates along a chart."""
+
+    @property
+    def parameters(self) -> int:
+        """The number of run-time parameters."""
+
+    @property
+    def variables(self) -> int:
+        """How many variables derivatives are taken by."""
+
+    @property
+    def inputs(self) -> int:
+        """How many numbers a motion at a place depends on, of which the variables come first."""
+
+    @property
+    def coordinates(self) -> int:
+        """How many coordinates a place has."""
+
+    def local(self, op: Recorder, lam: TapeNumber) -> Local:
+        """Record the motion at a place."""
+
+    def one_plus_beta(self, op: Recorder) -> TapeNumber:
+        """Record 1 + beta."""
+
+    def __hash__(self) -> int: ...
 
 
 def assemble(op: Recorder, outputs: Sequence[Any]) -> Program:
@@ -137,50 +201,41 @@ def assemble(op: Recorder, outputs: Sequence[Any]) -> Program:
 
 
 @lru_cache(maxsize=64)
-def turning_point_program(source: Source) -> Program:
+def turning_point_program(source: AnySource) -> Program:
     """The step of Newton's method to a turning point from the place, and its derivatives by all variables."""
-    op = Recorder(source.variables)
-    half = source.half(op, op.place)
-    slope, *partials = gradient(op, half, [op.place, *op.values])
-    return assemble(op, [-(part / slope) for part in (half, *partials)])
-
-
-def libration_inputs(source: Source) -> int:
-    """The number of inputs of the program of a libration: variables, turning points a and b, and their derivatives."""
-    return 3 * source.variables + 2
+    op = Recorder(source.inputs, source.coordinates)
+    here = source.local(op, op.place)
+    return assemble(op, [-(part / here.half_slope) for part in (here.half, *here.half_partials)])
 
 
 @lru_cache(maxsize=64)
-def libration_program(source: Source, wanted: tuple[int, ...] | None = None) -> Program:
+def libration_program(source: AnySource, wanted: tuple[int, ...] | None = None) -> Program:
     """What is integrated over the phase angle of a libration, with its derivatives at the same phase angle.
 
-    The place is the square of the sine of half the phase angle. The inputs behind the variables are both turning points
-    and then the derivatives of each. The results are dt/dphi, its derivatives by all variables, V**2 dt/dphi (1+beta)
-    with its derivatives, and the derivatives of ds/dlam by the run-time parameters at the same place. If some variables
-    are ``wanted``, they are the derivatives of dt/dphi by these, and nothing else.
+    The place is the square of the sine of half the phase angle. The inputs behind those of the source are both turning
+    points and then the derivatives of each. The results are dt/dphi, its derivatives by all variables, V**2 dt/dphi
+    (1+beta) with its derivatives, and the derivatives of ds/dlam by the run-time parameters at the same place. If some
+    variables are ``wanted``, they are the derivatives of dt/dphi by these, and nothing else.
     """
-    n, p = source.variables, source.parameters
-    op = Recorder(libration_inputs(source))
-    (a, b), share = op.values[n : n + 2], op.place
-    width, lam = b - a, a + (b - a) * share
-    half, ds = source.half(op, lam), source.formulas.ds(op, lam, op.values[:p])
-    inertia = source.one_plus_beta(op)
-    half_slope, *half_partials = gradient(op, half, [lam, *op.values[:n]])
-    ds_slope, *ds_partials = gradient(op, ds, [lam, *op.values[:n]])
+    n, share = source.variables, (op := Recorder(source.inputs + 2 * source.variables + 2, source.coordinates)).place
+    a, b, *ends = op.values[source.inputs :]
+    width, inertia = b - a, source.one_plus_beta(op)
+    half, half_slope, half_partials, ds, ds_slope, ds_partials = source.local(op, a + width * share)
     rate = width * op.sqrt(share * (1 - share)) * ds / op.sqrt(2 * half)
     power = 2 * rate * half * inertia
     rates, powers = [rate], [power]
+    by_launch = [op.number(0)] * LAUNCH_VARIABLES
     for k, by in enumerate(gradient(op, inertia, op.values[:n])):
-        low, high = op.values[n + 2 + k], op.values[2 * n + 2 + k]
+        low, high, stretch = ends[k], ends[n + k], [*ds_partials, *by_launch][k]
         moved = low + (high - low) * share
         # First the small change of V**2 as a whole, for near the turning points the parts of it are large.
         faster = (half_partials[k] + half_slope * moved) / (2 * half)
-        longer = (high - low) / width + (ds_partials[k] + ds_slope * moved) / ds
+        longer = (high - low) / width + (stretch + ds_slope * moved) / ds
         rates.append(rate * (longer - faster))
         powers.append(power * (longer + faster + by / inertia))
     if wanted is not None:
         return assemble(op, [rates[1 + k] for k in wanted])
-    return assemble(op, [*rates, *powers, *ds_partials[:p]])
+    return assemble(op, [*rates, *powers, *ds_partials])
 
 
 @lru_cache(maxsize=64)

@@ -8,8 +8,7 @@ import numpy as np
 from gqm_sym.arguments import names, unknown_argument
 from gqm_sym.errors import InputError, SolutionError
 from gqm_sym.runtime.compiled.types import Array
-from gqm_sym.runtime.gradients.orbit import OrbitDerivatives, values
-from gqm_sym.runtime.gradients.programs import extreme_program
+from gqm_sym.runtime.gradients.orbit import OrbitDerivatives
 
 # What has a gradient.
 EXTREMES = ("v_max", "v_min", "normal_force_max", "normal_force_min")
@@ -78,22 +77,20 @@ def extreme_gradient(derivatives: OrbitDerivatives, motion: Any, quantity: str) 
     found = np.zeros(derivatives.source.variables)
     if of_speed and extreme.value == 0.0:
         return found
-    program = extreme_program(derivatives.source, of_speed)
     place = np.array([extreme.lam])
     width, moved = abs(motion.problem.period), found
     if not derivatives.direction:
         ends = derivatives.turning_points
         width = ends[1] - ends[0]
-        for end, tangent in zip(ends, derivatives.ends.T, strict=True):
+        for end, tangent in zip(ends, derivatives.moved_ends.T, strict=True):
             if abs(extreme.lam - end) <= AT_TURN * width:
                 moved = tangent
     if moved is found:
         place, is_stationary = _improved(derivatives, of_speed, place, width)
         if not is_stationary and motion.t_end < motion.period:
-            moved = np.append(
-                motion.sensitivity(extreme.t, (*motion.problem.formulas.parameters, "lam0", "v0")).lam, 0.0
-            )
-    (_, slope, _, *partials) = values(program, derivatives.variables, place)[:, 0, 0]
+            everything = (*motion.problem.formulas.parameters, "lam0", "v0")
+            moved = derivatives.without_shift(np.append(motion.sensitivity(extreme.t, everything).lam, 0.0), place)
+    (_, slope, _, *partials) = derivatives.extreme_rows(place, of_speed=of_speed)[:, 0]
     total: Array = (np.array(partials) + slope * moved) / (extreme.value if of_speed else 1.0)
     return total
 
@@ -103,9 +100,9 @@ def _improved(derivatives: OrbitDerivatives, of_speed: bool, place: Array, width
 
     Where the quantity is constant, or all but constant, the place does not matter and is left.
     """
-    program, found = extreme_program(derivatives.source, of_speed), place
+    found = place
     for _ in range(NEWTON_STEPS):
-        _, slope, curvature, *_ = values(program, derivatives.variables, found)[:, 0]
+        _, slope, curvature, *_ = derivatives.extreme_rows(found, of_speed=of_speed)
         step = np.divide(slope, curvature, where=curvature != 0.0, out=np.zeros(1))
         if not abs(step[0]) <= MAX_STEP * width:
             return place, False

@@ -11,7 +11,6 @@ import numpy as np
 
 from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.gradients.orbit import OrbitDerivatives
-from gqm_sym.runtime.gradients.series import Series
 
 # The rows of launch place and speed among the variables (`programs.Source`).
 LAM0, V0 = -3, -2
@@ -79,17 +78,8 @@ class OrbitSensitivity:
 
     def __init__(self, derivatives: OrbitDerivatives) -> None:
         self._derivatives = derivatives
-        n, samples = derivatives.source.variables, derivatives.samples
-        rates, arcs = samples[: 1 + n], samples[2 * (1 + n) :]
-        if derivatives.direction:
-            arcs, laps = arcs[1 : 1 + n], arcs[1 + n :, :1]
-            self._scale, self._width, self._lap_gradient = 1.0, float(laps[0, 0]), laps[1:]
-        else:
-            low, high = derivatives.turning_points
-            rise = 0.5 * (high - low) * np.sin(2.0 * np.pi * (np.arange(samples.shape[1]) + 0.5) / samples.shape[1])
-            self._scale, self._width, self._lap_gradient = 2.0 * np.pi, high - low, np.zeros((n, 1))
-            arcs = self._by_all(rise * arcs)
-        self._rates, self._arcs = Series(rates), Series(arcs)
+        self._scale, self._width = 1.0 if derivatives.direction else 2.0 * np.pi, derivatives.width
+        self._rates, self._arcs, self._lap_gradient = derivatives.series
         self._launches: dict[float, _Along] = {}
 
     def _by_all(self, rows: Array) -> Array:
@@ -106,7 +96,7 @@ class OrbitSensitivity:
             widening = self._lap_gradient / self._width
         else:
             upper = np.sin(np.pi * share) ** 2
-            low, high = (end[:, None] for end in derivatives.ends.T)
+            low, high = (end[:, None] for end in derivatives.moved_ends.T)
             places, widening = low * (1.0 - upper) + high * upper, (high - low) / self._width
         ds, potential = path[2], path[5]
         stretch = (self._by_all(ds[1:-1]) + ds[-1] * places) / ds[0]
@@ -139,7 +129,7 @@ class OrbitSensitivity:
             own[V0] = given.direction  # at rest, the direction in which a speed would be
             passed: Array = direction * (own - launch.speeds) / acceleration
         else:
-            own[LAM0] = 1.0
+            own[:] = self._derivatives.launch_moves[:, None]
             passed = ds / v0 * (own - launch.places)
         passed += launch.times
         return passed
@@ -162,7 +152,8 @@ class OrbitSensitivity:
         along, launch = self._along(share, lam, v), self._at_launch(motion, points.trajectory.segments[0].phi_start)
         delay = self._delay(along, launch, motion, points)
         arcs = along.arcs - launch.arcs + v * delay
-        arcs[LAM0] -= launch.path[2][0]
+        launched = self._derivatives.launch_moves[:, None]
+        arcs -= launch.path[2][0] * launched
         if self._derivatives.direction:
             arcs += laps * self._arcs(np.ones(1))[1]
         else:
@@ -171,14 +162,18 @@ class OrbitSensitivity:
         speeds = along.speeds + along.acceleration * delay
         x, z, _, curvature, load, _ = (self._by_all(rows[1:-1]) + rows[-1] * places for rows in along.path)
         force = load + v**2 * curvature + 2.0 * v * along.path[3][0] * speeds
-        return [places + laps * self._lap_gradient, arcs, x, z, speeds, force]
+        if not self._derivatives.by_arc_length:
+            return [places + laps * self._lap_gradient, arcs, x, z, speeds, force]
+        arcs[LAM0] += 1.0  # from the start point of the curve
+        return [arcs, arcs, x, z, speeds, force]
 
     def _delay(self, along: _Along, launch: _Along, motion: Any, points: Any) -> Array:
         """How much further on, in time, the body is at the times of points."""
         gradient = self._derivatives.duration_gradient[:, None]
         if self._derivatives.direction:
             delay: Array = -along.times - points.laps * gradient
-            delay[LAM0] += motion.direction * launch.path[2][0] / motion.problem.launch.v0.value
+            moves = self._derivatives.launch_moves[:, None]
+            delay += motion.direction * launch.path[2][0] / motion.problem.launch.v0.value * moves
             return delay
         sense, swings = np.ones_like(points.laps), 2.0 * points.laps
         first, half_period = points.trajectory.segments[0], 0.5 * points.trajectory.period[0]

@@ -229,7 +229,7 @@ def _too_many_barriers(problem: Problem) -> SolutionError:
     """The error for a curve with too many places that doubles cannot decide."""
     return SolutionError(
         f"turning points from {problem.formulas.parameter} = {problem.lam0!r}: "
-        "too many places at which V**2 nearly vanishes"
+        "too many places at which V**2 nearly vanishes; launch a little higher, or with more speed"
     )
 
 
@@ -287,7 +287,7 @@ def _end_of_curve(problem: Problem, direction: int) -> EndOfMotion:
 
 def _decided_end(problem: Problem, end: End) -> EndOfMotion:
     """The turning point or the equilibrium that was found in extended precision."""
-    place = float(end.place)
+    place = min(max(float(end.place), problem.low), problem.high)
     if end.what == "equilibrium" and is_cusp(problem, place):
         return EndOfMotion("cusp", place, end.place, zero_v2=True)
     exact = problem.functions.exact

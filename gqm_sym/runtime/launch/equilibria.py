@@ -6,7 +6,7 @@ do not count: they vanish at rest, or hold a body near an equilibrium too.
 """
 
 from collections.abc import Iterator
-from ctypes import CFUNCTYPE, POINTER, c_double, c_ssize_t
+from ctypes import POINTER, c_double
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from math import inf, nan, sqrt
@@ -23,8 +23,6 @@ from gqm_sym.runtime.launch.formulas import Formulas, ParameterValues
 from gqm_sym.runtime.launch.problem import bind_all
 
 _MANY = POINTER(c_double)
-_POTENTIAL = CFUNCTYPE(None, c_ssize_t, _MANY, _MANY, _MANY)
-_BOUNDS = CFUNCTYPE(None, c_double, c_double, _MANY, _MANY)
 
 # Beyond this value of the curve parameter nothing is looked for on an open curve.
 MAX_PLACE = 2.0**40
@@ -86,8 +84,8 @@ class Potential:
     def __init__(self, formulas: Formulas, p: ParameterValues) -> None:
         self.bound = bind_all(formulas, p)
         potential, bounds = formulas.effective_potential, formulas.bounds
-        self._potential = _POTENTIAL((potential or formulas.functions.effective_potential).address)
-        self._bounds = _BOUNDS((bounds or formulas.functions.bounds).address)
+        self._potential = (potential or formulas.functions.effective_potential).call
+        self._bounds = (bounds or formulas.functions.bounds).call
         self._p = self.bound.p.ctypes.data_as(_MANY)
 
     def rows(self, places: Any) -> Array:

@@ -15,7 +15,7 @@ from gqm_sym.errors import ParameterError, renamed
 from gqm_sym.literals.namespaces import ARRAYS, FLOATS
 from gqm_sym.literals.numbers import Number, read_number
 from gqm_sym.runtime.charts.chart import Chart, ChartMaker
-from gqm_sym.runtime.compiled.jit import Later
+from gqm_sym.runtime.compiled.emitted import Emitted
 from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.interface import (
     BatchFunctions,
@@ -123,13 +123,13 @@ class Formulas:
         What makes the chart of a curve that has no formulas.
     dissipation : DissipativeFunctions or None
         What a dissipative model adds; None for a conservative one.
-    load_map : Later or None
+    load_map : Emitted or None
         The function that fills a load map in one pass; None if there is none.
     batch : BatchFunctions or None
         The functions that serve many orbits at once; None if motions are solved one by one.
     source, text : str
         The path of the module's file, and its text when it was imported: by them a motion is taken to another process.
-    effective_potential, bounds : Later or None
+    effective_potential, bounds : Emitted or None
         Of a dissipative module: functions that only its equilibria need; a conservative one has them in ``functions``.
     units : mapping of str to str
         SI units of the curve's parameter and of the run-time parameters, as far as they are known; "1" of plain numbers
@@ -154,14 +154,14 @@ class Formulas:
     exact: ExactFormulas | ExactLaw | ExactPotential | None = None
     chart: ChartMaker | None = None
     dissipation: DissipativeFunctions | None = None
-    load_map: Later | None = None
+    load_map: Emitted | None = None
     batch: BatchFunctions | None = None
     at_least: tuple[tuple[str, str], ...] = ()
     rolling_radius: str = ""
     static_friction_limit: tuple[str, str] | None = None
     source: str = ""
-    effective_potential: Later | None = None
-    bounds: Later | None = None
+    effective_potential: Emitted | None = None
+    bounds: Emitted | None = None
     inertia: Callable[..., Any] | None = None
     trigonometric: Callable[..., Any] | None = None
     separated: SeparatedTerms | None = None

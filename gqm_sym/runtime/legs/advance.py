@@ -201,8 +201,8 @@ def leaving(dissipation, p, joints, body, place, preferred):  # type: ignore[no-
 
 
 @Inner
-def near_start(dissipation, p, place, direction, step):  # type: ignore[no-untyped-def]
-    """A distance over which the force on a body released at a place is about the same, where ``step`` is too long.
+def near_start(dissipation, p, place, direction, v2, step):  # type: ignore[no-untyped-def]
+    """A distance over which the force on a body, or else V**2, is about the same, where ``step`` is too long.
 
     Next to an equilibrium a body turns, or moves on, by a distance that no other length of the curve tells of.
     """
@@ -212,7 +212,8 @@ def near_start(dissipation, p, place, direction, step):  # type: ignore[no-untyp
     slope = slope_of_v2(forces, place, LEAST_V2, contact_sign, point)
     for _ in range(MAX_HALVINGS):
         ahead = slope_of_v2(forces, place + v * step, LEAST_V2, contact_sign, point)
-        if 0.0 < ahead <= MAX_FORCE_GROWTH * slope or not slope > 0.0 or step <= CLEARANCE_SHARE * fabs(place):
+        grows_little = 0.0 < ahead <= MAX_FORCE_GROWTH * slope or (ahead * step <= v2 if v2 > 0.0 else not slope > 0.0)
+        if grows_little or step <= CLEARANCE_SHARE * fabs(place):
             break
         step *= 0.5
     return FIRST_STEPS * step
@@ -229,7 +230,7 @@ def launch(dissipation, p, joints, body):  # type: ignore[no-untyped-def]
     body[FROM_REST], body[DIRECTION] = 1.0 if body[V2] == 0.0 else 0.0, preferred
     if body[V2] == 0.0:
         body[DIRECTION] = leaving(dissipation, p, joints, body, lam0, preferred)
-        body[STEP] = min(body[STEP], near_start(dissipation, p, lam0, body[DIRECTION], step))
+    body[STEP] = min(body[STEP], near_start(dissipation, p, lam0, body[DIRECTION], body[V2], step))
 
 
 @Inner

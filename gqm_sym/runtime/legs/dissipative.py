@@ -8,13 +8,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from gqm_sym.errors import BudgetError, InputError, SolutionError
+from gqm_sym.errors import BudgetError, InputError, LaunchError, SolutionError
+from gqm_sym.literals.numbers import Number
 from gqm_sym.runtime.arithmetic.doubledouble import ULP, ZERO, Pair
 from gqm_sym.runtime.compiled.threads import run_in_threads
 from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.gradients.quantities import selected
 from gqm_sym.runtime.gradients.sensitivity import Sensitivity
-from gqm_sym.runtime.interface import Dissipation
+from gqm_sym.runtime.interface import Dissipation, ExactLaw
 from gqm_sym.runtime.inversion.leg_tables import places_along_legs, states_along_legs
 from gqm_sym.runtime.launch.ends import CUSP_SHARE, domain_end, leaving_at_once, starting_step
 from gqm_sym.runtime.launch.formulas import Formulas, ParameterValues
@@ -38,13 +39,15 @@ from gqm_sym.runtime.legs.body import (
     PERIOD,
     PLACE,
     PLACE_LOW,
+    REACH,
     STEP,
     TURNS,
     V2,
     VALUE,
     launched,
 )
-from gqm_sym.runtime.legs.frames.local_frame import SMALL_SHARE, Frame, frame_near, may_be_small
+from gqm_sym.runtime.legs.frames.local_frame import PLACE as PLACE_IN_FRAME
+from gqm_sym.runtime.legs.frames.local_frame import SMALL_SHARE, Frame, frame_near, may_be_small, refined
 from gqm_sym.runtime.legs.leg_errors import Errors, carry
 from gqm_sym.runtime.legs.leg_reading import place_at
 from gqm_sym.runtime.legs.leg_record import (
@@ -53,6 +56,7 @@ from gqm_sym.runtime.legs.leg_record import (
     CHANGE_COUNT,
     COLUMNS,
     END,
+    END_LOW,
     HEAD,
     HEADING,
     INHERITED,
@@ -102,6 +106,10 @@ LAST_DIGIT = ULP / 64.0
 # A body that creeps towards an equilibrium, and for which no panel is narrow enough any more, is no farther from it
 # than this share of its place and of the length of the leg.
 NEAR_EQUILIBRIUM = 1e-13
+
+# How near to an unstable equilibrium a body may be launched from rest, as a share of its place, where what resists the
+# body is no product of a factor and V**2: it is a difference of forces there that agree to a rounding.
+NEAREST_SHARE = 1e-20
 
 # The names of what ends a run, where the code alone says it.
 END_NAMES = {
@@ -183,22 +191,22 @@ class DissipativeMotion(Motion):
         self._segments: list[TimedSegment] = []
         self._laid: list[Run] = []
         self._tabulated: list[TabulatedPiece] = []
-        launch, domain, f = problem.launch, problem.domain, problem.functions
+        launch, domain = problem.launch, problem.domain
         super().__init__(problem, "dissipative", launch.direction)
-        drops = f.drops(ONLY_SIGN[launch.contact])
-        self._joints = Joints(f.breaks, f.corners, drops, np.empty(room_ahead(f.breaks.size)))
-        self._space = FEW_PANELS + f.breaks.size
+        self._joints = self._all_joints()
+        self._space = FEW_PANELS + problem.functions.breaks.size
         self._body = launched(
             *(1, launch.lam0.value, domain.low, domain.high, domain.period),
             *(launch.direction, ONLY_SIGN[launch.contact], self._horizon, nan, problem.w0),
         )
         self._at = self._body[0].tolist()
         self._frame: Frame | None = None
-        if may_be_small(_loss(problem), f.p, launch.lam0.value, problem.w0):
-            self._enter_frame(launch.lam0.value, launch.lam0.low, problem.w0)
+        if may_be_small(_loss(problem), problem.functions.p, launch.lam0.value, problem.w0):
+            self._enter_frame(launch.lam0.value, launch.lam0.low, problem.w0, launch.lam0)
         v0 = launch.v0
         # The errors with which the legs begin.
-        self._errors = [Errors(abs(launch.lam0.low), 2.0 * v0.value * abs(v0.low) + ULP * problem.w0, 0.0)]
+        of_place = abs(launch.lam0.low) if self._frame is None else ULP * abs(self._body[0, PLACE])
+        self._errors = [Errors(of_place, 2.0 * v0.value * abs(v0.low) + ULP * problem.w0, 0.0)]
         self._go_on()
         self.direction = int(self._runs[0].record[HEADING]) if self._runs else 0
 
@@ -467,7 +475,7 @@ class DissipativeMotion(Motion):
         frame.move(run.record, -1)
         after = Errors(*carry(frame.dissipation, frame.p, turns, before, run.record))
         frame.move(run.record, 1)
-        return after
+        return after._replace(place=after.place + frame.error) if run.what == LIMIT else after
 
     def _end_text(self) -> str:
         if not self._ending or self._elapsed > self._horizon:
@@ -531,13 +539,15 @@ class DissipativeMotion(Motion):
             frame.move(record, 1)
             self._at[PLACE] = float(record[END])
         head = record[:HEAD].tolist()
+        heading, leaves_frame = int(head[HEADING]), frame is not None and what == LIMIT
+        if leaves_frame:
+            self._leave_frame(record)
         self._settle(what, head[START], head[END])
-        heading = int(head[HEADING])
         if what == LEAVES:
             raise leaving_at_once(problem, heading, "end of the domain")
         if what == SPENT:
             raise self._lost(record)
-        name = self._end_name(what, record, heading)
+        name = "" if leaves_frame else self._end_name(what, record, heading)
         self._runs.append(Run(record, what, name, frame))
         if self._at[ENDING]:
             self._ending = name
@@ -593,22 +603,59 @@ class DissipativeMotion(Motion):
         self._last_swing = swing
         return True
 
-    def _enter_frame(self, place: float, low: float, v2: float) -> None:
-        """Follow the body from here on by its distance from an equilibrium, if it swings closely about one."""
+    def _enter_frame(self, place: float, low: float, v2: float, lam0: Number | None = None) -> None:
+        """Follow the body from here on by its distance from an equilibrium, if it is, and for a while stays, close.
+
+        About an unstable equilibrium it does not stay, so that only its launch, ``lam0``, is worth that.
+        """
         problem, line, loss = self.problem, self._body[0], _loss(self.problem)
         if loss.friction or loss.kinked:
             return
         ends = [abs(end - place) for end in (problem.low, problem.high, *problem.functions.breaks) if isfinite(end)]
         reach = min([starting_step(problem), *ends])
         frame = frame_near(loss, problem.functions.p, (place, low, v2), reach)
-        if frame is None:
+        if frame is None or not (frame.is_stable or lam0):
             return
-        self._frame, self._joints = frame, Joints(NOWHERE, NOWHERE, NOWHERE, NOWHERE)
         line[PLACE], line[PLACE_LOW] = frame.distance(place, low)
-        if v2 == 0.0 and abs(line[PLACE]) < LAST_DIGIT * abs(place):
+        unknown, exact = (LAST_DIGIT * abs(place) if frame.is_stable else frame.error), problem.formulas.exact
+        if not frame.is_stable and lam0 and isinstance(exact, ExactLaw):
+            known = refined(frame, exact, problem.p, lam0)
+            if known is not None:
+                (frame, line[PLACE]), line[PLACE_LOW], unknown = known, 0.0, 0.0
+        if v2 == 0.0 and abs(line[PLACE]) < unknown:
             line[PLACE] = 0.0  # there it stays
+        self._check_distance(frame.size(line[PLACE], v2), frame)
+        reach = reach if frame.is_stable else min(reach, frame.reach)
+        self._frame, self._joints = frame, Joints(NOWHERE, NOWHERE, NOWHERE, NOWHERE)
         line[LAM0], line[LOW], line[HIGH], line[PERIOD] = line[PLACE], -reach, reach, 0.0
         line[FIRST_STEP] = reach
+
+    def _check_distance(self, size: float, frame: Frame) -> None:
+        """Refuse a launch so near to an unstable equilibrium that doubles do not hold what makes the body depart."""
+        place = float(frame.p[PLACE_IN_FRAME])
+        nearest = LEAST_SWING if _loss(self.problem).linear else NEAREST_SHARE * abs(place)
+        if not frame.is_stable and 0.0 < size < nearest:
+            raise LaunchError(
+                f"lam0: a motion from so near to the unstable equilibrium at {self.problem.formulas.parameter} = "
+                f"{place!r} cannot be computed; launch at least {nearest:.1g} from it, faster, or, by exact text, at "
+                "the equilibrium itself"
+            )
+
+    def _all_joints(self) -> Joints:
+        """Where the curve is not smooth."""
+        f = self.problem.functions
+        drops = f.drops(ONLY_SIGN[self.problem.launch.contact])
+        return Joints(f.breaks, f.corners, drops, np.empty(room_ahead(f.breaks.size)))
+
+    def _leave_frame(self, record: Array) -> None:
+        """Follow the body by its place again; the record has places."""
+        problem, line = self.problem, self._body[0]
+        self._frame, self._joints = None, self._all_joints()
+        domain, step = problem.domain, starting_step(problem)
+        line[PLACE], line[PLACE_LOW], line[ENDING] = record[END], record[END_LOW], 0.0
+        line[LAM0], line[LOW], line[HIGH], line[PERIOD] = problem.lam0, domain.low, domain.high, domain.period
+        line[FIRST_STEP], line[REACH] = step, domain.period or step
+        self._at = line.tolist()
 
     def _end_name(self, what: int, record: Array, heading: int) -> str:
         """The name of what ended a run."""

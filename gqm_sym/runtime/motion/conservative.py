@@ -44,6 +44,9 @@ FORCE_SHARE = 1e-4
 # V**2 may be at a corner on which the body comes to rest.
 RIDGE_ROUNDINGS = 16.0
 
+# How far beyond the double nearest to a launch place V**2 is looked at, in units of its last place.
+HILLTOP_ROUNDINGS = 64.0
+
 
 def solve(formulas: Formulas, p: ParameterValues, launch: Launch) -> Motion:
     """The motion that a launch begins, as long as contact lasts.
@@ -108,7 +111,8 @@ def _as_bilateral(formulas: Formulas, p: ParameterValues, launch: Launch) -> Mot
             return MotionAtRest(problem)
         direction = -sign
         length = problem.period or distance_to_end(problem, direction)
-        ahead = first_zero_from(f.addresses, f.p, lam0, 0.0, direction, 0.0, length, starting_step(problem))
+        begin = _beyond_hilltop(problem, direction)
+        ahead = first_zero_from(f.addresses, f.p, lam0, 0.0, direction, begin, length, starting_step(problem))
     known_duration = time if time == time else None
     if known_duration is not None and ahead[0] == zeros.TURN:  # doubles have found all of a libration
         near, far = min(ahead[1], behind[1]), max(ahead[1], behind[1])
@@ -176,6 +180,17 @@ def _speeds_beside(problem: Problem) -> Array:
     offsets = NEAR_CUSP * starting_step(problem) * np.array([-1.0, 1.0])
     v2: Array = speed_squared_at(f.addresses, f.p, lam0, problem.launch.lam0.low, 0.0, lam0 + offsets, offsets)
     return v2
+
+
+def _beyond_hilltop(problem: Problem, direction: int) -> float:
+    """How far from the launch a search begins: past a hilltop that lies between it and the double nearest to it."""
+    f, lam0 = problem.functions, problem.lam0
+    if not problem.launch.lam0.low:
+        return 0.0
+    beyond = HILLTOP_ROUNDINGS * ulp(lam0)
+    offset = np.array([direction * beyond])
+    v2 = speed_squared_at(f.addresses, f.p, lam0, 0.0, 0.0, lam0 + offset, offset)
+    return beyond if v2[0] > 0.0 else 0.0
 
 
 def _check_place(problem: Problem) -> None:

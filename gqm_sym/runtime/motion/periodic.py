@@ -12,7 +12,9 @@ from gqm_sym.literals.numbers import read_number
 from gqm_sym.runtime.arithmetic.doubledouble import ULP, ZERO
 from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.double_double.orbit_time import Orbit
-from gqm_sym.runtime.gradients.orbit import OrbitDerivatives, asked_for
+from gqm_sym.runtime.gradients.charts import ChartOrbitDerivatives
+from gqm_sym.runtime.gradients.multiprecision import UNDECIDED
+from gqm_sym.runtime.gradients.orbit import FormulaOrbitDerivatives, OrbitDerivatives, asked_for, without_formulas
 from gqm_sym.runtime.gradients.quantities import gradient, selected
 from gqm_sym.runtime.gradients.sensitivity import OrbitSensitivity, Sensitivity
 from gqm_sym.runtime.gradients.spectrum import Fourier, fourier
@@ -36,6 +38,9 @@ MAX_TURN_ROUNDING = 1e-14
 # The largest relative change of a period by the rounding of a chart. It is largest at flat minima of the potential and
 # on splines (14 roundings were measured).
 CHART_ROUNDING = 16 * ULP
+
+# The least distance between two edges of a chart, as a share of the phase; at a smaller one they are the same edge.
+MIN_PANEL = 1e-13
 
 # The most events that `events_between` lists.
 MAX_EVENTS = 1_000_000
@@ -198,7 +203,25 @@ class PeriodicMotion(Motion):
     def _derivatives(self) -> OrbitDerivatives:
         """The orbit with its derivatives."""
         direction = self.direction if self.kind == "circulation" else 0
-        return OrbitDerivatives(self.problem, self._orbit, direction, self._offsets, self._segment.edges)
+        if self.problem.formulas.chart is not None:
+            return self._derivatives_along_chart(direction)
+        return FormulaOrbitDerivatives(self.problem, self._orbit, direction, self._offsets, self._segment.edges)
+
+    def _derivatives_along_chart(self, direction: int) -> ChartOrbitDerivatives:
+        segment, f = self._segment, self.problem.functions
+        if self.problem.true_pieces is None or self.problem.tape is None:
+            raise without_formulas()
+        passage = timing.passage_of(self.problem, self.kind, self.direction, self._offsets)
+        if passage is None:
+            raise SolutionError(UNDECIDED)
+        # Where pieces of the chart meet; the seam of a closed one is its first edge and its last.
+        ends = segment.a, segment.b
+        places = f.between(self.problem.formulas.charted(self.problem.p).edges, *ends)
+        last, edges = 1.0, np.sort((places - ends[0]) / (ends[1] - ends[0]))
+        if not direction:
+            last, edges = np.pi, 2.0 * np.arctan2(np.sqrt(places - ends[0]), np.sqrt(ends[1] - places))
+        edges = edges[np.diff(edges, prepend=0.0) > MIN_PANEL * last]
+        return ChartOrbitDerivatives(self.problem, passage, direction, np.concatenate([[0.0], edges, [last]]))
 
     @cached_property
     def _orbit_sensitivity(self) -> OrbitSensitivity:

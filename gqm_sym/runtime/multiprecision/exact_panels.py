@@ -84,11 +84,14 @@ class _Rates:
     def _by_mpmath(self, middle: Any, reach: Any) -> Array:
         rate, values = self.scale.time_rate(self.kind, *self.ends), np.empty((2, COUNT))
         for i, x in enumerate(ALL_NODES.tolist()):
-            duration, w = rate(middle + reach * x)
+            try:
+                duration, w = rate(middle + reach * x)
+            except ZeroDivisionError:  # V**2 is zero in so many digits
+                duration = w = self.scale.mpf(0)
             if duration.imag or w.imag or not (duration > 0 and w > 0):
                 raise SolutionError(
-                    f"time of flight from {float(self.ends[0])!r} to {float(self.ends[1])!r}: "
-                    "V**2 is not positive inside this segment"
+                    f"time of flight from {float(self.ends[0])!r} to {float(self.ends[1])!r}: V**2 is not positive "
+                    f"inside this segment, as far as {DIGITS} digits tell; launch a little farther from the equilibrium"
                 )
             values[:, i] = float(duration), float(duration * self.scale.sqrt(w))
         return values

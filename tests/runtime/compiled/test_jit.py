@@ -9,15 +9,12 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
-from paths import ROOT
 
-from gqm_sym.loading import load
 from gqm_sym.runtime import vocabulary
 from gqm_sym.runtime.arithmetic.doubledouble import two_sum
 from gqm_sym.runtime.compiled import jit
 from gqm_sym.runtime.compiled.numba_internals import KeyedFiles
 from gqm_sym.runtime.compiled.stamps import CALLED_BY_MODULES, Stamps
-from gqm_sym.runtime.interface import INTERFACE
 from gqm_sym.runtime.vocabulary import HOMES
 
 
@@ -127,94 +124,3 @@ def test_what_is_kept_is_found_again_by_its_key_alone(tmp_path: Path) -> None:
     kept.rename(tmp_path / files.file_name(("key", 2)))
     assert files.load(("key", 2)) is None
     assert KeyedFiles(str(tmp_path), "name", "another").load(("key", 1)) is None
-
-
-MODULE = f"""from numba import carray
-
-from gqm_sym.runtime import compiler
-from gqm_sym.runtime.vocabulary import EFFECTIVE_POTENTIAL, sin
-
-compiled = compiler(__file__, interface={INTERFACE})
-
-FACTOR = 2.0
-
-
-def plain(x):
-    return 3.0*x
-
-
-@compiled(EFFECTIVE_POTENTIAL)
-def effective_potential(n, places, p, out):
-    places, out = carray(places, n), carray(out, (2, n))
-    for i in range(n):
-        out[0, i] = sin(places[i])
-
-        out[1, i] = TERM
-
-
-LAST = 1
-"""
-
-
-def _compilations(text: str, file: Path, cache: Path) -> int:
-    """How often the function of a module is compiled, and written to the cache, when the module is imported."""
-    file.parent.mkdir(exist_ok=True)
-    file.write_text(text, encoding="utf-8")
-    before = len(list(cache.rglob("effective_potential.*.nbc")))
-    assert load(file, file.stem).effective_potential.address
-    return len(list(cache.rglob("effective_potential.*.nbc"))) - before
-
-
-@pytest.mark.parametrize("keep", [True, False])
-def test_equal_functions_of_modules_are_compiled_once(
-    keep: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Whatever else stands in the module, and in whichever folder it lies; also when none of them is in use."""
-    cache = tmp_path / "cache"
-    monkeypatch.setattr("numba.config.CACHE_DIR", str(cache))
-    text = MODULE.replace("TERM", "41.0" if keep else "42.0")
-    assert _compilations(text, tmp_path / "a" / "one.py", cache) == 1
-    others = [f'"""A title."""\n{text}', text.replace("LAST = 1", "LAST = 2"), text.replace("FACTOR = 2.0", "")]
-    for k, other in enumerate(others):
-        if not keep:
-            monkeypatch.setattr(jit, "_IN_USE", {})
-        assert other != text
-        assert _compilations(other, tmp_path / "b" / f"module_{k}.py", cache) == 0
-    assert _compilations(text.replace("sin(", "2.0*sin("), tmp_path / "b" / "changed.py", cache) == 1
-
-
-@pytest.mark.parametrize(
-    ("term", "before", "after"), [("FACTOR", "FACTOR = 2.0", "FACTOR = 4.0"), ("plain(1.0)", "3.0*x", "5.0*x")]
-)
-def test_what_a_function_uses_of_its_module_is_noticed(
-    term: str, before: str, after: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """A module that was written by hand may have constants of its own, which are compiled into its functions."""
-    cache = tmp_path / "cache"
-    monkeypatch.setattr("numba.config.CACHE_DIR", str(cache))
-    text = MODULE.replace("TERM", term).replace("def plain", "from numba import njit\n\n\n@njit\ndef plain")
-    assert _compilations(text, tmp_path / "one.py", cache) == 1
-    assert _compilations(text, tmp_path / "one.py", cache) == 0
-    assert _compilations(text.replace(before, after), tmp_path / "one.py", cache) == 1
-
-
-class _Callback:
-    address = 5
-
-
-def test_importing_a_module_compiles_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A function is compiled when its address is first needed, and not again."""
-    compiled = []
-
-    def callback(function: Any, _: Any) -> Any:
-        compiled.append(function.__name__)
-        return _Callback()
-
-    text = (ROOT / "generated" / "pendulum.py").read_text(encoding="utf-8")
-    file = tmp_path / "pendulum_of_this_test.py"
-    file.write_text(text.replace('"""Bounds of', '"""Other bounds of'), encoding="utf-8")
-    monkeypatch.setattr(jit, "COMPILER", SimpleNamespace(callback=callback))
-    functions = load(file, file.stem).MODEL.functions
-    assert compiled == []
-    assert [functions.bounds.address, functions.bounds.address] == [5, 5]
-    assert compiled == ["bounds"]

@@ -39,6 +39,7 @@ for module, name, value in gone:
 sys.path.insert(0, folder)
 import functions
 print(functions.total(2.0, functions.np.arange(5.0)).hex(), functions.unchecked(3.0).hex())
+functions.square.compile()
 print(functions.run(functions.square.address, 1.7).hex())
 """
 
@@ -46,11 +47,11 @@ FUNCTIONS = """
 import numpy as np
 from numba import carray, types
 from gqm_sym.runtime.arithmetic.doubledouble import two_sum
-from gqm_sym.runtime.compiled import jit
+from gqm_sym.runtime.compiled import emitted, jit
 from gqm_sym.runtime.compiled.calls import call_static_balance
 from gqm_sym.runtime.interface import INTERFACE
 
-compiled = jit.compiler(__file__, interface=INTERFACE)
+compiled = emitted.compiler(__file__, interface=INTERFACE)
 POINTER = types.CPointer(types.float64)
 
 
@@ -145,7 +146,7 @@ print({type(each.library).__name__ for each in functions.helper.dispatcher.overl
 
 REPEATED = """
 from numba import types
-from gqm_sym.runtime.compiled import jit
+from gqm_sym.runtime.compiled import emitted, jit
 
 
 @jit.Inner
@@ -180,7 +181,7 @@ CALLED_BY_USERS = """
 import numba
 import numpy as np
 from numba import types
-from gqm_sym.runtime.compiled import jit
+from gqm_sym.runtime.compiled import emitted, jit
 
 
 @jit.Inner

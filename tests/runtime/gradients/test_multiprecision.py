@@ -9,7 +9,7 @@ from paths import ROOT
 
 from gqm_sym.errors import SolutionError
 from gqm_sym.loading import load
-from gqm_sym.runtime.gradients.orbit import OrbitDerivatives, values
+from gqm_sym.runtime.gradients.orbit import FormulaOrbitDerivatives, values
 
 ULP = 2.0**-52
 
@@ -47,7 +47,7 @@ def test_the_same_as_in_double_double(name: str, v0: float) -> None:
     direction = motion.direction if motion.kind == "circulation" else 0
     fast, slow = (
         motion._derivatives,
-        OrbitDerivatives(motion.problem, None, direction, motion._offsets, motion._segment.edges),
+        FormulaOrbitDerivatives(motion.problem, None, direction, motion._offsets, motion._segment.edges),
     )
     assert fast._means[2]
     assert not slow._means[2]

@@ -1,11 +1,15 @@
-"""Small swings about an equilibrium e that is not at 0: places as distances from e, and the force on them.
+"""Small motions about an equilibrium e that is not at 0: places as distances from e, and the force on them.
 
 Doubles know a place next to e to a rounding of e, and the force there to a rounding of the terms that cancel at e. So
 the force on a body at rest, P(lam), is fitted by a polynomial ``C(d)`` with ``C(0) = 0``, where d is the distance from
 e. Functions of the interface then serve the legs with distances for places: P becomes
 ``C(d) + (P(e + d, W) - P(e + d, 0))``, and all else, which does not vanish at e, is evaluated at e + d.
+
+Swings about a stable equilibrium stay so near to it. From an unstable one a launched body departs, the later the nearer
+it was, and leaves the frame: there the distance at launch is taken in extended precision (`refined`).
 """
 
+from collections.abc import Sequence
 from functools import cache
 from typing import Any, NamedTuple
 
@@ -13,19 +17,22 @@ import numpy as np
 from numba import carray
 from numpy.polynomial import chebyshev
 
+from gqm_sym.literals.numbers import Number
 from gqm_sym.runtime.arithmetic.doubledouble import ULP, add
 from gqm_sym.runtime.compiled.calls import call_speed_equation
-from gqm_sym.runtime.compiled.jit import compiler, entry
+from gqm_sym.runtime.compiled.emitted import compiler
+from gqm_sym.runtime.compiled.jit import entry
 from gqm_sym.runtime.compiled.registers import on_stack
 from gqm_sym.runtime.compiled.types import MATRIX, VECTOR, Array
-from gqm_sym.runtime.interface import INTERFACE, SPEED_EQUATION, STATIC_BALANCE, Dissipation
+from gqm_sym.runtime.interface import INTERFACE, SPEED_EQUATION, STATIC_BALANCE, Dissipation, ExactLaw
 from gqm_sym.runtime.legs.advance import DISSIPATION
 from gqm_sym.runtime.legs.leg_equation import Forces
 from gqm_sym.runtime.legs.leg_record import CHANGE_COUNT, END, MIDDLE, START, change_at
 from gqm_sym.runtime.legs.leg_run import LEAST_V2, point_buffer, slope_of_v2
 from gqm_sym.runtime.legs.polynomials import WIDE
+from gqm_sym.runtime.multiprecision.exact_problem import GUARD_DIGITS, PRECISIONS
 
-# A swing is small if it is below these shares of the distance of e from 0, and of the range of the polynomial. Wider
+# A motion is small if it is below these shares of the distance of e from 0, and of the range of the polynomial. Wider
 # than a quarter of that distance, it loses two bits at most where its places are rounded as doubles. On the middle
 # quarter of a range the slope of a polynomial has hardly more than DEGREE times its noise, not DEGREE**2 times as at
 # the ends; and the width, which is estimated by the steepness at e, quadruples only where the force is a sixteenth.
@@ -35,6 +42,9 @@ SMALL_SHARE, RANGE_SHARE = 0.25, 0.25
 # range that is narrow enough, how often it is halved, and how often the fit is moved to where the force vanishes.
 NODES, DEGREE, RESOLVED, MAX_HALVINGS, MAX_MOVES = 64, 20, 1e-14, 12, 4
 SHARES = np.cos(np.pi * (np.arange(NODES) + 0.5) / NODES)
+
+# Steps of the secant method to an equilibrium that doubles know, and how far apart its first two places are.
+MAX_SECANTS, SECANT_SHARE = 40, 2.0**-30
 
 # The force without speed may differ between the two directions by this share: there is no friction.
 FRICTIONLESS_SHARE = 1e-12
@@ -63,6 +73,20 @@ class Frame(NamedTuple):
     dissipation: Dissipation
     p: Array
     error: float
+
+    @property
+    def is_stable(self) -> bool:
+        """Whether bodies swing about the equilibrium, and do not depart from it."""
+        return bool(self.p[TERMS] < 0.0)
+
+    def size(self, distance: float, v2: float) -> float:
+        """How far a motion is from the equilibrium, by a distance from it and V**2 there."""
+        return float(np.sqrt(distance**2 + 2.0 * v2 / abs(self.p[TERMS])))
+
+    @property
+    def reach(self) -> float:
+        """How far from the equilibrium the force is known well."""
+        return RANGE_SHARE * float(self.p[RANGE])
 
     def distance(self, place: float, low: float) -> tuple[float, float]:
         """A place, given as two doubles, as a distance from the equilibrium."""
@@ -126,16 +150,16 @@ def _functions() -> tuple[Any, Any]:
 
 
 def may_be_small(dissipation: Dissipation, p: Array, place: float, v2: float) -> bool:
-    """Whether a swing from a place may be small: the force that drives it changes its sign close by."""
+    """Whether a motion from a place may be small: the force on a body at rest changes its sign close by."""
     if dissipation.friction or dissipation.kinked or place == 0.0:
         return False
     reach = SMALL_SHARE * abs(place)
     behind, ahead = force_at_rest(dissipation, p, np.array([place - reach, place + reach]))[0].tolist()
-    return bool(ahead < 0.0 < behind and v2 < reach * (behind - ahead))
+    return bool(ahead * behind < 0.0 and v2 < reach * abs(behind - ahead))
 
 
 def frame_near(dissipation: Dissipation, p: Array, start: tuple[float, float, float], reach: float) -> Frame | None:
-    """The frame of the equilibrium about which a body swings; None if there is none, or the swing is not small.
+    """The frame of the equilibrium next to a body; None if there is none, or the motion about it is not small.
 
     Parameters
     ----------
@@ -165,14 +189,58 @@ def frame_near(dissipation: Dissipation, p: Array, start: tuple[float, float, fl
     terms, noise = fitted
     low, steepness = moved * size, -float(terms[0])
     away = (start[0] - middle) + (start[1] - low)
-    if not steepness > 0.0 or away**2 + 2.0 * start[2] / steepness > (
+    if not steepness or away**2 + 2.0 * start[2] / abs(steepness) > (
         min(SMALL_SHARE * abs(middle), RANGE_SHARE * size) ** 2
     ):
         return None
     speed_equation, static_balance = _functions()
     functions = Dissipation(speed_equation.address, static_balance.address, False, False, dissipation.linear)
     head = [float(dissipation.speed_equation), middle, low, size, *terms]
-    return Frame(functions, np.array([*head, *p]), noise / steepness + ULP * abs(middle))
+    return Frame(functions, np.array([*head, *p]), noise / abs(steepness) + ULP * abs(middle))
+
+
+def refined(frame: Frame, law: ExactLaw, parameters: Sequence[Number], lam0: Number) -> tuple[Frame, float] | None:
+    """The frame with its equilibrium from extended precision, and the distance of a launch place from that.
+
+    Parameters
+    ----------
+    frame : Frame
+        The frame as doubles know it.
+    law : ExactLaw
+        The formulas of the forces, none of which is friction.
+    parameters : sequence of Number
+        Run-time parameters.
+    lam0 : Number
+        The launch place.
+
+    Returns
+    -------
+    (Frame, float) or None
+        The distance is 0 if the launch is at the equilibrium; None if the secant method does not come to it.
+    """
+    from mpmath.ctx_mp import MPContext
+
+    context, near, distance = MPContext(), float(frame.p[PLACE]), 0.0
+    e: Any = near
+    for digits in PRECISIONS:
+        context.dps = digits
+        values, place, zero = tuple(number.at(context) for number in parameters), lam0.at(context), context.mpf(0)
+        tolerance = context.mpf(10) ** (GUARD_DIGITS - digits) * abs(place)
+        before, e = context.mpf(near), context.mpf(near) * (1 + SECANT_SHARE)
+        force_before = law.speed_slope(context, before, zero, 1, 0, values)
+        for _ in range(MAX_SECANTS):
+            force = law.speed_slope(context, e, zero, 1, 0, values)
+            if abs(e - before) <= tolerance or force == force_before:
+                break
+            before, e, force_before = e, e - force * (e - before) / (force - force_before), force
+        if not (abs(e - before) <= tolerance and abs(e - near) <= SMALL_SHARE * abs(near)):
+            return None
+        if abs(place - e) > tolerance:
+            distance = float(place - e)
+            break
+    p = frame.p.copy()
+    p[PLACE], p[PLACE_LOW] = float(e), float(e - float(e))
+    return frame._replace(p=p, error=0.0), distance
 
 
 def _fit(dissipation: Dissipation, p: Array, middle: float, size: float) -> tuple[float, tuple[Array, float] | None]:

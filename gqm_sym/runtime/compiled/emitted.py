@@ -1,0 +1,183 @@
+"""Functions of generated modules: Python runs them at first, and they are compiled when that is worth its time."""
+
+import builtins
+import ctypes
+import hashlib
+import math
+import sys
+import threading
+import time
+from collections.abc import Callable
+from functools import cache
+from itertools import takewhile
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+from weakref import WeakValueDictionary
+
+from numba import types
+
+from gqm_sym.errors import OutdatedModuleError
+from gqm_sym.runtime.compiled import jit
+from gqm_sym.runtime.compiled.numba_internals import GENERATED
+from gqm_sym.runtime.compiled.uncompiled import plain
+from gqm_sym.runtime.interface import INTERFACE
+
+# The processor time in seconds that Python may spend on a function of a generated module before it is compiled. To
+# compile it takes some four times as long.
+MAX_PYTHON_TIME = 0.05
+
+
+@cache
+def _c_function(signature: Any) -> Any:
+    """The type of C's functions with numba's signature."""
+    kinds: dict[Any, Any] = {types.float64: ctypes.c_double, types.intp: ctypes.c_ssize_t}
+    return ctypes.CFUNCTYPE(None, *(kinds.get(kind, ctypes.c_void_p) for kind in signature.args))
+
+
+class Emitted:
+    """A function of a generated module, which compiled code calls by the address that stands at its ``address``.
+
+    Python runs it at first, unless its compiled code is in the cache; it is compiled when that has taken some time. The
+    results are the same to the last bit (`uncompiled`).
+
+    Parameters
+    ----------
+    function : callable
+        The function.
+    signature
+        numba's signature: it returns nothing, and takes numbers and pointers to numbers.
+    text : str
+        The text of the function.
+    alias : str
+        The name under which numba sees its module.
+    """
+
+    def __init__(self, function: Any, signature: Any, text: str, alias: str) -> None:
+        self.function, self.signature, self.text, self._alias = function, signature, text, alias
+        self._slot = ctypes.c_void_p()
+        self._compiled: Any = None
+        self._plain: Any = None
+        self._called_from_c: Any = None
+        self._seconds = 0.0
+
+    @property
+    def address(self) -> int:
+        """Where the address of the code stands, of which there is some from now on."""
+        if not self._slot.value:
+            self._begin()
+        return ctypes.addressof(self._slot)
+
+    @property
+    def call(self) -> Callable[..., None]:
+        """The function for callers in Python, who pass pointers of `ctypes`."""
+        if not self._slot.value:
+            self._begin()
+        function: Callable[..., None] = _c_function(self.signature)(self._slot.value)
+        return function
+
+    def compile(self) -> None:
+        """Compile the function, if it is not compiled yet; callers take the compiled one from now on."""
+        if self._compiled is None:
+            try:
+                self._compiled = jit.COMPILER.callback(self._as_numba_sees_it(), self.signature)
+            finally:
+                jit.ANNOUNCER.end()
+            self._slot.value = self._compiled.address
+
+    def _as_numba_sees_it(self) -> Any:
+        sys.modules.setdefault(self._alias, ModuleType(self._alias))
+        self.function.__module__ = self._alias
+        return self.function
+
+    def _begin(self) -> None:
+        """Find code for the function: that of the cache, or Python's."""
+        if not jit.COMPILER.has_cached_callback(self._as_numba_sees_it(), self.signature):
+            self._plain = plain(self.function, self.text)
+        if self._plain is None:
+            self.compile()
+            return
+        self._called_from_c = _c_function(self.signature)(self._run)
+        self._slot.value = ctypes.cast(self._called_from_c, ctypes.c_void_p).value
+
+    def _run(self, *arguments: Any) -> None:
+        """Run the function in Python, or what is compiled in its place by now."""
+        try:
+            if self._compiled is None:
+                started = time.thread_time()
+                try:
+                    self._plain(*arguments)
+                except (ArithmeticError, ValueError):  # where compiled code goes on
+                    self._seconds = math.inf
+                self._seconds += time.thread_time() - started
+                if self._seconds < MAX_PYTHON_TIME:
+                    return
+                self.compile()
+                if self._seconds < math.inf:
+                    return
+            _c_function(self.signature)(self._slot.value)(*arguments)
+        except BaseException as error:
+            jit.RAISED[threading.get_ident()] = error
+
+
+# The functions of generated modules that are in use, by their text: modules with the same function share it.
+_IN_USE: WeakValueDictionary[str, Emitted] = WeakValueDictionary()
+
+# Where a function of a generated module finds what other functions of the runtime's stamp are made of.
+_KNOWN = ("gqm_sym.runtime.", "numba.", "math.", "builtins.")
+
+
+def _is_known(function: Any, name: str) -> bool:
+    """Whether a function uses a name for what the stamp of its code knows, or what never changes."""
+    found = vars(builtins).get(name, function.__globals__.get(name))
+    home = getattr(getattr(found, "py_func", found), "__module__", None)
+    return isinstance(home, str) and f"{home}.".startswith(_KNOWN)
+
+
+def _text(function: Any, lines: list[str]) -> list[str]:
+    """The lines of a function with its decorators; all lines if the function uses anything else of the module."""
+    if not all(_is_known(function, name) for name in function.__code__.co_names):
+        return lines
+    begin = function.__code__.co_firstlineno - 1
+    head = list(takewhile(lambda line: line.startswith(("@", "def ")), lines[begin:]))
+    body = takewhile(lambda line: not line or line[0] in " )", lines[begin + len(head) :])
+    return [*head, *body]
+
+
+def compiler(file: str, *, interface: int) -> Callable[[Any], Callable[[Any], Emitted]]:
+    """Return a decorator factory for the functions of one generated module: ``compiled(signature)``.
+
+    Each function becomes an `Emitted`: Python runs it until it is worth compiling.
+
+    numba's disk cache stores the name of a function's module, imports it on loading, and distinguishes machine code by
+    it. A generated module may be imported under any name, from any folder: so numba sees each function under a name
+    that is made from the function's own text. What else changes in the module compiles nothing anew.
+
+    Parameters
+    ----------
+    file : str
+        Path of the generated module.
+    interface : int
+        Version of the runtime's interface that it was generated for.
+
+    Raises
+    ------
+    OutdatedModuleError
+        If that is not the version of this runtime.
+    """
+    if interface != INTERFACE:
+        raise OutdatedModuleError(
+            f"{file}: made for interface {interface} of the runtime, which is now at {INTERFACE}; "
+            "run gqm-gen on its declaration again"
+        )
+    lines = Path(file).read_text(encoding="utf-8").splitlines()
+
+    def compiled(signature: Any) -> Callable[[Any], Emitted]:
+        def decorate(function: Any) -> Emitted:
+            text = "\n".join(_text(function, lines))
+            alias = GENERATED + hashlib.sha256(f"{function.__name__}\n{text}".encode()).hexdigest()[:16]
+            return _IN_USE.setdefault(alias, Emitted(function, signature, text, alias))
+
+        return decorate
+
+    return compiled

@@ -1,0 +1,193 @@
+"""Functions of generated modules are run by Python at first, compiled once, and found again by their text."""
+
+import math
+from collections.abc import Callable
+from ctypes import CFUNCTYPE, c_double, c_ssize_t, c_void_p, cast
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+from numba import types
+from paths import ROOT
+
+from gqm_sym.loading import load
+from gqm_sym.runtime.compiled import emitted, jit
+from gqm_sym.runtime.interface import INTERFACE
+
+MODULE = f"""from numba import carray
+
+from gqm_sym.runtime import compiler
+from gqm_sym.runtime.vocabulary import EFFECTIVE_POTENTIAL, sin
+
+compiled = compiler(__file__, interface={INTERFACE})
+
+FACTOR = 2.0
+
+
+def plain(x):
+    return 3.0*x
+
+
+@compiled(EFFECTIVE_POTENTIAL)
+def effective_potential(n, places, p, out):
+    places, out = carray(places, n), carray(out, (2, n))
+    for i in range(n):
+        out[0, i] = sin(places[i])
+
+        out[1, i] = TERM
+
+
+LAST = 1
+"""
+
+
+def _compilations(text: str, file: Path, cache: Path) -> int:
+    """How often the function of a module is compiled, and written to the cache, when the module is imported."""
+    file.parent.mkdir(exist_ok=True)
+    file.write_text(text, encoding="utf-8")
+    before = len(list(cache.rglob("effective_potential.*.nbc")))
+    load(file, file.stem).effective_potential.compile()
+    return len(list(cache.rglob("effective_potential.*.nbc"))) - before
+
+
+@pytest.mark.parametrize("keep", [True, False])
+def test_equal_functions_of_modules_are_compiled_once(
+    keep: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Whatever else stands in the module, and in whichever folder it lies; also when none of them is in use."""
+    cache = tmp_path / "cache"
+    monkeypatch.setattr("numba.config.CACHE_DIR", str(cache))
+    text = MODULE.replace("TERM", "41.0" if keep else "42.0")
+    assert _compilations(text, tmp_path / "a" / "one.py", cache) == 1
+    others = [f'"""A title."""\n{text}', text.replace("LAST = 1", "LAST = 2"), text.replace("FACTOR = 2.0", "")]
+    for k, other in enumerate(others):
+        if not keep:
+            monkeypatch.setattr(emitted, "_IN_USE", {})
+        assert other != text
+        assert _compilations(other, tmp_path / "b" / f"module_{k}.py", cache) == 0
+    assert _compilations(text.replace("sin(", "2.0*sin("), tmp_path / "b" / "changed.py", cache) == 1
+
+
+@pytest.mark.parametrize(
+    ("term", "before", "after"), [("FACTOR", "FACTOR = 2.0", "FACTOR = 4.0"), ("plain(1.0)", "3.0*x", "5.0*x")]
+)
+def test_what_a_function_uses_of_its_module_is_noticed(
+    term: str, before: str, after: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A module that was written by hand may have constants of its own, which are compiled into its functions."""
+    cache = tmp_path / "cache"
+    monkeypatch.setattr("numba.config.CACHE_DIR", str(cache))
+    text = MODULE.replace("TERM", term).replace("def plain", "from numba import njit\n\n\n@njit\ndef plain")
+    assert _compilations(text, tmp_path / "one.py", cache) == 1
+    assert _compilations(text, tmp_path / "one.py", cache) == 0
+    assert _compilations(text.replace(before, after), tmp_path / "one.py", cache) == 1
+
+
+class _Compiler:
+    """Stands for the compiler: it notes what is compiled, and has nothing in its cache."""
+
+    def __init__(self) -> None:
+        self.compiled: list[str] = []
+
+    def has_cached_callback(self, *_: Any) -> bool:
+        return False
+
+    def called(self, function: Any) -> Any:
+        return function
+
+    def callback(self, function: Any, signature: Any) -> Any:
+        self.compiled.append(function.__name__)
+        numbers = signature.args.count(types.CPointer(types.float64))
+        call = CFUNCTYPE(None, c_ssize_t, *(c_void_p,) * numbers)(self.fill)
+        return SimpleNamespace(address=cast(call, c_void_p).value, keep=call)
+
+    @staticmethod
+    def fill(n: int, *addresses: int) -> None:
+        (c_double * (2 * n)).from_address(addresses[-1])[:] = [7.0] * (2 * n)
+
+
+@pytest.fixture
+def compiler(monkeypatch: pytest.MonkeyPatch) -> _Compiler:
+    """A compiler whose functions give 7."""
+    compiler = _Compiler()
+    monkeypatch.setattr(jit, "COMPILER", compiler)
+    monkeypatch.setattr(emitted, "_IN_USE", {})
+    return compiler
+
+
+def _potential(tmp_path: Path, term: str) -> tuple[Any, Callable[[], list[float]]]:
+    """The function of a module, and what calls it as compiled code does, by what stands at its address."""
+    file = tmp_path / "one.py"
+    file.write_text(MODULE.replace("TERM", term), encoding="utf-8")
+    function = load(file, file.stem).effective_potential
+    address = function.address
+
+    def call() -> list[float]:
+        places, out = (c_double * 2)(0.5, 1.5), (c_double * 4)()
+        at = c_void_p.from_address(address).value
+        assert at
+        CFUNCTYPE(None, c_ssize_t, c_void_p, c_void_p, c_void_p)(at)(2, places, places, out)
+        return list(out)
+
+    return function, call
+
+
+def test_python_runs_a_function_until_it_is_worth_compiling(tmp_path: Path, compiler: _Compiler) -> None:
+    """Who has its address calls the compiled one from then on."""
+    function, call = _potential(tmp_path, "3.0")
+    assert call() == pytest.approx([math.sin(0.5), math.sin(1.5), 3.0, 3.0], rel=3e-16, abs=0.0)
+    assert compiler.compiled == []
+    function.compile()
+    function.compile()
+    assert compiler.compiled == ["effective_potential"]
+    assert call() == [7.0] * 4
+
+
+def test_a_function_is_compiled_when_python_has_taken_long(
+    tmp_path: Path, compiler: _Compiler, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Here after the first call."""
+    _, call = _potential(tmp_path, "3.0")
+    monkeypatch.setattr(emitted, "MAX_PYTHON_TIME", 0.0)
+    assert call()[2:] == [3.0, 3.0]
+    assert compiler.compiled == ["effective_potential"]
+    assert call() == [7.0] * 4
+
+
+@pytest.mark.parametrize("term", ["1/(n - 2)", "2.0**places[i]", "places[i]**0.5"])
+def test_what_python_cannot_run_is_compiled(term: str, tmp_path: Path, compiler: _Compiler) -> None:
+    """A quotient of integers by zero, which raises in Python, and powers that the compiler may write otherwise."""
+    _, call = _potential(tmp_path, term)
+    assert call() == [7.0] * 4
+    assert compiler.compiled == ["effective_potential"]
+
+
+@pytest.mark.parametrize("error", [KeyboardInterrupt, MemoryError])
+def test_what_is_raised_in_python_passes_through_compiled_code(
+    error: type[BaseException], tmp_path: Path, compiler: _Compiler, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It is raised when the compiled function that was called from Python returns, once."""
+    function, call = _potential(tmp_path, "3.0")
+
+    def interrupted(*_: Any) -> None:
+        raise error
+
+    monkeypatch.setattr(function, "_plain", interrupted)
+    call()
+    from_python = jit.Inner(lambda x: 2.0 * x)
+    with pytest.raises(error):
+        from_python(1.0)
+    assert from_python(1.0) == 2.0
+
+
+def test_importing_a_module_compiles_nothing(tmp_path: Path, compiler: _Compiler) -> None:
+    """Nor does asking for an address, where Python can run the function."""
+    text = (ROOT / "generated" / "pendulum.py").read_text(encoding="utf-8")
+    file = tmp_path / "pendulum_of_this_test.py"
+    file.write_text(text.replace('"""Bounds of', '"""Other bounds of'), encoding="utf-8")
+    functions = load(file, file.stem).MODEL.functions
+    assert functions.bounds.address == functions.bounds.address
+    assert compiler.compiled == []
+    functions.bounds.compile()
+    assert compiler.compiled == ["bounds"]
