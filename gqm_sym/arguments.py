@@ -5,7 +5,7 @@ Python's own errors say that a function takes no positional arguments; these say
 
 import difflib
 import inspect
-from collections.abc import Callable, Iterable, Mapping, Set
+from collections.abc import Callable, Iterable, Mapping, Sequence, Set
 from functools import wraps
 from typing import Any, ParamSpec, TypeVar
 
@@ -77,10 +77,14 @@ def _reason(
 def unknown_argument(called: str, name: str, names: Iterable[str], what: str = "argument") -> str:
     """``called: there is no argument 'name'``, the nearest known one if it is near, and all of them."""
     listed = list(names)
+    return f"{called}: there is no {what} {name!r}; {_hint(name, listed)}it takes {', '.join(listed) or 'none'}"
+
+
+def _hint(name: str, listed: Sequence[str]) -> str:
+    """The known name that was probably meant, as the beginning of a sentence; nothing if none is near."""
     near = difflib.get_close_matches(name.lower(), [known.lower() for known in listed], n=1)
     same = [known for known in listed if near and known.lower() == near[0]]
-    hint = f"did you mean {same[0]!r}? " if same else ""
-    return f"{called}: there is no {what} {name!r}; {hint}it takes {', '.join(listed) or 'none'}"
+    return f"did you mean {same[0]!r}? " if same else ""
 
 
 def not_given(name: str) -> str:
@@ -139,7 +143,8 @@ def flag(given: Any, *, where: str) -> bool:
 def one_of(given: Any, known: tuple[str, ...], *, where: str) -> str:
     """Return one of some words."""
     if not (isinstance(given, str) and given in known):
-        raise DeclarationError(f"{where}: must be one of {', '.join(known)}, got {short(given)}")
+        hint = _hint(given, known) if isinstance(given, str) else ""
+        raise DeclarationError(f"{where}: {hint}must be one of {', '.join(known)}, got {short(given)}")
     return given
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from gqm_sym.arguments import short, unknown_argument
 from gqm_sym.errors import GQMError, InputError, SolutionError
 from gqm_sym.fitting.data import Measurements, read_measurements
+from gqm_sym.fitting.quotients import central_differences
 from gqm_sym.fitting.result import Fit
 from gqm_sym.literals.numbers import read_number
 from gqm_sym.runtime.compiled.types import Array
@@ -241,18 +242,9 @@ class Residuals:
         return np.concatenate([np.broadcast_to(self._swept(name, x, gradient=wrt).gradient, shape) for name in names])
 
     def _differences(self, x: Array) -> Array:
-        """Difference quotients, central unless a limit is near."""
-        columns = []
-        for k in range(x.size):
-            step = STEP * max(abs(x[k]), 1e-3 * max(abs(self.free.start[k]), 1.0))
-            ends = [min(max(x[k] + d, self.free.low[k]), self.free.high[k]) for d in (-step, step)]
-            values = []
-            for end in ends:
-                moved = x.copy()
-                moved[k] = end
-                values.append(self.predicted(moved))
-            columns.append((values[1] - values[0]) / (ends[1] - ends[0]))
-        return np.stack(columns, axis=1)
+        """Difference quotients."""
+        steps = STEP * np.maximum(np.abs(x), 1e-3 * np.maximum(np.abs(self.free.start), 1.0))
+        return central_differences(self.predicted, x, steps, self.free.low, self.free.high)
 
 
 def _until_rest(motion: Any, t: Array) -> Array:

@@ -26,10 +26,13 @@ from gqm_sym.runtime.gradients.programs import (
     Program,
     Source,
     circulation_program,
+    circulation_seconds,
     extreme_program,
     libration_program,
+    libration_seconds,
     path_program,
     turning_point_program,
+    turning_point_seconds,
 )
 from gqm_sym.runtime.gradients.series import Series
 from gqm_sym.runtime.interface import ExactFormulas, ExactLaw
@@ -188,6 +191,16 @@ class OrbitDerivatives(ABC):
         """The derivatives of the half period of a libration, or of the time of a lap."""
         return self._integrals(1, self.source.variables)
 
+    def second_durations(self, rows: tuple[int, ...]) -> Array:
+        """The second derivatives of the half period of a libration, or of the time of a lap.
+
+        Parameters
+        ----------
+        rows : tuple of int
+            The variables, of which each pair has one, as `programs.pairs_of` them.
+        """
+        raise SolutionError("gradient: second derivatives along curves without formulas are not there yet")
+
     @property
     def action(self) -> float:
         """The integral of V**2 (1 + beta) dt over a period."""
@@ -247,14 +260,21 @@ class FormulaOrbitDerivatives(OrbitDerivatives):
 
     @cached_property
     def _multiprecision(self) -> MultiprecisionOrbit:
-        return MultiprecisionOrbit(self.source, self._program, self._given, self.direction, self._offsets)
+        return self._in_multiprecision(self._program, turning_point_program(self.source))
+
+    def _in_multiprecision(self, program: Program, turns: Program) -> MultiprecisionOrbit:
+        return MultiprecisionOrbit(self.source, program, turns, self._given, self.direction, self._offsets)
 
     @cached_property
     def _end_rows(self) -> Array:
         """The derivatives of both turning points in double-double arithmetic."""
+        return self._ends_by(turning_point_program(self.source))
+
+    def _ends_by(self, turns: Program) -> Array:
+        """What a program gives at both turning points, in double-double arithmetic, but for its first result."""
         assert self._orbit is not None
         high, low = np.array([self._orbit.low[:2], self._orbit.high[:2]]).T
-        return values(turning_point_program(self.source), self.variables, high.copy(), low.copy())[1:]
+        return values(turns, self.variables, high.copy(), low.copy())[1:]
 
     @property
     def ends(self) -> Array:
@@ -277,12 +297,16 @@ class FormulaOrbitDerivatives(OrbitDerivatives):
     @cached_property
     def _rule(self) -> tuple[Array, Array]:
         """The inputs of the orbit's program in double-double arithmetic, and the table of nodes."""
+        return self._rule_with(np.empty(0) if self.direction else self._end_rows)
+
+    def _rule_with(self, ends: Array) -> tuple[Array, Array]:
+        """The inputs of a program and the table of nodes, with what it takes of the turning points of a libration."""
         if self.direction:
             inputs = np.hstack([self.variables, self.variables[:, [self.source.parameters]]])
             return np.ascontiguousarray(inputs), trapezoidal_nodes(CIRCULATION)
         assert self._orbit is not None
-        ends = np.array([self._orbit.low, self._orbit.high]).T
-        inputs = np.hstack([self.variables, ends, self._end_rows[:, :, 0].T, self._end_rows[:, :, 1].T])
+        places = np.array([self._orbit.low, self._orbit.high]).T
+        inputs = np.hstack([self.variables, places, ends[:, :, 0].T, ends[:, :, 1].T])
         return np.ascontiguousarray(inputs), trapezoidal_nodes(LIBRATION)
 
     @cached_property
@@ -291,23 +315,39 @@ class FormulaOrbitDerivatives(OrbitDerivatives):
 
         The number is 0 if they are those of panels.
         """
+        found = None if self._orbit is None else self._means_of(self._program, *self._rule)
+        return found or (*self._multiprecision.means[:2], False)
+
+    def _means_of(self, program: Program, inputs: Array, nodes: Array) -> tuple[Array, int, bool] | None:
+        """`_means` of any program in double-double arithmetic; None where digits are lost."""
+        found = np.zeros((program.outputs.size, MEAN))
+        n = fill_means(program.operands, program.work, inputs, nodes, found)
+        if n == NOT_SMOOTH:
+            kind = CIRCULATION if self.direction else LIBRATION
+            n = fill_panel_means(program.operands, program.work, inputs, kind, self._edges, panel_rule(), found)
+            if n > 0:
+                return found, 0, True
+            raise SolutionError(UNDECIDED)
+        return None if n == LOST_DIGITS else (found, n, True)
+
+    def second_durations(self, rows: tuple[int, ...]) -> Array:
+        """As `OrbitDerivatives.second_durations`."""
+        turns = turning_point_seconds(self.source, rows)
+        if self.direction:
+            program = circulation_seconds(self.source, self.direction, rows)
+        else:
+            program = libration_seconds(self.source, rows)
+        found = None
         if self._orbit is not None:
-            found, program = np.zeros((self._program.outputs.size, MEAN)), self._program
-            inputs, nodes = self._rule
-            n = fill_means(program.operands, program.work, inputs, nodes, found)
-            if n == NOT_SMOOTH:
-                kind = CIRCULATION if self.direction else LIBRATION
-                n = fill_panel_means(program.operands, program.work, inputs, kind, self._edges, panel_rule(), found)
-                if n > 0:
-                    return found, 0, True
-                raise SolutionError(UNDECIDED)
-            if n != LOST_DIGITS:
-                return found, n, True
-        return *self._multiprecision.means[:2], False
+            found = self._means_of(program, *self._rule_with(np.empty(0) if self.direction else self._ends_by(turns)))
+        return self._over_phase(found[0] if found else self._in_multiprecision(program, turns).means[0])
 
     def _integrals(self, first: int, count: int) -> Array:
         """The integrals of results over a half period, or over a lap."""
-        found = self._means[0][first : first + count]
+        return self._over_phase(self._means[0][first : first + count])
+
+    def _over_phase(self, found: Array) -> Array:
+        """The integrals over a half period, or over a lap, from means."""
         is_zero = np.abs(found[:, 0]) <= found[:, 2]  # as far as double-double arithmetic can tell
         high, low = np.where(is_zero, 0.0, found[:, :2].T)
         integrals: Array = high + low if self.direction else PI * high + (PI * low + PI_LOW * high)

@@ -5,14 +5,16 @@ from typing import Any
 
 import numpy as np
 
-from gqm_sym.arguments import names, unknown_argument
+from gqm_sym.arguments import names, one_of, unknown_argument
 from gqm_sym.errors import InputError, SolutionError
 from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.gradients.orbit import OrbitDerivatives
+from gqm_sym.runtime.gradients.programs import pairs_of
 
 # What has a gradient.
 EXTREMES = ("v_max", "v_min", "normal_force_max", "normal_force_min")
-QUANTITIES = ("half_period", "period", "turning_points", *EXTREMES, "action")
+PERIODS = ("half_period", "period")
+QUANTITIES = (*PERIODS, "turning_points", *EXTREMES, "action")
 
 # An extreme this near to a turning point is there, as a share of the width of the orbit. The place of another one is
 # improved by Newton's method, whose steps may be this share of the width.
@@ -50,8 +52,7 @@ def gradient(derivatives: OrbitDerivatives, motion: Any, quantity: str, wrt: Any
         What they are by.
     """
     rows = selected(motion.problem.formulas.parameters, wrt)
-    if not (isinstance(quantity, str) and quantity in QUANTITIES):
-        raise InputError(unknown_argument("gradient", str(quantity), QUANTITIES, what="quantity"))
+    one_of(quantity, QUANTITIES, where="gradient: quantity")
     if quantity in ("half_period", "turning_points") and motion.kind != "libration":
         raise SolutionError(f"gradient: only a libration has {quantity}; this motion is of kind {motion.kind!r}")
     if quantity == "turning_points":
@@ -65,6 +66,25 @@ def gradient(derivatives: OrbitDerivatives, motion: Any, quantity: str, wrt: Any
     else:
         found = derivatives.duration_gradient if quantity == "half_period" else derivatives.period_gradient
     return {name: float(found[row]) for name, row in rows.items()}
+
+
+def second_gradient(derivatives: OrbitDerivatives, motion: Any, quantity: str, wrt: Any) -> dict[str, dict[str, float]]:
+    """The second derivatives of a half period or a period, by two names.
+
+    Parameters
+    ----------
+    derivatives, motion, quantity, wrt
+        As for `gradient`.
+    """
+    rows = selected(motion.problem.formulas.parameters, wrt)
+    one_of(quantity, PERIODS, where="gradient: order=2: quantity")
+    if quantity == "half_period" and motion.kind != "libration":
+        raise SolutionError(f"gradient: only a libration has {quantity}; this motion is of kind {motion.kind!r}")
+    chosen = tuple(dict.fromkeys(rows.values()))
+    share = 2.0 if quantity == "period" and motion.kind == "libration" else 1.0
+    found = dict(zip(pairs_of(chosen), (share * derivatives.second_durations(chosen)).tolist(), strict=True))
+    both = found | {(j, i): value for (i, j), value in found.items()}
+    return {one: {other: both[rows[one], rows[other]] for other in rows} for one in rows}
 
 
 def extreme_gradient(derivatives: OrbitDerivatives, motion: Any, quantity: str) -> Array:

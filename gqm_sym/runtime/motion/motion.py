@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from gqm_sym.arguments import short
 from gqm_sym.errors import InputError, SolutionError, renamed
 from gqm_sym.export.html import page, summary
 from gqm_sym.literals.namespaces import FLOATS
@@ -148,7 +149,7 @@ class Motion(ABC):
 
     # -- gradients ----------------------------------------------------------------------------
 
-    def gradient(self, quantity: str, wrt: Any = None, *, lam: Any = None) -> dict[str, Any]:
+    def gradient(self, quantity: str, wrt: Any = None, *, lam: Any = None, order: int = 1) -> dict[str, Any]:
         """The derivatives of a quantity of this motion by its launch and run-time parameters.
 
         Parameters
@@ -160,12 +161,15 @@ class Motion(ABC):
             What the derivatives are by: run-time parameters, "lam0" and "v0"; all of them if not given.
         lam : number, optional
             For "time_at": the place, as of `time_at`.
+        order : int
+            2 for the second derivatives of "half_period" or "period".
 
         Returns
         -------
         dict
             A float for each name; of turning points a tuple, in the order of `turning_points`. At ``v0 = 0`` the
-            derivative by v0 is that for greater speeds.
+            derivative by v0 is that for greater speeds. Of second derivatives a dict for each name, with a float for
+            each other.
 
         Raises
         ------
@@ -176,11 +180,18 @@ class Motion(ABC):
         """
         if (lam is None) == (quantity == "time_at"):
             raise InputError(f"lam: is the place that 'time_at' asks about, got {lam!r} with {quantity!r}")
+        if order not in (1, 2) or isinstance(order, bool):
+            raise InputError(f"gradient: order must be 1 or 2, got {short(order)}")
+        if order == 2:
+            return self._second_gradient(quantity, wrt)
         check_signed(self.problem.formulas, quantity)
         return self._gradient(quantity, wrt) if lam is None else self._arrival_gradient(lam, wrt)
 
     def _gradient(self, quantity: str, wrt: Any) -> dict[str, Any]:
         raise self._without_gradients()
+
+    def _second_gradient(self, quantity: str, wrt: Any) -> dict[str, dict[str, float]]:
+        raise SolutionError(f"gradient: only periodic motions have second derivatives; this one is {self.kind!r}")
 
     def _arrival_gradient(self, lam: Any, wrt: Any) -> dict[str, Any]:
         """The derivatives of the time at which the body is at a place: what carries it on makes that earlier."""

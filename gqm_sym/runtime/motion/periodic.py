@@ -15,7 +15,7 @@ from gqm_sym.runtime.double_double.orbit_time import Orbit
 from gqm_sym.runtime.gradients.charts import ChartOrbitDerivatives
 from gqm_sym.runtime.gradients.multiprecision import UNDECIDED
 from gqm_sym.runtime.gradients.orbit import FormulaOrbitDerivatives, OrbitDerivatives, asked_for, without_formulas
-from gqm_sym.runtime.gradients.quantities import gradient, selected
+from gqm_sym.runtime.gradients.quantities import gradient, second_gradient, selected
 from gqm_sym.runtime.gradients.sensitivity import OrbitSensitivity, Sensitivity
 from gqm_sym.runtime.gradients.spectrum import Fourier, fourier
 from gqm_sym.runtime.launch.kinds import MotionKind
@@ -230,6 +230,10 @@ class PeriodicMotion(Motion):
     @locked
     def _gradient(self, quantity: str, wrt: Any) -> dict[str, Any]:
         return gradient(self._derivatives, self, quantity, wrt)
+
+    @locked
+    def _second_gradient(self, quantity: str, wrt: Any) -> dict[str, dict[str, float]]:
+        return second_gradient(self._derivatives, self, quantity, wrt)
 
     @property
     @locked

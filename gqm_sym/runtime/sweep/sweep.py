@@ -266,7 +266,8 @@ class Group(NamedTuple):
         The launches, in the order of `strided`; each array has one number, or one for each launch.
     chart, joints, corners, drops : arrays
         What compiled code reads behind the parameters, and the places within one period at which the curve is not
-        smooth, at which its tangent jumps, and at which contact is lost; all are empty for a curve with formulas.
+        smooth, or at which pieces of the chart meet, at which its tangent jumps, and at which contact is lost; all are
+        empty for a curve with formulas.
     table : CurveTable
         The curve tabulated, where no energy is lost.
     factors : list of arrays
@@ -318,7 +319,9 @@ def _groups(
         has_ends = not chart.period and chart.ends == ("domain-end", "domain-end")
         ends = CURVE_ENDS if has_ends else NO_ENDS
         launches, drops = [*some[:4], *domain, *some[4:]], chart.corners[chart.bends * only_sign < 0.0]
-        yield Group(launches, chart.block, chart.breaks, chart.corners, drops, table, theirs, ends), chosen
+        # Bodies that lose energy pass the chart piece by piece.
+        joints = chart.breaks if not formulas.dissipation else chart.edges[0 if chart.period else 1 : -1]
+        yield Group(launches, chart.block, joints, chart.corners, drops, table, theirs, ends), chosen
 
 
 def _held(formulas: "Formulas", count: int) -> list[int]:

@@ -55,6 +55,8 @@ def test_the_same_as_in_double_double(name: str, v0: float) -> None:
     if not direction:
         np.testing.assert_allclose(slow.ends, fast.ends, rtol=2 * ULP)
         assert slow.turning_points == fast.turning_points
+    rows = (0, fast.source.parameters, fast.source.parameters + 1)
+    np.testing.assert_allclose(slow.second_durations(rows), fast.second_durations(rows), rtol=1e-15, atol=1e-20)
     n = slow._means[1]
     slow_values = slow._multiprecision.samples(n)
     nodes = fast._rule[1][:2, n : 2 * n].copy()

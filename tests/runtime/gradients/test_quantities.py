@@ -223,13 +223,13 @@ def test_the_choice_of_names(circle: ModuleType) -> None:
     ("quantity", "wrt", "launch", "error", "text"),
     [
         ("half_perid", None, {}, InputError, "did you mean 'half_period'"),
-        (3, None, {}, InputError, "there is no quantity '3'"),
+        (3, None, {}, InputError, "quantity: must be one of .*, got 3"),
         ("period", "l", {}, InputError, "there is no parameter 'l'; did you mean 'L'"),
         ("period", 3, {}, GQMError, "wrt: must be names"),
         ("half_period", None, {"v0": 9.0}, SolutionError, "only a libration has half_period"),
         ("turning_points", None, {"v0": 9.0}, SolutionError, "only a libration has turning_points"),
         ("period", None, {"lam0": 0}, SolutionError, "kind 'rest'"),
-        ("t_end", None, {}, InputError, "there is no quantity 't_end'"),
+        ("t_end", None, {}, InputError, "quantity: must be one of .*, got 't_end'"),
     ],
 )
 def test_what_has_no_gradient(

@@ -6,8 +6,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gqm_sym.arguments import unknown_argument
-from gqm_sym.errors import InputError, SolutionError
+from gqm_sym.arguments import one_of
+from gqm_sym.errors import SolutionError
 from gqm_sym.runtime.compiled.calls import call_static_balance
 from gqm_sym.runtime.compiled.jit import entry
 from gqm_sym.runtime.compiled.types import INTEGER, MATRIX, VECTOR, Array
@@ -122,10 +122,9 @@ def gradient(motion: Any, changes: Changes, quantity: str) -> Array:
     quantity : str
         One of `QUANTITIES`.
     """
-    if not (isinstance(quantity, str) and quantity in QUANTITIES):
-        if quantity in PERIODIC_QUANTITIES:
-            raise SolutionError(f"gradient: a motion with losses does not repeat, and so it has no {quantity}")
-        raise InputError(unknown_argument("gradient", str(quantity), QUANTITIES, what="quantity"))
+    if quantity in PERIODIC_QUANTITIES and quantity not in QUANTITIES:
+        raise SolutionError(f"gradient: a motion with losses does not repeat, and so it has no {quantity}")
+    one_of(quantity, QUANTITIES, where="gradient: quantity")
     if quantity == "turning_points":
         return turning_points(motion, changes)
     if quantity in EXTREMES:
