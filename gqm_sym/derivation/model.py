@@ -421,6 +421,11 @@ def derive(
         check_powers((("potential", law.potential),), curve, values)
     loss, speed, level = None, conservative_speed(law, lam), level_set(curve)
     if not kernel.conservative:
+        if law.loads and shape.cusp is not None:
+            raise DeclarationError(
+                f"derive: {shape.cusp} may vanish, which is a cusp; losses of energy on space curves with cusps are "
+                "not supported yet, so give a domain without one"
+            )
         loss = _losses(curve, kernel, (x, y, z), law, shape)
         speed = dissipative_speed(kernel, law, shape, loss, curve)
     pressure = shape.kappa * speed.held + law.static_normal_load
