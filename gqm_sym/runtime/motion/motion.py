@@ -240,6 +240,10 @@ class Motion(ABC):
         """
         raise self._without_gradients()
 
+    def place_changes(self, t: Any, wrt: Any) -> Array:
+        """The derivatives of the curve parameter alone, as of `sensitivity`, which takes longer."""
+        return self.sensitivity(t, wrt).lam
+
     @property
     def action(self) -> float:
         """The integral of (1 + beta) V ds over one period, per mass, in m2/s (libration and circulation).
