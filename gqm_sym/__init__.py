@@ -1,4 +1,4 @@
-"""Symbolic declaration, closed forms and generated numba code for motion along planar curves.
+"""Symbolic declaration, closed forms and generated numba code for motion along given curves.
 
 Importing this package loads no SymPy: names are fetched when first used.
 """

@@ -148,6 +148,8 @@ def _piece(given: Piece | FormulaCurve, where: str) -> Piece:
         return given
     if not isinstance(given, FormulaCurve):
         raise DeclarationError(f"{where}: {short(given)} given; give line, arc, clothoid or a curve with formulas")
+    if given.kind == "space":
+        raise DeclarationError(f"{where}: a space curve cannot be a piece yet; give a planar one")
     if given.charted:
         raise DeclarationError(f"{where}: a curve of kind {given.kind!r} cannot be a piece; give one with formulas")
     low, high = given.domain

@@ -248,12 +248,15 @@ WRONG: dict[str, tuple[str | bytes, list[str]]] = {
         edited((GRAPH, f"{GRAPH}\n  polar: {{r: theta}}")),
         [
             "a.yaml:4:3: curve: declared as graph and as polar; give exactly one of graph, parametric, polar, family, "
-            "implicit, points, pieces"
+            "space, implicit, points, pieces"
         ],
     ),
     "no curve": (
         edited((f"\n  {GRAPH}", " {}")),
-        ["a.yaml:2:1: curve: is empty; give exactly one of graph, parametric, polar, family, implicit, points, pieces"],
+        [
+            "a.yaml:2:1: curve: is empty; give exactly one of graph, parametric, polar, family, space, "
+            "implicit, points, pieces"
+        ],
     ),
     "a point for a curve": (
         edited(
@@ -267,8 +270,8 @@ WRONG: dict[str, tuple[str | bytes, list[str]]] = {
     "an unknown family": (
         edited((GRAPH, "family: {name: elipse, a: h, b: 1}")),
         [
-            "a.yaml:3:12: curve.family: unknown family 'elipse'; known are cartesian_graph, "
-            "circle, ellipse, parabola, log_spiral, catenary, cycloid, implicit"
+            "a.yaml:3:12: curve.family: unknown family 'elipse'; known are cartesian_graph, circle, "
+            "ellipse, parabola, log_spiral, catenary, cycloid, helix, conical_helix, torus_knot, viviani, implicit"
         ],
     ),
     "a name that means two things": (

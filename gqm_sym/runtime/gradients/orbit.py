@@ -61,6 +61,20 @@ def without_formulas() -> SolutionError:
     )
 
 
+def check_signed(formulas: Formulas, quantity: str) -> None:
+    """Refuse derivatives that hold a contact force without a sign.
+
+    Raises
+    ------
+    SolutionError
+        Unless the quantity has nothing to do with the contact force, or that has a sign.
+    """
+    if not formulas.signed and quantity in ("sensitivity", "normal_force_max", "normal_force_min"):
+        raise SolutionError(
+            f"gradients: {quantity} has none yet on space curves, for it holds the contact force; ask for another one"
+        )
+
+
 def source_of(formulas: Formulas) -> Source:
     """What the programs of a module are recorded from.
 

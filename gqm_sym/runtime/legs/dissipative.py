@@ -257,7 +257,7 @@ class DissipativeMotion(Motion):
     def state(self, t: Any) -> State:
         """The state of the body at times; see `Motion.state`. For doubles this is one call of compiled code."""
         times = _plain_times(t)
-        if times is None:
+        if times is None or self.problem.formulas.path_in_space is not None:
             return super().state(t)
         out = self._read(*times, STATE_ROWS, self._read_states, lambda later: np.array(Motion.state(self, later)[1:]))
         return State(t, *out.reshape(-1, *t.shape)) if np.ndim(t) else State(float(times[0][0]), *out[:, 0].tolist())
@@ -340,8 +340,7 @@ class DissipativeMotion(Motion):
         }
 
     @locked
-    def sensitivity(self, t: Any, wrt: Any = None) -> Sensitivity:
-        """The derivatives of the state at given times; see `Motion.sensitivity`."""
+    def _sensitivity(self, t: Any, wrt: Any) -> Sensitivity:
         rows = selected(self.problem.formulas.parameters, wrt)
         times, low, shape = self._times(t)
         self._trajectory(float(times.max(initial=0.0)))

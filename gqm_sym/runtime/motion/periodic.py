@@ -252,8 +252,7 @@ class PeriodicMotion(Motion):
             return float(self._derivatives.period_gradient[-1] / inertia)
 
     @locked
-    def sensitivity(self, t: Any, wrt: Any = None) -> Sensitivity:
-        """The derivatives of the state at given times; see `Motion.sensitivity`."""
+    def _sensitivity(self, t: Any, wrt: Any) -> Sensitivity:
         rows = selected(self.problem.formulas.parameters, wrt)
         times, low, shape = self._times(t)
         points = self._phase_points(times, low)
@@ -294,7 +293,8 @@ class PeriodicMotion(Motion):
         sampler = None if times is None else self._sampler_for(times[1], times[2])
         if times is None or sampler is None:
             return super().state(t)
-        if self._segment.from_multiprecision:  # its speeds can be computed from its panels only
+        # The speeds of some segments can be computed from their panels only, and what is in space by itself.
+        if self._segment.from_multiprecision or self.problem.formulas.path_in_space is not None:
             return super().state(t)._replace(lam=self.lam(t))
         if time is not None:
             return State(*sampler.state(time))

@@ -74,8 +74,11 @@ class Asked(NamedTuple):
 
 def asked_of_bodies(formulas: "Formulas", quantity: str, t_max: Any, contact: str) -> Asked | None:
     """What compiled code is asked for a quantity; None where motions are solved, or no energy is lost."""
-    if formulas.dissipation is None or formulas.rolling_radius or quantity not in QUESTIONS:
+    loss = formulas.dissipation
+    if loss is None or formulas.rolling_radius or quantity not in QUESTIONS:
         return None
+    if quantity.startswith("normal_force") and not formulas.signed:
+        return None  # the panels of a leg resolve its law of motion, and that may know nothing of the contact force
     horizon = inf if t_max is None else read_number(t_max, where="t_max").value
     return Asked(QUESTIONS[quantity], horizon, ONLY_SIGN[contact]) if horizon > 0.0 else None
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from gqm_sym.errors import GQMError, InputError
+from gqm_sym.runtime.gradients.orbit import check_signed
 from gqm_sym.runtime.gradients.quantities import selected
 from gqm_sym.runtime.gradients.sweep import PERIODS, period_gradients
 from gqm_sym.runtime.launch.request import LaunchRequest
@@ -42,6 +43,7 @@ def sweep_with_gradient(
     rows = selected(formulas.parameters, wrt)
     if quantity == "turning_points":
         raise InputError("gradient: sweeps have it of quantities that are one number, not of turning_points")
+    check_signed(formulas, quantity)
     found = sweep(formulas, quantity, launches, parameters, lam, solve)
     names = (*formulas.parameters, "lam0", "v0", "direction", "lam")
     given = (*parameters, launches.lam0, launches.v0, launches.direction, 0.0 if lam is None else lam)
