@@ -174,17 +174,21 @@ class Residuals:
         sigma = measured.sigma
         self.sigma = np.ones(self.values.size) if sigma is None else np.concatenate([*sigma.values()])
         self._loses = module.MODEL.dissipation is not None
+        self._solved: tuple[Array, Any] | None = None
 
     def arguments(self, x: Array) -> dict[str, Any]:
         """All arguments of ``module.solve`` for values of what is to be found."""
         return {**self.fixed, **dict(zip(self.free.names, x.tolist(), strict=True))}
 
     def motion(self, x: Array) -> Any:
-        """The motion for values of what is to be found."""
+        """The motion for values of what is to be found; it answers for residuals and for their derivatives."""
+        if self._solved is not None and np.array_equal(self._solved[0], x):
+            return self._solved[1]
         arguments = self.arguments(x)
         if self.measured.place is not None and self._loses:
             arguments["t_max"] = AMPLE * float(self.values.max())
-        return self.module.solve(**arguments)
+        self._solved = x.copy(), self.module.solve(**arguments)
+        return self._solved[1]
 
     def __call__(self, x: Array) -> Array:
         """The residuals; NaN where there is no such motion, which the solver steps back from."""
@@ -230,13 +234,15 @@ class Residuals:
         if self.measured.t is not None:
             motion = self.motion(x)
             t = _until_rest(motion, self.measured.t)
+            if names == ("lam",):
+                return np.asarray(motion.place_changes(t, wrt)).T
             found, moves = motion.sensitivity(t, wrt=wrt), {"v": t == self.measured.t}
             return np.concatenate([(getattr(found, name) * moves.get(name, 1.0)).T for name in names])
         if self.measured.place is not None:
             motion = self.motion(x)
             times = _passages(motion, self.measured.place)
             # A change that carries the body further along has it pass the place earlier.
-            sooner: Array = motion.sensitivity(times, wrt=wrt).lam / _rates(motion, times)
+            sooner: Array = motion.place_changes(times, wrt) / _rates(motion, times)
             return -sooner.T
         shape = (*next(iter(self.measured.values.values())).shape, len(wrt))
         return np.concatenate([np.broadcast_to(self._swept(name, x, gradient=wrt).gradient, shape) for name in names])

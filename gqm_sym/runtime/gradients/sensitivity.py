@@ -86,18 +86,25 @@ class OrbitSensitivity:
         """Derivatives by the run-time parameters as derivatives by all variables, of which the others are zero."""
         return np.vstack([rows, np.zeros((self._derivatives.source.variables - len(rows), rows.shape[1]))])
 
+    def _places(self, share: Array) -> Array:
+        """How places change at shares of the phase, within the lap."""
+        if self._derivatives.direction:
+            return self._lap_gradient * share
+        upper = np.sin(np.pi * share) ** 2
+        low, high = (end[:, None] for end in self._derivatives.moved_ends.T)
+        places: Array = low * (1.0 - upper) + high * upper
+        return places
+
     def _along(self, share: Array, lam: Array, v: Array) -> _Along:
         """What changes at shares of the phase, at which the places and velocities are known."""
         derivatives = self._derivatives
         (rates, times), arcs = self._rates(share), self._arcs(share)[1]
-        path = derivatives.at_places(lam)
+        path, places = derivatives.at_places(lam), self._places(share)
         if derivatives.direction:
-            places = self._lap_gradient * share
             widening = self._lap_gradient / self._width
         else:
-            upper = np.sin(np.pi * share) ** 2
             low, high = (end[:, None] for end in derivatives.moved_ends.T)
-            places, widening = low * (1.0 - upper) + high * upper, (high - low) / self._width
+            widening = (high - low) / self._width
         ds, potential = path[2], path[5]
         stretch = (self._by_all(ds[1:-1]) + ds[-1] * places) / ds[0]
         return _Along(
@@ -109,8 +116,9 @@ class OrbitSensitivity:
             path=path,
         )
 
-    def _at_launch(self, motion: Any, phi: float) -> _Along:
+    def _at_launch(self, motion: Any, points: Any) -> _Along:
         """What changes at the launch, whose phase angle has more digits once the period is known exactly."""
+        phi = points.trajectory.segments[0].phi_start
         if phi not in self._launches:
             v0 = motion.direction * motion.problem.launch.v0.value
             places = np.array([phi / self._scale]), np.array([motion.problem.lam0]), np.array([v0])
@@ -146,11 +154,8 @@ class OrbitSensitivity:
         lam, v : array
             The places within the lap, and the velocities.
         """
-        share, laps = np.zeros_like(lam), points.laps
-        for _, mask, phi in points.segments:
-            share[mask] = phi / self._scale
-        along, launch = self._along(share, lam, v), self._at_launch(motion, points.trajectory.segments[0].phi_start)
-        delay = self._delay(along, launch, motion, points)
+        along, launch, laps = self._along(self._share(points), lam, v), self._at_launch(motion, points), points.laps
+        delay = self._delay(along.times, launch, motion, points)
         arcs = along.arcs - launch.arcs + v * delay
         launched = self._derivatives.launch_moves[:, None]
         arcs -= launch.path[2][0] * launched
@@ -167,11 +172,25 @@ class OrbitSensitivity:
         arcs[LAM0] += 1.0  # from the start point of the curve
         return [arcs, arcs, x, z, speeds, force]
 
-    def _delay(self, along: _Along, launch: _Along, motion: Any, points: Any) -> Array:
+    def places_at(self, motion: Any, points: Any, v: Array, ds: Array) -> Array:
+        """The derivatives of lam alone, as of `at`, where v and ds/dlam are known."""
+        share, launch = self._share(points), self._at_launch(motion, points)
+        delay = self._delay(self._scale * self._rates(share)[1][1:], launch, motion, points)
+        found: Array = self._places(share) + v / ds * delay + points.laps * self._lap_gradient
+        return found
+
+    def _share(self, points: Any) -> Array:
+        """The shares of the phase at points."""
+        share: Array = np.zeros_like(points.laps)
+        for _, mask, phi in points.segments:
+            share[mask] = phi / self._scale
+        return share
+
+    def _delay(self, times: Array, launch: _Along, motion: Any, points: Any) -> Array:
         """How much further on, in time, the body is at the times of points."""
         gradient = self._derivatives.duration_gradient[:, None]
         if self._derivatives.direction:
-            delay: Array = -along.times - points.laps * gradient
+            delay: Array = -times - points.laps * gradient
             moves = self._derivatives.launch_moves[:, None]
             delay += motion.direction * launch.path[2][0] / motion.problem.launch.v0.value * moves
             return delay
@@ -181,5 +200,5 @@ class OrbitSensitivity:
             before = timed.t_start[0] - timed.sense * timed.r_start[0] + motion.direction * first.r_start[0]
             sense[mask] = timed.sense
             swings[mask] += round(before / half_period)
-        delay = motion.direction * self._launch_delay(launch, motion) - swings * gradient - sense * along.times
+        delay = motion.direction * self._launch_delay(launch, motion) - swings * gradient - sense * times
         return delay

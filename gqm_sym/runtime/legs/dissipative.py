@@ -66,7 +66,7 @@ from gqm_sym.runtime.legs.leg_record import (
 )
 from gqm_sym.runtime.legs.leg_run import ASYMPTOTE, FULL, LIFTOFF, LIMIT, NARROWED, PAUSED, SPENT, TURN
 from gqm_sym.runtime.legs.leg_segments import Run, TabulatedPiece, along_field, along_panels, leg_record, tabulated
-from gqm_sym.runtime.legs.variations.answers import Switch, gradient, nearest_switch, states_at
+from gqm_sym.runtime.legs.variations.answers import Switch, gradient, nearest_switch, places_at, states_at
 from gqm_sym.runtime.legs.variations.changes import Changes
 from gqm_sym.runtime.motion.aperiodic import MotionAtRest
 from gqm_sym.runtime.motion.events import Leg, passages
@@ -347,6 +347,15 @@ class DissipativeMotion(Motion):
         found = states_at(self, self._changes, times, low)
         fields = (getattr(found, name) for name in Sensitivity._fields[1:])
         return Sensitivity(tuple(rows), *(field[list(rows.values())].reshape(len(rows), *shape) for field in fields))
+
+    @locked
+    def place_changes(self, t: Any, wrt: Any) -> Array:
+        """The derivatives of the curve parameter at given times; see `Motion.place_changes`."""
+        rows = selected(self.problem.formulas.parameters, wrt)
+        times, low, shape = self._times(t)
+        self._trajectory(float(times.max(initial=0.0)))
+        found: Array = places_at(self, self._changes, times, low)[list(rows.values())].reshape(len(rows), *shape)
+        return found
 
     @property
     @locked

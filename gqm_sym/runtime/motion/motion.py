@@ -247,6 +247,10 @@ class Motion(ABC):
         """`sensitivity`, of which the contact force is right only where that has a sign."""
         raise self._without_gradients()
 
+    def place_changes(self, t: Any, wrt: Any) -> Array:
+        """The derivatives of the curve parameter alone, as of `sensitivity`, which takes longer."""
+        return self.sensitivity(t, wrt).lam
+
     @property
     def action(self) -> float:
         """The integral of (1 + beta) V ds over one period, per mass, in m2/s (libration and circulation).

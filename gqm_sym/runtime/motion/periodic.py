@@ -20,6 +20,7 @@ from gqm_sym.runtime.gradients.sensitivity import OrbitSensitivity, Sensitivity
 from gqm_sym.runtime.gradients.spectrum import Fourier, fourier
 from gqm_sym.runtime.launch.kinds import MotionKind
 from gqm_sym.runtime.launch.problem import Problem
+from gqm_sym.runtime.launch.speed import path_and_force_at
 from gqm_sym.runtime.motion import timing
 from gqm_sym.runtime.motion.events import Event
 from gqm_sym.runtime.motion.locking import locked
@@ -259,6 +260,19 @@ class PeriodicMotion(Motion):
         found = self._orbit_sensitivity.at(self, points, self._places(points), self._velocities(points))
         chosen = [array[list(rows.values())].reshape(len(rows), *shape) for array in found]
         return Sensitivity(tuple(rows), *chosen)
+
+    @locked
+    def place_changes(self, t: Any, wrt: Any) -> Array:
+        """The derivatives of the curve parameter at given times; see `Motion.place_changes`."""
+        if self.problem.formulas.chart is not None:
+            return super().place_changes(t, wrt)
+        rows = selected(self.problem.formulas.parameters, wrt)
+        times, low, shape = self._times(t)
+        points, f = self._phase_points(times, low), self.problem.functions
+        v = self._velocities(points)
+        ds = path_and_force_at(f.addresses, f.p, self._places(points), v**2)[2]
+        found = self._orbit_sensitivity.places_at(self, points, v, ds)
+        return found[list(rows.values())].reshape(len(rows), *shape)
 
     @locked
     def fourier(self, quantity: str, n: int) -> Fourier:

@@ -14,6 +14,7 @@ from gqm_sym.runtime.compiled.types import INTEGER, MATRIX, VECTOR, Array
 from gqm_sym.runtime.gradients.orbit import path_rows
 from gqm_sym.runtime.gradients.quantities import EXTREMES
 from gqm_sym.runtime.gradients.quantities import QUANTITIES as PERIODIC_QUANTITIES
+from gqm_sym.runtime.launch.speed import path_and_force_at
 from gqm_sym.runtime.legs.leg_record import END, END_LOW, HEADING
 from gqm_sym.runtime.legs.variations.changes import Changes
 from gqm_sym.runtime.legs.variations.equation import LawRows
@@ -77,10 +78,7 @@ class StateChanges:
     law: LawRows
 
     def __init__(self, changes: Changes, points: PhasePoints, v: Array) -> None:
-        half, w = np.empty(v.size, dtype=np.intp), np.empty(v.size)
-        for timed, here, phi in points.segments:
-            last = np.nan if timed.segment.speed_series is None else timed.segment.speed_series[0]
-            half[here], w[here] = changes.half(timed.leg, timed.sense < 0), phi * last
+        half, w = _marched(changes, points)
         parts = [
             self._part(changes, half[start : start + BLOCK], w[start : start + BLOCK], v[start : start + BLOCK])
             for start in range(0, max(v.size, 1), BLOCK)
@@ -100,6 +98,24 @@ class StateChanges:
         force = load + v**2 * curvature + 2.0 * v * path[3][0] * faster
         rates = (np.broadcast_to(rate, lam.shape) for rate in (acceleration, mass * law.load[0] * v / law.ds))
         return np.array([lam, law.ds * lam + along.arc, x, z, faster, force, *rates])
+
+
+def _marched(changes: Changes, points: PhasePoints) -> tuple[NDArray[np.intp], Array]:
+    """The halves of legs on which points lie, and their march variables."""
+    half, w = np.empty(points.laps.size, dtype=np.intp), np.empty(points.laps.size)
+    for timed, here, phi in points.segments:
+        last = np.nan if timed.segment.speed_series is None else timed.segment.speed_series[0]
+        half[here], w[here] = changes.half(timed.leg, timed.sense < 0), phi * last
+    return half, w
+
+
+def places_at(motion: Any, changes: Changes, t: Array, low: Array) -> Array:
+    """How the places of a motion at times, of two doubles each, change."""
+    points, f = motion._phase_points(t, low), motion.problem.functions
+    (lam, moved, delay), v = changes.delays(*_marched(changes, points)), motion._velocities(points)
+    ds = path_and_force_at(f.addresses, f.p, lam, v**2)[2]
+    places: Array = moved - v / ds * delay + points.laps * changes.lap[:, None]
+    return places
 
 
 def states_at(motion: Any, changes: Changes, t: Array, low: Array) -> StateChanges:
