@@ -11,6 +11,7 @@ import warnings
 from pathlib import Path
 
 from calls import profile
+from gradients import gradients
 from half_periods import half_periods
 from legs import legs
 from load_maps import load_maps
@@ -65,7 +66,7 @@ def main() -> int:
     output = parser.parse_args().output
     warnings.simplefilter("ignore", IntegrationWarning)  # the errors show what QUADPACK warns about
     results = []
-    for row in [*half_periods(), *sampling(), *legs(), *load_maps(), *many_launches()]:
+    for row in [*half_periods(), *sampling(), *legs(), *load_maps(), *many_launches(), *gradients()]:
         results.append(measured(row))
         print(f"{row.work:<45} {row.who:<60} {readable(results[-1].seconds):>9} {results[-1].error:9.2g}", flush=True)
     output.write_text(page(results, second_process()), encoding="utf-8")

@@ -86,13 +86,13 @@ def draw_curve(curve: Curve, lam: Any, axes: Any, parameters: dict[str, Any]) ->
     for name in parameters.keys() - set(curve.parameters):
         raise ArgumentError(unknown_argument("Curve.plot", name, ("lam", "axes", *curve.parameters)))
     if not curve.charted:
-        return drawn(*outline(curve, lam, parameters), curve.title, axes)
+        return drawn(outline(curve, lam, parameters), curve.title, axes)
     values_of(curve, parameters)
     model = transient(derive(curve, Gravity())).MODEL
     chart = model.charted(model.numbers(tuple({**model.parameters, **parameters}.values())))
     low, high = (chart.low, chart.high) if lam is None else (read_number(end, where="lam").value for end in lam)
-    x, z = chart.points([low + (high - low) * k / SAMPLES for k in range(SAMPLES + 1)])[:2]
-    return drawn(x, z, curve.title, axes)
+    points = chart.points([low + (high - low) * k / SAMPLES for k in range(SAMPLES + 1)])[:2]
+    return drawn(points, curve.title, axes)
 
 
 def write_module(text: str, path: str | os.PathLike[str], *, force: bool = False) -> bool:

@@ -39,6 +39,20 @@ REMARKS = {
         "ds/dtheta = 2*R*sin(theta/2) holds for 0 < theta < 2*pi only; at both ends are cusps, where a motion ends.",
         "`inverted=True` hangs it: the tautochrone, whose period 4*pi*sqrt(R/g) does not depend on the amplitude.",
     ),
+    "helix": (
+        "Its parameter is proportional to arc length, and its curvature R/(R**2 + c**2) is constant.",
+        "A body that slides down a slope of angle a with friction tends to a speed: "
+        "kappa*V**2 = g*sqrt(sin(a)**2/mu**2 - cos(a)**2).",
+    ),
+    "conical_helix": (
+        "At theta = 0 it passes through the tip of the cone, with a tangent along the x axis and upwards.",
+    ),
+    "torus_knot": (
+        "p and q are whole numbers from 1 to 12 that are fixed when the curve is declared; with p = 2 and q = 3, which "
+        "they are if nothing is said, it is the trefoil.",
+        "Where p and q have a common divisor it is passed several times in 2*pi, and its period is shorter.",
+    ),
+    "viviani": ("Half of its period is a loop: it meets itself at the point (2*a, 0, 0).",),
     "implicit": (
         "The parameter is arc length from the point `start`; it grows along (-F_z, F_x)/|grad F| where tangent=1, "
         "along the opposite where tangent=-1.",
@@ -54,6 +68,8 @@ REMARKS = {
 }
 
 UNTITLED = {"cartesian_graph": "Graph of a function", "implicit": "Curve given by an equation"}
+# The modules that are made from families of another name, and families of which there is none.
+MODULES = {"helix": "helix_coulomb", "conical_helix": "", "torus_knot": ""}
 # Where a family takes arguments: those, and the module that is made from it.
 EXAMPLES: dict[str, tuple[tuple[str, ...], dict[str, tuple[str, ...]], str]] = {
     "cartesian_graph": (("x**4/4 + x**3/10 + x**2/2",), {}, "quartic"),
@@ -63,7 +79,7 @@ EXAMPLES: dict[str, tuple[tuple[str, ...], dict[str, tuple[str, ...]], str]] = {
 
 def page(name: str) -> str:
     """The page of one family."""
-    given, named, module = EXAMPLES.get(name, ((), {}, name))
+    given, named, module = EXAMPLES.get(name, ((), {}, MODULES.get(name, name)))
     curve: Curve = getattr(gqm.families, name)(*given, **named)
     spelled = [_quoted(text) for text in given]
     spelled += [f"{key}=({', '.join(map(_quoted, texts))})" for key, texts in named.items()]
@@ -79,7 +95,8 @@ def page(name: str) -> str:
     parts += [_conventions(model), ""]
     parts += [f"- {remark}" for remark in REMARKS[name]]
     parts += ["", "Under gravity, launched at place and speed with the index 0:", "", "$$", model.latex(), "$$", ""]
-    parts += [f"A module made from it: [`generated/{module}.py`](../../generated/{module}.py).", ""]
+    if module:
+        parts += [f"A module made from it: [`generated/{module}.py`](../../generated/{module}.py).", ""]
     if name == "cycloid":
         hung = gqm.derive(gqm.families.cycloid(inverted=True), gqm.Gravity())
         parts += ["## Upside down", "", "$$", hung.latex(), "$$", ""]
@@ -104,7 +121,12 @@ def _conventions(model: Model) -> str:
 def pages() -> dict[Path, str]:
     """All pages by their files."""
     names = list(REMARKS)
-    index = ["# Families of curves", "", "The rows of the paper's Table 3, with their conventions as corrected.", ""]
+    index = [
+        "# Families of curves",
+        "",
+        "The rows of the paper's Table 3, with their conventions as corrected, and space curves.",
+        "",
+    ]
     index += [f"- [{name}]({name}.md)" for name in names]
     return {FOLDER / "index.md": "\n".join([*index, ""]), **{FOLDER / f"{name}.md": page(name) for name in names}}
 

@@ -332,7 +332,7 @@ def _families(options: argparse.Namespace) -> None:
 
     print("cartesian_graph(phi)\n    z = phi(x)\n    The graph of a function of x.")
     for row in FAMILIES.values():
-        print(f"{row.name}({', '.join(row.arguments)})")
+        print(f"{row.name}({', '.join(row.takes)})")
         print(f"    {', '.join(_formulas(row))}")
         print(f"    {row.title}{f'; {row.note}' if row.note else ''}.")
     print(
@@ -342,7 +342,7 @@ def _families(options: argparse.Namespace) -> None:
 
 
 def _formulas(row: "Family") -> list[str]:
-    parts = [f"{label} = {text}" for label, text in (("r", row.r), ("x", row.x), ("z", row.z)) if text]
+    parts = [f"{label} = {text}" for label, text in (("r", row.r), ("x", row.x), ("y", row.y), ("z", row.z)) if text]
     if row.domain:
         parts.append(f"{row.domain[0]} <= {row.parameter} <= {row.domain[1]}")
     if row.period:

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Mapping
 from itertools import product
-from math import hypot, isfinite
+from math import dist, hypot, isfinite
 
 import sympy as sp
 
@@ -10,7 +10,7 @@ from gqm_sym.errors import DeclarationError
 from gqm_sym.expressions import common_measure
 from gqm_sym.parameters import Value, tried_values
 
-Point = tuple[sp.Expr, sp.Expr]
+Point = tuple[sp.Expr, ...]
 
 # Places at which a period is tried, and the share of the coordinates that may be left.
 PLACES = (-2.71, -1.3, -0.37, 0.113, 0.59, 1.17, 1.93, 2.83)
@@ -77,8 +77,7 @@ def check_period(
     gap = _gap(point, lam, period, values)
     if gap is None or gap <= SHARE:
         return
-    x, z = point
-    right = found_period((x.xreplace(values), z.xreplace(values)), lam)
+    right = found_period(tuple(form.xreplace(values) for form in point), lam)
     remedy = "leave it out: the curve does not close" if right is None else f"give {right}"
     raise DeclarationError(
         f"{kind}: period: after {period} of {lam.name} the curve is not where it was, but {gap:.3g} of its size away; "
@@ -120,14 +119,14 @@ def _gap(point: Point, lam: sp.Symbol, period: sp.Expr, values: Mapping[sp.Symbo
     length = float(period.xreplace(dict(values)))
     functions = [sp.lambdify(lam, form.xreplace(dict(values)), "math") for form in point]
 
-    def at(place: float) -> tuple[float, float] | None:
+    def at(place: float) -> tuple[float, ...] | None:
         try:
-            x, z = (float(function(place)) for function in functions)
+            found = tuple(float(function(place)) for function in functions)
         except (ArithmeticError, TypeError, ValueError):
             return None
-        return (x, z) if isfinite(x) and isfinite(z) else None
+        return found if all(map(isfinite, found)) else None
 
-    def pairs() -> Iterator[tuple[tuple[float, float], tuple[float, float]]]:
+    def pairs() -> Iterator[tuple[tuple[float, ...], tuple[float, ...]]]:
         for share, turns in product(PLACES, (0, 1)):
             here, there = at(share * length / 3 + turns * length), at(share * length / 3 + (turns + 1) * length)
             if here is not None and there is not None:
@@ -137,4 +136,4 @@ def _gap(point: Point, lam: sp.Symbol, period: sp.Expr, values: Mapping[sp.Symbo
     if not found:
         return None
     size = max(hypot(*there) + hypot(*here) for here, there in found)
-    return max(hypot(b[0] - a[0], b[1] - a[1]) for a, b in found) / size if size else 0.0
+    return max(dist(a, b) for a, b in found) / size if size else 0.0

@@ -1,4 +1,4 @@
-"""A planar curve as it was declared: coordinates, parameter, domain and run-time parameters."""
+"""A curve as it was declared: coordinates, parameter, domain and run-time parameters."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
@@ -25,15 +25,15 @@ Source: TypeAlias = str | int | sp.Expr
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Curve:
-    """A curve ``(x(λ), z(λ))``, z upwards; made by one of the constructors below.
+    """A curve ``(x(λ), z(λ))``, or ``(x(λ), y(λ), z(λ))``, z upwards; made by one of the constructors below.
 
     Attributes
     ----------
     kind
-        The form in which it was declared: ``graph``, ``parametric``, ``polar``; of a charted curve ``implicit``,
-        ``sampled``, ``piecewise`` or ``polynomial``.
-    x, z
-        The coordinates, in the parameter and the run-time parameters.
+        The form in which it was declared: ``graph``, ``parametric``, ``polar``, ``space``; of a charted curve
+        ``implicit``, ``sampled``, ``piecewise`` or ``polynomial``.
+    x, z, y
+        The coordinates, in the parameter and the run-time parameters; y is 0 on curves of all kinds but ``space``.
     parameter
         The symbol of λ.
     domain
@@ -63,23 +63,44 @@ class Curve:
     positive: tuple[str, ...] = ()
     radius: sp.Expr | None = None
     definition: object = None
+    y: sp.Expr = sp.S.Zero
 
     def __post_init__(self) -> None:
-        if self.parameter not in self.x.free_symbols | self.z.free_symbols:
+        if not any(self.parameter in form.free_symbols for form in self.point):
+            told = ", ".join(f"{name} = {form}" for name, form in self.coordinates)
             raise DeclarationError(
-                f"{self.kind} curve: neither coordinate depends on the parameter "
-                f"{self.parameter.name!r}; x = {self.x}, z = {self.z} is a point, not a curve"
+                f"{self.kind} curve: {'no' if self.in_space else 'neither'} coordinate depends on the parameter "
+                f"{self.parameter.name!r}; {told} is a point, not a curve"
             )
         one_line(self.title, where=f"{self.kind} curve: title")
         check_ends(self.kind, self.domain, self.period, self.parameter)
         check_order(self.kind, self.domain, self.period, dict(self.defaults))
         if self.period is not None:
-            check_period(self.kind, (self.x, self.z), self.parameter, self.period, dict(self.defaults))
+            check_period(self.kind, self.point, self.parameter, self.period, dict(self.defaults))
 
     @property
     def parameters(self) -> tuple[str, ...]:
         """Names of the run-time parameters, in order."""
         return tuple(name for name, _ in self.defaults)
+
+    @property
+    def in_space(self) -> bool:
+        """Whether it was declared by three coordinates."""
+        return self.kind == "space"
+
+    @property
+    def coordinates(self) -> tuple[tuple[str, sp.Expr], ...]:
+        """The coordinates by name: x and z, or x, y and z."""
+        return self.named(self.x, self.y, self.z)
+
+    def named(self, x: sp.Expr, y: sp.Expr, z: sp.Expr) -> tuple[tuple[str, sp.Expr], ...]:
+        """Forms that belong to the coordinates by the names of these: of a planar curve those of x and z."""
+        return (("x", x), *((("y", y),) if self.in_space else ()), ("z", z))
+
+    @property
+    def point(self) -> tuple[sp.Expr, ...]:
+        """The coordinates without their names."""
+        return tuple(form for _, form in self.coordinates)
 
     @property
     def charted(self) -> bool:
@@ -195,6 +216,35 @@ class Curve:
         x, z = radius * sp.cos(symbol), radius * sp.sin(symbol)
         forms = cls(kind="polar", x=x, z=z, parameter=symbol, title=title, radius=radius)
         return _declare(forms, domain, parameters, positive, period)
+
+    @classmethod
+    @checked("Curve.space")
+    def space(
+        cls,
+        *,
+        x: Source,
+        y: Source,
+        z: Source,
+        parameter: str,
+        period: Source | None = None,
+        domain: Iterable[Source | None] | None = None,
+        parameters: Parameters | None = None,
+        title: str = "",
+    ) -> "Curve":
+        """Declare a curve in space by its three coordinates; z is up.
+
+        Without ``period`` and ``domain`` it is closed where its coordinates are made of waves of commensurate rates.
+        The contact force of a space curve is a vector, and ``normal_force`` its length; on a curve in a vertical plane
+        it has the sign that it has on planar curves.
+
+        Examples
+        --------
+        >>> Curve.space(x="R*cos(u)", y="R*sin(u)", z="c*u", parameter="u").parameters
+        ('R', 'c')
+        """
+        symbol = _symbol(parameter, "space")
+        at = {name: read_expression(form, where=f"space: {name}") for name, form in (("x", x), ("y", y), ("z", z))}
+        return _declare(cls(kind="space", **at, parameter=symbol, title=title), domain, parameters, (), period)
 
     @classmethod
     @checked("Curve.implicit")
@@ -376,13 +426,15 @@ def _declare(
     unit = unit_of(parameter_dimension(forms)) or None
     ends = read_ends(domain, kind, unit)
     turn = None if period is None else read_expression(period, where=f"{kind}: period", unit=unit)
-    written = (forms.x, forms.z) if forms.radius is None else (forms.radius,)
+    written = forms.point if forms.radius is None else (forms.radius,)
     given = tuple(end for end in (*ends, turn) if end is not None)
     used = (*names_in_order(*written), *names_of_level, *names_in_order(*given))
     found = tuple(name for name in dict.fromkeys(used) if name != symbol.name)
+    if forms.in_space and "y" in found:
+        raise DeclarationError("space curve: 'y' is a coordinate and cannot be a run-time parameter; rename it")
     defaults = read_parameters(parameters, found=found, where=f"{kind} curve")
-    if turn is None and kind in ("parametric", "polar") and ends == (None, None):
-        turn = found_period((forms.x, forms.z), symbol)
+    if turn is None and kind in ("parametric", "polar", "space") and ends == (None, None):
+        turn = found_period(forms.point, symbol)
     promised = names(positive, where=f"{kind}: positive")
     for name in promised:
         if name not in found:

@@ -1,4 +1,4 @@
-"""The curves of the paper's Table 3 by name: a table, and one call for each of its rows.
+"""The curves of the paper's Table 3 and space curves by name: a table, and one call for each of its rows.
 
 ``families.ellipse(a=2, b="b_e")`` declares an ellipse whose semi-axis a is 2 unless another value
 is given at run time, and whose b is called ``b_e``. A new family is a row here and one in
@@ -6,11 +6,11 @@ is given at run time, and whose b is called ``b_e``. A new family is a row here 
 """
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import sympy as sp
 
-from gqm_sym.arguments import checked, flag, short, unknown_argument
+from gqm_sym.arguments import checked, flag, nearest, short, unknown_argument
 from gqm_sym.declare.curve import Curve, Source, check_parameter_name
 from gqm_sym.errors import ArgumentError, DeclarationError
 from gqm_sym.expressions import read_expression
@@ -27,8 +27,10 @@ class Family:
         The run-time parameters by their usual names; all but those in ``signed`` are lengths.
     signed
         Arguments that may be negative.
-    x, z, r
-        Texts of the coordinates, or of the radius of a polar curve.
+    whole
+        Whole numbers that shape the curve, each with its value if none is given.
+    x, y, z, r
+        Texts of the coordinates, or of the radius of a polar curve; only space curves have y.
     domain, period
         Texts, empty where there is none.
     """
@@ -38,7 +40,9 @@ class Family:
     parameter: str
     arguments: tuple[str, ...]
     signed: tuple[str, ...] = ()
+    whole: tuple[tuple[str, int], ...] = ()
     x: str = ""
+    y: str = ""
     z: str = ""
     r: str = ""
     domain: tuple[str, str] | None = None
@@ -64,15 +68,15 @@ class Family:
         inverted
             Turn the curve upside down: z becomes -z.
         arguments
-            For each argument of the family another name or a value.
+            For each argument of the family another name or a value; for a whole number that number.
         """
         where = f"families.{self.name}"
         if unnamed:
-            named = ", ".join(f"{n}={short(v)}" for n, v in zip(self.arguments, unnamed, strict=False))
+            named = ", ".join(f"{n}={short(v)}" for n, v in zip(self.takes, unnamed, strict=False))
             raise ArgumentError(f"{where}: takes arguments by name only; write {where}({named})")
         for given in arguments:
-            if given not in self.arguments:
-                names_here = (*self.arguments, "parameter", "domain", "inverted")
+            if given not in self.takes:
+                names_here = (*self.takes, "parameter", "domain", "inverted")
                 raise ArgumentError(unknown_argument(where, given, names_here))
         flag(inverted, where=f"{where}: inverted")
         called = self.parameter if parameter is None else check_parameter_name(parameter, where)
@@ -91,8 +95,10 @@ class Family:
             if argument not in self.signed:
                 positive.append(name)
 
+        whole = {_symbol(name): _whole(arguments.get(name), value, f"{where}: {name}") for name, value in self.whole}
+
         def read(text: str) -> sp.Expr:
-            return read_expression(text, where=where).xreplace(renamed)
+            return read_expression(text, where=where).xreplace({**renamed, **whole})
 
         ends = domain
         if ends is None and self.domain is not None:
@@ -123,6 +129,18 @@ class Family:
                 title=title,
                 positive=positive,
             )
+        if self.y:
+            in_space = Curve.space(
+                x=read(x),
+                y=read(self.y),
+                z=sign * read(z),
+                parameter=called,
+                domain=ends,
+                period=period,
+                parameters=names,
+                title=title,
+            )
+            return replace(in_space, positive=tuple(positive))
         return Curve.parametric(
             x=read(x),
             z=sign * read(z),
@@ -133,6 +151,23 @@ class Family:
             title=title,
             positive=positive,
         )
+
+    @property
+    def takes(self) -> tuple[str, ...]:
+        """The names of the run-time parameters and of the whole numbers."""
+        return (*self.arguments, *dict(self.whole))
+
+
+def _whole(given: object, value: int, where: str) -> sp.Expr:
+    """Read a whole number from 1 to `MAX_WHOLE`, which may be written as text."""
+    number = value if given is None else read_expression(given, where=where)
+    if not (number == int(number) if isinstance(number, int) else number.is_Integer) or not 1 <= number <= MAX_WHOLE:
+        raise DeclarationError(f"{where}: must be a whole number from 1 to {MAX_WHOLE}, got {short(given)}")
+    return sp.Integer(number)
+
+
+# The largest whole number that shapes a curve: derivations of more windings take minutes.
+MAX_WHOLE = 12
 
 
 def _symbol(name: str) -> sp.Symbol:
@@ -200,6 +235,49 @@ FAMILIES: dict[str, Family] = {
             domain=("0", "2*pi"),
             note="an arch between two cusps; inverted=True hangs it as the tautochrone",
         ),
+        Family(
+            name="helix",
+            title="Helix of radius R that rises by c for each radian",
+            parameter="theta",
+            arguments=("R", "c"),
+            signed=("c",),
+            x="R*cos(theta)",
+            y="R*sin(theta)",
+            z="c*theta",
+            note="a space curve; theta grows counter-clockwise as seen from above",
+        ),
+        Family(
+            name="conical_helix",
+            title="Conical helix that widens by a and rises by c for each radian",
+            parameter="theta",
+            arguments=("a", "c"),
+            signed=("c",),
+            x="a*theta*cos(theta)",
+            y="a*theta*sin(theta)",
+            z="c*theta",
+            note="a space curve on a cone whose tip is at the origin",
+        ),
+        Family(
+            name="torus_knot",
+            title="Torus knot on a ring of radius R and a tube of radius r",
+            parameter="theta",
+            arguments=("R", "r"),
+            whole=(("p", 2), ("q", 3)),
+            x="(R + r*cos(q*theta))*cos(p*theta)",
+            y="(R + r*cos(q*theta))*sin(p*theta)",
+            z="r*sin(q*theta)",
+            note="a space curve, p times round the z axis and q times round the tube; R > r",
+        ),
+        Family(
+            name="viviani",
+            title="Viviani's curve on a sphere of radius 2*a",
+            parameter="theta",
+            arguments=("a",),
+            x="a*(1 + cos(theta))",
+            y="a*sin(theta)",
+            z="2*a*sin(theta/2)",
+            note="a space curve where a sphere about the origin meets an upright cylinder of half its radius",
+        ),
     )
 }
 
@@ -239,7 +317,9 @@ def __getattr__(name: str) -> Callable[..., Curve]:
     try:
         return FAMILIES[name]
     except KeyError:
-        raise AttributeError(f"there is no family {name!r}; known are {', '.join(names())}") from None
+        near = nearest(name, names())
+        hint = f"did you mean {near}? " if near else ""
+        raise AttributeError(f"there is no family {name!r}; {hint}known are {', '.join(names())}") from None
 
 
 def __dir__() -> list[str]:

@@ -16,12 +16,8 @@ class DeclaredCurve(FormulaCurve, Protocol):
     """What is read of a curve here (`curve.Curve` is one)."""
 
     @property
-    def x(self) -> sp.Expr:
-        """The horizontal coordinate."""
-
-    @property
-    def z(self) -> sp.Expr:
-        """The height."""
+    def coordinates(self) -> tuple[tuple[str, sp.Expr], ...]:
+        """The coordinates by name."""
 
     @property
     def radius(self) -> sp.Expr | None:
@@ -65,7 +61,7 @@ def curve_formulas(curve: DeclaredCurve) -> Formulas:
     if curve.charted:
         return Formulas()
     own = parameter_dimension(curve)
-    coordinates = (curve.x, curve.z) if curve.radius is None else (curve.radius,)
+    coordinates = [form for _, form in curve.coordinates] if curve.radius is None else [curve.radius]
     ends = [(end, own) for end in (*curve.domain, curve.period) if end is not None and own is not None]
     return Formulas([*((form, LENGTH) for form in coordinates), *ends], {lam.name: own})
 
@@ -73,9 +69,9 @@ def curve_formulas(curve: DeclaredCurve) -> Formulas:
 def parameter_dimension(curve: DeclaredCurve) -> Dimension | None:
     """Return what a curve's parameter is measured in; None where its formulas do not tell it at once."""
     lam = curve.parameter
-    if curve.kind == "parametric":
+    if curve.kind in ("parametric", "space"):
         # The argument of a wave with a number for its rate is an angle.
-        waves = [node for form in (curve.x, curve.z) for node in form.atoms(sp.sin, sp.cos, sp.tan)]
+        waves = [node for _, form in curve.coordinates for node in form.atoms(sp.sin, sp.cos, sp.tan)]
         return NUMBER if any(node.args[0].free_symbols == {lam} for node in waves) else None
     return NUMBER if curve.kind == "polar" else LENGTH
 
@@ -121,8 +117,10 @@ def _what(curve: DeclaredCurve) -> str:
     made = curve.definition
     if isinstance(made, Track):
         count = made.points.count("\n") + 1
-        between = "a quintic spline" if made.kind == "spline" else "stitched planes"
-        return f"{between} through {count} points, {'closed' if made.closed else 'open'}, in arc length s [m]"
+        between = f"{'a quintic spline' if made.kind == 'spline' else 'stitched planes'} through {count} points"
+        if made.smoothing is not None:
+            between = f"a smoothing spline of {len(made.smoothing.points)} points"
+        return f"{between}, {'closed' if made.closed else 'open'}, in arc length s [m]"
     if isinstance(made, Rail):
         kinds = ", ".join(piece.kind for piece in made.pieces[:8]) + (", ..." if len(made.pieces) > 8 else "")
         return f"{'closed ' if made.closed else ''}rail of {len(made.pieces)} pieces ({kinds}), in arc length s [m]"
@@ -142,4 +140,4 @@ def _forms(curve: DeclaredCurve) -> list[tuple[str, sp.Expr]]:
         return [("F", made.value), ("start", sp.Tuple(x, z))]
     if curve.charted:
         return []
-    return [("r", curve.radius)] if curve.radius is not None else [("x", curve.x), ("z", curve.z)]
+    return [("r", curve.radius)] if curve.radius is not None else list(curve.coordinates)

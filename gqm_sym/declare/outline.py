@@ -31,8 +31,8 @@ def values_of(curve: "Curve", given: Mapping[str, Any]) -> dict[str, Any]:
     return values
 
 
-def outline(curve: "Curve", lam: Any, given: Mapping[str, Any]) -> tuple[list[float], list[float]]:
-    """The coordinates of points of a curve with formulas, in order; NaN where it has none.
+def outline(curve: "Curve", lam: Any, given: Mapping[str, Any]) -> tuple[list[float], ...]:
+    """The coordinates x and z, or x, y and z, of points of a curve with formulas, in order; NaN where it has none.
 
     Parameters
     ----------
@@ -48,9 +48,9 @@ def outline(curve: "Curve", lam: Any, given: Mapping[str, Any]) -> tuple[list[fl
         for name, value in values_of(curve, given).items()
     }
     low, high = _range(curve, lam, values)
-    x, z = (sp.lambdify(curve.parameter, form.xreplace(values), "math") for form in (curve.x, curve.z))
+    forms = [sp.lambdify(curve.parameter, form.xreplace(values), "math") for form in curve.point]
     places = [low + (high - low) * k / SAMPLES for k in range(SAMPLES + 1)]
-    return [_number(x, place) for place in places], [_number(z, place) for place in places]
+    return tuple([_number(form, place) for place in places] for form in forms)
 
 
 def _range(curve: "Curve", lam: Any, values: dict[sp.Symbol, sp.Expr]) -> tuple[float, float]:

@@ -7,7 +7,7 @@ sign, or the base of a root has a zero of even order, tangents and curvatures to
 """
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from itertools import pairwise
+from itertools import combinations, pairwise
 from math import isfinite
 
 import sympy as sp
@@ -32,7 +32,7 @@ NEAR, NEARER, DIGITS = sp.Float("1e-12", 90), sp.Float("1e-24", 90), 90
 SAME, GROWS = 1e-3, 10
 
 Function = Callable[[float], float]
-Vector = tuple[sp.Expr, sp.Expr]
+Vector = tuple[sp.Expr, ...]
 
 
 def check_corners(curve: Curve, defaults: Mapping[str, Value | None]) -> None:
@@ -44,7 +44,7 @@ def check_corners(curve: Curve, defaults: Mapping[str, Value | None]) -> None:
         With the place, for the defaults; parameters without one are taken to be of the order of 1.
     """
     lam, values = curve.parameter, tried_values(defaults)
-    for zero in dict.fromkeys(_zeros((curve.x, curve.z), lam)):
+    for zero in dict.fromkeys(_zeros(curve.point, lam)):
         spend()
         for low, high in _changes(_function(zero, lam, values), curve, values):
             _compare(curve, values, zero, _root(zero.xreplace(values), lam, low, high))
@@ -164,47 +164,55 @@ def _root(form: sp.Expr, lam: sp.Symbol, low: float, high: float) -> sp.Expr:
 def _compare(curve: Curve, values: Mapping[sp.Symbol, sp.Expr], zero: sp.Expr, at: sp.Expr) -> None:
     """Compare the tangents to both sides of a place, and the curvature with that nearer to it."""
     lam = curve.parameter
-    first = [differentiate(form, lam) for form in (curve.x, curve.z)]
+    first = [differentiate(form, lam) for form in curve.point]
     forms = [form.xreplace(values) for form in (*first, *(differentiate(form, lam) for form in first))]
     size = 1 + abs(at)
     sides = [_seen(forms, lam, at + way * step * size) for way in (-1, 1) for step in (NEAR, NEARER)]
     if None in sides:
         return
     (_, left_far), (left, left_near), (_, right_far), (right, right_near) = (side for side in sides if side)
-    gap = abs(left[0] - right[0]) + abs(left[1] - right[1])
-    turned = abs(left[0] + right[0]) + abs(left[1] + right[1])
+    gap = sum(abs(a - b) for a, b in zip(left, right, strict=True))
+    turned = sum(abs(a + b) for a, b in zip(left, right, strict=True))
     if turned < SAME:
         return
     shown = 0.0 if abs(at) < NEARER else float(at)
     place = f"at {lam.name} = {shown:.6g}, where {zero} changes its sign"
     if gap > SAME:
-        degrees = float(sp.acos(left[0] * right[0] + left[1] * right[1]) * 180 / sp.pi)
+        degrees = float(sp.acos(sum(a * b for a, b in zip(left, right, strict=True))) * 180 / sp.pi)
         raise DeclarationError(
             f"{curve.kind} curve: the tangent turns by {degrees:.3g} degrees {place}: a corner, for which formulas "
             "have no rule; end the domain there, round it off, as sqrt(x**2 + r**2) for abs(x), or stitch planes by "
             "Curve.sampled(points, kind='linear'), at whose corners the speed is kept"
         )
-    near, far = (max(map(abs, pair)) for pair in ((left_near, right_near), (left_far, right_far)))
+    near, far = (max(map(abs, pair)) for pair in ((*left_near, *right_near), (*left_far, *right_far)))
     if near > GROWS * far and near > 1:
         raise DeclarationError(
             f"{curve.kind} curve: the curvature, and with it the contact force, is infinite {place}, though the "
             "tangent is continuous; end the domain there, or round it off, as (x**2 + r**2)**p for (x**2)**p"
         )
 
-    jump, before = abs(left_near - right_near), abs(left_far - right_far)
+    jump, before = (
+        max(abs(a - b) for a, b in zip(*pair, strict=True)) for pair in ((left_near, right_near), (left_far, right_far))
+    )
     if jump > SAME and jump > before / 2:
+        if curve.in_space:
+            raise DeclarationError(f"space curve: the curvature jumps {place}; end the domain there, or round it off")
         raise DeclarationError(
-            f"{curve.kind} curve: the curvature jumps {place}, from {float(left_near):.4g} to {float(right_near):.4g}; "
-            "join the two sides, each with its domain, by Curve.piecewise, which knows of joints"
+            f"{curve.kind} curve: the curvature jumps {place}, from {float(left_near[0]):.4g} to "
+            f"{float(right_near[0]):.4g}; join the two sides, each with its domain, by Curve.piecewise, which knows of "
+            "joints"
         )
 
 
-def _seen(forms: list[sp.Expr], lam: sp.Symbol, place: sp.Expr) -> tuple[Vector, sp.Expr] | None:
-    """The unit tangent and the signed curvature at a place; None where they are not real numbers."""
-    dx, dz, ddx, ddz = (form.xreplace({lam: place}).evalf(DIGITS) for form in forms)
-    if not all(value.is_real and value.is_finite for value in (dx, dz, ddx, ddz)):
+def _seen(forms: list[sp.Expr], lam: sp.Symbol, place: sp.Expr) -> tuple[Vector, Vector] | None:
+    """The unit tangent and the curvature by each pair of coordinates; None where they are not real numbers."""
+    values = [form.xreplace({lam: place}).evalf(DIGITS) for form in forms]
+    if not all(value.is_real and value.is_finite for value in values):
         return None
-    speed = sp.sqrt(dx**2 + dz**2).evalf(DIGITS)
+    first, second = values[: len(values) // 2], values[len(values) // 2 :]
+    speed = sp.sqrt(sum(part**2 for part in first)).evalf(DIGITS)
     if speed == 0:
         return None
-    return (dx / speed, dz / speed), (dx * ddz - dz * ddx) / speed**3
+    pairs = combinations(range(len(first)), 2)
+    bends = tuple((first[i] * second[j] - first[j] * second[i]) / speed**3 for i, j in pairs)
+    return tuple(part / speed for part in first), bends

@@ -16,17 +16,27 @@ from gqm_sym.derivation.algebra.rewrite import check_real, without_poles
 from gqm_sym.derivation.algebra.signs import Signs
 from gqm_sym.derivation.corners import check_corners, check_powers, without_known_bars
 from gqm_sym.derivation.defaults import join
-from gqm_sym.derivation.forces.dissipation import LOAD, PUSH, SIGMA, TILT, TURN, Dissipation, dissipation
-from gqm_sym.derivation.forces.forces import Forces, forces
+from gqm_sym.derivation.forces.dissipation import (
+    LOAD,
+    LOADS,
+    PUSH,
+    SIGMA,
+    TILT,
+    TURN,
+    TURNS,
+    Dissipation,
+    dissipation,
+)
+from gqm_sym.derivation.forces.forces import Forces, Place, forces, is_planar
 from gqm_sym.derivation.forces.speed import LAM0, V0, SpeedField, conservative_speed, dissipative_speed
-from gqm_sym.derivation.geometry.geometry import Geometry, geometry
+from gqm_sym.derivation.geometry.geometry import AHEAD, PAIRS, Geometry, geometry, vertical_plane
 from gqm_sym.derivation.geometry.level_set import LevelSet, level_set
 from gqm_sym.derivation.geometry.offset_curve import beside
 from gqm_sym.derivation.reality import check_somewhere_real
 from gqm_sym.derivation.wells.symmetric_orbits import SymmetricOrbits, symmetric_orbits
 from gqm_sym.derivation.wells.symmetry import Symmetry, symmetry
 from gqm_sym.dimensions import COMMON, found_dimensions, unit_of
-from gqm_sym.errors import ArgumentError, renamed
+from gqm_sym.errors import ArgumentError, DeclarationError, renamed
 from gqm_sym.kernels.base import (
     CONTACT_SIGN,
     DIRECTION,
@@ -35,6 +45,7 @@ from gqm_sym.kernels.base import (
     Kernel,
     W,
     X,
+    Y,
     Z,
     kernel_formulas,
     units_by_role,
@@ -64,14 +75,14 @@ class Model:
         One line for people.
     parameter, lam0, v0, mass
         The symbols of λ, of the launch and of the mass.
-    x, z
-        Coordinates.
-    ds, dxds, dzds
+    x, y, z
+        Coordinates; y is 0 on planar curves.
+    ds, dxds, dyds, dzds
         σ = ds/dλ ≥ 0 and the components of the unit tangent.
     kappa
-        Signed curvature, positive to the left of growing λ.
+        Signed curvature, positive to the left of growing λ; of a curve in no vertical plane its absolute value.
     turning_rate, turning_angle
-        dΘ/dλ, and Θ from ``lam0`` to λ.
+        dΘ/dλ, and Θ from ``lam0`` to λ; of a curve in no vertical plane |dt/dλ|, and None.
     cusp
         A smooth factor of σ that changes sign or vanishes at the cusps; None without cusps.
     potential, inertia
@@ -83,7 +94,12 @@ class Model:
     symmetric_orbits
         The time of orbits about such a place as an integral without sines; None where there is no such form.
     static_normal_load
-        n₀ with N/m = κ W + n₀.
+        n₀ with N/m = κ W + n₀; of a curve in no vertical plane its length.
+    normal
+        The unit vector along which N is positive; of a curve in no vertical plane empty.
+    bend, loads
+        Of a curve in no vertical plane the vectors t × dt/ds and -t × F, by components, with which t × N/m = W·bend +
+        loads; else empty.
     dissipation
         What a force law that is not conservative does along the curve; None for a conservative one.
     speed_squared
@@ -93,7 +109,7 @@ class Model:
         ``closed``, ``quadrature`` (it holds an Integral) or ``equation`` (an unknown function: the law is not linear
         in W). Where it is not closed, the forms below hold W as a symbol.
     normal_force
-        N, positive along the normal to the left of growing λ.
+        N, positive along the normal to the left of growing λ; of a curve in no vertical plane |N|, which has no sign.
     side_force
         What a track that turns about the z axis carries out of its plane; 0 for one at rest.
     tangential_acceleration
@@ -103,7 +119,7 @@ class Model:
     regularised_integrand
         σ √((λ - λ₁)(λ₂ - λ)/W) between turning points ``lam1`` and ``lam2``: it stays finite.
     turning_point_equation, liftoff_equation
-        W = 0 and N = 0.
+        W = 0 and N = 0; a contact force without a sign has no such equation.
     liftoff_speed_squared
         v0² of the launch for which N = 0 at λ; None where W is not closed, or the curve is straight.
     defaults
@@ -126,13 +142,15 @@ class Model:
     v0: sp.Symbol
     mass: sp.Symbol
     x: sp.Expr
+    y: sp.Expr
     z: sp.Expr
     ds: sp.Expr
     dxds: sp.Expr
+    dyds: sp.Expr
     dzds: sp.Expr
     kappa: sp.Expr
     turning_rate: sp.Expr
-    turning_angle: sp.Expr
+    turning_angle: sp.Expr | None
     cusp: sp.Expr | None
     potential: sp.Expr
     inertia: sp.Expr
@@ -141,6 +159,9 @@ class Model:
     symmetry: Symmetry | None
     symmetric_orbits: SymmetricOrbits | None
     static_normal_load: sp.Expr
+    normal: tuple[sp.Expr, ...]
+    bend: tuple[sp.Expr, ...]
+    loads: tuple[sp.Expr, ...]
     dissipation: Dissipation | None
     speed_squared: sp.Expr
     speed_squared_form: str
@@ -150,7 +171,7 @@ class Model:
     time_integrand: sp.Expr
     regularised_integrand: sp.Expr
     turning_point_equation: sp.Eq
-    liftoff_equation: sp.Eq
+    liftoff_equation: sp.Eq | None
     liftoff_speed_squared: sp.Expr | None
     defaults: tuple[tuple[str, Value | None], ...]
     positive: tuple[str, ...]
@@ -182,6 +203,27 @@ class Model:
         """The parameter period of a closed curve."""
         return self.curve.period
 
+    def normal_force_at(self, v2: sp.Expr) -> sp.Expr:
+        """N where V² has a value; of a curve in no vertical plane |N|."""
+        if not self.loads:
+            return MASS * (self.kappa * v2 + self.static_normal_load)
+        return MASS * sp.sqrt(sp.Add(*(part**2 for part in self._turned_force(v2))))
+
+    def normal_force_vector_at(self, v2: sp.Expr) -> Place:
+        """The components of the contact force along x, y and z where V² has a value."""
+        way = (self.dxds, self.dyds, self.dzds)
+        if self.loads:
+            turned = self._turned_force(v2)
+            along_x, along_y, along_z = (MASS * (turned[i] * way[j] - turned[j] * way[i]) for i, j in PAIRS)
+            return along_x, along_y, along_z
+        force = self.normal_force_at(v2)
+        along_x, along_y, along_z = (force * part for part in self.normal)
+        return along_x, along_y, along_z
+
+    def _turned_force(self, v2: sp.Expr) -> tuple[sp.Expr, ...]:
+        """The vector t × N/m, which has the length of N/m."""
+        return tuple(bend * v2 + load for bend, load in zip(self.bend, self.loads, strict=True))
+
     @property
     def units(self) -> dict[str, str]:
         """SI units of the curve's parameter and of the run-time parameters, as far as the formulas tell them.
@@ -199,26 +241,25 @@ class Model:
         force, side, rate = self.normal_force, self.side_force, self.time_integrand
         turning, liftoff = self.turning_point_equation, self.liftoff_equation
         if self.dissipation is not None:
-            pressure = self.kappa * W + self.static_normal_load
-            force, rate = self.mass * pressure, self.ds / sp.sqrt(W)
-            turning, liftoff = (sp.Eq(form, 0, evaluate=False) for form in (W, pressure))
+            force, rate = self.normal_force_at(W), self.ds / sp.sqrt(W)
+            turning = sp.Eq(W, 0, evaluate=False)
+            if liftoff is not None:
+                liftoff = sp.Eq(self.kappa * W + self.static_normal_load, 0, evaluate=False)
             side = 2 * self.mass * self.force.spin * DIRECTION * sp.sqrt(W) * self.dxds
         return (
             *(self.level_set.closed_forms() if self.level_set else ()),
-            ("x", self.x),
-            ("z", self.z),
+            *self.curve.named(self.x, self.y, self.z),
             (f"ds/d{lam}", self.ds),
-            ("dx/ds", self.dxds),
-            ("dz/ds", self.dzds),
+            *((f"d{name}/ds", form) for name, form in self.curve.named(self.dxds, self.dyds, self.dzds)),
             ("kappa", self.kappa),
-            ("Theta", self.turning_angle),
+            *((("Theta", self.turning_angle),) if self.turning_angle is not None else ()),
             ("V**2" if self.dissipation is None else "W = V**2", self.speed_squared),
-            ("N", force),
+            ("|N|" if self.loads else "N", force),
             *((("N_b", side),) if side else ()),
             ("A", self.tangential_acceleration),
             (f"dt/d{lam}", rate),
             ("turning points", turning),
-            ("liftoff", liftoff),
+            *((("liftoff", liftoff),) if liftoff is not None else ()),
         )
 
     def equilibria(self, *, between: Any = None, **parameters: Any) -> "tuple[Equilibrium, ...]":
@@ -252,10 +293,11 @@ class Model:
 
     def __str__(self) -> str:
         """A few lines for people: the closed forms that a motion follows, and the parameters with their units."""
-        said = {"kappa": " [1/m]", "V**2": " [m**2/s**2]", "W = V**2": " [m**2/s**2]", "N": " [N]", "A": " [m/s**2]"}
+        said = {"kappa": " [1/m]", "V**2": " [m**2/s**2]", "W = V**2": " [m**2/s**2]", "A": " [m/s**2]"}
+        said |= {"N": " [N]", "|N|": " [N]"}
         lines = [f"{self.title or 'Model'}: {self.curve.kind} curve, {', '.join(name for name, _ in self.force.terms)}"]
         for label, form in self.closed_forms():
-            if label in said or label in ("x", "z", f"ds/d{self.parameter.name}"):
+            if label in said or label in ("x", "y", "z", f"ds/d{self.parameter.name}"):
                 text = str(form)
                 shown = text if len(text) <= MOST_SHOWN else text[: MOST_SHOWN - 3] + "..."
                 lines.append(f"  {label}{said.get(label, '')} = {shown}")
@@ -270,6 +312,7 @@ class Model:
             f"ds/d{self.parameter.name}": rf"\frac{{ds}}{{d{lam}}}",
             f"dt/d{self.parameter.name}": rf"\frac{{dt}}{{d{lam}}}",
             "dx/ds": r"\frac{dx}{ds}",
+            "dy/ds": r"\frac{dy}{ds}",
             "dF/dx": r"\frac{\partial F}{\partial x}",
             "dF/dz": r"\frac{\partial F}{\partial z}",
             "d2F/dx2": r"\frac{\partial^{2} F}{\partial x^{2}}",
@@ -347,28 +390,41 @@ def derive(
         raise ArgumentError(f"derive: parameters: must be names with values, as in {{'mu': 0.1}}, got {short(given)}")
     called = curve.title if title is None else one_line(title, where="derive: title")
     lam = curve.parameter
-    kernel = kernel.along(lam)
+    kernel = kernel.along(lam, in_space=curve.in_space)
+    if curve.in_space:
+        _refuse_planar_forces(kernel)
     defaults = join(curve, kernel, given)
     check_measured(dict(defaults), _units(curve, kernel), where="derive", final=True)
     check_order(curve.kind, curve.domain, curve.period, dict(defaults))
     values = dict(defaults)
     if not curve.charted:
         if curve.period is not None:
-            check_period(curve.kind, (curve.x, curve.z), lam, curve.period, values)
-        check_powers((("x", curve.x), ("z", curve.z)), curve, values)
+            check_period(curve.kind, curve.point, lam, curve.period, values)
+        check_powers(curve.coordinates, curve, values)
         check_corners(curve, values)
         signs = Signs(parameter=lam, domain=curve.domain, positive=curve.positive, may_be_positive=())
-        curve = replace(curve, **{name: without_known_bars(getattr(curve, name), signs) for name in ("x", "z")})
-    track = geometry(curve, may_be_positive=tuple(name for name in values if is_positive(values[name])))
+        curve = replace(curve, **{name: without_known_bars(form, signs) for name, form in curve.coordinates})
+    heading = vertical_plane(curve) if curve.in_space else AHEAD
+    if heading is not None and not is_planar(heading, (curve.x, curve.y, curve.z), kernel):
+        if not curve.in_space:
+            raise DeclarationError(
+                "derive: a force acts across the curve's plane, as of a centre with y != 0; declare the curve by "
+                "Curve.space, whose contact force is a vector"
+            )
+        heading = None
+    may_be_positive = tuple(name for name in values if is_positive(values[name]))
+    track = geometry(curve, may_be_positive=may_be_positive, heading=heading)
     x, z, shape = beside(without_poles(curve.x), without_poles(curve.z), track, kernel.radius)
-    law = forces(x, z, kernel, shape, lam)
+    y = without_poles(curve.y)
+    law = forces((x, y, z), kernel, shape, lam)
     if not curve.charted:
         check_powers((("potential", law.potential),), curve, values)
     loss, speed, level = None, conservative_speed(law, lam), level_set(curve)
     if not kernel.conservative:
-        loss = _losses(curve, kernel, x, z, law, shape)
+        loss = _losses(curve, kernel, (x, y, z), law, shape)
         speed = dissipative_speed(kernel, law, shape, loss, curve)
     pressure = shape.kappa * speed.held + law.static_normal_load
+    dxds, dyds, dzds = shape.tangent
     potential, slope = law.effective_potential, law.effective_potential_slope
     axes = None if loss or curve.charted else symmetry(potential, slope, shape.ds, lam)
     if axes and kernel.radius:  # of the path of a body's centre the sign of σ is known by numbers only
@@ -383,13 +439,15 @@ def derive(
         v0=V0,
         mass=MASS,
         x=x,
+        y=y,
         z=z,
         ds=shape.ds,
-        dxds=shape.dxds,
-        dzds=shape.dzds,
+        dxds=dxds,
+        dyds=dyds,
+        dzds=dzds,
         kappa=shape.kappa,
         turning_rate=shape.turning_rate,
-        turning_angle=shape.angle - shape.angle.xreplace(start),
+        turning_angle=None if shape.angle is None else shape.angle - shape.angle.xreplace(start),
         cusp=shape.cusp,
         potential=law.potential,
         inertia=kernel.inertia,
@@ -398,6 +456,9 @@ def derive(
         symmetry=axes,
         symmetric_orbits=symmetric_orbits(2 * potential, shape.ds, lam, axes),
         static_normal_load=law.static_normal_load,
+        normal=shape.normal,
+        bend=shape.bend,
+        loads=law.loads,
         dissipation=loss,
         speed_squared=speed.squared,
         speed_squared_form=speed.form,
@@ -407,18 +468,20 @@ def derive(
         time_integrand=shape.ds / sp.sqrt(speed.held),
         regularised_integrand=shape.ds * sp.sqrt((lam - LAM1) * (LAM2 - lam) / speed.held),
         turning_point_equation=sp.Eq(speed.squared, 0, evaluate=False),
-        liftoff_equation=sp.Eq(pressure, 0, evaluate=False),
-        liftoff_speed_squared=_liftoff_speed(speed, shape.kappa, law.static_normal_load),
+        liftoff_equation=None if law.loads else sp.Eq(pressure, 0, evaluate=False),
+        liftoff_speed_squared=None if law.loads else _liftoff_speed(speed, shape.kappa, law.static_normal_load),
         defaults=defaults,
         positive=shape.positive,
         at_least=kernel.at_least,
         notes=(*(() if level is None else (level.note,)), *shape.notes, *(() if loss is None else (speed.note,))),
         level_set=level,
     )
+    if law.loads:
+        model = replace(model, normal_force=model.normal_force_at(speed.held))
     for label, form in model.closed_forms():
         check_real(form, where=label)
     if not curve.charted:
-        tried = (("x", x), ("z", z), (f"ds/d{lam.name}", shape.ds), ("potential", law.potential))
+        tried = (*curve.named(x, y, z), (f"ds/d{lam.name}", shape.ds), ("potential", law.potential))
         check_somewhere_real(tried, lam, curve.domain, values)
     return model
 
@@ -433,14 +496,33 @@ def _units(curve: Curve, kernel: Kernel) -> dict[str, str]:
     return {name: told[name] for name in names if name in told}
 
 
-def _losses(curve: Curve, kernel: Kernel, x: sp.Expr, z: sp.Expr, law: Forces, shape: Geometry) -> Dissipation:
+def _refuse_planar_forces(kernel: Kernel) -> None:
+    """Refuse what there is for planar curves only."""
+    refused = (
+        ("rolling: radius", kernel.radius, "the path of the centre of a rolling body"),
+        ("rotating_frame", kernel.spin, "a turning frame"),
+        ("surface_tension", kernel.resistance, "a droplet's resistance"),
+    )
+    for name, given, what in refused:
+        if given:
+            raise DeclarationError(f"derive: {name}: {what} is known for planar curves only yet; leave it out")
+
+
+def _losses(curve: Curve, kernel: Kernel, place: Place, law: Forces, shape: Geometry) -> Dissipation:
     lam = curve.parameter
     signs = Signs(parameter=lam, domain=curve.domain, positive=shape.positive, may_be_positive=())
+    if law.loads and shape.cusp is not None and signs.sign(shape.cusp) is None:
+        raise DeclarationError(
+            f"derive: {shape.cusp} may vanish, which is a cusp; losses of energy on space curves with cusps are not "
+            "supported yet, so give a domain without one"
+        )
     # A curve's own parameter may be called x, and then means that in a law.
-    coordinates = {symbol: form for symbol, form in ((X, x), (Z, z)) if symbol != lam}
+    coordinates = {symbol: form for symbol, form in zip((X, Y, Z), place, strict=True) if symbol != lam}
     pieces = {
         **{SIGMA: shape.ds, KAPPA: shape.kappa, TURN: shape.turning_rate, TILT: shape.dxds},
         **{PUSH: law.push, LOAD: law.static_normal_load},
+        **dict(zip(TURNS, shape.turning, strict=False)),
+        **dict(zip(LOADS, law.loads, strict=False)),
     }
     loss = dissipation(kernel, pieces, coordinates, signs)
     for way, form in zip(("forwards", "backwards"), loss.holds, strict=True):

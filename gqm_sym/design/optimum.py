@@ -16,6 +16,7 @@ from gqm_sym.declare.curve import Curve
 from gqm_sym.derivation import derive
 from gqm_sym.design.tracks import read_constant
 from gqm_sym.errors import DeclarationError, GQMError, NoisyPointsWarning, SolutionError
+from gqm_sym.fitting.quotients import central_differences
 from gqm_sym.kernels import Kernel
 from gqm_sym.parameters import exact_value
 from gqm_sym.runtime.charts.sampled import Sampled
@@ -119,9 +120,13 @@ def minimise(
             found = tracks.answer(asked, x) / first
             return found if isfinite(found) else PENALTY
 
+        def quotients(function: Callable[[Array], Any], x: Array) -> Array:
+            steps = tracks.step * np.maximum(np.abs(x), tracks.size)
+            return central_differences(function, x, steps, tracks.low, tracks.high)
+
         def slopes(x: Array) -> Array:
             exact = tracks.gradient(asked, x)
-            return _quotients(value, x, tracks) if exact is None else exact / first
+            return quotients(value, x) if exact is None else exact / first
 
         held = [(name, low, high) for name, (low, high) in wanted.items()]
 
@@ -129,7 +134,7 @@ def minimise(
             return np.concatenate([np.ones(1), *tracks.margins(x, held, between)])
 
         def steepness(x: Array) -> Array:
-            return _quotients(margins, x, tracks)
+            return quotients(margins, x)
 
         found = minimize(
             value,
@@ -181,17 +186,6 @@ def _check(tracks: "_Tracks", x: Array, held: list[Any], between: Any, where: st
 def _scale(low: float, high: float) -> float:
     """The size of a limit, by which its margin is measured."""
     return max((abs(end) for end in (low, high) if isfinite(end)), default=1.0) or 1.0
-
-
-def _quotients(function: Callable[[Array], Any], x: Array, tracks: "_Tracks") -> Array:
-    """Central difference quotients by everything that is free, which is the last axis; one-sided at its limits."""
-    columns = []
-    for k in range(x.size):
-        step = tracks.step * max(abs(x[k]), tracks.size)
-        ends = [min(max(x[k] + move, tracks.low[k]), tracks.high[k]) for move in (-step, step)]
-        sides = [function(np.where(np.arange(x.size) == k, end, x)) for end in ends]
-        columns.append((sides[1] - sides[0]) / (ends[1] - ends[0]))
-    return np.stack(columns, axis=-1)
 
 
 class _Tracks(ABC):

@@ -50,7 +50,7 @@ def _source(model: Model, name: str) -> str:
         return "-" if e is None else sympy.srepr(e)
 
     curve = model.curve
-    parts = [name, model.title, model.parameter.name, exact(curve.x), exact(curve.z)]
+    parts = [name, model.title, model.parameter.name, *(exact(form) for form in curve.point)]
     parts += [
         exact(e)
         for e in (*curve.domain, curve.period, model.effective_potential, model.static_normal_load, model.inertia)

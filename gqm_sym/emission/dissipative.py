@@ -6,13 +6,17 @@ from dataclasses import dataclass, replace
 import sympy
 from sympy import Expr, Symbol
 
-from gqm_sym.derivation.forces.dissipation import LOAD, PUSH, SIGMA, TILT, TURN, Dissipation
+from gqm_sym.derivation.forces.dissipation import LOAD, LOADS, PUSH, SIGMA, TILT, TURN, TURNS, Dissipation
 from gqm_sym.emission.context import Lowering
 from gqm_sym.emission.ir import Assignment, ExactIR, FunctionIR
 from gqm_sym.emission.subscripts import at
 from gqm_sym.kernels.base import CONTACT_SIGN, DIRECTION, KAPPA, W
 
-_NAMES = {SIGMA: "ds", KAPPA: "kappa", TURN: "turn", LOAD: "n0", PUSH: "push", TILT: "dxds"}
+_NAMES = {
+    **{SIGMA: "ds", KAPPA: "kappa", TURN: "turn", LOAD: "n0", PUSH: "push", TILT: "dxds"},
+    **{symbol: f"turn_{axis}" for symbol, axis in zip(TURNS, "xyz", strict=True)},
+    **{symbol: f"load_{axis}" for symbol, axis in zip(LOADS, "xyz", strict=True)},
+}
 """The names in emitted code of the geometric forms that a force law is written in."""
 
 
@@ -41,12 +45,15 @@ def speed_equation(lowering: Lowering, loss: Dissipation) -> FunctionIR:
     places, speeds, v, nu = names("places"), names("speeds"), names.symbol("v"), names.symbol("nu")
     linearised = "" if loss.linear else ", linearised at V**2 = w"
     law = _Law(
-        outputs=(SIGMA, loss.drive, loss.decay, LOAD, KAPPA),
+        outputs=(SIGMA, loss.drive, loss.decay, *loss.contact),
         begin=() if loss.linear else ((names.symbol("w"), at(speeds)),),
         symbols={DIRECTION: v, CONTACT_SIGN: nu, W: names.symbol("w")},
     )
+    contact, force = "n0, kappa", ", N = m*(kappa*V**2 + n0)"
+    if lowering.model.loads:
+        contact, force = ("|n0|, |kappa|" if loss.linear else "|N|/m, 0"), ""
     doc = (
-        f"ds/d{lam}, P, Q, n0, kappa: dV**2/d{lam} = P - Q*V**2{linearised}, N = m*(kappa*V**2 + n0) (paper, eq. 19); "
+        f"ds/d{lam}, P, Q, {contact}: dV**2/d{lam} = P - Q*V**2{linearised}{force} (paper, eq. 19); "
         "v = sgn(ds/dt), nu = sgn(N)."
     )
     function = _in_pieces(lowering, loss, "speed_equation", (places, speeds, v, nu), doc, law)

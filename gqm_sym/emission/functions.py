@@ -129,7 +129,9 @@ def enclosure(function: FunctionIR, parameter: str) -> tuple[dict[str, Any], set
     *count, lo, hi, p, out = function.arguments
     index = "_i" if "i" in {parameter} | {name for name, _ in function.parameters} else "i"
     here, row = (f"[{index}]", f", {index}") if function.batch else ("", "")
-    inside = [f"{parameter} = ({lo}{here}, {hi}{here})"]
+    values = (*(assignment.value for assignment in function.inside), *function.outputs)
+    depends = any(parameter in {symbol.name for symbol in value.free_symbols} for value in values)
+    inside = [f"{parameter} = ({lo}{here}, {hi}{here})"] if depends else []
     inside += _together([(name, f"({p}[{i}{row}], {p}[{i}{row}])") for name, i in function.parameters])
     inside += _statements(function.inside, printer)
     for k, e in enumerate(function.outputs):

@@ -118,7 +118,8 @@ class ModuleIR:
     the effective potential are compiled when they are first needed. ``rolling_radius`` is the radius of a rolling body
     that must fit into its track, empty for any other; ``static_friction_limit`` names beta and mu_static of one that
     may slip. ``units`` are the SI units of the curve's parameter and of the run-time parameters, as far as they are
-    known. ``monotone`` says that there are no cusps,
+    known. ``in_space`` and ``signed`` say whether it is of a space curve, and whether its contact force has a sign.
+    ``monotone`` says that there are no cusps,
     and that the effective potential rises or falls all the way between places of symmetry.
     """
 
@@ -142,3 +143,5 @@ class ModuleIR:
     units: tuple[tuple[str, str], ...]
     chart: ChartIR | None
     separated: SeparatedIR | None
+    in_space: bool
+    signed: bool

@@ -19,7 +19,7 @@ def load_map(lowering: Lowering) -> tuple[FunctionIR, ...]:
         return ()
     w0, level, places = names.symbol("w0"), names.symbol("level"), names("places")
     v2 = Function("speed_squared_from_potential")(w0, potential, level)
-    force = Symbol("m", real=True) * (model.kappa * v2 + model.static_normal_load)
+    force = model.normal_force_at(v2)
     grown, outputs = rising((model.x, model.z, model.ds, model.kappa, v2, force, size), names.symbol)
     return (
         lowering.function(

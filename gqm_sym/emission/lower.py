@@ -1,6 +1,6 @@
 """From a model's closed forms to functions as straight-line code."""
 
-from sympy import Expr, Function, Symbol
+from sympy import Expr, Function
 
 from gqm_sym.derivation import Model
 from gqm_sym.derivation.algebra.difference import Differences
@@ -14,7 +14,7 @@ from gqm_sym.emission.load_map import load_map
 from gqm_sym.emission.printer import check_emittable
 from gqm_sym.emission.separated import separated_terms
 from gqm_sym.emission.subscripts import at
-from gqm_sym.kernels.base import CONTACT_SIGN, DIRECTION, W
+from gqm_sym.kernels.base import CONTACT_SIGN, DIRECTION, MASS, W
 from gqm_sym.sympy_charts import chart_x, chart_z
 
 FLAGS = ("friction", "kinked", "linear")
@@ -42,7 +42,9 @@ def lower(model: Model, *, name: str, forms: tuple[tuple[str, Expr], ...]) -> Mo
         at_least=model.at_least,
         forms=forms,
         notes=model.notes,
-        functions=(lowering.path_and_contact_force(), *functions),
+        functions=(lowering.path_and_contact_force(), *lowering.path_in_space(), *functions),
+        in_space=model.curve.in_space,
+        signed=not model.loads,
         bounds=lowering.bounds(),
         batch=batch,
         bounds_batch=bounds_batch(lowering) if any(function.batch for function in batch) else None,
@@ -62,12 +64,15 @@ def _check(model: Model) -> None:
     names = {model.parameter.name, *model.parameters}
     low, high = model.domain
     forms = {
-        **{"x": model.x, "z": model.z, "ds": model.ds, "kappa": model.kappa},
+        **{"x": model.x, "y": model.y, "z": model.z, "ds": model.ds, "kappa": model.kappa},
         **{"static_normal_load": model.static_normal_load, "inertia": model.inertia},
         **{"effective_potential": model.effective_potential},
         **{"effective_potential_slope": model.effective_potential_slope},
         **{"domain, low": low, "domain, high": high, "period": model.period},
     }
+    if model.curve.in_space:
+        labels = (f"contact force, {axis}" for axis in "xyz")
+        forms |= dict(zip(labels, model.normal_force_vector_at(MASS), strict=True))
     loss = model.dissipation
     if loss is not None:
         names |= {DIRECTION.name, CONTACT_SIGN.name, W.name}
@@ -84,15 +89,30 @@ class _ModelLowering(Lowering):
     def path_and_contact_force(self) -> FunctionIR:
         """Position, metric, curvature and contact force, given the speed squared."""
         model, v2 = self.model, self.names.symbol("v2")
-        force = Symbol("m", real=True) * (model.kappa * v2 + model.static_normal_load)
         lam, places, speeds = self.place, self.names("places"), self.names("speeds")
+        form = "|N|" if model.loads else "N = m*(kappa*V**2 + n0)"
         return self.function(
             "path_and_contact_force",
             (places, speeds),
-            f"x, z, ds/d{lam}, curvature kappa, contact force N = m*(kappa*V**2 + n0), given V**2 (paper, eqs. 8, 15).",
+            f"x, z, ds/d{lam}, curvature kappa, contact force {form}, given V**2 (paper, eqs. 8, 15).",
             inside=[(lam, at(places)), (v2, at(speeds))],
-            outputs=(model.x, model.z, model.ds, model.kappa, force),
+            outputs=(model.x, model.z, model.ds, model.kappa, model.normal_force_at(v2)),
         )
+
+    def path_in_space(self) -> tuple[FunctionIR, ...]:
+        """The third coordinate of a space curve, and the contact force as a vector; nothing for a planar curve."""
+        model, v2 = self.model, self.names.symbol("v2")
+        places, speeds = self.names("places"), self.names("speeds")
+        if not model.curve.in_space:
+            return ()
+        function = self.function(
+            "path_in_space",
+            (places, speeds),
+            "y, and the contact force along x, y and z, given V**2.",
+            inside=[(self.place, at(places)), (v2, at(speeds))],
+            outputs=(model.y, *model.normal_force_vector_at(v2)),
+        )
+        return (function,)
 
     def potentials(self) -> tuple[FunctionIR, ...]:
         """The effective potential and its divided differences."""
@@ -146,16 +166,15 @@ class _ModelLowering(Lowering):
         model, loss = self.model, self.model.dissipation
         if model.curve.charted:
             return self.exact_potential() if loss is None else ()
+        bend, load = "Signed curvature", "n0 = N/m of a body at rest, so that N = m*(kappa*V**2 + n0)"
+        if model.loads:
+            bend, load = "Curvature", "|N|/m of a body at rest"
         named: tuple[tuple[str, str, tuple[Expr, ...]], ...] = (
             ("x", "Horizontal coordinate.", (model.x,)),
             ("z", "Height.", (model.z,)),
             ("ds", f"ds/d{self.place}.", (model.ds,)),
-            ("kappa", "Signed curvature (paper, eq. 8).", (model.kappa,)),
-            (
-                "static_normal_load",
-                "n0 = N/m of a body at rest, so that N = m*(kappa*V**2 + n0) (paper, eq. 15).",
-                (model.static_normal_load,),
-            ),
+            ("kappa", f"{bend} (paper, eq. 8).", (model.kappa,)),
+            ("static_normal_load", f"{load} (paper, eq. 15).", (model.static_normal_load,)),
         )
         path = tuple(self.exact_function(*entry, (self.place,)) for entry in named)
         if loss is not None:

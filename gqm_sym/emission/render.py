@@ -23,7 +23,7 @@ INTERFACE = 10
 # Functions that the runtime has in forms that fill vector registers; the rest is the standard library's.
 _ELEMENTARY = frozenset({"atan", "cos", "cosh", "exp", "sin", "sinh"})
 _MATH = frozenset({*FUNCTIONS.values(), "sqrt", "pi", "e"} - _ELEMENTARY)
-_RUNTIME = ("CompiledFunctions", "CompiledModel", "LaunchRequest", "Pass1")
+_RUNTIME = ("CompiledFunctions", "CompiledModel", "LaunchRequest")
 # Columns of the emitted import list.
 _WIDTH = 116
 # The functions of one motion, as the interface orders them.
@@ -42,6 +42,7 @@ _OWN = frozenset(
         *("Motion", "PARAMETERS", "Sweep", "TYPE_CHECKING", "carray", "chart", "chart_of", "compiled"),
         *("compiler", "fabs"),
         *("op", "pass1", "place_from_ends", "range", "self", "solve", "sweep"),
+        *("Pass1", "Pass1InSpace", "path_in_space"),
         *("Equilibrium", "ExactLaw", "SeparatedTerms", "between", "equilibria", "unknown"),
     }
 )
@@ -116,7 +117,8 @@ def render(module: ModuleIR, *, source: str) -> str:
 
 def _imported(module: ModuleIR, functions: _Functions) -> set[str]:
     """Names of the runtime that a module needs besides the functions that its formulas call."""
-    names = {*_RUNTIME, *(f["signature"] for f in functions.all), *(module.chart.imports if module.chart else ())}
+    names = {*_RUNTIME, _pass1(module), *(f["signature"] for f in functions.all)}
+    names |= set(module.chart.imports if module.chart else ())
     if _exact_formulas(module):
         names.add(_exact_class(module))
     if module.dissipation:
@@ -146,6 +148,9 @@ def _model_fields(module: ModuleIR, names: list[str]) -> dict[str, Any]:
         "for_equilibria": ", ".join(f"{name}={name}" for name in compiled[of_a_motion:]),
         "inertia": next((f.name for f in module.exact if f.name == "exact_inertia"), ""),
         "trigonometric": next((f.name for f in module.exact if f.name == "exact_trigonometric"), ""),
+        "pass1": _pass1(module),
+        "in_space": module.in_space,
+        "signed": module.signed,
         "load_map": "load_map" if "load_map" in names else "",
         "batch": _listed(_batch(module), _WIDTH - 8),
         "chart": module.chart.statement if module.chart else "",
@@ -176,6 +181,11 @@ def _separated(terms: SeparatedIR) -> str:
 def _exact_formulas(module: ModuleIR) -> list[str]:
     """The formulas over a namespace that a module hands over; empty where there are none."""
     return [function.name for function in module.exact if function.places]
+
+
+def _pass1(module: ModuleIR) -> str:
+    """What a load map is handed over as."""
+    return "Pass1InSpace" if module.in_space else "Pass1"
 
 
 def _exact_class(module: ModuleIR) -> str:

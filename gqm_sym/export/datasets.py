@@ -27,6 +27,11 @@ VARIABLES = {
     "kappa": ("signed curvature", "1/m"),
     "normal_force": ("contact force along the normal, which points to the left of increasing parameter", "N"),
 }
+# The same of what only states in space have.
+VARIABLES_IN_SPACE = {
+    "y": ("the other horizontal coordinate", "m"),
+    **{f"normal_{axis}": (f"contact force along {axis}", "N") for axis in "xyz"},
+}
 
 
 @require("data")
@@ -52,7 +57,8 @@ def dataset(motion: "Motion", t: Any = None) -> "Dataset":
     times = np.linspace(0.0, horizon(motion), SAMPLES) if t is None else t
     state = motion.state(times)
     formulas, launch = motion.problem.formulas, motion.problem.launch
-    columns = {name: (("t",), np.atleast_1d(getattr(state, name)), _attributes(*VARIABLES[name])) for name in VARIABLES}
+    known = VARIABLES | {name: text for name, text in VARIABLES_IN_SPACE.items() if name in state._fields}
+    columns = {name: (("t",), np.atleast_1d(getattr(state, name)), _attributes(*text)) for name, text in known.items()}
     columns["lam"][2]["parameter"] = formulas.parameter
     error = np.atleast_1d(motion.error_bound(times))
     columns["lam_error"] = (("t",), error, _attributes("bound of the error of lam", None))

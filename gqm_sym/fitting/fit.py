@@ -11,6 +11,7 @@ import numpy as np
 from gqm_sym.arguments import short, unknown_argument
 from gqm_sym.errors import GQMError, InputError, SolutionError
 from gqm_sym.fitting.data import Measurements, read_measurements
+from gqm_sym.fitting.quotients import central_differences
 from gqm_sym.fitting.result import Fit
 from gqm_sym.literals.numbers import read_number
 from gqm_sym.runtime.compiled.types import Array
@@ -79,9 +80,9 @@ def fit(module: ModuleType, data: Any, free: Mapping[str, Any], **fixed: Any) ->
     Notes
     -----
     Derivatives are those of ``motion.sensitivity`` and of sweeps with ``gradient``, which are exact to rounding, and
-    difference quotients of solved motions where these are not there yet, as along curves without formulas. Without
-    ``sigma`` all measurements have the same unknown standard deviation, which is estimated from the residuals. First
-    guesses for long series of positions must be so near that the fitted motion does not slip by a swing.
+    difference quotients of solved motions where these are not there yet, as with losses along curves without formulas.
+    Without ``sigma`` all measurements have the same unknown standard deviation, which is estimated from the residuals.
+    First guesses for long series of positions must be so near that the fitted motion does not slip by a swing.
     """
     from scipy.optimize import least_squares
 
@@ -173,17 +174,21 @@ class Residuals:
         sigma = measured.sigma
         self.sigma = np.ones(self.values.size) if sigma is None else np.concatenate([*sigma.values()])
         self._loses = module.MODEL.dissipation is not None
+        self._solved: tuple[Array, Any] | None = None
 
     def arguments(self, x: Array) -> dict[str, Any]:
         """All arguments of ``module.solve`` for values of what is to be found."""
         return {**self.fixed, **dict(zip(self.free.names, x.tolist(), strict=True))}
 
     def motion(self, x: Array) -> Any:
-        """The motion for values of what is to be found."""
+        """The motion for values of what is to be found; it answers for residuals and for their derivatives."""
+        if self._solved is not None and np.array_equal(self._solved[0], x):
+            return self._solved[1]
         arguments = self.arguments(x)
         if self.measured.place is not None and self._loses:
             arguments["t_max"] = AMPLE * float(self.values.max())
-        return self.module.solve(**arguments)
+        self._solved = x.copy(), self.module.solve(**arguments)
+        return self._solved[1]
 
     def __call__(self, x: Array) -> Array:
         """The residuals; NaN where there is no such motion, which the solver steps back from."""
@@ -229,30 +234,23 @@ class Residuals:
         if self.measured.t is not None:
             motion = self.motion(x)
             t = _until_rest(motion, self.measured.t)
+            if names == ("lam",):
+                return np.asarray(motion.place_changes(t, wrt)).T
             found, moves = motion.sensitivity(t, wrt=wrt), {"v": t == self.measured.t}
             return np.concatenate([(getattr(found, name) * moves.get(name, 1.0)).T for name in names])
         if self.measured.place is not None:
             motion = self.motion(x)
             times = _passages(motion, self.measured.place)
             # A change that carries the body further along has it pass the place earlier.
-            sooner: Array = motion.sensitivity(times, wrt=wrt).lam / _rates(motion, times)
+            sooner: Array = motion.place_changes(times, wrt) / _rates(motion, times)
             return -sooner.T
         shape = (*next(iter(self.measured.values.values())).shape, len(wrt))
         return np.concatenate([np.broadcast_to(self._swept(name, x, gradient=wrt).gradient, shape) for name in names])
 
     def _differences(self, x: Array) -> Array:
-        """Difference quotients, central unless a limit is near."""
-        columns = []
-        for k in range(x.size):
-            step = STEP * max(abs(x[k]), 1e-3 * max(abs(self.free.start[k]), 1.0))
-            ends = [min(max(x[k] + d, self.free.low[k]), self.free.high[k]) for d in (-step, step)]
-            values = []
-            for end in ends:
-                moved = x.copy()
-                moved[k] = end
-                values.append(self.predicted(moved))
-            columns.append((values[1] - values[0]) / (ends[1] - ends[0]))
-        return np.stack(columns, axis=1)
+        """Difference quotients."""
+        steps = STEP * np.maximum(np.abs(x), 1e-3 * np.maximum(np.abs(self.free.start), 1.0))
+        return central_differences(self.predicted, x, steps, self.free.low, self.free.high)
 
 
 def _until_rest(motion: Any, t: Array) -> Array:

@@ -11,6 +11,7 @@ import numpy as np
 from gqm_sym.arguments import one_of, short, unknown_argument
 from gqm_sym.errors import InputError, SolutionError
 from gqm_sym.fitting.fit import LAUNCH, units_of
+from gqm_sym.fitting.quotients import central_differences
 from gqm_sym.fitting.result import Fit, with_deviation
 from gqm_sym.literals.numbers import read_number
 from gqm_sym.runtime.compiled.types import Array
@@ -143,7 +144,9 @@ def uncertainty(
         raise SolutionError(f"uncertainty: {quantity}: {'; '.join(swept.status_counts())}")
     gradient = _gradient(module, quantity, values, fixed)
     if gradient is None:
-        gradient = _differences(answers, centre, np.sqrt(np.diag(covariance)))
+        steps = STEP * np.maximum(np.abs(centre), np.sqrt(np.diag(covariance)))
+        steps[steps == 0.0] = STEP
+        gradient = central_differences(lambda x: answers(x[None, :])[0], centre, steps)
     found = answers(centre + _draws(covariance, samples, seed))
     kept = found[np.isfinite(found)]
     return Uncertainty(
@@ -203,13 +206,3 @@ def _gradient(module: ModuleType, quantity: str, values: dict[str, float], fixed
     except (InputError, SolutionError):
         return None
     return np.array([*found.values()], dtype=np.float64)
-
-
-def _differences(answers: Any, centre: Array, deviations: Array) -> Array:
-    """Return central difference quotients, of one sweep."""
-    steps = STEP * np.maximum(np.abs(centre), deviations)
-    steps[steps == 0.0] = STEP
-    moves = np.diag(steps)
-    after, before = np.split(answers(np.concatenate([centre + moves, centre - moves])), 2)
-    quotients: Array = (after - before) / (2.0 * steps)
-    return quotients

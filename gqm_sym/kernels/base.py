@@ -44,6 +44,8 @@ from gqm_sym.parameters import (
 X = sp.Symbol("x", real=True)
 Z = sp.Symbol("z", real=True)
 """The coordinates of the plane, in which potentials are written."""
+Y = sp.Symbol("ŷ", real=True)
+"""The third coordinate, on space curves; in the plane it is 0, and a parameter may be called y there."""
 W = sp.Symbol("W", real=True)
 """V**2, in laws that are not linear in it."""
 DIRECTION = sp.Symbol("direction", real=True)
@@ -62,7 +64,8 @@ class Kernel:
     Attributes
     ----------
     potential
-        Potential energy per unit mass in the coordinates ``x`` and ``z``; the applied force is minus its gradient.
+        Potential energy per unit mass in the coordinates ``x`` and ``z``, on space curves also ``y``; the applied force
+        is minus its gradient.
     inertia
         What multiplies the acceleration: 1 for sliding, ``1 + beta`` for rolling.
     resistance
@@ -161,11 +164,26 @@ class Kernel:
         """Whether V**2 depends on the place alone."""
         return not any((self.resistance, self.drag, self.friction, self.tangential_law))
 
-    def along(self, parameter: sp.Symbol) -> "Kernel":
-        """Return the law on a curve of this parameter, which a law of the user's own may name."""
-        if parameter not in self.tangential_law.free_symbols:
-            return self
-        return replace(self, defaults=tuple(pair for pair in self.defaults if pair[0] != parameter.name))
+    def along(self, parameter: sp.Symbol, *, in_space: bool = False) -> "Kernel":
+        """Return the law on a curve of this parameter, which a law of the user's own may name.
+
+        On a space curve ``y`` is a coordinate, too.
+
+        Raises
+        ------
+        DeclarationError
+            If a parameter of the law with a value of its own is called ``y`` there.
+        """
+        own = {parameter.name} if parameter in self.tangential_law.free_symbols else set()
+        law = self
+        if in_space and "y" in self.parameters:
+            if dict(self.defaults)["y"] is not None:
+                raise DeclarationError("kernel: 'y' is a coordinate on a space curve; give the parameter another name")
+            own.add("y")
+            third = {sp.Symbol("y", real=True): Y}
+            forms = {name: getattr(self, name).xreplace(third) for name in ("potential", "tangential_law")}
+            law = replace(self, **forms)
+        return replace(law, defaults=tuple(pair for pair in self.defaults if pair[0] not in own)) if own else self
 
     def __add__(self, other: "Kernel") -> "Kernel":
         instance(other, Kernel, where="kernel: +", what="two kernels, as in Gravity() + CoulombFriction()")
@@ -251,7 +269,8 @@ def kernel_formulas(kernel: Kernel) -> Formulas:
     )
     numbers = ((kernel.friction, NUMBER), (kernel.static_friction, NUMBER), (kernel.inertia - 1, NUMBER))
     others = ((kernel.spin, dimension(second=-1)), (kernel.radius, LENGTH))
-    variables: dict[str, Dimension | None] = {X.name: LENGTH, Z.name: LENGTH, W.name: SPEED_SQUARED}
+    variables: dict[str, Dimension | None] = {symbol.name: LENGTH for symbol in (X, Y, Z)}
+    variables[W.name] = SPEED_SQUARED
     return Formulas([*fields, *numbers, *others], {**variables, DIRECTION.name: NUMBER})
 
 

@@ -21,7 +21,8 @@ def Potential(
     Parameters
     ----------
     U
-        Potential energy per unit mass in ``x`` and ``z``; its other symbols are parameters.
+        Potential energy per unit mass in ``x`` and ``z``, on space curves also in ``y``; its other symbols are
+        parameters.
     parameters
         Their defaults, or their names in the order wanted.
     """

@@ -11,12 +11,12 @@ from gqm_sym.runtime.compiled.emitted import compiler
 
 if TYPE_CHECKING:
     from gqm_sym.runtime.launch.equilibria import Equilibrium
-    from gqm_sym.runtime.launch.speed import Pass1
+    from gqm_sym.runtime.launch.speed import Pass1, Pass1InSpace
     from gqm_sym.runtime.model import CompiledModel
     from gqm_sym.runtime.motion.events import Event, Leg
     from gqm_sym.runtime.motion.extremes import Extreme
     from gqm_sym.runtime.motion.motion import Motion
-    from gqm_sym.runtime.motion.state import Energy, State
+    from gqm_sym.runtime.motion.state import Energy, State, StateInSpace
     from gqm_sym.runtime.sweep.result import Sweep
 
 __all__ = [
@@ -28,7 +28,9 @@ __all__ = [
     "Leg",
     "Motion",
     "Pass1",
+    "Pass1InSpace",
     "State",
+    "StateInSpace",
     "Sweep",
     "compiler",
 ]
@@ -42,7 +44,9 @@ _HOMES = {
     "Leg": "motion.events",
     "Motion": "motion.motion",
     "Pass1": "launch.speed",
+    "Pass1InSpace": "launch.speed",
     "State": "motion.state",
+    "StateInSpace": "motion.state",
     "Sweep": "sweep.result",
 }
 

@@ -13,6 +13,7 @@ function               arguments                      rows of ``out``
 ====================== ============================== ===============================================================
 path_and_contact_force n, lam, v2, p, out             x [m], z [m], ds/dlam [m/[lam]], curvature kappa [1/m], contact
                                                       force N = m*(kappa*v2 + n0) [N]
+path_in_space          n, lam, v2, p, out             y [m], and the contact force along x, y and z [N]
 load_map               n, w0, level, lam, p, out      x, z, ds/dlam, kappa, V**2 [m2/s2], N, and the size of the terms
                                                       of U [m2/s2], whose roundings are shares of it
 effective_potential    n, lam, p, out                 U [m2/s2], dU/dlam [m2/s2/[lam]]
@@ -32,6 +33,10 @@ dissipative one has ``speed_equation`` and ``static_balance`` instead, and the f
 energy and its equilibria, compiled when these are first asked for. On a leg with the signs v = sgn(ds/dt) and
 nu = sgn(N), ``dW/dlam = P - Q*W`` with W = V**2 (MATHS, section 2). For a law that is not linear in W, P and Q are its
 linearisation at the ``v2`` given: ``P - Q*v2`` is the law itself there. The contact force is ``N = m*(kappa*W + n0)``.
+
+Only modules of space curves have ``path_in_space``. Where such a curve lies in no vertical plane, the contact force has
+a length and no sign: N is that length, kappa the length of the curvature vector, and n0 that of N/m at rest. With
+friction the rows n0 and kappa of ``speed_equation`` are N/m at the ``v2`` given, and 0.
 
 ``separated_terms`` belongs to charted curves: U and n0 are sums of its parts times factors (`SeparatedTerms`), and it
 reads no other run-time parameters than those that it holds. Compiled when a sweep first asks for it.
@@ -83,6 +88,7 @@ REAL = types.float64
 MANY = types.CPointer(REAL)
 
 PATH_AND_CONTACT_FORCE = types.void(types.intp, MANY, MANY, MANY, MANY)
+PATH_IN_SPACE = PATH_AND_CONTACT_FORCE
 LOAD_MAP = types.void(types.intp, REAL, REAL, MANY, MANY, MANY)
 EFFECTIVE_POTENTIAL = types.void(types.intp, MANY, MANY, MANY)
 POTENTIAL_DIVDIFF1 = types.void(types.intp, REAL, MANY, MANY, MANY, MANY)
@@ -105,8 +111,8 @@ STATIC_BALANCE = types.void(types.intp, MANY, MANY, MANY)
 FIELD = types.void(types.intp, MANY, MANY, MANY, MANY)
 SEGMENT = types.void(types.intp, MANY, MANY, MANY)
 
-# Rows of path_and_contact_force and of load_map.
-PATH_ROWS, LOAD_MAP_ROWS = 5, 7
+# Rows of path_and_contact_force, of path_in_space and of load_map.
+PATH_ROWS, SPACE_ROWS, LOAD_MAP_ROWS = 5, 4, 7
 
 
 class Addresses(NamedTuple):

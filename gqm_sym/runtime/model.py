@@ -19,7 +19,14 @@ from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.launch.formulas import Formulas, ParameterValues
 from gqm_sym.runtime.launch.problem import bind
 from gqm_sym.runtime.launch.request import Launch, LaunchRequest, read_launch
-from gqm_sym.runtime.launch.speed import Pass1, fill_load_map, load_map_arrays, path_and_force_at
+from gqm_sym.runtime.launch.speed import (
+    Pass1,
+    Pass1InSpace,
+    fill_load_map,
+    load_map_arrays,
+    path_and_force_at,
+    path_in_space_at,
+)
 
 if TYPE_CHECKING:
     from gqm_sym.runtime.launch.equilibria import Equilibrium
@@ -83,7 +90,7 @@ class CompiledModel(Formulas):
         lam: Any,
         out: Any = None,
         unknown: Mapping[str, Any] = NOTHING,
-    ) -> Pass1:
+    ) -> Pass1 | Pass1InSpace:
         """Position, curvature, V**2 and contact force at places of the curve (MATHS, section 2).
 
         Parameters
@@ -94,14 +101,15 @@ class CompiledModel(Formulas):
             Values of the run-time parameters, in the order of the attribute ``parameters``.
         lam : number or array_like
             Places, as values of the curve parameter; strings, ints and Fractions are exact.
-        out : tuple of six arrays, optional
-            Arrays of doubles of the shape of ``lam`` to be filled; new ones are made if not given.
+        out : tuple of arrays, optional
+            Arrays of doubles of the shape of ``lam`` to be filled, as many as are returned; new ones are made if not
+            given.
         unknown : mapping, optional
             Arguments that the module's function does not have, which are refused.
 
         Returns
         -------
-        Pass1
+        Pass1, or Pass1InSpace of a space curve
             Arrays of the shape of ``lam``. Formulas are evaluated at any place; beyond the ends of a track that is
             known by points, by pieces or by an equation, all values are NaN.
 
@@ -120,18 +128,21 @@ class CompiledModel(Formulas):
         else:
             places, low_parts, shape = read_numbers(lam, where=self.parameter, unit=self.units.get(self.parameter))
             low_parts = low_parts if low_parts.any() else NO_LOW_PARTS
-        arrays, beyond = load_map_arrays(shape, places, out), self._beyond_ends(p, places)
+        kind = Pass1 if self.path_in_space is None else Pass1InSpace
+        arrays, beyond = load_map_arrays(kind, shape, places, out), self._beyond_ends(p, places)
         if self.dissipation is not None:
             from gqm_sym.runtime.legs.dissipative import launch_leg
 
             v2 = launch_leg(self, p, launch, places)
             x, z, ds, kappa, force = path_and_force_at(f.addresses, f.p, places, v2)
-            for array, values in zip(arrays, (x, z, ds, kappa, v2, force), strict=True):
+            for array, values in zip(arrays, (x, z, ds, kappa, v2, force), strict=False):
                 array[...] = (values if beyond is None else np.where(beyond, nan, values)).reshape(shape)
+            self._fill_in_space(f.p, places, arrays)
             return arrays
         start = (launch.lam0.value, launch.lam0.low, launch.v0.value**2)
         load_map = 0 if self.load_map is None else self.load_map.address
-        rows, past_cache = tuple(array.reshape(-1) for array in arrays), len(arrays) * places.nbytes >= LARGE
+        rows = tuple(array.reshape(-1) for array in arrays[: len(Pass1._fields)])
+        past_cache = len(rows) * places.nbytes >= LARGE
 
         def fill(part: slice) -> None:
             ends = part.start, part.stop
@@ -141,7 +152,21 @@ class CompiledModel(Formulas):
         if beyond is not None:
             for row in rows:
                 row[beyond] = nan
+        self._fill_in_space(f.p, places, arrays)
         return arrays
+
+    def _fill_in_space(self, p: Array, places: Array, arrays: Pass1 | Pass1InSpace) -> None:
+        """Fill what only the load map of a space curve has."""
+        if self.path_in_space is None:
+            return
+        address, v2 = self.path_in_space.address, arrays.v2.reshape(-1)
+        rows = [array.reshape(-1) for array in arrays[len(Pass1._fields) :]]
+
+        def fill(part: slice) -> None:
+            for row, values in zip(rows, path_in_space_at(address, p, places[part], v2[part]), strict=True):
+                row[part] = values
+
+        run_in_threads(fill, places.size, MIN_PLACES_PER_THREAD)
 
     def _beyond_ends(self, p: ParameterValues, places: Array) -> NDArray[np.bool_] | None:
         """Which places lie beyond the ends of a curve without formulas, where there is nothing; None if none does."""

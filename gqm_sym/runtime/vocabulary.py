@@ -40,12 +40,12 @@ _NAMES_BY_HOME = {
         "AGM_ARGUMENTS_BATCH BOUNDS BOUNDS_BATCH BatchFunctions CompiledFunctions DissipativeFunctions "
         "EFFECTIVE_POTENTIAL ExactFormulas ExactLaw ExactPotential FIELD INTEGRAND_INVARIANTS_BATCH LOAD_MAP "
         "ORBIT_INVARIANTS_BATCH "
-        "PATH_AND_CONTACT_FORCE POTENTIAL_DIVDIFF1 POTENTIAL_DIVDIFF1_BATCH POTENTIAL_DIVDIFF2 "
+        "PATH_AND_CONTACT_FORCE PATH_IN_SPACE POTENTIAL_DIVDIFF1 POTENTIAL_DIVDIFF1_BATCH POTENTIAL_DIVDIFF2 "
         "POTENTIAL_DIVDIFF2_BATCH SEGMENT SEPARATED_TERMS SPEED_EQUATION STATIC_BALANCE SeparatedTerms "
         "TIME_INTEGRAND_BATCH TURNING_POINT_BATCH"
     ),
     "launch.request": "LaunchRequest",
-    "launch.speed": "Pass1",
+    "launch.speed": "Pass1 Pass1InSpace",
     "model": "CompiledModel",
     "motion.motion": "Motion",
     "sweep.result": "Sweep",

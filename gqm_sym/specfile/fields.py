@@ -154,3 +154,4 @@ Ends: TypeAlias = Annotated[list[Expression | None], Field(min_length=2, max_len
 Length: TypeAlias = Annotated[str, AfterValidator(_in_metres), _checked(_check_number), WithJsonSchema(_TEXT_OR_NUMBER)]
 Place: TypeAlias = Annotated[list[Length], Field(min_length=2, max_length=2)]
 Centre: TypeAlias = Annotated[list[Expression], Field(min_length=2, max_length=2)]
+SpaceCentre: TypeAlias = Annotated[list[Expression], Field(min_length=2, max_length=3)]

@@ -175,7 +175,7 @@ class _Reader:
 
     def _check_names(self, curve: Curve, kernel: Kernel, declared: Parameters) -> None:
         """Note names that have no value, and values that have no use."""
-        defaults = {**dict(kernel.along(curve.parameter).defaults), **dict(curve.defaults)}
+        defaults = {**dict(kernel.along(curve.parameter, in_space=curve.in_space).defaults), **dict(curve.defaults)}
         right = [name for name, entry in declared.items() if entry is not None]
         unused = [name for name in right if name not in defaults and name != "m"]
         for name, default in defaults.items():
@@ -228,7 +228,7 @@ class _Reader:
         """Note units of another dimension than what they are given for has, whatever else is wrong."""
         written = {name: entry.unit for name, entry in declared.items() if entry is not None and entry.unit}
         if kernel is not None and curve is not None:
-            kernel = kernel.along(curve.parameter)
+            kernel = kernel.along(curve.parameter, in_space=curve.in_space)
         units, starts = expected_units(self.data, curve, kernel, written), launch_units(curve)
         given = [(("parameters", name), entry, units.get(name)) for name, entry in declared.items()]
         given += [(("launch", key), entry, starts.get(key)) for key, entry in launch or ()]

@@ -37,6 +37,7 @@ from gqm_sym.specfile.fields import (
     ParameterName,
     Place,
     Section,
+    SpaceCentre,
     Tangent,
     UnitText,
     split_value,
@@ -65,6 +66,17 @@ class Parametric(Section):
 
     x: Expression = Field(description="horizontal coordinate", examples=["L*cos(theta)"])
     z: Expression = Field(description="height", examples=["L*sin(theta)"])
+    parameter: CurveParameter = Field(description="the curve's parameter", examples=["theta"])
+    period: Expression | None = _PERIOD
+    domain: Ends | None = _DOMAIN
+
+
+class Space(Section):
+    """Three coordinates in a parameter; z is up."""
+
+    x: Expression = Field(description="horizontal coordinate", examples=["R*cos(theta)"])
+    y: Expression = Field(description="the other horizontal coordinate", examples=["R*sin(theta)"])
+    z: Expression = Field(description="height", examples=["c*theta"])
     parameter: CurveParameter = Field(description="the curve's parameter", examples=["theta"])
     period: Expression | None = _PERIOD
     domain: Ends | None = _DOMAIN
@@ -110,6 +122,10 @@ def _name_or_value(argument: str) -> tuple[Any, Any]:
     return (Expression, Field(default=None, description=what))
 
 
+def _whole_number(name: str, value: int) -> tuple[Any, Any]:
+    return (Expression, Field(default=None, description=f"the whole number {name}; {value} if not given"))
+
+
 FAMILY_MODELS: dict[str, type[Section]] = {
     "cartesian_graph": _family_model(
         "cartesian_graph",
@@ -122,6 +138,7 @@ FAMILY_MODELS: dict[str, type[Section]] = {
             row.title,
             {
                 **{argument: _name_or_value(argument) for argument in row.arguments},
+                **{name: _whole_number(name, value) for name, value in row.whole},
                 "inverted": (Flag, Field(default=False, description="upside down: -z for z")),
             },
         )
@@ -169,6 +186,7 @@ EXPLICIT: dict[str, CurveRow] = {
 RAILS = RailSchema.over({key: (row.model, row.declare, row.summary) for key, row in EXPLICIT.items()})
 CURVES: dict[str, CurveRow] = {
     **EXPLICIT,
+    "space": CurveRow(Space, lambda given: Curve.space(**given), "three coordinates in a parameter"),
     "implicit": CurveRow(Implicit, _declare_implicit, "F(x, z) = 0"),
     "points": CurveRow(POINTS, declare_track, "a track through the points of a file", reads_files=True),
     "pieces": CurveRow(RAILS.rail, RAILS.declare, "a rail of lines, arcs, clothoids and curves"),
@@ -176,7 +194,7 @@ CURVES: dict[str, CurveRow] = {
 
 # Arguments of kernels that are not a name or a value.
 _KERNEL_ARGUMENTS: dict[str, tuple[Any, Any]] = {
-    "U": (Expression, Field(description="potential energy per unit mass, in x and z")),
+    "U": (Expression, Field(description="potential energy per unit mass, in x and z, on space curves also in y")),
     "A": (
         Expression,
         Field(
@@ -188,7 +206,10 @@ _KERNEL_ARGUMENTS: dict[str, tuple[Any, Any]] = {
         Literal["resistance", "printed"],
         Field(default="resistance", description="printed: gamma*ell_c*kappa/m as the paper has it"),
     ),
-    "centre": (Centre, Field(default=None, description="its two coordinates; (0, 0) if not given")),
+    "centre": (
+        SpaceCentre,
+        Field(default=None, description="its coordinates x and z, or x, y and z; (0, 0) if not given"),
+    ),
 }
 
 

@@ -109,7 +109,7 @@ class StudyReader(ABC, Generic[P]):
         self.origin["curve_file"] = path.read_text(encoding="utf-8-sig")
         model = spec.derive()
         self.known = (*_LAUNCH, *(name for name, _ in model.defaults))
-        kernel = spec.kernel.along(spec.curve.parameter)
+        kernel = spec.kernel.along(spec.curve.parameter, in_space=spec.curve.in_space)
         units = {**expected_units(plain(spec.tree), spec.curve, kernel), **launch_units(spec.curve)}
         self.units = {**units, "direction": "1", **({"lam": units["lam0"]} if "lam0" in units else {})}
         return spec, model

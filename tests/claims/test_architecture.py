@@ -94,6 +94,7 @@ TESTED_THROUGH = {
     "compiled/types.py": "runtime/compiled/test_jit.py",
     "double_double/interpreter.py": "runtime/double_double/test_arithmetic.py",
     "double_double/nodes.py": "runtime/double_double/test_orbit_time.py",
+    "gradients/chart_programs.py": "runtime/gradients/test_charts.py",
     "gradients/evaluation.py": "runtime/gradients/test_quantities.py",
     "gradients/orbit.py": "runtime/gradients/test_quantities.py",
     "gradients/programs.py": "runtime/gradients/test_quantities.py",

@@ -82,9 +82,9 @@ def test_curve_and_kernel_must_not_share_a_name():
         derive(families.circle(), Potential("theta*z"))
 
 
-@pytest.mark.parametrize("centre", [(0,), (0, 0, 0), ("x", 0)])
+@pytest.mark.parametrize("centre", [(0,), (0, 0, 0, 0), ("x", 0), (0, "y", 0)])
 def test_a_centre_is_two_numbers(centre):
-    """Of the plane, and not moving with the body."""
+    """Of the plane, or three in space, and not moving with the body."""
     with pytest.raises(InputError, match="centre"):
         CentralForce(centre=centre)
 

@@ -15,6 +15,8 @@ from gqm_sym.kernels.base import CONTACT_SIGN, DIRECTION, KAPPA, Kernel, W
 
 # Names with a mark that no text of a user's can have.
 SIGMA, TURN, PUSH, LOAD, TILT = (sp.Symbol(name, real=True) for name in ("σ", "dΘ/dλ", "F·t", "n₀", "dx/ds"))
+TURNS = tuple(sp.Symbol(f"(t × dt/dλ)_{axis}", real=True) for axis in "xyz")
+LOADS = tuple(sp.Symbol(f"-(t × F)_{axis}", real=True) for axis in "xyz")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -31,6 +33,9 @@ class Dissipation:
         Tangential acceleration A in the pieces, so that dW/ds = 2 A.
     holds
         A of a body at rest that is about to move forwards and backwards, under static friction, in the pieces.
+    contact
+        The contact force per unit mass in the pieces: what of it is there at rest, and what W is multiplied by. Of a
+        curve in no vertical plane it has no sign, and where that law is not linear in W the first is all of it.
     friction, kinked, linear
         Whether it depends on the contact force, has a kink where κ changes sign, and is linear in W.
     """
@@ -40,6 +45,7 @@ class Dissipation:
     decay: sp.Expr
     acceleration: sp.Expr
     holds: tuple[sp.Expr, sp.Expr]
+    contact: tuple[sp.Expr, sp.Expr]
     friction: bool
     kinked: bool
     linear: bool
@@ -59,34 +65,42 @@ def dissipation(
     kernel
         The force law.
     pieces
-        Closed forms of SIGMA, KAPPA, TURN, PUSH, LOAD and TILT.
+        Closed forms of SIGMA, KAPPA, TURN, PUSH, LOAD and TILT, and on a curve in no vertical plane TURNS and LOADS.
     coordinates
-        What x and z are along the curve, where a law of the user's own names them.
+        What the coordinates are along the curve, where a law of the user's own names them.
     signs
         Of expressions on the curve.
     """
     v, nu = DIRECTION, CONTACT_SIGN
     resistance = _without_bars(kernel.resistance, pieces[KAPPA], signs)
     extra = kernel.tangential_law.xreplace(coordinates)
-    sliding, other = v * nu * kernel.friction, extra
+    sliding, other, contact = v * nu * kernel.friction, extra, (LOAD, KAPPA)
+    rubbing = sp.S.Zero
+    if kernel.friction and TURNS[0] in pieces:
+        # σ |N|/m, in which nothing is infinite at a cusp.
+        force = sp.sqrt(sp.Add(*((turn * W + SIGMA * load) ** 2 for turn, load in zip(TURNS, LOADS, strict=True))))
+        contact, rubbing, sliding = (force / SIGMA, sp.S.Zero), v * kernel.friction * force, sp.S.Zero
     if kernel.spin:
         # The contact force has a part out of the plane: friction is not linear in W.
         sideways = 2 * kernel.spin * TILT
         other -= v * kernel.friction * sp.sqrt((LOAD + KAPPA * W) ** 2 + sideways**2 * W)
         sliding = sp.S.Zero
     slope = differentiate(other, W)
-    linear = W not in sp.expand(slope).free_symbols
+    linear = W not in sp.expand(slope).free_symbols and not rubbing
     if linear:
         slope = sp.expand(slope)
     rest = sp.expand(other - slope * W) if linear else other - slope * W
-    resisting = v * resistance.xreplace({KAPPA: TURN})
+    resisting, rubbing_slope = v * resistance.xreplace({KAPPA: TURN}), differentiate(rubbing, W)
     return Dissipation(
         pieces=tuple(pieces.items()),
-        drive=2 * (SIGMA * (PUSH - sliding * LOAD + rest) - resisting) / kernel.inertia,
-        decay=2 * (SIGMA * (v * kernel.drag - slope) + sliding * TURN) / kernel.inertia,
-        acceleration=(PUSH - v * resistance - v * kernel.drag * W - sliding * (LOAD + KAPPA * W) + other)
+        drive=2 * (SIGMA * (PUSH - sliding * LOAD + rest) - resisting - (rubbing - rubbing_slope * W)) / kernel.inertia,
+        decay=2 * (SIGMA * (v * kernel.drag - slope) + sliding * TURN + rubbing_slope) / kernel.inertia,
+        acceleration=(
+            PUSH - v * resistance - v * kernel.drag * W - sliding * (LOAD + KAPPA * W) + other - rubbing / SIGMA
+        )
         / kernel.inertia,
         holds=(_held(kernel, resistance, extra, 1), _held(kernel, resistance, extra, -1)),
+        contact=contact,
         friction=bool(kernel.friction),
         kinked=bool(resistance.atoms(sp.Abs)),
         linear=linear,

@@ -7,8 +7,10 @@ import sympy as sp
 from gqm_sym.derivation.algebra.differentiate import differentiate
 from gqm_sym.derivation.algebra.normal_form import shortest
 from gqm_sym.derivation.algebra.rewrite import absorb_bars, multiplied_out, tidy, without_waves
-from gqm_sym.derivation.geometry.geometry import Geometry
-from gqm_sym.kernels.base import Kernel, X, Z
+from gqm_sym.derivation.geometry.geometry import PAIRS, Geometry, Heading
+from gqm_sym.kernels.base import Kernel, X, Y, Z
+
+Place = tuple[sp.Expr, sp.Expr, sp.Expr]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -26,9 +28,11 @@ class Forces:
     push
         F·t.
     static_normal_load
-        n₀ = -F·n: what the track carries at rest; N/m = κ W + n₀.
+        n₀ = -F·n: what the track carries at rest; N/m = κ W + n₀. Of a curve in no vertical plane its length.
     pressure
         σ n₀, in which no absolute values are left.
+    loads
+        Of a curve in no vertical plane: the components of t × (-F), so that t × N/m = W t × dt/ds - t × F.
     """
 
     potential: sp.Expr
@@ -37,22 +41,38 @@ class Forces:
     push: sp.Expr
     static_normal_load: sp.Expr
     pressure: sp.Expr
+    loads: tuple[sp.Expr, ...] = ()
 
 
-def forces(x: sp.Expr, z: sp.Expr, kernel: Kernel, shape: Geometry, lam: sp.Symbol) -> Forces:
-    """Put the coordinates of a curve in its parameter into the force law."""
-    along = {X: x, Z: z}
+def pulls(place: Place, kernel: Kernel) -> tuple[sp.Expr, ...]:
+    """The derivatives of the potential by x, y and z along a curve, and the potential itself."""
     # The force before the coordinates are put in: the curve's own symbols may be called x or z.
-    written = [
-        form.xreplace(along)
-        for form in (differentiate(kernel.potential, X), differentiate(kernel.potential, Z), kernel.potential)
-    ]
-    pull_x, pull_z, potential = forms = [without_waves(form) for form in written]
+    axes = (X, Y, Z)
+    written = (*(differentiate(kernel.potential, axis) for axis in axes), kernel.potential)
+    return tuple(form.xreplace(dict(zip(axes, place, strict=True))) for form in written)
+
+
+def is_planar(heading: Heading, place: Place, kernel: Kernel) -> bool:
+    """Whether it is proved that no force acts across a vertical plane, so that the contact force lies in it."""
+    cosine, sine = heading
+    pull_x, pull_y, *_ = pulls(place, kernel)
+    return bool(sp.expand(without_waves(cosine * pull_y - sine * pull_x)) == 0)
+
+
+def forces(place: Place, kernel: Kernel, shape: Geometry, lam: sp.Symbol) -> Forces:
+    """Put the coordinates x, y and z of a curve in its parameter into the force law."""
+    written = pulls(place, kernel)
+    forms = [without_waves(form) for form in written]
+    pull_x, pull_y, pull_z, potential = forms
+    if shape.heading is None:
+        return _in_space((pull_x, pull_y, pull_z), potential, kernel, shape)
+    cosine, sine = shape.heading
+    pull_x = cosine * pull_x + sine * pull_y
     # (F_x, F_z) turned into the tangent's frame, before the length of the tangent comes in: a
     # common root stays one piece.
     push = tidy(pull_x * shape.along + pull_z * shape.across)
     load = tidy(pull_z * shape.along - pull_x * shape.across)
-    if forms != written:
+    if forms != list(written):
         # Along a curve about the centre of a force most of its components cancels.
         push, load = (multiplied_out(form) for form in (push, load))
         if shape.cusp is None:
@@ -64,4 +84,21 @@ def forces(x: sp.Expr, z: sp.Expr, kernel: Kernel, shape: Geometry, lam: sp.Symb
         push=absorb_bars(-push * shape.per_length),
         static_normal_load=absorb_bars(load * shape.per_length),
         pressure=load * shape.size,
+    )
+
+
+def _in_space(pull: Place, potential: sp.Expr, kernel: Kernel, shape: Geometry) -> Forces:
+    """The same along a curve in no vertical plane."""
+    way = (shape.along, shape.sideways, shape.across)
+    push = tidy(sp.Add(*(part * rate for part, rate in zip(pull, way, strict=True))))
+    crossed = [tidy(way[i] * pull[j] - way[j] * pull[i]) for i, j in PAIRS]
+    load = tidy(sp.sqrt(without_waves(sp.Add(*(part**2 for part in crossed)))))
+    return Forces(
+        potential=potential,
+        effective_potential=tidy(potential / kernel.inertia),
+        effective_potential_slope=push * shape.size / kernel.inertia,
+        push=absorb_bars(-push * shape.per_length),
+        static_normal_load=load * sp.Abs(shape.per_length),
+        pressure=load * sp.Abs(shape.size),
+        loads=tuple(absorb_bars(part * shape.per_length) for part in crossed),
     )

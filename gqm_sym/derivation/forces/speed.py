@@ -85,11 +85,11 @@ def dissipative_speed(
         return SpeedField(squared=sp.Function(W.name, real=True)(lam), form=EQUATION)
     side = sp.Symbol("|κ|/κ", real=True)
     # What the law takes of a curve, without the absolute values in σ, and antiderivatives where those are known.
-    table = {
+    table: dict[sp.Expr, tuple[sp.Expr, sp.Expr | None]] = {
         SIGMA * PUSH: (-kernel.inertia * law.effective_potential_slope, -kernel.inertia * law.effective_potential),
         SIGMA * LOAD: (law.pressure, None),
         TURN: (shape.turning_rate, shape.angle),
-        sp.Abs(TURN): (side * shape.turning_rate, side * shape.angle),
+        sp.Abs(TURN): (side * shape.turning_rate, None if shape.angle is None else side * shape.angle),
     }
     drive, decay = (_Sum(form, table, shape.ds, lam) for form in (loss.drive, loss.decay))
     spent = decay.antiderivative()

@@ -13,26 +13,25 @@ from gqm_sym.derivation.algebra.signs import Signs
 MAX_TURNS = 4
 
 
-def tangent_angle(algebra: Algebra, first: Polynomial, second: Polynomial, weight: Polynomial, signs: Signs) -> sp.Expr:
-    """Return the angle of (first, second)/weight, up to a constant.
+def tangent_angle(algebra: Algebra, parts: tuple[Polynomial, ...], weight: Polynomial, signs: Signs) -> sp.Expr:
+    """Return the angle of two parts over a weight, up to a constant.
 
     Where one component, seen in a frame that turns evenly, never vanishes, it is that frame's
     angle and an arc tangent; else an ``atan2``, whose jumps by 2π whoever evaluates it must undo.
     """
-    u, v = (product(spell_ratio(algebra, part, weight)) for part in (first, second))
+    first, second = parts
+    u, v = (product(spell_ratio(algebra, part, weight)) for part in parts)
     for part, other, text, sign in ((first, second, u, 1), (second, first, v, -1)):
         if signs.nonzero(text) and signs.sign(text) is not None:
             return sign * sp.atan(product(spell_ratio(algebra, other, part)))
-    for turn, along, across in _turned(algebra, first, second):
+    for turn, along, across in turned(algebra, first, second):
         for part, other, sign in ((along, across, 1), (across, along, -1)):
             if _is_definite(algebra, signs, part):
                 return turn + sign * sp.atan(product(spell_ratio(algebra, other, part)))
     return sp.atan2(v, u)
 
 
-def _turned(
-    algebra: Algebra, first: Polynomial, second: Polynomial
-) -> Iterator[tuple[sp.Expr, Polynomial, Polynomial]]:
+def turned(algebra: Algebra, first: Polynomial, second: Polynomial) -> Iterator[tuple[sp.Expr, Polynomial, Polynomial]]:
     """Yield (u, v) as seen in frames that turn with multiples of an angle of the curve's own."""
     parts = (first, second)
     used = [pair for pair in algebra.pairs if any(pair.degree(monomial) for part in parts for monomial in part)]

@@ -467,13 +467,13 @@ class ChartPassage:
     formulas : BoundTape
         The effective potential as a function of the plane.
     found : (ROWS, COLUMNS) array
-        What `locate` has found.
+        What `locate` has found; it is an attribute, too.
     direction : int
         0 for a libration, else the sign of ds/dt on a lap.
     """
 
     def __init__(self, pieces: TruePieces, formulas: BoundTape, found: Array, direction: int) -> None:
-        self._pieces, self._found, self._direction = pieces, found, direction
+        self._pieces, self.found, self._direction = pieces, found, direction
         self._given = pieces.curve, *formulas.operands, found
 
     def _times(self, stops: Array, middle: int) -> Array:
@@ -485,12 +485,12 @@ class ChartPassage:
     @property
     def offsets(self) -> tuple[float, float]:
         """The distances of the turning points from the launch in arc length."""
-        return float(self._found[BEHIND, 0]), float(self._found[AHEAD, 0])
+        return float(self.found[BEHIND, 0]), float(self.found[AHEAD, 0])
 
     @property
     def turning_points(self) -> tuple[Bounded, Bounded]:
         """The lower and the upper turning point of a libration in arc length."""
-        found = self._found
+        found = self.found
         place = minus(found[PLACE, :2].tolist(), self._pieces.start_length)
         ways = minus((0.0, 0.0), found[BEHIND, :2].tolist()), found[AHEAD, :2].tolist()
         low, high = (found[PLACE, 2] + found[[BEHIND, AHEAD], 2]).tolist()
@@ -499,7 +499,7 @@ class ChartPassage:
     @cached_property
     def orbit(self) -> Orbit | None:
         """Duration and turning points; None where double-double arithmetic does not suffice."""
-        found = self._found
+        found = self.found
         if self._direction:
             count = len(self._pieces.curve.counts)
             stop = found[LAUNCH, :3] + (self._direction * count, 0.0, 0.0)
@@ -520,7 +520,7 @@ class ChartPassage:
         (n+1, 3) array or None
             Two doubles each, with a bound on the error; None where one is not found.
         """
-        found, curve = self._found, self._pieces.curve
+        found, curve = self.found, self._pieces.curve
         if self._direction and not len(phases):
             return np.zeros((1, 3))
         if self._direction:

@@ -15,7 +15,7 @@ from gqm_sym.runtime.double_double import interpreter
 from gqm_sym.runtime.double_double.interpreter import ROW
 from gqm_sym.runtime.double_double.nodes import LEVELS
 from gqm_sym.runtime.gradients.evaluation import MAX_NEXT_CHANGE, MAX_RATIO
-from gqm_sym.runtime.gradients.programs import Program, Source, turning_point_program
+from gqm_sym.runtime.gradients.programs import Program, Source
 
 # Why an orbit has no derivatives.
 UNDECIDED = (
@@ -87,8 +87,8 @@ class MultiprecisionOrbit:
     ----------
     source : Source
         The formulas.
-    program : Program
-        What is integrated along the orbit.
+    program, turns : Program
+        What is integrated along the orbit, and the step of Newton's method to a turning point with its derivatives.
     numbers : sequence of Number
         The run-time parameters, the launch place and the launch speed.
     direction : int
@@ -98,11 +98,17 @@ class MultiprecisionOrbit:
     """
 
     def __init__(
-        self, source: Source, program: Program, numbers: Sequence[Number], direction: int, offsets: tuple[float, float]
+        self,
+        source: Source,
+        program: Program,
+        turns: Program,
+        numbers: Sequence[Number],
+        direction: int,
+        offsets: tuple[float, float],
     ) -> None:
         from mpmath import MPContext
 
-        self._source, self._program, self._numbers = source, program, numbers
+        self._source, self._program, self._turns, self._numbers = source, program, turns, numbers
         self._direction, self._offsets = direction, offsets
         self._context = MPContext()
 
@@ -113,7 +119,7 @@ class MultiprecisionOrbit:
         lam0 = variables[self._source.parameters]
         if self._direction:
             return [*variables, lam0]
-        turns, ends, rows = turning_point_program(self._source), [], []
+        turns, ends, rows = self._turns, [], []
         for offset in (-self._offsets[0], self._offsets[1]):
             place = lam0 + offset
             for _ in range(NEWTON_STEPS):

@@ -8,7 +8,8 @@ derivatives are taken by: the run-time parameters, lam0, v0 and the energy, in t
 from collections.abc import Callable, Sequence
 from fractions import Fraction
 from functools import lru_cache
-from typing import Any, NamedTuple
+from itertools import combinations_with_replacement
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -60,6 +61,25 @@ class Program(NamedTuple):
         return INTERPRETER.address, self.operations, self.first, self.inputs, self.outputs
 
 
+class Local(NamedTuple):
+    """A motion at a place: half of V**2 and ds/dlam, each with its derivatives by the place and by all variables.
+
+    Attributes
+    ----------
+    half, half_slope, half_partials
+        Half of V**2, its derivative by the place, and those by the variables at a fixed place.
+    ds, ds_slope, ds_partials
+        The same of ds/dlam; there are derivatives by the run-time parameters only.
+    """
+
+    half: TapeNumber
+    half_slope: TapeNumber
+    half_partials: Sequence[TapeNumber]
+    ds: TapeNumber
+    ds_slope: TapeNumber
+    ds_partials: Sequence[TapeNumber]
+
+
 class Source(NamedTuple):
     """The formulas that programs are recorded from.
 
@@ -86,6 +106,16 @@ class Source(NamedTuple):
         """How many variables derivatives are taken by."""
         return self.parameters + LAUNCH_VARIABLES
 
+    @property
+    def inputs(self) -> int:
+        """How many numbers a motion at a place depends on."""
+        return self.variables
+
+    @property
+    def coordinates(self) -> int:
+        """How many coordinates a place has."""
+        return 1
+
     def half(self, op: Recorder, lam: TapeNumber) -> TapeNumber:
         """Record half of V**2 at a place."""
         p = op.values[: self.parameters]
@@ -94,9 +124,44 @@ class Source(NamedTuple):
         found: TapeNumber = (v0 * v0 / 2 + energy) + (potential(op, lam0, p) - potential(op, lam, p))
         return found
 
+    def local(self, op: Recorder, lam: TapeNumber) -> Local:
+        """Record the motion at a place that no variable changes."""
+        half, ds = self.half(op, lam), op.number(self.formulas.ds(op, lam, op.values[: self.parameters]))
+        half_slope, *half_partials = gradient(op, half, [lam, *op.values[: self.variables]])
+        ds_slope, *ds_partials = gradient(op, ds, [lam, *op.values[: self.parameters]])
+        return Local(half, half_slope, half_partials, ds, ds_slope, ds_partials)
+
     def one_plus_beta(self, op: Recorder) -> TapeNumber:
         """Record 1 + beta."""
         return op.number(1 if self.inertia is None else self.inertia(op, op.values[: self.parameters]))
+
+
+class AnySource(Protocol):
+    """Where programs get a motion at a place from: formulas of the curve, or its coordinates along a chart."""
+
+    @property
+    def parameters(self) -> int:
+        """The number of run-time parameters."""
+
+    @property
+    def variables(self) -> int:
+        """How many variables derivatives are taken by."""
+
+    @property
+    def inputs(self) -> int:
+        """How many numbers a motion at a place depends on, of which the variables come first."""
+
+    @property
+    def coordinates(self) -> int:
+        """How many coordinates a place has."""
+
+    def local(self, op: Recorder, lam: TapeNumber) -> Local:
+        """Record the motion at a place."""
+
+    def one_plus_beta(self, op: Recorder) -> TapeNumber:
+        """Record 1 + beta."""
+
+    def __hash__(self) -> int: ...
 
 
 def assemble(op: Recorder, outputs: Sequence[Any]) -> Program:
@@ -137,50 +202,108 @@ def assemble(op: Recorder, outputs: Sequence[Any]) -> Program:
 
 
 @lru_cache(maxsize=64)
-def turning_point_program(source: Source) -> Program:
+def turning_point_program(source: AnySource) -> Program:
     """The step of Newton's method to a turning point from the place, and its derivatives by all variables."""
-    op = Recorder(source.variables)
-    half = source.half(op, op.place)
-    slope, *partials = gradient(op, half, [op.place, *op.values])
-    return assemble(op, [-(part / slope) for part in (half, *partials)])
-
-
-def libration_inputs(source: Source) -> int:
-    """The number of inputs of the program of a libration: variables, turning points a and b, and their derivatives."""
-    return 3 * source.variables + 2
+    op = Recorder(source.inputs, source.coordinates)
+    here = source.local(op, op.place)
+    return assemble(op, [-(part / here.half_slope) for part in (here.half, *here.half_partials)])
 
 
 @lru_cache(maxsize=64)
-def libration_program(source: Source, wanted: tuple[int, ...] | None = None) -> Program:
+def libration_program(source: AnySource, wanted: tuple[int, ...] | None = None) -> Program:
     """What is integrated over the phase angle of a libration, with its derivatives at the same phase angle.
 
-    The place is the square of the sine of half the phase angle. The inputs behind the variables are both turning points
-    and then the derivatives of each. The results are dt/dphi, its derivatives by all variables, V**2 dt/dphi (1+beta)
-    with its derivatives, and the derivatives of ds/dlam by the run-time parameters at the same place. If some variables
-    are ``wanted``, they are the derivatives of dt/dphi by these, and nothing else.
+    The place is the square of the sine of half the phase angle. The inputs behind those of the source are both turning
+    points and then the derivatives of each. The results are dt/dphi, its derivatives by all variables, V**2 dt/dphi
+    (1+beta) with its derivatives, and the derivatives of ds/dlam by the run-time parameters at the same place. If some
+    variables are ``wanted``, they are the derivatives of dt/dphi by these, and nothing else.
     """
-    n, p = source.variables, source.parameters
-    op = Recorder(libration_inputs(source))
-    (a, b), share = op.values[n : n + 2], op.place
-    width, lam = b - a, a + (b - a) * share
-    half, ds = source.half(op, lam), source.formulas.ds(op, lam, op.values[:p])
-    inertia = source.one_plus_beta(op)
-    half_slope, *half_partials = gradient(op, half, [lam, *op.values[:n]])
-    ds_slope, *ds_partials = gradient(op, ds, [lam, *op.values[:n]])
+    n, share = source.variables, (op := Recorder(source.inputs + 2 * source.variables + 2, source.coordinates)).place
+    a, b, *ends = op.values[source.inputs :]
+    width, inertia = b - a, source.one_plus_beta(op)
+    half, half_slope, half_partials, ds, ds_slope, ds_partials = source.local(op, a + width * share)
     rate = width * op.sqrt(share * (1 - share)) * ds / op.sqrt(2 * half)
     power = 2 * rate * half * inertia
     rates, powers = [rate], [power]
+    by_launch = [op.number(0)] * LAUNCH_VARIABLES
     for k, by in enumerate(gradient(op, inertia, op.values[:n])):
-        low, high = op.values[n + 2 + k], op.values[2 * n + 2 + k]
+        low, high, stretch = ends[k], ends[n + k], [*ds_partials, *by_launch][k]
         moved = low + (high - low) * share
         # First the small change of V**2 as a whole, for near the turning points the parts of it are large.
         faster = (half_partials[k] + half_slope * moved) / (2 * half)
-        longer = (high - low) / width + (ds_partials[k] + ds_slope * moved) / ds
+        longer = (high - low) / width + (stretch + ds_slope * moved) / ds
         rates.append(rate * (longer - faster))
         powers.append(power * (longer + faster + by / inertia))
     if wanted is not None:
         return assemble(op, [rates[1 + k] for k in wanted])
-    return assemble(op, [*rates, *powers, *ds_partials[:p]])
+    return assemble(op, [*rates, *powers, *ds_partials])
+
+
+@lru_cache(maxsize=16)
+def turning_point_seconds(source: Source, rows: tuple[int, ...]) -> Program:
+    """As `turning_point_program`, and then the second derivatives by the variables in ``rows``, as `pairs_of` them."""
+    op = Recorder(source.variables)
+    here = source.local(op, op.place)
+    step, *moves = [-(part / here.half_slope) for part in (here.half, *here.half_partials)]
+    changes = {i: gradient(op, moves[i], [op.place, *op.values]) for i in rows}
+    seconds = [changes[i][1 + j] + changes[i][0] * moves[j] for i, j in pairs_of(rows)]
+    return assemble(op, [step, *moves, *seconds])
+
+
+def pairs_of(rows: tuple[int, ...]) -> list[tuple[int, int]]:
+    """The pairs of variables of which there are second derivatives: each with itself and those behind it."""
+    return list(combinations_with_replacement(rows, 2))
+
+
+@lru_cache(maxsize=16)
+def libration_seconds(source: Source, rows: tuple[int, ...]) -> Program:
+    """The second derivatives of dt/dphi at the same phase angle, as `pairs_of` the variables in ``rows``.
+
+    The inputs are as of `libration_program`, with the second derivatives of each turning point behind its first ones.
+    """
+    n, pairs = source.variables, pairs_of(rows)
+    op = Recorder(n + 2 * (1 + n + len(pairs)))
+    a, b, *ends = op.values[n:]
+    low, high, share = ends[: len(ends) // 2], ends[len(ends) // 2 :], op.place
+    width = b - a
+    lam = a + width * share
+    half, half_slope, half_partials, ds, ds_slope, ds_partials = source.local(op, lam)
+    rate = width * op.sqrt(share * (1 - share)) * ds / op.sqrt(2 * half)
+    by_launch = [op.number(0)] * LAUNCH_VARIABLES
+    moved = [at_low + (at_high - at_low) * share for at_low, at_high in zip(low, high, strict=True)]
+    wider = [(at_high - at_low) / width for at_low, at_high in zip(low, high, strict=True)]
+    # The changes of half of V**2 and of ds/dlam as a whole, for near the turning points the parts of them are large.
+    faster = [part + half_slope * move for part, move in zip(half_partials, moved, strict=False)]
+    longer = [part + ds_slope * move for part, move in zip([*ds_partials, *by_launch], moved, strict=False)]
+    log_rates = [wider[k] + longer[k] / ds - faster[k] / (2 * half) for k in range(n)]
+    second = {k: [gradient(op, q[k], [lam, *op.values[:n]]) for q in (faster, longer)] for k in rows}
+    outputs = []
+    for k, (i, j) in enumerate(pairs, start=n):
+        by_half, by_ds = (by[1 + j] + by[0] * moved[j] for by in second[i])
+        by_half, by_ds = by_half + half_slope * moved[k], by_ds + ds_slope * moved[k]
+        change = wider[k] - wider[i] * wider[j] + by_ds / ds - longer[i] * longer[j] / (ds * ds)
+        change = change - (by_half - faster[i] * faster[j] / half) / (2 * half)
+        outputs.append(rate * (log_rates[i] * log_rates[j] + change))
+    return assemble(op, outputs)
+
+
+@lru_cache(maxsize=16)
+def circulation_seconds(source: Source, direction: int, rows: tuple[int, ...]) -> Program:
+    """The second derivatives of dt/dshare at the same share of a lap, as `pairs_of` the variables in ``rows``."""
+    op, *_, rate = _lap_rate(source, direction)
+    first = gradient(op, rate, op.values[: source.variables])
+    second = {i: gradient(op, first[i], op.values[: source.variables]) for i in rows}
+    return assemble(op, [second[i][j] for i, j in pairs_of(rows)])
+
+
+def _lap_rate(source: Source, direction: int) -> tuple[Recorder, TapeNumber, TapeNumber, TapeNumber, TapeNumber]:
+    """A tape with the length of a lap in lam, and ds/dlam, V**2 and dt/dshare at a share of it."""
+    op = Recorder(source.variables + 1)
+    p = op.values[: source.parameters]
+    lap = direction * op.number(source.domain(op, p)[2])
+    lam = op.values[source.variables] + lap * op.place
+    ds, v2 = source.formulas.ds(op, lam, p), 2 * source.half(op, lam)
+    return op, lap, ds, v2, direction * lap * ds / op.sqrt(v2)
 
 
 @lru_cache(maxsize=64)
@@ -192,12 +315,7 @@ def circulation_program(source: Source, direction: int, wanted: tuple[int, ...] 
     ds/dshare with its derivatives, and the length of the lap in lam with its derivatives. ``wanted`` is as for a
     libration.
     """
-    op = Recorder(source.variables + 1)
-    p = op.values[: source.parameters]
-    lap = direction * op.number(source.domain(op, p)[2])
-    lam = op.values[source.variables] + lap * op.place
-    ds, v2 = source.formulas.ds(op, lam, p), 2 * source.half(op, lam)
-    rate = direction * lap * ds / op.sqrt(v2)
+    op, lap, ds, v2, rate = _lap_rate(source, direction)
     if wanted is not None:
         return assemble(op, gradient(op, rate, [op.values[k] for k in wanted]))
     outputs: list[Any] = []

@@ -5,15 +5,16 @@ from typing import Any
 
 import numpy as np
 
-from gqm_sym.arguments import names, unknown_argument
+from gqm_sym.arguments import names, one_of, unknown_argument
 from gqm_sym.errors import InputError, SolutionError
 from gqm_sym.runtime.compiled.types import Array
-from gqm_sym.runtime.gradients.orbit import OrbitDerivatives, values
-from gqm_sym.runtime.gradients.programs import extreme_program
+from gqm_sym.runtime.gradients.orbit import OrbitDerivatives
+from gqm_sym.runtime.gradients.programs import pairs_of
 
 # What has a gradient.
 EXTREMES = ("v_max", "v_min", "normal_force_max", "normal_force_min")
-QUANTITIES = ("half_period", "period", "turning_points", *EXTREMES, "action")
+PERIODS = ("half_period", "period")
+QUANTITIES = (*PERIODS, "turning_points", *EXTREMES, "action")
 
 # An extreme this near to a turning point is there, as a share of the width of the orbit. The place of another one is
 # improved by Newton's method, whose steps may be this share of the width.
@@ -51,8 +52,7 @@ def gradient(derivatives: OrbitDerivatives, motion: Any, quantity: str, wrt: Any
         What they are by.
     """
     rows = selected(motion.problem.formulas.parameters, wrt)
-    if not (isinstance(quantity, str) and quantity in QUANTITIES):
-        raise InputError(unknown_argument("gradient", str(quantity), QUANTITIES, what="quantity"))
+    one_of(quantity, QUANTITIES, where="gradient: quantity")
     if quantity in ("half_period", "turning_points") and motion.kind != "libration":
         raise SolutionError(f"gradient: only a libration has {quantity}; this motion is of kind {motion.kind!r}")
     if quantity == "turning_points":
@@ -68,6 +68,25 @@ def gradient(derivatives: OrbitDerivatives, motion: Any, quantity: str, wrt: Any
     return {name: float(found[row]) for name, row in rows.items()}
 
 
+def second_gradient(derivatives: OrbitDerivatives, motion: Any, quantity: str, wrt: Any) -> dict[str, dict[str, float]]:
+    """The second derivatives of a half period or a period, by two names.
+
+    Parameters
+    ----------
+    derivatives, motion, quantity, wrt
+        As for `gradient`.
+    """
+    rows = selected(motion.problem.formulas.parameters, wrt)
+    one_of(quantity, PERIODS, where="gradient: order=2: quantity")
+    if quantity == "half_period" and motion.kind != "libration":
+        raise SolutionError(f"gradient: only a libration has {quantity}; this motion is of kind {motion.kind!r}")
+    chosen = tuple(dict.fromkeys(rows.values()))
+    share = 2.0 if quantity == "period" and motion.kind == "libration" else 1.0
+    found = dict(zip(pairs_of(chosen), (share * derivatives.second_durations(chosen)).tolist(), strict=True))
+    both = found | {(j, i): value for (i, j), value in found.items()}
+    return {one: {other: both[rows[one], rows[other]] for other in rows} for one in rows}
+
+
 def extreme_gradient(derivatives: OrbitDerivatives, motion: Any, quantity: str) -> Array:
     """The derivatives of an extreme along the motion, by all variables.
 
@@ -78,22 +97,20 @@ def extreme_gradient(derivatives: OrbitDerivatives, motion: Any, quantity: str) 
     found = np.zeros(derivatives.source.variables)
     if of_speed and extreme.value == 0.0:
         return found
-    program = extreme_program(derivatives.source, of_speed)
     place = np.array([extreme.lam])
     width, moved = abs(motion.problem.period), found
     if not derivatives.direction:
         ends = derivatives.turning_points
         width = ends[1] - ends[0]
-        for end, tangent in zip(ends, derivatives.ends.T, strict=True):
+        for end, tangent in zip(ends, derivatives.moved_ends.T, strict=True):
             if abs(extreme.lam - end) <= AT_TURN * width:
                 moved = tangent
     if moved is found:
         place, is_stationary = _improved(derivatives, of_speed, place, width)
         if not is_stationary and motion.t_end < motion.period:
-            moved = np.append(
-                motion.sensitivity(extreme.t, (*motion.problem.formulas.parameters, "lam0", "v0")).lam, 0.0
-            )
-    (_, slope, _, *partials) = values(program, derivatives.variables, place)[:, 0, 0]
+            everything = (*motion.problem.formulas.parameters, "lam0", "v0")
+            moved = derivatives.without_shift(np.append(motion._sensitivity(extreme.t, everything).lam, 0.0), place)
+    (_, slope, _, *partials) = derivatives.extreme_rows(place, of_speed=of_speed)[:, 0]
     total: Array = (np.array(partials) + slope * moved) / (extreme.value if of_speed else 1.0)
     return total
 
@@ -103,9 +120,9 @@ def _improved(derivatives: OrbitDerivatives, of_speed: bool, place: Array, width
 
     Where the quantity is constant, or all but constant, the place does not matter and is left.
     """
-    program, found = extreme_program(derivatives.source, of_speed), place
+    found = place
     for _ in range(NEWTON_STEPS):
-        _, slope, curvature, *_ = values(program, derivatives.variables, found)[:, 0]
+        _, slope, curvature, *_ = derivatives.extreme_rows(found, of_speed=of_speed)
         step = np.divide(slope, curvature, where=curvature != 0.0, out=np.zeros(1))
         if not abs(step[0]) <= MAX_STEP * width:
             return place, False

@@ -11,7 +11,6 @@ import numpy as np
 
 from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.gradients.orbit import OrbitDerivatives
-from gqm_sym.runtime.gradients.series import Series
 
 # The rows of launch place and speed among the variables (`programs.Source`).
 LAM0, V0 = -3, -2
@@ -79,35 +78,33 @@ class OrbitSensitivity:
 
     def __init__(self, derivatives: OrbitDerivatives) -> None:
         self._derivatives = derivatives
-        n, samples = derivatives.source.variables, derivatives.samples
-        rates, arcs = samples[: 1 + n], samples[2 * (1 + n) :]
-        if derivatives.direction:
-            arcs, laps = arcs[1 : 1 + n], arcs[1 + n :, :1]
-            self._scale, self._width, self._lap_gradient = 1.0, float(laps[0, 0]), laps[1:]
-        else:
-            low, high = derivatives.turning_points
-            rise = 0.5 * (high - low) * np.sin(2.0 * np.pi * (np.arange(samples.shape[1]) + 0.5) / samples.shape[1])
-            self._scale, self._width, self._lap_gradient = 2.0 * np.pi, high - low, np.zeros((n, 1))
-            arcs = self._by_all(rise * arcs)
-        self._rates, self._arcs = Series(rates), Series(arcs)
+        self._scale, self._width = 1.0 if derivatives.direction else 2.0 * np.pi, derivatives.width
+        self._rates, self._arcs, self._lap_gradient = derivatives.series
         self._launches: dict[float, _Along] = {}
 
     def _by_all(self, rows: Array) -> Array:
         """Derivatives by the run-time parameters as derivatives by all variables, of which the others are zero."""
         return np.vstack([rows, np.zeros((self._derivatives.source.variables - len(rows), rows.shape[1]))])
 
+    def _places(self, share: Array) -> Array:
+        """How places change at shares of the phase, within the lap."""
+        if self._derivatives.direction:
+            return self._lap_gradient * share
+        upper = np.sin(np.pi * share) ** 2
+        low, high = (end[:, None] for end in self._derivatives.moved_ends.T)
+        places: Array = low * (1.0 - upper) + high * upper
+        return places
+
     def _along(self, share: Array, lam: Array, v: Array) -> _Along:
         """What changes at shares of the phase, at which the places and velocities are known."""
         derivatives = self._derivatives
         (rates, times), arcs = self._rates(share), self._arcs(share)[1]
-        path = derivatives.at_places(lam)
+        path, places = derivatives.at_places(lam), self._places(share)
         if derivatives.direction:
-            places = self._lap_gradient * share
             widening = self._lap_gradient / self._width
         else:
-            upper = np.sin(np.pi * share) ** 2
-            low, high = (end[:, None] for end in derivatives.ends.T)
-            places, widening = low * (1.0 - upper) + high * upper, (high - low) / self._width
+            low, high = (end[:, None] for end in derivatives.moved_ends.T)
+            widening = (high - low) / self._width
         ds, potential = path[2], path[5]
         stretch = (self._by_all(ds[1:-1]) + ds[-1] * places) / ds[0]
         return _Along(
@@ -119,8 +116,9 @@ class OrbitSensitivity:
             path=path,
         )
 
-    def _at_launch(self, motion: Any, phi: float) -> _Along:
+    def _at_launch(self, motion: Any, points: Any) -> _Along:
         """What changes at the launch, whose phase angle has more digits once the period is known exactly."""
+        phi = points.trajectory.segments[0].phi_start
         if phi not in self._launches:
             v0 = motion.direction * motion.problem.launch.v0.value
             places = np.array([phi / self._scale]), np.array([motion.problem.lam0]), np.array([v0])
@@ -139,7 +137,7 @@ class OrbitSensitivity:
             own[V0] = given.direction  # at rest, the direction in which a speed would be
             passed: Array = direction * (own - launch.speeds) / acceleration
         else:
-            own[LAM0] = 1.0
+            own[:] = self._derivatives.launch_moves[:, None]
             passed = ds / v0 * (own - launch.places)
         passed += launch.times
         return passed
@@ -156,13 +154,11 @@ class OrbitSensitivity:
         lam, v : array
             The places within the lap, and the velocities.
         """
-        share, laps = np.zeros_like(lam), points.laps
-        for _, mask, phi in points.segments:
-            share[mask] = phi / self._scale
-        along, launch = self._along(share, lam, v), self._at_launch(motion, points.trajectory.segments[0].phi_start)
-        delay = self._delay(along, launch, motion, points)
+        along, launch, laps = self._along(self._share(points), lam, v), self._at_launch(motion, points), points.laps
+        delay = self._delay(along.times, launch, motion, points)
         arcs = along.arcs - launch.arcs + v * delay
-        arcs[LAM0] -= launch.path[2][0]
+        launched = self._derivatives.launch_moves[:, None]
+        arcs -= launch.path[2][0] * launched
         if self._derivatives.direction:
             arcs += laps * self._arcs(np.ones(1))[1]
         else:
@@ -171,14 +167,32 @@ class OrbitSensitivity:
         speeds = along.speeds + along.acceleration * delay
         x, z, _, curvature, load, _ = (self._by_all(rows[1:-1]) + rows[-1] * places for rows in along.path)
         force = load + v**2 * curvature + 2.0 * v * along.path[3][0] * speeds
-        return [places + laps * self._lap_gradient, arcs, x, z, speeds, force]
+        if not self._derivatives.by_arc_length:
+            return [places + laps * self._lap_gradient, arcs, x, z, speeds, force]
+        arcs[LAM0] += 1.0  # from the start point of the curve
+        return [arcs, arcs, x, z, speeds, force]
 
-    def _delay(self, along: _Along, launch: _Along, motion: Any, points: Any) -> Array:
+    def places_at(self, motion: Any, points: Any, v: Array, ds: Array) -> Array:
+        """The derivatives of lam alone, as of `at`, where v and ds/dlam are known."""
+        share, launch = self._share(points), self._at_launch(motion, points)
+        delay = self._delay(self._scale * self._rates(share)[1][1:], launch, motion, points)
+        found: Array = self._places(share) + v / ds * delay + points.laps * self._lap_gradient
+        return found
+
+    def _share(self, points: Any) -> Array:
+        """The shares of the phase at points."""
+        share: Array = np.zeros_like(points.laps)
+        for _, mask, phi in points.segments:
+            share[mask] = phi / self._scale
+        return share
+
+    def _delay(self, times: Array, launch: _Along, motion: Any, points: Any) -> Array:
         """How much further on, in time, the body is at the times of points."""
         gradient = self._derivatives.duration_gradient[:, None]
         if self._derivatives.direction:
-            delay: Array = -along.times - points.laps * gradient
-            delay[LAM0] += motion.direction * launch.path[2][0] / motion.problem.launch.v0.value
+            delay: Array = -times - points.laps * gradient
+            moves = self._derivatives.launch_moves[:, None]
+            delay += motion.direction * launch.path[2][0] / motion.problem.launch.v0.value * moves
             return delay
         sense, swings = np.ones_like(points.laps), 2.0 * points.laps
         first, half_period = points.trajectory.segments[0], 0.5 * points.trajectory.period[0]
@@ -186,5 +200,5 @@ class OrbitSensitivity:
             before = timed.t_start[0] - timed.sense * timed.r_start[0] + motion.direction * first.r_start[0]
             sense[mask] = timed.sense
             swings[mask] += round(before / half_period)
-        delay = motion.direction * self._launch_delay(launch, motion) - swings * gradient - sense * along.times
+        delay = motion.direction * self._launch_delay(launch, motion) - swings * gradient - sense * times
         return delay

@@ -4,7 +4,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from gqm_sym.arguments import unknown_argument
+from gqm_sym.arguments import one_of
 from gqm_sym.errors import InputError, SolutionError
 from gqm_sym.runtime.compiled.types import Array
 
@@ -41,8 +41,7 @@ def fourier(motion: Any, quantity: str, n: int) -> Fourier:
     n : int
         The order of the last coefficient.
     """
-    if not (isinstance(quantity, str) and quantity in QUANTITIES):
-        raise InputError(unknown_argument("fourier", str(quantity), QUANTITIES, what="quantity"))
+    one_of(quantity, QUANTITIES, where="fourier: quantity")
     if not (isinstance(n, int) and 0 <= n <= MAX_STEPS // 4):
         raise InputError(f"fourier: n must be a whole number from 0 to {MAX_STEPS // 4}, got {n!r}")
     if motion.kind == "circulation" and quantity in GROWING:

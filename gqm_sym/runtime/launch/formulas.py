@@ -141,6 +141,10 @@ class Formulas:
         the parameters; None where there are none.
     separated : SeparatedTerms or None
         Potential and load along a charted curve as sums of products; None where a table belongs to all parameters.
+    path_in_space : Emitted or None
+        Of a space curve: what fills its third coordinate and the contact force as a vector.
+    signed : bool
+        Whether the contact force has a sign: it has none on a space curve that lies in no vertical plane.
     """
 
     name: str
@@ -165,6 +169,8 @@ class Formulas:
     inertia: Callable[..., Any] | None = None
     trigonometric: Callable[..., Any] | None = None
     separated: SeparatedTerms | None = None
+    path_in_space: Emitted | None = None
+    signed: bool = True
     units: Mapping[str, str] = field(default_factory=dict)
     text: str = field(init=False, repr=False, compare=False)
     _read: Callable[..., "ParameterValues"] = field(init=False, repr=False, compare=False)

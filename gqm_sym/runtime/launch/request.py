@@ -87,8 +87,7 @@ def read_launch(formulas: Formulas, p: ParameterValues, request: LaunchRequest) 
         place, at = _read_place(formulas, p, lam0, point)
     if isinstance(direction, np.ndarray | list | tuple) or direction not in (1, -1):
         raise LaunchError(f"direction: must be 1 or -1 (the sign of ds/dt at launch), got {direction!r}")
-    if contact not in CONTACTS:
-        raise LaunchError(f"contact: must be one of {', '.join(CONTACTS)}, got {contact!r}")
+    check_contact(formulas, contact)
     speed = read_number(v0, where="v0", unit="m/s")
     if speed.value < 0.0:
         raise LaunchError(
@@ -109,6 +108,22 @@ def read_launch(formulas: Formulas, p: ParameterValues, request: LaunchRequest) 
             f"{domain.period!r}"
         )
     return Launch(place, speed, int(direction), contact, horizon, at)
+
+
+def check_contact(formulas: Formulas, contact: Any) -> None:
+    """Refuse what says which side of the track can push, where it is none of `CONTACTS` or there are no sides.
+
+    Raises
+    ------
+    LaunchError
+    """
+    if contact not in CONTACTS:
+        raise LaunchError(f"contact: must be one of {', '.join(CONTACTS)}, got {contact!r}")
+    if ONLY_SIGN[contact] and not formulas.signed:
+        raise LaunchError(
+            f"contact: {contact!r} is for curves in a vertical plane; on this space curve the body is held from all "
+            "sides, which is 'bilateral'"
+        )
 
 
 def _read_place(

@@ -18,12 +18,13 @@ from gqm_sym.runtime.compiled.calls import (
     call_effective_potential,
     call_load_map,
     call_path_and_contact_force,
+    call_path_in_space,
     call_potential_divdiff1,
 )
 from gqm_sym.runtime.compiled.jit import Inlined, Inner, entry
 from gqm_sym.runtime.compiled.streaming import put, settle
 from gqm_sym.runtime.compiled.types import ADDRESSES, INTEGER, MATRIX, REAL, VECTOR, Array
-from gqm_sym.runtime.interface import LOAD_MAP_ROWS, PATH_ROWS
+from gqm_sym.runtime.interface import LOAD_MAP_ROWS, PATH_ROWS, SPACE_ROWS
 
 # Places filled at a time: few enough that what is streamed drains into memory while the next are computed.
 BLOCK = 256
@@ -64,6 +65,33 @@ class Pass1(NamedTuple):
     normal_force: Array
 
 
+class Pass1InSpace(NamedTuple):
+    """What pass 1 finds at places of a space curve: what `Pass1` has, and four arrays more.
+
+    Attributes
+    ----------
+    x, z, ds, v2 : array
+        As of `Pass1`.
+    kappa, normal_force : array
+        As of `Pass1` if the curve lies in a vertical plane; else the lengths of the curvature and of the contact force.
+    y : array
+        The third coordinate in m.
+    normal_x, normal_y, normal_z : array
+        The contact force along x, y and z, in N.
+    """
+
+    x: Array
+    z: Array
+    ds: Array
+    kappa: Array
+    v2: Array
+    normal_force: Array
+    y: Array
+    normal_x: Array
+    normal_y: Array
+    normal_z: Array
+
+
 class LaunchNumbers(NamedTuple):
     """A launch in doubles, and what a load map keeps of it.
 
@@ -83,26 +111,30 @@ class LaunchNumbers(NamedTuple):
     size: float
 
 
-def load_map_arrays(shape: tuple[int, ...], lam: Array, out: Any) -> Pass1:
+def load_map_arrays(
+    kind: type[Pass1] | type[Pass1InSpace], shape: tuple[int, ...], lam: Array, out: Any
+) -> Pass1 | Pass1InSpace:
     """The arrays of a load map: those of ``out``, or new ones if it is None.
 
     Parameters
     ----------
+    kind : type
+        What the arrays are handed over as.
     shape : tuple of int
         The shape of the places.
     lam : array
         The places, with which no array of ``out`` may share memory.
-    out : tuple or list of six arrays, or None
-        Arrays of doubles to be filled, in the order of `Pass1`.
+    out : tuple or list of arrays, or None
+        Arrays of doubles to be filled, in the order of ``kind``.
 
     Raises
     ------
     InputError
-        If ``out`` is not six writable, contiguous arrays of doubles of that shape, each with memory of its own.
+        If ``out`` is not so many writable, contiguous arrays of doubles of that shape, each with memory of its own.
     """
+    names = kind._fields
     if out is None:
-        return Pass1(*(np.empty(shape) for _ in Pass1._fields))
-    names = Pass1._fields
+        return kind(*(np.empty(shape) for _ in names))
     if not isinstance(out, tuple | list) or len(out) != len(names):
         what = f"{len(out)} of them" if isinstance(out, tuple | list) else type(out).__name__
         raise InputError(f"out: must be {len(names)} arrays ({', '.join(names)}), as pass1 returns them; got {what}")
@@ -117,7 +149,7 @@ def load_map_arrays(shape: tuple[int, ...], lam: Array, out: Any) -> Pass1:
     for name, array in zip(names, out, strict=True):
         if np.may_share_memory(array, lam):
             raise InputError(f"out: {name} shares memory with the places; give it its own")
-    return Pass1(*out)
+    return kind(*out)
 
 
 def _check(where: str, array: Any, shape: tuple[int, ...]) -> None:
@@ -253,4 +285,12 @@ def speed_squared_at(fns, p, lam0, lam0_low, w0, places, offsets):  # type: igno
     out = np.empty(offsets.size)
     for i in range(offsets.size):
         out[i] = w0 - 2.0 * (offsets[i] * rows[0, i] - lam0_low * launch[1, 0])
+    return out
+
+
+@entry(MATRIX(INTEGER, VECTOR, VECTOR, VECTOR), nogil=True)
+def path_in_space_at(address, p, lam, v2):  # type: ignore[no-untyped-def]
+    """Rows y and contact force along x, y and z at places ``lam`` of a space curve, given V**2 there."""
+    out = np.empty((SPACE_ROWS, lam.size))
+    call_path_in_space(address, lam.size, lam, v2, p, out)
     return out

@@ -60,7 +60,6 @@ from gqm_sym.runtime.legs.leg_record import (
     HEADING,
     LAPS_BEFORE,
     PANELS,
-    PEAKS,
     START,
     START_LOW,
     START_V2,
@@ -94,7 +93,8 @@ DISSIPATION = types.NamedTuple((INTEGER, INTEGER, types.boolean, types.boolean, 
 # The first panel as a share of the first step of a search. The shorter it is, the more digits early times have.
 FIRST_PANEL_SHARE = 0.25
 
-# How many laps of a closed curve are followed in one run at most: so far its breaks are listed.
+# How many laps of a closed curve are followed in one run at most: so far its breaks are listed. It is one lap where
+# breaks are so many that the gaps between them are kept.
 LAPS_AHEAD = 8
 
 # The first panel of a body released near an equilibrium in units of the distance to it, and how often the step to it is
@@ -145,20 +145,19 @@ def room_ahead(breaks: int) -> int:
 
 def room_kept(breaks: int) -> int:
     """How many numbers are kept of a curve with so many breaks."""
-    return 4 * GAP_COLUMNS * max(breaks - 1, 0)
+    return 4 * GAP_COLUMNS * breaks
 
 
 @Inner
-def gaps_on_leg(dissipation, joints, body, reads):  # type: ignore[no-untyped-def]
+def gaps_on_leg(dissipation, joints, reading):  # type: ignore[no-untyped-def]
     """What is kept of the curve between its breaks, if a leg may be passed by it: its panels cannot be read."""
-    is_used = body[PERIOD] == 0.0 and reads != PANELS and dissipation.linear
-    return joints.gaps if is_used else joints.gaps[:0]
+    return joints.gaps if reading.what != PANELS and dissipation.linear else joints.gaps[:0]
 
 
 @Inner
 def breaks_before(breaks, ahead, period, direction, begin, limit):  # type: ignore[no-untyped-def]
-    """The breaks strictly between two places, in the order in which they are passed from ``begin`` on."""
-    count = 0
+    """The breaks strictly between two places, in the order in which they are passed, and which of all is the first."""
+    count, first_break = 0, 0
     low, high = min(begin, limit), max(begin, limit)
     first, last = 0, 0
     if period > 0.0 and breaks.size > 0:
@@ -166,12 +165,17 @@ def breaks_before(breaks, ahead, period, direction, begin, limit):  # type: igno
     laps = last - first + 1
     for i in range(laps):
         lap = (first + i if direction > 0 else last - i) * period
-        for j in range(breaks.size):
-            place = breaks[j if direction > 0 else breaks.size - 1 - j] + lap
+        # One more on either side, because a lap is subtracted with a rounding.
+        from_k = max(np.searchsorted(breaks, low - lap) - 1, 0)
+        to_k = min(np.searchsorted(breaks, high - lap) + 1, breaks.size)
+        for j in range(to_k - from_k):
+            k = from_k + j if direction > 0 else to_k - 1 - j
+            place = breaks[k] + lap
             if low < place < high and count < ahead.size:
+                first_break = k if count == 0 else first_break
                 ahead[count] = place
                 count += 1
-    return ahead[:count]
+    return ahead[:count], first_break
 
 
 @Inner
@@ -264,19 +268,20 @@ def expected_width(body):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def next_leg(dissipation, p, joints, body, reads, record):  # type: ignore[no-untyped-def]
+def next_leg(dissipation, p, joints, body, reading, record):  # type: ignore[no-untyped-def]
     """Follow a body to its next turn, or as far as one run goes.
 
     A body that the track would have to pull at once is followed a little way without contact, and AT_ONCE is in ENDING.
     """
     place, direction, period = body[PLACE], int(body[DIRECTION]), body[PERIOD]
     end = body[HIGH] if direction > 0 else body[LOW]
-    limit = place + direction * LAPS_AHEAD * period if period > 0.0 else end
-    drops = breaks_before(joints.drops, joints.ahead, period, direction, place, limit)
+    gaps = gaps_on_leg(dissipation, joints, reading)
+    limit = place + direction * (LAPS_AHEAD if gaps.size == 0 else 1) * period if period > 0.0 else end
+    drops, _ = breaks_before(joints.drops, joints.ahead, period, direction, place, limit)
     limit = drops[0] if drops.size else limit
     # Breaks a little behind show on which piece of the curve the body is, and one at the limit where that piece ends.
     begin, beyond = place - direction * body[FIRST_STEP], direction * clearance(place, limit)
-    breaks = breaks_before(joints.breaks, joints.ahead, period, direction, begin, limit + beyond)
+    breaks, first_break = breaks_before(joints.breaks, joints.ahead, period, direction, begin, limit + beyond)
     record[START], record[START_LOW], record[LAPS_BEFORE] = place, body[PLACE_LOW], body[LAPS]
     record[START_V2] = body[V2]
     record[HEADING], record[BEGIN], record[BEGIN_LOW] = direction, body[ELAPSED], body[ELAPSED_LOW]
@@ -284,20 +289,15 @@ def next_leg(dissipation, p, joints, body, reads, record):  # type: ignore[no-un
     width = expected_width(body)
     may_be_whole = width == 0.0 or body[UNRESOLVED] == 0.0 or width <= MAX_WHOLE_SHARE * body[UNRESOLVED]
     until, target = body[HORIZON] - body[ELAPSED], body[TARGET] - body[LAPS] * period
-    gaps, first_gap = gaps_on_leg(dissipation, joints, body, reads), 0
-    if gaps.size > 0 and breaks.size > 0:
-        first_gap = int(np.searchsorted(joints.breaks, breaks[0]))
     while True:
         start = Start(
             *(place, body[PLACE_LOW], body[V2], direction, int(body[CONTACT_SIGN]), body[STEP], no_turn_until),
             *(width, may_be_whole),
         )
-        route = Route(breaks, limit, pause, only_sign, reads, until, target, gaps, first_gap)
+        route = Route(breaks, limit, pause, only_sign, reading, until, target, gaps, first_break, joints.breaks, period)
         found = follow(dissipation, p, start, route, record)
         if found.what == LIFTOFF and record[AHEAD] == 0.0:
             pause, only_sign, no_turn_until, until, body[ENDING] = 0.0, 0, inf, 0.0, AT_ONCE
-        elif reads == PEAKS and gaps.size > 0 and record[TIME_FROM_START] + record[TIME_FROM_END] > until:
-            gaps = gaps[:0]
         else:
             return found
 
@@ -319,7 +319,7 @@ def after_turn(dissipation, p, joints, body, found, record):  # type: ignore[no-
 
 
 @Inner
-def advance(dissipation, p, joints, body, reads, record):  # type: ignore[no-untyped-def]
+def advance(dissipation, p, joints, body, reading, record):  # type: ignore[no-untyped-def]
     """Take a body to its next turn, to the end of its motion, or as far as one run goes.
 
     Parameters
@@ -331,8 +331,7 @@ def advance(dissipation, p, joints, body, reads, record):  # type: ignore[no-unt
     joints : Joints
     body : array
         The line of the body (`legs.body`), which was launched; it is as before where the record is FULL.
-    reads : int
-        As of `leg_run.Route`.
+    reading : leg_run.Reading
     record : array
         Filled in (`leg_record`).
 
@@ -342,7 +341,7 @@ def advance(dissipation, p, joints, body, reads, record):  # type: ignore[no-unt
         RESTS if it comes to rest, one of the codes of `leg_run` for what ended the run, LEAVES or
         BEYOND; SPENT if it could not be followed.
     """
-    found, period = next_leg(dissipation, p, joints, body, reads, record), body[PERIOD]
+    found, period = next_leg(dissipation, p, joints, body, reading, record), body[PERIOD]
     what, ahead, back, place = found.what, record[AHEAD] > 0.0, record[BACK] > 0.0, record[END]
     if what == LIMIT and is_break(joints.drops, period, place):
         what = LIFTOFF

@@ -45,7 +45,7 @@ from gqm_sym.runtime.legs.leg_record import (
     START_V2,
     TIMES,
 )
-from gqm_sym.runtime.legs.leg_run import ASYMPTOTE, FULL, SPENT, TURN, point_buffer, slope_of_v2
+from gqm_sym.runtime.legs.leg_run import ASYMPTOTE, FULL, SPENT, TURN, Reading, point_buffer, slope_of_v2
 
 # What is asked of each body; LEG is to advance by one leg.
 LEG, END_TIME, REST_PLACE, ARRIVAL, LEAST_SPEED, MOST_SPEED, LEAST_LOAD, MOST_LOAD = range(8)
@@ -98,6 +98,12 @@ def goes_on(body, question, arrival):  # type: ignore[no-untyped-def]
 
 
 @Inner
+def sought(question):  # type: ignore[no-untyped-def]
+    """Whether a question is about the contact force; and 1 if about the largest value, -1 if about the smallest."""
+    return question >= LEAST_LOAD, 1.0 if question in (MOST_SPEED, MOST_LOAD) else -1.0
+
+
+@Inner
 def after_leg(body, question, observed, record):  # type: ignore[no-untyped-def]
     """What the legs so far have shown, once one more has been followed."""
     begin, low = record[BEGIN], record[BEGIN_LOW]
@@ -109,8 +115,7 @@ def after_leg(body, question, observed, record):  # type: ignore[no-untyped-def]
         return Observed(observed.arrival, max(observed.peak, v if question == MOST_SPEED else -v))
     if question >= LEAST_SPEED:
         until = 0.0 if body[ENDING] == AT_ONCE else (body[HORIZON] - begin) - low
-        asked = (question >= LEAST_LOAD, 1.0 if question in (MOST_SPEED, MOST_LOAD) else -1.0)
-        return Observed(observed.arrival, peak_of_leg(record, until, asked, observed.peak))
+        return Observed(observed.arrival, peak_of_leg(record, until, sought(question), observed.peak))
     return observed
 
 
@@ -157,8 +162,9 @@ def answer(dissipation, p, joints, question, body, record):  # type: ignore[no-u
     """The number that is asked for of one body, and its status."""
     observed = Observed(inf, -inf)
     reads = PEAKS if question >= LEAST_SPEED else (PASSAGE if question == ARRIVAL else TIMES)
+    force, sign = sought(question)
     for _ in range(MAX_LEGS):
-        what = advance(dissipation, p, joints, body, reads, record)
+        what = advance(dissipation, p, joints, body, Reading(reads, force, sign, observed.peak), record)
         if what in (FULL, SPENT, LEAVES, BEYOND):
             break
         if question == ARRIVAL and body[TARGET] == body[LAM0]:
@@ -183,7 +189,7 @@ def follow_legs(dissipation, p, joints, body, records):  # type: ignore[no-untyp
     """Advance a body by as many legs as there are records, or to a leg after which something else is decided."""
     what, count = RESTS, 0
     while count < records.shape[0]:
-        what = advance(dissipation, p, joints, body, PANELS, records[count])
+        what = advance(dissipation, p, joints, body, Reading(PANELS, False, 1.0, -inf), records[count])
         if what == FULL:
             break
         count += 1

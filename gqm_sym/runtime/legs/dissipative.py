@@ -66,7 +66,7 @@ from gqm_sym.runtime.legs.leg_record import (
 )
 from gqm_sym.runtime.legs.leg_run import ASYMPTOTE, FULL, LIFTOFF, LIMIT, NARROWED, PAUSED, SPENT, TURN
 from gqm_sym.runtime.legs.leg_segments import Run, TabulatedPiece, along_field, along_panels, leg_record, tabulated
-from gqm_sym.runtime.legs.variations.answers import Switch, gradient, nearest_switch, states_at
+from gqm_sym.runtime.legs.variations.answers import Switch, gradient, nearest_switch, places_at, states_at
 from gqm_sym.runtime.legs.variations.changes import Changes
 from gqm_sym.runtime.motion.aperiodic import MotionAtRest
 from gqm_sym.runtime.motion.events import Leg, passages
@@ -257,7 +257,7 @@ class DissipativeMotion(Motion):
     def state(self, t: Any) -> State:
         """The state of the body at times; see `Motion.state`. For doubles this is one call of compiled code."""
         times = _plain_times(t)
-        if times is None:
+        if times is None or self.problem.formulas.path_in_space is not None:
             return super().state(t)
         out = self._read(*times, STATE_ROWS, self._read_states, lambda later: np.array(Motion.state(self, later)[1:]))
         return State(t, *out.reshape(-1, *t.shape)) if np.ndim(t) else State(float(times[0][0]), *out[:, 0].tolist())
@@ -340,14 +340,22 @@ class DissipativeMotion(Motion):
         }
 
     @locked
-    def sensitivity(self, t: Any, wrt: Any = None) -> Sensitivity:
-        """The derivatives of the state at given times; see `Motion.sensitivity`."""
+    def _sensitivity(self, t: Any, wrt: Any) -> Sensitivity:
         rows = selected(self.problem.formulas.parameters, wrt)
         times, low, shape = self._times(t)
         self._trajectory(float(times.max(initial=0.0)))
         found = states_at(self, self._changes, times, low)
         fields = (getattr(found, name) for name in Sensitivity._fields[1:])
         return Sensitivity(tuple(rows), *(field[list(rows.values())].reshape(len(rows), *shape) for field in fields))
+
+    @locked
+    def place_changes(self, t: Any, wrt: Any) -> Array:
+        """The derivatives of the curve parameter at given times; see `Motion.place_changes`."""
+        rows = selected(self.problem.formulas.parameters, wrt)
+        times, low, shape = self._times(t)
+        self._trajectory(float(times.max(initial=0.0)))
+        found: Array = places_at(self, self._changes, times, low)[list(rows.values())].reshape(len(rows), *shape)
+        return found
 
     @property
     @locked

@@ -388,7 +388,7 @@ def next_panel(forces, march, panel, request, work):  # type: ignore[no-untyped-
 
 
 @Inner
-def bounds(work, row):  # type: ignore[no-untyped-def]
+def range_of(work, row):  # type: ignore[no-untyped-def]
     """Bounds of the polynomial through a row of values."""
     low, high = extent(work, row)
     beyond = 0.5 * (LEBESGUE - 1.0) * (high - low)
@@ -419,8 +419,8 @@ def fill_gap(forces, march, panel, width, gaps, at, work):  # type: ignore[no-un
     gaps[at + END_EXPM1], gaps[at + END_GAINED] = work[EXPM1_Q + COUNT], work[SPEED + COUNT]
     gaps[at + MIDDLE_GAINED], gaps[at + LARGEST_REST] = middle, largest
     gaps[at + LEAST_DAMPING], gaps[at + MOST_DAMPING] = 1.0 / (1.0 + most), 1.0 / (1.0 + least)
-    gaps[at + LEAST_N0], gaps[at + MOST_N0] = bounds(work, N0)
-    gaps[at + LEAST_KAPPA], gaps[at + MOST_KAPPA] = bounds(work, KAPPA)
+    gaps[at + LEAST_N0], gaps[at + MOST_N0] = range_of(work, N0)
+    gaps[at + LEAST_KAPPA], gaps[at + MOST_KAPPA] = range_of(work, KAPPA)
     undamped_row(work, SERIES, DS, EXPM1_Q, width)
     share_row(work, MEAN, SPEED, middle, largest)
     binomial = 1.0
@@ -432,32 +432,40 @@ def fill_gap(forces, march, panel, width, gaps, at, work):  # type: ignore[no-un
     gaps[at] = FILLED
 
 
+class Bounds(NamedTuple):
+    """Between which numbers V**2 and the contact force per mass are on a gap."""
+
+    least_v2: float
+    most_v2: float
+    least_load: float
+    most_load: float
+
+
 @Inner
 def pass_by_powers(v2, contact_sign, gaps, at):  # type: ignore[no-untyped-def]
-    """The time over a gap at whose start V**2 is ``v2``, V**2 at its end, and the largest V**2 on it.
+    """The time over a gap at whose start V**2 is ``v2``, V**2 at its end, and bounds on it.
 
     The time is NaN where V**2 changes too much for a few powers, or N may be near zero.
     """
     u, h = v2 + gaps[at + MIDDLE_GAINED], gaps[at + LARGEST_REST]
-    if gaps[at] != FILLED or not h <= MAX_SHARE * u:
-        return nan, nan, nan
     low, high = (u - h) * gaps[at + LEAST_DAMPING], (u + h) * gaps[at + MOST_DAMPING]
     flat, steep = gaps[at + LEAST_KAPPA], gaps[at + MOST_KAPPA]
     least, most = gaps[at + LEAST_N0], gaps[at + MOST_N0]
     size = max(fabs(least), fabs(most)) + max(fabs(flat), fabs(steep)) * high
-    load = least + min(flat * low, flat * high) if contact_sign > 0 else -(most + max(steep * low, steep * high))
-    if not load > FAR_SHARE * size:
-        return nan, nan, nan
+    bounds = Bounds(low, high, least + min(flat * low, flat * high), most + max(steep * low, steep * high))
+    load = bounds.least_load if contact_sign > 0 else -bounds.most_load
+    if gaps[at] != FILLED or not h <= MAX_SHARE * u or not load > FAR_SHARE * size:
+        return nan, nan, bounds
     share, total = h / u, 0.0
     for k in range(POWERS - 1, -1, -1):
         total = fma(total, share, gaps[at + FACTORS + k])
     lost = gaps[at + END_EXPM1]
-    return total / sqrt(u), v2 + (gaps[at + END_GAINED] - v2 * lost) / (1.0 + lost), high
+    return total / sqrt(u), v2 + (gaps[at + END_GAINED] - v2 * lost) / (1.0 + lost), bounds
 
 
 @Inner
 def pass_by_rows(v2, contact_sign, width, gaps, at, work):  # type: ignore[no-untyped-def]
-    """`pass_by_powers` from values at nodes: fills V**2, Y and the rate of time there.
+    """The time over a gap, V**2 at its end, and the largest V**2 on it; fills V**2, Y and the rate of time at nodes.
 
     The time is NaN where the curve or time is not resolved, V**2 vanishes or N may change its sign.
     """

@@ -23,6 +23,7 @@ from gqm_sym.runtime.legs.leg_record import (
     HEADING,
     MIDDLE,
     MIDDLE_LOW,
+    NO_VALUES,
     NORMAL_LOAD,
     RIGHT,
     START,
@@ -231,7 +232,7 @@ def peak_between(record, panels, half_c, between, asked, best):  # type: ignore[
         at, left = begin + k * COLUMNS, edge(record, begin, k)
         width = record[at + RIGHT] - left
         first, last = 2.0 * (low - left) / width - 1.0, 2.0 * (high - left) / width - 1.0
-        if first > 1.0 or last < -1.0:
+        if first > 1.0 or last < -1.0 or record[at + TIME_ERROR] == NO_VALUES:
             continue
         for j in range(COUNT):
             growth = left + width * SHARES[j] + half_c if half_c < inf and record[at + TIME_ERROR] >= 0.0 else 1.0

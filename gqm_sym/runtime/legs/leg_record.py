@@ -25,7 +25,8 @@ at the end           the places at which N changes sign, the first one last
 A panel is a row of COLUMNS numbers: at its nodes the rates of time and of arc length, Y, and the contact force per mass
 (from NORMAL_LOAD on); after each of the first three one more number, RIGHT (the march variable at its end), TIME, and
 TIME_ERROR (what the time may be wrong by); at last INHERITED (`leg_errors`). A panel that was passed by what is kept of
-the curve (`leg_run.pass_gaps`) has its nodes by distance, V for Y, no rates, and TIME_ERROR = -1.
+the curve (`leg_run.pass_gaps`) has its nodes by distance, V for Y, no rates, and TIME_ERROR = NO_RATES; with NO_VALUES
+it has RIGHT and TIME alone.
 
 A row of the field of V**2 next to an equilibrium has FIELD_COLUMNS numbers: the distances from the equilibrium between
 which it holds, and the Chebyshev coefficients of V**2/d**2 and of ds/dlam there (`quadrature.equilibrium` reads them).
@@ -51,14 +52,15 @@ START, START_LOW, START_V2, LAPS_BEFORE, HEADING, BEGIN, BEGIN_LOW = range(7)
 END, END_LOW, MIDDLE, MIDDLE_LOW, HALF_C, TIME_FROM_START, TIME_FROM_END, CHANGE_COUNT = range(7, 15)
 WHOLE, AHEAD, BACK, HEAD = range(15, 19)
 
-# What is read of a record: the times and places between which the leg runs; the largest or smallest speed or contact
-# force, too; the time at which the body passes a place; or all that panels say.
+# What is read of a record (`leg_run.Reading`): the times and places between which the leg runs; the largest or smallest
+# speed or contact force, too; the time at which the body passes a place; or all that panels say.
 TIMES, PEAKS, PASSAGE, PANELS = range(4)
 
 COLUMNS = 4 * WIDE
 RIGHT, TIME, TIME_ERROR = range(COUNT, 3 * WIDE, WIDE)
 Y_ROW, NORMAL_LOAD, INHERITED = 2 * WIDE, 3 * WIDE, 3 * WIDE + COUNT
 FIELD_COLUMNS = 2 + 2 * COUNT
+NO_RATES, NO_VALUES = -1.0, -2.0
 copy = copied(WIDE)
 
 

@@ -4,7 +4,7 @@ Time is counted on the way as long as V**2 is large. From where V**2 decreases f
 end, from which time is then counted back (`follow`).
 """
 
-from math import fabs, inf, nan, sqrt
+from math import fabs, inf, sqrt
 from typing import NamedTuple
 
 from gqm_sym.runtime.arithmetic.clenshaw import chebyshev_sum
@@ -62,6 +62,8 @@ from gqm_sym.runtime.legs.leg_panels import (
 from gqm_sym.runtime.legs.leg_record import (
     COLUMNS,
     HEAD,
+    NO_RATES,
+    NO_VALUES,
     NORMAL_LOAD,
     PASSAGE,
     PEAKS,
@@ -117,6 +119,9 @@ PANELS_PER_RUN = 512
 # The steps by which it is found where a body that moves slowly would have been at rest.
 REST_STEPS = 4
 
+# How far, as a share, times may be off that are summed in another order.
+ROUNDINGS_OF_TIMES = 1e-12
+
 # V**2 of a body at rest, for laws that take its root.
 LEAST_V2 = 1e-300
 
@@ -158,6 +163,27 @@ class Start(NamedTuple):
     may_be_whole: bool
 
 
+class Reading(NamedTuple):
+    """What is read of the record of a leg.
+
+    Attributes
+    ----------
+    what : int
+        TIMES to PANELS (`leg_record`).
+    force : bool
+        Of PEAKS, whether the contact force is read instead of the speed.
+    sign : float
+        1 for the largest, -1 for the smallest.
+    best : float
+        ``sign`` times the largest or smallest so far; what does not exceed it need not be in the record.
+    """
+
+    what: int
+    force: bool
+    sign: float
+    best: float
+
+
 class Route(NamedTuple):
     """The curve ahead of a run.
 
@@ -171,25 +197,30 @@ class Route(NamedTuple):
         The distance from which on the run may pause.
     only_sign : int
         The only sign that N can have; 0 if it can have both.
-    reads : int
-        What is read of the record (`leg_record`).
+    reading : Reading
     until, target : float
         The time from the leg's start up to which peaks are looked for, and the place whose passage is.
     gaps : array
         What is kept of the curve between its breaks (`leg_panels`); empty if that is not used.
-    first_gap : int
+    first_break : int
         The index of the first break of the route among all of the curve.
+    all_breaks : array
+        All breaks of the curve, within one lap.
+    period : float
+        The length of a lap; 0 on an open curve.
     """
 
     breaks: Array
     limit: float
     pause: float
     only_sign: int
-    reads: int
+    reading: Reading
     until: float
     target: float
     gaps: Array
-    first_gap: int
+    first_break: int
+    all_breaks: Array
+    period: float
 
 
 class Ahead(NamedTuple):
@@ -559,7 +590,8 @@ def conclude(forces, route, march, end, timed, searching, run_length):  # type: 
     if what == TURN or (what == ASYMPTOTE and forces.linear):
         place = located(march.origin, v, run_length, breaks, end.upcoming)
     elif searching and what != FULL:
-        no_turn_until = run_length - timed.distance if what == PAUSED or what == SLOWED else inf
+        goes_on = what == PAUSED or what == SLOWED or (what == LIMIT and route.period > 0.0)
+        no_turn_until = run_length - timed.distance if goes_on else inf
         what, v2, sign, changes = SLOWED, timed.v2, timed.contact_sign, timed.change_count
     else:
         place = (route.limit, 0.0) if what == LIMIT else located(march.origin, v, run_length, breaks, end.upcoming)
@@ -569,38 +601,67 @@ def conclude(forces, route, march, end, timed, searching, run_length):  # type: 
 
 
 @Inner
+def ends_of_gap(all_breaks, period, gap):  # type: ignore[no-untyped-def]
+    """Between which places a gap lies; the last one of a closed curve goes on to the first break of the next lap."""
+    return all_breaks[gap], (all_breaks[gap + 1] if gap + 1 < all_breaks.size else all_breaks[0] + period)
+
+
+@Inner
+def may_be_peak(reading, bounds):  # type: ignore[no-untyped-def]
+    """Whether what is looked for may be on a gap with these bounds."""
+    if reading.force:
+        return (bounds.most_load if reading.sign > 0.0 else -bounds.least_load) > reading.best
+    return (sqrt(bounds.most_v2) if reading.sign > 0.0 else -sqrt(bounds.least_v2)) > reading.best
+
+
+@Inner
+def is_read_inside(route, places, times):  # type: ignore[no-untyped-def]
+    """Whether a gap has the place or the time up to which a leg is read, which takes a panel."""
+    if route.reading.what == PASSAGE:
+        return min(places) <= route.target <= max(places)
+    near = ROUNDINGS_OF_TIMES * times[1]
+    return route.reading.what == PEAKS and times[0] - near <= route.until <= times[1] + near
+
+
+@Inner
 def pass_gaps(forces, march, route, contact_sign, before, record, work):  # type: ignore[no-untyped-def]
     """Go on from the break ahead, from one to the next, as far as V**2 is large and follows from what is kept."""
-    (left, run_length, v2, largest_v2, ahead, count), v = before, march.direction
-    breaks, gaps, upcoming = route.breaks, route.gaps, ahead.upcoming
+    (left, run_length, v2, largest_v2, ahead, count), v, spent = before, march.direction, 0.0
+    breaks, gaps, upcoming, reads = route.breaks, route.gaps, ahead.upcoming, route.reading.what
+    for k in range(count if reads == PEAKS else 0):
+        spent += record[HEAD + k * COLUMNS + TIME]
     while gaps.size > 0 and upcoming + 1 < breaks.size and v2 >= GAP_V2_RATIO * largest_v2:
         start, stop, to = breaks[upcoming], breaks[upcoming + 1], HEAD + count * COLUMNS
         # A break lies behind already where a panel is laid once more.
         is_ahead = offset(start, march.origin, v) == run_length
-        # Where the target is, time is read off a panel.
-        has_target = route.reads == PASSAGE and min(start, stop) <= route.target <= max(start, stop)
-        if contact_sign in (0, -route.only_sign) or has_target or not (is_ahead and has_space(record, to, 0)):
+        if contact_sign in (0, -route.only_sign) or not (is_ahead and has_space(record, to, 0)):
             break
-        gap = route.first_gap + (upcoming if v > 0 else -upcoming - 1)
-        at, width = GAP_COLUMNS * (4 * gap + (v + 1) + (contact_sign + 1) // 2), fabs(stop - start)
+        gap = (route.first_break + (upcoming if v > 0 else -upcoming - 1)) % route.all_breaks.size
+        low, high = ends_of_gap(route.all_breaks, route.period, gap)
+        at, width = GAP_COLUMNS * (4 * gap + (v + 1) + (contact_sign + 1) // 2), high - low
         if gaps[at] == 0.0:
-            span = span_before(breaks, upcoming + 1, v, clearance(start, stop))
-            panel = Panel(0.0, 0.0, contact_sign, span)
-            fill_gap(forces, March((start, 0.0), v, 0.0, 1.0), panel, width, gaps, at, work)
-        time, end, top = (nan, nan, nan) if route.reads == PEAKS else pass_by_powers(v2, contact_sign, gaps, at)
-        if not time > 0.0:
+            off, begin_at = clearance(low, high), low if v > 0 else high
+            panel = Panel(0.0, 0.0, contact_sign, (low + off, high - off))
+            fill_gap(forces, March((begin_at, 0.0), v, 0.0, 1.0), panel, width, gaps, at, work)
+        time, end, bounds = pass_by_powers(v2, contact_sign, gaps, at)
+        top, has_values = bounds.most_v2, reads == PEAKS and not (time > 0.0 and not may_be_peak(route.reading, bounds))
+        if has_values or not time > 0.0:
             time, end, top = pass_by_rows(v2, contact_sign, width, gaps, at, work)
-        if not time > 0.0:
+        if not time > 0.0 or is_read_inside(route, (start, stop), (spent, spent + time)):
             break
         largest_v2 = max(largest_v2 / (1.0 + gaps[at + END_EXPM1]), max(v2, top))
-        v2, upcoming, count = end, upcoming + 1, count + 1
+        v2, upcoming, count, spent = end, upcoming + 1, count + 1, spent + time
         run_length = offset(stop, march.origin, v)
         left = marched(run_length, march)
-        if route.reads == PEAKS:
+        if has_values:
             load_per_mass_row(work, MEAN, N0, KAPPA, W)
             copy(record, to + Y_ROW, work, SPEED)
             copy(record, to + NORMAL_LOAD, work, MEAN)
-        record[to + RIGHT], record[to + TIME], record[to + TIME_ERROR] = left, time, -1.0
+        record[to + RIGHT], record[to + TIME], record[to + TIME_ERROR] = (
+            left,
+            time,
+            NO_RATES if has_values else NO_VALUES,
+        )
     if upcoming > ahead.upcoming:
         ahead = Ahead(upcoming, ahead.span, inf, True)
     return Passed(left, run_length, v2, largest_v2, ahead, count)

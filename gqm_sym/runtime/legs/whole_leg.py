@@ -300,9 +300,10 @@ def enter_time(record, begin, time, is_read):  # type: ignore[no-untyped-def]
 @Inner
 def is_read(route, origin, v, h, time):  # type: ignore[no-untyped-def]
     """Whether anything of a leg of the width ``h`` is read for which it takes panels."""
-    if route.reads == PASSAGE:
+    reads = route.reading.what
+    if reads == PASSAGE:
         return 0.0 <= offset(route.target, origin, v) <= h * (1.0 + CLEARANCE_SHARE)
-    return route.reads == PANELS or (route.reads == PEAKS and time > route.until)
+    return reads == PANELS or (reads == PEAKS and time > route.until)
 
 
 @Inner

@@ -9,19 +9,21 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from gqm_sym.arguments import short
 from gqm_sym.errors import InputError, SolutionError, renamed
 from gqm_sym.export.html import page, summary
 from gqm_sym.literals.namespaces import FLOATS
 from gqm_sym.literals.numbers import Number, read_number, read_numbers
 from gqm_sym.runtime.arithmetic.doubledouble import ULP, Pair
 from gqm_sym.runtime.compiled.types import Array
+from gqm_sym.runtime.gradients.orbit import check_signed
 from gqm_sym.runtime.gradients.sensitivity import Sensitivity
 from gqm_sym.runtime.gradients.spectrum import Fourier
 from gqm_sym.runtime.launch.equilibria import Potential
 from gqm_sym.runtime.launch.kinds import MotionKind
 from gqm_sym.runtime.launch.problem import Problem
 from gqm_sym.runtime.launch.request import Launch, LaunchRequest
-from gqm_sym.runtime.launch.speed import path_and_force_at
+from gqm_sym.runtime.launch.speed import path_and_force_at, path_in_space_at
 from gqm_sym.runtime.motion.events import (
     Event,
     Leg,
@@ -35,7 +37,7 @@ from gqm_sym.runtime.motion.extremes import Extreme, extreme, speeds
 from gqm_sym.runtime.motion.locking import Lock, locked
 from gqm_sym.runtime.motion.rolling import slip_times
 from gqm_sym.runtime.motion.rows import Rows
-from gqm_sym.runtime.motion.state import Energy, State
+from gqm_sym.runtime.motion.state import Energy, State, StateInSpace
 from gqm_sym.runtime.motion.trajectory import PhasePoints, TimedSegment, Trajectory, locate
 
 
@@ -147,7 +149,7 @@ class Motion(ABC):
 
     # -- gradients ----------------------------------------------------------------------------
 
-    def gradient(self, quantity: str, wrt: Any = None, *, lam: Any = None) -> dict[str, Any]:
+    def gradient(self, quantity: str, wrt: Any = None, *, lam: Any = None, order: int = 1) -> dict[str, Any]:
         """The derivatives of a quantity of this motion by its launch and run-time parameters.
 
         Parameters
@@ -159,12 +161,15 @@ class Motion(ABC):
             What the derivatives are by: run-time parameters, "lam0" and "v0"; all of them if not given.
         lam : number, optional
             For "time_at": the place, as of `time_at`.
+        order : int
+            2 for the second derivatives of "half_period" or "period".
 
         Returns
         -------
         dict
             A float for each name; of turning points a tuple, in the order of `turning_points`. At ``v0 = 0`` the
-            derivative by v0 is that for greater speeds.
+            derivative by v0 is that for greater speeds. Of second derivatives a dict for each name, with a float for
+            each other.
 
         Raises
         ------
@@ -175,15 +180,23 @@ class Motion(ABC):
         """
         if (lam is None) == (quantity == "time_at"):
             raise InputError(f"lam: is the place that 'time_at' asks about, got {lam!r} with {quantity!r}")
+        if order not in (1, 2) or isinstance(order, bool):
+            raise InputError(f"gradient: order must be 1 or 2, got {short(order)}")
+        if order == 2:
+            return self._second_gradient(quantity, wrt)
+        check_signed(self.problem.formulas, quantity)
         return self._gradient(quantity, wrt) if lam is None else self._arrival_gradient(lam, wrt)
 
     def _gradient(self, quantity: str, wrt: Any) -> dict[str, Any]:
         raise self._without_gradients()
 
+    def _second_gradient(self, quantity: str, wrt: Any) -> dict[str, dict[str, float]]:
+        raise SolutionError(f"gradient: only periodic motions have second derivatives; this one is {self.kind!r}")
+
     def _arrival_gradient(self, lam: Any, wrt: Any) -> dict[str, Any]:
         """The derivatives of the time at which the body is at a place: what carries it on makes that earlier."""
         t = self.time_at(lam)
-        state, changes, f = self.state(t), self.sensitivity(t, wrt), self.problem.functions
+        state, changes, f = self.state(t), self._sensitivity(t, wrt), self.problem.functions
         if state.v == 0.0:
             raise SolutionError("gradient: time_at of a place where the body turns has none")
         rate = state.v / path_and_force_at(f.addresses, f.p, np.array([state.lam]), np.zeros(1))[2, 0]
@@ -225,9 +238,18 @@ class Motion(ABC):
         InputError
             If there is no such parameter, or as `lam`.
         SolutionError
-            If gradients are not there yet for motions of this kind.
+            If gradients are not there yet for motions of this kind, or on curves in space.
         """
+        check_signed(self.problem.formulas, "sensitivity")
+        return self._sensitivity(t, wrt)
+
+    def _sensitivity(self, t: Any, wrt: Any) -> Sensitivity:
+        """`sensitivity`, of which the contact force is right only where that has a sign."""
         raise self._without_gradients()
+
+    def place_changes(self, t: Any, wrt: Any) -> Array:
+        """The derivatives of the curve parameter alone, as of `sensitivity`, which takes longer."""
+        return self.sensitivity(t, wrt).lam
 
     @property
     def action(self) -> float:
@@ -359,7 +381,10 @@ class Motion(ABC):
         error = self._bound(times, points, reduced, v, ds)
         lam = reduced + points.laps * trajectory.lap
         s = (s + points.laps * trajectory.lap_length) + self.problem.arc_origin
-        return State(*(_shaped(array, shape) for array in (times, lam, s, x, z, v, v2, kappa, force, error)))
+        found = [_shaped(array, shape) for array in (times, lam, s, x, z, v, v2, kappa, force, error)]
+        if (space := self.problem.formulas.path_in_space) is None:
+            return State(*found)
+        return StateInSpace(*found, *(_shaped(a, shape) for a in path_in_space_at(space.address, f.p, reduced, v2)))
 
     @locked
     def time_at(self, lam: Any) -> float:

@@ -12,12 +12,15 @@ from gqm_sym.literals.numbers import read_number
 from gqm_sym.runtime.arithmetic.doubledouble import ULP, ZERO
 from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.double_double.orbit_time import Orbit
-from gqm_sym.runtime.gradients.orbit import OrbitDerivatives, asked_for
-from gqm_sym.runtime.gradients.quantities import gradient, selected
+from gqm_sym.runtime.gradients.charts import ChartOrbitDerivatives
+from gqm_sym.runtime.gradients.multiprecision import UNDECIDED
+from gqm_sym.runtime.gradients.orbit import FormulaOrbitDerivatives, OrbitDerivatives, asked_for, without_formulas
+from gqm_sym.runtime.gradients.quantities import gradient, second_gradient, selected
 from gqm_sym.runtime.gradients.sensitivity import OrbitSensitivity, Sensitivity
 from gqm_sym.runtime.gradients.spectrum import Fourier, fourier
 from gqm_sym.runtime.launch.kinds import MotionKind
 from gqm_sym.runtime.launch.problem import Problem
+from gqm_sym.runtime.launch.speed import path_and_force_at
 from gqm_sym.runtime.motion import timing
 from gqm_sym.runtime.motion.events import Event
 from gqm_sym.runtime.motion.locking import locked
@@ -36,6 +39,9 @@ MAX_TURN_ROUNDING = 1e-14
 # The largest relative change of a period by the rounding of a chart. It is largest at flat minima of the potential and
 # on splines (14 roundings were measured).
 CHART_ROUNDING = 16 * ULP
+
+# The least distance between two edges of a chart, as a share of the phase; at a smaller one they are the same edge.
+MIN_PANEL = 1e-13
 
 # The most events that `events_between` lists.
 MAX_EVENTS = 1_000_000
@@ -198,7 +204,25 @@ class PeriodicMotion(Motion):
     def _derivatives(self) -> OrbitDerivatives:
         """The orbit with its derivatives."""
         direction = self.direction if self.kind == "circulation" else 0
-        return OrbitDerivatives(self.problem, self._orbit, direction, self._offsets, self._segment.edges)
+        if self.problem.formulas.chart is not None:
+            return self._derivatives_along_chart(direction)
+        return FormulaOrbitDerivatives(self.problem, self._orbit, direction, self._offsets, self._segment.edges)
+
+    def _derivatives_along_chart(self, direction: int) -> ChartOrbitDerivatives:
+        segment, f = self._segment, self.problem.functions
+        if self.problem.true_pieces is None or self.problem.tape is None:
+            raise without_formulas()
+        passage = timing.passage_of(self.problem, self.kind, self.direction, self._offsets)
+        if passage is None:
+            raise SolutionError(UNDECIDED)
+        # Where pieces of the chart meet; the seam of a closed one is its first edge and its last.
+        ends = segment.a, segment.b
+        places = f.between(self.problem.formulas.charted(self.problem.p).edges, *ends)
+        last, edges = 1.0, np.sort((places - ends[0]) / (ends[1] - ends[0]))
+        if not direction:
+            last, edges = np.pi, 2.0 * np.arctan2(np.sqrt(places - ends[0]), np.sqrt(ends[1] - places))
+        edges = edges[np.diff(edges, prepend=0.0) > MIN_PANEL * last]
+        return ChartOrbitDerivatives(self.problem, passage, direction, np.concatenate([[0.0], edges, [last]]))
 
     @cached_property
     def _orbit_sensitivity(self) -> OrbitSensitivity:
@@ -207,6 +231,10 @@ class PeriodicMotion(Motion):
     @locked
     def _gradient(self, quantity: str, wrt: Any) -> dict[str, Any]:
         return gradient(self._derivatives, self, quantity, wrt)
+
+    @locked
+    def _second_gradient(self, quantity: str, wrt: Any) -> dict[str, dict[str, float]]:
+        return second_gradient(self._derivatives, self, quantity, wrt)
 
     @property
     @locked
@@ -225,14 +253,26 @@ class PeriodicMotion(Motion):
             return float(self._derivatives.period_gradient[-1] / inertia)
 
     @locked
-    def sensitivity(self, t: Any, wrt: Any = None) -> Sensitivity:
-        """The derivatives of the state at given times; see `Motion.sensitivity`."""
+    def _sensitivity(self, t: Any, wrt: Any) -> Sensitivity:
         rows = selected(self.problem.formulas.parameters, wrt)
         times, low, shape = self._times(t)
         points = self._phase_points(times, low)
         found = self._orbit_sensitivity.at(self, points, self._places(points), self._velocities(points))
         chosen = [array[list(rows.values())].reshape(len(rows), *shape) for array in found]
         return Sensitivity(tuple(rows), *chosen)
+
+    @locked
+    def place_changes(self, t: Any, wrt: Any) -> Array:
+        """The derivatives of the curve parameter at given times; see `Motion.place_changes`."""
+        if self.problem.formulas.chart is not None:
+            return super().place_changes(t, wrt)
+        rows = selected(self.problem.formulas.parameters, wrt)
+        times, low, shape = self._times(t)
+        points, f = self._phase_points(times, low), self.problem.functions
+        v = self._velocities(points)
+        ds = path_and_force_at(f.addresses, f.p, self._places(points), v**2)[2]
+        found = self._orbit_sensitivity.places_at(self, points, v, ds)
+        return found[list(rows.values())].reshape(len(rows), *shape)
 
     @locked
     def fourier(self, quantity: str, n: int) -> Fourier:
@@ -267,7 +307,8 @@ class PeriodicMotion(Motion):
         sampler = None if times is None else self._sampler_for(times[1], times[2])
         if times is None or sampler is None:
             return super().state(t)
-        if self._segment.from_multiprecision:  # its speeds can be computed from its panels only
+        # The speeds of some segments can be computed from their panels only, and what is in space by itself.
+        if self._segment.from_multiprecision or self.problem.formulas.path_in_space is not None:
             return super().state(t)._replace(lam=self.lam(t))
         if time is not None:
             return State(*sampler.state(time))

@@ -11,7 +11,8 @@ T = TypeVar("T")
 HEADINGS = {
     **{"t": "t (s)", "x": "x (m)", "z": "z (m)", "t_start": "t from (s)", "t_end": "t to (s)", "s": "s (m)"},
     **{"v": "v (m/s)", "v2": "v2 (m2/s2)", "kappa": "kappa (1/m)", "normal_force": "normal_force (N)"},
-    **{"frequency": "frequency (rad/s)"},
+    **{"frequency": "frequency (rad/s)", "y": "y (m)"},
+    **{f"normal_{axis}": f"normal_{axis} (N)" for axis in "xyz"},
 }
 
 

@@ -43,7 +43,7 @@ class State(dict[str, Any]):
 
     __slots__ = ()
 
-    _fields = ("t", "lam", "s", "x", "z", "v", "v2", "kappa", "normal_force", "error")
+    _fields: tuple[str, ...] = ("t", "lam", "s", "x", "z", "v", "v2", "kappa", "normal_force", "error")
 
     def __init__(self, *values: Any) -> None:
         super().__init__(zip(self._fields, values, strict=True))
@@ -76,13 +76,13 @@ class State(dict[str, Any]):
         return np.array(tuple(self.values()), dtype=dtype)
 
     def __repr__(self) -> str:
-        return f"State({', '.join(f'{name}={value!r}' for name, value in self.items())})"
+        return f"{type(self).__name__}({', '.join(f'{name}={value!r}' for name, value in self.items())})"
 
     def __reduce__(self) -> tuple[type["State"], tuple[Any, ...]]:
-        return State, tuple(self.values())
+        return type(self), tuple(self.values())
 
     def _replace(self, **changes: Any) -> "State":
-        return State(*{**self._asdict(), **changes}.values())
+        return type(self)(*{**self._asdict(), **changes}.values())
 
     def _asdict(self) -> dict[str, Any]:
         return dict(self.items())
@@ -117,6 +117,25 @@ class State(dict[str, Any]):
         titles, rows = self._rows()
         hidden = np.size(self.t) - len(rows)
         return f"{table(titles, rows)}{f'<p>... and {hidden} more</p>' if hidden else ''}"
+
+
+class StateInSpace(State):
+    """The state of a body on a space curve: what `State` has, and four fields more.
+
+    On a curve that lies in no vertical plane ``kappa`` and ``normal_force`` are the lengths of the curvature and of the
+    contact force.
+
+    Attributes
+    ----------
+    y : float or array
+        The third coordinate in m.
+    normal_x, normal_y, normal_z : float or array
+        The contact force along x, y and z, in N.
+    """
+
+    __slots__ = ()
+
+    _fields = (*State._fields, "y", "normal_x", "normal_y", "normal_z")
 
 
 class Energy(NamedTuple):

@@ -1,5 +1,6 @@
 """One quantity for each of many launches where forces dissipate, by driving all bodies in compiled code."""
 
+import threading
 from math import inf, nan
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -46,6 +47,13 @@ QUESTIONS = {
 }
 
 
+# What sweeps have kept of charts between their breaks (`legs.advance.Joints`), by forces, parameters and chart; the
+# chart stands beside it, so that no other one can have its identity. A sweep that uses it takes it out meanwhile.
+KEPT: dict[Any, tuple[Array, Array]] = {}
+MAX_KEPT = 8
+_LOCK = threading.Lock()
+
+
 class Asked(NamedTuple):
     """What is asked of all bodies.
 
@@ -66,8 +74,11 @@ class Asked(NamedTuple):
 
 def asked_of_bodies(formulas: "Formulas", quantity: str, t_max: Any, contact: str) -> Asked | None:
     """What compiled code is asked for a quantity; None where motions are solved, or no energy is lost."""
-    if formulas.dissipation is None or formulas.rolling_radius or quantity not in QUESTIONS:
+    loss = formulas.dissipation
+    if loss is None or formulas.rolling_radius or quantity not in QUESTIONS:
         return None
+    if quantity.startswith("normal_force") and not formulas.signed:
+        return None  # the panels of a leg resolve its law of motion, and that may know nothing of the contact force
     horizon = inf if t_max is None else read_number(t_max, where="t_max").value
     return Asked(QUESTIONS[quantity], horizon, ONLY_SIGN[contact]) if horizon > 0.0 else None
 
@@ -93,9 +104,13 @@ def answer_driven(
         Filled in for this part.
     """
     chart, breaks, corners, drops = curve
-    joints = Joints(breaks, corners, drops, np.empty(room_ahead(breaks.size)), np.zeros(room_kept(breaks.size)))
     assert formulas.dissipation is not None
     dissipation = formulas.dissipation.addresses()
+    key = dissipation, id(chart), *(column.flat[0] for column in columns[PARAMETERS:] if chart.size and column.size)
+    with _LOCK:
+        kept = KEPT.pop(key, None)
+    gaps = np.zeros(room_kept(breaks.size)) if kept is None else kept[0]
+    joints = Joints(breaks, corners, drops, np.empty(room_ahead(breaks.size)), gaps)
     record, mass = (
         np.empty((1, (MAX_PANELS + breaks.size) * COLUMNS)),
         PARAMETERS + list(formulas.parameters).index("m"),
@@ -118,6 +133,11 @@ def answer_driven(
         found.values[there, 0] = np.where(ended == legs.FOUND, values, nan)[decided]
         found.status[there] = np.where(ended == legs.FOUND, quantities.ANSWERED, none)[decided]
         found.route[there] = quantities.SINGLE
+    with _LOCK:
+        if gaps.size:
+            KEPT[key] = gaps, chart
+        while len(KEPT) > MAX_KEPT:
+            del KEPT[next(iter(KEPT))]
 
 
 def _are_possible(lines: list[Array], count: int) -> NDArray[np.bool_]:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from gqm_sym.errors import GQMError, InputError
-from gqm_sym.runtime.gradients.orbit import without_formulas
+from gqm_sym.runtime.gradients.orbit import check_signed
 from gqm_sym.runtime.gradients.quantities import selected
 from gqm_sym.runtime.gradients.sweep import PERIODS, period_gradients
 from gqm_sym.runtime.launch.request import LaunchRequest
@@ -43,8 +43,7 @@ def sweep_with_gradient(
     rows = selected(formulas.parameters, wrt)
     if quantity == "turning_points":
         raise InputError("gradient: sweeps have it of quantities that are one number, not of turning_points")
-    if formulas.chart is not None:
-        raise without_formulas()
+    check_signed(formulas, quantity)
     found = sweep(formulas, quantity, launches, parameters, lam, solve)
     names = (*formulas.parameters, "lam0", "v0", "direction", "lam")
     given = (*parameters, launches.lam0, launches.v0, launches.direction, 0.0 if lam is None else lam)
@@ -53,7 +52,7 @@ def sweep_with_gradient(
     ]
     answered = np.flatnonzero(found.status.reshape(-1) == ANSWERED)
     gradient, route = np.full((found.status.size, len(rows)), nan), found.route.reshape(-1)
-    if quantity in PERIODS and formulas.dissipation is None:
+    if quantity in PERIODS and formulas.dissipation is None and formulas.chart is None:
         spans = sweep(formulas, "turning_points", launches, parameters, None, solve).values.reshape(-1, 2)[answered]
         table = np.stack(columns[:-1], axis=1)[answered]
         gradient[answered] = period_gradients(formulas, table[:, :-1], table[:, -1], spans, tuple(rows.values()))

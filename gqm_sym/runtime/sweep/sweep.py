@@ -23,7 +23,7 @@ from gqm_sym.runtime.compiled.threads import run_in_threads
 from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.interface import ExactPotential
 from gqm_sym.runtime.launch.formulas import chart_with, true_pieces_of
-from gqm_sym.runtime.launch.request import CONTACTS, ONLY_SIGN, LaunchRequest
+from gqm_sym.runtime.launch.request import ONLY_SIGN, LaunchRequest, check_contact
 from gqm_sym.runtime.launch.speed import path_and_force_at, potential_at
 from gqm_sym.runtime.multiprecision.exact_problem import NOWHERE
 from gqm_sym.runtime.sweep import quantities, scalar
@@ -94,8 +94,7 @@ def sweep(
         raise InputError(f"quantity: must be one of {', '.join(QUANTITIES)}, got {quantity!r}")
     if (lam is None) == (quantity == "time_at"):
         raise InputError(f"lam: is the place that 'time_at' asks about, got {lam!r} with {quantity!r}")
-    if contact not in CONTACTS:
-        raise InputError(f"contact: must be one of {', '.join(CONTACTS)}, got {contact!r}")
+    check_contact(formulas, contact)
     names = ("lam0", "v0", "direction", "lam", *formulas.parameters)
     sources = (lam0, v0, direction, 0.0 if lam is None else lam, *parameters)
     named = {name: as_doubles(value, name) for value, name in zip(sources[:4], names, strict=False)}
@@ -138,8 +137,11 @@ def sweep(
 def has_compiled_route(formulas: "Formulas", quantity: Quantity, t_max: Any) -> bool:
     """Whether compiled loops answer most launches.
 
-    They do not for motions that lose energy, and of motions with a last time they know only when they end.
+    They do not for motions that lose energy, and of motions with a last time they know only when they end. The grid on
+    which they look for extremes is too coarse for the length of a vector, which may be all but zero somewhere.
     """
+    if not formulas.signed and quantity.code in (quantities.MIN_FORCE, quantities.MAX_FORCE):
+        return False
     timely = t_max is None or (quantity.code == quantities.END_TIME and float(as_doubles(t_max, "t_max")) > 0.0)
     return formulas.dissipation is None and quantity.code != quantities.NOT_COMPILED and timely
 
@@ -264,7 +266,8 @@ class Group(NamedTuple):
         The launches, in the order of `strided`; each array has one number, or one for each launch.
     chart, joints, corners, drops : arrays
         What compiled code reads behind the parameters, and the places within one period at which the curve is not
-        smooth, at which its tangent jumps, and at which contact is lost; all are empty for a curve with formulas.
+        smooth, or at which pieces of the chart meet, at which its tangent jumps, and at which contact is lost; all are
+        empty for a curve with formulas.
     table : CurveTable
         The curve tabulated, where no energy is lost.
     factors : list of arrays
@@ -316,7 +319,9 @@ def _groups(
         has_ends = not chart.period and chart.ends == ("domain-end", "domain-end")
         ends = CURVE_ENDS if has_ends else NO_ENDS
         launches, drops = [*some[:4], *domain, *some[4:]], chart.corners[chart.bends * only_sign < 0.0]
-        yield Group(launches, chart.block, chart.breaks, chart.corners, drops, table, theirs, ends), chosen
+        # Bodies that lose energy pass the chart piece by piece.
+        joints = chart.breaks if not formulas.dissipation else chart.edges[0 if chart.period else 1 : -1]
+        yield Group(launches, chart.block, joints, chart.corners, drops, table, theirs, ends), chosen
 
 
 def _held(formulas: "Formulas", count: int) -> list[int]:

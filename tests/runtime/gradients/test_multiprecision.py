@@ -9,7 +9,7 @@ from paths import ROOT
 
 from gqm_sym.errors import SolutionError
 from gqm_sym.loading import load
-from gqm_sym.runtime.gradients.orbit import OrbitDerivatives, values
+from gqm_sym.runtime.gradients.orbit import FormulaOrbitDerivatives, values
 
 ULP = 2.0**-52
 
@@ -47,7 +47,7 @@ def test_the_same_as_in_double_double(name: str, v0: float) -> None:
     direction = motion.direction if motion.kind == "circulation" else 0
     fast, slow = (
         motion._derivatives,
-        OrbitDerivatives(motion.problem, None, direction, motion._offsets, motion._segment.edges),
+        FormulaOrbitDerivatives(motion.problem, None, direction, motion._offsets, motion._segment.edges),
     )
     assert fast._means[2]
     assert not slow._means[2]
@@ -55,6 +55,8 @@ def test_the_same_as_in_double_double(name: str, v0: float) -> None:
     if not direction:
         np.testing.assert_allclose(slow.ends, fast.ends, rtol=2 * ULP)
         assert slow.turning_points == fast.turning_points
+    rows = (0, fast.source.parameters, fast.source.parameters + 1)
+    np.testing.assert_allclose(slow.second_durations(rows), fast.second_durations(rows), rtol=1e-15, atol=1e-20)
     n = slow._means[1]
     slow_values = slow._multiprecision.samples(n)
     nodes = fast._rule[1][:2, n : 2 * n].copy()

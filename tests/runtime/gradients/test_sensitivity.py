@@ -161,3 +161,21 @@ def test_shapes_and_names() -> None:
     np.testing.assert_allclose(motion.sensitivity(0.0).lam, [1.0, 0.0, 0.0, 0.0, 0.0], atol=1e-15)
     with pytest.raises(SolutionError, match="too near to an equilibrium"):
         generated("circle").solve(lam0="pi - 1/10**9").sensitivity(0.5)
+
+
+@pytest.mark.parametrize(
+    ("name", "launch"),
+    [
+        ("circle", {"lam0": 1.1, "v0": 0.5, "direction": -1}),
+        ("circle", {"lam0": 1.1, "v0": 9.0, "direction": -1}),
+        ("ellipse", {"lam0": -1.25, "v0": 9.0}),
+        ("circle_drag", {"lam0": 1.1, "v0": 0.5}),
+        ("circle_coulomb", {"lam0": 1.5}),
+        ("superellipse", {"lam0": 0.5}),
+    ],
+)
+def test_places_alone(name: str, launch: dict[str, float]) -> None:
+    """The derivatives of places alone, which fits ask for, are those of sensitivities."""
+    motion, times = generated(name).solve(**launch), np.linspace(0.0, 2.0, 9)
+    wanted = motion.sensitivity(times, ("g", "lam0")).lam
+    np.testing.assert_allclose(motion.place_changes(times, ("g", "lam0")), wanted, rtol=1e-14, atol=1e-15)

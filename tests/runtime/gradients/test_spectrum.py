@@ -41,7 +41,7 @@ def test_the_sum_is_the_motion(quantity: str, launch: dict[str, Any]) -> None:
 @pytest.mark.parametrize(
     ("quantity", "n", "launch", "error", "text"),
     [
-        ("y", 3, {}, InputError, "there is no quantity 'y'"),
+        ("y", 3, {}, InputError, "quantity: must be one of .*, got 'y'"),
         ("x", -1, {}, InputError, "must be a whole number from 0"),
         ("x", 1.5, {}, InputError, "must be a whole number from 0"),
         ("lam", 3, {"v0": 9.0}, SolutionError, "does not repeat"),

@@ -6,14 +6,15 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gqm_sym.arguments import unknown_argument
-from gqm_sym.errors import InputError, SolutionError
+from gqm_sym.arguments import one_of
+from gqm_sym.errors import SolutionError
 from gqm_sym.runtime.compiled.calls import call_static_balance
 from gqm_sym.runtime.compiled.jit import entry
 from gqm_sym.runtime.compiled.types import INTEGER, MATRIX, VECTOR, Array
 from gqm_sym.runtime.gradients.orbit import path_rows
 from gqm_sym.runtime.gradients.quantities import EXTREMES
 from gqm_sym.runtime.gradients.quantities import QUANTITIES as PERIODIC_QUANTITIES
+from gqm_sym.runtime.launch.speed import path_and_force_at
 from gqm_sym.runtime.legs.leg_record import END, END_LOW, HEADING
 from gqm_sym.runtime.legs.variations.changes import Changes
 from gqm_sym.runtime.legs.variations.equation import LawRows
@@ -77,10 +78,7 @@ class StateChanges:
     law: LawRows
 
     def __init__(self, changes: Changes, points: PhasePoints, v: Array) -> None:
-        half, w = np.empty(v.size, dtype=np.intp), np.empty(v.size)
-        for timed, here, phi in points.segments:
-            last = np.nan if timed.segment.speed_series is None else timed.segment.speed_series[0]
-            half[here], w[here] = changes.half(timed.leg, timed.sense < 0), phi * last
+        half, w = _marched(changes, points)
         parts = [
             self._part(changes, half[start : start + BLOCK], w[start : start + BLOCK], v[start : start + BLOCK])
             for start in range(0, max(v.size, 1), BLOCK)
@@ -100,6 +98,24 @@ class StateChanges:
         force = load + v**2 * curvature + 2.0 * v * path[3][0] * faster
         rates = (np.broadcast_to(rate, lam.shape) for rate in (acceleration, mass * law.load[0] * v / law.ds))
         return np.array([lam, law.ds * lam + along.arc, x, z, faster, force, *rates])
+
+
+def _marched(changes: Changes, points: PhasePoints) -> tuple[NDArray[np.intp], Array]:
+    """The halves of legs on which points lie, and their march variables."""
+    half, w = np.empty(points.laps.size, dtype=np.intp), np.empty(points.laps.size)
+    for timed, here, phi in points.segments:
+        last = np.nan if timed.segment.speed_series is None else timed.segment.speed_series[0]
+        half[here], w[here] = changes.half(timed.leg, timed.sense < 0), phi * last
+    return half, w
+
+
+def places_at(motion: Any, changes: Changes, t: Array, low: Array) -> Array:
+    """How the places of a motion at times, of two doubles each, change."""
+    points, f = motion._phase_points(t, low), motion.problem.functions
+    (lam, moved, delay), v = changes.delays(*_marched(changes, points)), motion._velocities(points)
+    ds = path_and_force_at(f.addresses, f.p, lam, v**2)[2]
+    places: Array = moved - v / ds * delay + points.laps * changes.lap[:, None]
+    return places
 
 
 def states_at(motion: Any, changes: Changes, t: Array, low: Array) -> StateChanges:
@@ -122,10 +138,9 @@ def gradient(motion: Any, changes: Changes, quantity: str) -> Array:
     quantity : str
         One of `QUANTITIES`.
     """
-    if not (isinstance(quantity, str) and quantity in QUANTITIES):
-        if quantity in PERIODIC_QUANTITIES:
-            raise SolutionError(f"gradient: a motion with losses does not repeat, and so it has no {quantity}")
-        raise InputError(unknown_argument("gradient", str(quantity), QUANTITIES, what="quantity"))
+    if quantity in PERIODIC_QUANTITIES and quantity not in QUANTITIES:
+        raise SolutionError(f"gradient: a motion with losses does not repeat, and so it has no {quantity}")
+    one_of(quantity, QUANTITIES, where="gradient: quantity")
     if quantity == "turning_points":
         return turning_points(motion, changes)
     if quantity in EXTREMES:

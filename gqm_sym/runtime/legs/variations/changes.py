@@ -12,7 +12,6 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from numpy.polynomial.chebyshev import chebvander
 from numpy.typing import NDArray
 
 from gqm_sym.errors import SolutionError
@@ -23,7 +22,6 @@ from gqm_sym.runtime.launch.problem import Problem
 from gqm_sym.runtime.legs.leg_record import END, HEADING, MIDDLE, START, START_V2
 from gqm_sym.runtime.legs.leg_run import ASYMPTOTE
 from gqm_sym.runtime.legs.leg_segments import Run
-from gqm_sym.runtime.legs.polynomials import COUNT, TO_COEFFICIENTS
 from gqm_sym.runtime.legs.variations.equation import Law, LawRows, Panels
 
 
@@ -238,21 +236,23 @@ class Changes:
         """How states change at march variables on halves with numbers."""
         panels = self.panels
         k = panels.panel_at(half, w)
-        x = np.clip(2.0 * (w - panels.begin[k]) / panels.width[k] - 1.0, -1.0, 1.0)
-        weights = TO_COEFFICIENTS.T @ chebvander(x, COUNT - 1).T
-
-        def at(rows: Array) -> Array:
-            found: Array = np.einsum("bmj,jm->bm", rows[:, k, :COUNT], weights)
-            return found
-
+        shares, times, arcs = panels.at(k, w)
         origin = Origin(*self._stacked[:, :, half])
         v = panels.heading[k]
         return Along(
             sigma=origin.sigma,
-            y=self._mixed(origin, at(panels.shares)),
-            delay=origin.delay + v * panels.u[k] * self._mixed(origin, at(panels.times)),
-            arc=origin.arc + self.by_all(at(panels.arcs)),
+            y=self._mixed(origin, shares),
+            delay=origin.delay + v * panels.u[k] * self._mixed(origin, times),
+            arc=origin.arc + self.by_all(arcs),
             places=panels.places(k, w),
             heading=v,
             contact_sign=panels.contact_sign[k],
         )
+
+    def delays(self, half: NDArray[np.intp], w: Array) -> tuple[Array, Array, Array]:
+        """Of `along` the places, as doubles, and how they and the times change."""
+        panels = self.panels
+        k = panels.panel_at(half, w)
+        origin = Origin(*self._stacked[:, :, half])
+        delay = origin.delay + panels.heading[k] * panels.u[k] * self._mixed(origin, panels.times_at(k, w))
+        return panels.places(k, w)[0], origin.sigma, delay

@@ -19,11 +19,13 @@ from math import ceil, inf, log2
 from typing import NamedTuple
 
 import numpy as np
+from numba import types
 from numpy.polynomial.chebyshev import chebvander
 from numpy.typing import NDArray
 
 from gqm_sym.runtime.arithmetic.doubledouble import two_sum
-from gqm_sym.runtime.compiled.types import Array
+from gqm_sym.runtime.compiled.jit import entry
+from gqm_sym.runtime.compiled.types import MATRIX, VECTOR, Array
 from gqm_sym.runtime.gradients.orbit import pairs, values, without_formulas
 from gqm_sym.runtime.gradients.programs import law_program
 from gqm_sym.runtime.interface import ExactLaw
@@ -38,6 +40,22 @@ POINTS = np.append(SHARES, 1.0)
 
 # From values at the nodes to that at the end of a panel.
 TO_END = TO_COEFFICIENTS.sum(axis=0)
+
+
+@entry(types.void(types.float64[:, :, ::1], types.int64[::1], VECTOR, MATRIX), checked=False)
+def fill_sums(series, panels, x, out):  # type: ignore[no-untyped-def]
+    """Fill the sums of Chebyshev series of panels at places x in [-1, 1] on them: a row for each series of a panel."""
+    waves = np.ones(COUNT)
+    for i in range(x.size):
+        waves[1] = x[i]
+        for j in range(2, COUNT):
+            waves[j] = 2.0 * x[i] * waves[j - 1] - waves[j - 2]
+        terms = series[panels[i]]
+        for row in range(out.shape[0]):
+            total = 0.0
+            for j in range(COUNT - 1, -1, -1):
+                total += terms[row, j] * waves[j]
+            out[row, i] = total
 
 
 class LawRows(NamedTuple):
@@ -197,6 +215,28 @@ class Panels:
     def arcs(self) -> Array:
         """For each parameter and panel the integral of the derivative of ds/dlam from the origin to there."""
         return self._solved[2]
+
+    @cached_property
+    def _series(self) -> tuple[Array, Array]:
+        """Chebyshev coefficients on each panel: rows for ``times``, and for ``shares`` and ``arcs``."""
+        others = np.concatenate([self.shares, self.arcs[:, :, :COUNT]])
+        parts = (self.times[:, :, :COUNT], others)
+        times, others = (np.ascontiguousarray(np.moveaxis(part @ TO_COEFFICIENTS.T, 0, 1)) for part in parts)
+        return times, others
+
+    def _sums(self, series: Array, k: NDArray[np.intp], w: Array) -> Array:
+        out = np.empty((series.shape[1], k.size))
+        fill_sums(series, k, np.clip(2.0 * (w - self.begin[k]) / self.width[k] - 1.0, -1.0, 1.0), out)
+        return out
+
+    def times_at(self, k: NDArray[np.intp], w: Array) -> Array:
+        """``times`` at march variables w on panels k."""
+        return self._sums(self._series[0], k, w)
+
+    def at(self, k: NDArray[np.intp], w: Array) -> tuple[Array, Array, Array]:
+        """``shares``, ``times`` and ``arcs`` at march variables w on panels k."""
+        others = self._sums(self._series[1], k, w)
+        return others[: self._law.count + 2], self.times_at(k, w), others[self._law.count + 2 :]
 
     @property
     def ends(self) -> Array:

@@ -1,0 +1,443 @@
+# Made by gqm-gen for "viviani". Do not edit: change its declaration and generate again.
+# interface 10, input c93b8a64a5a5, body 0dbbbb85c787
+"""Bead on Viviani's curve
+
+x              = a*(cos(theta) + 1)
+y              = a*sin(theta)
+z              = 2*a*sin(theta/2)
+ds/dtheta      = a*sqrt(cos(theta/2)**2 + 1)
+dx/ds          = -sin(theta)/sqrt(cos(theta/2)**2 + 1)
+dy/ds          = cos(theta)/sqrt(cos(theta/2)**2 + 1)
+dz/ds          = cos(theta/2)/sqrt(cos(theta/2)**2 + 1)
+kappa          = sqrt(3*cos(theta/2)**2 + 5)/(2*a*(cos(theta/2)**2 + 1)**(3/2))
+V**2           = 4*a*g*(sin(lam0/2) - sin(theta/2)) + v0**2
+|N|            = m*sqrt((g*sin(theta)/sqrt(cos(theta/2)**2 + 1) - (4*a*g*(sin(lam0/2) - sin(theta/2)) + v0**2)*cos(theta/2)**3/(a*(cos(theta/2)**2 + 1)**(3/2)))**2 + (g*cos(theta)/sqrt(cos(theta/2)**2 + 1) + (4*a*g*(sin(lam0/2) - sin(theta/2)) + v0**2)*(cos(theta) + 2)*sin(theta/2)/(2*a*(cos(theta/2)**2 + 1)**(3/2)))**2 + (4*a*g*(sin(lam0/2) - sin(theta/2)) + v0**2)**2/(a**2*(cos(theta/2)**2 + 1)**3))
+A              = -g*cos(theta/2)/sqrt(cos(theta/2)**2 + 1)
+dt/dtheta      = a*sqrt(cos(theta/2)**2 + 1)/sqrt(4*a*g*(sin(lam0/2) - sin(theta/2)) + v0**2)
+turning points : 4*a*g*(sin(lam0/2) - sin(theta/2)) + v0**2 = 0
+"""
+
+from math import fabs, sqrt
+from typing import TYPE_CHECKING, Any
+
+from numba import carray
+
+from gqm_sym.runtime import compiler
+
+# Before anything else is asked of the runtime, so that another version of it is told from a broken one.
+compiled = compiler(__file__, interface=10)
+
+from gqm_sym.runtime.vocabulary import (
+    BOUNDS, BOUNDS_BATCH, EFFECTIVE_POTENTIAL, INTEGRAND_INVARIANTS_BATCH, LOAD_MAP, ORBIT_INVARIANTS_BATCH,
+    PATH_AND_CONTACT_FORCE, PATH_IN_SPACE, POTENTIAL_DIVDIFF1, POTENTIAL_DIVDIFF1_BATCH, POTENTIAL_DIVDIFF2,
+    POTENTIAL_DIVDIFF2_BATCH, TIME_INTEGRAND_BATCH, TURNING_POINT_BATCH, BatchFunctions, CompiledFunctions,
+    CompiledModel, ExactFormulas, LaunchRequest, Pass1InSpace, atan, cos, divdiff1_cos_in_square, divdiff1_sin,
+    divdiff1_sinc_in_square, divdiff2_sin, iadd, iconst, icos, idiv, imul, ipow, isqrt, place_from_ends, sin, sinc_near,
+    speed_squared_from_potential,
+)
+
+if TYPE_CHECKING:
+    from gqm_sym.runtime import Equilibrium, Motion, Sweep
+
+# The run-time parameters and their defaults; pass1, solve, sweep and equilibria take them by keyword.
+PARAMETERS = {'a': '1', 'g': '9.81', 'm': '1'}
+
+
+@compiled(PATH_AND_CONTACT_FORCE)
+def path_and_contact_force(n, places, speeds, p, out):
+    """x, z, ds/dtheta, curvature kappa, contact force |N|, given V**2 (paper, eqs. 8, 15)."""
+    places, speeds, p, out = carray(places, n), carray(speeds, n), carray(p, 3), carray(out, (5, n))
+    a, g, m = p[0], p[1], p[2]
+    for i in range(n):
+        theta, v2 = places[i], speeds[i]
+        _t0 = cos(theta)
+        _t1 = theta/2
+        _t2 = sin(_t1)
+        _t3 = cos(_t1)
+        _t4 = _t3**2
+        _t5 = _t4 + 1
+        _t6 = sqrt(_t5)
+        _t7 = 1/(a*sqrt(_t5)**3)
+        _t8 = _t7/2
+        _t9 = g/_t6
+        out[0, i] = a*(_t0 + 1)
+        out[1, i] = 2*_t2*a
+        out[2, i] = _t6*a
+        out[3, i] = _t8*sqrt(3*_t4 + 5)
+        out[4, i] = m*sqrt((_t0*_t9 + _t2*_t8*v2*(_t0 + 2))**2 + (-_t3**3*_t7*v2 + _t9*sin(theta))**2 + v2**2/(_t5**3*a**2))
+
+
+@compiled(PATH_IN_SPACE)
+def path_in_space(n, places, speeds, p, out):
+    """y, and the contact force along x, y and z, given V**2."""
+    places, speeds, p, out = carray(places, n), carray(speeds, n), carray(p, 3), carray(out, (4, n))
+    a, g, m = p[0], p[1], p[2]
+    for i in range(n):
+        theta, v2 = places[i], speeds[i]
+        _t0 = sin(theta)
+        _t1 = cos(theta)
+        _t2 = theta/2
+        _t3 = cos(_t2)
+        _t4 = _t3**2 + 1
+        _t5 = v2/a
+        _t6 = _t5/_t4**2
+        _t7 = 1/sqrt(_t4)
+        _t8 = _t7*g
+        _t9 = _t5/sqrt(_t4)**3
+        _t10 = _t0*_t8 - _t3**3*_t9
+        _t11 = _t3*_t7
+        _t12 = _t1*_t8 + _t9*(_t1 + 2)*sin(_t2)/2
+        out[0, i] = _t0*a
+        out[1, i] = m*(-_t1*_t6 + _t10*_t11)
+        out[2, i] = m*(-_t0*_t6 - _t11*_t12)
+        out[3, i] = m*(_t0*_t10*_t7 + _t1*_t12*_t7)
+
+
+@compiled(EFFECTIVE_POTENTIAL)
+def effective_potential(n, places, p, out):
+    """U per unit mass, V**2 = v0**2 - 2*(U(theta) - U(lam0)), and dU/dtheta (paper, eq. 13)."""
+    places, p, out = carray(places, n), carray(p, 3), carray(out, (2, n))
+    a, g = p[0], p[1]
+    _t1 = a*g
+    for i in range(n):
+        theta = places[i]
+        _t0 = theta/2
+        out[0, i] = 2*_t1*sin(_t0)
+        out[1, i] = _t1*cos(_t0)
+
+
+@compiled(POTENTIAL_DIVDIFF1)
+def potential_divdiff1(n, _a, places, offsets, p, out):
+    """U[a, theta] = (U(theta) - U(a))/(theta - a) without cancellation, and ds/dtheta (MATHS, s. 3)."""
+    places, offsets, p, out = carray(places, n), carray(offsets, n), carray(p, 3), carray(out, (2, n))
+    a, g = p[0], p[1]
+    for i in range(n):
+        theta, d = places[i], offsets[i]
+        _t0 = theta/2
+        out[0, i] = a*g*divdiff1_sin(_a/2, _t0, d/2)
+        out[1, i] = a*sqrt(cos(_t0)**2 + 1)
+
+
+@compiled(POTENTIAL_DIVDIFF2)
+def potential_divdiff2(n, _a, b, left, right, p, out):
+    """U[a, theta, b] = V**2/(2*(theta - a)*(b - theta)) from turn a to turn b, and ds/dtheta (MATHS, s. 3)."""
+    left, right, p, out = carray(left, n), carray(right, n), carray(p, 3), carray(out, (2, n))
+    a, g = p[0], p[1]
+    for i in range(n):
+        da, db = left[i], right[i]
+        theta = place_from_ends(_a, b, da, db)
+        _t0 = theta/2
+        out[0, i] = a*g*divdiff2_sin(_a/2, _t0, b/2, da/2, db/2)/2
+        out[1, i] = a*sqrt(cos(_t0)**2 + 1)
+
+
+@compiled(BOUNDS)
+def bounds(lo, hi, p, out):
+    """Bounds of dU/dtheta and ds/dtheta for lo <= theta <= hi, by interval arithmetic."""
+    p, out = carray(p, 3), carray(out, 4)
+    theta = (lo, hi)
+    a, g = (p[0], p[0]), (p[1], p[1])
+    _t0 = icos(imul(idiv(iconst(1.0), iconst(2.0)), theta))
+    out[0], out[1] = imul(imul(_t0, a), g)
+    out[2], out[3] = imul(a, isqrt(iadd(ipow(_t0, 2), iconst(1.0))))
+
+
+# The same formulas over a namespace of operations, for extended precision.
+
+def exact_x(op, theta, p):
+    """Horizontal coordinate."""
+    a = p[0]
+    return a*(op.cos(theta) + 1)
+
+def exact_z(op, theta, p):
+    """Height."""
+    a = p[0]
+    return 2*a*op.sin(theta/2)
+
+def exact_ds(op, theta, p):
+    """ds/dtheta."""
+    a = p[0]
+    return a*op.sqrt(op.cos(theta/2)**2 + 1)
+
+def exact_kappa(op, theta, p):
+    """Curvature (paper, eq. 8)."""
+    a = p[0]
+    _t0 = op.cos(theta/2)**2
+    return op.sqrt(3*_t0 + 5)/(2*a*(_t0 + 1)**(op.mpf(3)/2))
+
+def exact_static_normal_load(op, theta, p):
+    """|N|/m of a body at rest (paper, eq. 15)."""
+    g = p[1]
+    return abs(g)/op.sqrt(op.cos(theta/2)**2 + 1)
+
+def exact_effective_potential(op, theta, p):
+    """U, so that V**2 + 2*U is constant (paper, eq. 13)."""
+    a, g = p[0], p[1]
+    return 2*a*g*op.sin(theta/2)
+
+def exact_effective_potential_slope(op, theta, p):
+    """dU/dtheta."""
+    a, g = p[0], p[1]
+    return a*g*op.cos(theta/2)
+
+def exact_domain(op, p):
+    """Both ends of the domain, and the period; None where there is none."""
+    return None, None, 4*op.pi
+
+def exact_axes(op, p):
+    """A place about which V**2 and ds are even, and the distance to the next; None where there is none."""
+    return -op.pi, 2*op.pi
+
+
+def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = None, a: Any = '1', g: Any = '9.81', m: Any = '1', **unknown: Any) -> Pass1InSpace:
+    """Position, metric, curvature, V**2 and contact force at places of the curve (Pass 1, no quadrature).
+
+    Parameters
+    ----------
+    lam : array_like
+        Places on the curve, as values of its parameter theta.
+    lam0, v0, direction
+        Launch place, speed and direction (+1 or -1: the sign of ds/dt).
+    out : Pass1InSpace, optional
+        The result of a call before, or ten arrays like it, to be filled again.
+
+    Returns
+    -------
+    Pass1InSpace
+        Arrays x, z, ds, kappa, v2 and normal_force; y, normal_x, normal_y and normal_z.
+    """
+    return MODEL.pass1(LaunchRequest(lam0, v0, direction), (a, g, m), lam, out, unknown)
+
+
+def solve(
+    lam0: Any = None, v0: Any = 0.0, direction: int = 1, *, point: Any = None, t_max: Any = None,
+    contact: str = "bilateral", a: Any = '1', g: Any = '9.81', m: Any = '1', **unknown: Any,
+) -> "Motion":
+    """The motion that a launch begins (Passes 1 to 3).
+
+    Parameters
+    ----------
+    lam0, v0, direction
+        Launch place, speed (never negative) and direction (+1 or -1: the sign of ds/dt).
+    point : pair of numbers, optional
+        The launch place by its coordinates, instead of ``lam0``.
+    t_max : number, optional
+        Horizon of time.
+    contact : {"bilateral", "above", "below"}
+        Which side of the track can push.
+
+    Returns
+    -------
+    Motion
+
+    Raises
+    ------
+    GQMError
+        For a launch or a parameter that cannot be; the message says what would be right.
+    """
+    return MODEL.solve(LaunchRequest(lam0, v0, direction, point, t_max, contact), (a, g, m), unknown)
+
+
+def sweep(
+    quantity: str, lam0: Any, v0: Any = 0.0, direction: Any = 1, *, lam: Any = None, t_max: Any = None,
+    contact: str = "bilateral", gradient: Any = None, client: Any = None, a: Any = '1', g: Any = '9.81', m: Any = '1',
+    **unknown: Any,
+) -> "Sweep":
+    """One quantity over arrays of launches and parameters, on all cores; all arguments broadcast.
+
+    Parameters
+    ----------
+    quantity : str
+        "half_period", "period", "turning_points" (the lower, the upper: one more axis), "v_min", "v_max",
+        "normal_force_min", "normal_force_max", "time_at", "t_end" or "rest_position".
+    lam0, v0, direction
+        Launch places, speeds and directions.
+    lam
+        For "time_at": the place, of which the first time there is asked.
+    t_max, contact
+        One for all launches, as of ``solve``.
+    gradient : str or sequence of str, optional
+        What derivatives of the quantity are by: run-time parameters, "lam0" and "v0".
+    client : distributed.Client, optional
+        A Dask cluster to do the work, with the same results.
+
+    Returns
+    -------
+    Sweep
+        ``values``, NaN where there is none; ``status``, 0 where there is one, and ``route``, how each was found.
+        ``status_counts()`` counts the launches without a value. ``gradient``, if asked for, has one more axis.
+    """
+    launches = LaunchRequest(lam0, v0, direction, None, t_max, contact)
+    return MODEL.sweep(quantity, launches, (a, g, m), lam=lam, client=client, gradient=gradient, unknown=unknown)
+
+
+def equilibria(*, between: Any = None, a: Any = '1', g: Any = '9.81', m: Any = '1', **unknown: Any) -> "tuple[Equilibrium, ...]":
+    """Where a body at rest stays, whether it is stable there, and the frequency of small oscillations.
+
+    Parameters
+    ----------
+    between : pair of numbers, optional
+        The range of theta to look in: the whole domain, or one period, if not given.
+
+    Returns
+    -------
+    tuple of Equilibrium
+        Each with lam, stable and frequency (rad/s).
+    """
+    return MODEL.equilibria((a, g, m), between, unknown)
+
+
+# ---- The same formulas once more, only for speed: a load map in one call, and many orbits at once for sweeps. ----
+
+
+@compiled(LOAD_MAP)
+def load_map(n, w0, level, places, p, out):
+    """x, z, ds/dtheta, kappa, V**2 = w0 - 2*(U - level), N (paper, eqs. 8, 13, 15), size of U's terms."""
+    places, p, out = carray(places, n), carray(p, 3), carray(out, (7, n))
+    a, g, m = p[0], p[1], p[2]
+    _c0 = fabs(a)
+    _c1 = fabs(g)
+    for i in range(n):
+        theta = places[i]
+        _t0 = cos(theta)
+        _t1 = theta/2
+        _t2 = sin(_t1)
+        _t3 = 2*_t2*a
+        _t4 = cos(_t1)
+        _t5 = _t4**2
+        _t6 = _t5 + 1
+        _t7 = sqrt(_t6)
+        _t8 = 1/(a*sqrt(_t6)**3)
+        _t9 = _t8/2
+        _t10 = speed_squared_from_potential(w0, _t3*g, level)
+        _t11 = g/_t7
+        out[0, i] = a*(_t0 + 1)
+        out[1, i] = _t3
+        out[2, i] = _t7*a
+        out[3, i] = _t9*sqrt(3*_t5 + 5)
+        out[4, i] = _t10
+        out[5, i] = m*sqrt(_t10**2/(_t6**3*a**2) + (_t0*_t11 + _t10*_t2*_t9*(_t0 + 2))**2 + (-_t10*_t4**3*_t8 + _t11*sin(theta))**2)
+        out[6, i] = 2*_c0*_c1*fabs(_t2)
+
+
+@compiled(POTENTIAL_DIVDIFF1_BATCH)
+def potential_divdiff1_batch(n, starts, places, offsets, p, out):
+    """U[a, theta], ds/dtheta and dU/dtheta."""
+    starts, places, offsets, p, out = carray(starts, n), carray(places, n), carray(offsets, n), carray(p, (3, n)), carray(out, (3, n))
+    for i in range(n):
+        a, g, _a, theta, d = p[0, i], p[1, i], starts[i], places[i], offsets[i]
+        _t0 = theta/2
+        _t1 = a*g
+        _t2 = cos(_t0)
+        out[0, i] = _t1*divdiff1_sin(_a/2, _t0, d/2)
+        out[1, i] = a*sqrt(_t2**2 + 1)
+        out[2, i] = _t1*_t2
+
+
+@compiled(POTENTIAL_DIVDIFF2_BATCH)
+def potential_divdiff2_batch(n, lows, highs, left, right, p, out):
+    """U[a, theta, b] and ds/dtheta; NaN where the points lie too far apart for the closed form."""
+    lows, highs, left, right, p, out = carray(lows, n), carray(highs, n), carray(left, n), carray(right, n), carray(p, (7, n)), carray(out, (2, n))
+    for i in range(n):
+        a, g, _c0, _c1, _c2, _c3, da, db = p[0, i], p[1, i], p[3, i], p[4, i], p[5, i], p[6, i], left[i], right[i]
+        _t0 = da/2
+        _t1 = db/2
+        _t2 = divdiff1_cos_in_square(_t0, _t1)
+        _t3 = db/4
+        _t4 = -_t3 + da/4
+        _t5 = _t4*divdiff1_sinc_in_square(_t0, _t1)
+        _t6 = _t3*da
+        out[0, i] = a*g*(_c1*_t2 + _c3*_t5)/2
+        out[1, i] = a*sqrt((-_c1*(_c0*_t4 - _t5*_t6) + _c3*(_c2 - _t2*_t6))**2 + 1)
+
+
+@compiled(ORBIT_INVARIANTS_BATCH)
+def orbit_invariants_batch(n, lows, highs, p, out):
+    """Terms that are constant along an orbit: ``potential_divdiff2_batch`` reads them behind the parameters."""
+    lows, highs, p, out = carray(lows, n), carray(highs, n), carray(p, (3, n)), carray(out, (4, n))
+    for i in range(n):
+        _a, b = lows[i], highs[i]
+        _t0 = _a/4
+        _t1 = _t0 - b/4
+        _t2 = _t0 + b/4
+        out[0, i] = sinc_near(-_t1)
+        out[1, i] = sin(_t2)
+        out[2, i] = cos(_t1)
+        out[3, i] = cos(_t2)
+
+
+@compiled(TIME_INTEGRAND_BATCH)
+def time_integrand_batch(n, sine2, cosine2, p, out):
+    """(dt/du)**2 at sine2 = sin(u)**2, and its divisor; dt/du integrates to the half period (paper, eq. 17)."""
+    p, out = carray(p, (7, n)), carray(out, (2, n))
+    for i in range(n):
+        a, g, t, one_minus_t, one_minus_tt, cosine_fourth = p[0, i], p[1, i], p[3, i], p[4, i], p[5, i], p[6, i]
+        _t0 = cosine2 + one_minus_tt*sine2
+        _t1 = sine2*t
+        _t2 = (_t1 + 1)**4
+        out[0, i] = 2*a*(16*_t1*(cosine2 + one_minus_t*sine2)**2 + _t2)/(_t0*_t2*cosine_fourth*g)
+        out[1, i] = 8*_t0*a*g
+
+
+@compiled(INTEGRAND_INVARIANTS_BATCH)
+def integrand_invariants_batch(n, halves, p, out):
+    """Terms that are constant along an orbit: ``time_integrand_batch`` reads them behind the parameters."""
+    halves, p, out = carray(halves, n), carray(p, (3, n)), carray(out, (4, n))
+    for i in range(n):
+        half = halves[i]
+        _t0 = half/8
+        _t1 = cos(_t0)
+        _t2 = 1/_t1**2
+        _t3 = cos(half/4)
+        _t4 = _t1**4
+        out[0, i] = _t2*sin(_t0)**2
+        out[1, i] = _t2*_t3
+        out[2, i] = _t3/_t4
+        out[3, i] = _t4
+
+
+@compiled(TURNING_POINT_BATCH)
+def turning_point_batch(n, offsets, launches, p, out):
+    """From V**2 at an offset: half the orbit's width (paper, eq. 14), -dV**2/dq, and a sine's square q at the turn."""
+    offsets, launches, p, out = carray(offsets, n), carray(launches, n), carray(p, (3, n)), carray(out, (3, n))
+    for i in range(n):
+        a, g, offset, launch = p[0, i], p[1, i], offsets[i], launches[i]
+        _t0 = sin(offset/4)**2 + launch/(8*a*g)
+        out[0, i] = 8*atan(sqrt(_t0)/(sqrt(1 - _t0) + 1))
+        out[1, i] = 8*a*g
+        out[2, i] = _t0
+
+
+@compiled(BOUNDS_BATCH)
+def bounds_batch(n, lo, hi, p, out):
+    """Bounds of dU/dtheta and ds/dtheta for lo <= theta <= hi."""
+    lo, hi, p, out = carray(lo, n), carray(hi, n), carray(p, (3, n)), carray(out, (4, n))
+    for i in range(n):
+        theta = (lo[i], hi[i])
+        a, g = (p[0, i], p[0, i]), (p[1, i], p[1, i])
+        _t0 = icos(imul(idiv(iconst(1.0), iconst(2.0)), theta))
+        out[0, i], out[1, i] = imul(imul(_t0, a), g)
+        out[2, i], out[3, i] = imul(a, isqrt(iadd(ipow(_t0, 2), iconst(1.0))))
+
+
+MODEL = CompiledModel(
+    name='viviani', parameter='theta', parameters=PARAMETERS, positive=('a',),
+    source=__file__,
+    units={'a': 'm', 'g': 'm/s**2', 'm': 'kg', 'theta': '1'},
+    functions=CompiledFunctions(
+        path_and_contact_force, effective_potential, potential_divdiff1, potential_divdiff2, bounds,
+    ),
+    path_in_space=path_in_space, signed=False,
+    load_map=load_map,
+    batch=BatchFunctions(
+        potential_divdiff1=potential_divdiff1_batch, potential_divdiff2=potential_divdiff2_batch,
+        orbit_invariants=orbit_invariants_batch, time_integrand=time_integrand_batch,
+        integrand_invariants=integrand_invariants_batch, turning_point=turning_point_batch, bounds=bounds_batch,
+        orbit_rows=4, integrand_rows=4,
+    ),
+    domain_of=exact_domain, axes_of=exact_axes, monotone=True,
+    exact=ExactFormulas(
+        exact_x, exact_z, exact_ds, exact_kappa, exact_static_normal_load, exact_effective_potential,
+        exact_effective_potential_slope,
+    ),
+)

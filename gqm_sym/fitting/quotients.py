@@ -1,0 +1,38 @@
+"""Difference quotients, for what has no derivatives."""
+
+from collections.abc import Callable
+from math import inf
+from typing import Any
+
+import numpy as np
+
+from gqm_sym.runtime.compiled.types import Array
+
+
+def central_differences(
+    function: Callable[[Array], Any], at: Array, steps: Array, low: Any = -inf, high: Any = inf
+) -> Array:
+    """Return the central difference quotients of a function by each of its arguments, one-sided at their limits.
+
+    Parameters
+    ----------
+    function : callable
+        ``f(x)`` gives a number or an array.
+    at : (n,) array
+        Where the quotients are taken.
+    steps : (n,) array
+        The steps to both sides, in the units of the arguments.
+    low, high : float or (n,) array
+        Limits of the arguments, which are not left.
+
+    Returns
+    -------
+    array
+        The quotients, with one axis more than the function has: the last one, for the arguments.
+    """
+    columns = []
+    ends = np.maximum(at - steps, low), np.minimum(at + steps, high)
+    for k in range(at.size):
+        before, after = (function(np.where(np.arange(at.size) == k, end, at)) for end in ends)
+        columns.append((after - before) / (ends[1][k] - ends[0][k]))
+    return np.stack(columns, axis=-1)

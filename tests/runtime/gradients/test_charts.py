@@ -1,0 +1,182 @@
+"""Gradients along charts: against closed forms, and against differences of half periods in double-double arithmetic."""
+
+from fractions import Fraction
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import pytest
+from mpmath import mp, mpf
+from paths import ROOT
+
+import gqm_sym as gqm
+from gqm_sym.errors import SolutionError
+from gqm_sym.loading import load
+from gqm_sym.runtime.motion import timing
+
+ULP = 2.0**-52
+
+# The step of a difference quotient of durations that have some 26 digits.
+STEP = Fraction(1, 2**30)
+
+
+@pytest.fixture(scope="module")
+def ring(generated_folder: Path) -> ModuleType:
+    """A circle as an implicit curve, in arc length from the bottom."""
+    curve = gqm.Curve.implicit("x**2 + z**2 - R**2", start=(0, "-R"), parameters={"R": 1})
+    return gqm.build(gqm.derive(curve, gqm.Gravity()), name="gradient_ring", folder=generated_folder)
+
+
+@pytest.fixture(scope="module")
+def rail(generated_folder: Path) -> ModuleType:
+    """A valley of an arc between clothoids and lines, down which a ball rolls."""
+    pieces = [
+        gqm.line(length=3),
+        gqm.clothoid(length="q", kappa_start=0, kappa_end="1/r"),
+        gqm.arc(radius="r", angle="3/5"),
+        gqm.clothoid(length="q", kappa_start="1/r", kappa_end=0),
+        gqm.line(length=3),
+    ]
+    curve = gqm.Curve.piecewise(pieces, heading="-h", parameters={"q": "1/2", "r": "3/2", "h": "7/10"})
+    model = gqm.derive(curve, gqm.Gravity() + gqm.Rolling(beta="2/5"))
+    return gqm.build(model, name="gradient_rail", folder=generated_folder)
+
+
+@pytest.fixture(scope="module")
+def valley(generated_folder: Path) -> ModuleType:
+    """The spline through nine points, beside a spring."""
+    x = np.linspace(-2.0, 2.0, 9)
+    points = np.stack([x, 0.3 * x**2 + 0.05 * np.sin(3.0 * x)], axis=1)
+    force = gqm.Gravity() + gqm.Potential("k*(x**2 + z**2)/2", parameters={"k": "3/2"})
+    return gqm.build(gqm.derive(gqm.Curve.sampled(points), force), name="gradient_valley", folder=generated_folder)
+
+
+def durations(module: ModuleType, launch: dict[str, Any], name: str) -> float:
+    """The derivative of a half period, or of the time of a lap, as a difference quotient."""
+    sides = []
+    for sign in (1, -1):
+        moved = Fraction(launch[name]) + sign * STEP
+        motion = module.solve(**{**launch, name: moved})
+        orbit = timing.orbit_of(motion.problem, motion.kind, motion.direction, motion._offsets)
+        assert orbit is not None
+        sides.append(Fraction(orbit.duration.high) + Fraction(orbit.duration.low))
+    return float((sides[0] - sides[1]) / (2 * STEP))
+
+
+def is_near(found: float, wanted: float, size: float, ulps: float = 4.0) -> bool:
+    """Whether a derivative is within so many units in the last place, of itself or of what it is a difference of."""
+    return abs(found - wanted) <= ulps * ULP * max(abs(wanted), size)
+
+
+CASES = [
+    ("ring", {"lam0": "3/2", "v0": 0, "R": "5/4", "g": "9.81"}),
+    ("ring", {"lam0": "3/2", "v0": "3/4", "R": "5/4", "g": "9.81"}),
+    ("ring", {"lam0": "-3/2", "v0": "8", "R": "5/4", "g": "9.81"}),
+    ("rail", {"lam0": "13/4", "v0": "1/2", "q": "1/2", "r": "3/2", "h": "7/10", "g": "9.81", "beta": "2/5"}),
+    ("rail", {"lam0": "5/2", "v0": 0, "q": "2/5", "r": "7/4", "h": "1/2", "g": "9.81", "beta": "2/5"}),
+    ("valley", {"lam0": "3/4", "v0": 0, "k": "3/2", "g": "9.81"}),
+    ("valley", {"lam0": "1", "v0": "3/2", "k": "1/2", "g": "9.81"}),
+]
+
+
+@pytest.mark.parametrize(("name", "launch"), CASES)
+def test_durations(name: str, launch: dict[str, Any], request: pytest.FixtureRequest) -> None:
+    """By launch, forces and shape; at rest the derivative by the speed is zero."""
+    module = request.getfixturevalue(name)
+    motion = module.solve(**launch)
+    quantity = "period" if motion.kind == "circulation" else "half_period"
+    found = motion.gradient(quantity, tuple(launch))
+    edges, samples, _ = motion._derivatives._panels
+    sizes = np.abs(samples[1:]).mean(axis=2) @ np.diff(edges)
+    size = dict(zip((*module.PARAMETERS, "lam0", "v0"), sizes, strict=False))
+    for key in launch:
+        if launch[key] != 0:
+            assert is_near(found[key], durations(module, launch, key), size[key]), key
+    assert motion.gradient(quantity, "m") == {"m": 0.0}
+    assert launch["v0"] != 0 or found["v0"] == 0.0
+
+
+LAUNCHES = [
+    (1.1, 1.3, 0.0, 0.7),
+    (1.1, 1.3, 2.0, -3.0),
+    (0.4, 0.6, -9.0, 250.0),
+    (2.5, 3.0, 8.0, 1e3),
+    (0.3, 2.0, -1.5, 99.0),
+]
+
+
+@pytest.mark.parametrize(("arc", "radius", "v0", "t"), LAUNCHES)
+def test_states_on_a_circle(arc: float, radius: float, v0: float, t: float, ring: ModuleType) -> None:
+    """Sensitivities, turning points, extremes and the action are those of the circle as a formula."""
+    circle = load(str(ROOT / "generated" / "circle.py"), "circle")
+    speed, direction = abs(v0), 1 if v0 >= 0.0 else -1
+    one = ring.solve(lam0=arc, v0=speed, R=radius, direction=direction)
+    other = circle.solve(lam0=f"{arc!r}/{radius!r}", v0=speed, L=radius, direction=direction)
+    found, wanted = one.sensitivity(t), other.sensitivity(t)
+    places = dict(zip(wanted.wrt, range(4), strict=False))
+
+    def on_circle(rows: Any, name: str) -> Any:
+        """The derivative at a given arc length of launch, from those at a given angle of it."""
+        if name == "R":
+            return rows[places["L"]] - arc / radius**2 * rows[places["lam0"]]
+        return rows[places[name]] / (radius if name == "lam0" else 1.0)
+
+    period = one.sensitivity(np.linspace(t, t + one.period, 50))
+    for k, name in enumerate(found.wrt[:4]):
+        for quantity in ("x", "z", "v", "normal_force"):
+            scale = np.abs(getattr(period, quantity)[k]).max()
+            # A contact force has the second derivative of the displacement of the curve.
+            enough = 1e-10 if (quantity, name) == ("normal_force", "R") else 5e-14
+            assert abs(getattr(found, quantity)[k] - on_circle(getattr(wanted, quantity), name)) <= enough * scale
+    angle = on_circle(wanted.lam, "R") * radius + float(other.lam(t))
+    assert found.lam[found.wrt.index("R")] == pytest.approx(angle, rel=1e-13, abs=1e-14 * abs(period.lam).max())
+    assert found.s.tolist() == found.lam.tolist()
+    for quantity in ("v_max", "v_min", "normal_force_max", "normal_force_min", "period"):
+        first, second = one.gradient(quantity), other.gradient(quantity)
+        rows = [second[name] for name in wanted.wrt[:4]]
+        for name in ("lam0", "g", "R"):
+            enough = 1e-10 if (quantity[:6], name) == ("normal", "R") else 1e-12
+            scale = max(map(abs, second.values()))
+            assert first[name] == pytest.approx(on_circle(rows, name), rel=enough, abs=enough * scale)
+    assert one.action == pytest.approx(other.action, rel=4e-15)
+    assert one.period_slope == pytest.approx(other.period_slope, rel=4e-15)
+
+
+def test_turning_points(ring: ModuleType) -> None:
+    """The other turning point of a swing from rest on a circle lies as far on the other side, whatever the radius."""
+    found = ring.solve(lam0="11/10", R="13/10").gradient("turning_points")
+    assert found["lam0"] == (1.0, -1.0)
+    assert found["g"] == (0.0, 0.0)
+    assert np.abs(found["R"]).max() < 1e-15
+    v0, radius, g, arc = mpf(2), mpf("1.3"), mpf("9.81"), mpf("1.1")
+    with mp.workdps(40):
+        ends = [
+            mp.diff(lambda r: r * mp.acos(mp.cos(arc / r) - v0**2 / (2 * g * r)), radius),
+            mp.diff(lambda q: radius * mp.acos(mp.cos(arc / radius) - v0**2 / (2 * q * radius)), g),
+        ]
+    found = ring.solve(lam0="11/10", R="13/10", v0=2).gradient("turning_points", ("R", "g"))
+    for name, end in zip(("R", "g"), ends, strict=True):
+        assert found[name] == pytest.approx((float(end), -float(end)), rel=4e-16)
+
+
+def test_sweeps_and_fits(ring: ModuleType) -> None:
+    """Sweeps have gradients along charts, and so have fits: the length of a pendulum from its positions."""
+    swept = ring.sweep("period", lam0=[0.5, 1.0], R=[1.0, 2.0], gradient=("R", "lam0"))
+    one = ring.solve(lam0=1.0, R=2.0).gradient("period", ("R", "lam0"))
+    assert swept.gradient[1].tolist() == pytest.approx([*one.values()], rel=1e-15)
+    t = np.linspace(0.0, 6.0, 60)
+    data = {"t": t, "lam": ring.solve(lam0=0.7, R=1.25).lam(t), "sigma": 1e-3}
+    found = gqm.fit(ring, data, {"R": 1.2, "lam0": 0.6})
+    assert found.estimates == pytest.approx({"R": 1.25, "lam0": 0.7}, rel=1e-9)
+
+
+def test_what_is_not_there(generated_folder: Path, ring: ModuleType) -> None:
+    """Motions with losses along charts, and unknown names."""
+    curve = gqm.Curve.implicit("x**2 + z**2 - R**2", start=(0, "-R"), parameters={"R": 1})
+    force = gqm.Gravity() + gqm.QuadraticDrag(b="1/10")
+    damped = gqm.build(gqm.derive(curve, force), name="gradient_damped_ring", folder=generated_folder)
+    with pytest.raises(SolutionError, match="where energy is lost"):
+        damped.solve(lam0=1.0).gradient("turning_points")
+    with pytest.raises(gqm.errors.InputError, match="there is no parameter 'L'"):
+        ring.solve(lam0=1.0).gradient("period", "L")

@@ -1,0 +1,108 @@
+"""Second derivatives of periods against those of closed forms in mpmath."""
+
+from fractions import Fraction
+from itertools import combinations_with_replacement
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import pytest
+from mpmath import mp, mpf
+from paths import ROOT
+
+import gqm_sym as gqm
+from gqm_sym.errors import GQMError, InputError, SolutionError
+from gqm_sym.loading import load
+
+ULP = 2.0**-52
+
+
+@pytest.fixture(scope="module")
+def circle() -> ModuleType:
+    """A bead on a circle."""
+    return load(str(ROOT / "generated" / "circle.py"), "circle")
+
+
+def swing(lam0: Any, v0: Any, L: Any, g: Any) -> Any:
+    """A quarter of the period of a pendulum."""
+    return mp.sqrt(L / g) * mp.ellipk(mp.sin(lam0 / 2) ** 2 + v0**2 / (4 * g * L))
+
+
+def lap(lam0: Any, v0: Any, L: Any, g: Any) -> Any:
+    """The time of a lap of a pendulum."""
+    square = v0**2 + 2 * g * L * (1 - mp.cos(lam0))
+    return 4 * L * mp.ellipk(4 * g * L / square) / mp.sqrt(square)
+
+
+def second(function: Any, at: dict[str, Any], one: str, other: str) -> Any:
+    """The second derivative by two of the arguments, by differences of 60 digits."""
+    step = mpf(10) ** -15
+
+    def value(**moves: Any) -> Any:
+        return function(**{name: x + moves.get(name, 0) for name, x in at.items()})
+
+    if one == other:
+        return (value(**{one: step}) - 2 * value() + value(**{one: -step})) / step**2
+    corners = [(i * j, value(**{one: i * step, other: j * step})) for i in (1, -1) for j in (1, -1)]
+    return sum(sign * found for sign, found in corners) / (4 * step**2)
+
+
+LAUNCHES = [("6/5", "0"), ("1/10", "1/2"), ("-2", "3"), ("1/1000", "0"), ("314/100", "0"), ("1", "9")]
+
+
+@pytest.mark.parametrize("launch", LAUNCHES)
+def test_a_pendulum(launch: tuple[str, str], circle: ModuleType) -> None:
+    """Small and large swings, one from near the top, and rounds; by all pairs of lam0, v0, L and g."""
+    motion = circle.solve(lam0=launch[0], v0=launch[1], L="5/4", g="9.81")
+    found = motion.gradient("period", ("lam0", "v0", "L", "g"), order=2)
+    with mp.workdps(60):
+        numbers = [Fraction(text) for text in (*launch, "5/4", "9.81")]
+        at = {name: mpf(x.numerator) / x.denominator for name, x in zip(("lam0", "v0", "L", "g"), numbers, strict=True)}
+        function, share = (lap, 1) if motion.kind == "circulation" else (swing, 4)
+        for one, other in combinations_with_replacement(at, 2):
+            wanted = share * second(function, at, one, other)
+            size = abs(wanted) + abs(share * function(**at)) * 1e-3
+            assert abs(found[one][other] - wanted) <= 4 * ULP * size, (one, other)
+            assert found[one][other] == found[other][one]
+
+
+def test_the_reference_number(circle: ModuleType) -> None:
+    """The pendulum of 1.2 rad; at rest the second derivative by v0 is the first by the energy."""
+    motion = circle.solve(lam0="6/5", L=1, g="9.81")
+    found = motion.gradient("half_period", ("lam0", "v0"), order=2)
+    wanted = mpf("0.20564724295197262477075024369")
+    assert abs(found["lam0"]["lam0"] - wanted) <= 2 * ULP * wanted
+    assert found["lam0"]["v0"] == 0.0
+    assert found["v0"]["v0"] == pytest.approx(0.5 * motion.period_slope, rel=2 * ULP)
+
+
+def test_an_asymmetric_well(generated_folder: Path) -> None:
+    """On z = x**2 + c*x**3: as differences of first derivatives, which are exact."""
+    module = gqm.build(
+        gqm.derive(gqm.Curve.graph("x**2 + c*x**3"), gqm.Gravity() + gqm.Rolling()),
+        name="second_well",
+        folder=generated_folder,
+    )
+    at = {"lam0": -0.8, "v0": 0.25, "c": 0.3, "beta": 0.4, "g": 9.81}
+    found = module.solve(**at).gradient("half_period", tuple(at), order=2)
+    for name in at:
+        step = 2.0**-20
+        sides = [module.solve(**{**at, name: at[name] + d}).gradient("half_period", tuple(at)) for d in (step, -step)]
+        for other in at:
+            quotient = (sides[0][other] - sides[1][other]) / (2 * step)
+            assert found[name][other] == pytest.approx(quotient, rel=1e-8, abs=1e-9), (name, other)
+
+
+def test_what_is_not_there(circle: ModuleType) -> None:
+    """One clear error each."""
+    motion = circle.solve(lam0=1.0)
+    with pytest.raises(InputError, match="order must be 1 or 2, got 3"):
+        motion.gradient("period", order=3)
+    with pytest.raises(GQMError, match="order=2: quantity: must be one of half_period, period, got 'v_max'"):
+        motion.gradient("v_max", order=2)
+    with pytest.raises(SolutionError, match="only a libration has half_period"):
+        circle.solve(lam0=1.0, v0=9.0).gradient("half_period", order=2)
+    with pytest.raises(SolutionError, match="second derivatives along curves without formulas"):
+        load(str(ROOT / "generated" / "superellipse.py"), "superellipse").solve(lam0=0.5).gradient("period", order=2)
+    with pytest.raises(SolutionError, match="only periodic motions have second derivatives; this one is 'dissipative'"):
+        load(str(ROOT / "generated" / "circle_drag.py"), "circle_drag").solve(lam0=1.0).gradient("t_end", order=2)
