@@ -16,6 +16,7 @@ from gqm_sym.loading import load_text
 from gqm_sym.runtime.compiled.streaming import LARGE
 from gqm_sym.runtime.compiled.threads import run_in_threads
 from gqm_sym.runtime.compiled.types import Array
+from gqm_sym.runtime.compiled.uncompiled import begin_launch
 from gqm_sym.runtime.launch.formulas import Formulas, ParameterValues
 from gqm_sym.runtime.launch.problem import bind
 from gqm_sym.runtime.launch.request import Launch, LaunchRequest, read_launch
@@ -202,6 +203,7 @@ class CompiledModel(Formulas):
         SolutionError
             If the motion cannot be computed, or a rolling body comes to where it does not fit into its track.
         """
+        begin_launch()
         if unknown:
             self.refuse("solve", unknown)
         p = self.numbers(parameters)
@@ -257,6 +259,7 @@ class CompiledModel(Formulas):
         InputError
             If the quantity is unknown, or numbers cannot be read or do not broadcast.
         """
+        begin_launch()
         if unknown:
             self.refuse("sweep", unknown)
         named = dict(zip(self.parameters, parameters, strict=True))

@@ -8,12 +8,12 @@ import math
 import numba
 import pytest
 
-from gqm_sym.runtime.compiled import emitted, jit
+from gqm_sym.runtime.compiled import emitted, jit, uncompiled
 
 
 def install() -> None:
     """Let Python run what numba would compile, from now on."""
-    jit.MAX_PYTHON_TIME = emitted.MAX_PYTHON_TIME = math.inf
+    jit.MAX_PYTHON_TIME = emitted.MAX_PYTHON_TIME = uncompiled.MAX_CALL = uncompiled.MAX_LAUNCHES = math.inf
     jit.COMPILER.has_cached = lambda *_: False  # type: ignore[method-assign]
     jit.COMPILER.callback = jit.COMPILER.entry = _refused  # type: ignore[method-assign, assignment]
     numba.cfunc = _refused

@@ -3,7 +3,6 @@
 import builtins
 import ctypes
 import hashlib
-import math
 import sys
 import threading
 import time
@@ -21,12 +20,12 @@ from numba import types
 from gqm_sym.errors import OutdatedModuleError
 from gqm_sym.runtime.compiled import jit
 from gqm_sym.runtime.compiled.numba_internals import GENERATED
-from gqm_sym.runtime.compiled.uncompiled import go_on, plain_by_address
+from gqm_sym.runtime.compiled.uncompiled import Trial, go_on, plain_by_address
 from gqm_sym.runtime.interface import INTERFACE
 
-# The time in seconds that Python may spend on a function of a generated module before it is compiled. To
-# compile it takes twice as long.
-MAX_PYTHON_TIME = 0.1
+# The time in seconds that Python may spend on a function of a generated module before it is compiled, which takes some
+# 0.2 s.
+MAX_PYTHON_TIME = 0.02
 
 
 @cache
@@ -71,7 +70,7 @@ class Emitted:
         self._compiled: Any = None
         self._plain: Any = None
         self._called_from_c: Any = None
-        self._left = MAX_PYTHON_TIME if alias else jit.MAX_PYTHON_TIME
+        self._trial = Trial(MAX_PYTHON_TIME if alias else jit.MAX_PYTHON_TIME)
 
     @property
     def address(self) -> int:
@@ -118,17 +117,15 @@ class Emitted:
         if not self._slot.value:
             self._begin()
         if self._compiled is None:
-            started = time.perf_counter()
-            try:
-                self._plain(*arguments)
-            except (ArithmeticError, ValueError):  # where compiled code goes on
-                self._left = -math.inf
-            self._left -= time.perf_counter() - started
-            if self._left > 0.0:
-                return
+            if not self._trial.is_over():
+                started = time.perf_counter()
+                try:
+                    self._plain(*arguments)
+                    self._trial.left -= time.perf_counter() - started
+                    return
+                except (ArithmeticError, ValueError):  # where compiled code goes on
+                    pass
             self.compile()
-            if self._left > -math.inf:
-                return
         _c_function(self.signature)(self._slot.value)(*arguments)
 
     def _run_for_c(self, *arguments: Any) -> None:

@@ -60,6 +60,36 @@ _DEADLINE = _Deadline()
 _STEPS = count()
 
 
+# Launches in this process so far.
+_LAUNCHES = SimpleNamespace(count=0)
+
+
+def begin_launch() -> None:
+    """Count a launch, or a sweep of them."""
+    _LAUNCHES.count += 1
+
+
+class Trial:
+    """How much Python has run of a function, by which it is decided when to compile it.
+
+    Parameters
+    ----------
+    seconds : float
+        The time after which it is worth compiling.
+    """
+
+    def __init__(self, seconds: float) -> None:
+        self.left = seconds
+        self._launch, self._launches = -1, 0
+
+    def is_over(self) -> bool:
+        """Whether the function is to be compiled: after this time, or in the third launch that it is used for."""
+        if self._launch != _LAUNCHES.count:
+            self._launch = _LAUNCHES.count
+            self._launches += 1
+        return self.left <= 0.0 or self._launches > MAX_LAUNCHES
+
+
 @contextmanager
 def limited(seconds: float) -> Iterator[None]:
     """Let functions run as plain Python for so long, and no longer."""
@@ -96,6 +126,12 @@ def _integer_power(x: Any, n: int) -> Any:
         factor, count = factor * factor, count >> 1
     return 1.0 / result if n < 0 else result
 
+
+# Who launches more than so often by the same function waits for the compiler, and who does not need not.
+MAX_LAUNCHES = 2
+
+# The time in seconds that one call of an entry point may take in Python, where the compiler takes some seconds.
+MAX_CALL = 1.5
 
 # What runs in Python in place of an operation of compiled code; a room adds those that are its own.
 _IN_PYTHON: dict[Any, Callable[..., Any]] = {}
@@ -363,11 +399,11 @@ class PlainEntry:
     kinds : sequence
         numba's types of its arguments.
     seconds : float
-        The time that Python may take, all calls together.
+        The time that Python may take before a call begins, all calls together.
     """
 
     def __init__(self, function: Any, kinds: Sequence[Any], seconds: float) -> None:
-        self._kinds, self._left = kinds, seconds
+        self._kinds, self._trial = kinds, Trial(seconds)
         self._run = plain_function(function)
 
     def __call__(self, arguments: tuple[Any, ...]) -> Any:
@@ -376,19 +412,20 @@ class PlainEntry:
         Raises
         ------
         NotPlainError
-            If the compiler must run it, or time has run out; then all arrays are as they were.
+            If the compiler must run it, or it is worth compiling; then all arrays are as they were.
         """
+        if self._trial.is_over():
+            raise NotPlainError
         arrays = list(_arrays(arguments))
         before = [array.copy() for array in arrays]
         started = time.perf_counter()
         try:
-            with limited(self._left), np.errstate(all="ignore"):
-                go_on()
+            with limited(MAX_CALL), np.errstate(all="ignore"):
                 return _result(self._run(*map(_given, self._kinds, arguments)))
         except (ArithmeticError, AttributeError, LookupError, TooSlowError, TypeError, ValueError):
-            self._left = 0.0
+            self._trial.left = 0.0
             for array, old in zip(arrays, before, strict=True):
                 array[...] = old
             raise NotPlainError from None
         finally:
-            self._left -= time.perf_counter() - started
+            self._trial.left -= time.perf_counter() - started

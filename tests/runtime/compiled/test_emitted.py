@@ -13,6 +13,7 @@ from paths import ROOT
 
 from gqm_sym.loading import load
 from gqm_sym.runtime.compiled import emitted, jit
+from gqm_sym.runtime.compiled.uncompiled import MAX_LAUNCHES, begin_launch
 from gqm_sym.runtime.interface import INTERFACE
 
 MODULE = f"""from numba import carray
@@ -153,6 +154,17 @@ def test_a_function_is_compiled_when_python_has_taken_long(
     _, call = _potential(tmp_path, "3.0")
     assert call()[2:] == [3.0, 3.0]
     assert compiler.compiled == ["effective_potential"]
+    assert call() == [7.0] * 4
+
+
+def test_a_function_is_compiled_in_the_third_launch_that_uses_it(tmp_path: Path, compiler: _Compiler) -> None:
+    """However short the launches are."""
+    _, call = _potential(tmp_path, "3.0")
+    for _ in range(MAX_LAUNCHES):
+        begin_launch()
+        assert call() == call()
+        assert compiler.compiled == []
+    begin_launch()
     assert call() == [7.0] * 4
 
 

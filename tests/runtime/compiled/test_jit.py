@@ -17,7 +17,7 @@ from numba import types
 from gqm_sym.runtime import vocabulary
 from gqm_sym.runtime.arithmetic.doubledouble import two_sum
 from gqm_sym.runtime.arithmetic.elementary import reduced
-from gqm_sym.runtime.compiled import jit
+from gqm_sym.runtime.compiled import jit, uncompiled
 from gqm_sym.runtime.compiled.intrinsics import fma
 from gqm_sym.runtime.compiled.numba_internals import KeyedFiles
 from gqm_sym.runtime.compiled.stamps import CALLED_BY_MODULES, Stamps
@@ -185,15 +185,16 @@ def test_an_entry_point_is_compiled_where_python_takes_long_or_raises(
     assert (compiled, values[0]) == (["run"], 0.0)
 
 
-def test_python_stops_when_its_time_has_run_out() -> None:
+def test_python_stops_when_its_time_has_run_out(monkeypatch: pytest.MonkeyPatch) -> None:
     """In the middle of a loop."""
+    monkeypatch.setattr(uncompiled, "MAX_CALL", 0.05)
 
     def run(x):  # type: ignore[no-untyped-def]
         while True:
             x = reduced(x)[1]
 
     with pytest.raises(NotPlainError):
-        PlainEntry(run, (types.float64,), 0.05)((1.0,))
+        PlainEntry(run, (types.float64,), 1.0)((1.0,))
 
 
 def norm(x):  # type: ignore[no-untyped-def]
