@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 from gqm_sym.declare import Curve
 from gqm_sym.errors import DeclarationError
-from gqm_sym.kernels.base import CONTACT_SIGN, DIRECTION, Kernel, W
+from gqm_sym.kernels.base import CONTACT_SIGN, DIRECTION, Kernel, W, Y
 from gqm_sym.parameters import COMMON, COMMON_DEFAULTS, COORDINATES, Given, Value, read_value, refuse_out_of_range
 
 
@@ -60,7 +60,7 @@ def _refuse_own_names(names: tuple[str, ...]) -> None:
 
 def _refuse_strangers(kernel: Kernel, names: tuple[str, ...]) -> None:
     """Refuse what a law of the user's own calls by a name that nothing has here."""
-    known = {*names, *COORDINATES, W.name, DIRECTION.name}
+    known = {*names, *COORDINATES, Y.name, W.name, DIRECTION.name}
     for symbol in sorted(kernel.tangential_law.free_symbols, key=str):
         if symbol.name not in known:
             raise DeclarationError(

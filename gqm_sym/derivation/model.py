@@ -511,6 +511,11 @@ def _refuse_planar_forces(kernel: Kernel) -> None:
 def _losses(curve: Curve, kernel: Kernel, place: Place, law: Forces, shape: Geometry) -> Dissipation:
     lam = curve.parameter
     signs = Signs(parameter=lam, domain=curve.domain, positive=shape.positive, may_be_positive=())
+    if law.loads and shape.cusp is not None and signs.sign(shape.cusp) is None:
+        raise DeclarationError(
+            f"derive: {shape.cusp} may vanish, which is a cusp; losses of energy on space curves with cusps are not "
+            "supported yet, so give a domain without one"
+        )
     # A curve's own parameter may be called x, and then means that in a law.
     coordinates = {symbol: form for symbol, form in zip((X, Y, Z), place, strict=True) if symbol != lam}
     pieces = {

@@ -13,7 +13,7 @@ from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.launch.formulas import Formulas
 from gqm_sym.runtime.launch.functions import BoundFunctions
 from gqm_sym.runtime.launch.problem import bind
-from gqm_sym.runtime.launch.request import CONTACTS, LaunchRequest, read_launch
+from gqm_sym.runtime.launch.request import LaunchRequest, check_contact, read_launch
 from gqm_sym.runtime.launch.speed import path_and_force_at, speed_squared_at
 from gqm_sym.runtime.motion.extremes import grid_peaks
 
@@ -91,8 +91,7 @@ def least_speed(
         raise SolutionError(
             f"least_speed: {formulas.name} loses energy, so that V**2 depends on the path taken; use module.solve"
         )
-    if contact not in CONTACTS:
-        raise LaunchError(f"contact: must be one of {', '.join(CONTACTS)}, got {contact!r}")
+    check_contact(formulas, contact)
     for name in parameters:
         if name not in formulas.parameters:
             known = ", ".join(formulas.parameters)

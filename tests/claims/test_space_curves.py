@@ -354,6 +354,8 @@ def test_a_contact_force_without_a_sign_is_told() -> None:
         generated.viviani.solve("3/10", contact="above")
     with pytest.raises(InputError, match="contact: 'below' is for curves in a vertical plane"):
         generated.viviani.sweep("half_period", lam0=0.3, contact="below")
+    with pytest.raises(InputError, match="contact: 'above' is for curves in a vertical plane"):
+        gqm.least_speed(generated.viviani, 0.3)
     motion = generated.viviani.solve(0.3)
     for ask in (lambda: motion.sensitivity(1.0), lambda: motion.gradient("normal_force_max")):
         with pytest.raises(SolutionError, match="none yet on space curves"):
@@ -363,6 +365,25 @@ def test_a_contact_force_without_a_sign_is_told() -> None:
     step = 1e-5
     near = [generated.viviani.solve(0.3 + side * step).half_period for side in (-1, 1)]
     assert motion.gradient("half_period")["lam0"] == pytest.approx((near[1] - near[0]) / (2 * step), rel=1e-8)
+
+
+def test_losses_on_space_curves_with_cusps_are_refused() -> None:
+    """A leg does not always stop there; without losses a motion ends at the cusp, and a domain leaves the cusp out."""
+    cusped = {"x": "u**2", "y": "u**3", "z": "-u**2/2", "parameter": "u"}
+    with pytest.raises(DeclarationError, match="u may vanish, which is a cusp; losses of energy"):
+        gqm.derive(gqm.Curve.space(**cusped), gqm.Gravity() + gqm.CoulombFriction())
+    rough = gqm.derive(gqm.Curve.space(**cusped, domain=("1/10", None)), gqm.Gravity() + gqm.CoulombFriction())
+    assert rough.dissipation is not None
+    assert gqm.derive(gqm.Curve.space(**cusped), gqm.Gravity()).cusp == U
+
+
+def test_a_law_of_the_users_own_knows_y() -> None:
+    """On a space curve it is the third coordinate, in a planar one a parameter."""
+    law = gqm.Kernel.law("-k*y*W*direction")
+    model = gqm.derive(gqm.Curve.space(x="u", y="u**3/3", z="u**2", parameter="u"), gqm.Gravity() + law)
+    assert model.parameters == ("k", "g", "m")
+    assert model.tangential_acceleration.has(sp.Symbol("k", real=True) * U**3)
+    assert "y" in gqm.derive(gqm.Curve.graph("u**2", parameter="u"), gqm.Gravity() + law).parameters
 
 
 def test_closed_curves_are_found_and_their_units_told() -> None:

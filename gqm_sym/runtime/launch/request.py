@@ -122,7 +122,7 @@ def check_contact(formulas: Formulas, contact: Any) -> None:
     if ONLY_SIGN[contact] and not formulas.signed:
         raise LaunchError(
             f"contact: {contact!r} is for curves in a vertical plane; on this space curve the body is held from all "
-            "sides, so leave contact out"
+            "sides, which is 'bilateral'"
         )
 
 
