@@ -96,7 +96,11 @@ __all__ = [
 def __getattr__(name: str) -> Any:
     """Fetch a public name from where it lives."""
     if name not in _HOMES:
-        raise AttributeError(f"module 'gqm_sym' has no attribute {name!r}")
+        from gqm_sym.arguments import nearest
+
+        near = nearest(name, __all__)
+        hint = f"; did you mean {near}?" if near else ""
+        raise AttributeError(f"module 'gqm_sym' has no attribute {name!r}{hint}")
     home = import_module(_HOMES[name])
     return home if home.__name__ == f"gqm_sym.{name}" else getattr(home, name)
 

@@ -5,7 +5,7 @@ Python's own errors say that a function takes no positional arguments; these say
 
 import difflib
 import inspect
-from collections.abc import Callable, Iterable, Mapping, Sequence, Set
+from collections.abc import Callable, Iterable, Mapping, Set
 from functools import wraps
 from typing import Any, ParamSpec, TypeVar
 
@@ -17,6 +17,8 @@ T = TypeVar("T")
 
 _BY_NAME = inspect.Parameter.KEYWORD_ONLY
 _BY_PLACE = (inspect.Parameter.POSITIONAL_ONLY, inspect.Parameter.POSITIONAL_OR_KEYWORD)
+# Of a name with fewer letters than this, one of two letters may be wrong.
+MIN_LENGTH = 4
 # Arguments that a method does not get from its caller.
 _OWN = frozenset({"cls", "self"})
 
@@ -80,11 +82,18 @@ def unknown_argument(called: str, name: str, names: Iterable[str], what: str = "
     return f"{called}: there is no {what} {name!r}; {_hint(name, listed)}it takes {', '.join(listed) or 'none'}"
 
 
-def _hint(name: str, listed: Sequence[str]) -> str:
+def _hint(name: str, listed: Iterable[str]) -> str:
     """The known name that was probably meant, as the beginning of a sentence; nothing if none is near."""
-    near = difflib.get_close_matches(name.lower(), [known.lower() for known in listed], n=1)
-    same = [known for known in listed if near and known.lower() == near[0]]
-    return f"did you mean {same[0]!r}? " if same else ""
+    near = nearest(name, listed)
+    return f"did you mean {near!r}? " if near else ""
+
+
+def nearest(name: str, known: Iterable[str]) -> str | None:
+    """The known name that a user may have meant, in whatever case; None if none is near."""
+    by_lower = {one.lower(): one for one in known}
+    cutoff = 0.5 if len(name) < MIN_LENGTH else 0.6
+    near = difflib.get_close_matches(name.lower(), list(by_lower), n=1, cutoff=cutoff)
+    return by_lower[near[0]] if near else None
 
 
 def not_given(name: str) -> str:

@@ -115,6 +115,7 @@ def renamed(old_to_new: Mapping[str, str], owner: str) -> Callable[..., NoReturn
     def missing(*arguments: object) -> NoReturn:
         name = str(arguments[-1])
         remedy = f"; it is called {old_to_new[name]!r} now" if name in old_to_new else ""
-        raise AttributeError(f"{owner} has no attribute {name!r}{remedy}", name=name)
+        # Python's traceback suggests a name that the object has.
+        raise AttributeError(f"{owner} has no attribute {name!r}{remedy}", name=name, obj=arguments[0])
 
     return missing

@@ -9,6 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import gqm_sym as gqm
+from gqm_sym.arguments import nearest
 from gqm_sym.errors import ArgumentError, DeclarationError, GQMError, InputError
 from gqm_sym.expressions import RESERVED_NAMES, check_module_name
 from gqm_sym.runtime.charts.sampled import Sampled
@@ -104,6 +105,7 @@ def test_whatever_is_given_is_understood_or_refused_clearly(call):
         (lambda: gqm.CoulombFriction(nu=1), "it takes mu, mu_static"),
         (lambda: gqm.families.ellipse(c=1), "it takes a, b, parameter, domain, inverted"),
         (lambda: gqm.Curve.graph("x", domian=(0, 1)), "did you mean 'domain'?"),
+        (lambda: gqm.QuadraticDrag(B="1"), "did you mean 'b'?"),
         (lambda: gqm.Curve.graph(), "'z' must be given"),
         (lambda: gqm.Curve.parametric("cos(u)", "sin(u)", "u"), r"write Curve.parametric\(x='cos\(u\)', z="),
         (lambda: gqm.Curve.parametric(x="cos(u)", z="sin(u)"), "'parameter' must be given"),
@@ -273,3 +275,21 @@ def test_noisy_points_make_a_track_or_are_refused(seed, noise, kind):
     except GQMError:
         return
     assert np.all(np.diff(edges) > 0)
+
+
+def test_names_of_two_letters_are_suggested_too():
+    """One of them may be wrong; nothing is suggested where nothing is near."""
+    assert nearest("vo", ("lam0", "v0", "direction")) == "v0"
+    assert nearest("Lam", ("lam0", "v0")) == "lam0"
+    assert nearest("q", ("lam0", "v0")) is None
+    for make, hint in ((lambda: gqm.Gravty, "Gravity"), (lambda: gqm.families.circel, "circle")):
+        with pytest.raises(AttributeError, match=f"did you mean {hint}"):
+            make()
+    with pytest.raises(AttributeError, match=r"'solve'$"):
+        _ = gqm.solve
+
+
+def test_a_file_of_points_is_to_be_read_first():
+    """Its name is not taken for rows."""
+    with pytest.raises(DeclarationError, match=r"got 'survey.csv'; read a file first"):
+        gqm.Curve.sampled("survey.csv")

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import sympy as sp
 
-from gqm_sym.arguments import checked, flag, short, unknown_argument
+from gqm_sym.arguments import checked, flag, nearest, short, unknown_argument
 from gqm_sym.declare.curve import Curve, Source, check_parameter_name
 from gqm_sym.errors import ArgumentError, DeclarationError
 from gqm_sym.expressions import read_expression
@@ -317,7 +317,9 @@ def __getattr__(name: str) -> Callable[..., Curve]:
     try:
         return FAMILIES[name]
     except KeyError:
-        raise AttributeError(f"there is no family {name!r}; known are {', '.join(names())}") from None
+        near = nearest(name, names())
+        hint = f"did you mean {near}? " if near else ""
+        raise AttributeError(f"there is no family {name!r}; {hint}known are {', '.join(names())}") from None
 
 
 def __dir__() -> list[str]:

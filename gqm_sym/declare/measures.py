@@ -117,8 +117,10 @@ def _what(curve: DeclaredCurve) -> str:
     made = curve.definition
     if isinstance(made, Track):
         count = made.points.count("\n") + 1
-        between = "a quintic spline" if made.kind == "spline" else "stitched planes"
-        return f"{between} through {count} points, {'closed' if made.closed else 'open'}, in arc length s [m]"
+        between = f"{'a quintic spline' if made.kind == 'spline' else 'stitched planes'} through {count} points"
+        if made.smoothing is not None:
+            between = f"a smoothing spline of {len(made.smoothing.points)} points"
+        return f"{between}, {'closed' if made.closed else 'open'}, in arc length s [m]"
     if isinstance(made, Rail):
         kinds = ", ".join(piece.kind for piece in made.pieces[:8]) + (", ..." if len(made.pieces) > 8 else "")
         return f"{'closed ' if made.closed else ''}rail of {len(made.pieces)} pieces ({kinds}), in arc length s [m]"

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from math import pi, tau
 from typing import Protocol, runtime_checkable
 
 import sympy as sp
@@ -13,6 +14,8 @@ from gqm_sym.parameters import Parameters, Value, names_in_order, read_parameter
 
 # What each standard piece is given by; the first of them must be positive.
 STANDARD = {"line": ("length",), "arc": ("radius", "angle"), "clothoid": ("length", "kappa_start", "kappa_end")}
+# An arc by a larger angle is meant in degrees.
+MAX_ARC = 4.0 * pi
 # The SI units of these.
 _UNITS = {"length": "m", "radius": "m", "angle": "1", "kappa_start": "1/m", "kappa_end": "1/m"}
 
@@ -112,6 +115,9 @@ def _standard(kind: str, *given: Source) -> Piece:
         raise DeclarationError(f"{kind}: {names[0]}: must be positive, got {numbers[0]}")
     if kind == "arc" and numbers[1].is_zero:
         raise DeclarationError("arc: angle: must not be zero; positive turns left, negative right")
+    if kind == "arc" and numbers[1].is_number and abs(numbers[1]) > MAX_ARC:
+        turns = f"{float(abs(numbers[1])) / tau:.1f} turns"
+        raise DeclarationError(f"arc: angle: {numbers[1]} rad are {turns}; for degrees write '{numbers[1]} deg'")
     return Piece(kind=kind, numbers=numbers)
 
 

@@ -227,6 +227,10 @@ def _column(values: Any, where: str) -> tuple[Any, ...]:
 
 
 def _read_rows(points: Iterable[Any]) -> Iterator[tuple[str, Place]]:
+    if isinstance(points, str):
+        raise DeclarationError(
+            f"sampled: points: must be rows of x and z, got {short(points)}; read a file first, as by pandas.read_csv"
+        )
     # An array of numbers gives Python's own floats at once, which is many times quicker than row by row.
     rows = points.tolist() if hasattr(points, "tolist") else points
     try:
@@ -362,7 +366,7 @@ def _warn_of_scatter(places: list[Place], joined: bool, remedy: str) -> None:
             f"{len(bends) - 1} neighbours), and loads with it, by about {felt:.2g} g where a body is fast: the points "
             f"scatter, or are too far apart; {remedy}",
             NoisyPointsWarning,
-            stacklevel=4,
+            stacklevel=5,
         )
 
 

@@ -167,7 +167,10 @@ def read_number(value: Source, *, where: str, unit: str | None = None) -> Number
         raise NumberError(str(error)) from None
     except ValueError as error:
         raise NumberError(f"{where}: {error}") from None
-    raise NumberError(f"{where}: {type(value).__name__} given; give a number, or text such as '9.81' or 'pi/2'")
+    if isinstance(value, np.ndarray) and value.ndim == 0:
+        return read_number(value[()], where=where, unit=unit)
+    remedy = "give one number" if hasattr(value, "__len__") else "give a number"
+    raise NumberError(f"{where}: {type(value).__name__} given; {remedy}, or text such as '9.81' or 'pi/2'")
 
 
 def flat_doubles(array: Doubles) -> Doubles:

@@ -101,8 +101,8 @@ def read_exact(value: object, *, where: str) -> Fraction | None:
     name = type(value).__name__
     if isinstance(value, bool | complex) or name in ("bool", "bool_", "complex64", "clongdouble"):
         raise NumberError(f"{where}: {value!r} is of type {name}; give a real number")
-    if name in ("timedelta64", "datetime64"):  # NumPy counts the first among the integers
-        raise NumberError(f"{where}: {value!r} is of type {name}; give a number of seconds, such as 0.005")
+    if name in ("timedelta", "timedelta64", "datetime64"):  # NumPy counts the first among the integers
+        raise NumberError(f"{where}: {value!r} is of type {name}; give a number of seconds, or text such as '5 ms'")
     try:
         if isinstance(value, Fraction):
             return bounded(value)

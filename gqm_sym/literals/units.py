@@ -57,8 +57,10 @@ _SI = {
     "J": Unit(kilogram=1, metre=2, second=-2),
 }
 
-# What stands between a number and its unit, in a text such as "30 deg".
-_GAP = re.compile(r"(?<=[\w.)])\s+(?=(?:1\s*/\s*)?[(A-Za-z\u00b0\u00b5])")
+# What stands between a number and its unit, in a text such as "30 deg" or "30deg".
+_GAP = re.compile(
+    r"(?<=[\w.)])\s+(?=(?:1\s*/\s*)?[(A-Za-z\u00b0\u00b5])|(?<=[\d.)])(?=[A-Za-z\u00b0\u00b5])(?![eE][+-]?\d)"
+)
 # Signs for which the grammar has no word.
 _SIGNS = {"\u00b0": "deg", "\u00b5": "micro", "%": "percent"}
 

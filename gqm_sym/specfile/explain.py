@@ -16,10 +16,9 @@ _WANTED = {
     "list_type": "must be a list, as in [a, b]",
     "too_short": "must have two entries, as in [a, b]",
     "too_long": "must have two entries, as in [a, b]",
-    "model_type": "must be a mapping, as in {key: value}",
-    "model_attributes_type": "must be a mapping, as in {key: value}",
-    "dict_type": "must be a mapping, as in {key: value}",
 }
+_SAMPLES = {"family": "{name: circle}", "launch": "{lam0: pi/3}", "parameters": "{a: 2}"}
+_MAPPINGS = ("model_type", "model_attributes_type", "dict_type")
 
 
 ModelAt: TypeAlias = Callable[[tuple[str, ...]], Any]
@@ -76,6 +75,8 @@ def explain(
         mistakes.add(value_mark, f"{what}, got {_given(node)}")
     else:
         what = _WANTED.get(kind, detail["msg"])
+        if kind in _MAPPINGS:
+            what = f"must be a mapping, as in {_sample(loc, model_at)}"
         given = detail.get("ctx", {}).get("actual_length", _given(node))
         mistakes.add(value_mark, f"{label}{what}, got {given}")
 
@@ -90,7 +91,20 @@ def _explain_unknown(
     mark = steps[-1][1]
     near = difflib.get_close_matches(key, allowed, n=1)
     remedy = f"did you mean {near[0]}?" if near else f"allowed are {', '.join(allowed)}"
+    if key.isdigit():
+        remedy = "a comma separates entries; write a decimal point, as in 0.7"
     mistakes.add(mark, f"{label}unknown key {shown(key)}", remedy)
+
+
+def _sample(loc: tuple[Any, ...], model_at: ModelAt) -> str:
+    """A mapping that may stand at a place of the file."""
+    if loc[-1] in _SAMPLES:
+        return _SAMPLES[loc[-1]]
+    field = getattr(model_at(_path(loc[:-1])), "model_fields", {}).get(loc[-1])
+    if field is not None and field.examples:
+        return _example(field)
+    fields = getattr(model_at(_path(loc)), "model_fields", {}).items()
+    return "{" + ", ".join(f"{name}: {_example(one)}" for name, one in fields if one.is_required()) + "}"
 
 
 def _path(loc: tuple[Any, ...]) -> tuple[str, ...]:

@@ -117,7 +117,7 @@ def test_the_closed_forms_are_the_centre_s() -> None:
 
 def test_a_body_that_does_not_fit_is_an_error(bowl: ModuleType) -> None:
     """At launch, or where it comes to such a place; not if the motion ends before."""
-    with pytest.raises(LaunchError, match=r"radius rho does not fit .* theta = 0\.5; launch elsewhere"):
+    with pytest.raises(LaunchError, match=r"this rho a body does not fit .* theta = 0\.5; launch elsewhere"):
         bowl.solve(0.5, L=1, rho=1, beta=0)
     # kappa*rho = 1 where (1 + (2 a x)**2)**1.5 = 2 a rho
     launch = {"lam0": 1.5, "a": 0.5, "rho": 1.5, "beta": "2/5"}

@@ -81,6 +81,7 @@ def test_numbers_that_cannot_be(
         (lambda: gqm.line(length=0), "line: length: must be positive, got 0"),
         (lambda: gqm.arc(radius="-2", angle=1), "arc: radius: must be positive, got -2"),
         (lambda: gqm.arc(radius=2, angle=0), "arc: angle: must not be zero"),
+        (lambda: gqm.arc(radius=2, angle=-90), "arc: angle: -90 rad are 14.3 turns; for degrees write '-90 deg'"),
         (lambda: gqm.clothoid(length="1 +", kappa_start=0, kappa_end=1), "clothoid: length: "),
         (lambda: gqm.Curve.piecewise([]), "piecewise: no pieces; give one or more"),
         (

@@ -36,6 +36,10 @@ u = pint.UnitRegistry()
         ("36 km/h", "m/s", Fraction(10)),
         (" 9.81  m / s**2 ", "m/s**2", Fraction(981, 100)),
         ("2 min", "s", Fraction(120)),
+        ("50cm", "m", Fraction(1, 2)),
+        ("1.5e3ms", "s", Fraction(3, 2)),
+        ("(1/3)ft", "m", Fraction(127, 1250)),
+        (np.array(2), "1", Fraction(2)),
     ],
 )
 def test_conversions_are_exact(given: object, unit: str, exact: Fraction) -> None:
@@ -43,7 +47,9 @@ def test_conversions_are_exact(given: object, unit: str, exact: Fraction) -> Non
     assert read_number(given, where="it", unit=unit).fraction == exact
 
 
-@pytest.mark.parametrize("given", [30 * u.deg, 30.0 * u.deg, "30 deg", "30 \u00b0", 1800 * u.arcmin])
+@pytest.mark.parametrize(
+    "given", [30 * u.deg, 30.0 * u.deg, "30 deg", "30 \u00b0", "30\u00b0", "30deg", 1800 * u.arcmin]
+)
 def test_degrees(given: object) -> None:
     """They become numbers with pi in them, known to any number of digits."""
     number = read_number(given, where="it", unit="1")
@@ -135,6 +141,10 @@ def test_launch_and_motion(swing: object) -> None:
     assert measured.time_at("60 deg") == plain.time_at("pi/3")
     assert measured.events_between(0 * u.s, 1 * u.min) == plain.events_between(0, 60)
     assert measured.energy(1 * u.s) == plain.energy(1)
+    # A time that a double holds is that double, however it is written; the others differed by a unit in the last place.
+    for half in ("1/2", "0.5", "500 ms", 500 * u.ms, Fraction(1, 2), np.array(0.5), np.float32(0.5)):
+        assert measured.lam(half) == measured.lam(0.5)
+        assert measured.state(half) == measured.state(0.5)
 
 
 def test_load_maps_and_sweeps(swing: object) -> None:

@@ -166,11 +166,13 @@ def test_the_coaster_of_the_issue(tmp_path: Path, count: int, interpolated: floa
     points = truth.surveyed(count, 0.01, 5)
     with pytest.warns(
         NoisyPointsWarning, match=r"^sampled: the curvature goes up and down .* as smoothing, or 'auto'$"
-    ):
+    ) as told:
         rough = gqm.Curve.sampled(points)
+    assert told[0].filename == __file__  # where the user wrote it
     off, _ = loads(truth, rough)
     assert np.sqrt(np.mean(off**2)) > interpolated
     curve = gqm.Curve.sampled(points, smoothing=0.01)
+    assert str(curve).startswith(f"Curve: a smoothing spline of {count} points, open")
     off, _ = loads(truth, curve)
     assert np.sqrt(np.mean(off**2)) < smoothed
     assert np.abs(off[30:-30]).max() < 6.0 * smoothed

@@ -79,11 +79,23 @@ WRONG: dict[str, tuple[str | bytes, list[str]]] = {
     ),
     "wrong type, a value": (
         edited(("gravity: {}", "gravity: 9.81")),
-        ["a.yaml:5:12: kernel.gravity: must be a mapping, as in {key: value}, got '9.81'"],
+        ["a.yaml:5:12: kernel.gravity: must be a mapping, as in {}, got '9.81'"],
     ),
     "wrong type, nothing": (
         edited((f"\n  {GRAPH}", "")),
-        ["a.yaml:2:1: curve: must be a mapping, as in {key: value}, got nothing"],
+        ["a.yaml:2:1: curve: must be a mapping, as in {graph: {z: x**3, parameter: x}}, got nothing"],
+    ),
+    "a force in place of the forces": (
+        edited(("kernel:\n  gravity: {}", "kernel: gravity")),
+        ["a.yaml:4:9: kernel: must be a mapping, as in {gravity: {}}, got 'gravity'"],
+    ),
+    "a family in place of its mapping": (
+        edited((GRAPH, "family: circle")),
+        ["a.yaml:3:11: curve.family: must be a mapping, as in {name: circle}, got 'circle'"],
+    ),
+    "a decimal comma": (
+        edited(("gravity: {}", "gravity: {g: 9,81}")),
+        ["a.yaml:5:18: kernel.gravity: unknown key '81'; a comma separates entries; write a decimal point, as in 0.7"],
     ),
     "a domain of one end": (
         edited(("[-2, 2]", "[-2]")),

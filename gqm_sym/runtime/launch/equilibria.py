@@ -185,7 +185,9 @@ def _clusters(potential: Potential, starts: list[float]) -> Iterator[tuple[float
         a, b, least = waiting.pop()
         looked += 1
         if looked > MAX_INTERVALS or found > MAX_EQUILIBRIA:
-            what = f"more than {MAX_EQUILIBRIA} of them" if found > MAX_EQUILIBRIA else "they cannot be told apart"
+            what = (
+                f"more than {MAX_EQUILIBRIA} of them" if found > MAX_EQUILIBRIA else "on a level stretch all places are"
+            )
             raise SolutionError(f"equilibria: {what}; give the range to look in as between=(low, high)")
         bottom, top = potential.bounds(a, b)[:2]
         flat = flat and bottom == 0.0 == top

@@ -67,7 +67,7 @@ def check_end(formulas: "Formulas", legs: Sequence[Leg]) -> None:
 
 
 def _what(formulas: "Formulas", place: float) -> str:
-    return f"a body of radius {formulas.rolling_radius} does not fit into the track at {formulas.parameter} = {place!r}"
+    return f"with this {formulas.rolling_radius} a body does not fit into the track at {formulas.parameter} = {place!r}"
 
 
 def _remedy(formulas: "Formulas") -> str:
