@@ -260,10 +260,14 @@ class DissipativeMotion(Motion):
     def state(self, t: Any) -> State:
         """The state of the body at times; see `Motion.state`. For doubles this is one call of compiled code."""
         times = _plain_times(t)
-        if times is None or self.problem.formulas.path_in_space is not None:
+        if times is None or (self.problem.formulas.path_in_space is not None and self.problem.period):
             return super().state(t)
-        out = self._read(*times, STATE_ROWS, self._read_states, lambda later: np.array(Motion.state(self, later)[1:]))
-        return State(t, *out.reshape(-1, *t.shape)) if np.ndim(t) else State(float(times[0][0]), *out[:, 0].tolist())
+
+        def by_segments(later: Array) -> Array:
+            return np.array(Motion.state(self, later)[1 : 1 + STATE_ROWS])
+
+        out = self._read(*times, STATE_ROWS, self._read_states, by_segments)
+        return self._state_of(t if np.ndim(t) else float(times[0][0]), out)
 
     def error_bound(self, t: Any) -> Any:
         """A bound of the error of ``lam(t)``; see `Motion.error_bound`. For doubles it is that of `state`."""
