@@ -117,6 +117,23 @@ def test_a_state_in_space_is_that_of_pass1() -> None:
     assert (data.y.item(), data.normal_y.item(), data.y.units) == (one.y, one.normal_y, "m")
 
 
+def test_states_of_laps_and_of_legs_in_space(build: Build) -> None:
+    """After a thousand laps the body is on the curve still; along legs states at one time are those at many."""
+    model = derived(ROWS["saddle_lap"])
+    motion = build("saddle_lap", model.curve, model.force).solve("1", "5")
+    late = motion.state(1000.4 * motion.period)
+    assert late.x**2 + late.y**2 == pytest.approx(1.0, rel=4e-16)
+    assert late.z == pytest.approx((late.x**2 - late.y**2) / 2, abs=4e-16)
+    slide = generated.helix_coulomb.solve(0, 3, direction=-1, t_max=20)
+    times = np.array([[0.0, 0.1], [3.0, 19.0]])
+    states = slide.state(times)
+    assert states.normal_y.shape == (2, 2)
+    for place in np.ndindex(2, 2):
+        one = slide.state(float(times[place]))
+        assert one == tuple(np.asarray(field)[place] for field in states)
+        assert one.x**2 + one.y**2 == pytest.approx(4.0, rel=4e-16)
+
+
 def helix_truth(w: str) -> tuple[mpf, mpf]:
     """Way and time from rest to V**2 = w on the helix of radius 2 and slope 0.5 rad with mu = 0.2."""
     g, mu, slope = mpf("9.81"), mpf("0.2"), mpf("0.5")

@@ -62,6 +62,7 @@ from gqm_sym.runtime.legs.leg_record import (
     INHERITED,
     MIDDLE,
     START,
+    TIME_FROM_END,
     TIME_FROM_START,
 )
 from gqm_sym.runtime.legs.leg_run import ASYMPTOTE, FULL, LIFTOFF, LIMIT, NARROWED, PAUSED, SPENT, TURN
@@ -179,6 +180,8 @@ class DissipativeMotion(Motion):
     _ending = ""
     # How far from the equilibrium the body turned last, once its swing has died away.
     _last_swing = 0.0
+    # By what share the force next to the unstable equilibrium of a frame may be wrong.
+    _force_error = 0.0
     _arc = 0.0
     _whole: Trajectory | None = None
     _known_changes: Changes | None = None
@@ -257,10 +260,14 @@ class DissipativeMotion(Motion):
     def state(self, t: Any) -> State:
         """The state of the body at times; see `Motion.state`. For doubles this is one call of compiled code."""
         times = _plain_times(t)
-        if times is None or self.problem.formulas.path_in_space is not None:
+        if times is None or (self.problem.formulas.path_in_space is not None and self.problem.period):
             return super().state(t)
-        out = self._read(*times, STATE_ROWS, self._read_states, lambda later: np.array(Motion.state(self, later)[1:]))
-        return State(t, *out.reshape(-1, *t.shape)) if np.ndim(t) else State(float(times[0][0]), *out[:, 0].tolist())
+
+        def by_segments(later: Array) -> Array:
+            return np.array(Motion.state(self, later)[1 : 1 + STATE_ROWS])
+
+        out = self._read(*times, STATE_ROWS, self._read_states, by_segments)
+        return self._state_of(t if np.ndim(t) else float(times[0][0]), out)
 
     def error_bound(self, t: Any) -> Any:
         """A bound of the error of ``lam(t)``; see `Motion.error_bound`. For doubles it is that of `state`."""
@@ -469,8 +476,13 @@ class DissipativeMotion(Motion):
         which = np.searchsorted(timed.segment.edges[1:-1], phi, side="right")
         inherited = panels[which, INHERITED]
         if timed.sense > 0:
-            return before.place + of_frame + swing, before.time + inherited
+            return before.place + of_frame + swing, before.time + inherited + self._time_error_of_force(run)
         return after.place + of_frame + swing, after.time + after.place * inherited
+
+    def _time_error_of_force(self, run: Run) -> float:
+        """What the error of the force makes of the time in which a body departs from an equilibrium."""
+        departs = run.frame is not None and not run.frame.is_stable
+        return self._force_error * float(run.record[TIME_FROM_START] + run.record[TIME_FROM_END]) if departs else 0.0
 
     def _carried(self, leg: int) -> Errors:
         """The errors at the end of a leg, given those with which it begins; in a frame, errors of distances."""
@@ -482,6 +494,7 @@ class DissipativeMotion(Motion):
             before = before._replace(place=before.place + frame.error)
         frame.move(run.record, -1)
         after = Errors(*carry(frame.dissipation, frame.p, turns, before, run.record))
+        after = after._replace(time=after.time + self._time_error_of_force(run))
         frame.move(run.record, 1)
         return after._replace(place=after.place + frame.error) if run.what == LIMIT else after
 
@@ -625,6 +638,7 @@ class DissipativeMotion(Motion):
         if frame is None or not (frame.is_stable or lam0):
             return
         line[PLACE], line[PLACE_LOW] = frame.distance(place, low)
+        self._force_error = 0.0 if frame.is_stable else frame.error / frame.reach
         unknown, exact = (LAST_DIGIT * abs(place) if frame.is_stable else frame.error), problem.formulas.exact
         if not frame.is_stable and lam0 and isinstance(exact, ExactLaw):
             known = refined(frame, exact, problem.p, lam0)

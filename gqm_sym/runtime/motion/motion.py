@@ -249,7 +249,7 @@ class Motion(ABC):
 
     def place_changes(self, t: Any, wrt: Any) -> Array:
         """The derivatives of the curve parameter alone, as of `sensitivity`, which takes longer."""
-        return self.sensitivity(t, wrt).lam
+        return self._sensitivity(t, wrt).lam
 
     @property
     def action(self) -> float:
@@ -385,6 +385,14 @@ class Motion(ABC):
         if (space := self.problem.formulas.path_in_space) is None:
             return State(*found)
         return StateInSpace(*found, *(_shaped(a, shape) for a in path_in_space_at(space.address, f.p, reduced, v2)))
+
+    def _state_of(self, t: Any, rows: Array) -> State:
+        """The state at one time, or at an array of times, from the rows of `Sampler.states` at places within a lap."""
+        space, kind = self.problem.formulas.path_in_space, State
+        if space is not None:
+            more = path_in_space_at(space.address, self.problem.functions.p, rows[0], rows[5])
+            rows, kind = np.concatenate([rows, more]), StateInSpace
+        return kind(t, *rows.reshape(-1, *t.shape)) if np.ndim(t) else kind(t, *rows[:, 0].tolist())
 
     @locked
     def time_at(self, lam: Any) -> float:

@@ -307,12 +307,15 @@ class PeriodicMotion(Motion):
         sampler = None if times is None else self._sampler_for(times[1], times[2])
         if times is None or sampler is None:
             return super().state(t)
-        # The speeds of some segments can be computed from their panels only, and what is in space by itself.
-        if self._segment.from_multiprecision or self.problem.formulas.path_in_space is not None:
+        # The speeds of some segments can be computed from their panels only, and what is in space by places in a lap.
+        in_space = self.problem.formulas.path_in_space is not None
+        if self._segment.from_multiprecision or (in_space and self.kind == "circulation"):
             return super().state(t)._replace(lam=self.lam(t))
-        if time is not None:
+        if time is not None and not in_space:
             return State(*sampler.state(time))
-        return State(t, *sampler.states(times[0]).reshape(-1, *t.shape))
+        if time is not None:
+            return self._state_of(time, np.array(sampler.state(time)[1:]).reshape(-1, 1))
+        return self._state_of(t, sampler.states(times[0]))
 
     def _sampler_for(self, least: float, greatest: float) -> Sampler | None:
         """The sampler for times from ``least`` to ``greatest``; None if they are impossible or too late for doubles."""

@@ -110,13 +110,18 @@ class Changes:
         """How many variables there are."""
         return self.law.count + 2
 
-    def _marks(self, at: int, v2: list[float], is_back: bool) -> LawRows:
-        """The law at places of the records of all runs, with V**2 there."""
-        places = np.array([run.pair(at) for run in self.runs]).T
-        heading = np.array([run.record[HEADING] for run in self.runs])
-        last = [run.back > 0 if is_back else run.ahead == 0 for run in self.runs]
-        first = [self._half(k, is_last)[0] for k, is_last in enumerate(last)]
-        return self.law.rows((places[0], places[1]), np.array(v2), heading, self.panels.contact_sign[first])
+    def _marks(self, marks: Sequence[tuple[int, list[float], bool]]) -> list[LawRows]:
+        """The law at places of the records of all runs, each with V**2 there and whether it is on the last half."""
+        places = np.array([run.pair(at) for at, _, _ in marks for run in self.runs]).T
+        heading = np.array([run.record[HEADING] for run in self.runs] * len(marks))
+        v2 = np.concatenate([speeds for _, speeds, _ in marks])
+        first = [
+            self._half(k, run.back > 0 if is_back else run.ahead == 0)[0]
+            for _, _, is_back in marks
+            for k, run in enumerate(self.runs)
+        ]
+        rows = self.law.rows((places[0], places[1]), v2, heading, self.panels.contact_sign[first])
+        return [LawRows(*part) for part in zip(*(np.split(row, len(marks), axis=-1) for row in rows), strict=True)]
 
     def _half(self, run: int, is_back: bool) -> tuple[int, int]:
         """The first panel of a half of the run with a number, and the one behind its last."""
@@ -143,8 +148,8 @@ class Changes:
             float(speeds[self._half(k, False)[1] - 1]) if run.ahead else start_v2[k] ** 0.5
             for k, run in enumerate(runs)
         ]
-        starts, ends = self._marks(START, start_v2, False), self._marks(END, [0.0] * len(runs), True)
-        middles = self._marks(MIDDLE, [v**2 for v in middle], False)
+        middle_v2, zeros = [v**2 for v in middle], [0.0] * len(runs)
+        starts, ends, middles = self._marks([(START, start_v2, False), (END, zeros, True), (MIDDLE, middle_v2, False)])
         laps, zero, origin = 0, np.zeros(self.variables), self._launched(starts)
         for k, run in enumerate(runs):
             v = float(run.record[HEADING])

@@ -133,20 +133,22 @@ class Panels:
     """
 
     def __init__(self, law: Law, halves: Sequence[tuple[Run, bool]]) -> None:
-        self._law, rows, parts, counts = law, [], [], []
+        self._law, rows, tables = law, [], []
         for run, is_back in halves:
             place, low = run.pair(END if is_back else START)
-            heading, half_c = float(run.record[HEADING]), 0.0 if is_back else run.half_c
-            u = -heading if is_back else heading
-            part = _divided(run.panels_back if is_back else run.panels_ahead, half_c)
-            parts.append(part)
-            counts.append(len(part))
-            rows.append(np.tile([place, low, u, heading, half_c], (len(part), 1)))
+            heading = float(run.record[HEADING])
+            u, half_c = (-heading, 0.0) if is_back else (heading, run.half_c)
+            tables.append(run.panels_back if is_back else run.panels_ahead)
+            rows.append((place, low, u, heading, half_c))
+        panels, counts = _as_followed(tables), [len(table) for table in tables]
+        if any(0.0 < row[-1] < inf for row in rows):
+            parts = np.split(panels, np.cumsum(counts)[:-1])
+            parts = [_divided(part, row[-1]) for part, row in zip(parts, rows, strict=True)]
+            panels, counts = np.concatenate(parts), [len(part) for part in parts]
         self.first = np.cumsum([0, *counts]).tolist()
-        self.place, self._low, self.u, self.heading, half_c = np.concatenate(rows).T
+        self.place, self._low, self.u, self.heading, half_c = np.repeat(np.array(rows), counts, axis=0).T.copy()
         self._is_distance = half_c == inf
         self._half_c = np.where(self._is_distance, 0.0, half_c)
-        panels = np.concatenate(parts)
         (self.begin, self.width, self.contact_sign), self._y = panels[:, :3].T, panels[:, 3:]
 
     @property
@@ -268,22 +270,32 @@ class Panels:
         return start
 
 
-def _divided(table: Array, half_c: float) -> Array:
-    """The panels of a half: where each begins, how far it goes, the sign of N on it, and Y at its nodes.
+def _as_followed(tables: Sequence[Array]) -> Array:
+    """The panels of all halves: where each begins, how far it goes, the sign of N on it, and Y at its nodes."""
+    table = np.concatenate(tables)
+    right = table[:, RIGHT]
+    begin = np.append(0.0, right[:-1])
+    begin[np.cumsum([0, *(len(part) for part in tables)])[:-1]] = 0.0
+    sign = np.where(table[:, NORMAL_LOAD + COUNT // 2] > 0.0, 1.0, -1.0)
+    return np.column_stack([begin, right - begin, sign, table[:, Y_ROW : Y_ROW + COUNT]])
+
+
+def _divided(panels: Array, half_c: float) -> Array:
+    """The panels of a half, divided where its launch is slow.
 
     The march variable of a slow launch begins near a zero of V**2 behind it, at -half_c. There Y is smooth, but changes
     of it are not: panels are no longer than their distance from it.
     """
-    right = table[:, RIGHT]
-    left = np.append(0.0, right[:-1])
-    edges = np.append(left, right[-1])
-    if 0.0 < half_c < inf:
-        marks = half_c * (2.0 ** np.arange(1, ceil(log2(right[-1] / half_c + 2.0))) - 1.0)
-        edges = np.unique([*edges, *marks[marks < right[-1]]])
+    if not 0.0 < half_c < inf:
+        return panels
+    left, sign, y = panels[:, 0], panels[:, 2], panels[:, 3:]
+    right = np.append(left[1:], left[-1] + panels[-1, 1])
+    marks = half_c * (2.0 ** np.arange(1, ceil(log2(right[-1] / half_c + 2.0))) - 1.0)
+    edges = np.unique([*left, right[-1], *marks[marks < right[-1]]])
+    if edges.size == left.size + 1:
+        return panels
     begin, width = edges[:-1], np.diff(edges)
     owner = np.searchsorted(right, begin, side="right")
-    y, sign = table[owner, Y_ROW : Y_ROW + COUNT], np.where(table[owner, NORMAL_LOAD + COUNT // 2] > 0.0, 1.0, -1.0)
-    if begin.size > left.size:
-        x = 2.0 * ((begin - left[owner])[:, None] + width[:, None] * SHARES) / (right - left)[owner, None] - 1.0
-        y = np.einsum("pj,jk,pik->pi", y, TO_COEFFICIENTS.T, chebvander(x, COUNT - 1))
-    return np.column_stack([begin, width, sign, y])
+    x = 2.0 * ((begin - left[owner])[:, None] + width[:, None] * SHARES) / (right - left)[owner, None] - 1.0
+    y = np.einsum("pj,jk,pik->pi", y[owner], TO_COEFFICIENTS.T, chebvander(x, COUNT - 1))
+    return np.column_stack([begin, width, sign[owner], y])

@@ -151,3 +151,23 @@ def test_the_bound_of_a_swing_at_the_end_of_the_range_of_doubles(exponent: int, 
     ratio = 1e60 * lam0
     allowed = bounds + ratio * np.asarray(larger.error_bound(t)) + 1e-15 * lam0
     assert np.all(np.abs(np.asarray(motion.lam(t)) - ratio * np.asarray(larger.lam(t))) <= allowed)
+
+
+@pytest.mark.parametrize(
+    ("h", "away", "k", "c"),
+    [(-35.164795, 4.875553e-9, 0.53167, 0.0283929), (60.5625724, 2.120856e-4, 1.02023, 0.3586965)],
+)
+def test_the_rounding_of_the_force_on_a_hilltop_is_charged(
+    h: float, away: float, k: float, c: float, tmp_path: Path
+) -> None:
+    """Two exponentials: the force is a difference of a place and the hilltop, and places lay up to 2.2 bounds away."""
+    level = gqm.Curve.graph("0*x", parameter="x", domain=(None, None))
+    force = gqm.Potential("-k*(x - h)**2/2") + LAWS["viscous"]
+    motion = gqm.build(gqm.derive(level, force), name="repelled", folder=tmp_path).solve(h + away, h=h, k=k, c=c)
+    with mp.workdps(40):
+        away = mpf(h + away) - mpf(h)
+        root = mp.sqrt(mpf(c) ** 2 / 4 + mpf(k))
+        one, two = root - mpf(c) / 2, -root - mpf(c) / 2
+        for t in np.linspace(0.5, float(mp.log(100 / away) / one), 30).tolist():
+            place = mpf(h) + away * (one * mp.exp(two * t) - two * mp.exp(one * t)) / (one - two)
+            assert abs(mpf(motion.lam(t)) - place) <= motion.error_bound(t) <= 1e-9
