@@ -20,12 +20,12 @@ from numba import types
 from gqm_sym.errors import OutdatedModuleError
 from gqm_sym.runtime.compiled import jit
 from gqm_sym.runtime.compiled.numba_internals import GENERATED
-from gqm_sym.runtime.compiled.uncompiled import Trial, go_on, plain_by_address
+from gqm_sym.runtime.compiled.uncompiled import Trial, go_on, paused, plain_by_address
 from gqm_sym.runtime.interface import INTERFACE
 
 # The time in seconds that Python may spend on a function of a generated module before it is compiled, which takes some
 # 0.2 s.
-MAX_PYTHON_TIME = 0.02
+MAX_PYTHON_TIME = 0.05
 
 
 @cache
@@ -91,7 +91,8 @@ class Emitted:
         """Compile the function, if it is not compiled yet; callers take the compiled one from now on."""
         if self._compiled is None:
             try:
-                self._compiled = jit.COMPILER.callback(self._as_numba_sees_it(), self.signature)
+                with paused():
+                    self._compiled = jit.COMPILER.callback(self._as_numba_sees_it(), self.signature)
             finally:
                 jit.ANNOUNCER.end()
             self._slot.value = self._compiled.address

@@ -100,6 +100,16 @@ def limited(seconds: float) -> Iterator[None]:
         _DEADLINE.at = before
 
 
+@contextmanager
+def paused() -> Iterator[None]:
+    """Do not count the time meanwhile, in which something is compiled."""
+    started = time.perf_counter()
+    try:
+        yield
+    finally:
+        _DEADLINE.at += time.perf_counter() - started
+
+
 def go_on() -> None:
     """Raise TooSlowError if Python has had all the time that it was given."""
     if time.perf_counter() > _DEADLINE.at:
