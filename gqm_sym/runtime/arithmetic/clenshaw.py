@@ -67,7 +67,7 @@ def sum_group(_, c, x, at, high, low):  # type: ignore[no-untyped-def]
 def _sum_group(c: Any, x: Any, at: int, high: Any, low: Any) -> None:
     for k in range(at, at + GROUP):
         ahead, behind, twice = np.float64(0.0), np.float64(0.0), x[k] + x[k]
-        for term in c[:0:-1]:
+        for term in c[:1:-1]:
             ahead, behind = plain_fma(twice, ahead, term - behind), ahead
         high[k], low[k] = ahead, behind
 

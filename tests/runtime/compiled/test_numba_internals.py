@@ -37,6 +37,8 @@ for module, name, value in gone:
     setattr(module, name, value)
 
 sys.path.insert(0, folder)
+from gqm_sym.runtime.compiled import jit
+jit.MAX_PYTHON_TIME = 0.0
 import functions
 print(functions.total(2.0, functions.np.arange(5.0)).hex(), functions.unchecked(3.0).hex())
 functions.square.compile()
@@ -146,7 +148,9 @@ print({type(each.library).__name__ for each in functions.helper.dispatcher.overl
 
 REPEATED = """
 from numba import types
-from gqm_sym.runtime.compiled import emitted, jit
+from gqm_sym.runtime.compiled import jit
+
+jit.MAX_PYTHON_TIME = 0.0
 
 
 @jit.Inner
@@ -181,7 +185,9 @@ CALLED_BY_USERS = """
 import numba
 import numpy as np
 from numba import types
-from gqm_sym.runtime.compiled import emitted, jit
+from gqm_sym.runtime.compiled import jit
+
+jit.MAX_PYTHON_TIME = 0.0
 
 
 @jit.Inner
