@@ -17,11 +17,13 @@ if numba.config.DISABLE_JIT:
     import uncompiled
     uncompiled.install()
 from gqm_sym.building import load
-pendulum, drag = (load(f"generated/{name}.py", name) for name in ("pendulum", "circle_drag"))
+names = ("pendulum", "circle_drag", "catenary", "loop")
+pendulum, drag, catenary, loop = (load(f"generated/{name}.py", name) for name in names)
 motion, lost = pendulum.solve("-pi/2 + 6/5"), drag.solve("1/2", v0="3")
 loads = pendulum.pass1([0.1, -0.2, 40.0], lam0=0.1, v0=1.0)
 swept = pendulum.sweep("period", lam0=[-1.5, -1.0, 0.5], v0=0.25)
 values = [motion.half_period, *motion.lam([0.1, 1.0, 1e6]).tolist(), *motion.state(0.7)[1:], lost.lam(2.5)]
+values += [*catenary.solve(-1.4, 3.0).lam([0.1, 50.0]).tolist(), *loop.solve(2.7, 0.4).state(0.3)[1:]]
 print(json.dumps([*map(float, values), *swept.values.tolist(), *loads.v2.tolist(), *loads.x.tolist()]))
 """
 

@@ -35,6 +35,10 @@ def _c_function(signature: Any) -> Any:
     return ctypes.CFUNCTYPE(None, *(kinds.get(kind, ctypes.c_void_p) for kind in signature.args))
 
 
+# Where the addresses of all functions stand. None of it is freed, so that an address always means one function: what is
+# computed with it may be kept under it.
+_SLOTS: list[ctypes.c_void_p] = []
+
 # The functions that may be called by address, by where their addresses stand.
 _AT: WeakValueDictionary[int, "Emitted"] = WeakValueDictionary()
 
@@ -66,6 +70,7 @@ class Emitted:
     def __init__(self, function: Any, signature: Any, text: str | None = None, alias: str | None = None) -> None:
         self.function, self.signature, self.text, self._alias = function, signature, text, alias
         self._slot = ctypes.c_void_p()
+        _SLOTS.append(self._slot)
         _AT[ctypes.addressof(self._slot)] = self
         self._compiled: Any = None
         self._plain: Any = None

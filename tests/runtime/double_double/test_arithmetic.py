@@ -1,7 +1,6 @@
 """Each operation of double-double arithmetic against mpmath, with the bound on its error."""
 
 from collections.abc import Callable
-from ctypes import CFUNCTYPE, c_ssize_t, c_void_p
 from typing import Any
 
 import numpy as np
@@ -38,7 +37,7 @@ CASES: dict[str, Case] = {
 def carry_out(operation: int, work: np.ndarray) -> None:
     """Carry out one operation on the registers A and B."""
     tape = np.array([[operation, ROW * OUT, ROW * A, ROW * B]], dtype=np.int64)
-    run = CFUNCTYPE(None, c_void_p, c_ssize_t, c_ssize_t, c_void_p, c_ssize_t)(interpreter.INTERPRETER.address)
+    run = interpreter.INTERPRETER.call
     run(tape.ctypes.data, 0, 1, work.ctypes.data, BLOCK)
 
 

@@ -1,6 +1,5 @@
 """Tapes of formulas: their values at many places against the formulas themselves in mpmath."""
 
-from ctypes import CFUNCTYPE, c_ssize_t, c_void_p
 from typing import Any
 
 import numpy as np
@@ -36,7 +35,7 @@ def values(tape: BoundTape, places: np.ndarray) -> tuple[list[mpf], np.ndarray]:
         row = work[first + k * ROW : first + (k + 1) * ROW]
         row[:LOW], row[LOW:ERROR], row[ERROR:] = high, low, 2.0**-106 * abs(high)
     work[place : place + LOW], work[place + LOW : place + ROW] = places, 0.0
-    run = CFUNCTYPE(None, c_void_p, c_ssize_t, c_ssize_t, c_void_p, c_ssize_t)(interpreter.INTERPRETER.address)
+    run = interpreter.INTERPRETER.call
     run(tape.tape.operations.ctypes.data, 0, tape.tape.parts[2], work.ctypes.data, BLOCK)
     out = work[potential : potential + ROW]
     return [mpf(h) + mpf(low) for h, low in out[:ERROR].reshape(2, -1).T.tolist()], out[ERROR:]
