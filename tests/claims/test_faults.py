@@ -90,8 +90,9 @@ def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 @pytest.fixture
-def function(tmp_path: Path) -> Callable[..., Callable[[float], float]]:
+def function(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Callable[[float], float]]:
     """Make an entry point that adds a number, from a source file that is always the same to numba, or of some time."""
+    monkeypatch.setattr(jit, "MAX_PYTHON_TIME", 0.0)
 
     def make(number: float, time: int = 1_000_000_000) -> Callable[[float], float]:
         path = tmp_path / "source.py"

@@ -1,14 +1,11 @@
 """Places and states of a periodic motion at many times, with one call of compiled code."""
 
 from collections.abc import Callable
-from decimal import Decimal
-from numbers import Real
 from typing import Any
 
 import numpy as np
 
-from gqm_sym.literals.numbers import flat_doubles, read_number
-from gqm_sym.literals.units import is_quantity
+from gqm_sym.literals.numbers import flat_doubles
 from gqm_sym.runtime.arithmetic.doubledouble import Pair, two_product
 from gqm_sym.runtime.compiled.threads import run_in_threads
 from gqm_sym.runtime.compiled.types import Array
@@ -31,15 +28,12 @@ STATE_ROWS = 9
 
 
 def plain_time(t: Any) -> float | None:
-    """A time that is a double or equal to one, in whatever form and unit; None for any other."""
+    """A time that is a double or equal to one; None for any other."""
     if type(t) is float:
         return t
     if isinstance(t, np.ndarray) and t.ndim == 0 and t.dtype == np.float64:
         return float(t)
-    if not (isinstance(t, str | Real | Decimal) or (is_quantity(t) and np.ndim(t.magnitude) == 0)):
-        return None
-    time = read_number(t, where="t", unit="s")
-    return None if time.low else time.value
+    return float(t) if type(t) is int and abs(t) < 2**53 else None
 
 
 def plain_times(t: Any) -> tuple[Array, float, float] | None:

@@ -28,7 +28,7 @@ def arch(module_of: Callable[[str], ModuleType]) -> ModuleType:
     ("given", "message"),
     [
         ({"L": None}, r"L: has no default and was not given; pass L=\.\.\."),
-        ({"L": [1]}, "L: list given; give a number"),
+        ({"L": [1]}, "L: list given; give one number"),
         ({"L": 0}, "L: must be positive, got 0; the closed forms hold for L > 0"),
         ({"lam0": None}, "lam0: not given; it is the value of lam to launch from"),
         ({"direction": 0}, r"direction: must be 1 or -1 .* got 0"),
