@@ -82,7 +82,7 @@ class Model:
     kappa
         Signed curvature, positive to the left of growing λ; of a curve in no vertical plane its absolute value.
     turning_rate, turning_angle
-        dΘ/dλ, and Θ from ``lam0`` to λ; of a curve in no vertical plane |dt/dλ|, and None.
+        dΘ/dλ, and Θ from ``lam0`` to λ; of a curve in no vertical plane ``|dt/dλ|``, and None.
     cusp
         A smooth factor of σ that changes sign or vanishes at the cusps; None without cusps.
     potential, inertia
@@ -109,7 +109,7 @@ class Model:
         ``closed``, ``quadrature`` (it holds an Integral) or ``equation`` (an unknown function: the law is not linear
         in W). Where it is not closed, the forms below hold W as a symbol.
     normal_force
-        N, positive along the normal to the left of growing λ; of a curve in no vertical plane |N|, which has no sign.
+        N, positive along the normal to the left of growing λ; of a curve in no vertical plane ``|N|``, which has no sign.
     side_force
         What a track that turns about the z axis carries out of its plane; 0 for one at rest.
     tangential_acceleration
@@ -204,7 +204,7 @@ class Model:
         return self.curve.period
 
     def normal_force_at(self, v2: sp.Expr) -> sp.Expr:
-        """N where V² has a value; of a curve in no vertical plane |N|."""
+        """N where V² has a value; of a curve in no vertical plane ``|N|``."""
         if not self.loads:
             return MASS * (self.kappa * v2 + self.static_normal_load)
         return MASS * sp.sqrt(sp.Add(*(part**2 for part in self._turned_force(v2))))
