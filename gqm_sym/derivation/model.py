@@ -109,7 +109,8 @@ class Model:
         ``closed``, ``quadrature`` (it holds an Integral) or ``equation`` (an unknown function: the law is not linear
         in W). Where it is not closed, the forms below hold W as a symbol.
     normal_force
-        N, positive along the normal to the left of growing λ; of a curve in no vertical plane ``|N|``, which has no sign.
+        N, positive along the normal to the left of growing λ; of a curve in no vertical plane its size ``|N|``, without
+        a sign.
     side_force
         What a track that turns about the z axis carries out of its plane; 0 for one at rest.
     tangential_acceleration
