@@ -25,7 +25,7 @@ from gqm_sym.runtime.interface import INTERFACE
 
 # The time in seconds that Python may spend on a function of a generated module before it is compiled, which takes some
 # 0.2 s.
-MAX_PYTHON_TIME = 0.05
+MAX_PYTHON_TIME = 0.02
 
 
 @cache
