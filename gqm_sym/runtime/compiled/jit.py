@@ -137,7 +137,7 @@ def _type_of_inner(value: Inner, _: Any) -> Any:
 
 
 # The time in seconds that Python may spend on an entry point before it is compiled, which takes some seconds.
-MAX_PYTHON_TIME = 0.3
+MAX_PYTHON_TIME = 2.0
 
 
 def _plain_entry(function: Any, signature: Any) -> PlainEntry:
