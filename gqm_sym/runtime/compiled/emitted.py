@@ -80,15 +80,13 @@ class Emitted:
     @property
     def address(self) -> int:
         """Where the address of the code stands, of which there is some from now on."""
-        if not self._slot.value:
-            self._begin()
+        self._begin()
         return ctypes.addressof(self._slot)
 
     @property
     def call(self) -> Callable[..., None]:
         """The function for callers in Python, who pass pointers of `ctypes`."""
-        if not self._slot.value:
-            self._begin()
+        self._begin()
         function: Callable[..., None] = _c_function(self.signature)(self._slot.value)
         return function
 
@@ -109,7 +107,9 @@ class Emitted:
         return self.function
 
     def _begin(self) -> None:
-        """Find code for the function: that of the cache, or Python's."""
+        """Find code for the function, unless there is some: that of the cache, or Python's."""
+        if self._slot.value:
+            return
         if not jit.COMPILER.has_cached(self._as_numba_sees_it(), self.signature):
             self._plain = plain_by_address(self.function, self.signature, self.text)
         if self._plain is None:
@@ -120,8 +120,7 @@ class Emitted:
 
     def run(self, *arguments: Any) -> None:
         """Run the function in Python, or what is compiled in its place by now; pointers are given as integers."""
-        if not self._slot.value:
-            self._begin()
+        self._begin()
         if self._compiled is None:
             if not self._trial.is_over():
                 started = time.perf_counter()
@@ -132,7 +131,7 @@ class Emitted:
                 except (ArithmeticError, ValueError):  # where compiled code goes on
                     pass
             self.compile()
-        _c_function(self.signature)(self._slot.value)(*arguments)
+        self.call(*arguments)
 
     def _run_for_c(self, *arguments: Any) -> None:
         try:

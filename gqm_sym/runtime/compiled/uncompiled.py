@@ -42,6 +42,13 @@ _NUMPY = SimpleNamespace(
 )
 
 
+# A function is compiled in the next launch that uses it after so many.
+MAX_LAUNCHES = 2
+
+# The time in seconds that one call of an entry point may take in Python, where the compiler takes some seconds.
+MAX_CALL = 1.5
+
+
 class NotPlainError(Exception):
     """A function uses what Python cannot run to the same bits."""
 
@@ -136,12 +143,6 @@ def _integer_power(x: Any, n: int) -> Any:
         factor, count = factor * factor, count >> 1
     return 1.0 / result if n < 0 else result
 
-
-# Who launches more than so often by the same function waits for the compiler, and who does not need not.
-MAX_LAUNCHES = 2
-
-# The time in seconds that one call of an entry point may take in Python, where the compiler takes some seconds.
-MAX_CALL = 1.5
 
 # What runs in Python in place of an operation of compiled code; a room adds those that are its own.
 _IN_PYTHON: dict[Any, Callable[..., Any]] = {}
@@ -310,8 +311,15 @@ def _raised(x: Any, y: Any) -> Any:
 _POWER = _binary_operations(_raised.__code__)
 
 
-def plain_function(function: Any) -> Callable[..., Any]:
+def plain_function(function: Any, text: str | None = None) -> Callable[..., Any]:
     """The function as plain Python over NumPy's numbers.
+
+    Parameters
+    ----------
+    function : callable
+        The function.
+    text : str, optional
+        Its text with its decorators; that of its file if it is not given.
 
     Raises
     ------
@@ -321,7 +329,7 @@ def plain_function(function: Any) -> Callable[..., Any]:
     code = function.__code__
     try:
         if _binary_operations(code) & _POWER:
-            code = _of_text(inspect.getsource(function), code)
+            code = _of_text(text or inspect.getsource(function), code)
         return _over_plain_names(code, function.__globals__ | _POWERS)
     except (AttributeError, OSError, SyntaxError, TypeError):  # TypeError: a name for what cannot be hashed
         raise NotPlainError from None
@@ -357,9 +365,8 @@ def plain_by_address(function: Any, signature: Any, text: str | None) -> Callabl
         It takes addresses in place of pointers.
     """
     try:
-        code = _of_text(text, function.__code__) if text else function.__code__
-        run = _over_plain_names(code, function.__globals__ | _POWERS)
-    except (AttributeError, NotPlainError, OSError, TypeError):  # TypeError: a name for what cannot be hashed
+        run = plain_function(function, text)
+    except NotPlainError:
         return None
     kinds = {numba.types.float64: np.float64, numba.types.CPointer(numba.types.int64): _AddressOfIntegers}
     given = [kinds.get(kind, int) for kind in signature.args]
