@@ -79,7 +79,7 @@ def _reason(
 def unknown_argument(called: str, name: str, names: Iterable[str], what: str = "argument") -> str:
     """``called: there is no argument 'name'``, the nearest known one if it is near, and all of them."""
     listed = list(names)
-    return f"{called}: there is no {what} {name!r}; {_hint(name, listed)}it takes {', '.join(listed) or 'none'}"
+    return f"{called}: there is no {what} {short(name)}; {_hint(name, listed)}it takes {', '.join(listed) or 'none'}"
 
 
 def _hint(name: str, listed: Iterable[str]) -> str:
@@ -123,6 +123,23 @@ def several(given: Any, *, where: str, what: str) -> tuple[Any, ...]:
         except TypeError:
             pass
     raise DeclarationError(f"{where}: must be {what}, got {short(given)}")
+
+
+def mapping(given: Any, *, where: str, example: str) -> Mapping[str, Any]:
+    """Return values by names; none if nothing was given."""
+    if given is None or (isinstance(given, Mapping) and all(isinstance(name, str) for name in given)):
+        return given or {}
+    raise DeclarationError(f"{where}: must be a dict of names and values, as {example}, got {short(given)}")
+
+
+def compiled_model(module: Any, *, where: str) -> Any:
+    """Return the compiled model of a generated module."""
+    model = getattr(module, "MODEL", None)
+    if not (hasattr(model, "solve") and callable(getattr(module, "sweep", None))):
+        raise ArgumentError(
+            f"{where}: module: must be what gqm.build returns, or an imported module, got {short(module)}"
+        )
+    return model
 
 
 def names(given: Any, *, where: str) -> tuple[str, ...]:

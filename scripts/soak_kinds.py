@@ -1,4 +1,4 @@
-"""Hold random motions of many kinds against closed forms: transits, circulations, losses, charts, sweeps, threads.
+"""Hold random motions of many kinds against closed forms: losses, charts, contact, space, gradients, sweeps, threads.
 
 ``soak_kinds.py [COUNT] [SEED]``. The closed forms stand here and not in the package; they are evaluated with forty
 digits, for the very doubles that the package is given. Places at some times must lie within the bounds that the motion
@@ -14,8 +14,10 @@ import time
 from collections import Counter
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from fractions import Fraction
 from itertools import pairwise
+from operator import attrgetter, methodcaller
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -35,6 +37,9 @@ TIMES, READERS, MAX_SECONDS = 8, 6, 10.0
 # Periods against closed forms, and sweeps against solved motions: relative, per unit of the condition number.
 ROUNDINGS = 4.0 * 2.0**-52
 POINTS = [("-2", "2"), ("-1", "0"), ("0", "1"), ("2", "0"), ("4", "3")]
+SLOPE = [("-4", "-3"), ("-2", "-1.5"), ("0", "0"), ("1.2", "0.9"), ("2.8", "2.1"), ("4", "3")]
+# Derivatives, relative to the largest of them, per unit of the condition number.
+SLOPES = 2e-13
 
 Modules = dict[str, ModuleType]
 Truth = Callable[[Any], Any]
@@ -54,6 +59,12 @@ def build(folder: str | Path) -> Modules:
         "planes": (planes, gravity),
         "rough_planes": (planes, gravity + gqm.CoulombFriction()),
         "wells": (gqm.Curve.graph("x**4/4 - x**2/2 + t*x", parameter="x"), gravity),
+        "rough_track": (gqm.Curve.sampled(SLOPE), gravity + gqm.CoulombFriction()),
+        "rim": (
+            gqm.Curve.implicit("x**2 + z**2 - 1", start=(0, -1)),
+            gravity + gqm.CoulombFriction() + gqm.QuadraticDrag(),
+        ),
+        "coil": (gqm.Curve.space(x="c*u", y="R*sin(u)", z="-R*cos(u)", parameter="u"), gravity),
     }
     return {
         name: gqm.build(gqm.derive(*parts), name=f"soaked_{name}", folder=folder) for name, parts in declared.items()
@@ -156,20 +167,19 @@ def damps(draw: random.Random, modules: Modules) -> tuple[list[str], int]:
     return damp(modules, {"lam0": lam0, "v0": v0, "direction": direction, "k": k, "c": c}, draw), TIMES
 
 
-def damp(modules: Modules, launch: dict[str, Any], draw: random.Random) -> list[str]:
+def damp(modules: Modules, launch: dict[str, Any], draw: random.Random, last: float = 30.0) -> list[str]:
     """What is wrong with one motion on a damped spring: two exponentials, or a swing that decays."""
     motion = modules["damped"].solve(**launch)
-    lam0, k, c = (mpf(launch[name]) for name in ("lam0", "k", "c"))
+    place = spring(launch["direction"], *(mpf(launch[name]) for name in ("lam0", "v0", "k", "c")))
+    return outside(motion, place, [draw.uniform(0.0, last) for _ in range(TIMES)])
+
+
+def spring(direction: int, lam0: Any, v0: Any, k: Any, c: Any) -> Truth:
+    """The place on a damped spring, by time."""
     root = mp.sqrt(mp.mpc(c**2 / 4 - k))
     one, two = -c / 2 + root, -c / 2 - root
-    if one == two:
-        return []
-    share = (launch["direction"] * mpf(launch["v0"]) - two * lam0) / (one - two)
-
-    def place(t: Any) -> Any:
-        return (share * mp.exp(one * t) + (lam0 - share) * mp.exp(two * t)).real
-
-    return outside(motion, place, [draw.uniform(0.0, 30.0) for _ in range(TIMES)])
+    share = (direction * v0 - two * lam0) / (one - two)
+    return lambda t: (share * mp.exp(one * t) + (lam0 - share) * mp.exp(two * t)).real
 
 
 def swings(draw: random.Random, modules: Modules) -> tuple[list[str], int]:
@@ -182,8 +192,7 @@ def swings(draw: random.Random, modules: Modules) -> tuple[list[str], int]:
     if motion.kind not in ("libration", "circulation"):
         return [], 0
     g = mpf(G)
-    m = mpf(v0) ** 2 / (4 * g) + mp.sin(mpf(lam0) / 2) ** 2
-    true = 4 * mp.ellipk(m) / mp.sqrt(g) if m < 1 else 2 * mp.ellipk(1 / m) / mp.sqrt(g * m)
+    m, true = mpf(v0) ** 2 / (4 * g) + mp.sin(mpf(lam0) / 2) ** 2, pendulum_period(mpf(lam0), mpf(v0), g)
     found = []
     if not abs(mpf(motion.period) - true) <= ROUNDINGS * true:
         found.append(f"period off by {float(motion.period / true - 1):.1e}")
@@ -244,6 +253,141 @@ def _planes(start: tuple[Any, Any, int], mu: Any, edges: list[Any], points: list
     return [*marks, (t, lam, u, v, mpf(0))]
 
 
+def tracks(draw: random.Random, modules: Modules) -> tuple[list[str], int]:
+    """With friction along a smooth track through points, which are those of an incline."""
+    lam0, v0, mu = draw.uniform(0.1, 9.9), log_uniform(draw, -3.0, 1.0), log_uniform(draw, -4.0, 0.0)
+    direction = draw.choice((1, -1))
+    motion = modules["rough_track"].solve(lam0, v0, direction, mu=mu)
+    begin, u, pull, drag = mpf(lam0), direction, -mpf(G) * 3 / 5, mpf(G) * mpf(mu) * 4 / 5
+    onwards = pull - u * drag
+    turn = -u * mpf(v0) / onwards if onwards * u < 0 else mp.inf
+    back = 0 if abs(pull) <= drag else pull + u * drag
+
+    def place(t: Any) -> Any:
+        first = min(t, turn)
+        gone = u * mpf(v0) * first + onwards * first**2 / 2
+        return begin + gone + (back * (t - turn) ** 2 / 2 if t > turn else 0)
+
+    end = min(motion.t_end, 5.0)
+    return outside(motion, place, [draw.uniform(0.0, end) for _ in range(TIMES)]), TIMES
+
+
+def rims(draw: random.Random, modules: Modules) -> tuple[list[str], int]:
+    """In a round valley known as F = 0, with friction and drag, pushed only: turns, lift-off, rest."""
+    lam0, v0 = draw.uniform(-1.5, 1.5), draw.choice((0.0, log_uniform(draw, -3.0, 1.0)))
+    mu, b = (draw.choice((0.0, log_uniform(draw, -3.0, -0.3))) for _ in range(2))
+    given = {"mu": mu, "b": b, "contact": "above", "t_max": 20.0}
+    motion = modules["rim"].solve(lam0, v0, draw.choice((1, -1)), **given)
+    found, count, w, at = [], 0, mpf(v0) ** 2, mpf(lam0)
+    for leg in [leg for leg in motion.legs if leg.end not in ("horizon", "asymptote") and leg.t_end > 0.0][:6]:
+        what, at = rim_end(w, at, leg, mpf(mu), mpf(mu) + mpf(b))
+        # The circle is a chart of doubles, whose radius is 1: its tangent has a rounding of its own everywhere.
+        error, bound = abs(mpf(leg.lam_end) - at), motion.error_bound(leg.t_end) + 2.0**-52
+        count, w = count + 1, mpf(0)
+        if leg.end not in what:
+            found.append(f"{leg.end} for {what[0]}")
+        if not error <= bound:
+            found.append(f"{leg.end} outside its bound by a factor of {float(error / bound):.2g}")
+        if leg.end != "turn":
+            break
+    return found, count
+
+
+def rim_end(w: Any, start: Any, leg: Any, mu: Any, c: Any) -> tuple[tuple[str, ...], Any]:
+    """How a leg ends, and where: V**2 is the solution of a linear equation there."""
+    g, u = mpf(G), leg.direction
+    a = (2 * g - 4 * c * mu * g) / (1 + 4 * c**2)
+    b = -2 * u * mu * g - 2 * u * c * a
+
+    def speed(s: Any) -> Any:
+        free = w - a * mp.cos(start) - b * mp.sin(start)
+        return a * mp.cos(s) + b * mp.sin(s) + free * mp.exp(-2 * u * c * (s - start))
+
+    def load(s: Any) -> Any:
+        return speed(s) + g * mp.cos(s)
+
+    def root(function: Callable[[Any], Any]) -> Any:
+        return mp.findroot(function, mpf(leg.lam_end))
+
+    if leg.end == "liftoff":
+        return ("liftoff",), root(load)
+    at = root(speed)
+    return ("rest",) if abs(mp.sin(at)) <= mu * mp.cos(at) else ("turn",), at
+
+
+def hills(draw: random.Random, modules: Modules) -> tuple[list[str], int]:
+    """From beside a hilltop with viscous resistance: two exponentials, one of which grows."""
+    lam0, direction = signed(draw, -30.0, -1.0), draw.choice((1, -1))
+    k, c = -log_uniform(draw, -1.0, 1.5), log_uniform(draw, -3.0, 0.5)
+    launch = {"lam0": lam0, "v0": 0.0, "direction": direction, "k": k, "c": c}
+    growth = float(np.sqrt(c * c / 4.0 - k) - c / 2.0)
+    return damp(modules, launch, draw, float(np.log(1.0 / abs(lam0))) / growth), TIMES
+
+
+def coils(draw: random.Random, modules: Modules) -> tuple[list[str], int]:
+    """Along a helix about a level axis: a pendulum whose path is longer."""
+    lam0, radius, pitch = signed(draw, -6.0, 0.45), log_uniform(draw, -1.0, 1.0), log_uniform(draw, -2.0, 1.0)
+    motion = modules["coil"].solve(lam0, R=radius, c=pitch)
+    rate = mp.sqrt(mpf(G) * mpf(radius) / (mpf(radius) ** 2 + mpf(pitch) ** 2))
+    m = mp.sin(mpf(lam0) / 2) ** 2
+    found, true = [], 4 * mp.ellipk(m) / rate
+    if not abs(mpf(motion.period) - true) <= ROUNDINGS * true:
+        found.append(f"period off by {float(motion.period / true - 1):.1e}")
+
+    def place(t: Any) -> Any:
+        return 2 * mp.asin(mp.sqrt(m) * mp.ellipfun("cd", rate * t, m=m)) * mp.sign(lam0)
+
+    return found + outside(motion, place, [draw.uniform(0.0, 3.0) * motion.period for _ in range(3)]), 4
+
+
+def gradients(draw: random.Random, modules: Modules) -> tuple[list[str], int]:
+    """Derivatives of pendulums' periods and actions, solved and swept, and of damped springs' places."""
+    lam0, v0, direction = draw.uniform(0.01, 3.0), draw.uniform(0.0, 12.0), draw.choice((1, -1))
+    names, found = ("lam0", "v0", "g"), []
+    motion = modules["circle"].solve(lam0, v0, direction)
+    given = tuple(mpf(value) for value in (lam0, v0, float(G)))
+    allowed = SLOPES * motion.condition_number
+    for quantity, law in (("period", pendulum_period), ("action", pendulum_action)):
+        slopes = list(motion.gradient(quantity, names).values())
+        true = [mp.diff(law, given, order) for order in ((1, 0, 0), (0, 1, 0), (0, 0, 1))]
+        found += unequal(f"gradient of {quantity}", slopes, true, allowed)
+        swept = modules["circle"].sweep(quantity, [lam0], v0, direction, gradient=names)
+        found += unequal(f"swept gradient of {quantity}", swept.gradient[0], true, allowed)
+    k, c, t = log_uniform(draw, -1.0, 2.0), log_uniform(draw, -3.0, 0.5), draw.uniform(0.0, 10.0)
+    damped = modules["damped"].solve(lam0, v0, direction, k=k, c=c)
+
+    def place(*numbers: Any) -> Any:
+        return spring(direction, *numbers)(mpf(t))
+
+    numbers = tuple(mpf(value) for value in (lam0, v0, k, c))
+    true = [mp.diff(place, numbers, tuple(int(i == j) for j in range(4))) for i in range(4)]
+    changes = damped.sensitivity(t, ("lam0", "v0", "k", "c"))
+    # Of places that died away roundings of the launch are left.
+    size = mp.exp(-numbers[3] * mpf(t) / 4)
+    return found + unequal("sensitivity", changes.lam, [*true, size], allowed), 5
+
+
+def unequal(what: str, slopes: Any, true: Any, allowed: float) -> list[str]:
+    """Whether derivatives differ from true ones; behind these may stand a size that counts too."""
+    size = max(map(abs, true))
+    off = float(max(abs(mpf(float(one)) - other) for one, other in zip(slopes, true, strict=False)) / size)
+    return [] if off <= allowed else [f"{what} off by {off:.1e}"]
+
+
+def pendulum_period(lam0: Any, v0: Any, g: Any) -> Any:
+    """The period of a pendulum of one metre."""
+    m = v0**2 / (4 * g) + mp.sin(lam0 / 2) ** 2
+    return 4 * mp.ellipk(m) / mp.sqrt(g) if m < 1 else 2 * mp.ellipk(1 / m) / mp.sqrt(g * m)
+
+
+def pendulum_action(lam0: Any, v0: Any, g: Any) -> Any:
+    """The integral of V ds over the period of such a pendulum."""
+    m = v0**2 / (4 * g) + mp.sin(lam0 / 2) ** 2
+    if m > 1:
+        return 8 * mp.sqrt(g * m) * mp.ellipe(1 / m)
+    return 16 * mp.sqrt(g) * (mp.ellipe(m) - (1 - m) * mp.ellipk(m))
+
+
 def sweeps(draw: random.Random, modules: Modules) -> tuple[list[str], int]:
     """Sweeps against solved motions in two wells, next to the separatrix between them."""
     module, t = modules["wells"], draw.choice((0.0, draw.uniform(-0.3, 0.3)))
@@ -268,23 +412,35 @@ def sweeps(draw: random.Random, modules: Modules) -> tuple[list[str], int]:
 
 
 def threads(draw: random.Random, modules: Modules) -> tuple[list[str], int]:
-    """Many threads read a motion as one does, within its bounds: after a period has passed times have more digits."""
+    """Many threads read a motion as one does, within its bounds: after a period has passed times have more digits.
+
+    Between they ask for what is made when it is first asked for: events, legs, arrivals, derivatives.
+    """
     name = draw.choice(("circle", "damped", "planes", "wells", "rough"))
     given = {"rough": {"a": 0.1, "mu": 0.01}, "damped": {"k": 10.0, "c": 0.1}, "wells": {"t": 0.1}}.get(name, {})
     launch = {"lam0": draw.uniform(0.2, 1.2), "v0": draw.uniform(0.0, 2.0), "direction": draw.choice((1, -1)), **given}
     shared, alone = (modules[name].solve(**launch) for _ in range(2))
     end = min(alone.t_end, 10.0)
     times = [draw.uniform(0.0, end) for _ in range(24)]
+    others = (attrgetter("events"), attrgetter("legs"), attrgetter("turning_points"), methodcaller("energy", 0.5))
+    others += (methodcaller("sensitivity", 0.5, "lam0"), methodcaller("time_at", float(alone.lam(0.3 * end))))
+
+    def read_between(k: int) -> float:
+        if k % 3 == 0:
+            with suppress(GQMError):
+                others[k // 3 % len(others)](shared)
+        return float(shared.state(times[k % len(times)]).lam)
+
     with ThreadPoolExecutor(READERS) as pool:
-        read = np.array(list(pool.map(lambda t: float(shared.state(t).lam), times * READERS)))
+        read = np.array(list(pool.map(read_between, range(len(times) * READERS))))
     expected = np.array([float(alone.state(t).lam) for t in times] * READERS)
     bounds = np.array([alone.error_bound(t) for t in times] * READERS)
     return [f"threads read otherwise on {name}"] if np.any(np.abs(read - expected) > 2.0 * bounds) else [], 1
 
 
-KINDS = (slides, falls, damps, swings, bounces, sweeps, threads)
-# Threads are dear, and told by few.
-WEIGHTS = (4, 4, 4, 4, 4, 4, 1)
+KINDS = (slides, falls, damps, swings, bounces, tracks, rims, hills, coils, gradients, sweeps, threads)
+# Gradients and threads are dear, and told by few.
+WEIGHTS = (4, 4, 4, 4, 4, 4, 4, 4, 4, 1, 4, 1)
 
 
 def soak(count: int, seed: int, modules: Modules) -> tuple[Counter[str], list[str], float]:

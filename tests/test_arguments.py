@@ -1,9 +1,15 @@
 """What careless and hostile callers write: refused by one clear error, or understood."""
 
+import datetime
 import math
 import random
+from decimal import Decimal
+from fractions import Fraction
+from functools import partial
+from importlib import import_module
 
 import numpy as np
+import pandas as pd
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -92,6 +98,163 @@ def test_whatever_is_given_is_understood_or_refused_clearly(call):
         except GQMError as error:
             assert ": " in str(error), (call, thing)
             assert len(str(error)) < 1000, (call, thing)
+
+
+CIRCLE, DRAG = (import_module(f"generated.{name}") for name in ("circle", "circle_drag"))
+SWUNG = np.linspace(0.0, 3.0, 12)
+DIPS = {"t": SWUNG, "lam": 0.8 * np.cos(3.0 * SWUNG)}
+
+# Made when they are first needed; the same for all calls.
+MOTIONS = {
+    "libration": lambda: CIRCLE.solve(1, L=1),
+    "circulation": lambda: CIRCLE.solve(0, 8, L=1),
+    "rest": lambda: CIRCLE.solve(0, L=1),
+    "lift-off": lambda: CIRCLE.solve(0, 5, L=1, contact="above"),
+    "losses": lambda: DRAG.solve(1, 0, L=1, b="1/10"),
+    "horizon": lambda: DRAG.solve(1, 0, L=1, b="1/10", t_max=2),
+}
+
+ASKED = {
+    "lam": lambda m, v: m.lam(v),
+    "state": lambda m, v: m.state(v),
+    "time_at": lambda m, v: m.time_at(v),
+    "error_bound": lambda m, v: m.error_bound(v),
+    "energy": lambda m, v: m.energy(v),
+    "events from": lambda m, v: m.events_between(v, 2),
+    "period_to": lambda m, v: m.period_to(v),
+    "gradient": lambda m, v: m.gradient(v),
+    "gradient wrt": lambda m, v: m.gradient("v_max", v),
+    "gradient lam": lambda m, v: m.gradient("time_at", "g", lam=v),
+    "gradient order": lambda m, v: m.gradient("period", "g", order=v),
+    "sensitivity": lambda m, v: m.sensitivity(v, "lam0"),
+    "sensitivity wrt": lambda m, v: m.sensitivity(0.1, v),
+    "fourier": lambda m, v: m.fourier(v, 3),
+    "fourier n": lambda m, v: m.fourier("x", v),
+    "to_xarray": lambda m, v: m.to_xarray(v),
+}
+
+LAUNCHED = {
+    "solve lam0": lambda v: CIRCLE.solve(v, L=1),
+    "solve v0": lambda v: CIRCLE.solve(0.5, v, L=1),
+    "solve direction": lambda v: CIRCLE.solve(0.5, 1, v, L=1),
+    "solve point": lambda v: CIRCLE.solve(point=v, L=1),
+    "solve t_max": lambda v: CIRCLE.solve(0.5, L=1, t_max=v),
+    "solve contact": lambda v: CIRCLE.solve(0.5, L=1, contact=v),
+    "solve L": lambda v: CIRCLE.solve(0.5, L=v),
+    "pass1 lam": lambda v: CIRCLE.pass1(v, lam0=0.5, L=1),
+    "pass1 out": lambda v: CIRCLE.pass1([0.1, 0.2], lam0=0.5, L=1, out=v),
+    "sweep quantity": lambda v: CIRCLE.sweep(v, 0.5, L=1),
+    "sweep lam0": lambda v: CIRCLE.sweep("period", v, L=1),
+    "sweep v0": lambda v: CIRCLE.sweep("v_max", 0.5, v, L=1),
+    "sweep direction": lambda v: CIRCLE.sweep("v_max", 0.5, 1, v, L=1),
+    "sweep L": lambda v: CIRCLE.sweep("period", [0.1, 0.2], L=v),
+    "sweep lam": lambda v: CIRCLE.sweep("time_at", 0.5, lam=v, L=1),
+    "sweep t_max": lambda v: CIRCLE.sweep("t_end", 0.5, t_max=v, L=1),
+    "sweep contact": lambda v: CIRCLE.sweep("t_end", 0.5, contact=v, L=1),
+    "sweep gradient": lambda v: CIRCLE.sweep("period", 0.5, gradient=v, L=1),
+    "sweep client": lambda v: CIRCLE.sweep("period", 0.5, client=v, L=1),
+    "equilibria": lambda v: CIRCLE.equilibria(between=v, L=1),
+    "least_speed module": lambda v: gqm.least_speed(v, 0),
+    "least_speed between": lambda v: gqm.least_speed(CIRCLE, 0, L=1, between=v),
+    "least_speed contact": lambda v: gqm.least_speed(CIRCLE, 0, L=1, contact=v),
+    "fit module": lambda v: gqm.fit(v, DIPS, {"L": 1}),
+    "fit data": lambda v: gqm.fit(CIRCLE, v, {"L": 1}, lam0=0.8),
+    "fit lam": lambda v: gqm.fit(CIRCLE, DIPS | {"lam": v}, {"L": 1}, lam0=0.8),
+    "fit sigma": lambda v: gqm.fit(CIRCLE, DIPS | {"sigma": v}, {"L": 1}, lam0=0.8),
+    "fit free": lambda v: gqm.fit(CIRCLE, DIPS, v, lam0=0.8),
+    "fit limits": lambda v: gqm.fit(CIRCLE, DIPS, {"L": (0.5, v)}, lam0=0.8),
+    "uncertainty module": lambda v: gqm.uncertainty(v, "period", {"L": (1, 0.1)}),
+    "uncertainty quantity": lambda v: gqm.uncertainty(CIRCLE, v, {"L": (1, 0.1)}, samples=9, lam0=0.5),
+    "uncertainty of": lambda v: gqm.uncertainty(CIRCLE, "period", v, samples=9, lam0=0.5, L=1),
+    "uncertainty number": lambda v: gqm.uncertainty(CIRCLE, "period", {"L": v}, samples=9, lam0=0.5),
+    "uncertainty seed": lambda v: gqm.uncertainty(CIRCLE, "period", {"L": (1, 0.1)}, samples=9, lam0=0.5, seed=v),
+    "from_period law": lambda v: gqm.design.from_period(v),
+    "from_period g": lambda v: gqm.design.from_period("2", g=v),
+    "from_period parameters": lambda v: gqm.design.from_period("T", parameters=v),
+    "from_load until": lambda v: gqm.design.from_load("1", 9, until=v),
+    "constant_load": lambda v: gqm.design.constant_load(v, 12),
+    "brachistochrone": lambda v: gqm.design.brachistochrone(v),
+    "brachistochrone x": lambda v: gqm.design.brachistochrone((v, -1)),
+    "minimise quantity": lambda v: gqm.design.minimise(v, TRACK, FORCE, free={"a": (1, 2, 3)}, lam0=1),
+    "minimise track": lambda v: gqm.design.minimise("period", v, FORCE, free={"a": (1, 2, 3)}, lam0=1),
+    "minimise limits": lambda v: gqm.design.minimise("period", None, FORCE, free={}, limits=v, lam0=1),
+}
+
+# Together with these, what raised errors of Python's, NumPy's or pandas' own.
+HOSTILE = (
+    *THINGS[:-7],
+    *("pi", "30 deg", "5 kg", "1/0", "sqrt(-1)", "1e400", 1e308, 1e-320, 10**400, Fraction(1, 3), Decimal("NaN")),
+    *(np.zeros((2, 3)), np.array([]), np.array([np.nan, np.inf, 1.0]), np.array([None]), np.ma.array([1.0], mask=[1])),
+    *(pd.DataFrame({"a": [1.0, 2.0]}), pd.Series([1.0, 2.0]), pd.NA, pd.NaT, [[]], [None], frozenset([1])),
+    *(np.timedelta64(1, "s"), datetime.timedelta(1), "time_at", ["L", "nope"], ("L", "L"), lambda t: t),
+)
+
+
+def refused_clearly(call, thing, shown):
+    """Call something; an error must be one of the package's own and say what was wrong."""
+    try:
+        call(thing)
+    except GQMError as error:
+        assert ": " in str(error), (shown, thing)
+        assert len(str(error)) < 1000, (shown, thing)
+
+
+@pytest.mark.filterwarnings("ignore:Warning. converting a masked element")
+@pytest.mark.parametrize("name", MOTIONS)
+def test_whatever_a_motion_is_asked_is_answered_or_refused_clearly(name):
+    """A sample of the questions with hostile times, places, names and numbers, another one for each motion."""
+    motion, draw = MOTIONS[name](), random.Random(name)
+    for call, ask in ASKED.items():
+        for thing in draw.sample(HOSTILE, 4):
+            refused_clearly(partial(ask, motion), thing, (name, call))
+
+
+@pytest.mark.filterwarnings("ignore:Warning. converting a masked element")
+def test_whatever_is_launched_is_understood_or_refused_clearly():
+    """A sample of hostile launches, sweeps, fits, uncertainties and designs."""
+    draw = random.Random(19)
+    for name, call in LAUNCHED.items():
+        for thing in draw.sample(HOSTILE, 3):
+            refused_clearly(call, thing, name)
+
+
+@pytest.mark.parametrize(
+    ("asked", "thing"),
+    [
+        ("gradient", pd.Series([1.0, 2.0])),
+        ("gradient order", np.array([1, 2])),
+        ("to_xarray", np.zeros((2, 3))),
+        ("sweep quantity", [[]]),
+        ("sweep contact", pd.Series([1.0, 2.0])),
+        ("sweep t_max", np.array([1.0, 2.0])),
+        ("sweep client", 1),
+        ("sweep L", np.array(["a"])),
+        ("sweep L", np.array([1j])),
+        ("solve direction", np.timedelta64(1, "s")),
+        ("least_speed module", 1),
+        ("least_speed between", 1.0),
+        ("least_speed contact", pd.NA),
+        ("fit module", 1),
+        ("fit sigma", 1e-320),
+        ("uncertainty module", 1),
+        ("uncertainty seed", "1/0"),
+        ("from_period law", 1e-320),
+        ("from_period g", 1e-320),
+        ("from_period parameters", 2.5),
+        ("brachistochrone x", "1e400"),
+        ("minimise limits", [1.0]),
+    ],
+)
+def test_what_raised_errors_of_others_is_refused(asked, thing):
+    """Each of these was met by a random search of the calls above."""
+    call = LAUNCHED[asked] if asked in LAUNCHED else partial(ASKED[asked], MOTIONS["libration"]())
+    with pytest.raises(GQMError, match=": "):
+        call(thing)
+
+
+def test_questions_without_an_answer_take_no_time():
+    """A circulation has no events in any period, however many of them are asked about."""
+    assert CIRCLE.solve(0, 8, L=1).events_between(0, 1e17) == ()
 
 
 @pytest.mark.parametrize(

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from gqm_sym.arguments import compiled_model, several, short
 from gqm_sym.errors import LaunchError, ParameterError, SolutionError
 from gqm_sym.literals.numbers import read_number
 from gqm_sym.runtime.compiled.types import Array
@@ -86,7 +87,7 @@ def least_speed(
     >>> round(least_speed(circle, 0, L=1, g=10), 12)
     7.071067811865
     """
-    formulas: Formulas = module.MODEL
+    formulas: Formulas = compiled_model(module, where="least_speed")
     if formulas.dissipation is not None:
         raise SolutionError(
             f"least_speed: {formulas.name} loses energy, so that V**2 depends on the path taken; use module.solve"
@@ -119,7 +120,10 @@ def least_speed(
 def _range(formulas: Formulas, p: Any, start: float, between: tuple[Any, Any] | None) -> tuple[float, float]:
     low, high, period = formulas.domain(p).numbers[:3]
     if between is not None:
-        ends = sorted(read_number(end, where="between").value for end in between)
+        pair = several(between, where="between", what="(low, high)")
+        if len(pair) != 2:
+            raise LaunchError(f"between: must be (low, high), got {short(between)}")
+        ends = sorted(read_number(end, where="between").value for end in pair)
         if not max(low, ends[0]) <= start <= min(high, ends[1]) or ends[0] < low or ends[1] > high:
             known = f"[{low!r}, {high!r}]"
             raise LaunchError(f"between: must be a range within {known} that contains lam0 = {start!r}, got {ends}")

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from gqm_sym.arguments import checked, one_of, short, unknown_argument
+from gqm_sym.arguments import checked, mapping, one_of, short, unknown_argument
 from gqm_sym.building import build
 from gqm_sym.declare.curve import Curve
 from gqm_sym.derivation import derive
@@ -108,7 +108,7 @@ def minimise(
     asked = one_of(quantity, tuple(QUANTITIES), where=f"{where}: quantity")
     if asked == "turning_points":
         raise DeclarationError(f"{where}: quantity: turning_points are two numbers; ask for one number")
-    wanted = _limits(limits or {}, where)
+    wanted = _limits(mapping(limits, where=f"{where}: limits", example="{'slope': (-1, 1)}"), where)
     kind = _Family if isinstance(track, Curve) else _Points
     with tempfile.TemporaryDirectory(prefix="gqm-") as folder:
         tracks = kind(track, force, free, given, folder)

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import sympy as sp
 from sympy.printing.pycode import MpmathPrinter
 
-from gqm_sym.arguments import short
+from gqm_sym.arguments import mapping, short
 from gqm_sym.declare.curve import Curve
 from gqm_sym.declare.polynomials import PolynomialPieces
 from gqm_sym.errors import DeclarationError
@@ -24,6 +24,8 @@ TERMS, MAX_TAIL = 24, 1e-22
 
 # A piece is not halved more often.
 MAX_HALVINGS = 40
+# Numbers of a design are no larger, and no smaller but for 0, than this power of ten says.
+MAX_EXPONENT = 60
 
 _U = sp.Symbol("u")
 
@@ -125,7 +127,7 @@ def read_law(
     form = read_expression(law, where=f"{where}: law", unit=unit)
     own = tuple(variables)
     found = {symbol.name for symbol in form.free_symbols}
-    given = dict(parameters or {})
+    given = mapping(parameters, where=f"{where}: parameters", example="{'T0': 2}")
     if unused := sorted(set(given) - found):
         raise DeclarationError(f"{where}: parameters: {unused[0]!r} is not in the law {short(str(form))}; remove it")
     if unset := sorted(found - set(own) - set(given)):
@@ -136,7 +138,7 @@ def read_law(
     if len(both := sorted(found & set(own) - set(given))) > 1:
         raise DeclarationError(f"{where}: law: must be a function of one of {', '.join(own)}, got {' and '.join(both)}")
     values = {sp.Symbol(name, real=True): exact_value(read_value(value, where=name)) for name, value in given.items()}
-    return form.xreplace(values)
+    return _bounded(form.xreplace(values), f"{where}: law")
 
 
 def read_constant(given: Source, name: str, *, where: str, unit: str) -> sp.Expr:
@@ -144,7 +146,19 @@ def read_constant(given: Source, name: str, *, where: str, unit: str) -> sp.Expr
     number = read_expression(given, where=f"{where}: {name}", unit=unit)
     if not number.is_number:
         raise DeclarationError(f"{where}: {name}: must be a number, got {short(given)}")
-    return number
+    return _bounded(number, f"{where}: {name}")
+
+
+def _bounded(form: sp.Expr, where: str) -> sp.Expr:
+    """Refuse numbers of a size that doubles could not square."""
+    if (
+        form.is_number
+        and form.is_real
+        and form != 0
+        and not -MAX_EXPONENT < sp.log(abs(form), 10).evalf() < MAX_EXPONENT
+    ):
+        raise DeclarationError(f"{where}: must be between 1e-{MAX_EXPONENT} and 1e{MAX_EXPONENT} in size")
+    return form
 
 
 def read_positive(given: Source, name: str, *, where: str, unit: str) -> sp.Expr:

@@ -4,6 +4,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from gqm_sym.errors import InputError
 from gqm_sym.optional import require
 from gqm_sym.runtime.motion.motion import horizon
 from gqm_sym.runtime.sweep.result import DESCRIBED, PLACE, Sweep, columns_of
@@ -56,6 +57,8 @@ def dataset(motion: "Motion", t: Any = None) -> "Dataset":
 
     times = np.linspace(0.0, horizon(motion), SAMPLES) if t is None else t
     state = motion.state(times)
+    if np.ndim(state.t) > 1:
+        raise InputError(f"t: must be one time or a row of times, got an array of shape {np.shape(state.t)}")
     formulas, launch = motion.problem.formulas, motion.problem.launch
     known = VARIABLES | {name: text for name, text in VARIABLES_IN_SPACE.items() if name in state._fields}
     columns = {name: (("t",), np.atleast_1d(getattr(state, name)), _attributes(*text)) for name, text in known.items()}

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from gqm_sym.arguments import short, unknown_argument
+from gqm_sym.arguments import compiled_model, short, unknown_argument
 from gqm_sym.errors import GQMError, InputError, SolutionError
 from gqm_sym.fitting.data import Measurements, read_measurements
 from gqm_sym.fitting.quotients import central_differences
@@ -86,7 +86,7 @@ def fit(module: ModuleType, data: Any, free: Mapping[str, Any], **fixed: Any) ->
     """
     from scipy.optimize import least_squares
 
-    model: CompiledModel = module.MODEL
+    model: CompiledModel = compiled_model(module, where="fit")
     unknown = _free(model, free, fixed)
     known = [*LAUNCH, *CHOICES, *model.parameters]
     for name in fixed:
@@ -101,6 +101,9 @@ def fit(module: ModuleType, data: Any, free: Mapping[str, Any], **fixed: Any) ->
         raise InputError(f"data: {size} measurements cannot determine {len(unknown.names)} numbers; free fewer of them")
     residuals = Residuals(module, measured, unknown, fixed)
     residuals.predicted(unknown.start)  # a launch that is refused says why
+    with np.errstate(over="ignore", invalid="ignore"):
+        if not np.isfinite(residuals(unknown.start)).all():
+            raise InputError("sigma: is so small that the first guess is infinitely many deviations away")
     found = least_squares(
         residuals,
         unknown.start,

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from gqm_sym.arguments import one_of, short, unknown_argument
+from gqm_sym.arguments import compiled_model, one_of, short, unknown_argument
 from gqm_sym.errors import InputError, SolutionError
 from gqm_sym.fitting.fit import LAUNCH, units_of
 from gqm_sym.fitting.quotients import central_differences
@@ -118,12 +118,14 @@ def uncertainty(
     -----
     Derivatives are those of ``motion.gradient``, exact to rounding, or difference quotients where there are none.
     """
-    model: CompiledModel = module.MODEL
+    model: CompiledModel = compiled_model(module, where="uncertainty")
     asked = one_of(quantity, tuple(QUANTITIES), where="uncertainty: quantity")
     if asked == "turning_points":
         raise InputError("uncertainty: quantity: turning_points are two numbers; ask for one number")
     if not (isinstance(samples, int) and 2 <= samples <= MAX_SAMPLES):
         raise InputError(f"uncertainty: samples: must be a whole number from 2 to {MAX_SAMPLES}, got {short(samples)}")
+    if not (isinstance(seed, int) and seed >= 0):
+        raise InputError(f"uncertainty: seed: must be a whole number of at least 0, got {short(seed)}")
     values, covariance = _read(model, uncertain, fixed)
     known = (*LAUNCH, "direction", "lam", "t_max", "contact", *model.parameters)
     for name in fixed:

@@ -248,7 +248,8 @@ class ShapedPieces:
 
     def path(self, places: Array) -> Array:
         """The coordinates that `chart_programs.chart_path_program` takes, in doubles."""
-        self._make(int(places[0].min()), int(places[0].max()))
+        if places.size:
+            self._make(int(places[0].min()), int(places[0].max()))
         rows = [_derivatives(self.pieces.curve.terms[:, ::2], places, 4)]
         if self._beside:
             count = len(self.pieces.curve.counts)

@@ -4,7 +4,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from gqm_sym.errors import LaunchError
+from gqm_sym.arguments import short
+from gqm_sym.errors import LaunchError, NumberError
 from gqm_sym.literals.numbers import Number, read_number
 from gqm_sym.runtime.launch.formulas import Formulas, ParameterValues
 
@@ -85,8 +86,8 @@ def read_launch(formulas: Formulas, p: ParameterValues, request: LaunchRequest) 
         place, at = read_number(lam0, where="lam0", unit=unit), None
     else:
         place, at = _read_place(formulas, p, lam0, point)
-    if isinstance(direction, np.ndarray | list | tuple) or direction not in (1, -1):
-        raise LaunchError(f"direction: must be 1 or -1 (the sign of ds/dt at launch), got {direction!r}")
+    if type(direction) is not int or direction not in (1, -1):
+        direction = _read_direction(direction)
     check_contact(formulas, contact)
     speed = read_number(v0, where="v0", unit="m/s")
     if speed.value < 0.0:
@@ -107,7 +108,18 @@ def read_launch(formulas: Formulas, p: ParameterValues, request: LaunchRequest) 
             f"lam0: {place.text} is so many laps away that doubles cannot tell places there; the curve repeats after "
             f"{domain.period!r}"
         )
-    return Launch(place, speed, int(direction), contact, horizon, at)
+    return Launch(place, speed, direction, contact, horizon, at)
+
+
+def _read_direction(given: Any) -> int:
+    """A sign that is given as another number than an int."""
+    try:
+        sign = 0.0 if isinstance(given, str | np.ndarray) else read_number(given, where="direction").value
+    except NumberError:
+        sign = 0.0
+    if sign not in (1.0, -1.0):
+        raise LaunchError(f"direction: must be 1 or -1 (the sign of ds/dt at launch), got {short(given)}")
+    return int(sign)
 
 
 def check_contact(formulas: Formulas, contact: Any) -> None:
@@ -117,8 +129,8 @@ def check_contact(formulas: Formulas, contact: Any) -> None:
     ------
     LaunchError
     """
-    if contact not in CONTACTS:
-        raise LaunchError(f"contact: must be one of {', '.join(CONTACTS)}, got {contact!r}")
+    if not (isinstance(contact, str) and contact in CONTACTS):
+        raise LaunchError(f"contact: must be one of {', '.join(CONTACTS)}, got {short(contact)}")
     if ONLY_SIGN[contact] and not formulas.signed:
         raise LaunchError(
             f"contact: {contact!r} is for curves in a vertical plane; on this space curve the body is held from all "

@@ -715,9 +715,9 @@ class DissipativeMotion(Motion):
 
         # A change in the middle of a run ends the part before it, and is none of the part behind.
         changes = without(run.changes, segment.b) if sense < 0 and run.ahead else list(run.changes)
-        if not end:
+        if not end or run.what == LIFTOFF:
             found, changes = len(changes), without(changes, segment.b if sense > 0 else segment.a)
-            end = "contact-sign" if len(changes) < found else ""
+            end = "contact-sign" if not end and len(changes) < found else end
         inside = [place for place in changes if low < place < high]
         cuts = [segment.phase_angle_of(*segment.offsets(place)) for place in inside]
         times = segment.times(np.array(cuts)) if cuts else ()

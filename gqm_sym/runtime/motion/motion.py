@@ -196,13 +196,13 @@ class Motion(ABC):
         SolutionError
             If the motion does not have the quantity, or gradients are not there yet for motions of its kind.
         """
+        one_of(quantity, QUANTITIES, where="gradient: quantity")
         if (lam is None) == (quantity == "time_at"):
-            raise InputError(f"lam: is the place that 'time_at' asks about, got {lam!r} with {quantity!r}")
-        if order not in (1, 2) or isinstance(order, bool):
+            raise InputError(f"lam: is the place that 'time_at' asks about, got {short(lam)} with {quantity!r}")
+        if type(order) is not int or order not in (1, 2):
             raise InputError(f"gradient: order must be 1 or 2, got {short(order)}")
         if order == 2:
             return self._second_gradient(quantity, wrt)
-        one_of(quantity, QUANTITIES, where="gradient: quantity")
         check_signed(self.problem.formulas, quantity)
         return self._gradient(quantity, wrt) if lam is None else self._arrival_gradient(lam, wrt)
 

@@ -409,6 +409,8 @@ class PeriodicMotion(Motion):
         start, stop = read_number(t1, where="t1", unit="s").value, read_number(t2, where="t2", unit="s").value
         period = self.period
         lap, within = self._trajectory(0.0).lap, self._one_period()
+        if not within:
+            return Rows([])
         first, last = int(np.floor(start / period)), int(np.floor(min(stop, self.t_end) / period))
         if (last - first) * len(within) > MAX_EVENTS:
             raise InputError(

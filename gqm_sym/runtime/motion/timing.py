@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from gqm_sym.arguments import short
 from gqm_sym.budgets import budget
 from gqm_sym.errors import InputError, SolutionError
 from gqm_sym.runtime.arithmetic.doubledouble import ZERO, Pair
@@ -216,7 +217,7 @@ def turning_points(problem: Problem, segment: Segment) -> tuple[float, float]:
 def period_to(problem: Problem, kind: str, direction: int, segment: Segment, digits: int) -> str:
     """The period in s as a decimal string with that many correct digits; see `Motion.period_to`."""
     if not isinstance(digits, int) or not 1 <= digits <= MAX_DIGITS:
-        raise InputError(f"period_to: digits must be a whole number from 1 to {MAX_DIGITS}, got {digits!r}")
+        raise InputError(f"period_to: digits must be a whole number from 1 to {MAX_DIGITS}, got {short(digits)}")
     a = _arithmetic(problem, segment, digits + 5)
     duration = sum(_durations(a, problem, kind, direction, segment, digits + 5)[0])
     value = 2 * duration if kind == "libration" else duration

@@ -10,6 +10,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
+from gqm_sym.arguments import short
 from gqm_sym.errors import InputError, SolutionError
 from gqm_sym.loading import load_text
 from gqm_sym.optional import require
@@ -106,6 +107,8 @@ def sweep_on(client: Any, module: tuple[str, str, str], quantity: str, arguments
     module
         The file of the generated module, its text and its name.
     """
+    if not hasattr(client, "nthreads"):
+        raise InputError(f"client: must be a distributed.Client, got {short(client)}")
     given = {key: value for key, value in arguments.items() if value is not None}
     # Arrays of objects keep exact numbers and text as they are.
     arrays = {k: v if isinstance(v, np.ndarray) else np.array(v, dtype=object) for k, v in given.items() if np.ndim(v)}

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gqm_sym.arguments import not_given
+from gqm_sym.arguments import not_given, one_of, short
 from gqm_sym.errors import GQMError, InputError, ParameterError, SolutionError
 from gqm_sym.literals.namespaces import ARRAYS
 from gqm_sym.literals.numbers import Number, read_number
@@ -89,11 +89,11 @@ def sweep(
         If a parameter is missing or outside of what the closed forms hold for.
     """
     lam0, v0, direction, _, t_max, contact = launches
-    found = QUANTITIES.get(quantity)
-    if found is None:
-        raise InputError(f"quantity: must be one of {', '.join(QUANTITIES)}, got {quantity!r}")
+    found = QUANTITIES[one_of(quantity, tuple(QUANTITIES), where="quantity")]
     if (lam is None) == (quantity == "time_at"):
-        raise InputError(f"lam: is the place that 'time_at' asks about, got {lam!r} with {quantity!r}")
+        raise InputError(f"lam: is the place that 'time_at' asks about, got {short(lam)} with {quantity!r}")
+    if t_max is not None and as_doubles(t_max, "t_max").ndim:
+        raise InputError(f"t_max: must be one number, the same for all launches, got {short(t_max)}")
     check_contact(formulas, contact)
     names = ("lam0", "v0", "direction", "lam", *formulas.parameters)
     sources = (lam0, v0, direction, 0.0 if lam is None else lam, *parameters)
@@ -166,7 +166,7 @@ def as_doubles(value: Any, name: str) -> Array:
         return np.array(_of_text(value, name))
     if value is None:
         raise ParameterError(not_given(name))
-    if isinstance(value, np.ndarray) and value.dtype != object:
+    if isinstance(value, np.ndarray) and value.dtype.kind in "fiu":
         return value.astype(np.float64, copy=False)
     array = np.asarray(value, dtype=object)
     numbers = [v if isinstance(v, float) else read_number(v, where=name).value for v in array.reshape(-1)]
