@@ -12,6 +12,7 @@ from numba import types
 from numpy.typing import NDArray
 
 from gqm_sym.runtime.compiled.types import MATRIX, Array
+from gqm_sym.runtime.launch.rider import LOADS
 
 # The quantities that compiled code computes. SPANS is asked of batches only, on the way to another quantity: the
 # offsets of both turning points from the launch, or for a circulation the length of a lap and NaN.
@@ -102,6 +103,9 @@ def _extreme(name: str) -> Callable[[Any, Any], float]:
     return of_motion
 
 
+LOAD_EXTREMES = tuple(f"n_{load}_{which}" for load in LOADS for which in ("min", "max"))
+"""The extremes of what a rider feels, which only banked tracks have."""
+
 QUANTITIES = {
     "half_period": Quantity(HALF_PERIOD, 1, 0, lambda motion, _: motion.half_period),
     "period": Quantity(PERIOD, 1, 0, lambda motion, _: motion.period),
@@ -110,6 +114,7 @@ QUANTITIES = {
     "v_max": Quantity(MAX_SPEED, 1, 0, _extreme("v_max")),
     "normal_force_min": Quantity(MIN_FORCE, 1, 0, _extreme("normal_force_min")),
     "normal_force_max": Quantity(MAX_FORCE, 1, 0, _extreme("normal_force_max")),
+    **{name: Quantity(NOT_COMPILED, 1, 0, _extreme(name)) for name in LOAD_EXTREMES},
     "time_at": Quantity(ARRIVAL_TIME, 1, 0, lambda motion, lam: motion.time_at(lam)),
     "t_end": Quantity(END_TIME, 1, 0, lambda motion, _: motion.t_end if isfinite(motion.t_end) else nan),
     "rest_position": Quantity(NOT_COMPILED, 1, 0, _rest_position),
