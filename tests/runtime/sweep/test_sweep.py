@@ -11,7 +11,7 @@ import pytest
 from mpmath import mp, mpf
 
 import gqm_sym as gqm
-from gqm_sym.errors import InputError, ParameterError
+from gqm_sym.errors import InputError, ParameterError, SolutionError
 from gqm_sym.runtime.compiled import threads
 from gqm_sym.runtime.sweep.quantities import STATUS_SENTENCES
 
@@ -318,6 +318,26 @@ def test_the_route_of_each_launch(module_of: ModuleOf) -> None:
     assert circle.sweep("v_max", places, L=1).route_counts() == {"single": 40}
     assert circle.sweep("t_end", places, L=1, t_max=2).route_counts() == {"single": 40}
     assert circle.sweep("rest_position", places, L=1).route_counts() == {"solve": 40}
+
+
+def test_actions_and_their_gradients(module_of: ModuleOf) -> None:
+    """Of a pendulum: 16 sqrt(g L**3) (E(m) - (1 - m) K(m)); by the energy they change as the period says."""
+    circle, places = module_of("circle"), np.array([0.5, 1.5, 3.0])
+    swept = circle.sweep("action", places, L=1, g=9.81, gradient="lam0")
+    for place, value in zip(places.tolist(), swept.values.tolist(), strict=True):
+        m = mp.sin(mpf(place) / 2) ** 2
+        true = 16 * mp.sqrt(mpf(9.81)) * (mp.ellipe(m) - (1 - m) * mp.ellipk(m))
+        assert value == pytest.approx(float(true), rel=1e-14)
+    periods = circle.sweep("period", places, L=1, g=9.81).values
+    assert swept.gradient[:, 0] == pytest.approx(periods * 9.81 * np.sin(places), rel=1e-13)
+    assert circle.sweep("action", 3.0, 9.0, L=1, t_max=0.5).status == 0
+    resting = circle.solve(0, L=1)
+    assert (resting.rest_position, circle.sweep("rest_position", 0, L=1).values) == (0.0, 0.0)
+    with pytest.raises(SolutionError, match="goes on for ever and does not come to rest"):
+        circle.solve(1, L=1).rest_position  # noqa: B018
+    assert circle.solve(1, L=1, t_max=2).gradient("t_end", "L") == {"L": 0.0}
+    with pytest.raises(SolutionError, match="goes on for ever and has no t_end"):
+        circle.solve(1, L=1).gradient("t_end", "L")
 
 
 @pytest.mark.parametrize(("old", "new"), [("reasons", "status"), ("why", "status_counts")])
