@@ -271,6 +271,8 @@ def test_bad_questions_about_loads(loop: ModuleType, build: Callable[..., Module
     module = build("tall", tall, gqm.Gravity())
     with pytest.raises(SolutionError, match=r"roll: the tangent is vertical at u = 0\.0"):
         module.pass1([0.5, 0.0], lam0=0, v0=1)
+    with pytest.raises(InputError, match="gradient: n_vertical_max has none yet"):
+        loop.sweep("n_vertical_max", lam0=0, v0=20, gradient="v0")
     with pytest.raises(DeclarationError, match="'y' is a coordinate"):
         gqm.Curve.space(**WAY, roll="y")
 
