@@ -191,7 +191,7 @@ def test_a_module_for_another_interface(version: int, text: str, path: Path, mon
     """It is refused as it is imported, with what to run."""
     path.write_text(text.replace(f"interface={INTERFACE})", f"interface={version})"), encoding="utf-8")
     monkeypatch.setattr(jit.COMPILER, "callback", _failing(AssertionError("compiled")))
-    monkeypatch.setattr(jit.COMPILER, "has_cached", lambda *_: True)
+    monkeypatch.setattr(jit.COMPILER, "record", lambda *_: None)
     with pytest.raises(OutdatedModuleError, match=rf"bowl\.py: .*interface {version} .*{INTERFACE}; run gqm-gen"):
         load(path, "outdated")
     path.write_text(text, encoding="utf-8")

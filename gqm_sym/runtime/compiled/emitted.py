@@ -75,7 +75,7 @@ class Emitted:
         self._compiled: Any = None
         self._plain: Any = None
         self._called_from_c: Any = None
-        self._trial = Trial(MAX_PYTHON_TIME if alias else jit.MAX_PYTHON_TIME)
+        self._trial: Any = None
 
     @property
     def address(self) -> int:
@@ -110,7 +110,9 @@ class Emitted:
         """Find code for the function, unless there is some: that of the cache, or Python's."""
         if self._slot.value:
             return
-        if not jit.COMPILER.has_cached(self._as_numba_sees_it(), self.signature):
+        record = jit.COMPILER.record(self._as_numba_sees_it(), self.signature)
+        if record is not None:
+            self._trial = Trial(MAX_PYTHON_TIME if self._alias else jit.MAX_PYTHON_TIME, record)
             self._plain = plain_by_address(self.function, self.signature, self.text)
         if self._plain is None:
             self.compile()

@@ -16,7 +16,7 @@ from numba.extending import typeof_impl
 
 from gqm_sym.runtime.compiled.numba_internals import Compiler
 from gqm_sym.runtime.compiled.stamps import RUNTIME, Stamps
-from gqm_sym.runtime.compiled.uncompiled import NotPlainError, PlainEntry
+from gqm_sym.runtime.compiled.uncompiled import NotPlainError, PlainEntry, Trial
 
 COMPILE: dict[str, Any] = {"error_model": "numpy"}
 
@@ -142,9 +142,10 @@ MAX_PYTHON_TIME = 2.0
 
 def _plain_entry(function: Any, signature: Any) -> PlainEntry:
     """An entry point as plain Python, unless its compiled code is in the cache."""
-    if COMPILER.has_cached(function, signature):
+    record = COMPILER.record(function, signature)
+    if record is None:
         raise NotPlainError
-    return PlainEntry(function, getattr(signature, "args", signature), MAX_PYTHON_TIME)
+    return PlainEntry(function, getattr(signature, "args", signature), Trial(MAX_PYTHON_TIME, record))
 
 
 def entry(signature: Any, *, nogil: bool = False, checked: bool = True) -> Callable[[Any], Callable[..., Any]]:

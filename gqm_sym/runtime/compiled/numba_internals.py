@@ -248,11 +248,15 @@ class KeyedFiles(IndexDataCacheFile):  # type: ignore[misc]
     def save(self, key: Any, data: Any) -> None:
         """Store compiled code under its key."""
         Path(self._cache_path).mkdir(parents=True, exist_ok=True)
+        record = self.record(key)
         self._save_data(self.file_name(key), (self._stamp, key, data))
+        if record is not None:
+            record.unlink(missing_ok=True)
 
-    def has(self, key: Any) -> bool:
-        """Whether there is a file that belongs to a key."""
-        return Path(self._data_path(self.file_name(key))).exists()
+    def record(self, key: Any) -> Path | None:
+        """The file with one byte for each launch in which Python has run the function; None if its code is stored."""
+        code = Path(self._data_path(self.file_name(key)))
+        return None if code.exists() else code.with_suffix(".launches")
 
     def load(self, key: Any) -> Any:
         """Read the compiled code that was stored under a key; None where there is none."""
@@ -300,10 +304,10 @@ class KeyedCache(FunctionCache):  # type: ignore[misc]
     def _index_key(self, sig: Any, codegen: Any) -> Any:
         return (*super()._index_key(sig, codegen), self._function.__module__, self._stamp, self._linked)
 
-    def has(self, sig: Any) -> bool:
-        """Whether there is code for a signature."""
+    def record(self, sig: Any) -> Path | None:
+        """The file with one byte for each launch in which Python has run the function; None if its code is stored."""
         target: Any = ccallback.CFunc._targetdescr  # type: ignore[attr-defined]
-        found: bool = self._cache_file.has(self._index_key(sig, target.target_context.codegen()))
+        found: Path | None = self._cache_file.record(self._index_key(sig, target.target_context.codegen()))
         return found
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
@@ -397,10 +401,13 @@ class Compiler:
         direct = not checked and _has(overload, "entry_point")
         return overload.entry_point if direct else dispatcher  # type: ignore[no-any-return]
 
-    def has_cached(self, function: Any, signature: Any) -> bool:
-        """Whether the cache has, as far as is known, code of a function that is called from Python or by address."""
+    def record(self, function: Any, signature: Any) -> Path | None:
+        """Return the file with one byte for each launch in which Python has run a function, in all processes.
+
+        The function is called from Python or by address. None means that the cache has its code, as far as is known.
+        """
         cache = self.cache_of(function) if HAS_CALLBACKS else None
-        return cache is None or bool(cache.has(signature))
+        return None if cache is None else cache.record(signature)
 
     def callback(self, function: Any, signature: Any) -> Any:
         """Compile a function that is called by its ``address``."""

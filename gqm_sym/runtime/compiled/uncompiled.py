@@ -14,12 +14,14 @@ import ctypes
 import dis
 import inspect
 import math
+import os
 import threading
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import cache
 from itertools import count
+from pathlib import Path
 from types import CodeType, FunctionType, ModuleType, SimpleNamespace
 from typing import Any
 
@@ -42,7 +44,7 @@ _NUMPY = SimpleNamespace(
 )
 
 
-# A function is compiled in the next launch that uses it after so many.
+# A function is compiled in the next launch that uses it after so many, which may have been in other processes.
 MAX_LAUNCHES = 2
 
 # The time in seconds that one call of an entry point may take in Python, where the compiler takes some seconds.
@@ -83,18 +85,27 @@ class Trial:
     ----------
     seconds : float
         The time after which it is worth compiling.
+    record : Path, optional
+        A file that gets one byte for each launch, so that a script which is run again and again has its functions
+        compiled too. It stands beside the compiled code and may be missing.
     """
 
-    def __init__(self, seconds: float) -> None:
+    def __init__(self, seconds: float, record: Path = Path(os.devnull)) -> None:
         self.left = seconds
-        self._launch, self._launches = -1, 0
+        self._launch, self._launches, self._record = -1, 0, record
 
     def is_over(self) -> bool:
         """Whether the function is to be compiled: after this time, or in the third launch that it is used for."""
         if self._launch != _LAUNCHES.count:
             self._launch = _LAUNCHES.count
-            self._launches += 1
+            self._launches = max(self._launches, self._recorded()) + 1
         return self.left <= 0.0 or self._launches > MAX_LAUNCHES
+
+    def _recorded(self) -> int:
+        """How many launches the record had, to which one more is added."""
+        with suppress(OSError), self._record.open("ab") as file:
+            return file.write(b".") and file.tell() - 1
+        return 0
 
 
 @contextmanager
@@ -415,12 +426,12 @@ class PlainEntry:
         The entry point.
     kinds : sequence
         numba's types of its arguments.
-    seconds : float
-        The time that Python may take before a call begins, all calls together.
+    trial : Trial
+        What decides when Python does not run it any more.
     """
 
-    def __init__(self, function: Any, kinds: Sequence[Any], seconds: float) -> None:
-        self._kinds, self._trial = kinds, Trial(seconds)
+    def __init__(self, function: Any, kinds: Sequence[Any], trial: Trial) -> None:
+        self._kinds, self._trial = kinds, trial
         self._run = plain_function(function)
 
     def __call__(self, arguments: tuple[Any, ...]) -> Any:

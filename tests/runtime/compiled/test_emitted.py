@@ -88,11 +88,12 @@ def test_what_a_function_uses_of_its_module_is_noticed(
 class _Compiler:
     """Stands for the compiler: it notes what is compiled, and has nothing in its cache."""
 
-    def __init__(self) -> None:
+    def __init__(self, launches: Path) -> None:
         self.compiled: list[str] = []
+        self.launches = launches
 
-    def has_cached(self, *_: Any) -> bool:
-        return False
+    def record(self, *_: Any) -> Path:
+        return self.launches
 
     @staticmethod
     def entry(function: Any, *_: Any, **__: Any) -> Any:
@@ -110,9 +111,9 @@ class _Compiler:
 
 
 @pytest.fixture
-def compiler(monkeypatch: pytest.MonkeyPatch) -> _Compiler:
+def compiler(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> _Compiler:
     """A compiler whose functions give 7."""
-    compiler = _Compiler()
+    compiler = _Compiler(tmp_path / "launches")
     monkeypatch.setattr(jit, "COMPILER", compiler)
     monkeypatch.setattr(emitted, "_IN_USE", {})
     return compiler
@@ -165,6 +166,20 @@ def test_a_function_is_compiled_in_the_third_launch_that_uses_it(tmp_path: Path,
         assert call() == call()
         assert compiler.compiled == []
     begin_launch()
+    assert call() == [7.0] * 4
+
+
+def test_launches_of_other_processes_count(
+    tmp_path: Path, compiler: _Compiler, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A script that launches one body compiles what it uses when it runs the third time."""
+    for _ in range(MAX_LAUNCHES):
+        _, call = _potential(tmp_path, "3.0")
+        assert call() == call()
+        monkeypatch.setattr(emitted, "_IN_USE", {})
+    assert compiler.compiled == []
+    assert compiler.launches.read_bytes() == b"." * MAX_LAUNCHES
+    _, call = _potential(tmp_path, "3.0")
     assert call() == [7.0] * 4
 
 

@@ -21,7 +21,7 @@ from gqm_sym.runtime.compiled import jit, uncompiled
 from gqm_sym.runtime.compiled.intrinsics import fma
 from gqm_sym.runtime.compiled.numba_internals import KeyedFiles
 from gqm_sym.runtime.compiled.stamps import CALLED_BY_MODULES, Stamps
-from gqm_sym.runtime.compiled.uncompiled import NotPlainError, PlainEntry
+from gqm_sym.runtime.compiled.uncompiled import NotPlainError, PlainEntry, Trial
 from gqm_sym.runtime.vocabulary import HOMES
 
 
@@ -147,7 +147,7 @@ def _entry(monkeypatch: pytest.MonkeyPatch, function: Callable[..., Any], signat
         compiled.append(function.__name__)
         return lambda *_: "compiled"
 
-    monkeypatch.setattr(jit.COMPILER, "has_cached", lambda *_: False)
+    monkeypatch.setattr(jit.COMPILER, "record", lambda *_: Path(os.devnull))
     monkeypatch.setattr(jit.COMPILER, "entry", compile_it)
     return jit.entry(signature)(function), compiled
 
@@ -194,7 +194,7 @@ def test_python_stops_when_its_time_has_run_out(monkeypatch: pytest.MonkeyPatch)
             x = reduced(x)[1]
 
     with pytest.raises(NotPlainError):
-        PlainEntry(run, (types.float64,), 1.0)((1.0,))
+        PlainEntry(run, (types.float64,), Trial(1.0))((1.0,))
 
 
 def norm(x):  # type: ignore[no-untyped-def]
@@ -221,4 +221,4 @@ def hashed(x):  # type: ignore[no-untyped-def]
 def test_what_cannot_be_run_to_the_same_bits_is_compiled(run: Callable[..., Any]) -> None:
     """Whether that is found when the function is read or when it is run."""
     with pytest.raises(NotPlainError):
-        PlainEntry(run, (types.float64,), 1e9)((1.0,))
+        PlainEntry(run, (types.float64,), Trial(1e9))((1.0,))

@@ -24,7 +24,7 @@ from gqm_sym.runtime.compiled.registers import copied, on_stack, over_rows, unco
 from gqm_sym.runtime.compiled.streaming import put
 from gqm_sym.runtime.compiled.strided import element, fill_row, pointers
 from gqm_sym.runtime.compiled.types import MATRIX, VECTOR
-from gqm_sym.runtime.compiled.uncompiled import PlainEntry
+from gqm_sym.runtime.compiled.uncompiled import PlainEntry, Trial
 from gqm_sym.runtime.double_double.arithmetic import series
 
 RNG = np.random.default_rng(11)
@@ -77,7 +77,7 @@ def test_python_gives_the_bits_of_each_operation() -> None:
     """Those of vector registers, of tables and of arrays by their address among them."""
     signature = types.void(VECTOR, VECTOR, types.int64[:, ::1], MATRIX)
     compiled = jit.COMPILER.entry(everything, signature, nogil=False, checked=True)
-    plain = PlainEntry(everything, signature.args, 1e9)
+    plain = PlainEntry(everything, signature.args, Trial(1e9))
     expected, found = _results(compiled), _results(lambda *arguments: plain(arguments))
     assert np.count_nonzero(expected) > 500
     assert np.flatnonzero(expected != found).tolist() == []
