@@ -131,8 +131,8 @@ class Law:
                 nu = np.where(panels[:, NORMAL_LOAD + COUNT // 2] > 0.0, 1.0, -1.0)
                 signs.append(np.array([np.full_like(nu, v), nu]))
         (v, nu), at = np.hstack(signs), np.hstack(places)
-        errors = [self.force_errors(np.ascontiguousarray(row), v, nu) for row in at]
-        return np.split(np.max(errors, axis=0), np.cumsum(counts)[:-1])
+        errors = self.force_errors(at.ravel(), np.tile(v, 3), np.tile(nu, 3)).reshape(at.shape)
+        return np.split(errors.max(axis=0), np.cumsum(counts)[:-1])
 
     def force_errors(self, places: Array, v: Array, nu: Array) -> Array:
         """By how much dW/dlam of a body at rest may be off in doubles: by rounding, and by rounding of the place.
