@@ -499,7 +499,9 @@ class Motion(ABC):
             inversion_error[mask] = place_before + timed.segment.inversion_error(phi)
         # The length of a lap, its multiple and the sum are rounded.
         rounding = ULP * (1.5 * np.abs(points.laps * points.trajectory.lap) + 2.0 * np.abs(reduced))
-        bound: Array = rate * time_error + inversion_error + rounding
+        # Where nothing is known of the time, nothing is known of the place, at rest too.
+        of_time = np.multiply(rate, time_error, out=np.full_like(rate, np.inf), where=time_error < np.inf)
+        bound: Array = of_time + inversion_error + rounding
         return bound
 
     # -- energy and extremes ------------------------------------------------------------------
