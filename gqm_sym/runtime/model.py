@@ -235,7 +235,7 @@ class CompiledModel(Formulas):
         Parameters
         ----------
         quantity : str
-            One of `gqm_sym.runtime.sweep.sweep.QUANTITIES`.
+            One of `gqm_sym.runtime.launch.kinds.QUANTITIES`.
         launches : LaunchRequest
             Arrays or numbers, which broadcast against each other and against the parameters.
         parameters : tuple

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from gqm_sym.arguments import short
+from gqm_sym.arguments import one_of, short
 from gqm_sym.errors import InputError, SolutionError, renamed
 from gqm_sym.export.html import page, summary
 from gqm_sym.literals.namespaces import FLOATS
@@ -20,7 +20,7 @@ from gqm_sym.runtime.gradients.orbit import check_signed
 from gqm_sym.runtime.gradients.sensitivity import Sensitivity
 from gqm_sym.runtime.gradients.spectrum import Fourier
 from gqm_sym.runtime.launch.equilibria import Potential
-from gqm_sym.runtime.launch.kinds import MotionKind
+from gqm_sym.runtime.launch.kinds import QUANTITIES, MotionKind
 from gqm_sym.runtime.launch.problem import Problem
 from gqm_sym.runtime.launch.request import Launch, LaunchRequest
 from gqm_sym.runtime.launch.speed import path_and_force_at, path_in_space_at
@@ -101,6 +101,24 @@ class Motion(ABC):
         """The time in s at which the motion ends, or the horizon ``t_max``; infinite if there is neither."""
         return self._known_end()
 
+    @property
+    def rest_position(self) -> float:
+        """Where the body rests in the end, as a value of the curve parameter.
+
+        Raises
+        ------
+        SolutionError
+            If the motion does not come to rest, or not before ``t_max``.
+        """
+        if self.kind == "rest":
+            return self.problem.lam0
+        if not self.t_end < inf:
+            raise SolutionError("rest_position: this motion goes on for ever and does not come to rest")
+        last = self.legs[-1]
+        if last.end != "rest":
+            raise SolutionError(f"rest_position: this motion does not come to rest; it ends with {last.end!r}")
+        return last.lam_end
+
     # -- periods ------------------------------------------------------------------------------
 
     @property
@@ -155,8 +173,8 @@ class Motion(ABC):
         Parameters
         ----------
         quantity : str
-            "turning_points", "v_max", "v_min", "normal_force_max", "normal_force_min" or "time_at"; of a periodic
-            motion also "half_period", "period" or "action", and of one with losses "t_end" or "rest_position".
+            "turning_points", "v_max", "v_min", "normal_force_max", "normal_force_min", "time_at" or "t_end"; of a
+            periodic motion also "half_period", "period" or "action", and of one with losses "rest_position".
         wrt : str or sequence of str, optional
             What the derivatives are by: run-time parameters, "lam0" and "v0"; all of them if not given.
         lam : number, optional
@@ -184,6 +202,7 @@ class Motion(ABC):
             raise InputError(f"gradient: order must be 1 or 2, got {short(order)}")
         if order == 2:
             return self._second_gradient(quantity, wrt)
+        one_of(quantity, QUANTITIES, where="gradient: quantity")
         check_signed(self.problem.formulas, quantity)
         return self._gradient(quantity, wrt) if lam is None else self._arrival_gradient(lam, wrt)
 

@@ -22,6 +22,7 @@ PLACE = "lam0"
 DESCRIBED = {
     "half_period": ("time from one turning point to the other", "s"),
     "period": ("time after which the motion repeats", "s"),
+    "action": ("integral of (1 + beta) V ds over one period, per mass", "m2/s"),
     "turning_point_lower": ("lower turning point, as a value of the curve's parameter", PLACE),
     "turning_point_upper": ("upper turning point, as a value of the curve's parameter", PLACE),
     "v_min": ("least speed", "m/s"),
@@ -59,9 +60,9 @@ class Sweep(SweepArrays):
     values : float array
         The quantity of each launch, in the shape that the arguments broadcast to; NaN where there is none. Times
         (``half_period``, ``period``, ``time_at``, ``t_end``) are in seconds, speeds (``v_min``, ``v_max``) in m/s,
-        forces (``normal_force_min``, ``normal_force_max``) in newtons; places (``turning_points``,
-        ``rest_position``) are values of the curve's parameter, in its unit. ``turning_points`` has one more axis of
-        length 2, for the lower and the upper one.
+        forces (``normal_force_min``, ``normal_force_max``) in newtons, the ``action`` in m2/s; places
+        (``turning_points``, ``rest_position``) are values of the curve's parameter, in its unit. ``turning_points``
+        has one more axis of length 2, for the lower and the upper one.
     status : int8 array
         0 for each launch that has a value; otherwise a code that says why there is none. `status_counts` gives the
         sentences, which stand in `quantities.STATUS_SENTENCES`.

@@ -273,7 +273,7 @@ class Group(NamedTuple):
     factors : list of arrays
         What each launch multiplies the parts of potential and load in the table with.
     ends : int
-        What both ends of the table are (`SweptCurve`).
+        What both ends of the table, or of the curve where there is none, are (`SweptCurve`).
     """
 
     columns: list[Array]
@@ -295,7 +295,9 @@ def _groups(
     """
     if formulas.chart is None:
         may_lift_off = only_sign and not formulas.dissipation
-        table, ends = _tabulated_range(formulas, columns, domain, only_sign) if may_lift_off else (NO_TABLE, NO_ENDS)
+        table, ends = NO_TABLE, CURVE_ENDS
+        if may_lift_off:
+            table, ends = _tabulated_range(formulas, columns, domain, only_sign)
         yield Group([*columns[:4], *domain, *columns[4:]], table=table, ends=ends), None
         return
     held, factors = _held(formulas, len(columns) - 4), _WHOLE
