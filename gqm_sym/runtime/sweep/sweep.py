@@ -394,8 +394,17 @@ def _tabulated_range(
                 width *= 2.0
         first, last = reach
         ends = CONTACT_ENDS if closed == 2 else NO_ENDS
+    return _tabulated_between(formulas.exact, _source(formulas), tuple(p.tolist()), first, last), ends
+
+
+@lru_cache(maxsize=8)
+def _tabulated_between(exact: Any, source: Source, values: tuple[float, ...], first: float, last: float) -> CurveTable:
+    """The table of a curve with formulas between two places; it is made once for the same parameters.
+
+    The exact formulas tell modules apart whose functions stood at the same place in memory, one after the other.
+    """
     pieces = np.linspace(first, last, MIN_PIECES + 1)
-    return CurveTable(*tabulate(_source(formulas), NO_PARTS, p, pieces)), ends
+    return CurveTable(*tabulate(source, NO_PARTS, np.array(values), pieces))
 
 
 def _exact_parts(formulas: "Formulas") -> Callable[..., Any] | None:

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from mpmath import mp, mpf
 
+import generated.circle_rotating as circle_rotating
 import gqm_sym as gqm
 from gqm_sym.errors import InputError, ParameterError, SolutionError
 from gqm_sym.runtime.compiled import threads
@@ -360,6 +361,27 @@ def test_bodies_leave_an_endless_hill(module_of: ModuleOf) -> None:
     for v0, value in zip(speeds.tolist(), swept.values.tolist(), strict=True):
         with mp.workdps(30):
             assert value == pytest.approx(float(time_of_flight(mpf(v0))), rel=1e-13)
+
+
+@pytest.mark.parametrize("omega", [0.7, 2.0, 3.0, 4.0])
+def test_a_hoop_that_turns(omega: float) -> None:
+    """Above sqrt(g/L) the lowest place is a hilltop between two wells; batches answer below and above."""
+    v0, g, square = np.array([1.0, 2.0, 4.0]), mpf(9.81), mpf(omega) ** 2
+    swept = {name: circle_rotating.sweep(name, 0.0, v0, Omega=omega) for name in ("turning_points", "half_period")}
+    assert swept["half_period"].route_counts() == {"batch": v0.size}
+    for k, speed in enumerate(map(mpf, v0.tolist())):
+        with mp.workdps(40):
+            cosine = (g - mp.sqrt((g - square) ** 2 + square * speed**2)) / square
+            top = mp.acos(cosine)
+
+            def rate(u: mpf, top: mpf = top, speed: mpf = speed) -> mpf:
+                angle = top * mp.sin(u)
+                v2 = speed**2 - 2 * g * (1 - mp.cos(angle)) + square * mp.sin(angle) ** 2
+                return top * mp.cos(u) / mp.sqrt(v2)
+
+            truth = 2 * mp.quad(rate, mp.linspace(0, mp.pi / 2, 9), method="gauss-legendre")
+            assert abs(swept["half_period"].values[k] / truth - 1) < 1e-15
+            assert abs(swept["turning_points"].values[k] / np.array([-top, top]) - 1).max() < 4e-16
 
 
 @pytest.fixture(scope="module")
