@@ -257,9 +257,9 @@ def test_no_speed_is_negative(kinds: dict[str, ModuleType]) -> None:
 def test_random_motions_of_many_kinds(kinds: dict[str, ModuleType], monkeypatch: pytest.MonkeyPatch) -> None:
     """On slopes, springs, circles, rims and coils closed forms, sweeps and threads agree; what does not is told."""
     modules = kinds
-    tally, failed, _ = soak_kinds.soak(150, 20, modules)
+    tally, failed, _ = soak_kinds.soak(110, 20, modules)
     assert failed == []
-    assert tally["checks"] >= 700
+    assert tally["checks"] >= 550
     assert {kind.__name__ for kind in soak_kinds.KINDS} <= tally.keys()
     # With gravity that is a little stronger the closed forms are those of another law.
     monkeypatch.setattr(soak_kinds, "G", "9.8100000001")
