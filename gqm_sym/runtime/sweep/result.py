@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gqm_sym.runtime.compiled.types import Array
+from gqm_sym.runtime.launch.rider import LOADS
 from gqm_sym.runtime.motion.rows import table, text_table
 from gqm_sym.runtime.sweep.quantities import ROUTES, STATUS_SENTENCES
 
@@ -29,6 +30,11 @@ DESCRIBED = {
     "v_max": ("largest speed", "m/s"),
     "normal_force_min": ("least contact force along the normal", "N"),
     "normal_force_max": ("largest contact force along the normal", "N"),
+    **{
+        f"n_{load}_{which}": (f"{word} {load} load on a rider, in units of 9.80665 m/s2", "1")
+        for load in LOADS
+        for which, word in (("min", "least"), ("max", "largest"))
+    },
     "time_at": ("first time at the place lam", "s"),
     "t_end": ("time at which the motion ends", "s"),
     "rest_position": ("where the body rests in the end, as a value of the curve's parameter", PLACE),

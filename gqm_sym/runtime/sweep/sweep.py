@@ -24,6 +24,7 @@ from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.interface import ExactPotential
 from gqm_sym.runtime.launch.formulas import chart_with, true_pieces_of
 from gqm_sym.runtime.launch.request import ONLY_SIGN, LaunchRequest, check_contact
+from gqm_sym.runtime.launch.rider import check_banked
 from gqm_sym.runtime.launch.speed import path_and_force_at, potential_at
 from gqm_sym.runtime.multiprecision.exact_problem import NOWHERE
 from gqm_sym.runtime.sweep import quantities, scalar
@@ -92,6 +93,8 @@ def sweep(
     found = QUANTITIES.get(quantity)
     if found is None:
         raise InputError(f"quantity: must be one of {', '.join(QUANTITIES)}, got {quantity!r}")
+    if quantity in quantities.LOAD_EXTREMES:
+        check_banked(formulas, quantity)
     if (lam is None) == (quantity == "time_at"):
         raise InputError(f"lam: is the place that 'time_at' asks about, got {lam!r} with {quantity!r}")
     check_contact(formulas, contact)
