@@ -72,6 +72,7 @@ bench: $(VENV)/.bench ## time each stage, and set accuracy and time beside the a
 	$(BIN)/python benchmarks/scale.py
 	$(BIN)/python benchmarks/comparison.py
 	-$(BIN)/python benchmarks/matrix.py
+	-$(BIN)/python benchmarks/routes.py
 
 # Python compiles the files that it imports; pip would compile all of them, most of which nothing here imports.
 INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile

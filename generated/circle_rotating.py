@@ -1,5 +1,5 @@
 # Made by gqm-gen for "circle_rotating". Do not edit: change its declaration and generate again.
-# interface 10, input a74aedd594f9, body f915e1e2075b
+# interface 10, input a74aedd594f9, body 954d2a7179e4
 """Bead on a hoop that turns about its vertical diameter
 
 x              = L*sin(theta)
@@ -18,7 +18,7 @@ turning points : 2*L*(-L*Omega**2*sin(lam0)**2/2 + L*Omega**2*sin(theta)**2/2 - 
 liftoff        : L*Omega**2*sin(theta)**2 + g*cos(theta) + (2*L*(-L*Omega**2*sin(lam0)**2/2 + L*Omega**2*sin(theta)**2/2 - g*cos(lam0) + g*cos(theta)) + v0**2)/L = 0
 """
 
-from math import fabs
+from math import fabs, sqrt
 from typing import TYPE_CHECKING, Any
 
 from numba import carray
@@ -31,9 +31,10 @@ compiled = compiler(__file__, interface=10)
 from gqm_sym.runtime.vocabulary import (
     BOUNDS, BOUNDS_BATCH, EFFECTIVE_POTENTIAL, INTEGRAND_INVARIANTS_BATCH, LOAD_MAP, ORBIT_INVARIANTS_BATCH,
     PATH_AND_CONTACT_FORCE, POTENTIAL_DIVDIFF1, POTENTIAL_DIVDIFF1_BATCH, POTENTIAL_DIVDIFF2, POTENTIAL_DIVDIFF2_BATCH,
-    TIME_INTEGRAND_BATCH, BatchFunctions, CompiledFunctions, CompiledModel, ExactFormulas, LaunchRequest, Pass1, cos,
-    divdiff1_cos, divdiff1_cos_in_square, divdiff1_sin, divdiff1_sinc_in_square, divdiff2_cos, divdiff2_sin, iadd,
-    iconst, icos, imul, ipow, isin, place_from_ends, sin, sinc_near, speed_squared_from_potential,
+    TIME_INTEGRAND_BATCH, TURNING_POINT_BATCH, BatchFunctions, CompiledFunctions, CompiledModel, ExactFormulas,
+    LaunchRequest, Pass1, atan, cos, divdiff1_cos, divdiff1_cos_in_square, divdiff1_sin, divdiff1_sinc_in_square,
+    divdiff2_cos, divdiff2_sin, iadd, iconst, icos, imul, ipow, isin, place_from_ends, sin, sinc_near,
+    speed_squared_from_potential,
 )
 
 if TYPE_CHECKING:
@@ -361,6 +362,28 @@ def integrand_invariants_batch(n, halves, p, out):
         out[3, i] = _t3
 
 
+@compiled(TURNING_POINT_BATCH)
+def turning_point_batch(n, offsets, launches, p, out):
+    """From V**2 at an offset: half the orbit's width (paper, eq. 14), -dV**2/dq, and a sine's square q at the turn."""
+    offsets, launches, p, out = carray(offsets, n), carray(launches, n), carray(p, (4, n)), carray(out, (3, n))
+    for i in range(n):
+        L, Omega, g, offset, launch = p[0, i], p[1, i], p[2, i], offsets[i], launches[i]
+        _t0 = sin(offset/2)**2
+        _t1 = Omega**2
+        _t2 = 2*_t1
+        _t3 = L*(L*_t2 - 2*g)
+        _t4 = L**2
+        _t5 = _t1*_t4
+        _t6 = _t0*_t5
+        _t7 = 2*_t3
+        _t8 = _t0 + launch/(-_t3 + 4*_t6 + sqrt(16*_t5*launch + (8*_t6 - _t7)**2)/2)
+        _t9 = fabs(_t3)
+        _t10 = fabs(_t8)
+        out[0, i] = 4*atan(sqrt(_t8)/(sqrt(1 - _t8) + 1))
+        out[1, i] = 4*_t1*_t4*_t8 - _t10*_t5 - _t7 - _t9/4 - fabs(_t10*_t2*_t4 - 8*_t5*_t8 + _t9/2)/2
+        out[2, i] = _t8
+
+
 @compiled(BOUNDS_BATCH)
 def bounds_batch(n, lo, hi, p, out):
     """Bounds of dU/dtheta and ds/dtheta for lo <= theta <= hi."""
@@ -383,7 +406,8 @@ MODEL = CompiledModel(
     batch=BatchFunctions(
         potential_divdiff1=potential_divdiff1_batch, potential_divdiff2=potential_divdiff2_batch,
         orbit_invariants=orbit_invariants_batch, time_integrand=time_integrand_batch,
-        integrand_invariants=integrand_invariants_batch, bounds=bounds_batch, orbit_rows=6, integrand_rows=4,
+        integrand_invariants=integrand_invariants_batch, turning_point=turning_point_batch, bounds=bounds_batch,
+        orbit_rows=6, integrand_rows=4,
     ),
     domain_of=exact_domain, axes_of=exact_axes,
     exact=ExactFormulas(

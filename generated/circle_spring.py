@@ -1,5 +1,5 @@
 # Made by gqm-gen for "circle_spring". Do not edit: change its declaration and generate again.
-# interface 10, input bcc7b1afa151, body 12b5eb08a996
+# interface 10, input bcc7b1afa151, body 84e3ac661ea2
 """Bead on a ring, tied by a spring to a point above its centre
 
 x              = L*sin(theta)
@@ -17,7 +17,7 @@ turning points : -2*L*g*cos(lam0) + 2*L*g*cos(theta) + v0**2 + w**2*(L**2*sin(la
 liftoff        : -L*w**2*sin(theta)**2 + (g - w**2*(L*cos(theta) + h))*cos(theta) + (-2*L*g*cos(lam0) + 2*L*g*cos(theta) + v0**2 + w**2*(L**2*sin(lam0)**2 + (L*cos(lam0) + h)**2) - w**2*(L**2*sin(theta)**2 + (L*cos(theta) + h)**2))/L = 0
 """
 
-from math import fabs
+from math import fabs, sqrt
 from typing import TYPE_CHECKING, Any
 
 from numba import carray
@@ -30,9 +30,9 @@ compiled = compiler(__file__, interface=10)
 from gqm_sym.runtime.vocabulary import (
     AGM_ARGUMENTS_BATCH, BOUNDS, BOUNDS_BATCH, EFFECTIVE_POTENTIAL, LOAD_MAP, ORBIT_INVARIANTS_BATCH,
     PATH_AND_CONTACT_FORCE, POTENTIAL_DIVDIFF1, POTENTIAL_DIVDIFF1_BATCH, POTENTIAL_DIVDIFF2, POTENTIAL_DIVDIFF2_BATCH,
-    BatchFunctions, CompiledFunctions, CompiledModel, ExactFormulas, LaunchRequest, Pass1, cos, divdiff1_cos,
-    divdiff1_cos_in_square, divdiff1_sin, divdiff1_sinc_in_square, divdiff2_cos, divdiff2_sin, iadd, iconst, icos, imul,
-    ipow, isin, place_from_ends, sin, sinc_near, speed_squared_from_potential,
+    TURNING_POINT_BATCH, BatchFunctions, CompiledFunctions, CompiledModel, ExactFormulas, LaunchRequest, Pass1, atan,
+    cos, divdiff1_cos, divdiff1_cos_in_square, divdiff1_sin, divdiff1_sinc_in_square, divdiff2_cos, divdiff2_sin, iadd,
+    iconst, icos, imul, ipow, isin, place_from_ends, sin, sinc_near, speed_squared_from_potential,
 )
 
 if TYPE_CHECKING:
@@ -369,6 +369,20 @@ def agm_arguments_batch(n, halves, p, out):
         out[1, i] = _t0*cos(half/2)
 
 
+@compiled(TURNING_POINT_BATCH)
+def turning_point_batch(n, offsets, launches, p, out):
+    """From V**2 at an offset: half the orbit's width (paper, eq. 14), -dV**2/dq, and a sine's square q at the turn."""
+    offsets, launches, p, out = carray(offsets, n), carray(launches, n), carray(p, (5, n)), carray(out, (3, n))
+    for i in range(n):
+        L, w, h, g, offset, launch = p[0, i], p[1, i], p[2, i], p[3, i], offsets[i], launches[i]
+        _t0 = 4*L
+        _t1 = _t0*g + w**2*(4*L**2 - _t0*(L + h))
+        _t2 = sin(offset/2)**2 + launch/_t1
+        out[0, i] = 4*atan(sqrt(_t2)/(sqrt(1 - _t2) + 1))
+        out[1, i] = _t1
+        out[2, i] = _t2
+
+
 @compiled(BOUNDS_BATCH)
 def bounds_batch(n, lo, hi, p, out):
     """Bounds of dU/dtheta and ds/dtheta for lo <= theta <= hi."""
@@ -392,8 +406,8 @@ MODEL = CompiledModel(
     load_map=load_map,
     batch=BatchFunctions(
         potential_divdiff1=potential_divdiff1_batch, potential_divdiff2=potential_divdiff2_batch,
-        orbit_invariants=orbit_invariants_batch, agm_arguments=agm_arguments_batch, bounds=bounds_batch,
-        orbit_rows=8,
+        orbit_invariants=orbit_invariants_batch, agm_arguments=agm_arguments_batch,
+        turning_point=turning_point_batch, bounds=bounds_batch, orbit_rows=8,
     ),
     domain_of=exact_domain, axes_of=exact_axes,
     exact=ExactFormulas(

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "double_well". Do not edit: change its declaration and generate again.
-# interface 10, input 876b66f15f50, body c5fcc6dd4603
+# interface 10, input 876b66f15f50, body 01a381a33c06
 """Bead between two wells
 
 x              = x
@@ -30,8 +30,8 @@ compiled = compiler(__file__, interface=10)
 from gqm_sym.runtime.vocabulary import (
     BOUNDS, BOUNDS_BATCH, EFFECTIVE_POTENTIAL, INTEGRAND_INVARIANTS_BATCH, LOAD_MAP, PATH_AND_CONTACT_FORCE,
     POTENTIAL_DIVDIFF1, POTENTIAL_DIVDIFF1_BATCH, POTENTIAL_DIVDIFF2, POTENTIAL_DIVDIFF2_BATCH, TIME_INTEGRAND_BATCH,
-    BatchFunctions, CompiledFunctions, CompiledModel, ExactFormulas, LaunchRequest, Pass1, divdiff1_ipow, iadd, iconst,
-    imul, ipow, isqrt, place_from_ends, speed_squared_from_potential,
+    TURNING_POINT_BATCH, BatchFunctions, CompiledFunctions, CompiledModel, ExactFormulas, LaunchRequest, Pass1,
+    divdiff1_ipow, iadd, iconst, imul, ipow, isqrt, place_from_ends, speed_squared_from_potential,
 )
 
 if TYPE_CHECKING:
@@ -331,6 +331,24 @@ def integrand_invariants_batch(n, halves, p, out):
         out[0, i] = half**2
 
 
+@compiled(TURNING_POINT_BATCH)
+def turning_point_batch(n, offsets, launches, p, out):
+    """From V**2 at an offset: half the orbit's width (paper, eq. 14), -dV**2/dq, and a sine's square q at the turn."""
+    offsets, launches, p, out = carray(offsets, n), carray(launches, n), carray(p, (3, n)), carray(out, (3, n))
+    for i in range(n):
+        h, g, offset, launch = p[0, i], p[1, i], offsets[i], launches[i]
+        _t0 = offset**2
+        _t1 = g*h
+        _t2 = 2*_t1
+        _t3 = 4*_t1
+        _t4 = _t0 + launch/(_t0*_t2 - _t2 + sqrt(8*_t1*launch + (_t0*_t3 - _t3)**2)/2)
+        _t5 = fabs(_t1)
+        _t6 = fabs(_t1*_t4)
+        out[0, i] = sqrt(_t4)
+        out[1, i] = -_t3 + 2*_t4*g*h - _t5/2 - _t6/2 - fabs(-_t3*_t4 + _t5 + _t6)/2
+        out[2, i] = 0
+
+
 @compiled(BOUNDS_BATCH)
 def bounds_batch(n, lo, hi, p, out):
     """Bounds of dU/dx and ds/dx for lo <= x <= hi."""
@@ -354,8 +372,8 @@ MODEL = CompiledModel(
     load_map=load_map,
     batch=BatchFunctions(
         potential_divdiff1=potential_divdiff1_batch, potential_divdiff2=potential_divdiff2_batch,
-        time_integrand=time_integrand_batch, integrand_invariants=integrand_invariants_batch, bounds=bounds_batch,
-        integrand_rows=1,
+        time_integrand=time_integrand_batch, integrand_invariants=integrand_invariants_batch,
+        turning_point=turning_point_batch, bounds=bounds_batch, integrand_rows=1,
     ),
     domain_of=exact_domain, axes_of=exact_axes,
     exact=ExactFormulas(

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "line_spring". Do not edit: change its declaration and generate again.
-# interface 10, input 702c9ef6b67b, body 77e0c9873632
+# interface 10, input 702c9ef6b67b, body 6ee5d96ac454
 """Bead on a sloping line, tied to the origin by a spring
 
 x              = x
@@ -17,7 +17,7 @@ turning points : v0**2 + w**2*(lam0**2 - x**2 + (3*lam0 + 8)**2/16 - (3*x + 8)**
 liftoff        : 8*w**2/5 = 0
 """
 
-from math import fabs
+from math import fabs, sqrt
 from typing import TYPE_CHECKING, Any
 
 from numba import carray
@@ -29,9 +29,9 @@ compiled = compiler(__file__, interface=10)
 
 from gqm_sym.runtime.vocabulary import (
     AGM_ARGUMENTS_BATCH, BOUNDS, BOUNDS_BATCH, EFFECTIVE_POTENTIAL, LOAD_MAP, PATH_AND_CONTACT_FORCE,
-    POTENTIAL_DIVDIFF1, POTENTIAL_DIVDIFF1_BATCH, POTENTIAL_DIVDIFF2, POTENTIAL_DIVDIFF2_BATCH, BatchFunctions,
-    CompiledFunctions, CompiledModel, ExactFormulas, LaunchRequest, Pass1, iadd, iconst, idiv, imul, ipow,
-    speed_squared_from_potential,
+    POTENTIAL_DIVDIFF1, POTENTIAL_DIVDIFF1_BATCH, POTENTIAL_DIVDIFF2, POTENTIAL_DIVDIFF2_BATCH, TURNING_POINT_BATCH,
+    BatchFunctions, CompiledFunctions, CompiledModel, ExactFormulas, LaunchRequest, Pass1, iadd, iconst, idiv, imul,
+    ipow, speed_squared_from_potential,
 )
 
 if TYPE_CHECKING:
@@ -293,6 +293,18 @@ def agm_arguments_batch(n, halves, p, out):
         out[1, i] = _t0
 
 
+@compiled(TURNING_POINT_BATCH)
+def turning_point_batch(n, offsets, launches, p, out):
+    """From V**2 at an offset: half the orbit's width (paper, eq. 14), -dV**2/dq, and a sine's square q at the turn."""
+    offsets, launches, p, out = carray(offsets, n), carray(launches, n), carray(p, (2, n)), carray(out, (3, n))
+    for i in range(n):
+        w, offset, launch = p[0, i], offsets[i], launches[i]
+        _t0 = w**2
+        out[0, i] = sqrt(offset**2 + 16*launch/(25*_t0))
+        out[1, i] = 25*_t0/16
+        out[2, i] = 0
+
+
 @compiled(BOUNDS_BATCH)
 def bounds_batch(n, lo, hi, p, out):
     """Bounds of dU/dx and ds/dx for lo <= x <= hi."""
@@ -314,7 +326,7 @@ MODEL = CompiledModel(
     load_map=load_map,
     batch=BatchFunctions(
         potential_divdiff1=potential_divdiff1_batch, potential_divdiff2=potential_divdiff2_batch,
-        agm_arguments=agm_arguments_batch, bounds=bounds_batch,
+        agm_arguments=agm_arguments_batch, turning_point=turning_point_batch, bounds=bounds_batch,
     ),
     domain_of=exact_domain, axes_of=exact_axes,
     exact=ExactFormulas(

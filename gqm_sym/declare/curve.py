@@ -2,16 +2,17 @@
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias, TypedDict, Unpack
 
 import sympy as sp
 
-from gqm_sym.arguments import checked, names, one_line, short
+from gqm_sym.arguments import checked, names, one_line, short, unknown_argument
+from gqm_sym.declare.banking import Banking, Roll, read_banking
 from gqm_sym.declare.closing import check_period, found_period
 from gqm_sym.declare.ends import Ends, check_ends, check_order, read_ends
 from gqm_sym.declare.measures import parameter_dimension, told, units_of
 from gqm_sym.dimensions import unit_of
-from gqm_sym.errors import DeclarationError
+from gqm_sym.errors import ArgumentError, DeclarationError
 from gqm_sym.expressions import check_name, read_expression
 from gqm_sym.parameters import Parameters, Value, check_measured, names_in_order, read_parameters
 from gqm_sym.sympy_charts import chart_x, chart_z
@@ -21,6 +22,15 @@ if TYPE_CHECKING:
     from gqm_sym.smoothing import Smoothing
 
 Source: TypeAlias = str | int | sp.Expr
+
+
+class SpaceOptions(TypedDict, total=False):
+    """Arguments of `Curve.space` that are rarely given; they are described there."""
+
+    roll: Roll | None
+    heartline: Source
+    parameters: Parameters | None
+    title: str
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -50,6 +60,8 @@ class Curve:
         Of a polar curve r(θ): its derivatives give shorter forms than those of x and z.
     definition
         What a charted curve is made from: its coordinates are known by numbers only, as functions of arc length.
+    banking
+        Of a space curve how it is banked; None where that is not declared.
     """
 
     kind: str
@@ -64,6 +76,7 @@ class Curve:
     radius: sp.Expr | None = None
     definition: object = None
     y: sp.Expr = sp.S.Zero
+    banking: Banking | None = None
 
     def __post_init__(self) -> None:
         if not any(self.parameter in form.free_symbols for form in self.point):
@@ -228,8 +241,7 @@ class Curve:
         parameter: str,
         period: Source | None = None,
         domain: Iterable[Source | None] | None = None,
-        parameters: Parameters | None = None,
-        title: str = "",
+        **more: Unpack[SpaceOptions],
     ) -> "Curve":
         """Declare a curve in space by its three coordinates; z is up.
 
@@ -237,14 +249,31 @@ class Curve:
         The contact force of a space curve is a vector, and ``normal_force`` its length; on a curve in a vertical plane
         it has the sign that it has on planar curves.
 
+        Parameters
+        ----------
+        roll
+            How the track is banked, so that states tell what a rider feels: a roll angle in radians, positive to the
+            left; "coordinated", so that there is no lateral force at the speed of the motion; or ("coordinated", v), at
+            the speed v. The angle is measured from the level, which a vertical tangent does not have; on a curve in a
+            vertical plane from the normal of that plane along which the contact force is positive. None: not banked.
+        heartline
+            The height of the declared curve, which the rider follows, over the track; 0 if not given.
+        parameters, title
+            As of other curves.
+
         Examples
         --------
         >>> Curve.space(x="R*cos(u)", y="R*sin(u)", z="c*u", parameter="u").parameters
         ('R', 'c')
         """
-        symbol = _symbol(parameter, "space")
+        if strangers := more.keys() - SpaceOptions.__annotations__.keys():
+            known = ("x", "y", "z", "parameter", "period", "domain", *SpaceOptions.__annotations__)
+            raise ArgumentError(unknown_argument("Curve.space", min(strangers), known))
+        symbol, title = _symbol(parameter, "space"), more.get("title", "")
         at = {name: read_expression(form, where=f"space: {name}") for name, form in (("x", x), ("y", y), ("z", z))}
-        return _declare(cls(kind="space", **at, parameter=symbol, title=title), domain, parameters, (), period)
+        banking = read_banking(more.get("roll"), more.get("heartline", 0))
+        forms = cls(kind="space", **at, parameter=symbol, title=title, banking=banking)
+        return _declare(forms, domain, more.get("parameters"), (), period)
 
     @classmethod
     @checked("Curve.implicit")
@@ -426,7 +455,8 @@ def _declare(
     unit = unit_of(parameter_dimension(forms)) or None
     ends = read_ends(domain, kind, unit)
     turn = None if period is None else read_expression(period, where=f"{kind}: period", unit=unit)
-    written = forms.point if forms.radius is None else (forms.radius,)
+    written = (*forms.point, *(forms.banking.forms if forms.banking else ()))
+    written = written if forms.radius is None else (forms.radius,)
     given = tuple(end for end in (*ends, turn) if end is not None)
     used = (*names_in_order(*written), *names_of_level, *names_in_order(*given))
     found = tuple(name for name in dict.fromkeys(used) if name != symbol.name)

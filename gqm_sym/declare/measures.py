@@ -4,6 +4,7 @@ from typing import Protocol, cast
 
 import sympy as sp
 
+from gqm_sym.declare.banking import Banking
 from gqm_sym.declare.implicit import Level
 from gqm_sym.declare.piecewise import FormulaCurve, Rail
 from gqm_sym.declare.polynomials import PolynomialPieces
@@ -39,8 +40,13 @@ class DeclaredCurve(FormulaCurve, Protocol):
     def definition(self) -> object:
         """What a charted curve is made from."""
 
+    @property
+    def banking(self) -> Banking | None:
+        """Of a space curve, how it is banked."""
+
 
 PER_LENGTH = dimension(metre=-1)
+SPEED = dimension(metre=1, second=-1)
 _PIECES: dict[str, tuple[Dimension, ...]] = {
     "line": (LENGTH,),
     "arc": (LENGTH, NUMBER),
@@ -63,7 +69,14 @@ def curve_formulas(curve: DeclaredCurve) -> Formulas:
     own = parameter_dimension(curve)
     coordinates = [form for _, form in curve.coordinates] if curve.radius is None else [curve.radius]
     ends = [(end, own) for end in (*curve.domain, curve.period) if end is not None and own is not None]
-    return Formulas([*((form, LENGTH) for form in coordinates), *ends], {lam.name: own})
+    banked = [] if curve.banking is None else _banked(curve.banking)
+    return Formulas([*((form, LENGTH) for form in coordinates), *ends, *banked], {lam.name: own})
+
+
+def _banked(banking: Banking) -> list[tuple[sp.Expr, Dimension]]:
+    """The formulas of a banking with their dimensions."""
+    forms = ((banking.angle, NUMBER), (banking.speed, SPEED), (banking.heartline, LENGTH))
+    return [(form, wanted) for form, wanted in forms if form is not None]
 
 
 def parameter_dimension(curve: DeclaredCurve) -> Dimension | None:

@@ -28,6 +28,7 @@ from gqm_sym.derivation.forces.dissipation import (
     dissipation,
 )
 from gqm_sym.derivation.forces.forces import Forces, Place, forces, is_planar
+from gqm_sym.derivation.forces.rider import Rider, rider
 from gqm_sym.derivation.forces.speed import LAM0, V0, SpeedField, conservative_speed, dissipative_speed
 from gqm_sym.derivation.geometry.geometry import AHEAD, PAIRS, Geometry, geometry, vertical_plane
 from gqm_sym.derivation.geometry.level_set import LevelSet, level_set
@@ -133,6 +134,8 @@ class Model:
         What was left unsimplified, and why; of a dissipative model what kind of form V² has.
     level_set
         Of an implicit curve: F with its derivatives, tangent and curvature, in x and z.
+    rider
+        Of a space curve that is banked: what a rider feels; else None.
     """
 
     curve: Curve
@@ -179,6 +182,7 @@ class Model:
     at_least: tuple[tuple[str, str], ...]
     notes: tuple[str, ...]
     level_set: LevelSet | None = None
+    rider: Rider | None = None
 
     if not TYPE_CHECKING:
         __getattr__ = renamed(
@@ -426,6 +430,7 @@ def derive(
         speed = dissipative_speed(kernel, law, shape, loss, curve)
     pressure = shape.kappa * speed.held + law.static_normal_load
     dxds, dyds, dzds = shape.tangent
+    acceleration = law.push / kernel.inertia if loss is None else loss.along(loss.acceleration)
     potential, slope = law.effective_potential, law.effective_potential_slope
     axes = None if loss or curve.charted else symmetry(potential, slope, shape.ds, lam)
     if axes and kernel.radius:  # of the path of a body's centre the sign of σ is known by numbers only
@@ -465,7 +470,7 @@ def derive(
         speed_squared_form=speed.form,
         normal_force=MASS * pressure,
         side_force=2 * MASS * kernel.spin * DIRECTION * sp.sqrt(speed.held) * shape.dxds,
-        tangential_acceleration=law.push / kernel.inertia if loss is None else loss.along(loss.acceleration),
+        tangential_acceleration=acceleration,
         time_integrand=shape.ds / sp.sqrt(speed.held),
         regularised_integrand=shape.ds * sp.sqrt((lam - LAM1) * (LAM2 - lam) / speed.held),
         turning_point_equation=sp.Eq(speed.squared, 0, evaluate=False),
@@ -476,6 +481,7 @@ def derive(
         at_least=kernel.at_least,
         notes=(*(() if level is None else (level.note,)), *shape.notes, *(() if loss is None else (speed.note,))),
         level_set=level,
+        rider=rider(curve.banking, shape, law, acceleration, lam) if curve.banking else None,
     )
     if law.loads:
         model = replace(model, normal_force=model.normal_force_at(speed.held))

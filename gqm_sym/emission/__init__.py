@@ -60,6 +60,11 @@ def _source(model: Model, name: str) -> str:
         parts.append(repr(model.at_least))
     if (loss := model.dissipation) is not None:
         parts += [exact(e) for e in (loss.drive, loss.decay, *loss.holds, *(form for _, form in loss.pieces))]
+    if curve.banking is not None:
+        parts += [
+            "banked",
+            *(exact(form) for form in (curve.banking.angle, curve.banking.speed, curve.banking.heartline)),
+        ]
     if curve.charted:
         parts.append(repr(curve.definition))
     return "\n".join(parts)

@@ -42,8 +42,14 @@ def lower(model: Model, *, name: str, forms: tuple[tuple[str, Expr], ...]) -> Mo
         at_least=model.at_least,
         forms=forms,
         notes=model.notes,
-        functions=(lowering.path_and_contact_force(), *lowering.path_in_space(), *functions),
+        functions=(
+            lowering.path_and_contact_force(),
+            *lowering.path_in_space(),
+            *lowering.rider_loads(),
+            *functions,
+        ),
         in_space=model.curve.in_space,
+        banked=model.rider is not None,
         signed=not model.loads,
         bounds=lowering.bounds(),
         batch=batch,
@@ -74,6 +80,10 @@ def _check(model: Model) -> None:
         labels = (f"contact force, {axis}" for axis in "xyz")
         forms |= dict(zip(labels, model.normal_force_vector_at(MASS), strict=True))
     loss = model.dissipation
+    if model.rider is not None:
+        felt = {DIRECTION.name, CONTACT_SIGN.name, W.name} | names
+        for form in model.rider.forms:
+            check_emittable(form, felt, where="what a rider feels")
     if loss is not None:
         names |= {DIRECTION.name, CONTACT_SIGN.name, W.name}
         laws = {"P": loss.drive, "Q": loss.decay, "A at rest": loss.holds[0], "A at rest, backwards": loss.holds[1]}
@@ -111,6 +121,26 @@ class _ModelLowering(Lowering):
             "y, and the contact force along x, y and z, given V**2.",
             inside=[(self.place, at(places)), (v2, at(speeds))],
             outputs=(model.y, *model.normal_force_vector_at(v2)),
+        )
+        return (function,)
+
+    def rider_loads(self) -> tuple[FunctionIR, ...]:
+        """What a rider feels on a banked track, and where that is; nothing for a track that is not banked."""
+        felt, model = self.model.rider, self.model
+        if felt is None or model.curve.banking is None:
+            return ()
+        places, speeds, w = self.names("places"), self.names("speeds"), self.names.symbol("w")
+        v, nu = self.names.symbol("v"), self.names.symbol("nu")
+        symbols = {DIRECTION: v, CONTACT_SIGN: nu, W: w}
+        height = model.curve.banking.heartline
+        track = (axis - height * up for axis, up in zip((model.x, model.y, model.z), felt.up, strict=True))
+        rows = (*felt.loads, *felt.onsets, *felt.roll, *track, felt.level)
+        function = self.function(
+            "rider_loads",
+            (places, speeds, v, nu),
+            "What a rider feels, given V**2 and the signs v = sgn(ds/dt) and nu = sgn(N).",
+            inside=[(self.place, at(places)), (w, at(speeds))],
+            outputs=tuple(row.xreplace(symbols) for row in rows),
         )
         return (function,)
 

@@ -42,7 +42,7 @@ _OWN = frozenset(
         *("Motion", "PARAMETERS", "Sweep", "TYPE_CHECKING", "carray", "chart", "chart_of", "compiled"),
         *("compiler", "fabs"),
         *("op", "pass1", "place_from_ends", "range", "self", "solve", "sweep"),
-        *("Pass1", "Pass1InSpace", "path_in_space"),
+        *("Pass1", "Pass1InSpace", "Pass1OfRider", "path_in_space", "rider_loads"),
         *("Equilibrium", "ExactLaw", "SeparatedTerms", "between", "equilibria", "unknown"),
     }
 )
@@ -151,6 +151,7 @@ def _model_fields(module: ModuleIR, names: list[str]) -> dict[str, Any]:
         "pass1": _pass1(module),
         "in_space": module.in_space,
         "signed": module.signed,
+        "banked": module.banked,
         "load_map": "load_map" if "load_map" in names else "",
         "batch": _listed(_batch(module), _WIDTH - 8),
         "chart": module.chart.statement if module.chart else "",
@@ -185,6 +186,8 @@ def _exact_formulas(module: ModuleIR) -> list[str]:
 
 def _pass1(module: ModuleIR) -> str:
     """What a load map is handed over as."""
+    if module.banked:
+        return "Pass1OfRider"
     return "Pass1InSpace" if module.in_space else "Pass1"
 
 

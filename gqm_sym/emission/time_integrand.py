@@ -17,8 +17,8 @@ def axis_orbits_batch(lowering: Lowering) -> tuple[FunctionIR, ...]:
     times = (
         (_agm_arguments(lowering, orbits.agm_arguments),) if orbits.agm_arguments else _time_integrand(lowering, orbits)
     )
-    symmetry = lowering.model.symmetry
-    if orbits.turning_point is None or symmetry is None or not symmetry.monotone:
+    model = lowering.model
+    if orbits.turning_point is None or model.cusp is not None or model.force.radius:
         return times
     return (*times, _turning_point(lowering, orbits.turning_point))
 

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from gqm_sym.optional import require
+from gqm_sym.runtime.launch.rider import LOADS
 from gqm_sym.runtime.motion.motion import horizon
 from gqm_sym.runtime.sweep.result import DESCRIBED, PLACE, Sweep, columns_of
 
@@ -31,6 +32,10 @@ VARIABLES = {
 VARIABLES_IN_SPACE = {
     "y": ("the other horizontal coordinate", "m"),
     **{f"normal_{axis}": (f"contact force along {axis}", "N") for axis in "xyz"},
+    **{f"n_{load}": (f"{load} load on a rider, in units of 9.80665 m/s2", "1") for load in LOADS},
+    **{f"onset_{load}": (f"rate of change of the {load} load, in units of 9.80665 m/s2", "1/s") for load in LOADS},
+    "roll": ("roll angle, positive to the left", "rad"),
+    **{f"track_{axis}": (f"{axis} of the track below the rider's line", "m") for axis in "xyz"},
 }
 
 

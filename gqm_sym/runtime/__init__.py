@@ -11,12 +11,13 @@ from gqm_sym.runtime.compiled.emitted import compiler
 
 if TYPE_CHECKING:
     from gqm_sym.runtime.launch.equilibria import Equilibrium
-    from gqm_sym.runtime.launch.speed import Pass1, Pass1InSpace
+    from gqm_sym.runtime.launch.speed import Pass1, Pass1InSpace, Pass1OfRider
     from gqm_sym.runtime.model import CompiledModel
     from gqm_sym.runtime.motion.events import Event, Leg
     from gqm_sym.runtime.motion.extremes import Extreme
     from gqm_sym.runtime.motion.motion import Motion
-    from gqm_sym.runtime.motion.state import Energy, State, StateInSpace
+    from gqm_sym.runtime.motion.riding.exceedance import Exceedance
+    from gqm_sym.runtime.motion.state import Energy, State, StateInSpace, StateOfRider
     from gqm_sym.runtime.sweep.result import Sweep
 
 __all__ = [
@@ -24,13 +25,16 @@ __all__ = [
     "Energy",
     "Equilibrium",
     "Event",
+    "Exceedance",
     "Extreme",
     "Leg",
     "Motion",
     "Pass1",
     "Pass1InSpace",
+    "Pass1OfRider",
     "State",
     "StateInSpace",
+    "StateOfRider",
     "Sweep",
     "compiler",
 ]
@@ -40,13 +44,16 @@ _HOMES = {
     "Energy": "motion.state",
     "Equilibrium": "launch.equilibria",
     "Event": "motion.events",
+    "Exceedance": "motion.riding.exceedance",
     "Extreme": "motion.extremes",
     "Leg": "motion.events",
     "Motion": "motion.motion",
     "Pass1": "launch.speed",
     "Pass1InSpace": "launch.speed",
+    "Pass1OfRider": "launch.speed",
     "State": "motion.state",
     "StateInSpace": "motion.state",
+    "StateOfRider": "motion.state",
     "Sweep": "sweep.result",
 }
 

@@ -14,6 +14,10 @@ function               arguments                      rows of ``out``
 path_and_contact_force n, lam, v2, p, out             x [m], z [m], ds/dlam [m/[lam]], curvature kappa [1/m], contact
                                                       force N = m*(kappa*v2 + n0) [N]
 path_in_space          n, lam, v2, p, out             y [m], and the contact force along x, y and z [N]
+rider_loads            n, lam, v2, v, nu, p, out      what a rider feels upwards, to the left and ahead, in units of
+                                                      9.80665 m/s2; the rates of these [1/s]; cosine and sine of the
+                                                      roll angle, times a positive number; x, y and z of the track [m];
+                                                      (dx/ds)**2 + (dy/ds)**2 where the roll angle is from the level
 load_map               n, w0, level, lam, p, out      x, z, ds/dlam, kappa, V**2 [m2/s2], N, and the size of the terms
                                                       of U [m2/s2], whose roundings are shares of it
 effective_potential    n, lam, p, out                 U [m2/s2], dU/dlam [m2/s2/[lam]]
@@ -37,6 +41,8 @@ linearisation at the ``v2`` given: ``P - Q*v2`` is the law itself there. The con
 Only modules of space curves have ``path_in_space``. Where such a curve lies in no vertical plane, the contact force has
 a length and no sign: N is that length, kappa the length of the curvature vector, and n0 that of N/m at rest. With
 friction the rows n0 and kappa of ``speed_equation`` are N/m at the ``v2`` given, and 0.
+
+Only modules of tracks with a declared roll have ``rider_loads``.
 
 ``separated_terms`` belongs to charted curves: U and n0 are sums of its parts times factors (`SeparatedTerms`), and it
 reads no other run-time parameters than those that it holds. Compiled when a sweep first asks for it.
@@ -106,13 +112,14 @@ AGM_ARGUMENTS_BATCH = types.void(types.intp, MANY, MANY, MANY)
 TURNING_POINT_BATCH = types.void(types.intp, MANY, MANY, MANY, MANY)
 
 SPEED_EQUATION = types.void(types.intp, MANY, MANY, REAL, REAL, MANY, MANY)
+RIDER_LOADS = SPEED_EQUATION
 STATIC_BALANCE = types.void(types.intp, MANY, MANY, MANY)
 
 FIELD = types.void(types.intp, MANY, MANY, MANY, MANY)
 SEGMENT = types.void(types.intp, MANY, MANY, MANY)
 
-# Rows of path_and_contact_force, of path_in_space and of load_map.
-PATH_ROWS, SPACE_ROWS, LOAD_MAP_ROWS = 5, 4, 7
+# Rows of path_and_contact_force, of path_in_space, of rider_loads and of load_map.
+PATH_ROWS, SPACE_ROWS, RIDER_ROWS, LOAD_MAP_ROWS = 5, 4, 12, 7
 
 
 class Addresses(NamedTuple):

@@ -20,9 +20,11 @@ from gqm_sym.runtime.compiled.uncompiled import begin_launch
 from gqm_sym.runtime.launch.formulas import Formulas, ParameterValues
 from gqm_sym.runtime.launch.problem import bind
 from gqm_sym.runtime.launch.request import Launch, LaunchRequest, read_launch
+from gqm_sym.runtime.launch.rider import rider_loads
 from gqm_sym.runtime.launch.speed import (
     Pass1,
     Pass1InSpace,
+    Pass1OfRider,
     fill_load_map,
     load_map_arrays,
     path_and_force_at,
@@ -91,7 +93,7 @@ class CompiledModel(Formulas):
         lam: Any,
         out: Any = None,
         unknown: Mapping[str, Any] = NOTHING,
-    ) -> Pass1 | Pass1InSpace:
+    ) -> Pass1 | Pass1InSpace | Pass1OfRider:
         """Position, curvature, V**2 and contact force at places of the curve (MATHS, section 2).
 
         Parameters
@@ -129,7 +131,7 @@ class CompiledModel(Formulas):
         else:
             places, low_parts, shape = read_numbers(lam, where=self.parameter, unit=self.units.get(self.parameter))
             low_parts = low_parts if low_parts.any() else NO_LOW_PARTS
-        kind = Pass1 if self.path_in_space is None else Pass1InSpace
+        kind = Pass1 if self.path_in_space is None else Pass1InSpace if self.rider_loads is None else Pass1OfRider
         arrays, beyond = load_map_arrays(kind, shape, places, out), self._beyond_ends(p, places)
         if self.dissipation is not None:
             from gqm_sym.runtime.legs.dissipative import launch_leg
@@ -138,7 +140,7 @@ class CompiledModel(Formulas):
             x, z, ds, kappa, force = path_and_force_at(f.addresses, f.p, places, v2)
             for array, values in zip(arrays, (x, z, ds, kappa, v2, force), strict=False):
                 array[...] = (values if beyond is None else np.where(beyond, nan, values)).reshape(shape)
-            self._fill_in_space(f.p, places, arrays)
+            self._fill_in_space(f.p, launch, places, arrays)
             return arrays
         start = (launch.lam0.value, launch.lam0.low, launch.v0.value**2)
         load_map = 0 if self.load_map is None else self.load_map.address
@@ -153,18 +155,30 @@ class CompiledModel(Formulas):
         if beyond is not None:
             for row in rows:
                 row[beyond] = nan
-        self._fill_in_space(f.p, places, arrays)
+        self._fill_in_space(f.p, launch, places, arrays)
         return arrays
 
-    def _fill_in_space(self, p: Array, places: Array, arrays: Pass1 | Pass1InSpace) -> None:
+    def _fill_in_space(
+        self, p: Array, launch: Launch, places: Array, arrays: Pass1 | Pass1InSpace | Pass1OfRider
+    ) -> None:
         """Fill what only the load map of a space curve has."""
         if self.path_in_space is None:
             return
         address, v2 = self.path_in_space.address, arrays.v2.reshape(-1)
-        rows = [array.reshape(-1) for array in arrays[len(Pass1._fields) :]]
+        rows, force = [array.reshape(-1) for array in arrays[len(Pass1._fields) :]], arrays.normal_force.reshape(-1)
 
         def fill(part: slice) -> None:
-            for row, values in zip(rows, path_in_space_at(address, p, places[part], v2[part]), strict=True):
+            found = path_in_space_at(address, p, places[part], v2[part])
+            if self.rider_loads is not None:
+                # From rest the body goes to either side of the launch.
+                ahead = np.full(found.shape[1], float(launch.direction))
+                if launch.v0.value == 0.0:
+                    ahead = np.where(
+                        places[part] == launch.lam0.value, ahead, np.sign(places[part] - launch.lam0.value)
+                    )
+                loads = rider_loads(self, p, places[part], v2[part], ahead, force[part])
+                found = np.concatenate([found, loads])
+            for row, values in zip(rows, found, strict=True):
                 row[part] = values
 
         run_in_threads(fill, places.size, MIN_PLACES_PER_THREAD)
@@ -235,7 +249,7 @@ class CompiledModel(Formulas):
         Parameters
         ----------
         quantity : str
-            One of `gqm_sym.runtime.sweep.sweep.QUANTITIES`.
+            One of `gqm_sym.runtime.launch.kinds.QUANTITIES`.
         launches : LaunchRequest
             Arrays or numbers, which broadcast against each other and against the parameters.
         parameters : tuple

@@ -41,11 +41,11 @@ _NAMES_BY_HOME = {
         "EFFECTIVE_POTENTIAL ExactFormulas ExactLaw ExactPotential FIELD INTEGRAND_INVARIANTS_BATCH LOAD_MAP "
         "ORBIT_INVARIANTS_BATCH "
         "PATH_AND_CONTACT_FORCE PATH_IN_SPACE POTENTIAL_DIVDIFF1 POTENTIAL_DIVDIFF1_BATCH POTENTIAL_DIVDIFF2 "
-        "POTENTIAL_DIVDIFF2_BATCH SEGMENT SEPARATED_TERMS SPEED_EQUATION STATIC_BALANCE SeparatedTerms "
+        "POTENTIAL_DIVDIFF2_BATCH RIDER_LOADS SEGMENT SEPARATED_TERMS SPEED_EQUATION STATIC_BALANCE SeparatedTerms "
         "TIME_INTEGRAND_BATCH TURNING_POINT_BATCH"
     ),
     "launch.request": "LaunchRequest",
-    "launch.speed": "Pass1 Pass1InSpace",
+    "launch.speed": "Pass1 Pass1InSpace Pass1OfRider",
     "model": "CompiledModel",
     "motion.motion": "Motion",
     "sweep.result": "Sweep",

@@ -80,6 +80,12 @@ class Space(Section):
     parameter: CurveParameter = Field(description="the curve's parameter", examples=["theta"])
     period: Expression | None = _PERIOD
     domain: Ends | None = _DOMAIN
+    roll: Expression | Centre | None = Field(
+        default=ABSENT,
+        description="roll angle, 'coordinated' (no lateral force), or [coordinated, speed]",
+        examples=["coordinated"],
+    )
+    heartline: Expression | None = Field(default=ABSENT, description="height of the riders' line over the track")
 
 
 class Polar(Section):

@@ -108,6 +108,7 @@ TESTED_THROUGH = {
     "launch/functions.py": "runtime/inversion/test_table.py",
     "launch/kinds.py": "runtime/motion/test_aperiodic.py",
     "launch/problem.py": "runtime/launch/test_zeros.py",
+    "launch/rider.py": "claims/test_riders.py",
     "launch/survey.py": "runtime/compiled/test_calls.py",
     "legs/advance.py": "claims/test_dissipative.py",
     "legs/answers.py": "runtime/sweep/test_dissipative_loop.py",
@@ -124,6 +125,8 @@ TESTED_THROUGH = {
     "motion/conditioning.py": "claims/test_degenerate.py",
     "motion/motion.py": "claims/test_reference.py",
     "motion/periodic.py": "claims/test_properties.py",
+    "motion/riding/exceedance.py": "claims/test_riders.py",
+    "motion/riding/loads.py": "claims/test_riders.py",
     "motion/rolling.py": "claims/test_rolling.py",
     "motion/rows.py": "export/test_datasets.py",
     "motion/segment.py": "runtime/motion/test_aperiodic.py",
@@ -161,6 +164,7 @@ ONLY_IN = {
     "jinja2": {"emission"},
     "llvmlite": {"runtime"},
     "matplotlib": {"figures", "report"},
+    "mpl_toolkits": {"figures"},
     "mpmath": {"runtime", "literals", "figures", "design"},
     "numba": {"runtime"},
     "pandas": {"export"},
@@ -188,7 +192,9 @@ ONLY_IN = {
 }
 
 # Imported when exact digits, splines, pictures, datasets or units are asked for, so never by a module as it loads.
-ONLY_INSIDE_FUNCTIONS = {"distributed", "jax", "matplotlib", "mpmath", "pandas", "pint", "scipy", "xarray"}
+ONLY_INSIDE_FUNCTIONS = {
+    *("distributed", "jax", "matplotlib", "mpl_toolkits", "mpmath", "pandas", "pint", "scipy", "xarray"),
+}
 
 
 class Import(NamedTuple):

@@ -269,6 +269,15 @@ def test_transit(famous: FamousMotion, famous_motion: MotionOf) -> None:
     assert error(famous_motion(famous).time_at(famous.launch["to"]), expected) <= TIME * float(expected)
 
 
+@pytest.mark.parametrize("famous", **of_kind("transit"))
+def test_transit_in_a_sweep(famous: FamousMotion, famous_module: ModuleOf) -> None:
+    """A compiled loop answers the same, also for bodies that leave the curve."""
+    swept = famous_module(famous.curve).sweep("time_at", lam=famous.launch["to"], **famous.start)
+    assert swept.route_counts() == {"single": 1}
+    expected = famous.expect["transit_time"]
+    assert error(swept.values.item(), expected) <= TIME * float(expected)
+
+
 @EVERY_MOTION
 def test_speed_field(famous: FamousMotion, famous_module: ModuleOf) -> None:
     """ds, kappa, V**2 and N at the sampled places, of the largest among the samples."""

@@ -57,7 +57,12 @@ def test_from_lip_to_lip(launch: dict[str, Any], build: Build) -> None:
     """A body released at a lip of a half pipe comes to the other lip: two quarter swings and a metre at full speed."""
     motion = build("half_pipe", HALF_PIPE, gqm.Gravity()).solve(**launch)
     assert motion.kind == "libration"
-    assert sorted(motion.turning_points) == pytest.approx([0.0, math.pi + 1.0], abs=1e-15)
+    low, high = sorted(motion.turning_points)
+    assert (low, high) == pytest.approx((0.0, math.pi + 1.0), abs=1e-15)
+    # In extended precision the turn is a rounding beyond the lip (-1.7e-54), where the track has no value.
+    assert 0.0 <= low < high <= motion.problem.high
+    places = motion.lam(np.linspace(0.0, motion.period, 9))
+    assert motion.problem.low <= places.min() < places.max() <= motion.problem.high
     half = 2 * mp.ellipk(mpf(1) / 2) / mp.sqrt(G) + 1 / mp.sqrt(2 * G)
     assert motion.half_period == pytest.approx(float(half), rel=1e-14)
     assert [event.kind for event in motion.events] == ["turn", "turn"]

@@ -19,6 +19,9 @@ import sympy as sp
 from gqm_sym.derivation.algebra.difference import Differences
 from gqm_sym.derivation.wells.symmetry import MAX_OPERATIONS, Symmetry, is_half_turn
 
+# How much of the growth of U2 with a square must be left at the turning point, as a share of the size of its terms.
+MIN_GROWTH = sp.Rational(1, 4)
+
 # A sine or cosine is written by powers of the slowest one if its rate is at most this multiple of that one's.
 MAX_MULTIPLE = 8
 
@@ -56,9 +59,10 @@ class SymmetricOrbits:
         The symbols of the whole orbit, each with its value as a function of HALF.
     turning_point
         As functions of OFFSET and LAUNCH: half the orbit's width; by how much U2 grows with the square in which it is
-        written, that of a sine or of the distance, so that it is positive in a well; and the square of the sine at the
-        turning point, which is above 1 where the body passes over the barrier (0 for other squares). None where U2 has
-        a third or higher power of that square, or is no polynomial.
+        written, that of a sine or of the distance; and the square of the sine at the turning point, which is above 1
+        where the body passes over the barrier (0 for other squares). Where the second is positive, U2 grows all the way
+        from the axis to the turning point. None where U2 has a third or higher power of that square, or is no
+        polynomial.
     agm_arguments
         Squares of two numbers as functions of HALF: the half period is pi over their arithmetic-geometric mean. None
         where it is no complete elliptic integral of the first kind.
@@ -112,7 +116,7 @@ def symmetric_orbits(
         slope = _divided_difference(height, Y, T, T_MINUS_Y)
         if not slope:
             return None
-        square, growth = _turn(height, Y, OFFSET**2)
+        square, growth = _turn(height, Y, OFFSET**2, symmetry.monotone)
         turning_point = square and (sp.sqrt(square), growth, sp.S.Zero)
         return _with_agm(metric / slope, slope, ((T, HALF**2),), turning_point)
     waves = next((waves for waves in (_CIRCULAR, _HYPERBOLIC) if functions <= {waves.sine, waves.cosine}), None)
@@ -139,7 +143,7 @@ def symmetric_orbits(
         (SINE_SQUARED, waves.sine(rate * HALF / 2) ** 2),
         (COSINE_FOURTH, cosine**4),
     )
-    square, growth = _turn(height, _SINE, waves.sine(rate * OFFSET / 2) ** 2)
+    square, growth = _turn(height, _SINE, waves.sine(rate * OFFSET / 2) ** 2, symmetry.monotone)
     if square is None:
         return _with_agm(integrand, divisor, invariants, None)
     turn, share = 2 * sp.asinh(sp.sqrt(square)) / abs(rate), sp.S.Zero
@@ -148,15 +152,25 @@ def symmetric_orbits(
     return _with_agm(integrand, divisor, invariants, (turn, growth, share))
 
 
-def _turn(height: sp.Expr, square: sp.Symbol, start: sp.Expr) -> tuple[sp.Expr | None, sp.Expr]:
-    """The square at the turning point, and by how much U2 grows with it; None where that takes more than a root."""
+def _turn(height: sp.Expr, square: sp.Symbol, start: sp.Expr, monotone: bool) -> tuple[sp.Expr | None, sp.Expr]:
+    """The square at the turning point, and by how much U2 grows with it; None where that takes more than a root.
+
+    Where U2 is not known to be ``monotone``, the growth is the smaller one of those at the axis and at the turning
+    point, less a margin within which the root would lose digits: a linear function has its extremes at the ends.
+    """
     if not 0 < _degree(height, {square}) <= 2:
         return None, sp.S.Zero
-    growth, second = (height.diff(square, k).xreplace({square: sp.S.Zero}) / k for k in (1, 2))
-    if second:
-        growth += 2 * second * start
-        growth = (growth + sp.sqrt(growth**2 + 4 * second * LAUNCH)) / 2
-    return start + LAUNCH / growth, growth
+    first, second = (height.diff(square, k).xreplace({square: sp.S.Zero}) / k for k in (1, 2))
+    if not second:
+        return start + LAUNCH / first, first
+    growth = first + 2 * second * start
+    growth = (growth + sp.sqrt(growth**2 + 4 * second * LAUNCH)) / 2
+    turn = start + LAUNCH / growth
+    if monotone:
+        return turn, growth
+    more = 2 * second * turn
+    at_turn = first + more - MIN_GROWTH * (abs(first) + abs(more))
+    return turn, (first + at_turn - abs(first - at_turn)) / 2
 
 
 def at_place(invariants: Mapping[sp.Symbol, sp.Expr], sine2: sp.Expr, cosine2: sp.Expr) -> dict[sp.Symbol, sp.Expr]:

@@ -49,6 +49,7 @@ def _caller(function: str) -> Any:
 
 call_path_and_contact_force = _caller("path_and_contact_force")
 call_path_in_space = _caller("path_in_space")
+call_rider_loads = _caller("rider_loads")
 call_load_map = _caller("load_map")
 call_effective_potential = _caller("effective_potential")
 call_potential_divdiff1 = _caller("potential_divdiff1")

@@ -366,6 +366,15 @@ def law_program(law: ExactLaw, parameters: int) -> Program:
 
 
 @lru_cache(maxsize=64)
+def force_program(law: ExactLaw, parameters: int) -> Program:
+    """dW/dlam at a place and a V**2, and its derivative by the place; the inputs are those of `law_program`."""
+    op = Recorder(parameters + 2, coordinates=2)
+    lam, w = op.places
+    slope = law.speed_slope(op, lam, w, *op.values[parameters:], op.values[:parameters])
+    return assemble(op, [slope, *gradient(op, slope, [lam])])
+
+
+@lru_cache(maxsize=64)
 def range_program(domain: Callable[..., Any], parameters: int) -> Program:
     """Both ends of the parameter's range and its period, each with its derivatives by the run-time parameters.
 

@@ -1,6 +1,7 @@
 """Gradients of single numbers of a periodic motion: its period, its turning points, its extremes, its action."""
 
 from collections.abc import Iterable
+from math import isfinite
 from typing import Any
 
 import numpy as np
@@ -10,11 +11,10 @@ from gqm_sym.errors import InputError, SolutionError
 from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.gradients.orbit import OrbitDerivatives
 from gqm_sym.runtime.gradients.programs import pairs_of
+from gqm_sym.runtime.launch.kinds import EXTREMES, FINAL_QUANTITIES
 
-# What has a gradient.
-EXTREMES = ("v_max", "v_min", "normal_force_max", "normal_force_min")
+# What has second derivatives.
 PERIODS = ("half_period", "period")
-QUANTITIES = (*PERIODS, "turning_points", *EXTREMES, "action")
 
 # An extreme this near to a turning point is there, as a share of the width of the orbit. The place of another one is
 # improved by Newton's method, whose steps may be this share of the width.
@@ -47,18 +47,21 @@ def gradient(derivatives: OrbitDerivatives, motion: Any, quantity: str, wrt: Any
     motion : motion.periodic.PeriodicMotion
         The motion.
     quantity : str
-        One of `QUANTITIES`.
+        One of `launch.kinds.QUANTITIES`.
     wrt : name, sequence of names, or None
         What they are by.
     """
     rows = selected(motion.problem.formulas.parameters, wrt)
-    one_of(quantity, QUANTITIES, where="gradient: quantity")
     if quantity in ("half_period", "turning_points") and motion.kind != "libration":
         raise SolutionError(f"gradient: only a libration has {quantity}; this motion is of kind {motion.kind!r}")
     if quantity == "turning_points":
         low, high = derivatives.ends.T
         in_order = (low, high) if motion.turning_points[0] < motion.turning_points[1] else (high, low)
         return {name: tuple(float(end[row]) for end in in_order) for name, row in rows.items()}
+    if quantity == "t_end" and isfinite(motion.t_end):
+        return dict.fromkeys(rows, 0.0)
+    if quantity in FINAL_QUANTITIES:
+        raise SolutionError(f"gradient: this motion goes on for ever and has no {quantity}")
     if quantity in EXTREMES:
         found = extreme_gradient(derivatives, motion, quantity)
     elif quantity == "action":

@@ -145,6 +145,8 @@ class Formulas:
         Of a space curve: what fills its third coordinate and the contact force as a vector.
     signed : bool
         Whether the contact force has a sign: it has none on a space curve that lies in no vertical plane.
+    rider_loads : Emitted or None
+        Of a track with a declared roll: what fills the loads on a rider.
     """
 
     name: str
@@ -171,6 +173,7 @@ class Formulas:
     separated: SeparatedTerms | None = None
     path_in_space: Emitted | None = None
     signed: bool = True
+    rider_loads: Emitted | None = None
     units: Mapping[str, str] = field(default_factory=dict)
     text: str = field(init=False, repr=False, compare=False)
     _read: Callable[..., "ParameterValues"] = field(init=False, repr=False, compare=False)

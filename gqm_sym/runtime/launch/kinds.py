@@ -1,4 +1,4 @@
-"""The words for kinds of motion, for what ends a motion or a leg of it, and for events.
+"""The words for kinds of motion, for what ends a motion or a leg of it, for events, and for what a motion is asked.
 
 =================== ====================================================================================
 word                what it means as the end of a leg or the kind of an event
@@ -32,3 +32,10 @@ LEG_ENDS = (
     *("asymptote", "horizon"),
 )
 EVENT_KINDS = (*LEG_ENDS, "slip")
+
+# The quantities of a motion: its attributes and methods, what gradients and uncertainties are of, and what sweeps, fits
+# and designs ask for.
+PERIODIC_QUANTITIES = ("half_period", "period", "action")
+FINAL_QUANTITIES = ("t_end", "rest_position")
+EXTREMES = ("v_min", "v_max", "normal_force_min", "normal_force_max")
+QUANTITIES = (*PERIODIC_QUANTITIES, "turning_points", *EXTREMES, "time_at", *FINAL_QUANTITIES)

@@ -92,6 +92,45 @@ class Pass1InSpace(NamedTuple):
     normal_z: Array
 
 
+class Pass1OfRider(NamedTuple):
+    """What pass 1 finds at places of a banked track: what `Pass1InSpace` has, and what a rider feels there.
+
+    Attributes
+    ----------
+    x, z, ds, kappa, v2, normal_force, y, normal_x, normal_y, normal_z : array
+        As of `Pass1InSpace`.
+    n_vertical, n_lateral, n_longitudinal : array
+        Loads on the rider upwards, to the left and ahead, in units of 9.80665 m/s**2.
+    onset_vertical, onset_lateral, onset_longitudinal : array
+        Their rates of change, in the same unit per second.
+    roll : array
+        The roll angle in radians, between -pi and pi, positive to the left.
+    track_x, track_y, track_z : array
+        Coordinates in m of the track, below the line that the rider follows.
+    """
+
+    x: Array
+    z: Array
+    ds: Array
+    kappa: Array
+    v2: Array
+    normal_force: Array
+    y: Array
+    normal_x: Array
+    normal_y: Array
+    normal_z: Array
+    n_vertical: Array
+    n_lateral: Array
+    n_longitudinal: Array
+    onset_vertical: Array
+    onset_lateral: Array
+    onset_longitudinal: Array
+    roll: Array
+    track_x: Array
+    track_y: Array
+    track_z: Array
+
+
 class LaunchNumbers(NamedTuple):
     """A launch in doubles, and what a load map keeps of it.
 
@@ -112,8 +151,8 @@ class LaunchNumbers(NamedTuple):
 
 
 def load_map_arrays(
-    kind: type[Pass1] | type[Pass1InSpace], shape: tuple[int, ...], lam: Array, out: Any
-) -> Pass1 | Pass1InSpace:
+    kind: type[Pass1] | type[Pass1InSpace] | type[Pass1OfRider], shape: tuple[int, ...], lam: Array, out: Any
+) -> Pass1 | Pass1InSpace | Pass1OfRider:
     """The arrays of a load map: those of ``out``, or new ones if it is None.
 
     Parameters

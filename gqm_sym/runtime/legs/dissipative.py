@@ -48,7 +48,7 @@ from gqm_sym.runtime.legs.body import (
 )
 from gqm_sym.runtime.legs.frames.local_frame import PLACE as PLACE_IN_FRAME
 from gqm_sym.runtime.legs.frames.local_frame import SMALL_SHARE, Frame, frame_near, may_be_small, refined
-from gqm_sym.runtime.legs.leg_errors import Errors, carry
+from gqm_sym.runtime.legs.leg_errors import Errors, carry, rounding_share
 from gqm_sym.runtime.legs.leg_reading import place_at
 from gqm_sym.runtime.legs.leg_record import (
     BEGIN,
@@ -69,6 +69,7 @@ from gqm_sym.runtime.legs.leg_run import ASYMPTOTE, FULL, LIFTOFF, LIMIT, NARROW
 from gqm_sym.runtime.legs.leg_segments import Run, TabulatedPiece, along_field, along_panels, leg_record, tabulated
 from gqm_sym.runtime.legs.variations.answers import Switch, gradient, nearest_switch, places_at, states_at
 from gqm_sym.runtime.legs.variations.changes import Changes
+from gqm_sym.runtime.legs.variations.equation import Law
 from gqm_sym.runtime.motion.aperiodic import MotionAtRest
 from gqm_sym.runtime.motion.events import Leg, passages
 from gqm_sym.runtime.motion.locking import locked
@@ -147,6 +148,11 @@ def _plain_times(t: Any) -> tuple[Array, float, float] | None:
     return times if times is not None and 0.0 <= times[1] <= times[2] < inf else None
 
 
+def _known(errors: tuple[float, float, float]) -> Errors:
+    """Bounds of errors, which are infinite where they come out as no numbers."""
+    return Errors(*(inf if isnan(error) else error for error in errors))
+
+
 def _loss(problem: Problem) -> Dissipation:
     """The dissipation of the model."""
     loss = problem.formulas.dissipation
@@ -193,6 +199,8 @@ class DissipativeMotion(Motion):
         self._runs: list[Run] = []
         self._segments: list[TimedSegment] = []
         self._laid: list[Run] = []
+        # For each panel of runs how large the terms of the force are that may cancel.
+        self._terms: list[Array] = []
         self._tabulated: list[TabulatedPiece] = []
         launch, domain = problem.launch, problem.domain
         super().__init__(problem, "dissipative", launch.direction)
@@ -204,8 +212,7 @@ class DissipativeMotion(Motion):
         )
         self._at = self._body[0].tolist()
         self._frame: Frame | None = None
-        if may_be_small(_loss(problem), problem.functions.p, launch.lam0.value, problem.w0):
-            self._enter_frame(launch.lam0.value, launch.lam0.low, problem.w0, launch.lam0)
+        self._enter_frame(launch.lam0.value, launch.lam0.low, problem.w0, launch.lam0)
         v0 = launch.v0
         # The errors with which the legs begin.
         of_place = abs(launch.lam0.low) if self._frame is None else ULP * abs(self._body[0, PLACE])
@@ -488,15 +495,32 @@ class DissipativeMotion(Motion):
         """The errors at the end of a leg, given those with which it begins; in a frame, errors of distances."""
         run, before = self._laid[leg], self._errors[leg]
         frame, turns = run.frame, run.what in (TURN, RESTS)
+        share, terms = rounding_share(_loss(self.problem).linear), self._terms_of(leg)
         if frame is None:
-            return Errors(*carry(_loss(self.problem), self.problem.functions.p, turns, before, run.record))
+            loss, p = _loss(self.problem), self.problem.functions.p
+            return _known(carry(loss, p, turns, before, share, terms, run.record))
         if leg == 0 or self._laid[leg - 1].frame is None:
             before = before._replace(place=before.place + frame.error)
         frame.move(run.record, -1)
-        after = Errors(*carry(frame.dissipation, frame.p, turns, before, run.record))
+        share += 0.0 if frame.is_stable else self._force_error
+        after = _known(carry(frame.dissipation, frame.p, turns, before, share, terms, run.record))
         after = after._replace(time=after.time + self._time_error_of_force(run))
         frame.move(run.record, 1)
         return after._replace(place=after.place + frame.error) if run.what == LIMIT else after
+
+    def _terms_of(self, leg: int) -> Array:
+        """For each panel of a leg how large the terms of the force are that may cancel; 0 where that is not known."""
+        missing, exact = self._laid[len(self._terms) :], self.problem.formulas.exact
+        if missing:
+            terms = [np.zeros(run.ahead + run.back) for run in missing]
+            by_place = [k for k, run in enumerate(missing) if run.frame is None]
+            if by_place and isinstance(exact, ExactLaw):
+                with suppress(SolutionError):  # formulas may be too long
+                    errors = Law(self.problem).force_errors_along([missing[k] for k in by_place])
+                    for k, of_panels in zip(by_place, errors, strict=True):
+                        terms[k] = of_panels / rounding_share(_loss(self.problem).linear)
+            self._terms += terms
+        return self._terms[leg]
 
     def _end_text(self) -> str:
         if not self._ending or self._elapsed > self._horizon:
@@ -619,7 +643,9 @@ class DissipativeMotion(Motion):
         """Whether the body is, or swings, so closely about an equilibrium that its place shows no more of it."""
         frame = self._frame
         swing = max(abs(start), abs(end)) if frame is None else abs(self._body[0, PLACE])
-        if swing >= (LEAST_SWING if frame is None else max(LAST_DIGIT * abs(end), LEAST_SWING)):
+        # From an unstable equilibrium the body departs, however near it turns.
+        shown = LAST_DIGIT * abs(end) if frame is not None and frame.is_stable else 0.0
+        if swing >= max(shown, LEAST_SWING):
             return False
         self._last_swing = swing
         return True
@@ -630,10 +656,10 @@ class DissipativeMotion(Motion):
         About an unstable equilibrium it does not stay, so that only its launch, ``lam0``, is worth that.
         """
         problem, line, loss = self.problem, self._body[0], _loss(self.problem)
-        if loss.friction or loss.kinked:
+        ends = np.abs(np.append(problem.functions.breaks, (problem.low, problem.high)) - place)
+        reach = min(starting_step(problem), float(ends.min()))
+        if not may_be_small(loss, problem.functions.p, place, v2, reach):
             return
-        ends = [abs(end - place) for end in (problem.low, problem.high, *problem.functions.breaks) if isfinite(end)]
-        reach = min([starting_step(problem), *ends])
         frame = frame_near(loss, problem.functions.p, (place, low, v2), reach)
         if frame is None or not (frame.is_stable or lam0):
             return

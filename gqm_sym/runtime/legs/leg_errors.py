@@ -6,7 +6,8 @@ Let the body start at a, at rest, and turn at b. With q the integral of Q from a
 run. From b to the middle it is the same with the direction reversed. What rounding makes of V**2 is a few units in the
 last place of all that its terms gained and lost, less what resistance has taken of that; this also changes the time.
 What drives the body and what resists it may all but cancel: the sum of their sizes is the larger one of the forces on
-bodies that move in either direction.
+bodies that move in either direction. Terms of the force on a body at rest may cancel too: how large they are follows
+from a running bound on the roundings of the module's formulas (`variations.equation.Law.force_errors`).
 """
 
 from math import fabs, inf
@@ -134,19 +135,20 @@ class Half(NamedTuple):
 
 
 @Inner
-def size_of_terms(forces, panel, work):  # type: ignore[no-untyped-def]
-    """The size of the terms of FORCE on a panel that was just solved (`solve_panel`)."""
+def size_of_terms(forces, panel, least, work):  # type: ignore[no-untyped-def]
+    """The size of the terms of FORCE on a panel that was just solved (`solve_panel`), which is at least ``least``."""
     rows, v, nu, size = other_way_buffer(), -float(forces.direction), float(panel.contact_sign), 0.0
     for j in range(WIDE):
         rows[j], rows[WIDE + j] = work[ARC_RATE + j], max(work[W + j], LEAST_V2)
     call_speed_equation(forces.speed_equation, WIDE, rows, (0, WIDE, 2 * WIDE), v, nu, forces.params)
     for j in range(COUNT):
-        size = max(size, max(fabs(work[P + j]), fabs(rows[3 * WIDE + j])) * (1.0 + work[EXPM1_Q + j]))
+        terms = max(least, max(fabs(work[P + j]), fabs(rows[3 * WIDE + j])))
+        size = max(size, terms * (1.0 + work[EXPM1_Q + j]))
     return size
 
 
 @Inner
-def half_of_leg(forces, march, panels, v2, errors, record):  # type: ignore[no-untyped-def]
+def half_of_leg(forces, march, panels, v2, errors, terms, record):  # type: ignore[no-untyped-def]
     """Solve the panels of a half of the leg once more, and sum up how errors grow on them.
 
     Parameters
@@ -159,6 +161,8 @@ def half_of_leg(forces, march, panels, v2, errors, record):  # type: ignore[no-u
         Errors of the place where they begin, of V**2 there, and relative ones of gains and losses. INHERITED of each
         panel becomes the largest error that these make in the times to places of the panel that are given by their
         distance from there.
+    terms : array
+        As of `carry`.
     """
     work = panel_buffer()
     set_nodes(work)
@@ -172,7 +176,7 @@ def half_of_leg(forces, march, panels, v2, errors, record):  # type: ignore[no-u
         begin_panel(forces, march, panel, right - left, work)
         if not solve_panel(forces, march, panel, work) < inf:
             return Half(inf, inf, 1.0, inf, inf, slope, rate)
-        size = size_of_terms(forces, panel, work)
+        size = size_of_terms(forces, panel, terms[(at - HEAD) // COLUMNS], work)
         fill_rates(march, panel, work)
         if k == 0:
             slope = u * (work[P] - work[Q] * work[W])
@@ -204,6 +208,11 @@ def half_of_leg(forces, march, panels, v2, errors, record):  # type: ignore[no-u
     return Half(by_place, by_v2, damping, gained, rounded, slope, rate)
 
 
+def rounding_share(linear: bool) -> float:
+    """The relative error that rounding makes in what V**2 gains and loses by each of its terms."""
+    return (V2_ROUNDINGS if linear else NONLINEAR_V2_ROUNDINGS) * ULP
+
+
 @Inner
 def own_time_error(record, begin, count):  # type: ignore[no-untyped-def]
     """The sum of what the times of panels may be wrong by, as their last coefficients show."""
@@ -213,8 +222,12 @@ def own_time_error(record, begin, count):  # type: ignore[no-untyped-def]
     return error
 
 
-@entry(types.UniTuple(REAL, 3)(DISSIPATION, VECTOR, types.boolean, types.NamedUniTuple(REAL, 3, Errors), VECTOR))
-def carry(dissipation, p, turns, before, record):  # type: ignore[no-untyped-def]
+@entry(
+    types.UniTuple(REAL, 3)(
+        DISSIPATION, VECTOR, types.boolean, types.NamedUniTuple(REAL, 3, Errors), REAL, VECTOR, VECTOR
+    )
+)
+def carry(dissipation, p, turns, before, share, terms, record):  # type: ignore[no-untyped-def]
     """The errors at the end of a leg, which are those with which the next one begins.
 
     Parameters
@@ -226,6 +239,10 @@ def carry(dissipation, p, turns, before, record):  # type: ignore[no-untyped-def
     turns : bool
         Whether V**2 vanishes where the leg ends, and times are counted back from there.
     before : Errors
+    share : float
+        The relative error of what V**2 gains and loses by each of its terms (`rounding_share`).
+    terms : array
+        For each panel of the record the size of terms of the force that may cancel, 0 where that is not known.
     record : array
         The record of the leg (`leg_record`). INHERITED is filled in: for panels from the end it is that of an error of
         1 of the place of the end.
@@ -238,8 +255,8 @@ def carry(dissipation, p, turns, before, record):  # type: ignore[no-untyped-def
     p, record, forward = uncounted(p), uncounted(record), march_of(record)
     ahead, back, v = int(record[AHEAD]), int(record[BACK]), forward.direction
     forces = Forces(dissipation.speed_equation, p, dissipation.friction, dissipation.kinked, dissipation.linear, v)
-    share = (V2_ROUNDINGS if dissipation.linear else NONLINEAR_V2_ROUNDINGS) * ULP
-    first = half_of_leg(forces, forward, (HEAD, ahead), record[START_V2], (before.place, before.v2, share), record)
+    errors = (before.place, before.v2, share)
+    first = half_of_leg(forces, forward, (HEAD, ahead), record[START_V2], errors, terms, record)
     rounding = PLACE_ROUNDINGS * ULP * max(fabs(record[START]), fabs(record[END]))
     own = own_time_error(record, HEAD, ahead) + TIME_ROUNDINGS * ULP * record[TIME_FROM_START] + share * first.rounded
     if not turns or back == 0:
@@ -247,7 +264,7 @@ def carry(dissipation, p, turns, before, record):  # type: ignore[no-untyped-def
         of_v2 = first.damping * (before.v2 + fabs(first.slope) * before.place)
         return rounding, of_v2 + share * first.gained, before.time + moved + own
     backward = March((record[END], record[END_LOW]), -v, 1.0, 0.0)
-    second = half_of_leg(forces, backward, (HEAD + ahead * COLUMNS, back), 0.0, (1.0, 0.0, 0.0), record)
+    second = half_of_leg(forces, backward, (HEAD + ahead * COLUMNS, back), 0.0, (1.0, 0.0, 0.0), terms, record)
     damping = first.damping / second.damping
     gained = (first.gained + second.gained) / second.damping
     start_slope, rate = first.slope, first.rate

@@ -456,7 +456,7 @@ def limited(forces, march, panel, ahead, change, run_length, point):  # type: ig
 
 
 @Inner
-def end_where_narrowed(forces, march, panel, run_length, point):  # type: ignore[no-untyped-def]
+def end_at_once(forces, march, panel, run_length, point):  # type: ignore[no-untyped-def]
     """What ends a run where no panel can be laid, at what distance and with what V**2: a turn, if one is near.
 
     Where a body at rest would go on, it is no turn but an equilibrium, V**2 grows with the square of the distance from
@@ -470,6 +470,16 @@ def end_where_narrowed(forces, march, panel, run_length, point):  # type: ignore
         if slope < 0.0 and panel.v2 <= -slope * NEAR_TURN * max(fabs(here), run_length):
             return (ASYMPTOTE, run_length, panel.v2) if goes_on else (TURN, run_length - panel.v2 / slope, 0.0)
     return NARROWED, run_length, panel.v2
+
+
+@Inner
+def turn_below_noise(forces, march, panel, change, run_length, point):  # type: ignore[no-untyped-def]
+    """`end_at_once` where V**2 is below its noise because the panel begins next to a turn; GOES_ON elsewhere."""
+    if change.first == change.touch and not forces.linear:
+        what, turn, v2 = end_at_once(forces, march, panel, run_length, point)
+        if what == TURN:
+            return what, turn, v2
+    return GOES_ON, run_length, panel.v2
 
 
 @Inner
@@ -711,10 +721,11 @@ def run(forces, start, route, off, record):  # type: ignore[no-untyped-def]
             break
         panel, max_width = Panel(left, v2, nu, ahead.span), marched(stop, march) - left
         timing = ALWAYS if run_length < start.no_turn_until else (NEVER if searching or late else MAYBE)
-        request = PanelRequest(min(max_width, ahead.widest), step, largest_v2, timing, True)
-        width, step, is_timed = next_panel(forces, march, panel, request, work)
+        width, step, is_timed = next_panel(
+            forces, march, panel, PanelRequest(min(max_width, ahead.widest), step, largest_v2, timing, True), work
+        )
         if width == 0.0:
-            what, run_length, v2 = end_where_narrowed(forces, march, panel, run_length, point)
+            what, run_length, v2 = end_at_once(forces, march, panel, run_length, point)
             break
         load_change, sign, _ = first_change_of(work, LOAD, nu, ZERO_TOLERANCE * work[size_at(LOAD)])
         if nu == 0 and sign != 0:
@@ -722,14 +733,17 @@ def run(forces, start, route, off, record):  # type: ignore[no-untyped-def]
             if forces.friction or nu == -route.only_sign:
                 continue  # with forces of this sign
         change = first_changes(march, panel, largest_v2, load_change, work)
+        what, run_length, v2 = turn_below_noise(forces, march, panel, change, run_length, point)
+        if what == TURN:
+            break
         ahead = limited(forces, march, panel, ahead, change, run_length, point)
         if ahead.widest < width:
             continue
         if changes_at_once(march, panel, width, change, run_length):
-            change_count = (
-                enter_change(record, change_count, start.place + v * run_length) if left > 0.0 else change_count
+            change_count, nu = (
+                enter_change(record, change_count, start.place + v * run_length) if left > 0.0 else change_count,
+                -nu,
             )
-            nu = -nu
             continue
         if not searching and timing != ALWAYS and (late or not is_timed):
             searching, timed = True, Timed(run_length, v2, nu, change_count)
@@ -740,8 +754,10 @@ def run(forces, start, route, off, record):  # type: ignore[no-untyped-def]
         at_stop, panel_count = not ends_here and width == max_width, panel_count + 1
         largest_v2 = largest_after(largest_v2, v2, ends_here, work)
         v2, left, run_length = max(work[W + COUNT], 0.0), right, stop if at_stop else distance(right, march)
-        ahead = Ahead(ahead.upcoming, ahead.span, inf, True)
-        timed = timed if searching else Timed(run_length, v2, nu, change_count)
+        ahead, timed = (
+            Ahead(ahead.upcoming, ahead.span, inf, True),
+            timed if searching else Timed(run_length, v2, nu, change_count),
+        )
         pauses = may_pause(forces, march, route, run_length, (v2, largest_v2), (left, step))
         what = what_after(change, at_stop and at_end, pauses or panel_count >= PANELS_PER_RUN)
         if what != GOES_ON:

@@ -11,7 +11,7 @@ from gqm_sym.errors import SolutionError
 from gqm_sym.runtime.arithmetic.doubledouble import ULP, minus, plus
 from gqm_sym.runtime.charts.chart import CORNER_ROUNDINGS
 from gqm_sym.runtime.compiled.types import Array
-from gqm_sym.runtime.motion.segment import Segment
+from gqm_sym.runtime.motion.events import contact_force
 from gqm_sym.runtime.motion.trajectory import TimedSegment, Trajectory
 
 # Points of each of the finer grids, and how many of them follow each other: each is 64 times as fine as the one before.
@@ -94,12 +94,27 @@ class Extreme(NamedTuple):
     lam: float
 
 
-def speeds(segment: Segment, phi: Array) -> Array:
-    """|ds/dt| in m/s at phase angles of a segment."""
-    return segment.speeds(phi)
+class Quantity(NamedTuple):
+    """What is the largest or the least somewhere along a motion.
+
+    Attributes
+    ----------
+    at : callable
+        ``at(timed, phi)`` gives the values at phase angles of a timed segment.
+    of_state : callable
+        Its value in a state.
+    """
+
+    at: Callable[[TimedSegment, Array], Array]
+    of_state: Callable[[Any], float]
 
 
-def extreme(motion: Any, quantity: Callable[[Segment, Array], Array], sign: int) -> Extreme:
+# |ds/dt| in m/s, and the contact force in N.
+SPEED = Quantity(lambda timed, phi: timed.segment.speeds(phi), lambda state: abs(state.v))
+CONTACT_FORCE = Quantity(lambda timed, phi: contact_force(timed.segment, phi), lambda state: float(state.normal_force))
+
+
+def extreme(motion: Any, quantity: Quantity, sign: int) -> Extreme:
     """The largest (sign 1) or least (-1) value over one period, or from launch to the end.
 
     It is looked for in phase angles, in which panels resolve the motion also where it is slow or short.
@@ -108,8 +123,8 @@ def extreme(motion: Any, quantity: Callable[[Segment, Array], Array], sign: int)
     ----------
     motion : motion.Motion
         The motion.
-    quantity : callable
-        Gives the values at phase angles of a segment.
+    quantity : Quantity
+        What is looked for.
     sign : int
         1 for the largest value, -1 for the least.
 
@@ -120,14 +135,8 @@ def extreme(motion: Any, quantity: Callable[[Segment, Array], Array], sign: int)
     """
     if motion.kind == "rest" or motion.t_end == 0.0:  # it stays, or lifts off at once
         state = motion.state(0.0)
-        return Extreme(abs(state.v) if quantity is speeds else state.normal_force, 0.0, state.lam)
-    if motion.kind not in ("libration", "circulation") and not isfinite(motion.t_end):
-        raise SolutionError(
-            "this motion goes on for ever and does not repeat; launch it with a horizon, t_max, for its extremes"
-        )
-    repeats = motion.kind in ("libration", "circulation")
-    end = min(motion.t_end, motion.period) if repeats else motion.t_end
-    trajectory = motion._trajectory(0.0 if repeats else end)
+        return Extreme(quantity.of_state(state), 0.0, state.lam)
+    trajectory, end = course(motion)
     best: Extreme | None = None
     for timed in trajectory.segments:
         if timed.t_start[0] >= end and best is not None:
@@ -139,19 +148,34 @@ def extreme(motion: Any, quantity: Callable[[Segment, Array], Array], sign: int)
     assert best is not None
     if best.t == 0.0:  # as it was given, without rounding
         launch = motion.problem.launch
-        return Extreme(launch.v0.value if quantity is speeds else best.value, 0.0, launch.lam0.value)
+        return Extreme(launch.v0.value if quantity is SPEED else best.value, 0.0, launch.lam0.value)
     return best
 
 
+def course(motion: Any) -> tuple[Trajectory, float]:
+    """The trajectory of one period, or from launch to the end, and the time in s at which that is over.
+
+    Raises
+    ------
+    SolutionError
+        If the motion goes on for ever without repeating.
+    """
+    repeats = motion.kind in ("libration", "circulation")
+    if not repeats and not isfinite(motion.t_end):
+        raise SolutionError(
+            "this motion goes on for ever and does not repeat; launch it with a horizon, t_max, for its extremes"
+        )
+    end = min(motion.t_end, motion.period) if repeats else motion.t_end
+    return motion._trajectory(0.0 if repeats else end), end
+
+
 def _on_segment(
-    timed: TimedSegment, trajectory: Trajectory, quantity: Callable[[Segment, Array], Array], sign: int, end: float
+    timed: TimedSegment, trajectory: Trajectory, quantity: Quantity, sign: int, end: float
 ) -> tuple[float, list[Extreme]]:
     """The size of a quantity on a timed segment up to the time ``end``, and its peaks in the order of time."""
     segment = timed.segment
-    start, stop = timed.phi_start, timed.phi_stop
-    if timed.t_stop[0] > end:
-        stop = float(trajectory.phase_angles(timed, np.array([end]), np.zeros(1))[0])
-    if timed.end == "liftoff" and quantity is not speeds and _ends_at_corner(timed):
+    start, stop = phases(timed, trajectory, end)
+    if timed.end == "liftoff" and quantity is not SPEED and _ends_at_corner(timed):
         stop -= BEFORE_CORNER * (stop - start)  # the body has left before the load on the next plane
     low, high = min(start, stop), max(start, stop)
     edges = segment.edges
@@ -160,7 +184,7 @@ def _on_segment(
     phi = np.unique([low, *inside[(inside > low) & (inside < high)], high])
 
     def signed(angles: Array) -> Array:
-        values = sign * quantity(segment, angles)
+        values = sign * quantity.at(timed, angles)
         return np.where(np.isnan(values), -np.inf, values)
 
     values = signed(phi)
@@ -173,10 +197,17 @@ def _on_segment(
         near = min((start, stop), key=lambda end: abs(end - angle))
         if abs(near - angle) < END_SHARE * (high - low):
             angle = near
-        at_turn = quantity is speeds and timed.end == "turn" and angle == timed.phi_stop
+        at_turn = quantity is SPEED and timed.end == "turn" and angle == timed.phi_stop
         value = 0.0 if at_turn else sign * float(signed(np.array([angle]))[0])
         found.append(_extreme_at(timed, trajectory, angle, value))
     return _size(values), sorted(found, key=lambda peak: peak.t)
+
+
+def phases(timed: TimedSegment, trajectory: Trajectory, end: float) -> tuple[float, float]:
+    """The phase angles at which a timed segment begins, and at which it or the time ``end`` stops."""
+    if timed.t_stop[0] <= end:
+        return timed.phi_start, timed.phi_stop
+    return timed.phi_start, float(trajectory.phase_angles(timed, np.array([end]), np.zeros(1))[0])
 
 
 def _ends_at_corner(timed: TimedSegment) -> bool:
@@ -220,13 +251,16 @@ def _size(values: Array) -> float:
 
 def _extreme_at(timed: TimedSegment, trajectory: Trajectory, phi: float, value: float) -> Extreme:
     """An extreme with the time and the place of a phase angle."""
-    if phi == timed.phi_start:
-        when = timed.t_start
-    elif phi == timed.phi_stop:
-        when = timed.t_stop
-    else:
-        r = float(timed.segment.times(np.array([phi]))[0])
-        spent = minus((r, -r * trajectory.time_scale_error), timed.r_start)
-        when = plus(timed.t_start, (timed.sense * spent[0], timed.sense * spent[1]))
     lam = float(timed.segment.places(np.array([phi]))[0]) + timed.laps * trajectory.lap
-    return Extreme(value, when[0], lam)
+    return Extreme(value, time_of(timed, trajectory, phi), lam)
+
+
+def time_of(timed: TimedSegment, trajectory: Trajectory, phi: float) -> float:
+    """The time in s from launch of a phase angle of a timed segment."""
+    if phi == timed.phi_start:
+        return timed.t_start[0]
+    if phi == timed.phi_stop:
+        return timed.t_stop[0]
+    r = float(timed.segment.times(np.array([phi]))[0])
+    spent = minus((r, -r * trajectory.time_scale_error), timed.r_start)
+    return plus(timed.t_start, (timed.sense * spent[0], timed.sense * spent[1]))[0]

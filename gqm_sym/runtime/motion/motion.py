@@ -8,8 +8,9 @@ from math import inf, isfinite
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from gqm_sym.arguments import short
+from gqm_sym.arguments import one_of, short
 from gqm_sym.errors import InputError, SolutionError, renamed
 from gqm_sym.export.html import page, summary
 from gqm_sym.literals.namespaces import FLOATS
@@ -20,7 +21,7 @@ from gqm_sym.runtime.gradients.orbit import check_signed
 from gqm_sym.runtime.gradients.sensitivity import Sensitivity
 from gqm_sym.runtime.gradients.spectrum import Fourier
 from gqm_sym.runtime.launch.equilibria import Potential
-from gqm_sym.runtime.launch.kinds import MotionKind
+from gqm_sym.runtime.launch.kinds import QUANTITIES, MotionKind
 from gqm_sym.runtime.launch.problem import Problem
 from gqm_sym.runtime.launch.request import Launch, LaunchRequest
 from gqm_sym.runtime.launch.speed import path_and_force_at, path_in_space_at
@@ -28,16 +29,17 @@ from gqm_sym.runtime.motion.events import (
     Event,
     Leg,
     contact_changes,
-    contact_force,
     corner_crossings,
     crossings,
     passages,
 )
-from gqm_sym.runtime.motion.extremes import Extreme, extreme, speeds
+from gqm_sym.runtime.motion.extremes import CONTACT_FORCE, SPEED, Extreme, extreme
 from gqm_sym.runtime.motion.locking import Lock, locked
+from gqm_sym.runtime.motion.riding.exceedance import Exceedance, exceedance
+from gqm_sym.runtime.motion.riding.loads import felt, load_extreme
 from gqm_sym.runtime.motion.rolling import slip_times
 from gqm_sym.runtime.motion.rows import Rows
-from gqm_sym.runtime.motion.state import Energy, State, StateInSpace
+from gqm_sym.runtime.motion.state import Energy, State, StateInSpace, StateOfRider
 from gqm_sym.runtime.motion.trajectory import PhasePoints, TimedSegment, Trajectory, locate
 
 
@@ -101,6 +103,24 @@ class Motion(ABC):
         """The time in s at which the motion ends, or the horizon ``t_max``; infinite if there is neither."""
         return self._known_end()
 
+    @property
+    def rest_position(self) -> float:
+        """Where the body rests in the end, as a value of the curve parameter.
+
+        Raises
+        ------
+        SolutionError
+            If the motion does not come to rest, or not before ``t_max``.
+        """
+        if self.kind == "rest":
+            return self.problem.lam0
+        if not self.t_end < inf:
+            raise SolutionError("rest_position: this motion goes on for ever and does not come to rest")
+        last = self.legs[-1]
+        if last.end != "rest":
+            raise SolutionError(f"rest_position: this motion does not come to rest; it ends with {last.end!r}")
+        return last.lam_end
+
     # -- periods ------------------------------------------------------------------------------
 
     @property
@@ -155,8 +175,8 @@ class Motion(ABC):
         Parameters
         ----------
         quantity : str
-            "turning_points", "v_max", "v_min", "normal_force_max", "normal_force_min" or "time_at"; of a periodic
-            motion also "half_period", "period" or "action", and of one with losses "t_end" or "rest_position".
+            "turning_points", "v_max", "v_min", "normal_force_max", "normal_force_min", "time_at" or "t_end"; of a
+            periodic motion also "half_period", "period" or "action", and of one with losses "rest_position".
         wrt : str or sequence of str, optional
             What the derivatives are by: run-time parameters, "lam0" and "v0"; all of them if not given.
         lam : number, optional
@@ -184,6 +204,7 @@ class Motion(ABC):
             raise InputError(f"gradient: order must be 1 or 2, got {short(order)}")
         if order == 2:
             return self._second_gradient(quantity, wrt)
+        one_of(quantity, QUANTITIES, where="gradient: quantity")
         check_signed(self.problem.formulas, quantity)
         return self._gradient(quantity, wrt) if lam is None else self._arrival_gradient(lam, wrt)
 
@@ -382,16 +403,32 @@ class Motion(ABC):
         lam = reduced + points.laps * trajectory.lap
         s = (s + points.laps * trajectory.lap_length) + self.problem.arc_origin
         found = [_shaped(array, shape) for array in (times, lam, s, x, z, v, v2, kappa, force, error)]
-        if (space := self.problem.formulas.path_in_space) is None:
-            return State(*found)
-        return StateInSpace(*found, *(_shaped(a, shape) for a in path_in_space_at(space.address, f.p, reduced, v2)))
+        kind, more = self._in_space(times, reduced, v, v2, force)
+        return kind(*found, *(_shaped(array, shape) for array in more))
+
+    def _in_space(self, times: Array, places: Array, v: Array, v2: Array, force: Array) -> tuple[type[State], Array]:
+        """The kind of state that there is on the curve, and what it has beside the fields of `State`, as rows."""
+        formulas, p = self.problem.formulas, self.problem.functions.p
+        if formulas.path_in_space is None:
+            return State, np.empty((0, 0))
+        rows = path_in_space_at(formulas.path_in_space.address, p, places, v2)
+        if formulas.rider_loads is None:
+            return StateInSpace, rows
+        return StateOfRider, np.concatenate([rows, felt(self.problem, places, v, v2, force, self._resting(times))])
+
+    def _resting(self, times: Array) -> NDArray[np.bool_]:
+        """Whether the body is at rest for good at times from launch."""
+        if self.kind == "rest":
+            return np.ones(times.size, dtype=np.bool_)
+        if self.kind != "dissipative" or not times.size or (last := float(times.max())) < self._known_end():
+            return np.zeros(times.size, dtype=np.bool_)
+        return times >= (last if self.legs[-1].end == "rest" else inf)
 
     def _state_of(self, t: Any, rows: Array) -> State:
         """The state at one time, or at an array of times, from the rows of `Sampler.states` at places within a lap."""
-        space, kind = self.problem.formulas.path_in_space, State
-        if space is not None:
-            more = path_in_space_at(space.address, self.problem.functions.p, rows[0], rows[5])
-            rows, kind = np.concatenate([rows, more]), StateInSpace
+        times = np.atleast_1d(np.asarray(t, dtype=np.float64)).reshape(-1)
+        kind, more = self._in_space(times, rows[0], rows[4], rows[5], rows[7])
+        rows = np.concatenate([rows, more]) if more.size else rows
         return kind(t, *rows.reshape(-1, *t.shape)) if np.ndim(t) else kind(t, *rows[:, 0].tolist())
 
     @locked
@@ -462,7 +499,9 @@ class Motion(ABC):
             inversion_error[mask] = place_before + timed.segment.inversion_error(phi)
         # The length of a lap, its multiple and the sum are rounded.
         rounding = ULP * (1.5 * np.abs(points.laps * points.trajectory.lap) + 2.0 * np.abs(reduced))
-        bound: Array = rate * time_error + inversion_error + rounding
+        # Where nothing is known of the time, nothing is known of the place, at rest too.
+        of_time = np.multiply(rate, time_error, out=np.full_like(rate, np.inf), where=time_error < np.inf)
+        bound: Array = of_time + inversion_error + rounding
         return bound
 
     # -- energy and extremes ------------------------------------------------------------------
@@ -512,25 +551,59 @@ class Motion(ABC):
         SolutionError
             If the motion goes on for ever without repeating; give it a horizon, ``t_max``.
         """
-        return extreme(self, speeds, 1)
+        return extreme(self, SPEED, 1)
 
     @property
     @locked
     def v_min(self) -> Extreme:
         """The least speed; as `v_max`. It is 0 at a turning point."""
-        return extreme(self, speeds, -1)
+        return extreme(self, SPEED, -1)
 
     @property
     @locked
     def normal_force_max(self) -> Extreme:
         """The largest contact force along the normal; as `v_max`."""
-        return extreme(self, contact_force, 1)
+        return extreme(self, CONTACT_FORCE, 1)
 
     @property
     @locked
     def normal_force_min(self) -> Extreme:
         """The least contact force along the normal, which may be negative; as `v_max`."""
-        return extreme(self, contact_force, -1)
+        return extreme(self, CONTACT_FORCE, -1)
+
+    n_vertical_max, n_vertical_min = load_extreme("vertical", 1), load_extreme("vertical", -1)
+    n_lateral_max, n_lateral_min = load_extreme("lateral", 1), load_extreme("lateral", -1)
+    n_longitudinal_max, n_longitudinal_min = load_extreme("longitudinal", 1), load_extreme("longitudinal", -1)
+
+    @locked
+    def exceedance(self, load: str, levels: Any, *, side: str = "above", limits: Any = None) -> Exceedance:
+        """How long a load on a rider is beyond each of some levels, over one period or over the whole motion.
+
+        Parameters
+        ----------
+        load : {"vertical", "lateral", "longitudinal"}
+            Which load.
+        levels : number or array_like
+            Levels in units of 9.80665 m/s**2.
+        side : {"above", "below"}
+            Which side of a level is beyond it.
+        limits : sequence of pairs, optional
+            What may be felt: pairs of a duration in s and a level, both as numbers, of which the levels fall (rise, if
+            the side is "below") as durations grow. Between them the limit is linear.
+
+        Returns
+        -------
+        Exceedance
+            ``total`` and ``longest`` times in s, and beside them the times that the limits ``allow``.
+
+        Raises
+        ------
+        InputError
+            If there is no such load, no roll was declared, or levels or limits are none.
+        SolutionError
+            If the motion goes on for ever without repeating; give it a horizon, ``t_max``.
+        """
+        return exceedance(self, load, levels, side, limits)
 
     # -- history ------------------------------------------------------------------------------
 

@@ -103,6 +103,7 @@ class PeriodicMotion(Motion):
         # A launch from rest is a turning point itself.
         a, behind = (segment.a, 0.0) if behind == 0.0 else (a, (lam0.value - a) + (lam0.low - a_low))
         b, ahead = (segment.b, 0.0) if ahead == 0.0 else (b, (b - lam0.value) + (b_low - lam0.low))
+        a, b = max(a, self.problem.low), min(b, self.problem.high)
         if not a < b:  # the same double: extended precision tells them apart from where doubles have them
             return segment
         self._offsets = behind, ahead
@@ -123,7 +124,9 @@ class PeriodicMotion(Motion):
         if orbit is not None and orbit.low.is_decided and orbit.high.is_decided:
             low, high = orbit.low.high, orbit.high.high
         elif self._has_multiprecision:
-            low, high = timing.turning_points(self.problem, self._segment)
+            # At an end of the curve a root is a rounding of extended precision beyond it.
+            found = timing.turning_points(self.problem, self._segment)
+            low, high = max(found[0], self.problem.low), min(found[1], self.problem.high)
         in_order = (high, low) if self.direction > 0 else (low, high)
         return (self.problem.lam0, in_order[0]) if self.problem.w0 == 0.0 else in_order
 

@@ -13,6 +13,10 @@ HEADINGS = {
     **{"v": "v (m/s)", "v2": "v2 (m2/s2)", "kappa": "kappa (1/m)", "normal_force": "normal_force (N)"},
     **{"frequency": "frequency (rad/s)", "y": "y (m)"},
     **{f"normal_{axis}": f"normal_{axis} (N)" for axis in "xyz"},
+    **{f"track_{axis}": f"track_{axis} (m)" for axis in "xyz"},
+    **{f"n_{load}": f"n_{load} (9.80665 m/s2)" for load in ("vertical", "lateral", "longitudinal")},
+    **{f"onset_{load}": f"onset_{load} (9.80665 m/s3)" for load in ("vertical", "lateral", "longitudinal")},
+    "roll": "roll (rad)",
 }
 
 

@@ -5,6 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from gqm_sym.runtime.compiled.types import Array
+from gqm_sym.runtime.launch.rider import FIELDS
 from gqm_sym.runtime.motion.rows import HEADINGS, table, text_table
 
 # The most times that a printed state or its table in a notebook shows.
@@ -136,6 +137,28 @@ class StateInSpace(State):
     __slots__ = ()
 
     _fields = (*State._fields, "y", "normal_x", "normal_y", "normal_z")
+
+
+class StateOfRider(StateInSpace):
+    """The state of a body on a banked track: what `StateInSpace` has, and what a rider feels.
+
+    At a turning point, where what opposes the motion changes its direction, ``n_longitudinal`` is without it.
+
+    Attributes
+    ----------
+    n_vertical, n_lateral, n_longitudinal : float or array
+        Loads on the rider upwards, to the left and ahead (towards growing parameter), in units of 9.80665 m/s**2.
+    onset_vertical, onset_lateral, onset_longitudinal : float or array
+        Their rates of change, in the same unit per second.
+    roll : float or array
+        The roll angle in radians, between -pi and pi, positive to the left.
+    track_x, track_y, track_z : float or array
+        Coordinates in m of the track, below the line that the rider follows.
+    """
+
+    __slots__ = ()
+
+    _fields = (*StateInSpace._fields, *FIELDS)
 
 
 class Energy(NamedTuple):

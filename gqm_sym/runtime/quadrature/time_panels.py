@@ -355,17 +355,31 @@ def joints_between(joints, period, low, high):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def orbit_panels(fns, p, is_circulation, a, b, lam0, w0, joints):  # type: ignore[no-untyped-def]
-    """Lay panels over half a period of a libration, or over a lap of a circulation, from joint to joint.
+def orbit_panels(fns, p, kind, a, b, lam0, w0, joints):  # type: ignore[no-untyped-def]
+    """Lay panels over half a period of a libration, a lap, or the way to an end of the curve, from joint to joint.
 
-    Both share one call of `lay`, because each call takes long to compile. ``joints`` are those inside the segment.
+    All share one call of `lay`, because each call takes long to compile.
+
+    Parameters
+    ----------
+    kind : int
+        TURN_TURN, FROM_TURN or REGULAR (`substitution`).
+    a, b : float
+        The ends of the segment; a single turning point is ``a``.
+    lam0, w0 : float
+        The launch place, and V**2 there; used by REGULAR segments.
+    joints : array
+        The places inside the segment at which the curve is not smooth, in ascending order.
     """
-    kind, ref, w, stop = (REGULAR, lam0, w0, 1.0) if is_circulation else (TURN_TURN, a, 0.0, pi)
+    ref, w, stop = (lam0, w0, 1.0) if kind == REGULAR else (a, 0.0, pi if kind == TURN_TURN else 1.0)
     marks = np.empty(joints.size + 2)
     marks[0], marks[-1] = 0.0, stop
     for i in range(joints.size):
         place = joints[i] if b > a else joints[joints.size - 1 - i]
-        marks[i + 1] = (place - a) / (b - a) if is_circulation else 2.0 * atan2(sqrt(place - a), sqrt(b - place))
+        share = (place - a) / (b - a)
+        marks[i + 1] = share if kind == REGULAR else sqrt(share)
+        if kind == TURN_TURN:
+            marks[i + 1] = 2.0 * atan2(sqrt(place - a), sqrt(b - place))
     return lay(Integrand(fns, p, kind, a, b, ref, w, np.empty((0, 0))), marks)
 
 

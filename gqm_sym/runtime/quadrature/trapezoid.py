@@ -11,6 +11,7 @@ import numpy as np
 from gqm_sym.runtime.compiled.calls import call_potential_divdiff1, call_potential_divdiff2
 from gqm_sym.runtime.compiled.jit import Inner
 from gqm_sym.runtime.compiled.registers import on_stack
+from gqm_sym.runtime.quadrature.substitution import REGULAR, TURN_TURN
 from gqm_sym.runtime.quadrature.time_panels import MIN_CANCELLATION_RATIO, are_accurate, orbit_panels
 
 # Kinds of orbits.
@@ -160,7 +161,7 @@ def time_by_trapezoid(fns, p, kind, lam0, w0, a, b, width):  # type: ignore[no-u
 @Inner
 def time_by_panels(fns, p, kind, lam0, w0, a, b, joints):  # type: ignore[no-untyped-def]
     """Return the half period or the lap time in s by adaptive panels from joint to joint; NaN if not accurate."""
-    panels = orbit_panels(fns, p, kind == CIRCULATION, a, b, lam0, w0, joints)
+    panels = orbit_panels(fns, p, REGULAR if kind == CIRCULATION else TURN_TURN, a, b, lam0, w0, joints)
     if not are_accurate(panels):
         return np.nan
     return panels.times[-1]

@@ -8,6 +8,7 @@ from gqm_sym.runtime.arithmetic.matrices import multiply
 from gqm_sym.runtime.compiled.calls import call_effective_potential, call_potential_divdiff1, call_potential_divdiff2
 from gqm_sym.runtime.compiled.intrinsics import fma
 from gqm_sym.runtime.compiled.jit import Inner
+from gqm_sym.runtime.quadrature.substitution import FROM_TURN, REGULAR, TURN_TURN
 from gqm_sym.runtime.quadrature.time_panels import (
     MIN_CANCELLATION_RATIO,
     are_accurate,
@@ -23,6 +24,9 @@ FEW_TERMS, MORE_TERMS, MAX_TERMS = 32, 64, 128
 # How many of the last coefficients must be small, and how small against the first. Integration divides a coefficient by
 # its number, so that their share of the time is smaller still.
 TAIL_LENGTH, TAIL_RATIO = 4, 1e-14
+
+# The width of the way to an end of the curve, as a share of its ends, below which their rounding spoils times.
+MIN_WIDTH_SHARE = 2.0**-5
 
 # The share of an orbit's width within which a turning point counts as near the launch.
 NEAR_LAUNCH = 1e-3
@@ -123,7 +127,7 @@ def arrival_on_lap(curve, orbit, ahead):  # type: ignore[no-untyped-def]
         return inf
     end = orbit.lam0 + lap
     joints = joints_between(curve.joints, curve.period, min(orbit.lam0, end), max(orbit.lam0, end))
-    panels = orbit_panels(curve.fns, curve.p, True, orbit.lam0, end, orbit.lam0, orbit.v2, joints)
+    panels = orbit_panels(curve.fns, curve.p, REGULAR, orbit.lam0, end, orbit.lam0, orbit.v2, joints)
     if not are_accurate(panels):
         return np.nan
     return laps * panels.times[-1] + read_off(panels.edges, panels.times, panels.time_terms, ahead / lap - laps)
@@ -155,7 +159,7 @@ def times_from_end(curve, orbit, width, ahead, work, series):  # type: ignore[no
         launch, target = phase_of(near, far), phase_of(max(to_near, 0.0), max(to_far, 0.0))
         start, stop = times_from(series, n, launch, target, -1.0 if from_upper else 1.0)
         return series[0] * pi, start, stop, from_upper
-    panels = orbit_panels(curve.fns, curve.p, False, a, b, orbit.lam0, orbit.v2, joints)
+    panels = orbit_panels(curve.fns, curve.p, TURN_TURN, a, b, orbit.lam0, orbit.v2, joints)
     if not are_accurate(panels):
         return np.nan, np.nan, np.nan, from_upper
     half_period = panels.times[-1]
@@ -168,11 +172,41 @@ def times_from_end(curve, orbit, width, ahead, work, series):  # type: ignore[no
 
 
 @Inner
+def arrival_on_way_out(curve, orbit, ahead, work):  # type: ignore[no-untyped-def]
+    """The time to the offset ``ahead``, or for NaN to the end, of a body that leaves the curve; as `arrival`."""
+    end, turn = (orbit.high, orbit.low) if orbit.leaves > 0 else (orbit.low, orbit.high)
+    turns = orbit.v2 == 0.0 or orbit.leaves != orbit.direction
+    turn = refined_end(curve.fns, curve.p, orbit, turn, work) if turns else 0.0
+    width, far = end - turn, ahead if ahead == ahead else end
+    share = (far - turn) / width
+    if not 0.0 <= share <= 1.0:
+        return inf
+    a, b = orbit.lam0 + turn, orbit.lam0 + end
+    if fabs(width) < MIN_WIDTH_SHARE * max(fabs(a), fabs(b)):
+        return np.nan
+    joints = joints_between(curve.joints, curve.period, min(a, b), max(a, b))
+    panels = orbit_panels(curve.fns, curve.p, FROM_TURN if turns else REGULAR, a, b, orbit.lam0, orbit.v2, joints)
+    if not are_accurate(panels):
+        return np.nan
+    edges, times, terms = panels.edges, panels.times, panels.time_terms
+    time = panels.times[-1] if far == end else read_off(edges, times, terms, sqrt(share) if turns else share)
+    if not turns or orbit.v2 == 0.0:
+        return time
+    before = read_off(edges, times, terms, sqrt(-turn / width))
+    return before - time if orbit.direction * far > 0.0 else before + time
+
+
+@Inner
 def arrival(curve, orbit, place, work, series):  # type: ignore[no-untyped-def]
-    """The first time at which the body is at ``place``: NaN if it is left to the exact problem, inf if never."""
+    """The first time at which the body is at ``place``: NaN if it is left to the exact problem, inf if never.
+
+    For NaN it is the time at which a body that leaves the curve comes to the end of it.
+    """
     ahead = place - orbit.lam0
     if ahead == 0.0:
         return 0.0
+    if orbit.leaves != 0:
+        return arrival_on_way_out(curve, orbit, ahead, work)
     if orbit.circulates:
         return arrival_on_lap(curve, orbit, ahead)
     width = orbit.high - orbit.low

@@ -14,7 +14,7 @@ from gqm_sym.runtime.gradients.orbit import check_signed
 from gqm_sym.runtime.gradients.quantities import selected
 from gqm_sym.runtime.gradients.sweep import PERIODS, period_gradients
 from gqm_sym.runtime.launch.request import LaunchRequest
-from gqm_sym.runtime.sweep.quantities import ANSWERED, SOLVE
+from gqm_sym.runtime.sweep.quantities import ANSWERED, LOAD_EXTREMES, SOLVE
 from gqm_sym.runtime.sweep.result import Sweep
 from gqm_sym.runtime.sweep.sweep import Solve, as_doubles, sweep
 
@@ -43,6 +43,8 @@ def sweep_with_gradient(
     rows = selected(formulas.parameters, wrt)
     if quantity == "turning_points":
         raise InputError("gradient: sweeps have it of quantities that are one number, not of turning_points")
+    if quantity in LOAD_EXTREMES:
+        raise InputError(f"gradient: {quantity} has none yet, as all that a rider feels; leave gradient out")
     check_signed(formulas, quantity)
     found = sweep(formulas, quantity, launches, parameters, lam, solve)
     names = (*formulas.parameters, "lam0", "v0", "direction", "lam")

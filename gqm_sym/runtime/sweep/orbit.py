@@ -2,8 +2,8 @@
 
 from typing import Any, NamedTuple
 
-# What the ends of a table are: nothing that is known, the ends of the curve, through which bodies leave it, or places
-# where no body is in contact with the track any more.
+# What the ends of a table, or of the curve where there is no table, are: nothing that is known, the ends of the curve,
+# through which bodies leave it, or places where no body is in contact with the track any more.
 NO_ENDS, CURVE_ENDS, CONTACT_ENDS = range(3)
 
 
@@ -21,7 +21,7 @@ class SweptCurve(NamedTuple):
     period : float
         The period of a closed curve, 0 otherwise.
     ends : int
-        What both ends of the table are: NO_ENDS, CURVE_ENDS or CONTACT_ENDS.
+        What both ends of the table, or of the curve where there is none, are: NO_ENDS, CURVE_ENDS or CONTACT_ENDS.
     mass : float
         The mass of the body.
     table : CurveTable

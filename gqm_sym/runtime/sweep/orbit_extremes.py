@@ -23,9 +23,13 @@ from gqm_sym.runtime.sweep.curve_table import (
 from gqm_sym.runtime.sweep.panel_forces import FAR, LOAD, NEAR, prepare
 from gqm_sym.runtime.sweep.passage import locate
 
-# Intervals of the first grid, in equal steps of the phase angle; how often the best point is refined; and the factor by
-# which the step shrinks each time.
-GRID_INTERVALS, REFINEMENTS, STEP_RATIO = 64, 2, 16.0
+# Intervals of the first grid, in equal steps of the phase angle, and the factor by which the step shrinks each time
+# that the best point is refined, or grows if a parabola has its vertex beyond it.
+GRID_INTERVALS, STEP_RATIO, GROWTH = 64, 16.0, 4.0
+
+# How often the best point is refined at least and at most. In between that ends if the value changes by less than this
+# share of the largest on the grid: its error is far smaller then, because it falls with the fourth power of the step.
+REFINEMENTS, MAX_REFINEMENTS, MAX_LAST_CHANGE = 2, 12, 1e-11
 
 # Half the widths of the first and of the last parabola on a panel of a tabulated curve, which is 2 wide, and how many
 # there are at most: one whose vertex is far away is followed by one of the same width there.
@@ -62,45 +66,62 @@ def sample_loads(fns, p, orbit, force, shares, n, out):  # type: ignore[no-untyp
 
 
 @Inner
+def beside(out, i, circulates):  # type: ignore[no-untyped-def]
+    """The value before the point ``i`` of the grid, that at it, and that behind it.
+
+    A libration passes the grid there and back, so that a turning point has the same neighbour on both sides. In the
+    phase angle, any function is even about the end of a curve too.
+    """
+    cycle = GRID_INTERVALS if circulates else 2 * GRID_INTERVALS
+    before, after = (i - 1) % cycle, (i + 1) % cycle
+    if circulates:
+        return out[before], out[i], out[after]
+    return out[min(before, cycle - before)], out[i], out[min(after, cycle - after)]
+
+
+@Inner
 def extreme(fns, p, orbit, force, sign):  # type: ignore[no-untyped-def]
     """The largest (``sign`` 1) or smallest (-1) V on an orbit, or contact force where ``force`` is set.
 
     Parabolas through three points are laid again and again with a smaller step. At an extreme the function is flat, so
     its value has all digits as soon as the place has half of them. They are laid through V**2, for V has a kink where
-    the body all but stops. In a well that is even, V is largest in the middle.
+    the body all but stops. In a well that is even, V is largest in the middle. The value is NaN where the grid is too
+    coarse.
     """
-    if not (orbit.circulates or force or sign > 0.0):
-        return 0.0  # at a turning point
+    meets_turn = orbit.v2 == 0.0 or not (orbit.circulates or orbit.leaves == orbit.direction)
+    if meets_turn and not (force or sign > 0.0):
+        return 0.0
     out, points, found = line_buffer(), point_buffer(), point_buffer()
     if orbit.even and not (orbit.circulates or force):
         points[0] = 0.5
         sample_loads(fns, p, orbit, force, points, 1, found)
         return sqrt(found[0])
     sample_loads(fns, p, orbit, force, LAP_SHARES if orbit.circulates else WIDTH_SHARES, GRID_POINTS, out)
-    best = 0
+    best, peak, size = 0, -inf, 0.0
     for i in range(GRID_POINTS):
-        if sign * out[i] > sign * out[best]:
-            best = i
-    # A libration passes the grid there and back, so that a turning point has the same neighbour on both sides.
-    cycle = GRID_INTERVALS if orbit.circulates else 2 * GRID_INTERVALS
-    before, after = (best - 1) % cycle, (best + 1) % cycle
-    f0, f1, f2 = out[min(before, cycle - before)], out[best], out[min(after, cycle - after)]
-    if orbit.circulates:
-        f0, f2 = out[before], out[after]
+        f0, f1, f2 = beside(out, i, orbit.circulates)
+        size = max(size, fabs(f1))
+        curvature = sign * (f0 - 2.0 * f1 + f2)
+        top = sign * f1 - 0.125 * (f0 - f2) ** 2 / curvature if curvature < 0.0 else sign * f1
+        if sign * f1 >= max(sign * f0, sign * f2) and top > peak:
+            best, peak = i, top
+    f0, f1, f2 = beside(out, best, orbit.circulates)
     share, step, value = best / GRID_INTERVALS, 1.0 / GRID_INTERVALS, out[best]
-    for k in range(REFINEMENTS + 1):
+    for k in range(MAX_REFINEMENTS):
         curvature = sign * (f0 - 2.0 * f1 + f2)
         move = 0.5 * sign * (f0 - f2) / curvature if curvature < 0.0 else 0.0
         share += step * min(max(move, -1.0), 1.0)
-        step /= STEP_RATIO
+        step *= 1.0 / STEP_RATIO if fabs(move) < 1.0 else GROWTH
         points[0], points[1], points[2] = share, share - step, share + step
         if not orbit.circulates:
             for i in range(3):
                 points[i] = sin(0.5 * pi * points[i]) ** 2
-        sample_loads(fns, p, orbit, force, points, 3 if k < REFINEMENTS else 1, found)
-        f1, f0, f2 = found[0], found[1], found[2]
+        sample_loads(fns, p, orbit, force, points, 3, found)
+        change, f1, f0, f2 = fabs(found[0] - value), found[0], found[1], found[2]
         value = max(value, f1) if sign > 0.0 else min(value, f1)
-    return value if force else sqrt(value)
+        if k >= REFINEMENTS and fabs(move) < 1.0 and change <= MAX_LAST_CHANGE * size:
+            return value if force else sqrt(value)
+    return np.nan
 
 
 @Inner

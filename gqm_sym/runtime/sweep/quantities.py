@@ -12,6 +12,8 @@ from numba import types
 from numpy.typing import NDArray
 
 from gqm_sym.runtime.compiled.types import MATRIX, Array
+from gqm_sym.runtime.launch import kinds
+from gqm_sym.runtime.launch.rider import LOADS
 
 # The quantities that compiled code computes. SPANS is asked of batches only, on the way to another quantity: the
 # offsets of both turning points from the launch, or for a circulation the length of a lap and NaN.
@@ -82,35 +84,37 @@ class Quantity(NamedTuple):
     of_motion: Callable[[Any, Any], Any]
 
 
-def _turning_points(motion: Any, _: Any) -> Any:
-    return sorted(motion.turning_points) if motion.kind == "libration" else (nan, nan)
-
-
-def _rest_position(motion: Any, _: Any) -> float:
-    if motion.kind == "rest":
-        return float(motion.problem.lam0)
-    rests = motion.kind == "dissipative" and isfinite(motion.t_end) and motion.legs[-1].end == "rest"
-    return motion.legs[-1].lam_end if rests else nan
-
-
-def _extreme(name: str) -> Callable[[Any, Any], float]:
-    """The value of one of a motion's extremes."""
+def _number(name: str) -> Callable[[Any, Any], float]:
+    """A quantity that is an attribute of a motion, or the value of an extreme; NaN where it is infinite."""
 
     def of_motion(motion: Any, _: Any) -> float:
-        return float(getattr(motion, name).value)
+        found = getattr(motion, name)
+        value = float(getattr(found, "value", found))
+        return value if isfinite(value) else nan
 
     return of_motion
 
 
-QUANTITIES = {
-    "half_period": Quantity(HALF_PERIOD, 1, 0, lambda motion, _: motion.half_period),
-    "period": Quantity(PERIOD, 1, 0, lambda motion, _: motion.period),
+def _turning_points(motion: Any, _: Any) -> Any:
+    return sorted(motion.turning_points) if motion.kind == "libration" else (nan, nan)
+
+
+# The codes of quantities that are one number, an attribute of a motion, by name.
+CODES = {
+    "half_period": HALF_PERIOD,
+    "period": PERIOD,
+    "v_min": MIN_SPEED,
+    "v_max": MAX_SPEED,
+    "normal_force_min": MIN_FORCE,
+    "normal_force_max": MAX_FORCE,
+    "t_end": END_TIME,
+}
+
+LOAD_EXTREMES = tuple(f"n_{load}_{which}" for load in LOADS for which in ("min", "max"))
+"""The extremes of what a rider feels, which only banked tracks have."""
+
+_NAMES = (*kinds.QUANTITIES, *LOAD_EXTREMES)
+QUANTITIES = {name: Quantity(CODES.get(name, NOT_COMPILED), 1, 0, _number(name)) for name in _NAMES} | {
     "turning_points": Quantity(TURNING_POINTS, 2, slice(0, 2), _turning_points),
-    "v_min": Quantity(MIN_SPEED, 1, 0, _extreme("v_min")),
-    "v_max": Quantity(MAX_SPEED, 1, 0, _extreme("v_max")),
-    "normal_force_min": Quantity(MIN_FORCE, 1, 0, _extreme("normal_force_min")),
-    "normal_force_max": Quantity(MAX_FORCE, 1, 0, _extreme("normal_force_max")),
     "time_at": Quantity(ARRIVAL_TIME, 1, 0, lambda motion, lam: motion.time_at(lam)),
-    "t_end": Quantity(END_TIME, 1, 0, lambda motion, _: motion.t_end if isfinite(motion.t_end) else nan),
-    "rest_position": Quantity(NOT_COMPILED, 1, 0, _rest_position),
 }

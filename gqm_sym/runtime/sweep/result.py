@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gqm_sym.runtime.compiled.types import Array
+from gqm_sym.runtime.launch.rider import LOADS
 from gqm_sym.runtime.motion.rows import table, text_table
 from gqm_sym.runtime.sweep.quantities import ROUTES, STATUS_SENTENCES
 
@@ -22,12 +23,18 @@ PLACE = "lam0"
 DESCRIBED = {
     "half_period": ("time from one turning point to the other", "s"),
     "period": ("time after which the motion repeats", "s"),
+    "action": ("integral of (1 + beta) V ds over one period, per mass", "m2/s"),
     "turning_point_lower": ("lower turning point, as a value of the curve's parameter", PLACE),
     "turning_point_upper": ("upper turning point, as a value of the curve's parameter", PLACE),
     "v_min": ("least speed", "m/s"),
     "v_max": ("largest speed", "m/s"),
     "normal_force_min": ("least contact force along the normal", "N"),
     "normal_force_max": ("largest contact force along the normal", "N"),
+    **{
+        f"n_{load}_{which}": (f"{word} {load} load on a rider, in units of 9.80665 m/s2", "1")
+        for load in LOADS
+        for which, word in (("min", "least"), ("max", "largest"))
+    },
     "time_at": ("first time at the place lam", "s"),
     "t_end": ("time at which the motion ends", "s"),
     "rest_position": ("where the body rests in the end, as a value of the curve's parameter", PLACE),
@@ -59,9 +66,9 @@ class Sweep(SweepArrays):
     values : float array
         The quantity of each launch, in the shape that the arguments broadcast to; NaN where there is none. Times
         (``half_period``, ``period``, ``time_at``, ``t_end``) are in seconds, speeds (``v_min``, ``v_max``) in m/s,
-        forces (``normal_force_min``, ``normal_force_max``) in newtons; places (``turning_points``,
-        ``rest_position``) are values of the curve's parameter, in its unit. ``turning_points`` has one more axis of
-        length 2, for the lower and the upper one.
+        forces (``normal_force_min``, ``normal_force_max``) in newtons, the ``action`` in m2/s; places
+        (``turning_points``, ``rest_position``) are values of the curve's parameter, in its unit. ``turning_points``
+        has one more axis of length 2, for the lower and the upper one.
     status : int8 array
         0 for each launch that has a value; otherwise a code that says why there is none. `status_counts` gives the
         sentences, which stand in `quantities.STATUS_SENTENCES`.

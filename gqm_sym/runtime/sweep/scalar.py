@@ -28,7 +28,8 @@ from gqm_sym.runtime.compiled.strided import (
 )
 from gqm_sym.runtime.compiled.types import ADDRESSES, MATRIX, REAL, VECTOR, Array
 from gqm_sym.runtime.launch.domain import DomainNumbers
-from gqm_sym.runtime.launch.ends import NO_ORBIT, ends, orbit_kind
+from gqm_sym.runtime.launch.ends import CUSP_SHARE, NO_ORBIT, ends, orbit_kind
+from gqm_sym.runtime.launch.zeros import LIMIT, TURN, SearchArrays, speed_squared
 from gqm_sym.runtime.quadrature.time_panels import joints_between
 from gqm_sym.runtime.quadrature.trapezoid import (
     CIRCULATION,
@@ -41,10 +42,11 @@ from gqm_sym.runtime.quadrature.trapezoid import (
 from gqm_sym.runtime.sweep.arrivals import arrival
 from gqm_sym.runtime.sweep.curve_table import TABLE, CurveTable
 from gqm_sym.runtime.sweep.liftoff import liftoff_place
-from gqm_sym.runtime.sweep.orbit import CONTACT_ENDS, Orbit, SweptCurve
+from gqm_sym.runtime.sweep.orbit import CONTACT_ENDS, CURVE_ENDS, Orbit, SweptCurve
 from gqm_sym.runtime.sweep.orbit_extremes import extreme, passage_extreme
 from gqm_sym.runtime.sweep.panel_forces import take_factors
 from gqm_sym.runtime.sweep.passage import (
+    MIN_LEAVING_SHARE,
     NOWHERE,
     fill_slacks,
     find_passage,
@@ -124,6 +126,25 @@ class Buffers(NamedTuple):
     slacks: Any
 
 
+@Inner
+def orbit_that_leaves(curve, lam0, v2, direction, ahead, behind):  # type: ignore[no-untyped-def]
+    """The orbit of a body that leaves the curve; `Orbit.leaves` is 0 where it stays, or where that is not certain."""
+    last, turn = (ahead, 0.0) if ahead.what == LIMIT else (behind, ahead.near)
+    end, leaves = last.near, direction if ahead.what == LIMIT else -direction
+    none = Orbit(False, False, direction, lam0, v2, 0.0, 0.0, 0)
+    if direction == 0 or last.what != LIMIT or curve.ends != CURVE_ENDS or curve.period > 0.0 or not isfinite(end):
+        return none
+    if not (ahead.what == TURN or (ahead.what == LIMIT and end != 0.0)):
+        return none
+    arrays = SearchArrays(np.empty(2), np.empty((2, 1)), np.empty(4))
+    speed_squared(curve.fns, curve.p, lam0, v2, 0.0, arrays)
+    ds = arrays.rows[1, 0]
+    v2_there, size = speed_squared(curve.fns, curve.p, lam0, v2, end, arrays)
+    if not (v2_there > MIN_LEAVING_SHARE * size and arrays.rows[1, 0] > CUSP_SHARE * ds):
+        return none
+    return Orbit(False, False, direction, lam0, v2, min(end, turn), max(end, turn), leaves)
+
+
 @Inlined
 def find_orbit(curve, columns, k, monotone, spans, known):  # type: ignore[no-untyped-def]
     """The status of launch k, ANSWERED where it has an orbit, that orbit, and the panels that it passes in a table.
@@ -161,7 +182,8 @@ def find_orbit(curve, columns, k, monotone, spans, known):  # type: ignore[no-un
     direction, ahead, behind = ends(curve.fns, curve.p, lam0, v0, direction, domain)
     kind = orbit_kind(direction, ahead, behind, v0, period)
     if kind == NO_ORBIT:
-        return UNDECIDED, none, nowhere
+        orbit = orbit_that_leaves(curve, lam0, v2, direction, ahead, behind)
+        return ANSWERED if orbit.leaves != 0 else UNDECIDED, orbit, nowhere
     circulates = kind == CIRCULATION
     one, other = (direction * period, 0.0) if circulates else (ahead.near, behind.near)
     orbit = Orbit(circulates, even, direction, lam0, v2, min(one, other), max(one, other), 0)
@@ -245,7 +267,8 @@ def fill_answer(curve, orbit, passage, asked, buffers, out):  # type: ignore[no-
     value = value_from_table(curve, orbit, passage, quantity, target, slacks) if tabulated else nan
     if quantity in (HALF_PERIOD, PERIOD) and passage.panels == 1 and passage.is_polished and curve.table.is_exact:
         value = time_on_panel_of_both(curve, passage)
-    if value != value and orbit.leaves == 0 and not (quantity in (HALF_PERIOD, PERIOD) and curve.table.is_exact):
+    by_formulas = orbit.leaves == 0 or passage.panels == 0
+    if value != value and by_formulas and not (quantity in (HALF_PERIOD, PERIOD) and curve.table.is_exact):
         value = value_by_itself(curve, orbit, quantity, target, buffers)
     if value == inf:
         return NEVER_THERE

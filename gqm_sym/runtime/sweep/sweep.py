@@ -24,6 +24,7 @@ from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.interface import ExactPotential
 from gqm_sym.runtime.launch.formulas import chart_with, true_pieces_of
 from gqm_sym.runtime.launch.request import ONLY_SIGN, LaunchRequest, check_contact
+from gqm_sym.runtime.launch.rider import check_banked
 from gqm_sym.runtime.launch.speed import path_and_force_at, potential_at
 from gqm_sym.runtime.multiprecision.exact_problem import NOWHERE
 from gqm_sym.runtime.sweep import quantities, scalar
@@ -92,6 +93,8 @@ def sweep(
     found = QUANTITIES.get(quantity)
     if found is None:
         raise InputError(f"quantity: must be one of {', '.join(QUANTITIES)}, got {quantity!r}")
+    if quantity in quantities.LOAD_EXTREMES:
+        check_banked(formulas, quantity)
     if (lam is None) == (quantity == "time_at"):
         raise InputError(f"lam: is the place that 'time_at' asks about, got {lam!r} with {quantity!r}")
     check_contact(formulas, contact)
@@ -273,7 +276,7 @@ class Group(NamedTuple):
     factors : list of arrays
         What each launch multiplies the parts of potential and load in the table with.
     ends : int
-        What both ends of the table are (`SweptCurve`).
+        What both ends of the table, or of the curve where there is none, are (`SweptCurve`).
     """
 
     columns: list[Array]
@@ -295,7 +298,9 @@ def _groups(
     """
     if formulas.chart is None:
         may_lift_off = only_sign and not formulas.dissipation
-        table, ends = _tabulated_range(formulas, columns, domain, only_sign) if may_lift_off else (NO_TABLE, NO_ENDS)
+        table, ends = NO_TABLE, CURVE_ENDS
+        if may_lift_off:
+            table, ends = _tabulated_range(formulas, columns, domain, only_sign)
         yield Group([*columns[:4], *domain, *columns[4:]], table=table, ends=ends), None
         return
     held, factors = _held(formulas, len(columns) - 4), _WHOLE
@@ -392,8 +397,17 @@ def _tabulated_range(
                 width *= 2.0
         first, last = reach
         ends = CONTACT_ENDS if closed == 2 else NO_ENDS
+    return _tabulated_between(formulas.exact, _source(formulas), tuple(p.tolist()), first, last), ends
+
+
+@lru_cache(maxsize=8)
+def _tabulated_between(exact: Any, source: Source, values: tuple[float, ...], first: float, last: float) -> CurveTable:
+    """The table of a curve with formulas between two places; it is made once for the same parameters.
+
+    The exact formulas tell modules apart whose functions stood at the same place in memory, one after the other.
+    """
     pieces = np.linspace(first, last, MIN_PIECES + 1)
-    return CurveTable(*tabulate(_source(formulas), NO_PARTS, p, pieces)), ends
+    return CurveTable(*tabulate(source, NO_PARTS, np.array(values), pieces))
 
 
 def _exact_parts(formulas: "Formulas") -> Callable[..., Any] | None:

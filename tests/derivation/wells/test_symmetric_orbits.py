@@ -118,6 +118,8 @@ def test_the_time_is_that_of_the_motion(name: str) -> None:
 
 AGM = ["pendulum", "Duffing"]
 TURNING_POINTS = [name for name in CASES if name != "root of a wave"]
+# Of these the potential falls beside the axis, or grows so little at the turning point that a root loses digits.
+NOT_GROWING = ["double well", "two waves"]
 
 
 def test_which_have_closed_forms() -> None:
@@ -156,7 +158,7 @@ def test_where_a_body_comes_to_rest(name: str, share: str) -> None:
         axis, offset = mpf(sp.N(model.symmetry.place, 40)), mpf(half) * mp.mpf(sp.Rational(share))
         left = 2 * (potential(axis + mpf(half)) - potential(axis + offset))
         assert abs(width(offset, left) / mpf(half) - 1) < mpf("1e-30")
-        assert growth(offset, left) > 0
+        assert (growth(offset, left) > 0) == (name not in NOT_GROWING)
         assert 0 <= square(offset, left) < 1
 
 

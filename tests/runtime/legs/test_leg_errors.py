@@ -50,6 +50,31 @@ def test_a_spring_with_weak_friction(build: Build) -> None:
     assert_bounded(motion, np.concatenate([turns[::5], turns[::7] - 0.1, turns[::9] - 0.3]), truth, "0.5")
 
 
+@pytest.mark.parametrize("size", [1.0, 1e2, 1e4, 1e6])
+@pytest.mark.parametrize(("lam0", "centre"), [(2.7, -0.38), (-1.3, 1.1)])
+def test_terms_of_the_force_that_cancel(size: float, lam0: float, centre: float, build: Build) -> None:
+    """Two potentials whose sum is a weak spring, with friction: places lay up to 150 bounds away."""
+    force = gqm.Potential("k1*(x - c1)**2/2") + gqm.Potential("-k2*(x - c2)**2/2") + gqm.CoulombFriction()
+    k2 = 0.83 * size
+    k1, c1 = k2 + 0.71, 1.86
+    c2 = (k1 * c1 - 0.71 * centre) / k2
+    module = build("springs_that_cancel", gqm.Curve.graph("0*x"), force)
+    motion = module.solve(lam0, k1=k1, k2=k2, c1=c1, c2=c2, mu="1/1000", t_max=40)
+    with mp.workdps(60):
+        k = mpf(k1) - mpf(k2)
+        middle, half, shift = (mpf(k1) * c1 - mpf(k2) * c2) / k, mp.pi / mp.sqrt(k), G / 1000 / k
+
+    def truth(t: float) -> Any:
+        turns, away = int(mp.floor(t / half)), mpf(lam0) - middle
+        swing = abs(away) - 2 * shift * turns - shift
+        return middle + mp.sign(away) * (-1) ** turns * (shift + swing * mp.cos(mp.sqrt(k) * (t - turns * half)))
+
+    for t in np.linspace(0.5, 39.5, 30).tolist():
+        with mp.workdps(60):
+            error = abs(mpf(motion.lam(t)) - truth(t))
+        assert error <= motion.error_bound(t) <= 1e-12 * size + 1e-11
+
+
 def dragged_swing(amplitude: mpf, k: mpf, b: mpf, digits: int) -> tuple[mpf, mpf]:
     """The next amplitude of a spring with quadratic drag, and the time to it."""
     with mp.workdps(digits):

@@ -5,6 +5,7 @@ from dataclasses import fields
 from typing import Any
 
 import pytest
+from paths import ROOT
 
 from gqm_sym.errors import renamed
 from gqm_sym.runtime.launch import kinds
@@ -13,6 +14,8 @@ from gqm_sym.runtime.motion.aperiodic import MotionAtRest
 from gqm_sym.runtime.motion.events import Event, Leg
 from gqm_sym.runtime.motion.extremes import grid_peaks
 from gqm_sym.runtime.motion.motion import Motion, State
+from gqm_sym.runtime.sweep import quantities
+from gqm_sym.runtime.sweep.result import DESCRIBED
 
 
 def test_a_renamed_attribute_says_its_new_name() -> None:
@@ -47,6 +50,17 @@ def test_every_kind_and_end_is_documented() -> None:
         assert f'"{kind}"' in str(kinds.__doc__)
     for end in kinds.LEG_ENDS:
         assert f'"{end}"' in str(Leg.__doc__)
+
+
+def test_sweeps_and_gradients_ask_what_a_motion_has() -> None:
+    """One list of quantities: each is an attribute of a motion, is described, and stands on the page of sweeps."""
+    page = (ROOT / "docs" / "howto" / "sweeps.md").read_text(encoding="utf-8")
+    assert set(quantities.QUANTITIES) == set(kinds.QUANTITIES)
+    for name in kinds.QUANTITIES:
+        assert hasattr(Motion, name)
+        assert f'"{name}"' in str(Motion.gradient.__doc__)
+        assert name in DESCRIBED or f"{name[:-1]}_lower" in DESCRIBED
+        assert f"`{name}`" in page
 
 
 def test_ever_finer_grids_find_a_peak() -> None:

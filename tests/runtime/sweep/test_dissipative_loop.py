@@ -53,6 +53,11 @@ def test_a_spring_with_friction(generated_folder: Path) -> None:
     assert ends.values == pytest.approx(turns * half, rel=FEW)
     rest = np.sign(starts) * (-1.0) ** turns * (np.abs(starts) - 2.0 * offset * turns)
     assert module.sweep("rest_position", starts, **given).values == pytest.approx(rest, rel=0.0, abs=1e-14)
+    motion = module.solve(starts[0], **given)
+    assert motion.rest_position == pytest.approx(rest[0], rel=0.0, abs=1e-14)
+    assert motion.rest_position == motion.legs[-1].lam_end
+    with pytest.raises(SolutionError, match=r"rest_position: .*it ends with 'horizon'"):
+        module.solve(starts[0], t_max=0.1, **given).rest_position  # noqa: B018
     fastest = math.sqrt(k) * (np.abs(starts) - offset)
     assert module.sweep("v_max", starts, **given).values == pytest.approx(fastest, rel=FEW)
     assert (module.sweep("v_min", starts, **given).values == 0.0).all()

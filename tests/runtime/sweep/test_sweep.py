@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 from mpmath import mp, mpf
 
+import generated.circle_rotating as circle_rotating
 import gqm_sym as gqm
-from gqm_sym.errors import InputError, ParameterError
+from gqm_sym.errors import InputError, ParameterError, SolutionError
 from gqm_sym.runtime.compiled import threads
 from gqm_sym.runtime.sweep.quantities import STATUS_SENTENCES
 
@@ -320,6 +321,26 @@ def test_the_route_of_each_launch(module_of: ModuleOf) -> None:
     assert circle.sweep("rest_position", places, L=1).route_counts() == {"solve": 40}
 
 
+def test_actions_and_their_gradients(module_of: ModuleOf) -> None:
+    """Of a pendulum: 16 sqrt(g L**3) (E(m) - (1 - m) K(m)); by the energy they change as the period says."""
+    circle, places = module_of("circle"), np.array([0.5, 1.5, 3.0])
+    swept = circle.sweep("action", places, L=1, g=9.81, gradient="lam0")
+    for place, value in zip(places.tolist(), swept.values.tolist(), strict=True):
+        m = mp.sin(mpf(place) / 2) ** 2
+        true = 16 * mp.sqrt(mpf(9.81)) * (mp.ellipe(m) - (1 - m) * mp.ellipk(m))
+        assert value == pytest.approx(float(true), rel=1e-14)
+    periods = circle.sweep("period", places, L=1, g=9.81).values
+    assert swept.gradient[:, 0] == pytest.approx(periods * 9.81 * np.sin(places), rel=1e-13)
+    assert circle.sweep("action", 3.0, 9.0, L=1, t_max=0.5).status == 0
+    resting = circle.solve(0, L=1)
+    assert (resting.rest_position, circle.sweep("rest_position", 0, L=1).values) == (0.0, 0.0)
+    with pytest.raises(SolutionError, match="goes on for ever and does not come to rest"):
+        circle.solve(1, L=1).rest_position  # noqa: B018
+    assert circle.solve(1, L=1, t_max=2).gradient("t_end", "L") == {"L": 0.0}
+    with pytest.raises(SolutionError, match="goes on for ever and has no t_end"):
+        circle.solve(1, L=1).gradient("t_end", "L")
+
+
 @pytest.mark.parametrize(("old", "new"), [("reasons", "status"), ("why", "status_counts")])
 def test_old_names_of_a_sweep(old: str, new: str, module_of: ModuleOf) -> None:
     """An earlier name is refused with the present one."""
@@ -340,6 +361,85 @@ def test_bodies_leave_an_endless_hill(module_of: ModuleOf) -> None:
     for v0, value in zip(speeds.tolist(), swept.values.tolist(), strict=True):
         with mp.workdps(30):
             assert value == pytest.approx(float(time_of_flight(mpf(v0))), rel=1e-13)
+
+
+@pytest.mark.parametrize("omega", [0.7, 2.0, 3.0, 4.0])
+def test_a_hoop_that_turns(omega: float) -> None:
+    """Above sqrt(g/L) the lowest place is a hilltop between two wells; batches answer below and above."""
+    v0, g, square = np.array([1.0, 2.0, 4.0]), mpf(9.81), mpf(omega) ** 2
+    swept = {name: circle_rotating.sweep(name, 0.0, v0, Omega=omega) for name in ("turning_points", "half_period")}
+    assert swept["half_period"].route_counts() == {"batch": v0.size}
+    for k, speed in enumerate(map(mpf, v0.tolist())):
+        with mp.workdps(40):
+            cosine = (g - mp.sqrt((g - square) ** 2 + square * speed**2)) / square
+            top = mp.acos(cosine)
+
+            def rate(u: mpf, top: mpf = top, speed: mpf = speed) -> mpf:
+                angle = top * mp.sin(u)
+                v2 = speed**2 - 2 * g * (1 - mp.cos(angle)) + square * mp.sin(angle) ** 2
+                return top * mp.cos(u) / mp.sqrt(v2)
+
+            truth = 2 * mp.quad(rate, mp.linspace(0, mp.pi / 2, 9), method="gauss-legendre")
+            assert abs(swept["half_period"].values[k] / truth - 1) < 1e-15
+            assert abs(swept["turning_points"].values[k] / np.array([-top, top]) - 1).max() < 4e-16
+
+
+@pytest.fixture(scope="module")
+def incline(generated_folder: Path) -> ModuleType:
+    """A straight line from x = -1 to x = 2, down a slope of 3 in 4: g acts along it with 3/5."""
+    line = gqm.Curve.graph("-3*x/4", parameter="x", domain=(-1, 2))
+    return gqm.build(gqm.derive(line, gqm.Gravity()), name="incline", folder=generated_folder)
+
+
+# Launch place, speed, direction: from rest; down; up to a turning point and back; up and out; from the end inwards.
+LEAVING = np.array([[0.5, 0, 1], [-1, 1, 1], [0.3, 2, -1], [1.5, 0.01, -1], [0.5, 9, -1], [2, 3, -1]], dtype=float)
+
+
+def test_bodies_leave_through_the_ends_of_a_line(incline: ModuleType) -> None:
+    """With constant acceleration all is in closed form; nothing is solved one by one."""
+    (lam0, v0, direction), pull = LEAVING.T, 0.6 * 9.81
+    out_below = v0**2 > 2 * pull * 1.25 * (lam0 + 1)
+    out_below &= direction < 0
+    way = 1.25 * np.where(out_below, lam0 + 1, 2 - lam0)
+    v_end = np.sqrt(v0**2 + 2 * pull * np.where(out_below, -way, way))
+    expected = {
+        "t_end": np.where(out_below, v0 - v_end, v_end - direction * v0) / pull,
+        "v_max": np.maximum(v0, v_end),
+        "v_min": np.where(direction > 0, v0, np.where(out_below, v_end, 0.0)),
+        "normal_force_max": np.full(lam0.size, 0.8 * 9.81),
+    }
+    for quantity, values in expected.items():
+        swept = incline.sweep(quantity, lam0, v0, direction)
+        assert swept.route_counts() == {"single": lam0.size}
+        assert swept.values == pytest.approx(values, rel=2e-14, abs=1e-15)
+    assert incline.sweep("half_period", lam0, v0, direction).status_counts() == {STATUS_SENTENCES[2]: lam0.size}
+
+
+def test_bodies_that_leave_come_to_places(incline: ModuleType) -> None:
+    """Before and behind the turning point, and never beyond it or against the direction of motion."""
+    lam0, v0, direction = LEAVING.T
+    pull, top = 0.6 * 9.81 / 1.25, np.where(direction < 0, lam0 - (v0 / 1.25) ** 2 / (2 * 0.6 * 9.81 / 1.25), lam0)
+    for place in (-0.9, 0.1, 0.4, 1.0, 1.9):
+        swept = incline.sweep("time_at", lam0, v0, direction, lam=place)
+        assert swept.route_counts() == {"single": lam0.size}
+        speed = np.sqrt(np.maximum((v0 / 1.25) ** 2 + 2 * pull * (place - lam0), 0.0))
+        ahead, down, out = direction * (place - lam0) > 0, direction > 0, top < -1
+        first = np.where(ahead & ~down, v0 / 1.25 - speed, speed - direction * v0 / 1.25) / pull
+        never = (place < top) | (~ahead & (down | out))
+        assert swept.values == pytest.approx(np.where(never, np.nan, first), rel=1e-13, nan_ok=True)
+
+
+def test_a_narrow_peak_of_the_load(generated_folder: Path) -> None:
+    """Next to where r = 1/sin(theta) - 2 turns round the origin, the grid of an orbit is much coarser than the peak."""
+    curve = gqm.Curve.polar("1/sin(theta) - 2", parameter="theta", domain=("0.1", "3.04"))
+    module = gqm.build(gqm.derive(curve, gqm.Gravity()), name="conchoid", folder=generated_folder)
+    lam0, v0 = np.array([1.15546, 0.6]), np.array([7.866, 5.0])
+    swept = module.sweep("normal_force_max", lam0, v0, 1)
+    for k, value in enumerate(swept.values.tolist()):
+        motion = module.solve(lam0[k], v0[k])
+        places = np.linspace(lam0[k], motion.legs[-1].lam_end, 400_001)
+        loads = module.pass1(places, lam0[k], v0[k]).normal_force
+        assert loads.max() * (1 - 1e-13) <= value <= loads.max() * (1 + 1e-7)
 
 
 def test_small_swings_keep_contact(module_of: ModuleOf) -> None:

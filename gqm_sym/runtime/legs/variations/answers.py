@@ -6,23 +6,18 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gqm_sym.arguments import one_of
 from gqm_sym.errors import SolutionError
 from gqm_sym.runtime.compiled.calls import call_static_balance
 from gqm_sym.runtime.compiled.jit import entry
 from gqm_sym.runtime.compiled.types import INTEGER, MATRIX, VECTOR, Array
 from gqm_sym.runtime.gradients.orbit import path_rows
-from gqm_sym.runtime.gradients.quantities import EXTREMES
-from gqm_sym.runtime.gradients.quantities import QUANTITIES as PERIODIC_QUANTITIES
+from gqm_sym.runtime.launch.kinds import EXTREMES, PERIODIC_QUANTITIES
 from gqm_sym.runtime.launch.speed import path_and_force_at
 from gqm_sym.runtime.legs.leg_record import END, END_LOW, HEADING
 from gqm_sym.runtime.legs.variations.changes import Changes
 from gqm_sym.runtime.legs.variations.equation import LawRows
 from gqm_sym.runtime.motion.events import Leg
 from gqm_sym.runtime.motion.trajectory import PhasePoints
-
-# What has a gradient.
-QUANTITIES = ("turning_points", "t_end", "rest_position", *EXTREMES)
 
 # An extreme inside a leg is improved by Newton's method, whose steps may be this share of the time of the motion.
 MAX_STEP, NEWTON_STEPS = 1e-5, 3
@@ -136,11 +131,10 @@ def gradient(motion: Any, changes: Changes, quantity: str) -> Array:
     changes : Changes
         The changes of its legs.
     quantity : str
-        One of `QUANTITIES`.
+        One of `launch.kinds.QUANTITIES`.
     """
-    if quantity in PERIODIC_QUANTITIES and quantity not in QUANTITIES:
+    if quantity in PERIODIC_QUANTITIES:
         raise SolutionError(f"gradient: a motion with losses does not repeat, and so it has no {quantity}")
-    one_of(quantity, QUANTITIES, where="gradient: quantity")
     if quantity == "turning_points":
         return turning_points(motion, changes)
     if quantity in EXTREMES:

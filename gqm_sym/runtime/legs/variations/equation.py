@@ -12,7 +12,7 @@ The solutions for each parameter (with sigma = 0), for sigma = 1 alone, and for 
 panels at once; the change of a leg is a sum of them (`changes`).
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import cached_property
 from itertools import pairwise
 from math import ceil, inf, log2
@@ -23,20 +23,24 @@ from numba import types
 from numpy.polynomial.chebyshev import chebvander
 from numpy.typing import NDArray
 
-from gqm_sym.runtime.arithmetic.doubledouble import two_sum
+from gqm_sym.runtime.arithmetic.doubledouble import ULP, two_sum
 from gqm_sym.runtime.compiled.jit import entry
 from gqm_sym.runtime.compiled.types import MATRIX, VECTOR, Array
+from gqm_sym.runtime.double_double.arithmetic import UNIT
 from gqm_sym.runtime.gradients.orbit import pairs, values, without_formulas
-from gqm_sym.runtime.gradients.programs import law_program
+from gqm_sym.runtime.gradients.programs import force_program, law_program
 from gqm_sym.runtime.interface import ExactLaw
 from gqm_sym.runtime.launch.problem import Problem
 from gqm_sym.runtime.legs.leg_record import END, HEADING, NORMAL_LOAD, RIGHT, START, Y_ROW
-from gqm_sym.runtime.legs.leg_run import LEAST_V2
+from gqm_sym.runtime.legs.leg_run import ASYMPTOTE, LEAST_V2
 from gqm_sym.runtime.legs.leg_segments import Run
 from gqm_sym.runtime.legs.polynomials import COUNT, GRADED_MEANS, MEANS, SHARES, TO_COEFFICIENTS
 
 # The nodes of a panel and its end, as shares of it.
 POINTS = np.append(SHARES, 1.0)
+
+# Roundings of doubles over those of double-double arithmetic.
+COARSER = 0.5 * ULP / UNIT
 
 # From values at the nodes to that at the end of a panel.
 TO_END = TO_COEFFICIENTS.sum(axis=0)
@@ -104,14 +108,50 @@ class Law:
     def rows(self, places: tuple[Array, Array], w: Array, v: Array, nu: Array) -> LawRows:
         """The law at places of two doubles each, where V**2 is ``w``, for the signs of dlam/dt and of N."""
         n, least = self.count, np.maximum(w, LEAST_V2)  # laws may take its root
-        found, program = np.empty((2 * n + 8, w.size)), law_program(self.exact, n)
-        for direction, contact_sign in sorted(set(zip(v.tolist(), nu.tolist(), strict=True))):
-            signs = pairs((direction, 0.0, 0.0), (contact_sign, 0.0, 0.0))
-            here = (v == direction) & (nu == contact_sign)
-            inputs = np.ascontiguousarray(np.hstack([self.parameters, signs]))
-            found[:, here] = values(program, inputs, places[0][here], places[1][here], least[here])[:, 0]
+        found = np.empty((2 * n + 8, w.size))
+        for here, inputs in self._inputs(v, nu):
+            rows = values(law_program(self.exact, n), inputs, places[0][here], places[1][here], least[here])
+            found[:, here] = rows[:, 0]
         ds, slope, load = found[: n + 2], found[n + 2 : 2 * n + 5], found[2 * n + 5 :]
         return LawRows(ds[0], ds[1], ds[2:], slope[0], slope[1], slope[2], slope[3:], load)
+
+    def force_errors_along(self, runs: Sequence[Run]) -> list[Array]:
+        """`force_errors` on the panels of each run, first those from its start: the largest of three places of each."""
+        places, signs, counts = [], [], []
+        for run in runs:
+            v, halves = run.record[HEADING], [(run.record[START], run.half_c, run.panels_ahead)]
+            if run.what != ASYMPTOTE:
+                halves.append((run.record[END], 0.0, run.panels_back))
+            counts.append(sum(len(panels) for *_, panels in halves))
+            for sense, (origin, half_c, panels) in zip((v, -v), halves, strict=False):
+                right = panels[:, RIGHT]
+                left = np.append(0.0, right)[:-1]
+                w = np.array([left, 0.5 * (left + right), right])
+                places.append(origin + sense * (w if half_c == inf else w * (w + 2.0 * half_c)))
+                nu = np.where(panels[:, NORMAL_LOAD + COUNT // 2] > 0.0, 1.0, -1.0)
+                signs.append(np.array([np.full_like(nu, v), nu]))
+        (v, nu), at = np.hstack(signs), np.hstack(places)
+        errors = self.force_errors(at.ravel(), np.tile(v, 3), np.tile(nu, 3)).reshape(at.shape)
+        return np.split(errors.max(axis=0), np.cumsum(counts)[:-1])
+
+    def force_errors(self, places: Array, v: Array, nu: Array) -> Array:
+        """By how much dW/dlam of a body at rest may be off in doubles: by rounding, and by rounding of the place.
+
+        Double-double arithmetic has a running bound on the error of each number, which grows with the unit of rounding.
+        """
+        errors, program = np.empty(places.size), force_program(self.exact, self.count)
+        for here, inputs in self._inputs(v, nu):
+            inputs[2, : self.count] = np.abs(self.parameters[1]) / COARSER  # doubles lack the low parts
+            at = np.ascontiguousarray(places[here])
+            force, slope = values(program, inputs, at, None, np.full_like(at, LEAST_V2))
+            errors[here] = COARSER * force[2] + 0.5 * ULP * np.abs(at * slope[0])
+        return np.nan_to_num(errors, posinf=0.0)
+
+    def _inputs(self, v: Array, nu: Array) -> Iterator[tuple[NDArray[np.bool_], Array]]:
+        """For each pair of signs of dlam/dt and N, where it holds, and what programs take."""
+        for direction, contact_sign in sorted(set(zip(v.tolist(), nu.tolist(), strict=True))):
+            signs = pairs((direction, 0.0, 0.0), (contact_sign, 0.0, 0.0))
+            yield (v == direction) & (nu == contact_sign), np.ascontiguousarray(np.hstack([self.parameters, signs]))
 
 
 class Panels:

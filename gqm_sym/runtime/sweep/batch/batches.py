@@ -33,6 +33,7 @@ from gqm_sym.runtime.sweep.batch.rows import (
     STATE,
     TIME_ROWS,
     TRIAL,
+    ZERO_BEHIND,
     Orbits,
     Scratch,
     contains,
@@ -179,7 +180,11 @@ def kind_of_librations(fns, orbits, monotone):  # type: ignore[no-untyped-def]
     kind = LIBRATION
     if mirrored and one_axis and (fns.time_integrand or fns.agm_arguments):
         kind = AGM_LIBRATION if fns.agm_arguments else AXIS_LIBRATION
-    return OrbitKind(kind, mirrored, monotone and mirrored and one_axis)
+    # Where closed forms gave turning points, V**2 is monotone on either side of the axis.
+    known = True
+    for j in range(n):
+        known &= rows[ZERO_BEHIND, j] == rows[ZERO_BEHIND, j]
+    return OrbitKind(kind, mirrored, (monotone or known) and mirrored and one_axis)
 
 
 @entry(

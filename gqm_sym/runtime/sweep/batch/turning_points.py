@@ -58,12 +58,14 @@ NEAR_MAXIMUM, INACCURATE = 1e-9, 0.5
 
 
 @Inner
-def by_closed_form(fns, n, rows, p, domain, work):  # type: ignore[no-untyped-def]
+def by_closed_form(fns, n, rows, p, domain, monotone, work):  # type: ignore[no-untyped-def]
     """Set both zeros, and the direction of bodies at rest, by the closed form of the width of the orbit in its well.
 
     Where that does not hold ZERO_BEHIND is NaN. The state is NOWHERE for bodies that pass the maximum next to the well,
-    and SEEKING for all others.
+    and SEEKING for all others. Where V**2 is ``monotone`` between axes for some parameters only, each root is improved,
+    for it may lose digits, and launches in other periods are left to the search.
     """
+    limit = INACCURATE if monotone else -1.0
     start, w0, direction, state = (
         rows[LAUNCH_PLACE, :n],
         rows[LAUNCH_V2, :n],
@@ -87,7 +89,7 @@ def by_closed_form(fns, n, rows, p, domain, work):  # type: ignore[no-untyped-de
         offsets[j] = fma(-periods, period, axis[j])
         halves[j] = choose(rests & (periods == 0.0), fabs(axis[j]), out[0, j])
         ahead[j] = choose(rests, choose(offsets[j] < 0.0, 1.0, -1.0), direction[j])
-        inaccurate[j] = choose((periods == 0.0) & (w0[j] > 0.0) & (out[2, j] > INACCURATE), 1.0, 0.0)
+        inaccurate[j] = choose((periods == 0.0) & (w0[j] > 0.0) & (out[2, j] > limit), 1.0, 0.0)
     if contains(inaccurate, 1.0):
         near, ends, widths = work[6, :n], work[7, :n], work[8, :n]
         slopes = work[9:12].reshape(-1)[: 3 * n].reshape(3, n)
@@ -101,7 +103,7 @@ def by_closed_form(fns, n, rows, p, domain, work):  # type: ignore[no-untyped-de
     for j in range(n):
         offset, half, sense, step, rests = offsets[j], halves[j], ahead[j], steps[j], w0[j] == 0.0
         size, alone = fabs(offset), step == 0.0
-        well = (out[1, j] > 0.0) & (alone | (size < step))
+        well = (out[1, j] > 0.0) & (alone | (size < step)) & (monotone | (offset == axis[j]))
         clear = (size > NEAR_AXIS * (fabs(start[j]) + fabs(places[j]))) & (alone | (size < MAX_AXIS_STEP_SHARE * step))
         inside = choose(size > half, half, size)  # many periods away the offset is rounded more than the width
         ascent = choose(sense * offset < 0.0, -inside, inside)
@@ -135,8 +137,8 @@ def start_search(fns, n, rows, p, domain, monotone, work):  # type: ignore[no-un
         rows[ZERO, :n],
         rows[ZERO_BEHIND, :n],
     )
-    if monotone and fns.turning_point:
-        by_closed_form(fns, n, rows, p, domain, work)
+    if fns.turning_point:
+        by_closed_form(fns, n, rows, p, domain, monotone, work)
     else:
         behind[:], zero[:], state[:] = nan, 0.0, SEEKING
     none, undecided, out = work[0, :n], work[1, :n], work[2:5].reshape(-1)[: 3 * n].reshape(3, n)

@@ -1,0 +1,68 @@
+"""How a track in space is banked: by an angle, or so that riders feel no lateral force."""
+
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import sympy as sp
+
+from gqm_sym.arguments import short
+from gqm_sym.errors import DeclarationError
+from gqm_sym.expressions import read_expression
+
+Source: TypeAlias = str | int | sp.Expr
+Roll: TypeAlias = Source | tuple[Source, Source]
+
+COORDINATED = "coordinated"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Banking:
+    """The banking of a track, and the line that its riders follow.
+
+    Attributes
+    ----------
+    angle
+        The roll angle in radians, in the curve's parameter and run-time parameters; None where the track is banked so
+        that the lateral force vanishes.
+    speed
+        The speed at which it vanishes; None where that is the speed of the motion.
+    heartline
+        The height of the declared curve, which the riders follow, over the track.
+    """
+
+    angle: sp.Expr | None
+    speed: sp.Expr | None
+    heartline: sp.Expr
+
+    @property
+    def forms(self) -> tuple[sp.Expr, ...]:
+        """The expressions that it holds."""
+        return tuple(form for form in (self.angle, self.speed, self.heartline) if form is not None)
+
+
+def read_banking(roll: Roll | None, heartline: Source) -> Banking | None:
+    """Read the arguments ``roll`` and ``heartline`` of a space curve; None where no roll is declared.
+
+    Raises
+    ------
+    DeclarationError
+        If they are no such thing, or there is a heartline without a roll.
+    """
+    height = read_expression(heartline, where="space: heartline", unit="m")
+    if roll is None:
+        if height != 0:
+            raise DeclarationError(
+                f"space: heartline: {height} is measured across the banked track; declare roll too, an angle or "
+                f"{COORDINATED!r}"
+            )
+        return None
+    if isinstance(roll, tuple | list):
+        if len(roll) != 2 or roll[0] != COORDINATED:
+            raise DeclarationError(
+                f"space: roll: must be an angle, {COORDINATED!r} or ({COORDINATED!r}, speed), got {short(roll)}"
+            )
+        speed = read_expression(roll[1], where="space: roll: speed", unit="m/s")
+        return Banking(angle=None, speed=speed, heartline=height)
+    if roll == COORDINATED:
+        return Banking(angle=None, speed=None, heartline=height)
+    return Banking(angle=read_expression(roll, where="space: roll", unit="rad"), speed=None, heartline=height)

@@ -1,0 +1,150 @@
+"""What a rider on a banked track feels, in closed form.
+
+With t × N/m = T the contact force has the component T·(t × u) along any unit vector u across the track. Riders sit
+upright along u = u₀ cos ψ + l₀ sin ψ, where l₀ is horizontal and points to the left, u₀ = t × l₀, and ψ is the roll
+angle. In a vertical plane u₀ is its normal, so that it also is defined where the tangent is vertical. A track without
+lateral force has u along N, at the speed of the motion or at a declared one.
+"""
+
+from dataclasses import dataclass
+
+import sympy as sp
+
+from gqm_sym.declare.banking import Banking
+from gqm_sym.derivation.algebra.differentiate import differentiate
+from gqm_sym.derivation.forces.forces import Forces, Place
+from gqm_sym.derivation.geometry.geometry import PAIRS, Geometry
+from gqm_sym.kernels.base import DIRECTION, W
+
+STANDARD_GRAVITY = sp.Rational(980665, 100000)
+"""What loads are measured in, in m/s²."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Rider:
+    """Closed forms in λ, W = V² and the signs of ds/dt and of N.
+
+    Attributes
+    ----------
+    loads
+        Along the rider's upward direction, to the left and forwards: what is felt, in units of 9.80665 m/s².
+    onsets
+        The rates of change of the loads, per second.
+    roll
+        Cosine and sine of the roll angle, each times a positive number.
+    up
+        The rider's upward direction.
+    level
+        The square of the tangent's horizontal part, where the roll angle is measured from the level; else 1.
+    """
+
+    loads: Place
+    onsets: Place
+    roll: tuple[sp.Expr, sp.Expr]
+    up: Place
+    level: sp.Expr
+
+    @property
+    def forms(self) -> tuple[sp.Expr, ...]:
+        """All of them."""
+        return (*self.loads, *self.onsets, *self.roll, *self.up, self.level)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Seat:
+    """The force on a rider per unit mass, upwards and to the left, and where upwards is."""
+
+    vertical: sp.Expr
+    lateral: sp.Expr
+    roll: tuple[sp.Expr, sp.Expr]
+    up: Place
+    level: sp.Expr = sp.S.One
+
+
+def rider(banking: Banking, shape: Geometry, law: Forces, acceleration: sp.Expr, lam: sp.Symbol) -> Rider:
+    """Derive what a rider feels.
+
+    Parameters
+    ----------
+    banking
+        How the track is banked.
+    shape, law
+        The curve and the applied forces along it.
+    acceleration
+        A in λ and W, so that dW/ds = 2 A.
+    lam
+        The curve's parameter.
+    """
+    seat = _in_plane(banking, shape, law) if shape.heading is not None else _in_space(banking, shape, law)
+    # What holds the rider back or pushes him: all that the potential does not do.
+    felt = (seat.vertical, seat.lateral, acceleration - law.push)
+    vertical, lateral, ahead = (load / STANDARD_GRAVITY for load in felt)
+
+    def onset(load: sp.Expr) -> sp.Expr:
+        change = differentiate(load, lam) / shape.ds + 2 * acceleration * differentiate(load, W)
+        return DIRECTION * sp.sqrt(W) * change
+
+    return Rider(
+        loads=(vertical, lateral, ahead),
+        onsets=(onset(vertical), onset(lateral), onset(ahead)),
+        roll=seat.roll,
+        up=seat.up,
+        level=seat.level,
+    )
+
+
+def _in_plane(banking: Banking, shape: Geometry, law: Forces) -> _Seat:
+    """In a vertical plane, whose normal carries the contact force: that alone has no lateral part."""
+    assert shape.heading is not None
+    cosine, sine = shape.heading
+    angle = sp.S.Zero if banking.angle is None else banking.angle
+    force, left = shape.kappa * W + law.static_normal_load, (-sine, cosine, sp.S.Zero)
+    upright, tilted = sp.cos(angle), sp.sin(angle)
+    along_x, along_y, along_z = (n * upright + side * tilted for n, side in zip(shape.normal, left, strict=True))
+    return _Seat(
+        vertical=force * upright, lateral=-force * tilted, roll=(upright, tilted), up=(along_x, along_y, along_z)
+    )
+
+
+def _in_space(banking: Banking, shape: Geometry, law: Forces) -> _Seat:
+    way = shape.tangent
+    across, along, _ = way
+    turned = _turned(shape, law, W)
+    if banking.angle is None:
+        loaded = turned if banking.speed is None else _turned(shape, law, banking.speed**2)
+        size = sp.sqrt(sp.Add(*(part**2 for part in loaded)))
+        up_x, up_y, up_z = (part / size for part in _cross(loaded, way))
+        roll = (loaded[0] * along - loaded[1] * across, loaded[2])
+        if banking.speed is None:
+            return _Seat(vertical=size, lateral=sp.S.Zero, roll=roll, up=(up_x, up_y, up_z))
+        vertical, lateral = _dot(turned, loaded) / size, -_dot(_cross(turned, way), loaded) / size
+        return _Seat(vertical=vertical, lateral=lateral, roll=roll, up=(up_x, up_y, up_z))
+    level = across**2 + along**2
+    width = sp.sqrt(level)
+    upwards, sideways = (turned[0] * along - turned[1] * across) / width, turned[2] / width
+    upright, tilted = sp.cos(banking.angle), sp.sin(banking.angle)
+    left = (-along / width, across / width, sp.S.Zero)
+    above = (-way[2] * across / width, -way[2] * along / width, width)
+    up_x, up_y, up_z = (one * upright + other * tilted for one, other in zip(above, left, strict=True))
+    return _Seat(
+        vertical=upwards * upright + sideways * tilted,
+        lateral=sideways * upright - upwards * tilted,
+        roll=(upright, tilted),
+        up=(up_x, up_y, up_z),
+        level=level,
+    )
+
+
+def _turned(shape: Geometry, law: Forces, w: sp.Expr) -> Place:
+    """The vector t × N/m at V² = w."""
+    along_x, along_y, along_z = (bend * w + load for bend, load in zip(shape.bend, law.loads, strict=True))
+    return along_x, along_y, along_z
+
+
+def _cross(one: Place, other: Place) -> Place:
+    along_x, along_y, along_z = (one[i] * other[j] - one[j] * other[i] for i, j in PAIRS)
+    return along_x, along_y, along_z
+
+
+def _dot(one: Place, other: Place) -> sp.Expr:
+    return sp.Add(*(a * b for a, b in zip(one, other, strict=True)))

@@ -1,0 +1,1 @@
+"""What the rider of a banked track feels along a motion."""
