@@ -252,10 +252,10 @@ def _interpolated(points: Array, knots: Array, closed: bool) -> Any:
 
     try:
         return make_interp_spline(knots, points, k=DEGREE, bc_type="periodic" if closed else None)
-    except (np.linalg.LinAlgError, ValueError) as error:
+    except (np.linalg.LinAlgError, ValueError):
         raise SolutionError(
-            f"sampled: no smooth track through these points was found ({error}); are they close enough along it, or is "
-            "it made of planes (kind 'linear')?"
+            "sampled: no smooth track through these points was found; give more of them where the track bends most, or "
+            "declare planes (kind 'linear')"
         ) from None
 
 
