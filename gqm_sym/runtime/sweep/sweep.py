@@ -23,6 +23,7 @@ from gqm_sym.runtime.compiled.threads import run_in_threads
 from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.interface import ExactPotential
 from gqm_sym.runtime.launch.formulas import chart_with, true_pieces_of
+from gqm_sym.runtime.launch.kinds import LOAD_EXTREMES
 from gqm_sym.runtime.launch.request import ONLY_SIGN, LaunchRequest, check_contact
 from gqm_sym.runtime.launch.rider import check_banked
 from gqm_sym.runtime.launch.speed import path_and_force_at, potential_at
@@ -91,7 +92,7 @@ def sweep(
     """
     lam0, v0, direction, _, t_max, contact = launches
     found = QUANTITIES[one_of(quantity, tuple(QUANTITIES), where="quantity")]
-    if quantity in quantities.LOAD_EXTREMES:
+    if quantity in LOAD_EXTREMES:
         check_banked(formulas, quantity)
     if (lam is None) == (quantity == "time_at"):
         raise InputError(f"lam: is the place that 'time_at' asks about, got {short(lam)} with {quantity!r}")
