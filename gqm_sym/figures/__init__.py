@@ -8,6 +8,7 @@ from typing import Any
 
 from gqm_sym.figures.motions import animate, portrait, sampled, speed_and_force, track
 from gqm_sym.figures.portraits import period_against_amplitude, phase_portrait
+from gqm_sym.figures.rides import ride
 from gqm_sym.figures.surveys import smoothing
 
 __all__ = [
@@ -15,6 +16,7 @@ __all__ = [
     "period_against_amplitude",
     "phase_portrait",
     "portrait",
+    "ride",
     "sampled",
     "smoothing",
     "speed_and_force",

@@ -164,6 +164,7 @@ ONLY_IN = {
     "jinja2": {"emission"},
     "llvmlite": {"runtime"},
     "matplotlib": {"figures", "report"},
+    "mpl_toolkits": {"figures"},
     "mpmath": {"runtime", "literals", "figures", "design"},
     "numba": {"runtime"},
     "pandas": {"export"},
@@ -191,7 +192,9 @@ ONLY_IN = {
 }
 
 # Imported when exact digits, splines, pictures, datasets or units are asked for, so never by a module as it loads.
-ONLY_INSIDE_FUNCTIONS = {"distributed", "jax", "matplotlib", "mpmath", "pandas", "pint", "scipy", "xarray"}
+ONLY_INSIDE_FUNCTIONS = {
+    *("distributed", "jax", "matplotlib", "mpl_toolkits", "mpmath", "pandas", "pint", "scipy", "xarray"),
+}
 
 
 class Import(NamedTuple):

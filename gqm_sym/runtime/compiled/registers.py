@@ -166,6 +166,17 @@ def copied(width: int) -> Any:
 
 
 @intrinsic
+def hidden(_, count):  # type: ignore[no-untyped-def]
+    """Return an integer unknown to LLVM, which vectorises a loop of that length; it would unroll it otherwise."""
+
+    def lower(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        whole = ir.IntType(64)  # an empty piece of assembly, through which LLVM does not look
+        return builder.asm(ir.FunctionType(whole, [whole]), "", "=r,0", [args[0]], side_effect=False)
+
+    return types.int64(types.int64), lower
+
+
+@intrinsic
 def uncounted(_, array):  # type: ignore[no-untyped-def]
     """Return an array whose references numba does not count, for calls that end before its owner does."""
 
@@ -178,9 +189,10 @@ def uncounted(_, array):  # type: ignore[no-untyped-def]
     return array(array), lower
 
 
+@in_python(hidden)
 @in_python(uncounted)
-def _same(array: Any) -> Any:
-    return array
+def _same(given: Any) -> Any:
+    return given
 
 
 def on_stack(count: int) -> Any:

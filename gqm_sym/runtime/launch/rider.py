@@ -1,5 +1,6 @@
 """Loads on the rider of a banked track, at places and speeds."""
 
+from itertools import product
 from math import atan2
 from typing import TYPE_CHECKING
 
@@ -72,15 +73,19 @@ def rider_loads(formulas: "Formulas", p: Array, lam: Array, v2: Array, direction
         If the tangent is vertical where the roll angle is measured from the level.
     """
     assert formulas.rider_loads is not None
-    rows = np.empty((len(FIELDS), lam.size))
-    sides = np.where(force < 0.0, -1.0, 1.0) if formulas.signed else np.ones(lam.size)
-    for v, nu in set(zip(direction.tolist(), sides.tolist(), strict=True)):
-        here = (direction == v) & (sides == nu)
-        found = rider_loads_at(formulas.rider_loads.address, p, lam[here], v2[here], v, nu)
-        if (vertical := found[-1] < MIN_LEVEL).any():
-            raise SolutionError(
-                f"roll: the tangent is vertical at {formulas.parameter} = {float(lam[here][vertical][0])!r}, where no "
-                "level is to measure a roll angle from; declare roll='coordinated'"
-            )
-        rows[:, here] = found[:-1]
-    return rows
+    rows = np.full((len(FIELDS) + 1, lam.size), np.nan)
+    rubs = formulas.signed and formulas.dissipation is not None and formulas.dissipation.friction
+    pushed = force < 0.0 if rubs else np.zeros(lam.size, dtype=np.bool_)
+    for v, nu in product((1.0, -1.0, 0.0), (1.0, -1.0)):
+        here = (direction == v) & (pushed == (nu < 0.0))
+        if here.all():
+            rows = rider_loads_at(formulas.rider_loads.address, p, lam, v2, v, nu)
+            break
+        if here.any():
+            rows[:, here] = rider_loads_at(formulas.rider_loads.address, p, lam[here], v2[here], v, nu)
+    if (vertical := rows[-1] < MIN_LEVEL).any():
+        raise SolutionError(
+            f"roll: the tangent is vertical at {formulas.parameter} = {float(lam[vertical][0])!r}, where no level is "
+            "there to measure a roll angle from; declare roll='coordinated'"
+        )
+    return rows[:-1]

@@ -212,8 +212,7 @@ class DissipativeMotion(Motion):
         )
         self._at = self._body[0].tolist()
         self._frame: Frame | None = None
-        if may_be_small(_loss(problem), problem.functions.p, launch.lam0.value, problem.w0):
-            self._enter_frame(launch.lam0.value, launch.lam0.low, problem.w0, launch.lam0)
+        self._enter_frame(launch.lam0.value, launch.lam0.low, problem.w0, launch.lam0)
         v0 = launch.v0
         # The errors with which the legs begin.
         of_place = abs(launch.lam0.low) if self._frame is None else ULP * abs(self._body[0, PLACE])
@@ -657,10 +656,10 @@ class DissipativeMotion(Motion):
         About an unstable equilibrium it does not stay, so that only its launch, ``lam0``, is worth that.
         """
         problem, line, loss = self.problem, self._body[0], _loss(self.problem)
-        if loss.friction or loss.kinked:
+        ends = np.abs(np.append(problem.functions.breaks, (problem.low, problem.high)) - place)
+        reach = min(starting_step(problem), float(ends.min()))
+        if not may_be_small(loss, problem.functions.p, place, v2, reach):
             return
-        ends = [abs(end - place) for end in (problem.low, problem.high, *problem.functions.breaks) if isfinite(end)]
-        reach = min([starting_step(problem), *ends])
         frame = frame_near(loss, problem.functions.p, (place, low, v2), reach)
         if frame is None or not (frame.is_stable or lam0):
             return

@@ -221,8 +221,8 @@ class Segment:
 
     def _initial_edges(self) -> Array:
         """The first and the last phase angle, and those at which panels must begin, to the rounding of their places."""
-        places = self.functions.between(self.functions.breaks, self.a, self.b)
-        inside = [self.phase_angle_of(*self._offsets_in_doubles(place)) for place in (*places, *self.panel_breaks)]
+        places = [*self.functions.between(self.functions.breaks, self.a, self.b).tolist(), *self.panel_breaks]
+        inside = self._phase_angles([self._offsets_in_doubles(place) for place in places])
         return np.array(sorted({0.0, *(phi for phi in inside if 0.0 < phi < self.stop), self.stop}))
 
     @property
@@ -403,8 +403,14 @@ class Segment:
 
     def phase_angle_of(self, offset_a: float, offset_b: float) -> float:
         """The phase angle of a place, which is given by its signed distances ``lam - a`` and ``b - lam``."""
-        ahead, behind = max(offset_a * self.direction, 0.0), max(offset_b * self.direction, 0.0)
-        return phase_angle_of(self.kind, self.turn_offset, ahead, behind, abs(self.width))
+        return self._phase_angles([(offset_a, offset_b)])[0]
+
+    def _phase_angles(self, offsets: list[tuple[float, float]]) -> list[float]:
+        kind, offset, width, sign = self.kind, self.turn_offset, abs(self.width), self.direction
+        return [
+            phase_angle_of(kind, offset, max(ahead * sign, 0.0), max(behind * sign, 0.0), width)
+            for ahead, behind in offsets
+        ]
 
     def places(self, phi: Array) -> Array:
         """The curve parameter at phase angles, computed from the nearer end."""

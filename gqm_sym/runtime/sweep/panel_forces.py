@@ -7,7 +7,7 @@ together when they are first asked for, and kept for launches with the same fact
 from math import fabs, inf
 
 from gqm_sym.runtime.arithmetic.doubledouble import add
-from gqm_sym.runtime.compiled.jit import Inner
+from gqm_sym.runtime.compiled.jit import Inlined, Inner
 from gqm_sym.runtime.double_double.arithmetic import multiply
 from gqm_sym.runtime.sweep.curve_table import (
     BASE,
@@ -96,11 +96,8 @@ def fill_load(curve, k):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def prepare(curve, k, wanted):  # type: ignore[no-untyped-def]
-    """Fill the row of panel k, as far as ``wanted`` (FAR, NEAR and LOAD, added up) and not there yet."""
-    missing = wanted & ~curve.levels[k]
-    if missing == 0:
-        return
+def fill_missing(curve, k, missing):  # type: ignore[no-untyped-def]
+    """Fill what is missing of the row of panel k."""
     if missing & FAR:
         fill_far(curve, k)
     if missing & NEAR:
@@ -108,6 +105,14 @@ def prepare(curve, k, wanted):  # type: ignore[no-untyped-def]
     if missing & LOAD:
         fill_load(curve, k)
     curve.levels[k] |= missing
+
+
+@Inlined
+def prepare(curve, k, wanted):  # type: ignore[no-untyped-def]
+    """Fill the row of panel k, as far as ``wanted`` (FAR, NEAR and LOAD, added up) and not there yet."""
+    missing = wanted & ~curve.levels[k]
+    if missing != 0:
+        fill_missing(curve, k, missing)
 
 
 @Inner

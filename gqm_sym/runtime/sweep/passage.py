@@ -11,9 +11,10 @@ from typing import NamedTuple
 import numpy as np
 
 from gqm_sym.runtime.arithmetic.doubledouble import two_sum
-from gqm_sym.runtime.arithmetic.elementary import cos, sin
+from gqm_sym.runtime.arithmetic.elementary import cos, inverse_root, sin
+from gqm_sym.runtime.compiled.intrinsics import choose
 from gqm_sym.runtime.compiled.jit import Inlined, Inner
-from gqm_sym.runtime.compiled.registers import on_stack
+from gqm_sym.runtime.compiled.registers import hidden, on_stack
 from gqm_sym.runtime.launch.zeros import CONSTANT_SHARE, CRITICAL, LIMIT, TURN
 from gqm_sym.runtime.quadrature.time_panels import MIN_CANCELLATION_RATIO
 from gqm_sym.runtime.sweep.curve_table import (
@@ -61,6 +62,9 @@ MAX_PHASE_RATIO = 4.0
 # What their extrapolation to that degree may be, and what counts as rounding noise.
 MAX_ERROR_RATIO, NOISE_RATIO = 2e-16, 2e-15
 
+# The last step of Newton's method to a turning point, in halves of the panel: the error is about its square.
+MAX_LAST_STEP = 2.0**-32
+
 # How near to an equilibrium a turning point may lie, as a share of the panel, for doubles to decide that it is one.
 MAX_ZERO_ERROR = 1e-6
 
@@ -68,7 +72,8 @@ MAX_ZERO_ERROR = 1e-6
 # body certainly falls.
 MIN_SLOPE_SHARE = 1e-6
 
-few_rates, rates_buffer, angle_buffer = on_stack(FEW_NODES), on_stack(NODES), on_stack(NODES)
+few_rates = on_stack(FEW_NODES)
+rates_buffer, angle_buffer, place_buffer, fall_buffer = (on_stack(NODES) for _ in range(4))
 
 
 # Which ends of a passage are turning points.
@@ -142,6 +147,15 @@ def locate(table, period, place):  # type: ignore[no-untyped-def]
     return below + int(laps) * count, near - 1.0 if before <= behind else 1.0 - near, near
 
 
+@Inlined
+def neighbour(k, direction, count):  # type: ignore[no-untyped-def]
+    """The panel next to panel k; on a closed curve the first is next to the last."""
+    k += direction
+    if k == count:
+        return 0
+    return k if k >= 0 else count - 1
+
+
 @Inner
 def edge_place(table, period, index):  # type: ignore[no-untyped-def]
     """The place of the left edge of a panel; on a closed curve by its index over all laps."""
@@ -213,7 +227,7 @@ def rise_between(rows, k, other):  # type: ignore[no-untyped-def]
 
 @Inner
 def zero_on_panel(rows, k, slack, near, far):  # type: ignore[no-untyped-def]
-    """Where the potential of panel k reaches ``slack`` between a place below it and one above it."""
+    """Where the potential of panel k reaches ``slack`` between a place below it and one above it (see `polished`)."""
     x = 0.5 * (near + far)
     for _ in range(60):
         value, slope, r = 0.0, 0.0, 1.0 + x
@@ -229,7 +243,7 @@ def zero_on_panel(rows, k, slack, near, far):  # type: ignore[no-untyped-def]
         new = x - (value - slack) / slope
         if not min(near, far) < new < max(near, far):
             new = 0.5 * (near + far)
-        if fabs(new - x) <= 2.0**-52:
+        if fabs(new - x) <= MAX_LAST_STEP:
             return new
         x = new
     return x
@@ -248,7 +262,6 @@ def turn_from(curve, launch, w0, direction):  # type: ignore[no-untyped-def]
     energy = 0.5 * w0 + rows[k, BASE] + rise_from_left(rows, k, x, near_edge)
     margin = CONSTANT_SHARE * (0.5 * w0 + max(fabs(energy), rows[k, BASE_SIZE]))
     for passed in range(count + 1):
-        prepare(curve, k, FAR)
         error = margin + CONSTANT_SHARE * rows[k, BASE_SIZE]
         may_turn = not rows[k, HIGHEST] < energy - error
         if may_turn:
@@ -273,7 +286,8 @@ def turn_from(curve, launch, w0, direction):  # type: ignore[no-untyped-def]
         index += direction
         if period == 0.0 and not 0 <= index < count:
             break
-        k = index % count
+        k = neighbour(k, direction, count)
+        prepare(curve, k, FAR)
     return LIMIT, index, float(direction)
 
 
@@ -430,19 +444,24 @@ def fill_slacks(curve, passage, slacks):  # type: ignore[no-untyped-def]
     They are measured from the nearer turning point. On a panel that has one they are as if the curve went on beyond it.
     """
     rows, count, last = curve.rows, curve.levels.size, passage.panels - 1
-    for j in range(passage.panels):
-        prepare(curve, (passage.first + j) % count, FAR | NEAR if j in (0, last) else FAR)
     turns, paths, middle, enough = passage.turns, curve.table.paths, passage.middle, True
     k, high, begin = passage.first % count, (passage.first + last) % count, 0.0
+    at = k
+    for _ in range(passage.panels):
+        prepare(curve, at, FAR)
+        at = neighbour(at, 1, count)
+    prepare(curve, k, NEAR)
+    prepare(curve, high, NEAR)
     peak, slope = 0.0, np.inf
     if turns == NEITHER:
         peak = begin = 0.5 * passage.v2
     if turns != UPPER:
         slacks[0] = potential_on(rows, k, passage.low_x) + begin
-        slack, after = begin + rise_on(rows, k, RIGHT_TERMS, passage.low_x, -passage.low_rest), (k + 1) % count
+        slack, after = begin + rise_on(rows, k, RIGHT_TERMS, passage.low_x, -passage.low_rest), neighbour(k, 1, count)
+        at = after
         for j in range(1, middle + 1):
-            slacks[j] = slack - rise_between(rows, after, (passage.first + j) % count)
-            peak = max(peak, slacks[j])
+            slacks[j] = slack - rise_between(rows, after, at)
+            peak, at = max(peak, slacks[j]), neighbour(at, 1, count)
             enough &= slacks[j] >= MIN_CANCELLATION_RATIO * peak
         if last > 0:
             peak = max(peak, slack)
@@ -450,9 +469,10 @@ def fill_slacks(curve, passage, slacks):  # type: ignore[no-untyped-def]
             slope = -difference_on(rows, k, passage.low_x, passage.low_x) / (2.0 * paths[k, HALF])
     if turns in (BOTH, UPPER):
         top = slack = rise_on(rows, high, LEFT_TERMS, passage.high_x, passage.high_rest)
+        at = high
         for j in range(last, middle, -1):
-            slacks[j] = slack - rise_between(rows, high, (passage.first + j) % count)
-            top = max(top, slacks[j])
+            slacks[j] = slack - rise_between(rows, high, at)
+            top, at = max(top, slacks[j]), neighbour(at, -1, count)
             enough &= slacks[j] >= MIN_CANCELLATION_RATIO * top
         slope_above = difference_on(rows, high, passage.high_x, passage.high_x) / (2.0 * paths[high, HALF])
         slope, peak = min(slope, slope_above), max(peak, top)
@@ -461,20 +481,27 @@ def fill_slacks(curve, passage, slacks):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def difference_to(rows, k, inner, y, q, way):  # type: ignore[no-untyped-def]
-    """The divided difference of the potential of panel k between a place and another one, ``way`` further.
+def fill_falls_from_turn(rows, k, end, sign, x, falls):  # type: ignore[no-untyped-def]
+    """Fill what the potential of panel k falls from a turning point on it to places x, ever farther from it.
 
-    The place is ``q`` away from the edge whose numbers begin at column ``inner``. The nearer edge is taken.
+    ``end`` is the turning point, and how far it is from the edge on whose side the places are, both in halves of the
+    panel; ``sign`` is 1 if they lie above it. Divided differences are taken from the edge that is nearer.
     """
-    x = y + way
-    if (x + y < 0.0) == (inner == LEFT_TERMS):
-        return difference_from(rows, k, inner, x, q + way, y, q)
-    return difference_on(rows, k, y, x)
+    y, rest = end
+    inner, outer, edge = (RIGHT_TERMS, LEFT_TERMS, -1.0) if sign > 0.0 else (LEFT_TERMS, RIGHT_TERMS, 1.0)
+    n, q, gone = hidden(NODES), -sign * rest, y - edge
+    for i in range(n):
+        way = falls[i]
+        falls[i] = -sign * difference_from(rows, k, inner, x[i], q + way, y, q)
+    if (x[0] + y < 0.0) != (sign < 0.0):
+        for i in range(n):
+            fall = -sign * difference_from(rows, k, outer, y, gone, x[i], x[i] - edge)
+            falls[i] = choose((x[i] + y < 0.0) != (sign < 0.0), fall, falls[i])
 
 
 @Inner
 def fill_rates(curve, passage, j, from_above, slack, gap, u, out):  # type: ignore[no-untyped-def]
-    """Fill the time per unit of u on panel j of a passage at the Gauss points u.
+    """Fill the time per unit of u on panel j of a passage at the Gauss points u, which ascend.
 
     u is the orbit's phase angle, or the place on the panel if the passage has no turning point. Phase angles are
     counted from the nearer one, because a small time next to it needs a small angle with all digits; ``from_above``
@@ -482,60 +509,53 @@ def fill_rates(curve, passage, j, from_above, slack, gap, u, out):  # type: igno
     ``gap`` belong to the panel's edge that is nearer to it: V**2/2 there, and the distance from the turning point. An
     end of the curve stands for a turning point that there is not.
     """
-    rows, last = curve.rows, passage.panels - 1
+    rows, paths, last = curve.rows, curve.table.paths, passage.panels - 1
     k = (passage.first + j) % curve.levels.size
-    half = curve.table.paths[k, HALF]
-    if last == 0 and passage.turns == BOTH:
-        fill_rates_within(curve, passage, k, u, out)
-        return
-    for i in range(NODES):
-        x, numerator = u[i], half * half
-        if passage.turns == NEITHER:
-            fall = slack - potential_on(rows, k, x)
-        else:
+    x, falls, half, n = place_buffer(), fall_buffer(), paths[k, HALF], hidden(NODES)
+    if passage.turns == NEITHER:
+        for i in range(n):
+            x[i], falls[i], out[i] = u[i], slack - potential_on(rows, k, u[i]), half * half
+    elif last == 0 and passage.turns == BOTH:
+        fill_falls_within(rows, k, passage, u, x, falls)
+        for i in range(n):
+            out[i] = half * half
+    else:
+        sign, width = -1.0 if from_above else 1.0, passage.width
+        on_panel, edge = j == (last if from_above else 0), LEFT_TERMS if sign > 0.0 else RIGHT_TERMS
+        end = (passage.high_x, passage.high_rest) if from_above else (passage.low_x, passage.low_rest)
+        for i in range(n):
             s, c = sin(0.5 * u[i]), cos(0.5 * u[i])
-            below, above = passage.width * s * s, passage.width * c * c
-            if from_above:
-                below, above = above, below
+            near, far = width * s * s, width * c * c
             # V**2/2 is its value at a turning point or an edge, and what the potential falls from there.
-            if j == 0 and not from_above:
-                x, way = passage.low_x + below / half, below / half
-                fall = -difference_to(rows, k, RIGHT_TERMS, passage.low_x, -passage.low_rest, way)
-                numerator = above * half
-            elif j == last and from_above:
-                x, way = passage.high_x - above / half, above / half
-                fall = difference_to(rows, k, LEFT_TERMS, passage.high_x, passage.high_rest, -way)
-                numerator = below * half
-            elif from_above:
-                rest, numerator = (above - gap) / half, below * above
-                x = 1.0 - rest
-                fall = slack - rise_on(rows, k, RIGHT_TERMS, x, -rest)
-            else:
-                rest, numerator = (below - gap) / half, below * above
-                x = rest - 1.0
-                fall = slack - rise_on(rows, k, LEFT_TERMS, x, rest)
-        out[i] = value_on(curve.table.paths, k, DS_TERMS, x) * sqrt(numerator / (2.0 * fall))
+            way = near / half if on_panel else (near - gap) / half
+            x[i], falls[i] = (end[0] if on_panel else -sign) + sign * way, sign * way
+            out[i] = far * half if on_panel else near * far
+        if on_panel:
+            fill_falls_from_turn(rows, k, end, sign, x, falls)
+        else:
+            for i in range(n):
+                falls[i] = slack - rise_on(rows, k, edge, x[i], falls[i])
+    for i in range(n):
+        out[i] = value_on(paths, k, DS_TERMS, x[i]) * sqrt(out[i] / (2.0 * falls[i]))
 
 
 @Inner
-def fill_rates_within(curve, passage, k, u, out):  # type: ignore[no-untyped-def]
-    """Fill the time per phase angle at the Gauss points u where panel k has both turning points.
+def fill_falls_within(rows, k, passage, u, x, falls):  # type: ignore[no-untyped-def]
+    """Fill places at phase angles u where panel k has both turning points, and V**2/2 as in `fill_rates`.
 
     V**2/2 is (x - low)*(high - x) times the second divided difference of the potential, whose powers are found once.
     """
-    rows, low, high, half = curve.rows, passage.low_x, passage.high_x, curve.table.paths[k, HALF]
-    terms, first, second = rates_buffer(), 0.0, 0.0
+    low, high, terms, first, second = passage.low_x, passage.high_x, rates_buffer(), 0.0, 0.0
     for j in range(NODES, 1, -1):
         # The powers of the potential divided by x - low, and then by x - high.
         first = first * low + power_on(rows, k, j)
         second = second * high + first
         terms[j - 2] = second
-    for i in range(NODES):
+    for i in range(hidden(NODES)):
         s, c = sin(0.5 * u[i]), cos(0.5 * u[i])
-        x, bend = low * c * c + high * s * s, 0.0
+        x[i], falls[i] = low * c * c + high * s * s, 0.0
         for j in range(NODES - 2, -1, -1):
-            bend = bend * x + terms[j]
-        out[i] = value_on(curve.table.paths, k, DS_TERMS, x) * half / sqrt(2.0 * bend)
+            falls[i] = falls[i] * x[i] + terms[j]
 
 
 @Inner
@@ -599,16 +619,16 @@ def time_on_panel(curve, k, slack):  # type: ignore[no-untyped-def]
     distance, total = slack - rows[k, MIDDLE], 0.0
     if distance > SAFETY * rows[k, FEW_REACH]:
         few = few_rates()
-        for i in range(FEW_NODES):
-            few[i] = paths[k, FEW_WEIGHTS + i] / sqrt(2.0 * (slack - rows[k, FEW_POTENTIAL + i]))
+        for i in range(hidden(FEW_NODES)):
+            few[i] = paths[k, FEW_WEIGHTS + i] * inverse_root(2.0 * (slack - rows[k, FEW_POTENTIAL + i]))
         for i in range(FEW_NODES):
             total += few[i]
         return total
     if distance > SAFETY * rows[k, REACH]:
         prepare(curve, k, NEAR)
         rates = rates_buffer()
-        for i in range(NODES):
-            rates[i] = paths[k, WEIGHTS + i] / sqrt(2.0 * (slack - rows[k, POTENTIAL + i]))
+        for i in range(hidden(NODES)):
+            rates[i] = paths[k, WEIGHTS + i] * inverse_root(2.0 * (slack - rows[k, POTENTIAL + i]))
         for i in range(NODES):
             total += rates[i]
         return total
@@ -632,9 +652,9 @@ def time_between(curve, passage, slacks, lower, upper):  # type: ignore[no-untyp
     first, end = passage.first + 1, passage.first + last
     to_edge = passage.low_rest * paths[(first - 1) % count, HALF]
     from_edge = passage.high_rest * paths[end % count, HALF]
-    right = 0.0
+    right, after = 0.0, passage.first % count
     for j in range(passage.panels):
-        k = (passage.first + j) % count
+        k, after = after, neighbour(after, 1, count)
         half = paths[k, HALF]
         left = right if j > 0 else to_edge - 2.0 * half
         right = left + 2.0 * half

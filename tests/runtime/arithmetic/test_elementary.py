@@ -83,6 +83,16 @@ def test_limits_of_the_arc_tangent() -> None:
     assert math.isnan(elementary.atan(math.nan))
 
 
+@pytest.mark.parametrize("power", [-1022, -700, -2, -1, 0, 1, 53, 1022])
+def test_inverse_root(power: int) -> None:
+    """From the least normal numbers to the largest, through a whole period of its first guess."""
+    source = random.Random(power)
+    with mp.workdps(DIGITS):
+        for x in (math.ldexp(source.uniform(1.0, 2.0), power + odd) for odd in (0, 1) for _ in range(COUNT)):
+            truth = 1 / mp.sqrt(mpf(x))
+            assert abs(mpf(elementary.inverse_root(x)) - truth) <= ULPS * mpf(np.spacing(float(truth))), x
+
+
 @pytest.mark.parametrize("x", [0.0, -0.0, 710.4, -710.4, 709.782712893384, 750.0, -745.0, -750.0, math.inf, -math.inf])
 @pytest.mark.parametrize("name", GROWING)
 def test_limits_are_those_of_the_library(name: str, x: float) -> None:

@@ -384,6 +384,38 @@ def test_a_hoop_that_turns(omega: float) -> None:
             assert abs(swept["turning_points"].values[k] / np.array([-top, top]) - 1).max() < 4e-16
 
 
+# Graphs z(x) with their derivatives, swept more widely than closed forms of second divided differences hold: over one
+# turn of a wave, or a narrow range of hyperbolic functions.
+WIDE = {
+    "wave": ("x**2/2 + sin(3*x)/10", lambda x: x**2 / 2 + mp.sin(3 * x) / 10, lambda x: x + 3 * mp.cos(3 * x) / 10),
+    "chain": ("cosh(x) + x/3", lambda x: mp.cosh(x) + x / 3, lambda x: mp.sinh(x) + mpf(1) / 3),
+}
+
+
+@pytest.mark.parametrize("name", WIDE)
+def test_wide_orbits_stay_in_batches(name: str, generated_folder: Path) -> None:
+    """As wide as they may be, their half periods have their digits."""
+    text, z, slope = WIDE[name]
+    module = gqm.build(
+        gqm.derive(gqm.Curve.graph(text, parameter="x"), gqm.Gravity()), name=f"wide_{name}", folder=generated_folder
+    )
+    places = np.array([1.2, 1.9])
+    swept = module.sweep("half_period", places)
+    assert swept.route_counts() == {"batch": places.size}
+    for place, value in zip(places.tolist(), swept.values.tolist(), strict=True):
+        with mp.workdps(25):
+            high = mpf(place)
+            low = mp.findroot(lambda x, top=high: z(x) - z(top), (-high - 1, -0.2), solver="anderson")
+            half, middle = (high - low) / 2, (high + low) / 2
+
+            def rate(u: mpf, middle: mpf = middle, half: mpf = half, top: mpf = high) -> mpf:
+                x = middle + half * mp.sin(u)
+                return half * mp.cos(u) * mp.sqrt((1 + slope(x) ** 2) / (2 * mpf("9.81") * (z(top) - z(x))))
+
+            truth = mp.quad(rate, mp.linspace(-mp.pi / 2, mp.pi / 2, 9), method="gauss-legendre")
+            assert abs(value / truth - 1) < 4.5e-16
+
+
 @pytest.fixture(scope="module")
 def incline(generated_folder: Path) -> ModuleType:
     """A straight line from x = -1 to x = 2, down a slope of 3 in 4: g acts along it with 3/5."""
@@ -437,9 +469,9 @@ def test_a_narrow_peak_of_the_load(generated_folder: Path) -> None:
     swept = module.sweep("normal_force_max", lam0, v0, 1)
     for k, value in enumerate(swept.values.tolist()):
         motion = module.solve(lam0[k], v0[k])
-        places = np.linspace(lam0[k], motion.legs[-1].lam_end, 400_001)
+        places = np.linspace(lam0[k], motion.legs[-1].lam_end, 40_001)
         loads = module.pass1(places, lam0[k], v0[k]).normal_force
-        assert loads.max() * (1 - 1e-13) <= value <= loads.max() * (1 + 1e-7)
+        assert loads.max() * (1 - 1e-13) <= value <= loads.max() * (1 + 1e-5)
 
 
 def test_small_swings_keep_contact(module_of: ModuleOf) -> None:

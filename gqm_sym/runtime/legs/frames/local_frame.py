@@ -149,13 +149,13 @@ def _functions() -> tuple[Any, Any]:
     return speed_equation, static_balance
 
 
-def may_be_small(dissipation: Dissipation, p: Array, place: float, v2: float) -> bool:
-    """Whether a motion from a place may be small: the force on a body at rest changes its sign close by."""
+def may_be_small(dissipation: Dissipation, p: Array, place: float, v2: float, reach: float) -> bool:
+    """Whether `frame_near` may find a frame: the force on a body at rest changes its sign close by."""
     if dissipation.friction or dissipation.kinked or place == 0.0:
         return False
-    reach = SMALL_SHARE * abs(place)
-    behind, ahead = force_at_rest(dissipation, p, np.array([place - reach, place + reach]))[0].tolist()
-    return bool(ahead * behind < 0.0 and v2 < reach * abs(behind - ahead))
+    around = min(SMALL_SHARE * abs(place), RANGE_SHARE * reach)
+    behind, ahead = force_at_rest(dissipation, p, np.array([place - around, place + around]))[0].tolist()
+    return bool(ahead * behind < 0.0 and v2 < around * abs(behind - ahead))
 
 
 def frame_near(dissipation: Dissipation, p: Array, start: tuple[float, float, float], reach: float) -> Frame | None:

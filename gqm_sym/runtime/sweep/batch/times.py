@@ -68,6 +68,35 @@ AGM_STEPS = 4
 
 
 @Inner
+def contains_nan(row):  # type: ignore[no-untyped-def]
+    """Whether a number in a row is NaN."""
+    found = False
+    for v in row:
+        found |= v != v
+    return found
+
+
+@Inner
+def replace_on_wide_orbits(fns, n, node, rows, p, two, work):  # type: ignore[no-untyped-def]
+    """Replace NaN in what `potential_divdiff2` gives of orbits that are too wide for its closed forms.
+
+    From the nearer turning point V**2 falls as U[a, x] or U[b, x] says, which on a wide orbit keeps all its digits.
+    """
+    from_below = NODE_SHARES[node] <= 0.5
+    ends = rows[END_LOW if from_below else END_HIGH, :n]
+    da, db, places, offsets = work[0, :n], work[1, :n], work[8, :n], work[9, :n]
+    out = work[10:13].reshape(-1)[: 3 * n].reshape(3, n)
+    for j in range(n):
+        offsets[j] = da[j] if from_below else -db[j]
+        places[j] = ends[j] + offsets[j]
+    call_potential_divdiff1_batch(fns.potential_divdiff1, n, ends, places, offsets, p, out)
+    for j in range(n):
+        wide = two[0, j] != two[0, j]
+        q = -out[0, j] / db[j] if from_below else out[0, j] / da[j]
+        two[0, j], two[1, j] = choose(wide, q, two[0, j]), choose(wide, out[1, j], two[1, j])
+
+
+@Inner
 def fill_integrand_batch(fns, kind, n, node, rows, p, work):  # type: ignore[no-untyped-def]
     """The time integrand of each orbit at one node of the rule.
 
@@ -88,6 +117,8 @@ def fill_integrand_batch(fns, kind, n, node, rows, p, work):  # type: ignore[no-
             da[j], db[j] = width * from_a, width * from_b
         a, b = rows[END_LOW, :n], rows[END_HIGH, :n]
         call_potential_divdiff2_batch(fns.potential_divdiff2, n, a, b, da, db, p, two)
+        if contains_nan(two[0]):
+            replace_on_wide_orbits(fns, n, node, rows, p, two, work)
         for j in range(n):
             q = two[0, j]
             rates[j] = pi * two[1, j] / sqrt(2.0 * q)
