@@ -132,9 +132,9 @@ FAR_SHARE = 4.0 * FAR_FROM_ZERO_RATIO
 # How far it is from the node next to an end of a panel to that end, against the distance of the next node.
 TO_END = float(SHARES[0] / (SHARES[1] - SHARES[0]))
 
-# Where ds/dlam changes by this factor or more on a panel, and the panel is no longer than that factor times so many
-# units in the last place, ds/dlam vanishes: narrower panels would step over that place, which their roundings hide.
-CUSP_RATIO, CUSP_UNITS = 1.5, 16.0
+# Where ds/dlam changes by this factor or more on a panel, and would vanish within so many units in the last place of
+# its start, it does: narrower panels would step over that place, which their roundings hide.
+CUSP_RATIO, CUSP_UNITS = 1.5, 32.0
 
 # A buffer for the start of a panel, V**2 there, and the five numbers of the speed equation.
 start_buffer = on_stack(7)
@@ -358,10 +358,11 @@ def hides_cusp(forces, march, panel, work):  # type: ignore[no-untyped-def]
 
 @Inner
 def is_at_cusp(length, unit, work):  # type: ignore[no-untyped-def]
-    """Whether ds/dlam vanishes next to a panel of a length, given a unit in the last place."""
+    """Whether ds/dlam vanishes next to the start of a panel of a length, given a unit in the last place."""
     first, last = work[DS], work[DS + COUNT - 1]
-    least, most = min(first, last), max(first, last)
-    return most > CUSP_RATIO * least and length * least <= CUSP_UNITS * unit * most
+    if last > first:  # it vanishes as far before the start as it takes to grow to its first value
+        return last > CUSP_RATIO * first and length * first <= CUSP_UNITS * unit * last
+    return first > CUSP_RATIO * last and length <= CUSP_UNITS * unit
 
 
 @Inner
