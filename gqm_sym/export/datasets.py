@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from gqm_sym.optional import require
-from gqm_sym.runtime.launch.rider import LOADS
+from gqm_sym.runtime.launch.kinds import LOADS
 from gqm_sym.runtime.motion.motion import horizon
 from gqm_sym.runtime.sweep.result import DESCRIBED, PLACE, Sweep, columns_of
 

@@ -11,7 +11,8 @@ from gqm_sym.figures.axes import finished, new_figure
 from gqm_sym.figures.motions import FORCE_COLOURS, LINE_COLOUR, sampled
 from gqm_sym.optional import require
 from gqm_sym.runtime.compiled.types import Array
-from gqm_sym.runtime.launch.rider import LOADS, check_banked
+from gqm_sym.runtime.launch.kinds import LOADS
+from gqm_sym.runtime.launch.rider import check_banked
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

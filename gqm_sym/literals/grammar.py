@@ -14,13 +14,13 @@ deep nesting. Constants hold Fractions. Text is never executed.
 """
 
 import ast
-import difflib
 import keyword
 import re
 import unicodedata
 from fractions import Fraction
 from typing import NamedTuple
 
+from gqm_sym.arguments import nearest
 from gqm_sym.errors import ExpressionError
 from gqm_sym.literals import rationals
 from gqm_sym.literals.trees import at_column, check_exponents, constant
@@ -105,8 +105,8 @@ def parse(text: str, *, where: str) -> ast.expr:
 
 def unknown(what: str, given: str, known: tuple[str, ...]) -> str:
     """Return a message about an unknown name, with the most similar known one and all known ones."""
-    near = difflib.get_close_matches(given.lower(), known, n=1)
-    hint = f"did you mean {near[0]!r}? " if near else ""
+    near = nearest(given, known)
+    hint = f"did you mean {near!r}? " if near else ""
     return f"unknown {what} {given!r}; {hint}known {what}s are {', '.join(known)}"
 
 

@@ -1,11 +1,11 @@
 """What is wrong with the structure of a file, in words that its author understands."""
 
-import difflib
 from collections.abc import Callable, Collection
 from typing import Any, TypeAlias
 
 from pydantic.fields import FieldInfo
 
+from gqm_sym.arguments import nearest
 from gqm_sym.specfile.locations import descend, place_of
 from gqm_sym.specfile.nodes import MapNode, Mark, Mistakes, Node, Scalar, shown
 from gqm_sym.specfile.schema import FAMILY_MODELS
@@ -89,8 +89,8 @@ def _explain_unknown(
     label = f"{path}: " if path else ""
     allowed = sorted(model_at(_path(loc[:-1])).model_fields)
     mark = steps[-1][1]
-    near = difflib.get_close_matches(key, allowed, n=1)
-    remedy = f"did you mean {near[0]}?" if near else f"allowed are {', '.join(allowed)}"
+    near = nearest(key, allowed)
+    remedy = f"did you mean {near}?" if near else f"allowed are {', '.join(allowed)}"
     if key.isdigit():
         remedy = "a comma separates entries; write a decimal point, as in 0.7"
     mistakes.add(mark, f"{label}unknown key {shown(key)}", remedy)

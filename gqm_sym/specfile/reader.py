@@ -4,7 +4,6 @@ Every stage notes what it finds wrong and goes on with the rest, so that all mis
 reported together. What is only a consequence of an earlier mistake is not reported.
 """
 
-import difflib
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from types import MappingProxyType
@@ -13,6 +12,7 @@ from typing import Any, TypeAlias, TypeVar
 import sympy as sp
 from pydantic import BaseModel, ValidationError
 
+from gqm_sym.arguments import nearest
 from gqm_sym.budgets import apart, budget, spend
 from gqm_sym.declare import Curve
 from gqm_sym.errors import BudgetError, InputError, SpecFileError
@@ -182,10 +182,10 @@ class _Reader:
             if default is not None or name in declared:
                 continue
             spend()
-            near = difflib.get_close_matches(name, unused, n=1, cutoff=0.5)
+            near = nearest(name, unused)
             remedy = f"add it there, as in {name}: 1 (null: to be given at run time)"
             if near:
-                remedy += f", or did you mean {near[0]}?"
+                remedy += f", or did you mean {near}?"
             self.mistakes.add(self._origin(name), f"{name!r} is not in parameters", remedy)
         for name in unused:
             what = f"parameters: {name!r} is used neither by the curve nor by the kernel"

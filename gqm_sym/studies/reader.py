@@ -1,6 +1,5 @@
 """Read a sweep file: every mistake at its line, as of a curve file."""
 
-import difflib
 import re
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -11,6 +10,7 @@ from typing import Any, Generic, TypeVar
 import numpy as np
 from pydantic import BaseModel, ValidationError
 
+from gqm_sym.arguments import nearest
 from gqm_sym.budgets import apart, budget
 from gqm_sym.derivation import Model
 from gqm_sym.emission import emit
@@ -161,8 +161,8 @@ class StudyReader(ABC, Generic[P]):
         name = path[-1]
         if name in known:
             return True
-        near = difflib.get_close_matches(name, known, n=1)
-        remedy = f"did you mean {near[0]}?" if near else f"known are {', '.join(known)}"
+        near = nearest(name, known)
+        remedy = f"did you mean {near}?" if near else f"known are {', '.join(known)}"
         self.mistakes.add(place_of(self.tree, path), f"{path[0]}: there is no {name!r} in {spec.path}", remedy)
         return False
 

@@ -5,8 +5,9 @@ import math
 import pickle
 import warnings
 from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 import pytest
@@ -26,7 +27,8 @@ G = 9.81
 FINE = 200_001
 
 
-class Truth(NamedTuple):
+@dataclass(frozen=True)
+class Truth:
     """A curve by closed forms, at many places in order: coordinates, angle of the tangent and curvature."""
 
     x: np.ndarray
@@ -45,7 +47,12 @@ class Truth(NamedTuple):
 
     def nearest(self, x: np.ndarray, z: np.ndarray) -> np.ndarray:
         """Which of the places are nearest."""
-        return KDTree(np.stack([self.x, self.z], axis=1)).query(np.stack([x, z], axis=1))[1]
+        return self.tree.query(np.stack([x, z], axis=1))[1]
+
+    @cached_property
+    def tree(self) -> KDTree:
+        """The places, for a search."""
+        return KDTree(np.stack([self.x, self.z], axis=1))
 
 
 def graph(low: float, high: float, z: Callable, slope: Callable, bend: Callable) -> Truth:

@@ -413,7 +413,7 @@ launch: {v0: -1, direction: left}
         *[(1, 7), (3, 3), (3, 50), (5, 3), (6, 13), (8, 3), (9, 3), (9, 7), (10, 3), (11, 1)],
         (11, 29),
     ]
-    assert found[4].endswith("kernel.coulomb: unknown key 'nu'; allowed are mu, mu_static")
+    assert found[4].endswith("kernel.coulomb: unknown key 'nu'; did you mean mu?")
 
 
 def test_many_mistakes_are_cut_off(tmp_path: Path) -> None:

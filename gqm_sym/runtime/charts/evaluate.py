@@ -20,7 +20,7 @@ from llvmlite import ir
 from numba import carray, types
 from numba.extending import intrinsic
 
-from gqm_sym.runtime.compiled.intrinsics import polynomial
+from gqm_sym.runtime.compiled.intrinsics import item_at, polynomial
 from gqm_sym.runtime.compiled.jit import Inlined, Inner
 from gqm_sym.runtime.compiled.registers import INDEX, LANES, REGISTER, line_of, operation, register, spread
 from gqm_sym.runtime.compiled.uncompiled import fma, in_python
@@ -222,8 +222,8 @@ def chart_kappa(chart, s):  # type: ignore[no-untyped-def]
 def _power(chart, row, start, j):  # type: ignore[no-untyped-def]
     """Return a coefficient of a row up to its constant; the angle is the integral of the curvature."""
     if row < 2:
-        return chart[start + 6 + row * TERMS + j]
-    return chart[start + 5 + 3 * TERMS + j] / (j * chart[start + 1]) if j > 0 else 0.0
+        return item_at(chart, start + 6 + row * TERMS + j)
+    return item_at(chart, start + 5 + 3 * TERMS + j) / (j * chart[start + 1]) if j > 0 else 0.0
 
 
 @Inner
@@ -254,8 +254,13 @@ def _divdiff1(chart, row, s, t, h):  # type: ignore[no-untyped-def]
     """Return the first divided difference over places s and t = s + h, in any order."""
     if h < 0.0:
         s, t, h = t, s, -h
-    ks, us, laps_s = find(chart, s)
-    kt, ut, laps_t = find(chart, t)
+    return _divdiff1_between(chart, row, find(chart, s), find(chart, t), h)
+
+
+@Inner
+def _divdiff1_between(chart, row, lower, upper, h):  # type: ignore[no-untyped-def]
+    """Return the first divided difference over places that `find` has found, the upper one ``h`` above the lower."""
+    (ks, us, laps_s), (kt, ut, laps_t) = lower, upper
     apart = (kt - ks) + (laps_t - laps_s) * chart[1]
     if apart == 0.0:
         return _divdiff1_on_piece(chart, row, ks, us, ut)
@@ -271,8 +276,8 @@ def _divdiff1(chart, row, s, t, h):  # type: ignore[no-untyped-def]
         return gained / (before + after)
     one, two = 0.0, 0.0
     for j in range(TERMS - 1, -1, -1):
-        one = one * us + chart[from_s + 6 + row * TERMS + j]
-        two = two * ut + chart[from_t + 6 + row * TERMS + j]
+        one = one * us + item_at(chart, from_s + 6 + row * TERMS + j)
+        two = two * ut + item_at(chart, from_t + 6 + row * TERMS + j)
     if row >= 2:  # the angle increases with each lap
         return ((laps_t - laps_s) * chart[5] + (two - one)) / h
     whole = chart[from_t + 2 + 2 * row] - chart[from_s + 2 + 2 * row]
@@ -289,9 +294,8 @@ def _divdiff2(chart, row, r, s, t, h1, h2):  # type: ignore[no-untyped-def]
         s, t, h1, h2 = t, s, h1 + h2, -h2
     if h1 < 0.0:
         r, s, h1, h2 = s, r, -h1, h1 + h2
-    kr, ur, laps_r = find(chart, r)
-    ks, us, laps_s = find(chart, s)
-    kt, ut, laps_t = find(chart, t)
+    lower, inner, upper = find(chart, r), find(chart, s), find(chart, t)
+    (kr, ur, laps_r), (ks, us, laps_s), (kt, ut, laps_t) = lower, inner, upper
     span = (kt - kr) + (laps_t - laps_r) * chart[1]
     if span == 0.0:
         return _divdiff2_on_piece(chart, row, kr, ur, us, ut)
@@ -326,7 +330,8 @@ def _divdiff2(chart, row, r, s, t, h1, h2):  # type: ignore[no-untyped-def]
             if near + before > 0.0:
                 over /= near + before
                 return (before * over + after * _divdiff2_on_piece(chart, row, kt, -1.0, us, ut)) / (before + after)
-    return (_divdiff1(chart, row, s, t, h2) - _divdiff1(chart, row, r, s, h1)) / (h1 + h2)
+    upward, downward = _divdiff1_between(chart, row, inner, upper, h2), _divdiff1_between(chart, row, lower, inner, h1)
+    return (upward - downward) / (h1 + h2)
 
 
 @Inner

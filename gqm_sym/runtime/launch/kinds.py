@@ -39,3 +39,7 @@ PERIODIC_QUANTITIES = ("half_period", "period", "action")
 FINAL_QUANTITIES = ("t_end", "rest_position")
 EXTREMES = ("v_min", "v_max", "normal_force_min", "normal_force_max")
 QUANTITIES = (*PERIODIC_QUANTITIES, "turning_points", *EXTREMES, "time_at", *FINAL_QUANTITIES)
+
+# What a rider feels on a banked track, and the extremes of it, which sweeps have too, without gradients.
+LOADS = ("vertical", "lateral", "longitudinal")
+LOAD_EXTREMES = tuple(f"n_{load}_{which}" for load in LOADS for which in ("min", "max"))

@@ -11,11 +11,11 @@ from gqm_sym.runtime.compiled.calls import call_rider_loads
 from gqm_sym.runtime.compiled.jit import entry
 from gqm_sym.runtime.compiled.types import INTEGER, MATRIX, REAL, VECTOR, Array
 from gqm_sym.runtime.interface import RIDER_ROWS
+from gqm_sym.runtime.launch.kinds import LOADS
 
 if TYPE_CHECKING:
     from gqm_sym.runtime.launch.formulas import Formulas
 
-LOADS = ("vertical", "lateral", "longitudinal")
 FIELDS = (
     *(f"n_{load}" for load in LOADS),
     *(f"onset_{load}" for load in LOADS),

@@ -13,8 +13,9 @@ from gqm_sym.errors import GQMError, InputError
 from gqm_sym.runtime.gradients.orbit import check_signed
 from gqm_sym.runtime.gradients.quantities import selected
 from gqm_sym.runtime.gradients.sweep import PERIODS, period_gradients
+from gqm_sym.runtime.launch.kinds import LOAD_EXTREMES
 from gqm_sym.runtime.launch.request import LaunchRequest
-from gqm_sym.runtime.sweep.quantities import ANSWERED, LOAD_EXTREMES, SOLVE
+from gqm_sym.runtime.sweep.quantities import ANSWERED, SOLVE
 from gqm_sym.runtime.sweep.result import Sweep
 from gqm_sym.runtime.sweep.sweep import Solve, as_doubles, sweep
 

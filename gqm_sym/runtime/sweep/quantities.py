@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 from gqm_sym.runtime.compiled.types import MATRIX, Array
 from gqm_sym.runtime.launch import kinds
-from gqm_sym.runtime.launch.rider import LOADS
 
 # The quantities that compiled code computes. SPANS is asked of batches only, on the way to another quantity: the
 # offsets of both turning points from the launch, or for a circulation the length of a lap and NaN.
@@ -110,10 +109,7 @@ CODES = {
     "t_end": END_TIME,
 }
 
-LOAD_EXTREMES = tuple(f"n_{load}_{which}" for load in LOADS for which in ("min", "max"))
-"""The extremes of what a rider feels, which only banked tracks have."""
-
-_NAMES = (*kinds.QUANTITIES, *LOAD_EXTREMES)
+_NAMES = (*kinds.QUANTITIES, *kinds.LOAD_EXTREMES)
 QUANTITIES = {name: Quantity(CODES.get(name, NOT_COMPILED), 1, 0, _number(name)) for name in _NAMES} | {
     "turning_points": Quantity(TURNING_POINTS, 2, slice(0, 2), _turning_points),
     "time_at": Quantity(ARRIVAL_TIME, 1, 0, lambda motion, lam: motion.time_at(lam)),

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gqm_sym.runtime.compiled.types import Array
-from gqm_sym.runtime.launch.rider import LOADS
+from gqm_sym.runtime.launch.kinds import LOADS
 from gqm_sym.runtime.motion.rows import table, text_table
 from gqm_sym.runtime.sweep.quantities import ROUTES, STATUS_SENTENCES
 

@@ -23,6 +23,7 @@ from gqm_sym.runtime.compiled.threads import run_in_threads
 from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.interface import ExactPotential
 from gqm_sym.runtime.launch.formulas import chart_with, true_pieces_of
+from gqm_sym.runtime.launch.kinds import LOAD_EXTREMES
 from gqm_sym.runtime.launch.request import ONLY_SIGN, LaunchRequest, check_contact
 from gqm_sym.runtime.launch.rider import check_banked
 from gqm_sym.runtime.launch.speed import path_and_force_at, potential_at
@@ -93,7 +94,7 @@ def sweep(
     found = QUANTITIES.get(quantity)
     if found is None:
         raise InputError(f"quantity: must be one of {', '.join(QUANTITIES)}, got {quantity!r}")
-    if quantity in quantities.LOAD_EXTREMES:
+    if quantity in LOAD_EXTREMES:
         check_banked(formulas, quantity)
     if (lam is None) == (quantity == "time_at"):
         raise InputError(f"lam: is the place that 'time_at' asks about, got {lam!r} with {quantity!r}")

@@ -77,13 +77,15 @@ MODULES = sorted(
 
 
 def test_code_is_compiled_anew_after_an_edit_of_what_it_may_come_from(tmp_path: Path) -> None:
-    """The stamp of each module changes with an edit of every module that it imports, directly or through others."""
+    """The stamp of each module is made of every module that it imports, directly or through others, and changes so."""
     reached = {name: _imported(name) | {name} for name in MODULES}
     for _ in MODULES:
         reached = {name: set().union(found, *(reached[each] for each in found)) for name, found in reached.items()}
     copy = shutil.copytree(RUNTIME, tmp_path / "runtime", ignore=shutil.ignore_patterns("__pycache__"))
-    before = {name: Stamps(copy).of(f"gqm_sym.runtime.{name}") for name in MODULES}
-    for edited in MODULES:
+    stamps = Stamps(copy)
+    assert [name for name in MODULES if not stamps.files((name,)) >= reached[name]] == []
+    before = {name: stamps.of(f"gqm_sym.runtime.{name}") for name in MODULES}
+    for edited in MODULES[::10]:
         file = copy.joinpath(*edited.split(".")).with_suffix(".py")
         text = file.read_bytes()
         file.write_bytes(text + b"#")

@@ -55,11 +55,15 @@ def test_every_kind_and_end_is_documented() -> None:
 def test_sweeps_and_gradients_ask_what_a_motion_has() -> None:
     """One list of quantities: each is an attribute of a motion, is described, and stands on the page of sweeps."""
     page = (ROOT / "docs" / "howto" / "sweeps.md").read_text(encoding="utf-8")
-    assert set(quantities.QUANTITIES) == set(kinds.QUANTITIES)
+    assert set(quantities.QUANTITIES) == {*kinds.QUANTITIES, *kinds.LOAD_EXTREMES}
     for name in kinds.QUANTITIES:
         assert hasattr(Motion, name)
         assert f'"{name}"' in str(Motion.gradient.__doc__)
         assert name in DESCRIBED or f"{name[:-1]}_lower" in DESCRIBED
+        assert f"`{name}`" in page
+    for name in kinds.LOAD_EXTREMES:
+        assert hasattr(Motion, name)
+        assert name in DESCRIBED
         assert f"`{name}`" in page
 
 

@@ -10,8 +10,9 @@ from gqm_sym.arguments import one_of
 from gqm_sym.literals.namespaces import FLOATS
 from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.launch.equilibria import Potential
+from gqm_sym.runtime.launch.kinds import LOADS
 from gqm_sym.runtime.launch.problem import Problem
-from gqm_sym.runtime.launch.rider import FIELDS, LOADS, check_banked, rider_loads
+from gqm_sym.runtime.launch.rider import FIELDS, check_banked, rider_loads
 from gqm_sym.runtime.launch.speed import path_and_force_at
 from gqm_sym.runtime.motion.extremes import Extreme, Quantity, extreme
 from gqm_sym.runtime.motion.trajectory import TimedSegment
