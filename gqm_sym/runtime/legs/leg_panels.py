@@ -13,10 +13,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from gqm_sym.runtime.compiled.calls import call_speed_equation
 from gqm_sym.runtime.compiled.intrinsics import bits, fma, from_bits
 from gqm_sym.runtime.compiled.jit import Inlined, Inner
-from gqm_sym.runtime.compiled.registers import over_rows
-from gqm_sym.runtime.legs.leg_breaks import offset
+from gqm_sym.runtime.compiled.registers import on_stack, over_rows
+from gqm_sym.runtime.legs.leg_breaks import offset, within
 from gqm_sym.runtime.legs.leg_equation import (
     DS,
     EXPM1_Q,
@@ -54,6 +55,7 @@ from gqm_sym.runtime.legs.leg_record import change_at, copy, tail_of
 from gqm_sym.runtime.legs.polynomials import (
     COUNT,
     LEBESGUE,
+    SHARES,
     WIDE,
     extent,
     first_change,
@@ -126,6 +128,16 @@ FILLED, REFUSED = 1.0, 2.0
 
 # N on a gap is far from zero if it is more than this share of the largest values of its parts.
 FAR_SHARE = 4.0 * FAR_FROM_ZERO_RATIO
+
+# How far it is from the node next to an end of a panel to that end, against the distance of the next node.
+TO_END = float(SHARES[0] / (SHARES[1] - SHARES[0]))
+
+# Where ds/dlam changes by this factor or more on a panel, and would vanish within so many units in the last place of
+# its start, it does: narrower panels would step over that place, which their roundings hide.
+CUSP_RATIO, CUSP_UNITS = 1.5, 32.0
+
+# A buffer for the start of a panel, V**2 there, and the five numbers of the speed equation.
+start_buffer = on_stack(7)
 
 undamped_row = over_rows(lambda ds, expm1, width: ds * np.sqrt(1.0 + expm1) * width, WIDE)
 share_row = over_rows(lambda gained, middle, largest: (gained - middle) / largest, WIDE)
@@ -325,6 +337,35 @@ def resolve_time(march, panel, request, largest_v2, worst, is_sliver, work):  # 
 
 
 @Inner
+def hides_cusp(forces, march, panel, work):  # type: ignore[no-untyped-def]
+    """Whether ds/dlam vanishes between an end of a panel and the node next to it, where no values show it.
+
+    The nodes then make it negative at that end, of the size that it has there.
+    """
+    last = DS + COUNT - 1
+    at_end = work[last] + TO_END * (work[last] - work[last - 1])
+    if at_end < 0.0 and work[DS + COUNT] > -0.5 * at_end:
+        return True
+    at_start = work[DS] + TO_END * (work[DS] - work[DS + 1])
+    if at_start >= 0.0:
+        return False
+    point, v = start_buffer(), forces.direction
+    point[0] = within(march.origin[0] + march.direction * distance(panel.left, march), panel.span)
+    point[1] = panel.v2
+    call_speed_equation(forces.speed_equation, 1, point, (0, 1, 2), float(v), float(panel.contact_sign), forces.params)
+    return point[2] > -0.5 * at_start
+
+
+@Inner
+def is_at_cusp(length, unit, work):  # type: ignore[no-untyped-def]
+    """Whether ds/dlam vanishes next to the start of a panel of a length, given a unit in the last place."""
+    first, last = work[DS], work[DS + COUNT - 1]
+    if last > first:  # it vanishes as far before the start as it takes to grow to its first value
+        return last > CUSP_RATIO * first and length * first <= CUSP_UNITS * unit * last
+    return first > CUSP_RATIO * last and length <= CUSP_UNITS * unit
+
+
+@Inner
 def next_panel(forces, march, panel, request, work):  # type: ignore[no-untyped-def]
     """The widest panel from a start on that can be resolved.
 
@@ -376,10 +417,12 @@ def next_panel(forces, march, panel, request, work):  # type: ignore[no-untyped-
             load_fine, ratio = is_load_resolved(work)
             fine, worst = fine and load_fine, max(worst, ratio)
         factor = growth(worst)
-        if fine:
+        if fine and not hides_cusp(forces, march, panel, work):
             widest = max(widest, width)
             is_sliver = width <= NOISE_WIDTH_RATIO * widest
             done, factor, timed = resolve_time(march, panel, request, largest_v2, worst, is_sliver, work)
+            if is_at_cusp(length, unit, work):
+                return 0.0, step, False
             if done:
                 grown = width * factor
                 return width, max(step, grown) if ends_at_kink or width == request.max_width else grown, timed
