@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from gqm_sym.runtime.compiled.types import MATRIX, Array
 from gqm_sym.runtime.launch import kinds
+from gqm_sym.runtime.motion.extremes import Extreme
 
 # The quantities that compiled code computes. SPANS is asked of batches only, on the way to another quantity: the
 # offsets of both turning points from the launch, or for a circulation the length of a lap and NaN.
@@ -84,12 +85,13 @@ class Quantity(NamedTuple):
 
 
 def _number(name: str) -> Callable[[Any, Any], float]:
-    """A quantity that is an attribute of a motion, or the value of an extreme; NaN where it is infinite."""
+    """A quantity that is an attribute of a motion, NaN where it is infinite; or the value of an extreme."""
 
     def of_motion(motion: Any, _: Any) -> float:
         found = getattr(motion, name)
-        value = float(getattr(found, "value", found))
-        return value if isfinite(value) else nan
+        if isinstance(found, Extreme):
+            return float(found.value)  # at a cusp or a pole a force is infinite
+        return float(found) if isfinite(found) else nan
 
     return of_motion
 

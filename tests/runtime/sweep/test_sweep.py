@@ -1,5 +1,6 @@
 """Sweeps over launches and parameters: against closed forms, and against motions solved one by one."""
 
+import math
 import pickle
 from collections.abc import Callable
 from pathlib import Path
@@ -12,6 +13,7 @@ from mpmath import mp, mpf
 
 import generated.circle_rotating as circle_rotating
 import gqm_sym as gqm
+from generated import cycloid, log_spiral
 from gqm_sym.errors import InputError, ParameterError, SolutionError
 from gqm_sym.runtime.compiled import threads
 from gqm_sym.runtime.sweep.quantities import STATUS_SENTENCES
@@ -251,6 +253,12 @@ def test_extremes_of_a_motion_that_ends(generated_folder: Path) -> None:
             scale = np.abs(values).max()
             assert values.max() - LOAD * scale <= most <= values.max() + 1e-7 * scale
             assert values.min() + LOAD * scale >= least >= values.min() - 1e-7 * scale
+
+
+def test_a_force_may_be_infinite() -> None:
+    """At a cusp, through which the body goes, and where a spiral winds into its pole."""
+    assert cycloid.sweep("normal_force_min", [0.5, 0.6]).values.tolist() == [-math.inf] * 2
+    assert not log_spiral.sweep("normal_force_max", [1.9, 2.0], 2.5).status.any()
 
 
 def test_columns_may_be_read_only(module_of: ModuleOf) -> None:
