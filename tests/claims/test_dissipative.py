@@ -407,10 +407,10 @@ def test_questions_without_an_answer(rubbed: ModuleType, dragged: ModuleType) ->
 
 def test_a_motion_of_too_many_legs(dragged: ModuleType, monkeypatch: pytest.MonkeyPatch) -> None:
     """Legs are kept: a motion that would need memory without end says how far it got; what was asked before stays."""
-    monkeypatch.setattr(dissipative, "MAX_SEGMENTS", 40)
+    monkeypatch.setattr(dissipative, "MAX_STORED", 40)
     motion = dragged.solve(0.3, c="1e-6")
     early = motion.lam(5.0)
-    words = r"^motion: 40 pieces of legs reach t = \d+\.\d+ only; give a shorter t_max, or ask for earlier times"
+    words = r"^motion: 4\d pieces of legs reach t = \d+\.\d+ only; give a shorter t_max, or ask for earlier times"
     with pytest.raises(BudgetError, match=words):
         motion.lam(1e9)
     assert motion.lam(5.0) == early

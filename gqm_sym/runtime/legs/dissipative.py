@@ -51,6 +51,8 @@ from gqm_sym.runtime.legs.frames.local_frame import SMALL_SHARE, Frame, frame_ne
 from gqm_sym.runtime.legs.leg_errors import Errors, carry, rounding_share
 from gqm_sym.runtime.legs.leg_reading import place_at
 from gqm_sym.runtime.legs.leg_record import (
+    AHEAD,
+    BACK,
     BEGIN,
     BEGIN_LOW,
     CHANGE_COUNT,
@@ -87,8 +89,8 @@ from gqm_sym.runtime.motion.state import State
 from gqm_sym.runtime.motion.trajectory import PhasePoints, TimedSegment, Trajectory
 from gqm_sym.runtime.multiprecision.exact_problem import NOWHERE
 
-# The most segments that are stored; each takes some kilobytes.
-MAX_SEGMENTS = 250_000
+# The most panels of legs that are stored; each takes some kilobytes.
+MAX_STORED = 250_000
 
 # When the record that compiled code reads is made anew for later times, it has this many times the pieces, so that many
 # questions one after the other do not copy it for each leg.
@@ -199,6 +201,7 @@ class DissipativeMotion(Motion):
         self._runs: list[Run] = []
         self._segments: list[TimedSegment] = []
         self._laid: list[Run] = []
+        self._stored = 0
         # For each panel of runs how large the terms of the force are that may cancel.
         self._terms: list[Array] = []
         self._tabulated: list[TabulatedPiece] = []
@@ -569,9 +572,9 @@ class DissipativeMotion(Motion):
 
     def _go_on(self) -> None:
         """Follow the body to its next turn, to the end of the motion, or as far as one run goes."""
-        if len(self._segments) + len(self._runs) >= MAX_SEGMENTS:
+        if self._stored >= MAX_STORED:
             raise BudgetError(
-                f"motion: {MAX_SEGMENTS} pieces of legs reach t = {self._pieces[-1].t_stop[0]!r} only; "
+                f"motion: {self._stored} pieces of legs reach t = {self._elapsed!r} only; "
                 "give a shorter t_max, or ask for earlier times and nearer places"
             )
         problem, frame = self.problem, self._frame
@@ -579,6 +582,7 @@ class DissipativeMotion(Motion):
         if self._body[0, DIRECTION] == 0.0 and not self._body[0, TURNS]:
             return  # the body stays where it is
         self._runs += [Run(before, TURN, END_NAMES[TURN], None) for before in passed]
+        self._stored += sum(1 + int(one[AHEAD] + one[BACK]) for one in (*passed, record))
         self._at = self._body[0].tolist()
         if frame is not None:
             frame.move(record, 1)

@@ -229,7 +229,7 @@ def test_the_choice_of_names(circle: ModuleType) -> None:
         ("half_period", None, {"v0": 9.0}, SolutionError, "only a libration has half_period"),
         ("turning_points", None, {"v0": 9.0}, SolutionError, "only a libration has turning_points"),
         ("period", None, {"lam0": 0}, SolutionError, "kind 'rest'"),
-        ("t_end", None, {}, InputError, "quantity: must be one of .*, got 't_end'"),
+        ("t_end", None, {}, SolutionError, "goes on for ever and has no t_end"),
     ],
 )
 def test_what_has_no_gradient(
