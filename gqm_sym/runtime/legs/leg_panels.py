@@ -204,7 +204,10 @@ def examine(work, row, size):  # type: ignore[no-untyped-def]
 
 @Inner
 def are_resolved(work, first, last):  # type: ignore[no-untyped-def]
-    """Whether rows ``first`` to ``last`` (excluded) are resolved; and their largest ratio of middle coefficients."""
+    """Whether rows ``first`` to ``last`` (excluded) are resolved; and their largest ratio of middle coefficients.
+
+    Noise counts as no more than it usually is: where terms of the force cancel, panels would stay as narrow as they are.
+    """
     resolved, worst = True, 0.0
     for row in range(first, last, WIDE):
         size = work[size_at(row)]
@@ -212,7 +215,8 @@ def are_resolved(work, first, last):  # type: ignore[no-untyped-def]
         if not (tail < inf and middle < inf):
             return False, inf
         if size > 0.0:
-            worst = max(worst, middle / size)
+            is_noise = fine and tail > TAIL_RATIO * size
+            worst = max(worst, min(middle / size, CANCELLATION_NOISE) if is_noise else middle / size)
         resolved = resolved and fine
     return resolved, worst
 

@@ -75,6 +75,26 @@ def test_terms_of_the_force_that_cancel(size: float, lam0: float, centre: float,
         assert error <= motion.error_bound(t) <= 1e-12 * size + 1e-11
 
 
+@pytest.mark.parametrize("size", [1e2, 1e3, 1e4])
+def test_terms_that_cancel_beside_a_viscous_law(size: float, build: Build) -> None:
+    """Their rounding was taken for structure: panels stayed as narrow as they were, or no panel was narrow enough."""
+    viscous = gqm.Kernel.law("-direction*c*sqrt(W)", parameters={"c": "3/2"})
+    force = gqm.Potential("k1*(x - c1)**2/2") + gqm.Potential("-k2*(x - c2)**2/2") + viscous
+    k2 = 0.8 * size
+    k1, c1 = k2 + 0.7, 1.86
+    c2 = (k1 * c1 + 0.7 * 0.38) / k2
+    module = build("springs_in_oil", gqm.Curve.graph("0*x"), force)
+    motion = module.solve(1.7, 0.9, -1, k1=k1, k2=k2, c1=c1, c2=c2, t_max=12)
+    with mp.workdps(60):
+        k = mpf(k1) - mpf(k2)
+        middle, decay = (mpf(k1) * c1 - mpf(k2) * c2) / k, mpf("0.75")
+        away, omega = mpf(1.7) - middle, mp.sqrt(k - decay**2)
+        for t in np.linspace(0.5, 11.5, 12).tolist():
+            sine = (decay * away - mpf(0.9)) / omega * mp.sin(omega * t)
+            truth = middle + mp.exp(-decay * t) * (away * mp.cos(omega * t) + sine)
+            assert abs(mpf(motion.lam(t)) - truth) <= motion.error_bound(t) <= 1e-12 * size
+
+
 def dragged_swing(amplitude: mpf, k: mpf, b: mpf, digits: int) -> tuple[mpf, mpf]:
     """The next amplitude of a spring with quadratic drag, and the time to it."""
     with mp.workdps(digits):
