@@ -206,7 +206,7 @@ def examine(work, row, size):  # type: ignore[no-untyped-def]
 def are_resolved(work, first, last):  # type: ignore[no-untyped-def]
     """Whether rows ``first`` to ``last`` (excluded) are resolved; and their largest ratio of middle coefficients.
 
-    Noise counts as no more than it usually is: where terms of the force cancel, panels would stay as narrow as they are.
+    Noise counts as no more than it usually is: where terms of the force cancel, panels would stay narrow for nothing.
     """
     resolved, worst = True, 0.0
     for row in range(first, last, WIDE):
