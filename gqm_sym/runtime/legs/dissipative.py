@@ -19,7 +19,7 @@ from gqm_sym.runtime.interface import Dissipation, ExactLaw
 from gqm_sym.runtime.inversion.leg_tables import places_along_legs, states_along_legs
 from gqm_sym.runtime.launch.ends import CUSP_SHARE, domain_end, leaving_at_once, starting_step
 from gqm_sym.runtime.launch.formulas import Formulas, ParameterValues
-from gqm_sym.runtime.launch.problem import Problem, bind
+from gqm_sym.runtime.launch.problem import Problem, bind_all
 from gqm_sym.runtime.launch.request import ONLY_SIGN, Launch
 from gqm_sym.runtime.launch.speed import path_and_force_at
 from gqm_sym.runtime.legs import answers
@@ -131,8 +131,7 @@ END_NAMES = {
 
 def dissipate(formulas: Formulas, p: ParameterValues, launch: Launch) -> Motion:
     """The motion of a launch where forces dissipate."""
-    functions = bind(formulas, p, launch)
-    problem = Problem(formulas, launch, p, functions, formulas.domain(p))
+    problem = Problem(formulas, launch, p, bind_all(formulas, p), formulas.domain(p))
     motion = DissipativeMotion(problem)
     return motion if motion.direction else MotionAtRest(problem)
 
