@@ -156,7 +156,7 @@ def test_from_beside_a_hilltop(start: str, build: Build) -> None:
         assert state.error <= 2e-15
 
 
-@pytest.mark.parametrize("v0", [1e-6, 1e-9, 1e-12, 1e-18])
+@pytest.mark.parametrize("v0", [1e-8, 1e-12, 1e-18])
 @pytest.mark.parametrize("lam0", [0.9, 0.999, 0.999999])
 def test_a_slow_launch_towards_a_hilltop(lam0: float, v0: float, build: Build) -> None:
     """The turn is close by and held as two doubles: of one double, what follows would have a bound of up to 0.04."""
