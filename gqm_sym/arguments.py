@@ -7,6 +7,8 @@ import difflib
 import inspect
 from collections.abc import Callable, Iterable, Mapping, Set
 from functools import wraps
+from os import PathLike, fspath
+from pathlib import Path
 from typing import Any, ParamSpec, TypeVar
 
 from gqm_sym.errors import ArgumentError, DeclarationError
@@ -19,6 +21,8 @@ _BY_NAME = inspect.Parameter.KEYWORD_ONLY
 _BY_PLACE = (inspect.Parameter.POSITIONAL_ONLY, inspect.Parameter.POSITIONAL_OR_KEYWORD)
 # Of a name with fewer letters than this, one of two letters may be wrong.
 MIN_LENGTH = 4
+# No longer path is the name of a file.
+MAX_PATH = 4096
 # Arguments that a method does not get from its caller.
 _OWN = frozenset({"cls", "self"})
 
@@ -150,6 +154,14 @@ def names(given: Any, *, where: str) -> tuple[str, ...]:
         if not isinstance(name, str):
             raise DeclarationError(f"{where}: must be {what}, got {short(name)} among them")
     return listed
+
+
+def file_path(given: Any, *, where: str) -> Path:
+    """Return the path of a file, which text or a `pathlib.Path` gives."""
+    text = fspath(given) if isinstance(given, str | PathLike) else None
+    if isinstance(text, str) and len(text) <= MAX_PATH:
+        return Path(text)
+    raise ArgumentError(f"{where}: must be the path of a file, as text or a pathlib.Path, got {short(given)}")
 
 
 def one_line(given: Any, *, where: str) -> str:

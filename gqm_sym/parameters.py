@@ -49,6 +49,8 @@ def read_value(given: Given | Any, *, where: str) -> Value:
             return Measured(in_si(read_value(measured[0], where=where), measured[2]), measured[2])
         _check_number(read_expression(given, where=where), given, where)
         return given.strip()
+    if type(given).__name__ == "timedelta64":  # NumPy counts it among the integers
+        raise NumberError(f"{where}: must be a number, got timedelta64")
     if isinstance(given, Integral):
         return int(given)
     if isinstance(given, sp.Expr):

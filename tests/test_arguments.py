@@ -5,7 +5,7 @@ import math
 import random
 from decimal import Decimal
 from fractions import Fraction
-from functools import partial
+from functools import cache, partial
 from importlib import import_module
 
 import numpy as np
@@ -26,10 +26,22 @@ FORCE = gqm.Gravity()
 LINE = gqm.line(length=1)
 ZIGZAG = [(0, 1), (1, 0), (2, 1)]
 
+NOISY = [(x, x * (19 - x) / 90 + 1e-4 * (-1) ** x) for x in range(20)]
+COIL = {"x": "cos(u)", "y": "sin(u)", "z": "u/4", "parameter": "u"}
+SPACE = (*COIL, "period", "domain", "parameters", "title", "roll", "heartline")
+
+
+@cache
+def parabola():
+    """A model, derived when it is first needed."""
+    return gqm.derive(TRACK, FORCE)
+
+
 THINGS = (
     *(None, True, 0, -1, 2.5, math.nan, math.inf, 1j, "", "a b", "x" * 5000, b"x", [], (1, 2, 3), {}, {1: 2}, set()),
     *(np.float64(2), np.int64(3), np.array([1.0, 2.0]), np.array([1j]), np.array(["a"]), object(), gqm.Gravity, LINE),
     *(TRACK, FORCE, np.zeros((2, 9)), range(10**6), ("x", "z"), float("-inf"), np.datetime64("2020-01-01")),
+    *(np.timedelta64(1, "s"), pd.NA, 1e308),
 )
 
 CALLS = {
@@ -54,6 +66,13 @@ CALLS = {
     "sampled value": lambda v: gqm.Curve.sampled([(v, 0), (1, 0), (2, 1)], kind="linear"),
     "sampled kind": lambda v: gqm.Curve.sampled(ZIGZAG, kind=v),
     "sampled closed": lambda v: gqm.Curve.sampled(ZIGZAG, kind="linear", closed=v),
+    "sampled smoothing": lambda v: gqm.Curve.sampled(NOISY, smoothing=v),
+    "sampled smooth value": lambda v: gqm.Curve.sampled([*NOISY, (20, v)], smoothing=1e-4),
+    **{f"space {name}": lambda v, name=name: gqm.Curve.space(**COIL | {name: v}) for name in SPACE},
+    "read_spec": lambda v: gqm.read_spec(v),
+    "read_sweep": lambda v: gqm.read_sweep(v),
+    "normal_force_at": lambda v: parabola().normal_force_at(v),
+    "normal_force_vector_at": lambda v: parabola().normal_force_vector_at(v),
     "piecewise": lambda v: gqm.Curve.piecewise(v),
     "piecewise piece": lambda v: gqm.Curve.piecewise([v]),
     "piecewise start": lambda v: gqm.Curve.piecewise([LINE], start=v),
@@ -182,7 +201,7 @@ LAUNCHED = {
 
 # Together with these, what raised errors of Python's, NumPy's or pandas' own.
 HOSTILE = (
-    *THINGS[:-7],
+    *THINGS[:-10],
     *("pi", "30 deg", "5 kg", "1/0", "sqrt(-1)", "1e400", 1e308, 1e-320, 10**400, Fraction(1, 3), Decimal("NaN")),
     *(np.zeros((2, 3)), np.array([]), np.array([np.nan, np.inf, 1.0]), np.array([None]), np.ma.array([1.0], mask=[1])),
     *(pd.DataFrame({"a": [1.0, 2.0]}), pd.Series([1.0, 2.0]), pd.NA, pd.NaT, [[]], [None], frozenset([1])),

@@ -1,7 +1,7 @@
 """How a track in space is banked: by an angle, or so that riders feel no lateral force."""
 
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import sympy as sp
 
@@ -40,6 +40,10 @@ class Banking:
         return tuple(form for form in (self.angle, self.speed, self.heartline) if form is not None)
 
 
+def _is_coordinated(given: Any) -> bool:
+    return isinstance(given, str) and given == COORDINATED
+
+
 def read_banking(roll: Roll | None, heartline: Source) -> Banking | None:
     """Read the arguments ``roll`` and ``heartline`` of a space curve; None where no roll is declared.
 
@@ -57,12 +61,12 @@ def read_banking(roll: Roll | None, heartline: Source) -> Banking | None:
             )
         return None
     if isinstance(roll, tuple | list):
-        if len(roll) != 2 or roll[0] != COORDINATED:
+        if len(roll) != 2 or not _is_coordinated(roll[0]):
             raise DeclarationError(
                 f"space: roll: must be an angle, {COORDINATED!r} or ({COORDINATED!r}, speed), got {short(roll)}"
             )
         speed = read_expression(roll[1], where="space: roll: speed", unit="m/s")
         return Banking(angle=None, speed=speed, heartline=height)
-    if roll == COORDINATED:
+    if _is_coordinated(roll):
         return Banking(angle=None, speed=None, heartline=height)
     return Banking(angle=read_expression(roll, where="space: roll", unit="rad"), speed=None, heartline=height)

@@ -4,6 +4,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from numbers import Real
 
+import numpy as np
 import sympy as sp
 
 from gqm_sym.arguments import several, short
@@ -76,7 +77,11 @@ def read_level(F: Source, *, start: Iterable[Source], tangent: int, parameter: s
                 f"implicit: start: {coordinate} contains a coordinate; "
                 "only numbers and run-time parameters may stand there"
             )
-    if isinstance(tangent, bool) or not isinstance(tangent, Real | sp.Integer) or tangent not in (1, -1):
+    if (
+        isinstance(tangent, bool | np.timedelta64)
+        or not isinstance(tangent, Real | sp.Integer)
+        or tangent not in (1, -1)
+    ):
         raise DeclarationError(
             f"implicit: tangent: must be 1, for (-F_z, F_x)/|grad F|, or -1, for the opposite; got {short(tangent)}"
         )

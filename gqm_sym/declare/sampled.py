@@ -37,6 +37,8 @@ BACKWARDS = pi - 1e-6
 JUMP = 100.0
 # A chord of measured points that is this many times as long as they scatter tells the direction of the track.
 LONG = 8.0
+# Points do not scatter by more than this, in m; squares of it are doubles.
+MAX_DEVIATION = 1e100
 # Cross-validation needs more points than a spline does.
 FEWEST_AUTO = 12
 # Curvature that rises and falls by turns between more than this share of neighbours is scatter,
@@ -178,7 +180,7 @@ def _read_smoothing(given: Any, kind: str) -> float | Literal["auto"] | None:
         raise DeclarationError(str(error)) from None
     except (TypeError, ValueError, OverflowError):
         deviation = float("nan")
-    if not (isfinite(deviation) and deviation > 0.0):
+    if not 0.0 < deviation < MAX_DEVIATION:
         raise DeclarationError(
             "sampled: smoothing: must be the standard deviation of the points in metres, a positive number, 'auto' or "
             f"None, got {given!r:.40}"

@@ -38,6 +38,7 @@ from gqm_sym.derivation.wells.symmetric_orbits import SymmetricOrbits, symmetric
 from gqm_sym.derivation.wells.symmetry import Symmetry, symmetry
 from gqm_sym.dimensions import COMMON, found_dimensions, unit_of
 from gqm_sym.errors import ArgumentError, DeclarationError, renamed
+from gqm_sym.expressions import read_expression
 from gqm_sym.kernels.base import (
     CONTACT_SIGN,
     DIRECTION,
@@ -62,6 +63,11 @@ LAM2 = sp.Symbol("lam2", real=True)
 MOST_SHOWN = 160
 # Variables of integration, as texts and as LaTeX.
 _DASHES = (("_", "'"), ("__", "''"))
+
+
+def _read_v2(given: Any) -> sp.Expr:
+    """V² as an expression."""
+    return given if isinstance(given, sp.Expr) else read_expression(given, where="v2")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -210,12 +216,14 @@ class Model:
 
     def normal_force_at(self, v2: sp.Expr) -> sp.Expr:
         """N where V² has a value; of a curve in no vertical plane ``|N|``."""
+        v2 = _read_v2(v2)
         if not self.loads:
             return MASS * (self.kappa * v2 + self.static_normal_load)
         return MASS * sp.sqrt(sp.Add(*(part**2 for part in self._turned_force(v2))))
 
     def normal_force_vector_at(self, v2: sp.Expr) -> Place:
         """The components of the contact force along x, y and z where V² has a value."""
+        v2 = _read_v2(v2)
         way = (self.dxds, self.dyds, self.dzds)
         if self.loads:
             turned = self._turned_force(v2)

@@ -12,7 +12,7 @@ from typing import Any, TypeAlias, TypeVar
 import sympy as sp
 from pydantic import BaseModel, ValidationError
 
-from gqm_sym.arguments import nearest
+from gqm_sym.arguments import file_path, nearest
 from gqm_sym.budgets import apart, budget, spend
 from gqm_sym.declare import Curve
 from gqm_sym.errors import BudgetError, InputError, SpecFileError
@@ -60,8 +60,9 @@ def read_spec(path: Path | str) -> Spec:
         With every mistake of the file, one line each: ``file:line:column: what; what would be
         right``.
     """
+    file = file_path(path, where="read_spec: path")
     mistakes = Mistakes(path)
-    tree = read_tree(read_text(Path(path), mistakes), mistakes)
+    tree = read_tree(read_text(file, mistakes), mistakes)
     if isinstance(tree, MapNode):
         try:
             with budget("reading", SECONDS, "write fewer and simpler expressions"):

@@ -10,7 +10,7 @@ from typing import Any, Generic, TypeVar
 import numpy as np
 from pydantic import BaseModel, ValidationError
 
-from gqm_sym.arguments import nearest
+from gqm_sym.arguments import file_path, nearest
 from gqm_sym.budgets import apart, budget
 from gqm_sym.derivation import Model
 from gqm_sym.emission import emit
@@ -57,8 +57,9 @@ def read_sweep(path: Path | str) -> Plan:
 
 def read_study(path: Path | str, reader: "type[StudyReader[P]]", *, needed: str) -> P:
     """Read a file that asks something of the motions on the curve of another file, as `read_sweep` does."""
+    file = file_path(path, where="path")
     mistakes = Mistakes(path)
-    text = read_text(Path(path), mistakes)
+    text = read_text(file, mistakes)
     tree = read_tree(text, mistakes, needed=needed)
     if isinstance(tree, MapNode):
         try:
