@@ -265,7 +265,7 @@ class DissipativeMotion(Motion):
         if times is None:
             return super().lam(t)
         out = self._read(*times, 1, self._read_places, super().lam)[0]
-        return out.reshape(t.shape) if np.ndim(t) else float(out[0])
+        return out.reshape(times[0].shape) if np.ndim(t) else float(out[0])
 
     def state(self, t: Any) -> State:
         """The state of the body at times; see `Motion.state`. For doubles this is one call of compiled code."""
@@ -277,7 +277,7 @@ class DissipativeMotion(Motion):
             return np.array(Motion.state(self, later)[1 : 1 + STATE_ROWS])
 
         out = self._read(*times, STATE_ROWS, self._read_states, by_segments)
-        return self._state_of(t if np.ndim(t) else float(times[0][0]), out)
+        return self._state_of(times[0] if np.ndim(t) else float(times[0][0]), out)
 
     def error_bound(self, t: Any) -> Any:
         """A bound of the error of ``lam(t)``; see `Motion.error_bound`. For doubles it is that of `state`."""
@@ -294,6 +294,7 @@ class DissipativeMotion(Motion):
     ) -> Array:
         """Rows of numbers at times, from the record that compiled code reads as far as it goes."""
         record, until = self._reading_up_to(greatest)
+        times = times.reshape(-1)
         out = np.empty((rows, times.size))
         if greatest <= until:
             by_record(record, times, out)
