@@ -4,7 +4,6 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from numbers import Real
 
-import numpy as np
 import sympy as sp
 
 from gqm_sym.arguments import several, short
@@ -78,7 +77,7 @@ def read_level(F: Source, *, start: Iterable[Source], tangent: int, parameter: s
                 "only numbers and run-time parameters may stand there"
             )
     if (
-        isinstance(tangent, bool | np.timedelta64)
+        type(tangent).__name__ in ("bool", "timedelta64")  # NumPy counts the latter among the integers
         or not isinstance(tangent, Real | sp.Integer)
         or tangent not in (1, -1)
     ):

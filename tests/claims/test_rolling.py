@@ -65,6 +65,17 @@ def test_on_a_charted_curve_as_on_one_with_formulas(loop: ModuleType, bowl: Modu
     assert np.abs(ours.normal_force - theirs.normal_force).max() <= 2e-13 * 9.81
 
 
+@pytest.mark.parametrize("share", ["1/2", "9/10", "99/100"])
+def test_small_swings_of_a_ball_that_all_but_fills_its_loop(share: str, loop: ModuleType, bowl: ModuleType) -> None:
+    """The path of its centre has the roundings of the curve, many of its own: places lay up to seven bounds away."""
+    numbers = {"rho": sp.Rational(share) * sp.Rational("5/4"), "beta": "2/5", "g": "9.81"}
+    for angle in np.geomspace(1e-6, 1e-2, 9).tolist():
+        motion = loop.solve(1.25 * angle, **numbers)
+        times = np.linspace(0.05, 0.95, 7) * motion.period
+        exact = 1.25 * bowl.solve(angle, L="5/4", **numbers).lam(times)
+        assert np.all(np.abs(motion.lam(times) - exact) <= motion.error_bound(times))
+
+
 def test_on_a_rail_of_arcs_and_a_line(generated_folder: Path) -> None:
     """Between two arcs the centre goes straight; on each it is a pendulum of length 2 - rho."""
     pieces = [gqm.arc(radius=2, angle="3/2"), gqm.line(length=3), gqm.arc(radius=2, angle="3/2")]

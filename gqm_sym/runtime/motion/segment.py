@@ -43,9 +43,10 @@ MIN_TIMED_WIDTH_SHARE = 2.0**-10
 # (`Segment._end_errors`); 0.6 was the most that was measured.
 MAX_END_ROUNDINGS = 2.0
 
-# The error of the slope of the potential along a chart that no formulas improve, in roundings of the largest slope; and
-# the number of places of a closed one at which that is looked for.
-CHART_ROUNDINGS, AROUND = 12.0, 16
+# The error of the slope of the potential along a chart that no formulas improve, in roundings of the largest slope, and
+# in those times ds, which is small along the path of a centre (0.95 was measured); and the number of places of a closed
+# one at which that is looked for.
+CHART_ROUNDINGS, CENTRE_ROUNDINGS, AROUND = 8.0, 2.0, 16
 
 # The error of a place by the rounding of a chart, in roundings of the width of a motion, and of its coordinates.
 MAX_WIDTH_ROUNDINGS, MAX_SIZE_ROUNDINGS = 128.0, 4.0
@@ -305,10 +306,13 @@ class Segment:
         steepness, of_chart = np.abs(potential_at(f.addresses, f.p, ends)[1]), 0.0
         errors = error * np.divide(steepness.min(), steepness, out=np.ones(2), where=steepness > 0.0)
         if f.exact is None:
-            # Slopes of a chart that no formulas improve are known to a rounding of the largest.
+            # Slopes of a chart that no formulas improve are known to a rounding of the largest. The path of a centre
+            # has roundings of the curve, which are larger by 1/ds.
             around = np.array([*ends, *f.breaks, *np.linspace(0.0, f.period, AROUND)])
             largest = np.abs(potential_at(f.addresses, f.p, around)[1]).max()
-            rounding = CHART_ROUNDINGS * ULP * abs(self.width) * largest
+            shortest = np.abs(path_and_force_at(f.addresses, f.p, around, np.zeros_like(around))[2]).min()
+            roundings = max(CHART_ROUNDINGS, CENTRE_ROUNDINGS / shortest) if shortest > 0.0 else inf
+            rounding = roundings * ULP * abs(self.width) * largest
             errors = errors + np.divide(rounding, steepness, out=np.zeros(2), where=steepness > 0.0)
         elif f.exact.edges.size:
             size = float(np.hypot(*path_and_force_at(f.addresses, f.p, ends, np.zeros(2))[:2]).max())
