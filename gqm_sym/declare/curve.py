@@ -15,7 +15,7 @@ from gqm_sym.dimensions import unit_of
 from gqm_sym.errors import ArgumentError, DeclarationError
 from gqm_sym.expressions import check_name, read_expression
 from gqm_sym.parameters import Parameters, Value, check_measured, names_in_order, read_parameters
-from gqm_sym.sympy_charts import chart_x, chart_z
+from gqm_sym.sympy_charts import SPACE, chart_x, chart_z
 
 if TYPE_CHECKING:
     from gqm_sym.declare.piecewise import Piece
@@ -43,7 +43,7 @@ class Curve:
         The form in which it was declared: ``graph``, ``parametric``, ``polar``, ``space``; of a charted curve
         ``implicit``, ``sampled``, ``piecewise`` or ``polynomial``.
     x, z, y
-        The coordinates, in the parameter and the run-time parameters; y is 0 on curves of all kinds but ``space``.
+        The coordinates, in the parameter and the run-time parameters; y is 0 on curves in the plane of x and z.
     parameter
         The symbol of λ.
     domain
@@ -99,7 +99,7 @@ class Curve:
     @property
     def in_space(self) -> bool:
         """Whether it was declared by three coordinates."""
-        return self.kind == "space"
+        return self.kind == "space" or getattr(self.definition, "in_space", False)
 
     @property
     def coordinates(self) -> tuple[tuple[str, sp.Expr], ...]:
@@ -375,6 +375,9 @@ class Curve:
 
         s = sp.Symbol("s", real=True)
         track = read_track(points, z, kind=kind, closed=closed, smoothing=smoothing)
+        if track.in_space:
+            at_x, at_y, at_z = (head(s) for head in SPACE)
+            return cls(kind="sampled", x=at_x, y=at_y, z=at_z, parameter=s, title=title, definition=track)
         return cls(kind="sampled", x=chart_x(s), z=chart_z(s), parameter=s, title=title, definition=track)
 
     @classmethod
