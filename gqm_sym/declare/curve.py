@@ -98,7 +98,7 @@ class Curve:
 
     @property
     def in_space(self) -> bool:
-        """Whether it was declared by three coordinates."""
+        """Whether it has three coordinates."""
         return self.kind == "space" or getattr(self.definition, "in_space", False)
 
     @property
@@ -335,8 +335,9 @@ class Curve:
         Parameters
         ----------
         points
-            Rows of x and z: an (n, 2) array, or pairs of numbers or of decimal text, which is kept as it is; or a
-            table with columns x and z, as a DataFrame or a mapping; or, where ``z`` is given, the x of all points.
+            Rows of x and z, or in space of x, y and z: an array, or numbers or decimal text, which is kept as it is; or
+            a table with these columns, as a DataFrame or a mapping; or, where ``z`` is given, the x of all points. In
+            space the track is a spline and not smoothed.
         z
             The heights of the points, where ``points`` are their x: ``Curve.sampled(x, z)``.
         kind

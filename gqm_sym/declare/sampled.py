@@ -260,17 +260,15 @@ def _read_rows(points: Iterable[Any]) -> Iterator[tuple[str, Place]]:
         numbered = enumerate(rows, start=1)
     except TypeError:
         raise DeclarationError(f"sampled: points: must be rows of x and z, got {short(points)}") from None
-    wanted = 0
+    wanted, told = 2, "two numbers, x and z"
     for count, row in numbered:
-        if isinstance(row, str) or not isinstance(row, Sequence) or len(row) not in (2, IN_SPACE):
+        is_row = isinstance(row, Sequence) and not isinstance(row, str)
+        if count == 1 and is_row and len(row) == IN_SPACE:
+            wanted, told = IN_SPACE, "three numbers, x, y and z, as in row 1"
+        if not is_row or len(row) != wanted:
             raise DeclarationError(
-                f"sampled: row {count}: must be two numbers, x and z, or in space three, x, y and z, got {short(row)}; "
-                "for one array of each write Curve.sampled(x, z)"
-            )
-        wanted = wanted or len(row)
-        if len(row) != wanted:
-            raise DeclarationError(
-                f"sampled: row {count}: has {len(row)} coordinates, and row 1 has {wanted}; give each point as many"
+                f"sampled: row {count}: must be {told}, got {short(row)}; for one array of each write "
+                "Curve.sampled(x, z), and in space rows of x, y and z"
             )
         read = [_read(value, count) for value in row]
         yield " ".join(text for text, _ in read), tuple(number for _, number in read)
