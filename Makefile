@@ -8,6 +8,10 @@ BIN     := $(VENV)/bin
 # Machine code is kept in one folder, where modules with the same functions share it.
 export NUMBA_CACHE_DIR ?= $(CURDIR)/$(VENV)/machine_code
 
+# Python keeps what it compiles of the files that it imports, also where the environment tells it not to: the tests start
+# hundreds of processes, and each would compile thousands of files again.
+export PYTHONDONTWRITEBYTECODE :=
+
 .DEFAULT_GOAL := help
 .PHONY: help demo test lint types current site generate docs soak fuzz bench coverage mutate
 

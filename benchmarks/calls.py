@@ -71,7 +71,7 @@ def dissipative() -> list[tuple[str, float]]:
     p = model.numbers(tuple(friction.PARAMETERS.values()))
     loss = model.dissipation
     assert loss is not None
-    launch = launched(1, -1.0, -inf, inf, 0.0, 1, 0, inf, nan, 6.2088**2)
+    launch = launched([(-1.0, -inf, inf, 0.0, 1, 0, inf, nan, 6.2088**2)])
     joints, records = Joints(NOWHERE, NOWHERE, NOWHERE, NOWHERE), np.empty((1, 16 * COLUMNS))
 
     def leg() -> int:

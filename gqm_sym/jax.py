@@ -76,7 +76,8 @@ def _for_jax(module: ModuleType, quantity: str) -> Callable[..., Any]:
             return np.asarray(found.gradient if wrt else found.values, dtype=out.dtype)
 
         arrays = jnp.broadcast_arrays(*arguments)
-        out = jax.ShapeDtypeStruct((*arrays[0].shape, *((len(wrt),) if wrt else ())), arrays[0].dtype)
+        shape = (*arrays[0].shape, *((len(wrt),) if wrt else ()))
+        out = jax.ShapeDtypeStruct(shape, arrays[0].dtype)  # type: ignore[no-untyped-call, unused-ignore]
         return jax.pure_callback(call, out, *arrays, vmap_method="broadcast_all")
 
     @cache

@@ -30,7 +30,7 @@ from gqm_sym.derivation.forces.dissipation import (
 from gqm_sym.derivation.forces.forces import Forces, Place, forces, is_planar
 from gqm_sym.derivation.forces.rider import Rider, rider
 from gqm_sym.derivation.forces.speed import LAM0, V0, SpeedField, conservative_speed, dissipative_speed
-from gqm_sym.derivation.geometry.geometry import AHEAD, PAIRS, Geometry, geometry, vertical_plane
+from gqm_sym.derivation.geometry.geometry import AHEAD, Geometry, cross, geometry, vertical_plane
 from gqm_sym.derivation.geometry.level_set import LevelSet, level_set
 from gqm_sym.derivation.geometry.offset_curve import beside
 from gqm_sym.derivation.reality import check_somewhere_real
@@ -219,7 +219,7 @@ class Model:
         way = (self.dxds, self.dyds, self.dzds)
         if self.loads:
             turned = self._turned_force(v2)
-            along_x, along_y, along_z = (MASS * (turned[i] * way[j] - turned[j] * way[i]) for i, j in PAIRS)
+            along_x, along_y, along_z = (MASS * part for part in cross(turned, way))
             return along_x, along_y, along_z
         force = self.normal_force_at(v2)
         along_x, along_y, along_z = (force * part for part in self.normal)

@@ -171,11 +171,8 @@ class CompiledModel(Formulas):
             found = path_in_space_at(address, p, places[part], v2[part])
             if self.rider_loads is not None:
                 # From rest the body goes to either side of the launch.
-                ahead = np.full(found.shape[1], float(launch.direction))
-                if launch.v0.value == 0.0:
-                    ahead = np.where(
-                        places[part] == launch.lam0.value, ahead, np.sign(places[part] - launch.lam0.value)
-                    )
+                side = np.sign(places[part] - launch.lam0.value) * (launch.v0.value == 0.0)
+                ahead = np.where(side != 0.0, side, float(launch.direction))
                 loads = rider_loads(self, p, places[part], v2[part], ahead, force[part])
                 found = np.concatenate([found, loads])
             for row, values in zip(rows, found, strict=True):

@@ -154,6 +154,7 @@ TESTED_THROUGH = {
     "sweep/passage.py": "runtime/sweep/test_charts.py",
     "sweep/quantities.py": "runtime/sweep/test_sweep.py",
     "sweep/scalar.py": "runtime/sweep/test_sweep.py",
+    "sweep/slow_places.py": "runtime/sweep/test_separatrices.py",
     "vocabulary.py": DIFFERENCES,
 }
 

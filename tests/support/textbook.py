@@ -7,6 +7,7 @@ Newton's law along the tangent, per unit mass (paper, eq. 20 with the correction
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 
 from mpmath import mp, mpf
 
@@ -35,10 +36,7 @@ class Textbook:
 
     def shape(self, lam: mpf) -> tuple[mpf, mpf, mpf, mpf]:
         """σ, both components of the tangent, and the curvature."""
-        dx, dz = mp.diff(self.x, lam), mp.diff(self.z, lam)
-        ddx, ddz = mp.diff(self.x, lam, 2), mp.diff(self.z, lam, 2)
-        ds = mp.hypot(dx, dz)
-        return ds, dx / ds, dz / ds, (dx * ddz - dz * ddx) / ds**3
+        return _shape(self.x, self.z, lam, mp.prec)
 
     def forces(self, lam: mpf) -> tuple[mpf, mpf]:
         """F·t, and n₀ = -F·n with n a quarter turn to the left of t."""
@@ -71,3 +69,12 @@ class Textbook:
             x=lambda lam: self.x(lam) + radius * across(lam)[0],
             z=lambda lam: self.z(lam) + radius * across(lam)[1],
         )
+
+
+@lru_cache(maxsize=4096)
+def _shape(x: Number, z: Number, lam: mpf, _precision: int) -> tuple[mpf, mpf, mpf, mpf]:
+    """The same, kept: all terms of an equation ask for it, and quadratures for either sign at the same places."""
+    dx, dz = mp.diff(x, lam), mp.diff(z, lam)
+    ddx, ddz = mp.diff(x, lam, 2), mp.diff(z, lam, 2)
+    ds = mp.hypot(dx, dz)
+    return ds, dx / ds, dz / ds, (dx * ddz - dz * ddx) / ds**3

@@ -7,7 +7,7 @@ import sympy as sp
 from gqm_sym.derivation.algebra.differentiate import differentiate
 from gqm_sym.derivation.algebra.normal_form import shortest
 from gqm_sym.derivation.algebra.rewrite import absorb_bars, multiplied_out, tidy, without_waves
-from gqm_sym.derivation.geometry.geometry import PAIRS, Geometry, Heading
+from gqm_sym.derivation.geometry.geometry import Geometry, Heading, cross
 from gqm_sym.kernels.base import Kernel, X, Y, Z
 
 Place = tuple[sp.Expr, sp.Expr, sp.Expr]
@@ -91,7 +91,7 @@ def _in_space(pull: Place, potential: sp.Expr, kernel: Kernel, shape: Geometry) 
     """The same along a curve in no vertical plane."""
     way = (shape.along, shape.sideways, shape.across)
     push = tidy(sp.Add(*(part * rate for part, rate in zip(pull, way, strict=True))))
-    crossed = [tidy(way[i] * pull[j] - way[j] * pull[i]) for i, j in PAIRS]
+    crossed = [tidy(part) for part in cross(way, pull)]
     load = tidy(sp.sqrt(without_waves(sp.Add(*(part**2 for part in crossed)))))
     return Forces(
         potential=potential,

@@ -13,7 +13,7 @@ import sympy as sp
 from gqm_sym.declare.banking import Banking
 from gqm_sym.derivation.algebra.differentiate import differentiate
 from gqm_sym.derivation.forces.forces import Forces, Place
-from gqm_sym.derivation.geometry.geometry import PAIRS, Geometry
+from gqm_sym.derivation.geometry.geometry import Geometry, cross
 from gqm_sym.kernels.base import DIRECTION, W
 
 STANDARD_GRAVITY = sp.Rational(980665, 100000)
@@ -113,11 +113,11 @@ def _in_space(banking: Banking, shape: Geometry, law: Forces) -> _Seat:
     if banking.angle is None:
         loaded = turned if banking.speed is None else _turned(shape, law, banking.speed**2)
         size = sp.sqrt(sp.Add(*(part**2 for part in loaded)))
-        up_x, up_y, up_z = (part / size for part in _cross(loaded, way))
+        up_x, up_y, up_z = (part / size for part in cross(loaded, way))
         roll = (loaded[0] * along - loaded[1] * across, loaded[2])
         if banking.speed is None:
             return _Seat(vertical=size, lateral=sp.S.Zero, roll=roll, up=(up_x, up_y, up_z))
-        vertical, lateral = _dot(turned, loaded) / size, -_dot(_cross(turned, way), loaded) / size
+        vertical, lateral = _dot(turned, loaded) / size, -_dot(cross(turned, way), loaded) / size
         return _Seat(vertical=vertical, lateral=lateral, roll=roll, up=(up_x, up_y, up_z))
     level = across**2 + along**2
     width = sp.sqrt(level)
@@ -138,11 +138,6 @@ def _in_space(banking: Banking, shape: Geometry, law: Forces) -> _Seat:
 def _turned(shape: Geometry, law: Forces, w: sp.Expr) -> Place:
     """The vector t × N/m at V² = w."""
     along_x, along_y, along_z = (bend * w + load for bend, load in zip(shape.bend, law.loads, strict=True))
-    return along_x, along_y, along_z
-
-
-def _cross(one: Place, other: Place) -> Place:
-    along_x, along_y, along_z = (one[i] * other[j] - one[j] * other[i] for i, j in PAIRS)
     return along_x, along_y, along_z
 
 

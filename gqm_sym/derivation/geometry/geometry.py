@@ -48,6 +48,12 @@ PAIRS = ((1, 2), (2, 0), (0, 1))
 """The coordinates in the components of a vector product."""
 
 
+def cross(one: Sequence[sp.Expr], other: Sequence[sp.Expr]) -> tuple[sp.Expr, sp.Expr, sp.Expr]:
+    """The vector product of two vectors."""
+    along_x, along_y, along_z = (one[i] * other[j] - one[j] * other[i] for i, j in PAIRS)
+    return along_x, along_y, along_z
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Geometry:
     """Closed forms of a curve in its parameter λ.
@@ -249,7 +255,7 @@ def _plain_in_space(curve: Curve, signs: Signs, note: str) -> Geometry:
     second = [differentiate(form, lam) for form in first]
     square = sp.Add(*(part**2 for part in first))
     ds = sp.sqrt(square)
-    turning = tuple((first[i] * second[j] - first[j] * second[i]) / square for i, j in PAIRS)
+    turning = tuple(part / square for part in cross(first, second))
     rate = sp.sqrt(sp.Add(*(part**2 for part in turning)))
     return Geometry(
         along=first[0],

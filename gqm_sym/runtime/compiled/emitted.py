@@ -92,13 +92,15 @@ class Emitted:
 
     def compile(self) -> None:
         """Compile the function, if it is not compiled yet; callers take the compiled one from now on."""
-        if self._compiled is None:
+        with jit.COMPILING:
+            if self._compiled is not None:
+                return
             try:
                 with paused():
-                    self._compiled = jit.COMPILER.callback(self._as_numba_sees_it(), self.signature)
+                    compiled = jit.COMPILER.callback(self._as_numba_sees_it(), self.signature)
             finally:
                 jit.ANNOUNCER.end()
-            self._slot.value = self._compiled.address
+            self._slot.value, self._compiled = compiled.address, compiled
 
     def _as_numba_sees_it(self) -> Any:
         if self._alias is not None:

@@ -73,6 +73,10 @@ ANNOUNCER = Announcer()
 COMPILER = Compiler(COMPILE, lambda function: stamp_for(function), ANNOUNCER.begin)
 
 
+# Held while a function is compiled: threads that need the same one wait for it. What has been compiled once must stay,
+# for other threads may be running it.
+COMPILING = threading.RLock()
+
 # What was raised where compiled code had called Python, by thread: Python has no way to raise it through compiled code.
 RAISED: dict[int, BaseException] = {}
 
@@ -178,10 +182,12 @@ def entry(signature: Any, *, nogil: bool = False, checked: bool = True) -> Calla
                     return plain(arguments)
                 except NotPlainError:
                     pass
-                try:
-                    compiled = COMPILER.entry(function, signature, nogil=nogil, checked=checked)
-                finally:
-                    ANNOUNCER.end()
+                with COMPILING:
+                    if compiled is None:
+                        try:
+                            compiled = COMPILER.entry(function, signature, nogil=nogil, checked=checked)
+                        finally:
+                            ANNOUNCER.end()
             result = compiled(*arguments)
             if RAISED:
                 raise_raised()

@@ -10,6 +10,8 @@ from functools import lru_cache
 from itertools import pairwise
 from typing import Any
 
+from gqm_sym.runtime.compiled.uncompiled import sharing_arrays
+
 
 @lru_cache(maxsize=1)
 def cores() -> int:
@@ -37,7 +39,11 @@ def run_in_threads(work: Callable[[slice], Any], size: int, min_slice: int) -> N
         return
     from concurrent.futures import ThreadPoolExecutor
 
+    def in_thread(part: slice) -> None:
+        with sharing_arrays():
+            work(part)
+
     marks = [size * k // parts for k in range(parts + 1)]
     with ThreadPoolExecutor(parts) as pool:
-        for done in [pool.submit(work, slice(*ends)) for ends in pairwise(marks)]:
+        for done in [pool.submit(in_thread, slice(*ends)) for ends in pairwise(marks)]:
             done.result()

@@ -65,7 +65,13 @@ class _Deadline(threading.local):
     at = math.inf
 
 
-_DEADLINE = _Deadline()
+class _Sharing(threading.local):
+    """Whether other threads write into the same arrays as this one."""
+
+    on = False
+
+
+_DEADLINE, _SHARING = _Deadline(), _Sharing()
 _STEPS = count()
 
 
@@ -126,6 +132,19 @@ def paused() -> Iterator[None]:
         yield
     finally:
         _DEADLINE.at += time.perf_counter() - started
+
+
+@contextmanager
+def sharing_arrays() -> Iterator[None]:
+    """Let no entry point run as plain Python in this thread, for others write into parts of the same arrays.
+
+    What plain Python has written before it gives up is taken back, and what others have written would be as well.
+    """
+    before, _SHARING.on = _SHARING.on, True
+    try:
+        yield
+    finally:
+        _SHARING.on = before
 
 
 def go_on() -> None:
@@ -440,9 +459,10 @@ class PlainEntry:
         Raises
         ------
         NotPlainError
-            If the compiler must run it, or it is worth compiling; then all arrays are as they were.
+            If the compiler must run it, it is worth compiling, or other threads write into the same arrays; then all
+            arrays are as they were.
         """
-        if self._trial.is_over():
+        if _SHARING.on or self._trial.is_over():
             raise NotPlainError
         arrays = list(_arrays(arguments))
         before = [array.copy() for array in arrays]

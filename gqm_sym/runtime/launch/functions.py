@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from gqm_sym.runtime.compiled.types import Array
-from gqm_sym.runtime.interface import Addresses
+from gqm_sym.runtime.interface import Addresses, Dissipation
 from gqm_sym.runtime.multiprecision.exact_problem import NOWHERE, ExactProblem
 
 
@@ -26,6 +26,8 @@ class BoundFunctions(NamedTuple):
         The period of a closed curve in units of its parameter, 0 otherwise.
     bends : array
         The sign of the tangent's turn at each corner: 1 where the curve bends to the left.
+    dissipation : Dissipation or None
+        What compiled code takes of a dissipative model; None for a conservative one.
     """
 
     addresses: Addresses
@@ -35,10 +37,11 @@ class BoundFunctions(NamedTuple):
     corners: Array = NOWHERE
     period: float = 0.0
     bends: Array = NOWHERE
+    dissipation: Dissipation | None = None
 
     def drops(self, only_sign: int) -> Array:
         """The corners at which a moving body leaves a track that can only push with one sign of N (0: with both)."""
-        return self.corners[self.bends * only_sign < 0.0]
+        return self.corners[self.bends * only_sign < 0.0] if self.corners.size else self.corners
 
     def between(self, places: Array, a: float, b: float) -> Array:
         """The places that lie strictly between a and b; on a closed curve they are repeated with the period."""

@@ -22,20 +22,21 @@ from gqm_sym.runtime.multiprecision.exact_tracks import FormulaTrack
 def bind(formulas: Formulas, p: ParameterValues, launch: Launch) -> BoundFunctions:
     """The compiled functions bound to parameter values, with one launch's problem in extended precision."""
     bound = bind_all(formulas, p)
-    if formulas.exact is None:
-        return bound
-    return bound._replace(exact=exact_problem(formulas, p, launch))
+    exact = exact_problem(formulas, p, launch)
+    return bound if exact is None else BoundFunctions(bound.addresses, bound.p, exact, *bound[3:])
 
 
 def bind_all(formulas: Formulas, p: ParameterValues) -> BoundFunctions:
     """The bound functions that all launches with these parameters share."""
     if p.functions is None:
-        p.functions = BoundFunctions(formulas.functions.addresses(), p.values)
+        addresses, losses = formulas.functions.addresses(), formulas.dissipation
+        dissipation = None if losses is None else losses.addresses()
+        p.functions = BoundFunctions(addresses, p.values, dissipation=dissipation)
         if formulas.chart is not None:
             chart = formulas.charted(p)
             block = np.concatenate([p.values, chart.block])
             shape = (chart.breaks, chart.corners, chart.period, chart.bends)
-            p.functions = BoundFunctions(formulas.functions.addresses(), block, None, *shape)
+            p.functions = BoundFunctions(addresses, block, None, *shape, dissipation)
     bound: BoundFunctions = p.functions
     return bound
 

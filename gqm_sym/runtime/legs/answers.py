@@ -29,7 +29,7 @@ from gqm_sym.runtime.legs.body import (
     TURNS,
     VALUE,
 )
-from gqm_sym.runtime.legs.frames.local_frame import SMALL_SHARE
+from gqm_sym.runtime.legs.frames.local_frame import SMALL_SHARE, may_be_small
 from gqm_sym.runtime.legs.leg_equation import Forces
 from gqm_sym.runtime.legs.leg_panels import GAP_COLUMNS
 from gqm_sym.runtime.legs.leg_reading import passage, peak_of_leg
@@ -47,8 +47,12 @@ from gqm_sym.runtime.legs.leg_record import (
 )
 from gqm_sym.runtime.legs.leg_run import ASYMPTOTE, FULL, SPENT, TURN, Reading, point_buffer, slope_of_v2
 
-# What is asked of each body; LEG is to advance by one leg.
-LEG, END_TIME, REST_PLACE, ARRIVAL, LEAST_SPEED, MOST_SPEED, LEAST_LOAD, MOST_LOAD = range(8)
+# What is asked of each body; LEG is to advance by one leg, FIRST_LEG the same unless its launch is next to an
+# equilibrium.
+FIRST_LEG, LEG, END_TIME, REST_PLACE, ARRIVAL, LEAST_SPEED, MOST_SPEED, LEAST_LOAD, MOST_LOAD = range(9)
+
+# What became of a body whose launch is so near to an equilibrium that it may be followed by its distance from that.
+NEARBY = 14
 
 # Whether there is an answer: LEFT is the status of a body that the loop does not decide.
 FOUND, LEFT, NONE = range(3)
@@ -193,7 +197,8 @@ def follow_legs(dissipation, p, joints, body, records):  # type: ignore[no-untyp
         if what == FULL:
             break
         count += 1
-        if what != TURN or body[ENDING] != 0.0 or body[ELAPSED] >= body[HORIZON] or is_tiny(records[count - 1]):
+        body[STATUS] = 1.0 if is_tiny(records[count - 1]) else 0.0
+        if what != TURN or body[ENDING] != 0.0 or body[ELAPSED] >= body[HORIZON] or body[STATUS] != 0.0:
             break
     body[VALUE] = count
     return what
@@ -215,8 +220,9 @@ def drive(dissipation, parameters, joints, question, bodies, records):  # type: 
         A row of run-time parameters for each body, or one for all of them.
     joints : Joints
     question : int
-        LEG to MOST_LOAD. The answer to all but LEG is in VALUE and STATUS of the body; LEAST_LOAD and MOST_LOAD mean
-        the contact force per mass. VALUE after LEG is the number of legs that have been followed.
+        FIRST_LEG to MOST_LOAD. The answer to all but the first two is in VALUE and STATUS of the body; LEAST_LOAD and
+        MOST_LOAD mean the contact force per mass. After the first two, VALUE is the number of legs that have been
+        followed, and STATUS is 1 if the last of them is tiny (`is_tiny`).
     bodies : (n, SIZE) array
         The bodies (`legs.body`), which are moved on.
     records : (n, size) array
@@ -226,7 +232,7 @@ def drive(dissipation, parameters, joints, question, bodies, records):  # type: 
     Returns
     -------
     int
-        What became of the last body on its last leg (`advance`).
+        What became of the last body on its last leg (`advance`), or NEARBY.
     """
     breaks, corners, drops, ahead, gaps = joints
     joints = Joints(uncounted(breaks), uncounted(corners), uncounted(drops), uncounted(ahead), uncounted(gaps))
@@ -237,7 +243,9 @@ def drive(dissipation, parameters, joints, question, bodies, records):  # type: 
             joints.gaps[::GAP_COLUMNS] = 0.0
         if body[STEP] == 0.0:
             launch(dissipation, p, joints, body)
-        if question == LEG:
+            if question == FIRST_LEG and may_be_small(dissipation, p, joints.breaks, body):
+                return NEARBY
+        if question <= LEG:
             what = follow_legs(dissipation, p, joints, body, records) if body[DIRECTION] != 0.0 else RESTS
         elif body[DIRECTION] != 0.0:
             body[VALUE], body[STATUS] = answer(dissipation, p, joints, question, body, records[0])

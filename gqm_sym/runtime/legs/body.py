@@ -38,6 +38,8 @@ VALUE, STATUS         the quantity that was asked for, and whether it has a valu
 ===================== ===========================================================================================
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from gqm_sym.runtime.compiled.types import Array
@@ -48,21 +50,18 @@ ELAPSED, ELAPSED_LOW, LEG_TIME, LAST_LEG, LEG_BEFORE, TURNS, PAUSES, MAY_REST = 
 LAST_WIDTH, WIDTH_BEFORE, UNRESOLVED, FROM_REST, ENDING, VALUE, STATUS, SIZE = range(26, 34)
 
 
-def launched(count: int, *given: float | Array) -> Array:
+def launched(given: Sequence[Sequence[float]] | Array) -> Array:
     """Bodies at their launch.
 
     Parameters
     ----------
-    count : int
-        The number of bodies.
-    *given : float or array
-        LAM0 to V2, one number for all bodies or an array.
+    given : (n, PLACE) array or sequence of sequences
+        LAM0 to V2 of each body.
 
     Returns
     -------
-    (count, SIZE) array
+    (n, SIZE) array
     """
-    bodies = np.zeros((count, SIZE))
-    for column, values in enumerate(given):
-        bodies[:, column] = values
+    bodies = np.zeros((len(given), SIZE))
+    bodies[:, :PLACE] = given
     return bodies

@@ -19,12 +19,12 @@ from gqm_sym.runtime.interface import Dissipation, ExactLaw
 from gqm_sym.runtime.inversion.leg_tables import places_along_legs, states_along_legs
 from gqm_sym.runtime.launch.ends import CUSP_SHARE, domain_end, leaving_at_once, starting_step
 from gqm_sym.runtime.launch.formulas import Formulas, ParameterValues
-from gqm_sym.runtime.launch.problem import Problem, bind
+from gqm_sym.runtime.launch.problem import Problem, bind_all
 from gqm_sym.runtime.launch.request import ONLY_SIGN, Launch
 from gqm_sym.runtime.launch.speed import path_and_force_at
 from gqm_sym.runtime.legs import answers
 from gqm_sym.runtime.legs.advance import AT_ONCE, BEYOND, CREEPING_SHARE, LEAVES, RESTS, Joints, room_ahead
-from gqm_sym.runtime.legs.answers import LEAST_SWING, LEG, MAX_PAUSES, MAX_TURNS
+from gqm_sym.runtime.legs.answers import FIRST_LEG, LEAST_SWING, LEG, MAX_PAUSES, MAX_TURNS, NEARBY
 from gqm_sym.runtime.legs.body import (
     DIRECTION,
     ELAPSED,
@@ -40,6 +40,7 @@ from gqm_sym.runtime.legs.body import (
     PLACE,
     PLACE_LOW,
     REACH,
+    STATUS,
     STEP,
     TURNS,
     V2,
@@ -47,7 +48,7 @@ from gqm_sym.runtime.legs.body import (
     launched,
 )
 from gqm_sym.runtime.legs.frames.local_frame import PLACE as PLACE_IN_FRAME
-from gqm_sym.runtime.legs.frames.local_frame import SMALL_SHARE, Frame, frame_near, may_be_small, refined
+from gqm_sym.runtime.legs.frames.local_frame import SMALL_SHARE, Frame, frame_near, is_small, refined
 from gqm_sym.runtime.legs.leg_errors import Errors, carry, rounding_share
 from gqm_sym.runtime.legs.leg_reading import place_at
 from gqm_sym.runtime.legs.leg_record import (
@@ -115,6 +116,9 @@ NEAR_EQUILIBRIUM = 1e-13
 # body is no product of a factor and V**2: it is a difference of forces there that agree to a rounding.
 NEAREST_SHARE = 1e-20
 
+# What compiled code reads of a curve that is smooth everywhere.
+SMOOTH = Joints(NOWHERE, NOWHERE, NOWHERE, NOWHERE)
+
 # The names of what ends a run, where the code alone says it.
 END_NAMES = {
     TURN: "turn",
@@ -127,8 +131,7 @@ END_NAMES = {
 
 def dissipate(formulas: Formulas, p: ParameterValues, launch: Launch) -> Motion:
     """The motion of a launch where forces dissipate."""
-    functions = bind(formulas, p, launch)
-    problem = Problem(formulas, launch, p, functions, formulas.domain(p))
+    problem = Problem(formulas, launch, p, bind_all(formulas, p), formulas.domain(p))
     motion = DissipativeMotion(problem)
     return motion if motion.direction else MotionAtRest(problem)
 
@@ -157,9 +160,9 @@ def _known(errors: tuple[float, float, float]) -> Errors:
 
 def _loss(problem: Problem) -> Dissipation:
     """The dissipation of the model."""
-    loss = problem.formulas.dissipation
+    loss = problem.functions.dissipation
     assert loss is not None
-    return loss.addresses()
+    return loss
 
 
 class Reading(NamedTuple):
@@ -194,6 +197,8 @@ class DissipativeMotion(Motion):
     _whole: Trajectory | None = None
     _known_changes: Changes | None = None
     _reading = Reading(np.empty(0), -1.0)
+    # How many panels there are, with one more for each run.
+    _stored = 0
     # How many runs `_look_ahead` computes of a motion that it finds no end of; 0 while that is not known.
     _beginning = 0
 
@@ -201,7 +206,6 @@ class DissipativeMotion(Motion):
         self._runs: list[Run] = []
         self._segments: list[TimedSegment] = []
         self._laid: list[Run] = []
-        self._stored = 0
         # For each panel of runs how large the terms of the force are that may cancel.
         self._terms: list[Array] = []
         self._tabulated: list[TabulatedPiece] = []
@@ -209,17 +213,13 @@ class DissipativeMotion(Motion):
         super().__init__(problem, "dissipative", launch.direction)
         self._joints = self._all_joints()
         self._space = FEW_PANELS + problem.functions.breaks.size
-        self._body = launched(
-            *(1, launch.lam0.value, domain.low, domain.high, domain.period),
-            *(launch.direction, ONLY_SIGN[launch.contact], self._horizon, nan, problem.w0),
-        )
-        self._at = self._body[0].tolist()
+        ends, asked = domain.numbers[:3], (ONLY_SIGN[launch.contact], self._horizon, nan)
+        self._body = launched([(launch.lam0.value, *ends, launch.direction, *asked, problem.w0)])
+        self._at: list[float] = []
         self._frame: Frame | None = None
-        self._enter_frame(launch.lam0.value, launch.lam0.low, problem.w0, launch.lam0)
-        v0 = launch.v0
         # The errors with which the legs begin.
-        of_place = abs(launch.lam0.low) if self._frame is None else ULP * abs(self._body[0, PLACE])
-        self._errors = [Errors(of_place, 2.0 * v0.value * abs(v0.low) + ULP * problem.w0, 0.0)]
+        v0 = launch.v0
+        self._errors = [Errors(abs(launch.lam0.low), 2.0 * v0.value * abs(v0.low) + ULP * problem.w0, 0.0)]
         self._go_on()
         self.direction = int(self._runs[0].record[HEADING]) if self._runs else 0
 
@@ -265,7 +265,7 @@ class DissipativeMotion(Motion):
         if times is None:
             return super().lam(t)
         out = self._read(*times, 1, self._read_places, super().lam)[0]
-        return out.reshape(t.shape) if np.ndim(t) else float(out[0])
+        return out.reshape(times[0].shape) if np.ndim(t) else float(out[0])
 
     def state(self, t: Any) -> State:
         """The state of the body at times; see `Motion.state`. For doubles this is one call of compiled code."""
@@ -277,7 +277,7 @@ class DissipativeMotion(Motion):
             return np.array(Motion.state(self, later)[1 : 1 + STATE_ROWS])
 
         out = self._read(*times, STATE_ROWS, self._read_states, by_segments)
-        return self._state_of(t if np.ndim(t) else float(times[0][0]), out)
+        return self._state_of(times[0] if np.ndim(t) else float(times[0][0]), out)
 
     def error_bound(self, t: Any) -> Any:
         """A bound of the error of ``lam(t)``; see `Motion.error_bound`. For doubles it is that of `state`."""
@@ -294,6 +294,7 @@ class DissipativeMotion(Motion):
     ) -> Array:
         """Rows of numbers at times, from the record that compiled code reads as far as it goes."""
         record, until = self._reading_up_to(greatest)
+        times = times.reshape(-1)
         out = np.empty((rows, times.size))
         if greatest <= until:
             by_record(record, times, out)
@@ -577,21 +578,32 @@ class DissipativeMotion(Motion):
                 f"motion: {self._stored} pieces of legs reach t = {self._elapsed!r} only; "
                 "give a shorter t_max, or ask for earlier times and nearer places"
             )
-        problem, frame = self.problem, self._frame
-        what, *passed, record = self._followed()
-        if self._body[0, DIRECTION] == 0.0 and not self._body[0, TURNS]:
+        what, records = self._followed()
+        frame, at = self._frame, self._body[0].tolist()
+        if not at[DIRECTION] and not at[TURNS]:
             return  # the body stays where it is
-        self._runs += [Run(before, TURN, END_NAMES[TURN], None) for before in passed]
-        self._stored += sum(1 + int(one[AHEAD] + one[BACK]) for one in (*passed, record))
-        self._at = self._body[0].tolist()
+        self._at, record = at, records[-1]
+        for head in records[:, :HEAD].tolist():
+            self._stored += 1 + int(head[AHEAD] + head[BACK])
+        if len(records) > 1:
+            self._runs += [Run(before, TURN, END_NAMES[TURN], None) for before in records[:-1]]
+        if what == TURN and frame is None and not at[STATUS]:
+            self._runs.append(Run(record, TURN, END_NAMES[TURN], None))
+        else:
+            self._end_run(what, record)
+        if not self._beginning and not self._ending and self._horizon == inf and self._goes_on_for_ever:
+            self._beginning = len(self._laid) + len(self._runs)
+
+    def _end_run(self, what: int, record: Array) -> None:
+        """Note a run that another follows in another way, or none."""
+        problem, frame = self.problem, self._frame
         if frame is not None:
             frame.move(record, 1)
             self._at[PLACE] = float(record[END])
-        head = record[:HEAD].tolist()
-        heading, leaves_frame = int(head[HEADING]), frame is not None and what == LIMIT
+        heading, leaves_frame = int(record[HEADING]), frame is not None and what == LIMIT
         if leaves_frame:
             self._leave_frame(record)
-        self._settle(what, head[START], head[END])
+        self._settle(what, float(record[START]), float(record[END]))
         if what == LEAVES:
             raise leaving_at_once(problem, heading, "end of the domain")
         if what == SPENT:
@@ -600,26 +612,28 @@ class DissipativeMotion(Motion):
         self._runs.append(Run(record, what, name, frame))
         if self._at[ENDING]:
             self._ending = name
-        if not self._beginning and not isfinite(self._horizon) and not self._ending and self._goes_on_for_ever:
-            self._beginning = len(self._laid) + len(self._runs)
         if what == BEYOND:
             raise SolutionError(
                 f"the motion leaves the range of doubles at {problem.formulas.parameter} = {self._at[PLACE]!r}; "
                 "give a shorter t_max"
             )
 
-    def _followed(self) -> tuple[Any, ...]:
+    def _followed(self) -> tuple[int, Array]:
         """What ended the last of the next legs (`advance`), and the records of all of them; one if the body stays."""
-        frame = self._frame
-        loss, parameters = (_loss(self.problem), self.problem.functions.p) if frame is None else frame[:2]
-        legs = LEGS_PER_CALL if frame is None and isfinite(self._horizon) else 1
+        legs, question = (LEGS_PER_CALL if self._horizon < inf else 1, LEG) if self._at else (1, FIRST_LEG)
         while True:
-            records = np.empty((legs, self._space * COLUMNS))
-            what = answers.drive(loss, parameters.reshape(1, -1), self._joints, LEG, self._body, records)
+            frame = self._frame
+            loss, parameters = (_loss(self.problem), self.problem.functions.p) if frame is None else frame[:2]
+            records = np.empty((legs if frame is None else 1, self._space * COLUMNS))
+            what = answers.drive(loss, parameters.reshape(1, -1), self._joints, question, self._body, records)
             count = int(self._body[0, VALUE])
-            if what != FULL or count:
-                return (what if what != FULL else TURN), *records[: max(count, 1)]
-            legs, self._space = 1, 4 * self._space
+            if what == NEARBY:
+                self._launch_nearby()
+                question = LEG
+            elif what != FULL or count:
+                return (what if what != FULL else TURN), records[: max(count, 1)]
+            else:
+                legs, self._space = 1, 4 * self._space
 
     def _settle(self, what: int, start: float, end: float) -> None:
         """Look whether a run has come so close to an equilibrium that the motion ends there, or goes on in a frame."""
@@ -628,10 +642,11 @@ class DissipativeMotion(Motion):
             self._ending = "asymptote"
         elif what == ASYMPTOTE and not linear:
             self._last_swing = NEAR_EQUILIBRIUM * max(abs(end), abs(end - start))
-        elif not in_frame and what == TURN and abs(end - start) < SMALL_SHARE * abs(end):
-            self._enter_frame(self._at[PLACE], self._at[PLACE_LOW], 0.0)
-        elif not in_frame and what == PAUSED and self._at[STEP] <= CREEPING_SHARE * self._at[FIRST_STEP]:
-            self._enter_frame(self._at[PLACE], self._at[PLACE_LOW], self._at[V2])
+        elif not in_frame:
+            turns_nearby = what == TURN and abs(end - start) < SMALL_SHARE * abs(end)
+            creeps = what == PAUSED and self._at[STEP] <= CREEPING_SHARE * self._at[FIRST_STEP]
+            if turns_nearby or creeps:
+                self._enter_frame()
 
     def _lost(self, record: Array) -> SolutionError:
         """Why a leg could not be followed."""
@@ -654,16 +669,28 @@ class DissipativeMotion(Motion):
         self._last_swing = swing
         return True
 
-    def _enter_frame(self, place: float, low: float, v2: float, lam0: Number | None = None) -> None:
+    def _launch_nearby(self) -> None:
+        """Launch the body next to an equilibrium."""
+        lam0 = self.problem.launch.lam0
+        self._body[0, PLACE_LOW] = lam0.low
+        self._enter_frame(lam0)
+        if self._frame is None:
+            self._body[0, PLACE_LOW] = 0.0
+        else:  # it is launched there again, by its distance
+            self._body[0, STEP] = 0.0
+            self._errors[0] = self._errors[0]._replace(place=ULP * abs(self._body[0, PLACE]))
+
+    def _enter_frame(self, lam0: Number | None = None) -> None:
         """Follow the body from here on by its distance from an equilibrium, if it is, and for a while stays, close.
 
         About an unstable equilibrium it does not stay, so that only its launch, ``lam0``, is worth that.
         """
         problem, line, loss = self.problem, self._body[0], _loss(self.problem)
+        if not (lam0 or is_small(loss, problem.functions.p, problem.functions.breaks, line)):
+            return
+        place, low, v2 = line[[PLACE, PLACE_LOW, V2]].tolist()
         ends = np.abs(np.append(problem.functions.breaks, (problem.low, problem.high)) - place)
         reach = min(starting_step(problem), float(ends.min()))
-        if not may_be_small(loss, problem.functions.p, place, v2, reach):
-            return
         frame = frame_near(loss, problem.functions.p, (place, low, v2), reach)
         if frame is None or not (frame.is_stable or lam0):
             return
@@ -678,7 +705,7 @@ class DissipativeMotion(Motion):
             line[PLACE] = 0.0  # there it stays
         self._check_distance(frame.size(line[PLACE], v2), frame)
         reach = reach if frame.is_stable else min(reach, frame.reach)
-        self._frame, self._joints = frame, Joints(NOWHERE, NOWHERE, NOWHERE, NOWHERE)
+        self._frame, self._joints = frame, SMOOTH
         line[LAM0], line[LOW], line[HIGH], line[PERIOD] = line[PLACE], -reach, reach, 0.0
         line[FIRST_STEP] = reach
 
@@ -696,6 +723,8 @@ class DissipativeMotion(Motion):
     def _all_joints(self) -> Joints:
         """Where the curve is not smooth."""
         f = self.problem.functions
+        if not f.breaks.size:
+            return SMOOTH
         drops = f.drops(ONLY_SIGN[self.problem.launch.contact])
         return Joints(f.breaks, f.corners, drops, np.empty(room_ahead(f.breaks.size)))
 

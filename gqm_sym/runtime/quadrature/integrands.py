@@ -19,7 +19,7 @@ from gqm_sym.runtime.compiled.jit import Inner, entry
 from gqm_sym.runtime.compiled.types import ADDRESSES, MATRIX, REAL, VECTOR
 from gqm_sym.runtime.interface import Addresses
 from gqm_sym.runtime.quadrature.equilibrium import speed_and_length_factors
-from gqm_sym.runtime.quadrature.substitution import FROM_TURN, REGULAR, TO_EQUILIBRIUM, TURN_TURN
+from gqm_sym.runtime.quadrature.substitution import FROM_SLOW, FROM_TURN, REGULAR, TO_EQUILIBRIUM, TURN_TURN
 
 # Where V**2 is given by polynomials, no function of the model is called.
 NO_FUNCTIONS = Addresses(0, 0, 0, 0, 0)
@@ -35,11 +35,12 @@ class Integrand(NamedTuple):
     p : array
         Run-time parameters.
     kind : int
-        TURN_TURN, FROM_TURN, REGULAR or TO_EQUILIBRIUM.
+        TURN_TURN, FROM_TURN, REGULAR, TO_EQUILIBRIUM or, for times only, FROM_SLOW.
     a, b : float
         Values of the curve parameter at both ends.
     ref, w0 : float
-        A place and V**2 there, in (m/s)**2; used by REGULAR segments.
+        A place and V**2 there, in (m/s)**2; used by REGULAR segments. Of FROM_SLOW segments the slope of the effective
+        potential at ``a``, and V**2 there.
     field : (n, m) array
         V**2 next to the equilibrium ``b`` where forces dissipate (`equilibrium`), else empty.
     """
@@ -52,6 +53,30 @@ class Integrand(NamedTuple):
     ref: Any
     w0: Any
     field: Any
+
+
+@Inner
+def fill_rates_from_place(integrand, phi, work, out):  # type: ignore[no-untyped-def]
+    """`fill_rates` of a segment without turning points, from V**2 at one place."""
+    fns, p, kind, a, b, ref, w0, _ = integrand
+    n = phi.size
+    da, db, rows = work[0, :n], work[1, :n], work[2:4, :n]
+    if kind == REGULAR:
+        for i in range(n):
+            da[i] = (a - ref) + (b - a) * phi[i]
+            db[i] = ref + da[i]
+        call_potential_divdiff1(fns.potential_divdiff1, n, ref, db, da, p, rows)
+        for i in range(n):
+            out[0, i] = rows[1, i] * fabs(b - a) / sqrt(w0 - 2.0 * da[i] * rows[0, i])
+    else:  # the mean slope from ``a`` is what the slope there and the second difference add up to
+        for i in range(n):
+            da[i] = (b - a) * phi[i]
+            db[i] = -da[i]
+        call_potential_divdiff2(fns.potential_divdiff2, n, a, a, da, db, p, rows)
+        for i in range(n):
+            out[0, i] = rows[1, i] * fabs(b - a) / sqrt(w0 - 2.0 * da[i] * (ref + da[i] * rows[0, i]))
+    for i in range(n):
+        out[1, i] = rows[1, i] * fabs(b - a)
 
 
 @Inner
@@ -68,7 +93,7 @@ def fill_rates(integrand, phi, work, out):  # type: ignore[no-untyped-def]
     out : (2, n) array
         dt/dphi in s, ds/dphi in m.
     """
-    fns, p, kind, a, b, ref, w0, field = integrand
+    fns, p, kind, a, b, _, _, field = integrand
     n = phi.size
     da, db, rows = work[0, :n], work[1, :n], work[2:4, :n]
     if field.size > 0:
@@ -97,14 +122,8 @@ def fill_rates(integrand, phi, work, out):  # type: ignore[no-untyped-def]
             fall = -2.0 * rows[0, i] if b > a else 2.0 * rows[0, i]
             out[0, i] = rows[1, i] * root / sqrt(fall)
             out[1, i] = rows[1, i] * 2.0 * fabs(b - a) * phi[i]
-    elif kind == REGULAR:
-        for i in range(n):
-            da[i] = (a - ref) + (b - a) * phi[i]
-            db[i] = ref + da[i]
-        call_potential_divdiff1(fns.potential_divdiff1, n, ref, db, da, p, rows)
-        for i in range(n):
-            out[0, i] = rows[1, i] * fabs(b - a) / sqrt(w0 - 2.0 * da[i] * rows[0, i])
-            out[1, i] = rows[1, i] * fabs(b - a)
+    elif kind in (REGULAR, FROM_SLOW):
+        fill_rates_from_place(integrand, phi, work, out)
     else:
         for i in range(n):
             da[i] = (a - b) * exp(-phi[i])
@@ -184,7 +203,7 @@ def cancellation_range(integrand, work, n, peak):  # type: ignore[no-untyped-def
         low, high = inf, 0.0
         for i in range(n):
             low, high = min(low, work[2, i]), max(high, work[2, i])
-    elif kind != TO_EQUILIBRIUM:
+    elif kind not in (TO_EQUILIBRIUM, FROM_SLOW):
         # Towards the place where V**2 is known, its relative error only falls.
         outwards = fabs(work[0, 0]) <= fabs(work[0, n - 1])
         for i in range(n):

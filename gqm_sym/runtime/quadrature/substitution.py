@@ -8,6 +8,7 @@ kind            lam                                     phi
 TURN_TURN       a + (b-a) sin(phi/2)**2                 0 to pi
 FROM_TURN       a + (b-a) phi**2                        0 to 1
 REGULAR         a + (b-a) phi                           0 to 1
+FROM_SLOW       a + (b-a) phi                           0 to 1
 TO_EQUILIBRIUM  b + (a-b) exp(-phi)                     0 onwards
 =============== ======================================= ================================
 
@@ -24,8 +25,9 @@ from gqm_sym.runtime.compiled.intrinsics import choose
 from gqm_sym.runtime.compiled.jit import Inlined
 from gqm_sym.runtime.compiled.types import Array
 
-# Kinds of segments: between turning points, from a turning point, without special ends, towards an equilibrium.
-TURN_TURN, FROM_TURN, REGULAR, TO_EQUILIBRIUM = range(4)
+# Kinds of segments: between turning points, from a turning point, without special ends, towards an equilibrium, and
+# from where the body is slowest, such as next to a hilltop that it passes.
+TURN_TURN, FROM_TURN, REGULAR, TO_EQUILIBRIUM, FROM_SLOW = range(5)
 
 
 def phase_angle_of(kind: int, offset: float, from_a: float, to_b: float, width: float) -> float:

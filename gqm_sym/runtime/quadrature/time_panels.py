@@ -16,7 +16,7 @@ from gqm_sym.runtime.compiled.jit import Inlined, Inner, entry
 from gqm_sym.runtime.compiled.types import ADDRESSES, MATRIX, REAL, VECTOR
 from gqm_sym.runtime.quadrature.integrands import NO_FUNCTIONS, Integrand, cancellation_range, fill_rates
 from gqm_sym.runtime.quadrature.kronrod import EVEN, GAUSS_WEIGHTS, KRONROD_WEIGHTS, NODES, ODD
-from gqm_sym.runtime.quadrature.substitution import REGULAR, TO_EQUILIBRIUM, TURN_TURN
+from gqm_sym.runtime.quadrature.substitution import FROM_SLOW, REGULAR, TO_EQUILIBRIUM, TURN_TURN
 
 # Status of a segment's quadrature.
 CONVERGED, FLOOR, EXHAUSTED, FAILED, ILL_CONDITIONED = range(5)
@@ -363,21 +363,21 @@ def orbit_panels(fns, p, kind, a, b, lam0, w0, joints):  # type: ignore[no-untyp
     Parameters
     ----------
     kind : int
-        TURN_TURN, FROM_TURN or REGULAR (`substitution`).
+        TURN_TURN, FROM_TURN, REGULAR or FROM_SLOW (`substitution`).
     a, b : float
         The ends of the segment; a single turning point is ``a``.
     lam0, w0 : float
-        The launch place, and V**2 there; used by REGULAR segments.
+        The launch place, and V**2 there; used by REGULAR and FROM_SLOW segments (`Integrand`).
     joints : array
         The places inside the segment at which the curve is not smooth, in ascending order.
     """
-    ref, w, stop = (lam0, w0, 1.0) if kind == REGULAR else (a, 0.0, pi if kind == TURN_TURN else 1.0)
+    ref, w, stop = (lam0, w0, 1.0) if kind in (REGULAR, FROM_SLOW) else (a, 0.0, pi if kind == TURN_TURN else 1.0)
     marks = np.empty(joints.size + 2)
     marks[0], marks[-1] = 0.0, stop
     for i in range(joints.size):
         place = joints[i] if b > a else joints[joints.size - 1 - i]
         share = (place - a) / (b - a)
-        marks[i + 1] = share if kind == REGULAR else sqrt(share)
+        marks[i + 1] = share if kind in (REGULAR, FROM_SLOW) else sqrt(share)
         if kind == TURN_TURN:
             marks[i + 1] = 2.0 * atan2(sqrt(place - a), sqrt(b - place))
     return lay(Integrand(fns, p, kind, a, b, ref, w, np.empty((0, 0))), marks)

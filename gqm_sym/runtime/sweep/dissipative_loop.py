@@ -122,7 +122,8 @@ def answer_driven(
         some = [line if line.size == 1 else line[chosen] for line in lines]
         ends = (some[DOMAIN_LOW], some[DOMAIN_HIGH], some[DOMAIN_PERIOD])
         asks = (some[DIRECTION], asked.only_sign, asked.horizon, some[TARGET])
-        bodies = launched(chosen.size, some[LAM0], *ends, *asks, some[V0] * some[V0])
+        given = (some[LAM0], *ends, *asks, some[V0] * some[V0])
+        bodies = launched(np.stack(np.broadcast_arrays(*given, chosen)[:-1], axis=1))
         legs.drive(dissipation, _rows(some[PARAMETERS:], chart), joints, asked.question, bodies, record)
         values, ended = bodies[:, VALUE], bodies[:, STATUS]
         if asked.question in (legs.LEAST_LOAD, legs.MOST_LOAD):

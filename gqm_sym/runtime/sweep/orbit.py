@@ -30,6 +30,10 @@ class SweptCurve(NamedTuple):
         What the parts of the potential and of the load in the table are multiplied with.
     rows, levels : arrays
         Potential and load of the launch on each panel, and how far they are filled in (`panel_forces`).
+    v0 : float
+        The speed of the launch.
+    exact : RecordedFormulas
+        The formulas as a tape, for what doubles do not tell (`slow_places`).
     """
 
     fns: Any
@@ -42,6 +46,8 @@ class SweptCurve(NamedTuple):
     factors: Any
     rows: Any
     levels: Any
+    v0: Any
+    exact: Any
 
 
 class Orbit(NamedTuple):

@@ -39,7 +39,7 @@ from gqm_sym.runtime.quadrature.trapezoid import (
     trapezoid_rates,
     trapezoid_workspace,
 )
-from gqm_sym.runtime.sweep.arrivals import arrival
+from gqm_sym.runtime.sweep.arrivals import arrival, refined_end
 from gqm_sym.runtime.sweep.curve_table import TABLE, CurveTable
 from gqm_sym.runtime.sweep.liftoff import liftoff_place
 from gqm_sym.runtime.sweep.orbit import CONTACT_ENDS, CURVE_ENDS, Orbit, SweptCurve
@@ -74,6 +74,7 @@ from gqm_sym.runtime.sweep.quantities import (
     TURNING_POINTS,
     UNDECIDED,
 )
+from gqm_sym.runtime.sweep.slow_places import EXACT, RecordedFormulas, passing_time, turns_at
 
 
 class GivenCurve(NamedTuple):
@@ -99,6 +100,8 @@ class GivenCurve(NamedTuple):
         1 if the track can only push along the normal, -1 if only against it, 0 if it can push and pull.
     t_max : float
         The last time in s, infinite if there is none; only END_TIME depends on it.
+    exact : RecordedFormulas
+        The formulas as a tape; none at first, for few launches need it.
     """
 
     parameters: Array
@@ -112,10 +115,13 @@ class GivenCurve(NamedTuple):
     ends: int
     side: int
     t_max: float
+    exact: RecordedFormulas
 
 
 _BUFFERS = types.int64[:, ::1], VECTOR, MATRIX, types.int8[::1]
-GIVEN = types.NamedTuple((VECTOR, VECTOR, TABLE, *_BUFFERS, types.int64, types.int64, types.int64, REAL), GivenCurve)
+GIVEN = types.NamedTuple(
+    (VECTOR, VECTOR, TABLE, *_BUFFERS, types.int64, types.int64, types.int64, REAL, EXACT), GivenCurve
+)
 
 
 class Buffers(NamedTuple):
@@ -232,6 +238,35 @@ def value_by_itself(curve, orbit, quantity, target, buffers):  # type: ignore[no
 
 
 @Inner
+def value_in_parts(curve, orbit, quantity, target, buffers):  # type: ignore[no-untyped-def]
+    """A time where V**2 all but vanishes on the way; NaN where that is not accurate, or not at hand."""
+    if curve.exact.work.size == 0 or quantity not in (HALF_PERIOD, PERIOD, ARRIVAL_TIME):
+        return nan
+    low, high = orbit.low, orbit.high
+    turns = turns_at(orbit)
+    if turns[0]:
+        low = refined_end(curve.fns, curve.p, orbit, low, buffers.work)
+    if turns[1]:
+        high = refined_end(curve.fns, curve.p, orbit, high, buffers.work)
+    better = Orbit(orbit.circulates, False, orbit.direction, orbit.lam0, orbit.v2, low, high, orbit.leaves)
+    return passing_time(curve, better, target if quantity == ARRIVAL_TIME else nan)
+
+
+@Inner
+def best_value(curve, orbit, passage, tabulated, quantity, target, buffers):  # type: ignore[no-untyped-def]
+    """A number of an orbit in the first way that is accurate: on the table, without it, in parts; NaN if none is."""
+    value = value_from_table(curve, orbit, passage, quantity, target, buffers.slacks) if tabulated else nan
+    if quantity in (HALF_PERIOD, PERIOD) and passage.panels == 1 and passage.is_polished and curve.table.is_exact:
+        value = time_on_panel_of_both(curve, passage)
+    by_formulas = orbit.leaves == 0 or passage.panels == 0
+    if value != value and by_formulas and not (quantity in (HALF_PERIOD, PERIOD) and curve.table.is_exact):
+        value = value_by_itself(curve, orbit, quantity, target, buffers)
+    if value != value:
+        value = value_in_parts(curve, orbit, quantity, target, buffers)
+    return value
+
+
+@Inner
 def fill_answer(curve, orbit, passage, asked, buffers, out):  # type: ignore[no-untyped-def]
     """Fill the row ``out`` with a quantity of an orbit; returns the status.
 
@@ -264,12 +299,7 @@ def fill_answer(curve, orbit, passage, asked, buffers, out):  # type: ignore[no-
     if quantity == TURNING_POINTS:
         out[0], out[1] = orbit.lam0 + orbit.low, orbit.lam0 + orbit.high
         return ANSWERED
-    value = value_from_table(curve, orbit, passage, quantity, target, slacks) if tabulated else nan
-    if quantity in (HALF_PERIOD, PERIOD) and passage.panels == 1 and passage.is_polished and curve.table.is_exact:
-        value = time_on_panel_of_both(curve, passage)
-    by_formulas = orbit.leaves == 0 or passage.panels == 0
-    if value != value and by_formulas and not (quantity in (HALF_PERIOD, PERIOD) and curve.table.is_exact):
-        value = value_by_itself(curve, orbit, quantity, target, buffers)
+    value = best_value(curve, orbit, passage, tabulated, quantity, target, buffers)
     if value == inf:
         return NEVER_THERE
     out[0] = 2.0 * value if quantity == PERIOD and not orbit.circulates else min(value, limit)
@@ -308,6 +338,9 @@ def answer_one_by_one(fns, columns, monotone, quantity, spans, answers, given): 
     paths, parts = uncounted(given.table.paths), uncounted(given.table.parts)
     table = CurveTable(edges, lows, paths, parts, given.table.potentials, given.table.is_exact)
     rows, levels, factors = uncounted(given.rows), uncounted(given.levels), uncounted(given.factors)
+    (address, operations, tape_parts, registers), work, exact_p = given.exact
+    tape = address, uncounted(operations), tape_parts, registers
+    exact = RecordedFormulas(tape, uncounted(work), uncounted(exact_p))
     columns, spans, values = uncounted(columns), uncounted(spans), uncounted(answers.values)
     statuses, routes = uncounted(answers.status), uncounted(answers.route)
     for k in range(statuses.size):
@@ -317,7 +350,9 @@ def answer_one_by_one(fns, columns, monotone, quantity, spans, answers, given): 
         for row in range(columns.shape[0] - PARAMETERS):
             p[row] = element(columns, PARAMETERS + row, k)
         period = element(columns, DOMAIN_PERIOD, k)
-        curve = SweptCurve(fns, p, joints, period, given.ends, p[given.mass], table, factors, rows, levels)
+        v0 = element(columns, V0, k)
+        made = fns, p, joints, period, given.ends, p[given.mass], table, factors, rows, levels
+        curve = SweptCurve(*made, v0, exact)
         for i in range(count):
             taken[i] = element(given.factor_columns, i, k)
         take_factors(curve, taken)

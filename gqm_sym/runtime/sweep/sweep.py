@@ -15,13 +15,14 @@ from numpy.typing import NDArray
 from gqm_sym.arguments import not_given, one_of, short
 from gqm_sym.errors import GQMError, InputError, ParameterError, SolutionError
 from gqm_sym.literals.namespaces import ARRAYS
-from gqm_sym.literals.numbers import Number, read_number
+from gqm_sym.literals.numbers import Number, doubles_at_once, read_number
 from gqm_sym.runtime.charts.chart import CORNER_ROUNDINGS, ChartMaker
 from gqm_sym.runtime.charts.true_parts import NO_PARTS, parts_along
 from gqm_sym.runtime.compiled.strided import DOMAIN_PERIOD, LAM0, PARAMETERS, V0, lay_out, pointers, widen
 from gqm_sym.runtime.compiled.threads import run_in_threads
 from gqm_sym.runtime.compiled.types import Array
-from gqm_sym.runtime.interface import ExactPotential
+from gqm_sym.runtime.double_double.recording import BoundTape, record
+from gqm_sym.runtime.interface import ExactFormulas, ExactPotential
 from gqm_sym.runtime.launch.formulas import chart_with, true_pieces_of
 from gqm_sym.runtime.launch.kinds import LOAD_EXTREMES
 from gqm_sym.runtime.launch.request import ONLY_SIGN, LaunchRequest, check_contact
@@ -36,6 +37,7 @@ from gqm_sym.runtime.sweep.orbit import CONTACT_ENDS, CURVE_ENDS, NO_ENDS
 from gqm_sym.runtime.sweep.panel_forces import ROW
 from gqm_sym.runtime.sweep.quantities import QUANTITIES, Answers, Quantity
 from gqm_sym.runtime.sweep.result import Sweep
+from gqm_sym.runtime.sweep.slow_places import NO_TAPE, RecordedFormulas
 
 if TYPE_CHECKING:
     from gqm_sym.runtime.launch.formulas import Formulas
@@ -52,6 +54,9 @@ Solve = Callable[[LaunchRequest, tuple[Any, ...]], Any]
 
 # Quantities that are answered by batches themselves; for others batches find the span of an orbit.
 ANSWERED_BY_BATCHES = (quantities.HALF_PERIOD, quantities.PERIOD, quantities.TURNING_POINTS)
+
+# Quantities that are times, which are found in parts where V**2 all but vanishes.
+IN_PARTS = (quantities.HALF_PERIOD, quantities.PERIOD, quantities.ARRIVAL_TIME, quantities.END_TIME)
 
 # Into how many pieces a curve with formulas is cut at least before it is tabulated. By which share of itself the range
 # of launch places is extended at first, so that it contains all motions, and how often that is doubled.
@@ -123,7 +128,8 @@ def sweep(
                 curve = (group.chart, group.joints, group.corners, group.drops)
                 work, least = partial(answer_driven, formulas, asked, curve, group.columns, some), MIN_BODIES_PER_THREAD
             else:
-                ask = Asked(found.code, ONLY_SIGN[contact], inf if t_max is None else as_doubles(t_max, "t_max").item())
+                last = inf if t_max is None else as_doubles(t_max, "t_max").item()
+                ask = Asked(found.code, ONLY_SIGN[contact], last, _rounded_off(formulas, parameters))
                 work, least = partial(_answer, formulas, ask, group, some), MIN_LAUNCHES_PER_THREAD
             run_in_threads(work, some.status.size, least)
             if asked is None and group.corners.size:
@@ -172,6 +178,9 @@ def as_doubles(value: Any, name: str) -> Array:
         raise ParameterError(not_given(name))
     if isinstance(value, np.ndarray) and value.dtype.kind in "fiu":
         return value.astype(np.float64, copy=False)
+    doubles = doubles_at_once(value)
+    if doubles is not None:
+        return doubles
     array = np.asarray(value, dtype=object)
     numbers = [v if isinstance(v, float) else read_number(v, where=name).value for v in array.reshape(-1)]
     return np.array(numbers, dtype=np.float64).reshape(array.shape)
@@ -250,11 +259,15 @@ def _rounding_of(axes: Callable[..., Any], place: float, values: tuple[float, ..
 
 
 class Asked(NamedTuple):
-    """What is asked of all launches: the code of a quantity, and side and last time as `GivenCurve` has them."""
+    """What is asked of all launches: the code of a quantity, and side and last time as `GivenCurve` has them.
+
+    ``lows`` is by how much each run-time parameter differs from its double, 0 of those that are arrays.
+    """
 
     code: int
     side: int
     t_max: float
+    lows: Array
 
 
 # The factors of a potential and a load that are tabulated as a whole.
@@ -478,8 +491,30 @@ def _answer(formulas: "Formulas", asked: Asked, group: Group, answers: Answers, 
         factors = lay_out(group.factors, chunk.start, chunk.stop)
         buffers = np.full(len(factors), nan), np.empty((len(table.paths), ROW)), np.zeros(len(table.paths), np.int8)
         shared = parameters, joints, table, pointers(factors), *buffers, mass, group.ends
-        given = scalar.GivenCurve(*shared, asked.side, asked.t_max)
+        given = scalar.GivenCurve(*shared, asked.side, asked.t_max, NO_TAPE)
         scalar.answer_one_by_one(formulas.functions.addresses(), *launches, code, spans, found, given)
+        if code in IN_PARTS and (found.status == quantities.UNDECIDED).any():
+            given = given._replace(exact=_recorded(formulas, asked.lows))
+            scalar.answer_one_by_one(formulas.functions.addresses(), *launches, code, spans, found, given)
+
+
+def _recorded(formulas: "Formulas", lows: Array) -> RecordedFormulas:
+    """The formulas of a curve as a tape, with registers of its own; none of a chart, or where they are too long."""
+    exact, domain, count = formulas.exact, formulas.domain_of, lows.size
+    recorded = record(exact, domain, count) if isinstance(exact, ExactFormulas) and domain is not None else None
+    if recorded is None:
+        return NO_TAPE
+    tape, work = recorded
+    return RecordedFormulas(*BoundTape(tape, work.copy(), np.array([np.zeros(count), lows])).operands)
+
+
+def _rounded_off(formulas: "Formulas", parameters: tuple[Any, ...]) -> Array:
+    """By how much each run-time parameter differs from its double, 0 of those that are arrays."""
+    lows = np.zeros(len(parameters))
+    for k, (name, value) in enumerate(zip(formulas.parameters, parameters, strict=True)):
+        if isinstance(value, (str, Number)):
+            lows[k] = read_number(value, where=name, unit=formulas.units.get(name)).low
+    return lows
 
 
 def _solved(

@@ -4,6 +4,7 @@ import ast
 import math
 import os
 import shutil
+import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -17,7 +18,7 @@ from numba import types
 from gqm_sym.runtime import vocabulary
 from gqm_sym.runtime.arithmetic.doubledouble import two_sum
 from gqm_sym.runtime.arithmetic.elementary import reduced
-from gqm_sym.runtime.compiled import jit, uncompiled
+from gqm_sym.runtime.compiled import jit, threads, uncompiled
 from gqm_sym.runtime.compiled.intrinsics import fma
 from gqm_sym.runtime.compiled.numba_internals import KeyedFiles
 from gqm_sym.runtime.compiled.stamps import CALLED_BY_MODULES, Stamps
@@ -224,3 +225,59 @@ def test_what_cannot_be_run_to_the_same_bits_is_compiled(run: Callable[..., Any]
     """Whether that is found when the function is read or when it is run."""
     with pytest.raises(NotPlainError):
         PlainEntry(run, (types.float64,), Trial(1e9))((1.0,))
+
+
+def test_threads_keep_what_they_write_into_one_array(monkeypatch: pytest.MonkeyPatch) -> None:
+    """One thread writes while another, which has begun before, gives Python up and takes back what that has written."""
+    begun, written = threading.Event(), threading.Event()
+
+    def fill(out, begin, end):  # type: ignore[no-untyped-def]
+        out[begin:end] = begin + 1.0
+        for _ in range(300 * begin):
+            fma(1.0, 1.0, 1.0)
+
+    def give_up() -> None:
+        begun.set()
+        written.wait()
+        raise uncompiled.TooSlowError
+
+    def compiled(function: Any, *_: Any, **__: Any) -> Any:
+        return lambda out, begin, end: out.__setitem__(slice(begin, end), begin + 1.0)
+
+    def work(part: slice) -> None:
+        if not part.start:
+            begun.wait()
+        call(out, part.start, part.stop)
+        (begun if part.start else written).set()
+
+    monkeypatch.setattr(threads, "cores", lambda: 2)
+    monkeypatch.setattr(uncompiled, "go_on", give_up)
+    call, _ = _entry(monkeypatch, fill, types.void(types.float64[::1], types.int64, types.int64))
+    monkeypatch.setattr(jit.COMPILER, "entry", compiled)
+    out = np.zeros(4)
+    threads.run_in_threads(work, out.size, 1)
+    assert out.tolist() == [1.0, 1.0, 3.0, 3.0]
+
+
+def test_threads_compile_an_entry_point_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Those that need it meanwhile wait for it."""
+    compiled = []
+
+    def compile_slowly(function: Any, *_: Any, **__: Any) -> Any:
+        compiled.append(function.__name__)
+        all_ask.wait()
+        return lambda *_: None
+
+    def work(part: slice) -> None:
+        if len(asked) == 2:
+            all_ask.set()
+        asked.append(part)
+        call(1.0)
+
+    asked: list[slice] = []
+    all_ask = threading.Event()
+    monkeypatch.setattr(threads, "cores", lambda: 3)
+    call, _ = _entry(monkeypatch, cubed.py_func, types.float64(types.float64))
+    monkeypatch.setattr(jit.COMPILER, "entry", compile_slowly)
+    threads.run_in_threads(work, 3, 1)
+    assert compiled == ["cubed"]

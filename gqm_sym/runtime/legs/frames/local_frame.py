@@ -11,21 +11,24 @@ it was, and leaves the frame: there the distance at launch is taken in extended 
 
 from collections.abc import Sequence
 from functools import cache
+from math import fabs
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import carray
+from numba import carray, types
 from numpy.polynomial import chebyshev
 
 from gqm_sym.literals.numbers import Number
 from gqm_sym.runtime.arithmetic.doubledouble import ULP, add
 from gqm_sym.runtime.compiled.calls import call_speed_equation
 from gqm_sym.runtime.compiled.emitted import compiler
-from gqm_sym.runtime.compiled.jit import entry
+from gqm_sym.runtime.compiled.jit import Inner, entry
 from gqm_sym.runtime.compiled.registers import on_stack
 from gqm_sym.runtime.compiled.types import MATRIX, VECTOR, Array
 from gqm_sym.runtime.interface import INTERFACE, SPEED_EQUATION, STATIC_BALANCE, Dissipation, ExactLaw
 from gqm_sym.runtime.legs.advance import DISSIPATION
+from gqm_sym.runtime.legs.body import FIRST_STEP, HIGH, LOW, V2
+from gqm_sym.runtime.legs.body import PLACE as BODY_PLACE
 from gqm_sym.runtime.legs.leg_equation import Forces
 from gqm_sym.runtime.legs.leg_record import CHANGE_COUNT, END, MIDDLE, START, change_at
 from gqm_sym.runtime.legs.leg_run import LEAST_V2, point_buffer, slope_of_v2
@@ -102,6 +105,28 @@ class Frame(NamedTuple):
             record[change_at(record, k)] += place
 
 
+@Inner
+def may_be_small(dissipation, p, breaks, body):  # type: ignore[no-untyped-def]
+    """Whether `frame_near` may find a frame for a body: the force on it at rest changes its sign close by."""
+    place, reach, point = body[BODY_PLACE], body[FIRST_STEP], point_buffer()
+    if dissipation.friction or dissipation.kinked or place == 0.0:
+        return False
+    reach = min(reach, fabs(body[LOW] - place), fabs(body[HIGH] - place))
+    for known in breaks:
+        reach = min(reach, fabs(known - place))
+    around = min(SMALL_SHARE * fabs(place), RANGE_SHARE * reach)
+    forces = Forces(dissipation.speed_equation, p, False, False, dissipation.linear, 1)
+    behind = slope_of_v2(forces, place - around, LEAST_V2, 0, point)
+    ahead = slope_of_v2(forces, place + around, LEAST_V2, 0, point)
+    return ahead * behind < 0.0 and body[V2] < around * fabs(behind - ahead)
+
+
+@entry(types.boolean(DISSIPATION, VECTOR, VECTOR, VECTOR))
+def is_small(dissipation, p, breaks, body):  # type: ignore[no-untyped-def]
+    """`may_be_small`, to be called from Python."""
+    return may_be_small(dissipation, p, breaks, body)
+
+
 @entry(MATRIX(DISSIPATION, VECTOR, VECTOR))
 def force_at_rest(dissipation, p, places):  # type: ignore[no-untyped-def]
     """By how much V**2 grows per unit of the curve parameter without speed, a row for each direction of motion."""
@@ -147,15 +172,6 @@ def _functions() -> tuple[Any, Any]:
             out[i] = out[n + i] = places[i] * total
 
     return speed_equation, static_balance
-
-
-def may_be_small(dissipation: Dissipation, p: Array, place: float, v2: float, reach: float) -> bool:
-    """Whether `frame_near` may find a frame: the force on a body at rest changes its sign close by."""
-    if dissipation.friction or dissipation.kinked or place == 0.0:
-        return False
-    around = min(SMALL_SHARE * abs(place), RANGE_SHARE * reach)
-    behind, ahead = force_at_rest(dissipation, p, np.array([place - around, place + around]))[0].tolist()
-    return bool(ahead * behind < 0.0 and v2 < around * abs(behind - ahead))
 
 
 def frame_near(dissipation: Dissipation, p: Array, start: tuple[float, float, float], reach: float) -> Frame | None:

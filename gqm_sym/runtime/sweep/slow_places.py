@@ -1,0 +1,209 @@
+"""The time between two places of an orbit on which V**2 all but vanishes, where a body just passes a hilltop.
+
+There V**2 is a small difference of large terms. The way is cut into parts, each of which begins where V**2 is smallest
+around. There V**2 and the slope of the potential are found in double-double arithmetic, from the module's formulas as a
+tape. From there V**2 only grows, by second divided differences in doubles, so that nothing cancels.
+"""
+
+from math import fabs, nan, sqrt
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import types
+
+from gqm_sym.runtime.arithmetic.doubledouble import two_sum
+from gqm_sym.runtime.compiled.calls import call_effective_potential, call_potential_divdiff1
+from gqm_sym.runtime.compiled.jit import Inner
+from gqm_sym.runtime.compiled.registers import on_stack
+from gqm_sym.runtime.compiled.types import MATRIX, VECTOR
+from gqm_sym.runtime.double_double.arithmetic import add
+from gqm_sym.runtime.double_double.interpreter import LOW, call_interpreter
+from gqm_sym.runtime.double_double.orbit_time import TAPE, energy_level, fill_parameters
+from gqm_sym.runtime.quadrature.substitution import FROM_SLOW, FROM_TURN
+from gqm_sym.runtime.quadrature.time_panels import MIN_CANCELLATION_RATIO, are_accurate, orbit_panels
+from gqm_sym.runtime.sweep.orbit import Orbit
+from gqm_sym.runtime.sweep.orbit_extremes import GRID_INTERVALS, GRID_POINTS, WIDTH_SHARES, sample_loads
+
+# The least V**2 between turning points, as a share of the largest, from which its place and times are accurate.
+MIN_V2_SHARE = 1e-9
+
+# The most parts of a way, and how often the interval of the grid in which V**2 is smallest is halved.
+MAX_PARTS, HALVINGS = 16, 36
+
+
+class RecordedFormulas(NamedTuple):
+    """A module's formulas as a tape, with registers and parameters (`recording.BoundTape`); no registers: no tape."""
+
+    tape: Any
+    work: Any
+    parameters: Any
+
+
+EXACT = types.NamedTuple((TAPE, VECTOR, MATRIX), RecordedFormulas)
+NO_TAPE = RecordedFormulas((0, np.empty((0, 4), dtype=np.int64), (0,) * 3, (0,) * 6), np.empty(0), np.empty((2, 0)))
+
+grid_buffer, place_buffer, point_buffer = on_stack(GRID_POINTS), on_stack(MAX_PARTS), on_stack(4)
+
+
+@Inner
+def fill_exactly(curve, lam0, places, count, v2, slopes):  # type: ignore[no-untyped-def]
+    """Fill in V**2 and the slope of the potential at some places, rounded from double-double arithmetic."""
+    tape, work, p = curve.exact
+    for k in range(p.shape[1]):
+        p[0, k] = curve.p[k]
+    fill_parameters(tape, p, work)
+    address, operations, parts, registers = tape
+    at = registers[1]
+    work[at], work[at + LOW] = lam0, 0.0
+    for i in range(count):
+        work[at + 1 + i], work[at + 1 + i + LOW] = places[i], 0.0
+    call_interpreter(address, operations, parts[0], parts[2], work, count + 1)
+    level, low, _ = energy_level(work, registers, (lam0, 0.0, curve.v0, 0.0), 0)
+    for i in range(count):
+        u = registers[2] + 1 + i
+        high, rest = add(level, low, -work[u], -work[u + LOW])
+        v2[i], slopes[i] = 2.0 * (high + rest), work[registers[4] + 1 + i]
+
+
+@Inner
+def slope_at(curve, place):  # type: ignore[no-untyped-def]
+    """The slope of the effective potential at a place."""
+    point = point_buffer()
+    point[0] = place
+    call_effective_potential(curve.fns.effective_potential, 1, point, curve.p, point[1:])
+    return point[2]
+
+
+@Inner
+def hilltop_between(curve, low, high):  # type: ignore[no-untyped-def]
+    """The place between two others at which the potential stops rising."""
+    for _ in range(HALVINGS):
+        middle = 0.5 * (low + high)
+        if slope_at(curve, middle) > 0.0:
+            low = middle
+        else:
+            high = middle
+    return 0.5 * (low + high)
+
+
+@Inner
+def rate_at(curve, orbit, place):  # type: ignore[no-untyped-def]
+    """The time per unit of the parameter at a place where V**2 does not vanish; 0 where doubles do not tell it."""
+    point = point_buffer()
+    point[0], point[1] = place, place - orbit.lam0
+    call_potential_divdiff1(curve.fns.potential_divdiff1, 1, orbit.lam0, point[:1], point[1:2], curve.p, point[2:])
+    v2 = orbit.v2 - 2.0 * point[1] * point[2]
+    return point[3] / sqrt(v2) if v2 > 0.0 else 0.0
+
+
+@Inner
+def is_steep(curve, turn, place, slope):  # type: ignore[no-untyped-def]
+    """Whether the potential falls from a turning point so steeply that its divided differences do not cancel."""
+    point = point_buffer()
+    point[0], point[1] = place, place - turn
+    call_potential_divdiff1(curve.fns.potential_divdiff1, 1, turn, point[:1], point[1:2], curve.p, point[2:])
+    return fabs(slope) > MIN_CANCELLATION_RATIO * fabs(point[2])
+
+
+@Inner
+def time_in_parts(curve, orbit, ends, turns):  # type: ignore[no-untyped-def]
+    """The time that the body takes from one place of its orbit to a higher one; NaN where it is not accurate.
+
+    Parameters
+    ----------
+    curve : SweptCurve
+        A curve with formulas.
+    orbit : Orbit
+        The orbit.
+    ends : (float, float)
+        The offsets of both places from the launch.
+    turns : (bool, bool)
+        Which of them are turning points.
+    """
+    fns, p, none, last = curve.fns, curve.p, curve.joints[:0], GRID_INTERVALS
+    (begin, end), lam0 = ends, orbit.lam0
+    if not begin < end:
+        return 0.0 if begin == end else nan
+    v2, cuts, places = grid_buffer(), place_buffer(), place_buffer()
+    slowest, slopes = place_buffer(), place_buffer()
+    way = Orbit(False, False, orbit.direction, lam0, orbit.v2, begin, end, 0)
+    sample_loads(fns, p, way, False, WIDTH_SHARES, GRID_POINTS, v2)
+    # The places with their roundings; those in between are doubles.
+    (first, first_low), (final, final_low) = two_sum(lam0, begin), two_sum(lam0, end)
+    count, peak, at_peak, largest = 0, -1.0, 0, 0.0
+    for i in range(GRID_POINTS):
+        largest = max(largest, v2[i])
+        if v2[i] > peak:
+            peak, at_peak = v2[i], i
+        is_least = (i == 0 or v2[i] < v2[i - 1]) and (i == last or v2[i] <= v2[i + 1])
+        if not is_least:
+            continue
+        if count == MAX_PARTS:
+            return nan
+        place = first if i == 0 else final
+        if 0 < i < last:
+            width = end - begin
+            low, high = lam0 + (begin + width * WIDTH_SHARES[i - 1]), lam0 + (begin + width * WIDTH_SHARES[i + 1])
+            place = hilltop_between(curve, low, high)
+        places[count] = place
+        cuts[count] = first if count == 0 else lam0 + (begin + (end - begin) * WIDTH_SHARES[at_peak])
+        peak, count = v2[i], count + 1
+    fill_exactly(curve, lam0, places, count, slowest, slopes)
+    total = 0.0
+    for k in range(count):
+        place, w = places[k], slowest[k]
+        at_turn = (turns[0] and place == first) or (turns[1] and place == final)
+        if not (at_turn or w > MIN_V2_SHARE * largest):
+            return nan
+        for side in range(2):
+            stop = cuts[k] if side == 0 else (cuts[k + 1] if k + 1 < count else final)
+            if stop == place:
+                continue
+            if at_turn and not is_steep(curve, place, stop, slopes[k]):
+                return nan
+            panels = orbit_panels(fns, p, FROM_TURN if at_turn else FROM_SLOW, place, stop, slopes[k], w, none)
+            if not are_accurate(panels):
+                return nan
+            total += panels.times[-1]
+    beside_first, beside_final = cuts[1] if count > 1 else final, cuts[count - 1]
+    total -= first_low * rate_at(curve, orbit, beside_first if turns[0] else first)
+    return total + final_low * rate_at(curve, orbit, beside_final if turns[1] else final)
+
+
+@Inner
+def turns_at(orbit):  # type: ignore[no-untyped-def]
+    """Whether the lower and the upper end of an orbit are turning points that the body comes to."""
+    if orbit.leaves == 0:
+        return not orbit.circulates, not orbit.circulates
+    turns = orbit.v2 == 0.0 or orbit.leaves != orbit.direction
+    return turns and orbit.leaves > 0, turns and orbit.leaves < 0
+
+
+@Inner
+def passing_time(curve, orbit, place):  # type: ignore[no-untyped-def]
+    """The first time at ``place``, or for NaN that of half a period, of a lap or until the body leaves; NaN if unsure.
+
+    The orbit's turning points have all digits, and the body comes to the place.
+    """
+    low, high, direction, turns = orbit.low, orbit.high, orbit.direction, turns_at(orbit)
+    if place != place and orbit.leaves == 0:
+        return time_in_parts(curve, orbit, (low, high), turns)
+    ahead, laps, lap = place - orbit.lam0, 0.0, 0.0
+    if place != place:
+        ahead = high if orbit.leaves > 0 else low
+    elif orbit.circulates:
+        width = high - low
+        laps = np.floor(direction * ahead / width)
+        ahead -= direction * laps * width
+        lap = time_in_parts(curve, orbit, (low, high), turns) if laps > 0.0 else 0.0
+    at_low, at_high = turns[0] and ahead <= low, turns[1] and ahead >= high
+    if direction * ahead >= 0.0:
+        begins, stops = turns[0] and low == 0.0, turns[1] and high == 0.0
+        ends = (0.0, ahead) if direction > 0 else (ahead, 0.0)
+        flags = (begins, at_high) if direction > 0 else (at_low, stops)
+        return laps * lap + time_in_parts(curve, orbit, ends, flags)
+    if direction > 0:
+        there = time_in_parts(curve, orbit, (0.0, high), (False, True))
+        return there + time_in_parts(curve, orbit, (ahead, high), (at_low, True))
+    there = time_in_parts(curve, orbit, (low, 0.0), (True, False))
+    return there + time_in_parts(curve, orbit, (low, ahead), (True, at_high))
