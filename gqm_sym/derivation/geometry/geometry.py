@@ -214,7 +214,7 @@ def _charted_in_space(curve: Curve) -> Geometry:
         dzds=first[2],
         kappa=kappa,
         turning_rate=kappa,
-        turning=tuple(first[i] * second[j] - first[j] * second[i] for i, j in PAIRS),
+        turning=cross(first, second),
         angle=None,
         cusp=None,
         positive=curve.positive,

@@ -299,7 +299,7 @@ def _integrated(half: Array, anchors: tuple[Any, Any], known: Array, second: Arr
     count, rows = left.shape
     constants, powers = np.empty((count, 2 * rows)), np.empty((count, rows, TERMS))
     # Second derivatives are as accurate as first ones: the tangent is integrated from them, only its mean is fitted.
-    turning: Array = chebint(_fitted(second), axis=2)[:, :, :TERMS]
+    turning = np.asarray(chebint(_fitted(second), axis=2), dtype=np.float64)[:, :, :TERMS]
     turning[:, :, 0] += np.mean(known - turning @ AT_NODES, axis=2)
     for row in range(rows):
         gained = chebint(turning[:, row], lbnd=-1, axis=1)[:, :TERMS]
