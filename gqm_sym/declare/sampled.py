@@ -10,7 +10,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from decimal import Decimal
 from itertools import pairwise
-from math import atan2, hypot, isfinite, pi
+from math import atan2, dist, hypot, isfinite, pi
 from statistics import median
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
@@ -79,7 +79,7 @@ class Track:
     @property
     def in_space(self) -> bool:
         """Whether its points have three coordinates."""
-        return len(self.points.partition("\n")[0].split()) == IN_SPACE
+        return len(self.points[: self.points.find("\n")].split()) == IN_SPACE
 
 
 def in_metres(given: Any) -> Any:
@@ -260,18 +260,20 @@ def _read_rows(points: Iterable[Any]) -> Iterator[tuple[str, Place]]:
         numbered = enumerate(rows, start=1)
     except TypeError:
         raise DeclarationError(f"sampled: points: must be rows of x and z, got {short(points)}") from None
-    wanted, told = 2, "two numbers, x and z"
+    wanted = 2
     for count, row in numbered:
         is_row = isinstance(row, Sequence) and not isinstance(row, str)
         if count == 1 and is_row and len(row) == IN_SPACE:
-            wanted, told = IN_SPACE, "three numbers, x, y and z, as in row 1"
+            wanted = IN_SPACE
         if not is_row or len(row) != wanted:
+            told = "two numbers, x and z" if wanted == 2 else "three numbers, x, y and z, as in row 1"
+            told += ", or in space three, x, y and z" if count == 1 else ""
             raise DeclarationError(
                 f"sampled: row {count}: must be {told}, got {short(row)}; for one array of each write "
-                "Curve.sampled(x, z), and in space rows of x, y and z"
+                "Curve.sampled(x, z)"
             )
-        read = [_read(value, count) for value in row]
-        yield " ".join(text for text, _ in read), tuple(number for _, number in read)
+        coordinates, place = zip(*[_read(value, count) for value in row], strict=True)
+        yield " ".join(coordinates), place
 
 
 def _read(value: Any, count: int) -> tuple[str, float]:
@@ -302,7 +304,7 @@ def _size(places: list[Place]) -> float:
 
 
 def _distance(one: Place, two: Place) -> float:
-    return hypot(*(there - here for here, there in zip(one, two, strict=True)))
+    return dist(one, two)
 
 
 def _check_survey(places: list[Place], rows: list[int], joined: bool, scatter: float) -> None:
