@@ -33,6 +33,9 @@ _TIE_BITS = 700
 # pi with the digits of extended doubles, where the machine has them.
 _PI = np.longdouble("3.14159265358979323846264338327950288")
 
+# Below this integers are doubles; the number of bytes that a double takes.
+_EXACT_BELOW, _DOUBLE_SIZE = 2.0**53, 8
+
 # Extra bits beyond the precision that ``at`` returns, so that its result is rounded only once.
 _GUARD_BITS = 16
 
@@ -182,14 +185,44 @@ def flat_doubles(array: Doubles) -> Doubles:
     return flat if flat.flags.writeable and flat.flags.aligned else flat.copy()
 
 
+def doubles_at_once(values: Any) -> Doubles | None:
+    """Numbers that doubles hold exactly, as an array of their shape; None of others, which are read one by one.
+
+    Parameters
+    ----------
+    values
+        An array, a column of a DataFrame, a range, or a list or tuple of Python's floats and ints.
+    """
+    if isinstance(values, np.ndarray) and values.dtype == np.float64:
+        return values
+    if isinstance(values, range):
+        ends = max(abs(values.start), abs(values.stop))
+        return np.arange(values.start, values.stop, values.step, dtype=np.float64) if ends < _EXACT_BELOW else None
+    if isinstance(values, list | tuple):
+        kinds = set(map(type, values))
+        if not kinds <= {float, int}:
+            return None
+        array, exact = np.array(values), kinds <= {float}
+    else:
+        array = values.to_numpy() if hasattr(values, "to_numpy") else values
+        if not isinstance(array, np.ndarray) or array.dtype.kind not in "fiu" or array.dtype.itemsize > _DOUBLE_SIZE:
+            return None
+        exact = array.dtype.kind == "f"
+    if array.dtype.kind not in "fiu":
+        return None
+    doubles = array.astype(np.float64, copy=False)
+    return doubles if (np.isfinite(doubles) if exact else np.abs(doubles) < _EXACT_BELOW).all() else None
+
+
 def read_numbers(values: Any, *, where: str, unit: str | None = None) -> tuple[Doubles, Doubles, tuple[int, ...]]:
     """Read a number or an array of numbers into a flat array of doubles, one of remainders, and the shape.
 
     The arguments are those of `read_number`.
     """
-    if isinstance(values, np.ndarray) and values.dtype == np.float64:
-        flat = flat_doubles(values)
-        return flat, np.zeros_like(flat), values.shape
+    doubles = doubles_at_once(values)
+    if doubles is not None:
+        flat = flat_doubles(doubles)
+        return flat, np.zeros_like(flat), doubles.shape
     if is_quantity(values) and np.ndim(values.magnitude):
         return _of_quantities(values, where, unit)
     array = np.asarray(_plain(values, where, unit), dtype=object)

@@ -19,7 +19,7 @@ from hypothesis import strategies as st
 
 from gqm_sym.errors import GQMError, NumberError
 from gqm_sym.literals.grammar import CONSTANTS, FUNCTIONS
-from gqm_sym.literals.numbers import Number, read_number
+from gqm_sym.literals.numbers import Number, read_number, read_numbers
 
 # Against a reader that hangs, not against a busy machine.
 NO_HANG = timedelta(seconds=20)
@@ -375,6 +375,51 @@ def test_in_interval_arithmetic_the_number_is_enclosed(text):
     low, high = ctx.mpf(interval.a._mpi_[0]), ctx.mpf(interval.b._mpi_[1])
     assert low <= exact <= high
     assert high - low <= abs(exact) * ctx.mpf(2) ** (3 - mpmath.iv.prec)
+
+
+@pytest.mark.parametrize(
+    "given",
+    [
+        range(-3, 9, 4),
+        range(2**53 - 4, 2**53),
+        range(0),
+        [0.1, 3, -(2**53) + 1],
+        (0.5, 1e300),
+        [[0.1, 1], [2, 3.5]],
+        [2.0, 2**53 + 1],
+        [10**400 // 10**390, 3],
+        range(2**53 - 1, 2**53 + 3),
+        np.array([0.1, 2.5], dtype=np.float32),
+        np.arange(5),
+        np.array([2**53 + 1]),
+        np.array([[1, 2], [3, 4]], dtype=np.uint8),
+        np.array([0.1, 0.7], dtype=np.longdouble),
+    ],
+    ids=str,
+)
+def test_many_numbers_at_once_are_those_read_one_by_one(given):
+    """Ranges, lists and arrays: what doubles hold is read at once, with the same values, remainders and shape."""
+    high, low, shape = read_numbers(given, where="t")
+    each = [read_number(v, where="t") for v in np.asarray(given, dtype=object).reshape(-1)]
+    assert high.tolist() == [number.value for number in each]
+    assert low.tolist() == [number.low for number in each]
+    assert shape == np.shape(given)
+
+
+@pytest.mark.parametrize("given", [[0.0, math.nan], [1, True], np.array([True]), [0.5, None], np.array(["NaT"], "M8")])
+def test_what_is_among_many_numbers_and_none_is_refused(given):
+    """Reading at once accepts no more than reading one by one."""
+    with pytest.raises(NumberError):
+        read_numbers(given, where="t")
+
+
+@pytest.mark.parametrize(
+    "given", [range(10**6), [0.1] * 10**6, [7] * 10**6, np.arange(10**6)], ids=lambda g: str(type(g))
+)
+def test_many_doubles_are_not_read_one_by_one(given, monkeypatch):
+    """Ten million times from a range took 20 s."""
+    monkeypatch.setattr("gqm_sym.literals.numbers.read_number", None)
+    assert read_numbers(given, where="t")[0].size == 10**6
 
 
 def test_numbers_are_values():

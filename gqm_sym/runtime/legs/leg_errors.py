@@ -59,6 +59,7 @@ from gqm_sym.runtime.legs.leg_record import (
     NORMAL_LOAD,
     RIGHT,
     START,
+    START_LOW,
     START_V2,
     TIME_ERROR,
     TIME_FROM_END,
@@ -123,6 +124,8 @@ class Half(NamedTuple):
         By how much V**2 grows per distance where they begin.
     rate : float
         The time rate per distance in the middle; 0 if there are no panels.
+    least, most : float
+        The smallest and the largest rate at which V**2 grows with the curve's parameter.
     """
 
     by_place: float
@@ -132,6 +135,8 @@ class Half(NamedTuple):
     rounded: float
     slope: float
     rate: float
+    least: float
+    most: float
 
 
 @Inner
@@ -168,6 +173,7 @@ def half_of_leg(forces, march, panels, v2, errors, terms, record):  # type: igno
     set_nodes(work)
     (begin, count), left, u = panels, 0.0, float(march.direction)
     by_place, by_v2, damping, gained, rounded, slope, rate = 0.0, 0.0, 1.0, v2, 0.0, 0.0, 0.0
+    least, most = inf, -inf
     for k in range(count):
         at = begin + k * COLUMNS
         right = record[at + RIGHT]
@@ -175,7 +181,7 @@ def half_of_leg(forces, march, panels, v2, errors, terms, record):  # type: igno
         panel = Panel(left, v2, contact_sign, (-inf, inf))
         begin_panel(forces, march, panel, right - left, work)
         if not solve_panel(forces, march, panel, work) < inf:
-            return Half(inf, inf, 1.0, inf, inf, slope, rate)
+            return Half(inf, inf, 1.0, inf, inf, slope, rate, -inf, inf)
         size = size_of_terms(forces, panel, terms[(at - HEAD) // COLUMNS], work)
         fill_rates(march, panel, work)
         if k == 0:
@@ -186,7 +192,9 @@ def half_of_leg(forces, march, panels, v2, errors, terms, record):  # type: igno
             kept = damping * remains
             grows = (right - left) * (slope_at(left, march) + 2.0 * march.g * work[OFFSET + j])
             bend = work[MEAN + j] / (grows * work[DS + j])
-            change = (u * (work[P + j] - work[Q + j] * work[W + j]) - slope * kept) / work[W + j]
+            by_parameter = work[P + j] - work[Q + j] * work[W + j]
+            least, most = min(least, by_parameter), max(most, by_parameter)
+            change = (u * by_parameter - slope * kept) / work[W + j]
             work[LOAD + j] = work[TIME_RATE + j] * (bend - 0.5 * change)
             work[MEAN + j] = work[TIME_RATE + j] * kept / work[W + j]
             rounding = remains * (gained + size * work[D + j])
@@ -205,7 +213,7 @@ def half_of_leg(forces, march, panels, v2, errors, terms, record):  # type: igno
         last = right - 0.5 * (right - left) * (1.0 - SHARES[COUNT - 1])
         rate = work[TIME_RATE + COUNT - 1] / slope_at(last, march)
         left, v2 = right, max(work[W + COUNT], 0.0)
-    return Half(by_place, by_v2, damping, gained, rounded, slope, rate)
+    return Half(by_place, by_v2, damping, gained, rounded, slope, rate, least, most)
 
 
 def rounding_share(linear: bool) -> float:
@@ -272,7 +280,11 @@ def carry(dissipation, p, turns, before, share, terms, record):  # type: ignore[
         start_slope, rate = slope_of_v2(forces, record[START], record[START_V2], 0, point_buffer()), second.rate
     by_place, by_v2 = -start_slope * damping / second.slope, damping / second.slope
     at_end = rate - second.by_place  # the time from the middle to the end, by the place of the end
-    of_end = share * gained / second.slope + rounding
+    # The end is held as two doubles. Forces are those at doubles, which shifts it by as much as they vary on the leg.
+    varied = max(first.most, second.most) - min(first.least, second.least)
+    rounding *= max(ULP, min(1.0, varied / fabs(second.slope)))
+    width = fabs((record[END] - record[START]) + (record[END_LOW] - record[START_LOW]))
+    of_end = share * gained / second.slope + (rounding + PLACE_ROUNDINGS * ULP * width)
     place = fabs(by_place) * before.place + fabs(by_v2) * before.v2 + of_end
     moved = fabs(first.by_place - rate + by_place * at_end) * before.place
     moved += fabs(first.by_v2 + by_v2 * at_end) * before.v2 + fabs(at_end) * of_end

@@ -301,7 +301,7 @@ class PeriodicMotion(Motion):
         sampler = None if times is None else self._sampler_for(times[1], times[2])
         if times is None or sampler is None:
             return super().lam(t)
-        return sampler.places(times[0]).reshape(t.shape)
+        return sampler.places(times[0].reshape(-1)).reshape(times[0].shape)
 
     def state(self, t: Any) -> State:
         """The state of the body at times; see `Motion.state`. For doubles this is one call of compiled code."""
@@ -318,7 +318,7 @@ class PeriodicMotion(Motion):
             return State(*sampler.state(time))
         if time is not None:
             return self._state_of(time, np.array(sampler.state(time)[1:]).reshape(-1, 1))
-        return self._state_of(t, sampler.states(times[0]))
+        return self._state_of(times[0], sampler.states(times[0].reshape(-1)))
 
     def _sampler_for(self, least: float, greatest: float) -> Sampler | None:
         """The sampler for times from ``least`` to ``greatest``; None if they are impossible or too late for doubles."""

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from gqm_sym.literals.numbers import flat_doubles
+from gqm_sym.literals.numbers import doubles_at_once, flat_doubles
 from gqm_sym.runtime.arithmetic.doubledouble import Pair, two_product
 from gqm_sym.runtime.compiled.threads import run_in_threads
 from gqm_sym.runtime.compiled.types import Array
@@ -37,11 +37,11 @@ def plain_time(t: Any) -> float | None:
 
 
 def plain_times(t: Any) -> tuple[Array, float, float] | None:
-    """Times that are an array of doubles, with the least and the greatest; None if they must be read one by one."""
-    if isinstance(t, np.ndarray) and t.dtype == np.float64 and t.size and t.ndim:
-        flat = flat_doubles(t)
-        return flat, float(flat.min()), float(flat.max())
-    return None
+    """Times that are doubles, with the least and the greatest; None if they must be read one by one."""
+    times = doubles_at_once(t)
+    if times is None or not times.size or not times.ndim:
+        return None
+    return flat_doubles(times).reshape(times.shape), float(times.min()), float(times.max())
 
 
 class Sampler:

@@ -138,8 +138,10 @@ def true_turning_points(problem: Problem, segment: Segment, offsets: tuple[float
             low, high = passage.turning_points
     elif problem.tape is not None:
         low, high = find_turning_points(problem.tape, (problem.launch.lam0, problem.launch.v0), offsets)
-    largest = MAX_TURN_ERROR * (high.high - low.high)
-    if low.error <= largest and high.error <= largest:
+    largest, error = MAX_TURN_ERROR * (high.high - low.high), max(low.error, high.error)
+    # Along a chart doubles may be off by much more than the error, however large that is for so small a swing.
+    off = max(abs(segment.a - low.high), abs(segment.b - high.high)) if problem.formulas.chart is not None else 0.0
+    if error <= largest or off > 2.0 * error:
         return low[:2], high[:2]
     if problem.formulas.chart is not None or problem.functions.exact is None:
         return None

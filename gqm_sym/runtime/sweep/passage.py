@@ -431,6 +431,8 @@ def passage_of(curve, orbit):  # type: ignore[no-untyped-def]
         rests = from_right(x, near), from_left(x, near)
         return Passage(first, count + 1, x, x, rests[0], rests[1], curve.period, NEITHER, orbit.v2, False, count)
     last, y, close = locate(table, curve.period, orbit.lam0 + orbit.high)
+    if close == 0.0 and y < 0.0 and last > first:  # at an edge: nothing of the panel behind it is passed
+        last, y = last - 1, 1.0
     inside = table.edges[0] <= orbit.lam0 + orbit.low and orbit.lam0 + orbit.high <= table.edges[-1]
     panels, rests = last - first + 1 if inside or curve.period > 0.0 else 0, (from_right(x, near), from_left(y, close))
     middle = middle_of(curve, orbit, first, panels, BOTH)

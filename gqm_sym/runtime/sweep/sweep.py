@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from gqm_sym.arguments import not_given, one_of, short
 from gqm_sym.errors import GQMError, InputError, ParameterError, SolutionError
 from gqm_sym.literals.namespaces import ARRAYS
-from gqm_sym.literals.numbers import Number, read_number
+from gqm_sym.literals.numbers import Number, doubles_at_once, read_number
 from gqm_sym.runtime.charts.chart import CORNER_ROUNDINGS, ChartMaker
 from gqm_sym.runtime.charts.true_parts import NO_PARTS, parts_along
 from gqm_sym.runtime.compiled.strided import DOMAIN_PERIOD, LAM0, PARAMETERS, V0, lay_out, pointers, widen
@@ -178,6 +178,9 @@ def as_doubles(value: Any, name: str) -> Array:
         raise ParameterError(not_given(name))
     if isinstance(value, np.ndarray) and value.dtype.kind in "fiu":
         return value.astype(np.float64, copy=False)
+    doubles = doubles_at_once(value)
+    if doubles is not None:
+        return doubles
     array = np.asarray(value, dtype=object)
     numbers = [v if isinstance(v, float) else read_number(v, where=name).value for v in array.reshape(-1)]
     return np.array(numbers, dtype=np.float64).reshape(array.shape)

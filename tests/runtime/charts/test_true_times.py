@@ -218,3 +218,17 @@ def test_the_bound_along_a_track_of_scattered_points(
     with mp.workdps(40):
         truth = mpf(motion.period_to(36)) / 2
         assert abs(mpf(duration.high) + mpf(duration.low) - truth) <= duration.error <= 1e-24 * truth
+
+
+@pytest.mark.parametrize("g", [0.4, 1.62, 9.81])
+def test_swings_too_small_for_doubles_along_a_chart(g: float, ring: ModuleType) -> None:
+    """Doubles have the bottom 1e-16 off, and the bound did not say so where no extended precision was asked."""
+    for lam0 in np.geomspace(1e-8, 1e-6, 41).tolist():
+        motion = ring.solve(lam0, g=g)
+        state = motion.state(1.0)
+        with mp.workdps(40):
+            # To the third order in the amplitude.
+            size, omega = mpf(lam0), mp.sqrt(mpf(g))
+            place = size * mp.cos(omega * (1 - size**2 / 16)) + size**3 / 192 * (mp.cos(omega) - mp.cos(3 * omega))
+            assert abs(state.lam - place) <= state.error + size**5
+        assert state.error <= 1e-13 * lam0

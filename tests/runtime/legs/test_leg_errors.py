@@ -156,6 +156,37 @@ def test_from_beside_a_hilltop(start: str, build: Build) -> None:
         assert state.error <= 2e-15
 
 
+@pytest.mark.parametrize("v0", [1e-8, 1e-12, 1e-18])
+@pytest.mark.parametrize("lam0", [0.9, 0.999, 0.999999])
+def test_a_slow_launch_towards_a_hilltop(lam0: float, v0: float, build: Build) -> None:
+    """The turn is close by and held as two doubles: of one double, what follows would have a bound of up to 0.04."""
+    force = gqm.Potential("-(x - 1)**2/2") + gqm.QuadraticDrag(b="b")
+    state = build("level_hill", gqm.Curve.graph("0*x"), force).solve(lam0, v0, 1, b=0.125).state(6.0)
+    with mp.workdps(100):
+        # With y = x - 1 it is V**2 = 8 y - 32 + c exp(-y/4) on the way up, and -8 y - 32 + c exp(y/4) on the way down.
+        start, place = mpf(lam0) - 1, mpf(state.lam) - 1
+
+        def rising(y: mpf) -> mpf:
+            return 8 * y - 32 + (mpf(v0) ** 2 - 8 * start + 32) * mp.exp((start - y) / 4)
+
+        rise = mpf(v0) ** 2 / (-2 * start)
+        top = mp.findroot(rising, (start + rise * mpf("0.99"), start + rise))
+
+        def falling(y: mpf) -> mpf:
+            return -8 * y - 32 + (8 * top + 32) * mp.exp((y - top) / 4)
+
+    def rate(u: mpf, v2: Callable[[mpf], mpf]) -> mpf:
+        with mp.workdps(100):
+            return 2 * u / mp.sqrt(v2(top - u * u))
+
+    with mp.workdps(25):
+        far = mp.sqrt(top - place)
+        panels = [0, *(far / 4**k for k in range(6, 0, -1)), far]
+        up = mp.quad(lambda u: rate(u, rising), [0, mp.sqrt(top - start)], method="gauss-legendre")
+        down = mp.quad(lambda u: rate(u, falling), panels, method="gauss-legendre")
+        assert abs(up + down - 6) * mp.sqrt(falling(place)) <= state.error <= 1e-10
+
+
 def test_a_resistance_that_never_stops_a_swing(build: Build) -> None:
     """Resistance c V on a ring: small swings last for ever, each damped by exp(-c/2 half)."""
     module = build("viscous_ring", gqm.families.circle(L=1), gqm.Kernel.law("-c*direction*sqrt(W)"))

@@ -9,6 +9,7 @@ import pytest
 from mpmath import mp, mpf
 from numpy.polynomial.chebyshev import chebval
 
+from generated import circle_coulomb
 from gqm_sym.errors import InputError
 from gqm_sym.runtime.arithmetic.clenshaw import GROUP
 from gqm_sym.runtime.compiled import threads
@@ -58,6 +59,17 @@ def test_a_pendulum_at_random_times(amplitude: Any, allowed: float, module_of: M
         for place, time in zip(places, t, strict=True):
             truth = 2 * mp.asin(k * mp.ellipfun("cd", w * mpf(float(time)), m=k * k))
             assert abs(mpf(float(place)) - truth) <= allowed * 2 * top
+
+
+@pytest.mark.parametrize("given", [range(6), [0, 1.5, 2], [[0.0, 1], [2, 3.5]], np.arange(3), np.float32([0.1, 0.2])])
+@pytest.mark.parametrize("rough", [False, True])
+def test_times_that_are_no_array_of_doubles(rough: bool, given: Any, module_of: ModuleOf) -> None:
+    """Ranges, lists and other arrays are read as the doubles that they hold, in their shape."""
+    motion = circle_coulomb.solve(0.3, mu="1/100") if rough else module_of("circle").solve(0.3, L=1)
+    times = np.array(given, dtype=np.float64)
+    assert np.abs(motion.lam(given) - motion.lam(times)).max() <= AGREE
+    assert np.abs(motion.state(given).lam - motion.state(times).lam).max() <= AGREE
+    assert motion.lam(given).shape == motion.state(given).lam.shape == motion.error_bound(given).shape == times.shape
 
 
 @pytest.mark.parametrize("direction", [1, -1])

@@ -314,3 +314,13 @@ def test_half_periods_on_a_measured_track(track: ModuleType) -> None:
     for value, place in zip(swept.values, places.tolist(), strict=True):
         exact = track.solve(place).half_period
         assert abs(value - exact) <= TWO_ULPS * exact
+
+
+def test_a_launch_from_rest_at_an_edge_of_a_panel(tmp_path: Path) -> None:
+    """The body comes to the bottom after half of half a period, from either side; the table has edges at all 1/16."""
+    curve = gqm.Curve.graph("x**2", parameter="x", domain=(-2, 2))
+    module = gqm.build(gqm.derive(curve, gqm.Gravity()), name="launch_at_edge", folder=tmp_path)
+    places = np.array([-1.25, -0.5, 0.5, 1.0, 1.25])
+    found = module.sweep("time_at", places, 0.0, lam=0.0, contact="above").values
+    known = [0.5 * module.solve(place, 0.0).half_period for place in places.tolist()]
+    np.testing.assert_allclose(found, known, rtol=2e-15)
