@@ -91,7 +91,7 @@ def draw_curve(curve: Curve, lam: Any, axes: Any, parameters: dict[str, Any]) ->
     model = transient(derive(curve, Gravity())).MODEL
     chart = model.charted(model.numbers(tuple({**model.parameters, **parameters}.values())))
     low, high = (chart.low, chart.high) if lam is None else (read_number(end, where="lam").value for end in lam)
-    points = chart.points([low + (high - low) * k / SAMPLES for k in range(SAMPLES + 1)])[:2]
+    points = chart.coordinates([low + (high - low) * k / SAMPLES for k in range(SAMPLES + 1)])
     return drawn(points, curve.title, axes)
 
 

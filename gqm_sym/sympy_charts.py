@@ -1,7 +1,8 @@
 """The coordinates of a charted curve as SymPy functions of its arc length.
 
 A curve that is known by numbers only (implicit, sampled, put together from pieces) has no formula x(s). These heads
-stand for what its chart holds: they are read as ``x(s)``, and lowered to calls of the chart.
+stand for what its chart holds: they are read as ``x(s)``, and lowered to calls of the chart. A track in space has a
+chart of each coordinate, with its first two derivatives by arc length.
 """
 
 from typing import ClassVar
@@ -48,3 +49,32 @@ class chart_kappa(ChartFunction):
     """Signed curvature."""
 
     row, symbol = "kappa", r"\kappa"
+
+
+class SpaceFunction(ChartFunction):
+    """A coordinate of a charted curve in space, or one of its first two derivatives by arc length.
+
+    Attributes
+    ----------
+    axis
+        The coordinate.
+    order
+        How often it is differentiated.
+    """
+
+    axis: ClassVar[str]
+    order: ClassVar[int]
+
+
+def _of_axis(axis: str, order: int) -> type[SpaceFunction]:
+    row, primes = "d" * order + axis, "'" * order
+    named = {"axis": axis, "order": order, "row": row, "symbol": axis + primes}
+    return type(f"space_{row}", (SpaceFunction,), {**named, "__module__": __name__})
+
+
+SPACE_ROWS: dict[str, tuple[type[SpaceFunction], ...]] = {
+    axis: tuple(_of_axis(axis, order) for order in range(3)) for axis in "xyz"
+}
+"""Each coordinate in space with its derivatives."""
+SPACE: tuple[type[SpaceFunction], ...] = tuple(rows[0] for rows in SPACE_ROWS.values())
+"""The coordinates x, y and z."""

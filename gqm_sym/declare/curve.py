@@ -15,7 +15,7 @@ from gqm_sym.dimensions import unit_of
 from gqm_sym.errors import ArgumentError, DeclarationError
 from gqm_sym.expressions import check_name, read_expression
 from gqm_sym.parameters import Parameters, Value, check_measured, names_in_order, read_parameters
-from gqm_sym.sympy_charts import chart_x, chart_z
+from gqm_sym.sympy_charts import SPACE, chart_x, chart_z
 
 if TYPE_CHECKING:
     from gqm_sym.declare.piecewise import Piece
@@ -43,7 +43,7 @@ class Curve:
         The form in which it was declared: ``graph``, ``parametric``, ``polar``, ``space``; of a charted curve
         ``implicit``, ``sampled``, ``piecewise`` or ``polynomial``.
     x, z, y
-        The coordinates, in the parameter and the run-time parameters; y is 0 on curves of all kinds but ``space``.
+        The coordinates, in the parameter and the run-time parameters; y is 0 on curves in the plane of x and z.
     parameter
         The symbol of λ.
     domain
@@ -98,8 +98,8 @@ class Curve:
 
     @property
     def in_space(self) -> bool:
-        """Whether it was declared by three coordinates."""
-        return self.kind == "space"
+        """Whether it has three coordinates."""
+        return self.kind == "space" or getattr(self.definition, "in_space", False)
 
     @property
     def coordinates(self) -> tuple[tuple[str, sp.Expr], ...]:
@@ -335,8 +335,9 @@ class Curve:
         Parameters
         ----------
         points
-            Rows of x and z: an (n, 2) array, or pairs of numbers or of decimal text, which is kept as it is; or a
-            table with columns x and z, as a DataFrame or a mapping; or, where ``z`` is given, the x of all points.
+            Rows of x and z, or in space of x, y and z: an array, or numbers or decimal text, which is kept as it is; or
+            a table with these columns, as a DataFrame or a mapping; or, where ``z`` is given, the x of all points. In
+            space the track is a spline and not smoothed.
         z
             The heights of the points, where ``points`` are their x: ``Curve.sampled(x, z)``.
         kind
@@ -375,6 +376,9 @@ class Curve:
 
         s = sp.Symbol("s", real=True)
         track = read_track(points, z, kind=kind, closed=closed, smoothing=smoothing)
+        if track.in_space:
+            at_x, at_y, at_z = (head(s) for head in SPACE)
+            return cls(kind="sampled", x=at_x, y=at_y, z=at_z, parameter=s, title=title, definition=track)
         return cls(kind="sampled", x=chart_x(s), z=chart_z(s), parameter=s, title=title, definition=track)
 
     @classmethod

@@ -10,7 +10,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from decimal import Decimal
 from itertools import pairwise
-from math import atan2, hypot, isfinite, pi
+from math import atan2, dist, hypot, isfinite, pi
 from statistics import median
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
@@ -46,7 +46,9 @@ RESTLESS = 0.5
 # if it changes loads by this many g where a body is as fast as after a fall from one side of the track to the other.
 FELT = 0.1
 
-Place: TypeAlias = tuple[float, float]
+Place: TypeAlias = tuple[float, ...]
+# The coordinates of points in space.
+IN_SPACE = 3
 # So many turns in a row, each to the other side and by more than this, are a zigzag that no smooth track goes through:
 # the lengths of the spline between such points never settle.
 ZIGZAGS = 5
@@ -62,7 +64,7 @@ class Track:
     Attributes
     ----------
     points : str
-        One point a line, x and z as decimal numbers. A closed track does not repeat its first point.
+        One point a line, x and z, or x, y and z, as decimal numbers. A closed track does not repeat its first point.
     kind : {"spline", "linear"}
         A quintic spline, or planes stitched together.
     closed : bool
@@ -75,6 +77,11 @@ class Track:
     kind: str
     closed: bool
     smoothing: "Smoothing | None" = field(default=None, compare=False, repr=False)
+
+    @property
+    def in_space(self) -> bool:
+        """Whether its points have three coordinates."""
+        return len(self.points[: self.points.find("\n")].split()) == IN_SPACE
 
 
 def in_metres(given: Any) -> Any:
@@ -106,8 +113,8 @@ def read_track(
     Parameters
     ----------
     points
-        Rows of x and z: an (n, 2) array, or pairs of numbers or of decimal text, which is kept as it is; or a table
-        with columns x and z; or the x of all points.
+        Rows of x and z, or in space of x, y and z: an array, or numbers or decimal text, which is kept as it is; or a
+        table with columns x and z, perhaps also y; or the x of all points.
     z
         The heights of the points, where ``points`` are their x.
     kind
@@ -143,6 +150,9 @@ def read_track(
     joined = repeated if closed is None else closed
     if joined and repeated:
         del texts[-1], places[-1]
+    in_space = bool(places) and len(places[0]) == IN_SPACE
+    if in_space:
+        _check_space(kind, deviation)
     rows = list(range(1, len(places) + 1))
     if deviation is not None:  # what a recorder that waits for news says again was not measured again
         rows = [row for row in rows if row == 1 or places[row - 1] != places[row - 2]]
@@ -154,7 +164,7 @@ def read_track(
         raise DeclarationError(f"sampled: {len(places)} different points; {what} track of {how} needs {fewest} or more")
     if deviation is None:
         _check_order(places, size, kind, joined)
-        if kind == "spline":
+        if kind == "spline" and not in_space:
             _warn_of_scatter(places, joined, "give their standard deviation in metres as smoothing, or 'auto'")
         return Track(points="\n".join(texts), kind=kind, closed=joined)
     _check_survey(places, rows, joined, 0.0 if deviation == "auto" else deviation)
@@ -162,6 +172,16 @@ def read_track(
     _warn_of_scatter(smoothed, joined, f"smoothing {smoothing!r} is less than their scatter")
     kept = "\n".join(f"{x!r} {z!r}" for x, z in smoothed)
     return Track(points=kept, kind=kind, closed=joined, smoothing=report)
+
+
+def _check_space(kind: str, deviation: object) -> None:
+    """Refuse what there is for tracks in the plane of x and z only."""
+    for told, given, what in (
+        (f"kind {kind!r}", kind != "spline", "declare a spline, of points dense enough where the track bends"),
+        ("smoothing", deviation is not None, "leave it out, and smooth the points before"),
+    ):
+        if given:
+            raise DeclarationError(f"sampled: {told} is for tracks of x and z only yet; in space {what}")
 
 
 def _read_smoothing(given: Any, kind: str) -> float | Literal["auto"] | None:
@@ -201,26 +221,29 @@ def _smoothed(
 def _rows(points: Any, z: Any) -> Any:
     """Points as rows, whichever way they were given."""
     if z is not None:
-        return _paired(points, z, "sampled: x and z")
+        return _paired("sampled: x and z", points, z)
     # Any kind of table will do, whoever made it.
     names = points if isinstance(points, Mapping) else getattr(points, "columns", None)
     if names is None:
         return points
     columns = {name.strip().lower(): name for name in names if isinstance(name, str)}
+    if columns.keys() >= {"x", "y", "z"}:
+        return _paired("sampled: columns x, y and z", *(points[columns[name]] for name in "xyz"))
     if not columns.keys() >= {"x", "z"}:
         raise DeclarationError(
             f"sampled: points: a table must have columns x and z, got {short(list(names))}; rename them, or give "
             "both columns, as in Curve.sampled(table['distance'], table['height'])"
         )
-    return _paired(points[columns["x"]], points[columns["z"]], "sampled: columns x and z")
+    return _paired("sampled: columns x and z", points[columns["x"]], points[columns["z"]])
 
 
-def _paired(x: Any, z: Any, where: str) -> list[tuple[Any, Any]]:
-    """Rows of two columns."""
-    first, second = (_column(column, where) for column in (x, z))
-    if len(first) != len(second):
-        raise DeclarationError(f"{where}: must be of one length, got {len(first)} and {len(second)} values")
-    return list(zip(first, second, strict=True))
+def _paired(where: str, *columns: Any) -> list[tuple[Any, ...]]:
+    """Rows of two or three columns."""
+    read = [_column(column, where) for column in columns]
+    if len({len(column) for column in read}) > 1:
+        lengths = " and ".join(str(len(column)) for column in read)
+        raise DeclarationError(f"{where}: must be of one length, got {lengths} values")
+    return list(zip(*read, strict=True))
 
 
 def _column(values: Any, where: str) -> tuple[Any, ...]:
@@ -239,14 +262,20 @@ def _read_rows(points: Iterable[Any]) -> Iterator[tuple[str, Place]]:
         numbered = enumerate(rows, start=1)
     except TypeError:
         raise DeclarationError(f"sampled: points: must be rows of x and z, got {short(points)}") from None
+    wanted = 2
     for count, row in numbered:
-        if isinstance(row, str) or not isinstance(row, Sequence) or len(row) != 2:
+        is_row = isinstance(row, Sequence) and not isinstance(row, str)
+        if count == 1 and is_row and len(row) == IN_SPACE:
+            wanted = IN_SPACE
+        if not is_row or len(row) != wanted:
+            told = "two numbers, x and z" if wanted == 2 else "three numbers, x, y and z, as in row 1"
+            told += ", or in space three, x, y and z" if count == 1 else ""
             raise DeclarationError(
-                f"sampled: row {count}: must be two numbers, x and z, got {short(row)}; "
-                "for one array of each write Curve.sampled(x, z)"
+                f"sampled: row {count}: must be {told}, got {short(row)}; for one array of each write "
+                "Curve.sampled(x, z)"
             )
-        (x, first), (z, second) = (_read(value, count) for value in row)
-        yield f"{x} {z}", (first, second)
+        coordinates, place = zip(*[_read(value, count) for value in row], strict=True)
+        yield " ".join(coordinates), place
 
 
 def _read(value: Any, count: int) -> tuple[str, float]:
@@ -273,12 +302,11 @@ def _size(places: list[Place]) -> float:
     """The longer side of the box around all points."""
     if not places:
         return 0.0
-    xs, zs = zip(*places, strict=True)
-    return float(max(max(xs) - min(xs), max(zs) - min(zs)))
+    return float(max(max(axis) - min(axis) for axis in zip(*places, strict=True)))
 
 
 def _distance(one: Place, two: Place) -> float:
-    return hypot(two[0] - one[0], two[1] - one[1])
+    return dist(one, two)
 
 
 def _check_survey(places: list[Place], rows: list[int], joined: bool, scatter: float) -> None:
@@ -312,10 +340,19 @@ def _chords(places: list[Place], joined: bool) -> list[float]:
 
 
 def _turns(places: list[Place], joined: bool) -> list[float]:
-    """By how much the track turns at each point between two others."""
+    """By how much the track turns at each point between two others; in space it has no sign."""
     around = [*places, *places[:2]] if joined else places
+    if len(places[0]) == IN_SPACE:
+        steps = [tuple(there - here for here, there in zip(*pair, strict=True)) for pair in pairwise(around)]
+        return [_angle(before, after) for before, after in pairwise(steps)]
     angles = [atan2(two[1] - one[1], two[0] - one[0]) for one, two in pairwise(around)]
     return [(after - before + pi) % (2.0 * pi) - pi for before, after in pairwise(angles)]
+
+
+def _angle(one: Place, two: Place) -> float:
+    """The angle between two vectors in space."""
+    crossed = [one[i] * two[j] - one[j] * two[i] for i, j in ((1, 2), (2, 0), (0, 1))]
+    return atan2(hypot(*crossed), sum(first * second for first, second in zip(one, two, strict=True)))
 
 
 def _check_order(places: list[Place], size: float, kind: str, joined: bool) -> None:

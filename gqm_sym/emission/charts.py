@@ -58,8 +58,9 @@ def _sampled(lowering: Lowering) -> ChartIR:
     """A sampled curve: its points, as text."""
     track = lowering.model.curve.definition
     assert isinstance(track, Track)
+    space = ", in_space=True" if track.in_space else ""
     return ChartIR(
-        statement=f"Sampled(POINTS, kind={track.kind!r}, closed={track.closed})",
+        statement=f"Sampled(POINTS, kind={track.kind!r}, closed={track.closed}{space})",
         imports=("Sampled",),
         data=(("POINTS", track.points),),
     )

@@ -9,10 +9,15 @@ from sympy import Expr, Function, Symbol
 from gqm_sym.emission.ir import Assignment, ExactIR, FunctionIR
 from gqm_sym.emission.printer import CodePrinter, ExactPrinter, IntervalPrinter
 from gqm_sym.emission.subscripts import at
-from gqm_sym.sympy_charts import chart_alpha, chart_kappa, chart_x, chart_z
+from gqm_sym.sympy_charts import SPACE_ROWS, ChartFunction, chart_alpha, chart_kappa, chart_x, chart_z
 
-# The rows of a chart, in their order there.
-CHART_ROWS = (chart_x, chart_z, chart_alpha, chart_kappa)
+# What the arrays of charts are called in emitted functions, each with the rows that it has and where. In space each
+# coordinate has a chart; they stand one after the other, all of one size.
+SPACE_CHARTS = ("along_z", "along_x", "along_y")
+CHART_ROWS: dict[str, dict[type[ChartFunction], int]] = {
+    "chart": {chart_x: 0, chart_z: 1, chart_alpha: 2, chart_kappa: 3},
+    **{name: dict(zip(SPACE_ROWS[name[-1]], (1, 2, 3), strict=True)) for name in SPACE_CHARTS},
+}
 
 # Columns up to which several loads of a value stand on one line.
 WIDTH = 112
@@ -53,33 +58,39 @@ def _unpacked(parameters: tuple[tuple[str, int], ...], p: str) -> list[str]:
 
 
 def _read_together(function: FunctionIR) -> tuple[FunctionIR, list[str]]:
-    """A function that finds what a chart says of its places in the last rows of ``out``, and the line that fills these.
+    """A function that finds what charts say of its places in the last rows of ``out``, and the lines that fill these.
 
     Neighbours often share a piece of the chart, which is then looked for once. Without a chart, or where ``out`` has
     too few rows, the function is as it was.
     """
     values = [*(a.value for a in function.inside), *function.outputs]
     given = {a.name: a.value for a in function.inside if type(a.value).__name__ == "at" and len(a.value.args) == 1}
-    places = {c.args[0].name for v in values for c in v.atoms(*CHART_ROWS) if c.args[0].is_Symbol}
+    heads = {head: (chart, row) for chart, rows in CHART_ROWS.items() for head, row in rows.items()}
+    places = {c.args[0].name for v in values for c in v.atoms(*heads) if c.args[0].is_Symbol}
     if len(places) != 1 or not places <= given.keys():
         return function, []
     place = Symbol(places.pop(), real=True)
-    used = [k for k, row in enumerate(CHART_ROWS) if any(v.has(row(place)) for v in values)]
+    used = [head for head in heads if any(v.has(head(place)) for v in values)]
     out, first = function.arguments[-1], len(function.outputs) - len(used)
     if first < 0:
         return function, []
     names = {a.value: Symbol(a.name, real=True) for a in function.inside}
     read: dict[Expr, Symbol] = {}
-    for k in used:
-        call = CHART_ROWS[k](place)
-        read[call] = names.get(call, Symbol(f"_{CHART_ROWS[k].__name__}", real=True))
+    for head in used:
+        call = head(place)
+        read[call] = names.get(call, Symbol(f"_{head.__name__}", real=True))
     rows = [Assignment(name=name.name, value=at(out, first + j)) for j, name in enumerate(read.values())]
     inside = [Assignment(name=a.name, value=a.value.xreplace(read)) for a in function.inside if a.value not in read]
     outputs = tuple(value.xreplace(read) for value in function.outputs)
     needed = {s.name for value in (*(a.value for a in inside), *outputs) for s in value.free_symbols}
     kept = [a for a in inside if a.name in needed]
-    line = f"chart_rows(chart, {tuple(used)}, {given[place.name].args[0]}, {out})"
-    return replace(function, inside=(*rows, *kept), outputs=outputs), [line]
+    lines, end = [], first
+    for chart in dict.fromkeys(heads[head][0] for head in used):
+        found = tuple(heads[head][1] for head in used if heads[head][0] == chart)
+        end += len(found)
+        filled = out if end == len(function.outputs) else f"{out}[:{end}]"
+        lines.append(f"chart_rows({chart}, {found}, {given[place.name].args[0]}, {filled})")
+    return replace(function, inside=(*rows, *kept), outputs=outputs), lines
 
 
 def loop(function: FunctionIR) -> tuple[dict[str, Any], set[str]]:
@@ -96,6 +107,7 @@ def loop(function: FunctionIR) -> tuple[dict[str, Any], set[str]]:
     inside += [f"{out}[{row}, {index}] = {printer.doprint(e)}" for row, e in enumerate(function.outputs)]
     if filled:
         printer.used.add("chart_rows")
+        printer.axes |= {line[len("chart_rows(along_")] for line in filled if "along_" in line}
     before = [*_chart_view(function, printer), *before, *filled]
     fields = {
         "name": function.name,
@@ -118,8 +130,13 @@ def _views(function: FunctionIR) -> str:
 
 
 def _chart_view(function: FunctionIR, printer: CodePrinter) -> list[str]:
-    """The line that finds the chart of the curve, which stands behind the run-time parameters."""
+    """The lines that find the charts of the curve, which stand behind the run-time parameters."""
     p, count = function.views[-2]
+    first, *others = SPACE_CHARTS
+    if printer.axes:
+        offsets = [f"{count} + {k} * {first}.size" for k in range(1, len(SPACE_CHARTS))]
+        needed = [(name, at) for name, at in zip(others, offsets, strict=True) if name[-1] in printer.axes]
+        return [f"{first} = chart_of({p}, {count})", *(f"{name} = chart_of({p}, {at})" for name, at in needed)]
     return [f"chart = chart_of({p}, {count})"] if any("chart_" in name for name in printer.used) else []
 
 

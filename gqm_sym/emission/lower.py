@@ -217,6 +217,8 @@ class _ModelLowering(Lowering):
 
     def exact_potential(self) -> tuple[ExactIR, ...]:
         """The effective potential and its gradient by coordinates; nothing where it depends on more than those."""
+        if self.model.curve.in_space:  # known in doubles only
+            return ()
         x, z = self.names.symbol("x"), self.names.symbol("z")
         potential = self.model.effective_potential.xreplace({chart_x(self.place): x, chart_z(self.place): z})
         if self.place in potential.free_symbols or self.model.ds != 1:

@@ -40,6 +40,7 @@ _OWN = frozenset(
         *_RUNTIME,
         *("Any", "BatchFunctions", "CHART", "DissipativeFunctions", "ExactFormulas", "ExactPotential", "MODEL"),
         *("Motion", "PARAMETERS", "Sweep", "TYPE_CHECKING", "carray", "chart", "chart_of", "compiled"),
+        *("along_x", "along_y", "along_z"),
         *("compiler", "fabs"),
         *("op", "pass1", "place_from_ends", "range", "self", "solve", "sweep"),
         *("Pass1", "Pass1InSpace", "Pass1OfRider", "path_in_space", "rider_loads"),

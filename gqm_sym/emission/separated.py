@@ -37,7 +37,7 @@ def separate(form: Expr, place: Symbol, held: set[Symbol]) -> dict[Expr, Expr]:
 def separated_terms(lowering: Lowering) -> SeparatedIR | None:
     """Divided differences of the potential's parts, with path and load; None where there is nothing to be gained."""
     model, place = lowering.model, lowering.place
-    if not model.curve.charted or model.dissipation is not None:
+    if not model.curve.charted or model.curve.in_space or model.dissipation is not None:
         return None
     forms = [form.xreplace(lowering.trigonometric) for form in (model.effective_potential, model.static_normal_load)]
     path = [form.xreplace(lowering.trigonometric) for form in (model.ds, model.kappa)]

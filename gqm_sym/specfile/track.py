@@ -16,7 +16,7 @@ from gqm_sym.parameters import exact_value, in_si
 from gqm_sym.specfile.beside import read_beside, read_rows
 from gqm_sym.specfile.fields import ABSENT, Flag, Line, ScatterText, Section, UnitText, split_value, wrapped
 
-_COLUMNS = ["x", "z"]
+_COLUMNS = (["x", "z"], ["x", "y", "z"])
 _ROW = re.compile(r"row (\d+)")
 
 
@@ -36,7 +36,7 @@ class Scatter(Section):
 
 
 class Points(Section):
-    """A track through the points of a CSV file with columns x, z; its path alone will do."""
+    """A track through the points of a CSV file with columns x, z, or x, y, z; its path alone will do."""
 
     file: Line = Field(description="path from this file's folder on, inside it", examples=["track.csv"])
     kind: Literal["spline", "linear"] = Field(default="spline", description="a quintic spline, or stitched planes")
@@ -68,9 +68,9 @@ def declare_track(given: dict[str, Any], folder: Path) -> Curve:
         the line of the file.
     """
     name = given.pop("file")
-    header, rows = read_rows(name, read_beside(name, folder, wanted="a CSV file with columns x, z"))
-    if header and [field.lower() for field in header] != _COLUMNS:
-        raise InputError(f"{name!r}, row 1: the columns must be x, z, got {','.join(header)!r:.60}")
+    header, rows = read_rows(name, read_beside(name, folder, wanted="a CSV file with columns x, z, or x, y, z"))
+    if header and [field.lower() for field in header] not in _COLUMNS:
+        raise InputError(f"{name!r}, row 1: the columns must be x, z, or x, y, z, got {','.join(header)!r:.60}")
     if "smoothing" in given:
         given["smoothing"] = _deviation(**given["smoothing"])
     try:

@@ -83,8 +83,7 @@ def test_places_lie_within_their_bounds(
     """From the launch to the turning point, and there; and the bound is no larger than it must be."""
     _, _, potential, ds, _ = WELLS[name]
     motion = wells[name].solve(lam0, v0, direction)
-    if motion.kind != "libration":
-        return
+    assert motion.kind == "libration"
     with mp.workdps(40):
         start = motion.problem.launch.lam0.at(mp)
         energy = mpf(v0) ** 2 / 2 + potential(start)

@@ -39,7 +39,7 @@ from gqm_sym.derivation.algebra.rewrite import (
 from gqm_sym.derivation.algebra.signs import Signs
 from gqm_sym.derivation.geometry.turning_angle import tangent_angle, turned
 from gqm_sym.errors import DeclarationError
-from gqm_sym.sympy_charts import chart_alpha, chart_kappa
+from gqm_sym.sympy_charts import SPACE_ROWS, chart_alpha, chart_kappa
 
 Heading = tuple[sp.Expr, sp.Expr]
 AHEAD: Heading = (sp.S.One, sp.S.Zero)
@@ -133,7 +133,7 @@ def geometry(curve: Curve, *, may_be_positive: tuple[str, ...], heading: Heading
         Of a space curve: the vertical plane that it is in (`vertical_plane`); None for a shape in space.
     """
     if curve.charted:
-        return _charted(curve)
+        return _charted_in_space(curve) if curve.in_space else _charted(curve)
     if curve.in_space and heading is not None:
         # In the plane: the distance along it, which is a coordinate over the cosine or the sine, and the height.
         cosine, sine = heading
@@ -155,8 +155,10 @@ def geometry(curve: Curve, *, may_be_positive: tuple[str, ...], heading: Heading
 def vertical_plane(curve: Curve) -> Heading | None:
     """Cosine and sine of the angle from the x axis to the vertical plane that a curve is in.
 
-    None where it is in none, or too long to see.
+    None where it is in none, or that cannot be seen: it is too long, or known by numbers only.
     """
+    if curve.charted:
+        return None
     rates = [differentiate(form, curve.parameter) for form in (curve.x, curve.y)]
     if rates[1] == 0:
         return AHEAD
@@ -193,6 +195,30 @@ def _charted(curve: Curve) -> Geometry:
         angle=angle,
         cusp=None,
         positive=curve.positive,
+    )
+
+
+def _charted_in_space(curve: Curve) -> Geometry:
+    """Read the shape from the charts of three coordinates."""
+    first, second = ([rows[order](curve.parameter) for rows in SPACE_ROWS.values()] for order in (1, 2))
+    kappa = sp.sqrt(sp.Add(*(part**2 for part in second)))
+    return Geometry(
+        along=first[0],
+        sideways=first[1],
+        across=first[2],
+        size=sp.S.One,
+        per_length=sp.S.One,
+        ds=sp.S.One,
+        dxds=first[0],
+        dyds=first[1],
+        dzds=first[2],
+        kappa=kappa,
+        turning_rate=kappa,
+        turning=cross(first, second),
+        angle=None,
+        cusp=None,
+        positive=curve.positive,
+        heading=None,
     )
 
 

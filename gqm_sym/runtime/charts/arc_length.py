@@ -7,7 +7,7 @@ inverts it at the Chebyshev nodes, where the curve itself then gives the tangent
 from collections.abc import Callable
 from dataclasses import dataclass
 from math import fabs
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import types
@@ -22,7 +22,8 @@ from gqm_sym.runtime.compiled.jit import Inner, entry
 from gqm_sym.runtime.compiled.types import Array
 
 # A curve: a function of places (n,) and of offsets from each of them (n, m) that returns x, z, ds/dlam, dx/ds, dz/ds
-# and kappa as an array (6, n, m).
+# and kappa as an array (6, n, m); of a curve in space x, y, z, ds/dlam and the first and second derivatives of the
+# coordinates by arc length, as an array (10, n, m).
 Rows = Callable[[Array, Array], Array]
 Flags = NDArray[np.bool_]
 Indices = NDArray[np.integer[Any]]
@@ -100,7 +101,45 @@ def unwrapped(angles: Array, start: float) -> Array:
     return smooth
 
 
+class Division(NamedTuple):
+    """A curve divided into n pieces in arc length.
+
+    Attributes
+    ----------
+    places : (n, 2) array
+        Where each piece begins and ends in the curve's own parameter.
+    lengths : (n,) array
+        Arc lengths.
+    at_nodes : (k, n, TERMS) array
+        What the curve's function returns behind ds/dlam, at the nodes.
+    at_edges : (k, n) array
+        All that it returns at the left edges.
+    """
+
+    places: Array
+    lengths: Array
+    at_nodes: Array
+    at_edges: Array
+
+
 def rectify(rows: Rows, edges: Array, *, where: str) -> Pieces:
+    """Divide a planar curve into pieces in arc length, and halve them until each is resolved.
+
+    Their angles are unwrapped, beginning with the tangent's angle at the first edge. Arguments and errors are those of
+    `divided`.
+    """
+    places, lengths, (dxds, dzds, curvatures), anchors = divided(rows, edges, 2, where=where)
+    start = float(np.arctan2(anchors[4, 0], anchors[3, 0]))
+    return Pieces(
+        places=places,
+        lengths=lengths,
+        anchors=anchors[:2].T,
+        angles=unwrapped(np.arctan2(dzds, dxds), start),
+        curvatures=curvatures,
+    )
+
+
+def divided(rows: Rows, edges: Array, dimension: int, *, where: str) -> Division:
     """Divide a curve into pieces in arc length, and halve them until each is resolved.
 
     Parameters
@@ -109,13 +148,10 @@ def rectify(rows: Rows, edges: Array, *, where: str) -> Pieces:
         The curve.
     edges : (n+1,) array
         Places in the curve's own parameter, increasing; the curve is analytic between them.
+    dimension
+        The number of its coordinates.
     where
         Name of the curve in messages.
-
-    Returns
-    -------
-    Pieces
-        Their angles are unwrapped, beginning with the tangent's angle at the first edge.
 
     Raises
     ------
@@ -139,30 +175,27 @@ def rectify(rows: Rows, edges: Array, *, where: str) -> Pieces:
         middle = low + half
         values = rows(low, half[:, None] * (1.0 + NODES))
         _check(np.all(np.isfinite(values), axis=(0, 2)), middle, where, "is not finite")
-        rates = np.ascontiguousarray((half[:, None] * values[2]) @ FIT.T)
+        speeds = values[dimension]
+        rates = np.ascontiguousarray((half[:, None] * speeds) @ FIT.T)
         gains = np.ascontiguousarray(chebint(rates, lbnd=-1, axis=1))
         lengths = gains.sum(axis=1)
         # The mean rate is subtracted: the remainder is small, so that its rounding does not limit Newton's method.
         gains[:, :2] -= 0.5 * lengths[:, None]
-        speeds = values[2]
-        values = rows(low, half[:, None] * (1.0 + _invert(lengths, rates, gains)))
-        turns = values[5] * lengths[:, None]
-        tail = np.max([_tail(speeds), _tail(values[3], 1.0), _tail(values[4], 1.0), _tail(turns, 1.0)], axis=0)
+        values = rows(low, half[:, None] * (1.0 + _invert(lengths, rates, gains)))[dimension + 1 :]
+        turns = values[dimension:] * lengths[:, None]
+        tail = np.max([_tail(speeds), *(_tail(row, 1.0) for row in (*values[:dimension], *turns))], axis=0)
         good = (tail <= MAX_TAIL_RATIO) | ((tail <= MAX_NOISE_RATIO) & (tail > before / MIN_FALL))
         _check(good | (half > shortest), middle, where, "has a cusp or a pole, or is not smooth")
-        angles = np.arctan2(values[4], values[3])
-        found.append((low[good], lengths[good], angles[good], values[5][good]))
+        found.append((low[good], lengths[good], values[:, good]))
         low, high, before = _halves(low[~good], middle[~good], high[~good], tail[~good])
-    places, lengths, angles, curvatures = (np.concatenate(columns) for columns in zip(*found, strict=True))
-    order = np.argsort(places)
-    anchors = rows(places[order], np.zeros((places.size, 1)))[:, :, 0]
-    start = float(np.arctan2(anchors[4, 0], anchors[3, 0]))
-    return Pieces(
-        places=np.stack([places[order], np.append(places[order][1:], edges[-1])], axis=1),
+    starts, lengths = (np.concatenate([one[k] for one in found]) for k in range(2))
+    order = np.argsort(starts)
+    starts = starts[order]
+    return Division(
+        places=np.stack([starts, np.append(starts[1:], edges[-1])], axis=1),
         lengths=lengths[order],
-        anchors=anchors[:2].T,
-        angles=unwrapped(angles[order], start),
-        curvatures=curvatures[order],
+        at_nodes=np.concatenate([one[2] for one in found], axis=1)[:, order],
+        at_edges=rows(starts, np.zeros((starts.size, 1)))[:, :, 0],
     )
 
 

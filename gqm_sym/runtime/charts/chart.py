@@ -124,6 +124,10 @@ class Chart:
         rows: Array = _read(self.block, np.ascontiguousarray(s, dtype=np.float64).reshape(-1))
         return rows
 
+    def coordinates(self, s: Any) -> Array:
+        """Return x and z at arc lengths, as rows."""
+        return self.points(s)[:2]
+
     @property
     def bends(self) -> Array:
         """Return the sign of the tangent's turn at each corner: 1 where the curve bends to the left."""
@@ -162,6 +166,25 @@ class Chart:
                 place = float(corner)
         row = self.points([place])[:, 0]
         return float(place), float(np.hypot(row[0] - x, row[1] - z))
+
+
+IN_BLOCK = (2, 0, 1)
+"""The coordinates in the order in which their charts stand in the block of a `SpaceChart`."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class SpaceChart(Chart):
+    """A curve in space in arc length.
+
+    Its block is that of the chart of z, followed by those of x and y. In the chart of a coordinate this is the height;
+    in the places of angle and curvature are its first two derivatives by arc length.
+    """
+
+    def coordinates(self, s: Any) -> Array:
+        """Return x, y and z at arc lengths, as rows."""
+        places = np.ascontiguousarray(s, dtype=np.float64).reshape(-1)
+        blocks = self.block.reshape(len(IN_BLOCK), -1)
+        return np.stack([_read(blocks[IN_BLOCK.index(axis)], places)[1] for axis in range(3)])
 
 
 class PieceData(NamedTuple):
@@ -213,34 +236,11 @@ def assemble(
     anchors, angles, curvatures, tangents, anchor_lows = data
     edges, anchors = np.asarray(edges, dtype=np.float64), np.asarray(anchors, dtype=np.float64)
     angles, half = np.asarray(angles, dtype=np.float64), 0.5 * np.diff(edges)
-    count = half.size
-    curvature = _fitted(np.asarray(curvatures, dtype=np.float64))
-    powers, records = np.empty((count, ROWS, TERMS)), np.empty((count, RECORD))
-    records[:, 0], records[:, 1] = edges[:-1] + half, 1.0 / half
     known = np.stack(tangents_of(angles), axis=1) if tangents is None else np.asarray(tangents)
-    anchor_lows = np.broadcast_to(anchor_lows, anchors.shape)
-    # Second derivatives are as accurate as first ones: the tangent is integrated from them, only its mean is fitted.
     second = half[:, None, None] * np.asarray(curvatures)[:, None] * np.stack([-known[:, 1], known[:, 0]], axis=1)
-    turning = chebint(_fitted(second), axis=2)[:, :, :TERMS]
-    turning[:, :, 0] += np.mean(known - turning @ AT_NODES, axis=2)
-    for row in range(2):
-        gained = chebint(turning[:, row], lbnd=-1, axis=1)[:, :TERMS]
-        powers[:, row] = half[:, None] * (gained @ _POWERS)
-        # The constant term is stored as two doubles, because differences of coordinates are differences of these.
-        records[:, 2 + 2 * row], records[:, 3 + 2 * row] = two_sum.py_func(anchors[:, row], powers[:, row, 0])
-        records[:, 3 + 2 * row] += anchor_lows[:, row]
-        powers[:, row, 0] = 0.0
-    powers[:, 2], powers[:, 3] = _fitted(angles) @ _POWERS, curvature @ _POWERS
-    records[:, 6:] = powers.reshape(count, -1)
-    # A bound of how much alpha turns from the start, from bounds of the curvature and jumps between pieces.
-    bounds = np.abs(curvature).sum(axis=1)
-    left, right = (powers[:, 2] @ (side ** np.arange(TERMS)) for side in (-1.0, 1.0))
-    jumps = np.append(np.abs(left[1:] - right[:-1]), abs(left[0] + turn - right[-1]) if period else 0.0)
-    turned = np.append(0.0, np.cumsum(2.0 * half * bounds + jumps))
-    block = np.concatenate([[0.0, count, edges[0], edges[-1], period, turn], edges, turned, bounds, records.ravel()])
-    block[0] = block.size
+    constants, powers, _ = _integrated(half, (anchors, anchor_lows), known, second)
     return Chart(
-        block=block,
+        block=_block(edges, constants, powers, _fitted(angles), np.asarray(curvatures), (period, turn)),
         low=float(edges[0]),
         high=float(edges[-1]),
         period=float(period),
@@ -249,6 +249,86 @@ def assemble(
         corners=np.asarray(corners, dtype=np.float64),
         origins=np.asarray(origins, dtype=np.float64).reshape(-1, 3),
     )
+
+
+def assemble_in_space(
+    edges: Array, anchors: Array, slopes: Array, bends: Array, *, period: float = 0.0, breaks: Any = ()
+) -> "SpaceChart":
+    """Assemble the chart of a track in space: of each coordinate the chart in which it is the height.
+
+    Parameters
+    ----------
+    edges : (n+1,) array
+        Arc length at the edges of the pieces, increasing.
+    anchors : (n, 3) array
+        x, y and z at the left edge of each piece.
+    slopes, bends : (n, 3, TERMS) arrays
+        Their first two derivatives by arc length at the nodes.
+    period, breaks
+        As `Chart` has them.
+    """
+    half = 0.5 * np.diff(edges)
+    constants, powers, turning = _integrated(half, (anchors, 0.0), slopes, half[:, None, None] * bends)
+    blocks = []
+    for axis in IN_BLOCK:
+        own, terms = np.zeros((half.size, 4)), np.zeros((half.size, 2, TERMS))
+        own[:, 2:], terms[:, 1] = constants[:, 2 * axis : 2 * axis + 2], powers[:, axis]
+        blocks.append(_block(edges, own, terms, turning[:, axis], bends[:, axis], (period, 0.0)))
+    return SpaceChart(
+        block=np.concatenate(blocks),
+        low=float(edges[0]),
+        high=float(edges[-1]),
+        period=float(period),
+        breaks=np.asarray(breaks, dtype=np.float64),
+    )
+
+
+def _integrated(half: Array, anchors: tuple[Any, Any], known: Array, second: Array) -> tuple[Array, Array, Array]:
+    """Return constants and powers of u of coordinates, and Chebyshev coefficients of their slopes.
+
+    Parameters
+    ----------
+    half : (n,) array
+        Half the lengths of the pieces.
+    anchors : pair of (n, d) arrays
+        The coordinates at the left edges, as two doubles.
+    known, second : (n, d, TERMS) arrays
+        Their derivatives by arc length at the nodes, and the derivatives of these by u.
+    """
+    left, lows = anchors[0], np.broadcast_to(anchors[1], np.shape(anchors[0]))
+    count, rows = left.shape
+    constants, powers = np.empty((count, 2 * rows)), np.empty((count, rows, TERMS))
+    # Second derivatives are as accurate as first ones: the tangent is integrated from them, only its mean is fitted.
+    turning = np.asarray(chebint(_fitted(second), axis=2), dtype=np.float64)[:, :, :TERMS]
+    turning[:, :, 0] += np.mean(known - turning @ AT_NODES, axis=2)
+    for row in range(rows):
+        gained = chebint(turning[:, row], lbnd=-1, axis=1)[:, :TERMS]
+        powers[:, row] = half[:, None] * (gained @ _POWERS)
+        # The constant term is stored as two doubles, because differences of coordinates are differences of these.
+        constants[:, 2 * row], constants[:, 2 * row + 1] = two_sum.py_func(left[:, row], powers[:, row, 0])
+        constants[:, 2 * row + 1] += lows[:, row]
+        powers[:, row, 0] = 0.0
+    return constants, powers, turning
+
+
+def _block(
+    edges: Array, constants: Array, coordinates: Array, angle: Array, curvatures: Array, lap: tuple[float, float]
+) -> Array:
+    """Return the numbers that compiled code reads, from constants and powers of the coordinates and coefficients."""
+    half, (period, turn) = 0.5 * np.diff(edges), lap
+    count, curvature = half.size, _fitted(np.asarray(curvatures, dtype=np.float64))
+    powers, records = np.empty((count, ROWS, TERMS)), np.empty((count, RECORD))
+    records[:, 0], records[:, 1], records[:, 2:6] = edges[:-1] + half, 1.0 / half, constants
+    powers[:, :2], powers[:, 2], powers[:, 3] = coordinates, angle @ _POWERS, curvature @ _POWERS
+    records[:, 6:] = powers.reshape(count, -1)
+    # A bound of how much alpha turns from the start, from bounds of the curvature and jumps between pieces.
+    bounds = np.abs(curvature).sum(axis=1)
+    left, right = (powers[:, 2] @ (side ** np.arange(TERMS)) for side in (-1.0, 1.0))
+    jumps = np.append(np.abs(left[1:] - right[:-1]), abs(left[0] + turn - right[-1]) if period else 0.0)
+    turned = np.append(0.0, np.cumsum(2.0 * half * bounds + jumps))
+    block = np.concatenate([[0.0, count, edges[0], edges[-1], period, turn], edges, turned, bounds, records.ravel()])
+    block[0] = block.size
+    return block
 
 
 def tangents_of(angles: Array) -> tuple[Array, Array]:

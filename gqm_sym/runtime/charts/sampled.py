@@ -6,7 +6,7 @@ points: the lengths of the chords at first, then those of the spline found befor
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, reduce
 from math import sqrt
 from typing import Any
 
@@ -17,8 +17,8 @@ from gqm_sym.budgets import spend
 from gqm_sym.errors import SolutionError
 from gqm_sym.literals.numbers import Number, read_number
 from gqm_sym.runtime.arithmetic.doubledouble import two_sum
-from gqm_sym.runtime.charts.arc_length import Indices, Pieces, rectify, summed, unwrapped
-from gqm_sym.runtime.charts.chart import NODES, Chart, PieceData, assemble
+from gqm_sym.runtime.charts.arc_length import Indices, Pieces, divided, rectify, summed, unwrapped
+from gqm_sym.runtime.charts.chart import NODES, Chart, PieceData, assemble, assemble_in_space
 from gqm_sym.runtime.charts.exact_parts import Part, Parts, polynomial
 from gqm_sym.runtime.charts.true_pieces import NODES as NODES_OF_PIECES
 from gqm_sym.runtime.charts.true_pieces import SAMPLES, TruePieces, sample_places
@@ -48,16 +48,19 @@ class Sampled:
     Attributes
     ----------
     points : str
-        x and z of the points one after the other, separated by blanks.
+        x and z of the points one after the other, separated by blanks; of a track in space x, y and z.
     kind : {"spline", "linear"}
         What lies between the points.
     closed : bool
         Whether the track continues from the last point to the first. The first point is not repeated.
+    in_space : bool
+        Whether the points have three coordinates. Such a track is known in doubles only.
     """
 
     points: str
     kind: str = "spline"
     closed: bool = False
+    in_space: bool = False
 
     @property
     def shaped_by(self) -> tuple[int, ...]:
@@ -69,8 +72,8 @@ class Sampled:
         return _made(self)[0]
 
     def is_exact(self, chart: Chart) -> bool:
-        """Return True: a track of polynomials is known exactly."""
-        return True
+        """Return whether the track lies in the plane of x and z: one of polynomials is known exactly."""
+        return not self.in_space
 
     def true_curve(self, context: Any, p: tuple[Any, ...], chart: Chart) -> Parts:
         """Return the track in extended precision, by its points as written or by the coefficients of its spline."""
@@ -165,7 +168,7 @@ def _exact_polynomial(context: Any, t: Array, c: Array, k: int) -> Part:
 @lru_cache(maxsize=4)
 def _made(track: Sampled) -> tuple[Chart, Any]:
     """The chart of a track, and its spline; None for stitched planes."""
-    points = np.array(track.points.split(), dtype=np.float64).reshape(-1, 2)
+    points = np.array(track.points.split(), dtype=np.float64).reshape(-1, 3 if track.in_space else 2)
     if track.closed:
         points = np.concatenate([points, points[:1]])
     return (_planes(points, track.closed), None) if track.kind == "linear" else _splined(points, track.closed)
@@ -195,7 +198,7 @@ def _planes(points: Array, closed: bool) -> Chart:
 
 def _splined(points: Array, closed: bool) -> tuple[Chart, Any]:
     """Return the chart of the interpolating spline; each of its polynomials becomes one or more pieces of the chart."""
-    knots = summed(np.hypot(*np.diff(points, axis=0).T))
+    knots = summed(reduce(np.hypot, np.diff(points, axis=0).T))
     for _ in range(MAX_ITERATIONS):
         spend()
         terms = _polynomials(points, knots, closed)
@@ -206,6 +209,8 @@ def _splined(points: Array, closed: bool) -> tuple[Chart, Any]:
             break
     points, knots = _thinned(points, knots, closed)
     terms = _polynomials(points, knots, closed)
+    if points.shape[1] == 3:
+        return _in_space(knots, terms, closed), None
     pieces = rectify(lambda left, offsets: _evaluate(knots, terms, left, offsets), knots, where="sampled")
     edges, turn = summed(pieces.lengths), 0.0
     if closed:
@@ -215,6 +220,34 @@ def _splined(points: Array, closed: bool) -> tuple[Chart, Any]:
     spline = _interpolated(points, knots, closed)
     parts = np.searchsorted(spline.t, pieces.places.mean(axis=1), side="right") - 1
     return _assembled(pieces, parts, edges, turn, closed, breaks, ()), spline
+
+
+def _in_space(knots: Array, terms: Array, closed: bool) -> Chart:
+    """Return the chart of a spline in space."""
+
+    def rows(left: Array, offsets: Array) -> Array:
+        k = np.clip(np.searchsorted(knots, left, side="right") - 1, 0, knots.size - 2)
+        part, place = terms[k], (left - knots[k])[:, None] + offsets
+        value, first, second = (np.zeros((3, *offsets.shape)) for _ in range(3))
+        for power in range(DEGREE, -1, -1):
+            second = second * place + 2.0 * first
+            first = first * place + value
+            value = value * place + part[:, :, power].T[:, :, None]
+        speed = np.sqrt((first * first).sum(axis=0))
+        tangent = first / speed
+        bend = (second - tangent * (tangent * second).sum(axis=0)) / (speed * speed)
+        return np.concatenate([value, speed[None], tangent, bend])
+
+    found = divided(rows, knots, 3, where="sampled")
+    edges, values = summed(found.lengths), np.moveaxis(found.at_nodes, 0, 1)
+    return assemble_in_space(
+        edges,
+        found.at_edges[:3].T,
+        values[:, :3],
+        values[:, 3:],
+        period=edges[-1] if closed else 0.0,
+        breaks=edges[:-1] if closed else edges[1:-1],
+    )
 
 
 def _thinned(points: Array, knots: Array, closed: bool) -> tuple[Array, Array]:
@@ -260,9 +293,9 @@ def _interpolated(points: Array, knots: Array, closed: bool) -> Any:
 
 
 def _polynomials(points: Array, knots: Array, closed: bool) -> Array:
-    """Coefficients of both coordinates between the points, in powers of the distance from the one before."""
+    """Coefficients of all coordinates between the points, in powers of the distance from the one before."""
     spline = _interpolated(points, knots, closed)
-    terms = np.empty((knots.size - 1, 2, DEGREE + 1))
+    terms = np.empty((knots.size - 1, points.shape[1], DEGREE + 1))
     share = 1.0
     for power in range(DEGREE + 1):
         terms[:, :, power] = share * spline(knots[:-1], power)
@@ -287,8 +320,11 @@ def _measure(knots, terms):  # type: ignore[no-untyped-def]
         width = knots[k + 1] - knots[k]
         speeds = np.empty(9)
         for i in range(9):
-            dx, dz = velocity(terms[k, 0], i * width / 8.0), velocity(terms[k, 1], i * width / 8.0)
-            speeds[i] = sqrt(dx * dx + dz * dz)
+            square = 0.0
+            for row in range(terms.shape[1]):
+                rate = velocity(terms[k, row], i * width / 8.0)
+                square += rate * rate
+            speeds[i] = sqrt(square)
         coarse = speeds[0] + 4.0 * (speeds[2] + speeds[6]) + 2.0 * speeds[4] + speeds[8]
         odd = speeds[1] + speeds[3] + speeds[5] + speeds[7]
         fine = speeds[0] + 4.0 * odd + 2.0 * (speeds[2] + speeds[4] + speeds[6]) + speeds[8]

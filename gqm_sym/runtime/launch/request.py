@@ -148,6 +148,10 @@ def _read_place(
         raise LaunchError(
             f"point: {formulas.name} has a parameter of its own; launch by lam0 (a value of {formulas.parameter})"
         )
+    if formulas.path_in_space is not None:
+        raise LaunchError(
+            f"point: is for planar curves; launch on this track in space by lam0 (a value of {formulas.parameter})"
+        )
     if lam0 is not None:
         raise LaunchError("lam0, point: give one of them; both say where to launch from")
     try:

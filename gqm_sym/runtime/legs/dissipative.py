@@ -1,6 +1,7 @@
 """Motions with friction, drag or resistance: leg after leg, each computed when it is needed."""
 
-from collections.abc import Callable, Iterable
+from bisect import bisect_right
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
 from itertools import pairwise
 from math import inf, isfinite, isnan, nan
@@ -197,6 +198,8 @@ class DissipativeMotion(Motion):
     _whole: Trajectory | None = None
     _known_changes: Changes | None = None
     _reading = Reading(np.empty(0), -1.0)
+    # What is read of the first piece that one time was asked of, and when that begins.
+    _first_reading, _first_since = Reading(np.empty(0), -1.0), 0.0
     # How many panels there are, with one more for each run.
     _stored = 0
     # How many runs `_look_ahead` computes of a motion that it finds no end of; 0 while that is not known.
@@ -277,6 +280,8 @@ class DissipativeMotion(Motion):
             return np.array(Motion.state(self, later)[1 : 1 + STATE_ROWS])
 
         out = self._read(*times, STATE_ROWS, self._read_states, by_segments)
+        if not np.ndim(t) and self.problem.formulas.path_in_space is None:
+            return State(float(times[0][0]), *out[:, 0].tolist())
         return self._state_of(times[0] if np.ndim(t) else float(times[0][0]), out)
 
     def error_bound(self, t: Any) -> Any:
@@ -293,7 +298,7 @@ class DissipativeMotion(Motion):
         by_segments: Callable[[Array], Array],
     ) -> Array:
         """Rows of numbers at times, from the record that compiled code reads as far as it goes."""
-        record, until = self._reading_up_to(greatest)
+        record, until = self._reading_at(greatest) if times.size == 1 else self._reading_up_to(greatest)
         times = times.reshape(-1)
         out = np.empty((rows, times.size))
         if greatest <= until:
@@ -325,6 +330,34 @@ class DissipativeMotion(Motion):
         reading = self._reading
         return reading if t <= reading.until else self._extended(t)
 
+    def _reading_at(self, t: float) -> Reading:
+        """What compiled code reads of the motion at one time.
+
+        Of a motion of which only times on one piece are asked, one after the other, only that piece is tabulated.
+        """
+        reading, first = self._reading, self._first_reading
+        if t <= reading.until:
+            return reading
+        return first if self._first_since <= t < first.until else self._read_first(t)
+
+    @locked
+    def _read_first(self, t: float) -> Reading:
+        """`_reading_at`, once the motion is followed so far."""
+        self._check_end(t)
+        pieces = self._pieces
+        k = bisect_right(pieces, t, key=lambda timed: timed.t_stop[0])
+        if self._first_reading.until >= 0.0 or k == len(pieces) or pieces[k].segment.v2 is not None:
+            return self._extended(t)
+        self._first_since = pieces[k].t_start[0]
+        self._first_reading = Reading(self._record_of([self._tabulated_piece(pieces[k])]), pieces[k].t_stop[0])
+        return self._first_reading
+
+    def _tabulated_piece(self, timed: TimedSegment) -> TabulatedPiece:
+        return tabulated(timed, self.problem.period, self._errors_before)
+
+    def _record_of(self, pieces: Sequence[TabulatedPiece]) -> Array:
+        return leg_record(self.problem, self.direction * self.problem.launch.v0.value, pieces)
+
     @locked
     def _extended(self, t: float) -> Reading:
         """`_reading_up_to`, once the motion is followed so far."""
@@ -335,10 +368,8 @@ class DissipativeMotion(Motion):
         done = len(self._tabulated)
         ahead = [timed for timed in self._pieces[done:] if timed.segment.v2 is None]
         if ahead:
-            lap, errors = self.problem.period, self._errors_before
-            self._tabulated += [tabulated(timed, lap, errors) for timed in ahead]
-            record = leg_record(self.problem, self.direction * self.problem.launch.v0.value, self._tabulated)
-            self._reading = Reading(record, min(self._known_end(), ahead[-1].t_stop[0]))
+            self._tabulated += map(self._tabulated_piece, ahead)
+            self._reading = Reading(self._record_of(self._tabulated), min(self._known_end(), ahead[-1].t_stop[0]))
         return self._reading
 
     def _follow_amply(self) -> None:

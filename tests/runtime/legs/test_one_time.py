@@ -1,0 +1,28 @@
+"""One time asked of a motion with losses: the same state as one of many times, for the price of one piece."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import generated.circle_drag
+from gqm_sym.runtime.legs import dissipative
+
+
+@pytest.mark.parametrize("t", [0.0, 0.3, 1.7, 4.9])
+def test_the_state_at_one_time_tabulates_one_piece(t: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    """To the last bit it is that of a motion which was asked for many times; another piece is tabulated with all."""
+    known = generated.circle_drag.solve(1.0, 0)
+    known.lam(np.linspace(0.0, 5.0, 50))
+    made: list[Any] = []
+    real = dissipative.tabulated
+    monkeypatch.setattr(dissipative, "tabulated", lambda *given: made.append(given) or real(*given))
+    motion = generated.circle_drag.solve(1.0, 0)
+    assert motion.state(t) == known.state(t)
+    assert motion.lam(t) == known.lam(t)
+    assert len(made) == 1
+    assert motion.state(9.0) == known.state(9.0)
+    assert motion.state(t) == known.state(t)
+    count = len(made)
+    motion.lam(np.linspace(0.0, 5.0, 50))
+    assert len(made) == count
