@@ -44,9 +44,9 @@ MIN_TIMED_WIDTH_SHARE = 2.0**-10
 MAX_END_ROUNDINGS = 2.0
 
 # The error of the slope of the potential along a chart that no formulas improve, in roundings of the largest slope, and
-# in those times ds, which is small along the path of a centre (0.95 was measured); and the number of places of a closed
+# in those times ds, which is small along the path of a centre (2.5 was measured); and the number of places of a closed
 # one at which that is looked for.
-CHART_ROUNDINGS, CENTRE_ROUNDINGS, AROUND = 8.0, 2.0, 16
+CHART_ROUNDINGS, CENTRE_ROUNDINGS, AROUND = 8.0, 4.0, 16
 
 # The error of a place by the rounding of a chart, in roundings of the width of a motion, and of its coordinates.
 MAX_WIDTH_ROUNDINGS, MAX_SIZE_ROUNDINGS = 128.0, 4.0
