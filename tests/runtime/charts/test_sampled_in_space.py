@@ -52,7 +52,12 @@ def test_points_converge_to_their_curve(smooth: object) -> None:
         for name in names:  # what is left is the distance of the spline, and of its curvature, from the curve
             found, wanted = (getattr(state, name) for state in states)
             assert found == pytest.approx(wanted, abs=allowed), name
-    lap = module(knot(400), closed=True).solve(0.0, 12.0)
+    track = module(knot(400), closed=True)
+    for quantity in ("half_period", "normal_force_max"):  # sweeps are the numbers of single motions
+        swept = track.sweep(quantity, lam0=[-0.5, 0.25]).values
+        single = [getattr(track.solve(place), quantity) for place in (-0.5, 0.25)]
+        assert swept == pytest.approx([getattr(value, "value", value) for value in single], rel=4 * ULP)
+    lap = track.solve(0.0, 12.0)
     assert lap.kind == "circulation"
     assert lap.period == pytest.approx(smooth.solve(START, 12.0).period, rel=1e-13)
 
