@@ -69,8 +69,8 @@ def dissipative() -> list[tuple[str, float]]:
     """Parts of the first leg of the paper's Example 2."""
     model = friction.MODEL
     p = model.numbers(tuple(friction.PARAMETERS.values()))
-    loss = model.dissipation
-    assert loss is not None
+    assert model.dissipation is not None
+    loss = model.dissipation.addresses()
     launch = launched([(-1.0, -inf, inf, 0.0, 1, 0, inf, nan, 6.2088**2)])
     joints, records = Joints(NOWHERE, NOWHERE, NOWHERE, NOWHERE), np.empty((1, 16 * COLUMNS))
 
