@@ -44,11 +44,11 @@ def conservative() -> list[tuple[str, float]]:
 
     return [
         ("`solve` of a pendulum, released from rest", least(lambda: pendulum.solve(-0.37))),
-        ("- parameters read, from the cache", least(lambda: model.numbers(given))),
-        ("- launch checked", least(lambda: read_launch(model, p, LaunchRequest(-0.37)))),
-        ("- functions and the exact problem", least(lambda: bind(model, p, launch))),
+        ("- reading the parameters, from the cache", least(lambda: model.numbers(given))),
+        ("- checking the launch", least(lambda: read_launch(model, p, LaunchRequest(-0.37)))),
+        ("- binding the functions and the exact problem", least(lambda: bind(model, p, launch))),
         (
-            "- the crossing: turning points, kind, half period",
+            "- compiled code: turning points, kind, half period",
             least(lambda: survey(f.addresses, f.p, -0.37, 0.0, 1, domain, True)),
         ),
         ("`lam` at one time", least(lambda: motion.lam(1000.0))),
@@ -56,12 +56,12 @@ def conservative() -> list[tuple[str, float]]:
         ("`solve` and the first `lam`", least(lambda: first("lam"))),
         ("`solve` and the first `state`", least(lambda: first("state"))),
         (
-            "- panels of time",
+            "- panels of the time integral",
             least(
                 lambda: time_panels.lay_panels(f.addresses, f.p, 0, segment.a, segment.b, 0.0, 0.0, panels[0][[0, -1]])
             ),
         ),
-        ("- table of the phase angle", least(lambda: table.build_table(panels[0], *clock, panels[3]))),
+        ("- table that inverts time", least(lambda: table.build_table(panels[0], *clock, panels[3]))),
     ]
 
 
@@ -80,9 +80,9 @@ def dissipative() -> list[tuple[str, float]]:
     run = Run(records[0], leg(), "turn", None)
     back, time = run.panels_back, float(run.record[TIME_FROM_END])
     return [
-        ("`solve` of Example 2: its leg to the turn", least(lambda: friction.solve(-1.0, 6.2088))),
-        ("- the crossing: the leg, its events, its time", least(leg)),
-        ("the leg's panels read, when a position is asked for", least(lambda: read_panels(back, time))),
+        ("`solve` of Example 2, to its turning point", least(lambda: friction.solve(-1.0, 6.2088))),
+        ("- compiled code: the leg, its events and its time", least(leg)),
+        ("reading the panels of the leg, for the first position", least(lambda: read_panels(back, time))),
         ("`solve` and the first `lam`", least(lambda: friction.solve(-1.0, 6.2088).lam(0.1), 5)),
     ]
 
@@ -140,14 +140,17 @@ def sweeping() -> list[tuple[str, float]]:
     found[rows.END_HIGH] = found[rows.LAUNCH_PLACE] + found[rows.OFFSET_HIGH]
     return [
         (
-            "an orbit of a sweep: its turning points, in closed form",
+            "turning points of an orbit in a sweep: in closed form",
             least(lambda: search(s, start, p, known, True, work)) / n,
         ),
-        ("- guessed by Newton's method", least(lambda: search(s, start, p, known, False, work)) / n),
-        ("- proved by intervals, where symbols do not tell", least(lambda: proof(s, found, p, work)) / n),
-        ("- its half period by a mean", least(lambda: mean(orbits, found, scratch, answers)) / n),
+        ("- by Newton's method, without proof", least(lambda: search(s, start, p, known, False, work)) / n),
+        ("- proof by intervals, where symbols do not suffice", least(lambda: proof(s, found, p, work)) / n),
         (
-            "- by the trapezoidal rule, error controlled",
+            "half period of an orbit in a sweep: by an arithmetic-geometric mean",
+            least(lambda: mean(orbits, found, scratch, answers)) / n,
+        ),
+        (
+            "- by the trapezoidal rule, with error control",
             least(lambda: trapezoidal(orbits, found, given, scratch, answers)) / n,
         ),
     ]
@@ -156,7 +159,7 @@ def sweeping() -> list[tuple[str, float]]:
 def profile() -> list[str]:
     """Give the table, line by line."""
     rows = conservative() + dissipative() + sweeping()
-    return ["| what | least time |", "|---|---|", *(f"| {what} | {readable(time)} |" for what, time in rows)]
+    return ["| step | shortest time |", "|---|---|", *(f"| {what} | {readable(time)} |" for what, time in rows)]
 
 
 if __name__ == "__main__":

@@ -41,7 +41,7 @@ def page(results: list[Result], start: tuple[float, float]) -> str:
     for result in results:
         row = result.row
         ratio = result.seconds / ours.setdefault(row.work, result.seconds)
-        wrong = f"{result.error:.2g} {row.unit}" + (f" **exceeds {row.line:g}**" if result.missed else "")
+        wrong = f"{result.error:.2g} {row.unit}".rstrip() + (f" **exceeds {row.line:g}**" if result.missed else "")
         lines.append(f"| {row.work} | {row.who} | {readable(result.seconds)} | {wrong} | {ratio:.3g} |")
     lines += [
         "",

@@ -16,7 +16,7 @@ from swing import G, half_period
 import generated.circle as circle
 import generated.ellipse as ellipse
 import generated.pendulum as pendulum
-from gqm_sym.runtime.compiled.jit import Inner, entry
+from gqm_sym.runtime.compiled.jit import Inner
 from gqm_sym.runtime.compiled.types import ADDRESSES, VECTOR
 from gqm_sym.runtime.launch import survey
 from gqm_sym.runtime.launch.domain import DOMAIN
@@ -29,7 +29,7 @@ ORBITS = 100_000
 survey_inside = Inner(survey.survey.__wrapped__)
 
 
-@entry(VECTOR(ADDRESSES, VECTOR, VECTOR, DOMAIN))
+@njit(VECTOR(ADDRESSES, VECTOR, VECTOR, DOMAIN), error_model="numpy")
 def in_a_loop(fns, p, lam0, domain):  # type: ignore[no-untyped-def]
     """Half periods of launches from rest, one after the other."""
     out = np.empty(lam0.size)
@@ -86,7 +86,7 @@ def half_periods() -> list[Row]:
             unit="ulp",
         ),
         Row(
-            "the same, its turning points alone",
+            "turning points of an orbit",
             ours,
             on_one_core(lambda: pendulum.sweep("turning_points", lam0).values),
             lambda values: ulps(values[:300, 0], [-mp.pi - mpf(float(v)) for v in lam0[:300]]),
@@ -95,7 +95,7 @@ def half_periods() -> list[Row]:
             unit="ulp",
         ),
         Row(
-            "the greatest contact force on an orbit",
+            "largest contact force on an orbit",
             ours,
             on_one_core(lambda: pendulum.sweep("normal_force_max", lam0).values),
             lambda values: ulps(values, [mpf(G) * (3 - 2 * mp.cos(mpf(float(v)) + mp.pi / 2)) for v in lam0[:300]]),
@@ -104,7 +104,7 @@ def half_periods() -> list[Row]:
             unit="ulp",
         ),
         Row(
-            "when a body is first at the bottom",
+            "first time at the lowest point",
             ours,
             on_one_core(lambda: pendulum.sweep("time_at", lam0, lam=-pi / 2).values),
             lambda values: ulps(values, [half / 2 for half in exact]),
@@ -123,7 +123,7 @@ def half_periods() -> list[Row]:
         ),
         Row(
             work,
-            "one launch after the other in a compiled loop, turning points found",
+            "a compiled loop over single launches, turning points found",
             lambda: in_a_loop(f.addresses, f.p, few - pi / 2, domain),
             lambda values: ulps(values, alone),
             each=100,
@@ -158,7 +158,7 @@ def half_periods() -> list[Row]:
         ),
         Row(
             work,
-            "QUADPACK on the raw integrand, in Python, turning points given",
+            "QUADPACK on the singular integrand, in Python, turning points given",
             lambda: [raw(a) for a in few],
             lambda values: ulps(values, truths),
             each=100,
