@@ -12,6 +12,7 @@ import sympy as sp
 from gqm_sym.arguments import names, short
 from gqm_sym.errors import DeclarationError, NumberError
 from gqm_sym.expressions import check_name, name_or_value, read_expression
+from gqm_sym.literals.rationals import is_numpy_span
 from gqm_sym.literals.units import Unit, is_quantity, read_unit, scale_of, split_unit, unit_of_quantity
 
 Value: TypeAlias = float | int | str
@@ -49,7 +50,7 @@ def read_value(given: Given | Any, *, where: str) -> Value:
             return Measured(in_si(read_value(measured[0], where=where), measured[2]), measured[2])
         _check_number(read_expression(given, where=where), given, where)
         return given.strip()
-    if type(given).__name__ == "timedelta64":  # NumPy counts it among the integers
+    if is_numpy_span(given):
         raise NumberError(f"{where}: must be a number, got timedelta64")
     if isinstance(given, Integral):
         return int(given)

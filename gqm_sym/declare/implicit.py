@@ -9,6 +9,7 @@ import sympy as sp
 from gqm_sym.arguments import several, short
 from gqm_sym.errors import DeclarationError
 from gqm_sym.expressions import Source, read_expression
+from gqm_sym.literals.rationals import is_numpy_span
 from gqm_sym.parameters import COORDINATES, names_in_order
 
 X, Z = (sp.Symbol(name, real=True) for name in COORDINATES)
@@ -76,11 +77,8 @@ def read_level(F: Source, *, start: Iterable[Source], tangent: int, parameter: s
                 f"implicit: start: {coordinate} contains a coordinate; "
                 "only numbers and run-time parameters may stand there"
             )
-    if (
-        type(tangent).__name__ in ("bool", "timedelta64")  # NumPy counts the latter among the integers
-        or not isinstance(tangent, Real | sp.Integer)
-        or tangent not in (1, -1)
-    ):
+    is_number = isinstance(tangent, Real | sp.Integer) and not (isinstance(tangent, bool) or is_numpy_span(tangent))
+    if not is_number or tangent not in (1, -1):
         raise DeclarationError(
             f"implicit: tangent: must be 1, for (-F_z, F_x)/|grad F|, or -1, for the opposite; got {short(tangent)}"
         )

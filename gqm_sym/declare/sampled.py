@@ -146,7 +146,7 @@ def read_track(
         texts.append(text)
         places.append(place)
     size = _size(places)
-    repeated = len(places) > 1 and _distance(places[0], places[-1]) <= CLOSES * size
+    repeated = len(places) > 1 and dist(places[0], places[-1]) <= CLOSES * size
     joined = repeated if closed is None else closed
     if joined and repeated:
         del texts[-1], places[-1]
@@ -305,10 +305,6 @@ def _size(places: list[Place]) -> float:
     return float(max(max(axis) - min(axis) for axis in zip(*places, strict=True)))
 
 
-def _distance(one: Place, two: Place) -> float:
-    return dist(one, two)
-
-
 def _check_survey(places: list[Place], rows: list[int], joined: bool, scatter: float) -> None:
     """Refuse measured points that are far away from the rest, or out of order beyond what scatter explains."""
     chords = _chords(places, joined)
@@ -317,7 +313,7 @@ def _check_survey(places: list[Place], rows: list[int], joined: bool, scatter: f
         _check_gap(chord, usual, rows[count - 1], rows[count % len(rows)])
     around = [*places, *places[:2]] if joined else places
     bends = [
-        _distance((0.5 * (one[0] + three[0]), 0.5 * (one[1] + three[1])), two)
+        dist((0.5 * (one[0] + three[0]), 0.5 * (one[1] + three[1])), two)
         for one, two, three in zip(around, around[1:], around[2:], strict=False)
     ]
     long = LONG * max(scatter, median(bends))
@@ -336,7 +332,7 @@ def _check_gap(chord: float, usual: float, before: int, row: int) -> None:
 
 def _chords(places: list[Place], joined: bool) -> list[float]:
     around = [*places, places[0]] if joined else places
-    return [_distance(one, two) for one, two in pairwise(around)]
+    return [dist(one, two) for one, two in pairwise(around)]
 
 
 def _turns(places: list[Place], joined: bool) -> list[float]:

@@ -83,6 +83,11 @@ def from_mpf(value: Any) -> Fraction:
     return -magnitude if sign else magnitude
 
 
+def is_numpy_span(value: object) -> bool:
+    """Whether a value is a span of time of NumPy's, which counts it among the integers."""
+    return type(value).__name__ == "timedelta64"
+
+
 def read_exact(value: object, *, where: str) -> Fraction | None:
     """Return the exact value of an object of a rational number type, or None for any other object.
 
@@ -101,7 +106,7 @@ def read_exact(value: object, *, where: str) -> Fraction | None:
     name = type(value).__name__
     if isinstance(value, bool | complex) or name in ("bool", "bool_", "complex64", "clongdouble"):
         raise NumberError(f"{where}: {value!r} is of type {name}; give a real number")
-    if name in ("timedelta", "timedelta64", "datetime64"):  # NumPy counts the first among the integers
+    if is_numpy_span(value) or name in ("timedelta", "datetime64"):
         raise NumberError(f"{where}: {value!r} is of type {name}; give a number of seconds, or text such as '5 ms'")
     try:
         if isinstance(value, Fraction):
