@@ -88,7 +88,7 @@ def fill_differences(parts, number, span, points, differences, ends):  # type: i
     number : int
         The piece.
     span : (float, float)
-        Where the part begins and ends, as shares of the piece that are sums of few powers of 2.
+        Where the part begins and ends, as shares of the piece whose difference is a double.
     points : (RULE,) array
         Places in [-1, 1] on the part.
     differences : (2, m, 2, RULE) array
@@ -102,16 +102,17 @@ def fill_differences(parts, number, span, points, differences, ends):  # type: i
     for i in range(2):
         u[i], u[RULE + i] = 2.0 * span[i] - 1.0, 0.0
         if 0.0 < span[i] < 1.0:
-            _, (u[i], u[RULE + i]) = place_at(parts.curve, number, (span[i] * length, span[i] * length_low))
+            _, (u[i], u[RULE + i]) = place_at(parts.curve, number, multiply(length, length_low, span[i], 0.0))
     fill_values(parts, number, 2, u, values)
     for row in range(parts.values.size):
         for k in range(2):
             ends[row, k, 0], ends[row, k, 1] = values[row, k, 0], values[row, k, 1]
-    share = 0.5 * (span[1] - span[0])
+    begin, begin_low = multiply(length, length_low, span[0], 0.0)
+    half, half_low = multiply(length, length_low, 0.5 * (span[1] - span[0]), 0.0)
     for i in range(RULE):
         way, way_low = add(1.0, 0.0, points[i], 0.0)
-        way, way_low = multiply(way, way_low, share * length, share * length_low)
-        way, way_low = add(way, way_low, span[0] * length, span[0] * length_low)
+        way, way_low = multiply(way, way_low, half, half_low)
+        way, way_low = add(way, way_low, begin, begin_low)
         _, (u[i], u[RULE + i]) = place_at(parts.curve, number, (way, way_low))
     fill_values(parts, number, RULE, u, values)
     for row in range(parts.values.size):
@@ -121,9 +122,9 @@ def fill_differences(parts, number, span, points, differences, ends):  # type: i
                 gain, gain_low = values[row, 0, i], values[row, 1, i]
                 gain, gain_low = add(gain, gain_low, -ends[row, 0, side], -ends[row, 1, side])
                 way, way_low = add(1.0, 0.0, sign * points[i], 0.0)
-                way, way_low = multiply(way, way_low, sign * share * length, sign * share * length_low)
+                way, way_low = multiply(way, way_low, sign * half, sign * half_low)
                 differences[side, row, 0, i], differences[side, row, 1, i] = divide(gain, gain_low, way, way_low)
-    return share * length
+    return half
 
 
 def parts_along(pieces: TruePieces, function: Callable[..., Any], count: int, p: Sequence[Number]) -> TrueParts | None:

@@ -42,6 +42,15 @@ MAX_NOISE_RATIO, MAX_TAIL_RATIO = 4e-16, 1e-13
 # The second share where values come from double-double arithmetic; and how often the fit is corrected then.
 MAX_TRUE_TAIL_RATIO, CORRECTIONS = 1e-15, 2
 
+# The same next to an edge at which the potential is level: its slope there is at most such a share of what it is on
+# average. Small swings there have far less energy than what the panel spreads over, and still need all their digits.
+# If the potential has one part, panels are cut where it is level farther than so much from their edges, at multiples of
+# such a share of a piece. A sum of several is level where its factors say.
+MAX_LEVEL_TAIL_RATIO, LEVEL_SHARE, MIN_CUT, CUT_STEP = 1e-20, 1e-3, 1e-3, 2.0**-20
+
+# How often an interval is halved to find a level place.
+HALVINGS = 50
+
 # Values below this share of what is usual on the curve need no relative accuracy of their own.
 NEGLIGIBLE = 1e-2
 
@@ -60,11 +69,12 @@ PATH_ROW = HALF + 1
 # panel and in both ellipses, at most; the size of what the first is a sum of; and the potential at the samples.
 BASE, BASE_LOW, INCREASE, MIDDLE, SPREAD, REACH, FEW_REACH, BASE_SIZE, POTENTIAL_SAMPLES = range(9)
 FEW_POTENTIAL = POTENTIAL_SAMPLES + 1
-# Then the potential from either edge: above that of the left edge it is r*(c0 + r*(c1 + c2*x + ...)) with r = 1 + x,
-# and above that of the right edge the same with r = x - 1, so that it has all its digits next to edges where its slope
-# c0 vanishes. At last its values at the Gauss points, and its Legendre coefficients.
+# Then the potential from either edge: above that of the left edge it is r*(c0 + c1*r + c2*r**2 + ...) with r = 1 + x,
+# and above that of the right edge the same with r = x - 1, so that it has all its digits next to an edge, however many
+# of the first coefficients vanish there. Then the coefficients of x, x**2, ... about the middle of the panel; at last
+# its values at the Gauss points, and its Legendre coefficients.
 LEFT_TERMS = POTENTIAL_SAMPLES + SAMPLES
-RIGHT_TERMS, POTENTIAL, SERIES = (LEFT_TERMS + k * NODES for k in range(1, 4))
+RIGHT_TERMS, MIDDLE_TERMS, POTENTIAL, SERIES = (LEFT_TERMS + k * NODES for k in range(1, 5))
 POTENTIAL_ROW = SERIES + NODES
 # What it has of a part of the load n0: powers of x, and values at the samples. A row of `panel_forces` has both.
 LOAD_TERMS, LOAD_SAMPLES = POTENTIAL_ROW, POTENTIAL_ROW + NODES
@@ -150,7 +160,7 @@ NO_TABLE = CurveTable(np.empty(0), np.empty(0), np.empty((0, PATH_ROW)), np.empt
 
 @Inner
 def value_on(rows, k, at, x):  # type: ignore[no-untyped-def]
-    """The polynomial of panel k that begins at column ``at``, at a place x in [-1, 1]."""
+    """The polynomial of panel k whose coefficients begin at column ``at``, at x."""
     total = 0.0
     for j in range(NODES - 1, -1, -1):
         total = total * x + rows[k, at + j]
@@ -158,34 +168,28 @@ def value_on(rows, k, at, x):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def curved_on(rows, k, at, x):  # type: ignore[no-untyped-def]
-    """The factor c1 + c2*x + ... of the potential on panel k from the edge whose numbers begin at column ``at``."""
-    total = 0.0
-    for j in range(NODES - 1, 0, -1):
-        total = total * x + rows[k, at + j]
-    return total
+def rise_on(rows, k, at, r):  # type: ignore[no-untyped-def]
+    """The potential on panel k above that of the edge whose numbers begin at column ``at``.
 
-
-@Inner
-def rise_on(rows, k, at, x, r):  # type: ignore[no-untyped-def]
-    """The potential at a place of panel k above that of an edge, from which it is ``r`` away in halves of the panel."""
-    return r * (rows[k, at] + r * curved_on(rows, k, at, x))
+    The place is ``r`` away from it in halves of the panel.
+    """
+    return r * value_on(rows, k, at, r)
 
 
 @Inner
 def potential_on(rows, k, x):  # type: ignore[no-untyped-def]
     """The potential of panel k above its left edge at a place x in [-1, 1]."""
-    return rise_on(rows, k, LEFT_TERMS, x, 1.0 + x)
+    return rise_on(rows, k, LEFT_TERMS, 1.0 + x)
 
 
 @Inner
-def difference_from(rows, k, at, x, r, y, q):  # type: ignore[no-untyped-def]
+def difference_from(rows, k, at, r, q):  # type: ignore[no-untyped-def]
     """The first divided difference of the potential of panel k over two places, which are r and q away from an edge."""
     value, first = 0.0, 0.0
-    for j in range(NODES - 1, 0, -1):
-        first = first * y + value
-        value = value * x + rows[k, at + j]
-    return rows[k, at] + (r + q) * value + q * q * first
+    for j in range(NODES - 1, -1, -1):
+        first = first * q + value
+        value = value * r + rows[k, at + j]
+    return value + q * first
 
 
 @Inner
@@ -195,15 +199,7 @@ def difference_on(rows, k, x, y):  # type: ignore[no-untyped-def]
     It is taken from the nearer edge: there the slope of a fitted polynomial is less accurate than its value.
     """
     at, edge = (LEFT_TERMS, -1.0) if x + y < 0.0 else (RIGHT_TERMS, 1.0)
-    return difference_from(rows, k, at, x, x - edge, y, y - edge)
-
-
-@Inlined
-def power_on(rows, k, j):  # type: ignore[no-untyped-def]
-    """The coefficient of x**j of the potential on panel k, of which j is 1 at least."""
-    beyond = rows[k, LEFT_TERMS + j] if j < NODES else 0.0
-    further = rows[k, LEFT_TERMS + j + 1] if j < NODES - 1 else 0.0
-    return rows[k, LEFT_TERMS + j - 1] + 2.0 * beyond + further
+    return difference_from(rows, k, at, x - edge, y - edge)
 
 
 @Inner
@@ -229,7 +225,10 @@ def fill_terms(values, work, row, at, size):  # type: ignore[no-untyped-def]
 
 @Inner
 def fill_true_terms(values, work, sums, size):  # type: ignore[no-untyped-def]
-    """As `fill_terms`, from values of two doubles, and with powers of two doubles."""
+    """As `fill_terms`, from values of two doubles, and with powers of two doubles.
+
+    Returns the last Legendre terms, and what they are compared with.
+    """
     rest, terms, series = values[0].copy(), np.empty(NODES), np.empty(NODES)
     for j in range(NODES):
         size, sums[0, j], sums[1, j] = max(size, fabs(rest[j])), 0.0, 0.0
@@ -238,14 +237,29 @@ def fill_true_terms(values, work, sums, size):  # type: ignore[no-untyped-def]
         powers(series, 0, terms, 0)
         for j in range(NODES):
             sums[0, j], sums[1, j] = add(sums[0, j], sums[1, j], terms[j], 0.0)
-            work[j] = series[j] if turn == 0 else work[j]
+            work[j] = series[j] if turn == 0 else work[j] + series[j]
         for i in range(NODES):
             value, low = 0.0, 0.0
             for j in range(NODES - 1, -1, -1):
                 value, low = multiply_pairs(value, low, POINTS[i], 0.0)
                 value, low = add(value, low, sums[0, j], sums[1, j])
             rest[i] = add(values[0, i], values[1, i], -value, -low)[0]
-    return max(fabs(work[NODES - 2]), fabs(work[NODES - 1])) <= MAX_TRUE_TAIL_RATIO * size
+    return max(fabs(work[NODES - 2]), fabs(work[NODES - 1])), size
+
+
+@Inner
+def move_terms(sums, edge, terms, middle):  # type: ignore[no-untyped-def]
+    """Fill the powers about an edge of a polynomial with powers of x of two doubles, which are changed.
+
+    And ``middle`` with those of x, x**2, ... in its product with the distance from the edge.
+    """
+    for j in range(NODES - 1):
+        middle[j] = add(sums[0, j], sums[1, j], -edge * sums[0, j + 1], -edge * sums[1, j + 1])[0]
+    middle[NODES - 1] = sums[0, NODES - 1]
+    for i in range(NODES):
+        for j in range(NODES - 2, i - 1, -1):
+            sums[0, j], sums[1, j] = add(sums[0, j], sums[1, j], edge * sums[0, j + 1], edge * sums[1, j + 1])
+        terms[i] = sums[0, i]
 
 
 @Inner
@@ -292,17 +306,18 @@ def fill_potential(half, differences, is_exact, slope, row):  # type: ignore[no-
         for j in range(NODES):
             high, low = differences[side, 0, j], differences[side, 1, j] if is_exact else 0.0
             values[0, j], values[1, j] = multiply_pairs(half, 0.0, high, low)
+        tail, largest = 0.0, 0.0
         if is_exact:
-            resolved &= fill_true_terms(values, work, sums, size)
+            tail, largest = fill_true_terms(values, work, sums, size)
         else:
             resolved &= fill_terms(values[0], work, sums[0], 0, size)
-        high, low = 0.0, 0.0
-        for j in range(NODES - 1, -1, -1):
-            high, low = add(sums[0, j], sums[1, j], edge * high, edge * low)
-            row[at + j] = high
-    total, reach, few_reach, spread = 0.0, 0.0, 0.0, 0.0
+            sums[1] = 0.0
+        move_terms(sums, edge, row[at : at + NODES], row[MIDDLE_TERMS : MIDDLE_TERMS + NODES])
+        far = fabs(values[0, 0 if edge > 0.0 else NODES - 1])
+        is_level = fabs(row[at]) <= LEVEL_SHARE * far
+        resolved &= tail <= (MAX_LEVEL_TAIL_RATIO if is_level else MAX_TRUE_TAIL_RATIO) * largest
+    reach, few_reach, spread = 0.0, 0.0, 0.0
     for j in range(NODES):
-        total += row[LEFT_TERMS + j] * (1.0 if j == 0 else 2.0)
         row[POTENTIAL + j] = (1.0 + POINTS[j]) * values[0, j]
     fit(row, POTENTIAL, row, SERIES)
     for j in range(1, NODES):
@@ -310,11 +325,35 @@ def fill_potential(half, differences, is_exact, slope, row):  # type: ignore[no-
         reach += size * GROWTH[j]
         few_reach += size * FEW_GROWTH[j]
         spread += size
-    row[INCREASE], row[MIDDLE], row[SPREAD] = 2.0 * total, row[SERIES], spread
+    row[INCREASE], row[MIDDLE], row[SPREAD] = rise_on(one, 0, LEFT_TERMS, 2.0), row[SERIES], spread
     row[REACH], row[FEW_REACH] = reach, few_reach
     for j in range(SAMPLES):
         row[POTENTIAL_SAMPLES + j] = potential_on(one, 0, SAMPLE_POINTS[j])
     return resolved
+
+
+@Inner
+def level_place(row):  # type: ignore[no-untyped-def]
+    """Where inside a panel a part of the potential that is not monotone on it is stationary; NaN if it is nowhere."""
+    low, high, sign, x = -1.0, 1.0, row[LEFT_TERMS], 0.0
+    if not sign * row[RIGHT_TERMS] < 0.0:
+        return np.nan
+    for _ in range(HALVINGS):
+        x, slope = 0.5 * (low + high), 0.0
+        for j in range(NODES - 1, -1, -1):
+            slope = slope * x + (j + 1) * row[MIDDLE_TERMS + j]
+        if sign * slope > 0.0:
+            low = x
+        else:
+            high = x
+    return x if fabs(x) < 1.0 - MIN_CUT else np.nan
+
+
+@Inner
+def cut_between(part, begin, end):  # type: ignore[no-untyped-def]
+    """The share of a piece at which to cut a panel between two shares, for the potential is level; NaN if it is not."""
+    cut = CUT_STEP * np.rint((begin + 0.5 * (1.0 + level_place(part)) * (end - begin)) / CUT_STEP)
+    return cut if begin < cut < end else np.nan
 
 
 @Inner
@@ -406,7 +445,8 @@ def place_on_piece(true, pieces, k, share):  # type: ignore[no-untyped-def]
     """The place at a share of piece k, as two doubles."""
     if true.values.size > 0:
         high, low, _ = true.curve.lengths[k]
-        return add(true.origins[k, 0], true.origins[k, 1], share * high, share * low)
+        high, low = multiply_pairs(high, low, share, 0.0)
+        return add(true.origins[k, 0], true.origins[k, 1], high, low)
     return pieces[k] + share * (pieces[k + 1] - pieces[k]) if share < 1.0 else pieces[k + 1], 0.0
 
 
@@ -435,7 +475,8 @@ def tabulate(source, true, p, pieces):  # type: ignore[no-untyped-def]
     edges, lows = np.empty(capacity + 1), np.empty(capacity + 1)
     paths, parts = np.empty((capacity, PATH_ROW)), np.empty((capacity, width))
     pending, count, scales = np.empty(64), 0, scales_of(source, p, pieces)
-    if true.values.size > 0:
+    is_exact = true.values.size > 0
+    if is_exact:
         fill_parameters(true.tape, true.parameters, true.work)
     for k in range(pieces.size - 1):
         waiting, begin = 1, 0.0
@@ -448,12 +489,15 @@ def tabulate(source, true, p, pieces):  # type: ignore[no-untyped-def]
             edges[count], lows[count] = place_on_piece(true, pieces, k, begin)
             edges[count + 1], lows[count + 1] = place_on_piece(true, pieces, k, end)
             panel = edges[count], edges[count + 1], k, (begin, end)
+            cut = 0.5 * (begin + end)
             if fill_panel(source, true, p, panel, scales, paths[count], parts[count]):
-                count, waiting, begin = count + 1, waiting - 1, end
-            else:
-                pending[waiting] = 0.5 * (begin + end)
+                cut = cut_between(parts[count], begin, end) if is_exact and source.potentials == 1 else np.nan
+            if cut == cut:
+                pending[waiting] = cut
                 waiting += 1
-    parts, is_exact = parts[:count].copy(), true.values.size > 0
+            else:
+                count, waiting, begin = count + 1, waiting - 1, end
+    parts = parts[:count].copy()
     fill_bases(parts, source.potentials, is_exact)
     edges, lows, paths = edges[: count + 1].copy(), lows[: count + 1].copy(), paths[:count].copy()
     return CurveTable(edges, lows, paths, parts, source.potentials, is_exact)

@@ -6,7 +6,7 @@ import numpy as np
 
 from gqm_sym.runtime.arithmetic.elementary import sin
 from gqm_sym.runtime.compiled.calls import call_path_and_contact_force, call_potential_divdiff1
-from gqm_sym.runtime.compiled.jit import Inner
+from gqm_sym.runtime.compiled.jit import Inlined, Inner
 from gqm_sym.runtime.compiled.registers import on_stack
 from gqm_sym.runtime.interface import PATH_ROWS
 from gqm_sym.runtime.sweep.curve_table import (
@@ -14,10 +14,12 @@ from gqm_sym.runtime.sweep.curve_table import (
     KAPPA_TERMS,
     LOAD_SAMPLES,
     LOAD_TERMS,
+    LEFT_TERMS,
     POTENTIAL_SAMPLES,
+    RIGHT_TERMS,
     SAMPLE_POINTS,
     SAMPLES,
-    potential_on,
+    rise_on,
     value_on,
 )
 from gqm_sym.runtime.sweep.panel_forces import FAR, LOAD, NEAR, prepare
@@ -124,37 +126,46 @@ def extreme(fns, p, orbit, force, sign):  # type: ignore[no-untyped-def]
     return np.nan
 
 
-@Inner
-def load_on(curve, k, slack, force, x):  # type: ignore[no-untyped-def]
-    """V**2, or the contact force per unit mass if ``force`` is set, at a place of panel k.
+@Inlined
+def level_on(passage, slacks, j):  # type: ignore[no-untyped-def]
+    """V**2/2 at an edge of panel j of a passage, the column of the powers from there, and where that edge is.
 
-    V**2/2 is ``slack`` at the panel's left edge.
+    It is the edge that is farther from a turning point, for the lowest place of a small swing is there.
     """
-    v2 = 2.0 * (slack - potential_on(curve.rows, k, x))
+    if j == 0 and passage.panels > 1:
+        return slacks[1], RIGHT_TERMS, 1.0
+    return slacks[j], LEFT_TERMS, -1.0
+
+
+@Inner
+def load_on(curve, k, level, force, x):  # type: ignore[no-untyped-def]
+    """V**2, or the contact force per unit mass if ``force`` is set, at a place of panel k; ``level`` is of `level_on`."""
+    slack, at, edge = level
+    v2 = 2.0 * (slack - rise_on(curve.rows, k, at, x - edge))
     if force:
         return value_on(curve.table.paths, k, KAPPA_TERMS, x) * v2 + value_on(curve.rows, k, LOAD_TERMS, x)
     return v2
 
 
 @Inner
-def refined(curve, k, slack, force, sign, x, ends):  # type: ignore[no-untyped-def]
+def refined(curve, k, level, force, sign, x, ends):  # type: ignore[no-untyped-def]
     """The largest (``sign`` 1) or smallest (-1) value next to a place between two ends on panel k, by parabolas."""
     prepare(curve, k, NEAR)
     low, high = ends
-    best, step = load_on(curve, k, slack, force, x), FIRST_STEP
+    best, step = load_on(curve, k, level, force, x), FIRST_STEP
     for _ in range(MAX_PARABOLAS):
         x_before = x
         left, right = max(x - step, low), min(x + step, high)
         if not left < x < right:
             x = 0.5 * (left + right)
-        f0 = load_on(curve, k, slack, force, left)
-        f1 = load_on(curve, k, slack, force, x)
-        f2 = load_on(curve, k, slack, force, right)
+        f0 = load_on(curve, k, level, force, left)
+        f1 = load_on(curve, k, level, force, x)
+        f2 = load_on(curve, k, level, force, right)
         before, after = (x - left) * (f1 - f2), (x - right) * (f1 - f0)
         if before != after:
             vertex = x - 0.5 * ((x - left) * before - (x - right) * after) / (before - after)
             x = min(max(vertex, left), right)
-        found = load_on(curve, k, slack, force, x)
+        found = load_on(curve, k, level, force, x)
         best = sign * max(sign * best, sign * f0, sign * f1, sign * f2, sign * found)
         if step <= LAST_STEP:
             break
@@ -180,7 +191,7 @@ def best_sample(curve, path, passage, slacks, force, sign):  # type: ignore[no-u
             else:
                 # The end itself, for the next panel shares it.
                 x = low + (high - low) * i / (SAMPLES - 1) if i < SAMPLES - 1 else high
-                value = load_on(curve, k, slack, force, x)
+                value = load_on(curve, k, level_on(passage, slacks, j), force, x)
             if sign * value > best:
                 best, best_j, best_x = sign * value, j, x
     return best, best_j, best_x
@@ -214,6 +225,6 @@ def passage_extreme(curve, orbit, passage, slacks, force, sign):  # type: ignore
         if shared:
             ends = path[0][1] if j == path[0][0] else -1.0, path[1][1] if j == path[1][0] else 1.0
             k = (passage.first + j) % count
-            best = max(best, sign * refined(curve, k, slacks[j], force, sign, x, ends))
+            best = max(best, sign * refined(curve, k, level_on(passage, slacks, j), force, sign, x, ends))
     value = sign * best
     return curve.mass * value if force else sqrt(max(value, 0.0))

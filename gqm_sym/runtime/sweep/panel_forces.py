@@ -21,23 +21,27 @@ from gqm_sym.runtime.sweep.curve_table import (
     LOAD_TERMS,
     MAY_STOP,
     MIDDLE,
+    MIDDLE_TERMS,
     NODES,
     POTENTIAL_ROW,
     REACH,
+    RIGHT_TERMS,
     SAMPLES,
     SERIES,
     SPREAD,
-    power_on,
 )
 
 # What a panel's row contains so far: numbers that suffice far from turning points, its polynomials, the load.
 FAR, NEAR, LOAD = 1, 2, 4
 
+# How often a panel is halved towards an edge to find out from where on the potential is convex.
+HALVINGS = 20
+
 # A row: as `curve_table` has it for one part; then an upper bound of the potential on the panel above the reference,
 # infinite where ds may vanish; a better one; whether the potential rises (1) or falls (-1) throughout, 0 if neither is
-# certain; and whether it is certain that it is convex (1).
-HIGHEST, TOP, SLOPE_SIGN, CONVEX = range(LOAD_SAMPLES + SAMPLES, LOAD_SAMPLES + SAMPLES + 4)
-ROW = CONVEX + 1
+# certain; and the level from which it is certain that it is convex.
+HIGHEST, TOP, SLOPE_SIGN, CONVEX_FROM = range(LOAD_SAMPLES + SAMPLES, LOAD_SAMPLES + SAMPLES + 4)
+ROW = CONVEX_FROM + 1
 
 
 @Inner
@@ -70,17 +74,48 @@ def fill_far(curve, k):  # type: ignore[no-untyped-def]
 
 
 @Inner
+def convex_level(row, at, edge):  # type: ignore[no-untyped-def]
+    """The least height above an edge from which the potential is certainly convex; infinite if there is none.
+
+    That is where one term of its second derivative, in powers of the distance from the edge, outweighs all others. A
+    flat well has such small terms in front of that one as the edge is beside its lowest place.
+    """
+    lead, behind, way, first = 0.0, 0.0, 1.0, 0
+    for j in range(1, NODES):
+        bend = j * (j + 1) * row[at + j] * way
+        behind, way = behind + fabs(bend), -2.0 * edge * way
+        if fabs(bend) > fabs(lead):
+            lead, behind, first = bend, 0.0, j
+    distance, height = 2.0, 0.0
+    if not lead > 2.0 * behind:
+        return inf
+    for _ in range(HALVINGS):
+        before, way = 0.0, 1.0
+        for j in range(1, first):
+            before, way = before + j * (j + 1) * fabs(row[at + j]) * way, way * distance
+        if 2.0 * before > first * (first + 1) * fabs(row[at + first]) * way:
+            break
+        distance *= 0.5
+    for j in range(NODES - 1, -1, -1):
+        height = (height + fabs(row[at + j])) * 2.0 * distance
+    return height if distance < 2.0 else inf
+
+
+@Inner
 def fill_near(curve, k):  # type: ignore[no-untyped-def]
     """Fill the polynomials, and what they say of the potential's slope and bound."""
-    parts, rows, row, count = curve.table.parts[k], curve.rows, curve.rows[k], curve.table.potentials
+    parts, row, count = curve.table.parts[k], curve.rows[k], curve.table.potentials
     fill_sums(parts[LEFT_TERMS:], POTENTIAL_ROW, curve.factors[:count], row[LEFT_TERMS:POTENTIAL_ROW])
-    change, slope, spread, bend = 0.0, power_on(rows, k, 1), 0.0, 2.0 * power_on(rows, k, 2)
+    change, slope, spread, bend = 0.0, row[MIDDLE_TERMS], 0.0, 2.0 * row[MIDDLE_TERMS + 1]
     for j in range(2, NODES + 1):
-        term = fabs(power_on(rows, k, j))
+        term = fabs(row[MIDDLE_TERMS + j - 1])
         change += j * term
         bend -= j * (j - 1) * term if j > 2 else 0.0
         spread += fabs(row[SERIES + j - 1])
-    row[CONVEX] = 1.0 if bend > 0.0 else 0.0
+    row[CONVEX_FROM] = -inf
+    if not bend > 0.0:
+        from_right = row[INCREASE] + convex_level(row, RIGHT_TERMS, 1.0)
+        row[CONVEX_FROM] = row[BASE] + min(convex_level(row, LEFT_TERMS, -1.0), from_right)
     row[SLOPE_SIGN], top = 0.0, row[MIDDLE] + spread
     if fabs(slope) > change:
         row[SLOPE_SIGN], top = 1.0 if slope > 0.0 else -1.0, max(row[INCREASE], 0.0)

@@ -32,6 +32,7 @@ from gqm_sym.runtime.sweep.curve_table import (
     INCREASE,
     LEFT_TERMS,
     MIDDLE,
+    MIDDLE_TERMS,
     NODES,
     POINTS,
     POTENTIAL,
@@ -42,12 +43,11 @@ from gqm_sym.runtime.sweep.curve_table import (
     difference_from,
     difference_on,
     potential_on,
-    power_on,
     rise_on,
     value_on,
 )
 from gqm_sym.runtime.sweep.orbit import NO_ENDS, Orbit
-from gqm_sym.runtime.sweep.panel_forces import CONVEX, FAR, HIGHEST, NEAR, SLOPE_SIGN, TOP, prepare
+from gqm_sym.runtime.sweep.panel_forces import CONVEX_FROM, FAR, HIGHEST, NEAR, SLOPE_SIGN, TOP, prepare
 
 # By how much V**2 at the middle of a panel must exceed what the panel's rule needs.
 SAFETY = 1.05
@@ -64,6 +64,12 @@ MAX_ERROR_RATIO, NOISE_RATIO = 2e-16, 2e-15
 
 # The last step of Newton's method to a turning point, in halves of the panel: the error is about its square.
 MAX_LAST_STEP = 2.0**-32
+
+# By how much the potential may differ between turning points that doubles found, as a share of what it falls from them.
+MAX_MISMATCH = 1e-14
+
+# How many steps follow from where the body comes from: in flat wells the place before them has few digits.
+LAST_STEPS = 2
 
 # How near to an equilibrium a turning point may lie, as a share of the panel, for doubles to decide that it is one.
 MAX_ZERO_ERROR = 1e-6
@@ -207,16 +213,16 @@ def way_between(table, lower, higher):  # type: ignore[no-untyped-def]
 def rise_from_left(rows, k, x, near):  # type: ignore[no-untyped-def]
     """The potential at a place of panel k above that of the left edge."""
     if x <= 0.0:
-        return rise_on(rows, k, LEFT_TERMS, x, near)
-    return rows[k, INCREASE] + rise_on(rows, k, RIGHT_TERMS, x, -near)
+        return rise_on(rows, k, LEFT_TERMS, near)
+    return rows[k, INCREASE] + rise_on(rows, k, RIGHT_TERMS, -near)
 
 
 @Inner
 def rise_from_right(rows, k, x, near):  # type: ignore[no-untyped-def]
     """The potential at a place of panel k above that of the right edge."""
     if x > 0.0:
-        return rise_on(rows, k, RIGHT_TERMS, x, -near)
-    return rise_on(rows, k, LEFT_TERMS, x, near) - rows[k, INCREASE]
+        return rise_on(rows, k, RIGHT_TERMS, -near)
+    return rise_on(rows, k, LEFT_TERMS, near) - rows[k, INCREASE]
 
 
 @Inlined
@@ -231,11 +237,11 @@ def zero_on_panel(rows, k, slack, near, far):  # type: ignore[no-untyped-def]
     x = 0.5 * (near + far)
     for _ in range(60):
         value, slope, r = 0.0, 0.0, 1.0 + x
-        for j in range(NODES - 1, 0, -1):
-            slope = slope * x + value
-            value = value * x + rows[k, LEFT_TERMS + j]
-        slope = rows[k, LEFT_TERMS] + r * (2.0 * value + r * slope)
-        value = r * (rows[k, LEFT_TERMS] + r * value)
+        for j in range(NODES - 1, -1, -1):
+            slope = slope * r + value
+            value = value * r + rows[k, LEFT_TERMS + j]
+        slope = value + r * slope
+        value *= r
         if value < slack:
             near = x
         else:
@@ -268,7 +274,7 @@ def turn_from(curve, launch, w0, direction):  # type: ignore[no-untyped-def]
             prepare(curve, k, NEAR)
         if may_turn and not rows[k, TOP] < energy - error:
             sign, slack = rows[k, SLOPE_SIGN] * direction, energy - rows[k, BASE]
-            if sign == 0.0 and rows[k, CONVEX] == 1.0:
+            if sign == 0.0 and energy - error > rows[k, CONVEX_FROM]:
                 sign = 1.0  # where a convex potential reaches a level that it was below, it rises
             if sign == 0.0 or not rows[k, TOP] < np.inf:
                 return CRITICAL, index, x
@@ -314,25 +320,29 @@ def slack_at_edge(curve, launch, w0, index, direction):  # type: ignore[no-untyp
 
 @Inner
 def polished(curve, launch, w0, index, x, direction):  # type: ignore[no-untyped-def]
-    """A turning point with all digits, by a step of Newton's method: its offset from the launch, and its place.
+    """A turning point with all digits, by steps of Newton's method: its offset from the launch, and its place.
 
     V**2 is measured from the launch if that is on the same panel, else from the edge through which the body comes.
     """
     table, rows, count = curve.table, curve.rows, curve.levels.size
     k = index % count
-    slope, half, (start, at, near) = difference_on(rows, k, x, x), table.paths[k, HALF], launch
+    half, (start, at, near) = table.paths[k, HALF], launch
     if index == start:
-        way = x - at
-        way += (0.5 * w0 - way * difference_on(rows, k, at, x)) / slope
+        edge, rest, way = LEFT_TERMS if at <= 0.0 else RIGHT_TERMS, near if at <= 0.0 else -near, x - at
+        for _ in range(LAST_STEPS):
+            y = rest + way
+            way += (0.5 * w0 - way * difference_from(rows, k, edge, rest, y)) / difference_from(rows, k, edge, y, y)
         gap = from_left(at, near) + way
         gap = gap if gap <= 1.0 else from_right(at, near) - way
         return half * way, (index, at + way, gap)
     gap, slack = 1.0 + direction * x, slack_at_edge(curve, launch, w0, index, direction)
+    edge = LEFT_TERMS if direction > 0 else RIGHT_TERMS
+    for _ in range(LAST_STEPS):
+        y = direction * gap
+        gap += direction * (slack - rise_on(rows, k, edge, y)) / difference_from(rows, k, edge, y, y)
     if direction > 0:
-        gap += (slack - rise_on(rows, k, LEFT_TERMS, x, gap)) / slope
         turn = index, gap - 1.0, gap if gap <= 1.0 else 2.0 - gap
         return way_between(table, launch, turn), turn
-    gap -= (slack - rise_on(rows, k, RIGHT_TERMS, x, -gap)) / slope
     turn = index, 1.0 - gap, gap if gap < 1.0 else 2.0 - gap
     return -way_between(table, turn, launch), turn
 
@@ -440,6 +450,24 @@ def passage_of(curve, orbit):  # type: ignore[no-untyped-def]
 
 
 @Inner
+def are_level(curve, passage):  # type: ignore[no-untyped-def]
+    """Whether the potential is the same at both turning points of a passage, as far as an exact table tells it."""
+    if passage.panels < 2 or passage.turns != BOTH or not curve.table.is_exact:
+        return True
+    rows, count = curve.rows, curve.levels.size
+    low, high = passage.first % count, (passage.first + passage.panels - 1) % count
+    after = neighbour(low, 1, count)
+    for k in (low, after, high):
+        prepare(curve, k, FAR | NEAR)
+    lower, upper = (
+        rise_on(rows, low, RIGHT_TERMS, -passage.low_rest),
+        rise_on(rows, high, LEFT_TERMS, passage.high_rest),
+    )
+    between = rise_between(rows, after, high)
+    return fabs(lower - (between + upper)) <= MAX_MISMATCH * max(fabs(lower), fabs(upper), fabs(between))
+
+
+@Inner
 def fill_slacks(curve, passage, slacks):  # type: ignore[no-untyped-def]
     """Fill V**2/2 at the left edge of each panel of a passage; returns whether they keep enough digits.
 
@@ -459,7 +487,7 @@ def fill_slacks(curve, passage, slacks):  # type: ignore[no-untyped-def]
         peak = begin = 0.5 * passage.v2
     if turns != UPPER:
         slacks[0] = potential_on(rows, k, passage.low_x) + begin
-        slack, after = begin + rise_on(rows, k, RIGHT_TERMS, passage.low_x, -passage.low_rest), neighbour(k, 1, count)
+        slack, after = begin + rise_on(rows, k, RIGHT_TERMS, -passage.low_rest), neighbour(k, 1, count)
         at = after
         for j in range(1, middle + 1):
             slacks[j] = slack - rise_between(rows, after, at)
@@ -470,7 +498,7 @@ def fill_slacks(curve, passage, slacks):  # type: ignore[no-untyped-def]
         if turns != NEITHER:
             slope = -difference_on(rows, k, passage.low_x, passage.low_x) / (2.0 * paths[k, HALF])
     if turns in (BOTH, UPPER):
-        top = slack = rise_on(rows, high, LEFT_TERMS, passage.high_x, passage.high_rest)
+        top = slack = rise_on(rows, high, LEFT_TERMS, passage.high_rest)
         at = high
         for j in range(last, middle, -1):
             slacks[j] = slack - rise_between(rows, high, at)
@@ -494,10 +522,10 @@ def fill_falls_from_turn(rows, k, end, sign, x, falls):  # type: ignore[no-untyp
     n, q, gone = hidden(NODES), -sign * rest, y - edge
     for i in range(n):
         way = falls[i]
-        falls[i] = -sign * difference_from(rows, k, inner, x[i], q + way, y, q)
+        falls[i] = -sign * difference_from(rows, k, inner, q + way, q)
     if (x[0] + y < 0.0) != (sign < 0.0):
         for i in range(n):
-            fall = -sign * difference_from(rows, k, outer, y, gone, x[i], x[i] - edge)
+            fall = -sign * difference_from(rows, k, outer, gone, x[i] - edge)
             falls[i] = choose((x[i] + y < 0.0) != (sign < 0.0), fall, falls[i])
 
 
@@ -536,7 +564,7 @@ def fill_rates(curve, passage, j, from_above, slack, gap, u, out):  # type: igno
             fill_falls_from_turn(rows, k, end, sign, x, falls)
         else:
             for i in range(n):
-                falls[i] = slack - rise_on(rows, k, edge, x[i], falls[i])
+                falls[i] = slack - rise_on(rows, k, edge, falls[i])
     for i in range(n):
         out[i] = value_on(paths, k, DS_TERMS, x[i]) * sqrt(out[i] / (2.0 * falls[i]))
 
@@ -550,7 +578,7 @@ def fill_falls_within(rows, k, passage, u, x, falls):  # type: ignore[no-untyped
     low, high, terms, first, second = passage.low_x, passage.high_x, rates_buffer(), 0.0, 0.0
     for j in range(NODES, 1, -1):
         # The powers of the potential divided by x - low, and then by x - high.
-        first = first * low + power_on(rows, k, j)
+        first = first * low + rows[k, MIDDLE_TERMS + j - 1]
         second = second * high + first
         terms[j - 2] = second
     for i in range(hidden(NODES)):

@@ -48,6 +48,7 @@ from gqm_sym.runtime.sweep.panel_forces import take_factors
 from gqm_sym.runtime.sweep.passage import (
     MIN_LEAVING_SHARE,
     NOWHERE,
+    are_level,
     fill_slacks,
     find_passage,
     passage_of,
@@ -193,7 +194,8 @@ def find_orbit(curve, columns, k, monotone, spans, known):  # type: ignore[no-un
     circulates = kind == CIRCULATION
     one, other = (direction * period, 0.0) if circulates else (ahead.near, behind.near)
     orbit = Orbit(circulates, even, direction, lam0, v2, min(one, other), max(one, other), 0)
-    return ANSWERED, orbit, passage_of(curve, orbit)
+    passage = passage_of(curve, orbit)
+    return ANSWERED if are_level(curve, passage) else UNDECIDED, orbit, passage
 
 
 @Inner

@@ -305,6 +305,86 @@ def test_the_largest_force_on_a_small_swing(tmp_path: Path) -> None:
         assert motion.normal_force_max.value == pytest.approx(truth, rel=1e-14)
 
 
+def _half_period_in_a_flat_well(lam0: float, a: mpf, b: mpf) -> mpf:
+    """After a start from rest at such an arc length from the lowest place of (x/a)**4 + (z/b)**4 = 1."""
+
+    def height(x: mpf) -> mpf:
+        return (1 - (x / a) ** 4) ** mpf("0.25")
+
+    def speed(x: mpf) -> mpf:
+        return mp.sqrt(1 + (b * x**3 / a**4 / height(x) ** 3) ** 2)
+
+    def time(phi: mpf) -> mpf:
+        p, q = height(x0), height(x0 * mp.sin(phi))
+        fall = 2 * G * b * (1 + mp.sin(phi) ** 2) / ((p + q) * (p * p + q * q))
+        return speed(x0 * mp.sin(phi)) * a**2 / x0 / mp.sqrt(fall)
+
+    x0 = mp.findroot(lambda x: mp.quad(speed, [0, x]) - lam0, lam0)
+    return 2 * mp.quad(time, [0, mp.pi / 4, mp.pi / 2])
+
+
+def test_small_swings_in_a_flat_well(tmp_path: Path) -> None:
+    """There V**2 grows as the fourth power of the amplitude, which is far below what a panel spreads over."""
+    curve = gqm.Curve.implicit("(x/a)**4 + (z/b)**4 - 1", start=(0, "-b"))
+    module = gqm.build(gqm.derive(curve, gqm.Gravity()), name="flat_well", folder=tmp_path)
+    size, places = {"a": 3.211745185445401, "b": 0.9}, np.array([4e-3, 0.0068, 0.01, 0.0214, 0.1, 0.5])
+    half = module.sweep("half_period", places, **size)
+    assert half.route_counts() == {"single": len(places)}
+    ends = module.sweep("turning_points", places, **size).values
+    assert ends[:, 0] == pytest.approx(-places, rel=2e-14)
+    arrival = module.sweep("time_at", places, lam=0.0, **size).values
+    for place, value, quarter in zip(places.tolist(), half.values, arrival, strict=True):
+        with mp.workdps(25):
+            truth = _half_period_in_a_flat_well(place, mpf(size["a"]), mpf(size["b"]))
+        assert float(value) == pytest.approx(float(truth), rel=2e-14)
+        assert float(quarter) == pytest.approx(float(truth / 2), rel=2e-14)
+
+
+def test_small_swings_beside_an_edge_of_a_piece(tmp_path: Path) -> None:
+    """Speeds, turning points and arrivals have all digits, however small the swing is."""
+    curve = gqm.Curve.implicit("x**2 + z**2 - 1", start=("3/5", "-4/5"))
+    module = gqm.build(gqm.derive(curve, gqm.Gravity()), name="ring_from_its_side", folder=tmp_path)
+    with mp.workdps(30):
+        bottom = -mp.asin(mpf(3) / 5)
+        places = float(bottom) + 10.0 ** np.random.default_rng(5).uniform(-5, 0, 40)
+        there = float(bottom) + 0.5 * (places - float(bottom))
+        fastest, arrival = module.sweep("v_max", places), module.sweep("time_at", places, lam=there)
+        ends = module.sweep("turning_points", places).values[:, 0]
+        assert fastest.route_counts() == arrival.route_counts() == {"single": 40}
+        for k, place in enumerate(places.tolist()):
+            amplitude, angle = mpf(place) - bottom, mpf(float(there[k])) - bottom
+            share = mp.sin(amplitude / 2)
+            time = mp.ellipk(share**2) - mp.ellipf(mp.asin(mp.sin(angle / 2) / share), share**2)
+            assert float(fastest.values[k]) == pytest.approx(float(2 * mp.sqrt(G) * share), rel=4e-15)
+            assert float(arrival.values[k]) == pytest.approx(float(time / mp.sqrt(G)), rel=4e-15)
+            assert abs(mpf(float(ends[k])) - (bottom - amplitude)) <= 2.0**-52
+
+
+def test_the_largest_speed_of_small_swings(tmp_path: Path) -> None:
+    """On the loop of a strophoid, r = -a*cos(2*t)/cos(t) in polar coordinates about its node."""
+    curve = gqm.Curve.implicit("x**2*(a - z) - z**2*(a + z)", start=("-a/(2*sqrt(3))", "-a/2"), tangent=-1)
+    module = gqm.build(gqm.derive(curve, gqm.Gravity()), name="swings_on_a_strophoid", folder=tmp_path)
+    with mp.workdps(30):
+
+        def length(t: mpf) -> mpf:
+            return mp.quad(lambda u: mp.sqrt(mp.diff(z, u) ** 2 + mp.diff(x, u) ** 2), [0, t])
+
+        def x(t: mpf) -> mpf:
+            return -mp.cos(2 * t) * mp.tan(t)
+
+        def z(t: mpf) -> mpf:
+            return -mp.cos(2 * t)
+
+        below = length(mp.pi / 6)
+        places = -float(below) + np.array([1e-4, -1e-4, 1e-3, -1e-3, 1e-2, 0.3])
+        swept = module.sweep("v_max", places, a=1)
+        assert swept.route_counts() == {"single": len(places)}
+        for place, value in zip(places.tolist(), swept.values, strict=True):
+            top = mp.findroot(lambda t, way=abs(mpf(place) + below): length(t) - way, abs(mpf(place) + below))
+            truth = mp.sqrt(2 * G * (z(top) + 1))
+            assert float(value) == pytest.approx(float(truth), rel=4e-15)
+
+
 def test_half_periods_on_a_measured_track(track: ModuleType) -> None:
     """As `solve` gives them from extended precision, over dozens of pieces."""
     rng, bottom = np.random.default_rng(6), track.equilibria()[0].lam
