@@ -12,9 +12,9 @@ from gqm_sym.runtime.interface import PATH_ROWS
 from gqm_sym.runtime.sweep.curve_table import (
     KAPPA_SAMPLES,
     KAPPA_TERMS,
+    LEFT_TERMS,
     LOAD_SAMPLES,
     LOAD_TERMS,
-    LEFT_TERMS,
     POTENTIAL_SAMPLES,
     RIGHT_TERMS,
     SAMPLE_POINTS,
@@ -139,7 +139,10 @@ def level_on(passage, slacks, j):  # type: ignore[no-untyped-def]
 
 @Inner
 def load_on(curve, k, level, force, x):  # type: ignore[no-untyped-def]
-    """V**2, or the contact force per unit mass if ``force`` is set, at a place of panel k; ``level`` is of `level_on`."""
+    """V**2, or the contact force per unit mass if ``force`` is set, at a place of panel k.
+
+    ``level`` is what `level_on` gives.
+    """
     slack, at, edge = level
     v2 = 2.0 * (slack - rise_on(curve.rows, k, at, x - edge))
     if force:

@@ -77,14 +77,14 @@ def fill_far(curve, k):  # type: ignore[no-untyped-def]
 def convex_level(row, at, edge):  # type: ignore[no-untyped-def]
     """The least height above an edge from which the potential is certainly convex; infinite if there is none.
 
-    That is where one term of its second derivative, in powers of the distance from the edge, outweighs all others. A
-    flat well has such small terms in front of that one as the edge is beside its lowest place.
+    That is where one term of its second derivative, in powers of the distance from the edge, outweighs all that are
+    negative. A flat well has such small terms in front of that one as the edge is beside its lowest place.
     """
     lead, behind, way, first = 0.0, 0.0, 1.0, 0
     for j in range(1, NODES):
         bend = j * (j + 1) * row[at + j] * way
-        behind, way = behind + fabs(bend), -2.0 * edge * way
-        if fabs(bend) > fabs(lead):
+        behind, way = behind + max(-bend, 0.0), -2.0 * edge * way
+        if bend > lead:
             lead, behind, first = bend, 0.0, j
     distance, height = 2.0, 0.0
     if not lead > 2.0 * behind:
@@ -92,8 +92,8 @@ def convex_level(row, at, edge):  # type: ignore[no-untyped-def]
     for _ in range(HALVINGS):
         before, way = 0.0, 1.0
         for j in range(1, first):
-            before, way = before + j * (j + 1) * fabs(row[at + j]) * way, way * distance
-        if 2.0 * before > first * (first + 1) * fabs(row[at + first]) * way:
+            before, way = before + max(-j * (j + 1) * row[at + j] * way, 0.0), -edge * distance * way
+        if 2.0 * before > first * (first + 1) * row[at + first] * way:
             break
         distance *= 0.5
     for j in range(NODES - 1, -1, -1):
