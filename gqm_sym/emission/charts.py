@@ -151,7 +151,9 @@ def chart_maker(lowering: Lowering) -> ChartIR | None:
     if not train.cars:
         return made
     pull = differentiate(train.potential, HEIGHT)
-    numbers = lowering.constants("exact_train", "The length of a train, and what gravity is.", (train.train_length, pull))
+    numbers = lowering.constants(
+        "exact_train", "The length of a train, and what gravity is.", (train.train_length, pull)
+    )
     length = lowering.order[train.train_length.name]
     return replace(
         made,

@@ -17,7 +17,10 @@ PLANE_CHARTS = ("chart", "along_h")
 SPACE_CHARTS = ("along_z", "along_x", "along_y", "along_h")
 CHART_ROWS: dict[str, dict[type[ChartFunction], int]] = {
     "chart": {chart_x: 0, chart_z: 1, chart_alpha: 2, chart_kappa: 3},
-    **{f"along_{axis}": dict(zip(heads, (1, 2, 3), strict=True)) for axis, heads in (*SPACE_ROWS.items(), ("h", MEAN_HEIGHT))},
+    **{
+        f"along_{axis}": dict(zip(heads, (1, 2, 3), strict=True))
+        for axis, heads in (*SPACE_ROWS.items(), ("h", MEAN_HEIGHT))
+    },
 }
 
 # Columns up to which several loads of a value stand on one line.

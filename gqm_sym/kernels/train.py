@@ -1,6 +1,7 @@
 """A train: mass spread evenly along the track."""
 
 from numbers import Integral
+from typing import Any
 
 from gqm_sym.arguments import checked, short
 from gqm_sym.errors import DeclarationError
@@ -11,7 +12,7 @@ MAX_CARS = 1000
 
 
 @checked("Train")
-def Train(*, length: Given | None = None, cars: int = 1, mass: Given | None = None) -> Kernel:
+def Train(*, length: Given | None = None, cars: Any = 1, mass: Given | None = None) -> Kernel:
     """Return what makes the body a train, whose mass is spread evenly over a length of the track.
 
     Gravity then acts on the mean height of the train, so that its motion is that of its middle. The run-time parameter
@@ -28,7 +29,7 @@ def Train(*, length: Given | None = None, cars: int = 1, mass: Given | None = No
         Of the whole train, as a value.
     """
     size, pair = parameter(length, "length", where="train")
-    if isinstance(cars, bool) or not isinstance(cars, Integral) or not 1 <= cars <= MAX_CARS:
+    if isinstance(cars, bool) or not isinstance(cars, Integral) or not 1 <= int(cars) <= MAX_CARS:
         raise DeclarationError(f"train: cars: must be a whole number from 1 to {MAX_CARS}, got {short(cars)}")
     pairs = (pair,) if mass is None else (pair, ("m", read_value(mass, where="train: mass")))
     text = f"a train of length {size}, {cars} car{'' if cars == 1 else 's'}"

@@ -22,11 +22,11 @@ if TYPE_CHECKING:
     from gqm_sym.runtime.sweep.result import Sweep
 
 __all__ = [
+    "Cars",
     "CompiledModel",
     "Energy",
     "Equilibrium",
     "Event",
-    "Cars",
     "Exceedance",
     "Extreme",
     "Leg",

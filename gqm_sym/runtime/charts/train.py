@@ -117,7 +117,7 @@ def _merged(places: Array, whole: float) -> Array:
 
 
 def _edges(track: Chart, places: Array, length: float) -> Array:
-    """Return where the middle of the train is when one of its ends passes some places, between the ends of its range."""
+    """Return where the middle of the train is when one of its ends passes some places, and the ends of its range."""
     ends = np.concatenate([places - 0.5 * length, places + 0.5 * length])
     if track.period:
         low, high = track.low, track.low + track.period

@@ -1,6 +1,6 @@
 """The cars of a train: where they are, what the track does to each, and what each coupling carries."""
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -8,9 +8,6 @@ from gqm_sym.errors import InputError
 from gqm_sym.literals.namespaces import FLOATS
 from gqm_sym.runtime.charts.train import TrackOfTrain
 from gqm_sym.runtime.launch.speed import path_and_force_at, path_in_space_at
-
-if TYPE_CHECKING:
-    from gqm_sym.runtime.motion.motion import Motion
 
 
 class Cars(NamedTuple):
@@ -46,7 +43,7 @@ class Cars(NamedTuple):
     coupling_force: Any
 
 
-def cars(motion: "Motion", t: Any) -> Cars:
+def cars(motion: Any, t: Any) -> Cars:
     """Return the cars of a train at times.
 
     Raises
