@@ -264,13 +264,14 @@ def assemble_in_space(
     edges : (n+1,) array
         Arc length at the edges of the pieces, increasing.
     anchors : (n, 3) array
-        x, y and z at the left edge of each piece.
+        x, y and z at the left edge of each piece; floats longer than doubles keep their digits.
     slopes, bends : (n, 3, TERMS) arrays
         Their first two derivatives by arc length at the nodes.
     period, breaks
         As `Chart` has them.
     """
-    blocks = blocks_of(edges, (anchors, 0.0), slopes, bends, period)
+    left = np.asarray(anchors, dtype=np.float64)
+    blocks = blocks_of(edges, (left, np.asarray(anchors - left, dtype=np.float64)), slopes, bends, period)
     return SpaceChart(
         block=np.concatenate([blocks[axis] for axis in IN_BLOCK]),
         low=float(edges[0]),
