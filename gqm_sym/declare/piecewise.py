@@ -185,7 +185,11 @@ def declare_rail(
             "piecewise: no pieces; give one or more, as in [line(length=2), arc(radius=1, angle=pi)]"
         )
     joined = tuple(_piece(piece, f"piecewise: piece {count}") for count, piece in enumerate(given, start=1))
-    place = None if start is None else several(start, where="piecewise: start", what="(x, z), or (x, y, z) in space")
+    place = (
+        None
+        if start is None
+        else several(start, where="piecewise: start", what="a pair (x, z), or three numbers in space")
+    )
     in_space = (place is not None and len(place) == 3) or any(_is_spatial(piece) for piece in joined)
     first = _start(place, heading, joined[0], in_space)
     rail = Rail(start=first, pieces=joined, closed=closed, in_space=in_space)
