@@ -151,7 +151,7 @@ def room_kept(breaks: int) -> int:
 @Inner
 def gaps_on_leg(dissipation, joints, reading):  # type: ignore[no-untyped-def]
     """What is kept of the curve between its breaks, if a leg may be passed by it: its panels cannot be read."""
-    return joints.gaps if reading.what != PANELS and dissipation.linear else joints.gaps[:0]
+    return joints.gaps if reading.what < PANELS and dissipation.linear else joints.gaps[:0]
 
 
 @Inner
@@ -276,7 +276,7 @@ def next_leg(dissipation, p, joints, body, reading, record):  # type: ignore[no-
     place, direction, period = body[PLACE], int(body[DIRECTION]), body[PERIOD]
     end = body[HIGH] if direction > 0 else body[LOW]
     gaps = gaps_on_leg(dissipation, joints, reading)
-    limit = place + direction * (LAPS_AHEAD if gaps.size == 0 else 1) * period if period > 0.0 else end
+    limit = place + direction * (LAPS_AHEAD if joints.gaps.size == 0 else 1) * period if period > 0.0 else end
     drops, _ = breaks_before(joints.drops, joints.ahead, period, direction, place, limit)
     limit = drops[0] if drops.size else limit
     # Breaks a little behind show on which piece of the curve the body is, and one at the limit where that piece ends.

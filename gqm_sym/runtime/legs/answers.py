@@ -1,15 +1,31 @@
-"""Bodies driven along the curve by compiled code: one leg of one body, or one number for the motion of each of many."""
+"""Bodies driven along the curve by compiled code: a few legs of one body, or one number for each of many."""
 
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 from math import fabs, inf, isfinite, sqrt
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import types
 
 from gqm_sym.runtime.compiled.jit import Inner, entry
 from gqm_sym.runtime.compiled.registers import uncounted
-from gqm_sym.runtime.compiled.types import INTEGER, MATRIX, VECTOR
-from gqm_sym.runtime.legs.advance import AT_ONCE, BEYOND, DISSIPATION, LEAVES, RESTS, Joints, advance, launch
+from gqm_sym.runtime.compiled.types import INTEGER, MATRIX, VECTOR, Array
+from gqm_sym.runtime.interface import Dissipation
+from gqm_sym.runtime.legs.advance import (
+    AT_ONCE,
+    BEYOND,
+    DISSIPATION,
+    LEAVES,
+    NOTHING,
+    RESTS,
+    Joints,
+    advance,
+    launch,
+    room_ahead,
+    room_kept,
+)
 from gqm_sym.runtime.legs.body import (
     DIRECTION,
     ELAPSED,
@@ -23,6 +39,7 @@ from gqm_sym.runtime.legs.body import (
     PAUSES,
     PERIOD,
     PLACE,
+    SIZE,
     STATUS,
     STEP,
     TARGET,
@@ -34,6 +51,7 @@ from gqm_sym.runtime.legs.leg_equation import Forces
 from gqm_sym.runtime.legs.leg_panels import GAP_COLUMNS
 from gqm_sym.runtime.legs.leg_reading import passage, peak_of_leg
 from gqm_sym.runtime.legs.leg_record import (
+    AGAIN,
     BEGIN,
     BEGIN_LOW,
     END,
@@ -45,10 +63,11 @@ from gqm_sym.runtime.legs.leg_record import (
     START_V2,
     TIMES,
 )
-from gqm_sym.runtime.legs.leg_run import ASYMPTOTE, FULL, SPENT, TURN, Reading, point_buffer, slope_of_v2
+from gqm_sym.runtime.legs.leg_run import ASYMPTOTE, FULL, LIMIT, SPENT, TURN, Reading, point_buffer, slope_of_v2
 
-# What is asked of each body; LEG is to advance by one leg.
-LEG, END_TIME, REST_PLACE, ARRIVAL, LEAST_SPEED, MOST_SPEED, LEAST_LOAD, MOST_LOAD = range(8)
+# What is asked of each body. LEGS is to advance by some legs; LEG_AGAIN is to follow one of them once more for its
+# panels.
+LEGS, LEG_AGAIN, END_TIME, REST_PLACE, ARRIVAL, LEAST_SPEED, MOST_SPEED, LEAST_LOAD, MOST_LOAD = range(9)
 
 # Whether there is an answer: LEFT is the status of a body that the loop does not decide.
 FOUND, LEFT, NONE = range(3)
@@ -67,6 +86,47 @@ MAX_LEGS = 250_000
 LEAST_SWING = 1e-110
 
 JOINTS = types.NamedUniTuple(VECTOR, 5, Joints)
+
+# What has been kept of charts between their breaks (`legs.advance.Joints`), by forces, parameters and chart; the chart
+# stands beside it, so that no other one can have its identity. Who uses it takes it out meanwhile.
+_KEPT: dict[Any, tuple[Array, Array]] = {}
+MAX_KEPT = 8
+_LOCK = threading.Lock()
+
+
+class Track(NamedTuple):
+    """The curve along which bodies are driven, and where it is not smooth.
+
+    Attributes
+    ----------
+    chart : array
+        What stands behind the run-time parameters; empty for a curve with formulas.
+    breaks, corners, drops : arrays
+        As of `legs.advance.Joints`.
+    """
+
+    chart: Array
+    breaks: Array
+    corners: Array
+    drops: Array
+
+
+@contextmanager
+def joints_of(dissipation: Dissipation, values: tuple[float, ...], track: Track) -> Iterator[Joints]:
+    """The joints of a track, with what is kept of it for these values of the run-time parameters."""
+    ahead, kept = np.empty(room_ahead(track.breaks.size)), NOTHING
+    if not (dissipation.linear and track.chart.size and track.breaks.size):
+        yield Joints(*track[1:], ahead, kept)
+        return
+    key = dissipation, id(track.chart), values
+    with _LOCK:
+        found = _KEPT.pop(key, None)
+    kept = np.zeros(room_kept(track.breaks.size)) if found is None else found[0]
+    yield Joints(*track[1:], ahead, kept)
+    with _LOCK:
+        _KEPT[key] = kept, track.chart
+        while len(_KEPT) > MAX_KEPT:
+            del _KEPT[next(iter(_KEPT))]
 
 
 class Observed(NamedTuple):
@@ -185,11 +245,29 @@ def is_tiny(record):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def follow_legs(dissipation, p, joints, body, records):  # type: ignore[no-untyped-def]
+def follow_leg(dissipation, p, joints, body, before, record):  # type: ignore[no-untyped-def]
+    """Advance a body by one leg; ``before`` becomes what the body is before it.
+
+    Where gaps are kept, the leg is passed by them if it ends at a turn or at the limit of a run. Its record then has no
+    panels, which `LEG_AGAIN` fills in.
+    """
+    for k in range(SIZE):
+        before[k] = body[k]
+    if joints.gaps.size > 0:
+        what = advance(dissipation, p, joints, body, Reading(TIMES, False, 1.0, -inf), record)
+        if what in (TURN, RESTS, LIMIT, FULL):
+            return what
+        for k in range(SIZE):
+            body[k] = before[k]
+    return advance(dissipation, p, joints, body, Reading(PANELS, False, 1.0, -inf), record)
+
+
+@Inner
+def follow_legs(dissipation, p, joints, bodies, records):  # type: ignore[no-untyped-def]
     """Advance a body by as many legs as there are records, or to a leg after which something else is decided."""
-    what, count = RESTS, 0
+    what, count, body = RESTS, 0, bodies[0]
     while count < records.shape[0]:
-        what = advance(dissipation, p, joints, body, Reading(PANELS, False, 1.0, -inf), records[count])
+        what = follow_leg(dissipation, p, joints, body, bodies[1 + count], records[count])
         if what == FULL:
             break
         count += 1
@@ -215,12 +293,13 @@ def drive(dissipation, parameters, joints, question, bodies, records):  # type: 
         A row of run-time parameters for each body, or one for all of them.
     joints : Joints
     question : int
-        LEG to MOST_LOAD. The answer to all but LEG is in VALUE and STATUS of the body; LEAST_LOAD and MOST_LOAD mean
-        the contact force per mass. VALUE after LEG is the number of legs that have been followed.
+        LEGS to MOST_LOAD. The answer to others than LEGS and LEG_AGAIN is in VALUE and STATUS of the body; LEAST_LOAD
+        and MOST_LOAD mean the contact force per mass. VALUE after LEGS is the number of legs that were followed.
     bodies : (n, SIZE) array
-        The bodies (`legs.body`), which are moved on.
+        The bodies (`legs.body`), which are moved on. LEGS and LEG_AGAIN move the first one; after LEGS the others are
+        what that was before each leg.
     records : (n, size) array
-        Filled in with the legs of the last body (`leg_record`), of which LEG asks for n at most. The first row is work
+        Filled in with legs of the first body (`leg_record`), of which LEGS asks for n at most. The first row is work
         space of other questions.
 
     Returns
@@ -231,14 +310,16 @@ def drive(dissipation, parameters, joints, question, bodies, records):  # type: 
     breaks, corners, drops, ahead, gaps = joints
     joints = Joints(uncounted(breaks), uncounted(corners), uncounted(drops), uncounted(ahead), uncounted(gaps))
     parameters, bodies, records, what = uncounted(parameters), uncounted(bodies), uncounted(records), RESTS
-    for k in range(bodies.shape[0]):
+    for k in range(1 if question <= LEG_AGAIN else bodies.shape[0]):
         p, body = parameters[k if parameters.shape[0] > 1 else 0], bodies[k]
         if parameters.shape[0] > 1:
             joints.gaps[::GAP_COLUMNS] = 0.0
         if body[STEP] == 0.0:
             launch(dissipation, p, joints, body)
-        if question == LEG:
-            what = follow_legs(dissipation, p, joints, body, records) if body[DIRECTION] != 0.0 else RESTS
+        if question == LEGS:
+            what = follow_legs(dissipation, p, joints, bodies, records) if body[DIRECTION] != 0.0 else RESTS
+        elif question == LEG_AGAIN:
+            what = advance(dissipation, p, joints, body, Reading(AGAIN, False, 1.0, -inf), records[0])
         elif body[DIRECTION] != 0.0:
             body[VALUE], body[STATUS] = answer(dissipation, p, joints, question, body, records[0])
         else:

@@ -23,8 +23,8 @@ from gqm_sym.runtime.launch.problem import Problem, bind
 from gqm_sym.runtime.launch.request import ONLY_SIGN, Launch
 from gqm_sym.runtime.launch.speed import path_and_force_at
 from gqm_sym.runtime.legs import answers
-from gqm_sym.runtime.legs.advance import AT_ONCE, BEYOND, CREEPING_SHARE, LEAVES, RESTS, Joints, room_ahead
-from gqm_sym.runtime.legs.answers import LEAST_SWING, LEG, MAX_PAUSES, MAX_TURNS
+from gqm_sym.runtime.legs.advance import AT_ONCE, BEYOND, CREEPING_SHARE, LEAVES, RESTS
+from gqm_sym.runtime.legs.answers import LEAST_SWING, LEG_AGAIN, LEGS, MAX_PAUSES, MAX_TURNS, Track, joints_of
 from gqm_sym.runtime.legs.body import (
     DIRECTION,
     ELAPSED,
@@ -162,6 +162,22 @@ def _loss(problem: Problem) -> Dissipation:
     return loss.addresses()
 
 
+def _track(problem: Problem) -> Track:
+    """The curve of a motion, with all places where it, or its chart, is not smooth."""
+    f = problem.functions
+    chart = None if problem.formulas.chart is None else problem.formulas.charted(problem.p)
+    drops = f.drops(ONLY_SIGN[problem.launch.contact])
+    return (
+        Track(NOWHERE, f.breaks, f.corners, drops)
+        if chart is None
+        else Track(chart.block, chart.joints, f.corners, drops)
+    )
+
+
+# In the surroundings of an equilibrium (`Frame`) everything is smooth.
+SMOOTH = Track(NOWHERE, NOWHERE, NOWHERE, NOWHERE)
+
+
 class Reading(NamedTuple):
     """What compiled code reads of a motion.
 
@@ -207,10 +223,10 @@ class DissipativeMotion(Motion):
         self._tabulated: list[TabulatedPiece] = []
         launch, domain = problem.launch, problem.domain
         super().__init__(problem, "dissipative", launch.direction)
-        self._joints = self._all_joints()
-        self._space = FEW_PANELS + problem.functions.breaks.size
+        self._dissipation, self._track = _loss(problem), _track(problem)
+        self._space = FEW_PANELS
         self._body = launched(
-            *(1, launch.lam0.value, domain.low, domain.high, domain.period),
+            *(1 + LEGS_PER_CALL, launch.lam0.value, domain.low, domain.high, domain.period),
             *(launch.direction, ONLY_SIGN[launch.contact], self._horizon, nan, problem.w0),
         )
         self._at = self._body[0].tolist()
@@ -247,7 +263,7 @@ class DissipativeMotion(Motion):
         everything = [*self._laid, *self._runs]
         runs = everything[: self._beginning or None]
         cuts_at_changes = "contact-sign" not in self._internal_ends
-        if self._joints.corners.size or (cuts_at_changes and any(run.record[CHANGE_COUNT] for run in runs)):
+        if self._track.corners.size or (cuts_at_changes and any(run.record[CHANGE_COUNT] for run in runs)):
             return super().legs
         begins = [*(float(run.record[BEGIN]) for run in everything), self._elapsed]
         lap, stops = self.problem.period, begins[1 : len(runs) + 1]
@@ -256,7 +272,8 @@ class DissipativeMotion(Motion):
 
     def _place_on_last_leg(self, t: float) -> float:
         run = next(run for run in reversed([*self._laid, *self._runs]) if run.record[BEGIN] <= t)
-        place = place_at(run.record, (t - run.record[BEGIN]) - run.record[BEGIN_LOW])
+        record = run.record if run.passed is None else run.passed
+        place = place_at(record, (t - record[BEGIN]) - record[BEGIN_LOW])
         return float(self.lam(t)) if isnan(place) else place + run.laps * self.problem.period
 
     def lam(self, t: Any) -> Any:
@@ -380,7 +397,7 @@ class DissipativeMotion(Motion):
         """The turn at which the motion is nearest to another number of legs; see `Motion.nearest_switch`."""
         turns = [leg for leg in self.legs if leg.end in ("turn", "rest")]
         functions = self.problem.functions
-        return nearest_switch(_loss(self.problem).static_balance, functions.p, turns, self.problem.period)
+        return nearest_switch(self._dissipation.static_balance, functions.p, turns, self.problem.period)
 
     @property
     def _changes(self) -> Changes:
@@ -427,7 +444,7 @@ class DissipativeMotion(Motion):
 
     @property
     def _internal_ends(self) -> tuple[str, ...]:
-        return ("",) if _loss(self.problem).friction else ("", "contact-sign")
+        return ("",) if self._dissipation.friction else ("", "contact-sign")
 
     def _follow(self, reach: float) -> None:
         """Compute legs up to a time in s, and up to the horizon if there is one."""
@@ -498,9 +515,9 @@ class DissipativeMotion(Motion):
         """The errors at the end of a leg, given those with which it begins; in a frame, errors of distances."""
         run, before = self._laid[leg], self._errors[leg]
         frame, turns = run.frame, run.what in (TURN, RESTS)
-        share, terms = rounding_share(_loss(self.problem).linear), self._terms_of(leg)
+        share, terms = rounding_share(self._dissipation.linear), self._terms_of(leg)
         if frame is None:
-            loss, p = _loss(self.problem), self.problem.functions.p
+            loss, p = self._dissipation, self.problem.functions.p
             return _known(carry(loss, p, turns, before, share, terms, run.record))
         if leg == 0 or self._laid[leg - 1].frame is None:
             before = before._replace(place=before.place + frame.error)
@@ -521,7 +538,7 @@ class DissipativeMotion(Motion):
                 with suppress(SolutionError):  # formulas may be too long
                     errors = Law(self.problem).force_errors_along([missing[k] for k in by_place])
                     for k, of_panels in zip(by_place, errors, strict=True):
-                        terms[k] = of_panels / rounding_share(_loss(self.problem).linear)
+                        terms[k] = of_panels / rounding_share(self._dissipation.linear)
             self._terms += terms
         return self._terms[leg]
 
@@ -566,7 +583,7 @@ class DissipativeMotion(Motion):
     def _pieces(self) -> list[TimedSegment]:
         """All segments so far."""
         for run in self._runs:
-            self._lay(run)
+            self._lay(self._with_panels(run))
         self._runs.clear()
         return self._segments
 
@@ -578,11 +595,11 @@ class DissipativeMotion(Motion):
                 "give a shorter t_max, or ask for earlier times and nearer places"
             )
         problem, frame = self.problem, self._frame
-        what, *passed, record = self._followed()
+        what, *passed, (before, record) = self._followed()
         if self._body[0, DIRECTION] == 0.0 and not self._body[0, TURNS]:
             return  # the body stays where it is
-        self._runs += [Run(before, TURN, END_NAMES[TURN], None) for before in passed]
-        self._stored += sum(1 + int(one[AHEAD] + one[BACK]) for one in (*passed, record))
+        self._runs += [Run(leg, TURN, END_NAMES[TURN], None, line) for line, leg in passed]
+        self._stored += sum(1 + int(leg[AHEAD] + leg[BACK]) for _, leg in (*passed, (before, record)))
         self._at = self._body[0].tolist()
         if frame is not None:
             frame.move(record, 1)
@@ -597,7 +614,7 @@ class DissipativeMotion(Motion):
         if what == SPENT:
             raise self._lost(record)
         name = "" if leaves_frame else self._end_name(what, record, heading)
-        self._runs.append(Run(record, what, name, frame))
+        self._runs.append(Run(record, what, name, frame, before if what in (TURN, RESTS, LIMIT) else None))
         if self._at[ENDING]:
             self._ending = name
         if not self._beginning and not isfinite(self._horizon) and not self._ending and self._goes_on_for_ever:
@@ -609,21 +626,44 @@ class DissipativeMotion(Motion):
             )
 
     def _followed(self) -> tuple[Any, ...]:
-        """What ended the last of the next legs (`advance`), and the records of all of them; one if the body stays."""
-        frame = self._frame
-        loss, parameters = (_loss(self.problem), self.problem.functions.p) if frame is None else frame[:2]
-        legs = LEGS_PER_CALL if frame is None and isfinite(self._horizon) else 1
+        """What ended the last of the next legs (`advance`), and of each of them the record and what `Run.before` is."""
+        legs = LEGS_PER_CALL if self._frame is None and isfinite(self._horizon) else 1
         while True:
             records = np.empty((legs, self._space * COLUMNS))
-            what = answers.drive(loss, parameters.reshape(1, -1), self._joints, LEG, self._body, records)
+            what, has_panels = self._drive(LEGS, self._body, records, self._frame)
             count = int(self._body[0, VALUE])
             if what != FULL or count:
-                return (what if what != FULL else TURN), *records[: max(count, 1)]
+                count = max(count, 1)
+                before = [None] * count if has_panels else self._body[1 : 1 + count].copy()
+                return (what if what != FULL else TURN), *zip(before, records[:count], strict=True)
             legs, self._space = 1, 4 * self._space
+
+    def _drive(self, question: int, bodies: Array, records: Array, frame: Frame | None) -> tuple[int, bool]:
+        """Drive the body (`answers.drive`); also whether legs are followed by their panels at once."""
+        if frame is not None:
+            with joints_of(frame.dissipation, (), SMOOTH) as joints:
+                p = frame.p.reshape(1, -1)
+                return answers.drive(frame.dissipation, p, joints, question, bodies, records), True
+        p = self.problem.functions.p.reshape(1, -1)
+        with joints_of(self._dissipation, tuple(self.problem.p.values.tolist()), self._track) as joints:
+            return answers.drive(self._dissipation, p, joints, question, bodies, records), joints.gaps.size == 0
+
+    def _with_panels(self, run: Run) -> Run:
+        """A run with its panels, for which it is followed once more if need be."""
+        if run.before is None:
+            return run
+        space, what = FEW_PANELS + self._track.breaks.size, FULL
+        while what == FULL:
+            body, record = run.before.reshape(1, -1).copy(), np.empty(space * COLUMNS)
+            what, _ = self._drive(LEG_AGAIN, body, record.reshape(1, -1), None)
+            space *= 4
+        if what not in (TURN, RESTS, LIMIT):
+            raise self._lost(record)
+        return run.with_panels(record, self._horizon)
 
     def _settle(self, what: int, start: float, end: float) -> None:
         """Look whether a run has come so close to an equilibrium that the motion ends there, or goes on in a frame."""
-        in_frame, linear = self._frame is not None, _loss(self.problem).linear
+        in_frame, linear = self._frame is not None, self._dissipation.linear
         if what in (TURN, PAUSED) and self._has_died_away(start, end):
             self._ending = "asymptote"
         elif what == ASYMPTOTE and not linear:
@@ -659,7 +699,7 @@ class DissipativeMotion(Motion):
 
         About an unstable equilibrium it does not stay, so that only its launch, ``lam0``, is worth that.
         """
-        problem, line, loss = self.problem, self._body[0], _loss(self.problem)
+        problem, line, loss = self.problem, self._body[0], self._dissipation
         ends = np.abs(np.append(problem.functions.breaks, (problem.low, problem.high)) - place)
         reach = min(starting_step(problem), float(ends.min()))
         if not may_be_small(loss, problem.functions.p, place, v2, reach):
@@ -678,14 +718,14 @@ class DissipativeMotion(Motion):
             line[PLACE] = 0.0  # there it stays
         self._check_distance(frame.size(line[PLACE], v2), frame)
         reach = reach if frame.is_stable else min(reach, frame.reach)
-        self._frame, self._joints = frame, Joints(NOWHERE, NOWHERE, NOWHERE, NOWHERE)
+        self._frame = frame
         line[LAM0], line[LOW], line[HIGH], line[PERIOD] = line[PLACE], -reach, reach, 0.0
         line[FIRST_STEP] = reach
 
     def _check_distance(self, size: float, frame: Frame) -> None:
         """Refuse a launch so near to an unstable equilibrium that doubles do not hold what makes the body depart."""
         place = float(frame.p[PLACE_IN_FRAME])
-        nearest = LEAST_SWING if _loss(self.problem).linear else NEAREST_SHARE * abs(place)
+        nearest = LEAST_SWING if self._dissipation.linear else NEAREST_SHARE * abs(place)
         if not frame.is_stable and 0.0 < size < nearest:
             raise LaunchError(
                 f"lam0: a motion from so near to the unstable equilibrium at {self.problem.formulas.parameter} = "
@@ -693,16 +733,10 @@ class DissipativeMotion(Motion):
                 "the equilibrium itself"
             )
 
-    def _all_joints(self) -> Joints:
-        """Where the curve is not smooth."""
-        f = self.problem.functions
-        drops = f.drops(ONLY_SIGN[self.problem.launch.contact])
-        return Joints(f.breaks, f.corners, drops, np.empty(room_ahead(f.breaks.size)))
-
     def _leave_frame(self, record: Array) -> None:
         """Follow the body by its place again; the record has places."""
         problem, line = self.problem, self._body[0]
-        self._frame, self._joints = None, self._all_joints()
+        self._frame = None
         domain, step = problem.domain, starting_step(problem)
         line[PLACE], line[PLACE_LOW], line[ENDING] = record[END], record[END_LOW], 0.0
         line[LAM0], line[LOW], line[HIGH], line[PERIOD] = problem.lam0, domain.low, domain.high, domain.period

@@ -53,8 +53,9 @@ END, END_LOW, MIDDLE, MIDDLE_LOW, HALF_C, TIME_FROM_START, TIME_FROM_END, CHANGE
 WHOLE, AHEAD, BACK, HEAD = range(15, 19)
 
 # What is read of a record (`leg_run.Reading`): the times and places between which the leg runs; the largest or smallest
-# speed or contact force, too; the time at which the body passes a place; or all that panels say.
-TIMES, PEAKS, PASSAGE, PANELS = range(4)
+# speed or contact force, too; the time at which the body passes a place; or all that panels say. AGAIN is PANELS for a
+# leg whose end is known from times: it does not pause before.
+TIMES, PEAKS, PASSAGE, PANELS, AGAIN = range(5)
 
 COLUMNS = 4 * WIDE
 RIGHT, TIME, TIME_ERROR = range(COUNT, 3 * WIDE, WIDE)

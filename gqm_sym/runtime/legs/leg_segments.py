@@ -24,6 +24,7 @@ from gqm_sym.runtime.legs.leg_record import (
     CHANGE_COUNT,
     COLUMNS,
     END,
+    END_LOW,
     FIELD_COLUMNS,
     HALF_C,
     HEAD,
@@ -33,6 +34,8 @@ from gqm_sym.runtime.legs.leg_record import (
     START,
     TIME,
     TIME_ERROR,
+    TIME_FROM_END,
+    TIME_FROM_START,
     Y_ROW,
 )
 from gqm_sym.runtime.legs.leg_run import ASYMPTOTE
@@ -96,12 +99,30 @@ class Run(NamedTuple):
         The name of its end, as of `Leg.end`.
     frame : Frame or None
         The surroundings of an equilibrium by which it was followed.
+    before : array or None
+        The line of the body before it (`legs.body`), if the record says no more of its panels than their times.
+    passed : array or None
+        That record, once `record` has the panels of a leg on which a place is read off it.
     """
 
     record: Array
     what: int
     end: str
     frame: Frame | None
+    before: Array | None = None
+    passed: Array | None = None
+
+    def with_panels(self, record: Array, until: float) -> "Run":
+        """The run with the panels of another record of it, which agrees with its own to rounding.
+
+        Its own one tells where the body is at the last time of the motion, ``until``, if that is on it.
+        """
+        begin, times = self.record[BEGIN], self.record[TIME_FROM_START : TIME_FROM_END + 1].sum()
+        is_last = begin <= until <= begin + 2.0 * times
+        spent = self.record[TIME_FROM_START : TIME_FROM_END + 1] - record[TIME_FROM_START : TIME_FROM_END + 1]
+        record[END : END_LOW + 1] = self.record[END : END_LOW + 1]
+        record[TIME_FROM_END if record[BACK] else TIME_FROM_START] += spent[0] + spent[1]
+        return self._replace(record=record, before=None, passed=self.record if is_last else None)
 
     @property
     def laps(self) -> int:

@@ -192,7 +192,7 @@ def test_a_leg_that_cannot_be_followed(slope: ModuleType, monkeypatch: pytest.Mo
     """The error names the place up to which it was followed."""
 
     def lost(*arguments: Any) -> int:
-        arguments[-1][:, leg_record.END] = 0.5
+        arguments[-1][:], arguments[-1][:, leg_record.END] = 0.0, 0.5
         return leg_run.SPENT
 
     motion = slope.solve(lam0=0, mu=0.1)
