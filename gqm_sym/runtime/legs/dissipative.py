@@ -23,9 +23,18 @@ from gqm_sym.runtime.launch.formulas import Formulas, ParameterValues
 from gqm_sym.runtime.launch.problem import Problem, bind_all
 from gqm_sym.runtime.launch.request import ONLY_SIGN, Launch
 from gqm_sym.runtime.launch.speed import path_and_force_at
-from gqm_sym.runtime.legs import answers
-from gqm_sym.runtime.legs.advance import AT_ONCE, BEYOND, CREEPING_SHARE, LEAVES, RESTS, Joints, room_ahead
-from gqm_sym.runtime.legs.answers import FIRST_LEG, LEAST_SWING, LEG, MAX_PAUSES, MAX_TURNS, NEARBY
+from gqm_sym.runtime.legs.advance import AT_ONCE, BEYOND, CREEPING_SHARE, LEAVES, RESTS
+from gqm_sym.runtime.legs.answers import (
+    FIRST_LEGS,
+    LEAST_SWING,
+    LEGS,
+    MAX_PAUSES,
+    MAX_TURNS,
+    NEARBY,
+    RUN_AGAIN,
+    Track,
+    drive_along,
+)
 from gqm_sym.runtime.legs.body import (
     DIRECTION,
     ELAPSED,
@@ -64,12 +73,13 @@ from gqm_sym.runtime.legs.leg_record import (
     HEAD,
     HEADING,
     INHERITED,
+    LAPS_BEFORE,
     MIDDLE,
     START,
     TIME_FROM_END,
     TIME_FROM_START,
 )
-from gqm_sym.runtime.legs.leg_run import ASYMPTOTE, FULL, LIFTOFF, LIMIT, NARROWED, PAUSED, SPENT, TURN
+from gqm_sym.runtime.legs.leg_run import ASYMPTOTE, FULL, LIFTOFF, LIMIT, NARROWED, PAUSED, SLOWED, SPENT, TURN
 from gqm_sym.runtime.legs.leg_segments import Run, TabulatedPiece, along_field, along_panels, leg_record, tabulated
 from gqm_sym.runtime.legs.variations.answers import Switch, gradient, nearest_switch, places_at, states_at
 from gqm_sym.runtime.legs.variations.changes import Changes
@@ -117,8 +127,8 @@ NEAR_EQUILIBRIUM = 1e-13
 # body is no product of a factor and V**2: it is a difference of forces there that agree to a rounding.
 NEAREST_SHARE = 1e-20
 
-# What compiled code reads of a curve that is smooth everywhere.
-SMOOTH = Joints(NOWHERE, NOWHERE, NOWHERE, NOWHERE)
+# What ends a leg along a chart that may have been passed by what is kept of the curve (`answers.follow_leg`).
+PASSED = TURN, RESTS, LIMIT
 
 # The names of what ends a run, where the code alone says it.
 END_NAMES = {
@@ -164,6 +174,18 @@ def _loss(problem: Problem) -> Dissipation:
     loss = problem.functions.dissipation
     assert loss is not None
     return loss
+
+
+def _track(problem: Problem) -> Track:
+    """The curve of a motion, with all places where it, or its chart, is not smooth."""
+    if problem.formulas.chart is None:
+        return SMOOTH
+    f, chart = problem.functions, problem.formulas.charted(problem.p)
+    return Track(chart.block, chart.joints, f.corners, f.drops(ONLY_SIGN[problem.launch.contact]))
+
+
+# Curves with formulas are smooth, and so is any curve next to an equilibrium (`Frame`).
+SMOOTH = Track(NOWHERE, NOWHERE, NOWHERE, NOWHERE)
 
 
 class Reading(NamedTuple):
@@ -214,10 +236,12 @@ class DissipativeMotion(Motion):
         self._tabulated: list[TabulatedPiece] = []
         launch, domain = problem.launch, problem.domain
         super().__init__(problem, "dissipative", launch.direction)
-        self._joints = self._all_joints()
-        self._space = FEW_PANELS + problem.functions.breaks.size
-        ends, asked = domain.numbers[:3], (ONLY_SIGN[launch.contact], self._horizon, nan)
-        self._body = launched([(launch.lam0.value, *ends, launch.direction, *asked, problem.w0)])
+        self._dissipation, self._track = _loss(problem), _track(problem)
+        passes = self._track.is_kept(self._dissipation)
+        self._space = FEW_PANELS + (0 if passes else self._track.breaks.size)
+        given = (launch.lam0.value, *domain.numbers[:3], launch.direction, ONLY_SIGN[launch.contact])
+        # Behind the body are lines for what it was before each leg, if legs may have to be followed again.
+        self._body = launched([(*given, self._horizon, nan, problem.w0)] * (1 + LEGS_PER_CALL if passes else 1))
         self._at: list[float] = []
         self._frame: Frame | None = None
         # The errors with which the legs begin.
@@ -250,7 +274,7 @@ class DissipativeMotion(Motion):
         everything = [*self._laid, *self._runs]
         runs = everything[: self._beginning or None]
         cuts_at_changes = "contact-sign" not in self._internal_ends
-        if self._joints.corners.size or (cuts_at_changes and any(run.record[CHANGE_COUNT] for run in runs)):
+        if self._track.corners.size or (cuts_at_changes and any(run.record[CHANGE_COUNT] for run in runs)):
             return super().legs
         begins = [*(float(run.record[BEGIN]) for run in everything), self._elapsed]
         lap, stops = self.problem.period, begins[1 : len(runs) + 1]
@@ -259,8 +283,9 @@ class DissipativeMotion(Motion):
 
     def _place_on_last_leg(self, t: float) -> float:
         run = next(run for run in reversed([*self._laid, *self._runs]) if run.record[BEGIN] <= t)
-        place = place_at(run.record, (t - run.record[BEGIN]) - run.record[BEGIN_LOW])
-        return float(self.lam(t)) if isnan(place) else place + run.laps * self.problem.period
+        record = run.record if run.passed is None else run.passed
+        place = place_at(record, (t - record[BEGIN]) - record[BEGIN_LOW])
+        return float(self.lam(t)) if isnan(place) else place + float(record[LAPS_BEFORE]) * self.problem.period
 
     def lam(self, t: Any) -> Any:
         """The curve parameter at times; see `Motion.lam`. For doubles this is one call of compiled code."""
@@ -412,7 +437,7 @@ class DissipativeMotion(Motion):
         """The turn at which the motion is nearest to another number of legs; see `Motion.nearest_switch`."""
         turns = [leg for leg in self.legs if leg.end in ("turn", "rest")]
         functions = self.problem.functions
-        return nearest_switch(_loss(self.problem).static_balance, functions.p, turns, self.problem.period)
+        return nearest_switch(self._dissipation.static_balance, functions.p, turns, self.problem.period)
 
     @property
     def _changes(self) -> Changes:
@@ -459,7 +484,7 @@ class DissipativeMotion(Motion):
 
     @property
     def _internal_ends(self) -> tuple[str, ...]:
-        return ("",) if _loss(self.problem).friction else ("", "contact-sign")
+        return ("",) if self._dissipation.friction else ("", "contact-sign")
 
     def _follow(self, reach: float) -> None:
         """Compute legs up to a time in s, and up to the horizon if there is one."""
@@ -530,9 +555,9 @@ class DissipativeMotion(Motion):
         """The errors at the end of a leg, given those with which it begins; in a frame, errors of distances."""
         run, before = self._laid[leg], self._errors[leg]
         frame, turns = run.frame, run.what in (TURN, RESTS)
-        share, terms = rounding_share(_loss(self.problem).linear), self._terms_of(leg)
+        share, terms = rounding_share(self._dissipation.linear), self._terms_of(leg)
         if frame is None:
-            loss, p = _loss(self.problem), self.problem.functions.p
+            loss, p = self._dissipation, self.problem.functions.p
             return _known(carry(loss, p, turns, before, share, terms, run.record))
         if leg == 0 or self._laid[leg - 1].frame is None:
             before = before._replace(place=before.place + frame.error)
@@ -553,7 +578,7 @@ class DissipativeMotion(Motion):
                 with suppress(SolutionError):  # formulas may be too long
                     errors = Law(self.problem).force_errors_along([missing[k] for k in by_place])
                     for k, of_panels in zip(by_place, errors, strict=True):
-                        terms[k] = of_panels / rounding_share(_loss(self.problem).linear)
+                        terms[k] = of_panels / rounding_share(self._dissipation.linear)
             self._terms += terms
         return self._terms[leg]
 
@@ -598,7 +623,11 @@ class DissipativeMotion(Motion):
     def _pieces(self) -> list[TimedSegment]:
         """All segments so far."""
         for run in self._runs:
-            self._lay(run)
+            parts = self._with_panels(run)
+            if len(self._laid) < self._beginning:
+                self._beginning += len(parts) - 1
+            for part in parts:
+                self._lay(part)
         self._runs.clear()
         return self._segments
 
@@ -611,21 +640,24 @@ class DissipativeMotion(Motion):
             )
         what, records = self._followed()
         frame, at = self._frame, self._body[0].tolist()
+        passes = frame is None and self._track.is_kept(self._dissipation)
+        before = self._body[1 : 1 + len(records)].copy() if passes else [None] * len(records)
         if not at[DIRECTION] and not at[TURNS]:
             return  # the body stays where it is
         self._at, record = at, records[-1]
         for head in records[:, :HEAD].tolist():
             self._stored += 1 + int(head[AHEAD] + head[BACK])
         if len(records) > 1:
-            self._runs += [Run(before, TURN, END_NAMES[TURN], None) for before in records[:-1]]
+            earlier = zip(records[:-1], before[:-1], strict=True)
+            self._runs += [Run(leg, TURN, END_NAMES[TURN], None, line) for leg, line in earlier]
         if what == TURN and frame is None and not at[STATUS]:
-            self._runs.append(Run(record, TURN, END_NAMES[TURN], None))
+            self._runs.append(Run(record, TURN, END_NAMES[TURN], None, before[-1]))
         else:
-            self._end_run(what, record)
+            self._end_run(what, record, before[-1])
         if not self._beginning and not self._ending and self._horizon == inf and self._goes_on_for_ever:
             self._beginning = len(self._laid) + len(self._runs)
 
-    def _end_run(self, what: int, record: Array) -> None:
+    def _end_run(self, what: int, record: Array, before: Array | None) -> None:
         """Note a run that another follows in another way, or none."""
         problem, frame = self.problem, self._frame
         if frame is not None:
@@ -640,7 +672,7 @@ class DissipativeMotion(Motion):
         if what == SPENT:
             raise self._lost(record)
         name = "" if leaves_frame else self._end_name(what, record, heading)
-        self._runs.append(Run(record, what, name, frame))
+        self._runs.append(Run(record, what, name, frame, before if what in PASSED else None))
         if self._at[ENDING]:
             self._ending = name
         if what == BEYOND:
@@ -651,24 +683,49 @@ class DissipativeMotion(Motion):
 
     def _followed(self) -> tuple[int, Array]:
         """What ended the last of the next legs (`advance`), and the records of all of them; one if the body stays."""
-        legs, question = (LEGS_PER_CALL if self._horizon < inf else 1, LEG) if self._at else (1, FIRST_LEG)
+        legs, question = (LEGS_PER_CALL if self._horizon < inf else 1, LEGS) if self._at else (1, FIRST_LEGS)
         while True:
-            frame = self._frame
-            loss, parameters = (_loss(self.problem), self.problem.functions.p) if frame is None else frame[:2]
-            records = np.empty((legs if frame is None else 1, self._space * COLUMNS))
-            what = answers.drive(loss, parameters.reshape(1, -1), self._joints, question, self._body, records)
+            records = np.empty((legs if self._frame is None else 1, self._space * COLUMNS))
+            what = self._drive(question, self._body, records)
             count = int(self._body[0, VALUE])
             if what == NEARBY:
                 self._launch_nearby()
-                question = LEG
+                question = LEGS
             elif what != FULL or count:
                 return (what if what != FULL else TURN), records[: max(count, 1)]
             else:
                 legs, self._space = 1, 4 * self._space
 
+    def _drive(self, question: int, bodies: Array, records: Array) -> int:
+        """Drive the body along the curve, or by its distance from an equilibrium (`answers.drive`)."""
+        frame = self._frame
+        if frame is not None:
+            return drive_along(SMOOTH, frame.dissipation, frame.p.reshape(1, -1), question, bodies, records)
+        p = self.problem.functions.p.reshape(1, -1)
+        return drive_along(self._track, self._dissipation, p, question, bodies, records)
+
+    def _with_panels(self, run: Run) -> list[Run]:
+        """A run with its panels, for which it is followed once more if need be, in as many runs as that takes."""
+        if run.before is None:
+            return [run]
+        space, body, parts = FEW_PANELS + self._track.breaks.size, run.before.reshape(1, -1).copy(), []
+        p = self.problem.functions.p.reshape(1, -1)
+        for _ in range(MAX_PAUSES):
+            record = np.empty((1, space * COLUMNS))
+            what = drive_along(self._track, self._dissipation, p, RUN_AGAIN, body, record)
+            if what in PASSED:
+                return run.with_panels([*parts, record[0]], self._horizon)
+            if what == FULL:
+                space *= 4
+            elif what in (PAUSED, SLOWED):
+                parts.append(record[0])
+            else:
+                break
+        raise self._lost(record[0])
+
     def _settle(self, what: int, start: float, end: float) -> None:
         """Look whether a run has come so close to an equilibrium that the motion ends there, or goes on in a frame."""
-        in_frame, linear = self._frame is not None, _loss(self.problem).linear
+        in_frame, linear = self._frame is not None, self._dissipation.linear
         if what in (TURN, PAUSED) and self._has_died_away(start, end):
             self._ending = "asymptote"
         elif what == ASYMPTOTE and not linear:
@@ -716,8 +773,8 @@ class DissipativeMotion(Motion):
 
         About an unstable equilibrium it does not stay, so that only its launch, ``lam0``, is worth that.
         """
-        problem, line, loss = self.problem, self._body[0], _loss(self.problem)
-        if not (lam0 or is_small(loss, problem.functions.p, problem.functions.breaks, line)):
+        problem, line, loss = self.problem, self._body[0], self._dissipation
+        if not is_small(loss, problem.functions.p, problem.functions.breaks, line):
             return
         place, low, v2 = line[[PLACE, PLACE_LOW, V2]].tolist()
         ends = np.abs(np.append(problem.functions.breaks, (problem.low, problem.high)) - place)
@@ -736,14 +793,14 @@ class DissipativeMotion(Motion):
             line[PLACE] = 0.0  # there it stays
         self._check_distance(frame.size(line[PLACE], v2), frame)
         reach = reach if frame.is_stable else min(reach, frame.reach)
-        self._frame, self._joints = frame, SMOOTH
+        self._frame = frame
         line[LAM0], line[LOW], line[HIGH], line[PERIOD] = line[PLACE], -reach, reach, 0.0
         line[FIRST_STEP] = reach
 
     def _check_distance(self, size: float, frame: Frame) -> None:
         """Refuse a launch so near to an unstable equilibrium that doubles do not hold what makes the body depart."""
         place = float(frame.p[PLACE_IN_FRAME])
-        nearest = LEAST_SWING if _loss(self.problem).linear else NEAREST_SHARE * abs(place)
+        nearest = LEAST_SWING if self._dissipation.linear else NEAREST_SHARE * abs(place)
         if not frame.is_stable and 0.0 < size < nearest:
             raise LaunchError(
                 f"lam0: a motion from so near to the unstable equilibrium at {self.problem.formulas.parameter} = "
@@ -751,18 +808,10 @@ class DissipativeMotion(Motion):
                 "the equilibrium itself"
             )
 
-    def _all_joints(self) -> Joints:
-        """Where the curve is not smooth."""
-        f = self.problem.functions
-        if not f.breaks.size:
-            return SMOOTH
-        drops = f.drops(ONLY_SIGN[self.problem.launch.contact])
-        return Joints(f.breaks, f.corners, drops, np.empty(room_ahead(f.breaks.size)))
-
     def _leave_frame(self, record: Array) -> None:
         """Follow the body by its place again; the record has places."""
         problem, line = self.problem, self._body[0]
-        self._frame, self._joints = None, self._all_joints()
+        self._frame = None
         domain, step = problem.domain, starting_step(problem)
         line[PLACE], line[PLACE_LOW], line[ENDING] = record[END], record[END_LOW], 0.0
         line[LAM0], line[LOW], line[HIGH], line[PERIOD] = problem.lam0, domain.low, domain.high, domain.period
