@@ -325,15 +325,17 @@ def drive_along(
     track: Track, dissipation: Dissipation, parameters: Array, question: int, bodies: Array, records: Array
 ) -> int:
     """`drive` bodies along a curve, with what is kept of it for these forces and run-time parameters."""
-    ahead, kept, key = np.empty(room_ahead(track.breaks.size)), NOTHING, None
+    if not track.breaks.size:
+        what: int = drive(dissipation, parameters, SMOOTH, question, bodies, records)
+        return what
+    key, kept = (dissipation, id(track.chart), parameters[0, : -track.chart.size].tobytes()), NOTHING
     if track.is_kept(dissipation):
-        key = dissipation, id(track.chart), parameters[0, : -track.chart.size].tobytes()
         with _LOCK:
             found = _KEPT.pop(key, None)
         kept = np.zeros(room_kept(track.breaks.size)) if found is None else found[0]
-    joints = Joints(*track[1:], ahead, kept) if track.breaks.size else SMOOTH
-    what: int = drive(dissipation, parameters, joints, question, bodies, records)
-    if key is not None:
+    joints = Joints(*track[1:], np.empty(room_ahead(track.breaks.size)), kept)
+    what = drive(dissipation, parameters, joints, question, bodies, records)
+    if kept.size:
         with _LOCK:
             _KEPT[key] = kept, track.chart
             while len(_KEPT) > MAX_KEPT:

@@ -181,7 +181,7 @@ def _track(problem: Problem) -> Track:
     if problem.formulas.chart is None:
         return SMOOTH
     f, chart = problem.functions, problem.formulas.charted(problem.p)
-    return Track(chart.block, chart.joints, f.corners, f.drops(ONLY_SIGN[problem.launch.contact]))
+    return Track(chart.block, chart.inner_edges, f.corners, f.drops(ONLY_SIGN[problem.launch.contact]))
 
 
 # Curves with formulas are smooth, and so is any curve next to an equilibrium (`Frame`).
@@ -263,7 +263,8 @@ class DissipativeMotion(Motion):
     @locked
     def turning_points(self) -> tuple[float, ...]:
         """The turning points on `legs` in the order of time; the place of a launch from rest is one."""
-        turns = [leg.lam_end for leg in self.legs if leg.end == "turn"]
+        self._look_ahead()
+        turns = [leg.lam_end for leg in self._up_to_horizon(self._runs_as_legs()) if leg.end == "turn"]
         return (*((self.problem.lam0,) if self.problem.w0 == 0.0 else ()), *turns)
 
     @property
@@ -271,18 +272,26 @@ class DissipativeMotion(Motion):
     def legs(self) -> tuple[Leg, ...]:
         """The legs of the motion in the order of time; see `Motion.legs`."""
         self._look_ahead()
-        everything = [*self._laid, *self._runs]
-        runs = everything[: self._beginning or None]
         cuts_at_changes = "contact-sign" not in self._internal_ends
-        if self._track.corners.size or (cuts_at_changes and any(run.record[CHANGE_COUNT] for run in runs)):
+        shown = self._all_runs[: self._beginning or None]
+        if self._track.corners.size or (cuts_at_changes and any(run.record[CHANGE_COUNT] for run in shown)):
             return super().legs
-        begins = [*(float(run.record[BEGIN]) for run in everything), self._elapsed]
-        lap, stops = self.problem.period, begins[1 : len(runs) + 1]
-        legs = [run.leg(lap, stop) for run, stop in zip(runs, stops, strict=True)]
-        return Rows(self._up_to_horizon(merged(legs, self._internal_ends)))
+        return Rows(self._up_to_horizon(merged(self._runs_as_legs(), self._internal_ends)))
+
+    @property
+    def _all_runs(self) -> list[Run]:
+        """The runs so far."""
+        return [*self._laid, *self._runs]
+
+    def _runs_as_legs(self) -> list[Leg]:
+        """The runs that `legs` tells of, which changes of contact sign and corners do not cut."""
+        everything, lap = self._all_runs, self.problem.period
+        stops = [*(float(run.record[BEGIN]) for run in everything[1:]), self._elapsed]
+        shown = everything[: self._beginning or None]
+        return [run.leg(lap, stop) for run, stop in zip(shown, stops, strict=False)]
 
     def _place_on_last_leg(self, t: float) -> float:
-        run = next(run for run in reversed([*self._laid, *self._runs]) if run.record[BEGIN] <= t)
+        run = next(run for run in reversed(self._all_runs) if run.record[BEGIN] <= t)
         record = run.record if run.passed is None else run.passed
         place = place_at(record, (t - record[BEGIN]) - record[BEGIN_LOW])
         return float(self.lam(t)) if isnan(place) else place + float(record[LAPS_BEFORE]) * self.problem.period
@@ -442,9 +451,10 @@ class DissipativeMotion(Motion):
     @property
     def _changes(self) -> Changes:
         """How the legs so far change."""
-        pieces = self._pieces
-        if self._known_changes is None or len(self._known_changes.runs) < pieces[-1].leg + 1:
-            self._known_changes = Changes(self.problem, self._laid)
+        self._follow_again()
+        runs = self._all_runs
+        if self._known_changes is None or self._known_changes.followed < len(runs):
+            self._known_changes = Changes(self.problem, runs)
         return self._known_changes
 
     def fill_launch_leg(self, places: Array, v2: Array) -> None:
@@ -622,14 +632,21 @@ class DissipativeMotion(Motion):
     @property
     def _pieces(self) -> list[TimedSegment]:
         """All segments so far."""
+        self._follow_again()
         for run in self._runs:
-            parts = self._with_panels(run)
-            if len(self._laid) < self._beginning:
-                self._beginning += len(parts) - 1
-            for part in parts:
-                self._lay(part)
+            self._lay(run)
         self._runs.clear()
         return self._segments
+
+    def _follow_again(self) -> None:
+        """Follow runs once more whose panels are not known, each in as many parts as that takes."""
+        runs: list[Run] = []
+        for run in self._runs:
+            parts = self._with_panels(run)
+            if len(self._laid) + len(runs) < self._beginning:
+                self._beginning += len(parts) - 1
+            runs += parts
+        self._runs = runs
 
     def _go_on(self) -> None:
         """Follow the body to its next turn, to the end of the motion, or as far as one run goes."""
@@ -705,10 +722,11 @@ class DissipativeMotion(Motion):
         return drive_along(self._track, self._dissipation, p, question, bodies, records)
 
     def _with_panels(self, run: Run) -> list[Run]:
-        """A run with its panels, for which it is followed once more if need be, in as many runs as that takes."""
+        """A run in parts with panels; the run alone if these are known."""
         if run.before is None:
             return [run]
-        space, body, parts = FEW_PANELS + self._track.breaks.size, run.before.reshape(1, -1).copy(), []
+        parts: list[Array] = []
+        space, body = FEW_PANELS + self._track.breaks.size, run.before.reshape(1, -1).copy()
         p = self.problem.functions.p.reshape(1, -1)
         for _ in range(MAX_PAUSES):
             record = np.empty((1, space * COLUMNS))

@@ -340,7 +340,7 @@ def _groups(
         ends = CURVE_ENDS if has_ends else NO_ENDS
         launches, drops = [*some[:4], *domain, *some[4:]], chart.corners[chart.bends * only_sign < 0.0]
         # Bodies that lose energy pass the chart piece by piece.
-        joints = chart.breaks if not formulas.dissipation else chart.joints
+        joints = chart.breaks if not formulas.dissipation else chart.inner_edges
         yield Group(launches, chart.block, joints, chart.corners, drops, table, theirs, ends), chosen
 
 
