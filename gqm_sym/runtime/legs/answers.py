@@ -34,6 +34,7 @@ from gqm_sym.runtime.legs.body import (
     LAPS,
     MAY_REST,
     ONLY_SIGN,
+    PANEL_COUNT,
     PAUSES,
     PERIOD,
     PLACE,
@@ -49,6 +50,8 @@ from gqm_sym.runtime.legs.leg_equation import Forces
 from gqm_sym.runtime.legs.leg_panels import GAP_COLUMNS
 from gqm_sym.runtime.legs.leg_reading import passage, peak_of_leg
 from gqm_sym.runtime.legs.leg_record import (
+    AHEAD,
+    BACK,
     BEGIN,
     BEGIN_LOW,
     END,
@@ -261,6 +264,7 @@ def follow_legs(dissipation, p, joints, bodies, records):  # type: ignore[no-unt
         if what == FULL:
             break
         count += 1
+        body[PANEL_COUNT] += 1.0 + records[count - 1, AHEAD] + records[count - 1, BACK]
         body[STATUS] = 1.0 if is_tiny(records[count - 1]) else 0.0
         if what != TURN or body[ENDING] != 0.0 or body[ELAPSED] >= body[HORIZON] or body[STATUS] != 0.0:
             break

@@ -45,6 +45,7 @@ from gqm_sym.runtime.legs.body import (
     LAPS,
     LOW,
     MAY_REST,
+    PANEL_COUNT,
     PAUSES,
     PERIOD,
     PLACE,
@@ -62,15 +63,12 @@ from gqm_sym.runtime.legs.frames.local_frame import SMALL_SHARE, Frame, frame_ne
 from gqm_sym.runtime.legs.leg_errors import Errors, carry, rounding_share
 from gqm_sym.runtime.legs.leg_reading import place_at
 from gqm_sym.runtime.legs.leg_record import (
-    AHEAD,
-    BACK,
     BEGIN,
     BEGIN_LOW,
     CHANGE_COUNT,
     COLUMNS,
     END,
     END_LOW,
-    HEAD,
     HEADING,
     INHERITED,
     LAPS_BEFORE,
@@ -178,10 +176,8 @@ def _loss(problem: Problem) -> Dissipation:
 
 def _track(problem: Problem) -> Track:
     """The curve of a motion, with all places where it, or its chart, is not smooth."""
-    if problem.formulas.chart is None:
-        return SMOOTH
-    f, chart = problem.functions, problem.formulas.charted(problem.p)
-    return Track(chart.block, chart.inner_edges, f.corners, f.drops(ONLY_SIGN[problem.launch.contact]))
+    f = problem.functions
+    return Track(f.chart, f.joints, f.corners, f.drops(ONLY_SIGN[problem.launch.contact])) if f.chart.size else SMOOTH
 
 
 # Curves with formulas are smooth, and so is any curve next to an equilibrium (`Frame`).
@@ -216,14 +212,14 @@ class DissipativeMotion(Motion):
     _last_swing = 0.0
     # By what share the force next to the unstable equilibrium of a frame may be wrong.
     _force_error = 0.0
+    # What its distance from there may be wrong by at launch.
+    _launch_error: float | None = None
     _arc = 0.0
     _whole: Trajectory | None = None
     _known_changes: Changes | None = None
     _reading = Reading(np.empty(0), -1.0)
     # What is read of the first piece that one time was asked of, and when that begins.
     _first_reading, _first_since = Reading(np.empty(0), -1.0), 0.0
-    # How many panels there are, with one more for each run.
-    _stored = 0
     # How many runs `_look_ahead` computes of a motion that it finds no end of; 0 while that is not known.
     _beginning = 0
 
@@ -237,16 +233,16 @@ class DissipativeMotion(Motion):
         launch, domain = problem.launch, problem.domain
         super().__init__(problem, "dissipative", launch.direction)
         self._dissipation, self._track = _loss(problem), _track(problem)
-        passes = self._track.is_kept(self._dissipation)
+        # If legs are passed by what is kept of the curve, and may have to be followed again.
+        self._passes = passes = self._track.is_kept(self._dissipation)
         self._space = FEW_PANELS + (0 if passes else self._track.breaks.size)
-        given = (launch.lam0.value, *domain.numbers[:3], launch.direction, ONLY_SIGN[launch.contact])
-        # Behind the body are lines for what it was before each leg, if legs may have to be followed again.
-        self._body = launched([(*given, self._horizon, nan, problem.w0)] * (1 + LEGS_PER_CALL if passes else 1))
+        ends, asked = domain.numbers[:3], (ONLY_SIGN[launch.contact], self._horizon, nan)
+        given = (launch.lam0.value, *ends, launch.direction, *asked, problem.w0)
+        self._body = launched((given,), LEGS_PER_CALL if passes else 0)
         self._at: list[float] = []
         self._frame: Frame | None = None
-        # The errors with which the legs begin.
-        v0 = launch.v0
-        self._errors = [Errors(abs(launch.lam0.low), 2.0 * v0.value * abs(v0.low) + ULP * problem.w0, 0.0)]
+        # The errors with which the legs begin, once they are asked for.
+        self._errors: list[Errors] = []
         self._go_on()
         self.direction = int(self._runs[0].record[HEADING]) if self._runs else 0
 
@@ -539,6 +535,8 @@ class DissipativeMotion(Motion):
         return np.zeros_like(t)
 
     def _errors_before(self, timed: TimedSegment, phi: Array) -> tuple[float, Array]:
+        if not self._errors:
+            self._errors = [self._errors_at_launch()]
         while len(self._errors) <= timed.leg + 1:
             self._errors.append(self._carried(len(self._errors) - 1))
         run, (before, after) = self._laid[timed.leg], self._errors[timed.leg : timed.leg + 2]
@@ -555,6 +553,11 @@ class DissipativeMotion(Motion):
         if timed.sense > 0:
             return before.place + of_frame + swing, before.time + inherited + self._time_error_of_force(run)
         return after.place + of_frame + swing, after.time + after.place * inherited
+
+    def _errors_at_launch(self) -> Errors:
+        lam0, v0 = self.problem.launch[:2]
+        place = abs(lam0.low) if self._launch_error is None else self._launch_error
+        return Errors(place, 2.0 * v0.value * abs(v0.low) + ULP * self.problem.w0, 0.0)
 
     def _time_error_of_force(self, run: Run) -> float:
         """What the error of the force makes of the time in which a body departs from an equilibrium."""
@@ -650,20 +653,17 @@ class DissipativeMotion(Motion):
 
     def _go_on(self) -> None:
         """Follow the body to its next turn, to the end of the motion, or as far as one run goes."""
-        if self._stored >= MAX_STORED:
+        if self._at and self._at[PANEL_COUNT] >= MAX_STORED:
             raise BudgetError(
-                f"motion: {self._stored} pieces of legs reach t = {self._elapsed!r} only; "
+                f"motion: {self._at[PANEL_COUNT]:.0f} pieces of legs reach t = {self._elapsed!r} only; "
                 "give a shorter t_max, or ask for earlier times and nearer places"
             )
         what, records = self._followed()
         frame, at = self._frame, self._body[0].tolist()
-        passes = frame is None and self._track.is_kept(self._dissipation)
-        before = self._body[1 : 1 + len(records)].copy() if passes else [None] * len(records)
+        before = self._body[1 : 1 + len(records)].copy() if self._passes and frame is None else [None] * len(records)
         if not at[DIRECTION] and not at[TURNS]:
             return  # the body stays where it is
         self._at, record = at, records[-1]
-        for head in records[:, :HEAD].tolist():
-            self._stored += 1 + int(head[AHEAD] + head[BACK])
         if len(records) > 1:
             earlier = zip(records[:-1], before[:-1], strict=True)
             self._runs += [Run(leg, TURN, END_NAMES[TURN], None, line) for leg, line in earlier]
@@ -671,7 +671,7 @@ class DissipativeMotion(Motion):
             self._runs.append(Run(record, TURN, END_NAMES[TURN], None, before[-1]))
         else:
             self._end_run(what, record, before[-1])
-        if not self._beginning and not self._ending and self._horizon == inf and self._goes_on_for_ever:
+        if self._horizon == inf and not self._beginning and not self._ending and self._goes_on_for_ever:
             self._beginning = len(self._laid) + len(self._runs)
 
     def _end_run(self, what: int, record: Array, before: Array | None) -> None:
@@ -784,7 +784,7 @@ class DissipativeMotion(Motion):
             self._body[0, PLACE_LOW] = 0.0
         else:  # it is launched there again, by its distance
             self._body[0, STEP] = 0.0
-            self._errors[0] = self._errors[0]._replace(place=ULP * abs(self._body[0, PLACE]))
+            self._launch_error = ULP * abs(float(self._body[0, PLACE]))
 
     def _enter_frame(self, lam0: Number | None = None) -> None:
         """Follow the body from here on by its distance from an equilibrium, if it is, and for a while stays, close.
