@@ -58,7 +58,7 @@ def _sampled(lowering: Lowering) -> ChartIR:
     """A sampled curve: its points, as text."""
     track = lowering.model.curve.definition
     assert isinstance(track, Track)
-    space = ", in_space=True" if track.in_space else ""
+    space = (", in_space=True" if track.in_space else "") + (", banked=True" if track.banked else "")
     return ChartIR(
         statement=f"Sampled(POINTS, kind={track.kind!r}, closed={track.closed}{space})",
         imports=("Sampled",),

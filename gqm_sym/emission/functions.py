@@ -9,14 +9,14 @@ from sympy import Expr, Function, Symbol
 from gqm_sym.emission.ir import Assignment, ExactIR, FunctionIR
 from gqm_sym.emission.printer import CodePrinter, ExactPrinter, IntervalPrinter
 from gqm_sym.emission.subscripts import at
-from gqm_sym.sympy_charts import SPACE_ROWS, ChartFunction, chart_alpha, chart_kappa, chart_x, chart_z
+from gqm_sym.sympy_charts import ROLL, SPACE_ROWS, ChartFunction, chart_alpha, chart_kappa, chart_x, chart_z
 
 # What the arrays of charts are called in emitted functions, each with the rows that it has and where. In space each
-# coordinate has a chart; they stand one after the other, all of one size.
-SPACE_CHARTS = ("along_z", "along_x", "along_y")
+# coordinate has a chart, and the roll angle of points that have one; they stand one after the other, all of one size.
+SPACE_CHARTS = {f"along_{axis}": axis for axis in ("z", "x", "y", ROLL)}
 CHART_ROWS: dict[str, dict[type[ChartFunction], int]] = {
     "chart": {chart_x: 0, chart_z: 1, chart_alpha: 2, chart_kappa: 3},
-    **{name: dict(zip(SPACE_ROWS[name[-1]], (1, 2, 3), strict=True)) for name in SPACE_CHARTS},
+    **{name: dict(zip(SPACE_ROWS[axis], (1, 2, 3, 0), strict=True)) for name, axis in SPACE_CHARTS.items()},
 }
 
 # Columns up to which several loads of a value stand on one line.
@@ -60,8 +60,8 @@ def _unpacked(parameters: tuple[tuple[str, int], ...], p: str) -> list[str]:
 def _read_together(function: FunctionIR) -> tuple[FunctionIR, list[str]]:
     """A function that finds what charts say of its places in the last rows of ``out``, and the lines that fill these.
 
-    Neighbours often share a piece of the chart, which is then looked for once. Without a chart, or where ``out`` has
-    too few rows, the function is as it was.
+    Neighbours often share a piece of the chart, which is then looked for once. Without a chart the function is as it
+    was; what ``out`` has too few rows for is looked for place by place.
     """
     values = [*(a.value for a in function.inside), *function.outputs]
     given = {a.name: a.value for a in function.inside if type(a.value).__name__ == "at" and len(a.value.args) == 1}
@@ -70,10 +70,8 @@ def _read_together(function: FunctionIR) -> tuple[FunctionIR, list[str]]:
     if len(places) != 1 or not places <= given.keys():
         return function, []
     place = Symbol(places.pop(), real=True)
-    used = [head for head in heads if any(v.has(head(place)) for v in values)]
+    used = [head for head in heads if any(v.has(head(place)) for v in values)][: len(function.outputs)]
     out, first = function.arguments[-1], len(function.outputs) - len(used)
-    if first < 0:
-        return function, []
     names = {a.value: Symbol(a.name, real=True) for a in function.inside}
     read: dict[Expr, Symbol] = {}
     for head in used:
@@ -107,7 +105,7 @@ def loop(function: FunctionIR) -> tuple[dict[str, Any], set[str]]:
     inside += [f"{out}[{row}, {index}] = {printer.doprint(e)}" for row, e in enumerate(function.outputs)]
     if filled:
         printer.used.add("chart_rows")
-        printer.axes |= {line[len("chart_rows(along_")] for line in filled if "along_" in line}
+        printer.axes |= {axis for name, axis in SPACE_CHARTS.items() if any(f"({name}," in line for line in filled)}
     before = [*_chart_view(function, printer), *before, *filled]
     fields = {
         "name": function.name,
@@ -135,7 +133,7 @@ def _chart_view(function: FunctionIR, printer: CodePrinter) -> list[str]:
     first, *others = SPACE_CHARTS
     if printer.axes:
         offsets = [f"{count} + {k} * {first}.size" for k in range(1, len(SPACE_CHARTS))]
-        needed = [(name, at) for name, at in zip(others, offsets, strict=True) if name[-1] in printer.axes]
+        needed = [(name, at) for name, at in zip(others, offsets, strict=True) if SPACE_CHARTS[name] in printer.axes]
         return [f"{first} = chart_of({p}, {count})", *(f"{name} = chart_of({p}, {at})" for name, at in needed)]
     return [f"chart = chart_of({p}, {count})"] if any("chart_" in name for name in printer.used) else []
 

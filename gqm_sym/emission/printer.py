@@ -41,9 +41,10 @@ CHARTED = frozenset(
     | {head.__name__ for rows in SPACE_ROWS.values() for head in rows}
 )
 _CHART_CALL = re.compile(r"(divdiff[12]_)?chart_[a-z]+")
-# In space each coordinate has a chart, whose height is the coordinate; angle and curvature are its derivatives.
-_SPACE_CALL = re.compile(r"(i?(?:divdiff[12]_)?)space_(d{0,2})([xyz])")
-ROWS_BY_ORDER = ("chart_z", "chart_alpha", "chart_kappa")
+# In space each coordinate has a chart, whose height is the coordinate; its derivatives are in the places of angle,
+# curvature and x.
+_SPACE_CALL = re.compile(r"(i?(?:divdiff[12]_)?)space_(d*)(x|y|z|roll)")
+ROWS_BY_ORDER = ("chart_z", "chart_alpha", "chart_kappa", "chart_x")
 
 
 def check_emittable(expr: Expr, names: Collection[str], *, where: str) -> None:
