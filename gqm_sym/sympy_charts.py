@@ -8,8 +8,9 @@ chart of each coordinate, with its first three derivatives by arc length, and ma
 from typing import ClassVar
 
 import sympy as sp
-from sympy.core.function import ArgumentIndexError
 from sympy.printing.printer import Printer
+
+from gqm_sym.errors import DerivationError
 
 # How often coordinates in space are differentiated: rates of loads have third derivatives.
 MOST_DERIVATIVES = 3
@@ -71,9 +72,10 @@ class SpaceFunction(ChartFunction):
 
     def fdiff(self, argindex: int = 1) -> sp.Expr:
         """Return its derivative by arc length."""
-        if self.order == MOST_DERIVATIVES:
-            raise ArgumentIndexError(self, argindex)
-        return SPACE_ROWS[self.axis][self.order + 1](self.args[0])
+        heads = SPACE_CHARTS[self.axis]
+        if self.order + 1 == len(heads):
+            raise DerivationError(f"{self}: no derivative of it is known")
+        return heads[self.order + 1](self.args[0])
 
 
 def _of_axis(axis: str, order: int) -> type[SpaceFunction]:
@@ -92,3 +94,7 @@ SPACE: tuple[type[SpaceFunction], ...] = tuple(SPACE_ROWS[axis][0] for axis in A
 """The coordinates x, y and z."""
 space_roll: type[SpaceFunction] = SPACE_ROWS[ROLL][0]
 """The roll angle."""
+MEAN_HEIGHT: tuple[type[SpaceFunction], ...] = tuple(_of_axis("h", order) for order in range(3))
+"""The mean height of a train with its derivatives, by the place of its middle."""
+SPACE_CHARTS: dict[str, tuple[type[SpaceFunction], ...]] = {**SPACE_ROWS, "h": MEAN_HEIGHT}
+"""All that has a chart of its own, with its derivatives."""

@@ -7,7 +7,7 @@ differences do not cancel. Compiled code reads a chart from one flat array that 
 (`evaluate`).
 """
 
-from collections.abc import Hashable
+from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, field
 from math import inf
 from typing import Any, NamedTuple, Protocol
@@ -98,6 +98,8 @@ class Chart:
     origins : (n, 3) array
         For each piece, the index of the part of the track that it belongs to, and where it begins and ends in that
         part's own parameter; empty if the track has no parts.
+    joints : array
+        The arc length at the edges of all charts in the block, where it holds more than those of the curve.
     """
 
     block: Array
@@ -108,6 +110,7 @@ class Chart:
     breaks: Array = field(default_factory=lambda: np.empty(0))
     corners: Array = field(default_factory=lambda: np.empty(0))
     origins: Array = field(default_factory=lambda: np.empty((0, 3)))
+    joints: Array = field(default_factory=lambda: np.empty(0))
 
     @property
     def range(self) -> tuple[float, float, float]:
@@ -117,7 +120,7 @@ class Chart:
     @property
     def edges(self) -> Array:
         """Return the arc length at the edges of the pieces."""
-        return self.block[EDGES : EDGES + int(self.block[1]) + 1]
+        return self.joints if self.joints.size else self.block[EDGES : EDGES + int(self.block[1]) + 1]
 
     def points(self, s: Any) -> Array:
         """Return x, z, alpha and kappa at arc lengths, as rows."""
@@ -184,7 +187,7 @@ class SpaceChart(Chart):
     def coordinates(self, s: Any) -> Array:
         """Return x, y and z at arc lengths, as rows."""
         places = np.ascontiguousarray(s, dtype=np.float64).reshape(-1)
-        blocks = self.block.reshape(-1, int(self.block[0]))
+        blocks = self.block[: 3 * int(self.block[0])].reshape(3, -1)
         return np.stack([_read(blocks[IN_BLOCK.index(axis)], places)[1] for axis in range(3)])
 
 
@@ -253,7 +256,7 @@ def assemble(
 
 
 def assemble_in_space(
-    edges: Array, anchors: Array, derivatives: Array, *, period: float = 0.0, breaks: Any = ()
+    edges: Array, anchors: Array, derivatives: Sequence[Array], *, period: float = 0.0, breaks: Any = ()
 ) -> "SpaceChart":
     """Assemble the chart of a track in space: of each coordinate the chart in which it is the height.
 
@@ -263,26 +266,37 @@ def assemble_in_space(
         Arc length at the edges of the pieces, increasing.
     anchors : (n, d) array
         x, y and z at the left edge of each piece, and the roll angle if there is one.
-    derivatives : (3, n, d, TERMS) array
+    derivatives : three (n, d, TERMS) arrays
         Their first three derivatives by arc length at the nodes.
     period, breaks
         As `Chart` has them.
     """
-    half, (slopes, bends, thirds) = 0.5 * np.diff(edges), derivatives
-    constants, powers, turning = _integrated(half, (anchors, 0.0), slopes, half[:, None, None] * bends)
-    blocks = []
-    for axis in IN_BLOCK[: anchors.shape[1]]:
-        own, terms = np.zeros((half.size, 4)), np.empty((half.size, 2, TERMS))
-        own[:, 2:], terms[:, 1] = constants[:, 2 * axis : 2 * axis + 2], powers[:, axis]
-        terms[:, 0] = _fitted(thirds[:, axis]) @ _POWERS
-        blocks.append(_block(edges, own, terms, turning[:, axis], bends[:, axis], (period, 0.0)))
+    blocks = blocks_of(edges, (anchors, 0.0), derivatives, period)
     return SpaceChart(
-        block=np.concatenate(blocks),
+        block=np.concatenate([blocks[axis] for axis in IN_BLOCK[: len(blocks)]]),
         low=float(edges[0]),
         high=float(edges[-1]),
         period=float(period),
         breaks=np.asarray(breaks, dtype=np.float64),
     )
+
+
+def blocks_of(edges: Array, anchors: tuple[Any, Any], derivatives: Sequence[Array], period: float) -> list[Array]:
+    """Return for each of d functions of arc length the block of a chart in which it is the height.
+
+    The arguments are those of `assemble_in_space`, but for ``anchors``, which are pairs of doubles; third derivatives
+    may be left out.
+    """
+    half, (slopes, bends, *thirds) = 0.5 * np.diff(edges), derivatives
+    constants, powers, turning = _integrated(half, anchors, slopes, half[:, None, None] * bends)
+    blocks = []
+    for axis in range(bends.shape[1]):
+        own, terms = np.zeros((half.size, 4)), np.zeros((half.size, 2, TERMS))
+        own[:, 2:], terms[:, 1] = constants[:, 2 * axis : 2 * axis + 2], powers[:, axis]
+        for third in thirds:
+            terms[:, 0] = _fitted(third[:, axis]) @ _POWERS
+        blocks.append(_block(edges, own, terms, turning[:, axis], bends[:, axis], (period, 0.0)))
+    return blocks
 
 
 def _integrated(half: Array, anchors: tuple[Any, Any], known: Array, second: Array) -> tuple[Array, Array, Array]:

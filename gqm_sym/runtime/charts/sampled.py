@@ -261,12 +261,13 @@ def _in_space(knots: Array, terms: Array, closed: bool) -> Chart:
     edges, behind = summed(found.lengths), 3 * ROLL + 1
     anchors = np.concatenate([found.at_edges[:ROLL], found.at_edges[ROLL + behind :][:1]])
     derivatives = [
-        np.concatenate([found.at_nodes[ROLL * k : ROLL * (k + 1)], found.at_nodes[behind + k :][:1]]) for k in range(3)
+        np.concatenate([found.at_nodes[ROLL * k : ROLL * (k + 1)], found.at_nodes[behind + k :][:1]]).swapaxes(0, 1)
+        for k in range(3)
     ]
     return assemble_in_space(
         edges,
         anchors.T,
-        np.moveaxis(np.array(derivatives), 1, 2),
+        derivatives,
         period=edges[-1] if closed else 0.0,
         breaks=edges[:-1] if closed else edges[1:-1],
     )
