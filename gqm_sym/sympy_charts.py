@@ -78,3 +78,5 @@ SPACE_ROWS: dict[str, tuple[type[SpaceFunction], ...]] = {
 """Each coordinate in space with its derivatives."""
 SPACE: tuple[type[SpaceFunction], ...] = tuple(rows[0] for rows in SPACE_ROWS.values())
 """The coordinates x, y and z."""
+MEAN_HEIGHT: tuple[type[SpaceFunction], ...] = tuple(_of_axis("h", order) for order in range(3))
+"""The mean height of a train with its derivatives, by the place of its middle."""

@@ -120,6 +120,25 @@ class Curve:
         """Whether the parameter is arc length, and the coordinates are known by numbers only."""
         return self.definition is not None
 
+    def in_arc_length(self) -> "Curve":
+        """Return the same curve with arc length from its beginning as its parameter.
+
+        Raises
+        ------
+        DeclarationError
+            If it has no beginning or no end, or is a space curve with formulas.
+        """
+        if self.charted:
+            return self
+        if self.in_space:
+            raise DeclarationError("space curve: its formulas are not known in arc length yet; give a track by points")
+        closed = self.period is not None
+        ends = (sp.S.Zero, self.period) if closed else self.domain
+        if None in ends:
+            raise DeclarationError(f"{self.kind} curve: has no end to measure arc length from; give it a domain")
+        whole = replace(self, domain=ends, period=None)
+        return Curve.piecewise([whole], closed=closed, parameters=dict(self.defaults), title=self.title)
+
     def __str__(self) -> str:
         """A few lines for people: what it is, where it goes, and what its parameters are measured in."""
         return told(self)

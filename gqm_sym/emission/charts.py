@@ -15,6 +15,7 @@ from gqm_sym.derivation.geometry.geometry import geometry
 from gqm_sym.emission.context import Lowering
 from gqm_sym.emission.ir import ChartIR, ExactIR, FunctionIR
 from gqm_sym.emission.printer import check_emittable
+from gqm_sym.kernels.base import Z as HEIGHT
 
 
 def _shaped_by(*formulas: ExactIR | FunctionIR) -> str:
@@ -143,5 +144,20 @@ MAKERS: dict[str, Callable[[Lowering], ChartIR]] = {
 
 def chart_maker(lowering: Lowering) -> ChartIR | None:
     """The maker of a model's chart; None for a curve with formulas."""
-    curve = lowering.model.curve
-    return MAKERS[curve.kind](lowering) if curve.charted else None
+    curve, train = lowering.model.curve, lowering.model.force
+    if not curve.charted:
+        return None
+    made = MAKERS[curve.kind](lowering)
+    if not train.cars:
+        return made
+    pull = differentiate(train.potential, HEIGHT)
+    numbers = lowering.constants(
+        "exact_train", "The length of a train, and what gravity is.", (train.train_length, pull)
+    )
+    length = lowering.order[train.train_length.name]
+    return replace(
+        made,
+        statement=f"TrackOfTrain({made.statement}, cars={train.cars}, numbers={numbers.name}, length={length})",
+        imports=(*made.imports, "TrackOfTrain"),
+        exact=(*made.exact, numbers),
+    )

@@ -67,11 +67,11 @@ class _Functions:
         )
         for texts, functions, enclosing in groups:
             for function in functions:
-                text, names = loop(function)
+                text, names = loop(function, in_space=module.in_space)
                 texts.append(text)
                 self.called |= names
             if enclosing is not None:
-                text, names = enclosure(enclosing, module.parameter)
+                text, names = enclosure(enclosing, module.parameter, in_space=module.in_space)
                 texts.append(text)
                 self.intervals |= names
 

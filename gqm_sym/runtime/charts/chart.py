@@ -98,6 +98,8 @@ class Chart:
     origins : (n, 3) array
         For each piece, the index of the part of the track that it belongs to, and where it begins and ends in that
         part's own parameter; empty if the track has no parts.
+    joints : array
+        The arc length at the edges of all charts in the block, where it holds more than those of the curve.
     """
 
     block: Array
@@ -108,6 +110,7 @@ class Chart:
     breaks: Array = field(default_factory=lambda: np.empty(0))
     corners: Array = field(default_factory=lambda: np.empty(0))
     origins: Array = field(default_factory=lambda: np.empty((0, 3)))
+    joints: Array = field(default_factory=lambda: np.empty(0))
 
     @property
     def range(self) -> tuple[float, float, float]:
@@ -117,7 +120,7 @@ class Chart:
     @property
     def edges(self) -> Array:
         """Return the arc length at the edges of the pieces."""
-        return self.block[EDGES : EDGES + int(self.block[1]) + 1]
+        return self.joints if self.joints.size else self.block[EDGES : EDGES + int(self.block[1]) + 1]
 
     def points(self, s: Any) -> Array:
         """Return x, z, alpha and kappa at arc lengths, as rows."""
@@ -183,7 +186,7 @@ class SpaceChart(Chart):
     def coordinates(self, s: Any) -> Array:
         """Return x, y and z at arc lengths, as rows."""
         places = np.ascontiguousarray(s, dtype=np.float64).reshape(-1)
-        blocks = self.block.reshape(len(IN_BLOCK), -1)
+        blocks = self.block[: len(IN_BLOCK) * int(self.block[0])].reshape(len(IN_BLOCK), -1)
         return np.stack([_read(blocks[IN_BLOCK.index(axis)], places)[1] for axis in range(3)])
 
 
@@ -267,20 +270,29 @@ def assemble_in_space(
     period, breaks
         As `Chart` has them.
     """
-    half = 0.5 * np.diff(edges)
-    constants, powers, turning = _integrated(half, (anchors, 0.0), slopes, half[:, None, None] * bends)
-    blocks = []
-    for axis in IN_BLOCK:
-        own, terms = np.zeros((half.size, 4)), np.zeros((half.size, 2, TERMS))
-        own[:, 2:], terms[:, 1] = constants[:, 2 * axis : 2 * axis + 2], powers[:, axis]
-        blocks.append(_block(edges, own, terms, turning[:, axis], bends[:, axis], (period, 0.0)))
+    blocks = blocks_of(edges, (anchors, 0.0), slopes, bends, period)
     return SpaceChart(
-        block=np.concatenate(blocks),
+        block=np.concatenate([blocks[axis] for axis in IN_BLOCK]),
         low=float(edges[0]),
         high=float(edges[-1]),
         period=float(period),
         breaks=np.asarray(breaks, dtype=np.float64),
     )
+
+
+def blocks_of(edges: Array, anchors: tuple[Any, Any], slopes: Array, bends: Array, period: float) -> list[Array]:
+    """Return for each of d functions of arc length the block of a chart in which it is the height.
+
+    The arguments are those of `assemble_in_space`, but for ``anchors``, which are pairs of doubles.
+    """
+    half = 0.5 * np.diff(edges)
+    constants, powers, turning = _integrated(half, anchors, slopes, half[:, None, None] * bends)
+    blocks = []
+    for axis in range(bends.shape[1]):
+        own, terms = np.zeros((half.size, 4)), np.zeros((half.size, 2, TERMS))
+        own[:, 2:], terms[:, 1] = constants[:, 2 * axis : 2 * axis + 2], powers[:, axis]
+        blocks.append(_block(edges, own, terms, turning[:, axis], bends[:, axis], (period, 0.0)))
+    return blocks
 
 
 def _integrated(half: Array, anchors: tuple[Any, Any], known: Array, second: Array) -> tuple[Array, Array, Array]:

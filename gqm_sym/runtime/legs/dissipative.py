@@ -239,7 +239,8 @@ class DissipativeMotion(Motion):
     @locked
     def turning_points(self) -> tuple[float, ...]:
         """The turning points on `legs` in the order of time; the place of a launch from rest is one."""
-        turns = [leg.lam_end for leg in self.legs if leg.end == "turn"]
+        self._look_ahead()
+        turns = [leg.lam_end for leg in self._up_to_horizon(self._runs_as_legs()) if leg.end == "turn"]
         return (*((self.problem.lam0,) if self.problem.w0 == 0.0 else ()), *turns)
 
     @property
@@ -247,18 +248,26 @@ class DissipativeMotion(Motion):
     def legs(self) -> tuple[Leg, ...]:
         """The legs of the motion in the order of time; see `Motion.legs`."""
         self._look_ahead()
-        everything = [*self._laid, *self._runs]
-        runs = everything[: self._beginning or None]
         cuts_at_changes = "contact-sign" not in self._internal_ends
-        if self._joints.corners.size or (cuts_at_changes and any(run.record[CHANGE_COUNT] for run in runs)):
+        shown = self._all_runs[: self._beginning or None]
+        if self._joints.corners.size or (cuts_at_changes and any(run.record[CHANGE_COUNT] for run in shown)):
             return super().legs
-        begins = [*(float(run.record[BEGIN]) for run in everything), self._elapsed]
-        lap, stops = self.problem.period, begins[1 : len(runs) + 1]
-        legs = [run.leg(lap, stop) for run, stop in zip(runs, stops, strict=True)]
-        return Rows(self._up_to_horizon(merged(legs, self._internal_ends)))
+        return Rows(self._up_to_horizon(merged(self._runs_as_legs(), self._internal_ends)))
+
+    @property
+    def _all_runs(self) -> list[Run]:
+        """The runs so far."""
+        return [*self._laid, *self._runs]
+
+    def _runs_as_legs(self) -> list[Leg]:
+        """The runs that `legs` tells of, which changes of contact sign and corners do not cut."""
+        everything, lap = self._all_runs, self.problem.period
+        stops = [*(float(run.record[BEGIN]) for run in everything[1:]), self._elapsed]
+        shown = everything[: self._beginning or None]
+        return [run.leg(lap, stop) for run, stop in zip(shown, stops, strict=False)]
 
     def _place_on_last_leg(self, t: float) -> float:
-        run = next(run for run in reversed([*self._laid, *self._runs]) if run.record[BEGIN] <= t)
+        run = next(run for run in reversed(self._all_runs) if run.record[BEGIN] <= t)
         place = place_at(run.record, (t - run.record[BEGIN]) - run.record[BEGIN_LOW])
         return float(self.lam(t)) if isnan(place) else place + run.laps * self.problem.period
 
@@ -417,9 +426,9 @@ class DissipativeMotion(Motion):
     @property
     def _changes(self) -> Changes:
         """How the legs so far change."""
-        pieces = self._pieces
-        if self._known_changes is None or len(self._known_changes.runs) < pieces[-1].leg + 1:
-            self._known_changes = Changes(self.problem, self._laid)
+        runs = self._all_runs
+        if self._known_changes is None or self._known_changes.followed < len(runs):
+            self._known_changes = Changes(self.problem, runs)
         return self._known_changes
 
     def fill_launch_leg(self, places: Array, v2: Array) -> None:

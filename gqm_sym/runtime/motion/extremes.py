@@ -166,7 +166,7 @@ def course(motion: Any) -> tuple[Trajectory, float]:
             "this motion goes on for ever and does not repeat; launch it with a horizon, t_max, for its extremes"
         )
     end = min(motion.t_end, motion.period) if repeats else motion.t_end
-    return motion._trajectory(0.0 if repeats else end), end
+    return motion._course if repeats else motion._trajectory(end), end
 
 
 def _on_segment(
