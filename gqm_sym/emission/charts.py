@@ -59,7 +59,7 @@ def _sampled(lowering: Lowering) -> ChartIR:
     """A sampled curve: its points, as text."""
     track = lowering.model.curve.definition
     assert isinstance(track, Track)
-    space = ", in_space=True" if track.in_space else ""
+    space = (", in_space=True" if track.in_space else "") + (", banked=True" if track.banked else "")
     return ChartIR(
         statement=f"Sampled(POINTS, kind={track.kind!r}, closed={track.closed}{space})",
         imports=("Sampled",),
@@ -147,7 +147,9 @@ def chart_maker(lowering: Lowering) -> ChartIR | None:
     curve, train = lowering.model.curve, lowering.model.force
     if not curve.charted:
         return None
-    made = MAKERS[curve.kind](lowering)
+    along = ("along_z", "along_x", "along_y") if curve.in_space else ("chart",)
+    names = (*along, *(("along_roll",) if getattr(curve.definition, "banked", False) else ()))
+    made = replace(MAKERS[curve.kind](lowering), names=names)
     if not train.cars:
         return made
     pull = differentiate(train.potential, HEIGHT)
@@ -159,5 +161,6 @@ def chart_maker(lowering: Lowering) -> ChartIR | None:
         made,
         statement=f"TrackOfTrain({made.statement}, cars={train.cars}, numbers={numbers.name}, length={length})",
         imports=(*made.imports, "TrackOfTrain"),
+        names=(*names, "along_h"),
         exact=(*made.exact, numbers),
     )
