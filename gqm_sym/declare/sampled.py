@@ -15,6 +15,7 @@ from statistics import median
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 from gqm_sym.arguments import one_of, several, short
+from gqm_sym.declare.banking import is_formula
 from gqm_sym.errors import DeclarationError, NoisyPointsWarning, NumberError
 from gqm_sym.literals.numbers import Number, read_numbers, without_unit
 from gqm_sym.literals.units import is_quantity
@@ -64,7 +65,8 @@ class Track:
     Attributes
     ----------
     points : str
-        One point a line, x and z, or x, y and z, as decimal numbers. A closed track does not repeat its first point.
+        One point a line, x and z, or x, y and z, and perhaps the roll angle, as decimal numbers. A closed track does
+        not repeat its first point.
     kind : {"spline", "linear"}
         A quintic spline, or planes stitched together.
     closed : bool
@@ -81,7 +83,16 @@ class Track:
     @property
     def in_space(self) -> bool:
         """Whether its points have three coordinates."""
-        return len(self.points[: self.points.find("\n")].split()) == IN_SPACE
+        return self._columns >= IN_SPACE
+
+    @property
+    def banked(self) -> bool:
+        """Whether its points have a roll angle."""
+        return self._columns > IN_SPACE
+
+    @property
+    def _columns(self) -> int:
+        return len(self.points[: self.points.find("\n")].split())
 
 
 def in_metres(given: Any) -> Any:
@@ -107,6 +118,7 @@ def read_track(
     kind: str = "spline",
     closed: bool | None = None,
     smoothing: float | str | None = None,
+    roll: Any = None,
 ) -> Track:
     """Read and check the points of a track.
 
@@ -123,6 +135,9 @@ def read_track(
         Whether the track closes; None: if its last point is its first.
     smoothing
         The standard deviation of the points in metres, "auto", or None: the track goes through them.
+    roll
+        In space the roll angle at each point, in radians; None: that of a table which has one. What is no such thing,
+        as a formula, is not for points.
 
     Raises
     ------
@@ -142,9 +157,11 @@ def read_track(
     deviation = _read_smoothing(in_metres(smoothing), kind)
     texts: list[str] = []
     places: list[Place] = []
-    for text, place in _read_rows(_rows(points, z)):
+    rows_given, angles = _rows(points, z)
+    for text, place in _read_rows(rows_given):
         texts.append(text)
         places.append(place)
+    angles = [] if is_formula(roll) else _angles(angles if roll is None else roll, places)
     size = _size(places)
     repeated = len(places) > 1 and dist(places[0], places[-1]) <= CLOSES * size
     joined = repeated if closed is None else closed
@@ -166,6 +183,7 @@ def read_track(
         _check_order(places, size, kind, joined)
         if kind == "spline" and not in_space:
             _warn_of_scatter(places, joined, "give their standard deviation in metres as smoothing, or 'auto'")
+        texts = [" ".join(parts) for parts in zip(texts, angles, strict=False)] if angles else texts
         return Track(points="\n".join(texts), kind=kind, closed=joined)
     _check_survey(places, rows, joined, 0.0 if deviation == "auto" else deviation)
     smoothed, report = _smoothed(places, rows, joined, deviation)
@@ -218,23 +236,37 @@ def _smoothed(
     return [(x, z) for x, z in found.tolist()], report
 
 
-def _rows(points: Any, z: Any) -> Any:
-    """Points as rows, whichever way they were given."""
+def _angles(given: Any, places: list[Place]) -> list[str]:
+    """The text of the roll angle at each point; none where none are given."""
+    if given is None:
+        return []
+    if places and len(places[0]) != IN_SPACE:
+        raise DeclarationError("sampled: roll: is for tracks in space; give rows of x, y and z")
+    given = without_unit(given, where="sampled: roll", unit="rad")
+    angles = several(given, where="sampled: roll", what="an angle for each point, a formula in s or 'coordinated'")
+    if len(angles) != len(places):
+        raise DeclarationError(f"sampled: roll: must be an angle for each point, got {len(angles)} for {len(places)}")
+    return [_read(angle, count)[0] for count, angle in enumerate(angles, start=1)]
+
+
+def _rows(points: Any, z: Any) -> tuple[Any, Any]:
+    """Points as rows, whichever way they were given, and their roll angles in a table that has them."""
     if z is not None:
-        return _paired("sampled: x and z", points, z)
+        return _paired("sampled: x and z", points, z), None
     # Any kind of table will do, whoever made it.
     names = points if isinstance(points, Mapping) else getattr(points, "columns", None)
     if names is None:
-        return points
+        return points, None
     columns = {name.strip().lower(): name for name in names if isinstance(name, str)}
     if columns.keys() >= {"x", "y", "z"}:
-        return _paired("sampled: columns x, y and z", *(points[columns[name]] for name in "xyz"))
+        rows = _paired("sampled: columns x, y and z", *(points[columns[name]] for name in "xyz"))
+        return rows, points[columns["roll"]] if "roll" in columns else None
     if not columns.keys() >= {"x", "z"}:
         raise DeclarationError(
             f"sampled: points: a table must have columns x and z, got {short(list(names))}; rename them, or give "
             "both columns, as in Curve.sampled(table['distance'], table['height'])"
         )
-    return _paired("sampled: columns x and z", points[columns["x"]], points[columns["z"]])
+    return _paired("sampled: columns x and z", points[columns["x"]], points[columns["z"]]), None
 
 
 def _paired(where: str, *columns: Any) -> list[tuple[Any, ...]]:

@@ -59,7 +59,7 @@ def _sampled(lowering: Lowering) -> ChartIR:
     """A sampled curve: its points, as text."""
     track = lowering.model.curve.definition
     assert isinstance(track, Track)
-    space = ", in_space=True" if track.in_space else ""
+    space = (", in_space=True" if track.in_space else "") + (", banked=True" if track.banked else "")
     return ChartIR(
         statement=f"Sampled(POINTS, kind={track.kind!r}, closed={track.closed}{space})",
         imports=("Sampled",),
@@ -122,8 +122,10 @@ def _segment_in_space(lowering: Lowering, curve: Curve, name: str) -> FunctionIR
     """The same of a piece of a rail in space: the derivatives of its coordinates by arc length."""
     shape = geometry(replace(curve, kind="space"), may_be_positive=(), heading=None)
     tangent = (shape.dxds, shape.dyds, shape.dzds)
-    rows = (*(curve.x, curve.y, curve.z, shape.ds), *tangent, *cross(shape.bend, tangent))
-    what = f"x, y, z, ds/d{curve.parameter} and the first and second derivatives of the coordinates by arc length"
+    bends = cross(shape.bend, tangent)
+    changes = (differentiate(bend, curve.parameter) / shape.ds for bend in bends)
+    rows = (curve.x, curve.y, curve.z, shape.ds, *tangent, *bends, *changes)
+    what = f"x, y, z, ds/d{curve.parameter} and the first three derivatives of the coordinates by arc length"
     return _function_of_segment(lowering, curve, name, what, rows)
 
 
@@ -164,7 +166,9 @@ def chart_maker(lowering: Lowering) -> ChartIR | None:
     curve, train = lowering.model.curve, lowering.model.force
     if not curve.charted:
         return None
-    made = MAKERS[curve.kind](lowering)
+    along = ("along_z", "along_x", "along_y") if curve.in_space else ("chart",)
+    names = (*along, *(("along_roll",) if getattr(curve.definition, "banked", False) else ()))
+    made = replace(MAKERS[curve.kind](lowering), names=names)
     if not train.cars:
         return made
     pull = differentiate(train.potential, HEIGHT)
@@ -176,5 +180,6 @@ def chart_maker(lowering: Lowering) -> ChartIR | None:
         made,
         statement=f"TrackOfTrain({made.statement}, cars={train.cars}, numbers={numbers.name}, length={length})",
         imports=(*made.imports, "TrackOfTrain"),
+        names=(*names, "along_h"),
         exact=(*made.exact, numbers),
     )

@@ -1,6 +1,6 @@
 """Lowered functions as lines of text: the fields that the template prints, and the names that they call."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -9,18 +9,13 @@ from sympy import Expr, Function, Symbol
 from gqm_sym.emission.ir import Assignment, ExactIR, FunctionIR
 from gqm_sym.emission.printer import CodePrinter, ExactPrinter, IntervalPrinter
 from gqm_sym.emission.subscripts import at
-from gqm_sym.sympy_charts import MEAN_HEIGHT, SPACE_ROWS, ChartFunction, chart_alpha, chart_kappa, chart_x, chart_z
+from gqm_sym.sympy_charts import SPACE_CHARTS, ChartFunction, chart_alpha, chart_kappa, chart_x, chart_z
 
 # What the arrays of charts are called in emitted functions, each with the rows that it has and where. In space each
-# coordinate has a chart; they stand one after the other, all of one size. Behind them stands that of a train.
-PLANE_CHARTS = ("chart", "along_h")
-SPACE_CHARTS = ("along_z", "along_x", "along_y", "along_h")
+# coordinate has a chart, and perhaps the roll angle.
 CHART_ROWS: dict[str, dict[type[ChartFunction], int]] = {
     "chart": {chart_x: 0, chart_z: 1, chart_alpha: 2, chart_kappa: 3},
-    **{
-        f"along_{axis}": dict(zip(heads, (1, 2, 3), strict=True))
-        for axis, heads in (*SPACE_ROWS.items(), ("h", MEAN_HEIGHT))
-    },
+    **{f"along_{axis}": dict(zip(heads, (1, 2, 3, 0), strict=False)) for axis, heads in SPACE_CHARTS.items()},
 }
 
 # Columns up to which several loads of a value stand on one line.
@@ -66,8 +61,8 @@ def _read_together(function: FunctionIR) -> tuple[FunctionIR, list[str], set[str
 
     The third is the charts that these lines read.
 
-    Neighbours often share a piece of the chart, which is then looked for once. Without a chart, or where ``out`` has
-    too few rows, the function is as it was.
+    Neighbours often share a piece of the chart, which is then looked for once. Without a chart the function is as it
+    was; what ``out`` has too few rows for is looked for place by place.
     """
     values = [*(a.value for a in function.inside), *function.outputs]
     given = {a.name: a.value for a in function.inside if type(a.value).__name__ == "at" and len(a.value.args) == 1}
@@ -76,10 +71,8 @@ def _read_together(function: FunctionIR) -> tuple[FunctionIR, list[str], set[str
     if len(places) != 1 or not places <= given.keys():
         return function, [], set()
     place = Symbol(places.pop(), real=True)
-    used = [head for head in heads if any(v.has(head(place)) for v in values)]
+    used = [head for head in heads if any(v.has(head(place)) for v in values)][: len(function.outputs)]
     out, first = function.arguments[-1], len(function.outputs) - len(used)
-    if first < 0:
-        return function, [], set()
     names = {a.value: Symbol(a.name, real=True) for a in function.inside}
     read: dict[Expr, Symbol] = {}
     for head in used:
@@ -100,10 +93,10 @@ def _read_together(function: FunctionIR) -> tuple[FunctionIR, list[str], set[str
     return replace(function, inside=(*rows, *kept), outputs=outputs), lines, set(charts)
 
 
-def loop(function: FunctionIR, *, in_space: bool = False) -> tuple[dict[str, Any], set[str]]:
+def loop(function: FunctionIR, charts: Sequence[str] = ()) -> tuple[dict[str, Any], set[str]]:
     """The template's fields of a function over many places, and the names that it calls.
 
-    ``in_space`` says whether the charts that it may read are those of a curve in space.
+    ``charts`` are the names of those behind the run-time parameters (`ChartIR`).
     """
     function, filled, read = _read_together(function)
     taken = {name for name, _ in function.parameters} | {a.name for a in function.inside}
@@ -118,7 +111,7 @@ def loop(function: FunctionIR, *, in_space: bool = False) -> tuple[dict[str, Any
     if filled:
         printer.used.add("chart_rows")
         printer.charts |= read
-    before = [*_chart_view(function, printer, in_space), *before, *filled]
+    before = [*_chart_view(function, printer, charts), *before, *filled]
     fields = {
         "name": function.name,
         "signature": function.signature,
@@ -139,18 +132,18 @@ def _views(function: FunctionIR) -> str:
     return f"{names} = {', '.join(f'carray({name}, {shape})' for name, shape in function.views)}"
 
 
-def _chart_view(function: FunctionIR, printer: CodePrinter, in_space: bool) -> list[str]:
+def _chart_view(function: FunctionIR, printer: CodePrinter, charts: Sequence[str]) -> list[str]:
     """The lines that find the charts of the curve, which stand behind the run-time parameters."""
     if not printer.charts:
         return []
     p, count = function.views[-2]
-    first, *others = SPACE_CHARTS if in_space else PLANE_CHARTS
+    first, *others = charts
     offsets = [f"{count} + {k} * {first}.size" for k in range(1, len(others) + 1)]
     needed = [(name, at) for name, at in zip(others, offsets, strict=True) if name in printer.charts]
     return [f"{first} = chart_of({p}, {count})", *(f"{name} = chart_of({p}, {at})" for name, at in needed)]
 
 
-def enclosure(function: FunctionIR, parameter: str, *, in_space: bool = False) -> tuple[dict[str, Any], set[str]]:
+def enclosure(function: FunctionIR, parameter: str, charts: Sequence[str] = ()) -> tuple[dict[str, Any], set[str]]:
     """The template's fields of a function over intervals, and the names that it calls."""
     printer = IntervalPrinter()
     *count, lo, hi, p, out = function.arguments
@@ -168,7 +161,7 @@ def enclosure(function: FunctionIR, parameter: str, *, in_space: bool = False) -
         "signature": function.signature,
         "arguments": ", ".join(function.arguments),
         "doc": function.doc,
-        "before": [*_chart_view(function, printer, in_space), _views(function)],
+        "before": [*_chart_view(function, printer, charts), _views(function)],
         "loop": function.batch,
         "index": index,
         "count": count[0] if count else "",

@@ -11,7 +11,7 @@ from sympy.printing.precedence import PRECEDENCE
 from sympy.printing.str import StrPrinter
 
 from gqm_sym.errors import EmissionError
-from gqm_sym.sympy_charts import MEAN_HEIGHT, SPACE_ROWS
+from gqm_sym.sympy_charts import SPACE_CHARTS
 
 # Up to this every integer is a double.
 MAX_INTEGER = 2**53
@@ -38,13 +38,13 @@ FUNCTIONS = {
 # Rows of a chart, which compiled code reads from the array ``chart``.
 CHARTED = frozenset(
     {"chart_x", "chart_z", "chart_alpha", "chart_kappa"}
-    | {head.__name__ for rows in (*SPACE_ROWS.values(), MEAN_HEIGHT) for head in rows}
+    | {head.__name__ for rows in SPACE_CHARTS.values() for head in rows}
 )
 _CHART_CALL = re.compile(r"(divdiff[12]_)?chart_[a-z]+")
-# In space each coordinate has a chart, whose height is the coordinate; angle and curvature are its derivatives. So has
-# the mean height of a train.
-_SPACE_CALL = re.compile(r"(i?(?:divdiff[12]_)?)space_(d{0,2})([hxyz])")
-ROWS_BY_ORDER = ("chart_z", "chart_alpha", "chart_kappa")
+# In space each coordinate has a chart, whose height is the coordinate; its derivatives are in the places of angle,
+# curvature and x. So have the roll angle and the mean height of a train.
+_SPACE_CALL = re.compile(r"(i?(?:divdiff[12]_)?)space_(d*)(x|y|z|roll|h)")
+ROWS_BY_ORDER = ("chart_z", "chart_alpha", "chart_kappa", "chart_x")
 
 
 def check_emittable(expr: Expr, names: Collection[str], *, where: str) -> None:

@@ -7,7 +7,7 @@ differences do not cancel. Compiled code reads a chart from one flat array that 
 (`evaluate`).
 """
 
-from collections.abc import Hashable
+from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, field
 from math import inf
 from typing import Any, NamedTuple, Protocol
@@ -122,6 +122,11 @@ class Chart:
         """Return the arc length at the edges of the pieces."""
         return self.joints if self.joints.size else self.block[EDGES : EDGES + int(self.block[1]) + 1]
 
+    @property
+    def inner_edges(self) -> Array:
+        """Return the arc length where two pieces meet, within one period."""
+        return self.edges[0 if self.period else 1 : -1]
+
     def points(self, s: Any) -> Array:
         """Return x, z, alpha and kappa at arc lengths, as rows."""
         rows: Array = _read(self.block, np.ascontiguousarray(s, dtype=np.float64).reshape(-1))
@@ -171,22 +176,23 @@ class Chart:
         return float(place), float(np.hypot(row[0] - x, row[1] - z))
 
 
-IN_BLOCK = (2, 0, 1)
-"""The coordinates in the order in which their charts stand in the block of a `SpaceChart`."""
+IN_BLOCK = (2, 0, 1, 3)
+"""The coordinates, and behind them the roll angle, in the order of their charts in the block of a `SpaceChart`."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class SpaceChart(Chart):
     """A curve in space in arc length.
 
-    Its block is that of the chart of z, followed by those of x and y. In the chart of a coordinate this is the height;
-    in the places of angle and curvature are its first two derivatives by arc length.
+    Its block is that of the chart of z, followed by those of x and y, and of the roll angle if there is one. In the
+    chart of a coordinate this is the height; in the places of angle, curvature and x are its first three derivatives by
+    arc length.
     """
 
     def coordinates(self, s: Any) -> Array:
         """Return x, y and z at arc lengths, as rows."""
         places = np.ascontiguousarray(s, dtype=np.float64).reshape(-1)
-        blocks = self.block[: len(IN_BLOCK) * int(self.block[0])].reshape(len(IN_BLOCK), -1)
+        blocks = self.block[: 3 * int(self.block[0])].reshape(3, -1)
         return np.stack([_read(blocks[IN_BLOCK.index(axis)], places)[1] for axis in range(3)])
 
 
@@ -255,7 +261,7 @@ def assemble(
 
 
 def assemble_in_space(
-    edges: Array, anchors: Array, slopes: Array, bends: Array, *, period: float = 0.0, breaks: Any = ()
+    edges: Array, anchors: Array, derivatives: Sequence[Array], *, period: float = 0.0, breaks: Any = ()
 ) -> "SpaceChart":
     """Assemble the chart of a track in space: of each coordinate the chart in which it is the height.
 
@@ -263,17 +269,18 @@ def assemble_in_space(
     ----------
     edges : (n+1,) array
         Arc length at the edges of the pieces, increasing.
-    anchors : (n, 3) array
-        x, y and z at the left edge of each piece; floats longer than doubles keep their digits.
-    slopes, bends : (n, 3, TERMS) arrays
-        Their first two derivatives by arc length at the nodes.
+    anchors : (n, d) array
+        x, y and z at the left edge of each piece, and the roll angle if there is one; floats longer than doubles keep
+        their digits.
+    derivatives : three (n, d, TERMS) arrays
+        Their first three derivatives by arc length at the nodes.
     period, breaks
         As `Chart` has them.
     """
     left = np.asarray(anchors, dtype=np.float64)
-    blocks = blocks_of(edges, (left, np.asarray(anchors - left, dtype=np.float64)), slopes, bends, period)
+    blocks = blocks_of(edges, (left, np.asarray(anchors - left, dtype=np.float64)), derivatives, period)
     return SpaceChart(
-        block=np.concatenate([blocks[axis] for axis in IN_BLOCK]),
+        block=np.concatenate([blocks[axis] for axis in IN_BLOCK[: len(blocks)]]),
         low=float(edges[0]),
         high=float(edges[-1]),
         period=float(period),
@@ -281,17 +288,20 @@ def assemble_in_space(
     )
 
 
-def blocks_of(edges: Array, anchors: tuple[Any, Any], slopes: Array, bends: Array, period: float) -> list[Array]:
+def blocks_of(edges: Array, anchors: tuple[Any, Any], derivatives: Sequence[Array], period: float) -> list[Array]:
     """Return for each of d functions of arc length the block of a chart in which it is the height.
 
-    The arguments are those of `assemble_in_space`, but for ``anchors``, which are pairs of doubles.
+    The arguments are those of `assemble_in_space`, but for ``anchors``, which are pairs of doubles; third derivatives
+    may be left out.
     """
-    half = 0.5 * np.diff(edges)
+    half, (slopes, bends, *thirds) = 0.5 * np.diff(edges), derivatives
     constants, powers, turning = _integrated(half, anchors, slopes, half[:, None, None] * bends)
     blocks = []
     for axis in range(bends.shape[1]):
         own, terms = np.zeros((half.size, 4)), np.zeros((half.size, 2, TERMS))
         own[:, 2:], terms[:, 1] = constants[:, 2 * axis : 2 * axis + 2], powers[:, axis]
+        for third in thirds:
+            terms[:, 0] = _fitted(third[:, axis]) @ _POWERS
         blocks.append(_block(edges, own, terms, turning[:, axis], bends[:, axis], (period, 0.0)))
     return blocks
 

@@ -159,7 +159,7 @@ def _mean_height(track: Chart, edges: Array, length: float) -> Array:
     heights = np.cumsum(gains, dtype=np.longdouble)[:-1]
     anchors = heights.astype(np.float64)
     lows = (heights - anchors).astype(np.float64)
-    (made,) = blocks_of(edges, (anchors[:, None], lows[:, None]), slopes[:, None], bends[:, None], track.period)
+    (made,) = blocks_of(edges, (anchors[:, None], lows[:, None]), (slopes[:, None], bends[:, None]), track.period)
     return made
 
 

@@ -35,8 +35,8 @@ PIECE_NUMBERS = {"line": 1, "arc": 2, "clothoid": 3, "transition": 1 + 3 * POWER
 # series fall at least as powers of RADIUS, so that after TERMS of them nothing is left of 64 bits.
 RADIUS, MAX_GROWTH, TERMS = 4.0, 0.5, 36
 
-# Rows of the function of a piece with formulas: coordinates, ds/dlam, and their derivatives by arc length.
-CURVE_ROWS = 10
+# Rows of the function of a piece with formulas: coordinates, ds/dlam, and three derivatives of these by arc length.
+CURVE_ROWS = 13
 Long = Any  # an array of the longest floats
 
 
@@ -48,12 +48,13 @@ class Pen(NamedTuple):
 
 
 class Pieces(NamedTuple):
-    """The n pieces of a chart of one part of the rail: lengths, coordinates at left edges, and at nodes t and t'."""
+    """The n pieces of a chart of one part of the rail: lengths, coordinates at left edges, and t, t', t'' at nodes."""
 
     lengths: Array
     anchors: Long
     slopes: Array
     bends: Array
+    changes: Array
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -118,13 +119,12 @@ class SpaceRail:
         assert pen is not None
         if self.closed:
             _check_joint(pen, start, joints[-1], "piecewise: closed: the start lies", "the last piece ends")
-        lengths, anchors, slopes, bends = (np.concatenate(rows) for rows in zip(*parts, strict=True))
+        lengths, anchors, *derivatives = (np.concatenate(rows) for rows in zip(*parts, strict=True))
         edges, inner = summed(lengths), joints[:-1] if self.closed else joints[1:-1]
         return assemble_in_space(
             edges,
             anchors,
-            slopes,
-            bends,
+            derivatives,
             period=edges[-1] if self.closed else 0.0,
             # Breaks are edges of the chart, to the last bit.
             breaks=edges[np.abs(edges[:, None] - np.array(inner)).argmin(axis=0)] if inner else (),
@@ -230,10 +230,14 @@ def _turned(length: float, rates: Long, pen: Pen, where: str) -> tuple[Pieces, P
     shares = 0.5 * (1.0 + np.asarray(NODES, dtype=np.longdouble))
     at_nodes: Long = sum(term[:, None] * (shares**k)[:, None, None] for k, term in enumerate(series))
     at_nodes = at_nodes @ frames[:-1, None]
-    change: Long = sum(rate[:, :, None] * shares**j for j, rate in enumerate(np.moveaxis(scaled, 2, 0))) / step
-    bends = change[:, 0, :, None] * at_nodes[:, :, 1] + change[:, 1, :, None] * at_nodes[:, :, 2]
-    slopes, bends = (np.moveaxis(rows, 2, 1).astype(np.float64) for rows in (at_nodes[:, :, 0], bends))
-    pieces = Pieces(np.full(count, float(step)), places[:-1], slopes, bends)
+    now: Long = sum(scaled[:, :, j, None] * shares**j for j in range(POWERS)) / step
+    growth: Long = sum(scaled[:, :, j, None] * (j * shares ** (j - 1)) for j in range(1, POWERS)) / step**2
+    (yaw, pitch, roll), (more_yaw, more_pitch, _) = (np.moveaxis(r, 1, 0)[..., None] for r in (now, growth))
+    ahead, side, up = np.moveaxis(at_nodes, 2, 0)
+    bends = yaw * side + pitch * up
+    changes = (more_yaw + pitch * roll) * side + (more_pitch - yaw * roll) * up - (yaw**2 + pitch**2) * ahead
+    rows = (np.moveaxis(row, 2, 1).astype(np.float64) for row in (ahead, bends, changes))
+    pieces = Pieces(np.full(count, float(step)), places[:-1], *rows)
     return pieces, Pen(places[-1], frames[-1])
 
 
@@ -260,7 +264,7 @@ def _curve(address: int, p: Array, ends: list[float], where: str) -> tuple[Piece
     begin, end = (Pen(row[:3].astype(np.longdouble), _level(row[4:7])) for row in at_ends)
     values = np.moveaxis(found.at_nodes, 0, 1)
     anchors = found.at_edges[:3].T.astype(np.longdouble)
-    return Pieces(found.lengths, anchors, values[:, :3], values[:, 3:]), begin, end
+    return Pieces(found.lengths, anchors, values[:, :3], values[:, 3:6], values[:, 6:]), begin, end
 
 
 def _level(tangent: Array) -> Long:
