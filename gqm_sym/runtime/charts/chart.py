@@ -122,6 +122,11 @@ class Chart:
         """Return the arc length at the edges of the pieces."""
         return self.joints if self.joints.size else self.block[EDGES : EDGES + int(self.block[1]) + 1]
 
+    @property
+    def inner_edges(self) -> Array:
+        """Return the arc length where two pieces meet, within one period."""
+        return self.edges[0 if self.period else 1 : -1]
+
     def points(self, s: Any) -> Array:
         """Return x, z, alpha and kappa at arc lengths, as rows."""
         rows: Array = _read(self.block, np.ascontiguousarray(s, dtype=np.float64).reshape(-1))
