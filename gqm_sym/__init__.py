@@ -26,6 +26,7 @@ if TYPE_CHECKING:
         Rolling,
         RotatingFrame,
         SurfaceTension,
+        Train,
     )
     from gqm_sym.specfile import read_spec
     from gqm_sym.studies import read_sweep
@@ -45,6 +46,7 @@ _HOMES = {
     "Rolling": "gqm_sym.kernels",
     "RotatingFrame": "gqm_sym.kernels",
     "SurfaceTension": "gqm_sym.kernels",
+    "Train": "gqm_sym.kernels",
     "arc": "gqm_sym.declare",
     "build": "gqm_sym.building",
     "clothoid": "gqm_sym.declare",
@@ -75,6 +77,7 @@ __all__ = [
     "Rolling",
     "RotatingFrame",
     "SurfaceTension",
+    "Train",
     "arc",
     "build",
     "clothoid",

@@ -64,16 +64,16 @@ def curve_formulas(curve: DeclaredCurve) -> Formulas:
         return Formulas([(level.value, None), *places], _PLANE)
     if isinstance(curve.definition, Rail):
         return _rail_formulas(curve.definition)
-    if curve.charted:
-        return Formulas()
     own = parameter_dimension(curve)
+    banked = [] if curve.banking is None else _banked(curve.banking)
+    if curve.charted:
+        return Formulas(banked, {lam.name: own})
     coordinates = [form for _, form in curve.coordinates] if curve.radius is None else [curve.radius]
     ends = [(end, own) for end in (*curve.domain, curve.period) if end is not None and own is not None]
-    banked = [] if curve.banking is None else _banked(curve.banking)
     return Formulas([*((form, LENGTH) for form in coordinates), *ends, *banked], {lam.name: own})
 
 
-def _banked(banking: Banking) -> list[tuple[sp.Expr, Dimension]]:
+def _banked(banking: Banking) -> list[tuple[sp.Expr, Dimension | None]]:
     """The formulas of a banking with their dimensions."""
     forms = ((banking.angle, NUMBER), (banking.speed, SPEED), (banking.heartline, LENGTH))
     return [(form, wanted) for form, wanted in forms if form is not None]

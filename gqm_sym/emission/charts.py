@@ -15,6 +15,7 @@ from gqm_sym.derivation.geometry.geometry import geometry
 from gqm_sym.emission.context import Lowering
 from gqm_sym.emission.ir import ChartIR, ExactIR, FunctionIR
 from gqm_sym.emission.printer import check_emittable
+from gqm_sym.kernels.base import Z as HEIGHT
 
 
 def _shaped_by(*formulas: ExactIR | FunctionIR) -> str:
@@ -58,7 +59,7 @@ def _sampled(lowering: Lowering) -> ChartIR:
     """A sampled curve: its points, as text."""
     track = lowering.model.curve.definition
     assert isinstance(track, Track)
-    space = ", in_space=True" if track.in_space else ""
+    space = (", in_space=True" if track.in_space else "") + (", banked=True" if track.banked else "")
     return ChartIR(
         statement=f"Sampled(POINTS, kind={track.kind!r}, closed={track.closed}{space})",
         imports=("Sampled",),
@@ -143,5 +144,23 @@ MAKERS: dict[str, Callable[[Lowering], ChartIR]] = {
 
 def chart_maker(lowering: Lowering) -> ChartIR | None:
     """The maker of a model's chart; None for a curve with formulas."""
-    curve = lowering.model.curve
-    return MAKERS[curve.kind](lowering) if curve.charted else None
+    curve, train = lowering.model.curve, lowering.model.force
+    if not curve.charted:
+        return None
+    along = ("along_z", "along_x", "along_y") if curve.in_space else ("chart",)
+    names = (*along, *(("along_roll",) if getattr(curve.definition, "banked", False) else ()))
+    made = replace(MAKERS[curve.kind](lowering), names=names)
+    if not train.cars:
+        return made
+    pull = differentiate(train.potential, HEIGHT)
+    numbers = lowering.constants(
+        "exact_train", "The length of a train, and what gravity is.", (train.train_length, pull)
+    )
+    length = lowering.order[train.train_length.name]
+    return replace(
+        made,
+        statement=f"TrackOfTrain({made.statement}, cars={train.cars}, numbers={numbers.name}, length={length})",
+        imports=(*made.imports, "TrackOfTrain"),
+        names=(*names, "along_h"),
+        exact=(*made.exact, numbers),
+    )

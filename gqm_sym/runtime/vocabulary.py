@@ -36,6 +36,7 @@ _NAMES_BY_HOME = {
     "charts.rail": "Rail",
     "charts.sampled": "Sampled",
     "charts.tracing": "Traced",
+    "charts.train": "TrackOfTrain",
     "interface": (
         "AGM_ARGUMENTS_BATCH BOUNDS BOUNDS_BATCH BatchFunctions CompiledFunctions DissipativeFunctions "
         "EFFECTIVE_POTENTIAL ExactFormulas ExactLaw ExactPotential FIELD INTEGRAND_INVARIANTS_BATCH LOAD_MAP "

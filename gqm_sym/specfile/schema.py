@@ -26,6 +26,7 @@ from gqm_sym.kernels import KERNELS, KernelRow
 from gqm_sym.specfile.fields import (
     ABSENT,
     Centre,
+    Count,
     CurveParameter,
     Direction,
     Ends,
@@ -208,6 +209,8 @@ _KERNEL_ARGUMENTS: dict[str, tuple[Any, Any]] = {
             examples=["-direction*k*W"],
         ),
     ),
+    "cars": (Count, Field(default=1, description="how many equal cars it has")),
+    "mass": (Number, Field(default=None, description="of the whole train; that of the parameter m if not given")),
     "form": (
         Literal["resistance", "printed"],
         Field(default="resistance", description="printed: gamma*ell_c*kappa/m as the paper has it"),

@@ -144,7 +144,7 @@ def extreme(motion: Any, quantity: Quantity, sign: int) -> Extreme:
         size, peaks = _on_segment(timed, trajectory, quantity, sign, end)
         for value, t, lam in peaks:
             if best is None or sign * (value - best.value) > EQUAL_ROUNDINGS * ULP * size:
-                best = Extreme(value, t, lam)
+                best = Extreme(value, min(t, end), lam)  # the time of the end itself may be rounded up
     assert best is not None
     if best.t == 0.0:  # as it was given, without rounding
         launch = motion.problem.launch

@@ -35,6 +35,7 @@ from gqm_sym.runtime.motion.events import (
 )
 from gqm_sym.runtime.motion.extremes import CONTACT_FORCE, SPEED, Extreme, extreme
 from gqm_sym.runtime.motion.locking import Lock, locked
+from gqm_sym.runtime.motion.riding.cars import Cars, cars
 from gqm_sym.runtime.motion.riding.exceedance import Exceedance, exceedance
 from gqm_sym.runtime.motion.riding.loads import felt, load_extreme
 from gqm_sym.runtime.motion.rolling import slip_times
@@ -609,6 +610,27 @@ class Motion(ABC):
             If the motion goes on for ever without repeating; give it a horizon, ``t_max``.
         """
         return exceedance(self, load, levels, side, limits)
+
+    @locked
+    def cars(self, t: Any) -> Cars:
+        """Where the cars of a train are, and the contact and coupling forces of each.
+
+        Parameters
+        ----------
+        t : number or array_like
+            Times in s from launch, as for `lam`.
+
+        Returns
+        -------
+        Cars
+            Arrays whose first axis is the cars, or the couplings between them.
+
+        Raises
+        ------
+        InputError
+            If the body is no train, or a time is none.
+        """
+        return cars(self, t)
 
     # -- history ------------------------------------------------------------------------------
 
