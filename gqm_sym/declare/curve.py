@@ -352,7 +352,7 @@ class Curve:
         points
             Rows of x and z, or in space of x, y and z: an array, or numbers or decimal text, which is kept as it is; or
             a table with these columns, as a DataFrame or a mapping; or, where ``z`` is given, the x of all points. In
-            space the track is a spline and not smoothed. Of a table in space the column roll is read too.
+            space the track is a spline; of a table in space the column roll is read too.
         z
             The heights of the points, where ``points`` are their x: ``Curve.sampled(x, z)``.
         kind
