@@ -28,7 +28,7 @@ if TYPE_CHECKING:
         SurfaceTension,
         Train,
     )
-    from gqm_sym.specfile import read_spec
+    from gqm_sym.specfile import read_spec, read_track
     from gqm_sym.studies import read_sweep
 
 __version__ = "0.1.0"
@@ -61,6 +61,7 @@ _HOMES = {
     "line": "gqm_sym.declare",
     "read_spec": "gqm_sym.specfile",
     "read_sweep": "gqm_sym.studies",
+    "read_track": "gqm_sym.specfile",
     "transition": "gqm_sym.declare",
     "uncertainty": "gqm_sym.fitting.uncertainty",
 }
@@ -93,6 +94,7 @@ __all__ = [
     "line",
     "read_spec",
     "read_sweep",
+    "read_track",
     "transition",
     "uncertainty",
 ]
