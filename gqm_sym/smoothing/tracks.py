@@ -158,8 +158,9 @@ def _fitted(points: Array, closed: bool, deviation: float | None) -> _Track:
     dimension = points.shape[1]
     u, period = lengths[: len(points)], float(lengths[-1]) if closed else None
     for count in range(1, ROUNDS + 1):
-        early = deviation is not None and count <= ROUNDS - LAST
-        deviations = [None, sqrt(dimension / (dimension - 1)) * deviation] if early else [deviation]
+        deviations = [deviation]
+        if deviation is not None and count <= ROUNDS - LAST:
+            deviations = [None, sqrt(dimension / (dimension - 1)) * deviation]
         choice = choose(u, points, period, deviations)
         track = _Track(choice, choice.smoother.basis.spline(choice.fit.coefficients), u, period)
         u = _nearest(track, points)
