@@ -168,12 +168,16 @@ def read_track(
     if joined and repeated:
         del texts[-1], places[-1]
     in_space = bool(places) and len(places[0]) == IN_SPACE
-    if in_space:
-        _check_space(kind, deviation)
+    if in_space and kind != "spline":
+        raise DeclarationError(
+            f"sampled: kind {kind!r} is for tracks of x and z only yet; in space declare a spline, of points dense "
+            "enough where the track bends"
+        )
     rows = list(range(1, len(places) + 1))
     if deviation is not None:  # what a recorder that waits for news says again was not measured again
         rows = [row for row in rows if row == 1 or places[row - 1] != places[row - 2]]
         places = [places[row - 1] for row in rows]
+        angles = [angles[row - 1] for row in rows] if angles else angles
     fewest = FEWEST_AUTO if deviation == "auto" else FEWEST[kind, joined]
     if len(places) < fewest:
         what = "a closed" if joined else "an open"
@@ -186,20 +190,11 @@ def read_track(
         texts = [" ".join(parts) for parts in zip(texts, angles, strict=False)] if angles else texts
         return Track(points="\n".join(texts), kind=kind, closed=joined)
     _check_survey(places, rows, joined, 0.0 if deviation == "auto" else deviation)
-    smoothed, report = _smoothed(places, rows, joined, deviation)
-    _warn_of_scatter(smoothed, joined, f"smoothing {smoothing!r} is less than their scatter")
-    kept = "\n".join(f"{x!r} {z!r}" for x, z in smoothed)
+    smoothed, report = _smoothed(places, rows, joined, deviation, angles)
+    if not in_space:
+        _warn_of_scatter(smoothed, joined, f"smoothing {smoothing!r} is less than their scatter")
+    kept = "\n".join(" ".join(map(repr, place)) for place in smoothed)
     return Track(points=kept, kind=kind, closed=joined, smoothing=report)
-
-
-def _check_space(kind: str, deviation: object) -> None:
-    """Refuse what there is for tracks in the plane of x and z only."""
-    for told, given, what in (
-        (f"kind {kind!r}", kind != "spline", "declare a spline, of points dense enough where the track bends"),
-        ("smoothing", deviation is not None, "leave it out, and smooth the points before"),
-    ):
-        if given:
-            raise DeclarationError(f"sampled: {told} is for tracks of x and z only yet; in space {what}")
 
 
 def _read_smoothing(given: Any, kind: str) -> float | Literal["auto"] | None:
@@ -227,13 +222,15 @@ def _read_smoothing(given: Any, kind: str) -> float | Literal["auto"] | None:
 
 
 def _smoothed(
-    places: list[Place], rows: list[int], joined: bool, deviation: float | Literal["auto"]
+    places: list[Place], rows: list[int], joined: bool, deviation: float | Literal["auto"], angles: list[str]
 ) -> tuple[list[Place], "Smoothing"]:
     """The points of the smooth track, and what smoothing did."""
     from gqm_sym.smoothing import smooth
 
-    found, report = smooth(places, rows, closed=joined, deviation=None if deviation == "auto" else deviation)
-    return [(x, z) for x, z in found.tolist()], report
+    known = None if deviation == "auto" else deviation
+    rolls = [float(angle) for angle, _ in zip(angles, places, strict=False)]
+    found, report = smooth(places, rows, closed=joined, deviation=known, angles=rolls)
+    return [tuple(place) for place in found.tolist()], report
 
 
 def _angles(given: Any, places: list[Place]) -> list[str]:
@@ -345,7 +342,7 @@ def _check_survey(places: list[Place], rows: list[int], joined: bool, scatter: f
         _check_gap(chord, usual, rows[count - 1], rows[count % len(rows)])
     around = [*places, *places[:2]] if joined else places
     bends = [
-        dist((0.5 * (one[0] + three[0]), 0.5 * (one[1] + three[1])), two)
+        dist([0.5 * (before + after) for before, after in zip(one, three, strict=True)], two)
         for one, two, three in zip(around, around[1:], around[2:], strict=False)
     ]
     long = LONG * max(scatter, median(bends))

@@ -11,7 +11,7 @@ from mpmath import mp, mpf
 import gqm_sym as gqm
 from gqm_sym.building import transient
 from gqm_sym.errors import DeclarationError
-from gqm_sym.runtime.charts.chart import SpaceChart, _read
+from gqm_sym.runtime.charts.chart import SpaceChart
 from gqm_sym.runtime.charts.sampled import Sampled
 
 G0 = 9.80665
@@ -28,9 +28,7 @@ def ring(count: int) -> np.ndarray:
 
 def derivatives(chart: SpaceChart, s: np.ndarray) -> np.ndarray:
     """x, y, z and the roll angle at arc lengths with their first three derivatives, as (4, 4, n)."""
-    blocks = chart.block.reshape(4, -1)
-    rows = [_read(np.ascontiguousarray(blocks[k]), s)[[1, 2, 3, 0]] for k in (1, 2, 0, 3)]
-    return np.stack(rows, axis=1)
+    return np.stack([chart.derivatives(s, order) for order in range(4)])
 
 
 def chart_of(points: np.ndarray, *, closed: bool) -> SpaceChart:

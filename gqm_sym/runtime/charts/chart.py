@@ -179,6 +179,9 @@ class Chart:
 IN_BLOCK = (2, 0, 1, 3)
 """The coordinates, and behind them the roll angle, in the order of their charts in the block of a `SpaceChart`."""
 
+BY_ORDER = (1, 2, 3, 0)
+"""The rows of such a chart that have a coordinate and its derivatives."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class SpaceChart(Chart):
@@ -187,13 +190,33 @@ class SpaceChart(Chart):
     Its block is that of the chart of z, followed by those of x and y, and of the roll angle if there is one. In the
     chart of a coordinate this is the height; in the places of angle, curvature and x are its first three derivatives by
     arc length.
+
+    Attributes
+    ----------
+    banked : bool
+        Whether there is a roll angle.
     """
+
+    banked: bool = False
 
     def coordinates(self, s: Any) -> Array:
         """Return x, y and z at arc lengths, as rows."""
-        places = np.ascontiguousarray(s, dtype=np.float64).reshape(-1)
-        blocks = self.block[: 3 * int(self.block[0])].reshape(3, -1)
-        return np.stack([_read(blocks[IN_BLOCK.index(axis)], places)[1] for axis in range(3)])
+        return self.derivatives(s, 0)[:3]
+
+    def derivatives(self, s: Any, order: int) -> Array:
+        """Return the derivatives of x, y and z by arc length, and of the roll angle if there is one, as rows.
+
+        Parameters
+        ----------
+        s
+            Arc lengths.
+        order
+            0 of them themselves, to 3.
+        """
+        places, size = np.ascontiguousarray(s, dtype=np.float64).reshape(-1), int(self.block[0])
+        order_in_block = IN_BLOCK[: 3 + self.banked]
+        blocks = self.block[: len(order_in_block) * size].reshape(-1, size)
+        return np.stack([_read(blocks[k], places)[BY_ORDER[order]] for k in np.argsort(order_in_block)])
 
 
 class PieceData(NamedTuple):
@@ -270,19 +293,22 @@ def assemble_in_space(
     edges : (n+1,) array
         Arc length at the edges of the pieces, increasing.
     anchors : (n, d) array
-        x, y and z at the left edge of each piece, and the roll angle if there is one.
+        x, y and z at the left edge of each piece, and the roll angle if there is one; floats longer than doubles keep
+        their digits.
     derivatives : three (n, d, TERMS) arrays
         Their first three derivatives by arc length at the nodes.
     period, breaks
         As `Chart` has them.
     """
-    blocks = blocks_of(edges, (anchors, 0.0), derivatives, period)
+    left = np.asarray(anchors, dtype=np.float64)
+    blocks = blocks_of(edges, (left, np.asarray(anchors - left, dtype=np.float64)), derivatives, period)
     return SpaceChart(
         block=np.concatenate([blocks[axis] for axis in IN_BLOCK[: len(blocks)]]),
         low=float(edges[0]),
         high=float(edges[-1]),
         period=float(period),
         breaks=np.asarray(breaks, dtype=np.float64),
+        banked=len(blocks) > 3,
     )
 
 
