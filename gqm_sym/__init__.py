@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from gqm_sym import design, figures, jax
     from gqm_sym.building import build
-    from gqm_sym.declare import Curve, arc, clothoid, families, line
+    from gqm_sym.declare import Curve, arc, clothoid, families, line, transition
     from gqm_sym.derivation import Model, derive
     from gqm_sym.design.least_speed import least_speed
     from gqm_sym.emission import emit
@@ -62,6 +62,7 @@ _HOMES = {
     "read_spec": "gqm_sym.specfile",
     "read_sweep": "gqm_sym.studies",
     "read_track": "gqm_sym.specfile",
+    "transition": "gqm_sym.declare",
     "uncertainty": "gqm_sym.fitting.uncertainty",
 }
 
@@ -94,6 +95,7 @@ __all__ = [
     "read_spec",
     "read_sweep",
     "read_track",
+    "transition",
     "uncertainty",
 ]
 

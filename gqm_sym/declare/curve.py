@@ -126,12 +126,10 @@ class Curve:
         Raises
         ------
         DeclarationError
-            If it has no beginning or no end, or is a space curve with formulas.
+            If it has no beginning or no end.
         """
         if self.charted:
             return self
-        if self.in_space:
-            raise DeclarationError("space curve: its formulas are not known in arc length yet; give a track by points")
         closed = self.period is not None
         ends = (sp.S.Zero, self.period) if closed else self.domain
         if None in ends:
@@ -417,7 +415,7 @@ class Curve:
         pieces: "Iterable[Piece | Curve]",
         *,
         start: Sequence[Source] | None = None,
-        heading: Source | None = None,
+        heading: Source | Sequence[Source] | None = None,
         closed: bool = False,
         parameters: Parameters | None = None,
         title: str = "",
@@ -429,9 +427,12 @@ class Curve:
         pieces
             `line`, `arc` and `clothoid`, which are placed at the end of the piece before, and curves with formulas and
             a bounded domain, whose place and tangent must match there (within 1e-9 of the rail's length and 1e-9 rad).
+            A `transition` or a space curve among them makes a rail in space, on which arcs and clothoids turn upwards
+            where they turn left in a plane.
         start, heading
-            Where the first piece begins, and the angle of its tangent from the x axis; (0, 0) and 0 if not given. A
-            curve that comes first has its own.
+            Where the first piece begins, and the angle of its tangent from the x axis; (0, 0) and 0 if not given. In
+            space x, y and z, and the angles of the tangent from the x axis as seen from above and from the level, then
+            how far the frame leans to the left; those left out are 0. A curve that comes first has its own.
         closed
             Whether the rail ends where it began, in the same direction.
 
@@ -452,10 +453,12 @@ class Curve:
             pieces, start=start, heading=heading, closed=closed, parameters=parameters
         )
         s = sp.Symbol("s", real=True)
+        at_x, at_y, at_z = (head(s) for head in SPACE) if rail.in_space else (chart_x(s), sp.S.Zero, chart_z(s))
         return cls(
             kind="piecewise",
-            x=chart_x(s),
-            z=chart_z(s),
+            x=at_x,
+            y=at_y,
+            z=at_z,
             parameter=s,
             defaults=defaults,
             title=title,

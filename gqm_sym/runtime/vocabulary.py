@@ -35,6 +35,7 @@ _NAMES_BY_HOME = {
     "charts.polynomials": "Polynomials",
     "charts.rail": "Rail",
     "charts.sampled": "Sampled",
+    "charts.space.rail": "SpaceRail",
     "charts.tracing": "Traced",
     "charts.train": "TrackOfTrain",
     "interface": (

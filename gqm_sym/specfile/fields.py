@@ -167,3 +167,4 @@ Length: TypeAlias = Annotated[str, AfterValidator(_in_metres), _checked(_check_n
 Place: TypeAlias = Annotated[list[Length], Field(min_length=2, max_length=2)]
 Centre: TypeAlias = Annotated[list[Expression], Field(min_length=2, max_length=2)]
 SpaceCentre: TypeAlias = Annotated[list[Expression], Field(min_length=2, max_length=3)]
+Headings: TypeAlias = Annotated[list[Expression], Field(min_length=1, max_length=3)]

@@ -190,10 +190,10 @@ EXPLICIT: dict[str, CurveRow] = {
     "polar": CurveRow(Polar, _declare_polar, "r = r(theta)"),
     "family": CurveRow(_FAMILY, _declare_family, "a curve of a known family"),
 }
+EXPLICIT["space"] = CurveRow(Space, lambda given: Curve.space(**given), "three coordinates in a parameter")
 RAILS = RailSchema.over({key: (row.model, row.declare, row.summary) for key, row in EXPLICIT.items()})
 CURVES: dict[str, CurveRow] = {
     **EXPLICIT,
-    "space": CurveRow(Space, lambda given: Curve.space(**given), "three coordinates in a parameter"),
     "implicit": CurveRow(Implicit, _declare_implicit, "F(x, z) = 0"),
     "points": CurveRow(POINTS, declare_track, "a track through the points of a file", reads_files=True),
     "pieces": CurveRow(RAILS.rail, RAILS.declare, "a rail of lines, arcs, clothoids and curves"),

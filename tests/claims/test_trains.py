@@ -185,6 +185,32 @@ def test_in_space(build: Build) -> None:
     )
 
 
+def test_on_a_helix(build: Build) -> None:
+    """Where the height is linear in arc length a train falls as a body does; its cars press inwards and down."""
+    radius, rise, length, cars = 2.0, 0.75, 3.0, 5
+    module = build("train_on_helix", gqm.families.helix(R="2", c="3/4", domain=(0, 12)), cars=cars)
+    rate, launch = float(np.hypot(radius, rise)), 20.0
+    slope = rise / rate
+    motion = module.solve(launch, length=length)
+    assert motion.t_end == pytest.approx(np.sqrt(2 * (launch - length / 2) / (9.81 * slope)), rel=1e-15)
+    time = 1.25
+    found = motion.cars(time)
+    shares = (np.arange(cars) + 0.5) / cars - 0.5
+    places, v2 = launch - 9.81 * slope * time**2 / 2 + length * shares, (9.81 * slope * time) ** 2
+    angles = places / rate
+    inwards, tangent = radius / rate**2 * v2, np.array([-radius * np.sin(angles), radius * np.cos(angles)]) / rate
+    scale = SHARE * 9.81
+    np.testing.assert_allclose(found.lam, places, rtol=1e-14)
+    wanted = [
+        -inwards * np.cos(angles) - 9.81 * slope * tangent[0],
+        -inwards * np.sin(angles) - 9.81 * slope * tangent[1],
+    ]
+    np.testing.assert_allclose(cars * found.normal_x, wanted[0], rtol=0, atol=scale)
+    np.testing.assert_allclose(cars * found.normal_y, wanted[1], rtol=0, atol=scale)
+    np.testing.assert_allclose(cars * found.normal_z, 9.81 * (1 - slope**2), rtol=0, atol=scale)
+    np.testing.assert_allclose(found.coupling_force, 0, rtol=0, atol=scale)
+
+
 def test_declared_in_one_piece() -> None:
     """The mass is that of the whole train, and forces that are not known of a train are refused."""
     train = gqm.Train(length="2.5", cars=4, mass=1200)
@@ -203,8 +229,6 @@ def test_declared_in_one_piece() -> None:
             gqm.derive(circle, train + force)
     with pytest.raises(DeclarationError, match="has no end to measure arc length from"):
         gqm.derive(gqm.families.parabola(), gqm.Gravity() + train)
-    with pytest.raises(DeclarationError, match="not known in arc length yet"):
-        gqm.derive(gqm.families.helix(), gqm.Gravity() + train)
     for cars in (0, 1.5, True, 10**6):
         with pytest.raises(DeclarationError, match="cars: must be a whole number"):
             gqm.Train(cars=cars)

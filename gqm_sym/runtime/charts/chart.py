@@ -293,13 +293,15 @@ def assemble_in_space(
     edges : (n+1,) array
         Arc length at the edges of the pieces, increasing.
     anchors : (n, d) array
-        x, y and z at the left edge of each piece, and the roll angle if there is one.
+        x, y and z at the left edge of each piece, and the roll angle if there is one; floats longer than doubles keep
+        their digits.
     derivatives : three (n, d, TERMS) arrays
         Their first three derivatives by arc length at the nodes.
     period, breaks
         As `Chart` has them.
     """
-    blocks = blocks_of(edges, (anchors, 0.0), derivatives, period)
+    left = np.asarray(anchors, dtype=np.float64)
+    blocks = blocks_of(edges, (left, np.asarray(anchors - left, dtype=np.float64)), derivatives, period)
     return SpaceChart(
         block=np.concatenate([blocks[axis] for axis in IN_BLOCK[: len(blocks)]]),
         low=float(edges[0]),
