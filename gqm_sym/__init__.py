@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from gqm_sym import design, figures, jax
     from gqm_sym.building import build
-    from gqm_sym.declare import Curve, arc, clothoid, families, line
+    from gqm_sym.declare import Curve, arc, clothoid, families, line, transition
     from gqm_sym.derivation import Model, derive
     from gqm_sym.design.least_speed import least_speed
     from gqm_sym.emission import emit
@@ -26,8 +26,9 @@ if TYPE_CHECKING:
         Rolling,
         RotatingFrame,
         SurfaceTension,
+        Train,
     )
-    from gqm_sym.specfile import read_spec
+    from gqm_sym.specfile import read_spec, read_track
     from gqm_sym.studies import read_sweep
 
 __version__ = "0.1.0"
@@ -45,6 +46,7 @@ _HOMES = {
     "Rolling": "gqm_sym.kernels",
     "RotatingFrame": "gqm_sym.kernels",
     "SurfaceTension": "gqm_sym.kernels",
+    "Train": "gqm_sym.kernels",
     "arc": "gqm_sym.declare",
     "build": "gqm_sym.building",
     "clothoid": "gqm_sym.declare",
@@ -59,6 +61,8 @@ _HOMES = {
     "line": "gqm_sym.declare",
     "read_spec": "gqm_sym.specfile",
     "read_sweep": "gqm_sym.studies",
+    "read_track": "gqm_sym.specfile",
+    "transition": "gqm_sym.declare",
     "uncertainty": "gqm_sym.fitting.uncertainty",
 }
 
@@ -75,6 +79,7 @@ __all__ = [
     "Rolling",
     "RotatingFrame",
     "SurfaceTension",
+    "Train",
     "arc",
     "build",
     "clothoid",
@@ -89,6 +94,8 @@ __all__ = [
     "line",
     "read_spec",
     "read_sweep",
+    "read_track",
+    "transition",
     "uncertainty",
 ]
 

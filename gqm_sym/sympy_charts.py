@@ -2,13 +2,18 @@
 
 A curve that is known by numbers only (implicit, sampled, put together from pieces) has no formula x(s). These heads
 stand for what its chart holds: they are read as ``x(s)``, and lowered to calls of the chart. A track in space has a
-chart of each coordinate, with its first two derivatives by arc length.
+chart of each coordinate, with its first three derivatives by arc length, and may have one of its roll angle.
 """
 
 from typing import ClassVar
 
 import sympy as sp
 from sympy.printing.printer import Printer
+
+from gqm_sym.errors import DerivationError
+
+# How often coordinates in space are differentiated: rates of loads have third derivatives.
+MOST_DERIVATIVES = 3
 
 
 class ChartFunction(sp.Function):  # type: ignore[misc]
@@ -52,12 +57,12 @@ class chart_kappa(ChartFunction):
 
 
 class SpaceFunction(ChartFunction):
-    """A coordinate of a charted curve in space, or one of its first two derivatives by arc length.
+    """A coordinate of a charted curve in space or its roll angle, or one of their derivatives by arc length.
 
     Attributes
     ----------
     axis
-        The coordinate.
+        The coordinate, or ``roll``.
     order
         How often it is differentiated.
     """
@@ -65,16 +70,31 @@ class SpaceFunction(ChartFunction):
     axis: ClassVar[str]
     order: ClassVar[int]
 
+    def fdiff(self, argindex: int = 1) -> sp.Expr:
+        """Return its derivative by arc length."""
+        heads = SPACE_CHARTS[self.axis]
+        if self.order + 1 == len(heads):
+            raise DerivationError(f"{self}: no derivative of it is known")
+        return heads[self.order + 1](self.args[0])
+
 
 def _of_axis(axis: str, order: int) -> type[SpaceFunction]:
     row, primes = "d" * order + axis, "'" * order
-    named = {"axis": axis, "order": order, "row": row, "symbol": axis + primes}
+    named = {"axis": axis, "order": order, "row": row, "symbol": (r"\psi" if axis == ROLL else axis) + primes}
     return type(f"space_{row}", (SpaceFunction,), {**named, "__module__": __name__})
 
 
+ROLL = "roll"
+AXES = ("x", "y", "z")
 SPACE_ROWS: dict[str, tuple[type[SpaceFunction], ...]] = {
-    axis: tuple(_of_axis(axis, order) for order in range(3)) for axis in "xyz"
+    axis: tuple(_of_axis(axis, order) for order in range(MOST_DERIVATIVES + 1)) for axis in (*AXES, ROLL)
 }
-"""Each coordinate in space with its derivatives."""
-SPACE: tuple[type[SpaceFunction], ...] = tuple(rows[0] for rows in SPACE_ROWS.values())
+"""Each coordinate in space, and the roll angle, with their derivatives."""
+SPACE: tuple[type[SpaceFunction], ...] = tuple(SPACE_ROWS[axis][0] for axis in AXES)
 """The coordinates x, y and z."""
+space_roll: type[SpaceFunction] = SPACE_ROWS[ROLL][0]
+"""The roll angle."""
+MEAN_HEIGHT: tuple[type[SpaceFunction], ...] = tuple(_of_axis("h", order) for order in range(3))
+"""The mean height of a train with its derivatives, by the place of its middle."""
+SPACE_CHARTS: dict[str, tuple[type[SpaceFunction], ...]] = {**SPACE_ROWS, "h": MEAN_HEIGHT}
+"""All that has a chart of its own, with its derivatives."""

@@ -70,6 +70,7 @@ CALLS = {
     "sampled smooth value": lambda v: gqm.Curve.sampled([*NOISY, (20, v)], smoothing=1e-4),
     **{f"space {name}": lambda v, name=name: gqm.Curve.space(**COIL | {name: v}) for name in SPACE},
     "read_spec": lambda v: gqm.read_spec(v),
+    "read_track": lambda v: gqm.read_track(v),
     "read_sweep": lambda v: gqm.read_sweep(v),
     "normal_force_at": lambda v: parabola().normal_force_at(v),
     "normal_force_vector_at": lambda v: parabola().normal_force_vector_at(v),

@@ -2,6 +2,6 @@
 
 from gqm_sym.declare import families
 from gqm_sym.declare.curve import Curve
-from gqm_sym.declare.piecewise import arc, clothoid, line
+from gqm_sym.declare.piecewise import arc, clothoid, line, transition
 
-__all__ = ["Curve", "arc", "clothoid", "families", "line"]
+__all__ = ["Curve", "arc", "clothoid", "families", "line", "transition"]

@@ -8,6 +8,7 @@ import sympy as sp
 from gqm_sym.arguments import short
 from gqm_sym.errors import DeclarationError
 from gqm_sym.expressions import read_expression
+from gqm_sym.sympy_charts import SpaceFunction
 
 Source: TypeAlias = str | int | sp.Expr
 Roll: TypeAlias = Source | tuple[Source, Source]
@@ -44,29 +45,43 @@ def _is_coordinated(given: Any) -> bool:
     return isinstance(given, str) and given == COORDINATED
 
 
-def read_banking(roll: Roll | None, heartline: Source) -> Banking | None:
+def is_formula(roll: Any) -> bool:
+    """Whether a roll is told by a formula or a word, not by angles of points."""
+    return isinstance(roll, str | int | sp.Expr) or (isinstance(roll, tuple | list) and len(roll) <= 2)
+
+
+def read_banking(roll: Roll | None, heartline: Source, where: str = "space") -> Banking | None:
     """Read the arguments ``roll`` and ``heartline`` of a space curve; None where no roll is declared.
+
+    Parameters
+    ----------
+    roll, heartline
+        As `Curve.space` has them; the roll may also be the chart of angles at points.
+    where
+        What declares the curve, for messages.
 
     Raises
     ------
     DeclarationError
         If they are no such thing, or there is a heartline without a roll.
     """
-    height = read_expression(heartline, where="space: heartline", unit="m")
+    height = read_expression(heartline, where=f"{where}: heartline", unit="m")
     if roll is None:
         if height != 0:
             raise DeclarationError(
-                f"space: heartline: {height} is measured across the banked track; declare roll too, an angle or "
+                f"{where}: heartline: {height} is measured across the banked track; declare roll too, an angle or "
                 f"{COORDINATED!r}"
             )
         return None
     if isinstance(roll, tuple | list):
         if len(roll) != 2 or not _is_coordinated(roll[0]):
             raise DeclarationError(
-                f"space: roll: must be an angle, {COORDINATED!r} or ({COORDINATED!r}, speed), got {short(roll)}"
+                f"{where}: roll: must be an angle, {COORDINATED!r} or ({COORDINATED!r}, speed), got {short(roll)}"
             )
-        speed = read_expression(roll[1], where="space: roll: speed", unit="m/s")
+        speed = read_expression(roll[1], where=f"{where}: roll: speed", unit="m/s")
         return Banking(angle=None, speed=speed, heartline=height)
     if _is_coordinated(roll):
         return Banking(angle=None, speed=None, heartline=height)
-    return Banking(angle=read_expression(roll, where="space: roll", unit="rad"), speed=None, heartline=height)
+    of_points = isinstance(roll, SpaceFunction)
+    angle = roll if of_points else read_expression(roll, where=f"{where}: roll", unit="rad")
+    return Banking(angle=angle, speed=None, heartline=height)

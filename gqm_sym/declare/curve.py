@@ -1,13 +1,13 @@
 """A curve as it was declared: coordinates, parameter, domain and run-time parameters."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, TypeAlias, TypedDict, Unpack
 
 import sympy as sp
 
 from gqm_sym.arguments import checked, names, one_line, short, unknown_argument
-from gqm_sym.declare.banking import Banking, Roll, read_banking
+from gqm_sym.declare.banking import Banking, read_banking
 from gqm_sym.declare.closing import check_period, found_period
 from gqm_sym.declare.ends import Ends, check_ends, check_order, read_ends
 from gqm_sym.declare.measures import parameter_dimension, told, units_of
@@ -15,7 +15,7 @@ from gqm_sym.dimensions import unit_of
 from gqm_sym.errors import ArgumentError, DeclarationError
 from gqm_sym.expressions import check_name, read_expression
 from gqm_sym.parameters import Parameters, Value, check_measured, names_in_order, read_parameters
-from gqm_sym.sympy_charts import SPACE, chart_x, chart_z
+from gqm_sym.sympy_charts import SPACE, chart_x, chart_z, space_roll
 
 if TYPE_CHECKING:
     from gqm_sym.declare.piecewise import Piece
@@ -25,9 +25,9 @@ Source: TypeAlias = str | int | sp.Expr
 
 
 class SpaceOptions(TypedDict, total=False):
-    """Arguments of `Curve.space` that are rarely given; they are described there."""
+    """Arguments of `Curve.space` and `Curve.sampled` that are rarely given; they are described there."""
 
-    roll: Roll | None
+    roll: Any
     heartline: Source
     parameters: Parameters | None
     title: str
@@ -119,6 +119,23 @@ class Curve:
     def charted(self) -> bool:
         """Whether the parameter is arc length, and the coordinates are known by numbers only."""
         return self.definition is not None
+
+    def in_arc_length(self) -> "Curve":
+        """Return the same curve with arc length from its beginning as its parameter.
+
+        Raises
+        ------
+        DeclarationError
+            If it has no beginning or no end.
+        """
+        if self.charted:
+            return self
+        closed = self.period is not None
+        ends = (sp.S.Zero, self.period) if closed else self.domain
+        if None in ends:
+            raise DeclarationError(f"{self.kind} curve: has no end to measure arc length from; give it a domain")
+        whole = replace(self, domain=ends, period=None)
+        return Curve.piecewise([whole], closed=closed, parameters=dict(self.defaults), title=self.title)
 
     def __str__(self) -> str:
         """A few lines for people: what it is, where it goes, and what its parameters are measured in."""
@@ -266,9 +283,7 @@ class Curve:
         >>> Curve.space(x="R*cos(u)", y="R*sin(u)", z="c*u", parameter="u").parameters
         ('R', 'c')
         """
-        if strangers := more.keys() - SpaceOptions.__annotations__.keys():
-            known = ("x", "y", "z", "parameter", "period", "domain", *SpaceOptions.__annotations__)
-            raise ArgumentError(unknown_argument("Curve.space", min(strangers), known))
+        _refuse_others(more, "Curve.space", ("x", "y", "z", "parameter", "period", "domain"))
         symbol, title = _symbol(parameter, "space"), more.get("title", "")
         at = {name: read_expression(form, where=f"space: {name}") for name, form in (("x", x), ("y", y), ("z", z))}
         banking = read_banking(more.get("roll"), more.get("heartline", 0))
@@ -328,7 +343,7 @@ class Curve:
         kind: str = "spline",
         closed: bool | None = None,
         smoothing: float | str | None = None,
-        title: str = "",
+        **more: Unpack[SpaceOptions],
     ) -> "Curve":
         """Declare the track through points, in arc length from the first of them.
 
@@ -337,7 +352,7 @@ class Curve:
         points
             Rows of x and z, or in space of x, y and z: an array, or numbers or decimal text, which is kept as it is; or
             a table with these columns, as a DataFrame or a mapping; or, where ``z`` is given, the x of all points. In
-            space the track is a spline and not smoothed.
+            space the track is a spline; of a table in space the column roll is read too.
         z
             The heights of the points, where ``points`` are their x: ``Curve.sampled(x, z)``.
         kind
@@ -353,6 +368,14 @@ class Curve:
             in metres, or "auto", to find it by cross-validation. The track is then the smoothing spline of degree 5;
             what it changed, and how good its curvature is, is in the attribute ``smoothing`` of the curve. None: the
             track goes through the points.
+        roll
+            In space, how the track is banked, so that states tell what a rider feels: an array of the roll angle at
+            each point in radians, through which a spline goes as well; or what `Curve.space` takes, with formulas in
+            the arc length s.
+        heartline, parameters
+            As of `Curve.space`.
+        title
+            One line for people.
 
         Raises
         ------
@@ -374,12 +397,16 @@ class Curve:
         """
         from gqm_sym.declare.sampled import read_track
 
-        s = sp.Symbol("s", real=True)
-        track = read_track(points, z, kind=kind, closed=closed, smoothing=smoothing)
-        if track.in_space:
-            at_x, at_y, at_z = (head(s) for head in SPACE)
-            return cls(kind="sampled", x=at_x, y=at_y, z=at_z, parameter=s, title=title, definition=track)
-        return cls(kind="sampled", x=chart_x(s), z=chart_z(s), parameter=s, title=title, definition=track)
+        _refuse_others(more, "Curve.sampled", ("points", "z", "kind", "closed", "smoothing"))
+        s, roll, title = sp.Symbol("s", real=True), more.get("roll"), more.get("title", "")
+        track = read_track(points, z, kind=kind, closed=closed, smoothing=smoothing, roll=roll)
+        banking = read_banking(space_roll(s) if track.banked else roll, more.get("heartline", 0), "sampled")
+        if banking is not None and not track.in_space:
+            raise DeclarationError("sampled: roll: is for tracks in space; give rows of x, y and z")
+        named = dict(zip("xyz", (head(s) for head in SPACE), strict=True))
+        at = named if track.in_space else {"x": chart_x(s), "z": chart_z(s)}
+        forms = cls(kind="sampled", **at, parameter=s, title=title, definition=track, banking=banking)
+        return _declare(forms, None, more.get("parameters"), ())
 
     @classmethod
     @checked("Curve.piecewise")
@@ -388,7 +415,7 @@ class Curve:
         pieces: "Iterable[Piece | Curve]",
         *,
         start: Sequence[Source] | None = None,
-        heading: Source | None = None,
+        heading: Source | Sequence[Source] | None = None,
         closed: bool = False,
         parameters: Parameters | None = None,
         title: str = "",
@@ -400,9 +427,12 @@ class Curve:
         pieces
             `line`, `arc` and `clothoid`, which are placed at the end of the piece before, and curves with formulas and
             a bounded domain, whose place and tangent must match there (within 1e-9 of the rail's length and 1e-9 rad).
+            A `transition` or a space curve among them makes a rail in space, on which arcs and clothoids turn upwards
+            where they turn left in a plane.
         start, heading
-            Where the first piece begins, and the angle of its tangent from the x axis; (0, 0) and 0 if not given. A
-            curve that comes first has its own.
+            Where the first piece begins, and the angle of its tangent from the x axis; (0, 0) and 0 if not given. In
+            space x, y and z, and the angles of the tangent from the x axis as seen from above and from the level, then
+            how far the frame leans to the left; those left out are 0. A curve that comes first has its own.
         closed
             Whether the rail ends where it began, in the same direction.
 
@@ -423,10 +453,12 @@ class Curve:
             pieces, start=start, heading=heading, closed=closed, parameters=parameters
         )
         s = sp.Symbol("s", real=True)
+        at_x, at_y, at_z = (head(s) for head in SPACE) if rail.in_space else (chart_x(s), sp.S.Zero, chart_z(s))
         return cls(
             kind="piecewise",
-            x=chart_x(s),
-            z=chart_z(s),
+            x=at_x,
+            y=at_y,
+            z=at_z,
             parameter=s,
             defaults=defaults,
             title=title,
@@ -437,6 +469,12 @@ class Curve:
 
 def _symbol(name: str, kind: str) -> sp.Symbol:
     return sp.Symbol(check_parameter_name(name, kind), real=True)
+
+
+def _refuse_others(given: Mapping[str, Any], called: str, known: tuple[str, ...]) -> None:
+    """Refuse arguments that are not among the known ones, nor among `SpaceOptions`."""
+    if strangers := given.keys() - SpaceOptions.__annotations__.keys():
+        raise ArgumentError(unknown_argument(called, min(strangers), (*known, *SpaceOptions.__annotations__)))
 
 
 def check_parameter_name(name: str, kind: str) -> str:

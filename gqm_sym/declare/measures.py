@@ -6,7 +6,7 @@ import sympy as sp
 
 from gqm_sym.declare.banking import Banking
 from gqm_sym.declare.implicit import Level
-from gqm_sym.declare.piecewise import FormulaCurve, Rail
+from gqm_sym.declare.piecewise import MAX_POWER, FormulaCurve, Rail
 from gqm_sym.declare.polynomials import PolynomialPieces
 from gqm_sym.declare.sampled import Track
 from gqm_sym.dimensions import COMMON, LENGTH, NUMBER, Dimension, Formulas, dimension, found_dimensions, unit_of
@@ -51,6 +51,7 @@ _PIECES: dict[str, tuple[Dimension, ...]] = {
     "line": (LENGTH,),
     "arc": (LENGTH, NUMBER),
     "clothoid": (LENGTH, PER_LENGTH, PER_LENGTH),
+    "transition": (LENGTH, *3 * tuple(dimension(metre=-1 - power) for power in range(MAX_POWER + 1))),
 }
 _PLANE: dict[str, Dimension | None] = {"x": LENGTH, "z": LENGTH}
 
@@ -64,16 +65,16 @@ def curve_formulas(curve: DeclaredCurve) -> Formulas:
         return Formulas([(level.value, None), *places], _PLANE)
     if isinstance(curve.definition, Rail):
         return _rail_formulas(curve.definition)
-    if curve.charted:
-        return Formulas()
     own = parameter_dimension(curve)
+    banked = [] if curve.banking is None else _banked(curve.banking)
+    if curve.charted:
+        return Formulas(banked, {lam.name: own})
     coordinates = [form for _, form in curve.coordinates] if curve.radius is None else [curve.radius]
     ends = [(end, own) for end in (*curve.domain, curve.period) if end is not None and own is not None]
-    banked = [] if curve.banking is None else _banked(curve.banking)
     return Formulas([*((form, LENGTH) for form in coordinates), *ends, *banked], {lam.name: own})
 
 
-def _banked(banking: Banking) -> list[tuple[sp.Expr, Dimension]]:
+def _banked(banking: Banking) -> list[tuple[sp.Expr, Dimension | None]]:
     """The formulas of a banking with their dimensions."""
     forms = ((banking.angle, NUMBER), (banking.speed, SPEED), (banking.heartline, LENGTH))
     return [(form, wanted) for form, wanted in forms if form is not None]
@@ -92,7 +93,8 @@ def parameter_dimension(curve: DeclaredCurve) -> Dimension | None:
 def _rail_formulas(rail: Rail) -> Formulas:
     total = Formulas()
     if rail.start is not None:
-        total += Formulas(list(zip(rail.start, (LENGTH, LENGTH, NUMBER), strict=True)))
+        places, angles = (3, 3) if rail.in_space else (2, 1)
+        total += Formulas(list(zip(rail.start, (*places * (LENGTH,), *angles * (NUMBER,)), strict=True)))
     for count, piece in enumerate(rail.pieces, start=1):
         if piece.curve is None:
             total += Formulas(list(zip(piece.numbers, _PIECES[piece.kind], strict=True)))

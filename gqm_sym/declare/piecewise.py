@@ -1,9 +1,9 @@
-"""Rails put together from pieces: lines, arcs, clothoids and curves with formulas."""
+"""Rails put together from pieces: lines, arcs, clothoids, transitions in space and curves with formulas."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from math import pi, tau
-from typing import Protocol, runtime_checkable
+from typing import Any, Protocol, runtime_checkable
 
 import sympy as sp
 
@@ -14,9 +14,12 @@ from gqm_sym.parameters import Parameters, Value, names_in_order, read_parameter
 
 # What each standard piece is given by; the first of them must be positive.
 STANDARD = {"line": ("length",), "arc": ("radius", "angle"), "clothoid": ("length", "kappa_start", "kappa_end")}
+# The highest power of s in the rates of a transition.
+MAX_POWER = 5
 # An arc by a larger angle is meant in degrees.
 MAX_ARC = 4.0 * pi
 # The SI units of these.
+DISTANCE = sp.Symbol("s", real=True)
 _UNITS = {"length": "m", "radius": "m", "angle": "1", "kappa_start": "1/m", "kappa_end": "1/m"}
 
 
@@ -56,9 +59,10 @@ class Piece:
     Attributes
     ----------
     kind
-        "line", "arc", "clothoid" or "curve".
+        "line", "arc", "clothoid", "transition" or "curve".
     numbers
-        What `STANDARD` says, or the ends of the curve's parameter.
+        What `STANDARD` says, or the ends of the curve's parameter; of a transition its length, then the coefficients
+        of yaw, of pitch and of roll, lowest power first.
     curve
         Where the piece is a curve with formulas.
     """
@@ -75,16 +79,19 @@ class Rail:
     Attributes
     ----------
     start
-        x, z and heading; None where the first piece has a place of its own.
+        x, z and heading, or x, y and z, heading, climb and roll; None where the first piece has a place of its own.
     pieces
         In order.
     closed
         Whether the last is joined to the first.
+    in_space
+        Whether it has three coordinates.
     """
 
     start: tuple[sp.Expr, ...] | None
     pieces: tuple[Piece, ...]
     closed: bool
+    in_space: bool = False
 
 
 @checked("line")
@@ -103,6 +110,40 @@ def arc(*, radius: Source, angle: Source) -> Piece:
 def clothoid(*, length: Source, kappa_start: Source, kappa_end: Source) -> Piece:
     """A piece whose signed curvature is linear in arc length."""
     return _standard("clothoid", length, kappa_start, kappa_end)
+
+
+@checked("transition")
+def transition(*, length: Source, yaw: Source = 0, pitch: Source = 0, roll: Source = 0) -> Piece:
+    """A piece in space along which the rail turns and rolls at given rates.
+
+    The rates are those of the frame of a rider: his tangent, left and up. In the terms of Frenet's formulas, with the
+    normal to the left, curvature is yaw and torsion is minus the roll rate.
+
+    Parameters
+    ----------
+    length
+        Of the piece.
+    yaw, pitch, roll
+        Rates in 1/m: positive where the rail turns to the left, upwards, and leans to the left, each a number or a
+        polynomial in ``s``, the distance from the beginning of the piece, of degree 5 at most.
+    """
+    size = read_expression(length, where="transition: length", unit="m")
+    if size.is_number and not size > 0:
+        raise DeclarationError(f"transition: length: must be positive, got {size}")
+    rates = {"yaw": yaw, "pitch": pitch, "roll": roll}
+    return Piece(kind="transition", numbers=(size, *(c for name in rates for c in _polynomial(rates[name], name))))
+
+
+def _polynomial(given: Source, name: str) -> tuple[sp.Expr, ...]:
+    """The coefficients of a rate in powers of s, lowest first."""
+    rate = sp.expand(read_expression(given, where=f"transition: {name}", unit="1/m"))
+    found = tuple(rate.coeff(DISTANCE, power) for power in range(MAX_POWER + 1))
+    rest = sp.expand(rate - sp.Add(*(c * DISTANCE**power for power, c in enumerate(found))))
+    if rest != 0 or any(DISTANCE in c.free_symbols for c in found):
+        raise DeclarationError(
+            f"transition: {name}: must be a polynomial in s of degree {MAX_POWER} at most, got {short(str(rate))}"
+        )
+    return found
 
 
 def _standard(kind: str, *given: Source) -> Piece:
@@ -125,7 +166,7 @@ def declare_rail(
     pieces: Iterable[Piece | FormulaCurve],
     *,
     start: Sequence[Source] | None,
-    heading: Source | None,
+    heading: Source | Sequence[Source] | None,
     closed: bool,
     parameters: Parameters | None,
 ) -> tuple[Rail, tuple[tuple[str, Value | None], ...], tuple[str, ...]]:
@@ -144,7 +185,14 @@ def declare_rail(
             "piecewise: no pieces; give one or more, as in [line(length=2), arc(radius=1, angle=pi)]"
         )
     joined = tuple(_piece(piece, f"piecewise: piece {count}") for count, piece in enumerate(given, start=1))
-    rail = Rail(start=_start(start, heading, joined[0]), pieces=joined, closed=closed)
+    place = (
+        None
+        if start is None
+        else several(start, where="piecewise: start", what="a pair (x, z), or three numbers in space")
+    )
+    in_space = (place is not None and len(place) == 3) or any(_is_spatial(piece) for piece in joined)
+    first = _start(place, heading, joined[0], in_space)
+    rail = Rail(start=first, pieces=joined, closed=closed, in_space=in_space)
     defaults, positive = _parameters(rail, parameters)
     return rail, defaults, positive
 
@@ -154,8 +202,6 @@ def _piece(given: Piece | FormulaCurve, where: str) -> Piece:
         return given
     if not isinstance(given, FormulaCurve):
         raise DeclarationError(f"{where}: {short(given)} given; give line, arc, clothoid or a curve with formulas")
-    if given.kind == "space":
-        raise DeclarationError(f"{where}: a space curve cannot be a piece yet; give a planar one")
     if given.charted:
         raise DeclarationError(f"{where}: a curve of kind {given.kind!r} cannot be a piece; give one with formulas")
     low, high = given.domain
@@ -164,20 +210,33 @@ def _piece(given: Piece | FormulaCurve, where: str) -> Piece:
     return Piece(kind="curve", numbers=(low, high), curve=given)
 
 
-def _start(start: Sequence[Source] | None, heading: Source | None, first: Piece) -> tuple[sp.Expr, ...] | None:
+def _is_spatial(piece: Piece) -> bool:
+    return piece.kind == "transition" or (piece.curve is not None and piece.curve.kind == "space")
+
+
+def _start(place: tuple[Source, ...] | None, heading: Any, first: Piece, in_space: bool) -> tuple[sp.Expr, ...] | None:
+    """The start of a rail as `Rail` has it."""
     if first.curve is not None:
-        if start is not None or heading is not None:
+        if place is not None or heading is not None:
             raise DeclarationError(
                 "piecewise: start: the first piece is a curve with a place of its own; leave start and heading out"
             )
         return None
-    place = (0, 0) if start is None else several(start, where="piecewise: start", what="a pair (x, z)")
-    if len(place) != 2:
-        raise DeclarationError(f"piecewise: start: must be a pair (x, z), got {short(start)}")
-    numbers = (*place, 0 if heading is None else heading)
+    what, size = ("three numbers (x, y, z)", 3) if in_space else ("a pair (x, z)", 2)
+    place = (0,) * size if place is None else place
+    if len(place) != size:
+        raise DeclarationError(f"piecewise: start: must be {what}, got {short(place)}")
+    angles: tuple[Source, ...] = (0,) if heading is None else (heading,)
+    if in_space:
+        angles = tuple(heading) if isinstance(heading, tuple | list) else angles
+        if len(angles) > 3:
+            raise DeclarationError(
+                f"piecewise: heading: must be an angle, or up to three: heading, climb and roll; got {short(heading)}"
+            )
+        angles += (0,) * (3 - len(angles))
     return tuple(
         read_expression(number, where=f"piecewise: {name}", unit="1" if name == "heading" else "m")
-        for number, name in zip(numbers, ("start", "start", "heading"), strict=True)
+        for number, name in zip((*place, *angles), (*size * ("start",), *len(angles) * ("heading",)), strict=True)
     )
 
 

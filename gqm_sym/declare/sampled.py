@@ -15,6 +15,7 @@ from statistics import median
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 from gqm_sym.arguments import one_of, several, short
+from gqm_sym.declare.banking import is_formula
 from gqm_sym.errors import DeclarationError, NoisyPointsWarning, NumberError
 from gqm_sym.literals.numbers import Number, read_numbers, without_unit
 from gqm_sym.literals.units import is_quantity
@@ -66,7 +67,8 @@ class Track:
     Attributes
     ----------
     points : str
-        One point a line, x and z, or x, y and z, as decimal numbers. A closed track does not repeat its first point.
+        One point a line, x and z, or x, y and z, and perhaps the roll angle, as decimal numbers. A closed track does
+        not repeat its first point.
     kind : {"spline", "linear"}
         A quintic spline, or planes stitched together.
     closed : bool
@@ -83,7 +85,16 @@ class Track:
     @property
     def in_space(self) -> bool:
         """Whether its points have three coordinates."""
-        return len(self.points[: self.points.find("\n")].split()) == IN_SPACE
+        return self._columns >= IN_SPACE
+
+    @property
+    def banked(self) -> bool:
+        """Whether its points have a roll angle."""
+        return self._columns > IN_SPACE
+
+    @property
+    def _columns(self) -> int:
+        return len(self.points[: self.points.find("\n")].split())
 
 
 def in_metres(given: Any) -> Any:
@@ -109,6 +120,7 @@ def read_track(
     kind: str = "spline",
     closed: bool | None = None,
     smoothing: float | str | None = None,
+    roll: Any = None,
 ) -> Track:
     """Read and check the points of a track.
 
@@ -125,6 +137,9 @@ def read_track(
         Whether the track closes; None: if its last point is its first.
     smoothing
         The standard deviation of the points in metres, "auto", or None: the track goes through them.
+    roll
+        In space the roll angle at each point, in radians; None: that of a table which has one. What is no such thing,
+        as a formula, is not for points.
 
     Raises
     ------
@@ -144,9 +159,11 @@ def read_track(
     deviation = _read_smoothing(in_metres(smoothing), kind)
     texts: list[str] = []
     places: list[Place] = []
-    for text, place in _read_rows(_rows(points, z)):
+    rows_given, angles = _rows(points, z)
+    for text, place in _read_rows(rows_given):
         texts.append(text)
         places.append(place)
+    angles = [] if is_formula(roll) else _angles(angles if roll is None else roll, places)
     size = _size(places)
     if size and not SIZES[0] <= size <= SIZES[1]:
         raise DeclarationError(
@@ -157,12 +174,16 @@ def read_track(
     if joined and repeated:
         del texts[-1], places[-1]
     in_space = bool(places) and len(places[0]) == IN_SPACE
-    if in_space:
-        _check_space(kind, deviation)
+    if in_space and kind != "spline":
+        raise DeclarationError(
+            f"sampled: kind {kind!r} is for tracks of x and z only yet; in space declare a spline, of points dense "
+            "enough where the track bends"
+        )
     rows = list(range(1, len(places) + 1))
     if deviation is not None:  # what a recorder that waits for news says again was not measured again
         rows = [row for row in rows if row == 1 or places[row - 1] != places[row - 2]]
         places = [places[row - 1] for row in rows]
+        angles = [angles[row - 1] for row in rows] if angles else angles
     fewest = FEWEST_AUTO if deviation == "auto" else FEWEST[kind, joined]
     if len(places) < fewest:
         what = "a closed" if joined else "an open"
@@ -172,22 +193,14 @@ def read_track(
         _check_order(places, size, kind, joined)
         if kind == "spline" and not in_space:
             _warn_of_scatter(places, joined, "give their standard deviation in metres as smoothing, or 'auto'")
+        texts = [" ".join(parts) for parts in zip(texts, angles, strict=False)] if angles else texts
         return Track(points="\n".join(texts), kind=kind, closed=joined)
     _check_survey(places, rows, joined, 0.0 if deviation == "auto" else deviation)
-    smoothed, report = _smoothed(places, rows, joined, deviation)
-    _warn_of_scatter(smoothed, joined, f"smoothing {smoothing!r} is less than their scatter")
-    kept = "\n".join(f"{x!r} {z!r}" for x, z in smoothed)
+    smoothed, report = _smoothed(places, rows, joined, deviation, angles)
+    if not in_space:
+        _warn_of_scatter(smoothed, joined, f"smoothing {smoothing!r} is less than their scatter")
+    kept = "\n".join(" ".join(map(repr, place)) for place in smoothed)
     return Track(points=kept, kind=kind, closed=joined, smoothing=report)
-
-
-def _check_space(kind: str, deviation: object) -> None:
-    """Refuse what there is for tracks in the plane of x and z only."""
-    for told, given, what in (
-        (f"kind {kind!r}", kind != "spline", "declare a spline, of points dense enough where the track bends"),
-        ("smoothing", deviation is not None, "leave it out, and smooth the points before"),
-    ):
-        if given:
-            raise DeclarationError(f"sampled: {told} is for tracks of x and z only yet; in space {what}")
 
 
 def _read_smoothing(given: Any, kind: str) -> float | Literal["auto"] | None:
@@ -215,32 +228,48 @@ def _read_smoothing(given: Any, kind: str) -> float | Literal["auto"] | None:
 
 
 def _smoothed(
-    places: list[Place], rows: list[int], joined: bool, deviation: float | Literal["auto"]
+    places: list[Place], rows: list[int], joined: bool, deviation: float | Literal["auto"], angles: list[str]
 ) -> tuple[list[Place], "Smoothing"]:
     """The points of the smooth track, and what smoothing did."""
     from gqm_sym.smoothing import smooth
 
-    found, report = smooth(places, rows, closed=joined, deviation=None if deviation == "auto" else deviation)
-    return [(x, z) for x, z in found.tolist()], report
+    known = None if deviation == "auto" else deviation
+    rolls = [float(angle) for angle, _ in zip(angles, places, strict=False)]
+    found, report = smooth(places, rows, closed=joined, deviation=known, angles=rolls)
+    return [tuple(place) for place in found.tolist()], report
 
 
-def _rows(points: Any, z: Any) -> Any:
-    """Points as rows, whichever way they were given."""
+def _angles(given: Any, places: list[Place]) -> list[str]:
+    """The text of the roll angle at each point; none where none are given."""
+    if given is None:
+        return []
+    if places and len(places[0]) != IN_SPACE:
+        raise DeclarationError("sampled: roll: is for tracks in space; give rows of x, y and z")
+    given = without_unit(given, where="sampled: roll", unit="rad")
+    angles = several(given, where="sampled: roll", what="an angle for each point, a formula in s or 'coordinated'")
+    if len(angles) != len(places):
+        raise DeclarationError(f"sampled: roll: must be an angle for each point, got {len(angles)} for {len(places)}")
+    return [_read(angle, count)[0] for count, angle in enumerate(angles, start=1)]
+
+
+def _rows(points: Any, z: Any) -> tuple[Any, Any]:
+    """Points as rows, whichever way they were given, and their roll angles in a table that has them."""
     if z is not None:
-        return _paired("sampled: x and z", points, z)
+        return _paired("sampled: x and z", points, z), None
     # Any kind of table will do, whoever made it.
     names = points if isinstance(points, Mapping) else getattr(points, "columns", None)
     if names is None:
-        return points
+        return points, None
     columns = {name.strip().lower(): name for name in names if isinstance(name, str)}
     if columns.keys() >= {"x", "y", "z"}:
-        return _paired("sampled: columns x, y and z", *(points[columns[name]] for name in "xyz"))
+        rows = _paired("sampled: columns x, y and z", *(points[columns[name]] for name in "xyz"))
+        return rows, points[columns["roll"]] if "roll" in columns else None
     if not columns.keys() >= {"x", "z"}:
         raise DeclarationError(
             f"sampled: points: a table must have columns x and z, got {short(list(names))}; rename them, or give "
             "both columns, as in Curve.sampled(table['distance'], table['height'])"
         )
-    return _paired("sampled: columns x and z", points[columns["x"]], points[columns["z"]])
+    return _paired("sampled: columns x and z", points[columns["x"]], points[columns["z"]]), None
 
 
 def _paired(where: str, *columns: Any) -> list[tuple[Any, ...]]:
@@ -319,7 +348,7 @@ def _check_survey(places: list[Place], rows: list[int], joined: bool, scatter: f
         _check_gap(chord, usual, rows[count - 1], rows[count % len(rows)])
     around = [*places, *places[:2]] if joined else places
     bends = [
-        dist((0.5 * (one[0] + three[0]), 0.5 * (one[1] + three[1])), two)
+        dist([0.5 * (before + after) for before, after in zip(one, three, strict=True)], two)
         for one, two, three in zip(around, around[1:], around[2:], strict=False)
     ]
     long = LONG * max(scatter, median(bends))

@@ -27,7 +27,7 @@ from gqm_sym.derivation.forces.dissipation import (
     Dissipation,
     dissipation,
 )
-from gqm_sym.derivation.forces.forces import Forces, Place, forces, is_planar
+from gqm_sym.derivation.forces.forces import Forces, Place, forces, is_planar, of_train
 from gqm_sym.derivation.forces.rider import Rider, rider
 from gqm_sym.derivation.forces.speed import LAM0, V0, SpeedField, conservative_speed, dissipative_speed
 from gqm_sym.derivation.geometry.geometry import AHEAD, Geometry, cross, geometry, vertical_plane
@@ -406,6 +406,10 @@ def derive(
     kernel = kernel.along(lam, in_space=curve.in_space)
     if curve.in_space:
         _refuse_planar_forces(kernel)
+    if kernel.cars:
+        _refuse_of_train(kernel)
+        curve = curve.in_arc_length()
+        lam = curve.parameter
     defaults = join(curve, kernel, given)
     check_measured(dict(defaults), _units(curve, kernel), where="derive", final=True)
     check_order(curve.kind, curve.domain, curve.period, dict(defaults))
@@ -429,7 +433,8 @@ def derive(
     track = geometry(curve, may_be_positive=may_be_positive, heading=heading)
     x, z, shape = beside(without_poles(curve.x), without_poles(curve.z), track, kernel.radius)
     y = without_poles(curve.y)
-    law = forces((x, y, z), kernel, shape, lam)
+    body = forces((x, y, z), kernel, shape, lam)
+    law = of_train(body, kernel, lam) if kernel.cars else body
     if not curve.charted:
         check_powers((("potential", law.potential),), curve, values)
     loss, speed, level = None, conservative_speed(law, lam), level_set(curve)
@@ -485,11 +490,11 @@ def derive(
         liftoff_equation=None if law.loads else sp.Eq(pressure, 0, evaluate=False),
         liftoff_speed_squared=None if law.loads else _liftoff_speed(speed, shape.kappa, law.static_normal_load),
         defaults=defaults,
-        positive=shape.positive,
+        positive=tuple(dict.fromkeys((*shape.positive, *kernel.positive))),
         at_least=kernel.at_least,
         notes=(*(() if level is None else (level.note,)), *shape.notes, *(() if loss is None else (speed.note,))),
         level_set=level,
-        rider=rider(curve.banking, shape, law, acceleration, lam) if curve.banking else None,
+        rider=rider(curve.banking, shape, body, acceleration, lam) if curve.banking else None,
     )
     if law.loads:
         model = replace(model, normal_force=model.normal_force_at(speed.held))
@@ -521,6 +526,21 @@ def _refuse_planar_forces(kernel: Kernel) -> None:
     for name, given, what in refused:
         if given:
             raise DeclarationError(f"derive: {name}: {what} is known for planar curves only yet; leave it out")
+
+
+def _refuse_of_train(kernel: Kernel) -> None:
+    """Refuse what is not known of a train."""
+    refused = (
+        ("coulomb", kernel.friction or kernel.static_friction, "friction"),
+        ("surface_tension", kernel.resistance, "a droplet's resistance"),
+        ("rotating_frame", kernel.spin, "a turning frame"),
+        ("rolling: radius", kernel.radius, "the path of the centre of a rolling body"),
+        ("rolling: mu_static", kernel.static_friction_limit, "the friction that its wheels need"),
+        ("law", kernel.tangential_law, "a law of acceleration"),
+    )
+    for name, given, what in refused:
+        if given:
+            raise DeclarationError(f"derive: {name}: {what} is not known of a train; leave it out")
 
 
 def _losses(curve: Curve, kernel: Kernel, place: Place, law: Forces, shape: Geometry) -> Dissipation:

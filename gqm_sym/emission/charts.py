@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import replace
 
-from sympy import Function, Symbol
+from sympy import Expr, Function, Symbol
 
 from gqm_sym.declare import Curve
 from gqm_sym.declare.implicit import X, Z
@@ -11,10 +11,11 @@ from gqm_sym.declare.piecewise import Rail
 from gqm_sym.declare.polynomials import PolynomialPieces
 from gqm_sym.declare.sampled import Track
 from gqm_sym.derivation.algebra.differentiate import differentiate
-from gqm_sym.derivation.geometry.geometry import geometry
+from gqm_sym.derivation.geometry.geometry import cross, geometry
 from gqm_sym.emission.context import Lowering
 from gqm_sym.emission.ir import ChartIR, ExactIR, FunctionIR
 from gqm_sym.emission.printer import check_emittable
+from gqm_sym.kernels.base import Z as HEIGHT
 
 
 def _shaped_by(*formulas: ExactIR | FunctionIR) -> str:
@@ -58,7 +59,7 @@ def _sampled(lowering: Lowering) -> ChartIR:
     """A sampled curve: its points, as text."""
     track = lowering.model.curve.definition
     assert isinstance(track, Track)
-    space = ", in_space=True" if track.in_space else ""
+    space = (", in_space=True" if track.in_space else "") + (", banked=True" if track.banked else "")
     return ChartIR(
         statement=f"Sampled(POINTS, kind={track.kind!r}, closed={track.closed}{space})",
         imports=("Sampled",),
@@ -82,8 +83,10 @@ def _rail(lowering: Lowering) -> ChartIR:
     rail = lowering.model.curve.definition
     assert isinstance(rail, Rail)
     curves = [piece.curve for piece in rail.pieces if isinstance(piece.curve, Curve)]
-    functions = tuple(_segment(lowering, curve, f"segment_{count}") for count, curve in enumerate(curves, start=1))
-    formulas = tuple(_exact_segment(lowering, curve, f.name) for curve, f in zip(curves, functions, strict=True))
+    maker, segment, exact = ("SpaceRail", _segment_in_space, False) if rail.in_space else ("Rail", _segment, True)
+    functions = tuple(segment(lowering, curve, f"segment_{count}") for count, curve in enumerate(curves, start=1))
+    known = zip(curves, functions, strict=True) if exact else ()
+    formulas = tuple(_exact_segment(lowering, curve, f.name) for curve, f in known)
     given = (*(rail.start or ()), *(number for piece in rail.pieces for number in piece.numbers))
     doc = "The start of the rail, then the numbers of each piece."
     numbers = lowering.exact_function("rail", doc, given)
@@ -94,13 +97,14 @@ def _rail(lowering: Lowering) -> ChartIR:
     ]
     if functions:
         arguments.append(f"segments=({', '.join(f'{function.name}.address' for function in functions)},)")
+    if formulas:
         arguments.append(f"formulas=({', '.join(formula.name for formula in formulas)},)")
     if rail.closed:
         arguments.append("closed=True")
     arguments.append(_shaped_by(numbers, *formulas, *functions))
     return ChartIR(
-        statement="Rail(\n    " + ",\n    ".join(arguments) + ",\n)",
-        imports=("Rail", *(["SEGMENT"] if functions else [])),
+        statement=f"{maker}(\n    " + ",\n    ".join(arguments) + ",\n)",
+        imports=(maker, *(["SEGMENT"] if functions else [])),
         functions=functions,
         exact=(numbers, *formulas),
     )
@@ -109,15 +113,31 @@ def _rail(lowering: Lowering) -> ChartIR:
 def _segment(lowering: Lowering, curve: Curve, name: str) -> FunctionIR:
     """Position, metric and curvature of a piece that is a curve with formulas, in its own parameter."""
     shape = geometry(curve, may_be_positive=())
-    place, places = lowering.place, lowering.names("places")
     rows = (curve.x, curve.z, shape.ds, shape.dxds, shape.dzds, shape.kappa)
+    what = f"x, z, ds/d{curve.parameter}, dx/ds, dz/ds and curvature"
+    return _function_of_segment(lowering, curve, name, what, rows)
+
+
+def _segment_in_space(lowering: Lowering, curve: Curve, name: str) -> FunctionIR:
+    """The same of a piece of a rail in space: the derivatives of its coordinates by arc length."""
+    shape = geometry(replace(curve, kind="space"), may_be_positive=(), heading=None)
+    tangent = (shape.dxds, shape.dyds, shape.dzds)
+    bends = cross(shape.bend, tangent)
+    changes = (differentiate(bend, curve.parameter) / shape.ds for bend in bends)
+    rows = (curve.x, curve.y, curve.z, shape.ds, *tangent, *bends, *changes)
+    what = f"x, y, z, ds/d{curve.parameter} and the first three derivatives of the coordinates by arc length"
+    return _function_of_segment(lowering, curve, name, what, rows)
+
+
+def _function_of_segment(lowering: Lowering, curve: Curve, name: str, what: str, rows: tuple[Expr, ...]) -> FunctionIR:
+    place, places = lowering.place, lowering.names("places")
     outputs = tuple(row.xreplace({curve.parameter: place}) for row in rows)
     for row in outputs:
         check_emittable(row, {place.name, *lowering.order}, where=f"piecewise: {curve.kind}")
     function = lowering.function(
         name,
         (places,),
-        f"x, z, ds/d{curve.parameter}, dx/ds, dz/ds and curvature of a piece by its own parameter (paper, eqs. 6, 8).",
+        f"{what} of a piece by its own parameter (paper, eqs. 6, 8).",
         inside=[(place, Function("at")(Symbol(places, real=True)))],
         outputs=outputs,
     )
@@ -143,5 +163,23 @@ MAKERS: dict[str, Callable[[Lowering], ChartIR]] = {
 
 def chart_maker(lowering: Lowering) -> ChartIR | None:
     """The maker of a model's chart; None for a curve with formulas."""
-    curve = lowering.model.curve
-    return MAKERS[curve.kind](lowering) if curve.charted else None
+    curve, train = lowering.model.curve, lowering.model.force
+    if not curve.charted:
+        return None
+    along = ("along_z", "along_x", "along_y") if curve.in_space else ("chart",)
+    names = (*along, *(("along_roll",) if getattr(curve.definition, "banked", False) else ()))
+    made = replace(MAKERS[curve.kind](lowering), names=names)
+    if not train.cars:
+        return made
+    pull = differentiate(train.potential, HEIGHT)
+    numbers = lowering.constants(
+        "exact_train", "The length of a train, and what gravity is.", (train.train_length, pull)
+    )
+    length = lowering.order[train.train_length.name]
+    return replace(
+        made,
+        statement=f"TrackOfTrain({made.statement}, cars={train.cars}, numbers={numbers.name}, length={length})",
+        imports=(*made.imports, "TrackOfTrain"),
+        names=(*names, "along_h"),
+        exact=(*made.exact, numbers),
+    )

@@ -1,6 +1,6 @@
 """Lowered functions as lines of text: the fields that the template prints, and the names that they call."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -9,14 +9,13 @@ from sympy import Expr, Function, Symbol
 from gqm_sym.emission.ir import Assignment, ExactIR, FunctionIR
 from gqm_sym.emission.printer import CodePrinter, ExactPrinter, IntervalPrinter
 from gqm_sym.emission.subscripts import at
-from gqm_sym.sympy_charts import SPACE_ROWS, ChartFunction, chart_alpha, chart_kappa, chart_x, chart_z
+from gqm_sym.sympy_charts import SPACE_CHARTS, ChartFunction, chart_alpha, chart_kappa, chart_x, chart_z
 
 # What the arrays of charts are called in emitted functions, each with the rows that it has and where. In space each
-# coordinate has a chart; they stand one after the other, all of one size.
-SPACE_CHARTS = ("along_z", "along_x", "along_y")
+# coordinate has a chart, and perhaps the roll angle.
 CHART_ROWS: dict[str, dict[type[ChartFunction], int]] = {
     "chart": {chart_x: 0, chart_z: 1, chart_alpha: 2, chart_kappa: 3},
-    **{name: dict(zip(SPACE_ROWS[name[-1]], (1, 2, 3), strict=True)) for name in SPACE_CHARTS},
+    **{f"along_{axis}": dict(zip(heads, (1, 2, 3, 0), strict=False)) for axis, heads in SPACE_CHARTS.items()},
 }
 
 # Columns up to which several loads of a value stand on one line.
@@ -57,23 +56,23 @@ def _unpacked(parameters: tuple[tuple[str, int], ...], p: str) -> list[str]:
     return _together([(name, f"{p}[{i}]") for name, i in parameters])
 
 
-def _read_together(function: FunctionIR) -> tuple[FunctionIR, list[str]]:
+def _read_together(function: FunctionIR) -> tuple[FunctionIR, list[str], set[str]]:
     """A function that finds what charts say of its places in the last rows of ``out``, and the lines that fill these.
 
-    Neighbours often share a piece of the chart, which is then looked for once. Without a chart, or where ``out`` has
-    too few rows, the function is as it was.
+    The third is the charts that these lines read.
+
+    Neighbours often share a piece of the chart, which is then looked for once. Without a chart the function is as it
+    was; what ``out`` has too few rows for is looked for place by place.
     """
     values = [*(a.value for a in function.inside), *function.outputs]
     given = {a.name: a.value for a in function.inside if type(a.value).__name__ == "at" and len(a.value.args) == 1}
     heads = {head: (chart, row) for chart, rows in CHART_ROWS.items() for head, row in rows.items()}
     places = {c.args[0].name for v in values for c in v.atoms(*heads) if c.args[0].is_Symbol}
     if len(places) != 1 or not places <= given.keys():
-        return function, []
+        return function, [], set()
     place = Symbol(places.pop(), real=True)
-    used = [head for head in heads if any(v.has(head(place)) for v in values)]
+    used = [head for head in heads if any(v.has(head(place)) for v in values)][: len(function.outputs)]
     out, first = function.arguments[-1], len(function.outputs) - len(used)
-    if first < 0:
-        return function, []
     names = {a.value: Symbol(a.name, real=True) for a in function.inside}
     read: dict[Expr, Symbol] = {}
     for head in used:
@@ -85,17 +84,21 @@ def _read_together(function: FunctionIR) -> tuple[FunctionIR, list[str]]:
     needed = {s.name for value in (*(a.value for a in inside), *outputs) for s in value.free_symbols}
     kept = [a for a in inside if a.name in needed]
     lines, end = [], first
-    for chart in dict.fromkeys(heads[head][0] for head in used):
+    charts = dict.fromkeys(heads[head][0] for head in used)
+    for chart in charts:
         found = tuple(heads[head][1] for head in used if heads[head][0] == chart)
         end += len(found)
         filled = out if end == len(function.outputs) else f"{out}[:{end}]"
         lines.append(f"chart_rows({chart}, {found}, {given[place.name].args[0]}, {filled})")
-    return replace(function, inside=(*rows, *kept), outputs=outputs), lines
+    return replace(function, inside=(*rows, *kept), outputs=outputs), lines, set(charts)
 
 
-def loop(function: FunctionIR) -> tuple[dict[str, Any], set[str]]:
-    """The template's fields of a function over many places, and the names that it calls."""
-    function, filled = _read_together(function)
+def loop(function: FunctionIR, charts: Sequence[str] = ()) -> tuple[dict[str, Any], set[str]]:
+    """The template's fields of a function over many places, and the names that it calls.
+
+    ``charts`` are the names of those behind the run-time parameters (`ChartIR`).
+    """
+    function, filled, read = _read_together(function)
     taken = {name for name, _ in function.parameters} | {a.name for a in function.inside}
     index = "_i" if "i" in taken else "i"
     printer = CodePrinter(index)
@@ -107,8 +110,8 @@ def loop(function: FunctionIR) -> tuple[dict[str, Any], set[str]]:
     inside += [f"{out}[{row}, {index}] = {printer.doprint(e)}" for row, e in enumerate(function.outputs)]
     if filled:
         printer.used.add("chart_rows")
-        printer.axes |= {line[len("chart_rows(along_")] for line in filled if "along_" in line}
-    before = [*_chart_view(function, printer), *before, *filled]
+        printer.charts |= read
+    before = [*_chart_view(function, printer, charts), *before, *filled]
     fields = {
         "name": function.name,
         "signature": function.signature,
@@ -129,18 +132,18 @@ def _views(function: FunctionIR) -> str:
     return f"{names} = {', '.join(f'carray({name}, {shape})' for name, shape in function.views)}"
 
 
-def _chart_view(function: FunctionIR, printer: CodePrinter) -> list[str]:
+def _chart_view(function: FunctionIR, printer: CodePrinter, charts: Sequence[str]) -> list[str]:
     """The lines that find the charts of the curve, which stand behind the run-time parameters."""
+    if not printer.charts:
+        return []
     p, count = function.views[-2]
-    first, *others = SPACE_CHARTS
-    if printer.axes:
-        offsets = [f"{count} + {k} * {first}.size" for k in range(1, len(SPACE_CHARTS))]
-        needed = [(name, at) for name, at in zip(others, offsets, strict=True) if name[-1] in printer.axes]
-        return [f"{first} = chart_of({p}, {count})", *(f"{name} = chart_of({p}, {at})" for name, at in needed)]
-    return [f"chart = chart_of({p}, {count})"] if any("chart_" in name for name in printer.used) else []
+    first, *others = charts
+    offsets = [f"{count} + {k} * {first}.size" for k in range(1, len(others) + 1)]
+    needed = [(name, at) for name, at in zip(others, offsets, strict=True) if name in printer.charts]
+    return [f"{first} = chart_of({p}, {count})", *(f"{name} = chart_of({p}, {at})" for name, at in needed)]
 
 
-def enclosure(function: FunctionIR, parameter: str) -> tuple[dict[str, Any], set[str]]:
+def enclosure(function: FunctionIR, parameter: str, charts: Sequence[str] = ()) -> tuple[dict[str, Any], set[str]]:
     """The template's fields of a function over intervals, and the names that it calls."""
     printer = IntervalPrinter()
     *count, lo, hi, p, out = function.arguments
@@ -158,7 +161,7 @@ def enclosure(function: FunctionIR, parameter: str) -> tuple[dict[str, Any], set
         "signature": function.signature,
         "arguments": ", ".join(function.arguments),
         "doc": function.doc,
-        "before": [*_chart_view(function, printer), _views(function)],
+        "before": [*_chart_view(function, printer, charts), _views(function)],
         "loop": function.batch,
         "index": index,
         "count": count[0] if count else "",

@@ -78,12 +78,16 @@ class ChartIR:
         Functions it needs.
     data : tuple of (str, str)
         Names and texts of long literals it needs.
+    names : tuple of str
+        What emitted functions call the arrays of its charts, in the order in which they stand behind the run-time
+        parameters; those in front of the last one are all of one size.
     """
 
     statement: str
     imports: tuple[str, ...]
     functions: tuple[FunctionIR, ...] = ()
     exact: tuple[ExactIR, ...] = ()
+    names: tuple[str, ...] = ()
     data: tuple[tuple[str, str], ...] = ()
 
 

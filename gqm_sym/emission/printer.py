@@ -11,7 +11,7 @@ from sympy.printing.precedence import PRECEDENCE
 from sympy.printing.str import StrPrinter
 
 from gqm_sym.errors import EmissionError
-from gqm_sym.sympy_charts import SPACE_ROWS
+from gqm_sym.sympy_charts import SPACE_CHARTS
 
 # Up to this every integer is a double.
 MAX_INTEGER = 2**53
@@ -38,12 +38,13 @@ FUNCTIONS = {
 # Rows of a chart, which compiled code reads from the array ``chart``.
 CHARTED = frozenset(
     {"chart_x", "chart_z", "chart_alpha", "chart_kappa"}
-    | {head.__name__ for rows in SPACE_ROWS.values() for head in rows}
+    | {head.__name__ for rows in SPACE_CHARTS.values() for head in rows}
 )
 _CHART_CALL = re.compile(r"(divdiff[12]_)?chart_[a-z]+")
-# In space each coordinate has a chart, whose height is the coordinate; angle and curvature are its derivatives.
-_SPACE_CALL = re.compile(r"(i?(?:divdiff[12]_)?)space_(d{0,2})([xyz])")
-ROWS_BY_ORDER = ("chart_z", "chart_alpha", "chart_kappa")
+# In space each coordinate has a chart, whose height is the coordinate; its derivatives are in the places of angle,
+# curvature and x. So have the roll angle and the mean height of a train.
+_SPACE_CALL = re.compile(r"(i?(?:divdiff[12]_)?)space_(d*)(x|y|z|roll|h)")
+ROWS_BY_ORDER = ("chart_z", "chart_alpha", "chart_kappa", "chart_x")
 
 
 def check_emittable(expr: Expr, names: Collection[str], *, where: str) -> None:
@@ -93,7 +94,7 @@ def is_double(number: Rational) -> bool:
 
 
 class CodePrinter(StrPrinter):  # type: ignore[misc]
-    """Numba code over floats; ``used`` collects the functions that must be imported, ``axes`` the charts in space."""
+    """Numba code over floats; ``used`` collects the functions that must be imported, ``charts`` the charts."""
 
     printmethod = "_emitted"
     prefix = ""
@@ -103,18 +104,18 @@ class CodePrinter(StrPrinter):  # type: ignore[misc]
         super().__init__({"order": None})
         self.index = index
         self.used: set[str] = set()
-        self.axes: set[str] = set()
+        self.charts: set[str] = set()
 
     def _call(self, name: str, *arguments: Expr) -> str:
-        texts = [self._print(a) for a in arguments]
+        texts, chart = [self._print(a) for a in arguments], "chart"
         if in_space := _SPACE_CALL.fullmatch(name):
             before, primes, axis = in_space.groups()
             name = before + ROWS_BY_ORDER[len(primes)]
-            texts.insert(0, f"along_{axis}")
-            self.axes.add(axis)
+            chart = f"along_{axis}"
         self.used.add(name)
-        if not in_space and _CHART_CALL.fullmatch(name.removeprefix("i")):
-            texts.insert(0, "chart")
+        if in_space or _CHART_CALL.fullmatch(name.removeprefix("i")):
+            texts.insert(0, chart)
+            self.charts.add(chart)
         return f"{self.prefix}{name}({', '.join(texts)})"
 
     def _print_Function(self, expr: Expr) -> str:

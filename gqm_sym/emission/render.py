@@ -61,17 +61,18 @@ class _Functions:
     def add(self, module: ModuleIR) -> None:
         """All functions of a module, in the order in which they are printed."""
         chart, separated = module.chart, module.separated
+        charts = chart.names if chart else ()
         groups = (
             (self.single, (*module.functions, *(chart.functions if chart else ())), module.bounds),
             (self.batch, (*module.batch, *((separated.function,) if separated else ())), module.bounds_batch),
         )
         for texts, functions, enclosing in groups:
             for function in functions:
-                text, names = loop(function)
+                text, names = loop(function, charts)
                 texts.append(text)
                 self.called |= names
             if enclosing is not None:
-                text, names = enclosure(enclosing, module.parameter)
+                text, names = enclosure(enclosing, module.parameter, charts)
                 texts.append(text)
                 self.intervals |= names
 

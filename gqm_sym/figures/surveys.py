@@ -25,6 +25,8 @@ MILLIMETRES = 1e3
 def smoothing(curve: Any, axes: Any = None) -> "Figure":
     """Draw what smoothing did to the points of a sampled track: shifts, and curvature with the band of its error.
 
+    A track in space is drawn from above.
+
     Parameters
     ----------
     curve : Curve
@@ -46,11 +48,12 @@ def smoothing(curve: Any, axes: Any = None) -> "Figure":
     size = float(np.ptp(report.places, axis=0).max())
     enlarged = _round(FAR * size / report.largest_shift) if report.largest_shift > 0.0 else 1.0
     drawn = report.places + enlarged * (report.points - report.places)
-    above.plot(*report.places[order].T, color=TRACK, linewidth=1.2, label="smooth track")
+    in_space = report.points.shape[1] > 2
+    above.plot(*report.places[order, :2].T, color=TRACK, linewidth=1.2, label="smooth track")
     what = f"measured points, their shifts enlarged {enlarged:g} times" if enlarged > 1.0 else "measured points"
-    above.plot(*drawn[kept].T, ".", color=POINT, markersize=3, label=what, rasterized=len(kept) > MOST // 4)
+    above.plot(*drawn[kept, :2].T, ".", color=POINT, markersize=3, label=what, rasterized=len(kept) > MOST // 4)
     above.set_aspect("equal", adjustable="datalim")
-    finished(above, "x (m)", "z (m)")
+    finished(above, "x (m)", "y (m)" if in_space else "z (m)")
     above.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2, fontsize="small", frameon=False)
     middle.plot(
         report.places_s[kept],
@@ -63,7 +66,7 @@ def smoothing(curve: Any, axes: Any = None) -> "Figure":
     middle.axhline(0.0, color=TRACK, linewidth=0.8)
     rms = f"root mean square {MILLIMETRES * report.rms:.3g} mm, largest {MILLIMETRES * report.largest_shift:.3g} mm"
     middle.set_title(rms, fontsize="small")
-    finished(middle, "arc length s (m)", "shift to the left (mm)")
+    finished(middle, "arc length s (m)", "shift (mm)" if in_space else "shift to the left (mm)")
     off = ERRORS * report.curvature_error
     below.fill_between(
         report.s,

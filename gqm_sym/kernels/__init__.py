@@ -12,6 +12,7 @@ from gqm_sym.kernels.potential import Potential
 from gqm_sym.kernels.rolling import Rolling
 from gqm_sym.kernels.rotating_frame import RotatingFrame
 from gqm_sym.kernels.surface_tension import SurfaceTension
+from gqm_sym.kernels.train import Train
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -38,6 +39,12 @@ KERNELS: dict[str, KernelRow] = {
             make=Rolling,
             arguments=("beta", "radius", "mu_static"),
             summary="rolling without slipping: inertia 1 + beta; with a radius the curve is the track",
+        ),
+        KernelRow(
+            name="train",
+            make=Train,
+            arguments=("length", "cars", "mass"),
+            summary="mass spread evenly along the track: lam is the middle of the train",
         ),
         KernelRow(
             name="coulomb",
@@ -96,4 +103,5 @@ __all__ = [
     "Rolling",
     "RotatingFrame",
     "SurfaceTension",
+    "Train",
 ]

@@ -83,6 +83,8 @@ class Kernel:
         Of a body that rolls to the left of growing λ (negative: to the right), whose centre moves on a path of its own.
     static_friction_limit
         Of a rolling body whose static friction is known: the names of its parameters beta and mu_static.
+    train_length, cars
+        Of a train, whose mass is spread evenly along the track: its length, and how many equal cars it has; else 0.
     terms
         Name and one line of text of every force in it.
     defaults
@@ -103,6 +105,8 @@ class Kernel:
     tangential_law: sp.Expr = field(default=sp.S.Zero)
     spin: sp.Expr = field(default=sp.S.Zero)
     radius: sp.Expr = field(default=sp.S.Zero)
+    train_length: sp.Expr = field(default=sp.S.Zero)
+    cars: int = 0
     static_friction_limit: tuple[str, str] | None = None
     defaults: tuple[tuple[str, Value | None], ...] = ()
     positive: tuple[str, ...] = ()
@@ -201,6 +205,8 @@ class Kernel:
             tangential_law=self.tangential_law + other.tangential_law,
             spin=self.spin + other.spin,
             radius=self.radius + other.radius,
+            train_length=self.train_length + other.train_length,
+            cars=self.cars + other.cars,
             static_friction_limit=self.static_friction_limit or other.static_friction_limit,
             defaults=(*self.defaults, *(pair for pair in other.defaults if pair[0] not in known)),
             positive=tuple(dict.fromkeys(self.positive + other.positive)),
@@ -238,7 +244,7 @@ def _refuse_clashes(first: Kernel, second: Kernel) -> None:
 
 
 # Forces that act on a body as a whole: a second one is a mistake, not a sum.
-_ONCE = frozenset({"gravity", "rolling", "coulomb", "rotating_frame"})
+_ONCE = frozenset({"gravity", "rolling", "coulomb", "rotating_frame", "train"})
 _EXCLUSIVE = frozenset({"rolling", "coulomb"})
 
 
@@ -249,6 +255,7 @@ UNITS = {
     "k": "m**3/s**2",
     "beta": "1",
     "radius": "m",
+    "length": "m",
     "mu": "1",
     "mu_static": "1",
     "b": "kg/m",
@@ -268,7 +275,7 @@ def kernel_formulas(kernel: Kernel) -> Formulas:
         (kernel.drag, dimension(metre=-1)),
     )
     numbers = ((kernel.friction, NUMBER), (kernel.static_friction, NUMBER), (kernel.inertia - 1, NUMBER))
-    others = ((kernel.spin, dimension(second=-1)), (kernel.radius, LENGTH))
+    others = ((kernel.spin, dimension(second=-1)), (kernel.radius, LENGTH), (kernel.train_length, LENGTH))
     variables: dict[str, Dimension | None] = {symbol.name: LENGTH for symbol in (X, Y, Z)}
     variables[W.name] = SPEED_SQUARED
     return Formulas([*fields, *numbers, *others], {**variables, DIRECTION.name: NUMBER})

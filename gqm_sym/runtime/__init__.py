@@ -16,11 +16,13 @@ if TYPE_CHECKING:
     from gqm_sym.runtime.motion.events import Event, Leg
     from gqm_sym.runtime.motion.extremes import Extreme
     from gqm_sym.runtime.motion.motion import Motion
+    from gqm_sym.runtime.motion.riding.cars import Cars
     from gqm_sym.runtime.motion.riding.exceedance import Exceedance
     from gqm_sym.runtime.motion.state import Energy, State, StateInSpace, StateOfRider
     from gqm_sym.runtime.sweep.result import Sweep
 
 __all__ = [
+    "Cars",
     "CompiledModel",
     "Energy",
     "Equilibrium",
@@ -44,6 +46,7 @@ _HOMES = {
     "Energy": "motion.state",
     "Equilibrium": "launch.equilibria",
     "Event": "motion.events",
+    "Cars": "motion.riding.cars",
     "Exceedance": "motion.riding.exceedance",
     "Extreme": "motion.extremes",
     "Leg": "motion.events",

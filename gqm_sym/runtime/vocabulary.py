@@ -35,7 +35,9 @@ _NAMES_BY_HOME = {
     "charts.polynomials": "Polynomials",
     "charts.rail": "Rail",
     "charts.sampled": "Sampled",
+    "charts.space.rail": "SpaceRail",
     "charts.tracing": "Traced",
+    "charts.train": "TrackOfTrain",
     "interface": (
         "AGM_ARGUMENTS_BATCH BOUNDS BOUNDS_BATCH BatchFunctions CompiledFunctions DissipativeFunctions "
         "EFFECTIVE_POTENTIAL ExactFormulas ExactLaw ExactPotential FIELD INTEGRAND_INVARIANTS_BATCH LOAD_MAP "

@@ -31,11 +31,13 @@ class Smoothing:
     s, curvature, curvature_error : array
         Arc lengths from the start of the track, its curvature there in 1/m, and the standard error of that curvature.
         It holds what noise adds and what smoothing takes away, at open ends as well, where it is several times as
-        large. What a track does between two points is not in it.
-    points, places : (n, 2) array
+        large. What a track does between two points is not in it. In space the curvature has no sign, and the error is
+        that of each of its components.
+    points, places : (n, d) array
         The points as measured, and the places of the track that are nearest to them.
     places_s, shifts : (n,) array
-        Arc lengths of these places, and how far from them the points are; positive to the left of growing arc length.
+        Arc lengths of these places, and how far from them the points are; positive to the left of growing arc length,
+        in space without a sign.
     """
 
     given: float | None

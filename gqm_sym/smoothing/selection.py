@@ -69,16 +69,17 @@ class Criterion:
     was tried as well; it lets so much noise through that loads are two to four times as wrong.
 
     Of noise only the part across the track is left in the residual, as the places along it are those nearest to the
-    points: a point brings one number, and not two.
+    points: a point brings one number, and not two, or in space two, and not three. So many ``across`` the track are.
     """
 
     count: int
     deviation: float | None
+    across: int
 
     def __call__(self, fit: Fit) -> float:
         """The logarithm of what is least for the best spline."""
         if self.deviation is not None:
-            total = fit.residual + 2.0 * CHARGE * self.deviation**2 * fit.freedom
+            total = fit.residual + 2.0 * CHARGE * self.across * self.deviation**2 * fit.freedom
             return float(np.log(max(total / self.count, TINY)))
         left = 1.0 - CHARGE * fit.freedom / self.count
         return float(np.log(max(fit.residual / self.count, TINY)) - 2.0 * np.log(left)) if left > 0.0 else np.inf
@@ -91,7 +92,7 @@ def choose(u: Array, points: Array, period: float | None, deviations: Sequence[f
     ----------
     u : (n,) array
         Within one period, if there is one.
-    points : (n, 2) array
+    points : (n, d) array
     period : float or None
         Of a closed track.
     deviations : floats or None
@@ -115,7 +116,7 @@ def choose(u: Array, points: Array, period: float | None, deviations: Sequence[f
             break
         better = False
         for deviation in deviations:
-            criterion = Criterion(len(u), deviation)
+            criterion = Criterion(len(u), deviation, points.shape[1] - 1)
             scores = [criterion(fit) for fit in fits]
             k = int(np.argmin(scores))
             if deviation not in best or scores[k] < best[deviation].score:

@@ -116,7 +116,7 @@ class Fit:
 
     Attributes
     ----------
-    coefficients : (K, 2) array
+    coefficients : (K, d) array
         Of its basis.
     factor : array
         The Cholesky factor of its matrix, in bands.
@@ -139,7 +139,7 @@ class Smoother:
     ----------
     u : (n,) array
         Where on the curve each point belongs.
-    points : (n, 2) array
+    points : (n, d) array
     basis : Basis
     least : float
         The least weight that will be asked for.

@@ -8,6 +8,7 @@ along the track is in the residual too, take the smoother one of what cross-vali
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import reduce
 from math import ceil, pi, sqrt
 from typing import Any, NamedTuple
 
@@ -17,8 +18,10 @@ from gqm_sym.budgets import spend
 from gqm_sym.errors import DeclarationError
 from gqm_sym.smoothing.report import Smoothing
 from gqm_sym.smoothing.selection import APART, Choice, choose
-from gqm_sym.smoothing.splines import Array
+from gqm_sym.smoothing.splines import Array, Smoother
 
+# The coordinates of a track that is not in space.
+PLANE = 2
 # Rounds of fitting; from the second on little changes.
 ROUNDS = 4
 LAST = 2
@@ -65,18 +68,23 @@ class _Track(NamedTuple):
         """Its tangents, of length 1."""
         basis = self.choice.smoother.basis
         first = self.spline(u if basis.closed else np.clip(u, basis.low, basis.high), 1)
-        tangents: Array = first / np.hypot(*first.T)[:, None]
+        tangents: Array = first / _length(first)[:, None]
         return tangents
 
 
 def smooth(
-    given: Sequence[Sequence[float]], rows: Sequence[int], *, closed: bool, deviation: float | None
+    given: Sequence[Sequence[float]],
+    rows: Sequence[int],
+    *,
+    closed: bool,
+    deviation: float | None,
+    angles: Sequence[float] = (),
 ) -> tuple[Array, Smoothing]:
     """Smooth the points of a track.
 
     Parameters
     ----------
-    given : (n, 2) array
+    given : (n, d) array
         Points; a closed track does not repeat its first one.
     rows : (n,) ints
         What messages call the points.
@@ -84,11 +92,14 @@ def smooth(
         Whether the track goes on from the last point to the first.
     deviation : float or None
         The standard deviation of the points in each coordinate; None: by cross-validation.
+    angles : n floats, optional
+        The roll angle at each point. It is smoothed as much as the coordinates are.
 
     Returns
     -------
-    places : (m, 2) array
-        Points of the smooth track, as many as the interpolating spline needs to be it.
+    places : (m, d) array
+        Points of the smooth track, as many as the interpolating spline needs to be it; with angles these are one
+        column more.
     report : Smoothing
         What smoothing changed, and how good the track is.
 
@@ -103,21 +114,53 @@ def smooth(
     track = _fitted(centred, closed, deviation)
     nearest = track.at(track.u)
     off, along = centred - nearest, track.heading(track.u)
-    shifts = along[:, 0] * off[:, 1] - along[:, 1] * off[:, 0]
+    shifts = _across(along, off)
     _check_shifts(np.abs(shifts), centred, rows, deviation)
     places = _places(track, closed)
     report = _report(track, places, deviation, shifts)
     _check_turns(track, report, rows)
-    return middle + track.at(places), replace(report, points=points, places=middle + nearest)
+    smoothed = middle + track.at(places)
+    if len(angles):
+        smoothed = np.column_stack([smoothed, _turned(track, np.asarray(angles, dtype=np.float64), places)])
+    return smoothed, replace(report, points=points, places=middle + nearest)
+
+
+def _length(vectors: Array) -> Array:
+    """The lengths of vectors in rows."""
+    length: Array = reduce(np.hypot, vectors.T)
+    return length
+
+
+def _across(along: Array, off: Array) -> Array:
+    """How far vectors lead off from directions: in a plane to the left of them, in space without a sign."""
+    if off.shape[1] == PLANE:
+        left: Array = along[:, 0] * off[:, 1] - along[:, 1] * off[:, 0]
+        return left
+    return _length(np.cross(along, off))
+
+
+def _turned(track: _Track, angles: Array, places: Array) -> Array:
+    """Roll angles at places of a track, which were measured at its points."""
+    choice, u, rate = track.choice, track.u, 0.0
+    basis = choice.smoother.basis
+    angles = np.unwrap(np.append(angles, angles[0]))
+    if basis.closed:  # what a lap adds is linear, and the rest is periodic
+        rate = (angles[-1] - angles[0]) / (basis.high - basis.low)
+    smoother = Smoother(u, (angles[:-1] - rate * u)[:, None], basis, choice.weight)
+    found: Array = basis.spline(smoother.fit(choice.weight).coefficients)(places)[:, 0] + rate * places
+    return found
 
 
 def _fitted(points: Array, closed: bool, deviation: float | None) -> _Track:
     """The smooth track, in its own arc length from the place of the first point."""
     around = np.concatenate([points, points[:1]]) if closed else points
-    lengths = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(around, axis=0).T))])
+    lengths = np.concatenate([[0.0], np.cumsum(_length(np.diff(around, axis=0)))])
+    dimension = points.shape[1]
     u, period = lengths[: len(points)], float(lengths[-1]) if closed else None
     for count in range(1, ROUNDS + 1):
-        deviations = [deviation] if deviation is None or count > ROUNDS - LAST else [None, sqrt(2.0) * deviation]
+        deviations = [deviation]
+        if deviation is not None and count <= ROUNDS - LAST:
+            deviations = [None, sqrt(dimension / (dimension - 1)) * deviation]
         choice = choose(u, points, period, deviations)
         track = _Track(choice, choice.smoother.basis.spline(choice.fit.coefficients), u, period)
         u = _nearest(track, points)
@@ -164,7 +207,7 @@ def _measured(track: _Track, u: Array) -> tuple[Array, float | None]:
 
 def _speed(spline: Any, u: Array) -> Array:
     first = np.moveaxis(spline(u, 1), -1, 0)
-    speed: Array = np.hypot(first[0], first[1])
+    speed: Array = reduce(np.hypot, first)
     return speed
 
 
@@ -191,11 +234,12 @@ def _report(track: _Track, places: Array, deviation: float | None, shifts: Array
     """What is known of a smooth track; its points are put in by whom they are known to."""
     choice = track.choice
     fit = choice.fit
-    estimate = sqrt(fit.residual / max(len(shifts) - fit.freedom, 1.0))
+    across = track.spline.c.shape[1] - 1
+    estimate = sqrt(fit.residual / (across * max(len(shifts) - fit.freedom, 1.0)))
     most = max(FEWEST, min(PLACES, WORK // choice.smoother.basis.size))
     told = places if len(places) <= most else places[np.linspace(0, len(places) - 1, most).astype(np.int64)]
     first, second = track.spline(told, 1), track.spline(told, 2)
-    speed = np.hypot(*first.T)
+    speed = _length(first)
     lengths, _ = _measured(track._replace(u=told), told)
     scatter = estimate if deviation is None else deviation
     return Smoothing(
@@ -207,10 +251,10 @@ def _report(track: _Track, places: Array, deviation: float | None, shifts: Array
         width=choice.width,
         degrees_of_freedom=fit.freedom,
         s=lengths,
-        curvature=(first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]) / speed**3,
+        curvature=_across(first, second) / speed**3,
         curvature_error=np.hypot(scatter * choice.smoother.spread(fit, told, 2), _end_errors(track, told)) / speed**2,
-        points=np.empty((0, 2)),
-        places=np.empty((0, 2)),
+        points=np.empty((0, across + 1)),
+        places=np.empty((0, across + 1)),
         places_s=_measured(track, track.u)[0],
         shifts=shifts,
     )
@@ -229,7 +273,7 @@ def _end_errors(track: _Track, u: Array) -> Array:
         return errors
     for end, sign in ((basis.low, 1.0), (basis.high, -1.0)):
         near = np.clip(end + sign * np.linspace(0.0, REACH, 10 * int(REACH)) * choice.width, basis.low, basis.high)
-        largest = float(np.hypot(*track.spline(near, 3).T).max())
+        largest = float(_length(track.spline(near, 3)).max())
         x = np.maximum(sign * (u - end), 0.0) / choice.width
         turn = 0.5 * sqrt(3.0) * x
         taken = np.exp(-x) + np.exp(-0.5 * x) * (np.cos(turn) + np.sin(turn) / sqrt(3.0))
@@ -241,7 +285,7 @@ def _check_shifts(shifts: Array, points: Array, rows: Sequence[int], deviation: 
     """Refuse a point that is far away from the track through all of them."""
     usual = max(MEDIAN * float(np.median(shifts)), deviation or 0.0)
     worst = int(shifts.argmax())
-    chord = float(np.median(np.hypot(*np.diff(points, axis=0).T)))
+    chord = float(np.median(_length(np.diff(points, axis=0))))
     if shifts[worst] > max(STRAY * usual, OFF * chord):
         raise DeclarationError(
             f"sampled: row {rows[worst]}: is {shifts[worst]:.3g} m from the smooth track, where the points scatter by "

@@ -19,6 +19,8 @@ from gqm_sym.parameters import check_parameter, exact_value, in_si, read_value
 from gqm_sym.specfile.nodes import shown
 
 LINE_LIMIT = 200
+# A count with more digits is refused as what it is given as.
+MAX_DIGITS = 9
 
 # The default of what may be left out. Not "model | None = None": null in the file is a mistake.
 ABSENT: Any = None
@@ -128,6 +130,13 @@ def _read_flag(value: object) -> object:
     return value == "true"
 
 
+def _read_count(value: object) -> object:
+    text = str(value)
+    if not (text.isascii() and text.isdigit() and len(text) <= MAX_DIGITS):
+        raise _mistake(f"must be a whole number, got {shown(text)}")
+    return int(text)
+
+
 def _read_sign(of: str) -> BeforeValidator:
     def read(value: object) -> object:
         if value not in ("1", "+1", "-1"):
@@ -148,6 +157,9 @@ Expression: TypeAlias = Annotated[str, _checked(_check_expression), WithJsonSche
 Number: TypeAlias = Annotated[str, _checked(_check_number), WithJsonSchema(_TEXT_OR_NUMBER)]
 ScatterText: TypeAlias = Annotated[str, _checked(_check_scatter), WithJsonSchema(_TEXT_OR_NUMBER)]
 Flag: TypeAlias = Annotated[bool, BeforeValidator(_read_flag), WithJsonSchema({"type": "boolean"})]
+Count: TypeAlias = Annotated[
+    int, BeforeValidator(_read_count), WithJsonSchema({"type": "integer", "minimum": 1, "default": 1})
+]
 Direction: TypeAlias = Annotated[int, _read_sign("ds/dt at launch"), WithJsonSchema({"enum": [1, -1]})]
 Tangent: TypeAlias = Annotated[int, _read_sign("the tangent (-F_z, F_x)"), WithJsonSchema({"enum": [1, -1]})]
 Ends: TypeAlias = Annotated[list[Expression | None], Field(min_length=2, max_length=2)]
@@ -155,3 +167,4 @@ Length: TypeAlias = Annotated[str, AfterValidator(_in_metres), _checked(_check_n
 Place: TypeAlias = Annotated[list[Length], Field(min_length=2, max_length=2)]
 Centre: TypeAlias = Annotated[list[Expression], Field(min_length=2, max_length=2)]
 SpaceCentre: TypeAlias = Annotated[list[Expression], Field(min_length=2, max_length=3)]
+Headings: TypeAlias = Annotated[list[Expression], Field(min_length=1, max_length=3)]

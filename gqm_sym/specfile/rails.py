@@ -5,10 +5,10 @@ from typing import Annotated, Any, NamedTuple
 
 from pydantic import ConfigDict, Field, create_model
 
-from gqm_sym.declare import Curve, arc, clothoid, line
+from gqm_sym.declare import Curve, arc, clothoid, line, transition
 from gqm_sym.declare.piecewise import Piece
 from gqm_sym.errors import DeclarationError, InputError
-from gqm_sym.specfile.fields import ABSENT, Centre, Expression, Flag, Section, wrapped
+from gqm_sym.specfile.fields import ABSENT, Expression, Flag, Headings, Section, SpaceCentre, wrapped
 
 
 class Line(Section):
@@ -32,6 +32,15 @@ class Clothoid(Section):
     kappa_end: Expression = Field(description="signed curvature at its end", examples=["1/R"])
 
 
+class Transition(Section):
+    """A piece in space, of which yaw, pitch and roll rates are polynomials in s, the distance from its beginning."""
+
+    length: Expression = Field(description="its length", examples=[10])
+    yaw: Expression = Field(default="0", description="rate of turning left", examples=["s/(10*R)"])
+    pitch: Expression = Field(default="0", description="rate of turning upwards", examples=[0])
+    roll: Expression = Field(default="0", description="rate of leaning to the left", examples=["0.05"])
+
+
 class PieceRow(NamedTuple):
     """How a piece is written, and how it is declared from what was written."""
 
@@ -44,6 +53,7 @@ STANDARD = {
     "line": PieceRow(Line, lambda given: line(**given), "a straight piece"),
     "arc": PieceRow(Arc, lambda given: arc(**given), "a piece of a circle"),
     "clothoid": PieceRow(Clothoid, lambda given: clothoid(**given), "a piece whose curvature is linear in arc length"),
+    "transition": PieceRow(Transition, lambda given: transition(**given), "a piece in space that turns and rolls"),
 }
 
 
@@ -71,10 +81,16 @@ class RailSchema(NamedTuple):
         example = [{"line": {"length": 2}}, {"arc": {"radius": "R", "angle": "pi/2"}}]
         fields: dict[str, Any] = {
             "pieces": (list[piece], Field(description="in order", examples=[example])),
-            "start": (Centre, Field(default=ABSENT, description="x and z of the start; (0, 0) if not given")),
+            "start": (
+                SpaceCentre,
+                Field(default=ABSENT, description="x and z of the start, in space x, y and z; zeros if not given"),
+            ),
             "heading": (
-                Expression,
-                Field(default=ABSENT, description="the tangent's angle at the start; 0 if not given"),
+                Expression | Headings,
+                Field(
+                    default=ABSENT,
+                    description="the angle of the tangent at the start, in space [heading, climb, roll]; else 0",
+                ),
             ),
             "closed": (Flag, Field(default=False, description="whether the end is joined to the start")),
         }

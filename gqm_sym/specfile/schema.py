@@ -26,6 +26,7 @@ from gqm_sym.kernels import KERNELS, KernelRow
 from gqm_sym.specfile.fields import (
     ABSENT,
     Centre,
+    Count,
     CurveParameter,
     Direction,
     Ends,
@@ -189,10 +190,10 @@ EXPLICIT: dict[str, CurveRow] = {
     "polar": CurveRow(Polar, _declare_polar, "r = r(theta)"),
     "family": CurveRow(_FAMILY, _declare_family, "a curve of a known family"),
 }
+EXPLICIT["space"] = CurveRow(Space, lambda given: Curve.space(**given), "three coordinates in a parameter")
 RAILS = RailSchema.over({key: (row.model, row.declare, row.summary) for key, row in EXPLICIT.items()})
 CURVES: dict[str, CurveRow] = {
     **EXPLICIT,
-    "space": CurveRow(Space, lambda given: Curve.space(**given), "three coordinates in a parameter"),
     "implicit": CurveRow(Implicit, _declare_implicit, "F(x, z) = 0"),
     "points": CurveRow(POINTS, declare_track, "a track through the points of a file", reads_files=True),
     "pieces": CurveRow(RAILS.rail, RAILS.declare, "a rail of lines, arcs, clothoids and curves"),
@@ -208,6 +209,8 @@ _KERNEL_ARGUMENTS: dict[str, tuple[Any, Any]] = {
             examples=["-direction*k*W"],
         ),
     ),
+    "cars": (Count, Field(default=1, description="how many equal cars it has")),
+    "mass": (Number, Field(default=None, description="of the whole train; that of the parameter m if not given")),
     "form": (
         Literal["resistance", "printed"],
         Field(default="resistance", description="printed: gamma*ell_c*kappa/m as the paper has it"),

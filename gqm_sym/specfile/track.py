@@ -1,4 +1,4 @@
-"""Points of a track from a CSV file beside the YAML."""
+"""Points of a track from a CSV or GPX file beside the YAML."""
 
 import re
 import warnings
@@ -13,10 +13,20 @@ from gqm_sym.declare import Curve
 from gqm_sym.errors import DeclarationError, InputError, NoisyPointsWarning
 from gqm_sym.literals.units import check_unit
 from gqm_sym.parameters import exact_value, in_si
-from gqm_sym.specfile.beside import read_beside, read_rows
-from gqm_sym.specfile.fields import ABSENT, Flag, Line, ScatterText, Section, UnitText, split_value, wrapped
+from gqm_sym.specfile.fields import (
+    ABSENT,
+    Centre,
+    Expression,
+    Flag,
+    Line,
+    ScatterText,
+    Section,
+    UnitText,
+    split_value,
+    wrapped,
+)
+from gqm_sym.specfile.survey import surveyed
 
-_COLUMNS = (["x", "z"], ["x", "y", "z"])
 _ROW = re.compile(r"row (\d+)")
 
 
@@ -36,7 +46,7 @@ class Scatter(Section):
 
 
 class Points(Section):
-    """A track through the points of a CSV file with columns x, z, or x, y, z; its path alone will do."""
+    """A track through the points of a CSV file with columns x, z, or x, y, z, or of a GPX file; its path will do."""
 
     file: Line = Field(description="path from this file's folder on, inside it", examples=["track.csv"])
     kind: Literal["spline", "linear"] = Field(default="spline", description="a quintic spline, or stitched planes")
@@ -46,6 +56,13 @@ class Points(Section):
         description="for measured points: their standard deviation, or auto; else the track goes through them",
         examples=["auto", {"value": 8, "unit": "mm"}],
     )
+    roll: Expression | Centre | None = Field(
+        default=ABSENT,
+        description="in space: roll angle by s, 'coordinated' (no lateral force), or [coordinated, speed]; else the "
+        "column roll",
+        examples=["coordinated"],
+    )
+    heartline: Expression | None = Field(default=ABSENT, description="height of the riders' line over the track")
 
 
 POINTS: TypeAlias = Annotated[Points, wrapped("file", str)]
@@ -57,7 +74,7 @@ def declare_track(given: dict[str, Any], folder: Path) -> Curve:
     Parameters
     ----------
     given
-        ``file``, and where they are given ``kind``, ``closed`` and ``smoothing``.
+        ``file``, and what else is given of the section's keys.
     folder
         Of the YAML file; the points are in it, or in a folder inside.
 
@@ -68,19 +85,21 @@ def declare_track(given: dict[str, Any], folder: Path) -> Curve:
         the line of the file.
     """
     name = given.pop("file")
-    header, rows = read_rows(name, read_beside(name, folder, wanted="a CSV file with columns x, z, or x, y, z"))
-    if header and [field.lower() for field in header] not in _COLUMNS:
-        raise InputError(f"{name!r}, row 1: the columns must be x, z, or x, y, z, got {','.join(header)!r:.60}")
+    found = surveyed(name, folder)
+    if found.roll is not None:
+        given.setdefault("roll", found.roll)
     if "smoothing" in given:
         given["smoothing"] = _deviation(**given["smoothing"])
     try:
         with warnings.catch_warnings(record=True) as noted:
-            curve = Curve.sampled(rows, **given)
+            curve = Curve.sampled(found.rows, **given)
     except DeclarationError as error:
         what = str(error).removeprefix("sampled: ")
         if what.startswith("smoothing: "):
             raise DeclarationError(what) from None
-        raise DeclarationError(f"{name!r}, {_ROW.sub(lambda m: f'row {int(m[1]) + bool(header)}', what)}") from None
+        raise DeclarationError(
+            f"{name!r}, {_ROW.sub(lambda m: f'row {int(m[1]) + found.first_line - 1}', what)}"
+        ) from None
     for one in noted:
         warnings.warn(f"{name!r}, {str(one.message).removeprefix('sampled: ')}", NoisyPointsWarning, stacklevel=2)
     return curve

@@ -330,7 +330,6 @@ REFUSED = (
     (lambda: gqm.Curve.space(x="1", y="2", z="3", parameter="u"), "no coordinate depends on the parameter 'u'"),
     (lambda: gqm.Curve.space(x="u", y="y*u", z="u", parameter="u"), "'y' is a coordinate"),
     (lambda: gqm.Curve.space(x="cos(u)", y="sin(u)", z="u", parameter="u", period="2*pi"), "leave it out"),
-    (lambda: gqm.Curve.piecewise([gqm.families.helix(domain=(0, 1))]), "a space curve cannot be a piece yet"),
     (lambda: gqm.families.torus_knot(p="5/2"), "p: must be a whole number from 1 to 12"),
     (lambda: gqm.families.torus_knot(q=0), "q: must be a whole number from 1 to 12"),
     (lambda: gqm.families.torus_knot(2, 1), r"write families.torus_knot\(R=2, r=1\)"),

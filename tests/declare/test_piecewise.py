@@ -103,7 +103,7 @@ def test_numbers_that_cannot_be(
         ),
         (
             lambda: gqm.Curve.piecewise([gqm.line(length=1)], start=3),
-            r"piecewise: start: must be a pair \(x, z\), got 3",
+            r"piecewise: start: must be a pair \(x, z\), or three numbers in space, got 3",
         ),
         (
             lambda: gqm.Curve.piecewise([gqm.line(length=1)], closed=1),
@@ -172,7 +172,10 @@ def test_rails_in_yaml(tmp_path: Path) -> None:
     [
         ("    - line: {length: -2}", ":5:5: curve.pieces: piece 1, line: length: must be positive, got -2"),
         ("    - arc: {radius: 2}", ":5:7: curve.pieces.0.arc: angle is missing; add angle: pi/2"),
-        ("    - {}", ":5:5: curve.pieces: piece 1, which is empty: give exactly one of line, arc, clothoid, graph"),
+        (
+            "    - {}",
+            ":5:5: curve.pieces: piece 1, which is empty: give exactly one of line, arc, clothoid, transition, graph",
+        ),
         ("    - {line: {length: 1}, arc: {radius: 1, angle: 1}}", "piece 1, which is line and arc: give exactly one"),
         ("    - spiral: {length: 1}", "curve.pieces.0: unknown key 'spiral'"),
         ("    - line: {length: 1 +}", r":5:25: curve.pieces.0.line.length: "),

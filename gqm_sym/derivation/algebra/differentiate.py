@@ -11,6 +11,7 @@ import sympy as sp
 
 from gqm_sym.budgets import spend
 from gqm_sym.errors import DerivationError
+from gqm_sym.sympy_charts import SpaceFunction
 
 # Factors up to which the product rule is written out in one sum.
 MAX_FLAT_FACTORS = 4
@@ -90,6 +91,8 @@ def _rule(node: sp.Basic, variable: sp.Symbol, visit: Callable[[sp.Basic], sp.Ex
         # The angle of a tangent: a curve that a law reads by its turning holds one.
         up, along = node.args
         return (along * visit(up) - up * visit(along)) / (along**2 + up**2)
+    if isinstance(node, SpaceFunction):
+        return node.fdiff() * visit(node.args[0])
     outer = _OUTER.get(node.func)
     if outer is None:
         raise DerivationError(

@@ -1,6 +1,6 @@
 """What a force law becomes along a curve: potential, static normal load and tangential acceleration."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import sympy as sp
 
@@ -8,7 +8,9 @@ from gqm_sym.derivation.algebra.differentiate import differentiate
 from gqm_sym.derivation.algebra.normal_form import shortest
 from gqm_sym.derivation.algebra.rewrite import absorb_bars, multiplied_out, tidy, without_waves
 from gqm_sym.derivation.geometry.geometry import Geometry, Heading, cross
+from gqm_sym.errors import DeclarationError
 from gqm_sym.kernels.base import Kernel, X, Y, Z
+from gqm_sym.sympy_charts import MEAN_HEIGHT
 
 Place = tuple[sp.Expr, sp.Expr, sp.Expr]
 
@@ -101,4 +103,30 @@ def _in_space(pull: Place, potential: sp.Expr, kernel: Kernel, shape: Geometry) 
         static_normal_load=load * sp.Abs(shape.per_length),
         pressure=load * sp.Abs(shape.size),
         loads=tuple(absorb_bars(part * shape.per_length) for part in crossed),
+    )
+
+
+def of_train(law: Forces, kernel: Kernel, lam: sp.Symbol) -> Forces:
+    """The forces along the track of a train: gravity acts on its mean height.
+
+    The contact force stays that of a body at the middle, and so do `Forces.loads`.
+
+    Raises
+    ------
+    DeclarationError
+        If a force of another kind acts.
+    """
+    pull = differentiate(kernel.potential, Z)
+    if not pull or (pull.free_symbols | (kernel.potential - pull * Z).free_symbols) & {X, Y, Z}:
+        raise DeclarationError(
+            "derive: train: potentials other than gravity are not known of a train; use Gravity() alone"
+        )
+    height, slope, _ = (head(lam) for head in MEAN_HEIGHT)
+    potential = kernel.potential.xreplace({Z: height})
+    return replace(
+        law,
+        potential=potential,
+        effective_potential=potential / kernel.inertia,
+        effective_potential_slope=pull * slope / kernel.inertia,
+        push=-pull * slope,
     )

@@ -39,7 +39,7 @@ from gqm_sym.derivation.algebra.rewrite import (
 from gqm_sym.derivation.algebra.signs import Signs
 from gqm_sym.derivation.geometry.turning_angle import tangent_angle, turned
 from gqm_sym.errors import DeclarationError
-from gqm_sym.sympy_charts import SPACE_ROWS, chart_alpha, chart_kappa
+from gqm_sym.sympy_charts import AXES, SPACE_ROWS, chart_alpha, chart_kappa
 
 Heading = tuple[sp.Expr, sp.Expr]
 AHEAD: Heading = (sp.S.One, sp.S.Zero)
@@ -200,7 +200,7 @@ def _charted(curve: Curve) -> Geometry:
 
 def _charted_in_space(curve: Curve) -> Geometry:
     """Read the shape from the charts of three coordinates."""
-    first, second = ([rows[order](curve.parameter) for rows in SPACE_ROWS.values()] for order in (1, 2))
+    first, second = ([SPACE_ROWS[axis][order](curve.parameter) for axis in AXES] for order in (1, 2))
     kappa = sp.sqrt(sp.Add(*(part**2 for part in second)))
     return Geometry(
         along=first[0],

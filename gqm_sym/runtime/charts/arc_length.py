@@ -23,7 +23,7 @@ from gqm_sym.runtime.compiled.types import Array
 
 # A curve: a function of places (n,) and of offsets from each of them (n, m) that returns x, z, ds/dlam, dx/ds, dz/ds
 # and kappa as an array (6, n, m); of a curve in space x, y, z, ds/dlam and the first and second derivatives of the
-# coordinates by arc length, as an array (10, n, m).
+# coordinates by arc length, as an array (10, n, m), perhaps with more rows behind that belong to it.
 Rows = Callable[[Array, Array], Array]
 Flags = NDArray[np.bool_]
 Indices = NDArray[np.integer[Any]]
@@ -182,7 +182,7 @@ def divided(rows: Rows, edges: Array, dimension: int, *, where: str) -> Division
         # The mean rate is subtracted: the remainder is small, so that its rounding does not limit Newton's method.
         gains[:, :2] -= 0.5 * lengths[:, None]
         values = rows(low, half[:, None] * (1.0 + _invert(lengths, rates, gains)))[dimension + 1 :]
-        turns = values[dimension:] * lengths[:, None]
+        turns = values[dimension : 2 * dimension] * lengths[:, None]
         tail = np.max([_tail(speeds), *(_tail(row, 1.0) for row in (*values[:dimension], *turns))], axis=0)
         good = (tail <= MAX_TAIL_RATIO) | ((tail <= MAX_NOISE_RATIO) & (tail > before / MIN_FALL))
         _check(good | (half > shortest), middle, where, "has a cusp or a pole, or is not smooth")

@@ -7,7 +7,7 @@ differences do not cancel. Compiled code reads a chart from one flat array that 
 (`evaluate`).
 """
 
-from collections.abc import Hashable
+from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, field
 from math import inf
 from typing import Any, NamedTuple, Protocol
@@ -98,6 +98,8 @@ class Chart:
     origins : (n, 3) array
         For each piece, the index of the part of the track that it belongs to, and where it begins and ends in that
         part's own parameter; empty if the track has no parts.
+    joints : array
+        The arc length at the edges of all charts in the block, where it holds more than those of the curve.
     """
 
     block: Array
@@ -108,6 +110,7 @@ class Chart:
     breaks: Array = field(default_factory=lambda: np.empty(0))
     corners: Array = field(default_factory=lambda: np.empty(0))
     origins: Array = field(default_factory=lambda: np.empty((0, 3)))
+    joints: Array = field(default_factory=lambda: np.empty(0))
 
     @property
     def range(self) -> tuple[float, float, float]:
@@ -117,7 +120,12 @@ class Chart:
     @property
     def edges(self) -> Array:
         """Return the arc length at the edges of the pieces."""
-        return self.block[EDGES : EDGES + int(self.block[1]) + 1]
+        return self.joints if self.joints.size else self.block[EDGES : EDGES + int(self.block[1]) + 1]
+
+    @property
+    def inner_edges(self) -> Array:
+        """Return the arc length where two pieces meet, within one period."""
+        return self.edges[0 if self.period else 1 : -1]
 
     def points(self, s: Any) -> Array:
         """Return x, z, alpha and kappa at arc lengths, as rows."""
@@ -168,23 +176,47 @@ class Chart:
         return float(place), float(np.hypot(row[0] - x, row[1] - z))
 
 
-IN_BLOCK = (2, 0, 1)
-"""The coordinates in the order in which their charts stand in the block of a `SpaceChart`."""
+IN_BLOCK = (2, 0, 1, 3)
+"""The coordinates, and behind them the roll angle, in the order of their charts in the block of a `SpaceChart`."""
+
+BY_ORDER = (1, 2, 3, 0)
+"""The rows of such a chart that have a coordinate and its derivatives."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class SpaceChart(Chart):
     """A curve in space in arc length.
 
-    Its block is that of the chart of z, followed by those of x and y. In the chart of a coordinate this is the height;
-    in the places of angle and curvature are its first two derivatives by arc length.
+    Its block is that of the chart of z, followed by those of x and y, and of the roll angle if there is one. In the
+    chart of a coordinate this is the height; in the places of angle, curvature and x are its first three derivatives by
+    arc length.
+
+    Attributes
+    ----------
+    banked : bool
+        Whether there is a roll angle.
     """
+
+    banked: bool = False
 
     def coordinates(self, s: Any) -> Array:
         """Return x, y and z at arc lengths, as rows."""
-        places = np.ascontiguousarray(s, dtype=np.float64).reshape(-1)
-        blocks = self.block.reshape(len(IN_BLOCK), -1)
-        return np.stack([_read(blocks[IN_BLOCK.index(axis)], places)[1] for axis in range(3)])
+        return self.derivatives(s, 0)[:3]
+
+    def derivatives(self, s: Any, order: int) -> Array:
+        """Return the derivatives of x, y and z by arc length, and of the roll angle if there is one, as rows.
+
+        Parameters
+        ----------
+        s
+            Arc lengths.
+        order
+            0 of them themselves, to 3.
+        """
+        places, size = np.ascontiguousarray(s, dtype=np.float64).reshape(-1), int(self.block[0])
+        order_in_block = IN_BLOCK[: 3 + self.banked]
+        blocks = self.block[: len(order_in_block) * size].reshape(-1, size)
+        return np.stack([_read(blocks[k], places)[BY_ORDER[order]] for k in np.argsort(order_in_block)])
 
 
 class PieceData(NamedTuple):
@@ -252,7 +284,7 @@ def assemble(
 
 
 def assemble_in_space(
-    edges: Array, anchors: Array, slopes: Array, bends: Array, *, period: float = 0.0, breaks: Any = ()
+    edges: Array, anchors: Array, derivatives: Sequence[Array], *, period: float = 0.0, breaks: Any = ()
 ) -> "SpaceChart":
     """Assemble the chart of a track in space: of each coordinate the chart in which it is the height.
 
@@ -260,27 +292,42 @@ def assemble_in_space(
     ----------
     edges : (n+1,) array
         Arc length at the edges of the pieces, increasing.
-    anchors : (n, 3) array
-        x, y and z at the left edge of each piece.
-    slopes, bends : (n, 3, TERMS) arrays
-        Their first two derivatives by arc length at the nodes.
+    anchors : (n, d) array
+        x, y and z at the left edge of each piece, and the roll angle if there is one; floats longer than doubles keep
+        their digits.
+    derivatives : three (n, d, TERMS) arrays
+        Their first three derivatives by arc length at the nodes.
     period, breaks
         As `Chart` has them.
     """
-    half = 0.5 * np.diff(edges)
-    constants, powers, turning = _integrated(half, (anchors, 0.0), slopes, half[:, None, None] * bends)
-    blocks = []
-    for axis in IN_BLOCK:
-        own, terms = np.zeros((half.size, 4)), np.zeros((half.size, 2, TERMS))
-        own[:, 2:], terms[:, 1] = constants[:, 2 * axis : 2 * axis + 2], powers[:, axis]
-        blocks.append(_block(edges, own, terms, turning[:, axis], bends[:, axis], (period, 0.0)))
+    left = np.asarray(anchors, dtype=np.float64)
+    blocks = blocks_of(edges, (left, np.asarray(anchors - left, dtype=np.float64)), derivatives, period)
     return SpaceChart(
-        block=np.concatenate(blocks),
+        block=np.concatenate([blocks[axis] for axis in IN_BLOCK[: len(blocks)]]),
         low=float(edges[0]),
         high=float(edges[-1]),
         period=float(period),
         breaks=np.asarray(breaks, dtype=np.float64),
+        banked=len(blocks) > 3,
     )
+
+
+def blocks_of(edges: Array, anchors: tuple[Any, Any], derivatives: Sequence[Array], period: float) -> list[Array]:
+    """Return for each of d functions of arc length the block of a chart in which it is the height.
+
+    The arguments are those of `assemble_in_space`, but for ``anchors``, which are pairs of doubles; third derivatives
+    may be left out.
+    """
+    half, (slopes, bends, *thirds) = 0.5 * np.diff(edges), derivatives
+    constants, powers, turning = _integrated(half, anchors, slopes, half[:, None, None] * bends)
+    blocks = []
+    for axis in range(bends.shape[1]):
+        own, terms = np.zeros((half.size, 4)), np.zeros((half.size, 2, TERMS))
+        own[:, 2:], terms[:, 1] = constants[:, 2 * axis : 2 * axis + 2], powers[:, axis]
+        for third in thirds:
+            terms[:, 0] = _fitted(third[:, axis]) @ _POWERS
+        blocks.append(_block(edges, own, terms, turning[:, axis], bends[:, axis], (period, 0.0)))
+    return blocks
 
 
 def _integrated(half: Array, anchors: tuple[Any, Any], known: Array, second: Array) -> tuple[Array, Array, Array]:

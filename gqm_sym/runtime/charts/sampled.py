@@ -28,6 +28,9 @@ from gqm_sym.runtime.double_double.arithmetic import UNIT, add, divide, multiply
 
 DEGREE = 5
 
+# The column of points in space that has the roll angle.
+ROLL = 3
+
 # The lengths between points have converged when their relative change is below this; each iteration gains some digits.
 MAX_LAST_CHANGE = 1e-9
 MAX_ITERATIONS = 10
@@ -48,19 +51,23 @@ class Sampled:
     Attributes
     ----------
     points : str
-        x and z of the points one after the other, separated by blanks; of a track in space x, y and z.
+        x and z of the points one after the other, separated by blanks; of a track in space x, y and z, and of one with
+        a roll angle this behind them.
     kind : {"spline", "linear"}
         What lies between the points.
     closed : bool
         Whether the track continues from the last point to the first. The first point is not repeated.
     in_space : bool
         Whether the points have three coordinates. Such a track is known in doubles only.
+    banked : bool
+        Whether points in space have a roll angle, in radians.
     """
 
     points: str
     kind: str = "spline"
     closed: bool = False
     in_space: bool = False
+    banked: bool = False
 
     @property
     def shaped_by(self) -> tuple[int, ...]:
@@ -168,9 +175,11 @@ def _exact_polynomial(context: Any, t: Array, c: Array, k: int) -> Part:
 @lru_cache(maxsize=4)
 def _made(track: Sampled) -> tuple[Chart, Any]:
     """The chart of a track, and its spline; None for stitched planes."""
-    points = np.array(track.points.split(), dtype=np.float64).reshape(-1, 3 if track.in_space else 2)
+    points = np.array(track.points.split(), dtype=np.float64).reshape(-1, 2 + track.in_space + track.banked)
     if track.closed:
         points = np.concatenate([points, points[:1]])
+    if track.banked:  # from point to point by less than half a turn: after a lap it may be another one by whole turns
+        points[:, ROLL] = np.unwrap(points[:, ROLL])
     return (_planes(points, track.closed), None) if track.kind == "linear" else _splined(points, track.closed)
 
 
@@ -198,18 +207,22 @@ def _planes(points: Array, closed: bool) -> Chart:
 
 def _splined(points: Array, closed: bool) -> tuple[Chart, Any]:
     """Return the chart of the interpolating spline; each of its polynomials becomes one or more pieces of the chart."""
-    knots = summed(reduce(np.hypot, np.diff(points, axis=0).T))
+    knots = summed(reduce(np.hypot, np.diff(points[:, :ROLL], axis=0).T))
     for _ in range(MAX_ITERATIONS):
         spend()
-        terms = _polynomials(points, knots, closed)
+        terms = _polynomials(points[:, :ROLL], knots, closed)
         lengths = _lengths(knots, terms)
         change = np.abs(lengths / np.diff(knots) - 1.0).max()
         knots = summed(lengths)
         if change <= MAX_LAST_CHANGE:
             break
-    points, knots = _thinned(points, knots, closed)
+    # What a lap adds to a roll angle is linear, and the rest is periodic.
+    rates = (points[-1] - points[0]) / knots[-1] if closed else np.zeros(points.shape[1])
+    points, knots = _thinned(points - rates * knots[:, None], knots, closed)
     terms = _polynomials(points, knots, closed)
-    if points.shape[1] == 3:
+    terms[:, :, 0] += rates * knots[:-1, None]
+    terms[:, :, 1] += rates
+    if points.shape[1] > 2:
         return _in_space(knots, terms, closed), None
     pieces = rectify(lambda left, offsets: _evaluate(knots, terms, left, offsets), knots, where="sampled")
     edges, turn = summed(pieces.lengths), 0.0
@@ -223,28 +236,38 @@ def _splined(points: Array, closed: bool) -> tuple[Chart, Any]:
 
 
 def _in_space(knots: Array, terms: Array, closed: bool) -> Chart:
-    """Return the chart of a spline in space."""
+    """Return the chart of a spline in space, perhaps with a roll angle behind its coordinates."""
 
     def rows(left: Array, offsets: Array) -> Array:
         k = np.clip(np.searchsorted(knots, left, side="right") - 1, 0, knots.size - 2)
         part, place = terms[k], (left - knots[k])[:, None] + offsets
-        value, first, second = (np.zeros((3, *offsets.shape)) for _ in range(3))
+        value, first, second, third = (np.zeros((terms.shape[1], *offsets.shape)) for _ in range(4))
         for power in range(DEGREE, -1, -1):
+            third = third * place + 3.0 * second
             second = second * place + 2.0 * first
             first = first * place + value
             value = value * place + part[:, :, power].T[:, :, None]
-        speed = np.sqrt((first * first).sum(axis=0))
+        speed = np.sqrt((first[:ROLL] ** 2).sum(axis=0))
+        # By arc length all columns change as the coordinates do; the speed's own derivatives are gain and growth.
         tangent = first / speed
-        bend = (second - tangent * (tangent * second).sum(axis=0)) / (speed * speed)
-        return np.concatenate([value, speed[None], tangent, bend])
+        gain = (tangent * second)[:ROLL].sum(axis=0)
+        bend = (second - tangent * gain) / (speed * speed)
+        growth = (speed * bend * second + tangent * third)[:ROLL].sum(axis=0)
+        change = (third - tangent * growth - 3.0 * speed * gain * bend) / speed**3
+        parts = [part[:ROLL] for part in (value, speed[None], tangent, bend, change)]
+        return np.concatenate([*parts, *(part[ROLL:] for part in (value, tangent, bend, change))])
 
-    found = divided(rows, knots, 3, where="sampled")
-    edges, values = summed(found.lengths), np.moveaxis(found.at_nodes, 0, 1)
+    found = divided(rows, knots, ROLL, where="sampled")
+    edges, behind = summed(found.lengths), 3 * ROLL + 1
+    anchors = np.concatenate([found.at_edges[:ROLL], found.at_edges[ROLL + behind :][:1]])
+    derivatives = [
+        np.concatenate([found.at_nodes[ROLL * k : ROLL * (k + 1)], found.at_nodes[behind + k :][:1]]).swapaxes(0, 1)
+        for k in range(3)
+    ]
     return assemble_in_space(
         edges,
-        found.at_edges[:3].T,
-        values[:, :3],
-        values[:, 3:],
+        anchors.T,
+        derivatives,
         period=edges[-1] if closed else 0.0,
         breaks=edges[:-1] if closed else edges[1:-1],
     )

@@ -21,7 +21,8 @@ from gqm_sym.runtime.double_double.orbit_time import MAX_PANELS, MIN_PANELS, fil
 from gqm_sym.runtime.quadrature.trapezoid import LIBRATION
 
 # The rule has converged if the largest of the changes, each as a share of the mean of the absolute values, has shrunk
-# by this factor and the next one would be smaller than the second number.
+# by this factor and the next one would be smaller than the second number. Errors fall geometrically: the first change,
+# from 16 to 32 nodes, is about the square root of the next one.
 MAX_RATIO, MAX_NEXT_CHANGE = 1e-3, 1e-20
 
 # The largest rounding error of a mean, as a share of the mean of the absolute values.
@@ -90,7 +91,7 @@ def add_midpoints(program, work, nodes, n, sums):  # type: ignore[no-untyped-def
 def fill_means_of(program, work, inputs, nodes, found):  # type: ignore[no-untyped-def]
     """Fill the means of all results, as `fill_means`."""
     begin(program, work, inputs)
-    sums, before, rounding = np.empty((found.shape[0], MEAN)), inf, inf
+    sums, before, rounding = np.empty((found.shape[0], MEAN)), 1.0, inf
     for level in range(1, len(LEVELS) - 1):
         n = LEVELS[level]
         add_midpoints(program, work, nodes, n, sums)
@@ -103,11 +104,10 @@ def fill_means_of(program, work, inputs, nodes, found):  # type: ignore[no-untyp
                 change = step if not step <= change else change
                 rounding = max(rounding, sums[j, 2] / (n * size))
             found[j, 0], found[j, 1], found[j, 2], found[j, 3] = high, low, sums[j, 2] / n, size
-        following = change * change / before if level > 1 else inf
-        has_converged = change <= MAX_RATIO * before and before < inf and following <= MAX_NEXT_CHANGE
-        if level > 2 and rounding <= MAX_ROUNDING and (has_converged or change <= rounding):
+        has_converged = change <= MAX_RATIO * before and change * change <= MAX_NEXT_CHANGE * before
+        if level > 1 and rounding <= MAX_ROUNDING and (has_converged or change <= rounding):
             return n
-        before = change if level > 1 else inf
+        before = change if level > 1 else 1.0
     return NOT_SMOOTH if rounding <= MAX_ROUNDING else LOST_DIGITS
 
 

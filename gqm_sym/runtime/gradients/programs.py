@@ -346,32 +346,39 @@ def law_program(law: ExactLaw, parameters: int) -> Program:
     """The law of a motion with losses at a place and a V**2, the two coordinates.
 
     The inputs are the run-time parameters, sgn(dlam/dt) and sgn(N). The results are ds/dlam and its derivatives by the
-    place and the parameters; dW/dlam, where W is V**2, and its derivatives by the place, by W and by the parameters;
-    and the slope along the motion of the contact force per mass, with its derivatives by the place and by W.
+    place and the parameters, and dW/dlam, where W is V**2, and its derivatives by the place, W and the parameters.
     """
+    op, ds, slope = _law(law, parameters)
+    (lam, w), p = op.places, op.values[:parameters]
+    return assemble(op, [ds, *gradient(op, ds, [lam, *p]), slope, *gradient(op, slope, [lam, w, *p])])
+
+
+@lru_cache(maxsize=64)
+def load_program(law: ExactLaw, parameters: int) -> Program:
+    """The slope of the contact force per mass along a motion with losses, and its derivatives by the place and by W.
+
+    The inputs are those of `law_program`.
+    """
+    op, _, slope = _law(law, parameters)
+    (lam, w), p = op.places, op.values[:parameters]
+    load = law.kappa(op, lam, p) * w + law.static_normal_load(op, lam, p)
+    by_place, by_w = gradient(op, load, [lam, w])
+    load_slope = by_place + by_w * slope
+    return assemble(op, [load_slope, *gradient(op, load_slope, [lam, w])])
+
+
+def _law(law: ExactLaw, parameters: int) -> tuple[Recorder, TapeNumber, TapeNumber]:
+    """A tape with ds/dlam and dW/dlam."""
     op = Recorder(parameters + 2, coordinates=2)
     (lam, w), p, signs = op.places, op.values[:parameters], op.values[parameters:]
-    ds, slope = law.ds(op, lam, p), law.speed_slope(op, lam, w, *signs, p)
-    load = law.kappa(op, lam, p) * w + law.static_normal_load(op, lam, p)
-    load_by_place, load_by_w = gradient(op, load, [lam, w])
-    load_slope = load_by_place + load_by_w * slope
-    return assemble(
-        op,
-        [
-            *(ds, *gradient(op, ds, [lam, *p])),
-            *(slope, *gradient(op, slope, [lam, w, *p])),
-            *(load_slope, *gradient(op, load_slope, [lam, w])),
-        ],
-    )
+    return op, op.number(law.ds(op, lam, p)), op.number(law.speed_slope(op, lam, w, *signs, p))
 
 
 @lru_cache(maxsize=64)
 def force_program(law: ExactLaw, parameters: int) -> Program:
     """dW/dlam at a place and a V**2, and its derivative by the place; the inputs are those of `law_program`."""
-    op = Recorder(parameters + 2, coordinates=2)
-    lam, w = op.places
-    slope = law.speed_slope(op, lam, w, *op.values[parameters:], op.values[:parameters])
-    return assemble(op, [slope, *gradient(op, slope, [lam])])
+    op, _, slope = _law(law, parameters)
+    return assemble(op, [slope, *gradient(op, slope, [op.place])])
 
 
 @lru_cache(maxsize=64)

@@ -28,6 +28,8 @@ class BoundFunctions(NamedTuple):
         The sign of the tangent's turn at each corner: 1 where the curve bends to the left.
     dissipation : Dissipation or None
         What compiled code takes of a dissipative model; None for a conservative one.
+    chart, joints : arrays
+        The chart, and the places at which its pieces meet, within one period; empty for a curve with formulas.
     """
 
     addresses: Addresses
@@ -38,10 +40,12 @@ class BoundFunctions(NamedTuple):
     period: float = 0.0
     bends: Array = NOWHERE
     dissipation: Dissipation | None = None
+    chart: Array = NOWHERE
+    joints: Array = NOWHERE
 
     def drops(self, only_sign: int) -> Array:
         """The corners at which a moving body leaves a track that can only push with one sign of N (0: with both)."""
-        return self.corners[self.bends * only_sign < 0.0] if self.corners.size else self.corners
+        return self.corners[self.bends * only_sign < 0.0] if only_sign and self.corners.size else NOWHERE
 
     def between(self, places: Array, a: float, b: float) -> Array:
         """The places that lie strictly between a and b; on a closed curve they are repeated with the period."""

@@ -36,7 +36,7 @@ def bind_all(formulas: Formulas, p: ParameterValues) -> BoundFunctions:
             chart = formulas.charted(p)
             block = np.concatenate([p.values, chart.block])
             shape = (chart.breaks, chart.corners, chart.period, chart.bends)
-            p.functions = BoundFunctions(addresses, block, None, *shape, dissipation)
+            p.functions = BoundFunctions(addresses, block, None, *shape, dissipation, chart.block, chart.inner_edges)
     bound: BoundFunctions = p.functions
     return bound
 

@@ -7,6 +7,7 @@ import numpy as np
 from gqm_sym.arguments import short
 from gqm_sym.errors import LaunchError, NumberError
 from gqm_sym.literals.numbers import Number, read_number
+from gqm_sym.runtime.charts.train import TrackOfTrain
 from gqm_sym.runtime.launch.formulas import Formulas, ParameterValues
 
 # The largest distance of a launch point from a charted curve, as a share of the point's larger coordinate or of the
@@ -131,6 +132,11 @@ def check_contact(formulas: Formulas, contact: Any) -> None:
     """
     if not (isinstance(contact, str) and contact in CONTACTS):
         raise LaunchError(f"contact: must be one of {', '.join(CONTACTS)}, got {short(contact)}")
+    if ONLY_SIGN[contact] and isinstance(formulas.chart, TrackOfTrain):
+        raise LaunchError(
+            f"contact: {contact!r} is for one body; a train is held from all sides, which is 'bilateral', and "
+            "`Motion.cars` tells the contact force of each car"
+        )
     if ONLY_SIGN[contact] and not formulas.signed:
         raise LaunchError(
             f"contact: {contact!r} is for curves in a vertical plane; on this space curve the body is held from all "

@@ -1,15 +1,29 @@
-"""Bodies driven along the curve by compiled code: one leg of one body, or one number for the motion of each of many."""
+"""Bodies driven along the curve by compiled code: a few legs of one body, or one number for each of many."""
 
+import threading
 from math import fabs, inf, isfinite, sqrt
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import types
 
 from gqm_sym.runtime.compiled.jit import Inner, entry
 from gqm_sym.runtime.compiled.registers import uncounted
-from gqm_sym.runtime.compiled.types import INTEGER, MATRIX, VECTOR
-from gqm_sym.runtime.legs.advance import AT_ONCE, BEYOND, DISSIPATION, LEAVES, RESTS, Joints, advance, launch
+from gqm_sym.runtime.compiled.types import INTEGER, MATRIX, VECTOR, Array
+from gqm_sym.runtime.interface import Dissipation
+from gqm_sym.runtime.legs.advance import (
+    AT_ONCE,
+    BEYOND,
+    DISSIPATION,
+    LEAVES,
+    NOTHING,
+    RESTS,
+    Joints,
+    advance,
+    launch,
+    room_ahead,
+    room_kept,
+)
 from gqm_sym.runtime.legs.body import (
     DIRECTION,
     ELAPSED,
@@ -20,9 +34,11 @@ from gqm_sym.runtime.legs.body import (
     LAPS,
     MAY_REST,
     ONLY_SIGN,
+    PANEL_COUNT,
     PAUSES,
     PERIOD,
     PLACE,
+    SIZE,
     STATUS,
     STEP,
     TARGET,
@@ -34,6 +50,8 @@ from gqm_sym.runtime.legs.leg_equation import Forces
 from gqm_sym.runtime.legs.leg_panels import GAP_COLUMNS
 from gqm_sym.runtime.legs.leg_reading import passage, peak_of_leg
 from gqm_sym.runtime.legs.leg_record import (
+    AHEAD,
+    BACK,
     BEGIN,
     BEGIN_LOW,
     END,
@@ -45,11 +63,11 @@ from gqm_sym.runtime.legs.leg_record import (
     START_V2,
     TIMES,
 )
-from gqm_sym.runtime.legs.leg_run import ASYMPTOTE, FULL, SPENT, TURN, Reading, point_buffer, slope_of_v2
+from gqm_sym.runtime.legs.leg_run import ASYMPTOTE, FULL, LIMIT, SPENT, TURN, Reading, point_buffer, slope_of_v2
 
-# What is asked of each body; LEG is to advance by one leg, FIRST_LEG the same unless its launch is next to an
-# equilibrium.
-FIRST_LEG, LEG, END_TIME, REST_PLACE, ARRIVAL, LEAST_SPEED, MOST_SPEED, LEAST_LOAD, MOST_LOAD = range(9)
+# What is asked of each body. LEGS is to advance by some legs, FIRST_LEGS the same unless its launch is next to an
+# equilibrium; RUN_AGAIN is to follow one of them once more for its panels, or a part of it.
+FIRST_LEGS, LEGS, RUN_AGAIN, END_TIME, REST_PLACE, ARRIVAL, LEAST_SPEED, MOST_SPEED, LEAST_LOAD, MOST_LOAD = range(10)
 
 # What became of a body whose launch is so near to an equilibrium that it may be followed by its distance from that.
 NEARBY = 14
@@ -71,6 +89,36 @@ MAX_LEGS = 250_000
 LEAST_SWING = 1e-110
 
 JOINTS = types.NamedUniTuple(VECTOR, 5, Joints)
+
+# What has been kept of charts between their breaks (`legs.advance.Joints`), by forces, parameters and chart; the chart
+# stands beside it, so that no other one can have its identity. Who uses it takes it out meanwhile.
+_KEPT: dict[Any, tuple[Array, Array]] = {}
+MAX_KEPT = 8
+_LOCK = threading.Lock()
+
+# What compiled code reads of a curve that is smooth everywhere.
+SMOOTH = Joints(NOTHING, NOTHING, NOTHING, NOTHING)
+
+
+class Track(NamedTuple):
+    """The curve along which bodies are driven, and where it is not smooth.
+
+    Attributes
+    ----------
+    chart : array
+        What stands behind the run-time parameters; empty for a curve with formulas, which has no breaks.
+    breaks, corners, drops : arrays
+        As of `legs.advance.Joints`.
+    """
+
+    chart: Array
+    breaks: Array
+    corners: Array
+    drops: Array
+
+    def is_kept(self, dissipation: Dissipation) -> bool:
+        """Whether the curve between its breaks is kept, by which most legs are passed."""
+        return dissipation.linear and self.breaks.size > 0
 
 
 class Observed(NamedTuple):
@@ -189,14 +237,34 @@ def is_tiny(record):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def follow_legs(dissipation, p, joints, body, records):  # type: ignore[no-untyped-def]
+def follow_leg(dissipation, p, joints, body, before, record):  # type: ignore[no-untyped-def]
+    """Advance a body by one leg, past what is kept of the curve; ``before`` becomes what the body is before it.
+
+    A leg that ends at a turn, or at the limit of a run, has a record without panels, which `RUN_AGAIN` fills in.
+    """
+    for k in range(SIZE):
+        before[k] = body[k]
+    what = advance(dissipation, p, joints, body, Reading(TIMES, False, 1.0, -inf), record)
+    if what in (TURN, RESTS, LIMIT, FULL):
+        return what
+    for k in range(SIZE):
+        body[k] = before[k]
+    return advance(dissipation, p, joints, body, Reading(PANELS, False, 1.0, -inf), record)
+
+
+@Inner
+def follow_legs(dissipation, p, joints, bodies, records):  # type: ignore[no-untyped-def]
     """Advance a body by as many legs as there are records, or to a leg after which something else is decided."""
-    what, count = RESTS, 0
+    what, count, body = RESTS, 0, bodies[0]
     while count < records.shape[0]:
-        what = advance(dissipation, p, joints, body, Reading(PANELS, False, 1.0, -inf), records[count])
+        if joints.gaps.size > 0:
+            what = follow_leg(dissipation, p, joints, body, bodies[1 + count], records[count])
+        else:
+            what = advance(dissipation, p, joints, body, Reading(PANELS, False, 1.0, -inf), records[count])
         if what == FULL:
             break
         count += 1
+        body[PANEL_COUNT] += 1.0 + records[count - 1, AHEAD] + records[count - 1, BACK]
         body[STATUS] = 1.0 if is_tiny(records[count - 1]) else 0.0
         if what != TURN or body[ENDING] != 0.0 or body[ELAPSED] >= body[HORIZON] or body[STATUS] != 0.0:
             break
@@ -220,13 +288,14 @@ def drive(dissipation, parameters, joints, question, bodies, records):  # type: 
         A row of run-time parameters for each body, or one for all of them.
     joints : Joints
     question : int
-        FIRST_LEG to MOST_LOAD. The answer to all but the first two is in VALUE and STATUS of the body; LEAST_LOAD and
-        MOST_LOAD mean the contact force per mass. After the first two, VALUE is the number of legs that have been
+        FIRST_LEGS to MOST_LOAD. The answer to all from END_TIME on is in VALUE and STATUS of the body; LEAST_LOAD and
+        MOST_LOAD mean the contact force per mass. After FIRST_LEGS and LEGS, VALUE is the number of legs that have been
         followed, and STATUS is 1 if the last of them is tiny (`is_tiny`).
     bodies : (n, SIZE) array
-        The bodies (`legs.body`), which are moved on.
+        The bodies (`legs.body`), which are moved on. Up to RUN_AGAIN that is the first one alone; where the curve
+        between its breaks is kept, the others become what it is before each leg.
     records : (n, size) array
-        Filled in with the legs of the last body (`leg_record`), of which LEG asks for n at most. The first row is work
+        Filled in with legs of the first body (`leg_record`), of which LEGS asks for n at most. The first row is work
         space of other questions.
 
     Returns
@@ -237,18 +306,42 @@ def drive(dissipation, parameters, joints, question, bodies, records):  # type: 
     breaks, corners, drops, ahead, gaps = joints
     joints = Joints(uncounted(breaks), uncounted(corners), uncounted(drops), uncounted(ahead), uncounted(gaps))
     parameters, bodies, records, what = uncounted(parameters), uncounted(bodies), uncounted(records), RESTS
-    for k in range(bodies.shape[0]):
+    for k in range(1 if question <= RUN_AGAIN else bodies.shape[0]):
         p, body = parameters[k if parameters.shape[0] > 1 else 0], bodies[k]
         if parameters.shape[0] > 1:
             joints.gaps[::GAP_COLUMNS] = 0.0
         if body[STEP] == 0.0:
             launch(dissipation, p, joints, body)
-            if question == FIRST_LEG and may_be_small(dissipation, p, joints.breaks, body):
+            if question == FIRST_LEGS and may_be_small(dissipation, p, joints.corners, body):
                 return NEARBY
-        if question <= LEG:
-            what = follow_legs(dissipation, p, joints, body, records) if body[DIRECTION] != 0.0 else RESTS
+        if question <= LEGS:
+            what = follow_legs(dissipation, p, joints, bodies, records) if body[DIRECTION] != 0.0 else RESTS
+        elif question == RUN_AGAIN:
+            what = advance(dissipation, p, joints, body, Reading(PANELS, False, 1.0, -inf), records[0])
         elif body[DIRECTION] != 0.0:
             body[VALUE], body[STATUS] = answer(dissipation, p, joints, question, body, records[0])
         else:
             body[VALUE], body[STATUS] = at_rest(dissipation, p, body, question)
+    return what
+
+
+def drive_along(
+    track: Track, dissipation: Dissipation, parameters: Array, question: int, bodies: Array, records: Array
+) -> int:
+    """`drive` bodies along a curve, with what is kept of it for these forces and run-time parameters."""
+    if not track.breaks.size:
+        what: int = drive(dissipation, parameters, SMOOTH, question, bodies, records)
+        return what
+    key, kept = (dissipation, id(track.chart), parameters[0, : -track.chart.size].tobytes()), NOTHING
+    if track.is_kept(dissipation):
+        with _LOCK:
+            found = _KEPT.pop(key, None)
+        kept = np.zeros(room_kept(track.breaks.size)) if found is None else found[0]
+    joints = Joints(*track[1:], np.empty(room_ahead(track.breaks.size)), kept)
+    what = drive(dissipation, parameters, joints, question, bodies, records)
+    if kept.size:
+        with _LOCK:
+            _KEPT[key] = kept, track.chart
+            while len(_KEPT) > MAX_KEPT:
+                del _KEPT[next(iter(_KEPT))]
     return what

@@ -34,6 +34,7 @@ TURNS, PAUSES         how often the body has turned, and how many runs without a
 MAY_REST              whether the body could stay at its last turn, were the curve less steep; 1 before the first turn
 FROM_REST             1 if the launch was from rest
 ENDING                the code of what has ended the motion (`advance`), or 0
+PANEL_COUNT           how many panels the records of the legs had, with one more for each (counted for `solve`)
 VALUE, STATUS         the quantity that was asked for, and whether it has a value (`answers`)
 ===================== ===========================================================================================
 """
@@ -47,21 +48,23 @@ from gqm_sym.runtime.compiled.types import Array
 LAM0, LOW, HIGH, PERIOD, PREFERRED, ONLY_SIGN, HORIZON, TARGET, V2 = range(9)
 PLACE, PLACE_LOW, LAPS, DIRECTION, CONTACT_SIGN, STEP, NO_TURN_UNTIL, FIRST_STEP, REACH = range(9, 18)
 ELAPSED, ELAPSED_LOW, LEG_TIME, LAST_LEG, LEG_BEFORE, TURNS, PAUSES, MAY_REST = range(18, 26)
-LAST_WIDTH, WIDTH_BEFORE, UNRESOLVED, FROM_REST, ENDING, VALUE, STATUS, SIZE = range(26, 34)
+LAST_WIDTH, WIDTH_BEFORE, UNRESOLVED, FROM_REST, ENDING, PANEL_COUNT, VALUE, STATUS, SIZE = range(26, 35)
 
 
-def launched(given: Sequence[Sequence[float]] | Array) -> Array:
+def launched(given: Sequence[Sequence[float]] | Array, lines: int = 0) -> Array:
     """Bodies at their launch.
 
     Parameters
     ----------
     given : (n, PLACE) array or sequence of sequences
         LAM0 to V2 of each body.
+    lines : int
+        How many lines more there are.
 
     Returns
     -------
-    (n, SIZE) array
+    (n + lines, SIZE) array
     """
-    bodies = np.zeros((len(given), SIZE))
-    bodies[:, :PLACE] = given
+    bodies = np.zeros((len(given) + lines, SIZE))
+    bodies[: len(given), :PLACE] = given
     return bodies

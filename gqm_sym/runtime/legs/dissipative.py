@@ -23,9 +23,18 @@ from gqm_sym.runtime.launch.formulas import Formulas, ParameterValues
 from gqm_sym.runtime.launch.problem import Problem, bind_all
 from gqm_sym.runtime.launch.request import ONLY_SIGN, Launch
 from gqm_sym.runtime.launch.speed import path_and_force_at
-from gqm_sym.runtime.legs import answers
-from gqm_sym.runtime.legs.advance import AT_ONCE, BEYOND, CREEPING_SHARE, LEAVES, RESTS, Joints, room_ahead
-from gqm_sym.runtime.legs.answers import FIRST_LEG, LEAST_SWING, LEG, MAX_PAUSES, MAX_TURNS, NEARBY
+from gqm_sym.runtime.legs.advance import AT_ONCE, BEYOND, CREEPING_SHARE, LEAVES, RESTS
+from gqm_sym.runtime.legs.answers import (
+    FIRST_LEGS,
+    LEAST_SWING,
+    LEGS,
+    MAX_PAUSES,
+    MAX_TURNS,
+    NEARBY,
+    RUN_AGAIN,
+    Track,
+    drive_along,
+)
 from gqm_sym.runtime.legs.body import (
     DIRECTION,
     ELAPSED,
@@ -36,6 +45,7 @@ from gqm_sym.runtime.legs.body import (
     LAPS,
     LOW,
     MAY_REST,
+    PANEL_COUNT,
     PAUSES,
     PERIOD,
     PLACE,
@@ -53,23 +63,21 @@ from gqm_sym.runtime.legs.frames.local_frame import SMALL_SHARE, Frame, frame_ne
 from gqm_sym.runtime.legs.leg_errors import Errors, carry, rounding_share
 from gqm_sym.runtime.legs.leg_reading import place_at
 from gqm_sym.runtime.legs.leg_record import (
-    AHEAD,
-    BACK,
     BEGIN,
     BEGIN_LOW,
     CHANGE_COUNT,
     COLUMNS,
     END,
     END_LOW,
-    HEAD,
     HEADING,
     INHERITED,
+    LAPS_BEFORE,
     MIDDLE,
     START,
     TIME_FROM_END,
     TIME_FROM_START,
 )
-from gqm_sym.runtime.legs.leg_run import ASYMPTOTE, FULL, LIFTOFF, LIMIT, NARROWED, PAUSED, SPENT, TURN
+from gqm_sym.runtime.legs.leg_run import ASYMPTOTE, FULL, LIFTOFF, LIMIT, NARROWED, PAUSED, SLOWED, SPENT, TURN
 from gqm_sym.runtime.legs.leg_segments import Run, TabulatedPiece, along_field, along_panels, leg_record, tabulated
 from gqm_sym.runtime.legs.variations.answers import Switch, gradient, nearest_switch, places_at, states_at
 from gqm_sym.runtime.legs.variations.changes import Changes
@@ -117,8 +125,8 @@ NEAR_EQUILIBRIUM = 1e-13
 # body is no product of a factor and V**2: it is a difference of forces there that agree to a rounding.
 NEAREST_SHARE = 1e-20
 
-# What compiled code reads of a curve that is smooth everywhere.
-SMOOTH = Joints(NOWHERE, NOWHERE, NOWHERE, NOWHERE)
+# What ends a leg along a chart that may have been passed by what is kept of the curve (`answers.follow_leg`).
+PASSED = TURN, RESTS, LIMIT
 
 # The names of what ends a run, where the code alone says it.
 END_NAMES = {
@@ -166,6 +174,16 @@ def _loss(problem: Problem) -> Dissipation:
     return loss
 
 
+def _track(problem: Problem) -> Track:
+    """The curve of a motion, with all places where it, or its chart, is not smooth."""
+    f = problem.functions
+    return Track(f.chart, f.joints, f.corners, f.drops(ONLY_SIGN[problem.launch.contact])) if f.chart.size else SMOOTH
+
+
+# Curves with formulas are smooth, and so is any curve next to an equilibrium (`Frame`).
+SMOOTH = Track(NOWHERE, NOWHERE, NOWHERE, NOWHERE)
+
+
 class Reading(NamedTuple):
     """What compiled code reads of a motion.
 
@@ -194,14 +212,14 @@ class DissipativeMotion(Motion):
     _last_swing = 0.0
     # By what share the force next to the unstable equilibrium of a frame may be wrong.
     _force_error = 0.0
+    # What its distance from there may be wrong by at launch.
+    _launch_error: float | None = None
     _arc = 0.0
     _whole: Trajectory | None = None
     _known_changes: Changes | None = None
     _reading = Reading(np.empty(0), -1.0)
     # What is read of the first piece that one time was asked of, and when that begins.
     _first_reading, _first_since = Reading(np.empty(0), -1.0), 0.0
-    # How many panels there are, with one more for each run.
-    _stored = 0
     # How many runs `_look_ahead` computes of a motion that it finds no end of; 0 while that is not known.
     _beginning = 0
 
@@ -214,15 +232,17 @@ class DissipativeMotion(Motion):
         self._tabulated: list[TabulatedPiece] = []
         launch, domain = problem.launch, problem.domain
         super().__init__(problem, "dissipative", launch.direction)
-        self._joints = self._all_joints()
-        self._space = FEW_PANELS + problem.functions.breaks.size
+        self._dissipation, self._track = _loss(problem), _track(problem)
+        # If legs are passed by what is kept of the curve, and may have to be followed again.
+        self._passes = passes = self._track.is_kept(self._dissipation)
+        self._space = FEW_PANELS + (0 if passes else self._track.breaks.size)
         ends, asked = domain.numbers[:3], (ONLY_SIGN[launch.contact], self._horizon, nan)
-        self._body = launched([(launch.lam0.value, *ends, launch.direction, *asked, problem.w0)])
+        given = (launch.lam0.value, *ends, launch.direction, *asked, problem.w0)
+        self._body = launched((given,), LEGS_PER_CALL if passes else 0)
         self._at: list[float] = []
         self._frame: Frame | None = None
-        # The errors with which the legs begin.
-        v0 = launch.v0
-        self._errors = [Errors(abs(launch.lam0.low), 2.0 * v0.value * abs(v0.low) + ULP * problem.w0, 0.0)]
+        # The errors with which the legs begin, once they are asked for.
+        self._errors: list[Errors] = []
         self._go_on()
         self.direction = int(self._runs[0].record[HEADING]) if self._runs else 0
 
@@ -239,7 +259,8 @@ class DissipativeMotion(Motion):
     @locked
     def turning_points(self) -> tuple[float, ...]:
         """The turning points on `legs` in the order of time; the place of a launch from rest is one."""
-        turns = [leg.lam_end for leg in self.legs if leg.end == "turn"]
+        self._look_ahead()
+        turns = [leg.lam_end for leg in self._up_to_horizon(self._runs_as_legs()) if leg.end == "turn"]
         return (*((self.problem.lam0,) if self.problem.w0 == 0.0 else ()), *turns)
 
     @property
@@ -247,20 +268,29 @@ class DissipativeMotion(Motion):
     def legs(self) -> tuple[Leg, ...]:
         """The legs of the motion in the order of time; see `Motion.legs`."""
         self._look_ahead()
-        everything = [*self._laid, *self._runs]
-        runs = everything[: self._beginning or None]
         cuts_at_changes = "contact-sign" not in self._internal_ends
-        if self._joints.corners.size or (cuts_at_changes and any(run.record[CHANGE_COUNT] for run in runs)):
+        shown = self._all_runs[: self._beginning or None]
+        if self._track.corners.size or (cuts_at_changes and any(run.record[CHANGE_COUNT] for run in shown)):
             return super().legs
-        begins = [*(float(run.record[BEGIN]) for run in everything), self._elapsed]
-        lap, stops = self.problem.period, begins[1 : len(runs) + 1]
-        legs = [run.leg(lap, stop) for run, stop in zip(runs, stops, strict=True)]
-        return Rows(self._up_to_horizon(merged(legs, self._internal_ends)))
+        return Rows(self._up_to_horizon(merged(self._runs_as_legs(), self._internal_ends)))
+
+    @property
+    def _all_runs(self) -> list[Run]:
+        """The runs so far."""
+        return [*self._laid, *self._runs]
+
+    def _runs_as_legs(self) -> list[Leg]:
+        """The runs that `legs` tells of, which changes of contact sign and corners do not cut."""
+        everything, lap = self._all_runs, self.problem.period
+        stops = [*(float(run.record[BEGIN]) for run in everything[1:]), self._elapsed]
+        shown = everything[: self._beginning or None]
+        return [run.leg(lap, stop) for run, stop in zip(shown, stops, strict=False)]
 
     def _place_on_last_leg(self, t: float) -> float:
-        run = next(run for run in reversed([*self._laid, *self._runs]) if run.record[BEGIN] <= t)
-        place = place_at(run.record, (t - run.record[BEGIN]) - run.record[BEGIN_LOW])
-        return float(self.lam(t)) if isnan(place) else place + run.laps * self.problem.period
+        run = next(run for run in reversed(self._all_runs) if run.record[BEGIN] <= t)
+        record = run.record if run.passed is None else run.passed
+        place = place_at(record, (t - record[BEGIN]) - record[BEGIN_LOW])
+        return float(self.lam(t)) if isnan(place) else place + float(record[LAPS_BEFORE]) * self.problem.period
 
     def lam(self, t: Any) -> Any:
         """The curve parameter at times; see `Motion.lam`. For doubles this is one call of compiled code."""
@@ -412,14 +442,15 @@ class DissipativeMotion(Motion):
         """The turn at which the motion is nearest to another number of legs; see `Motion.nearest_switch`."""
         turns = [leg for leg in self.legs if leg.end in ("turn", "rest")]
         functions = self.problem.functions
-        return nearest_switch(_loss(self.problem).static_balance, functions.p, turns, self.problem.period)
+        return nearest_switch(self._dissipation.static_balance, functions.p, turns, self.problem.period)
 
     @property
     def _changes(self) -> Changes:
         """How the legs so far change."""
-        pieces = self._pieces
-        if self._known_changes is None or len(self._known_changes.runs) < pieces[-1].leg + 1:
-            self._known_changes = Changes(self.problem, self._laid)
+        self._follow_again()
+        runs = self._all_runs
+        if self._known_changes is None or self._known_changes.followed < len(runs):
+            self._known_changes = Changes(self.problem, runs)
         return self._known_changes
 
     def fill_launch_leg(self, places: Array, v2: Array) -> None:
@@ -459,7 +490,7 @@ class DissipativeMotion(Motion):
 
     @property
     def _internal_ends(self) -> tuple[str, ...]:
-        return ("",) if _loss(self.problem).friction else ("", "contact-sign")
+        return ("",) if self._dissipation.friction else ("", "contact-sign")
 
     def _follow(self, reach: float) -> None:
         """Compute legs up to a time in s, and up to the horizon if there is one."""
@@ -504,6 +535,8 @@ class DissipativeMotion(Motion):
         return np.zeros_like(t)
 
     def _errors_before(self, timed: TimedSegment, phi: Array) -> tuple[float, Array]:
+        if not self._errors:
+            self._errors = [self._errors_at_launch()]
         while len(self._errors) <= timed.leg + 1:
             self._errors.append(self._carried(len(self._errors) - 1))
         run, (before, after) = self._laid[timed.leg], self._errors[timed.leg : timed.leg + 2]
@@ -521,6 +554,11 @@ class DissipativeMotion(Motion):
             return before.place + of_frame + swing, before.time + inherited + self._time_error_of_force(run)
         return after.place + of_frame + swing, after.time + after.place * inherited
 
+    def _errors_at_launch(self) -> Errors:
+        lam0, v0 = self.problem.launch[:2]
+        place = abs(lam0.low) if self._launch_error is None else self._launch_error
+        return Errors(place, 2.0 * v0.value * abs(v0.low) + ULP * self.problem.w0, 0.0)
+
     def _time_error_of_force(self, run: Run) -> float:
         """What the error of the force makes of the time in which a body departs from an equilibrium."""
         departs = run.frame is not None and not run.frame.is_stable
@@ -530,9 +568,9 @@ class DissipativeMotion(Motion):
         """The errors at the end of a leg, given those with which it begins; in a frame, errors of distances."""
         run, before = self._laid[leg], self._errors[leg]
         frame, turns = run.frame, run.what in (TURN, RESTS)
-        share, terms = rounding_share(_loss(self.problem).linear), self._terms_of(leg)
+        share, terms = rounding_share(self._dissipation.linear), self._terms_of(leg)
         if frame is None:
-            loss, p = _loss(self.problem), self.problem.functions.p
+            loss, p = self._dissipation, self.problem.functions.p
             return _known(carry(loss, p, turns, before, share, terms, run.record))
         if leg == 0 or self._laid[leg - 1].frame is None:
             before = before._replace(place=before.place + frame.error)
@@ -553,7 +591,7 @@ class DissipativeMotion(Motion):
                 with suppress(SolutionError):  # formulas may be too long
                     errors = Law(self.problem).force_errors_along([missing[k] for k in by_place])
                     for k, of_panels in zip(by_place, errors, strict=True):
-                        terms[k] = of_panels / rounding_share(_loss(self.problem).linear)
+                        terms[k] = of_panels / rounding_share(self._dissipation.linear)
             self._terms += terms
         return self._terms[leg]
 
@@ -597,35 +635,46 @@ class DissipativeMotion(Motion):
     @property
     def _pieces(self) -> list[TimedSegment]:
         """All segments so far."""
+        self._follow_again()
         for run in self._runs:
             self._lay(run)
         self._runs.clear()
         return self._segments
 
+    def _follow_again(self) -> None:
+        """Follow runs once more whose panels are not known, each in as many parts as that takes."""
+        runs: list[Run] = []
+        for run in self._runs:
+            parts = self._with_panels(run)
+            if len(self._laid) + len(runs) < self._beginning:
+                self._beginning += len(parts) - 1
+            runs += parts
+        self._runs = runs
+
     def _go_on(self) -> None:
         """Follow the body to its next turn, to the end of the motion, or as far as one run goes."""
-        if self._stored >= MAX_STORED:
+        if self._at and self._at[PANEL_COUNT] >= MAX_STORED:
             raise BudgetError(
-                f"motion: {self._stored} pieces of legs reach t = {self._elapsed!r} only; "
+                f"motion: {self._at[PANEL_COUNT]:.0f} pieces of legs reach t = {self._elapsed!r} only; "
                 "give a shorter t_max, or ask for earlier times and nearer places"
             )
         what, records = self._followed()
         frame, at = self._frame, self._body[0].tolist()
+        before = self._body[1 : 1 + len(records)].copy() if self._passes and frame is None else [None] * len(records)
         if not at[DIRECTION] and not at[TURNS]:
             return  # the body stays where it is
         self._at, record = at, records[-1]
-        for head in records[:, :HEAD].tolist():
-            self._stored += 1 + int(head[AHEAD] + head[BACK])
         if len(records) > 1:
-            self._runs += [Run(before, TURN, END_NAMES[TURN], None) for before in records[:-1]]
+            earlier = zip(records[:-1], before[:-1], strict=True)
+            self._runs += [Run(leg, TURN, END_NAMES[TURN], None, line) for leg, line in earlier]
         if what == TURN and frame is None and not at[STATUS]:
-            self._runs.append(Run(record, TURN, END_NAMES[TURN], None))
+            self._runs.append(Run(record, TURN, END_NAMES[TURN], None, before[-1]))
         else:
-            self._end_run(what, record)
-        if not self._beginning and not self._ending and self._horizon == inf and self._goes_on_for_ever:
+            self._end_run(what, record, before[-1])
+        if self._horizon == inf and not self._beginning and not self._ending and self._goes_on_for_ever:
             self._beginning = len(self._laid) + len(self._runs)
 
-    def _end_run(self, what: int, record: Array) -> None:
+    def _end_run(self, what: int, record: Array, before: Array | None) -> None:
         """Note a run that another follows in another way, or none."""
         problem, frame = self.problem, self._frame
         if frame is not None:
@@ -640,7 +689,7 @@ class DissipativeMotion(Motion):
         if what == SPENT:
             raise self._lost(record)
         name = "" if leaves_frame else self._end_name(what, record, heading)
-        self._runs.append(Run(record, what, name, frame))
+        self._runs.append(Run(record, what, name, frame, before if what in PASSED else None))
         if self._at[ENDING]:
             self._ending = name
         if what == BEYOND:
@@ -651,24 +700,50 @@ class DissipativeMotion(Motion):
 
     def _followed(self) -> tuple[int, Array]:
         """What ended the last of the next legs (`advance`), and the records of all of them; one if the body stays."""
-        legs, question = (LEGS_PER_CALL if self._horizon < inf else 1, LEG) if self._at else (1, FIRST_LEG)
+        legs, question = (LEGS_PER_CALL if self._horizon < inf else 1, LEGS) if self._at else (1, FIRST_LEGS)
         while True:
-            frame = self._frame
-            loss, parameters = (_loss(self.problem), self.problem.functions.p) if frame is None else frame[:2]
-            records = np.empty((legs if frame is None else 1, self._space * COLUMNS))
-            what = answers.drive(loss, parameters.reshape(1, -1), self._joints, question, self._body, records)
+            records = np.empty((legs if self._frame is None else 1, self._space * COLUMNS))
+            what = self._drive(question, self._body, records)
             count = int(self._body[0, VALUE])
             if what == NEARBY:
                 self._launch_nearby()
-                question = LEG
+                question = LEGS
             elif what != FULL or count:
                 return (what if what != FULL else TURN), records[: max(count, 1)]
             else:
                 legs, self._space = 1, 4 * self._space
 
+    def _drive(self, question: int, bodies: Array, records: Array) -> int:
+        """Drive the body along the curve, or by its distance from an equilibrium (`answers.drive`)."""
+        frame = self._frame
+        if frame is not None:
+            return drive_along(SMOOTH, frame.dissipation, frame.p.reshape(1, -1), question, bodies, records)
+        p = self.problem.functions.p.reshape(1, -1)
+        return drive_along(self._track, self._dissipation, p, question, bodies, records)
+
+    def _with_panels(self, run: Run) -> list[Run]:
+        """A run in parts with panels; the run alone if these are known."""
+        if run.before is None:
+            return [run]
+        parts: list[Array] = []
+        space, body = FEW_PANELS + self._track.breaks.size, run.before.reshape(1, -1).copy()
+        p = self.problem.functions.p.reshape(1, -1)
+        for _ in range(MAX_PAUSES):
+            record = np.empty((1, space * COLUMNS))
+            what = drive_along(self._track, self._dissipation, p, RUN_AGAIN, body, record)
+            if what in PASSED:
+                return run.with_panels([*parts, record[0]], self._horizon)
+            if what == FULL:
+                space *= 4
+            elif what in (PAUSED, SLOWED):
+                parts.append(record[0])
+            else:
+                break
+        raise self._lost(record[0])
+
     def _settle(self, what: int, start: float, end: float) -> None:
         """Look whether a run has come so close to an equilibrium that the motion ends there, or goes on in a frame."""
-        in_frame, linear = self._frame is not None, _loss(self.problem).linear
+        in_frame, linear = self._frame is not None, self._dissipation.linear
         if what in (TURN, PAUSED) and self._has_died_away(start, end):
             self._ending = "asymptote"
         elif what == ASYMPTOTE and not linear:
@@ -709,15 +784,15 @@ class DissipativeMotion(Motion):
             self._body[0, PLACE_LOW] = 0.0
         else:  # it is launched there again, by its distance
             self._body[0, STEP] = 0.0
-            self._errors[0] = self._errors[0]._replace(place=ULP * abs(self._body[0, PLACE]))
+            self._launch_error = ULP * abs(float(self._body[0, PLACE]))
 
     def _enter_frame(self, lam0: Number | None = None) -> None:
         """Follow the body from here on by its distance from an equilibrium, if it is, and for a while stays, close.
 
         About an unstable equilibrium it does not stay, so that only its launch, ``lam0``, is worth that.
         """
-        problem, line, loss = self.problem, self._body[0], _loss(self.problem)
-        if not (lam0 or is_small(loss, problem.functions.p, problem.functions.breaks, line)):
+        problem, line, loss = self.problem, self._body[0], self._dissipation
+        if not is_small(loss, problem.functions.p, problem.functions.breaks, line):
             return
         place, low, v2 = line[[PLACE, PLACE_LOW, V2]].tolist()
         ends = np.abs(np.append(problem.functions.breaks, (problem.low, problem.high)) - place)
@@ -736,14 +811,14 @@ class DissipativeMotion(Motion):
             line[PLACE] = 0.0  # there it stays
         self._check_distance(frame.size(line[PLACE], v2), frame)
         reach = reach if frame.is_stable else min(reach, frame.reach)
-        self._frame, self._joints = frame, SMOOTH
+        self._frame = frame
         line[LAM0], line[LOW], line[HIGH], line[PERIOD] = line[PLACE], -reach, reach, 0.0
         line[FIRST_STEP] = reach
 
     def _check_distance(self, size: float, frame: Frame) -> None:
         """Refuse a launch so near to an unstable equilibrium that doubles do not hold what makes the body depart."""
         place = float(frame.p[PLACE_IN_FRAME])
-        nearest = LEAST_SWING if _loss(self.problem).linear else NEAREST_SHARE * abs(place)
+        nearest = LEAST_SWING if self._dissipation.linear else NEAREST_SHARE * abs(place)
         if not frame.is_stable and 0.0 < size < nearest:
             raise LaunchError(
                 f"lam0: a motion from so near to the unstable equilibrium at {self.problem.formulas.parameter} = "
@@ -751,18 +826,10 @@ class DissipativeMotion(Motion):
                 "the equilibrium itself"
             )
 
-    def _all_joints(self) -> Joints:
-        """Where the curve is not smooth."""
-        f = self.problem.functions
-        if not f.breaks.size:
-            return SMOOTH
-        drops = f.drops(ONLY_SIGN[self.problem.launch.contact])
-        return Joints(f.breaks, f.corners, drops, np.empty(room_ahead(f.breaks.size)))
-
     def _leave_frame(self, record: Array) -> None:
         """Follow the body by its place again; the record has places."""
         problem, line = self.problem, self._body[0]
-        self._frame, self._joints = None, self._all_joints()
+        self._frame = None
         domain, step = problem.domain, starting_step(problem)
         line[PLACE], line[PLACE_LOW], line[ENDING] = record[END], record[END_LOW], 0.0
         line[LAM0], line[LOW], line[HIGH], line[PERIOD] = problem.lam0, domain.low, domain.high, domain.period

@@ -7,7 +7,9 @@ run. From b to the middle it is the same with the direction reversed. What round
 last place of all that its terms gained and lost, less what resistance has taken of that; this also changes the time.
 What drives the body and what resists it may all but cancel: the sum of their sizes is the larger one of the forces on
 bodies that move in either direction. Terms of the force on a body at rest may cancel too: how large they are follows
-from a running bound on the roundings of the module's formulas (`variations.equation.Law.force_errors`).
+from a running bound on the roundings of the module's formulas (`variations.equation.Law.force_errors`). A law that is
+not linear in V**2 has a root at the turn, of which panels that run into it may have nine digits; those that are
+followed back from it have all. By how much they disagree in the middle is by how much the turn is off.
 """
 
 from math import fabs, inf
@@ -126,6 +128,8 @@ class Half(NamedTuple):
         The time rate per distance in the middle; 0 if there are no panels.
     least, most : float
         The smallest and the largest rate at which V**2 grows with the curve's parameter.
+    v2 : float
+        V**2 in the middle.
     """
 
     by_place: float
@@ -137,6 +141,7 @@ class Half(NamedTuple):
     rate: float
     least: float
     most: float
+    v2: float
 
 
 @Inner
@@ -181,7 +186,7 @@ def half_of_leg(forces, march, panels, v2, errors, terms, record):  # type: igno
         panel = Panel(left, v2, contact_sign, (-inf, inf))
         begin_panel(forces, march, panel, right - left, work)
         if not solve_panel(forces, march, panel, work) < inf:
-            return Half(inf, inf, 1.0, inf, inf, slope, rate, -inf, inf)
+            return Half(inf, inf, 1.0, inf, inf, slope, rate, -inf, inf, v2)
         size = size_of_terms(forces, panel, terms[(at - HEAD) // COLUMNS], work)
         fill_rates(march, panel, work)
         if k == 0:
@@ -213,7 +218,7 @@ def half_of_leg(forces, march, panels, v2, errors, terms, record):  # type: igno
         last = right - 0.5 * (right - left) * (1.0 - SHARES[COUNT - 1])
         rate = work[TIME_RATE + COUNT - 1] / slope_at(last, march)
         left, v2 = right, max(work[W + COUNT], 0.0)
-    return Half(by_place, by_v2, damping, gained, rounded, slope, rate, least, most)
+    return Half(by_place, by_v2, damping, gained, rounded, slope, rate, least, most, v2)
 
 
 def rounding_share(linear: bool) -> float:
@@ -274,7 +279,7 @@ def carry(dissipation, p, turns, before, share, terms, record):  # type: ignore[
     backward = March((record[END], record[END_LOW]), -v, 1.0, 0.0)
     second = half_of_leg(forces, backward, (HEAD + ahead * COLUMNS, back), 0.0, (1.0, 0.0, 0.0), terms, record)
     damping = first.damping / second.damping
-    gained = (first.gained + second.gained) / second.damping
+    off = (share * (first.gained + second.gained) + fabs(first.v2 - second.v2)) / second.damping
     start_slope, rate = first.slope, first.rate
     if ahead == 0:
         start_slope, rate = slope_of_v2(forces, record[START], record[START_V2], 0, point_buffer()), second.rate
@@ -284,7 +289,7 @@ def carry(dissipation, p, turns, before, share, terms, record):  # type: ignore[
     varied = max(first.most, second.most) - min(first.least, second.least)
     rounding *= max(ULP, min(1.0, varied / fabs(second.slope)))
     width = fabs((record[END] - record[START]) + (record[END_LOW] - record[START_LOW]))
-    of_end = share * gained / second.slope + (rounding + PLACE_ROUNDINGS * ULP * width)
+    of_end = off / second.slope + (rounding + PLACE_ROUNDINGS * ULP * width)
     place = fabs(by_place) * before.place + fabs(by_v2) * before.v2 + of_end
     moved = fabs(first.by_place - rate + by_place * at_end) * before.place
     moved += fabs(first.by_v2 + by_v2 * at_end) * before.v2 + fabs(at_end) * of_end

@@ -93,13 +93,15 @@ def time_to(record, begin, count, w):  # type: ignore[no-untyped-def]
 
 @Inner
 def marched_in(record, begin, count, time):  # type: ignore[no-untyped-def]
-    """The march variable at a time from where ``count`` panels begin: the inverse of `time_to`."""
+    """The march variable at a time from where ``count`` panels begin: the inverse of `time_to`; NaN without rates."""
     terms, k = terms_buffer(), 0
     while k < count - 1 and record[begin + k * COLUMNS + TIME] <= time:
         time -= record[begin + k * COLUMNS + TIME]
         k += 1
     at = begin + k * COLUMNS
     half = 0.5 * (record[at + RIGHT] - edge(record, begin, k))
+    if record[at + TIME_ERROR] < 0.0:
+        return np.nan
     to_integral(record, at, terms, 0)
     to_plain(record, at, terms, WIDE)
     lo, hi, share = -1.0, 1.0, time / record[at + TIME]
@@ -146,6 +148,8 @@ def place_at(record, time):  # type: ignore[no-untyped-def]
     """The place within the lap at a time in s from a leg's start; NaN if the record does not say."""
     record, ahead, back = uncounted(record), int(record[AHEAD]), int(record[BACK])
     march, v = march_of(record), record[HEADING]
+    if record[WHOLE] > 0.0:
+        return np.nan
     if time <= record[TIME_FROM_START] and ahead > 0:
         return record[START] + (record[START_LOW] + v * distance(marched_in(record, HEAD, ahead, time), march))
     remaining = (record[TIME_FROM_START] - time) + record[TIME_FROM_END]

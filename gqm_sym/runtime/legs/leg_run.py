@@ -8,6 +8,7 @@ from math import fabs, inf, sqrt
 from typing import NamedTuple
 
 from gqm_sym.runtime.arithmetic.clenshaw import chebyshev_sum
+from gqm_sym.runtime.arithmetic.doubledouble import two_sum
 from gqm_sym.runtime.compiled.calls import call_speed_equation
 from gqm_sym.runtime.compiled.jit import Inner
 from gqm_sym.runtime.compiled.registers import on_stack
@@ -199,7 +200,7 @@ class Route(NamedTuple):
         The only sign that N can have; 0 if it can have both.
     reading : Reading
     until, target : float
-        The time from the leg's start up to which peaks are looked for, and the place whose passage is.
+        The time from the leg's start up to which it is read, and the place whose passage is looked for.
     gaps : array
         What is kept of the curve between its breaks (`leg_panels`); empty if that is not used.
     first_break : int
@@ -630,7 +631,7 @@ def is_read_inside(route, places, times):  # type: ignore[no-untyped-def]
     if route.reading.what == PASSAGE:
         return min(places) <= route.target <= max(places)
     near = ROUNDINGS_OF_TIMES * times[1]
-    return route.reading.what == PEAKS and times[0] - near <= route.until <= times[1] + near
+    return times[0] - near <= route.until <= times[1] + near
 
 
 @Inner
@@ -638,10 +639,11 @@ def pass_gaps(forces, march, route, contact_sign, before, record, work):  # type
     """Go on from the break ahead, from one to the next, as far as V**2 is large and follows from what is kept."""
     (left, run_length, v2, largest_v2, ahead, count), v, spent = before, march.direction, 0.0
     breaks, gaps, upcoming, reads = route.breaks, route.gaps, ahead.upcoming, route.reading.what
-    for k in range(count if reads == PEAKS else 0):
+    to, total, total_low, may_join = HEAD + count * COLUMNS, 0.0, 0.0, False
+    for k in range(count):
         spent += record[HEAD + k * COLUMNS + TIME]
     while gaps.size > 0 and upcoming + 1 < breaks.size and v2 >= GAP_V2_RATIO * largest_v2:
-        start, stop, to = breaks[upcoming], breaks[upcoming + 1], HEAD + count * COLUMNS
+        start, stop = breaks[upcoming], breaks[upcoming + 1]
         # A break lies behind already where a panel is laid once more.
         is_ahead = offset(start, march.origin, v) == run_length
         if contact_sign in (0, -route.only_sign) or not (is_ahead and has_space(record, to, 0)):
@@ -660,20 +662,22 @@ def pass_gaps(forces, march, route, contact_sign, before, record, work):  # type
         if not time > 0.0 or is_read_inside(route, (start, stop), (spent, spent + time)):
             break
         largest_v2 = max(largest_v2 / (1.0 + gaps[at + END_EXPM1]), max(v2, top))
-        v2, upcoming, count, spent = end, upcoming + 1, count + 1, spent + time
+        v2, upcoming, spent = end, upcoming + 1, spent + time
         run_length = offset(stop, march.origin, v)
-        left = marched(run_length, march)
+        # Gaps of which nothing is read but the time are one entry.
+        to += COLUMNS if may_join and has_values else 0
+        total, rounding = two_sum(total if may_join and not has_values else 0.0, time)
+        total_low = rounding + (total_low if may_join and not has_values else 0.0)
         if has_values:
             load_per_mass_row(work, MEAN, N0, KAPPA, W)
             copy(record, to + Y_ROW, work, SPEED)
             copy(record, to + NORMAL_LOAD, work, MEAN)
-        record[to + RIGHT], record[to + TIME], record[to + TIME_ERROR] = (
-            left,
-            time,
-            NO_RATES if has_values else NO_VALUES,
-        )
+        record[to + RIGHT], record[to + TIME] = marched(run_length, march), total + total_low
+        record[to + TIME_ERROR], may_join = NO_RATES if has_values else NO_VALUES, not has_values
+        to += COLUMNS if has_values else 0
     if upcoming > ahead.upcoming:
-        ahead = Ahead(upcoming, ahead.span, inf, True)
+        left, ahead = marched(run_length, march), Ahead(upcoming, ahead.span, inf, True)
+        count = (to - HEAD) // COLUMNS + (1 if may_join else 0)
     return Passed(left, run_length, v2, largest_v2, ahead, count)
 
 

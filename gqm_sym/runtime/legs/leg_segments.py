@@ -21,9 +21,11 @@ from gqm_sym.runtime.legs.leg_record import (
     AHEAD,
     BACK,
     BEGIN,
+    BEGIN_LOW,
     CHANGE_COUNT,
     COLUMNS,
     END,
+    END_LOW,
     FIELD_COLUMNS,
     HALF_C,
     HEAD,
@@ -33,9 +35,11 @@ from gqm_sym.runtime.legs.leg_record import (
     START,
     TIME,
     TIME_ERROR,
+    TIME_FROM_END,
+    TIME_FROM_START,
     Y_ROW,
 )
-from gqm_sym.runtime.legs.leg_run import ASYMPTOTE
+from gqm_sym.runtime.legs.leg_run import ASYMPTOTE, PAUSED
 from gqm_sym.runtime.legs.polynomials import WIDE
 from gqm_sym.runtime.motion.events import Leg
 from gqm_sym.runtime.motion.segment import MAX_END_ROUNDINGS, MAX_SLOPES, Segment
@@ -96,12 +100,32 @@ class Run(NamedTuple):
         The name of its end, as of `Leg.end`.
     frame : Frame or None
         The surroundings of an equilibrium by which it was followed.
+    before : array or None
+        The line of the body before it (`legs.body`), if the record says no more of its panels than their times.
+    passed : array or None
+        That record, if its panels have been followed since, and the motion may end on it: it says where.
     """
 
     record: Array
     what: int
     end: str
     frame: Frame | None
+    before: Array | None = None
+    passed: Array | None = None
+
+    def with_panels(self, records: list[Array], until: float) -> "list[Run]":
+        """The run in parts with panels, the last of which ends where and when this one does, but for rounding.
+
+        ``until`` is the last time of the motion.
+        """
+        own, last = self.record, records[-1]
+        begin, times = own[BEGIN], own[TIME_FROM_START] + own[TIME_FROM_END]
+        passed = own if begin <= until <= begin + 2.0 * times else None
+        clock = [BEGIN, BEGIN_LOW, TIME_FROM_START, TIME_FROM_END]
+        last[TIME_FROM_END if last[BACK] else TIME_FROM_START] += sum((own[clock] - last[clock]).tolist())
+        last[[END, END_LOW]] = own[[END, END_LOW]]
+        earlier = [Run(record, PAUSED, "", None, None, passed) for record in records[:-1]]
+        return [*earlier, self._replace(record=last, before=None, passed=passed)]
 
     @property
     def laps(self) -> int:

@@ -62,7 +62,6 @@ from gqm_sym.runtime.legs.leg_record import (
     NORMAL_LOAD,
     PANELS,
     PASSAGE,
-    PEAKS,
     RIGHT,
     TIME,
     TIME_ERROR,
@@ -303,7 +302,7 @@ def is_read(route, origin, v, h, time):  # type: ignore[no-untyped-def]
     reads = route.reading.what
     if reads == PASSAGE:
         return 0.0 <= offset(route.target, origin, v) <= h * (1.0 + CLEARANCE_SHARE)
-    return reads == PANELS or (reads == PEAKS and time > route.until)
+    return reads == PANELS or time > route.until
 
 
 @Inner

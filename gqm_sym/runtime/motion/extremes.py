@@ -144,7 +144,7 @@ def extreme(motion: Any, quantity: Quantity, sign: int) -> Extreme:
         size, peaks = _on_segment(timed, trajectory, quantity, sign, end)
         for value, t, lam in peaks:
             if best is None or sign * (value - best.value) > EQUAL_ROUNDINGS * ULP * size:
-                best = Extreme(value, t, lam)
+                best = Extreme(value, min(t, end), lam)  # the time of the end itself may be rounded up
     assert best is not None
     if best.t == 0.0:  # as it was given, without rounding
         launch = motion.problem.launch
@@ -166,7 +166,7 @@ def course(motion: Any) -> tuple[Trajectory, float]:
             "this motion goes on for ever and does not repeat; launch it with a horizon, t_max, for its extremes"
         )
     end = min(motion.t_end, motion.period) if repeats else motion.t_end
-    return motion._trajectory(0.0 if repeats else end), end
+    return motion._course if repeats else motion._trajectory(end), end
 
 
 def _on_segment(

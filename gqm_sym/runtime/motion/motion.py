@@ -35,6 +35,7 @@ from gqm_sym.runtime.motion.events import (
 )
 from gqm_sym.runtime.motion.extremes import CONTACT_FORCE, SPEED, Extreme, extreme
 from gqm_sym.runtime.motion.locking import Lock, locked
+from gqm_sym.runtime.motion.riding.cars import Cars, cars
 from gqm_sym.runtime.motion.riding.exceedance import Exceedance, exceedance
 from gqm_sym.runtime.motion.riding.loads import felt, load_extreme
 from gqm_sym.runtime.motion.rolling import slip_times
@@ -81,6 +82,11 @@ class Motion(ABC):
     @abstractmethod
     def _trajectory(self, end_time: float) -> Trajectory:
         """The trajectory, computed for times up to ``end_time`` from launch at least."""
+
+    @property
+    def _course(self) -> Trajectory:
+        """The trajectory that legs, events and passages are read off: of a motion that repeats, one period."""
+        return self._trajectory(0.0)
 
     @abstractmethod
     def _time_error(self, t: Array) -> Array:
@@ -605,6 +611,27 @@ class Motion(ABC):
         """
         return exceedance(self, load, levels, side, limits)
 
+    @locked
+    def cars(self, t: Any) -> Cars:
+        """Where the cars of a train are, and the contact and coupling forces of each.
+
+        Parameters
+        ----------
+        t : number or array_like
+            Times in s from launch, as for `lam`.
+
+        Returns
+        -------
+        Cars
+            Arrays whose first axis is the cars, or the couplings between them.
+
+        Raises
+        ------
+        InputError
+            If the body is no train, or a time is none.
+        """
+        return cars(self, t)
+
     # -- history ------------------------------------------------------------------------------
 
     @property
@@ -618,18 +645,18 @@ class Motion(ABC):
             Of a motion that goes on for ever, those of its beginning; ``t_max`` says how far to go.
         """
         legs = []
-        time_scale_error, lap = self._trajectory(0.0).time_scale_error, self._trajectory(0.0).lap
+        course = self._course
         for timed in self._history():
-            corners = corner_crossings(timed, timed.segment.functions.corners, time_scale_error)
+            corners = corner_crossings(timed, timed.segment.functions.corners, course.time_scale_error)
             last = "corner" if corners and corners[-1][1] == timed.phi_stop else timed.end
             corners = corners[:-1] if last != timed.end else corners
             marks = [(timed.t_start, timed.phi_start), *corners, (timed.t_stop, timed.phi_stop)]
-            lam = self._places_at(timed, marks) + timed.laps * lap
+            lam = self._places_at(timed, marks) + timed.laps * course.lap
             for k, ((start, _), (stop, _)) in enumerate(pairwise(marks)):
                 end = last if k == len(marks) - 2 else "corner"
                 legs.append(Leg(float(lam[k]), float(lam[k + 1]), start[0], stop[0], timed.direction, end))
             if timed.end == "asymptote":
-                legs[-1] = replace(legs[-1], lam_end=timed.segment.b + timed.laps * lap, t_end=inf)
+                legs[-1] = replace(legs[-1], lam_end=timed.segment.b + timed.laps * course.lap, t_end=inf)
         return Rows(self._up_to_horizon(merged(legs, self._internal_ends)))
 
     def _places_at(self, timed: TimedSegment, marks: Sequence[tuple[Pair, float]]) -> Array:
@@ -654,7 +681,7 @@ class Motion(ABC):
     def _events_along(self, segments: Sequence[TimedSegment], until: float = inf) -> list[Event]:
         """The events on timed segments from launch, and the horizon if it is not later than a time in s."""
         found: list[Event] = []
-        time_scale_error = self._trajectory(0.0).time_scale_error
+        time_scale_error = self._course.time_scale_error
         for timed in segments:
             found_here = [("contact-sign", *m) for m in self._contact_changes(timed)]
             found_here += [
@@ -783,23 +810,23 @@ class Motion(ABC):
 
     def _history(self) -> tuple[TimedSegment, ...]:
         """The timed segments that `legs` and `events` list."""
-        return self._trajectory(0.0).segments
+        return self._course.segments
 
     def _contact_changes(self, timed: TimedSegment) -> list[tuple[Pair, float]]:
         """The times at which N changes sign on a timed segment, each with its phase angle."""
-        return crossings(timed, contact_changes(timed), self._trajectory(0.0).time_scale_error)
+        return crossings(timed, contact_changes(timed), self._course.time_scale_error)
 
     def _asymptote(self, timed: TimedSegment) -> Event:
         """The approach to an equilibrium, which the body reaches after infinite time."""
         f, lam = self.problem.functions, timed.segment.b
         x, z = path_and_force_at(f.addresses, f.p, np.array([lam]), np.zeros(1))[:2, 0]
-        return Event("asymptote", inf, lam + timed.laps * self._trajectory(0.0).lap, float(x), float(z))
+        return Event("asymptote", inf, lam + timed.laps * self._course.lap, float(x), float(z))
 
     def _event(self, kind: str, when: Pair, timed: TimedSegment, phi: float) -> Event:
         f = self.problem.functions
         lam = self._places_at(timed, [(when, phi)])
         x, z = path_and_force_at(f.addresses, f.p, lam, np.zeros(1))[:2, 0]
-        return Event(kind, when[0], float(lam[0]) + timed.laps * self._trajectory(0.0).lap, float(x), float(z))
+        return Event(kind, when[0], float(lam[0]) + timed.laps * self._course.lap, float(x), float(z))
 
     def _times(self, t: Any) -> tuple[Array, Array, tuple[int, ...]]:
         times, low, shape = read_numbers(t, where="t", unit="s")
@@ -840,7 +867,7 @@ class Motion(ABC):
 
     def _first_passages(self, lam: float, low: float) -> list[float]:
         """Times at which the body passes a place, the first time on each segment."""
-        trajectory = self._trajectory(0.0)
+        trajectory = self._course
         return passages(trajectory.segments, trajectory, lam, low)
 
 

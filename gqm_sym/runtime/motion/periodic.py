@@ -1,5 +1,6 @@
 """Motions that repeat: libration between two turning points, and circulation round a closed curve."""
 
+from dataclasses import dataclass
 from functools import cached_property
 from math import inf
 from typing import Any
@@ -43,6 +44,9 @@ CHART_ROUNDING = 16 * ULP
 # The least distance between two edges of a chart, as a share of the phase; at a smaller one they are the same edge.
 MIN_PANEL = 1e-13
 
+# The latest time that doubles answer where double-double arithmetic does not suffice, in periods from launch.
+EARLY = 0.999
+
 # The most events that `events_between` lists.
 MAX_EVENTS = 1_000_000
 
@@ -50,11 +54,34 @@ MAX_EVENTS = 1_000_000
 MAX_CHART_PIECES = 250
 
 
+@dataclass(slots=True)
+class _Times:
+    """The times of a motion to some accuracy, with the trajectory that has them.
+
+    Attributes
+    ----------
+    timing : Timing
+        The times.
+    trajectory : Trajectory
+        One period.
+    span : (float, float)
+        The distances in s from launch, later or earlier, that they answer: above the first, up to the second.
+    sampler : Sampler, optional
+        What reads them at many times, once that was asked for.
+    """
+
+    timing: timing.Timing
+    trajectory: Trajectory
+    span: tuple[float, float]
+    sampler: Sampler | None = None
+
+
 class PeriodicMotion(Motion):
     """A libration or a circulation: one segment that is repeated for ever.
 
-    Its trajectory is first made with times in doubles. For times beyond one period from launch the period is needed as
-    two doubles; it is then computed in double-double arithmetic, or where that does not suffice in extended precision.
+    Its times come from double-double arithmetic. Where that does not suffice, doubles answer within the first period,
+    and extended precision beyond it and for what is listed of a period. Which of them answers depends on the latest
+    time that is asked for, and on no question before.
 
     Parameters
     ----------
@@ -80,10 +107,6 @@ class PeriodicMotion(Motion):
     ) -> None:
         super().__init__(problem, kind, direction)
         self._segment_in_doubles, self._offsets = segment, offsets
-        self._double_trajectory: Trajectory | None = None
-        self._precise_trajectory: Trajectory | None = None
-        self._exact_timing: timing.Timing | None = None
-        self._is_period_known = False  # to more digits than doubles hold
         self._sampler: Sampler | None = None
 
     @cached_property
@@ -153,25 +176,44 @@ class PeriodicMotion(Motion):
                 return orbit
         return timing.orbit_of(*launch, timing.times_along(self._segment, is_thrown=False))
 
-    def _timing(self, end_time: float) -> timing.Timing:
+    @cached_property
+    def _in_doubles(self) -> _Times:
+        times = timing.in_doubles(self.kind, self._segment, self._offsets)
+        return _Times(times, self._build(times), (-inf, self._latest_in_doubles if self._is_exact else inf))
+
+    @cached_property
+    def _in_double_double(self) -> _Times | None:
+        launch = self.problem, self.kind, self.direction
+        times = timing.in_double_double(*launch, self._segment, self._offsets) if self._is_exact else None
+        return None if times is None else _Times(times, self._build(times), (-inf, times.max_time))
+
+    @cached_property
+    def _in_multiprecision(self) -> _Times:
+        launch, known = (self.problem, self.kind, self.direction), self._in_double_double
+        times = timing.in_multiprecision(*launch, self._segment)
+        return _Times(times, self._build(times), (self._latest_in_doubles if known is None else known.span[1], inf))
+
+    @property
+    def _latest_in_doubles(self) -> float:
+        """The largest distance in s of a time from launch for which extended precision would be too dear."""
+        if self._segment.from_multiprecision:
+            return -inf
+        return EARLY * self._segment.duration * (2.0 if self.kind == "libration" else 1.0)
+
+    def _times_until(self, end_time: float) -> _Times:
         """The times with as many digits as a phase needs at ``end_time`` in s from launch."""
-        if not self._is_exact:
-            return timing.in_doubles(self.kind, self._segment, self._offsets)
-        launch, self._is_period_known = (self.problem, self.kind, self.direction), True
-        if self._exact_timing is None:
-            self._exact_timing = timing.in_double_double(*launch, self._segment, self._offsets)
-        if self._has_multiprecision and (self._exact_timing is None or end_time > self._exact_timing.max_time):
-            self._exact_timing = timing.in_multiprecision(*launch, self._segment)
-            self._precise_trajectory = None
-        return self._exact_timing or timing.in_doubles(self.kind, self._segment, self._offsets)
+        known = self._in_double_double
+        if known is not None and (end_time <= known.span[1] or not self._has_multiprecision):
+            return known
+        return self._in_doubles if end_time <= self._in_doubles.span[1] else self._in_multiprecision
 
     @property
     def _duration(self) -> float:
         """Half period or loop time in s, the double nearest to the exact one."""
-        orbit, self._is_period_known = self._orbit, True
+        orbit = self._orbit
         if orbit is not None and orbit.duration.is_decided:
             return orbit.duration.high
-        return self._timing(inf).duration[0]
+        return self._times_until(inf).timing.duration[0]
 
     @property
     @locked
@@ -282,15 +324,6 @@ class PeriodicMotion(Motion):
         """The Fourier coefficients of a quantity over one period; see `Motion.fourier`."""
         return fourier(self, quantity, n)
 
-    def __reduce__(self) -> tuple[Any, ...]:
-        """As `Motion`, with how exactly its period is known: the last digit of a place depends on it."""
-        known_until = self._exact_timing.max_time if self._exact_timing is not None else 0.0
-        end_time = None if not self._is_period_known else inf if known_until == inf else 0.0
-        return *super().__reduce__(), end_time
-
-    def __setstate__(self, end_time: float) -> None:
-        self._timing(end_time)
-
     def lam(self, t: Any) -> Any:
         """The curve parameter at times; see `Motion.lam`. For doubles this is one call of compiled code."""
         time = plain_time(t)
@@ -326,40 +359,28 @@ class PeriodicMotion(Motion):
         if not (end_time < inf and greatest <= self.t_end):
             return None
         sampler = self._sampler
-        if sampler is not None and sampler.trajectory is self._precise_trajectory and end_time <= sampler.max_time:
+        if sampler is not None and sampler.min_time < end_time <= sampler.max_time:
             return sampler
         return self._new_sampler_for(end_time)
 
     @locked
     def _new_sampler_for(self, end_time: float) -> Sampler | None:
         """The sampler for times up to ``end_time``, made if there is none yet."""
-        sampler = self._sampler
-        trajectory = self._trajectory(end_time)
-        if sampler is None or sampler.trajectory is not trajectory:
-            is_precise = trajectory is self._precise_trajectory
-            times = self._timing(end_time) if is_precise else timing.in_doubles(self.kind, self._segment, self._offsets)
-            sampler = self._sampler = Sampler(
-                self.problem,
-                trajectory,
-                times,
-                self.direction,
-                lambda: self._time_drift(trajectory),
-                self._lock,
+        times = self._times_until(end_time)
+        if times.sampler is None:
+            span, drift = times.span, lambda: self._time_drift(times)
+            times.sampler = Sampler(
+                self.problem, times.trajectory, times.timing, span, self.direction, drift, self._lock
             )
-        return sampler if end_time <= sampler.max_time else None
+        self._sampler = times.sampler
+        return self._sampler if end_time <= self._sampler.max_time else None
 
     def _trajectory(self, end_time: float) -> Trajectory:
-        one_period_time = self._segment.duration * (2.0 if self.kind == "libration" else 1.0)
-        if self._is_exact and (
-            end_time > one_period_time or self._is_period_known or self._segment.from_multiprecision
-        ):
-            times = self._timing(end_time)
-            if self._precise_trajectory is None:
-                self._precise_trajectory = self._build(times)
-            return self._precise_trajectory
-        if self._double_trajectory is None:
-            self._double_trajectory = self._build(timing.in_doubles(self.kind, self._segment, self._offsets))
-        return self._double_trajectory
+        return self._times_until(end_time).trajectory
+
+    @property
+    def _course(self) -> Trajectory:
+        return self._trajectory(self._segment.duration * (2.0 if self.kind == "libration" else 1.0))
 
     def _build(self, times: timing.Timing) -> Trajectory:
         duration = times.duration
@@ -390,15 +411,15 @@ class PeriodicMotion(Motion):
         )
 
     def _time_error(self, t: Array) -> Array:
-        at_launch, drift = self._time_drift(self._trajectory(float(np.abs(t).max()) if t.size else 0.0))
+        at_launch, drift = self._time_drift(self._times_until(float(np.abs(t).max()) if t.size else 0.0))
         return at_launch + np.abs(t) * drift
 
-    def _time_drift(self, trajectory: Trajectory) -> tuple[float, float]:
+    def _time_drift(self, times: _Times) -> tuple[float, float]:
         """Estimated error in s of a trajectory's times at launch, and its growth per second."""
-        if trajectory is self._precise_trajectory:
-            return 0.0, self._timing(0.0).relative_error
+        if times is not self._in_doubles:
+            return 0.0, times.timing.relative_error
         # The quadrature errors of the time to the launch and of the period; the rounding of the launch's phase angle.
-        segment, start = self._segment, np.array([trajectory.segments[0].phi_start])
+        segment, start = self._segment, np.array([times.trajectory.segments[0].phi_start])
         launch = segment.time_error(start) + ULP * start * slopes(segment.edges, segment.panels[3], start)
         rounding = ULP if self.problem.formulas.chart is None else CHART_ROUNDING
         return float(launch[0]), segment.relative_error + rounding
@@ -408,7 +429,7 @@ class PeriodicMotion(Motion):
         """The events from time t1 to t2 over as many periods as that takes; see `Motion.events_between`."""
         start, stop = read_number(t1, where="t1", unit="s").value, read_number(t2, where="t2", unit="s").value
         period = self.period
-        lap, within = self._trajectory(0.0).lap, self._one_period()
+        lap, within = self._course.lap, self._one_period()
         if not within:
             return Rows([])
         first, last = int(np.floor(start / period)), int(np.floor(min(stop, self.t_end) / period))
@@ -439,7 +460,7 @@ class PeriodicMotion(Motion):
         return lam
 
     def _first_passages(self, lam: float, low: float) -> list[float]:
-        lap = self._trajectory(0.0).lap
+        lap = self._course.lap
         if not lap:
             return super()._first_passages(self._at_end(lam, low), low)
         count = np.floor((lam - self.problem.lam0) / lap)

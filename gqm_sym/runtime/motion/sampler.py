@@ -51,8 +51,8 @@ class Sampler:
     ----------
     trajectory : Trajectory
         The trajectory that is sampled.
-    max_time : float
-        The largest distance in s of a time from launch, later or earlier, that is reduced exactly.
+    min_time, max_time : float
+        It answers times whose distance in s from launch, later or earlier, is above the first and up to the second.
     """
 
     def __init__(
@@ -60,6 +60,7 @@ class Sampler:
         problem: Problem,
         trajectory: Trajectory,
         times: Timing,
+        span: Pair,
         direction: int,
         time_drift: Callable[[], Pair],
         lock: Lock,
@@ -67,7 +68,7 @@ class Sampler:
         assert trajectory.period is not None
         segment = trajectory.segments[0].segment
         self.trajectory = trajectory
-        self.max_time = min(MAX_PERIODS * trajectory.period[0], times.max_time)
+        self.min_time, self.max_time = span[0], min(MAX_PERIODS * trajectory.period[0], span[1])
         self._problem, self._segment = problem, segment
         there_and_back = segment.kind == TURN_TURN
         sign = direction if there_and_back else 1

@@ -79,7 +79,8 @@ def in_doubles(kind: str, segment: Segment, offsets: tuple[float, float]) -> Tim
     # In the time of the duration, of which the panels' may be off by some roundings.
     scale = duration[0] / segment.total_time[0]
     phase_time = scale * float(segment.times(np.array([segment.phase_angle_of(*offsets)]))[0])
-    return Timing(duration, (phase_time, 0.0), offsets)
+    # Beside a turning point it is a rounding longer than the duration; no time from launch is negative.
+    return Timing(duration, (min(phase_time, duration[0]), 0.0), offsets)
 
 
 def passage_of(problem: Problem, kind: str, direction: int, offsets: tuple[float, float]) -> ChartPassage | None:

@@ -1,6 +1,5 @@
 """One quantity for each of many launches where forces dissipate, by driving all bodies in compiled code."""
 
-import threading
 from math import inf, nan
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -22,7 +21,6 @@ from gqm_sym.runtime.compiled.strided import (
 from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.launch.request import ONLY_SIGN
 from gqm_sym.runtime.legs import answers as legs
-from gqm_sym.runtime.legs.advance import Joints, room_ahead, room_kept
 from gqm_sym.runtime.legs.body import STATUS, VALUE, launched
 from gqm_sym.runtime.legs.leg_record import COLUMNS
 from gqm_sym.runtime.sweep import quantities
@@ -45,13 +43,6 @@ QUESTIONS = {
     "normal_force_min": legs.LEAST_LOAD,
     "normal_force_max": legs.MOST_LOAD,
 }
-
-
-# What sweeps have kept of charts between their breaks (`legs.advance.Joints`), by forces, parameters and chart; the
-# chart stands beside it, so that no other one can have its identity. A sweep that uses it takes it out meanwhile.
-KEPT: dict[Any, tuple[Array, Array]] = {}
-MAX_KEPT = 8
-_LOCK = threading.Lock()
 
 
 class Asked(NamedTuple):
@@ -86,7 +77,7 @@ def asked_of_bodies(formulas: "Formulas", quantity: str, t_max: Any, contact: st
 def answer_driven(
     formulas: "Formulas",
     asked: Asked,
-    curve: tuple[Array, Array, Array, Array],
+    track: legs.Track,
     columns: list[Array],
     answers: Answers,
     part: slice,
@@ -95,26 +86,17 @@ def answer_driven(
 
     Parameters
     ----------
-    curve : four arrays
-        The chart, empty for a curve with formulas; all places where it is not smooth, those that are corners, and those
-        at which contact is lost.
+    track : legs.answers.Track
+        The curve.
     columns : list of arrays
         The launches, in the order of `compiled.strided`.
     answers : Answers
         Filled in for this part.
     """
-    chart, breaks, corners, drops = curve
     assert formulas.dissipation is not None
     dissipation = formulas.dissipation.addresses()
-    key = dissipation, id(chart), *(column.flat[0] for column in columns[PARAMETERS:] if chart.size and column.size)
-    with _LOCK:
-        kept = KEPT.pop(key, None)
-    gaps = np.zeros(room_kept(breaks.size)) if kept is None else kept[0]
-    joints = Joints(breaks, corners, drops, np.empty(room_ahead(breaks.size)), gaps)
-    record, mass = (
-        np.empty((1, (MAX_PANELS + breaks.size) * COLUMNS)),
-        PARAMETERS + list(formulas.parameters).index("m"),
-    )
+    record = np.empty((1, (MAX_PANELS + track.breaks.size) * COLUMNS))
+    mass = PARAMETERS + list(formulas.parameters).index("m")
     for begin in range(part.start, part.stop, CHUNK):
         chunk = slice(begin, min(begin + CHUNK, part.stop))
         lines, found = lay_out(columns, chunk.start, chunk.stop), answers.part(chunk)
@@ -124,7 +106,8 @@ def answer_driven(
         asks = (some[DIRECTION], asked.only_sign, asked.horizon, some[TARGET])
         given = (some[LAM0], *ends, *asks, some[V0] * some[V0])
         bodies = launched(np.stack(np.broadcast_arrays(*given, chosen)[:-1], axis=1))
-        legs.drive(dissipation, _rows(some[PARAMETERS:], chart), joints, asked.question, bodies, record)
+        rows = _rows(some[PARAMETERS:], track.chart)
+        legs.drive_along(track, dissipation, rows, asked.question, bodies, record)
         values, ended = bodies[:, VALUE], bodies[:, STATUS]
         if asked.question in (legs.LEAST_LOAD, legs.MOST_LOAD):
             values = values * some[mass]
@@ -134,11 +117,6 @@ def answer_driven(
         found.values[there, 0] = np.where(ended == legs.FOUND, values, nan)[decided]
         found.status[there] = np.where(ended == legs.FOUND, quantities.ANSWERED, none)[decided]
         found.route[there] = quantities.SINGLE
-    with _LOCK:
-        if gaps.size:
-            KEPT[key] = gaps, chart
-        while len(KEPT) > MAX_KEPT:
-            del KEPT[next(iter(KEPT))]
 
 
 def _are_possible(lines: list[Array], count: int) -> NDArray[np.bool_]:

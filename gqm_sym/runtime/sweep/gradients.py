@@ -1,6 +1,7 @@
 """Sweeps with gradients: the values as ever, then the derivatives at the same launches.
 
-Compiled code has those of periods; for other quantities, and where its digits do not suffice, each launch is solved.
+Compiled code has those of periods, turning points and extremes of periodic motions along curves with formulas; for all
+else, and where its digits do not suffice, each launch is solved.
 """
 
 from contextlib import suppress
@@ -12,7 +13,7 @@ import numpy as np
 from gqm_sym.errors import GQMError, InputError
 from gqm_sym.runtime.gradients.orbit import check_signed
 from gqm_sym.runtime.gradients.quantities import selected
-from gqm_sym.runtime.gradients.sweep import PERIODS, period_gradients
+from gqm_sym.runtime.gradients.sweep import COMPILED, PERIODS, Launches, launch_gradients
 from gqm_sym.runtime.launch.kinds import LOAD_EXTREMES
 from gqm_sym.runtime.launch.request import LaunchRequest
 from gqm_sym.runtime.sweep.quantities import ANSWERED, SOLVE
@@ -42,8 +43,6 @@ def sweep_with_gradient(
         What the derivatives are by.
     """
     rows = selected(formulas.parameters, wrt)
-    if quantity == "turning_points":
-        raise InputError("gradient: sweeps have it of quantities that are one number, not of turning_points")
     if quantity in LOAD_EXTREMES:
         raise InputError(f"gradient: {quantity} has none yet, as all that a rider feels; leave gradient out")
     check_signed(formulas, quantity)
@@ -54,19 +53,29 @@ def sweep_with_gradient(
         np.broadcast_to(as_doubles(v, n), found.status.shape).reshape(-1) for v, n in zip(given, names, strict=True)
     ]
     answered = np.flatnonzero(found.status.reshape(-1) == ANSWERED)
-    gradient, route = np.full((found.status.size, len(rows)), nan), found.route.reshape(-1)
-    if quantity in PERIODS and formulas.dissipation is None and formulas.chart is None:
-        spans = sweep(formulas, "turning_points", launches, parameters, None, solve).values.reshape(-1, 2)[answered]
-        table = np.stack(columns[:-1], axis=1)[answered]
-        gradient[answered] = period_gradients(formulas, table[:, :-1], table[:, -1], spans, tuple(rows.values()))
-        gradient[answered] *= np.where(np.isnan(spans[:, :1]), 1.0, PERIODS[quantity])
-    for k in answered[np.isnan(gradient[answered]).any(axis=1)].tolist():
+    shape = (*found.values.shape[found.status.ndim :], len(rows))  # of turning points one more axis
+    gradient, route = np.full((found.status.size, *shape), nan), found.route.reshape(-1)
+    is_whole = quantity in PERIODS or (launches.t_max is None and launches.contact == "bilateral")
+    if quantity in COMPILED and is_whole and formulas.dissipation is None and formulas.chart is None:
+        spans, periods = (
+            sweep(formulas, name, launches, parameters, None, solve) for name in ("turning_points", "period")
+        )
+        which = answered[periods.status.reshape(-1)[answered] == ANSWERED]
+        table = np.stack(columns[:-1], axis=1)[which]
+        several = Launches(table[:, :-1], table[:, -1], spans.values.reshape(-1, 2)[which])
+        values = found.values.reshape(found.status.size, *shape[:-1])[which]
+        if which.size:
+            gradient[which] = launch_gradients(formulas, quantity, several, values, tuple(rows.values()))
+    is_open = np.isnan(gradient[answered]).any(axis=tuple(range(1, gradient.ndim)))
+    for k in answered[is_open].tolist():
         *p, lam0, v0, direction, place = (column[k].item() for column in columns)
         motion = solve(LaunchRequest(lam0, v0, int(direction), None, launches.t_max, launches.contact), tuple(p))
         route[k] = SOLVE
         with suppress(GQMError):
             slopes = motion.gradient(quantity, tuple(rows), lam=None if lam is None else place)
-            gradient[k] = list(slopes.values())
+            by_name = np.stack(list(slopes.values()), axis=-1)
+            falls = quantity == "turning_points" and motion.turning_points[0] > motion.turning_points[1]
+            gradient[k] = by_name[::-1] if falls else by_name
     found.route[...] = route.reshape(found.status.shape)
-    found.gradient = gradient.reshape(*found.status.shape, len(rows))
+    found.gradient = gradient.reshape(*found.status.shape, *shape)
     return found

@@ -28,6 +28,7 @@ from gqm_sym.runtime.launch.kinds import LOAD_EXTREMES
 from gqm_sym.runtime.launch.request import ONLY_SIGN, LaunchRequest, check_contact
 from gqm_sym.runtime.launch.rider import check_banked
 from gqm_sym.runtime.launch.speed import path_and_force_at, potential_at
+from gqm_sym.runtime.legs.answers import Track
 from gqm_sym.runtime.multiprecision.exact_problem import NOWHERE
 from gqm_sym.runtime.sweep import quantities, scalar
 from gqm_sym.runtime.sweep.batch.batches import answer_batches
@@ -125,8 +126,8 @@ def sweep(
                 continue  # tables know no corners
             some = answers if chosen is None else answers.part(chosen)
             if asked is not None:
-                curve = (group.chart, group.joints, group.corners, group.drops)
-                work, least = partial(answer_driven, formulas, asked, curve, group.columns, some), MIN_BODIES_PER_THREAD
+                track = Track(group.chart, group.joints, group.corners, group.drops)
+                work, least = partial(answer_driven, formulas, asked, track, group.columns, some), MIN_BODIES_PER_THREAD
             else:
                 last = inf if t_max is None else as_doubles(t_max, "t_max").item()
                 ask = Asked(found.code, ONLY_SIGN[contact], last, _rounded_off(formulas, parameters))
@@ -339,7 +340,7 @@ def _groups(
         ends = CURVE_ENDS if has_ends else NO_ENDS
         launches, drops = [*some[:4], *domain, *some[4:]], chart.corners[chart.bends * only_sign < 0.0]
         # Bodies that lose energy pass the chart piece by piece.
-        joints = chart.breaks if not formulas.dissipation else chart.edges[0 if chart.period else 1 : -1]
+        joints = chart.breaks if not formulas.dissipation else chart.inner_edges
         yield Group(launches, chart.block, joints, chart.corners, drops, table, theirs, ends), chosen
 
 

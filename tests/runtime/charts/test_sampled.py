@@ -301,7 +301,11 @@ def test_options_of_a_file(tmp_path: Path) -> None:
         ("track.csv", "1,2\n1,2,3", "'track.csv', row 2: must be two numbers"),
         ("track.csv", "1,2\n\n2,3", "'track.csv', row 2: must be two numbers"),
         ("track.csv", "", "'track.csv', row 1: must be two numbers"),
-        ("track.csv", "z,x\n1,2", "'track.csv', row 1: the columns must be x, z, or x, y, z, got 'z,x'"),
+        (
+            "track.csv",
+            "z,y\n1,2",
+            "'track.csv', row 1: the columns must be x, z, or x, y, z, perhaps with roll, got 'z,y'",
+        ),
         ("track.csv", "1,2\n" + "9" * 300, "'track.csv', row 2: is longer than 200 characters"),
         ("track.csv", b"1,2\n\xff\xfe", "'track.csv', row 2: is not UTF-8 text"),
         ("track.csv", "1,2\n" * 500_001, "'track.csv': has 500001 rows; 500000 is the most"),

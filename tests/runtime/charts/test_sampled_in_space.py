@@ -171,7 +171,6 @@ LINE = [(float(k), 0.5 * k, -1.0 * k) for k in range(9)]
         ([(*row, 0.0) for row in LINE], {}, "row 1: must be two numbers, x and z, or in space three, x, y and z, got"),
         ([*LINE[:4], (1.0, 0.5, 9.0), *LINE[5:]], {}, r"row \d: the track turns by 1\d\d degrees there"),
         (LINE, {"kind": "linear"}, "kind 'linear' is for tracks of x and z only yet"),
-        (LINE, {"smoothing": 0.01}, "smoothing is for tracks of x and z only yet"),
     ],
 )
 def test_bad_points_are_refused(points: object, options: dict[str, object], message: str) -> None:

@@ -182,6 +182,24 @@ def test_what_is_kept_of_a_track_is_that_of_any_launch(quantity: str, name: str,
     assert np.array_equal(swept, alone, equal_nan=True)
 
 
+@pytest.mark.parametrize(("name", "speed"), [("track", 0.5), ("closed", 6.0)])
+def test_one_launch_is_passed_as_many_are(name: str, speed: float, build: Build) -> None:
+    """`solve` rests when and where a sweep says, its places agree with its legs, and its legs do not depend on them."""
+    module, given = build(f"swept_{name}", *(make() for make in CASES[name][:2])), CASES[name][2]
+    starts = np.linspace(0.1, 3.2, 8)
+    swept = {q: module.sweep(q, starts, speed, **given).values for q in ("t_end", "rest_position")}
+    for start, end, place in zip(starts.tolist(), swept["t_end"], swept["rest_position"], strict=True):
+        motion = module.solve(start, speed, 1, **given)
+        legs = list(motion.legs)
+        assert (motion.t_end, legs[-1].lam_end) == pytest.approx((end, place), rel=ROUNDING, abs=ROUNDING)
+        for leg in legs:
+            assert abs(motion.lam(leg.t_end) - leg.lam_end) <= motion.state(leg.t_end).error
+        assert list(motion.legs) == legs
+        cut, asked_first = (module.solve(start, speed, 1, t_max=0.6 * end, **given) for _ in range(2))
+        asked_first.state(0.3 * end)
+        assert list(cut.legs) == list(asked_first.legs)
+
+
 @pytest.mark.parametrize("name", ["track", "rail"])
 def test_arrivals_where_the_curve_is_not_smooth(name: str, build: Build) -> None:
     """A body passes each break between its launch and its first turn before that turn, one after the other.

@@ -15,7 +15,7 @@ from gqm_sym.runtime.launch.kinds import EXTREMES, PERIODIC_QUANTITIES
 from gqm_sym.runtime.launch.speed import path_and_force_at
 from gqm_sym.runtime.legs.leg_record import END, END_LOW, HEADING
 from gqm_sym.runtime.legs.variations.changes import Changes
-from gqm_sym.runtime.legs.variations.equation import LawRows
+from gqm_sym.runtime.legs.variations.equation import LawRows, States
 from gqm_sym.runtime.motion.events import Leg
 from gqm_sym.runtime.motion.trajectory import PhasePoints
 
@@ -64,13 +64,16 @@ class StateChanges:
     ----------
     lam, s, x, z, v, normal_force : arrays
         As of `gradients.sensitivity.Sensitivity`, but places within the lap.
-    rates : (2, n) array
-        How the velocity and the contact force change with time.
+    acceleration : array
+        How the velocity changes with time.
+    states : States
+        The last of the points.
     law : LawRows
-        The law at the last of the points.
+        The law there.
     """
 
     law: LawRows
+    states: States
 
     def __init__(self, changes: Changes, points: PhasePoints, v: Array) -> None:
         half, w = _marched(changes, points)
@@ -80,19 +83,19 @@ class StateChanges:
         ]
         found = np.concatenate(parts, axis=-1)
         self.lam, self.s, self.x, self.z, self.v, self.normal_force = found[:6]
-        self.rates = found[6:, 0]
+        self.acceleration = found[6, 0]
 
     def _part(self, changes: Changes, half: NDArray[np.intp], w: Array, v: Array) -> Array:
-        """The attributes for some of the points: a row for each, and for each rate a row of equal rows."""
-        along, mass = changes.along(half, w), changes.law.parameters[0, changes.mass]
-        self.law = law = changes.law.rows(along.places, v**2, along.heading, along.contact_sign)
+        """The attributes for some of the points: a row for each, and for the acceleration a row of equal rows."""
+        along = changes.along(half, w)
+        self.states = States(*along.places, v**2, along.heading, along.contact_sign)
+        self.law = law = changes.law.rows(self.states)
         path = path_rows(changes.law.exact, changes.law.parameters, changes.mass, *along.places)
         lam, acceleration = along.sigma - v / law.ds * along.delay, 0.5 * law.slope / law.ds
         faster = 0.5 * v * along.y - acceleration * along.delay
         x, z, _, curvature, load = (changes.by_all(rows[1:-1]) + rows[-1] * lam for rows in path)
         force = load + v**2 * curvature + 2.0 * v * path[3][0] * faster
-        rates = (np.broadcast_to(rate, lam.shape) for rate in (acceleration, mass * law.load[0] * v / law.ds))
-        return np.array([lam, law.ds * lam + along.arc, x, z, faster, force, *rates])
+        return np.array([lam, law.ds * lam + along.arc, x, z, faster, force, np.broadcast_to(acceleration, lam.shape)])
 
 
 def _marched(changes: Changes, points: PhasePoints) -> tuple[NDArray[np.intp], Array]:
@@ -169,14 +172,15 @@ def end(motion: Any, changes: Changes) -> tuple[Array, Array]:
         return origin.sigma + run.laps * changes.lap, origin.delay
     if what not in ("liftoff", "domain-end") or not run.ahead:
         raise SolutionError(f"gradient: the end of a motion by {what!r} has none")
-    law, speed, v = *changes.law_at_end(k), run.record[HEADING]
+    at_end, speed = changes.at_end(k)
+    law, v = changes.law.rows(at_end), run.record[HEADING]
     if what == "liftoff":
         place = np.array([run.record[END]]), np.array([run.record[END_LOW]])
         path = path_rows(changes.law.exact, changes.law.parameters, changes.mass, *place)[3:, :, 0]
         curvature, load = path
         faster = origin.y - law.slope[0] * origin.sigma
         change = changes.by_all(load[1:-1] + speed**2 * curvature[1:-1]) + curvature[0] * faster
-        moved = -change / (changes.law.parameters[0, changes.mass] * law.load[0, 0])
+        moved = -change / (changes.law.parameters[0, changes.mass] * changes.law.loads(at_end)[0, 0])
     else:
         moved = changes.ranges[0 if v < 0.0 else 1]
     return moved + run.laps * changes.lap, origin.delay + v * law.ds[0] * (moved - origin.sigma) / speed
@@ -230,9 +234,11 @@ def extreme(motion: Any, changes: Changes, quantity: str) -> Array:
         t = _improved(motion, changes, of_speed, found)
     at = states_at(motion, changes, np.array([t]), np.zeros(1))
     if of_speed:
-        faster: Array = np.sign(motion.state(t).v) * (at.v[:, 0] + at.rates[0, 0] * moved)
+        faster: Array = np.sign(motion.state(t).v) * (at.v[:, 0] + at.acceleration[0] * moved)
         return faster
-    stronger: Array = at.normal_force[:, 0] + at.rates[1, 0] * moved
+    law, mass = changes.law, changes.law.parameters[0, changes.mass]
+    rate = mass * law.loads(at.states)[0, 0] * motion.state(t).v / at.law.ds[0]
+    stronger: Array = at.normal_force[:, 0] + rate * moved
     return stronger
 
 
@@ -240,8 +246,9 @@ def _improved(motion: Any, changes: Changes, of_speed: bool, found: Any) -> floa
     """The time of an extreme inside a leg by Newton's method; it is left where the quantity is not stationary."""
     t = found.t
     for _ in range(NEWTON_STEPS):
-        law = states_at(motion, changes, np.array([t]), np.zeros(1)).law
-        slope, by_place, by_w = (law.slope, law.by_place, law.by_w) if of_speed else law.load
+        at = states_at(motion, changes, np.array([t]), np.zeros(1))
+        law = at.law
+        slope, by_place, by_w = (law.slope, law.by_place, law.by_w) if of_speed else changes.law.loads(at.states)
         bend, v = by_place[0] + by_w[0] * law.slope[0], motion.state(t).v
         step = -slope[0] / bend * law.ds[0] / v if bend and v else np.inf
         if not abs(step) <= MAX_STEP * motion.t_end or not 0.0 <= t + step <= motion.t_end:

@@ -22,7 +22,7 @@ from gqm_sym.runtime.launch.problem import Problem
 from gqm_sym.runtime.legs.leg_record import END, HEADING, MIDDLE, START, START_V2
 from gqm_sym.runtime.legs.leg_run import ASYMPTOTE
 from gqm_sym.runtime.legs.leg_segments import Run
-from gqm_sym.runtime.legs.variations.equation import Law, LawRows, Panels
+from gqm_sym.runtime.legs.variations.equation import Law, LawRows, Panels, States, one_state
 
 
 class Origin(NamedTuple):
@@ -86,6 +86,8 @@ class Changes:
         The law of motion.
     mass : int
         Which of the run-time parameters is the mass.
+    followed : int
+        How many runs there were, with approaches to an equilibrium.
     runs : list of Run
         The runs.
     ends : list of Origin
@@ -95,11 +97,11 @@ class Changes:
     def __init__(self, problem: Problem, runs: Sequence[Run]) -> None:
         self.law, self._problem = Law(problem), problem
         self.mass = list(problem.formulas.parameters).index("m")
-        self.runs = [run for run in runs if run.what != ASYMPTOTE]
+        self.followed, self.runs = len(runs), [run for run in runs if run.what != ASYMPTOTE]
         counts = [(run.ahead, run.back) for run in self.runs]
         halves = [(k, is_back) for k, count in enumerate(counts) for is_back in (False, True) if count[is_back]]
         self._where = {half: i for i, half in enumerate(halves)}
-        self.panels = Panels(self.law, [(self.runs[k], is_back) for k, is_back in halves])
+        self.panels = Panels([(self.runs[k], is_back) for k, is_back in halves])
         self._origins: list[Origin] = []
         self.ends: list[Origin] = []
         self._follow()
@@ -110,8 +112,8 @@ class Changes:
         """How many variables there are."""
         return self.law.count + 2
 
-    def _marks(self, marks: Sequence[tuple[int, list[float], bool]]) -> list[LawRows]:
-        """The law at places of the records of all runs, each with V**2 there and whether it is on the last half."""
+    def _marks(self, marks: Sequence[tuple[int, list[float], bool]]) -> States:
+        """Places of the records of all runs, each with V**2 there and whether it is on the last half."""
         places = np.array([run.pair(at) for at, _, _ in marks for run in self.runs]).T
         heading = np.array([run.record[HEADING] for run in self.runs] * len(marks))
         v2 = np.concatenate([speeds for _, speeds, _ in marks])
@@ -120,8 +122,7 @@ class Changes:
             for _, _, is_back in marks
             for k, run in enumerate(self.runs)
         ]
-        rows = self.law.rows((places[0], places[1]), v2, heading, self.panels.contact_sign[first])
-        return [LawRows(*part) for part in zip(*(np.split(row, len(marks), axis=-1) for row in rows), strict=True)]
+        return States(places[0], places[1], v2, heading, self.panels.contact_sign[first])
 
     def _half(self, run: int, is_back: bool) -> tuple[int, int]:
         """The first panel of a half of the run with a number, and the one behind its last."""
@@ -149,7 +150,12 @@ class Changes:
             for k, run in enumerate(runs)
         ]
         middle_v2, zeros = [v**2 for v in middle], [0.0] * len(runs)
-        starts, ends, middles = self._marks([(START, start_v2, False), (END, zeros, True), (MIDDLE, middle_v2, False)])
+        marks = self._marks([(START, start_v2, False), (END, zeros, True), (MIDDLE, middle_v2, False)])
+        # One call evaluates the law at the marks and at the nodes of all panels.
+        rows = self.law.rows(States(*map(np.concatenate, zip(marks, panels.nodes, strict=True))))
+        count = len(runs)
+        starts, ends, middles = (rows.part(k * count, (k + 1) * count) for k in range(3))
+        panels.solve(rows.part(3 * count, None))
         laps, zero, origin = 0, np.zeros(self.variables), self._launched(starts)
         for k, run in enumerate(runs):
             v = float(run.record[HEADING])
@@ -198,12 +204,12 @@ class Changes:
         lap: Array = self.ranges[2]
         return lap
 
-    def law_at_end(self, k: int) -> tuple[LawRows, float]:
-        """The law where the k-th run ends, and the speed there."""
+    def at_end(self, k: int) -> tuple[States, float]:
+        """The state in which the k-th run ends, and the speed there."""
         run, last = self.runs[k], self._half(k, False)[1] - 1
-        (place, low), speed = run.pair(END), float(self.panels.end_speeds[last])
-        signs = np.array([run.record[HEADING]]), self.panels.contact_sign[last : last + 1]
-        return self.law.rows((np.array([place]), np.array([low])), np.array([speed**2]), *signs), speed
+        speed = float(self.panels.end_speeds[last])
+        sign = float(self.panels.contact_sign[last])
+        return one_state(run.pair(END), speed**2, float(run.record[HEADING]), sign), speed
 
     def _launched(self, starts: LawRows) -> Origin:
         """How the launch changes."""
@@ -217,9 +223,8 @@ class Changes:
             if launch.direction == heading:
                 delay[n + 1] = -2.0 * starts.ds[0] / abs(slope)
             else:  # thrown the other way, it comes back with little less speed
-                place, contact_sign = self.runs[0].pair(START), self.panels.contact_sign[:1]
-                places = np.array([place[0]]), np.array([place[1]])
-                upwards = self.law.rows(places, np.zeros(1), np.array([-heading]), contact_sign).slope[0]
+                contact_sign = float(self.panels.contact_sign[0])
+                upwards = self.law.rows(one_state(self.runs[0].pair(START), 0.0, -heading, contact_sign)).slope[0]
                 delay[n + 1] = 2.0 * starts.ds[0] / abs(upwards)
         return Origin(sigma, y, delay, arc)
 

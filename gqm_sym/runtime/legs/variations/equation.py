@@ -12,7 +12,7 @@ The solutions for each parameter (with sigma = 0), for sigma = 1 alone, and for 
 panels at once; the change of a leg is a sum of them (`changes`).
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from functools import cached_property
 from itertools import pairwise
 from math import ceil, inf, log2
@@ -23,12 +23,12 @@ from numba import types
 from numpy.polynomial.chebyshev import chebvander
 from numpy.typing import NDArray
 
-from gqm_sym.runtime.arithmetic.doubledouble import ULP, two_sum
+from gqm_sym.runtime.arithmetic.doubledouble import ULP, Pair, two_sum
 from gqm_sym.runtime.compiled.jit import entry
 from gqm_sym.runtime.compiled.types import MATRIX, VECTOR, Array
 from gqm_sym.runtime.double_double.arithmetic import UNIT
 from gqm_sym.runtime.gradients.orbit import pairs, values, without_formulas
-from gqm_sym.runtime.gradients.programs import force_program, law_program
+from gqm_sym.runtime.gradients.programs import Program, force_program, law_program, load_program
 from gqm_sym.runtime.interface import ExactLaw
 from gqm_sym.runtime.launch.problem import Problem
 from gqm_sym.runtime.legs.leg_record import END, HEADING, NORMAL_LOAD, RIGHT, START, Y_ROW
@@ -75,8 +75,6 @@ class LawRows(NamedTuple):
         F = dW/dlam and its derivatives by the place and by W.
     by_parameters : (k, n) array
         Its derivatives by the run-time parameters.
-    load : (3, n) array
-        The slope of the contact force per mass along the motion, and its derivatives by the place and by W.
     """
 
     ds: Array
@@ -86,7 +84,35 @@ class LawRows(NamedTuple):
     by_place: Array
     by_w: Array
     by_parameters: Array
-    load: Array
+
+    def part(self, first: int, last: int | None) -> "LawRows":
+        """The law at some of the places."""
+        return LawRows(*(row[..., first:last] for row in self))
+
+
+class States(NamedTuple):
+    """States in which the law is asked for: a number for each.
+
+    Attributes
+    ----------
+    high, low : (n,) arrays
+        The places as two doubles each.
+    w : (n,) array
+        V**2 there.
+    heading, contact_sign : (n,) arrays
+        The signs of dlam/dt and of N.
+    """
+
+    high: Array
+    low: Array
+    w: Array
+    heading: Array
+    contact_sign: Array
+
+
+def one_state(place: Pair, w: float, heading: float, contact_sign: float) -> States:
+    """One state, at a place of two doubles."""
+    return States(*(np.array([number]) for number in (*place, w, heading, contact_sign)))
 
 
 class Law:
@@ -105,15 +131,31 @@ class Law:
         self.exact, self.count = formulas.exact, len(problem.p)
         self.parameters = pairs(*((n.value, n.low, 0.0) for n in problem.p))
 
-    def rows(self, places: tuple[Array, Array], w: Array, v: Array, nu: Array) -> LawRows:
-        """The law at places of two doubles each, where V**2 is ``w``, for the signs of dlam/dt and of N."""
-        n, least = self.count, np.maximum(w, LEAST_V2)  # laws may take its root
-        found = np.empty((2 * n + 8, w.size))
-        for here, inputs in self._inputs(v, nu):
-            rows = values(law_program(self.exact, n), inputs, places[0][here], places[1][here], least[here])
-            found[:, here] = rows[:, 0]
-        ds, slope, load = found[: n + 2], found[n + 2 : 2 * n + 5], found[2 * n + 5 :]
-        return LawRows(ds[0], ds[1], ds[2:], slope[0], slope[1], slope[2], slope[3:], load)
+    def rows(self, states: States) -> LawRows:
+        """The law in states."""
+        n = self.count
+        found = self._values(law_program(self.exact, n), states)[:, 0]
+        ds, slope = found[: n + 2], found[n + 2 :]
+        return LawRows(ds[0], ds[1], ds[2:], slope[0], slope[1], slope[2], slope[3:])
+
+    def loads(self, states: States) -> Array:
+        """The slope of the contact force per mass along the motion, and its derivatives by the place and by W."""
+        found: Array = self._values(load_program(self.exact, self.count), states)[:, 0]
+        return found
+
+    def _values(self, program: Program, states: States, errors: Array | None = None) -> Array:
+        """The results of a program in states (`orbit.values`), for parameters with bounds on their errors."""
+        signs, found = 2.0 * states.heading + states.contact_sign, np.empty((program.outputs.size, 3, states.w.size))
+        w = np.maximum(states.w, LEAST_V2)  # laws may take its root
+        for heading in (-1.0, 1.0):
+            for contact_sign in (-1.0, 1.0):
+                here = np.flatnonzero(signs == 2.0 * heading + contact_sign)
+                if here.size:
+                    inputs = np.hstack([self.parameters, [[heading, contact_sign], [0.0, 0.0], [0.0, 0.0]]])
+                    if errors is not None:
+                        inputs[2, : self.count] = errors
+                    found[:, :, here] = values(program, inputs, states.high[here], states.low[here], w[here])
+        return found
 
     def force_errors_along(self, runs: Sequence[Run]) -> list[Array]:
         """`force_errors` on the panels of each run, first those from its start: the largest of three places of each."""
@@ -139,19 +181,11 @@ class Law:
 
         Double-double arithmetic has a running bound on the error of each number, which grows with the unit of rounding.
         """
-        errors, program = np.empty(places.size), force_program(self.exact, self.count)
-        for here, inputs in self._inputs(v, nu):
-            inputs[2, : self.count] = np.abs(self.parameters[1]) / COARSER  # doubles lack the low parts
-            at = np.ascontiguousarray(places[here])
-            force, slope = values(program, inputs, at, None, np.full_like(at, LEAST_V2))
-            errors[here] = COARSER * force[2] + 0.5 * ULP * np.abs(at * slope[0])
+        states = States(places, np.zeros_like(places), np.zeros_like(places), v, nu)
+        lows = np.abs(self.parameters[1]) / COARSER  # doubles lack the low parts
+        force, slope = self._values(force_program(self.exact, self.count), states, lows)
+        errors: Array = COARSER * force[2] + 0.5 * ULP * np.abs(places * slope[0])
         return np.nan_to_num(errors, posinf=0.0)
-
-    def _inputs(self, v: Array, nu: Array) -> Iterator[tuple[NDArray[np.bool_], Array]]:
-        """For each pair of signs of dlam/dt and N, where it holds, and what programs take."""
-        for direction, contact_sign in sorted(set(zip(v.tolist(), nu.tolist(), strict=True))):
-            signs = pairs((direction, 0.0, 0.0), (contact_sign, 0.0, 0.0))
-            yield (v == direction) & (nu == contact_sign), np.ascontiguousarray(np.hstack([self.parameters, signs]))
 
 
 class Panels:
@@ -159,8 +193,6 @@ class Panels:
 
     Parameters
     ----------
-    law : Law
-        The law.
     halves : sequence of (Run, bool)
         Runs, each with whether the half from its end is meant.
 
@@ -170,10 +202,25 @@ class Panels:
         Where the panels of each half begin; the last item is their number.
     begin, width, contact_sign : (n,) arrays
         The march variable where each panel begins, how far it goes, and the sign of N on it.
+    nodes : States
+        The nodes of all panels.
+    shares : (k+2, n, COUNT) array
+        For each solution and panel y/W at the nodes.
+    times : (k+2, n, COUNT+1) array
+        For each solution and panel the change of the time from the origin to the nodes, and to the panel's end.
+    arcs : (k, n, COUNT+1) array
+        For each parameter and panel the integral of the derivative of ds/dlam from the origin to there.
+    ends : (k+2, n) array
+        For each solution and panel y at the panel's end.
     """
 
-    def __init__(self, law: Law, halves: Sequence[tuple[Run, bool]]) -> None:
-        self._law, rows, tables = law, [], []
+    shares: Array
+    times: Array
+    arcs: Array
+    ends: Array
+
+    def __init__(self, halves: Sequence[tuple[Run, bool]]) -> None:
+        rows, tables = [], []
         for run, is_back in halves:
             place, low = run.pair(END if is_back else START)
             heading = float(run.record[HEADING])
@@ -190,6 +237,11 @@ class Panels:
         self._is_distance = half_c == inf
         self._half_c = np.where(self._is_distance, 0.0, half_c)
         (self.begin, self.width, self.contact_sign), self._y = panels[:, :3].T, panels[:, 3:]
+        w = self.begin[:, None] + self.width[:, None] * SHARES
+        self._growth = np.where(self._is_distance[:, None], 1.0, w + self._half_c[:, None])
+        signs = np.repeat(self.heading, COUNT), np.repeat(self.contact_sign, COUNT)
+        places = self.places(np.repeat(np.arange(len(self.width)), COUNT), w.ravel())
+        self.nodes = States(*places, ((self._y * self._growth) ** 2).ravel(), *signs)
 
     @property
     def end_speeds(self) -> Array:
@@ -217,46 +269,26 @@ class Panels:
         high, low = two_sum.py_func(self.place[k], self.u[k] * self.distances(k, w)[0])
         return high, low + self._low[k]
 
-    @cached_property
-    def _solved(self) -> tuple[Array, Array, Array, Array]:
-        n, count = self._law.count, len(self.width)
-        owner = np.repeat(np.arange(count), COUNT)
-        w = self.begin[:, None] + self.width[:, None] * SHARES
-        growth = np.where(self._is_distance[:, None], 1.0, w + self._half_c[:, None])
-        v2, offset = (self._y * growth) ** 2, self.width[:, None] * POINTS
-        signs = np.repeat(self.heading, COUNT), np.repeat(self.contact_sign, COUNT)
-        rows = self._law.rows(self.places(owner, w.ravel()), v2.ravel(), *signs)
+    def solve(self, rows: LawRows) -> None:
+        """Solve the variational equation, with the law at all nodes."""
+        n, count = len(rows.by_parameters), len(self.width)
+        offset, zero = self.width[:, None] * POINTS, np.zeros_like(rows.ds)
+        twice = np.where(self._is_distance, 1.0, 2.0)[:, None]
         ds = rows.ds.reshape(count, COUNT)
         # By w and not by the distance: laws with the root of W have a pole here at a turn, but not times the growth.
-        rate = np.where(self._is_distance, 1.0, 2.0)[:, None] * growth * rows.by_w.reshape(count, COUNT)
+        rate = twice * self._growth * rows.by_w.reshape(count, COUNT)
         factor = np.exp(self.u[:, None] * offset * (rate @ MEANS.T))
         # Sources for each parameter, for sigma, and none for what begins with y = 1.
-        sources = np.vstack([rows.by_parameters, rows.by_place, np.zeros_like(rows.ds)]).reshape(n + 2, count, COUNT)
+        sources = np.vstack([rows.by_parameters, rows.by_place, zero]).reshape(n + 2, count, COUNT)
         gained = self._over_distance(sources / factor[:, :COUNT])
         y = factor * (gained + self._chained(gained[:, :, -1], factor[:, -1])[:, :, None])
-        shares = y[:, :, :COUNT] / v2
-        shares[n + 1, ~self._is_distance] = 0.0  # there nothing begins with V**2 > 0
-        stretch = np.vstack([rows.ds_by_parameters, rows.ds_by_place, np.zeros_like(rows.ds)])
-        rates = np.where(self._is_distance, 1.0, 2.0)[:, None] * ds / self._y
-        changes = rates * (stretch.reshape(n + 2, count, COUNT) / ds - 0.5 * shares)
+        self.shares, self.ends = y[:, :, :COUNT] / self.nodes.w.reshape(count, COUNT), y[:, :, -1]
+        self.shares[n + 1, ~self._is_distance] = 0.0  # there nothing begins with V**2 > 0
+        stretch = np.vstack([rows.ds_by_parameters, rows.ds_by_place, zero]).reshape(n + 2, count, COUNT)
+        changes = twice * ds / self._y * (stretch / ds - 0.5 * self.shares)
         times = offset * (changes @ MEANS.T)
         arcs = self._over_distance(rows.ds_by_parameters.reshape(n, count, COUNT))
-        return shares, times + self._before(times), arcs + self._before(arcs), y[:, :, -1]
-
-    @property
-    def shares(self) -> Array:
-        """For each solution and panel y/W at the nodes."""
-        return self._solved[0]
-
-    @property
-    def times(self) -> Array:
-        """For each solution and panel the change of the time from the origin to the nodes, and to the panel's end."""
-        return self._solved[1]
-
-    @property
-    def arcs(self) -> Array:
-        """For each parameter and panel the integral of the derivative of ds/dlam from the origin to there."""
-        return self._solved[2]
+        self.times, self.arcs = times + self._before(times), arcs + self._before(arcs)
 
     @cached_property
     def _series(self) -> tuple[Array, Array]:
@@ -278,12 +310,8 @@ class Panels:
     def at(self, k: NDArray[np.intp], w: Array) -> tuple[Array, Array, Array]:
         """``shares``, ``times`` and ``arcs`` at march variables w on panels k."""
         others = self._sums(self._series[1], k, w)
-        return others[: self._law.count + 2], self.times_at(k, w), others[self._law.count + 2 :]
-
-    @property
-    def ends(self) -> Array:
-        """For each solution and panel y at the panel's end."""
-        return self._solved[3]
+        count = len(self.shares)
+        return others[:count], self.times_at(k, w), others[count:]
 
     def _over_distance(self, rows: Array) -> Array:
         """Integrals of u times rows over the distance, from the start of each panel to its points."""

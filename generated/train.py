@@ -1,0 +1,316 @@
+# Made by gqm-gen for "train". Do not edit: change its declaration and generate again.
+# interface 10, input b87305fcd75e, body a9a1838443f9
+"""A train of five cars on hills
+
+x              = x(s)
+z              = z(s)
+ds/ds          = 1
+dx/ds          = cos(alpha(s))
+dz/ds          = sin(alpha(s))
+kappa          = kappa(s)
+Theta          = -alpha(lam0) + alpha(s)
+V**2           = 2*g*(h(lam0) - h(s)) + v0**2
+N              = m*(g*cos(alpha(s)) + (2*g*(h(lam0) - h(s)) + v0**2)*kappa(s))
+A              = -g*dh(s)
+dt/ds          = 1/sqrt(2*g*(h(lam0) - h(s)) + v0**2)
+turning points : 2*g*(h(lam0) - h(s)) + v0**2 = 0
+liftoff        : g*cos(alpha(s)) + (2*g*(h(lam0) - h(s)) + v0**2)*kappa(s) = 0
+"""
+
+from typing import TYPE_CHECKING, Any
+
+from numba import carray
+
+from gqm_sym.runtime import compiler
+
+# Before anything else is asked of the runtime, so that another version of it is told from a broken one.
+compiled = compiler(__file__, interface=10)
+
+from gqm_sym.runtime.vocabulary import (
+    BOUNDS, EFFECTIVE_POTENTIAL, PATH_AND_CONTACT_FORCE, POTENTIAL_DIVDIFF1, POTENTIAL_DIVDIFF2, SEPARATED_TERMS,
+    CompiledFunctions, CompiledModel, LaunchRequest, Pass1, Sampled, SeparatedTerms, TrackOfTrain, chart_of, chart_rows,
+    cos, divdiff1_chart_z, divdiff2_chart_z, ichart_alpha, iconst, imul, place_from_ends,
+)
+
+if TYPE_CHECKING:
+    from gqm_sym.runtime import Equilibrium, Motion, Sweep
+
+# The run-time parameters and their defaults; pass1, solve, sweep and equilibria take them by keyword.
+PARAMETERS = {'length': '6', 'g': '9.81', 'm': '4000'}
+
+POINTS = """
+0.0 14.0000
+0.5 13.3813
+1.0 12.2950
+1.5 10.8719
+2.0 9.2645
+2.5 7.6312
+3.0 6.1201
+3.5 4.8562
+4.0 3.9310
+4.5 3.3963
+5.0 3.2628
+5.5 3.5017
+6.0 4.0511
+6.5 4.8238
+7.0 5.7180
+7.5 6.6279
+8.0 7.4537
+8.5 8.1110
+9.0 8.5371
+9.5 8.6957
+10.0 8.5777
+10.5 8.2002
+11.0 7.6029
+11.5 6.8424
+12.0 5.9856
+12.5 5.1027
+13.0 4.2604
+13.5 3.5158
+14.0 2.9120
+14.5 2.4752
+15.0 2.2138
+15.5 2.1189
+16.0 2.1670
+16.5 2.3229
+17.0 2.5448
+17.5 2.7886
+18.0 3.0120
+18.5 3.1790
+19.0 3.2628
+19.5 3.2475
+20.0 3.1288
+20.5 2.9138
+21.0 2.6194
+21.5 2.2699
+22.0 1.8941
+22.5 1.5225
+23.0 1.1841
+23.5 0.9039
+24.0 0.7009
+24.5 0.5864
+25.0 0.5642
+25.5 0.6301
+26.0 0.7733
+26.5 0.9780
+27.0 1.2248
+27.5 1.4930
+28.0 1.7626
+28.5 2.0160
+29.0 2.2392
+29.5 2.4231
+30.0 2.5635
+"""
+
+
+@compiled(PATH_AND_CONTACT_FORCE)
+def path_and_contact_force(n, places, speeds, p, out):
+    """x, z, ds/ds, curvature kappa, contact force N = m*(kappa*V**2 + n0), given V**2 (paper, eqs. 8, 15)."""
+    chart = chart_of(p, 3)
+    places, speeds, p, out = carray(places, n), carray(speeds, n), carray(p, 3), carray(out, (5, n))
+    g, m = p[1], p[2]
+    chart_rows(chart, (0, 1, 2, 3), places, out)
+    for i in range(n):
+        _chart_x, _chart_z, _chart_alpha, _t0, v2 = out[1, i], out[2, i], out[3, i], out[4, i], speeds[i]
+        out[0, i] = _chart_x
+        out[1, i] = _chart_z
+        out[2, i] = 1
+        out[3, i] = _t0
+        out[4, i] = m*(_t0*v2 + g*cos(_chart_alpha))
+
+
+@compiled(EFFECTIVE_POTENTIAL)
+def effective_potential(n, places, p, out):
+    """U per unit mass, V**2 = v0**2 - 2*(U(s) - U(lam0)), and dU/ds (paper, eq. 13)."""
+    chart = chart_of(p, 3)
+    along_h = chart_of(p, 3 + 1 * chart.size)
+    places, p, out = carray(places, n), carray(p, 3), carray(out, (2, n))
+    g = p[1]
+    chart_rows(along_h, (1, 2), places, out)
+    for i in range(n):
+        _space_h, _space_dh = out[0, i], out[1, i]
+        out[0, i] = _space_h*g
+        out[1, i] = _space_dh*g
+
+
+@compiled(POTENTIAL_DIVDIFF1)
+def potential_divdiff1(n, a, places, offsets, p, out):
+    """U[a, s] = (U(s) - U(a))/(s - a) without cancellation, and ds/ds (MATHS, s. 3)."""
+    chart = chart_of(p, 3)
+    along_h = chart_of(p, 3 + 1 * chart.size)
+    places, offsets, p, out = carray(places, n), carray(offsets, n), carray(p, 3), carray(out, (2, n))
+    g = p[1]
+    for i in range(n):
+        s, d = places[i], offsets[i]
+        out[0, i] = g*divdiff1_chart_z(along_h, a, s, d)
+        out[1, i] = 1
+
+
+@compiled(POTENTIAL_DIVDIFF2)
+def potential_divdiff2(n, a, b, left, right, p, out):
+    """U[a, s, b] = V**2/(2*(s - a)*(b - s)) from turn a to turn b, and ds/ds (MATHS, s. 3)."""
+    chart = chart_of(p, 3)
+    along_h = chart_of(p, 3 + 1 * chart.size)
+    left, right, p, out = carray(left, n), carray(right, n), carray(p, 3), carray(out, (2, n))
+    g = p[1]
+    for i in range(n):
+        da, db = left[i], right[i]
+        s = place_from_ends(a, b, da, db)
+        out[0, i] = g*divdiff2_chart_z(along_h, a, s, b, da, db)
+        out[1, i] = 1
+
+
+@compiled(BOUNDS)
+def bounds(lo, hi, p, out):
+    """Bounds of dU/ds and ds/ds for lo <= s <= hi, by interval arithmetic."""
+    chart = chart_of(p, 3)
+    along_h = chart_of(p, 3 + 1 * chart.size)
+    p, out = carray(p, 3), carray(out, 4)
+    s = (lo, hi)
+    g = (p[1], p[1])
+    out[0], out[1] = imul(g, ichart_alpha(along_h, s))
+    out[2], out[3] = iconst(1.0)
+
+
+# The same formulas over a namespace of operations, for extended precision.
+
+def exact_train(op, p):
+    """The length of a train, and what gravity is."""
+    length, g = p[0], p[1]
+    return length, g
+
+def exact_factors(op, p):
+    """What stands before the parts of U, then before those of n0."""
+    g = p[1]
+    return g, g
+
+
+def pass1(lam: Any, lam0: Any, v0: Any = 0.0, direction: int = 1, *, out: Any = None, length: Any = '6', g: Any = '9.81', m: Any = '4000', **unknown: Any) -> Pass1:
+    """Position, metric, curvature, V**2 and contact force at places of the curve (Pass 1, no quadrature).
+
+    Parameters
+    ----------
+    lam : array_like
+        Places on the curve, as values of its parameter s.
+    lam0, v0, direction
+        Launch place, speed and direction (+1 or -1: the sign of ds/dt).
+    out : Pass1, optional
+        The result of a call before, or six arrays like it, to be filled again.
+
+    Returns
+    -------
+    Pass1
+        Arrays x, z, ds, kappa, v2 and normal_force.
+    """
+    return MODEL.pass1(LaunchRequest(lam0, v0, direction), (length, g, m), lam, out, unknown)
+
+
+def solve(
+    lam0: Any = None, v0: Any = 0.0, direction: int = 1, *, point: Any = None, t_max: Any = None,
+    contact: str = "bilateral", length: Any = '6', g: Any = '9.81', m: Any = '4000', **unknown: Any,
+) -> "Motion":
+    """The motion that a launch begins (Passes 1 to 3).
+
+    Parameters
+    ----------
+    lam0, v0, direction
+        Launch place, speed (never negative) and direction (+1 or -1: the sign of ds/dt).
+    point : pair of numbers, optional
+        The launch place by its coordinates, instead of ``lam0``.
+    t_max : number, optional
+        Horizon of time.
+    contact : {"bilateral", "above", "below"}
+        Which side of the track can push.
+
+    Returns
+    -------
+    Motion
+
+    Raises
+    ------
+    GQMError
+        For a launch or a parameter that cannot be; the message says what would be right.
+    """
+    return MODEL.solve(LaunchRequest(lam0, v0, direction, point, t_max, contact), (length, g, m), unknown)
+
+
+def sweep(
+    quantity: str, lam0: Any, v0: Any = 0.0, direction: Any = 1, *, lam: Any = None, t_max: Any = None,
+    contact: str = "bilateral", gradient: Any = None, client: Any = None, length: Any = '6', g: Any = '9.81',
+    m: Any = '4000', **unknown: Any,
+) -> "Sweep":
+    """One quantity over arrays of launches and parameters, on all cores; all arguments broadcast.
+
+    Parameters
+    ----------
+    quantity : str
+        "half_period", "period", "turning_points" (the lower, the upper: one more axis), "v_min", "v_max",
+        "normal_force_min", "normal_force_max", "time_at", "t_end" or "rest_position".
+    lam0, v0, direction
+        Launch places, speeds and directions.
+    lam
+        For "time_at": the place, of which the first time there is asked.
+    t_max, contact
+        One for all launches, as of ``solve``.
+    gradient : str or sequence of str, optional
+        What derivatives of the quantity are by: run-time parameters, "lam0" and "v0".
+    client : distributed.Client, optional
+        A Dask cluster to do the work, with the same results.
+
+    Returns
+    -------
+    Sweep
+        ``values``, NaN where there is none; ``status``, 0 where there is one, and ``route``, how each was found.
+        ``status_counts()`` counts the launches without a value. ``gradient``, if asked for, has one more axis.
+    """
+    launches = LaunchRequest(lam0, v0, direction, None, t_max, contact)
+    return MODEL.sweep(quantity, launches, (length, g, m), lam=lam, client=client, gradient=gradient, unknown=unknown)
+
+
+def equilibria(*, between: Any = None, length: Any = '6', g: Any = '9.81', m: Any = '4000', **unknown: Any) -> "tuple[Equilibrium, ...]":
+    """Where a body at rest stays, whether it is stable there, and the frequency of small oscillations.
+
+    Parameters
+    ----------
+    between : pair of numbers, optional
+        The range of s to look in: the whole domain, or one period, if not given.
+
+    Returns
+    -------
+    tuple of Equilibrium
+        Each with lam, stable and frequency (rad/s).
+    """
+    return MODEL.equilibria((length, g, m), between, unknown)
+
+
+# ---- The same formulas once more, only for speed: a load map in one call, and many orbits at once for sweeps. ----
+
+
+@compiled(SEPARATED_TERMS)
+def separated_terms(n, a, places, offsets, p, out):
+    """Parts of U[a, s] and of n0, whose factors are `exact_factors`; between them ds/ds and kappa."""
+    chart = chart_of(p, 3)
+    along_h = chart_of(p, 3 + 1 * chart.size)
+    places, offsets, p, out = carray(places, n), carray(offsets, n), carray(p, 3), carray(out, (4, n))
+    chart_rows(chart, (2, 3), places, out)
+    for i in range(n):
+        _chart_alpha, _chart_kappa, s, d = out[2, i], out[3, i], places[i], offsets[i]
+        out[0, i] = divdiff1_chart_z(along_h, a, s, d)
+        out[1, i] = 1
+        out[2, i] = _chart_kappa
+        out[3, i] = cos(_chart_alpha)
+
+
+CHART = TrackOfTrain(Sampled(POINTS, kind='spline', closed=False), cars=5, numbers=exact_train, length=0)
+
+
+MODEL = CompiledModel(
+    name='train', parameter='s', parameters=PARAMETERS, positive=('length',),
+    source=__file__,
+    units={'g': 'm/s**2', 'length': 'm', 'm': 'kg', 's': 'm'},
+    functions=CompiledFunctions(
+        path_and_contact_force, effective_potential, potential_divdiff1, potential_divdiff2, bounds,
+    ),
+    chart=CHART,
+    separated=SeparatedTerms(separated_terms, exact_factors, potentials=1, loads=1, held=()),
+)

@@ -1,0 +1,1 @@
+"""Charts of rails in space."""

@@ -1,0 +1,275 @@
+"""Rails in space: pieces whose frame turns at rates that are polynomials in arc length, and curves with formulas.
+
+The frame is the tangent t, the direction l to the left and u upwards; along a piece
+
+    t' = yaw l + pitch u,   l' = -yaw t - roll u,   u' = -pitch t + roll l.
+
+Its Taylor series on parts of the piece is found with a longer mantissa than that of doubles, which the coordinates,
+integrals of t, keep as two doubles each.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from itertools import islice
+from math import ceil, comb, cos, sin
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from gqm_sym.errors import BudgetError, DeclarationError, ParameterError
+from gqm_sym.literals.namespaces import FLOATS
+from gqm_sym.literals.numbers import Number
+from gqm_sym.runtime.charts.arc_length import MAX_PIECES, divided, summed
+from gqm_sym.runtime.charts.chart import NODES, Chart, assemble_in_space
+from gqm_sym.runtime.charts.rail import MAX_MISMATCH, MAX_TOTAL_TURN
+from gqm_sym.runtime.compiled.calls import call_segment
+from gqm_sym.runtime.compiled.jit import entry
+from gqm_sym.runtime.compiled.types import INTEGER, MATRIX, VECTOR, Array
+
+# The coefficients of each of the three rates of a transition, in powers of the distance from its beginning.
+POWERS = 6
+# The numbers that define each piece: the length of a transition stands before the coefficients of its rates.
+PIECE_NUMBERS = {"line": 1, "arc": 2, "clothoid": 3, "transition": 1 + 3 * POWERS, "curve": 2}
+
+# On a part of a piece the frame turns by less than a half even where distances are RADIUS times as long: terms of its
+# series fall at least as powers of RADIUS, so that after TERMS of them nothing is left of 64 bits.
+RADIUS, MAX_GROWTH, TERMS = 4.0, 0.5, 36
+
+# Rows of the function of a piece with formulas: coordinates, ds/dlam, and three derivatives of these by arc length.
+CURVE_ROWS = 13
+Long = Any  # an array of the longest floats
+
+
+class Pen(NamedTuple):
+    """The end of a piece: its coordinates, and the frame in rows."""
+
+    place: Long
+    frame: Long
+
+
+class Pieces(NamedTuple):
+    """The n pieces of a chart of one part of the rail: lengths, coordinates at left edges, and t, t', t'' at nodes."""
+
+    lengths: Array
+    anchors: Long
+    slopes: Array
+    bends: Array
+    changes: Array
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SpaceRail:
+    """A rail in space, which makes its chart for values of the run-time parameters.
+
+    Attributes
+    ----------
+    numbers
+        ``f(op, p)``: x, y and z, heading, climb and roll at the start where the rail is ``placed``, then for each piece
+        as many as `PIECE_NUMBERS` says.
+    pieces : tuple of str
+        "line", "arc", "clothoid", "transition" or "curve".
+    placed : bool
+        Whether the start is given; else the first piece is a curve, whose place is known.
+    segments : tuple of int
+        Addresses of the compiled functions of the curves among the pieces, in order.
+    closed : bool
+        Whether the end is joined to the start.
+    shaped_by : tuple of int or None
+        The run-time parameters that the rail depends on, by their place; None if that is not known.
+    """
+
+    numbers: Callable[..., Any]
+    pieces: tuple[str, ...]
+    placed: bool
+    segments: tuple[int, ...] = ()
+    closed: bool = False
+    shaped_by: tuple[int, ...] | None = None
+
+    def chart(self, p: tuple[float, ...]) -> Chart:
+        """Return the chart.
+
+        Raises
+        ------
+        ParameterError
+            If a length or a radius is not positive, or a number is not finite.
+        DeclarationError
+            If pieces do not meet, or a closed rail does not close.
+        """
+        numbers, segments = iter(self.numbers(FLOATS, p)), iter(self.segments)
+        pen = _start(*(float(number) for number in islice(numbers, 6))) if self.placed else None
+        start, parts, joints = pen, [], [0.0]
+        for count, kind in enumerate(self.pieces, start=1):
+            where = f"piecewise: piece {count} ({kind})"
+            given = [float(number) for number in islice(numbers, PIECE_NUMBERS[kind])]
+            if kind == "curve":
+                part, begin, end = _curve(next(segments), np.array(p), given, where)
+                if pen is not None:
+                    length = joints[-1] + float(part.lengths.sum())
+                    _check_joint(pen, begin, length, f"{where}: begins", "the piece before it ends")
+            else:
+                assert pen is not None
+                begin = pen
+                part, end = _turned(*_rates(kind, given, where), pen, where)
+            start, pen = start or begin, end
+            parts.append(part)
+            joints.append(joints[-1] + float(part.lengths.sum()))
+            if sum(one.lengths.size for one in parts) > MAX_PIECES:
+                raise BudgetError(f"chart: {where}: {MAX_PIECES} pieces reach no farther; let the rail turn less")
+        assert start is not None
+        assert pen is not None
+        if self.closed:
+            _check_joint(pen, start, joints[-1], "piecewise: closed: the start lies", "the last piece ends")
+        lengths, anchors, *derivatives = (np.concatenate(rows) for rows in zip(*parts, strict=True))
+        edges, inner = summed(lengths), joints[:-1] if self.closed else joints[1:-1]
+        return assemble_in_space(
+            edges,
+            anchors,
+            derivatives,
+            period=edges[-1] if self.closed else 0.0,
+            # Breaks are edges of the chart, to the last bit.
+            breaks=edges[np.abs(edges[:, None] - np.array(inner)).argmin(axis=0)] if inner else (),
+        )
+
+    def is_exact(self, chart: Chart) -> bool:
+        """Return False: the rail is known in doubles only."""
+        return False
+
+    def true_curve(self, context: Any, p: tuple[Any, ...], chart: Chart) -> Any:
+        """Return None: there is no such thing."""
+        return None
+
+    def true_pieces(self, p: Sequence[Number], chart: Chart) -> Any:
+        """Return None: there is no such thing."""
+        return None
+
+
+def _start(x: float, y: float, z: float, heading: float, climb: float, roll: float) -> Pen:
+    """Return the start of a rail, whose frame leans to the left by the roll angle."""
+    cosine, sine, level, rise = cos(heading), sin(heading), cos(climb), sin(climb)
+    ahead = np.array([level * cosine, level * sine, rise], dtype=np.longdouble)
+    left = np.array([-sine, cosine, 0.0], dtype=np.longdouble)
+    up = np.array([-rise * cosine, -rise * sine, level], dtype=np.longdouble)
+    lean, upright = sin(roll), cos(roll)
+    frame = np.stack([ahead, upright * left - lean * up, upright * up + lean * left])
+    return Pen(np.array([x, y, z], dtype=np.longdouble), frame)
+
+
+def _check_joint(end: Pen, begin: Pen, length: float, who: str, whom: str) -> None:
+    """Refuse a joint at which the place or the tangent jumps."""
+    gap = float(np.sqrt(((begin.place - end.place) ** 2).sum()))
+    turn = float(np.sqrt(((begin.frame[0] - end.frame[0]) ** 2).sum()))
+    if not (gap <= MAX_MISMATCH * length and turn <= MAX_MISMATCH):
+        place, other = (tuple(pen.place.astype(float).tolist()) for pen in (begin, end))
+        raise DeclarationError(
+            f"{who} at {place!r}, {gap:.3g} m and {turn:.3g} rad off where {whom}: {other!r}; "
+            f"both must match within {MAX_MISMATCH:g} of the rail's length and {MAX_MISMATCH:g} rad"
+        )
+
+
+def _rates(kind: str, given: list[float], where: str) -> tuple[float, Long]:
+    """Return the length of a piece, and the coefficients of yaw, pitch and roll in rows.
+
+    Arcs and clothoids turn by pitch, as a rail in a plane does.
+    """
+    size, other = ("radius", "angle") if kind == "arc" else ("length", "rate")
+    if not (np.isfinite(given[0]) and given[0] > 0.0):
+        raise ParameterError(f"{where}: {size}: must be positive, got {given[0]!r}")
+    for value in given[1:]:
+        if not np.isfinite(value):
+            raise ParameterError(f"{where}: {other}: must be finite, got {value!r}")
+    if kind == "arc" and given[1] == 0.0:
+        raise ParameterError(f"{where}: angle: must not be zero; positive turns up, negative down")
+    rates, length = np.zeros((3, POWERS), dtype=np.longdouble), given[0]
+    match kind:
+        case "arc":
+            radius, angle = given
+            length = radius * abs(angle)
+            rates[1, 0] = np.copysign(1.0, angle) / np.longdouble(radius)
+        case "clothoid":
+            rates[1, 0], rates[1, 1] = given[1], (np.longdouble(given[2]) - given[1]) / length
+        case "transition":
+            rates[:] = np.array(given[1:]).reshape(3, POWERS)
+    return length, rates
+
+
+def _turned(length: float, rates: Long, pen: Pen, where: str) -> tuple[Pieces, Pen]:
+    """Return a piece by its rates, and its right end."""
+    orders = np.arange(POWERS)
+    sizes = np.sqrt((rates.astype(np.float64) ** 2).sum(axis=0))
+    turned = float((sizes * length ** (orders + 1)).sum())
+    if not turned <= MAX_TOTAL_TURN:
+        raise ParameterError(f"{where}: turns by {turned:.3g} rad; {MAX_TOTAL_TURN:g} is the most")
+    # Bounds of the rates' Taylor coefficients anywhere on the piece.
+    most = np.array([sum(comb(i, j) * sizes[i] * length ** (i - j) for i in range(j, POWERS)) for j in range(POWERS)])
+    count = 1
+    while (most * (length / count) ** (orders + 1) * RADIUS**orders).sum() > MAX_GROWTH:
+        count = ceil(1.25 * count)
+    step = np.longdouble(length) / count
+    left = step * np.arange(count)
+    scaled = np.zeros((count, 3, POWERS), dtype=np.longdouble)
+    for j in range(POWERS):
+        for i in range(j, POWERS):
+            scaled[:, :, j] += comb(i, j) * rates[:, i] * (left ** (i - j))[:, None]
+        scaled[:, :, j] *= step ** (j + 1)
+    yaw, pitch, roll = np.moveaxis(scaled, 1, 0)
+    turn = np.zeros((POWERS, count, 3, 3), dtype=np.longdouble)
+    for (row, column), rate in {(0, 1): yaw, (0, 2): pitch, (2, 1): roll}.items():
+        turn[:, :, row, column], turn[:, :, column, row] = rate.T, -rate.T
+    series = [np.broadcast_to(np.eye(3, dtype=np.longdouble), (count, 3, 3))]
+    for k in range(TERMS):
+        total = sum(turn[j] @ series[k - j] for j in range(min(k + 1, POWERS)))
+        series.append(total / (k + 1))
+    frames = np.empty((count + 1, 3, 3), dtype=np.longdouble)
+    passed: Long = sum(series)
+    frames[0] = pen.frame
+    for k in range(count):
+        frames[k + 1] = passed[k] @ frames[k]
+    gained: Long = step * sum(term[:, 0] / (k + 1) for k, term in enumerate(series))
+    gains = np.concatenate([pen.place[None], np.einsum("ki,kij->kj", gained, frames[:-1])])
+    places = np.cumsum(gains, axis=0)
+    shares = 0.5 * (1.0 + np.asarray(NODES, dtype=np.longdouble))
+    at_nodes: Long = sum(term[:, None] * (shares**k)[:, None, None] for k, term in enumerate(series))
+    at_nodes = at_nodes @ frames[:-1, None]
+    now: Long = sum(scaled[:, :, j, None] * shares**j for j in range(POWERS)) / step
+    growth: Long = sum(scaled[:, :, j, None] * (j * shares ** (j - 1)) for j in range(1, POWERS)) / step**2
+    (yaw, pitch, roll), (more_yaw, more_pitch, _) = (np.moveaxis(r, 1, 0)[..., None] for r in (now, growth))
+    ahead, side, up = np.moveaxis(at_nodes, 2, 0)
+    bends = yaw * side + pitch * up
+    changes = (more_yaw + pitch * roll) * side + (more_pitch - yaw * roll) * up - (yaw**2 + pitch**2) * ahead
+    rows = (np.moveaxis(row, 2, 1).astype(np.float64) for row in (ahead, bends, changes))
+    pieces = Pieces(np.full(count, float(step)), places[:-1], *rows)
+    return pieces, Pen(places[-1], frames[-1])
+
+
+@entry(MATRIX(INTEGER, VECTOR, VECTOR))
+def _segment_rows(address, p, lam):  # type: ignore[no-untyped-def]
+    """Return the rows of a curve with formulas."""
+    out = np.empty((CURVE_ROWS, lam.size))
+    call_segment(address, lam.size, lam, p, out)
+    return out
+
+
+def _curve(address: int, p: Array, ends: list[float], where: str) -> tuple[Pieces, Pen, Pen]:
+    """Return a curve with formulas, and both its ends."""
+    low, high = ends
+    if not (np.isfinite(low) and np.isfinite(high) and low < high):
+        raise ParameterError(f"{where}: domain: must have finite ends lo < hi, got ({low!r}, {high!r})")
+
+    def rows(left: Array, offsets: Array) -> Array:
+        out: Array = _segment_rows(address, p, (left[:, None] + offsets).ravel())
+        return out.reshape(CURVE_ROWS, *offsets.shape)
+
+    found = divided(rows, np.array([low, high]), 3, where=where)
+    at_ends = rows(np.array([low, high]), np.zeros((2, 1)))[:, :, 0].T
+    begin, end = (Pen(row[:3].astype(np.longdouble), _level(row[4:7])) for row in at_ends)
+    values = np.moveaxis(found.at_nodes, 0, 1)
+    anchors = found.at_edges[:3].T.astype(np.longdouble)
+    return Pieces(found.lengths, anchors, values[:, :3], values[:, 3:6], values[:, 6:]), begin, end
+
+
+def _level(tangent: Array) -> Long:
+    """Return the frame of a tangent that leans to no side; where it is vertical, that with l along y."""
+    ahead = tangent.astype(np.longdouble)
+    width = np.hypot(ahead[0], ahead[1])
+    left = np.array([-ahead[1] / width, ahead[0] / width, 0.0]) if width > MAX_MISMATCH else np.array([0.0, 1.0, 0.0])
+    return np.stack([ahead, left, np.cross(ahead, left)])

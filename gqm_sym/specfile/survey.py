@@ -1,0 +1,202 @@
+"""Surveyed tracks as files have them: tables of coordinates (CSV), and places on the Earth (GPX) in local metres."""
+
+from collections.abc import Sequence
+from math import cos, hypot, isfinite, radians, sin, sqrt
+from pathlib import Path
+from typing import Any, NamedTuple
+from xml.parsers import expat
+
+from gqm_sym.arguments import file_path
+from gqm_sym.errors import InputError
+from gqm_sym.specfile.beside import ROW_LIMIT, read_beside, read_rows
+
+WANTED = "a CSV file with columns x, z, or x, y, z, perhaps with roll, or a GPX file"
+"""What a file of points should be, for messages."""
+# The columns of a table without their names, by their number.
+_UNNAMED = {2: ("x", "z"), 3: ("x", "y", "z"), 4: ("x", "y", "z", "roll")}
+# The elements of GPX whose points are a track.
+_PLACES = ("trkpt", "rtept")
+# The ellipsoid of the World Geodetic System 1984: half its longer axis in m, and its flattening.
+EQUATOR, FLATTENING = 6378137.0, 1.0 / 298.257223563
+# How far from its first point a track may go, in m: the Earth's curvature displaces a place by some d**3/(6 R**2).
+FARTHEST = 50_000.0
+
+
+class Survey(NamedTuple):
+    """Points as a file has them.
+
+    Attributes
+    ----------
+    rows
+        The coordinates of each point, x and z, or x, y and z: numbers or decimal text.
+    roll
+        The roll angle at each point; None where the file has none.
+    first_line
+        The line of the first point, which messages count from; of GPX, which has no lines, 1.
+    """
+
+    rows: Sequence[Sequence[Any]]
+    roll: Sequence[Any] | None
+    first_line: int
+
+
+def read_track(path: Path | str) -> dict[str, tuple[float, ...]]:
+    """Read the points of a surveyed track, as `Curve.sampled` takes them.
+
+    Parameters
+    ----------
+    path
+        Of a CSV file with columns x and z, or x, y and z in metres, in the order that its first line names, perhaps
+        with the roll angle in radians as a column roll; or of a GPX file, whose latitudes, longitudes and heights
+        become metres to the east (x), to the north (y) and upwards (z). x and y are then those in the plane that
+        touches the ellipsoid of WGS 84 at the first point, and z is the height as the file has it. At most 32 MiB.
+
+    Returns
+    -------
+    dict
+        The columns by name.
+
+    Raises
+    ------
+    InputError
+        If there is no such file, or it is anything but a table of points; the message names file and row.
+    """
+    file = file_path(path, where="read_track: path")
+    if file.is_file():
+        file = file.resolve()
+    found = surveyed(file.name, file.parent)
+    width = len(found.rows[0]) if found.rows else 0
+    rolls = [()] * len(found.rows) if found.roll is None else [(angle,) for angle in found.roll]
+    numbers = []
+    for k, (row, roll) in enumerate(zip(found.rows, rolls, strict=True), found.first_line):
+        where = f"{file.name!r}, row {k}"
+        if len(row) != width or width not in _UNNAMED:
+            raise InputError(f"{where}: must be numbers, x and z, or x, y and z, as many in each row, got {list(row)}")
+        numbers.append([_number(value, where) for value in (*row, *roll)])
+    if not numbers:
+        raise InputError(f"{file.name!r}: has no points; give {WANTED}")
+    return dict(zip(_UNNAMED[len(numbers[0])], zip(*numbers, strict=True), strict=True))
+
+
+def surveyed(name: str, folder: Path) -> Survey:
+    """Read the points of a file in a folder, which is named by its extension or else a CSV file.
+
+    Raises
+    ------
+    InputError
+        If it is anything but points.
+    """
+    text = read_beside(name, folder, wanted=WANTED)
+    if name.lower().endswith(".gpx"):
+        return Survey(_local(name, _Reader(name).read(text)), None, 1)
+    header, rows = read_rows(name, text)
+    named = tuple(field.lower() for field in header)
+    if header and not (set(named) in map(set, _UNNAMED.values()) and len(set(named)) == len(named)):
+        raise InputError(
+            f"{name!r}, row 1: the columns must be x, z, or x, y, z, perhaps with roll, got {','.join(header)!r:.60}"
+        )
+    columns = named or _UNNAMED.get(len(rows[0]), ())
+    if columns in (_UNNAMED[2], _UNNAMED[3]) or not columns:
+        return Survey(rows, None, 1 + bool(header))
+    for row, fields in enumerate(rows, start=1 + bool(header)):
+        if len(fields) != len(columns):
+            raise InputError(f"{name!r}, row {row}: must be {len(columns)} numbers, {', '.join(columns)}, got {fields}")
+    places = [columns.index(axis) for axis in "xyz" if axis in columns]
+    roll = [fields[columns.index("roll")] for fields in rows] if "roll" in columns else None
+    return Survey([[fields[k] for k in places] for fields in rows], roll, 1 + bool(header))
+
+
+def _number(value: Any, where: str) -> float:
+    try:
+        number = float(value)
+    except ValueError:
+        number = float("nan")
+    if not isfinite(number):
+        raise InputError(f"{where}: {str(value)[:40]!r} is no finite decimal number; leave the row out or mend it")
+    return number
+
+
+class _Reader:
+    """Collects latitude, longitude and height of the points of the first track or route of a GPX file.
+
+    Declarations of document types are refused, and entities with them: nothing is expanded or fetched.
+    """
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+        self.places: list[list[Any]] = []
+        self.kind = ""
+        self.height: list[str] | None = None
+        self.ended = False
+
+    def read(self, text: str) -> list[list[Any]]:
+        """Read a file's text."""
+        parser = expat.ParserCreate("utf-8")
+        parser.StartDoctypeDeclHandler = self._refuse
+        parser.StartElementHandler, parser.EndElementHandler = self._start, self._end
+        parser.CharacterDataHandler = self._text
+        try:
+            parser.Parse(text.encode(), True)
+        except expat.ExpatError as error:
+            what = expat.ErrorString(error.code)
+            raise InputError(f"{self.name!r}, line {error.lineno}: is no GPX ({what}); export it again") from None
+        if not self.places:
+            raise InputError(f"{self.name!r}: has no points of a track (trkpt) or a route (rtept)")
+        return self.places
+
+    def _refuse(self, *_: Any) -> None:
+        raise InputError(f"{self.name!r}: has a document type (DOCTYPE), which GPX files do not have; remove it")
+
+    def _start(self, tag: str, attributes: dict[str, str]) -> None:
+        tag = tag.rpartition(":")[2]
+        if tag in _PLACES and not self.ended and self.kind in ("", tag):
+            self.kind = tag
+            if len(self.places) == ROW_LIMIT:
+                raise InputError(f"{self.name!r}: has more than {ROW_LIMIT} points, which are the most")
+            where = f"{self.name!r}, point {len(self.places) + 1}"
+            latitude, longitude = (_number(attributes.get(key, ""), f"{where}: {key}") for key in ("lat", "lon"))
+            if not (abs(latitude) <= 90.0 and abs(longitude) <= 360.0):
+                raise InputError(f"{where}: {latitude!r}, {longitude!r} are no latitude and longitude in degrees")
+            self.places.append([latitude, longitude, None])
+        elif tag == "ele" and self.kind and not self.ended:
+            self.height = []
+
+    def _text(self, text: str) -> None:
+        if self.height is not None:
+            self.height.append(text)
+
+    def _end(self, tag: str) -> None:
+        tag = tag.rpartition(":")[2]
+        where = f"{self.name!r}, point {len(self.places)}"
+        if tag == "ele" and self.height is not None:
+            self.places[-1][2] = _number("".join(self.height), f"{where}: ele")
+            self.height = None
+        elif tag == self.kind and not self.ended and self.places[-1][2] is None:
+            raise InputError(f"{where}: has no height (ele); loads need heights")
+        elif tag in ("trk", "rte") and self.kind:
+            self.ended = True
+
+
+def _local(name: str, places: Sequence[Sequence[float]]) -> list[list[float]]:
+    """Metres to the east and to the north of the first place, in the plane that touches the ellipsoid, and height."""
+    square = FLATTENING * (2.0 - FLATTENING)
+    north, start = radians(places[0][0]), radians(places[0][1])
+
+    def in_meridian(latitude: float, height: float) -> tuple[float, float]:
+        """The distance from the axis, and that along it from the equator's plane."""
+        radius = EQUATOR / sqrt(1.0 - square * sin(latitude) ** 2)
+        return (radius + height) * cos(latitude), (radius * (1.0 - square) + height) * sin(latitude)
+
+    first = in_meridian(north, places[0][2])
+    rows = []
+    for count, (latitude, longitude, height) in enumerate(places, start=1):
+        out, along = in_meridian(radians(latitude), height)
+        turn = radians(longitude) - start
+        away = out * cos(turn) - first[0]
+        rows.append([out * sin(turn), (along - first[1]) * cos(north) - away * sin(north), height])
+        if (far := hypot(*rows[-1][:2])) > FARTHEST:
+            raise InputError(
+                f"{name!r}, point {count}: is {far / 1e3:.0f} km from the first; a track goes no further than "
+                f"{FARTHEST / 1e3:.0f} km, as the Earth is round"
+            )
+    return rows

@@ -1,0 +1,251 @@
+"""Trains against closed forms, a 30-digit truth, and the motion of the body that a short train is."""
+
+from collections.abc import Callable
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import pytest
+from mpmath import mp, mpf
+from naive import ulps
+
+import generated.circle_drag
+import gqm_sym as gqm
+from gqm_sym.errors import DeclarationError, GQMError, InputError, LaunchError, ParameterError
+
+G = mpf("9.81")
+# Heights of a chart are right to a unit or two in the last place; half periods are measured to 2 of them.
+MAX_ULPS = 3.0
+# Forces are a few operations on such heights, as a share of the weight.
+SHARE = 1e-14
+# Times along points in space are known in doubles only: some units in the last place.
+ROUNDING = 4e-15
+
+Build = Callable[..., ModuleType]
+
+
+@pytest.fixture(scope="module")
+def build(tmp_path_factory: pytest.TempPathFactory) -> Build:
+    """Build a module of a train once."""
+    folder, built = tmp_path_factory.mktemp("trains"), {}
+
+    def module(name: str, curve: gqm.Curve, force: Any = None, cars: int = 3) -> ModuleType:
+        if name not in built:
+            law = gqm.Gravity() + gqm.Train(cars=cars)
+            model = gqm.derive(curve, law if force is None else law + force)
+            built[name] = gqm.build(model, name=name, folder=folder)
+        return built[name]
+
+    return module
+
+
+@pytest.fixture(scope="module")
+def circle(build: Build) -> ModuleType:
+    """A train on a circle."""
+    return build("train_on_circle", gqm.families.circle())
+
+
+def weaker(length: Any, radius: Any) -> Any:
+    """Gravity of the pendulum that a train on a circle is."""
+    half = mpf(length) / (2 * mpf(radius))
+    return G * mp.sin(half) / half
+
+
+@pytest.mark.parametrize(
+    ("radius", "length", "place"),
+    [(1, 1, 1.2), (5, 9.5, 1.5), (2, 6, 5.0), (1, 0.1, 0.01), (3, 12, 4.0), (1, 1e-6, 1.2), (1, 2.0**-40, 2.0)],
+)
+def test_on_a_circle_it_is_a_pendulum(circle: ModuleType, radius: float, length: float, place: float) -> None:
+    """Its half period is that of a pendulum under g*sinc(l/(2*R)), also of a train so short that it is a body."""
+    with mp.workdps(40):
+        sine = mp.sin(mpf(place) / (2 * radius))
+        truth = 2 * mp.sqrt(radius / weaker(length, radius)) * mp.ellipk(sine**2)
+        found = circle.solve(place, L=radius, length=length).half_period
+        assert ulps(found, truth) <= MAX_ULPS
+    assert circle.sweep("half_period", [place], L=radius, length=length).values[0] == pytest.approx(found, rel=1e-15)
+
+
+def test_forces_on_cars(circle: ModuleType) -> None:
+    """They are those of bodies on a circle at the speed of the train, and couplings carry what gravity leaves over."""
+    radius, length, cars, mass = 5.0, 4.0, 3, 900.0
+    motion = circle.solve(6, L=radius, length=length, m=mass)
+    times = np.array([[0.0, 0.3], [1.0, 9.0]])
+    found, g, state = motion.cars(times), float(weaker(length, radius)), motion.state(times)
+    shares = (np.arange(cars) + 0.5) / cars - 0.5
+    angles = (state.lam + length * shares[:, None, None]) / radius
+    v2 = 2 * g * radius * (np.cos(state.lam / radius) - np.cos(6 / radius))
+    force = mass / cars * (v2 / radius + 9.81 * np.cos(angles))
+    scale = SHARE * mass * 9.81
+    assert found.lam.shape == (cars, 2, 2)
+    np.testing.assert_allclose(found.normal_force, force, rtol=0, atol=scale)
+    np.testing.assert_allclose(found.normal_x, -force * np.sin(angles), rtol=0, atol=scale)
+    np.testing.assert_allclose(found.normal_z, force * np.cos(angles), rtol=0, atol=scale)
+    assert not found.normal_y.any()
+    assert not found.y.any()
+    np.testing.assert_allclose(found.z, -radius * np.cos(angles), rtol=0, atol=1e-14)
+    # The part behind a coupling is as fast as all: its own gravity is g sinc(own length/2R) at its own middle.
+    for k in range(1, cars):
+        behind = length * k / cars
+        middle = state.lam - length / 2 + behind / 2
+        pull = float(weaker(behind, radius)) * np.sin(middle / radius) - g * np.sin(state.lam / radius)
+        np.testing.assert_allclose(found.coupling_force[k - 1], mass * k / cars * pull, rtol=0, atol=scale)
+    one = motion.cars(0.3)
+    np.testing.assert_array_equal(one.coupling_force, found.coupling_force[:, 0, 1])
+    assert one.t == 0.3
+
+
+def test_parabola(build: Build) -> None:
+    """On an open track the half period is that of the mean height, whose integral has a closed form there."""
+    length, reach = mpf(3) / 2, 2
+    with mp.workdps(30):
+
+        def arc(x: Any) -> Any:
+            return x * mp.sqrt(1 + 4 * x * x) / 2 + mp.asinh(2 * x) / 4
+
+        def raised(x: Any) -> Any:  # the integral of z = x² over arc length
+            return x * (8 * x * x + 1) * mp.sqrt(1 + 4 * x * x) / 32 - mp.asinh(2 * x) / 64
+
+        def place(s: Any) -> Any:
+            return mp.findroot(lambda x: arc(x) - s, s / 2)
+
+        def height(s: Any) -> Any:
+            return (raised(place(s + length / 2)) - raised(place(s - length / 2))) / length
+
+        start, end = arc(mpf(reach)), mpf(5) / 2
+        low, high = height(mpf(0)), height(end)
+        assert low > 0
+        count = 40  # trapezoidal rule over the angle with s = end*sin(angle), which is periodic
+        total = mpf(0)
+        for k in range(count):
+            angle = mp.pi * (k + mpf(1) / 2) / (2 * count)
+            s = end * mp.sin(angle)
+            total += end * mp.cos(angle) / mp.sqrt(2 * G * (high - height(s)))
+        truth = total * mp.pi / count
+        launch = str(start - end)
+    module = build("train_on_parabola", gqm.Curve.graph("x**2", parameter="x", domain=(-reach, reach)))
+    motion = module.solve(launch, length="3/2")
+    assert ulps(motion.half_period, truth) <= MAX_ULPS
+    assert motion.turning_points == pytest.approx((float(start - end), float(start + end)), rel=1e-15)
+    # Beyond its range an end of the train would be beyond the end of the track.
+    with pytest.raises(LaunchError, match="domain"):
+        module.solve("1/2", length="3/2")
+
+
+def test_across_joints(build: Build) -> None:
+    """Where a rail is put together, the mean height is that of the heights: nothing is smoothed over a joint."""
+    rail = gqm.Curve.piecewise([gqm.line(length=2), gqm.arc(radius=1, angle=1), gqm.line(length=3)], heading=-1)
+    module = build("train_on_rail", rail)
+    length = 1.25
+    launch, v0 = 0.7, 3.0
+    places = np.array([0.7, 1.3, 1.5, 2.2, 2.9, 3.4, 3.8, 5.0])
+    found = module.pass1(places, launch, v0, length=length).v2
+    nodes, weights = np.polynomial.legendre.leggauss(20)
+
+    def mean(s: float) -> float:
+        edges = np.unique(np.clip([s - length / 2, 2.0, 3.0, s + length / 2], s - length / 2, s + length / 2))
+        half = np.diff(edges)[:, None] / 2
+        at = (edges[:-1, None] + half * (1 + nodes)).ravel()
+        slide, turned = np.minimum(at, 2.0), np.clip(at - 2.0, 0.0, 1.0)
+        z = -slide * np.sin(1) + np.cos(1) - np.cos(1 - turned)
+        return float((half * (z.reshape(half.size, -1) @ weights)[:, None]).sum() / length)
+
+    heights = np.array([mean(s) for s in places])
+    np.testing.assert_allclose(found, v0**2 - 2 * 9.81 * (heights - heights[0]), rtol=0, atol=4e-14)
+
+
+def test_drag(build: Build) -> None:
+    """A train on a circle with drag turns where a pendulum under weaker gravity does."""
+    module = build("train_with_drag", gqm.families.circle(), gqm.QuadraticDrag())
+    length, drag = 1.5, 0.05
+    legs = module.solve(2.0, L=1, length=length, b=drag, t_max=4).legs
+    body = generated.circle_drag.solve(2.0, L=1, b=drag, g=float(weaker(length, 1)), t_max=4).legs
+    assert len(legs) == len(body) > 2
+    for train, pendulum in zip(legs, body, strict=True):
+        assert train.lam_end == pytest.approx(pendulum.lam_end, rel=0, abs=1e-13)
+        assert train.t_end == pytest.approx(pendulum.t_end, rel=1e-13)
+
+
+def test_in_space(build: Build) -> None:
+    """Along points in space a vertical track is the planar one, and sweeps are single motions."""
+    angle = np.linspace(0, 2 * np.pi, 60, endpoint=False)
+    x, z = 4 * np.cos(angle), np.sin(2 * angle) + np.sin(angle)
+    flat = build("train_in_plane", gqm.Curve.sampled(np.stack([x, z], axis=1), closed=True))
+    upright = np.stack([0.6 * x, 0.8 * x, z], axis=1)
+    tilted = build("train_in_space", gqm.Curve.sampled(upright, closed=True))
+    planar, spatial = (module.solve(9, length=2.5) for module in (flat, tilted))
+    assert spatial.half_period == pytest.approx(planar.half_period, rel=1e-13)
+    cars, theirs = planar.cars(0.7), spatial.cars(0.7)
+    # The curvature of a spline through 60 points has some hundred roundings of these.
+    np.testing.assert_allclose(theirs.normal_force, np.abs(cars.normal_force), rtol=1e-11)
+    np.testing.assert_allclose(0.6 * theirs.normal_x + 0.8 * theirs.normal_y, cars.normal_x, rtol=0, atol=1e-11)
+    np.testing.assert_allclose(theirs.coupling_force, cars.coupling_force, rtol=0, atol=1e-13)
+    swept = tilted.sweep("half_period", [9, 9.5], length=2.5).values
+    np.testing.assert_allclose(
+        swept, [tilted.solve(place, length=2.5).half_period for place in (9, 9.5)], rtol=ROUNDING
+    )
+
+
+def test_on_a_helix(build: Build) -> None:
+    """Where the height is linear in arc length a train falls as a body does; its cars press inwards and down."""
+    radius, rise, length, cars = 2.0, 0.75, 3.0, 5
+    module = build("train_on_helix", gqm.families.helix(R="2", c="3/4", domain=(0, 12)), cars=cars)
+    rate, launch = float(np.hypot(radius, rise)), 20.0
+    slope = rise / rate
+    motion = module.solve(launch, length=length)
+    assert motion.t_end == pytest.approx(np.sqrt(2 * (launch - length / 2) / (9.81 * slope)), rel=1e-15)
+    time = 1.25
+    found = motion.cars(time)
+    shares = (np.arange(cars) + 0.5) / cars - 0.5
+    places, v2 = launch - 9.81 * slope * time**2 / 2 + length * shares, (9.81 * slope * time) ** 2
+    angles = places / rate
+    inwards, tangent = radius / rate**2 * v2, np.array([-radius * np.sin(angles), radius * np.cos(angles)]) / rate
+    scale = SHARE * 9.81
+    np.testing.assert_allclose(found.lam, places, rtol=1e-14)
+    wanted = [
+        -inwards * np.cos(angles) - 9.81 * slope * tangent[0],
+        -inwards * np.sin(angles) - 9.81 * slope * tangent[1],
+    ]
+    np.testing.assert_allclose(cars * found.normal_x, wanted[0], rtol=0, atol=scale)
+    np.testing.assert_allclose(cars * found.normal_y, wanted[1], rtol=0, atol=scale)
+    np.testing.assert_allclose(cars * found.normal_z, 9.81 * (1 - slope**2), rtol=0, atol=scale)
+    np.testing.assert_allclose(found.coupling_force, 0, rtol=0, atol=scale)
+
+
+def test_declared_in_one_piece() -> None:
+    """The mass is that of the whole train, and forces that are not known of a train are refused."""
+    train = gqm.Train(length="2.5", cars=4, mass=1200)
+    assert dict(train.defaults) == {"length": "2.5", "m": 1200}
+    circle = gqm.families.circle()
+    assert dict(gqm.derive(circle, train + gqm.Gravity()).defaults)["m"] == 1200
+    for force, message in (
+        (gqm.Gravity() + gqm.CoulombFriction(), "coulomb: friction is not known of a train"),
+        (gqm.Gravity() + gqm.RotatingFrame(), "rotating_frame: a turning frame"),
+        (gqm.Gravity() + gqm.Potential("x**2"), "potentials other than gravity"),
+        (gqm.Kernel(terms=()), "potentials other than gravity"),
+        (gqm.Gravity() + gqm.Rolling(radius=1), "rolling: radius"),
+        (gqm.Gravity() + train, "train is given twice"),
+    ):
+        with pytest.raises(DeclarationError, match=message):
+            gqm.derive(circle, train + force)
+    with pytest.raises(DeclarationError, match="has no end to measure arc length from"):
+        gqm.derive(gqm.families.parabola(), gqm.Gravity() + train)
+    for cars in (0, 1.5, True, 10**6):
+        with pytest.raises(DeclarationError, match="cars: must be a whole number"):
+            gqm.Train(cars=cars)
+
+
+def test_impossible_trains(circle: ModuleType, build: Build) -> None:
+    """A train longer than the track, or without length, one over corners, and one on a one-sided track are refused."""
+    cases: tuple[tuple[type[GQMError], str, Callable[[], Any]], ...] = (
+        (ParameterError, "not shorter than the track", lambda: circle.solve(1, L=1, length=7)),
+        (ParameterError, "length: must be positive", lambda: circle.solve(1, L=1, length=0)),
+        (LaunchError, "is for one body", lambda: circle.solve(1, L=1, length=1, contact="above")),
+        (InputError, "one body", lambda: circle.sweep("half_period", 1, L=1, length=1, contact="above")),
+        (InputError, "is no train", lambda: generated.circle_drag.solve(1, L=1).cars(0)),
+    )
+    for kind, message, call in cases:
+        with pytest.raises(kind, match=message):
+            call()
+    planes = build("train_over_corners", gqm.Curve.sampled([(0, 1), (1, 0), (3, 0)], kind="linear"))
+    with pytest.raises(ParameterError, match="corners"):
+        planes.solve(1, length="1/2")
