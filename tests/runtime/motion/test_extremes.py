@@ -87,7 +87,7 @@ def test_against_many_states(name: str, swing: ModuleType, tmp_path: Path) -> No
 
 
 def test_a_bend_that_is_shorter_than_steps_of_a_grid() -> None:
-    """At the bottom of a valley with a rounded edge, N by its formula; sweeps told a 300th of it, from a grid too coarse."""
+    """At the rounded edge of a valley, N by its formula; sweeps told a 300th of it, from a grid that is too coarse."""
     module = transient(gqm.derive(gqm.Curve.graph("sqrt(x**2 + 1/1000000) + x/3", parameter="x"), gqm.Gravity()))
     x = np.linspace(-2e-3, 2e-3, 1_000_001)
     radius = np.hypot(x, 1e-3)
