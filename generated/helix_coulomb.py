@@ -1,5 +1,5 @@
 # Made by gqm-gen for "helix_coulomb". Do not edit: change its declaration and generate again.
-# interface 10, input 3f2dfaf376e9, body 6ade37195543
+# interface 10, input 3f2dfaf376e9, body 6ff1f17191a2
 """Bead on a rough helix
 
 x              = R*cos(theta)
@@ -205,6 +205,15 @@ def exact_speed_slope(op, theta, w, v, nu, p):
     _t5 = R*c*w/_t0
     return 2*_t1*(-_t2*c*g - _t2*mu*v*op.sqrt(R**4*w**2/_t0**2 + (R*_t3*g + _t4*_t5)**2 + (R*_t4*g - _t3*_t5)**2))
 
+def exact_y(op, theta, p):
+    """Second horizontal coordinate."""
+    R = p[0]
+    return R*op.sin(theta)
+
+def exact_load_along_curvature(op, theta, p):
+    """c, so that |N|**2 = m**2*(kappa**2*V**4 + 2*c*V**2 + n0**2), where n0 is |N|/m at rest."""
+    return 0
+
 def exact_domain(op, p):
     """Both ends of the domain, and the period; None where there is none."""
     return None, None, None
@@ -322,6 +331,7 @@ MODEL = CompiledModel(
     domain_of=exact_domain,
     dissipation=DissipativeFunctions(speed_equation, static_balance, friction=True, kinked=False, linear=False),
     exact=ExactLaw(
-        exact_x, exact_z, exact_ds, exact_kappa, exact_static_normal_load, exact_speed_slope,
+        exact_x, exact_z, exact_ds, exact_kappa, exact_static_normal_load, exact_speed_slope, exact_y,
+        exact_load_along_curvature,
     ),
 )

@@ -1,5 +1,5 @@
 # Made by gqm-gen for "viviani". Do not edit: change its declaration and generate again.
-# interface 10, input c93b8a64a5a5, body 0dbbbb85c787
+# interface 10, input c93b8a64a5a5, body 8b0326c7e4c1
 """Bead on Viviani's curve
 
 x              = a*(cos(theta) + 1)
@@ -179,6 +179,20 @@ def exact_effective_potential_slope(op, theta, p):
     """dU/dtheta."""
     a, g = p[0], p[1]
     return a*g*op.cos(theta/2)
+
+def exact_y(op, theta, p):
+    """Second horizontal coordinate."""
+    a = p[0]
+    return a*op.sin(theta)
+
+def exact_load_along_curvature(op, theta, p):
+    """c, so that |N|**2 = m**2*(kappa**2*V**4 + 2*c*V**2 + n0**2), where n0 is |N|/m at rest."""
+    a, g = p[0], p[1]
+    _t0 = theta/2
+    _t1 = op.cos(_t0)
+    _t2 = g/(a*(_t1**2 + 1)**2)
+    _t3 = op.cos(theta)
+    return -_t1**3*_t2*op.sin(theta) + _t2*_t3*(_t3 + 2)*op.sin(_t0)/2
 
 def exact_domain(op, p):
     """Both ends of the domain, and the period; None where there is none."""
@@ -438,6 +452,6 @@ MODEL = CompiledModel(
     domain_of=exact_domain, axes_of=exact_axes, monotone=True,
     exact=ExactFormulas(
         exact_x, exact_z, exact_ds, exact_kappa, exact_static_normal_load, exact_effective_potential,
-        exact_effective_potential_slope,
+        exact_effective_potential_slope, exact_y, exact_load_along_curvature,
     ),
 )

@@ -1,6 +1,6 @@
 """From a model's closed forms to functions as straight-line code."""
 
-from sympy import Expr, Function
+from sympy import Add, Expr, Function
 
 from gqm_sym.derivation import Model
 from gqm_sym.derivation.algebra.difference import Differences
@@ -206,14 +206,27 @@ class _ModelLowering(Lowering):
             ("kappa", f"{bend} (paper, eq. 8).", (model.kappa,)),
             ("static_normal_load", f"{load} (paper, eq. 15).", (model.static_normal_load,)),
         )
-        path = tuple(self.exact_function(*entry, (self.place,)) for entry in named)
+        path, space = ([self.exact_function(*entry, (self.place,)) for entry in of] for of in (named, self._space()))
         if loss is not None:
-            return (*path, speed_slope(self, loss))
+            return (*path, speed_slope(self, loss), *space)
         potentials = (
             ("effective_potential", "U, so that V**2 + 2*U is constant (paper, eq. 13).", model.effective_potential),
             ("effective_potential_slope", f"dU/d{self.place}.", model.effective_potential_slope),
         )
-        return (*path, *(self.exact_function(name, doc, (form,), (self.place,)) for name, doc, form in potentials))
+        energy = (self.exact_function(name, doc, (form,), (self.place,)) for name, doc, form in potentials)
+        return (*path, *energy, *space)
+
+    def _space(self) -> tuple[tuple[str, str, tuple[Expr, ...]], ...]:
+        """What a space curve has besides, each with its name and what it is."""
+        model = self.model
+        if not model.curve.in_space:
+            return ()
+        found: list[tuple[str, str, tuple[Expr, ...]]] = [("y", "Second horizontal coordinate.", (model.y,))]
+        if model.loads:
+            doc = "c, so that |N|**2 = m**2*(kappa**2*V**4 + 2*c*V**2 + n0**2), where n0 is |N|/m at rest."
+            product = Add(*(bend * load for bend, load in zip(model.bend, model.loads, strict=True)))
+            found.append(("load_along_curvature", doc, (product,)))
+        return tuple(found)
 
     def exact_potential(self) -> tuple[ExactIR, ...]:
         """The effective potential and its gradient by coordinates; nothing where it depends on more than those."""

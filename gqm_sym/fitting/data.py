@@ -11,7 +11,7 @@ from gqm_sym.literals.numbers import read_numbers
 from gqm_sym.runtime.compiled.types import Array
 
 # What is measured at times, and what each launch has one of, with their units; that of a place is the parameter's own.
-AT_TIMES = {"lam": None, "s": "m", "x": "m", "z": "m", "v": "m/s"}
+AT_TIMES = {"lam": None, "s": "m", "x": "m", "y": "m", "z": "m", "v": "m/s"}
 OF_LAUNCHES = {"period": "s", "half_period": "s"}
 PASSAGES = "passages"
 UNITS = {**AT_TIMES, **OF_LAUNCHES, PASSAGES: "s"}
@@ -69,7 +69,7 @@ def read_measurements(data: Any, arguments: Mapping[str, str | None], unit: str 
         raise InputError(f"data: needs at least one of {what}; it has {', '.join(given) or 'nothing'}")
     if any((name in AT_TIMES) != timed for name in quantities) or (PASSAGES in given and len(quantities) > 1):
         raise InputError(
-            "data: give t with lam, s, x, z or v; or periods, without t; or passages with their place; "
+            "data: give t with lam, s, x, y, z or v; or periods, without t; or passages with their place; "
             f"got {', '.join(given)}"
         )
     columns = set() if timed or PASSAGES in given else set(arguments) & set(given)

@@ -55,9 +55,10 @@ def fit(module: ModuleType, data: Any, free: Mapping[str, Any], **fixed: Any) ->
     module : module
         A generated module.
     data : mapping or DataFrame
-        One of: ``t`` in s with one or more of ``lam``, ``s``, ``x``, ``z`` and ``v`` at these times; ``period`` or
-        ``half_period``, with columns of launch arguments or run-time parameters where these differ; or ``passages``,
-        the times of consecutive passages through ``place`` (a value of the curve parameter), the first passage first.
+        One of: ``t`` in s with one or more of ``lam``, ``s``, ``x``, ``z`` and ``v``, in space also ``y``, at these
+        times; ``period`` or ``half_period``, with columns of launch arguments or run-time parameters where these
+        differ; or ``passages``, the times of consecutive passages through ``place`` (a value of the curve parameter),
+        the first passage first.
         And ``sigma``, their standard deviation: a number, a column, or a mapping with one for each quantity.
     free : mapping
         What is to be found, run-time parameters, "lam0" or "v0": a first guess, limits ``(low, high)``, all three
@@ -96,6 +97,8 @@ def fit(module: ModuleType, data: Any, free: Mapping[str, Any], **fixed: Any) ->
     for name in measured.columns:
         if name in unknown.names:
             raise InputError(f"free: {name} is a column of the data, and so it is known")
+    if "y" in measured.values and model.path_in_space is None:
+        raise InputError("data: y: this curve lies in the plane of x and z; leave the column out")
     size = sum(values.size for values in measured.values.values())
     if size < len(unknown.names):
         raise InputError(f"data: {size} measurements cannot determine {len(unknown.names)} numbers; free fewer of them")

@@ -261,7 +261,9 @@ class ExactPotential(NamedTuple):
 class ExactFormulas(NamedTuple):
     """The same formulas as plain Python over a namespace of operations: ``f(op, lam, p)``.
 
-    ``static_normal_load`` is n0 [m/s2], the contact force per unit mass of a body at rest.
+    ``static_normal_load`` is n0 [m/s2], the contact force per unit mass of a body at rest. ``y`` is there for a space
+    curve; and ``load_along_curvature``, the product of the vectors whose lengths are kappa and n0 [1/s2], for one in no
+    vertical plane.
     """
 
     x: Callable[..., Any]
@@ -271,6 +273,8 @@ class ExactFormulas(NamedTuple):
     static_normal_load: Callable[..., Any]
     effective_potential: Callable[..., Any]
     effective_potential_slope: Callable[..., Any]
+    y: Callable[..., Any] | None = None
+    load_along_curvature: Callable[..., Any] | None = None
 
 
 class ExactLaw(NamedTuple):
@@ -286,3 +290,5 @@ class ExactLaw(NamedTuple):
     kappa: Callable[..., Any]
     static_normal_load: Callable[..., Any]
     speed_slope: Callable[..., Any]
+    y: Callable[..., Any] | None = None
+    load_along_curvature: Callable[..., Any] | None = None

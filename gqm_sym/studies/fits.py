@@ -67,7 +67,7 @@ class FitFile(Section):
         description="the curve file: its path from this file's folder on, inside it", examples=["pendulum.yaml"]
     )
     data: Annotated[Table, wrapped("file", str)] = Field(
-        description="measurements: t with lam, s, x, z or v; or period or half_period; or passages with place; and "
+        description="measurements: t with lam, s, x, y, z or v; or period or half_period; or passages with place; and "
         "their standard deviations, as sigma or sigma_x",
         examples=[{"file": "swings.csv", "units": {"lam": "deg"}}],
     )

@@ -174,6 +174,18 @@ def test_the_rounding_of_an_end_near_a_hilltop_is_charged(families: dict[str, Mo
     assert soak_bounds.faults(module, family, NEAR_HILLTOP) == ([], len(soak_bounds.SHARES))
 
 
+@pytest.mark.parametrize("c2", [-25.952397021578278, -60.0, -8.0])
+def test_a_sharp_bottom_of_the_valley_is_resolved(c2: float, families: dict[str, ModuleType]) -> None:
+    """There ds/dx changes within a thousandth of the swing: seen from far, that was taken for noise of 1e-10."""
+    call = {"lam0": 0.9038783239624086, "c1": 0.0, "c2": c2, "c3": -0.03722067968333353, "c4": 0.014594479042941668}
+    motion = families["polynomial"].solve(**call, k=0.0)
+    assert motion.quadrature_error <= 1e-14
+    times = np.linspace(0.0, motion.half_period, 9)
+    assert np.all(motion.error_bound(times) <= 1e-15 * motion.condition_number * np.ptp(motion.turning_points))
+    call |= {"v0": 0.0, "direction": -1, "k": 0.0, "g": 9.81}
+    assert soak_bounds.faults(families["polynomial"], soak_bounds.FAMILIES["polynomial"], call)[0] == []
+
+
 def test_a_bound_that_does_not_hold_is_reported(
     families: dict[str, ModuleType], monkeypatch: pytest.MonkeyPatch
 ) -> None:

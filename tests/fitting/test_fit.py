@@ -7,12 +7,14 @@ import numpy as np
 import pandas as pd
 import pint
 import pytest
+from paths import ROOT
 from scipy.special import ellipk
 
 import gqm_sym as gqm
 from gqm_sym.errors import InputError, SolutionError
 from gqm_sym.fitting.data import read_measurements
 from gqm_sym.fitting.fit import Free, Residuals, _until_rest
+from gqm_sym.loading import load
 
 u = pint.UnitRegistry()
 
@@ -165,7 +167,7 @@ def test_coverage(pendulum: ModuleType) -> None:
 BAD = {
     "no mapping": ([1, 2], {"L": 1}, "data: must be a mapping"),
     "nothing measured": ({"t": [1]}, {"L": 1}, "data: needs at least one of lam, s, x"),
-    "an unknown column": ({"t": [1], "y": [1], "x": [1]}, {"L": 1}, "there is no column 'y'"),
+    "an unknown column": ({"t": [1], "q": [1], "x": [1]}, {"L": 1}, "there is no column 'q'"),
     "no times": ({"x": [1, 2]}, {"L": 1}, "data: give t with lam"),
     "nan": ({"t": [1, 2], "x": [1, np.nan]}, {"L": 1}, "data: x: row 2 is no finite number"),
     "another length": ({"t": [1, 2], "x": [1, 2, 3]}, {"L": 1}, "data: t: has 2 rows where others have 3"),
@@ -202,3 +204,15 @@ def test_what_is_shown(pendulum: ModuleType) -> None:
     figure = found.plot()
     assert [axes.get_ylabel() for axes in figure.axes] == ["period (s)", "residual (s)"]
     assert figure.axes[1].get_xlabel() == "lam0"
+
+
+def test_places_in_space() -> None:
+    """A radius and a launch are found again from places along Viviani's curve; a planar curve has no y."""
+    viviani = load(str(ROOT / "generated" / "viviani.py"), "viviani")
+    t = np.linspace(0.0, 3.0, 40)
+    state = viviani.solve(0.7, 1.0, a=1.5).state(t)
+    found = gqm.fit(viviani, {"t": t, "x": state.x, "y": state.y, "z": state.z}, {"a": 1.4, "lam0": 0.8}, v0=1.0)
+    assert found.estimates["a"] == pytest.approx(1.5, rel=1e-12)
+    assert found.estimates["lam0"] == pytest.approx(0.7, rel=1e-12)
+    with pytest.raises(InputError, match="y: this curve lies in the plane of x and z"):
+        gqm.fit(load(str(ROOT / "generated" / "circle.py"), "circle"), {"t": t, "y": t}, {"L": 1.4}, lam0=1.0)

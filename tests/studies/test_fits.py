@@ -132,7 +132,7 @@ TABLES = {
     "a formula": ("t,lam\n1,=1+1\n", "row 2: '=1+1' is no finite decimal number"),
     "no names": ("1,2\n3,4\n", "row 1: must name the columns"),
     "nothing measured": ("t\n1\n2\n", "data: needs at least one of lam"),
-    "an unknown column": ("t,lam,y\n1,2,3\n", "there is no column 'y'"),
+    "an unknown column": ("t,lam,q\n1,2,3\n", "there is no column 'q'"),
 }
 
 

@@ -45,7 +45,7 @@ from gqm_sym.runtime.gradients.chart_programs import (
 )
 from gqm_sym.runtime.gradients.evaluation import fill_values
 from gqm_sym.runtime.gradients.multiprecision import UNDECIDED
-from gqm_sym.runtime.gradients.orbit import OrbitDerivatives, SeriesOf, pairs, values
+from gqm_sym.runtime.gradients.orbit import OrbitDerivatives, PathRows, SeriesOf, pairs, values
 from gqm_sym.runtime.gradients.programs import LAUNCH_VARIABLES, Program, libration_program, turning_point_program
 from gqm_sym.runtime.interface import ExactPotential
 from gqm_sym.runtime.launch.formulas import true_pieces_of
@@ -507,11 +507,11 @@ class ChartOrbitDerivatives(OrbitDerivatives):
         fill_places(pieces.curve, pieces.begin, from_edge, places)
         return places
 
-    def at_places(self, lam: Array) -> Array:
+    def at_places(self, lam: Array) -> PathRows:
         """`path_rows` at arc lengths, with derivatives at the points of the curve."""
         path = self._shape.path(self._places(lam))
         found = values(chart_path_program(self.source), self.parameters, path[0], None, *path[1:])[:, 0]
-        return found.reshape(6, self.source.parameters + 2, lam.size)
+        return PathRows(*found.reshape(6, self.source.parameters + 2, lam.size))
 
     def extreme_rows(self, place: Array, *, of_speed: bool) -> Array:
         """As `OrbitDerivatives.extreme_rows`, at the points of the curve; the second is a difference quotient."""

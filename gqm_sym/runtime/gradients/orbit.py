@@ -4,6 +4,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import cached_property
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -61,17 +62,18 @@ def without_formulas() -> SolutionError:
     )
 
 
-def check_signed(formulas: Formulas, quantity: str) -> None:
+def check_force(formulas: Formulas, quantity: str) -> None:
     """Refuse derivatives that hold a contact force without a sign.
 
     Raises
     ------
     SolutionError
-        Unless the quantity has nothing to do with the contact force, or that has a sign.
+        Unless the quantity has nothing to do with the contact force, or that has a formula.
     """
-    if not formulas.signed and quantity in ("sensitivity", "normal_force_max", "normal_force_min"):
+    has_force = formulas.signed or getattr(formulas.exact, "load_along_curvature", None) is not None
+    if not has_force and quantity in ("sensitivity", "normal_force_max", "normal_force_min"):
         raise SolutionError(
-            f"gradients: {quantity} has none yet on space curves, for it holds the contact force; ask for another one"
+            f"gradients: {quantity} has none yet along points in space, for it holds the contact force; ask for others"
         )
 
 
@@ -109,13 +111,53 @@ def values(program: Program, inputs: Array, high: Array, low: Array | None = Non
     return found
 
 
+class PathRows(NamedTuple):
+    """What `path_program` gives at n places, each an (m + 2, n) array: the values, and the derivatives by m parameters
+    and by the place.
+
+    Attributes
+    ----------
+    x, z, ds, curvature, load : array
+        x, z, ds/dlam, m*kappa and m*n0.
+    potential : array or None
+        U; None of a motion with losses.
+    y, product : array or None
+        y of a space curve, and m**2 times ``load_along_curvature`` of one in no vertical plane; None of others.
+    """
+
+    x: Array
+    z: Array
+    ds: Array
+    curvature: Array
+    load: Array
+    potential: Array | None = None
+    y: Array | None = None
+    product: Array | None = None
+
+    def force_changes(self, v: Array, faster: Array, changed: Callable[[Array], Array]) -> Array:
+        """How the contact force changes where the velocity changes by ``faster``; ``changed`` gives how rows do."""
+        curvature, load = changed(self.curvature), changed(self.load)
+        if self.product is None:
+            force: Array = load + v**2 * curvature + 2.0 * v * self.curvature[0] * faster
+            return force
+        w, kappa, product = v**2, self.curvature[0], self.product[0]
+        half_square = kappa * w * w * curvature + w * changed(self.product) + self.load[0] * load
+        half_square += 2.0 * v * (kappa * kappa * w + product) * faster
+        with np.errstate(divide="ignore", invalid="ignore"):  # |N| has a kink where it vanishes
+            force = half_square / np.sqrt((kappa * w) ** 2 + 2.0 * product * w + self.load[0] ** 2)
+        return force
+
+
 def path_rows(
     formulas: ExactFormulas | ExactLaw, parameters: Array, mass: int, high: Array, low: Array | None = None
-) -> Array:
-    """What `path_program` gives at places: a row for each quantity, of rows for its value and its derivatives."""
+) -> PathRows:
+    """The path at places, with derivatives."""
     count = parameters.shape[1]
     found = values(path_program(formulas, count, mass), parameters, high, low)[:, 0]
-    return found.reshape(len(found) // (count + 2), count + 2, high.size)
+    rows: list[Any] = list(found.reshape(len(found) // (count + 2), count + 2, high.size))
+    if isinstance(formulas, ExactLaw):
+        rows.insert(5, None)  # no potential
+    return PathRows(*rows)
 
 
 # Values of functions at shares of the phase, and their integrals from the beginning of it: a row for each function.
@@ -163,7 +205,7 @@ class OrbitDerivatives(ABC):
         """The time per phase with its derivatives, the derivatives of arc length per share, and those of the lap."""
 
     @abstractmethod
-    def at_places(self, lam: Array) -> Array:
+    def at_places(self, lam: Array) -> PathRows:
         """`path_rows` at places."""
 
     @abstractmethod
@@ -393,7 +435,7 @@ class FormulaOrbitDerivatives(OrbitDerivatives):
         others = np.zeros((n - self.source.parameters, count))
         return Series(rates), Series(np.vstack([rise * arcs, others])), np.zeros((n, 1))
 
-    def at_places(self, lam: Array) -> Array:
+    def at_places(self, lam: Array) -> PathRows:
         """`path_rows` at places."""
         return path_rows(self.source.formulas, self.parameters, self.source.mass, lam)
 

@@ -329,16 +329,30 @@ def path_program(formulas: ExactFormulas | ExactLaw, parameters: int, mass: int)
     """What states consist of at a place, each with its derivatives by the run-time parameters and by the place.
 
     The inputs are the run-time parameters, of which ``mass`` is the number of the mass. The results are of x, z,
-    ds/dlam, m*kappa, m*n0 and, without losses, U.
+    ds/dlam, m*kappa, m*n0, U without losses, y of a space curve, and m**2 times ``load_along_curvature`` of one in no
+    vertical plane.
     """
     op = Recorder(parameters)
-    arguments = op, op.place, op.values
+    arguments, m = (op, op.place, op.values), op.values[mass]
     quantities = [formula(*arguments) for formula in (formulas.x, formulas.z, formulas.ds)]
     for formula in (formulas.kappa, formulas.static_normal_load):
-        quantities.append(op.values[mass] * formula(*arguments))
+        quantities.append(m * formula(*arguments))
     if isinstance(formulas, ExactFormulas):
         quantities.append(formulas.effective_potential(*arguments))
+    if formulas.y is not None:
+        quantities.append(formulas.y(*arguments))
+    if formulas.load_along_curvature is not None:
+        quantities.append(m * m * formulas.load_along_curvature(*arguments))
     return assemble(op, [part for q in quantities for part in (q, *gradient(op, q, [*op.values, op.place]))])
+
+
+def load_per_mass(op: Recorder, formulas: ExactFormulas | ExactLaw, lam: TapeNumber, w: Any) -> Any:
+    """Record N/m where V**2 is ``w``; of a curve in no vertical plane ``|N|/m``."""
+    curvature, load = (f(op, lam, op.values) for f in (formulas.kappa, formulas.static_normal_load))
+    if formulas.load_along_curvature is None:
+        return curvature * w + load
+    product = formulas.load_along_curvature(op, lam, op.values)
+    return op.sqrt(curvature * curvature * w * w + 2 * product * w + load * load)
 
 
 @lru_cache(maxsize=64)
@@ -360,8 +374,8 @@ def load_program(law: ExactLaw, parameters: int) -> Program:
     The inputs are those of `law_program`.
     """
     op, _, slope = _law(law, parameters)
-    (lam, w), p = op.places, op.values[:parameters]
-    load = law.kappa(op, lam, p) * w + law.static_normal_load(op, lam, p)
+    lam, w = op.places
+    load = load_per_mass(op, law, lam, w)
     by_place, by_w = gradient(op, load, [lam, w])
     load_slope = by_place + by_w * slope
     return assemble(op, [load_slope, *gradient(op, load_slope, [lam, w])])
@@ -399,9 +413,8 @@ def extreme_program(source: Source, of_speed: bool) -> Program:
     The inputs are the variables; the derivatives by them follow.
     """
     op = Recorder(source.variables)
-    quantity, p, formulas = source.half(op, op.place), op.values[: source.parameters], source.formulas
+    quantity = source.half(op, op.place)
     if not of_speed:
-        load = 2 * quantity * formulas.kappa(op, op.place, p) + formulas.static_normal_load(op, op.place, p)
-        quantity = op.values[source.mass] * load
+        quantity = op.values[source.mass] * load_per_mass(op, source.formulas, op.place, 2 * quantity)
     slope, *partials = gradient(op, quantity, [op.place, *op.values])
     return assemble(op, [quantity, slope, *gradient(op, slope, [op.place]), *partials])

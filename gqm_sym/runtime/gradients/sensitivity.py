@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from gqm_sym.runtime.compiled.types import Array
-from gqm_sym.runtime.gradients.orbit import OrbitDerivatives
+from gqm_sym.runtime.gradients.orbit import OrbitDerivatives, PathRows
 
 # The rows of launch place and speed among the variables (`programs.Source`).
 LAM0, V0 = -3, -2
@@ -25,9 +25,9 @@ class Sensitivity(NamedTuple):
     ----------
     wrt : tuple of str
         What the derivatives are by: run-time parameters, the launch place ``lam0`` and speed ``v0``.
-    lam, s, x, z, v, normal_force : array
+    lam, s, x, z, v, normal_force, y : array
         Derivatives of the curve parameter, of arc length from launch, of the coordinates, of the velocity ds/dt and of
-        the contact force, at fixed times.
+        the contact force, at fixed times. That of y is 0 along a planar curve.
     """
 
     wrt: tuple[str, ...]
@@ -37,6 +37,7 @@ class Sensitivity(NamedTuple):
     z: Array
     v: Array
     normal_force: Array
+    y: Array
 
 
 class _Along(NamedTuple):
@@ -55,8 +56,8 @@ class _Along(NamedTuple):
         at a fixed share.
     acceleration : array
         The acceleration along the curve in m/s2, without row.
-    path : (6, k, n) array
-        What `path_program` gives there.
+    path : PathRows
+        The path there.
     """
 
     times: Array
@@ -64,7 +65,7 @@ class _Along(NamedTuple):
     speeds: Array
     arcs: Array
     acceleration: Array
-    path: Array
+    path: PathRows
 
 
 class OrbitSensitivity:
@@ -105,7 +106,8 @@ class OrbitSensitivity:
         else:
             low, high = (end[:, None] for end in derivatives.moved_ends.T)
             widening = (high - low) / self._width
-        ds, potential = path[2], path[5]
+        ds, potential = path.ds, path.potential
+        assert potential is not None
         stretch = (self._by_all(ds[1:-1]) + ds[-1] * places) / ds[0]
         return _Along(
             times=self._scale * times[1:],
@@ -131,7 +133,7 @@ class OrbitSensitivity:
         The launch place says when, and so does the launch speed: the one near turning points, the other elsewhere.
         """
         direction, given = motion.direction, motion.problem.launch
-        v0, ds, acceleration = given.v0.value, launch.path[2][0], launch.acceleration
+        v0, ds, acceleration = given.v0.value, launch.path.ds[0], launch.acceleration
         own: Array = np.zeros_like(launch.times)
         if v0**2 < abs(acceleration[0]) * ds[0] * self._width:
             own[V0] = given.direction  # at rest, the direction in which a speed would be
@@ -143,7 +145,7 @@ class OrbitSensitivity:
         return passed
 
     def at(self, motion: Any, points: Any, lam: Array, v: Array) -> list[Array]:
-        """The derivatives of lam, s, x, z, v and N at times: a row for each variable.
+        """The derivatives of lam, s, x, z, v, N and y at times: a row for each variable.
 
         Parameters
         ----------
@@ -158,19 +160,25 @@ class OrbitSensitivity:
         delay = self._delay(along.times, launch, motion, points)
         arcs = along.arcs - launch.arcs + v * delay
         launched = self._derivatives.launch_moves[:, None]
-        arcs -= launch.path[2][0] * launched
+        arcs -= launch.path.ds[0] * launched
         if self._derivatives.direction:
             arcs += laps * self._arcs(np.ones(1))[1]
         else:
-            arcs += along.path[2][0] * along.places
-        places = along.places + v / along.path[2][0] * delay
+            arcs += along.path.ds[0] * along.places
+        places = along.places + v / along.path.ds[0] * delay
         speeds = along.speeds + along.acceleration * delay
-        x, z, _, curvature, load, _ = (self._by_all(rows[1:-1]) + rows[-1] * places for rows in along.path)
-        force = load + v**2 * curvature + 2.0 * v * along.path[3][0] * speeds
+        path = along.path
+
+        def changed(rows: Array) -> Array:
+            found: Array = self._by_all(rows[1:-1]) + rows[-1] * places
+            return found
+
+        y = np.zeros_like(places) if path.y is None else changed(path.y)
+        others = [changed(path.x), changed(path.z), speeds, path.force_changes(v, speeds, changed), y]
         if not self._derivatives.by_arc_length:
-            return [places + laps * self._lap_gradient, arcs, x, z, speeds, force]
+            return [places + laps * self._lap_gradient, arcs, *others]
         arcs[LAM0] += 1.0  # from the start point of the curve
-        return [arcs, arcs, x, z, speeds, force]
+        return [arcs, arcs, *others]
 
     def places_at(self, motion: Any, points: Any, v: Array, ds: Array) -> Array:
         """The derivatives of lam alone, as of `at`, where v and ds/dlam are known."""
@@ -192,7 +200,7 @@ class OrbitSensitivity:
         if self._derivatives.direction:
             delay: Array = -times - points.laps * gradient
             moves = self._derivatives.launch_moves[:, None]
-            delay += motion.direction * launch.path[2][0] / motion.problem.launch.v0.value * moves
+            delay += motion.direction * launch.path.ds[0] / motion.problem.launch.v0.value * moves
             return delay
         sense, swings = np.ones_like(points.laps), 2.0 * points.laps
         first, half_period = points.trajectory.segments[0], 0.5 * points.trajectory.period[0]

@@ -17,7 +17,7 @@ from gqm_sym.literals.namespaces import FLOATS
 from gqm_sym.literals.numbers import Number, read_number, read_numbers
 from gqm_sym.runtime.arithmetic.doubledouble import ULP, Pair
 from gqm_sym.runtime.compiled.types import Array
-from gqm_sym.runtime.gradients.orbit import check_signed
+from gqm_sym.runtime.gradients.orbit import check_force
 from gqm_sym.runtime.gradients.sensitivity import Sensitivity
 from gqm_sym.runtime.gradients.spectrum import Fourier
 from gqm_sym.runtime.launch.equilibria import Potential
@@ -211,7 +211,7 @@ class Motion(ABC):
             raise InputError(f"gradient: order must be 1 or 2, got {short(order)}")
         if order == 2:
             return self._second_gradient(quantity, wrt)
-        check_signed(self.problem.formulas, quantity)
+        check_force(self.problem.formulas, quantity)
         return self._gradient(quantity, wrt) if lam is None else self._arrival_gradient(lam, wrt)
 
     def _gradient(self, quantity: str, wrt: Any) -> dict[str, Any]:
@@ -267,7 +267,7 @@ class Motion(ABC):
         SolutionError
             If gradients are not there yet for motions of this kind, or on curves in space.
         """
-        check_signed(self.problem.formulas, "sensitivity")
+        check_force(self.problem.formulas, "sensitivity")
         return self._sensitivity(t, wrt)
 
     def _sensitivity(self, t: Any, wrt: Any) -> Sensitivity:

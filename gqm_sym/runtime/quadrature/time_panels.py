@@ -35,6 +35,10 @@ MAX_NOISE_RATIO = 1e-7
 # They have stopped falling when the last ones are at least this share of those in the middle.
 MIN_FLAT_RATIO = 0.05
 
+# Noise above FLOOR_RATIO stays when the panel is halved; if less than this share does, it was structure from beyond the
+# panel's end, far below the largest values and falling slowly.
+FLOOR_RATIO, KEPT_SHARE = 50.0 * MAX_TAIL_RATIO, 0.1
+
 # Kronrod's and Gauss's value of a resolved panel differ by no more than this share.
 MAX_RULE_DIFFERENCE = 1e-6
 
@@ -150,6 +154,14 @@ def _panel_sums(values, half):  # type: ignore[no-untyped-def]
 
 
 @Inlined
+def _place_nodes(middle, half, phi):  # type: ignore[no-untyped-def]
+    """Fill the phase angles of a panel's nodes."""
+    for i in range(11):
+        phi[10 + i] = middle + half * NODES[i]
+        phi[10 - i] = middle - half * NODES[i]
+
+
+@Inlined
 def _is_noise(size, tail, middle):  # type: ignore[no-untyped-def]
     """Whether coefficients have stopped falling at the level of rounding noise."""
     return middle <= MAX_NOISE_RATIO * size and tail >= MIN_FLAT_RATIO * middle
@@ -180,18 +192,16 @@ def lay(integrand, marks):  # type: ignore[no-untyped-def]
     pending = np.empty(waiting + MAX_WAITING)  # right edges of the panels that remain, the next one last
     for k in range(waiting):
         pending[k] = marks[waiting - k]
+    before_halving = np.full(pending.size, inf)  # the shares of their last coefficients then
     max_panels = MAX_PANELS + waiting
     edges[0], times[0], lengths[0] = start, 0.0, 0.0
     left, count, error, status = start, 0, 0.0, CONVERGED
-    time_low, length_low = 0.0, 0.0
-    min_width = MIN_FIRST_PANEL_SHARE * fabs(stop - start)
+    time_low, length_low, min_width = 0.0, 0.0, MIN_FIRST_PANEL_SHARE * fabs(stop - start)
     smallest, largest, peak = inf, 0.0, 0.0
     while waiting > 0:
         right = pending[waiting - 1]
         half, middle = 0.5 * (right - left), 0.5 * (right + left)
-        for i in range(11):
-            phi[10 + i] = middle + half * NODES[i]
-            phi[10 - i] = middle - half * NODES[i]
+        _place_nodes(middle, half, phi)
         fill_rates(integrand, phi, work, values)
         low, high, new_peak = cancellation_range(integrand, work, COUNT, peak)
         smallest, largest = min(smallest, low), max(largest, high)
@@ -211,6 +221,7 @@ def lay(integrand, marks):  # type: ignore[no-untyped-def]
         duration, length, difference = _panel_sums(values, half)
         length_resolved = length_tail <= MAX_TAIL_RATIO * length_size
         resolved = tail <= MAX_TAIL_RATIO * size and length_resolved and difference <= MAX_RULE_DIFFERENCE * duration
+        keeps = tail <= FLOOR_RATIO * size or tail >= KEPT_SHARE * before_halving[waiting - 1] * size
         noise = _is_noise(size, tail, level) and (length_resolved or _is_noise(length_size, length_tail, length_middle))
         narrow = fabs(right - left) <= max(MIN_PANEL_SHARE * fabs(right - start), min_width)
         full = count + waiting >= max_panels or waiting >= pending.size - 1
@@ -224,9 +235,9 @@ def lay(integrand, marks):  # type: ignore[no-untyped-def]
             if narrow or full:
                 status = FAILED
                 break
-        elif resolved or noise or narrow or full or negligible:
+        elif resolved or (noise and keeps) or narrow or full or negligible:
             if not (resolved or negligible):
-                if noise and tail > 50.0 * MAX_TAIL_RATIO * size:
+                if noise and tail > FLOOR_RATIO * size:
                     status = max(status, FLOOR)
                 elif not noise:
                     status = EXHAUSTED
@@ -238,16 +249,16 @@ def lay(integrand, marks):  # type: ignore[no-untyped-def]
             count += 1
             waiting -= 1
             continue
+        before_halving[waiting - 1] = before_halving[waiting] = tail / size if size > 0.0 else inf
         pending[waiting] = middle
         waiting += 1
-    total = times[count]
     return Panels(
         edges[: count + 1].copy(),
         times[: count + 1].copy(),
         lengths[: count + 1].copy(),
         time_terms[:count].copy(),
         length_terms[:count].copy(),
-        error / total + 2.3e-16 if total > 0.0 else inf,
+        error / times[count] + 2.3e-16 if times[count] > 0.0 else inf,
         smallest / largest if largest > 0.0 else 0.0,
         status,
     )

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from gqm_sym.errors import GQMError, InputError
-from gqm_sym.runtime.gradients.orbit import check_signed
+from gqm_sym.runtime.gradients.orbit import check_force
 from gqm_sym.runtime.gradients.quantities import selected
 from gqm_sym.runtime.gradients.sweep import COMPILED, PERIODS, Launches, launch_gradients
 from gqm_sym.runtime.launch.kinds import LOAD_EXTREMES
@@ -45,7 +45,7 @@ def sweep_with_gradient(
     rows = selected(formulas.parameters, wrt)
     if quantity in LOAD_EXTREMES:
         raise InputError(f"gradient: {quantity} has none yet, as all that a rider feels; leave gradient out")
-    check_signed(formulas, quantity)
+    check_force(formulas, quantity)
     found = sweep(formulas, quantity, launches, parameters, lam, solve)
     names = (*formulas.parameters, "lam0", "v0", "direction", "lam")
     given = (*parameters, launches.lam0, launches.v0, launches.direction, 0.0 if lam is None else lam)

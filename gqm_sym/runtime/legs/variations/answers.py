@@ -62,7 +62,7 @@ class StateChanges:
 
     Attributes
     ----------
-    lam, s, x, z, v, normal_force : arrays
+    lam, s, x, z, v, normal_force, y : arrays
         As of `gradients.sensitivity.Sensitivity`, but places within the lap.
     acceleration : array
         How the velocity changes with time.
@@ -82,8 +82,8 @@ class StateChanges:
             for start in range(0, max(v.size, 1), BLOCK)
         ]
         found = np.concatenate(parts, axis=-1)
-        self.lam, self.s, self.x, self.z, self.v, self.normal_force = found[:6]
-        self.acceleration = found[6, 0]
+        self.lam, self.s, self.x, self.z, self.v, self.normal_force, self.y = found[:7]
+        self.acceleration = found[7, 0]
 
     def _part(self, changes: Changes, half: NDArray[np.intp], w: Array, v: Array) -> Array:
         """The attributes for some of the points: a row for each, and for the acceleration a row of equal rows."""
@@ -93,9 +93,15 @@ class StateChanges:
         path = path_rows(changes.law.exact, changes.law.parameters, changes.mass, *along.places)
         lam, acceleration = along.sigma - v / law.ds * along.delay, 0.5 * law.slope / law.ds
         faster = 0.5 * v * along.y - acceleration * along.delay
-        x, z, _, curvature, load = (changes.by_all(rows[1:-1]) + rows[-1] * lam for rows in path)
-        force = load + v**2 * curvature + 2.0 * v * path[3][0] * faster
-        return np.array([lam, law.ds * lam + along.arc, x, z, faster, force, np.broadcast_to(acceleration, lam.shape)])
+
+        def changed(rows: Array) -> Array:
+            found: Array = changes.by_all(rows[1:-1]) + rows[-1] * lam
+            return found
+
+        x, z, force = changed(path.x), changed(path.z), path.force_changes(v, faster, changed)
+        y = np.zeros_like(lam) if path.y is None else changed(path.y)
+        accelerations = np.broadcast_to(acceleration, lam.shape)
+        return np.array([lam, law.ds * lam + along.arc, x, z, faster, force, y, accelerations])
 
 
 def _marched(changes: Changes, points: PhasePoints) -> tuple[NDArray[np.intp], Array]:
@@ -176,8 +182,8 @@ def end(motion: Any, changes: Changes) -> tuple[Array, Array]:
     law, v = changes.law.rows(at_end), run.record[HEADING]
     if what == "liftoff":
         place = np.array([run.record[END]]), np.array([run.record[END_LOW]])
-        path = path_rows(changes.law.exact, changes.law.parameters, changes.mass, *place)[3:, :, 0]
-        curvature, load = path
+        path = path_rows(changes.law.exact, changes.law.parameters, changes.mass, *place)
+        curvature, load = path.curvature[:, 0], path.load[:, 0]
         faster = origin.y - law.slope[0] * origin.sigma
         change = changes.by_all(load[1:-1] + speed**2 * curvature[1:-1]) + curvature[0] * faster
         moved = -change / (changes.law.parameters[0, changes.mass] * changes.law.loads(at_end)[0, 0])
