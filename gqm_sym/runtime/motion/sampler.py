@@ -87,12 +87,20 @@ class Sampler:
             self._sections[records.COSINES], self._sections[records.SINES] = series
         if not len(self._sections.get(records.COSINES, ())):
             self._tabulate()
-        self._place_record, self._lock = records.record(self._sections), lock
+        self._lock = lock
+        self._place_record: Array | None = None
         self._state_record: Array | None = None
 
     def _tabulate(self) -> None:
         names = (records.MIDDLES, records.LOWS, records.SCALES, records.POWERS, records.INDEX, records.ENDS)
         self._sections.update(zip(names, self._segment.table[:6], strict=True))
+
+    @property
+    def _record_of_places(self) -> Array:
+        """The record for places; two threads may make the same one."""
+        if self._place_record is None:
+            self._place_record = records.record(self._sections)
+        return self._place_record
 
     @property
     def _record(self) -> Array:
@@ -111,7 +119,7 @@ class Sampler:
             # The part of the error that changes within an interval of the table is largest at one of its ends, where
             # the powers are those of -1 and 1.
             starts, stops = intervals @ (-1.0) ** np.arange(intervals.shape[1]), intervals.sum(axis=1)
-            both_ends = starts + 1e-9 * (stops - starts), stops
+            both_ends = np.concatenate([starts + 1e-9 * (stops - starts), stops])
             middles = 0.5 * (segment.edges[1:] + segment.edges[:-1])
             self._sections |= {
                 records.LAUNCH: np.array([problem.lam0, self._v0, *lengths, *self._time_drift()], dtype=np.float64),
@@ -120,7 +128,7 @@ class Sampler:
                 records.LENGTHS: panels[2],
                 records.ARCS: panels[4],
                 records.TIME_ERRORS: segment.time_error(middles),
-                records.TABLE_ERRORS: np.maximum(*(segment.inversion_error(phi) for phi in both_ends)),
+                records.TABLE_ERRORS: segment.inversion_error(both_ends).reshape(2, -1).max(axis=0),
                 records.OWNERS: owners.astype(np.int64),
             }
             self._state_record = records.record(self._sections)
@@ -128,14 +136,14 @@ class Sampler:
 
     def place(self, t: float) -> float:
         """The curve parameter at one time."""
-        place: float = records.place_at_time(self._place_record, t)
+        place: float = records.place_at_time(self._record_of_places, t)
         return place
 
     def places(self, t: Array) -> Array:
         """The curve parameter at times."""
-        out = np.empty_like(t)
+        record, out = self._record_of_places, np.empty_like(t)
         run_in_threads(
-            lambda part: records.places_along(self._place_record, t, out, part.start, part.stop),
+            lambda part: records.places_along(record, t, out, part.start, part.stop),
             t.size,
             MIN_PLACES_PER_THREAD,
         )
