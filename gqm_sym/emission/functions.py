@@ -61,8 +61,8 @@ def _read_together(function: FunctionIR) -> tuple[FunctionIR, list[str], set[str
 
     The third is the charts that these lines read.
 
-    Neighbours often share a piece of the chart, which is then looked for once. Without a chart the function is as it
-    was; what ``out`` has too few rows for is looked for place by place.
+    Neighbours often share a piece of the chart, which is then looked for once. Where ``out`` has too few rows, there is
+    an array for it. Without a chart the function is as it was.
     """
     values = [*(a.value for a in function.inside), *function.outputs]
     given = {a.name: a.value for a in function.inside if type(a.value).__name__ == "at" and len(a.value.args) == 1}
@@ -71,8 +71,12 @@ def _read_together(function: FunctionIR) -> tuple[FunctionIR, list[str], set[str
     if len(places) != 1 or not places <= given.keys():
         return function, [], set()
     place = Symbol(places.pop(), real=True)
-    used = [head for head in heads if any(v.has(head(place)) for v in values)][: len(function.outputs)]
-    out, first = function.arguments[-1], len(function.outputs) - len(used)
+    used = [head for head in heads if any(v.has(head(place)) for v in values)]
+    out, last, lines = function.arguments[-1], len(function.outputs), []
+    if len(used) > last:
+        out, last = "_spare", len(used)
+        lines.append(f"{out} = spare_rows({last}, {function.arguments[0]})")
+    first = last - len(used)
     names = {a.value: Symbol(a.name, real=True) for a in function.inside}
     read: dict[Expr, Symbol] = {}
     for head in used:
@@ -83,12 +87,12 @@ def _read_together(function: FunctionIR) -> tuple[FunctionIR, list[str], set[str
     outputs = tuple(value.xreplace(read) for value in function.outputs)
     needed = {s.name for value in (*(a.value for a in inside), *outputs) for s in value.free_symbols}
     kept = [a for a in inside if a.name in needed]
-    lines, end = [], first
+    end = first
     charts = dict.fromkeys(heads[head][0] for head in used)
     for chart in charts:
         found = tuple(heads[head][1] for head in used if heads[head][0] == chart)
         end += len(found)
-        filled = out if end == len(function.outputs) else f"{out}[:{end}]"
+        filled = out if end == last else f"{out}[:{end}]"
         lines.append(f"chart_rows({chart}, {found}, {given[place.name].args[0]}, {filled})")
     return replace(function, inside=(*rows, *kept), outputs=outputs), lines, set(charts)
 
@@ -109,7 +113,7 @@ def loop(function: FunctionIR, charts: Sequence[str] = ()) -> tuple[dict[str, An
     inside = _statements(function.inside, printer)
     inside += [f"{out}[{row}, {index}] = {printer.doprint(e)}" for row, e in enumerate(function.outputs)]
     if filled:
-        printer.used.add("chart_rows")
+        printer.used |= {name for name in ("chart_rows", "spare_rows") if any(f"{name}(" in line for line in filled)}
         printer.charts |= read
     before = [*_chart_view(function, printer, charts), *before, *filled]
     fields = {

@@ -168,13 +168,12 @@ class CompiledModel(Formulas):
         rows, force = [array.reshape(-1) for array in arrays[len(Pass1._fields) :]], arrays.normal_force.reshape(-1)
 
         def fill(part: slice) -> None:
-            found = path_in_space_at(address, p, places[part], v2[part])
+            found = [*path_in_space_at(address, p, places[part], v2[part])]
             if self.rider_loads is not None:
                 # From rest the body goes to either side of the launch.
                 side = np.sign(places[part] - launch.lam0.value) * (launch.v0.value == 0.0)
                 ahead = np.where(side != 0.0, side, float(launch.direction))
-                loads = rider_loads(self, p, places[part], v2[part], ahead, force[part])
-                found = np.concatenate([found, loads])
+                found.extend(rider_loads(self, p, places[part], v2[part], ahead, force[part]))
             for row, values in zip(rows, found, strict=True):
                 row[part] = values
 

@@ -69,12 +69,13 @@ def running_totals(times: Array, terms: Array) -> tuple[Array, Array]:
     """Return the running totals of the panels' times as two doubles each, scaled to end at the last of ``times``."""
     own = terms.sum(axis=1)  # all Legendre polynomials are 1 at the right edge
     own *= times[-1] / (own.sum() or 1.0)  # all times are 0 if both ends are the same place
-    high, low = np.zeros(len(own) + 1), np.zeros(len(own) + 1)
-    for k, part in enumerate(own):
-        high[k + 1], error = two_sum.py_func(high[k], part)
-        low[k + 1] = low[k] + error
-    high[-1], low[-1] = times[-1], 0.0
-    return high, low
+    high, low = [0.0], [0.0]
+    for part in own.tolist():
+        total, error = two_sum.py_func(high[-1], part)
+        high.append(total)
+        low.append(low[-1] + error)
+    high[-1], low[-1] = float(times[-1]), 0.0
+    return np.array(high), np.array(low)
 
 
 Pair = tuple[float, float]

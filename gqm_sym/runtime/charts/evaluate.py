@@ -16,6 +16,7 @@ coordinates that are two doubles each.
 from math import fabs, floor, inf
 from typing import Any
 
+import numpy as np
 from llvmlite import ir
 from numba import carray, types
 from numba.extending import intrinsic
@@ -192,6 +193,12 @@ def chart_rows(chart, rows, places, out):  # type: ignore[no-untyped-def]
                 at = min(j, n - LANES)
                 numbers = (lap, middle, scale, limit, whole, rest)
                 fill_lanes(chart, terms, places, at, out, (first + k) * n + at, begin - at, numbers)
+
+
+@Inner
+def spare_rows(count, n):  # type: ignore[no-untyped-def]
+    """Return an array for so many rows of charts at n places."""
+    return np.empty((count, n))
 
 
 @Inner

@@ -20,11 +20,14 @@ TABLE_ERRORS, OWNERS     error of the table on each of its segments, and the pan
 ======================== ===================================================================================
 """
 
+from collections.abc import Mapping
+from itertools import accumulate
 from math import fabs, inf
 from typing import Any, NamedTuple
 
 import numpy as np
 from numba import types
+from numpy.typing import NDArray
 
 from gqm_sym.runtime.arithmetic.doubledouble import ULP, two_sum
 from gqm_sym.runtime.compiled.calls import call_path_and_contact_force
@@ -45,6 +48,7 @@ FUNCTIONS, SHAPE, LAUNCH, WAVE, COSINES, SINES, TIMING = range(7)
 MIDDLES, LOWS, SCALES, POWERS, INDEX, ENDS = range(7, 13)
 EDGES, LENGTHS, ARCS, TIME_ERRORS, TABLE_ERRORS, OWNERS = range(13, 19)
 SECTIONS = 19
+_EMPTY = np.empty(0)
 _STATE = types.UniTuple(types.float64, 10)
 
 
@@ -72,17 +76,11 @@ class Phases(NamedTuple):
     segments: Any
 
 
-def record(sections: dict[int, Array]) -> Array:
+def record(sections: Mapping[int, Array | NDArray[np.int64]]) -> Array:
     """Return a record of some sections; the others are empty."""
-    marks = np.empty(SECTIONS + 1, dtype=np.int64)
-    parts, end = [marks.view(np.float64)], SECTIONS + 1
-    for k in range(SECTIONS):
-        marks[k] = end
-        if k in sections:
-            parts.append(sections[k].reshape(-1).view(np.float64))
-            end += sections[k].size
-    marks[SECTIONS] = end
-    return np.concatenate(parts)
+    parts = [sections[k].reshape(-1) if k in sections else _EMPTY for k in range(SECTIONS)]
+    marks = np.array([*accumulate(map(len, parts), initial=SECTIONS + 1)])
+    return np.concatenate([part if part.dtype == np.float64 else part.view(np.float64) for part in (marks, *parts)])
 
 
 @Inner

@@ -73,7 +73,7 @@ def rider_loads(formulas: "Formulas", p: Array, lam: Array, v2: Array, direction
         If the tangent is vertical where the roll angle is measured from the level.
     """
     assert formulas.rider_loads is not None
-    rows = np.full((len(FIELDS) + 1, lam.size), np.nan)
+    rows: Array | None = None
     rubs = formulas.signed and formulas.dissipation is not None and formulas.dissipation.friction
     pushed = force < 0.0 if rubs else np.zeros(lam.size, dtype=np.bool_)
     for v, nu in product((1.0, -1.0, 0.0), (1.0, -1.0)):
@@ -81,8 +81,11 @@ def rider_loads(formulas: "Formulas", p: Array, lam: Array, v2: Array, direction
         if here.all():
             rows = rider_loads_at(formulas.rider_loads.address, p, lam, v2, v, nu)
             break
+        if rows is None:
+            rows = np.full((len(FIELDS) + 1, lam.size), np.nan)
         if here.any():
             rows[:, here] = rider_loads_at(formulas.rider_loads.address, p, lam[here], v2[here], v, nu)
+    assert rows is not None
     if (vertical := rows[-1] < MIN_LEVEL).any():
         raise SolutionError(
             f"roll: the tangent is vertical at {formulas.parameter} = {float(lam[vertical][0])!r}, where no level is "

@@ -193,10 +193,20 @@ class Reading(NamedTuple):
         `leg_segments.leg_record`.
     until : float
         The time in s up to which it holds.
+    since : float
+        The time in s from which on it holds.
+    pieces : sequence of TabulatedPiece
+        What it is made of.
     """
 
-    record: Array
-    until: float
+    record: Array = np.empty(0)
+    until: float = -1.0
+    since: float = 0.0
+    pieces: Sequence[TabulatedPiece] = ()
+
+    def has(self, t: float, errors: bool) -> bool:
+        """Whether it holds up to a time, with all errors if these are asked for."""
+        return t <= self.until and (self.pieces[-1].has_all_errors or not errors)
 
 
 class DissipativeMotion(Motion):
@@ -217,9 +227,9 @@ class DissipativeMotion(Motion):
     _arc = 0.0
     _whole: Trajectory | None = None
     _known_changes: Changes | None = None
-    _reading = Reading(np.empty(0), -1.0)
-    # What is read of the first piece that one time was asked of, and when that begins.
-    _first_reading, _first_since = Reading(np.empty(0), -1.0), 0.0
+    _reading = Reading()
+    # What is read of the first piece that one time was asked of.
+    _first_reading = Reading()
     # How many runs `_look_ahead` computes of a motion that it finds no end of; 0 while that is not known.
     _beginning = 0
 
@@ -229,7 +239,6 @@ class DissipativeMotion(Motion):
         self._laid: list[Run] = []
         # For each panel of runs how large the terms of the force are that may cancel.
         self._terms: list[Array] = []
-        self._tabulated: list[TabulatedPiece] = []
         launch, domain = problem.launch, problem.domain
         super().__init__(problem, "dissipative", launch.direction)
         self._dissipation, self._track = _loss(problem), _track(problem)
@@ -328,7 +337,8 @@ class DissipativeMotion(Motion):
         by_segments: Callable[[Array], Array],
     ) -> Array:
         """Rows of numbers at times, from the record that compiled code reads as far as it goes."""
-        record, until = self._reading_at(greatest) if times.size == 1 else self._reading_up_to(greatest)
+        read = self._reading_at if times.size == 1 else self._reading_up_to
+        record, until = read(greatest, rows > 1)[:2]
         times = times.reshape(-1)
         out = np.empty((rows, times.size))
         if greatest <= until:
@@ -355,56 +365,73 @@ class DissipativeMotion(Motion):
             MIN_STATES_PER_THREAD,
         )
 
-    def _reading_up_to(self, t: float) -> Reading:
+    def _reading_up_to(self, t: float, errors: bool) -> Reading:
         """What compiled code reads of the motion up to a time, or up to an approach to an equilibrium before it."""
-        reading = self._reading
-        return reading if t <= reading.until else self._extended(t)
+        return self._reading if self._reading.has(t, errors) else self._extended(t, errors)
 
-    def _reading_at(self, t: float) -> Reading:
+    def _reading_at(self, t: float, errors: bool) -> Reading:
         """What compiled code reads of the motion at one time.
 
         Of a motion of which only times on one piece are asked, one after the other, only that piece is tabulated.
         """
-        reading, first = self._reading, self._first_reading
-        if t <= reading.until:
-            return reading
-        return first if self._first_since <= t < first.until else self._read_first(t)
+        first = self._first_reading
+        if self._reading.has(t, errors=False):
+            return self._reading_up_to(t, errors)
+        is_first = first.since <= t < first.until and first.has(t, errors)
+        return first if is_first else self._read_first(t, errors)
 
     @locked
-    def _read_first(self, t: float) -> Reading:
+    def _read_first(self, t: float, errors: bool) -> Reading:
         """`_reading_at`, once the motion is followed so far."""
         self._check_end(t)
-        pieces = self._pieces
+        pieces, first = self._pieces, self._first_reading
         k = bisect_right(pieces, t, key=lambda timed: timed.t_stop[0])
-        if self._first_reading.until >= 0.0 or k == len(pieces) or pieces[k].segment.v2 is not None:
-            return self._extended(t)
-        self._first_since = pieces[k].t_start[0]
-        self._first_reading = Reading(self._record_of([self._tabulated_piece(pieces[k])]), pieces[k].t_stop[0])
+        is_known = first.until >= 0.0
+        if k == len(pieces) or pieces[k].segment.v2 is not None or (is_known and pieces[k].t_start[0] != first.since):
+            return self._extended(t, errors)
+        made = first.pieces if is_known else [tabulated(pieces[k], self.problem.period)]
+        made = self._with_errors(made, pieces[k:]) if errors else made
+        self._first_reading = Reading(self._record_of(made), pieces[k].t_stop[0], pieces[k].t_start[0], made)
         return self._first_reading
 
-    def _tabulated_piece(self, timed: TimedSegment) -> TabulatedPiece:
-        return tabulated(timed, self.problem.period, self._errors_before)
+    def _with_errors(self, made: Sequence[TabulatedPiece], pieces: Sequence[TimedSegment]) -> list[TabulatedPiece]:
+        """Tabulated pieces with all errors."""
+        return [
+            piece
+            if piece.has_all_errors
+            else piece.with_errors(*self._errors_before(timed, 0.5 * (piece.edges[1:] + piece.edges[:-1])))
+            for piece, timed in zip(made, pieces, strict=False)
+        ]
 
     def _record_of(self, pieces: Sequence[TabulatedPiece]) -> Array:
         return leg_record(self.problem, self.direction * self.problem.launch.v0.value, pieces)
 
     @locked
-    def _extended(self, t: float) -> Reading:
+    def _extended(self, t: float, errors: bool) -> Reading:
         """`_reading_up_to`, once the motion is followed so far."""
         self._check_end(t)
-        if t <= self._reading.until:  # another thread has followed it
-            return self._reading
-        self._follow_amply()
-        done = len(self._tabulated)
-        ahead = [timed for timed in self._pieces[done:] if timed.segment.v2 is None]
-        if ahead:
-            self._tabulated += map(self._tabulated_piece, ahead)
-            self._reading = Reading(self._record_of(self._tabulated), min(self._known_end(), ahead[-1].t_stop[0]))
+        before = self._reading
+        if before.has(t, errors):  # another thread has followed it
+            return before
+        made = list(before.pieces)
+        if t > before.until:
+            self._follow_amply(len(made))
+            ahead = [timed for timed in self._pieces[len(made) :] if timed.segment.v2 is None]
+            made += [tabulated(timed, self.problem.period) for timed in ahead]
+        # Once errors have been asked for, they are found for later pieces too.
+        errors = errors or (len(before.pieces) > 0 and before.pieces[0].has_all_errors)
+        if len(made) > len(before.pieces) or (made and errors and not made[0].has_all_errors):
+            made = self._with_errors(made, self._pieces) if errors else made
+            until = min(self._known_end(), self._pieces[len(made) - 1].t_stop[0])
+            self._reading = Reading(self._record_of(made), until, 0.0, made)
         return self._reading
 
-    def _follow_amply(self) -> None:
-        """Follow the motion until there are enough new pieces for another record, or as far as it can be followed."""
-        enough = EXTENSION * len(self._tabulated)
+    def _follow_amply(self, count: int) -> None:
+        """Follow the motion until there are enough new pieces for another record, or as far as it can be followed.
+
+        ``count`` is how many the last one was made of.
+        """
+        enough = EXTENSION * count
         with suppress(SolutionError, BudgetError):  # it is raised when that is asked for
             while len(self._pieces) < enough and not self._ending and self._elapsed < self._horizon:
                 self._go_on()
@@ -686,7 +713,7 @@ class DissipativeMotion(Motion):
         self._settle(what, float(record[START]), float(record[END]))
         if what == LEAVES:
             raise leaving_at_once(problem, heading, "end of the domain")
-        if what == SPENT:
+        if what == SPENT or (what == NARROWED and self._force_cancels(record)):
             raise self._lost(record)
         name = "" if leaves_frame else self._end_name(what, record, heading)
         self._runs.append(Run(record, what, name, frame, before if what in PASSED else None))
@@ -762,7 +789,19 @@ class DissipativeMotion(Motion):
                 f"{place} comes to the end of the range of doubles; launch the body more than {LEAST_SWING!r} from the "
                 "equilibrium, or faster"
             )
+        if self._force_cancels(record):
+            return SolutionError(
+                f"{place} could not be followed: terms of the force cancel there to fewer digits than doubles need; "
+                "declare the sum of such forces as one, or make them smaller"
+            )
         return SolutionError(f"{place} could not be followed; are the curve and the force smooth there?")
+
+    def _force_cancels(self, record: Array) -> bool:
+        """Whether terms of the force cancel where a leg ends, or starts, so that doubles do not tell it."""
+        with suppress(SolutionError):  # curves without formulas have no bound on its rounding, nor have very long ones
+            law, heading = Law(self.problem), int(record[HEADING])
+            return self._frame is None and any(law.cancels(float(record[end]), heading) for end in (START, END))
+        return False
 
     def _has_died_away(self, start: float, end: float) -> bool:
         """Whether the body is, or swings, so closely about an equilibrium that its place shows no more of it."""

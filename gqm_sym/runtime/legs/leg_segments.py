@@ -1,11 +1,12 @@
 """Segments of a dissipative motion, from the panels of its legs, and what compiled code reads of them."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from math import inf
 from typing import NamedTuple
 
 import numpy as np
 from numba import types
+from numpy.typing import NDArray
 
 from gqm_sym.runtime.arithmetic.doubledouble import ULP, Pair, two_sum
 from gqm_sym.runtime.compiled.jit import Inner, entry
@@ -213,8 +214,6 @@ def along_field(f: BoundFunctions, a: float, b: float, field: Array) -> Segment:
 # How many equal parts of the time there are for each interval, by which the interval of a time is found.
 SLOTS_PER_INTERVAL = 4
 
-ErrorsBefore = Callable[[TimedSegment, Array], tuple[float, Array]]
-
 
 class TabulatedPiece(NamedTuple):
     """What compiled code needs of a piece of a motion, as rows of the sections of `inversion.leg_tables`.
@@ -223,11 +222,24 @@ class TabulatedPiece(NamedTuple):
     ----------
     intervals, states, panels : arrays
         INTERVALS, STATES and PANELS; panels are counted from the first one of the piece.
+    edges : array
+        The phase angles at the edges of its panels.
+    has_all_errors : bool
+        Whether the errors in STATES are those of times and places from launch, or of this piece alone.
     """
 
     intervals: Array
     states: Array
     panels: Array
+    edges: Array
+    has_all_errors: bool = False
+
+    def with_errors(self, of_place: float, of_times: Array) -> "TabulatedPiece":
+        """The piece with the errors from before it: of places, and of the times on each panel."""
+        states = self.states.copy()
+        states[:, leg_tables.TIME_ERROR] += of_times[states[:, leg_tables.PANEL].astype(np.intp)]
+        states[:, leg_tables.PLACE_ERROR] += of_place
+        return self._replace(states=states, has_all_errors=True)
 
 
 class Timing(NamedTuple):
@@ -239,8 +251,8 @@ class Timing(NamedTuple):
         1 if the segment begins at a turning point, or close to one; 0 if it is REGULAR.
     last, turn_offset : float
         As of `Segment.speed_series`, and of `Segment`.
-    relative_error, place_error : float
-        Of its times, and of the places with which it begins.
+    relative_error : float
+        Of its times.
     lam_before : float
         By how much the curve parameter has grown in all laps before it.
     """
@@ -262,7 +274,6 @@ class Timing(NamedTuple):
     t_start_low: float
     t_stop: float
     relative_error: float
-    place_error: float
 
 
 @Inner
@@ -276,8 +287,8 @@ def time_from_launch(r, r_low, timing):  # type: ignore[no-untyped-def]
 TIMING = types.NamedUniTuple(types.float64, len(Timing._fields), Timing)
 
 
-@entry(types.Tuple((MATRIX, MATRIX, MATRIX))(MATRIX, MATRIX, MATRIX, MATRIX, VECTOR, TIMING))
-def tabulate_piece(marks, time_terms, length_terms, speed_terms, time_errors, timing):  # type: ignore[no-untyped-def]
+@entry(types.Tuple((MATRIX, MATRIX, MATRIX))(MATRIX, MATRIX, MATRIX, MATRIX, TIMING))
+def tabulate_piece(marks, time_terms, length_terms, speed_terms, timing):  # type: ignore[no-untyped-def]
     """The arrays of a `TabulatedPiece`.
 
     Parameters
@@ -286,13 +297,11 @@ def tabulate_piece(marks, time_terms, length_terms, speed_terms, time_errors, ti
         Phase angles at the edges of n panels, the times there as two doubles, and the arc lengths.
     time_terms, length_terms, speed_terms : arrays
         As of `read_panels`.
-    time_errors : (n,) array
-        The error with which the time begins on each panel.
     timing : Timing
     """
     edges, times, lengths = marks[0], marks[1], marks[3]
     middles, lows, scales, powers, _, ends, errors = tabulate(edges, times, marks[2], time_terms)
-    count, panel_count, sense, width = ends.size, time_errors.size, timing.sense, timing.width
+    count, panel_count, sense, width = ends.size, edges.size - 1, timing.sense, timing.width
     intervals, states = np.empty((count, leg_tables.INTERVAL_COLUMNS)), np.empty((count, leg_tables.STATE_COLUMNS))
     share, is_from_turn = 1.0 / (1.0 + 2.0 * timing.turn_offset), timing.from_turn > 0.0
     linear = 2.0 * timing.turn_offset * share if is_from_turn else 1.0
@@ -321,11 +330,10 @@ def tabulate_piece(marks, time_terms, length_terms, speed_terms, time_errors, ti
         state[leg_tables.PANEL], state[leg_tables.DIRECTION] = panel, direction
         state[leg_tables.HEADING], state[leg_tables.ARC_A] = sense * direction, timing.s_a
         state[leg_tables.GROWTH], state[leg_tables.FIRST_GROWTH] = growth
-        own_error = (timing.relative_error + ULP + MAX_TIME_ERROR) * times[panel + 1]
-        state[leg_tables.TIME_ERROR] = time_errors[panel] + own_error
+        state[leg_tables.TIME_ERROR] = (timing.relative_error + ULP + MAX_TIME_ERROR) * times[panel + 1]
         # The error of a turn as of `Segment`, which is largest next to it.
         of_turn = MAX_END_ROUNDINGS * ULP * (1.0 - start * start) if is_from_turn else 0.0
-        state[leg_tables.PLACE_ERROR] = timing.place_error + abs(width) * (slope * errors[i] + 3.0 * ULP + of_turn)
+        state[leg_tables.PLACE_ERROR] = abs(width) * (slope * errors[i] + 3.0 * ULP + of_turn)
         kept += 1
     intervals[kept - 1, leg_tables.UNTIL] = timing.t_stop
     panels = np.empty((panel_count, leg_tables.PANEL_COLUMNS))
@@ -337,20 +345,20 @@ def tabulate_piece(marks, time_terms, length_terms, speed_terms, time_errors, ti
     return intervals[:kept].copy(), states[:kept].copy(), panels
 
 
-def tabulated(timed: TimedSegment, lap: float, errors_before: ErrorsBefore) -> TabulatedPiece:
-    """What compiled code needs of a piece, which is no approach to an equilibrium."""
+def tabulated(timed: TimedSegment, lap: float) -> TabulatedPiece:
+    """What compiled code needs of a piece, which is no approach to an equilibrium, with its own errors."""
     segment = timed.segment
     assert segment.speed_series is not None
     edges, _, lengths, time_terms, length_terms, error = segment.panels[:6]
     last, speed_terms = segment.speed_series
-    place_error, time_errors = errors_before(timed, 0.5 * (edges[1:] + edges[:-1]))
     timing = Timing(
         *(float(segment.kind == FROM_TURN), last, segment.turn_offset, segment.a, segment.low_parts[0], segment.b),
         *(segment.low_parts[1], segment.width, timed.laps * lap, float(timed.sense), timed.s_a, *timed.r_start),
-        *(*timed.t_start, timed.t_stop[0], error, place_error),
+        *(*timed.t_start, timed.t_stop[0], error),
     )
     marks = np.array([edges, *segment.edge_times, lengths])
-    return TabulatedPiece(*tabulate_piece(marks, time_terms, length_terms, speed_terms, time_errors, timing))
+    intervals, states, panels = tabulate_piece(marks, time_terms, length_terms, speed_terms, timing)
+    return TabulatedPiece(intervals, states, panels, edges)
 
 
 def leg_record(problem: Problem, v0: float, pieces: Sequence[TabulatedPiece]) -> Array:
@@ -358,20 +366,24 @@ def leg_record(problem: Problem, v0: float, pieces: Sequence[TabulatedPiece]) ->
 
     ``v0`` is the signed speed of the launch.
     """
-    intervals, states, panels = (np.concatenate(rows) for rows in zip(*pieces, strict=True))
-    counts = [len(piece.panels) for piece in pieces]
-    states[:, leg_tables.PANEL] += np.repeat(np.cumsum([0, *counts[:-1]]), [len(piece.states) for piece in pieces])
+    intervals, states, panels = pieces[0][:3]
+    if len(pieces) > 1:
+        intervals, states, panels = (np.concatenate([piece[k] for piece in pieces]) for k in range(3))
+        counts = [len(piece.panels) for piece in pieces]
+        states[:, leg_tables.PANEL] += np.repeat(np.cumsum([0, *counts[:-1]]), [len(piece.states) for piece in pieces])
     until = intervals[:, leg_tables.UNTIL]
-    grid = np.linspace(0.0, until[-1], SLOTS_PER_INTERVAL * len(until) + 1)
-    slots = np.minimum(np.searchsorted(until, grid, side="right"), len(until) - 1)
+    parts, last = SLOTS_PER_INTERVAL * len(until), len(until) - 1
+    slots: NDArray[np.int64] = np.zeros(parts + 1, dtype=np.int64)
     # Rounding may put a time into the slot after its own.
-    slots = np.append(slots[:1], slots[:-1]) * leg_tables.INTERVAL_COLUMNS
+    slots[1:] = until.searchsorted(until[-1] / parts * np.arange(parts), side="right")
+    slots[0] = slots[1]
+    slots = np.minimum(slots, last) * leg_tables.INTERVAL_COLUMNS
     address = problem.functions.addresses.path_and_contact_force
     return records.record(
         {
             leg_tables.FUNCTION: np.array([address], dtype=np.int64),
             leg_tables.LAUNCH: np.array([problem.lam0, v0, problem.arc_origin, until[-1]], dtype=np.float64),
-            leg_tables.SLOTS: slots.astype(np.int64),
+            leg_tables.SLOTS: slots,
             leg_tables.INTERVALS: intervals,
             leg_tables.STATES: states,
             leg_tables.PANELS: panels,

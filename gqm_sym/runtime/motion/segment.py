@@ -187,7 +187,9 @@ class Segment:
     @property
     def panels(self) -> Any:
         """Its panels, as `quadrature.time_panels.lay` returns them."""
-        return self._with_panels().stored_panels
+        if self.stored_panels is None:
+            self._lay_panels()
+        return self.stored_panels
 
     @property
     def from_multiprecision(self) -> bool:
