@@ -1,5 +1,5 @@
 # Made by gqm-gen for "loop". Do not edit: change its declaration and generate again.
-# interface 10, input 1702921d1283, body c46e6dbcb7c7
+# interface 10, input a497e433309c, body c46e6dbcb7c7
 """Loop of a roller coaster
 
 x              = x(s)

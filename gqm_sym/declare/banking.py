@@ -14,6 +14,7 @@ Source: TypeAlias = str | int | sp.Expr
 Roll: TypeAlias = Source | tuple[Source, Source]
 
 COORDINATED = "coordinated"
+OF_PIECES = "pieces"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

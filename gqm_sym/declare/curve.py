@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias, TypedDict, Unpack
 import sympy as sp
 
 from gqm_sym.arguments import checked, names, one_line, short, unknown_argument
-from gqm_sym.declare.banking import Banking, read_banking
+from gqm_sym.declare.banking import OF_PIECES, Banking, read_banking
 from gqm_sym.declare.closing import check_period, found_period
 from gqm_sym.declare.ends import Ends, check_ends, check_order, read_ends
 from gqm_sym.declare.measures import parameter_dimension, told, units_of
@@ -417,8 +417,7 @@ class Curve:
         start: Sequence[Source] | None = None,
         heading: Source | Sequence[Source] | None = None,
         closed: bool = False,
-        parameters: Parameters | None = None,
-        title: str = "",
+        **more: Unpack[SpaceOptions],
     ) -> "Curve":
         """Declare a rail of pieces joined end to start, in arc length from its start.
 
@@ -435,6 +434,13 @@ class Curve:
             how far the frame leans to the left; those left out are 0. A curve that comes first has its own.
         closed
             Whether the rail ends where it began, in the same direction.
+        roll
+            In space, how the track is banked, so that states tell what a rider feels: "pieces", as the frame leans that
+            the pieces turn and roll; or what `Curve.space` takes, with formulas in the arc length s.
+        heartline, parameters
+            As of `Curve.space`.
+        title
+            One line for people.
 
         Raises
         ------
@@ -449,10 +455,16 @@ class Curve:
         """
         from gqm_sym.declare.piecewise import declare_rail
 
+        _refuse_others(more, "Curve.piecewise", ("pieces", "start", "heading", "closed"))
+        s, roll = sp.Symbol("s", real=True), more.get("roll")
+        of_pieces = isinstance(roll, str) and roll == OF_PIECES
+        banking = read_banking(space_roll(s) if of_pieces else roll, more.get("heartline", 0), "piecewise")
+        forms = banking.forms if banking else ()
         rail, defaults, positive = declare_rail(
-            pieces, start=start, heading=heading, closed=closed, parameters=parameters
+            pieces, start=start, heading=heading, closed=closed, parameters=more.get("parameters"), forms=forms
         )
-        s = sp.Symbol("s", real=True)
+        if banking is not None and not rail.in_space:
+            raise DeclarationError("piecewise: roll: is for rails in space; give start=(x, y, z)")
         at_x, at_y, at_z = (head(s) for head in SPACE) if rail.in_space else (chart_x(s), sp.S.Zero, chart_z(s))
         return cls(
             kind="piecewise",
@@ -461,9 +473,10 @@ class Curve:
             z=at_z,
             parameter=s,
             defaults=defaults,
-            title=title,
+            title=more.get("title", ""),
             positive=positive,
-            definition=rail,
+            definition=replace(rail, banked=of_pieces),
+            banking=banking,
         )
 
 

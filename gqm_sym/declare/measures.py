@@ -64,7 +64,8 @@ def curve_formulas(curve: DeclaredCurve) -> Formulas:
         places = [(form, LENGTH) for form in (*level.start, *curve.domain) if form is not None]
         return Formulas([(level.value, None), *places], _PLANE)
     if isinstance(curve.definition, Rail):
-        return _rail_formulas(curve.definition)
+        banked = [] if curve.banking is None else _banked(curve.banking)
+        return _rail_formulas(curve.definition) + Formulas(banked, {curve.parameter.name: LENGTH})
     own = parameter_dimension(curve)
     banked = [] if curve.banking is None else _banked(curve.banking)
     if curve.charted:

@@ -86,12 +86,15 @@ class Rail:
         Whether the last is joined to the first.
     in_space
         Whether it has three coordinates.
+    banked
+        Whether the roll of its pieces is that of the track.
     """
 
     start: tuple[sp.Expr, ...] | None
     pieces: tuple[Piece, ...]
     closed: bool
     in_space: bool = False
+    banked: bool = False
 
 
 @checked("line")
@@ -169,8 +172,9 @@ def declare_rail(
     heading: Source | Sequence[Source] | None,
     closed: bool,
     parameters: Parameters | None,
+    forms: tuple[sp.Expr, ...] = (),
 ) -> tuple[Rail, tuple[tuple[str, Value | None], ...], tuple[str, ...]]:
-    """Read and check the pieces of a rail.
+    """Read and check the pieces of a rail, whose run-time parameters are those of other forms too.
 
     Returns
     -------
@@ -193,7 +197,7 @@ def declare_rail(
     in_space = (place is not None and len(place) == 3) or any(_is_spatial(piece) for piece in joined)
     first = _start(place, heading, joined[0], in_space)
     rail = Rail(start=first, pieces=joined, closed=closed, in_space=in_space)
-    defaults, positive = _parameters(rail, parameters)
+    defaults, positive = _parameters(rail, parameters, forms)
     return rail, defaults, positive
 
 
@@ -241,7 +245,7 @@ def _start(place: tuple[Source, ...] | None, heading: Any, first: Piece, in_spac
 
 
 def _parameters(
-    rail: Rail, parameters: Parameters | None
+    rail: Rail, parameters: Parameters | None, forms: tuple[sp.Expr, ...]
 ) -> tuple[tuple[tuple[str, Value | None], ...], tuple[str, ...]]:
     """Join the parameters of all pieces; a name means the same in each."""
     found = dict.fromkeys(names_in_order(*(rail.start or ())))
@@ -261,6 +265,7 @@ def _parameters(
                     "give one of them another name"
                 )
             own[name] = own.get(name) if value is None else value
+    found |= dict.fromkeys(name for name in names_in_order(*forms) if name != DISTANCE.name)
     if "s" in found:
         raise DeclarationError("piecewise: 's' is the arc length of the rail; give the parameter another name")
     defaults = read_parameters(parameters, found=found, where="piecewise")

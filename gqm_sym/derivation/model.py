@@ -521,7 +521,7 @@ def _refuse_planar_forces(kernel: Kernel) -> None:
     refused = (
         ("rolling: radius", kernel.radius, "the path of the centre of a rolling body"),
         ("rotating_frame", kernel.spin, "a turning frame"),
-        ("surface_tension", kernel.resistance, "a droplet's resistance"),
+        ("surface_tension: form", kernel.resistance and not kernel.resistance.has(sp.Abs), "the printed form's sign"),
     )
     for name, given, what in refused:
         if given:

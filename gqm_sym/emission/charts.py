@@ -101,6 +101,8 @@ def _rail(lowering: Lowering) -> ChartIR:
         arguments.append(f"formulas=({', '.join(formula.name for formula in formulas)},)")
     if rail.closed:
         arguments.append("closed=True")
+    if rail.banked:
+        arguments.append("banked=True")
     arguments.append(_shaped_by(numbers, *formulas, *functions))
     return ChartIR(
         statement=f"{maker}(\n    " + ",\n    ".join(arguments) + ",\n)",

@@ -8,7 +8,7 @@ from pydantic import ConfigDict, Field, create_model
 from gqm_sym.declare import Curve, arc, clothoid, line, transition
 from gqm_sym.declare.piecewise import Piece
 from gqm_sym.errors import DeclarationError, InputError
-from gqm_sym.specfile.fields import ABSENT, Expression, Flag, Headings, Section, SpaceCentre, wrapped
+from gqm_sym.specfile.fields import ABSENT, Centre, Expression, Flag, Headings, Section, SpaceCentre, wrapped
 
 
 class Line(Section):
@@ -92,6 +92,15 @@ class RailSchema(NamedTuple):
                     description="the angle of the tangent at the start, in space [heading, climb, roll]; else 0",
                 ),
             ),
+            "roll": (
+                Expression | Centre,
+                Field(
+                    default=ABSENT,
+                    description="in space: 'pieces', the lean of the frame, or what space curves take, in s",
+                    examples=["pieces"],
+                ),
+            ),
+            "heartline": (Expression, Field(default=ABSENT, description="height of the riders' line over the track")),
             "closed": (Flag, Field(default=False, description="whether the end is joined to the start")),
         }
         doc = "A rail of pieces joined end to start; the list of them alone will do."

@@ -337,7 +337,10 @@ REFUSED = (
 )
 FORCES = (
     (gqm.RotatingFrame(), "rotating_frame: a turning frame is known for planar curves only yet; leave it out"),
-    (gqm.SurfaceTension(), "surface_tension: a droplet's resistance is known for planar curves only yet"),
+    (
+        gqm.SurfaceTension(form="printed"),
+        "surface_tension: form: the printed form's sign is known for planar curves only",
+    ),
     (gqm.Rolling(radius="1/10"), "the path of the centre of a rolling body is known for planar curves only yet"),
     (gqm.Potential("k*y", parameters={"y": 1, "k": 1}), "'y' is a coordinate on a space curve"),
 )
@@ -424,3 +427,20 @@ def test_a_central_force_in_space() -> None:
     assert away.effective_potential_slope != 0
     with pytest.raises(DeclarationError, match="a force acts across the curve's plane"):
         gqm.derive(gqm.families.circle(), gqm.CentralForce(centre=(0, 2, 0)))
+
+
+def test_droplet_on_a_helix(build: Build) -> None:
+    """Its resistance is constant, so that both legs are those of a body on an incline, up to rest in the end."""
+    module = build("droplet_on_helix", gqm.families.helix(R="2", c="3/4"), gqm.Gravity() + gqm.SurfaceTension())
+    rate = mp.sqrt(4 + mpf(9) / 16)
+    pull, drag = mpf("9.81") * mpf(3) / 4 / rate, mpf("0.07") * 9 * 2 / rate**2
+    motion = module.solve(0, v0=4, gamma="0.07", ell_c=3, t_max=3)
+    up, down = motion.legs
+    assert ulps(up.lam_end, 8 / (pull + drag) / rate) <= 1
+    assert ulps(up.t_end, 4 / (pull + drag)) <= 1
+    assert down.lam_end == pytest.approx(
+        float((8 / (pull + drag) - (pull - drag) * (3 - 4 / (pull + drag)) ** 2 / 2) / rate)
+    )
+    sticky = module.solve(0, v0=4, gamma="0.07", ell_c=12, t_max=3)
+    assert sticky.legs[-1].end == "rest"
+    assert sticky.rest_position == pytest.approx(float(8 / (pull + 16 * drag) / rate), rel=1e-15)

@@ -72,7 +72,8 @@ def dissipation(
         Of expressions on the curve.
     """
     v, nu = DIRECTION, CONTACT_SIGN
-    resistance = _without_bars(kernel.resistance, pieces[KAPPA], signs)
+    # The curvature of a curve in no vertical plane has no sign.
+    resistance = _without_bars(kernel.resistance, 1 if TURNS[0] in pieces else signs.sign(pieces[KAPPA]))
     extra = kernel.tangential_law.xreplace(coordinates)
     sliding, other, contact = v * nu * kernel.friction, extra, (LOAD, KAPPA)
     rubbing = sp.S.Zero
@@ -112,7 +113,6 @@ def _held(kernel: Kernel, resistance: sp.Expr, extra: sp.Expr, way: int) -> sp.E
     return (PUSH - way * against + extra.xreplace({DIRECTION: sp.Integer(way), W: sp.S.Zero})) / kernel.inertia
 
 
-def _without_bars(resistance: sp.Expr, kappa: sp.Expr, signs: Signs) -> sp.Expr:
-    """Write |κ| as κ or -κ on a curve that bends one way only."""
-    sign = signs.sign(kappa)
+def _without_bars(resistance: sp.Expr, sign: int | None) -> sp.Expr:
+    """Write |κ| as κ or -κ where the sign of κ is known: on a curve that bends one way only."""
     return resistance if sign is None else resistance.xreplace({sp.Abs(KAPPA): sign * KAPPA})

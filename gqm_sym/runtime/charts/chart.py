@@ -31,6 +31,9 @@ _QUARTERS = np.outer(np.arange(TERMS), 2 * np.arange(TERMS) + 1) % (4 * TERMS)
 FIT: Array = (2.0 / TERMS) * np.cos(np.pi * _QUARTERS / (2 * TERMS))
 FIT[0] *= 0.5
 
+WEIGHTS: Array = (2.0 / (1.0 - np.arange(0, TERMS, 2) ** 2)) @ FIT[::2]
+"""Integrals over [-1, 1] are sums of values at the nodes with these weights."""
+
 AT_NODES: Array = np.cos(np.pi * _QUARTERS / (2 * TERMS))
 _POWERS = np.array([np.pad(cheb2poly(row[: k + 1]), (0, TERMS - 1 - k)) for k, row in enumerate(np.eye(TERMS))])
 

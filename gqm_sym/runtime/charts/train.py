@@ -15,17 +15,13 @@ from numba import types
 from gqm_sym.errors import ParameterError
 from gqm_sym.literals.namespaces import FLOATS
 from gqm_sym.literals.numbers import Number
-from gqm_sym.runtime.charts.chart import FIT, NODES, Chart, ChartMaker, SpaceChart, blocks_of
+from gqm_sym.runtime.charts.chart import NODES, WEIGHTS, Chart, ChartMaker, SpaceChart, blocks_of
 from gqm_sym.runtime.charts.evaluate import TERMS, chart_alpha, chart_rows, divdiff1_chart_alpha, divdiff1_chart_z
 from gqm_sym.runtime.compiled.jit import entry
 from gqm_sym.runtime.compiled.types import MATRIX, REAL, VECTOR, Array
 
 # Edges nearer to each other than this share of the track are one: they differ by rounding.
 SAME_EDGE = 1e-13
-
-# Integrals over [-1, 1] of polynomials that are known at `NODES`.
-_ORDERS = np.arange(0, TERMS, 2)
-WEIGHTS: Array = (2.0 / (1.0 - _ORDERS**2)) @ FIT[::2]
 
 
 @dataclass(frozen=True, slots=True)

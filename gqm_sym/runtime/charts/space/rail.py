@@ -15,12 +15,13 @@ from math import ceil, comb, cos, sin
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.polynomial.chebyshev import chebder
 
 from gqm_sym.errors import BudgetError, DeclarationError, ParameterError
 from gqm_sym.literals.namespaces import FLOATS
 from gqm_sym.literals.numbers import Number
 from gqm_sym.runtime.charts.arc_length import MAX_PIECES, divided, summed
-from gqm_sym.runtime.charts.chart import NODES, Chart, assemble_in_space
+from gqm_sym.runtime.charts.chart import AT_NODES, FIT, NODES, WEIGHTS, Chart, assemble_in_space
 from gqm_sym.runtime.charts.rail import MAX_MISMATCH, MAX_TOTAL_TURN
 from gqm_sym.runtime.compiled.calls import call_segment
 from gqm_sym.runtime.compiled.jit import entry
@@ -35,20 +36,29 @@ PIECE_NUMBERS = {"line": 1, "arc": 2, "clothoid": 3, "transition": 1 + 3 * POWER
 # series fall at least as powers of RADIUS, so that after TERMS of them nothing is left of 64 bits.
 RADIUS, MAX_GROWTH, TERMS = 4.0, 0.5, 36
 
+# A piece is cut into so many times as many parts until the last coefficients of its roll angle are below MAX_TAIL.
+FINER, MAX_TAIL = (1, 2, 4, 8, 16, 32, 64), 1e-14
+# Takes values at the nodes to those of the derivative.
+DERIVATIVE: Array = np.pad(chebder(FIT, axis=0), ((0, 1), (0, 0))).T @ AT_NODES
+
 # Rows of the function of a piece with formulas: coordinates, ds/dlam, and three derivatives of these by arc length.
 CURVE_ROWS = 13
 Long = Any  # an array of the longest floats
 
 
 class Pen(NamedTuple):
-    """The end of a piece: its coordinates, and the frame in rows."""
+    """The end of a piece: its coordinates, the frame in rows, and the roll angle of a banked rail."""
 
     place: Long
     frame: Long
+    lean: Long = 0.0
 
 
 class Pieces(NamedTuple):
-    """The n pieces of a chart of one part of the rail: lengths, coordinates at left edges, and t, t', t'' at nodes."""
+    """The n pieces of a chart of one part of the rail: lengths, coordinates at left edges, and t, t', t'' at nodes.
+
+    Behind the coordinates stands the roll angle of a banked rail.
+    """
 
     lengths: Array
     anchors: Long
@@ -74,6 +84,8 @@ class SpaceRail:
         Addresses of the compiled functions of the curves among the pieces, in order.
     closed : bool
         Whether the end is joined to the start.
+    banked : bool
+        Whether the chart has the roll angle of the frame too.
     shaped_by : tuple of int or None
         The run-time parameters that the rail depends on, by their place; None if that is not known.
     """
@@ -83,6 +95,7 @@ class SpaceRail:
     placed: bool
     segments: tuple[int, ...] = ()
     closed: bool = False
+    banked: bool = False
     shaped_by: tuple[int, ...] | None = None
 
     def chart(self, p: tuple[float, ...]) -> Chart:
@@ -93,7 +106,7 @@ class SpaceRail:
         ParameterError
             If a length or a radius is not positive, or a number is not finite.
         DeclarationError
-            If pieces do not meet, or a closed rail does not close.
+            If pieces do not meet, a closed rail does not close, or the frame of a banked one has no roll angle.
         """
         numbers, segments = iter(self.numbers(FLOATS, p)), iter(self.segments)
         pen = _start(*(float(number) for number in islice(numbers, 6))) if self.placed else None
@@ -102,6 +115,8 @@ class SpaceRail:
             where = f"piecewise: piece {count} ({kind})"
             given = [float(number) for number in islice(numbers, PIECE_NUMBERS[kind])]
             if kind == "curve":
+                if self.banked:
+                    raise DeclarationError(f"{where}: has no roll of its own; declare the roll by a formula in s")
                 part, begin, end = _curve(next(segments), np.array(p), given, where)
                 if pen is not None:
                     length = joints[-1] + float(part.lengths.sum())
@@ -109,7 +124,7 @@ class SpaceRail:
             else:
                 assert pen is not None
                 begin = pen
-                part, end = _turned(*_rates(kind, given, where), pen, where)
+                part, end = _piece(*_rates(kind, given, where), pen, where, self.banked)
             start, pen = start or begin, end
             parts.append(part)
             joints.append(joints[-1] + float(part.lengths.sum()))
@@ -119,6 +134,9 @@ class SpaceRail:
         assert pen is not None
         if self.closed:
             _check_joint(pen, start, joints[-1], "piecewise: closed: the start lies", "the last piece ends")
+            if self.banked and not abs(np.sin(0.5 * (pen.lean - start.lean))) <= MAX_MISMATCH:
+                leans = f"{float(pen.lean)!r} rad at its end, and {float(start.lean)!r} rad at its start"
+                raise DeclarationError(f"piecewise: closed: the rail leans by {leans}; let it roll back")
         lengths, anchors, *derivatives = (np.concatenate(rows) for rows in zip(*parts, strict=True))
         edges, inner = summed(lengths), joints[:-1] if self.closed else joints[1:-1]
         return assemble_in_space(
@@ -151,7 +169,7 @@ def _start(x: float, y: float, z: float, heading: float, climb: float, roll: flo
     up = np.array([-rise * cosine, -rise * sine, level], dtype=np.longdouble)
     lean, upright = sin(roll), cos(roll)
     frame = np.stack([ahead, upright * left - lean * up, upright * up + lean * left])
-    return Pen(np.array([x, y, z], dtype=np.longdouble), frame)
+    return Pen(np.array([x, y, z], dtype=np.longdouble), frame, np.longdouble(roll))
 
 
 def _check_joint(end: Pen, begin: Pen, length: float, who: str, whom: str) -> None:
@@ -192,8 +210,37 @@ def _rates(kind: str, given: list[float], where: str) -> tuple[float, Long]:
     return length, rates
 
 
-def _turned(length: float, rates: Long, pen: Pen, where: str) -> tuple[Pieces, Pen]:
-    """Return a piece by its rates, and its right end."""
+def _piece(length: float, rates: Long, pen: Pen, where: str, banked: bool) -> tuple[Pieces, Pen]:
+    """Return a piece by its rates, in as many parts as its roll angle needs too, and its right end."""
+    for finer in FINER if banked else FINER[:1]:
+        pieces, end, spin, leaning = _turned(length, rates, pen, where, finer)
+        if not banked:
+            break
+        with np.errstate(all="ignore"):
+            across, along, up = np.moveaxis(pieces.slopes, 1, 0)
+            change = (across * pieces.bends[:, 1] - along * pieces.bends[:, 0]) / (across**2 + along**2)
+            # The frame rolls, and the level turns about the tangent where a climbing track turns.
+            slopes = spin + up * change
+        half = 0.5 * pieces.lengths[:, None]
+        leans = np.cumsum(np.append(pen.lean, half[:, 0] * (slopes @ WEIGHTS)), dtype=np.longdouble)
+        # Behind a vertical tangent the level is another one.
+        off = np.abs(np.sin(0.5 * (leans[1:] - leaning))).max()
+        if np.abs(half * (slopes @ FIT[-2:].T)).max() <= MAX_TAIL and off <= MAX_MISMATCH:
+            bends = slopes @ DERIVATIVE / half
+            rows = (slopes, bends, bends @ DERIVATIVE / half)
+            known = (np.append(row, roll[:, None], axis=1) for row, roll in zip(pieces[2:], rows, strict=True))
+            anchors = np.column_stack([pieces.anchors, leans[:-1]])
+            return Pieces(pieces.lengths, anchors, *known), end._replace(lean=leans[-1])
+    else:
+        raise DeclarationError(
+            f"{where}: its tangent is vertical, or nearly so, where no level is there to measure a roll angle from; "
+            "declare roll='coordinated'"
+        )
+    return pieces, end
+
+
+def _turned(length: float, rates: Long, pen: Pen, where: str, finer: int) -> tuple[Pieces, Pen, Array, Long]:
+    """Return a piece by its rates, its right end, the roll rate at the nodes, and roll angles where parts end."""
     orders = np.arange(POWERS)
     sizes = np.sqrt((rates.astype(np.float64) ** 2).sum(axis=0))
     turned = float((sizes * length ** (orders + 1)).sum())
@@ -204,6 +251,7 @@ def _turned(length: float, rates: Long, pen: Pen, where: str) -> tuple[Pieces, P
     count = 1
     while (most * (length / count) ** (orders + 1) * RADIUS**orders).sum() > MAX_GROWTH:
         count = ceil(1.25 * count)
+    count *= finer
     step = np.longdouble(length) / count
     left = step * np.arange(count)
     scaled = np.zeros((count, 3, POWERS), dtype=np.longdouble)
@@ -238,7 +286,9 @@ def _turned(length: float, rates: Long, pen: Pen, where: str) -> tuple[Pieces, P
     changes = (more_yaw + pitch * roll) * side + (more_pitch - yaw * roll) * up - (yaw**2 + pitch**2) * ahead
     rows = (np.moveaxis(row, 2, 1).astype(np.float64) for row in (ahead, bends, changes))
     pieces = Pieces(np.full(count, float(step)), places[:-1], *rows)
-    return pieces, Pen(places[-1], frames[-1])
+    across, along = -frames[1:, 0, 1], frames[1:, 0, 0]
+    left, upright = (frames[1:, row, 0] * across + frames[1:, row, 1] * along for row in (1, 2))
+    return pieces, Pen(places[-1], frames[-1]), roll[:, :, 0].astype(np.float64), np.arctan2(upright, left)
 
 
 @entry(MATRIX(INTEGER, VECTOR, VECTOR))

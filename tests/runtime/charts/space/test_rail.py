@@ -10,7 +10,7 @@ from naive import ulps
 from railed import LOOP, built, chart_of
 
 import gqm_sym as gqm
-from gqm_sym.errors import DeclarationError, GQMError, ParameterError
+from gqm_sym.errors import ArgumentError, DeclarationError, GQMError, ParameterError
 from gqm_sym.specfile import read_spec
 
 # Roundings of coordinates, as a share of the largest; half periods of closed rails, in units in the last place.
@@ -29,7 +29,7 @@ def polynomial(coefficients: tuple[str, ...]) -> str:
 
 
 def frame_truth(places: list[Any]) -> list[Any]:
-    """Coordinates and tangents on a transition, from the equations of its frame."""
+    """Coordinates and the frame on a transition, from the equations of that."""
     heading, climb, roll = mpf(1) / 2, mpf(1) / 4, mpf(1) / 3
     ahead = mp.matrix([mp.cos(climb) * mp.cos(heading), mp.cos(climb) * mp.sin(heading), mp.sin(climb)])
     level = mp.matrix([-mp.sin(heading), mp.cos(heading), 0])
@@ -48,13 +48,13 @@ def frame_truth(places: list[Any]) -> list[Any]:
         ]
 
     found = mp.odefun(slope, 0, [*map(mpf, START), *ahead, *left, *up])
-    return [found(place)[:6] for place in places]
+    return [found(place) for place in places]
 
 
 def test_transition(tmp_path: Path) -> None:
-    """Rates of degree 5: coordinates and tangents are those of the frame's equations in 25 digits."""
+    """Rates of degree 5: coordinates, tangents and the lean are those of the frame's equations in 25 digits."""
     rates = {"yaw": polynomial(YAW), "pitch": polynomial(PITCH), "roll": polynomial(ROLL)}
-    module = built(tmp_path, "bent", [gqm.transition(length=3, **rates)], start=START, heading=ANGLES)
+    module = built(tmp_path, "bent", [gqm.transition(length=3, **rates)], start=START, heading=ANGLES, roll="pieces")
     chart = chart_of(module)
     places = [0.75, 2.0, 3.0]
     with mp.workdps(25):
@@ -64,6 +64,11 @@ def test_transition(tmp_path: Path) -> None:
         assert max(errors) <= 8 * ROUNDING
         dz = chart.points([place])[2, 0]
         assert abs(mpf(float(dz)) - truth[k][5]) <= ROUNDING
+        ahead, left, up = (truth[k][3 + 3 * row : 6 + 3 * row] for row in range(3))
+        across = [part / mp.hypot(ahead[0], ahead[1]) for part in (-ahead[1], ahead[0])]
+        lean = mp.atan2(*(row[0] * across[0] + row[1] * across[1] for row in (up, left)))
+        found = module.pass1([place], 0, 1).roll[0]
+        assert abs(mpf(float(found)) - lean) <= 4 * ROUNDING
 
 
 def test_helix(tmp_path: Path) -> None:
@@ -80,6 +85,34 @@ def test_helix(tmp_path: Path) -> None:
         # Curvature and torsion are rounded as parameters are, which turns the last end by some roundings of 80/2.1.
         np.testing.assert_allclose(row, wanted, rtol=0, atol=80 * ROUNDING)
     np.testing.assert_allclose(found.kappa, radius / square, rtol=1e-14)
+
+
+def test_loads_on_riders(tmp_path: Path) -> None:
+    """On a helix by its rates the frame stays level; loads and their rates are those on the helix by its formulas."""
+    rates = {"yaw": "R/(R**2 + c**2)", "roll": "-c/(R**2 + c**2)"}
+    given = {"start": ("R", 0, 0), "heading": ("pi/2", "atan(c/R)"), "parameters": {"R": "2", "c": "3/4"}}
+    module = built(tmp_path, "level", [gqm.transition(length=20, **rates)], **given, roll="pieces", heartline="11/10")
+    formulas = {"x": "2*cos(u)", "y": "2*sin(u)", "z": "3*u/4", "parameter": "u"}
+    curve = gqm.Curve.space(**formulas, roll=0, heartline="11/10")
+    other = gqm.build(gqm.derive(curve, gqm.Gravity()), name="helix_by_formulas", folder=tmp_path)
+    rate = np.sqrt(4 + 9 / 16)
+    ours, theirs = module.solve(18, v0=3).state(1.5), other.solve(18 / rate, v0=3).state(1.5)
+    for name in ours._fields[10:]:
+        assert ours[name] == pytest.approx(theirs[name], rel=1e-14, abs=2e-14), name
+
+
+def test_a_loop_has_no_level(tmp_path: Path) -> None:
+    """Where the tangent is vertical there is no angle that the frame leans by; steep climbs have one."""
+    loop = gqm.transition(length=8, pitch="1/2")
+    module = built(tmp_path, "loop", [gqm.line(length=1), loop], start=(0, 0, 0), roll="pieces")
+    with pytest.raises(DeclarationError, match=r"piece 2 \(transition\): its tangent is vertical"):
+        module.solve(0.5)
+    steep = gqm.transition(length=3, pitch="1/2", yaw="1/10")
+    chart = chart_of(built(tmp_path, "steep", [gqm.line(length=1), steep], start=(0, 0, 0), roll="pieces"))
+    assert np.isfinite(chart.block).all()
+    closed = built(tmp_path, "leaning", [gqm.transition(length="2*pi", yaw=1, roll="s*(2*pi - s)/10")], closed=True)
+    with pytest.raises(DeclarationError, match="off where the last piece ends"):
+        closed.solve(1)
 
 
 @pytest.mark.parametrize(("radius", "amplitude"), [(1, 1.25), (5, 2.0), (2, 0.125)])
@@ -138,6 +171,10 @@ def test_in_a_curve_file(tmp_path: Path) -> None:
     pieces = [gqm.line(length=2), gqm.transition(length=3, yaw="s/R", roll="0.1")]
     assert spec.curve == gqm.Curve.piecewise(pieces, start=(0, 0, 5), heading=heading)
     assert spec.curve.in_space
+    text = file.read_text().replace("    heading:", "    roll: pieces\n    heartline: 1.1\n    heading:")
+    file.write_text(text)
+    banked = gqm.Curve.piecewise(pieces, start=(0, 0, 5), heading=heading, roll="pieces", heartline="1.1")
+    assert read_spec(file).curve == banked
 
 
 LINE = gqm.line(length=1)
@@ -154,6 +191,8 @@ LINE = gqm.line(length=1)
         ),
         (DeclarationError, lambda: gqm.transition(length=1, roll="s**6"), "roll: must be a polynomial in s"),
         (DeclarationError, lambda: gqm.Curve.piecewise([LINE], start=(0, 0, 0, 0)), r"start: must be a pair \(x, z\)"),
+        (DeclarationError, lambda: gqm.Curve.piecewise([LINE], roll="pieces"), "roll: is for rails in space"),
+        (ArgumentError, lambda: gqm.Curve.piecewise([LINE], banking=1), "no argument 'banking'"),
         (
             DeclarationError,
             lambda: gqm.Curve.piecewise([gqm.transition(length=1)], start=(0, 0)),
