@@ -63,7 +63,17 @@ from gqm_sym.runtime.legs.leg_record import (
     START_V2,
     TIMES,
 )
-from gqm_sym.runtime.legs.leg_run import ASYMPTOTE, FULL, LIMIT, SPENT, TURN, Reading, point_buffer, slope_of_v2
+from gqm_sym.runtime.legs.leg_run import (
+    ASYMPTOTE,
+    FULL,
+    LIMIT,
+    NARROWED,
+    SPENT,
+    TURN,
+    Reading,
+    point_buffer,
+    slope_of_v2,
+)
 
 # What is asked of each body. LEGS is to advance by some legs, FIRST_LEGS the same unless its launch is next to an
 # equilibrium; RUN_AGAIN is to follow one of them once more for its panels, or a part of it.
@@ -217,7 +227,8 @@ def answer(dissipation, p, joints, question, body, record):  # type: ignore[no-u
     force, sign = sought(question)
     for _ in range(MAX_LEGS):
         what = advance(dissipation, p, joints, body, Reading(reads, force, sign, observed.peak), record)
-        if what in (FULL, SPENT, LEAVES, BEYOND):
+        # Of a run without room for a panel `solve` says whether the curve or the arithmetic ends there.
+        if what in (FULL, SPENT, NARROWED, LEAVES, BEYOND):
             break
         if question == ARRIVAL and body[TARGET] == body[LAM0]:
             return 0.0, FOUND

@@ -713,7 +713,7 @@ class DissipativeMotion(Motion):
         self._settle(what, float(record[START]), float(record[END]))
         if what == LEAVES:
             raise leaving_at_once(problem, heading, "end of the domain")
-        if what == SPENT:
+        if what == SPENT or (what == NARROWED and self._force_cancels(record)):
             raise self._lost(record)
         name = "" if leaves_frame else self._end_name(what, record, heading)
         self._runs.append(Run(record, what, name, frame, before if what in PASSED else None))
@@ -789,7 +789,19 @@ class DissipativeMotion(Motion):
                 f"{place} comes to the end of the range of doubles; launch the body more than {LEAST_SWING!r} from the "
                 "equilibrium, or faster"
             )
+        if self._force_cancels(record):
+            return SolutionError(
+                f"{place} could not be followed: terms of the force cancel there to fewer digits than doubles need; "
+                "declare the sum of such forces as one, or make them smaller"
+            )
         return SolutionError(f"{place} could not be followed; are the curve and the force smooth there?")
+
+    def _force_cancels(self, record: Array) -> bool:
+        """Whether terms of the force cancel where a leg ends, or starts, so that doubles do not tell it."""
+        with suppress(SolutionError):  # curves without formulas have no bound on its rounding, nor have very long ones
+            law, heading = Law(self.problem), int(record[HEADING])
+            return self._frame is None and any(law.cancels(float(record[end]), heading) for end in (START, END))
+        return False
 
     def _has_died_away(self, start: float, end: float) -> bool:
         """Whether the body is, or swings, so closely about an equilibrium that its place shows no more of it."""

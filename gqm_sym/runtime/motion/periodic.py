@@ -1,7 +1,7 @@
 """Motions that repeat: libration between two turning points, and circulation round a closed curve."""
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from math import inf
 from typing import Any
 
@@ -10,7 +10,7 @@ import numpy as np
 from gqm_sym.errors import InputError, SolutionError
 from gqm_sym.literals.namespaces import FLOATS
 from gqm_sym.literals.numbers import read_number
-from gqm_sym.runtime.arithmetic.doubledouble import ULP, ZERO
+from gqm_sym.runtime.arithmetic.doubledouble import ULP
 from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.double_double.orbit_time import Orbit
 from gqm_sym.runtime.gradients.charts import ChartOrbitDerivatives
@@ -30,7 +30,7 @@ from gqm_sym.runtime.motion.rows import Rows
 from gqm_sym.runtime.motion.sampler import Sampler, plain_time, plain_times
 from gqm_sym.runtime.motion.segment import Segment
 from gqm_sym.runtime.motion.state import State
-from gqm_sym.runtime.motion.trajectory import TimedSegment, Trajectory, libration
+from gqm_sym.runtime.motion.trajectory import Repeated, TimedSegment, Trajectory, circulation, libration
 from gqm_sym.runtime.multiprecision.exact_problem import NOWHERE
 from gqm_sym.runtime.quadrature.time_panels import slopes
 
@@ -62,18 +62,21 @@ class _Times:
     ----------
     timing : Timing
         The times.
-    trajectory : Trajectory
-        One period.
+    repeated : Repeated
+        What repeats itself.
     span : (float, float)
         The distances in s from launch, later or earlier, that they answer: above the first, up to the second.
     sampler : Sampler, optional
         What reads them at many times, once that was asked for.
+    trajectory : Trajectory, optional
+        One period, once that was asked for.
     """
 
     timing: timing.Timing
-    trajectory: Trajectory
+    repeated: Repeated
     span: tuple[float, float]
     sampler: Sampler | None = None
+    trajectory: Trajectory | None = None
 
 
 class PeriodicMotion(Motion):
@@ -179,19 +182,19 @@ class PeriodicMotion(Motion):
     @cached_property
     def _in_doubles(self) -> _Times:
         times = timing.in_doubles(self.kind, self._segment, self._offsets)
-        return _Times(times, self._build(times), (-inf, self._latest_in_doubles if self._is_exact else inf))
+        return _Times(times, self._repeated(times), (-inf, self._latest_in_doubles if self._is_exact else inf))
 
     @cached_property
     def _in_double_double(self) -> _Times | None:
         launch = self.problem, self.kind, self.direction
         times = timing.in_double_double(*launch, self._segment, self._offsets) if self._is_exact else None
-        return None if times is None else _Times(times, self._build(times), (-inf, times.max_time))
+        return None if times is None else _Times(times, self._repeated(times), (-inf, times.max_time))
 
     @cached_property
     def _in_multiprecision(self) -> _Times:
         launch, known = (self.problem, self.kind, self.direction), self._in_double_double
         times = timing.in_multiprecision(*launch, self._segment)
-        return _Times(times, self._build(times), (self._latest_in_doubles if known is None else known.span[1], inf))
+        return _Times(times, self._repeated(times), (self._latest_in_doubles if known is None else known.span[1], inf))
 
     @property
     def _latest_in_doubles(self) -> float:
@@ -368,47 +371,50 @@ class PeriodicMotion(Motion):
         """The sampler for times up to ``end_time``, made if there is none yet."""
         times = self._times_until(end_time)
         if times.sampler is None:
-            span, drift = times.span, lambda: self._time_drift(times)
+            of_states = partial(self._constants_of_states, times)
             times.sampler = Sampler(
-                self.problem, times.trajectory, times.timing, span, self.direction, drift, self._lock
+                self.problem, times.repeated, times.timing, times.span, self.direction, of_states, self._lock
             )
         self._sampler = times.sampler
         return self._sampler if end_time <= self._sampler.max_time else None
 
+    def _constants_of_states(self, times: _Times) -> tuple[float, ...]:
+        trajectory = self._trajectory_of(times)
+        return trajectory.lap_length, self.problem.arc_origin, trajectory.segments[0].s_a, *self._time_drift(times)
+
     def _trajectory(self, end_time: float) -> Trajectory:
-        return self._times_until(end_time).trajectory
+        return self._trajectory_of(self._times_until(end_time))
 
     @property
     def _course(self) -> Trajectory:
         return self._trajectory(self._segment.duration * (2.0 if self.kind == "libration" else 1.0))
 
-    def _build(self, times: timing.Timing) -> Trajectory:
+    def _repeated(self, times: timing.Timing) -> Repeated:
+        """What repeats itself, with these times."""
         duration = times.duration
         segment = self._segment if times.edge_times is None else self._segment.with_edge_times(times.edge_times)
         total = segment.total_time
         time_scale_error = ((total[0] - duration[0]) + (total[1] - duration[1])) / duration[0]
         if self.kind == "libration":
-            phi = segment.phase_angle_of(*times.offsets)
-            segments = libration(
-                segment, direction=self.direction, duration=duration, phase_time=times.phase_time, phi=phi
+            return Repeated(segment, (2.0 * duration[0], 2.0 * duration[1]), 0.0, time_scale_error)
+        return Repeated(segment, duration, self.direction * self.problem.period, time_scale_error)
+
+    def _trajectory_of(self, times: _Times) -> Trajectory:
+        """One period with these times, made when it is first asked for."""
+        if times.trajectory is None:
+            (segment, period, lap, time_scale_error), duration = times.repeated, times.timing.duration
+            if self.kind == "libration":
+                phi, phase_time = segment.phase_angle_of(*times.timing.offsets), times.timing.phase_time
+                segments = libration(
+                    segment, direction=self.direction, duration=duration, phase_time=phase_time, phi=phi
+                )
+                length = 0.0
+            else:
+                segments, length = (circulation(segment, duration),), self.direction * segment.length
+            times.trajectory = Trajectory(
+                segments=segments, period=period, lap=lap, lap_length=length, time_scale_error=time_scale_error
             )
-            period = (2.0 * duration[0], 2.0 * duration[1])
-            return Trajectory(segments=segments, period=period, time_scale_error=time_scale_error)
-        timed = TimedSegment(
-            segment=segment,
-            sense=1,
-            r_start=ZERO,
-            r_stop=duration,
-            phi_start=0.0,
-            phi_stop=segment.stop,
-            t_start=ZERO,
-            s_a=0.0,
-            end="horizon",
-        )
-        lap, length = self.direction * self.problem.period, self.direction * segment.length
-        return Trajectory(
-            segments=(timed,), period=duration, lap=lap, lap_length=length, time_scale_error=time_scale_error
-        )
+        return times.trajectory
 
     def _time_error(self, t: Array) -> Array:
         at_launch, drift = self._time_drift(self._times_until(float(np.abs(t).max()) if t.size else 0.0))
@@ -419,7 +425,7 @@ class PeriodicMotion(Motion):
         if times is not self.__dict__.get("_in_doubles"):  # those are not computed for the question
             return 0.0, times.timing.relative_error
         # The quadrature errors of the time to the launch and of the period; the rounding of the launch's phase angle.
-        segment, start = self._segment, np.array([times.trajectory.segments[0].phi_start])
+        segment, start = self._segment, np.array([self._trajectory_of(times).segments[0].phi_start])
         launch = segment.time_error(start) + ULP * start * slopes(segment.edges, segment.panels[3], start)
         rounding = ULP if self.problem.formulas.chart is None else CHART_ROUNDING
         return float(launch[0]), segment.relative_error + rounding

@@ -14,7 +14,7 @@ from gqm_sym.runtime.inversion.fourier import fit_wave
 from gqm_sym.runtime.launch.problem import Problem
 from gqm_sym.runtime.motion.locking import Lock, locked
 from gqm_sym.runtime.motion.timing import Timing
-from gqm_sym.runtime.motion.trajectory import Trajectory
+from gqm_sym.runtime.motion.trajectory import Repeated
 from gqm_sym.runtime.quadrature.substitution import TURN_TURN
 
 # The fewest times for which another thread is started.
@@ -47,10 +47,11 @@ def plain_times(t: Any) -> tuple[Array, float, float] | None:
 class Sampler:
     """The places and states of one periodic motion.
 
+    ``of_states`` gives what only states need: the length of a lap, arc length at launch, and that of the segment's end
+    ``a`` from there; the error of the time at launch, and its growth with time.
+
     Attributes
     ----------
-    trajectory : Trajectory
-        The trajectory that is sampled.
     min_time, max_time : float
         It answers times whose distance in s from launch, later or earlier, is above the first and up to the second.
     """
@@ -58,28 +59,26 @@ class Sampler:
     def __init__(
         self,
         problem: Problem,
-        trajectory: Trajectory,
+        repeated: Repeated,
         times: Timing,
         span: Pair,
         direction: int,
-        time_drift: Callable[[], Pair],
+        of_states: Callable[[], tuple[float, ...]],
         lock: Lock,
     ) -> None:
-        assert trajectory.period is not None
-        segment = trajectory.segments[0].segment
-        self.trajectory = trajectory
-        self.min_time, self.max_time = span[0], min(MAX_PERIODS * trajectory.period[0], span[1])
+        segment, period, lap, time_scale_error = repeated
+        self.min_time, self.max_time = span[0], min(MAX_PERIODS * period[0], span[1])
         self._problem, self._segment = problem, segment
         there_and_back = segment.kind == TURN_TURN
         sign = direction if there_and_back else 1
         start, start_low = sign * times.phase_time[0], sign * times.phase_time[1]
-        ends = (segment.a, segment.b, problem.lam0, trajectory.lap)
-        self._v0, self._time_drift = direction * problem.launch.v0.value, time_drift
-        own_times = (*segment.total_time, segment.stop, trajectory.time_scale_error)
+        ends = (segment.a, segment.b, problem.lam0, lap)
+        self._v0, self._of_states = direction * problem.launch.v0.value, of_states
+        own_times = (*segment.total_time, segment.stop, time_scale_error)
         self._sections = {
             records.FUNCTIONS: np.array([*problem.functions.addresses, segment.kind], dtype=np.int64),
-            records.WAVE: np.array([*trajectory.period, *_inverse(trajectory.period), start, start_low, *ends]),
-            records.TIMING: np.array([*trajectory.period, start, start_low, *own_times]),
+            records.WAVE: np.array([*period, *_inverse(period), start, start_low, *ends]),
+            records.TIMING: np.array([*period, start, start_low, *own_times]),
         }
         f = problem.functions
         if not f.between(f.breaks, segment.a, segment.b).size:
@@ -113,7 +112,6 @@ class Sampler:
         if self._state_record is None:
             self._tabulate()
             segment, panels, problem = self._segment, self._segment.panels, self._problem
-            lengths = self.trajectory.lap_length, problem.arc_origin, self.trajectory.segments[0].s_a
             intervals = segment.table[3]
             owners = np.clip(np.searchsorted(segment.edges, intervals[:, 0], side="right") - 1, 0, len(panels[2]) - 2)
             # The part of the error that changes within an interval of the table is largest at one of its ends, where
@@ -122,7 +120,7 @@ class Sampler:
             both_ends = np.concatenate([starts + 1e-9 * (stops - starts), stops])
             middles = 0.5 * (segment.edges[1:] + segment.edges[:-1])
             self._sections |= {
-                records.LAUNCH: np.array([problem.lam0, self._v0, *lengths, *self._time_drift()], dtype=np.float64),
+                records.LAUNCH: np.array([problem.lam0, self._v0, *self._of_states()], dtype=np.float64),
                 records.SHAPE: np.array([segment.a, segment.b, segment.ref, segment.ref_v2, segment.width_ratio]),
                 records.EDGES: panels[0],
                 records.LENGTHS: panels[2],

@@ -1,6 +1,7 @@
 """Where a motion is at a time: segments in the order of time, repeated if the motion is periodic."""
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -58,6 +59,23 @@ class TimedSegment:
     def direction(self) -> int:
         """The sign of ds/dt."""
         return self.sense * self.segment.direction
+
+
+class Repeated(NamedTuple):
+    """The one segment of a periodic motion.
+
+    Attributes
+    ----------
+    segment : Segment
+        The segment.
+    period, lap, time_scale_error
+        As of `Trajectory`.
+    """
+
+    segment: Segment
+    period: Pair
+    lap: float
+    time_scale_error: float
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -140,6 +158,21 @@ def libration(
         segments.append(timed)
         t = timed.t_stop
     return tuple(segments)
+
+
+def circulation(segment: Segment, duration: Pair) -> TimedSegment:
+    """One lap from the launch, in ``duration``."""
+    return TimedSegment(
+        segment=segment,
+        sense=1,
+        r_start=ZERO,
+        r_stop=duration,
+        phi_start=0.0,
+        phi_stop=segment.stop,
+        t_start=ZERO,
+        s_a=0.0,
+        end="horizon",
+    )
 
 
 @dataclass(frozen=True, slots=True)

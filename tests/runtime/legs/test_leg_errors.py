@@ -95,6 +95,22 @@ def test_terms_that_cancel_beside_a_viscous_law(size: float, build: Build) -> No
             assert abs(mpf(motion.lam(t)) - truth) <= motion.error_bound(t) <= 1e-12 * size
 
 
+@pytest.mark.parametrize("size", [1e6, 1e7, 1e8, 1e10])
+def test_terms_that_cancel_too_far(size: float, build: Build) -> None:
+    """No motion ends where they do: it was told to end at a singular point, which this curve has none of."""
+    viscous = gqm.Kernel.law("-direction*c*sqrt(W)", parameters={"c": "3/2"})
+    force = gqm.Potential("k1*(x - c1)**2/2") + gqm.Potential("-k2*(x - c2)**2/2") + viscous
+    k2 = 0.8 * size
+    k1, c1 = k2 + 0.7, 1.86
+    launch = {"k1": k1, "k2": k2, "c1": c1, "c2": (k1 * c1 + 0.7 * 0.38) / k2, "t_max": 12}
+    module = build("springs_in_oil", gqm.Curve.graph("0*x"), force)
+    with pytest.raises(SolutionError, match="terms of the force cancel there"):
+        module.solve(1.7, 0.9, -1, **launch).lam(12.0)
+    swept = module.sweep("t_end", [1.7], 0.9, -1, **launch)
+    assert np.isnan(swept.values[0])
+    assert swept.status[0] != 0
+
+
 def slow_launches() -> list[tuple[float, float, int, float, float]]:
     """Place, speed, direction, stiffness and damping: launched slowly from where a spring pulls hard.
 

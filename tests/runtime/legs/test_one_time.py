@@ -26,3 +26,21 @@ def test_the_state_at_one_time_tabulates_one_piece(t: float, monkeypatch: pytest
     count = len(made)
     motion.lam(np.linspace(0.0, 5.0, 50))
     assert len(made) == count
+
+
+def test_a_place_needs_no_bounds(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Errors are carried from leg to leg when a state is asked for, and are those of a motion that was asked first."""
+    known = generated.circle_drag.solve(1.0, 0).state(3.0)
+    motion, count = generated.circle_drag.solve(1.0, 0), 0
+    real = dissipative.carry
+
+    def carried(*given: Any) -> Any:
+        nonlocal count
+        count += 1
+        return real(*given)
+
+    monkeypatch.setattr(dissipative, "carry", carried)
+    places = motion.lam(np.linspace(0.0, 3.0, 50))
+    assert (motion.lam(3.0), count) == (places[-1], 0)
+    assert motion.state(3.0) == known
+    assert count > 0

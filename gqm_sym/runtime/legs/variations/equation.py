@@ -62,6 +62,10 @@ def fill_sums(series, panels, x, out):  # type: ignore[no-untyped-def]
             out[row, i] = total
 
 
+# The largest error of the force, as a share of it, at which panels still tell rounding from structure.
+MAX_FORCE_ERROR = 1e-11
+
+
 class LawRows(NamedTuple):
     """The law of motion at places: a column for each.
 
@@ -177,15 +181,24 @@ class Law:
         return np.split(errors.max(axis=0), np.cumsum(counts)[:-1])
 
     def force_errors(self, places: Array, v: Array, nu: Array) -> Array:
-        """By how much dW/dlam of a body at rest may be off in doubles: by rounding, and by rounding of the place.
+        """By how much dW/dlam of a body at rest may be off in doubles: by rounding, and by rounding of the place."""
+        return np.nan_to_num(self._forces(places, v, nu)[1], posinf=0.0)
+
+    def _forces(self, places: Array, v: Array, nu: Array) -> tuple[Array, Array]:
+        """The force dW/dlam on a body at rest, and its errors.
 
         Double-double arithmetic has a running bound on the error of each number, which grows with the unit of rounding.
         """
         states = States(places, np.zeros_like(places), np.zeros_like(places), v, nu)
         lows = np.abs(self.parameters[1]) / COARSER  # doubles lack the low parts
         force, slope = self._values(force_program(self.exact, self.count), states, lows)
-        errors: Array = COARSER * force[2] + 0.5 * ULP * np.abs(places * slope[0])
-        return np.nan_to_num(errors, posinf=0.0)
+        return force[0], COARSER * force[2] + 0.5 * ULP * np.abs(places * slope[0])
+
+    def cancels(self, place: float, heading: int) -> bool:
+        """Whether terms of the force on a body at rest cancel so far there that their rounding passes for structure."""
+        both = np.array([-1.0, 1.0])
+        forces, errors = self._forces(np.full(2, place), np.full(2, float(heading)), both)
+        return bool(np.all(errors > MAX_FORCE_ERROR * np.abs(forces)))
 
 
 class Panels:
