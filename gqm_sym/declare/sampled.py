@@ -34,6 +34,8 @@ CLOSES = 1e-9
 SHARPEST = pi / 2
 # Planes that turn by more than this lead back along themselves.
 BACKWARDS = pi - 1e-6
+# Tracks are as large as this, in m: fourth powers of the distances of points are doubles, and so are their inverses.
+SIZES = 1e-60, 1e60
 # A chord of a smooth track that is this many times as long as half of all chords jumps to another place.
 JUMP = 100.0
 # A chord of measured points that is this many times as long as they scatter tells the direction of the track.
@@ -163,6 +165,10 @@ def read_track(
         places.append(place)
     angles = [] if is_formula(roll) else _angles(angles if roll is None else roll, places)
     size = _size(places)
+    if size and not SIZES[0] <= size <= SIZES[1]:
+        raise DeclarationError(
+            f"sampled: the points span {size:.3g} m; a track spans {SIZES[0]:g} to {SIZES[1]:g} m: are they in metres?"
+        )
     repeated = len(places) > 1 and dist(places[0], places[-1]) <= CLOSES * size
     joined = repeated if closed is None else closed
     if joined and repeated:

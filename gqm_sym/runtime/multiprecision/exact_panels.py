@@ -20,6 +20,7 @@ from gqm_sym.runtime.quadrature.time_panels import (
     COUNT,
     DEGREE,
     EXHAUSTED,
+    MAX_PANELS,
     MAX_TAIL_RATIO,
     NEGLIGIBLE_SHARE,
     Panels,
@@ -28,7 +29,6 @@ from gqm_sym.runtime.quadrature.time_panels import (
 
 # Decimal digits: enough for all digits of a double at a distance of 1e-30 from a barrier.
 DIGITS = 80
-MAX_EXACT_PANELS = 400
 
 ALL_NODES = np.concatenate([-NODES[:0:-1], NODES])
 
@@ -115,7 +115,7 @@ def lay_exactly(exact: ExactProblem, kind: int, ends: tuple[Any, Any], stop: flo
     Raises
     ------
     SolutionError
-        If V**2 is not positive inside the segment.
+        If V**2 is not positive inside the segment, or changes so often there that panels do not resolve it.
     """
     scale, rates_on = exact.at(DIGITS), _Rates(exact, kind, ends)
     weights = np.concatenate([KRONROD_WEIGHTS[:0:-1], KRONROD_WEIGHTS])
@@ -125,7 +125,7 @@ def lay_exactly(exact: ExactProblem, kind: int, ends: tuple[Any, Any], stop: flo
     end = scale.context.pi if kind == TURN_TURN else scale.mpf(stop)
     joints = scale.phase_angles(kind, *ends, scale.track.joints(*ends) or ())
     pending = [stop, *reversed([phi for phi in joints if 0 < phi < stop])]
-    left, error, status, max_panels = 0.0, 0.0, CONVERGED, MAX_EXACT_PANELS + len(pending)
+    left, error, status, max_panels = 0.0, 0.0, CONVERGED, MAX_PANELS + len(pending)
     while pending:
         right = pending[-1]
         # The nodes are not rounded to doubles: next to a peak of width 1e-6 that would be noise.
@@ -138,8 +138,12 @@ def lay_exactly(exact: ExactProblem, kind: int, ends: tuple[Any, Any], stop: flo
         resolved = tail <= MAX_TAIL_RATIO * size and length_tail <= 10.0 * MAX_TAIL_RATIO * length_size
         time, length = half * (weights @ values[0]), half * (weights @ values[1])
         resolved = resolved or (time <= NEGLIGIBLE_SHARE * times[-1] and length <= NEGLIGIBLE_SHARE * lengths[-1])
-        full = len(edges) + len(pending) >= max_panels or half <= 2.0**-50 * right
-        if not resolved and not full:
+        if not resolved and half > 2.0**-50 * right:
+            if len(edges) + len(pending) >= max_panels:
+                raise SolutionError(
+                    f"time of flight from {float(ends[0])!r} to {float(ends[1])!r}: is not resolved by {MAX_PANELS} "
+                    "panels; launch so that the body passes fewer hills and dips"
+                )
             pending.append((left + right) / 2)
             continue
         status = status if resolved else EXHAUSTED

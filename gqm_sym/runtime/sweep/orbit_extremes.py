@@ -27,6 +27,15 @@ from gqm_sym.runtime.sweep.passage import locate
 # that the best point is refined, or grows if a parabola has its vertex beyond it.
 GRID_INTERVALS, STEP_RATIO, GROWTH = 64, 16.0, 4.0
 
+# A grid that does not resolve the orbit is followed by one that is so many times as fine, up to so many grids of the
+# first size beside each other.
+FINER, MAX_GRIDS = 4, 256
+
+# A grid resolves a function if its mean is the same over every second point, but for this share of its range, and for
+# rounding. The mean of the contact force itself converges later than those of the coordinates and of ds, which turn
+# where the curve bends: a bend that is shorter than the grid's steps is seen in these alone.
+MAX_MEAN_CHANGE, MAX_FORCE_MEAN_CHANGE, MEAN_ROUNDING = 1e-8, 1e-4, 1e-13
+
 # How often the best point is refined at least and at most. In between that ends if the value changes by less than this
 # share of the largest on the grid: its error is far smaller then, because it falls with the fourth power of the step.
 REFINEMENTS, MAX_REFINEMENTS, MAX_LAST_CHANGE = 2, 12, 1e-11
@@ -39,19 +48,27 @@ FIRST_STEP, LAST_STEP, MAX_PARABOLAS = 0.25, 1e-3, 10
 LAP_SHARES = np.arange(GRID_INTERVALS + 1) / GRID_INTERVALS
 WIDTH_SHARES = np.sin(0.5 * pi * LAP_SHARES) ** 2
 GRID_POINTS = GRID_INTERVALS + 1
-line_buffer, pair_buffer, frame_buffer, point_buffer = (
-    on_stack(n) for n in (GRID_POINTS, 2 * GRID_POINTS, PATH_ROWS * GRID_POINTS, 3)
+# What is known of each function on a grid: the sums over all points and over every second one, the least value and the
+# largest. The functions are what is looked for, and beside the contact force x, z and ds.
+SUM, COARSE_SUM, LEAST, LARGEST = range(4)
+FUNCTIONS, COORDINATES = 4, 3
+# The highest peaks of a grid: the top of the parabola, the point of the grid, and the values before it, at it and after
+# it. As many are refined as reach the highest but for this share of the range, for the grid does not tell them apart.
+PEAKS, PEAK_ROW, TIED = 4, 5, 0.02
+line_buffer, pair_buffer, frame_buffer, point_buffer, sum_buffer, peak_buffer = (
+    on_stack(n) for n in (GRID_POINTS, 2 * GRID_POINTS, PATH_ROWS * GRID_POINTS, 3, 4 * FUNCTIONS, PEAKS * PEAK_ROW)
 )
 
 
 @Inner
-def sample_loads(fns, p, orbit, force, shares, n, out):  # type: ignore[no-untyped-def]
+def sample_loads(fns, p, orbit, force, shares, n, out, frame):  # type: ignore[no-untyped-def]
     """Fill V**2, or the contact force where ``force`` is set, at n shares of an orbit's width from its lower end.
 
+    For the contact force, and only then, ``frame`` is filled with the path.
     V**2 is its value at launch less what it loses from there. Next to a turning point this has the digits of the
     largest V**2 on the orbit, not those of the small value itself.
     """
-    offsets, lam, rows, frame = line_buffer(), line_buffer(), pair_buffer(), frame_buffer()
+    offsets, lam, rows = line_buffer(), line_buffer(), pair_buffer()
     width = orbit.high - orbit.low
     for i in range(n):
         offsets[i] = orbit.low + width * shares[i]
@@ -66,47 +83,84 @@ def sample_loads(fns, p, orbit, force, shares, n, out):  # type: ignore[no-untyp
 
 
 @Inner
-def beside(out, i, circulates):  # type: ignore[no-untyped-def]
-    """The value before the point ``i`` of the grid, that at it, and that behind it.
+def take_in(sums, at, value, weight, is_coarse):  # type: ignore[no-untyped-def]
+    """Add the value of a function at a point of the grid to what is known of it, from the index ``at`` on."""
+    sums[at + SUM] += weight * value
+    if is_coarse:
+        sums[at + COARSE_SUM] += 2.0 * weight * value
+    sums[at + LEAST], sums[at + LARGEST] = min(sums[at + LEAST], value), max(sums[at + LARGEST], value)
+
+
+@Inner
+def is_resolved(sums, intervals, force):  # type: ignore[no-untyped-def]
+    """Whether a grid of so many intervals resolves what it was laid for."""
+    for k in range(FUNCTIONS if force else 1):
+        at = k * FUNCTIONS
+        share = MAX_FORCE_MEAN_CHANGE if force and k == 0 else MAX_MEAN_CHANGE
+        least, largest = sums[at + LEAST], sums[at + LARGEST]
+        allowed = share * (largest - least) + MEAN_ROUNDING * max(fabs(least), fabs(largest))
+        if not fabs(sums[at + SUM] - sums[at + COARSE_SUM]) <= allowed * intervals:
+            return False
+    return True
+
+
+@Inner
+def note_peak(peaks, sign, j, f0, f1, f2):  # type: ignore[no-untyped-def]
+    """Keep the point ``j`` of the grid if its value is between no larger ones, and among the highest so far."""
+    if sign * f1 < max(sign * f0, sign * f2):
+        return
+    curvature = sign * (f0 - 2.0 * f1 + f2)
+    top = sign * f1 - 0.125 * (f0 - f2) ** 2 / curvature if curvature < 0.0 else sign * f1
+    at = PEAKS * PEAK_ROW
+    while at > 0 and top > peaks[at - PEAK_ROW]:
+        at -= PEAK_ROW
+        if at + PEAK_ROW < PEAKS * PEAK_ROW:
+            for i in range(PEAK_ROW):
+                peaks[at + PEAK_ROW + i] = peaks[at + i]
+    if at < PEAKS * PEAK_ROW:
+        peaks[at], peaks[at + 1], peaks[at + 2], peaks[at + 3], peaks[at + 4] = top, j, f0, f1, f2
+
+
+@Inner
+def find_peaks(fns, p, orbit, force, sign, grids, sums, peaks):  # type: ignore[no-untyped-def]
+    """Find the highest peaks of a grid, which is ``grids`` of the first size side by side.
 
     A libration passes the grid there and back, so that a turning point has the same neighbour on both sides. In the
     phase angle, any function is even about the end of a curve too.
     """
-    cycle = GRID_INTERVALS if circulates else 2 * GRID_INTERVALS
-    before, after = (i - 1) % cycle, (i + 1) % cycle
-    if circulates:
-        return out[before], out[i], out[after]
-    return out[min(before, cycle - before)], out[i], out[min(after, cycle - after)]
+    out, shares, frame = line_buffer(), line_buffer(), frame_buffer()
+    count, f0, f1, second = grids * GRID_INTERVALS, 0.0, 0.0, 0.0
+    for k in range(FUNCTIONS):
+        at = k * FUNCTIONS
+        sums[at + SUM], sums[at + COARSE_SUM], sums[at + LEAST], sums[at + LARGEST] = 0.0, 0.0, inf, -inf
+    for k in range(PEAKS):
+        peaks[k * PEAK_ROW] = -inf
+    for grid in range(grids):
+        for i in range(GRID_POINTS):
+            shares[i] = LAP_SHARES[i] if orbit.circulates else WIDTH_SHARES[i]
+            if grids > 1:
+                share = (grid + LAP_SHARES[i]) / grids
+                shares[i] = share if orbit.circulates else sin(0.5 * pi * share) ** 2
+        sample_loads(fns, p, orbit, force, shares, GRID_POINTS, out, frame)
+        for i in range(min(grid, 1), GRID_POINTS):
+            j = grid * GRID_INTERVALS + i
+            weight, is_coarse = 0.5 if j in (0, count) else 1.0, i % 2 == 0
+            take_in(sums, 0, out[i], weight, is_coarse)
+            for k in range(COORDINATES if force else 0):
+                take_in(sums, (1 + k) * FUNCTIONS, frame[k * GRID_POINTS + i], weight, is_coarse)
+            second = out[i] if j == 1 else second
+            if j > 1 or (j == 1 and not orbit.circulates):
+                note_peak(peaks, sign, j - 1, out[i] if j == 1 else f0, f1, out[i])
+            f0, f1 = f1, out[i]
+    note_peak(peaks, sign, count, f0, f1, second if orbit.circulates else f0)
 
 
 @Inner
-def extreme(fns, p, orbit, force, sign):  # type: ignore[no-untyped-def]
-    """The largest (``sign`` 1) or smallest (-1) V on an orbit, or contact force where ``force`` is set.
-
-    Parabolas through three points are laid again and again with a smaller step. At an extreme the function is flat, so
-    its value has all digits as soon as the place has half of them. They are laid through V**2, for V has a kink where
-    the body all but stops. In a well that is even, V is largest in the middle. The value is NaN where the grid is too
-    coarse.
-    """
-    meets_turn = orbit.v2 == 0.0 or not (orbit.circulates or orbit.leaves == orbit.direction)
-    if meets_turn and not (force or sign > 0.0):
-        return 0.0
-    out, points, found = line_buffer(), point_buffer(), point_buffer()
-    if orbit.even and not (orbit.circulates or force):
-        points[0] = 0.5
-        sample_loads(fns, p, orbit, force, points, 1, found)
-        return sqrt(found[0])
-    sample_loads(fns, p, orbit, force, LAP_SHARES if orbit.circulates else WIDTH_SHARES, GRID_POINTS, out)
-    best, peak, size = 0, -inf, 0.0
-    for i in range(GRID_POINTS):
-        f0, f1, f2 = beside(out, i, orbit.circulates)
-        size = max(size, fabs(f1))
-        curvature = sign * (f0 - 2.0 * f1 + f2)
-        top = sign * f1 - 0.125 * (f0 - f2) ** 2 / curvature if curvature < 0.0 else sign * f1
-        if sign * f1 >= max(sign * f0, sign * f2) and top > peak:
-            best, peak = i, top
-    f0, f1, f2 = beside(out, best, orbit.circulates)
-    share, step, value = best / GRID_INTERVALS, 1.0 / GRID_INTERVALS, out[best]
+def top_of(fns, p, orbit, force, sign, peak, step, size):  # type: ignore[no-untyped-def]
+    """The value at a peak of a grid with steps of ``step``; NaN where no parabola settles on it."""
+    points, found, frame = point_buffer(), point_buffer(), frame_buffer()
+    f0, f1, f2 = peak[2], peak[3], peak[4]
+    share, value = peak[1] * step, f1
     for k in range(MAX_REFINEMENTS):
         curvature = sign * (f0 - 2.0 * f1 + f2)
         move = 0.5 * sign * (f0 - f2) / curvature if curvature < 0.0 else 0.0
@@ -116,12 +170,49 @@ def extreme(fns, p, orbit, force, sign):  # type: ignore[no-untyped-def]
         if not orbit.circulates:
             for i in range(3):
                 points[i] = sin(0.5 * pi * points[i]) ** 2
-        sample_loads(fns, p, orbit, force, points, 3, found)
+        sample_loads(fns, p, orbit, force, points, 3, found, frame)
         change, f1, f0, f2 = fabs(found[0] - value), found[0], found[1], found[2]
         value = max(value, f1) if sign > 0.0 else min(value, f1)
         if k >= REFINEMENTS and fabs(move) < 1.0 and change <= MAX_LAST_CHANGE * size:
-            return value if force else sqrt(value)
+            return value
     return np.nan
+
+
+@Inner
+def extreme(fns, p, orbit, force, sign):  # type: ignore[no-untyped-def]
+    """The largest (``sign`` 1) or smallest (-1) V on an orbit, or contact force where ``force`` is set.
+
+    Parabolas through three points are laid again and again with a smaller step. At an extreme the function is flat, so
+    its value has all digits as soon as the place has half of them. They are laid through V**2, for V has a kink where
+    the body all but stops. In a well that is even, V is largest in the middle. The value is NaN where the finest grid
+    is too coarse.
+    """
+    meets_turn = orbit.v2 == 0.0 or not (orbit.circulates or orbit.leaves == orbit.direction)
+    if meets_turn and not (force or sign > 0.0):
+        return 0.0
+    sums, peaks = sum_buffer(), peak_buffer()
+    if orbit.even and not (orbit.circulates or force):
+        points, frame = point_buffer(), frame_buffer()
+        points[0] = 0.5
+        sample_loads(fns, p, orbit, force, points, 1, sums, frame)
+        return sqrt(sums[0])
+    grids = 1
+    while True:
+        find_peaks(fns, p, orbit, force, sign, grids, sums, peaks)
+        if is_resolved(sums, grids * GRID_INTERVALS, force):
+            break
+        grids *= FINER
+        if grids > MAX_GRIDS:
+            return np.nan
+    least, largest = sums[LEAST], sums[LARGEST]
+    size, step, best = max(fabs(least), fabs(largest)), 1.0 / (grids * GRID_INTERVALS), -inf
+    for k in range(PEAKS):
+        if peaks[k * PEAK_ROW] >= peaks[0] - TIED * (largest - least):
+            value = top_of(fns, p, orbit, force, sign, peaks[k * PEAK_ROW : (k + 1) * PEAK_ROW], step, size)
+            if value != value:
+                return value
+            best = max(best, sign * value)
+    return sign * best if force else sqrt(sign * best)
 
 
 @Inner

@@ -243,6 +243,8 @@ LINE = [(float(i), 0.1 * i * i) for i in range(12)]
             {},
             "row 7: is 3e\\+03 from row 6, where half of all points are within",
         ),
+        ([(1e90 * x, 1e90 * z) for x, z in LINE], {}, r"the points span 1\.21e\+91 m; a track spans 1e-60 to 1e\+60 m"),
+        ([(1e-90 * x, 1e-90 * z) for x, z in LINE], {"smoothing": "auto"}, r"the points span 1\.21e-89 m; a track"),
         ([*LINE[:6], (3.2, 6.0), *LINE[7:]], {}, "row 7: the track turns by 1.. degrees there"),
         (LINE[:5], {}, "5 different points; an open track of kind 'spline' needs 6 or more"),
         ([], {}, "0 different points"),

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import gqm_sym as gqm
+from gqm_sym.building import transient
 from gqm_sym.errors import SolutionError
 from gqm_sym.runtime import Motion
 
@@ -83,6 +84,24 @@ def test_against_many_states(name: str, swing: ModuleType, tmp_path: Path) -> No
         # At a turning point the speed is as steep as the acceleration: a rounding of the time is one of the speed.
         assert there == pytest.approx(found.value, rel=1e-12, abs=1e-12)
         assert state.lam == pytest.approx(found.lam, rel=1e-9, abs=1e-9)
+
+
+def test_a_bend_that_is_shorter_than_steps_of_a_grid() -> None:
+    """At the rounded edge of a valley, N by its formula; sweeps told a 300th of it, from a grid that is too coarse."""
+    module = transient(gqm.derive(gqm.Curve.graph("sqrt(x**2 + 1/1000000) + x/3", parameter="x"), gqm.Gravity()))
+    x = np.linspace(-2e-3, 2e-3, 1_000_001)
+    radius = np.hypot(x, 1e-3)
+    slope = x / radius + 1 / 3
+    kappa = 1e-6 / radius**3 / (1 + slope**2) ** 1.5
+    for launch in (1.0, 0.3):
+        v2 = 2 * 9.81 * (np.hypot(launch, 1e-3) + launch / 3 - radius - x / 3)
+        true = {
+            "normal_force_max": np.max(kappa * v2 + 9.81 / np.hypot(1, slope)),
+            "v_max": np.sqrt(np.max(v2)),
+        }
+        for name, value in true.items():
+            assert module.sweep(name, launch).values == pytest.approx(value, rel=1e-9)
+            assert getattr(module.solve(launch), name).value == pytest.approx(value, rel=1e-9)
 
 
 def test_rest_and_motions_without_end(swing: ModuleType, tmp_path: Path) -> None:
