@@ -113,15 +113,16 @@ def curve_files() -> Iterator[str]:
 
 
 def _file(title: str, schema: dict[str, Any]) -> Iterator[str]:
-    yield from _keys(title, schema)
-    for name, definition in schema["definitions"].items():
+    definitions = schema["definitions"]
+    yield from _keys(title, schema, definitions)
+    for name, definition in definitions.items():
         # A parameter may also be written in a short form; the long form is described.
         forms = [form for form in definition.get("anyOf", [definition]) if "properties" in form]
         for form in forms:
-            yield from _keys(name.replace("_", ": ", 1).replace("_", " "), form)
+            yield from _keys(name.replace("_", ": ", 1).replace("_", " "), form, definitions)
 
 
-def _keys(title: str, schema: dict[str, Any]) -> Iterator[str]:
+def _keys(title: str, schema: dict[str, Any], definitions: dict[str, Any]) -> Iterator[str]:
     yield from (
         f"## {title}",
         "",
@@ -135,7 +136,9 @@ def _keys(title: str, schema: dict[str, Any]) -> Iterator[str]:
         example = entry.get("examples", [entry.get("default", "")])[0]
         needed = " (required)" if key in required else ""
         shown = f"`{_flow(example)}`" if example else ""
-        yield f"| `{key}`{needed} | {_cell(entry.get('description', ''))} | {shown} |"
+        meant = definitions.get(entry.get("$ref", "").rpartition("/")[2], {})
+        meaning = entry.get("description", meant.get("description", ""))
+        yield f"| `{key}`{needed} | {_cell(meaning)} | {shown} |"
     yield ""
 
 

@@ -81,6 +81,8 @@ def read_measurements(data: Any, arguments: Mapping[str, str | None], unit: str 
     sizes = {name: _column(given[name], name, units.get(name)) for name in (*quantities, *columns)}
     count = max(column.size for column in sizes.values())
     full = {name: _spread(column, name, count) for name, column in sizes.items()}
+    for name in (*OF_LAUNCHES, PASSAGES):
+        _check_times(full.get(name, np.empty(0)), name)
     t = _spread(_column(given["t"], "t", "s"), "t", count) if timed else None
     if PASSAGES in given and "place" not in given:
         raise InputError("data: passages: the place is missing; give 'place', a value of the curve parameter")
@@ -104,6 +106,15 @@ def _column(values: Any, name: str, unit: str | None) -> Array:
     if len(shape) > 1:
         raise InputError(f"data: {name}: must be one column, got the shape {shape}")
     return numbers
+
+
+def _check_times(times: Array, name: str) -> None:
+    """Refuse periods that are not positive, and passages that are not one after the other."""
+    before = np.concatenate([[0.0], times[:-1]]) if name == PASSAGES else np.zeros_like(times)
+    wrong = np.flatnonzero(~(times > before))
+    if wrong.size:
+        what = "positive times in ascending order" if name == PASSAGES else "positive"
+        raise InputError(f"data: {name}: must be {what}; row {wrong[0] + 1} is {times[wrong[0]]:g}")
 
 
 def _spread(column: Array, name: str, count: int) -> Array:

@@ -228,12 +228,19 @@ class Residuals:
 
     def jacobian(self, x: Array) -> Array:
         """The derivatives of the residuals: a column for each number that is to be found."""
+        found = None
         if self.exact:
             try:
-                return self._derivatives(x) / self.sigma[:, None]
+                with np.errstate(divide="ignore", over="ignore", invalid="ignore"):  # looked at below
+                    found = self._derivatives(x)
             except SolutionError:
                 self.exact = False
-        return self._differences(x) / self.sigma[:, None]
+        jacobian: Array = (self._differences(x) if found is None else found) / self.sigma[:, None]
+        if not np.isfinite(jacobian).all():
+            raise SolutionError(
+                f"fit: the measurements have no finite derivatives at {short(x.tolist())}; begin at other first guesses"
+            )
+        return jacobian
 
     def _derivatives(self, x: Array) -> Array:
         names, wrt = tuple(self.measured.values), self.free.names

@@ -118,7 +118,7 @@ def _family_model(name: str, doc: str, own: dict[str, Any]) -> type[Section]:
     fields: dict[str, Any] = {
         "name": (Literal[name], Field(description="the family")),
         **own,
-        "parameter": (CurveParameter | None, Field(default=None, description="another name")),
+        "parameter": (CurveParameter | None, Field(default=None, description="another name for the curve's parameter")),
         "domain": (Ends | None, _DOMAIN),
     }
     return create_model(f"Family_{name}", __base__=Section, __doc__=doc, **fields)

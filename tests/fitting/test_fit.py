@@ -179,6 +179,13 @@ BAD = {
     "a guess outside": ({"t": [1], "x": [1]}, {"L": (1, 3, 2)}, "free: L: the first guess 3.0 must lie between"),
     "both": ({"t": [1], "x": [1]}, {"g": 9}, "free: g has a first guess here and a value by keyword"),
     "too many passages": ({"passages": [1, 2], "place": 3}, {"L": 1}, "the body passes only 0 times"),
+    "passages out of order": (
+        {"passages": [2, 3, 1], "place": 0},
+        {"L": 1},
+        "passages: must be positive times in ascending order; row 3 is 1",
+    ),
+    "a period of zero": ({"lam0": [0.5, 1], "period": [2, 0]}, {"L": 1}, "period: must be positive; row 2 is 0"),
+    "no derivatives": ({"t": [1, 2], "lam": [0, 1]}, {"L": 1e-300}, "have no finite derivatives at [1e-300]"),
     "a free column": ({"lam0": [1], "period": [1]}, {"lam0": 1}, "free: lam0 is a column of the data"),
 }
 
