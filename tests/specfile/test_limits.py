@@ -26,7 +26,7 @@ def read(folder: Path, text: str) -> gqm.Model:
         ),
         (
             "{pieces: {begin: [0, 0], pieces: [{line: {length: 1}}]}}",
-            "2:18: curve.pieces: unknown key 'begin'; allowed are closed, heading, pieces, start",
+            "2:18: curve.pieces: unknown key 'begin'; allowed are closed, heading, heartline, pieces, roll, start",
         ),
         (
             "{pieces: {pieces: [{line: {length: 1, len: 2}}]}}",

@@ -38,8 +38,9 @@ _ELEMENTARY = {
 
 # What else a function may use, which means the same in Python.
 _SAME = (abs, bool, enumerate, int, len, max, min, range, round, slice, math.copysign)
+_OF_NUMPY = "abs array empty floor full int64 maximum ones rint searchsorted zeros"
 _NUMPY = SimpleNamespace(
-    **{name: getattr(np, name) for name in ("abs", "array", "empty", "int64", "maximum", "searchsorted", "zeros")},
+    **{name: getattr(np, name) for name in _OF_NUMPY.split()},
     **{name: np.float64(getattr(np, name)) for name in ("inf", "nan", "pi")},
 )
 

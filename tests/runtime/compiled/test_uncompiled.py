@@ -1,7 +1,13 @@
 """Functions of generated modules give the same bits in Python as compiled."""
 
+import dis
+import itertools
+from collections.abc import Iterator
+from importlib import import_module
 from inspect import signature
 from pathlib import Path
+from pkgutil import walk_packages
+from types import FunctionType
 from typing import Any
 
 import numpy as np
@@ -9,8 +15,10 @@ import pytest
 from numba import types
 from paths import ROOT
 
+from gqm_sym import runtime
 from gqm_sym.loading import load
 from gqm_sym.runtime import vocabulary
+from gqm_sym.runtime.compiled import jit, uncompiled
 from gqm_sym.runtime.compiled.emitted import Emitted
 from gqm_sym.runtime.compiled.uncompiled import plain_by_address
 from gqm_sym.runtime.interface import INTERFACE
@@ -113,3 +121,27 @@ def test_bits_of_the_arithmetic(tmp_path: Path) -> None:
         found[np.isnan(found)] = np.nan
         one, other = found.view(np.int64)
         assert [row for row, same in zip(rows, (one == other).all(axis=1), strict=True) if not same] == []
+
+
+def _compiled_functions() -> Iterator[FunctionType]:
+    """Every function of the runtime that numba compiles."""
+    for module in walk_packages(runtime.__path__, f"{runtime.__name__}."):
+        for value in vars(import_module(module.name)).values():
+            is_entry = getattr(getattr(value, "__code__", None), "co_filename", None) == jit.__file__
+            function = getattr(value, "__wrapped__" if is_entry else "py_func", None)
+            if getattr(function, "__module__", None) == module.name:
+                yield function
+
+
+def test_python_knows_all_of_numpy_that_compiled_functions_use() -> None:
+    """Otherwise the first call compiles them, and what calls them, in silence."""
+    found, unknown = 0, set()
+    for function in _compiled_functions():
+        steps = list(dis.get_instructions(function))
+        found += 1
+        for step, following in itertools.pairwise(steps):
+            is_numpy = step.opname == "LOAD_GLOBAL" and function.__globals__.get(step.argval) is np
+            if is_numpy and not hasattr(uncompiled._NUMPY, following.argval):
+                unknown.add(f"{function.__module__}.{function.__name__}: np.{following.argval}")
+    assert found > 500
+    assert unknown == set()
