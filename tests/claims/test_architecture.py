@@ -22,6 +22,7 @@ LAYERS = (
     {"building", "specfile"},
     {"emission"},
     {"derivation"},
+    {"derivation.pipeline"},
     {"derivation.model"},
     {"derivation.wells", "derivation.forces", "derivation.defaults"},
     {"derivation.geometry", "derivation.reality", "derivation.corners"},

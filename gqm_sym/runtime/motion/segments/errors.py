@@ -47,7 +47,7 @@ def time_error(segment: Segment, phi: Array) -> Array:
 
 
 def inversion_error(segment: Segment, phi: Array) -> Array:
-    """Estimated error of places by the table of a segment at phase angles, in the unit of the parameter, with rounding."""
+    """Estimated error of places by the table of a segment, at phase angles and in units of the curve parameter."""
     powers, of_intervals = segment.table[3], segment.table[6]
     errors = of_intervals[np.searchsorted(powers[:-1].sum(axis=1), phi)]
     width = abs(segment.width)
