@@ -35,7 +35,7 @@ def defined() -> list[str]:
 def members(owner: type) -> Iterator[str]:
     """Yield the public names of a class with its name before them."""
     inherited = set(dir(tuple))
-    fields = getattr(owner, "__annotations__", {})
+    fields = {name for part in owner.__mro__ for name in vars(part).get("__annotations__", {})}
     for name in {*dir(owner), *fields}:
         if not name.startswith("_") and (name not in inherited or name in fields):
             yield f"{owner.__name__}.{name}"

@@ -85,7 +85,8 @@ from gqm_sym.runtime.legs.variations.equation import Law
 from gqm_sym.runtime.motion.aperiodic import MotionAtRest
 from gqm_sym.runtime.motion.events import Leg, passages
 from gqm_sym.runtime.motion.locking import locked
-from gqm_sym.runtime.motion.motion import Motion, merged
+from gqm_sym.runtime.motion.motion import Motion
+from gqm_sym.runtime.motion.parts.history import merged
 from gqm_sym.runtime.motion.rows import Rows
 from gqm_sym.runtime.motion.sampler import (
     MIN_PLACES_PER_THREAD,
@@ -94,7 +95,7 @@ from gqm_sym.runtime.motion.sampler import (
     plain_time,
     plain_times,
 )
-from gqm_sym.runtime.motion.segment import Segment
+from gqm_sym.runtime.motion.segments.segment import Segment
 from gqm_sym.runtime.motion.state import State
 from gqm_sym.runtime.motion.trajectory import PhasePoints, TimedSegment, Trajectory
 from gqm_sym.runtime.multiprecision.exact_problem import NOWHERE
