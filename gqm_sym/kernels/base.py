@@ -182,7 +182,16 @@ class Kernel:
     def along(self, parameter: sp.Symbol, *, in_space: bool = False) -> "Kernel":
         """Return the law on a curve with this parameter, which a tangential law may contain.
 
-        On a space curve ``y`` is a coordinate too.
+        Parameters
+        ----------
+        parameter
+            The name of the curve's parameter.
+        in_space
+            Whether the curve has three coordinates: then ``y`` is a coordinate too.
+
+        Returns
+        -------
+        Kernel
 
         Raises
         ------

@@ -85,16 +85,34 @@ class Plan:
         return -(-self.size // self.part)
 
     def extent(self, number: int) -> slice:
-        """Return the slice of the points in a part."""
+        """Return the slice of the points in a part.
+
+        Parameters
+        ----------
+        number
+            The number of the part, from 0.
+        """
         return slice(number * self.part, min((number + 1) * self.part, self.size))
 
     def arguments(self, number: int) -> dict[str, Any]:
-        """Return the arguments of ``module.sweep`` for a part: fixed ones as text, and varying ones as arrays."""
+        """Return the arguments of ``module.sweep`` for a part: fixed ones as text, and varying ones as arrays.
+
+        Parameters
+        ----------
+        number
+            The number of the part, from 0.
+        """
         extent = self.extent(number)
         return self._at(np.arange(extent.start, extent.stop))
 
     def point(self, index: int) -> dict[str, Any]:
-        """Return the arguments of ``module.solve`` for one point."""
+        """Return the arguments of ``module.solve`` for one point.
+
+        Parameters
+        ----------
+        index
+            The number of the point, from 0, in C order.
+        """
         given = self._at(np.array([index]))
         return given | {axis.name: float(given[axis.name][0]) for axis in self.axes}
 
