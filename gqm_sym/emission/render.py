@@ -44,7 +44,7 @@ _OWN = frozenset(
         *("compiler", "fabs"),
         *("op", "pass1", "place_from_ends", "range", "self", "solve", "sweep"),
         *("Pass1", "Pass1InSpace", "Pass1OfRider", "path_in_space", "rider_loads"),
-        *("Equilibrium", "ExactLaw", "SeparatedTerms", "between", "equilibria", "unknown"),
+        *("Equilibrium", "ExactChartLaw", "ExactLaw", "SeparatedTerms", "between", "equilibria", "unknown"),
     }
 )
 
@@ -196,7 +196,7 @@ def _pass1(module: ModuleIR) -> str:
 def _exact_class(module: ModuleIR) -> str:
     """The record that takes them."""
     if module.dissipation:
-        return "ExactLaw"
+        return "ExactChartLaw" if module.chart else "ExactLaw"
     return "ExactPotential" if module.chart else "ExactFormulas"
 
 

@@ -258,6 +258,17 @@ class ExactPotential(NamedTuple):
     effective_potential: Callable[..., Any]
 
 
+class ExactChartLaw(NamedTuple):
+    """The formulas of a dissipative module along a charted curve, by what is known at a point of it.
+
+    ``static_normal_load`` is n0 [m/s2]: ``f(op, x, z, dxds, dzds, kappa, p)``. ``speed_slope`` is dW/ds [m/s2] with W =
+    V**2: ``f(op, x, z, dxds, dzds, kappa, w, v, nu, p)`` with v = sgn(ds/dt), nu = sgn(N).
+    """
+
+    static_normal_load: Callable[..., Any]
+    speed_slope: Callable[..., Any]
+
+
 class ExactFormulas(NamedTuple):
     """The same formulas as plain Python over a namespace of operations: ``f(op, lam, p)``.
 

@@ -10,7 +10,7 @@ from gqm_sym.arguments import names, one_of, unknown_argument
 from gqm_sym.errors import InputError, SolutionError
 from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.gradients.orbit import OrbitDerivatives
-from gqm_sym.runtime.gradients.programs import pairs_of
+from gqm_sym.runtime.gradients.second_programs import pairs_of
 from gqm_sym.runtime.launch.kinds import EXTREMES, FINAL_QUANTITIES
 
 # What has second derivatives.

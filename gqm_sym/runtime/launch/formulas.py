@@ -21,6 +21,7 @@ from gqm_sym.runtime.interface import (
     BatchFunctions,
     CompiledFunctions,
     DissipativeFunctions,
+    ExactChartLaw,
     ExactFormulas,
     ExactLaw,
     ExactPotential,
@@ -117,7 +118,7 @@ class Formulas:
     monotone : bool
         Whether it is proved that V**2 rises or falls all the way between two neighbouring axes, and that ds vanishes
         nowhere.
-    exact : ExactFormulas, ExactPotential, ExactLaw or None
+    exact : ExactFormulas, ExactPotential, ExactLaw, ExactChartLaw or None
         The formulas over a namespace of operations; those of the forces only for a charted curve.
     chart : ChartMaker or None
         What makes the chart of a curve that has no formulas.
@@ -157,7 +158,7 @@ class Formulas:
     domain_of: Callable[..., Any] | None = None
     axes_of: Callable[..., Any] | None = None
     monotone: bool = False
-    exact: ExactFormulas | ExactLaw | ExactPotential | None = None
+    exact: ExactFormulas | ExactLaw | ExactPotential | ExactChartLaw | None = None
     chart: ChartMaker | None = None
     dissipation: DissipativeFunctions | None = None
     load_map: Emitted | None = None

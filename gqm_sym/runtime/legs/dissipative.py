@@ -81,7 +81,7 @@ from gqm_sym.runtime.legs.leg_run import ASYMPTOTE, FULL, LIFTOFF, LIMIT, NARROW
 from gqm_sym.runtime.legs.leg_segments import Run, TabulatedPiece, along_field, along_panels, leg_record, tabulated
 from gqm_sym.runtime.legs.variations.answers import Switch, gradient, nearest_switch, places_at, states_at
 from gqm_sym.runtime.legs.variations.changes import Changes
-from gqm_sym.runtime.legs.variations.equation import Law
+from gqm_sym.runtime.legs.variations.law import FormulaLaw
 from gqm_sym.runtime.motion.aperiodic import MotionAtRest
 from gqm_sym.runtime.motion.events import Leg, passages
 from gqm_sym.runtime.motion.locking import locked
@@ -616,7 +616,7 @@ class DissipativeMotion(Motion):
             by_place = [k for k, run in enumerate(missing) if run.frame is None]
             if by_place and isinstance(exact, ExactLaw):
                 with suppress(SolutionError):  # formulas may be too long
-                    errors = Law(self.problem).force_errors_along([missing[k] for k in by_place])
+                    errors = FormulaLaw(self.problem).force_errors_along([missing[k] for k in by_place])
                     for k, of_panels in zip(by_place, errors, strict=True):
                         terms[k] = of_panels / rounding_share(self._dissipation.linear)
             self._terms += terms
@@ -799,7 +799,7 @@ class DissipativeMotion(Motion):
     def _force_cancels(self, record: Array) -> bool:
         """Whether terms of the force cancel where a leg ends, or starts, so that doubles do not tell it."""
         with suppress(SolutionError):  # curves without formulas have no bound on its rounding, nor have very long ones
-            law, heading = Law(self.problem), int(record[HEADING])
+            law, heading = FormulaLaw(self.problem), int(record[HEADING])
             return self._frame is None and any(law.cancels(float(record[end]), heading) for end in (START, END))
         return False
 
