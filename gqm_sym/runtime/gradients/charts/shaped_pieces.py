@@ -166,7 +166,8 @@ class ShapedPieces:
         rows = self.coordinates(places)[::2]
         (dx, dz), moved = rows[2:4], rows[POINT:]
         # Points of equal u are displaced along the curve, too.
-        return self.lengthened(places) - (moved[::2] * dx + moved[1::2] * dz) / np.hypot(dx, dz)
+        shifts: Array = self.lengthened(places) - (moved[::2] * dx + moved[1::2] * dz) / np.hypot(dx, dz)
+        return shifts
 
     def path(self, places: Array, orders: int = 4) -> Array:
         """The coordinates in doubles, with all derivatives by u below an order; of displacements there are three."""

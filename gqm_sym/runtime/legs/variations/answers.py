@@ -118,7 +118,8 @@ def _marched(changes: Changes, points: PhasePoints) -> tuple[NDArray[np.intp], A
 def places_at(motion: Any, changes: Changes, t: Array, low: Array) -> Array:
     """How the places of a motion at times, of two doubles each, change."""
     if changes.law.by_arc_length:  # the stretch of the way is needed, too
-        return states_at(motion, changes, t, low).lam
+        found: Array = states_at(motion, changes, t, low).lam
+        return found
     points, f = motion._phase_points(t, low), motion.problem.functions
     (lam, moved, delay), v = changes.delays(*_marched(changes, points)), motion._velocities(points)
     ds = path_and_force_at(f.addresses, f.p, lam, v**2)[2]
@@ -253,8 +254,10 @@ def extreme(motion: Any, changes: Changes, quantity: str) -> Array:
             near, far = _changed(
                 motion, changes, of_speed, sides[np.argmin(np.abs(np.subtract(values, found.value)))]
             ).T
-            return 2.0 * near - far
-    return _changed(motion, changes, of_speed, np.array([t]), moved)[:, 0]
+            on_place: Array = 2.0 * near - far
+            return on_place
+    at_time: Array = _changed(motion, changes, of_speed, np.array([t]), moved)[:, 0]
+    return at_time
 
 
 def _changed(motion: Any, changes: Changes, of_speed: bool, t: Array, moved: Array | None = None) -> Array:
