@@ -96,15 +96,25 @@ def test_the_made_pages_are_current(monkeypatch: pytest.MonkeyPatch) -> None:
         assert (REFERENCE / f"{name}.md").read_text(encoding="utf-8") == text, name
 
 
+def anchors(page: Path) -> set[str]:
+    """Return the anchors of a page's headings, as hosting sites and the built site make them."""
+    text = re.sub(r"^```.*?^```$", "", page.read_text(encoding="utf-8"), flags=re.MULTILINE | re.DOTALL)
+    headings = re.findall(r"^#+ (.*)$", text, flags=re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
+
+
 def test_links_are_words_and_lead_to_files() -> None:
-    """Pages are read as files too: each link has a text, and what it leads to is in the repository."""
+    """Pages are read as files too: each link has a text, and leads to a file of the repository and a heading in it."""
     wrong = []
     for page in (DOCS.parent / "README.md", *DOCS.rglob("*.md")):
         if {"made", "_build"} & set(page.relative_to(DOCS.parent).parts):
             continue
         text = re.sub(r"^```.*?^```$", "", page.read_text(encoding="utf-8"), flags=re.MULTILINE | re.DOTALL)
         for words, target in re.findall(r"(?<!\\)\[([^\]\n]*)\]\(([^)\s]+)\)", text):
-            path = target.partition("#")[0]
-            if not words or (path and "://" not in path and not (page.parent / path).exists()):
+            if "://" in target:
+                continue
+            path, _, anchor = target.partition("#")
+            file = page.parent / path if path else page
+            if not words or not file.exists() or (anchor and anchor not in anchors(file)):
                 wrong.append(f"{page.name}: [{words}]({target})")
     assert wrong == []
