@@ -18,7 +18,7 @@ from gqm_sym.runtime.gradients.quantities import selected
 from gqm_sym.runtime.gradients.sensitivity import Sensitivity
 from gqm_sym.runtime.interface import Dissipation, ExactLaw
 from gqm_sym.runtime.inversion.leg_tables import places_along_legs, states_along_legs
-from gqm_sym.runtime.launch.ends import CUSP_SHARE, domain_end, leaving_at_once, starting_step
+from gqm_sym.runtime.launch.ends import NEAR_CUSP, domain_end, is_cusp, leaving_at_once, starting_step
 from gqm_sym.runtime.launch.formulas import Formulas, ParameterValues
 from gqm_sym.runtime.launch.problem import Problem, bind_all
 from gqm_sym.runtime.launch.request import ONLY_SIGN, Launch
@@ -73,6 +73,7 @@ from gqm_sym.runtime.legs.leg_record import (
     INHERITED,
     LAPS_BEFORE,
     MIDDLE,
+    MIDDLE_LOW,
     START,
     TIME_FROM_END,
     TIME_FROM_START,
@@ -118,6 +119,9 @@ END_ROUNDINGS = 8.0
 # `LEAST_SWING`.
 LAST_DIGIT = ULP / 64.0
 
+# Legs come to within some 1e-8 of a cusp, where roundings of the place hide how ds/dlam decreases; ds is then no more
+# than this share of what it is a thousandth of the first step away.
+CUSP_SHARE = 1e-2
 # A body that creeps towards an equilibrium, and for which no panel is narrow enough any more, is no farther from it
 # than this share of its place and of the length of the leg.
 NEAR_EQUILIBRIUM = 1e-13
@@ -714,9 +718,12 @@ class DissipativeMotion(Motion):
         self._settle(what, float(record[START]), float(record[END]))
         if what == LEAVES:
             raise leaving_at_once(problem, heading, "end of the domain")
-        if what == SPENT or (what == NARROWED and self._force_cancels(record)):
-            raise self._lost(record)
         name = "" if leaves_frame else self._end_name(what, record, heading)
+        if name == "cusp" and what == NARROWED:
+            record[[MIDDLE, MIDDLE_LOW]] = record[[END, END_LOW]] = self._cusp_ahead(record, heading), 0.0
+        # At a cusp dW/dlam vanishes, so that its rounding, too, is large against it.
+        if what == SPENT or (what == NARROWED and name != "cusp" and self._force_cancels(record)):
+            raise self._lost(record)
         self._runs.append(Run(record, what, name, frame, before if what in PASSED else None))
         if self._at[ENDING]:
             self._ending = name
@@ -878,14 +885,22 @@ class DissipativeMotion(Motion):
         line[FIRST_STEP], line[REACH] = step, domain.period or step
         self._at = line.tolist()
 
+    def _cusp_ahead(self, record: Array, heading: int) -> float:
+        """The place of a cusp close ahead of the end of a run; the way there takes less than a rounding of the time."""
+        f, place, near = self.problem.functions, float(record[END]), 0.01 * NEAR_CUSP * starting_step(self.problem)
+        places = place - heading * near * np.array([0.0, 1.0, 2.0])
+        ds = path_and_force_at(f.addresses, f.p, places, np.zeros(3))[2]
+        slope, bend = (4.0 * ds[1] - 3.0 * ds[0] - ds[2]) / (2.0 * near), (ds[0] - 2.0 * ds[1] + ds[2]) / near**2
+        distance = float(ds[0] / slope)
+        return place + heading * distance * (1.0 + float(0.5 * bend / slope) * distance)
+
     def _end_name(self, what: int, record: Array, heading: int) -> str:
         """The name of what ended a run."""
-        problem, f = self.problem, self.problem.functions
+        problem = self.problem
         if what == LIMIT and not problem.period:
             return domain_end(problem, heading).what
         if what == NARROWED:
-            ds = path_and_force_at(f.addresses, f.p, record[[START, END]], np.zeros(2))[2]
-            return "cusp" if ds[1] <= CUSP_SHARE * ds[0] else "singular-point"
+            return "cusp" if is_cusp(problem, float(record[END]), CUSP_SHARE) else "singular-point"
         return END_NAMES.get(what, "")
 
     def _lay(self, run: Run) -> None:

@@ -12,13 +12,14 @@ from numba import types
 from numpy.typing import NDArray
 
 from gqm_sym.errors import SolutionError
-from gqm_sym.runtime.charts.true_pieces import (
+from gqm_sym.runtime.charts.double_double.passage import ChartPassage
+from gqm_sym.runtime.charts.double_double.pieces import (
     TRUE_CURVE,
     arc_between,
     place_at,
     unshared,
 )
-from gqm_sym.runtime.charts.true_times import AHEAD, BEHIND, LAUNCH, LOWER, UPPER, ChartPassage
+from gqm_sym.runtime.charts.double_double.turning_points import AHEAD, BEHIND, LAUNCH, LOWER, UPPER
 from gqm_sym.runtime.compiled.jit import entry
 from gqm_sym.runtime.compiled.types import INTEGER, MATRIX, Array
 from gqm_sym.runtime.double_double.arithmetic import UNIT, add, multiply
@@ -104,7 +105,7 @@ class ChartOrbitDerivatives(OrbitDerivatives):
     Parameters
     ----------
     problem : Problem
-        The launch and the module that it is of.
+        The launch with its module.
     passage : ChartPassage
         The orbit in double-double arithmetic.
     direction : int

@@ -1,8 +1,8 @@
 """The true pieces of a curve and how its points are displaced by the parameters that shape it.
 
-The curve is known in double-double arithmetic, as polynomials of its pieces (`charts.true_pieces`). The displacements
-are differences of these polynomials for neighbouring values of a parameter: of some 20 digits, for the polynomials have
-31.
+The curve is known in double-double arithmetic, as polynomials of its pieces (`charts.double_double.pieces`). The
+displacements are differences of these polynomials for neighbouring values of a parameter: of some 20 digits, for the
+polynomials have 31.
 """
 
 from fractions import Fraction
@@ -15,7 +15,7 @@ from numpy.polynomial.chebyshev import cheb2poly
 from gqm_sym.errors import SolutionError
 from gqm_sym.literals.numbers import Number, read_number
 from gqm_sym.runtime.charts.chart import ChartMaker
-from gqm_sym.runtime.charts.true_pieces import (
+from gqm_sym.runtime.charts.double_double.pieces import (
     NODES,
     TRUE_CURVE,
     TruePieces,
@@ -27,7 +27,7 @@ from gqm_sym.runtime.charts.true_pieces import (
     stacked_points,
     unshared,
 )
-from gqm_sym.runtime.charts.true_times import arc_from
+from gqm_sym.runtime.charts.double_double.turning_points import arc_from
 from gqm_sym.runtime.compiled.jit import entry
 from gqm_sym.runtime.compiled.types import INTEGER, MATRIX, Array
 from gqm_sym.runtime.double_double.arithmetic import add, multiply
@@ -103,7 +103,7 @@ class ShapedPieces:
     Parameters
     ----------
     problem : Problem
-        The launch and the module that it is of.
+        The launch with its module.
     pieces : TruePieces
         The curve.
     shaping : tuple of int

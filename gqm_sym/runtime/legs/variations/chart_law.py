@@ -1,7 +1,8 @@
 """The law of a motion with losses along a chart, with its derivatives.
 
 The label of a point is its arc length along the curve as it is. With a parameter that shapes the curve, the point moves
-as that of equal u on its piece does (`charts.true_pieces`), so that pieces keep their edges, where forces may jump.
+as that of equal u on its piece does (`charts.double_double.pieces`), so that pieces keep their edges, where forces may
+jump.
 """
 
 import numpy as np

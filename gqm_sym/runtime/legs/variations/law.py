@@ -91,7 +91,7 @@ class Law(ABC):
     Parameters
     ----------
     problem : Problem
-        The launch and the module that it is of.
+        The launch with its module.
 
     Attributes
     ----------
