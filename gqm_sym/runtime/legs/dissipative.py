@@ -29,7 +29,8 @@ from gqm_sym.runtime.legs.variations.changes import Changes
 from gqm_sym.runtime.motion.aperiodic import MotionAtRest
 from gqm_sym.runtime.motion.events import Leg
 from gqm_sym.runtime.motion.locking import locked
-from gqm_sym.runtime.motion.motion import Motion, merged
+from gqm_sym.runtime.motion.motion import Motion
+from gqm_sym.runtime.motion.parts.history import merged
 from gqm_sym.runtime.motion.rows import Rows
 from gqm_sym.runtime.motion.sampler import (
     MIN_PLACES_PER_THREAD,

@@ -50,7 +50,7 @@ from gqm_sym.runtime.legs.body import (
     launched,
 )
 from gqm_sym.runtime.legs.frames.local_frame import PLACE as PLACE_IN_FRAME
-from gqm_sym.runtime.legs.frames.local_frame import SMALL_SHARE, Frame, frame_near, is_small, refined
+from gqm_sym.runtime.legs.frames.local_frame import SMALL_SHARE, Frame, frame_near, is_small, refined, sharpened
 from gqm_sym.runtime.legs.leg_record import COLUMNS, END, END_LOW, HEADING, START
 from gqm_sym.runtime.legs.leg_segments import Run
 from gqm_sym.runtime.legs.runs.ends import ASYMPTOTE, FULL, LIFTOFF, LIMIT, NARROWED, PAUSED, SLOWED, SPENT, TURN
@@ -334,6 +334,8 @@ class Driver:
         frame = frame_near(loss, problem.functions.p, (place, low, v2), reach)
         if frame is None or not (frame.is_stable or lam0):
             return
+        if isinstance(problem.formulas.exact, ExactLaw):
+            frame = sharpened(frame, Law(problem).at_rest)
         line[PLACE], line[PLACE_LOW] = frame.distance(place, low)
         self.force_error = 0.0 if frame.is_stable else frame.error / frame.reach
         unknown, exact = (LAST_DIGIT * abs(place) if frame.is_stable else frame.error), problem.formulas.exact

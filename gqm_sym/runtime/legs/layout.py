@@ -11,7 +11,7 @@ from gqm_sym.runtime.legs.advance import AT_ONCE
 from gqm_sym.runtime.legs.leg_record import BEGIN, END, MIDDLE, START, TIME_FROM_START
 from gqm_sym.runtime.legs.leg_segments import Run, along_field, along_panels
 from gqm_sym.runtime.legs.runs.ends import ASYMPTOTE, LIFTOFF
-from gqm_sym.runtime.motion.segment import Segment
+from gqm_sym.runtime.motion.segments.segment import Segment
 from gqm_sym.runtime.motion.trajectory import TimedSegment
 
 # A change of the contact force's sign this many roundings from the end of a piece is there.

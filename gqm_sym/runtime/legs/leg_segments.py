@@ -38,7 +38,7 @@ from gqm_sym.runtime.legs.leg_record import (
 from gqm_sym.runtime.legs.panels.polynomials import WIDE
 from gqm_sym.runtime.legs.runs.ends import ASYMPTOTE, PAUSED
 from gqm_sym.runtime.motion.events import Leg
-from gqm_sym.runtime.motion.segment import Segment
+from gqm_sym.runtime.motion.segments.segment import Segment
 from gqm_sym.runtime.quadrature.substitution import FROM_TURN, REGULAR, TO_EQUILIBRIUM
 from gqm_sym.runtime.quadrature.time_panels import CONVERGED
 

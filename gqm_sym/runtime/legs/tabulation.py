@@ -14,7 +14,7 @@ from gqm_sym.runtime.inversion import leg_tables, records
 from gqm_sym.runtime.inversion.table import MAX_TIME_ERROR, TERMS, tabulate
 from gqm_sym.runtime.launch.problem import Problem
 from gqm_sym.runtime.legs.panels.polynomials import WIDE
-from gqm_sym.runtime.motion.segment import MAX_END_ROUNDINGS, MAX_SLOPES
+from gqm_sym.runtime.motion.segments.errors import MAX_END_ROUNDINGS, MAX_SLOPES
 from gqm_sym.runtime.motion.trajectory import TimedSegment
 from gqm_sym.runtime.quadrature.substitution import FROM_TURN, REGULAR
 

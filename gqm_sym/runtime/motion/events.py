@@ -10,7 +10,7 @@ import numpy as np
 from gqm_sym.runtime.arithmetic.doubledouble import ZERO, Pair, minus, plus
 from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.launch.speed import path_and_force_at
-from gqm_sym.runtime.motion.segment import Segment
+from gqm_sym.runtime.motion.segments.segment import Segment
 from gqm_sym.runtime.motion.trajectory import TimedSegment, Trajectory
 from gqm_sym.runtime.quadrature.substitution import REGULAR, TO_EQUILIBRIUM
 
