@@ -197,7 +197,7 @@ class ShapedPieces:
     Parameters
     ----------
     problem : Problem
-        The launch and the module that it is of.
+        The launch with its module.
     pieces : TruePieces
         The curve.
     shaping : tuple of int
@@ -323,7 +323,7 @@ class ChartOrbitDerivatives(OrbitDerivatives):
     Parameters
     ----------
     problem : Problem
-        The launch and the module that it is of.
+        The launch with its module.
     passage : ChartPassage
         The orbit in double-double arithmetic.
     direction : int

@@ -277,7 +277,7 @@ class FormulaOrbitDerivatives(OrbitDerivatives):
     Parameters
     ----------
     problem : Problem
-        The launch and the module that it is of.
+        The launch with its module.
     orbit : Orbit or None
         Duration and turning points in double-double arithmetic, if that suffices.
     direction : int

@@ -126,7 +126,7 @@ class Law:
     Parameters
     ----------
     problem : Problem
-        The launch and the module that it is of.
+        The launch with its module.
     """
 
     def __init__(self, problem: Problem) -> None:
