@@ -10,7 +10,7 @@ from gqm_sym.literals.numbers import Number
 from gqm_sym.runtime.arithmetic.doubledouble import ULP
 from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.interface import Dissipation, ExactLaw
-from gqm_sym.runtime.launch.ends import CUSP_SHARE, domain_end, leaving_at_once, starting_step
+from gqm_sym.runtime.launch.ends import NEAR_CUSP, domain_end, is_cusp, leaving_at_once, starting_step
 from gqm_sym.runtime.launch.problem import Problem
 from gqm_sym.runtime.launch.request import ONLY_SIGN
 from gqm_sym.runtime.launch.speed import path_and_force_at
@@ -51,7 +51,7 @@ from gqm_sym.runtime.legs.body import (
 )
 from gqm_sym.runtime.legs.frames.local_frame import PLACE as PLACE_IN_FRAME
 from gqm_sym.runtime.legs.frames.local_frame import SMALL_SHARE, Frame, frame_near, is_small, refined, sharpened
-from gqm_sym.runtime.legs.leg_record import COLUMNS, END, END_LOW, HEADING, START
+from gqm_sym.runtime.legs.leg_record import COLUMNS, END, END_LOW, HEADING, MIDDLE, MIDDLE_LOW, START
 from gqm_sym.runtime.legs.leg_segments import Run
 from gqm_sym.runtime.legs.runs.ends import ASYMPTOTE, FULL, LIFTOFF, LIMIT, NARROWED, PAUSED, SLOWED, SPENT, TURN
 from gqm_sym.runtime.legs.variations.equation import Law
@@ -75,6 +75,10 @@ NEAR_EQUILIBRIUM = 1e-13
 # How near to an unstable equilibrium a body may be launched from rest, as a share of its place, where what resists the
 # body is no product of a factor and V**2: it is a difference of forces there that agree to a rounding.
 NEAREST_SHARE = 1e-20
+
+# Legs come to within some 1e-8 of a cusp, where roundings of the place hide how ds/dlam decreases; ds is then no more
+# than this share of what it is a thousandth of the first step away.
+CUSP_SHARE = 1e-2
 
 # What ends a leg along a chart that may have been passed by what is kept of the curve (`answers.follow_leg`).
 PASSED = TURN, RESTS, LIMIT
@@ -228,9 +232,12 @@ class Driver:
         self._settle(what, float(record[START]), float(record[END]))
         if what == LEAVES:
             raise leaving_at_once(problem, heading, "end of the domain")
-        if what == SPENT or (what == NARROWED and self._force_cancels(record)):
-            raise self._lost(record)
         name = "" if leaves_frame else self._end_name(what, record, heading)
+        if name == "cusp" and what == NARROWED:
+            record[[MIDDLE, MIDDLE_LOW]] = record[[END, END_LOW]] = self._cusp_ahead(record, heading), 0.0
+        # At a cusp dW/dlam vanishes, so that its rounding, too, is large against it.
+        if what == SPENT or (what == NARROWED and name != "cusp" and self._force_cancels(record)):
+            raise self._lost(record)
         self.runs.append(Run(record, what, name, frame, before if what in PASSED else None))
         if self.at[ENDING]:
             self.ending = name
@@ -372,12 +379,20 @@ class Driver:
         line[FIRST_STEP], line[REACH] = step, domain.period or step
         self.at = line.tolist()
 
+    def _cusp_ahead(self, record: Array, heading: int) -> float:
+        """The place of a cusp close ahead of the end of a run; the way there takes less than a rounding of the time."""
+        f, place, near = self.problem.functions, float(record[END]), 0.01 * NEAR_CUSP * starting_step(self.problem)
+        places = place - heading * near * np.array([0.0, 1.0, 2.0])
+        ds = path_and_force_at(f.addresses, f.p, places, np.zeros(3))[2]
+        slope, bend = (4.0 * ds[1] - 3.0 * ds[0] - ds[2]) / (2.0 * near), (ds[0] - 2.0 * ds[1] + ds[2]) / near**2
+        distance = float(ds[0] / slope)
+        return place + heading * distance * (1.0 + float(0.5 * bend / slope) * distance)
+
     def _end_name(self, what: int, record: Array, heading: int) -> str:
         """The name of what ended a run."""
-        problem, f = self.problem, self.problem.functions
+        problem = self.problem
         if what == LIMIT and not problem.period:
             return domain_end(problem, heading).what
         if what == NARROWED:
-            ds = path_and_force_at(f.addresses, f.p, record[[START, END]], np.zeros(2))[2]
-            return "cusp" if ds[1] <= CUSP_SHARE * ds[0] else "singular-point"
+            return "cusp" if is_cusp(problem, float(record[END]), CUSP_SHARE) else "singular-point"
         return END_NAMES.get(what, "")

@@ -61,6 +61,9 @@ TO_END = float(SHARES[0] / (SHARES[1] - SHARES[0]))
 # its start, it does: narrower panels would step over that place, which their roundings hide.
 CUSP_RATIO, CUSP_UNITS = 1.5, 32.0
 
+# At a cusp that roots of a polynomial give, ds/dlam is no more than this share of what it is about it.
+CUSP_SHARE = 1e-7
+
 # Whether time has to be resolved.
 NEVER, MAYBE, ALWAYS = range(3)
 
@@ -137,10 +140,25 @@ def hides_cusp(forces, march, panel, work):  # type: ignore[no-untyped-def]
     at_start = work[DS] + TO_END * (work[DS] - work[DS + 1])
     if at_start >= 0.0:
         return False
+    return ds_at(forces, march, panel, distance(panel.left, march)) > -0.5 * at_start
+
+
+@Inner
+def ds_at(forces, march, panel, far):  # type: ignore[no-untyped-def]
+    """ds/dlam at a distance from the origin of the march."""
     point = point_buffer()
-    place = within(march.origin[0] + march.direction * distance(panel.left, march), panel.span)
+    place = within(march.origin[0] + march.direction * far, panel.span)
     slope_of_v2(forces, place, panel.v2, panel.contact_sign, point)
-    return point[2] > -0.5 * at_start
+    return point[2]
+
+
+@Inner
+def is_cusp(forces, march, panel, far, work):  # type: ignore[no-untyped-def]
+    """Whether ds/dlam vanishes at a place on a panel, at which the curvature changes sign.
+
+    There the curve turns back on itself, and no panel may end: the next one would begin behind the end of the motion.
+    """
+    return ds_at(forces, march, panel, far) <= CUSP_SHARE * max(work[DS], work[DS + COUNT - 1])
 
 
 @Inner
@@ -190,7 +208,8 @@ def next_panel(forces, march, panel, request, work):  # type: ignore[no-untyped-
             x = kink(work)
             to_kink = width * (0.5 * (1.0 + x) if x > -1.0 else 0.5)
             # A leg that begins at a kink may begin a rounding before it.
-            if x <= 1.0 and to_kink * (slope + march.g * to_kink) > unit:
+            far = to_kink * (slope + march.g * to_kink)
+            if x <= 1.0 and far > unit and not (x > -1.0 and is_cusp(forces, march, panel, start + far, work)):
                 width, ends_at_kink = to_kink, x > -1.0
                 continue
             load_row(work, LOAD, DS, N0, KAPPA, W)
