@@ -18,8 +18,8 @@ from gqm_sym.errors import SolutionError
 from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.launch.problem import Problem
 from gqm_sym.runtime.legs.leg_record import END, HEADING, MIDDLE, START, START_V2
-from gqm_sym.runtime.legs.leg_run import ASYMPTOTE
 from gqm_sym.runtime.legs.leg_segments import Run
+from gqm_sym.runtime.legs.runs.ends import ASYMPTOTE
 from gqm_sym.runtime.legs.variations.chart_law import law_of
 from gqm_sym.runtime.legs.variations.equation import Panels
 from gqm_sym.runtime.legs.variations.law import LawRows, States, one_state

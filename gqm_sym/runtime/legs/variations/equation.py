@@ -27,7 +27,7 @@ from gqm_sym.runtime.compiled.jit import entry
 from gqm_sym.runtime.compiled.types import MATRIX, VECTOR, Array
 from gqm_sym.runtime.legs.leg_record import END, HEADING, NORMAL_LOAD, RIGHT, START, Y_ROW
 from gqm_sym.runtime.legs.leg_segments import Run
-from gqm_sym.runtime.legs.polynomials import COUNT, GRADED_MEANS, MEANS, SHARES, TO_COEFFICIENTS
+from gqm_sym.runtime.legs.panels.polynomials import COUNT, GRADED_MEANS, MEANS, SHARES, TO_COEFFICIENTS
 from gqm_sym.runtime.legs.variations.law import LawRows, States
 
 # The nodes of a panel and its end, as shares of it.

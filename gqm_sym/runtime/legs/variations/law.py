@@ -17,9 +17,10 @@ from gqm_sym.runtime.gradients.programs import Program
 from gqm_sym.runtime.interface import ExactLaw
 from gqm_sym.runtime.launch.problem import Problem
 from gqm_sym.runtime.legs.leg_record import END, HEADING, NORMAL_LOAD, RIGHT, START
-from gqm_sym.runtime.legs.leg_run import ASYMPTOTE, LEAST_V2
 from gqm_sym.runtime.legs.leg_segments import Run
-from gqm_sym.runtime.legs.polynomials import COUNT
+from gqm_sym.runtime.legs.panels.point import LEAST_V2
+from gqm_sym.runtime.legs.panels.polynomials import COUNT
+from gqm_sym.runtime.legs.runs.ends import ASYMPTOTE
 from gqm_sym.runtime.legs.variations.programs import force_program, law_program, load_program, range_program
 
 # Roundings of doubles over those of double-double arithmetic.
