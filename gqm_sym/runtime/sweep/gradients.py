@@ -16,9 +16,10 @@ from gqm_sym.runtime.gradients.quantities import selected
 from gqm_sym.runtime.gradients.sweep import COMPILED, PERIODS, Launches, launch_gradients
 from gqm_sym.runtime.launch.kinds import LOAD_EXTREMES
 from gqm_sym.runtime.launch.request import LaunchRequest
+from gqm_sym.runtime.sweep.columns import as_doubles
 from gqm_sym.runtime.sweep.quantities import ANSWERED, SOLVE
 from gqm_sym.runtime.sweep.result import Sweep
-from gqm_sym.runtime.sweep.sweep import Solve, as_doubles, sweep
+from gqm_sym.runtime.sweep.sweep import Solve, sweep
 
 if TYPE_CHECKING:
     from gqm_sym.runtime.launch.formulas import Formulas
