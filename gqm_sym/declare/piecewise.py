@@ -263,12 +263,14 @@ def _piece(given: Piece | FormulaCurve, where: str) -> Piece:
     if isinstance(given, Piece):
         return given
     if not isinstance(given, FormulaCurve):
-        raise DeclarationError(f"{where}: {short(given)} given; give line, arc, clothoid or a curve with formulas")
+        raise DeclarationError(
+            f"{where}: must be a line, an arc, a clothoid, a transition or a curve with formulas, got {short(given)}"
+        )
     if given.charted:
         raise DeclarationError(f"{where}: a curve of kind {given.kind!r} cannot be a piece; give one with formulas")
     low, high = given.domain
     if low is None or high is None:
-        raise DeclarationError(f"{where} ({given.kind}): domain: must have two ends, which the piece lies between")
+        raise DeclarationError(f"{where} ({given.kind}): domain: must have two ends, between which the piece lies")
     return Piece(kind="curve", numbers=(low, high), curve=given)
 
 

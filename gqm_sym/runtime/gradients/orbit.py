@@ -35,7 +35,7 @@ def asked_for(name: str) -> Iterator[None]:
 def without_formulas() -> SolutionError:
     """What is raised for curves that have no gradients."""
     return SolutionError(
-        "gradients: curves that are known in doubles only have none yet; declare the curve by formulas"
+        "gradients: there are none along curves that are known in doubles only; declare the curve by formulas"
     )
 
 
@@ -50,7 +50,7 @@ def check_force(formulas: Formulas, quantity: str) -> None:
     has_force = formulas.signed or getattr(formulas.exact, "load_along_curvature", None) is not None
     if not has_force and quantity in ("sensitivity", "normal_force_max", "normal_force_min"):
         raise SolutionError(
-            f"gradients: {quantity} has none yet along points in space, for it holds the contact force; ask for others"
+            f"gradients: there are none of {quantity} along points in space, because it contains the contact force"
         )
 
 

@@ -86,7 +86,9 @@ def sweep(
     if quantity in LOAD_EXTREMES:
         check_banked(formulas, quantity)
     if (lam is None) == (quantity == "time_at"):
-        raise InputError(f"lam: is the place that 'time_at' asks about, got {short(lam)} with {quantity!r}")
+        raise InputError(
+            f"lam: must be given with 'time_at', and with no other quantity, got {short(lam)} with {quantity!r}"
+        )
     if t_max is not None and as_doubles(t_max, "t_max").ndim:
         raise InputError(f"t_max: must be one number, the same for all launches, got {short(t_max)}")
     check_contact(formulas, contact)
