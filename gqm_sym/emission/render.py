@@ -232,7 +232,7 @@ def _listed(names: list[str], width: int = _WIDTH) -> list[str]:
 
 
 def _as_imported(name: str) -> tuple[int, str]:
-    """The order in which names of one import stand: constants, classes, functions."""
+    """Return the key that orders the names of an import: constants, classes, functions."""
     return (0 if name.isupper() else 1 if name[0].isupper() else 2, name)
 
 
@@ -247,7 +247,7 @@ def _digest(text: str) -> str:
 
 
 def _quoted(text: str) -> str:
-    """Change any text so that it can stand inside a docstring."""
+    """Change a text so that it can be part of a docstring."""
     plain = "".join(c if c.isprintable() else " " for c in text)
     return plain.replace("\\", "\\\\").replace('"', "'")
 
