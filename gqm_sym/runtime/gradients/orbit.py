@@ -25,7 +25,7 @@ from gqm_sym.runtime.launch.formulas import Formulas
 
 @contextmanager
 def asked_for(name: str) -> Iterator[None]:
-    """Have errors that speak of gradients name what was asked for."""
+    """Name the requested quantity in errors about gradients."""
     try:
         yield
     except SolutionError as error:

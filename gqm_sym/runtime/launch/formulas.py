@@ -235,10 +235,10 @@ class Formulas:
         return values if isinstance(values, tuple) else (values,)
 
     def separated_factors(self, p: Sequence[Array]) -> list[Array]:
-        """What stands before the parts of potential and load (`interface.SeparatedTerms`), for arrays of parameters.
+        """Return the factors of the parts of potential and load (`interface.SeparatedTerms`), for arrays of parameters.
 
-        A factor does not depend on how many others are asked for: elementary functions of NumPy may differ in their
-        last bits between single numbers and arrays, and between arrays with and without gaps.
+        A factor does not depend on the number of others that are computed with it: elementary functions of NumPy may
+        differ in their last bits between single numbers and arrays, and between arrays with and without gaps.
         """
         assert self.separated is not None
         with np.errstate(all="ignore"):

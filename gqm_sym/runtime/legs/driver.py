@@ -73,7 +73,7 @@ LAST_DIGIT = ULP / 64.0
 NEAR_EQUILIBRIUM = 1e-13
 
 # How near to an unstable equilibrium a body may be launched from rest, as a share of its place, where what resists the
-# body is no product of a factor and V**2: it is a difference of forces there that agree to a rounding.
+# body is not a product of a factor and V**2, but a difference of forces that agree to a rounding.
 NEAREST_SHARE = 1e-20
 
 # Legs come to within some 1e-8 of a cusp, where roundings of the place hide how ds/dlam decreases; ds is then no more
@@ -110,7 +110,7 @@ def _track(problem: Problem) -> Track:
 
 
 class Driver:
-    """A body that is driven by some legs more, each time that this is asked for.
+    """A body that is driven by some more legs at each request.
 
     Parameters
     ----------
@@ -299,7 +299,7 @@ class Driver:
         return SolutionError(f"{place} could not be followed; are the curve and the force smooth there?")
 
     def _force_cancels(self, record: Array) -> bool:
-        """Whether terms of the force cancel where a leg ends, or starts, so that doubles do not tell it."""
+        """Whether terms of the force cancel at the end or the start of a leg, so that doubles do not resolve it."""
         with suppress(SolutionError):  # curves without formulas have no bound on its rounding, nor have very long ones
             law, heading = FormulaLaw(self.problem), int(record[HEADING])
             return self._frame is None and any(law.cancels(float(record[end]), heading) for end in (START, END))

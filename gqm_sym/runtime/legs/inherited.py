@@ -25,7 +25,7 @@ def _known(errors: tuple[float, float, float]) -> Errors:
 
 
 class InheritedErrors:
-    """The errors with which legs begin, computed as far as they are asked for.
+    """The errors with which legs begin, computed as far as required.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What is asked of the changes of a motion with losses: states at times, turning points, ends and extremes."""
+"""Derivatives of a motion with losses: of states at given times, turning points, ends and extremes."""
 
 from collections.abc import Sequence
 from typing import Any, NamedTuple

@@ -2,8 +2,8 @@
 
 Let y, sigma and ``delay`` be the changes of W, of the place and of the time at a given distance from a moving origin
 (`equation`). At a given place W changes by ``y - F sigma``, and the time by ``delay - v sigma ds/V`` with v =
-sgn(dlam/dt). Both halves of a leg agree on these in the middle, which tells how the turn at the end moves. A body that
-is thrown slowly and speeds up is followed from where it would have been at rest, so that nothing is divided by its
+sgn(dlam/dt). Both halves of a leg agree on these in the middle, which determines how the turn at the end moves. A body
+that is thrown slowly and speeds up is followed from where it would have been at rest, so that nothing is divided by its
 speed.
 """
 

@@ -26,7 +26,7 @@ from gqm_sym.runtime.legs.variations.programs import force_program, law_program,
 # Roundings of doubles over those of double-double arithmetic.
 COARSER = 0.5 * ULP / UNIT
 
-# The largest error of the force, as a share of it, at which panels still tell rounding from structure.
+# The largest relative error of the force at which panels still distinguish rounding from structure.
 MAX_FORCE_ERROR = 1e-11
 
 
@@ -59,7 +59,7 @@ class LawRows(NamedTuple):
 
 
 class States(NamedTuple):
-    """States in which the law is asked for: a number for each.
+    """The states for which the law is evaluated: a number for each.
 
     Attributes
     ----------
