@@ -87,10 +87,8 @@ def minimise(
     SolutionError
         If no track meets all limits, or the motion does not have the quantity at the first guess.
 
-    Notes
-    -----
-    SciPy's SLSQP, with the exact derivatives of ``motion.gradient`` where there are some, and difference quotients
-    elsewhere. What it finds is a local minimum.
+    Notes ----- SciPy's SLSQP, with the exact derivatives of ``motion.gradient`` where there are some, and difference
+    quotients elsewhere. The result is a local minimum.
 
     Examples
     --------

@@ -39,7 +39,7 @@ LAUNCH, CHOICES = ("lam0", "v0"), ("direction", "contact", "point")
 
 
 class Free(NamedTuple):
-    """What is to be found: names, first guesses and limits, in the same order."""
+    """The unknowns: names, first guesses and limits, in the same order."""
 
     names: tuple[str, ...]
     start: Array
@@ -205,7 +205,7 @@ class Residuals:
             return np.full(self.values.size, nan)
 
     def predicted(self, x: Array) -> Array:
-        """What would be measured without errors."""
+        """Return the measurements without errors."""
         names = tuple(self.measured.values)
         if self.measured.t is not None:
             motion = self.motion(x)

@@ -60,7 +60,7 @@ class Choice:
 
 @dataclass(frozen=True, slots=True)
 class Criterion:
-    """What is to be least.
+    """The function to be minimised.
 
     For a standard deviation s of the points it is Mallows' C_p, residual + 2 s**2 freedom: but for a constant an
     unbiased estimate of how far the spline is from the true places of the points. (To ask for a residual of n s**2, the

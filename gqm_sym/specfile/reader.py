@@ -1,7 +1,7 @@
 """Read a curve file: text -> tree -> checked sections -> what they declare.
 
-Every stage records its mistakes and continues, so that all mistakes of a file are reported together. What is only a
-consequence of an earlier mistake is not reported.
+Every stage records its mistakes and continues, so that all mistakes of a file are reported together. Consequences of an
+earlier mistake are not reported.
 """
 
 from collections.abc import Iterable, Mapping

@@ -1,4 +1,4 @@
-"""What a curve file says, read and checked."""
+"""The content of a curve file, read and checked."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field

@@ -33,7 +33,7 @@ def asked_for(name: str) -> Iterator[None]:
 
 
 def without_formulas() -> SolutionError:
-    """What is raised for curves that have no gradients."""
+    """Return the error for curves that have no gradients."""
     return SolutionError(
         "gradients: there are none along curves that are known in doubles only; declare the curve by formulas"
     )

@@ -242,7 +242,7 @@ class Launches(NamedTuple):
 
     @property
     def table(self) -> Array:
-        """What compiled code takes: the variables of each launch, then its turning points."""
+        """Return the arguments of compiled code: the variables of each launch, then its turning points."""
         return np.hstack([self.given, np.zeros((len(self.given), 1)), self.spans])
 
     @property

@@ -234,7 +234,7 @@ def _too_many_barriers(problem: Problem) -> SolutionError:
 
 
 def end_of_motion(problem: Problem, direction: int, found: tuple[int, float, float]) -> EndOfMotion:
-    """What ends the motion in one direction, by what a search found and, where needed, by extended precision."""
+    """Return the end of the motion in one direction, from a search and, where needed, from extended precision."""
     lam0, period, step = problem.lam0, problem.period, starting_step(problem)
     length = period or distance_to_end(problem, direction)
     for _ in range(MAX_BARRIERS):

@@ -110,7 +110,7 @@ class Errors(NamedTuple):
 
 
 class Half(NamedTuple):
-    """What some panels say of the motion between the place where they begin and the middle of the run.
+    """Data of some panels on the motion between the place where they begin and the middle of the run.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""What a sweep returns: the values of one quantity, with the launches that they belong to."""
+"""The result of a sweep: the values of one quantity with their launches."""
 
 from collections.abc import Mapping
 from math import prod

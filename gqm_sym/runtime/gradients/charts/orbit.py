@@ -90,7 +90,7 @@ def fill_nodes(curve, kind, panels, orbit, shares, places):  # type: ignore[no-u
 
 
 def source_along(problem: Problem) -> ChartSource:
-    """What the programs of motions along the chart of a module are recorded from."""
+    """The formulas from which the programs of motions along the chart of a module are recorded."""
     formulas = problem.formulas
     assert isinstance(formulas.exact, ExactPotential)
     names = list(formulas.parameters)

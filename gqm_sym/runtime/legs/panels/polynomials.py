@@ -183,7 +183,7 @@ def _sign(value, noise):  # type: ignore[no-untyped-def]
 
 @Inner
 def _on_part(part, before, noise, smallest):  # type: ignore[no-untyped-def]
-    """What bounds by the coefficients say of a series on a part of the panel.
+    """Return the result of bounds by the coefficients for a series on a part of the panel.
 
     Parameters
     ----------

@@ -183,7 +183,7 @@ class Derivatives(Positions):
         )
 
     def _without_gradients(self) -> SolutionError:
-        """What is raised by motions without gradients."""
+        """Return the error of motions without gradients."""
         return SolutionError(
             "gradients: only librations, circulations and motions with losses have them; "
             f"this motion is of kind {self.kind!r}"
