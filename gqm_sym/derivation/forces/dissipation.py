@@ -69,7 +69,7 @@ def dissipation(
     coordinates
         What the coordinates are along the curve, where a law of the user's own names them.
     signs
-        Of expressions on the curve.
+        The variables of expressions on the curve.
     """
     v, nu = DIRECTION, CONTACT_SIGN
     # The curvature of a curve in no vertical plane has no sign.

@@ -1,4 +1,4 @@
-"""How errors grow along a leg: of the place where it begins, of V**2 there and of the time, by their derivatives.
+"""The propagation of errors along a leg: of its start, of V**2 there and of the time, by their derivatives.
 
 Let the body start at a, at rest, and turn at b. With q the integral of Q from a on, V**2 at a place changes by
 ``-P(a) exp(-q) da``, and so the turn by ``db/da = P(a) exp(-q)/P(b)``. At a given distance from a, V**2 changes by
@@ -172,7 +172,7 @@ def half_of_leg(forces, march, panels, v2, errors, terms, record):  # type: igno
         panel becomes the largest error that these make in the times to places of the panel that are given by their
         distance from there.
     terms : array
-        As of `carry`.
+        As in `carry`.
     """
     work = panel_buffer()
     set_nodes(work)
@@ -263,7 +263,7 @@ def carry(dissipation, p, turns, before, share, terms, record):  # type: ignore[
     Returns
     -------
     place, v2, time : float
-        As of `Errors`.
+        As in `Errors`.
     """
     p, record, forward = uncounted(p), uncounted(record), march_of(record)
     ahead, back, v = int(record[AHEAD]), int(record[BACK]), forward.direction
