@@ -1,4 +1,4 @@
-"""What the lowered functions of one model share: its names, its parameters, and how a function is made of forms."""
+"""The common context of the lowered functions of one model: names, parameters, and functions made from forms."""
 
 from collections.abc import Iterable
 

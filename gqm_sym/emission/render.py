@@ -187,7 +187,7 @@ def _exact_formulas(module: ModuleIR) -> list[str]:
 
 
 def _pass1(module: ModuleIR) -> str:
-    """What a load map is handed over as."""
+    """The description of a load map for the runtime."""
     if module.banked:
         return "Pass1OfRider"
     return "Pass1InSpace" if module.in_space else "Pass1"

@@ -1,4 +1,4 @@
-"""What generated modules and the runtime agree on.
+"""The interface between generated modules and the runtime.
 
 A generated module evaluates its formulas at many places in one call. Its functions reach the runtime by address, so
 the runtime is compiled once per installation and shared by every module.
@@ -190,7 +190,7 @@ class BatchFunctions(NamedTuple):
 
 
 class Dissipation(NamedTuple):
-    """What compiled code takes of a dissipative model: the addresses of two functions, and of what kind its forces are.
+    """The arguments for a dissipative model: the memory cells of two functions, and the kind of its forces.
 
     Attributes
     ----------
@@ -237,7 +237,7 @@ class SeparatedTerms(NamedTuple):
         ``f(op, p)`` gives what depends on parameters alone: a factor for each part of U, then for each of n0. ``p`` are
         the run-time parameters and what stands behind them.
     potentials, loads : int
-        How many parts U and n0 have.
+        The numbers of parts of U and n0.
     held : tuple of int
         Where in ``p`` the numbers stand that ``function`` reads.
     parts : callable or None

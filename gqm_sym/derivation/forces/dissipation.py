@@ -1,4 +1,4 @@
-"""What a force law that is not conservative does along a curve: dW/dλ = P - Q W, and what holds a body at rest.
+"""A force law that is not conservative, along a curve: dW/dλ = P - Q W, and the forces that hold a body at rest.
 
 The law is first written in what it takes of a curve, its *pieces* (σ, κ, dΘ/dλ, F·t, n₀ and dx/ds), where every force
 adds its terms; then the pieces are replaced by their closed forms. Emitted code keeps the pieces apart, as a person
@@ -69,7 +69,7 @@ def dissipation(
     coordinates
         What the coordinates are along the curve, where a law of the user's own names them.
     signs
-        Of expressions on the curve.
+        The variables of expressions on the curve.
     """
     v, nu = DIRECTION, CONTACT_SIGN
     # The curvature of a curve in no vertical plane has no sign.

@@ -66,7 +66,7 @@ class InheritedErrors:
         return Errors(abs(lam0.low) if known is None else known, 2.0 * v0.value * abs(v0.low) + ULP * problem.w0, 0.0)
 
     def _time_error_of_force(self, run: Run) -> float:
-        """What the error of the force makes of the time in which a body departs from an equilibrium."""
+        """Return the effect of the error of the force on the time in which a body departs from an equilibrium."""
         if run.frame is None or run.frame.is_stable:
             return 0.0
         return self._driver.force_error * float(run.record[TIME_FROM_START] + run.record[TIME_FROM_END])

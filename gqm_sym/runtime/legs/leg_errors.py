@@ -1,4 +1,4 @@
-"""How errors grow along a leg: of the place where it begins, of V**2 there and of the time, by their derivatives.
+"""The propagation of errors along a leg: of its start, of V**2 there and of the time, by their derivatives.
 
 Let the body start at a, at rest, and turn at b. With q the integral of Q from a on, V**2 at a place changes by
 ``-P(a) exp(-q) da``, and so the turn by ``db/da = P(a) exp(-q)/P(b)``. At a given distance from a, V**2 changes by
@@ -110,7 +110,7 @@ class Errors(NamedTuple):
 
 
 class Half(NamedTuple):
-    """What some panels say of the motion between the place where they begin and the middle of the run.
+    """Data of some panels on the motion between the place where they begin and the middle of the run.
 
     Attributes
     ----------
@@ -172,7 +172,7 @@ def half_of_leg(forces, march, panels, v2, errors, terms, record):  # type: igno
         panel becomes the largest error that these make in the times to places of the panel that are given by their
         distance from there.
     terms : array
-        As of `carry`.
+        As in `carry`.
     """
     work = panel_buffer()
     set_nodes(work)
@@ -265,7 +265,7 @@ def carry(dissipation, p, turns, before, share, lap, terms, record):  # type: ig
     Returns
     -------
     place, v2, time : float
-        As of `Errors`.
+        As in `Errors`.
     """
     p, record, forward = uncounted(p), uncounted(record), march_of(record)
     ahead, back, v = int(record[AHEAD]), int(record[BACK]), forward.direction

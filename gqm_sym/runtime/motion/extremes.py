@@ -95,7 +95,7 @@ class Extreme(NamedTuple):
 
 
 class Quantity(NamedTuple):
-    """What is the largest or the least somewhere along a motion.
+    """A quantity with a largest or least value along a motion.
 
     Attributes
     ----------

@@ -28,7 +28,7 @@ class Lock:
 
 
 class HasLock(Protocol):
-    """What has a lock as ``_lock``."""
+    """An object with a lock ``_lock``."""
 
     _lock: Lock
 

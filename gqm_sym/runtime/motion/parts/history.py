@@ -1,4 +1,4 @@
-"""What happens along a motion: its legs and its events."""
+"""The legs and the events of a motion."""
 
 from collections.abc import Sequence
 from dataclasses import replace
