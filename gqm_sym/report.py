@@ -13,6 +13,7 @@ from html import escape, unescape
 from importlib.metadata import version
 from typing import TYPE_CHECKING
 
+import numpy as np
 import sympy as sp
 
 from gqm_sym.derivation import Model
@@ -21,6 +22,10 @@ from gqm_sym.export.html import summary
 from gqm_sym.kernels.base import CONTACT_SIGN, DIRECTION
 from gqm_sym.optional import require
 from gqm_sym.runtime import Motion
+from gqm_sym.runtime.charts.train import TrackOfTrain
+from gqm_sym.runtime.launch.kinds import LOADS
+from gqm_sym.runtime.launch.rider import STANDARD_GRAVITY
+from gqm_sym.runtime.motion.motion import horizon
 from gqm_sym.runtime.motion.rows import Rows, table
 from gqm_sym.specfile import Spec
 from gqm_sym.sympy_charts import ChartFunction
@@ -33,6 +38,9 @@ FIGURES = {
     "speed_and_force": "Speed and contact force against arc length",
     "portrait": "Phase portrait, with the orbit of this launch",
 }
+
+# Times at which the loads in the cars of a train are compared.
+SEAT_TIMES = 4001
 
 # SymPy prints the names of functions as they are written.
 _GREEK = {"alpha": "α", "kappa": "κ"}
@@ -79,6 +87,7 @@ def report(spec: Spec, model: Model, motion: Motion, text: str) -> str:
         _facts(summary(motion)),
         "<h2>The motion</h2>",
         *_figures(motion),
+        *_riders(motion),
         "<h2>Events</h2>",
         Rows(motion.events)._repr_html_(),
         "<h2>Legs</h2>",
@@ -200,9 +209,39 @@ def _character(entity: str) -> str:
 
 def _figures(motion: Motion) -> Iterator[str]:
     for what, caption in FIGURES.items():
+        if what == "track" and motion.problem.formulas.rider_loads is not None:
+            continue  # the ride has it
         # A motion that loses energy has no phase portrait.
         with suppress(SolutionError):
             yield _svg(motion.plot(what), what, caption)
+
+
+def _riders(motion: Motion) -> Iterator[str]:
+    """Yield what riders feel, on a banked track: the extremes of loads, and in a train those of three cars."""
+    from gqm_sym.figures.rides import ride, seats
+
+    if motion.problem.formulas.rider_loads is None:
+        return
+    yield "<h2>What riders feel</h2>"
+    yield f"<p>Loads are in units of {STANDARD_GRAVITY} m/s².</p>"
+    rows = []
+    for load in LOADS:
+        least, most = getattr(motion, f"n_{load}_min"), getattr(motion, f"n_{load}_max")
+        rows.append((load, *(f"{number:.4f}" for number in (least.value, least.t, most.value, most.t))))
+    yield table(("load", "least", "after (s)", "most", "after (s)"), rows)
+    if isinstance(motion.problem.formulas.chart, TrackOfTrain):
+        cars = motion.cars(np.linspace(0.0, horizon(motion), SEAT_TIMES))
+        loads = [getattr(cars, f"n_{load}") for load in LOADS]
+        middle = cars.lam.shape[0] // 2
+        rows = [
+            (seat, *(f"{end(felt[car]):.3f}" for felt in loads for end in (np.min, np.max)))
+            for seat, car in (("first", -1), ("middle", middle), ("last", 0))
+        ]
+        heads = [f"{load}, {which}" for load in LOADS for which in ("least", "most")]
+        yield f"<p>The same in three cars of the train, at {SEAT_TIMES} times:</p>"
+        yield table(("car", *heads), rows)
+        yield _svg(seats(motion), "seats", "What riders feel in three cars, against the place of their car")
+    yield _svg(ride(motion), "ride", "The track with the vertical load, its plan and elevation, and all loads along it")
 
 
 def _svg(figure: "Figure", name: str, caption: str) -> str:

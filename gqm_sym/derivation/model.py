@@ -17,6 +17,7 @@ from gqm_sym.derivation.algebra.signs import Signs
 from gqm_sym.derivation.corners import check_corners, check_powers, without_known_bars
 from gqm_sym.derivation.defaults import join
 from gqm_sym.derivation.forces.dissipation import (
+    CORIOLIS,
     LOAD,
     LOADS,
     PUSH,
@@ -24,11 +25,12 @@ from gqm_sym.derivation.forces.dissipation import (
     TILT,
     TURN,
     TURNS,
+    UPRIGHT,
     Dissipation,
     dissipation,
 )
-from gqm_sym.derivation.forces.forces import Forces, Place, forces, is_planar, of_train
-from gqm_sym.derivation.forces.rider import Rider, rider
+from gqm_sym.derivation.forces.forces import Forces, Place, forces, is_planar, load_of_cars, of_train, turned_force
+from gqm_sym.derivation.forces.rider import Rider, rider, upright_force
 from gqm_sym.derivation.forces.speed import LAM0, V0, SpeedField, conservative_speed, dissipative_speed
 from gqm_sym.derivation.geometry.geometry import AHEAD, Geometry, cross, geometry, vertical_plane
 from gqm_sym.derivation.geometry.level_set import LevelSet, level_set
@@ -107,6 +109,8 @@ class Model:
     bend, loads
         Of a curve in no vertical plane the vectors t × dt/ds and -t × F, by components, with which t × N/m = W·bend +
         loads; else empty.
+    coriolis
+        Of such a curve in a frame that turns: the vector that ds/dt adds to that, for each unit of it; else empty.
     dissipation
         What a force law that is not conservative does along the curve; None for a conservative one.
     speed_squared
@@ -119,7 +123,7 @@ class Model:
         N, positive along the normal to the left of growing λ; of a curve in no vertical plane its size ``|N|``, without
         a sign.
     side_force
-        What a track that turns about the z axis carries out of its plane; 0 for one at rest.
+        What a planar track that turns about the z axis carries out of its plane; 0 for one at rest, and in space.
     tangential_acceleration
         A, so that dW/ds = 2 A; of a dissipative model in ``W``.
     time_integrand
@@ -140,6 +144,9 @@ class Model:
         What was left unsimplified, and why; of a dissipative model what kind of form V² has.
     level_set
         Of an implicit curve: F with its derivatives, tangent and curvature, in x and z.
+    sided
+        Whether it is told on which side of the track a body is, so that N has a sign, or a part of it does: that along
+        the upward direction of riders on a banked space curve.
     rider
         Of a space curve that is banked: what a rider feels; else None.
     """
@@ -172,6 +179,7 @@ class Model:
     normal: tuple[sp.Expr, ...]
     bend: tuple[sp.Expr, ...]
     loads: tuple[sp.Expr, ...]
+    coriolis: tuple[sp.Expr, ...]
     dissipation: Dissipation | None
     speed_squared: sp.Expr
     speed_squared_form: str
@@ -188,6 +196,7 @@ class Model:
     at_least: tuple[tuple[str, str], ...]
     notes: tuple[str, ...]
     level_set: LevelSet | None = None
+    sided: bool = True
     rider: Rider | None = None
 
     if not TYPE_CHECKING:
@@ -215,7 +224,10 @@ class Model:
         return self.curve.period
 
     def normal_force_at(self, v2: sp.Expr) -> sp.Expr:
-        """N where V² has a value; of a curve in no vertical plane ``|N|``."""
+        """N where V² has a value; of a curve in no vertical plane ``|N|``.
+
+        In a frame that turns that depends on ``direction``, the sign of ds/dt.
+        """
         v2 = _read_v2(v2)
         if not self.loads:
             return MASS * (self.kappa * v2 + self.static_normal_load)
@@ -235,7 +247,7 @@ class Model:
 
     def _turned_force(self, v2: sp.Expr) -> tuple[sp.Expr, ...]:
         """The vector t × N/m, which has the length of N/m."""
-        return tuple(bend * v2 + load for bend, load in zip(self.bend, self.loads, strict=True))
+        return turned_force(self.bend, self.loads, self.coriolis, v2)
 
     @property
     def units(self) -> dict[str, str]:
@@ -258,7 +270,7 @@ class Model:
             turning = sp.Eq(W, 0, evaluate=False)
             if liftoff is not None:
                 liftoff = sp.Eq(self.kappa * W + self.static_normal_load, 0, evaluate=False)
-            side = 2 * self.mass * self.force.spin * DIRECTION * sp.sqrt(W) * self.dxds
+            side = 0 if self.loads else 2 * self.mass * self.force.spin * DIRECTION * sp.sqrt(W) * self.dxds
         return (
             *(self.level_set.closed_forms() if self.level_set else ()),
             *self.curve.named(self.x, self.y, self.z),
@@ -421,7 +433,8 @@ def derive(
         check_corners(curve, values)
         signs = Signs(parameter=lam, domain=curve.domain, positive=curve.positive, may_be_positive=())
         curve = replace(curve, **{name: without_known_bars(form, signs) for name, form in curve.coordinates})
-    heading = vertical_plane(curve) if curve.in_space else AHEAD
+    # A frame that turns pushes a body out of every vertical plane.
+    heading = (None if kernel.spin else vertical_plane(curve)) if curve.in_space else AHEAD
     if heading is not None and not is_planar(heading, (curve.x, curve.y, curve.z), kernel):
         if not curve.in_space:
             raise DeclarationError(
@@ -437,9 +450,10 @@ def derive(
     law = of_train(body, kernel, lam) if kernel.cars else body
     if not curve.charted:
         check_powers((("potential", law.potential),), curve, values)
+    upright = upright_force(curve.banking, shape, body) if curve.banking else None
     loss, speed, level = None, conservative_speed(law, lam), level_set(curve)
     if not kernel.conservative:
-        loss = _losses(curve, kernel, (x, y, z), law, shape)
+        loss = _losses(curve, kernel, (x, y, z), law, shape, upright or ())
         speed = dissipative_speed(kernel, law, shape, loss, curve)
     pressure = shape.kappa * speed.held + law.static_normal_load
     dxds, dyds, dzds = shape.tangent
@@ -478,11 +492,12 @@ def derive(
         normal=shape.normal,
         bend=shape.bend,
         loads=law.loads,
+        coriolis=law.coriolis,
         dissipation=loss,
         speed_squared=speed.squared,
         speed_squared_form=speed.form,
         normal_force=MASS * pressure,
-        side_force=2 * MASS * kernel.spin * DIRECTION * sp.sqrt(speed.held) * shape.dxds,
+        side_force=sp.S.Zero if law.loads else 2 * MASS * kernel.spin * DIRECTION * sp.sqrt(speed.held) * shape.dxds,
         tangential_acceleration=acceleration,
         time_integrand=shape.ds / sp.sqrt(speed.held),
         regularised_integrand=shape.ds * sp.sqrt((lam - LAM1) * (LAM2 - lam) / speed.held),
@@ -494,6 +509,7 @@ def derive(
         at_least=kernel.at_least,
         notes=(*(() if level is None else (level.note,)), *shape.notes, *(() if loss is None else (speed.note,))),
         level_set=level,
+        sided=not law.loads or upright is not None,
         rider=rider(curve.banking, shape, body, acceleration, lam) if curve.banking else None,
     )
     if law.loads:
@@ -520,7 +536,6 @@ def _refuse_planar_forces(kernel: Kernel) -> None:
     """Refuse what there is for planar curves only."""
     refused = (
         ("rolling: radius", kernel.radius, "the path of the centre of a rolling body"),
-        ("rotating_frame", kernel.spin, "a turning frame"),
         ("surface_tension: form", kernel.resistance and not kernel.resistance.has(sp.Abs), "the printed form's sign"),
     )
     for name, given, what in refused:
@@ -531,7 +546,6 @@ def _refuse_planar_forces(kernel: Kernel) -> None:
 def _refuse_of_train(kernel: Kernel) -> None:
     """Refuse what is not known of a train."""
     refused = (
-        ("coulomb", kernel.friction or kernel.static_friction, "friction"),
         ("surface_tension", kernel.resistance, "a droplet's resistance"),
         ("rotating_frame", kernel.spin, "a turning frame"),
         ("rolling: radius", kernel.radius, "the path of the centre of a rolling body"),
@@ -543,7 +557,9 @@ def _refuse_of_train(kernel: Kernel) -> None:
             raise DeclarationError(f"derive: {name}: {what} is not known of a train; leave it out")
 
 
-def _losses(curve: Curve, kernel: Kernel, place: Place, law: Forces, shape: Geometry) -> Dissipation:
+def _losses(
+    curve: Curve, kernel: Kernel, place: Place, law: Forces, shape: Geometry, upright: tuple[sp.Expr, ...]
+) -> Dissipation:
     lam = curve.parameter
     signs = Signs(parameter=lam, domain=curve.domain, positive=shape.positive, may_be_positive=())
     if law.loads and shape.cusp is not None and signs.sign(shape.cusp) is None:
@@ -558,8 +574,11 @@ def _losses(curve: Curve, kernel: Kernel, place: Place, law: Forces, shape: Geom
         **{PUSH: law.push, LOAD: law.static_normal_load},
         **dict(zip(TURNS, shape.turning, strict=False)),
         **dict(zip(LOADS, law.loads, strict=False)),
+        **dict(zip(CORIOLIS, law.coriolis, strict=False)),
+        **dict(zip(UPRIGHT, reversed(upright), strict=False)),
     }
-    loss = dissipation(kernel, pieces, coordinates, signs)
+    cars_load = load_of_cars(kernel, lam, in_space=curve.in_space) if kernel.cars else None
+    loss = dissipation(kernel, pieces, coordinates, signs, cars_load)
     for way, form in zip(("forwards", "backwards"), loss.holds, strict=True):
         check_real(form, where=f"the law of a body at rest that is about to move {way}")
     return loss

@@ -1,7 +1,7 @@
-"""A track that turns about the vertical axis x = 0."""
+"""A track that turns about the vertical axis x = y = 0."""
 
 from gqm_sym.arguments import checked
-from gqm_sym.kernels.base import Kernel, X, parameter
+from gqm_sym.kernels.base import Kernel, X, Y, parameter
 from gqm_sym.parameters import Given
 
 
@@ -9,7 +9,8 @@ from gqm_sym.parameters import Given
 def RotatingFrame(*, Omega: Given | None = None) -> Kernel:
     """Return the centrifugal force of a track that turns about the z axis.
 
-    Its Coriolis force presses the body out of the plane: friction feels that too.
+    Its Coriolis force presses the body out of the plane of a planar track: friction feels that too. On a space curve it
+    is part of the contact force, which then depends on the direction of motion.
 
     Parameters
     ----------
@@ -19,7 +20,7 @@ def RotatingFrame(*, Omega: Given | None = None) -> Kernel:
     rate, pair = parameter(Omega, "Omega", where="rotating_frame")
     return Kernel(
         terms=(("rotating_frame", f"frame turning about the z axis at {rate}"),),
-        potential=-(rate**2) * X**2 / 2,
+        potential=-(rate**2) * (X**2 + Y**2) / 2,
         spin=rate,
         defaults=(pair,),
     )

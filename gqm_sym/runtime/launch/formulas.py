@@ -145,6 +145,11 @@ class Formulas:
         Of a space curve: what fills its third coordinate and the contact force as a vector.
     signed : bool
         Whether the contact force has a sign: it has none on a space curve that lies in no vertical plane.
+    sided : bool
+        Whether the sign of the contact force, or on a banked space curve of its part along the upward direction of
+        riders, tells on which side of the track the body is.
+    directed : bool
+        Whether the contact force depends on the sign of ds/dt: it does on a space curve in a frame that turns.
     rider_loads : Emitted or None
         Of a track with a declared roll: what fills the loads on a rider.
     """
@@ -173,6 +178,8 @@ class Formulas:
     separated: SeparatedTerms | None = None
     path_in_space: Emitted | None = None
     signed: bool = True
+    sided: bool = True
+    directed: bool = False
     rider_loads: Emitted | None = None
     units: Mapping[str, str] = field(default_factory=dict)
     text: str = field(init=False, repr=False, compare=False)

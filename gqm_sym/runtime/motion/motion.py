@@ -24,7 +24,7 @@ from gqm_sym.runtime.launch.equilibria import Potential
 from gqm_sym.runtime.launch.kinds import QUANTITIES, MotionKind
 from gqm_sym.runtime.launch.problem import Problem
 from gqm_sym.runtime.launch.request import Launch, LaunchRequest
-from gqm_sym.runtime.launch.speed import path_and_force_at, path_in_space_at
+from gqm_sym.runtime.launch.speed import length, path_and_force_at, path_in_space
 from gqm_sym.runtime.motion.events import (
     Event,
     Leg,
@@ -33,9 +33,9 @@ from gqm_sym.runtime.motion.events import (
     crossings,
     passages,
 )
-from gqm_sym.runtime.motion.extremes import CONTACT_FORCE, SPEED, Extreme, extreme
+from gqm_sym.runtime.motion.extremes import SPEED, Extreme, extreme, force_of
 from gqm_sym.runtime.motion.locking import Lock, locked
-from gqm_sym.runtime.motion.riding.cars import Cars, cars
+from gqm_sym.runtime.motion.riding.cars import Cars, CarsOfRiders, cars
 from gqm_sym.runtime.motion.riding.exceedance import Exceedance, exceedance
 from gqm_sym.runtime.motion.riding.loads import felt, load_extreme
 from gqm_sym.runtime.motion.rolling import slip_times
@@ -408,16 +408,21 @@ class Motion(ABC):
         error = self._bound(times, points, reduced, v, ds)
         lam = reduced + points.laps * trajectory.lap
         s = (s + points.laps * trajectory.lap_length) + self.problem.arc_origin
-        found = [_shaped(array, shape) for array in (times, lam, s, x, z, v, v2, kappa, force, error)]
         kind, more = self._in_space(times, reduced, v, v2, force)
+        found = [_shaped(array, shape) for array in (times, lam, s, x, z, v, v2, kappa, force, error)]
         return kind(*found, *(_shaped(array, shape) for array in more))
 
     def _in_space(self, times: Array, places: Array, v: Array, v2: Array, force: Array) -> tuple[type[State], Array]:
-        """The kind of state that there is on the curve, and what it has beside the fields of `State`, as rows."""
+        """The kind of state that there is on the curve, and what it has beside the fields of `State`, as rows.
+
+        In a frame that turns the contact ``force`` is filled, too.
+        """
         formulas, p = self.problem.formulas, self.problem.functions.p
         if formulas.path_in_space is None:
             return State, np.empty((0, 0))
-        rows = path_in_space_at(formulas.path_in_space.address, p, places, v2)
+        rows = path_in_space(formulas, p, places, v2, v)
+        if formulas.directed:
+            force[:] = length(rows[1:])
         if formulas.rider_loads is None:
             return StateInSpace, rows
         return StateOfRider, np.concatenate([rows, felt(self.problem, places, v, v2, force, self._resting(times))])
@@ -569,13 +574,13 @@ class Motion(ABC):
     @locked
     def normal_force_max(self) -> Extreme:
         """The largest contact force along the normal; as `v_max`."""
-        return extreme(self, CONTACT_FORCE, 1)
+        return extreme(self, force_of(self.problem), 1)
 
     @property
     @locked
     def normal_force_min(self) -> Extreme:
         """The least contact force along the normal, which may be negative; as `v_max`."""
-        return extreme(self, CONTACT_FORCE, -1)
+        return extreme(self, force_of(self.problem), -1)
 
     n_vertical_max, n_vertical_min = load_extreme("vertical", 1), load_extreme("vertical", -1)
     n_lateral_max, n_lateral_min = load_extreme("lateral", 1), load_extreme("lateral", -1)
@@ -612,8 +617,8 @@ class Motion(ABC):
         return exceedance(self, load, levels, side, limits)
 
     @locked
-    def cars(self, t: Any) -> Cars:
-        """Where the cars of a train are, and the contact and coupling forces of each.
+    def cars(self, t: Any) -> Cars | CarsOfRiders:
+        """Where the cars of a train are, what forces act on each, and on banked tracks what riders feel.
 
         Parameters
         ----------
@@ -622,7 +627,7 @@ class Motion(ABC):
 
         Returns
         -------
-        Cars
+        Cars, or CarsOfRiders on a banked track
             Arrays whose first axis is the cars, or the couplings between them.
 
         Raises
@@ -814,7 +819,7 @@ class Motion(ABC):
 
     def _contact_changes(self, timed: TimedSegment) -> list[tuple[Pair, float]]:
         """The times at which N changes sign on a timed segment, each with its phase angle."""
-        return crossings(timed, contact_changes(timed), self._course.time_scale_error)
+        return crossings(timed, contact_changes(self.problem.formulas, timed), self._course.time_scale_error)
 
     def _asymptote(self, timed: TimedSegment) -> Event:
         """The approach to an equilibrium, which the body reaches after infinite time."""
