@@ -30,9 +30,9 @@ def page(results: list[Result], start: tuple[float, float]) -> str:
     lines = [
         "# Benchmarks",
         "",
-        "Written by `make bench`. Each error is the largest of some hundred cases, compared with closed forms of 40",
-        f"digits. Times are medians on {platform.machine()} with Python {platform.python_version()};",
-        "only their ratios are meaningful.",
+        "`make bench` writes this page. Each error is the largest of some hundred cases, compared with closed forms of",
+        "40 digits. The last column is the time relative to that of the first row with the same work. Times are",
+        f"medians on {platform.machine()} with Python {platform.python_version()}; only their ratios are meaningful.",
         "",
         "| work | method | time | error | time relative to ours |",
         "|---|---|---|---|---|",

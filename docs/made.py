@@ -4,6 +4,8 @@
 """
 
 import argparse
+import json
+import re
 import shutil
 from collections.abc import Iterator
 from pathlib import Path
@@ -105,41 +107,89 @@ def curve_files() -> Iterator[str]:
     """Yield the tables of the keys of curve files, sweep files and fit files, from their schemas."""
     yield from ("# Curve files, sweep files and fit files (YAML)", "")
     yield "`gqm schema`, `gqm schema --sweep` and `gqm schema --fit` print these keys as JSON Schema (draft 7), and"
-    yield "`gqm-gen --init NAME` writes a commented file to start from. Numbers are read as text and are exact."
+    yield "`gqm-gen --init NAME` writes a commented file to start from. Numbers are read as text and are exact. A"
+    yield "number may be written with its unit, as in `50 cm`. Each mapping is described where a key first needs it."
     yield ""
-    yield from _file("A curve file", json_schema())
-    yield from _file("A sweep file", sweep_schema())
-    yield from _file("A fit file", fit_schema())
+    described: set[str] = set()
+    for title, schema in (
+        ("A curve file", json_schema()),
+        ("A sweep file", sweep_schema()),
+        ("A fit file", fit_schema()),
+    ):
+        yield from _file(title, schema, described)
 
 
-def _file(title: str, schema: dict[str, Any]) -> Iterator[str]:
-    definitions = schema["definitions"]
-    yield from _keys(title, schema, definitions)
-    for name, definition in definitions.items():
-        # A parameter may also be written in a short form; the long form is described.
-        forms = [form for form in definition.get("anyOf", [definition]) if "properties" in form]
-        for form in forms:
-            yield from _keys(name.replace("_", ": ", 1).replace("_", " "), form, definitions)
+def _file(title: str, schema: dict[str, Any], described: set[str]) -> Iterator[str]:
+    """Yield the tables of a file: that of the whole, then each mapping where a table first refers to it."""
+    definitions = schema.pop("definitions")
+    yield from _keys(f"## {title}", schema)
+    names = list(_referred(schema, definitions))
+    for name in names:
+        kind = name.partition("_")[0].removesuffix("Section")
+        if kind in described:
+            continue
+        described.add(kind)
+        members = {other.partition("_")[2]: definitions[other] for other in names if other.startswith(f"{kind}_")}
+        if members:
+            yield from _variants(kind, definitions.get(f"{kind}Section", {}).get("description", ""), members)
+        else:
+            yield from _keys(f"### {kind}", _long(definitions[name]))
 
 
-def _keys(title: str, schema: dict[str, Any], definitions: dict[str, Any]) -> Iterator[str]:
-    yield from (
-        f"## {title}",
-        "",
-        _cell(schema.get("description", "")),
-        "",
-        "| key | meaning | example |",
-        "|---|---|---|",
-    )
+def _referred(schema: Any, definitions: dict[str, Any]) -> Iterator[str]:
+    """Yield the names of the definitions that a schema refers to, each followed by those that it refers to itself."""
+    for name in re.findall(r'"#/definitions/(\w+)"', json.dumps(schema)):
+        yield name
+        yield from _referred(definitions[name], definitions)
+
+
+def _long(definition: dict[str, Any]) -> dict[str, Any]:
+    """Return the long form of a definition: a number may also be written in a short one."""
+    return next(form for form in definition.get("anyOf", [definition]) if "properties" in form)
+
+
+def _keys(heading: str, schema: dict[str, Any]) -> Iterator[str]:
+    """Yield the table of the keys of one mapping."""
+    yield from (heading, "", _cell(schema.get("description", "")), "", "| key | meaning | example |", "|---|---|---|")
     required = schema.get("required", [])
     for key, entry in schema["properties"].items():
-        example = entry.get("examples", [entry.get("default", "")])[0]
-        needed = " (required)" if key in required else ""
-        shown = f"`{_flow(example)}`" if example else ""
-        meant = definitions.get(entry.get("$ref", "").rpartition("/")[2], {})
-        meaning = entry.get("description", meant.get("description", ""))
-        yield f"| `{key}`{needed} | {_cell(meaning)} | {shown} |"
+        yield f"| {_key(key, required)} | {_cell(entry.get('description', ''))} | {_example(entry)} |"
     yield ""
+
+
+def _variants(kind: str, text: str, members: dict[str, dict[str, Any]]) -> Iterator[str]:
+    """Yield one table of all families or forces, and below it one of the keys that most of them share."""
+    yield from (f"### {kind}", "", *([_cell(text), ""] if text else []))
+    yield from ("| name | key | meaning | example |", "|---|---|---|---|")
+    shared = {
+        key: entry
+        for member in members.values()
+        for key, entry in member["properties"].items()
+        if key != "name" and sum(other["properties"].get(key) == entry for other in members.values()) > len(members) / 2
+    }
+    for name, member in members.items():
+        shown = f"`{name}`: {_cell(member['description'])}"
+        for key, entry in member["properties"].items():
+            if key != "name" and key not in shared:
+                meaning = _cell(entry.get("description", ""))
+                yield f"| {shown} | {_key(key, member.get('required', []))} | {meaning} | {_example(entry)} |"
+                shown = ""
+    if shared:
+        yield from ("", "These keys are shared:", "", "| key | meaning | example |", "|---|---|---|")
+    for key, entry in shared.items():
+        lacking = [f"`{name}`" for name, member in members.items() if key not in member["properties"]]
+        exceptions = f"; not of {' and '.join(lacking)}" if lacking else ""
+        yield f"| `{key}` | {_cell(entry['description'])}{exceptions} | {_example(entry)} |"
+    yield ""
+
+
+def _key(key: str, required: list[str]) -> str:
+    return f"`{key}` (required)" if key in required else f"`{key}`"
+
+
+def _example(entry: dict[str, Any]) -> str:
+    example = entry.get("examples", [entry.get("default", "")])[0]
+    return f"`{_flow(example)}`" if example else ""
 
 
 def _flow(value: Any) -> str:

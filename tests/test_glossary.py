@@ -35,7 +35,7 @@ def defined() -> list[str]:
 def members(owner: type) -> Iterator[str]:
     """Yield the public names of a class with its name before them."""
     inherited = set(dir(tuple))
-    fields = getattr(owner, "__annotations__", {})
+    fields = {name for part in owner.__mro__ for name in vars(part).get("__annotations__", {})}
     for name in {*dir(owner), *fields}:
         if not name.startswith("_") and (name not in inherited or name in fields):
             yield f"{owner.__name__}.{name}"
@@ -96,15 +96,54 @@ def test_the_made_pages_are_current(monkeypatch: pytest.MonkeyPatch) -> None:
         assert (REFERENCE / f"{name}.md").read_text(encoding="utf-8") == text, name
 
 
+def anchors(page: Path) -> set[str]:
+    """Return the anchors of a page's headings, as hosting sites and the built site make them."""
+    text = re.sub(r"^```.*?^```$", "", page.read_text(encoding="utf-8"), flags=re.MULTILINE | re.DOTALL)
+    headings = re.findall(r"^#+ (.*)$", text, flags=re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
+
+
 def test_links_are_words_and_lead_to_files() -> None:
-    """Pages are read as files too: each link has a text, and what it leads to is in the repository."""
+    """Pages are read as files too: each link has a text, and leads to a file of the repository and a heading in it."""
     wrong = []
     for page in (DOCS.parent / "README.md", *DOCS.rglob("*.md")):
         if {"made", "_build"} & set(page.relative_to(DOCS.parent).parts):
             continue
         text = re.sub(r"^```.*?^```$", "", page.read_text(encoding="utf-8"), flags=re.MULTILINE | re.DOTALL)
         for words, target in re.findall(r"(?<!\\)\[([^\]\n]*)\]\(([^)\s]+)\)", text):
-            path = target.partition("#")[0]
-            if not words or (path and "://" not in path and not (page.parent / path).exists()):
+            if "://" in target:
+                continue
+            path, _, anchor = target.partition("#")
+            file = page.parent / path if path else page
+            if not words or not file.exists() or (anchor and anchor not in anchors(file)):
                 wrong.append(f"{page.name}: [{words}]({target})")
     assert wrong == []
+
+
+def words() -> list[str]:
+    """List the words that the glossary defines, without their plurals and abbreviations."""
+    text = (REFERENCE / "glossary.md").read_text(encoding="utf-8").partition("## Words")[2]
+    return [line.split("|")[1].strip() for line in text.splitlines()[4:]]
+
+
+def test_words_are_in_order() -> None:
+    """A reader finds a word in alphabetical order."""
+    assert words() == sorted(words(), key=str.lower)
+
+
+# What ARCHITECTURE.md presupposes. A word that is no longer used there leaves this list.
+TERMS = """arithmetic-geometric mean, axis of symmetry, batch, body, chart, divided difference, double-double,
+effective potential, emission, facade, Fourier series, Gauss-Legendre rule, gradient, hilltop, integrating factor,
+interface, interval bounds, lane, launch, leg, lowering, multiprecision, Newton's method, node, normal, orbit, panel,
+phase angle, piece, quadrature, record, room, run-time parameter, segment, separatrix, shared subexpression, stage,
+substitution, table, tape, tier, trapezoidal rule, turning point, variational equation, vector register,
+vocabulary"""
+
+
+@pytest.mark.parametrize("term", [term.strip() for term in " ".join(TERMS.split()).split(",")])
+def test_the_words_of_the_architecture(term: str) -> None:
+    """Each is used there and defined here."""
+    architecture = " ".join((DOCS.parent / "ARCHITECTURE.md").read_text(encoding="utf-8").split())
+    used = re.compile(re.sub(r"rule$", "rules?", re.escape(term)).replace("mean", "means?"), re.IGNORECASE)
+    assert used.search(architecture)
+    assert term in words()

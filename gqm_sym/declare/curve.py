@@ -1,27 +1,24 @@
-"""A curve as it was declared: coordinates, parameter, domain and run-time parameters."""
+"""Curves, and the ways to declare one: by formulas, by an equation, by points or by pieces."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, TypeAlias, TypedDict, Unpack
+from typing import TYPE_CHECKING, Any, TypedDict, Unpack
 
 import sympy as sp
 
-from gqm_sym.arguments import checked, names, one_line, short, unknown_argument
-from gqm_sym.declare.banking import OF_PIECES, Banking, read_banking
-from gqm_sym.declare.closing import check_period, found_period
-from gqm_sym.declare.ends import Ends, check_ends, check_order, read_ends
-from gqm_sym.declare.measures import parameter_dimension, told, units_of
-from gqm_sym.dimensions import unit_of
+from gqm_sym.arguments import checked, unknown_argument
+from gqm_sym.declare.banking import OF_PIECES, read_banking
+from gqm_sym.declare.declaration import Declaration, Source, declare, parameter_symbol
+from gqm_sym.declare.ends import read_ends
+from gqm_sym.declare.measures import told
 from gqm_sym.errors import ArgumentError, DeclarationError
-from gqm_sym.expressions import check_name, read_expression
-from gqm_sym.parameters import Parameters, Value, check_measured, names_in_order, read_parameters
+from gqm_sym.expressions import read_expression
+from gqm_sym.parameters import Parameters
 from gqm_sym.sympy_charts import SPACE, chart_x, chart_z, space_roll
 
 if TYPE_CHECKING:
     from gqm_sym.declare.piecewise import Piece
     from gqm_sym.smoothing import Smoothing
-
-Source: TypeAlias = str | int | sp.Expr
 
 
 class SpaceOptions(TypedDict, total=False):
@@ -34,7 +31,7 @@ class SpaceOptions(TypedDict, total=False):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Curve:
+class Curve(Declaration):
     """A curve ``(x(λ), z(λ))``, or ``(x(λ), y(λ), z(λ))``, z upwards; made by one of the constructors below.
 
     Attributes
@@ -64,69 +61,13 @@ class Curve:
         Of a space curve how it is banked; None where that is not declared.
     """
 
-    kind: str
-    x: sp.Expr
-    z: sp.Expr
-    parameter: sp.Symbol
-    domain: Ends = (None, None)
-    period: sp.Expr | None = None
-    defaults: tuple[tuple[str, Value | None], ...] = ()
-    title: str = ""
-    positive: tuple[str, ...] = ()
-    radius: sp.Expr | None = None
-    definition: object = None
-    y: sp.Expr = sp.S.Zero
-    banking: Banking | None = None
-
-    def __post_init__(self) -> None:
-        if not any(self.parameter in form.free_symbols for form in self.point):
-            told = ", ".join(f"{name} = {form}" for name, form in self.coordinates)
-            raise DeclarationError(
-                f"{self.kind} curve: {'no' if self.in_space else 'neither'} coordinate depends on the parameter "
-                f"{self.parameter.name!r}; {told} is a point, not a curve"
-            )
-        one_line(self.title, where=f"{self.kind} curve: title")
-        check_ends(self.kind, self.domain, self.period, self.parameter)
-        check_order(self.kind, self.domain, self.period, dict(self.defaults))
-        if self.period is not None:
-            check_period(self.kind, self.point, self.parameter, self.period, dict(self.defaults))
-
-    @property
-    def parameters(self) -> tuple[str, ...]:
-        """Names of the run-time parameters, in order."""
-        return tuple(name for name, _ in self.defaults)
-
-    @property
-    def in_space(self) -> bool:
-        """Whether it has three coordinates."""
-        return self.kind == "space" or getattr(self.definition, "in_space", False)
-
-    @property
-    def coordinates(self) -> tuple[tuple[str, sp.Expr], ...]:
-        """The coordinates by name: x and z, or x, y and z."""
-        return self.named(self.x, self.y, self.z)
-
-    def named(self, x: sp.Expr, y: sp.Expr, z: sp.Expr) -> tuple[tuple[str, sp.Expr], ...]:
-        """Forms that belong to the coordinates by the names of these: of a planar curve those of x and z."""
-        return (("x", x), *((("y", y),) if self.in_space else ()), ("z", z))
-
-    @property
-    def point(self) -> tuple[sp.Expr, ...]:
-        """The coordinates without their names."""
-        return tuple(form for _, form in self.coordinates)
-
-    @property
-    def charted(self) -> bool:
-        """Whether the parameter is arc length, and the coordinates are known by numbers only."""
-        return self.definition is not None
-
     def in_arc_length(self) -> "Curve":
         """Return the same curve with arc length from its beginning as its parameter.
 
         Raises
         ------
         DeclarationError
-            If it has no beginning or no end.
+            If it has no beginning or no end, or its roll angle is a formula in its own parameter.
         """
         if self.charted:
             return self
@@ -134,8 +75,16 @@ class Curve:
         ends = (sp.S.Zero, self.period) if closed else self.domain
         if None in ends:
             raise DeclarationError(f"{self.kind} curve: has no end to measure arc length from; give it a domain")
-        whole = replace(self, domain=ends, period=None)
-        return Curve.piecewise([whole], closed=closed, parameters=dict(self.defaults), title=self.title)
+        banking = self.banking
+        if banking is not None and banking.angle is not None and self.parameter in banking.angle.free_symbols:
+            raise DeclarationError(
+                f"{self.kind} curve: roll: {banking.angle} is in {self.parameter}, and the track of a train has arc "
+                "length for its parameter; declare roll='coordinated', ('coordinated', speed) or an angle that is the "
+                "same everywhere, or give the track as points with roll angles"
+            )
+        whole = replace(self, domain=ends, period=None, banking=None)
+        made = Curve.piecewise([whole], closed=closed, parameters=dict(self.defaults), title=self.title)
+        return replace(made, banking=banking)
 
     def __str__(self) -> str:
         """A few lines for people: what it is, where it goes, and what its parameters are measured in."""
@@ -193,10 +142,10 @@ class Curve:
         >>> Curve.graph("a*x**2 + b*x", parameter="x").parameters
         ('a', 'b')
         """
-        symbol = _symbol(parameter, "graph")
+        symbol = parameter_symbol(parameter, "graph")
         height = read_expression(z, where="graph: z")
         forms = cls(kind="graph", x=symbol, z=height, parameter=symbol, title=title)
-        return _declare(forms, domain, parameters, positive)
+        return declare(forms, domain, parameters, positive)
 
     @classmethod
     @checked("Curve.parametric")
@@ -221,11 +170,11 @@ class Curve:
         >>> Curve.parametric(x="L*sin(u)", z="-L*cos(u)", parameter="u", period="2*pi").period
         2*pi
         """
-        symbol = _symbol(parameter, "parametric")
+        symbol = parameter_symbol(parameter, "parametric")
         first = read_expression(x, where="parametric: x")
         second = read_expression(z, where="parametric: z")
         forms = cls(kind="parametric", x=first, z=second, parameter=symbol, title=title)
-        return _declare(forms, domain, parameters, positive, period)
+        return declare(forms, domain, parameters, positive, period)
 
     @classmethod
     @checked("Curve.polar")
@@ -241,11 +190,11 @@ class Curve:
         positive: Iterable[str] = (),
     ) -> "Curve":
         """Declare ``r = r(θ)``, θ from the positive x axis; r may be negative."""
-        symbol = _symbol(parameter, "polar")
+        symbol = parameter_symbol(parameter, "polar")
         radius = read_expression(r, where="polar: r")
         x, z = radius * sp.cos(symbol), radius * sp.sin(symbol)
         forms = cls(kind="polar", x=x, z=z, parameter=symbol, title=title, radius=radius)
-        return _declare(forms, domain, parameters, positive, period)
+        return declare(forms, domain, parameters, positive, period)
 
     @classmethod
     @checked("Curve.space")
@@ -284,11 +233,11 @@ class Curve:
         ('R', 'c')
         """
         _refuse_others(more, "Curve.space", ("x", "y", "z", "parameter", "period", "domain"))
-        symbol, title = _symbol(parameter, "space"), more.get("title", "")
+        symbol, title = parameter_symbol(parameter, "space"), more.get("title", "")
         at = {name: read_expression(form, where=f"space: {name}") for name, form in (("x", x), ("y", y), ("z", z))}
         banking = read_banking(more.get("roll"), more.get("heartline", 0))
         forms = cls(kind="space", **at, parameter=symbol, title=title, banking=banking)
-        return _declare(forms, domain, more.get("parameters"), (), period)
+        return declare(forms, domain, more.get("parameters"), (), period)
 
     @classmethod
     @checked("Curve.implicit")
@@ -325,13 +274,13 @@ class Curve:
         """
         from gqm_sym.declare.implicit import check_domain, read_level
 
-        symbol = _symbol(parameter, "implicit")
+        symbol = parameter_symbol(parameter, "implicit")
         level = read_level(F, start=start, tangent=tangent, parameter=symbol.name)
         ends = read_ends(domain, "implicit", "m")
         check_domain(*ends)
         x, z = chart_x(symbol), chart_z(symbol)
         forms = cls(kind="implicit", x=x, z=z, parameter=symbol, title=title, definition=level)
-        return _declare(forms, ends, parameters, positive, names_of_level=level.names)
+        return declare(forms, ends, parameters, positive, names_of_level=level.names)
 
     @classmethod
     @checked("Curve.sampled")
@@ -406,7 +355,7 @@ class Curve:
         named = dict(zip("xyz", (head(s) for head in SPACE), strict=True))
         at = named if track.in_space else {"x": chart_x(s), "z": chart_z(s)}
         forms = cls(kind="sampled", **at, parameter=s, title=title, definition=track, banking=banking)
-        return _declare(forms, None, more.get("parameters"), ())
+        return declare(forms, None, more.get("parameters"), ())
 
     @classmethod
     @checked("Curve.piecewise")
@@ -480,50 +429,7 @@ class Curve:
         )
 
 
-def _symbol(name: str, kind: str) -> sp.Symbol:
-    return sp.Symbol(check_parameter_name(name, kind), real=True)
-
-
 def _refuse_others(given: Mapping[str, Any], called: str, known: tuple[str, ...]) -> None:
     """Refuse arguments that are not among the known ones, nor among `SpaceOptions`."""
     if strangers := given.keys() - SpaceOptions.__annotations__.keys():
         raise ArgumentError(unknown_argument(called, min(strangers), (*known, *SpaceOptions.__annotations__)))
-
-
-def check_parameter_name(name: str, kind: str) -> str:
-    """Return the name of a curve's own parameter, which alone may be called ``lam``."""
-    # "lam" is reserved because emitted functions call their argument so, and that is the curve's parameter.
-    own = isinstance(name, str) and name == "lam"
-    return name if own else check_name(name, where=f"{kind}: parameter")
-
-
-def _declare(
-    forms: Curve,
-    domain: Iterable[Source | None] | None,
-    parameters: Parameters | None,
-    positive: Iterable[str],
-    period: Source | None = None,
-    names_of_level: tuple[str, ...] = (),
-) -> Curve:
-    """The curve of these coordinates with its domain, its period and its run-time parameters, read and checked."""
-    kind, symbol = forms.kind, forms.parameter
-    unit = unit_of(parameter_dimension(forms)) or None
-    ends = read_ends(domain, kind, unit)
-    turn = None if period is None else read_expression(period, where=f"{kind}: period", unit=unit)
-    written = (*forms.point, *(forms.banking.forms if forms.banking else ()))
-    written = written if forms.radius is None else (forms.radius,)
-    given = tuple(end for end in (*ends, turn) if end is not None)
-    used = (*names_in_order(*written), *names_of_level, *names_in_order(*given))
-    found = tuple(name for name in dict.fromkeys(used) if name != symbol.name)
-    if forms.in_space and "y" in found:
-        raise DeclarationError("space curve: 'y' is a coordinate and cannot be a run-time parameter; rename it")
-    defaults = read_parameters(parameters, found=found, where=f"{kind} curve")
-    if turn is None and kind in ("parametric", "polar", "space") and ends == (None, None):
-        turn = found_period(forms.point, symbol)
-    promised = names(positive, where=f"{kind}: positive")
-    for name in promised:
-        if name not in found:
-            raise DeclarationError(f"{kind} curve: {short(name)} is promised to be positive but not used; remove it")
-    curve = replace(forms, domain=ends, period=turn, defaults=defaults, positive=promised)
-    check_measured(dict(defaults), units_of(curve), where=f"{kind} curve", final=False)
-    return curve

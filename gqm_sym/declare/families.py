@@ -11,7 +11,8 @@ from dataclasses import dataclass, replace
 import sympy as sp
 
 from gqm_sym.arguments import checked, flag, nearest, short, unknown_argument
-from gqm_sym.declare.curve import Curve, Source, check_parameter_name
+from gqm_sym.declare.curve import Curve
+from gqm_sym.declare.declaration import Source, check_parameter_name
 from gqm_sym.errors import ArgumentError, DeclarationError
 from gqm_sym.expressions import read_expression
 from gqm_sym.parameters import Given, Parameters, Value, read_argument

@@ -1,4 +1,4 @@
-"""Force laws: each a small file that fills slots of one linear equation; they add with ``+``."""
+"""Force laws, one file for each. Every law fills in terms of one linear equation, and laws are added with ``+``."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -38,43 +38,43 @@ KERNELS: dict[str, KernelRow] = {
             name="rolling",
             make=Rolling,
             arguments=("beta", "radius", "mu_static"),
-            summary="rolling without slipping: inertia 1 + beta; with a radius the curve is the track",
+            summary="rolling without slipping: the inertia is 1 + beta; with a radius, the curve is the track",
         ),
         KernelRow(
             name="train",
             make=Train,
             arguments=("length", "cars", "mass"),
-            summary="mass spread evenly along the track: lam is the middle of the train",
+            summary="a train whose mass is spread evenly along the track; lam is its middle",
         ),
         KernelRow(
             name="coulomb",
             make=CoulombFriction,
             arguments=("mu", "mu_static"),
-            summary="friction mu*|N| of a body that slides, up to mu_static*|N| of one at rest",
+            summary="sliding friction mu*|N|, and static friction up to mu_static*|N|",
         ),
         KernelRow(
             name="drag",
             make=QuadraticDrag,
             arguments=("b",),
-            summary="drag b*V**2 against the motion",
+            summary="drag b*V**2 against the motion, in N",
         ),
         KernelRow(
             name="surface_tension",
             make=SurfaceTension,
             arguments=("gamma", "ell_c", "form"),
-            summary="resistance of a droplet: gamma*ell_c**2*|kappa|/m",
+            summary="resistance of a droplet, gamma*ell_c**2*|kappa|/m per unit mass",
         ),
         KernelRow(
             name="rotating_frame",
             make=RotatingFrame,
             arguments=("Omega",),
-            summary="the track turns about the z axis",
+            summary="a track that rotates about the z axis",
         ),
         KernelRow(
             name="potential",
             make=Potential,
             arguments=("U",),
-            summary="a potential energy per unit mass, in x and z",
+            summary="a potential energy per unit mass, as a function of x and z",
         ),
         KernelRow(
             name="central_force",
@@ -86,7 +86,7 @@ KERNELS: dict[str, KernelRow] = {
             name="law",
             make=Kernel.law,
             arguments=("A",),
-            summary="a tangential acceleration in the curve's parameter, x, z, W = V**2 and direction",
+            summary="a tangential acceleration, as a function of the curve's parameter, x, z, W = V**2 and direction",
         ),
     )
 }

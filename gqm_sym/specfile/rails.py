@@ -33,7 +33,7 @@ class Clothoid(Section):
 
 
 class Transition(Section):
-    """A piece in space, of which yaw, pitch and roll rates are polynomials in s, the distance from its beginning."""
+    """A piece in space whose yaw, pitch and roll rates are polynomials in s, the distance from its start."""
 
     length: Expression = Field(description="its length", examples=[10])
     yaw: Expression = Field(default="0", description="rate of turning left", examples=["s/(10*R)"])
@@ -66,7 +66,7 @@ class RailSchema(NamedTuple):
 
     @classmethod
     def over(cls, explicit: Mapping[str, tuple[Any, Callable[..., Curve], str]]) -> "RailSchema":
-        """Of the standard pieces, and of curves with formulas: model, declaration and summary of each."""
+        """Make the schema of rails from the standard pieces and from curves with formulas."""
         rows = STANDARD | {key: PieceRow(*row) for key, row in explicit.items()}
         sections: dict[str, Any] = {
             key: (row.model, Field(default=ABSENT, description=row.summary)) for key, row in rows.items()
@@ -74,36 +74,36 @@ class RailSchema(NamedTuple):
         piece: type[Section] = create_model(
             "Piece",
             __base__=Section,
-            __doc__="Exactly one piece.",
+            __doc__="One piece, in exactly one of these ways.",
             __config__=ConfigDict(json_schema_extra={"minProperties": 1, "maxProperties": 1}),
             **sections,
         )
         example = [{"line": {"length": 2}}, {"arc": {"radius": "R", "angle": "pi/2"}}]
         fields: dict[str, Any] = {
-            "pieces": (list[piece], Field(description="in order", examples=[example])),
+            "pieces": (list[piece], Field(description="the pieces in order", examples=[example])),
             "start": (
                 SpaceCentre,
-                Field(default=ABSENT, description="x and z of the start, in space x, y and z; zeros if not given"),
+                Field(default=ABSENT, description="x and z of the start, in space x, y and z; by default the origin"),
             ),
             "heading": (
                 Expression | Headings,
                 Field(
                     default=ABSENT,
-                    description="the angle of the tangent at the start, in space [heading, climb, roll]; else 0",
+                    description="angle of the tangent at the start, in space [heading, climb, roll]; by default 0",
                 ),
             ),
             "roll": (
                 Expression | Centre,
                 Field(
                     default=ABSENT,
-                    description="in space: 'pieces', the lean of the frame, or what space curves take, in s",
+                    description="in space: 'pieces' (the roll of the rail's frame), or as for space curves",
                     examples=["pieces"],
                 ),
             ),
-            "heartline": (Expression, Field(default=ABSENT, description="height of the riders' line over the track")),
+            "heartline": (Expression, Field(default=ABSENT, description="height of the riders' line above the track")),
             "closed": (Flag, Field(default=False, description="whether the end is joined to the start")),
         }
-        doc = "A rail of pieces joined end to start; the list of them alone will do."
+        doc = "A rail of pieces, each joined to the end of the one before. The list of pieces alone is enough."
         rail = create_model("Rail", __base__=Section, __doc__=doc, **fields)
         return cls(Annotated[rail, wrapped("pieces", list)], piece, rows)
 

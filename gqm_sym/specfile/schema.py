@@ -63,7 +63,7 @@ class Graph(Section):
 
 
 class Parametric(Section):
-    """Both coordinates in a parameter."""
+    """The coordinates x and z as functions of a parameter."""
 
     x: Expression = Field(description="horizontal coordinate", examples=["L*cos(theta)"])
     z: Expression = Field(description="height", examples=["L*sin(theta)"])
@@ -73,7 +73,7 @@ class Parametric(Section):
 
 
 class Space(Section):
-    """Three coordinates in a parameter; z is up."""
+    """The coordinates x, y and z as functions of a parameter; z is up."""
 
     x: Expression = Field(description="horizontal coordinate", examples=["R*cos(theta)"])
     y: Expression = Field(description="the other horizontal coordinate", examples=["R*sin(theta)"])
@@ -83,14 +83,14 @@ class Space(Section):
     domain: Ends | None = _DOMAIN
     roll: Expression | Centre | None = Field(
         default=ABSENT,
-        description="roll angle, 'coordinated' (no lateral force), or [coordinated, speed]",
+        description="roll angle; 'coordinated', without lateral force; or [coordinated, speed of no lateral force]",
         examples=["coordinated"],
     )
-    heartline: Expression | None = Field(default=ABSENT, description="height of the riders' line over the track")
+    heartline: Expression | None = Field(default=ABSENT, description="height of the riders' line above the track")
 
 
 class Polar(Section):
-    """r = r(theta), theta from the positive x axis."""
+    """The radius r as a function of the angle theta from the positive x axis."""
 
     r: Expression = Field(description="radius; may be negative", examples=["r0*exp(b*theta)"])
     parameter: CurveParameter = Field(default="theta", description="the curve's parameter")
@@ -99,17 +99,17 @@ class Polar(Section):
 
 
 _LEVEL: dict[str, Any] = {
-    "F": (Expression, Field(description="in x and z; the curve is where it vanishes", examples=["x**4 + z**4 - 1"])),
+    "F": (Expression, Field(description="a function of x and z that is 0 on the curve", examples=["x**4 + z**4 - 1"])),
     "start": (Centre, Field(description="x and z of the point where arc length is 0", examples=[[1, 0]])),
-    "tangent": (Tangent, Field(default=1, description="1: arc length grows along (-F_z, F_x); -1: the other way")),
+    "tangent": (Tangent, Field(default=1, description="1: arc length increases along (-F_z, F_x); -1: against it")),
 }
-_LEVEL_SUMMARY = "F(x, z) = 0, in arc length from a start point."
+_LEVEL_SUMMARY = "The curve F(x, z) = 0; its parameter is the arc length from a start point."
 Implicit: type[Section] = create_model(
     "Implicit",
     __base__=Section,
     __doc__=_LEVEL_SUMMARY,
     **_LEVEL,
-    parameter=(CurveParameter, Field(default="s", description="the curve's parameter, arc length")),
+    parameter=(CurveParameter, Field(default="s", description="name of the curve's parameter, which is arc length")),
     domain=(Ends | None, _DOMAIN),
 )
 
@@ -125,12 +125,12 @@ def _family_model(name: str, doc: str, own: dict[str, Any]) -> type[Section]:
 
 
 def _name_or_value(argument: str) -> tuple[Any, Any]:
-    what = f"another name for the parameter {argument}, or a value of it"
+    what = f"value of the parameter {argument}, or another name for it"
     return (Expression, Field(default=None, description=what))
 
 
 def _whole_number(name: str, value: int) -> tuple[Any, Any]:
-    return (Expression, Field(default=None, description=f"the whole number {name}; {value} if not given"))
+    return (Expression, Field(default=None, description=f"the whole number {name}; by default {value}"))
 
 
 FAMILY_MODELS: dict[str, type[Section]] = {
@@ -146,7 +146,10 @@ FAMILY_MODELS: dict[str, type[Section]] = {
             {
                 **{argument: _name_or_value(argument) for argument in row.arguments},
                 **{name: _whole_number(name, value) for name, value in row.whole},
-                "inverted": (Flag, Field(default=False, description="upside down: -z for z")),
+                "inverted": (
+                    Flag,
+                    Field(default=False, description="whether the curve is turned upside down (-z for z)"),
+                ),
             },
         )
         for row in FAMILIES.values()
@@ -186,38 +189,41 @@ _FAMILY: Any = Annotated[reduce(or_, FAMILY_MODELS.values()), Field(discriminato
 
 EXPLICIT: dict[str, CurveRow] = {
     "graph": CurveRow(Graph, _declare_graph, "the graph z = z(x)"),
-    "parametric": CurveRow(Parametric, lambda given: Curve.parametric(**given), "both coordinates in a parameter"),
-    "polar": CurveRow(Polar, _declare_polar, "r = r(theta)"),
+    "parametric": CurveRow(Parametric, lambda given: Curve.parametric(**given), "x and z as functions of a parameter"),
+    "polar": CurveRow(Polar, _declare_polar, "the radius r = r(theta)"),
     "family": CurveRow(_FAMILY, _declare_family, "a curve of a known family"),
 }
-EXPLICIT["space"] = CurveRow(Space, lambda given: Curve.space(**given), "three coordinates in a parameter")
+EXPLICIT["space"] = CurveRow(Space, lambda given: Curve.space(**given), "x, y and z as functions of a parameter")
 RAILS = RailSchema.over({key: (row.model, row.declare, row.summary) for key, row in EXPLICIT.items()})
 CURVES: dict[str, CurveRow] = {
     **EXPLICIT,
-    "implicit": CurveRow(Implicit, _declare_implicit, "F(x, z) = 0"),
+    "implicit": CurveRow(Implicit, _declare_implicit, "the curve F(x, z) = 0"),
     "points": CurveRow(POINTS, declare_track, "a track through the points of a file", reads_files=True),
     "pieces": CurveRow(RAILS.rail, RAILS.declare, "a rail of lines, arcs, clothoids and curves"),
 }
 
 # Arguments of kernels that are not a name or a value.
 _KERNEL_ARGUMENTS: dict[str, tuple[Any, Any]] = {
-    "U": (Expression, Field(description="potential energy per unit mass, in x and z, on space curves also in y")),
+    "U": (
+        Expression,
+        Field(description="the potential energy; on space curves also a function of y"),
+    ),
     "A": (
         Expression,
         Field(
-            description="acceleration in the curve's parameter, x, z, W = V**2, direction and parameters",
+            description="the acceleration; other symbols are run-time parameters",
             examples=["-direction*k*W"],
         ),
     ),
-    "cars": (Count, Field(default=1, description="how many equal cars it has")),
-    "mass": (Number, Field(default=None, description="of the whole train; that of the parameter m if not given")),
+    "cars": (Count, Field(default=1, description="number of cars, which are equal")),
+    "mass": (Number, Field(default=None, description="mass of the whole train; by default that of the parameter m")),
     "form": (
         Literal["resistance", "printed"],
-        Field(default="resistance", description="printed: gamma*ell_c*kappa/m as the paper has it"),
+        Field(default="resistance", description="printed: gamma*ell_c*kappa/m, as in the paper"),
     ),
     "centre": (
         SpaceCentre,
-        Field(default=None, description="its coordinates x and z, or x, y and z; (0, 0) if not given"),
+        Field(default=None, description="coordinates x and z, or x, y and z, of the centre; by default the origin"),
     ),
 }
 
@@ -240,14 +246,14 @@ class _OneEntry(Section):
 CurveSection: type[Section] = create_model(
     "CurveSection",
     __base__=_OneEntry,
-    __doc__="Exactly one way to give the curve.",
+    __doc__="The curve, in exactly one of these ways.",
     **_sections({key: (row.model, row.summary) for key, row in CURVES.items()}),
 )
 KERNEL_MODELS = {key: _kernel_model(row) for key, row in KERNELS.items()}
 KernelSection: type[Section] = create_model(
     "KernelSection",
     __base__=Section,
-    __doc__="The forces, one entry a term; gravity too is there only if named.",
+    __doc__="The forces, one entry for each. Gravity acts only if it is listed.",
     **_sections({key: (model, KERNELS[key].summary) for key, model in KERNEL_MODELS.items()}),
 )
 
@@ -257,10 +263,12 @@ def _read_if_given(value: object) -> object:
 
 
 class Quantity(Section):
-    """A number, in SI or in the unit that it names."""
+    """A number in SI units, or in the unit that is given with it."""
 
-    value: Number = Field(description="exactly as written", examples=["9.81", "2/5", "pi/2"])
-    unit: UnitText = Field(default="", description="converted to SI", examples=["m", "cm", "km/h", "deg"])
+    value: Number = Field(description="the number, exactly as written", examples=["9.81", "2/5", "pi/2"])
+    unit: UnitText = Field(
+        default="", description="its unit; the number is converted to SI", examples=["m", "cm", "km/h", "deg"]
+    )
 
     @classmethod
     def __get_pydantic_json_schema__(cls, core_schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
@@ -272,47 +280,50 @@ class Quantity(Section):
 
 
 class Parameter(Quantity):
-    """A run-time parameter: its default, and what people should know about it."""
+    """A run-time parameter with its default, its unit and a description."""
 
     value: Number | None = Field(  # type: ignore[assignment]
-        description="the default, exactly as written; null: to be given at run time",
+        description="the default, exactly as written; null if it must be given at run time",
         examples=["9.81", "2/5", "pi/2"],
     )
-    description: Line = Field(default="", description="for people")
+    description: Line = Field(default="", description="one line of text for readers")
 
 
 class Launch(Section):
-    """Where, how fast and which way the motion starts: at lam0, or at a point of a curve in arc length."""
+    """Place, speed and direction at the start of the motion. Only a curve in arc length may be launched at a point."""
 
     lam0: Annotated[Quantity, BeforeValidator(split_value)] = Field(
         default=ABSENT, description="the curve's parameter at launch", examples=["-pi/2 + 6/5"]
     )
-    point: Place = Field(default=ABSENT, description="x and z at launch, instead of lam0", examples=[[1, 0]])
+    point: Place = Field(default=ABSENT, description="x and z at launch, in place of lam0", examples=[[1, 0]])
     v0: Annotated[Quantity, BeforeValidator(split_value)] = Field(
         default="0", validate_default=True, description="speed, never negative", examples=["6.2088"]
     )
     direction: Direction = Field(default=1, description="the sign of ds/dt at launch")
     t_max: Annotated[Quantity | None, BeforeValidator(_read_if_given)] = Field(
-        default=None, description="how long to follow the motion"
+        default=None, description="time up to which the motion is followed, s"
     )
     contact: Literal["bilateral", "above", "below"] = Field(
         default="bilateral",
-        description="above: the body is left of growing parameter and can lift off; below: right",
+        description="side of the track on which the body runs. above: to the left of increasing parameter, where "
+        "it can lift off; below: to the right; bilateral: the track holds it on both sides",
     )
 
 
 class CurveFile(Section):
     """A curve, the forces on a body that moves along it, and a launch."""
 
-    name: Name = Field(description="of the generated module: a Python identifier", examples=["pendulum"])
-    title: Line = Field(default="", description="one line for people")
-    curve: CurveSection = Field(description="exactly one kind", examples=[{"graph": {"z": "x**3", "parameter": "x"}}])
+    name: Name = Field(description="name of the generated module, a Python identifier", examples=["pendulum"])
+    title: Line = Field(default="", description="one line of text for readers")
+    curve: CurveSection = Field(
+        description="the curve, in exactly one way", examples=[{"graph": {"z": "x**3", "parameter": "x"}}]
+    )
     kernel: KernelSection = Field(description="the forces", examples=[{"gravity": {}}])
     parameters: dict[ParameterName, Annotated[Parameter, BeforeValidator(split_value)]] = Field(
         default_factory=dict,
-        description="every free symbol: a number, {value, unit, description}, or null",
+        description="every free symbol, with a number, {value, unit, description} or null",
     )
-    launch: Launch = Field(default=ABSENT, description="needed to solve")
+    launch: Launch = Field(default=ABSENT, description="the start of the motion; needed to solve")
 
 
 def model_at(path: tuple[str, ...]) -> Any:

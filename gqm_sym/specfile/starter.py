@@ -1,4 +1,4 @@
-"""The file that ``gqm-gen --init`` writes: a first curve file, with what else could stand in it as comments."""
+"""The file that ``gqm-gen --init`` writes: a first curve file with other possible entries as comments."""
 
 from gqm_sym.expressions import check_module_name
 
@@ -13,48 +13,48 @@ _TEXT = """\
 # such files: write the schema by `gqm schema > curve.schema.json`.
 
 name: {name}
-title: Bead in a bowl # one line for people
+title: Bead in a bowl # one line of text for readers
 
-# Exactly one kind of curve; z points upwards.
+# The curve, in exactly one of these ways; z points upwards.
 curve:
   graph: {{z: x**2/a, parameter: x}}
   # parametric: {{x: a*cos(theta), z: a*sin(theta), parameter: theta, period: 2*pi}}
   # polar: {{r: a*theta, parameter: theta}}
-  # family: {{name: cycloid, R: a, inverted: true}} # gqm families lists them
+  # family: {{name: cycloid, R: a, inverted: true}} # `gqm families` lists them
 
-# The forces, which add. Gravity too acts only if it is named; gqm kernels lists them.
+# The forces, which are added. Gravity acts only if it is listed. `gqm kernels` lists all forces.
 kernel:
   gravity: {{}}
   # rotating_frame: {{Omega: 1/2}}
   # rolling: {{beta: 2/5}}
 
-# Every name in the expressions above: a number, or more about it. A unit is converted to SI; null
-# means that the value is given at run time. The mass m is 1 kg and g is 9.81 m/s**2 if not said otherwise.
+# Every other name in the expressions above, with a number or with value, unit and description. Values are
+# converted to SI; null means that the value is given at run time. By default m is 1 kg and g is 9.81 m/s**2.
 parameters:
   a: {{value: 140, unit: cm, description: size of the bowl}}
   m: {{value: 250, unit: g}}
 
-# Where the motion begins, for --solve and gqm plot.
+# The start of the motion, for --solve and gqm plot.
 launch:
   lam0: 0.8 # the curve's parameter
   v0: 0 # speed
-  # direction: -1 # against growing parameter
-  # t_max: {{value: 1, unit: min}} # follow the motion so long
-  # contact: above # the body lies on the track and may lift off
+  # direction: -1 # towards decreasing parameter
+  # t_max: {{value: 1, unit: min}} # time up to which the motion is followed
+  # contact: above # the body is on top of the track and can lift off
 """
 
 
 def starter(name: str) -> str:
-    """The text of a commented curve file that generates and solves.
+    """Return the text of a commented curve file, from which a module can be generated and solved.
 
     Parameters
     ----------
     name
-        Of the generated module: a Python identifier.
+        Name of the generated module, a Python identifier.
 
     Raises
     ------
     ExpressionError
-        If it may not be called so.
+        If the name is not allowed.
     """
     return _TEXT.format(name=check_module_name(name, where="name"))

@@ -31,13 +31,13 @@ _ROW = re.compile(r"row (\d+)")
 
 
 class Scatter(Section):
-    """How far measured points scatter: their standard deviation in metres or in the unit that it names, or auto."""
+    """The standard deviation of measured points, in metres or in the unit that is given with it, or auto."""
 
     value: ScatterText = Field(
-        description="the standard deviation of each coordinate; auto: found by cross-validation",
+        description="standard deviation of each coordinate; auto: it is found by cross-validation",
         examples=["0.01", "auto"],
     )
-    unit: UnitText = Field(default="", description="of length", examples=["mm", "cm"])
+    unit: UnitText = Field(default="", description="its unit of length", examples=["mm", "cm"])
 
     @classmethod
     def __get_pydantic_json_schema__(cls, core_schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
@@ -46,23 +46,29 @@ class Scatter(Section):
 
 
 class Points(Section):
-    """A track through the points of a CSV file with columns x, z, or x, y, z, or of a GPX file; its path will do."""
+    """A track through the points of a CSV file (columns x, z or x, y, z) or a GPX file. The path alone is enough."""
 
-    file: Line = Field(description="path from this file's folder on, inside it", examples=["track.csv"])
-    kind: Literal["spline", "linear"] = Field(default="spline", description="a quintic spline, or stitched planes")
-    closed: Flag = Field(default=False, description="whether the track closes; else if its last point is its first")
+    file: Line = Field(
+        description="path of the file, in the folder of the curve file or below it", examples=["track.csv"]
+    )
+    kind: Literal["spline", "linear"] = Field(
+        default="spline", description="spline: a quintic spline; linear: straight lines between the points"
+    )
+    closed: Flag = Field(
+        default=False, description="whether the track is closed; it also is if its last point equals its first"
+    )
     smoothing: Annotated[Scatter, BeforeValidator(split_value)] = Field(
         default=ABSENT,
-        description="for measured points: their standard deviation, or auto; else the track goes through them",
+        description="standard deviation of measured points, or auto; without it the track passes through the points",
         examples=["auto", {"value": 8, "unit": "mm"}],
     )
     roll: Expression | Centre | None = Field(
         default=ABSENT,
-        description="in space: roll angle by s, 'coordinated' (no lateral force), or [coordinated, speed]; else the "
-        "column roll",
+        description="in space: roll angle as a function of s, 'coordinated' (no lateral force), or [coordinated, "
+        "speed]; by default the column roll of the file",
         examples=["coordinated"],
     )
-    heartline: Expression | None = Field(default=ABSENT, description="height of the riders' line over the track")
+    heartline: Expression | None = Field(default=ABSENT, description="height of the riders' line above the track")
 
 
 POINTS: TypeAlias = Annotated[Points, wrapped("file", str)]

@@ -51,44 +51,46 @@ def _split_unknown(value: object) -> object:
 
 
 class Unknown(Section):
-    """What is known beforehand of a number that is to be found; a guess alone will do, or limits, or nothing."""
+    """First guess and limits of a number to be fitted. A guess alone, limits alone, or null are enough."""
 
     start: Number = Field(default=ABSENT, description="first guess", examples=["1.2"])
     low: Number = Field(default=ABSENT, description="lower limit", examples=["0"])
     high: Number = Field(default=ABSENT, description="upper limit", examples=["2"])
-    unit: UnitText = Field(default="", description="of these numbers, converted to SI", examples=["cm", "deg"])
+    unit: UnitText = Field(
+        default="", description="unit of these numbers, which are converted to SI", examples=["cm", "deg"]
+    )
 
 
 class FitFile(Section):
-    """Parameters and launch of a motion, to be found from measurements."""
+    """Parameters and launch of a motion that are fitted to measurements."""
 
-    title: Line = Field(default="", description="one line for people")
+    title: Line = Field(default="", description="one line of text for readers")
     curve: Line = Field(
-        description="the curve file: its path from this file's folder on, inside it", examples=["pendulum.yaml"]
+        description="path of the curve file, in the folder of this file or below it", examples=["pendulum.yaml"]
     )
     data: Annotated[Table, wrapped("file", str)] = Field(
-        description="measurements: t with lam, s, x, y, z or v; or period or half_period; or passages with place; and "
-        "their standard deviations, as sigma or sigma_x",
+        description="measurements with the columns t and lam, s, x, y, z or v; or period or half_period; or passages; "
+        "and their standard deviations in a column sigma, or sigma_x and the like",
         examples=[{"file": "swings.csv", "units": {"lam": "deg"}}],
     )
     free: Annotated[dict[Name, Annotated[Unknown, BeforeValidator(_split_unknown)]], Field(min_length=1)] = Field(
-        description="what is to be found: run-time parameters, lam0, v0; each with a first guess, [low, high], "
-        "[low, guess, high], or null for the value that the curve file has",
+        description="run-time parameters, lam0 and v0 to be fitted, each with a first guess, [low, high], "
+        "[low, guess, high], or null, which starts from the value in the curve file",
         examples=[{"L": "1.2", "mu": ["0", "0.1", "1"]}],
     )
     sigma: dict[Name, Annotated[Quantity, BeforeValidator(split_value)]] = Field(
         default_factory=dict, description="standard deviations of whole columns", examples=[{"x": "1 mm"}]
     )
     place: Annotated[Quantity, BeforeValidator(split_value)] = Field(
-        default=ABSENT, description="of all passages, a value of the curve parameter", examples=["0"]
+        default=ABSENT, description="place of all passages, a value of the curve parameter", examples=["0"]
     )
     fixed: dict[Name, Annotated[Quantity, BeforeValidator(split_value)]] = Field(
         default_factory=dict,
-        description="launch and parameters that are known, where the curve file has others",
+        description="known launch and parameters that replace those of the curve file",
         examples=[{"v0": "0"}],
     )
     contact: Literal["bilateral", "above", "below"] = Field(
-        default=ABSENT, description="which side of the track can push, where the curve file says otherwise"
+        default=ABSENT, description="side of the track on which the body runs, in place of that in the curve file"
     )
 
 

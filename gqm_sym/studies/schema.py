@@ -28,33 +28,39 @@ Name: TypeAlias = str
 
 
 class Axis(Section):
-    """The values that one thing takes: evenly from start to stop, both included, or a list; which alone will do."""
+    """The values of one axis: evenly spaced from start to stop, both included, or a list. The list alone is enough."""
 
     start: Number = Field(default=ABSENT, description="the first value", examples=["0.1"])
     stop: Number = Field(default=ABSENT, description="the last value", examples=["3"])
     num: Count = Field(default=ABSENT, description="how many values", examples=[300])
-    values: list[Number] = Field(default=ABSENT, description="instead of those: the values", examples=[[0.5, 1, 2]])
-    unit: UnitText = Field(default="", description="converted to SI", examples=["cm", "deg"])
+    values: list[Number] = Field(
+        default=ABSENT, description="the values themselves, in place of the keys above", examples=[[0.5, 1, 2]]
+    )
+    unit: UnitText = Field(
+        default="", description="unit of these numbers, which are converted to SI", examples=["cm", "deg"]
+    )
 
 
 class Table(Section):
-    """A CSV file whose first line names its columns; its path alone will do."""
+    """A CSV file whose first line names its columns. The path alone is enough."""
 
-    file: Line = Field(description="path from this file's folder on, inside it", examples=["launches.csv"])
+    file: Line = Field(
+        description="path of the file, in the folder of this file or below it", examples=["launches.csv"]
+    )
     units: dict[Name, UnitText] = Field(
-        default_factory=dict, description="units of columns, converted to SI", examples=[{"L": "cm"}]
+        default_factory=dict, description="units of columns, which are converted to SI", examples=[{"L": "cm"}]
     )
 
 
 class SweepFile(Section):
-    """Quantities of the motions that many launches on one curve begin."""
+    """Quantities to compute for many launches along one curve."""
 
-    title: Line = Field(default="", description="one line for people")
+    title: Line = Field(default="", description="one line of text for readers")
     curve: Line = Field(
-        description="the curve file: its path from this file's folder on, inside it", examples=["pendulum.yaml"]
+        description="path of the curve file, in the folder of this file or below it", examples=["pendulum.yaml"]
     )
     quantities: Annotated[list[Asked], Field(min_length=1)] = Field(
-        description="what is asked of each motion", examples=[["half_period", "v_max"]]
+        description="the quantities to compute for each launch", examples=[["half_period", "v_max"]]
     )
     grid: dict[Name, Annotated[Axis, wrapped("values", list)]] = Field(
         default=ABSENT,
@@ -62,15 +68,17 @@ class SweepFile(Section):
         examples=[{"lam0": {"start": "0.1", "stop": "3", "num": 300}}],
     )
     table: Annotated[Table, wrapped("file", str)] = Field(
-        default=ABSENT, description="instead of a grid: one point a row", examples=["launches.csv"]
+        default=ABSENT,
+        description="launches and parameters, one launch in each row, in place of a grid",
+        examples=["launches.csv"],
     )
     fixed: dict[Name, Annotated[Quantity, BeforeValidator(split_value)]] = Field(
         default_factory=dict,
-        description="launch, t_max and parameters that are the same at all points, where the curve file has others",
+        description="launch, t_max and parameters of all points that replace those of the curve file",
         examples=[{"v0": "1.5"}],
     )
     contact: Literal["bilateral", "above", "below"] = Field(
-        default=ABSENT, description="which side of the track can push, where the curve file says otherwise"
+        default=ABSENT, description="side of the track on which the body runs, in place of that in the curve file"
     )
 
 

@@ -253,7 +253,7 @@ def test_impossible_trains(circle: ModuleType, build: Build) -> None:
 
 def test_what_riders_feel_in_each_car(build: Build) -> None:
     """It is the acceleration of the places of the cars less gravity, along the rider's directions there."""
-    track = gqm.Curve.space(x="20*cos(u)", y="30*sin(u)", z="4*cos(2*u)", parameter="u", roll="u/9", domain=(0, 6))
+    track = gqm.Curve.space(x="20*cos(u)", y="30*sin(u)", z="4*cos(2*u)", parameter="u", roll="2/9", domain=(0, 6))
     module = build("train_with_riders", track, cars=5)
     motion = module.solve(40, 9, length=12)
     h, time = 2e-3, 2.0

@@ -107,7 +107,7 @@ def test_numbers_of_every_head(head: str, folder: Path, monkeypatch: pytest.Monk
     Corners and powers without a side are refused in a curve, but the printer can write them.
     """
     for check in ("check_corners", "check_powers"):
-        monkeypatch.setattr(f"gqm_sym.derivation.model.{check}", lambda *_, **__: None)
+        monkeypatch.setattr(f"gqm_sym.derivation.pipeline.{check}", lambda *_, **__: None)
     text = HEADS[head]
     values = {"k": 1.6875} if "k" in re.findall(r"\w+", text) else {}
     model = declared(text, **{name: str(value) for name, value in values.items()})

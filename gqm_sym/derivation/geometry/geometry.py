@@ -10,35 +10,37 @@ along the binormal, p × p'/|p|², whose components are those of dΘ/dλ for eac
 length is |κ| σ. A curve in a vertical plane is a planar curve of z and the distance along the plane.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import reduce
 
 import sympy as sp
 
 from gqm_sym.declare import Curve
-from gqm_sym.derivation.algebra.algebra import Algebra, Fraction, Polynomial
+from gqm_sym.derivation.algebra.algebra import Fraction
 from gqm_sym.derivation.algebra.differentiate import differentiate
-from gqm_sym.derivation.algebra.factors import factors
-from gqm_sym.derivation.algebra.generators import Angle, OverBudget
+from gqm_sym.derivation.algebra.generators import OverBudget
 from gqm_sym.derivation.algebra.normal_form import shortest
 from gqm_sym.derivation.algebra.rewrite import (
     Power,
     absorb_bars,
     direction,
-    is_safe,
-    known_sign,
     magnitudes,
     product,
-    spell_factors,
-    spell_product,
     spell_quotient,
     spell_ratio,
-    without_waves,
 )
 from gqm_sym.derivation.algebra.signs import Signs
-from gqm_sym.derivation.geometry.turning_angle import tangent_angle, turned
-from gqm_sym.errors import DeclarationError
+from gqm_sym.derivation.geometry.direction import (
+    Direction,
+    Root,
+    change_of,
+    direction_of,
+    inverse_of,
+    length_of,
+    primitive,
+    root_of_sum,
+)
+from gqm_sym.derivation.geometry.turning_angle import tangent_angle
 from gqm_sym.sympy_charts import AXES, SPACE_ROWS, chart_alpha, chart_kappa
 
 Heading = tuple[sp.Expr, sp.Expr]
@@ -133,7 +135,7 @@ def geometry(curve: Curve, *, may_be_positive: tuple[str, ...], heading: Heading
         Of a space curve: the vertical plane that it is in (`vertical_plane`); None for a shape in space.
     """
     if curve.charted:
-        return _charted_in_space(curve) if curve.in_space else _charted(curve)
+        return _charted(curve)
     if curve.in_space and heading is not None:
         # In the plane: the distance along it, which is a coordinate over the cosine or the sine, and the height.
         cosine, sine = heading
@@ -165,7 +167,7 @@ def vertical_plane(curve: Curve) -> Heading | None:
     if rates[0] == 0:
         return sp.S.Zero, sp.S.One
     try:
-        way = _primitive(curve, rates, sp.S.Zero)
+        way = primitive(curve, rates, sp.S.Zero)
     except OverBudget:
         return None
     u, v = (product(spell_ratio(way.algebra, part, way.algebra.one)) for part in way.parts)
@@ -179,147 +181,73 @@ def vertical_plane(curve: Curve) -> Heading | None:
 
 def _charted(curve: Curve) -> Geometry:
     """Read the shape from the chart: its parameter is arc length."""
-    s = curve.parameter
-    angle, kappa = chart_alpha(s), chart_kappa(s)
-    along, across = sp.cos(angle), sp.sin(angle)
-    return Geometry(
-        along=along,
-        across=across,
-        size=sp.S.One,
-        per_length=sp.S.One,
-        ds=sp.S.One,
-        dxds=along,
-        dzds=across,
-        kappa=kappa,
-        turning_rate=kappa,
-        angle=angle,
-        cusp=None,
-        positive=curve.positive,
-    )
-
-
-def _charted_in_space(curve: Curve) -> Geometry:
-    """Read the shape from the charts of three coordinates."""
-    first, second = ([SPACE_ROWS[axis][order](curve.parameter) for axis in AXES] for order in (1, 2))
-    kappa = sp.sqrt(sp.Add(*(part**2 for part in second)))
-    return Geometry(
-        along=first[0],
-        sideways=first[1],
-        across=first[2],
-        size=sp.S.One,
-        per_length=sp.S.One,
-        ds=sp.S.One,
-        dxds=first[0],
-        dyds=first[1],
-        dzds=first[2],
-        kappa=kappa,
-        turning_rate=kappa,
-        turning=cross(first, second),
-        angle=None,
-        cusp=None,
-        positive=curve.positive,
-        heading=None,
-    )
+    s, one = curve.parameter, sp.S.One
+    if curve.in_space:
+        first, second = ([SPACE_ROWS[axis][order](s) for axis in AXES] for order in (1, 2))
+        kappa = sp.sqrt(sp.Add(*(part**2 for part in second)))
+        return _undivided(first, one, kappa, positive=curve.positive, turning=cross(first, second))
+    angle = chart_alpha(s)
+    way = (sp.cos(angle), sp.S.Zero, sp.sin(angle))
+    return _undivided(way, one, chart_kappa(s), positive=curve.positive, angle=angle)
 
 
 def _plain(curve: Curve, signs: Signs, note: str) -> Geometry:
     """Write the definitions down as they are."""
     lam = curve.parameter
-    if curve.in_space:
-        return _plain_in_space(curve, signs, note)
-    dx, dz = differentiate(curve.x, lam), differentiate(curve.z, lam)
-    square = dx**2 + dz**2
-    ds = sp.sqrt(square)
-    rate = (dx * differentiate(dz, lam) - dz * differentiate(dx, lam)) / square
-    return Geometry(
-        along=dx,
-        across=dz,
-        size=sp.S.One,
-        per_length=1 / ds,
-        ds=ds,
-        dxds=dx / ds,
-        dzds=dz / ds,
-        kappa=rate / ds,
-        turning_rate=rate,
-        angle=sp.atan2(dz, dx),
-        cusp=None,
-        positive=signs.positive,
-        notes=(note,),
-    )
-
-
-def _plain_in_space(curve: Curve, signs: Signs, note: str) -> Geometry:
-    """The same for a space curve."""
-    lam = curve.parameter
-    first = [differentiate(form, lam) for form in curve.point]
+    first = [differentiate(form, lam) for form in (curve.x, curve.y, curve.z)]
     second = [differentiate(form, lam) for form in first]
     square = sp.Add(*(part**2 for part in first))
     ds = sp.sqrt(square)
-    turning = tuple(part / square for part in cross(first, second))
-    rate = sp.sqrt(sp.Add(*(part**2 for part in turning)))
+    if curve.in_space:
+        turning = tuple(part / square for part in cross(first, second))
+        rate = sp.sqrt(sp.Add(*(part**2 for part in turning)))
+        return _undivided(first, ds, rate, positive=signs.positive, notes=(note,), turning=turning)
+    rate = (first[0] * second[2] - first[2] * second[0]) / square
+    return _undivided(first, ds, rate, positive=signs.positive, notes=(note,), angle=sp.atan2(first[2], first[0]))
+
+
+def _undivided(
+    first: Sequence[sp.Expr],
+    ds: sp.Expr,
+    rate: sp.Expr,
+    *,
+    positive: tuple[str, ...],
+    notes: tuple[str, ...] = (),
+    angle: sp.Expr | None = None,
+    turning: tuple[sp.Expr, ...] = (),
+) -> Geometry:
+    """A shape of which the components of dr/dλ are not divided by anything, with σ and dΘ/dλ."""
+    along, sideways, across = first
     return Geometry(
-        along=first[0],
-        sideways=first[1],
-        across=first[2],
+        along=along,
+        sideways=sideways,
+        across=across,
         size=sp.S.One,
         per_length=1 / ds,
         ds=ds,
-        dxds=first[0] / ds,
-        dyds=first[1] / ds,
-        dzds=first[2] / ds,
+        dxds=along / ds,
+        dyds=sideways / ds,
+        dzds=across / ds,
         kappa=rate / ds,
         turning_rate=rate,
         turning=turning,
-        angle=None,
+        angle=angle,
         cusp=None,
-        positive=signs.positive,
-        notes=(note,),
-        heading=None,
+        positive=positive,
+        notes=notes,
+        heading=None if turning else AHEAD,
     )
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Direction:
-    """A vector that is common/below times its ``parts``, which have no common factors, in a frame turned by ``frame``.
-
-    ``square`` is the sum of the squares of the parts.
-    """
-
-    algebra: Algebra
-    frame: sp.Expr
-    parts: tuple[Polynomial, ...]
-    square: Polynomial
-    common: Polynomial
-    below: Polynomial
-
-    def scale(self, root: "_Root") -> list[Power]:
-        """What stands before the parts over the weight of the root."""
-        one = self.algebra.one
-        return spell_product(self.algebra, self.common, self.below if root.weight == one else one)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Root:
-    """The length of the parts of a direction over a weight, as factors.
-
-    ``square`` is what stands under the root if that is one piece, else None. ``weight`` is what the parts were divided
-    by: a denominator of r' that then is no part of H.
-    """
-
-    powers: list[Power]
-    square: sp.Expr | None
-    weight: Polynomial
 
 
 def _factored(curve: Curve, signs: Signs) -> Geometry:
     lam = curve.parameter
-    way = _direction(curve)
+    way = direction_of(curve)
     algebra = way.algebra
-    root = _root_of_sum(way, signs)
+    root = root_of_sum(way, signs)
     scale = way.scale(root)
     ds = [*magnitudes(signs, scale), *root.powers]
     rate = _turning_rate(way, root, (0, 1))
-    inverse = _inverse(root.powers)
+    inverse = inverse_of(root.powers)
     per_length = product([*direction(signs, scale), *inverse])
     along, across = _in_plane(way, root)
     turning_rate = product(rate)
@@ -331,7 +259,7 @@ def _factored(curve: Curve, signs: Signs) -> Geometry:
         ds=product(ds),
         dxds=absorb_bars(product([*along, (per_length, 1)])),
         dzds=absorb_bars(product([*across, (per_length, 1)])),
-        kappa=product([*rate, *_inverse(ds)]),
+        kappa=product([*rate, *inverse_of(ds)]),
         turning_rate=turning_rate,
         angle=turning_rate * lam
         if lam not in turning_rate.free_symbols
@@ -343,15 +271,15 @@ def _factored(curve: Curve, signs: Signs) -> Geometry:
 
 def _in_space(curve: Curve, signs: Signs) -> Geometry:
     lam = curve.parameter
-    way = _direction(curve)
-    algebra, root = way.algebra, _root_of_sum(way, signs)
+    way = direction_of(curve)
+    algebra, root = way.algebra, root_of_sum(way, signs)
     scale = way.scale(root)
     ds = [*magnitudes(signs, scale), *root.powers]
-    per_length = product([*direction(signs, scale), *_inverse(root.powers)])
+    per_length = product([*direction(signs, scale), *inverse_of(root.powers)])
     along, sideways, across = (product(spell_ratio(algebra, part, root.weight)) for part in way.parts)
     square = [(base, 2 * power) for base, power in root.powers]
     weight = product(spell_ratio(algebra, root.weight, algebra.one))
-    rate = [*_length([_change(way, pair) for pair in PAIRS], algebra, signs), *_inverse([*square, (weight, 2)])]
+    rate = [*length_of([change_of(way, pair) for pair in PAIRS], algebra, signs), *inverse_of([*square, (weight, 2)])]
     dxds, dyds, dzds = (absorb_bars(part * per_length) for part in (along, sideways, across))
     return Geometry(
         along=along,
@@ -363,7 +291,7 @@ def _in_space(curve: Curve, signs: Signs) -> Geometry:
         dxds=dxds,
         dyds=dyds,
         dzds=dzds,
-        kappa=product([*rate, *_inverse(ds)]),
+        kappa=product([*rate, *inverse_of(ds)]),
         turning_rate=product(rate),
         turning=tuple(product(_turning_rate(way, root, pair)) for pair in PAIRS),
         angle=None,
@@ -373,128 +301,10 @@ def _in_space(curve: Curve, signs: Signs) -> Geometry:
     )
 
 
-def _length(components: list[Fraction], algebra: Algebra, signs: Signs) -> list[Power]:
-    """The length of a vector with these components."""
-    if not any(component.top for component in components):
-        return [(sp.S.Zero, 1)]
-    vector = _without_common_factor(algebra, components, sp.S.Zero)
-    root = _root_of_sum(vector, signs)
-    return [*magnitudes(signs, vector.scale(root)), *root.powers]
-
-
-def _direction(curve: Curve) -> _Direction:
-    lam = curve.parameter
-    if curve.radius is not None:
-        return _primitive(curve, (differentiate(curve.radius, lam), curve.radius), lam)
-    return _primitive(curve, [differentiate(form, lam) for form in curve.point], sp.S.Zero)
-
-
-def _primitive(curve: Curve, components: Sequence[sp.Expr], frame: sp.Expr) -> _Direction:
-    """Some components, of which one is not zero, without their common factor."""
-    lam = curve.parameter
-    halved: frozenset[Angle] = frozenset()
-    while True:
-        algebra = Algebra((*components, sp.sin(frame)), lam, halved)
-        fractions = [algebra.fraction(component) for component in components]
-        if not any(fraction.top for fraction in fractions):
-            told = " and ".join(f"{name} = {form}" for name, form in curve.coordinates)
-            raise DeclarationError(f"{curve.kind} curve: {told} do not change with {lam.name}: a point, not a curve")
-        parts = [part for fraction in fractions for part in (fraction.top, fraction.bottom)]
-        uneven = algebra.uneven(parts) - halved
-        if not uneven:
-            break
-        halved |= uneven
-    return _without_common_factor(algebra, fractions, frame)
-
-
-def _without_common_factor(algebra: Algebra, fractions: Sequence[Fraction], frame: sp.Expr) -> _Direction:
-    """A vector of fractions, not all of them zero, as a direction."""
-    tops, below = [fractions[0].top], fractions[0].bottom
-    for fraction in fractions[1:]:
-        _, lacking, lacking_here = below.cofactors(fraction.bottom)
-        tops = [*(algebra.times(top, lacking_here) for top in tops), algebra.times(fraction.top, lacking)]
-        below = algebra.times(below, lacking_here)
-    tops = [algebra.normal(top) for top in tops]
-    common, first, second = tops[0].cofactors(tops[1])
-    parts = [first, second]
-    for top in tops[2:]:
-        common, shared, part = common.cofactors(top)
-        parts = [*(algebra.times(other, shared) for other in parts), part]
-    return _Direction(
-        algebra=algebra,
-        frame=frame,
-        parts=tuple(parts),
-        square=algebra.normal(reduce(lambda total, square: total + square, (algebra.times(p, p) for p in parts))),
-        common=common,
-        below=below,
-    )
-
-
-def _root_of_sum(way: _Direction, signs: Signs) -> _Root:
-    """Choose how to write the length of a vector of polynomials."""
-    algebra, one = way.algebra, way.algebra.one
-    content, found = factors(algebra, way.square)
-    number, written = spell_factors(algebra, found)
-    whole = magnitudes(signs, [(factor, power // 2) for factor, power in written if power > 1])
-    number *= content
-    odd = [factor for factor, power in written if power % 2]
-    if odd and number.is_negative:
-        # Both signs under one root: (a - x)*(a + x), not -(x - a)*(x + a).
-        number, odd[0] = -number, -odd[0]
-    known = [factor for factor in odd if known_sign(signs, factor) == 1]
-    unknown = sp.Mul(*(factor for factor in odd if factor not in known))
-    whole += [(sp.sqrt(part), 1) for part in (number, *known, unknown)]
-    if not odd:
-        return _Root(powers=whole, square=None, weight=one)
-    text = sp.count_ops(product(whole))
-    parts = way.parts
-    sums = [_sum_of_squares(algebra, parts, one)]
-    if len(parts) == 2:
-        # Components at 45 degrees may be simpler.
-        halves = (parts[0] + parts[1], parts[0] - parts[1])
-        sums.append(_sum_of_squares(algebra, [algebra.normal(half) for half in halves], one) / 2)
-    else:
-        # So may components in a frame that turns about the z axis: the one with the fewest terms is written out.
-        frames = [(along, across, parts[2]) for _, along, across in turned(algebra, parts[0], parts[1])]
-        frame = min(frames, key=lambda frame: sum(map(len, frame)), default=parts)
-        if sum(map(len, frame)) < sum(map(len, parts)):
-            sums.append(without_waves(_sum_of_squares(algebra, frame, one)))
-    kept = shortest(sums)
-    if all(is_safe(signs, factor) for factor in odd) and text <= sp.count_ops(sp.sqrt(kept)):
-        return _Root(powers=whole, square=None, weight=one)
-    for part in parts:
-        # A graph: 1 + (dz/dx)², which also overflows later than with its denominator cleared.
-        if way.below != one and algebra.reduced(Fraction(part, way.below)).top.is_ground:
-            square = _sum_of_squares(algebra, parts, way.below)
-            return _Root(powers=[(sp.sqrt(square), 1)], square=square, weight=way.below)
-    return _Root(powers=[(sp.sqrt(kept), 1)], square=kept, weight=one)
-
-
-def _sum_of_squares(algebra: Algebra, parts: Sequence[Polynomial], weight: Polynomial) -> sp.Expr:
-    return sp.Add(*(product(spell_ratio(algebra, part, weight)) ** 2 for part in parts))
-
-
-def _inverse(powers: Iterable[Power]) -> list[Power]:
-    return [(base, -power) for base, power in powers]
-
-
-def _change(way: _Direction, pair: tuple[int, int]) -> Fraction:
-    """Write u v' - v u' of two parts, and in a frame that turns what that adds."""
-    algebra, one = way.algebra, way.algebra.one
-    first, second = (way.parts[k] for k in pair)
-    change = algebra.add(
-        algebra.multiply(Fraction(first, one), algebra.derivative(second)),
-        algebra.multiply(Fraction(-second, one), algebra.derivative(first)),
-    )
-    if way.frame != 0:
-        change = algebra.add(change, Fraction(way.square, one))
-    return algebra.reduced(change)
-
-
-def _turning_rate(way: _Direction, root: _Root, pair: tuple[int, int]) -> list[Power]:
+def _turning_rate(way: Direction, root: Root, pair: tuple[int, int]) -> list[Power]:
     """Write dΘ/dλ = frame' + (u v' - v u')/(u² + v²), with the parts of a pair above."""
     algebra = way.algebra
-    change = _change(way, pair)
+    change = change_of(way, pair)
     rate = algebra.reduced(Fraction(change.top, algebra.times(change.bottom, way.square)))
     reduced = spell_quotient(algebra, rate.top, rate.bottom)
     if root.square is None or rate.bottom.is_ground or not rate.top:
@@ -503,11 +313,11 @@ def _turning_rate(way: _Direction, root: _Root, pair: tuple[int, int]) -> list[P
     weight = algebra.times(root.weight, root.weight)
     part = algebra.reduced(Fraction(change.top, algebra.times(change.bottom, weight)))
     shared = [*spell_quotient(algebra, part.top, part.bottom), (root.square, -1)]
-    texts = [product([*powers, *_inverse(root.powers)]) for powers in (shared, reduced)]
+    texts = [product([*powers, *inverse_of(root.powers)]) for powers in (shared, reduced)]
     return shared if shortest(texts) == texts[0] else reduced
 
 
-def _in_plane(way: _Direction, root: _Root) -> tuple[list[Power], list[Power]]:
+def _in_plane(way: Direction, root: Root) -> tuple[list[Power], list[Power]]:
     """Write the components of (u, v) along x and z."""
     algebra = way.algebra
     first, second = (spell_ratio(algebra, part, root.weight) for part in way.parts)

@@ -59,7 +59,7 @@ from gqm_sym.runtime.legs.body import (
     launched,
 )
 from gqm_sym.runtime.legs.frames.local_frame import PLACE as PLACE_IN_FRAME
-from gqm_sym.runtime.legs.frames.local_frame import SMALL_SHARE, Frame, frame_near, is_small, refined
+from gqm_sym.runtime.legs.frames.local_frame import SMALL_SHARE, Frame, frame_near, is_small, refined, sharpened
 from gqm_sym.runtime.legs.leg_errors import Errors, carry, rounding_share
 from gqm_sym.runtime.legs.leg_reading import place_at
 from gqm_sym.runtime.legs.leg_record import (
@@ -85,7 +85,8 @@ from gqm_sym.runtime.legs.variations.equation import Law
 from gqm_sym.runtime.motion.aperiodic import MotionAtRest
 from gqm_sym.runtime.motion.events import Leg, passages
 from gqm_sym.runtime.motion.locking import locked
-from gqm_sym.runtime.motion.motion import Motion, merged
+from gqm_sym.runtime.motion.motion import Motion
+from gqm_sym.runtime.motion.parts.history import merged
 from gqm_sym.runtime.motion.rows import Rows
 from gqm_sym.runtime.motion.sampler import (
     MIN_PLACES_PER_THREAD,
@@ -94,7 +95,7 @@ from gqm_sym.runtime.motion.sampler import (
     plain_time,
     plain_times,
 )
-from gqm_sym.runtime.motion.segment import Segment
+from gqm_sym.runtime.motion.segments.segment import Segment
 from gqm_sym.runtime.motion.state import State
 from gqm_sym.runtime.motion.trajectory import PhasePoints, TimedSegment, Trajectory
 from gqm_sym.runtime.multiprecision.exact_problem import NOWHERE
@@ -839,6 +840,8 @@ class DissipativeMotion(Motion):
         frame = frame_near(loss, problem.functions.p, (place, low, v2), reach)
         if frame is None or not (frame.is_stable or lam0):
             return
+        if isinstance(problem.formulas.exact, ExactLaw):
+            frame = sharpened(frame, Law(problem).at_rest)
         line[PLACE], line[PLACE_LOW] = frame.distance(place, low)
         self._force_error = 0.0 if frame.is_stable else frame.error / frame.reach
         unknown, exact = (LAST_DIGIT * abs(place) if frame.is_stable else frame.error), problem.formulas.exact

@@ -43,7 +43,8 @@ from gqm_sym.runtime.legs.leg_record import (
 from gqm_sym.runtime.legs.leg_run import ASYMPTOTE, PAUSED
 from gqm_sym.runtime.legs.polynomials import WIDE
 from gqm_sym.runtime.motion.events import Leg
-from gqm_sym.runtime.motion.segment import MAX_END_ROUNDINGS, MAX_SLOPES, Segment
+from gqm_sym.runtime.motion.segments.errors import MAX_END_ROUNDINGS, MAX_SLOPES
+from gqm_sym.runtime.motion.segments.segment import Segment
 from gqm_sym.runtime.motion.trajectory import TimedSegment
 from gqm_sym.runtime.quadrature.substitution import FROM_TURN, REGULAR, TO_EQUILIBRIUM
 from gqm_sym.runtime.quadrature.time_panels import CONVERGED

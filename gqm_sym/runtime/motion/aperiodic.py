@@ -17,12 +17,13 @@ from gqm_sym.runtime.launch.problem import Problem
 from gqm_sym.runtime.launch.request import ONLY_SIGN
 from gqm_sym.runtime.launch.speed import path_and_force_at
 from gqm_sym.runtime.launch.zeros import MAX_PARAMETER, MIN_STEP_SHARE
-from gqm_sym.runtime.motion.conditioning import v2_correction
 from gqm_sym.runtime.motion.events import Event, Leg, liftoff, sided_force
 from gqm_sym.runtime.motion.locking import locked
 from gqm_sym.runtime.motion.motion import Motion
 from gqm_sym.runtime.motion.rows import Rows
-from gqm_sym.runtime.motion.segment import Segment, through, toward_equilibrium
+from gqm_sym.runtime.motion.segments.conditioning import v2_correction
+from gqm_sym.runtime.motion.segments.kinds import through, toward_equilibrium
+from gqm_sym.runtime.motion.segments.segment import Segment
 from gqm_sym.runtime.motion.trajectory import PhasePoints, TimedSegment, Trajectory
 from gqm_sym.runtime.quadrature.time_panels import NEGLIGIBLE_SHARE
 

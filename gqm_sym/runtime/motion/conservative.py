@@ -29,7 +29,8 @@ from gqm_sym.runtime.launch.survey import survey
 from gqm_sym.runtime.motion.aperiodic import AperiodicMotion, MotionAtRest, OpenEnd
 from gqm_sym.runtime.motion.motion import Motion
 from gqm_sym.runtime.motion.periodic import PeriodicMotion
-from gqm_sym.runtime.motion.segment import Segment, between_turns, from_turn, through
+from gqm_sym.runtime.motion.segments.kinds import between_turns, from_turn, through
+from gqm_sym.runtime.motion.segments.segment import Segment
 from gqm_sym.runtime.multiprecision.exact_panels import DIGITS, lay_exactly
 from gqm_sym.runtime.quadrature.substitution import REGULAR
 from gqm_sym.runtime.quadrature.time_panels import MIN_CANCELLATION_RATIO

@@ -14,7 +14,7 @@ from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.launch.functions import BoundFunctions
 from gqm_sym.runtime.launch.rider import rider_loads
 from gqm_sym.runtime.launch.speed import length, path_and_force_at, path_in_space
-from gqm_sym.runtime.motion.segment import Segment
+from gqm_sym.runtime.motion.segments.segment import Segment
 from gqm_sym.runtime.motion.trajectory import TimedSegment, Trajectory
 from gqm_sym.runtime.quadrature.substitution import REGULAR, TO_EQUILIBRIUM
 

@@ -13,6 +13,7 @@ from gqm_sym.runtime.inversion import records
 from gqm_sym.runtime.inversion.fourier import fit_wave
 from gqm_sym.runtime.launch.problem import Problem
 from gqm_sym.runtime.motion.locking import Lock, locked
+from gqm_sym.runtime.motion.segments import errors
 from gqm_sym.runtime.motion.timing import Timing
 from gqm_sym.runtime.motion.trajectory import Repeated
 from gqm_sym.runtime.quadrature.substitution import TURN_TURN
@@ -125,8 +126,8 @@ class Sampler:
                 records.EDGES: panels[0],
                 records.LENGTHS: panels[2],
                 records.ARCS: panels[4],
-                records.TIME_ERRORS: segment.time_error(middles),
-                records.TABLE_ERRORS: segment.inversion_error(both_ends).reshape(2, -1).max(axis=0),
+                records.TIME_ERRORS: errors.time_error(segment, middles),
+                records.TABLE_ERRORS: errors.inversion_error(segment, both_ends).reshape(2, -1).max(axis=0),
                 records.OWNERS: owners.astype(np.int64),
             }
             self._state_record = records.record(self._sections)

@@ -16,7 +16,7 @@ from gqm_sym.runtime.charts.true_times import ChartPassage, pass_along
 from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.double_double.orbit_time import NO_TIMES, Bounded, Orbit, find_turning_points, time_orbit
 from gqm_sym.runtime.launch.problem import Problem
-from gqm_sym.runtime.motion.segment import Segment
+from gqm_sym.runtime.motion.segments.segment import Segment
 from gqm_sym.runtime.multiprecision.exact_panels import DIGITS, exact_ends
 from gqm_sym.runtime.multiprecision.exact_problem import MAX_SMOOTH_PANELS, NOWHERE, Arithmetic, two_doubles
 from gqm_sym.runtime.quadrature.substitution import REGULAR, TURN_TURN

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from gqm_sym.runtime.arithmetic.doubledouble import ZERO, Pair, minus, plus, reduce_many, two_sum
 from gqm_sym.runtime.compiled.types import Array
-from gqm_sym.runtime.motion.segment import Segment
+from gqm_sym.runtime.motion.segments.segment import Segment
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -13,7 +13,8 @@ from gqm_sym.runtime.launch.speed import Pass1
 from gqm_sym.runtime.motion.aperiodic import MotionAtRest
 from gqm_sym.runtime.motion.events import Event, Leg
 from gqm_sym.runtime.motion.extremes import grid_peaks
-from gqm_sym.runtime.motion.motion import Motion, State
+from gqm_sym.runtime.motion.motion import Motion
+from gqm_sym.runtime.motion.state import State
 from gqm_sym.runtime.sweep import quantities
 from gqm_sym.runtime.sweep.result import DESCRIBED
 

@@ -105,7 +105,7 @@ def vee(generated_folder: Any) -> ModuleType:
     """Two straight lines with a corner at the origin, which a user's formula may not have."""
     curve = gqm.Curve.graph("abs(x)", parameter="x")
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("gqm_sym.derivation.model.check_corners", lambda *_, **__: None)
+        patch.setattr("gqm_sym.derivation.pipeline.check_corners", lambda *_, **__: None)
         model = gqm.derive(curve, gqm.Gravity())
     return gqm.build(model, name="vee", folder=generated_folder)
 

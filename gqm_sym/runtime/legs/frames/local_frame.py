@@ -9,7 +9,7 @@ Swings about a stable equilibrium stay so near to it. From an unstable one a lau
 it was, and leaves the frame: there the distance at launch is taken in extended precision (`refined`).
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import cache
 from math import fabs
 from typing import Any, NamedTuple
@@ -19,7 +19,7 @@ from numba import carray, types
 from numpy.polynomial import chebyshev
 
 from gqm_sym.literals.numbers import Number
-from gqm_sym.runtime.arithmetic.doubledouble import ULP, add
+from gqm_sym.runtime.arithmetic.doubledouble import ULP, add, two_sum
 from gqm_sym.runtime.compiled.calls import call_speed_equation
 from gqm_sym.runtime.compiled.emitted import compiler
 from gqm_sym.runtime.compiled.jit import Inner, entry
@@ -213,6 +213,29 @@ def frame_near(dissipation: Dissipation, p: Array, start: tuple[float, float, fl
     functions = Dissipation(speed_equation.address, static_balance.address, False, False, dissipation.linear)
     head = [float(dissipation.speed_equation), middle, low, size, *terms]
     return Frame(functions, np.array([*head, *p]), noise / abs(steepness) + ULP * abs(middle))
+
+
+def sharpened(frame: Frame, at_rest: Callable[[Array, Array], tuple[Array, Array]]) -> Frame:
+    """The frame with equilibrium and force from double-double arithmetic: doubles know them to a rounding of e.
+
+    Parameters
+    ----------
+    frame : Frame
+        The frame as doubles know it.
+    at_rest : callable
+        The force on a body at rest, and its derivative by the place, at places that are given as two doubles each.
+    """
+    place, low, size = (float(frame.p[k]) for k in (PLACE, PLACE_LOW, RANGE))
+    force, slope = at_rest(np.array([place]), np.array([low]))
+    place, low = add(place, low, -float(force[0] / slope[0]), 0.0)  # Newton's method doubles the digits
+    distances = size * np.append(SHARES, 0.0)
+    high, rest = two_sum.py_func(np.full(NODES + 1, place), distances)
+    forces, slopes = at_rest(high, rest + low)
+    terms = chebyshev.cheb2poly(chebyshev.chebfit(SHARES, forces[:NODES] / distances[:NODES], DEGREE - 1))
+    terms[0] = slopes[NODES]
+    p = frame.p.copy()
+    p[PLACE], p[PLACE_LOW], p[TERMS:OWN] = place, low, terms
+    return frame._replace(p=p, error=ULP**2 * abs(place))
 
 
 def refined(frame: Frame, law: ExactLaw, parameters: Sequence[Number], lam0: Number) -> tuple[Frame, float] | None:

@@ -194,6 +194,15 @@ class Law:
         force, slope = self._values(force_program(self.exact, self.count), states, lows)
         return force[0], COARSER * force[2] + 0.5 * ULP * np.abs(places * slope[0])
 
+    def at_rest(self, high: Array, low: Array) -> tuple[Array, Array]:
+        """The force dW/dlam on a body at rest, without friction, and its derivative by the place.
+
+        Places are given as two doubles each.
+        """
+        ones = np.ones_like(high)
+        force, slope = self._values(force_program(self.exact, self.count), States(high, low, 0.0 * ones, ones, ones))
+        return force[0], slope[0]
+
     def cancels(self, place: float, heading: int) -> bool:
         """Whether terms of the force on a body at rest cancel so far there that their rounding passes for structure."""
         both = np.array([-1.0, 1.0])

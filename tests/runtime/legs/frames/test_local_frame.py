@@ -37,6 +37,8 @@ SHAPES: dict[str, tuple[Any, Any, str]] = {
         "1",
     ),
 }
+# Relative error of the times of turns; worst measured: 1.4e-15, of the viscous law.
+TURN_TIMES = 2e-15
 Pairs = Callable[[str, str], tuple[ModuleType, ModuleType]]
 
 
@@ -76,7 +78,7 @@ def test_a_swing_is_the_same_elsewhere(lam0: str, law: str, shape: str, pairs: P
             assert allowed <= 1e-12
             assert abs(motion.state(t).v - true.state(t).v) <= 4.0 * allowed
     begins = [[leg.t_start for leg in some.legs[:8]] for some in (true, motion)]
-    assert begins[0] == pytest.approx(begins[1], rel=1e-13, abs=2e-16 / abs(float(Fraction(lam0))))
+    assert begins[0] == pytest.approx(begins[1], rel=TURN_TIMES)
 
 
 @pytest.mark.parametrize("law", LAWS)

@@ -2,24 +2,22 @@
 
 from copy import copy
 from dataclasses import dataclass, field
-from math import exp, inf, log, pi
+from math import inf
 from typing import Any
 
 import numpy as np
 
 from gqm_sym.errors import SolutionError
-from gqm_sym.runtime.arithmetic.doubledouble import ULP, running_totals
+from gqm_sym.runtime.arithmetic.doubledouble import running_totals
 from gqm_sym.runtime.compiled.types import Array
-from gqm_sym.runtime.inversion.table import MAX_TIME_ERROR, build_table, phase_angles
+from gqm_sym.runtime.inversion.table import build_table, phase_angles
 from gqm_sym.runtime.launch.functions import BoundFunctions
-from gqm_sym.runtime.launch.speed import path_and_force_at, potential_at
-from gqm_sym.runtime.motion.conditioning import launch_condition_number, v2_correction
+from gqm_sym.runtime.motion.segments.conditioning import launch_condition_number, v2_correction
 from gqm_sym.runtime.multiprecision.exact_panels import DIGITS, exact_ends, lay_exactly
 from gqm_sym.runtime.quadrature.integrands import speeds_along, speeds_at
 from gqm_sym.runtime.quadrature.substitution import (
     FROM_TURN,
     REGULAR,
-    TO_EQUILIBRIUM,
     TURN_TURN,
     phase_angle_of,
     places_at,
@@ -39,21 +37,6 @@ from gqm_sym.runtime.quadrature.time_panels import (
 MIN_WIDTH_SHARE = 1.0 / 32.0
 MIN_TIMED_WIDTH_SHARE = 2.0**-10
 
-# The error of a turning point in doubles, in roundings of the width times the ratio of the largest Q to that there
-# (`Segment._end_errors`); 0.6 was the most that was measured.
-MAX_END_ROUNDINGS = 2.0
-
-# The error of the slope of the potential along a chart that no formulas improve, in roundings of the largest slope, and
-# in those times ds, which is small along the path of a centre (2.5 was measured); and the number of places of a closed
-# one at which that is looked for.
-CHART_ROUNDINGS, CENTRE_ROUNDINGS, AROUND = 8.0, 4.0, 16
-
-# The error of a place by the rounding of a chart, in roundings of the width of a motion, and of its coordinates.
-MAX_WIDTH_ROUNDINGS, MAX_SIZE_ROUNDINGS = 128.0, 4.0
-
-# The largest slope of lam(phi), in widths, by the kind of the segment; approaches to an equilibrium have none.
-MAX_SLOPES = (0.5, 2.0, 1.0)
-
 # The distance from a turning point, as a share of the width, within which offsets are computed from the exact one.
 NEAR_TURN = 1e-3
 
@@ -62,12 +45,6 @@ MAX_CORRECTION_SHARE = 2.0**-10
 
 # The rounding of a place that is given by text, as two doubles.
 MAX_TEXT_ROUNDING = 2.0**-105
-
-# The distance from an equilibrium up to which an approach to it is computed, near the least that doubles know.
-NEAREST = 1e-300
-
-# Phase angles of such an approach at which panels begin: near its start, panels must be short.
-APPROACH_MARKS = (8.0, 16.0, 32.0, 64.0, 128.0, 256.0)
 
 # The slope of the time by the phase angle, as a share of its largest, from which on it has enough digits for a speed.
 MIN_TIME_SLOPE = 1e-6
@@ -133,7 +110,7 @@ class Segment:
     _from_multiprecision: bool = False
     _condition_number: float = field(default=1.0, init=False)
     _edge_times: Any = field(default=None, repr=False)
-    _has_given_times: bool = field(default=False, repr=False)
+    has_given_times: bool = field(default=False, repr=False)
     _width_ratio: float | None = field(default=None, repr=False)
     _table: Any = field(default=None, repr=False)
 
@@ -201,17 +178,10 @@ class Segment:
         """The largest relative change of its times per relative change of the numbers that they depend on."""
         return self._with_panels()._condition_number
 
-    def with_turning_points(self, a: float, b: float, duration: float | None) -> "Segment":
-        """The same segment from one turning point to the other with other doubles for them, and its duration if known.
-
-        It is not that of the old doubles: near a separatrix a rounding of the ends is many of the duration.
-        """
-        return between_turns(self.functions, a, b, duration, is_lazy=self.stored_panels is None)
-
     def with_edge_times(self, edge_times: tuple[Array, Array]) -> "Segment":
         """The same segment with more accurate times at the edges of its panels."""
         other = copy(self._with_panels())
-        other._edge_times, other._table, other._has_given_times, other.known_duration = edge_times, None, True, None
+        other._edge_times, other._table, other.has_given_times, other.known_duration = edge_times, None, True, None
         return other
 
     @property
@@ -255,79 +225,6 @@ class Segment:
     def relative_error(self) -> float:
         """Estimated relative error of the duration by quadrature."""
         return float(self.panels[5])
-
-    def time_error(self, phi: Array) -> Array:
-        """Estimated error in s of its times at phase angles.
-
-        It is a share of the whole duration, or of the panel's where the times of its edges are exact.
-        """
-        error = self.relative_error + ULP + MAX_TIME_ERROR
-        if self.kind == TURN_TURN and self.balance > 0.0 and not self.from_multiprecision:
-            # Rounded ends change V**2 by more where cancellation leaves little of it.
-            error += 0.5 * ULP * max(abs(self.a), abs(self.b)) / (abs(self.width) * self.balance)
-        which, times = np.searchsorted(self.edges[1:-1], phi, side="right"), self.edge_times[0]
-        if self._has_given_times:
-            spans: Array = np.diff(times)[which]
-        elif (
-            self.kind == TO_EQUILIBRIUM or self.speed_series is not None
-        ):  # its end is arbitrary, or it grows from ``a``
-            spans = times[which + 1]
-        else:
-            spans = np.full_like(phi, self.duration)
-        return error * spans
-
-    def inversion_error(self, phi: Array) -> Array:
-        """Estimated error of places by the table at phase angles, in units of the curve parameter, with rounding."""
-        powers, of_intervals = self.table[3], self.table[6]
-        errors = of_intervals[np.searchsorted(powers[:-1].sum(axis=1), phi)]
-        width = abs(self.width)
-        if self.kind == TO_EQUILIBRIUM:
-            near_equilibrium: Array = width * np.exp(-phi) * (errors + 3.0 * ULP * np.maximum(phi, 1.0))
-            return near_equilibrium
-        bounded: Array = width * (MAX_SLOPES[self.kind] * errors + 3.0 * ULP)
-        if self.kind == REGULAR or self.from_multiprecision:
-            return bounded
-        at_a, at_b = self._end_errors()
-        share = phi**2 if self.kind == FROM_TURN else np.sin(0.5 * phi) ** 2
-        return bounded + at_a * (1.0 - share) + at_b * share
-
-    def _end_errors(self) -> tuple[float, float]:
-        """How far its turning points may be from the exact ones, in units of the curve parameter.
-
-        V**2 = (lam - a)*(b - lam)*Q is known to a rounding of its largest values, so that its zero at ``a`` is known
-        to as many roundings of the width as Q is smaller there than at its largest. Along a chart Q is rounded too.
-        """
-        if not self.balance > 0.0:
-            return 0.0, 0.0
-        error = MAX_END_ROUNDINGS * ULP * abs(self.width) / self.balance
-        f = self.functions
-        if self.kind == FROM_TURN:
-            return error, 0.0
-        # Q at the ends, but for a factor.
-        ends = np.array([self.a, self.b])
-        steepness, of_chart = np.abs(potential_at(f.addresses, f.p, ends)[1]), 0.0
-        errors = error * np.divide(steepness.min(), steepness, out=np.ones(2), where=steepness > 0.0)
-        if f.exact is None:
-            # Slopes of a chart that no formulas improve are known to a rounding of the largest. The path of a centre
-            # has roundings of the curve, which are larger by 1/ds.
-            around = np.array([*ends, *f.breaks, *np.linspace(0.0, f.period, AROUND)])
-            largest = np.abs(potential_at(f.addresses, f.p, around)[1]).max()
-            shortest = np.abs(path_and_force_at(f.addresses, f.p, around, np.zeros_like(around))[2]).min()
-            roundings = max(CHART_ROUNDINGS, CENTRE_ROUNDINGS / shortest) if shortest > 0.0 else inf
-            rounding = roundings * ULP * abs(self.width) * largest
-            errors = errors + np.divide(rounding, steepness, out=np.zeros(2), where=steepness > 0.0)
-        elif f.exact.edges.size:
-            size = float(np.hypot(*path_and_force_at(f.addresses, f.p, ends, np.zeros(2))[:2]).max())
-            of_chart = ULP * min(MAX_WIDTH_ROUNDINGS * abs(self.width), MAX_SIZE_ROUNDINGS * size)
-        at_a, at_b = (
-            of_chart if known is not None or self._is_launch_from_rest(place) else float(own) + of_chart
-            for place, known, own in zip((self.a, self.b), self.ends, errors, strict=True)
-        )
-        return at_a, at_b
-
-    def _is_launch_from_rest(self, place: float) -> bool:
-        exact = self.functions.exact
-        return exact is not None and place == exact.lam0.value and exact.v0.value == 0.0
 
     @property
     def balance(self) -> float:
@@ -468,60 +365,3 @@ class Segment:
             low, high = exact_ends(exact, DIGITS, self.kind, self.a, self.b, self.ends)
             self._width_ratio = float((high - low) / width)
         return self._width_ratio
-
-
-def toward_equilibrium(functions: BoundFunctions, start: float, equilibrium: float) -> Segment:
-    """A segment from ``start`` towards an equilibrium, as near to it as doubles can tell."""
-    stop = log(abs(start - equilibrium) / NEAREST)
-    marks = tuple(equilibrium + (start - equilibrium) * exp(-phi) for phi in APPROACH_MARKS)
-    return Segment(functions=functions, kind=TO_EQUILIBRIUM, a=start, b=equilibrium, stop=stop, panel_breaks=marks)
-
-
-def between_turns(
-    functions: BoundFunctions,
-    a: float,
-    b: float,
-    known_duration: float | None = None,
-    ends: tuple[Any, Any] = (None, None),
-    *,
-    is_lazy: bool = False,
-) -> Segment:
-    """A segment between two turning points."""
-    return Segment(
-        functions=functions,
-        kind=TURN_TURN,
-        a=a,
-        b=b,
-        stop=pi,
-        known_duration=known_duration,
-        is_lazy=is_lazy,
-        ends=ends,
-    )
-
-
-def from_turn(functions: BoundFunctions, turn: float, end: float) -> Segment:
-    """A segment from a turning point to a place where the speed is not zero."""
-    return Segment(functions=functions, kind=FROM_TURN, a=turn, b=end)
-
-
-def through(
-    functions: BoundFunctions,
-    start: float,
-    end: float,
-    ref: float,
-    ref_v2: float,
-    *,
-    known_duration: float | None = None,
-    panel_breaks: tuple[float, ...] = (),
-) -> Segment:
-    """A segment at both ends of which the speed is not zero; ``ref_v2`` is V**2 at ``ref``."""
-    return Segment(
-        functions=functions,
-        kind=REGULAR,
-        a=start,
-        b=end,
-        ref=ref,
-        ref_v2=ref_v2,
-        known_duration=known_duration,
-        panel_breaks=panel_breaks,
-    )

@@ -1,0 +1,155 @@
+"""Whether points lie along a track: in order, near enough to each other, and without much scatter."""
+
+import warnings
+from itertools import pairwise
+from math import atan2, dist, hypot, pi
+from statistics import median
+
+from gqm_sym.declare.points import IN_SPACE, Place
+from gqm_sym.errors import DeclarationError, NoisyPointsWarning
+
+# Points nearer to each other than this share of the track's size are the same point.
+SAME = 1e-12
+
+# A smooth track that turns by more than this from one chord to the next is out of order, or sampled too coarsely.
+SHARPEST = pi / 2
+
+# Planes that turn by more than this lead back along themselves.
+BACKWARDS = pi - 1e-6
+
+# A chord of a smooth track that is this many times as long as half of all chords jumps to another place.
+JUMP = 100.0
+
+# A chord of measured points that is this many times as long as they scatter tells the direction of the track.
+LONG = 8.0
+
+# Curvature that rises and falls by turns between more than this share of neighbours is scatter,
+RESTLESS = 0.5
+# if it changes loads by this many g where a body is as fast as after a fall from one side of the track to the other.
+FELT = 0.1
+
+# So many turns in a row, each to the other side and by more than this, are a zigzag that no smooth track goes through:
+# the lengths of the spline between such points never settle.
+ZIGZAGS, ZIGZAG = 5, pi / 9
+
+
+def extent(places: list[Place]) -> float:
+    """The longer side of the box around all points."""
+    if not places:
+        return 0.0
+    return float(max(max(axis) - min(axis) for axis in zip(*places, strict=True)))
+
+
+def check_survey(places: list[Place], rows: list[int], joined: bool, scatter: float) -> None:
+    """Refuse measured points that are far away from the rest, or out of order beyond what scatter explains."""
+    chords = _chords(places, joined)
+    usual = median(chords)
+    for count, chord in enumerate(chords, start=1):
+        _check_gap(chord, usual, rows[count - 1], rows[count % len(rows)])
+    around = [*places, *places[:2]] if joined else places
+    bends = [
+        dist([0.5 * (before + after) for before, after in zip(one, three, strict=True)], two)
+        for one, two, three in zip(around, around[1:], around[2:], strict=False)
+    ]
+    long = LONG * max(scatter, median(bends))
+    for count, (turn, pair) in enumerate(zip(_turns(places, joined), pairwise([*chords, chords[0]]), strict=False), 1):
+        if abs(turn) > SHARPEST and min(pair) > long:
+            _refuse_turn(turn, rows[count % len(rows)])
+
+
+def _check_gap(chord: float, usual: float, before: int, row: int) -> None:
+    if chord > JUMP * usual:
+        raise DeclarationError(
+            f"sampled: row {row}: is {chord:.3g} from row {before}, where half of all points are within "
+            f"{usual:.3g} of the next; leave out stray points, or sample the gap"
+        )
+
+
+def _chords(places: list[Place], joined: bool) -> list[float]:
+    around = [*places, places[0]] if joined else places
+    return [dist(one, two) for one, two in pairwise(around)]
+
+
+def _turns(places: list[Place], joined: bool) -> list[float]:
+    """By how much the track turns at each point between two others; in space it has no sign."""
+    around = [*places, *places[:2]] if joined else places
+    if len(places[0]) == IN_SPACE:
+        steps = [tuple(there - here for here, there in zip(*pair, strict=True)) for pair in pairwise(around)]
+        return [_angle(before, after) for before, after in pairwise(steps)]
+    angles = [atan2(two[1] - one[1], two[0] - one[0]) for one, two in pairwise(around)]
+    return [(after - before + pi) % (2.0 * pi) - pi for before, after in pairwise(angles)]
+
+
+def _angle(one: Place, two: Place) -> float:
+    """The angle between two vectors in space."""
+    crossed = [one[i] * two[j] - one[j] * two[i] for i, j in ((1, 2), (2, 0), (0, 1))]
+    return atan2(hypot(*crossed), sum(first * second for first, second in zip(one, two, strict=True)))
+
+
+def check_order(places: list[Place], size: float, kind: str, joined: bool) -> None:
+    """Refuse points that are repeated, out of order or far away from the rest."""
+    chords = _chords(places, joined)
+    usual = median(chords)
+    for count, chord in enumerate(chords, start=1):
+        if chord <= SAME * size:
+            row = count % len(places) + 1
+            raise DeclarationError(f"sampled: row {row}: repeats row {count}; leave one of them out")
+        if kind == "spline":
+            _check_gap(chord, usual, count, count % len(places) + 1)
+    most = SHARPEST if kind == "spline" else BACKWARDS
+    for count, turn in enumerate(_turns(places, joined), start=1):
+        if abs(turn) > most:
+            _refuse_turn(turn, count % len(places) + 1)
+    if kind == "spline":
+        _check_zigzag(_turns(places, joined))
+
+
+def _refuse_turn(turn: float, row: int) -> None:
+    raise DeclarationError(
+        f"sampled: row {row}: the track turns by {abs(turn) * 180.0 / pi:.0f} degrees there; are the points in order "
+        "along it, without a stray one, and close enough? (If they scatter farther than they are apart, give smoothing)"
+    )
+
+
+def warn_of_scatter(places: list[Place], joined: bool, remedy: str) -> None:
+    """Warn of a track whose curvature goes up and down from point to point, as that of the track does not.
+
+    Scatter of points at distances h is in the curvature over h**2. Where it is most of that, the sign changes between
+    most neighbours; that the sign of the curvature's changes does shows it earlier, and on a loop as well.
+    """
+    chords = _chords(places, joined)
+    if joined:
+        chords.append(chords[0])
+    bends = [
+        2.0 * turn / (before + after)
+        for turn, (before, after) in zip(_turns(places, joined), pairwise(chords), strict=True)
+    ]
+    steps = [after - before for before, after in pairwise(bends)]
+    swings = [abs(after - before) / 4.0 for before, after in pairwise(steps) if before * after < 0.0]
+    if len(swings) <= RESTLESS * (len(steps) - 1):
+        return
+    felt = 2.0 * extent(places) * median(swings)
+    if felt > FELT:
+        changes = sum(before * after < 0.0 for before, after in pairwise(bends))
+        warnings.warn(
+            f"sampled: the curvature goes up and down from point to point (its sign changes between {changes} of "
+            f"{len(bends) - 1} neighbours), and loads with it, by about {felt:.2g} g where a body is fast: the points "
+            f"scatter, or are too far apart; {remedy}",
+            NoisyPointsWarning,
+            stacklevel=5,
+        )
+
+
+def _check_zigzag(turns: list[float]) -> None:
+    """Refuse points between which a smooth track would swing to and fro."""
+    run = 0
+    for count, turn in enumerate(turns):
+        swings = run and turn * turns[count - 1] < 0.0
+        run = 0 if abs(turn) <= ZIGZAG else run + 1 if swings else 1
+        if run == ZIGZAGS:
+            first = count + 3 - ZIGZAGS
+            raise DeclarationError(
+                f"sampled: row {first}: the track turns to and fro there, {ZIGZAGS} times by more than "
+                f"{ZIGZAG * 180.0 / pi:.0f} degrees; no smooth track goes through a zigzag: give more points, points "
+                "without their noise (smoothing takes it out), or kind='linear' for planes"
+            )

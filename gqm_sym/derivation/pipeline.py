@@ -1,0 +1,247 @@
+"""The derivation of a model: from a declared curve and a force law to closed forms, stage by stage."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import sympy as sp
+
+from gqm_sym.arguments import checked, instance, one_line, short
+from gqm_sym.budgets import budget
+from gqm_sym.declare import Curve
+from gqm_sym.declare.closing import check_period
+from gqm_sym.declare.ends import check_order
+from gqm_sym.derivation.algebra.rewrite import check_real, without_poles
+from gqm_sym.derivation.algebra.signs import Signs
+from gqm_sym.derivation.corners import check_corners, check_powers, without_known_bars
+from gqm_sym.derivation.defaults import join
+from gqm_sym.derivation.forces.dissipation import (
+    CORIOLIS,
+    LOAD,
+    LOADS,
+    PUSH,
+    SIGMA,
+    TILT,
+    TURN,
+    TURNS,
+    UPRIGHT,
+    Dissipation,
+    dissipation,
+)
+from gqm_sym.derivation.forces.forces import Forces, Place, forces, is_planar, load_of_cars, of_train
+from gqm_sym.derivation.forces.rider import rider, upright_force
+from gqm_sym.derivation.forces.speed import LAM0, V0, SpeedField, conservative_speed, dissipative_speed
+from gqm_sym.derivation.geometry.geometry import AHEAD, Geometry, geometry, vertical_plane
+from gqm_sym.derivation.geometry.level_set import level_set
+from gqm_sym.derivation.geometry.offset_curve import beside
+from gqm_sym.derivation.model import Model, units_of
+from gqm_sym.derivation.reality import check_somewhere_real
+from gqm_sym.derivation.wells.symmetric_orbits import symmetric_orbits
+from gqm_sym.derivation.wells.symmetry import symmetry
+from gqm_sym.errors import ArgumentError, DeclarationError
+from gqm_sym.kernels.base import DIRECTION, KAPPA, MASS, Kernel, X, Y, Z
+from gqm_sym.parameters import Given, check_measured, is_positive
+
+LAM1 = sp.Symbol("lam1", real=True)
+LAM2 = sp.Symbol("lam2", real=True)
+
+
+@checked("derive")
+@budget("derivation", 60.0, "declare the curve and the forces by shorter expressions")
+def derive(
+    curve: Curve,
+    kernel: Kernel,
+    *,
+    parameters: Mapping[str, Given | None] | None = None,
+    title: str | None = None,
+) -> Model:
+    """Derive every closed form of a motion on ``curve`` under ``kernel``.
+
+    Parameters
+    ----------
+    curve, kernel
+        The declarations.
+    parameters
+        Defaults that replace those of the declarations; None means: to be given at run time.
+    title
+        One line for people; that of the curve if nothing is said.
+
+    Raises
+    ------
+    DeclarationError
+        If a name means two things, a default belongs to no parameter, or a form is nowhere real.
+    DerivationError
+        If a closed form is not real and finite.
+    BudgetError
+        If it takes more than a minute of processor time, or is nested too deeply.
+    """
+    instance(curve, Curve, where="derive: curve", what="a curve, as Curve.graph or a family makes one")
+    instance(kernel, Kernel, where="derive: kernel", what="a force law, as Gravity() + CoulombFriction()")
+    given = {} if parameters is None else parameters
+    if not isinstance(given, Mapping):
+        raise ArgumentError(f"derive: parameters: must be names with values, as in {{'mu': 0.1}}, got {short(given)}")
+    called = curve.title if title is None else one_line(title, where="derive: title")
+    lam = curve.parameter
+    kernel = kernel.along(lam, in_space=curve.in_space)
+    if curve.in_space:
+        _refuse_planar_forces(kernel)
+    if kernel.cars:
+        _refuse_of_train(kernel)
+        curve = curve.in_arc_length()
+        lam = curve.parameter
+    defaults = join(curve, kernel, given)
+    check_measured(dict(defaults), units_of(curve, kernel), where="derive", final=True)
+    check_order(curve.kind, curve.domain, curve.period, dict(defaults))
+    values = dict(defaults)
+    if not curve.charted:
+        if curve.period is not None:
+            check_period(curve.kind, curve.point, lam, curve.period, values)
+        check_powers(curve.coordinates, curve, values)
+        check_corners(curve, values)
+        signs = Signs(parameter=lam, domain=curve.domain, positive=curve.positive, may_be_positive=())
+        curve = replace(curve, **{name: without_known_bars(form, signs) for name, form in curve.coordinates})
+    # A frame that turns pushes a body out of every vertical plane.
+    heading = (None if kernel.spin else vertical_plane(curve)) if curve.in_space else AHEAD
+    if heading is not None and not is_planar(heading, (curve.x, curve.y, curve.z), kernel):
+        if not curve.in_space:
+            raise DeclarationError(
+                "derive: a force acts across the curve's plane, as of a centre with y != 0; declare the curve by "
+                "Curve.space, whose contact force is a vector"
+            )
+        heading = None
+    may_be_positive = tuple(name for name in values if is_positive(values[name]))
+    track = geometry(curve, may_be_positive=may_be_positive, heading=heading)
+    x, z, shape = beside(without_poles(curve.x), without_poles(curve.z), track, kernel.radius)
+    y = without_poles(curve.y)
+    body = forces((x, y, z), kernel, shape, lam)
+    law = of_train(body, kernel, lam) if kernel.cars else body
+    if not curve.charted:
+        check_powers((("potential", law.potential),), curve, values)
+    upright = upright_force(curve.banking, shape, body) if curve.banking else None
+    loss, speed, level = None, conservative_speed(law, lam), level_set(curve)
+    if not kernel.conservative:
+        loss = _losses(curve, kernel, (x, y, z), law, shape, upright or ())
+        speed = dissipative_speed(kernel, law, shape, loss, curve)
+    pressure = shape.kappa * speed.held + law.static_normal_load
+    dxds, dyds, dzds = shape.tangent
+    acceleration = law.push / kernel.inertia if loss is None else loss.along(loss.acceleration)
+    potential, slope = law.effective_potential, law.effective_potential_slope
+    axes = None if loss or curve.charted else symmetry(potential, slope, shape.ds, lam)
+    if axes and kernel.radius:  # of the path of a body's centre the sign of σ is known by numbers only
+        axes = replace(axes, monotone=False)
+    start = {lam: LAM0}
+    model = Model(
+        curve=curve,
+        force=kernel,
+        title=called,
+        parameter=lam,
+        lam0=LAM0,
+        v0=V0,
+        mass=MASS,
+        x=x,
+        y=y,
+        z=z,
+        ds=shape.ds,
+        dxds=dxds,
+        dyds=dyds,
+        dzds=dzds,
+        kappa=shape.kappa,
+        turning_rate=shape.turning_rate,
+        turning_angle=None if shape.angle is None else shape.angle - shape.angle.xreplace(start),
+        cusp=shape.cusp,
+        potential=law.potential,
+        inertia=kernel.inertia,
+        effective_potential=potential,
+        effective_potential_slope=slope,
+        symmetry=axes,
+        symmetric_orbits=symmetric_orbits(2 * potential, shape.ds, lam, axes),
+        static_normal_load=law.static_normal_load,
+        normal=shape.normal,
+        bend=shape.bend,
+        loads=law.loads,
+        coriolis=law.coriolis,
+        dissipation=loss,
+        speed_squared=speed.squared,
+        speed_squared_form=speed.form,
+        normal_force=MASS * pressure,
+        side_force=sp.S.Zero if law.loads else 2 * MASS * kernel.spin * DIRECTION * sp.sqrt(speed.held) * shape.dxds,
+        tangential_acceleration=acceleration,
+        time_integrand=shape.ds / sp.sqrt(speed.held),
+        regularised_integrand=shape.ds * sp.sqrt((lam - LAM1) * (LAM2 - lam) / speed.held),
+        turning_point_equation=sp.Eq(speed.squared, 0, evaluate=False),
+        liftoff_equation=None if law.loads else sp.Eq(pressure, 0, evaluate=False),
+        liftoff_speed_squared=None if law.loads else _liftoff_speed(speed, shape.kappa, law.static_normal_load),
+        defaults=defaults,
+        positive=tuple(dict.fromkeys((*shape.positive, *kernel.positive))),
+        at_least=kernel.at_least,
+        notes=(*(() if level is None else (level.note,)), *shape.notes, *(() if loss is None else (speed.note,))),
+        level_set=level,
+        sided=not law.loads or upright is not None,
+        rider=rider(curve.banking, shape, body, acceleration, lam) if curve.banking else None,
+    )
+    if law.loads:
+        model = replace(model, normal_force=model.normal_force_at(speed.held))
+    for label, form in model.closed_forms():
+        check_real(form, where=label)
+    if not curve.charted:
+        tried = (*curve.named(x, y, z), (f"ds/d{lam.name}", shape.ds), ("potential", law.potential))
+        check_somewhere_real(tried, lam, curve.domain, values)
+    return model
+
+
+def _refuse_planar_forces(kernel: Kernel) -> None:
+    """Refuse forces that are known for planar curves only."""
+    refused = (
+        ("rolling: radius", kernel.radius, "the path of the centre of a rolling body"),
+        ("surface_tension: form", kernel.resistance and not kernel.resistance.has(sp.Abs), "the printed form's sign"),
+    )
+    for name, given, what in refused:
+        if given:
+            raise DeclarationError(f"derive: {name}: {what} is known for planar curves only yet; leave it out")
+
+
+def _refuse_of_train(kernel: Kernel) -> None:
+    """Refuse what is not known of a train."""
+    refused = (
+        ("surface_tension", kernel.resistance, "a droplet's resistance"),
+        ("rotating_frame", kernel.spin, "a turning frame"),
+        ("rolling: radius", kernel.radius, "the path of the centre of a rolling body"),
+        ("rolling: mu_static", kernel.static_friction_limit, "the friction that its wheels need"),
+        ("law", kernel.tangential_law, "a law of acceleration"),
+    )
+    for name, given, what in refused:
+        if given:
+            raise DeclarationError(f"derive: {name}: {what} is not known of a train; leave it out")
+
+
+def _losses(
+    curve: Curve, kernel: Kernel, place: Place, law: Forces, shape: Geometry, upright: tuple[sp.Expr, ...]
+) -> Dissipation:
+    lam = curve.parameter
+    signs = Signs(parameter=lam, domain=curve.domain, positive=shape.positive, may_be_positive=())
+    if law.loads and shape.cusp is not None and signs.sign(shape.cusp) is None:
+        raise DeclarationError(
+            f"derive: {shape.cusp} may vanish, which is a cusp; losses of energy on space curves with cusps are not "
+            "supported yet, so give a domain without one"
+        )
+    # A curve's own parameter may be called x, and then means that in a law.
+    coordinates = {symbol: form for symbol, form in zip((X, Y, Z), place, strict=True) if symbol != lam}
+    pieces = {
+        **{SIGMA: shape.ds, KAPPA: shape.kappa, TURN: shape.turning_rate, TILT: shape.dxds},
+        **{PUSH: law.push, LOAD: law.static_normal_load},
+        **dict(zip(TURNS, shape.turning, strict=False)),
+        **dict(zip(LOADS, law.loads, strict=False)),
+        **dict(zip(CORIOLIS, law.coriolis, strict=False)),
+        **dict(zip(UPRIGHT, reversed(upright), strict=False)),
+    }
+    cars_load = load_of_cars(kernel, lam, in_space=curve.in_space) if kernel.cars else None
+    loss = dissipation(kernel, pieces, coordinates, signs, cars_load)
+    for way, form in zip(("forwards", "backwards"), loss.holds, strict=True):
+        check_real(form, where=f"the law of a body at rest that is about to move {way}")
+    return loss
+
+
+def _liftoff_speed(speed: SpeedField, kappa: sp.Expr, load: sp.Expr) -> sp.Expr | None:
+    """Solve kappa*W + n0 = 0 for v0**2."""
+    if speed.gain is None or not kappa:
+        return None
+    return -(load / kappa + speed.squared.xreplace({V0: sp.S.Zero})) / speed.gain

@@ -1,0 +1,341 @@
+"""Where the body of a motion is at a time: its states, their error, and the time at a place."""
+
+from abc import ABC, abstractmethod
+from math import inf
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gqm_sym.errors import InputError, SolutionError
+from gqm_sym.literals.namespaces import FLOATS
+from gqm_sym.literals.numbers import read_number, read_numbers
+from gqm_sym.runtime.arithmetic.doubledouble import ULP
+from gqm_sym.runtime.compiled.types import Array
+from gqm_sym.runtime.launch.equilibria import Potential
+from gqm_sym.runtime.launch.kinds import MotionKind
+from gqm_sym.runtime.launch.problem import Problem
+from gqm_sym.runtime.launch.speed import length, path_and_force_at, path_in_space
+from gqm_sym.runtime.motion.events import Leg, passages
+from gqm_sym.runtime.motion.locking import Lock, locked
+from gqm_sym.runtime.motion.riding.loads import felt
+from gqm_sym.runtime.motion.segments import errors
+from gqm_sym.runtime.motion.state import Energy, State, StateInSpace, StateOfRider
+from gqm_sym.runtime.motion.trajectory import PhasePoints, TimedSegment, Trajectory, locate
+
+
+class Positions(ABC):
+    """A motion of which one asks where the body is.
+
+    Attributes
+    ----------
+    kind, direction, problem
+        As of `Motion`.
+    """
+
+    kind: MotionKind
+    direction: int
+
+    def __init__(self, problem: Problem, kind: MotionKind, direction: int) -> None:
+        self.problem = problem
+        self.kind = kind
+        self.direction = direction
+        self._lock = Lock()
+        horizon = problem.launch.t_max
+        self._horizon = inf if horizon is None else horizon.value
+
+    # -- what subclasses say ------------------------------------------------------------------
+
+    @abstractmethod
+    def _trajectory(self, end_time: float) -> Trajectory:
+        """The trajectory, computed for times up to ``end_time`` from launch at least."""
+
+    @property
+    def _course(self) -> Trajectory:
+        """The trajectory that legs, events and passages are read off: of a motion that repeats, one period."""
+        return self._trajectory(0.0)
+
+    @abstractmethod
+    def _time_error(self, t: Array) -> Array:
+        """Estimated error in s of the time at which the body comes to its segment of the trajectory."""
+
+    def _errors_before(self, timed: TimedSegment, phi: Array) -> tuple[float, Array]:
+        """Bounds of the errors from before a timed segment: of its place, and of the times at phase angles."""
+        return 0.0, np.zeros_like(phi)
+
+    def _known_end(self) -> float:
+        """The time in s at which the motion ends by what has been computed of it; infinite if that is not known."""
+        return self._horizon
+
+    def _end_text(self) -> str:
+        return "the horizon t_max"
+
+    @property
+    @abstractmethod
+    def legs(self) -> tuple[Leg, ...]:
+        """The legs of the motion in the order of time."""
+
+    # -- accuracy -----------------------------------------------------------------------------
+
+    @property
+    @locked
+    def quadrature_error(self) -> float:
+        """Estimated relative error of a time of flight by quadrature, for the exact numbers of the launch."""
+        return max((timed.segment.relative_error for timed in self._history()), default=0.0)
+
+    @property
+    @locked
+    def condition_number(self) -> float:
+        """The largest relative change of a time of flight per relative change of the numbers of the launch.
+
+        It is a property of the problem. Near a separatrix it is large, and a launch of 16 digits then determines the
+        motion to correspondingly fewer digits. From 100 on, the computation itself uses extended precision.
+        """
+        return max((timed.segment.condition_number for timed in self._history()), default=1.0)
+
+    def _history(self) -> tuple[TimedSegment, ...]:
+        """The timed segments that `legs` and `events` list."""
+        return self._course.segments
+
+    # -- positions ----------------------------------------------------------------------------
+
+    @locked
+    def lam(self, t: Any) -> Any:
+        """The curve parameter at times (the inverse of the time of flight; MATHS, section 5).
+
+        Parameters
+        ----------
+        t : number or array_like
+            Times in s from launch, at most ``t_end``; they may be negative if the motion is periodic. Strings, ints
+            and Fractions are exact.
+
+        Returns
+        -------
+        float or ndarray
+            Values of the shape of ``t``. In circulation the parameter grows lap by lap.
+
+        Raises
+        ------
+        InputError
+            If a time is not a number, negative where the motion does not repeat, or beyond ``t_end``.
+        SolutionError
+            If the motion cannot be followed so far.
+        """
+        times, low, shape = self._times(t)
+        points = self._phase_points(times, low)
+        return _shaped(self._places(points) + points.laps * points.trajectory.lap, shape)
+
+    @locked
+    def state(self, t: Any) -> State:
+        """Curve parameter, arc length, position, velocity, curvature and contact force at times.
+
+        Parameters
+        ----------
+        t : number or array_like
+            Times in s from launch, as for `lam`.
+
+        Returns
+        -------
+        State
+            Floats, or arrays of the shape of ``t``.
+
+        Raises
+        ------
+        InputError
+            If a time is not a number, negative where the motion does not repeat, or beyond ``t_end``.
+        SolutionError
+            If the motion cannot be followed so far.
+        """
+        times, low, shape = self._times(t)
+        points = self._phase_points(times, low)
+        f, trajectory = self.problem.functions, points.trajectory
+        reduced, s, v = self._places(points), points.arc_lengths(), self._velocities(points)
+        v2 = v**2
+        x, z, ds, kappa, force = path_and_force_at(f.addresses, f.p, reduced, v2)
+        error = self._bound(times, points, reduced, v, ds)
+        lam = reduced + points.laps * trajectory.lap
+        s = (s + points.laps * trajectory.lap_length) + self.problem.arc_origin
+        kind, more = self._in_space(times, reduced, v, v2, force)
+        found = [_shaped(array, shape) for array in (times, lam, s, x, z, v, v2, kappa, force, error)]
+        return kind(*found, *(_shaped(array, shape) for array in more))
+
+    def _in_space(self, times: Array, places: Array, v: Array, v2: Array, force: Array) -> tuple[type[State], Array]:
+        """The kind of state that there is on the curve, and what it has beside the fields of `State`, as rows.
+
+        In a frame that turns the contact ``force`` is filled, too.
+        """
+        formulas, p = self.problem.formulas, self.problem.functions.p
+        if formulas.path_in_space is None:
+            return State, np.empty((0, 0))
+        rows = path_in_space(formulas, p, places, v2, v)
+        if formulas.directed:
+            force[:] = length(rows[1:])
+        if formulas.rider_loads is None:
+            return StateInSpace, rows
+        return StateOfRider, np.concatenate([rows, felt(self.problem, places, v, v2, force, self._resting(times))])
+
+    def _resting(self, times: Array) -> NDArray[np.bool_]:
+        """Whether the body is at rest for good at times from launch."""
+        if self.kind == "rest":
+            return np.ones(times.size, dtype=np.bool_)
+        if self.kind != "dissipative" or not times.size or (last := float(times.max())) < self._known_end():
+            return np.zeros(times.size, dtype=np.bool_)
+        return times >= (last if self.legs[-1].end == "rest" else inf)
+
+    def _state_of(self, t: Any, rows: Array) -> State:
+        """The state at one time, or at an array of times, from the rows of `Sampler.states` at places within a lap."""
+        times = np.atleast_1d(np.asarray(t, dtype=np.float64)).reshape(-1)
+        kind, more = self._in_space(times, rows[0], rows[4], rows[5], rows[7])
+        rows = np.concatenate([rows, more]) if more.size else rows
+        return kind(t, *rows.reshape(-1, *t.shape)) if np.ndim(t) else kind(t, *rows[:, 0].tolist())
+
+    @locked
+    def time_at(self, lam: Any) -> float:
+        """The first time at which the body is at a place.
+
+        Parameters
+        ----------
+        lam : number
+            A value of the curve parameter, in its unit; on a closed curve laps count (lam + period is the next lap).
+
+        Returns
+        -------
+        float
+            Time in s from launch; 0.0 at the launch place.
+
+        Raises
+        ------
+        SolutionError
+            If the motion is never there before ``t_end``.
+        """
+        formulas = self.problem.formulas
+        place = read_number(lam, where=formulas.parameter, unit=formulas.units.get(formulas.parameter))
+        origin = self.problem.launch.lam0
+        if place.value == origin.value and place.low == origin.low:
+            return 0.0
+        times = self._first_passages(place.value, place.low)
+        times = [t for t in times if t <= self._horizon]
+        if not times:
+            where = f"{self.problem.formulas.parameter} = {place.text}"
+            raise SolutionError(f"time_at: the motion is never at {where}; {self._extent_text()}")
+        return min(times)
+
+    @locked
+    def error_bound(self, t: Any) -> Any:
+        """A bound of the error of ``lam(t)``: the parts of quadrature and of inversion (paper, eq. 32), and rounding.
+
+        Parameters
+        ----------
+        t : number or array_like
+            Times in s from launch, as for `lam`.
+
+        Returns
+        -------
+        float or ndarray
+            Bounds in the unit of the curve parameter, of the shape of ``t``. They hold for the exact numbers of the
+            launch and for exact times.
+
+        Raises
+        ------
+        InputError
+            As `lam`.
+        """
+        times, low, shape = self._times(t)
+        points = self._phase_points(times, low)
+        f, reduced, v = self.problem.functions, self._places(points), self._velocities(points)
+        ds = path_and_force_at(f.addresses, f.p, reduced, v**2)[2]
+        return _shaped(self._bound(times, points, reduced, v, ds), shape)
+
+    def _bound(self, times: Array, points: PhasePoints, reduced: Array, v: Array, ds: Array) -> Array:
+        """`error_bound`, from the places within the lap, the velocities and ds/dlam."""
+        with np.errstate(divide="ignore", invalid="ignore"):
+            rate = np.where(ds > 0.0, np.abs(v) / ds, 0.0)
+        time_error, inversion_error = self._time_error(times), np.zeros_like(times)
+        for timed, mask, phi in points.segments:
+            place_before, time_before = self._errors_before(timed, phi)
+            time_error[mask] += time_before + errors.time_error(timed.segment, phi)
+            inversion_error[mask] = place_before + errors.inversion_error(timed.segment, phi)
+        # The length of a lap, its multiple and the sum are rounded.
+        rounding = ULP * (1.5 * np.abs(points.laps * points.trajectory.lap) + 2.0 * np.abs(reduced))
+        # Where nothing is known of the time, nothing is known of the place, at rest too.
+        of_time = np.multiply(rate, time_error, out=np.full_like(rate, np.inf), where=time_error < np.inf)
+        bound: Array = of_time + inversion_error + rounding
+        return bound
+
+    # -- energy -------------------------------------------------------------------------------
+
+    @locked
+    def energy(self, t: Any) -> Energy:
+        """Kinetic and potential energy at times, and what has been lost since launch (MATHS, section 2).
+
+        Parameters
+        ----------
+        t : number or array_like
+            Times in s from launch, as for `lam`.
+
+        Returns
+        -------
+        Energy
+            Floats, or arrays of the shape of ``t``, in J.
+
+        Raises
+        ------
+        InputError
+            As `state`.
+        """
+        state, launch = self.state(t), self.state(0.0)
+        formulas, p = self.problem.formulas, self.problem.p
+        mass = float(p.values[list(formulas.parameters).index("m")])
+        inertia = 1.0 if formulas.inertia is None else float(formulas.inertia(FLOATS, p.values.tolist()))
+        potential = Potential(formulas, p)
+
+        def energies(at: State) -> tuple[Array, Array]:
+            level = potential.rows(at.lam)[0].reshape(np.shape(at.lam))
+            return 0.5 * mass * inertia * np.asarray(at.v2), mass * inertia * level
+
+        kinetic, height = energies(state)
+        lost = np.zeros_like(kinetic)
+        if formulas.dissipation is not None:
+            lost = sum(energies(launch)) - (kinetic + height)
+        return Energy(*(_shaped(np.atleast_1d(array), np.shape(state.t)) for array in (kinetic, height, lost)))
+
+    # -- inside -------------------------------------------------------------------------------
+
+    def _times(self, t: Any) -> tuple[Array, Array, tuple[int, ...]]:
+        times, low, shape = read_numbers(t, where="t", unit="s")
+        if times.size:
+            if not np.isfinite(times).all():
+                raise InputError("t: must be finite numbers, got NaN or an infinite one")
+            self._check_end(float(times.max()))
+            if times.min() < 0.0 and self._trajectory(0.0).period is None:
+                raise InputError(f"t: cannot be negative for a motion that does not repeat, got {float(times.min())!r}")
+        return times, low, shape
+
+    def _check_end(self, t: float) -> None:
+        """Refuse a time beyond the end of the motion."""
+        self._trajectory(min(t, self._horizon))
+        end = self._known_end()
+        if t > end:
+            raise InputError(f"t: the motion ends at {end!r} s ({self._end_text()}), got {t!r}")
+
+    def _extent_text(self) -> str:
+        return "it moves " + ", ".join(f"from {leg.lam_start!r} to {leg.lam_end!r}" for leg in self.legs)
+
+    def _phase_points(self, t: Array, t_low: Array) -> PhasePoints:
+        return locate(self._trajectory(float(np.abs(t).max()) if t.size else 0.0), t, t_low)
+
+    def _places(self, points: PhasePoints) -> Array:
+        """The curve parameter within the lap; at launch it is exactly the launch place."""
+        return points.places(self.problem.lam0)
+
+    def _velocities(self, points: PhasePoints) -> Array:
+        return points.velocities(self.direction * self.problem.launch.v0.value)
+
+    def _first_passages(self, lam: float, low: float) -> list[float]:
+        """Times at which the body passes a place, the first time on each segment."""
+        trajectory = self._course
+        return passages(trajectory.segments, trajectory, lam, low)
+
+
+def _shaped(array: Array, shape: tuple[int, ...]) -> Any:
+    return float(array[0]) if shape == () else array.reshape(shape)

@@ -1,0 +1,102 @@
+"""Errors of a segment: of its times, and of its places by the table and by the rounding of its turning points."""
+
+from math import inf
+
+import numpy as np
+
+from gqm_sym.runtime.arithmetic.doubledouble import ULP
+from gqm_sym.runtime.compiled.types import Array
+from gqm_sym.runtime.inversion.table import MAX_TIME_ERROR
+from gqm_sym.runtime.launch.speed import path_and_force_at, potential_at
+from gqm_sym.runtime.motion.segments.segment import Segment
+from gqm_sym.runtime.quadrature.substitution import FROM_TURN, REGULAR, TO_EQUILIBRIUM, TURN_TURN
+
+# The error of a turning point in doubles, in roundings of the width times the ratio of the largest Q to that there
+# (`_end_errors`); 0.6 was the most that was measured.
+MAX_END_ROUNDINGS = 2.0
+
+# The error of the slope of the potential along a chart that no formulas improve, in roundings of the largest slope, and
+# in those times ds, which is small along the path of a centre (2.5 was measured); and the number of places of a closed
+# one at which that is looked for.
+CHART_ROUNDINGS, CENTRE_ROUNDINGS, AROUND = 8.0, 4.0, 16
+
+# The error of a place by the rounding of a chart, in roundings of the width of a motion, and of its coordinates.
+MAX_WIDTH_ROUNDINGS, MAX_SIZE_ROUNDINGS = 128.0, 4.0
+
+# The largest slope of lam(phi), in widths, by the kind of the segment; approaches to an equilibrium have none.
+MAX_SLOPES = (0.5, 2.0, 1.0)
+
+
+def time_error(segment: Segment, phi: Array) -> Array:
+    """Estimated error in s of a segment's times at phase angles.
+
+    It is a share of the whole duration, or of the panel's where the times of its edges are exact.
+    """
+    error = segment.relative_error + ULP + MAX_TIME_ERROR
+    if segment.kind == TURN_TURN and segment.balance > 0.0 and not segment.from_multiprecision:
+        # Rounded ends change V**2 by more where cancellation leaves little of it.
+        error += 0.5 * ULP * max(abs(segment.a), abs(segment.b)) / (abs(segment.width) * segment.balance)
+    which, times = np.searchsorted(segment.edges[1:-1], phi, side="right"), segment.edge_times[0]
+    if segment.has_given_times:
+        spans: Array = np.diff(times)[which]
+    elif segment.kind == TO_EQUILIBRIUM or segment.speed_series is not None:
+        spans = times[which + 1]  # its end is arbitrary, or the error grows from ``a``
+    else:
+        spans = np.full_like(phi, segment.duration)
+    return error * spans
+
+
+def inversion_error(segment: Segment, phi: Array) -> Array:
+    """Estimated error of places by the table of a segment, at phase angles and in units of the curve parameter."""
+    powers, of_intervals = segment.table[3], segment.table[6]
+    errors = of_intervals[np.searchsorted(powers[:-1].sum(axis=1), phi)]
+    width = abs(segment.width)
+    if segment.kind == TO_EQUILIBRIUM:
+        near_equilibrium: Array = width * np.exp(-phi) * (errors + 3.0 * ULP * np.maximum(phi, 1.0))
+        return near_equilibrium
+    bounded: Array = width * (MAX_SLOPES[segment.kind] * errors + 3.0 * ULP)
+    if segment.kind == REGULAR or segment.from_multiprecision:
+        return bounded
+    at_a, at_b = _end_errors(segment)
+    share = phi**2 if segment.kind == FROM_TURN else np.sin(0.5 * phi) ** 2
+    return bounded + at_a * (1.0 - share) + at_b * share
+
+
+def _end_errors(segment: Segment) -> tuple[float, float]:
+    """How far the turning points of a segment may be from the exact ones, in units of the curve parameter.
+
+    V**2 = (lam - a)*(b - lam)*Q is known to a rounding of its largest values, so that its zero at ``a`` is known
+    to as many roundings of the width as Q is smaller there than at its largest. Along a chart Q is rounded too.
+    """
+    if not segment.balance > 0.0:
+        return 0.0, 0.0
+    error = MAX_END_ROUNDINGS * ULP * abs(segment.width) / segment.balance
+    f = segment.functions
+    if segment.kind == FROM_TURN:
+        return error, 0.0
+    # Q at the ends, but for a factor.
+    ends = np.array([segment.a, segment.b])
+    steepness, of_chart = np.abs(potential_at(f.addresses, f.p, ends)[1]), 0.0
+    errors = error * np.divide(steepness.min(), steepness, out=np.ones(2), where=steepness > 0.0)
+    if f.exact is None:
+        # Slopes of a chart that no formulas improve are known to a rounding of the largest. The path of a centre
+        # has roundings of the curve, which are larger by 1/ds.
+        around = np.array([*ends, *f.breaks, *np.linspace(0.0, f.period, AROUND)])
+        largest = np.abs(potential_at(f.addresses, f.p, around)[1]).max()
+        shortest = np.abs(path_and_force_at(f.addresses, f.p, around, np.zeros_like(around))[2]).min()
+        roundings = max(CHART_ROUNDINGS, CENTRE_ROUNDINGS / shortest) if shortest > 0.0 else inf
+        rounding = roundings * ULP * abs(segment.width) * largest
+        errors = errors + np.divide(rounding, steepness, out=np.zeros(2), where=steepness > 0.0)
+    elif f.exact.edges.size:
+        size = float(np.hypot(*path_and_force_at(f.addresses, f.p, ends, np.zeros(2))[:2]).max())
+        of_chart = ULP * min(MAX_WIDTH_ROUNDINGS * abs(segment.width), MAX_SIZE_ROUNDINGS * size)
+    at_a, at_b = (
+        of_chart if known is not None or _is_launch_from_rest(segment, place) else float(own) + of_chart
+        for place, known, own in zip((segment.a, segment.b), segment.ends, errors, strict=True)
+    )
+    return at_a, at_b
+
+
+def _is_launch_from_rest(segment: Segment, place: float) -> bool:
+    exact = segment.functions.exact
+    return exact is not None and place == exact.lam0.value and exact.v0.value == 0.0

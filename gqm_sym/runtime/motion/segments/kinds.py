@@ -1,0 +1,79 @@
+"""Segments by what lies at their ends: turning points, an equilibrium, or places where the body moves."""
+
+from math import exp, log, pi
+from typing import Any
+
+from gqm_sym.runtime.launch.functions import BoundFunctions
+from gqm_sym.runtime.motion.segments.segment import Segment
+from gqm_sym.runtime.quadrature.substitution import FROM_TURN, REGULAR, TO_EQUILIBRIUM, TURN_TURN
+
+# The distance from an equilibrium up to which an approach to it is computed, near the least that doubles know.
+NEAREST = 1e-300
+
+# Phase angles of such an approach at which panels begin: near its start, panels must be short.
+APPROACH_MARKS = (8.0, 16.0, 32.0, 64.0, 128.0, 256.0)
+
+
+def toward_equilibrium(functions: BoundFunctions, start: float, equilibrium: float) -> Segment:
+    """A segment from ``start`` towards an equilibrium, as near to it as doubles can tell."""
+    stop = log(abs(start - equilibrium) / NEAREST)
+    marks = tuple(equilibrium + (start - equilibrium) * exp(-phi) for phi in APPROACH_MARKS)
+    return Segment(functions=functions, kind=TO_EQUILIBRIUM, a=start, b=equilibrium, stop=stop, panel_breaks=marks)
+
+
+def between_turns(
+    functions: BoundFunctions,
+    a: float,
+    b: float,
+    known_duration: float | None = None,
+    ends: tuple[Any, Any] = (None, None),
+    *,
+    is_lazy: bool = False,
+) -> Segment:
+    """A segment between two turning points."""
+    return Segment(
+        functions=functions,
+        kind=TURN_TURN,
+        a=a,
+        b=b,
+        stop=pi,
+        known_duration=known_duration,
+        is_lazy=is_lazy,
+        ends=ends,
+    )
+
+
+def from_turn(functions: BoundFunctions, turn: float, end: float) -> Segment:
+    """A segment from a turning point to a place where the speed is not zero."""
+    return Segment(functions=functions, kind=FROM_TURN, a=turn, b=end)
+
+
+def through(
+    functions: BoundFunctions,
+    start: float,
+    end: float,
+    ref: float,
+    ref_v2: float,
+    *,
+    known_duration: float | None = None,
+    panel_breaks: tuple[float, ...] = (),
+) -> Segment:
+    """A segment at both ends of which the speed is not zero; ``ref_v2`` is V**2 at ``ref``."""
+    return Segment(
+        functions=functions,
+        kind=REGULAR,
+        a=start,
+        b=end,
+        ref=ref,
+        ref_v2=ref_v2,
+        known_duration=known_duration,
+        panel_breaks=panel_breaks,
+    )
+
+
+def with_turning_points(segment: Segment, a: float, b: float, duration: float | None) -> Segment:
+    """The same segment from one turning point to the other with other doubles for them, and its duration if known.
+
+    It is not that of the old doubles: near a separatrix a rounding of the ends is many of the duration.
+    """
+    return between_turns(segment.functions, a, b, duration, is_lazy=segment.stored_panels is None)
