@@ -52,7 +52,8 @@ def animate(motion: "Motion", path: "str | Path", *, duration: float | None = No
     bodies = motion.cars(times) if is_train else frames
     in_space = motion.problem.formulas.path_in_space is not None
     figure = _ride(motion) if in_space else track(motion)
-    style = {"marker": "o", "color": "black", "markersize": 6 if is_train else 12, "zorder": 9}
+    style: dict[str, Any] = {"marker": "o", "color": "black", "markersize": 6 if is_train else 12, "zorder": 9}
+    body: Any
     (body,) = figure.axes[0].plot(*([[]] * (3 if in_space else 2)), **style)
     title = figure.axes[0].set_title("")
 
@@ -75,5 +76,5 @@ def _ride(motion: "Motion") -> "Figure":
     if motion.problem.formulas.rider_loads is None:
         draw_in_space(view, states, states.normal_force, FORCE_LABEL)
     else:
-        draw_in_space(view, states, states.n_vertical, f"vertical {LOAD_LABEL}")  # type: ignore[attr-defined]
+        draw_in_space(view, states, states.n_vertical, f"vertical {LOAD_LABEL}")
     return figure

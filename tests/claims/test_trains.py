@@ -32,7 +32,7 @@ def build(tmp_path_factory: pytest.TempPathFactory) -> Build:
 
     def module(name: str, curve: gqm.Curve, force: Any = None, cars: int = 3) -> ModuleType:
         if name not in built:
-            law = gqm.Gravity() + gqm.Train(cars=cars)
+            law = gqm.Gravity() + gqm.Train(cars=cars) if cars else gqm.Gravity()
             model = gqm.derive(curve, law if force is None else law + force)
             built[name] = gqm.build(model, name=name, folder=folder)
         return built[name]
@@ -354,3 +354,30 @@ def test_friction_of_each_car(in_space: bool, build: Build) -> None:
     edges = 3 * np.cos(places(truth[0][1] + length * (np.arange(5) / 4 - 0.5)))
     lacking = np.cumsum(acceleration / 4 + 9.81 * np.diff(edges) / length + mu * force / 4)
     assert cars.coupling_force == pytest.approx(lacking[:-1], abs=1e-10)
+
+
+@pytest.mark.parametrize("in_space", [True, False])
+def test_a_short_train_is_a_body(in_space: bool, build: Build) -> None:
+    """The shorter a train, the nearer is its motion to that of a body with friction; of a nanometre it is that one."""
+    waves = {"x": "20*u", "z": "3*cos(u)", "parameter": "u", "domain": (-3, 3)}
+    curve = gqm.Curve.space(**waves, y="5*sin(u)") if in_space else gqm.Curve.parametric(**waves)
+    name = "rubbing_train_in_space" if in_space else "rubbing_train_in_plane"
+    module = build(name, curve, gqm.CoulombFriction(), cars=4)
+    rail = gqm.Curve.piecewise([curve])
+    body = build(f"body_{in_space}", rail, gqm.CoulombFriction(), cars=0).solve(30, 12, mu="0.05", t_max=3).state(2.0)
+    trains = [module.solve(30, 12, mu="0.05", length=length, t_max=3).state(2.0) for length in (2.0, 1.0, 1e-9)]
+    # The cars of a train see the square of its length.
+    wide, half, short = (abs(train.lam - body.lam) for train in trains)
+    assert wide / half == pytest.approx(4.0, rel=0.05)
+    assert short < 1e-12 * body.lam
+    assert trains[2].v == pytest.approx(body.v, rel=1e-12)
+    assert trains[2].normal_force == pytest.approx(body.normal_force, rel=1e-11)
+
+
+def test_a_roll_in_another_parameter_than_arc_length_is_refused() -> None:
+    """It would have to be known by arc length; other rolls are kept."""
+    rolled = {"x": "20*cos(u)", "y": "30*sin(u)", "z": "u", "parameter": "u", "domain": (0, 6)}
+    law = gqm.Gravity() + gqm.Train(length=2)
+    with pytest.raises(DeclarationError, match="roll: u/9 is in u, and the track of a train has arc length"):
+        gqm.derive(gqm.Curve.space(**rolled, roll="u/9"), law)
+    assert gqm.derive(gqm.Curve.space(**rolled, roll=("coordinated", "v_d")), law).rider is not None

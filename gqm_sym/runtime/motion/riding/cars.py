@@ -109,7 +109,8 @@ def cars(motion: Any, t: Any) -> Cars | CarsOfRiders:
         # Likewise for what rubs on the cars behind, which a train at rest does not tell.
         rubbing = np.cumsum(friction * np.sign(np.atleast_1d(state.v)) * np.abs(found[4]), axis=0)
         coupling += rubbing[:-1] - share * rubbing[-1]
-    rows, kind = [*found, coupling], Cars
+    rows: list[Array] = [*found, coupling]
+    kind: type[Cars] | type[CarsOfRiders] = Cars
     if formulas.rider_loads is not None:
         rows, kind = [*rows, *_loads(problem, state, found[0], gravity)], CarsOfRiders
     return kind(state.t, *(row if np.ndim(state.lam) else row[:, 0] for row in rows))
