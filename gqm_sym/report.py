@@ -13,7 +13,6 @@ from html import escape, unescape
 from importlib.metadata import version
 from typing import TYPE_CHECKING
 
-import numpy as np
 import sympy as sp
 
 from gqm_sym.derivation import Model
@@ -25,7 +24,6 @@ from gqm_sym.runtime import Motion
 from gqm_sym.runtime.charts.train import TrackOfTrain
 from gqm_sym.runtime.launch.kinds import LOADS
 from gqm_sym.runtime.launch.rider import STANDARD_GRAVITY
-from gqm_sym.runtime.motion.motion import horizon
 from gqm_sym.runtime.motion.rows import Rows, table
 from gqm_sym.specfile import Spec
 from gqm_sym.sympy_charts import ChartFunction
@@ -38,9 +36,6 @@ FIGURES = {
     "speed_and_force": "Speed and contact force against arc length",
     "portrait": "Phase portrait, with the orbit of this launch",
 }
-
-# Times at which the loads in the cars of a train are compared.
-SEAT_TIMES = 4001
 
 # SymPy prints the names of functions as they are written.
 _GREEK = {"alpha": "α", "kappa": "κ"}
@@ -218,7 +213,7 @@ def _figures(motion: Motion) -> Iterator[str]:
 
 def _riders(motion: Motion) -> Iterator[str]:
     """Yield what riders feel, on a banked track: the extremes of loads, and in a train those of three cars."""
-    from gqm_sym.figures.rides import ride, seats
+    from gqm_sym.figures.rides import SEAT_TIMES, ride, seat_extremes, seats
 
     if motion.problem.formulas.rider_loads is None:
         return
@@ -230,13 +225,7 @@ def _riders(motion: Motion) -> Iterator[str]:
         rows.append((load, *(f"{number:.4f}" for number in (least.value, least.t, most.value, most.t))))
     yield table(("load", "least", "after (s)", "most", "after (s)"), rows)
     if isinstance(motion.problem.formulas.chart, TrackOfTrain):
-        cars = motion.cars(np.linspace(0.0, horizon(motion), SEAT_TIMES))
-        loads = [getattr(cars, f"n_{load}") for load in LOADS]
-        middle = cars.lam.shape[0] // 2
-        rows = [
-            (seat, *(f"{end(felt[car]):.3f}" for felt in loads for end in (np.min, np.max)))
-            for seat, car in (("first", -1), ("middle", middle), ("last", 0))
-        ]
+        rows = [(seat, *(f"{load:.3f}" for load in felt)) for seat, *felt in seat_extremes(motion)]
         heads = [f"{load}, {which}" for load in LOADS for which in ("least", "most")]
         yield f"<p>The same in three cars of the train, at {SEAT_TIMES} times:</p>"
         yield table(("car", *heads), rows)

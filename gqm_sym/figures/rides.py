@@ -1,6 +1,6 @@
 """The picture of a ride on a banked track: where it goes, and what riders feel."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,6 +12,7 @@ from gqm_sym.figures.motions import LINE_COLOUR, draw_in_space, sampled
 from gqm_sym.optional import require
 from gqm_sym.runtime.launch.kinds import LOADS
 from gqm_sym.runtime.launch.rider import check_banked
+from gqm_sym.runtime.motion.motion import horizon
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -20,6 +21,8 @@ if TYPE_CHECKING:
 
 COLOURS = {"vertical": "#d55e00", "lateral": "#0072b2", "longitudinal": "#009e73"}
 SEATS = {"first": "#d55e00", "middle": "#333333", "last": "#0072b2"}
+# Times at which the loads in these cars are compared.
+SEAT_TIMES = 4001
 LOAD_LABEL = "load (9.80665 m/s²)"
 
 
@@ -92,18 +95,31 @@ def seats(motion: "Motion", *, limits: Mapping[str, Sequence[float]] | None = No
     check_banked(motion.problem.formulas, "seats")
     levels = _levels({} if limits is None else limits)
     cars = motion.cars(sampled(motion).t)
-    count = cars.lam.shape[0]
     figure = new_figure(9, 8)
     rows = figure.subplots(len(COLOURS), 1, sharex=True)
     for axes, load in zip(rows, COLOURS, strict=True):
         axes.axhline(0.0, color=LINE_COLOUR, linewidth=0.8)
-        for (seat, colour), car in zip(SEATS.items(), (count - 1, count // 2, 0), strict=True):
-            axes.plot(cars.lam[car], getattr(cars, f"n_{load}")[car], color=colour, label=f"{seat} car", linewidth=1.2)
+        for seat, car in _seats(cars.lam.shape[0]):
+            felt = getattr(cars, f"n_{load}")[car]
+            axes.plot(cars.lam[car], felt, color=SEATS[seat], label=f"{seat} car", linewidth=1.2)
         _limit(axes, levels.get(load, ()), LINE_COLOUR, "limit")
         finished(axes, "arc length of the car s (m)" if axes is rows[-1] else "", f"{load} {LOAD_LABEL}")
         if axes is not rows[0]:
             axes.get_legend().remove()
     return figure
+
+
+def seat_extremes(motion: "Motion") -> Iterator[tuple[Any, ...]]:
+    """Yield the first, the middle and the last car of a train, each with the least and the largest of its loads."""
+    cars = motion.cars(np.linspace(0.0, horizon(motion), SEAT_TIMES))
+    loads = [getattr(cars, f"n_{load}") for load in LOADS]
+    for seat, car in _seats(cars.lam.shape[0]):
+        yield seat, *(end(felt[car]) for felt in loads for end in (np.min, np.max))
+
+
+def _seats(count: int) -> zip[tuple[str, int]]:
+    """Three cars of a train by name and number."""
+    return zip(SEATS, (count - 1, count // 2, 0), strict=True)
 
 
 def _limit(axes: Any, levels: Sequence[float], colour: str, label: str) -> None:

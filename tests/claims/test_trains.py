@@ -11,6 +11,7 @@ from naive import ulps
 from scipy.integrate import solve_ivp
 
 import generated.circle_drag
+import generated.helix_coulomb
 import gqm_sym as gqm
 from gqm_sym.errors import DeclarationError, GQMError, InputError, LaunchError, ParameterError
 
