@@ -1,5 +1,6 @@
 """Animations of motions, as files."""
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,9 +13,10 @@ from gqm_sym.optional import require
 from gqm_sym.runtime.charts.train import TrackOfTrain
 from gqm_sym.runtime.motion.motion import horizon
 
-if TYPE_CHECKING:
-    from pathlib import Path
+# Formats of animations, by the extension of the file.
+ANIMATED = (".gif", ".mp4")
 
+if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from gqm_sym.runtime.motion.motion import Motion
@@ -39,13 +41,15 @@ def animate(motion: "Motion", path: "str | Path", *, duration: float | None = No
     Raises
     ------
     InputError
-        If ``duration`` is not positive.
+        If ``duration`` is not positive, or the extension belongs to no such format.
     """
     from matplotlib.animation import FuncAnimation
 
     end = horizon(motion) if duration is None else float(duration)
     if not end > 0.0:
-        raise InputError(f"duration: must be positive, got {duration!r}")
+        raise InputError(f"animate: duration: must be positive, got {duration!r}")
+    if Path(path).suffix.lower() not in ANIMATED:
+        raise InputError(f"animate: path: must end in one of {', '.join(ANIMATED)}, got {str(path)!r}")
     times = np.arange(0.0, end, 1.0 / rate)
     frames = motion.state(times)
     is_train = isinstance(motion.problem.formulas.chart, TrackOfTrain)
