@@ -117,9 +117,9 @@ def seat_extremes(motion: "Motion") -> Iterator[tuple[Any, ...]]:
         yield seat, *(end(felt[car]) for felt in loads for end in (np.min, np.max))
 
 
-def _seats(count: int) -> zip[tuple[str, int]]:
+def _seats(count: int) -> list[tuple[str, int]]:
     """Three cars of a train by name and number."""
-    return zip(SEATS, (count - 1, count // 2, 0), strict=True)
+    return list(zip(SEATS, (count - 1, count // 2, 0), strict=True))
 
 
 def _limit(axes: Any, levels: Sequence[float], colour: str, label: str) -> None:

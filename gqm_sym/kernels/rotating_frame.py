@@ -9,8 +9,8 @@ from gqm_sym.parameters import Given
 def RotatingFrame(*, Omega: Given | None = None) -> Kernel:
     """Return the centrifugal force of a track that rotates about the z axis.
 
-    The Coriolis force presses the body sideways against a planar track, which increases friction. On a space curve it is
-    part of the contact force, which then depends on the direction of motion.
+    The Coriolis force presses the body sideways against a planar track, which increases friction. On a space curve it
+    is part of the contact force, which then depends on the direction of motion.
 
     Parameters
     ----------
