@@ -25,7 +25,7 @@ _UNITS = {"length": "m", "radius": "m", "angle": "1", "kappa_start": "1/m", "kap
 
 @runtime_checkable
 class FormulaCurve(Protocol):
-    """What a rail needs of a curve with formulas that is one of its pieces (`curve.Curve` is one)."""
+    """The attributes that a rail needs of a piece with formulas; `curve.Curve` has them."""
 
     @property
     def kind(self) -> str:
@@ -279,7 +279,7 @@ def _is_spatial(piece: Piece) -> bool:
 
 
 def _start(place: tuple[Source, ...] | None, heading: Any, first: Piece, in_space: bool) -> tuple[sp.Expr, ...] | None:
-    """The start of a rail as `Rail` has it."""
+    """Return the start of a rail in the form that `Rail` stores."""
     if first.curve is not None:
         if place is not None or heading is not None:
             raise DeclarationError(

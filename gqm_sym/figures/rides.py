@@ -1,4 +1,4 @@
-"""The picture of a ride on a banked track: where it goes, and what riders feel."""
+"""The figure of a ride on a banked track: the track, and the loads on riders."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
@@ -45,7 +45,7 @@ def ride(motion: "Motion", *, limits: Mapping[str, Sequence[float]] | None = Non
     Raises
     ------
     InputError
-        If no roll was declared, or the limits are none.
+        If no roll was declared, or the limits are not pairs of numbers.
     """
     check_banked(motion.problem.formulas, "ride")
     levels = _levels({} if limits is None else limits)

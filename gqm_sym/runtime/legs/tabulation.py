@@ -1,4 +1,4 @@
-"""What compiled code reads of the segments of a motion with losses: tables of places, states and panels."""
+"""The record of the segments of a motion with losses for compiled code: tables of places, states and panels."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -23,7 +23,7 @@ SLOTS_PER_INTERVAL = 4
 
 
 class TabulatedPiece(NamedTuple):
-    """What compiled code needs of a piece of a motion, as rows of the sections of `inversion.leg_tables`.
+    """The record of a piece of a motion for compiled code, as rows of the sections of `inversion.leg_tables`.
 
     Attributes
     ----------
@@ -153,7 +153,7 @@ def tabulate_piece(marks, time_terms, length_terms, speed_terms, timing):  # typ
 
 
 def tabulated(timed: TimedSegment, lap: float) -> TabulatedPiece:
-    """What compiled code needs of a piece, which is no approach to an equilibrium, with its own errors."""
+    """Return the record of a piece, which is not an approach to an equilibrium, with its own errors."""
     segment = timed.segment
     assert segment.speed_series is not None
     edges, _, lengths, time_terms, length_terms, error = segment.panels[:6]

@@ -223,7 +223,7 @@ def run_forwards(forces, start, route, off, record):  # type: ignore[no-untyped-
 
 
 class Followed(NamedTuple):
-    """What became of a leg that was followed; the rest of it is in the record.
+    """The outcome of a leg that was followed; its other data are in the record.
 
     Attributes
     ----------

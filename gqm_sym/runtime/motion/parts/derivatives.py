@@ -177,13 +177,13 @@ class Derivatives(Positions):
         raise SolutionError(f"fourier: only a motion that repeats has coefficients; it is of kind {self.kind!r}")
 
     def _without_period(self, asked: str) -> SolutionError:
-        """What is raised by motions that do not repeat, by the name of what was asked for."""
+        """Return the error of motions that do not repeat, with the name of the requested quantity."""
         return SolutionError(
             f"{asked}: only a libration or a circulation has one; this motion is of kind {self.kind!r}"
         )
 
     def _without_gradients(self) -> SolutionError:
-        """What is raised by motions without gradients."""
+        """Return the error of motions without gradients."""
         return SolutionError(
             "gradients: only librations, circulations and motions with losses have them; "
             f"this motion is of kind {self.kind!r}"
