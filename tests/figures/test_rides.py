@@ -65,7 +65,7 @@ def test_seats_and_their_animation(tmp_path: Path) -> None:
     gqm.figures.animate(motion, tmp_path / "ride.gif", duration=0.3, rate=10)
     with Image.open(tmp_path / "ride.gif") as frames:
         assert frames.n_frames == 3
-    with pytest.raises(InputError, match="this body is no train"):
+    with pytest.raises(InputError, match="is not a train"):
         gqm.figures.seats(gqm.build(gqm.derive(track, gqm.Gravity()), name="hilly_body", folder=tmp_path).solve(0, 10))
 
 
