@@ -239,7 +239,7 @@ class SeparatedTerms(NamedTuple):
         ``f(op, p)`` gives what depends on parameters alone: a factor for each part of U, then for each of n0. ``p`` are
         the run-time parameters and what stands behind them.
     potentials, loads : int
-        How many parts U and n0 have.
+        The numbers of parts of U and n0.
     held : tuple of int
         Where in ``p`` the numbers stand that ``function`` reads.
     parts : callable or None

@@ -77,9 +77,9 @@ def dissipation(
     coordinates
         What the coordinates are along the curve, where a law of the user's own names them.
     signs
-        Of expressions on the curve.
+        The signs of expressions on the curve.
     cars_load
-        Of a train: the mean of |N|/m over its cars, in λ and W.
+        The mean of |N|/m over the cars of a train, in λ and W; None for one body.
     """
     v, nu = DIRECTION, CONTACT_SIGN
     # The curvature of a curve in no vertical plane has no sign.

@@ -67,7 +67,7 @@ def rider(banking: Banking, shape: Geometry, law: Forces, acceleration: sp.Expr,
     Parameters
     ----------
     banking
-        How the track is banked.
+        The banking of the track.
     shape, law
         The curve and the applied forces along it.
     acceleration

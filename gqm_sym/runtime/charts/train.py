@@ -43,7 +43,7 @@ class TrackOfTrain:
     track : ChartMaker
         The track by itself.
     cars : int
-        How many equal cars the train has.
+        The number of equal cars of the train.
     numbers
         ``f(op, p)``: the length of the train, the acceleration of gravity, and the coefficient of friction.
     length : int

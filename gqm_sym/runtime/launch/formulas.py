@@ -131,7 +131,7 @@ class Formulas:
     source, text : str
         The path of the module's file, and its text when it was imported: by them a motion is taken to another process.
     effective_potential, bounds : Emitted or None
-        Of a dissipative module: functions that only its equilibria need; a conservative one has them in ``functions``.
+        Functions for the equilibria of a dissipative module; a conservative one has them in ``functions``.
     units : mapping of str to str
         SI units of the curve's parameter and of the run-time parameters, as far as they are known; "1" of plain numbers
         and angles.
@@ -143,7 +143,7 @@ class Formulas:
     separated : SeparatedTerms or None
         Potential and load along a charted curve as sums of products; None where a table belongs to all parameters.
     path_in_space : Emitted or None
-        Of a space curve: what fills its third coordinate and the contact force as a vector.
+        The function that fills the third coordinate of a space curve and the contact force as a vector.
     signed : bool
         Whether the contact force has a sign: it has none on a space curve that lies in no vertical plane.
     sided : bool
@@ -152,7 +152,7 @@ class Formulas:
     directed : bool
         Whether the contact force depends on the sign of ds/dt: it does on a space curve in a frame that turns.
     rider_loads : Emitted or None
-        Of a track with a declared roll: what fills the loads on a rider.
+        The function that fills the loads on a rider of a banked track.
     """
 
     name: str

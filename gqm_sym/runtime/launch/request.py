@@ -50,7 +50,7 @@ class LaunchRequest(NamedTuple):
 
 
 class Launch(NamedTuple):
-    """Where and how a motion begins, in exact numbers.
+    """The launch of a motion, in exact numbers.
 
     Attributes
     ----------

@@ -189,7 +189,7 @@ class AperiodicMotion(Motion):
         return tuple(self._segments if count == inf else self._segments[: int(count)])
 
     def _segments_ahead(self) -> float:
-        """How many segments `legs` and `events` cover; infinite if there are not so many yet, or all lead to a pole."""
+        """The number of segments of `legs` and `events`; infinite if there are fewer so far, or all lead to a pole."""
         panels = 0
         for k, timed in enumerate(self._segments if self._is_endless else ()):
             panels += timed.segment.edges.size

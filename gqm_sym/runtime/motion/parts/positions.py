@@ -1,4 +1,4 @@
-"""Where the body of a motion is at a time: its states, their error, and the time at a place."""
+"""States of a motion at given times with their errors, and the time at a place."""
 
 from abc import ABC, abstractmethod
 from math import inf
@@ -30,7 +30,7 @@ class Positions(ABC):
     Attributes
     ----------
     kind, direction, problem
-        As of `Motion`.
+        As in `Motion`.
     """
 
     kind: MotionKind
