@@ -237,10 +237,10 @@ def own_time_error(record, begin, count):  # type: ignore[no-untyped-def]
 
 @entry(
     types.UniTuple(REAL, 3)(
-        DISSIPATION, VECTOR, types.boolean, types.NamedUniTuple(REAL, 3, Errors), REAL, VECTOR, VECTOR
+        DISSIPATION, VECTOR, types.boolean, types.NamedUniTuple(REAL, 3, Errors), REAL, REAL, VECTOR, VECTOR
     )
 )
-def carry(dissipation, p, turns, before, share, terms, record):  # type: ignore[no-untyped-def]
+def carry(dissipation, p, turns, before, share, lap, terms, record):  # type: ignore[no-untyped-def]
     """The errors at the end of a leg, which are those with which the next one begins.
 
     Parameters
@@ -254,6 +254,8 @@ def carry(dissipation, p, turns, before, share, terms, record):  # type: ignore[
     before : Errors
     share : float
         The relative error of what V**2 gains and loses by each of its terms (`rounding_share`).
+    lap : float
+        The period of a closed chart, which is read at places less whole laps; 0 of other curves.
     terms : array
         For each panel of the record the size of terms of the force that may cancel, 0 where that is not known.
     record : array
@@ -270,7 +272,7 @@ def carry(dissipation, p, turns, before, share, terms, record):  # type: ignore[
     forces = Forces(dissipation.speed_equation, p, dissipation.friction, dissipation.kinked, dissipation.linear, v)
     errors = (before.place, before.v2, share)
     first = half_of_leg(forces, forward, (HEAD, ahead), record[START_V2], errors, terms, record)
-    rounding = PLACE_ROUNDINGS * ULP * max(fabs(record[START]), fabs(record[END]))
+    rounding = PLACE_ROUNDINGS * ULP * max(fabs(record[START]), fabs(record[END]), lap)
     own = own_time_error(record, HEAD, ahead) + TIME_ROUNDINGS * ULP * record[TIME_FROM_START] + share * first.rounded
     if not turns or back == 0:
         moved = fabs(first.by_place - first.rate) * before.place + fabs(first.by_v2) * before.v2
