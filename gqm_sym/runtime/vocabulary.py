@@ -1,4 +1,4 @@
-"""All that emitted modules import: each name is fetched from the room it lives in when a module first asks for it.
+"""All that emitted modules import: each name is fetched from its room when a module first needs it.
 
 A room of the runtime may be moved without touching a module that was generated before.
 """
@@ -37,7 +37,9 @@ _NAMES_BY_HOME = {
     "charts.sampled": "Sampled",
     "charts.space.rail": "SpaceRail",
     "charts.tracing": "Traced",
-    "charts.train": "TrackOfTrain",
+    "charts.train": (
+        "TrackOfTrain train_load train_load_in_plane train_load_rate train_load_slope train_load_slope_in_plane"
+    ),
     "interface": (
         "AGM_ARGUMENTS_BATCH BOUNDS BOUNDS_BATCH BatchFunctions CompiledFunctions DissipativeFunctions "
         "EFFECTIVE_POTENTIAL ExactChartLaw ExactFormulas ExactLaw ExactPotential FIELD INTEGRAND_INVARIANTS_BATCH "

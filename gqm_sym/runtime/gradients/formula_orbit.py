@@ -46,7 +46,7 @@ PI, PI_LOW = np.pi, 1.2246467991473532e-16
 
 
 def source_of(formulas: Formulas) -> Source:
-    """What the programs of a module are recorded from.
+    """The formulas from which the programs of a module are recorded.
 
     Raises
     ------
@@ -109,7 +109,7 @@ class FormulaOrbitDerivatives(OrbitDerivatives):
         return self._ends_by(turning_point_program(self.source))
 
     def _ends_by(self, turns: Program) -> Array:
-        """What a program gives at both turning points, in double-double arithmetic, but for its first result."""
+        """Return the results of a program at both turning points except the first one, in double-double arithmetic."""
         assert self._orbit is not None
         high, low = np.array([self._orbit.low[:2], self._orbit.high[:2]]).T
         return values(turns, self.variables, high.copy(), low.copy())[1:]
@@ -129,7 +129,7 @@ class FormulaOrbitDerivatives(OrbitDerivatives):
 
     @property
     def _program(self) -> Program:
-        """What is integrated along the orbit."""
+        """Return the integrand along the orbit."""
         return circulation_program(self.source, self.direction) if self.direction else libration_program(self.source)
 
     @cached_property
@@ -186,7 +186,7 @@ class FormulaOrbitDerivatives(OrbitDerivatives):
 
     def _over_phase(self, found: Array) -> Array:
         """The integrals over a half period, or over a lap, from means."""
-        is_zero = np.abs(found[:, 0]) <= found[:, 2]  # as far as double-double arithmetic can tell
+        is_zero = np.abs(found[:, 0]) <= found[:, 2]  # within the rounding of double-double arithmetic
         high, low = np.where(is_zero, 0.0, found[:, :2].T)
         integrals: Array = high + low if self.direction else PI * high + (PI * low + PI_LOW * high)
         return integrals

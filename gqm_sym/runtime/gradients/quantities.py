@@ -27,7 +27,7 @@ def selected(parameters: Iterable[str], wrt: Any) -> dict[str, int]:
     Raises
     ------
     InputError
-        If a name is none of a run-time parameter, ``lam0`` and ``v0``.
+        If a name is neither a run-time parameter nor ``lam0`` or ``v0``.
     """
     rows = {name: row for row, name in enumerate((*parameters, "lam0", "v0"))}
     wanted = ("lam0", "v0", *parameters) if wrt is None else names(wrt, where="wrt")

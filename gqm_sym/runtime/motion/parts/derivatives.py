@@ -1,4 +1,4 @@
-"""How the answers of a motion change with its launch and its parameters, and the spectrum of one that repeats."""
+"""Derivatives of a motion with respect to launch and parameters, and the spectrum of a periodic motion."""
 
 from typing import Any
 
@@ -177,13 +177,13 @@ class Derivatives(Positions):
         raise SolutionError(f"fourier: only a motion that repeats has coefficients; it is of kind {self.kind!r}")
 
     def _without_period(self, asked: str) -> SolutionError:
-        """What is raised by motions that do not repeat, by the name of what was asked for."""
+        """Return the error of motions that do not repeat, with the name of the requested quantity."""
         return SolutionError(
             f"{asked}: only a libration or a circulation has one; this motion is of kind {self.kind!r}"
         )
 
     def _without_gradients(self) -> SolutionError:
-        """What is raised by motions without gradients."""
+        """Return the error of motions without gradients."""
         return SolutionError(
             "gradients: only librations, circulations and motions with losses have them; "
             f"this motion is of kind {self.kind!r}"
