@@ -88,7 +88,7 @@ from typing import Any, NamedTuple
 from numba import types
 
 # Raised with every change of a signature here, or of a number that runtime code puts into generated modules.
-INTERFACE = 10
+INTERFACE = 11
 
 REAL = types.float64
 MANY = types.CPointer(REAL)

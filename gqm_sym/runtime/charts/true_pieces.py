@@ -27,6 +27,7 @@ from gqm_sym.runtime.compiled.types import INTEGER, MATRIX, REAL, VECTOR, Array
 from gqm_sym.runtime.double_double.arithmetic import (
     UNIT,
     add,
+    divide,
     fast_sum,
     multiply,
     sine_and_cosine,
@@ -49,10 +50,11 @@ MAX_LAST_STEP, MAX_STEPS = 1e-17, 12
 # The tangent turns by no larger angle on a piece that polynomials of degree 15 resolve.
 MAX_PIECE_TURN = 4.0
 
-# Columns of the points that `fill_points` fills: x, z and their derivatives by u, two doubles each.
-X, X_LOW, Z, Z_LOW, DX, DX_LOW, DZ, DZ_LOW = range(0, 8 * RULE, RULE)
+# Columns of the points that `fill_points` fills: x, z and their derivatives by u, two doubles each; and of `fill_path`
+# the length of the path over that of the curve.
+X, X_LOW, Z, Z_LOW, DX, DX_LOW, DZ, DZ_LOW, SHARE = range(0, 9 * RULE, RULE)
 
-stacked_points, stacked_places = on_stack(8 * RULE), on_stack(2 * RULE)
+stacked_points, stacked_places, stacked_bends = on_stack(9 * RULE), on_stack(2 * RULE), on_stack(4 * RULE)
 
 
 class TrueCurve(NamedTuple):
@@ -76,6 +78,8 @@ class TrueCurve(NamedTuple):
         The nodes and weights of a Gauss-Legendre rule (`nodes.legendre_rule`).
     tails : (2, RULE) array
         Factors that take weighted values at its nodes to the last two Legendre coefficients.
+    offset : (float, float)
+        How far to the left of the curve a body's path lies, as two doubles: the radius of a rolling body, else 0.
     """
 
     terms: Any
@@ -86,10 +90,15 @@ class TrueCurve(NamedTuple):
     period: Any
     rule: Any
     tails: Any
+    offset: Any = (0.0, 0.0)
 
 
 TRUE_CURVE = types.NamedTuple(
-    (types.float64[:, :, ::1], types.int64[:, ::1], MATRIX, MATRIX, VECTOR, REAL, MATRIX, MATRIX), TrueCurve
+    (
+        *(types.float64[:, :, ::1], types.int64[:, ::1], MATRIX, MATRIX, VECTOR, REAL, MATRIX, MATRIX),
+        types.UniTuple(REAL, 2),
+    ),
+    TrueCurve,
 )
 
 
@@ -112,6 +121,7 @@ def unshared(curve):  # type: ignore[no-untyped-def]
         curve.period,
         uncounted(curve.rule),
         uncounted(curve.tails),
+        curve.offset,
     )
 
 
@@ -143,6 +153,73 @@ def fill_points(curve, number, n, u, points):  # type: ignore[no-untyped-def]
                 slope[i], slope_low[i] = nearly_add(s, s_low, value[i], value_low[i])
                 s, s_low = multiply(value[i], value_low[i], u[i], u[RULE + i])
                 value[i], value_low[i] = nearly_add(s, s_low, term, term_low)
+
+
+@Inner
+def fill_bends(curve, number, n, u, bends):  # type: ignore[no-untyped-def]
+    """Fill the second derivatives of x and z by u at places on a piece, two doubles each."""
+    k = piece_of(curve, number)
+    precise, count = curve.counts[k, 0], curve.counts[k, 1]
+    for row in range(2):
+        bend, bend_low = bends[2 * row * RULE :], bends[(2 * row + 1) * RULE :]
+        for i in range(n):
+            bend[i], bend_low[i] = 0.0, 0.0
+        for j in range(count - 1, 1, -1):
+            term, term_low = multiply(curve.terms[k, 2 * row, j], curve.terms[k, 2 * row + 1, j], j * (j - 1.0), 0.0)
+            for i in range(n):
+                if j >= precise:
+                    bend[i] = fma(bend[i], u[i], term)
+                else:
+                    s, s_low = multiply(bend[i], bend_low[i], u[i], u[RULE + i])
+                    bend[i], bend_low[i] = nearly_add(s, s_low, term, term_low)
+
+
+@Inner
+def fill_path(curve, number, n, u, points):  # type: ignore[no-untyped-def]
+    """Fill the points of a body's path at places on a piece of the curve, as `fill_points` does those of the curve.
+
+    A path at a distance h to the left is r + h*n with the unit normal n, and ``1 - h*kappa`` times as long as the curve.
+
+    Returns
+    -------
+    (float, float)
+        Bounds on the errors of the coordinates, and of their derivatives by u.
+    """
+    fill_points(curve, number, n, u, points)
+    k, (h, h_low) = piece_of(curve, number), curve.offset
+    error, rate_error = curve.errors[k, 0], curve.errors[k, 1]
+    if h == 0.0:
+        points[SHARE : SHARE + n] = 1.0
+        return error, rate_error
+    bends, away, away_rate = stacked_bends(), 0.0, 0.0
+    fill_bends(curve, number, n, u, bends)
+    for i in range(n):
+        dx, dz = (points[DX + i], points[DX_LOW + i]), (points[DZ + i], points[DZ_LOW + i])
+        s, s_low = multiply(dx[0], dx[1], dx[0], dx[1])
+        t, t_low = multiply(dz[0], dz[1], dz[0], dz[1])
+        square, square_low = add(s, s_low, t, t_low)
+        speed, speed_low = square_root(square, square_low)
+        ahead, ahead_low = divide(h, h_low, speed, speed_low)
+        s, s_low = multiply(dx[0], dx[1], bends[2 * RULE + i], bends[3 * RULE + i])
+        t, t_low = multiply(dz[0], dz[1], bends[i], bends[RULE + i])
+        turn, turn_low = add(s, s_low, -t, -t_low)
+        turn, turn_low = divide(turn, turn_low, square, square_low)
+        s, s_low = multiply(ahead, ahead_low, turn, turn_low)
+        share, share_low = add(1.0, 0.0, -s, -s_low)
+        bend = fabs(bends[i]) + fabs(bends[2 * RULE + i])
+        # Second derivatives have an error of up to NODES**2 times that of the first ones, by Markov's inequality.
+        angle_error = fabs(ahead) * rate_error
+        turn_error = fabs(ahead) * (rate_error * (NODES**2 + 4.0 * bend / speed) + 16.0 * UNIT * bend)
+        away = max(away, angle_error + 8.0 * UNIT * fabs(h))
+        away_rate = max(away_rate, fabs(share) * rate_error + turn_error + 8.0 * UNIT * speed)
+        s, s_low = multiply(ahead, ahead_low, dz[0], dz[1])
+        points[X + i], points[X_LOW + i] = add(points[X + i], points[X_LOW + i], -s, -s_low)
+        s, s_low = multiply(ahead, ahead_low, dx[0], dx[1])
+        points[Z + i], points[Z_LOW + i] = add(points[Z + i], points[Z_LOW + i], s, s_low)
+        points[DX + i], points[DX_LOW + i] = multiply(dx[0], dx[1], share, share_low)
+        points[DZ + i], points[DZ_LOW + i] = multiply(dz[0], dz[1], share, share_low)
+        points[SHARE + i] = share
+    return error + away, away_rate
 
 
 @Inner

@@ -14,12 +14,13 @@ import numpy as np
 from numba import types
 
 from gqm_sym.literals.numbers import Number
-from gqm_sym.runtime.arithmetic.doubledouble import minus, plus
+from gqm_sym.runtime.arithmetic.doubledouble import ZERO, Pair, minus, plus
 from gqm_sym.runtime.charts.true_pieces import (
     DX,
     DX_LOW,
     DZ,
     DZ_LOW,
+    SHARE,
     TRUE_CURVE,
     X_LOW,
     Z_LOW,
@@ -27,7 +28,7 @@ from gqm_sym.runtime.charts.true_pieces import (
     X,
     Z,
     arc_between,
-    fill_points,
+    fill_path,
     foot,
     piece_of,
     place_at,
@@ -106,19 +107,22 @@ def fill_registers(tape, work, n, points, error):  # type: ignore[no-untyped-def
 
 @Inner
 def energy_at(path, number, at):  # type: ignore[no-untyped-def]
-    """Return at a place on a piece the potential (two doubles, error), its derivative by u, and that of arc length."""
+    """Return at a place on a piece the potential (two doubles, error), its derivative by u, and that of arc length.
+
+    The potential is that of the body's path, arc length that of the curve.
+    """
     curve, tape, work, _ = path
     address, operations, parts, registers = tape
     u, points = stacked_places(), stacked_points()
     u[0], u[RULE] = at
-    fill_points(curve, number, 1, u, points)
-    fill_registers(tape, work, 1, points, curve.errors[piece_of(curve, number), 0])
+    error, _ = fill_path(curve, number, 1, u, points)
+    fill_registers(tape, work, 1, points, error)
     call_interpreter(address, operations, parts[0], parts[2], work, 1)
     value, by_x, by_z = registers[2], registers[3], registers[4]
     s, s_low = multiply(work[by_x], work[by_x + LOW], points[DX], points[DX_LOW])
     t, t_low = multiply(work[by_z], work[by_z + LOW], points[DZ], points[DZ_LOW])
     slope = add(s, s_low, t, t_low)
-    speed = sqrt(points[DX] * points[DX] + points[DZ] * points[DZ])
+    speed = sqrt(points[DX] * points[DX] + points[DZ] * points[DZ]) / fabs(points[SHARE])
     return (work[value], work[value + LOW], work[value + ERROR]), slope, speed
 
 
@@ -153,11 +157,10 @@ def panel_time(path, number, left, right, spread):  # type: ignore[no-untyped-de
     u, points, factors, sums = stacked_places(), stacked_points(), stacked_places(), stacked_sums()
     width = add(right[0], right[1], -left[0], -left[1])
     fill_places(curve, left, width, spread, u, factors)
-    fill_points(curve, number, RULE, u, points)
-    k = piece_of(curve, number)
-    fill_registers(tape, work, RULE, points, curve.errors[k, 0])
+    error, rate_error = fill_path(curve, number, RULE, u, points)
+    fill_registers(tape, work, RULE, points, error)
     call_interpreter(address, operations, parts[0], parts[1], work, RULE)
-    potential, rate_error = work[registers[2] : registers[2] + ROW], curve.errors[k, 1]
+    potential = work[registers[2] : registers[2] + ROW]
     from_turn, q, shift, rate = spread[0] != 0.0 and left[0] == 0.0, 1.0, level[3], 0.0
     for i in range(RULE):
         half, half_low = add(level[0], level[1], -potential[i], -potential[LOW + i])
@@ -470,11 +473,15 @@ class ChartPassage:
         What `locate` has found; it is an attribute, too.
     direction : int
         0 for a libration, else the sign of ds/dt on a lap.
+    offset : pair of float
+        How far to the left of the curve the body's path lies (`TrueCurve`).
     """
 
-    def __init__(self, pieces: TruePieces, formulas: BoundTape, found: Array, direction: int) -> None:
+    def __init__(
+        self, pieces: TruePieces, formulas: BoundTape, found: Array, direction: int, offset: Pair = ZERO
+    ) -> None:
         self._pieces, self.found, self._direction = pieces, found, direction
-        self._given = pieces.curve, *formulas.operands, found
+        self._given = pieces.curve._replace(offset=offset), *formulas.operands, found
 
     def _times(self, stops: Array, middle: int) -> Array:
         """The times to stops, with errors (`fill_passage`)."""
@@ -545,6 +552,7 @@ def pass_along(
     launch: tuple[Number, Number, tuple[Number, Number] | None],
     ends: tuple[float, float],
     direction: int,
+    offset: Pair = ZERO,
 ) -> ChartPassage | None:
     """Return an orbit along a chart; None where double-double arithmetic does not suffice.
 
@@ -560,6 +568,8 @@ def pass_along(
         The turning points of a libration, or the ends of a lap, as doubles know them.
     direction : int
         0 for a libration, else the sign of ds/dt on a lap.
+    offset : pair of float
+        How far to the left of the curve the body's path lies.
     """
     lam0, v0, point = launch
     begin, count = pieces.begin, len(pieces.curve.counts)
@@ -572,7 +582,7 @@ def pass_along(
     given = *length, v0.value, v0.low, float(point is not None), x.value, x.low, z.value, z.low
     found = np.full((ROWS, COLUMNS), nan)
     found[LAUNCH, 3] = pieces.doubt + UNIT * max(abs(x.value), abs(z.value))
-    passage = ChartPassage(pieces, formulas, found, direction)
+    passage = ChartPassage(pieces, formulas, found, direction, offset)
     curve, tape, work, p, _ = passage._given
     locate(curve, tape, work, p, given, (*ends, float(direction != 0)), begin, found)
     if direction == 0:

@@ -65,7 +65,7 @@ class PeriodicMotion(PeriodicTimes):
 
     def _derivatives_along_chart(self, direction: int) -> ChartOrbitDerivatives:
         segment, f = self._segment, self.problem.functions
-        if self.problem.true_pieces is None or self.problem.tape is None:
+        if self.problem.true_pieces is None or self.problem.tape is None or self.problem.formulas.rolling_radius:
             raise without_formulas()
         passage = timing.passage_of(self.problem, self.kind, self.direction, self._offsets)
         if passage is None:

@@ -91,7 +91,8 @@ def passage_of(problem: Problem, kind: str, direction: int, offsets: tuple[float
     sense = direction if kind == "circulation" else 0
     ways = (0.0, direction * problem.period) if sense else (-offsets[0], offsets[1])
     low, high = sorted(launch.lam0.value + way for way in ways)
-    return pass_along(pieces, formulas, (launch.lam0, launch.v0, launch.point), (low, high), sense)
+    given, offset = (launch.lam0, launch.v0, launch.point), problem.formulas.offset(problem.p)
+    return pass_along(pieces, formulas, given, (low, high), sense, offset)
 
 
 def times_along(segment: Segment, *, is_thrown: bool) -> Array:
