@@ -178,7 +178,8 @@ def fill_bends(curve, number, n, u, bends):  # type: ignore[no-untyped-def]
 def fill_path(curve, number, n, u, points):  # type: ignore[no-untyped-def]
     """Fill the points of a body's path at places on a piece of the curve, as `fill_points` does those of the curve.
 
-    A path at a distance h to the left is r + h*n with the unit normal n, and ``1 - h*kappa`` times as long as the curve.
+    A path at a distance h to the left is r + h*n with the unit normal n; its arc length element is ``1 - h*kappa``
+    times that of the curve.
 
     Returns
     -------

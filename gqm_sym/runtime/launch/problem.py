@@ -140,8 +140,8 @@ def tape_of(formulas: "Formulas", p: "ParameterValues") -> BoundTape | None:
 def exact_problem(formulas: "Formulas", p: "ParameterValues", launch: "Launch") -> ExactProblem | None:
     """The problem of one launch in extended precision.
 
-    It is None if the curve is known in doubles only, and for the path of a body beside a charted curve, of which double-double
-    arithmetic has the most digits.
+    It is None if the curve is known in doubles only, and for the path of a body beside a charted curve: of that
+    double-double arithmetic has the most digits.
     """
     exact, maker = formulas.exact, formulas.chart
     if isinstance(exact, ExactFormulas) and formulas.domain_of is not None:
