@@ -64,7 +64,7 @@ class SpaceFunction(ChartFunction):
     axis
         The coordinate, or ``roll``.
     order
-        How often it is differentiated.
+        The order of the derivative.
     """
 
     axis: ClassVar[str]

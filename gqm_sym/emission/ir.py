@@ -104,7 +104,7 @@ class SeparatedIR:
     parts : ExactIR or None
         What depends on the place of the potential, by coordinates; None where it depends on more.
     potentials : int
-        How many of the products belong to the potential.
+        The number of products that belong to the potential.
     """
 
     function: FunctionIR

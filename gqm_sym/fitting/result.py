@@ -1,4 +1,4 @@
-"""What a fit found, as numbers, text and a figure."""
+"""The result of a fit, as numbers, text and a figure."""
 
 from dataclasses import dataclass
 from math import isfinite
@@ -18,24 +18,23 @@ class Fit:
     Attributes
     ----------
     names : tuple of str
-        What was found, in the order of ``covariance``.
+        The names that were fitted, in the order of ``covariance``.
     estimates : dict
         The value of each in its unit.
     std : dict
-        The standard deviation of each; infinite where the data do not tell it.
+        The standard deviation of each; infinite where the data do not determine it.
     covariance : (k, k) array
-        The covariance of the estimates. Without ``sigma`` it is scaled so that the residuals have the deviation that
-        they show.
+        The covariance of the estimates. Without ``sigma`` it is scaled by the deviation of the residuals.
     residuals : dict
-        Measured less fitted values, for each quantity, in its unit.
+        Measured minus fitted values, for each quantity, in its unit.
     chi2 : float
         The sum of squares of the residuals in standard deviations; without ``sigma`` in SI units.
     degrees_of_freedom : int
-        The number of measurements less that of the combinations of parameters that they tell.
+        The number of measurements minus ``rank``.
     rank : int
-        How many independent combinations of what was sought the data tell.
+        The number of independent combinations of the unknowns that the data determine.
     unidentified : tuple of tuples of str
-        The names that the data cannot tell apart, for each combination that changes nothing that was measured.
+        For each combination of unknowns without effect on the measured values, the names in it.
     arguments : dict
         All arguments of ``module.solve`` that give the fitted motion.
     measured : data.Measurements
@@ -56,7 +55,7 @@ class Fit:
 
     @property
     def correlation(self) -> Array:
-        """The correlations of the estimates, a (k, k) array; NaN where the data do not tell them."""
+        """The correlations of the estimates, a (k, k) array; NaN where the data do not determine them."""
         with np.errstate(invalid="ignore"):
             deviations = np.sqrt(np.diag(self.covariance))
             correlation: Array = self.covariance / np.outer(deviations, deviations)
@@ -118,7 +117,7 @@ class Fit:
         return figure
 
     def _across(self, count: int) -> tuple[Array, str]:
-        """What the horizontal axis shows: times, the only column that differs, or numbers."""
+        """Return the values of the horizontal axis: times, the only column that differs, or numbers."""
         if self.measured.t is not None:
             return self.measured.t, "t (s)"
         if len(self.measured.columns) == 1:
@@ -128,7 +127,7 @@ class Fit:
 
 
 def with_deviation(value: float, std: float) -> str:
-    """Return a value with its standard deviation as text, with the two digits that tell something of it."""
+    """Return a value with its standard deviation as text, with two digits of the latter."""
     if not isfinite(std):
         return f"{value:.6g}, not determined"
     if std == 0.0:

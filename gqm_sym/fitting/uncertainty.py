@@ -1,4 +1,4 @@
-"""How uncertain an answer is where launch and parameters are: by derivatives, and by many exact answers."""
+"""The uncertainty of an answer from that of launch and parameters: by derivatives, and by many exact answers."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -26,7 +26,15 @@ STEP = 1e-5
 
 
 class Estimate(NamedTuple):
-    """A value and its standard deviation, in the same unit."""
+    """A value with its standard deviation.
+
+    Attributes
+    ----------
+    value : float
+        The value, in the unit of its quantity.
+    std : float
+        The standard deviation, in the same unit.
+    """
 
     value: float
     std: float
@@ -39,17 +47,17 @@ class Uncertainty:
     Attributes
     ----------
     quantity : str
-        What was asked.
+        The name of the quantity.
     linear : Estimate
-        The answer for the given values, and its standard deviation by the derivatives there.
+        The answer for the given values, and its standard deviation from the derivatives there.
     sampled : Estimate
         Mean and standard deviation of the answers for values that were drawn at random.
     gradient : dict
-        The derivative of the answer by each uncertain number.
+        The derivative of the answer with respect to each uncertain number.
     samples : array
-        The answers for the values that were drawn, without those for which there is none.
+        The answers for the values that were drawn, as far as there are answers.
     missing : int
-        For how many of them there is none.
+        The number of drawn values without an answer.
     """
 
     quantity: str
@@ -95,9 +103,9 @@ def uncertainty(
         Run-time parameters, "lam0" or "v0", each with its value and its standard deviation: ``{"L": (1.0, 1e-3)}``.
         They are independent and normally distributed. Or the result of `fit`, with its covariance.
     samples : int
-        How many values are drawn.
+        The number of values that are drawn.
     seed : int
-        Of the random numbers; the same seed gives the same samples.
+        The seed of the random numbers; the same seed gives the same samples.
     fixed
         All else of the launch and the parameters, as for ``module.sweep``.
 
@@ -110,7 +118,7 @@ def uncertainty(
     Raises
     ------
     InputError
-        If a name is unknown, a standard deviation is negative, or the data of a fit do not tell what it found.
+        If a name is unknown, a standard deviation is negative, or the data of a fit do not determine its estimates.
     SolutionError
         If the motion does not have the quantity.
 
@@ -190,7 +198,7 @@ def _read(model: CompiledModel, uncertain: Any, fixed: Mapping[str, Any]) -> tup
 
 
 def _draws(covariance: Array, samples: int, seed: int) -> Array:
-    """Return normally distributed numbers of mean zero, the same on every machine but for rounding."""
+    """Return normally distributed numbers of mean zero, which are the same on every machine up to rounding."""
     deviations = np.sqrt(np.diag(covariance))
     scale = np.where(deviations > 0.0, deviations, 1.0)
     correlation = covariance / np.outer(scale, scale)

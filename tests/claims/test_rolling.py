@@ -19,7 +19,8 @@ ROUNDINGS = 8 * 2.0**-53
 NEAREST = 0.51
 # Of a swing along a chart that is too small for double-double arithmetic, in doubles; worst measured: 1.4.
 SMALL_ULPS = 2.0
-# Errors of double-double arithmetic beside a curve, as shares; worst measured: 7e-18 for a thousandth of a radian and a ball that all but fits.
+# Errors of double-double arithmetic beside a curve, as shares; worst measured: 7e-18 for a thousandth of a radian and a
+# ball that all but fills its track.
 USEFUL_ERROR = 1e-17
 # Of charted curves at t < 100 s, relative to the size of the curve.
 EARLY = 1e-13

@@ -22,6 +22,7 @@ from gqm_sym.runtime.interface import (
     BatchFunctions,
     CompiledFunctions,
     DissipativeFunctions,
+    ExactChartLaw,
     ExactFormulas,
     ExactLaw,
     ExactPotential,
@@ -46,7 +47,7 @@ class ParameterValues(tuple[Number, ...]):
         The compiled functions bound to these values, once they have been asked for.
     tape : double_double.recording.BoundTape or None
         The exact formulas as a tape, once it has been asked for; False if there is none.
-    true_pieces : charts.true_pieces.TruePieces or None
+    true_pieces : charts.double_double.pieces.TruePieces or None
         A charted curve in double-double arithmetic, once it has been asked for; False if there is no such thing.
     columns : tuple of lists of arrays or None
         What sweeps lay out of them (`sweep.columns`), once one has been asked for.
@@ -118,7 +119,7 @@ class Formulas:
     monotone : bool
         Whether it is proved that V**2 rises or falls all the way between two neighbouring axes, and that ds vanishes
         nowhere.
-    exact : ExactFormulas, ExactPotential, ExactLaw or None
+    exact : ExactFormulas, ExactPotential, ExactLaw, ExactChartLaw or None
         The formulas over a namespace of operations; those of the forces only for a charted curve.
     chart : ChartMaker or None
         What makes the chart of a curve that has no formulas.
@@ -131,7 +132,7 @@ class Formulas:
     source, text : str
         The path of the module's file, and its text when it was imported: by them a motion is taken to another process.
     effective_potential, bounds : Emitted or None
-        Of a dissipative module: functions that only its equilibria need; a conservative one has them in ``functions``.
+        Functions for the equilibria of a dissipative module; a conservative one has them in ``functions``.
     units : mapping of str to str
         SI units of the curve's parameter and of the run-time parameters, as far as they are known; "1" of plain numbers
         and angles.
@@ -143,11 +144,11 @@ class Formulas:
     separated : SeparatedTerms or None
         Potential and load along a charted curve as sums of products; None where a table belongs to all parameters.
     path_in_space : Emitted or None
-        Of a space curve: what fills its third coordinate and the contact force as a vector.
+        The function that fills the third coordinate of a space curve and the contact force as a vector.
     signed : bool
         Whether the contact force has a sign: it has none on a space curve that lies in no vertical plane.
     rider_loads : Emitted or None
-        Of a track with a declared roll: what fills the loads on a rider.
+        The function that fills the loads on a rider of a banked track.
     """
 
     name: str
@@ -158,7 +159,7 @@ class Formulas:
     domain_of: Callable[..., Any] | None = None
     axes_of: Callable[..., Any] | None = None
     monotone: bool = False
-    exact: ExactFormulas | ExactLaw | ExactPotential | None = None
+    exact: ExactFormulas | ExactLaw | ExactPotential | ExactChartLaw | None = None
     chart: ChartMaker | None = None
     dissipation: DissipativeFunctions | None = None
     load_map: Emitted | None = None
@@ -235,10 +236,10 @@ class Formulas:
         return values if isinstance(values, tuple) else (values,)
 
     def separated_factors(self, p: Sequence[Array]) -> list[Array]:
-        """What stands before the parts of potential and load (`interface.SeparatedTerms`), for arrays of parameters.
+        """Return the factors of the parts of potential and load (`interface.SeparatedTerms`), for arrays of parameters.
 
-        A factor does not depend on how many others are asked for: elementary functions of NumPy may differ in their
-        last bits between single numbers and arrays, and between arrays with and without gaps.
+        A factor does not depend on the number of others that are computed with it: elementary functions of NumPy may
+        differ in their last bits between single numbers and arrays, and between arrays with and without gaps.
         """
         assert self.separated is not None
         with np.errstate(all="ignore"):

@@ -1,4 +1,4 @@
-"""How errors grow along a leg: of the place where it begins, of V**2 there and of the time, by their derivatives.
+"""The propagation of errors along a leg: of its start, of V**2 there and of the time, by their derivatives.
 
 Let the body start at a, at rest, and turn at b. With q the integral of Q from a on, V**2 at a place changes by
 ``-P(a) exp(-q) da``, and so the turn by ``db/da = P(a) exp(-q)/P(b)``. At a given distance from a, V**2 changes by
@@ -7,7 +7,7 @@ run. From b to the middle it is the same with the direction reversed. What round
 last place of all that its terms gained and lost, less what resistance has taken of that; this also changes the time.
 What drives the body and what resists it may all but cancel: the sum of their sizes is the larger one of the forces on
 bodies that move in either direction. Terms of the force on a body at rest may cancel too: how large they are follows
-from a running bound on the roundings of the module's formulas (`variations.equation.Law.force_errors`). A law that is
+from a running bound on the roundings of the module's formulas (`variations.law.FormulaLaw.force_errors`). A law that is
 not linear in V**2 has a root at the turn, of which panels that run into it may have nine digits; those that are
 followed back from it have all. By how much they disagree in the middle is by how much the turn is off.
 """
@@ -25,7 +25,25 @@ from gqm_sym.runtime.compiled.jit import Inner, entry
 from gqm_sym.runtime.compiled.registers import on_stack, uncounted
 from gqm_sym.runtime.compiled.types import REAL, VECTOR, Array
 from gqm_sym.runtime.legs.advance import DISSIPATION
-from gqm_sym.runtime.legs.leg_equation import (
+from gqm_sym.runtime.legs.leg_reading import march_of
+from gqm_sym.runtime.legs.leg_record import (
+    AHEAD,
+    BACK,
+    COLUMNS,
+    END,
+    END_LOW,
+    HEAD,
+    INHERITED,
+    NORMAL_LOAD,
+    RIGHT,
+    START,
+    START_LOW,
+    START_V2,
+    TIME_ERROR,
+    TIME_FROM_END,
+    TIME_FROM_START,
+)
+from gqm_sym.runtime.legs.panels.equation import (
     ARC_RATE,
     DS,
     EXPM1_Q,
@@ -49,26 +67,8 @@ from gqm_sym.runtime.legs.leg_equation import (
     slope_at,
     solve_panel,
 )
-from gqm_sym.runtime.legs.leg_reading import march_of
-from gqm_sym.runtime.legs.leg_record import (
-    AHEAD,
-    BACK,
-    COLUMNS,
-    END,
-    END_LOW,
-    HEAD,
-    INHERITED,
-    NORMAL_LOAD,
-    RIGHT,
-    START,
-    START_LOW,
-    START_V2,
-    TIME_ERROR,
-    TIME_FROM_END,
-    TIME_FROM_START,
-)
-from gqm_sym.runtime.legs.leg_run import LEAST_V2, point_buffer, slope_of_v2
-from gqm_sym.runtime.legs.polynomials import COUNT, SHARES, TO_COEFFICIENTS, WIDE, to_tails
+from gqm_sym.runtime.legs.panels.point import LEAST_V2, point_buffer, slope_of_v2
+from gqm_sym.runtime.legs.panels.polynomials import COUNT, SHARES, TO_COEFFICIENTS, WIDE, to_tails
 
 # Roundings of V**2, of a place and of a time, in units in the last place. Laws that are not linear in V**2 take many
 # panels to a turn, each of which rounds V**2.
@@ -110,7 +110,7 @@ class Errors(NamedTuple):
 
 
 class Half(NamedTuple):
-    """What some panels say of the motion between the place where they begin and the middle of the run.
+    """Data of some panels on the motion between the place where they begin and the middle of the run.
 
     Attributes
     ----------
@@ -172,7 +172,7 @@ def half_of_leg(forces, march, panels, v2, errors, terms, record):  # type: igno
         panel becomes the largest error that these make in the times to places of the panel that are given by their
         distance from there.
     terms : array
-        As of `carry`.
+        As in `carry`.
     """
     work = panel_buffer()
     set_nodes(work)
@@ -237,10 +237,10 @@ def own_time_error(record, begin, count):  # type: ignore[no-untyped-def]
 
 @entry(
     types.UniTuple(REAL, 3)(
-        DISSIPATION, VECTOR, types.boolean, types.NamedUniTuple(REAL, 3, Errors), REAL, VECTOR, VECTOR
+        DISSIPATION, VECTOR, types.boolean, types.NamedUniTuple(REAL, 3, Errors), REAL, REAL, VECTOR, VECTOR
     )
 )
-def carry(dissipation, p, turns, before, share, terms, record):  # type: ignore[no-untyped-def]
+def carry(dissipation, p, turns, before, share, lap, terms, record):  # type: ignore[no-untyped-def]
     """The errors at the end of a leg, which are those with which the next one begins.
 
     Parameters
@@ -254,6 +254,8 @@ def carry(dissipation, p, turns, before, share, terms, record):  # type: ignore[
     before : Errors
     share : float
         The relative error of what V**2 gains and loses by each of its terms (`rounding_share`).
+    lap : float
+        The period of a closed chart, which is read at places less whole laps; 0 of other curves.
     terms : array
         For each panel of the record the size of terms of the force that may cancel, 0 where that is not known.
     record : array
@@ -263,14 +265,14 @@ def carry(dissipation, p, turns, before, share, terms, record):  # type: ignore[
     Returns
     -------
     place, v2, time : float
-        As of `Errors`.
+        As in `Errors`.
     """
     p, record, forward = uncounted(p), uncounted(record), march_of(record)
     ahead, back, v = int(record[AHEAD]), int(record[BACK]), forward.direction
     forces = Forces(dissipation.speed_equation, p, dissipation.friction, dissipation.kinked, dissipation.linear, v)
     errors = (before.place, before.v2, share)
     first = half_of_leg(forces, forward, (HEAD, ahead), record[START_V2], errors, terms, record)
-    rounding = PLACE_ROUNDINGS * ULP * max(fabs(record[START]), fabs(record[END]))
+    rounding = PLACE_ROUNDINGS * ULP * max(fabs(record[START]), fabs(record[END]), lap)
     own = own_time_error(record, HEAD, ahead) + TIME_ROUNDINGS * ULP * record[TIME_FROM_START] + share * first.rounded
     if not turns or back == 0:
         moved = fabs(first.by_place - first.rate) * before.place + fabs(first.by_v2) * before.v2

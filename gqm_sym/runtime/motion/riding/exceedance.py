@@ -1,4 +1,4 @@
-"""How long a load on the rider is beyond a level: between the places where it equals that level.
+"""The times for which a load on the rider is beyond a level: between the places where it equals that level.
 
 Along each stretch of a motion the load is a smooth function of the phase angle. It is written as Chebyshev polynomials
 on parts that are halved until they resolve it; all roots of these are known, and one step on the load itself makes each
@@ -34,7 +34,7 @@ Span: TypeAlias = tuple[float, float]
 
 
 class Exceedance(NamedTuple):
-    """How long a load is beyond each of some levels.
+    """The times for which a load is beyond each of some levels.
 
     Attributes
     ----------
@@ -43,7 +43,8 @@ class Exceedance(NamedTuple):
     total : float or array
         The times in s for which the load is beyond them, over one period or over the whole motion.
     longest : float or array
-        The longest of these times without a break. It is infinite where a motion that repeats is beyond a level always.
+        The longest of these times without interruption, in s. It is infinite where a motion that repeats is always
+        beyond the level.
     allowed : float or array or None
         The longest time in s that the limits allow at each level: infinite below all of them, 0 above. None if no
         limits were given.
@@ -77,7 +78,7 @@ class _Part(NamedTuple):
 
 
 def exceedance(motion: Any, load: str, levels: Any, side: str, limits: Any) -> Exceedance:
-    """How long a load is beyond levels; the arguments are those of `Motion.exceedance`."""
+    """Return the times for which a load is beyond levels; the arguments are those of `Motion.exceedance`."""
     quantity, sign = load_of(load, motion.problem), _sign(side)
     asked = _numbers(levels, "levels")
     allowed = None if limits is None else _allowed(asked.reshape(-1), _limits(limits, sign), sign).reshape(asked.shape)

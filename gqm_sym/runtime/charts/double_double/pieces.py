@@ -1,0 +1,423 @@
+"""The curve behind a chart in double-double arithmetic: polynomials of its coordinates, one pair for each piece.
+
+A chart is accurate to the rounding of doubles. Here the coordinates of the curve itself are sampled on each piece of
+the chart, in a parameter u in [-1, 1] that the kind of the curve chooses, and a polynomial of degree 31 goes through
+the samples. As the chart's polynomials of degree 15 are accurate to 16 digits, these are accurate to some 31. A piece
+is made when a motion first passes it, and kept for all motions along the curve.
+"""
+
+from bisect import bisect_right
+from collections.abc import Callable
+from functools import cache, cached_property
+from math import fabs, floor, nan, sqrt
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import types
+from numpy.polynomial.chebyshev import cheb2poly
+from numpy.polynomial.legendre import legval
+
+from gqm_sym.runtime.arithmetic.doubledouble import ZERO, Pair, two_sum
+from gqm_sym.runtime.arithmetic.elementary import QUARTER
+from gqm_sym.runtime.charts.chart import Chart
+from gqm_sym.runtime.compiled.intrinsics import fma
+from gqm_sym.runtime.compiled.jit import Inlined, Inner, entry
+from gqm_sym.runtime.compiled.registers import on_stack, uncounted
+from gqm_sym.runtime.compiled.types import INTEGER, MATRIX, REAL, VECTOR, Array
+from gqm_sym.runtime.double_double.arithmetic import (
+    UNIT,
+    add,
+    fast_sum,
+    multiply,
+    sine_and_cosine,
+    square_root,
+)
+from gqm_sym.runtime.double_double.nodes import RULE, panel_rule
+
+# Chebyshev points of the first kind at which a piece is sampled.
+NODES = 32
+
+# Decimal digits in which mpmath gives what double-double arithmetic begins with.
+DIGITS = 40
+
+# Powers of u whose coefficients are below this share of those of u itself are summed in doubles.
+MAX_DOUBLE_SHARE = 2.0**-57
+
+# A place on a piece has converged when Newton's method moves it by less than this; then the next step is rounding.
+MAX_LAST_STEP, MAX_STEPS = 1e-17, 12
+
+# The tangent turns by no larger angle on a piece that polynomials of degree 15 resolve.
+MAX_PIECE_TURN = 4.0
+
+# Columns of the points that `fill_points` fills: x, z and their derivatives by u, two doubles each; and of
+# `offset_path.fill_path` the length of the path over that of the curve.
+X, X_LOW, Z, Z_LOW, DX, DX_LOW, DZ, DZ_LOW, SHARE = range(0, 9 * RULE, RULE)
+
+stacked_points, stacked_places = on_stack(9 * RULE), on_stack(2 * RULE)
+
+
+class TrueCurve(NamedTuple):
+    """The pieces of a curve, as compiled code takes them; those that have not been made have lengths of NaN.
+
+    Attributes
+    ----------
+    terms : (n, 4, NODES) array
+        Powers of u for x and z, the high doubles of each before the low ones.
+    counts : (n, 2) array of int
+        The number of powers that need two doubles, and the number of all powers.
+    errors : (n, 2) array
+        Bounds on the errors of the coordinates, and on those of their derivatives by u.
+    lengths : (n, 3) array
+        Arc length as two doubles, and a bound on its error.
+    edges : (n+1,) array
+        Arc lengths at the edges of the chart's pieces, in doubles.
+    period : float
+        The period of a closed curve in arc length, 0 for an open one.
+    rule : (4, RULE) array
+        The nodes and weights of a Gauss-Legendre rule (`nodes.legendre_rule`).
+    tails : (2, RULE) array
+        Factors that take weighted values at its nodes to the last two Legendre coefficients.
+    offset : (float, float)
+        How far to the left of the curve a body's path lies, as two doubles: the radius of a rolling body, else 0.
+    """
+
+    terms: Any
+    counts: Any
+    errors: Any
+    lengths: Any
+    edges: Any
+    period: Any
+    rule: Any
+    tails: Any
+    offset: Any = (0.0, 0.0)
+
+
+TRUE_CURVE = types.NamedTuple(
+    (
+        *(types.float64[:, :, ::1], types.int64[:, ::1], MATRIX, MATRIX, VECTOR, REAL, MATRIX, MATRIX),
+        types.UniTuple(REAL, 2),
+    ),
+    TrueCurve,
+)
+
+
+@Inlined
+def nearly_add(a, a_low, b, b_low):  # type: ignore[no-untyped-def]
+    """Return the sum within 2 UNIT of the larger term, faster than `add`."""
+    s, e = two_sum(a, b)
+    return fast_sum(s, e + (a_low + b_low))
+
+
+@Inlined
+def unshared(curve):  # type: ignore[no-untyped-def]
+    """Return a curve whose arrays numba does not count references to."""
+    return TrueCurve(
+        uncounted(curve.terms),
+        uncounted(curve.counts),
+        uncounted(curve.errors),
+        uncounted(curve.lengths),
+        uncounted(curve.edges),
+        curve.period,
+        uncounted(curve.rule),
+        uncounted(curve.tails),
+        curve.offset,
+    )
+
+
+@Inner
+def piece_of(curve, number):  # type: ignore[no-untyped-def]
+    """Return the index of a piece; on a closed curve pieces are numbered on beyond the last one."""
+    return number % curve.counts.shape[0]
+
+
+@Inner
+def fill_points(curve, number, n, u, points):  # type: ignore[no-untyped-def]
+    """Fill the points at the places ``u`` (the high doubles, then the low ones) on a piece."""
+    k = piece_of(curve, number)
+    precise, count = curve.counts[k, 0], curve.counts[k, 1]
+    for row in range(2):
+        value, value_low = points[X + 2 * row * RULE :], points[X_LOW + 2 * row * RULE :]
+        slope, slope_low = points[DX + 2 * row * RULE :], points[DX_LOW + 2 * row * RULE :]
+        for i in range(n):
+            value[i], value_low[i], slope[i], slope_low[i] = 0.0, 0.0, 0.0, 0.0
+        for j in range(count - 1, precise - 1, -1):
+            term = curve.terms[k, 2 * row, j]
+            for i in range(n):
+                slope[i] = fma(slope[i], u[i], value[i])
+                value[i] = fma(value[i], u[i], term)
+        for j in range(precise - 1, -1, -1):
+            term, term_low = curve.terms[k, 2 * row, j], curve.terms[k, 2 * row + 1, j]
+            for i in range(n):
+                s, s_low = multiply(slope[i], slope_low[i], u[i], u[RULE + i])
+                slope[i], slope_low[i] = nearly_add(s, s_low, value[i], value_low[i])
+                s, s_low = multiply(value[i], value_low[i], u[i], u[RULE + i])
+                value[i], value_low[i] = nearly_add(s, s_low, term, term_low)
+
+
+@Inner
+def arc_on(curve, number, left, right):  # type: ignore[no-untyped-def]
+    """Return the arc length from one place on a piece to another, with its error.
+
+    Errors of the coordinates along the tangent count at both ends, and others by the angle that the tangent turns by.
+    """
+    rule, u, points = curve.rule, stacked_places(), stacked_points()
+    width, width_low = add(right[0], right[1], -left[0], -left[1])
+    for i in range(RULE):
+        way, way_low = multiply(width, width_low, rule[0, i], rule[1, i])
+        u[i], u[RULE + i] = add(left[0], left[1], way, way_low)
+    fill_points(curve, number, RULE, u, points)
+    total, low, one, two = 0.0, 0.0, 0.0, 0.0
+    for i in range(RULE):
+        s, s_low = multiply(points[DX + i], points[DX_LOW + i], points[DX + i], points[DX_LOW + i])
+        t, t_low = multiply(points[DZ + i], points[DZ_LOW + i], points[DZ + i], points[DZ_LOW + i])
+        s, s_low = nearly_add(s, s_low, t, t_low)
+        s, s_low = square_root(s, s_low)
+        s, s_low = multiply(s, s_low, rule[2, i], rule[3, i])
+        total, low = add(total, low, s, s_low)
+        one += curve.tails[0, i] * s
+        two += curve.tails[1, i] * s
+    tail = (fabs(one) + fabs(two)) / total
+    arc, arc_low = multiply(total, low, width, width_low)
+    k = piece_of(curve, number)
+    error = (2.0 + MAX_PIECE_TURN) * curve.errors[k, 0] + fabs(width) * total * (tail * tail + 16.0 * UNIT)
+    return (arc, arc_low), error
+
+
+@Inner
+def speed_at(curve, number, at):  # type: ignore[no-untyped-def]
+    """Return the derivative of arc length by u at a place, as a double."""
+    u, points = stacked_places(), stacked_points()
+    u[0], u[RULE] = at
+    fill_points(curve, number, 1, u, points)
+    return sqrt(points[DX] * points[DX] + points[DZ] * points[DZ])
+
+
+@Inner
+def place_at(curve, number, length):  # type: ignore[no-untyped-def]
+    """Return the piece and the place on it at an arc length (two doubles) from the left edge of a piece.
+
+    The place is NaN where a piece on the way has not been made.
+    """
+    count, lengths = curve.counts.shape[0], curve.lengths
+    while length[0] < 0.0 and (curve.period > 0.0 or number > 0):
+        number -= 1
+        k = piece_of(curve, number)
+        length = add(length[0], length[1], lengths[k, 0], lengths[k, 1])
+    k = piece_of(curve, number)
+    while length[0] >= lengths[k, 0] and (curve.period > 0.0 or number < count - 1):
+        rest = add(length[0], length[1], -lengths[k, 0], -lengths[k, 1])
+        if rest[0] < 0.0:
+            break
+        length, number = rest, number + 1
+        k = piece_of(curve, number)
+    at, begin = (2.0 * length[0] / lengths[k, 0] - 1.0, 0.0), (-1.0, 0.0)
+    for _ in range(MAX_STEPS):
+        arc, _ = arc_on(curve, number, begin, at)
+        rest = add(length[0], length[1], -arc[0], -arc[1])
+        speed = speed_at(curve, number, at)
+        step = rest[0] / speed
+        at = add(at[0], at[1], step, rest[1] / speed)
+        if not fabs(step) > MAX_LAST_STEP:
+            break
+    return number, at
+
+
+@Inner
+def arc_between(curve, number, at, other, to):  # type: ignore[no-untyped-def]
+    """Return the arc length from a place on a piece to one on the same or a later piece, with its error."""
+    if number == other:
+        return arc_on(curve, number, at, to)
+    (high, low), error = arc_on(curve, number, at, (1.0, 0.0))
+    for between in range(number + 1, other):
+        k = piece_of(curve, between)
+        high, low = add(high, low, curve.lengths[k, 0], curve.lengths[k, 1])
+        error += curve.lengths[k, 2]
+    part, part_error = arc_on(curve, other, (-1.0, 0.0), to)
+    high, low = add(high, low, part[0], part[1])
+    return (high, low), error + part_error + UNIT * high
+
+
+@Inner
+def foot(curve, number, at, point):  # type: ignore[no-untyped-def]
+    """Return the place on a piece, near a place on it, where the perpendicular from a point meets the curve."""
+    x, x_low, z, z_low = point
+    u, points = stacked_places(), stacked_points()
+    for _ in range(MAX_STEPS):
+        u[0], u[RULE] = at
+        fill_points(curve, number, 1, u, points)
+        x_gap, x_gap_low = add(x, x_low, -points[X], -points[X_LOW])
+        z_gap, z_gap_low = add(z, z_low, -points[Z], -points[Z_LOW])
+        s, s_low = multiply(x_gap, x_gap_low, points[DX], points[DX_LOW])
+        t, t_low = multiply(z_gap, z_gap_low, points[DZ], points[DZ_LOW])
+        s, s_low = add(s, s_low, t, t_low)
+        square = points[DX] * points[DX] + points[DZ] * points[DZ]
+        step, step_low = s / square, s_low / square
+        at = add(at[0], at[1], step, step_low)
+        if not fabs(step) > 1e-30:
+            break
+    return at
+
+
+@entry(types.UniTuple(REAL, 2)(TRUE_CURVE, INTEGER, types.UniTuple(REAL, 4)))
+def length_to(curve, number, point):  # type: ignore[no-untyped-def]
+    """Return the arc length from the left edge of a piece to a point that is near it."""
+    arc, _ = arc_on(curve, number, (-1.0, 0.0), foot(curve, number, (-1.0, 0.0), point))
+    return arc
+
+
+# -- making a piece ---------------------------------------------------------------------------------------------------
+
+
+@entry(types.Tuple((MATRIX, types.float64[:, :, ::1]))())
+def chebyshev_tables():  # type: ignore[no-untyped-def]
+    """Return the Chebyshev points, and the matrix that takes values there to coefficients, as two doubles each."""
+    nodes, fit = np.empty((2, NODES)), np.empty((2, NODES, NODES))
+    for j in range(NODES):
+        for k in range(NODES):
+            quarters = (j * (2 * k + 1)) % (4 * NODES) / NODES
+            _, _, c, c_low = sine_and_cosine(*multiply(quarters, 0.0, QUARTER[0], QUARTER[1]))
+            share = (1.0 if j == 0 else 2.0) / NODES
+            fit[0, j, k], fit[1, j, k] = share * c, share * c_low
+            if j == 1:
+                nodes[0, k], nodes[1, k] = c, c_low
+    return nodes, fit
+
+
+@entry(types.void(TRUE_CURVE, INTEGER, types.float64[:, :, ::1], REAL, types.float64[:, :, ::1], MATRIX))
+def fill_piece(curve, k, samples, error, fit, powers):  # type: ignore[no-untyped-def]
+    """Fill a piece.
+
+    Parameters
+    ----------
+    curve : TrueCurve
+        The curve.
+    k : int
+        The piece.
+    samples : (2, 2, NODES) array
+        x and z at the Chebyshev points: the high doubles of each, then the low ones.
+    error : float
+        A bound on their errors.
+    fit, powers : arrays
+        What takes values to Chebyshev coefficients, and these to powers.
+    """
+    terms, series, count, rounding = curve.terms[k], np.zeros((2, NODES)), 2, error
+    for row in range(2):
+        first, first_low, size = samples[row, 0, 0], samples[row, 1, 0], 0.0
+        for j in range(NODES):
+            high, low = 0.0, 0.0
+            for i in range(NODES):
+                gap, gap_low = add(samples[row, 0, i], samples[row, 1, i], -first, -first_low)
+                size = max(size, fabs(gap))
+                gap, gap_low = multiply(gap, gap_low, fit[0, j, i], fit[1, j, i])
+                high, low = add(high, low, gap, gap_low)
+            series[0, j], series[1, j] = high, low
+        rounding += 8.0 * UNIT * size + UNIT * fabs(first) + fabs(series[0, NODES - 1]) + fabs(series[0, NODES - 2])
+        used = NODES
+        while used > 1 and fabs(series[0, used - 1]) <= 8.0 * UNIT * size:
+            used -= 1
+        count = max(count, used)
+        for i in range(NODES):
+            high, low = (first, first_low) if i == 0 else (0.0, 0.0)
+            for j in range(i, used):
+                part, part_low = multiply(series[0, j], series[1, j], powers[j, i], 0.0)
+                high, low = add(high, low, part, part_low)
+            terms[2 * row, i], terms[2 * row + 1, i] = high, low
+    enough, precise = MAX_DOUBLE_SHARE * (fabs(terms[0, 1]) + fabs(terms[2, 1])), count
+    while precise > 2 and max(fabs(terms[0, precise - 1]), fabs(terms[2, precise - 1])) <= enough:
+        precise -= 1
+    curve.counts[k, 0], curve.counts[k, 1] = precise, count
+    curve.errors[k, 0], curve.errors[k, 1] = rounding, NODES * rounding
+    (high, low), error = arc_on(curve, k, (-1.0, 0.0), (1.0, 0.0))
+    curve.lengths[k, 0], curve.lengths[k, 1], curve.lengths[k, 2] = high, low, error
+
+
+@cache
+def _tables() -> tuple[Array, Array, Array, Array]:
+    """Return the Chebyshev points, both matrices that `fill_piece` takes, and `TrueCurve.tails`."""
+    nodes, fit = chebyshev_tables()
+    powers = np.array([np.pad(cheb2poly(row[: k + 1]), (0, NODES - 1 - k)) for k, row in enumerate(np.eye(NODES))])
+    at = 2.0 * panel_rule()[0] - 1.0
+    tails = np.array([(2 * k + 1) * legval(at, np.eye(RULE)[k]) for k in (RULE - 2, RULE - 1)])
+    return nodes, fit, powers, tails
+
+
+def sample_places() -> Array:
+    """Return the Chebyshev points in [-1, 1] at which pieces are sampled, as rows of the high and the low doubles."""
+    return _tables()[0]
+
+
+def chebyshev_fit() -> Array:
+    """Return the matrix that takes values at these points to Chebyshev coefficients, as two doubles each."""
+    return _tables()[1]
+
+
+# The coordinates of one piece at the Chebyshev points as an array (2, 2, NODES), and a bound on their errors; and its
+# type in compiled code.
+Samples = tuple[Array, float]
+SAMPLES = types.Tuple((types.float64[:, :, ::1], REAL))
+
+
+class TruePieces:
+    """The pieces of one curve, made as they are needed.
+
+    Parameters
+    ----------
+    chart : Chart
+        The chart.
+    sample : callable
+        ``sample(k)`` gives the `Samples` of piece k.
+    start : tuple of float, optional
+        x and z of the start point, two doubles each, near the left edge of the piece that begins at arc length 0; None
+        if it is that edge.
+    """
+
+    def __init__(
+        self, chart: Chart, sample: Callable[[int], Samples], start: tuple[float, float, float, float] | None = None
+    ) -> None:
+        count = chart.edges.size - 1
+        self._sample, self._point, self._tables = sample, start, _tables()
+        self.curve = TrueCurve(
+            np.zeros((count, 4, NODES)),
+            np.zeros((count, 2), dtype=np.int64),
+            np.zeros((count, 2)),
+            np.full((count, 3), nan),
+            np.ascontiguousarray(chart.edges),
+            chart.period,
+            panel_rule(),
+            self._tables[3],
+        )
+        self._made, self.doubt, self._edges = np.zeros(count, dtype=bool), 0.0, chart.edges.tolist()
+        self.begin = min(int(np.argmin(np.abs(chart.edges))), count - 1)
+
+    @cached_property
+    def start_length(self) -> Pair:
+        """The arc length from the left edge of the piece ``begin`` to the start point, from which it is measured."""
+        if self._point is None:
+            return ZERO
+        self.make(self.begin, self.begin)
+        length: Pair = length_to(self.curve, self.begin, self._point)
+        return length
+
+    def number_of(self, place: float) -> int:
+        """Return the number of the piece on which a place lies, given by its arc length in doubles."""
+        edges, period, count = self._edges, self.curve.period, len(self._edges) - 1
+        laps = floor((place - edges[0]) / period) if period else 0
+        return min(max(bisect_right(edges, place - laps * period) - 1, 0), count - 1) + count * laps
+
+    def make(self, first: int, last: int) -> None:
+        """Make the pieces with these numbers and all between them, as far as they have not been made."""
+        count = self._made.size
+        if not self.curve.period:
+            first, last = max(first, 0), min(last, count - 1)
+        numbers = np.arange(first, min(last, first + count) + 1)
+        if self._made.take(numbers, mode="wrap").all():
+            return
+        for k in (numbers % count).tolist():
+            if not self._made[k]:
+                samples, error = self._sample(k)
+                fill_piece(self.curve, k, samples, error, self._tables[1], self._tables[2])
+                self._made[k] = True
+        # A bound on the error of an arc length from the start point.
+        self.doubt = float(
+            4.0 * UNIT * np.abs(self.curve.edges[[0, -1]]).max() + 2.0 * np.nansum(self.curve.lengths[:, 2])
+        )

@@ -1,0 +1,322 @@
+"""A periodic orbit along a chart with its derivatives: Gauss's rules on panels of the phase angle.
+
+Displacements of the curve's points come from neighbouring curves (`shaped_pieces`). All else are tangents of formulas
+(`programs`).
+"""
+
+from fractions import Fraction
+from functools import cached_property
+
+import numpy as np
+from numba import types
+from numpy.typing import NDArray
+
+from gqm_sym.errors import SolutionError
+from gqm_sym.runtime.charts.double_double.passage import ChartPassage
+from gqm_sym.runtime.charts.double_double.pieces import (
+    TRUE_CURVE,
+    arc_between,
+    place_at,
+    unshared,
+)
+from gqm_sym.runtime.charts.double_double.turning_points import AHEAD, BEHIND, LAUNCH, LOWER, UPPER
+from gqm_sym.runtime.compiled.jit import entry
+from gqm_sym.runtime.compiled.types import INTEGER, MATRIX, Array
+from gqm_sym.runtime.double_double.arithmetic import UNIT, add, multiply
+from gqm_sym.runtime.double_double.nodes import RULE, panel_rule
+from gqm_sym.runtime.double_double.orbit_time import fill_panel
+from gqm_sym.runtime.gradients.charts.programs import (
+    ChartSource,
+    chart_circulation_program,
+    chart_path_program,
+    speed_program,
+)
+from gqm_sym.runtime.gradients.charts.shaped_pieces import PLACE, ShapedPieces, shaping_of
+from gqm_sym.runtime.gradients.evaluation import fill_values
+from gqm_sym.runtime.gradients.multiprecision import UNDECIDED
+from gqm_sym.runtime.gradients.orbit import OrbitDerivatives, PathRows, SeriesOf, pairs, values
+from gqm_sym.runtime.gradients.programs import LAUNCH_VARIABLES, Program, libration_program, turning_point_program
+from gqm_sym.runtime.gradients.series import PanelSeries, to_legendre
+from gqm_sym.runtime.interface import ExactPotential
+from gqm_sym.runtime.launch.problem import Problem
+from gqm_sym.runtime.multiprecision.exact_problem import NOWHERE
+from gqm_sym.runtime.quadrature.trapezoid import CIRCULATION, LIBRATION
+
+# A panel is resolved if the last two Legendre coefficients of all integrands are below this share of the integrals of
+# the absolute values; others are halved, as often as this.
+MAX_TAIL, MAX_HALVINGS = 1e-14, 40
+
+# The largest rounding error of an integral, as a share of that of the absolute values.
+MAX_ROUNDING = 1e-16
+
+# A place this near to the edge of a piece is there.
+AT_EDGE = 1e-15
+
+# How far from an extreme its second derivative is looked for, as a share of the orbit's width.
+BESIDE = 2.0**-20
+
+
+@entry(types.void(TRUE_CURVE, INTEGER, MATRIX, types.UniTuple(types.float64, 4), MATRIX, MATRIX), checked=False)
+def fill_nodes(curve, kind, panels, orbit, shares, places):  # type: ignore[no-untyped-def]
+    """Fill the nodes of Gauss's rule on panels.
+
+    Parameters
+    ----------
+    curve : TrueCurve
+        The curve.
+    kind : int
+        LIBRATION or CIRCULATION.
+    panels : (m, 3) array
+        The start of each panel, as a phase angle or as a share of the lap, and its width as two doubles.
+    orbit : tuple of float
+        The piece and the place on it where the phase begins are the first of ``places`` before; here are the orbit's
+        width in arc length, two doubles with a sign, and the piece.
+    shares : (2, n) array
+        Filled: the share of the orbit's width at each node.
+    places : (PLACE, n) array
+        Filled. Its first column is where the phase begins.
+    """
+    curve, width, width_low, number = unshared(curve), orbit[0], orbit[1], int(orbit[2])
+    base, _ = arc_between(curve, number, (-1.0, 0.0), number, (places[1, 0], places[2, 0]))
+    nodes = np.empty((4, RULE))
+    for k in range(panels.shape[0]):
+        fill_panel(kind, (panels[k, 0], 0.0), (panels[k, 1], panels[k, 2]), 0, curve.rule, nodes)
+        for i in range(RULE):
+            way, way_low = multiply(nodes[0, i], nodes[1, i], width, width_low)
+            piece, at = place_at(curve, number, add(base[0], base[1], way, way_low))
+            to = k * RULE + i
+            shares[0, to], shares[1, to] = nodes[0, i], nodes[1, i]
+            places[0, to], places[1, to], places[2, to] = piece, at[0], at[1]
+
+
+def source_along(problem: Problem) -> ChartSource:
+    """The formulas from which the programs of motions along the chart of a module are recorded."""
+    formulas = problem.formulas
+    assert isinstance(formulas.exact, ExactPotential)
+    names = list(formulas.parameters)
+    return ChartSource(
+        formulas.exact.effective_potential, formulas.inertia, len(names), names.index("m"), shaping_of(formulas)
+    )
+
+
+class ChartOrbitDerivatives(OrbitDerivatives):
+    """A libration or circulation along a chart, with derivatives by all variables.
+
+    Parameters
+    ----------
+    problem : Problem
+        The launch with its module.
+    passage : ChartPassage
+        The orbit in double-double arithmetic.
+    direction : int
+        0 for a libration, else the sign of ds/dt.
+    edges : array
+        Phase angles between which the speed changes smoothly, or shares of a lap, from the first to the last.
+    """
+
+    source: ChartSource
+    by_arc_length = True
+
+    def __init__(self, problem: Problem, passage: ChartPassage, direction: int, edges: Array) -> None:
+        pieces, launch = problem.true_pieces, problem.launch
+        assert pieces is not None
+        self.direction, self._edges, self._passage = direction, edges, passage
+        self.source = source_along(problem)
+        self._shape = ShapedPieces(problem, pieces, self.source.shaping)
+        self._found = passage.found
+        numbers = [
+            (n.value, n.low, 0.25 * UNIT * abs(n.value) if n.low else 0.0) for n in (*problem.p, launch.lam0, launch.v0)
+        ]
+        self.variables = pairs(*numbers, (0.0, 0.0, 0.0))
+        self.parameters = np.ascontiguousarray(self.variables[:, : self.source.parameters])
+        start = np.ascontiguousarray(self._found[[LAUNCH], :PLACE].T)
+        self._shifts = self._shape.shifts(start)[:, 0]
+        point = self._shape.coordinates(start)[:, 0].reshape(-1, 2)
+        given = [(high, low, UNIT * abs(high)) for high, low in point.tolist()]
+        self._inputs = np.hstack([self.variables, pairs(*given), pairs(*((s, 0.0, 0.0) for s in self._shifts))])
+
+    @property
+    def launch_moves(self) -> Array:
+        """How the place of the launch changes, at the points of the curve, which do not move."""
+        moves = np.zeros(self.source.variables)
+        moves[self.source.parameters] = 1.0
+        moves[list(self.source.shaping)] = -self._shifts
+        return moves
+
+    def _values(self, program: Program, inputs: Array, shares: Array, places: Array) -> Array:
+        """The results of a program at places: values as two doubles, and bounds on the errors."""
+        rows = np.ascontiguousarray(np.concatenate([shares, self._shape.coordinates(places)]))
+        found = np.empty((program.outputs.size, 3, places.shape[1]))
+        fill_values(program.operands, program.work, np.ascontiguousarray(inputs), rows, found)
+        return found
+
+    @cached_property
+    def _turns(self) -> Array:
+        """The places of both turning points; one where two pieces meet is on the piece that the motion passes.
+
+        So rounding of the displacements, which differs between pieces, does not count beside the small V**2 near there.
+        """
+        turns = self._found[[LOWER, UPPER], :PLACE].T.copy()
+        for column, edge in zip(turns.T, (1.0, -1.0), strict=True):
+            beyond = (column[1] - edge) + column[2]
+            if abs(beyond) <= AT_EDGE:
+                both = np.array([[column[0], column[0] + edge], [edge, -edge], [0.0, 0.0]])
+                dx, dz = self._shape.coordinates(both)[4:8:2]
+                speeds = np.hypot(dx, dz)
+                column[:] = column[0] + edge, -edge, beyond * speeds[0] / speeds[1]
+        return turns
+
+    @cached_property
+    def _end_rows(self) -> Array:
+        """The derivatives of both turning points at the points of the curve, in double-double arithmetic."""
+        program = turning_point_program(self.source)
+        return self._values(program, self._inputs, np.zeros((2, 2)), self._turns)[1:]
+
+    @property
+    def moved_ends(self) -> Array:
+        """The derivatives of both turning points at the points of the curve, as columns."""
+        return self._end_rows[:, 0]
+
+    @property
+    def ends(self) -> Array:
+        """The derivatives of the lower and of the upper turning point of a libration, as columns."""
+        ends = self._end_rows[:, 0].copy()
+        ends[list(self.source.shaping)] += self._shape.shifts(self._turns)
+        return ends
+
+    @property
+    def turning_points(self) -> tuple[float, float]:
+        """The lower and the upper turning point of a libration."""
+        low, high = self._passage.turning_points
+        return low.high, high.high
+
+    @property
+    def _program(self) -> Program:
+        return chart_circulation_program(self.source) if self.direction else libration_program(self.source)
+
+    @cached_property
+    def _panels(self) -> tuple[Array, Array, Array]:
+        """The edges of panels on which all integrands are resolved, their values there, and the integrals.
+
+        Raises
+        ------
+        SolutionError
+            If there are no such panels, or digits are lost.
+        """
+        curve, found, n = self._shape.pieces.curve, self._found, self.source.variables
+        row, kind = (LAUNCH, CIRCULATION) if self.direction else (LOWER, LIBRATION)
+        if self.direction:
+            length = curve.lengths[:, :2].sum(axis=0)
+            width = self.direction * length
+            inputs = np.hstack([self._inputs, pairs((abs(width[0]), abs(width[1]), 0.0))])
+        else:
+            both = found[[BEHIND, AHEAD], :2]
+            width = np.array(_sum(both[0], both[1]))
+            ends = self._end_rows
+            wide = pairs((0.0, 0.0, 0.0), (*width, UNIT * width[0]))
+            inputs = np.hstack([self._inputs, wide, ends[:, :, 0].T, ends[:, :, 1].T])
+        rule, tail_factors = panel_rule(), to_legendre()[:, -2:]
+        pending, done, sizes = np.stack([self._edges[:-1], np.diff(self._edges)], axis=1), [], NOWHERE
+        for _ in range(MAX_HALVINGS):
+            panels = np.column_stack([pending, np.zeros(len(pending))])
+            shares, places = np.empty((2, RULE * len(panels))), np.empty((PLACE, RULE * len(panels)))
+            places[:, 0] = found[row, :PLACE]
+            fill_nodes(curve, kind, panels, (width[0], width[1], found[row, 0], 0.0), shares, places)
+            got = self._values(self._program, inputs, shares, places).reshape(-1, 3, len(panels), RULE)
+            high, widths = got[: 2 + 2 * n, 0], pending[:, 1]
+            if not np.isfinite(high).all():
+                break
+            here = (np.abs(got[:, 0]) @ rule[2]) @ widths
+            sizes = sizes if sizes.size else here
+            scale = np.where(sizes > 0.0, sizes, 1.0)[: 2 + 2 * n, None]
+            tails = np.abs(high @ tail_factors).sum(axis=-1) * widths / scale
+            noise = (got[: 2 + 2 * n, 2] @ rule[2]) * widths / scale
+            resolved = (tails <= np.maximum(MAX_TAIL, noise)).all(axis=0)
+            done.append((pending[resolved], got[:, :, resolved]))
+            left, width_left = pending[~resolved].T
+            if not left.size:
+                break
+            half = 0.5 * width_left
+            pending = np.stack([np.concatenate([left, left + half]), np.concatenate([half, half])], axis=1)
+        else:
+            raise SolutionError(UNDECIDED)
+        if not np.isfinite(high).all():
+            raise SolutionError(UNDECIDED)
+        panels, samples = np.concatenate([d[0] for d in done]), np.concatenate([d[1] for d in done], axis=2)
+        order = np.argsort(panels[:, 0])
+        panels, samples = panels[order], samples[:, :, order]
+        weights = rule[2] * panels[:, 1:]
+        errors = np.einsum("kmj,mj->k", samples[:, 2], weights)
+        if not (errors[: 2 + 2 * n] <= MAX_ROUNDING * sizes[: 2 + 2 * n]).all():
+            raise SolutionError(UNDECIDED)
+        integrals = np.array([_total(r[0] * weights, r[1] * weights) for r in samples])
+        integrals[np.abs(integrals) <= errors] = 0.0
+        return np.append(panels[:, 0], self._edges[-1]), samples[:, 0], integrals
+
+    def _integrals(self, first: int, count: int) -> Array:
+        return self._panels[2][first : first + count]
+
+    @property
+    def series(self) -> tuple[SeriesOf, SeriesOf, Array]:
+        """The time per phase with its derivatives, the derivatives of arc length per share, and those of the lap."""
+        edges, samples, _ = self._panels
+        n = self.source.variables
+        arcs = np.concatenate([samples[2 + 2 * n :], np.zeros((n - self.source.parameters, *samples.shape[1:]))])
+        if self.direction:
+            arcs *= self.width
+        else:
+            left, rule = edges[:-1, None], panel_rule()
+            arcs *= 0.5 * self.width * np.sin(left + np.diff(edges)[:, None] * rule[0])
+            edges = edges / (2.0 * np.pi)
+        return PanelSeries(edges, samples[: 1 + n]), PanelSeries(edges, arcs), np.zeros((n, 1))
+
+    @property
+    def width(self) -> float:
+        """The width of a libration, or the length of a lap with its sign."""
+        if self.direction:
+            return float(self.direction * self._shape.pieces.curve.lengths[:, 0].sum())
+        low, high = self.turning_points
+        return high - low
+
+    def at_places(self, lam: Array) -> PathRows:
+        """`path_rows` at arc lengths, with derivatives at the points of the curve."""
+        path = self._shape.path(self._shape.places(lam))
+        found = values(chart_path_program(self.source), self.parameters, path[0], None, *path[1:])[:, 0]
+        return PathRows(*found.reshape(6, self.source.parameters + 2, lam.size))
+
+    def extreme_rows(self, place: Array, *, of_speed: bool) -> Array:
+        """As `OrbitDerivatives.extreme_rows`, at the points of the curve; the second is a difference quotient."""
+        steps = BESIDE * self.width * np.array([[0.0], [-1.0], [1.0]])
+        lam = (place + steps).ravel()
+        places = self._shape.places(lam)
+        rows = self._values(speed_program(self.source), self._inputs, np.zeros((2, lam.size)), places)[:, 0]
+        if not of_speed:
+            mass_curvature, load = self.at_places(lam)[3:5]
+            by_variables = np.zeros((LAUNCH_VARIABLES, lam.size))
+            force = [2.0 * rows[0] * mass_curvature[0] + load[0]]
+            force.append(2.0 * (rows[1] * mass_curvature[0] + rows[0] * mass_curvature[-1]) + load[-1])
+            partials = [np.vstack([row[1:-1], by_variables]) for row in (mass_curvature, load)]
+            rows = np.vstack([*force, 2.0 * (rows[2:] * mass_curvature[0] + rows[0] * partials[0]) + partials[1]])
+        here, before, after = np.moveaxis(rows.reshape(len(rows), 3, place.size), 1, 0)
+        curvature = (after[1] - before[1]) / (steps[2] - steps[1])
+        return np.vstack([here[:2], curvature, here[2:]])
+
+    def without_shift(self, moved: Array, lam: Array) -> Array:
+        """As `OrbitDerivatives.without_shift`."""
+        moved = moved.copy()
+        moved[list(self.source.shaping)] -= self._shape.shifts(self._shape.places(lam))[:, 0]
+        return moved
+
+
+def _sum(a: NDArray[np.float64], b: NDArray[np.float64]) -> tuple[float, float]:
+    """The sum of two numbers of two doubles each."""
+    exact = sum(map(Fraction, (*a.tolist(), *b.tolist())), Fraction(0))
+    high = float(exact)
+    return high, float(exact - Fraction(high))
+
+
+def _total(high: Array, low: Array) -> float:
+    """The sum of numbers, rounded once."""
+    from math import fsum
+
+    return fsum([*high.ravel().tolist(), *low.ravel().tolist()])

@@ -1,0 +1,317 @@
+"""V**2 on one panel of a leg, from one linear equation (MATHS, section 2).
+
+On a leg ``dW/dlam = P - Q W``, where W is V**2. The distance run from the *origin*, the place where the leg was begun,
+is ``d = w (g w + c)`` with w the *march variable* (`March`): g is 0 and c is 1 in the regular case; from a turning
+point g is 1 and c is 0, so that W/w**2 and the rate of time are smooth; after a slow launch with W = W0 and W' > 0 they
+are 1 and 2 sqrt(W0/W'). With ``h = g (w + c/2) + 1 - g`` the speed is h Y and ``dt/dw = (1 + g) ds/Y``, where Y is
+smooth.
+
+With q the integral of Q from the panel's start, where W has the value ``v2``, ``W = exp(-q) (v2 + integral of
+exp(q) P)``. The integrals come from running means, so that nothing is subtracted however short they are, and W has all
+its digits next to a turning point too.
+"""
+
+from math import fabs, factorial, inf, sqrt
+from typing import NamedTuple
+
+import numpy as np
+
+from gqm_sym.runtime.compiled.calls import call_speed_equation
+from gqm_sym.runtime.compiled.intrinsics import fma, polynomial
+from gqm_sym.runtime.compiled.jit import Inner
+from gqm_sym.runtime.compiled.registers import copied, on_stack, over_rows
+from gqm_sym.runtime.compiled.types import Array
+from gqm_sym.runtime.legs.panels.breaks import within
+from gqm_sym.runtime.legs.panels.polynomials import COUNT, ENDS_BY_NODE, WIDE, size_of, to_graded_means, to_means
+
+copy = copied(WIDE)
+
+# The largest q over a panel: resistance alone may not change V**2 by more than the factor exp(MAX_Q).
+MAX_Q = 2.0
+
+# exp(q) - 1 is summed as a series up to this q; beyond it q is halved and the result squared up again.
+MAX_SERIES_Q = 0.25
+EXPM1_TERMS = tuple(1.0 / factorial(k) for k in range(13, 1, -1))
+
+# The most iterations for forces that are not linear in V**2.
+MAX_ITERATIONS = 40
+
+# A distance larger than all others; nothing could be computed from an infinite one.
+FARTHEST = 1e300
+
+# The work array of a panel is a sequence of rows, each of WIDE numbers: a value at each of the COUNT Chebyshev nodes,
+# and the value at the panel's right end in rows that have one there (W and those after it, and DS to KAPPA).
+#
+# ============ ====================================================================================================
+# row          meaning
+# ============ ====================================================================================================
+# TIME_RATE    dt/dw
+# LOAD         ds (n0 + kappa W): the contact force per mass, times ds
+# W_FACTOR     W over its zero factor: W/d where a turning point lies at distance d, be it one behind a slow launch;
+#              W itself elsewhere
+# FORCE        exp(q) P along the direction
+# Q_RATE       dq/dw
+# DS           ds/dlam
+# P, Q         coefficients of the equation
+# N0, KAPPA    static normal load per mass and curvature
+# W            V**2
+# D            distance from the panel's start
+# EXPM1_Q      exp(q) - 1
+# MEAN         running means of FORCE
+# GRADED       running means of FORCE, weighted with the distance in w
+# SPEED        Y
+# ARC_RATE     places on the curve; at the end of the panel's computation |ds/dw|
+# OFFSET       w from the panel's start
+# SERIES       Chebyshev coefficients of a row under examination
+# SIZES        for each of the rows before P the size that its coefficients are compared with
+# TAILS        last and middle coefficients of the row examined last, and its mean
+# NODES        the nodes as shares of a panel
+# ============ ====================================================================================================
+#
+# The resolution of the rows before P can be tested.
+TIME_RATE, LOAD, W_FACTOR, FORCE, Q_RATE, DS, P, Q, N0, KAPPA = range(0, 10 * WIDE, WIDE)
+W, D, EXPM1_Q, MEAN, GRADED, SPEED, ARC_RATE, OFFSET, SERIES, SIZES, TAILS, NODES = range(10 * WIDE, 22 * WIDE, WIDE)
+panel_buffer = on_stack(22 * WIDE)
+
+# Formulas for one row from others. Here y is the march variable from the panel's start, where the distance grows at the
+# rate ``slope``, and u is the direction in which the panel is run.
+copy_row = over_rows(lambda row: row, WIDE)
+product = over_rows(lambda one, other: one * other, WIDE)
+distance_row = over_rows(lambda y, slope, g: y * (slope + g * y), WIDE)
+linear_row = over_rows(lambda d, begin, u: begin + u * d, WIDE)
+q_rate_row = over_rows(lambda q, y, slope, g, u: u * q * (slope + 2.0 * g * y), WIDE)
+force_row = over_rows(lambda p, expm1, u: u * p * (1.0 + expm1), WIDE)
+solution_row = over_rows(lambda gained, expm1, v2: v2 + (gained - v2 * expm1) / (1.0 + expm1), WIDE)
+graded_integral_row = over_rows(lambda y, mean, graded, slope: y * (slope * mean + y * graded), WIDE)
+damped_row = over_rows(lambda mean, expm1: mean / (1.0 + expm1), WIDE)
+factor_row = over_rows(lambda w, y, shift: w / ((y + shift) * (y + shift)), WIDE)
+load_row = over_rows(lambda ds, n0, kappa, w: ds * (n0 + kappa * w), WIDE)
+load_per_mass_row = over_rows(lambda n0, kappa, w: n0 + kappa * w, WIDE)
+load_size_row = over_rows(lambda ds, n0, kappa, w: abs(ds) * (abs(n0) + abs(kappa * w)), WIDE)
+root_row = over_rows(np.sqrt, WIDE)
+time_rate_row = over_rows(lambda ds, speed, factor: factor * ds / speed, WIDE)
+arc_rate_row = over_rows(lambda ds, y, slope, g: ds * (slope + 2.0 * g * y), WIDE)
+
+
+class Forces(NamedTuple):
+    """The forces on a leg, and which way the body moves.
+
+    Attributes
+    ----------
+    speed_equation : int
+        The address of the module's compiled function of this name.
+    params : array
+        Run-time parameters.
+    friction, kinked, linear : bool
+        As in `interface.Dissipation`.
+    direction : int
+        The sign of dlam/dt.
+    """
+
+    speed_equation: int
+    params: Array
+    friction: bool
+    kinked: bool
+    linear: bool
+    direction: int
+
+
+class March(NamedTuple):
+    """The march variable w of some panels: the distance from the origin is ``w (g w + c)``.
+
+    Attributes
+    ----------
+    origin : (float, float)
+        The place where the distance is zero, as two doubles.
+    direction : int
+        The sign of dlam/dw; against the motion if a leg is followed back.
+    g, c : float
+        The coefficients.
+    """
+
+    origin: tuple[float, float]
+    direction: int
+    g: float
+    c: float
+
+
+class Panel(NamedTuple):
+    """The start of a panel.
+
+    Attributes
+    ----------
+    left : float
+        The march variable.
+    v2 : float
+        V**2.
+    contact_sign : int
+        The sign of the normal force N on the panel; 0 where it is not known.
+    span : (float, float)
+        The places between which the curve may be evaluated (`panels.breaks`).
+    """
+
+    left: float
+    v2: float
+    contact_sign: int
+    span: tuple[float, float]
+
+
+@Inner
+def distance(w, march):  # type: ignore[no-untyped-def]
+    """The distance from the origin."""
+    return w * (march.g * w + march.c)
+
+
+@Inner
+def slope_at(w, march):  # type: ignore[no-untyped-def]
+    """How fast the distance grows with the march variable."""
+    return 2.0 * march.g * w + march.c
+
+
+@Inner
+def marched(d, march):  # type: ignore[no-untyped-def]
+    """The march variable at a distance from the origin."""
+    d = min(d, FARTHEST)
+    return 2.0 * d / (march.c + sqrt(march.c * march.c + 4.0 * march.g * d)) if d > 0.0 else 0.0
+
+
+@Inner
+def fill_expm1(work, q, out):  # type: ignore[no-untyped-def]
+    """Fill the row at ``out`` with exp - 1 of the row at ``q``."""
+    largest, scale, doublings = max(size_of(work, q), fabs(work[q + COUNT])), 1.0, 0
+    while largest * scale > MAX_SERIES_Q:
+        scale, doublings = 0.5 * scale, doublings + 1
+    for j in range(WIDE):
+        x = work[q + j] * scale
+        work[out + j] = fma(polynomial(EXPM1_TERMS, x) * x, x, x)
+    for _ in range(doublings):
+        for j in range(WIDE):
+            work[out + j] *= work[out + j] + 2.0
+
+
+@Inner
+def set_nodes(work):  # type: ignore[no-untyped-def]
+    """Fill in the nodes, once for all panels."""
+    for j in range(WIDE):
+        work[NODES + j] = ENDS_BY_NODE[j]
+
+
+@Inner
+def begin_panel(forces, march, panel, width, work):  # type: ignore[no-untyped-def]
+    """Lay the nodes of a panel; where forces are linear in V**2, also fill what `sample` fills."""
+    origin, u = march.origin, march.direction
+    product(work, OFFSET, NODES, width)
+    distance_row(work, D, OFFSET, slope_at(panel.left, march), march.g)
+    linear_row(work, ARC_RATE, D, origin[0] + (u * distance(panel.left, march) + origin[1]), float(u))
+    if panel.span[0] > -inf or panel.span[1] < inf:
+        for j in range(WIDE):
+            work[ARC_RATE + j] = within(work[ARC_RATE + j], panel.span)
+    copy_row(work, W, panel.v2)
+    if forces.linear:
+        sample(forces, march, panel, work)
+
+
+@Inner
+def sample(forces, march, panel, work):  # type: ignore[no-untyped-def]
+    """Fill the rows DS to KAPPA and Q_RATE at the panel's places, for V**2 as it stands in W.
+
+    The values at the panel's end only fill the registers, and may not be numbers.
+    """
+    v, nu = float(forces.direction), float(panel.contact_sign)
+    call_speed_equation(forces.speed_equation, WIDE, work, (ARC_RATE, W, DS), v, nu, forces.params)
+    q_rate_row(work, Q_RATE, Q, OFFSET, slope_at(panel.left, march), march.g, float(march.direction))
+
+
+@Inner
+def fill_force(march, work):  # type: ignore[no-untyped-def]
+    """Fill the rows EXPM1_Q and FORCE for the forces that were sampled; returns q over the panel, inf if too large."""
+    to_means(work, Q_RATE, work, SPEED)
+    product(work, SPEED, SPEED, OFFSET)
+    total = work[SPEED + COUNT]
+    if not fabs(total) <= MAX_Q:
+        return inf
+    fill_expm1(work, SPEED, EXPM1_Q)
+    force_row(work, FORCE, P, EXPM1_Q, float(march.direction))
+    return total
+
+
+@Inner
+def integrate(march, panel, out, work):  # type: ignore[no-untyped-def]
+    """Fill the row at ``out`` with W for the forces that were sampled; returns q over the panel, inf if too large."""
+    total = fill_force(march, work)
+    if not total < inf:
+        return inf
+    # The integral over the distance comes from means, and where g is not zero also from means with the weight y.
+    to_means(work, FORCE, work, MEAN)
+    if march.g > 0.0:
+        to_graded_means(work, FORCE, work, GRADED)
+        graded_integral_row(work, SPEED, OFFSET, MEAN, GRADED, slope_at(panel.left, march))
+    else:
+        product(work, SPEED, OFFSET, MEAN)
+    solution_row(work, out, SPEED, EXPM1_Q, panel.v2)
+    return total
+
+
+@Inner
+def solve_nonlinear(forces, march, panel, work):  # type: ignore[no-untyped-def]
+    """`integrate` for forces that are not linear in V**2, by Newton's method; inf if it does not converge."""
+    v, nu = float(forces.direction), float(panel.contact_sign)
+    work[W] = max(panel.v2, 1e-300)  # laws may take its root
+    call_speed_equation(forces.speed_equation, 1, work, (ARC_RATE, W, MEAN), v, nu, forces.params)
+    # The first approximation grows as V**2 does at the panel's start.
+    slope = max(march.direction * (work[MEAN + 1] - work[MEAN + 2] * work[W]), 0.0)
+    linear_row(work, W, D, panel.v2, slope)
+    last_change = inf
+    for _ in range(MAX_ITERATIONS):
+        sample(forces, march, panel, work)
+        total = integrate(march, panel, SPEED, work)
+        if not total < inf:
+            return inf
+        change, size = 0.0, 0.0
+        for j in range(WIDE):
+            change, size = max(change, fabs(work[SPEED + j] - work[W + j])), max(size, fabs(work[SPEED + j]))
+        copy_row(work, W, SPEED)
+        if not change < inf:
+            return inf
+        # Each iteration squares the error, until rounding is all that changes.
+        if change <= 4e-16 * size or (change <= 1e-13 * size and change >= 0.5 * last_change):
+            return total
+        last_change = change
+    return inf
+
+
+@Inner
+def solve_panel(forces, march, panel, work):  # type: ignore[no-untyped-def]
+    """W on a panel that was begun (`begin_panel`), and all rows that do not need W > 0.
+
+    Returns q over the panel, or inf if the panel is too wide for an answer.
+    """
+    total = integrate(march, panel, W, work) if forces.linear else solve_nonlinear(forces, march, panel, work)
+    if not total < inf:
+        return inf
+    if panel.v2 == 0.0:
+        damped_row(work, W_FACTOR, GRADED if march.g > 0.0 else MEAN, EXPM1_Q)
+    elif march.g > 0.0 and panel.left == 0.0:
+        factor_row(work, W_FACTOR, W, OFFSET, 0.5 * march.c)
+    else:
+        copy_row(work, W_FACTOR, W)
+    load_row(work, LOAD, DS, N0, KAPPA, W)
+    return total
+
+
+@Inner
+def as_factor(w, march, left):  # type: ignore[no-untyped-def]
+    """A value of W in the unit of W_FACTOR, at the start of a panel."""
+    return w / (0.25 * march.c * march.c) if march.g > 0.0 and left == 0.0 and march.c > 0.0 else w
+
+
+@Inner
+def fill_rates(march, panel, work):  # type: ignore[no-untyped-def]
+    """Fill Y and the rates of time and of arc length; they are not numbers where W is not positive."""
+    if panel.v2 == 0.0 or march.g == 0.0:
+        root_row(work, SPEED, W_FACTOR)
+    else:
+        factor_row(work, SPEED, W, OFFSET, panel.left + 0.5 * march.c)
+        root_row(work, SPEED, SPEED)
+    time_rate_row(work, TIME_RATE, DS, SPEED, 1.0 + march.g)
+    arc_rate_row(work, ARC_RATE, DS, OFFSET, slope_at(panel.left, march), march.g)

@@ -1,0 +1,295 @@
+"""V**2 along the legs of a dissipative motion, panel after panel: to where they end, and back from where they turn.
+
+A leg is run once from its start (`run`), and time is counted on the way as long as V**2 is large. If the leg ends
+at a turn, time is counted from there back to where it was left off: next to a turn V**2 is a small difference when it
+is computed from the start, but has all its digits when it is computed from the turn. A leg that tends to an equilibrium
+is followed back from there as a field of polynomials (`leg_record`). Before all this, a leg that begins at a turn is
+tried as one polynomial (`whole_leg`).
+"""
+
+from math import fabs, sqrt
+from typing import NamedTuple
+
+from gqm_sym.runtime.arithmetic.clenshaw import chebyshev_sum
+from gqm_sym.runtime.compiled.calls import call_static_balance
+from gqm_sym.runtime.compiled.jit import Inner
+from gqm_sym.runtime.legs.leg_record import (
+    AHEAD,
+    BACK,
+    CHANGE_COUNT,
+    COLUMNS,
+    END,
+    END_LOW,
+    FIELD_COLUMNS,
+    HALF_C,
+    HEAD,
+    MIDDLE,
+    MIDDLE_LOW,
+    TIME_FROM_END,
+    TIME_FROM_START,
+    WHOLE,
+    add_panel,
+    change_at,
+    has_space,
+    total_time,
+)
+from gqm_sym.runtime.legs.panels.breaks import clearance, offset, span_before, within
+from gqm_sym.runtime.legs.panels.equation import (
+    DS,
+    OFFSET,
+    SERIES,
+    W_FACTOR,
+    Forces,
+    March,
+    Panel,
+    W,
+    panel_buffer,
+    set_nodes,
+)
+from gqm_sym.runtime.legs.panels.point import point_buffer
+from gqm_sym.runtime.legs.panels.polynomials import COUNT, to_coefficients
+from gqm_sym.runtime.legs.panels.widest import ALWAYS, MAX_PANELS, NEVER, PanelRequest, next_panel
+from gqm_sym.runtime.legs.runs.ends import ASYMPTOTE, FULL, SLOWED, SPENT, TURN
+from gqm_sym.runtime.legs.runs.route import Start
+from gqm_sym.runtime.legs.runs.run import run
+from gqm_sym.runtime.legs.runs.whole_leg import run_whole
+
+# Why a leg was not followed back.
+NO_SPACE, LOST = -1, -2
+
+
+@Inner
+def next_stop(march, passed, length_back, record, breaks, remaining):  # type: ignore[no-untyped-def]
+    """On the way back, the distance at which the next panel must end.
+
+    Parameters
+    ----------
+    passed, length_back : float
+        The distance that was followed back so far, and that to follow.
+    remaining : (int, int, int)
+        The index of the next change of N's sign, that of the next break, and the sign of N.
+
+    Returns
+    -------
+    stop : float
+    remaining : (int, int, int)
+    """
+    change, upcoming, contact_sign = remaining
+    origin, u, stop = march.origin, march.direction, length_back
+    # Distances are compared, because the distance to a stop was given as such: its place may be a rounding farther.
+    while change >= 0 and offset(record[change_at(record, change)], origin, u) <= passed:
+        change, contact_sign = change - 1, -contact_sign
+    while upcoming >= 0 and offset(breaks[upcoming], origin, u) <= passed:
+        upcoming -= 1
+    if change >= 0:
+        stop = min(stop, offset(record[change_at(record, change)], origin, u))
+    if upcoming >= 0:
+        stop = min(stop, offset(breaks[upcoming], origin, u))
+    return stop, (change, upcoming, contact_sign)
+
+
+@Inner
+def run_back(forces, end, breaks, off, record, used):  # type: ignore[no-untyped-def]
+    """Enter the panels of a leg that turns, followed back from the turn to the middle of its run.
+
+    Parameters and Returns are those of `approach`, with panels for rows.
+    """
+    work = panel_buffer()
+    set_nodes(work)
+    v, march = forces.direction, March(end.place, -forces.direction, 1.0, 0.0)
+    # By the same differences as in `next_stop`, for the middle may be a break.
+    length = v * ((end.place[0] - end.middle[0]) + end.place[1]) - v * end.middle[1]
+    count, v2, left, passed, step = 0, 0.0, 0.0, 0.0, sqrt(end.step)
+    remaining = (end.change_count - 1, breaks.size - 1, end.contact_sign)
+    for _ in range(MAX_PANELS):
+        stop, remaining = next_stop(march, passed, length, record, breaks, remaining)
+        max_width, at = sqrt(stop) - left, used + count * COLUMNS
+        if max_width <= 0.0:
+            break
+        if not has_space(record, at, end.change_count):
+            return NO_SPACE
+        panel = Panel(left, v2, remaining[2], span_before(breaks, remaining[1] + 1, v, off))
+        request = PanelRequest(max_width, step, 0.0, ALWAYS, False)
+        width, step, _timed = next_panel(forces, march, panel, request, work)
+        if width == 0.0:
+            break
+        right = left + width
+        passed, left = (stop, sqrt(stop)) if width == max_width else (right * right, right)
+        add_panel(record, at, left, width, work)
+        count, v2 = count + 1, work[W + COUNT]
+        if passed >= length:
+            break
+    return count if left >= sqrt(length) else LOST
+
+
+@Inner
+def approach(forces, end, breaks, off, record, used):  # type: ignore[no-untyped-def]
+    """Enter the field of a leg that tends to an equilibrium, followed back from there to the middle of its run.
+
+    Parameters
+    ----------
+    forces : Forces
+    end : runs.ends.End
+        The end of the leg.
+    breaks, off
+        As in `runs.run.run`.
+    record, used
+        The field is entered in the record after the numbers that are used already.
+
+    Returns
+    -------
+    int
+        The number of rows; NO_SPACE if the record has none for them, LOST if the leg could not be followed.
+    """
+    work = panel_buffer()
+    set_nodes(work)
+    march = March((end.place[0], 0.0), -forces.direction, 0.0, 1.0)
+    count, v2, left, linear_part, step = 0, 0.0, 0.0, 0.0, end.step
+    length = fabs(end.middle[0] - end.place[0])
+    remaining = (end.change_count - 1, breaks.size - 1, end.contact_sign)
+    for _ in range(MAX_PANELS):
+        stop, remaining = next_stop(march, left, length, record, breaks, remaining)
+        if stop <= left:
+            break
+        panel = Panel(left, v2, remaining[2], span_before(breaks, remaining[1] + 1, forces.direction, off))
+        request = PanelRequest(stop - left, step, 0.0, NEVER, False)
+        width, step, _timed = next_panel(forces, march, panel, request, work)
+        if width == 0.0:
+            break
+        row, right = used + count * FIELD_COLUMNS, stop if width == stop - left else left + width
+        if not has_space(record, row, end.change_count):
+            return NO_SPACE
+        record[row], record[row + 1] = left, right
+        if count == 0:
+            # V**2/d vanishes at the equilibrium, as the force does; what rounding leaves of it there is subtracted.
+            to_coefficients(work, W_FACTOR, work, SERIES)
+            linear_part = chebyshev_sum(work[SERIES : SERIES + COUNT], -1.0)
+        for j in range(COUNT):
+            d = left + work[OFFSET + j]
+            work[W_FACTOR + j] = (work[W_FACTOR + j] - linear_part) / d if count == 0 else work[W + j] / (d * d)
+        for begin, values in ((2, W_FACTOR), (2 + COUNT, DS)):
+            to_coefficients(work, values, work, SERIES)
+            for k in range(COUNT):
+                record[row + begin + k] = work[SERIES + k]
+        count, v2, left = count + 1, work[W + COUNT], right
+    return count if left >= length else LOST
+
+
+@Inner
+def released(static_balance, p, behind, ahead, preferred):  # type: ignore[no-untyped-def]
+    """The direction in which a body at rest leaves a place, 0 if it stays; and whether it could stay at some slope.
+
+    The place is given by one on either side of it; these differ where it is a break. From a ridge the body may leave in
+    either direction, and takes the ``preferred`` one.
+    """
+    point, rates = point_buffer(), point_buffer()
+    point[0] = ahead
+    call_static_balance(static_balance, 1, point, p, rates)
+    forwards, backwards = rates[0], rates[1]
+    if behind != ahead:
+        point[0] = behind
+        call_static_balance(static_balance, 1, point, p, rates)
+        backwards = rates[1]
+    if forwards <= 0.0 <= backwards:
+        direction = 0
+    elif forwards > 0.0 > backwards:
+        direction = preferred
+    else:
+        direction = 1 if forwards > 0.0 else -1
+    return direction, forwards < backwards
+
+
+@Inner
+def run_to_end(forces, start, route, off, record):  # type: ignore[no-untyped-def]
+    """`run`, begun again with the turn expected later where it slows down before its first panel."""
+    while True:
+        end = run(forces, start, route, off, record)
+        if end.what != SLOWED or end.panel_count > 0:
+            return end
+        start = Start(
+            *(start.place, start.place_low, start.v2, start.direction, start.contact_sign, start.step),
+            *(end.no_turn_until, start.width, False),
+        )
+
+
+@Inner
+def run_forwards(forces, start, route, off, record):  # type: ignore[no-untyped-def]
+    """`run_to_end`, as one polynomial if that will do; and how many panels from the end have been entered with it."""
+    if start.v2 == 0.0 and forces.linear and start.may_be_whole:
+        end = run_whole(forces, start, route, off, record)
+        if end.what == TURN:
+            return end, 2
+    return run_to_end(forces, start, route, off, record), 0
+
+
+class Followed(NamedTuple):
+    """The outcome of a leg that was followed; its other data are in the record.
+
+    Attributes
+    ----------
+    what, contact_sign : int
+        As in `runs.ends.End`.
+    direction : int
+        At a turn, the one that `released` finds; otherwise that of the motion.
+    could_stay : bool
+        At a turn, whether the body could stay there at some slope; otherwise True.
+    is_whole : bool
+        Whether the leg was one polynomial.
+    step, no_turn_until, v2 : float
+        As in `runs.ends.End`.
+    """
+
+    what: int
+    contact_sign: int
+    direction: int
+    could_stay: bool
+    is_whole: bool
+    step: float
+    no_turn_until: float
+    v2: float
+
+
+@Inner
+def follow(dissipation, p, start, route, record):  # type: ignore[no-untyped-def]
+    """Run a leg, and follow it back from where it ends with V**2 = 0.
+
+    Parameters
+    ----------
+    dissipation : Dissipation
+        The module's compiled functions, and of what kind its forces are.
+    p : array
+        Run-time parameters.
+    start : Start
+    route : Route
+    record : array
+        Filled in (`leg_record`).
+
+    Returns
+    -------
+    Followed
+    """
+    breaks = route.breaks
+    forces = Forces(
+        dissipation.speed_equation, p, dissipation.friction, dissipation.kinked, dissipation.linear, start.direction
+    )
+    off = clearance(start.place, route.limit) if breaks.size else 0.0
+    record[WHOLE] = 0.0
+    end, back = run_forwards(forces, start, route, off, record)
+    is_whole = back > 0
+    what, used, time_from_end = end.what, HEAD + end.panel_count * COLUMNS, 0.0
+    direction, could_stay = start.direction, True
+    if what == TURN:
+        back = run_back(forces, end, breaks, off, record, used) if back == 0 else back
+        time_from_end = total_time(record, used, back)
+        here = within(end.place[0], span_before(breaks, end.upcoming, direction, off))
+        direction, could_stay = released(dissipation.static_balance, p, here, here, direction)
+    elif what == ASYMPTOTE and dissipation.linear:
+        back = approach(forces, end, breaks, off, record, used)
+    record[END], record[END_LOW] = end.place
+    record[MIDDLE], record[MIDDLE_LOW] = end.middle
+    record[HALF_C], record[CHANGE_COUNT] = end.half_c, end.change_count
+    record[TIME_FROM_START], record[TIME_FROM_END] = total_time(record, HEAD, end.panel_count), time_from_end
+    record[AHEAD], record[BACK] = end.panel_count, max(back, 0)
+    if back < 0:
+        what = FULL if back == NO_SPACE else SPENT
+    return Followed(what, end.contact_sign, direction, could_stay, is_whole, end.step, end.no_turn_until, end.v2)

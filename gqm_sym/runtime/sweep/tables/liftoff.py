@@ -1,0 +1,118 @@
+"""The first place of an orbit at which the track would have to pull, on a tabulated curve."""
+
+from math import fabs
+
+import numpy as np
+
+from gqm_sym.runtime.compiled.jit import Inner
+from gqm_sym.runtime.motion.events import ROUNDING_SHARE
+from gqm_sym.runtime.sweep.tables.layout import (
+    HALF,
+    KAPPA_SAMPLES,
+    KAPPA_TERMS,
+    LOAD_SAMPLES,
+    LOAD_TERMS,
+    POTENTIAL_SAMPLES,
+    SAMPLE_POINTS,
+    SAMPLES,
+)
+from gqm_sym.runtime.sweep.tables.panel_forces import FAR, LOAD, NEAR, prepare
+from gqm_sym.runtime.sweep.tables.places import edge_place, locate
+from gqm_sym.runtime.sweep.tables.potential import potential_on, value_on
+
+# Steps of the search for a zero of N between two samples.
+MAX_STEPS = 80
+
+
+@Inner
+def signed_force(curve, k, slack, side, x):  # type: ignore[no-untyped-def]
+    """N per unit mass at a place of panel k, positive where the track pushes; zero where it is zero within rounding."""
+    rows = curve.rows
+    inertia = 2.0 * value_on(curve.table.paths, k, KAPPA_TERMS, x) * (slack - potential_on(rows, k, x))
+    load = value_on(rows, k, LOAD_TERMS, x)
+    force = inertia + load
+    return side * force if fabs(force) > ROUNDING_SHARE * (fabs(inertia) + fabs(load)) else 0.0
+
+
+@Inner
+def change_between(curve, k, slack, side, before, after):  # type: ignore[no-untyped-def]
+    """Where N changes its sign between a place of panel k at which the track pushes and one at which it pulls."""
+    pushes, pulls = before, after
+    f, g = signed_force(curve, k, slack, side, pushes), signed_force(curve, k, slack, side, pulls)
+    for step in range(MAX_STEPS):
+        middle = 0.5 * (pushes + pulls)
+        x = middle if step % 3 == 2 or not f > g else pushes + (pulls - pushes) * f / (f - g)
+        if not min(pushes, pulls) < x < max(pushes, pulls):
+            return x if fabs(pulls - pushes) > 2.0**-50 else middle
+        value = signed_force(curve, k, slack, side, x)
+        if value < 0.0:
+            pulls, g = x, value
+        else:
+            pushes, f = x, value
+        if value == 0.0 or fabs(pulls - pushes) <= 2.0**-52:
+            return x
+    return pulls
+
+
+@Inner
+def loss_on_way(curve, passage, slacks, side, begin, sense):  # type: ignore[no-untyped-def]
+    """The first place at which the track would pull, from a place ``begin`` to one end of a passage.
+
+    Parameters
+    ----------
+    side : int
+        1 if the track can only push along the normal, -1 if only against it.
+    begin : (j, x)
+        A panel of the passage and a place on it.
+    sense : int
+        1 towards the upper end, -1 towards the lower one.
+
+    Returns
+    -------
+    j, x : the place; j is -1 if there is none
+    """
+    rows, paths, count, last = curve.rows, curve.table.paths, curve.levels.size, passage.panels - 1
+    j, start = begin
+    while 0 <= j <= last:
+        k, slack = (passage.first + j) % count, slacks[j]
+        prepare(curve, k, FAR | LOAD)
+        stop = float(sense)
+        if j == (last if sense > 0 else 0):
+            stop = passage.high_x if sense > 0 else passage.low_x
+        before, whole = start, fabs(stop - start) == 2.0
+        for i in range(SAMPLES):
+            x = start + (stop - start) * 0.5 * (1.0 + SAMPLE_POINTS[i])
+            if whole:
+                at = i if sense > 0 else SAMPLES - 1 - i
+                v2 = 2.0 * (slack - rows[k, POTENTIAL_SAMPLES + at])
+                force = side * (paths[k, KAPPA_SAMPLES + at] * v2 + rows[k, LOAD_SAMPLES + at])
+            if not whole or force < 0.0:
+                prepare(curve, k, NEAR)
+                force = signed_force(curve, k, slack, side, x)
+            if force < 0.0:
+                return j, change_between(curve, k, slack, side, before, x) if i > 0 else x
+            before = x
+        j, start = j + sense, -float(sense)
+    return -1, 0.0
+
+
+@Inner
+def liftoff_place(curve, orbit, passage, slacks, side):  # type: ignore[no-untyped-def]
+    """The place at which a body leaves the track before it comes to an end of it; NaN if it never does."""
+    table, period = curve.table, curve.period
+    index, x, _ = locate(table, period, orbit.lam0)
+    j, last = index - passage.first, passage.panels - 1
+    if orbit.circulates and orbit.direction < 0:
+        j = last
+    at_low, at_high = orbit.low == 0.0, orbit.high == 0.0
+    if not orbit.circulates and (at_low or at_high):
+        j, x = (0, passage.low_x) if at_low else (last, passage.high_x)
+    for way in range(1 if orbit.circulates or orbit.leaves == orbit.direction else 2):
+        sense = orbit.direction if way == 0 else -orbit.direction
+        lost, where = loss_on_way(curve, passage, slacks, side, (j, x), sense)
+        if way == 0 and lost == j and where == x:
+            return orbit.lam0
+        if lost >= 0:
+            k = (passage.first + lost) % curve.levels.size
+            return edge_place(table, period, passage.first + lost) + table.paths[k, HALF] * (1.0 + where)
+    return np.nan
