@@ -1,5 +1,5 @@
 # Made by gqm-gen for "train". Do not edit: change its declaration and generate again.
-# interface 11, input b87305fcd75e, body f02e65e953ed
+# interface 11, input b87305fcd75e, body 76be0a6a259e
 """A train of five cars on hills
 
 x              = x(s)
@@ -175,9 +175,9 @@ def bounds(lo, hi, p, out):
 # The same formulas over a namespace of operations, for extended precision.
 
 def exact_train(op, p):
-    """The length of a train, and what gravity is."""
+    """The length of a train, what gravity is, and its coefficient of friction."""
     length, g = p[0], p[1]
-    return length, g
+    return length, g, 0
 
 def exact_factors(op, p):
     """What stands before the parts of U, then before those of n0."""

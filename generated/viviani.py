@@ -1,5 +1,5 @@
 # Made by gqm-gen for "viviani". Do not edit: change its declaration and generate again.
-# interface 11, input c93b8a64a5a5, body af300e28cf36
+# interface 11, input c93b8a64a5a5, body 9aeede97de4f
 """Bead on Viviani's curve
 
 x              = a*(cos(theta) + 1)
@@ -68,8 +68,8 @@ def path_and_contact_force(n, places, speeds, p, out):
 
 
 @compiled(PATH_IN_SPACE)
-def path_in_space(n, places, speeds, p, out):
-    """y, and the contact force along x, y and z, given V**2."""
+def path_in_space(n, places, speeds, v, p, out):
+    """y, and the contact force along x, y and z, given V**2 and the sign v = sgn(ds/dt)."""
     places, speeds, p, out = carray(places, n), carray(speeds, n), carray(p, 3), carray(out, (4, n))
     a, g, m = p[0], p[1], p[2]
     for i in range(n):
@@ -441,7 +441,7 @@ MODEL = CompiledModel(
     functions=CompiledFunctions(
         path_and_contact_force, effective_potential, potential_divdiff1, potential_divdiff2, bounds,
     ),
-    path_in_space=path_in_space, signed=False,
+    path_in_space=path_in_space, signed=False, sided=False,
     load_map=load_map,
     batch=BatchFunctions(
         potential_divdiff1=potential_divdiff1_batch, potential_divdiff2=potential_divdiff2_batch,

@@ -153,6 +153,8 @@ def _model_fields(module: ModuleIR, names: list[str]) -> dict[str, Any]:
         "pass1": _pass1(module),
         "in_space": module.in_space,
         "signed": module.signed,
+        "sided": module.sided,
+        "directed": module.directed,
         "banked": module.banked,
         "load_map": "load_map" if "load_map" in names else "",
         "batch": _listed(_batch(module), _WIDTH - 8),

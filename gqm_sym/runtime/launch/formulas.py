@@ -147,6 +147,11 @@ class Formulas:
         The function that fills the third coordinate of a space curve and the contact force as a vector.
     signed : bool
         Whether the contact force has a sign: it has none on a space curve that lies in no vertical plane.
+    sided : bool
+        Whether the sign of the contact force, or on a banked space curve of its part along the upward direction of
+        riders, tells on which side of the track the body is.
+    directed : bool
+        Whether the contact force depends on the sign of ds/dt: it does on a space curve in a frame that turns.
     rider_loads : Emitted or None
         The function that fills the loads on a rider of a banked track.
     """
@@ -175,6 +180,8 @@ class Formulas:
     separated: SeparatedTerms | None = None
     path_in_space: Emitted | None = None
     signed: bool = True
+    sided: bool = True
+    directed: bool = False
     rider_loads: Emitted | None = None
     units: Mapping[str, str] = field(default_factory=dict)
     text: str = field(init=False, repr=False, compare=False)
