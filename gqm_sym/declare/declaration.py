@@ -66,7 +66,7 @@ class Declaration:
         return self.named(self.x, self.y, self.z)
 
     def named(self, x: sp.Expr, y: sp.Expr, z: sp.Expr) -> tuple[tuple[str, sp.Expr], ...]:
-        """Forms that belong to the coordinates by the names of these: of a planar curve those of x and z."""
+        """Pair forms, one for each coordinate, with the names of the coordinates; a planar curve has x and z."""
         return (("x", x), *((("y", y),) if self.in_space else ()), ("z", z))
 
     @property

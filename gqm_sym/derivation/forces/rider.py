@@ -52,7 +52,7 @@ class Rider:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Seat:
-    """The force on a rider per unit mass, upwards and to the left, and where upwards is."""
+    """The force on a rider per unit mass, upwards and to the left, and which direction is upwards."""
 
     vertical: sp.Expr
     lateral: sp.Expr
