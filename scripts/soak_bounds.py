@@ -12,6 +12,7 @@ import sys
 import tempfile
 from collections import Counter
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
@@ -269,19 +270,22 @@ def root(family: Family, p: dict[str, Any], energy: Any, guess: float, start: An
 
 
 def soak(count: int, seed: int, modules: dict[str, ModuleType]) -> tuple[Counter[str], list[str]]:
-    """Draw so many launches; what came of them, and what failed."""
-    draw, tally, failed = random.Random(seed), Counter[str](), []
-    for _ in range(count):
-        name, call = drawn(draw)
-        try:
-            found, checks = faults(modules[name], FAMILIES[name], call)
-            tally["checks"] += checks
-            tally["librations" if checks else "other motions"] += 1
-        except GQMError as error:
-            tally[type(error).__name__] += 1
-            found = []
-        shown = ", ".join(f"{key}={value!r}" for key, value in call.items())
-        failed += [f"{what}: {name}.solve({shown})" for what in found]
+    """Draw so many launches, or until it is interrupted; what came of them, and what failed, which is printed."""
+    draw, tally, failed = random.Random(seed), Counter[str](), list[str]()
+    with suppress(KeyboardInterrupt):
+        for _ in range(count):
+            name, call = drawn(draw)
+            try:
+                found, checks = faults(modules[name], FAMILIES[name], call)
+                tally["checks"] += checks
+                tally["librations" if checks else "other motions"] += 1
+            except GQMError as error:
+                tally[type(error).__name__] += 1
+                found = []
+            shown = ", ".join(f"{key}={value!r}" for key, value in call.items())
+            failed += [f"{what}: {name}.solve({shown})" for what in found]
+            if found:
+                print(*failed[-len(found) :], sep="\n", flush=True)
     return tally, failed
 
 
@@ -289,7 +293,7 @@ def main(count: int, seed: int) -> int:
     """Print what failed and the counts; returns 1 if anything did."""
     with tempfile.TemporaryDirectory() as folder:
         tally, failed = soak(count, seed, build(folder))
-    print(*failed, f"{dict(tally)}, {len(failed)} failures", sep="\n")
+    print(f"{dict(tally)}, {len(failed)} failures")
     return 1 if failed else 0
 
 

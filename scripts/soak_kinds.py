@@ -34,6 +34,8 @@ DIGITS = 40
 G = "9.81"
 # Times at which a motion is looked at, readers of one motion, and the longest time that a call may take, in s.
 TIMES, READERS, MAX_SECONDS = 8, 6, 10.0
+# Motions of a kind after which its functions are compiled.
+FIRST = 20
 # Periods against closed forms, and sweeps against solved motions: relative, per unit of the condition number.
 ROUNDINGS = 4.0 * 2.0**-52
 POINTS = [("-2", "2"), ("-1", "0"), ("0", "1"), ("2", "0"), ("4", "3")]
@@ -43,6 +45,7 @@ SLOPES = 2e-13
 
 Modules = dict[str, ModuleType]
 Truth = Callable[[Any], Any]
+Kind = Callable[[random.Random, Modules], tuple[list[str], int]]
 
 
 def build(folder: str | Path) -> Modules:
@@ -444,26 +447,38 @@ WEIGHTS = (4, 4, 4, 4, 4, 4, 4, 4, 4, 1, 4, 1)
 
 
 def soak(count: int, seed: int, modules: Modules) -> tuple[Counter[str], list[str], float]:
-    """Draw so many motions; what came of them, what failed, and the longest call in s of processor time."""
-    draw, tally, failed, longest = random.Random(seed), Counter[str](), [], 0.0
-    for number in range(count):
-        kind, own = draw.choices(KINDS, WEIGHTS)[0], draw.getrandbits(48)
-        begin = time.process_time()
-        with mp.workdps(DIGITS):
-            try:
-                found, checks = kind(random.Random(own), modules)
-                tally[kind.__name__] += 1
-                tally["checks"] += checks
-            except GQMError as error:
-                found = []
-                tally[f"{kind.__name__}: {type(error).__name__}"] += 1
-            except Exception as error:
-                found = [f"{type(error).__name__}: {error}"]
-        spent = time.process_time() - begin
-        # The first calls compile.
-        longest = max(longest, spent) if number >= count // 4 else longest
-        failed += [f"{what}: {kind.__name__}(random.Random({own}))" for what in found]
+    """Draw so many motions, or until it is interrupted; what came of them, what failed, and the longest call in s.
+
+    What fails is printed at once. Times are those of the processor.
+    """
+    draw, tally, failed, longest = random.Random(seed), Counter[str](), list[str](), 0.0
+    with suppress(KeyboardInterrupt):
+        for _ in range(count):
+            kind, own = draw.choices(KINDS, WEIGHTS)[0], draw.getrandbits(48)
+            begin = time.process_time()
+            found = _told(kind, own, modules, tally)
+            # The first calls compile.
+            longest = max(longest, time.process_time() - begin) if tally[kind.__name__] > FIRST else longest
+            shown = [f"{what}: {kind.__name__}(random.Random({own}))" for what in found]
+            failed += shown
+            if shown:
+                print(*shown, sep="\n", flush=True)
     return tally, failed, longest
+
+
+def _told(kind: Kind, own: int, modules: Modules, tally: Counter[str]) -> list[str]:
+    """What is wrong with one motion; what came of it is counted."""
+    with mp.workdps(DIGITS):
+        try:
+            found, checks = kind(random.Random(own), modules)
+            tally[kind.__name__] += 1
+            tally["checks"] += checks
+        except GQMError as error:
+            found = []
+            tally[f"{kind.__name__}: {type(error).__name__}"] += 1
+        except Exception as error:
+            found = [f"{type(error).__name__}: {error}"]
+    return found
 
 
 def main(count: int, seed: int) -> int:
@@ -472,7 +487,7 @@ def main(count: int, seed: int) -> int:
         tally, failed, longest = soak(count, seed, build(folder))
     if longest > MAX_SECONDS:
         failed.append(f"a call took {longest:.0f} s")
-    print(*failed[:200], f"{dict(tally)}, {len(failed)} failures, {longest:.1f} s the longest", sep="\n")
+    print(f"{dict(tally)}, {len(failed)} failures, {longest:.1f} s the longest")
     return 1 if failed else 0
 
 

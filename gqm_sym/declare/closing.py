@@ -80,8 +80,7 @@ def check_period(
     right = found_period(tuple(form.xreplace(values) for form in point), lam)
     remedy = "leave it out: the curve does not close" if right is None else f"give {right}"
     raise DeclarationError(
-        f"{kind}: period: after {period} of {lam.name} the curve is not where it was, but {gap:.3g} of its size away; "
-        f"{remedy}"
+        f"{kind}: period: after {period} of {lam.name} the curve is {gap:.3g} of its size away from its start; {remedy}"
     )
 
 

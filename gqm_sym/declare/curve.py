@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 class SpaceOptions(TypedDict, total=False):
-    """Arguments of `Curve.space` and `Curve.sampled` that are rarely given; they are described there."""
+    """Less common arguments of `Curve.space`, `Curve.sampled` and `Curve.piecewise`, which describe them."""
 
     roll: Any
     heartline: Source
@@ -32,42 +32,50 @@ class SpaceOptions(TypedDict, total=False):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Curve(Declaration):
-    """A curve ``(x(λ), z(λ))``, or ``(x(λ), y(λ), z(λ))``, z upwards; made by one of the constructors below.
+    """A curve ``(x(λ), z(λ))`` or ``(x(λ), y(λ), z(λ))``, where z is up; one of the constructors below makes it.
 
     Attributes
     ----------
     kind
-        The form in which it was declared: ``graph``, ``parametric``, ``polar``, ``space``; of a charted curve
+        The form of declaration: ``graph``, ``parametric``, ``polar`` or ``space``; for curves without formulas
         ``implicit``, ``sampled``, ``piecewise`` or ``polynomial``.
-    x, z, y
-        The coordinates, in the parameter and the run-time parameters; y is 0 on curves in the plane of x and z.
+    x
+        The horizontal coordinate in m, as an expression in λ and the run-time parameters.
+    y
+        The other horizontal coordinate in m; 0 on planar curves.
+    z
+        The height in m.
     parameter
         The symbol of λ.
     domain
-        Ends of the parameter's range, each an expression in run-time parameters or None (open).
+        The two ends of the range of λ, each an expression in run-time parameters, or None where it is open.
     period
-        The parameter period of a closed curve: as given, or found where the formulas tell it.
+        The increase of λ in one lap of a closed curve; None on open curves.
     defaults
         The run-time parameters in order, each with its default or None.
     title
-        One line for people.
+        One line of text for readers.
     positive
-        Parameters promised to be positive; checked when the emitted module runs.
+        Names of run-time parameters that must be positive; checked when a module runs.
     radius
-        Of a polar curve r(θ): its derivatives give shorter forms than those of x and z.
+        The radius r(θ) of a polar curve in m, whose derivatives give shorter forms than those of x and z.
     definition
-        What a charted curve is made from: its coordinates are known by numbers only, as functions of arc length.
+        The points, pieces or equation of a curve without formulas, whose coordinates are numbers.
     banking
-        Of a space curve how it is banked; None where that is not declared.
+        How a space curve is banked; None where that is not declared.
     """
 
     def in_arc_length(self) -> "Curve":
-        """Return the same curve with arc length from its beginning as its parameter.
+        """Return the same curve with arc length as its parameter, measured from its start.
+
+        Returns
+        -------
+        Curve
 
         Raises
         ------
         DeclarationError
-            If it has no beginning or no end.
+            If the curve has no start or no end.
         """
         if self.charted:
             return self
@@ -79,21 +87,21 @@ class Curve(Declaration):
         return Curve.piecewise([whole], closed=closed, parameters=dict(self.defaults), title=self.title)
 
     def __str__(self) -> str:
-        """A few lines for people: what it is, where it goes, and what its parameters are measured in."""
+        """Describe the curve in a few lines: its form, its range and the units of its parameters."""
         return description(self)
 
     def plot(self, lam: Any = None, *, axes: Any = None, **parameters: Any) -> Any:
-        """Draw the curve with Matplotlib, its start marked and its direction shown by an arrow.
+        """Draw the curve with Matplotlib, with its start and an arrow along increasing λ.
 
         Parameters
         ----------
         lam
-            The range of the parameter to draw, a pair of numbers. Without it the domain is drawn or one period; where
-            there is neither, a graph from -1 to 1, and other curves from 0 to 2*pi.
+            The two ends of the range of λ to draw. The default is the domain or one period; without these it is -1 to 1
+            for a graph, and 0 to 2*pi for other curves.
         axes
-            The Matplotlib axes to draw on; a new figure if not given.
+            The Matplotlib axes to draw on; by default a new figure is made.
         parameters
-            Values of run-time parameters, by name; others have their defaults.
+            Values of run-time parameters by name, in SI units; the others have their defaults.
 
         Returns
         -------
@@ -112,7 +120,7 @@ class Curve(Declaration):
 
     @property
     def smoothing(self) -> "Smoothing | None":
-        """What smoothing did to the points of a sampled track; None where nothing was smoothed."""
+        """The changes that smoothing made to the points of a sampled track; None if it was not smoothed."""
         return getattr(self.definition, "smoothing", None)
 
     @classmethod
@@ -127,7 +135,34 @@ class Curve(Declaration):
         title: str = "",
         positive: Iterable[str] = (),
     ) -> "Curve":
-        """Declare the graph ``z = z(x)``.
+        """Declare the graph ``z = z(x)`` (paper, Table 3).
+
+        Parameters
+        ----------
+        z
+            The height in m, as text or a SymPy expression.
+        parameter
+            The name of the curve's parameter λ.
+        domain
+            The two ends of the range of λ: numbers or expressions in run-time parameters, or None for an open end.
+        parameters
+            Defaults of run-time parameters in SI units, or their names in order; None for a value that is given at run
+            time. Every other symbol becomes a run-time parameter without a default.
+        title
+            One line of text for readers.
+        positive
+            Names of run-time parameters that must be positive.
+
+        Returns
+        -------
+        Curve
+
+        Raises
+        ------
+        DeclarationError
+            If names, ends or period do not fit together, or the curve is a point.
+        ExpressionError
+            If a text is not an arithmetic expression.
 
         Examples
         --------
@@ -153,9 +188,28 @@ class Curve(Declaration):
         title: str = "",
         positive: Iterable[str] = (),
     ) -> "Curve":
-        """Declare a curve by both coordinates.
+        """Declare a planar curve by both coordinates as functions of a parameter.
 
-        Without ``period`` and ``domain`` it is closed where both are made of waves of commensurate rates.
+        Parameters
+        ----------
+        x, z
+            The horizontal coordinate and the height in m, as text or SymPy expressions.
+        period
+            The increase of λ in one lap of a closed curve. Without it and without ``domain`` the curve is closed if its
+            coordinates consist of sines and cosines of commensurate angles.
+        parameter, domain, parameters, title, positive
+            As in `Curve.graph`.
+
+        Returns
+        -------
+        Curve
+
+        Raises
+        ------
+        DeclarationError
+            If names, ends or period do not fit together, or the curve is a point.
+        ExpressionError
+            If a text is not an arithmetic expression.
 
         Examples
         --------
@@ -181,7 +235,29 @@ class Curve(Declaration):
         title: str = "",
         positive: Iterable[str] = (),
     ) -> "Curve":
-        """Declare ``r = r(θ)``, θ from the positive x axis; r may be negative."""
+        """Declare a curve by its radius ``r(θ)``, where θ is measured from the positive x axis.
+
+        Parameters
+        ----------
+        r
+            The radius in m, as text or a SymPy expression; it may be negative.
+        period
+            The increase of λ in one lap of a closed curve. Without it and without ``domain`` the curve is closed if its
+            coordinates consist of sines and cosines of commensurate angles.
+        parameter, domain, parameters, title, positive
+            As in `Curve.graph`.
+
+        Returns
+        -------
+        Curve
+
+        Raises
+        ------
+        DeclarationError
+            If names, ends or period do not fit together, or the curve is a point.
+        ExpressionError
+            If a text is not an arithmetic expression.
+        """
         symbol = parameter_symbol(parameter, "polar")
         radius = read_expression(r, where="polar: r")
         x, z = radius * sp.cos(symbol), radius * sp.sin(symbol)
@@ -203,21 +279,37 @@ class Curve(Declaration):
     ) -> "Curve":
         """Declare a curve in space by its three coordinates; z is up.
 
-        Without ``period`` and ``domain`` it is closed where its coordinates are made of waves of commensurate rates.
-        The contact force of a space curve is a vector, and ``normal_force`` its length; on a curve in a vertical plane
-        it has the sign that it has on planar curves.
+        The contact force of a space curve is a vector, and ``normal_force`` is its length; on a curve in a vertical
+        plane ``normal_force`` has the same sign as on planar curves.
 
         Parameters
         ----------
+        x, y, z
+            The coordinates in m, as text or SymPy expressions.
+        parameter, domain, parameters, title
+            As in `Curve.graph`.
+        period
+            The increase of λ in one lap of a closed curve. Without it and without ``domain`` the curve is closed if its
+            coordinates consist of sines and cosines of commensurate angles.
         roll
-            How the track is banked, so that states tell what a rider feels: a roll angle in radians, positive to the
-            left; "coordinated", so that there is no lateral force at the speed of the motion; or ("coordinated", v), at
-            the speed v. The angle is measured from the level, which a vertical tangent does not have; on a curve in a
-            vertical plane from the normal of that plane along which the contact force is positive. None: not banked.
+            How the track is banked, so that states have the loads on a rider: a roll angle in radians, positive to the
+            left; "coordinated", without lateral force at the speed of the motion; or ("coordinated", v), without
+            lateral force at the speed v. The angle is measured from the horizontal, and is undefined where the tangent
+            is vertical; on a curve in a vertical plane it is measured from the normal of that plane along which the
+            contact force is positive. None, the default, is a track that is not banked.
         heartline
-            The height of the declared curve, which the rider follows, over the track; 0 if not given.
-        parameters, title
-            As of other curves.
+            The height in m of the declared curve, which riders follow, above the track; by default 0.
+
+        Returns
+        -------
+        Curve
+
+        Raises
+        ------
+        DeclarationError
+            If names, ends or period do not fit together, or the curve is a point.
+        ExpressionError
+            If a text is not an arithmetic expression.
 
         Examples
         --------
@@ -245,19 +337,35 @@ class Curve(Declaration):
         title: str = "",
         positive: Iterable[str] = (),
     ) -> "Curve":
-        """Declare the curve ``F(x, z) = 0`` through a point, in arc length from there.
+        """Declare the curve ``F(x, z) = 0`` through a point; its parameter is the arc length in m from there.
 
         Parameters
         ----------
         F
             An expression in x, z and run-time parameters.
         start
-            x and z of a point of the curve, where arc length is 0: numbers or expressions in run-time parameters.
+            x and z in m of a point of the curve, where the arc length is 0: numbers or expressions in run-time
+            parameters.
         tangent
-            1: arc length grows along ``(-F_z, F_x)/|grad F|``; -1: along the opposite.
+            1: the arc length increases along ``(-F_z, F_x)/|grad F|`` (paper, eq. 36); -1: against it.
+        parameter
+            The name of the arc length.
         domain
-            Ends of the arc length, which contain 0. Without them the curve is followed until it closes or comes to a
-            singular point, where grad F = 0.
+            The two ends of the arc length, between which 0 lies. By default the curve is traced until it closes or
+            reaches a singular point, where grad F = 0.
+        parameters, title, positive
+            As in `Curve.graph`.
+
+        Returns
+        -------
+        Curve
+
+        Raises
+        ------
+        DeclarationError
+            If names, ends or period do not fit together, or the curve is a point.
+        ExpressionError
+            If a text is not an arithmetic expression.
 
         Examples
         --------
@@ -286,47 +394,50 @@ class Curve(Declaration):
         smoothing: float | str | None = None,
         **more: Unpack[SpaceOptions],
     ) -> "Curve":
-        """Declare the track through points, in arc length from the first of them.
+        """Declare the track through points; its parameter is the arc length in m from the first of them.
 
         Parameters
         ----------
         points
-            Rows of x and z, or in space of x, y and z: an array, or numbers or decimal text, which is kept as it is; or
-            a table with these columns, as a DataFrame or a mapping; or, where ``z`` is given, the x of all points. In
-            space the track is a spline; of a table in space the column roll is read too.
+            An (n, 2) array of x and z, or in space an (n, 3) array of x, y and z, in m; or rows of numbers or decimal
+            text, which is exact; or a table with these columns, as a DataFrame or a mapping, in space also with the
+            column roll; or, if ``z`` is given, the x of all points.
         z
-            The heights of the points, where ``points`` are their x: ``Curve.sampled(x, z)``.
+            The heights of the points in m, if ``points`` are their x: ``Curve.sampled(x, z)``.
         kind
-            "spline": the interpolating quintic spline. "linear": planes stitched together (paper, eq. 1); at their
-            corners the speed is kept. A body at rest on a corner stays where both planes rise from it or hold it; on a
-            ridge that lets it slide down either side it goes in the direction of launch. A moving body that only one
-            side of the track holds (``contact="above"`` or ``"below"``) leaves it at a corner that bends away from the
-            body, with the event "liftoff", and passes one that bends towards it.
+            "spline": the interpolating quintic spline. "linear", for planar tracks: straight lines between the points
+            (paper, eq. 1). At their corners the speed is kept. A body at rest on a corner stays if both lines rise from
+            it or friction holds it; on a ridge from which it can slide down on either side it starts in the direction
+            of launch. A moving body that only one side of the track holds (``contact="above"`` or ``"below"``) leaves
+            it at a corner that bends away from the body, with the event "liftoff", and passes a corner that bends
+            towards it.
         closed
-            Whether the track closes; None: if its last point is its first.
+            Whether the track is closed; by default it is if its last point equals its first.
         smoothing
-            For measured points, whose scatter would be a hundredfold in curvature and loads: their standard deviation
-            in metres, or "auto", to find it by cross-validation. The track is then the smoothing spline of degree 5;
-            what it changed, and how good its curvature is, is in the attribute ``smoothing`` of the curve. None: the
-            track goes through the points.
+            For measured points: their standard deviation in m, or "auto", to find it by cross-validation. The track is
+            then the smoothing spline of degree 5, and the attribute ``smoothing`` of the curve describes the changes
+            and the error of the curvature. By default the track passes through the points, so that their scatter
+            appears in the loads, a hundred times as large.
         roll
-            In space, how the track is banked, so that states tell what a rider feels: an array of the roll angle at
-            each point in radians, through which a spline goes as well; or what `Curve.space` takes, with formulas in
-            the arc length s.
-        heartline, parameters
-            As of `Curve.space`.
-        title
-            One line for people.
+            In space, how the track is banked, so that states have the loads on a rider: an array of the roll angle at
+            each point in radians, which a spline interpolates too; or what `Curve.space` takes, with formulas in the
+            arc length s.
+        heartline, parameters, title
+            As in `Curve.space`.
+
+        Returns
+        -------
+        Curve
 
         Raises
         ------
         DeclarationError
-            If a row is no point, or points are too few, repeated, out of order or far away.
+            If a row is not a point, or points are too few, repeated, out of order or too far away.
 
         Warns
         -----
         NoisyPointsWarning
-            If the curvature of the track goes up and down from point to point.
+            If the curvature of the track changes its sign from point to point.
 
         Examples
         --------
@@ -360,7 +471,7 @@ class Curve(Declaration):
         closed: bool = False,
         **more: Unpack[SpaceOptions],
     ) -> "Curve":
-        """Declare a rail of pieces joined end to start, in arc length from its start.
+        """Declare a rail of pieces, each joined to the end of the one before; its parameter is arc length in m.
 
         Parameters
         ----------
@@ -369,24 +480,28 @@ class Curve(Declaration):
             a bounded domain, whose place and tangent must match there (within 1e-9 of the rail's length and 1e-9 rad).
             A `transition` or a space curve among them makes a rail in space, on which arcs and clothoids turn upwards
             where they turn left in a plane.
-        start, heading
-            Where the first piece begins, and the angle of its tangent from the x axis; (0, 0) and 0 if not given. In
-            space x, y and z, and the angles of the tangent from the x axis as seen from above and from the level, then
-            how far the frame leans to the left; those left out are 0. A curve that comes first has its own.
+        start
+            The coordinates of the start in m: x and z, in space x, y and z; by default the origin. A curve with
+            formulas that comes first has its own.
+        heading
+            The angle of the tangent at the start from the x axis, in radians; by default 0. In space it has up to three
+            angles: that from the x axis as seen from above, that above the horizontal, and the roll to the left.
         closed
             Whether the rail ends where it began, in the same direction.
         roll
-            In space, how the track is banked, so that states tell what a rider feels: "pieces", as the frame leans that
-            the pieces turn and roll; or what `Curve.space` takes, with formulas in the arc length s.
-        heartline, parameters
-            As of `Curve.space`.
-        title
-            One line for people.
+            In space, how the track is banked, so that states have the loads on a rider: "pieces", by the roll of the
+            rail's frame; or what `Curve.space` takes, with formulas in the arc length s.
+        heartline, parameters, title
+            As in `Curve.space`.
+
+        Returns
+        -------
+        Curve
 
         Raises
         ------
         DeclarationError
-            If a piece is none, or has no ends. What depends on parameters is checked when they are known.
+            If a piece is of another type, or has no ends. Whatever depends on parameters is checked at run time.
 
         Examples
         --------

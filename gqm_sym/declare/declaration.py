@@ -1,4 +1,4 @@
-"""What a declared curve consists of, checked: coordinates, parameter, ends, period and run-time parameters."""
+"""The checked data of a declared curve: coordinates, parameter, ends, period and run-time parameters."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
@@ -21,7 +21,7 @@ Source: TypeAlias = str | int | sp.Expr
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Declaration:
-    """A curve by its formulas or by what its chart is made from; `Curve`, which is one, describes the attributes."""
+    """The data of a curve; the subclass `Curve` describes the attributes."""
 
     kind: str
     x: sp.Expr
@@ -57,7 +57,7 @@ class Declaration:
 
     @property
     def in_space(self) -> bool:
-        """Whether it has three coordinates."""
+        """Whether the curve has three coordinates."""
         return self.kind == "space" or getattr(self.definition, "in_space", False)
 
     @property
@@ -66,7 +66,17 @@ class Declaration:
         return self.named(self.x, self.y, self.z)
 
     def named(self, x: sp.Expr, y: sp.Expr, z: sp.Expr) -> tuple[tuple[str, sp.Expr], ...]:
-        """Pair forms, one for each coordinate, with the names of the coordinates; a planar curve has x and z."""
+        """Pair three expressions with the names of the coordinates; a planar curve has no y.
+
+        Parameters
+        ----------
+        x, y, z
+            The expressions that belong to the three coordinates.
+
+        Returns
+        -------
+        tuple of (str, sympy.Expr)
+        """
         return (("x", x), *((("y", y),) if self.in_space else ()), ("z", z))
 
     @property
@@ -76,7 +86,7 @@ class Declaration:
 
     @property
     def charted(self) -> bool:
-        """Whether the parameter is arc length, and the coordinates are known by numbers only."""
+        """Whether the curve has no formulas: the parameter is arc length, and the coordinates are numbers."""
         return self.definition is not None
 
 
@@ -84,7 +94,7 @@ Declared = TypeVar("Declared", bound=Declaration)
 
 
 def parameter_symbol(name: str, kind: str) -> sp.Symbol:
-    """The symbol of a curve's own parameter."""
+    """Return the symbol of a curve's own parameter."""
     return sp.Symbol(check_parameter_name(name, kind), real=True)
 
 
@@ -103,7 +113,7 @@ def declare(
     period: Source | None = None,
     names_of_level: tuple[str, ...] = (),
 ) -> Declared:
-    """The curve of these coordinates with its domain, its period and its run-time parameters, read and checked."""
+    """Return the curve with its domain, its period and its run-time parameters, which are read and checked."""
     kind, symbol = forms.kind, forms.parameter
     unit = unit_of(parameter_dimension(forms)) or None
     ends = read_ends(domain, kind, unit)
@@ -113,8 +123,11 @@ def declare(
     given = tuple(end for end in (*ends, turn) if end is not None)
     used = (*names_in_order(*written), *names_of_level, *names_in_order(*given))
     found = tuple(name for name in dict.fromkeys(used) if name != symbol.name)
-    if forms.in_space and "y" in found:
-        raise DeclarationError("space curve: 'y' is a coordinate and cannot be a run-time parameter; rename it")
+    if confused := {name for name, _ in forms.coordinates}.intersection(found):
+        raise DeclarationError(
+            f"{kind} curve: {min(confused)!r} is a coordinate and cannot be a run-time parameter; write the curve as a "
+            f"function of its parameter {symbol.name!r}, or rename it"
+        )
     defaults = read_parameters(parameters, found=found, where=f"{kind} curve")
     if turn is None and kind in ("parametric", "polar", "space") and ends == (None, None):
         turn = found_period(forms.point, symbol)

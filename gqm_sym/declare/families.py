@@ -1,4 +1,4 @@
-"""The curves of the paper's Table 3 and space curves by name: a table, and one call for each of its rows.
+"""The curves of the paper's Table 3, and space curves, by name: a table with one call for each row.
 
 ``families.ellipse(a=2, b="b_e")`` declares an ellipse whose semi-axis a is 2 unless another value
 is given at run time, and whose b is called ``b_e``. A new family is a row here and one in
@@ -25,15 +25,15 @@ class Family:
     Attributes
     ----------
     arguments
-        The run-time parameters by their usual names; all but those in ``signed`` are lengths.
+        The run-time parameters by their usual names; all except those in ``signed`` are lengths.
     signed
         Arguments that may be negative.
     whole
-        Whole numbers that shape the curve, each with its value if none is given.
+        Whole numbers that shape the curve, each with its default.
     x, y, z, r
         Texts of the coordinates, or of the radius of a polar curve; only space curves have y.
     domain, period
-        Texts, empty where there is none.
+        Texts, empty if there is none.
     """
 
     name: str
@@ -62,14 +62,27 @@ class Family:
 
         Parameters
         ----------
+        unnamed
+            Positional arguments, which are refused.
         parameter
             Another name for the curve's parameter.
         domain
-            Another range of the parameter than the family's own.
+            The two ends of the range of the parameter, if they differ from those of the family.
         inverted
-            Turn the curve upside down: z becomes -z.
+            Whether to turn the curve upside down: z becomes -z.
         arguments
-            For each argument of the family another name or a value; for a whole number that number.
+            For each argument of the family a value in SI units or another name; for a whole number its value.
+
+        Returns
+        -------
+        Curve
+
+        Raises
+        ------
+        ArgumentError
+            If an argument is positional or unknown.
+        DeclarationError
+            If a name has two meanings, or a value is not allowed.
         """
         where = f"families.{self.name}"
         if unnamed:
@@ -291,7 +304,19 @@ def cartesian_graph(
     domain: Iterable[Source | None] | None = None,
     parameters: Parameters | None = None,
 ) -> Curve:
-    """Declare the graph ``z = phi(x)``; the same as `Curve.graph`, by the paper's name."""
+    """Declare the graph ``z = phi(x)``: `Curve.graph` under the name of the paper's Table 3.
+
+    Parameters
+    ----------
+    phi
+        The height in m, as text or a SymPy expression.
+    parameter, domain, parameters
+        As in `Curve.graph`, whose errors are raised too.
+
+    Returns
+    -------
+    Curve
+    """
     return Curve.graph(phi, parameter=parameter, domain=domain, parameters=parameters)
 
 
@@ -305,7 +330,17 @@ def implicit(
     domain: Iterable[Source | None] | None = None,
     parameters: Parameters | None = None,
 ) -> Curve:
-    """Declare the curve ``F(x, z) = 0``; the same as `Curve.implicit`, by the paper's name."""
+    """Declare the curve ``F(x, z) = 0``: `Curve.implicit` under the name of the paper's Table 3.
+
+    Parameters
+    ----------
+    F, start, tangent, parameter, domain, parameters
+        As in `Curve.implicit`, whose errors are raised too.
+
+    Returns
+    -------
+    Curve
+    """
     return Curve.implicit(F, start=start, tangent=tangent, parameter=parameter, domain=domain, parameters=parameters)
 
 

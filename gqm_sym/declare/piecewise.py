@@ -99,36 +99,94 @@ class Rail:
 
 @checked("line")
 def line(*, length: Source) -> Piece:
-    """A straight piece of a rail."""
+    """Return a straight piece of a rail.
+
+    Parameters
+    ----------
+    length
+        The length in m: a number, or an expression in run-time parameters.
+
+    Returns
+    -------
+    Piece
+
+    Raises
+    ------
+    DeclarationError
+        If a number is not allowed, such as a length that is not positive.
+    """
     return _standard("line", length)
 
 
 @checked("arc")
 def arc(*, radius: Source, angle: Source) -> Piece:
-    """A piece of a circle; a positive angle turns left, a negative one right."""
+    """Return a piece of a rail that is an arc of a circle.
+
+    Parameters
+    ----------
+    radius
+        The radius in m: a number, or an expression in run-time parameters.
+    angle
+        The angle of the turn in radians, positive to the left.
+
+    Returns
+    -------
+    Piece
+
+    Raises
+    ------
+    DeclarationError
+        If a number is not allowed, such as a length that is not positive.
+    """
     return _standard("arc", radius, angle)
 
 
 @checked("clothoid")
 def clothoid(*, length: Source, kappa_start: Source, kappa_end: Source) -> Piece:
-    """A piece whose signed curvature is linear in arc length."""
+    """Return a piece of a rail whose signed curvature is linear in arc length.
+
+    Parameters
+    ----------
+    length
+        The length in m: a number, or an expression in run-time parameters.
+    kappa_start, kappa_end
+        The signed curvature at both ends in 1/m, positive to the left.
+
+    Returns
+    -------
+    Piece
+
+    Raises
+    ------
+    DeclarationError
+        If a number is not allowed, such as a length that is not positive.
+    """
     return _standard("clothoid", length, kappa_start, kappa_end)
 
 
 @checked("transition")
 def transition(*, length: Source, yaw: Source = 0, pitch: Source = 0, roll: Source = 0) -> Piece:
-    """A piece in space along which the rail turns and rolls at given rates.
+    """Return a piece in space along which the rail turns and rolls at given rates.
 
-    The rates are those of the frame of a rider: his tangent, left and up. In the terms of Frenet's formulas, with the
-    normal to the left, curvature is yaw and torsion is minus the roll rate.
+    The rates are those of a rider's frame: tangent, left and up. In the terms of Frenet's formulas, with the normal to
+    the left at the start, the curvature is the yaw rate, and the torsion is minus the roll rate.
 
     Parameters
     ----------
     length
-        Of the piece.
+        The length in m: a number, or an expression in run-time parameters.
     yaw, pitch, roll
-        Rates in 1/m: positive where the rail turns to the left, upwards, and leans to the left, each a number or a
-        polynomial in ``s``, the distance from the beginning of the piece, of degree 5 at most.
+        The rates in rad/m at which the rail turns to the left, turns upwards and rolls to the left. Each is a number,
+        or a polynomial of degree 5 at most in ``s``, the distance from the start of the piece.
+
+    Returns
+    -------
+    Piece
+
+    Raises
+    ------
+    DeclarationError
+        If a number is not allowed, such as a length that is not positive.
     """
     size = read_expression(length, where="transition: length", unit="m")
     if size.is_number and not size > 0:
@@ -205,12 +263,14 @@ def _piece(given: Piece | FormulaCurve, where: str) -> Piece:
     if isinstance(given, Piece):
         return given
     if not isinstance(given, FormulaCurve):
-        raise DeclarationError(f"{where}: {short(given)} given; give line, arc, clothoid or a curve with formulas")
+        raise DeclarationError(
+            f"{where}: must be a line, an arc, a clothoid, a transition or a curve with formulas, got {short(given)}"
+        )
     if given.charted:
         raise DeclarationError(f"{where}: a curve of kind {given.kind!r} cannot be a piece; give one with formulas")
     low, high = given.domain
     if low is None or high is None:
-        raise DeclarationError(f"{where} ({given.kind}): domain: must have two ends, which the piece lies between")
+        raise DeclarationError(f"{where} ({given.kind}): domain: must have two ends, between which the piece lies")
     return Piece(kind="curve", numbers=(low, high), curve=given)
 
 

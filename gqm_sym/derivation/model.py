@@ -170,23 +170,45 @@ class Model:
 
     @property
     def domain(self) -> tuple[sp.Expr | None, sp.Expr | None]:
-        """Ends of the parameter's range; None where it is open."""
+        """The two ends of the range of λ, each None where it is open."""
         return self.curve.domain
 
     @property
     def period(self) -> sp.Expr | None:
-        """The parameter period of a closed curve."""
+        """The increase of λ in one lap of a closed curve; None on open curves."""
         return self.curve.period
 
     def normal_force_at(self, v2: sp.Expr) -> sp.Expr:
-        """N where V² has a value; of a curve in no vertical plane ``|N|``."""
+        """Return the contact force for a given value of V²: N, or ``|N|`` for a curve in no vertical plane.
+
+        Parameters
+        ----------
+        v2
+            V² in m²/s², an expression.
+
+        Returns
+        -------
+        sympy.Expr
+            The contact force in N, ``m*(kappa*V**2 + n0)`` (paper, eq. 15, for any force; MATHS, section 2).
+        """
         v2 = _read_v2(v2)
         if not self.loads:
             return MASS * (self.kappa * v2 + self.static_normal_load)
         return MASS * sp.sqrt(sp.Add(*(part**2 for part in self._turned_force(v2))))
 
     def normal_force_vector_at(self, v2: sp.Expr) -> Place:
-        """The components of the contact force along x, y and z where V² has a value."""
+        """Return the components of the contact force along x, y and z for a given value of V².
+
+        Parameters
+        ----------
+        v2
+            V² in m²/s², an expression.
+
+        Returns
+        -------
+        tuple of sympy.Expr
+            The three components in N.
+        """
         v2 = _read_v2(v2)
         way = (self.dxds, self.dyds, self.dzds)
         if self.loads:
@@ -203,16 +225,16 @@ class Model:
 
     @property
     def units(self) -> dict[str, str]:
-        """SI units of the curve's parameter and of the run-time parameters, as far as the formulas tell them.
+        """SI units of the curve's parameter and of the run-time parameters, as far as the formulas determine them.
 
-        A plain number and an angle have "1".
+        Plain numbers and angles have the unit "1".
         """
         return units_of(self.curve, self.force)
 
     def closed_forms(self) -> tuple[tuple[str, sp.Basic], ...]:
-        """Return the forms for people, in the order to print them, each with its label.
+        """Return the closed forms in the order in which they are printed, each with its label.
 
-        Those of a dissipative model hold V² as the symbol W.
+        In those of a dissipative model V² is the symbol W.
         """
         lam = self.parameter.name
         force, side, rate = self.normal_force, self.side_force, self.time_integrand

@@ -52,21 +52,28 @@ def derive(
     parameters: Mapping[str, Given | None] | None = None,
     title: str | None = None,
 ) -> Model:
-    """Derive every closed form of a motion on ``curve`` under ``kernel``.
+    """Derive every closed form of a motion along a curve under a force law.
 
     Parameters
     ----------
-    curve, kernel
-        The declarations.
+    curve : Curve
+        The curve.
+    kernel : Kernel
+        The force law, a sum of forces.
     parameters
-        Defaults that replace those of the declarations; None means: to be given at run time.
+        Defaults in SI units that replace those of the declarations; None for a value that is given at run time.
     title
-        One line for people; that of the curve if nothing is said.
+        One line of text for readers; by default that of the curve.
+
+    Returns
+    -------
+    Model
+        The closed forms as SymPy expressions (MATHS, sections 1 to 4).
 
     Raises
     ------
     DeclarationError
-        If a name means two things, a default belongs to no parameter, or a form is nowhere real.
+        If a name has two meanings, a default belongs to no parameter, or an expression is nowhere real.
     DerivationError
         If a closed form is not real and finite.
     BudgetError

@@ -150,13 +150,18 @@ def height_limit(
     g: Source = "9.81",
     parameters: Mapping[str, Given] | None = None,
 ) -> float:
-    """Return the height in m up to which a track of a given period exists; arguments are those of `from_period`.
+    """Return the height in m up to which a track of a given period exists.
+
+    Parameters
+    ----------
+    law, share, g, parameters
+        As in `from_period`.
 
     Returns
     -------
     float
-        Where one side of the track becomes vertical; infinite if neither does within a hundred times the height of the
-        track whose period is that at the bottom everywhere.
+        The height at which one side of the track becomes vertical; infinite if neither does within a hundred times
+        the height of the cycloid with the period at the bottom.
 
     Raises
     ------

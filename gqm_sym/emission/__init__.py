@@ -17,7 +17,7 @@ __all__ = ["body_digests", "emit"]
 
 @budget("emission", 60.0, "declare the curve and the forces by shorter expressions")
 def emit(model: Model, *, name: str) -> str:
-    """The module's text for a model. The same model and name give the same bytes.
+    """Return the text of a model's module; the same model and name give the same bytes.
 
     Parameters
     ----------
@@ -26,10 +26,14 @@ def emit(model: Model, *, name: str) -> str:
     name : str
         The module's name, a Python identifier.
 
+    Returns
+    -------
+    str
+
     Raises
     ------
     InputError
-        If the name is none.
+        If the name is not allowed.
     EmissionError
         If an expression has no form in emitted code; the message names it.
     BudgetError

@@ -23,16 +23,25 @@ MILLIMETRES = 1e3
 
 @require("plot")
 def smoothing(curve: Any, axes: Any = None) -> "Figure":
-    """Draw what smoothing did to the points of a sampled track: shifts, and curvature with the band of its error.
+    """Draw the effect of smoothing on the points of a sampled track: shifts, and the curvature with its error band.
 
     A track in space is drawn from above.
 
     Parameters
     ----------
     curve : Curve
-        Declared with ``Curve.sampled(points, smoothing=...)``.
+        A curve that was declared with ``Curve.sampled(points, smoothing=...)``.
     axes : three matplotlib Axes, optional
-        For the track with its points, for the shifts, and for the curvature.
+        The axes of the track with its points, of the shifts, and of the curvature; by default a new figure is made.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+
+    Raises
+    ------
+    InputError
+        If the curve was not smoothed.
     """
     report = getattr(curve, "smoothing", None)
     if report is None:

@@ -18,24 +18,23 @@ class Fit:
     Attributes
     ----------
     names : tuple of str
-        What was found, in the order of ``covariance``.
+        The names that were fitted, in the order of ``covariance``.
     estimates : dict
         The value of each in its unit.
     std : dict
-        The standard deviation of each; infinite where the data do not tell it.
+        The standard deviation of each; infinite where the data do not determine it.
     covariance : (k, k) array
-        The covariance of the estimates. Without ``sigma`` it is scaled so that the residuals have the deviation that
-        they show.
+        The covariance of the estimates. Without ``sigma`` it is scaled by the deviation of the residuals.
     residuals : dict
-        Measured less fitted values, for each quantity, in its unit.
+        Measured minus fitted values, for each quantity, in its unit.
     chi2 : float
         The sum of squares of the residuals in standard deviations; without ``sigma`` in SI units.
     degrees_of_freedom : int
-        The number of measurements less that of the combinations of parameters that they tell.
+        The number of measurements minus ``rank``.
     rank : int
-        How many independent combinations of what was sought the data tell.
+        The number of independent combinations of the unknowns that the data determine.
     unidentified : tuple of tuples of str
-        The names that the data cannot tell apart, for each combination that changes nothing that was measured.
+        For each combination of unknowns without effect on the measured values, the names in it.
     arguments : dict
         All arguments of ``module.solve`` that give the fitted motion.
     measured : data.Measurements
@@ -56,7 +55,7 @@ class Fit:
 
     @property
     def correlation(self) -> Array:
-        """The correlations of the estimates, a (k, k) array; NaN where the data do not tell them."""
+        """The correlations of the estimates, a (k, k) array; NaN where the data do not determine them."""
         with np.errstate(invalid="ignore"):
             deviations = np.sqrt(np.diag(self.covariance))
             correlation: Array = self.covariance / np.outer(deviations, deviations)

@@ -26,7 +26,15 @@ STEP = 1e-5
 
 
 class Estimate(NamedTuple):
-    """A value and its standard deviation, in the same unit."""
+    """A value with its standard deviation.
+
+    Attributes
+    ----------
+    value : float
+        The value, in the unit of its quantity.
+    std : float
+        The standard deviation, in the same unit.
+    """
 
     value: float
     std: float
@@ -39,17 +47,17 @@ class Uncertainty:
     Attributes
     ----------
     quantity : str
-        What was asked.
+        The name of the quantity.
     linear : Estimate
-        The answer for the given values, and its standard deviation by the derivatives there.
+        The answer for the given values, and its standard deviation from the derivatives there.
     sampled : Estimate
         Mean and standard deviation of the answers for values that were drawn at random.
     gradient : dict
-        The derivative of the answer by each uncertain number.
+        The derivative of the answer with respect to each uncertain number.
     samples : array
-        The answers for the values that were drawn, without those for which there is none.
+        The answers for the values that were drawn, as far as there are answers.
     missing : int
-        For how many of them there is none.
+        The number of drawn values without an answer.
     """
 
     quantity: str

@@ -59,40 +59,41 @@ KAPPA = sp.Symbol("κ", real=True)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Kernel:
-    """A force law; ``first + second`` is the law with both forces.
+    """A force law; ``first + second`` is the law with both forces (MATHS, section 2).
 
     Attributes
     ----------
     potential
-        Potential energy per unit mass in the coordinates ``x`` and ``z``, on space curves also ``y``; the applied force
-        is minus its gradient.
+        The potential energy per unit mass in m²/s², as a function of the coordinates ``x`` and ``z``, on space curves
+        also of ``y``; the applied force is minus its gradient.
     inertia
-        What multiplies the acceleration: 1 for sliding, ``1 + beta`` for rolling.
+        The factor of the acceleration: 1 for sliding, ``1 + beta`` for rolling.
     resistance
-        What opposes motion and does not depend on speed, per unit mass, in proportion to the curvature `KAPPA` or to
-        its absolute value.
+        The force per unit mass against the motion that does not depend on speed, in m/s², proportional to the curvature
+        `KAPPA` or to its absolute value.
     drag
-        Coefficient of V**2 in what opposes motion, 1/length.
+        The coefficient of V**2 in the force per unit mass against the motion, in 1/m.
     friction, static_friction
-        Coefficients of the contact force in what opposes motion, and in what holds a body at rest.
+        The coefficients of sliding and of static friction.
     tangential_law
-        Tangential acceleration of the user's own, in the curve's parameter, coordinates, `W` and `DIRECTION`.
+        The acceleration of `Kernel.law` in m/s², in the curve's parameter, the coordinates, `W` and `DIRECTION`.
     spin
-        Angular velocity of a frame that turns about the z axis: its Coriolis force presses out of the plane.
+        The angular velocity in rad/s of a frame that rotates about the z axis, whose Coriolis force acts sideways.
     radius
-        Of a body that rolls to the left of growing λ (negative: to the right), whose centre moves on a path of its own.
+        The radius in m of a rolling body, whose centre is to the left of increasing λ (to the right if negative).
     static_friction_limit
-        Of a rolling body whose static friction is known: the names of its parameters beta and mu_static.
+        The names of the parameters beta and mu_static of a rolling body; None if its static friction is not given.
     train_length, cars
-        Of a train, whose mass is spread evenly along the track: its length, and how many equal cars it has; else 0.
+        The length in m of a train, whose mass is spread evenly along the track, and the number of its equal cars; 0
+        for a body.
     terms
-        Name and one line of text of every force in it.
+        The name and a description of every force in the sum.
     defaults
-        Its run-time parameters in order, each with its default or None.
+        The run-time parameters in order, each with its default or None.
     positive
-        Parameters promised to be positive.
+        Names of parameters that must be positive.
     at_least
-        Parameters with what they must not fall below: a number, or another parameter.
+        Parameters with their lower bounds, each a number or another parameter.
     """
 
     terms: tuple[tuple[str, str], ...]
@@ -128,15 +129,25 @@ class Kernel:
         *,
         parameters: Mapping[str, Given | None] | Iterable[str] | None = None,
     ) -> "Kernel":
-        """Return a force law of the user's own, which is added to the tangential acceleration.
+        """Return a force law by its tangential acceleration.
 
         Parameters
         ----------
         A
-            Acceleration along growing λ in the curve's parameter, its coordinates ``x`` and ``z``, ``W`` = V**2 and
-            ``direction`` = sgn(ds/dt); its other symbols are run-time parameters. It adds nothing to the contact force.
+            The acceleration in m/s² along increasing λ, as a function of the curve's parameter, the coordinates ``x``
+            and ``z``, ``W`` = V**2 and ``direction`` = sgn(ds/dt); its other symbols are run-time parameters. It
+            does not contribute to the contact force.
         parameters
-            Their defaults, or their names in the order wanted.
+            Defaults of these parameters in SI units, or their names in order.
+
+        Returns
+        -------
+        Kernel
+
+        Raises
+        ------
+        ExpressionError
+            If the text is not an arithmetic expression.
 
         Examples
         --------
@@ -169,14 +180,23 @@ class Kernel:
         return not any((self.resistance, self.drag, self.friction, self.tangential_law))
 
     def along(self, parameter: sp.Symbol, *, in_space: bool = False) -> "Kernel":
-        """Return the law on a curve of this parameter, which a law of the user's own may name.
+        """Return the law on a curve with this parameter, which a tangential law may contain.
 
-        On a space curve ``y`` is a coordinate, too.
+        Parameters
+        ----------
+        parameter
+            The name of the curve's parameter.
+        in_space
+            Whether the curve has three coordinates: then ``y`` is a coordinate too.
+
+        Returns
+        -------
+        Kernel
 
         Raises
         ------
         DeclarationError
-            If a parameter of the law with a value of its own is called ``y`` there.
+            If a parameter of the law with a default is called ``y`` on a space curve.
         """
         own = {parameter.name} if parameter in self.tangential_law.free_symbols else set()
         law = self

@@ -13,14 +13,23 @@ from gqm_sym.parameters import COORDINATES, Given, names_in_order, read_paramete
 
 @checked("CentralForce")
 def CentralForce(*, centre: Iterable[str | int | sp.Expr] = (0, 0), k: Given | None = None) -> Kernel:
-    """Return the attraction ``k/r**2`` towards ``centre``.
+    """Return the attraction ``k/r**2`` per unit mass towards a centre.
 
     Parameters
     ----------
     centre
-        Its coordinates (x, z), or (x, y, z) where y is not 0: numbers, or expressions in run-time parameters.
+        The coordinates x and z of the centre in m, or x, y and z: numbers, or expressions in run-time parameters.
     k
-        The strength (G times the mass of the centre), or another name for it.
+        The strength in m³/s² (the gravitational constant times the mass of the centre), or another name for it.
+
+    Returns
+    -------
+    Kernel
+
+    Raises
+    ------
+    DeclarationError
+        If a name or a value is not allowed.
     """
     where = "central_force: centre"
     given = several(centre, where=where, what="two coordinates (x, z), or three (x, y, z)")

@@ -12,9 +12,22 @@ def CoulombFriction(*, mu: Given | None = None, mu_static: Given | None = None) 
     Parameters
     ----------
     mu
-        Another name for the coefficient of friction of a body that slides, or a value.
+        The coefficient of sliding friction, or another name for this parameter.
     mu_static
-        The same of a body at rest, never below ``mu``; that of sliding if nothing is said.
+        The coefficient of static friction, never below ``mu``, or another name for it; by default it is ``mu``.
+
+    Returns
+    -------
+    Kernel
+
+    Raises
+    ------
+    DeclarationError
+        If a name or a value is not allowed.
+
+    Notes
+    -----
+    The row "Coulomb friction" of the paper's Table 2, with the signs of velocity and contact force (MATHS, section 2).
     """
     sliding, pair = parameter(mu, "mu", where="coulomb")
     holding, other = (sliding, pair) if mu_static is None else parameter(mu_static, "mu_static", where="coulomb")

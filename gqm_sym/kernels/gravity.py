@@ -7,12 +7,21 @@ from gqm_sym.parameters import Given
 
 @checked("Gravity")
 def Gravity(*, g: Given | None = None) -> Kernel:
-    """Return uniform gravity, downwards.
+    """Return uniform gravity, downwards: ``F = -g`` per unit mass along z (MATHS, section 2).
 
     Parameters
     ----------
     g
-        Another name for its acceleration, or a value; 9.81 (exactly) if nothing is said.
+        The acceleration in m/s², by default exactly 9.81; or another name for this parameter.
+
+    Returns
+    -------
+    Kernel
+
+    Raises
+    ------
+    DeclarationError
+        If a name or a value is not allowed.
     """
     strength, pair = parameter(g, "g", where="gravity")
     return Kernel(

@@ -16,15 +16,24 @@ def Potential(
     *,
     parameters: Mapping[str, Given | None] | Iterable[str] | None = None,
 ) -> Kernel:
-    """Return the force minus the gradient of ``U``.
+    """Return the force ``-grad U`` per unit mass (MATHS, section 2).
 
     Parameters
     ----------
     U
-        Potential energy per unit mass in ``x`` and ``z``, on space curves also in ``y``; its other symbols are
-        parameters.
+        The potential energy per unit mass in m²/s², as a function of ``x`` and ``z``, on space curves also of ``y``;
+        its other symbols are run-time parameters.
     parameters
-        Their defaults, or their names in the order wanted.
+        Defaults of these parameters in SI units, or their names in order.
+
+    Returns
+    -------
+    Kernel
+
+    Raises
+    ------
+    DeclarationError
+        If a name or a value is not allowed.
     """
     energy = read_expression(U, where="potential: U")
     found = tuple(name for name in names_in_order(energy) if name not in COORDINATES)

@@ -9,18 +9,32 @@ from gqm_sym.parameters import Given
 
 @checked("Rolling")
 def Rolling(*, beta: Given | None = None, radius: Given | None = None, mu_static: Given | None = None) -> Kernel:
-    """Return the inertia of a body that rolls.
+    """Return the inertia ``1 + beta`` of a body that rolls without slipping.
 
     Parameters
     ----------
     beta
-        Moment of inertia over mass and radius squared: sphere 2/5, cylinder 1/2, ring 1.
+        The moment of inertia over mass and radius squared (sphere 2/5, cylinder 1/2, ring 1), or another name for it.
     radius
-        Of the body, a name or a value: then the curve is the track, and the body's centre moves beside it, to the left
-        of growing λ (to the right if negative). Without it the curve is the path of the centre.
+        The radius of the body in m, or another name for it. With it the curve is the track, and the centre of the body
+        moves beside it, to the left of increasing λ, or to the right if the radius is negative. Without it the curve is
+        the path of the centre.
     mu_static
-        Coefficient of static friction, a name or a value: then events of the kind "slip" tell where a conservative
-        motion asks for more. It goes on as if the body still rolled.
+        The coefficient of static friction, or another name for it. With it, events of the kind "slip" mark the places
+        where a conservative motion needs more friction; the motion continues as if the body still rolled.
+
+    Returns
+    -------
+    Kernel
+
+    Raises
+    ------
+    DeclarationError
+        If a name or a value is not allowed.
+
+    Notes
+    -----
+    The paper's section on rolling, with the path of the centre in place of the track (MATHS, section 2).
     """
     symbol, pair = parameter(beta, "beta", where="rolling")
     size, limit = sp.S.Zero, None

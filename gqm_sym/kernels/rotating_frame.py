@@ -1,4 +1,4 @@
-"""A track that turns about the vertical axis x = 0."""
+"""A track that rotates about the vertical axis x = 0."""
 
 from gqm_sym.arguments import checked
 from gqm_sym.kernels.base import Kernel, X, parameter
@@ -7,14 +7,27 @@ from gqm_sym.parameters import Given
 
 @checked("RotatingFrame")
 def RotatingFrame(*, Omega: Given | None = None) -> Kernel:
-    """Return the centrifugal force of a track that turns about the z axis.
+    """Return the centrifugal force of a track that rotates about the z axis.
 
-    Its Coriolis force presses the body out of the plane: friction feels that too.
+    The Coriolis force presses the body sideways against the track, which increases friction.
 
     Parameters
     ----------
     Omega
-        The angular velocity.
+        The angular velocity in rad/s, or another name for this parameter.
+
+    Returns
+    -------
+    Kernel
+
+    Raises
+    ------
+    DeclarationError
+        If a name or a value is not allowed.
+
+    Notes
+    -----
+    The centrifugal potential is ``-Omega**2*x**2/2`` (MATHS, section 2).
     """
     rate, pair = parameter(Omega, "Omega", where="rotating_frame")
     return Kernel(

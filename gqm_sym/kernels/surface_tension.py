@@ -1,4 +1,4 @@
-"""What surface tension does to a droplet that moves along a curve."""
+"""The resistance of surface tension to a droplet that moves along a curve."""
 
 import sympy as sp
 
@@ -11,15 +11,27 @@ FORMS = ("resistance", "printed")
 
 @checked("SurfaceTension")
 def SurfaceTension(*, gamma: Given | None = None, ell_c: Given | None = None, form: str = "resistance") -> Kernel:
-    """Return the resistance of a droplet's contact line, in proportion to the curvature.
+    """Return the resistance of a droplet's contact line, which is proportional to the curvature.
 
     Parameters
     ----------
-    gamma, ell_c
-        Other names for surface tension and contact length, or values.
+    gamma
+        The surface tension in N/m, or another name for this parameter.
+    ell_c
+        The contact length in m, or another name for this parameter.
     form
-        ``resistance``: ``gamma*ell_c**2*|kappa|/m`` against the motion. ``printed``: the paper's
-        ``gamma*ell_c*kappa/m``, numbers in SI; it drives a droplet where the curvature is negative.
+        ``resistance``: ``gamma*ell_c**2*|kappa|/m`` per unit mass against the motion. ``printed``: the form
+        ``gamma*ell_c*kappa/m`` of the paper's Table 2 with numbers in SI units, which drives a droplet where the
+        curvature is negative.
+
+    Returns
+    -------
+    Kernel
+
+    Raises
+    ------
+    DeclarationError
+        If a name or a value is not allowed.
     """
     one_of(form, FORMS, where="surface_tension: form")
     tension, first = parameter(gamma, "gamma", where="surface_tension")

@@ -13,20 +13,29 @@ MAX_CARS = 1000
 
 @checked("Train")
 def Train(*, length: Given | None = None, cars: Any = 1, mass: Given | None = None) -> Kernel:
-    """Return what makes the body a train, whose mass is spread evenly over a length of the track.
+    """Make the body a train, whose mass is spread evenly over a length of the track.
 
-    Gravity then acts on the mean height of the train, so that its motion is that of its middle. The run-time parameter
-    ``m`` is the mass of the whole train.
+    Gravity then acts on the mean height of the train, and λ belongs to its middle. The run-time parameter ``m`` is the
+    mass of the whole train.
 
     Parameters
     ----------
     length
-        Of the train along the track, a name or a value.
+        The length of the train along the track in m, or another name for this parameter.
     cars
-        The number of equal cars: the motion does not depend on it, but `Motion.cars` tells the contact force of each
-        and the force in each coupling.
+        The number of equal cars. The motion does not depend on it; `Motion.cars` has the contact force of each car and
+        the force in each coupling.
     mass
-        Of the whole train, as a value.
+        The mass of the whole train in kg; by default that of the parameter ``m``.
+
+    Returns
+    -------
+    Kernel
+
+    Raises
+    ------
+    DeclarationError
+        If a name or a value is not allowed.
     """
     size, pair = parameter(length, "length", where="train")
     if isinstance(cars, bool) or not isinstance(cars, Integral) or not 1 <= int(cars) <= MAX_CARS:

@@ -65,7 +65,7 @@ def _solver(dissipative: bool) -> "Callable[[Formulas, ParameterValues, Launch],
 
 
 class CompiledModel(Formulas):
-    """The compiled functions and formulas of one generated module, with the computations that they serve.
+    """The compiled functions and formulas of one generated module, with the computations that use them.
 
     A generated module has one as ``MODEL``; its functions ``pass1``, ``solve`` and ``sweep`` call the methods here. The
     attributes are those of `Formulas`.
@@ -74,7 +74,7 @@ class CompiledModel(Formulas):
     __slots__ = ()
 
     def refuse(self, called: str, unknown: Mapping[str, Any]) -> NoReturn:
-        """Say that a function of the module has no argument of a name, which was probably meant, and which there are.
+        """Refuse an argument that a function of the module does not have; the message says which was probably meant.
 
         Parameters
         ----------
@@ -251,11 +251,11 @@ class CompiledModel(Formulas):
         parameters : tuple
             Arrays or numbers, in the order of the attribute ``parameters``.
         lam : array_like or None
-            The places that "time_at" asks about.
+            The places for "time_at".
         client : distributed.Client or None
             The cluster; None for this machine.
         gradient : str or sequence of str, optional
-            What derivatives of the quantity are wanted by: run-time parameters, "lam0" and "v0".
+            The names with respect to which derivatives are computed: run-time parameters, "lam0" and "v0".
         unknown : mapping, optional
             Arguments that the module's function does not have, which are refused.
 
@@ -303,14 +303,14 @@ class CompiledModel(Formulas):
     def equilibria(
         self, parameters: tuple[Any, ...], between: Any = None, unknown: Mapping[str, Any] = NOTHING
     ) -> "tuple[Equilibrium, ...]":
-        """The places where a body at rest stays, in ascending order; see `gqm_sym.runtime.launch.equilibria`.
+        """Return the places where a body at rest stays, in ascending order; see `gqm_sym.runtime.launch.equilibria`.
 
         Parameters
         ----------
         parameters : tuple
             Values of the run-time parameters, in the order of the attribute ``parameters``.
         between : pair of numbers, optional
-            The range of the curve parameter to look in; the whole domain, or one period, if not given.
+            The range of the curve parameter to search; by default the whole domain, or one period.
         unknown : mapping, optional
             Arguments that the module's function does not have, which are refused.
         """

@@ -52,13 +52,17 @@ def read_spec(path: Path | str) -> Spec:
     Parameters
     ----------
     path
-        Of a YAML file, at most 64 KiB.
+        The path of a YAML file of at most 64 KiB.
+
+    Returns
+    -------
+    Spec
+        The curve, the force law and the launch; ``spec.derive()`` returns the model.
 
     Raises
     ------
     SpecFileError
-        With every mistake of the file, one line each: ``file:line:column: what; what would be
-        right``.
+        If the file has mistakes, with a line ``file:line:column: ...`` for each of them.
     """
     file = file_path(path, where="read_spec: path")
     mistakes = Mistakes(path)

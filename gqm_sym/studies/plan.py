@@ -34,28 +34,28 @@ class Axis:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Plan:
-    """A sweep: the same plan gives the same numbers.
+    """The plan of a sweep; the same plan gives the same numbers.
 
     Attributes
     ----------
     title
-        One line for people.
+        One line of text for readers.
     quantities
-        As of ``module.sweep``.
+        Names of quantities, as for ``module.sweep``.
     axes
-        What varies.
+        The arguments that vary, with their values.
     grid
-        Whether all combinations of the axes are points; else they are columns of a table.
+        Whether the points are all combinations of the axes; otherwise the axes are columns of a table.
     fixed
-        Arguments that are the same at all points; numbers as exact texts.
+        Arguments that are the same at all points, with numbers as exact texts.
     units
         SI units of all names, as far as they are known.
     name, module
-        The generated module: its name and its text.
+        The name and the text of the generated module.
     origin
-        Files that the plan was read from: what each is, and its text.
+        The files from which the plan was read, with their texts.
     part
-        Points that are computed, and stored, at a time.
+        The number of points that are computed and stored together.
     """
 
     title: str
@@ -71,30 +71,48 @@ class Plan:
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """Of the results."""
+        """The shape of the results."""
         return tuple(axis.values.size for axis in self.axes) if self.grid else (self.axes[0].values.size,)
 
     @property
     def size(self) -> int:
-        """How many points there are."""
+        """The number of points."""
         return prod(self.shape)
 
     @property
     def parts(self) -> int:
-        """In how many parts they are computed."""
+        """The number of parts in which the points are computed."""
         return -(-self.size // self.part)
 
     def extent(self, number: int) -> slice:
-        """The points of a part."""
+        """Return the slice of the points in a part.
+
+        Parameters
+        ----------
+        number
+            The number of the part, from 0.
+        """
         return slice(number * self.part, min((number + 1) * self.part, self.size))
 
     def arguments(self, number: int) -> dict[str, Any]:
-        """Arguments of ``module.sweep`` for a part: what is fixed as text, what varies as arrays."""
+        """Return the arguments of ``module.sweep`` for a part: fixed ones as text, and varying ones as arrays.
+
+        Parameters
+        ----------
+        number
+            The number of the part, from 0.
+        """
         extent = self.extent(number)
         return self._at(np.arange(extent.start, extent.stop))
 
     def point(self, index: int) -> dict[str, Any]:
-        """The same for one point."""
+        """Return the arguments of ``module.solve`` for one point.
+
+        Parameters
+        ----------
+        index
+            The number of the point, from 0, in C order.
+        """
         given = self._at(np.array([index]))
         return given | {axis.name: float(given[axis.name][0]) for axis in self.axes}
 
@@ -104,7 +122,7 @@ class Plan:
 
     @cached_property
     def digest(self) -> str:
-        """What tells plans apart whose numbers may differ: by the module and the runtime too."""
+        """Return a digest that differs for plans whose numbers may differ; it includes the module and the runtime."""
         values = [[axis.name, hashlib.sha256(axis.values.tobytes()).hexdigest()] for axis in self.axes]
         facts = [STAMP, self.module, self.quantities, values, self.grid, sorted(self.fixed.items()), self.part]
         return hashlib.sha256(json.dumps(facts).encode()).hexdigest()

@@ -45,12 +45,16 @@ def read_sweep(path: Path | str) -> Plan:
     Parameters
     ----------
     path
-        Of a YAML file, at most 64 KiB.
+        The path of a YAML file of at most 64 KiB.
+
+    Returns
+    -------
+    Plan
 
     Raises
     ------
     SpecFileError
-        With every mistake, one line each: ``file:line:column: what; what would be right``.
+        If the file has mistakes, with a line ``file:line:column: ...`` for each of them.
     """
     return read_study(path, _SweepReader, needed="curve, quantities and grid")
 

@@ -16,7 +16,7 @@ from scipy.integrate import solve_ivp
 
 import gqm_sym as gqm
 from gqm_sym.errors import BudgetError
-from gqm_sym.runtime.legs import dissipative
+from gqm_sym.runtime.legs import driver
 
 CASES = {case["id"]: case for case in json.loads((DATA / "paper_cases.json").read_text())["cases"]}
 LOSING = [case for case in CASES if case.startswith(("example2", "table2_3", "table2_4", "table2_5"))]
@@ -368,6 +368,35 @@ def test_every_body_that_comes_to_a_cusp_ends_there(loss: str, build: Build) -> 
         assert legs[-1].end != "cusp" or abs(legs[-1].lam_end) <= 1e-13
 
 
+CUSPED = {
+    "deltoid": ("2*cos(u) + cos(2*u)", "2*sin(u) - sin(2*u)", math.tau / 3.0, 0.0),
+    "turns back on itself": ("sin(3*u)", "cos(2*u)", math.pi, 0.5 * math.pi),
+}
+LOSSES = {
+    "friction": gqm.CoulombFriction(mu="1/100"),
+    "drag": gqm.QuadraticDrag(b="1/100"),
+    "droplet": gqm.SurfaceTension(gamma="1/1000", ell_c="3/1000"),
+}
+
+
+@pytest.mark.parametrize("loss", LOSSES)
+@pytest.mark.parametrize("name", CUSPED)
+def test_cusps_at_places_that_are_not_zero(name: str, loss: str, build: Build) -> None:
+    """The body ends at the cusp itself (it was up to 5e-8 from it, or was refused; droplets went on)."""
+    x, z, apart, first = CUSPED[name]
+    curve = gqm.Curve.parametric(x=x, z=z, parameter="u", period="2*pi")
+    module = build(f"cusped_{name.split()[0]}_{loss}", curve, LOSSES[loss])
+    draw = random.Random(7)
+    for _ in range(10):
+        u, heading = draw.uniform(-7.0, 7.0), draw.choice((1, -1))
+        motion = module.solve(u, 10.0, heading)
+        count = math.floor((u - first) / apart) + (heading > 0)
+        end = motion.legs[-1]
+        assert end.end == "cusp"
+        assert abs(end.lam_end - (first + count * apart)) <= 2e-15
+        assert module.sweep("t_end", u, 10.0, heading).values == pytest.approx(motion.t_end, rel=1e-14)
+
+
 def test_ends_at_a_cusp(build: Build) -> None:
     """Down an arch of a cycloid to its cusp, where V**2 is what friction left of the height."""
     module = build("arch_rubbed", gqm.families.cycloid(), gqm.CoulombFriction(mu="mu"))
@@ -407,7 +436,7 @@ def test_questions_without_an_answer(rubbed: ModuleType, dragged: ModuleType) ->
 
 def test_a_motion_of_too_many_legs(dragged: ModuleType, monkeypatch: pytest.MonkeyPatch) -> None:
     """Legs are kept: a motion that would need memory without end says how far it got; what was asked before stays."""
-    monkeypatch.setattr(dissipative, "MAX_STORED", 40)
+    monkeypatch.setattr(driver, "MAX_STORED", 40)
     motion = dragged.solve(0.3, c="1e-6")
     early = motion.lam(5.0)
     words = r"^motion: 4\d pieces of legs reach t = \d+\.\d+ only; give a shorter t_max, or ask for earlier times"

@@ -64,7 +64,7 @@ class ChartMaker(Hashable, Protocol):
         """Return the curve itself in extended precision (`exact_normals.TrueCurve`)."""
 
     def true_pieces(self, p: Any, chart: "Chart") -> Any:
-        """Return the curve in double-double arithmetic (`true_pieces.TruePieces`), for parameters as exact numbers.
+        """Return the curve in double-double arithmetic (`double_double.pieces`), for parameters as exact numbers.
 
         It is None if there is no such thing.
         """

@@ -8,7 +8,7 @@ import numpy as np
 
 from gqm_sym.errors import SolutionError
 from gqm_sym.runtime.charts.chart import Chart
-from gqm_sym.runtime.charts.true_pieces import NODES, Samples, sample_places
+from gqm_sym.runtime.charts.double_double.pieces import NODES, Samples, sample_places
 from gqm_sym.runtime.double_double.arithmetic import UNIT
 from gqm_sym.runtime.multiprecision.exact_problem import two_doubles
 from gqm_sym.runtime.multiprecision.fixed_point import Polynomials
@@ -46,7 +46,7 @@ class Parts:
         return gauss(context, speed, [context.mpf(place) for place in places], context.dps)[0]
 
     def sample(self, k: int) -> Samples:
-        """Return a piece at the Chebyshev points in double-double arithmetic (`true_pieces`)."""
+        """Return a piece at the Chebyshev points in double-double arithmetic (`double_double.pieces`)."""
         context, (part, low, high) = self._context, self._origins[k]
         at, samples = self._part(part), np.empty((2, 2, NODES))
         middle, half = (context.mpf(high) + low) / 2, (context.mpf(high) - low) / 2

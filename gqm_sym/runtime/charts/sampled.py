@@ -19,9 +19,9 @@ from gqm_sym.literals.numbers import Number, read_number
 from gqm_sym.runtime.arithmetic.doubledouble import two_sum
 from gqm_sym.runtime.charts.arc_length import Indices, Pieces, divided, rectify, summed, unwrapped
 from gqm_sym.runtime.charts.chart import NODES, Chart, PieceData, assemble, assemble_in_space
+from gqm_sym.runtime.charts.double_double.pieces import NODES as NODES_OF_PIECES
+from gqm_sym.runtime.charts.double_double.pieces import SAMPLES, TruePieces, sample_places
 from gqm_sym.runtime.charts.exact_parts import Part, Parts, polynomial
-from gqm_sym.runtime.charts.true_pieces import NODES as NODES_OF_PIECES
-from gqm_sym.runtime.charts.true_pieces import SAMPLES, TruePieces, sample_places
 from gqm_sym.runtime.compiled.jit import Inner, entry
 from gqm_sym.runtime.compiled.types import MATRIX, VECTOR, Array
 from gqm_sym.runtime.double_double.arithmetic import UNIT, add, divide, multiply
@@ -113,7 +113,7 @@ class Sampled:
 
 @entry(SAMPLES(VECTOR, VECTOR, MATRIX))
 def sample_plane(begin, end, nodes):  # type: ignore[no-untyped-def]
-    """Return the samples of a plane between two points, each x and z as two doubles each (`true_pieces.Samples`)."""
+    """Return the samples of a plane between two points, each x and z as two doubles each (`pieces.Samples`)."""
     samples = np.empty((2, 2, NODES_OF_PIECES))
     for i in range(NODES_OF_PIECES):
         share, share_low = add(0.5 * nodes[0, i], 0.5 * nodes[1, i], 0.5, 0.0)

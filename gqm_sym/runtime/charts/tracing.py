@@ -19,10 +19,10 @@ from gqm_sym.literals.numbers import Number
 from gqm_sym.runtime.arithmetic import doubledouble
 from gqm_sym.runtime.charts.chart import NODES, Chart, PieceData, assemble
 from gqm_sym.runtime.charts.continuation import CLOSED, FAR, MAX_PIECES, PIECE_ROWS, SINGULAR, trace_one_way
+from gqm_sym.runtime.charts.double_double.pieces import DIGITS, SAMPLES, Samples, TruePieces, sample_places
+from gqm_sym.runtime.charts.double_double.pieces import NODES as NODES_OF_PIECES
 from gqm_sym.runtime.charts.evaluate import EDGES, RECORD, TERMS
 from gqm_sym.runtime.charts.level_pieces import ANCHOR, CORNER, POINTS, SMOOTH, LevelCurve, evaluate_points
-from gqm_sym.runtime.charts.true_pieces import DIGITS, SAMPLES, Samples, TruePieces, sample_places
-from gqm_sym.runtime.charts.true_pieces import NODES as NODES_OF_PIECES
 from gqm_sym.runtime.compiled.jit import Inner, entry
 from gqm_sym.runtime.compiled.types import INTEGER, MATRIX, VECTOR, Array
 from gqm_sym.runtime.double_double.arithmetic import UNIT, add, multiply, product
@@ -329,7 +329,7 @@ def fill_level(k, block, tape, work, places, out):  # type: ignore[no-untyped-de
 
 @entry(SAMPLES(INTEGER, INTEGER, VECTOR, TAPE, VECTOR, MATRIX, MATRIX))
 def sample_level(k, following, block, tape, work, p, nodes):  # type: ignore[no-untyped-def]
-    """Return the samples of a piece of a curve F = 0: where the normals of the chart meet it (`true_pieces.Samples`).
+    """Return the samples of a piece of a curve F = 0: where the normals of the chart meet it (`pieces.Samples`).
 
     Normals at the common edge of two pieces differ by rounding. So the piece is sampled to where the ``following`` one
     (negative if there is none) begins.

@@ -1,10 +1,10 @@
 """What gradients along charts evaluate: the formulas of a motion over coordinates of the plane, recorded as tapes.
 
-A chart has no formula of its coordinates, and so they come with each place: x and z, their derivatives by the
-parameter u of a piece (`charts.true_pieces`), and the curvature. The place itself is arc length. A parameter that
-shapes the curve moves its points, each across the curve: of a displacement only the part along the normal counts. Arc
-lengths between such points change by the curvature times the displacement. How much farther from the start point of
-the curve the point of the launch then lies is known (``shift``); its arc length is given, and so it is another point.
+A chart has no formula of its coordinates, and so they come with each place: x and z, their derivatives by the parameter
+u of a piece (`charts.double_double.pieces`), and the curvature. The place itself is arc length. A parameter that shapes
+the curve moves its points, each across the curve: of a displacement only the part along the normal counts. Arc lengths
+between such points change by the curvature times the displacement. How much farther from the start point of the curve
+the point of the launch then lies is known (``shift``); its arc length is given, and so it is another point.
 """
 
 from collections.abc import Callable, Sequence

@@ -1,8 +1,8 @@
 """A periodic orbit along a chart with its derivatives: Gauss's rules on panels of the phase angle.
 
-The curve is known in double-double arithmetic, as polynomials of its pieces (`charts.true_pieces`). Where a parameter
-shapes the curve, the displacements of its points are differences of these polynomials for neighbouring values: of some
-20 digits, for the polynomials have 31. All else are tangents of formulas (`chart_programs`).
+The curve is known in double-double arithmetic, as polynomials of its pieces (`charts.double_double.pieces`). Where a
+parameter shapes the curve, the displacements of its points are differences of these polynomials for neighbouring
+values: of some 20 digits, for the polynomials have 31. All else are tangents of formulas (`chart_programs`).
 """
 
 from fractions import Fraction
@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 from gqm_sym.errors import SolutionError
 from gqm_sym.literals.numbers import Number, read_number
 from gqm_sym.runtime.charts.chart import ChartMaker
-from gqm_sym.runtime.charts.true_pieces import (
+from gqm_sym.runtime.charts.double_double.passage import ChartPassage
+from gqm_sym.runtime.charts.double_double.pieces import (
     NODES,
     TRUE_CURVE,
     TruePieces,
@@ -30,7 +31,7 @@ from gqm_sym.runtime.charts.true_pieces import (
     stacked_points,
     unshared,
 )
-from gqm_sym.runtime.charts.true_times import AHEAD, BEHIND, LAUNCH, LOWER, UPPER, ChartPassage, arc_from
+from gqm_sym.runtime.charts.double_double.turning_points import AHEAD, BEHIND, LAUNCH, LOWER, UPPER, arc_from
 from gqm_sym.runtime.compiled.jit import entry
 from gqm_sym.runtime.compiled.types import INTEGER, MATRIX, Array
 from gqm_sym.runtime.double_double.arithmetic import UNIT, add, multiply
@@ -197,7 +198,7 @@ class ShapedPieces:
     Parameters
     ----------
     problem : Problem
-        The launch and the module that it is of.
+        The launch with its module.
     pieces : TruePieces
         The curve.
     shaping : tuple of int
@@ -323,7 +324,7 @@ class ChartOrbitDerivatives(OrbitDerivatives):
     Parameters
     ----------
     problem : Problem
-        The launch and the module that it is of.
+        The launch with its module.
     passage : ChartPassage
         The orbit in double-double arithmetic.
     direction : int

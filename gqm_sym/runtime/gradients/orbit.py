@@ -57,8 +57,8 @@ def asked_for(name: str) -> Iterator[None]:
 def without_formulas() -> SolutionError:
     """What is raised for curves that have no gradients."""
     return SolutionError(
-        "gradients: curves without formulas have none yet where energy is lost, or where the curve is known in doubles "
-        "only; declare the curve by formulas"
+        "gradients: there are none along curves without formulas if energy is lost, or if the curve is known in "
+        "doubles only; declare the curve by formulas"
     )
 
 
@@ -73,7 +73,7 @@ def check_force(formulas: Formulas, quantity: str) -> None:
     has_force = formulas.signed or getattr(formulas.exact, "load_along_curvature", None) is not None
     if not has_force and quantity in ("sensitivity", "normal_force_max", "normal_force_min"):
         raise SolutionError(
-            f"gradients: {quantity} has none yet along points in space, for it holds the contact force; ask for others"
+            f"gradients: there are none of {quantity} along points in space, because it contains the contact force"
         )
 
 
@@ -277,7 +277,7 @@ class FormulaOrbitDerivatives(OrbitDerivatives):
     Parameters
     ----------
     problem : Problem
-        The launch and the module that it is of.
+        The launch with its module.
     orbit : Orbit or None
         Duration and turning points in double-double arithmetic, if that suffices.
     direction : int

@@ -310,11 +310,11 @@ def domain_end(problem: Problem, direction: int) -> EndOfMotion:
     return EndOfMotion(cast(EndKind, problem.domain.ends[1 if upper else 0]), place)
 
 
-def is_cusp(problem: Problem, place: float) -> bool:
-    """Whether ds vanishes at a place, as a share of its values near by."""
+def is_cusp(problem: Problem, place: float, share: float = 1e-10) -> bool:
+    """Whether ds vanishes at a place, up to a share of its values near by."""
     f, near = problem.functions, NEAR_CUSP * starting_step(problem)
     ds = path_and_force_at(f.addresses, f.p, place + near * np.array([0.0, -1.0, 1.0]), np.zeros(3))[2]
-    return bool(ds[0] <= 1e-10 * np.nanmax(ds[1:]))
+    return bool(ds[0] <= share * np.nanmax(ds[1:]))
 
 
 def leaving_at_once(problem: Problem, direction: int, what: str) -> LaunchError:

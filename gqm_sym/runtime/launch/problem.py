@@ -5,8 +5,8 @@ from functools import partial
 
 import numpy as np
 
+from gqm_sym.runtime.charts.double_double.pieces import TruePieces
 from gqm_sym.runtime.charts.exact_normals import ChartTrack
-from gqm_sym.runtime.charts.true_pieces import TruePieces
 from gqm_sym.runtime.double_double.recording import BoundTape, record, record_in_plane
 from gqm_sym.runtime.double_double.recording import bind as bind_tape
 from gqm_sym.runtime.interface import ExactFormulas, ExactPotential

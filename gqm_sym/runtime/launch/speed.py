@@ -38,7 +38,7 @@ MAX_TERMS_RATIO = 1.0
 
 
 class Pass1(NamedTuple):
-    """What pass 1 finds at places of a curve (paper, section "Pass 1"; MATHS, section 2).
+    """The results of pass 1 at places of a curve (paper, section "Pass 1"; MATHS, section 2).
 
     Each field is an array of the shape of the places, or of that of ``out``.
 
@@ -49,12 +49,12 @@ class Pass1(NamedTuple):
     ds : array
         Arc length per unit of the curve parameter, ds/dlam, in m.
     kappa : array
-        Signed curvature in 1/m, positive where the track bends to the left of growing parameter.
+        Signed curvature in 1/m, positive where the track bends to the left of increasing parameter.
     v2 : array
-        Squared speed V**2 in m**2/s**2; negative where a conservative motion cannot come, NaN beyond the first turn of
-        a dissipative one.
+        Squared speed V**2 in m**2/s**2; negative at places that a conservative motion cannot reach, NaN beyond the
+        first turn of a dissipative one.
     normal_force : array
-        Contact force N in N along the normal, which is to the left of growing parameter.
+        Contact force N in N along the normal, which is to the left of increasing parameter.
     """
 
     x: Array
@@ -66,14 +66,14 @@ class Pass1(NamedTuple):
 
 
 class Pass1InSpace(NamedTuple):
-    """What pass 1 finds at places of a space curve: what `Pass1` has, and four arrays more.
+    """The results of pass 1 at places of a space curve: those of `Pass1` and four more arrays.
 
     Attributes
     ----------
     x, z, ds, v2 : array
-        As of `Pass1`.
+        As in `Pass1`.
     kappa, normal_force : array
-        As of `Pass1` if the curve lies in a vertical plane; else the lengths of the curvature and of the contact force.
+        As in `Pass1` if the curve lies in a vertical plane; else the lengths of the curvature and of the contact force.
     y : array
         The third coordinate in m.
     normal_x, normal_y, normal_z : array
@@ -93,20 +93,20 @@ class Pass1InSpace(NamedTuple):
 
 
 class Pass1OfRider(NamedTuple):
-    """What pass 1 finds at places of a banked track: what `Pass1InSpace` has, and what a rider feels there.
+    """The results of pass 1 at places of a banked track: those of `Pass1InSpace` and the loads on a rider.
 
     Attributes
     ----------
     x, z, ds, kappa, v2, normal_force, y, normal_x, normal_y, normal_z : array
-        As of `Pass1InSpace`.
+        As in `Pass1InSpace`.
     n_vertical, n_lateral, n_longitudinal : array
-        Loads on the rider upwards, to the left and ahead, in units of 9.80665 m/s**2.
+        Loads on the rider upwards, to the left and forwards, in units of 9.80665 m/s**2.
     onset_vertical, onset_lateral, onset_longitudinal : array
         Their rates of change, in the same unit per second.
     roll : array
         The roll angle in radians, between -pi and pi, positive to the left.
     track_x, track_y, track_z : array
-        Coordinates in m of the track, below the line that the rider follows.
+        Coordinates in m of the track, below the riders' line.
     """
 
     x: Array

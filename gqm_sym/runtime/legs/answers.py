@@ -46,8 +46,6 @@ from gqm_sym.runtime.legs.body import (
     VALUE,
 )
 from gqm_sym.runtime.legs.frames.local_frame import SMALL_SHARE, may_be_small
-from gqm_sym.runtime.legs.leg_equation import Forces
-from gqm_sym.runtime.legs.leg_panels import GAP_COLUMNS
 from gqm_sym.runtime.legs.leg_reading import passage, peak_of_leg
 from gqm_sym.runtime.legs.leg_record import (
     AHEAD,
@@ -63,17 +61,11 @@ from gqm_sym.runtime.legs.leg_record import (
     START_V2,
     TIMES,
 )
-from gqm_sym.runtime.legs.leg_run import (
-    ASYMPTOTE,
-    FULL,
-    LIMIT,
-    NARROWED,
-    SPENT,
-    TURN,
-    Reading,
-    point_buffer,
-    slope_of_v2,
-)
+from gqm_sym.runtime.legs.panels.equation import Forces
+from gqm_sym.runtime.legs.panels.point import point_buffer, slope_of_v2
+from gqm_sym.runtime.legs.runs.ends import ASYMPTOTE, FULL, LIMIT, NARROWED, SPENT, TURN
+from gqm_sym.runtime.legs.runs.gaps import GAP_COLUMNS
+from gqm_sym.runtime.legs.runs.route import Reading
 
 # What is asked of each body. LEGS is to advance by some legs, FIRST_LEGS the same unless its launch is next to an
 # equilibrium; RUN_AGAIN is to follow one of them once more for its panels, or a part of it.

@@ -35,7 +35,7 @@ LAUNCH_SHARE = 1e-14
 
 @dataclass(frozen=True, slots=True)
 class Event:
-    """Something that happens at one time of a motion.
+    """An event at one time of a motion.
 
     Attributes
     ----------
@@ -59,7 +59,7 @@ class Event:
 
 @dataclass(frozen=True, slots=True)
 class Leg:
-    """A part of the motion in one direction, and what ends it.
+    """A part of the motion in one direction, with the reason for its end.
 
     Attributes
     ----------

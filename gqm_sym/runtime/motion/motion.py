@@ -27,7 +27,7 @@ class Motion(History, Derivatives):
     direction : int
         The sign of ds/dt after launch.
     problem : Problem
-        The launch and the module that it is of.
+        The launch with its module.
     """
 
     if not TYPE_CHECKING:
@@ -50,7 +50,7 @@ class Motion(History, Derivatives):
 
     @property
     def rest_position(self) -> float:
-        """Where the body rests in the end, as a value of the curve parameter.
+        """The place at which the body comes to rest, as a value of the curve parameter.
 
         Raises
         ------
@@ -148,7 +148,7 @@ class Motion(History, Derivatives):
 
     @locked
     def exceedance(self, load: str, levels: Any, *, side: str = "above", limits: Any = None) -> Exceedance:
-        """How long a load on a rider is beyond each of some levels, over one period or over the whole motion.
+        """Return the times for which a load on a rider is beyond given levels, over one period or the whole motion.
 
         Parameters
         ----------
@@ -159,18 +159,18 @@ class Motion(History, Derivatives):
         side : {"above", "below"}
             Which side of a level is beyond it.
         limits : sequence of pairs, optional
-            What may be felt: pairs of a duration in s and a level, both as numbers, of which the levels fall (rise, if
-            the side is "below") as durations grow. Between them the limit is linear.
+            Permitted loads: pairs of a duration in s and a level, both numbers. Levels decrease with increasing
+            duration (increase, if the side is "below"), and the limit is linear between them.
 
         Returns
         -------
         Exceedance
-            ``total`` and ``longest`` times in s, and beside them the times that the limits ``allow``.
+            The ``total`` and ``longest`` times in s, and the ``allowed`` times within the limits.
 
         Raises
         ------
         InputError
-            If there is no such load, no roll was declared, or levels or limits are none.
+            If there is no such load, no roll was declared, or levels or limits are not numbers.
         SolutionError
             If the motion goes on for ever without repeating; give it a horizon, ``t_max``.
         """
@@ -178,7 +178,7 @@ class Motion(History, Derivatives):
 
     @locked
     def cars(self, t: Any) -> Cars:
-        """Where the cars of a train are, and the contact and coupling forces of each.
+        """Return the places, the contact forces and the coupling forces of the cars of a train.
 
         Parameters
         ----------
@@ -193,7 +193,7 @@ class Motion(History, Derivatives):
         Raises
         ------
         InputError
-            If the body is no train, or a time is none.
+            If the body is not a train, or a time is not a number.
         """
         return cars(self, t)
 
@@ -208,7 +208,7 @@ class Motion(History, Derivatives):
             The track, coloured by the sign and size of the contact force; speed and contact force against arc
             length; or the phase portrait round the orbit. All events are marked on the first two.
         axes : matplotlib Axes, optional
-            Where to draw (a pair of them for "speed_and_force"); a new figure if not given.
+            The axes to draw on (a pair for "speed_and_force"); by default a new figure is made.
 
         Returns
         -------
@@ -225,12 +225,12 @@ class Motion(History, Derivatives):
         return drawing(self, what, axes)
 
     def to_xarray(self, t: Any = None) -> Any:
-        """The states at times as an xarray Dataset, with units and with what the motion was computed from.
+        """Return the states at given times as an xarray Dataset, with units and provenance.
 
         Parameters
         ----------
         t : array_like, optional
-            Times in s from launch; equally spaced over one period, or over the whole motion, if not given.
+            Times in s from launch; by default equally spaced over one period or over the whole motion.
 
         Returns
         -------

@@ -42,7 +42,7 @@ class PeriodicMotion(PeriodicTimes):
     Parameters
     ----------
     problem : Problem
-        The launch and the module that it is of.
+        The launch with its module.
     kind : {"libration", "circulation"}
         The kind of motion.
     direction : int

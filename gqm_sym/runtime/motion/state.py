@@ -27,7 +27,8 @@ class State(dict[str, Any]):
     lam : float or array
         The curve parameter, in its unit; in circulation laps are counted.
     s : float or array
-        Arc length in m: 0 at launch and growing with the parameter. On a charted curve it is 0 at the start point.
+        Arc length in m, 0 at launch and increasing with the parameter. On a curve without formulas it is 0 at the start
+        point.
     x, z : float or array
         Coordinates in m; z is up.
     v : float or array
@@ -35,9 +36,9 @@ class State(dict[str, Any]):
     v2 : float or array
         Squared speed V**2 in m**2/s**2.
     kappa : float or array
-        Signed curvature in 1/m, positive where the track bends to the left of growing parameter.
+        Signed curvature in 1/m, positive where the track bends to the left of increasing parameter.
     normal_force : float or array
-        Contact force N in N along the normal, which is to the left of growing parameter.
+        Contact force N in N along the normal, which is to the left of increasing parameter.
     error : float or array
         A bound of the error of ``lam``, in the unit of the parameter (`Motion.error_bound`).
     """
@@ -89,12 +90,12 @@ class State(dict[str, Any]):
         return dict(self.items())
 
     def to_pandas(self) -> Any:
-        """The states as a table with a row for each time.
+        """Return the states as a table with a row for each time.
 
         Returns
         -------
         pandas.DataFrame
-            A column for each field; arrays of times of more than one dimension are taken in order.
+            A column for each field; times in more than one dimension are listed in C order.
         """
         from gqm_sym.export.datasets import state_frame
 
@@ -121,7 +122,7 @@ class State(dict[str, Any]):
 
 
 class StateInSpace(State):
-    """The state of a body on a space curve: what `State` has, and four fields more.
+    """The state of a body on a space curve: the fields of `State` and four more.
 
     On a curve that lies in no vertical plane ``kappa`` and ``normal_force`` are the lengths of the curvature and of the
     contact force.
@@ -140,20 +141,21 @@ class StateInSpace(State):
 
 
 class StateOfRider(StateInSpace):
-    """The state of a body on a banked track: what `StateInSpace` has, and what a rider feels.
+    """The state of a body on a banked track: the fields of `StateInSpace` and the loads on a rider.
 
-    At a turning point, where what opposes the motion changes its direction, ``n_longitudinal`` is without it.
+    At a turning point, where forces against the motion change their direction, ``n_longitudinal`` does not include
+    them.
 
     Attributes
     ----------
     n_vertical, n_lateral, n_longitudinal : float or array
-        Loads on the rider upwards, to the left and ahead (towards growing parameter), in units of 9.80665 m/s**2.
+        Loads on the rider upwards, to the left and forwards (towards increasing parameter), in units of 9.80665 m/s**2.
     onset_vertical, onset_lateral, onset_longitudinal : float or array
         Their rates of change, in the same unit per second.
     roll : float or array
         The roll angle in radians, between -pi and pi, positive to the left.
     track_x, track_y, track_z : float or array
-        Coordinates in m of the track, below the line that the rider follows.
+        Coordinates in m of the track, below the riders' line.
     """
 
     __slots__ = ()
@@ -169,13 +171,13 @@ class Energy(NamedTuple):
     Attributes
     ----------
     kinetic : float or array
-        m*(1 + beta)*V**2/2 in J: of the motion along the curve and, of a rolling body, of its rotation.
+        m*(1 + beta)*V**2/2 in J, which includes the rotation of a rolling body.
     potential : float or array
         m times the potential per unit mass in J: m*g*z for gravity alone. In a rotating frame it contains the
         centrifugal potential.
     lost : float or array
-        What friction, drag or resistance have taken since launch in J; 0 for a conservative model. It is a difference
-        of energies, so its error is some roundings of these.
+        The energy lost to friction, drag or resistance since launch in J; 0 for a conservative model. It is a
+        difference of energies, with an error of some roundings of these.
     """
 
     kinetic: Any

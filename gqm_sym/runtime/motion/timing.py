@@ -12,7 +12,7 @@ from gqm_sym.arguments import short
 from gqm_sym.budgets import budget
 from gqm_sym.errors import InputError, SolutionError
 from gqm_sym.runtime.arithmetic.doubledouble import ZERO, Pair
-from gqm_sym.runtime.charts.true_times import ChartPassage, pass_along
+from gqm_sym.runtime.charts.double_double.passage import ChartPassage, pass_along
 from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.double_double.orbit_time import NO_TIMES, Bounded, Orbit, find_turning_points, time_orbit
 from gqm_sym.runtime.launch.problem import Problem

@@ -15,8 +15,8 @@ from gqm_sym.errors import InputError, SolutionError
 from gqm_sym.loading import load_text
 from gqm_sym.optional import require
 from gqm_sym.runtime.compiled.jit import STAMP
+from gqm_sym.runtime.sweep.columns import broadcast_shape
 from gqm_sym.runtime.sweep.result import Sweep
-from gqm_sym.runtime.sweep.sweep import broadcast_shape
 
 T = TypeVar("T")
 

@@ -16,9 +16,10 @@ from gqm_sym.runtime.gradients.quantities import selected
 from gqm_sym.runtime.gradients.sweep import COMPILED, PERIODS, Launches, launch_gradients
 from gqm_sym.runtime.launch.kinds import LOAD_EXTREMES
 from gqm_sym.runtime.launch.request import LaunchRequest
+from gqm_sym.runtime.sweep.columns import as_doubles
 from gqm_sym.runtime.sweep.quantities import ANSWERED, SOLVE
 from gqm_sym.runtime.sweep.result import Sweep
-from gqm_sym.runtime.sweep.sweep import Solve, as_doubles, sweep
+from gqm_sym.runtime.sweep.sweep import Solve, sweep
 
 if TYPE_CHECKING:
     from gqm_sym.runtime.launch.formulas import Formulas
@@ -44,7 +45,7 @@ def sweep_with_gradient(
     """
     rows = selected(formulas.parameters, wrt)
     if quantity in LOAD_EXTREMES:
-        raise InputError(f"gradient: {quantity} has none yet, as all that a rider feels; leave gradient out")
+        raise InputError(f"gradient: there is none of {quantity}, which is a load on a rider; leave gradient out")
     check_force(formulas, quantity)
     found = sweep(formulas, quantity, launches, parameters, lam, solve)
     names = (*formulas.parameters, "lam0", "v0", "direction", "lam")

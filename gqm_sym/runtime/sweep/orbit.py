@@ -29,7 +29,7 @@ class SweptCurve(NamedTuple):
     factors : array
         What the parts of the potential and of the load in the table are multiplied with.
     rows, levels : arrays
-        Potential and load of the launch on each panel, and how far they are filled in (`panel_forces`).
+        Potential and load of the launch on each panel, and how far they are filled in (`tables.panel_forces`).
     v0 : float
         The speed of the launch.
     exact : RecordedFormulas

@@ -6,24 +6,9 @@ import numpy as np
 
 from gqm_sym.runtime.arithmetic.elementary import sin
 from gqm_sym.runtime.compiled.calls import call_path_and_contact_force, call_potential_divdiff1
-from gqm_sym.runtime.compiled.jit import Inlined, Inner
+from gqm_sym.runtime.compiled.jit import Inner
 from gqm_sym.runtime.compiled.registers import on_stack
 from gqm_sym.runtime.interface import PATH_ROWS
-from gqm_sym.runtime.sweep.curve_table import (
-    KAPPA_SAMPLES,
-    KAPPA_TERMS,
-    LEFT_TERMS,
-    LOAD_SAMPLES,
-    LOAD_TERMS,
-    POTENTIAL_SAMPLES,
-    RIGHT_TERMS,
-    SAMPLE_POINTS,
-    SAMPLES,
-    rise_on,
-    value_on,
-)
-from gqm_sym.runtime.sweep.panel_forces import FAR, LOAD, NEAR, prepare
-from gqm_sym.runtime.sweep.passage import locate
 
 # Intervals of the first grid, in equal steps of the phase angle, and the factor by which the step shrinks each time
 # that the best point is refined, or grows if a parabola has its vertex beyond it.
@@ -41,10 +26,6 @@ MAX_MEAN_CHANGE, MAX_FORCE_MEAN_CHANGE, MEAN_ROUNDING = 1e-8, 1e-4, 1e-13
 # How often the best point is refined at least and at most. In between that ends if the value changes by less than this
 # share of the largest on the grid: its error is far smaller then, because it falls with the fourth power of the step.
 REFINEMENTS, MAX_REFINEMENTS, MAX_LAST_CHANGE = 2, 12, 1e-11
-
-# Half the widths of the first and of the last parabola on a panel of a tabulated curve, which is 2 wide, and how many
-# there are at most: one whose vertex is far away is followed by one of the same width there.
-FIRST_STEP, LAST_STEP, MAX_PARABOLAS = 0.25, 1e-3, 10
 
 # The grid as shares of a lap, and as shares of a libration's width.
 LAP_SHARES = np.arange(GRID_INTERVALS + 1) / GRID_INTERVALS
@@ -215,110 +196,3 @@ def extreme(fns, p, orbit, force, sign):  # type: ignore[no-untyped-def]
                 return value
             best = max(best, sign * value)
     return sign * best if force else sqrt(sign * best)
-
-
-@Inlined
-def level_on(passage, slacks, j):  # type: ignore[no-untyped-def]
-    """V**2/2 at an edge of panel j of a passage, the column of the powers from there, and where that edge is.
-
-    It is the edge that is farther from a turning point, for the lowest place of a small swing is there.
-    """
-    if j == 0 and passage.panels > 1:
-        return slacks[1], RIGHT_TERMS, 1.0
-    return slacks[j], LEFT_TERMS, -1.0
-
-
-@Inner
-def load_on(curve, k, level, force, x):  # type: ignore[no-untyped-def]
-    """V**2, or the contact force per unit mass if ``force`` is set, at a place of panel k.
-
-    ``level`` is what `level_on` gives.
-    """
-    slack, at, edge = level
-    v2 = 2.0 * (slack - rise_on(curve.rows, k, at, x - edge))
-    if force:
-        return value_on(curve.table.paths, k, KAPPA_TERMS, x) * v2 + value_on(curve.rows, k, LOAD_TERMS, x)
-    return v2
-
-
-@Inner
-def refined(curve, k, level, force, sign, x, ends):  # type: ignore[no-untyped-def]
-    """The largest (``sign`` 1) or smallest (-1) value next to a place between two ends on panel k, by parabolas."""
-    prepare(curve, k, NEAR)
-    low, high = ends
-    best, step = load_on(curve, k, level, force, x), FIRST_STEP
-    for _ in range(MAX_PARABOLAS):
-        x_before = x
-        left, right = max(x - step, low), min(x + step, high)
-        if not left < x < right:
-            x = 0.5 * (left + right)
-        f0 = load_on(curve, k, level, force, left)
-        f1 = load_on(curve, k, level, force, x)
-        f2 = load_on(curve, k, level, force, right)
-        before, after = (x - left) * (f1 - f2), (x - right) * (f1 - f0)
-        if before != after:
-            vertex = x - 0.5 * ((x - left) * before - (x - right) * after) / (before - after)
-            x = min(max(vertex, left), right)
-        found = load_on(curve, k, level, force, x)
-        best = sign * max(sign * best, sign * f0, sign * f1, sign * f2, sign * found)
-        if step <= LAST_STEP:
-            break
-        step = min(step, max(step / STEP_RATIO, fabs(x - x_before)))
-    return best
-
-
-@Inner
-def best_sample(curve, path, passage, slacks, force, sign):  # type: ignore[no-untyped-def]
-    """The largest value times ``sign`` of V**2 or of the contact force at the samples, its panel, and where on it."""
-    rows, paths, count = curve.rows, curve.table.paths, curve.levels.size
-    best, best_j, best_x = -inf, 0, 0.0
-    (first, low_x), (last, high_x) = path
-    for j in range(first, last + 1):
-        k, slack = (passage.first + j) % count, slacks[j]
-        low, high = low_x if j == first else -1.0, high_x if j == last else 1.0
-        prepare(curve, k, (FAR | LOAD if force else FAR) | (0 if first < j < last else NEAR))
-        for i in range(SAMPLES):
-            x = SAMPLE_POINTS[i]
-            if first < j < last:
-                v2 = 2.0 * (slack - rows[k, POTENTIAL_SAMPLES + i])
-                value = paths[k, KAPPA_SAMPLES + i] * v2 + rows[k, LOAD_SAMPLES + i] if force else v2
-            else:
-                # The end itself, for the next panel shares it.
-                x = low + (high - low) * i / (SAMPLES - 1) if i < SAMPLES - 1 else high
-                value = load_on(curve, k, level_on(passage, slacks, j), force, x)
-            if sign * value > best:
-                best, best_j, best_x = sign * value, j, x
-    return best, best_j, best_x
-
-
-@Inner
-def passage_extreme(curve, orbit, passage, slacks, force, sign):  # type: ignore[no-untyped-def]
-    """As `extreme`, on a tabulated curve: the best of each panel's samples, refined on the panels that have it.
-
-    At a joint the values on both sides count.
-    """
-    count, last = curve.levels.size, passage.panels - 1
-    path, begin = ((0, passage.low_x), (last, passage.high_x)), (-1, 0.0)
-    if orbit.leaves == orbit.direction:  # a body that is not in front of its turning point does not come there
-        index, x, _ = locate(curve.table, curve.period, orbit.lam0)
-        begin = index - passage.first, x
-        path = (begin, path[1]) if orbit.leaves > 0 else (path[0], begin)
-    meets_turn = orbit.v2 == 0.0 or not (orbit.circulates or orbit.leaves == orbit.direction)
-    if meets_turn and not (force or sign > 0.0):
-        return 0.0
-    best, best_j, best_x = best_sample(curve, path, passage, slacks, force, sign)
-    if orbit.leaves == orbit.direction and not force and (best_j, best_x) == begin:
-        return sqrt(orbit.v2)
-    for step in range(-1, 2):
-        # On the panel itself, and on that which it shares the place with.
-        j, x, shared = best_j + step, best_x, step == 0
-        if step != 0 and best_x == float(step):
-            x, shared = -best_x, path[0][0] <= j <= path[1][0]
-        if orbit.circulates and step != 0 and not 0 <= j <= last:
-            j, shared = last - best_j, best_x in (passage.low_x, passage.high_x)
-        if shared:
-            ends = path[0][1] if j == path[0][0] else -1.0, path[1][1] if j == path[1][0] else 1.0
-            k = (passage.first + j) % count
-            best = max(best, sign * refined(curve, k, level_on(passage, slacks, j), force, sign, x, ends))
-    value = sign * best
-    return curve.mass * value if force else sqrt(max(value, 0.0))

@@ -73,16 +73,16 @@ class Sweep(SweepArrays):
         0 for each launch that has a value; otherwise a code that says why there is none. `status_counts` gives the
         sentences, which stand in `quantities.STATUS_SENTENCES`.
     route : int8 array
-        How each launch was answered, as an index into `quantities.ROUTES`: 0 "batch", in a batch of orbits side by
-        side; 1 "single", alone in a compiled loop; 2 "solve", solved as ``solve`` does it. The values do not depend
-        on it beyond rounding, but the time that they take does.
+        How each launch was answered, as an index into `quantities.ROUTES`: 0 "batch", in a batch of orbits; 1 "single",
+        alone in a compiled loop; 2 "solve", solved as by ``solve``. The route affects the time that a launch takes, and
+        its value only by rounding.
     quantity : str
         The name of the quantity.
     arguments : mapping of str to number or array
         The launches and parameters, by name, as they were given and before they were broadcast.
     gradient : float array or None
-        The derivatives of the values, with one more axis for the names that they were asked by; NaN where there are
-        none. None if they were not asked for.
+        The derivatives of the values, with one more axis for the names with respect to which they were taken; NaN where
+        there are none. None without the argument ``gradient``.
     """
 
     quantity: str = ""
@@ -110,20 +110,20 @@ class Sweep(SweepArrays):
         return _counts(self.route, ROUTES, 0)
 
     def to_pandas(self) -> Any:
-        """The launches as a table, one row each.
+        """Return the launches as a table with a row for each.
 
         Returns
         -------
         pandas.DataFrame
             A column for each argument that is an array, the values (two columns for ``turning_points``), and
-            ``status``. Arguments that are the same for all launches stand in the attribute ``attrs``.
+            ``status``. Arguments that are the same for all launches are in the attribute ``attrs``.
         """
         from gqm_sym.export.datasets import sweep_frame
 
         return sweep_frame(self)
 
     def to_xarray(self) -> Any:
-        """The values as an xarray Dataset, with units.
+        """Return the values as an xarray Dataset with units.
 
         Returns
         -------

@@ -40,21 +40,8 @@ from gqm_sym.runtime.quadrature.trapezoid import (
     trapezoid_workspace,
 )
 from gqm_sym.runtime.sweep.arrivals import arrival, refined_end
-from gqm_sym.runtime.sweep.curve_table import TABLE, CurveTable
-from gqm_sym.runtime.sweep.liftoff import liftoff_place
 from gqm_sym.runtime.sweep.orbit import CONTACT_ENDS, CURVE_ENDS, Orbit, SweptCurve
-from gqm_sym.runtime.sweep.orbit_extremes import extreme, passage_extreme
-from gqm_sym.runtime.sweep.panel_forces import take_factors
-from gqm_sym.runtime.sweep.passage import (
-    MIN_LEAVING_SHARE,
-    NOWHERE,
-    are_level,
-    fill_slacks,
-    find_passage,
-    passage_of,
-    time_on_panel_of_both,
-    travel_time,
-)
+from gqm_sym.runtime.sweep.orbit_extremes import extreme
 from gqm_sym.runtime.sweep.quantities import (
     ANSWERED,
     ANSWERS,
@@ -76,6 +63,13 @@ from gqm_sym.runtime.sweep.quantities import (
     UNDECIDED,
 )
 from gqm_sym.runtime.sweep.slow_places import EXACT, RecordedFormulas, passing_time, turns_at
+from gqm_sym.runtime.sweep.tables.extremes import passage_extreme
+from gqm_sym.runtime.sweep.tables.layout import TABLE, CurveTable
+from gqm_sym.runtime.sweep.tables.liftoff import liftoff_place
+from gqm_sym.runtime.sweep.tables.panel_forces import take_factors
+from gqm_sym.runtime.sweep.tables.passage import NOWHERE, are_level, fill_slacks, find_passage, passage_of
+from gqm_sym.runtime.sweep.tables.times import time_on_panel_of_both, travel_time
+from gqm_sym.runtime.sweep.tables.turning_points import MIN_LEAVING_SHARE
 
 
 class GivenCurve(NamedTuple):

@@ -29,10 +29,10 @@ from gqm_sym.runtime.interface import INTERFACE, SPEED_EQUATION, STATIC_BALANCE,
 from gqm_sym.runtime.legs.advance import DISSIPATION
 from gqm_sym.runtime.legs.body import FIRST_STEP, HIGH, LOW, V2
 from gqm_sym.runtime.legs.body import PLACE as BODY_PLACE
-from gqm_sym.runtime.legs.leg_equation import Forces
 from gqm_sym.runtime.legs.leg_record import CHANGE_COUNT, END, MIDDLE, START, change_at
-from gqm_sym.runtime.legs.leg_run import LEAST_V2, point_buffer, slope_of_v2
-from gqm_sym.runtime.legs.polynomials import WIDE
+from gqm_sym.runtime.legs.panels.equation import Forces
+from gqm_sym.runtime.legs.panels.point import LEAST_V2, point_buffer, slope_of_v2
+from gqm_sym.runtime.legs.panels.polynomials import WIDE
 from gqm_sym.runtime.multiprecision.exact_problem import GUARD_DIGITS, PRECISIONS
 
 # A motion is small if it is below these shares of the distance of e from 0, and of the range of the polynomial. Wider

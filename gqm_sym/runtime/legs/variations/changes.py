@@ -20,8 +20,8 @@ from gqm_sym.runtime.gradients.orbit import values
 from gqm_sym.runtime.gradients.programs import range_program
 from gqm_sym.runtime.launch.problem import Problem
 from gqm_sym.runtime.legs.leg_record import END, HEADING, MIDDLE, START, START_V2
-from gqm_sym.runtime.legs.leg_run import ASYMPTOTE
 from gqm_sym.runtime.legs.leg_segments import Run
+from gqm_sym.runtime.legs.runs.ends import ASYMPTOTE
 from gqm_sym.runtime.legs.variations.equation import Law, LawRows, Panels, States, one_state
 
 

@@ -32,9 +32,10 @@ from gqm_sym.runtime.gradients.programs import Program, force_program, law_progr
 from gqm_sym.runtime.interface import ExactLaw
 from gqm_sym.runtime.launch.problem import Problem
 from gqm_sym.runtime.legs.leg_record import END, HEADING, NORMAL_LOAD, RIGHT, START, Y_ROW
-from gqm_sym.runtime.legs.leg_run import ASYMPTOTE, LEAST_V2
 from gqm_sym.runtime.legs.leg_segments import Run
-from gqm_sym.runtime.legs.polynomials import COUNT, GRADED_MEANS, MEANS, SHARES, TO_COEFFICIENTS
+from gqm_sym.runtime.legs.panels.point import LEAST_V2
+from gqm_sym.runtime.legs.panels.polynomials import COUNT, GRADED_MEANS, MEANS, SHARES, TO_COEFFICIENTS
+from gqm_sym.runtime.legs.runs.ends import ASYMPTOTE
 
 # The nodes of a panel and its end, as shares of it.
 POINTS = np.append(SHARES, 1.0)
@@ -125,7 +126,7 @@ class Law:
     Parameters
     ----------
     problem : Problem
-        The launch and the module that it is of.
+        The launch with its module.
     """
 
     def __init__(self, problem: Problem) -> None:

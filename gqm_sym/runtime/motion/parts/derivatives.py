@@ -16,40 +16,43 @@ from gqm_sym.runtime.motion.parts.positions import Positions
 
 
 class Derivatives(Positions):
-    """A motion of which one asks for derivatives; kinds of motion that have none say so."""
+    """The derivatives of a motion; kinds of motion without derivatives raise an error."""
 
     def gradient(self, quantity: str, wrt: Any = None, *, lam: Any = None, order: int = 1) -> dict[str, Any]:
-        """The derivatives of a quantity of this motion by its launch and run-time parameters.
+        """Return the derivatives of a quantity with respect to launch and run-time parameters.
 
         Parameters
         ----------
         quantity : str
-            "turning_points", "v_max", "v_min", "normal_force_max", "normal_force_min", "time_at" or "t_end"; of a
-            periodic motion also "half_period", "period" or "action", and of one with losses "rest_position".
+            "turning_points", "v_max", "v_min", "normal_force_max", "normal_force_min", "time_at" or "t_end"; for a
+            periodic motion also "half_period", "period" or "action"; for a motion with losses also "rest_position".
         wrt : str or sequence of str, optional
-            What the derivatives are by: run-time parameters, "lam0" and "v0"; all of them if not given.
+            The names with respect to which derivatives are taken: run-time parameters, "lam0" and "v0"; by default all
+            of them.
         lam : number, optional
-            For "time_at": the place, as of `time_at`.
+            The place for "time_at", as in `time_at`.
         order : int
             2 for the second derivatives of "half_period" or "period".
 
         Returns
         -------
         dict
-            A float for each name; of turning points a tuple, in the order of `turning_points`. At ``v0 = 0`` the
-            derivative by v0 is that for greater speeds. Of second derivatives a dict for each name, with a float for
-            each other.
+            A float for each name, or for turning points a tuple in the order of `turning_points`. At ``v0 = 0`` the
+            derivative with respect to v0 is that for greater speeds. For second derivatives, a dict for each name with
+            a float for each other name.
 
         Raises
         ------
         InputError
             If there is no such quantity or parameter.
         SolutionError
-            If the motion does not have the quantity, or gradients are not there yet for motions of its kind.
+            If the motion does not have the quantity, or motions of its kind have no gradients.
         """
         one_of(quantity, QUANTITIES, where="gradient: quantity")
         if (lam is None) == (quantity == "time_at"):
-            raise InputError(f"lam: is the place that 'time_at' asks about, got {short(lam)} with {quantity!r}")
+            raise InputError(
+                f"lam: must be given with 'time_at', and with no other quantity, got {short(lam)} with {quantity!r}"
+            )
         if type(order) is not int or order not in (1, 2):
             raise InputError(f"gradient: order must be 1 or 2, got {short(order)}")
         if order == 2:
@@ -74,29 +77,29 @@ class Derivatives(Positions):
 
     @property
     def nearest_switch(self) -> Any:
-        """The turn at which a motion with friction comes nearest to resting, or to one leg more; None if there is none.
+        """The turn at which a motion with friction is nearest to a change of its number of legs; None if there is none.
 
         Returns
         -------
         Switch or None
-            Its time ``t``, its place ``lam``, and ``margin``: by how much the pull along the track is larger there than
-            what can hold the body, as a share of the latter, negative where it stays. The derivatives of a motion are
-            those for the legs that it has; at a margin of 0 they are one-sided.
+            Its time ``t``, its place ``lam``, and ``margin``: the force along the track minus the largest static
+            friction, divided by the latter; negative where the body stays. Derivatives are those for the present number
+            of legs, and one-sided at a margin of 0.
         """
         return None
 
     def sensitivity(self, t: Any, wrt: Any = None) -> Sensitivity:
-        """The derivatives of the state at given times by launch and run-time parameters.
+        """Return the derivatives of the state at given times with respect to launch and run-time parameters.
 
-        Of a periodic motion they are as exact, and take as long, after a million periods as after one. With losses they
-        are carried from leg to leg.
+        For a periodic motion they are as accurate, and take as long, after a million periods as after one. With losses
+        they are passed on from leg to leg.
 
         Parameters
         ----------
         t : number or array_like
             Times in s from launch, as for `lam`.
         wrt : str or sequence of str, optional
-            What the derivatives are by, as for `gradient`.
+            The names with respect to which derivatives are taken, as in `gradient`.
 
         Returns
         -------
@@ -108,7 +111,7 @@ class Derivatives(Positions):
         InputError
             If there is no such parameter, or as `lam`.
         SolutionError
-            If gradients are not there yet for motions of this kind, or on curves in space.
+            If motions of this kind, or on such a curve, have no gradients.
         """
         check_force(self.problem.formulas, "sensitivity")
         return self._sensitivity(t, wrt)
@@ -118,7 +121,18 @@ class Derivatives(Positions):
         raise self._without_gradients()
 
     def place_changes(self, t: Any, wrt: Any) -> Array:
-        """The derivatives of the curve parameter alone, as of `sensitivity`, which takes longer."""
+        """Return the derivatives of the curve parameter alone, which is faster than `sensitivity`.
+
+        Parameters
+        ----------
+        t, wrt
+            As in `sensitivity`, whose errors are raised too.
+
+        Returns
+        -------
+        ndarray
+            The row ``lam`` of `sensitivity`.
+        """
         return self._sensitivity(t, wrt).lam
 
     @property
@@ -134,16 +148,16 @@ class Derivatives(Positions):
 
     @property
     def period_slope(self) -> float:
-        """dT/dE, the derivative of the period by the energy per mass, in s3/m2; raises what `action` does."""
+        """dT/dE, the slope of the period over the energy per mass, in s3/m2; raises the errors of `action`."""
         raise self._without_period("period_slope")
 
     def fourier(self, quantity: str, n: int) -> Fourier:
-        """The Fourier coefficients of a quantity over one period (libration and circulation).
+        """Return the Fourier coefficients of a quantity over one period (libration and circulation).
 
         Parameters
         ----------
         quantity : str
-            "x", "z", "v" or "normal_force"; of a libration also "lam" or "s".
+            "x", "z", "v" or "normal_force"; for a libration also "lam" or "s".
         n : int
             The order of the last coefficient.
 
@@ -171,6 +185,6 @@ class Derivatives(Positions):
     def _without_gradients(self) -> SolutionError:
         """What is raised by motions without gradients."""
         return SolutionError(
-            "gradients: only librations, circulations and motions with losses have them yet; "
+            "gradients: only librations, circulations and motions with losses have them; "
             f"this motion is of kind {self.kind!r}"
         )

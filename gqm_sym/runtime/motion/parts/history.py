@@ -36,7 +36,8 @@ class History(Positions):
         Returns
         -------
         tuple of Leg
-            Of a motion that goes on for ever, those of its beginning; ``t_max`` says how far to go.
+            For a motion that goes on for ever without repeating, the legs up to its first turn; a horizon ``t_max``
+            extends them.
         """
         legs = []
         trajectory = self._listed_trajectory
@@ -67,8 +68,8 @@ class History(Positions):
         Returns
         -------
         tuple of Event
-            For a periodic motion, `events_between` gives those of other periods; of any other motion that goes on for
-            ever these are the events of its beginning.
+            For a periodic motion, `events_between` returns the events of other periods. For any other motion that goes
+            on for ever, these are the events up to its first turn.
         """
         return Rows(self._events_along(self._history()))
 
@@ -96,7 +97,7 @@ class History(Positions):
 
     @locked
     def events_between(self, t1: Any, t2: Any) -> tuple[Event, ...]:
-        """The events from one time to another, over as many periods as that takes.
+        """Return the events from one time to another, over as many periods as necessary.
 
         Parameters
         ----------

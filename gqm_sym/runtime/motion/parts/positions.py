@@ -103,7 +103,7 @@ class Positions(ABC):
 
     @locked
     def lam(self, t: Any) -> Any:
-        """The curve parameter at times (the inverse of the time of flight; MATHS, section 5).
+        """Return the curve parameter at given times (the inverse of the time of flight; MATHS, section 5).
 
         Parameters
         ----------
@@ -114,7 +114,7 @@ class Positions(ABC):
         Returns
         -------
         float or ndarray
-            Values of the shape of ``t``. In circulation the parameter grows lap by lap.
+            Values of the shape of ``t``. In circulation the parameter increases lap by lap.
 
         Raises
         ------
@@ -129,7 +129,7 @@ class Positions(ABC):
 
     @locked
     def state(self, t: Any) -> State:
-        """Curve parameter, arc length, position, velocity, curvature and contact force at times.
+        """Return curve parameter, arc length, position, velocity, curvature and contact force at given times.
 
         Parameters
         ----------
@@ -190,12 +190,13 @@ class Positions(ABC):
 
     @locked
     def time_at(self, lam: Any) -> float:
-        """The first time at which the body is at a place.
+        """Return the first time at which the body is at a place.
 
         Parameters
         ----------
         lam : number
-            A value of the curve parameter, in its unit; on a closed curve laps count (lam + period is the next lap).
+            A value of the curve parameter, in its unit; on a closed curve laps are counted (lam + period is the next
+            lap).
 
         Returns
         -------
@@ -221,7 +222,7 @@ class Positions(ABC):
 
     @locked
     def error_bound(self, t: Any) -> Any:
-        """A bound of the error of ``lam(t)``: the parts of quadrature and of inversion (paper, eq. 32), and rounding.
+        """Return a bound on the error of ``lam(t)``, the sum of quadrature, inversion (paper, eq. 32) and rounding.
 
         Parameters
         ----------
@@ -265,7 +266,7 @@ class Positions(ABC):
 
     @locked
     def energy(self, t: Any) -> Energy:
-        """Kinetic and potential energy at times, and what has been lost since launch (MATHS, section 2).
+        """Return kinetic and potential energy at given times, and the energy lost since launch (MATHS, section 2).
 
         Parameters
         ----------

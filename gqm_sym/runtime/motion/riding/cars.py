@@ -11,24 +11,24 @@ from gqm_sym.runtime.launch.speed import path_and_force_at, path_in_space_at
 
 
 class Cars(NamedTuple):
-    """The cars of a train at given times, the last one first: cars are numbered along growing arc length.
+    """The cars of a train at given times, numbered along increasing arc length, the last car first.
 
     Attributes
     ----------
     t : float or array
         Times from launch in s, as given.
     lam : array
-        Arc length in m at the middle of each car; the first axis is the cars, and so it is below.
+        Arc length in m at the middle of each car. The first axis of this array, and of those below, is the cars.
     x, y, z : array
         Coordinates of these places in m; z is up, and y is 0 along a planar track.
     normal_force : array
-        Contact force of each car in N, that of a body of its mass at its middle: as in `State` with a sign along a
-        planar track, and the length of the vector in space.
+        Contact force of each car in N, that of a body of its mass at its middle. As in `State` it has a sign along a
+        planar track, and is the length of the vector in space.
     normal_x, normal_y, normal_z : array
         The same force as a vector.
     coupling_force : array
-        Force in each coupling in N, positive where it pulls the cars together; the first axis is the couplings, of
-        which there is one less than cars.
+        Force in each coupling in N, positive where it pulls the cars together. The first axis is the couplings, one
+        fewer than the cars.
     """
 
     t: Any
@@ -49,12 +49,12 @@ def cars(motion: Any, t: Any) -> Cars:
     Raises
     ------
     InputError
-        If the body is no train, or a time is none.
+        If the body is not a train, or a time is not a number.
     """
     problem = motion.problem
     formulas, f, track = problem.formulas, problem.functions, problem.formulas.chart
     if not isinstance(track, TrackOfTrain):
-        raise InputError("cars: this body is no train; add Train(length=..., cars=...) to its forces")
+        raise InputError("cars: this body is not a train; add Train(length=..., cars=...) to its forces")
     state, values = motion.state(t), problem.p.values.tolist()
     length, gravity = (float(number) for number in track.numbers(FLOATS, values))
     mass, count = values[list(formulas.parameters).index("m")], track.cars

@@ -34,7 +34,7 @@ Span: TypeAlias = tuple[float, float]
 
 
 class Exceedance(NamedTuple):
-    """How long a load is beyond each of some levels.
+    """The times for which a load is beyond each of some levels.
 
     Attributes
     ----------
@@ -43,7 +43,8 @@ class Exceedance(NamedTuple):
     total : float or array
         The times in s for which the load is beyond them, over one period or over the whole motion.
     longest : float or array
-        The longest of these times without a break. It is infinite where a motion that repeats is beyond a level always.
+        The longest of these times without interruption, in s. It is infinite where a motion that repeats is always
+        beyond the level.
     allowed : float or array or None
         The longest time in s that the limits allow at each level: infinite below all of them, 0 above. None if no
         limits were given.

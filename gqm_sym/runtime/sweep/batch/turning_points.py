@@ -7,11 +7,7 @@ are approximated by Newton's method and then proved by interval bounds.
 
 from math import fabs, inf, nan
 
-from gqm_sym.runtime.compiled.calls import (
-    call_bounds_batch,
-    call_potential_divdiff1_batch,
-    call_turning_point_batch,
-)
+from gqm_sym.runtime.compiled.calls import call_bounds_batch, call_potential_divdiff1_batch, call_turning_point_batch
 from gqm_sym.runtime.compiled.intrinsics import choose, fma, whole_below
 from gqm_sym.runtime.compiled.jit import Inner
 from gqm_sym.runtime.launch.ends import MAX_AXIS_STEP_SHARE, NEAR_AXIS, distance_to_axis

@@ -8,7 +8,7 @@ from numba import types
 
 from gqm_sym.literals.numbers import Number
 from gqm_sym.runtime.arithmetic.doubledouble import plus
-from gqm_sym.runtime.charts.true_pieces import (
+from gqm_sym.runtime.charts.double_double.pieces import (
     TRUE_CURVE,
     TrueCurve,
     TruePieces,
@@ -17,7 +17,7 @@ from gqm_sym.runtime.charts.true_pieces import (
     stacked_places,
     stacked_points,
 )
-from gqm_sym.runtime.charts.true_times import fill_registers
+from gqm_sym.runtime.charts.double_double.potential import fill_registers
 from gqm_sym.runtime.compiled.jit import Inner
 from gqm_sym.runtime.compiled.types import MATRIX, VECTOR
 from gqm_sym.runtime.double_double.arithmetic import add, divide, multiply
@@ -37,7 +37,7 @@ class TrueParts(NamedTuple):
     origins : (n+1, 2) array
         Arc lengths from the start point to the edges of its pieces, two doubles each.
     tape, work, parameters
-        The functions with the values of their parameters, as `true_times.locate` takes them.
+        The functions with the values of their parameters, as `turning_points.locate` takes them.
     values : array of int
         The registers of the functions' values.
     """

@@ -10,8 +10,8 @@ from mpmath import mp, mpf
 from railed import built
 
 import gqm_sym as gqm
+from gqm_sym.runtime.sweep.groups import tabulated
 from gqm_sym.runtime.sweep.quantities import STATUS_SENTENCES
-from gqm_sym.runtime.sweep.sweep import _tabulated
 
 with mp.workdps(40):
     G = mpf("9.81")
@@ -254,9 +254,9 @@ def test_forces_of_every_launch_share_a_table(kind: str, tmp_path: Path) -> None
     middle = module.equilibria(Omega=0.3)[-1].lam
     given = {"g": rng.uniform(5, 20, count), "Omega": rng.uniform(-0.9, 0.9, count), "m": rng.uniform(0.5, 2, count)}
     launch = (middle + rng.uniform(-0.9, 0.9, count), rng.uniform(0, 1.5, count) * (rng.random(count) < 0.5))
-    made = _tabulated.cache_info().misses
+    made = tabulated.cache_info().misses
     swept, force = (module.sweep(what, *launch, **given) for what in ("half_period", "normal_force_max"))
-    assert _tabulated.cache_info().misses == made + 1
+    assert tabulated.cache_info().misses == made + 1
     assert swept.route_counts() == {"single": count}
     for k in range(count):
         here = {name: float(values[k]) for name, values in given.items()}

@@ -1,11 +1,8 @@
-"""The parts of the potential and of the contact force along one curve, tabulated for all forces on it.
+"""Making the table of a curve (`layout`).
 
-The curve is cut into panels on which they are polynomials to rounding. The potential on a panel is that above its left
-edge, so that it has all its digits however small the panel is. Potential and load are sums of parts, each times a
-factor that depends on run-time parameters alone (`interface.SeparatedTerms`): the table has the parts, and a launch
-puts together its own potential on the panels that it comes to (`panel_forces`). Where a curve is known in double-double
-arithmetic (`charts.true_parts`), parts of the potential and lengths of panels are rounded from there: the places of a
-chart of many short pieces are doubles, whose differences have few digits.
+Where a curve is known in double-double arithmetic (`charts.double_double.parts`), parts of the potential and lengths of
+panels are rounded from there: the places of a chart of many short pieces are doubles, and their differences have few
+digits.
 """
 
 from math import fabs
@@ -13,34 +10,55 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numba import types
-from numpy.polynomial.legendre import leg2poly, leggauss, legvander
 
 from gqm_sym.runtime.arithmetic.doubledouble import add
-from gqm_sym.runtime.arithmetic.matrices import multiply
-from gqm_sym.runtime.charts.true_parts import TRUE_PARTS, fill_differences
-from gqm_sym.runtime.compiled.calls import (
-    call_path_and_contact_force,
-    call_potential_divdiff1,
-    call_separated_terms,
-)
+from gqm_sym.runtime.charts.double_double.parts import TRUE_PARTS, fill_differences
+from gqm_sym.runtime.compiled.calls import call_path_and_contact_force, call_potential_divdiff1, call_separated_terms
 from gqm_sym.runtime.compiled.jit import Inlined, Inner, entry
-from gqm_sym.runtime.compiled.types import ADDRESSES, MATRIX, VECTOR, Array
+from gqm_sym.runtime.compiled.types import ADDRESSES, VECTOR
 from gqm_sym.runtime.double_double.arithmetic import multiply as multiply_pairs
 from gqm_sym.runtime.double_double.orbit_time import fill_parameters
 from gqm_sym.runtime.interface import PATH_ROWS
-
-# Gauss points of a panel, of the rule for panels far from turning points, and places at which loads are sampled.
-NODES, FEW_NODES, SAMPLES = 16, 8, 10
-
-# Bernstein ellipses (sums of half axes) in which V**2 must not vanish for these rules to be accurate to rounding.
-ELLIPSE, FEW_ELLIPSE = 3.2, 10.0
-
-# Legendre coefficients behind the last one above this share of the largest value are rounding noise; a panel is halved
-# if its last two are above the second share.
-MAX_NOISE_RATIO, MAX_TAIL_RATIO = 4e-16, 1e-13
-
-# The second share where values come from double-double arithmetic; and how often the fit is corrected then.
-MAX_TRUE_TAIL_RATIO, CORRECTIONS = 1e-15, 2
+from gqm_sym.runtime.sweep.tables.fitting import MAX_TRUE_TAIL_RATIO, fill_terms, fill_true_terms, fit, move_terms
+from gqm_sym.runtime.sweep.tables.layout import (
+    BASE,
+    BASE_LOW,
+    BASE_SIZE,
+    DS_TERMS,
+    FEW_GAUSS_WEIGHTS,
+    FEW_GROWTH,
+    FEW_NODES,
+    FEW_POINTS,
+    FEW_REACH,
+    FEW_WEIGHTS,
+    GAUSS_WEIGHTS,
+    GROWTH,
+    HALF,
+    INCREASE,
+    KAPPA_SAMPLES,
+    KAPPA_TERMS,
+    LEFT_TERMS,
+    LOAD_ROW,
+    MAY_STOP,
+    MIDDLE,
+    MIDDLE_TERMS,
+    NODES,
+    PATH_ROW,
+    POINTS,
+    POTENTIAL,
+    POTENTIAL_ROW,
+    POTENTIAL_SAMPLES,
+    REACH,
+    RIGHT_TERMS,
+    SAMPLE_POINTS,
+    SAMPLES,
+    SERIES,
+    SPREAD,
+    TABLE,
+    WEIGHTS,
+    CurveTable,
+)
+from gqm_sym.runtime.sweep.tables.potential import potential_on, rise_on, value_on
 
 # The same next to an edge at which the potential is level: its slope there is at most such a share of what it is on
 # average. Small swings there have far less energy than what the panel spreads over, and still need all their digits.
@@ -56,79 +74,6 @@ NEGLIGIBLE = 1e-2
 
 # How many panels a piece of the curve may be cut into on average.
 MAX_PARTS = 4
-
-# What a panel has of the path: weights in m at the Gauss points, and at fewer of them; powers of x in [-1, 1] for
-# ds/dlam and kappa; kappa at the samples; whether ds may vanish; and half the panel's length in lam.
-WEIGHTS, FEW_WEIGHTS, DS_TERMS, KAPPA_TERMS = 0, NODES, NODES + FEW_NODES, 2 * NODES + FEW_NODES
-KAPPA_SAMPLES = KAPPA_TERMS + NODES
-MAY_STOP = KAPPA_SAMPLES + SAMPLES
-HALF = MAY_STOP + 1
-PATH_ROW = HALF + 1
-# What it has of a part of the potential. Numbers that suffice far from turning points: the potential of the left edge
-# above the reference, two doubles; its increase from edge to edge; its mean; by how much it differs from that on the
-# panel and in both ellipses, at most; the size of what the first is a sum of; and the potential at the samples.
-BASE, BASE_LOW, INCREASE, MIDDLE, SPREAD, REACH, FEW_REACH, BASE_SIZE, POTENTIAL_SAMPLES = range(9)
-FEW_POTENTIAL = POTENTIAL_SAMPLES + 1
-# Then the potential from either edge: above that of the left edge it is r*(c0 + c1*r + c2*r**2 + ...) with r = 1 + x,
-# and above that of the right edge the same with r = x - 1, so that it has all its digits next to an edge, however many
-# of the first coefficients vanish there. Then the coefficients of x, x**2, ... about the middle of the panel; at last
-# its values at the Gauss points, and its Legendre coefficients.
-LEFT_TERMS = POTENTIAL_SAMPLES + SAMPLES
-RIGHT_TERMS, MIDDLE_TERMS, POTENTIAL, SERIES = (LEFT_TERMS + k * NODES for k in range(1, 5))
-POTENTIAL_ROW = SERIES + NODES
-# What it has of a part of the load n0: powers of x, and values at the samples. A row of `panel_forces` has both.
-LOAD_TERMS, LOAD_SAMPLES = POTENTIAL_ROW, POTENTIAL_ROW + NODES
-LOAD_ROW = NODES + SAMPLES
-
-
-def _gauss(n: int) -> tuple[Array, Array, Array]:
-    """Gauss points, their weights, and factors that take values at the points to Legendre coefficients.
-
-    They are exact for the points as doubles; the weights of `leggauss` are off by 70 last places.
-    """
-    points = leggauss(n)[0]
-    values = legvander(points.astype(np.longdouble), n - 1)
-    factors = np.linalg.inv(values.astype(np.float64)).astype(np.longdouble)
-    for _ in range(2):
-        factors = factors + factors @ (np.eye(n) - values @ factors)
-    return points, (2.0 * factors[0]).astype(np.float64), factors.T.astype(np.float64)
-
-
-# FIT takes values at the Gauss points to Legendre coefficients, and `powers` takes these to powers.
-POINTS, GAUSS_WEIGHTS, FIT = _gauss(NODES)
-FEW_POINTS, FEW_GAUSS_WEIGHTS, _ = _gauss(FEW_NODES)
-SAMPLE_POINTS = np.concatenate([[-1.0], FEW_POINTS, [1.0]])
-_POWERS = np.array([np.pad(leg2poly(row[: k + 1]), (0, NODES - 1 - k)) for k, row in enumerate(np.eye(NODES))])
-fit, powers = multiply(FIT), multiply(_POWERS)
-# The largest values of Legendre polynomials in the ellipses.
-GROWTH, FEW_GROWTH = (legvander(np.array([0.5 * (e + 1.0 / e)]), NODES - 1)[0] for e in (ELLIPSE, FEW_ELLIPSE))
-
-
-class CurveTable(NamedTuple):
-    """A tabulated curve.
-
-    Attributes
-    ----------
-    edges : (n+1,) array
-        The places at the edges of the panels; n is 0 if there is no table.
-    edge_lows : (n+1,) array
-        What these are rounded by.
-    paths : (n, PATH_ROW) array
-        What the panels have of the path.
-    parts : (n, potentials*POTENTIAL_ROW + loads*LOAD_ROW) array
-        What they have of the parts of the potential and of the load.
-    potentials : int
-        How many parts the potential has.
-    is_exact : bool
-        Whether potential and lengths were rounded from double-double arithmetic.
-    """
-
-    edges: Any
-    edge_lows: Any
-    paths: Any
-    parts: Any
-    potentials: Any
-    is_exact: Any
 
 
 class Source(NamedTuple):
@@ -153,113 +98,7 @@ class Source(NamedTuple):
     mass: int
 
 
-TABLE = types.NamedTuple((VECTOR, VECTOR, MATRIX, MATRIX, types.int64, types.boolean), CurveTable)
 SOURCE = types.NamedTuple((ADDRESSES, types.int64, types.int64, types.int64, types.int64), Source)
-NO_TABLE = CurveTable(np.empty(0), np.empty(0), np.empty((0, PATH_ROW)), np.empty((0, 0)), 0, False)
-
-
-@Inner
-def value_on(rows, k, at, x):  # type: ignore[no-untyped-def]
-    """The polynomial of panel k whose coefficients begin at column ``at``, at x."""
-    total = 0.0
-    for j in range(NODES - 1, -1, -1):
-        total = total * x + rows[k, at + j]
-    return total
-
-
-@Inner
-def rise_on(rows, k, at, r):  # type: ignore[no-untyped-def]
-    """The potential on panel k above that of the edge whose numbers begin at column ``at``.
-
-    The place is ``r`` away from it in halves of the panel.
-    """
-    return r * value_on(rows, k, at, r)
-
-
-@Inner
-def potential_on(rows, k, x):  # type: ignore[no-untyped-def]
-    """The potential of panel k above its left edge at a place x in [-1, 1]."""
-    return rise_on(rows, k, LEFT_TERMS, 1.0 + x)
-
-
-@Inner
-def difference_from(rows, k, at, r, q):  # type: ignore[no-untyped-def]
-    """The first divided difference of the potential of panel k over two places, which are r and q away from an edge."""
-    value, first = 0.0, 0.0
-    for j in range(NODES - 1, -1, -1):
-        first = first * q + value
-        value = value * r + rows[k, at + j]
-    return value + q * first
-
-
-@Inner
-def difference_on(rows, k, x, y):  # type: ignore[no-untyped-def]
-    """The first divided difference of the potential of panel k over two places on it, by x.
-
-    It is taken from the nearer edge: there the slope of a fitted polynomial is less accurate than its value.
-    """
-    at, edge = (LEFT_TERMS, -1.0) if x + y < 0.0 else (RIGHT_TERMS, 1.0)
-    return difference_from(rows, k, at, x - edge, y - edge)
-
-
-@Inner
-def fill_terms(values, work, row, at, size):  # type: ignore[no-untyped-def]
-    """Fit a polynomial to values at the Gauss points; returns whether it is resolved. ``work`` has its Legendre terms.
-
-    Coefficients behind the last significant one are set to zero. ``size`` is how large the values are elsewhere: where
-    they are much smaller than that, they are rounding noise.
-    """
-    off = np.empty(NODES)
-    for j in range(NODES):
-        off[j], size = values[j] - values[0], max(size, fabs(values[j]))
-    fit(off, 0, work, 0)
-    work[0] += values[0]  # so that a constant is fitted without rounding
-    resolved = max(fabs(work[NODES - 2]), fabs(work[NODES - 1])) <= MAX_TAIL_RATIO * size
-    for j in range(NODES - 1, -1, -1):
-        if fabs(work[j]) > MAX_NOISE_RATIO * size:
-            break
-        work[j] = 0.0
-    powers(work, 0, row, at)
-    return resolved
-
-
-@Inner
-def fill_true_terms(values, work, sums, size):  # type: ignore[no-untyped-def]
-    """As `fill_terms`, from values of two doubles, and with powers of two doubles.
-
-    Returns the last Legendre terms, and what they are compared with.
-    """
-    rest, terms, series = values[0].copy(), np.empty(NODES), np.empty(NODES)
-    for j in range(NODES):
-        size, sums[0, j], sums[1, j] = max(size, fabs(rest[j])), 0.0, 0.0
-    for turn in range(CORRECTIONS + 1):
-        fit(rest, 0, series, 0)
-        powers(series, 0, terms, 0)
-        for j in range(NODES):
-            sums[0, j], sums[1, j] = add(sums[0, j], sums[1, j], terms[j], 0.0)
-            work[j] = series[j] if turn == 0 else work[j] + series[j]
-        for i in range(NODES):
-            value, low = 0.0, 0.0
-            for j in range(NODES - 1, -1, -1):
-                value, low = multiply_pairs(value, low, POINTS[i], 0.0)
-                value, low = add(value, low, sums[0, j], sums[1, j])
-            rest[i] = add(values[0, i], values[1, i], -value, -low)[0]
-    return max(fabs(work[NODES - 2]), fabs(work[NODES - 1])), size
-
-
-@Inner
-def move_terms(sums, edge, terms, middle):  # type: ignore[no-untyped-def]
-    """Fill the powers about an edge of a polynomial with powers of x of two doubles, which are changed.
-
-    And ``middle`` with those of x, x**2, ... in its product with the distance from the edge.
-    """
-    for j in range(NODES - 1):
-        middle[j] = add(sums[0, j], sums[1, j], -edge * sums[0, j + 1], -edge * sums[1, j + 1])[0]
-    middle[NODES - 1] = sums[0, NODES - 1]
-    for i in range(NODES):
-        for j in range(NODES - 2, i - 1, -1):
-            sums[0, j], sums[1, j] = add(sums[0, j], sums[1, j], edge * sums[0, j + 1], edge * sums[1, j + 1])
-        terms[i] = sums[0, i]
 
 
 @Inner

@@ -1,4 +1,4 @@
-"""The first place of an orbit at which the track would have to pull, on a tabulated curve (`curve_table`)."""
+"""The first place of an orbit at which the track would have to pull, on a tabulated curve."""
 
 from math import fabs
 
@@ -6,7 +6,7 @@ import numpy as np
 
 from gqm_sym.runtime.compiled.jit import Inner
 from gqm_sym.runtime.motion.events import ROUNDING_SHARE
-from gqm_sym.runtime.sweep.curve_table import (
+from gqm_sym.runtime.sweep.tables.layout import (
     HALF,
     KAPPA_SAMPLES,
     KAPPA_TERMS,
@@ -15,11 +15,10 @@ from gqm_sym.runtime.sweep.curve_table import (
     POTENTIAL_SAMPLES,
     SAMPLE_POINTS,
     SAMPLES,
-    potential_on,
-    value_on,
 )
-from gqm_sym.runtime.sweep.panel_forces import FAR, LOAD, NEAR, prepare
-from gqm_sym.runtime.sweep.passage import edge_place, locate
+from gqm_sym.runtime.sweep.tables.panel_forces import FAR, LOAD, NEAR, prepare
+from gqm_sym.runtime.sweep.tables.places import edge_place, locate
+from gqm_sym.runtime.sweep.tables.potential import potential_on, value_on
 
 # Steps of the search for a zero of N between two samples.
 MAX_STEPS = 80

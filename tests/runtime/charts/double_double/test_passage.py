@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from mpmath import mp, mpf
 
 import gqm_sym as gqm
-from gqm_sym.runtime.charts.true_times import ChartPassage
+from gqm_sym.runtime.charts.double_double.passage import ChartPassage
 from gqm_sym.runtime.double_double.orbit_time import Bounded
 from gqm_sym.runtime.launch.formulas import _chart_with
 from gqm_sym.runtime.motion import timing
@@ -44,7 +44,7 @@ def holds(motion: Any, truth: mpf) -> None:
 @pytest.fixture(scope="module")
 def module_for(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., ModuleType]:
     """A function that makes a module for motion under gravity along a curve."""
-    folder: Path = tmp_path_factory.mktemp("true_times")
+    folder: Path = tmp_path_factory.mktemp("passage")
     made: dict[str, ModuleType] = {}
 
     def module(curve: gqm.Curve, name: str) -> ModuleType:

@@ -9,7 +9,7 @@ from math import fabs, inf
 from gqm_sym.runtime.arithmetic.doubledouble import add
 from gqm_sym.runtime.compiled.jit import Inlined, Inner
 from gqm_sym.runtime.double_double.arithmetic import multiply
-from gqm_sym.runtime.sweep.curve_table import (
+from gqm_sym.runtime.sweep.tables.layout import (
     BASE,
     BASE_LOW,
     BASE_SIZE,
@@ -37,7 +37,7 @@ FAR, NEAR, LOAD = 1, 2, 4
 # How often a panel is halved towards an edge to find out from where on the potential is convex.
 HALVINGS = 20
 
-# A row: as `curve_table` has it for one part; then an upper bound of the potential on the panel above the reference,
+# A row: as `layout` has it for one part; then an upper bound of the potential on the panel above the reference,
 # infinite where ds may vanish; a better one; whether the potential rises (1) or falls (-1) throughout, 0 if neither is
 # certain; and the level from which it is certain that it is convex.
 HIGHEST, TOP, SLOPE_SIGN, CONVEX_FROM = range(LOAD_SAMPLES + SAMPLES, LOAD_SAMPLES + SAMPLES + 4)

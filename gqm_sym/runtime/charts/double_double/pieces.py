@@ -24,14 +24,7 @@ from gqm_sym.runtime.compiled.intrinsics import fma
 from gqm_sym.runtime.compiled.jit import Inlined, Inner, entry
 from gqm_sym.runtime.compiled.registers import on_stack, uncounted
 from gqm_sym.runtime.compiled.types import INTEGER, MATRIX, REAL, VECTOR, Array
-from gqm_sym.runtime.double_double.arithmetic import (
-    UNIT,
-    add,
-    fast_sum,
-    multiply,
-    sine_and_cosine,
-    square_root,
-)
+from gqm_sym.runtime.double_double.arithmetic import UNIT, add, fast_sum, multiply, sine_and_cosine, square_root
 from gqm_sym.runtime.double_double.nodes import RULE, panel_rule
 
 # Chebyshev points of the first kind at which a piece is sampled.

@@ -1,0 +1,1 @@
+"""Charts in double-double arithmetic: their pieces, potential, turning points and times."""

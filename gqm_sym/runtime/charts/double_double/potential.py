@@ -1,0 +1,73 @@
+"""The effective potential along a chart in double-double arithmetic, with its derivative."""
+
+from math import sqrt
+from typing import Any, NamedTuple
+
+from gqm_sym.runtime.charts.double_double.pieces import (
+    DX,
+    DX_LOW,
+    DZ,
+    DZ_LOW,
+    X_LOW,
+    Z_LOW,
+    X,
+    Z,
+    fill_points,
+    piece_of,
+    stacked_places,
+    stacked_points,
+)
+from gqm_sym.runtime.compiled.jit import Inner
+from gqm_sym.runtime.double_double.arithmetic import add, multiply
+from gqm_sym.runtime.double_double.interpreter import ERROR, LOW, ROW, call_interpreter
+from gqm_sym.runtime.double_double.nodes import RULE
+
+
+class Path(NamedTuple):
+    """What the time along a curve depends on: the curve, the tape of the potential, its registers, and the level.
+
+    The energy level is two doubles, a bound on what differences from it are off by at turning points, and one on its
+    own error, by which turning points are shifted.
+    """
+
+    curve: Any
+    tape: Any
+    work: Any
+    level: Any
+
+
+@Inner
+def fill_registers(tape, work, n, points, error):  # type: ignore[no-untyped-def]
+    """Fill the registers of the coordinates from points."""
+    place = tape[3][1]
+    for i in range(n):
+        x, z = place + i, place + ROW + i
+        work[x], work[x + LOW], work[x + ERROR] = points[X + i], points[X_LOW + i], error
+        work[z], work[z + LOW], work[z + ERROR] = points[Z + i], points[Z_LOW + i], error
+
+
+@Inner
+def energy_at(path, number, at):  # type: ignore[no-untyped-def]
+    """Return at a place on a piece the potential (two doubles, error), its derivative by u, and that of arc length."""
+    curve, tape, work, _ = path
+    address, operations, parts, registers = tape
+    u, points = stacked_places(), stacked_points()
+    u[0], u[RULE] = at
+    fill_points(curve, number, 1, u, points)
+    fill_registers(tape, work, 1, points, curve.errors[piece_of(curve, number), 0])
+    call_interpreter(address, operations, parts[0], parts[2], work, 1)
+    value, by_x, by_z = registers[2], registers[3], registers[4]
+    s, s_low = multiply(work[by_x], work[by_x + LOW], points[DX], points[DX_LOW])
+    t, t_low = multiply(work[by_z], work[by_z + LOW], points[DZ], points[DZ_LOW])
+    slope = add(s, s_low, t, t_low)
+    speed = sqrt(points[DX] * points[DX] + points[DZ] * points[DZ])
+    return (work[value], work[value + LOW], work[value + ERROR]), slope, speed
+
+
+@Inner
+def position(curve, number, at):  # type: ignore[no-untyped-def]
+    """Return a place in arc length, roughly."""
+    count = curve.counts.shape[0]
+    k = piece_of(curve, number)
+    low, high = curve.edges[k], curve.edges[k + 1]
+    return low + 0.5 * (1.0 + at) * (high - low) + (number // count) * curve.period

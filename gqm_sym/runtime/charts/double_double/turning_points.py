@@ -1,0 +1,156 @@
+"""The launch and the turning points of an orbit along a chart in double-double arithmetic, by Newton's method."""
+
+from math import fabs, nan
+
+from numba import types
+
+from gqm_sym.runtime.charts.double_double.pieces import TRUE_CURVE, arc_between, foot, place_at, unshared
+from gqm_sym.runtime.charts.double_double.potential import Path, energy_at, position
+from gqm_sym.runtime.compiled.jit import Inner, entry
+from gqm_sym.runtime.compiled.registers import uncounted
+from gqm_sym.runtime.compiled.types import INTEGER, MATRIX, REAL, VECTOR
+from gqm_sym.runtime.double_double.arithmetic import UNIT, add, divide, multiply
+from gqm_sym.runtime.double_double.orbit_time import TAPE, fill_parameters
+
+# Steps of Newton's method to a turning point, of which the last but one moves it by less than this; and how often it
+# may go to a neighbouring piece.
+MAX_STEPS, MAX_LAST_STEP, MAX_MOVES = 12, 1e-15, 4
+
+# A place this close to the edge of a piece is at the edge.
+AT_EDGE = 2.0**-98
+
+# Rows of what `locate` finds: the launch, the lower and the upper turning point, and a place between them (number of
+# the piece, place on it as two doubles, error); the energy level with both errors of `Path`, and the arc lengths from
+# the lower turning point to the launch, from there to the upper one, and from the left edge of the piece where it
+# begins to the launch (two doubles, error).
+LAUNCH, LOWER, UPPER, MIDDLE, LEVEL, BEHIND, AHEAD, PLACE = range(8)
+ROWS, COLUMNS = 8, 4
+
+
+@Inner
+def find_turn(path, number, at, inward):  # type: ignore[no-untyped-def]
+    """Return the turning point near a place (piece, place), and a bound on half V**2 there with its slope.
+
+    ``inward`` is 1 if the motion lies above it, -1 if below. The place is NaN where Newton's method fails.
+    """
+    before, moves, side = 0.0, 0, float(inward)
+    for _ in range(MAX_STEPS):
+        (value, value_low, error), slope, speed = energy_at(path, number, at)
+        half, half_low = add(path.level[0], path.level[1], -value, -value_low)
+        step, step_low = divide(half, half_low, slope[0], slope[1])
+        at = add(at[0], at[1], step, step_low)
+        over = side * at[0] - 1.0 + side * at[1]
+        if fabs(step) < 0.5 and moves < MAX_MOVES and (over >= -AT_EDGE or over < -2.0 - AT_EDGE):
+            # The turning point lies on a neighbouring piece, or on the edge that it has in common with it.
+            way = inward if over >= -AT_EDGE else -inward
+            if path.curve.period > 0.0 or 0 <= number + way < path.curve.counts.shape[0]:
+                number, at, before, moves = number + way, (-float(way), 0.0), 0.0, moves + 1
+                continue
+        if 0.0 < before < MAX_LAST_STEP or step == 0.0:
+            ratio = step / before if before > 0.0 else 0.0
+            if side * at[0] < -1.0:
+                at = (-side, 0.0)
+            return (number, at[0], at[1]), fabs(half) * ratio * ratio + error, slope[0] / speed
+        before = fabs(step)
+    return (number, nan, nan), nan, nan
+
+
+@entry(
+    types.void(TRUE_CURVE, TAPE, VECTOR, MATRIX, types.UniTuple(REAL, 9), types.UniTuple(REAL, 3), INTEGER, MATRIX),
+    checked=False,
+)
+def locate(curve, tape, work, p, launch, ends, start, found):  # type: ignore[no-untyped-def]
+    """Find the launch of an orbit, its energy level, and its turning points; what is not found is NaN.
+
+    Parameters
+    ----------
+    curve : TrueCurve
+        The curve.
+    tape : (address, operations, parts, registers)
+        The address of the interpreter, and the potential as a function of the plane (`recording.record_in_plane`).
+    work, p
+        As for `orbit_time.orbit_time`.
+    launch : tuple of float
+        The launch's arc length from the left edge of the piece ``start``, and its speed, two doubles each; whether it
+        is given by coordinates (then the arc length is a guess), and x and z, two doubles each.
+    ends : (low, high, is_closed)
+        Both turning points in arc length as doubles know them; or whether the motion goes round instead.
+    start : int
+        The piece from whose left edge arc length is measured.
+    found : (ROWS, COLUMNS) array
+        Filled; of the launch the error in arc length is given.
+    """
+    curve, work, found = unshared(curve), uncounted(work), uncounted(found)
+    address, operations, parts, registers = tape
+    tape = (address, uncounted(operations), parts, registers)
+    fill_parameters(tape, uncounted(p), work)
+    length, length_low, v0, v0_low, by_point, x, x_low, z, z_low = launch
+    doubt = found[LAUNCH, 3]
+    number, at = place_at(curve, start, (length, length_low))
+    if by_point != 0.0:
+        at = foot(curve, number, at, (x, x_low, z, z_low))
+    path = Path(curve, tape, work, (0.0, 0.0, 0.0, 0.0))
+    (value, value_low, error), slope, speed = energy_at(path, number, at)
+    half, half_low = multiply(v0, v0_low, 0.5 * v0, 0.5 * v0_low)
+    high, low = add(value, value_low, half, half_low)
+    level = (high, low, 0.0, error + UNIT * half + fabs(slope[0]) * (doubt / speed + 4.0 * UNIT))
+    found[:] = nan
+    found[LAUNCH, 0], found[LAUNCH, 1], found[LAUNCH, 2], found[LAUNCH, 3] = number, at[0], at[1], doubt
+    if by_point != 0.0:
+        length, length_low = arc_from(curve, start, number, at)
+    found[PLACE, 0], found[PLACE, 1], found[PLACE, 2] = length, length_low, doubt
+    if ends[2] == 0.0:
+        path, rest = Path(curve, tape, work, level), 0.0
+        for row, place, inward in ((LOWER, ends[0], 1), (UPPER, ends[1], -1)):
+            guess, near = place_at(curve, number, (place - position(curve, number, -1.0), 0.0))
+            turn, left, fall = find_turn(path, guess, near, inward)
+            found[row, 0], found[row, 1], found[row, 2], found[row, 3] = (
+                turn[0],
+                turn[1],
+                turn[2],
+                (left + level[3]) / fabs(fall),
+            )
+            rest = max(rest, left)
+        level = (level[0], level[1], rest, level[3])
+        fill_middle(curve, found)
+    found[LEVEL, 0], found[LEVEL, 1], found[LEVEL, 2], found[LEVEL, 3] = level
+
+
+@Inner
+def arc_from(curve, start, number, at):  # type: ignore[no-untyped-def]
+    """Return the arc length from the left edge of a piece to a place before or behind it."""
+    edge = (-1.0, 0.0)
+    if number >= start:
+        return arc_between(curve, start, edge, number, at)[0]
+    arc, _ = arc_between(curve, number, at, start, edge)
+    return -arc[0], -arc[1]
+
+
+@Inner
+def fill_middle(curve, found):  # type: ignore[no-untyped-def]
+    """Fill the arc lengths between launch and turning points, and a place between these."""
+    first, last, number = int(found[LOWER, 0]), int(found[UPPER, 0]), int(found[LAUNCH, 0])
+    low, high = (found[LOWER, 1], found[LOWER, 2]), (found[UPPER, 1], found[UPPER, 2])
+    at = found[LAUNCH, 1], found[LAUNCH, 2]
+    if not (low[0] == low[0] and high[0] == high[0] and first <= number <= last):
+        found[LOWER, 1] = nan
+        return
+    arc, error = arc_between(curve, first, low, number, at)
+    found[BEHIND, 0], found[BEHIND, 1], found[BEHIND, 2] = arc[0], arc[1], error + found[LAUNCH, 3] + found[LOWER, 3]
+    arc, error = arc_between(curve, number, at, last, high)
+    found[AHEAD, 0], found[AHEAD, 1], found[AHEAD, 2] = arc[0], arc[1], error + found[LAUNCH, 3] + found[UPPER, 3]
+    middle = 0.5 * (low[0] + high[0])
+    if first != last:
+        target = 0.5 * (position(curve, first, low[0]) + position(curve, last, high[0]))
+        between = first
+        while between < last and position(curve, between, 1.0) <= target:
+            between += 1
+        edge = position(curve, between, -1.0)
+        middle = 2.0 * (target - edge) / (position(curve, between, 1.0) - edge) - 1.0
+        middle = max(-0.9, min(0.9, middle))
+        if between == first:
+            middle = max(middle, 0.5 * (low[0] + 1.0))
+        elif between == last:
+            middle = min(middle, 0.5 * (high[0] - 1.0))
+        first = between
+    found[MIDDLE, 0], found[MIDDLE, 1], found[MIDDLE, 2] = first, middle, 0.0

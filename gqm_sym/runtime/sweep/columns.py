@@ -1,0 +1,123 @@
+"""Launches and parameters of a sweep as columns of doubles, checked."""
+
+from collections.abc import Callable, Iterator, Mapping
+from functools import lru_cache
+from math import inf, nan
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from gqm_sym.arguments import not_given
+from gqm_sym.errors import InputError, ParameterError
+from gqm_sym.literals.namespaces import ARRAYS
+from gqm_sym.literals.numbers import Number, doubles_at_once, read_number
+from gqm_sym.runtime.compiled.types import Array
+
+if TYPE_CHECKING:
+    from gqm_sym.runtime.launch.formulas import Formulas
+
+
+# What one number is given as, and up to where all integers are doubles.
+ONE_NUMBER, MAX_EXACT_INTEGER = (float, int, str, Number), 2**53
+
+
+def broadcast_shape(columns: Mapping[str, Array]) -> tuple[int, ...]:
+    """The shape that named arrays broadcast to."""
+    different = {column.shape for column in columns.values()} - {()}
+    if len(different) <= 1:
+        return next(iter(different), ())
+    try:
+        return np.broadcast_shapes(*different)
+    except ValueError:
+        shapes = ", ".join(f"{name} {column.shape}" for name, column in columns.items() if column.shape)
+        raise InputError(f"sweep: these shapes do not broadcast against each other: {shapes}") from None
+
+
+def as_doubles(value: Any, name: str) -> Array:
+    """Numbers as doubles; text and exact numbers by their nearest."""
+    if type(value) is float or (type(value) is int and abs(value) <= MAX_EXACT_INTEGER):
+        return np.array(float(value))
+    if type(value) is str:
+        return np.array(_of_text(value, name))
+    if value is None:
+        raise ParameterError(not_given(name))
+    if isinstance(value, np.ndarray) and value.dtype.kind in "fiu":
+        return value.astype(np.float64, copy=False)
+    doubles = doubles_at_once(value)
+    if doubles is not None:
+        return doubles
+    array = np.asarray(value, dtype=object)
+    numbers = [v if isinstance(v, float) else read_number(v, where=name).value for v in array.reshape(-1)]
+    return np.array(numbers, dtype=np.float64).reshape(array.shape)
+
+
+@lru_cache(maxsize=256)
+def _of_text(value: str, name: str) -> float:
+    return read_number(value, where=name).value
+
+
+def check_launches(v0: Array, direction: Array) -> None:
+    """Refuse what no launch of a sweep may be."""
+    if (v0 < 0.0).any():
+        raise InputError("v0: is a speed and cannot be negative; use direction=-1 to launch the other way")
+    if (np.abs(direction) != 1.0).any():
+        raise InputError("direction: must be 1 or -1 (the sign of ds/dt at launch)")
+
+
+def _check(formulas: "Formulas", columns: dict[str, Array]) -> None:
+    """Refuse parameters for which the closed forms do not hold, and those below the limits that the model has."""
+    for name in (*formulas.positive, "m"):
+        if (columns[name] <= 0.0).any():
+            raise ParameterError(f"{name}: must be positive; the closed forms hold for {name} > 0")
+    for name, lower in formulas.at_least:
+        bound = columns[lower] if lower in columns else read_number(lower, where=lower).value
+        if (columns[name] < bound).any():
+            raise ParameterError(f"{name}: must be at least {lower}")
+
+
+def columns_of(
+    formulas: "Formulas", given: tuple[Any, ...], launches: dict[str, Array]
+) -> tuple[list[Array], list[Array]]:
+    """The columns of the parameters, with what stands behind them, and those of the curve's domain.
+
+    Where all launches have the same parameters, they are found once; otherwise they must broadcast with the launches.
+    """
+    if all(isinstance(value, ONE_NUMBER) or not (isinstance(value, np.ndarray) or np.ndim(value)) for value in given):
+        numbers = formulas.numbers(given)
+        if numbers.columns is None:
+            p = list(map(np.array, numbers.values))
+            numbers.columns = p, list(_domain_columns(formulas, p))
+        columns: tuple[list[Array], list[Array]] = numbers.columns
+        return columns
+    named = {name: as_doubles(value, name) for value, name in zip(given, formulas.parameters, strict=True)}
+    _check(formulas, named)
+    broadcast_shape({**launches, **named})
+    p = list(named.values())
+    if formulas.trigonometric is not None:
+        p += map(np.asarray, formulas.trigonometric_over(ARRAYS, tuple(p)))
+    return p, list(_domain_columns(formulas, p))
+
+
+def _domain_columns(formulas: "Formulas", p: list[Array]) -> Iterator[Array]:
+    """The domain and the axes of symmetry of each launch's curve, in the order of `strided`; none of a chart."""
+    if formulas.chart is not None:
+        return
+    place, step = formulas.axes(ARRAYS, tuple(p))
+    found = (*formulas.ends(ARRAYS, tuple(p)), place, _rounding_of_axis(formulas, place, p), step)
+    for value, default in zip(found, (-inf, inf, 0.0, nan, nan, 0.0), strict=True):
+        yield np.asarray(default if value is None else value, dtype=np.float64)
+
+
+def _rounding_of_axis(formulas: "Formulas", place: Any, p: list[Array]) -> float | None:
+    """The difference between the axis of symmetry and its nearest double, if the axis is the same for all launches."""
+    if place is None or np.ndim(place) or not all(column.size for column in p):
+        return None
+    return _rounding_of(formulas.axes, float(place), tuple(float(column.flat[0]) for column in p))
+
+
+@lru_cache(maxsize=256)
+def _rounding_of(axes: Callable[..., Any], place: float, values: tuple[float, ...]) -> float:
+    from mpmath import mp
+
+    with mp.workdps(40):
+        return float(mp.mpf(axes(mp, tuple(map(mp.mpf, values)))[0]) - mp.mpf(place))

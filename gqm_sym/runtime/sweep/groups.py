@@ -1,0 +1,231 @@
+"""Launches of a sweep on curves of one shape, which share a chart and a table."""
+
+from collections.abc import Callable, Iterator
+from functools import lru_cache
+from math import isfinite, nan
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gqm_sym.errors import GQMError
+from gqm_sym.literals.numbers import read_number
+from gqm_sym.runtime.charts.chart import CORNER_ROUNDINGS, ChartMaker
+from gqm_sym.runtime.charts.double_double.parts import NO_PARTS, parts_along
+from gqm_sym.runtime.compiled.strided import DOMAIN_PERIOD, LAM0, V0, widen
+from gqm_sym.runtime.compiled.types import Array
+from gqm_sym.runtime.interface import ExactPotential
+from gqm_sym.runtime.launch.formulas import chart_with, true_pieces_of
+from gqm_sym.runtime.launch.speed import path_and_force_at, potential_at
+from gqm_sym.runtime.multiprecision.exact_problem import NOWHERE
+from gqm_sym.runtime.sweep.orbit import CONTACT_ENDS, CURVE_ENDS, NO_ENDS
+from gqm_sym.runtime.sweep.tables.layout import NO_TABLE, CurveTable
+from gqm_sym.runtime.sweep.tables.tabulate import Source, tabulate
+
+if TYPE_CHECKING:
+    from gqm_sym.runtime.launch.formulas import Formulas
+
+
+# Into how many pieces a curve with formulas is cut at least before it is tabulated. By which share of itself the range
+# of launch places is extended at first, so that it contains all motions, and how often that is doubled.
+MIN_PIECES, FIRST_SHARE, MAX_DOUBLINGS = 64, 0.125, 10
+
+# The factors of a potential and a load that are tabulated as a whole.
+_WHOLE = [np.ones(1), np.ones(1)]
+
+
+class Group(NamedTuple):
+    """Launches on curves of one shape, which share a table.
+
+    Attributes
+    ----------
+    columns : list of arrays
+        The launches, in the order of `strided`; each array has one number, or one for each launch.
+    chart, joints, corners, drops : arrays
+        What compiled code reads behind the parameters, and the places within one period at which the curve is not
+        smooth, or at which pieces of the chart meet, at which its tangent jumps, and at which contact is lost; all are
+        empty for a curve with formulas.
+    table : CurveTable
+        The curve tabulated, where no energy is lost.
+    factors : list of arrays
+        What each launch multiplies the parts of potential and load in the table with.
+    ends : int
+        What both ends of the table, or of the curve where there is none, are (`SweptCurve`).
+    """
+
+    columns: list[Array]
+    chart: Array = NOWHERE
+    joints: Array = NOWHERE
+    corners: Array = NOWHERE
+    drops: Array = NOWHERE
+    table: CurveTable = NO_TABLE
+    factors: list[Array] = _WHOLE
+    ends: int = NO_ENDS
+
+
+def groups_of(
+    formulas: "Formulas", columns: list[Array], domain: list[Array], shape: tuple[int, ...], only_sign: int
+) -> Iterator[tuple[Group, NDArray[np.intp] | None]]:
+    """The launches, grouped by the shape of their curve, and which they are; None where all are of one shape.
+
+    Launches whose curve cannot be made are in no group. Curves with formulas are tabulated if bodies may lift off.
+    """
+    if formulas.chart is None:
+        may_lift_off = only_sign and not formulas.dissipation
+        table, ends = NO_TABLE, CURVE_ENDS
+        if may_lift_off:
+            table, ends = _tabulated_range(formulas, columns, domain, only_sign)
+        yield Group([*columns[:4], *domain, *columns[4:]], table=table, ends=ends), None
+        return
+    held, factors = _held(formulas, len(columns) - 4), _WHOLE
+    if formulas.separated is not None and formulas.dissipation is None:
+        factors = [widen(factor, shape) for factor in formulas.separated_factors(columns[4:])]
+    for found, chosen in _distinct([columns[4 + k] for k in held], shape):
+        given = dict(zip(held, found, strict=True))
+        values = tuple(given.get(k, 1.0) for k in range(len(columns) - 4))
+        try:
+            chart = chart_with(formulas.chart, values)
+        except GQMError:
+            continue  # `solve` says why
+        domain = [np.array(value) for value in (*chart.range, nan, nan, 0.0)]
+        table = NO_TABLE
+        if not formulas.dissipation:
+            made_from = _source(formulas), _exact_parts(formulas), len(formulas.parameters)
+            table = tabulated(formulas.chart, *made_from, values)
+        some, theirs = columns, factors
+        if chosen is not None:
+            some, theirs = ([_chosen(column, shape, chosen) for column in of] for of in (columns, factors))
+        has_ends = not chart.period and chart.ends == ("domain-end", "domain-end")
+        ends = CURVE_ENDS if has_ends else NO_ENDS
+        launches, drops = [*some[:4], *domain, *some[4:]], chart.corners[chart.bends * only_sign < 0.0]
+        # Bodies that lose energy pass the chart piece by piece.
+        joints = chart.breaks if not formulas.dissipation else chart.inner_edges
+        yield Group(launches, chart.block, joints, chart.corners, drops, table, theirs, ends), chosen
+
+
+def _held(formulas: "Formulas", count: int) -> list[int]:
+    """Which run-time parameters, with what stands behind them, launches of one group have in common.
+
+    The curve and its table depend on no others; bodies that lose energy are driven with all parameters the same.
+    """
+    shaped_by = None if formulas.chart is None else formulas.chart.shaped_by
+    if formulas.separated is None or formulas.dissipation is not None or shaped_by is None:
+        return list(range(count))
+    return sorted({*shaped_by, *formulas.separated.held})
+
+
+def _source(formulas: "Formulas") -> Source:
+    """What a table of the model's potential and load is made from."""
+    terms, mass = formulas.separated, list(formulas.parameters).index("m")
+    if terms is None:
+        return Source(formulas.functions.addresses(), 0, 1, 1, mass)
+    return Source(formulas.functions.addresses(), terms.function.address, terms.potentials, terms.loads, mass)
+
+
+def rests_on_corner(group: Group) -> NDArray[np.bool_]:
+    """Whether each launch is from rest on a corner, so that it takes the direction of launch."""
+    lam0, v0, period = group.columns[LAM0].reshape(-1), group.columns[V0].reshape(-1), group.columns[DOMAIN_PERIOD]
+    near, found = CORNER_ROUNDINGS * np.spacing(np.abs(lam0)), np.zeros(1, dtype=np.bool_)
+    for corner in group.corners if np.any(v0 == 0.0) else ():
+        off = lam0 - corner
+        found = found | (np.abs(off - period * np.round(off / period) if period else off) <= near)
+    on_corner: NDArray[np.bool_] = found & (v0 == 0.0)
+    return on_corner
+
+
+def _tabulated_range(
+    formulas: "Formulas", columns: list[Array], domain: list[Array], only_sign: int
+) -> tuple[CurveTable, int]:
+    """The table of a curve with formulas on the range of all motions, and what its ends are.
+
+    It is empty if launches differ in parameters.
+    """
+    low, high, period = domain[:3]
+    if not all(column.size == 1 for column in (low, high, period, *columns[4:])) or not columns[0].size:
+        return NO_TABLE, NO_ENDS
+    p = np.array([column.item() for column in columns[4:]])
+    first, last, places = low.item(), high.item(), np.ascontiguousarray(columns[0]).reshape(-1)
+    ends = NO_ENDS
+    if period.item() > 0.0:
+        first, last = 0.0, period.item()
+    elif isfinite(first) and isfinite(last):
+        ends = CURVE_ENDS
+    else:
+        if not np.isfinite(places).all():
+            return NO_TABLE, NO_ENDS
+        # From all launches outwards, until the potential is above the energy of each or none is in contact any more.
+        fns, closed, reach = formulas.functions.addresses(), 0, [float(places.min()), float(places.max())]
+        heights, energies = potential_at(fns, p, places)[0], 0.5 * columns[1] ** 2
+        energy = np.array([np.min(heights) + np.min(energies), np.max(heights) + np.max(energies)])
+        for side, (limit, sense) in enumerate(((first, -1.0), (last, 1.0))):
+            width = FIRST_SHARE * float(np.ptp(places)) or 1.0
+            for _ in range(MAX_DOUBLINGS):
+                place = reach[side] + sense * width
+                reach[side] = max(place, limit) if side == 0 else min(place, limit)
+                both = np.repeat(reach[side], 2)
+                v2 = 2.0 * (energy - potential_at(fns, p, both)[0])
+                force = path_and_force_at(fns, p, both, np.maximum(v2, 0.0))[4]  # it is linear in the energy
+                if not v2[1] > 0.0 or (only_sign * force < 0.0).all():
+                    closed += 1
+                    break
+                width *= 2.0
+        first, last = reach
+        ends = CONTACT_ENDS if closed == 2 else NO_ENDS
+    return _tabulated_between(formulas.exact, _source(formulas), tuple(p.tolist()), first, last), ends
+
+
+@lru_cache(maxsize=8)
+def _tabulated_between(exact: Any, source: Source, values: tuple[float, ...], first: float, last: float) -> CurveTable:
+    """The table of a curve with formulas between two places; it is made once for the same parameters.
+
+    The exact formulas tell modules apart whose functions stood at the same place in memory, one after the other.
+    """
+    pieces = np.linspace(first, last, MIN_PIECES + 1)
+    return CurveTable(*tabulate(source, NO_PARTS, np.array(values), pieces))
+
+
+def _exact_parts(formulas: "Formulas") -> Callable[..., Any] | None:
+    """The function that gives the parts of the potential by coordinates, and perhaps more behind them."""
+    if formulas.separated is not None:
+        return formulas.separated.parts
+    return formulas.exact.effective_potential if isinstance(formulas.exact, ExactPotential) else None
+
+
+@lru_cache(maxsize=8)
+def tabulated(
+    maker: ChartMaker,
+    source: Source,
+    exact_parts: Callable[..., Any] | None,
+    parameters: int,
+    values: tuple[float, ...],
+) -> CurveTable:
+    """The table of a chart; it is made once for the same parameters. Behind these many stand functions of them."""
+    chart, true = chart_with(maker, values), None
+    if exact_parts is not None and maker.is_exact(chart):
+        p = tuple(read_number(value, where="p") for value in values)
+        try:
+            pieces = true_pieces_of(maker, p[:parameters], chart)
+            true = pieces and parts_along(pieces, exact_parts, source.potentials, p)
+        except GQMError:
+            true = None  # then the table has the digits of the chart
+    p_and_chart = np.concatenate([values, chart.block])
+    return CurveTable(*tabulate(source, true or NO_PARTS, p_and_chart, chart.edges))
+
+
+def _distinct(
+    columns: list[Array], shape: tuple[int, ...]
+) -> Iterator[tuple[tuple[float, ...], NDArray[np.intp] | None]]:
+    """The different sets of values that columns have, and which elements have each; None where all have the same."""
+    if all(column.size == 1 for column in columns):
+        yield tuple(float(column.flat[0]) for column in columns), None
+        return
+    rows = np.column_stack([np.broadcast_to(column, shape).reshape(-1) for column in columns])
+    different, which = np.unique(rows, axis=0, return_inverse=True)
+    order = np.argsort(which.reshape(-1), kind="stable")
+    parts = np.split(order, np.cumsum(np.bincount(which.reshape(-1)))[:-1])
+    yield from zip(map(tuple, different.tolist()), parts, strict=True)
+
+
+def _chosen(column: Array, shape: tuple[int, ...], chosen: NDArray[np.intp]) -> Array:
+    """Elements of a column, which is broadcast to a shape."""
+    return column if column.size == 1 else np.broadcast_to(column, shape).reshape(-1)[chosen]

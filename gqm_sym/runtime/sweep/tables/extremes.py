@@ -1,0 +1,131 @@
+"""The smallest and largest speed or contact force on a tabulated curve: the best sample, refined on its panel."""
+
+from math import fabs, inf, sqrt
+
+from gqm_sym.runtime.compiled.jit import Inlined, Inner
+from gqm_sym.runtime.sweep.orbit_extremes import STEP_RATIO
+from gqm_sym.runtime.sweep.tables.layout import (
+    KAPPA_SAMPLES,
+    KAPPA_TERMS,
+    LEFT_TERMS,
+    LOAD_SAMPLES,
+    LOAD_TERMS,
+    POTENTIAL_SAMPLES,
+    RIGHT_TERMS,
+    SAMPLE_POINTS,
+    SAMPLES,
+)
+from gqm_sym.runtime.sweep.tables.panel_forces import FAR, LOAD, NEAR, prepare
+from gqm_sym.runtime.sweep.tables.places import locate
+from gqm_sym.runtime.sweep.tables.potential import rise_on, value_on
+
+# Half the widths of the first and of the last parabola on a panel of a tabulated curve, which is 2 wide, and how many
+# there are at most: one whose vertex is far away is followed by one of the same width there.
+FIRST_STEP, LAST_STEP, MAX_PARABOLAS = 0.25, 1e-3, 10
+
+
+@Inlined
+def level_on(passage, slacks, j):  # type: ignore[no-untyped-def]
+    """V**2/2 at an edge of panel j of a passage, the column of the powers from there, and where that edge is.
+
+    It is the edge that is farther from a turning point, for the lowest place of a small swing is there.
+    """
+    if j == 0 and passage.panels > 1:
+        return slacks[1], RIGHT_TERMS, 1.0
+    return slacks[j], LEFT_TERMS, -1.0
+
+
+@Inner
+def load_on(curve, k, level, force, x):  # type: ignore[no-untyped-def]
+    """V**2, or the contact force per unit mass if ``force`` is set, at a place of panel k.
+
+    ``level`` is what `level_on` gives.
+    """
+    slack, at, edge = level
+    v2 = 2.0 * (slack - rise_on(curve.rows, k, at, x - edge))
+    if force:
+        return value_on(curve.table.paths, k, KAPPA_TERMS, x) * v2 + value_on(curve.rows, k, LOAD_TERMS, x)
+    return v2
+
+
+@Inner
+def refined(curve, k, level, force, sign, x, ends):  # type: ignore[no-untyped-def]
+    """The largest (``sign`` 1) or smallest (-1) value next to a place between two ends on panel k, by parabolas."""
+    prepare(curve, k, NEAR)
+    low, high = ends
+    best, step = load_on(curve, k, level, force, x), FIRST_STEP
+    for _ in range(MAX_PARABOLAS):
+        x_before = x
+        left, right = max(x - step, low), min(x + step, high)
+        if not left < x < right:
+            x = 0.5 * (left + right)
+        f0 = load_on(curve, k, level, force, left)
+        f1 = load_on(curve, k, level, force, x)
+        f2 = load_on(curve, k, level, force, right)
+        before, after = (x - left) * (f1 - f2), (x - right) * (f1 - f0)
+        if before != after:
+            vertex = x - 0.5 * ((x - left) * before - (x - right) * after) / (before - after)
+            x = min(max(vertex, left), right)
+        found = load_on(curve, k, level, force, x)
+        best = sign * max(sign * best, sign * f0, sign * f1, sign * f2, sign * found)
+        if step <= LAST_STEP:
+            break
+        step = min(step, max(step / STEP_RATIO, fabs(x - x_before)))
+    return best
+
+
+@Inner
+def best_sample(curve, path, passage, slacks, force, sign):  # type: ignore[no-untyped-def]
+    """The largest value times ``sign`` of V**2 or of the contact force at the samples, its panel, and where on it."""
+    rows, paths, count = curve.rows, curve.table.paths, curve.levels.size
+    best, best_j, best_x = -inf, 0, 0.0
+    (first, low_x), (last, high_x) = path
+    for j in range(first, last + 1):
+        k, slack = (passage.first + j) % count, slacks[j]
+        low, high = low_x if j == first else -1.0, high_x if j == last else 1.0
+        prepare(curve, k, (FAR | LOAD if force else FAR) | (0 if first < j < last else NEAR))
+        for i in range(SAMPLES):
+            x = SAMPLE_POINTS[i]
+            if first < j < last:
+                v2 = 2.0 * (slack - rows[k, POTENTIAL_SAMPLES + i])
+                value = paths[k, KAPPA_SAMPLES + i] * v2 + rows[k, LOAD_SAMPLES + i] if force else v2
+            else:
+                # The end itself, for the next panel shares it.
+                x = low + (high - low) * i / (SAMPLES - 1) if i < SAMPLES - 1 else high
+                value = load_on(curve, k, level_on(passage, slacks, j), force, x)
+            if sign * value > best:
+                best, best_j, best_x = sign * value, j, x
+    return best, best_j, best_x
+
+
+@Inner
+def passage_extreme(curve, orbit, passage, slacks, force, sign):  # type: ignore[no-untyped-def]
+    """As `extreme`, on a tabulated curve: the best of each panel's samples, refined on the panels that have it.
+
+    At a joint the values on both sides count.
+    """
+    count, last = curve.levels.size, passage.panels - 1
+    path, begin = ((0, passage.low_x), (last, passage.high_x)), (-1, 0.0)
+    if orbit.leaves == orbit.direction:  # a body that is not in front of its turning point does not come there
+        index, x, _ = locate(curve.table, curve.period, orbit.lam0)
+        begin = index - passage.first, x
+        path = (begin, path[1]) if orbit.leaves > 0 else (path[0], begin)
+    meets_turn = orbit.v2 == 0.0 or not (orbit.circulates or orbit.leaves == orbit.direction)
+    if meets_turn and not (force or sign > 0.0):
+        return 0.0
+    best, best_j, best_x = best_sample(curve, path, passage, slacks, force, sign)
+    if orbit.leaves == orbit.direction and not force and (best_j, best_x) == begin:
+        return sqrt(orbit.v2)
+    for step in range(-1, 2):
+        # On the panel itself, and on that which it shares the place with.
+        j, x, shared = best_j + step, best_x, step == 0
+        if step != 0 and best_x == float(step):
+            x, shared = -best_x, path[0][0] <= j <= path[1][0]
+        if orbit.circulates and step != 0 and not 0 <= j <= last:
+            j, shared = last - best_j, best_x in (passage.low_x, passage.high_x)
+        if shared:
+            ends = path[0][1] if j == path[0][0] else -1.0, path[1][1] if j == path[1][0] else 1.0
+            k = (passage.first + j) % count
+            best = max(best, sign * refined(curve, k, level_on(passage, slacks, j), force, sign, x, ends))
+    value = sign * best
+    return curve.mass * value if force else sqrt(max(value, 0.0))
