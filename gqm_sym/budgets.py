@@ -1,8 +1,8 @@
 """Processor time that a stage may take: symbolic work has no bound that could be seen from its input.
 
-Processor time and not that of the clock: a busy machine is no reason to refuse anything. Nor is a large program: what
-collecting its garbage takes meanwhile does not count. Work in the stage calls `spend` often; what it is called from
-says nothing of budgets, and stages may lie within one another.
+Processor time is measured, not the time of the clock, so that nothing is refused because a machine is busy. Nor is a
+large program: what collecting its garbage takes meanwhile does not count. Work in the stage calls `spend` often; what
+it is called from says nothing of budgets, and stages may lie within one another.
 """
 
 import gc

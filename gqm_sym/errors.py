@@ -88,7 +88,7 @@ class NoisyPointsWarning(UserWarning):
 
 
 def renamed(old_to_new: Mapping[str, str], owner: str) -> Callable[..., NoReturn]:
-    """A ``__getattr__`` for a class or a module that tells the new name of an attribute that was renamed.
+    """Return a ``__getattr__`` for a class or a module whose error says the new name of a renamed attribute.
 
     Parameters
     ----------

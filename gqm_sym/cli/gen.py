@@ -173,7 +173,7 @@ def _check(products: Sequence[Product], options: argparse.Namespace) -> int:
 
 
 def _deliver(product: Product, options: argparse.Namespace) -> None:
-    """Print and write what the options ask for."""
+    """Print and write the results that the options select."""
     from gqm_sym.building import write_module, write_text
 
     if options.latex is not None:

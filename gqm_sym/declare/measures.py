@@ -82,7 +82,7 @@ def _banked(banking: Banking) -> list[tuple[sp.Expr, Dimension | None]]:
 
 
 def parameter_dimension(curve: DeclaredCurve) -> Dimension | None:
-    """Return what a curve's parameter is measured in; None where its formulas do not tell it at once."""
+    """Return what a curve's parameter is measured in; None if its formulas do not determine it immediately."""
     lam = curve.parameter
     if curve.kind in ("parametric", "space"):
         # The argument of a wave with a number for its rate is an angle.
@@ -111,7 +111,7 @@ def _rail_formulas(rail: Rail) -> Formulas:
 
 
 def units_of(curve: DeclaredCurve) -> dict[str, str]:
-    """The SI units of the parameters of a curve, as far as its formulas tell them."""
+    """Return the SI units of a curve's parameters, as far as its formulas determine them."""
     return {name: unit_of(found) for name, found in found_dimensions(curve_formulas(curve), COMMON).items()}
 
 

@@ -279,7 +279,7 @@ def _is_spatial(piece: Piece) -> bool:
 
 
 def _start(place: tuple[Source, ...] | None, heading: Any, first: Piece, in_space: bool) -> tuple[sp.Expr, ...] | None:
-    """The start of a rail as `Rail` has it."""
+    """Return the start of a rail in the form that `Rail` stores."""
     if first.curve is not None:
         if place is not None or heading is not None:
             raise DeclarationError(

@@ -57,7 +57,7 @@ def constant_load(
     parameters : mapping, optional
         Defaults of names in ``n`` and ``v0``.
     title : str
-        One line for people.
+        One line of text for readers.
 
     Returns
     -------
@@ -159,7 +159,7 @@ def from_load(
     parameters : mapping, optional
         Values of the parameters in ``law``.
     title : str
-        One line for people.
+        One line of text for readers.
 
     Returns
     -------

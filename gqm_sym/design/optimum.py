@@ -172,7 +172,7 @@ def _limits(limits: Mapping[str, tuple[Any, Any]], where: str) -> dict[str, tupl
 
 
 def _check(tracks: "_Tracks", x: Array, held: list[Any], between: Any, where: str) -> None:
-    """Refuse what was found where it does not meet the limits, or is no minimum."""
+    """Refuse a result that violates the limits, or is not a minimum."""
     for (name, low, high), margins in zip(held, tracks.margins(x, held, between), strict=True):
         if not margins.min() >= -MAX_EXCESS:
             raise SolutionError(

@@ -127,7 +127,7 @@ class Fit:
 
 
 def with_deviation(value: float, std: float) -> str:
-    """Return a value with its standard deviation as text, with the two digits that tell something of it."""
+    """Return a value with its standard deviation as text, with two digits of the latter."""
     if not isfinite(std):
         return f"{value:.6g}, not determined"
     if std == 0.0:

@@ -1,4 +1,4 @@
-"""The tree of a YAML file, whose nodes know their line and column, and what is wrong with it."""
+"""The tree of a YAML file, whose nodes have their line and column, and the mistakes in it."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field

@@ -139,7 +139,7 @@ class FitPlan:
         return fit(module, self.data, self.free, **self.fixed)
 
     def as_json(self, found: Fit) -> str:
-        """Return a fit as JSON: estimates, covariance, and how well they fit; null for what the data do not tell."""
+        """Return a fit as JSON: estimates, covariance and quality; null for values that the data do not determine."""
         estimates = {
             name: {"value": value, "std": _finite(found.std[name]), "unit": self.units.get(name, "")}
             for name, value in found.estimates.items()

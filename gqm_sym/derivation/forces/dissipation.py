@@ -37,7 +37,7 @@ class Dissipation:
         The contact force per unit mass in the pieces: what of it is there at rest, and what W is multiplied by. Of a
         curve in no vertical plane it has no sign, and where that law is not linear in W the first is all of it.
     friction, kinked, linear
-        Whether it depends on the contact force, has a kink where κ changes sign, and is linear in W.
+        Whether the law depends on the contact force, has a kink where κ changes sign, and is linear in W.
     """
 
     pieces: tuple[tuple[sp.Symbol, sp.Expr], ...]

@@ -54,7 +54,7 @@ class SpeedField:
 
     @property
     def in_other_forms(self) -> sp.Expr:
-        """W as other forms hold it: itself if closed, else its symbol."""
+        """Return W for use in other forms: W itself if it is closed, otherwise its symbol."""
         return self.squared if self.form == CLOSED else W
 
     @property

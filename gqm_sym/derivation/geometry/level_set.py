@@ -45,7 +45,7 @@ class LevelSet:
         return (self.value, self.slope_x, self.slope_z, self.bend_xx, self.bend_xz, self.bend_zz)
 
     def closed_forms(self) -> tuple[tuple[str, sp.Expr], ...]:
-        """The forms for people."""
+        """The forms as they are printed."""
         return (
             ("F", self.value),
             ("dF/dx", self.slope_x),

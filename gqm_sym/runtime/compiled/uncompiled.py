@@ -94,7 +94,7 @@ class Trial:
         The time after which it is worth compiling.
     record : Path, optional
         A file that gets one byte for each launch, so that a script which is run again and again has its functions
-        compiled too. It stands beside the compiled code and may be missing.
+        compiled too. It is stored beside the compiled code and may be missing.
     """
 
     def __init__(self, seconds: float, record: Path = Path(os.devnull)) -> None:
@@ -324,7 +324,7 @@ def _over_plain_names(code: CodeType, given: dict[str, Any]) -> Callable[..., An
     given = vars(builtins) | given
     names = {name: _plain_value(given[name]) for name in code.co_names if name in given}
     numbers = tuple(_plain_value(number) if type(number) in (float, tuple) else number for number in code.co_consts)
-    names["__builtins__"] = builtins  # what NumPy is asked for may import
+    names["__builtins__"] = builtins  # attributes of NumPy may cause imports
     return FunctionType(code.replace(co_consts=numbers), names)
 
 

@@ -1,8 +1,8 @@
 """How states at given times depend on the launch and the parameters, however many periods have gone by.
 
 At a fixed phase angle everything changes smoothly. A time reaches a phase angle earlier or later when a variable
-changes: by the change of the time along the orbit, of the time at which the launch stands on it, and of the periods
-that have gone by. Below, ``delay`` is how much further on, in time, the body is along the changed orbit.
+changes: by the change of the time along the orbit, of the time of the launch on it, and of the elapsed periods. Below,
+``delay`` is how much further on, in time, the body is along the changed orbit.
 """
 
 from typing import Any, NamedTuple

@@ -16,7 +16,7 @@ from gqm_sym.runtime.double_double.arithmetic import UNIT, add, multiply
 from gqm_sym.runtime.double_double.interpreter import BLOCK, ERROR, LOW
 from gqm_sym.runtime.double_double.nodes import trapezoidal_nodes
 from gqm_sym.runtime.gradients.evaluation import MEAN, PROGRAM, begin, evaluate_block, fill_means_of
-from gqm_sym.runtime.gradients.orbit import source_of
+from gqm_sym.runtime.gradients.formula_orbit import source_of
 from gqm_sym.runtime.gradients.programs import (
     Program,
     circulation_program,

@@ -191,7 +191,7 @@ def leaving(dissipation, p, joints, body, place, preferred):  # type: ignore[no-
 def near_start(dissipation, p, place, direction, v2, step):  # type: ignore[no-untyped-def]
     """A distance over which the force on a body, or else V**2, is about the same, where ``step`` is too long.
 
-    Next to an equilibrium a body turns, or moves on, by a distance that no other length of the curve tells of.
+    Next to an equilibrium a body turns, or moves on, by a distance that is unrelated to other lengths of the curve.
     """
     v, point = int(direction), point_buffer()
     forces = Forces(dissipation.speed_equation, p, dissipation.friction, False, dissipation.linear, v)
@@ -222,7 +222,7 @@ def launch(dissipation, p, joints, body):  # type: ignore[no-untyped-def]
 
 @Inner
 def rests_between(dissipation, p, joints, body, place):  # type: ignore[no-untyped-def]
-    """Whether the body, which turns at a place, has come to rest on a corner there as far as times can tell.
+    """Whether the body, which turns at a place, has come to rest on a corner there within the resolution of times.
 
     Between two planes the times from turn to turn decrease geometrically, those in either direction by the same
     factor. The body is at rest if the sum of all that follow is less than a rounding of the time.

@@ -15,7 +15,7 @@ from gqm_sym.runtime.legs.leg_errors import Errors, carry, rounding_share
 from gqm_sym.runtime.legs.leg_record import INHERITED, TIME_FROM_END, TIME_FROM_START
 from gqm_sym.runtime.legs.leg_segments import Run
 from gqm_sym.runtime.legs.runs.ends import ASYMPTOTE, LIMIT, TURN
-from gqm_sym.runtime.legs.variations.equation import Law
+from gqm_sym.runtime.legs.variations.law import FormulaLaw
 from gqm_sym.runtime.motion.trajectory import TimedSegment
 
 
@@ -25,7 +25,7 @@ def _known(errors: tuple[float, float, float]) -> Errors:
 
 
 class InheritedErrors:
-    """The errors with which legs begin, computed as far as they are asked for.
+    """The errors with which legs begin, computed as far as required.
 
     Parameters
     ----------
@@ -97,7 +97,7 @@ class InheritedErrors:
             by_place = [k for k, run in enumerate(missing) if run.frame is None]
             if by_place and isinstance(driver.problem.formulas.exact, ExactLaw):
                 with suppress(SolutionError):  # formulas may be too long
-                    errors = Law(driver.problem).force_errors_along([missing[k] for k in by_place])
+                    errors = FormulaLaw(driver.problem).force_errors_along([missing[k] for k in by_place])
                     for k, of_panels in zip(by_place, errors, strict=True):
                         terms[k] = of_panels / rounding_share(driver.dissipation.linear)
             self._terms += terms

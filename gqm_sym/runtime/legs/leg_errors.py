@@ -7,7 +7,7 @@ run. From b to the middle it is the same with the direction reversed. What round
 last place of all that its terms gained and lost, less what resistance has taken of that; this also changes the time.
 What drives the body and what resists it may all but cancel: the sum of their sizes is the larger one of the forces on
 bodies that move in either direction. Terms of the force on a body at rest may cancel too: how large they are follows
-from a running bound on the roundings of the module's formulas (`variations.equation.Law.force_errors`). A law that is
+from a running bound on the roundings of the module's formulas (`variations.law.FormulaLaw.force_errors`). A law that is
 not linear in V**2 has a root at the turn, of which panels that run into it may have nine digits; those that are
 followed back from it have all. By how much they disagree in the middle is by how much the turn is off.
 """

@@ -109,7 +109,7 @@ class Run(NamedTuple):
     passed: Array | None = None
 
     def with_panels(self, records: list[Array], until: float) -> "list[Run]":
-        """The run in parts with panels, the last of which ends where and when this one does, but for rounding.
+        """The run in parts with panels, the last of which ends at the same place and time up to rounding.
 
         ``until`` is the last time of the motion.
         """

@@ -110,7 +110,7 @@ def sweep(
     if asked is not None or has_compiled_route(formulas, found, t_max):
         for group, chosen in groups_of(formulas, columns, domain, shape, ONLY_SIGN[contact]):
             if asked is None and group.drops.size:
-                continue  # tables know no corners
+                continue  # tables do not contain corners
             some = answers if chosen is None else answers.part(chosen)
             if asked is not None:
                 track = Track(group.chart, group.joints, group.corners, group.drops)
@@ -135,7 +135,7 @@ def sweep(
 def has_compiled_route(formulas: "Formulas", quantity: Quantity, t_max: Any) -> bool:
     """Whether compiled loops answer most launches.
 
-    They do not for motions that lose energy, and of motions with a last time they know only when they end. The grid on
+    They do not do so for motions that lose energy, and for motions with a last time they know only the end. The grid on
     which they look for extremes is too coarse for the length of a vector, which may be all but zero somewhere.
     """
     if not formulas.signed and quantity.code in (quantities.MIN_FORCE, quantities.MAX_FORCE):
@@ -145,7 +145,7 @@ def has_compiled_route(formulas: "Formulas", quantity: Quantity, t_max: Any) -> 
 
 
 class Asked(NamedTuple):
-    """What is asked of all launches: the code of a quantity, and side and last time as `GivenCurve` has them.
+    """The question for all launches: the code of a quantity, and side and last time in the form of `GivenCurve`.
 
     ``lows`` is by how much each run-time parameter differs from its double, 0 of those that are arrays.
     """

@@ -69,7 +69,7 @@ NEVER, MAYBE, ALWAYS = range(3)
 
 
 class PanelRequest(NamedTuple):
-    """What is asked of the next panel.
+    """The requirements on the next panel.
 
     Attributes
     ----------

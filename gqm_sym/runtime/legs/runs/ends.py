@@ -1,4 +1,4 @@
-"""What ends a run, and where."""
+"""The end of a run: its code and its place."""
 
 from math import fabs, inf
 from typing import NamedTuple
@@ -8,14 +8,14 @@ from gqm_sym.runtime.legs.panels.breaks import located, within
 from gqm_sym.runtime.legs.panels.equation import slope_at
 from gqm_sym.runtime.legs.panels.point import LEAST_V2, slope_of_v2
 
-# What ended a run:
+# The codes of the end of a run:
 #
 # ========== ==================================================================================================
 # TURN       V**2 vanished, and the body turns or rests
 # LIMIT      the end of the domain, or of the range of breaks that were given
 # LIFTOFF    N took the sign that it cannot have
 # ASYMPTOTE  V**2 and the force vanish together: the body approaches an equilibrium; by a law that is not linear in
-#            V**2, it is closer to it than its place in doubles can tell
+#            V**2, it is closer to it than doubles resolve its place
 # PAUSED     it has run far enough for once
 # NARROWED   a place where the functions are not smooth: no panel that doubles can represent is narrow enough
 # SPENT      too many panels were needed

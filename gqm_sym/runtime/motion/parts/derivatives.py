@@ -177,7 +177,7 @@ class Derivatives(Positions):
         raise SolutionError(f"fourier: only a motion that repeats has coefficients; it is of kind {self.kind!r}")
 
     def _without_period(self, asked: str) -> SolutionError:
-        """What is raised by motions that do not repeat, by the name of what was asked for."""
+        """Return the error of motions that do not repeat, with the name of the requested quantity."""
         return SolutionError(
             f"{asked}: only a libration or a circulation has one; this motion is of kind {self.kind!r}"
         )

@@ -21,7 +21,7 @@ from gqm_sym.runtime.motion.trajectory import TimedSegment
 
 
 class History(Positions):
-    """A motion of which one asks what happens along it."""
+    """The events and legs of a motion."""
 
     @property
     def _internal_ends(self) -> tuple[str, ...]:

@@ -77,7 +77,7 @@ class ChartSource(NamedTuple):
         return [(k, (z * dx - x * dz) / speed) for k, (x, z) in zip(self.shaping, moves, strict=True)]
 
     def local(self, op: Recorder, lam: TapeNumber) -> Local:
-        """Record the motion at the point that the coordinates tell."""
+        """Record the motion at the point with the given coordinates."""
         n, end = self.variables, self.variables + self.point
         v0, energy = op.values[n - LAUNCH_VARIABLES + 1 : n]
         value, slope, partials = self._at(op, op.places[1:])
