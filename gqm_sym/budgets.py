@@ -30,7 +30,7 @@ _CURRENT: ContextVar[_Budget | None] = ContextVar("budget", default=None)
 
 
 def _without_collections(own: _Budget) -> Callable[[str, Any], None]:
-    """What to call when a collection of garbage begins and ends, for the budget to be longer by its time."""
+    """Return the callback of garbage collection, whose time is added to the budget."""
     thread, begin = get_ident(), thread_time()
 
     def collecting(phase: str, _: Any) -> None:
@@ -53,7 +53,7 @@ def budget(stage: str, seconds: float, remedy: str) -> Iterator[None]:
     stage
         What it does, as the error should call it: ``derivation``.
     seconds
-        How long it may take.
+        The limit of time.
     remedy
         What to try if that is not enough.
     """

@@ -1,4 +1,4 @@
-"""What can go wrong: one exception a kind, and which of them are the user's to mend.
+"""Exceptions, one for each kind of error; `InputError` and its subclasses are mistakes in the input.
 
 Every message says, in this order: where, what was given, what would be right.
 """
@@ -12,7 +12,7 @@ class GQMError(Exception):
 
 
 class InputError(GQMError):
-    """What was given is wrong: an expression, a declaration, a file or a launch."""
+    """The input is wrong: an expression, a declaration, a file or a launch."""
 
 
 class ExpressionError(InputError):

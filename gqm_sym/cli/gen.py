@@ -23,7 +23,7 @@ FOLDER = "generated"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Product:
-    """What is made from one curve file: the model, the text of its module and where the module is written."""
+    """The results of one curve file: the model, the text of its module and the path of the module."""
 
     spec: "Spec"
     model: "Model"

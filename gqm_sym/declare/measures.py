@@ -1,4 +1,4 @@
-"""What the formulas of a curve are measured in, and the curve in words: coordinates are lengths, angles numbers."""
+"""The units of a curve's formulas, and the curve in words: coordinates are lengths, and angles are numbers."""
 
 from typing import Protocol, cast
 
@@ -14,7 +14,7 @@ from gqm_sym.parameters import in_words
 
 
 class DeclaredCurve(FormulaCurve, Protocol):
-    """What the functions here read of a curve (`curve.Curve` is one)."""
+    """The attributes of a curve that are used here; `curve.Curve` has them."""
 
     @property
     def coordinates(self) -> tuple[tuple[str, sp.Expr], ...]:
@@ -38,7 +38,7 @@ class DeclaredCurve(FormulaCurve, Protocol):
 
     @property
     def definition(self) -> object:
-        """What a charted curve is made from."""
+        """The definition of a curve without formulas."""
 
     @property
     def banking(self) -> Banking | None:

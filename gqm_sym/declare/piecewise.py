@@ -25,7 +25,7 @@ _UNITS = {"length": "m", "radius": "m", "angle": "1", "kappa_start": "1/m", "kap
 
 @runtime_checkable
 class FormulaCurve(Protocol):
-    """What a rail needs of a curve with formulas that is one of its pieces (`curve.Curve` is one)."""
+    """The attributes that a rail needs of a piece with formulas; `curve.Curve` has them."""
 
     @property
     def kind(self) -> str:
@@ -64,7 +64,7 @@ class Piece:
         What `STANDARD` says, or the ends of the curve's parameter; of a transition its length, then the coefficients
         of yaw, of pitch and of roll, lowest power first.
     curve
-        Where the piece is a curve with formulas.
+        The curve, if the piece is one with formulas.
     """
 
     kind: str

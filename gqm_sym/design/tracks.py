@@ -1,4 +1,4 @@
-"""What the designs have in common: how their arguments are read, and tracks made of polynomials."""
+"""The common parts of designs: reading of arguments, and tracks made of polynomials."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from decimal import Context, Decimal

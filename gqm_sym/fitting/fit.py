@@ -39,7 +39,7 @@ LAUNCH, CHOICES = ("lam0", "v0"), ("direction", "contact", "point")
 
 
 class Free(NamedTuple):
-    """What is to be found: names, first guesses and limits, in the same order."""
+    """The unknowns: names, first guesses and limits, in the same order."""
 
     names: tuple[str, ...]
     start: Array
@@ -205,7 +205,7 @@ class Residuals:
             return np.full(self.values.size, nan)
 
     def predicted(self, x: Array) -> Array:
-        """What would be measured without errors."""
+        """Return the measurements without errors."""
         names = tuple(self.measured.values)
         if self.measured.t is not None:
             motion = self.motion(x)
@@ -273,7 +273,7 @@ def _until_rest(motion: Any, t: Array) -> Array:
 
 
 def _rates(motion: Any, t: Array) -> Array:
-    """How fast the curve parameter changes at times."""
+    """Return the rate of change of the curve parameter at given times."""
     state, f = motion.state(t), motion.problem.functions
     rates: Array = state.v / path_and_force_at(f.addresses, f.p, state.lam, state.v2)[2]
     return rates

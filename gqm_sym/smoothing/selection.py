@@ -1,4 +1,4 @@
-"""How much to smooth: the weight of roughness, and knots as close as it needs.
+"""The selection of smoothing: the weight of roughness, and the distance of the knots that it needs.
 
 A weight is described by its width w: the spline keeps waves longer than about 2 pi w and removes shorter ones. Widths
 are tried on knots that are close enough for them and not much closer, from coarse to fine: knots at every one of a
@@ -60,7 +60,7 @@ class Choice:
 
 @dataclass(frozen=True, slots=True)
 class Criterion:
-    """What is to be least.
+    """The function to be minimised.
 
     For a standard deviation s of the points it is Mallows' C_p, residual + 2 s**2 freedom: but for a constant an
     unbiased estimate of how far the spline is from the true places of the points. (To ask for a residual of n s**2, the

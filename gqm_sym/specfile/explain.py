@@ -1,4 +1,4 @@
-"""What is wrong with the structure of a file, in words that its author understands."""
+"""Mistakes in the structure of a file, in words that its author understands."""
 
 from collections.abc import Callable, Collection
 from typing import Any, TypeAlias

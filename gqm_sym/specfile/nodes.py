@@ -88,7 +88,7 @@ def shown(text: str) -> str:
 
 
 class Mistakes:
-    """What is wrong with one file, collected until all of it has been looked at."""
+    """The mistakes of one file, collected until all of it has been read."""
 
     def __init__(self, path: Path | str) -> None:
         self.path = str(path)

@@ -1,4 +1,4 @@
-"""What a curve file says, read and checked."""
+"""The content of a curve file, read and checked."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -105,7 +105,7 @@ class Spec:
         Parameters
         ----------
         message
-            Of an error that something in the file led to.
+            The message of an error that was caused by something in the file.
         base
             Keys on the way to the section it is about, as far as that is known.
         """

@@ -59,7 +59,7 @@ class SpeedField:
 
     @property
     def note(self) -> str:
-        """What kind of form it is, and what the signs in it are."""
+        """The kind of the form, and the meaning of the signs in it."""
         meanings = {DIRECTION: "the sign of ds/dt", CONTACT_SIGN: "the sign of N"}
         found = [f"{s.name} is {text}" for s, text in meanings.items() if s in self.squared.free_symbols]
         jumps = ["atan2 is continued without its jumps by 2*pi"] if self.squared.has(sp.atan2) else []

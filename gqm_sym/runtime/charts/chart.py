@@ -223,7 +223,7 @@ class SpaceChart(Chart):
 
 
 class PieceData(NamedTuple):
-    """What the pieces of a chart are made from.
+    """The data from which the pieces of a chart are made.
 
     Attributes
     ----------

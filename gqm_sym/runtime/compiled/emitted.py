@@ -175,7 +175,7 @@ def compiler(file: str, *, interface: int) -> Callable[[Any], Callable[[Any], Em
 
     numba's disk cache stores the name of a function's module, imports it on loading, and distinguishes machine code by
     it. A generated module may be imported under any name, from any folder: so numba sees each function under a name
-    that is made from the function's own text. What else changes in the module compiles nothing anew.
+    that is made from the function's own text. Other changes of the module cause no compilation.
 
     Parameters
     ----------

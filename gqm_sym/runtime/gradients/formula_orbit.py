@@ -46,7 +46,7 @@ PI, PI_LOW = np.pi, 1.2246467991473532e-16
 
 
 def source_of(formulas: Formulas) -> Source:
-    """What the programs of a module are recorded from.
+    """The formulas from which the programs of a module are recorded.
 
     Raises
     ------
@@ -129,7 +129,7 @@ class FormulaOrbitDerivatives(OrbitDerivatives):
 
     @property
     def _program(self) -> Program:
-        """What is integrated along the orbit."""
+        """Return the integrand along the orbit."""
         return circulation_program(self.source, self.direction) if self.direction else libration_program(self.source)
 
     @cached_property

@@ -1,4 +1,4 @@
-"""What gradients evaluate: formulas of a motion with their derivatives, recorded as tapes.
+"""The programs of gradients: formulas of a motion with their derivatives, recorded as tapes.
 
 ``half`` below is half of V**2, as a function of a place, the run-time parameters, the launch place lam0, its speed v0,
 and a change of the energy, which is zero: ``half = v0**2/2 + energy + U(lam0) - U(lam)``. The variables are what
@@ -36,11 +36,11 @@ class Program(NamedTuple):
     operations : (m, 4) array of int
         What the interpreter carries out: first what does not depend on the place.
     first : int
-        How many operations do not depend on the place.
+        The number of operations that do not depend on the place.
     inputs : int
         The number of inputs, whose registers come first; those of the place's coordinates follow them.
     outputs : array of int
-        Where in the work space the registers of the results begin.
+        The start of the registers of the results in the work space.
     work : array
         The registers, of which those of constants are filled.
     constants : tuple
@@ -56,7 +56,7 @@ class Program(NamedTuple):
 
     @property
     def operands(self) -> tuple[Any, ...]:
-        """What compiled code takes, the address of the interpreter first."""
+        """The arguments of compiled code, beginning with the address of the interpreter."""
         return INTERPRETER.address, self.operations, self.first, self.inputs, self.outputs
 
 
@@ -210,7 +210,7 @@ def turning_point_program(source: AnySource) -> Program:
 
 @lru_cache(maxsize=64)
 def libration_program(source: AnySource, wanted: tuple[int, ...] | None = None) -> Program:
-    """What is integrated over the phase angle of a libration, with its derivatives at the same phase angle.
+    """Return the integrand over the phase angle of a libration, with its derivatives at the same phase angle.
 
     The place is the square of the sine of half the phase angle. The inputs behind those of the source are both turning
     points and then the derivatives of each. The results are dt/dphi, its derivatives by all variables, V**2 dt/dphi
@@ -250,7 +250,7 @@ def lap_rate(source: Source, direction: int) -> tuple[Recorder, TapeNumber, Tape
 
 @lru_cache(maxsize=64)
 def circulation_program(source: Source, direction: int, wanted: tuple[int, ...] | None = None) -> Program:
-    """What is integrated over a lap, as a share of which the place is given, with its derivatives at the same share.
+    """Return the integrand over a lap, with the place as a share of the lap, and its derivatives at the same share.
 
     The inputs are the variables, and the place where the lap begins: it is that of the launch, but does not change with
     it. The results are dt/dshare, its derivatives by all variables, V**2 dt/dshare (1+beta) with its derivatives,
@@ -268,7 +268,7 @@ def circulation_program(source: Source, direction: int, wanted: tuple[int, ...] 
 
 @lru_cache(maxsize=64)
 def path_program(formulas: ExactFormulas | ExactLaw, parameters: int, mass: int) -> Program:
-    """What states consist of at a place, each with its derivatives by the run-time parameters and by the place.
+    """Return the program of states at a place, with derivatives with respect to run-time parameters and to the place.
 
     The inputs are the run-time parameters, of which ``mass`` is the number of the mass. The results are of x, z,
     ds/dlam, m*kappa, m*n0, U without losses, y of a space curve, and m**2 times ``load_along_curvature`` of one in no

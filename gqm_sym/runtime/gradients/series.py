@@ -1,4 +1,4 @@
-"""What changes along an orbit as a series, with its integrals: of Fourier, or of Legendre on panels."""
+"""The changes along an orbit as a series with its integrals: of Fourier, or of Legendre on panels."""
 
 import numpy as np
 from numpy.polynomial.legendre import legint, legvander
@@ -72,7 +72,7 @@ class PanelSeries:
     Parameters
     ----------
     edges : (m+1,) array
-        Where the panels begin and end.
+        The edges of the panels.
     samples : (k, m, RULE) array
         The values of k functions.
     """
@@ -100,7 +100,7 @@ class PanelSeries:
 
 
 def to_legendre() -> Array:
-    """What takes values at the nodes to Legendre coefficients, from the right."""
+    """The matrix that maps values at the nodes to Legendre coefficients, multiplied from the right."""
     rule = panel_rule()
     table: Array = rule[2][:, None] * legvander(2.0 * rule[0] - 1.0, RULE - 1) * (2.0 * np.arange(RULE) + 1.0)
     return table

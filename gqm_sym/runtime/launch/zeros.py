@@ -46,7 +46,7 @@ MAX_ZERO_ERROR_SHARE = 1e-6
 
 
 class FoundEnd(NamedTuple):
-    """What a search found.
+    """The result of a search.
 
     Attributes
     ----------

@@ -110,7 +110,7 @@ class Track(NamedTuple):
     chart : array
         The chart that follows the run-time parameters; empty for a curve with formulas, which has no breaks.
     breaks, corners, drops : arrays
-        As of `legs.advance.Joints`.
+        As in `legs.advance.Joints`.
     """
 
     chart: Array
@@ -159,7 +159,7 @@ def sought(question):  # type: ignore[no-untyped-def]
 
 @Inner
 def after_leg(body, question, observed, record):  # type: ignore[no-untyped-def]
-    """What the legs so far have shown, once one more has been followed."""
+    """Return the findings of the legs so far after one more leg."""
     begin, low = record[BEGIN], record[BEGIN_LOW]
     if question == ARRIVAL and body[ENDING] != AT_ONCE:
         spent = passage(record, body[TARGET] - record[LAPS_BEFORE] * body[PERIOD])

@@ -206,11 +206,11 @@ class DissipativeMotion(FollowedMotion):
         )
 
     def _reading_up_to(self, t: float, errors: bool) -> Reading:
-        """What compiled code reads of the motion up to a time, or up to an approach to an equilibrium before it."""
+        """Return the record for compiled code up to a time, or up to an approach to an equilibrium before it."""
         return self._reading if self._reading.has(t, errors) else self._extended(t, errors)
 
     def _reading_at(self, t: float, errors: bool) -> Reading:
-        """What compiled code reads of the motion at one time.
+        """Return the record for compiled code at one time.
 
         If only times on one piece are requested, one after the other, only that piece is tabulated.
         """
@@ -303,7 +303,7 @@ class DissipativeMotion(FollowedMotion):
 
     @property
     def _changes(self) -> Changes:
-        """How the legs so far change."""
+        """The derivatives of the legs so far."""
         self._follow_again()
         runs = self._all_runs
         if self._known_changes is None or self._known_changes.followed < len(runs):

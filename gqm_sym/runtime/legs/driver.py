@@ -135,7 +135,7 @@ class Driver:
     ending : str
         The name of what ended the motion, or nothing.
     last_swing : float
-        How far from the equilibrium the body turned last, once its swing has died away.
+        The distance of the last turn from the equilibrium, once the swing has died away.
     force_error : float
         By what share the force next to the unstable equilibrium of a frame may be wrong.
     launch_error : float or None
@@ -248,7 +248,7 @@ class Driver:
             )
 
     def _followed(self) -> tuple[int, Array]:
-        """What ended the last of the next legs (`advance`), and the records of all of them; one if the body stays."""
+        """Return the end of the last of the next legs (`advance`), and the records of all; one if the body stays."""
         legs, question = (LEGS_PER_CALL if self._horizon < inf else 1, LEGS) if self.at else (1, FIRST_LEGS)
         while True:
             records = np.empty((legs if self._frame is None else 1, self._space * COLUMNS))

@@ -10,7 +10,7 @@ R = TypeVar("R")
 
 
 class HasLock(Protocol):
-    """What has as ``_lock`` a lock that the thread which holds it may take again."""
+    """An object whose lock ``_lock`` may be taken again by the thread that holds it."""
 
     _lock: AbstractContextManager[Any]
 

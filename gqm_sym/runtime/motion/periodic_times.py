@@ -235,7 +235,7 @@ class PeriodicTimes(Motion):
         return self._trajectory(self._segment.duration * (2.0 if self.kind == "libration" else 1.0))
 
     def _repeated(self, times: timing.Timing) -> Repeated:
-        """What repeats itself, with these times."""
+        """The repeated part of a motion, with these times."""
         duration = times.duration
         segment = self._segment if times.edge_times is None else self._segment.with_edge_times(times.edge_times)
         total = segment.total_time

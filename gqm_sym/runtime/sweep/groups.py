@@ -115,7 +115,7 @@ def _held(formulas: "Formulas", count: int) -> list[int]:
 
 
 def _source(formulas: "Formulas") -> Source:
-    """What a table of the model's potential and load is made from."""
+    """The formulas from which a table of the model's potential and load is made."""
     terms, mass = formulas.separated, list(formulas.parameters).index("m")
     if terms is None:
         return Source(formulas.functions.addresses(), 0, 1, 1, mass)

@@ -1,4 +1,4 @@
-"""What gradients along charts evaluate: the formulas of a motion over coordinates of the plane, recorded as tapes.
+"""The programs of gradients along charts: the formulas of a motion over coordinates of the plane, recorded as tapes.
 
 A chart has no formula of its coordinates, and so they come with each place: x and z, their derivatives by the parameter
 u of a piece (`charts.double_double.pieces`), and the curvature. The place itself is arc length. A parameter that shapes
@@ -119,7 +119,7 @@ def chart_circulation_program(source: ChartSource) -> Program:
 
 @lru_cache(maxsize=64)
 def chart_path_program(source: ChartSource) -> Program:
-    """What states consist of at a point, as `programs.path_program`, with the derivatives at points of the curve.
+    """Return the program of states at a point, as `programs.path_program`, with derivatives at points of the curve.
 
     The coordinates are x and z with their first three derivatives by u, and for each parameter that shapes the curve
     the displacement of x and z with its first two.

@@ -54,7 +54,7 @@ class Timed(NamedTuple):
 
 
 class End(NamedTuple):
-    """How a run ended.
+    """The code of the end of a run.
 
     Attributes
     ----------
@@ -73,7 +73,7 @@ class End(NamedTuple):
     half_c : float
         c/2 of the march variable (`panels.equation.March`); infinite where it is the distance itself.
     change_count, panel_count : int
-        How often N has changed its sign, and how many panels were recorded.
+        The number of sign changes of N, and of recorded panels.
     upcoming : int
         The index of the next break.
     """
@@ -93,7 +93,7 @@ class End(NamedTuple):
 
 @Inner
 def end_at_once(forces, march, panel, run_length, point):  # type: ignore[no-untyped-def]
-    """What ends a run where no panel can be laid, at what distance and with what V**2: a turn, if one is near.
+    """Return the end of a run where no panel is possible, with its distance and V**2: a turn, if one is near.
 
     Where a body at rest would go on, it is no turn but an equilibrium, V**2 grows with the square of the distance from
     there, and the body never comes to it.
@@ -132,7 +132,7 @@ def may_pause(forces, march, route, run_length, speeds, panel):  # type: ignore[
 
 @Inner
 def what_after(change, at_limit, pauses):  # type: ignore[no-untyped-def]
-    """What ends a run after a panel, or GOES_ON."""
+    """Return the code of the end of a run after a panel, or GOES_ON."""
     if change.first <= 1.0:
         if change.first == change.turn:
             return TURN
@@ -144,7 +144,7 @@ def what_after(change, at_limit, pauses):  # type: ignore[no-untyped-def]
 
 @Inner
 def what_before(contact_sign, only_sign, has_room, fast_again, at_limit):  # type: ignore[no-untyped-def]
-    """What ends a run before a panel, or GOES_ON."""
+    """Return the code of the end of a run before a panel, or GOES_ON."""
     if contact_sign != 0 and contact_sign == -only_sign:
         return LIFTOFF
     if not has_room:

@@ -202,7 +202,7 @@ class Panels:
         return integrals
 
     def _before(self, integrals: Array) -> Array:
-        """What integrals have come to before each panel of its half."""
+        """Return the values of integrals before each panel of their half."""
         before = np.zeros((*integrals.shape[:2], 1))
         for first, stop in pairwise(self.first):
             before[:, first + 1 : stop, 0] = np.cumsum(integrals[:, first : stop - 1, -1], axis=1)

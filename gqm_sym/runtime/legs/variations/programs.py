@@ -1,4 +1,4 @@
-"""What variations evaluate: the law of a motion with losses and its derivatives, recorded as tapes."""
+"""The programs of variations: the law of a motion with losses and its derivatives, recorded as tapes."""
 
 from collections.abc import Callable, Sequence
 from functools import lru_cache
@@ -62,7 +62,7 @@ def range_program(domain: Callable[..., Any], parameters: int) -> Program:
 
 
 class ChartForces(NamedTuple):
-    """What programs of motions with losses along charts are recorded from.
+    """The formulas from which the programs of motions with losses along charts are recorded.
 
     Attributes
     ----------
@@ -149,7 +149,7 @@ def chart_load_program(forces: ChartForces) -> Program:
 
 @lru_cache(maxsize=64)
 def chart_path_program(forces: ChartForces) -> Program:
-    """What states consist of at a point, as `gradients.programs.path_program` without a potential."""
+    """Return the program of states at a point, as `gradients.programs.path_program` without a potential."""
     at = _ChartPoint(forces)
     op, m, outputs = at.op, at.p[forces.mass], list[TapeNumber]()
     for quantity in (at.x, at.z, None, m * at.curvature, m * at.load):

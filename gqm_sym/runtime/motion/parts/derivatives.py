@@ -1,4 +1,4 @@
-"""How the answers of a motion change with its launch and its parameters, and the spectrum of one that repeats."""
+"""Derivatives of a motion with respect to launch and parameters, and the spectrum of a periodic motion."""
 
 from typing import Any
 
@@ -183,7 +183,7 @@ class Derivatives(Positions):
         )
 
     def _without_gradients(self) -> SolutionError:
-        """What is raised by motions without gradients."""
+        """Return the error of motions without gradients."""
         return SolutionError(
             "gradients: only librations, circulations and motions with losses have them; "
             f"this motion is of kind {self.kind!r}"
