@@ -90,7 +90,7 @@ def seats(motion: "Motion", *, limits: Mapping[str, Sequence[float]] | None = No
     Raises
     ------
     InputError
-        If the body is no train, no roll was declared, or the limits are none.
+        If the body is not a train, no roll was declared, or the limits are not pairs of numbers.
     """
     check_banked(motion.problem.formulas, "seats")
     levels = _levels({} if limits is None else limits)
