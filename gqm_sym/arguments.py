@@ -108,6 +108,23 @@ def not_given(name: str) -> str:
     return f"{name}: has no default and was not given; pass {name}=..."
 
 
+def launch_arguments(
+    called: str, defaults: Mapping[str, Any], lam0: Any, v0: Any, parameters: Mapping[str, Any]
+) -> dict[str, Any]:
+    """Return launch and parameters by name, for a function of a module with these defaults.
+
+    Raises
+    ------
+    ArgumentError
+        If a name is no parameter, or if a parameter without default was not given.
+    """
+    if unknown := sorted(set(parameters) - set(defaults)):
+        raise ArgumentError(unknown_argument(called, unknown[0], ("lam0", "v0", *defaults)))
+    if unset := [name for name, value in defaults.items() if value is None and name not in parameters]:
+        raise ArgumentError(not_given(unset[0]))
+    return {"lam0": lam0, "v0": v0, **parameters}
+
+
 def short(value: object) -> str:
     """A value as a message shows it: on one line, and not too long."""
     text = " ".join(repr(value).split())
