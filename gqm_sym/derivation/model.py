@@ -38,8 +38,8 @@ def _read_v2(given: Any) -> sp.Expr:
 class Model:
     """Closed forms in the parameter λ, the launch (``lam0``, ``v0``) and run-time parameters.
 
-    The geometry is that of MATHS, section 1. Forces and the contact force are in section 2 (paper, eq. 15), turning points
-    in section 3, and the time in section 4 (paper, eq. 17).
+    The geometry is that of MATHS, section 1. Forces and the contact force are in section 2 (paper, eq. 15), turning
+    points in section 3, and the time in section 4 (paper, eq. 17).
 
     Attributes
     ----------
