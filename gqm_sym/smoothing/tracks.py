@@ -212,7 +212,7 @@ def _speed(spline: Any, u: Array) -> Array:
 
 
 def _places(track: _Track, closed: bool) -> Array:
-    """Where the track is taken from its spline: at the points' places, or as often as its width asks for."""
+    """The places at which the track is sampled from its spline: at the points, or as often as its width requires."""
     choice, basis = track.choice, track.choice.smoother.basis
     low, high = track.u[0], track.u[-1]
     if closed:

@@ -115,7 +115,7 @@ class FitPlan:
     Attributes
     ----------
     title : str
-        One line for people.
+        One line of text for readers.
     data : dict
         The measurements, as `gqm_sym.fit` takes them, in SI.
     free, fixed : dict

@@ -91,7 +91,7 @@ class StudyReader(ABC, Generic[P]):
 
     @abstractmethod
     def read(self) -> P | None:
-        """Return what the file asks for; None if it cannot be told."""
+        """Return the content of the file; None if it cannot be told."""
 
     def validated(self, schema: type[S], model_at: Callable[[tuple[str, ...]], Any]) -> S | None:
         """Return the file in the shape of its schema."""

@@ -55,8 +55,8 @@ class Direction:
 class Root:
     """The length of the parts of a direction over a weight, as factors.
 
-    ``square`` is what stands under the root if that is one piece, else None. ``weight`` is what the parts were divided
-    by: a denominator of r' that then is no part of H.
+    ``square`` is the expression under the root if that is one factor, otherwise None. ``weight`` is what the parts were
+    divided by: a denominator of r' that then is no part of H.
     """
 
     powers: list[Power]
