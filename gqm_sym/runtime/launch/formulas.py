@@ -14,6 +14,7 @@ from gqm_sym.budgets import budget
 from gqm_sym.errors import ParameterError, renamed
 from gqm_sym.literals.namespaces import ARRAYS, FLOATS
 from gqm_sym.literals.numbers import Number, read_number
+from gqm_sym.runtime.arithmetic.doubledouble import ZERO, Pair
 from gqm_sym.runtime.charts.chart import Chart, ChartMaker
 from gqm_sym.runtime.compiled.emitted import Emitted
 from gqm_sym.runtime.compiled.types import Array
@@ -146,6 +147,11 @@ class Formulas:
         The function that fills the third coordinate of a space curve and the contact force as a vector.
     signed : bool
         Whether the contact force has a sign: it has none on a space curve that lies in no vertical plane.
+    sided : bool
+        Whether the sign of the contact force, or on a banked space curve of its part along the upward direction of
+        riders, tells on which side of the track the body is.
+    directed : bool
+        Whether the contact force depends on the sign of ds/dt: it does on a space curve in a frame that turns.
     rider_loads : Emitted or None
         The function that fills the loads on a rider of a banked track.
     """
@@ -174,6 +180,8 @@ class Formulas:
     separated: SeparatedTerms | None = None
     path_in_space: Emitted | None = None
     signed: bool = True
+    sided: bool = True
+    directed: bool = False
     rider_loads: Emitted | None = None
     units: Mapping[str, str] = field(default_factory=dict)
     text: str = field(init=False, repr=False, compare=False)
@@ -273,6 +281,11 @@ class Formulas:
         """The chart of a charted curve."""
         assert self.chart is not None
         return chart_with(self.chart, tuple(p.values.tolist()))
+
+    def offset(self, p: Sequence[Number]) -> Pair:
+        """How far to the left of the curve a body's path lies, as two doubles: the radius of a rolling body, else 0."""
+        radius = dict(zip(self.parameters, p, strict=True)).get(self.rolling_radius)
+        return ZERO if radius is None else (radius.value, radius.low)
 
     def domain(self, p: ParameterValues) -> Domain:
         """The range of the curve parameter."""

@@ -1,7 +1,9 @@
 """States of a motion at given times with their errors, and the time at a place."""
 
 from abc import ABC, abstractmethod
+from contextlib import AbstractContextManager
 from math import inf
+from threading import RLock
 from typing import Any
 
 import numpy as np
@@ -15,10 +17,10 @@ from gqm_sym.runtime.compiled.types import Array
 from gqm_sym.runtime.launch.equilibria import Potential
 from gqm_sym.runtime.launch.kinds import MotionKind
 from gqm_sym.runtime.launch.problem import Problem
-from gqm_sym.runtime.launch.speed import path_and_force_at, path_in_space_at
+from gqm_sym.runtime.launch.speed import length, path_and_force_at, path_in_space
 from gqm_sym.runtime.motion.events import Leg, passages
-from gqm_sym.runtime.motion.locking import Lock, locked
-from gqm_sym.runtime.motion.riding.loads import felt
+from gqm_sym.runtime.motion.locking import locked
+from gqm_sym.runtime.motion.riding.loads import loads_on_rider
 from gqm_sym.runtime.motion.segments import errors
 from gqm_sym.runtime.motion.state import Energy, State, StateInSpace, StateOfRider
 from gqm_sym.runtime.motion.trajectory import PhasePoints, TimedSegment, Trajectory, locate
@@ -40,7 +42,7 @@ class Positions(ABC):
         self.problem = problem
         self.kind = kind
         self.direction = direction
-        self._lock = Lock()
+        self._lock: AbstractContextManager[Any] = RLock()
         horizon = problem.launch.t_max
         self._horizon = inf if horizon is None else horizon.value
 
@@ -51,7 +53,7 @@ class Positions(ABC):
         """The trajectory, computed for times up to ``end_time`` from launch at least."""
 
     @property
-    def _course(self) -> Trajectory:
+    def _listed_trajectory(self) -> Trajectory:
         """The trajectory that legs, events and passages are read off: of a motion that repeats, one period."""
         return self._trajectory(0.0)
 
@@ -95,7 +97,7 @@ class Positions(ABC):
 
     def _history(self) -> tuple[TimedSegment, ...]:
         """The timed segments that `legs` and `events` list."""
-        return self._course.segments
+        return self._listed_trajectory.segments
 
     # -- positions ----------------------------------------------------------------------------
 
@@ -155,19 +157,26 @@ class Positions(ABC):
         error = self._bound(times, points, reduced, v, ds)
         lam = reduced + points.laps * trajectory.lap
         s = (s + points.laps * trajectory.lap_length) + self.problem.arc_origin
-        found = [_shaped(array, shape) for array in (times, lam, s, x, z, v, v2, kappa, force, error)]
         kind, more = self._in_space(times, reduced, v, v2, force)
+        found = [_shaped(array, shape) for array in (times, lam, s, x, z, v, v2, kappa, force, error)]
         return kind(*found, *(_shaped(array, shape) for array in more))
 
     def _in_space(self, times: Array, places: Array, v: Array, v2: Array, force: Array) -> tuple[type[State], Array]:
-        """The kind of state that there is on the curve, and what it has beside the fields of `State`, as rows."""
+        """The kind of state that there is on the curve, and what it has beside the fields of `State`, as rows.
+
+        In a frame that turns the contact ``force`` is filled, too.
+        """
         formulas, p = self.problem.formulas, self.problem.functions.p
         if formulas.path_in_space is None:
             return State, np.empty((0, 0))
-        rows = path_in_space_at(formulas.path_in_space.address, p, places, v2)
+        rows = path_in_space(formulas, p, places, v2, v)
+        if formulas.directed:
+            force[:] = length(rows[1:])
         if formulas.rider_loads is None:
             return StateInSpace, rows
-        return StateOfRider, np.concatenate([rows, felt(self.problem, places, v, v2, force, self._resting(times))])
+        return StateOfRider, np.concatenate(
+            [rows, loads_on_rider(self.problem, places, v, v2, force, self._resting(times))]
+        )
 
     def _resting(self, times: Array) -> NDArray[np.bool_]:
         """Whether the body is at rest for good at times from launch."""
@@ -329,7 +338,7 @@ class Positions(ABC):
 
     def _first_passages(self, lam: float, low: float) -> list[float]:
         """Times at which the body passes a place, the first time on each segment."""
-        trajectory = self._course
+        trajectory = self._listed_trajectory
         return passages(trajectory.segments, trajectory, lam, low)
 
 
