@@ -40,6 +40,12 @@ FIRST = 20
 ROUNDINGS = 4.0 * 2.0**-52
 POINTS = [("-2", "2"), ("-1", "0"), ("0", "1"), ("2", "0"), ("4", "3")]
 SLOPE = [("-4", "-3"), ("-2", "-1.5"), ("0", "0"), ("1.2", "0.9"), ("2.8", "2.1"), ("4", "3")]
+PIPE = [gqm.arc(radius="1", angle="pi/2"), gqm.line(length="2"), gqm.arc(radius="1", angle="pi/2")]
+PIPE_IN_SPACE = [
+    gqm.transition(length="pi/2", pitch="1"),
+    gqm.line(length="2"),
+    gqm.transition(length="pi/2", pitch="1"),
+]
 # Derivatives, relative to the largest of them, per unit of the condition number.
 SLOPES = 2e-13
 
@@ -66,6 +72,12 @@ def build(folder: str | Path) -> Modules:
         "rim": (
             gqm.Curve.implicit("x**2 + z**2 - 1", start=(0, -1)),
             gravity + gqm.CoulombFriction() + gqm.QuadraticDrag(),
+        ),
+        "pipe": (gqm.Curve.piecewise(PIPE, heading="-pi/2"), gravity),
+        "pipe_in_space": (gqm.Curve.piecewise(PIPE_IN_SPACE, start=("1", "2", "3"), heading=("1/3", "-pi/2")), gravity),
+        "train": (
+            gqm.Curve.parametric(x="R*sin(u)", z="-R*cos(u)", parameter="u", period="2*pi", domain=None),
+            gravity + gqm.Train(length="ell", cars=3),
         ),
         "coil": (gqm.Curve.space(x="c*u", y="R*sin(u)", z="-R*cos(u)", parameter="u"), gravity),
     }
@@ -441,12 +453,64 @@ def threads(draw: random.Random, modules: Modules) -> tuple[list[str], int]:
     return [f"threads read otherwise on {name}"] if np.any(read != expected) else [], 1
 
 
+def pipes(draw: random.Random, modules: Modules) -> tuple[list[str], int]:
+    """From rest in a half pipe of pieces, in a plane and in space: pendulums and a level way between."""
+    name, lam0 = (
+        draw.choice(("pipe", "pipe_in_space")),
+        draw.choice((draw.uniform(0.0, 1.5), log_uniform(draw, -6.0, 0.0))),
+    )
+    motion = modules[name].solve(lam0)
+    corner = mp.pi / 2
+    angle, rate = corner - mpf(lam0), mp.sqrt(mpf(G))
+    m = mp.sin(angle / 2) ** 2
+    quarter, fastest = mp.ellipk(m) / rate, 2 * rate * mp.sqrt(m)
+    half = 2 * quarter + 2 / fastest
+
+    def place(t: Any) -> Any:
+        rest = t - 2 * half * mp.floor(t / (2 * half))
+        if rest > half:
+            return 2 * corner + 2 - place(rest - half)
+        if rest < quarter:
+            return corner - 2 * mp.asin(mp.sqrt(m) * mp.ellipfun("cd", rate * rest, m=m))
+        if rest < half - quarter:
+            return corner + fastest * (rest - quarter)
+        return corner + 2 + 2 * mp.asin(mp.sqrt(m) * mp.ellipfun("sn", rate * (rest - half + quarter), m=m))
+
+    found = outside(motion, place, [draw.uniform(0.0, 3.0) * motion.period for _ in range(3)])
+    swept = modules[name].sweep("half_period", [lam0])
+    for what, value in (("half period", motion.half_period), ("swept half period", swept.values[0])):
+        if not abs(mpf(float(value)) - half) <= ROUNDINGS * half:
+            found.append(f"{what} off by {float(value / half - 1):.1e}")
+    return found, 5
+
+
+def trains(draw: random.Random, modules: Modules) -> tuple[list[str], int]:
+    """A train on a circle: a pendulum whose gravity is less by the mean of the cosine over its length."""
+    lam0, radius, share = signed(draw, -6.0, 0.45), log_uniform(draw, -1.0, 2.0), log_uniform(draw, -3.0, 0.3)
+    size = share * radius
+    motion = modules["train"].solve(lam0 * radius, R=radius, ell=size)
+    half = mpf(size) / (2 * mpf(radius))
+    true = pendulum_period(mpf(lam0 * radius) / mpf(radius), mpf(0), mpf(G) * mp.sin(half) / half / mpf(radius))
+    swept = modules["train"].sweep("period", [lam0 * radius], R=radius, ell=size)
+    found = []
+    for what, value in (("period", motion.period), ("swept period", swept.values[0])):
+        # At the lowest place the chart begins and ends: a place is rounded there as the length of a lap is.
+        seam = 2.0**-53 * 2.0 * np.pi / abs(lam0)
+        if not abs(mpf(float(value)) - true) <= (4.0 * ROUNDINGS * motion.condition_number + seam) * true:
+            found.append(f"{what} off by {float(value / true - 1):.1e}")
+    return found, 2
+
+
 KINDS = (slides, falls, damps, swings, bounces, tracks, rims, hills, coils, gradients, sweeps, threads)
+# These make many charts: ``make soak`` draws them, and no test.
+CHARTED = (pipes, trains)
 # Gradients and threads are dear, and told by few.
-WEIGHTS = (4, 4, 4, 4, 4, 4, 4, 4, 4, 1, 4, 1)
+WEIGHTS = (4, 4, 4, 4, 4, 4, 4, 4, 4, 1, 4, 1, 4, 4)
 
 
-def soak(count: int, seed: int, modules: Modules) -> tuple[Counter[str], list[str], float]:
+def soak(
+    count: int, seed: int, modules: Modules, kinds: tuple[Kind, ...] = KINDS
+) -> tuple[Counter[str], list[str], float]:
     """Draw so many motions, or until it is interrupted; what came of them, what failed, and the longest call in s.
 
     What fails is printed at once. Times are those of the processor.
@@ -454,7 +518,7 @@ def soak(count: int, seed: int, modules: Modules) -> tuple[Counter[str], list[st
     draw, tally, failed, longest = random.Random(seed), Counter[str](), list[str](), 0.0
     with suppress(KeyboardInterrupt):
         for _ in range(count):
-            kind, own = draw.choices(KINDS, WEIGHTS)[0], draw.getrandbits(48)
+            kind, own = draw.choices(kinds, WEIGHTS[: len(kinds)])[0], draw.getrandbits(48)
             begin = time.process_time()
             found = _told(kind, own, modules, tally)
             # The first calls compile.
@@ -484,7 +548,7 @@ def _told(kind: Kind, own: int, modules: Modules, tally: Counter[str]) -> list[s
 def main(count: int, seed: int) -> int:
     """Print what failed and the counts; returns 1 if anything did."""
     with tempfile.TemporaryDirectory() as folder:
-        tally, failed, longest = soak(count, seed, build(folder))
+        tally, failed, longest = soak(count, seed, build(folder), KINDS + CHARTED)
     if longest > MAX_SECONDS:
         failed.append(f"a call took {longest:.0f} s")
     print(f"{dict(tally)}, {len(failed)} failures, {longest:.1f} s the longest")
