@@ -134,7 +134,7 @@ class Lowering:
         Parameters
         ----------
         name, doc
-            The function's name, and what its docstring says.
+            The function's name, and the text of its docstring.
         arguments
             Between the number of places and the run-time parameters: the name of an array that has one element for
             each place, or the symbol of a single number.
