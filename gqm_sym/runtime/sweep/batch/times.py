@@ -38,6 +38,7 @@ from gqm_sym.runtime.sweep.batch.rows import (
     INDEX,
     LAUNCH_PLACE,
     LAUNCH_V2,
+    LEAST_RATIO,
     LIBRATION_ROWS,
     OFFSET_HIGH,
     OFFSET_LOW,
@@ -60,6 +61,12 @@ COS2, SIN2 = np.cos(pi * NODE_SHARES) ** 2, np.sin(pi * NODE_SHARES) ** 2
 
 # What becomes of an orbit after a level of the rule.
 CONTINUES, CONVERGED, FAILED = 0.0, 1.0, 2.0
+
+# The ratio of the smallest to the largest regular factor of V**2 from which on roundings of the turning points do not
+# matter: they change a time by a multiple that is the inverse of its square, and in even wells, both of whose turning
+# points come near a hilltop, of its fourth power. Where both turning points are exact, as those of a launch from rest
+# about an axis of symmetry, it is MIN_CANCELLATION_RATIO.
+MIN_RATIO, MIN_EVEN_RATIO = 0.25, 0.5
 
 # Steps of the arithmetic-geometric mean. Of two numbers in a ratio of 1 : 10, the root of MIN_CANCELLATION_RATIO, the
 # relative difference becomes 9e-1, 6e-1, 4e-2, 2e-4, 4e-9. One more arithmetic mean is then exact to half an ulp,
@@ -168,7 +175,7 @@ def judge_level(rows, n, nodes, verdict):  # type: ignore[no-untyped-def]
         value, before = rows[SUM, j] / nodes, rows[CHANGE, j]
         change = fabs(value - rows[VALUE, j]) / value
         rows[VALUE, j], rows[CHANGE, j] = value, change
-        clear = rows[FACTOR_LOW, j] > MIN_CANCELLATION_RATIO * rows[FACTOR_HIGH, j]
+        clear = rows[FACTOR_LOW, j] > rows[LEAST_RATIO, j] * rows[FACTOR_HIGH, j]
         verdict[j] = choose(clear, choose(has_converged(before, change), CONVERGED, CONTINUES), FAILED)
 
 
@@ -197,6 +204,8 @@ def times_by_trapezoid(fns, kind, mirrored, orbits, scratch, quantity, answers):
     for j in range(n):
         rows[SUM, j], rows[VALUE, j], rows[CHANGE, j] = 0.0, 0.0, inf
         rows[FACTOR_LOW, j], rows[FACTOR_HIGH, j] = inf, 0.0
+        even = choose(rows[LAUNCH_V2, j] == 0.0, MIN_CANCELLATION_RATIO, MIN_EVEN_RATIO)
+        rows[LEAST_RATIO, j] = even if mirrored else MIN_RATIO
     begin, nodes, factor = 0, MIN_INTERVALS, 2.0 if quantity == PERIOD and kind != CIRCULATION else 1.0
     last, sides = (MIN_INTERVALS // 2, 2.0) if mirrored else (MIN_INTERVALS, 1.0)
     while True:
@@ -236,7 +245,8 @@ def half_periods_by_agm(fns, orbits, scratch, quantity, answers):  # type: ignor
     call_agm_arguments_batch(fns.agm_arguments, n, halves, p, pair)
     for j in range(n):
         a, b = pair[0, j], pair[1, j]
-        balanced = (b > MIN_CANCELLATION_RATIO * a) & (a > MIN_CANCELLATION_RATIO * b) & (a + b < inf)
+        least = choose(rows[LAUNCH_V2, j] == 0.0, MIN_CANCELLATION_RATIO, MIN_EVEN_RATIO)
+        balanced = (b > least * a) & (a > least * b) & (a + b < inf)
         clear[j] = choose(balanced, 1.0, 0.0)
         pair[0, j], pair[1, j] = sqrt(a), sqrt(b)
     for _ in range(AGM_STEPS):
