@@ -101,7 +101,7 @@ def nearest(name: str, known: Iterable[str]) -> str | None:
 
 
 def not_given(name: str) -> str:
-    """What to do about a parameter that has no value."""
+    """Return the remedy for a parameter without a value."""
     return f"{name}: has no default and was not given; pass {name}=..."
 
 

@@ -171,7 +171,7 @@ def _power(base: str, exponent: str) -> str:
 
 
 def _mathml(form: sp.Basic) -> str:
-    # XML does not know the named entities of HTML.
+    # XML does not have the named entities of HTML.
     text: str = sp.mathml(form, printer="presentation")
     return re.sub(r"&[A-Za-z]\w+;", lambda found: _character(found[0]), _unfenced(text))
 

@@ -47,7 +47,7 @@ def _is_coordinated(given: Any) -> bool:
 
 
 def is_formula(roll: Any) -> bool:
-    """Whether a roll is told by a formula or a word, not by angles of points."""
+    """Whether a roll is given by a formula or a word, and not by angles of points."""
     return isinstance(roll, str | int | sp.Expr) or (isinstance(roll, tuple | list) and len(roll) <= 2)
 
 

@@ -38,74 +38,81 @@ def _read_v2(given: Any) -> sp.Expr:
 class Model:
     """Closed forms in the parameter λ, the launch (``lam0``, ``v0``) and run-time parameters.
 
+    Sections and equations: geometry MATHS, section 1; forces and the contact force MATHS, section 2 (paper, eq. 15);
+    turning points MATHS, section 3; time MATHS, section 4 (paper, eq. 17).
+
     Attributes
     ----------
     curve, force
-        What it was derived from.
+        The declarations from which the model was derived.
     title
-        One line for people.
+        One line of text for readers.
     parameter, lam0, v0, mass
-        The symbols of λ, of the launch and of the mass.
+        The symbols of λ, of the place and the speed of launch, and of the mass.
     x, y, z
-        Coordinates; y is 0 on planar curves.
-    ds, dxds, dyds, dzds
-        σ = ds/dλ ≥ 0 and the components of the unit tangent.
+        Coordinates in m; y is 0 on planar curves.
+    ds
+        σ = ds/dλ ≥ 0, in m per unit of λ.
+    dxds, dyds, dzds
+        The components of the unit tangent.
     kappa
-        Signed curvature, positive to the left of growing λ; of a curve in no vertical plane its absolute value.
+        The signed curvature in 1/m, positive to the left of increasing λ; its absolute value for a curve in no vertical
+        plane.
     turning_rate, turning_angle
-        dΘ/dλ, and Θ from ``lam0`` to λ; of a curve in no vertical plane ``|dt/dλ|``, and None.
+        dΘ/dλ, and Θ from ``lam0`` to λ in radians; ``|dt/dλ|`` and None for a curve in no vertical plane.
     cusp
-        A smooth factor of σ that changes sign or vanishes at the cusps; None without cusps.
-    potential, inertia
-        Φ per unit mass along the curve, and 1 + β.
+        A smooth factor of σ that changes sign or vanishes at cusps; None without cusps.
+    potential
+        Φ, the potential energy per unit mass along the curve, in m²/s².
+    inertia
+        1 + β.
     effective_potential, effective_potential_slope
-        U = Φ/inertia, so that W + 2U is constant along a motion, and dU/dλ.
+        U = Φ/inertia in m²/s², so that W + 2U is constant along a motion, and dU/dλ.
     symmetry
-        Where the effective potential and σ are even; None where no such place was found, or nothing repeats.
+        The places about which the effective potential and σ are even; None if none was found, or nothing repeats.
     symmetric_orbits
-        The time of orbits about such a place as an integral without sines; None where there is no such form.
+        The time of orbits about such a place as an integral without sines; None if there is no such form.
     static_normal_load
-        n₀ with N/m = κ W + n₀; of a curve in no vertical plane its length.
+        n₀ in m/s², with N/m = κ W + n₀; its length for a curve in no vertical plane.
     normal
-        The unit vector along which N is positive; of a curve in no vertical plane empty.
+        The unit vector along which N is positive; empty for a curve in no vertical plane.
     bend, loads
-        Of a curve in no vertical plane the vectors t × dt/ds and -t × F, by components, with which t × N/m = W·bend +
-        loads; else empty.
+        The components of t × dt/ds and of -t × F for a curve in no vertical plane, with t × N/m = W·bend + loads;
+        otherwise empty.
     dissipation
-        What a force law that is not conservative does along the curve; None for a conservative one.
+        The terms of a force law that is not conservative; None for a conservative one.
     speed_squared
-        W = V². Of a dissipative model on one leg, where ``direction`` is the sign of ds/dt and ``contact_sign`` that
-        of N.
+        W = V² in m²/s². In a dissipative model it holds on one leg, where ``direction`` is the sign of ds/dt and
+        ``contact_sign`` that of N.
     speed_squared_form
-        ``closed``, ``quadrature`` (it holds an Integral) or ``equation`` (an unknown function: the law is not linear
-        in W). Where it is not closed, the forms below hold W as a symbol.
+        ``closed``, ``quadrature`` (W contains an Integral) or ``equation`` (W is an unknown function, because the law
+        is not linear in W). If it is not closed, the forms below contain W as a symbol.
     normal_force
-        N, positive along the normal to the left of growing λ; of a curve in no vertical plane its size ``|N|``, without
-        a sign.
+        N in N, positive along the normal to the left of increasing λ; ``|N|`` for a curve in no vertical plane.
     side_force
-        What a track that turns about the z axis carries out of its plane; 0 for one at rest.
+        The force in N out of the plane of a rotating track; 0 for a track at rest.
     tangential_acceleration
-        A, so that dW/ds = 2 A; of a dissipative model in ``W``.
+        A in m/s², so that dW/ds = 2 A; it contains ``W`` in a dissipative model.
     time_integrand
-        dt/dλ = σ/√W.
+        dt/dλ = σ/√W, in s per unit of λ.
     regularised_integrand
-        σ √((λ - λ₁)(λ₂ - λ)/W) between turning points ``lam1`` and ``lam2``: it stays finite.
+        σ √((λ - λ₁)(λ₂ - λ)/W) between the turning points ``lam1`` and ``lam2``, which is finite.
     turning_point_equation, liftoff_equation
-        W = 0 and N = 0; a contact force without a sign has no such equation.
+        W = 0 and N = 0; None for a contact force without a sign.
     liftoff_speed_squared
-        v0² of the launch for which N = 0 at λ; None where W is not closed, or the curve is straight.
+        v0² of the launch for which N = 0 at λ; None if W is not closed, or the curve is straight.
     defaults
-        Run-time parameters in order, each with its default or None; g and m come last.
+        The run-time parameters in order, each with its default or None; g and m come last.
     positive
-        Parameters that were taken to be positive, which is checked at run time.
+        Parameters that were assumed to be positive, which is checked at run time.
     at_least
-        Parameters with what they must not fall below, which is checked too.
+        Parameters with their lower bounds, which are checked at run time.
     notes
-        What was left unsimplified, and why; of a dissipative model what kind of form V² has.
+        Remarks on forms that were not simplified, and on the form of V² in a dissipative model.
     level_set
-        Of an implicit curve: F with its derivatives, tangent and curvature, in x and z.
+        F of an implicit curve with its derivatives, tangent and curvature, as functions of x and z.
     rider
-        Of a space curve that is banked: what a rider feels; else None.
+        The loads on a rider of a banked space curve; None for other curves.
     """
 
     curve: Curve
@@ -291,7 +298,7 @@ class Model:
         return found
 
     def __str__(self) -> str:
-        """A few lines for people: the closed forms that a motion follows, and the parameters with their units."""
+        """Describe the model in a few lines: its closed forms, and its parameters with their units."""
         said = {"kappa": " [1/m]", "V**2": " [m**2/s**2]", "W = V**2": " [m**2/s**2]", "A": " [m/s**2]"}
         said |= {"N": " [N]", "|N|": " [N]"}
         lines = [f"{self.title or 'Model'}: {self.curve.kind} curve, {', '.join(name for name, _ in self.force.terms)}"]

@@ -8,7 +8,7 @@ from gqm_sym.derivation.algebra.differentiate import differentiate
 from gqm_sym.emission.batches import batch_functions, bounds_batch
 from gqm_sym.emission.charts import chart_maker
 from gqm_sym.emission.context import Lowering
-from gqm_sym.emission.dissipative import speed_equation, speed_slope, static_balance
+from gqm_sym.emission.dissipative import chart_law, speed_equation, speed_slope, static_balance
 from gqm_sym.emission.ir import ExactIR, FunctionIR, ModuleIR
 from gqm_sym.emission.load_map import load_map
 from gqm_sym.emission.printer import check_emittable
@@ -195,7 +195,7 @@ class _ModelLowering(Lowering):
         """The formulas that extended precision and gradients need; of a charted curve the potential by coordinates."""
         model, loss = self.model, self.model.dissipation
         if model.curve.charted:
-            return self.exact_potential() if loss is None else ()
+            return self.exact_potential() if loss is None else chart_law(self, loss)
         bend, load = "Signed curvature", "n0 = N/m of a body at rest, so that N = m*(kappa*V**2 + n0)"
         if model.loads:
             bend, load = "Curvature", "|N|/m of a body at rest"

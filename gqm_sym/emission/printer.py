@@ -120,7 +120,7 @@ class CodePrinter(StrPrinter):  # type: ignore[misc]
 
     def _print_Function(self, expr: Expr) -> str:
         name = type(expr).__name__
-        if name == "at":  # the element of an array that the loop stands at
+        if name == "at":  # the element of an array in the current step of the loop
             array, *rows = expr.args
             return f"{array}[{', '.join([*map(str, rows), self.index])}]"
         if isinstance(expr, AppliedUndef) or name in CHARTED:  # a helper of the runtime

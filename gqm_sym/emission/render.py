@@ -44,7 +44,7 @@ _OWN = frozenset(
         *("compiler", "fabs"),
         *("op", "pass1", "place_from_ends", "range", "self", "solve", "sweep"),
         *("Pass1", "Pass1InSpace", "Pass1OfRider", "path_in_space", "rider_loads"),
-        *("Equilibrium", "ExactLaw", "SeparatedTerms", "between", "equilibria", "unknown"),
+        *("Equilibrium", "ExactChartLaw", "ExactLaw", "SeparatedTerms", "between", "equilibria", "unknown"),
     }
 )
 
@@ -187,7 +187,7 @@ def _exact_formulas(module: ModuleIR) -> list[str]:
 
 
 def _pass1(module: ModuleIR) -> str:
-    """What a load map is handed over as."""
+    """The description of a load map for the runtime."""
     if module.banked:
         return "Pass1OfRider"
     return "Pass1InSpace" if module.in_space else "Pass1"
@@ -196,7 +196,7 @@ def _pass1(module: ModuleIR) -> str:
 def _exact_class(module: ModuleIR) -> str:
     """The record that takes them."""
     if module.dissipation:
-        return "ExactLaw"
+        return "ExactChartLaw" if module.chart else "ExactLaw"
     return "ExactPotential" if module.chart else "ExactFormulas"
 
 
@@ -232,7 +232,7 @@ def _listed(names: list[str], width: int = _WIDTH) -> list[str]:
 
 
 def _as_imported(name: str) -> tuple[int, str]:
-    """The order in which names of one import stand: constants, classes, functions."""
+    """Return the key that orders the names of an import: constants, classes, functions."""
     return (0 if name.isupper() else 1 if name[0].isupper() else 2, name)
 
 
@@ -247,7 +247,7 @@ def _digest(text: str) -> str:
 
 
 def _quoted(text: str) -> str:
-    """Change any text so that it can stand inside a docstring."""
+    """Change a text so that it can be part of a docstring."""
     plain = "".join(c if c.isprintable() else " " for c in text)
     return plain.replace("\\", "\\\\").replace('"', "'")
 

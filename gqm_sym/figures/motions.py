@@ -1,6 +1,7 @@
 """Figures of one motion: its track, its speed and contact force, its portrait, and animations."""
 
 from itertools import pairwise
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,8 +15,6 @@ from gqm_sym.runtime.model import CompiledModel
 from gqm_sym.runtime.motion.motion import horizon
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
@@ -25,6 +24,9 @@ if TYPE_CHECKING:
 
 # Number of states that are drawn, and the least number between two events.
 MAX_SAMPLES, MIN_SAMPLES = 801, 33
+
+# Formats of animations, by the extension of the file.
+ANIMATED = (".gif", ".mp4")
 
 # How far a phase portrait extends beyond its motion on each side, as a fraction of the motion's range.
 PORTRAIT_MARGIN = 0.4
@@ -174,13 +176,15 @@ def animate(motion: "Motion", path: "str | Path", *, duration: float | None = No
     Raises
     ------
     InputError
-        If ``duration`` is not positive.
+        If ``duration`` is not positive, or the extension belongs to no such format.
     """
     from matplotlib.animation import FuncAnimation
 
     end = horizon(motion) if duration is None else float(duration)
     if not end > 0.0:
-        raise InputError(f"duration: must be positive, got {duration!r}")
+        raise InputError(f"animate: duration: must be positive, got {duration!r}")
+    if Path(path).suffix.lower() not in ANIMATED:
+        raise InputError(f"animate: path: must end in one of {', '.join(ANIMATED)}, got {str(path)!r}")
     frames = motion.state(np.arange(0.0, end, 1.0 / rate))
     figure = track(motion)
     (body,) = figure.axes[0].plot([], [], "o", color="black", markersize=12, zorder=9)

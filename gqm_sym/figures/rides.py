@@ -1,4 +1,4 @@
-"""The picture of a ride on a banked track: where it goes, and what riders feel."""
+"""The figure of a ride on a banked track: the track, and the loads on riders."""
 
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
@@ -41,7 +41,7 @@ def ride(motion: "Motion", *, limits: Mapping[str, Sequence[float]] | None = Non
     Raises
     ------
     InputError
-        If no roll was declared, or the limits are none.
+        If no roll was declared, or the limits are not pairs of numbers.
     """
     check_banked(motion.problem.formulas, "ride")
     levels = _levels({} if limits is None else limits)
@@ -53,7 +53,7 @@ def ride(motion: "Motion", *, limits: Mapping[str, Sequence[float]] | None = Non
     view.plot(path.track_x, path.track_y, path.track_z, color=LINE_COLOUR, linewidth=0.8)
     view.plot(path.x[:1], path.y[:1], path.z[:1], ">", color="black", label="launch")
     view.set_aspect("equal")
-    # Smaller than its place, for the layout does not know how wide the labels of three dimensions are.
+    # Smaller than its place, because the layout ignores the width of labels in three dimensions.
     view.set_box_aspect([np.ptp(ends()) for ends in (view.get_xlim, view.get_ylim, view.get_zlim)], zoom=0.85)
     view.locator_params(nbins=5)
     view.locator_params(axis="z", nbins=3)

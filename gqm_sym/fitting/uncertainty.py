@@ -118,7 +118,7 @@ def uncertainty(
     Raises
     ------
     InputError
-        If a name is unknown, a standard deviation is negative, or the data of a fit do not tell what it found.
+        If a name is unknown, a standard deviation is negative, or the data of a fit do not determine its estimates.
     SolutionError
         If the motion does not have the quantity.
 
@@ -198,7 +198,7 @@ def _read(model: CompiledModel, uncertain: Any, fixed: Mapping[str, Any]) -> tup
 
 
 def _draws(covariance: Array, samples: int, seed: int) -> Array:
-    """Return normally distributed numbers of mean zero, the same on every machine but for rounding."""
+    """Return normally distributed numbers of mean zero, which are the same on every machine up to rounding."""
     deviations = np.sqrt(np.diag(covariance))
     scale = np.where(deviations > 0.0, deviations, 1.0)
     correlation = covariance / np.outer(scale, scale)

@@ -1,4 +1,4 @@
-"""What generated modules and the runtime agree on.
+"""The interface between generated modules and the runtime.
 
 A generated module evaluates its formulas at many places in one call. Its functions reach the runtime by address, so
 the runtime is compiled once per installation and shared by every module.
@@ -123,7 +123,7 @@ PATH_ROWS, SPACE_ROWS, RIDER_ROWS, LOAD_MAP_ROWS = 5, 4, 12, 7
 
 
 class Addresses(NamedTuple):
-    """Where the addresses of one generated module's functions stand in memory; 0 for those that it has none of."""
+    """The memory cells with the addresses of one generated module's functions; 0 for missing ones."""
 
     path_and_contact_force: int
     effective_potential: int = 0
@@ -154,7 +154,7 @@ def _addresses(functions: Iterable[Any]) -> Iterator[int]:
 
 
 class BatchAddresses(NamedTuple):
-    """Where the addresses of one module's functions for many orbits at once stand in memory; 0 for missing ones."""
+    """The memory cells with the addresses of one module's functions for many orbits at once; 0 for missing ones."""
 
     potential_divdiff1: int
     potential_divdiff2: int
@@ -190,12 +190,12 @@ class BatchFunctions(NamedTuple):
 
 
 class Dissipation(NamedTuple):
-    """What compiled code takes of a dissipative model: the addresses of two functions, and of what kind its forces are.
+    """The arguments for a dissipative model: the memory cells of two functions, and the kind of its forces.
 
     Attributes
     ----------
     speed_equation, static_balance : int
-        Where the addresses of these functions stand in memory.
+        The memory cells with the addresses of these functions.
     friction : bool
         Whether the force depends on the sign of N: then a leg ends where N changes sign.
     kinked : bool
@@ -221,7 +221,7 @@ class DissipativeFunctions(NamedTuple):
     linear: bool
 
     def addresses(self) -> Dissipation:
-        """Where their addresses stand in memory, with the flags."""
+        """The memory cells with their addresses, and the flags."""
         speed_equation, static_balance = _addresses(self[:2])
         return Dissipation(speed_equation, static_balance, self.friction, self.kinked, self.linear)
 
@@ -256,6 +256,17 @@ class ExactPotential(NamedTuple):
     """The exact formula of a charted curve: ``f(op, x, z, p)`` gives U and its derivatives by x and z."""
 
     effective_potential: Callable[..., Any]
+
+
+class ExactChartLaw(NamedTuple):
+    """The formulas of a dissipative module along a charted curve, by what is known at a point of it.
+
+    ``static_normal_load`` is n0 [m/s2]: ``f(op, x, z, dxds, dzds, kappa, p)``. ``speed_slope`` is dW/ds [m/s2] with W =
+    V**2: ``f(op, x, z, dxds, dzds, kappa, w, v, nu, p)`` with v = sgn(ds/dt), nu = sgn(N).
+    """
+
+    static_normal_load: Callable[..., Any]
+    speed_slope: Callable[..., Any]
 
 
 class ExactFormulas(NamedTuple):

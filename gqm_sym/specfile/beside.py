@@ -37,7 +37,7 @@ def path_beside(name: str, folder: Path, *, wanted: str) -> Path:
     try:
         path = (folder / name).resolve(strict=True)
     except FileNotFoundError:
-        raise InputError(f"{name!r}: there is no such file beside the YAML file; check its path") from None
+        raise InputError(f"{name!r}: there is no such file in this folder; check its path") from None
     except (OSError, ValueError, RuntimeError) as error:
         raise _unreadable(name, error, wanted) from None
     if not path.is_relative_to(folder.resolve()):

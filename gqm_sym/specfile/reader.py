@@ -1,7 +1,7 @@
 """Read a curve file: text -> tree -> checked sections -> what they declare.
 
-Every stage notes what it finds wrong and goes on with the rest, so that all mistakes of a file are
-reported together. What is only a consequence of an earlier mistake is not reported.
+Every stage records its mistakes and continues, so that all mistakes of a file are reported together. Consequences of an
+earlier mistake are not reported.
 """
 
 from collections.abc import Iterable, Mapping
@@ -276,7 +276,7 @@ class _Reader:
 
 
 def _is_true(relation: Any) -> bool:
-    # A relation that SymPy cannot decide (two equal numbers in disguise) is no reason to refuse.
+    # A relation that SymPy cannot decide (two equal numbers in different forms) is accepted.
     return bool(relation is sp.true or relation is True)
 
 

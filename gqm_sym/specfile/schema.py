@@ -359,7 +359,7 @@ def model_at(path: tuple[str, ...]) -> Any:
 
 
 class _Draft07(GenerateJsonSchema):
-    """What editors understand: draft 7, without the titles that pydantic makes from names."""
+    """A schema for editors: draft 7, without the titles that pydantic makes from names."""
 
     schema_dialect = "http://json-schema.org/draft-07/schema#"
 

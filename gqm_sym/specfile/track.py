@@ -112,7 +112,7 @@ def declare_track(given: dict[str, Any], folder: Path) -> Curve:
 
 
 def _deviation(value: str, unit: str = "") -> float | str:
-    """What was written as smoothing, in metres."""
+    """Return the standard deviation for smoothing in metres."""
     try:
         if unit:
             check_unit(unit, "m")

@@ -16,7 +16,7 @@ from scipy.integrate import solve_ivp
 
 import gqm_sym as gqm
 from gqm_sym.errors import BudgetError
-from gqm_sym.runtime.legs import dissipative
+from gqm_sym.runtime.legs import driver
 
 CASES = {case["id"]: case for case in json.loads((DATA / "paper_cases.json").read_text())["cases"]}
 LOSING = [case for case in CASES if case.startswith(("example2", "table2_3", "table2_4", "table2_5"))]
@@ -436,7 +436,7 @@ def test_questions_without_an_answer(rubbed: ModuleType, dragged: ModuleType) ->
 
 def test_a_motion_of_too_many_legs(dragged: ModuleType, monkeypatch: pytest.MonkeyPatch) -> None:
     """Legs are kept: a motion that would need memory without end says how far it got; what was asked before stays."""
-    monkeypatch.setattr(dissipative, "MAX_STORED", 40)
+    monkeypatch.setattr(driver, "MAX_STORED", 40)
     motion = dragged.solve(0.3, c="1e-6")
     early = motion.lam(5.0)
     words = r"^motion: 4\d pieces of legs reach t = \d+\.\d+ only; give a shorter t_max, or ask for earlier times"

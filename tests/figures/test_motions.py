@@ -115,3 +115,5 @@ def test_animation(circle: ModuleType, tmp_path: Path) -> None:
     assert (tmp_path / "swing.gif").read_bytes().startswith(b"GIF89a")
     with pytest.raises(InputError, match="duration: must be positive"):
         motions.animate(circle.solve(1.0), tmp_path / "none.gif", duration=0)
+    with pytest.raises(InputError, match="path: must end in one of"):
+        motions.animate(circle.solve(1.0), tmp_path / "swing.foo")

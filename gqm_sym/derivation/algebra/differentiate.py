@@ -1,8 +1,7 @@
 """Exact derivatives of the expressions of the grammar, written so that they can be evaluated.
 
-SymPy's own ``diff`` writes the derivative of ``u**p`` as ``p*u**p/u``, which is 0/0 where ``u``
-vanishes, and brings in ``sign`` and ``Derivative``. Here every result stays inside the heads that
-the emitter knows.
+SymPy's own ``diff`` writes the derivative of ``u**p`` as ``p*u**p/u``, which is 0/0 where ``u`` vanishes, and brings in
+``sign`` and ``Derivative``. Here every result consists of functions that the emitter can write.
 """
 
 from collections.abc import Callable, Sequence

@@ -1,4 +1,4 @@
-"""What a force law that is not conservative does along a curve: dW/dλ = P - Q W, and what holds a body at rest.
+"""A force law that is not conservative, along a curve: dW/dλ = P - Q W, and the forces that hold a body at rest.
 
 The law is first written in what it takes of a curve, its *pieces* (σ, κ, dΘ/dλ, F·t, n₀ and dx/ds), where every force
 adds its terms; then the pieces are replaced by their closed forms. Emitted code keeps the pieces apart, as a person
@@ -37,7 +37,7 @@ class Dissipation:
         The contact force per unit mass in the pieces: what of it is there at rest, and what W is multiplied by. Of a
         curve in no vertical plane it has no sign, and where that law is not linear in W the first is all of it.
     friction, kinked, linear
-        Whether it depends on the contact force, has a kink where κ changes sign, and is linear in W.
+        Whether the law depends on the contact force, has a kink where κ changes sign, and is linear in W.
     """
 
     pieces: tuple[tuple[sp.Symbol, sp.Expr], ...]

@@ -1,4 +1,4 @@
-"""What a force law becomes along a curve: potential, static normal load and tangential acceleration."""
+"""A force law along a curve: potential, static normal load and tangential acceleration."""
 
 from dataclasses import dataclass, replace
 

@@ -1,4 +1,4 @@
-"""What a rider on a banked track feels, in closed form.
+"""The loads on a rider of a banked track, in closed form.
 
 With t × N/m = T the contact force has the component T·(t × u) along any unit vector u across the track. Riders sit
 upright along u = u₀ cos ψ + l₀ sin ψ, where l₀ is horizontal and points to the left, u₀ = t × l₀, and ψ is the roll

@@ -223,7 +223,7 @@ class SpaceChart(Chart):
 
 
 class PieceData(NamedTuple):
-    """What the pieces of a chart are made from.
+    """The data from which the pieces of a chart are made.
 
     Attributes
     ----------
@@ -382,7 +382,7 @@ def _block(
 
 
 def tangents_of(angles: Array) -> tuple[Array, Array]:
-    """Return cosines and sines, exactly 0 where an angle is a multiple of pi/2 but for its rounding."""
+    """Return cosines and sines, exactly 0 where an angle is a multiple of pi/2 up to rounding."""
     waves = np.cos(angles), np.sin(angles)
     cosines, sines = (np.where(np.abs(wave) <= ULP * np.abs(angles), 0.0, wave) for wave in waves)
     return cosines, sines

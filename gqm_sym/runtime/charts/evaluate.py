@@ -114,8 +114,8 @@ def chart_row(chart, row, s):  # type: ignore[no-untyped-def]
 def fill_lanes(_, chart, terms, places, at, out, to, first, numbers):  # type: ignore[no-untyped-def]
     """Fill a register's numbers of ``out``, from ``to`` on, with a row of the chart at the places from ``at`` on.
 
-    Lanes before ``first`` keep what they have. The powers of u stand at ``terms``; ``numbers`` are the length of all
-    laps before, the piece's middle and scale, the limit of u, and two numbers that the polynomial is added to.
+    Lanes before ``first`` keep what they have. The powers of u are stored at ``terms``; ``numbers`` are the length of
+    all laps before, the piece's middle and scale, the limit of u, and two numbers that the polynomial is added to.
     """
 
     def lower(context: Any, builder: Any, signature: Any, args: Any) -> Any:

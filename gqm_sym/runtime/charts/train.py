@@ -1,4 +1,4 @@
-"""The track of a train: behind its chart stands the chart of the mean height of a train with its middle at a place.
+"""The track of a train: its chart is followed by the chart of the mean height of a train with its middle at a place.
 
 The mean height h(s) of a train of length l is the mean of z over [s - l/2, s + l/2], so that h' and h'' are the divided
 differences of z and dz/ds over its ends. These keep all their digits however short the train is. A piece of the chart

@@ -57,7 +57,7 @@ NO_TIMES = np.empty((3, 0))
 
 
 class Integrand(NamedTuple):
-    """What the time per share of an interval depends on.
+    """The inputs of the time per share of an interval.
 
     Attributes
     ----------
@@ -402,7 +402,7 @@ def orbit_time(tape, work, p, launch, offsets, direction, nodes):  # type: ignor
 
 
 class Orbit(NamedTuple):
-    """What is known of an orbit in double-double arithmetic.
+    """The properties of an orbit in double-double arithmetic.
 
     Attributes
     ----------

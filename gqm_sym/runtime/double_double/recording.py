@@ -74,7 +74,7 @@ class BoundTape(NamedTuple):
 
     @property
     def operands(self) -> tuple[Any, ...]:
-        """What compiled code takes: the tape with the interpreter's address, the work space, the parameters."""
+        """Return the arguments of compiled code: interpreter and tape, the work space, the parameters."""
         return (interpreter.INTERPRETER.address, *self.tape), self.work, self.parameters
 
 

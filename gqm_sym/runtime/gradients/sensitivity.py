@@ -1,8 +1,8 @@
 """How states at given times depend on the launch and the parameters, however many periods have gone by.
 
 At a fixed phase angle everything changes smoothly. A time reaches a phase angle earlier or later when a variable
-changes: by the change of the time along the orbit, of the time at which the launch stands on it, and of the periods
-that have gone by. Below, ``delay`` is how much further on, in time, the body is along the changed orbit.
+changes: by the change of the time along the orbit, of the time of the launch on it, and of the elapsed periods. Below,
+``delay`` is how much further on, in time, the body is along the changed orbit.
 """
 
 from typing import Any, NamedTuple
@@ -41,7 +41,7 @@ class Sensitivity(NamedTuple):
 
 
 class _Along(NamedTuple):
-    """What changes along an orbit at fixed shares of its phase: a column for each share, a row for each variable.
+    """The changes along an orbit at fixed shares of its phase: a column for each share, a row for each variable.
 
     Attributes
     ----------
@@ -97,7 +97,7 @@ class OrbitSensitivity:
         return places
 
     def _along(self, share: Array, lam: Array, v: Array) -> _Along:
-        """What changes at shares of the phase, at which the places and velocities are known."""
+        """Return the changes at shares of the phase, at which the places and velocities are known."""
         derivatives = self._derivatives
         (rates, times), arcs = self._rates(share), self._arcs(share)[1]
         path, places = derivatives.at_places(lam), self._places(share)
@@ -119,7 +119,7 @@ class OrbitSensitivity:
         )
 
     def _at_launch(self, motion: Any, points: Any) -> _Along:
-        """What changes at the launch, whose phase angle has more digits once the period is known exactly."""
+        """Return the changes at the launch, whose phase angle has more digits once the period is known exactly."""
         phi = points.trajectory.segments[0].phi_start
         if phi not in self._launches:
             v0 = motion.direction * motion.problem.launch.v0.value

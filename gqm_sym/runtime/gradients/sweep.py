@@ -16,7 +16,7 @@ from gqm_sym.runtime.double_double.arithmetic import UNIT, add, multiply
 from gqm_sym.runtime.double_double.interpreter import BLOCK, ERROR, LOW
 from gqm_sym.runtime.double_double.nodes import trapezoidal_nodes
 from gqm_sym.runtime.gradients.evaluation import MEAN, PROGRAM, begin, evaluate_block, fill_means_of
-from gqm_sym.runtime.gradients.orbit import source_of
+from gqm_sym.runtime.gradients.formula_orbit import source_of
 from gqm_sym.runtime.gradients.programs import (
     Program,
     circulation_program,
@@ -242,7 +242,7 @@ class Launches(NamedTuple):
 
     @property
     def table(self) -> Array:
-        """What compiled code takes: the variables of each launch, then its turning points."""
+        """Return the arguments of compiled code: the variables of each launch, then its turning points."""
         return np.hstack([self.given, np.zeros((len(self.given), 1)), self.spans])
 
     @property

@@ -26,7 +26,7 @@ from gqm_sym.runtime.quadrature.trapezoid import CIRCULATION, LIBRATION
 # A `FoundEnd` as Python gets it: making a plain tuple is faster.
 END_TYPE = types.Tuple((types.int64, REAL, REAL))
 
-# `orbit_kind` of a motion that is no periodic one, or that doubles cannot decide.
+# `orbit_kind` of a motion that is not periodic, or that doubles cannot decide.
 NO_ORBIT = -1
 
 # A launch from rest may be an equilibrium if the change of the effective potential over the first step, by its slope,
@@ -44,8 +44,8 @@ CUSP_SHARE = 1e-7
 # the number of places at which the slope of the potential on the way is looked at.
 LIP_SHARE, WAY_MARKS = 1e-12, 5
 
-# Distance from a place at which ds is compared with that at the place itself, to tell whether it is a cusp; as a share
-# of the first step.
+# Distance from a place at which ds is compared with that at the place itself, to decide whether it is a cusp; as a
+# share of the first step.
 NEAR_CUSP = 1e-3
 
 # Places at which V**2 nearly vanishes that a search passes.
@@ -234,7 +234,7 @@ def _too_many_barriers(problem: Problem) -> SolutionError:
 
 
 def end_of_motion(problem: Problem, direction: int, found: tuple[int, float, float]) -> EndOfMotion:
-    """What ends the motion in one direction, by what a search found and, where needed, by extended precision."""
+    """Return the end of the motion in one direction, from a search and, where needed, from extended precision."""
     lam0, period, step = problem.lam0, problem.period, starting_step(problem)
     length = period or distance_to_end(problem, direction)
     for _ in range(MAX_BARRIERS):

@@ -21,6 +21,7 @@ from gqm_sym.runtime.interface import (
     BatchFunctions,
     CompiledFunctions,
     DissipativeFunctions,
+    ExactChartLaw,
     ExactFormulas,
     ExactLaw,
     ExactPotential,
@@ -117,7 +118,7 @@ class Formulas:
     monotone : bool
         Whether it is proved that V**2 rises or falls all the way between two neighbouring axes, and that ds vanishes
         nowhere.
-    exact : ExactFormulas, ExactPotential, ExactLaw or None
+    exact : ExactFormulas, ExactPotential, ExactLaw, ExactChartLaw or None
         The formulas over a namespace of operations; those of the forces only for a charted curve.
     chart : ChartMaker or None
         What makes the chart of a curve that has no formulas.
@@ -157,7 +158,7 @@ class Formulas:
     domain_of: Callable[..., Any] | None = None
     axes_of: Callable[..., Any] | None = None
     monotone: bool = False
-    exact: ExactFormulas | ExactLaw | ExactPotential | None = None
+    exact: ExactFormulas | ExactLaw | ExactPotential | ExactChartLaw | None = None
     chart: ChartMaker | None = None
     dissipation: DissipativeFunctions | None = None
     load_map: Emitted | None = None
@@ -234,10 +235,10 @@ class Formulas:
         return values if isinstance(values, tuple) else (values,)
 
     def separated_factors(self, p: Sequence[Array]) -> list[Array]:
-        """What stands before the parts of potential and load (`interface.SeparatedTerms`), for arrays of parameters.
+        """Return the factors of the parts of potential and load (`interface.SeparatedTerms`), for arrays of parameters.
 
-        A factor does not depend on how many others are asked for: elementary functions of NumPy may differ in their
-        last bits between single numbers and arrays, and between arrays with and without gaps.
+        A factor does not depend on the number of others that are computed with it: elementary functions of NumPy may
+        differ in their last bits between single numbers and arrays, and between arrays with and without gaps.
         """
         assert self.separated is not None
         with np.errstate(all="ignore"):

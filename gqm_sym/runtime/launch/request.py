@@ -21,7 +21,8 @@ CONTACTS = tuple(ONLY_SIGN)
 # The largest speed in m/s whose square is in the range of doubles with room for what it is multiplied by.
 MAX_SPEED = 1e150
 
-# The largest launch place on a closed curve, in laps: beyond, doubles know places to a thousandth of a lap or worse.
+# The largest launch place on a closed curve, in laps: beyond it, doubles resolve places to a thousandth of a lap or
+# worse.
 MAX_LAPS = 2.0**43
 
 
@@ -124,7 +125,7 @@ def _read_direction(given: Any) -> int:
 
 
 def check_contact(formulas: Formulas, contact: Any) -> None:
-    """Refuse what says which side of the track can push, where it is none of `CONTACTS` or there are no sides.
+    """Refuse a side of contact that is not one of `CONTACTS`, or that the curve does not have.
 
     Raises
     ------

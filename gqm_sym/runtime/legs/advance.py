@@ -46,10 +46,6 @@ from gqm_sym.runtime.legs.body import (
     V2,
     WIDTH_BEFORE,
 )
-from gqm_sym.runtime.legs.follow import follow, released
-from gqm_sym.runtime.legs.leg_breaks import CLEARANCE_SHARE, clearance
-from gqm_sym.runtime.legs.leg_equation import Forces
-from gqm_sym.runtime.legs.leg_panels import GAP_COLUMNS
 from gqm_sym.runtime.legs.leg_record import (
     AHEAD,
     BACK,
@@ -66,26 +62,17 @@ from gqm_sym.runtime.legs.leg_record import (
     TIME_FROM_END,
     TIME_FROM_START,
 )
-from gqm_sym.runtime.legs.leg_run import (
-    ASYMPTOTE,
-    FULL,
-    LEAST_V2,
-    LIFTOFF,
-    LIMIT,
-    NARROWED,
-    PAUSED,
-    SPENT,
-    TURN,
-    Route,
-    Start,
-    point_buffer,
-    sign_of_load,
-    slope_of_v2,
-)
+from gqm_sym.runtime.legs.panels.breaks import CLEARANCE_SHARE, clearance
+from gqm_sym.runtime.legs.panels.equation import Forces
+from gqm_sym.runtime.legs.panels.point import LEAST_V2, point_buffer, sign_of_load, slope_of_v2
+from gqm_sym.runtime.legs.runs.ends import ASYMPTOTE, FULL, LIFTOFF, LIMIT, NARROWED, PAUSED, SPENT, TURN
+from gqm_sym.runtime.legs.runs.follow import follow, released
+from gqm_sym.runtime.legs.runs.gaps import GAP_COLUMNS
+from gqm_sym.runtime.legs.runs.route import Route, Start
 
-# What became of a body that was to advance, beside the codes of `leg_run`; in place of TURN where it stays, and ENDING
-# has the same code where the motion ends. AT_ONCE: the track would have to pull it at once, so that it lifts off where
-# it is. LEAVES: it would leave the domain at once. BEYOND: it has left the range of doubles.
+# What became of a body that was to advance, beside the codes of `runs.ends`; in place of TURN where it stays, and
+# ENDING has the same code where the motion ends. AT_ONCE: the track would have to pull it at once, so that it lifts off
+# where it is. LEAVES: it would leave the domain at once. BEYOND: it has left the range of doubles.
 RESTS, AT_ONCE, LEAVES, BEYOND = range(10, 14)
 
 DISSIPATION = types.NamedTuple((INTEGER, INTEGER, types.boolean, types.boolean, types.boolean), Dissipation)
@@ -204,7 +191,7 @@ def leaving(dissipation, p, joints, body, place, preferred):  # type: ignore[no-
 def near_start(dissipation, p, place, direction, v2, step):  # type: ignore[no-untyped-def]
     """A distance over which the force on a body, or else V**2, is about the same, where ``step`` is too long.
 
-    Next to an equilibrium a body turns, or moves on, by a distance that no other length of the curve tells of.
+    Next to an equilibrium a body turns, or moves on, by a distance that is unrelated to other lengths of the curve.
     """
     v, point = int(direction), point_buffer()
     forces = Forces(dissipation.speed_equation, p, dissipation.friction, False, dissipation.linear, v)
@@ -235,7 +222,7 @@ def launch(dissipation, p, joints, body):  # type: ignore[no-untyped-def]
 
 @Inner
 def rests_between(dissipation, p, joints, body, place):  # type: ignore[no-untyped-def]
-    """Whether the body, which turns at a place, has come to rest on a corner there as far as times can tell.
+    """Whether the body, which turns at a place, has come to rest on a corner there within the resolution of times.
 
     Between two planes the times from turn to turn decrease geometrically, those in either direction by the same
     factor. The body is at rest if the sum of all that follow is less than a rounding of the time.
@@ -331,14 +318,14 @@ def advance(dissipation, p, joints, body, reading, record):  # type: ignore[no-u
     joints : Joints
     body : array
         The line of the body (`legs.body`), which was launched; it is as before where the record is FULL.
-    reading : leg_run.Reading
+    reading : runs.route.Reading
     record : array
         Filled in (`leg_record`).
 
     Returns
     -------
     int
-        RESTS if it comes to rest, one of the codes of `leg_run` for what ended the run, LEAVES or
+        RESTS if it comes to rest, one of the codes of `runs.ends` for what ended the run, LEAVES or
         BEYOND; SPENT if it could not be followed.
     """
     found, period = next_leg(dissipation, p, joints, body, reading, record), body[PERIOD]

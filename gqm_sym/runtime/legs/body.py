@@ -20,7 +20,7 @@ number                meaning
 PLACE, PLACE_LOW      the place, as two doubles, within one lap
 LAPS                  the whole laps before it
 DIRECTION             the sign of dlam/dt of the next leg; 0 if the body stays where it is
-CONTACT_SIGN, STEP,   as of `leg_run.Start`
+CONTACT_SIGN, STEP,   as of `runs.route.Start`
 NO_TURN_UNTIL
 FIRST_STEP            the step of a search along the curve (`launch.ends.first_step`)
 REACH                 on a curve without ends, the distance after which a run pauses

@@ -7,7 +7,7 @@ run. From b to the middle it is the same with the direction reversed. What round
 last place of all that its terms gained and lost, less what resistance has taken of that; this also changes the time.
 What drives the body and what resists it may all but cancel: the sum of their sizes is the larger one of the forces on
 bodies that move in either direction. Terms of the force on a body at rest may cancel too: how large they are follows
-from a running bound on the roundings of the module's formulas (`variations.equation.Law.force_errors`). A law that is
+from a running bound on the roundings of the module's formulas (`variations.law.FormulaLaw.force_errors`). A law that is
 not linear in V**2 has a root at the turn, of which panels that run into it may have nine digits; those that are
 followed back from it have all. By how much they disagree in the middle is by how much the turn is off.
 """
@@ -25,7 +25,25 @@ from gqm_sym.runtime.compiled.jit import Inner, entry
 from gqm_sym.runtime.compiled.registers import on_stack, uncounted
 from gqm_sym.runtime.compiled.types import REAL, VECTOR, Array
 from gqm_sym.runtime.legs.advance import DISSIPATION
-from gqm_sym.runtime.legs.leg_equation import (
+from gqm_sym.runtime.legs.leg_reading import march_of
+from gqm_sym.runtime.legs.leg_record import (
+    AHEAD,
+    BACK,
+    COLUMNS,
+    END,
+    END_LOW,
+    HEAD,
+    INHERITED,
+    NORMAL_LOAD,
+    RIGHT,
+    START,
+    START_LOW,
+    START_V2,
+    TIME_ERROR,
+    TIME_FROM_END,
+    TIME_FROM_START,
+)
+from gqm_sym.runtime.legs.panels.equation import (
     ARC_RATE,
     DS,
     EXPM1_Q,
@@ -49,26 +67,8 @@ from gqm_sym.runtime.legs.leg_equation import (
     slope_at,
     solve_panel,
 )
-from gqm_sym.runtime.legs.leg_reading import march_of
-from gqm_sym.runtime.legs.leg_record import (
-    AHEAD,
-    BACK,
-    COLUMNS,
-    END,
-    END_LOW,
-    HEAD,
-    INHERITED,
-    NORMAL_LOAD,
-    RIGHT,
-    START,
-    START_LOW,
-    START_V2,
-    TIME_ERROR,
-    TIME_FROM_END,
-    TIME_FROM_START,
-)
-from gqm_sym.runtime.legs.leg_run import LEAST_V2, point_buffer, slope_of_v2
-from gqm_sym.runtime.legs.polynomials import COUNT, SHARES, TO_COEFFICIENTS, WIDE, to_tails
+from gqm_sym.runtime.legs.panels.point import LEAST_V2, point_buffer, slope_of_v2
+from gqm_sym.runtime.legs.panels.polynomials import COUNT, SHARES, TO_COEFFICIENTS, WIDE, to_tails
 
 # Roundings of V**2, of a place and of a time, in units in the last place. Laws that are not linear in V**2 take many
 # panels to a turn, each of which rounds V**2.
@@ -110,7 +110,7 @@ class Errors(NamedTuple):
 
 
 class Half(NamedTuple):
-    """What some panels say of the motion between the place where they begin and the middle of the run.
+    """Data of some panels on the motion between the place where they begin and the middle of the run.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""What the record of a leg says: the time at a place, the place at a time, and the largest speed or contact force."""
+"""Readings of the record of a leg: the time at a place, the place at a time, and the largest speed or contact force."""
 
 from math import fabs, inf, sqrt
 
@@ -10,8 +10,6 @@ from gqm_sym.runtime.arithmetic.matrices import multiply
 from gqm_sym.runtime.compiled.jit import Inner, entry
 from gqm_sym.runtime.compiled.registers import on_stack, uncounted
 from gqm_sym.runtime.compiled.types import VECTOR, Array
-from gqm_sym.runtime.legs.leg_breaks import offset
-from gqm_sym.runtime.legs.leg_equation import March, distance, marched
 from gqm_sym.runtime.legs.leg_record import (
     AHEAD,
     BACK,
@@ -34,9 +32,10 @@ from gqm_sym.runtime.legs.leg_record import (
     TIME_FROM_START,
     WHOLE,
     Y_ROW,
-    copy,
 )
-from gqm_sym.runtime.legs.polynomials import COUNT, SHARES, TO_COEFFICIENTS, WIDE, sum_and_slope, to_coefficients
+from gqm_sym.runtime.legs.panels.breaks import offset
+from gqm_sym.runtime.legs.panels.equation import March, copy, distance, marched
+from gqm_sym.runtime.legs.panels.polynomials import COUNT, SHARES, TO_COEFFICIENTS, WIDE, sum_and_slope, to_coefficients
 
 
 def _to_legendre() -> tuple[Array, Array]:

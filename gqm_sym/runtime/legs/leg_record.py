@@ -10,7 +10,7 @@ HEADING              the sign of dlam/dt
 BEGIN, BEGIN_LOW     the time from launch at which it begins, as two doubles
 END, END_LOW         where the leg ends, as two doubles
 MIDDLE, MIDDLE_LOW   the place up to which time is counted from the start, as two doubles
-HALF_C               c/2 of the march variable (`leg_equation.March`); inf where it is the distance itself
+HALF_C               c/2 of the march variable (`panels.equation.March`); inf where it is the distance itself
 TIME_FROM_START      the time from the start to the middle
 TIME_FROM_END        the time from the middle to a turn
 CHANGE_COUNT         how often N changes sign
@@ -25,8 +25,8 @@ at the end           the places at which N changes sign, the first one last
 A panel is a row of COLUMNS numbers: at its nodes the rates of time and of arc length, Y, and the contact force per mass
 (from NORMAL_LOAD on); after each of the first three one more number, RIGHT (the march variable at its end), TIME, and
 TIME_ERROR (what the time may be wrong by); at last INHERITED (`leg_errors`). A panel that was passed by what is kept of
-the curve (`leg_run.pass_gaps`) has its nodes by distance, V for Y, no rates, and TIME_ERROR = NO_RATES; with NO_VALUES
-it has RIGHT and TIME alone.
+the curve (`runs.gaps`) has its nodes by distance, V for Y, no rates, and TIME_ERROR = NO_RATES; with NO_VALUES it has
+RIGHT and TIME alone.
 
 A row of the field of V**2 next to an equilibrium has FIELD_COLUMNS numbers: the distances from the equilibrium between
 which it holds, and the Chebyshev coefficients of V**2/d**2 and of ds/dlam there (`quadrature.equilibrium` reads them).
@@ -34,8 +34,7 @@ which it holds, and the Chebyshev coefficients of V**2/d**2 and of ds/dlam there
 
 from gqm_sym.runtime.arithmetic.doubledouble import two_sum
 from gqm_sym.runtime.compiled.jit import Inlined, Inner
-from gqm_sym.runtime.compiled.registers import copied
-from gqm_sym.runtime.legs.leg_equation import (
+from gqm_sym.runtime.legs.panels.equation import (
     ARC_RATE,
     KAPPA,
     MEAN,
@@ -44,16 +43,18 @@ from gqm_sym.runtime.legs.leg_equation import (
     TAILS,
     TIME_RATE,
     W,
+    copy,
     load_per_mass_row,
 )
-from gqm_sym.runtime.legs.polynomials import COUNT, WIDE, to_tails
+from gqm_sym.runtime.legs.panels.polynomials import COUNT, WIDE, to_tails
+from gqm_sym.runtime.legs.panels.resolution import tail_of
 
 START, START_LOW, START_V2, LAPS_BEFORE, HEADING, BEGIN, BEGIN_LOW = range(7)
 END, END_LOW, MIDDLE, MIDDLE_LOW, HALF_C, TIME_FROM_START, TIME_FROM_END, CHANGE_COUNT = range(7, 15)
 WHOLE, AHEAD, BACK, HEAD = range(15, 19)
 
-# What is read of a record (`leg_run.Reading`): the times and places between which the leg runs; the largest or smallest
-# speed or contact force, too; the time at which the body passes a place; or all that panels say.
+# What is read of a record (`runs.route.Reading`): the times and places between which the leg runs; the largest or
+# smallest speed or contact force, too; the time at which the body passes a place; or all that panels say.
 TIMES, PEAKS, PASSAGE, PANELS = range(4)
 
 COLUMNS = 4 * WIDE
@@ -61,7 +62,6 @@ RIGHT, TIME, TIME_ERROR = range(COUNT, 3 * WIDE, WIDE)
 Y_ROW, NORMAL_LOAD, INHERITED = 2 * WIDE, 3 * WIDE, 3 * WIDE + COUNT
 FIELD_COLUMNS = 2 + 2 * COUNT
 NO_RATES, NO_VALUES = -1.0, -2.0
-copy = copied(WIDE)
 
 
 @Inlined
@@ -74,12 +74,6 @@ def has_space(record, used, change_count):  # type: ignore[no-untyped-def]
 def change_at(record, k):  # type: ignore[no-untyped-def]
     """The index of the k-th change of N's sign in a record."""
     return record.size - 1 - k
-
-
-@Inlined
-def tail_of(work):  # type: ignore[no-untyped-def]
-    """The largest of the last coefficients of the row examined last."""
-    return max(abs(work[TAILS]), max(abs(work[TAILS + 1]), abs(work[TAILS + 2])))
 
 
 @Inner

@@ -40,7 +40,7 @@ SHOWN_PHASE = 8.0
 
 @dataclass(slots=True)
 class OpenEnd:
-    """How far a motion to infinity or to a pole has been computed; it is continued when more is asked for.
+    """How far a motion to infinity or to a pole has been computed; it is continued on request.
 
     Attributes
     ----------
@@ -71,8 +71,8 @@ class AperiodicMotion(Motion):
     """A motion that does not repeat: its segments follow each other, and each is passed once in each direction at most.
 
     If the track can push from one side only, the motion ends as soon as contact is lost. A motion to infinity or to a
-    pole is continued when later times or farther places are asked for; `t_end`, `legs` and `events` tell of as many
-    segments as `MAX_SEGMENTS_AHEAD` and `MAX_PANELS_AHEAD` say, whatever has been asked for before.
+    pole is continued when later times or farther places are requested; `t_end`, `legs` and `events` cover as many
+    segments as `MAX_SEGMENTS_AHEAD` and `MAX_PANELS_AHEAD` allow, whatever was requested before.
     """
 
     def __init__(self, problem: Problem, kind: MotionKind, direction: int) -> None:

@@ -33,7 +33,7 @@ BEFORE_CORNER = 1e-13
 # a share of the phase angle.
 BESIDE_JOINT = 64.0 * ULP
 
-# Values that differ by less than so many roundings are equal: the earlier one is told.
+# Values that differ by less than so many roundings count as equal, and the earlier one is returned.
 EQUAL_ROUNDINGS = 8
 
 
@@ -95,7 +95,7 @@ class Extreme(NamedTuple):
 
 
 class Quantity(NamedTuple):
-    """What is the largest or the least somewhere along a motion.
+    """A quantity with a largest or least value along a motion.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""The motion that a launch begins, and what can be asked of it."""
+"""The motion that begins with a launch, with all its answers."""
 
 from math import inf, isfinite
 from typing import TYPE_CHECKING, Any
@@ -17,7 +17,7 @@ from gqm_sym.runtime.motion.riding.loads import load_extreme
 
 
 class Motion(History, Derivatives):
-    """A motion along a curve, computed as far as it is asked for; many threads may ask at once.
+    """A motion along a curve, computed as far as required; many threads may read it at once.
 
     Attributes
     ----------
@@ -245,7 +245,7 @@ class Motion(History, Derivatives):
         return page(self)
 
     def __str__(self) -> str:
-        """A few lines for people: the kind, the launch, times and parameters."""
+        """Describe the motion in a few lines: kind, launch, times and parameters."""
         rows = summary(self)
         width = max(len(label) for label, _ in rows)
         texts = ((label, repr(value) if isinstance(value, float) else value) for label, value in rows)

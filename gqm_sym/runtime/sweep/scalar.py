@@ -77,7 +77,7 @@ PERIODIC = (HALF_PERIOD, PERIOD, TURNING_POINTS, SPANS)
 
 
 class GivenCurve(NamedTuple):
-    """What the launches of a loop share.
+    """The common data of the launches of a loop.
 
     Attributes
     ----------

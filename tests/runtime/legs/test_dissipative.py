@@ -13,7 +13,8 @@ import generated.circle_coulomb
 import generated.circle_droplet
 import gqm_sym as gqm
 from gqm_sym.errors import InputError, LaunchError, SolutionError
-from gqm_sym.runtime.legs import answers, leg_record, leg_run
+from gqm_sym.runtime.legs import answers, leg_record
+from gqm_sym.runtime.legs.runs import ends
 
 G = 9.81
 Build = Callable[..., ModuleType]
@@ -193,7 +194,7 @@ def test_a_leg_that_cannot_be_followed(slope: ModuleType, monkeypatch: pytest.Mo
 
     def lost(*arguments: Any) -> int:
         arguments[-1][:], arguments[-1][:, leg_record.END] = 0.0, 0.5
-        return leg_run.SPENT
+        return ends.SPENT
 
     motion = slope.solve(lam0=0, mu=0.1)
     monkeypatch.setattr(answers, "drive", lost)

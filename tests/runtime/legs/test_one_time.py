@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import generated.circle_drag
-from gqm_sym.runtime.legs import dissipative
+from gqm_sym.runtime.legs import dissipative, inherited
 
 
 @pytest.mark.parametrize("t", [0.0, 0.3, 1.7, 4.9])
@@ -32,14 +32,14 @@ def test_a_place_needs_no_bounds(monkeypatch: pytest.MonkeyPatch) -> None:
     """Errors are carried from leg to leg when a state is asked for, and are those of a motion that was asked first."""
     known = generated.circle_drag.solve(1.0, 0).state(3.0)
     motion, count = generated.circle_drag.solve(1.0, 0), 0
-    real = dissipative.carry
+    real = inherited.carry
 
     def carried(*given: Any) -> Any:
         nonlocal count
         count += 1
         return real(*given)
 
-    monkeypatch.setattr(dissipative, "carry", carried)
+    monkeypatch.setattr(inherited, "carry", carried)
     places = motion.lam(np.linspace(0.0, 3.0, 50))
     assert (motion.lam(3.0), count) == (places[-1], 0)
     assert motion.state(3.0) == known

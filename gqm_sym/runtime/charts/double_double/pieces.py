@@ -330,6 +330,11 @@ def sample_places() -> Array:
     return _tables()[0]
 
 
+def chebyshev_fit() -> Array:
+    """Return the matrix that takes values at these points to Chebyshev coefficients, as two doubles each."""
+    return _tables()[1]
+
+
 # The coordinates of one piece at the Chebyshev points as an array (2, 2, NODES), and a bound on their errors; and its
 # type in compiled code.
 Samples = tuple[Array, float]

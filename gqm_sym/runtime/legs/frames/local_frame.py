@@ -1,9 +1,9 @@
 """Small motions about an equilibrium e that is not at 0: places as distances from e, and the force on them.
 
-Doubles know a place next to e to a rounding of e, and the force there to a rounding of the terms that cancel at e. So
-the force on a body at rest, P(lam), is fitted by a polynomial ``C(d)`` with ``C(0) = 0``, where d is the distance from
-e. Functions of the interface then serve the legs with distances for places: P becomes
-``C(d) + (P(e + d, W) - P(e + d, 0))``, and all else, which does not vanish at e, is evaluated at e + d.
+Doubles resolve a place next to e to a rounding of e, and the force there to a rounding of the terms that cancel at e.
+So the force on a body at rest, P(lam), is fitted by a polynomial ``C(d)`` with ``C(0) = 0``, where d is the distance
+from e. Functions of the interface then serve the legs with distances for places: P becomes ``C(d) + (P(e + d, W) - P(e
++ d, 0))``, and all else, which does not vanish at e, is evaluated at e + d.
 
 Swings about a stable equilibrium stay so near to it. From an unstable one a launched body departs, the later the nearer
 it was, and leaves the frame: there the distance at launch is taken in extended precision (`refined`).
@@ -29,10 +29,10 @@ from gqm_sym.runtime.interface import INTERFACE, SPEED_EQUATION, STATIC_BALANCE,
 from gqm_sym.runtime.legs.advance import DISSIPATION
 from gqm_sym.runtime.legs.body import FIRST_STEP, HIGH, LOW, V2
 from gqm_sym.runtime.legs.body import PLACE as BODY_PLACE
-from gqm_sym.runtime.legs.leg_equation import Forces
 from gqm_sym.runtime.legs.leg_record import CHANGE_COUNT, END, MIDDLE, START, change_at
-from gqm_sym.runtime.legs.leg_run import LEAST_V2, point_buffer, slope_of_v2
-from gqm_sym.runtime.legs.polynomials import WIDE
+from gqm_sym.runtime.legs.panels.equation import Forces
+from gqm_sym.runtime.legs.panels.point import LEAST_V2, point_buffer, slope_of_v2
+from gqm_sym.runtime.legs.panels.polynomials import WIDE
 from gqm_sym.runtime.multiprecision.exact_problem import GUARD_DIGITS, PRECISIONS
 
 # A motion is small if it is below these shares of the distance of e from 0, and of the range of the polynomial. Wider
@@ -52,8 +52,8 @@ MAX_SECANTS, SECANT_SHARE = 40, 2.0**-30
 # The force without speed may differ between the two directions by this share: there is no friction.
 FRICTIONLESS_SHARE = 1e-12
 
-# What stands in front of the module's parameters: the address of its speed equation, e as two doubles, the range, and
-# the coefficients of C(d)/d by powers of d over the range.
+# The numbers before the module's parameters: the address of its speed equation, e as two doubles, the range, and the
+# coefficients of C(d)/d by powers of d over the range.
 ADDRESS, PLACE, PLACE_LOW, RANGE, TERMS = range(5)
 OWN = TERMS + DEGREE
 
@@ -216,7 +216,7 @@ def frame_near(dissipation: Dissipation, p: Array, start: tuple[float, float, fl
 
 
 def sharpened(frame: Frame, at_rest: Callable[[Array, Array], tuple[Array, Array]]) -> Frame:
-    """The frame with equilibrium and force from double-double arithmetic: doubles know them to a rounding of e.
+    """Return the frame with equilibrium and force from double-double arithmetic, more accurate than e in doubles.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What happens along a motion: its legs and its events."""
+"""The legs and the events of a motion."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -21,7 +21,7 @@ from gqm_sym.runtime.motion.trajectory import TimedSegment
 
 
 class History(Positions):
-    """A motion of which one asks what happens along it."""
+    """The events and legs of a motion."""
 
     @property
     def _internal_ends(self) -> tuple[str, ...]:

@@ -25,7 +25,7 @@ from gqm_sym.runtime.motion.trajectory import PhasePoints, TimedSegment, Traject
 
 
 class Positions(ABC):
-    """A motion of which one asks where the body is.
+    """The places and states of a motion.
 
     Attributes
     ----------

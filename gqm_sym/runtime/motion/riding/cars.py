@@ -54,7 +54,7 @@ def cars(motion: Any, t: Any) -> Cars:
     problem = motion.problem
     formulas, f, track = problem.formulas, problem.functions, problem.formulas.chart
     if not isinstance(track, TrackOfTrain):
-        raise InputError("cars: this body is no train; add Train(length=..., cars=...) to its forces")
+        raise InputError("cars: this body is not a train; add Train(length=..., cars=...) to its forces")
     state, values = motion.state(t), problem.p.values.tolist()
     length, gravity = (float(number) for number in track.numbers(FLOATS, values))
     mass, count = values[list(formulas.parameters).index("m")], track.cars

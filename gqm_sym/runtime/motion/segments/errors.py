@@ -74,7 +74,7 @@ def _end_errors(segment: Segment) -> tuple[float, float]:
     f = segment.functions
     if segment.kind == FROM_TURN:
         return error, 0.0
-    # Q at the ends, but for a factor.
+    # Q at the ends, up to a factor.
     ends = np.array([segment.a, segment.b])
     steepness, of_chart = np.abs(potential_at(f.addresses, f.p, ends)[1]), 0.0
     errors = error * np.divide(steepness.min(), steepness, out=np.ones(2), where=steepness > 0.0)

@@ -82,7 +82,7 @@ class Segment:
         Its panels, if they were computed in extended precision or with a leg.
     speed_series : (float, array), optional
         For panels computed with a leg, the last value of the time-like variable and the Legendre coefficients of Y
-        (`legs.leg_equation`).
+        (`legs.panels.equation`).
     known_duration : float, optional
         Its duration in s, if doubles have given that accurately; panels are then computed when they are first needed.
     is_lazy : bool
@@ -269,7 +269,7 @@ class Segment:
         return self._exact_offsets(place, low)
 
     def _offsets_in_doubles(self, place: float, low: float = 0.0) -> tuple[float, float]:
-        """`offsets` from the ends as doubles know them."""
+        """`offsets` from the ends in doubles."""
         return (place - self.a) + (low - self.low_parts[0]), (self.b - place) + (self.low_parts[1] - low)
 
     @property

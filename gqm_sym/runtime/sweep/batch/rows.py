@@ -78,7 +78,7 @@ class Orbits(NamedTuple):
 
 
 class Scratch(NamedTuple):
-    """What a batch needs while it is worked on.
+    """The work space of a batch.
 
     Attributes
     ----------

@@ -77,7 +77,7 @@ MAX_PARTS = 4
 
 
 class Source(NamedTuple):
-    """What a table is made from.
+    """The functions from which a table is made.
 
     Attributes
     ----------

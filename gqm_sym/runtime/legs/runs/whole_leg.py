@@ -3,8 +3,8 @@
 V**2 is smooth along a leg; only its root is not. Let the leg have the width h, and let y be the share of it behind the
 body: ``W = h y (1 - y) C`` with a smooth C > 0, and with ``y = sin(phi/2)**2`` the time is the integral of
 ``f = ds sqrt(h/C)`` over phi, which Gauss-Chebyshev quadrature gives from the nodes. C is computed from running means
-of exp(q) P (`leg_equation`) from the nearer turn, so that nothing is subtracted. The leg ends where the mean over all
-of it vanishes, which Newton's method finds.
+of exp(q) P (`panels.equation`) from the nearer turn, so that nothing is subtracted. The leg ends where the mean over
+all of it vanishes, which Newton's method finds.
 """
 
 from math import fabs, fsum, pi, sin, sqrt
@@ -16,8 +16,21 @@ from gqm_sym.runtime.arithmetic.matrices import multiply
 from gqm_sym.runtime.compiled.jit import Inner
 from gqm_sym.runtime.compiled.registers import over_rows
 from gqm_sym.runtime.compiled.types import Array
-from gqm_sym.runtime.legs.leg_breaks import CLEARANCE_SHARE, located, offset, span_before, within
-from gqm_sym.runtime.legs.leg_equation import (
+from gqm_sym.runtime.legs.leg_record import (
+    COLUMNS,
+    HEAD,
+    NORMAL_LOAD,
+    PANELS,
+    PASSAGE,
+    RIGHT,
+    TIME,
+    TIME_ERROR,
+    WHOLE,
+    Y_ROW,
+    has_space,
+)
+from gqm_sym.runtime.legs.panels.breaks import CLEARANCE_SHARE, located, offset, span_before, within
+from gqm_sym.runtime.legs.panels.equation import (
     ARC_RATE,
     DS,
     EXPM1_Q,
@@ -37,6 +50,7 @@ from gqm_sym.runtime.legs.leg_equation import (
     Panel,
     W,
     begin_panel,
+    copy,
     damped_row,
     fill_force,
     linear_row,
@@ -46,7 +60,9 @@ from gqm_sym.runtime.legs.leg_equation import (
     set_nodes,
     time_rate_row,
 )
-from gqm_sym.runtime.legs.leg_panels import (
+from gqm_sym.runtime.legs.panels.point import ZERO_TOLERANCE, point_buffer, sign_of_load
+from gqm_sym.runtime.legs.panels.polynomials import BITS, COUNT, MEANS, SHARES, TO_COEFFICIENTS, WIDE, size_of, to_means
+from gqm_sym.runtime.legs.panels.resolution import (
     CANCELLATION_NOISE,
     are_resolved,
     examine,
@@ -55,24 +71,9 @@ from gqm_sym.runtime.legs.leg_panels import (
     kink,
     set_sizes,
     size_at,
-)
-from gqm_sym.runtime.legs.leg_record import (
-    COLUMNS,
-    HEAD,
-    NORMAL_LOAD,
-    PANELS,
-    PASSAGE,
-    RIGHT,
-    TIME,
-    TIME_ERROR,
-    WHOLE,
-    Y_ROW,
-    copy,
-    has_space,
     tail_of,
 )
-from gqm_sym.runtime.legs.leg_run import GOES_ON, TURN, ZERO_TOLERANCE, End, point_buffer, sign_of_load
-from gqm_sym.runtime.legs.polynomials import BITS, COUNT, MEANS, SHARES, TO_COEFFICIENTS, WIDE, size_of, to_means
+from gqm_sym.runtime.legs.runs.ends import GOES_ON, TURN, End
 
 # The first width to try where none is known, in units of the first panel's.
 FIRST_WIDTH = 2.0
@@ -318,7 +319,7 @@ def enter_rows(record, work):  # type: ignore[no-untyped-def]
 def run_whole(forces, start, route, off, record):  # type: ignore[no-untyped-def]
     """Follow the body from one turn to the next, if that takes one polynomial only.
 
-    The parameters are those of `leg_run.run`.
+    The parameters are those of `runs.run.run`.
 
     Returns
     -------

@@ -19,10 +19,12 @@ import numpy as np
 from gqm_sym.runtime.compiled.calls import call_speed_equation
 from gqm_sym.runtime.compiled.intrinsics import fma, polynomial
 from gqm_sym.runtime.compiled.jit import Inner
-from gqm_sym.runtime.compiled.registers import on_stack, over_rows
+from gqm_sym.runtime.compiled.registers import copied, on_stack, over_rows
 from gqm_sym.runtime.compiled.types import Array
-from gqm_sym.runtime.legs.leg_breaks import within
-from gqm_sym.runtime.legs.polynomials import COUNT, ENDS_BY_NODE, WIDE, size_of, to_graded_means, to_means
+from gqm_sym.runtime.legs.panels.breaks import within
+from gqm_sym.runtime.legs.panels.polynomials import COUNT, ENDS_BY_NODE, WIDE, size_of, to_graded_means, to_means
+
+copy = copied(WIDE)
 
 # The largest q over a panel: resistance alone may not change V**2 by more than the factor exp(MAX_Q).
 MAX_Q = 2.0
@@ -145,7 +147,7 @@ class Panel(NamedTuple):
     contact_sign : int
         The sign of the normal force N on the panel; 0 where it is not known.
     span : (float, float)
-        The places between which the curve may be evaluated (`leg_breaks`).
+        The places between which the curve may be evaluated (`panels.breaks`).
     """
 
     left: float

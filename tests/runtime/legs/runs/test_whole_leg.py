@@ -10,8 +10,8 @@ import pytest
 from mpmath import mp, mpf
 
 import generated.circle_coulomb
-from gqm_sym.runtime.legs import whole_leg
-from gqm_sym.runtime.legs.polynomials import COUNT, SHARES, TO_COEFFICIENTS
+from gqm_sym.runtime.legs.panels.polynomials import COUNT, SHARES, TO_COEFFICIENTS
+from gqm_sym.runtime.legs.runs import whole_leg
 
 # Tables are rounded numbers, and so are sums with them.
 TABLE = 2e-15

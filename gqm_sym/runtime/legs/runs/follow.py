@@ -1,6 +1,6 @@
 """V**2 along the legs of a dissipative motion, panel after panel: to where they end, and back from where they turn.
 
-A leg is run once from its start (`leg_run`), and time is counted on the way as long as V**2 is large. If the leg ends
+A leg is run once from its start (`run`), and time is counted on the way as long as V**2 is large. If the leg ends
 at a turn, time is counted from there back to where it was left off: next to a turn V**2 is a small difference when it
 is computed from the start, but has all its digits when it is computed from the turn. A leg that tends to an equilibrium
 is followed back from there as a field of polynomials (`leg_record`). Before all this, a leg that begins at a turn is
@@ -13,20 +13,6 @@ from typing import NamedTuple
 from gqm_sym.runtime.arithmetic.clenshaw import chebyshev_sum
 from gqm_sym.runtime.compiled.calls import call_static_balance
 from gqm_sym.runtime.compiled.jit import Inner
-from gqm_sym.runtime.legs.leg_breaks import clearance, span_before, within
-from gqm_sym.runtime.legs.leg_equation import (
-    DS,
-    OFFSET,
-    SERIES,
-    W_FACTOR,
-    Forces,
-    March,
-    Panel,
-    W,
-    panel_buffer,
-    set_nodes,
-)
-from gqm_sym.runtime.legs.leg_panels import ALWAYS, MAX_PANELS, NEVER, PanelRequest, next_panel, next_stop
 from gqm_sym.runtime.legs.leg_record import (
     AHEAD,
     BACK,
@@ -43,15 +29,63 @@ from gqm_sym.runtime.legs.leg_record import (
     TIME_FROM_START,
     WHOLE,
     add_panel,
+    change_at,
     has_space,
     total_time,
 )
-from gqm_sym.runtime.legs.leg_run import ASYMPTOTE, FULL, SLOWED, SPENT, TURN, Start, point_buffer, run
-from gqm_sym.runtime.legs.polynomials import COUNT, to_coefficients
-from gqm_sym.runtime.legs.whole_leg import run_whole
+from gqm_sym.runtime.legs.panels.breaks import clearance, offset, span_before, within
+from gqm_sym.runtime.legs.panels.equation import (
+    DS,
+    OFFSET,
+    SERIES,
+    W_FACTOR,
+    Forces,
+    March,
+    Panel,
+    W,
+    panel_buffer,
+    set_nodes,
+)
+from gqm_sym.runtime.legs.panels.point import point_buffer
+from gqm_sym.runtime.legs.panels.polynomials import COUNT, to_coefficients
+from gqm_sym.runtime.legs.panels.widest import ALWAYS, MAX_PANELS, NEVER, PanelRequest, next_panel
+from gqm_sym.runtime.legs.runs.ends import ASYMPTOTE, FULL, SLOWED, SPENT, TURN
+from gqm_sym.runtime.legs.runs.route import Start
+from gqm_sym.runtime.legs.runs.run import run
+from gqm_sym.runtime.legs.runs.whole_leg import run_whole
 
 # Why a leg was not followed back.
 NO_SPACE, LOST = -1, -2
+
+
+@Inner
+def next_stop(march, passed, length_back, record, breaks, remaining):  # type: ignore[no-untyped-def]
+    """On the way back, the distance at which the next panel must end.
+
+    Parameters
+    ----------
+    passed, length_back : float
+        The distance that was followed back so far, and that to follow.
+    remaining : (int, int, int)
+        The index of the next change of N's sign, that of the next break, and the sign of N.
+
+    Returns
+    -------
+    stop : float
+    remaining : (int, int, int)
+    """
+    change, upcoming, contact_sign = remaining
+    origin, u, stop = march.origin, march.direction, length_back
+    # Distances are compared, because the distance to a stop was given as such: its place may be a rounding farther.
+    while change >= 0 and offset(record[change_at(record, change)], origin, u) <= passed:
+        change, contact_sign = change - 1, -contact_sign
+    while upcoming >= 0 and offset(breaks[upcoming], origin, u) <= passed:
+        upcoming -= 1
+    if change >= 0:
+        stop = min(stop, offset(record[change_at(record, change)], origin, u))
+    if upcoming >= 0:
+        stop = min(stop, offset(breaks[upcoming], origin, u))
+    return stop, (change, upcoming, contact_sign)
 
 
 @Inner
@@ -95,10 +129,10 @@ def approach(forces, end, breaks, off, record, used):  # type: ignore[no-untyped
     Parameters
     ----------
     forces : Forces
-    end : leg_run.End
+    end : runs.ends.End
         How the leg ends.
     breaks, off
-        As of `leg_run.run`.
+        As of `runs.run.run`.
     record, used
         The field is entered in the record after the numbers that are used already.
 
@@ -189,12 +223,12 @@ def run_forwards(forces, start, route, off, record):  # type: ignore[no-untyped-
 
 
 class Followed(NamedTuple):
-    """What became of a leg that was followed; the rest of it is in the record.
+    """The outcome of a leg that was followed; its other data are in the record.
 
     Attributes
     ----------
     what, contact_sign : int
-        As of `leg_run.End`.
+        As of `runs.ends.End`.
     direction : int
         At a turn, the one that `released` finds; otherwise that of the motion.
     could_stay : bool
@@ -202,7 +236,7 @@ class Followed(NamedTuple):
     is_whole : bool
         Whether the leg was one polynomial.
     step, no_turn_until, v2 : float
-        As of `leg_run.End`.
+        As of `runs.ends.End`.
     """
 
     what: int

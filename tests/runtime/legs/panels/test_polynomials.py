@@ -12,10 +12,9 @@ from numpy.polynomial import chebyshev, legendre
 
 import generated.cubic_coulomb as cubic_coulomb
 from gqm_sym.runtime.compiled.registers import LANES, copied, on_stack, over_rows, uncounted
-from gqm_sym.runtime.legs import dissipative
-from gqm_sym.runtime.legs.leg_panels import DECREASE, DEGREES, MAX_GROWTH, SAFETY_FACTOR, growth, growth_towards
+from gqm_sym.runtime.legs import driver
 from gqm_sym.runtime.legs.leg_reading import INTEGRAL_BY_NODE, PLAIN_BY_NODE
-from gqm_sym.runtime.legs.polynomials import (
+from gqm_sym.runtime.legs.panels.polynomials import (
     COUNT,
     GRADED_MEANS,
     MEANS,
@@ -27,6 +26,7 @@ from gqm_sym.runtime.legs.polynomials import (
     size_of,
     to_means,
 )
+from gqm_sym.runtime.legs.panels.resolution import DECREASE, DEGREES, MAX_GROWTH, SAFETY_FACTOR, growth, growth_towards
 
 # Roundings of as many products, of size 1.
 TABLE = 1e-15
@@ -176,7 +176,7 @@ def test_a_record_that_is_too_short(monkeypatch: pytest.MonkeyPatch) -> None:
     """A leg of more panels than a record has room for is followed once more, to the same digits."""
     times = np.linspace(0.0, 3.0, 40)
     expected = cubic_coulomb.solve(-1.0, 6.2088).lam(times)
-    monkeypatch.setattr(dissipative, "FEW_PANELS", 1)
+    monkeypatch.setattr(driver, "FEW_PANELS", 1)
     assert np.array_equal(cubic_coulomb.solve(-1.0, 6.2088).lam(times), expected)
 
 

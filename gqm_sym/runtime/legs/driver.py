@@ -1,0 +1,398 @@
+"""A body with losses, driven leg after leg along the curve, or by its distance from an equilibrium close by."""
+
+from contextlib import suppress
+from math import inf, nan
+
+import numpy as np
+
+from gqm_sym.errors import BudgetError, LaunchError, SolutionError
+from gqm_sym.literals.numbers import Number
+from gqm_sym.runtime.arithmetic.doubledouble import ULP
+from gqm_sym.runtime.compiled.types import Array
+from gqm_sym.runtime.interface import Dissipation, ExactLaw
+from gqm_sym.runtime.launch.ends import NEAR_CUSP, domain_end, is_cusp, leaving_at_once, starting_step
+from gqm_sym.runtime.launch.problem import Problem
+from gqm_sym.runtime.launch.request import ONLY_SIGN
+from gqm_sym.runtime.launch.speed import path_and_force_at
+from gqm_sym.runtime.legs.advance import AT_ONCE, BEYOND, CREEPING_SHARE, LEAVES, RESTS
+from gqm_sym.runtime.legs.answers import (
+    FIRST_LEGS,
+    LEAST_SWING,
+    LEGS,
+    MAX_PAUSES,
+    MAX_TURNS,
+    NEARBY,
+    RUN_AGAIN,
+    Track,
+    drive_along,
+)
+from gqm_sym.runtime.legs.body import (
+    DIRECTION,
+    ELAPSED,
+    ENDING,
+    FIRST_STEP,
+    HIGH,
+    LAM0,
+    LAPS,
+    LOW,
+    MAY_REST,
+    PANEL_COUNT,
+    PAUSES,
+    PERIOD,
+    PLACE,
+    PLACE_LOW,
+    REACH,
+    STATUS,
+    STEP,
+    TURNS,
+    V2,
+    VALUE,
+    launched,
+)
+from gqm_sym.runtime.legs.frames.local_frame import PLACE as PLACE_IN_FRAME
+from gqm_sym.runtime.legs.frames.local_frame import SMALL_SHARE, Frame, frame_near, is_small, refined, sharpened
+from gqm_sym.runtime.legs.leg_record import COLUMNS, END, END_LOW, HEADING, MIDDLE, MIDDLE_LOW, START
+from gqm_sym.runtime.legs.leg_segments import Run
+from gqm_sym.runtime.legs.runs.ends import ASYMPTOTE, FULL, LIFTOFF, LIMIT, NARROWED, PAUSED, SLOWED, SPENT, TURN
+from gqm_sym.runtime.legs.variations.law import FormulaLaw
+from gqm_sym.runtime.multiprecision.exact_problem import NOWHERE
+
+# The most panels of legs that are stored; each takes some kilobytes.
+MAX_STORED = 250_000
+
+# How many panels a record has space for beside one for each break; a leg with more is followed again with a larger
+# record. How many legs are followed in one call of a motion that has a horizon, whose legs are all needed.
+FEW_PANELS, LEGS_PER_CALL = 12, 8
+
+# A swing about an equilibrium has died away when it is below this share of the last digit of its place, or below
+# `LEAST_SWING`.
+LAST_DIGIT = ULP / 64.0
+
+# A body that creeps towards an equilibrium, and for which no panel is narrow enough any more, is no farther from it
+# than this share of its place and of the length of the leg.
+NEAR_EQUILIBRIUM = 1e-13
+
+# How near to an unstable equilibrium a body may be launched from rest, as a share of its place, where what resists the
+# body is not a product of a factor and V**2, but a difference of forces that agree to a rounding.
+NEAREST_SHARE = 1e-20
+
+# Legs come to within some 1e-8 of a cusp, where roundings of the place hide how ds/dlam decreases; ds is then no more
+# than this share of what it is a thousandth of the first step away.
+CUSP_SHARE = 1e-2
+
+# What ends a leg along a chart that may have been passed by what is kept of the curve (`answers.follow_leg`).
+PASSED = TURN, RESTS, LIMIT
+
+# The names of what ends a run, where the code alone says it.
+END_NAMES = {
+    TURN: "turn",
+    RESTS: "rest",
+    LIFTOFF: "liftoff",
+    AT_ONCE: "liftoff",
+    ASYMPTOTE: "asymptote",
+}
+
+# Curves with formulas are smooth, and so is any curve next to an equilibrium (`Frame`).
+SMOOTH = Track(NOWHERE, NOWHERE, NOWHERE, NOWHERE)
+
+
+def _loss(problem: Problem) -> Dissipation:
+    """The dissipation of the model."""
+    loss = problem.functions.dissipation
+    assert loss is not None
+    return loss
+
+
+def _track(problem: Problem) -> Track:
+    """The curve of a motion, with all places where it, or its chart, is not smooth."""
+    f = problem.functions
+    return Track(f.chart, f.joints, f.corners, f.drops(ONLY_SIGN[problem.launch.contact])) if f.chart.size else SMOOTH
+
+
+class Driver:
+    """A body that is driven by some more legs at each request.
+
+    Parameters
+    ----------
+    problem : Problem
+        The launch.
+    horizon : float
+        The time in s up to which all legs are needed; infinite if there is none.
+
+    Attributes
+    ----------
+    problem : Problem
+    dissipation : Dissipation
+        The forces on the body.
+    track : Track
+        The curve.
+    runs : list of Run
+        The runs so far that nobody has taken from here.
+    body : array
+        The lines of the body (`legs.body`); the first one is where it is.
+    at : list of float
+        That line where the curve is followed by its parameter; empty before the first leg.
+    ending : str
+        The name of what ended the motion, or nothing.
+    last_swing : float
+        How far from the equilibrium the body turned last, once its swing has died away.
+    force_error : float
+        By what share the force next to the unstable equilibrium of a frame may be wrong.
+    launch_error : float or None
+        What its distance from there may be wrong by at launch.
+    """
+
+    ending = ""
+    last_swing = 0.0
+    force_error = 0.0
+    launch_error: float | None = None
+
+    def __init__(self, problem: Problem, horizon: float) -> None:
+        launch = problem.launch
+        self.problem, self.dissipation, self.track = problem, _loss(problem), _track(problem)
+        self.runs: list[Run] = []
+        self.at: list[float] = []
+        self._horizon = horizon
+        # If legs are passed by what is kept of the curve, and may have to be followed again.
+        self._passes = passes = self.track.is_kept(self.dissipation)
+        self._space = FEW_PANELS + (0 if passes else self.track.breaks.size)
+        ends, asked = problem.domain.numbers[:3], (ONLY_SIGN[launch.contact], horizon, nan)
+        given = (launch.lam0.value, *ends, launch.direction, *asked, problem.w0)
+        self.body = launched((given,), LEGS_PER_CALL if passes else 0)
+        self._frame: Frame | None = None
+
+    @property
+    def reached(self) -> float:
+        """The place up to which the body has been driven."""
+        place: float = self.at[PLACE] + self.at[LAPS] * self.problem.period
+        return place
+
+    @property
+    def elapsed(self) -> float:
+        """The time in s up to which the body has been driven."""
+        elapsed: float = self.at[ELAPSED]
+        return elapsed
+
+    @property
+    def goes_on_for_ever(self) -> bool:
+        """Whether the body has done so much that an end of the motion is not looked for any further."""
+        turns, pauses = self.at[TURNS], self.at[PAUSES]
+        return bool(pauses >= MAX_PAUSES or turns > MAX_TURNS or (turns and not self.at[MAY_REST]))
+
+    def go_on(self) -> None:
+        """Follow the body to its next turn, to the end of the motion, or as far as one run goes."""
+        if self.at and self.at[PANEL_COUNT] >= MAX_STORED:
+            raise BudgetError(
+                f"motion: {self.at[PANEL_COUNT]:.0f} pieces of legs reach t = {self.elapsed!r} only; "
+                "give a shorter t_max, or ask for earlier times and nearer places"
+            )
+        what, records = self._followed()
+        frame, at = self._frame, self.body[0].tolist()
+        before = self.body[1 : 1 + len(records)].copy() if self._passes and frame is None else [None] * len(records)
+        if not at[DIRECTION] and not at[TURNS]:
+            return  # the body stays where it is
+        self.at, record = at, records[-1]
+        if len(records) > 1:
+            earlier = zip(records[:-1], before[:-1], strict=True)
+            self.runs += [Run(leg, TURN, END_NAMES[TURN], None, line) for leg, line in earlier]
+        if what == TURN and frame is None and not at[STATUS]:
+            self.runs.append(Run(record, TURN, END_NAMES[TURN], None, before[-1]))
+        else:
+            self._end_run(what, record, before[-1])
+
+    def with_panels(self, run: Run) -> list[Run]:
+        """A run in parts with panels; the run alone if these are known."""
+        if run.before is None:
+            return [run]
+        parts: list[Array] = []
+        space, body = FEW_PANELS + self.track.breaks.size, run.before.reshape(1, -1).copy()
+        p = self.problem.functions.p.reshape(1, -1)
+        for _ in range(MAX_PAUSES):
+            record = np.empty((1, space * COLUMNS))
+            what = drive_along(self.track, self.dissipation, p, RUN_AGAIN, body, record)
+            if what in PASSED:
+                return run.with_panels([*parts, record[0]], self._horizon)
+            if what == FULL:
+                space *= 4
+            elif what in (PAUSED, SLOWED):
+                parts.append(record[0])
+            else:
+                break
+        raise self._lost(record[0])
+
+    def _end_run(self, what: int, record: Array, before: Array | None) -> None:
+        """Note a run that another follows in another way, or none."""
+        problem, frame = self.problem, self._frame
+        if frame is not None:
+            frame.move(record, 1)
+            self.at[PLACE] = float(record[END])
+        heading, leaves_frame = int(record[HEADING]), frame is not None and what == LIMIT
+        if leaves_frame:
+            self._leave_frame(record)
+        self._settle(what, float(record[START]), float(record[END]))
+        if what == LEAVES:
+            raise leaving_at_once(problem, heading, "end of the domain")
+        name = "" if leaves_frame else self._end_name(what, record, heading)
+        if name == "cusp" and what == NARROWED:
+            record[[MIDDLE, MIDDLE_LOW]] = record[[END, END_LOW]] = self._cusp_ahead(record, heading), 0.0
+        # At a cusp dW/dlam vanishes, so that its rounding, too, is large against it.
+        if what == SPENT or (what == NARROWED and name != "cusp" and self._force_cancels(record)):
+            raise self._lost(record)
+        self.runs.append(Run(record, what, name, frame, before if what in PASSED else None))
+        if self.at[ENDING]:
+            self.ending = name
+        if what == BEYOND:
+            raise SolutionError(
+                f"the motion leaves the range of doubles at {problem.formulas.parameter} = {self.at[PLACE]!r}; "
+                "give a shorter t_max"
+            )
+
+    def _followed(self) -> tuple[int, Array]:
+        """Return the end of the last of the next legs (`advance`), and the records of all; one if the body stays."""
+        legs, question = (LEGS_PER_CALL if self._horizon < inf else 1, LEGS) if self.at else (1, FIRST_LEGS)
+        while True:
+            records = np.empty((legs if self._frame is None else 1, self._space * COLUMNS))
+            what = self._drive(question, self.body, records)
+            count = int(self.body[0, VALUE])
+            if what == NEARBY:
+                self._launch_nearby()
+                question = LEGS
+            elif what != FULL or count:
+                return (what if what != FULL else TURN), records[: max(count, 1)]
+            else:
+                legs, self._space = 1, 4 * self._space
+
+    def _drive(self, question: int, bodies: Array, records: Array) -> int:
+        """Drive the body along the curve, or by its distance from an equilibrium (`answers.drive`)."""
+        frame = self._frame
+        if frame is not None:
+            return drive_along(SMOOTH, frame.dissipation, frame.p.reshape(1, -1), question, bodies, records)
+        p = self.problem.functions.p.reshape(1, -1)
+        return drive_along(self.track, self.dissipation, p, question, bodies, records)
+
+    def _settle(self, what: int, start: float, end: float) -> None:
+        """Look whether a run has come so close to an equilibrium that the motion ends there, or goes on in a frame."""
+        in_frame, linear = self._frame is not None, self.dissipation.linear
+        if what in (TURN, PAUSED) and self._has_died_away(start, end):
+            self.ending = "asymptote"
+        elif what == ASYMPTOTE and not linear:
+            self.last_swing = NEAR_EQUILIBRIUM * max(abs(end), abs(end - start))
+        elif not in_frame:
+            turns_nearby = what == TURN and abs(end - start) < SMALL_SHARE * abs(end)
+            creeps = what == PAUSED and self.at[STEP] <= CREEPING_SHARE * self.at[FIRST_STEP]
+            if turns_nearby or creeps:
+                self._enter_frame()
+
+    def _lost(self, record: Array) -> SolutionError:
+        """Why a leg could not be followed."""
+        place = f"V**2 beyond {self.problem.formulas.parameter} = {float(record[END])!r}"
+        if 0.0 < abs(record[[START, END]]).max() < LEAST_SWING:
+            return SolutionError(
+                f"{place} comes to the end of the range of doubles; launch the body more than {LEAST_SWING!r} from the "
+                "equilibrium, or faster"
+            )
+        if self._force_cancels(record):
+            return SolutionError(
+                f"{place} could not be followed: terms of the force cancel there to fewer digits than doubles need; "
+                "declare the sum of such forces as one, or make them smaller"
+            )
+        return SolutionError(f"{place} could not be followed; are the curve and the force smooth there?")
+
+    def _force_cancels(self, record: Array) -> bool:
+        """Whether terms of the force cancel at the end or the start of a leg, so that doubles do not resolve it."""
+        with suppress(SolutionError):  # curves without formulas have no bound on its rounding, nor have very long ones
+            law, heading = FormulaLaw(self.problem), int(record[HEADING])
+            return self._frame is None and any(law.cancels(float(record[end]), heading) for end in (START, END))
+        return False
+
+    def _has_died_away(self, start: float, end: float) -> bool:
+        """Whether the body is, or swings, so closely about an equilibrium that its place shows no more of it."""
+        frame = self._frame
+        swing = max(abs(start), abs(end)) if frame is None else abs(self.body[0, PLACE])
+        # From an unstable equilibrium the body departs, however near it turns.
+        shown = LAST_DIGIT * abs(end) if frame is not None and frame.is_stable else 0.0
+        if swing >= max(shown, LEAST_SWING):
+            return False
+        self.last_swing = swing
+        return True
+
+    def _launch_nearby(self) -> None:
+        """Launch the body next to an equilibrium."""
+        lam0 = self.problem.launch.lam0
+        self.body[0, PLACE_LOW] = lam0.low
+        self._enter_frame(lam0)
+        if self._frame is None:
+            self.body[0, PLACE_LOW] = 0.0
+        else:  # it is launched there again, by its distance
+            self.body[0, STEP] = 0.0
+            self.launch_error = ULP * abs(float(self.body[0, PLACE]))
+
+    def _enter_frame(self, lam0: Number | None = None) -> None:
+        """Follow the body from here on by its distance from an equilibrium, if it is, and for a while stays, close.
+
+        About an unstable equilibrium it does not stay, so that only its launch, ``lam0``, is worth that.
+        """
+        problem, line, loss = self.problem, self.body[0], self.dissipation
+        if not is_small(loss, problem.functions.p, problem.functions.breaks, line):
+            return
+        place, low, v2 = line[[PLACE, PLACE_LOW, V2]].tolist()
+        ends = np.abs(np.append(problem.functions.breaks, (problem.low, problem.high)) - place)
+        reach = min(starting_step(problem), float(ends.min()))
+        frame = frame_near(loss, problem.functions.p, (place, low, v2), reach)
+        if frame is None or not (frame.is_stable or lam0):
+            return
+        if isinstance(problem.formulas.exact, ExactLaw):
+            frame = sharpened(frame, FormulaLaw(problem).at_rest)
+        line[PLACE], line[PLACE_LOW] = frame.distance(place, low)
+        self.force_error = 0.0 if frame.is_stable else frame.error / frame.reach
+        unknown, exact = (LAST_DIGIT * abs(place) if frame.is_stable else frame.error), problem.formulas.exact
+        if not frame.is_stable and lam0 and isinstance(exact, ExactLaw):
+            known = refined(frame, exact, problem.p, lam0)
+            if known is not None:
+                (frame, line[PLACE]), line[PLACE_LOW], unknown = known, 0.0, 0.0
+        if v2 == 0.0 and abs(line[PLACE]) < unknown:
+            line[PLACE] = 0.0  # there it stays
+        self._check_distance(frame.size(line[PLACE], v2), frame)
+        reach = reach if frame.is_stable else min(reach, frame.reach)
+        self._frame = frame
+        line[LAM0], line[LOW], line[HIGH], line[PERIOD] = line[PLACE], -reach, reach, 0.0
+        line[FIRST_STEP] = reach
+
+    def _check_distance(self, size: float, frame: Frame) -> None:
+        """Refuse a launch so near to an unstable equilibrium that doubles do not hold what makes the body depart."""
+        place = float(frame.p[PLACE_IN_FRAME])
+        nearest = LEAST_SWING if self.dissipation.linear else NEAREST_SHARE * abs(place)
+        if not frame.is_stable and 0.0 < size < nearest:
+            raise LaunchError(
+                f"lam0: a motion from so near to the unstable equilibrium at {self.problem.formulas.parameter} = "
+                f"{place!r} cannot be computed; launch at least {nearest:.1g} from it, faster, or, by exact text, at "
+                "the equilibrium itself"
+            )
+
+    def _leave_frame(self, record: Array) -> None:
+        """Follow the body by its place again; the record has places."""
+        problem, line = self.problem, self.body[0]
+        self._frame = None
+        domain, step = problem.domain, starting_step(problem)
+        line[PLACE], line[PLACE_LOW], line[ENDING] = record[END], record[END_LOW], 0.0
+        line[LAM0], line[LOW], line[HIGH], line[PERIOD] = problem.lam0, domain.low, domain.high, domain.period
+        line[FIRST_STEP], line[REACH] = step, domain.period or step
+        self.at = line.tolist()
+
+    def _cusp_ahead(self, record: Array, heading: int) -> float:
+        """The place of a cusp close ahead of the end of a run; the way there takes less than a rounding of the time."""
+        f, place, near = self.problem.functions, float(record[END]), 0.01 * NEAR_CUSP * starting_step(self.problem)
+        places = place - heading * near * np.array([0.0, 1.0, 2.0])
+        ds = path_and_force_at(f.addresses, f.p, places, np.zeros(3))[2]
+        slope, bend = (4.0 * ds[1] - 3.0 * ds[0] - ds[2]) / (2.0 * near), (ds[0] - 2.0 * ds[1] + ds[2]) / near**2
+        distance = float(ds[0] / slope)
+        return place + heading * distance * (1.0 + float(0.5 * bend / slope) * distance)
+
+    def _end_name(self, what: int, record: Array, heading: int) -> str:
+        """The name of what ended a run."""
+        problem = self.problem
+        if what == LIMIT and not problem.period:
+            return domain_end(problem, heading).what
+        if what == NARROWED:
+            return "cusp" if is_cusp(problem, float(record[END]), CUSP_SHARE) else "singular-point"
+        return END_NAMES.get(what, "")

@@ -1,0 +1,176 @@
+"""A motion with losses as far as it has been followed: its legs, their segments, and what errors they begin with."""
+
+from contextlib import suppress
+from functools import cached_property
+from math import inf, isfinite
+
+import numpy as np
+
+from gqm_sym.errors import BudgetError, InputError, SolutionError
+from gqm_sym.runtime.arithmetic.doubledouble import Pair
+from gqm_sym.runtime.compiled.types import Array
+from gqm_sym.runtime.launch.problem import Problem
+from gqm_sym.runtime.legs.body import DIRECTION, PLACE, TURNS
+from gqm_sym.runtime.legs.driver import Driver
+from gqm_sym.runtime.legs.inherited import InheritedErrors
+from gqm_sym.runtime.legs.layout import Layout
+from gqm_sym.runtime.legs.leg_record import BEGIN, HEADING
+from gqm_sym.runtime.legs.leg_segments import Run
+from gqm_sym.runtime.motion.events import Leg, passages
+from gqm_sym.runtime.motion.motion import Motion
+from gqm_sym.runtime.motion.trajectory import PhasePoints, TimedSegment, Trajectory
+
+
+class FollowedMotion(Motion):
+    """A motion that loses energy, followed as far as required; `DissipativeMotion` has the questions."""
+
+    _whole: Trajectory | None = None
+    # How many runs `_look_ahead` computes of a motion that it finds no end of; 0 while that is not known.
+    _beginning = 0
+
+    def __init__(self, problem: Problem) -> None:
+        super().__init__(problem, "dissipative", problem.launch.direction)
+        self._driver = Driver(problem, self._horizon)
+        self._go_on()
+        self.direction = int(self._driver.runs[0].record[HEADING]) if self._driver.runs else 0
+
+    # -- what `Motion` needs ------------------------------------------------------------------
+
+    @property
+    def _internal_ends(self) -> tuple[str, ...]:
+        return ("",) if self._driver.dissipation.friction else ("", "contact-sign")
+
+    def _trajectory(self, reach: float) -> Trajectory:
+        self._follow(reach)
+        if self._whole is None or len(self._whole.segments) != len(self._pieces):
+            self._whole = Trajectory(segments=tuple(self._pieces), lap=self.problem.period)
+        return self._whole
+
+    def _history(self) -> tuple[TimedSegment, ...]:
+        self._look_ahead()
+        segments = self._trajectory(0.0).segments
+        return tuple(timed for timed in segments if timed.leg < self._beginning) if self._beginning else segments
+
+    def _contact_changes(self, piece: TimedSegment) -> list[tuple[Pair, float]]:
+        return []  # segments end there
+
+    def _check_end(self, t: float) -> None:
+        self._follow(t)
+        driver, end = self._driver, self._known_end()
+        if t > end:
+            raise InputError(f"t: the motion ends at {end!r} s ({self._end_text()}), got {t!r}")
+        if driver.ending == "asymptote" and not driver.last_swing and t > self._pieces[-1].t_stop[0]:
+            raise SolutionError(
+                f"t = {t!r}: by then the body is closer to the equilibrium at "
+                f"{self.problem.formulas.parameter} = {driver.at[PLACE]!r} than doubles can tell"
+            )
+
+    def _phase_points(self, t: Array, t_low: Array) -> PhasePoints:
+        if not self._driver.last_swing:
+            return super()._phase_points(t, t_low)
+        # A swing that has died away stays where it turned last.
+        last, last_low = self._pieces[-1].t_stop
+        return super()._phase_points(np.minimum(t, last), np.where(t < last, t_low, last_low))
+
+    def _time_error(self, t: Array) -> Array:
+        return np.zeros_like(t)
+
+    def _errors_before(self, timed: TimedSegment, phi: Array) -> tuple[float, Array]:
+        return self._inherited.before(timed, phi)
+
+    def _end_text(self) -> str:
+        driver = self._driver
+        if not driver.ending or driver.elapsed > self._horizon:
+            return super()._end_text()
+        return f"{driver.ending} at {self.problem.formulas.parameter} = {driver.reached!r}"
+
+    def _first_passages(self, lam: float, low: float) -> list[float]:
+        done, driver = 0, self._driver
+        while True:
+            trajectory = self._trajectory(0.0)
+            found = passages(trajectory.segments[done:], trajectory, lam, low)
+            done = len(trajectory.segments)
+            # A body that turns at two points reaches no place outside of them any more.
+            settled = driver.at[TURNS] >= (1.0 if self.problem.w0 == 0.0 else 2.0)
+            if found or driver.ending or settled or driver.elapsed >= self._horizon:
+                return found
+            self._go_on()
+
+    # -- leg after leg ------------------------------------------------------------------------
+
+    @cached_property
+    def _layout(self) -> Layout:
+        """The segments so far of runs that have been laid."""
+        return Layout(self.problem.functions)
+
+    @cached_property
+    def _inherited(self) -> InheritedErrors:
+        """The errors with which the legs begin."""
+        return InheritedErrors(self._driver, self._layout.runs)
+
+    @property
+    def _pieces(self) -> list[TimedSegment]:
+        """All segments so far."""
+        self._follow_again()
+        for run in self._driver.runs:
+            self._layout.lay(run)
+        self._driver.runs.clear()
+        return self._layout.segments
+
+    @property
+    def _all_runs(self) -> list[Run]:
+        """The runs so far."""
+        return [*self._layout.runs, *self._driver.runs]
+
+    def _runs_as_legs(self) -> list[Leg]:
+        """The runs of `legs`, which are not cut at changes of the contact sign and at corners."""
+        everything, lap = self._all_runs, self.problem.period
+        stops = [*(float(run.record[BEGIN]) for run in everything[1:]), self._driver.elapsed]
+        shown = everything[: self._beginning or None]
+        return [run.leg(lap, stop) for run, stop in zip(shown, stops, strict=False)]
+
+    def _known_end(self) -> float:
+        """The time at which the motion ends, as far as is known; infinite if it is not."""
+        ends = self._driver.ending not in ("", "asymptote")
+        return min(self._horizon, self._driver.elapsed if ends else inf)
+
+    def _go_on(self) -> None:
+        """Follow the body to its next turn, to the end of the motion, or as far as one run goes."""
+        driver = self._driver
+        driver.go_on()
+        if self._horizon == inf and not self._beginning and driver.at and not driver.ending and driver.goes_on_for_ever:
+            self._beginning = len(self._all_runs)
+
+    def _follow(self, reach: float) -> None:
+        """Compute legs up to a time in s, and up to the horizon if there is one."""
+        if isfinite(self._horizon):
+            reach = max(reach, self._horizon)
+        while not self._driver.ending and self._driver.elapsed < reach:
+            self._go_on()
+
+    def _follow_amply(self, enough: float) -> None:
+        """Follow the motion until there are enough pieces, or as far as it can be followed."""
+        with suppress(SolutionError, BudgetError):  # it is raised when that is requested
+            while len(self._pieces) < enough and not self._driver.ending and self._driver.elapsed < self._horizon:
+                self._go_on()
+
+    def _look_ahead(self) -> None:
+        """Compute the whole motion if it ends, and at least its first leg if it does not."""
+        if isfinite(self._horizon):
+            self._follow(self._horizon)
+        while not self._driver.ending and not self._beginning and self._driver.elapsed < self._horizon:
+            self._go_on()
+
+    def _follow_again(self) -> None:
+        """Follow runs once more whose panels are not known, each in as many parts as that takes."""
+        runs: list[Run] = []
+        for run in self._driver.runs:
+            parts = self._driver.with_panels(run)
+            if len(self._layout.runs) + len(runs) < self._beginning:
+                self._beginning += len(parts) - 1
+            runs += parts
+        self._driver.runs = runs
+
+    def _is_ahead(self, places: Array) -> bool:
+        """Whether one of the places lies ahead of what has been computed."""
+        return bool(np.any((places - self._driver.reached) * self._driver.at[DIRECTION] > 0.0))

@@ -1,0 +1,104 @@
+"""The errors that the legs of a motion with losses begin with, each from those before it."""
+
+from contextlib import suppress
+from math import inf, isnan
+
+import numpy as np
+
+from gqm_sym.errors import SolutionError
+from gqm_sym.runtime.arithmetic.doubledouble import ULP
+from gqm_sym.runtime.compiled.types import Array
+from gqm_sym.runtime.interface import ExactLaw
+from gqm_sym.runtime.legs.advance import RESTS
+from gqm_sym.runtime.legs.driver import Driver
+from gqm_sym.runtime.legs.leg_errors import Errors, carry, rounding_share
+from gqm_sym.runtime.legs.leg_record import INHERITED, TIME_FROM_END, TIME_FROM_START
+from gqm_sym.runtime.legs.leg_segments import Run
+from gqm_sym.runtime.legs.runs.ends import ASYMPTOTE, LIMIT, TURN
+from gqm_sym.runtime.legs.variations.law import FormulaLaw
+from gqm_sym.runtime.motion.trajectory import TimedSegment
+
+
+def _known(errors: tuple[float, float, float]) -> Errors:
+    """Bounds of errors, which are infinite where they come out as no numbers."""
+    return Errors(*(inf if isnan(error) else error for error in errors))
+
+
+class InheritedErrors:
+    """The errors with which legs begin, computed as far as required.
+
+    Parameters
+    ----------
+    driver : Driver
+        The body.
+    runs : list of Run
+        Its runs with panels, which others are added to.
+    """
+
+    def __init__(self, driver: Driver, runs: list[Run]) -> None:
+        self._driver, self._runs = driver, runs
+        self._errors = [self._at_launch()]
+        # For each panel of runs how large the terms of the force are that may cancel.
+        self._terms: list[Array] = []
+
+    def before(self, timed: TimedSegment, phi: Array) -> tuple[float, Array]:
+        """Bounds of the errors from before a timed segment: of its place, and of the times at phase angles."""
+        while len(self._errors) <= timed.leg + 1:
+            self._errors.append(self._carried(len(self._errors) - 1))
+        run, (before, after) = self._runs[timed.leg], self._errors[timed.leg : timed.leg + 2]
+        if timed.segment.v2 is not None:  # the approach to an equilibrium
+            return after.place, np.full_like(phi, after.time)
+        of_frame = 0.0 if run.frame is None else run.frame.error
+        swing = 2.0 * self._driver.last_swing if timed.leg == len(self._runs) - 1 else 0.0
+        if swing and run.what != ASYMPTOTE:
+            # So small a V**2 may have no error in the range of doubles, but the body stays where it is.
+            return before.place + of_frame + swing, np.zeros_like(phi)
+        panels = run.panels_ahead if timed.sense > 0 else run.panels_back
+        which = np.searchsorted(timed.segment.edges[1:-1], phi, side="right")
+        inherited = panels[which, INHERITED]
+        if timed.sense > 0:
+            return before.place + of_frame + swing, before.time + inherited + self._time_error_of_force(run)
+        return after.place + of_frame + swing, after.time + after.place * inherited
+
+    def _at_launch(self) -> Errors:
+        problem, known = self._driver.problem, self._driver.launch_error
+        lam0, v0 = problem.launch[:2]
+        return Errors(abs(lam0.low) if known is None else known, 2.0 * v0.value * abs(v0.low) + ULP * problem.w0, 0.0)
+
+    def _time_error_of_force(self, run: Run) -> float:
+        """Return the effect of the error of the force on the time in which a body departs from an equilibrium."""
+        if run.frame is None or run.frame.is_stable:
+            return 0.0
+        return self._driver.force_error * float(run.record[TIME_FROM_START] + run.record[TIME_FROM_END])
+
+    def _carried(self, leg: int) -> Errors:
+        """The errors at the end of a leg, given those with which it begins; in a frame, errors of distances."""
+        run, before, driver = self._runs[leg], self._errors[leg], self._driver
+        frame, turns = run.frame, run.what in (TURN, RESTS)
+        share, terms = rounding_share(driver.dissipation.linear), self._terms_of(leg)
+        if frame is None:
+            return _known(
+                carry(driver.dissipation, driver.problem.functions.p, turns, before, share, terms, run.record)
+            )
+        if leg == 0 or self._runs[leg - 1].frame is None:
+            before = before._replace(place=before.place + frame.error)
+        frame.move(run.record, -1)
+        share += 0.0 if frame.is_stable else driver.force_error
+        after = _known(carry(frame.dissipation, frame.p, turns, before, share, terms, run.record))
+        after = after._replace(time=after.time + self._time_error_of_force(run))
+        frame.move(run.record, 1)
+        return after._replace(place=after.place + frame.error) if run.what == LIMIT else after
+
+    def _terms_of(self, leg: int) -> Array:
+        """For each panel of a leg how large the terms of the force are that may cancel; 0 where that is not known."""
+        missing, driver = self._runs[len(self._terms) :], self._driver
+        if missing:
+            terms = [np.zeros(run.ahead + run.back) for run in missing]
+            by_place = [k for k, run in enumerate(missing) if run.frame is None]
+            if by_place and isinstance(driver.problem.formulas.exact, ExactLaw):
+                with suppress(SolutionError):  # formulas may be too long
+                    errors = FormulaLaw(driver.problem).force_errors_along([missing[k] for k in by_place])
+                    for k, of_panels in zip(by_place, errors, strict=True):
+                        terms[k] = of_panels / rounding_share(driver.dissipation.linear)
+            self._terms += terms
+        return self._terms[leg]

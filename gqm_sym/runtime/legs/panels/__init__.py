@@ -1,0 +1,1 @@
+"""One panel of a leg: how wide it may be, and V**2 and the time on it as polynomials."""

@@ -1,0 +1,236 @@
+"""The widest panel from a place on, on which V**2, the forces and the time rate can be resolved by a polynomial."""
+
+from math import fabs, inf, sqrt
+from typing import NamedTuple
+
+from gqm_sym.runtime.compiled.jit import Inner
+from gqm_sym.runtime.legs.panels.breaks import within
+from gqm_sym.runtime.legs.panels.equation import (
+    DS,
+    KAPPA,
+    LOAD,
+    N0,
+    Q_RATE,
+    TAILS,
+    TIME_RATE,
+    W_FACTOR,
+    P,
+    W,
+    as_factor,
+    begin_panel,
+    distance,
+    fill_rates,
+    load_row,
+    slope_at,
+    solve_panel,
+)
+from gqm_sym.runtime.legs.panels.point import point_buffer, slope_of_v2
+from gqm_sym.runtime.legs.panels.polynomials import COUNT, SHARES, size_of
+from gqm_sym.runtime.legs.panels.resolution import (
+    are_resolved,
+    growth,
+    growth_towards,
+    is_curve_resolved,
+    is_load_resolved,
+    kink,
+    narrower,
+    set_sizes,
+    size_at,
+)
+
+# A width of a few units in the last place of the curve's parameter.
+MIN_RELATIVE_WIDTH = 1e-15
+
+# From this ratio on of its coefficients to all others the time rate is taken to have a turning point ahead.
+TURNING_RATIO = 10.0
+
+# The ratio of V**2 at a panel's end to the largest V**2 so far above which time is resolved. Below it a turn is
+# expected, and time is counted from there.
+HIGH_V2_RATIO = 0.25
+
+# The share of a panel on which V**2 is resolved within which structure of the time rate can only be noise.
+NOISE_WIDTH_RATIO = 2.0**-20
+
+# The most panels of a leg, and the most widths that are tried for one.
+MAX_PANELS, MAX_WIDTHS = 20000, 2100
+
+# How far it is from the node next to an end of a panel to that end, against the distance of the next node.
+TO_END = float(SHARES[0] / (SHARES[1] - SHARES[0]))
+
+# Where ds/dlam changes by this factor or more on a panel, and would vanish within so many units in the last place of
+# its start, it does: narrower panels would step over that place, which their roundings hide.
+CUSP_RATIO, CUSP_UNITS = 1.5, 32.0
+
+# At a cusp that roots of a polynomial give, ds/dlam is no more than this share of what it is about it.
+CUSP_SHARE = 1e-7
+
+# Whether time has to be resolved.
+NEVER, MAYBE, ALWAYS = range(3)
+
+
+class PanelRequest(NamedTuple):
+    """The requirements on the next panel.
+
+    Attributes
+    ----------
+    max_width : float
+        How wide it may be, in the march variable.
+    step : float
+        The width to begin with.
+    largest_v2 : float
+        The largest V**2 on the leg so far, less what resistance alone takes of it since.
+    timing : int
+        ALWAYS if time must be resolved, NEVER if not; MAYBE if it must unless V**2 is below HIGH_V2_RATIO of the
+        largest at both ends.
+    resolve_load : bool
+        Whether N must be resolved as far as its changes of sign need it.
+    """
+
+    max_width: float
+    step: float
+    largest_v2: float
+    timing: int
+    resolve_load: bool
+
+
+@Inner
+def resolve_time(march, panel, request, largest_v2, worst, is_sliver, work):  # type: ignore[no-untyped-def]
+    """Whether a panel will do as far as time is concerned.
+
+    ``worst`` is the ratio of middle coefficients of the other functions. On so small a part of a smooth panel that it
+    ``is_sliver`` only noise is unresolved, which the error of the time includes.
+
+    Returns
+    -------
+    done : bool
+        Whether the panel will do.
+    factor : float
+        By how much the next panel may be wider; or this one, if it will not do.
+    timed : bool
+        Whether time is resolved.
+    """
+    top, end, factor = max(request.largest_v2, largest_v2), work[W + COUNT], growth(worst)
+    is_high = end >= HIGH_V2_RATIO * top or panel.v2 < HIGH_V2_RATIO * top
+    needed = request.timing == ALWAYS or (request.timing == MAYBE and is_high)
+    timed, ratio = False, 0.0
+    if request.timing != NEVER:
+        fill_rates(march, panel, work)
+        work[size_at(TIME_RATE)] = size_of(work, TIME_RATE)
+        timed, ratio = are_resolved(work, TIME_RATE, LOAD)
+    timed = timed or (needed and is_sliver and work[TAILS] < inf)
+    # Where only time needs narrow panels while V**2 decreases, there is a turn ahead.
+    turning = end < panel.v2 and ratio > TURNING_RATIO * worst
+    if timed:
+        factor = min(factor, growth_towards(ratio, -1.0) if turning else growth(ratio))
+    elif needed:
+        factor = growth_towards(ratio, 1.0) if turning else growth(ratio)
+    return timed or not needed, factor, timed
+
+
+@Inner
+def hides_cusp(forces, march, panel, work):  # type: ignore[no-untyped-def]
+    """Whether ds/dlam vanishes between an end of a panel and the node next to it, where no values show it.
+
+    The nodes then make it negative at that end, of the size that it has there.
+    """
+    last = DS + COUNT - 1
+    at_end = work[last] + TO_END * (work[last] - work[last - 1])
+    if at_end < 0.0 and work[DS + COUNT] > -0.5 * at_end:
+        return True
+    at_start = work[DS] + TO_END * (work[DS] - work[DS + 1])
+    if at_start >= 0.0:
+        return False
+    return ds_at(forces, march, panel, distance(panel.left, march)) > -0.5 * at_start
+
+
+@Inner
+def ds_at(forces, march, panel, far):  # type: ignore[no-untyped-def]
+    """ds/dlam at a distance from the origin of the march."""
+    point = point_buffer()
+    place = within(march.origin[0] + march.direction * far, panel.span)
+    slope_of_v2(forces, place, panel.v2, panel.contact_sign, point)
+    return point[2]
+
+
+@Inner
+def is_cusp(forces, march, panel, far, work):  # type: ignore[no-untyped-def]
+    """Whether ds/dlam vanishes at a place on a panel, at which the curvature changes sign.
+
+    There the curve turns back on itself, and no panel may end: the next one would begin behind the end of the motion.
+    """
+    return ds_at(forces, march, panel, far) <= CUSP_SHARE * max(work[DS], work[DS + COUNT - 1])
+
+
+@Inner
+def is_at_cusp(length, unit, work):  # type: ignore[no-untyped-def]
+    """Whether ds/dlam vanishes next to the start of a panel of a length, given a unit in the last place."""
+    first, last = work[DS], work[DS + COUNT - 1]
+    if last > first:  # it vanishes as far before the start as it takes to grow to its first value
+        return last > CUSP_RATIO * first and length * first <= CUSP_UNITS * unit * last
+    return first > CUSP_RATIO * last and length <= CUSP_UNITS * unit
+
+
+@Inner
+def next_panel(forces, march, panel, request, work):  # type: ignore[no-untyped-def]
+    """The widest panel from a start on that can be resolved.
+
+    Returns
+    -------
+    width : float
+        In the march variable; 0 if no width suffices that doubles can represent.
+    step : float
+        The width to begin with on the next panel.
+    timed : bool
+        Whether time is resolved.
+    """
+    step, ends_at_kink, widest = request.step, False, 0.0
+    start, slope = distance(panel.left, march), slope_at(panel.left, march)
+    unit = MIN_RELATIVE_WIDTH * max(fabs(march.origin[0] + march.direction * start), start)
+    # What is left of a leg may be hardly wider than the last panel may be narrow.
+    width = min(max(step, 4.0 * unit / (slope + sqrt(slope * slope + 8.0 * march.g * unit))), request.max_width)
+    # Where rows are known before V**2 is, they show most panels that are too wide.
+    curve_first = forces.linear and not forces.kinked
+    last = Q_RATE if curve_first else P
+    for _ in range(MAX_WIDTHS):
+        length = width * (slope + march.g * width)
+        # A panel may be narrower than places in doubles if its end is given: distances on it keep their digits.
+        if (length <= unit and width < request.max_width) or length < 1e-300:
+            return 0.0, step, False
+        begin_panel(forces, march, panel, width, work)
+        ratio = 0.0
+        if curve_first:
+            fine, ratio = is_curve_resolved(width, work)
+            if not fine:
+                width = narrower(width, growth(ratio))
+                continue
+        q = solve_panel(forces, march, panel, work)
+        if forces.kinked and not ends_at_kink and (q < inf or forces.linear):
+            x = kink(work)
+            to_kink = width * (0.5 * (1.0 + x) if x > -1.0 else 0.5)
+            # A leg that begins at a kink may begin a rounding before it.
+            far = to_kink * (slope + march.g * to_kink)
+            if x <= 1.0 and far > unit and not (x > -1.0 and is_cusp(forces, march, panel, start + far, work)):
+                width, ends_at_kink = to_kink, x > -1.0
+                continue
+            load_row(work, LOAD, DS, N0, KAPPA, W)
+        if not q < inf:
+            width, ends_at_kink = 0.5 * width, False
+            continue
+        largest_v2 = set_sizes(panel.v2, as_factor(panel.v2, march, panel.left), work)
+        fine, worst = are_resolved(work, W_FACTOR, last)
+        worst = max(worst, ratio)
+        if request.resolve_load:
+            load_fine, ratio = is_load_resolved(work)
+            fine, worst = fine and load_fine, max(worst, ratio)
+        factor = growth(worst)
+        if fine and not hides_cusp(forces, march, panel, work):
+            widest = max(widest, width)
+            is_sliver = width <= NOISE_WIDTH_RATIO * widest
+            done, factor, timed = resolve_time(march, panel, request, largest_v2, worst, is_sliver, work)
+            if is_at_cusp(length, unit, work):
+                return 0.0, step, False
+            if done:
+                grown = width * factor
+                return width, max(step, grown) if ends_at_kink or width == request.max_width else grown, timed
+        width, ends_at_kink = narrower(width, factor), False
+    return 0.0, step, False

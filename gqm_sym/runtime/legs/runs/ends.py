@@ -1,0 +1,174 @@
+"""The end of a run: its code and its place."""
+
+from math import fabs, inf
+from typing import NamedTuple
+
+from gqm_sym.runtime.compiled.jit import Inner
+from gqm_sym.runtime.legs.panels.breaks import located, within
+from gqm_sym.runtime.legs.panels.equation import slope_at
+from gqm_sym.runtime.legs.panels.point import LEAST_V2, slope_of_v2
+
+# The codes of the end of a run:
+#
+# ========== ==================================================================================================
+# TURN       V**2 vanished, and the body turns or rests
+# LIMIT      the end of the domain, or of the range of breaks that were given
+# LIFTOFF    N took the sign that it cannot have
+# ASYMPTOTE  V**2 and the force vanish together: the body approaches an equilibrium; by a law that is not linear in
+#            V**2, it is closer to it than doubles resolve its place
+# PAUSED     it has run far enough for once
+# NARROWED   a place where the functions are not smooth: no panel that doubles can represent is narrow enough
+# SPENT      too many panels were needed
+# SLOWED     the body becomes slow from the place given, but does not turn; it has to be run again from there
+# FULL       the record is full
+# ========== ==================================================================================================
+#
+# GOES_ON is the code of a run that has not ended.
+TURN, LIMIT, LIFTOFF, ASYMPTOTE, PAUSED, NARROWED, SPENT, SLOWED, FULL = range(9)
+GOES_ON = -1
+
+# A body this close to a turn, as a share of the distance it has run, counts as being there; some laws have no value
+# beyond a turn.
+NEAR_TURN = 1e-11
+
+# A body whose place is smaller than where the run began by this factor, and which goes on by hardly more than that, is
+# on its way to an equilibrium at 0: places that are counted from farther away would lose their digits.
+CLOSE_SHARE = 2.0**-10
+
+
+class Timed(NamedTuple):
+    """The last point of a run up to which time is counted.
+
+    Attributes
+    ----------
+    distance, v2 : float
+        The distance from the origin, and V**2 there.
+    contact_sign, change_count : int
+        The sign of N there, and how often it has changed so far.
+    """
+
+    distance: float
+    v2: float
+    contact_sign: int
+    change_count: int
+
+
+class End(NamedTuple):
+    """How a run ended.
+
+    Attributes
+    ----------
+    what : int
+        TURN to FULL.
+    place : (float, float)
+        The place as two doubles.
+    v2 : float
+        V**2 there.
+    contact_sign : int
+        The sign of N there.
+    step, no_turn_until : float
+        As in `Start`, from here on.
+    middle : (float, float)
+        The place up to which time is counted, as two doubles.
+    half_c : float
+        c/2 of the march variable (`panels.equation.March`); infinite where it is the distance itself.
+    change_count, panel_count : int
+        How often N has changed its sign, and how many panels were recorded.
+    upcoming : int
+        The index of the next break.
+    """
+
+    what: int
+    place: tuple[float, float]
+    v2: float
+    contact_sign: int
+    step: float
+    no_turn_until: float
+    middle: tuple[float, float]
+    half_c: float
+    change_count: int
+    panel_count: int
+    upcoming: int
+
+
+@Inner
+def end_at_once(forces, march, panel, run_length, point):  # type: ignore[no-untyped-def]
+    """Return the end of a run where no panel is possible, with its distance and V**2: a turn, if one is near.
+
+    Where a body at rest would go on, it is no turn but an equilibrium, V**2 grows with the square of the distance from
+    there, and the body never comes to it.
+    """
+    if not forces.linear and panel.v2 > 0.0:
+        here = march.origin[0] + march.direction * run_length
+        place = within(here, panel.span)
+        goes_on = slope_of_v2(forces, place, LEAST_V2, panel.contact_sign, point) > 0.0
+        slope = slope_of_v2(forces, place, panel.v2, panel.contact_sign, point)
+        if slope < 0.0 and panel.v2 <= -slope * NEAR_TURN * max(fabs(here), run_length):
+            return (ASYMPTOTE, run_length, panel.v2) if goes_on else (TURN, run_length - panel.v2 / slope, 0.0)
+    return NARROWED, run_length, panel.v2
+
+
+@Inner
+def turn_below_noise(forces, march, panel, change, run_length, point):  # type: ignore[no-untyped-def]
+    """`end_at_once` where V**2 is below its noise because the panel begins next to a turn; GOES_ON elsewhere."""
+    if change.first == change.touch and not forces.linear:
+        what, turn, v2 = end_at_once(forces, march, panel, run_length, point)
+        if what == TURN:
+            return what, turn, v2
+    return GOES_ON, run_length, panel.v2
+
+
+@Inner
+def may_pause(forces, march, route, run_length, speeds, panel):  # type: ignore[no-untyped-def]
+    """Whether a body has run far enough for once, or approaches an equilibrium at 0 that the run's start is far from.
+
+    ``speeds`` are V**2 and the largest so far, ``panel`` where the next one begins and how wide it is to be.
+    """
+    here, (left, step) = fabs(march.origin[0] + march.direction * run_length), panel
+    onwards = step * (slope_at(left, march) + march.g * step)
+    is_close = not forces.linear and onwards <= here <= CLOSE_SHARE * fabs(march.origin[0])
+    return is_close or (run_length >= route.pause and 2.0 * speeds[0] >= speeds[1])
+
+
+@Inner
+def what_after(change, at_limit, pauses):  # type: ignore[no-untyped-def]
+    """Return the code of the end of a run after a panel, or GOES_ON."""
+    if change.first <= 1.0:
+        if change.first == change.turn:
+            return TURN
+        return ASYMPTOTE if change.first == change.touch else GOES_ON
+    if at_limit:
+        return LIMIT
+    return PAUSED if pauses else GOES_ON
+
+
+@Inner
+def what_before(contact_sign, only_sign, has_room, fast_again, at_limit):  # type: ignore[no-untyped-def]
+    """Return the code of the end of a run before a panel, or GOES_ON."""
+    if contact_sign != 0 and contact_sign == -only_sign:
+        return LIFTOFF
+    if not has_room:
+        return FULL
+    if fast_again:
+        return SLOWED
+    return LIMIT if at_limit else GOES_ON
+
+
+@Inner
+def conclude(forces, route, march, end, timed, searching, run_length):  # type: ignore[no-untyped-def]
+    """The end of a run at the distance ``run_length``; ``end`` has all of it but the places."""
+    breaks, v, what = route.breaks, march.direction, end.what
+    middle = located(march.origin, v, timed.distance, breaks, end.upcoming)
+    v2, sign, changes, no_turn_until = end.v2, end.contact_sign, end.change_count, end.no_turn_until - run_length
+    place = middle
+    if what == TURN or (what == ASYMPTOTE and forces.linear):
+        place = located(march.origin, v, run_length, breaks, end.upcoming)
+    elif searching and what != FULL:
+        goes_on = what == PAUSED or what == SLOWED or (what == LIMIT and route.period > 0.0)
+        no_turn_until = run_length - timed.distance if goes_on else inf
+        what, v2, sign, changes = SLOWED, timed.v2, timed.contact_sign, timed.change_count
+    else:
+        place = (route.limit, 0.0) if what == LIMIT else located(march.origin, v, run_length, breaks, end.upcoming)
+        middle = place
+    count, upcoming = end.panel_count, end.upcoming
+    return End(what, place, v2, sign, end.step, no_turn_until, middle, end.half_c, changes, count, upcoming)

@@ -1,0 +1,209 @@
+"""Where a run begins, and the curve ahead of it and of each of its panels."""
+
+from math import inf, sqrt
+from typing import NamedTuple
+
+from gqm_sym.runtime.compiled.jit import Inner
+from gqm_sym.runtime.compiled.types import Array
+from gqm_sym.runtime.legs.panels.breaks import offset, span_before, within
+from gqm_sym.runtime.legs.panels.equation import March, marched
+from gqm_sym.runtime.legs.panels.point import LEAST_V2, sign_of_load, slope_of_v2
+
+# The width of the first panel of a leg, and of the first one after a break, against the distance on which the
+# acceleration there would stop the body.
+STOPPING_SHARE = 2.0
+
+# The steps by which it is found where a body that moves slowly would have been at rest.
+REST_STEPS = 4
+
+
+class Start(NamedTuple):
+    """Where a run begins.
+
+    Attributes
+    ----------
+    place, place_low : float
+        The place as two doubles.
+    v2 : float
+        V**2.
+    direction : int
+        The sign of dlam/dt.
+    contact_sign : int
+        The sign of N; 0 if it has to be found out.
+    step : float
+        The distance to begin with.
+    no_turn_until : float
+        The distance up to which no turn is expected, however slow the body becomes.
+    width : float
+        About how long the leg is, if it begins at a turn; 0 if that is unknown.
+    may_be_whole : bool
+        Whether the leg is tried as one polynomial, if it begins at a turn.
+    """
+
+    place: float
+    place_low: float
+    v2: float
+    direction: int
+    contact_sign: int
+    step: float
+    no_turn_until: float
+    width: float
+    may_be_whole: bool
+
+
+class Reading(NamedTuple):
+    """The data that are read from the record of a leg.
+
+    Attributes
+    ----------
+    what : int
+        TIMES to PANELS (`leg_record`).
+    force : bool
+        Of PEAKS, whether the contact force is read instead of the speed.
+    sign : float
+        1 for the largest, -1 for the smallest.
+    best : float
+        ``sign`` times the largest or smallest so far; what does not exceed it need not be in the record.
+    """
+
+    what: int
+    force: bool
+    sign: float
+    best: float
+
+
+class Route(NamedTuple):
+    """The curve ahead of a run.
+
+    Attributes
+    ----------
+    breaks : array
+        Places where panels have to begin, in the order in which they are passed; some may lie behind.
+    limit : float
+        The end of the domain.
+    pause : float
+        The distance from which on the run may pause.
+    only_sign : int
+        The only sign that N can have; 0 if it can have both.
+    reading : Reading
+    until, target : float
+        The time from the leg's start up to which it is read, and the place whose passage is looked for.
+    gaps : array
+        What is kept of the curve between its breaks (`gaps`); empty if that is not used.
+    first_break : int
+        The index of the first break of the route among all of the curve.
+    all_breaks : array
+        All breaks of the curve, within one lap.
+    period : float
+        The length of a lap; 0 on an open curve.
+    """
+
+    breaks: Array
+    limit: float
+    pause: float
+    only_sign: int
+    reading: Reading
+    until: float
+    target: float
+    gaps: Array
+    first_break: int
+    all_breaks: Array
+    period: float
+
+
+class Ahead(NamedTuple):
+    """What is ahead of a panel.
+
+    Attributes
+    ----------
+    upcoming : int
+        The index of the next break.
+    span : (float, float)
+        The places between which the curve may be evaluated (`panels.breaks`).
+    widest : float
+        The width that the panel may have at most; infinite but for the first panel and those after a break.
+    is_limited : bool
+        Whether ``widest`` has been found. After a break this waits until the panel turns out to have a turn.
+    """
+
+    upcoming: int
+    span: tuple[float, float]
+    widest: float
+    is_limited: bool
+
+
+@Inner
+def distance_from_rest(forces, start, span, contact_sign, slope, point):  # type: ignore[no-untyped-def]
+    """How far behind a start V**2 would vanish, by the steps of Runge and Kutta from speed to speed."""
+    d, u, v = 0.0, sqrt(start.v2), start.direction
+    step, moved, sums = u / REST_STEPS, 2.0 * u / slope, 0.0
+    for k in range(REST_STEPS):
+        for stage in range(4):
+            if k + stage > 0:
+                share = 0.0 if stage == 0 else (1.0 if stage == 3 else 0.5)
+                speed = u - share * step if k + 1 < REST_STEPS or stage < 3 else 0.0
+                place = within(start.place - v * (d + share * step * moved), span)
+                there = slope_of_v2(forces, place, max(speed * speed, LEAST_V2), contact_sign, point)
+                moved = 2.0 * speed / there
+            sums = moved if stage == 0 else sums + (1.0 if stage == 3 else 2.0) * moved
+        d, u = d + step * sums / 6.0, u - step
+    return d
+
+
+@Inner
+def begin_march(forces, start, place, span, contact_sign, point):  # type: ignore[no-untyped-def]
+    """The march variable from a start on, and the width that the first panel may have at most.
+
+    After a slow launch the root of V**2 has its zero where the march variable is ``-c/2``: the speed over it would not
+    be smooth if c were only about right, and panels are too wide to tell.
+    """
+    origin, g, c, widest = (start.place, start.place_low), 1.0, 0.0, inf
+    if start.v2 > 0.0:
+        slope = slope_of_v2(forces, place, start.v2, contact_sign, point)
+        slow = slope > 0.0 and start.v2 <= slope * start.step
+        if slow:
+            behind = distance_from_rest(forces, start, span, contact_sign, slope, point)
+            g, c = 1.0, 2.0 * sqrt(behind if 0.0 < behind <= start.step else start.v2 / slope)
+        else:
+            g, c = 0.0, 1.0
+        # V**2 at launch is exact; a turn near the launch has all digits on a panel that is no wider than this.
+        widest = STOPPING_SHARE * start.v2 / -slope if slope < 0.0 else inf
+    return March(origin, start.direction, g, c), widest
+
+
+@Inner
+def begin(forces, start, route, off, point):  # type: ignore[no-untyped-def]
+    """The march variable of a run, the sign of N with which it begins, and what is ahead of it."""
+    breaks, origin, upcoming = route.breaks, (start.place, start.place_low), 0
+    while upcoming < breaks.size and offset(breaks[upcoming], origin, start.direction) <= 0.0:
+        upcoming += 1
+    span, contact_sign = span_before(breaks, upcoming, start.direction, off), start.contact_sign
+    place = within(start.place, span)
+    if contact_sign == 0:
+        contact_sign = sign_of_load(forces, place, start.v2, point)
+    march, widest = begin_march(forces, start, place, span, contact_sign, point)
+    return march, contact_sign, Ahead(upcoming, span, widest, True)
+
+
+@Inner
+def pass_break(march, route, off, v2, ahead, run_length):  # type: ignore[no-untyped-def]
+    """Return the data ahead of a panel that begins at the distance ``run_length`` with V**2 = ``v2``."""
+    upcoming, breaks, v = ahead.upcoming, route.breaks, march.direction
+    if upcoming == breaks.size or offset(breaks[upcoming], march.origin, v) > run_length:
+        return ahead
+    return Ahead(upcoming + 1, span_before(breaks, upcoming + 1, v, off), inf, v2 == 0.0)
+
+
+@Inner
+def limited(forces, march, panel, ahead, change, run_length, point):  # type: ignore[no-untyped-def]
+    """Return the data ahead of a panel that begins at the distance ``run_length`` and has these changes.
+
+    V**2 at a break is as exact as at launch, so that a panel after it that has a turn is as narrow as the first one.
+    """
+    if ahead.is_limited or min(change.turn, change.touch) > 1.0:
+        return ahead
+    place, widest = within(march.origin[0] + march.direction * run_length, panel.span), inf
+    slope = slope_of_v2(forces, place, panel.v2, panel.contact_sign, point)
+    if slope < 0.0:
+        widest = marched(run_length + STOPPING_SHARE * panel.v2 / -slope, march) - panel.left
+    return Ahead(ahead.upcoming, ahead.span, widest, True)

@@ -1,0 +1,160 @@
+"""A run of the body along the curve where forces dissipate: panel after panel, until it turns, ends or may pause.
+
+Time is counted on the way as long as V**2 is large. From where V**2 decreases for good the run is only followed to its
+end, from which time is then counted back (`follow`).
+"""
+
+from math import inf
+
+from gqm_sym.runtime.compiled.jit import Inner
+from gqm_sym.runtime.legs.leg_record import COLUMNS, HEAD, add_panel, change_at, has_space
+from gqm_sym.runtime.legs.panels.breaks import offset
+from gqm_sym.runtime.legs.panels.equation import (
+    EXPM1_Q,
+    LOAD,
+    Panel,
+    W,
+    distance,
+    marched,
+    panel_buffer,
+    set_nodes,
+    slope_at,
+)
+from gqm_sym.runtime.legs.panels.point import ZERO_TOLERANCE, point_buffer
+from gqm_sym.runtime.legs.panels.polynomials import COUNT, extent
+from gqm_sym.runtime.legs.panels.resolution import first_change_of, size_at
+from gqm_sym.runtime.legs.panels.widest import ALWAYS, HIGH_V2_RATIO, MAX_PANELS, MAYBE, NEVER, PanelRequest, next_panel
+from gqm_sym.runtime.legs.runs.changes import changes_at_once, cut_panel, first_changes
+from gqm_sym.runtime.legs.runs.ends import (
+    GOES_ON,
+    SPENT,
+    TURN,
+    End,
+    Timed,
+    conclude,
+    end_at_once,
+    may_pause,
+    turn_below_noise,
+    what_after,
+    what_before,
+)
+from gqm_sym.runtime.legs.runs.gaps import Passed, pass_gaps
+from gqm_sym.runtime.legs.runs.route import Ahead, begin, limited, pass_break
+
+# The number of panels after which a run pauses.
+PANELS_PER_RUN = 512
+
+
+@Inner
+def enter_change(record, count, place):  # type: ignore[no-untyped-def]
+    """Enter a place where N changes its sign in the record; returns the number of changes."""
+    record[change_at(record, count)] = place
+    return count + 1
+
+
+@Inner
+def enter_panel(record, count, right, width, work):  # type: ignore[no-untyped-def]
+    """Enter a panel that ends at w = ``right`` in the record; returns the number of panels."""
+    add_panel(record, HEAD + count * COLUMNS, right, width, work)
+    return count + 1
+
+
+@Inner
+def largest_after(largest_v2, v2, ends_here, work):  # type: ignore[no-untyped-def]
+    """The largest V**2 so far, of which resistance alone leaves the share exp(-q) on a panel beginning with ``v2``."""
+    damped = largest_v2 if ends_here else largest_v2 / (1.0 + work[EXPM1_Q + COUNT])
+    return max(damped, max(v2, extent(work, W)[1]))
+
+
+@Inner
+def run(forces, start, route, off, record):  # type: ignore[no-untyped-def]
+    """Follow the body from a start to the first turn, end or pause.
+
+    Parameters
+    ----------
+    forces : Forces
+    start : Start
+    route : Route
+    off : float
+        How far from the breaks the curve is evaluated (`panels.breaks`).
+    record : array
+        Filled with panels up to the middle, and changes of N's sign (`leg_record`).
+
+    Returns
+    -------
+    End
+    """
+    work, point, v = panel_buffer(), point_buffer(), start.direction
+    set_nodes(work)
+    march, nu, ahead = begin(forces, start, route, off, point)
+    v2, left, run_length, largest_v2, step = start.v2, 0.0, 0.0, start.v2, marched(start.step, march)
+    # Once time is not counted any more, a turn is searched for.
+    what, panel_count, recorded, change_count, searching, at_stop = GOES_ON, 0, 0, 0, False, False
+    # Time on the second half of a leg is counted from its end, unless breaks limit its panels anyway; laws that are not
+    # linear keep to what is next to it.
+    middle = 0.5 * start.width if forces.linear and start.v2 == 0.0 and start.width > 0.0 else inf
+    timed = Timed(run_length, v2, nu, change_count)
+    for _ in range(MAX_PANELS):
+        if at_stop and not searching:
+            left, run_length, v2, largest_v2, ahead, recorded = pass_gaps(
+                *(forces, march, route, nu, Passed(left, run_length, v2, largest_v2, ahead, recorded), record, work)
+            )
+            timed = Timed(run_length, v2, nu, change_count)
+        late = v2 < HIGH_V2_RATIO * largest_v2 or (run_length >= middle and (searching or not at_stop))
+        ahead = pass_break(march, route, off, v2, ahead, run_length)
+        at_end = ahead.upcoming == route.breaks.size
+        stop = offset(route.limit if at_end else route.breaks[ahead.upcoming], march.origin, v)
+        has_room = has_space(record, HEAD + recorded * COLUMNS, change_count)
+        what = what_before(nu, route.only_sign, has_room, searching and not late, stop <= run_length)
+        if what != GOES_ON:
+            break
+        panel, max_width = Panel(left, v2, nu, ahead.span), marched(stop, march) - left
+        timing = ALWAYS if run_length < start.no_turn_until else (NEVER if searching or late else MAYBE)
+        width, step, is_timed = next_panel(
+            forces, march, panel, PanelRequest(min(max_width, ahead.widest), step, largest_v2, timing, True), work
+        )
+        if width == 0.0:
+            what, run_length, v2 = end_at_once(forces, march, panel, run_length, point)
+            break
+        load_change, sign, _ = first_change_of(work, LOAD, nu, ZERO_TOLERANCE * work[size_at(LOAD)])
+        if nu == 0 and sign != 0:
+            nu = sign
+            if forces.friction or nu == -route.only_sign:
+                continue  # with forces of this sign
+        change = first_changes(march, panel, largest_v2, load_change, work)
+        what, run_length, v2 = turn_below_noise(forces, march, panel, change, run_length, point)
+        if what == TURN:
+            break
+        ahead = limited(forces, march, panel, ahead, change, run_length, point)
+        if ahead.widest < width:
+            continue
+        if changes_at_once(march, panel, width, change, run_length):
+            change_count, nu = (
+                enter_change(record, change_count, start.place + v * run_length) if left > 0.0 else change_count,
+                -nu,
+            )
+            continue
+        if not searching and timing != ALWAYS and (late or not is_timed):
+            searching, timed = True, Timed(run_length, v2, nu, change_count)
+        right, ends_here = left + width, change.first <= 1.0
+        if ends_here:
+            right = cut_panel(forces, march, Panel(left, v2, nu, ahead.span), width, change, run_length, work, point)
+        recorded = recorded if searching else enter_panel(record, recorded, right, right - left, work)
+        at_stop, panel_count = not ends_here and width == max_width, panel_count + 1
+        largest_v2 = largest_after(largest_v2, v2, ends_here, work)
+        v2, left, run_length = max(work[W + COUNT], 0.0), right, stop if at_stop else distance(right, march)
+        ahead, timed = (
+            Ahead(ahead.upcoming, ahead.span, inf, True),
+            timed if searching else Timed(run_length, v2, nu, change_count),
+        )
+        pauses = may_pause(forces, march, route, run_length, (v2, largest_v2), (left, step))
+        what = what_after(change, at_stop and at_end, pauses or panel_count >= PANELS_PER_RUN)
+        if what != GOES_ON:
+            v2 = 0.0 if ends_here else v2
+            break
+        if ends_here:
+            change_count, nu = enter_change(record, change_count, start.place + v * run_length), -nu
+    onwards, half_c = step * (slope_at(left, march) + march.g * step), 0.5 * march.c if march.g > 0.0 else inf
+    ends = (SPENT if what == GOES_ON else what, march.origin, v2, nu, onwards, start.no_turn_until, march.origin)
+    end = End(*ends, half_c, change_count, recorded, ahead.upcoming)
+    return conclude(forces, route, march, end, timed, searching, run_length)
