@@ -76,7 +76,8 @@ def fill_orbits(exact, columns, quantity, spans, answers, nodes):  # type: ignor
         duration, lower, upper, _ = found
         if quantity == TURNING_POINTS:
             values[k, 0], values[k, 1] = lower[0], upper[0]
-            decided = max(lower[2], upper[2]) <= MAX_TURN_ERROR * (high - low)
+            enough = MAX_TURN_ERROR * (high - low)
+            decided = lower[2] <= enough and upper[2] <= enough  # NaN is not
         else:
             values[k, 0] = 2.0 * duration[0] if quantity == PERIOD and not circulates else duration[0]
             decided = duration[2] <= MAX_ERROR * duration[0]

@@ -33,12 +33,12 @@ from gqm_sym.runtime.sweep.batch.rows import (
     CHANGE,
     END_HIGH,
     END_LOW,
+    FACTOR_AT_TURN,
     FACTOR_HIGH,
     FACTOR_LOW,
     INDEX,
     LAUNCH_PLACE,
     LAUNCH_V2,
-    LEAST_RATIO,
     LIBRATION_ROWS,
     OFFSET_HIGH,
     OFFSET_LOW,
@@ -62,11 +62,10 @@ COS2, SIN2 = np.cos(pi * NODE_SHARES) ** 2, np.sin(pi * NODE_SHARES) ** 2
 # What becomes of an orbit after a level of the rule.
 CONTINUES, CONVERGED, FAILED = 0.0, 1.0, 2.0
 
-# The ratio of the smallest to the largest regular factor of V**2 from which on roundings of the turning points do not
-# matter: they change a time by a multiple that is the inverse of its square, and in even wells, both of whose turning
-# points come near a hilltop, of its fourth power. Where both turning points are exact, as those of a launch from rest
-# about an axis of symmetry, it is MIN_CANCELLATION_RATIO.
-MIN_RATIO, MIN_EVEN_RATIO = 0.25, 0.5
+# The ratio of the smallest to the largest regular factor of V**2 from which on roundings of the turning points, or of
+# the energy of a lap, do not matter. In even wells, both of whose turning points come near a hilltop, the factor counts
+# at these, unless they are exact, as those of a launch from rest are.
+MIN_RATIO, MIN_LAP_RATIO, MIN_EVEN_RATIO = 0.25, 0.1, 0.5
 
 # Steps of the arithmetic-geometric mean. Of two numbers in a ratio of 1 : 10, the root of MIN_CANCELLATION_RATIO, the
 # relative difference becomes 9e-1, 6e-1, 4e-2, 2e-4, 4e-9. One more arithmetic mean is then exact to half an ulp,
@@ -169,13 +168,14 @@ def add_invariants(fns, kind, orbits, scratch):  # type: ignore[no-untyped-def]
 
 
 @Inner
-def judge_level(rows, n, nodes, verdict):  # type: ignore[no-untyped-def]
-    """Set each orbit's time by a level of the rule, and the verdict on it."""
+def judge_level(rows, n, nodes, least, verdict):  # type: ignore[no-untyped-def]
+    """Set each orbit's time by a level of the rule, and the verdict on it; ``least`` is the ratio that doubles need."""
     for j in range(n):
         value, before = rows[SUM, j] / nodes, rows[CHANGE, j]
         change = fabs(value - rows[VALUE, j]) / value
         rows[VALUE, j], rows[CHANGE, j] = value, change
-        clear = rows[FACTOR_LOW, j] > rows[LEAST_RATIO, j] * rows[FACTOR_HIGH, j]
+        high, at_turn = rows[FACTOR_HIGH, j], rows[FACTOR_AT_TURN, j]
+        clear = (rows[FACTOR_LOW, j] > least * high) & (at_turn > MIN_EVEN_RATIO * high)
         verdict[j] = choose(clear, choose(has_converged(before, change), CONVERGED, CONTINUES), FAILED)
 
 
@@ -204,15 +204,18 @@ def times_by_trapezoid(fns, kind, mirrored, orbits, scratch, quantity, answers):
     for j in range(n):
         rows[SUM, j], rows[VALUE, j], rows[CHANGE, j] = 0.0, 0.0, inf
         rows[FACTOR_LOW, j], rows[FACTOR_HIGH, j] = inf, 0.0
-        even = choose(rows[LAUNCH_V2, j] == 0.0, MIN_CANCELLATION_RATIO, MIN_EVEN_RATIO)
-        rows[LEAST_RATIO, j] = even if mirrored else MIN_RATIO
+        rows[FACTOR_AT_TURN, j] = inf
     begin, nodes, factor = 0, MIN_INTERVALS, 2.0 if quantity == PERIOD and kind != CIRCULATION else 1.0
+    least = MIN_CANCELLATION_RATIO if mirrored else MIN_LAP_RATIO if kind == CIRCULATION else MIN_RATIO
     last, sides = (MIN_INTERVALS // 2, 2.0) if mirrored else (MIN_INTERVALS, 1.0)
     while True:
         p, more, lost = orbits.params[: count * n].reshape(count, n), work[6, :n], work[7, :n]
         more[:] = lost[:] = 0.0
         for node in range(begin, last + 1):
             rates = fill_integrand_batch(fns, kind, n, node, rows, p, work)
+            if mirrored and node == 0 and begin == 0:
+                for j in range(n):
+                    rows[FACTOR_AT_TURN, j] = choose(rows[LAUNCH_V2, j] == 0.0, inf, rows[FACTOR_LOW, j])
             weight = 0.5 * sides if node == 0 or (node == last and begin == 0) else sides
             for j in range(n):  # Kahan's compensated summation
                 term = weight * rates[j] - lost[j]
@@ -224,7 +227,7 @@ def times_by_trapezoid(fns, kind, mirrored, orbits, scratch, quantity, answers):
                     rows[VALUE, j] += share * rates[j]
         for j in range(n):
             rows[SUM, j] += more[j]
-        judge_level(rows, n, nodes, work[0, :n])
+        judge_level(rows, n, nodes, least, work[0, :n])
         if begin > 0:
             continuing = answer_level(rows, n, factor, work[0, :n], chosen, answers)
             if continuing == 0 or nodes == MAX_NODES:
