@@ -53,7 +53,7 @@ def budget(stage: str, seconds: float, remedy: str) -> Iterator[None]:
     stage
         What it does, as the error should call it: ``derivation``.
     seconds
-        How long it may take.
+        The limit of time.
     remedy
         What to try if that is not enough.
     """

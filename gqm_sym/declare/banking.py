@@ -1,4 +1,4 @@
-"""How a track in space is banked: by an angle, or so that riders feel no lateral force."""
+"""The banking of a track in space: by an angle, or without lateral force on riders."""
 
 from dataclasses import dataclass
 from typing import Any, TypeAlias

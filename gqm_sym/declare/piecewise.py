@@ -64,7 +64,7 @@ class Piece:
         What `STANDARD` says, or the ends of the curve's parameter; of a transition its length, then the coefficients
         of yaw, of pitch and of roll, lowest power first.
     curve
-        Where the piece is a curve with formulas.
+        The curve, if the piece is one with formulas.
     """
 
     kind: str

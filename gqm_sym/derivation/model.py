@@ -8,7 +8,7 @@ import sympy as sp
 from gqm_sym.declare import Curve
 from gqm_sym.declare.measures import curve_formulas, parameter_dimension
 from gqm_sym.derivation.forces.dissipation import Dissipation
-from gqm_sym.derivation.forces.forces import Place
+from gqm_sym.derivation.forces.forces import Place, turned_force
 from gqm_sym.derivation.forces.rider import Rider
 from gqm_sym.derivation.geometry.geometry import cross
 from gqm_sym.derivation.geometry.level_set import LevelSet
@@ -79,6 +79,9 @@ class Model:
     bend, loads
         The components of t × dt/ds and of -t × F for a curve in no vertical plane, with t × N/m = W·bend + loads;
         otherwise empty.
+    coriolis
+        In a rotating frame the vector that ds/dt adds to that sum for such a curve, for each unit of ds/dt; otherwise
+        empty.
     dissipation
         The terms of a force law that is not conservative; None for a conservative one.
     speed_squared
@@ -90,7 +93,7 @@ class Model:
     normal_force
         N in N, positive along the normal to the left of increasing λ; ``|N|`` for a curve in no vertical plane.
     side_force
-        The force in N out of the plane of a rotating track; 0 for a track at rest.
+        The force in N out of the plane of a planar track that rotates; 0 for a track at rest, and in space.
     tangential_acceleration
         A in m/s², so that dW/ds = 2 A; it contains ``W`` in a dissipative model.
     time_integrand
@@ -111,6 +114,9 @@ class Model:
         Remarks on forms that were not simplified, and on the form of V² in a dissipative model.
     level_set
         F of an implicit curve with its derivatives, tangent and curvature, as functions of x and z.
+    sided
+        Whether the sign of N, or of its part along the upward direction of riders on a banked space curve, tells on
+        which side of the track a body is.
     rider
         The loads on a rider of a banked space curve; None for other curves.
     """
@@ -143,6 +149,7 @@ class Model:
     normal: tuple[sp.Expr, ...]
     bend: tuple[sp.Expr, ...]
     loads: tuple[sp.Expr, ...]
+    coriolis: tuple[sp.Expr, ...]
     dissipation: Dissipation | None
     speed_squared: sp.Expr
     speed_squared_form: str
@@ -159,6 +166,7 @@ class Model:
     at_least: tuple[tuple[str, str], ...]
     notes: tuple[str, ...]
     level_set: LevelSet | None = None
+    sided: bool = True
     rider: Rider | None = None
 
     if not TYPE_CHECKING:
@@ -187,6 +195,8 @@ class Model:
 
     def normal_force_at(self, v2: sp.Expr) -> sp.Expr:
         """Return the contact force for a given value of V²: N, or ``|N|`` for a curve in no vertical plane.
+
+        In a rotating frame in space it depends on ``direction``, the sign of ds/dt.
 
         Parameters
         ----------
@@ -228,7 +238,7 @@ class Model:
 
     def _turned_force(self, v2: sp.Expr) -> tuple[sp.Expr, ...]:
         """The vector t × N/m, which has the length of N/m."""
-        return tuple(bend * v2 + load for bend, load in zip(self.bend, self.loads, strict=True))
+        return turned_force(self.bend, self.loads, self.coriolis, v2)
 
     @property
     def units(self) -> dict[str, str]:
@@ -251,7 +261,7 @@ class Model:
             turning = sp.Eq(W, 0, evaluate=False)
             if liftoff is not None:
                 liftoff = sp.Eq(self.kappa * W + self.static_normal_load, 0, evaluate=False)
-            side = 2 * self.mass * self.force.spin * DIRECTION * sp.sqrt(W) * self.dxds
+            side = 0 if self.loads else 2 * self.mass * self.force.spin * DIRECTION * sp.sqrt(W) * self.dxds
         return (
             *(self.level_set.closed_forms() if self.level_set else ()),
             *self.curve.named(self.x, self.y, self.z),

@@ -122,7 +122,7 @@ class _Motion(NamedTuple):
 
 
 class _State(NamedTuple):
-    """Where a track has come to: the tangent's angle, and coordinates."""
+    """The end of a track so far: the tangent's angle, and coordinates."""
 
     alpha: Any
     x: Any

@@ -194,7 +194,7 @@ class _Tracks(ABC):
     start, low, high : (n,) arrays
         First guesses and limits of what is free.
     size : float
-        Of what is free, at least.
+        The least number of unknowns.
     step, tolerance : float
         The step of a difference quotient as a share of the size, and the relative change of the quantity at which the
         optimiser ends.

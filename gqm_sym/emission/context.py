@@ -9,6 +9,10 @@ from gqm_sym.derivation import Model
 from gqm_sym.emission.ir import Assignment, ExactIR, FunctionIR
 from gqm_sym.emission.sharing import check_size, straight_line
 from gqm_sym.emission.subscripts import at
+from gqm_sym.kernels.base import DIRECTION
+
+FORWARDS = {DIRECTION: sympy.S.One}
+"""Contact forces that depend on the sign of ds/dt are those of motions forwards where functions are not told it."""
 
 
 class Names:

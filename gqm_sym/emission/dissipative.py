@@ -6,7 +6,18 @@ from dataclasses import dataclass, replace
 import sympy
 from sympy import Expr, Symbol
 
-from gqm_sym.derivation.forces.dissipation import LOAD, LOADS, PUSH, SIGMA, TILT, TURN, TURNS, Dissipation
+from gqm_sym.derivation.forces.dissipation import (
+    CORIOLIS,
+    LOAD,
+    LOADS,
+    PUSH,
+    SIGMA,
+    TILT,
+    TURN,
+    TURNS,
+    UPRIGHT,
+    Dissipation,
+)
 from gqm_sym.emission.context import Lowering
 from gqm_sym.emission.ir import Assignment, ExactIR, FunctionIR
 from gqm_sym.emission.subscripts import at
@@ -17,6 +28,8 @@ _NAMES = {
     **{SIGMA: "ds", KAPPA: "kappa", TURN: "turn", LOAD: "n0", PUSH: "push", TILT: "dxds"},
     **{symbol: f"turn_{axis}" for symbol, axis in zip(TURNS, "xyz", strict=True)},
     **{symbol: f"load_{axis}" for symbol, axis in zip(LOADS, "xyz", strict=True)},
+    **dict(zip(UPRIGHT, ("n0_upright", "kappa_upright"), strict=True)),
+    **{symbol: f"coriolis_{axis}" for symbol, axis in zip(CORIOLIS, "xyz", strict=True)},
 }
 """The names in emitted code of the geometric forms that a force law is written in."""
 
@@ -53,6 +66,8 @@ def speed_equation(lowering: Lowering, loss: Dissipation) -> FunctionIR:
     contact, force = "n0, kappa", ", N = m*(kappa*V**2 + n0)"
     if lowering.model.loads:
         contact, force = ("|n0|, |kappa|" if loss.linear else "|N|/m, 0"), ""
+        if loss.contact == UPRIGHT:
+            contact = "n0 and kappa along the upward direction of riders"
     doc = (
         f"ds/d{lam}, P, Q, {contact}: dV**2/d{lam} = P - Q*V**2{linearised}{force} (paper, eq. 19); "
         "v = sgn(ds/dt), nu = sgn(N)."

@@ -18,7 +18,7 @@ from gqm_sym.emission.printer import FUNCTIONS
 from gqm_sym.errors import EmissionError
 
 # The version of gqm_sym.runtime.interface that emitted code is written for (a test holds the two together).
-INTERFACE = 10
+INTERFACE = 11
 
 # Functions that the runtime has in forms that fill vector registers; the rest is the standard library's.
 _ELEMENTARY = frozenset({"atan", "cos", "cosh", "exp", "sin", "sinh"})
@@ -153,6 +153,8 @@ def _model_fields(module: ModuleIR, names: list[str]) -> dict[str, Any]:
         "pass1": _pass1(module),
         "in_space": module.in_space,
         "signed": module.signed,
+        "sided": module.sided,
+        "directed": module.directed,
         "banked": module.banked,
         "load_map": "load_map" if "load_map" in names else "",
         "batch": _listed(_batch(module), _WIDTH - 8),

@@ -273,7 +273,7 @@ def _until_rest(motion: Any, t: Array) -> Array:
 
 
 def _rates(motion: Any, t: Array) -> Array:
-    """How fast the curve parameter changes at times."""
+    """Return the rate of change of the curve parameter at given times."""
     state, f = motion.state(t), motion.problem.functions
     rates: Array = state.v / path_and_force_at(f.addresses, f.p, state.lam, state.v2)[2]
     return rates

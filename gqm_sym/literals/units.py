@@ -120,7 +120,7 @@ def split_unit(text: str) -> tuple[str, expr, str] | None:
 
 
 def scale_of(unit: str, wanted: str | None, *, where: str) -> Unit:
-    """How many SI units a unit is, if it is one of the dimension that is wanted.
+    """Return the size of a unit in SI units, if it has the required dimension.
 
     Parameters
     ----------

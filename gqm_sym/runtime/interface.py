@@ -13,7 +13,7 @@ function               arguments                      rows of ``out``
 ====================== ============================== ===============================================================
 path_and_contact_force n, lam, v2, p, out             x [m], z [m], ds/dlam [m/[lam]], curvature kappa [1/m], contact
                                                       force N = m*(kappa*v2 + n0) [N]
-path_in_space          n, lam, v2, p, out             y [m], and the contact force along x, y and z [N]
+path_in_space          n, lam, v2, v, p, out          y [m], and the contact force along x, y and z [N]; v = sgn(ds/dt)
 rider_loads            n, lam, v2, v, nu, p, out      what a rider feels upwards, to the left and ahead, in units of
                                                       9.80665 m/s2; the rates of these [1/s]; cosine and sine of the
                                                       roll angle, times a positive number; x, y and z of the track [m];
@@ -40,7 +40,9 @@ linearisation at the ``v2`` given: ``P - Q*v2`` is the law itself there. The con
 
 Only modules of space curves have ``path_in_space``. Where such a curve lies in no vertical plane, the contact force has
 a length and no sign: N is that length, kappa the length of the curvature vector, and n0 that of N/m at rest. With
-friction the rows n0 and kappa of ``speed_equation`` are N/m at the ``v2`` given, and 0.
+friction the rows n0 and kappa of ``speed_equation`` are N/m at the ``v2`` given, and 0; on a banked track whose riders
+have an upward direction they belong to the part of N along that. In a frame that turns it depends
+on the sign of ds/dt too: in ``path_and_contact_force`` and ``load_map`` it then is that of a motion forwards.
 
 Only modules of tracks with a declared roll have ``rider_loads``.
 
@@ -88,13 +90,13 @@ from typing import Any, NamedTuple
 from numba import types
 
 # Raised with every change of a signature here, or of a number that runtime code puts into generated modules.
-INTERFACE = 10
+INTERFACE = 11
 
 REAL = types.float64
 MANY = types.CPointer(REAL)
 
 PATH_AND_CONTACT_FORCE = types.void(types.intp, MANY, MANY, MANY, MANY)
-PATH_IN_SPACE = PATH_AND_CONTACT_FORCE
+PATH_IN_SPACE = types.void(types.intp, MANY, MANY, REAL, MANY, MANY)
 LOAD_MAP = types.void(types.intp, REAL, REAL, MANY, MANY, MANY)
 EFFECTIVE_POTENTIAL = types.void(types.intp, MANY, MANY, MANY)
 POTENTIAL_DIVDIFF1 = types.void(types.intp, REAL, MANY, MANY, MANY, MANY)
@@ -237,7 +239,7 @@ class SeparatedTerms(NamedTuple):
         ``f(op, p)`` gives what depends on parameters alone: a factor for each part of U, then for each of n0. ``p`` are
         the run-time parameters and what stands behind them.
     potentials, loads : int
-        How many parts U and n0 have.
+        The numbers of parts of U and n0.
     held : tuple of int
         Where in ``p`` the numbers stand that ``function`` reads.
     parts : callable or None

@@ -1,4 +1,4 @@
-"""How much to smooth: the weight of roughness, and knots as close as it needs.
+"""The selection of smoothing: the weight of roughness, and the distance of the knots that it needs.
 
 A weight is described by its width w: the spline keeps waves longer than about 2 pi w and removes shorter ones. Widths
 are tried on knots that are close enough for them and not much closer, from coarse to fine: knots at every one of a

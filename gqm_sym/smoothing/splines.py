@@ -37,7 +37,7 @@ class Basis:
     knots : array
         With those beyond the ends: repeated ends of an open track, or the next rounds of a closed one.
     size : int
-        How many functions there are.
+        The number of functions.
     closed : bool
         Whether they are periodic.
     """
@@ -58,12 +58,12 @@ class Basis:
 
     @property
     def low(self) -> float:
-        """Where the first piece begins."""
+        """The start of the first piece."""
         return float(self.knots[DEGREE])
 
     @property
     def high(self) -> float:
-        """Where the last piece ends."""
+        """The end of the last piece."""
         return float(self.knots[-DEGREE - 1])
 
     def rows(self, u: Array, derivative: int = 0) -> Any:
@@ -124,7 +124,7 @@ class Fit:
     residual : float
         The sum of the squared distances of points from it.
     freedom : float
-        How many numbers it fitted: the trace of the matrix that leads from points to their places on it.
+        The number of numbers it fitted: the trace of the matrix that leads from points to their places on it.
     """
 
     coefficients: Array
@@ -139,7 +139,7 @@ class Smoother:
     Parameters
     ----------
     u : (n,) array
-        Where on the curve each point belongs.
+        The place of each point on the curve.
     points : (n, d) array
     basis : Basis
     least : float

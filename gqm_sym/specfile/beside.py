@@ -33,7 +33,7 @@ def path_beside(name: str, folder: Path, *, wanted: str) -> Path:
     """
     pure = PurePath(name)
     if pure.is_absolute() or ".." in pure.parts or "\\" in name or ":" in name or "\0" in name:
-        raise InputError(f"{name!r}: must be a path from the YAML file's folder on, inside it, without '..'")
+        raise InputError(f"{name!r}: must be a path inside the YAML file's folder, without '..'")
     try:
         path = (folder / name).resolve(strict=True)
     except FileNotFoundError:
@@ -78,6 +78,8 @@ def read_rows(name: str, text: str) -> tuple[list[str], list[list[str]]]:
     for count, line in enumerate(lines, start=1):
         if len(line) > LINE_LIMIT:
             raise InputError(f"{name!r}, row {count}: is longer than {LINE_LIMIT} characters; give few numbers a line")
+        if ";" in line and "," in line:
+            raise InputError(f"{name!r}, row {count}: has commas and semicolons; write decimals with a point, as 0.5")
         rows.append(_BETWEEN.split(line.strip()))
     named = rows[0][0][:1].isalpha()
     return (rows[0], rows[1:]) if named else ([], rows)

@@ -58,7 +58,7 @@ def locate(tree: Node, message: str, base: tuple[str, ...] = ()) -> tuple[Mark, 
     tree
         The file.
     message
-        Of an error raised while something in the file was declared.
+        The message of an error raised while something in the file was declared.
     base
         Path of what was being declared.
     """

@@ -253,7 +253,7 @@ class _Reader:
             self.mistakes.add(mark, f"launch.{key}: {what}", remedy)
 
         if "v0" in launch and _is_true(exact_value(launch["v0"]) < 0):
-            remedy = "give a speed, and direction: -1 to launch against growing parameter"
+            remedy = "give a speed, and direction: -1 to launch towards decreasing parameter"
             note("v0", f"must not be negative, got {launch['v0']}", remedy)
         if "t_max" in launch and not _is_true(exact_value(launch["t_max"]) > 0):
             note("t_max", f"must be positive, got {launch['t_max']}", "give a time in seconds")

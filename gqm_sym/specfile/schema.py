@@ -159,7 +159,7 @@ FAMILY_MODELS: dict[str, type[Section]] = {
 
 
 class CurveRow(NamedTuple):
-    """How a curve kind is written, and how it is declared from what was written."""
+    """The schema of a kind of curve, and its declaration from a file."""
 
     model: Any
     declare: Callable[..., Curve]

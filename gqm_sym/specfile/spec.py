@@ -83,7 +83,7 @@ class Spec:
         if self.launch is None:
             mistakes.add(
                 self.tree.mark,
-                "launch is missing, and to solve needs one",
+                "launch is missing, which is needed to solve",
                 "add it, as in launch: {lam0: 0.5, v0: 0}",
             )
         for name, value in model.defaults:
@@ -105,7 +105,7 @@ class Spec:
         Parameters
         ----------
         message
-            Of an error that something in the file led to.
+            The message of an error that was caused by something in the file.
         base
             Keys on the way to the section it is about, as far as that is known.
         """

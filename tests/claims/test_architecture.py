@@ -31,7 +31,7 @@ LAYERS = (
     {"parameters"},
     {"expressions"},
     {"fitting"},
-    {"figures", "export", "jax"},
+    {"figures", "export", "jax", "torch"},
     {"runtime", "runtime.vocabulary"},
     {"runtime.model"},
     {"runtime.sweep"},
@@ -207,12 +207,13 @@ ONLY_IN = {
     "mpmath": {"runtime", "literals", "figures", "design"},
     "numba": {"runtime"},
     "pandas": {"export"},
-    "numpy": {"runtime", "literals", "figures", "export", "design", "fitting", "studies", "smoothing", "jax"},
+    "numpy": {"runtime", "literals", "figures", "export", "design", "fitting", "studies", "smoothing", "jax", "torch"},
     "pint": {"literals"},
     "pydantic": {"specfile", "studies"},
     "pydantic_core": {"specfile", "studies"},
     "ruamel": {"specfile"},
     "scipy": {"runtime", "smoothing", "fitting", "design"},
+    "torch": {"torch"},
     "sympy": {
         "cli",
         "report",
@@ -232,7 +233,7 @@ ONLY_IN = {
 
 # Imported when exact digits, splines, pictures, datasets or units are asked for, so never by a module as it loads.
 ONLY_INSIDE_FUNCTIONS = {
-    *("distributed", "jax", "matplotlib", "mpl_toolkits", "mpmath", "pandas", "pint", "scipy", "xarray"),
+    *("distributed", "jax", "matplotlib", "mpl_toolkits", "mpmath", "pandas", "pint", "scipy", "torch", "xarray"),
 }
 
 

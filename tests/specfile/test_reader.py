@@ -230,7 +230,7 @@ WRONG: dict[str, tuple[str | bytes, list[str]]] = {
         edited(("v0: 0", "v0: -2")),
         [
             "a.yaml:7:25: launch.v0: must not be negative, got -2; "
-            "give a speed, and direction: -1 to launch against growing parameter"
+            "give a speed, and direction: -1 to launch towards decreasing parameter"
         ],
     ),
     "no direction": (
@@ -530,7 +530,7 @@ def test_what_does_not_go_together(case: tuple[str, str], tmp_path: Path) -> Non
 UNSOLVABLE = {
     "no launch": (
         edited(("launch: {lam0: 1/2, v0: 0}", "")),
-        ["a.yaml:1:1: launch is missing, and to solve needs one; add it, as in launch: {lam0: 0.5, v0: 0}"],
+        ["a.yaml:1:1: launch is missing, which is needed to solve; add it, as in launch: {lam0: 0.5, v0: 0}"],
     ),
     "no value": (
         edited(("{h: 3}", "{h: null}")),

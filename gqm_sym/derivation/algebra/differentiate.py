@@ -10,7 +10,7 @@ import sympy as sp
 
 from gqm_sym.budgets import spend
 from gqm_sym.errors import DerivationError
-from gqm_sym.sympy_charts import SpaceFunction
+from gqm_sym.sympy_charts import SpaceFunction, TrainLoad
 
 # Factors up to which the product rule is written out in one sum.
 MAX_FLAT_FACTORS = 4
@@ -90,8 +90,9 @@ def _rule(node: sp.Basic, variable: sp.Symbol, visit: Callable[[sp.Basic], sp.Ex
         # The angle of a tangent: a curve that a law reads by its turning holds one.
         up, along = node.args
         return (along * visit(up) - up * visit(along)) / (along**2 + up**2)
-    if isinstance(node, SpaceFunction):
-        return node.fdiff() * visit(node.args[0])
+    if isinstance(node, SpaceFunction | TrainLoad):
+        rates = ((place, visit(argument)) for place, argument in enumerate(node.args, start=1))
+        return sp.Add(*(node.fdiff(place) * rate for place, rate in rates if rate != 0))
     outer = _OUTER.get(node.func)
     if outer is None:
         raise DerivationError(

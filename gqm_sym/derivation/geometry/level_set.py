@@ -57,7 +57,7 @@ class LevelSet:
 
     @property
     def note(self) -> str:
-        """How the rows of the chart follow from them."""
+        """The rows of the chart that follow from them."""
         x, z = self.level.start
         sign = "" if self.level.tangent > 0 else "-"
         return (

@@ -226,6 +226,15 @@ def chart_kappa(chart, s):  # type: ignore[no-untyped-def]
 
 
 @Inner
+def derivatives_at(chart, k, u, laps):  # type: ignore[no-untyped-def]
+    """Return alpha, kappa and x at a place that `find` has found: in space the derivatives of a coordinate."""
+    start = EDGES + 3 * int(chart[1]) + 2 + k * RECORD
+    first = laps * chart[5] + polynomial(_powers(chart, start, 2), u)
+    high, low = _constant(chart, start, 0, laps)
+    return first, polynomial(_powers(chart, start, 3), u), high + (low + polynomial(_powers(chart, start, 0), u))
+
+
+@Inner
 def _power(chart, row, start, j):  # type: ignore[no-untyped-def]
     """Return a coefficient of a row up to its constant; the angle is the integral of the curvature."""
     if row < 2:

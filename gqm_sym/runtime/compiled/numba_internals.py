@@ -343,7 +343,7 @@ def _steps(pipeline: type[Any]) -> dict[str, Any]:
 
 
 class Compiler:
-    """How functions are compiled and cached; `jit` holds the only one.
+    """The way in which functions are compiled and cached; `jit` has the only one.
 
     Parameters
     ----------

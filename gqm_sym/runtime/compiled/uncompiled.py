@@ -86,7 +86,7 @@ def begin_launch() -> None:
 
 
 class Trial:
-    """How much Python has run of a function, by which it is decided when to compile it.
+    """The work that Python has done for a function, which decides when it is compiled.
 
     Parameters
     ----------
@@ -109,7 +109,7 @@ class Trial:
         return self.left <= 0.0 or self._launches > MAX_LAUNCHES
 
     def _recorded(self) -> int:
-        """How many launches the record had, to which one more is added."""
+        """The number of launches in the record before this one."""
         with suppress(OSError), self._record.open("ab") as file:
             return file.write(b".") and file.tell() - 1
         return 0

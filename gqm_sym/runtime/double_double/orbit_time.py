@@ -68,7 +68,7 @@ class Integrand(NamedTuple):
     level : (high, low, error)
         U + V**2/2, which is constant.
     start, width : (high, low)
-        Where the interval begins, and how much the curve's parameter grows over it.
+        The start of the interval, and the increase of the curve's parameter over it.
     """
 
     tape: Any
@@ -349,7 +349,7 @@ def find_orbit_time(tape, work, p, launch, offsets, direction, nodes):  # type: 
     launch : (lam0, lam0_low, v0, v0_low)
         Launch place and speed in m/s as two doubles each.
     offsets : (float, float)
-        How far the lower and the upper turning point are from the launch, approximately.
+        Approximate distances of the lower and the upper turning point from the launch.
     direction : int
         0 for a libration, else the sign of ds/dt on a lap.
     nodes : (4, n) array

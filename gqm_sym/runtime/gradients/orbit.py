@@ -92,7 +92,7 @@ class PathRows(NamedTuple):
     product: Array | None = None
 
     def force_changes(self, v: Array, faster: Array, changed: Callable[[Array], Array]) -> Array:
-        """How the contact force changes where the velocity changes by ``faster``; ``changed`` gives how rows do."""
+        """Return the change of the contact force with the velocity's, ``faster``; ``changed`` gives that of rows."""
         curvature, load = changed(self.curvature), changed(self.load)
         if self.product is None:
             force: Array = load + v**2 * curvature + 2.0 * v * self.curvature[0] * faster
@@ -222,5 +222,5 @@ class OrbitDerivatives(ABC):
         return 1.0 if self.direction else 2.0
 
     def without_shift(self, moved: Array, lam: Array) -> Array:
-        """How a place changes among the points of the curve, which do not move, from how its parameter changes."""
+        """Return the change of a place among the fixed points of the curve from the change of its parameter."""
         return moved

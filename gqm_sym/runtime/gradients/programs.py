@@ -36,11 +36,11 @@ class Program(NamedTuple):
     operations : (m, 4) array of int
         What the interpreter carries out: first what does not depend on the place.
     first : int
-        How many operations do not depend on the place.
+        The number of operations that do not depend on the place.
     inputs : int
         The number of inputs, whose registers come first; those of the place's coordinates follow them.
     outputs : array of int
-        Where in the work space the registers of the results begin.
+        The start of the registers of the results in the work space.
     work : array
         The registers, of which those of constants are filled.
     constants : tuple

@@ -1,4 +1,4 @@
-"""How states at given times depend on the launch and the parameters, however many periods have gone by.
+"""Derivatives of states at given times with respect to launch and parameters, after any number of periods.
 
 At a fixed phase angle everything changes smoothly. A time reaches a phase angle earlier or later when a variable
 changes: by the change of the time along the orbit, of the time of the launch on it, and of the elapsed periods. Below,
@@ -88,7 +88,7 @@ class OrbitSensitivity:
         return np.vstack([rows, np.zeros((self._derivatives.source.variables - len(rows), rows.shape[1]))])
 
     def _places(self, share: Array) -> Array:
-        """How places change at shares of the phase, within the lap."""
+        """Return the changes of places at shares of the phase, within the lap."""
         if self._derivatives.direction:
             return self._lap_gradient * share
         upper = np.sin(np.pi * share) ** 2
@@ -128,7 +128,7 @@ class OrbitSensitivity:
         return self._launches[phi]
 
     def _launch_delay(self, launch: _Along, motion: Any) -> Array:
-        """How much later than the lower turning point a libration is launched, by all variables.
+        """Return the derivatives of the time from the lower turning point to the launch of a libration.
 
         The launch place says when, and so does the launch speed: the one near turning points, the other elsewhere.
         """
@@ -181,7 +181,7 @@ class OrbitSensitivity:
         return [arcs, arcs, *others]
 
     def places_at(self, motion: Any, points: Any, v: Array, ds: Array) -> Array:
-        """The derivatives of lam alone, as of `at`, where v and ds/dlam are known."""
+        """The derivatives of lam alone, as in `at`, where v and ds/dlam are known."""
         share, launch = self._share(points), self._at_launch(motion, points)
         delay = self._delay(self._scale * self._rates(share)[1][1:], launch, motion, points)
         found: Array = self._places(share) + v / ds * delay + points.laps * self._lap_gradient
@@ -195,7 +195,7 @@ class OrbitSensitivity:
         return share
 
     def _delay(self, times: Array, launch: _Along, motion: Any, points: Any) -> Array:
-        """How much further on, in time, the body is at the times of points."""
+        """Return the changes of time along the orbit at the times of points."""
         gradient = self._derivatives.duration_gradient[:, None]
         if self._derivatives.direction:
             delay: Array = -times - points.laps * gradient

@@ -72,7 +72,7 @@ class PanelSeries:
     Parameters
     ----------
     edges : (m+1,) array
-        Where the panels begin and end.
+        The edges of the panels.
     samples : (k, m, RULE) array
         The values of k functions.
     """

@@ -135,7 +135,7 @@ def fill_extreme(program, work, sign, ends, tangents, shares, found):  # type: i
     ends : (2, 2) array
         Both places: a row of high doubles, and one of low ones.
     tangents : (2, 3, n) array
-        How both places move; empty for a lap, which has no ends.
+        The changes of both places; empty for a lap, which has no ends.
     shares : (k,) array
         The grid.
     found : (n + 2,) array

@@ -50,7 +50,7 @@ class LaunchRequest(NamedTuple):
 
 
 class Launch(NamedTuple):
-    """Where and how a motion begins, in exact numbers.
+    """The launch of a motion, in exact numbers.
 
     Attributes
     ----------
@@ -138,10 +138,13 @@ def check_contact(formulas: Formulas, contact: Any) -> None:
             f"contact: {contact!r} is for one body; a train is held from all sides, which is 'bilateral', and "
             "`Motion.cars` tells the contact force of each car"
         )
-    if ONLY_SIGN[contact] and not formulas.signed:
+    if ONLY_SIGN[contact] and not formulas.sided:
         raise LaunchError(
-            f"contact: {contact!r} is for curves in a vertical plane; on this space curve the body is held from all "
-            "sides, which is 'bilateral'"
+            f"contact: {contact!r} needs to know which side of this space curve the body is on: declare the upward "
+            "direction by Curve.space(..., roll=...), as an angle (0 is level) or for a speed; without it the body is "
+            "held from all sides, which is 'bilateral'"
+            if not formulas.directed
+            else f"contact: {contact!r} is not known in a frame that turns about a space curve; leave it 'bilateral'"
         )
 
 

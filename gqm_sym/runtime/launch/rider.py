@@ -22,6 +22,9 @@ FIELDS = (
     *("roll", "track_x", "track_y", "track_z"),
 )
 
+# What loads are measured in, in m/s**2.
+STANDARD_GRAVITY = 9.80665
+
 # A tangent whose horizontal part has a smaller square is vertical to rounding.
 MIN_LEVEL = 1e-20
 

@@ -103,7 +103,7 @@ NOTHING: Array = np.empty(0)
 
 
 class Joints(NamedTuple):
-    """Where a curve is not smooth.
+    """The places where a curve is not smooth.
 
     Attributes
     ----------
@@ -126,12 +126,12 @@ class Joints(NamedTuple):
 
 
 def room_ahead(breaks: int) -> int:
-    """How many breaks may lie ahead of a body on a curve with so many of them a lap."""
+    """Return the largest number of breaks ahead of a body on a curve with a number of them in each lap."""
     return (LAPS_AHEAD + 3) * breaks
 
 
 def room_kept(breaks: int) -> int:
-    """How many numbers are kept of a curve with so many breaks."""
+    """Return the number of values that are kept for a curve with a number of breaks."""
     return 4 * GAP_COLUMNS * breaks
 
 

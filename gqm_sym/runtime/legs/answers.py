@@ -110,7 +110,7 @@ class Track(NamedTuple):
     chart : array
         The chart that follows the run-time parameters; empty for a curve with formulas, which has no breaks.
     breaks, corners, drops : arrays
-        As of `legs.advance.Joints`.
+        As in `legs.advance.Joints`.
     """
 
     chart: Array

@@ -303,7 +303,7 @@ class DissipativeMotion(FollowedMotion):
 
     @property
     def _changes(self) -> Changes:
-        """How the legs so far change."""
+        """The derivatives of the legs so far."""
         self._follow_again()
         runs = self._all_runs
         if self._known_changes is None or self._known_changes.followed < len(runs):

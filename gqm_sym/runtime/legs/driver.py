@@ -135,7 +135,7 @@ class Driver:
     ending : str
         The name of what ended the motion, or nothing.
     last_swing : float
-        How far from the equilibrium the body turned last, once its swing has died away.
+        The distance of the last turn from the equilibrium, once the swing has died away.
     force_error : float
         By what share the force next to the unstable equilibrium of a frame may be wrong.
     launch_error : float or None

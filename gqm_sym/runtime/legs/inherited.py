@@ -77,14 +77,14 @@ class InheritedErrors:
         frame, turns = run.frame, run.what in (TURN, RESTS)
         share, terms = rounding_share(driver.dissipation.linear), self._terms_of(leg)
         if frame is None:
-            return _known(
-                carry(driver.dissipation, driver.problem.functions.p, turns, before, share, terms, run.record)
-            )
+            problem = driver.problem
+            p, lap = problem.functions.p, problem.period if problem.functions.chart.size else 0.0
+            return _known(carry(driver.dissipation, p, turns, before, share, lap, terms, run.record))
         if leg == 0 or self._runs[leg - 1].frame is None:
             before = before._replace(place=before.place + frame.error)
         frame.move(run.record, -1)
         share += 0.0 if frame.is_stable else driver.force_error
-        after = _known(carry(frame.dissipation, frame.p, turns, before, share, terms, run.record))
+        after = _known(carry(frame.dissipation, frame.p, turns, before, share, 0.0, terms, run.record))
         after = after._replace(time=after.time + self._time_error_of_force(run))
         frame.move(run.record, 1)
         return after._replace(place=after.place + frame.error) if run.what == LIMIT else after

@@ -1,4 +1,4 @@
-"""How errors grow along a leg: of the place where it begins, of V**2 there and of the time, by their derivatives.
+"""The propagation of errors along a leg: of its start, of V**2 there and of the time, by their derivatives.
 
 Let the body start at a, at rest, and turn at b. With q the integral of Q from a on, V**2 at a place changes by
 ``-P(a) exp(-q) da``, and so the turn by ``db/da = P(a) exp(-q)/P(b)``. At a given distance from a, V**2 changes by
@@ -172,7 +172,7 @@ def half_of_leg(forces, march, panels, v2, errors, terms, record):  # type: igno
         panel becomes the largest error that these make in the times to places of the panel that are given by their
         distance from there.
     terms : array
-        As of `carry`.
+        As in `carry`.
     """
     work = panel_buffer()
     set_nodes(work)
@@ -237,10 +237,10 @@ def own_time_error(record, begin, count):  # type: ignore[no-untyped-def]
 
 @entry(
     types.UniTuple(REAL, 3)(
-        DISSIPATION, VECTOR, types.boolean, types.NamedUniTuple(REAL, 3, Errors), REAL, VECTOR, VECTOR
+        DISSIPATION, VECTOR, types.boolean, types.NamedUniTuple(REAL, 3, Errors), REAL, REAL, VECTOR, VECTOR
     )
 )
-def carry(dissipation, p, turns, before, share, terms, record):  # type: ignore[no-untyped-def]
+def carry(dissipation, p, turns, before, share, lap, terms, record):  # type: ignore[no-untyped-def]
     """The errors at the end of a leg, which are those with which the next one begins.
 
     Parameters
@@ -254,6 +254,8 @@ def carry(dissipation, p, turns, before, share, terms, record):  # type: ignore[
     before : Errors
     share : float
         The relative error of what V**2 gains and loses by each of its terms (`rounding_share`).
+    lap : float
+        The period of a closed chart, which is read at places less whole laps; 0 of other curves.
     terms : array
         For each panel of the record the size of terms of the force that may cancel, 0 where that is not known.
     record : array
@@ -263,14 +265,14 @@ def carry(dissipation, p, turns, before, share, terms, record):  # type: ignore[
     Returns
     -------
     place, v2, time : float
-        As of `Errors`.
+        As in `Errors`.
     """
     p, record, forward = uncounted(p), uncounted(record), march_of(record)
     ahead, back, v = int(record[AHEAD]), int(record[BACK]), forward.direction
     forces = Forces(dissipation.speed_equation, p, dissipation.friction, dissipation.kinked, dissipation.linear, v)
     errors = (before.place, before.v2, share)
     first = half_of_leg(forces, forward, (HEAD, ahead), record[START_V2], errors, terms, record)
-    rounding = PLACE_ROUNDINGS * ULP * max(fabs(record[START]), fabs(record[END]))
+    rounding = PLACE_ROUNDINGS * ULP * max(fabs(record[START]), fabs(record[END]), lap)
     own = own_time_error(record, HEAD, ahead) + TIME_ROUNDINGS * ULP * record[TIME_FROM_START] + share * first.rounded
     if not turns or back == 0:
         moved = fabs(first.by_place - first.rate) * before.place + fabs(first.by_v2) * before.v2

@@ -50,16 +50,16 @@ class TabulatedPiece(NamedTuple):
 
 
 class Timing(NamedTuple):
-    """The numbers by which the table of a segment becomes rows for its times from launch, as of `TimedSegment`.
+    """The numbers by which the table of a segment becomes rows for its times from launch, as in `TimedSegment`.
 
     Attributes
     ----------
     from_turn : float
         1 if the segment begins at a turning point, or close to one; 0 if it is REGULAR.
     last, turn_offset : float
-        As of `Segment.speed_series`, and of `Segment`.
+        As in `Segment.speed_series`, and of `Segment`.
     relative_error : float
-        Of its times.
+        The errors of its times.
     lam_before : float
         By how much the curve parameter has grown in all laps before it.
     """
@@ -103,7 +103,7 @@ def tabulate_piece(marks, time_terms, length_terms, speed_terms, timing):  # typ
     marks : (4, n+1) array
         Phase angles at the edges of n panels, the times there as two doubles, and the arc lengths.
     time_terms, length_terms, speed_terms : arrays
-        As of `read_panels`.
+        As in `read_panels`.
     timing : Timing
     """
     edges, times, lengths = marks[0], marks[1], marks[3]

@@ -17,7 +17,7 @@ from gqm_sym.runtime.launch.problem import Problem
 from gqm_sym.runtime.launch.request import ONLY_SIGN
 from gqm_sym.runtime.launch.speed import path_and_force_at
 from gqm_sym.runtime.launch.zeros import MAX_PARAMETER, MIN_STEP_SHARE
-from gqm_sym.runtime.motion.events import Event, Leg, liftoff
+from gqm_sym.runtime.motion.events import Event, Leg, liftoff, sided_force
 from gqm_sym.runtime.motion.locking import locked
 from gqm_sym.runtime.motion.motion import Motion
 from gqm_sym.runtime.motion.rows import Rows
@@ -135,7 +135,7 @@ class AperiodicMotion(Motion):
         if self.lifted_off:
             return
         side = ONLY_SIGN[self.problem.launch.contact]
-        lost = liftoff(timed, side, first=not self._segments) if side else None
+        lost = liftoff(self.problem.formulas, timed, side, first=not self._segments) if side else None
         if lost is not None:
             timed = replace(timed, r_stop=lost[0], phi_stop=lost[1], end="liftoff")
             self.kind, self.open_end = "transit", None
@@ -189,7 +189,7 @@ class AperiodicMotion(Motion):
         return tuple(self._segments if count == inf else self._segments[: int(count)])
 
     def _segments_ahead(self) -> float:
-        """How many segments `legs` and `events` cover; infinite if there are not so many yet, or all lead to a pole."""
+        """The number of segments of `legs` and `events`; infinite if there are fewer so far, or all lead to a pole."""
         panels = 0
         for k, timed in enumerate(self._segments if self._is_endless else ()):
             panels += timed.segment.edges.size
@@ -342,5 +342,4 @@ class MotionAtRest(Motion):
 def _is_pulled(problem: Problem) -> bool:
     """Whether a track that can push from one side only would have to pull a body at rest at the launch place."""
     f, side = problem.functions, ONLY_SIGN[problem.launch.contact]
-    force = path_and_force_at(f.addresses, f.p, np.array([problem.lam0]), np.zeros(1))[4, 0]
-    return bool(side * force < 0.0)
+    return bool(side) and bool(side * sided_force(problem.formulas, f, np.array([problem.lam0]), np.zeros(1))[0] < 0.0)

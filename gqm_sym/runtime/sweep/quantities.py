@@ -64,14 +64,14 @@ ANSWERS = types.NamedTuple((MATRIX, types.int8[::1], types.int8[::1]), Answers)
 
 
 class Quantity(NamedTuple):
-    """How one quantity of a sweep is found.
+    """The way in which one quantity of a sweep is found.
 
     Attributes
     ----------
     code : int
         The number of the quantity in compiled code, or NOT_COMPILED.
     width : int
-        How many numbers compiled code fills in for each launch.
+        The number of numbers compiled code fills in for each launch.
     columns : slice or int
         Which of these numbers are the quantity; a slice gives the values one more axis.
     of_motion : callable

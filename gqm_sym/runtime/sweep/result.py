@@ -197,6 +197,6 @@ def columns_of(sweep: Sweep) -> dict[str, Any]:
 
 
 def _counts(codes: NDArray[np.int8], names: tuple[str, ...], first: int) -> dict[str, int]:
-    """How often each code from ``first`` on occurs, by the codes' names."""
+    """Return the number of occurrences of each code from ``first`` on, by the codes' names."""
     found, counts = np.unique(codes[codes >= first], return_counts=True)
     return {names[code]: int(count) for code, count in zip(found, counts, strict=True)}

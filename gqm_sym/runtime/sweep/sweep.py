@@ -108,7 +108,7 @@ def sweep(
         np.full(size, quantities.BATCH, dtype=np.int8),
     )
     asked = asked_of_bodies(formulas, quantity, t_max, contact)
-    if asked is not None or has_compiled_route(formulas, found, t_max):
+    if asked is not None or has_compiled_route(formulas, found, t_max, contact):
         for group, chosen in groups_of(formulas, columns, domain, shape, ONLY_SIGN[contact]):
             if asked is None and group.drops.size:
                 continue  # tables do not contain corners
@@ -133,13 +133,15 @@ def sweep(
     return Sweep(values.reshape(shape + values.shape[1:]), answers.status.reshape(shape), answers.route.reshape(shape))
 
 
-def has_compiled_route(formulas: "Formulas", quantity: Quantity, t_max: Any) -> bool:
+def has_compiled_route(formulas: "Formulas", quantity: Quantity, t_max: Any, contact: str) -> bool:
     """Whether compiled loops answer most launches.
 
     They do not do so for motions that lose energy, and for motions with a last time they know only the end. The grid on
-    which they look for extremes is too coarse for the length of a vector, which may be all but zero somewhere.
+    which they look for extremes is too coarse for the length of a vector, which may be all but zero somewhere,
+    and they do not distinguish the sides of a space curve.
     """
-    if not formulas.signed and quantity.code in (quantities.MIN_FORCE, quantities.MAX_FORCE):
+    of_force = quantity.code in (quantities.MIN_FORCE, quantities.MAX_FORCE)
+    if not formulas.signed and (of_force or ONLY_SIGN[contact]):
         return False
     timely = t_max is None or (quantity.code == quantities.END_TIME and float(as_doubles(t_max, "t_max")) > 0.0)
     return formulas.dissipation is None and quantity.code != quantities.NOT_COMPILED and timely

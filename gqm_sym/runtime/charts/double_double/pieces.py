@@ -56,7 +56,7 @@ class TrueCurve(NamedTuple):
     terms : (n, 4, NODES) array
         Powers of u for x and z, the high doubles of each before the low ones.
     counts : (n, 2) array of int
-        How many powers need two doubles, and how many there are.
+        The number of powers that need two doubles, and the number of all powers.
     errors : (n, 2) array
         Bounds on the errors of the coordinates, and on those of their derivatives by u.
     lengths : (n, 3) array

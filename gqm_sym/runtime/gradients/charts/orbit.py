@@ -67,7 +67,7 @@ def fill_nodes(curve, kind, panels, orbit, shares, places):  # type: ignore[no-u
     kind : int
         LIBRATION or CIRCULATION.
     panels : (m, 3) array
-        Where each panel begins, as a phase angle or as a share of the lap, and its width as two doubles.
+        The start of each panel, as a phase angle or as a share of the lap, and its width as two doubles.
     orbit : tuple of float
         The piece and the place on it where the phase begins are the first of ``places`` before; here are the orbit's
         width in arc length, two doubles with a sign, and the piece.

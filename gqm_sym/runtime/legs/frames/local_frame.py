@@ -70,7 +70,7 @@ class Frame(NamedTuple):
     p : array
         Their parameters.
     error : float
-        Of the place of the equilibrium.
+        The error of the place of the equilibrium.
     """
 
     dissipation: Dissipation
@@ -88,7 +88,7 @@ class Frame(NamedTuple):
 
     @property
     def reach(self) -> float:
-        """How far from the equilibrium the force is known well."""
+        """Return the distance from the equilibrium up to which the force is accurate."""
         return RANGE_SHARE * float(self.p[RANGE])
 
     def distance(self, place: float, low: float) -> tuple[float, float]:
@@ -185,7 +185,7 @@ def frame_near(dissipation: Dissipation, p: Array, start: tuple[float, float, fl
     start : (float, float, float)
         A place as two doubles, and V**2 there.
     reach : float
-        How far from there functions may be smooth.
+        The distance from there over which functions may be smooth.
     """
     middle, size = start[0], reach
     for _ in range(MAX_HALVINGS):

@@ -201,7 +201,7 @@ def _on_part(part, before, noise, smallest):  # type: ignore[no-untyped-def]
     before : int
         The sign with which it starts, if it was not known before.
     x : float
-        Where in [-1, 1] it crosses zero.
+        The place in [-1, 1] where it crosses zero.
     """
     spread = 0.0
     for k in range(1, COUNT):

@@ -74,7 +74,7 @@ class PanelRequest(NamedTuple):
     Attributes
     ----------
     max_width : float
-        How wide it may be, in the march variable.
+        The largest width, in the march variable.
     step : float
         The width to begin with.
     largest_v2 : float

@@ -54,7 +54,7 @@ class Timed(NamedTuple):
 
 
 class End(NamedTuple):
-    """How a run ended.
+    """The code of the end of a run.
 
     Attributes
     ----------
@@ -73,7 +73,7 @@ class End(NamedTuple):
     half_c : float
         c/2 of the march variable (`panels.equation.March`); infinite where it is the distance itself.
     change_count, panel_count : int
-        How often N has changed its sign, and how many panels were recorded.
+        The number of sign changes of N, and of recorded panels.
     upcoming : int
         The index of the next break.
     """

@@ -204,7 +204,7 @@ ROUNDINGS_OF_TIMES = 1e-12
 
 
 class Passed(NamedTuple):
-    """How far a run has come.
+    """The state of a run.
 
     Attributes
     ----------
@@ -214,7 +214,7 @@ class Passed(NamedTuple):
         V**2 there, and the largest so far.
     ahead : Ahead
     panel_count : int
-        How many panels were recorded.
+        The number of recorded panels.
     """
 
     left: float

@@ -18,7 +18,7 @@ REST_STEPS = 4
 
 
 class Start(NamedTuple):
-    """Where a run begins.
+    """The start of a run.
 
     Attributes
     ----------
@@ -59,7 +59,7 @@ class Reading(NamedTuple):
     what : int
         TIMES to PANELS (`leg_record`).
     force : bool
-        Of PEAKS, whether the contact force is read instead of the speed.
+        For PEAKS, whether the contact force is read in place of the speed.
     sign : float
         1 for the largest, -1 for the smallest.
     best : float

@@ -63,7 +63,7 @@ class StateChanges:
     Attributes
     ----------
     lam, s, x, z, v, normal_force, y : arrays
-        As of `gradients.sensitivity.Sensitivity`, but for places by the labels of points, within the lap.
+        As in `gradients.sensitivity.Sensitivity`, but for places by the labels of points, within the lap.
     labels, arc : array
         How the labels of the places change, and as of `changes.Origin`.
     acceleration : array

@@ -1,4 +1,4 @@
-"""How a motion with losses changes from leg to leg: its turning points, their times, and its states between them.
+"""Changes of a motion with losses from leg to leg: of its turning points, their times, and its states between them.
 
 Let y, sigma and ``delay`` be the changes of W, of the place and of the time at a given distance from a moving origin
 (`equation`). At a given place W changes by ``y - F sigma``, and the time by ``delay - v sigma ds/V`` with v =
@@ -54,7 +54,7 @@ class Along(NamedTuple):
     Attributes
     ----------
     sigma, y, delay, arc : arrays
-        As of `Origin`, at given distances from the origin, with ``y`` as a share of V**2.
+        As in `Origin`, at given distances from the origin, with ``y`` as a share of V**2.
     places : (array, array)
         The places as two doubles each.
     heading, contact_sign : arrays

@@ -45,7 +45,7 @@ class ChartLaw(Law):
 
     @property
     def launch_moves(self) -> Array:
-        """As of `Law`: points that shift along the curve leave the place of the launch to others."""
+        """As in `Law`: points that shift along the curve leave the place of the launch to others."""
         moves = np.zeros(self.count + 2)
         moves[self.count] = 1.0
         place = self._shape.places(np.array([self._launch.value]), self._launch.low)
@@ -54,11 +54,11 @@ class ChartLaw(Law):
 
     @property
     def ranges(self) -> Array:
-        """As of `Law`: the ends of the curve keep their labels."""
+        """As in `Law`: the ends of the curve keep their labels."""
         return np.zeros((3, self.count))
 
     def coordinates(self, states: States) -> Array:
-        """As of `Law`."""
+        """As in `Law`."""
         return self._coordinates(states.high, states.low)
 
     def _coordinates(self, high: Array, low: Array) -> Array:
@@ -71,7 +71,7 @@ class ChartLaw(Law):
         return np.stack([found, np.zeros_like(found)], axis=1).reshape(-1, high.size)
 
     def rows(self, states: States) -> LawRows:
-        """As of `Law`."""
+        """As in `Law`."""
         found = self.values(chart_law_program(self._forces), states)[:, 0]
         stretches, slope = found[: self.count], found[self.count :]
         return LawRows(
@@ -79,12 +79,12 @@ class ChartLaw(Law):
         )
 
     def loads(self, states: States) -> Array:
-        """As of `Law`."""
+        """As in `Law`."""
         found: Array = self.values(chart_load_program(self._forces), states)[:, 0]
         return found
 
     def path(self, high: Array, low: Array) -> PathRows:
-        """As of `Law`."""
+        """As in `Law`."""
         program, places = chart_path_program(self._forces), self._coordinates(high, low)
         found = np.empty((program.outputs.size, 3, high.size))
         fill_values(program.operands, program.work, self.parameters, places, found)

@@ -170,36 +170,36 @@ class FormulaLaw(Law):
 
     @property
     def launch_moves(self) -> Array:
-        """As of `Law`."""
+        """As in `Law`."""
         moves = np.zeros(self.count + 2)
         moves[self.count] = 1.0
         return moves
 
     @cached_property
     def ranges(self) -> Array:
-        """As of `Law`."""
+        """As in `Law`."""
         assert self._domain is not None
         found = values(range_program(self._domain, self.count), self.parameters, np.zeros(1))[:, 0, 0]
         return found.reshape(3, -1)[:, 1:]
 
     def coordinates(self, states: States) -> Array:
-        """As of `Law`."""
+        """As in `Law`."""
         return np.array([states.high, states.low])
 
     def rows(self, states: States) -> LawRows:
-        """As of `Law`."""
+        """As in `Law`."""
         n = self.count
         found = self.values(law_program(self._exact, n), states)[:, 0]
         ds, slope = found[: n + 2], found[n + 2 :]
         return LawRows(ds[0], ds[1], ds[2:], slope[0], slope[1], slope[2], slope[3:])
 
     def loads(self, states: States) -> Array:
-        """As of `Law`."""
+        """As in `Law`."""
         found: Array = self.values(load_program(self._exact, self.count), states)[:, 0]
         return found
 
     def path(self, high: Array, low: Array) -> PathRows:
-        """As of `Law`."""
+        """As in `Law`."""
         return path_rows(self._exact, self.parameters, self.mass, high, low)
 
     def force_errors_along(self, runs: Sequence[Run]) -> list[Array]:

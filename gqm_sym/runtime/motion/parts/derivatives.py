@@ -1,4 +1,4 @@
-"""How the answers of a motion change with its launch and its parameters, and the spectrum of one that repeats."""
+"""Derivatives of a motion with respect to launch and parameters, and the spectrum of a periodic motion."""
 
 from typing import Any
 

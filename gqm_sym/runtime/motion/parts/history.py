@@ -135,7 +135,7 @@ class History(Positions):
 
     def _contact_changes(self, timed: TimedSegment) -> list[tuple[Pair, float]]:
         """The times at which N changes sign on a timed segment, each with its phase angle."""
-        return crossings(timed, contact_changes(timed), self._course.time_scale_error)
+        return crossings(timed, contact_changes(self.problem.formulas, timed), self._course.time_scale_error)
 
     def _asymptote(self, timed: TimedSegment) -> Event:
         """The approach to an equilibrium, which the body reaches after infinite time."""

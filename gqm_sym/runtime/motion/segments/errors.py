@@ -63,7 +63,7 @@ def inversion_error(segment: Segment, phi: Array) -> Array:
 
 
 def _end_errors(segment: Segment) -> tuple[float, float]:
-    """How far the turning points of a segment may be from the exact ones, in units of the curve parameter.
+    """Return bounds on the errors of a segment's turning points, in units of the curve parameter.
 
     V**2 = (lam - a)*(b - lam)*Q is known to a rounding of its largest values, so that its zero at ``a`` is known
     to as many roundings of the width as Q is smaller there than at its largest. Along a chart Q is rounded too.

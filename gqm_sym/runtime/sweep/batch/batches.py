@@ -201,7 +201,7 @@ def answer_batches(fns, invariant_counts, columns, monotone, quantity, answers):
     fns : BatchAddresses
         The module's compiled functions for batches.
     invariant_counts : (int, int)
-        How many numbers `orbit_invariants` and `integrand_invariants` fill for an orbit.
+        The number of numbers `orbit_invariants` and `integrand_invariants` fill for an orbit.
     columns : array
         The launches, as `strided.pointers` gives them.
     monotone : bool

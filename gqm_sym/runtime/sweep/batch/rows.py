@@ -85,7 +85,7 @@ class Scratch(NamedTuple):
     param_count : int
         The number of run-time parameters.
     invariant_counts : (int, int)
-        How many numbers `orbit_invariants` and `integrand_invariants` of the module fill for an orbit.
+        The number of numbers `orbit_invariants` and `integrand_invariants` of the module fill for an orbit.
     chosen, others : int arrays
         Lists of columns.
     work : (13, BATCH) array

@@ -79,7 +79,7 @@ class CurveTable(NamedTuple):
     parts : (n, potentials*POTENTIAL_ROW + loads*LOAD_ROW) array
         What they have of the parts of the potential and of the load.
     potentials : int
-        How many parts the potential has.
+        The number of parts of the potential.
     is_exact : bool
         Whether potential and lengths were rounded from double-double arithmetic.
     """
