@@ -22,7 +22,7 @@ _BY_NAME = inspect.Parameter.KEYWORD_ONLY
 _BY_PLACE = (inspect.Parameter.POSITIONAL_ONLY, inspect.Parameter.POSITIONAL_OR_KEYWORD)
 # Of a name with fewer letters than this, one of two letters may be wrong.
 MIN_LENGTH = 4
-# The most things in order that an argument may have: what has no end is no list of them.
+# The largest number of items in an argument, so that endless iterators are refused.
 MAX_ITEMS = 2_000_000
 # No longer path is the name of a file.
 MAX_PATH = 4096
@@ -169,7 +169,7 @@ def compiled_model(module: Any, *, where: str) -> Any:
 
 
 def names(given: Any, *, where: str) -> tuple[str, ...]:
-    """Return names, of which one may stand alone."""
+    """Return names; a single name may be given without a list."""
     what = "names, as in ('a', 'b')"
     listed = (given,) if isinstance(given, str) else several(given, where=where, what=what)
     for name in listed:
@@ -187,7 +187,7 @@ def file_path(given: Any, *, where: str) -> Path:
 
 
 def one_line(given: Any, *, where: str) -> str:
-    """Return a text for people."""
+    """Return a text that describes the object."""
     if not isinstance(given, str):
         raise DeclarationError(f"{where}: must be text, got {short(given)}")
     return given
